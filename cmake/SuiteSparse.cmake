@@ -1,0 +1,11 @@
+# Debian's SuiteSparse comes without a CMake package. Targets: SuiteSparse::cholmod, ::spqr, ::btf.
+foreach(part cholmod spqr btf)
+  find_library(SUITESPARSE_${part} ${part} REQUIRED)
+  add_library(SuiteSparse::${part} UNKNOWN IMPORTED)
+  set_target_properties(SuiteSparse::${part} PROPERTIES IMPORTED_LOCATION ${SUITESPARSE_${part}})
+endforeach()
+find_path(SUITESPARSE_INCLUDE cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
+foreach(part cholmod spqr btf)
+  target_include_directories(SuiteSparse::${part} SYSTEM INTERFACE ${SUITESPARSE_INCLUDE})
+endforeach()
+target_link_libraries(SuiteSparse::spqr INTERFACE SuiteSparse::cholmod)

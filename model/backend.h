@@ -1,0 +1,48 @@
+// The contract of a dissection backend: the one interface in this project (architecture.md, Backends).
+#pragma once
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "model/setup.h"
+#include "model/stage.h"
+#include "model/state.h"
+
+namespace cutproof {
+
+// What the last call of run() did.
+struct SpanReport {
+  std::array<bool, 6> ran = {};      // by stage: did any body launch it?
+  std::array<double, 6> seconds = {};  // by stage: wall time [s]
+};
+
+class Backend {
+ public:
+  virtual ~Backend() = default;
+
+  // "reference", "host", "gpu", or the name of a plugin.
+  virtual std::string name() const = 0;
+
+  // Which contiguous runs of stages it can execute. Whole frames are always among them.
+  virtual bool can_run(Span span) const = 0;
+
+  // Takes one or more bodies, each with its own parameters. Changes nothing in them: a state in the middle of a
+  // frame may be loaded. Requires setups.size() == states.size(). Throws std::invalid_argument if a state does not
+  // fit its setup.
+  virtual void load(std::vector<Setup> setups, std::vector<State> states) = 0;
+
+  // Executes the stages of `span` on every body whose timetable is not over. What a scene does not need is not
+  // launched: no blade and no other cause, no detect; nothing removed, no split, merge, expand, and no new cells of
+  // skin. A span that ends with skin ends the frame: numbers are compacted and state.frame counts up.
+  // The same state comes out whether a frame is run whole or span by span, bit for bit.
+  virtual void run(Span span) = 0;
+
+  // A copy of every body's present state.
+  virtual std::vector<State> snapshot() const = 0;
+
+  virtual SpanReport report() const = 0;
+};
+
+}  // namespace cutproof

@@ -1,0 +1,27 @@
+// Files that are either whole or not there.
+#pragma once
+#include <string>
+
+namespace cutproof::io {
+
+// A name beside `path` to write to; commit() renames it to `path`, the destructor removes what was not committed.
+class AtomicFile {
+ public:
+  explicit AtomicFile(std::string path);
+  ~AtomicFile();
+  AtomicFile(const AtomicFile&) = delete;
+  AtomicFile& operator=(const AtomicFile&) = delete;
+  const std::string& temporary() const { return temporary_; }
+  void commit();  // throws MachineError if the rename fails
+
+ private:
+  std::string path_, temporary_;
+  bool committed_ = false;
+};
+
+// Throws InputError if the folder is not there or not writable, MachineError if the disk fails.
+void write_text(const std::string& path, const std::string& text);
+// Throws InputError if it cannot be read.
+std::string read_text(const std::string& path);
+
+}  // namespace cutproof::io

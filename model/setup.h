@@ -1,0 +1,107 @@
+// All that stays constant while one body is simulated: the body, the parameters of the six stages, and what the
+// outside world does in each substep. Paths are resolved to tables, so that a backend looks them up and two
+// backends cannot disagree about kinematics.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "model/blade.h"
+#include "model/body.h"
+
+namespace cutproof {
+
+enum class Solver { implicit, published };                     // method.md §3
+enum class Criterion { none, distance, geometric, strain };    // method.md §4; none: nothing is ever removed
+enum class MergeRule { none, deterministic, published, single_pass };  // method.md §6
+enum class ExpandRule { none, edge_cover, published };                 // method.md §7
+
+struct StepParameters {
+  Solver solver = Solver::implicit;
+  int32_t substeps = 4;          // per frame, >= 1
+  int32_t iterations = 4;        // K per substep, >= 0
+  double stiffness = 1e5;        // k [1/s²], implicit: s = k dt² / (1 + k dt²)
+  double relaxation = 0.5;       // s in (0, 1], published
+  double damping = 0;            // c [1/s]: v = exp(-c dt) (x - x_prev) / dt
+  Vec3 gravity;                  // [m/s²], body frame
+  friend bool operator==(const StepParameters&, const StepParameters&) = default;
+};
+
+struct DetectParameters {
+  Criterion criterion = Criterion::distance;
+  double epsilon = 1.5;          // removed if the greatest neighbour distance exceeds epsilon · h
+  double strain = 1.2;           // strain baseline: removed if a principal stretch of a cluster exceeds this
+  bool without_blade = false;    // false: a scene without a blade launches no detection
+  friend bool operator==(const DetectParameters&, const DetectParameters&) = default;
+};
+
+struct SplitParameters {
+  int32_t debris = 0;            // components of G with fewer particles are removed; 0 keeps all
+  friend bool operator==(const SplitParameters&, const SplitParameters&) = default;
+};
+
+struct MergeParameters {
+  MergeRule rule = MergeRule::deterministic;  // tau and cap are part of the state
+  friend bool operator==(const MergeParameters&, const MergeParameters&) = default;
+};
+
+struct ExpandParameters {
+  ExpandRule rule = ExpandRule::edge_cover;
+  int32_t depth = 1;             // layers taken in, >= 1
+  friend bool operator==(const ExpandParameters&, const ExpandParameters&) = default;
+};
+
+struct SkinParameters {
+  bool wanted = true;            // false: no skin is made
+  double alpha = 0.5;            // vertex at X_i + alpha h e, in (0, 1)
+  friend bool operator==(const SkinParameters&, const SkinParameters&) = default;
+};
+
+// A half-space orthogonal to an axis: tissue keeps side · (x[axis] - offset) >= 0. The ground is one of these.
+struct Wall {
+  int32_t axis = 2;              // 0, 1, 2
+  int32_t side = +1;             // +1 or -1
+  double offset = 0;             // body frame [m]
+  double friction = 0;           // Coulomb coefficient, >= 0
+  friend bool operator==(const Wall&, const Wall&) = default;
+};
+
+// Particles that follow a given path while active. Pinned particles are a grip that never moves.
+struct Grip {
+  std::vector<int32_t> particles;      // ascending; no particle is held by two grips at once
+  std::vector<uint8_t> active;         // [frames · substeps] 1: held in this substep
+  std::vector<Vec3> displacement;      // [frames · substeps] by how much they move in this substep [m]
+  friend bool operator==(const Grip&, const Grip&) = default;
+};
+
+struct Setup {
+  Body body;
+  StepParameters step;
+  DetectParameters detect;
+  SplitParameters split;
+  MergeParameters merge;
+  ExpandParameters expand;
+  SkinParameters skin;
+  std::vector<Wall> walls;
+  std::vector<Grip> grips;
+  bool has_blade = false;
+  Blade blade;
+  // The timetable. Frame f consists of substeps f·S .. f·S + S - 1 with S = step.substeps. A scene's frame in which
+  // the blade would be too fast is already divided into equal frames here (method.md §3, Blade).
+  std::vector<double> substep_length;  // [frames] dt [s], > 0
+  std::vector<BladeMove> blade_moves;  // [frames · S], empty if there is no blade
+
+  int64_t frame_count() const { return static_cast<int64_t>(substep_length.size()); }
+};
+
+// Whether frames of this setup launch the detect stage.
+inline bool needs_detection(const Setup& setup) {
+  return setup.detect.criterion != Criterion::none && (setup.has_blade || setup.detect.without_blade);
+}
+
+// ρ: how far the blade keeps particles from its mid-surface [m] (method.md §3, Blade: dynamic).
+inline double blade_clearance(const Setup& setup) {
+  const double reach = setup.detect.epsilon * setup.body.grid.spacing;
+  return 1.001 * (setup.blade.thickness > reach ? setup.blade.thickness : reach) / 2;
+}
+
+}  // namespace cutproof

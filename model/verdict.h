@@ -1,0 +1,39 @@
+// What an oracle says of a state (oracles_and_tests.md §1). A wrong simulation is a failing verdict, never an
+// exception.
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "model/stage.h"
+
+namespace cutproof {
+
+// The smallest thing that shows the failure.
+struct Witness {
+  std::vector<int32_t> clusters;   // numbers of the clusters concerned
+  std::vector<int32_t> particles;  // the particles concerned
+  std::vector<int32_t> path;       // particles along a path of G that shows it, where there is one
+  std::string text;                // one sentence for a person
+
+  friend bool operator==(const Witness&, const Witness&) = default;
+};
+
+struct Verdict {
+  std::string property;      // "cluster connectivity", "coverage", …: the names of oracles_and_tests.md §1
+  Stage stage = Stage::skin; // after which stage the state was judged
+  std::string backend;
+  int64_t frame = 0;
+  int32_t body = 0;
+  bool holds = true;
+  double measured = 0;       // in `unit`
+  double bound = 0;          // in `unit`; holds means measured <= bound unless the property says otherwise
+  std::string unit;          // "1" for counts and ratios
+  std::string bound_source;  // where the bound comes from, e.g. "method.md §2, I1"
+  int64_t checked = 0;       // how many things were looked at; 0 means the property was vacuous here
+  Witness witness;           // empty if it holds
+
+  friend bool operator==(const Verdict&, const Verdict&) = default;
+};
+
+}  // namespace cutproof

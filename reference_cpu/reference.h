@@ -1,0 +1,65 @@
+// The CPU reference: double precision, serial, readable. Each stage is a function from a state to the next one and
+// stands in a file of its name. Correct first; compare anything else with it.
+#pragma once
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "model/backend.h"
+
+namespace cutproof::reference {
+
+// Method.md §3: all substeps of frame state.frame; starts a frame, so it clears state.removed, .debris, .impulse.
+void step(const Setup& setup, State& state);
+// Method.md §4: marks removed particles dead and lists them in state.removed.
+void detect(const Setup& setup, State& state);
+// Method.md §5: replaces every cluster that lost a particle by the connected components of the rest.
+void split(const Setup& setup, State& state);
+// Method.md §6: joins small clusters with neighbours.
+void merge(const Setup& setup, State& state);
+// Method.md §7: lets clusters take in particles until no tissue is uncoupled.
+void expand(const Setup& setup, State& state);
+// Method.md §8: triangles where something changed (always, if state.skin is empty), then all vertex positions.
+void skin(const Setup& setup, State& state);
+
+std::unique_ptr<Backend> make_backend();
+
+// --- Pieces that cooking, tests and tools use on their own -------------------------------------------------------
+
+// For each particle the clusters (indices, ascending) that hold it, as compressed rows.
+struct Memberships {
+  std::vector<int64_t> offsets;   // [n + 1]
+  std::vector<int32_t> clusters;  // cluster indices, ascending within each particle
+  std::span<const int32_t> of(int32_t particle) const {
+    const auto i = static_cast<std::size_t>(particle);
+    return {clusters.data() + offsets[i], static_cast<std::size_t>(offsets[i + 1] - offsets[i])};
+  }
+  int64_t count(int32_t particle) const {
+    const auto i = static_cast<std::size_t>(particle);
+    return offsets[i + 1] - offsets[i];
+  }
+};
+Memberships memberships_of(const Clusters& clusters, int32_t particle_count);
+
+// T_c and M_c of every cluster, from the present memberships (method.md §5, Rest frames). Recomputing all of them
+// gives the same bits as recomputing those that changed.
+void update_rest_frames(const Body& body, Clusters& clusters);
+
+// One rotation problem (method.md §3): argmax over rotations R of tr(Rᵀ A). Among several answers the one nearest to
+// `previous`. `degenerate` says that the answer was not unique, or that A was not finite (then R = previous).
+struct Rotation {
+  Mat3 r;
+  bool degenerate = false;
+};
+Rotation closest_rotation(const Mat3& a, const Mat3& previous);
+
+// Method.md §6 on any family of sets, overlapping or not: returns for each set of the input the index (into the
+// result) of the set that it ended in, and the unions. Does not touch rest frames. `rule` must not be none.
+struct Merged {
+  std::vector<std::vector<int32_t>> sets;  // unions, in the order of their numbers
+  std::vector<int32_t> survivor;           // for each set of the result the index of the input set whose number it keeps
+};
+Merged merge_sets(const Body& body, const std::vector<uint8_t>& alive, const std::vector<std::vector<int32_t>>& sets,
+                  const std::vector<int32_t>& numbers, MergeRule rule, int64_t tau, int64_t cap);
+
+}  // namespace cutproof::reference
