@@ -14,7 +14,7 @@ namespace cutproof {
 
 // What the last call of run() did.
 struct SpanReport {
-  std::array<bool, 6> ran = {};      // by stage: did any body launch it?
+  std::array<bool, 6> ran = {};        // by stage: did any body launch it?
   std::array<double, 6> seconds = {};  // by stage: wall time [s]
 };
 

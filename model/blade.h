@@ -20,9 +20,9 @@ struct Blade {
 // Where the mid-surface is: { edge + u·along + w·back : |u| <= length / 2, 0 <= w <= depth }. Its positive normal
 // is along × back.
 struct BladePose {
-  Vec3 edge;                 // middle of the cutting edge, body frame [m]
-  Vec3 along = {1, 0, 0};    // unit, direction of the cutting edge
-  Vec3 back = {0, 0, 1};     // unit, orthogonal to `along`: from the cutting edge to the back
+  Vec3 edge;               // middle of the cutting edge, body frame [m]
+  Vec3 along = {1, 0, 0};  // unit, direction of the cutting edge
+  Vec3 back = {0, 0, 1};   // unit, orthogonal to `along`: from the cutting edge to the back
 
   friend bool operator==(const BladePose&, const BladePose&) = default;
 };

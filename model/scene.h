@@ -22,81 +22,81 @@ struct Shape {
 };
 
 struct MeshSpec {
-  std::string file;             // as written in the scene; relative to the scene's file
-  double unit = 0;              // metres per unit of the file's numbers: 1e-3 for mm. Must be given.
+  std::string file;  // as written in the scene; relative to the scene's file
+  double unit = 0;   // metres per unit of the file's numbers: 1e-3 for mm. Must be given.
 };
 
 struct BodySpec {
-  std::optional<Shape> shape;   // exactly one of shape and mesh
+  std::optional<Shape> shape;  // exactly one of shape and mesh
   std::optional<MeshSpec> mesh;
-  double spacing = 0;           // h [m]; exactly one of spacing and particles is positive
-  int64_t particles = 0;        // wanted count, met within 2 %
-  double density = 1000;        // [kg/m³]; m_i = density · h³
-  bool align = true;            // turn the principal axes (longest, middle, shortest) to x, y, z
-  Vec3 origin;                  // where the body's frame lies in the world [m]
+  double spacing = 0;     // h [m]; exactly one of spacing and particles is positive
+  int64_t particles = 0;  // wanted count, met within 2 %
+  double density = 1000;  // [kg/m³]; m_i = density · h³
+  bool align = true;      // turn the principal axes (longest, middle, shortest) to x, y, z
+  Vec3 origin;            // where the body's frame lies in the world [m]
 };
 
 enum class Cooking { boxes, sampled };
 struct ClusterSpec {
   Cooking method = Cooking::boxes;
-  int32_t side = 5;             // boxes: c, nodes per side of a core
-  double spacing = 3.0;         // sampled: least distance of a new seed from what is covered [h]
-  double radius = 4.0;          // sampled: radius of the balls [h]
-  double small = 0.5;           // tau = small · median size at cooking
-  double cap = 1.4;             // cap = cap · largest size at cooking
+  int32_t side = 5;      // boxes: c, nodes per side of a core
+  double spacing = 3.0;  // sampled: least distance of a new seed from what is covered [h]
+  double radius = 4.0;   // sampled: radius of the balls [h]
+  double small = 0.5;    // tau = small · median size at cooking
+  double cap = 1.4;      // cap = cap · largest size at cooking
 };
 
 // Points of paths and regions are in box coordinates: (0,0,0) is the lower, (1,1,1) the upper corner of the bounding
 // box of the body's particles (half a spacing beyond the outermost), after alignment. They may lie outside.
-enum class Curve { line, arc };   // line: polyline through the points; arc: the circle through three points
+enum class Curve { line, arc };  // line: polyline through the points; arc: the circle through three points
 struct StrokeSpec {
   Curve curve = Curve::line;
-  std::vector<Vec3> points;       // where the middle of the cutting edge goes; at least two, arc: exactly three
-  Vec3 back = {0, 0, 1};          // from the cutting edge to the back of the blade (metric direction)
-  std::optional<Vec3> along;      // direction of the cutting edge; absent: the path's tangent, turning with it
-  double pause = 0;               // [s] with the blade up, before the next stroke
+  std::vector<Vec3> points;   // where the middle of the cutting edge goes; at least two, arc: exactly three
+  Vec3 back = {0, 0, 1};      // from the cutting edge to the back of the blade (metric direction)
+  std::optional<Vec3> along;  // direction of the cutting edge; absent: the path's tangent, turning with it
+  double pause = 0;           // [s] with the blade up, before the next stroke
 };
 
 struct BladeSpec {
-  double length = 1.5;            // of the cutting edge, in extents of the bounding box along it
-  double depth = 1.5;             // in extents of the bounding box along `back`
-  double thickness = 1.0;         // [h]
+  double length = 1.5;     // of the cutting edge, in extents of the bounding box along it
+  double depth = 1.5;      // in extents of the bounding box along `back`
+  double thickness = 1.0;  // [h]
   double friction = 0;
-  double speed = 0.1;             // of the middle of the edge [m/s]
-  double start = 0;               // time at which the first stroke begins [s]
+  double speed = 0.1;  // of the middle of the edge [m/s]
+  double start = 0;    // time at which the first stroke begins [s]
   std::vector<StrokeSpec> strokes;
 };
 
 struct WallSpec {
   int32_t axis = 2;
   int32_t side = +1;
-  double offset = 0;              // box coordinate along the axis; the ground is axis 2, side +1, offset 0
+  double offset = 0;  // box coordinate along the axis; the ground is axis 2, side +1, offset 0
   double friction = 0;
 };
 
 struct GripSpec {
-  Vec3 low, high;                 // box of rest positions that is held, box coordinates
-  double start = 0;               // [s]; negative is not allowed
-  double end = -1;                // [s]; < 0: until the scene ends
-  bool after_strokes = false;     // start and end count from the end of the last stroke
-  Vec3 velocity;                  // [m/s]; zero: pinned
+  Vec3 low, high;              // box of rest positions that is held, box coordinates
+  double start = 0;            // [s]; negative is not allowed
+  double end = -1;             // [s]; < 0: until the scene ends
+  bool after_strokes = false;  // start and end count from the end of the last stroke
+  Vec3 velocity;               // [m/s]; zero: pinned
 };
 
 // What `cutproof run --check` enforces. Absent: not enforced.
 struct Range {
-  double low = 0, high = 0;       // both included
+  double low = 0, high = 0;  // both included
 };
 struct Expectations {
-  std::vector<int64_t> components_after_stroke;    // of G, one entry per stroke
-  std::optional<int64_t> components_at_end;        // of G
-  std::optional<int64_t> shells_at_end;            // outer shells of the skin
-  std::optional<Range> removed;                    // particles, over the whole run
-  std::optional<Range> isolated_clusters;          // greatest count of uncoupled cluster groups in any frame
-  std::optional<Range> cluster_growth;             // (clusters at the end - at the start) / at the start
-  std::optional<Range> clusters;                   // after cooking
-  std::optional<Range> particles;                  // of the body
-  std::optional<Range> dent;                       // greatest depth of the surface dent before the first removal [h]
-  std::optional<Range> greatest_stretch;           // greatest neighbour distance in any frame [h]
+  std::vector<int64_t> components_after_stroke;  // of G, one entry per stroke
+  std::optional<int64_t> components_at_end;      // of G
+  std::optional<int64_t> shells_at_end;          // outer shells of the skin
+  std::optional<Range> removed;                  // particles, over the whole run
+  std::optional<Range> isolated_clusters;        // greatest count of uncoupled cluster groups in any frame
+  std::optional<Range> cluster_growth;           // (clusters at the end - at the start) / at the start
+  std::optional<Range> clusters;                 // after cooking
+  std::optional<Range> particles;                // of the body
+  std::optional<Range> dent;                     // greatest depth of the surface dent before the first removal [h]
+  std::optional<Range> greatest_stretch;         // greatest neighbour distance in any frame [h]
 };
 
 struct Scene {
@@ -106,9 +106,9 @@ struct Scene {
   uint64_t seed = 1;
   BodySpec body;
   ClusterSpec clusters;
-  double frame_length = 0.016;    // [s]
-  int64_t frames = 0;             // 0: until the last stroke ends and `settle` is over
-  double settle = 0;              // [s] after the last stroke
+  double frame_length = 0.016;  // [s]
+  int64_t frames = 0;           // 0: until the last stroke ends and `settle` is over
+  double settle = 0;            // [s] after the last stroke
   StepParameters step;
   DetectParameters detect;
   SplitParameters split;

@@ -10,32 +10,32 @@
 
 namespace cutproof {
 
-enum class Solver { implicit, published };                     // method.md §3
-enum class Criterion { none, distance, geometric, strain };    // method.md §4; none: nothing is ever removed
+enum class Solver { implicit, published };                             // method.md §3
+enum class Criterion { none, distance, geometric, strain };            // method.md §4; none: nothing is ever removed
 enum class MergeRule { none, deterministic, published, single_pass };  // method.md §6
 enum class ExpandRule { none, edge_cover, published };                 // method.md §7
 
 struct StepParameters {
   Solver solver = Solver::implicit;
-  int32_t substeps = 4;          // per frame, >= 1
-  int32_t iterations = 4;        // K per substep, >= 0
-  double stiffness = 1e5;        // k [1/s²], implicit: s = k dt² / (1 + k dt²)
-  double relaxation = 0.5;       // s in (0, 1], published
-  double damping = 0;            // c [1/s]: v = exp(-c dt) (x - x_prev) / dt
-  Vec3 gravity;                  // [m/s²], body frame
+  int32_t substeps = 4;     // per frame, >= 1
+  int32_t iterations = 4;   // K per substep, >= 0
+  double stiffness = 1e5;   // k [1/s²], implicit: s = k dt² / (1 + k dt²)
+  double relaxation = 0.5;  // s in (0, 1], published
+  double damping = 0;       // c [1/s]: v = exp(-c dt) (x - x_prev) / dt
+  Vec3 gravity;             // [m/s²], body frame
   friend bool operator==(const StepParameters&, const StepParameters&) = default;
 };
 
 struct DetectParameters {
   Criterion criterion = Criterion::distance;
-  double epsilon = 1.5;          // removed if the greatest neighbour distance exceeds epsilon · h
-  double strain = 1.2;           // strain baseline: removed if a principal stretch of a cluster exceeds this
-  bool without_blade = false;    // false: a scene without a blade launches no detection
+  double epsilon = 1.5;        // removed if the greatest neighbour distance exceeds epsilon · h
+  double strain = 1.2;         // strain baseline: removed if a principal stretch of a cluster exceeds this
+  bool without_blade = false;  // false: a scene without a blade launches no detection
   friend bool operator==(const DetectParameters&, const DetectParameters&) = default;
 };
 
 struct SplitParameters {
-  int32_t debris = 0;            // components of G with fewer particles are removed; 0 keeps all
+  int32_t debris = 0;  // components of G with fewer particles are removed; 0 keeps all
   friend bool operator==(const SplitParameters&, const SplitParameters&) = default;
 };
 
@@ -46,30 +46,30 @@ struct MergeParameters {
 
 struct ExpandParameters {
   ExpandRule rule = ExpandRule::edge_cover;
-  int32_t depth = 1;             // layers taken in, >= 1
+  int32_t depth = 1;  // layers taken in, >= 1
   friend bool operator==(const ExpandParameters&, const ExpandParameters&) = default;
 };
 
 struct SkinParameters {
-  bool wanted = true;            // false: no skin is made
-  double alpha = 0.5;            // vertex at X_i + alpha h e, in (0, 1)
+  bool wanted = true;  // false: no skin is made
+  double alpha = 0.5;  // vertex at X_i + alpha h e, in (0, 1)
   friend bool operator==(const SkinParameters&, const SkinParameters&) = default;
 };
 
 // A half-space orthogonal to an axis: tissue keeps side · (x[axis] - offset) >= 0. The ground is one of these.
 struct Wall {
-  int32_t axis = 2;              // 0, 1, 2
-  int32_t side = +1;             // +1 or -1
-  double offset = 0;             // body frame [m]
-  double friction = 0;           // Coulomb coefficient, >= 0
+  int32_t axis = 2;     // 0, 1, 2
+  int32_t side = +1;    // +1 or -1
+  double offset = 0;    // body frame [m]
+  double friction = 0;  // Coulomb coefficient, >= 0
   friend bool operator==(const Wall&, const Wall&) = default;
 };
 
 // Particles that follow a given path while active. Pinned particles are a grip that never moves.
 struct Grip {
-  std::vector<int32_t> particles;      // ascending; no particle is held by two grips at once
-  std::vector<uint8_t> active;         // [frames · substeps] 1: held in this substep
-  std::vector<Vec3> displacement;      // [frames · substeps] by how much they move in this substep [m]
+  std::vector<int32_t> particles;  // ascending; no particle is held by two grips at once
+  std::vector<uint8_t> active;     // [frames · substeps] 1: held in this substep
+  std::vector<Vec3> displacement;  // [frames · substeps] by how much they move in this substep [m]
   friend bool operator==(const Grip&, const Grip&) = default;
 };
 

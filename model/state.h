@@ -10,17 +10,17 @@
 namespace cutproof {
 
 struct State {
-  int64_t frame = 0;                // index of the frame in progress: counts up when a frame ends (after skin)
-  std::vector<Vec3> x;              // [n] current positions, body frame [m]; of dead particles: the last one
-  std::vector<Vec3> v;              // [n] velocities [m/s]
-  std::vector<uint8_t> alive;       // [n] 1: in G
-  std::vector<int32_t> removed;     // taken out by this frame's detection, ascending
-  std::vector<int32_t> debris;      // taken out by this frame's split as debris, ascending
+  int64_t frame = 0;             // index of the frame in progress: counts up when a frame ends (after skin)
+  std::vector<Vec3> x;           // [n] current positions, body frame [m]; of dead particles: the last one
+  std::vector<Vec3> v;           // [n] velocities [m/s]
+  std::vector<uint8_t> alive;    // [n] 1: in G
+  std::vector<int32_t> removed;  // taken out by this frame's detection, ascending
+  std::vector<int32_t> debris;   // taken out by this frame's split as debris, ascending
   Clusters clusters;
-  int32_t tau = 0;                  // a cluster with fewer particles is small (method.md §6)
-  int32_t cap = 0;                  // most particles of a merged cluster
-  bool edge_covered = false;        // I4 is known to hold, so no expansion stage is needed (method.md §7)
-  Vec3 impulse;                     // what contacts, pins and grips gave in this frame, damped as v is [kg m/s]
+  int32_t tau = 0;            // a cluster with fewer particles is small (method.md §6)
+  int32_t cap = 0;            // most particles of a merged cluster
+  bool edge_covered = false;  // I4 is known to hold, so no expansion stage is needed (method.md §7)
+  Vec3 impulse;               // what contacts, pins and grips gave in this frame, damped as v is [kg m/s]
   Skin skin;
 
   friend bool operator==(const State&, const State&) = default;

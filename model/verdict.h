@@ -20,8 +20,8 @@ struct Witness {
 };
 
 struct Verdict {
-  std::string property;      // "cluster connectivity", "coverage", …: the names of oracles_and_tests.md §1
-  Stage stage = Stage::skin; // after which stage the state was judged
+  std::string property;       // "cluster connectivity", "coverage", …: the names of oracles_and_tests.md §1
+  Stage stage = Stage::skin;  // after which stage the state was judged
   std::string backend;
   int64_t frame = 0;
   int32_t body = 0;

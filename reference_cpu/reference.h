@@ -57,7 +57,7 @@ Rotation closest_rotation(const Mat3& a, const Mat3& previous);
 // result) of the set that it ended in, and the unions. Does not touch rest frames. `rule` must not be none.
 struct Merged {
   std::vector<std::vector<int32_t>> sets;  // unions, in the order of their numbers
-  std::vector<int32_t> survivor;           // for each set of the result the index of the input set whose number it keeps
+  std::vector<int32_t> survivor;  // for each set of the result the index of the input set whose number it keeps
 };
 Merged merge_sets(const Body& body, const std::vector<uint8_t>& alive, const std::vector<std::vector<int32_t>>& sets,
                   const std::vector<int32_t>& numbers, MergeRule rule, int64_t tau, int64_t cap);

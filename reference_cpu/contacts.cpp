@@ -1,0 +1,121 @@
+#include "reference_cpu/contacts.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace cutproof::reference {
+
+namespace {
+
+// How often blade and walls are projected in turn where both hold at once.
+constexpr int kMostTurns = 16;
+
+}  // namespace
+
+Contacts::Frame Contacts::frame_of(const BladePose& pose) {
+  return {pose.edge, pose.along, pose.back, cross(pose.along, pose.back)};
+}
+
+Contacts::Contacts(const Setup& setup, const BladeMove* move) : setup_(setup) {
+  for (const Wall& wall : setup.walls) frictionless_ = frictionless_ && wall.friction == 0;
+  // A geometric blade removes what it sweeps and touches nothing.
+  if (move == nullptr || setup.detect.criterion == Criterion::geometric) return;
+  has_blade_ = true;
+  frictionless_ = frictionless_ && setup.blade.friction == 0;
+  from_ = frame_of(move->from);
+  to_ = frame_of(move->to);
+  half_length_ = setup.blade.length / 2;
+  depth_ = setup.blade.depth;
+  clearance_ = blade_clearance(setup);
+}
+
+int Contacts::side(Vec3 x) const { return has_blade_ && from_.local(x).z < 0 ? -1 : +1; }
+
+Vec3 Contacts::project_on_walls(Vec3 x) const {
+  for (const Wall& wall : setup_.walls) {
+    if (wall.side * (x[wall.axis] - wall.offset) < 0) x[wall.axis] = wall.offset;
+  }
+  return x;
+}
+
+// In the blade's frame a point is (u, w, n) with the mid-surface at n = 0, |u| <= L/2, 0 <= w <= D. Forbidden is
+// (a) what is nearer than the clearance ρ to the mid-surface, and (b) what lies over the mid-surface on the other side
+// than the one where the particle began: it could only have come there through the blade.
+Vec3 Contacts::project_on_blade(Vec3 x, int side) const {
+  const Vec3 c = to_.local(x);
+  const bool over = std::abs(c.x) < half_length_ && c.y > 0 && c.y < depth_;
+  if (over) {
+    const double height = side * c.z;
+    if (height >= clearance_) return x;
+    if (height >= 0) return to_.global({c.x, c.y, side * clearance_});
+    return leave_by_a_side(c, side);
+  }
+  const Vec3 nearest = {std::clamp(c.x, -half_length_, half_length_), std::clamp(c.y, 0.0, depth_), 0};
+  const Vec3 offset = c - nearest;
+  const double distance = norm(offset);
+  if (distance >= clearance_) return x;
+  if (distance == 0) return to_.global({c.x, c.y, side * clearance_});
+  return to_.global(nearest + (clearance_ / distance) * offset);
+}
+
+// The nearest allowed point of one that came through the blade: back to its own side, or round one of the four sides
+// of the rectangle, where it has to clear the rounded rim, so at least ρ from the plane.
+Vec3 Contacts::leave_by_a_side(Vec3 c, int side) const {
+  Vec3 best = {c.x, c.y, side * clearance_};
+  double best_distance = norm(best - c);
+  const double beyond = -side * std::max(std::abs(c.z), clearance_);
+  for (const Vec3 candidate : {Vec3{c.x, 0, beyond}, Vec3{c.x, depth_, beyond}, Vec3{-half_length_, c.y, beyond},
+                               Vec3{half_length_, c.y, beyond}}) {
+    const double distance = norm(candidate - c);
+    if (distance < best_distance) {
+      best = candidate;
+      best_distance = distance;
+    }
+  }
+  return to_.global(best);
+}
+
+Vec3 Contacts::project(Vec3 x, int side) const {
+  if (!has_blade_) return project_on_walls(x);
+  Vec3 result = project_on_blade(x, side);
+  for (int turn = 0; turn < kMostTurns; ++turn) {
+    const Vec3 inside = project_on_walls(result);
+    if (inside == result) return result;
+    result = project_on_blade(inside, side);
+    if (result == inside) return result;
+  }
+  return result;
+}
+
+// Coulomb friction in position form (Müller et al. 2007, Macklin et al. 2014 §6.1): a contact that moved the particle
+// by δ along its normal takes back at most μ δ of how far the particle has slid along the surface in this substep.
+Vec3 Contacts::project_with_friction(Vec3 x, int side, Vec3 start) const {
+  const Vec3 projected = project(x, side);
+  if (frictionless_ || projected == x) return projected;
+  Vec3 result = projected;
+  const auto rub = [&result](Vec3 slid, Vec3 normal, double reach) {
+    const Vec3 along = slid - dot(slid, normal) * normal;
+    const double length = norm(along);
+    if (length > 0) result -= std::min(1.0, reach / length) * along;
+  };
+  for (const Wall& wall : setup_.walls) {
+    const double depth = wall.side * (wall.offset - x[wall.axis]);
+    if (depth <= 0 || wall.friction == 0) continue;
+    Vec3 normal;
+    normal[wall.axis] = wall.side;
+    rub(result - start, normal, wall.friction * depth);
+  }
+  if (has_blade_ && setup_.blade.friction > 0) {
+    const Vec3 pushed = project_on_blade(x, side) - x;
+    const double depth = norm(pushed);
+    if (depth > 0) {
+      // The blade's own point under the particle has moved too; only sliding against it rubs.
+      const Vec3 carried = result - from_.global(to_.local(result));
+      rub(result - start - carried, pushed / depth, setup_.blade.friction * depth);
+    }
+  }
+  return project(result, side);
+}
+
+}  // namespace cutproof::reference

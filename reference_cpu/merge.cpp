@@ -1,0 +1,272 @@
+// Merge (method.md §6): small clusters join neighbours, so that cutting does not leave ever more and softer clusters.
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+#include "reference_cpu/append_cluster.h"
+#include "reference_cpu/reference.h"
+
+namespace cutproof::reference {
+namespace {
+
+// The sets of one merge, as they grow. A set is known by its slot, its index in the input; a set that was merged
+// into another one has a dead slot.
+class MergingSets {
+ public:
+  MergingSets(const Body& body, const std::vector<uint8_t>& alive, const std::vector<std::vector<int32_t>>& sets,
+              const std::vector<int32_t>& numbers, int64_t tau, int64_t cap)
+      : body_(body),
+        alive_(alive),
+        numbers_(numbers),
+        tau_(tau),
+        cap_(cap),
+        sets_(sets),
+        exists_(sets.size(), 1),
+        holders_(static_cast<std::size_t>(body.particle_count())),
+        shared_(sets.size(), 0),
+        seen_(sets.size(), 0) {
+    for (std::size_t slot = 0; slot < sets.size(); ++slot) {
+      for (const int32_t p : sets[slot]) holders_[at(p)].push_back(static_cast<int32_t>(slot));
+      if (size(static_cast<int32_t>(slot)) < tau) small_.push_back(static_cast<int32_t>(slot));
+    }
+    std::sort(small_.begin(), small_.end(), [&](int32_t a, int32_t b) { return number(a) < number(b); });
+  }
+
+  int32_t number(int32_t slot) const { return numbers_[at(slot)]; }
+  int64_t size(int32_t slot) const { return static_cast<int64_t>(sets_[at(slot)].size()); }
+
+  // Slots of the sets with fewer than tau particles, in the order of their numbers.
+  const std::vector<int32_t>& small() const { return small_; }
+
+  // The set that `s` would join: it touches s (shares a particle, or an edge of G joins them), the union has at most
+  // cap particles or s lies inside it; the smallest such, then the one with the lowest number.
+  std::optional<int32_t> preferred_target(int32_t s) {
+    std::vector<int32_t> touching;
+    const auto touch = [&](int32_t slot, int64_t shares) {
+      if (slot == s) return;
+      if (!std::exchange(seen_[at(slot)], uint8_t{1})) touching.push_back(slot);
+      shared_[at(slot)] += shares;
+    };
+    for (const int32_t p : sets_[at(s)]) {
+      for (const int32_t slot : holders_[at(p)]) touch(slot, 1);
+      for (int direction = 0; direction < 6 && alive_[at(p)]; ++direction) {
+        const int32_t q = body_.neighbour(p, direction);
+        if (q < 0 || !alive_[at(q)]) continue;
+        for (const int32_t slot : holders_[at(q)]) touch(slot, 0);
+      }
+    }
+
+    std::optional<int32_t> best;
+    for (const int32_t t : touching) {
+      const int64_t shared = std::exchange(shared_[at(t)], 0);
+      seen_[at(t)] = 0;
+      const bool legal = shared == size(s) || size(s) + size(t) - shared <= cap_;
+      if (legal && (!best || std::pair(size(t), number(t)) < std::pair(size(*best), number(*best)))) best = t;
+    }
+    return best;
+  }
+
+  // Lets `target` take in `source`, whose slot dies.
+  void join(int32_t source, int32_t target) {
+    std::vector<int32_t>& from = sets_[at(source)];
+    std::vector<int32_t>& to = sets_[at(target)];
+    for (const int32_t p : from) {
+      auto& holders = holders_[at(p)];
+      holders.erase(std::find(holders.begin(), holders.end(), source));
+      if (std::find(holders.begin(), holders.end(), target) == holders.end()) holders.push_back(target);
+    }
+    std::vector<int32_t> both;
+    both.reserve(from.size() + to.size());
+    std::set_union(from.begin(), from.end(), to.begin(), to.end(), std::back_inserter(both));
+    to = std::move(both);
+    from.clear();
+    exists_[at(source)] = 0;
+  }
+
+  // To be called after joins: drops from small() what is merged or has grown.
+  void update_small() {
+    std::erase_if(small_, [&](int32_t slot) { return !exists_[at(slot)] || size(slot) >= tau_; });
+  }
+
+  Merged result() && {
+    std::vector<int32_t> slots;
+    for (std::size_t slot = 0; slot < sets_.size(); ++slot) {
+      if (exists_[slot]) slots.push_back(static_cast<int32_t>(slot));
+    }
+    std::sort(slots.begin(), slots.end(), [&](int32_t a, int32_t b) { return number(a) < number(b); });
+    Merged merged;
+    for (const int32_t slot : slots) {
+      merged.sets.push_back(std::move(sets_[at(slot)]));
+      merged.survivor.push_back(slot);
+    }
+    return merged;
+  }
+
+ private:
+  static std::size_t at(int32_t index) { return static_cast<std::size_t>(index); }
+
+  const Body& body_;
+  const std::vector<uint8_t>& alive_;
+  const std::vector<int32_t>& numbers_;
+  int64_t tau_, cap_;
+  std::vector<std::vector<int32_t>> sets_;     // by slot
+  std::vector<uint8_t> exists_;                // by slot
+  std::vector<std::vector<int32_t>> holders_;  // by particle: slots of the sets that hold it
+  std::vector<int32_t> small_;
+  std::vector<int64_t> shared_;  // scratch of preferred_target, by slot; zero between calls
+  std::vector<uint8_t> seen_;    // likewise
+};
+
+struct Proposal {
+  int32_t source, target;  // slots
+};
+
+// --- deterministic ---------------------------------------------------------------------------------------------
+
+// A bijection of 32-bit words that scatters neighbouring values (method.md §6).
+uint32_t mix(uint32_t x) {
+  x ^= x >> 16;
+  x *= 0x7feb352du;
+  x ^= x >> 15;
+  x *= 0x846ca68bu;
+  x ^= x >> 16;
+  return x;
+}
+
+using Key = std::tuple<uint32_t, int32_t, int32_t, int32_t>;
+
+Key key_of(int32_t source_number, int32_t target_number, uint32_t round) {
+  const auto [low, high] = std::minmax(source_number, target_number);
+  const uint32_t word = 0x9E3779B9u * static_cast<uint32_t>(low) ^ 0x85EBCA6Bu * static_cast<uint32_t>(high) ^
+                        0xC2B2AE35u * round;
+  return {mix(word), low, high, source_number};
+}
+
+// The first round has the index 0.
+void merge_deterministic(MergingSets& sets, std::size_t slot_count) {
+  constexpr Key kNone = {std::numeric_limits<uint32_t>::max(), std::numeric_limits<int32_t>::max(),
+                         std::numeric_limits<int32_t>::max(), std::numeric_limits<int32_t>::max()};
+  std::vector<Key> least(slot_count, kNone);  // by slot: the smallest key of a proposal that names it
+  for (uint32_t round = 0;; ++round) {
+    std::vector<std::pair<Key, Proposal>> proposals;
+    for (const int32_t s : sets.small()) {
+      if (const auto t = sets.preferred_target(s)) {
+        proposals.push_back({key_of(sets.number(s), sets.number(*t), round), {s, *t}});
+      }
+    }
+    if (proposals.empty()) return;
+
+    const auto ends = [&](const Proposal& p) {
+      return std::pair<Key&, Key&>(least[static_cast<std::size_t>(p.source)], least[static_cast<std::size_t>(p.target)]);
+    };
+    for (const auto& [key, proposal] : proposals) {
+      auto [at_source, at_target] = ends(proposal);
+      at_source = std::min(at_source, key);
+      at_target = std::min(at_target, key);
+    }
+    for (const auto& [key, proposal] : proposals) {
+      const auto [at_source, at_target] = ends(proposal);
+      if (at_source == key && at_target == key) sets.join(proposal.source, proposal.target);
+    }
+    for (const auto& [key, proposal] : proposals) {
+      auto [at_source, at_target] = ends(proposal);
+      at_source = at_target = kNone;
+    }
+    sets.update_small();
+  }
+}
+
+// --- published -------------------------------------------------------------------------------------------------
+
+// The paper's claims (§2.2.3) with roles locked and passes repeated, in the schedule in which clusters come in the
+// order of their numbers. In a pass each small cluster claims its preferred target, once; the claim fails if the
+// claimer has been claimed or the target has any role already. A pass without a claim ends the merging: then no
+// small cluster has a target, because the first that had one would have succeeded.
+void merge_published(MergingSets& sets, std::size_t slot_count) {
+  std::vector<uint8_t> has_role(slot_count, 0);
+  for (;;) {
+    std::vector<Proposal> claims;
+    for (const int32_t s : sets.small()) {
+      if (has_role[static_cast<std::size_t>(s)]) continue;
+      const auto t = sets.preferred_target(s);
+      if (!t || has_role[static_cast<std::size_t>(*t)]) continue;
+      has_role[static_cast<std::size_t>(s)] = has_role[static_cast<std::size_t>(*t)] = 1;
+      claims.push_back({s, *t});
+    }
+    if (claims.empty()) return;
+    for (const Proposal& claim : claims) {
+      sets.join(claim.source, claim.target);
+      has_role[static_cast<std::size_t>(claim.source)] = has_role[static_cast<std::size_t>(claim.target)] = 0;
+    }
+    sets.update_small();
+  }
+}
+
+// --- single_pass -----------------------------------------------------------------------------------------------
+
+// The paper's strategy as printed, a baseline. One pass: every small cluster, in the order of numbers, tries to set
+// the owner of its preferred target from "none" to itself (compare-and-swap); whoever comes second gets nothing.
+// Nothing keeps a claimed cluster from claiming, so the claims form chains s -> t -> u and cycles, and each chain is
+// merged into one. Every single claim respects cap, their unions may not: that is this rule's fault, and it is not
+// maximal either. The number that stays is that of the chain's last target; in a cycle, the lowest.
+void merge_single_pass(MergingSets& sets, std::size_t slot_count) {
+  constexpr int32_t kNobody = -1;
+  std::vector<int32_t> owner(slot_count, kNobody), target(slot_count, kNobody);
+  for (const int32_t s : sets.small()) {
+    const auto t = sets.preferred_target(s);
+    if (!t || owner[static_cast<std::size_t>(*t)] != kNobody) continue;
+    owner[static_cast<std::size_t>(*t)] = s;
+    target[static_cast<std::size_t>(s)] = *t;
+  }
+
+  // Clusters come in the order of their numbers, so the first one met in a cycle has the cycle's lowest number:
+  // dropping its claim leaves a chain that ends there.
+  for (const int32_t s : sets.small()) {
+    int32_t end = s;
+    while (target[static_cast<std::size_t>(end)] != kNobody && target[static_cast<std::size_t>(end)] != s) {
+      end = target[static_cast<std::size_t>(end)];
+    }
+    if (target[static_cast<std::size_t>(end)] == s) target[static_cast<std::size_t>(s)] = kNobody;
+  }
+  for (const int32_t s : std::vector<int32_t>(sets.small())) {
+    int32_t end = s;
+    while (target[static_cast<std::size_t>(end)] != kNobody) end = target[static_cast<std::size_t>(end)];
+    if (end != s) sets.join(s, end);
+  }
+}
+
+}  // namespace
+
+Merged merge_sets(const Body& body, const std::vector<uint8_t>& alive, const std::vector<std::vector<int32_t>>& sets,
+                  const std::vector<int32_t>& numbers, MergeRule rule, int64_t tau, int64_t cap) {
+  MergingSets merging(body, alive, sets, numbers, tau, cap);
+  if (rule == MergeRule::deterministic) merge_deterministic(merging, sets.size());
+  if (rule == MergeRule::published) merge_published(merging, sets.size());
+  if (rule == MergeRule::single_pass) merge_single_pass(merging, sets.size());
+  return std::move(merging).result();
+}
+
+void merge(const Setup& setup, State& state) {
+  if (setup.merge.rule == MergeRule::none) return;
+  const Clusters& before = state.clusters;
+  std::vector<std::vector<int32_t>> sets;
+  sets.reserve(static_cast<std::size_t>(before.count()));
+  for (int32_t c = 0; c < before.count(); ++c) sets.emplace_back(before.of(c).begin(), before.of(c).end());
+
+  const Merged merged =
+      merge_sets(setup.body, state.alive, sets, before.number, setup.merge.rule, state.tau, state.cap);
+  if (merged.sets.size() == sets.size()) return;
+
+  Clusters after;
+  for (std::size_t k = 0; k < merged.sets.size(); ++k) {
+    const int32_t survivor = merged.survivor[k];
+    append_cluster(after, merged.sets[k], before.number[static_cast<std::size_t>(survivor)], before, survivor);
+  }
+  update_rest_frames(setup.body, after);
+  state.clusters = std::move(after);
+}
+
+}  // namespace cutproof::reference

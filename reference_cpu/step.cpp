@@ -1,0 +1,148 @@
+// Stage step (method.md §3): position-based dynamics with shape matching constraints.
+#include <cmath>
+
+#include "reference_cpu/contacts.h"
+#include "reference_cpu/reference.h"
+
+namespace cutproof::reference {
+
+namespace {
+
+// t_c and R_c of one cluster at positions x.
+struct Pose {
+  Vec3 center;
+  Mat3 rotation;
+};
+
+std::size_t at(int64_t index) { return static_cast<std::size_t>(index); }
+
+// For every particle: how far a grip moves it in the substep, or not held at all.
+struct Held {
+  std::vector<uint8_t> yes;
+  std::vector<Vec3> displacement;
+};
+
+Held held_particles(const Setup& setup, int64_t substep) {
+  Held held{std::vector<uint8_t>(setup.body.node.size(), 0), std::vector<Vec3>(setup.body.node.size())};
+  for (const Grip& grip : setup.grips) {
+    if (!grip.active[at(substep)]) continue;
+    for (const int32_t i : grip.particles) {
+      held.yes[at(i)] = 1;
+      held.displacement[at(i)] = grip.displacement[at(substep)];
+    }
+  }
+  return held;
+}
+
+// t_c = Σ w x / M, A = Σ w (x - t)(X - T)ᵀ, R_c = argmax tr(Rᵀ A).
+std::vector<Pose> match_shapes(const Body& body, const Memberships& memberships, const std::vector<Vec3>& x,
+                               Clusters& clusters) {
+  std::vector<Pose> poses(at(clusters.count()));
+  for (int32_t c = 0; c < clusters.count(); ++c) {
+    Pose& pose = poses[at(c)];
+    // Summed relative to one member, so that a far away cluster loses no digits.
+    const Vec3 base = x[at(clusters.of(c).front())];
+    for (const int32_t i : clusters.of(c)) {
+      pose.center += (body.mass[at(i)] / static_cast<double>(memberships.count(i))) * (x[at(i)] - base);
+    }
+    pose.center = base + pose.center / clusters.mass[at(c)];
+
+    Mat3 a;
+    a.m.fill(0);
+    for (const int32_t i : clusters.of(c)) {
+      const double weight = body.mass[at(i)] / static_cast<double>(memberships.count(i));
+      const Vec3 now = weight * (x[at(i)] - pose.center);
+      const Vec3 rest = body.rest_position(i) - clusters.rest_center[at(c)];
+      for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column) a(row, column) += now[row] * rest[column];
+      }
+    }
+    const Rotation best = closest_rotation(a, clusters.rotation[at(c)]);
+    pose.rotation = best.r;
+    clusters.rotation[at(c)] = best.r;
+    clusters.degenerate[at(c)] = best.degenerate;
+  }
+  return poses;
+}
+
+// g_i: where its clusters would have particle i, on average. A particle in no cluster stays where it is.
+Vec3 goal(const Body& body, const Memberships& memberships, const Clusters& clusters, const std::vector<Pose>& poses,
+          int32_t i, Vec3 x) {
+  if (memberships.count(i) == 0) return x;
+  Vec3 sum;
+  for (const int32_t c : memberships.of(i)) {
+    sum += poses[at(c)].center + poses[at(c)].rotation * (body.rest_position(i) - clusters.rest_center[at(c)]);
+  }
+  return sum / static_cast<double>(memberships.count(i));
+}
+
+void substep(const Setup& setup, const Memberships& memberships, int64_t index, double dt, State& state) {
+  const StepParameters& parameters = setup.step;
+  const Body& body = setup.body;
+  const int32_t n = body.particle_count();
+  const BladeMove* move = setup.has_blade ? &setup.blade_moves[at(index)] : nullptr;
+  const Contacts contacts(setup, move != nullptr && move->down ? move : nullptr);
+  const Held held = held_particles(setup, index);
+  const bool implicit = parameters.solver == Solver::implicit;
+  const double kdt2 = parameters.stiffness * dt * dt;
+  const double s = implicit ? kdt2 / (1 + kdt2) : parameters.relaxation;
+
+  const std::vector<Vec3> start = state.x;
+  std::vector<Vec3> predicted(at(n));
+  std::vector<int> side(at(n), +1);
+  // What contacts and grips have displaced, times mass: Σ m (x - where the solver alone would have put it), carried
+  // through the iterations as the solver carries positions. Divided by dt it is their impulse.
+  Vec3 pushed;
+
+  for (int32_t i = 0; i < n; ++i) {
+    if (!state.alive[at(i)]) continue;
+    predicted[at(i)] = start[at(i)] + dt * state.v[at(i)] + (dt * dt) * parameters.gravity;
+    side[at(i)] = contacts.side(start[at(i)]);
+    state.x[at(i)] = held.yes[at(i)] ? start[at(i)] + held.displacement[at(i)]
+                                     : contacts.project_with_friction(predicted[at(i)], side[at(i)], start[at(i)]);
+    pushed += body.mass[at(i)] * (state.x[at(i)] - predicted[at(i)]);
+  }
+
+  for (int32_t iteration = 0; iteration < parameters.iterations; ++iteration) {
+    const std::vector<Pose> poses = match_shapes(body, memberships, state.x, state.clusters);
+    Vec3 pushed_now;
+    for (int32_t i = 0; i < n; ++i) {
+      if (!state.alive[at(i)]) continue;
+      const Vec3 x = state.x[at(i)];
+      const Vec3 g = goal(body, memberships, state.clusters, poses, i, x);
+      const Vec3 free = implicit ? predicted[at(i)] + s * (g - predicted[at(i)]) : x + s * (g - x);
+      Vec3 next = x;  // a held particle stays where its grip has put it
+      if (!held.yes[at(i)]) {
+        next = contacts.project_with_friction(free, side[at(i)], start[at(i)]);
+        // Where blade and walls hold at once, projecting in turn need not give the nearest point. Never accept one
+        // that is worse than the present one, so that the energy cannot grow.
+        if (contacts.frictionless() && dot(next - free, next - free) > dot(x - free, x - free)) next = x;
+      }
+      pushed_now += body.mass[at(i)] * (next - free);
+      state.x[at(i)] = next;
+    }
+    // Both solvers carry Σ m x from one iteration to the next exactly: the implicit one draws it to x~ by 1 - s.
+    pushed = (implicit ? s : 1.0) * pushed + pushed_now;
+  }
+
+  const double decay = std::exp(-parameters.damping * dt);
+  for (int32_t i = 0; i < n; ++i) {
+    if (state.alive[at(i)]) state.v[at(i)] = (decay / dt) * (state.x[at(i)] - start[at(i)]);
+  }
+  state.impulse = decay * (state.impulse + pushed / dt);
+}
+
+}  // namespace
+
+void step(const Setup& setup, State& state) {
+  state.removed.clear();
+  state.debris.clear();
+  state.impulse = {};
+  const Memberships memberships = memberships_of(state.clusters, setup.body.particle_count());
+  const double dt = setup.substep_length[at(state.frame)];
+  for (int32_t s = 0; s < setup.step.substeps; ++s) {
+    substep(setup, memberships, state.frame * setup.step.substeps + s, dt, state);
+  }
+}
+
+}  // namespace cutproof::reference
