@@ -140,8 +140,8 @@ using Key = std::tuple<uint32_t, int32_t, int32_t, int32_t>;
 
 Key key_of(int32_t source_number, int32_t target_number, uint32_t round) {
   const auto [low, high] = std::minmax(source_number, target_number);
-  const uint32_t word = 0x9E3779B9u * static_cast<uint32_t>(low) ^ 0x85EBCA6Bu * static_cast<uint32_t>(high) ^
-                        0xC2B2AE35u * round;
+  const uint32_t word =
+      0x9E3779B9u * static_cast<uint32_t>(low) ^ 0x85EBCA6Bu * static_cast<uint32_t>(high) ^ 0xC2B2AE35u * round;
   return {mix(word), low, high, source_number};
 }
 
@@ -160,7 +160,8 @@ void merge_deterministic(MergingSets& sets, std::size_t slot_count) {
     if (proposals.empty()) return;
 
     const auto ends = [&](const Proposal& p) {
-      return std::pair<Key&, Key&>(least[static_cast<std::size_t>(p.source)], least[static_cast<std::size_t>(p.target)]);
+      return std::pair<Key&, Key&>(least[static_cast<std::size_t>(p.source)],
+                                   least[static_cast<std::size_t>(p.target)]);
     };
     for (const auto& [key, proposal] : proposals) {
       auto [at_source, at_target] = ends(proposal);

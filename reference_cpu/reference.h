@@ -53,8 +53,8 @@ struct Rotation {
 };
 Rotation closest_rotation(const Mat3& a, const Mat3& previous);
 
-// Method.md §6 on any family of sets, overlapping or not: returns for each set of the input the index (into the
-// result) of the set that it ended in, and the unions. Does not touch rest frames. `rule` must not be none.
+// Method.md §6 on any family of sets (each strictly ascending), overlapping or not: a set with fewer than tau
+// particles is small. `numbers` are distinct. Does not touch rest frames. `rule` must not be none.
 struct Merged {
   std::vector<std::vector<int32_t>> sets;  // unions, in the order of their numbers
   std::vector<int32_t> survivor;  // for each set of the result the index of the input set whose number it keeps
