@@ -4,122 +4,10 @@
 #include <vector>
 
 #include "reference_cpu/reference.h"
+#include "reference_cpu/skin_cases.h"
 
 namespace cutproof::reference {
 namespace {
-
-// --- The 256 cases, derived from two rules --------------------------------------------------------------------
-//
-// Corner c of a cell is the node (x, y, z) = bits 0, 1, 2 of c away from the cell's lowest node. Case: bit c is set
-// if corner c is inside, that is, tissue. The twelve grid edges of a cell are numbered by axis, then by lower corner.
-
-struct CellEdge {
-  int low, high;  // corners; high = low with the bit of `axis` set
-  int axis;
-};
-
-constexpr std::array<CellEdge, 12> cell_edges() {
-  std::array<CellEdge, 12> edges = {};
-  std::size_t next = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    for (int corner = 0; corner < 8; ++corner) {
-      if ((corner >> axis & 1) == 0) edges[next++] = {corner, corner | 1 << axis, axis};
-    }
-  }
-  return edges;
-}
-constexpr auto kCellEdges = cell_edges();
-
-constexpr int edge_between(int a, int b) {
-  for (int e = 0; e < 12; ++e) {
-    const CellEdge& edge = kCellEdges[static_cast<std::size_t>(e)];
-    if ((edge.low == a && edge.high == b) || (edge.low == b && edge.high == a)) return e;
-  }
-  return -1;
-}
-
-// Corners of each face, counter-clockwise seen from outside the cell.
-constexpr std::array<std::array<int, 4>, 6> cell_faces() {
-  std::array<std::array<int, 4>, 6> faces = {};
-  for (int axis = 0; axis < 3; ++axis) {
-    const int u = 1 << (axis + 1) % 3, v = 1 << (axis + 2) % 3, high = 1 << axis;
-    faces[static_cast<std::size_t>(2 * axis)] = {high, high | u, high | u | v, high | v};  // normal + axis
-    faces[static_cast<std::size_t>(2 * axis + 1)] = {0, v, u | v, u};                      // normal - axis
-  }
-  return faces;
-}
-constexpr auto kCellFaces = cell_faces();
-
-constexpr bool on_one_face(int edge_a, int edge_b) {
-  const CellEdge& a = kCellEdges[static_cast<std::size_t>(edge_a)];
-  const CellEdge& b = kCellEdges[static_cast<std::size_t>(edge_b)];
-  const int all_set = a.low & a.high & b.low & b.high, any_set = a.low | a.high | b.low | b.high;
-  return all_set != 0 || any_set != 7;  // some coordinate is the same at all four ends
-}
-
-// Rule 1: for each crossed edge the crossed edge that follows it in its polygon; -1 for edges that are not crossed.
-// On each face the contour runs round every run of inside corners, from where the boundary of the face enters it to
-// where it leaves it. So two inside corners of an ambiguous face are separated, and a polygon is counter-clockwise
-// seen from outside the tissue.
-std::array<int, 12> contour(int inside) {
-  std::array<int, 12> next;
-  next.fill(-1);
-  for (const auto& face : kCellFaces) {
-    const auto corner = [&](std::size_t k) { return face[k % 4]; };
-    const auto is_inside = [&](std::size_t k) { return (inside >> corner(k) & 1) != 0; };
-    for (std::size_t k = 0; k < 4; ++k) {
-      if (is_inside(k) || !is_inside(k + 1)) continue;
-      std::size_t last = k + 1;
-      while (is_inside(last + 1)) ++last;
-      next[static_cast<std::size_t>(edge_between(corner(k), corner(k + 1)))] =
-          edge_between(corner(last), corner(last + 1));
-    }
-  }
-  return next;
-}
-
-// Rule 2: a polygon is fanned from its first vertex, counted from its lowest edge, whose diagonals never join two
-// vertices of one face. A diagonal inside a face could meet the same diagonal of the cell beyond it.
-std::size_t fan_start(const std::vector<int>& polygon) {
-  const std::size_t n = polygon.size();
-  for (std::size_t start = 0; start < n; ++start) {
-    bool fits = true;
-    for (std::size_t k = 2; k + 1 < n; ++k) fits = fits && !on_one_face(polygon[start], polygon[(start + k) % n]);
-    if (fits) return start;
-  }
-  return n;  // never happens: a test goes through all 256 cases
-}
-
-using CellTriangles = std::vector<std::array<int, 3>>;  // cell edges
-
-CellTriangles triangles_of_case(int inside) {
-  CellTriangles triangles;
-  const std::array<int, 12> next = contour(inside);
-  std::array<bool, 12> done = {};
-  for (int first = 0; first < 12; ++first) {
-    std::vector<int> polygon;
-    for (int e = first; next[static_cast<std::size_t>(e)] >= 0 && !done[static_cast<std::size_t>(e)];
-         e = next[static_cast<std::size_t>(e)]) {
-      done[static_cast<std::size_t>(e)] = true;
-      polygon.push_back(e);
-    }
-    if (polygon.empty()) continue;
-    const std::size_t n = polygon.size(), start = fan_start(polygon);
-    for (std::size_t k = 1; k + 1 < n; ++k) {
-      triangles.push_back({polygon[start % n], polygon[(start + k) % n], polygon[(start + k + 1) % n]});
-    }
-  }
-  return triangles;
-}
-
-const std::array<CellTriangles, 256>& case_table() {
-  static const std::array<CellTriangles, 256> table = [] {
-    std::array<CellTriangles, 256> cases;
-    for (int inside = 0; inside < 256; ++inside) cases[static_cast<std::size_t>(inside)] = triangles_of_case(inside);
-    return cases;
-  }();
-  return table;
-}
 
 // --- Extraction -------------------------------------------------------------------------------------------------
 
@@ -153,13 +41,13 @@ void extract(const Body& body, const std::vector<uint8_t>& alive, Skin& skin) {
           if (is_tissue(corner[c])) inside |= 1 << c;
         }
         const auto vertex_on = [&](int cell_edge) {
-          const CellEdge& edge = kCellEdges[static_cast<std::size_t>(cell_edge)];
+          const CellEdge& edge = cell_edges()[static_cast<std::size_t>(cell_edge)];
           const bool low_owns = (inside >> edge.low & 1) != 0;
           const auto owner =
               static_cast<std::size_t>(corner[static_cast<std::size_t>(low_owns ? edge.low : edge.high)]);
           return vertex[owner * 6 + static_cast<std::size_t>(2 * edge.axis + (low_owns ? 0 : 1))];
         };
-        for (const auto& [a, b, c] : case_table()[static_cast<std::size_t>(inside)]) {
+        for (const auto& [a, b, c] : skin_cases()[static_cast<std::size_t>(inside)].triangles) {
           skin.triangles.push_back({vertex_on(a), vertex_on(b), vertex_on(c)});
         }
       }
