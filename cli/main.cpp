@@ -1,0 +1,110 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <new>
+
+#include "cli/commands.h"
+#include "model/error.h"
+
+namespace {
+
+constexpr const char* kNextSteps =
+    "cutproof run needs a scene. Try\n"
+    "  cutproof run fixtures/scenes/kidney_discontinuous.json --check\n"
+    "      cuts a kidney in two steps and certifies every frame\n"
+    "  cutproof run fixtures/scenes/kidney_discontinuous.json --check --mesh KIDNEY.stl --unit mm\n"
+    "      does the same on your own closed surface mesh (STL, OBJ, PLY, OFF)\n"
+    "  cutproof run fixtures/scenes/three_cuts.json --check --record cuts --json cuts.json\n"
+    "      keeps a recording for ParaView and `cutproof check`, and the verdicts for a machine\n"
+    "  cutproof info --scene\n"
+    "      lists every field of a scene file\n";
+
+int status_of(const std::exception_ptr& failure) {
+  try {
+    std::rethrow_exception(failure);
+  } catch (const cutproof::InputError& error) {
+    fmt::print(stderr, "cutproof: {}\n", error.what());
+    return 2;
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr, "cutproof: the machine has not enough memory for this\n");
+    return 3;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "cutproof: {}\n", error.what());
+    return 3;
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace cutproof::cli;
+  CLI::App app{
+      "cutproof: judges soft-body dissection. Cuts a body made of shape matching clusters and certifies every frame.\n"
+      "Exit status: 0 everything holds, 1 a verdict failed, 2 bad input or usage, 3 the machine failed."};
+  app.set_version_flag("--version", std::string("cutproof ") + kVersion);
+  app.require_subcommand(1);
+
+  RunOptions run_options;
+  CLI::App* run_command = app.add_subcommand("run", "simulate a scene, and judge it with --check");
+  run_command->add_option("scene", run_options.scene, "scene file (JSON); see `cutproof info --scene`")
+      ->type_name("SCENE");
+  run_command->add_option("--backend", run_options.backend, "who simulates; `cutproof info` lists them")
+      ->capture_default_str()
+      ->type_name("B");
+  run_command->add_option("--mesh", run_options.mesh, "closed surface mesh that takes the place of the scene's body")
+      ->type_name("FILE");
+  run_command->add_option("--unit", run_options.unit, "what one unit of the mesh is: mm, cm or m")
+      ->capture_default_str()
+      ->type_name("U")
+      ->needs("--mesh");
+  run_command->add_option("--particles", run_options.particles, "how many particles the body is to have")
+      ->type_name("N")
+      ->check(CLI::PositiveNumber);
+  run_command->add_option("--frames", run_options.frames, "stop after so many frames of the scene")
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber);
+  run_command->add_flag("--check", run_options.check,
+                        "judge every frame with every oracle, and the scene's expectations");
+  run_command->add_option("--record", run_options.record, "keep every frame, for `cutproof check` and ParaView")
+      ->type_name("F");
+  run_command->add_option("--json", run_options.json, "write verdicts, stage times and counts")->type_name("F");
+
+  CheckOptions check_options;
+  CLI::App* check_command = app.add_subcommand("check", "judge a recording");
+  check_command->add_option("recording", check_options.recording, "what --record was given")
+      ->required()
+      ->type_name("RECORDING");
+  check_command->add_option("--json", check_options.json, "write verdicts and counts")->type_name("F");
+
+  InfoOptions info_options;
+  CLI::App* info_command = app.add_subcommand("info", "version, backends, devices");
+  info_command->add_flag("--scene", info_options.scene, "list every field of a scene file");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& asked) {  // --help, --version
+    return app.exit(asked);
+  } catch (const CLI::ParseError& error) {
+    if (argc <= 1) {
+      fmt::print(stderr, "{}", app.help());
+    } else {
+      app.exit(error);
+    }
+    return 2;
+  }
+  try {
+    if (run_command->parsed()) {
+      if (run_options.scene.empty()) {
+        fmt::print(stderr, "{}", kNextSteps);
+        return 2;
+      }
+      return run(run_options);
+    }
+    if (check_command->parsed()) return check(check_options);
+    if (info_command->parsed()) return info(info_options);
+  } catch (...) {
+    return status_of(std::current_exception());
+  }
+  return 2;
+}

@@ -1,0 +1,91 @@
+#include "cli/results.h"
+
+#include <cmath>
+
+#include "cli/commands.h"
+#include "model/stage.h"
+
+namespace cutproof::cli {
+
+namespace {
+
+// JSON has no NaN and no infinity; they are written as the words that a reader can tell from a number.
+nlohmann::json number(double value) {
+  if (std::isnan(value)) return "nan";
+  if (std::isinf(value)) return value > 0 ? "inf" : "-inf";
+  return value;
+}
+
+nlohmann::json to_json(const FrameResult& frame, bool timed) {
+  nlohmann::json stages = nlohmann::json::array();
+  nlohmann::json seconds = nlohmann::json::object();
+  for (const Stage stage : kStages) {
+    const auto index = static_cast<std::size_t>(stage);
+    if (!frame.ran[index]) continue;
+    stages.push_back(name_of(stage));
+    if (timed) seconds[std::string(name_of(stage))] = frame.seconds[index];
+  }
+  nlohmann::json result = {{"frame", frame.frame},        {"stages", stages},         {"removed", frame.removed},
+                           {"debris", frame.debris},      {"particles", frame.alive}, {"clusters", frame.clusters},
+                           {"triangles", frame.triangles}};
+  if (timed) result["seconds"] = seconds;
+  return result;
+}
+
+}  // namespace
+
+nlohmann::json to_json(const Verdict& verdict, bool expected_failure) {
+  nlohmann::json result = {{"property", verdict.property},
+                           {"stage", name_of(verdict.stage)},
+                           {"backend", verdict.backend},
+                           {"frame", verdict.frame},
+                           {"body", verdict.body},
+                           {"holds", verdict.holds},
+                           {"measured", number(verdict.measured)},
+                           {"bound", number(verdict.bound)},
+                           {"unit", verdict.unit},
+                           {"bound_source", verdict.bound_source},
+                           {"checked", verdict.checked}};
+  if (expected_failure && !verdict.holds) result["expected_failure"] = true;
+  if (!verdict.holds) {
+    result["witness"] = {{"text", verdict.witness.text},
+                         {"clusters", verdict.witness.clusters},
+                         {"particles", verdict.witness.particles},
+                         {"path", verdict.witness.path}};
+  }
+  return result;
+}
+
+nlohmann::json to_json(const RunResult& result, const Gate* gate) {
+  nlohmann::json document = {{"format", "cutproof." + result.command},
+                             {"format_version", 1},
+                             {"cutproof", kVersion},
+                             {"source", result.source},
+                             {"scene", result.scene},
+                             {"backend", result.backend},
+                             {"seed", result.seed},
+                             {"body",
+                              {{"name", result.body},
+                               {"spacing", result.spacing},
+                               {"particles", result.particles},
+                               {"clusters", result.clusters_at_start}}}};
+  document["frames"] = nlohmann::json::array();
+  for (const FrameResult& frame : result.frames) document["frames"].push_back(to_json(frame, result.timed));
+  document["checked"] = gate != nullptr;
+  if (gate != nullptr) {
+    document["verdicts"] = nlohmann::json::array();
+    int64_t failed = 0, expected = 0;
+    for (const Verdict& verdict : gate->verdicts()) {
+      const bool foreseen = gate->expected_failure(verdict);
+      document["verdicts"].push_back(to_json(verdict, foreseen));
+      if (!verdict.holds) ++(foreseen ? expected : failed);
+    }
+    document["summary"] = {{"holds", gate->holds()},
+                           {"verdicts", gate->verdicts().size()},
+                           {"failed", failed},
+                           {"failed_as_expected", expected}};
+  }
+  return document;
+}
+
+}  // namespace cutproof::cli

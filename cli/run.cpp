@@ -1,0 +1,175 @@
+#include <fmt/format.h>
+
+#include <functional>
+#include <map>
+#include <optional>
+
+#include "cli/commands.h"
+#include "cli/gate.h"
+#include "cli/results.h"
+#include "cli/terminal.h"
+#include "fixtures/bodies.h"
+#include "fixtures/build.h"
+#include "model/error.h"
+#include "model/io/atomic_file.h"
+#include "model/io/recording.h"
+#include "model/io/scene_io.h"
+#include "reference_cpu/reference.h"
+
+namespace cutproof::cli {
+
+namespace {
+
+double metres_per(const std::string& unit) {
+  static const std::map<std::string, double> kUnits = {{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}};
+  const auto found = kUnits.find(unit);
+  if (found == kUnits.end()) {
+    throw InputError("command line", "--unit", fmt::format("'{}' is not a unit", unit), "use mm, cm or m");
+  }
+  return found->second;
+}
+
+std::unique_ptr<Backend> make_backend(const std::string& name) {
+  if (name == "reference") return reference::make_backend();
+  throw InputError("command line", "--backend", fmt::format("there is no backend '{}'", name),
+                   "use one of those that `cutproof info` lists: reference");
+}
+
+// Runs one frame and hands its snapshots to `see`: after every stage that ran from detect on if something was removed,
+// else once, after the last stage. Without anyone to see them the frame runs whole.
+FrameResult run_frame(Backend& backend, bool watched, const std::function<void(Stage, const State&)>& see) {
+  FrameResult result;
+  const auto run = [&](Span span) {
+    backend.run(span);
+    const SpanReport report = backend.report();
+    for (const Stage stage : kStages) {
+      const auto s = static_cast<std::size_t>(stage);
+      result.ran[s] = result.ran[s] || report.ran[s];
+      result.seconds[s] += report.seconds[s];
+    }
+  };
+  const auto ran = [&](Stage stage) { return result.ran[static_cast<std::size_t>(stage)]; };
+
+  if (!watched) {
+    run({Stage::step, Stage::skin});
+  } else {
+    run({Stage::step, Stage::step});
+    run({Stage::detect, Stage::detect});
+    const bool cut = ran(Stage::detect) && !backend.snapshot().front().removed.empty();
+    if (cut) see(Stage::detect, backend.snapshot().front());
+    for (const Stage stage : {Stage::split, Stage::merge, Stage::expand}) {
+      run({stage, stage});
+      if (cut && ran(stage)) see(stage, backend.snapshot().front());
+    }
+    run({Stage::skin, Stage::skin});
+  }
+  const State state = backend.snapshot().front();
+  if (watched) see(Stage::skin, state);
+  result.frame = state.frame - 1;
+  result.removed = static_cast<int64_t>(state.removed.size());
+  result.debris = static_cast<int64_t>(state.debris.size());
+  for (const uint8_t alive : state.alive) result.alive += alive;
+  result.clusters = state.clusters.count();
+  result.triangles = static_cast<int64_t>(state.skin.triangles.size());
+  return result;
+}
+
+void print_header(const Scene& scene, const fixtures::Built& built, const RunOptions& options) {
+  const Body& body = built.setup.body;
+  const fixtures::Bounds box = fixtures::path_box(body);
+  const Vec3 size = 1e3 * (box.high - box.low);
+  fmt::print("scene {}: {}\n", scene.name, scene.description);
+  fmt::print("body {}, {:.4g} × {:.4g} × {:.4g} mm, {} particles at h = {:.4g} mm, {} clusters\n", body.name, size.x,
+             size.y, size.z, body.particle_count(), body.grid.spacing * 1e3, built.state.clusters.count());
+  if (!options.mesh.empty()) fmt::print("one unit of the mesh is 1 {} (--unit changes that)\n", options.unit);
+  fmt::print("{} frames of {} substeps × {} iterations, backend {}, seed {}\n", built.setup.frame_count(),
+             built.setup.step.substeps, built.setup.step.iterations, options.backend, scene.seed);
+}
+
+void print_summary(const RunResult& result) {
+  std::array<double, 6> seconds = {};
+  std::array<int64_t, 6> launched = {};
+  int64_t removed = 0, debris = 0;
+  for (const FrameResult& frame : result.frames) {
+    for (std::size_t s = 0; s < 6; ++s) {
+      seconds[s] += frame.seconds[s];
+      launched[s] += frame.ran[s];
+    }
+    removed += frame.removed;
+    debris += frame.debris;
+  }
+  fmt::print("\n{:<8} {:>7} {:>14}\n", "stage", "frames", "ms per frame");
+  for (const Stage stage : kStages) {
+    const auto s = static_cast<std::size_t>(stage);
+    fmt::print("{:<8} {:>7} {:>14}\n", name_of(stage), launched[s],
+               launched[s] == 0 ? "-" : fmt::format("{:.3f}", 1e3 * seconds[s] / static_cast<double>(launched[s])));
+  }
+  const int64_t clusters = result.frames.empty() ? result.clusters_at_start : result.frames.back().clusters;
+  fmt::print("removed {} particles ({} as debris); clusters {} -> {}\n", removed + debris, debris,
+             result.clusters_at_start, clusters);
+}
+
+}  // namespace
+
+int run(const RunOptions& options) {
+  fixtures::BuildOptions build_options;
+  if (!options.mesh.empty()) build_options.mesh = MeshSpec{options.mesh, metres_per(options.unit)};
+  build_options.particles = options.particles;
+  build_options.frames = options.frames;
+  const std::unique_ptr<Backend> backend = make_backend(options.backend);
+
+  const Scene scene = io::read_scene(options.scene);
+  const fixtures::Built built = fixtures::build(scene, options.scene, build_options);
+  // Opened before the work, so that a folder that cannot be written to is found out now and not after it.
+  std::optional<io::AtomicFile> json_file;
+  if (!options.json.empty()) json_file.emplace(options.json);
+  std::optional<io::Recorder> recorder;
+  if (!options.record.empty()) recorder.emplace(options.record, built.setup, io::write_scene(scene), options.backend);
+  std::optional<Gate> gate;
+  if (options.check) gate.emplace(built.setup, scene.expect, options.backend, built.state);
+  print_header(scene, built, options);
+
+  RunResult result{"run",
+                   options.scene,
+                   scene.name,
+                   options.backend,
+                   scene.seed,
+                   built.setup.body.name,
+                   built.setup.body.grid.spacing,
+                   built.setup.body.particle_count(),
+                   built.state.clusters.count(),
+                   true,
+                   {}};
+  if (recorder) recorder->add(Stage::skin, built.state);
+  backend->load({built.setup}, {built.state});
+  {
+    Progress progress(built.setup.frame_count());
+    for (int64_t frame = 0; frame < built.setup.frame_count(); ++frame) {
+      result.frames.push_back(run_frame(*backend, gate || recorder, [&](Stage stage, const State& state) {
+        if (gate) gate->see(stage, state);
+        if (recorder) recorder->add(stage, state);
+      }));
+      progress.show(frame + 1, fmt::format("{} clusters, {} particles", result.frames.back().clusters,
+                                           result.frames.back().alive));
+    }
+  }
+  print_summary(result);
+  if (gate) {
+    gate->finish();
+    print_verdicts(*gate);
+  }
+  if (recorder) {
+    recorder->finish();
+    const io::RecordingPaths paths = io::recording_paths(options.record);
+    fmt::print("recorded {} (for ParaView: {}, {}, {})\n", paths.index, paths.particles, paths.skin, paths.blade);
+  }
+  if (json_file) {
+    io::write_text(json_file->temporary(), to_json(result, gate ? &*gate : nullptr).dump(1) + "\n");
+    json_file->commit();
+    fmt::print("wrote {}\n", options.json);
+  }
+  if (!gate) fmt::print("nothing was judged: add --check for that\n");
+  return !gate || gate->holds() ? 0 : 1;
+}
+
+}  // namespace cutproof::cli

@@ -1,0 +1,91 @@
+#include "cli/terminal.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <vector>
+
+namespace cutproof::cli {
+
+namespace {
+
+double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+constexpr std::size_t kMostFailuresShown = 5;
+
+struct Row {
+  const Verdict* worst = nullptr;  // the failing one with the greatest measure, or the greatest that holds
+  int64_t frames = 0, failed = 0, expected = 0, checked = 0;
+};
+
+std::string figure(double value) { return fmt::format("{:.4g}", value); }
+
+}  // namespace
+
+Progress::Progress(int64_t total) : total_(total), terminal_(isatty(STDERR_FILENO) != 0) {}
+
+Progress::~Progress() { clear(); }
+
+void Progress::clear() {
+  if (!terminal_ || width_ == 0) return;
+  fmt::print(stderr, "\r{:{}}\r", "", width_);
+  std::fflush(stderr);
+  width_ = 0;
+}
+
+void Progress::show(int64_t done, const std::string& what) {
+  if (!terminal_ || (now() - last_ < 0.1 && done < total_)) return;
+  last_ = now();
+  const std::string line = fmt::format("frame {} of {}: {}", done, total_, what);
+  clear();
+  fmt::print(stderr, "\r{}", line);
+  std::fflush(stderr);
+  width_ = line.size();
+}
+
+void print_verdicts(const Gate& gate) {
+  std::vector<std::pair<std::string, Row>> rows;  // in order of first appearance
+  for (const Verdict& verdict : gate.verdicts()) {
+    // Expectations are read one by one; properties are gathered over frames.
+    const std::string key = fmt::format("{}\t{}", verdict.property, name_of(verdict.stage));
+    auto found = rows.begin();
+    while (found != rows.end() && found->first != key) ++found;
+    if (found == rows.end()) found = rows.insert(rows.end(), {key, {}});
+    Row& row = found->second;
+    row.frames += verdict.checked > 0 || !verdict.holds;
+    row.checked += verdict.checked;
+    if (!verdict.holds) ++(gate.expected_failure(verdict) ? row.expected : row.failed);
+    const bool worse = row.worst == nullptr || (row.worst->holds && !verdict.holds) ||
+                       (row.worst->holds == verdict.holds && verdict.measured > row.worst->measured);
+    if (worse) row.worst = &verdict;
+  }
+  fmt::print("\n{:<34} {:<7} {:>7} {:>12} {:>7} {:>11} {:>11} {:<10} {}\n", "property", "after", "frames", "checked",
+             "failed", "worst", "bound", "unit", "");
+  for (const auto& [key, row] : rows) {
+    const Verdict& worst = *row.worst;
+    const char* mark = row.failed > 0     ? "FAILS"
+                       : row.expected > 0 ? "fails, as the scene expects"
+                       : row.frames == 0  ? "vacuous"
+                                          : "holds";
+    fmt::print("{:<34} {:<7} {:>7} {:>12} {:>7} {:>11} {:>11} {:<10} {}\n", worst.property, name_of(worst.stage),
+               row.frames, row.checked, row.failed + row.expected, figure(worst.measured), figure(worst.bound),
+               worst.unit, mark);
+  }
+  std::size_t failures = 0;
+  for (const Verdict& verdict : gate.verdicts()) {
+    if (verdict.holds || gate.expected_failure(verdict)) continue;
+    if (++failures > kMostFailuresShown) continue;
+    fmt::print("\nFAILS: {} after {}, frame {}, backend {}\n  measured {} {}, bound {} ({})\n  {}\n", verdict.property,
+               name_of(verdict.stage), verdict.frame, verdict.backend, figure(verdict.measured), verdict.unit,
+               figure(verdict.bound), verdict.bound_source, verdict.witness.text);
+  }
+  if (failures > kMostFailuresShown) {
+    fmt::print("\n… and {} more failing verdicts; --json holds all of them.\n", failures - kMostFailuresShown);
+  }
+  fmt::print("\n{} verdicts, {} failed: {}\n", gate.verdicts().size(), failures,
+             gate.holds() ? "everything holds." : "NOT everything holds.");
+}
+
+}  // namespace cutproof::cli

@@ -1,0 +1,28 @@
+// What a person sees: progress on a terminal (silent when piped) and the table of verdicts.
+#pragma once
+#include <cstdint>
+#include <string>
+
+#include "cli/gate.h"
+
+namespace cutproof::cli {
+
+class Progress {
+ public:
+  explicit Progress(int64_t total);
+  ~Progress();
+  void show(int64_t done, const std::string& what);
+
+ private:
+  void clear();
+  int64_t total_;
+  bool terminal_;
+  std::size_t width_ = 0;
+  double last_ = -1;
+};
+
+// One row per property and stage: how often judged, how often it failed, the worst figure beside its bound; then the
+// first failures with their witnesses, and one line that says whether everything holds.
+void print_verdicts(const Gate& gate);
+
+}  // namespace cutproof::cli
