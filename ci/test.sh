@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# Installs what is missing, builds, runs every test. The last line is "N passed, N failed, N skipped".
+# CUTPROOF_MESHES: a folder with outside meshes; tests on them say so when it is unset.
+# CUTPROOF_PRESET: another preset of CMakePresets.json (debug, asan, tsan).
+set -euo pipefail
+cd "$(dirname "$0")/.."
+preset=${CUTPROOF_PRESET:-default}
+
+ci/install.sh
+werror=()
+[ "${CI:-}" = true ] && werror=(-DCUTPROOF_WERROR=ON)
+cmake --preset "$preset" "${werror[@]}" >/dev/null
+build=build/$preset
+cmake --build "$build"
+
+report=$build/tests.xml
+status=0
+ctest --test-dir "$build" --output-on-failure --no-tests=error -j "$(nproc)" --output-junit "$PWD/$report" || status=$?
+[ -s "$report" ] || { echo "no test was run"; echo "0 passed, 1 failed, 0 skipped"; exit 1; }
+exec /usr/bin/env python3 ci/count_tests.py "$report" "$status"
