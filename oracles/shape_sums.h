@@ -1,0 +1,81 @@
+// Internal to oracles/: the sums of shape matching (method.md §2, §3), written down a second time so that no oracle
+// trusts what a backend stored, and the constants of the rounding bounds of docs/tolerances.md.
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "model/setup.h"
+#include "model/state.h"
+
+namespace cutproof::oracles {
+
+// u: relative error of one rounding in double precision.
+inline constexpr double kUnitRoundoff = 0x1p-53;
+
+// n_i: in how many clusters each particle lies.
+inline std::vector<int32_t> membership_counts(const Clusters& clusters, int32_t particle_count) {
+  std::vector<int32_t> count(static_cast<std::size_t>(particle_count), 0);
+  for (const int32_t particle : clusters.members) ++count[static_cast<std::size_t>(particle)];
+  return count;
+}
+
+// w_ic = m_i / n_i, the same for every cluster of i. Requires i to lie in a cluster.
+inline double weight_of(const Body& body, const std::vector<int32_t>& counts, int32_t particle) {
+  const auto i = static_cast<std::size_t>(particle);
+  return body.mass[i] / counts[i];
+}
+
+// A cluster's weighted means at rest and now, recomputed from the memberships.
+struct ClusterMeans {
+  double mass = 0;  // M_c [kg]
+  Vec3 rest;        // T_c [m]
+  Vec3 current;     // t_c [m]
+};
+
+inline ClusterMeans cluster_means(const Body& body, const Clusters& clusters, const std::vector<int32_t>& counts,
+                                  const std::vector<Vec3>& x, int32_t cluster) {
+  ClusterMeans means;
+  for (const int32_t i : clusters.of(cluster)) {
+    const double w = weight_of(body, counts, i);
+    means.mass += w;
+    means.rest += w * body.rest_position(i);
+    means.current += w * x[static_cast<std::size_t>(i)];
+  }
+  means.rest = means.rest / means.mass;
+  means.current = means.current / means.mass;
+  return means;
+}
+
+// Figures that enter every rounding bound of docs/tolerances.md.
+struct RoundingScale {
+  int64_t largest_cluster = 0;   // N: most particles in one cluster
+  int32_t most_memberships = 0;  // n: most clusters of one particle
+  double extent = 0;             // greatest |x| or |X| of an alive particle from the body's origin [m]
+};
+
+inline RoundingScale rounding_scale(const Setup& setup, const State& state) {
+  RoundingScale scale;
+  for (int32_t c = 0; c < state.clusters.count(); ++c) {
+    scale.largest_cluster = std::max(scale.largest_cluster, state.clusters.size(c));
+  }
+  for (const int32_t count : membership_counts(state.clusters, setup.body.particle_count())) {
+    scale.most_memberships = std::max(scale.most_memberships, count);
+  }
+  for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
+    if (!state.alive[static_cast<std::size_t>(i)]) continue;
+    scale.extent =
+        std::max({scale.extent, norm(setup.body.rest_position(i)), norm(state.x[static_cast<std::size_t>(i)])});
+  }
+  return scale;
+}
+
+// docs/tolerances.md, "One goal position": the error of one evaluation of g_i or of a skin vertex, given the
+// rotations [m].
+inline double goal_rounding(const RoundingScale& scale) {
+  const double operations = 2.0 * static_cast<double>(scale.largest_cluster) + scale.most_memberships + 16.0;
+  return 3.0 * std::sqrt(3.0) * operations * kUnitRoundoff * scale.extent;
+}
+
+}  // namespace cutproof::oracles
