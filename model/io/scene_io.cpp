@@ -1,0 +1,730 @@
+#include "model/io/scene_io.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <optional>
+#include <set>
+#include <type_traits>
+#include <vector>
+
+#include "model/error.h"
+#include "model/io/atomic_file.h"
+#include "model/io/scene_fields.h"
+
+namespace cutproof::io {
+namespace {
+
+using nlohmann::json;
+using nlohmann::ordered_json;
+
+template <class T>
+inline constexpr bool is_vector = false;
+template <class T>
+inline constexpr bool is_vector<std::vector<T>> = true;
+template <class T>
+inline constexpr bool is_optional = false;
+template <class T>
+inline constexpr bool is_optional<std::optional<T>> = true;
+template <class T>
+inline constexpr bool is_integer = std::is_integral_v<T> && !std::is_same_v<T, bool>;
+
+// Shapes inside shapes: deeper than any person writes, shallower than what recursion could not bear.
+constexpr int kDeepest = 64;
+// How far from the left a small array or object may reach on one line.
+constexpr std::size_t kLineLength = 100;
+
+std::string join(const std::string& path, std::string_view name) {
+  return path.empty() ? std::string(name) : fmt::format("{}.{}", path, name);
+}
+
+std::string number_text(double x) { return fmt::format("{}", x); }
+
+std::string bounds_text(const Bounds& b, std::string_view unit) {
+  const bool low = std::isfinite(b.low), high = std::isfinite(b.high);
+  std::string text;
+  if (low) text = fmt::format("{} {}", b.open_low ? "greater than" : "at least", number_text(b.low));
+  if (high) {
+    if (low) text += " and ";
+    text += fmt::format("{} {}", b.open_high ? "less than" : "at most", number_text(b.high));
+  }
+  if (!unit.empty() && !text.empty()) text += fmt::format(" [{}]", unit);
+  return text;
+}
+
+template <class E>
+std::string word_of(E value) {
+  for (const auto& [enumerator, word] : words(E{})) {
+    if (enumerator == value) return std::string(word);
+  }
+  return "";
+}
+
+template <class E>
+std::string all_words(const char* quote) {
+  std::string text;
+  for (const auto& [enumerator, word] : words(E{})) {
+    text += fmt::format("{}{}{}{}", text.empty() ? "" : ", ", quote, word, quote);
+  }
+  return text;
+}
+
+// --- From text to a JSON tree ----------------------------------------------------------------------------------------
+
+// Follows the parser, so that errors can say in which field they are, and refuses a field that is given twice (which
+// JSON libraries let pass, and then one of the two is lost).
+class PathTracker {
+ public:
+  explicit PathTracker(std::string file) : file_(std::move(file)) {}
+
+  bool operator()(int, json::parse_event_t event, json& parsed) {
+    using Event = json::parse_event_t;
+    switch (event) {
+      case Event::object_start:
+      case Event::array_start:
+        next_entry();
+        levels_.push_back({event == Event::array_start, -1, "", {}});
+        break;
+      case Event::object_end:
+      case Event::array_end:
+        levels_.pop_back();
+        break;
+      case Event::key: {
+        Level& level = levels_.back();
+        level.key = parsed.get<std::string>();
+        if (!level.keys.insert(level.key).second) {
+          throw InputError(file_, path(), "This field is given twice.", "Keep one of the two.");
+        }
+        break;
+      }
+      case Event::value:
+        next_entry();
+        break;
+    }
+    return true;
+  }
+
+  std::string path() const {
+    std::string text;
+    for (const Level& level : levels_) {
+      if (level.list) {
+        if (level.index >= 0) text += fmt::format("[{}]", level.index);
+      } else if (!level.key.empty()) {
+        text = join(text, level.key);
+      }
+    }
+    return text;
+  }
+
+ private:
+  struct Level {
+    bool list;
+    int64_t index;
+    std::string key;
+    std::set<std::string> keys;
+  };
+  void next_entry() {
+    if (!levels_.empty() && levels_.back().list) ++levels_.back().index;
+  }
+  std::string file_;
+  std::vector<Level> levels_;
+};
+
+std::string position_text(const std::string& text, std::size_t byte) {
+  const std::size_t end = std::min(byte == 0 ? 0 : byte - 1, text.size());
+  const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(end), '\n');
+  const std::size_t newline = end == 0 ? std::string::npos : text.rfind('\n', end - 1);
+  const std::size_t column = newline == std::string::npos ? end + 1 : end - newline;
+  return fmt::format("line {}, column {}", line, column);
+}
+
+// The sentence in a message of the library, without its number and position.
+std::string parser_message(const std::string& what) {
+  const std::size_t column = what.find("column ");
+  const std::size_t start = what.find(": ", column == std::string::npos ? 0 : column);
+  return start == std::string::npos ? what : what.substr(start + 2);
+}
+
+json parse_tree(const std::string& text, const std::string& name) {
+  if (text.find_first_not_of(" \t\r\n") == std::string::npos) {
+    throw InputError(name, "", "The file is empty.", "A scene is a JSON object; docs/scene.md lists its fields.");
+  }
+  PathTracker tracker(name);
+  try {
+    return json::parse(text, std::ref(tracker));
+  } catch (const json::parse_error& error) {
+    const std::string message = parser_message(error.what());
+    std::string remedy = "Correct the JSON there: fields are \"name\": value, separated by commas, without comments.";
+    const std::size_t quoted = message.find("last read: ");
+    const std::string last = quoted == std::string::npos ? "" : message.substr(quoted);
+    if (last.find_first_of("NI") != std::string::npos || last.find("na'") != std::string::npos ||
+        last.find("inf") != std::string::npos) {
+      remedy = "If this is NaN or Infinity: neither is a value in JSON or in a scene. Give a finite number.";
+    }
+    throw InputError(name, position_text(text, error.byte), fmt::format("This is not valid JSON: {}.", message),
+                     remedy);
+  } catch (const json::out_of_range& error) {
+    const std::string what = error.what();
+    const std::size_t quote = what.find('\'');
+    throw InputError(name, tracker.path(),
+                     fmt::format("The number{} is out of range: no finite number is that large.",
+                                 quote == std::string::npos ? "" : " " + what.substr(quote)),
+                     "Give a finite number below 1e308.");
+  }
+}
+
+// --- Reading ---------------------------------------------------------------------------------------------------------
+
+std::string type_text(const json& value) {
+  if (value.is_null()) return "null";
+  if (value.is_boolean()) return value.get<bool>() ? "true" : "false";
+  if (value.is_number()) return "the number " + value.dump();
+  if (value.is_string()) {
+    const auto text = value.get<std::string>();
+    return text.size() > 40 ? "a text" : fmt::format("the text \"{}\"", text);
+  }
+  return value.is_array() ? "a list" : "an object";
+}
+
+// Levenshtein's distance: insertions, deletions and substitutions from one word to the other.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = std::exchange(row[0], i);
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = std::exchange(row[j], std::min({row[j] + 1, row[j - 1] + 1, substituted}));
+    }
+  }
+  return row[b.size()];
+}
+
+// Where a value stands: in which file, under which path.
+struct Place {
+  std::string file;
+  std::string path;
+  int depth = 0;
+
+  Place inner(std::string_view name) const { return {file, join(path, name), depth + 1}; }
+  Place entry(std::size_t index) const { return {file, fmt::format("{}[{}]", path, index), depth + 1}; }
+  [[noreturn]] void fail(const std::string& problem, const std::string& remedy) const {
+    throw InputError(file, path, problem, remedy);
+  }
+};
+
+void require_bounds(double value, const std::string& text, const Field& field, const Place& at) {
+  if (field.bounds.contains(value)) return;
+  at.fail(fmt::format("The value {} is out of bounds.", text),
+          fmt::format("Give a number {}.", bounds_text(field.bounds, field.unit)));
+}
+
+template <class T>
+requires std::is_floating_point_v<T>
+void read(const json& value, const Place& at, const Field& field, T& out) {
+  if (!value.is_number())
+    at.fail(fmt::format("A number is needed, and this is {}.", type_text(value)),
+            "Give a number without quotation marks.");
+  const double number = value.get<double>();
+  require_bounds(number, value.dump(), field, at);
+  out = number;
+}
+
+template <class T>
+requires is_integer<T>
+void read(const json& value, const Place& at, const Field& field, T& out) {
+  // 1e5 and 5.0 are whole numbers too, although JSON's grammar does not call them integers.
+  const bool whole =
+      value.is_number_integer() || (value.is_number_float() && std::floor(value.get<double>()) == value.get<double>());
+  if (!whole)
+    at.fail(fmt::format("A whole number is needed, and this is {}.", type_text(value)),
+            "Give a whole number without quotation marks.");
+  const double approximate = value.get<double>();
+  require_bounds(approximate, value.dump(), field, at);
+  // 2^53: beyond it a number written with a fraction or an exponent is not exact.
+  if (!value.is_number_integer() && std::abs(approximate) > 9007199254740992.0) {
+    at.fail(fmt::format("The whole number {} is too large to be exact in this notation.", value.dump()),
+            "Write it with digits only.");
+  }
+  out = value.is_number_integer() ? value.get<T>() : static_cast<T>(approximate);
+}
+
+void read(const json& value, const Place& at, const Field&, bool& out) {
+  if (!value.is_boolean())
+    at.fail(fmt::format("true or false is needed, and this is {}.", type_text(value)),
+            "Write true or false without quotation marks.");
+  out = value.get<bool>();
+}
+
+void read(const json& value, const Place& at, const Field&, std::string& out) {
+  if (!value.is_string())
+    at.fail(fmt::format("A text is needed, and this is {}.", type_text(value)), "Put it in quotation marks.");
+  out = value.get<std::string>();
+}
+
+void read(const json& value, const Place& at, const Field& field, Vec3& out) {
+  if (!value.is_array() || value.size() != 3) {
+    at.fail(fmt::format("A vector is needed, and this is {}{}.", type_text(value),
+                        value.is_array() ? fmt::format(" of {} entries", value.size()) : ""),
+            "Give three numbers: [x, y, z].");
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    read(value[axis], at.entry(axis), field, out[static_cast<int>(axis)]);
+  }
+}
+
+void read(const json& value, const Place& at, const Field& field, Range& out) {
+  if (value.is_number()) {
+    read(value, at, field, out.low);
+    out.high = out.low;
+    return;
+  }
+  const char* remedy = "Give a number, or {\"at_least\": a}, {\"at_most\": b}, or both.";
+  if (!value.is_object() || value.empty()) {
+    at.fail(fmt::format("A range is needed, and this is {}.", value.is_object() ? "an empty object" : type_text(value)),
+            remedy);
+  }
+  out = {-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+  for (const auto& [key, bound] : value.items()) {
+    if (key != "at_least" && key != "at_most") at.inner(key).fail("This field is not known.", remedy);
+    read(bound, at.inner(key), field, key == "at_least" ? out.low : out.high);
+  }
+  if (out.low > out.high) {
+    at.fail(fmt::format("at_least {} is greater than at_most {}.", out.low, out.high), "Exchange the two.");
+  }
+}
+
+template <class E>
+requires std::is_enum_v<E>
+void read(const json& value, const Place& at, const Field&, E& out) {
+  if (value.is_string()) {
+    const auto given = value.get<std::string>();
+    for (const auto& [enumerator, word] : words(E{})) {
+      if (word == given) {
+        out = enumerator;
+        return;
+      }
+    }
+  }
+  at.fail(fmt::format("{} is none of the known words.", type_text(value)),
+          fmt::format("Give one of {}.", all_words<E>("\"")));
+}
+
+// Structs with fields, lists and optional values refer to each other.
+template <class T>
+requires std::is_class_v<T>
+void read(const json& value, const Place& at, const Field& field, T& out);
+
+template <class T>
+void read(const json& value, const Place& at, const Field& field, std::optional<T>& out) {
+  read(value, at, field, out.emplace());
+}
+
+template <class T>
+void read(const json& value, const Place& at, const Field& field, std::vector<T>& out) {
+  if (!value.is_array())
+    at.fail(fmt::format("A list is needed, and this is {}.", type_text(value)), "Put the entries in square brackets.");
+  out.clear();
+  for (std::size_t i = 0; i < value.size(); ++i) read(value[i], at.entry(i), field, out.emplace_back());
+}
+
+// --- What no single field can say: conditions between the fields of one object -----------------------------------
+template <class T>
+void check(const T&, const Place&) {}
+
+void check(const Shape& s, const Place& at) {
+  if ((s.kind == Shape::Kind::union_of || s.kind == Shape::Kind::difference) && s.parts.empty()) {
+    at.inner("parts").fail("The list of parts is empty or missing.", "Give at least one shape.");
+  }
+}
+
+void check(const BodySpec& s, const Place& at) {
+  if (s.shape.has_value() == s.mesh.has_value()) {
+    at.fail(s.shape ? "Both shape and mesh are given." : "Neither shape nor mesh is given.",
+            "Give exactly one of \"shape\" and \"mesh\".");
+  }
+  if ((s.spacing > 0) == (s.particles > 0)) {
+    at.fail(s.spacing > 0 ? "Both spacing and particles are given." : "Neither spacing nor particles is given.",
+            "Give exactly one of \"spacing\" [m] and \"particles\".");
+  }
+}
+
+void check(const MeshSpec& s, const Place& at) {
+  if (s.file.empty()) at.inner("file").fail("The file's name is empty.", "Name a mesh file.");
+}
+
+void check(const StrokeSpec& s, const Place& at) {
+  const Place points = at.inner("points");
+  if (s.points.size() < 2) {
+    points.fail(fmt::format("The blade's path is empty: this stroke has {} point{}.", s.points.size(),
+                            s.points.size() == 1 ? "" : "s"),
+                "Give at least two points.");
+  }
+  if (s.curve == Curve::arc && s.points.size() != 3) {
+    points.fail(fmt::format("An arc needs three points, and {} are given.", s.points.size()),
+                "Give a first point, one on the way, and a last one; or choose \"curve\": \"line\".");
+  }
+  const bool still =
+      std::all_of(s.points.begin(), s.points.end(), [&s](const Vec3& p) { return p == s.points.front(); });
+  if (still && s.points.size() > 2) {
+    points.fail("The blade's path is empty: all points of this stroke are the same.",
+                "Give points that differ. (A stroke that stands still on purpose has two equal points.)");
+  }
+}
+
+void check(const BladeSpec& s, const Place& at) {
+  if (s.strokes.empty()) {
+    at.inner("strokes").fail("The blade's path is empty: there is no stroke.",
+                             "Give at least one stroke with two points, or leave out \"blade\".");
+  }
+}
+
+void check(const WallSpec& s, const Place& at) {
+  if (s.side == 0) at.inner("side").fail("The value 0 is out of bounds.", "Give 1 or -1.");
+}
+
+void check(const GripSpec& s, const Place& at) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (s.low[axis] > s.high[axis]) {
+      at.inner("low").fail(fmt::format("The lower corner {} lies above the upper one {} along {}.", s.low[axis],
+                                       s.high[axis], "xyz"[axis]),
+                           "Exchange the two.");
+    }
+  }
+  if (s.end >= 0 && s.end <= s.start) {
+    at.inner("end").fail(fmt::format("The grip ends at {} s and starts at {} s.", s.end, s.start),
+                         "Give an end after the start, or leave it out to hold until the scene ends.");
+  }
+}
+
+// Reads the fields of one object.
+class Reader {
+ public:
+  Reader(const json& object, Place at) : object_(object), at_(std::move(at)) {
+    if (!object.is_object()) {
+      at_.fail(fmt::format("An object is needed, and this is {}.", type_text(object)),
+               "Put its fields in braces: {\"name\": value, ...}.");
+    }
+    if (at_.depth > kDeepest) at_.fail("Objects are nested too deeply.", "Nest at most 30 shapes.");
+  }
+
+  template <class T>
+  void field(const Field& f, T& value) {
+    known_.push_back(f.name);
+    const auto found = object_.find(std::string(f.name));
+    if (found == object_.end()) {
+      if (f.required) missing_.push_back(f.name);
+    } else {
+      read(*found, at_.inner(f.name), f, value);
+    }
+  }
+
+  template <class Describe>
+  void group(const Field& f, Describe&& describe_fields) {
+    known_.push_back(f.name);
+    const auto found = object_.find(std::string(f.name));
+    if (found == object_.end()) return;
+    Reader inner(*found, at_.inner(f.name));
+    describe_fields(inner);
+    inner.finish();
+  }
+
+  bool applies(bool condition) const { return condition; }
+
+  // Unknown fields come before missing ones: a misspelt field is both.
+  void finish() const {
+    for (const auto& [key, value] : object_.items()) {
+      if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
+      const auto nearest = std::min_element(known_.begin(), known_.end(), [&key](auto a, auto b) {
+        return edit_distance(key, a) < edit_distance(key, b);
+      });
+      const bool near = edit_distance(key, *nearest) <= std::max<std::size_t>(2, nearest->size() / 2);
+      at_.inner(key).fail(
+          "This field is not known here.",
+          fmt::format("{}Known here are: {}.", near ? fmt::format("Did you mean \"{}\"? ", *nearest) : "",
+                      fmt::join(known_, ", ")));
+    }
+    if (!missing_.empty()) at_.inner(missing_.front()).fail("This field is missing.", "It must be given.");
+  }
+
+ private:
+  const json& object_;
+  Place at_;
+  std::vector<std::string_view> known_, missing_;
+};
+
+template <class T>
+requires std::is_class_v<T>
+void read(const json& value, const Place& at, const Field&, T& out) {
+  Reader reader(value, at);
+  describe(reader, out);
+  reader.finish();
+  check(out, at);
+}
+
+// A scene of another version has other fields, so this comes before anything else.
+void require_version(const json& tree, const std::string& name) {
+  if (!tree.is_object()) {
+    throw InputError(name, "", fmt::format("A scene is an object, and this is {}.", type_text(tree)),
+                     "Put its fields in braces: {\"version\": 1, \"body\": ...}.");
+  }
+  const auto version = tree.find("version");
+  if (version == tree.end()) {
+    throw InputError(name, "version", "This field is missing.", "Add \"version\": 1 if this is a cutproof scene.");
+  }
+  if (!version->is_number() || version->get<double>() != 1) {
+    throw InputError(name, "version", fmt::format("This is {}, and only version 1 is known.", type_text(*version)),
+                     "Use a newer cutproof for a scene of a newer version.");
+  }
+}
+
+// --- Writing ---------------------------------------------------------------------------------------------------------
+
+class Writer;
+
+template <class T>
+ordered_json written(const T& value);
+
+class Writer {
+ public:
+  template <class T>
+  void field(const Field& f, const T& value) {
+    const std::string name(f.name);
+    if constexpr (is_optional<T>) {
+      if (value) object[name] = written(*value);
+    } else if constexpr (is_vector<T>) {
+      if (!value.empty() || f.required) object[name] = written(value);
+    } else {
+      object[name] = written(value);
+      if constexpr (std::is_arithmetic_v<T>) {
+        if (f.zero_is_absent && value == T{}) object.erase(name);
+      }
+    }
+  }
+  template <class Describe>
+  void group(const Field& f, Describe&& describe_fields) {
+    Writer inner;
+    describe_fields(inner);
+    object[std::string(f.name)] = std::move(inner.object);
+  }
+  bool applies(bool condition) const { return condition; }
+
+  ordered_json object = ordered_json::object();
+};
+
+template <class T>
+ordered_json written(const T& value) {
+  if constexpr (std::is_enum_v<T>) {
+    return word_of(value);
+  } else if constexpr (std::is_same_v<T, Vec3>) {
+    return ordered_json::array({value.x, value.y, value.z});
+  } else if constexpr (std::is_same_v<T, Range>) {
+    if (value.low == value.high) return value.low;
+    ordered_json range = ordered_json::object();
+    if (std::isfinite(value.low)) range["at_least"] = value.low;
+    if (std::isfinite(value.high)) range["at_most"] = value.high;
+    return range;
+  } else if constexpr (is_vector<T>) {
+    ordered_json list = ordered_json::array();
+    for (const auto& entry : value) list.push_back(written(entry));
+    return list;
+  } else if constexpr (std::is_class_v<T> && !std::is_same_v<T, std::string>) {
+    Writer writer;
+    T copy = value;  // the table of fields is written for values that can be changed
+    describe(writer, copy);
+    return std::move(writer.object);
+  } else {
+    return value;
+  }
+}
+
+std::string on_one_line(const ordered_json& value) {
+  std::string text;
+  if (value.is_object()) {
+    for (const auto& [key, entry] : value.items()) {
+      text += fmt::format("{}{}: {}", text.empty() ? "" : ", ", ordered_json(key).dump(), on_one_line(entry));
+    }
+    return "{" + text + "}";
+  }
+  if (value.is_array()) {
+    for (const auto& entry : value) text += (text.empty() ? "" : ", ") + on_one_line(entry);
+    return "[" + text + "]";
+  }
+  return value.dump();
+}
+
+// Indented, but what is short stays on one line: three numbers are one thing to a reader.
+std::string pretty(const ordered_json& value, std::size_t indent) {
+  std::string line = on_one_line(value);
+  const bool whole_scene = indent == 0;
+  if (!value.is_structured() || value.empty() || (!whole_scene && indent + line.size() <= kLineLength)) return line;
+  const std::string margin(indent + 2, ' ');
+  std::string text;
+  const bool is_object = value.is_object();
+  for (const auto& [key, entry] : value.items()) {
+    text += fmt::format("{}{}{}{}", text.empty() ? "\n" : ",\n", margin,
+                        is_object ? ordered_json(key).dump() + ": " : "", pretty(entry, indent + 2));
+  }
+  return fmt::format("{}{}\n{}{}", is_object ? '{' : '[', text, std::string(indent, ' '), is_object ? '}' : ']');
+}
+
+// --- Documentation ---------------------------------------------------------------------------------------------------
+
+template <class T>
+std::string type_name() {
+  if constexpr (is_optional<T>) {
+    return type_name<typename T::value_type>();
+  } else if constexpr (is_vector<T>) {
+    return "list of " + type_name<typename T::value_type>();
+  } else if constexpr (std::is_enum_v<T>) {
+    return all_words<T>("`");
+  } else if constexpr (std::is_same_v<T, Vec3>) {
+    return "[x, y, z]";
+  } else if constexpr (std::is_same_v<T, Range>) {
+    return "range";
+  } else if constexpr (std::is_same_v<T, bool>) {
+    return "true or false";
+  } else if constexpr (std::is_same_v<T, std::string>) {
+    return "text";
+  } else if constexpr (std::is_class_v<T>) {
+    return "object";
+  } else {
+    return is_integer<T> ? "whole number" : "number";
+  }
+}
+
+template <class T>
+struct Innermost {
+  using type = T;
+};
+template <class T>
+struct Innermost<std::optional<T>> : Innermost<T> {};
+template <class T>
+struct Innermost<std::vector<T>> : Innermost<T> {};
+
+template <class T>
+inline constexpr bool has_fields =
+    std::is_class_v<T> && !std::is_same_v<T, std::string> && !std::is_same_v<T, Vec3> && !std::is_same_v<T, Range>;
+
+std::string interval_text(const Bounds& b) {
+  if (!std::isfinite(b.low) && !std::isfinite(b.high)) return "";
+  return fmt::format("{}{}, {}{}", b.open_low ? "(" : "[", number_text(b.low), number_text(b.high),
+                     b.open_high ? ")" : "]");
+}
+
+// One table per object. Shapes contain shapes, so an object that has its table already gets none again.
+class Documenter {
+ public:
+  Documenter(std::string path, std::vector<std::string>& sections) : path_(std::move(path)), sections_(sections) {
+    slot_ = sections_.size();
+    sections_.emplace_back();
+    text_ = fmt::format("## {}\n\n| field | type | unit | default | bounds | meaning |\n|---|---|---|---|---|---|\n",
+                        path_.empty() ? "The scene" : "`" + path_ + "`");
+  }
+  ~Documenter() { sections_[slot_] = text_; }
+  Documenter(const Documenter&) = delete;
+  Documenter& operator=(const Documenter&) = delete;
+
+  template <class T>
+  void field(const Field& f, T& value) {
+    using Inner = typename Innermost<T>::type;
+    add_row(f, type_name<T>(), default_text(f, value));
+    if constexpr (has_fields<Inner>) {
+      const bool recursive = std::is_same_v<Inner, Shape> && f.name == "parts";
+      if (!recursive) {
+        Documenter inner(join(path_, f.name) + (is_vector<T> ? "[]" : ""), sections_);
+        Inner fresh;
+        describe(inner, fresh);
+      }
+    }
+  }
+
+  template <class Describe>
+  void group(const Field& f, Describe&& describe_fields) {
+    add_row(f, "object", "see below");
+    Documenter inner(join(path_, f.name), sections_);
+    describe_fields(inner);
+  }
+
+  bool applies(bool) const { return true; }
+
+ private:
+  template <class T>
+  static std::string default_text(const Field& f, const T& value) {
+    if (f.required) return "required";
+    if constexpr (is_optional<T>) {
+      return "absent";
+    } else if constexpr (is_vector<T>) {
+      return "[]";
+    } else if constexpr (has_fields<T>) {
+      return "see below";
+    } else {
+      return f.zero_is_absent ? "absent" : fmt::format("`{}`", on_one_line(written(value)));
+    }
+  }
+
+  void add_row(const Field& f, const std::string& type, const std::string& default_value) {
+    text_ += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", f.name, type, f.unit, default_value,
+                         interval_text(f.bounds), f.doc);
+  }
+
+  std::string path_;
+  std::vector<std::string>& sections_;
+  std::size_t slot_;
+  std::string text_;
+};
+
+constexpr std::string_view kReferenceHead =
+    R"(# Scenes
+
+This page is what `cutproof info --scene` prints: it is generated from the table of fields that also reads and checks
+scenes, and a test sees to it that the two are equal.
+
+A scene is a JSON file (UTF-8, no comments). It says what is cut, how it is simulated, what the blade does, and what
+must come out. Fields that are absent have their default; a field that is not listed here, or that is given twice, is
+an error, and so is a value out of bounds. Units are SI unless stated:
+
+- **box**: coordinates in the bounding box of the body's particles at rest, after alignment: (0, 0, 0) is its lower
+  corner and (1, 1, 1) its upper one, half a spacing beyond the outermost particles. Points may lie outside. A path in
+  these coordinates runs on any organ.
+- **h**: the spacing of the background grid. **extents**: multiples of the bounding box's width along a direction.
+- Directions (`back`, `along`, `velocity`, `gravity`) are metric and in the body's frame.
+- A **range** is a number (exactly that), or `{"at_least": a}`, `{"at_most": b}`, or both.
+- In bounds, a square bracket includes the number and a round one does not. They hold for each component of a vector,
+  each entry of a list and both ends of a range.
+
+Time is divided into frames of `frame.length`, and these into `step.substeps`. With a dynamic criterion (anything but
+`geometric`), a frame in which the blade would be too fast for its own thickness is divided into the least number of
+equal shorter frames in which, per substep, no corner of the blade moves by more than
+1.001 · max(thickness, epsilon · h) / 2, and none moves, by turning, by more than half of the shorter of length and
+depth (method.md §3, Blade).
+)";
+
+}  // namespace
+
+Scene parse_scene(const std::string& text, const std::string& name) {
+  const json tree = parse_tree(text, name);
+  require_version(tree, name);
+  Scene scene;
+  read(tree, Place{name, "", 0}, Field{}, scene);
+  return scene;
+}
+
+Scene read_scene(const std::string& path) { return parse_scene(read_text(path), path); }
+
+std::string write_scene(const Scene& scene) { return pretty(written(scene), 0) + "\n"; }
+
+std::string scene_reference() {
+  std::vector<std::string> sections;
+  {
+    Documenter documenter("", sections);
+    Scene scene;
+    describe(documenter, scene);
+  }
+  return fmt::format("{}\n{}", kReferenceHead, fmt::join(sections, "\n"));
+}
+
+}  // namespace cutproof::io
