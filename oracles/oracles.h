@@ -43,8 +43,11 @@ Verdict no_pass(const Setup& setup, const State& state);
 // Small clusters that could still merge (method.md §6, maximal): none, given that nothing else is owed.
 Verdict merge_maximality(const Setup& setup, const State& state);
 
-// All of the above that apply; the geometric skin check only if `thorough`.
+// All of the above that apply to a state at the end of a frame; the geometric skin check only if `thorough`.
 std::vector<Verdict> judge(const Setup& setup, const State& state, bool thorough);
+// The same for a state in the middle of a frame: what later stages still owe after `after` is not asked for, such as
+// coverage after detect, or a skin that matches after split. Fills the stage too.
+std::vector<Verdict> judge(const Setup& setup, const State& state, Stage after, bool thorough);
 
 // --- One stage: the state before and after it -----------------------------------------------------------------------
 Verdict detection(const Setup& setup, const State& before, const State& after);    // removed <=> d_i > εh outside the band
