@@ -1,0 +1,491 @@
+#include "model/io/scene_io.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "model/error.h"
+#include "model/io/atomic_file.h"
+#include "model/io/scene_fields.h"
+
+namespace cutproof::io {
+namespace {
+
+using nlohmann::json;
+
+const char* const kSmallest = R"({"version": 1, "body": {"shape": {"kind": "box"}, "spacing": 0.01}})";
+
+json smallest() { return json::parse(kSmallest); }
+json with_blade() {
+  json scene = smallest();
+  scene["blade"]["strokes"] = json::parse("[{\"points\": [[0, 0, 0], [1, 0, 0]]}]");
+  return scene;
+}
+
+// The error that a text must give: where it is, and words that must stand in it.
+void expect_error(const std::string& text, const std::string& field, const std::vector<std::string>& words) {
+  SCOPED_TRACE(text.substr(0, 300));
+  try {
+    parse_scene(text, "scene.json");
+    FAIL() << "was accepted";
+  } catch (const InputError& error) {
+    const std::string message = error.what();
+    EXPECT_EQ(error.file(), "scene.json");
+    EXPECT_EQ(error.field(), field) << message;
+    EXPECT_NE(message.find("\n  remedy: "), std::string::npos) << message;
+    for (const std::string& word : words) EXPECT_NE(message.find(word), std::string::npos) << word << ": " << message;
+  }
+}
+void expect_error(const json& scene, const std::string& field, const std::vector<std::string>& words) {
+  expect_error(scene.dump(), field, words);
+}
+
+// Gives every field a value that differs from its default, every list two entries and every optional field a value:
+// what the round trip loses, shows.
+class Scrambler {
+ public:
+  template <class T>
+  void field(const Field& f, T& value) {
+    change(f, value);
+  }
+  template <class Describe>
+  void group(const Field&, Describe&& describe_fields) {
+    describe_fields(*this);
+  }
+  bool applies(bool condition) const { return condition; }
+
+ private:
+  double number(const Field& f, double old) {
+    const double low = std::max(f.bounds.low, -1e3), high = std::min(f.bounds.high, 1e3);
+    fraction_ = fraction_ < 0.8 ? fraction_ + 1.0 / 64 + 1e-9 : 0.1;
+    const double x = low + fraction_ * (high - low);
+    return x == old ? (x + high) / 2 : x;
+  }
+  void change(const Field& f, double& value) { value = number(f, value); }
+  template <class T>
+  requires(std::is_integral_v<T>) void change(const Field& f, T& value) {
+    if (f.name == "version") return;
+    value = static_cast<T>(std::max(number(f, 0), f.bounds.low)) + 1;
+    if (static_cast<double>(value) > f.bounds.high) value = static_cast<T>(f.bounds.high);
+  }
+  void change(const Field&, bool& value) { value = !value; }
+  void change(const Field&, std::string& value) { value = "a \"text\" with \\ and é\n" + std::to_string(fraction_); }
+  void change(const Field& f, Vec3& value) {
+    for (int axis = 0; axis < 3; ++axis) value[axis] = number(f, value[axis]);
+    if (f.name == "high") value = {1000, 1000, 1000};  // above every "low"
+  }
+  void change(const Field& f, Range& value) {
+    value.low = number(f, 0);
+    value.high = value.low + 0.5;
+    if (++ranges_ % 3 == 0) value.high = value.low;
+    if (ranges_ % 3 == 1) value.high = std::numeric_limits<double>::infinity();
+  }
+  template <class E>
+  requires(std::is_enum_v<E>) void change(const Field&, E& value) {
+    if constexpr (!std::is_same_v<E, Shape::Kind> && !std::is_same_v<E, Curve>) value = words(E{}).back().first;
+  }
+  template <class T>
+  void change(const Field& f, std::optional<T>& value) {
+    if (f.name == "ground" || f.name == "mesh") return;  // another way to give walls; excludes the shape
+    change(f, value.emplace());
+  }
+  template <class T>
+  void change(const Field& f, std::vector<T>& value) {
+    for (int i = 0; i < 2; ++i) change(f, value.emplace_back());
+  }
+  template <class T>
+  requires(std::is_class_v<T>) void change(const Field& f, T& value) {
+    describe(*this, value);
+    if constexpr (std::is_same_v<T, BodySpec>) value.particles = 0;
+    if constexpr (std::is_same_v<T, WallSpec>) value.side = -1;
+    if constexpr (std::is_same_v<T, GripSpec>) value.end = value.start + 0.25;
+    (void)f;
+  }
+  double fraction_ = 0.1;
+  int ranges_ = 0;
+};
+
+Scene scrambled() {
+  Scene scene;
+  Scrambler scrambler;
+  describe(scrambler, scene);
+  return scene;
+}
+
+// The bounds of every number in a group of fields.
+struct Probe {
+  std::string path;
+  std::vector<std::pair<std::string, Bounds>> found;
+  void field(const Field&, bool&) {}
+  void field(const Field& f, double&) { found.emplace_back(f.name, f.bounds); }
+  void field(const Field& f, int32_t&) { found.emplace_back(f.name, f.bounds); }
+  template <class T>
+  void field(const Field&, T&) {}
+  bool applies(bool) const { return true; }
+};
+
+TEST(SceneIo, TheSmallestSceneHasTheDefaultsOfTheStructs) {
+  const Scene scene = parse_scene(kSmallest, "scene.json");
+  const Scene fresh;
+  EXPECT_EQ(scene.step, fresh.step);
+  EXPECT_EQ(scene.detect, fresh.detect);
+  EXPECT_EQ(scene.frame_length, fresh.frame_length);
+  EXPECT_EQ(scene.seed, fresh.seed);
+  EXPECT_EQ(scene.clusters.side, fresh.clusters.side);
+  EXPECT_FALSE(scene.blade.has_value());
+  ASSERT_TRUE(scene.body.shape.has_value());
+  EXPECT_EQ(scene.body.shape->size, fresh.body.shape.value_or(Shape{}).size);
+  EXPECT_EQ(scene.body.spacing, 0.01);
+}
+
+TEST(SceneIo, EveryFieldSurvivesWritingAndReading) {
+  const Scene scene = scrambled();
+  const std::string text = write_scene(scene);
+  EXPECT_EQ(write_scene(parse_scene(text, "scene.json")), text);
+  // Nothing was left at its default, or the comparison above would say nothing of it.
+  const json tree = json::parse(text);
+  Scene plain;
+  plain.blade.emplace();
+  const json defaults = json::parse(write_scene(plain));
+  for (const char* group : {"clusters", "frame", "step", "detect", "split", "merge", "expand", "skin", "blade"}) {
+    for (const auto& [name, value] : tree[group].items()) {
+      EXPECT_NE(value, defaults[group].value(name, json())) << group << "." << name << " kept its default";
+    }
+  }
+  EXPECT_EQ(tree["blade"]["strokes"].size(), 2u);
+  EXPECT_EQ(tree["walls"].size(), 2u);
+  EXPECT_EQ(tree["grips"].size(), 2u);
+  EXPECT_EQ(tree["expect"].size(), 10u) << "an expectation is not written";
+}
+
+TEST(SceneIo, EveryFieldThatIsWrittenIsReadAgainAlone) {
+  // Taking out any one optional field changes what is read: no field is ignored by the reader.
+  const std::string whole = write_scene(scrambled());
+  const json tree = json::parse(whole);
+  for (const char* group : {"clusters", "frame", "step", "detect", "split", "merge", "expand", "skin", "expect"}) {
+    for (const auto& [name, value] : tree[group].items()) {
+      json less = tree;
+      less[group].erase(name);
+      EXPECT_NE(write_scene(parse_scene(less.dump(), "scene.json")), whole) << group << "." << name;
+    }
+  }
+}
+
+TEST(SceneIo, NumbersKeepAllTheirBits) {
+  Scene scene = parse_scene(kSmallest, "scene.json");
+  for (const double x : {0.1, 1.0 / 3.0, 4.9406564584124654e-324, 1e-300, 123456.78901234567}) {
+    scene.body.spacing = x;
+    EXPECT_EQ(parse_scene(write_scene(scene), "scene.json").body.spacing, x);
+  }
+  scene.body.spacing = 1;
+  scene.seed = std::numeric_limits<uint64_t>::max();
+  EXPECT_EQ(parse_scene(write_scene(scene), "scene.json").seed, scene.seed);
+}
+
+TEST(SceneIo, EveryWordOfEveryEnumerationIsReadBack) {
+  Scene scene = parse_scene(kSmallest, "scene.json");
+  for (const auto& [criterion, word] : words(Criterion{})) {
+    for (const auto& [merge, merge_word] : words(MergeRule{})) {
+      for (const auto& [expand, expand_word] : words(ExpandRule{})) {
+        scene.detect.criterion = criterion;
+        scene.merge.rule = merge;
+        scene.expand.rule = expand;
+        const Scene back = parse_scene(write_scene(scene), "scene.json");
+        EXPECT_EQ(back.detect.criterion, criterion) << word;
+        EXPECT_EQ(back.merge.rule, merge) << merge_word;
+        EXPECT_EQ(back.expand.rule, expand) << expand_word;
+      }
+    }
+  }
+  for (const auto& [kind, word] : words(Shape::Kind{})) {
+    scene.body.shape->kind = kind;
+    scene.body.shape->parts.assign(2, Shape{});
+    EXPECT_EQ(parse_scene(write_scene(scene), "scene.json").body.shape->kind, kind) << word;
+  }
+  EXPECT_NE(write_scene(parse_scene(R"({"version": 1, "body": {"shape": {"kind": "union", "parts": [{"kind": "box"}]},
+            "spacing": 1}})",
+                                    "s"))
+                .find("\"union\""),
+            std::string::npos);
+}
+
+TEST(SceneIo, TheGroundIsTheWallThatHeaderSays) {
+  json tree = smallest();
+  tree["ground"] = {{"friction", 0.5}, {"offset", -0.25}};
+  tree["walls"] = json::parse(R"([{"axis": 0, "side": -1, "offset": 2}])");
+  const Scene scene = parse_scene(tree.dump(), "scene.json");
+  ASSERT_EQ(scene.walls.size(), 2u);
+  EXPECT_EQ(scene.walls[0].axis, 2);
+  EXPECT_EQ(scene.walls[0].side, +1);
+  EXPECT_EQ(scene.walls[0].offset, -0.25);
+  EXPECT_EQ(scene.walls[0].friction, 0.5);
+  EXPECT_EQ(scene.walls[1].axis, 0);
+}
+
+TEST(SceneIo, RangesAreOneNumberOrOpenOnOneSide) {
+  json tree = smallest();
+  tree["expect"] = json::parse(R"({"removed": {"at_least": 1}, "isolated_clusters": 0, "dent": {"at_most": 2}})");
+  const Scene scene = parse_scene(tree.dump(), "scene.json");
+  EXPECT_EQ(scene.expect.removed->low, 1);
+  EXPECT_EQ(scene.expect.removed->high, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(scene.expect.isolated_clusters->low, 0);
+  EXPECT_EQ(scene.expect.isolated_clusters->high, 0);
+  EXPECT_EQ(scene.expect.dent->high, 2);
+  EXPECT_FALSE(scene.expect.particles.has_value());
+  tree["expect"] = json::parse(R"({"removed": {"at_least": 3, "at_most": 2}})");
+  expect_error(tree, "expect.removed", {"3", "2"});
+  tree["expect"] = json::parse(R"({"removed": {"least": 3}})");
+  expect_error(tree, "expect.removed.least", {"at_least"});
+  tree["expect"] = json::parse(R"({"removed": {}})");
+  expect_error(tree, "expect.removed", {"at_least"});
+}
+
+TEST(SceneIoErrors, AnUnknownFieldNamesTheNearestKnownOne) {
+  json tree = smallest();
+  tree["body"]["spacng"] = 0.01;
+  tree["body"].erase("spacing");
+  expect_error(tree, "body.spacng", {"not known", "\"spacing\""});
+  tree = smallest();
+  tree["stepp"] = json::object();
+  expect_error(tree, "stepp", {"\"step\""});
+  tree = with_blade();
+  tree["blade"]["strokes"][0]["pionts"] = 1;
+  expect_error(tree, "blade.strokes[0].pionts", {"\"points\""});
+  tree = smallest();
+  tree["body"]["shape"]["radius"] = 1;  // of balls only
+  expect_error(tree, "body.shape.radius", {"not known here", "size"});
+}
+
+TEST(SceneIoErrors, AFieldThatIsGivenTwiceIsRefused) {
+  expect_error(std::string(R"({"version": 1, "body": {"spacing": 1, "shape": {"kind": "box"}, "spacing": 2}})"),
+               "body.spacing", {"twice"});
+  expect_error(std::string(R"({"version": 1, "grips": [{"low": [0,0,0]}, {"end": 1, "end": 1}]})"), "grips[1].end",
+               {"twice"});
+}
+
+TEST(SceneIoErrors, WrongTypesNameWhatIsThereAndWhatIsNeeded) {
+  json tree = smallest();
+  tree["body"]["spacing"] = "0.01";
+  expect_error(tree, "body.spacing", {"number", "0.01"});
+  tree = smallest();
+  tree["step"]["substeps"] = 2.5;
+  expect_error(tree, "step.substeps", {"whole number", "2.5"});
+  tree = smallest();
+  tree["step"]["gravity"] = -9.81;
+  expect_error(tree, "step.gravity", {"vector", "[x, y, z]"});
+  tree["step"]["gravity"] = {0, 0};
+  expect_error(tree, "step.gravity", {"2 entries"});
+  tree["step"]["gravity"] = {0, 0, "down"};
+  expect_error(tree, "step.gravity[2]", {"down"});
+  tree = smallest();
+  tree["detect"]["without_blade"] = 1;
+  expect_error(tree, "detect.without_blade", {"true or false"});
+  tree = smallest();
+  tree["detect"]["criterion"] = "distence";
+  expect_error(tree, "detect.criterion", {"distence", "\"distance\"", "\"strain\""});
+  tree = smallest();
+  tree["walls"] = json::object();
+  expect_error(tree, "walls", {"list"});
+  tree = smallest();
+  tree["skin"] = true;
+  expect_error(tree, "skin", {"object"});
+  tree = smallest();
+  tree["frame"] = json::array();
+  expect_error(tree, "frame", {"object"});
+  tree = smallest();
+  tree["blade"] = nullptr;
+  expect_error(tree, "blade", {"null"});
+}
+
+TEST(SceneIoErrors, WholeNumbersMayBeWrittenWithAnExponent) {
+  json tree = smallest();
+  tree["body"].erase("spacing");
+  tree["body"]["particles"] = 1e5;
+  EXPECT_EQ(parse_scene(tree.dump(), "scene.json").body.particles, 100000);
+}
+
+TEST(SceneIoErrors, ValuesBeyondTheirBoundsAreRefusedAndValuesAtThemAreNot) {
+  // Each bounded number of these groups, from the table itself: just inside passes, just outside does not.
+  int tested = 0;
+  const auto test_group = [&tested](auto value, const std::string& group) {
+    Probe probe;
+    describe(probe, value);
+    for (const auto& [name, bounds] : probe.found) {
+      const auto parse = [&group, name = name](double x) {
+        json tree = with_blade();
+        tree[group][name] = x;
+        parse_scene(tree.dump(), "scene.json");
+      };
+      SCOPED_TRACE(group + "." + name);
+      ASSERT_TRUE(std::isfinite(bounds.low) && std::isfinite(bounds.high)) << "a number without bounds";
+      if (bounds.open_low) {
+        EXPECT_THROW(parse(bounds.low), InputError);
+      } else {
+        EXPECT_NO_THROW(parse(bounds.low));
+      }
+      if (bounds.open_high) {
+        EXPECT_THROW(parse(bounds.high), InputError);
+      } else {
+        EXPECT_NO_THROW(parse(bounds.high));
+      }
+      EXPECT_THROW(parse(bounds.low - 1), InputError);
+      EXPECT_THROW(parse(bounds.high * 1.5 + 1), InputError);
+      ++tested;
+    }
+  };
+  test_group(ClusterSpec{}, "clusters");
+  test_group(StepParameters{}, "step");
+  test_group(DetectParameters{}, "detect");
+  test_group(SplitParameters{}, "split");
+  test_group(ExpandParameters{}, "expand");
+  test_group(SkinParameters{}, "skin");
+  test_group(BladeSpec{}, "blade");
+  EXPECT_GE(tested, 21) << "the table lost fields";
+}
+
+TEST(SceneIoErrors, ANegativeSpacingNamesItsValueAndItsBounds) {
+  json tree = smallest();
+  tree["body"]["spacing"] = -0.01;
+  expect_error(tree, "body.spacing", {"-0.01", "greater than 0"});
+  tree["body"]["spacing"] = 0;
+  expect_error(tree, "body.spacing", {"greater than 0"});
+}
+
+TEST(SceneIoErrors, NotANumberIsAnErrorOfTheTextWithItsPosition) {
+  expect_error(std::string("{\"version\": 1,\n \"body\": {\"spacing\": NaN}}"), "line 2, column 22",
+               {"not valid JSON", "NaN", "finite"});
+  expect_error(std::string("{\"version\": 1,\n\"body\": {\"spacing\": -Infinity}}"), "line 2, column 22", {"finite"});
+}
+
+TEST(SceneIoErrors, ANumberTooLargeForTheMachineNamesItsField) {
+  expect_error(std::string(R"({"version": 1, "step": {"gravity": [0, 1e999, 0]}})"), "step.gravity[0]", {"1e999"});
+  expect_error(std::string(R"({"version": 1, "body": {"spacing": -1e999}})"), "body.spacing", {"1e999"});
+  expect_error(std::string(R"({"version": 1, "seed": 18446744073709551616, "body": {"shape": {"kind": "box"},
+               "spacing": 1}})"),
+               "seed", {"too large"});
+}
+
+TEST(SceneIoErrors, BrokenJsonNamesLineAndColumn) {
+  expect_error(std::string("{\"version\": 1,\n \"body\": {\n"), "line 3, column 1", {"unexpected end of input"});
+  expect_error(std::string("{\"version\": 1 \"body\": {}}"), "line 1, column 20", {"not valid JSON"});
+  expect_error(std::string("{} x"), "line 1, column 4", {"not valid JSON"});
+  expect_error(std::string("{\"name\": \"\xff\"}"), "line 1, column 11", {"not valid JSON"});
+  expect_error(std::string(""), "", {"empty"});
+  expect_error(std::string(" \n\t"), "", {"empty"});
+  expect_error(std::string("solid organ\n"), "line 1, column 1", {"not valid JSON"});
+}
+
+TEST(SceneIoErrors, MissingRequiredFieldsAreNamed) {
+  expect_error(std::string(R"({"version": 1})"), "body", {"missing"});
+  expect_error(std::string(R"({"body": {}})"), "version", {"missing"});
+  json tree = smallest();
+  tree["body"]["shape"].erase("kind");
+  expect_error(tree, "body.shape.kind", {"missing"});
+  tree = smallest();
+  tree["body"] = json::parse(R"({"mesh": {"file": "a.stl"}, "spacing": 1})");
+  expect_error(tree, "body.mesh.unit", {"missing"});
+  tree = smallest();
+  tree["grips"] = json::parse(R"([{"low": [0, 0, 0]}])");
+  expect_error(tree, "grips[0].high", {"missing"});
+}
+
+TEST(SceneIoErrors, AnotherVersionIsRefusedBeforeAnythingElse) {
+  expect_error(std::string(R"({"version": 2, "new_field": true})"), "version", {"2", "version 1"});
+  expect_error(std::string(R"({"version": "1"})"), "version", {"\"1\""});
+  expect_error(std::string(R"([1])"), "", {"object", "list"});
+}
+
+TEST(SceneIoErrors, ExactlyOneOfShapeAndMeshAndOfSpacingAndParticles) {
+  json tree = smallest();
+  tree["body"]["mesh"] = {{"file", "a.stl"}, {"unit", 0.001}};
+  expect_error(tree, "body", {"Both shape and mesh"});
+  tree = smallest();
+  tree["body"].erase("shape");
+  expect_error(tree, "body", {"Neither shape nor mesh"});
+  tree = smallest();
+  tree["body"]["particles"] = 100;
+  expect_error(tree, "body", {"Both spacing and particles"});
+  tree = smallest();
+  tree["body"].erase("spacing");
+  expect_error(tree, "body", {"Neither spacing nor particles"});
+}
+
+TEST(SceneIoErrors, AnEmptyBladePathHasItsOwnMessage) {
+  json tree = with_blade();
+  tree["blade"]["strokes"] = json::array();
+  expect_error(tree, "blade.strokes", {"path is empty"});
+  tree = with_blade();
+  tree["blade"]["strokes"][0]["points"] = json::array();
+  expect_error(tree, "blade.strokes[0].points", {"path is empty", "0 points", "two points"});
+  tree["blade"]["strokes"][0]["points"] = json::parse("[[0, 0, 0]]");
+  expect_error(tree, "blade.strokes[0].points", {"path is empty", "1 point."});
+  tree["blade"]["strokes"][0]["points"] = json::parse("[[0, 0, 0], [0, 0, 0], [0, 0, 0]]");
+  expect_error(tree, "blade.strokes[0].points", {"path is empty", "same"});
+  tree["blade"].erase("strokes");
+  expect_error(tree, "blade.strokes", {"missing"});
+  // A stroke that stands still on purpose is a hard case, not a mistake.
+  tree = with_blade();
+  tree["blade"]["strokes"][0]["points"] = json::parse("[[0, 0, 0], [0, 0, 0]]");
+  EXPECT_NO_THROW(parse_scene(tree.dump(), "scene.json"));
+}
+
+TEST(SceneIoErrors, ConditionsBetweenFieldsAreChecked) {
+  json tree = with_blade();
+  tree["blade"]["strokes"][0]["curve"] = "arc";
+  expect_error(tree, "blade.strokes[0].points", {"three points"});
+  tree = smallest();
+  tree["walls"] = json::parse(R"([{"side": 0}])");
+  expect_error(tree, "walls[0].side", {"1 or -1"});
+  tree = smallest();
+  tree["grips"] = json::parse(R"([{"low": [0, 0.5, 0], "high": [1, 0.25, 1]}])");
+  expect_error(tree, "grips[0].low", {"0.5", "0.25"});
+  tree["grips"] = json::parse(R"([{"low": [0, 0, 0], "high": [1, 1, 1], "start": 2, "end": 1}])");
+  expect_error(tree, "grips[0].end", {"1", "2"});
+  tree = smallest();
+  tree["body"]["shape"] = json::parse(R"({"kind": "union", "parts": []})");
+  expect_error(tree, "body.shape.parts", {"empty"});
+}
+
+TEST(SceneIoErrors, ShapesNestedWithoutEndAreRefused) {
+  std::string text = R"({"kind": "ball"})";
+  for (int i = 0; i < 20000; ++i) text = R"({"kind": "union", "parts": [)" + std::exchange(text, "") + "]}";
+  const std::string scene = R"({"version": 1, "body": {"spacing": 1, "shape": )" + text + "}}";
+  EXPECT_THROW(parse_scene(scene, "scene.json"), InputError);
+}
+
+TEST(SceneIoErrors, AMissingSceneFileIsNamed) {
+  try {
+    read_scene("no/such/scene.json");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.file(), "no/such/scene.json");
+  }
+}
+
+TEST(SceneReference, NamesEveryFieldThatIsWritten) {
+  const std::string reference = scene_reference();
+  const std::function<void(const json&)> visit = [&](const json& tree) {
+    for (const auto& [name, value] : tree.items()) {
+      if (tree.is_object()) {
+        EXPECT_NE(reference.find("| `" + name + "` |"), std::string::npos) << name << " is not documented";
+      }
+      if (value.is_structured() && name != "removed") visit(value);
+    }
+  };
+  json tree = json::parse(write_scene(scrambled()));
+  for (auto& [name, value] : tree["expect"].items()) value = 1;  // at_least and at_most are explained in the text
+  visit(tree);
+}
+
+TEST(SceneReference, IsThePageOfTheDocumentation) {
+  const std::string page = read_text(std::string(CUTPROOF_SOURCE_DIR) + "/docs/scene.md");
+  EXPECT_EQ(page, scene_reference()) << "Regenerate it: cutproof info --scene > docs/scene.md";
+}
+
+}  // namespace
+}  // namespace cutproof::io
