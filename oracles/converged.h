@@ -9,12 +9,12 @@
 namespace cutproof::oracles {
 
 struct Converged {
-  std::vector<Vec3> x;          // [n] the minimiser [m]; dead particles keep their position
-  std::vector<Mat3> rotation;   // [m]
-  double energy = 0;            // E(x) [kg m²/s²]
+  std::vector<Vec3> x;         // [n] the minimiser [m]; dead particles keep their position
+  std::vector<Mat3> rotation;  // [m]
+  double energy = 0;           // E(x) [kg m²/s²]
   int32_t alternations = 0;
-  double last_change = 0;       // greatest change of a position in the last alternation [h]
-  bool converged = false;       // last_change < 1e-12
+  double last_change = 0;  // greatest change of a position in the last alternation [h]
+  bool converged = false;  // last_change < 1e-12
 };
 
 // The first substep of frame state.frame. Requires Solver::implicit; no blade down, no friction (throws
@@ -22,17 +22,19 @@ struct Converged {
 Converged converged_substep(const Setup& setup, const State& state);
 
 // E of method.md §3 at positions x, minimised over t and R: what `energy_is_monotone` compares. x~ is computed from
-// the state.
+// the state; it is the free motion, before contacts: walls bound x, and held particles have no inertia. Throws as
+// converged_substep does.
 double substep_energy(const Setup& setup, const State& state, const std::vector<Vec3>& x);
 
 // The limit of the plain iteration, in double, written down a second time without reference_cpu/: iterates until the
-// change is below `tolerance` · h or `most` iterations are done. Also the error after each iteration count asked for.
+// change is below `tolerance` · h or `most` iterations are done. With tolerance 0 exactly `most` are done. Throws as
+// converged_substep does.
 struct PlainLimit {
   std::vector<Vec3> x;
   std::vector<double> energy;          // after each iteration, from x~ on
   std::vector<double> momentum_drift;  // after each iteration: |Σ m (x − x~)| / Σ m |x~ − x_prev|
   int64_t iterations = 0;
-  double last_change = 0;              // [h]
+  double last_change = 0;  // [h]
 };
 PlainLimit plain_limit(const Setup& setup, const State& state, double tolerance, int64_t most);
 
