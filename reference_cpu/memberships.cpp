@@ -24,15 +24,18 @@ void update_rest_frames(const Body& body, Clusters& clusters) {
   clusters.mass.assign(count, 0.0);
   clusters.rest_center.assign(count, Vec3{});
   for (int32_t c = 0; c < clusters.count(); ++c) {
+    // Relative to one member: an error of T_c pushes the cluster the same way in every iteration, so it is kept to the
+    // rounding of the result.
+    const Vec3 base = body.rest_position(clusters.of(c).front());
     double mass = 0;
     Vec3 moment;
     for (const int32_t i : clusters.of(c)) {
       const double weight = body.mass[static_cast<std::size_t>(i)] / static_cast<double>(memberships.count(i));
       mass += weight;
-      moment += weight * body.rest_position(i);
+      moment += weight * (body.rest_position(i) - base);
     }
     clusters.mass[static_cast<std::size_t>(c)] = mass;
-    clusters.rest_center[static_cast<std::size_t>(c)] = moment / mass;
+    clusters.rest_center[static_cast<std::size_t>(c)] = base + moment / mass;
   }
 }
 

@@ -49,16 +49,21 @@ std::vector<Pose> match_shapes(const Body& body, const Memberships& memberships,
 
     Mat3 a;
     a.m.fill(0);
+    Vec3 moment, rest_moment;  // zero, but for the rounding of t_c, of T_c and of M_c
     for (const int32_t i : clusters.of(c)) {
       const double weight = body.mass[at(i)] / static_cast<double>(memberships.count(i));
       const Vec3 now = weight * (x[at(i)] - pose.center);
       const Vec3 rest = body.rest_position(i) - clusters.rest_center[at(c)];
+      moment += now;
+      rest_moment += weight * rest;
       for (int row = 0; row < 3; ++row) {
         for (int column = 0; column < 3; ++column) a(row, column) += now[row] * rest[column];
       }
     }
     const Rotation best = closest_rotation(a, clusters.rotation[at(c)]);
     pose.rotation = best.r;
+    // Left in, it would push the cluster the same way in every iteration, and the body's momentum with it.
+    pose.center += (moment - best.r * rest_moment) / clusters.mass[at(c)];
     clusters.rotation[at(c)] = best.r;
     clusters.degenerate[at(c)] = best.degenerate;
   }

@@ -1,0 +1,180 @@
+// Stage detect: what each criterion removes, against brute force.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "fixtures/bodies.h"
+#include "fixtures/cook.h"
+#include "reference_cpu/reference.h"
+
+namespace cutproof::reference {
+namespace {
+
+Setup setup_of(Body body) {
+  cutproof::Setup setup;
+  setup.body = std::move(body);
+  setup.step.substeps = 1;
+  setup.substep_length = {0.01};
+  return setup;
+}
+
+State cooked(const Setup& setup) { return fixtures::cook(setup.body, {}, setup.expand, setup.merge, 1); }
+
+void sweep(Setup& setup, BladePose from, BladePose to, double length, double depth, double thickness) {
+  setup.detect.criterion = Criterion::geometric;
+  setup.has_blade = true;
+  setup.blade = {length, depth, thickness, 0};
+  setup.blade_moves = {{from, to, true, 0}};
+}
+
+TEST(DetectByDistance, RemovesBothEndsOfAnEdgeThatIsTooLongAndNothingElse) {
+  const cutproof::Setup setup = setup_of(fixtures::block(6, 1, 1, 1.0));
+  State state = cooked(setup);
+  for (std::size_t i = 3; i < 6; ++i) state.x[i].x += 0.500001;
+  detect(setup, state);
+  EXPECT_EQ(state.removed, (std::vector<int32_t>{2, 3}));
+  EXPECT_EQ(state.alive, (std::vector<uint8_t>{1, 1, 0, 0, 1, 1}));
+}
+
+TEST(DetectByDistance, KeepsAnEdgeOfExactlyTheLimit) {
+  const cutproof::Setup setup = setup_of(fixtures::block(2, 1, 1, 1.0));
+  State state = cooked(setup);
+  state.x[1].x += 0.5;
+  detect(setup, state);
+  EXPECT_TRUE(state.removed.empty());
+}
+
+TEST(DetectByDistance, IgnoresDeadNeighbours) {
+  const cutproof::Setup setup = setup_of(fixtures::block(3, 1, 1, 1.0));
+  State state = cooked(setup);
+  state.alive[1] = 0;
+  state.x[1].y += 10;
+  detect(setup, state);
+  EXPECT_TRUE(state.removed.empty());
+}
+
+TEST(DetectByDistance, NeverCutsUniformStretchBelowTheLimit) {
+  const cutproof::Setup setup = setup_of(fixtures::block(8, 4, 4, 0.01));
+  State state = cooked(setup);
+  for (Vec3& x : state.x) x = {1.49 * x.x, 0.8 * x.y, 0.8 * x.z};
+  detect(setup, state);
+  EXPECT_TRUE(state.removed.empty());
+}
+
+TEST(DetectByStrain, CutsUniformStretchFalsely) {
+  cutproof::Setup setup = setup_of(fixtures::block(8, 4, 4, 0.01));
+  setup.detect.criterion = Criterion::strain;
+  State state = cooked(setup);
+  for (Vec3& x : state.x) x = {1.19 * x.x, x.y, x.z};
+  detect(setup, state);
+  EXPECT_TRUE(state.removed.empty());
+  for (Vec3& x : state.x) x.x *= 1.25 / 1.19;
+  detect(setup, state);
+  EXPECT_EQ(state.removed.size(), state.x.size()) << "every cluster is stretched by 1.25";
+}
+
+TEST(DetectByStrain, IsNotMisledByFlatClusters) {
+  cutproof::Setup setup = setup_of(fixtures::block(5, 5, 1, 0.01));
+  setup.detect.criterion = Criterion::strain;
+  State state = cooked(setup);
+  detect(setup, state);
+  EXPECT_TRUE(state.removed.empty());
+}
+
+// Brute force: the blade at many positions and turns along the way, its rectangle sampled through the closest point.
+double sampled_distance(const Blade& blade, const BladePose& from, const BladePose& to, Vec3 x, int samples) {
+  double best = 1e300;
+  for (int k = 0; k <= samples; ++k) {
+    const double t = static_cast<double>(k) / samples;
+    const Vec3 edge = from.edge + t * (to.edge - from.edge);
+    // Only turns about `back` occur below.
+    const Vec3 normal = cross(from.along, from.back);
+    const double angle = t * std::atan2(dot(to.along, normal), dot(to.along, from.along));
+    const Vec3 along = std::cos(angle) * from.along + std::sin(angle) * normal;
+    const double u = std::clamp(dot(x - edge, along), -blade.length / 2, blade.length / 2);
+    const double w = std::clamp(dot(x - edge, from.back), 0.0, blade.depth);
+    best = std::min(best, norm(x - edge - u * along - w * from.back));
+  }
+  return best;
+}
+
+TEST(DetectGeometric, RemovesWhatIsWithinReachOfTheSweptMidSurface) {
+  std::mt19937_64 random(8);
+  std::uniform_real_distribution<double> unit(0, 1);
+  int removed = 0, kept = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    cutproof::Setup setup = setup_of(fixtures::block(7, 7, 7, 1.0));
+    const double a = 6 * unit(random), b = trial % 3 == 0 ? a + 0.6 * unit(random) : a;
+    BladePose from{
+        {1 + 7 * unit(random), 1 + 7 * unit(random), 1 + 7 * unit(random)}, {std::cos(a), std::sin(a), 0}, {0, 0, 1}};
+    BladePose to = from;
+    to.along = {std::cos(b), std::sin(b), 0};
+    to.edge += Vec3{4 * unit(random) - 2, 4 * unit(random) - 2, 4 * unit(random) - 2};
+    if (trial % 7 == 0) to.edge = from.edge;
+    const double thickness = 2 * unit(random);
+    sweep(setup, from, to, 1 + 3 * unit(random), 1 + 3 * unit(random), thickness);
+    State state = cooked(setup);
+    detect(setup, state);
+    const double reach = std::max(thickness, 1.0) / 2;
+    for (std::size_t i = 0; i < state.x.size(); ++i) {
+      const double distance = sampled_distance(setup.blade, from, to, state.x[i], 4000);
+      // The sampled way is off by at most half its step; a turning blade by the slack of its pieces, 0.05 h.
+      const double band = 0.002 + (b == a ? 0 : 0.06);
+      if (std::abs(distance - reach) <= band) continue;
+      EXPECT_EQ(state.alive[i] == 0, distance < reach) << "trial " << trial << ", particle " << i << ", " << distance;
+      ++(state.alive[i] ? kept : removed);
+    }
+  }
+  EXPECT_GT(removed, 500);
+  EXPECT_GT(kept, 500);
+}
+
+TEST(DetectGeometric, TakesBothLayersWhenTheBladeIsHalfwayBetweenThem) {
+  cutproof::Setup setup =
+      setup_of(fixtures::block(4, 4, 4, 0.1));  // 0.1 is not a binary fraction: the tie is a rounded one
+  const BladePose pose = {{0.25, 0.25, 0}, {1, 0, 0}, {0, 0, 1}};
+  sweep(setup, pose, pose, 2, 2, 0);
+  State state = cooked(setup);
+  detect(setup, state);
+  EXPECT_EQ(state.removed.size(), 32u) << "the layers at y = 0.2 and 0.3";
+}
+
+TEST(DetectGeometric, AThinBladeOfAnyPlaneSeparatesWhateverEdgeItCrosses) {
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> normal;
+  for (int trial = 0; trial < 100; ++trial) {
+    cutproof::Setup setup = setup_of(fixtures::block(6, 6, 6, 1.0));
+    const Vec3 n = normalized({normal(random), normal(random), normal(random)});
+    const Vec3 along = normalized(cross(n, std::abs(n.x) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0}));
+    const Vec3 back = cross(n, along);
+    const Vec3 middle = {3.5 + normal(random), 3.5 + normal(random), 3.5 + normal(random)};
+    const BladePose pose = {middle - 20 * back, along, back};
+    sweep(setup, pose, pose, 40, 40, 0.0);
+    State state = cooked(setup);
+    detect(setup, state);
+    for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
+      for (const int direction : {0, 2, 4}) {
+        const int32_t j = setup.body.neighbour(i, direction);
+        if (j < 0) continue;
+        const auto p = static_cast<std::size_t>(i), q = static_cast<std::size_t>(j);
+        const double a = dot(state.x[p] - middle, n), b = dot(state.x[q] - middle, n);
+        if (a * b >= 0) continue;
+        EXPECT_FALSE(state.alive[p] && state.alive[q]) << "edge " << i << "-" << j << " is crossed";
+      }
+    }
+  }
+}
+
+TEST(DetectGeometric, DoesNothingWhileTheBladeIsUp) {
+  cutproof::Setup setup = setup_of(fixtures::block(4, 4, 4, 1.0));
+  const BladePose pose = {{2, 2, 0}, {1, 0, 0}, {0, 0, 1}};
+  sweep(setup, pose, pose, 10, 10, 1);
+  setup.blade_moves[0].down = false;
+  State state = cooked(setup);
+  detect(setup, state);
+  EXPECT_TRUE(state.removed.empty());
+}
+
+}  // namespace
+}  // namespace cutproof::reference
