@@ -52,7 +52,7 @@ bool body_is_well_formed(const Setup& setup, Verdict& verdict) {
   const Body& body = setup.body;
   const Grid& grid = body.grid;
   const auto reject = [&](std::string text, std::vector<int32_t> particles = {}) {
-    violate(verdict, {{}, std::move(particles), {}, std::move(text)});
+    violate(verdict, std::move(text), {}, std::move(particles));
     return false;
   };
   if (grid.nodes[0] < 0 || grid.nodes[1] < 0 || grid.nodes[2] < 0) return reject("the grid has a negative side");
@@ -102,15 +102,15 @@ bool body_is_well_formed(const Setup& setup, Verdict& verdict) {
 void check_particle_list(const std::vector<int32_t>& list, const char* name, int32_t n, Verdict& verdict) {
   for (std::size_t k = 0; k < list.size(); ++k) {
     if (list[k] < 0 || list[k] >= n) {
-      violate(verdict, {{}, {list[k]}, {}, fmt::format("{} lists particle {} of {}", name, list[k], n)});
+      violate(verdict, fmt::format("{} lists particle {} of {}", name, list[k], n), {}, {list[k]});
     } else if (k > 0 && list[k] <= list[k - 1]) {
-      violate(verdict, {{}, {list[k]}, {}, fmt::format("{} does not ascend at particle {}", name, list[k])});
+      violate(verdict, fmt::format("{} does not ascend at particle {}", name, list[k]), {}, {list[k]});
     }
   }
 }
 
 void check_clusters_form(const Clusters& clusters, int32_t n, Verdict& verdict) {
-  const auto reject = [&](std::string text) { violate(verdict, {{}, {}, {}, std::move(text)}); };
+  const auto reject = [&](std::string text) { violate(verdict, std::move(text)); };
   if (clusters.offsets.empty()) return reject("cluster offsets are empty");
   const std::size_t m = clusters.offsets.size() - 1;
   if (clusters.number.size() != m || clusters.rotation.size() != m || clusters.rest_center.size() != m ||
@@ -129,15 +129,15 @@ void check_clusters_form(const Clusters& clusters, int32_t n, Verdict& verdict) 
   for (std::size_t c = 0; c < m; ++c) {
     const int32_t number = clusters.number[c];
     if (clusters.offsets[c + 1] < clusters.offsets[c]) {
-      violate(verdict, {{number}, {}, {}, fmt::format("cluster offsets decrease at cluster {}", number)});
+      violate(verdict, fmt::format("cluster offsets decrease at cluster {}", number), {number});
     }
     if (number < 0 || (c > 0 && number <= clusters.number[c - 1])) {
-      violate(verdict, {{number}, {}, {}, fmt::format("cluster numbers do not ascend at {}", number)});
+      violate(verdict, fmt::format("cluster numbers do not ascend at {}", number), {number});
     }
   }
   for (const int32_t i : clusters.members) {
     if (i < 0 || i >= n) {
-      violate(verdict, {{}, {i}, {}, fmt::format("a cluster holds particle {}, but there are {}", i, n)});
+      violate(verdict, fmt::format("a cluster holds particle {}, but there are {}", i, n), {}, {i});
     }
   }
 }
@@ -145,26 +145,20 @@ void check_clusters_form(const Clusters& clusters, int32_t n, Verdict& verdict) 
 void check_skin_form(const Skin& skin, int32_t n, Verdict& verdict) {
   const std::size_t vertices = skin.owner.size();
   if (skin.direction.size() != vertices || skin.position.size() != vertices) {
-    violate(verdict, {{},
-                      {},
-                      {},
-                      fmt::format("the skin has {} owners, {} directions, {} positions", vertices,
-                                  skin.direction.size(), skin.position.size())});
+    violate(verdict, fmt::format("the skin has {} owners, {} directions, {} positions", vertices, skin.direction.size(),
+                                 skin.position.size()));
     return;
   }
   for (std::size_t v = 0; v < vertices; ++v) {
     if (skin.owner[v] < 0 || skin.owner[v] >= n || skin.direction[v] >= kDirections.size()) {
-      violate(verdict,
-              {{},
-               {skin.owner[v]},
-               {},
-               fmt::format("skin vertex {} has owner {} and direction {}", v, skin.owner[v], skin.direction[v])});
+      violate(verdict, fmt::format("skin vertex {} has owner {} and direction {}", v, skin.owner[v], skin.direction[v]),
+              {}, {skin.owner[v]});
     }
   }
   for (std::size_t t = 0; t < skin.triangles.size(); ++t) {
     for (const int32_t v : skin.triangles[t]) {
       if (v < 0 || at(v) >= vertices) {
-        violate(verdict, {{}, {}, {}, fmt::format("skin triangle {} names vertex {} of {}", t, v, vertices)});
+        violate(verdict, fmt::format("skin triangle {} names vertex {} of {}", t, v, vertices));
       }
     }
   }
@@ -172,7 +166,7 @@ void check_skin_form(const Skin& skin, int32_t n, Verdict& verdict) {
 
 Verdict check_form(const Setup& setup, const State& state) {
   Verdict verdict = start_verdict("well formed", state, "1", "model/state.h, model/clusters.h, model/skin.h");
-  const auto reject = [&](std::string text) { violate(verdict, {{}, {}, {}, std::move(text)}); };
+  const auto reject = [&](std::string text) { violate(verdict, std::move(text)); };
   if (!body_is_well_formed(setup, verdict)) return verdict;
   const int32_t n = setup.body.particle_count();
   if (state.x.size() != at(n) || state.v.size() != at(n) || state.alive.size() != at(n)) {
@@ -181,7 +175,7 @@ Verdict check_form(const Setup& setup, const State& state) {
   }
   for (std::size_t i = 0; i < state.alive.size(); ++i) {
     if (state.alive[i] > 1) {
-      violate(verdict, {{}, {static_cast<int32_t>(i)}, {}, fmt::format("particle {} is neither alive nor dead", i)});
+      violate(verdict, fmt::format("particle {} is neither alive nor dead", i), {}, {static_cast<int32_t>(i)});
     }
   }
   check_particle_list(state.removed, "removed", n, verdict);
@@ -249,29 +243,28 @@ Verdict check_coverage(Judged& judged) {
   for (int32_t c = 0; c < judged.clusters.count(); ++c) {
     const auto members = judged.clusters.of(c);
     const int32_t number = judged.number(c);
-    if (members.empty()) violate(verdict, {{number}, {}, {}, fmt::format("cluster {} has no particles", number)});
+    if (members.empty()) violate(verdict, fmt::format("cluster {} has no particles", number), {number});
     for (std::size_t k = 0; k < members.size(); ++k) {
       const int32_t i = members[k];
       covered[at(i)] = 1;
       if (!judged.alive(i)) {
-        violate(verdict, {{number}, {i}, {}, fmt::format("cluster {} holds particle {}, which is dead", number, i)});
+        violate(verdict, fmt::format("cluster {} holds particle {}, which is dead", number, i), {number}, {i});
       }
       if (k > 0 && members[k] == members[k - 1]) {
-        violate(verdict, {{number}, {i}, {}, fmt::format("cluster {} holds particle {} twice", number, i)});
+        violate(verdict, fmt::format("cluster {} holds particle {} twice", number, i), {number}, {i});
       } else if (k > 0 && members[k] < members[k - 1]) {
-        violate(verdict,
-                {{number}, {members[k - 1], i}, {}, fmt::format("the members of cluster {} do not ascend", number)});
+        violate(verdict, fmt::format("the members of cluster {} do not ascend", number), {number}, {members[k - 1], i});
       }
     }
   }
   for (int32_t i = 0; i < judged.body.particle_count(); ++i) {
     if (judged.alive(i) && covered[at(i)] == 0) {
-      violate(verdict, {{}, {i}, {}, fmt::format("particle {} is alive and in no cluster", i)});
+      violate(verdict, fmt::format("particle {} is alive and in no cluster", i), {}, {i});
     }
   }
   for (const auto* list : {&judged.state.removed, &judged.state.debris}) {
     for (const int32_t i : *list) {
-      if (judged.alive(i)) violate(verdict, {{}, {i}, {}, fmt::format("particle {} was removed but is alive", i)});
+      if (judged.alive(i)) violate(verdict, fmt::format("particle {} was removed but is alive", i), {}, {i});
     }
   }
   verdict.checked = judged.body.particle_count() + static_cast<int64_t>(judged.clusters.members.size());
@@ -437,19 +430,17 @@ void match_skin(Judged& judged, Verdict& verdict) {
     const int32_t shell = shells.of_vertex[v], owner = skin.owner[v];
     if (shell < 0) continue;
     if (!judged.alive(owner)) {
-      violate(verdict,
-              {{}, {owner}, {}, fmt::format("skin vertex {} is owned by particle {}, which is dead", v, owner)});
+      violate(verdict, fmt::format("skin vertex {} is owned by particle {}, which is dead", v, owner), {}, {owner});
       continue;
     }
     int32_t& first = first_owner[at(shell)];
     if (first < 0) first = owner;
     if (components.label[at(first)] != components.label[at(owner)]) {
-      violate(verdict, {{},
-                        {first, owner},
-                        {},
-                        fmt::format("one shell of the skin joins particles {} and {}, which lie in components {} and "
-                                    "{} of the tissue",
-                                    first, owner, components.label[at(first)], components.label[at(owner)])});
+      violate(verdict,
+              fmt::format("one shell of the skin joins particles {} and {}, which lie in components {} and "
+                          "{} of the tissue",
+                          first, owner, components.label[at(first)], components.label[at(owner)]),
+              {}, {first, owner});
     }
   }
   // Exactly one outer shell for each component of the tissue.
@@ -464,11 +455,10 @@ void match_skin(Judged& judged, Verdict& verdict) {
     }
     int32_t& outer = outer_of[at(components.label[at(owner)])];
     if (outer >= 0) {
-      violate(verdict, {{},
-                        {first_owner[at(outer)], owner},
-                        {},
-                        fmt::format("component {} of the tissue has two outer shells, at particles {} and {}",
-                                    components.label[at(owner)], first_owner[at(outer)], owner)});
+      violate(verdict,
+              fmt::format("component {} of the tissue has two outer shells, at particles {} and {}",
+                          components.label[at(owner)], first_owner[at(outer)], owner),
+              {}, {first_owner[at(outer)], owner});
     }
     outer = shell;
   }
@@ -476,28 +466,23 @@ void match_skin(Judged& judged, Verdict& verdict) {
     if (!judged.alive(i)) continue;
     int32_t& outer = outer_of[at(components.label[at(i)])];
     if (outer < 0) {
-      violate(verdict, {{},
-                        {i},
-                        {},
-                        fmt::format("component {} of the tissue, which holds particle {}, has no outer "
-                                    "shell",
-                                    components.label[at(i)], i)});
+      violate(verdict,
+              fmt::format("component {} of the tissue, which holds particle {}, has no outer "
+                          "shell",
+                          components.label[at(i)], i),
+              {}, {i});
       outer = shell_count;  // told once
     }
   }
   const int32_t cavities = count_cavities(judged);
   if (inner != cavities) {
-    violate(verdict,
-            {{}, {}, {}, fmt::format("the skin has {} inner shells, but the tissue has {} cavities", inner, cavities)});
+    violate(verdict, fmt::format("the skin has {} inner shells, but the tissue has {} cavities", inner, cavities));
   }
   const ShellCount counted = skin_shells(skin);
   if (counted.outer + counted.inner != shell_count) {
-    violate(verdict, {{},
-                      {},
-                      {},
-                      fmt::format("CGAL counts {} shells of the skin, joining triangles at vertices gives "
-                                  "{}: shells touch",
-                                  counted.outer + counted.inner, shell_count)});
+    violate(verdict, fmt::format("CGAL counts {} shells of the skin, joining triangles at vertices gives "
+                                 "{}: shells touch",
+                                 counted.outer + counted.inner, shell_count));
   }
 }
 
@@ -514,12 +499,11 @@ Verdict check_component_match(Judged& judged, bool with_skin) {
   const int64_t surplus = pairs - components.count, ghosts = pairs - coupling.count;
   if (surplus > 0) {
     const Edge edge = first_uncoupled_edge(judged);
-    violate(verdict, {{},
-                      {edge.a, edge.b},
-                      {edge.a, edge.b},
-                      fmt::format("particles {} and {} are neighbours in component {} of the tissue, but no chain of "
-                                  "clusters couples them",
-                                  edge.a, edge.b, components.label[at(edge.a)])});
+    violate(verdict,
+            fmt::format("particles {} and {} are neighbours in component {} of the tissue, but no chain of "
+                        "clusters couples them",
+                        edge.a, edge.b, components.label[at(edge.a)]),
+            {}, {edge.a, edge.b}, {edge.a, edge.b});
   }
   if (ghosts > 0) violate(verdict, first_ghost_coupling(judged));
   verdict.measured = static_cast<double>(surplus + ghosts);
@@ -637,7 +621,7 @@ Verdict check_finite(Judged& judged) {
   const auto look = [&](bool finite, std::vector<int32_t> clusters, std::vector<int32_t> particles, const char* what) {
     ++verdict.checked;
     if (!finite) {
-      violate(verdict, {std::move(clusters), std::move(particles), {}, fmt::format("{} is not finite", what)});
+      violate(verdict, fmt::format("{} is not finite", what), std::move(clusters), std::move(particles));
     }
   };
   for (int32_t i = 0; i < judged.body.particle_count(); ++i) {
@@ -659,7 +643,7 @@ Verdict check_finite(Judged& judged) {
   for (std::size_t v = 0; v < skin.position.size(); ++v) {
     ++verdict.checked;
     if (!is_finite(skin.position[v])) {
-      violate(verdict, {{}, {skin.owner[v]}, {}, fmt::format("the position of skin vertex {} is not finite", v)});
+      violate(verdict, fmt::format("the position of skin vertex {} is not finite", v), {}, {skin.owner[v]});
     }
   }
   look(is_finite(judged.state.impulse), {}, {}, "the impulse");
@@ -727,11 +711,10 @@ Verdict check_no_pass(Judged& judged) {
       if (other < 0 || held[at(other)] != 0) continue;
       ++verdict.checked;
       if (!crosses(setup.blade, local[at(i)], local[at(other)])) continue;
-      violate(verdict, {{},
-                        {i, other},
-                        {i, other},
-                        fmt::format("the edge from particle {} to {}, {:.6g} h long, crosses the blade", i, other,
-                                    norm(state.x[at(i)] - state.x[at(other)]) / judged.body.grid.spacing)});
+      violate(verdict,
+              fmt::format("the edge from particle {} to {}, {:.6g} h long, crosses the blade", i, other,
+                          norm(state.x[at(i)] - state.x[at(other)]) / judged.body.grid.spacing),
+              {}, {i, other}, {i, other});
     }
   }
   return verdict;
@@ -779,13 +762,12 @@ Verdict check_merge_maximality(Judged& judged) {
       if (t == s || (!contained && joined > judged.state.cap)) continue;
       std::vector<int32_t> particles = {contact[at(t)].a};
       if (contact[at(t)].b != contact[at(t)].a) particles.push_back(contact[at(t)].b);
-      violate(verdict, {{judged.number(s), judged.number(t)},
-                        particles,
-                        {},
-                        fmt::format("cluster {} has {} particles, fewer than tau = {}, and could still merge into "
-                                    "cluster {}: together {} particles, cap = {}{}",
-                                    judged.number(s), size, judged.state.tau, judged.number(t), joined,
-                                    judged.state.cap, contained ? ", contained in it" : "")});
+      violate(verdict,
+              fmt::format("cluster {} has {} particles, fewer than tau = {}, and could still merge into "
+                          "cluster {}: together {} particles, cap = {}{}",
+                          judged.number(s), size, judged.state.tau, judged.number(t), joined, judged.state.cap,
+                          contained ? ", contained in it" : ""),
+              {judged.number(s), judged.number(t)}, particles);
       break;
     }
   }

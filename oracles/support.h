@@ -90,10 +90,14 @@ inline Verdict start_verdict(std::string property, const State& state, std::stri
 }
 
 // Counts one more violation; the first one is the witness.
-inline void violate(Verdict& verdict, const Witness& witness) {
-  if (verdict.holds) verdict.witness = witness;
+inline void violate(Verdict& verdict, Witness witness) {
+  if (verdict.holds) verdict.witness = std::move(witness);
   verdict.holds = false;
   verdict.measured += 1;
+}
+inline void violate(Verdict& verdict, std::string text, std::vector<int32_t> clusters = {},
+                    std::vector<int32_t> particles = {}, std::vector<int32_t> path = {}) {
+  violate(verdict, Witness{std::move(clusters), std::move(particles), std::move(path), std::move(text)});
 }
 
 // The answer of every oracle on a state that is not well formed. `form` is the failing verdict of well_formed.
