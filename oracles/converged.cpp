@@ -55,8 +55,6 @@ Substep substep_of(const Setup& setup, const State& state) {
   const Verdict form = well_formed(setup, state);
   require(form.holds, form.witness.text.c_str());
   const auto index = at(state.frame * setup.step.substeps);
-  const bool blade = setup.has_blade && setup.blade_moves[index].down && setup.detect.criterion != Criterion::geometric;
-  require(!blade, "the blade is down, and the tissue it keeps away is not convex");
 
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const Body& body = setup.body;
@@ -76,11 +74,9 @@ Substep substep_of(const Setup& setup, const State& state) {
   const double dt = substep.dt, kdt2 = substep.stiffness * dt * dt;
   substep.s = kdt2 / (1 + kdt2);
   for (const Wall& wall : setup.walls) {
-    require(wall.friction == 0, "a wall has friction, which has no energy");
     const auto axis = at(wall.axis);
     if (wall.side > 0) substep.low[axis] = std::max(substep.low[axis], wall.offset);
     if (wall.side < 0) substep.high[axis] = std::min(substep.high[axis], wall.offset);
-    require(substep.low[axis] <= substep.high[axis], "two walls leave no room between them");
   }
 
   for (int32_t i = 0; i < body.particle_count(); ++i) {
@@ -107,6 +103,17 @@ Substep substep_of(const Setup& setup, const State& state) {
     for (const int32_t i : state.clusters.of(c)) substep.offset.push_back(body.rest_position(i) - center);
   }
   return substep;
+}
+
+// E alone says where the substep goes.
+void require_solvable(const Setup& setup, const State& state, const Substep& substep) {
+  const auto index = at(state.frame * setup.step.substeps);
+  const bool blade = setup.has_blade && setup.blade_moves[index].down && setup.detect.criterion != Criterion::geometric;
+  require(!blade, "the blade is down, and the room that it leaves is not convex");
+  for (const Wall& wall : setup.walls) require(wall.friction == 0, "a wall has friction, which has no energy");
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    require(substep.low[axis] <= substep.high[axis], "two walls leave no room between them");
+  }
 }
 
 // Where the iteration begins: x~ with the walls projected.
@@ -429,6 +436,7 @@ class LinearStage {
 
 Converged converged_substep(const Setup& setup, const State& state) {
   const Substep substep = substep_of(setup, state);
+  require_solvable(setup, state, substep);
   const double h = setup.body.grid.spacing;
   Converged result;
   result.x = first_positions(substep);
@@ -464,6 +472,7 @@ double substep_energy(const Setup& setup, const State& state, const std::vector<
 
 PlainLimit plain_limit(const Setup& setup, const State& state, double tolerance, int64_t most) {
   const Substep substep = substep_of(setup, state);
+  require_solvable(setup, state, substep);
   const double h = setup.body.grid.spacing;
   const auto drift = [&](const std::vector<Vec3>& x) {
     Vec3 sum;

@@ -22,8 +22,8 @@ struct Converged {
 Converged converged_substep(const Setup& setup, const State& state);
 
 // E of method.md §3 at positions x, minimised over t and R: what `energy_is_monotone` compares. x~ is computed from
-// the state; it is the free motion, before contacts: walls bound x, and held particles have no inertia. Throws as
-// converged_substep does.
+// the state; it is the free motion, before contacts: walls bound x, and held particles have no inertia. Blade and
+// friction do not enter it. Throws if the solver is not implicit.
 double substep_energy(const Setup& setup, const State& state, const std::vector<Vec3>& x);
 
 // The limit of the plain iteration, in double, written down a second time without reference_cpu/: iterates until the

@@ -8,14 +8,20 @@ namespace cutproof::oracles {
 
 // Every particle of every other component ends `frames` frames with the same bits when the component of `particle`
 // is kicked: displaced by `kick` and given the velocity `kick` / dt.
-Verdict no_ghost_force(Backend& backend, const Setup& setup, const State& state, int32_t particle, Vec3 kick, int64_t frames);
+Verdict no_ghost_force(Backend& backend, const Setup& setup, const State& state, int32_t particle, Vec3 kick,
+                       int64_t frames);
 // Same input, same bits, over `frames` frames.
 Verdict determinism(Backend& backend, const Setup& setup, const State& state, int64_t frames);
 // A frame equals the composition of its spans, bit for bit: whole, six single stages, and every cut in two.
 Verdict span_composition(Backend& backend, const Setup& setup, const State& state, int64_t frames);
-// The same scene turned by a multiple of 90°, mirrored axes excluded; shifted on the grid; scaled by a power of two;
-// particles and clusters renumbered; duplicated as two bodies: same answer, carried along (method in
-// oracles_and_tests.md §1). `seed` chooses.
+// The same scene carried along must give the same answer, carried along (oracles_and_tests.md §1). seed mod 6 chooses
+// 0: turned by a multiple of 90° (mirrored axes excluded), which renumbers particles, and clusters in another order;
+// 1: shifted on the grid; 2: clusters in another order; 3: scaled by a power of two; 4: elsewhere in the world;
+// 5: duplicated as two bodies. The rest of the seed chooses by how much. 3 to 5 in bits; 0 to 2: decisions, clusters
+// and skin vertices exactly, numbers up to rounding (docs/tolerances.md, A scene carried along), merge and expand up to
+// ties, and the fans of the skin's polygons not at all (they follow the numbering of grid edges). A removal that a
+// disturbance of 1e-7 h also changes is "either": then the verdict holds with checked = 0.
+inline constexpr uint64_t kEquivarianceKinds = 6;
 Verdict equivariance(Backend& backend, const Setup& setup, const State& state, Span span, uint64_t seed);
 // Geometric cuts: what is separate after fewer strokes stays separate after more (setup with all strokes, without
 // the last).
@@ -26,5 +32,8 @@ Verdict rest_is_fixed(Backend& backend, const Setup& setup, const State& state);
 Verdict translation_is_exact(Backend& backend, const Setup& setup, const State& state, Vec3 velocity);
 // Implicit: E(x_k) never grows over k = 0 .. iterations in one substep (iterates from runs with k iterations).
 Verdict energy_is_monotone(Backend& backend, const Setup& setup, const State& state, int32_t iterations);
+
+// The first substep of `frame` as a scene of its own: one frame of one substep.
+Setup single_substep_setup(const Setup& setup, int64_t frame);
 
 }  // namespace cutproof::oracles

@@ -1,0 +1,871 @@
+#include "oracles/two_runs.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <optional>
+
+#include "oracles/carried.h"
+#include "oracles/converged.h"
+#include "oracles/shape_sums.h"
+#include "oracles/support.h"
+
+namespace cutproof::oracles {
+namespace {
+
+constexpr Span kFrame{Stage::step, Stage::skin};
+constexpr Span kStep{Stage::step, Stage::step};
+
+Verdict fail(Verdict verdict, std::string text, std::vector<int32_t> particles = {},
+             std::vector<int32_t> clusters = {}) {
+  verdict.holds = false;
+  verdict.witness.text = std::move(text);
+  verdict.witness.particles = std::move(particles);
+  verdict.witness.clusters = std::move(clusters);
+  return verdict;
+}
+
+Verdict begin(const char* property, const Backend& backend, const State& state, const char* unit, const char* source) {
+  Verdict verdict = start_verdict(property, state, unit, source);
+  verdict.backend = backend.name();
+  return verdict;
+}
+
+// What these oracles need to know of a state before they run it.
+std::optional<Verdict> unfit(Verdict verdict, const Setup& setup, const State& state) {
+  const Verdict form = well_formed(setup, state);
+  if (!form.holds) return fail(std::move(verdict), "not judged: the state is not well formed: " + form.witness.text);
+  return std::nullopt;
+}
+
+State after(Backend& backend, const Setup& setup, const State& state, const std::vector<Span>& spans) {
+  backend.load({setup}, {state});
+  for (const Span span : spans) backend.run(span);
+  return backend.snapshot().at(0);
+}
+
+State after_frames(Backend& backend, const Setup& setup, const State& state, int64_t frames) {
+  return after(backend, setup, state, std::vector<Span>(at(frames), kFrame));
+}
+
+// One step stage, on its own where the backend can do that.
+State after_step(Backend& backend, const Setup& setup, const State& state) {
+  return after(backend, setup, state, {backend.can_run(kStep) ? kStep : kFrame});
+}
+
+// --- Equal bits ----------------------------------------------------------------------------------------------------
+
+struct Difference {
+  std::string text;
+  std::vector<int32_t> particles, clusters;
+};
+
+template <typename T>
+std::optional<std::size_t> first_different(const std::vector<T>& a, const std::vector<T>& b) {
+  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) {
+    if (!same_bits(a[i], b[i])) return i;
+  }
+  if (a.size() != b.size()) return std::min(a.size(), b.size());
+  return std::nullopt;
+}
+
+// In the order in which a fault would show first: decisions, clusters, positions, what follows from them.
+std::optional<Difference> difference(const State& a, const State& b) {
+  std::optional<Difference> found;
+  const auto of_particle = [&](const char* what, const auto& in_a, const auto& in_b) {
+    if (found) return;
+    const auto i = first_different(in_a, in_b);
+    if (i) found = Difference{fmt::format("{} of particle {} differs", what, *i), {static_cast<int32_t>(*i)}, {}};
+  };
+  const auto of_list = [&](const char* what, const auto& in_a, const auto& in_b) {
+    if (found) return;
+    const auto i = first_different(in_a, in_b);
+    if (i) found = Difference{fmt::format("{} differ, first in entry {}", what, *i), {}, {}};
+  };
+  const auto of_cluster = [&](const char* what, const auto& in_a, const auto& in_b) {
+    if (found) return;
+    const auto c = first_different(in_a, in_b);
+    if (!c) return;
+    found = Difference{fmt::format("{} of the cluster in place {} differs", what, *c), {}, {}};
+    if (*c < a.clusters.number.size()) found->clusters = {a.clusters.number[*c]};
+  };
+  const auto of_value = [&](const char* what, const auto& in_a, const auto& in_b) {
+    if (!found && !same_bits(in_a, in_b)) found = Difference{fmt::format("{} differs", what), {}, {}};
+  };
+  of_value("the frame's index", a.frame, b.frame);
+  of_particle("life", a.alive, b.alive);
+  of_list("the removed particles", a.removed, b.removed);
+  of_list("the particles removed as debris", a.debris, b.debris);
+  of_particle("the position", a.x, b.x);
+  of_particle("the velocity", a.v, b.v);
+  of_list("the clusters' sizes", a.clusters.offsets, b.clusters.offsets);
+  of_list("the clusters' members", a.clusters.members, b.clusters.members);
+  of_cluster("the number", a.clusters.number, b.clusters.number);
+  of_cluster("the rotation", a.clusters.rotation, b.clusters.rotation);
+  of_cluster("the rest center", a.clusters.rest_center, b.clusters.rest_center);
+  of_cluster("the mass", a.clusters.mass, b.clusters.mass);
+  of_cluster("the flag for a rotation that is not unique", a.clusters.degenerate, b.clusters.degenerate);
+  of_value("tau", a.tau, b.tau);
+  of_value("cap", a.cap, b.cap);
+  of_value("whether every edge is covered", a.edge_covered, b.edge_covered);
+  of_value("the impulse", a.impulse, b.impulse);
+  of_list("the skin's owners", a.skin.owner, b.skin.owner);
+  of_list("the skin's directions", a.skin.direction, b.skin.direction);
+  of_list("the skin's positions", a.skin.position, b.skin.position);
+  of_list("the skin's triangles", a.skin.triangles, b.skin.triangles);
+  return found;
+}
+
+Verdict fail_on(Verdict verdict, const std::string& where, const Difference& difference) {
+  verdict.measured = 1;
+  return fail(std::move(verdict), where + ": " + difference.text, difference.particles, difference.clusters);
+}
+
+// --- Rounding of one substep (docs/tolerances.md, "One substep") -----------------------------------------------------
+
+// By how much a cluster's rotation amplifies an error of positions: Σ w |X − T| r / (σ2 + σ3) at rest, r the greatest
+// distance from the center. Of a collinear cluster the rotation moves no particle.
+double greatest_amplification(const Body& body, const Clusters& clusters, const std::vector<int32_t>& counts,
+                              const std::vector<Vec3>& rest) {
+  double greatest = 0;
+  for (int32_t c = 0; c < clusters.count(); ++c) {
+    const ClusterMeans means = cluster_means(body, clusters, counts, rest, c);
+    Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
+    double moment = 0, radius = 0;
+    for (const int32_t i : clusters.of(c)) {
+      const Vec3 d = rest[at(i)] - means.rest;
+      const double w = weight_of(body, counts, i);
+      a += w * Eigen::Vector3d(d.x, d.y, d.z) * Eigen::RowVector3d(d.x, d.y, d.z);
+      moment += w * norm(d);
+      radius = std::max(radius, norm(d));
+    }
+    const Eigen::Vector3d sigma = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(a).eigenvalues();
+    constexpr double kCollinear = 1e-12;
+    const double gap = sigma[0] + sigma[1];  // ascending: the two smaller ones
+    if (gap > kCollinear * sigma[2]) greatest = std::max(greatest, moment * radius / gap);
+  }
+  return greatest;
+}
+
+std::vector<Vec3> rest_positions(const Body& body) {
+  std::vector<Vec3> rest;
+  for (int32_t i = 0; i < body.particle_count(); ++i) rest.push_back(body.rest_position(i));
+  return rest;
+}
+
+// How far rounding can carry a particle in one substep near the rest state [m].
+double substep_rounding(const Setup& setup, const State& state) {
+  const Body& body = setup.body;
+  double mass = 0, lightest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < body.mass.size(); ++i) {
+    if (!state.alive[i]) continue;
+    mass += body.mass[i];
+    lightest = std::min(lightest, body.mass[i]);
+  }
+  if (mass == 0) return 0;
+  const std::vector<int32_t> counts = membership_counts(state.clusters, body.particle_count());
+  const double amplification = greatest_amplification(body, state.clusters, counts, rest_positions(body));
+  const RoundingScale scale = rounding_scale(setup, state);
+  return setup.step.iterations * std::sqrt(mass / lightest) * (1 + amplification) * goal_rounding(scale) +
+         8 * kUnitRoundoff * scale.extent;
+}
+
+// --- Scenes made from others -----------------------------------------------------------------------------------------
+
+// Nothing acts from outside: no blade, walls, grips; nothing is removed.
+Setup undisturbed(Setup setup) {
+  setup.has_blade = false;
+  setup.blade_moves.clear();
+  setup.walls.clear();
+  setup.grips.clear();
+  setup.detect.criterion = Criterion::none;
+  setup.skin.wanted = false;
+  return setup;
+}
+
+// The same tissue and clusters, at rest.
+State at_rest(const Setup& setup, const State& state) {
+  State rest = state;
+  rest.frame = 0;
+  for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
+    if (state.alive[at(i)]) rest.x[at(i)] = setup.body.rest_position(i);
+    rest.v[at(i)] = {};
+  }
+  rest.removed.clear();
+  rest.debris.clear();
+  rest.clusters.rotation.assign(at(state.clusters.count()), Mat3{});
+  rest.impulse = {};
+  rest.skin = {};
+  return rest;
+}
+
+double greatest_distance(const State& state, const std::vector<Vec3>& expected, int32_t& where) {
+  double greatest = 0;
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    if (!state.alive[i]) continue;
+    const double distance = norm(state.x[i] - expected[i]);
+    if (distance <= greatest) continue;
+    where = static_cast<int32_t>(i);
+    if (!std::isfinite(distance)) return distance;
+    greatest = distance;
+  }
+  return greatest;
+}
+
+// --- Equivariance
+// ------------------------------------------------------------------------------------------------------
+
+uint64_t mixed(uint64_t& seed) {  // splitmix64 (Steele, Lea and Flood 2014)
+  uint64_t z = (seed += 0x9E3779B97F4A7C15u);
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+  return z ^ (z >> 31);
+}
+
+std::vector<int32_t> shuffled(int32_t count, uint64_t& seed) {
+  std::vector<int32_t> order(at(count));
+  std::iota(order.begin(), order.end(), 0);
+  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[mixed(seed) % i]);
+  return order;
+}
+
+int determinant_sign(const Motion& m) {
+  const bool even = (m.target[0] + 1) % 3 == m.target[1];  // cyclic
+  return (even ? 1 : -1) * m.sign[0] * m.sign[1] * m.sign[2];
+}
+
+// One of the 23 turns by quarter turns that are not the identity.
+Motion random_turn(uint64_t& seed) {
+  for (;;) {
+    Motion motion;
+    const auto order = shuffled(3, seed);
+    for (std::size_t a = 0; a < 3; ++a) {
+      motion.target[a] = order[a];
+      motion.sign[a] = mixed(seed) % 2 == 0 ? 1 : -1;
+    }
+    const bool identity = motion.target == std::array{0, 1, 2} && motion.sign == std::array{1, 1, 1};
+    if (determinant_sign(motion) > 0 && !identity) return motion;
+  }
+}
+
+std::string text_of(const Motion& motion) {
+  std::string text;
+  for (std::size_t a = 0; a < 3; ++a) {
+    text += fmt::format("{}{} -> {}{}", a == 0 ? "" : ", ", "xyz"[a], motion.sign[a] < 0 ? "-" : "+",
+                        "xyz"[motion.target[a]]);
+  }
+  return text;
+}
+
+// The span in pieces, so that what merging and expansion may decide differently is judged where it happens.
+std::vector<Span> pieces_of(const Backend& backend, Span span) {
+  std::vector<Span> pieces;
+  const auto add = [&](Stage first, Stage last) {
+    first = std::max(first, span.first);
+    last = std::min(last, span.last);
+    if (first <= last) pieces.push_back({first, last});
+  };
+  add(Stage::step, Stage::split);
+  add(Stage::merge, Stage::merge);
+  add(Stage::expand, Stage::expand);
+  add(Stage::skin, Stage::skin);
+  for (const Span piece : pieces) {
+    if (!backend.can_run(piece)) return {span};
+  }
+  return pieces;
+}
+
+std::vector<State> after_each(Backend& backend, const Setup& setup, const State& state,
+                              const std::vector<Span>& pieces) {
+  std::vector<State> states;
+  backend.load({setup}, {state});
+  for (const Span piece : pieces) {
+    backend.run(piece);
+    states.push_back(backend.snapshot().at(0));
+  }
+  return states;
+}
+
+struct Tolerance {
+  double position = 0;  // [m], also of velocities times dt and of what a rotation does to a member
+  double skin = 0;      // [m]
+  double velocity = 0;  // [m/s]
+  double impulse = 0;   // [kg m/s]
+  double rest = 0;      // [m], rest centers; relative for masses times the extent
+};
+
+std::map<std::vector<int32_t>, int32_t> places_by_members(const Clusters& clusters) {
+  std::map<std::vector<int32_t>, int32_t> places;
+  for (int32_t c = 0; c < clusters.count(); ++c) {
+    const auto members = clusters.of(c);
+    places[{members.begin(), members.end()}] = c;
+  }
+  return places;
+}
+
+// Equal as families of sets.
+bool same_families(const Clusters& a, const Clusters& b) {
+  const auto sorted_lists = [](const Clusters& clusters) {
+    std::vector<std::vector<int32_t>> lists;
+    for (int32_t c = 0; c < clusters.count(); ++c) {
+      const auto members = clusters.of(c);
+      lists.emplace_back(members.begin(), members.end());
+    }
+    std::sort(lists.begin(), lists.end());
+    return lists;
+  };
+  return sorted_lists(a) == sorted_lists(b);
+}
+
+std::vector<int32_t> decided_differently(const State& a, const State& b) {
+  std::vector<int32_t> particles;
+  for (std::size_t i = 0; i < a.alive.size(); ++i) {
+    if (a.alive[i] != b.alive[i]) particles.push_back(static_cast<int32_t>(i));
+  }
+  return particles;
+}
+
+struct Measured {
+  double ratio = 0, distance = 0, bound = 0;  // the worst of all comparisons, by distance / bound
+  Difference difference;
+  int64_t checked = 0;
+  void compare(double value, double limit, const char* what, std::vector<int32_t> particles,
+               std::vector<int32_t> clusters = {}) {
+    ++checked;
+    const double now = limit > 0 ? value / limit : value > 0 ? std::numeric_limits<double>::infinity() : 0;
+    if (now <= ratio) return;  // not if it is not a number
+    ratio = std::isnan(now) ? std::numeric_limits<double>::infinity() : now;
+    distance = value;
+    bound = limit;
+    difference = {fmt::format("{} differs by {}, more than {}", what, value, limit), std::move(particles),
+                  std::move(clusters)};
+  }
+};
+
+// Numbers in two states with the same particles alive; clusters where both have the same ones.
+Measured compare_numbers(const Setup& setup, const State& expected, const State& actual, const Tolerance& tolerance) {
+  Measured measured;
+  const double extent = rounding_scale(setup, actual).extent;
+  for (std::size_t i = 0; i < expected.x.size(); ++i) {
+    const std::vector<int32_t> particle = {static_cast<int32_t>(i)};
+    measured.compare(norm(expected.x[i] - actual.x[i]), tolerance.position, "a position [m]", particle);
+    measured.compare(norm(expected.v[i] - actual.v[i]), tolerance.velocity, "a velocity [m/s]", particle);
+  }
+  measured.compare(norm(expected.impulse - actual.impulse), tolerance.impulse, "the impulse [kg m/s]", {});
+  const auto places = places_by_members(expected.clusters);
+  for (int32_t c = 0; c < actual.clusters.count(); ++c) {
+    const auto members = actual.clusters.of(c);
+    const auto same = places.find({members.begin(), members.end()});
+    if (same == places.end()) continue;
+    const auto j = at(same->second), k = at(c);
+    const Clusters &a = expected.clusters, &b = actual.clusters;
+    const std::vector<int32_t> number = {b.number[k]};
+    measured.compare(norm(a.rest_center[j] - b.rest_center[k]), tolerance.rest, "a rest center [m]", {}, number);
+    measured.compare(std::abs(a.mass[j] - b.mass[k]) * extent, tolerance.rest * a.mass[j],
+                     "a cluster's mass, times the extent [kg m],", {}, number);
+    for (const int32_t i : members) {
+      const Vec3 offset = setup.body.rest_position(i) - a.rest_center[j];
+      measured.compare(norm(a.rotation[j] * offset - b.rotation[k] * offset), tolerance.position,
+                       "where a rotation puts a member [m]", {i}, number);
+    }
+  }
+  return measured;
+}
+
+std::map<std::pair<int32_t, uint8_t>, Vec3> vertices_of(const Skin& skin) {
+  std::map<std::pair<int32_t, uint8_t>, Vec3> vertices;
+  for (std::size_t v = 0; v < skin.owner.size(); ++v) vertices[{skin.owner[v], skin.direction[v]}] = skin.position[v];
+  return vertices;
+}
+
+// The same vertices; as many triangles, shells, and a surface. Which fan a polygon gets depends on the numbering of
+// grid edges, so triangles are not compared one by one.
+std::optional<Difference> compare_skins(const Skin& expected, const Skin& actual, const Tolerance& tolerance,
+                                        bool compare_positions) {
+  const auto a = vertices_of(expected), b = vertices_of(actual);
+  for (const auto& [key, position] : a) {
+    const auto other = b.find(key);
+    if (other == b.end()) {
+      return Difference{
+          fmt::format("the skin's vertex of particle {} in direction {} is missing", key.first, key.second),
+          {key.first},
+          {}};
+    }
+    const double distance = norm(position - other->second);
+    if (compare_positions && !(distance <= tolerance.skin)) {
+      return Difference{fmt::format("the skin's vertex of particle {} in direction {} differs by {} m, more than {} m",
+                                    key.first, key.second, distance, tolerance.skin),
+                        {key.first},
+                        {}};
+    }
+  }
+  for (const auto& [key, position] : b) {
+    if (a.count(key)) continue;
+    return Difference{
+        fmt::format("the skin has a vertex of particle {} in direction {} too many", key.first, key.second),
+        {key.first},
+        {}};
+  }
+  const ShellCount shells = skin_shells(expected), other = skin_shells(actual);
+  if (shells.outer != other.outer || shells.inner != other.inner ||
+      expected.triangles.size() != actual.triangles.size()) {
+    return Difference{
+        fmt::format("the skins have {} + {} and {} + {} shells and {} and {} triangles", shells.outer, shells.inner,
+                    other.outer, other.inner, expected.triangles.size(), actual.triangles.size()),
+        {},
+        {}};
+  }
+  return std::nullopt;
+}
+
+// Relative size of the disturbances that show how sensitive a scene is: far above rounding, far below what tissue
+// feels.
+constexpr double kDisturbance = 1e-7;
+
+State jittered(const Setup& setup, State state, uint64_t& seed) {
+  const double step = kDisturbance * setup.body.grid.spacing;
+  for (Vec3& x : state.x) {
+    for (int axis = 0; axis < 3; ++axis) x[axis] += mixed(seed) % 2 == 0 ? step : -step;
+  }
+  return state;
+}
+
+Setup disturbed(Setup setup, double sign) {
+  setup.detect.epsilon *= 1 + sign * kDisturbance;
+  setup.detect.strain *= 1 + sign * kDisturbance;
+  const double h = setup.body.grid.spacing;
+  setup.blade.thickness = std::max(setup.blade.thickness, h) * (1 + sign * kDisturbance);
+  for (BladeMove& move : setup.blade_moves) {
+    for (BladePose* pose : {&move.from, &move.to}) {
+      pose->edge += sign * kDisturbance * h * (cross(pose->along, pose->back) + pose->along + pose->back);
+    }
+  }
+  return setup;
+}
+
+// Particles whose life depends on a disturbance of the input: decisions inside the rounding band among them.
+std::vector<uint8_t> undecided(Backend& backend, const Setup& setup, const State& state, Span span, const State& result,
+                               uint64_t seed) {
+  std::vector<uint8_t> either(state.alive.size(), 0);
+  const auto note = [&](const State& other) {
+    for (const int32_t i : decided_differently(result, other)) either[at(i)] = 1;
+  };
+  note(after(backend, disturbed(setup, +1), state, {span}));
+  note(after(backend, disturbed(setup, -1), state, {span}));
+  note(after(backend, setup, jittered(setup, state, seed), {span}));
+  return either;
+}
+
+// How far a disturbance of positions has grown at the end of the span, relative to it: at least 1.
+double sensitivity(Backend& backend, const Setup& setup, const State& state, Span span, const State& result,
+                   uint64_t seed) {
+  const State other = after(backend, setup, jittered(setup, state, seed), {span});
+  double greatest = 0;
+  for (std::size_t i = 0; i < result.x.size(); ++i) {
+    if (result.alive[i] && other.alive[i]) greatest = std::max(greatest, norm(result.x[i] - other.x[i]));
+  }
+  const auto vertices = vertices_of(result.skin);
+  for (const auto& [key, position] : vertices_of(other.skin)) {
+    const auto same = vertices.find(key);
+    if (same != vertices.end()) greatest = std::max(greatest, norm(position - same->second));
+  }
+  return std::max(1.0, greatest / (kDisturbance * setup.body.grid.spacing));
+}
+
+Verdict judge_exactly(Verdict verdict, const std::string& how, const State& expected, const State& actual) {
+  verdict.unit = "1";
+  verdict.checked += static_cast<int64_t>(expected.x.size());
+  if (const auto found = difference(expected, actual)) return fail_on(std::move(verdict), how, *found);
+  return verdict;
+}
+
+// Both runs, piece by piece, up to rounding and ties.
+Verdict judge_carried(Verdict verdict, const std::string& how, Backend& backend, const Setup& setup, const State& state,
+                      const Carrier& carrier, const State& carried_state, Span span, uint64_t seed) {
+  const std::vector<Span> pieces = pieces_of(backend, span);
+  const std::vector<State> original = after_each(backend, setup, state, pieces);
+  const std::vector<State> carried = after_each(backend, carrier.setup(), carried_state, pieces);
+  const Setup& carried_setup = carrier.setup();
+
+  Tolerance tolerance;
+  RoundingScale scale = rounding_scale(carried_setup, carried.back());
+  scale.extent = std::max(scale.extent, rounding_scale(carried_setup, carried_state).extent);
+  scale.largest_cluster = std::max(scale.largest_cluster, rounding_scale(carried_setup, carried_state).largest_cluster);
+  const double goal = goal_rounding(scale);
+  tolerance.rest = 2 * goal;
+  tolerance.skin = 2 * goal;
+  if (span.contains(Stage::step) && state.frame >= 0 && state.frame < setup.frame_count()) {
+    const double grown = sensitivity(backend, setup, state, span, original.back(), seed);
+    const double evaluations = static_cast<double>(setup.step.substeps) * (setup.step.iterations + 1.0);
+    tolerance.position = 4 * grown * evaluations * goal;
+    tolerance.skin += 2 * tolerance.position;
+    const double dt = setup.substep_length[at(state.frame)];
+    tolerance.velocity = 2 * tolerance.position / dt;
+    tolerance.impulse =
+        setup.step.substeps * std::accumulate(setup.body.mass.begin(), setup.body.mass.end(), 0.0) * tolerance.velocity;
+  }
+
+  bool families_agree = true;
+  const State* input = &carried_state;
+  for (std::size_t p = 0; p < pieces.size(); ++p) {
+    const Span piece = pieces[p];
+    const State expected = carrier.state(original[p]);
+    const State& actual = carried[p];
+    const std::string where = fmt::format("{}, after {}", how, name_of(piece.last));
+
+    const std::vector<int32_t> different = decided_differently(expected, actual);
+    if (!different.empty()) {
+      const std::vector<uint8_t> either = undecided(backend, setup, state, span, original.back(), seed);
+      for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
+        const int32_t j = carrier.particle(i);
+        if (expected.alive[at(j)] == actual.alive[at(j)] || either[at(i)]) continue;
+        return fail(std::move(verdict),
+                    fmt::format("{}: particle {} is {}, and {} in the other run", where, i,
+                                original[p].alive[at(i)] ? "alive" : "dead", actual.alive[at(j)] ? "alive" : "dead"),
+                    {i});
+      }
+      verdict.checked = 0;  // either: a removal inside the rounding band
+      return verdict;
+    }
+    if (expected.removed != actual.removed || expected.debris != actual.debris || expected.frame != actual.frame ||
+        expected.tau != actual.tau || expected.cap != actual.cap || expected.edge_covered != actual.edge_covered) {
+      return fail(std::move(verdict),
+                  where + ": the lists of removed particles, or frame, tau, cap or edge cover differ");
+    }
+
+    const bool ties = piece.contains(Stage::merge) || piece.contains(Stage::expand) || !families_agree;
+    families_agree = same_families(expected.clusters, actual.clusters);
+    if (!families_agree && !ties) return fail(std::move(verdict), where + ": the clusters differ");
+    if (!families_agree) {
+      if (coupling_components(carried_setup, expected).label != coupling_components(carried_setup, actual).label) {
+        return fail(std::move(verdict), where + ": the clusters couple the particles differently");
+      }
+      std::optional<Verdict> legal;
+      if (piece == Span{Stage::merge, Stage::merge}) legal = merge_legality(carried_setup, *input, actual);
+      if (piece == Span{Stage::expand, Stage::expand}) legal = expansion(carried_setup, *input, actual);
+      if (legal && !legal->holds) {
+        return fail(std::move(verdict), where + ": " + legal->witness.text, legal->witness.particles,
+                    legal->witness.clusters);
+      }
+    }
+
+    const Measured measured = compare_numbers(carried_setup, expected, actual, tolerance);
+    verdict.checked += measured.checked;
+    if (measured.ratio > verdict.measured || verdict.bound == 0) {
+      verdict.measured = measured.ratio;
+      verdict.bound = 1;
+    }
+    if (measured.ratio > 1) {
+      return fail(std::move(verdict), where + ": " + measured.difference.text, measured.difference.particles,
+                  measured.difference.clusters);
+    }
+    if (piece.contains(Stage::skin)) {
+      if (const auto found = compare_skins(expected.skin, actual.skin, tolerance, families_agree)) {
+        return fail_on(std::move(verdict), where, *found);
+      }
+    }
+    input = &actual;
+  }
+  return verdict;
+}
+
+}  // namespace
+
+Setup single_substep_setup(const Setup& setup, int64_t frame) {
+  const auto first = at(frame * setup.step.substeps);
+  Setup single = setup;
+  single.step.substeps = 1;
+  single.substep_length = {setup.substep_length[at(frame)]};
+  if (!setup.blade_moves.empty()) single.blade_moves = {setup.blade_moves[first]};
+  for (Grip& grip : single.grips) {
+    grip.active = {grip.active[first]};
+    grip.displacement = {grip.displacement[first]};
+  }
+  return single;
+}
+
+Verdict no_ghost_force(Backend& backend, const Setup& setup, const State& state, int32_t particle, Vec3 kick,
+                       int64_t frames) {
+  Verdict verdict = begin("no ghost force", backend, state, "1", "oracles_and_tests.md §1: the same bits");
+  if (auto unjudged = unfit(verdict, setup, state)) return *unjudged;
+  if (particle < 0 || particle >= setup.body.particle_count() || !state.alive[at(particle)]) return verdict;
+  if (state.frame >= setup.frame_count()) return verdict;
+  const Partition partition = graph_components(setup, state);
+  const int32_t kicked = partition.label[at(particle)];
+  const double dt = setup.substep_length[at(state.frame)];
+  State disturbed_state = state;
+  for (std::size_t i = 0; i < state.x.size(); ++i) {
+    if (partition.label[i] != kicked) continue;
+    disturbed_state.x[i] += kick;
+    disturbed_state.v[i] += kick / dt;
+  }
+  const State quiet = after_frames(backend, setup, state, frames);
+  const State moved = after_frames(backend, setup, disturbed_state, frames);
+  for (std::size_t i = 0; i < state.x.size(); ++i) {
+    if (!state.alive[i] || partition.label[i] == kicked) continue;
+    ++verdict.checked;
+    const bool same =
+        same_bits(quiet.x[i], moved.x[i]) && same_bits(quiet.v[i], moved.v[i]) && quiet.alive[i] == moved.alive[i];
+    if (same) continue;
+    verdict.measured += 1;
+    if (!verdict.holds) continue;
+    verdict =
+        fail(std::move(verdict),
+             fmt::format("particle {} ends {} m elsewhere because the component of particle {}, to which it is not "
+                         "connected, was kicked",
+                         i, norm(quiet.x[i] - moved.x[i]), particle),
+             {particle, static_cast<int32_t>(i)});
+  }
+  return verdict;
+}
+
+Verdict determinism(Backend& backend, const Setup& setup, const State& state, int64_t frames) {
+  Verdict verdict = begin("determinism", backend, state, "1", "oracles_and_tests.md §1: the same bits");
+  std::vector<State> first;
+  backend.load({setup}, {state});
+  for (int64_t f = 0; f < frames; ++f) {
+    backend.run(kFrame);
+    first.push_back(backend.snapshot().at(0));
+  }
+  backend.load({setup}, {state});
+  for (const State& expected : first) {
+    backend.run(kFrame);
+    ++verdict.checked;
+    if (const auto found = difference(expected, backend.snapshot().at(0))) {
+      return fail_on(std::move(verdict), fmt::format("the second run, at the end of frame {}", expected.frame - 1),
+                     *found);
+    }
+  }
+  return verdict;
+}
+
+Verdict span_composition(Backend& backend, const Setup& setup, const State& state, int64_t frames) {
+  Verdict verdict = begin("span composition", backend, state, "1", "architecture.md, Contract: bit for bit");
+  std::vector<std::vector<Span>> ways(1);
+  for (const Stage stage : kStages) ways[0].push_back({stage, stage});
+  for (std::size_t cut = 1; cut < kStages.size(); ++cut) {
+    ways.push_back({{Stage::step, kStages[cut - 1]}, {kStages[cut], Stage::skin}});
+  }
+  std::vector<State> whole;
+  backend.load({setup}, {state});
+  for (int64_t f = 0; f < frames; ++f) {
+    backend.run(kFrame);
+    whole.push_back(backend.snapshot().at(0));
+  }
+  for (const auto& way : ways) {
+    if (!std::all_of(way.begin(), way.end(), [&](Span span) { return backend.can_run(span); })) continue;
+    backend.load({setup}, {state});
+    for (const State& expected : whole) {
+      for (const Span span : way) backend.run(span);
+      ++verdict.checked;
+      const auto found = difference(expected, backend.snapshot().at(0));
+      if (!found) continue;
+      std::string text = "the frame in spans";
+      for (const Span span : way) text += fmt::format(" {}-{}", name_of(span.first), name_of(span.last));
+      return fail_on(std::move(verdict), text, *found);
+    }
+  }
+  return verdict;
+}
+
+Verdict equivariance(Backend& backend, const Setup& setup, const State& state, Span span, uint64_t seed) {
+  Verdict verdict = begin("equivariance", backend, state, "1", "docs/tolerances.md, A scene carried along");
+  if (auto unjudged = unfit(verdict, setup, state)) return *unjudged;
+  const uint64_t kind = seed % kEquivarianceKinds;
+  uint64_t random = seed;
+  Motion motion;
+  switch (kind) {
+    case 0: {  // turned
+      motion = random_turn(random);
+      for (int32_t& padding : motion.padding) padding = static_cast<int32_t>(mixed(random) % 3);
+      const Carrier carrier(motion, setup);
+      State carried = carrier.state(state);
+      carried.clusters = reordered(carried.clusters, shuffled(carried.clusters.count(), random));
+      return judge_carried(std::move(verdict), "turned, " + text_of(motion), backend, setup, state, carrier, carried,
+                           span, random);
+    }
+    case 1: {  // shifted on the grid
+      for (int32_t& padding : motion.padding) padding = static_cast<int32_t>(mixed(random) % 8);
+      const Carrier carrier(motion, setup);
+      return judge_carried(
+          std::move(verdict),
+          fmt::format("shifted by ({}, {}, {}) nodes", motion.padding[0], motion.padding[1], motion.padding[2]),
+          backend, setup, state, carrier, carrier.state(state), span, random);
+    }
+    case 2: {  // clusters renumbered
+      const Carrier carrier(motion, setup);
+      State carried = state;
+      carried.clusters = reordered(state.clusters, shuffled(state.clusters.count(), random));
+      return judge_carried(std::move(verdict), "clusters in another order", backend, setup, state, carrier, carried,
+                           span, random);
+    }
+    case 3: {  // scaled by a power of two
+      const int power = static_cast<int>(mixed(random) % 17) - 8;
+      motion.scale = std::ldexp(1.0, power == 0 ? 9 : power);
+      const Carrier carrier(motion, setup);
+      const State expected = carrier.state(after(backend, setup, state, {span}));
+      const State actual = after(backend, carrier.setup(), carrier.state(state), {span});
+      return judge_exactly(std::move(verdict), fmt::format("scaled by {}", motion.scale), expected, actual);
+    }
+    case 4: {  // elsewhere in the world
+      motion.world_shift = {1e6 * setup.body.grid.spacing, -3e5 * setup.body.grid.spacing, 0.1};
+      const Carrier carrier(motion, setup);
+      const State expected = after(backend, setup, state, {span});
+      const State actual = after(backend, carrier.setup(), state, {span});
+      return judge_exactly(std::move(verdict), "elsewhere in the world", expected, actual);
+    }
+    default: {  // two of them
+      const State expected = after(backend, setup, state, {span});
+      backend.load({setup, setup}, {state, state});
+      backend.run(span);
+      const std::vector<State> both = backend.snapshot();
+      for (std::size_t body = 0; body < 2 && verdict.holds; ++body) {
+        verdict =
+            judge_exactly(std::move(verdict), fmt::format("body {} of two equal ones", body), expected, both.at(body));
+      }
+      return verdict;
+    }
+  }
+}
+
+Verdict refinement(Backend& backend, const Setup& more, const State& state, int64_t fewer_frames) {
+  Verdict verdict = begin("refinement", backend, state, "1", "oracles_and_tests.md §1: a stroke only refines");
+  if (auto unjudged = unfit(verdict, more, state)) return *unjudged;
+  Setup fewer = more;
+  const auto substeps = at(fewer_frames * more.step.substeps);
+  fewer.substep_length.resize(at(fewer_frames));
+  if (!fewer.blade_moves.empty()) fewer.blade_moves.resize(substeps);
+  for (Grip& grip : fewer.grips) {
+    grip.active.resize(substeps);
+    grip.displacement.resize(substeps);
+  }
+  const State coarse = after_frames(backend, fewer, state, fewer_frames - state.frame);
+  const State fine = after_frames(backend, more, state, more.frame_count() - state.frame);
+  const Partition before = graph_components(fewer, coarse);
+  const Partition now = graph_components(more, fine);
+  // For each component of the finer partition, a particle of it.
+  std::vector<int32_t> first(at(now.count), -1);
+  for (int32_t i = 0; i < more.body.particle_count(); ++i) {
+    if (!fine.alive[at(i)]) continue;
+    ++verdict.checked;
+    if (!coarse.alive[at(i)]) {
+      verdict.measured = 1;
+      return fail(std::move(verdict), fmt::format("particle {} is dead after fewer strokes and alive after more", i),
+                  {i});
+    }
+    int32_t& other = first[at(now.label[at(i)])];
+    if (other < 0) other = i;
+    if (before.label[at(other)] == before.label[at(i)]) continue;
+    verdict.measured = 1;
+    return fail(std::move(verdict),
+                fmt::format("particles {} and {} are separate after fewer strokes and connected after more", other, i),
+                {other, i});
+  }
+  return verdict;
+}
+
+Verdict rest_is_fixed(Backend& backend, const Setup& setup, const State& state) {
+  Verdict verdict = begin("rest is fixed", backend, state, "h", "docs/tolerances.md, One substep");
+  if (auto unjudged = unfit(verdict, setup, state)) return *unjudged;
+  if (setup.frame_count() == 0) return verdict;
+  Setup calm = single_substep_setup(undisturbed(setup), std::min(state.frame, setup.frame_count() - 1));
+  calm.step.gravity = {};
+  const State rest = at_rest(calm, state);
+  const State end = after_step(backend, calm, rest);
+  const double h = setup.body.grid.spacing;
+  int32_t where = -1;
+  verdict.measured = greatest_distance(end, rest.x, where) / h;
+  verdict.bound = substep_rounding(calm, rest) / h;
+  verdict.checked = static_cast<int64_t>(std::count(rest.alive.begin(), rest.alive.end(), 1));
+  if (verdict.measured <= verdict.bound) return verdict;
+  return fail(std::move(verdict),
+              fmt::format("particle {} of the rest state moves by {} h in one substep", where, verdict.measured),
+              {where});
+}
+
+Verdict translation_is_exact(Backend& backend, const Setup& setup, const State& state, Vec3 velocity) {
+  Verdict verdict = begin("translation is exact", backend, state, "h", "docs/tolerances.md, One substep");
+  if (auto unjudged = unfit(verdict, setup, state)) return *unjudged;
+  if (setup.frame_count() == 0) return verdict;
+  Setup free = single_substep_setup(undisturbed(setup), std::min(state.frame, setup.frame_count() - 1));
+  free.step.damping = 0;
+  State start = at_rest(free, state);
+  for (Vec3& v : start.v) v = velocity;
+  const double dt = free.substep_length[0];
+  std::vector<Vec3> expected = start.x;
+  for (Vec3& x : expected) x += dt * (velocity + dt * free.step.gravity);
+  const State end = after_step(backend, free, start);
+
+  const double h = setup.body.grid.spacing;
+  State moved = start;
+  moved.x = expected;
+  int32_t where = -1;
+  verdict.measured = greatest_distance(end, expected, where) / h;
+  verdict.bound = substep_rounding(free, moved) / h;
+  // Velocities are differences of positions over dt.
+  for (std::size_t i = 0; i < end.v.size(); ++i) {
+    if (!start.alive[i]) continue;
+    const double error = dt * norm(end.v[i] - (velocity + dt * free.step.gravity)) / (2 * h);
+    if (error <= verdict.measured) continue;
+    verdict.measured = error;
+    where = static_cast<int32_t>(i);
+  }
+  verdict.checked = static_cast<int64_t>(std::count(start.alive.begin(), start.alive.end(), 1));
+  if (verdict.measured <= verdict.bound) return verdict;
+  return fail(std::move(verdict),
+              fmt::format("particle {} of a body that is only carried along ends {} h from where it should", where,
+                          verdict.measured),
+              {where});
+}
+
+Verdict energy_is_monotone(Backend& backend, const Setup& setup, const State& state, int32_t iterations) {
+  Verdict verdict = begin("energy is monotone", backend, state, "J", "docs/tolerances.md, Energy");
+  if (auto unjudged = unfit(verdict, setup, state)) return *unjudged;
+  if (setup.step.solver != Solver::implicit || state.frame < 0 || state.frame >= setup.frame_count()) return verdict;
+  Setup single = single_substep_setup(setup, state.frame);
+  const bool blade = single.has_blade && single.blade_moves[0].down && single.blade.friction > 0;
+  const bool wall = std::any_of(single.walls.begin(), single.walls.end(), [](const Wall& w) { return w.friction > 0; });
+  if (blade || wall) return verdict;  // friction has no energy
+  single.detect.criterion =
+      single.detect.criterion == Criterion::geometric ? Criterion::geometric : Criterion::distance;
+  State start = state;
+  start.frame = 0;
+
+  double mass = 0;
+  for (std::size_t i = 0; i < state.alive.size(); ++i) mass += state.alive[i] ? single.body.mass[i] : 0;
+  const double dt = single.substep_length[0], k = single.step.stiffness;
+  const auto terms = static_cast<double>(state.clusters.members.size() + state.x.size());
+  double previous = 0, worst = -1;
+  for (int32_t iteration = 0; iteration <= iterations; ++iteration) {
+    single.step.iterations = iteration;
+    const State end = after_step(backend, single, start);
+    const double energy = substep_energy(single, start, end.x);
+    RoundingScale scale = rounding_scale(single, start);
+    scale.extent = std::max(scale.extent, rounding_scale(single, end).extent);
+    const double rho = 2 * goal_rounding(scale);
+    const double bound = rho * (std::sqrt(2 * mass * energy) / dt + std::sqrt(2 * k * mass * energy)) +
+                         terms * kUnitRoundoff * energy + mass * (1 / (dt * dt) + k) * rho * rho;
+    const double growth = iteration == 0 ? 0 : energy - previous;
+    if (iteration > 0) ++verdict.checked;
+    if (!(growth <= bound)) {
+      verdict.measured = growth;
+      verdict.bound = bound;
+      return fail(std::move(verdict), fmt::format("iteration {} raises the energy of the substep from {} to {} J",
+                                                  iteration, previous, energy));
+    }
+    if (iteration > 0 && growth / bound > worst) {
+      worst = growth / bound;
+      verdict.measured = std::max(0.0, growth);
+      verdict.bound = bound;
+    }
+    previous = energy;
+  }
+  return verdict;
+}
+
+}  // namespace cutproof::oracles
