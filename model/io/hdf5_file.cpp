@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <limits>
+#include <string_view>
 #include <utility>
 
 namespace cutproof::io::hdf5 {
@@ -92,6 +93,12 @@ herr_t keep_deepest(unsigned depth, const H5E_error2_t* error, void* text) {
 std::string last_message() {
   std::string text;
   H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep_deepest, &text);
+  // Failures of the system come with addresses and times; what a person needs is in the quotation marks.
+  constexpr std::string_view kSystem = "error message = '";
+  if (const std::size_t at = text.find(kSystem); at != std::string::npos) {
+    const std::size_t from = at + kSystem.size();
+    return text.substr(0, text.find(':')) + ": " + text.substr(from, text.find('\'', from) - from);
+  }
   return text.empty() ? "no reason given" : text;
 }
 
@@ -123,6 +130,9 @@ bool is_type(const Id& type, Scalar scalar) { return H5Tequal(type.get(), file_t
 }  // namespace
 
 Quiet::Quiet() {
+  // Objects that could not be written stay open inside HDF5, and its clean-up at exit then crashes. We close what we
+  // open, so there is nothing left for it to do. Counts only before the first call to the library.
+  [[maybe_unused]] static const herr_t no_cleanup = H5dont_atexit();
   H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }

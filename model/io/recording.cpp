@@ -31,7 +31,7 @@ constexpr const char* kParticlesKind = "recording particles";
 constexpr const char* kSkinKind = "recording skin";
 constexpr const char* kBladeKind = "recording blade";
 
-// --- What the index says of each snapshot ---------------------------------------------------------------------------
+// --- What the index says of each snapshot ---
 
 // One column per field, one row per snapshot. Whatever did not change since the snapshot before is stored once: the
 // columns *_row name the first row of a block of rows, of which the lengths are known.
@@ -111,8 +111,7 @@ void for_each_table(ClusterTables& tables, F&& visit) {
   visit("degenerate", tables.degenerate);
 }
 
-// --- Writing
-// ----------------------------------------------------------------------------------------------------------
+// --- Writing ---
 
 // Equal bits, where == would call NaN unequal and -0 equal to 0.
 template <class T>
@@ -522,8 +521,7 @@ void Recorder::finish() {
   file_->broken = false;
 }
 
-// --- Reading
-// ----------------------------------------------------------------------------------------------------------
+// --- Reading ---
 
 namespace {
 
