@@ -1,0 +1,454 @@
+#include "property_tests/cases.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <stdexcept>
+#include <type_traits>
+#include <utility>
+
+#include "fixtures/bodies.h"
+#include "fixtures/cook.h"
+#include "property_tests/random.h"
+
+namespace cutproof::property_tests {
+namespace {
+
+// --- Bodies -------------------------------------------------------------------------------------------------------
+
+using NodeTest = std::function<bool(Node)>;
+
+std::vector<Node> nodes_where(Node dims, const NodeTest& is_tissue) {
+  std::vector<Node> nodes;
+  for (int32_t k = 0; k < dims[2]; ++k) {
+    for (int32_t j = 0; j < dims[1]; ++j) {
+      for (int32_t i = 0; i < dims[0]; ++i) {
+        if (is_tissue({i, j, k})) nodes.push_back({i, j, k});
+      }
+    }
+  }
+  return nodes;
+}
+
+struct Ball {
+  std::array<double, 3> center;
+  double radius;
+  bool contains(Node node) const {
+    double square = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) square += (node[axis] - center[axis]) * (node[axis] - center[axis]);
+    return square <= radius * radius;
+  }
+};
+
+// Balls that are added or taken away, one after the other.
+std::vector<Node> balls(Random& random, Node dims) {
+  std::vector<std::pair<Ball, bool>> parts;
+  const int32_t count = random.between(1, 5);
+  const double longest = std::max({dims[0], dims[1], dims[2]});
+  for (int32_t b = 0; b < count; ++b) {
+    Ball ball;
+    for (std::size_t axis = 0; axis < 3; ++axis) ball.center[axis] = random.real(0, dims[axis] - 1);
+    ball.radius = random.real(0.2, 0.6) * longest;
+    parts.emplace_back(ball, b == 0 || random.chance(0.6));
+  }
+  return nodes_where(dims, [&](Node node) {
+    bool inside = false;
+    for (const auto& [ball, added] : parts) {
+      if (ball.contains(node)) inside = added;
+    }
+    return inside;
+  });
+}
+
+// A sheet, one node thick where it is flat, bent along x and y.
+std::vector<Node> sheet(Random& random, Node dims) {
+  const double bend = random.chance(0.5) ? 0 : random.real(0, dims[2]);
+  const double wave = random.real(0.1, 1.0);
+  return nodes_where(dims, [&](Node node) {
+    const double height = 0.5 * dims[2] + 0.5 * bend * std::sin(wave * node[0]) * std::cos(wave * node[1]);
+    return node[2] == std::clamp(static_cast<int32_t>(std::floor(height)), 0, dims[2] - 1);
+  });
+}
+
+// A random walk on the grid that seldom turns.
+std::vector<Node> wire(Random& random, Node dims) {
+  std::set<Node> nodes;
+  Node at = {random.between(0, dims[0] - 1), random.between(0, dims[1] - 1), random.between(0, dims[2] - 1)};
+  const int32_t steps = 3 * (dims[0] + dims[1] + dims[2]);
+  auto direction = static_cast<std::size_t>(random.between(0, 5));
+  for (int32_t s = 0; s < steps; ++s) {
+    nodes.insert(at);
+    if (random.chance(0.2)) direction = static_cast<std::size_t>(random.between(0, 5));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      at[axis] = std::clamp(at[axis] + kDirections[direction][axis], 0, dims[axis] - 1);
+    }
+  }
+  return {nodes.begin(), nodes.end()};
+}
+
+std::vector<Node> degenerate_body(Random& random, Node dims) {
+  switch (random.between(0, 6)) {
+    case 0:
+      return {};
+    case 1:
+      return {{0, 0, 0}};
+    case 2:  // two particles, joined or only diagonal
+      return {{0, 0, 0}, random.pick<Node>({{1, 0, 0}, {0, 0, 1}, {1, 1, 0}, {1, 1, 1}, {2, 0, 0}})};
+    case 3:  // a straight wire
+      return nodes_where({dims[0] + dims[1] + dims[2], 1, 1}, [](Node) { return true; });
+    case 4:  // a flat sheet
+      return nodes_where({dims[0], 1, dims[2]}, [](Node) { return true; });
+    case 5:  // a checkerboard: no two particles are joined
+      return nodes_where(dims, [](Node node) { return (node[0] + node[1] + node[2]) % 2 == 0; });
+    default:  // two blocks that meet in an edge of the grid
+      return nodes_where(dims, [&](Node node) { return (2 * node[0] < dims[0]) == (2 * node[1] < dims[1]); });
+  }
+}
+
+std::vector<Node> draw_body(Random& random, Node dims) {
+  if (random.chance(0.3)) return degenerate_body(random, dims);
+  switch (random.between(0, 4)) {
+    case 0:
+      return nodes_where(dims, [](Node) { return true; });
+    case 1:
+      return balls(random, dims);
+    case 2:
+      return sheet(random, dims);
+    case 3:
+      return wire(random, dims);
+    default: {  // a sponge
+      const double fill = random.real(0.3, 0.95);
+      return nodes_where(dims, [&](Node) { return random.chance(fill); });
+    }
+  }
+}
+
+// --- Strokes ------------------------------------------------------------------------------------------------------
+
+Stroke draw_stroke(Random& random, Node dims) {
+  constexpr int32_t kBeyond = 6;  // strokes may begin and end this far outside the body
+  Stroke stroke;
+  stroke.back = random.between(0, 5);
+  stroke.down = random.chance(0.85);
+  stroke.link = random.pick({Link::apart, Link::apart, Link::chained});
+  const auto point = [&](Quarters& p) {
+    for (std::size_t axis = 0; axis < 3; ++axis) p[axis] = random.between(-kBeyond, 4 * (dims[axis] - 1) + kBeyond);
+  };
+  point(stroke.from);
+  point(stroke.to);
+  if (random.chance(0.5)) stroke.to[static_cast<std::size_t>(random.between(0, 2))] = stroke.from[0];
+  if (!random.chance(0.3)) return stroke;
+
+  const auto to_nodes = [](Quarters& p) {
+    for (auto& q : p) q = 4 * (q / 4);
+  };
+  switch (random.between(0, 4)) {
+    case 0:  // from vertex to vertex
+      to_nodes(stroke.from);
+      to_nodes(stroke.to);
+      break;
+    case 1: {  // along one edge of the grid
+      to_nodes(stroke.from);
+      stroke.to = stroke.from;
+      stroke.to[static_cast<std::size_t>(random.between(0, 2))] += 4;
+      break;
+    }
+    case 2: {  // in a plane of the grid, or halfway between two of them
+      const auto normal = static_cast<std::size_t>(random.between(0, 2));
+      stroke.from[normal] = stroke.to[normal] = 2 * (stroke.from[normal] / 2);
+      stroke.back = static_cast<int32_t>(2 * ((normal + 1) % 3));
+      break;
+    }
+    case 3:  // zero length
+      stroke.to = stroke.from;
+      break;
+    default:
+      stroke.link = Link::retraced;
+  }
+  return stroke;
+}
+
+// --- Foreign clusters ---------------------------------------------------------------------------------------------
+
+// Connected sets of at most `most` particles that cover the body: I1, I2 and nothing more.
+std::vector<std::vector<int32_t>> connected_cover(const Body& body, int32_t most, uint64_t seed) {
+  Random random(seed);
+  std::vector<uint8_t> covered(static_cast<std::size_t>(body.particle_count()), 0);
+  std::vector<int32_t> order;
+  for (int32_t p = 0; p < body.particle_count(); ++p) order.push_back(p);
+  for (std::size_t k = order.size(); k > 1; --k) {
+    std::swap(order[k - 1], order[static_cast<std::size_t>(random.between(0, static_cast<int32_t>(k) - 1))]);
+  }
+  std::vector<std::vector<int32_t>> clusters;
+  for (const int32_t start : order) {
+    if (covered[static_cast<std::size_t>(start)]) continue;
+    std::vector<int32_t> members = {start};
+    const auto wanted = static_cast<std::size_t>(random.between(1, most));
+    for (int32_t attempt = 0; attempt < 6 * most && members.size() < wanted; ++attempt) {
+      const int32_t from =
+          members[static_cast<std::size_t>(random.between(0, static_cast<int32_t>(members.size()) - 1))];
+      const int32_t next = body.neighbour(from, random.between(0, 5));
+      if (next >= 0 && std::find(members.begin(), members.end(), next) == members.end()) members.push_back(next);
+    }
+    std::sort(members.begin(), members.end());
+    for (const int32_t p : members) covered[static_cast<std::size_t>(p)] = 1;
+    clusters.push_back(std::move(members));
+  }
+  return clusters;
+}
+
+// --- Blade --------------------------------------------------------------------------------------------------------
+
+Vec3 metric(Quarters p, double h) { return (h / 4) * Vec3{1.0 * p[0], 1.0 * p[1], 1.0 * p[2]}; }
+
+Vec3 direction_vector(int32_t direction) {
+  const auto& d = kDirections[static_cast<std::size_t>(direction)];
+  return {1.0 * d[0], 1.0 * d[1], 1.0 * d[2]};
+}
+
+// The cutting edge lies along the stroke, as far as that is orthogonal to the back; a stroke along the back, or of no
+// length, has its edge along another axis.
+Vec3 edge_direction(const Stroke& stroke) {
+  const Vec3 back = direction_vector(stroke.back);
+  Vec3 way;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    way[axis] = 1.0 * (stroke.to[a] - stroke.from[a]);
+  }
+  const Vec3 across = way - dot(way, back) * back;
+  return norm(across) > 0 ? normalized(across) : direction_vector((stroke.back + 2) % 6);
+}
+
+}  // namespace
+
+Case draw_case(uint64_t seed, int size) {
+  Random random(seed);
+  Case c;
+  const double u = std::clamp(size, 0, 100) / 100.0;
+  const auto longest = static_cast<int32_t>(3 + 24 * u * u * u + 4 * u);
+  const Node dims = {random.between(1, longest), random.between(1, longest), random.between(1, longest)};
+  c.nodes = draw_body(random, dims);
+  std::sort(c.nodes.begin(), c.nodes.end());
+  c.nodes.erase(std::unique(c.nodes.begin(), c.nodes.end()), c.nodes.end());
+  c.spacing = random.pick({1.0, 0.003});
+
+  c.clusters = random.pick({ClusterKind::boxes, ClusterKind::sampled, ClusterKind::foreign});
+  c.side = random.between(1, 6);
+  c.seed_spacing = random.between(2, 14);
+  c.ball_radius = random.between(4, 18);
+  c.most = random.between(1, 30);
+  c.tau = random.between(0, c.most);
+  c.cap = random.between(c.most, 3 * c.most);
+  c.seed = random.seed();
+  c.merge = random.chance(0.1) ? MergeRule::none : random.chance(0.6) ? MergeRule::deterministic : MergeRule::published;
+  c.expand = random.chance(0.1)   ? ExpandRule::none
+             : random.chance(0.7) ? ExpandRule::edge_cover
+                                  : ExpandRule::published;
+  c.expand_depth = random.chance(0.7) ? 1 : random.between(2, 4);
+  c.debris = random.chance(0.7) ? 0 : random.between(2, 12);
+
+  c.blade_length = random.pick({1, 4, 8, 16, 400});
+  c.blade_depth = random.pick({1, 4, 8, 400, 400});
+  c.blade_thickness = random.chance(0.5) ? random.between(0, 10) : random.pick({0, 4, 8, 16, 100});
+  const int32_t strokes = random.between(0, 1 + size / 15);
+  for (int32_t s = 0; s < strokes; ++s) c.strokes.push_back(draw_stroke(random, dims));
+  return c;
+}
+
+std::vector<Stroke> resolved_strokes(const Case& c) {
+  std::vector<Stroke> strokes = c.strokes;
+  for (std::size_t s = 1; s < strokes.size(); ++s) {
+    if (strokes[s].link != Link::apart) strokes[s].from = strokes[s - 1].to;
+    if (strokes[s].link == Link::retraced) {
+      strokes[s].to = strokes[s - 1].from;
+      strokes[s].back = strokes[s - 1].back;
+    }
+  }
+  return strokes;
+}
+
+Loaded load(const Case& c) {
+  Loaded loaded;
+  Setup& setup = loaded.setup;
+  const double h = c.spacing;
+  setup.body = fixtures::body_from_nodes(c.nodes, h);
+  setup.step.substeps = 1;
+  setup.step.iterations = 0;
+  setup.detect.criterion = Criterion::geometric;
+  setup.split.debris = c.debris;
+  setup.merge.rule = c.merge;
+  setup.expand = {c.expand, c.expand_depth};
+
+  setup.has_blade = true;
+  setup.blade = {c.blade_length * h / 4, c.blade_depth * h / 4, c.blade_thickness * h / 4, 0};
+  // Node (0, 0, 0) of the case rests one spacing from the grid's lowest node, behind the ring of empty ones.
+  const Vec3 first_node = {h, h, h};
+  for (const Stroke& stroke : resolved_strokes(c)) {
+    BladeMove move;
+    move.from = {first_node + metric(stroke.from, h), edge_direction(stroke), direction_vector(stroke.back)};
+    move.to = move.from;
+    move.to.edge = first_node + metric(stroke.to, h);
+    move.down = stroke.down;
+    move.stroke = stroke.down ? static_cast<int32_t>(setup.blade_moves.size()) : -1;
+    setup.blade_moves.push_back(move);
+  }
+  setup.substep_length.assign(setup.blade_moves.size(), 0.001);
+
+  if (c.clusters == ClusterKind::foreign) {
+    loaded.state = fixtures::foreign_state(setup.body, connected_cover(setup.body, c.most, c.seed), c.tau, c.cap);
+  } else {
+    ClusterSpec spec;
+    spec.method = c.clusters == ClusterKind::boxes ? Cooking::boxes : Cooking::sampled;
+    spec.side = c.side;
+    spec.spacing = c.seed_spacing / 4.0;
+    spec.radius = c.ball_radius / 4.0;
+    loaded.state = fixtures::cook(setup.body, spec, setup.expand, setup.merge, c.seed);
+  }
+  return loaded;
+}
+
+// --- Simpler cases ------------------------------------------------------------------------------------------------
+
+namespace {
+
+using Edits = std::vector<std::function<void(Case&)>>;
+
+// Without a run of elements: all, halves, quarters, … down to single ones. About 2n edits of n elements.
+template <typename T>
+void drop_chunks(std::size_t count, std::vector<T> Case::*list, Edits& edits) {
+  for (std::size_t length = count; length > 0; length = length == 1 ? 0 : (length + 1) / 2) {
+    for (std::size_t begin = 0; begin < count; begin += length) {
+      edits.push_back([list, begin, end = std::min(begin + length, count)](Case& c) {
+        auto& elements = c.*list;
+        elements.erase(elements.begin() + static_cast<std::ptrdiff_t>(begin),
+                       elements.begin() + static_cast<std::ptrdiff_t>(end));
+      });
+    }
+  }
+}
+
+std::pair<int32_t, int32_t> extent(const std::vector<Node>& nodes, std::size_t axis) {
+  std::pair<int32_t, int32_t> range = {nodes.front()[axis], nodes.front()[axis]};
+  for (const Node& node : nodes) range = {std::min(range.first, node[axis]), std::max(range.second, node[axis])};
+  return range;
+}
+
+// Without what lies on one side of a plane of the grid.
+void drop_slabs(const std::vector<Node>& nodes, Edits& edits) {
+  for (std::size_t axis = 0; axis < 3 && !nodes.empty(); ++axis) {
+    const auto [low, high] = extent(nodes, axis);
+    for (const int32_t plane : {(low + high + 1) / 2, low + 1, high}) {
+      for (const bool keep_lower : {true, false}) {
+        edits.push_back([axis, plane, keep_lower](Case& c) {
+          std::erase_if(c.nodes, [&](const Node& node) { return (node[axis] < plane) != keep_lower; });
+        });
+      }
+    }
+  }
+}
+
+// Body and strokes to the origin.
+void shift(const std::vector<Node>& nodes, Edits& edits) {
+  for (std::size_t axis = 0; axis < 3 && !nodes.empty(); ++axis) {
+    edits.push_back([axis, low = extent(nodes, axis).first](Case& c) {
+      for (Node& node : c.nodes) node[axis] -= low;
+      for (Stroke& stroke : c.strokes) {
+        stroke.from[axis] -= 4 * low;
+        stroke.to[axis] -= 4 * low;
+      }
+    });
+  }
+}
+
+// To the value wanted, and halfway there.
+template <typename T>
+void towards(const Case& from, T Case::*field, T wanted, Edits& edits) {
+  edits.push_back([field, wanted](Case& c) { c.*field = wanted; });
+  if constexpr (std::is_same_v<T, int32_t>) {
+    const int32_t halfway = wanted + (from.*field - wanted) / 2;
+    edits.push_back([field, halfway](Case& c) { c.*field = halfway; });
+  }
+}
+
+void simplify_stroke(const Case& from, std::size_t k, Edits& edits) {
+  edits.push_back([k](Case& c) { c.strokes[k].down = true; });
+  edits.push_back([k](Case& c) {
+    c.strokes[k] = resolved_strokes(c)[k];
+    c.strokes[k].link = Link::apart;
+  });
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (Quarters Stroke::*end : {&Stroke::from, &Stroke::to}) {
+      const int32_t value = (from.strokes[k].*end)[axis];  // division rounds towards zero: each step is a shorter one
+      for (const int32_t simpler : {0, value / 2, 4 * (value / 4), 2 * (value / 2)}) {
+        edits.push_back([=](Case& c) { (c.strokes[k].*end)[axis] = simpler; });
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<std::function<void(Case&)>> simplifications(const Case& c) {
+  Edits edits;
+  drop_chunks(c.strokes.size(), &Case::strokes, edits);
+  drop_slabs(c.nodes, edits);
+  drop_chunks(c.nodes.size(), &Case::nodes, edits);
+
+  towards(c, &Case::clusters, ClusterKind::boxes, edits);
+  if (c.clusters == ClusterKind::foreign) towards(c, &Case::clusters, ClusterKind::sampled, edits);
+  towards(c, &Case::merge, MergeRule::none, edits);
+  towards(c, &Case::expand, ExpandRule::none, edits);
+  towards(c, &Case::spacing, 1.0, edits);
+  towards(c, &Case::seed, uint64_t{1}, edits);
+  towards(c, &Case::expand_depth, 1, edits);
+  towards(c, &Case::debris, 0, edits);
+  towards(c, &Case::blade_thickness, 4, edits);
+  towards(c, &Case::blade_length, 400, edits);
+  towards(c, &Case::blade_depth, 400, edits);
+  towards(c, &Case::side, 1, edits);
+  towards(c, &Case::most, 1, edits);
+  towards(c, &Case::tau, 0, edits);
+  towards(c, &Case::cap, 1, edits);
+  for (std::size_t k = 0; k < c.strokes.size(); ++k) simplify_stroke(c, k, edits);
+  shift(c.nodes, edits);
+  return edits;
+}
+
+// --- JSON ---------------------------------------------------------------------------------------------------------
+
+NLOHMANN_JSON_SERIALIZE_ENUM(ClusterKind, {{ClusterKind::boxes, "boxes"},
+                                           {ClusterKind::sampled, "sampled"},
+                                           {ClusterKind::foreign, "foreign"}})
+NLOHMANN_JSON_SERIALIZE_ENUM(Link, {{Link::apart, "apart"}, {Link::chained, "chained"}, {Link::retraced, "retraced"}})
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Stroke, from, to, back, down, link)
+
+}  // namespace cutproof::property_tests
+
+namespace cutproof {
+NLOHMANN_JSON_SERIALIZE_ENUM(MergeRule, {{MergeRule::none, "none"},
+                                         {MergeRule::deterministic, "deterministic"},
+                                         {MergeRule::published, "published"},
+                                         {MergeRule::single_pass, "single_pass"}})
+NLOHMANN_JSON_SERIALIZE_ENUM(ExpandRule, {{ExpandRule::none, "none"},
+                                          {ExpandRule::edge_cover, "edge_cover"},
+                                          {ExpandRule::published, "published"}})
+}  // namespace cutproof
+
+namespace cutproof::property_tests {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Case, nodes, spacing, clusters, side, seed_spacing, ball_radius, most, tau, cap,
+                                   seed, merge, expand, expand_depth, debris, blade_length, blade_depth,
+                                   blade_thickness, strokes)
+
+std::string to_json(const Case& c) { return nlohmann::json(c).dump(); }
+
+Case from_json(const std::string& text) {
+  try {
+    return nlohmann::json::parse(text).get<Case>();
+  } catch (const nlohmann::json::exception& error) {
+    throw std::invalid_argument(std::string("This is not a case of the property tests: ") + error.what());
+  }
+}
+
+}  // namespace cutproof::property_tests

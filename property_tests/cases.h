@@ -1,0 +1,76 @@
+// A random dissection as plain data: what rapidcheck generates and shrinks, what a counterexample is saved as.
+//
+// All lengths are integers, in quarters of the grid spacing, so that a case reads well, shrinks towards whole nodes,
+// and hits the degenerate positions (a vertex, an edge, a plane of the grid) exactly.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "model/setup.h"
+#include "model/state.h"
+
+namespace cutproof::property_tests {
+
+using Node = std::array<int32_t, 3>;
+using Quarters = std::array<int32_t, 3>;  // a point: 4·i is node i of the case
+
+enum class ClusterKind { boxes, sampled, foreign };
+enum class Link { apart, chained, retraced };  // chained: begins where the last stroke ended; retraced: runs it back
+
+struct Stroke {
+  Quarters from = {0, 0, 0}, to = {0, 0, 0};  // way of the middle of the cutting edge
+  int32_t back = 4;                           // from the edge to the back of the blade, index into kDirections
+  bool down = true;                           // false: pen up, the frame passes without a cut
+  Link link = Link::apart;
+  friend bool operator==(const Stroke&, const Stroke&) = default;
+};
+
+struct Case {
+  std::vector<Node> nodes;  // tissue, >= 0, ascending, without duplicates
+  double spacing = 1;       // h [m]
+
+  ClusterKind clusters = ClusterKind::boxes;
+  int32_t side = 5;           // boxes [nodes]
+  int32_t seed_spacing = 12;  // sampled [quarters]
+  int32_t ball_radius = 16;   // sampled [quarters]
+  int32_t most = 8;           // foreign: most particles of a cluster
+  int32_t tau = 3, cap = 12;  // foreign
+  uint64_t seed = 1;          // sampled and foreign
+
+  MergeRule merge = MergeRule::deterministic;
+  ExpandRule expand = ExpandRule::edge_cover;
+  int32_t expand_depth = 1;
+  int32_t debris = 0;
+
+  int32_t blade_length = 400, blade_depth = 400;  // [quarters], > 0
+  int32_t blade_thickness = 4;                    // [quarters], >= 0
+  std::vector<Stroke> strokes;                    // one frame each
+
+  friend bool operator==(const Case&, const Case&) = default;
+};
+
+// A case of a given size, 0 .. 100: from nothing to at most about 20,000 particles, growing slowly; about 30 % of the
+// bodies and of the strokes are degenerate. The same case for the same arguments on every platform.
+Case draw_case(uint64_t seed, int size);
+
+// Strokes with links resolved, and what a backend loads: geometric cuts, one stroke a frame, one substep, no iteration.
+std::vector<Stroke> resolved_strokes(const Case& c);
+struct Loaded {
+  Setup setup;
+  State state;
+};
+Loaded load(const Case& c);
+
+// Edits that each make this case simpler (or leave it as it is), the most drastic first: fewer strokes, fewer
+// particles, plainer parameters. Repeated as long as one of them keeps a failure, they end: each moves some part
+// towards a fixed value.
+std::vector<std::function<void(Case&)>> simplifications(const Case& c);
+
+// One line of JSON. from_json throws std::invalid_argument for anything that is not a case.
+std::string to_json(const Case& c);
+Case from_json(const std::string& text);
+
+}  // namespace cutproof::property_tests

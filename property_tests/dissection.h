@@ -1,0 +1,84 @@
+// One random dissection, run stage by stage on a backend and judged after each of them.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "model/backend.h"
+#include "model/verdict.h"
+#include "property_tests/cases.h"
+
+namespace cutproof::property_tests {
+
+// What happened in a case. A class of cases that never occurs means that nothing was tested there, so every class
+// must (oracles_and_tests.md §2: rapidcheck has no coverage assertions).
+enum class Happened {
+  no_particles,  // the body is empty
+  one_particle,
+  several_components,  // already before the first cut
+  boxes,
+  sampled,
+  foreign,
+  removal,  // a cut took particles out
+  miss,     // a frame with the blade down removed nothing
+  pen_up,
+  retraced_stroke,
+  zero_length_stroke,
+  thin_blade,  // thickness 0
+  split,       // a split made more clusters
+  vanished_cluster,
+  debris,
+  separation,  // G has more components than before a cut
+  merge,
+  expansion,
+  published_merge,
+  published_expansion,
+  uncoupled,  // connected tissue is uncoupled where no rule promises otherwise
+  cavity,     // the skin has an inner shell
+  consumed,   // a body is cut away entirely
+  count
+};
+inline constexpr std::size_t kHappenedCount = static_cast<std::size_t>(Happened::count);
+inline constexpr std::array<const char*, kHappenedCount> kHappenedNames = {"no particles",
+                                                                           "one particle",
+                                                                           "several components",
+                                                                           "boxes",
+                                                                           "sampled clusters",
+                                                                           "foreign clusters",
+                                                                           "removal",
+                                                                           "miss",
+                                                                           "pen up",
+                                                                           "retraced stroke",
+                                                                           "zero length stroke",
+                                                                           "blade of thickness 0",
+                                                                           "split",
+                                                                           "vanished cluster",
+                                                                           "debris",
+                                                                           "separation",
+                                                                           "merge",
+                                                                           "expansion",
+                                                                           "published merge",
+                                                                           "published expansion",
+                                                                           "uncoupled without promise",
+                                                                           "cavity",
+                                                                           "consumed body"};
+
+struct Judgement {
+  std::array<bool, kHappenedCount> happened = {};
+  int64_t verdicts = 0;            // how many were asked for
+  std::optional<Verdict> failure;  // the first that does not hold
+
+  bool& operator[](Happened what) { return happened[static_cast<std::size_t>(what)]; }
+};
+
+// `thorough`: with CGAL's geometric check of every skin.
+Judgement dissect(Backend& backend, const Case& c, bool thorough);
+
+// One line for a person.
+std::string describe(const Verdict& verdict);
+
+}  // namespace cutproof::property_tests

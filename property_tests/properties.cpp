@@ -1,0 +1,276 @@
+// Properties of every backend over random dissections (oracles_and_tests.md §2).
+//
+// Environment: CUTPROOF_CASES, how many cases of the first property (default 2000; the others take shares of it);
+// CUTPROOF_SEED, what they are drawn from (default 1); RC_PARAMS, anything that rapidcheck takes, such as the
+// reproduce=… that a failure prints; CUTPROOF_REGRESSIONS, the folder of saved counterexamples.
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <sstream>
+
+#include "oracles/two_runs.h"
+#include "property_tests/dissection.h"
+#include "reference_cpu/reference.h"
+
+namespace cutproof::property_tests {
+
+void showValue(const Case& c, std::ostream& os) { os << to_json(c); }
+
+namespace {
+
+// --- Settings -----------------------------------------------------------------------------------------------------
+
+// Throws std::invalid_argument (or out_of_range) unless the variable is a number.
+int64_t number_from_environment(const char* name, int64_t otherwise) {
+  const char* text = std::getenv(name);
+  return text == nullptr ? otherwise : std::stoll(text);
+}
+
+int64_t wanted_cases() { return number_from_environment("CUTPROOF_CASES", 2000); }
+uint64_t wanted_seed() { return static_cast<uint64_t>(number_from_environment("CUTPROOF_SEED", 1)); }
+
+struct NamedBackend {
+  std::string name;
+  std::function<std::unique_ptr<Backend>()> make;
+};
+void PrintTo(const NamedBackend& backend, std::ostream* os) { *os << backend.name; }
+
+// Every backend that this build has: each property runs over each of them, under its name.
+std::vector<NamedBackend> all_backends() { return {{"reference", reference::make_backend}}; }
+
+// --- Cases for rapidcheck -----------------------------------------------------------------------------------------
+
+// Shrinking has no bound of its own: after the first failure it may take this long.
+constexpr std::chrono::seconds kShrinkingTime{60};
+
+struct Deadline {
+  std::optional<std::chrono::steady_clock::time_point> at;
+  void start() {
+    if (!at) at = std::chrono::steady_clock::now() + kShrinkingTime;
+  }
+  bool is_over() const { return at && std::chrono::steady_clock::now() > *at; }
+};
+
+// The sequence of simpler cases.
+class SimplerCases {
+ public:
+  SimplerCases(Case c, std::shared_ptr<const Deadline> deadline)
+      : case_(std::move(c)),
+        edits_(std::make_shared<const std::vector<std::function<void(Case&)>>>(simplifications(case_))),
+        deadline_(std::move(deadline)) {}
+  rc::Maybe<Case> operator()() {
+    while (next_ < edits_->size() && !deadline_->is_over()) {
+      Case simpler = case_;
+      (*edits_)[next_++](simpler);
+      if (!(simpler == case_)) return simpler;
+    }
+    return rc::Nothing;
+  }
+
+ private:
+  Case case_;
+  std::shared_ptr<const std::vector<std::function<void(Case&)>>> edits_;
+  std::shared_ptr<const Deadline> deadline_;
+  std::size_t next_ = 0;
+};
+
+rc::Gen<Case> random_cases(std::shared_ptr<const Deadline> deadline) {
+  return [deadline](const rc::Random& random, int size) {
+    rc::Random source(random);
+    return rc::shrinkable::shrinkRecur(draw_case(source.next(), size), [deadline](Case c) {
+      return rc::makeSeq<SimplerCases>(std::move(c), deadline);
+    });
+  };
+}
+
+// --- Checking -----------------------------------------------------------------------------------------------------
+
+// Empty: the property holds. Otherwise what is wrong, for a person.
+using Property = std::function<std::string(const Case&)>;
+
+// Checks `cases` random cases; on a failure prints the simplest case found, and the line that replays it.
+void check(const std::string& id, int64_t cases, const Property& property) {
+  namespace detail = rc::detail;
+  detail::TestMetadata metadata;
+  metadata.id = metadata.description = id;
+  detail::TestParams params = detail::configuration().testParams;
+  if (std::getenv("RC_PARAMS") == nullptr) {
+    params.seed = wanted_seed();
+    params.maxSuccess = static_cast<int>(cases);
+  }
+  std::cout << id << ": seed " << params.seed << ", " << params.maxSuccess << " cases" << std::endl;
+
+  const auto deadline = std::make_shared<Deadline>();
+  const auto cases_of = random_cases(deadline);
+  std::string simplest;
+  const auto testable = [&] {
+    const Case c = *cases_of;
+    const std::string problem = property(c);
+    if (problem.empty()) return;
+    deadline->start();
+    simplest = to_json(c);
+    RC_FAIL(problem);
+  };
+  const detail::TestResult result = detail::checkTestable(testable, metadata, params);
+  if (result.is<detail::SuccessResult>()) return;
+
+  std::ostringstream message;
+  detail::printResultMessage(result, message);
+  if (result.is<detail::FailureResult>()) {
+    detail::Configuration replay;
+    replay.reproduce[id] = result.get<detail::FailureResult>().reproduce;
+    message << "\nReplay: RC_PARAMS=\"" << detail::configToMinimalString(replay)
+            << "\" property_tests --gtest_filter=" << id
+            << "\nTo keep it, save this line as fixtures/regressions/NAME.json (replayed first on every run):\n"
+            << simplest << "\n";
+  }
+  ADD_FAILURE() << message.str();
+}
+
+// Whether all cases ran as planned, so that empty classes mean something.
+bool ran_in_full() {
+  return std::getenv("RC_PARAMS") == nullptr && wanted_cases() >= 2000 && !::testing::Test::HasFailure();
+}
+
+class EveryBackend : public ::testing::TestWithParam<NamedBackend> {
+ protected:
+  std::string id() const {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    return std::string(test->test_suite_name()) + "." + test->name();
+  }
+};
+
+std::string text_of(const Verdict& verdict) { return verdict.holds ? "" : describe(verdict); }
+
+// --- Properties ---------------------------------------------------------------------------------------------------
+
+TEST_P(EveryBackend, AgreesWithEveryOracleOnSavedCounterexamples) {
+  const char* folder = std::getenv("CUTPROOF_REGRESSIONS");
+  const std::filesystem::path path = folder != nullptr ? folder : CUTPROOF_REGRESSIONS_FOLDER;
+  ASSERT_TRUE(std::filesystem::is_directory(path)) << path << " is not a folder";
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(path)) {
+    if (entry.path().extension() == ".json") files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  for (const auto& file : files) {
+    std::ostringstream text;
+    text << std::ifstream(file).rdbuf();
+    const auto judgement = dissect(*GetParam().make(), from_json(text.str()), true);
+    if (judgement.failure) ADD_FAILURE() << file << ": " << describe(*judgement.failure);
+  }
+  std::cout << files.size() << " saved counterexamples replayed" << std::endl;
+}
+
+TEST_P(EveryBackend, KeepsEveryInvariantAfterEveryStageOfARandomDissection) {
+  const auto backend = GetParam().make();
+  std::array<int64_t, kHappenedCount> seen = {};
+  int64_t cases = 0, verdicts = 0;
+  check(id(), wanted_cases(), [&](const Case& c) {
+    const Judgement judgement = dissect(*backend, c, cases % 50 == 0);
+    ++cases;
+    verdicts += judgement.verdicts;
+    for (std::size_t k = 0; k < kHappenedCount; ++k) seen[k] += judgement.happened[k];
+    return judgement.failure ? describe(*judgement.failure) : "";
+  });
+  std::cout << cases << " cases, " << verdicts << " verdicts; cases with:";
+  for (std::size_t k = 0; k < kHappenedCount; ++k)
+    std::cout << (k == 0 ? " " : ", ") << kHappenedNames[k] << " " << seen[k];
+  std::cout << std::endl;
+  for (std::size_t k = 0; k < kHappenedCount && ran_in_full(); ++k) {
+    EXPECT_GT(seen[k], 0) << "no case with '" << kHappenedNames[k] << "': nothing was tested there";
+  }
+}
+
+TEST_P(EveryBackend, OnlyRefinesTheComponentsWithEveryStroke) {
+  const auto backend = GetParam().make();
+  check(id(), wanted_cases() / 10, [&](const Case& c) {
+    const Loaded loaded = load(c);
+    for (int64_t fewer = 0; fewer < loaded.setup.frame_count(); ++fewer) {
+      const Verdict verdict = oracles::refinement(*backend, loaded.setup, loaded.state, fewer);
+      if (!verdict.holds) return describe(verdict);
+    }
+    return std::string();
+  });
+}
+
+TEST_P(EveryBackend, GivesTheSameBitsTwice) {
+  const auto backend = GetParam().make();
+  check(id(), wanted_cases() / 20, [&](const Case& c) {
+    const Loaded loaded = load(c);
+    return text_of(oracles::determinism(*backend, loaded.setup, loaded.state, loaded.setup.frame_count()));
+  });
+}
+
+TEST_P(EveryBackend, RunsAFrameAsTheCompositionOfItsSpans) {
+  const auto backend = GetParam().make();
+  check(id(), wanted_cases() / 20, [&](const Case& c) {
+    const Loaded loaded = load(c);
+    return text_of(oracles::span_composition(*backend, loaded.setup, loaded.state, loaded.setup.frame_count()));
+  });
+}
+
+TEST_P(EveryBackend, GivesTheSameAnswerToASceneTurnedShiftedScaledOrRenumbered) {
+  const auto backend = GetParam().make();
+  check(id(), wanted_cases() / 10, [&](const Case& c) {
+    const Loaded loaded = load(c);
+    if (loaded.setup.frame_count() == 0) return std::string();
+    return text_of(oracles::equivariance(*backend, loaded.setup, loaded.state, {}, c.seed));
+  });
+}
+
+INSTANTIATE_TEST_SUITE_P(Over, EveryBackend, ::testing::ValuesIn(all_backends()),
+                         [](const auto& tested) { return tested.param.name; });
+
+// --- The generators themselves ------------------------------------------------------------------------------------
+
+TEST(Cases, ComeBackFromJsonAsTheyWere) {
+  for (uint64_t seed = 0; seed < 50; ++seed) {
+    const Case c = draw_case(seed, static_cast<int>(seed));
+    EXPECT_EQ(from_json(to_json(c)), c);
+  }
+  EXPECT_THROW(from_json("{}"), std::invalid_argument);
+  EXPECT_THROW(from_json("not a case"), std::invalid_argument);
+}
+
+TEST(Cases, ShrinkToTheFewestParticlesAndStrokesThatAPlantedFaultNeeds) {
+  // The planted fault: a stroke straight down a column of three tissue nodes is not survived.
+  const auto fails = [](const Case& c) {
+    const auto has = [&](Node node) { return std::find(c.nodes.begin(), c.nodes.end(), node) != c.nodes.end(); };
+    const bool column = has({0, 0, 0}) && has({0, 0, 1}) && has({0, 0, 2});
+    return column && std::any_of(c.strokes.begin(), c.strokes.end(), [](const Stroke& s) { return s.down; });
+  };
+  int shrunk = 0;
+  for (uint64_t seed = 0; shrunk < 5; ++seed) {
+    Case c = draw_case(seed, 60);
+    if (!fails(c)) continue;
+    for (bool simpler_found = true; simpler_found;) {
+      simpler_found = false;
+      for (const auto& edit : simplifications(c)) {
+        Case simpler = c;
+        edit(simpler);
+        if (simpler == c || !fails(simpler)) continue;
+        c = simpler;
+        simpler_found = true;
+        break;
+      }
+    }
+    EXPECT_EQ(c.nodes, (std::vector<Node>{{0, 0, 0}, {0, 0, 1}, {0, 0, 2}})) << "seed " << seed;
+    EXPECT_EQ(c.strokes.size(), 1u);
+    ++shrunk;
+  }
+}
+
+}  // namespace
+}  // namespace cutproof::property_tests
+
+int main(int argc, char** argv) {
+  ::testing::InitGoogleTest(&argc, argv);
+  return RUN_ALL_TESTS();
+}
