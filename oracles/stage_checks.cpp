@@ -147,6 +147,12 @@ Vec3 rotated(Vec3 v, const Turn& turn, double fraction) {
          (1 - std::cos(angle)) * dot(turn.axis, v) * turn.axis;
 }
 
+// Ties go to removal, also when rounding lifts them a little: a blade halfway between two layers takes both, because if
+// it took none it would not separate them. So the limit is reach · (1 + kTie), and rounding, about 1e-13 of it on a
+// body of a thousand spacings, is far inside the band around that.
+constexpr double kTie = 1e-9;
+constexpr double kSweepBand = 5e-10;
+
 // A turning sweep has no closed form, and a backend may replace it by translations that are off by a little: between
 // `reach` and `reach` + kTurningSlack · h either answer is right. The distance to the pose at t changes by at most
 // |way| + radius · angle per unit of t, so halving intervals and dropping those that cannot matter finds the answer;
@@ -157,7 +163,7 @@ constexpr double kTurningStep = 1e-3;
 Demand demand_of_turning(const Blade& blade, const BladeMove& move, const Turn& turn, double h, double reach, Vec3 x) {
   const Vec3 way = move.to.edge - move.from.edge;
   const double rate = norm(way) + std::hypot(blade.length / 2, blade.depth) * turn.angle;
-  const double must = reach * (1 - 1e-9), most = reach + kTurningSlack * h;
+  const double must = reach * (1 + kTie - kSweepBand), most = reach + kTurningSlack * h;
   const auto distance = [&](double t) {
     const BladePose pose = {move.from.edge + t * way, rotated(move.from.along, turn, t),
                             rotated(move.from.back, turn, t)};
@@ -187,7 +193,7 @@ Demand demand_of_turning(const Blade& blade, const BladeMove& move, const Turn& 
 }
 
 // All that the blade swept in one frame. Nodes go at a distance of at most max(thickness, h, d_i) / 2: whichever edge
-// the blade crosses then loses an end, stretched ones too. Ties go to removal.
+// the blade crosses then loses an end, stretched ones too.
 class Swept {
  public:
   Swept(const Setup& setup, int64_t frame) : setup_(setup) {
@@ -216,9 +222,8 @@ class Swept {
         here = demand_of_turning(blade, *move, turn, h, reach, x);
       } else {
         const double distance = distance_to_translated(blade, move->from, way, x);
-        // The band holds the backend's tie (nothing beyond 1 + 1e-9 may go on its account) and all rounding.
-        if (distance <= reach * (1 - 1e-9)) here = Demand::remove;
-        if (distance > reach * (1 + 2e-9)) here = Demand::keep;
+        if (distance <= reach * (1 + kTie - kSweepBand)) here = Demand::remove;
+        if (distance > reach * (1 + kTie + kSweepBand)) here = Demand::keep;
       }
       if (here == Demand::remove) return here;
       if (here == Demand::either) demand = here;
