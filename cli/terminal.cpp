@@ -61,7 +61,7 @@ void print_verdicts(const Gate& gate) {
                        (row.worst->holds == verdict.holds && verdict.measured > row.worst->measured);
     if (worse) row.worst = &verdict;
   }
-  fmt::print("\n{:<34} {:<7} {:>7} {:>12} {:>7} {:>11} {:>11} {:<10} {}\n", "property", "after", "frames", "checked",
+  fmt::print("\n{:<40} {:<7} {:>7} {:>12} {:>7} {:>11} {:>11} {:<10} {}\n", "property", "after", "frames", "checked",
              "failed", "worst", "bound", "unit", "");
   for (const auto& [key, row] : rows) {
     const Verdict& worst = *row.worst;
@@ -69,7 +69,7 @@ void print_verdicts(const Gate& gate) {
                        : row.expected > 0 ? "fails, as the scene expects"
                        : row.frames == 0  ? "vacuous"
                                           : "holds";
-    fmt::print("{:<34} {:<7} {:>7} {:>12} {:>7} {:>11} {:>11} {:<10} {}\n", worst.property, name_of(worst.stage),
+    fmt::print("{:<40} {:<7} {:>7} {:>12} {:>7} {:>11} {:>11} {:<10} {}\n", worst.property, name_of(worst.stage),
                row.frames, row.checked, row.failed + row.expected, figure(worst.measured), figure(worst.bound),
                worst.unit, mark);
   }

@@ -127,14 +127,24 @@ std::vector<uint8_t> swept_over(const Setup& setup, const State& state) {
     const BladeMove& move = setup.blade_moves[at(state.frame * setup.step.substeps + s)];
     if (!move.down) continue;
     for (const Sweep& sweep : sweeps_of(setup.blade, move, h)) {
-      // A ball around the sweep spares most particles the exact distance.
-      const Vec3 middle = sweep.pose.edge + (setup.blade.depth / 2) * sweep.pose.back + 0.5 * sweep.way;
-      const double radius = (setup.blade.length + setup.blade.depth + norm(sweep.way)) / 2;
+      const Vec3 normal = cross(sweep.pose.along, sweep.pose.back);
+      // The sweep's bounding box in the blade's own directions spares most particles the exact distance.
+      const Vec3 axes[3] = {sweep.pose.along, sweep.pose.back, normal};
+      double low[3] = {-setup.blade.length / 2, 0, 0}, high[3] = {setup.blade.length / 2, setup.blade.depth, 0};
+      for (int k = 0; k < 3; ++k) {
+        const double moved = dot(sweep.way, axes[k]);
+        (moved < 0 ? low : high)[k] += moved;
+      }
       for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
         if (!state.alive[at(i)] || found[at(i)]) continue;
         const double longest = std::max(h, greatest_neighbour_distance(setup.body, state, i));
         const double reach = std::max(setup.blade.thickness, longest) / 2 * kTie + sweep.slack;
-        if (norm(state.x[at(i)] - middle) > radius + reach) continue;
+        bool outside = false;
+        for (int k = 0; k < 3; ++k) {
+          const double c = dot(state.x[at(i)] - sweep.pose.edge, axes[k]);
+          outside = outside || c < low[k] - reach || c > high[k] + reach;
+        }
+        if (outside) continue;
         found[at(i)] = distance_to_sweep(setup.blade, sweep, state.x[at(i)]) <= reach;
       }
     }
