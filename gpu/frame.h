@@ -1,0 +1,123 @@
+// The work of a frame, written down once for every launcher: which kernels run, in which order, and under which
+// condition. No size is known here; all of them live in World::counters.
+#pragma once
+#include "gpu/detect.cuh"
+#include "gpu/expand.cuh"
+#include "gpu/launcher.h"
+#include "gpu/layout.h"
+#include "gpu/merge.cuh"
+#include "gpu/plan.h"
+#include "gpu/skin.cuh"
+#include "gpu/split.cuh"
+#include "gpu/step.cuh"
+#include "model/stage.h"
+
+namespace cutproof::gpu {
+
+// Which bodies have something to split, merge and expand, for the conditions below. One thread.
+template <class Block>
+CUTPROOF_DEVICE void note_cuts_kernel(Block& block, World w) {
+  if (block.first() != 0) return;
+  Counters& c = *w.counters;
+  c.cut = 0;
+  c.expanding = 0;
+  for (int b = 0; b < w.bodies; ++b) {
+    if (!cut_now(w, b)) continue;
+    c.cut = 1;
+    const bool uncovered = w.body[b].expand_rule == kEdgeCover && !w.edge_covered[b];
+    if (uncovered || w.body[b].expand_rule == kPublishedExpand) c.expanding = 1;
+  }
+}
+CUTPROOF_KERNEL(note_cuts_kernel);
+
+template <class Block>
+CUTPROOF_DEVICE void note_stage_kernel(Block& block, World w, int stage) {
+  if (block.first() == 0) w.counters->stage_ran[stage] = 1;
+}
+CUTPROOF_KERNEL(note_stage_kernel);
+
+// Numbers in the order of slots, and the frame counts up.
+template <class Block>
+CUTPROOF_DEVICE void flag_live_slots_kernel(Block& block, World w) {
+  for (int64_t s = block.first(); s < w.slot_capacity; s += block.stride()) {
+    w.slot_scratch[s] = s < w.counters->slots_used && w.slot_size[s] > 0;
+  }
+}
+CUTPROOF_KERNEL(flag_live_slots_kernel);
+
+// slot_scratch[slot_capacity + s]: live slots before s, over all bodies; numbers start at 0 in each body.
+template <class Block>
+CUTPROOF_DEVICE void number_slots_kernel(Block& block, World w) {
+  for (int64_t s = block.first(); s < w.counters->slots_used; s += block.stride()) {
+    if (w.slot_size[s] == 0 || !running(w, w.slot_body[s])) continue;
+    // Bodies' slots interleave once clusters have split, so with several bodies the rank counts within the body.
+    int rank = w.slot_scratch[w.slot_capacity + s];
+    if (w.bodies > 1) {
+      rank = 0;
+      for (int64_t before = 0; before < s; ++before) {
+        rank += w.slot_size[before] > 0 && w.slot_body[before] == w.slot_body[s];
+      }
+    }
+    w.slot_number[s] = rank;
+  }
+}
+CUTPROOF_KERNEL(number_slots_kernel);
+
+template <class Block>
+CUTPROOF_DEVICE void end_frame_kernel(Block& block, World w) {
+  for (int64_t b = block.first(); b < w.bodies; b += block.stride()) {
+    if (running(w, static_cast<int>(b))) ++w.frame[b];
+  }
+}
+CUTPROOF_KERNEL(end_frame_kernel);
+
+template <class Launcher>
+void enqueue_span(Launcher& launcher, const World& w, const Plan& plan, Span span) {
+  const auto ran = [&](Stage stage) { launcher.items(note_stage_kernel_object{}, 1, w, static_cast<int>(stage)); };
+  if (span.contains(Stage::step)) {
+    ran(Stage::step);
+    enqueue_step(launcher, w, plan);
+  }
+  if (span.contains(Stage::detect) && plan.detection) {
+    ran(Stage::detect);
+    enqueue_detect(launcher, w, plan);
+  }
+  const bool clusters = span.contains(Stage::split) || span.contains(Stage::merge) || span.contains(Stage::expand);
+  if (clusters || span.contains(Stage::skin)) launcher.items(note_cuts_kernel_object{}, 1, w);
+  if (clusters) {
+    launcher.if_nonzero(&w.counters->cut, [&](Launcher& inner) {
+      const auto ran_inside = [&](Stage stage) {
+        inner.items(note_stage_kernel_object{}, 1, w, static_cast<int>(stage));
+      };
+      if (span.contains(Stage::split)) {
+        ran_inside(Stage::split);
+        enqueue_split(inner, w, plan);
+      }
+      if (span.contains(Stage::merge) && plan.merge) {
+        ran_inside(Stage::merge);
+        enqueue_merge(inner, w, plan);
+      }
+      if (span.contains(Stage::expand) && plan.expand) {
+        inner.if_nonzero(&w.counters->expanding, [&](Launcher& innermost) {
+          innermost.items(note_stage_kernel_object{}, 1, w, static_cast<int>(Stage::expand));
+          enqueue_expand(innermost, w, plan);
+        });
+      }
+    });
+  }
+  if (span.contains(Stage::skin)) {
+    if (plan.skin) {
+      ran(Stage::skin);
+      launcher.if_nonzero(&w.counters->cut, [&](Launcher& inner) { enqueue_skin_cells(inner, w, plan); });
+      enqueue_skin_positions(launcher, w, plan);
+    }
+    launcher.if_nonzero(&w.counters->cut, [&](Launcher& inner) {
+      inner.items(flag_live_slots_kernel_object{}, w.slot_capacity, w);
+      inner.exclusive_scan(w.slot_scratch, w.slot_scratch + w.slot_capacity, w.slot_capacity, &w.counters->scratch[0]);
+      inner.items(number_slots_kernel_object{}, w.slot_capacity, w);
+    });
+    launcher.items(end_frame_kernel_object{}, w.bodies, w);
+  }
+}
+
+}  // namespace cutproof::gpu
