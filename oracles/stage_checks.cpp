@@ -242,8 +242,7 @@ class Swept {
 };
 
 Verdict check_detection(const Setup& setup, const State& before, const State& after) {
-  Verdict verdict =
-      start_verdict("detection", after, "1", "method.md §4; rounding band 16 u of εh, or 1e-9 of a sweep");
+  Verdict verdict = start_verdict("detection", after, "1", "method.md §4; docs/oracles.md, Rounding");
   const TissueGraph graph(setup.body, before.alive);
   const double h = setup.body.grid.spacing;
   const double limit = setup.detect.epsilon * h;

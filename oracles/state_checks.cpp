@@ -569,8 +569,8 @@ Verdict check_edge_cover(Judged& judged) {
 // Σ w by (k + 1) u Σ w; the quotient adds one u. With |X| <= L: (2k + 4) u L per axis, twice that because both sides
 // round, √3 for three axes; 8 (k + 2) u L covers it. The mass obeys the same bound relative to itself, because L >= h.
 Verdict check_rest_frames(Judged& judged) {
-  Verdict verdict = start_verdict("rest frames", judged.state, "h",
-                                  "method.md §5, Rest frames; rounding of two sums: 8 (k + 2) u L / h");
+  Verdict verdict =
+      start_verdict("rest frames", judged.state, "h", "method.md §5, Rest frames; docs/oracles.md, Rounding");
   const double h = judged.body.grid.spacing;
   const int32_t n = judged.body.particle_count();
   // Dead members count too: between detect and split the frames are those of before.
@@ -833,8 +833,8 @@ std::vector<Verdict> judge(const Setup& setup, const State& state, Stage after, 
   add("rotation", true, [&] { return rotation_quality(setup, state); });
   add("merge maximality", merged && maximal, [&] { return check_merge_maximality(judged); });
   add("no pass", after == Stage::detect && setup.has_blade, [&] { return check_no_pass(judged); });
-  const bool skin_here = skin_done && judged.has_skin();
-  add("skin", skin_here, [&] { return skin_surface(setup, state); });
+  const bool skin_here = skin_done && skin_is_due(judged);
+  add("skin surface", skin_here, [&] { return skin_surface(setup, state); });
   add("skin vertices", skin_here, [&] { return skin_vertices(setup, state); });
   add("skin geometry", skin_here && thorough, [&] { return skin_geometry(setup, state); });
   for (Verdict& verdict : verdicts) verdict.stage = after;
