@@ -840,7 +840,7 @@ Verdict energy_is_monotone(Backend& backend, const Setup& setup, const State& st
   for (std::size_t i = 0; i < state.alive.size(); ++i) mass += state.alive[i] ? single.body.mass[i] : 0;
   const double dt = single.substep_length[0], k = single.step.stiffness;
   const auto terms = static_cast<double>(state.clusters.members.size() + state.x.size());
-  double previous = 0, worst = -1;
+  double previous = 0, worst = -std::numeric_limits<double>::infinity();
   for (int32_t iteration = 0; iteration <= iterations; ++iteration) {
     single.step.iterations = iteration;
     const State end = after_step(backend, single, start);
