@@ -299,7 +299,7 @@ Verdict check_detection(const Setup& setup, const State& before, const State& af
 
 // What must come out of a split, found from the definition.
 struct ExpectedCluster {
-  int32_t number = 0;
+  int64_t number = 0;  // may leave the range of numbers, and then no cluster can have it
   int32_t parent = 0;  // index of the cluster it comes from
   bool lost = false;   // whether that one lost a particle
   std::vector<int32_t> members;
@@ -354,7 +354,7 @@ std::vector<ExpectedCluster> expected_split(const TissueGraph& graph, const Clus
       (k == 0 ? expected : separated).push_back({before.number[at(c)], c, true, std::move(components[k])});
     }
   }
-  int32_t next = before.count() == 0 ? 0 : before.number.back() + 1;
+  int64_t next = before.count() == 0 ? 0 : int64_t{before.number.back()} + 1;
   for (ExpectedCluster& cluster : separated) {
     cluster.number = next++;
     expected.push_back(std::move(cluster));
@@ -450,7 +450,7 @@ Verdict check_split(const Setup& setup, const State& before, const State& after)
                       cluster.members.size(),
                       cluster.members.empty() ? "" : fmt::format(", the smallest {}", cluster.members.front()),
                       cluster.lost ? "a component of what is left" : "all", before.clusters.number[at(cluster.parent)]),
-          {cluster.number}, first);
+          {static_cast<int32_t>(cluster.number)}, first);
       continue;
     }
     const int32_t number = found.number[at(f)];
@@ -976,7 +976,7 @@ Verdict check_untouched(const Setup& setup, Stage stage, const State& before, co
   }
   if (stage == Stage::skin) {
     // The end of the frame, or the stage alone: then nothing is compacted.
-    const bool ended = after.frame == before.frame + 1;
+    const bool ended = after.frame - 1 == before.frame;
     if (!ended) compare.same(before.frame, after.frame, "the frame, by other than one,");
     if (a.number.size() != b.number.size()) {
       violate(verdict, fmt::format("{} clusters before, {} after", a.number.size(), b.number.size()));

@@ -689,12 +689,13 @@ Verdict check_no_pass(Judged& judged) {
   Verdict verdict = start_verdict("no pass", judged.state, "1", "method.md §3, Blade: lemma of the dynamic cut");
   const Setup& setup = judged.setup;
   const State& state = judged.state;
-  const int64_t substep = (state.frame + 1) * setup.step.substeps - 1;
   // Only where particles keep their distance from the blade *and* stretched ones are removed does the lemma hold.
   if (!setup.has_blade || setup.detect.criterion != Criterion::distance || setup.step.substeps < 1 ||
-      state.frame >= setup.frame_count() || !setup.blade_moves[at(substep)].down) {
+      state.frame >= setup.frame_count()) {
     return verdict;
   }
+  const int64_t substep = (state.frame + 1) * setup.step.substeps - 1;
+  if (!setup.blade_moves[at(substep)].down) return verdict;
   const BladePose& pose = setup.blade_moves[at(substep)].to;
   const int32_t n = judged.body.particle_count();
   std::vector<uint8_t> held(at(n), 0);
