@@ -21,7 +21,9 @@ CUTPROOF_DEVICE void note_cuts_kernel(Block& block, World w) {
   Counters& c = *w.counters;
   c.cut = 0;
   c.expanding = 0;
+  c.extracting = 0;
   for (int b = 0; b < w.bodies; ++b) {
+    if (running(w, b) && w.body[b].skin_wanted && (w.cut[b] >= 0 || !w.skin_made[b])) c.extracting = 1;
     if (!cut_now(w, b)) continue;
     c.cut = 1;
     const bool uncovered = w.body[b].expand_rule == kEdgeCover && !w.edge_covered[b];
@@ -108,7 +110,7 @@ void enqueue_span(Launcher& launcher, const World& w, const Plan& plan, Span spa
   if (span.contains(Stage::skin)) {
     if (plan.skin) {
       ran(Stage::skin);
-      launcher.if_nonzero(&w.counters->cut, [&](Launcher& inner) { enqueue_skin_cells(inner, w, plan); });
+      launcher.if_nonzero(&w.counters->extracting, [&](Launcher& inner) { enqueue_skin_cells(inner, w, plan); });
       enqueue_skin_positions(launcher, w, plan);
     }
     launcher.if_nonzero(&w.counters->cut, [&](Launcher& inner) {

@@ -76,6 +76,7 @@ struct Counters {
   int vertices_used;     // skin vertices given out
   int cells_used;        // skin cells given out
   int cut;               // some running body lost a particle in this frame
+  int extracting;        // some running body has skin cells to extract: cut, or no skin yet
   int removed;           // particles removed by this frame's detection, over all bodies
   int debris;            // …, by this frame's split
   int affected;          // clusters that lost a particle in this frame: length of World::affected
@@ -102,6 +103,7 @@ struct World {
   int* frame = nullptr;                 // [bodies] State::frame
   int* cut = nullptr;                   // [bodies] code of this frame's removals (see death); -1: nothing was removed
   int* edge_covered = nullptr;          // [bodies]
+  int* skin_made = nullptr;             // [bodies] 0: the next skin stage extracts every cell
   float* substep_length = nullptr;      // see BodyConstants::frame_begin
   MoveF* moves = nullptr;
   WallF* walls = nullptr;

@@ -1,0 +1,484 @@
+#include "gpu/image.h"
+
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "model/body.h"
+#include "model/error.h"
+
+namespace cutproof::gpu {
+
+namespace {
+
+std::size_t at(int64_t index) { return static_cast<std::size_t>(index); }
+float f(double value) { return static_cast<float>(value); }
+Float3 f(Vec3 v) { return {f(v.x), f(v.y), f(v.z)}; }
+Vec3 d(Float3 v) { return {v.x, v.y, v.z}; }
+
+int narrow(int64_t value, const char* what) {
+  if (value > std::numeric_limits<int>::max()) {
+    throw MachineError(std::string("the kernels index with 32 bits, and this load has too many ") + what + ": " +
+                       std::to_string(value));
+  }
+  return static_cast<int>(value);
+}
+
+PoseF pose_of(const BladePose& pose) { return {f(pose.edge), f(pose.along), f(pose.back)}; }
+
+void require(bool condition, const char* what) {
+  if (!condition) throw std::invalid_argument(std::string("kernels, load: ") + what);
+}
+
+void require_fit(const Setup& setup, const State& state) {
+  const std::size_t n = setup.body.node.size();
+  require(setup.body.mass.size() == n && state.x.size() == n && state.v.size() == n && state.alive.size() == n,
+          "masses, positions, velocities and alive need one entry per particle");
+  const auto substeps = at(setup.frame_count() * setup.step.substeps);
+  require(!setup.has_blade || setup.blade_moves.size() == substeps, "one blade move per substep is needed");
+  for (const Grip& grip : setup.grips) {
+    require(grip.active.size() == substeps && grip.displacement.size() == substeps,
+            "one grip displacement per substep is needed");
+  }
+  const Clusters& c = state.clusters;
+  const std::size_t m = at(c.count());
+  require(c.number.size() == m && c.rotation.size() == m && c.rest_center.size() == m && c.mass.size() == m &&
+              c.degenerate.size() == m,
+          "every array of clusters needs one entry per cluster");
+  require(c.offsets.front() == 0 && c.offsets.back() == static_cast<int64_t>(c.members.size()),
+          "cluster offsets must run from 0 to the number of members");
+  for (std::size_t k = 0; k < m; ++k) require(c.offsets[k] < c.offsets[k + 1], "no cluster may be empty");
+  for (const int32_t i : c.members) {
+    require(i >= 0 && at(i) < n, "cluster members must be particles of the body");
+  }
+}
+
+int criterion_of(Criterion criterion) {
+  switch (criterion) {
+    case Criterion::none:
+      return kNoCriterion;
+    case Criterion::distance:
+      return kDistance;
+    case Criterion::geometric:
+      return kGeometric;
+    case Criterion::strain:
+      return kStrain;
+  }
+  return kNoCriterion;
+}
+
+int merge_of(MergeRule rule) {
+  switch (rule) {
+    case MergeRule::none:
+      return kNoMerge;
+    case MergeRule::deterministic:
+      return kDeterministic;
+    case MergeRule::published:
+      return kPublishedMerge;
+    case MergeRule::single_pass:
+      return kSinglePass;
+  }
+  return kNoMerge;
+}
+
+int expand_of(ExpandRule rule) {
+  switch (rule) {
+    case ExpandRule::none:
+      return kNoExpand;
+    case ExpandRule::edge_cover:
+      return kEdgeCover;
+    case ExpandRule::published:
+      return kPublishedExpand;
+  }
+  return kNoExpand;
+}
+
+void add_constants(Image& image, const Setup& setup, const State& state, int64_t particles, int64_t nodes) {
+  BodyConstants body{};
+  body.particle_begin = narrow(particles, "particles");
+  body.particle_end = narrow(particles + setup.body.particle_count(), "particles");
+  body.node_begin = nodes;
+  narrow(setup.body.grid.node_count(), "grid nodes of one body");
+  for (int axis = 0; axis < 3; ++axis) body.nodes[axis] = setup.body.grid.nodes[at(axis)];
+  body.h = f(setup.body.grid.spacing);
+  body.solver = setup.step.solver == Solver::implicit ? kImplicit : kPublished;
+  body.substeps = setup.step.substeps;
+  body.iterations = setup.step.iterations;
+  body.stiffness = f(setup.step.stiffness);
+  body.relaxation = f(setup.step.relaxation);
+  body.damping = f(setup.step.damping);
+  body.gravity = f(setup.step.gravity);
+  body.criterion = criterion_of(setup.detect.criterion);
+  body.needs_detection = needs_detection(setup);
+  body.epsilon = f(setup.detect.epsilon);
+  body.strain = f(setup.detect.strain);
+  body.debris = setup.split.debris;
+  body.merge_rule = merge_of(setup.merge.rule);
+  body.tau = state.tau;
+  body.cap = state.cap;
+  body.expand_rule = expand_of(setup.expand.rule);
+  body.depth = setup.expand.depth;
+  body.skin_wanted = setup.skin.wanted;
+  body.alpha = f(setup.skin.alpha);
+  body.has_blade = setup.has_blade;
+  body.blade_length = f(setup.blade.length);
+  body.blade_depth = f(setup.blade.depth);
+  body.blade_thickness = f(setup.blade.thickness);
+  body.blade_friction = f(setup.blade.friction);
+  body.clearance = f(blade_clearance(setup));
+  body.frames = narrow(setup.frame_count(), "frames");
+  body.timetable = static_cast<int64_t>(image.moves.size());
+  body.frame_begin = static_cast<int64_t>(image.substep_length.size());
+
+  for (const double dt : setup.substep_length) image.substep_length.push_back(f(dt));
+  const int64_t substeps = setup.frame_count() * setup.step.substeps;
+  for (int64_t s = 0; s < substeps; ++s) {
+    MoveF move{};
+    if (setup.has_blade) {
+      const BladeMove& given = setup.blade_moves[at(s)];
+      move = {pose_of(given.from), pose_of(given.to), given.down};
+    }
+    image.moves.push_back(move);
+  }
+  body.wall_begin = narrow(static_cast<int64_t>(image.walls.size()), "walls");
+  for (const Wall& wall : setup.walls) image.walls.push_back({wall.axis, wall.side, f(wall.offset), f(wall.friction)});
+  body.wall_end = narrow(static_cast<int64_t>(image.walls.size()), "walls");
+  body.grip_begin = narrow(static_cast<int64_t>(image.grips.size()), "grips");
+  for (const Grip& grip : setup.grips) {
+    GripF entry{};
+    entry.particle_begin = narrow(static_cast<int64_t>(image.grip_particles.size()), "held particles");
+    for (const int32_t i : grip.particles) image.grip_particles.push_back(body.particle_begin + i);
+    entry.particle_end = narrow(static_cast<int64_t>(image.grip_particles.size()), "held particles");
+    entry.table = static_cast<int64_t>(image.grip_active.size());
+    image.grip_active.insert(image.grip_active.end(), grip.active.begin(), grip.active.end());
+    for (const Vec3 moved : grip.displacement) image.grip_displacement.push_back(f(moved));
+    image.grips.push_back(entry);
+  }
+  body.grip_end = narrow(static_cast<int64_t>(image.grips.size()), "grips");
+  image.body.push_back(body);
+}
+
+void add_particles(Image& image, const Setup& setup, const State& state, int body_index) {
+  const BodyConstants& body = image.body.back();
+  for (const int32_t p : setup.body.particle_at) {
+    image.particle_at.push_back(p < 0 ? -1 : body.particle_begin + p);
+  }
+  for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
+    const Vec3 moved = state.x[at(i)] - setup.body.rest_position(i);
+    image.body_of.push_back(body_index);
+    image.node.push_back(static_cast<int>(setup.body.node[at(i)]));
+    image.death.push_back(state.alive[at(i)] ? -1 : kDeadBefore);
+    image.displacement.push_back(with_w(f(moved), f(setup.body.mass[at(i)])));
+    image.velocity.push_back(with_w(f(state.v[at(i)]), 0));
+    // The state has one impulse for the body; shared out by mass it adds up to the same.
+    image.impulse.push_back({});
+  }
+  double mass = 0;
+  for (const double m : setup.body.mass) mass += m;
+  if (mass > 0 && !(state.impulse == Vec3{})) {
+    for (int p = body.particle_begin; p < body.particle_end; ++p)
+      image.impulse[at(p)] = with_w(f(state.impulse / mass), 0);
+  }
+  const int code = narrow(2 * state.frame, "frames");
+  const auto mark = [&](const std::vector<int32_t>& particles, int value) {
+    for (const int32_t i : particles) {
+      require(i >= 0 && i < setup.body.particle_count() && !state.alive[at(i)],
+              "removed and debris must list dead particles of the body");
+      image.death[at(body.particle_begin + i)] = value;
+    }
+  };
+  mark(state.removed, code);
+  mark(state.debris, code + 1);
+  image.frame.push_back(narrow(state.frame, "frames"));
+  image.cut.push_back(state.removed.empty() ? -1 : code);
+  image.edge_covered.push_back(state.edge_covered);
+  image.skin_made.push_back(0);
+  image.loaded_skin.push_back(state.skin);
+}
+
+void add_clusters(Image& image, const Setup& setup, const State& state, int body_index) {
+  const BodyConstants& body = image.body.back();
+  const Clusters& clusters = state.clusters;
+  for (int32_t c = 0; c < clusters.count(); ++c) {
+    image.slot_begin.push_back(narrow(static_cast<int64_t>(image.members.size()), "cluster members"));
+    image.slot_size.push_back(narrow(clusters.size(c), "members of one cluster"));
+    image.slot_number.push_back(clusters.number[at(c)]);
+    image.slot_body.push_back(body_index);
+    Matrix3 r;
+    for (int k = 0; k < 9; ++k) r.m[k] = f(clusters.rotation[at(c)].m[at(k)]);
+    image.rotation.push_back(r);
+    image.degenerate.push_back(clusters.degenerate[at(c)]);
+    image.mass.push_back(f(clusters.mass[at(c)]));
+    const auto base = setup.body.grid.coordinates(setup.body.node[at(clusters.of(c).front())]);
+    Vec3 offset;
+    for (int axis = 0; axis < 3; ++axis) {
+      image.rest_base.push_back(base[at(axis)]);
+      offset[axis] = clusters.rest_center[at(c)][axis] / setup.body.grid.spacing - base[at(axis)];
+    }
+    image.rest_offset.push_back(f(offset));
+    for (const int32_t i : clusters.of(c)) image.members.push_back(body.particle_begin + i);
+  }
+}
+
+// Which slots hold each particle, in ascending order.
+void find_holders(Image& image) {
+  const std::size_t n = image.node.size();
+  image.share.assign(n, 0);
+  for (const int p : image.members) ++image.share[at(p)];
+  image.holder_begin.assign(n + 1, 0);
+  for (std::size_t p = 0; p < n; ++p) image.holder_begin[p + 1] = image.holder_begin[p] + image.share[p];
+  image.holders.assign(image.members.size(), -1);
+  std::vector<int> next(image.holder_begin.begin(), image.holder_begin.end() - 1);
+  for (std::size_t s = 0; s < image.slot_size.size(); ++s) {
+    for (int k = 0; k < image.slot_size[s]; ++k) {
+      const int p = image.members[at(image.slot_begin[s] + k)];
+      image.holders[at(next[at(p)]++)] = static_cast<int>(s);
+    }
+  }
+}
+
+void make_room(Image& image, Room room) {
+  const auto n = static_cast<int64_t>(image.node.size());
+  const auto nodes = static_cast<int64_t>(image.particle_at.size());
+  const auto slots = static_cast<int64_t>(image.slot_size.size());
+  const auto members = static_cast<int64_t>(image.members.size());
+  const auto scaled = [&](int64_t count) { return static_cast<int64_t>(room.factor * static_cast<double>(count)); };
+  // A cut makes at most one new cluster for each member that it touches: all of a small body at once, a plane's share
+  // of a large one. A merge writes the union to new room; expansion copies what it enlarges.
+  const int64_t slot_capacity = slots + scaled(std::min(members, std::max<int64_t>(65536, 2 * slots))) + 64;
+  const int64_t member_capacity = members + scaled(2 * members + 4096);
+  const int64_t vertex_capacity = std::min(6 * n, scaled(4'000'000 + n)) + 64;
+  const int64_t cell_capacity = std::min(nodes, scaled(4'000'000 + n)) + 64;
+  const int64_t addition_capacity = std::min(6 * n, scaled(1'000'000 + n)) + 64;
+  narrow(15 * cell_capacity, "skin cells");
+  narrow(6 * n, "particles");
+  narrow(member_capacity, "cluster members");
+
+  Counters counters{};
+  counters.slots_used = narrow(slots, "clusters");
+  counters.members_used = narrow(members, "cluster members");
+  image.counters = {counters};
+
+  for (std::vector<Float4>* v : {&image.start, &image.predicted, &image.pushed}) v->assign(at(n), {});
+  image.particle_flag.assign(at(n), 0);
+  image.particle_scratch.assign(at(2 * n), 0);
+  for (std::vector<int>* v :
+       {&image.slot_begin, &image.slot_size, &image.slot_number, &image.slot_body, &image.degenerate, &image.affected,
+        &image.proposal, &image.best, &image.small_clusters}) {
+    v->resize(at(slot_capacity), 0);
+  }
+  image.slot_scratch.assign(at(4 * slot_capacity), 0);
+  image.rotation.resize(at(slot_capacity));
+  image.mass.resize(at(slot_capacity), 0);
+  image.rest_base.resize(at(3 * slot_capacity), 0);
+  image.rest_offset.resize(at(slot_capacity));
+  image.center.resize(at(slot_capacity));
+  image.slot_flag.assign(at(slot_capacity), 0);
+  image.rest_dirty.assign(at(slot_capacity), 0);
+  image.members.resize(at(member_capacity), -1);
+  image.holders.resize(at(member_capacity), -1);
+  image.label.assign(at(member_capacity), -1);
+  image.additions.assign(at(addition_capacity), 0);
+  image.vertex_of.assign(at(6 * n), -1);
+  image.vertex_owner.assign(at(vertex_capacity), -1);
+  image.vertex_direction.assign(at(vertex_capacity), 0);
+  image.vertex_position.assign(at(vertex_capacity), {});
+  image.cell_of.assign(at(nodes), -1);
+  image.cell_node.assign(at(cell_capacity), -1);
+  image.cell_triangles.assign(at(15 * cell_capacity), -1);
+  image.cell_dirty.assign(at(nodes), 0);
+  image.dirty_cells.assign(at(nodes), 0);
+  image.cell_scratch.assign(at(nodes), 0);
+}
+
+Clusters extract_clusters(const Image& image, const BodyConstants& body, double spacing, int body_index) {
+  Clusters clusters;
+  for (int s = 0; s < image.counters.front().slots_used; ++s) {
+    if (image.slot_size[at(s)] == 0 || image.slot_body[at(s)] != body_index) continue;
+    for (int k = 0; k < image.slot_size[at(s)]; ++k) {
+      clusters.members.push_back(image.members[at(image.slot_begin[at(s)] + k)] - body.particle_begin);
+    }
+    clusters.offsets.push_back(static_cast<int64_t>(clusters.members.size()));
+    clusters.number.push_back(image.slot_number[at(s)]);
+    Mat3 r;
+    for (int k = 0; k < 9; ++k) r.m[at(k)] = image.rotation[at(s)].m[k];
+    clusters.rotation.push_back(r);
+    Vec3 center;
+    const Float3 offset = image.rest_offset[at(s)];
+    for (int axis = 0; axis < 3; ++axis) {
+      center[axis] = spacing * (image.rest_base[at(3 * s + axis)] + double{offset[axis]});
+    }
+    clusters.rest_center.push_back(center);
+    clusters.mass.push_back(image.mass[at(s)]);
+    clusters.degenerate.push_back(static_cast<uint8_t>(image.degenerate[at(s)] != 0));
+  }
+  return clusters;
+}
+
+// Vertices in the order (owner, direction), triangles in the order of their cells.
+Skin extract_skin(const Image& image, const Setup& setup, const BodyConstants& body) {
+  struct Vertex {
+    int owner, direction, index;
+  };
+  const Counters& counters = image.counters.front();
+  std::vector<Vertex> vertices;
+  for (int v = 0; v < counters.vertices_used; ++v) {
+    const int p = image.vertex_owner[at(v)];
+    if (p >= body.particle_begin && p < body.particle_end) {
+      vertices.push_back({p - body.particle_begin, image.vertex_direction[at(v)], v});
+    }
+  }
+  std::sort(vertices.begin(), vertices.end(), [](const Vertex& a, const Vertex& b) {
+    return a.owner != b.owner ? a.owner < b.owner : a.direction < b.direction;
+  });
+  Skin skin;
+  std::vector<int32_t> place(at(counters.vertices_used), -1);
+  const double h = setup.body.grid.spacing;
+  for (const Vertex& vertex : vertices) {
+    place[at(vertex.index)] = static_cast<int32_t>(skin.owner.size());
+    const auto& e = kDirections[at(vertex.direction)];
+    const Vec3 rest = setup.body.rest_position(vertex.owner) +
+                      (setup.skin.alpha * h) * Vec3{double(e[0]), double(e[1]), double(e[2])};
+    skin.owner.push_back(vertex.owner);
+    skin.direction.push_back(static_cast<uint8_t>(vertex.direction));
+    skin.position.push_back(rest + d(xyz(image.vertex_position[at(vertex.index)])));
+  }
+  std::vector<std::pair<int, int>> cells;  // node, cell
+  const int64_t nodes = setup.body.grid.node_count();
+  for (int c = 0; c < counters.cells_used; ++c) {
+    const int64_t node = image.cell_node[at(c)];
+    if (node >= body.node_begin && node < body.node_begin + nodes) cells.emplace_back(image.cell_node[at(c)], c);
+  }
+  std::sort(cells.begin(), cells.end());
+  for (const auto& [node, cell] : cells) {
+    for (int t = 0; t < 5; ++t) {
+      const int* corner = &image.cell_triangles[at(15 * int64_t{cell} + 3 * t)];
+      if (corner[0] < 0) continue;
+      skin.triangles.push_back({place[at(corner[0])], place[at(corner[1])], place[at(corner[2])]});
+    }
+  }
+  return skin;
+}
+
+}  // namespace
+
+World Image::world() {
+  World w;
+  w.bodies = static_cast<int>(body.size());
+  w.particles = static_cast<int>(node.size());
+  w.nodes = static_cast<int64_t>(particle_at.size());
+  w.slot_capacity = static_cast<int>(slot_size.size());
+  w.member_capacity = static_cast<int>(members.size());
+  w.vertex_capacity = static_cast<int>(vertex_owner.size());
+  w.cell_capacity = static_cast<int>(cell_node.size());
+  w.addition_capacity = static_cast<int>(additions.size());
+  w.rotation_method = rotation_method;
+  for (const BodyConstants& b : body) {
+    w.any_contact = w.any_contact || b.has_blade || b.wall_end > b.wall_begin || b.grip_end > b.grip_begin;
+  }
+  each(w, [](auto& vector, auto& pointer, bool) { pointer = vector.data(); });
+  return w;
+}
+
+Image make_image(const std::vector<Setup>& setups, const std::vector<State>& states, int rotation_method, Room room) {
+  require(setups.size() == states.size(), "as many states as setups are needed");
+  Image image;
+  image.rotation_method = rotation_method;
+  int64_t particles = 0, nodes = 0;
+  for (std::size_t b = 0; b < setups.size(); ++b) {
+    require_fit(setups[b], states[b]);
+    add_constants(image, setups[b], states[b], particles, nodes);
+    add_particles(image, setups[b], states[b], static_cast<int>(b));
+    add_clusters(image, setups[b], states[b], static_cast<int>(b));
+    particles += setups[b].body.particle_count();
+    nodes += setups[b].body.grid.node_count();
+  }
+  find_holders(image);
+  make_room(image, room);
+  return image;
+}
+
+Plan make_plan(const std::vector<Setup>& setups, const std::vector<State>& states, int rotation_method,
+               SplitMethod split) {
+  Plan plan;
+  plan.rotation_method = rotation_method;
+  plan.split = split;
+  for (std::size_t b = 0; b < setups.size(); ++b) {
+    const Setup& setup = setups[b];
+    plan.substeps = std::max(plan.substeps, setup.step.substeps);
+    plan.iterations = std::max(plan.iterations, setup.step.iterations);
+    plan.contacts = plan.contacts || setup.has_blade || !setup.walls.empty() || !setup.grips.empty();
+    const bool detection = needs_detection(setup);
+    plan.detection = plan.detection || detection;
+    plan.distance = plan.distance || (detection && setup.detect.criterion == Criterion::distance);
+    plan.geometric = plan.geometric || (detection && setup.detect.criterion == Criterion::geometric);
+    plan.strain = plan.strain || (detection && setup.detect.criterion == Criterion::strain);
+    plan.debris = plan.debris || setup.split.debris > 0;
+    plan.merge = plan.merge || setup.merge.rule != MergeRule::none;
+    plan.deterministic_merge = plan.deterministic_merge || setup.merge.rule == MergeRule::deterministic;
+    plan.published_merge = plan.published_merge || setup.merge.rule == MergeRule::published;
+    plan.single_pass_merge = plan.single_pass_merge || setup.merge.rule == MergeRule::single_pass;
+    plan.edge_cover = plan.edge_cover || (setup.expand.rule == ExpandRule::edge_cover && !states[b].edge_covered);
+    plan.published_expand = plan.published_expand || setup.expand.rule == ExpandRule::published;
+    plan.skin = plan.skin || setup.skin.wanted;
+    for (int32_t c = 0; c < states[b].clusters.count(); ++c) {
+      plan.largest_cluster =
+          std::max(plan.largest_cluster, narrow(states[b].clusters.size(c), "members of one cluster"));
+    }
+    plan.largest_cluster = std::max(plan.largest_cluster, int{states[b].cap});
+  }
+  plan.expand = plan.edge_cover || plan.published_expand;
+  return plan;
+}
+
+std::vector<State> extract_states(const Image& image, const std::vector<Setup>& setups) {
+  std::vector<State> states;
+  for (std::size_t b = 0; b < setups.size(); ++b) {
+    const Setup& setup = setups[b];
+    const BodyConstants& body = image.body[b];
+    State state;
+    state.frame = image.frame[b];
+    Vec3 impulse;
+    for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
+      const std::size_t p = at(body.particle_begin + i);
+      state.x.push_back(setup.body.rest_position(i) + d(xyz(image.displacement[p])));
+      state.v.push_back(d(xyz(image.velocity[p])));
+      state.alive.push_back(image.death[p] < 0);
+      impulse += setup.body.mass[at(i)] * d(xyz(image.impulse[p]));
+      if (image.cut[b] >= 0 && image.death[p] == image.cut[b]) state.removed.push_back(i);
+      if (image.cut[b] >= 0 && image.death[p] == image.cut[b] + 1) state.debris.push_back(i);
+    }
+    state.impulse = impulse;
+    state.clusters = extract_clusters(image, body, setup.body.grid.spacing, static_cast<int>(b));
+    state.tau = body.tau;
+    state.cap = body.cap;
+    state.edge_covered = image.edge_covered[b] != 0;
+    state.skin = image.skin_made[b] ? extract_skin(image, setup, body) : image.loaded_skin[b];
+    states.push_back(std::move(state));
+  }
+  return states;
+}
+
+bool wants_room(const World& w, const Counters& c) {
+  const auto full = [](int used, int capacity) { return int64_t{4} * used > int64_t{3} * capacity; };
+  return full(c.slots_used, w.slot_capacity) || full(c.members_used, w.member_capacity) ||
+         full(c.vertices_used, w.vertex_capacity) || full(c.cells_used, w.cell_capacity);
+}
+
+void require_no_fault(const Counters& c) {
+  if (c.fault == 0) return;
+  std::string what;
+  const auto name = [&](int bit, const char* text) {
+    if (c.fault & bit) what += std::string(what.empty() ? "" : ", ") + text;
+  };
+  name(kSlotsFull, "clusters");
+  name(kMembersFull, "cluster members");
+  name(kVerticesFull, "skin vertices");
+  name(kCellsFull, "skin cells");
+  name(kAdditionsFull, "expanded particles");
+  throw MachineError("a stage found no room for its " + what +
+                     " and has written nothing; the state before that frame is the last sound one");
+}
+
+}  // namespace cutproof::gpu
