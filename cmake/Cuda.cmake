@@ -1,0 +1,47 @@
+# Whether kernels are built for the GPU. Sets CUTPROOF_HAS_CUDA. Without CUDA everything but the `gpu` backend is built.
+set(CUTPROOF_CUDA AUTO CACHE STRING "Build the gpu backend: AUTO (if a CUDA toolkit is found), ON or OFF")
+set_property(CACHE CUTPROOF_CUDA PROPERTY STRINGS AUTO ON OFF)
+
+set(CUTPROOF_HAS_CUDA OFF)
+set(without_cuda "")
+if(CUTPROOF_CUDA STREQUAL "OFF")
+  set(without_cuda "CUTPROOF_CUDA is OFF")
+elseif(CUTPROOF_SANITIZE)
+  set(without_cuda "CUDA's driver and the host's sanitizers claim the same addresses")
+else()
+  include(CheckLanguage)
+  check_language(CUDA)
+  find_package(CUDAToolkit QUIET)
+  if(NOT CMAKE_CUDA_COMPILER OR NOT CUDAToolkit_FOUND)
+    set(without_cuda "no CUDA toolkit was found")
+  elseif(CUDAToolkit_VERSION VERSION_LESS 12.4)
+    set(without_cuda "the CUDA toolkit ${CUDAToolkit_VERSION} is older than 12.4 and knows no conditional graph nodes")
+  else()
+    set(CUTPROOF_HAS_CUDA ON)
+  endif()
+endif()
+
+if(CUTPROOF_HAS_CUDA)
+  # Code for the H200, and portable code that the driver compiles for any other GPU from Turing on.
+  if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
+    set(CMAKE_CUDA_ARCHITECTURES 75-virtual 90a-real CACHE STRING "CUDA architectures")
+  endif()
+  set(CMAKE_CUDA_RUNTIME_LIBRARY Static)  # programs run where there is only a driver
+  if(CCACHE)
+    set(CMAKE_CUDA_COMPILER_LAUNCHER ${CCACHE})
+  endif()
+  enable_language(CUDA)
+  set(CMAKE_CUDA_STANDARD 20)
+  set(CMAKE_CUDA_STANDARD_REQUIRED ON)
+  set(CMAKE_CUDA_EXTENSIONS OFF)
+  target_compile_options(cutproof_options INTERFACE
+    # No fused multiply-add, as on the host: the same bits where the same operations are done. Its cost stands in
+    # docs/results/.
+    "$<$<COMPILE_LANGUAGE:CUDA>:--fmad=false;--expt-relaxed-constexpr;-Xcompiler=-Wall,-ffp-contract=off>")
+  message(STATUS "CUDA ${CUDAToolkit_VERSION}: the gpu backend is built for ${CMAKE_CUDA_ARCHITECTURES}")
+else()
+  if(CUTPROOF_CUDA STREQUAL "ON")
+    message(FATAL_ERROR "CUTPROOF_CUDA is ON, but ${without_cuda}.")
+  endif()
+  message(STATUS "The gpu backend is not built: ${without_cuda}")
+endif()

@@ -1,0 +1,51 @@
+// Who runs next when kernels are executed under a simulated schedule (docs/architecture.md, Kernels;
+// oracles_and_tests.md §3). Threads of a launch are numbered place · 32 + thread, where place is that of a block among
+// the blocks that are alive at once.
+//
+// A schedule is written down as a vector of choices, one for each decision at which more than one thread could run:
+// choice k is the k-th of those threads, counted in cyclic order from the thread that ran last (itself included if it
+// can go on). So 0 means "no preemption", a schedule may be cut off anywhere (zeros follow), and any vector of numbers
+// is a schedule: that is what makes it replayable and shrinkable.
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+namespace cutproof::gpu {
+
+using Schedule = std::vector<std::uint16_t>;
+
+// The threads that can run at a decision: bit t of masks[place] is thread place · 32 + t. Never empty.
+struct Candidates {
+  std::span<const std::uint32_t> masks;
+  int current = 0;  // the thread that ran last
+
+  int count() const;
+  bool contains(int thread) const { return (masks[thread / 32] >> (thread % 32) & 1u) != 0; }
+  int lowest() const;
+  int highest() const;
+  int nth(int k) const;        // k in [0, count()): in cyclic order from `current`, which comes first
+  int rank(int thread) const;  // inverse of nth
+};
+
+// Returns one of the candidates. Stateful: one generator drives one run.
+using Generator = std::function<int(const Candidates&)>;
+
+Generator forward();      // always the lowest number
+Generator reverse();      // always the highest number
+Generator round_robin();  // the next number after the current one
+Generator random_walk(std::uint64_t seed);
+// Probabilistic concurrency testing (Burckhardt et al. 2010): random priorities, and depth - 1 places among the first
+// `length` decisions at which the running thread falls behind all others. Finds a bug of depth d in a run of k
+// decisions with n threads with probability at least 1 / (n k^(d-1)). Requires 1 <= depth <= 4, length >= 1.
+Generator pct(std::uint64_t seed, int depth, std::int64_t length);
+Generator replay(Schedule schedule);
+
+// A schedule that still `fails`, with as few preemptions as removing ever smaller pieces gives. Requires
+// fails(schedule); calls it at most `budget` times.
+Schedule shrink(Schedule schedule, const std::function<bool(const Schedule&)>& fails, int budget = 2000);
+// Choices that are not 0.
+int preemptions(const Schedule& schedule);
+
+}  // namespace cutproof::gpu
