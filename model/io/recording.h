@@ -19,21 +19,28 @@ struct Snapshot {
   State state;
 };
 
-// F names a folder-less stem: F.cutproof.h5 is the index; F.particles.vtkhdf, F.skin.vtkhdf, F.blade.vtkhdf are for
-// ParaView. `--record F` may be given with or without ".cutproof.h5".
+// HDF5 keeps global state: recorders and readers are used from one thread.
+
+// F is a name, with or without a folder: F.cutproof.h5 is the index; F.particles.vtkhdf, F.skin.vtkhdf, F.blade.vtkhdf
+// are for ParaView. `--record F` may be given with or without ".cutproof.h5".
 struct RecordingPaths {
   std::string index, particles, skin, blade;
 };
 RecordingPaths recording_paths(const std::string& name);
 
-// Writes as it goes, to temporary names; finish() renames all of them, and without it nothing is left behind. One
-// recorder holds one body.
+// Writes as it goes, to temporary names; finish() renames all of them, the index last, and without it nothing is left
+// behind. What did not change since the snapshot before is stored once. One recorder holds one body.
 class Recorder {
  public:
-  // scene_json and backend are kept as they are.
+  // scene_json and backend are kept as they are. Throws InputError if the folder is not there or not writable, before
+  // anything else is done; std::invalid_argument if the setup is not valid; MachineError if the disk fails.
   Recorder(const std::string& name, const Setup& setup, const std::string& scene_json, const std::string& backend);
   ~Recorder();
+  // The contents of a state may be anything (an oracle is to judge them), but its arrays must have the lengths of the
+  // setup and of each other: std::invalid_argument otherwise. Throws MachineError if the disk fails, is full, …; the
+  // recorder is then good for nothing more.
   void add(Stage stage, const State& state);
+  // Throws MachineError as add() does.
   void finish();
 
  private:
@@ -51,11 +58,13 @@ struct Recording {
 
 class RecordingReader {
  public:
-  // Throws InputError if the file is missing, cut off, not a recording, of a newer version, or inconsistent
-  // (offsets that decrease, particles out of range, …).
+  // Throws InputError if the file is missing, cut off, not a recording, of a newer version, or inconsistent: sizes and
+  // rows that do not fit each other, a setup with particles out of range or NaN, …. What a snapshot's state contains
+  // is not judged. The particles and skin files must be beside the index; the blade's is not needed.
   explicit RecordingReader(const std::string& name);
   ~RecordingReader();
   const Recording& header() const;
+  // 0 <= index < snapshot_count, std::out_of_range otherwise. Throws InputError if that part of a file is damaged.
   Snapshot snapshot(int64_t index) const;
 
  private:
