@@ -5,8 +5,11 @@
 namespace cutproof::io {
 
 // A name beside `path` to write to; commit() renames it to `path`, the destructor removes what was not committed.
+// A symbolic link is followed, so it is its target that is replaced. A `path` that exists and is no regular file
+// (a pipe, /dev/stdout) cannot be replaced: temporary() is then `path` itself and commit() does nothing.
 class AtomicFile {
  public:
+  // Throws InputError if the folder is not there or not writable, or if `path` names a folder.
   explicit AtomicFile(std::string path);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
