@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <bit>
+#include <numeric>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <unordered_map>
 #include <utility>
 
@@ -161,22 +163,39 @@ Schedule shrink(Schedule schedule, const std::function<bool(const Schedule&)>& f
       schedule = std::move(shorter);
     }
   }
-  // Then pieces of preemptions, halving the pieces (delta debugging, Zeller and Hildebrandt 2002).
+  // Then pieces, halving them (delta debugging, Zeller and Hildebrandt 2002): without the preemptions of a piece,
+  // without its decisions altogether, with the nearest thread instead of a far one.
+  using Change = std::function<Schedule(const Schedule&, std::size_t begin, std::size_t end)>;
+  const Change calm = [](Schedule s, std::size_t begin, std::size_t end) {
+    std::fill(s.begin() + static_cast<std::ptrdiff_t>(begin), s.begin() + static_cast<std::ptrdiff_t>(end), 0);
+    return s;
+  };
+  const Change drop = [](Schedule s, std::size_t begin, std::size_t end) {
+    s.erase(s.begin() + static_cast<std::ptrdiff_t>(begin), s.begin() + static_cast<std::ptrdiff_t>(end));
+    return s;
+  };
+  const Change near = [](Schedule s, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) s[i] = std::min<std::uint16_t>(s[i], 1);
+    return s;
+  };
+  // Fewer preemptions, then fewer decisions, then nearer threads.
+  const auto size_of = [](const Schedule& s) {
+    return std::tuple(preemptions(s), s.size(), std::accumulate(s.begin(), s.end(), std::int64_t{0}));
+  };
   for (bool progress = true; progress && budget > 0;) {
     progress = false;
-    std::vector<std::size_t> places;
-    for (std::size_t i = 0; i < schedule.size(); ++i) {
-      if (schedule[i] != 0) places.push_back(i);
-    }
-    for (std::size_t piece = std::max<std::size_t>(places.size() / 2, 1); piece > 0 && budget > 0; piece /= 2) {
-      for (std::size_t begin = 0; begin < places.size() && budget > 0; begin += piece) {
-        Schedule calmer = schedule;
-        bool changed = false;
-        for (std::size_t i = begin; i < std::min(begin + piece, places.size()); ++i) {
-          changed = changed || calmer[places[i]] != 0;
-          calmer[places[i]] = 0;
+    for (const Change& change : {calm, drop, near}) {
+      for (std::size_t piece = std::max<std::size_t>(schedule.size() / 2, 1); piece > 0 && budget > 0; piece /= 2) {
+        for (std::size_t begin = 0; begin < schedule.size() && budget > 0;) {
+          Schedule smaller = change(schedule, begin, std::min(begin + piece, schedule.size()));
+          if (size_of(smaller) < size_of(schedule) && still_fails(smaller)) {
+            progress = true;
+            if (smaller.size() == schedule.size()) begin += piece;
+            schedule = std::move(smaller);
+          } else {
+            begin += piece;
+          }
         }
-        if (changed && still_fails(calmer)) schedule = std::move(calmer), progress = true;
       }
     }
   }
