@@ -230,7 +230,10 @@ TEST_P(EveryBackend, GivesTheSameAnswerToASceneTurnedShiftedScaledOrRenumbered) 
   check(id(), wanted_cases() / 10, [&](const Case& c) {
     const Loaded loaded = load(c);
     if (loaded.setup.frame_count() == 0) return std::string();
-    return text_of(oracles::equivariance(*backend, loaded.setup, loaded.state, {}, c.seed));
+    // Which clusters are merged depends on their numbers; without I4 so does what is coupled afterwards.
+    const bool decided = loaded.state.edge_covered || c.merge == MergeRule::none;
+    const Span span = decided ? Span{} : Span{Stage::step, Stage::split};
+    return text_of(oracles::equivariance(*backend, loaded.setup, loaded.state, span, c.seed));
   });
 }
 
