@@ -279,6 +279,7 @@ void make_room(Image& image, Room room) {
   image.members.resize(at(member_capacity), -1);
   image.holders.resize(at(member_capacity), -1);
   image.label.assign(at(member_capacity), -1);
+  image.member_scratch.assign(at(member_capacity), -1);
   image.additions.assign(at(addition_capacity), 0);
   image.vertex_of.assign(at(6 * n), -1);
   image.vertex_owner.assign(at(vertex_capacity), -1);

@@ -40,7 +40,7 @@ struct Image {
   std::vector<Float3> rest_offset, center;
   std::vector<int> members;
   std::vector<unsigned char> slot_flag, rest_dirty;
-  std::vector<int> affected, slot_scratch, label, proposal, best, small_clusters;
+  std::vector<int> affected, slot_scratch, label, member_scratch, proposal, best, small_clusters;
   std::vector<unsigned long long> additions;
   std::vector<unsigned char> particle_flag;
   std::vector<int> particle_scratch;
@@ -124,6 +124,7 @@ void Image::each(World& w, Visit&& visit) {
   visit(affected, w.affected, kScratch);
   visit(slot_scratch, w.slot_scratch, kScratch);
   visit(label, w.label, kScratch);
+  visit(member_scratch, w.member_scratch, kScratch);
   visit(proposal, w.proposal, kScratch);
   visit(best, w.best, kScratch);
   visit(small_clusters, w.small_clusters, kScratch);

@@ -89,6 +89,11 @@ struct Counters {
   int dirty_cells;       // skin cells to be extracted again
   int stage_ran[6];      // by stage: launched in this span
   int changed;           // scratch of a stage's loop
+  int failed;            // the stage in progress found no room and takes back what it has done
+  int members_before;    // merge: members_used when it began
+  int additions_before;  // expand: length of World::additions before the layer in progress
+  int growth;            // expand: members that the enlarged clusters need
+  int holders_before;    // expand: length of World::holders in use before it
   int scratch[8];
 };
 
@@ -148,6 +153,7 @@ struct World {
   int* affected = nullptr;              // slots that lost a particle in this frame, ascending
   int* slot_scratch = nullptr;          // [4 · slot_capacity]
   int* label = nullptr;                 // [member_capacity] scratch of split: by place in members
+  int* member_scratch = nullptr;        // [member_capacity] scratch of split: by place in members
   int* proposal = nullptr;              // merge: the t that slot s proposes, or -1
   int* best = nullptr;                  // merge: the s whose proposal has the smallest key of those naming this slot
   int* small_clusters = nullptr;        // slots
