@@ -59,17 +59,6 @@ double dent_depth(const Setup& setup, const State& state, Vec3 back) {
 
 }  // namespace
 
-std::vector<int64_t> stroke_ends(const Setup& setup) {
-  std::vector<int64_t> ends;
-  for (std::size_t s = 0; s < setup.blade_moves.size(); ++s) {
-    const int32_t stroke = setup.blade_moves[s].stroke;
-    if (stroke < 0) continue;
-    if (ends.size() <= at(stroke)) ends.resize(at(stroke) + 1, -1);
-    ends[at(stroke)] = static_cast<int64_t>(s) / setup.step.substeps;
-  }
-  return ends;
-}
-
 Gate::Gate(const Setup& setup, const Expectations& expectations, std::string backend, const State& initial)
     : setup_(setup),
       expectations_(expectations),
@@ -78,8 +67,7 @@ Gate::Gate(const Setup& setup, const Expectations& expectations, std::string bac
       frame_start_(initial),
       frame_(initial.frame),
       initial_clusters_(initial.clusters.count()),
-      stroke_ends_(stroke_ends(setup)),
-      components_after_stroke_(stroke_ends_.size(), -1) {}
+      components_after_stroke_(setup.stroke_end.size(), -1) {}
 
 void Gate::add(std::vector<Verdict> found, Stage stage, int64_t frame) {
   for (Verdict& verdict : found) {
@@ -137,8 +125,8 @@ void Gate::note_progress(const State& state, int64_t frame) {
   }
   const bool asks_for_isolation = expectations_.isolated_clusters.has_value();
   if (asks_for_isolation) isolated_ = std::max(isolated_, oracles::isolation(setup_, state).measured);
-  for (std::size_t s = 0; s < stroke_ends_.size(); ++s) {
-    if (stroke_ends_[s] == frame) components_after_stroke_[s] = oracles::graph_components(setup_, state).count;
+  for (std::size_t s = 0; s < setup_.stroke_end.size(); ++s) {
+    if (setup_.stroke_end[s] == frame) components_after_stroke_[s] = oracles::graph_components(setup_, state).count;
   }
 }
 

@@ -49,11 +49,7 @@ class Gate {
   double dent_ = 0;
   double greatest_stretch_ = 0;
   double isolated_ = 0;
-  std::vector<int64_t> stroke_ends_;
   std::vector<int64_t> components_after_stroke_;
 };
-
-// For each stroke of the blade's path the frame at whose end it is complete.
-std::vector<int64_t> stroke_ends(const Setup& setup);
 
 }  // namespace cutproof::cli

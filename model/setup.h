@@ -89,6 +89,7 @@ struct Setup {
   // the blade would be too fast is already divided into equal frames here (method.md §3, Blade).
   std::vector<double> substep_length;  // [frames] dt [s], > 0
   std::vector<BladeMove> blade_moves;  // [frames · S], empty if there is no blade
+  std::vector<int64_t> stroke_end;     // [strokes] frame at whose end the stroke is complete; -1: the run ends before
 
   int64_t frame_count() const { return static_cast<int64_t>(substep_length.size()); }
 };

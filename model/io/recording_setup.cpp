@@ -200,6 +200,7 @@ void walk(Archive& archive, S& setup) {
     if constexpr (Archive::kReading) setup.blade_moves = moves_of(columns);
   });
   archive.array("substep_length", setup.substep_length);
+  archive.array("stroke_end", setup.stroke_end);
 }
 
 using Defect = std::optional<SetupDefect>;
@@ -313,6 +314,12 @@ Defect timetable_defect(const Setup& setup) {
   if (setup.blade_moves.size() != (setup.has_blade ? substeps : 0)) {
     return SetupDefect{"blade_moves", fmt::format("There are {} moves of the blade, and there should be {}.",
                                                   setup.blade_moves.size(), setup.has_blade ? substeps : 0)};
+  }
+  for (const int64_t frame : setup.stroke_end) {
+    if (frame < -1 || frame >= setup.frame_count()) {
+      return SetupDefect{"stroke_end", fmt::format("A stroke ends with frame {}, and there are {} frames.", frame,
+                                                   setup.frame_count())};
+    }
   }
   for (const BladeMove& move : setup.blade_moves) {
     if (!is_finite(move.from) || !is_finite(move.to)) return SetupDefect{"blade_moves", "A pose is not finite."};

@@ -48,6 +48,7 @@ Setup block_setup(int32_t nx, int32_t ny, int32_t nz) {
   body.orientation = {{0, -1, 0, 1, 0, 0, 0, 0, 1}};
   setup.step.substeps = 2;
   setup.substep_length = {0.004, 0.005, 0.1 / 3};
+  setup.stroke_end = {1, -1};
   return setup;
 }
 
@@ -215,7 +216,7 @@ std::string bits_of(const Setup& s) {
   for (const Wall& wall : s.walls) bits.add(wall.axis).add(wall.side).add(wall.offset).add(wall.friction);
   for (const Grip& grip : s.grips) bits.add(grip.particles).add(grip.active).add(grip.displacement);
   bits.add(s.has_blade).add(s.blade.length).add(s.blade.depth).add(s.blade.thickness).add(s.blade.friction);
-  bits.add(s.substep_length);
+  bits.add(s.substep_length).add(s.stroke_end);
   for (const BladeMove& move : s.blade_moves) bits.add(move.from).add(move.to).add(move.down).add(move.stroke);
   return bits.bytes();
 }
@@ -760,6 +761,7 @@ TEST_F(RecordingTest, IsRefusedIfItIsInconsistent) {
   entry("/setup/grips/displacement", 1, kNan);
   entry("/setup/substep_length", 0, kNan);
   entry("/setup/substep_length", 0, 0.0);
+  entry("/setup/stroke_end", 0, int64_t{3});
   entry("/setup/blade_moves/down", 0, uint8_t{9});
   refused("blade_moves", [&](hid_t file) { set_entry(file, "/setup/blade_moves/to_edge", 2, kNan); });
   entry("/snapshots/stage", 0, uint8_t{6});

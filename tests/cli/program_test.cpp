@@ -1,0 +1,353 @@
+// The program as a user meets it: scenes, meshes, recordings, bad input, exit statuses.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+
+namespace {
+
+namespace files = std::filesystem;
+using nlohmann::json;
+
+struct Outcome {
+  int status = -1;
+  std::string output;  // standard output and standard error
+};
+
+// A folder of its own for each test, removed at the end.
+class Program : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    std::string name = std::string(info->test_suite_name()) + "." + info->name() + "." + std::to_string(getpid());
+    for (char& c : name) c = c == '/' ? '_' : c;
+    folder_ = files::temp_directory_path() / ("cutproof." + name);
+    files::create_directories(folder_);
+  }
+  void TearDown() override { files::remove_all(folder_); }
+
+  static std::string scene(const std::string& name) {
+    return (files::path(CUTPROOF_SOURCE) / "fixtures/scenes" / (name + ".json")).string();
+  }
+  Outcome cutproof(const std::string& arguments) const {
+    const std::string command = "cd '" + folder_.string() + "' && '" CUTPROOF_PROGRAM "' " + arguments + " 2>&1";
+    FILE* pipe = popen(command.c_str(), "r");
+    Outcome outcome;
+    std::array<char, 4096> buffer;
+    for (std::size_t n; (n = fread(buffer.data(), 1, buffer.size(), pipe)) > 0;)
+      outcome.output.append(buffer.data(), n);
+    const int status = pclose(pipe);
+    outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    return outcome;
+  }
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(path(name), std::ios::binary) << text;
+  }
+  std::string read(const std::string& name) const {
+    std::ifstream file(path(name), std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  std::set<std::string> listing() const {
+    std::set<std::string> names;
+    for (const auto& entry : files::directory_iterator(folder_)) names.insert(entry.path().filename());
+    return names;
+  }
+  void expect_refused(const std::string& arguments, const std::vector<std::string>& words) const {
+    const std::set<std::string> before = listing();
+    const Outcome outcome = cutproof(arguments);
+    EXPECT_EQ(outcome.status, 2) << arguments << "\n" << outcome.output;
+    for (const std::string& word : words) {
+      EXPECT_NE(outcome.output.find(word), std::string::npos) << "no '" << word << "' in:\n" << outcome.output;
+    }
+    EXPECT_EQ(listing(), before) << "something was written";
+  }
+
+  files::path folder_;
+};
+
+json small_block(const std::string& name = "small") {
+  return json::parse(R"({"version": 1, "body": {"shape": {"kind": "box", "size": [0.06, 0.05, 0.05]}, "spacing": 0.01},
+    "frame": {"settle": 0.032}, "detect": {"criterion": "geometric"},
+    "blade": {"speed": 1, "strokes": [{"points": [[0.45, 0.5, 1.3], [0.45, 0.5, -0.3]], "along": [0, 1, 0]}]},
+    "expect": {"components_after_stroke": [2], "components_at_end": 2}})")
+      .patch(json::array({{{"op", "add"}, {"path", "/name"}, {"value", name}}}));
+}
+
+// --- The paper's scenes ---------------------------------------------------------------------------------------------
+
+class Scene : public Program, public testing::WithParamInterface<std::string> {};
+
+TEST_P(Scene, HoldsWithEveryCheckOn) {
+  const Outcome outcome = cutproof("run " + scene(GetParam()) + " --check");
+  EXPECT_EQ(outcome.status, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("0 failed: everything holds."), std::string::npos);
+}
+
+INSTANTIATE_TEST_SUITE_P(OfThePaper, Scene,
+                         testing::Values("cuboid_press", "uniform_stretch", "uniform_stretch_strain", "three_cuts",
+                                         "liver_cut", "kidney_arc", "kidney_discontinuous", "irregular_sampled",
+                                         "irregular_sampled_covered", "cluster_growth", "small_block", "kidney_37704"),
+                         [](const auto& instance) { return instance.param; });
+
+struct OnMesh {
+  std::string scene, mesh;
+};
+class SceneOnMesh : public Program, public testing::WithParamInterface<OnMesh> {};
+
+TEST_P(SceneOnMesh, HoldsWithEveryCheckOn) {
+  const char* meshes = std::getenv("CUTPROOF_MESHES");
+  if (meshes == nullptr) GTEST_SKIP() << "CUTPROOF_MESHES is not set";
+  const Outcome outcome =
+      cutproof("run " + scene(GetParam().scene) + " --check --mesh " + meshes + "/" + GetParam().mesh);
+  EXPECT_EQ(outcome.status, 0) << outcome.output;
+}
+
+INSTANTIATE_TEST_SUITE_P(Organs, SceneOnMesh,
+                         testing::Values(OnMesh{"kidney_discontinuous", "openhelp_Kidney_left.stl"},
+                                         OnMesh{"kidney_discontinuous", "bp3d_FMA7205_Left_Kidney.obj"},
+                                         OnMesh{"liver_cut", "openhelp_Liver.stl"},
+                                         OnMesh{"liver_cut", "sksurgery_liver.ply"},
+                                         OnMesh{"liver_cut", "bp3d_FMA7197_Liver.obj"}),
+                         [](const auto& instance) {
+                           std::string name = instance.param.scene + "_on_" + instance.param.mesh;
+                           for (char& c : name) c = std::isalnum(static_cast<unsigned char>(c)) ? c : '_';
+                           return name;
+                         });
+
+struct BadMesh {
+  std::string mesh;
+  std::vector<std::string> words;
+};
+class BadOutsideMesh : public Program, public testing::WithParamInterface<BadMesh> {};
+
+TEST_P(BadOutsideMesh, IsRefusedWithItsDefect) {
+  const char* meshes = std::getenv("CUTPROOF_MESHES");
+  if (meshes == nullptr) GTEST_SKIP() << "CUTPROOF_MESHES is not set";
+  expect_refused(
+      "run " + scene("liver_cut") + " --check --json out.json --record r --mesh " + meshes + "/" + GetParam().mesh,
+      GetParam().words);
+}
+
+INSTANTIATE_TEST_SUITE_P(Meshes, BadOutsideMesh,
+                         testing::Values(BadMesh{"sksurgery_intraop_surface.stl", {"open", "160 edges", "remedy"}},
+                                         BadMesh{"beamadapter_carotids.stl", {"open", "41 edges", "remedy"}},
+                                         BadMesh{"sksurgery_Tumor.ply", {"manifold", "31 edges", "remedy"}},
+                                         BadMesh{"manifold_self_intersectA.obj", {"crosses itself", "338", "remedy"}},
+                                         BadMesh{"sofa_liver-smooth.obj", {"crosses itself", "7 pairs", "810-811"}}),
+                         [](const auto& instance) {
+                           std::string name = instance.param.mesh;
+                           for (char& c : name) c = std::isalnum(static_cast<unsigned char>(c)) ? c : '_';
+                           return name;
+                         });
+
+// --- What a scene expects -------------------------------------------------------------------------------------------
+
+TEST_F(Program, FailsWithStatusOneWhenAnExpectationDoesNotHold) {
+  json wrong = small_block();
+  wrong["expect"]["components_at_end"] = 3;
+  write("wrong.json", wrong.dump());
+  const Outcome outcome = cutproof("run wrong.json --check");
+  EXPECT_EQ(outcome.status, 1) << outcome.output;
+  EXPECT_NE(outcome.output.find("at the end there are 2, expected 3"), std::string::npos) << outcome.output;
+}
+
+TEST_F(Program, CallsIsolationAFailureUnlessTheSceneExpectsIt) {
+  std::ifstream file(scene("irregular_sampled"));
+  json foreign = json::parse(file);
+  foreign["expect"].erase("isolated_clusters");
+  write("isolated.json", foreign.dump());
+  const Outcome outcome = cutproof("run isolated.json --check");
+  EXPECT_EQ(outcome.status, 1) << outcome.output;
+  EXPECT_NE(outcome.output.find("FAILS: isolation"), std::string::npos) << outcome.output;
+}
+
+// --- What runs in a frame -------------------------------------------------------------------------------------------
+
+TEST_F(Program, NamesInJsonTheStagesThatRanInEachFrame) {
+  write("cut.json", small_block().dump());
+  ASSERT_EQ(cutproof("run cut.json --json cut_out.json").status, 0);
+  bool cut = false, whole = false;
+  const json cut_frames = json::parse(read("cut_out.json"))["frames"];
+  for (const json& frame : cut_frames) {
+    const json with = {"step", "detect", "split", "merge", "skin"}, without = {"step", "detect", "skin"};
+    EXPECT_EQ(frame["stages"], frame["removed"] > 0 ? with : without);
+    for (const json& stage : frame["stages"]) EXPECT_TRUE(frame["seconds"].contains(stage));
+    (frame["removed"] > 0 ? cut : whole) = true;
+  }
+  EXPECT_TRUE(cut);
+  EXPECT_TRUE(whole);
+  json idle = small_block();
+  idle.erase("blade");
+  idle.erase("expect");
+  idle["frame"] = {{"count", 3}};
+  write("idle.json", idle.dump());
+  ASSERT_EQ(cutproof("run idle.json --json idle_out.json").status, 0);
+  const json frames = json::parse(read("idle_out.json"))["frames"];
+  ASSERT_EQ(frames.size(), 3u);
+  for (const json& frame : frames) EXPECT_EQ(frame["stages"], json({"step", "skin"}));
+}
+
+TEST_F(Program, EndsWithAReportOnBodiesOfNoneOneAndOneCutAway) {
+  json none = small_block();
+  none["body"]["shape"] = json::parse(R"({"kind": "difference", "parts": [{"kind": "ball", "radius": 0.02},
+                                           {"kind": "ball", "radius": 0.03}]})");
+  none.erase("expect");
+  write("none.json", none.dump());
+  json one = none;
+  one["body"] = json::parse(R"({"shape": {"kind": "box", "size": [0.01, 0.01, 0.01]}, "spacing": 0.01})");
+  write("one.json", one.dump());
+  json away = small_block();
+  away["blade"]["thickness"] = 50;
+  away["expect"] = {{"components_at_end", 0}, {"shells_at_end", 0}};
+  write("away.json", away.dump());
+  for (const std::string name : {"none", "one", "away"}) {
+    const Outcome outcome = cutproof("run " + name + ".json --check --json " + name + "_out.json --record " + name);
+    EXPECT_EQ(outcome.status, 0) << name << "\n" << outcome.output;
+    EXPECT_EQ(cutproof("check " + name).status, 0) << name;
+  }
+  EXPECT_EQ(json::parse(read("none_out.json"))["body"]["particles"], 0);
+  EXPECT_EQ(json::parse(read("one_out.json"))["body"]["particles"], 1);
+  EXPECT_EQ(json::parse(read("away_out.json"))["frames"].back()["particles"], 0);
+}
+
+// --- Recordings -----------------------------------------------------------------------------------------------------
+
+TEST_F(Program, CheckGivesTheVerdictsThatTheRunGave) {
+  for (const std::string name : {"three_cuts", "uniform_stretch_strain"}) {
+    const Outcome run = cutproof("run " + scene(name) + " --check --json run.json --record recording");
+    const Outcome check = cutproof("check recording --json check.json");
+    EXPECT_EQ(run.status, check.status) << check.output;
+    const json ran = json::parse(read("run.json")), checked = json::parse(read("check.json"));
+    EXPECT_GT(ran["verdicts"].size(), 500u);
+    EXPECT_EQ(ran["verdicts"], checked["verdicts"]);
+    ASSERT_EQ(ran["frames"].size(), checked["frames"].size());
+    for (std::size_t f = 0; f < ran["frames"].size(); ++f)
+      EXPECT_EQ(ran["frames"][f]["stages"], checked["frames"][f]["stages"]);
+  }
+}
+
+TEST_F(Program, GivesTheSameFailingVerdictsOnARecording) {
+  json wrong = small_block();
+  wrong["expect"]["components_at_end"] = 3;
+  write("wrong.json", wrong.dump());
+  EXPECT_EQ(cutproof("run wrong.json --check --json run.json --record recording").status, 1);
+  EXPECT_EQ(cutproof("check recording --json check.json").status, 1);
+  EXPECT_EQ(json::parse(read("run.json"))["verdicts"], json::parse(read("check.json"))["verdicts"]);
+}
+
+TEST_F(Program, RefusesARecordingThatIsCutOffOrNone) {
+  write("cut.json", small_block().dump());
+  ASSERT_EQ(cutproof("run cut.json --record recording").status, 0);
+  const auto size = files::file_size(path("recording.cutproof.h5"));
+  files::resize_file(path("recording.cutproof.h5"), size / 2);
+  expect_refused("check recording", {"recording.cutproof.h5", "remedy"});
+  write("text.cutproof.h5", "this is no recording");
+  expect_refused("check text.cutproof.h5", {"text.cutproof.h5", "remedy"});
+  expect_refused("check nothing_there", {"nothing_there", "remedy"});
+}
+
+// --- Bad input ------------------------------------------------------------------------------------------------------
+
+TEST_F(Program, SaysWhatToDoNextWhenRunHasNoScene) {
+  expect_refused("run", {"cutproof run fixtures/scenes/", "--check", "--mesh"});
+  expect_refused("", {"run", "check", "info"});
+}
+
+TEST_F(Program, RefusesWrongUsageWithStatusTwo) {
+  write("cut.json", small_block().dump());
+  expect_refused("run cut.json --frobnicate", {"--frobnicate"});
+  expect_refused("dissect cut.json", {"subcommand", "--help"});
+  expect_refused("run cut.json --backend abacus", {"abacus", "cutproof info"});
+  expect_refused("run cut.json --mesh x.stl --unit furlong", {"furlong", "mm"});
+  expect_refused("run cut.json --particles 0", {"--particles"});
+  expect_refused("run not_there.json", {"not_there.json"});
+  expect_refused("run cut.json --json no/such/folder/out.json", {"no/such/folder"});
+  expect_refused("run cut.json --record no/such/folder/r", {"no/such/folder"});
+  expect_refused("check", {"recording", "required"});
+}
+
+TEST_F(Program, RefusesEachBadSceneWithFileFieldAndRemedy) {
+  const auto refuse = [this](const std::string& pointer, const json& value, const std::vector<std::string>& words) {
+    json scene = small_block();
+    scene[json::json_pointer(pointer)] = value;
+    write("bad.json", scene.dump());
+    std::vector<std::string> all = words;
+    all.push_back("bad.json");
+    all.push_back("remedy");
+    expect_refused("run bad.json --check --json out.json --record r", all);
+  };
+  refuse("/stpe", json::object(), {"stpe", "step"});
+  refuse("/body/spacing", -0.01, {"body.spacing", "-0.01"});
+  refuse("/body/spacing", 1e-9, {"body.spacing", "GB"});
+  refuse("/body/spacing", "fine", {"body.spacing"});
+  refuse("/blade/strokes", json::array(), {"blade.strokes"});
+  refuse("/blade/strokes/0/points", json::array(), {"blade.strokes[0].points"});
+  refuse("/version", 99, {"version", "99"});
+  refuse("/body/particles", 1000, {"body"});
+  std::string nan = small_block().dump();
+  nan.replace(nan.find("\"speed\":1"), 9, "\"speed\":NaN");
+  write("nan.json", nan);
+  expect_refused("run nan.json", {"nan.json", "remedy"});
+  std::string huge = small_block().dump();
+  huge.replace(huge.find("\"speed\":1"), 9, "\"speed\":1e999");
+  write("huge.json", huge);
+  expect_refused("run huge.json", {"huge.json", "remedy"});
+  write("empty.json", "");
+  expect_refused("run empty.json", {"empty.json", "remedy"});
+}
+
+TEST_F(Program, RefusesEachBadMeshFile) {
+  write("cut.json", small_block().dump());
+  write("empty.stl", "");
+  expect_refused("run cut.json --mesh empty.stl --json out.json", {"empty.stl", "empty", "remedy"});
+  write("text.stl", "Dear sir, this is a letter and not a mesh.\n");
+  expect_refused("run cut.json --mesh text.stl --json out.json", {"text.stl", "remedy"});
+  std::string binary(84, '\0');
+  binary[80] = 100;  // promises 100 triangles
+  write("short.stl", binary + std::string(120, '\1'));
+  expect_refused("run cut.json --mesh short.stl --json out.json", {"short.stl", "100", "remedy"});
+  expect_refused("run cut.json --mesh not_there.obj", {"not_there.obj"});
+}
+
+TEST_F(Program, PrintsNothingButPlainLinesWhenPiped) {
+  write("cut.json", small_block().dump());
+  const Outcome outcome = cutproof("run cut.json --check");
+  EXPECT_EQ(outcome.output.find('\r'), std::string::npos);
+  EXPECT_EQ(outcome.output.find('\x1b'), std::string::npos);
+}
+
+TEST_F(Program, TellsItsVersionBackendsAndSceneFields) {
+  EXPECT_EQ(cutproof("--version").output, std::string("cutproof ") + CUTPROOF_VERSION + "\n");
+  EXPECT_NE(cutproof("info").output.find("reference"), std::string::npos);
+  const Outcome scene_fields = cutproof("info --scene");
+  EXPECT_EQ(scene_fields.status, 0);
+  EXPECT_NE(scene_fields.output.find("blade"), std::string::npos);
+  for (const std::string command : {"--help", "run --help", "check --help", "info --help"}) {
+    EXPECT_EQ(cutproof(command).status, 0) << command;
+  }
+}
+
+TEST_F(Program, LetsTheRestOfTheKidneyEndWithTheSameBitsWhetherOrNotThePieceIsPulledAway) {
+  std::ifstream file(scene("kidney_discontinuous"));
+  json pulled = json::parse(file);
+  json left = pulled;
+  left["grips"].erase(1);
+  write("pulled.json", pulled.dump());
+  write("left.json", left.dump());
+  ASSERT_EQ(cutproof("run pulled.json --record pulled").status, 0);
+  ASSERT_EQ(cutproof("run left.json --record left").status, 0);
+  const std::string script = std::string("/usr/bin/python3 '") + CUTPROOF_SOURCE + "/tests/cli/same_bits.py' '" +
+                             path("pulled") + "' '" + path("left") + "'";
+  EXPECT_EQ(std::system(script.c_str()), 0);
+}
+
+}  // namespace
