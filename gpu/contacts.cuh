@@ -126,13 +126,19 @@ CUTPROOF_DEVICE inline Float3 off_blade(const Contacts& contacts, const RestPoin
 
 inline constexpr int kMostTurns = 16;  // of blade and walls, where both hold at once
 
-CUTPROOF_DEVICE inline Float3 allowed(const Contacts& contacts, const RestPoint& rest, Float3 d, float side) {
+// The allowed point nearest to d: exactly, unless blade and walls both move it. Then they do in turn, the blade last,
+// and `in_turn` is set.
+CUTPROOF_DEVICE inline Float3 allowed(const Contacts& contacts, const RestPoint& rest, Float3 d, float side,
+                                      bool& in_turn) {
   if (contacts.move == nullptr) return off_walls(contacts, rest, d);
   Float3 result = off_blade(contacts, rest, d, side);
+  bool by_blade = !same(result, d);
   for (int turn = 0; turn < kMostTurns; ++turn) {
     const Float3 inside = off_walls(contacts, rest, result);
     if (same(inside, result)) return result;
     result = off_blade(contacts, rest, inside, side);
+    by_blade = by_blade || !same(result, inside);
+    in_turn = by_blade;
     if (same(result, inside)) return result;
   }
   return result;
@@ -154,11 +160,12 @@ CUTPROOF_DEVICE inline float blade_side(const Contacts& contacts, const RestPoin
   return contacts_detail::into_frame(pose, rest.from(pose.edge) + d).z < 0 ? -1.0f : 1.0f;
 }
 
-// Where contacts let a particle be that wants to be at d, began the substep at `start` and on side `side`.
+// Where contacts let a particle be that wants to be at d, began the substep at `start` and on side `side`. Sets
+// `in_turn` where that need not be the nearest allowed point, and leaves it alone elsewhere.
 CUTPROOF_DEVICE inline Float3 project(const Contacts& contacts, const RestPoint& rest, Float3 d, float side,
-                                      Float3 start) {
+                                      Float3 start, bool& in_turn) {
   using namespace contacts_detail;
-  const Float3 projected = allowed(contacts, rest, d, side);
+  const Float3 projected = allowed(contacts, rest, d, side, in_turn);
   if (contacts.frictionless || same(projected, d)) return projected;
   Float3 result = projected;
   for (int k = 0; k < contacts.wall_count; ++k) {
@@ -181,7 +188,7 @@ CUTPROOF_DEVICE inline Float3 project(const Contacts& contacts, const RestPoint&
       result = rubbed(result, result - start - carried, (1.0f / depth) * pushed, contacts.blade_friction * depth);
     }
   }
-  return allowed(contacts, rest, result, side);
+  return allowed(contacts, rest, result, side, in_turn);
 }
 
 }  // namespace cutproof::gpu

@@ -243,7 +243,8 @@ CUTPROOF_DEVICE inline void begin_substep(const World& w, const BodyConstants& b
     const Contacts contacts = contacts_of(w, body, frame, substep);
     const RestPoint rest = {body.h, grid_node(body, w.node[p])};
     const float side = blade_side(contacts, rest, d);
-    const Float3 x = project(contacts, rest, predicted, side, d);
+    bool in_turn = false;  // of no interest: there is no earlier point to compare with
+    const Float3 x = project(contacts, rest, predicted, side, d, in_turn);
     w.predicted[p] = with_w(predicted, side);
     w.displacement[p] = with_w(x, mass);
     w.pushed[p] = with_w(x - predicted, 0.0f);
@@ -365,10 +366,12 @@ CUTPROOF_DEVICE void update_positions_kernel(Block& block, const World& w, int s
         } else {
           const Contacts contacts = contacts_of(w, body, frame, substep);
           const RestPoint rest = {body.h, grid_node(body, w.node[p])};
-          next = project(contacts, rest, free, predicted.w, xyz(w.start[p]));
+          bool in_turn = false;
+          next = project(contacts, rest, free, predicted.w, xyz(w.start[p]), in_turn);
           // Where blade and walls hold at once, projecting in turn need not give the nearest point: never one that is
-          // worse than the present one, so that the energy cannot grow.
-          if (contacts.frictionless && dot(next - free, next - free) > dot(x - free, x - free)) next = x;
+          // worse than the present one, so that the energy cannot grow. Elsewhere the projection is the nearest point,
+          // and asking would refuse motions below the root of the rounding.
+          if (in_turn && contacts.frictionless && dot(next - free, next - free) > dot(x - free, x - free)) next = x;
         }
         pushed = with_w((implicit ? s : 1.0f) * xyz(pushed) + (next - free), 0.0f);
       }
