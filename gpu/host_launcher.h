@@ -38,12 +38,16 @@ class HostLauncher {
 
   template <class Kernel, class... Args>
   void items(Kernel kernel, std::int64_t capacity, Args... args) {
-    launch(kernel, (capacity + kHostThreads - 1) / kHostThreads, 0, args...);
+    // Every thread has at most about 8 items, so that what its neighbours read next is still in the cache; an odd
+    // number of blocks, so that its items do not all fall into the same lines of it.
+    const std::int64_t all = (capacity + kHostThreads - 1) / kHostThreads;
+    const std::int64_t most = runtime_->simulated() ? blocks_ : std::max<std::int64_t>(kMostBlocks, all / 8 | 1);
+    launch(kernel, std::min(all, most), 0, args...);
   }
   template <class Kernel, class... Args>
   void blocks(Kernel kernel, std::int64_t capacity, int threads, std::size_t shared_bytes, Args... args) {
     check_threads<Kernel>(threads);
-    launch(kernel, capacity, shared_bytes, args...);
+    launch(kernel, std::min<std::int64_t>(capacity, blocks_), shared_bytes, args...);
   }
 
   template <class Body>
@@ -78,7 +82,10 @@ class HostLauncher {
                         std::to_string(capacity) + '.');
     }
     std::sort(keys, keys + *count);
-    *count = static_cast<int>(std::unique(keys, keys + *count) - keys);
+    if (*count > 0 && keys[*count - 1] == ~0ull) throw KernelFault("sort_unique: ~0 is not a key.");
+    unsigned long long* const end = std::unique(keys, keys + *count);
+    std::fill(end, keys + *count, ~0ull);  // so that nobody relies on what is there
+    *count = static_cast<int>(end - keys);
   }
   void clear(void* data, std::size_t bytes) {
     if (bytes > 0) std::memset(data, 0, bytes);
@@ -86,6 +93,10 @@ class HostLauncher {
 
   // All choices so far, if SimulationOptions::record was set.
   const Schedule& recorded() const { return runtime_->recorded(); }
+  // Goes on under another schedule, with nothing recorded. Cheaper than another launcher: stacks are kept. Requires a
+  // launcher that is simulated.
+  void reschedule(Generator schedule) { runtime_->reschedule(std::move(schedule)); }
+  bool simulated() const { return runtime_->simulated(); }
 
  private:
   template <class Kernel, class... Args>
@@ -95,7 +106,7 @@ class HostLauncher {
     job.kernel = kernel_name<Kernel>();
     job.run = [](const void* closure, HostBlock& block) { (*static_cast<decltype(&call)>(closure))(block); };
     job.call = &call;
-    job.blocks = static_cast<int>(std::clamp<std::int64_t>(blocks, 1, blocks_));
+    job.blocks = static_cast<int>(std::max<std::int64_t>(blocks, 1));
     job.shared_bytes = shared_bytes;
     runtime_->run(job);
   }

@@ -529,6 +529,12 @@ HostRuntime::HostRuntime(SimulationOptions simulation)
 
 HostRuntime::~HostRuntime() { pool_.reset(); }
 
+void HostRuntime::reschedule(Generator schedule) {
+  if (simulation_ == nullptr) throw std::logic_error("HostRuntime: threads follow no schedule.");
+  simulation_->schedule = std::move(schedule);
+  recorded_.clear();
+}
+
 void HostRuntime::run(const Job& job) {
   Worker& own = *workers_.front();
   if (simulation_ != nullptr) {

@@ -163,6 +163,8 @@ class HostRuntime {
   // Carries out the launch. Rethrows what a kernel threw; of several failures that of the lowest block.
   void run(const Job& job);
   const Schedule& recorded() const { return recorded_; }
+  // Goes on under another schedule, with nothing recorded. Requires simulated().
+  void reschedule(Generator schedule);
 
  private:
   struct Pool;
