@@ -172,7 +172,7 @@ double substep_rounding(const Setup& setup, const State& state) {
   const double amplification = greatest_amplification(body, state.clusters, counts, rest_positions(body));
   const RoundingScale scale = rounding_scale(setup, state);
   return setup.step.iterations * std::sqrt(mass / lightest) * (1 + amplification) * goal_rounding(scale) +
-         8 * kUnitRoundoff * scale.extent;
+         8 * setup.unit_roundoff * scale.extent;
 }
 
 // --- Scenes made from others -----------------------------------------------------------------------------------------
@@ -707,6 +707,7 @@ Setup single_substep_setup(const Setup& setup, int64_t frame) {
   Setup single = setup;
   single.step.substeps = 1;
   single.substep_length = {setup.substep_length[at(frame)]};
+  single.stroke_end.clear();
   if (!setup.blade_moves.empty()) single.blade_moves = {setup.blade_moves[first]};
   for (Grip& grip : single.grips) {
     grip.active = {grip.active[first]};
@@ -864,6 +865,7 @@ Verdict refinement(Backend& backend, const Setup& more, const State& state, int6
   Setup fewer = more;
   const auto substeps = at(fewer_frames * more.step.substeps);
   fewer.substep_length.resize(at(fewer_frames));
+  for (int64_t& end : fewer.stroke_end) end = end < fewer_frames ? end : -1;
   if (!fewer.blade_moves.empty()) fewer.blade_moves.resize(substeps);
   for (Grip& grip : fewer.grips) {
     grip.active.resize(substeps);
@@ -972,7 +974,7 @@ Verdict energy_is_monotone(Backend& backend, const Setup& setup, const State& st
     scale.extent = std::max(scale.extent, rounding_scale(single, end).extent);
     const double rho = 2 * goal_rounding(scale);
     const double bound = rho * (std::sqrt(2 * mass * energy) / dt + std::sqrt(2 * k * mass * energy)) +
-                         terms * kUnitRoundoff * energy + mass * (1 / (dt * dt) + k) * rho * rho;
+                         terms * setup.unit_roundoff * energy + mass * (1 / (dt * dt) + k) * rho * rho;
     const double growth = iteration == 0 ? 0 : energy - previous;
     if (iteration > 0) ++verdict.checked;
     if (!(growth <= bound)) {
