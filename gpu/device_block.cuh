@@ -35,11 +35,11 @@ class DeviceBlock {
 
   template <class T>
   __device__ T sum(T value) {
-    return reduce(value, [](T a, T b) { return a + b; });
+    return reduce<true>(value, [](T a, T b) { return a + b; });
   }
   template <class T>
   __device__ T smallest(T value) {
-    return reduce(value, [](T a, T b) { return b < a ? b : a; });
+    return reduce<std::is_integral_v<T>>(value, [](T a, T b) { return b < a ? b : a; });
   }
   __device__ bool any(bool value) { return __syncthreads_or(value) != 0; }
   __device__ int exclusive_scan(int value, int& total) {
@@ -137,25 +137,26 @@ class DeviceBlock {
     return value;
   }
 
-  // A butterfly, as HostBlock does it. Every lane computes the same sum up to the order of the two terms of each
-  // addition, which changes no bit; lane 0's is handed out where it might (the sign of a zero, NaN).
+  // A butterfly, as HostBlock does it. Every lane combines the same terms, in one order or the other.
   template <class T, class Combine>
   __device__ static T reduce_warp(T value, Combine combine) {
 #pragma unroll
     for (int distance = 16; distance > 0; distance /= 2) {
       value = combine(value, by_words(value, [=](unsigned word) { return __shfl_xor_sync(kWarp, word, distance); }));
     }
-    if constexpr (!std::is_integral_v<T>) {
-      value = by_words(value, [=](unsigned word) { return __shfl_sync(kWarp, word, 0); });
-    }
     return value;
   }
 
-  template <class T, class Combine>
+  // `symmetric`: combine(a, b) and combine(b, a) have the same bits, so every lane has the result already. (Minima of
+  // floats are not: the sign of a zero, NaN.)
+  template <bool symmetric, class T, class Combine>
   __device__ static T reduce(T value, Combine combine) {
+    const auto from_first = [](T own) {
+      return by_words(own, [](unsigned word) { return __shfl_sync(kWarp, word, 0); });
+    };
     value = reduce_warp(value, combine);
     const int warps = static_cast<int>(blockDim.x) / 32;
-    if (warps == 1) return value;
+    if (warps == 1) return symmetric ? value : from_first(value);
     alignas(16) __shared__ unsigned char storage[32 * sizeof(T)];
     T* const partial = reinterpret_cast<T*>(storage);
     const int lane = static_cast<int>(threadIdx.x & 31u);
@@ -169,7 +170,7 @@ class DeviceBlock {
       const T other = by_words(value, [=](unsigned word) { return __shfl_down_sync(kWarp, word, distance); });
       if (lane + distance < warps) value = combine(value, other);
     }
-    return by_words(value, [=](unsigned word) { return __shfl_sync(kWarp, word, 0); });
+    return from_first(value);
   }
 
   __device__ int inclusive_scan_in_warp(int value) const {
