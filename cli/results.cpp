@@ -23,12 +23,15 @@ nlohmann::json to_json(const FrameResult& frame, bool timed) {
     const auto index = static_cast<std::size_t>(stage);
     if (!frame.ran[index]) continue;
     stages.push_back(name_of(stage));
-    if (timed) seconds[std::string(name_of(stage))] = frame.seconds[index];
+    if (timed && frame.seconds[index] > 0) seconds[std::string(name_of(stage))] = frame.seconds[index];
   }
   nlohmann::json result = {{"frame", frame.frame},        {"stages", stages},         {"removed", frame.removed},
                            {"debris", frame.debris},      {"particles", frame.alive}, {"clusters", frame.clusters},
                            {"triangles", frame.triangles}};
-  if (timed) result["seconds"] = seconds;
+  if (timed) {
+    result["seconds"] = seconds;
+    result["total_seconds"] = frame.total_seconds;
+  }
   return result;
 }
 

@@ -16,6 +16,7 @@ namespace cutproof::cli {
 struct FrameResult {
   int64_t frame = 0;
   std::array<bool, 6> ran = {};
+  double total_seconds = 0;
   std::array<double, 6> seconds = {};
   int64_t removed = 0, debris = 0, alive = 0, clusters = 0, triangles = 0;
 };

@@ -3,6 +3,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <thread>
 
 #include "cli/commands.h"
 #include "cli/gate.h"
@@ -10,6 +11,7 @@
 #include "cli/terminal.h"
 #include "fixtures/bodies.h"
 #include "fixtures/build.h"
+#include "gpu/backends.h"
 #include "model/error.h"
 #include "model/io/atomic_file.h"
 #include "model/io/recording.h"
@@ -31,8 +33,18 @@ double metres_per(const std::string& unit) {
 
 std::unique_ptr<Backend> make_backend(const std::string& name) {
   if (name == "reference") return reference::make_backend();
+  if (name == "host")
+    return gpu::make_host_backend(static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
+#if CUTPROOF_HAS_CUDA
+  if (name == "gpu") return gpu::make_gpu_backend();
+#else
+  if (name == "gpu") {
+    throw InputError("command line", "--backend", "this cutproof was built without CUDA",
+                     "build it where a CUDA toolkit of version 12.4 or newer is installed");
+  }
+#endif
   throw InputError("command line", "--backend", fmt::format("there is no backend '{}'", name),
-                   "use one of those that `cutproof info` lists: reference");
+                   "use one of those that `cutproof info` lists: reference, host, gpu");
 }
 
 // Runs one frame and hands its snapshots to `see`: after every stage that ran from detect on if something was removed,
@@ -42,6 +54,7 @@ FrameResult run_frame(Backend& backend, bool watched, const std::function<void(S
   const auto run = [&](Span span) {
     backend.run(span);
     const SpanReport report = backend.report();
+    result.total_seconds += report.total_seconds;
     for (const Stage stage : kStages) {
       const auto s = static_cast<std::size_t>(stage);
       result.ran[s] = result.ran[s] || report.ran[s];
@@ -87,10 +100,12 @@ void print_header(const Scene& scene, const fixtures::Built& built, const RunOpt
 }
 
 void print_summary(const RunResult& result) {
+  double total = 0;
   std::array<double, 6> seconds = {};
   std::array<int64_t, 6> launched = {};
   int64_t removed = 0, debris = 0;
   for (const FrameResult& frame : result.frames) {
+    total += frame.total_seconds;
     for (std::size_t s = 0; s < 6; ++s) {
       seconds[s] += frame.seconds[s];
       launched[s] += frame.ran[s];
@@ -102,7 +117,13 @@ void print_summary(const RunResult& result) {
   for (const Stage stage : kStages) {
     const auto s = static_cast<std::size_t>(stage);
     fmt::print("{:<8} {:>7} {:>14}\n", name_of(stage), launched[s],
-               launched[s] == 0 ? "-" : fmt::format("{:.3f}", 1e3 * seconds[s] / static_cast<double>(launched[s])));
+               launched[s] == 0 || seconds[s] == 0
+                   ? "-"
+                   : fmt::format("{:.3f}", 1e3 * seconds[s] / static_cast<double>(launched[s])));
+  }
+  if (!result.frames.empty()) {
+    fmt::print("{:<8} {:>7} {:>14.3f}\n", "all", result.frames.size(),
+               1e3 * total / static_cast<double>(result.frames.size()));
   }
   const int64_t clusters = result.frames.empty() ? result.clusters_at_start : result.frames.back().clusters;
   fmt::print("removed {} particles ({} as debris); clusters {} -> {}\n", removed + debris, debris,
@@ -119,14 +140,14 @@ int run(const RunOptions& options) {
   const std::unique_ptr<Backend> backend = make_backend(options.backend);
 
   const Scene scene = io::read_scene(options.scene);
-  const fixtures::Built built = fixtures::build(scene, options.scene, build_options);
+  fixtures::Built built = fixtures::build(scene, options.scene, build_options);
+  built.setup.unit_roundoff = backend->unit_roundoff();
   // Opened before the work, so that a folder that cannot be written to is found out now and not after it.
   std::optional<io::AtomicFile> json_file;
   if (!options.json.empty()) json_file.emplace(options.json);
   std::optional<io::Recorder> recorder;
   if (!options.record.empty()) recorder.emplace(options.record, built.setup, io::write_scene(scene), options.backend);
   std::optional<Gate> gate;
-  if (options.check) gate.emplace(built.setup, scene.expect, options.backend, built.state);
   print_header(scene, built, options);
 
   RunResult result{"run",
@@ -140,8 +161,11 @@ int run(const RunOptions& options) {
                    built.state.clusters.count(),
                    true,
                    {}};
-  if (recorder) recorder->add(Stage::skin, built.state);
   backend->load({built.setup}, {built.state});
+  // What the backend has made of the state: one in single precision has rounded it.
+  const State initial = backend->snapshot().front();
+  if (options.check) gate.emplace(built.setup, scene.expect, options.backend, initial);
+  if (recorder) recorder->add(Stage::skin, initial);
   {
     Progress progress(built.setup.frame_count());
     for (int64_t frame = 0; frame < built.setup.frame_count(); ++frame) {

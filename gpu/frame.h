@@ -73,14 +73,18 @@ CUTPROOF_DEVICE void end_frame_kernel(Block& block, World w) {
 }
 CUTPROOF_KERNEL(end_frame_kernel);
 
-template <class Launcher>
-void enqueue_span(Launcher& launcher, const World& w, const Plan& plan, Span span) {
+// `mark` is called with each stage before its work is handed over (a launcher that works at once can take times).
+template <class Launcher, class Mark>
+void enqueue_span(Launcher& launcher, const World& w, const Plan& plan, Span span, Mark mark) {
+  launcher.clear(w.counters->stage_ran, sizeof w.counters->stage_ran);
   const auto ran = [&](Stage stage) { launcher.items(note_stage_kernel_object{}, 1, w, static_cast<int>(stage)); };
   if (span.contains(Stage::step)) {
+    mark(Stage::step);
     ran(Stage::step);
     enqueue_step(launcher, w, plan);
   }
   if (span.contains(Stage::detect) && plan.detection) {
+    mark(Stage::detect);
     ran(Stage::detect);
     enqueue_detect(launcher, w, plan);
   }
@@ -92,15 +96,18 @@ void enqueue_span(Launcher& launcher, const World& w, const Plan& plan, Span spa
         inner.items(note_stage_kernel_object{}, 1, w, static_cast<int>(stage));
       };
       if (span.contains(Stage::split)) {
+        mark(Stage::split);
         ran_inside(Stage::split);
         enqueue_split(inner, w, plan);
       }
       if (span.contains(Stage::merge) && plan.merge) {
+        mark(Stage::merge);
         ran_inside(Stage::merge);
         enqueue_merge(inner, w, plan);
       }
       if (span.contains(Stage::expand) && plan.expand) {
         inner.if_nonzero(&w.counters->expanding, [&](Launcher& innermost) {
+          mark(Stage::expand);
           innermost.items(note_stage_kernel_object{}, 1, w, static_cast<int>(Stage::expand));
           enqueue_expand(innermost, w, plan);
         });
@@ -108,6 +115,7 @@ void enqueue_span(Launcher& launcher, const World& w, const Plan& plan, Span spa
     });
   }
   if (span.contains(Stage::skin)) {
+    mark(Stage::skin);
     if (plan.skin) {
       ran(Stage::skin);
       launcher.if_nonzero(&w.counters->extracting, [&](Launcher& inner) { enqueue_skin_cells(inner, w, plan); });

@@ -15,7 +15,8 @@ namespace cutproof {
 // What the last call of run() did.
 struct SpanReport {
   std::array<bool, 6> ran = {};        // by stage: did any body launch it?
-  std::array<double, 6> seconds = {};  // by stage: wall time [s]
+  double total_seconds = 0;            // wall time of the whole span [s]
+  std::array<double, 6> seconds = {};  // by stage: wall time [s]; 0 where the span ran as one piece
 };
 
 class Backend {
@@ -24,6 +25,9 @@ class Backend {
 
   // "reference", "host", "gpu", or the name of a plugin.
   virtual std::string name() const = 0;
+
+  // Unit roundoff of its arithmetic: 2⁻⁵³ or 2⁻²⁴. Whoever judges it puts this into the setup's unit_roundoff.
+  virtual double unit_roundoff() const { return 0x1p-53; }
 
   // Which contiguous runs of stages it can execute. Whole frames are always among them.
   virtual bool can_run(Span span) const = 0;

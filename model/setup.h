@@ -81,6 +81,7 @@ struct Setup {
   MergeParameters merge;
   ExpandParameters expand;
   SkinParameters skin;
+  double unit_roundoff = 0x1p-53;  // u of the backend's arithmetic: what the bounds of the oracles allow for
   std::vector<Wall> walls;
   std::vector<Grip> grips;
   bool has_blade = false;

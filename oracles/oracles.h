@@ -20,23 +20,23 @@ Verdict well_formed(const Setup& setup, const State& state);
 Verdict cluster_connectivity(const Setup& setup, const State& state);  // I1, by BFS
 Verdict coverage(const Setup& setup, const State& state);              // I2; members sorted, unique, alive
 // I3 and the skin: components of G = of the coupling "shares a cluster" (both as partitions of the alive particles)
-// and, if the state has a skin, = outer shells of the skin (method.md §8). Witness of a failure: two particles and, if they
-// are connected, a path.
+// and, if the state has a skin, = outer shells of the skin (method.md §8). Witness of a failure: two particles and, if
+// they are connected, a path.
 Verdict component_match(const Setup& setup, const State& state);
 // No cluster and no group of clusters isolated inside connected tissue; measured: number of surplus groups, that is
 // coupling components minus components of G (0 expected).
 Verdict isolation(const Setup& setup, const State& state);
-Verdict edge_cover(const Setup& setup, const State& state);            // I4, where state.edge_covered promises it
-Verdict rest_frames(const Setup& setup, const State& state);           // T_c and M_c of every cluster
-Verdict finite(const Setup& setup, const State& state);                // no NaN, no Inf anywhere
-Verdict skin_surface(const Setup& setup, const State& state);          // closed, 2-manifold, oriented; CGAL
+Verdict edge_cover(const Setup& setup, const State& state);    // I4, where state.edge_covered promises it
+Verdict rest_frames(const Setup& setup, const State& state);   // T_c and M_c of every cluster
+Verdict finite(const Setup& setup, const State& state);        // no NaN, no Inf anywhere
+Verdict skin_surface(const Setup& setup, const State& state);  // closed, 2-manifold, oriented; CGAL
 // At rest (every X_v from the owner's rest position): no degenerate or self-intersecting triangle, outward, shells =
 // components + cavities (18 neighbours), Euler number, volume between bounds; CGAL. Costs about 10 ms on 3,000
 // triangles.
 Verdict skin_geometry(const Setup& setup, const State& state);
 // Each vertex where its owner's clusters put it; owners alive, the other end of the edge empty.
 Verdict skin_vertices(const Setup& setup, const State& state);
-Verdict rotation_quality(const Setup& setup, const State& state);      // ‖RᵀR − I‖ and det > 0 of every cluster
+Verdict rotation_quality(const Setup& setup, const State& state);  // ‖RᵀR − I‖ and det > 0 of every cluster
 // No alive edge with two free ends crosses the blade where it stands at the end of the frame just simulated (pass
 // the state after detect, before the frame counts up). Dynamic criterion only.
 Verdict no_pass(const Setup& setup, const State& state);
@@ -50,7 +50,8 @@ std::vector<Verdict> judge(const Setup& setup, const State& state, bool thorough
 std::vector<Verdict> judge(const Setup& setup, const State& state, Stage after, bool thorough);
 
 // --- One stage: the state before and after it -----------------------------------------------------------------------
-Verdict detection(const Setup& setup, const State& before, const State& after);    // removed <=> d_i > εh outside the band
+Verdict detection(const Setup& setup, const State& before,
+                  const State& after);  // removed <=> d_i > εh outside the band
 Verdict split_exactness(const Setup& setup, const State& before, const State& after);
 Verdict merge_legality(const Setup& setup, const State& before, const State& after);
 Verdict expansion(const Setup& setup, const State& before, const State& after);
@@ -66,8 +67,8 @@ struct Partition {
   std::vector<int32_t> label;  // [n] component of each alive particle, numbered by smallest particle; -1 if dead
   int32_t count = 0;
 };
-Partition graph_components(const Setup& setup, const State& state);      // BFS on G
-Partition coupling_components(const Setup& setup, const State& state);   // "shares a cluster"
+Partition graph_components(const Setup& setup, const State& state);     // BFS on G
+Partition coupling_components(const Setup& setup, const State& state);  // "shares a cluster"
 // A second, independent count: block triangular form (strongly connected components) by SuiteSparse BTF.
 int32_t graph_component_count_btf(const Setup& setup, const State& state);
 // A third: n − rank of the Laplacian by SPQR. Slow; for tests.
@@ -75,7 +76,7 @@ int32_t graph_component_count_spqr(const Setup& setup, const State& state);
 struct ShellCount {
   int32_t outer = 0, inner = 0;
 };
-ShellCount skin_shells(const Skin& skin);                              // CGAL; by sign of the volume at `position`
+ShellCount skin_shells(const Skin& skin);  // CGAL; by sign of the volume at `position`
 // Couplings between clusters that are only a shared particle (ball joint) or collinear ones (hinge) (method.md §7).
 struct WeakCouplings {
   int64_t ball_joints = 0, hinges = 0;

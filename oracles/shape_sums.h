@@ -50,13 +50,15 @@ inline ClusterMeans cluster_means(const Body& body, const Clusters& clusters, co
 
 // Figures that enter every rounding bound of docs/tolerances.md.
 struct RoundingScale {
-  int64_t largest_cluster = 0;   // N: most particles in one cluster
-  int32_t most_memberships = 0;  // n: most clusters of one particle
-  double extent = 0;             // greatest |x| or |X| of an alive particle from the body's origin [m]
+  int64_t largest_cluster = 0;     // N: most particles in one cluster
+  int32_t most_memberships = 0;    // n: most clusters of one particle
+  double unit_roundoff = 0x1p-53;  // u of the arithmetic that is judged
+  double extent = 0;               // greatest |x| or |X| of an alive particle from the body's origin [m]
 };
 
 inline RoundingScale rounding_scale(const Setup& setup, const State& state) {
   RoundingScale scale;
+  scale.unit_roundoff = setup.unit_roundoff;
   for (int32_t c = 0; c < state.clusters.count(); ++c) {
     scale.largest_cluster = std::max(scale.largest_cluster, state.clusters.size(c));
   }
@@ -75,7 +77,7 @@ inline RoundingScale rounding_scale(const Setup& setup, const State& state) {
 // rotations [m].
 inline double goal_rounding(const RoundingScale& scale) {
   const double operations = 2.0 * static_cast<double>(scale.largest_cluster) + scale.most_memberships + 16.0;
-  return 3.0 * std::sqrt(3.0) * operations * kUnitRoundoff * scale.extent;
+  return 3.0 * std::sqrt(3.0) * operations * scale.unit_roundoff * scale.extent;
 }
 
 }  // namespace cutproof::oracles

@@ -13,8 +13,6 @@
 namespace cutproof::oracles {
 namespace {
 
-constexpr double kRoundoff = 0x1p-53;
-
 // --- Detection -------------------------------------------------------------------------------------------------------
 
 // d_i: greatest current distance from an alive particle to its neighbours in G, and that neighbour.
@@ -36,15 +34,16 @@ Stretch stretch_of(const TissueGraph& graph, const std::vector<Vec3>& x, int32_t
 
 enum class Demand { keep, either, remove };
 
-// Rounding band of d_i > εh, with u = 2⁻⁵³. From the stored positions: each difference is off by u relative to
-// itself, its square by 3u, their sum by at most 5u, and the root by 2.5u + u. So every way to compute d_i in double
-// is off by at most 4u d_i, every way to compute εh by u (squared and compared: 3u on squares, 1.5u here). What is
-// compared here has the same errors once more: 2 (4u + 2u) = 12u; 16u leaves room for the terms of second order.
-constexpr double kStretchBand = 16 * kRoundoff;
+// Rounding band of d_i > εh, with u the unit roundoff of what is judged. From the stored positions: each difference is
+// off by u relative to itself, its square by 3u, their sum by at most 5u, and the root by 2.5u + u. So every way to
+// compute d_i in double is off by at most 4u d_i, every way to compute εh by u (squared and compared: 3u on
+// squares, 1.5u here). What is compared here has the same errors once more: 2 (4u + 2u) = 12u; 16u leaves room for the
+// terms of second order.
+constexpr double kStretchBand = 16;  // [u]
 
-Demand demand_of_distance(double distance, double limit) {
-  if (distance > limit * (1 + kStretchBand)) return Demand::remove;
-  if (distance < limit * (1 - kStretchBand)) return Demand::keep;
+Demand demand_of_distance(double distance, double limit, double u) {
+  if (distance > limit * (1 + kStretchBand * u)) return Demand::remove;
+  if (distance < limit * (1 - kStretchBand * u)) return Demand::keep;
   return Demand::either;
 }
 
@@ -152,6 +151,7 @@ Vec3 rotated(Vec3 v, const Turn& turn, double fraction) {
 // body of a thousand spacings, is far inside the band around that.
 constexpr double kTie = 1e-9;
 constexpr double kSweepBand = 5e-10;
+constexpr double kPlacesBand = 32;  // [u]: twice the lengthening of 16 u reach + 4 u (|x| + |edge|), and rounding
 
 // A turning sweep has no closed form, and a backend may replace it by translations that are off by a little: between
 // `reach` and `reach` + kTurningSlack · h either answer is right. The distance to the pose at t changes by at most
@@ -218,12 +218,15 @@ class Swept {
       const double extent = std::hypot(blade.length / 2, blade.depth) + norm(way);
       if (norm(x - move->from.edge) > extent + reach + kTurningSlack * h) continue;
       Demand here = Demand::either;
+      // A distance between places in the body is rounded as the places are; a backend lengthens its reach by as much,
+      // so that ties still go to removal. In double precision this is far below the band.
+      const double places = kPlacesBand * setup_.unit_roundoff * (reach + norm(x) + norm(move->from.edge));
       if (turns) {
         here = demand_of_turning(blade, *move, turn, h, reach, x);
       } else {
         const double distance = distance_to_translated(blade, move->from, way, x);
         if (distance <= reach * (1 + kTie - kSweepBand)) here = Demand::remove;
-        if (distance > reach * (1 + kTie + kSweepBand)) here = Demand::keep;
+        if (distance > reach * (1 + kTie + kSweepBand) + places) here = Demand::keep;
       }
       if (here == Demand::remove) return here;
       if (here == Demand::either) demand = here;
@@ -263,7 +266,7 @@ Verdict check_detection(const Setup& setup, const State& before, const State& af
       case Criterion::none:
         break;
       case Criterion::distance:
-        demand = demand_of_distance(stretch.distance, limit);
+        demand = demand_of_distance(stretch.distance, limit, setup.unit_roundoff);
         break;
       case Criterion::geometric:
         demand = swept.demand_of(stretch.distance, before.x[at(i)]);

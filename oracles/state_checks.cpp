@@ -11,8 +11,6 @@
 namespace cutproof::oracles {
 namespace {
 
-constexpr double kRoundoff = 0x1p-53;
-
 // A well-formed state with what several oracles derive from it, derived once.
 class Judged {
  public:
@@ -600,7 +598,7 @@ Verdict check_rest_frames(Judged& judged) {
       worst = c;
     }
   }
-  verdict.bound = 8.0 * static_cast<double>(largest + 2) * kRoundoff * reach / h;
+  verdict.bound = 8.0 * static_cast<double>(largest + 2) * judged.setup.unit_roundoff * reach / h;
   verdict.holds = verdict.measured <= verdict.bound;
   if (!verdict.holds) {
     const Vec3 t = judged.clusters.rest_center[at(worst)];

@@ -101,13 +101,14 @@ Verdict momentum(const Setup& setup, const State& before, const State& after) {
   constexpr double kLambda = 8;
   const RoundingScale scale = rounding_scale(setup, before), later = rounding_scale(setup, after);
   const IndependentMasses masses = independent_masses(setup.body, before);
-  const double step_length = kUnitRoundoff * std::max(scale.extent, later.extent);
+  const double step_length = setup.unit_roundoff * std::max(scale.extent, later.extent);
   const double goal = std::sqrt(2.0 * static_cast<double>(scale.largest_cluster) + 16) * masses.clusters +
                       std::sqrt(scale.most_memberships + 16.0) * masses.particles;
   const double evaluations = step.substeps * (step.iterations + 1.0);
   const double sums = std::sqrt(static_cast<double>(verdict.checked) * evaluations) + 16 * step.substeps;
-  verdict.bound = kLambda * (evaluations * goal * step_length / dt +
-                             sums * kUnitRoundoff * (start.magnitude + end.magnitude + gained + norm(after.impulse)));
+  verdict.bound =
+      kLambda * (evaluations * goal * step_length / dt +
+                 sums * setup.unit_roundoff * (start.magnitude + end.magnitude + gained + norm(after.impulse)));
   if (!(verdict.measured <= verdict.bound)) {
     verdict.holds = false;
     verdict.witness.text = fmt::format(

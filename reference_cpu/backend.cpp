@@ -52,7 +52,9 @@ class ReferenceBackend final : public Backend {
 
   void run(Span span) override {
     report_ = {};
+    const auto begin = std::chrono::steady_clock::now();
     for (std::size_t b = 0; b < setups_.size(); ++b) run_body(span, setups_[b], states_[b]);
+    report_.total_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   }
 
   std::vector<State> snapshot() const override { return states_; }

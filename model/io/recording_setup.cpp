@@ -199,6 +199,7 @@ void walk(Archive& archive, S& setup) {
     a.array("stroke", columns.stroke);
     if constexpr (Archive::kReading) setup.blade_moves = moves_of(columns);
   });
+  archive.value("unit_roundoff", setup.unit_roundoff);
   archive.array("substep_length", setup.substep_length);
   archive.array("stroke_end", setup.stroke_end);
 }
@@ -315,6 +316,7 @@ Defect timetable_defect(const Setup& setup) {
     return SetupDefect{"blade_moves", fmt::format("There are {} moves of the blade, and there should be {}.",
                                                   setup.blade_moves.size(), setup.has_blade ? substeps : 0)};
   }
+  if (!is_positive(setup.unit_roundoff)) return SetupDefect{"unit_roundoff", "This should be positive."};
   for (const int64_t frame : setup.stroke_end) {
     if (frame < -1 || frame >= setup.frame_count()) {
       return SetupDefect{"stroke_end", fmt::format("A stroke ends with frame {}, and there are {} frames.", frame,

@@ -49,6 +49,7 @@ Setup block_setup(int32_t nx, int32_t ny, int32_t nz) {
   setup.step.substeps = 2;
   setup.substep_length = {0.004, 0.005, 0.1 / 3};
   setup.stroke_end = {1, -1};
+  setup.unit_roundoff = 0x1p-24;
   return setup;
 }
 
@@ -216,7 +217,7 @@ std::string bits_of(const Setup& s) {
   for (const Wall& wall : s.walls) bits.add(wall.axis).add(wall.side).add(wall.offset).add(wall.friction);
   for (const Grip& grip : s.grips) bits.add(grip.particles).add(grip.active).add(grip.displacement);
   bits.add(s.has_blade).add(s.blade.length).add(s.blade.depth).add(s.blade.thickness).add(s.blade.friction);
-  bits.add(s.substep_length).add(s.stroke_end);
+  bits.add(s.substep_length).add(s.stroke_end).add(s.unit_roundoff);
   for (const BladeMove& move : s.blade_moves) bits.add(move.from).add(move.to).add(move.down).add(move.stroke);
   return bits.bytes();
 }

@@ -1,0 +1,32 @@
+// The backends that run the kernels: `host` on the CPU, on any machine; `gpu` on a CUDA device, in builds that have a
+// toolkit. Both keep the contract of model/backend.h.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "gpu/host_launcher.h"
+#include "gpu/plan.h"
+#include "model/backend.h"
+
+namespace cutproof::gpu {
+
+struct KernelOptions {
+  int rotation_method = 0;  // layout.h; default kJacobi4
+  SplitMethod split = SplitMethod::blocks;
+};
+
+// Kernels on `threads` threads of the CPU.
+std::unique_ptr<Backend> make_host_backend(int threads = 1, KernelOptions options = {});
+// Kernels under a simulated schedule (schedule.h).
+std::unique_ptr<Backend> make_simulated_backend(HostLauncher::Simulated simulation, KernelOptions options = {});
+
+#if CUTPROOF_HAS_CUDA
+// The device in use, e.g. "NVIDIA H200, compute capability 9.0, 139.8 GiB"; empty if there is none, and then `why` says
+// why.
+std::string device_description(std::string& why);
+// State lives on the device. run() does not wait for the device; snapshot() and report() do.
+std::unique_ptr<Backend> make_gpu_backend(KernelOptions options = {});
+#endif
+
+}  // namespace cutproof::gpu

@@ -1,0 +1,86 @@
+#include <array>
+#include <chrono>
+#include <utility>
+
+#include "gpu/backends.h"
+#include "gpu/frame.h"
+#include "gpu/image.h"
+
+namespace cutproof::gpu {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+class HostBackend final : public Backend {
+ public:
+  HostBackend(std::string name, HostLauncher launcher, KernelOptions options)
+      : name_(std::move(name)), launcher_(std::move(launcher)), options_(options) {}
+
+  std::string name() const override { return name_; }
+  double unit_roundoff() const override { return 0x1p-24; }
+  bool can_run(Span) const override { return true; }
+
+  void load(std::vector<Setup> setups, std::vector<State> states) override {
+    Image image = make_image(setups, states, options_.rotation_method, room_);
+    plan_ = make_plan(setups, states, options_.rotation_method, options_.split);
+    image_ = std::move(image);
+    setups_ = std::move(setups);
+    world_ = image_.world();
+    report_ = {};
+  }
+
+  void run(Span span) override {
+    if (wants_room(world_, image_.counters.front())) {
+      room_.factor *= 2;
+      load(std::move(setups_), snapshot());
+    }
+    report_ = {};
+    // Work is done when it is handed over, so the time between two marks is that of the stage between them.
+    const auto begin = Clock::now();
+    auto since = begin;
+    int stage = -1;
+    const auto close = [&](Clock::time_point now) {
+      if (stage >= 0) report_.seconds[static_cast<std::size_t>(stage)] += seconds(now - since);
+      since = now;
+    };
+    enqueue_span(launcher_, world_, plan_, span, [&](Stage next) {
+      close(Clock::now());
+      stage = static_cast<int>(next);
+    });
+    const auto end = Clock::now();
+    close(end);
+    report_.total_seconds = seconds(end - begin);
+    const Counters& counters = image_.counters.front();
+    for (std::size_t s = 0; s < 6; ++s) report_.ran[s] = counters.stage_ran[s] != 0;
+    require_no_fault(counters);
+  }
+
+  std::vector<State> snapshot() const override { return extract_states(image_, setups_); }
+  SpanReport report() const override { return report_; }
+
+ private:
+  static double seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
+
+  std::string name_;
+  HostLauncher launcher_;
+  KernelOptions options_;
+  Room room_;
+  std::vector<Setup> setups_;
+  Image image_;
+  World world_;
+  Plan plan_;
+  SpanReport report_;
+};
+
+}  // namespace
+
+std::unique_ptr<Backend> make_host_backend(int threads, KernelOptions options) {
+  return std::make_unique<HostBackend>("host", HostLauncher(HostLauncher::Threads{threads}), options);
+}
+
+std::unique_ptr<Backend> make_simulated_backend(HostLauncher::Simulated simulation, KernelOptions options) {
+  return std::make_unique<HostBackend>("host simulated", HostLauncher(std::move(simulation)), options);
+}
+
+}  // namespace cutproof::gpu
