@@ -12,19 +12,26 @@
 // - Memory that other threads write in the same launch is touched through load, store and the atomics only.
 // - No float atomics: sums must not depend on the schedule.
 //
+// HostBlock throws a KernelFault where it sees one of these broken. In the simulated mode every atomic, load and store
+// lets another thread go first if the schedule says so; plain accesses do not.
+//
 // Members of a Block, B standing for DeviceBlock or HostBlock:
 //   static constexpr bool on_device;
-//   int thread(), size(), index(), count();     thread in block, threads per block, block in grid, blocks in grid
+//   int thread(), size(), index(), count();     thread in block, threads per block, block in grid, blocks in grid; sizes
+//                                               are multiples of 32
 //   int64_t first(), stride();                  for grid-stride loops over single items: index·size + thread, count·size
 //   void sync();
-//   T* shared<T>(int count);                    aligned to 16 bytes
-//   T sum<T>(T), T smallest<T>(T), bool any(bool);   to all threads; in a fixed order, so floats are reproducible
+//   T* shared<T>(int count);                    aligned to 16 bytes; counts against the launch's shared_bytes, rounded up
+//                                               to a multiple of 16
+//   T sum<T>(T), T smallest<T>(T), bool any(bool);   to all threads; in a fixed order, so floats are reproducible for
+//                                               equal block sizes. T: trivially copyable, at most 60 bytes, with + or <
 //   int exclusive_scan(int value, int& total);  in thread order
 //   unsigned ballot(unsigned mask, bool); T shuffle<T>(unsigned mask, T, int lane); int lane();
-//   int atomic_add(int*, int), atomic_min(int*, int), atomic_max(int*, int), atomic_exchange(int*, int),
-//       atomic_cas(int*, int expected, int desired), atomic_or(int*, int);   all return the old value, relaxed
-//   int load(const int*); void store(int*, int);     relaxed
-//   void fence();                                    orders this thread's memory operations for the whole grid
+//   T atomic_add(T*, T), atomic_min(T*, T), atomic_max(T*, T), atomic_exchange(T*, T),
+//     atomic_cas(T*, T expected, T desired), atomic_or(T*, T);   all return the old value, relaxed; T: int, unsigned or
+//                                               unsigned long long
+//   T load(const T*); void store(T*, T);        relaxed; T of 4 or 8 bytes
+//   void fence();                               orders this thread's memory operations for the whole grid
 #pragma once
 
 #if defined(__CUDACC__)

@@ -6,7 +6,6 @@
 #include <atomic>
 #include <cstdint>
 #include <cstring>
-#include <source_location>
 #include <string>
 #include <type_traits>
 
@@ -18,7 +17,6 @@ namespace cutproof::gpu {
 class HostBlock {
  public:
   static constexpr bool on_device = false;
-  using Where = std::source_location;
 
   HostBlock(Worker& worker, LiveBlock& state, int thread)
       : worker_(worker), state_(state), thread_(thread), count_(worker.job().blocks) {}
@@ -31,7 +29,7 @@ class HostBlock {
   std::int64_t stride() const { return static_cast<std::int64_t>(count_) * kHostThreads; }
   int lane() const { return thread_; }
 
-  void sync(Where where = Where::current()) {
+  void sync(Where where = Where::here()) {
     meet(Operation::sync, kEveryone, where, [] {});
   }
 
@@ -44,17 +42,17 @@ class HostBlock {
   // Sums and minima in the order of a butterfly, as a warp on the device does, so that equal block sizes give equal
   // bits.
   template <class T>
-  T sum(T value, Where where = Where::current()) {
+  T sum(T value, Where where = Where::here()) {
     return reduce(Operation::sum, value, where, [](T a, T b) { return a + b; });
   }
   template <class T>
-  T smallest(T value, Where where = Where::current()) {
+  T smallest(T value, Where where = Where::here()) {
     return reduce(Operation::smallest, value, where, [](T a, T b) { return b < a ? b : a; });
   }
-  bool any(bool value, Where where = Where::current()) {
+  bool any(bool value, Where where = Where::here()) {
     return reduce(Operation::any, static_cast<int>(value), where, [](int a, int b) { return a | b; }) != 0;
   }
-  int exclusive_scan(int value, int& total, Where where = Where::current()) {
+  int exclusive_scan(int value, int& total, Where where = Where::here()) {
     bring(value);
     meet(Operation::exclusive_scan, kEveryone, where, [&] {
       int before = 0;
@@ -68,7 +66,7 @@ class HostBlock {
     return taken<int>();
   }
 
-  unsigned ballot(unsigned mask, bool value, Where where = Where::current()) {
+  unsigned ballot(unsigned mask, bool value, Where where = Where::here()) {
     bring(static_cast<unsigned>(value));
     meet(Operation::ballot, mask, where, [&] {
       unsigned votes = 0;
@@ -78,7 +76,7 @@ class HostBlock {
     return taken<unsigned>();
   }
   template <class T>
-  T shuffle(unsigned mask, T value, int lane, Where where = Where::current()) {
+  T shuffle(unsigned mask, T value, int lane, Where where = Where::here()) {
     if (lane < 0 || lane >= kHostThreads || (mask >> lane & 1u) == 0) {
       worker_.fault(state_, thread_, "shuffles from lane " + std::to_string(lane) + ", which is not in its mask");
     }

@@ -103,9 +103,8 @@ void destroy_fibre(Fibre& fibre) {
 }
 
 bool same(const Meeting& a, const Meeting& b) {
-  return a.operation == b.operation && a.mask == b.mask && a.where.line() == b.where.line() &&
-         a.where.column() == b.where.column() &&
-         (a.where.file_name() == b.where.file_name() || std::strcmp(a.where.file_name(), b.where.file_name()) == 0);
+  return a.operation == b.operation && a.mask == b.mask && a.where.line == b.where.line &&
+         (a.where.file == b.where.file || std::strcmp(a.where.file, b.where.file) == 0);
 }
 
 const char* name(Operation operation) {
@@ -147,7 +146,7 @@ std::string list(std::uint32_t mask) {
 }
 
 std::string describe(const Meeting& meeting) {
-  const char* file = meeting.where.file_name();
+  const char* file = meeting.where.file;
   const char* slash = std::strrchr(file, '/');
   std::string text = name(meeting.operation);
   if (of_warp(meeting.operation)) {
@@ -155,7 +154,7 @@ std::string describe(const Meeting& meeting) {
     std::snprintf(mask, sizeof mask, "0x%08x", meeting.mask);
     text += std::string(" with mask ") + mask;
   }
-  return text + " (" + (slash != nullptr ? slash + 1 : file) + ':' + std::to_string(meeting.where.line()) + ')';
+  return text + " (" + (slash != nullptr ? slash + 1 : file) + ':' + std::to_string(meeting.where.line) + ')';
 }
 
 std::string place_of(const Job& job, const LiveBlock& block) {

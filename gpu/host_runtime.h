@@ -12,7 +12,6 @@
 #include <cstdint>
 #include <exception>
 #include <memory>
-#include <source_location>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -36,11 +35,18 @@ struct Fibre;
 
 enum class Operation : unsigned char { sync, sum, smallest, any, exclusive_scan, ballot, shuffle };
 
+// A place in a kernel. (std::source_location is not known to the Clang of Debian 12.)
+struct Where {
+  const char* file = "";
+  int line = 0;
+  static constexpr Where here(const char* file = __builtin_FILE(), int line = __builtin_LINE()) { return {file, line}; }
+};
+
 // Where a thread waits: threads meet if all three agree.
 struct Meeting {
   Operation operation = Operation::sync;
   std::uint32_t mask = 0;
-  std::source_location where;
+  Where where;
 };
 
 // One launch.

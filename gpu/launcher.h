@@ -36,7 +36,7 @@
 #define CUTPROOF_KERNEL_THREADS(name, most_threads)                            \
   struct name##_object {                                                       \
     static constexpr const char* kName = #name;                                \
-    static constexpr int kMaxThreads = most_threads;                           \
+    [[maybe_unused]] static constexpr int kMaxThreads = most_threads;          \
     template <class Block, class... Args>                                      \
     CUTPROOF_DEVICE void operator()(Block& block, const Args&... args) const { \
       name(block, args...);                                                    \
