@@ -81,7 +81,9 @@ struct Counters {
   int debris;            // …, by this frame's split
   int affected;          // clusters that lost a particle in this frame: length of World::affected
   int merging;           // merge rounds go on while this is not 0
-  int round;             // merge round, from 0
+  int round;             // merge round, from 0: the next one
+  int merging_round;     // merge: the round whose proposals are being carried out
+  int live_members;      // merge: members of all clusters
   int small;             // length of World::small_clusters
   int expanding;         // some body of this span needs the expand stage
   int additions;         // length of World::additions
@@ -89,8 +91,7 @@ struct Counters {
   int dirty_cells;       // skin cells to be extracted again
   int stage_ran[6];      // by stage: launched in this span
   int changed;           // scratch of a stage's loop
-  int failed;            // the stage in progress found no room and takes back what it has done
-  int members_before;    // merge: members_used when it began
+  int failed;            // the stage in progress has found no room
   int additions_before;  // expand: length of World::additions before the layer in progress
   int growth;            // expand: members that the enlarged clusters need
   int holders_before;    // expand: length of World::holders in use before it
