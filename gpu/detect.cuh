@@ -116,7 +116,11 @@ struct Angle {
 CUTPROOF_DEVICE inline Float3 turned(Float3 v, Float3 axis, Angle a) {  // Rodrigues
   return a.cosine * v + a.sine * cross(axis, v) + ((1.0f - a.cosine) * dot(axis, v)) * axis;
 }
-CUTPROOF_DEVICE inline Angle between(Angle a, Angle b) {  // half way; the two are less than half a turn apart
+CUTPROOF_DEVICE inline Angle half_of(Angle a) {  // of an angle in [0, π]
+  const float larger = sqrtf((1.0f + fabsf(a.cosine)) / 2.0f), smaller = a.sine / (2.0f * larger);
+  return a.cosine < 0 ? Angle{smaller, larger} : Angle{larger, smaller};
+}
+CUTPROOF_DEVICE inline Angle between(Angle a, Angle b) {  // half way; the two are at most a quarter turn apart
   const float c = a.cosine + b.cosine, s = a.sine + b.sine;
   const float length = sqrtf(c * c + s * s);
   return {c / length, s / length};
@@ -162,7 +166,7 @@ CUTPROOF_DEVICE inline float swept_slack(float reach, float places) {
 
 // Whether the plate, turning while its edge goes along `way`, comes as near as `reach` to x. A part of the move counts
 // as a translation, from which the plate is never farther than its radius times the angle of that part; parts for which
-// this is more than h / 20 are halved where it matters.
+// this is more than h / 25 are halved where it matters.
 CUTPROOF_DEVICE inline bool turning_comes_near(const BodyConstants& body, const PoseF& from, const Axes& axes,
                                                const Axes& last, Float3 way, float reach, Float3 x) {
   constexpr int kMostHalvings = 24;
@@ -175,7 +179,7 @@ CUTPROOF_DEVICE inline bool turning_comes_near(const BodyConstants& body, const 
   for (;;) {
     Angle a = {1, 0}, b = {turn.cosine, turn.sine};
     for (int bit = level - 1; bit >= 0; --bit) {
-      const Angle middle = between(a, b);
+      const Angle middle = bit == level - 1 ? half_of(b) : between(a, b);
       (part >> bit & 1u ? a : b) = middle;
     }
     const float length = ldexpf(1.0f, -level);
@@ -186,7 +190,7 @@ CUTPROOF_DEVICE inline bool turning_comes_near(const BodyConstants& body, const 
     const float distance =
         distance_to_sweep(rectangle, in_axes(now, x - from.edge - begin * way), length * in_axes(now, way));
     const bool near = distance <= reach + slack;
-    const bool fine = slack <= 0.05f * body.h || level == kMostHalvings;
+    const bool fine = slack <= 0.04f * body.h || level == kMostHalvings;
     if (near && (fine || distance + slack <= reach)) return true;
     if (near && !fine) {
       ++level;
