@@ -101,6 +101,8 @@ void add_constants(Image& image, const Setup& setup, const State& state, int64_t
   body.node_begin = nodes;
   narrow(setup.body.grid.node_count(), "grid nodes of one body");
   for (int axis = 0; axis < 3; ++axis) body.nodes[axis] = setup.body.grid.nodes[at(axis)];
+  body.by_row = divider_of(std::max(1, body.nodes[0]));
+  body.by_layer = divider_of(std::max(1, body.nodes[0] * body.nodes[1]));
   body.h = f(setup.body.grid.spacing);
   body.solver = setup.step.solver == Solver::implicit ? kImplicit : kPublished;
   body.substeps = setup.step.substeps;
@@ -238,6 +240,22 @@ void find_holders(Image& image) {
   }
 }
 
+// How many particles expansions may find: the other ends of edges, some of them several times; at greater depth what
+// lies around these, up to depth - 1 edges away.
+int64_t additions_bound(const Image& image) {
+  int64_t additions = 0;
+  for (std::size_t b = 0; b < image.body.size(); ++b) {
+    const BodyConstants& body = image.body[b];
+    const bool covered = body.expand_rule == kEdgeCover && image.edge_covered[b];
+    if (body.expand_rule == kNoExpand || covered) continue;
+    // Beyond 64 edges a cluster takes in all of a body that is not huge.
+    const int64_t r = std::min(body.depth, 64);
+    const int64_t around = r <= 1 ? 1 : (2 * r + 1) * (2 * r * r + 2 * r + 3) / 3;  // grid nodes within r edges of one
+    additions += 6 * int64_t{body.particle_end - body.particle_begin} * around;
+  }
+  return additions;
+}
+
 void make_room(Image& image, Room room) {
   const auto n = static_cast<int64_t>(image.node.size());
   const auto nodes = static_cast<int64_t>(image.particle_at.size());
@@ -245,12 +263,14 @@ void make_room(Image& image, Room room) {
   const auto members = static_cast<int64_t>(image.members.size());
   const auto scaled = [&](int64_t count) { return static_cast<int64_t>(room.factor * static_cast<double>(count)); };
   // A cut makes at most one new cluster for each member that it touches: all of a small body at once, a plane's share
-  // of a large one. A merge writes the union to new room; expansion copies what it enlarges.
+  // of a large one. A merge writes unions to new room, and no round of it needs more than all lists together; expansion
+  // copies what it enlarges.
   const int64_t slot_capacity = slots + scaled(std::min(members, std::max<int64_t>(65536, 2 * slots))) + 64;
-  const int64_t member_capacity = members + scaled(2 * members + 4096);
+  const int64_t additions = std::min(additions_bound(image), scaled(1'000'000 + 3 * n));
+  const int64_t member_capacity = members + scaled(2 * members + 4096) + additions;
   const int64_t vertex_capacity = std::min(6 * n, scaled(4'000'000 + n)) + 64;
   const int64_t cell_capacity = std::min(nodes, scaled(4'000'000 + n)) + 64;
-  const int64_t addition_capacity = std::min(6 * n, scaled(1'000'000 + n)) + 64;
+  const int64_t addition_capacity = additions + 64;
   narrow(15 * cell_capacity, "skin cells");
   narrow(6 * n, "particles");
   narrow(member_capacity, "cluster members");

@@ -25,11 +25,27 @@ enum : int { kSlotsFull = 1, kMembersFull = 2, kVerticesFull = 4, kCellsFull = 8
 // Which rotation method match_shapes uses (rotation.cuh); chosen by measurement, docs/rotations.md.
 enum : int { kJacobi4 = 0, kMueller2016 = 1, kApd = 2, kSvd = 3, kQuest = 4 };
 
+// Division by a number that is known before: n / d = n · multiplier >> shift for every 0 <= n < 2^31 (Granlund and
+// Montgomery 1994). A division proper takes some 20 instructions, and kernels need two for each particle they look at.
+struct Divider {
+  unsigned multiplier;
+  int shift;
+};
+CUTPROOF_BOTH inline Divider divider_of(int divisor) {
+  int bits = 0;
+  while ((1LL << bits) < divisor) ++bits;
+  return {static_cast<unsigned>((1ULL << (31 + bits)) / static_cast<unsigned>(divisor) + 1), 31 + bits};
+}
+CUTPROOF_BOTH inline int operator/(int n, Divider d) {
+  return static_cast<int>(static_cast<unsigned long long>(static_cast<unsigned>(n)) * d.multiplier >> d.shift);
+}
+
 // One body's parameters; constant between loads.
 struct BodyConstants {
   int particle_begin, particle_end;
   int64_t node_begin;          // its first node in World::particle_at
   int nodes[3];                // of its grid
+  Divider by_row, by_layer;    // by nodes[0] and by nodes[0] · nodes[1]
   float h;
   int solver, substeps, iterations;
   float stiffness, relaxation, damping;
@@ -194,8 +210,10 @@ struct Coordinates {
   int i, j, k;
 };
 CUTPROOF_BOTH inline Coordinates coordinates(const BodyConstants& body, int node) {
-  const int row = node / body.nodes[0];
-  return {node % body.nodes[0], row % body.nodes[1], row / body.nodes[1]};
+  const int k = node / body.by_layer;
+  const int in_layer = node - k * (body.nodes[0] * body.nodes[1]);
+  const int j = in_layer / body.by_row;
+  return {in_layer - j * body.nodes[0], j, k};
 }
 CUTPROOF_BOTH inline Float3 rest_position(const BodyConstants& body, int node) {
   const Coordinates c = coordinates(body, node);

@@ -173,17 +173,22 @@ TEST(GpuStep, MeetsTheReferenceWithinItsRounding) {
   Random random(21);
   double worst = 0;
   for (const Solver solver : {Solver::implicit, Solver::published}) {
-    for (int trial = 0; trial < 24; ++trial) {
-      const auto side = [&] { return 3 + static_cast<int>(uniform(random, 0, 8)); };
-      cutproof::Setup setup = setup_of(fixtures::block(side(), side(), side(), 0.01));
+    for (int trial = 0; trial < 32; ++trial) {
+      const auto below = [&](int count) { return static_cast<int>(uniform(random, 0, count)); };
+      cutproof::Setup setup = setup_of(fixtures::block(3 + below(8), 3 + below(8), 3 + below(8), 0.01));
       setup.step.solver = solver;
-      setup.step.substeps = 1 + trial % 4;
-      setup.step.iterations = trial % 6;
+      setup.step.substeps = 1 + below(4);
+      setup.step.iterations = below(6);
       setup.step.stiffness = std::pow(10, uniform(random, 3, 6));
-      setup.step.damping = trial % 3;
+      setup.step.damping = below(3);
       setup.step.gravity = {0.1, 0, -9.81};
-      if (trial % 3 > 0) add_contacts(setup, trial % 3 == 1 ? 0.0 : 0.4, random);
-      State state = cooked(setup, 2 + trial % 4);
+      // Nothing, the blade, walls, and all at once with friction. Not all at once without: the two sides would accept
+      // or refuse a point between blade and wall (docs/decisions.md) by comparing distances that differ by rounding.
+      const int kind = trial % 4;
+      if (kind > 0) add_contacts(setup, kind == 3 ? 0.4 : 0.0, random);
+      if (kind == 1) setup.walls.clear();
+      if (kind == 2) setup.has_blade = false;
+      State state = cooked(setup, 2 + below(4));
       perturb(setup, state, random);
       state = seeded(setup, state);
       State expected = state;
@@ -192,14 +197,14 @@ TEST(GpuStep, MeetsTheReferenceWithinItsRounding) {
       const double h = setup.body.grid.spacing, dt = setup.substep_length[0];
       double bound = frame_bound(setup, state, expected);
       EXPECT_LE(bound, 1e-4 * h) << "the goal of accuracy_and_speed.md";
-      if (trial % 3 > 0) bound += 20 * response(setup, state, expected, random);
+      if (kind > 0) bound += 5 * response(setup, state, expected, random);
       const double error = greatest_distance(reached.x, expected.x);
       worst = std::max(worst, error / h);
       EXPECT_LE(error, bound) << "trial " << trial;
       EXPECT_LE(greatest_distance(reached.v, expected.v), 2 * bound / dt) << "trial " << trial;
       EXPECT_LE(norm(reached.impulse - expected.impulse), 2 * bound / dt * total_mass(setup)) << "trial " << trial;
       EXPECT_EQ(reached.clusters.degenerate, expected.clusters.degenerate) << "trial " << trial;
-      if (trial % 3 > 0) {
+      if (kind > 0) {
         EXPECT_GT(norm(reached.impulse), 0) << "trial " << trial << " touched nothing";
       }
     }
@@ -447,6 +452,19 @@ TEST(GpuStep, BringsInvertedAndFlattenedBodiesBackWithoutNaN) {
     for (const Mat3& r : reached.clusters.rotation) {
       const Vec3 a = {r(0, 0), r(1, 0), r(2, 0)}, b = {r(0, 1), r(1, 1), r(2, 1)}, c = {r(0, 2), r(1, 2), r(2, 2)};
       EXPECT_NEAR(dot(cross(a, b), c), 1, 5e-6);
+    }
+  }
+}
+
+TEST(Layout, FindsCoordinatesOfNodesOfEveryGrid) {
+  Random random(32);
+  for (const int divisor : {1, 2, 3, 5, 7, 64, 65, 641, 46341, 65535, 65536, 0x3fffffff, 0x40000001, 0x7fffffff}) {
+    const Divider by = divider_of(divisor);
+    for (int trial = 0; trial < 1000; ++trial) {
+      const int multiple = static_cast<int>(uniform(random, 0, 0x7fffffff / divisor)) * divisor;
+      for (const int n : {multiple, std::max(0, multiple - 1), multiple / 2, 0x7fffffff}) {
+        ASSERT_EQ(n / by, n / divisor) << n << " / " << divisor;
+      }
     }
   }
 }
