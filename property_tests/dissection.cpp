@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "oracles/oracles.h"
+#include "reference_cpu/reference.h"
 
 namespace cutproof::property_tests {
 namespace {
@@ -76,13 +77,141 @@ bool is_promised(const Verdict& verdict, Stage stage, const State& state, bool h
   return true;
 }
 
+// Which stages the contract launches for a body in this state (model/backend.h).
+bool is_due(const Setup& setup, Stage stage, const State& before) {
+  const bool cut = !before.removed.empty();
+  switch (stage) {
+    case Stage::step:
+      return true;
+    case Stage::detect:
+      return needs_detection(setup);
+    case Stage::split:
+      return cut;
+    case Stage::merge:
+      return cut && setup.merge.rule != MergeRule::none;
+    case Stage::expand:
+      return cut && (setup.expand.rule == ExpandRule::published ||
+                     (setup.expand.rule == ExpandRule::edge_cover && !before.edge_covered));
+    case Stage::skin:
+      return setup.skin.wanted;
+  }
+  return false;
+}
+
+Verdict broken_contract(const std::string& what, Stage stage, const State& state, const std::string& backend) {
+  Verdict verdict;
+  verdict.property = what;
+  verdict.stage = stage;
+  verdict.frame = state.frame;
+  verdict.backend = backend;
+  verdict.holds = false;
+  verdict.bound_source = "model/backend.h";
+  return verdict;
+}
+
+void run_stage_of_reference(const Setup& setup, Stage stage, State& state) {
+  switch (stage) {
+    case Stage::step:
+      reference::step(setup, state);
+      break;
+    case Stage::detect:
+      reference::detect(setup, state);
+      break;
+    case Stage::split:
+      reference::split(setup, state);
+      break;
+    case Stage::merge:
+      reference::merge(setup, state);
+      break;
+    case Stage::expand:
+      reference::expand(setup, state);
+      break;
+    case Stage::skin:
+      reference::skin(setup, state);
+      break;
+  }
+}
+
+std::vector<std::array<int32_t, 3>> sorted_triangles(const Skin& skin) {
+  std::vector<std::array<int32_t, 3>> triangles = skin.triangles;
+  for (auto& t : triangles) std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+  std::sort(triangles.begin(), triangles.end());
+  return triangles;
+}
+
+// The first thing in which the topology of two states differs; empty if in none. Detection may differ within its
+// rounding band, which is the detection oracle's to judge.
+std::string topological_difference(Stage stage, const Setup& setup, const State& expected, const State& actual) {
+  if (stage == Stage::step || stage == Stage::detect) return {};
+  if (stage == Stage::merge && setup.merge.rule != MergeRule::deterministic) return {};
+  if (expected.alive != actual.alive) return "alive particles";
+  if (expected.debris != actual.debris) return "debris";
+  if (expected.clusters.offsets != actual.clusters.offsets) return "sizes of clusters";
+  if (expected.clusters.members != actual.clusters.members) return "members of clusters";
+  if (stage != Stage::skin && expected.clusters.number != actual.clusters.number) return "numbers of clusters";
+  if (expected.edge_covered != actual.edge_covered) return "edge_covered";
+  if (stage != Stage::skin) return {};
+  if (expected.skin.owner != actual.skin.owner || expected.skin.direction != actual.skin.direction) {
+    return "skin vertices";
+  }
+  if (sorted_triangles(expected.skin) != sorted_triangles(actual.skin)) return "skin triangles";
+  return {};
+}
+
 }  // namespace
 
-Judgement dissect(Backend& backend, const Case& c, bool thorough) {
+std::vector<Trail> run_cases(Backend& backend, std::vector<Loaded>& loaded) {
+  std::vector<Setup> setups;
+  std::vector<State> states;
+  int64_t frames = 0;
+  for (Loaded& one : loaded) {
+    one.setup.unit_roundoff = backend.unit_roundoff();
+    setups.push_back(one.setup);
+    states.push_back(one.state);
+    frames = std::max(frames, one.setup.frame_count() - one.state.frame);
+  }
+  backend.load(setups, states);
+  std::vector<Trail> trails(loaded.size());
+  states = backend.snapshot();
+  for (std::size_t b = 0; b < loaded.size(); ++b) {
+    trails[b].initial = states[b];
+    // In single precision what is loaded is rounded; in double it comes back as it is.
+    if (backend.unit_roundoff() == 0x1p-53 && !(states[b] == loaded[b].state)) {
+      trails[b].failure = broken_contract("loading changes nothing", Stage::step, states[b], backend.name());
+    }
+  }
+  for (int64_t frame = 0; frame < frames; ++frame) {
+    for (const Stage stage : kStages) {
+      bool due = false;
+      for (std::size_t b = 0; b < loaded.size(); ++b) {
+        due = due || (states[b].frame < setups[b].frame_count() && is_due(setups[b], stage, states[b]));
+      }
+      backend.run({stage, stage});
+      if (backend.report().ran[static_cast<std::size_t>(stage)] != due) {
+        trails.front().failure = broken_contract(due ? "a stage that is due runs" : "only what is due runs", stage,
+                                                 states.front(), backend.name());
+      }
+      std::vector<State> next = backend.snapshot();
+      for (std::size_t b = 0; b < loaded.size(); ++b) {
+        if (states[b].frame < setups[b].frame_count()) {
+          trails[b].steps.push_back({stage, next[b]});
+        } else if (!(next[b] == states[b])) {
+          trails[b].failure =
+              broken_contract("a body whose timetable is over stays as it is", stage, states[b], backend.name());
+        }
+      }
+      states = std::move(next);
+    }
+  }
+  return trails;
+}
+
+Judgement judge_trail(const Case& c, const Loaded& loaded, const Trail& trail, const std::string& backend,
+                      bool thorough) {
   Judgement judgement;
-  const Loaded loaded = load(c);
   const Setup& setup = loaded.setup;
   note_what_is_given(c, loaded, judgement);
+  judgement.failure = trail.failure;
 
   bool has_expanded = c.clusters == ClusterKind::foreign;  // foreign clusters begin anywhere
   const auto take = [&](std::vector<Verdict> verdicts, Stage stage, const State& state) {
@@ -93,44 +222,42 @@ Judgement dissect(Backend& backend, const Case& c, bool thorough) {
       }
       ++judgement.verdicts;
       if (verdict.holds || judgement.failure) continue;
-      verdict.backend = backend.name();
+      verdict.backend = backend;
       judgement.failure = std::move(verdict);
     }
   };
 
-  const auto failed = [&](const char* property, Stage stage) {
-    Verdict verdict;
-    verdict.property = property;
-    verdict.stage = stage;
-    verdict.backend = backend.name();
-    verdict.holds = false;
-    return verdict;
-  };
-
-  backend.load({setup}, {loaded.state});
-  State before = backend.snapshot().front();
-  if (!(before == loaded.state)) {
-    judgement.failure = failed("loading changes nothing", Stage::step);
-  }
-  while (before.frame < setup.frame_count() && !judgement.failure) {
-    for (const Stage stage : kStages) {
-      backend.run({stage, stage});
-      const State after = backend.snapshot().front();
-      const bool ran = backend.report().ran[static_cast<std::size_t>(stage)];
-      if (stage == Stage::expand && after.clusters.members != before.clusters.members) has_expanded = true;
-      if (ran) {
-        note_what_a_stage_did(setup, stage, before, after, judgement);
-        take(oracles::judge_stage(setup, stage, before, after), stage, after);
-        if (stage != Stage::step) take(oracles::judge(setup, after, stage, thorough), stage, after);
-      } else if (!(after == before)) {
-        judgement.failure = failed("a stage that did not run changes nothing", stage);
+  const State* before = &trail.initial;
+  for (const auto& [stage, after] : trail.steps) {
+    if (judgement.failure) break;
+    if (stage == Stage::expand && after.clusters.members != before->clusters.members) has_expanded = true;
+    if (is_due(setup, stage, *before)) {
+      note_what_a_stage_did(setup, stage, *before, after, judgement);
+      take(oracles::judge_stage(setup, stage, *before, after), stage, after);
+      if (stage != Stage::step) take(oracles::judge(setup, after, stage, thorough), stage, after);
+      if (backend != "reference") {
+        State expected = *before;
+        run_stage_of_reference(setup, stage, expected);
+        ++judgement.verdicts;
+        const std::string difference = topological_difference(stage, setup, expected, after);
+        if (!difference.empty() && !judgement.failure) {
+          judgement.failure = broken_contract("the reference's topology", stage, *before, backend);
+          judgement.failure->witness.text = difference + " differ";
+        }
       }
-      before = after;
-      if (judgement.failure) break;
+    } else if (stage != Stage::skin && !(after == *before)) {
+      judgement.failure = broken_contract("a stage that does not run changes nothing", stage, *before, backend);
     }
+    before = &after;
   }
-  if (!before.skin.owner.empty() && oracles::skin_shells(before.skin).inner > 0) judgement[Happened::cavity] = true;
+  if (!before->skin.owner.empty() && oracles::skin_shells(before->skin).inner > 0) judgement[Happened::cavity] = true;
   return judgement;
+}
+
+Judgement dissect(Backend& backend, const Case& c, bool thorough) {
+  std::vector<Loaded> loaded = {load(c)};
+  const Trail trail = run_cases(backend, loaded).front();
+  return judge_trail(c, loaded.front(), trail, backend.name(), thorough);
 }
 
 std::string describe(const Verdict& verdict) {

@@ -75,7 +75,27 @@ struct Judgement {
   bool& operator[](Happened what) { return happened[static_cast<std::size_t>(what)]; }
 };
 
+// What a backend made of one case: the state as it was loaded, and the state after each stage of each frame.
+struct Trail {
+  State initial;
+  struct Step {
+    Stage stage;
+    State state;
+  };
+  std::vector<Step> steps;
+  std::optional<Verdict> failure;  // of the contract, seen while running
+};
+
+// Loads all cases at once and runs them to their ends, stage by stage. Sets unit_roundoff in every setup.
+std::vector<Trail> run_cases(Backend& backend, std::vector<Loaded>& loaded);
+
+// Puts every oracle that applies to the trail of one case; and compares every stage with what the reference makes of
+// the same state: equal clusters, components, triangles (method.md: merge only where it is `deterministic`).
 // `thorough`: with CGAL's geometric check of every skin.
+Judgement judge_trail(const Case& c, const Loaded& loaded, const Trail& trail, const std::string& backend,
+                      bool thorough);
+
+// Both, for one case alone.
 Judgement dissect(Backend& backend, const Case& c, bool thorough);
 
 // One line for a person.

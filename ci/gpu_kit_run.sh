@@ -1,0 +1,63 @@
+#!/usr/bin/env bash
+# Runs all that needs a GPU: primitives, scenes, properties, compute-sanitizer, timings. Part of the kit that
+# ci/gpu_kit.sh makes. Usage: run.sh RESULTS [PART...]   parts: primitives scenes lockstep properties sanitizer timings
+set -uo pipefail
+here=$(cd "$(dirname "$0")" && pwd)
+results=$(mkdir -p "$1" && cd "$1" && pwd)
+shift
+parts=${*:-primitives scenes lockstep properties sanitizer timings}
+export LD_LIBRARY_PATH="$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
+export PATH="$here/bin:$PATH:/usr/local/cuda/bin"
+cases=${CUTPROOF_CASES:-100000}
+status=0
+lines=()
+cd "$here"
+
+note() {  # NAME STATUS SECONDS
+  lines+=("    {\"name\": \"$1\", \"status\": $2, \"seconds\": $3}")
+  [ "$2" = 0 ] || status=1
+  echo "$1: status $2, $3 s"
+}
+try() {  # NAME COMMAND...
+  local name=$1 begin=$SECONDS result=0
+  shift
+  "$@" > "$results/$name.log" 2>&1 || result=$?
+  [ "$result" = 0 ] || tail -25 "$results/$name.log"
+  note "$name" "$result" "$((SECONDS - begin))"
+}
+
+for part in $parts; do
+  case $part in
+    primitives) try launch_device_test launch_device_test ;;
+    scenes)
+      for scene in cuboid_press uniform_stretch uniform_stretch_strain three_cuts liver_cut kidney_arc \
+          kidney_discontinuous irregular_sampled irregular_sampled_covered cluster_growth small_block kidney_101096; do
+        try "scene_$scene" cutproof run "fixtures/scenes/$scene.json" --backend gpu --check
+      done ;;
+    lockstep)
+      for scene in kidney_discontinuous liver_cut cuboid_press; do
+        try "lockstep_$scene" cutproof run "fixtures/scenes/$scene.json" --backend gpu --against reference --json "$results/lockstep_$scene.json"
+      done ;;
+    properties) try properties random_cuts --backend gpu --cases "$cases" --json "$results/properties.json" ;;
+    sanitizer)
+      for tool in memcheck racecheck initcheck synccheck; do
+        try "sanitizer_$tool" compute-sanitizer --tool "$tool" --error-exitcode 9 \
+          random_cuts --backend gpu --cases "${CUTPROOF_SANITIZER_CASES:-40}" --batch 20
+      done ;;
+    timings) try timings cutproof bench stages --backend gpu --json "$results/stages.json" ;;
+    *) echo "run.sh: there is no part '$part'" >&2; exit 2 ;;
+  esac
+done
+
+device=$(nvidia-smi --query-gpu=name,driver_version,memory.total --format=csv,noheader 2>/dev/null | head -1)
+{
+  echo "{"
+  echo "  \"commit\": \"$(cat commit)\","
+  echo "  \"device\": \"$device\","
+  echo "  \"date\": \"$(date -u +%Y-%m-%dT%H:%M:%SZ)\","
+  echo "  \"steps\": ["
+  for ((i = 0; i < ${#lines[@]}; ++i)); do echo "${lines[i]}$([ $((i + 1)) -lt ${#lines[@]} ] && echo ,)"; done
+  echo "  ]"
+  echo "}"
+} > "$results/summary.json"
+exit $status
