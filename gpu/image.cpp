@@ -240,16 +240,15 @@ void find_holders(Image& image) {
   }
 }
 
-// How many particles expansions may find: the other ends of edges, some of them several times; at greater depth what
-// lies around these, up to depth - 1 edges away.
+// How many pairs of cluster and particle expansions may find, some of them several times: the other ends of edges, and
+// at greater depth what lies around these.
 int64_t additions_bound(const Image& image) {
   int64_t additions = 0;
   for (std::size_t b = 0; b < image.body.size(); ++b) {
     const BodyConstants& body = image.body[b];
     const bool covered = body.expand_rule == kEdgeCover && image.edge_covered[b];
     if (body.expand_rule == kNoExpand || covered) continue;
-    // Beyond 64 edges a cluster takes in all of a body that is not huge.
-    const int64_t r = std::min(body.depth, 64);
+    const int64_t r = std::min(body.depth, 64);  // more would pass the limit below for any body
     const int64_t around = r <= 1 ? 1 : (2 * r + 1) * (2 * r * r + 2 * r + 3) / 3;  // grid nodes within r edges of one
     additions += 6 * int64_t{body.particle_end - body.particle_begin} * around;
   }

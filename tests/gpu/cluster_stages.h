@@ -28,7 +28,7 @@ struct Bodies {
   }
 };
 
-// A world whose host memory is at hand. Additions have room for every depth.
+// A world whose host memory is at hand.
 struct Bench {
   Bodies bodies;
   Image image;
@@ -42,7 +42,6 @@ struct Bench {
     if (cut) {
       for (std::size_t b = 0; b < bodies.setups.size(); ++b) image.cut[b] = 2 * image.frame[b];
     }
-    image.additions.resize(image.additions.size() + 100'000);
     world = image.world();
     plan = make_plan(bodies.setups, bodies.states, kJacobi4, SplitMethod::blocks);
     loaded = states();
