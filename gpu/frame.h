@@ -14,7 +14,27 @@
 
 namespace cutproof::gpu {
 
-// Which bodies have something to split, merge and expand, for the conditions below. One thread.
+// Whether a stage has anything to do for a body (model/backend.h, run).
+CUTPROOF_DEVICE inline bool is_due(const World& w, int b, int stage) {
+  const BodyConstants& body = w.body[b];
+  switch (stage) {
+    case static_cast<int>(Stage::step):
+      return running(w, b);
+    case static_cast<int>(Stage::detect):
+      return running(w, b) && body.needs_detection != 0;
+    case static_cast<int>(Stage::split):
+      return cut_now(w, b);
+    case static_cast<int>(Stage::merge):
+      return cut_now(w, b) && body.merge_rule != kNoMerge;
+    case static_cast<int>(Stage::expand):
+      return cut_now(w, b) &&
+             (body.expand_rule == kPublishedExpand || (body.expand_rule == kEdgeCover && w.edge_covered[b] == 0));
+    default:
+      return running(w, b) && body.skin_wanted != 0;
+  }
+}
+
+// What the conditions of a span ask for. One thread.
 template <class Block>
 CUTPROOF_DEVICE void note_cuts_kernel(Block& block, World w) {
   if (block.first() != 0) return;
@@ -23,18 +43,20 @@ CUTPROOF_DEVICE void note_cuts_kernel(Block& block, World w) {
   c.expanding = 0;
   c.extracting = 0;
   for (int b = 0; b < w.bodies; ++b) {
-    if (running(w, b) && w.body[b].skin_wanted && (w.cut[b] >= 0 || !w.skin_made[b])) c.extracting = 1;
-    if (!cut_now(w, b)) continue;
-    c.cut = 1;
-    const bool uncovered = w.body[b].expand_rule == kEdgeCover && !w.edge_covered[b];
-    if (uncovered || w.body[b].expand_rule == kPublishedExpand) c.expanding = 1;
+    if (is_due(w, b, static_cast<int>(Stage::split))) c.cut = 1;
+    if (is_due(w, b, static_cast<int>(Stage::expand))) c.expanding = 1;
+    if (is_due(w, b, static_cast<int>(Stage::skin)) && (w.cut[b] >= 0 || w.skin_made[b] == 0)) c.extracting = 1;
   }
 }
 CUTPROOF_KERNEL(note_cuts_kernel);
 
+// One thread: reports a stage as run if some body had it due.
 template <class Block>
 CUTPROOF_DEVICE void note_stage_kernel(Block& block, World w, int stage) {
-  if (block.first() == 0) w.counters->stage_ran[stage] = 1;
+  if (block.first() != 0) return;
+  for (int b = 0; b < w.bodies; ++b) {
+    if (is_due(w, b, stage)) w.counters->stage_ran[stage] = 1;
+  }
 }
 CUTPROOF_KERNEL(note_stage_kernel);
 
