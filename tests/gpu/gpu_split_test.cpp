@@ -6,9 +6,11 @@
 #include <numeric>
 #include <random>
 
+#include "gpu/detect.cuh"
 #include "gpu/host_launcher.h"
 #include "gpu/image.h"
 #include "gpu/split.cuh"
+#include "property_tests/cases.h"
 #include "reference_cpu/reference.h"
 #include "tests/reference_cpu/random_covers.h"
 
@@ -119,7 +121,11 @@ void expect_equal(const Scene& scene, const std::vector<State>& actual) {
     const Clusters &mine = actual[b].clusters, &theirs = expected[b].clusters;
     ASSERT_EQ(lists_of(mine), lists_of(theirs));
     EXPECT_EQ(mine.number, theirs.number);
-    EXPECT_EQ(mine.rotation, theirs.rotation);
+    std::vector<Mat3> rotation = theirs.rotation;
+    for (Mat3& r : rotation) {
+      for (double& entry : r.m) entry = static_cast<float>(entry);
+    }
+    EXPECT_EQ(mine.rotation, rotation);
     EXPECT_EQ(mine.degenerate, theirs.degenerate);
     const double h = scene.setups[b].body.grid.spacing;
     for (std::size_t c = 0; c < mine.number.size(); ++c) {
@@ -426,6 +432,38 @@ TEST(GpuSplit, HoldsUnderHundredsOfSchedules) {
       if (HasFailure()) return;
     }
   }
+}
+
+// Lattice cuts meet every tie there is: through nodes, along edges, halfway between layers.
+TEST(GpuDetectAndSplit, EqualTheReferenceInEveryFrameOfRandomDissections) {
+  HostLauncher launcher;
+  int64_t cuts = 0, frames = 0;
+  for (int seed = 0; seed < 600; ++seed) {
+    const property_tests::Loaded loaded = property_tests::load(property_tests::draw_case(at(seed), seed % 60));
+    const auto backend = reference::make_backend();
+    backend->load({loaded.setup}, {loaded.state});
+    for (int64_t f = 0; f < loaded.setup.frame_count(); ++f) {
+      SCOPED_TRACE("case " + std::to_string(seed) + ", frame " + std::to_string(f));
+      backend->run({Stage::step, Stage::step});
+      Scene scene;
+      scene.add(loaded.setup, backend->snapshot().front());
+      Image image = scene.image();
+      const Plan plan = scene.plan(kMethods[at(seed % 2)]);
+      if (plan.detection) enqueue_detect(launcher, image.world(), plan);
+      backend->run({Stage::detect, Stage::detect});
+      scene.states = backend->snapshot();
+      ASSERT_EQ(extract_states(image, scene.setups)[0].removed, scene.states[0].removed);
+      if (image.cut[0] >= 0) enqueue_split(launcher, image.world(), plan);
+      expect_consistent(image);
+      expect_equal(scene, extract_states(image, scene.setups));
+      if (HasFailure()) return;
+      ++frames;
+      cuts += image.cut[0] >= 0;
+      backend->run({Stage::split, Stage::skin});
+    }
+  }
+  EXPECT_GT(frames, 500);
+  EXPECT_GT(cuts, 200);
 }
 
 // ---- Disjoint sets alone
