@@ -23,7 +23,7 @@ enum : int { kNoExpand = 0, kEdgeCover = 1, kPublishedExpand = 2 };             
 enum : int { kSlotsFull = 1, kMembersFull = 2, kVerticesFull = 4, kCellsFull = 8, kAdditionsFull = 16 };
 
 // Which rotation method match_shapes uses (rotation.cuh); chosen by measurement, docs/rotations.md.
-enum : int { kJacobi4 = 0, kMueller2016 = 1, kApd = 2, kSvd = 3, kQuest = 4 };
+enum : int { kJacobi4 = 0, kMueller2016 = 1, kApd = 2, kSvd = 3, kQuest = 4, kNewton = 5 };
 
 // Division by a number that is known before: n / d = n · multiplier >> shift for every 0 <= n < 2^31 (Granlund and
 // Montgomery 1994). A division proper takes some 20 instructions, and kernels need two for each particle they look at.

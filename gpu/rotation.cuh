@@ -182,39 +182,88 @@ CUTPROOF_BOTH inline Rotation by_mueller2016(const Matrix3& a, const Matrix3& pr
     }
     const Float3 omega = (1.0f / (fabsf(value) + 1e-9f)) * torque;
     const float angle = norm(omega);
-    if (angle < 1e-9f) break;
+    if (angle < 2e-7f) break;  // the rounding of the torque
     const float s = sinf(0.5f * angle) / angle;
     q = normalized(Quaternion{cosf(0.5f * angle), s * omega.x, s * omega.y, s * omega.z} * q);
   }
   return {matrix_of(q), false};
 }
 
-// Kugelstadt, Koschier, Bender 2018, "Fast corotated FEM using operator splitting", §4: Newton's method on the
-// objective, the step applied through Cayley's map. With B = Rᵀ A and ω the turn in R's frame the objective is
+// The objective at the rotation q, turned on by a small ω in the rotated frame: with B = Rᵀ A it is
 // tr B + g·ω - ½ ωᵀ H ω + …, g the axial vector of B and H = tr(B) I - sym(B).
+struct Expansion {
+  Float3 g;
+  float h00, h11, h22, h01, h02, h12;
+  float c00, c01, c02, c11, c12, c22;  // cofactors of H
+  float determinant;
+  // determinant · H⁻¹ g
+  CUTPROOF_BOTH Float3 scaled_step() const {
+    return {c00 * g.x + c01 * g.y + c02 * g.z, c01 * g.x + c11 * g.y + c12 * g.z, c02 * g.x + c12 * g.y + c22 * g.z};
+  }
+};
+
+CUTPROOF_BOTH inline Expansion expand(const Matrix3& a, Quaternion q) {
+  const Matrix3 r = matrix_of(q);
+  Matrix3 b;
+  for (int row = 0; row < 3; ++row) {
+    for (int k = 0; k < 3; ++k) b(row, k) = gpu::dot(column(r, row), column(a, k));
+  }
+  Expansion e;
+  e.g = {b(2, 1) - b(1, 2), b(0, 2) - b(2, 0), b(1, 0) - b(0, 1)};
+  e.h00 = b(1, 1) + b(2, 2);
+  e.h11 = b(0, 0) + b(2, 2);
+  e.h22 = b(0, 0) + b(1, 1);
+  e.h01 = -0.5f * (b(0, 1) + b(1, 0));
+  e.h02 = -0.5f * (b(0, 2) + b(2, 0));
+  e.h12 = -0.5f * (b(1, 2) + b(2, 1));
+  e.c00 = e.h11 * e.h22 - e.h12 * e.h12;
+  e.c01 = e.h02 * e.h12 - e.h01 * e.h22;
+  e.c02 = e.h01 * e.h12 - e.h02 * e.h11;
+  e.c11 = e.h00 * e.h22 - e.h02 * e.h02;
+  e.c12 = e.h01 * e.h02 - e.h00 * e.h12;
+  e.c22 = e.h00 * e.h11 - e.h01 * e.h01;
+  e.determinant = e.h00 * e.c00 + e.h01 * e.c01 + e.h02 * e.c02;
+  return e;
+}
+
+// q turned on by ω in its own frame, through Cayley's map.
+CUTPROOF_BOTH inline Quaternion turned(Quaternion q, Float3 omega) {
+  return normalized(q * Quaternion{1.0f, 0.5f * omega.x, 0.5f * omega.y, 0.5f * omega.z});
+}
+
+// Kugelstadt, Koschier, Bender 2018, "Fast corotated FEM using operator splitting", §4: Newton's method from the
+// previous rotation, up the gradient where the objective is not concave.
 CUTPROOF_BOTH inline Rotation by_apd(const Matrix3& a, const Matrix3& previous) {
   Quaternion q = quaternion_of(previous);
   for (int iteration = 0; iteration < 20; ++iteration) {
-    const Matrix3 r = matrix_of(q);
-    Matrix3 b;
-    for (int row = 0; row < 3; ++row) {
-      for (int k = 0; k < 3; ++k) b(row, k) = gpu::dot(column(r, row), column(a, k));
-    }
-    const Float3 g = {b(2, 1) - b(1, 2), b(0, 2) - b(2, 0), b(1, 0) - b(0, 1)};
-    const float h00 = b(1, 1) + b(2, 2), h11 = b(0, 0) + b(2, 2), h22 = b(0, 0) + b(1, 1);
-    const float h01 = -0.5f * (b(0, 1) + b(1, 0)), h02 = -0.5f * (b(0, 2) + b(2, 0)), h12 = -0.5f * (b(1, 2) + b(2, 1));
-    const float c00 = h11 * h22 - h12 * h12, c01 = h02 * h12 - h01 * h22, c02 = h01 * h12 - h02 * h11;
-    const float determinant = h00 * c00 + h01 * c01 + h02 * c02;
-    Float3 omega = {c00 * g.x + c01 * g.y + c02 * g.z,
-                    c01 * g.x + (h00 * h22 - h02 * h02) * g.y + (h01 * h02 - h00 * h12) * g.z,
-                    c02 * g.x + (h01 * h02 - h00 * h12) * g.y + (h00 * h11 - h01 * h01) * g.z};
-    // Not concave here, or not invertible: up the gradient. Entries of A are below 1, so that 0.25 is a short step.
-    const bool newton = fabsf(determinant) > 1e-9f && gpu::dot(omega, g) * determinant > 0;
-    omega = (newton ? 1.0f / determinant : 0.0f) * omega + (newton ? 0.0f : 0.25f) * g;
-    if (gpu::dot(omega, omega) < 1e-16f) break;
-    q = normalized(q * Quaternion{1.0f, 0.5f * omega.x, 0.5f * omega.y, 0.5f * omega.z});
+    const Expansion e = expand(a, q);
+    Float3 omega = e.scaled_step();
+    // Entries of A are below 1, so that 0.25 of the gradient is a short step.
+    const bool newton = fabsf(e.determinant) > 1e-9f && gpu::dot(omega, e.g) * e.determinant > 0;
+    omega = (newton ? 1.0f / e.determinant : 0.0f) * omega + (newton ? 0.0f : 0.25f) * e.g;
+    q = turned(q, omega);
+    if (gpu::dot(omega, omega) < (newton ? 1e-7f : 1e-14f)) break;  // Newton's next step would be below rounding
   }
   return {matrix_of(q), false};
+}
+
+// Newton's method from the previous rotation where it can be shown to have found the best one, else kJacobi4. At a
+// stationary point B is symmetric with eigenvalues b1, b2, b3, and H has the eigenvalues bi + bj: that they are
+// positive is what distinguishes the greatest maximum (N's other eigenvalues are lower by 2 (bi + bj)). So a step of
+// less than 1e-3 from a point where H is safely positive ends there: what is left of the objective is below
+// ½ |ω|⁴ / λ, with λ >= 1e-5 the least eigenvalue that the bound on the determinant lets through: 5e-8.
+CUTPROOF_BOTH inline Rotation by_newton(const Matrix3& a, const Matrix3& previous) {
+  Quaternion q = quaternion_of(previous);
+  for (int iteration = 0; iteration < 5; ++iteration) {
+    const Expansion e = expand(a, q);
+    const float trace = e.h00 + e.h11 + e.h22;
+    const bool positive = e.h00 > 0 && e.c22 > 0 && e.determinant > 1e-5f * trace * trace * trace;
+    if (!positive) break;
+    const Float3 omega = (1.0f / e.determinant) * e.scaled_step();
+    q = turned(q, omega);
+    if (gpu::dot(omega, omega) < 1e-6f) return {matrix_of(q), false};
+  }
+  return by_jacobi4(a, previous);
 }
 
 // Rotates columns p and q of B and V so that B's become orthogonal (Hestenes 1958).
@@ -342,9 +391,10 @@ CUTPROOF_BOTH inline Rotation by_quest(const Matrix3& a, const Matrix3& previous
 
 }  // namespace rotation_detail
 
-// One rotation problem. Where the answer is not unique, the one nearest to `previous` (kJacobi4; kSvd for rank one);
-// where A is zero or not finite, `previous`. Never NaN if `previous` is a rotation. kMueller2016 and kApd start from
-// `previous`, the others do not need it; kMueller2016, kApd and kQuest do not know when an answer is not unique.
+// One rotation problem. Where the answer is not unique, the one nearest to `previous` (kJacobi4, kNewton; kSvd for rank
+// one); where A is zero or not finite, `previous`. Never NaN if `previous` is a rotation. kMueller2016, kApd and
+// kNewton start from `previous`, the others do not need it; kMueller2016, kApd and kQuest do not know when an answer is
+// not unique.
 template <int Method>
 CUTPROOF_BOTH inline Rotation rotate(Matrix3 a, const Matrix3& previous) {
   if (!rotation_detail::scale_to_one(a)) return {previous, true};
@@ -353,6 +403,7 @@ CUTPROOF_BOTH inline Rotation rotate(Matrix3 a, const Matrix3& previous) {
   if constexpr (Method == kApd) return rotation_detail::by_apd(a, previous);
   if constexpr (Method == kSvd) return rotation_detail::by_svd(a, previous);
   if constexpr (Method == kQuest) return rotation_detail::by_quest(a, previous);
+  if constexpr (Method == kNewton) return rotation_detail::by_newton(a, previous);
 }
 
 }  // namespace cutproof::gpu

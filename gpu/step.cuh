@@ -458,6 +458,8 @@ void enqueue_step(Launcher& launcher, const World& w, const Plan& plan) {
       return step_detail::enqueue<kSvd>(launcher, w, plan);
     case kQuest:
       return step_detail::enqueue<kQuest>(launcher, w, plan);
+    case kNewton:
+      return step_detail::enqueue<kNewton>(launcher, w, plan);
     default:
       return step_detail::enqueue<kJacobi4>(launcher, w, plan);
   }

@@ -1,8 +1,6 @@
 // The rotation of one cluster in single precision: every method on every set of hard cases of accuracy_and_speed.md §3,
 // judged by a singular value decomposition in double precision of the same single-precision matrix. The table that the
 // first test prints is the one in docs/rotations.md.
-#include "gpu/rotation.cuh"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -16,6 +14,8 @@
 #include <random>
 #include <string>
 #include <vector>
+
+#include "gpu/rotation.cuh"
 
 namespace cutproof::gpu {
 namespace {
@@ -232,17 +232,17 @@ Worst worst_of(const Set& set, uint64_t seed) {
 
 TEST(GpuRotation, TheDefaultReachesTheGoalOnEveryHardCaseAndNoMethodGivesNaN) {
   std::printf("%-32s", "worst gap (wrong of 2,000)");
-  for (const char* name : {"jacobi4", "mueller2016", "apd", "svd", "quest"}) std::printf("%20s", name);
+  for (const char* name : {"jacobi4", "mueller2016", "apd", "svd", "quest", "newton"}) std::printf("%20s", name);
   std::printf("\n");
-  std::array<double, 5> orthogonality = {};
+  std::array<double, 6> orthogonality = {};
   uint64_t seed = 100;
   for (const Set& set : hard_cases()) {
     ++seed;
-    const std::array<Worst, 5> worst = {worst_of<kJacobi4>(set, seed), worst_of<kMueller2016>(set, seed),
-                                        worst_of<kApd>(set, seed), worst_of<kSvd>(set, seed),
-                                        worst_of<kQuest>(set, seed)};
+    const std::array<Worst, 6> worst = {worst_of<kJacobi4>(set, seed), worst_of<kMueller2016>(set, seed),
+                                        worst_of<kApd>(set, seed),     worst_of<kSvd>(set, seed),
+                                        worst_of<kQuest>(set, seed),   worst_of<kNewton>(set, seed)};
     std::printf("%-32s", set.name.c_str());
-    for (std::size_t method = 0; method < 5; ++method) {
+    for (std::size_t method = 0; method < 6; ++method) {
       const Worst& w = worst[method];
       std::printf("%12.1e (%5d)", w.gap, w.wrong);
       orthogonality[method] = std::max(orthogonality[method], w.orthogonality);
@@ -251,6 +251,7 @@ TEST(GpuRotation, TheDefaultReachesTheGoalOnEveryHardCaseAndNoMethodGivesNaN) {
     std::printf("\n");
     EXPECT_EQ(worst[kJacobi4].wrong, 0) << set.name << ", gap " << worst[kJacobi4].gap << ", orthogonality "
                                         << worst[kJacobi4].orthogonality << ", seed " << seed;
+    EXPECT_EQ(worst[kNewton].wrong, 0) << set.name << ", gap " << worst[kNewton].gap << ", seed " << seed;
     EXPECT_EQ(worst[kSvd].wrong, 0) << set.name << ", gap " << worst[kSvd].gap << ", seed " << seed;
   }
   std::printf("%-32s", "worst |RᵀR - I|");
@@ -298,6 +299,7 @@ TEST(GpuRotation, KeepsThePreviousOneAndFlagsItWhereNothingIsKnown) {
   expect_previous_kept<kApd>();
   expect_previous_kept<kSvd>();
   expect_previous_kept<kQuest>();
+  expect_previous_kept<kNewton>();
 }
 
 template <int Method>
@@ -319,6 +321,7 @@ TEST(GpuRotation, OfASymmetricMatrixIsTheIdentityToTheBit) {
   expect_identity_kept<kJacobi4>();
   expect_identity_kept<kMueller2016>();
   expect_identity_kept<kApd>();
+  expect_identity_kept<kNewton>();
 }
 
 TEST(GpuRotation, TakesTheNearestToThePreviousOneForACollinearCluster) {

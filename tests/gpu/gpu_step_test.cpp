@@ -220,14 +220,14 @@ TEST(GpuStep, MeetsTheReferenceWithEveryRotationMethodNearRest) {
   state = seeded(setup, state);
   State expected = state;
   reference::step(setup, expected);
-  for (const int method : {kJacobi4, kMueller2016, kApd, kSvd, kQuest}) {
+  for (const int method : {kJacobi4, kMueller2016, kApd, kSvd, kQuest, kNewton}) {
     EXPECT_LE(greatest_distance(kernel_step(setup, state, method).x, expected.x), 1e-4 * 0.01) << method;
   }
 }
 
 TEST(GpuStep, LeavesTheRestStateWhereItIsToTheBit) {
   for (const Solver solver : {Solver::implicit, Solver::published}) {
-    for (const int method : {kJacobi4, kMueller2016, kApd}) {
+    for (const int method : {kJacobi4, kMueller2016, kApd, kNewton}) {
       cutproof::Setup setup = setup_of(fixtures::block(9, 6, 5, 0.01), 0.004, 5);
       setup.step.solver = solver;
       const State state = cooked(setup);
