@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace cutproof::cli {
 
@@ -15,6 +16,8 @@ struct RunOptions {
   std::optional<int64_t> particles;  // wanted count
   std::optional<int64_t> frames;     // at most this many of the scene's frames
   bool check = false;
+  std::string against;        // "" or "reference"
+  std::string mode = "both";  // of the comparison: lockstep, shadow, both
   std::string record;
   std::string json;
 };
@@ -30,6 +33,16 @@ struct InfoOptions {
   bool scene = false;  // print the reference of scene files
 };
 int info(const InfoOptions& options);
+
+struct BenchOptions {
+  std::string backend = "reference";
+  std::vector<int64_t> sizes;     // particles; empty: by backend
+  std::optional<int64_t> frames;  // timed; absent: by backend
+  std::string split;              // blocks, global or both; empty: blocks
+  std::string rotation;           // empty: the kernels' default
+  std::string json;
+};
+int bench_stages(const BenchOptions& options);
 
 inline constexpr const char* kVersion = CUTPROOF_VERSION;
 

@@ -66,6 +66,13 @@ int main(int argc, char** argv) {
       ->check(CLI::NonNegativeNumber);
   run_command->add_flag("--check", run_options.check,
                         "judge every frame with every oracle, and the scene's expectations");
+  run_command->add_option("--against", run_options.against, "compare every stage with this backend: reference")
+      ->type_name("B");
+  run_command->add_option("--mode", run_options.mode, "of the comparison: lockstep, shadow or both")
+      ->capture_default_str()
+      ->type_name("M")
+      ->check(CLI::IsMember({"lockstep", "shadow", "both"}))
+      ->needs("--against");
   run_command->add_option("--record", run_options.record, "keep every frame, for `cutproof check` and ParaView")
       ->type_name("F");
   run_command->add_option("--json", run_options.json, "write verdicts, stage times and counts")->type_name("F");
@@ -80,6 +87,26 @@ int main(int argc, char** argv) {
   InfoOptions info_options;
   CLI::App* info_command = app.add_subcommand("info", "version, backends, devices");
   info_command->add_flag("--scene", info_options.scene, "list every field of a scene file");
+
+  BenchOptions bench_options;
+  CLI::App* bench_command = app.add_subcommand("bench", "times, each beside its error");
+  bench_command->require_subcommand(1);
+  CLI::App* stages_command = bench_command->add_subcommand("stages", "whole frames and each stage, a blade cutting");
+  stages_command->add_option("--backend", bench_options.backend, "who is timed; `cutproof info` lists them")
+      ->capture_default_str()
+      ->type_name("B");
+  stages_command
+      ->add_option("--sizes", bench_options.sizes,
+                   "particles, separated by commas (default: 1000,10000; gpu: 1000,101096,1000000,10000000)")
+      ->delimiter(',')
+      ->type_name("N,N...");
+  stages_command->add_option("--frames", bench_options.frames, "timed frames (default: 10; gpu: 20)")
+      ->type_name("N")
+      ->check(CLI::Range(1, 10'000));
+  stages_command->add_option("--split", bench_options.split, "kernels: how clusters are split, blocks, global or both")
+      ->type_name("M");
+  stages_command->add_option("--rotation", bench_options.rotation, "kernels: how rotations are found")->type_name("M");
+  stages_command->add_option("--json", bench_options.json, "write times, errors and floors")->type_name("F");
 
   try {
     app.parse(argc, argv);
@@ -103,6 +130,7 @@ int main(int argc, char** argv) {
     }
     if (check_command->parsed()) return check(check_options);
     if (info_command->parsed()) return info(info_options);
+    if (stages_command->parsed()) return bench_stages(bench_options);
   } catch (...) {
     return status_of(std::current_exception());
   }

@@ -1,0 +1,736 @@
+#include "cli/bench.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+#include <utility>
+
+#include "cli/commands.h"
+#include "cli/results.h"
+#include "fixtures/bodies.h"
+#include "fixtures/build.h"
+#include "fixtures/cook.h"
+#include "gpu/backends.h"
+#include "model/error.h"
+#include "model/io/atomic_file.h"
+#include "oracles/oracles.h"
+#include "reference_cpu/reference.h"
+#if CUTPROOF_HAS_CUDA
+#include "gpu/floors.h"
+#include "gpu/twins.h"
+#endif
+
+namespace cutproof::cli {
+
+namespace {
+
+using nlohmann::json;
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
+
+constexpr Span kWholeFrame = {Stage::step, Stage::skin};
+
+// Beyond this, one frame of the reference and the oracles take minutes on one core.
+constexpr int64_t kMostJudgedParticles = 12'000'000;
+
+// What counts as "beyond" in Distances [h].
+constexpr double kDistanceBound = 1e-4;
+
+Vec3 kidney_size() { return {0.11, 0.06, 0.05}; }  // [m]
+Vec3 box_size() { return {0.2, 0.1, 0.05}; }       // [m]
+
+}  // namespace
+
+// --- The scene -------------------------------------------------------------------------------------------------------
+
+BenchScene make_bench_scene(int64_t particles, int64_t frames) {
+  const bool box = particles <= kLargestBox;
+  const std::string kind = box ? "box" : "kidney";
+  const auto begin = Clock::now();
+
+  Scene spec;
+  spec.name = fmt::format("{}_{}", kind, particles);
+  Shape shape;
+  shape.kind = box ? Shape::Kind::box : Shape::Kind::kidney;
+  shape.size = box ? box_size() : kidney_size();
+  spec.body.shape = shape;
+  spec.body.particles = particles;
+  spec.step.substeps = 4;
+  spec.step.iterations = 4;
+  spec.step.stiffness = 1e5;
+  spec.step.damping = 5;
+
+  BenchScene scene;
+  scene.name = spec.name;
+  Setup& setup = scene.setup;
+  setup.body = fixtures::sample(fixtures::solid_from_shape(shape, kind), spec.body, "command line");
+  setup.step = spec.step;
+  setup.detect = spec.detect;
+  setup.split = spec.split;
+  setup.merge = spec.merge;
+  setup.expand = spec.expand;
+  setup.skin = spec.skin;
+
+  // The blade goes along x. It is well under way after a quarter of the body and has still something to cut at the end.
+  const fixtures::Bounds bounds = fixtures::path_box(setup.body);
+  const Vec3 extent = bounds.high - bounds.low;
+  const double h = setup.body.grid.spacing;
+  const double layers = extent.x / h;
+  scene.advance = std::min(1.0, 0.5 * layers / static_cast<double>(frames + kJudgedFrames));
+  scene.warm_up = static_cast<int64_t>(std::ceil(0.25 * layers / scene.advance));
+  const int64_t all = scene.warm_up + frames + kJudgedFrames;
+
+  // Halfway between two layers of nodes: on a layer the side of the blade would be decided by rounding.
+  const double cut = std::floor(0.5 * extent.z / h) * h / extent.z;
+  const double start = 1 + h / extent.x;
+  BladeSpec blade;
+  blade.thickness = 0.5;
+  blade.speed = scene.advance * h / spec.frame_length;
+  StrokeSpec stroke;
+  stroke.points = {{start, 0.5, cut}, {start - scene.advance * h * static_cast<double>(all) / extent.x, 0.5, cut}};
+  stroke.back = {1, 0, 0};
+  stroke.along = Vec3{0, 1, 0};
+  blade.strokes = {stroke};
+  spec.blade = blade;
+  GripSpec grip;
+  grip.high = {0.1, 1, 1};
+  spec.grips = {grip};
+  fixtures::resolve_timetable(spec, "command line", {}, setup);
+
+  scene.state = fixtures::cook(setup.body, spec.clusters, spec.expand, spec.merge, spec.seed);
+  scene.build_seconds = seconds_since(begin);
+  return scene;
+}
+
+// --- Times -----------------------------------------------------------------------------------------------------------
+
+Times times_of(std::vector<double> seconds) {
+  if (seconds.empty()) return {};
+  std::sort(seconds.begin(), seconds.end());
+  const std::size_t n = seconds.size();
+  return {(seconds[(n - 1) / 2] + seconds[n / 2]) / 2, seconds.front(), seconds.back(), static_cast<int64_t>(n)};
+}
+
+namespace {
+
+// Brings the backend to where the timed frames begin.
+void warm_up(Backend& backend, const BenchScene& scene) {
+  backend.load({scene.setup}, {scene.state});
+  for (int64_t frame = 0; frame < scene.warm_up; ++frame) backend.run(kWholeFrame);
+  static_cast<void>(backend.report());  // waits
+}
+
+}  // namespace
+
+Timings time_stages(Backend& backend, const BenchScene& scene, int64_t frames, bool pipelined) {
+  Timings timings;
+  std::vector<double> whole, cutting;
+  warm_up(backend, scene);
+  for (int64_t frame = 0; frame < frames; ++frame) {
+    backend.run(kWholeFrame);
+    const SpanReport report = backend.report();
+    whole.push_back(report.total_seconds);
+    if (report.ran[at(Stage::split)]) cutting.push_back(report.total_seconds);
+  }
+  timings.frame = times_of(whole);
+  timings.cutting = times_of(cutting);
+
+  if (pipelined) {
+    warm_up(backend, scene);
+    const auto begin = Clock::now();
+    for (int64_t frame = 0; frame < frames; ++frame) backend.run(kWholeFrame);
+    static_cast<void>(backend.report());
+    timings.back_to_back = seconds_since(begin) / static_cast<double>(frames);
+  }
+
+  // Last, so that the backend is left where the timed frames end.
+  std::array<std::vector<double>, 6> alone;
+  warm_up(backend, scene);
+  for (int64_t frame = 0; frame < frames; ++frame) {
+    for (const Stage stage : kStages) {
+      backend.run({stage, stage});
+      const SpanReport report = backend.report();
+      if (report.ran[at(stage)]) alone[at(stage)].push_back(report.total_seconds);
+    }
+  }
+  for (const Stage stage : kStages) timings.stage[at(stage)] = times_of(alone[at(stage)]);
+  return timings;
+}
+
+// --- Errors ----------------------------------------------------------------------------------------------------------
+
+namespace {
+
+void run_reference(Stage stage, const Setup& setup, State& state) {
+  switch (stage) {
+    case Stage::step:
+      return reference::step(setup, state);
+    case Stage::detect:
+      return reference::detect(setup, state);
+    case Stage::split:
+      return reference::split(setup, state);
+    case Stage::merge:
+      return reference::merge(setup, state);
+    case Stage::expand:
+      return reference::expand(setup, state);
+    case Stage::skin:
+      return reference::skin(setup, state);
+  }
+}
+
+// Gathers distances one by one. A distance that is no number counts as infinite.
+class DistanceSum {
+ public:
+  explicit DistanceSum(double spacing) : spacing_(spacing) {}
+  void add(Vec3 a, Vec3 b) {
+    double distance = norm(a - b) / spacing_;
+    if (!std::isfinite(distance)) distance = std::numeric_limits<double>::infinity();
+    found_.max = std::max(found_.max, distance);
+    found_.beyond += distance > kDistanceBound;
+    squares_ += distance * distance;
+    ++count_;
+  }
+  Distances result() const {
+    Distances distances = found_;
+    if (count_ > 0) distances.rms = std::sqrt(squares_ / static_cast<double>(count_));
+    return distances;
+  }
+
+ private:
+  double spacing_;
+  Distances found_;
+  double squares_ = 0;
+  int64_t count_ = 0;
+};
+
+Distances worse(const std::optional<Distances>& before, const Distances& now) {
+  if (!before) return now;
+  return {std::max(before->max, now.max), std::max(before->rms, now.rms), before->beyond + now.beyond};
+}
+
+Distances compare_positions(const Setup& setup, const State& expected, const State& got) {
+  DistanceSum sum(setup.body.grid.spacing);
+  for (std::size_t i = 0; i < got.x.size(); ++i) {
+    if (got.alive[i]) sum.add(expected.x[i], got.x[i]);
+  }
+  return sum.result();
+}
+
+bool same_clusters(const Clusters& a, const Clusters& b) {
+  return a.offsets == b.offsets && a.members == b.members && a.number == b.number;
+}
+
+// A skin without the order of its vertices and triangles: a vertex is named by 6 · owner + direction.
+struct NamedSkin {
+  std::vector<std::pair<int64_t, Vec3>> vertices;
+  std::vector<std::array<int64_t, 3>> triangles;
+};
+NamedSkin named(const Skin& skin) {
+  NamedSkin result;
+  const auto name = [&](std::size_t v) { return 6 * int64_t{skin.owner[v]} + skin.direction[v]; };
+  for (std::size_t v = 0; v < skin.owner.size(); ++v) result.vertices.emplace_back(name(v), skin.position[v]);
+  for (const auto& triangle : skin.triangles) {
+    std::array<int64_t, 3> corners;
+    for (std::size_t k = 0; k < 3; ++k) corners[k] = name(static_cast<std::size_t>(triangle[k]));
+    std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end()), corners.end());
+    result.triangles.push_back(corners);
+  }
+  std::sort(result.vertices.begin(), result.vertices.end(),
+            [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::sort(result.triangles.begin(), result.triangles.end());
+  return result;
+}
+
+FrameErrors::Surface compare_skins(const Setup& setup, const Skin& expected, const Skin& got) {
+  const NamedSkin a = named(expected), b = named(got);
+  FrameErrors::Surface surface;
+  surface.triangles_equal = a.triangles == b.triangles && a.vertices.size() == b.vertices.size();
+  DistanceSum sum(setup.body.grid.spacing);
+  for (std::size_t v = 0; v < std::min(a.vertices.size(), b.vertices.size()); ++v) {
+    if (a.vertices[v].first != b.vertices[v].first) break;  // the triangles differ too
+    sum.add(a.vertices[v].second, b.vertices[v].second);
+  }
+  surface.vertices = sum.result();
+  return surface;
+}
+
+int64_t count_differing(const std::vector<int32_t>& a, const std::vector<int32_t>& b) {
+  std::vector<int32_t> differing;
+  std::set_symmetric_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(differing));
+  return static_cast<int64_t>(differing.size());
+}
+
+State take_snapshot(const Backend& backend) {
+  std::vector<State> states = backend.snapshot();
+  return std::move(states.front());
+}
+
+// `before` becomes the reference's answer.
+void judge_stage(FrameErrors& errors, Stage stage, const Setup& setup, State& before, const State& after) {
+  if (stage == Stage::detect) {
+    State expected = before;
+    run_reference(stage, setup, expected);
+    FrameErrors::Detection found = errors.detect.value_or(FrameErrors::Detection{});
+    found.removed += static_cast<int64_t>(after.removed.size());
+    const int64_t differing = count_differing(expected.removed, after.removed);
+    found.differing += differing;
+    if (differing > 0) found.within_rounding &= oracles::detection(setup, before, after).holds;
+    errors.detect = found;
+    return;
+  }
+  run_reference(stage, setup, before);
+  const State& expected = before;
+  switch (stage) {
+    case Stage::step:
+      errors.step = worse(errors.step, compare_positions(setup, expected, after));
+      break;
+    case Stage::skin: {
+      FrameErrors::Surface now = compare_skins(setup, expected.skin, after.skin);
+      if (errors.skin) {
+        now.vertices = worse(errors.skin->vertices, now.vertices);
+        now.triangles_equal &= errors.skin->triangles_equal;
+      }
+      errors.skin = now;
+      break;
+    }
+    default:
+      errors.clusters_equal[at(stage)] =
+          errors.clusters_equal[at(stage)].value_or(true) && same_clusters(expected.clusters, after.clusters);
+  }
+}
+
+}  // namespace
+
+bool FrameErrors::topology_holds() const {
+  return std::all_of(topology.begin(), topology.end(), [](const Verdict& verdict) { return verdict.holds; });
+}
+
+FrameErrors judge_frames(Backend& backend, const Setup& setup) {
+  FrameErrors errors;
+  State state = take_snapshot(backend);
+  bool cut = false;
+  while (!cut && errors.frames < kJudgedFrames) {
+    for (const Stage stage : kStages) {
+      backend.run({stage, stage});
+      if (!backend.report().ran[at(stage)]) continue;
+      State after = take_snapshot(backend);
+      judge_stage(errors, stage, setup, state, after);
+      state = std::move(after);
+      cut |= stage == Stage::split;
+    }
+    ++errors.frames;
+  }
+  for (const auto oracle :
+       {oracles::cluster_connectivity, oracles::coverage, oracles::edge_cover, oracles::component_match}) {
+    errors.topology.push_back(oracle(setup, state));
+    errors.topology.back().backend = backend.name();
+  }
+  return errors;
+}
+
+// --- Floors ----------------------------------------------------------------------------------------------------------
+
+StepFloor step_floor(const Setup& setup, const State& state) {
+  const auto particles = static_cast<double>(setup.body.particle_count());
+  const auto memberships = static_cast<double>(state.clusters.members.size());
+  const auto clusters = static_cast<double>(state.clusters.count());
+  const bool contacts = setup.has_blade || !setup.walls.empty() || !setup.grips.empty();
+  // match_shapes. Member: its index. Particle: displacement 16, node 4, share 4. Cluster: begin, size, body 12, rest
+  // frame 24, rotation in and out 72, centre 12, flag 4.
+  const double match = 4 * memberships + 24 * particles + 124 * clusters;
+  // update_positions. Member: its slot. Particle: displacement in and out 32, predicted 16, node, share, first holder,
+  // death 16; with contacts start 16, pushed in and out 32. Cluster: rest frame 24, rotation 36, centre 12.
+  const double update = 4 * memberships + (64 + (contacts ? 48 : 0)) * particles + 72 * clusters;
+  // Once a substep. Out: start 16, predicted 16; in: start 16 without contacts; with contacts impulse in and out 32.
+  const double substep = (32 + (contacts ? 32 : 16)) * particles;
+  // Once a frame, begin_frame and the last velocity. Displacement in and out 32, velocity in and out 32, node and death
+  // 8, impulse out 16.
+  const double frame = 88 * particles;
+  const int64_t substeps = setup.step.substeps, iterations = setup.step.iterations;
+  return {frame + static_cast<double>(substeps) * (substep + static_cast<double>(iterations) * (match + update)),
+          1 + substeps * ((contacts ? 1 : 0) + 2 * iterations)};
+}
+
+namespace {
+
+// What the machine can do, measured in the same run.
+struct MachineFloors {
+  double copy_bytes_per_second = 0;          // read + written
+  std::optional<double> graph_node_seconds;  // device only
+  std::optional<double> chain_seconds;       // of a graph of 40 empty kernels; device only
+};
+
+// Copies with `threads` threads of the CPU between buffers beyond any cache.
+double cpu_copy_bandwidth(int threads) {
+  const std::size_t each = (std::size_t{256} << 20) / static_cast<std::size_t>(threads);
+  std::vector<std::vector<char>> from(static_cast<std::size_t>(threads)), to(static_cast<std::size_t>(threads));
+  const auto on_all = [&](auto work) {
+    std::vector<std::thread> pool;
+    for (std::size_t t = 0; t < from.size(); ++t) pool.emplace_back([&, t] { work(t); });
+    for (std::thread& thread : pool) thread.join();
+  };
+  on_all([&](std::size_t t) {
+    from[t].assign(each, 1);
+    to[t].assign(each, 0);
+  });
+  std::vector<double> seconds;
+  for (int turn = 0; turn < 7; ++turn) {
+    const auto begin = Clock::now();
+    on_all([&](std::size_t t) { std::memcpy(to[t].data(), from[t].data(), each); });
+    seconds.push_back(seconds_since(begin));
+  }
+  return 2.0 * static_cast<double>(each) * threads / times_of(seconds).median;
+}
+
+int cpu_threads() { return static_cast<int>(std::max(1u, std::thread::hardware_concurrency())); }
+
+std::string cpu_description() {
+  std::ifstream file("/proc/cpuinfo");
+  std::string name = "CPU";
+  for (std::string line; std::getline(file, line);) {
+    const std::size_t colon = line.find(": ");
+    if (line.rfind("model name", 0) == 0 && colon != std::string::npos) {
+      name = line.substr(colon + 2);
+      break;
+    }
+  }
+  return name;
+}
+
+// --- Who is timed ----------------------------------------------------------------------------------------------------
+
+// In the order of layout.h.
+constexpr std::array<const char*, 6> kRotationNames = {"jacobi4", "mueller", "apd", "svd", "quest", "newton"};
+
+struct Contender {
+  std::string backend, device, precision, rotation, split;
+  bool pipelined = false;     // run() does not wait
+  bool kernel_bytes = false;  // its step moves what step_floor counts
+  std::unique_ptr<Backend> instance;
+};
+
+int rotation_index(const std::string& name) {
+  if (name.empty()) return gpu::KernelOptions{}.rotation_method;
+  const auto found = std::find(kRotationNames.begin(), kRotationNames.end(), name);
+  if (found == kRotationNames.end()) {
+    throw InputError("command line", "--rotation", fmt::format("there is no rotation method '{}'", name),
+                     fmt::format("use one of {}", fmt::join(kRotationNames, ", ")));
+  }
+  return static_cast<int>(found - kRotationNames.begin());
+}
+
+std::vector<std::string> split_names(const std::string& wanted) {
+  if (wanted == "blocks" || wanted == "global") return {wanted};
+  if (wanted == "both") return {"blocks", "global"};
+  throw InputError("command line", "--split", fmt::format("there is no split method '{}'", wanted),
+                   "use blocks, global or both");
+}
+
+Contender make_kernels(const std::string& backend, const std::string& rotation, const std::string& split) {
+  gpu::KernelOptions options;
+  options.rotation_method = rotation_index(rotation);
+  options.split = split == "global" ? gpu::SplitMethod::global_labels : gpu::SplitMethod::blocks;
+  Contender contender{backend, "", "single", kRotationNames[static_cast<std::size_t>(options.rotation_method)],
+                      split,   {}, true,     nullptr};
+  if (backend == "host") {
+    contender.device = fmt::format("{}, {} threads", cpu_description(), cpu_threads());
+    contender.instance = gpu::make_host_backend(cpu_threads(), options);
+    return contender;
+  }
+#if CUTPROOF_HAS_CUDA
+  std::string why;
+  contender.pipelined = true;
+  contender.instance = gpu::make_gpu_backend(options);
+  contender.device = gpu::device_description(why);
+  return contender;
+#else
+  throw InputError("command line", "--backend", "this cutproof was built without CUDA",
+                   "build it where a CUDA toolkit of version 12.4 or newer is installed");
+#endif
+}
+
+std::vector<Contender> make_contenders(const BenchOptions& options) {
+  const std::vector<std::string> splits = split_names(options.split.empty() ? "blocks" : options.split);
+  std::vector<Contender> contenders;
+  if (options.backend == "reference") {
+    if (!options.split.empty() || !options.rotation.empty()) {
+      throw InputError("command line", options.split.empty() ? "--rotation" : "--split",
+                       "the reference has one way only", "leave it out, or choose --backend host or gpu");
+    }
+    contenders.push_back({"reference", cpu_description() + ", 1 thread", "double", "horn", "search", false, false,
+                          reference::make_backend()});
+  } else if (options.backend == "host" || options.backend == "gpu") {
+    for (const std::string& split : splits) {
+      contenders.push_back(make_kernels(options.backend, options.rotation, split));
+    }
+  } else {
+    throw InputError("command line", "--backend", fmt::format("there is no backend '{}'", options.backend),
+                     "use one of those that `cutproof info` lists: reference, host, gpu");
+  }
+  return contenders;
+}
+
+std::vector<int64_t> sizes_of(const BenchOptions& options) {
+  constexpr int64_t kLeast = 100, kMost = 1'000'000'000;
+  std::vector<int64_t> sizes = options.sizes;
+  if (sizes.empty() && options.backend == "gpu") sizes = {1000, 101'096, 1'000'000, 10'000'000};
+  if (sizes.empty()) sizes = {1000, 10'000};
+  for (const int64_t size : sizes) {
+    if (size >= kLeast && size <= kMost) continue;
+    throw InputError("command line", "--sizes", fmt::format("{} particles cannot be timed", size),
+                     fmt::format("give numbers from {} to {}, separated by commas", kLeast, kMost));
+  }
+  return sizes;
+}
+
+// --- What is told ----------------------------------------------------------------------------------------------------
+
+// JSON has no infinity.
+json number(double value) {
+  if (std::isfinite(value)) return value;
+  return std::isnan(value) ? "nan" : "inf";
+}
+
+json to_json(const Times& times) {
+  if (times.count == 0) return nullptr;
+  return {{"median", times.median}, {"min", times.min}, {"max", times.max}};
+}
+json to_json(const Distances& d) { return {{"max_h", number(d.max)}, {"rms_h", number(d.rms)}, {"beyond", d.beyond}}; }
+std::string in_words(const Distances& d) {
+  std::string text = fmt::format("{:.2g} h max, {:.2g} h RMS", d.max, d.rms);
+  if (d.beyond > 0) text += fmt::format(", {} beyond {:.0e} h", d.beyond, kDistanceBound);
+  return text;
+}
+
+// One row's error, for people and for machines. `judged` is null if it was not measured.
+struct ErrorColumn {
+  std::string text;
+  json value;
+};
+ErrorColumn error_of(Stage stage, const FrameErrors* judged) {
+  if (judged == nullptr) return {"not measured", nullptr};
+  switch (stage) {
+    case Stage::step:
+      if (judged->step) return {in_words(*judged->step), to_json(*judged->step)};
+      break;
+    case Stage::detect:
+      if (const auto& d = judged->detect) {
+        std::string text = fmt::format("{} of {} removals differ", d->differing, d->removed);
+        if (d->differing > 0) text += d->within_rounding ? ", all within rounding" : ", NOT all within rounding";
+        return {text, {{"removed", d->removed}, {"differing", d->differing}, {"within_rounding", d->within_rounding}}};
+      }
+      break;
+    case Stage::skin:
+      if (const auto& s = judged->skin) {
+        json value = to_json(s->vertices);
+        value["triangles_equal"] = s->triangles_equal;
+        return {in_words(s->vertices) + (s->triangles_equal ? ", triangles equal" : ", triangles NOT equal"), value};
+      }
+      break;
+    default:
+      if (const auto equal = judged->clusters_equal[at(stage)]) {
+        return {*equal ? "clusters equal" : "clusters NOT equal", {{"clusters_equal", *equal}}};
+      }
+  }
+  return {"did not run", nullptr};
+}
+ErrorColumn error_of_frame(const FrameErrors* judged) {
+  if (judged == nullptr) return {"not measured", nullptr};
+  const bool holds = judged->topology_holds();
+  return {holds ? "topology holds" : "topology FAILS", {{"topology_holds", holds}}};
+}
+
+void print_row(const std::string& what, const Times& times, int64_t of, const std::string& error) {
+  const auto ms = [&](double seconds) { return times.count == 0 ? "-" : fmt::format("{:.4f}", 1e3 * seconds); };
+  fmt::print("  {:<14} {:>11} {:>11} {:>11} {:>9}  {}\n", what, ms(times.median), ms(times.min), ms(times.max),
+             fmt::format("{}/{}", times.count, of), error);
+}
+
+struct Report {
+  json rows = json::array(), scenes = json::array();
+  bool holds = true;
+};
+
+void report_scene(Report& report, const Contender& contender, const BenchScene& scene, const Timings& timings,
+                  const FrameErrors* judged, double judge_seconds, const MachineFloors& machine, int64_t frames) {
+  const Setup& setup = scene.setup;
+  const int64_t particles = setup.body.particle_count();
+  const auto memberships = static_cast<int64_t>(scene.state.clusters.members.size());
+  fmt::print("\n{}: {} particles, {} clusters, {} memberships, h = {:.4g} mm; the blade cuts on by {:.2g} h a frame\n",
+             scene.name, particles, scene.state.clusters.count(), memberships, 1e3 * setup.body.grid.spacing,
+             scene.advance);
+  fmt::print("{}, {} precision, {} substeps × {} iterations, rotation {}, split {}\n", contender.backend,
+             contender.precision, setup.step.substeps, setup.step.iterations, contender.rotation, contender.split);
+  fmt::print("  {:<14} {:>11} {:>11} {:>11} {:>9}  {}\n", "", "median ms", "least ms", "most ms", "frames", "error");
+
+  const auto add = [&](const std::string& what, const Times& times, const ErrorColumn& error) {
+    print_row(what, times, frames, error.text);
+    report.rows.push_back({{"scene", scene.name},
+                           {"particles", particles},
+                           {"backend", contender.backend},
+                           {"precision", contender.precision},
+                           {"substeps", setup.step.substeps},
+                           {"iterations", setup.step.iterations},
+                           {"rotation", contender.rotation},
+                           {"split", contender.split},
+                           {"what", what},
+                           {"seconds", to_json(times)},
+                           {"frames", times.count},
+                           {"of", frames},
+                           {"error", error.value},
+                           {"error_text", error.text}});
+  };
+  const ErrorColumn frame_error = error_of_frame(judged);
+  add("frame", timings.frame, frame_error);
+  add("frame, cutting", timings.cutting, frame_error);
+  if (timings.back_to_back) {
+    const double each = *timings.back_to_back;
+    add("back to back", {each, each, each, frames}, frame_error);
+  }
+  for (const Stage stage : kStages) {
+    add(std::string(name_of(stage)), timings.stage[at(stage)], error_of(stage, judged));
+  }
+
+  json entry = {{"scene", scene.name},
+                {"backend", contender.backend},
+                {"rotation", contender.rotation},
+                {"split", contender.split},
+                {"body",
+                 {{"name", setup.body.name},
+                  {"particles", particles},
+                  {"clusters", scene.state.clusters.count()},
+                  {"memberships", memberships},
+                  {"spacing", setup.body.grid.spacing},
+                  {"nodes", setup.body.grid.nodes}}},
+                {"stiffness", setup.step.stiffness},
+                {"damping", setup.step.damping},
+                {"blade_advance_h", scene.advance},
+                {"warm_up", scene.warm_up},
+                {"frames", frames},
+                {"build_seconds", scene.build_seconds},
+                {"judged_frames", judged ? judged->frames : 0},
+                {"judge_seconds", judge_seconds}};
+  if (judged != nullptr) {
+    entry["topology"] = json::array();
+    for (const Verdict& verdict : judged->topology) {
+      entry["topology"].push_back(cli::to_json(verdict, false));
+      if (!verdict.holds) {
+        report.holds = false;
+        fmt::print("  FAILS: {}: {}\n", verdict.property, verdict.witness.text);
+      }
+    }
+  } else {
+    fmt::print("  errors not measured: beyond {} particles the reference takes minutes\n", kMostJudgedParticles);
+  }
+  if (contender.kernel_bytes) {
+    const StepFloor floor = step_floor(setup, scene.state);
+    const double by_bytes = floor.bytes / machine.copy_bytes_per_second;
+    const double by_launches = static_cast<double>(floor.launches) * machine.graph_node_seconds.value_or(0);
+    const double step = timings.stage[at(Stage::step)].median;
+    const double floor_seconds = std::max(by_bytes, by_launches);
+    fmt::print("  floor of step: {:.4g} MB at the copy's bandwidth {:.4f} ms", 1e-6 * floor.bytes, 1e3 * by_bytes);
+    if (machine.graph_node_seconds) fmt::print(", {} launches {:.4f} ms", floor.launches, 1e3 * by_launches);
+    fmt::print("; step takes {:.2f} × its floor ({:.2f} × bytes / bandwidth)\n", step / floor_seconds, step / by_bytes);
+    entry["step_floor"] = {
+        {"bytes", floor.bytes},     {"launches", floor.launches},       {"bytes_seconds", by_bytes},
+        {"seconds", floor_seconds}, {"multiple", step / floor_seconds}, {"multiple_of_bytes", step / by_bytes}};
+    if (machine.graph_node_seconds) entry["step_floor"]["launch_seconds"] = by_launches;
+  }
+  report.scenes.push_back(entry);
+  std::fflush(stdout);
+}
+
+MachineFloors measure_machine(const std::string& backend) {
+  MachineFloors floors;
+#if CUTPROOF_HAS_CUDA
+  if (backend == "gpu") {
+    const gpu::Floors measured = gpu::measure_floors();
+    return {measured.copy_bytes_per_second, measured.graph_node_seconds, measured.chain_seconds};
+  }
+#endif
+  floors.copy_bytes_per_second = cpu_copy_bandwidth(backend == "reference" ? 1 : cpu_threads());
+  return floors;
+}
+
+void write_json(const std::string& path, const json& document) {
+  io::AtomicFile file(path);
+  io::write_text(file.temporary(), document.dump(1) + "\n");
+  file.commit();
+}
+
+}  // namespace
+
+int bench_stages(const BenchOptions& options) {
+  const std::vector<int64_t> sizes = sizes_of(options);
+  const int64_t frames = options.frames.value_or(options.backend == "gpu" ? 20 : 10);
+  const std::vector<Contender> contenders = make_contenders(options);
+  if (!options.json.empty()) io::AtomicFile{options.json};  // a folder that cannot be written to is found out now
+
+  const std::string date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+  const std::string device = contenders.front().device;
+  fmt::print("{} on {}, {}\n", options.backend, device, date);
+  const MachineFloors machine = measure_machine(options.backend);
+  fmt::print("copy, read + written: {:.4g} GB/s", 1e-9 * machine.copy_bytes_per_second);
+  if (machine.graph_node_seconds) {
+    fmt::print("; one node of a graph {:.2f} µs (40 empty kernels {:.1f} µs)", 1e6 * *machine.graph_node_seconds,
+               1e6 * *machine.chain_seconds);
+  }
+  fmt::print("\n");
+
+  json document = {{"format", "cutproof.bench"}, {"format_version", 1}, {"cutproof", kVersion}, {"date", date},
+                   {"backend", options.backend}, {"device", device},    {"frames", frames},     {"complete", false}};
+  if (const char* commit = std::getenv("CUTPROOF_COMMIT"); commit != nullptr && *commit != '\0') {
+    document["commit"] = commit;
+  }
+  document["floors"] = {{"copy_bytes_per_second", machine.copy_bytes_per_second}};
+  if (machine.graph_node_seconds) {
+    document["floors"]["graph_node_seconds"] = *machine.graph_node_seconds;
+    document["floors"]["chain_of_40_seconds"] = *machine.chain_seconds;
+  }
+#if CUTPROOF_HAS_CUDA
+  if (options.backend == "gpu")
+    document["launch_layer"] = json::parse(gpu::twins_json(gpu::compare_twins(1'000'000, 200)));
+#endif
+
+  Report report;
+  for (std::size_t k = 0; k < sizes.size(); ++k) {
+    BenchScene scene = make_bench_scene(sizes[k], frames);
+    for (const Contender& contender : contenders) {
+      Backend& backend = *contender.instance;
+      scene.setup.unit_roundoff = backend.unit_roundoff();
+      const Timings timings = time_stages(backend, scene, frames, contender.pipelined);
+      std::optional<FrameErrors> judged;
+      const auto begin = Clock::now();
+      if (scene.setup.body.particle_count() <= kMostJudgedParticles) judged = judge_frames(backend, scene.setup);
+      report_scene(report, contender, scene, timings, judged ? &*judged : nullptr, seconds_since(begin), machine,
+                   frames);
+      // After each size, so that what has been measured is kept if a later one fails.
+      document["rows"] = report.rows;
+      document["scenes"] = report.scenes;
+      document["holds"] = report.holds;
+      document["complete"] = k + 1 == sizes.size() && &contender == &contenders.back();
+      if (!options.json.empty()) write_json(options.json, document);
+    }
+  }
+  if (!options.json.empty()) fmt::print("\nwrote {}\n", options.json);
+  return report.holds ? 0 : 1;
+}
+
+}  // namespace cutproof::cli
