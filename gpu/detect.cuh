@@ -6,8 +6,11 @@
 // plus
 //   a difference of displacements, so where the body is does not matter: u for the difference, u for the sum, 1.5 u for
 //   the squares and their sum, and u each for h, epsilon, their product and its square.
-// - geometric: distances to the blade are between places in the body, so they carry u (|x| + |edge|). Ties go to
-//   removal, so the reach is longer by swept_slack(), and a node farther than the reach by up to twice that may go.
+// - geometric: distances to the blade are between places in the body, so they carry 10 u |x| + 8 u |edge|: u each for
+// h,
+//   X, X + d and the stored edge, and for x - edge the difference, the stored axes and the products with them. Ties go
+//   to removal, so the reach is longer by swept_slack(), which is more than that: what is within the reach always goes,
+//   and what is farther by up to twice the slack may go.
 #pragma once
 #include "gpu/launcher.h"
 #include "gpu/layout.h"
@@ -161,7 +164,7 @@ CUTPROOF_DEVICE inline Turn turn_between(const Axes& from, const Axes& to) {
 
 // By how much the reach is lengthened for ties to go to removal, given the length of |x| + |edge|.
 CUTPROOF_DEVICE inline float swept_slack(float reach, float places) {
-  return 16.0f * kRounding * reach + 4.0f * kRounding * places;
+  return 16.0f * kRounding * reach + 12.0f * kRounding * places;
 }
 
 // Whether the plate, turning while its edge goes along `way`, comes as near as `reach` to x. A part of the move counts

@@ -277,7 +277,7 @@ TEST(GpuDetectGeometric, TakesWhatATranslatedBladeComesNearAndNothingBeyondItsSl
       const double longest = std::max({h, setup.blade.thickness, greatest_neighbour_distance(setup.body, state, i)});
       const double reach = longest / 2;
       const double distance = distance_to_translated(setup.blade, from, to, state.x[at(i)]);
-      const double slack = 16 * kUnit * reach + 4 * kUnit * (norm(state.x[at(i)]) + norm(from.edge));
+      const double slack = 16 * kUnit * reach + 12 * kUnit * (norm(state.x[at(i)]) + norm(from.edge));
       if (distance > reach && distance <= reach + 2 * slack) {
         ++either;
         continue;
