@@ -5,6 +5,7 @@
 #include <optional>
 #include <thread>
 
+#include "cli/against.h"
 #include "cli/commands.h"
 #include "cli/gate.h"
 #include "cli/results.h"
@@ -47,9 +48,21 @@ std::unique_ptr<Backend> make_backend(const std::string& name) {
                    "use one of those that `cutproof info` lists: reference, host, gpu");
 }
 
+AgainstMode against_mode(const RunOptions& options) {
+  if (options.against != "reference") {
+    throw InputError("command line", "--against", fmt::format("'{}' is nothing to compare with", options.against),
+                     "use --against reference");
+  }
+  return options.mode == "lockstep" ? AgainstMode::lockstep
+         : options.mode == "shadow" ? AgainstMode::shadow
+                                    : AgainstMode::both;
+}
+
 // Runs one frame and hands its snapshots to `see`: after every stage that ran from detect on if something was removed,
-// else once, after the last stage. Without anyone to see them the frame runs whole.
-FrameResult run_frame(Backend& backend, bool watched, const std::function<void(Stage, const State&)>& see) {
+// else once, after the last stage. `against`, if not null, sees every stage. Without anyone to see them the frame runs
+// whole.
+FrameResult run_frame(Backend& backend, bool watched, const std::function<void(Stage, const State&)>& see,
+                      Against* against) {
   FrameResult result;
   const auto run = [&](Span span) {
     backend.run(span);
@@ -63,18 +76,24 @@ FrameResult run_frame(Backend& backend, bool watched, const std::function<void(S
   };
   const auto ran = [&](Stage stage) { return result.ran[static_cast<std::size_t>(stage)]; };
 
-  if (!watched) {
+  const auto run_stage = [&](Stage stage) {
+    run({stage, stage});
+    if (against == nullptr) return;
+    against->see(stage, backend.snapshot().front(), backend.report().ran[static_cast<std::size_t>(stage)]);
+  };
+
+  if (!watched && against == nullptr) {
     run({Stage::step, Stage::skin});
   } else {
-    run({Stage::step, Stage::step});
-    run({Stage::detect, Stage::detect});
+    run_stage(Stage::step);
+    run_stage(Stage::detect);
     const bool cut = ran(Stage::detect) && !backend.snapshot().front().removed.empty();
     if (cut) see(Stage::detect, backend.snapshot().front());
     for (const Stage stage : {Stage::split, Stage::merge, Stage::expand}) {
-      run({stage, stage});
+      run_stage(stage);
       if (cut && ran(stage)) see(stage, backend.snapshot().front());
     }
-    run({Stage::skin, Stage::skin});
+    run_stage(Stage::skin);
   }
   const State state = backend.snapshot().front();
   if (watched) see(Stage::skin, state);
@@ -133,6 +152,8 @@ void print_summary(const RunResult& result) {
 }  // namespace
 
 int run(const RunOptions& options) {
+  std::optional<AgainstMode> mode;
+  if (!options.against.empty()) mode = against_mode(options);
   fixtures::BuildOptions build_options;
   if (!options.mesh.empty()) build_options.mesh = MeshSpec{options.mesh, metres_per(options.unit)};
   build_options.particles = options.particles;
@@ -148,6 +169,7 @@ int run(const RunOptions& options) {
   std::optional<io::Recorder> recorder;
   if (!options.record.empty()) recorder.emplace(options.record, built.setup, io::write_scene(scene), options.backend);
   std::optional<Gate> gate;
+  std::optional<Against> against;
   print_header(scene, built, options);
 
   RunResult result{"run",
@@ -165,14 +187,16 @@ int run(const RunOptions& options) {
   // What the backend has made of the state: one in single precision has rounded it.
   const State initial = backend->snapshot().front();
   if (options.check) gate.emplace(built.setup, scene.expect, options.backend, initial);
+  if (mode) against.emplace(built.setup, built.state, initial, options.backend, *mode);
   if (recorder) recorder->add(Stage::skin, initial);
   {
     Progress progress(built.setup.frame_count());
     for (int64_t frame = 0; frame < built.setup.frame_count(); ++frame) {
-      result.frames.push_back(run_frame(*backend, gate || recorder, [&](Stage stage, const State& state) {
+      const auto see = [&](Stage stage, const State& state) {
         if (gate) gate->see(stage, state);
         if (recorder) recorder->add(stage, state);
-      }));
+      };
+      result.frames.push_back(run_frame(*backend, gate || recorder, see, against ? &*against : nullptr));
       progress.show(frame + 1, fmt::format("{} clusters, {} particles", result.frames.back().clusters,
                                            result.frames.back().alive));
     }
@@ -182,18 +206,26 @@ int run(const RunOptions& options) {
     gate->finish();
     print_verdicts(*gate);
   }
+  if (against) print_against(*against);
   if (recorder) {
     recorder->finish();
     const io::RecordingPaths paths = io::recording_paths(options.record);
     fmt::print("recorded {} (for ParaView: {}, {}, {})\n", paths.index, paths.particles, paths.skin, paths.blade);
   }
   if (json_file) {
-    io::write_text(json_file->temporary(), to_json(result, gate ? &*gate : nullptr).dump(1) + "\n");
+    nlohmann::json document = to_json(result, gate ? &*gate : nullptr);
+    if (against) {
+      document["against"] = against->to_json();
+      for (const Verdict& verdict : against->verdicts()) {
+        document["against"]["verdicts"].push_back(to_json(verdict, false));
+      }
+    }
+    io::write_text(json_file->temporary(), document.dump(1) + "\n");
     json_file->commit();
     fmt::print("wrote {}\n", options.json);
   }
-  if (!gate) fmt::print("nothing was judged: add --check for that\n");
-  return !gate || gate->holds() ? 0 : 1;
+  if (!gate && !against) fmt::print("nothing was judged: add --check for that\n");
+  return (!gate || gate->holds()) && (!against || against->holds()) ? 0 : 1;
 }
 
 }  // namespace cutproof::cli

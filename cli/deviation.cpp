@@ -1,0 +1,299 @@
+#include "cli/deviation.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "reference_cpu/reference.h"
+
+namespace cutproof::cli {
+
+namespace {
+
+std::size_t at(int64_t index) { return static_cast<std::size_t>(index); }
+
+// Clusters as sets with their numbers, in an order that depends on nothing else.
+std::vector<std::pair<std::vector<int32_t>, int32_t>> numbered_sets(const Clusters& clusters) {
+  std::vector<std::pair<std::vector<int32_t>, int32_t>> sets;
+  for (int32_t c = 0; c < clusters.count(); ++c) {
+    const auto members = clusters.of(c);
+    sets.push_back({{members.begin(), members.end()}, clusters.number[at(c)]});
+  }
+  std::sort(sets.begin(), sets.end());
+  return sets;
+}
+
+std::optional<Difference> difference_of_clusters(const Clusters& expected, const Clusters& actual) {
+  if (expected.offsets == actual.offsets && expected.members == actual.members && expected.number == actual.number) {
+    return {};
+  }
+  const auto wanted = numbered_sets(expected), found = numbered_sets(actual);
+  const auto [w, f] = std::mismatch(wanted.begin(), wanted.end(), found.begin(), found.end());
+  if (w == wanted.end() && f == found.end()) {
+    return Difference{"the clusters are those of the reference, but not in the order of their numbers", {}, {}};
+  }
+  if (w != wanted.end() && f != found.end() && w->first == f->first) {
+    return Difference{
+        fmt::format("the cluster of {} particles around particle {} has the number {}, but {} in the reference",
+                    w->first.size(), w->first.front(), f->second, w->second),
+        {f->second, w->second},
+        {w->first.front()}};
+  }
+  const bool surplus = w == wanted.end() || (f != found.end() && f->first < w->first);
+  const auto& [members, number] = surplus ? *f : *w;
+  return Difference{
+      fmt::format("cluster {}, of {} particles around particle {}, is {}", number, members.size(),
+                  members.empty() ? -1 : members.front(), surplus ? "not in the reference" : "only in the reference"),
+      {number},
+      members};
+}
+
+// Vertices in the order of (owner, direction).
+std::vector<int32_t> vertex_order(const Skin& skin) {
+  std::vector<int32_t> order(skin.owner.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto key = [&](int32_t v) { return std::pair(skin.owner[at(v)], skin.direction[at(v)]); };
+  const auto before = [&](int32_t a, int32_t b) { return key(a) < key(b); };
+  if (!std::is_sorted(order.begin(), order.end(), before)) std::sort(order.begin(), order.end(), before);
+  return order;
+}
+
+// Triangles by their vertices' places in `order`, each beginning at its lowest, sorted.
+std::vector<std::array<int32_t, 3>> canonical_triangles(const Skin& skin, const std::vector<int32_t>& order) {
+  std::vector<int32_t> place(order.size());
+  for (std::size_t k = 0; k < order.size(); ++k) place[at(order[k])] = static_cast<int32_t>(k);
+  std::vector<std::array<int32_t, 3>> triangles = skin.triangles;
+  for (auto& t : triangles) {
+    for (int32_t& v : t) v = v >= 0 && at(v) < place.size() ? place[at(v)] : -1;
+    std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+  }
+  std::sort(triangles.begin(), triangles.end());
+  return triangles;
+}
+
+std::optional<Difference> difference_of_skins(const Skin& expected, const Skin& actual) {
+  if (expected == actual) return {};
+  if (actual.direction.size() != actual.owner.size() || actual.position.size() != actual.owner.size()) {
+    return Difference{"the skin's arrays of vertices have different lengths", {}, {}};
+  }
+  const auto wanted = vertex_order(expected), found = vertex_order(actual);
+  for (std::size_t k = 0; k < std::min(wanted.size(), found.size()); ++k) {
+    const std::size_t w = at(wanted[k]), f = at(found[k]);
+    if (expected.owner[w] == actual.owner[f] && expected.direction[w] == actual.direction[f]) continue;
+    return Difference{fmt::format("skin vertex {} belongs to particle {}, direction {}, but in the reference to "
+                                  "particle {}, direction {}",
+                                  k, actual.owner[f], actual.direction[f], expected.owner[w], expected.direction[w]),
+                      {},
+                      {actual.owner[f], expected.owner[w]}};
+  }
+  if (wanted.size() != found.size()) {
+    return Difference{
+        fmt::format("the skin has {} vertices, but {} in the reference", found.size(), wanted.size()), {}, {}};
+  }
+  const auto triangles = canonical_triangles(expected, wanted), others = canonical_triangles(actual, found);
+  const auto [w, f] = std::mismatch(triangles.begin(), triangles.end(), others.begin(), others.end());
+  if (w == triangles.end() && f == others.end()) return {};
+  const bool surplus = w == triangles.end() || (f != others.end() && *f < *w);
+  Difference difference{
+      fmt::format("a skin triangle is {}", surplus ? "not in the reference" : "only in the reference"), {}, {}};
+  for (const int32_t place : surplus ? *f : *w) {
+    if (place >= 0) difference.particles.push_back(expected.owner[at(wanted[at(place)])]);
+  }
+  return difference;
+}
+
+// The first particle in one ascending list and not in the other, said in a sentence.
+std::optional<Difference> difference_of_lists(const std::vector<int32_t>& expected, const std::vector<int32_t>& actual,
+                                              const char* what) {
+  const auto [w, f] = std::mismatch(expected.begin(), expected.end(), actual.begin(), actual.end());
+  if (w == expected.end() && f == actual.end()) return {};
+  const bool surplus = w == expected.end() || (f != actual.end() && *f < *w);
+  const int32_t particle = surplus ? *f : *w;
+  return Difference{
+      fmt::format("particle {} is {} {}", particle, what, surplus ? "here only" : "in the reference only"),
+      {},
+      {particle}};
+}
+
+}  // namespace
+
+void Spread::add(double deviation, int32_t index) {
+  if (!std::isfinite(deviation)) deviation = std::numeric_limits<double>::infinity();
+  ++count;
+  sum_of_squares += deviation * deviation;
+  if (deviation > greatest || where < 0) {
+    greatest = deviation;
+    where = index;
+  }
+}
+
+void Spread::join(const Spread& other) {
+  if (other.count == 0) return;
+  if (other.greatest > greatest || where < 0) {
+    greatest = other.greatest;
+    where = other.where;
+  }
+  sum_of_squares += other.sum_of_squares;
+  count += other.count;
+}
+
+double Spread::rms() const { return count == 0 ? 0 : std::sqrt(sum_of_squares / static_cast<double>(count)); }
+
+Spread positions_apart(const Setup& setup, const State& expected, const State& actual,
+                       const std::vector<uint8_t>& mask) {
+  Spread spread;
+  for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
+    if (mask[at(i)]) spread.add(norm(actual.x[at(i)] - expected.x[at(i)]) / setup.body.grid.spacing, i);
+  }
+  return spread;
+}
+
+Spread velocities_apart(const Setup& setup, const State& expected, const State& actual, double dt,
+                        const std::vector<uint8_t>& mask) {
+  Spread spread;
+  for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
+    if (mask[at(i)]) spread.add(norm(actual.v[at(i)] - expected.v[at(i)]) * dt / setup.body.grid.spacing, i);
+  }
+  return spread;
+}
+
+RotationSpread rotations_apart(const Setup& setup, const State& expected, const State& actual) {
+  RotationSpread spread;
+  const Body& body = setup.body;
+  const Clusters& clusters = expected.clusters;
+  std::vector<int32_t> held_by(body.node.size(), 0);
+  for (const int32_t i : clusters.members) ++held_by[at(i)];
+  for (int32_t c = 0; c < clusters.count(); ++c) {
+    double squared = 0;
+    for (std::size_t k = 0; k < 9; ++k) {
+      const double d = actual.clusters.rotation[at(c)].m[k] - clusters.rotation[at(c)].m[k];
+      squared += d * d;
+    }
+    if (squared == 0) {
+      spread.angle.add(0, c);
+      spread.displacement.add(0, c);
+      continue;
+    }
+    Vec3 center, rest_center;
+    double mass = 0;
+    for (const int32_t i : clusters.of(c)) {
+      const double w = body.mass[at(i)] / held_by[at(i)];
+      mass += w;
+      center += w * expected.x[at(i)];
+      rest_center += w * body.rest_position(i);
+    }
+    center = center / mass;
+    rest_center = rest_center / mass;
+    Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
+    double arm = 0;  // Σ w |X - T|
+    for (const int32_t i : clusters.of(c)) {
+      const double w = body.mass[at(i)] / held_by[at(i)];
+      const Vec3 now = expected.x[at(i)] - center, rest = body.rest_position(i) - rest_center;
+      arm += w * norm(rest);
+      for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column) a(row, column) += w * now[row] * rest[column];
+      }
+    }
+    if (!a.allFinite()) {
+      spread.either.push_back(c);  // no rotation of such a matrix is right; its positions tell of it
+      continue;
+    }
+    const Eigen::JacobiSVD<Eigen::Matrix3d> decomposition(a);
+    Eigen::Vector3d sigma = decomposition.singularValues();
+    if (a.determinant() < 0) sigma[2] = -sigma[2];
+    if (!(sigma[1] + sigma[2] >= kUniqueRotation * sigma[0]) || sigma[0] == 0) {
+      spread.either.push_back(c);
+      if (sigma[1] > kUniqueRotation * sigma[0]) {
+        const auto members = clusters.of(c);
+        spread.moved_by_either.insert(spread.moved_by_either.end(), members.begin(), members.end());
+      }
+      continue;
+    }
+    // ‖R - R'‖² = 8 sin²(angle / 2): exact for small angles, where the trace loses all digits.
+    const double angle = 2 * std::asin(std::min(1.0, std::sqrt(squared / 8)));
+    spread.angle.add(std::isnan(squared) ? squared : angle, c);
+    spread.displacement.add(
+        std::isnan(squared) ? squared : angle * (sigma[1] + sigma[2]) / (std::sqrt(2.0) * arm * body.grid.spacing), c);
+  }
+  return spread;
+}
+
+RestFrameSpread rest_frames_apart(const Setup& setup, const State& actual) {
+  Clusters fresh = actual.clusters;
+  reference::update_rest_frames(setup.body, fresh);
+  RestFrameSpread spread;
+  for (int32_t c = 0; c < fresh.count(); ++c) {
+    const std::size_t k = at(c);
+    spread.center.add(norm(actual.clusters.rest_center[k] - fresh.rest_center[k]) / setup.body.grid.spacing, c);
+    spread.mass.add(std::abs(actual.clusters.mass[k] - fresh.mass[k]) / fresh.mass[k], c);
+  }
+  return spread;
+}
+
+Spread skins_apart(const Setup& setup, const Skin& expected, const Skin& actual) {
+  const auto wanted = vertex_order(expected), found = vertex_order(actual);
+  Spread spread;
+  for (std::size_t k = 0; k < wanted.size(); ++k) {
+    const Vec3 apart = actual.position[at(found[k])] - expected.position[at(wanted[k])];
+    spread.add(norm(apart) / setup.body.grid.spacing, expected.owner[at(wanted[k])]);
+  }
+  return spread;
+}
+
+std::optional<Difference> topological_difference(const State& expected, const State& actual, bool sets_are_open) {
+  const auto say = [](std::string text) { return Difference{std::move(text), {}, {}}; };
+  if (expected.frame != actual.frame) {
+    return say(fmt::format("the state is of frame {}, but of {} in the reference", actual.frame, expected.frame));
+  }
+  if (auto found = difference_of_lists(expected.removed, actual.removed, "removed")) return found;
+  if (auto found = difference_of_lists(expected.debris, actual.debris, "debris")) return found;
+  if (expected.alive != actual.alive) {
+    const auto [w, f] = std::mismatch(expected.alive.begin(), expected.alive.end(), actual.alive.begin());
+    const auto particle = static_cast<int32_t>(w - expected.alive.begin());
+    return Difference{
+        fmt::format("particle {} is alive {}", particle, *f ? "here only" : "in the reference only"), {}, {particle}};
+  }
+  if (expected.tau != actual.tau || expected.cap != actual.cap) {
+    return say(fmt::format("tau and cap are {} and {}, but {} and {} in the reference", actual.tau, actual.cap,
+                           expected.tau, expected.cap));
+  }
+  if (!sets_are_open) {
+    if (auto found = difference_of_clusters(expected.clusters, actual.clusters)) return found;
+    if (expected.edge_covered != actual.edge_covered) {
+      return say(
+          fmt::format("edge_covered is {}, but {} in the reference", actual.edge_covered, expected.edge_covered));
+    }
+  }
+  return difference_of_skins(expected.skin, actual.skin);
+}
+
+double body_extent(const Body& body) {
+  std::array<int32_t, 3> low = body.grid.nodes, high = {0, 0, 0};
+  for (const int64_t node : body.node) {
+    const auto c = body.grid.coordinates(node);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], c[axis]);
+      high[axis] = std::max(high[axis], c[axis]);
+    }
+  }
+  int32_t extent = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) extent = std::max(extent, high[axis] - low[axis]);
+  return extent;
+}
+
+double greatest_neighbour_distance(const Setup& setup, const State& state, int32_t particle) {
+  double greatest = 0;
+  for (int direction = 0; direction < 6; ++direction) {
+    const int32_t other = setup.body.neighbour(particle, direction);
+    if (other < 0 || !state.alive[at(other)]) continue;
+    greatest = std::max(greatest, norm(state.x[at(particle)] - state.x[at(other)]));
+  }
+  return greatest;
+}
+
+}  // namespace cutproof::cli
