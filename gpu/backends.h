@@ -14,6 +14,7 @@ namespace cutproof::gpu {
 struct KernelOptions {
   int rotation_method = 0;  // layout.h; default kJacobi4
   SplitMethod split = SplitMethod::blocks;
+  bool eager = false;  // gpu: kernels one by one, waiting for each condition, instead of one graph per span
 };
 
 // Kernels on `threads` threads of the CPU.

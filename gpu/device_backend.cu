@@ -1,5 +1,7 @@
 #include <cuda_runtime.h>
 
+#include <array>
+#include <cstdint>
 #include <cstdio>
 #include <map>
 #include <type_traits>
@@ -65,16 +67,16 @@ class GpuBackend final : public Backend {
   explicit GpuBackend(KernelOptions options) : options_(options) {
     CUTPROOF_CUDA(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking));
     CUTPROOF_CUDA(cudaEventCreate(&begin_));
-    CUTPROOF_CUDA(cudaEventCreate(&end_));
-    CUTPROOF_CUDA(cudaMallocHost(&counters_, sizeof(Counters)));
-    *counters_ = Counters{};
+    for (cudaEvent_t& event : end_) CUTPROOF_CUDA(cudaEventCreate(&event));
+    CUTPROOF_CUDA(cudaMallocHost(&counters_, kInFlight * sizeof(Counters)));
+    for (std::size_t k = 0; k < kInFlight; ++k) counters_[k] = Counters{};
   }
   ~GpuBackend() override {
     static_cast<void>(cudaStreamSynchronize(stream_));
     graphs_.clear();
     static_cast<void>(cudaFreeHost(counters_));
     static_cast<void>(cudaEventDestroy(begin_));
-    static_cast<void>(cudaEventDestroy(end_));
+    for (cudaEvent_t event : end_) static_cast<void>(cudaEventDestroy(event));
     static_cast<void>(cudaStreamDestroy(stream_));
   }
   GpuBackend(const GpuBackend&) = delete;
@@ -85,28 +87,30 @@ class GpuBackend final : public Backend {
   bool can_run(Span) const override { return true; }
 
   void load(std::vector<Setup> setups, std::vector<State> states) override {
-    CUTPROOF_CUDA(cudaStreamSynchronize(stream_));
-    Image image = make_image(setups, states, options_.rotation_method, room_);
-    plan_ = make_plan(setups, states, options_.rotation_method, options_.split);
-    graphs_.clear();
-    device_ = DeviceWorld();  // gives the old memory back before the new is asked for
-    device_ = DeviceWorld(image);
-    *counters_ = image.counters.front();
-    image_ = std::move(image);
-    setups_ = std::move(setups);
-    ran_ = false;
+    load_with(Room{}, std::move(setups), std::move(states));
   }
 
-  // Starts the span and returns. The counters come back on their own; the next call looks at those that have arrived.
+  // Starts the span and returns. Whether more room is wanted is read from what the counters were kInFlight calls ago:
+  // by then they have nearly always arrived, and the answer does not depend on how fast the device is, so two runs make
+  // room at the same places and have the same bits.
   void run(Span span) override {
-    if (ran_ && cudaEventQuery(end_) == cudaSuccess) {
-      require_no_fault(*counters_);
-      if (wants_room(device_.world(), *counters_)) {
-        room_.factor *= 2;
-        load(std::move(setups_), snapshot());
+    if (runs_ >= kInFlight) {
+      CUTPROOF_CUDA(cudaEventSynchronize(end_[slot()]));
+      const Counters& then = counters_[slot()];
+      require_no_fault(then);
+      if (wants_room(device_.world(), then)) {
+        std::vector<State> states = snapshot();
+        load_with(Room{2 * room_.factor}, std::move(setups_), std::move(states));
       }
     }
-    static_cast<void>(cudaGetLastError());  // "not ready" is no error
+    if (options_.eager) {
+      DeviceLauncher launcher(stream_);
+      CUTPROOF_CUDA(cudaEventRecord(begin_, stream_));
+      enqueue_span(launcher, device_.world(), plan_, span, [](Stage) {});
+      finish(span);
+      CUTPROOF_CUDA(cudaStreamSynchronize(stream_));  // the launcher's temporary memory goes with it
+      return;
+    }
     const auto key = std::pair(static_cast<int>(span.first), static_cast<int>(span.last));
     auto found = graphs_.find(key);
     if (found == graphs_.end()) {
@@ -116,11 +120,7 @@ class GpuBackend final : public Backend {
     }
     CUTPROOF_CUDA(cudaEventRecord(begin_, stream_));
     found->second.launch(stream_);
-    CUTPROOF_CUDA(
-        cudaMemcpyAsync(counters_, device_.world().counters, sizeof(Counters), cudaMemcpyDeviceToHost, stream_));
-    CUTPROOF_CUDA(cudaEventRecord(end_, stream_));
-    ran_ = true;
-    span_ = span;
+    finish(span);
   }
 
   std::vector<State> snapshot() const override {
@@ -131,28 +131,53 @@ class GpuBackend final : public Backend {
 
   SpanReport report() const override {
     SpanReport report;
-    if (!ran_) return report;
+    if (runs_ == 0) return report;
     wait();
-    for (std::size_t s = 0; s < 6; ++s) report.ran[s] = counters_->stage_ran[s] != 0;
+    for (std::size_t s = 0; s < 6; ++s) report.ran[s] = counters_[last()].stage_ran[s] != 0;
     float milliseconds = 0;
-    CUTPROOF_CUDA(cudaEventElapsedTime(&milliseconds, begin_, end_));
+    CUTPROOF_CUDA(cudaEventElapsedTime(&milliseconds, begin_, end_[last()]));
     report.total_seconds = 1e-3 * milliseconds;
     if (span_.first == span_.last) report.seconds[static_cast<std::size_t>(span_.first)] = report.total_seconds;
     return report;
   }
 
  private:
+  void load_with(Room room, std::vector<Setup> setups, std::vector<State> states) {
+    CUTPROOF_CUDA(cudaStreamSynchronize(stream_));
+    Image image = make_image(setups, states, options_.rotation_method, room);
+    plan_ = make_plan(setups, states, options_.rotation_method, options_.split);
+    graphs_.clear();
+    device_ = DeviceWorld();  // gives the old memory back before the new is asked for
+    device_ = DeviceWorld(image);
+    image_ = std::move(image);
+    setups_ = std::move(setups);
+    runs_ = 0;
+    room_ = room;
+  }
+  static constexpr std::size_t kInFlight = 4;
+  std::size_t slot() const { return static_cast<std::size_t>(runs_ % kInFlight); }
+  std::size_t last() const { return static_cast<std::size_t>((runs_ - 1) % kInFlight); }
+
+  // The counters come back on their own.
+  void finish(Span span) {
+    CUTPROOF_CUDA(cudaMemcpyAsync(&counters_[slot()], device_.world().counters, sizeof(Counters),
+                                  cudaMemcpyDeviceToHost, stream_));
+    CUTPROOF_CUDA(cudaEventRecord(end_[slot()], stream_));
+    ++runs_;
+    span_ = span;
+  }
   void wait() const {
     CUTPROOF_CUDA(cudaStreamSynchronize(stream_));
-    require_no_fault(*counters_);
+    if (runs_ > 0) require_no_fault(counters_[last()]);
   }
 
   KernelOptions options_;
   Room room_;
   cudaStream_t stream_ = nullptr;
-  cudaEvent_t begin_ = nullptr, end_ = nullptr;
-  Counters* counters_ = nullptr;  // pinned
-  bool ran_ = false;
+  cudaEvent_t begin_ = nullptr;
+  std::array<cudaEvent_t, kInFlight> end_ = {};
+  Counters* counters_ = nullptr;  // [kInFlight] pinned; of the last runs, in turn
+  uint64_t runs_ = 0;             // since the load
   Span span_;
   std::vector<Setup> setups_;
   mutable Image image_;  // host side of snapshots

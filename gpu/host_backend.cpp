@@ -22,18 +22,13 @@ class HostBackend final : public Backend {
   bool can_run(Span) const override { return true; }
 
   void load(std::vector<Setup> setups, std::vector<State> states) override {
-    Image image = make_image(setups, states, options_.rotation_method, room_);
-    plan_ = make_plan(setups, states, options_.rotation_method, options_.split);
-    image_ = std::move(image);
-    setups_ = std::move(setups);
-    world_ = image_.world();
-    report_ = {};
+    load_with(Room{}, std::move(setups), std::move(states));
   }
 
   void run(Span span) override {
     if (wants_room(world_, image_.counters.front())) {
-      room_.factor *= 2;
-      load(std::move(setups_), snapshot());
+      std::vector<State> states = snapshot();
+      load_with(Room{2 * room_.factor}, std::move(setups_), std::move(states));
     }
     report_ = {};
     // Work is done when it is handed over, so the time between two marks is that of the stage between them.
@@ -60,6 +55,15 @@ class HostBackend final : public Backend {
   SpanReport report() const override { return report_; }
 
  private:
+  void load_with(Room room, std::vector<Setup> setups, std::vector<State> states) {
+    Image image = make_image(setups, states, options_.rotation_method, room);
+    plan_ = make_plan(setups, states, options_.rotation_method, options_.split);
+    image_ = std::move(image);
+    setups_ = std::move(setups);
+    world_ = image_.world();
+    report_ = {};
+    room_ = room;
+  }
   static double seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
   std::string name_;

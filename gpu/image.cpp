@@ -482,8 +482,10 @@ std::vector<State> extract_states(const Image& image, const std::vector<Setup>& 
 
 bool wants_room(const World& w, const Counters& c) {
   const auto full = [](int used, int capacity) { return int64_t{4} * used > int64_t{3} * capacity; };
+  // A particle has at most six vertices and a node one cell: what has room for all of them cannot want more.
   return full(c.slots_used, w.slot_capacity) || full(c.members_used, w.member_capacity) ||
-         full(c.vertices_used, w.vertex_capacity) || full(c.cells_used, w.cell_capacity);
+         (w.vertex_capacity < int64_t{6} * w.particles && full(c.vertices_used, w.vertex_capacity)) ||
+         (w.cell_capacity < w.nodes && full(c.cells_used, w.cell_capacity));
 }
 
 void require_no_fault(const Counters& c) {

@@ -15,6 +15,7 @@
 #include <iostream>
 #include <sstream>
 
+#include "gpu/backends.h"
 #include "oracles/two_runs.h"
 #include "property_tests/dissection.h"
 #include "property_tests/random.h"
@@ -43,11 +44,42 @@ std::string g_rapidcheck_parameters;
 struct NamedBackend {
   std::string name;
   std::function<std::unique_ptr<Backend>()> make;
+  int64_t fraction = 1;  // one in so many of the wanted cases: what a schedule costs buys fewer of them
 };
 void PrintTo(const NamedBackend& backend, std::ostream* os) { *os << backend.name; }
 
 // Every backend that this build has: each property runs over each of them, under its name.
-std::vector<NamedBackend> all_backends() { return {{"reference", reference::make_backend}}; }
+std::vector<NamedBackend> all_backends() {
+  const auto with = [](gpu::SplitMethod split) {
+    gpu::KernelOptions options;
+    options.split = split;
+    return options;
+  };
+  std::vector<NamedBackend> backends = {
+      {"reference", reference::make_backend},
+      {"host", [=] { return gpu::make_host_backend(2, with(gpu::SplitMethod::blocks)); }},
+      {"host_global_labels", [=] { return gpu::make_host_backend(1, with(gpu::SplitMethod::global_labels)); }, 4},
+      {"simulated_random", [] { return gpu::make_simulated_backend({gpu::random_walk(wanted_seed())}); }, 20},
+      {"simulated_pct", [] { return gpu::make_simulated_backend({gpu::pct(wanted_seed(), 3, 1'000'000)}); }, 20},
+      {"simulated_reverse",
+       [=] { return gpu::make_simulated_backend({gpu::reverse()}, with(gpu::SplitMethod::global_labels)); }, 20}};
+#if CUTPROOF_HAS_CUDA
+  std::string why;
+  if (!gpu::device_description(why).empty()) {
+    backends.push_back({"gpu", [=] { return gpu::make_gpu_backend(with(gpu::SplitMethod::blocks)); }});
+    backends.push_back(
+        {"gpu_global_labels", [=] { return gpu::make_gpu_backend(with(gpu::SplitMethod::global_labels)); }, 4});
+  }
+#endif
+  return backends;
+}
+
+// What a backend loads, and what its arithmetic allows.
+Loaded load_for(const Backend& backend, const Case& c) {
+  Loaded loaded = load(c);
+  loaded.setup.unit_roundoff = backend.unit_roundoff();
+  return loaded;
+}
 
 // --- Cases for rapidcheck -----------------------------------------------------------------------------------------
 
@@ -154,6 +186,11 @@ class EveryBackend : public ::testing::TestWithParam<NamedBackend> {
     const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
     return std::string(test->test_suite_name()) + "." + test->name();
   }
+  int64_t cases_of(int64_t fraction) const {
+    return std::max<int64_t>(wanted_cases() / (fraction * GetParam().fraction), 5);
+  }
+  // Whether every class of cases must have occurred.
+  bool ran_in_full() const { return property_tests::ran_in_full() && GetParam().fraction == 1; }
 };
 
 std::string text_of(const Verdict& verdict) { return verdict.holds ? "" : describe(verdict); }
@@ -182,7 +219,7 @@ TEST_P(EveryBackend, KeepsEveryInvariantAfterEveryStageOfARandomDissection) {
   const auto backend = GetParam().make();
   std::array<int64_t, kHappenedCount> seen = {};
   int64_t cases = 0, verdicts = 0;
-  check(id(), wanted_cases(), [&](const Case& c) {
+  check(id(), cases_of(1), [&](const Case& c) {
     const Judgement judgement = dissect(*backend, c, cases % 50 == 0);
     ++cases;
     verdicts += judgement.verdicts;
@@ -200,8 +237,8 @@ TEST_P(EveryBackend, KeepsEveryInvariantAfterEveryStageOfARandomDissection) {
 
 TEST_P(EveryBackend, OnlyRefinesTheComponentsWithEveryStroke) {
   const auto backend = GetParam().make();
-  check(id(), wanted_cases() / 10, [&](const Case& c) {
-    const Loaded loaded = load(c);
+  check(id(), cases_of(10), [&](const Case& c) {
+    const Loaded loaded = load_for(*backend, c);
     const int64_t strokes = loaded.setup.frame_count();
     if (strokes == 0) return std::string();
     return text_of(oracles::refinement(*backend, loaded.setup, loaded.state,
@@ -211,24 +248,24 @@ TEST_P(EveryBackend, OnlyRefinesTheComponentsWithEveryStroke) {
 
 TEST_P(EveryBackend, GivesTheSameBitsTwice) {
   const auto backend = GetParam().make();
-  check(id(), wanted_cases() / 20, [&](const Case& c) {
-    const Loaded loaded = load(c);
+  check(id(), cases_of(20), [&](const Case& c) {
+    const Loaded loaded = load_for(*backend, c);
     return text_of(oracles::determinism(*backend, loaded.setup, loaded.state, loaded.setup.frame_count()));
   });
 }
 
 TEST_P(EveryBackend, RunsAFrameAsTheCompositionOfItsSpans) {
   const auto backend = GetParam().make();
-  check(id(), wanted_cases() / 20, [&](const Case& c) {
-    const Loaded loaded = load(c);
+  check(id(), cases_of(20), [&](const Case& c) {
+    const Loaded loaded = load_for(*backend, c);
     return text_of(oracles::span_composition(*backend, loaded.setup, loaded.state, loaded.setup.frame_count()));
   });
 }
 
 TEST_P(EveryBackend, GivesTheSameAnswerToASceneTurnedShiftedScaledOrRenumbered) {
   const auto backend = GetParam().make();
-  check(id(), wanted_cases() / 10, [&](const Case& c) {
-    const Loaded loaded = load(c);
+  check(id(), cases_of(10), [&](const Case& c) {
+    const Loaded loaded = load_for(*backend, c);
     if (loaded.setup.frame_count() == 0) return std::string();
     // Which clusters are merged depends on their numbers; without I4 so does what is coupled afterwards.
     const bool decided = loaded.state.edge_covered || c.merge == MergeRule::none;
@@ -240,7 +277,7 @@ TEST_P(EveryBackend, GivesTheSameAnswerToASceneTurnedShiftedScaledOrRenumbered) 
 // What is left of a body after all strokes, every particle displaced by up to 0.3 h along each axis, and a setup that
 // moves it: one frame of one substep of 3 iterations, without a blade.
 Loaded cut_and_disturbed(Backend& backend, const Case& c) {
-  Loaded loaded = load(c);
+  Loaded loaded = load_for(backend, c);
   backend.load({loaded.setup}, {loaded.state});
   for (int64_t frame = 0; frame < loaded.setup.frame_count(); ++frame) backend.run({});
   loaded.state = backend.snapshot().front();
@@ -260,7 +297,7 @@ Loaded cut_and_disturbed(Backend& backend, const Case& c) {
 TEST_P(EveryBackend, StepsACutBodyWithoutGhostForcesAndWithoutEnergyFromNowhere) {
   const auto backend = GetParam().make();
   int64_t compared = 0, iterations = 0;
-  check(id(), wanted_cases() / 10, [&](const Case& c) {
+  check(id(), cases_of(10), [&](const Case& c) {
     const Loaded cut = cut_and_disturbed(*backend, c);
     int32_t kicked = 0;
     while (kicked < cut.setup.body.particle_count() && !cut.state.alive[static_cast<std::size_t>(kicked)]) ++kicked;

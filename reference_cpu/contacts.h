@@ -22,6 +22,8 @@ class Contacts {
   Vec3 project_with_friction(Vec3 x, int side, Vec3 start) const;
 
   bool any() const { return has_blade_ || !setup_.walls.empty(); }
+  // Blade and walls are projected in turn, which need not give the nearest point.
+  bool takes_turns() const { return has_blade_ && !setup_.walls.empty(); }
   bool frictionless() const { return frictionless_; }
 
  private:

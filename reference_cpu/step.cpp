@@ -119,9 +119,13 @@ void substep(const Setup& setup, const Memberships& memberships, int64_t index, 
       Vec3 next = x;  // a held particle stays where its grip has put it
       if (!held.yes[at(i)]) {
         next = contacts.project_with_friction(free, side[at(i)], start[at(i)]);
-        // Where blade and walls hold at once, projecting in turn need not give the nearest point. Never accept one
-        // that is worse than the present one, so that the energy cannot grow.
-        if (contacts.frictionless() && dot(next - free, next - free) > dot(x - free, x - free)) next = x;
+        // Where blade and walls are projected in turn, that need not give the nearest point. Never accept one that is
+        // worse than the present one, so that the energy cannot grow. Elsewhere the projection is exact, and asking
+        // would only let rounding decide.
+        if (contacts.takes_turns() && contacts.frictionless() &&
+            dot(next - free, next - free) > dot(x - free, x - free)) {
+          next = x;
+        }
       }
       pushed_now += body.mass[at(i)] * (next - free);
       state.x[at(i)] = next;
