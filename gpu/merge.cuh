@@ -24,6 +24,8 @@ namespace cutproof::gpu {
 
 // Scratch of merge in World::slot_scratch, by slot: where lists go when they are moved together.
 CUTPROOF_BOTH inline int* moved_begin(const World& w) { return w.slot_scratch; }
+// r + 1: in round r the cluster itself, or one that it touches, has changed. What it proposes stands until then.
+CUTPROOF_BOTH inline int* changed_after(const World& w) { return w.slot_scratch + w.slot_capacity; }
 // Not 0: a particle of the cluster is in fewer or more clusters than before, or the cluster has grown.
 CUTPROOF_BOTH inline int* rest_marks(const World& w) { return w.slot_scratch + int64_t{3} * w.slot_capacity; }
 // World::best of even and odd rounds. A round writes to one and clears what the round before wrote to the other.
@@ -38,7 +40,7 @@ CUTPROOF_BOTH inline bool merges_now(const World& w, int b) {
 // --- Who may join whom -----------------------------------------------------------------------------------------------
 
 // A hash table of the clusters that a small cluster touches, in shared memory. Should it overflow, which takes a
-// cluster with hundreds of neighbours, they are enumerated instead.
+// cluster with hundreds of neighbours, they are gone through in windows of slots instead.
 inline constexpr int kCandidates = 512, kProbes = 24;
 struct TouchTable {
   int* slot;      // [kCandidates] -1: free
@@ -70,7 +72,7 @@ CUTPROOF_DEVICE void add_candidate(Block& block, const TouchTable& table, int t,
 }
 
 // Calls visit(t, shares) for holders t of the members of s (shares: true) and of their neighbours in G, many of them
-// several times. The threads of the block share the work; holders are not changed meanwhile.
+// several times. The threads of the block share the work.
 template <class Block, class Visit>
 CUTPROOF_DEVICE void for_touching(Block& block, const World& w, int s, Visit visit) {
   const BodyConstants& body = w.body[w.slot_body[s]];
@@ -85,7 +87,7 @@ CUTPROOF_DEVICE void for_touching(Block& block, const World& w, int s, Visit vis
       if (q < 0 || !alive(w, q)) continue;
     }
     for (int h = w.holder_begin[q]; h < w.holder_begin[q + 1]; ++h) {
-      const int t = w.holders[h];
+      const int t = block.load(&w.holders[h]);
       if (t >= 0 && t != s) visit(t, direction < 0);
     }
   }
@@ -121,20 +123,37 @@ CUTPROOF_DEVICE int preferred_target(Block& block, const World& w, int s, const 
     }
     least = block.smallest(least);
   } else {
+    // Slot by slot in windows as wide as the table, which then needs no search: where hundreds of clusters overlap, one
+    // walk for each of them would take forever.
     constexpr int kNone = 0x7fffffff;
-    for (int last = -1;;) {
-      int next = kNone;
+    for (int begin = 0;;) {
+      block.sync();  // the last window has been read
+      for (int i = block.thread(); i < kCandidates; i += block.size()) {
+        table.slot[i] = -1;
+        table.shares[i] = 0;
+      }
+      int first = kNone;
       for_touching(block, w, s, [&](int t, bool) {
-        if (t > last && t < next) next = t;
+        if (t >= begin && t < first) first = t;
       });
-      last = block.smallest(next);
-      if (last == kNone) break;
-      const int size = w.slot_size[s];
-      const int missing =
-          count_missing(block, w.members + w.slot_begin[s], size, w.members + w.slot_begin[last], w.slot_size[last]);
-      const unsigned long long found = preference(w, s, last, size - missing);
-      if (found < least) least = found;
+      first = block.smallest(first);
+      if (first == kNone) break;
+      block.sync();
+      for_touching(block, w, s, [&](int t, bool shares) {
+        if (t < first || t - first >= kCandidates) return;
+        block.store(&table.slot[t - first], t);
+        if (shares) block.atomic_add(&table.shares[t - first], 1);
+      });
+      block.sync();
+      for (int i = block.thread(); i < kCandidates; i += block.size()) {
+        if (table.slot[i] < 0) continue;
+        const unsigned long long found = preference(w, s, table.slot[i], table.shares[i]);
+        if (found < least) least = found;
+      }
+      if (first > kNone - kCandidates) break;
+      begin = first + kCandidates;
     }
+    least = block.smallest(least);
   }
   return least == ~0ull ? -1 : static_cast<int>(least & 0xffffffffu);
 }
@@ -211,9 +230,15 @@ CUTPROOF_DEVICE void propose_merges_kernel(Block& block, World w) {
     if (body.merge_rule == kSinglePass) continue;
     const int before = w.proposal[s];
     if (round > 0 && before < 0) continue;  // never again
-    int t = -1;
-    if (w.slot_size[s] > 0 && w.slot_size[s] < body.tau) t = preferred_target(block, w, s, table);
-    block.sync();  // everyone has read proposal[s]
+    // Many clusters may wait for the same target, round after round: looking again only where something has changed
+    // keeps that from costing a search each.
+    int t = before;
+    const bool stands = round > 0 && block.load(&changed_after(w)[s]) != round;
+    if (!stands) {
+      t = -1;
+      if (w.slot_size[s] > 0 && w.slot_size[s] < body.tau) t = preferred_target(block, w, s, table);
+      block.sync();  // everyone has read proposal[s]
+    }
     if (block.thread() != 0) continue;
     if (before >= 0) {
       block.store(&best_before[s], -1);
@@ -290,7 +315,18 @@ CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, World w) {
       if (*place >= 0) write_union(block, target, target_size, members, size, w.members + *place);
     }
     const bool fits = missing == 0 || *place >= 0;
-    if (fits) hand_over(block, w, s, t, target, target_size);
+    if (fits) {
+      // Others hand over at the same time: who is read here may be gone, but then whoever took it in says so itself.
+      int* changed = changed_after(w);
+      const auto note = [&](int touched, bool) { block.store(&changed[touched], c.merging_round + 1); };
+      for_touching(block, w, s, note);
+      for_touching(block, w, t, note);
+      if (block.thread() == 0) {
+        note(s, true);
+        note(t, true);
+      }
+      hand_over(block, w, s, t, target, target_size);
+    }
     block.sync();
     if (block.thread() == 0 && fits) {
       if (missing > 0) w.slot_begin[t] = *place;
@@ -399,6 +435,7 @@ CUTPROOF_DEVICE void begin_merge_kernel(Block& block, World w) {
     best_of_round(w, 0)[s] = -1;
     best_of_round(w, 1)[s] = -1;
     rest_marks(w)[s] = 0;
+    changed_after(w)[s] = 0;
     w.slot_flag[s] = w.slot_size[s] > 0 && w.slot_size[s] < w.body[w.slot_body[s]].tau;
   }
   live = block.sum(live);
