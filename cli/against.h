@@ -21,7 +21,8 @@ namespace cutproof::cli {
 
 enum class AgainstMode { lockstep, shadow, both };
 
-// One frame in lockstep.
+// One frame in lockstep. "Either" is what rounding decides, so that both answers are right; it is counted and not
+// measured.
 struct LockstepFrame {
   int64_t frame = 0;
   Spread position, velocity;          // [h], [h / dt]
@@ -33,7 +34,8 @@ struct LockstepFrame {
   int64_t sides_either = 0;           // particles in the blade's plane at the start of a substep
   int64_t sides_taken_otherwise = 0;  // of these: the reference was led to the backend's side
   int64_t rotations_either = 0;       // clusters whose rotation is not unique, and differs
-  int64_t particles_excluded = 0;     // from position and velocity, for either reason
+  int64_t sensitive_either = 0;       // particles beyond the bound that one rounding of the start carries as far
+  int64_t particles_excluded = 0;     // from position and velocity, for any of these reasons
 };
 
 // One frame of both running freely, at the end of its step.
@@ -51,7 +53,8 @@ struct FirstDifference {
   // reference's positions, and by how much their d_i may differ, given how far the positions are apart.
   std::optional<double> margin;
   double reach = 0;  // [h]
-  // Its cause is known: the margin is within reach, or the rule leaves several answers.
+  // Both may be right: the backend's removals are those that its own positions ask for and the margin is within reach,
+  // or the rule leaves several answers.
   bool explained = false;
 };
 
@@ -60,7 +63,6 @@ class Against {
   // `setup.unit_roundoff` must be the backend's. `start` is what was loaded, `loaded` the backend's first snapshot.
   // `setup` must outlive this.
   Against(const Setup& setup, const State& start, const State& loaded, std::string backend, AgainstMode mode);
-  ~Against();
 
   // The backend's state after `stage`, of every stage of every frame, in order; whether the backend launched it.
   void see(Stage stage, const State& after, bool launched);
