@@ -8,7 +8,7 @@ cd "$(dirname "$0")/.."
 build=${1:-build/default}
 kit=${2:-gpu_kit}
 
-programs=(cli/cutproof tests/gpu/launch_device_test property_tests/random_cuts)
+programs=(cli/cutproof tests/gpu/launch_device_test property_tests/random_cuts property_tests/property_tests)
 for program in "${programs[@]}"; do
   [ -x "$build/$program" ] || { echo "ci/gpu_kit.sh: $build/$program is not there: build it with a CUDA toolkit first" >&2; exit 2; }
 done
@@ -23,6 +23,16 @@ for program in "${programs[@]}"; do
 done
 cp -r fixtures "$kit.new/fixtures"
 find "$kit.new/fixtures" -name '*.cpp' -delete -o -name '*.h' -delete -o -name CMakeLists.txt -delete
+# kidney_discontinuous at rest for long enough to make 1,000 frames of it.
+python3 - "$kit.new/fixtures/scenes" <<'PYTHON'
+import json, sys
+folder = sys.argv[1]
+scene = json.load(open(folder + "/kidney_discontinuous.json"))
+scene["name"] = "kidney_1000_frames"
+scene["frame"]["count"] = 1000
+scene["frame"].pop("settle", None)
+json.dump(scene, open(folder + "/kidney_1000_frames.json", "w"))
+PYTHON
 cp ci/gpu_kit_run.sh "$kit.new/run.sh"
 git describe --always --dirty --abbrev=12 > "$kit.new/commit"
 rm -rf "$kit"

@@ -1,14 +1,19 @@
 #!/usr/bin/env bash
 # Runs all that needs a GPU: primitives, scenes, properties, compute-sanitizer, timings. Part of the kit that
-# ci/gpu_kit.sh makes. Usage: run.sh RESULTS [PART...]   parts: primitives scenes lockstep properties sanitizer timings
+# ci/gpu_kit.sh makes. Usage: run.sh RESULTS [PART...]
+# Parts: primitives scenes lockstep determinism properties sanitizer timings
 set -uo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 results=$(mkdir -p "$1" && cd "$1" && pwd)
 shift
-parts=${*:-primitives scenes lockstep properties sanitizer timings}
+parts=${*:-primitives scenes lockstep determinism properties sanitizer timings}
+export CUTPROOF_REGRESSIONS="$here/fixtures/regressions"
+export CUTPROOF_COMMIT=$(cat "$here/commit")
 export LD_LIBRARY_PATH="$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
 export PATH="$here/bin:$PATH:/usr/local/cuda/bin"
 cases=${CUTPROOF_CASES:-100000}
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
 status=0
 lines=()
 cd "$here"
@@ -38,11 +43,25 @@ for part in $parts; do
       for scene in kidney_discontinuous liver_cut cuboid_press; do
         try "lockstep_$scene" cutproof run "fixtures/scenes/$scene.json" --backend gpu --against reference --json "$results/lockstep_$scene.json"
       done ;;
-    properties) try properties random_cuts --backend gpu --cases "$cases" --json "$results/properties.json" ;;
+    determinism)
+      # The same run gives the same files, byte for byte, so two runs are compared by their recordings.
+      for run in first second; do
+        try "determinism_$run" cutproof run fixtures/scenes/kidney_1000_frames.json --backend gpu --record "$work/$run"
+      done
+      for file in cutproof.h5 particles.vtkhdf skin.vtkhdf; do
+        try "determinism_same_$file" cmp "$work/first.$file" "$work/second.$file"
+      done ;;
+    properties)
+      try properties random_cuts --backend gpu --cases "$cases" --json "$results/properties.json"
+      try properties_global_labels random_cuts --backend gpu --split global --cases 10000 --seed 1000001 --json "$results/properties_global_labels.json"
+      try rapidcheck property_tests --gtest_filter='*/gpu*:Cases*' ;;
     sanitizer)
       for tool in memcheck racecheck initcheck synccheck; do
-        try "sanitizer_$tool" compute-sanitizer --tool "$tool" --error-exitcode 9 \
-          random_cuts --backend gpu --cases "${CUTPROOF_SANITIZER_CASES:-40}" --batch 20
+        # One by one and not as a graph: racecheck does not know conditional nodes.
+        try "sanitizer_$tool" compute-sanitizer --tool "$tool" --error-exitcode 9 random_cuts --backend gpu --eager \
+          --cases "${CUTPROOF_SANITIZER_CASES:-128}" --batch 64
+        try "sanitizer_${tool}_step" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof run \
+          fixtures/scenes/cuboid_press.json --backend gpu-eager --particles 1000 --frames 35
       done ;;
     timings) try timings cutproof bench stages --backend gpu --json "$results/stages.json" ;;
     *) echo "run.sh: there is no part '$part'" >&2; exit 2 ;;

@@ -38,6 +38,11 @@ std::unique_ptr<Backend> make_backend(const std::string& name) {
     return gpu::make_host_backend(static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
 #if CUTPROOF_HAS_CUDA
   if (name == "gpu") return gpu::make_gpu_backend();
+  if (name == "gpu-eager") {  // for tools that cannot look into graphs
+    gpu::KernelOptions options;
+    options.eager = true;
+    return gpu::make_gpu_backend(options);
+  }
 #else
   if (name == "gpu") {
     throw InputError("command line", "--backend", "this cutproof was built without CUDA",
