@@ -235,7 +235,8 @@ TEST(APlantedDeviation, OfARotationThatAMergeForgetsIsFound) {
 
 class AForgottenRemoval : public testing::TestWithParam<const char*> {};
 TEST_P(AForgottenRemoval, IsFoundInLockstepAndInTheShadow) {
-  fixtures::Built built = build(GetParam(), 2000);
+  const std::string scene = GetParam();
+  fixtures::Built built = scene == "three_cuts" ? build(scene) : build(scene, 2000);
   int64_t frame = 0;
   {
     const auto scout = reference::make_backend();
@@ -426,7 +427,7 @@ fixtures::Built block_with_blade(double beside) {
 }
 
 TEST(WithinItsRounding, TheSideOfTheBladeIsEither) {
-  fixtures::Built built = block_with_blade(0);
+  fixtures::Built built = block_with_blade(-1e-10);
   const BladePose pose = built.setup.blade_moves.front().from;
   const Vec3 normal = cross(pose.along, pose.back);
   // By less than one rounding, but every tie goes the other way and the layer ends on the other side.
@@ -450,8 +451,10 @@ TEST(WithinItsRounding, TheSideOfTheBladeIsEither) {
 TEST(WithinItsRounding, AParticleThatOneRoundingThrowsFarIsEither) {
   // Particles so near to the cutting edge that the direction in which it pushes them turns with the least change.
   fixtures::Built built = block_with_blade(1e-3);
+  built.setup.step.iterations = 0;
+  built.setup.step.gravity = {};
   const Fault nudge = [](const cutproof::Setup& setup, State& state) {
-    for (Vec3& x : state.x) x.x += 1e-6 * setup.body.grid.spacing;
+    for (Vec3& x : state.x) x.x += 2e-7 * setup.body.grid.spacing;
   };
   Planted backend(reference::make_backend(), Stage::step, 0, {}, nudge);
   const Against against = compare(backend, built, 1, AgainstMode::lockstep, 0x1p-24);
