@@ -104,11 +104,18 @@ TEST(GpuExpand, EqualsTheReferenceInEverySchedule) {
   }
 }
 
+// Every particle a cluster of its own, so that several of them take in the same one.
+Bodies singles(Node size) {
+  Lists lists;
+  for (int32_t p = 0; p < size[0] * size[1] * size[2]; ++p) lists.push_back({p});
+  return hand_made(block_body(size[0], size[1], size[2]), lists, kCover);
+}
+
 TEST(GpuExpand, SchedulesLeaveTheSameOrderOfHolders) {
   std::vector<int> first;
   for (std::uint64_t seed = 0; seed < 30; ++seed) {
     HostLauncher launcher(HostLauncher::Simulated{.schedule = random_walk(seed)});
-    Bench bench(random_foreign(5, kCover), true);
+    Bench bench(singles({4, 3, 2}), true);
     expand_on(launcher, bench);
     const int used = bench.image.holder_begin.back();
     const std::vector<int> holders(bench.image.holders.begin(), bench.image.holders.begin() + used);
@@ -169,6 +176,18 @@ TEST(GpuExpand, WhatIsCoveredOrWasNotCutIsLeftAsItIs) {
     EXPECT_EQ(bench.states(), bench.loaded);
     EXPECT_EQ(bench.image.holders, holders);
   }
+}
+
+TEST(GpuExpand, ABodyThatCountsAsCoveredIsLeftAsItIsBesideOneThatDoesNot) {
+  Bodies bodies = singles({3, 2, 2});
+  bodies.add(bodies.setups.front(), bodies.states.front());
+  bodies.states.back().edge_covered = true;
+  HostLauncher launcher;
+  Bench bench(std::move(bodies), true);
+  expand_on(launcher, bench);
+  const std::vector<State> after = bench.states();
+  EXPECT_NE(after[0], bench.loaded[0]);
+  EXPECT_EQ(after[1], bench.loaded[1]);
 }
 
 TEST(GpuExpand, BodiesOfOneWorldKeepTheirOwnRulesAndDepths) {

@@ -203,16 +203,46 @@ TEST(GpuMerge, RestFramesOfEveryClusterThatSharesAParticleAreRecomputed) {
                             hand_made(body, {range(0, 3), range(2, 4), range(2, 8)}, 3, 4), true);
 }
 
-// A star: one small cluster touches more clusters than the table of candidates holds.
+// One cluster touches more clusters than the table of candidates holds, and may join only one of them.
 TEST(GpuMerge, AClusterThatTouchesAThousandOthersFindsItsTarget) {
-  Body body = block_body(30, 30, 2);
-  Lists lists = {range(0, 900)};
-  for (int32_t p = 900; p < 1800; ++p)
-    lists.push_back(p == 1234 ? std::vector<int32_t>{p} : std::vector<int32_t>{p - 1, p});
-  lists[1] = {900};
-  // tau beyond the large cluster: it proposes too, and its only legal target is the one that touches and is smallest.
-  for (const int32_t cap : {901, 902}) {
-    expect_equal_to_reference(*std::make_unique<HostLauncher>(), hand_made(body, lists, 901, cap), true);
+  HostLauncher launcher(HostLauncher::Threads{2});
+  const Body body = block_body(30, 30, 2);
+  for (const int32_t single : {901, 950, 1003, 1111, 1234, 1313, 1499, 1600, 1750, 1799}) {
+    SCOPED_TRACE("single particle " + std::to_string(single));
+    Lists lists = {range(0, 900)};
+    for (int32_t p = 901; p < 1800; ++p) lists.push_back(p == single ? range(p, p + 1) : range(p - 1, p + 1));
+    expect_equal_to_reference(launcher, hand_made(body, lists, 901, 901), true);
+    ASSERT_FALSE(::testing::Test::HasFatalFailure());
+  }
+}
+
+// A round lets one in, so the target is named in round after round.
+TEST(GpuMerge, ManyClustersThatWaitForOneTargetComeInOneByOne) {
+  HostLauncher launcher(HostLauncher::Threads{2});
+  for (const int32_t cap : {40, 1000}) {
+    for (const MergeRule rule : {MergeRule::deterministic, MergeRule::published}) {
+      // A floor of 36, and on every second node of it a post of two.
+      std::vector<Node> nodes;
+      for (int32_t j = 0; j < 6; ++j) {
+        for (int32_t i = 0; i < 6; ++i) nodes.push_back({i, j, 0});
+      }
+      Lists lists = {range(0, 36)};
+      for (int32_t k = 1; k <= 2; ++k) {
+        for (int32_t j = 0; j < 6; ++j) {
+          for (int32_t i = j % 2; i < 6; i += 2) nodes.push_back({i, j, k});
+        }
+      }
+      for (int32_t post = 36; post < 54; ++post) lists.push_back({post, post + 18});
+      Bench bench(hand_made(body_of(nodes), lists, 3, cap, rule), true);
+      merge_on(launcher, bench);
+      expect_holders_agree(bench.image);
+      const State after = bench.states().front();
+      EXPECT_EQ(after.clusters.count(), cap == 40 ? 17 : 1);
+      if (rule == MergeRule::deterministic) {
+        const cutproof::Setup& setup = bench.bodies.setups.front();
+        expect_same_clusters(reference_merge(setup, bench.bodies.states.front()), after, 1);
+      }
+    }
   }
 }
 
