@@ -61,7 +61,7 @@ for part in $parts; do
         try "sanitizer_$tool" compute-sanitizer --tool "$tool" --error-exitcode 9 random_cuts --backend gpu --eager \
           --cases "${CUTPROOF_SANITIZER_CASES:-128}" --batch 64
         try "sanitizer_${tool}_step" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof run \
-          fixtures/scenes/cuboid_press.json --backend gpu-eager --particles 1000 --frames 35
+          fixtures/scenes/small_block.json --backend gpu-eager
       done ;;
     timings) try timings cutproof bench stages --backend gpu --json "$results/stages.json" ;;
     *) echo "run.sh: there is no part '$part'" >&2; exit 2 ;;

@@ -199,12 +199,14 @@ CUTPROOF_DEVICE void label_in_blocks_kernel(Block& block, World w, int most) {
     }
     block.sync();
     for (int k = block.thread(); k < size; k += block.size()) {
-      if (block.load(&parent[k]) < 0) continue;
+      if (peek<Memory::shared>(block, &parent[k]) < 0) continue;
       for (int d = 0; d < 3; ++d) {
         const int q = neighbour(w, body, members[k], lower_direction(d));
         if (q < 0) continue;
         const int place = place_of_lower(members, k, q, lower_direction(d));
-        if (place >= 0 && block.load(&parent[place]) >= 0) unite(block, parent, k, place);
+        if (place >= 0 && peek<Memory::shared>(block, &parent[place]) >= 0) {
+          unite<Memory::shared>(block, parent, k, place);
+        }
       }
     }
     block.sync();

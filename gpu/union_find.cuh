@@ -10,14 +10,32 @@
 
 namespace cutproof::gpu {
 
+// Where the sets lie. In shared memory plain reads beside another thread's writes are hazards to the tools that look
+// for them, and atomics cost no more there; in global memory relaxed loads and stores do.
+enum class Memory { global, shared };
+
+template <Memory memory, class Block>
+CUTPROOF_DEVICE int peek(Block& block, int* parent) {
+  if constexpr (memory == Memory::shared) return block.atomic_or(parent, 0);
+  return block.load(parent);
+}
+template <Memory memory, class Block>
+CUTPROOF_DEVICE void poke(Block& block, int* parent, int value) {
+  if constexpr (memory == Memory::shared) {
+    block.atomic_exchange(parent, value);
+  } else {
+    block.store(parent, value);
+  }
+}
+
 // The root of i at some moment of the call. Halves the path on the way.
-template <class Block>
+template <Memory memory = Memory::global, class Block>
 CUTPROOF_DEVICE int find_root(Block& block, int* parent, int i) {
-  int at = block.load(&parent[i]);
+  int at = peek<memory>(block, &parent[i]);
   if (at == i) return i;
   int below = i;  // its parent was `at`: it is no root
-  for (int above = block.load(&parent[at]); above != at; above = block.load(&parent[at])) {
-    block.store(&parent[below], above);
+  for (int above = peek<memory>(block, &parent[at]); above != at; above = peek<memory>(block, &parent[at])) {
+    poke<memory>(block, &parent[below], above);
     below = at;
     at = above;
   }
@@ -25,10 +43,10 @@ CUTPROOF_DEVICE int find_root(Block& block, int* parent, int i) {
 }
 
 // Makes one set of those of i and j.
-template <class Block>
+template <Memory memory = Memory::global, class Block>
 CUTPROOF_DEVICE void unite(Block& block, int* parent, int i, int j) {
-  int a = find_root(block, parent, i);
-  int b = find_root(block, parent, j);
+  int a = find_root<memory>(block, parent, i);
+  int b = find_root<memory>(block, parent, j);
   while (a != b) {
     const int high = a < b ? b : a, low = a < b ? a : b;
     const int found = block.atomic_cas(&parent[high], high, low);

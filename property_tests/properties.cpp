@@ -180,6 +180,13 @@ bool ran_in_full() {
   return g_rapidcheck_parameters.empty() && wanted_cases() >= 2000 && !::testing::Test::HasFailure();
 }
 
+// Claims by compare-and-swap are legal under every schedule and not the same under each, so what is asked of bits is
+// asked of the rule that promises them.
+Case without_claims(Case c) {
+  if (c.merge != MergeRule::none) c.merge = MergeRule::deterministic;
+  return c;
+}
+
 class EveryBackend : public ::testing::TestWithParam<NamedBackend> {
  protected:
   std::string id() const {
@@ -249,7 +256,7 @@ TEST_P(EveryBackend, OnlyRefinesTheComponentsWithEveryStroke) {
 TEST_P(EveryBackend, GivesTheSameBitsTwice) {
   const auto backend = GetParam().make();
   check(id(), cases_of(20), [&](const Case& c) {
-    const Loaded loaded = load_for(*backend, c);
+    const Loaded loaded = load_for(*backend, without_claims(c));
     return text_of(oracles::determinism(*backend, loaded.setup, loaded.state, loaded.setup.frame_count()));
   });
 }
@@ -257,7 +264,7 @@ TEST_P(EveryBackend, GivesTheSameBitsTwice) {
 TEST_P(EveryBackend, RunsAFrameAsTheCompositionOfItsSpans) {
   const auto backend = GetParam().make();
   check(id(), cases_of(20), [&](const Case& c) {
-    const Loaded loaded = load_for(*backend, c);
+    const Loaded loaded = load_for(*backend, without_claims(c));
     return text_of(oracles::span_composition(*backend, loaded.setup, loaded.state, loaded.setup.frame_count()));
   });
 }
