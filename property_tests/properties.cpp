@@ -327,6 +327,38 @@ TEST_P(EveryBackend, StepsACutBodyWithoutGhostForcesAndWithoutEnergyFromNowhere)
   EXPECT_GT(iterations, 0);
 }
 
+// Particle counts around the sizes of warps and blocks, and clusters of one to three particles; a cut through the
+// middle.
+TEST_P(EveryBackend, DissectsBodiesOfSizesAroundThoseOfBlocks) {
+  const auto backend = GetParam().make();
+  int64_t verdicts = 0;
+  for (const int32_t count : {0, 1, 2, 3, 31, 32, 33, 63, 64, 65, 255, 256, 257, 1023, 1024, 1025}) {
+    for (const int32_t most : {0, 1, 3}) {  // 0: boxes
+      if (count > 300 && GetParam().fraction > 1) continue;
+      Case c;
+      // The first `count` nodes of a block, row by row; a wire for the smallest.
+      const int32_t side = std::max(1, static_cast<int32_t>(std::ceil(std::cbrt(count))));
+      for (int32_t i = 0; i < count; ++i) c.nodes.push_back({i / (side * side), i / side % side, i % side});
+      if (most > 0) {
+        c.clusters = ClusterKind::foreign;
+        c.most = most;
+        c.tau = 2;
+        c.cap = 2 * most;
+      }
+      c.strokes = {{{2 * side, 2 * side, -4}, {2 * side, 2 * side, 4 * side}, 4, true, Link::apart},
+                   {{-4, 2 * side, 2 * side}, {4 * side, 2 * side, 2 * side}, 4, true, Link::apart}};
+      c.blade_thickness = 0;
+      c.blade_length = 2;
+      c.blade_depth = 2 * side + 1;
+      const Judgement judgement = dissect(*backend, c, true);
+      verdicts += judgement.verdicts;
+      EXPECT_FALSE(judgement.failure) << count << " particles, clusters of at most " << most << ": "
+                                      << describe(*judgement.failure);
+    }
+  }
+  EXPECT_GT(verdicts, 100);
+}
+
 INSTANTIATE_TEST_SUITE_P(Over, EveryBackend, ::testing::ValuesIn(all_backends()),
                          [](const auto& tested) { return tested.param.name; });
 
