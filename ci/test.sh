@@ -17,4 +17,4 @@ report=$build/tests.xml
 status=0
 ctest --test-dir "$build" --output-on-failure --no-tests=error -j "$(nproc)" --output-junit "$PWD/$report" || status=$?
 [ -s "$report" ] || { echo "no test was run"; echo "0 passed, 1 failed, 0 skipped"; exit 1; }
-exec /usr/bin/env python3 ci/count_tests.py "$report" "$status"
+exec python3 ci/count_tests.py "$report" "$status" "$("$build/cli/cutproof" info | grep -E "^ +gpu ")"
