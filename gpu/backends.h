@@ -12,7 +12,7 @@
 namespace cutproof::gpu {
 
 struct KernelOptions {
-  int rotation_method = 0;  // layout.h; default kJacobi4
+  int rotation_method = 5;  // layout.h; kNewton: the fastest of those that fail on no hard case (docs/rotations.md)
   SplitMethod split = SplitMethod::blocks;
   bool eager = false;  // gpu: kernels one by one, waiting for each condition, instead of one graph per span
 };
