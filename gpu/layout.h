@@ -13,10 +13,10 @@
 
 namespace cutproof::gpu {
 
-enum : int { kImplicit = 0, kPublished = 1 };                                   // Solver
-enum : int { kNoCriterion = 0, kDistance = 1, kGeometric = 2, kStrain = 3 };    // Criterion
+enum : int { kImplicit = 0, kPublished = 1 };                                           // Solver
+enum : int { kNoCriterion = 0, kDistance = 1, kGeometric = 2, kStrain = 3 };            // Criterion
 enum : int { kNoMerge = 0, kDeterministic = 1, kPublishedMerge = 2, kSinglePass = 3 };  // MergeRule
-enum : int { kNoExpand = 0, kEdgeCover = 1, kPublishedExpand = 2 };             // ExpandRule
+enum : int { kNoExpand = 0, kEdgeCover = 1, kPublishedExpand = 2 };                     // ExpandRule
 
 // Why a run had to stop; written with atomic_or into Counters::fault. The stage that would have overflowed has written
 // nothing.
@@ -43,9 +43,9 @@ CUTPROOF_BOTH inline int operator/(int n, Divider d) {
 // One body's parameters; constant between loads.
 struct BodyConstants {
   int particle_begin, particle_end;
-  int64_t node_begin;          // its first node in World::particle_at
-  int nodes[3];                // of its grid
-  Divider by_row, by_layer;    // by nodes[0] and by nodes[0] · nodes[1]
+  int64_t node_begin;        // its first node in World::particle_at
+  int nodes[3];              // of its grid
+  Divider by_row, by_layer;  // by nodes[0] and by nodes[0] · nodes[1]
   float h;
   int solver, substeps, iterations;
   float stiffness, relaxation, damping;
@@ -57,13 +57,13 @@ struct BodyConstants {
   int expand_rule, depth;
   int skin_wanted;
   float alpha;
-  int wall_begin, wall_end;    // in World::walls
-  int grip_begin, grip_end;    // in World::grips
+  int wall_begin, wall_end;  // in World::walls
+  int grip_begin, grip_end;  // in World::grips
   int has_blade;
   float blade_length, blade_depth, blade_thickness, blade_friction, clearance;
-  int frames;                  // length of the timetable
-  int64_t timetable;           // first substep in World::moves (blade) and in each grip's tables: timetable + f·S + s
-  int64_t frame_begin;         // first frame in World::substep_length
+  int frames;           // length of the timetable
+  int64_t timetable;    // first substep in World::moves (blade) and in each grip's tables: timetable + f·S + s
+  int64_t frame_begin;  // first frame in World::substep_length
 };
 
 struct WallF {
@@ -72,7 +72,7 @@ struct WallF {
 };
 
 struct PoseF {
-  Float3 edge, along, back;    // model/blade.h BladePose
+  Float3 edge, along, back;  // model/blade.h BladePose
 };
 struct MoveF {
   PoseF from, to;
@@ -116,49 +116,49 @@ struct Counters {
 
 struct World {
   int bodies = 0, particles = 0;
-  int64_t nodes = 0;           // over all bodies
+  int64_t nodes = 0;  // over all bodies
   int slot_capacity = 0, member_capacity = 0, vertex_capacity = 0, cell_capacity = 0, addition_capacity = 0;
   int rotation_method = kJacobi4;
-  int any_contact = 0;         // some body has a blade, a wall or a grip
+  int any_contact = 0;  // some body has a blade, a wall or a grip
 
-  BodyConstants* body = nullptr;        // [bodies]
-  int* frame = nullptr;                 // [bodies] State::frame
-  int* cut = nullptr;                   // [bodies] code of this frame's removals (see death); -1: nothing was removed
-  int* edge_covered = nullptr;          // [bodies]
-  int* skin_made = nullptr;             // [bodies] 0: the next skin stage extracts every cell
-  float* substep_length = nullptr;      // see BodyConstants::frame_begin
+  BodyConstants* body = nullptr;    // [bodies]
+  int* frame = nullptr;             // [bodies] State::frame
+  int* cut = nullptr;               // [bodies] code of this frame's removals (see death); -1: nothing was removed
+  int* edge_covered = nullptr;      // [bodies]
+  int* skin_made = nullptr;         // [bodies] 0: the next skin stage extracts every cell
+  float* substep_length = nullptr;  // see BodyConstants::frame_begin
   MoveF* moves = nullptr;
   WallF* walls = nullptr;
   GripF* grips = nullptr;
-  int* grip_particles = nullptr;        // p
+  int* grip_particles = nullptr;  // p
   unsigned char* grip_active = nullptr;
   Float3* grip_displacement = nullptr;
 
   // Particles, [particles] each.
   int* body_of = nullptr;
-  int* node = nullptr;                  // in its body's grid
-  int* particle_at = nullptr;           // [nodes] p or -1
-  int* death = nullptr;                 // -1: alive; 2 f + 2: removed by detection in frame f; 2 f + 3: as debris by
-                                        // its split; 2 f and 2 f + 1: in the removed and debris lists of a state loaded
-                                        // at frame f; kDeadBefore: dead at load and in neither
-  Float4* displacement = nullptr;       // d; w: mass m_i
+  int* node = nullptr;             // in its body's grid
+  int* particle_at = nullptr;      // [nodes] p or -1
+  int* death = nullptr;            // -1: alive; 2 f + 2: removed by detection in frame f; 2 f + 3: as debris by
+                                   // its split; 2 f and 2 f + 1: in the removed and debris lists of a state loaded
+                                   // at frame f; kDeadBefore: dead at load and in neither
+  Float4* displacement = nullptr;  // d; w: mass m_i
   Float4* velocity = nullptr;
-  Float4* start = nullptr;              // d when the substep began
-  Float4* predicted = nullptr;          // d~ of x~; w: side of the blade, +1 or -1; 0: held by a grip
-  Float4* pushed = nullptr;             // displacement by contacts and grips, carried through the iterations
-  Float4* impulse = nullptr;            // per mass, this frame; Σ m_i impulse_i = State::impulse
-  int* share = nullptr;                 // n_i: how many clusters hold it
-  int* holder_begin = nullptr;          // [particles + 1] holders of p: holders[holder_begin[p] .. holder_begin[p + 1])
-  int* holders = nullptr;               // [member_capacity] slots, -1: none (any more); in no particular but a
-                                        // reproducible order
+  Float4* start = nullptr;      // d when the substep began
+  Float4* predicted = nullptr;  // d~ of x~; w: side of the blade, +1 or -1; 0: held by a grip
+  Float4* pushed = nullptr;     // displacement by contacts and grips, carried through the iterations
+  Float4* impulse = nullptr;    // per mass, this frame; Σ m_i impulse_i = State::impulse
+  int* share = nullptr;         // n_i: how many clusters hold it
+  int* holder_begin = nullptr;  // [particles + 1] holders of p: holders[holder_begin[p] .. holder_begin[p + 1])
+  int* holders = nullptr;       // [member_capacity] slots, -1: none (any more); in no particular but a
+                                // reproducible order
 
   // Clusters, [slot_capacity] each. Slots are given out in ascending order of number and never reused within a load
   // (the backend compacts them between frames), so the order of slots is the order of numbers.
-  int* slot_begin = nullptr;            // members[slot_begin .. slot_begin + slot_size)
-  int* slot_size = nullptr;             // 0: the cluster is gone
+  int* slot_begin = nullptr;  // members[slot_begin .. slot_begin + slot_size)
+  int* slot_size = nullptr;   // 0: the cluster is gone
   int* slot_number = nullptr;
   int* slot_body = nullptr;
-  Matrix3* rotation = nullptr;          // last R_c
+  Matrix3* rotation = nullptr;  // last R_c
   int* degenerate = nullptr;
   float* mass = nullptr;                // M_c
   int* rest_base = nullptr;             // [3 · slot_capacity] grid coordinates of one member
@@ -176,11 +176,11 @@ struct World {
   int* small_clusters = nullptr;        // slots
   unsigned long long* additions = nullptr;  // [addition_capacity] expand: slot · 2^32 + particle
   unsigned char* particle_flag = nullptr;   // [particles] scratch
-  int* particle_scratch = nullptr;      // [2 · particles]
+  int* particle_scratch = nullptr;          // [2 · particles]
 
   // Skin.
-  int* vertex_of = nullptr;             // [6 · particles] vertex of owner p in direction d, or -1
-  int* vertex_owner = nullptr;          // [vertex_capacity] p; -1: gone
+  int* vertex_of = nullptr;     // [6 · particles] vertex of owner p in direction d, or -1
+  int* vertex_owner = nullptr;  // [vertex_capacity] p; -1: gone
   unsigned char* vertex_direction = nullptr;
   Float4* vertex_position = nullptr;    // displacement from X_v
   int* cell_of = nullptr;               // [nodes] the skin cell whose lowest corner is the node, or -1

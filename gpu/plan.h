@@ -7,20 +7,20 @@ namespace cutproof::gpu {
 enum class SplitMethod { global_labels, blocks };  // split.cuh: ECL-CC over all pairs, or one block per cluster
 
 struct Plan {
-  int substeps = 0;          // most of any body
-  int iterations = 0;        // most of any body
-  bool contacts = false;     // some body has a blade, a wall or a grip
-  bool detection = false;    // some body launches detect
+  int substeps = 0;                                          // most of any body
+  int iterations = 0;                                        // most of any body
+  bool contacts = false;                                     // some body has a blade, a wall or a grip
+  bool detection = false;                                    // some body launches detect
   bool distance = false, geometric = false, strain = false;  // criteria in use
   bool debris = false;
-  bool merge = false;        // some body merges
+  bool merge = false;  // some body merges
   bool published_merge = false, deterministic_merge = false, single_pass_merge = false;
-  bool expand = false;       // some body may expand
+  bool expand = false;  // some body may expand
   bool edge_cover = false, published_expand = false;
   bool skin = false;
   SplitMethod split = SplitMethod::blocks;
-  int rotation_method = 0;   // layout.h
-  int largest_cluster = 0;   // particles; a cluster beyond kMostInBlock is split by global labels whatever `split` says
+  int rotation_method = 0;  // layout.h
+  int largest_cluster = 0;  // particles; a cluster beyond kMostInBlock is split by global labels whatever `split` says
 };
 
 }  // namespace cutproof::gpu
