@@ -151,7 +151,7 @@ Vec3 rotated(Vec3 v, const Turn& turn, double fraction) {
 // body of a thousand spacings, is far inside the band around that.
 constexpr double kTie = 1e-9;
 constexpr double kSweepBand = 5e-10;
-constexpr double kPlacesBand = 32;  // [u]: twice the lengthening of 16 u reach + 4 u (|x| + |edge|), and rounding
+constexpr double kPlacesBand = 32;  // [u]: twice the lengthening of 16 u reach + 12 u (|x| + |edge|), and rounding
 
 // A turning sweep has no closed form, and a backend may replace it by translations that are off by a little: between
 // `reach` and `reach` + kTurningSlack · h either answer is right. The distance to the pose at t changes by at most
