@@ -137,6 +137,20 @@ class DeviceBlock {
     return value;
   }
 
+  // Word by word: for a whole struct the compiler branches, which made block sums 5 % slower than plain CUDA.
+  template <class T>
+  __device__ static T select(bool first, T a, const T& b) {
+    static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % 4 == 0);
+    constexpr int kWords = static_cast<int>(sizeof(T) / 4);
+    unsigned from_a[kWords], from_b[kWords];
+    memcpy(from_a, &a, sizeof(T));
+    memcpy(from_b, &b, sizeof(T));
+#pragma unroll
+    for (int i = 0; i < kWords; ++i) from_a[i] = first ? from_a[i] : from_b[i];
+    memcpy(&a, from_a, sizeof(T));
+    return a;
+  }
+
   // A butterfly, as HostBlock does it. Every lane combines the same terms, in one order or the other.
   template <class T, class Combine>
   __device__ static T reduce_warp(T value, Combine combine) {
@@ -155,7 +169,7 @@ class DeviceBlock {
       return by_words(own, [](unsigned word) { return __shfl_sync(kWarp, word, 0); });
     };
     value = reduce_warp(value, combine);
-    const int warps = static_cast<int>(blockDim.x) / 32;
+    const int warps = static_cast<int>(blockDim.x / 32u);
     if (warps == 1) return symmetric ? value : from_first(value);
     alignas(16) __shared__ unsigned char storage[32 * sizeof(T)];
     T* const partial = reinterpret_cast<T*>(storage);
@@ -168,7 +182,7 @@ class DeviceBlock {
 #pragma unroll
     for (int distance = 16; distance > 0; distance /= 2) {
       const T other = by_words(value, [=](unsigned word) { return __shfl_down_sync(kWarp, word, distance); });
-      if (lane + distance < warps) value = combine(value, other);
+      value = select(lane + distance < warps, combine(value, other), value);
     }
     return from_first(value);
   }
