@@ -399,8 +399,6 @@ double cpu_copy_bandwidth(int threads) {
   return 2.0 * static_cast<double>(each) * threads / times_of(seconds).median;
 }
 
-int cpu_threads() { return static_cast<int>(std::max(1u, std::thread::hardware_concurrency())); }
-
 std::string cpu_description() {
   std::ifstream file("/proc/cpuinfo");
   std::string name = "CPU";
@@ -416,25 +414,12 @@ std::string cpu_description() {
 
 // --- Who is timed ----------------------------------------------------------------------------------------------------
 
-// In the order of layout.h.
-constexpr std::array<const char*, 6> kRotationNames = {"jacobi4", "mueller", "apd", "svd", "quest", "newton"};
-
 struct Contender {
   std::string backend, device, precision, rotation, split;
   bool pipelined = false;     // run() does not wait
   bool kernel_bytes = false;  // its step moves what step_floor counts
   std::unique_ptr<Backend> instance;
 };
-
-int rotation_index(const std::string& name) {
-  if (name.empty()) return gpu::KernelOptions{}.rotation_method;
-  const auto found = std::find(kRotationNames.begin(), kRotationNames.end(), name);
-  if (found == kRotationNames.end()) {
-    throw InputError("command line", "--rotation", fmt::format("there is no rotation method '{}'", name),
-                     fmt::format("use one of {}", fmt::join(kRotationNames, ", ")));
-  }
-  return static_cast<int>(found - kRotationNames.begin());
-}
 
 std::vector<std::string> split_names(const std::string& wanted) {
   if (wanted == "blocks" || wanted == "global") return {wanted};
@@ -443,46 +428,39 @@ std::vector<std::string> split_names(const std::string& wanted) {
                    "use blocks, global or both");
 }
 
-Contender make_kernels(const std::string& backend, const std::string& rotation, const std::string& split) {
-  gpu::KernelOptions options;
-  options.rotation_method = rotation_index(rotation);
-  options.split = split == "global" ? gpu::SplitMethod::global_labels : gpu::SplitMethod::blocks;
-  Contender contender{backend, "", "single", kRotationNames[static_cast<std::size_t>(options.rotation_method)],
-                      split,   {}, true,     nullptr};
-  if (backend == "host") {
-    contender.device = fmt::format("{}, {} threads", cpu_description(), cpu_threads());
-    contender.instance = gpu::make_host_backend(cpu_threads(), options);
-    return contender;
-  }
+Contender make_contender(const BackendChoice& choice) {
+  const bool kernels = choice.name != "reference";
+  Contender contender{choice.name, "", kernels ? "single" : "double", kernels ? rotation_of(choice) : "horn",
+                      kernels ? choice.split : "search", false, kernels, make_backend(choice)};
+  contender.device = kernels ? fmt::format("{}, {} threads", cpu_description(), cpu_threads())
+                             : cpu_description() + ", 1 thread";
 #if CUTPROOF_HAS_CUDA
-  std::string why;
-  contender.pipelined = true;
-  contender.instance = gpu::make_gpu_backend(options);
-  contender.device = gpu::device_description(why);
-  return contender;
-#else
-  throw InputError("command line", "--backend", "this cutproof was built without CUDA",
-                   "build it where a CUDA toolkit of version 12.4 or newer is installed");
+  if (choice.name == "gpu") {
+    std::string why;
+    contender.pipelined = true;
+    contender.device = gpu::device_description(why);
+  }
 #endif
+  return contender;
 }
 
 std::vector<Contender> make_contenders(const BenchOptions& options) {
-  const std::vector<std::string> splits = split_names(options.split.empty() ? "blocks" : options.split);
+  BackendChoice choice;
+  choice.name = options.backend;
+  choice.rotation = options.rotation;
+  choice.split = options.split;
+  if (choice.name == "simulated" || choice.name == "gpu-eager") {
+    throw InputError("command line", "--backend", fmt::format("'{}' is for finding faults, not for timing", choice.name),
+                     "use reference, host or gpu");
+  }
   std::vector<Contender> contenders;
-  if (options.backend == "reference") {
-    if (!options.split.empty() || !options.rotation.empty()) {
-      throw InputError("command line", options.split.empty() ? "--rotation" : "--split",
-                       "the reference has one way only", "leave it out, or choose --backend host or gpu");
-    }
-    contenders.push_back({"reference", cpu_description() + ", 1 thread", "double", "horn", "search", false, false,
-                          reference::make_backend()});
-  } else if (options.backend == "host" || options.backend == "gpu") {
-    for (const std::string& split : splits) {
-      contenders.push_back(make_kernels(options.backend, options.rotation, split));
+  if (choice.name == "host" || choice.name == "gpu") {
+    for (const std::string& split : split_names(options.split.empty() ? "blocks" : options.split)) {
+      choice.split = split;
+      contenders.push_back(make_contender(choice));
     }
   } else {
-    throw InputError("command line", "--backend", fmt::format("there is no backend '{}'", options.backend),
-                     "use one of those that `cutproof info` lists: reference, host, gpu");
+    contenders.push_back(make_contender(choice));
   }
   return contenders;
 }

@@ -57,7 +57,7 @@ int check(const CheckOptions& options) {
                    false,
                    {}};
   {
-    Progress progress(recording.setup.frame_count());
+    Progress progress("frame", recording.setup.frame_count());
     std::vector<Stage> seen;
     for (int64_t index = 1; index < recording.snapshot_count; ++index) {
       const io::Snapshot snapshot = reader.snapshot(index);

@@ -6,11 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "cli/backends.h"
+
 namespace cutproof::cli {
 
 struct RunOptions {
   std::string scene;
-  std::string backend = "reference";
+  BackendChoice backend;
   std::string mesh;                  // takes the place of the scene's body
   std::string unit = "mm";           // of the mesh's numbers
   std::optional<int64_t> particles;  // wanted count
@@ -43,6 +45,30 @@ struct BenchOptions {
   std::string json;
 };
 int bench_stages(const BenchOptions& options);
+
+struct FuzzOptions {
+  BackendChoice backend{"host", {}, {}, "random", 1, 0};
+  std::optional<int64_t> cases;  // default: 1000, or as many as `seconds` allow
+  std::optional<double> seconds;
+  uint64_t seed = 1;
+  std::string sizes = "0-79";  // of cases, which take turns: 0 is nothing, 100 up to about 20,000 particles
+  bool dynamics = false;
+  int batch = 64;         // bodies in one load
+  int threads = 0;        // 0: as many as the machine has
+  std::string shard;      // "i/N"; empty: all
+  bool keep_going = false;
+  std::string save = ".";  // the folder for counterexamples
+  std::string json;
+  std::vector<std::string> merge;  // results of shards, to be put together; nothing is run
+};
+int fuzz(const FuzzOptions& options);
+
+struct ReplayOptions {
+  std::string counterexample;
+  std::optional<BackendChoice> backend;  // absent: the one on which it was found
+  std::string record;
+};
+int replay(const ReplayOptions& options);
 
 inline constexpr const char* kVersion = CUTPROOF_VERSION;
 

@@ -32,6 +32,7 @@ int info(const InfoOptions& options) {
       "backends:\n"
       "  reference   CPU, double precision, serial: the oracle that everything else is compared with\n"
       "  host        the CUDA kernels' source, single precision, on the threads of this CPU\n"
+      "  simulated   the same on one thread, under a schedule that is chosen and can be replayed\n"
       "{}"
       "scene files: version 1 (`cutproof info --scene` lists every field)\n"
       "recordings: temporal VTKHDF 2.0, index version 1\n"

@@ -35,6 +35,19 @@ int status_of(const std::exception_ptr& failure) {
   }
 }
 
+// --backend, and what may be said about kernels and schedules.
+void add_backend(CLI::App& command, cutproof::cli::BackendChoice& choice, const std::string& who) {
+  command.add_option("--backend", choice.name, who)->capture_default_str()->type_name("B");
+  command.add_option("--split", choice.split, "kernels: how clusters are split, blocks or global")->type_name("M");
+  command.add_option("--rotation", choice.rotation, "kernels: how rotations are found")->type_name("M");
+  command.add_option("--schedule", choice.schedule, "simulated: forward, reverse, round_robin, random or pct")
+      ->capture_default_str()
+      ->type_name("S");
+  command.add_option("--schedule-seed", choice.seed, "simulated: what random and pct are drawn from")
+      ->capture_default_str()
+      ->type_name("N");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -49,9 +62,7 @@ int main(int argc, char** argv) {
   CLI::App* run_command = app.add_subcommand("run", "simulate a scene, and judge it with --check");
   run_command->add_option("scene", run_options.scene, "scene file (JSON); see `cutproof info --scene`")
       ->type_name("SCENE");
-  run_command->add_option("--backend", run_options.backend, "who simulates; `cutproof info` lists them")
-      ->capture_default_str()
-      ->type_name("B");
+  add_backend(*run_command, run_options.backend, "who simulates; `cutproof info` lists them");
   run_command->add_option("--mesh", run_options.mesh, "closed surface mesh that takes the place of the scene's body")
       ->type_name("FILE");
   run_command->add_option("--unit", run_options.unit, "what one unit of the mesh is: mm, cm or m")
@@ -108,6 +119,49 @@ int main(int argc, char** argv) {
   stages_command->add_option("--rotation", bench_options.rotation, "kernels: how rotations are found")->type_name("M");
   stages_command->add_option("--json", bench_options.json, "write times, errors and floors")->type_name("F");
 
+  FuzzOptions fuzz_options;
+  CLI::App* fuzz_command = app.add_subcommand("fuzz", "random dissections until one is wrong, and that one simplified");
+  add_backend(*fuzz_command, fuzz_options.backend, "whom to find faults in; `cutproof info` lists them");
+  fuzz_command->add_option("--cases", fuzz_options.cases, "how many (default: 1000)")
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber);
+  fuzz_command->add_option("--seconds", fuzz_options.seconds, "for how long")
+      ->type_name("S")
+      ->check(CLI::NonNegativeNumber);
+  fuzz_command->add_option("--seed", fuzz_options.seed, "what cases are drawn from")
+      ->capture_default_str()
+      ->type_name("N");
+  fuzz_command->add_option("--sizes", fuzz_options.sizes, "least and greatest size of a case, within 0-100")
+      ->capture_default_str()
+      ->type_name("A-B");
+  fuzz_command->add_flag("--dynamics", fuzz_options.dynamics, "bodies move and blades push what they cut");
+  fuzz_command->add_option("--batch", fuzz_options.batch, "bodies in one load")
+      ->capture_default_str()
+      ->type_name("N")
+      ->check(CLI::Range(1, 100'000));
+  fuzz_command->add_option("--threads", fuzz_options.threads, "that generate and judge (default: all)")
+      ->type_name("N")
+      ->check(CLI::Range(1, 4096));
+  fuzz_command->add_option("--shard", fuzz_options.shard, "only part i of N of the cases")->type_name("i/N");
+  fuzz_command->add_flag("--keep-going", fuzz_options.keep_going, "beyond the first violation");
+  fuzz_command->add_option("--save", fuzz_options.save, "folder for counterexamples")
+      ->capture_default_str()
+      ->type_name("DIR");
+  fuzz_command->add_option("--json", fuzz_options.json, "write counts, classes and violations")->type_name("F");
+  fuzz_command->add_option("--merge", fuzz_options.merge, "put the results of all shards together; runs nothing")
+      ->type_name("JSON...");
+
+  ReplayOptions replay_options;
+  BackendChoice replay_backend;
+  replay_backend.name.clear();
+  CLI::App* replay_command = app.add_subcommand("replay", "run a counterexample again");
+  replay_command->add_option("counterexample", replay_options.counterexample, "what `cutproof fuzz` has saved")
+      ->required()
+      ->type_name("CASE");
+  add_backend(*replay_command, replay_backend, "on whom (default: where it was found)");
+  replay_command->add_option("--record", replay_options.record, "keep every frame, for `cutproof check` and ParaView")
+      ->type_name("F");
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& asked) {  // --help, --version
@@ -130,6 +184,11 @@ int main(int argc, char** argv) {
     }
     if (check_command->parsed()) return check(check_options);
     if (info_command->parsed()) return info(info_options);
+    if (fuzz_command->parsed()) return fuzz(fuzz_options);
+    if (replay_command->parsed()) {
+      if (!replay_backend.name.empty()) replay_options.backend = replay_backend;
+      return replay(replay_options);
+    }
     if (stages_command->parsed()) return bench_stages(bench_options);
   } catch (...) {
     return status_of(std::current_exception());

@@ -3,21 +3,19 @@
 #include <functional>
 #include <map>
 #include <optional>
-#include <thread>
 
 #include "cli/against.h"
+#include "cli/backends.h"
 #include "cli/commands.h"
 #include "cli/gate.h"
 #include "cli/results.h"
 #include "cli/terminal.h"
 #include "fixtures/bodies.h"
 #include "fixtures/build.h"
-#include "gpu/backends.h"
 #include "model/error.h"
 #include "model/io/atomic_file.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
-#include "reference_cpu/reference.h"
 
 namespace cutproof::cli {
 
@@ -30,27 +28,6 @@ double metres_per(const std::string& unit) {
     throw InputError("command line", "--unit", fmt::format("'{}' is not a unit", unit), "use mm, cm or m");
   }
   return found->second;
-}
-
-std::unique_ptr<Backend> make_backend(const std::string& name) {
-  if (name == "reference") return reference::make_backend();
-  if (name == "host")
-    return gpu::make_host_backend(static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
-#if CUTPROOF_HAS_CUDA
-  if (name == "gpu") return gpu::make_gpu_backend();
-  if (name == "gpu-eager") {  // for tools that cannot look into graphs
-    gpu::KernelOptions options;
-    options.eager = true;
-    return gpu::make_gpu_backend(options);
-  }
-#else
-  if (name == "gpu") {
-    throw InputError("command line", "--backend", "this cutproof was built without CUDA",
-                     "build it where a CUDA toolkit of version 12.4 or newer is installed");
-  }
-#endif
-  throw InputError("command line", "--backend", fmt::format("there is no backend '{}'", name),
-                   "use one of those that `cutproof info` lists: reference, host, gpu");
 }
 
 AgainstMode against_mode(const RunOptions& options) {
@@ -120,7 +97,7 @@ void print_header(const Scene& scene, const fixtures::Built& built, const RunOpt
              size.y, size.z, body.particle_count(), body.grid.spacing * 1e3, built.state.clusters.count());
   if (!options.mesh.empty()) fmt::print("one unit of the mesh is 1 {} (--unit changes that)\n", options.unit);
   fmt::print("{} frames of {} substeps × {} iterations, backend {}, seed {}\n", built.setup.frame_count(),
-             built.setup.step.substeps, built.setup.step.iterations, options.backend, scene.seed);
+             built.setup.step.substeps, built.setup.step.iterations, options.backend.name, scene.seed);
 }
 
 void print_summary(const RunResult& result) {
@@ -172,7 +149,7 @@ int run(const RunOptions& options) {
   std::optional<io::AtomicFile> json_file;
   if (!options.json.empty()) json_file.emplace(options.json);
   std::optional<io::Recorder> recorder;
-  if (!options.record.empty()) recorder.emplace(options.record, built.setup, io::write_scene(scene), options.backend);
+  if (!options.record.empty()) recorder.emplace(options.record, built.setup, io::write_scene(scene), options.backend.name);
   std::optional<Gate> gate;
   std::optional<Against> against;
   print_header(scene, built, options);
@@ -180,7 +157,7 @@ int run(const RunOptions& options) {
   RunResult result{"run",
                    options.scene,
                    scene.name,
-                   options.backend,
+                   options.backend.name,
                    scene.seed,
                    built.setup.body.name,
                    built.setup.body.grid.spacing,
@@ -191,11 +168,11 @@ int run(const RunOptions& options) {
   backend->load({built.setup}, {built.state});
   // What the backend has made of the state: one in single precision has rounded it.
   const State initial = backend->snapshot().front();
-  if (options.check) gate.emplace(built.setup, scene.expect, options.backend, initial);
-  if (mode) against.emplace(built.setup, built.state, initial, options.backend, *mode);
+  if (options.check) gate.emplace(built.setup, scene.expect, options.backend.name, initial);
+  if (mode) against.emplace(built.setup, built.state, initial, options.backend.name, *mode);
   if (recorder) recorder->add(Stage::skin, initial);
   {
-    Progress progress(built.setup.frame_count());
+    Progress progress("frame", built.setup.frame_count());
     for (int64_t frame = 0; frame < built.setup.frame_count(); ++frame) {
       const auto see = [&](Stage stage, const State& state) {
         if (gate) gate->see(stage, state);

@@ -24,7 +24,8 @@ std::string figure(double value) { return fmt::format("{:.4g}", value); }
 
 }  // namespace
 
-Progress::Progress(int64_t total) : total_(total), terminal_(isatty(STDERR_FILENO) != 0) {}
+Progress::Progress(std::string thing, int64_t total)
+    : thing_(std::move(thing)), total_(total), terminal_(isatty(STDERR_FILENO) != 0) {}
 
 Progress::~Progress() { clear(); }
 
@@ -36,9 +37,10 @@ void Progress::clear() {
 }
 
 void Progress::show(int64_t done, const std::string& what) {
-  if (!terminal_ || (now() - last_ < 0.1 && done < total_)) return;
+  if (!terminal_ || (now() - last_ < 0.1 && done != total_)) return;
   last_ = now();
-  const std::string line = fmt::format("frame {} of {}: {}", done, total_, what);
+  const std::string line = total_ > 0 ? fmt::format("{} {} of {}: {}", thing_, done, total_, what)
+                                      : fmt::format("{} {}: {}", thing_, done, what);
   clear();
   fmt::print(stderr, "\r{}", line);
   std::fflush(stderr);

@@ -9,12 +9,14 @@ namespace cutproof::cli {
 
 class Progress {
  public:
-  explicit Progress(int64_t total);
+  // Of `total` things of this name; 0: nobody knows how many there will be.
+  Progress(std::string thing, int64_t total);
   ~Progress();
   void show(int64_t done, const std::string& what);
 
  private:
   void clear();
+  std::string thing_;
   int64_t total_;
   bool terminal_;
   std::size_t width_ = 0;

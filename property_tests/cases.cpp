@@ -220,6 +220,31 @@ Vec3 edge_direction(const Stroke& stroke) {
   return norm(across) > 0 ? normalized(across) : direction_vector((stroke.back + 2) % 6);
 }
 
+// One frame, or as many as the blade needs so that it does not pass what it pushes (Setup's timetable).
+void add_frames(const Stroke& stroke, Vec3 first_node, const Case& c, Setup& setup) {
+  const double h = c.spacing;
+  const Vec3 from = first_node + metric(stroke.from, h), to = first_node + metric(stroke.to, h);
+  const int32_t substeps = setup.step.substeps;
+  int64_t frames = 1;
+  if (c.moves) {
+    const double most = blade_clearance(setup) * substeps;
+    frames = std::max<int64_t>(1, static_cast<int64_t>(std::ceil(norm(to - from) / most)));
+  }
+  const auto number = static_cast<int32_t>(setup.stroke_end.size());
+  BladeMove move;
+  move.from = {from, edge_direction(stroke), direction_vector(stroke.back)};
+  move.down = stroke.down;
+  move.stroke = stroke.down ? number : -1;
+  for (int64_t k = 1; k <= frames * substeps; ++k) {
+    move.to = move.from;
+    move.to.edge = from + (static_cast<double>(k) / static_cast<double>(frames * substeps)) * (to - from);
+    setup.blade_moves.push_back(move);
+    move.from = move.to;
+  }
+  for (int64_t f = 0; f < frames; ++f) setup.substep_length.push_back(0.001);
+  if (stroke.down) setup.stroke_end.push_back(setup.frame_count() - 1);
+}
+
 // Without iterations rotations stay as they are loaded. Each cluster gets one of its own, so that a stage that gives a
 // cluster the wrong one is seen; small ones, so that the skin keeps its shape.
 void tell_apart(Clusters& clusters) {
@@ -249,6 +274,9 @@ Case draw_case(uint64_t seed, int size) {
   c.side = random.between(1, 6);
   c.seed_spacing = random.between(2, 14);
   c.ball_radius = random.between(4, 18);
+  // Balls of nine times their spacing hold every particle a thousand times: legal, and paid for by every other case, so
+  // they are small and rare.
+  if (size > 40 || random.chance(0.9)) c.seed_spacing = std::max(c.seed_spacing, (c.ball_radius + 2) / 3);
   c.most = random.between(1, 30);
   c.tau = random.between(0, c.most);
   c.cap = random.between(c.most, 3 * c.most);
@@ -265,6 +293,17 @@ Case draw_case(uint64_t seed, int size) {
   c.blade_thickness = random.chance(0.5) ? random.between(0, 10) : random.pick({0, 4, 8, 16, 100});
   const int32_t strokes = random.between(0, 1 + size / 15);
   for (int32_t s = 0; s < strokes; ++s) c.strokes.push_back(draw_stroke(random, dims));
+  return c;
+}
+
+Case draw_moving_case(uint64_t seed, int size) {
+  Case c = draw_case(seed, size);
+  Random random(~seed);
+  c.moves = true;
+  c.substeps = random.between(1, 4);
+  c.iterations = random.between(1, 4);
+  c.stiffness = random.between(3, 6);
+  c.ground = random.chance(0.5);
   return c;
 }
 
@@ -285,9 +324,10 @@ Loaded load(const Case& c) {
   Setup& setup = loaded.setup;
   const double h = c.spacing;
   setup.body = fixtures::body_from_nodes(c.nodes, h);
-  setup.step.substeps = 1;
-  setup.step.iterations = 0;
-  setup.detect.criterion = Criterion::geometric;
+  setup.step.substeps = c.moves ? c.substeps : 1;
+  setup.step.iterations = c.moves ? c.iterations : 0;
+  setup.step.stiffness = std::pow(10.0, c.stiffness);
+  setup.detect.criterion = c.moves ? Criterion::distance : Criterion::geometric;
   setup.split.debris = c.debris;
   setup.merge.rule = c.merge;
   setup.expand = {c.expand, c.expand_depth};
@@ -296,16 +336,11 @@ Loaded load(const Case& c) {
   setup.blade = {c.blade_length * h / 4, c.blade_depth * h / 4, c.blade_thickness * h / 4, 0};
   // Node (0, 0, 0) of the case rests one spacing from the grid's lowest node, behind the ring of empty ones.
   const Vec3 first_node = {h, h, h};
-  for (const Stroke& stroke : resolved_strokes(c)) {
-    BladeMove move;
-    move.from = {first_node + metric(stroke.from, h), edge_direction(stroke), direction_vector(stroke.back)};
-    move.to = move.from;
-    move.to.edge = first_node + metric(stroke.to, h);
-    move.down = stroke.down;
-    move.stroke = stroke.down ? static_cast<int32_t>(setup.blade_moves.size()) : -1;
-    setup.blade_moves.push_back(move);
+  if (c.moves && c.ground) {
+    setup.step.gravity = {0, 0, -9.81};
+    setup.walls = {{2, +1, first_node.z - 0.5 * h, 0.3}};
   }
-  setup.substep_length.assign(setup.blade_moves.size(), 0.001);
+  for (const Stroke& stroke : resolved_strokes(c)) add_frames(stroke, first_node, c, setup);
 
   if (c.clusters == ClusterKind::foreign) {
     loaded.state = fixtures::foreign_state(setup.body, connected_cover(setup.body, c.most, c.seed), c.tau, c.cap);
@@ -408,6 +443,11 @@ std::vector<std::function<void(Case&)>> simplifications(const Case& c) {
   drop_slabs(c.nodes, edits);
   drop_chunks(c.nodes.size(), &Case::nodes, edits);
 
+  towards(c, &Case::moves, false, edits);
+  towards(c, &Case::ground, false, edits);
+  towards(c, &Case::substeps, 1, edits);
+  towards(c, &Case::iterations, 1, edits);
+  towards(c, &Case::stiffness, 5, edits);
   towards(c, &Case::clusters, ClusterKind::boxes, edits);
   if (c.clusters == ClusterKind::foreign) towards(c, &Case::clusters, ClusterKind::sampled, edits);
   towards(c, &Case::merge, MergeRule::none, edits);
@@ -426,6 +466,22 @@ std::vector<std::function<void(Case&)>> simplifications(const Case& c) {
   for (std::size_t k = 0; k < c.strokes.size(); ++k) simplify_stroke(c, k, edits);
   shift(c.nodes, edits);
   return edits;
+}
+
+Case simplest(Case c, const std::function<bool(const Case&)>& fails, const std::function<bool()>& is_over) {
+  for (bool found = true; found && !is_over();) {
+    found = false;
+    for (const auto& edit : simplifications(c)) {
+      if (is_over()) break;
+      Case simpler = c;
+      edit(simpler);
+      if (simpler == c || !fails(simpler)) continue;
+      c = std::move(simpler);
+      found = true;
+      break;
+    }
+  }
+  return c;
 }
 
 // --- JSON ---------------------------------------------------------------------------------------------------------
@@ -452,13 +508,57 @@ namespace cutproof::property_tests {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Case, nodes, spacing, clusters, side, seed_spacing, ball_radius, most, tau, cap,
                                    seed, merge, expand, expand_depth, debris, blade_length, blade_depth,
-                                   blade_thickness, strokes)
+                                   blade_thickness, strokes, moves, substeps, iterations, stiffness, ground)
 
 std::string to_json(const Case& c) { return nlohmann::json(c).dump(); }
 
+namespace {
+
+// Throws std::invalid_argument for numbers that no case can have.
+void require_sane(const Case& c) {
+  const auto require = [](bool holds, const char* field, const char* what) {
+    if (!holds) throw std::invalid_argument(std::string(field) + " must be " + what);
+  };
+  constexpr int32_t kFarthest = 1 << 20;  // [quarters]; a grid beyond that fits no memory
+  const auto is_near = [](const std::array<int32_t, 3>& p, int32_t low) {
+    return std::all_of(p.begin(), p.end(), [&](int32_t q) { return q >= low && q <= kFarthest; });
+  };
+  require(std::is_sorted(c.nodes.begin(), c.nodes.end()) &&
+              std::adjacent_find(c.nodes.begin(), c.nodes.end()) == c.nodes.end() &&
+              std::all_of(c.nodes.begin(), c.nodes.end(), [&](const Node& n) { return is_near(n, 0); }),
+          "nodes", "ascending, without duplicates, between 0 and 2^20");
+  require(c.spacing > 0 && c.spacing <= 1e6, "spacing", "in (0, 1e6]");
+  require(c.side >= 1, "side", ">= 1");
+  require(c.seed_spacing >= 1, "seed_spacing", ">= 1");
+  require(c.ball_radius >= 1, "ball_radius", ">= 1");
+  require(c.most >= 1, "most", ">= 1");
+  require(c.tau >= 0 && c.cap >= 0, "tau and cap", ">= 0");
+  require(c.expand_depth >= 1, "expand_depth", ">= 1");
+  require(c.debris >= 0, "debris", ">= 0");
+  require(c.blade_length > 0 && c.blade_depth > 0 && c.blade_thickness >= 0, "blade_…", "> 0 (thickness: >= 0)");
+  require(c.substeps >= 1 && c.substeps <= 1000, "substeps", "in [1, 1000]");
+  require(c.iterations >= 0 && c.iterations <= 1000, "iterations", "in [0, 1000]");
+  require(c.stiffness >= 0 && c.stiffness <= 12, "stiffness", "in [0, 12]");
+  for (const Stroke& stroke : c.strokes) {
+    require(stroke.back >= 0 && stroke.back < 6, "strokes.back", "in [0, 5]");
+    require(is_near(stroke.from, -kFarthest) && is_near(stroke.to, -kFarthest), "strokes", "within 2^20 of the origin");
+  }
+}
+
+}  // namespace
+
 Case from_json(const std::string& text) {
   try {
-    return nlohmann::json::parse(text).get<Case>();
+    const auto document = nlohmann::json::parse(text);
+    const Case c = document.get<Case>();
+    // What nlohmann reads without a word, such as a rule that does not exist, does not come back as it was.
+    const nlohmann::json again = c;
+    for (const auto& [key, value] : document.items()) {
+      if (!again.contains(key)) throw std::invalid_argument("there is no field '" + key + "'");
+      if (again[key] != value) throw std::invalid_argument(key + ": " + value.dump().substr(0, 60) + " is not known");
+    }
+    require_sane(c);
+    return c;
   } catch (const nlohmann::json::exception& error) {
     throw std::invalid_argument(std::string("This is not a case of the property tests: ") + error.what());
   }

@@ -47,7 +47,13 @@ struct Case {
 
   int32_t blade_length = 400, blade_depth = 400;  // [quarters], > 0
   int32_t blade_thickness = 4;                    // [quarters], >= 0
-  std::vector<Stroke> strokes;                    // one frame each
+  std::vector<Stroke> strokes;                    // one frame each; more if the body moves
+
+  // false: nothing moves, and cuts are geometric. true: the body is soft, and the blade cuts what it stretches apart.
+  bool moves = false;
+  int32_t substeps = 2, iterations = 2;  // moves: of a frame, of a substep
+  int32_t stiffness = 5;                 // moves: log10 of k [1/s²]
+  bool ground = false;                   // moves: gravity, and a floor half a spacing below the lowest node
 
   friend bool operator==(const Case&, const Case&) = default;
 };
@@ -55,8 +61,11 @@ struct Case {
 // A case of a given size, 0 .. 100: from nothing to at most about 20,000 particles, growing slowly; about 30 % of the
 // bodies and of the strokes are degenerate. The same case for the same arguments on every platform.
 Case draw_case(uint64_t seed, int size);
+// The same body, clusters and strokes, and it moves.
+Case draw_moving_case(uint64_t seed, int size);
 
-// Strokes with links resolved, and what a backend loads: geometric cuts, one stroke a frame, one substep, no iteration.
+// Strokes with links resolved, and what a backend loads. If nothing moves: geometric cuts, one stroke a frame, one
+// substep, no iteration.
 std::vector<Stroke> resolved_strokes(const Case& c);
 struct Loaded {
   Setup setup;
@@ -68,6 +77,9 @@ Loaded load(const Case& c);
 // particles, plainer parameters. Repeated as long as one of them keeps a failure, they end: each moves some part
 // towards a fixed value.
 std::vector<std::function<void(Case&)>> simplifications(const Case& c);
+
+// The simplest case found that still `fails`, by such edits; looks no further once `is_over`. Requires fails(c).
+Case simplest(Case c, const std::function<bool(const Case&)>& fails, const std::function<bool()>& is_over);
 
 // One line of JSON. from_json throws std::invalid_argument for anything that is not a case.
 std::string to_json(const Case& c);

@@ -32,7 +32,7 @@ void note_what_a_stage_did(const Setup& setup, Stage stage, const State& before,
   const auto clusters_before = before.clusters.count(), clusters_after = after.clusters.count();
   switch (stage) {
     case Stage::detect: {
-      const bool down = setup.blade_moves[static_cast<std::size_t>(before.frame)].down;
+      const bool down = setup.blade_moves[static_cast<std::size_t>(before.frame * setup.step.substeps)].down;
       if (!after.removed.empty()) judgement[Happened::removal] = true;
       if (after.removed.empty() && down && alive_count(before) > 0) judgement[Happened::miss] = true;
       if (oracles::graph_components(setup, after).count > oracles::graph_components(setup, before).count) {

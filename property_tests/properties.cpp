@@ -386,17 +386,7 @@ TEST(Cases, ShrinkToTheFewestParticlesAndStrokesThatAPlantedFaultNeeds) {
   for (uint64_t seed = 0; shrunk < 5; ++seed) {
     Case c = draw_case(seed, 60);
     if (!fails(c)) continue;
-    for (bool simpler_found = true; simpler_found;) {
-      simpler_found = false;
-      for (const auto& edit : simplifications(c)) {
-        Case simpler = c;
-        edit(simpler);
-        if (simpler == c || !fails(simpler)) continue;
-        c = simpler;
-        simpler_found = true;
-        break;
-      }
-    }
+    c = simplest(c, fails, [] { return false; });
     EXPECT_EQ(c.nodes, (std::vector<Node>{{0, 0, 0}, {0, 0, 1}, {0, 0, 2}})) << "seed " << seed;
     EXPECT_EQ(c.strokes.size(), 1u);
     ++shrunk;

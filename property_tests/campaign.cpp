@@ -1,0 +1,217 @@
+#include "property_tests/campaign.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <new>
+#include <thread>
+
+#include "model/error.h"
+
+namespace cutproof::property_tests {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+Judgement thrown(const std::string& backend, const std::string& what) {
+  Judgement judgement;
+  Verdict verdict;
+  verdict.property = "runs to its end";
+  verdict.backend = backend;
+  verdict.holds = false;
+  verdict.bound_source = "model/backend.h";
+  verdict.witness.text = what;
+  judgement.failure = std::move(verdict);
+  return judgement;
+}
+
+// A backend that nobody else uses, for as long as this lives.
+class Pool {
+ public:
+  Pool(const BackendSource& source, int count) : source_(source), idle_(static_cast<std::size_t>(count)) {}
+
+  std::unique_ptr<Backend> take(int64_t load) {
+    std::unique_ptr<Backend> backend;
+    {
+      std::unique_lock lock(guard_);
+      returned_.wait(lock, [&] { return !idle_.empty(); });
+      backend = std::move(idle_.back());
+      idle_.pop_back();
+    }
+    if (backend && !source_.fresh) return backend;
+    try {
+      return source_.make(load);
+    } catch (...) {
+      give(nullptr);
+      throw;
+    }
+  }
+  void give(std::unique_ptr<Backend> backend) {
+    {
+      const std::lock_guard lock(guard_);
+      idle_.push_back(std::move(backend));
+    }
+    returned_.notify_one();
+  }
+
+ private:
+  const BackendSource& source_;
+  std::mutex guard_;
+  std::condition_variable returned_;
+  std::vector<std::unique_ptr<Backend>> idle_;  // null: not made yet
+};
+
+// One load of cases.
+struct Load {
+  std::vector<int64_t> indices;
+  std::vector<Case> cases;
+  std::vector<Loaded> loaded;
+};
+
+class Runner {
+ public:
+  Runner(const CampaignOptions& options, const BackendSource& source,
+         const std::function<void(const Campaign&)>& progress)
+      : options_(options), source_(source), progress_(progress), pool_(source, options.backends) {}
+
+  Campaign run() {
+    std::vector<std::thread> threads;
+    for (int t = 0; t < options_.threads; ++t) threads.emplace_back([this] { work(); });
+    for (std::thread& thread : threads) thread.join();
+    if (error_) std::rethrow_exception(error_);
+    auto& violations = campaign_.violations;
+    std::sort(violations.begin(), violations.end(),
+              [](const Violation& a, const Violation& b) { return a.index < b.index; });
+    if (!options_.keep_going && violations.size() > 1) violations.erase(violations.begin() + 1, violations.end());
+    campaign_.seconds = seconds_since(begin_);
+    return std::move(campaign_);
+  }
+
+ private:
+  void work() {
+    try {
+      while (!stop_) {
+        const int64_t load = next_++;
+        if (!run_load(load)) return;
+      }
+    } catch (...) {
+      const std::lock_guard lock(guard_);
+      if (!error_) error_ = std::current_exception();
+      stop_ = true;
+    }
+  }
+
+  // False: there is nothing left to do.
+  bool run_load(int64_t number) {
+    const Clock::time_point begin = Clock::now();
+    if (options_.seconds && seconds_since(begin_) >= *options_.seconds) return false;
+    Load load;
+    for (int64_t k = number * options_.batch; k < (number + 1) * options_.batch; ++k) {
+      const int64_t index = options_.shard + k * options_.shards;
+      if (index >= options_.cases) break;
+      load.indices.push_back(index);
+      load.cases.push_back(case_at(options_, index));
+      load.loaded.push_back(property_tests::load(load.cases.back()));
+    }
+    if (load.cases.empty()) return false;
+    const double generating = seconds_since(begin);
+
+    std::unique_ptr<Backend> backend = pool_.take(number);
+    const Clock::time_point running_since = Clock::now();
+    const std::string name = backend->name();
+    std::vector<Trail> trails;
+    std::string problem;
+    try {
+      trails = run_cases(*backend, load.loaded);
+      pool_.give(std::move(backend));
+    } catch (const MachineError&) {
+      pool_.give(nullptr);
+      throw;
+    } catch (const std::bad_alloc&) {
+      pool_.give(nullptr);
+      throw;
+    } catch (const std::exception& error) {
+      problem = error.what();
+      pool_.give(nullptr);  // what threw is not used again
+    }
+    const double running = seconds_since(running_since);
+    const Clock::time_point judging_since = Clock::now();
+    std::vector<Judgement> judgements(load.cases.size());
+    for (std::size_t k = 0; k < load.cases.size(); ++k) {
+      judgements[k] = problem.empty() ? judge_trail(load.cases[k], load.loaded[k], trails[k], name,
+                                                    load.indices[k] % options_.thorough == 0)
+                                      : dissect_alone([&] { return source_.make(number); }, load.cases[k], true);
+    }
+    if (!problem.empty() &&
+        std::none_of(judgements.begin(), judgements.end(), [](const Judgement& j) { return j.failure.has_value(); })) {
+      judgements.front() = thrown(name, "(with the other bodies of its load only) " + problem);
+    }
+    note(load, judgements, generating, running, seconds_since(judging_since));
+    return true;
+  }
+
+  void note(const Load& load, std::vector<Judgement>& judgements, double generating, double running, double judging) {
+    const std::lock_guard lock(guard_);
+    campaign_.generating += generating;
+    campaign_.running += running;
+    campaign_.judging += judging;
+    for (std::size_t k = 0; k < judgements.size(); ++k) {
+      Judgement& judgement = judgements[k];
+      ++campaign_.cases;
+      campaign_.verdicts += judgement.verdicts;
+      campaign_.particles += load.loaded[k].setup.body.particle_count();
+      for (std::size_t h = 0; h < kHappenedCount; ++h) campaign_.happened[h] += judgement.happened[h];
+      if (!judgement.failure) continue;
+      campaign_.violations.push_back({load.indices[k], load.cases[k], std::move(*judgement.failure)});
+      if (!options_.keep_going) stop_ = true;
+    }
+    campaign_.seconds = seconds_since(begin_);
+    if (progress_) progress_(campaign_);
+  }
+
+  const CampaignOptions& options_;
+  const BackendSource& source_;
+  const std::function<void(const Campaign&)>& progress_;
+  Pool pool_;
+  Clock::time_point begin_ = Clock::now();
+  std::atomic<int64_t> next_{0};  // loads are begun in order, so the first violation is found whatever comes after it
+  std::atomic<bool> stop_{false};
+  std::mutex guard_;
+  Campaign campaign_;
+  std::exception_ptr error_;
+};
+
+}  // namespace
+
+Case case_at(const CampaignOptions& options, int64_t index) {
+  const int64_t sizes = options.most_size - options.least_size + 1;
+  const int size = options.least_size + static_cast<int>(index % sizes);
+  const uint64_t seed = options.seed + static_cast<uint64_t>(index);
+  return options.dynamics ? draw_moving_case(seed, size) : draw_case(seed, size);
+}
+
+Campaign run_campaign(const CampaignOptions& options, const BackendSource& source,
+                      const std::function<void(const Campaign&)>& progress) {
+  return Runner(options, source, progress).run();
+}
+
+Judgement dissect_alone(const std::function<std::unique_ptr<Backend>()>& make, const Case& c, bool thorough) {
+  std::string name;
+  try {
+    const std::unique_ptr<Backend> backend = make();
+    name = backend->name();
+    return dissect(*backend, c, thorough);
+  } catch (const MachineError&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& error) {
+    return thrown(name, error.what());
+  }
+}
+
+}  // namespace cutproof::property_tests

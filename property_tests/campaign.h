@@ -1,0 +1,62 @@
+// Random dissections at scale: many bodies in one load, every stage judged by every oracle and compared with the
+// reference. What `cutproof fuzz` runs.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "property_tests/dissection.h"
+
+namespace cutproof::property_tests {
+
+struct CampaignOptions {
+  uint64_t seed = 1;
+  int64_t cases = 1000;           // of the whole campaign, all shards together
+  std::optional<double> seconds;  // begins no further load after so long
+  int least_size = 0, most_size = 79;  // sizes of cases (cases.h) take turns
+  bool dynamics = false;               // bodies move as well, and blades cut what they pass
+  int batch = 64;                      // bodies in one load
+  int threads = 1;                     // each generates, loads, runs and judges whole loads
+  int backends = 1;                    // how many of them may run at once
+  int thorough = 50;                   // every so manieth case with CGAL's geometric check
+  int64_t shard = 0, shards = 1;       // of cases 0, 1, 2, …: those that are `shard` modulo `shards`
+  bool keep_going = false;             // beyond the first violation
+};
+
+// Makes the backend for a load; called once for each of `backends` and never for others if `fresh` is false.
+struct BackendSource {
+  std::function<std::unique_ptr<Backend>(int64_t load)> make;
+  bool fresh = false;  // a new one for every load, e.g. because schedules depend on it
+};
+
+struct Violation {
+  int64_t index = 0;  // of the case
+  Case failing;
+  Verdict verdict;
+};
+
+struct Campaign {
+  int64_t cases = 0, verdicts = 0, particles = 0;
+  std::array<int64_t, kHappenedCount> happened = {};
+  std::vector<Violation> violations;  // by index; without keep_going the first alone
+  double seconds = 0;                 // wall time
+  // Of all threads together [s].
+  double generating = 0, running = 0, judging = 0;
+};
+
+// Case `index` of a campaign: the same on every platform, whatever the batch, the shards and the backend.
+Case case_at(const CampaignOptions& options, int64_t index);
+
+// `progress` is called from any thread, one at a time, after every load. Throws what the machine throws (MachineError,
+// std::bad_alloc); whatever else a backend throws is a violation of the case that makes it throw.
+Campaign run_campaign(const CampaignOptions& options, const BackendSource& source,
+                      const std::function<void(const Campaign&)>& progress);
+
+// One case alone; a backend that throws gives a failing verdict.
+Judgement dissect_alone(const std::function<std::unique_ptr<Backend>()>& make, const Case& c, bool thorough);
+
+}  // namespace cutproof::property_tests

@@ -1,0 +1,84 @@
+#include "property_tests/counterexample.h"
+
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "model/error.h"
+
+namespace cutproof::property_tests {
+namespace {
+
+constexpr const char* kFormat = "cutproof.counterexample";
+constexpr int kVersion = 1;
+// Beyond what any run decides; a number larger than this is a mistake, and would ask for that much memory.
+constexpr std::size_t kMostDecisions = 100'000'000;
+
+}  // namespace
+
+std::string to_json(const Counterexample& counterexample) {
+  nlohmann::json choices = nlohmann::json::array();
+  for (std::size_t k = 0; k < counterexample.schedule.size(); ++k) {
+    if (counterexample.schedule[k] != 0) choices.push_back({k, counterexample.schedule[k]});
+  }
+  return nlohmann::json{{"format", kFormat},
+                        {"format_version", kVersion},
+                        {"backend", counterexample.backend},
+                        {"split", counterexample.split},
+                        {"schedule", choices},
+                        {"found", counterexample.found},
+                        {"seed", counterexample.seed},
+                        {"index", counterexample.index},
+                        {"case", nlohmann::json::parse(to_json(counterexample.failing))}}
+      .dump();
+}
+
+Counterexample counterexample_from_json(const std::string& text, const std::string& file) {
+  const auto refuse = [&](const std::string& field, const std::string& problem) -> InputError {
+    return {file, field, problem, "give a file that `cutproof fuzz` has saved"};
+  };
+  Counterexample result;
+  std::string field;
+  try {
+    const auto document = nlohmann::json::parse(text);
+    if (!document.is_object()) throw refuse("", "this is not a counterexample");
+    if (!document.contains("format")) {
+      result.failing = from_json(text);
+      return result;
+    }
+    const auto get = [&](const char* name, auto& value) {
+      field = name;
+      document.at(name).get_to(value);
+    };
+    std::string format;
+    int version = 0;
+    get("format", format);
+    if (format != kFormat) throw refuse("format", "'" + format + "' is not '" + kFormat + "'");
+    get("format_version", version);
+    if (version != kVersion) {
+      throw refuse("format_version", "version " + std::to_string(version) + " is not known here, only " +
+                                         std::to_string(kVersion) + " is");
+    }
+    get("backend", result.backend);
+    get("split", result.split);
+    get("found", result.found);
+    get("seed", result.seed);
+    get("index", result.index);
+    std::vector<std::pair<std::size_t, std::uint16_t>> choices;
+    get("schedule", choices);
+    for (const auto& [decision, choice] : choices) {
+      if (decision >= kMostDecisions) throw refuse("schedule", "a decision with number " + std::to_string(decision));
+      if (decision >= result.schedule.size()) result.schedule.resize(decision + 1, 0);
+      result.schedule[decision] = choice;
+    }
+    field = "case";
+    result.failing = from_json(document.at("case").dump());
+    return result;
+  } catch (const nlohmann::json::exception& error) {
+    throw refuse(field, error.what());
+  } catch (const std::invalid_argument& error) {
+    throw refuse(field, error.what());
+  }
+}
+
+}  // namespace cutproof::property_tests
