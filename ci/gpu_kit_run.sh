@@ -52,18 +52,24 @@ for part in $parts; do
         try "determinism_same_$file" cmp "$work/first.$file" "$work/second.$file"
       done ;;
     properties)
-      try properties random_cuts --backend gpu --cases "$cases" --json "$results/properties.json"
-      try properties_global_labels random_cuts --backend gpu --split global --cases 10000 --seed 1000001 --json "$results/properties_global_labels.json"
+      try fuzz cutproof fuzz --backend gpu --cases "$cases" --save "$results" --json "$results/fuzz.json"
+      try fuzz_global_labels cutproof fuzz --backend gpu --split global --cases 10000 --seed 1000001 \
+        --save "$results" --json "$results/fuzz_global_labels.json"
+      try fuzz_dynamics cutproof fuzz --backend gpu --dynamics --cases 10000 --seed 2000001 \
+        --save "$results" --json "$results/fuzz_dynamics.json"
       try rapidcheck property_tests --gtest_filter='*/gpu*:Cases*' ;;
     sanitizer)
       for tool in memcheck racecheck initcheck synccheck; do
         # One by one and not as a graph: racecheck does not know conditional nodes.
-        try "sanitizer_$tool" compute-sanitizer --tool "$tool" --error-exitcode 9 random_cuts --backend gpu --eager \
-          --cases "${CUTPROOF_SANITIZER_CASES:-128}" --batch 64
+        try "sanitizer_$tool" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof fuzz \
+          --backend gpu-eager --cases "${CUTPROOF_SANITIZER_CASES:-128}" --save "$results"
         try "sanitizer_${tool}_step" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof run \
           fixtures/scenes/small_block.json --backend gpu-eager
       done ;;
-    timings) try timings cutproof bench stages --backend gpu --json "$results/stages.json" ;;
+    timings)
+      try timings cutproof bench stages --backend gpu --split both --json "$results/stages.json"
+      # A body of ten million particles for 100 frames, a blade cutting.
+      try ten_million cutproof bench stages --backend gpu --sizes 10000000 --frames 100 --json "$results/stages_10M.json" ;;
     *) echo "run.sh: there is no part '$part'" >&2; exit 2 ;;
   esac
 done
