@@ -60,9 +60,10 @@ for part in $parts; do
       try rapidcheck property_tests --gtest_filter='*/gpu*:Cases*' ;;
     sanitizer)
       for tool in memcheck racecheck initcheck synccheck; do
-        # One by one and not as a graph: racecheck does not know conditional nodes.
+        # One by one and not as a graph: racecheck does not know conditional nodes. From one thread: it ends no kernel
+        # while another is being launched.
         try "sanitizer_$tool" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof fuzz \
-          --backend gpu-eager --cases "${CUTPROOF_SANITIZER_CASES:-128}" --save "$results"
+          --backend gpu-eager --threads 1 --cases "${CUTPROOF_SANITIZER_CASES:-128}" --save "$results"
         try "sanitizer_${tool}_step" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof run \
           fixtures/scenes/small_block.json --backend gpu-eager
       done ;;

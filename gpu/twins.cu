@@ -185,25 +185,31 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-// Both in turns, so that clocks and caches treat them alike; the first launches do not count.
+// Both in turns, so that clocks and caches treat them alike; the first turns do not count. A turn is a queue of
+// launches: of a single one the host's own time to launch it would be part.
+constexpr int kLaunchesInATurn = 16;
 template <class Layer, class Plain>
 void time_both(Layer layer, Plain plain, int launches, TwinResult& result) {
   Event before, between, after;
   std::vector<double> layer_times, plain_times;
   constexpr int kWarmUp = 5;
+  const auto turn = [](const auto& launch) {
+    for (int k = 0; k < kLaunchesInATurn; ++k) launch();
+  };
   for (int i = 0; i < launches + kWarmUp; ++i) {
     before.record();
     if (i % 2 == 0)
-      layer();
+      turn(layer);
     else
-      plain();
+      turn(plain);
     between.record();
     if (i % 2 == 0)
-      plain();
+      turn(plain);
     else
-      layer();
+      turn(layer);
     after.record();
-    const double first = between.microseconds_since(before), second = after.microseconds_since(between);
+    const double first = between.microseconds_since(before) / kLaunchesInATurn;
+    const double second = after.microseconds_since(between) / kLaunchesInATurn;
     if (i < kWarmUp) continue;
     layer_times.push_back(i % 2 == 0 ? first : second);
     plain_times.push_back(i % 2 == 0 ? second : first);
