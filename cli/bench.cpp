@@ -430,10 +430,16 @@ std::vector<std::string> split_names(const std::string& wanted) {
 
 Contender make_contender(const BackendChoice& choice) {
   const bool kernels = choice.name != "reference";
-  Contender contender{choice.name, "", kernels ? "single" : "double", kernels ? rotation_of(choice) : "horn",
-                      kernels ? choice.split : "search", false, kernels, make_backend(choice)};
-  contender.device = kernels ? fmt::format("{}, {} threads", cpu_description(), cpu_threads())
-                             : cpu_description() + ", 1 thread";
+  Contender contender{choice.name,
+                      "",
+                      kernels ? "single" : "double",
+                      kernels ? rotation_of(choice) : "horn",
+                      kernels ? choice.split : "search",
+                      false,
+                      kernels,
+                      make_backend(choice)};
+  contender.device =
+      kernels ? fmt::format("{}, {} threads", cpu_description(), cpu_threads()) : cpu_description() + ", 1 thread";
 #if CUTPROOF_HAS_CUDA
   if (choice.name == "gpu") {
     std::string why;
@@ -450,7 +456,8 @@ std::vector<Contender> make_contenders(const BenchOptions& options) {
   choice.rotation = options.rotation;
   choice.split = options.split;
   if (choice.name == "simulated" || choice.name == "gpu-eager") {
-    throw InputError("command line", "--backend", fmt::format("'{}' is for finding faults, not for timing", choice.name),
+    throw InputError("command line", "--backend",
+                     fmt::format("'{}' is for finding faults, not for timing", choice.name),
                      "use reference, host or gpu");
   }
   std::vector<Contender> contenders;

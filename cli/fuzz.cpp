@@ -91,7 +91,8 @@ BackendChoice choice_for(BackendChoice choice, int64_t load) {
   return choice;
 }
 
-// --- Results of campaigns ---------------------------------------------------------------------------------------------
+// --- Results of campaigns
+// ---------------------------------------------------------------------------------------------
 
 json violation_json(const Violation& violation, const std::string& file) {
   return {{"index", violation.index},
@@ -105,31 +106,30 @@ json campaign_json(const FuzzOptions& options, const CampaignOptions& asked, con
                    const json& violations) {
   json happened = json::object();
   for (std::size_t h = 0; h < kHappenedCount; ++h) happened[kHappenedNames[h]] = campaign.happened[h];
-  json document = {{"format", kFormat},
-                   {"format_version", kVersion},
-                   {"version", cutproof::cli::kVersion},
-                   {"backend", options.backend.name},
-                   {"split", options.backend.split.empty() ? "blocks" : options.backend.split},
-                   {"seed", asked.seed},
-                   {"sizes", {asked.least_size, asked.most_size}},
-                   {"dynamics", asked.dynamics},
-                   {"batch", asked.batch},
-                   {"threads", asked.threads},
-                   {"shard", asked.shard + 1},
-                   {"shards", asked.shards},
-                   {"cases", campaign.cases},
-                   {"verdicts", campaign.verdicts},
-                   {"mean_particles",
-                    campaign.cases == 0 ? 0.0
-                                        : static_cast<double>(campaign.particles) / static_cast<double>(campaign.cases)},
-                   {"seconds", campaign.seconds},
-                   {"cases_per_second",
-                    campaign.seconds > 0 ? static_cast<double>(campaign.cases) / campaign.seconds : 0.0},
-                   {"thread_seconds",
-                    {{"generating", campaign.generating}, {"running", campaign.running}, {"judging", campaign.judging}}},
-                   {"happened", happened},
-                   {"violations", violations},
-                   {"holds", violations.empty()}};
+  json document = {
+      {"format", kFormat},
+      {"format_version", kVersion},
+      {"version", cutproof::cli::kVersion},
+      {"backend", options.backend.name},
+      {"split", options.backend.split.empty() ? "blocks" : options.backend.split},
+      {"seed", asked.seed},
+      {"sizes", {asked.least_size, asked.most_size}},
+      {"dynamics", asked.dynamics},
+      {"batch", asked.batch},
+      {"threads", asked.threads},
+      {"shard", asked.shard + 1},
+      {"shards", asked.shards},
+      {"cases", campaign.cases},
+      {"verdicts", campaign.verdicts},
+      {"mean_particles",
+       campaign.cases == 0 ? 0.0 : static_cast<double>(campaign.particles) / static_cast<double>(campaign.cases)},
+      {"seconds", campaign.seconds},
+      {"cases_per_second", campaign.seconds > 0 ? static_cast<double>(campaign.cases) / campaign.seconds : 0.0},
+      {"thread_seconds",
+       {{"generating", campaign.generating}, {"running", campaign.running}, {"judging", campaign.judging}}},
+      {"happened", happened},
+      {"violations", violations},
+      {"holds", violations.empty()}};
   if (options.seconds) {
     document["seconds_asked"] = *options.seconds;
   } else {
@@ -229,9 +229,8 @@ int merge(const FuzzOptions& options) {
     if (!shards.contains(shard)) missing.push_back(shard);
   }
   if (!missing.empty()) {
-    throw InputError("command line", "--merge", fmt::format("of {} shards these are missing: {}", expected,
-                                                            fmt::join(missing, ", ")),
-                     remedy);
+    throw InputError("command line", "--merge",
+                     fmt::format("of {} shards these are missing: {}", expected, fmt::join(missing, ", ")), remedy);
   }
   whole["holds"] = whole.at("violations").empty();
   whole["shard"] = 1;
@@ -246,7 +245,8 @@ int merge(const FuzzOptions& options) {
   return conclude(whole, true);
 }
 
-// --- Counterexamples --------------------------------------------------------------------------------------------------
+// --- Counterexamples
+// --------------------------------------------------------------------------------------------------
 
 // Frames as a recording holds them (io::Recorder).
 void record(const std::string& name, const Loaded& loaded, const Trail& trail, const std::string& backend) {
@@ -319,7 +319,8 @@ Simplified simplify(const Violation& violation, const BackendChoice& choice) {
   found.failing = simplest(violation.failing, fails, is_over);
   if (simulated) {
     const auto schedule = std::make_shared<gpu::Schedule>();
-    static_cast<void>(dissect_alone([&] { return make_recorded_backend(failing_choice, schedule); }, found.failing, true));
+    static_cast<void>(
+        dissect_alone([&] { return make_recorded_backend(failing_choice, schedule); }, found.failing, true));
     found.schedule = gpu::shrink(*schedule, [&](const gpu::Schedule& tried) {
       if (is_over()) return false;
       return dissect_alone([&] { return make_replaying_backend(failing_choice, tried); }, found.failing, true)
@@ -345,7 +346,8 @@ std::string keep(const Violation& violation, const FuzzOptions& options, const B
   simplified.counterexample.seed = options.seed;
   const Counterexample& found = simplified.counterexample;
   const std::string stem =
-      (std::filesystem::path(options.save) / fmt::format("{}_{}_{}", choice.name, options.seed, violation.index)).string();
+      (std::filesystem::path(options.save) / fmt::format("{}_{}_{}", choice.name, options.seed, violation.index))
+          .string();
   const std::string file = stem + ".json";
   io::write_text(file, to_json(found) + "\n");
   if (simplified.alone) {
@@ -387,7 +389,8 @@ int fuzz(const FuzzOptions& options) {
     const int64_t of_this_shard = (asked.cases - asked.shard + asked.shards - 1) / asked.shards;
     Progress progress("case", options.seconds ? 0 : of_this_shard);
     campaign = run_campaign(asked, source, [&](const Campaign& so_far) {
-      const auto classes = std::count_if(so_far.happened.begin(), so_far.happened.end(), [](int64_t n) { return n > 0; });
+      const auto classes =
+          std::count_if(so_far.happened.begin(), so_far.happened.end(), [](int64_t n) { return n > 0; });
       progress.show(so_far.cases, fmt::format("{:.0f} cases/s, {} of {} classes met, {} violations",
                                               static_cast<double>(so_far.cases) / so_far.seconds, classes,
                                               kHappenedCount, so_far.violations.size()));

@@ -149,7 +149,8 @@ int run(const RunOptions& options) {
   std::optional<io::AtomicFile> json_file;
   if (!options.json.empty()) json_file.emplace(options.json);
   std::optional<io::Recorder> recorder;
-  if (!options.record.empty()) recorder.emplace(options.record, built.setup, io::write_scene(scene), options.backend.name);
+  if (!options.record.empty())
+    recorder.emplace(options.record, built.setup, io::write_scene(scene), options.backend.name);
   std::optional<Gate> gate;
   std::optional<Against> against;
   print_header(scene, built, options);

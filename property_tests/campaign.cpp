@@ -200,17 +200,15 @@ Campaign run_campaign(const CampaignOptions& options, const BackendSource& sourc
 }
 
 Judgement dissect_alone(const std::function<std::unique_ptr<Backend>()>& make, const Case& c, bool thorough) {
-  std::string name;
+  const std::unique_ptr<Backend> backend = make();
   try {
-    const std::unique_ptr<Backend> backend = make();
-    name = backend->name();
     return dissect(*backend, c, thorough);
   } catch (const MachineError&) {
     throw;
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception& error) {
-    return thrown(name, error.what());
+    return thrown(backend->name(), error.what());
   }
 }
 

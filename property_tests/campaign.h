@@ -15,8 +15,8 @@ namespace cutproof::property_tests {
 
 struct CampaignOptions {
   uint64_t seed = 1;
-  int64_t cases = 1000;           // of the whole campaign, all shards together
-  std::optional<double> seconds;  // begins no further load after so long
+  int64_t cases = 1000;                // of the whole campaign, all shards together
+  std::optional<double> seconds;       // begins no further load after so long
   int least_size = 0, most_size = 79;  // sizes of cases (cases.h) take turns
   bool dynamics = false;               // bodies move as well, and blades cut what they pass
   int batch = 64;                      // bodies in one load

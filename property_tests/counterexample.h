@@ -1,5 +1,5 @@
-// A violation as data: what `cutproof fuzz` saves, what `cutproof replay` and the property tests run again. Data and not
-// a seed, because seeds change their meaning when generators do.
+// A violation as data: what `cutproof fuzz` saves, what `cutproof replay` and the property tests run again. Data and
+// not a seed, because seeds change their meaning when generators do.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -11,12 +11,12 @@ namespace cutproof::property_tests {
 
 struct Counterexample {
   Case failing;
-  std::string backend;      // on which it was found, and how its clusters were split; empty: nothing is known
+  std::string backend;  // on which it was found, and how its clusters were split; empty: nothing is known
   std::string split;
-  gpu::Schedule schedule;   // `simulated`: the choices that make it fail; empty: none were recorded
-  std::string found;        // what was wrong, for a person
-  uint64_t seed = 0;        // of the campaign
-  int64_t index = 0;        // of the case in it, before it was simplified
+  gpu::Schedule schedule;  // `simulated`: the choices that make it fail; empty: none were recorded
+  std::string found;       // what was wrong, for a person
+  uint64_t seed = 0;       // of the campaign
+  int64_t index = 0;       // of the case in it, before it was simplified
 };
 
 // JSON, one line. The schedule is written as pairs [decision, choice] of the choices that are not 0.

@@ -2,15 +2,10 @@
 #include "cli/against.h"
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <functional>
 #include <limits>
 
@@ -19,6 +14,7 @@
 #include "gpu/backends.h"
 #include "model/io/scene_io.h"
 #include "reference_cpu/reference.h"
+#include "tests/cli/program.h"
 
 namespace cutproof::cli {
 namespace {
@@ -493,30 +489,14 @@ TEST(WithinItsRounding, AFreeAxisOfACollinearClusterIsEither) {
 
 // --- The program ----------------------------------------------------------------------------------------------------
 
-struct Outcome {
-  int status = -1;
-  std::string output;
-};
-Outcome cutproof(const std::string& arguments) {
-  FILE* pipe = popen(("'" CUTPROOF_PROGRAM "' " + arguments + " 2>&1").c_str(), "r");
-  Outcome outcome;
-  std::array<char, 4096> buffer;
-  for (std::size_t n; (n = fread(buffer.data(), 1, buffer.size(), pipe)) > 0;) outcome.output.append(buffer.data(), n);
-  const int status = pclose(pipe);
-  outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  return outcome;
-}
+class TheProgram : public Program {};
 const std::string kScene = "'" CUTPROOF_SOURCE "/fixtures/scenes/small_block.json'";
 
-TEST(TheProgram, ComparesTheKernelsWithTheReferenceAndWritesEveryFrame) {
-  const auto file = std::filesystem::temp_directory_path() / ("cutproof.against." + std::to_string(getpid()) + ".json");
-  const Outcome outcome =
-      cutproof("run " + kScene + " --frames 12 --backend host --against reference --json '" + file.string() + "'");
+TEST_F(TheProgram, ComparesTheKernelsWithTheReferenceAndWritesEveryFrame) {
+  const Outcome outcome = cutproof("run " + kScene + " --frames 12 --backend host --against reference --json out.json");
   EXPECT_EQ(outcome.status, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("lockstep: topology"), std::string::npos) << outcome.output;
-  std::ifstream stream(file);
-  const nlohmann::json document = nlohmann::json::parse(stream);
-  std::filesystem::remove(file);
+  const nlohmann::json document = nlohmann::json::parse(read("out.json"));
   const nlohmann::json& against = document["against"];
   EXPECT_EQ(against["mode"], "both");
   EXPECT_EQ(against["holds"], true);
@@ -528,7 +508,7 @@ TEST(TheProgram, ComparesTheKernelsWithTheReferenceAndWritesEveryFrame) {
   EXPECT_GT(against["lockstep"]["frames"]["position_max"][5], 0.0);
 }
 
-TEST(TheProgram, ComparesInOneModeOnlyIfAsked) {
+TEST_F(TheProgram, ComparesInOneModeOnlyIfAsked) {
   const Outcome lockstep = cutproof("run " + kScene + " --frames 2 --against reference --mode lockstep");
   EXPECT_EQ(lockstep.status, 0);
   EXPECT_EQ(lockstep.output.find("shadow"), std::string::npos) << lockstep.output;
@@ -537,7 +517,7 @@ TEST(TheProgram, ComparesInOneModeOnlyIfAsked) {
   EXPECT_NE(shadow.output.find("cluster connectivity"), std::string::npos) << "--check works beside it";
 }
 
-TEST(TheProgram, RefusesToCompareWithAnythingElse) {
+TEST_F(TheProgram, RefusesToCompareWithAnythingElse) {
   const Outcome outcome = cutproof("run " + kScene + " --against host");
   EXPECT_EQ(outcome.status, 2);
   EXPECT_NE(outcome.output.find("'host' is nothing to compare with"), std::string::npos) << outcome.output;

@@ -2,14 +2,9 @@
 #include "cli/bench.h"
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <array>
 #include <cmath>
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -17,10 +12,10 @@
 #include <utility>
 
 #include "reference_cpu/reference.h"
+#include "tests/cli/program.h"
 
 namespace {
 
-namespace files = std::filesystem;
 using cutproof::Backend;
 using cutproof::Setup;
 using cutproof::Span;
@@ -32,35 +27,12 @@ using nlohmann::json;
 
 // --- The program -----------------------------------------------------------------------------------------------------
 
-struct Outcome {
-  int status = -1;
-  std::string output;  // standard output and standard error
-};
-
-class Bench : public testing::Test {
+class Bench : public Program {
  protected:
-  void SetUp() override {
-    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = files::temp_directory_path() / (std::string("cutproof.") + info->name() + "." + std::to_string(getpid()));
-    files::create_directories(folder_);
-  }
-  void TearDown() override { files::remove_all(folder_); }
-
   Outcome bench(const std::string& arguments, const std::string& environment = "") const {
-    const std::string command =
-        "cd '" + folder_.string() + "' && " + environment + " '" CUTPROOF_PROGRAM "' bench " + arguments + " 2>&1";
-    FILE* pipe = popen(command.c_str(), "r");
-    Outcome outcome;
-    std::array<char, 4096> buffer;
-    for (std::size_t n; (n = fread(buffer.data(), 1, buffer.size(), pipe)) > 0;)
-      outcome.output.append(buffer.data(), n);
-    const int status = pclose(pipe);
-    outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-    return outcome;
+    return cutproof("bench " + arguments, environment);
   }
-  json read(const std::string& name) const { return json::parse(std::ifstream(folder_ / name)); }
-
-  files::path folder_;
+  json result(const std::string& name) const { return json::parse(read(name)); }
 };
 
 // Every row that bench.cpp owes, each with an error where it ran.
@@ -112,7 +84,7 @@ TEST_F(Bench, TellsEveryTimeOfTheReferenceWithItsError) {
   const Outcome outcome =
       bench("stages --sizes 1000,3000 --frames 3 --json out.json", "CUTPROOF_COMMIT=0123456789ab-dirty");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
-  const json document = read("out.json");
+  const json document = result("out.json");
   expect_rows(document, "reference", "double", {"box_1000", "kidney_3000"}, {"search"});
   EXPECT_EQ(document.at("commit"), "0123456789ab-dirty");
   for (const json& row : document.at("rows")) {
@@ -128,7 +100,7 @@ TEST_F(Bench, TellsEveryTimeOfTheReferenceWithItsError) {
 TEST_F(Bench, TellsBothWaysOfSplittingOnTheHost) {
   const Outcome outcome = bench("stages --backend host --sizes 1000 --frames 3 --split both --json out.json");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
-  const json document = read("out.json");
+  const json document = result("out.json");
   expect_rows(document, "host", "single", {"box_1000"}, {"blocks", "global"});
   EXPECT_FALSE(document.contains("commit"));
   for (const json& row : document.at("rows")) {

@@ -1,78 +1,14 @@
 // The program as a user meets it: scenes, meshes, recordings, bad input, exit statuses.
-#include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
+#include "tests/cli/program.h"
 
-#include <array>
-#include <cstdio>
+#include <gtest/gtest.h>
+
 #include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <set>
-#include <string>
 
 namespace {
 
-namespace files = std::filesystem;
 using nlohmann::json;
-
-struct Outcome {
-  int status = -1;
-  std::string output;  // standard output and standard error
-};
-
-// A folder of its own for each test, removed at the end.
-class Program : public testing::Test {
- protected:
-  void SetUp() override {
-    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    std::string name = std::string(info->test_suite_name()) + "." + info->name() + "." + std::to_string(getpid());
-    for (char& c : name) c = c == '/' ? '_' : c;
-    folder_ = files::temp_directory_path() / ("cutproof." + name);
-    files::create_directories(folder_);
-  }
-  void TearDown() override { files::remove_all(folder_); }
-
-  static std::string scene(const std::string& name) {
-    return (files::path(CUTPROOF_SOURCE) / "fixtures/scenes" / (name + ".json")).string();
-  }
-  Outcome cutproof(const std::string& arguments) const {
-    const std::string command = "cd '" + folder_.string() + "' && '" CUTPROOF_PROGRAM "' " + arguments + " 2>&1";
-    FILE* pipe = popen(command.c_str(), "r");
-    Outcome outcome;
-    std::array<char, 4096> buffer;
-    for (std::size_t n; (n = fread(buffer.data(), 1, buffer.size(), pipe)) > 0;)
-      outcome.output.append(buffer.data(), n);
-    const int status = pclose(pipe);
-    outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-    return outcome;
-  }
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
-  void write(const std::string& name, const std::string& text) const {
-    std::ofstream(path(name), std::ios::binary) << text;
-  }
-  std::string read(const std::string& name) const {
-    std::ifstream file(path(name), std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
-  std::set<std::string> listing() const {
-    std::set<std::string> names;
-    for (const auto& entry : files::directory_iterator(folder_)) names.insert(entry.path().filename());
-    return names;
-  }
-  void expect_refused(const std::string& arguments, const std::vector<std::string>& words) const {
-    const std::set<std::string> before = listing();
-    const Outcome outcome = cutproof(arguments);
-    EXPECT_EQ(outcome.status, 2) << arguments << "\n" << outcome.output;
-    for (const std::string& word : words) {
-      EXPECT_NE(outcome.output.find(word), std::string::npos) << "no '" << word << "' in:\n" << outcome.output;
-    }
-    EXPECT_EQ(listing(), before) << "something was written";
-  }
-
-  files::path folder_;
-};
 
 json small_block(const std::string& name = "small") {
   return json::parse(R"({"version": 1, "body": {"shape": {"kind": "box", "size": [0.06, 0.05, 0.05]}, "spacing": 0.01},
@@ -84,19 +20,35 @@ json small_block(const std::string& name = "small") {
 
 // --- The paper's scenes ---------------------------------------------------------------------------------------------
 
-class Scene : public Program, public testing::WithParamInterface<std::string> {};
+struct SceneOn {
+  std::string scene, backend;
+};
+void PrintTo(const SceneOn& tested, std::ostream* os) { *os << tested.scene << " on " << tested.backend; }
+class Scene : public Program, public testing::WithParamInterface<SceneOn> {};
 
 TEST_P(Scene, HoldsWithEveryCheckOn) {
-  const Outcome outcome = cutproof("run " + scene(GetParam()) + " --check");
+  const Outcome outcome = cutproof("run " + scene(GetParam().scene) + " --check --backend " + GetParam().backend);
   EXPECT_EQ(outcome.status, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("0 failed: everything holds."), std::string::npos);
 }
 
-INSTANTIATE_TEST_SUITE_P(OfThePaper, Scene,
-                         testing::Values("cuboid_press", "uniform_stretch", "uniform_stretch_strain", "three_cuts",
-                                         "liver_cut", "kidney_arc", "kidney_discontinuous", "irregular_sampled",
-                                         "irregular_sampled_covered", "cluster_growth", "small_block", "kidney_37704"),
-                         [](const auto& instance) { return instance.param; });
+// Under a simulated schedule those of which a run takes seconds; docs/results has all of them.
+std::vector<SceneOn> scenes_and_backends() {
+  std::vector<SceneOn> all;
+  for (const char* scene : {"cuboid_press", "uniform_stretch", "uniform_stretch_strain", "three_cuts", "liver_cut",
+                            "kidney_arc", "kidney_discontinuous", "irregular_sampled", "irregular_sampled_covered",
+                            "cluster_growth", "small_block", "kidney_37704"}) {
+    all.push_back({scene, "reference"});
+    all.push_back({scene, "host"});
+  }
+  for (const char* scene :
+       {"cuboid_press", "three_cuts", "liver_cut", "kidney_arc", "kidney_discontinuous", "small_block"}) {
+    all.push_back({scene, "simulated"});
+  }
+  return all;
+}
+INSTANTIATE_TEST_SUITE_P(OfThePaper, Scene, testing::ValuesIn(scenes_and_backends()),
+                         [](const auto& instance) { return instance.param.scene + "_on_" + instance.param.backend; });
 
 struct OnMesh {
   std::string scene, mesh;

@@ -1,0 +1,74 @@
+// The program as a user meets it: run in a folder of its own, its exit status and what it prints.
+#pragma once
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace files = std::filesystem;
+
+struct Outcome {
+  int status = -1;
+  std::string output;  // standard output and standard error
+};
+
+// A folder of its own for each test, removed at the end.
+class Program : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    std::string name = std::string(info->test_suite_name()) + "." + info->name() + "." + std::to_string(getpid());
+    for (char& c : name) c = c == '/' ? '_' : c;
+    folder_ = files::temp_directory_path() / ("cutproof." + name);
+    files::create_directories(folder_);
+  }
+  void TearDown() override { files::remove_all(folder_); }
+
+  static std::string scene(const std::string& name) {
+    return (files::path(CUTPROOF_SOURCE) / "fixtures/scenes" / (name + ".json")).string();
+  }
+  // `environment`: variables for the program, as a shell writes them.
+  Outcome cutproof(const std::string& arguments, const std::string& environment = "") const {
+    const std::string command =
+        "cd '" + folder_.string() + "' && " + environment + " '" CUTPROOF_PROGRAM "' " + arguments + " 2>&1";
+    FILE* pipe = popen(command.c_str(), "r");
+    Outcome outcome;
+    std::array<char, 4096> buffer;
+    for (std::size_t n; (n = fread(buffer.data(), 1, buffer.size(), pipe)) > 0;)
+      outcome.output.append(buffer.data(), n);
+    const int status = pclose(pipe);
+    outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    return outcome;
+  }
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(path(name), std::ios::binary) << text;
+  }
+  std::string read(const std::string& name) const {
+    std::ifstream file(path(name), std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  std::set<std::string> listing() const {
+    std::set<std::string> names;
+    for (const auto& entry : files::directory_iterator(folder_)) names.insert(entry.path().filename());
+    return names;
+  }
+  void expect_refused(const std::string& arguments, const std::vector<std::string>& words) const {
+    const std::set<std::string> before = listing();
+    const Outcome outcome = cutproof(arguments);
+    EXPECT_EQ(outcome.status, 2) << arguments << "\n" << outcome.output;
+    for (const std::string& word : words) {
+      EXPECT_NE(outcome.output.find(word), std::string::npos) << "no '" << word << "' in:\n" << outcome.output;
+    }
+    EXPECT_EQ(listing(), before) << "something was written";
+  }
+
+  files::path folder_;
+};

@@ -1,0 +1,223 @@
+// Campaigns find what is planted, wherever it is, and the first of it; counterexamples come back from their files.
+#include "property_tests/campaign.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <stdexcept>
+
+#include "gpu/backends.h"
+#include "model/error.h"
+#include "property_tests/counterexample.h"
+#include "reference_cpu/reference.h"
+
+namespace cutproof::property_tests {
+namespace {
+
+// The reference with something planted in what it shows or does.
+class Planted final : public Backend {
+ public:
+  using Change = std::function<void(State&)>;
+  using Refusal = std::function<void(const Setup&)>;
+  explicit Planted(Change change, Refusal refuse = {}) : change_(std::move(change)), refuse_(std::move(refuse)) {}
+
+  std::string name() const override { return "planted"; }
+  bool can_run(Span span) const override { return inner_->can_run(span); }
+  void load(std::vector<Setup> setups, std::vector<State> states) override {
+    if (refuse_) std::for_each(setups.begin(), setups.end(), refuse_);
+    inner_->load(std::move(setups), std::move(states));
+  }
+  void run(Span span) override { inner_->run(span); }
+  std::vector<State> snapshot() const override {
+    std::vector<State> states = inner_->snapshot();
+    if (change_) std::for_each(states.begin(), states.end(), change_);
+    return states;
+  }
+  SpanReport report() const override { return inner_->report(); }
+
+ private:
+  std::unique_ptr<Backend> inner_ = reference::make_backend();
+  Change change_;
+  Refusal refuse_;
+};
+
+// Wrong after the second frame, if something was removed in it.
+void break_second_cut(State& state) {
+  if (state.frame == 2 && !state.removed.empty()) state.edge_covered = !state.edge_covered;
+}
+
+CampaignOptions small_campaign(int64_t cases) {
+  CampaignOptions options;
+  options.cases = cases;
+  options.most_size = 40;
+  options.seed = 3;
+  return options;
+}
+
+const BackendSource kReference{[](int64_t) { return reference::make_backend(); }, false};
+
+TEST(Campaign, JudgesEveryCaseOnceWhateverTheLoadsAndThreads) {
+  const Campaign one = run_campaign(small_campaign(150), kReference, {});
+  CampaignOptions options = small_campaign(150);
+  options.batch = 7;
+  options.threads = options.backends = 3;
+  const Campaign other = run_campaign(options, kReference, {});
+  EXPECT_EQ(one.cases, 150);
+  EXPECT_TRUE(one.violations.empty());
+  EXPECT_GT(one.verdicts, 1000);
+  EXPECT_EQ(other.cases, one.cases);
+  EXPECT_EQ(other.verdicts, one.verdicts);
+  EXPECT_EQ(other.particles, one.particles);
+  EXPECT_EQ(other.happened, one.happened);
+}
+
+TEST(Campaign, ShardsAreTheWhole) {
+  const Campaign whole = run_campaign(small_campaign(100), kReference, {});
+  int64_t cases = 0, verdicts = 0;
+  for (int64_t shard = 0; shard < 3; ++shard) {
+    CampaignOptions options = small_campaign(100);
+    options.shard = shard;
+    options.shards = 3;
+    const Campaign part = run_campaign(options, kReference, {});
+    cases += part.cases;
+    verdicts += part.verdicts;
+  }
+  EXPECT_EQ(cases, whole.cases);
+  EXPECT_EQ(verdicts, whole.verdicts);
+}
+
+TEST(Campaign, BeginsNothingAfterItsTime) {
+  CampaignOptions options = small_campaign(1'000'000'000);
+  options.seconds = 0.0;
+  EXPECT_EQ(run_campaign(options, kReference, {}).cases, 0);
+}
+
+TEST(Campaign, FindsTheFirstViolationWhateverTheLoadsAndThreads) {
+  const BackendSource planted{[](int64_t) { return std::make_unique<Planted>(break_second_cut); }, false};
+  const Campaign one = run_campaign(small_campaign(400), planted, {});
+  ASSERT_EQ(one.violations.size(), 1u);
+  CampaignOptions options = small_campaign(400);
+  options.batch = 5;
+  options.threads = options.backends = 3;
+  const Campaign other = run_campaign(options, planted, {});
+  ASSERT_EQ(other.violations.size(), 1u);
+  EXPECT_EQ(other.violations.front().index, one.violations.front().index);
+  EXPECT_EQ(other.violations.front().failing, one.violations.front().failing);
+
+  options.keep_going = true;
+  const Campaign all = run_campaign(options, planted, {});
+  EXPECT_EQ(all.cases, 400);
+  EXPECT_GT(all.violations.size(), 1u);
+  EXPECT_EQ(all.violations.front().index, one.violations.front().index);
+}
+
+TEST(Campaign, NamesTheCaseWhoseBodyTheBackendThrowsOver) {
+  constexpr int32_t kMost = 30;
+  const BackendSource planted{[](int64_t) {
+                                return std::make_unique<Planted>(Planted::Change(), [](const cutproof::Setup& setup) {
+                                  if (setup.body.particle_count() > kMost) throw std::logic_error("too many for me");
+                                });
+                              },
+                              false};
+  const CampaignOptions options = small_campaign(400);
+  const Campaign campaign = run_campaign(options, planted, {});
+  ASSERT_EQ(campaign.violations.size(), 1u);
+  const Violation& violation = campaign.violations.front();
+  EXPECT_EQ(violation.verdict.property, "runs to its end");
+  EXPECT_EQ(violation.verdict.witness.text, "too many for me");
+  EXPECT_GT(violation.failing.nodes.size(), static_cast<std::size_t>(kMost));
+  for (int64_t index = 0; index < violation.index; ++index) {
+    EXPECT_LE(case_at(options, index).nodes.size(), static_cast<std::size_t>(kMost)) << index;
+  }
+}
+
+TEST(Campaign, EndsWithWhatTheMachineThrows) {
+  const BackendSource broken{[](int64_t) -> std::unique_ptr<Backend> { throw MachineError("no device"); }, false};
+  CampaignOptions options = small_campaign(100);
+  options.threads = 3;
+  EXPECT_THROW(run_campaign(options, broken, {}), MachineError);
+}
+
+TEST(Simplest, KeepsOnlyWhatTheFaultNeeds) {
+  const auto fails = [](const Case& c) {
+    return dissect_alone([] { return std::make_unique<Planted>(break_second_cut); }, c, false).failure.has_value();
+  };
+  int found = 0;
+  for (int64_t index = 0; index < 400 && found < 3; ++index) {
+    const Case c = case_at(small_campaign(400), index);
+    if (!fails(c)) continue;
+    ++found;
+    const Case simple = simplest(c, fails, [] { return false; });
+    EXPECT_TRUE(fails(simple));
+    // Something must be removed in the second of two frames.
+    EXPECT_EQ(simple.nodes.size(), 1u);
+    EXPECT_EQ(simple.strokes.size(), 2u);
+  }
+  EXPECT_EQ(found, 3);
+}
+
+TEST(AMovingCase, HasAsManyFramesAsTheBladeNeeds) {
+  int64_t divided = 0;
+  for (uint64_t seed = 0; seed < 40; ++seed) {
+    const Case c = draw_moving_case(seed, 50);
+    const cutproof::Setup setup = load(c).setup;
+    const double most = blade_clearance(setup) * (1 + 1e-12);
+    for (const BladeMove& move : setup.blade_moves) EXPECT_LE(norm(move.to.edge - move.from.edge), most);
+    divided += setup.frame_count() > static_cast<int64_t>(c.strokes.size());
+    EXPECT_EQ(std::ssize(setup.blade_moves), setup.frame_count() * setup.step.substeps);
+  }
+  EXPECT_GT(divided, 10);
+}
+
+TEST(ACounterexample, ComesBackFromItsFile) {
+  Counterexample found;
+  found.failing = draw_moving_case(5, 30);
+  found.backend = "simulated";
+  found.split = "global";
+  found.schedule = {0, 0, 3, 0, 1};
+  found.found = "'coverage' fails";
+  found.seed = 12;
+  found.index = 345;
+  const Counterexample read = counterexample_from_json(to_json(found), "f.json");
+  EXPECT_EQ(read.failing, found.failing);
+  EXPECT_EQ(read.backend, found.backend);
+  EXPECT_EQ(read.split, found.split);
+  EXPECT_EQ(read.schedule, found.schedule);
+  EXPECT_EQ(read.found, found.found);
+  EXPECT_EQ(read.seed, found.seed);
+  EXPECT_EQ(read.index, found.index);
+  EXPECT_EQ(counterexample_from_json(to_json(found.failing), "f.json").failing, found.failing);
+}
+
+TEST(ACounterexample, IsRefusedWithItsFieldIfItIsNone) {
+  Counterexample good;
+  good.failing = draw_case(5, 30);
+  ASSERT_FALSE(good.failing.strokes.empty());
+  const std::string text = to_json(good);
+  const auto refused = [&](std::string from, const std::string& to, const std::string& field) {
+    std::string broken = text;
+    const std::size_t at = broken.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    broken.replace(at, from.size(), to);
+    try {
+      counterexample_from_json(broken, "f.json");
+      ADD_FAILURE() << "accepted: " << to;
+    } catch (const InputError& error) {
+      EXPECT_EQ(error.file(), "f.json");
+      EXPECT_NE(std::string(error.what()).find(field), std::string::npos) << error.what();
+    }
+  };
+  refused("\"format_version\":1", "\"format_version\":2", "format_version");
+  refused("cutproof.counterexample", "cutproof.fuzz", "format");
+  refused("\"schedule\":[]", "\"schedule\":[[99999999999,1]]", "schedule");
+  refused("\"moves\":false", "\"moves\":false,\"tail\":1", "tail");
+  refused("\"substeps\":2", "\"substeps\":0", "substeps");
+  refused("\"link\":\"", "\"link\":\"not ", "strokes");
+  refused("\"back\":", "\"back\":7", "");
+  EXPECT_THROW(counterexample_from_json("[]", "f.json"), InputError);
+  EXPECT_THROW(counterexample_from_json("", "f.json"), InputError);
+}
+
+}  // namespace
+}  // namespace cutproof::property_tests
