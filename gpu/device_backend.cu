@@ -68,7 +68,7 @@ class GpuBackend final : public Backend {
   bool can_run(Span) const override { return true; }
 
   void load(std::vector<Setup> setups, std::vector<State> states) override {
-    load_with(Room{}, std::move(setups), std::move(states));
+    load_with(Room{options_.room}, std::move(setups), std::move(states));
   }
 
   // Starts the span and returns. Whether more room is wanted is read from what the counters were kInFlight calls ago:
@@ -177,7 +177,8 @@ std::string device_description(std::string& why) {
   const cudaError_t status = cudaGetDeviceCount(&count);
   if (status != cudaSuccess || count == 0) {
     static_cast<void>(cudaGetLastError());
-    why = status != cudaSuccess ? cudaGetErrorString(status) : "no CUDA device";
+    why = status != cudaSuccess ? std::string("cudaGetDeviceCount says: ") + cudaGetErrorString(status)
+                                : "no CUDA device";
     return {};
   }
   cudaDeviceProp properties;

@@ -274,7 +274,7 @@ class DeviceLauncher {
     if (mode_ != Mode::measure) {
       const int grid = static_cast<int>(std::min<std::int64_t>((n + 255) / 256, 8 * resources_->multiprocessors));
       detail::pad_keys_kernel<><<<grid, 256, 0, stream_>>>(keys, count, n);
-      CUTPROOF_CUDA(cudaGetLastError());
+      check_cuda(cudaGetLastError(), "pad_keys_kernel", __FILE__, __LINE__);
     }
     const auto sort = [&](void* temporary, std::size_t& bytes) {
       return cub::DeviceRadixSort::SortKeys(temporary, bytes, keys, sorted(), n, 0, 64, stream_);
@@ -289,7 +289,7 @@ class DeviceLauncher {
     with_temporary(kUnique, unique, sorted_bytes);
     if (mode_ != Mode::measure) {
       detail::drop_padding_kernel<><<<1, 1, 0, stream_>>>(keys, count);
-      CUTPROOF_CUDA(cudaGetLastError());
+      check_cuda(cudaGetLastError(), "drop_padding_kernel", __FILE__, __LINE__);
     }
   }
   void clear(void* data, std::size_t bytes) {
@@ -370,7 +370,7 @@ class DeviceLauncher {
   }
   static void set_condition(cudaGraphConditionalHandle handle, const int* flag, cudaStream_t stream) {
     detail::set_condition_kernel<><<<1, 1, 0, stream>>>(handle, flag);
-    CUTPROOF_CUDA(cudaGetLastError());
+    check_cuda(cudaGetLastError(), "set_condition_kernel", __FILE__, __LINE__);
   }
 
   template <class Call>

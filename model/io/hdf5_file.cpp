@@ -105,7 +105,10 @@ std::unique_ptr<void, Free> reserve;  // for closing what is open when an except
 
 void* allocated(std::size_t bytes) {
   void* const block = std::malloc(bytes);
-  if (block == nullptr) throw std::bad_alloc();
+  if (block == nullptr) {
+    release_memory();
+    throw std::bad_alloc();
+  }
   return block;
 }
 
