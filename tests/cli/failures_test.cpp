@@ -22,6 +22,7 @@
 #include <system_error>
 #include <vector>
 
+#include "tests/cli/cut_scene.h"
 #include "tests/cli/failing_allocations.h"
 
 namespace cutproof::tests {
@@ -33,12 +34,6 @@ using nlohmann::json;
 constexpr unsigned kMostSeconds = 60;  // beyond which a run hangs
 constexpr int kStatusOfAKilled = 128;
 
-// Sixteen particles that one stroke cuts in two within a few frames.
-constexpr const char* kScene = R"({"version": 1, "name": "cut",
-  "body": {"shape": {"kind": "box", "size": [0.04, 0.02, 0.02]}, "spacing": 0.01},
-  "frame": {"settle": 0.016}, "detect": {"criterion": "geometric"}, "ground": {"friction": 0.5},
-  "blade": {"speed": 2, "strokes": [{"points": [[0.5, 0.5, 1.3], [0.5, 0.5, -0.3]], "along": [0, 1, 0]}]},
-  "expect": {"components_at_end": 2, "shells_at_end": 2}})";
 constexpr const char* kOldJson = "what was there before\n";
 
 using Files = std::map<std::string, std::string>;  // name -> content
@@ -200,9 +195,9 @@ class Allocations : public testing::TestWithParam<Case> {
       GTEST_SKIP() << "failing allocations were not run: sanitizers (" CUTPROOF_SANITIZERS
                       ") bring their own allocator";
     }
-    std::string bad = kScene;
+    std::string bad = kCutScene;
     bad.replace(bad.find("speed"), 5, "spede");
-    Files given = {{"cut.json", kScene}, {"bad.json", bad}, {"out.json", kOldJson}};
+    Files given = {{"cut.json", kCutScene}, {"bad.json", bad}, {"out.json", kOldJson}};
     const std::string name = GetParam().name;
     if (GetParam().reads_a_recording) {
       Program recording(name + "_recording", {"run", "cut.json", "--record", "seen"}, given);
@@ -225,7 +220,7 @@ class Allocations : public testing::TestWithParam<Case> {
     return text == nullptr ? otherwise : text;
   }
   static bool all() { return setting("CUTPROOF_ALLOCATIONS", "") == "all"; }
-  static uint64_t wanted() { return std::stoull(setting("CUTPROOF_ALLOCATIONS", "150")); }
+  static uint64_t wanted() { return std::stoull(setting("CUTPROOF_ALLOCATIONS", "100")); }
   static uint64_t seed() { return std::stoull(setting("CUTPROOF_SEED", std::to_string(std::random_device{}()))); }
 
   // Numbers from 1 to `most`: all, or one from each of as many equal parts as are wanted.
@@ -320,7 +315,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(MissingDevice, IsAMachineErrorAndWritesNothing) {
   Program program("MissingDevice",
                   {"run", "cut.json", "--backend", "gpu", "--check", "--record", "r", "--json", "out.json"},
-                  {{"cut.json", kScene}, {"out.json", kOldJson}});
+                  {{"cut.json", kCutScene}, {"out.json", kOldJson}});
   const Outcome outcome = program.run();
 #if CUTPROOF_HAS_CUDA
   EXPECT_EQ(outcome.status, 3) << outcome.error;
