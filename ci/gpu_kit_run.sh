@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Runs all that needs a GPU: primitives, scenes, properties, compute-sanitizer, timings. Part of the kit that
-# ci/gpu_kit.sh makes. Usage: run.sh RESULTS [PART...]
-# Parts: primitives scenes lockstep determinism properties sanitizer timings
+# Runs all that needs a GPU: primitives, failing calls, scenes, properties, compute-sanitizer, timings. Part of the kit
+# that ci/gpu_kit.sh makes. Usage: run.sh RESULTS [PART...]
+# Parts: primitives failures scenes lockstep determinism properties sanitizer timings
 set -uo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 results=$(mkdir -p "$1" && cd "$1" && pwd)
 shift
-parts=${*:-primitives scenes lockstep determinism properties sanitizer timings}
+parts=${*:-primitives failures scenes lockstep determinism properties sanitizer timings}
 export CUTPROOF_REGRESSIONS="$here/fixtures/regressions"
 export CUTPROOF_COMMIT=$(cat "$here/commit")
 export LD_LIBRARY_PATH="$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
@@ -34,6 +34,7 @@ try() {  # NAME COMMAND...
 for part in $parts; do
   case $part in
     primitives) try launch_device_test launch_device_test ;;
+    failures) try device_failures_test device_failures_test ;;
     scenes)
       for scene in cuboid_press uniform_stretch uniform_stretch_strain three_cuts liver_cut kidney_arc \
           kidney_discontinuous irregular_sampled irregular_sampled_covered cluster_growth small_block kidney_101096; do

@@ -1,6 +1,6 @@
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <new>
 
@@ -20,19 +20,36 @@ constexpr const char* kNextSteps =
     "  cutproof info --scene\n"
     "      lists every field of a scene file\n";
 
-int status_of(const std::exception_ptr& failure) {
+// Not fmt::print, which may need memory that is not there.
+int say(const char* what, int status) {
+  std::fflush(stdout);
+  std::fputs("cutproof: ", stderr);
+  std::fputs(what, stderr);
+  std::fputs("\n", stderr);
+  return status;
+}
+
+// Exit status 2: bad input, 3: the machine failed. Requires an exception in flight.
+int status_of_exception() noexcept {
   try {
-    std::rethrow_exception(failure);
+    throw;
   } catch (const cutproof::InputError& error) {
-    fmt::print(stderr, "cutproof: {}\n", error.what());
-    return 2;
+    return say(error.what(), 2);
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "cutproof: the machine has not enough memory for this\n");
-    return 3;
+    return say("the machine has not enough memory for this", 3);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "cutproof: {}\n", error.what());
-    return 3;
+    return say(error.what(), 3);
+  } catch (...) {
+    return say("something that is no exception was thrown: a defect of this program", 3);
   }
+}
+
+// Destructors of libraries that need memory cannot say that there is none, so they end here: nlohmann::json takes its
+// values apart on a stack that it allocates.
+[[noreturn]] void end_with_status() {
+  const int status = std::current_exception() != nullptr ? status_of_exception() : say("a defect of this program", 3);
+  std::fflush(stdout);
+  std::_Exit(status);
 }
 
 // --backend, and what may be said about kernels and schedules.
@@ -48,9 +65,7 @@ void add_backend(CLI::App& command, cutproof::cli::BackendChoice& choice, const 
       ->type_name("N");
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run_command_line(int argc, char** argv) {
   using namespace cutproof::cli;
   CLI::App app{
       "cutproof: judges soft-body dissection. Cuts a body made of shape matching clusters and certifies every frame.\n"
@@ -168,30 +183,37 @@ int main(int argc, char** argv) {
     return app.exit(asked);
   } catch (const CLI::ParseError& error) {
     if (argc <= 1) {
-      fmt::print(stderr, "{}", app.help());
+      std::fputs(app.help().c_str(), stderr);
     } else {
       app.exit(error);
     }
     return 2;
   }
-  try {
-    if (run_command->parsed()) {
-      if (run_options.scene.empty()) {
-        fmt::print(stderr, "{}", kNextSteps);
-        return 2;
-      }
-      return run(run_options);
+  if (run_command->parsed()) {
+    if (run_options.scene.empty()) {
+      std::fputs(kNextSteps, stderr);
+      return 2;
     }
-    if (check_command->parsed()) return check(check_options);
-    if (info_command->parsed()) return info(info_options);
-    if (fuzz_command->parsed()) return fuzz(fuzz_options);
-    if (replay_command->parsed()) {
-      if (!replay_backend.name.empty()) replay_options.backend = replay_backend;
-      return replay(replay_options);
-    }
-    if (stages_command->parsed()) return bench_stages(bench_options);
-  } catch (...) {
-    return status_of(std::current_exception());
+    return run(run_options);
   }
+  if (check_command->parsed()) return check(check_options);
+  if (info_command->parsed()) return info(info_options);
+  if (fuzz_command->parsed()) return fuzz(fuzz_options);
+  if (replay_command->parsed()) {
+    if (!replay_backend.name.empty()) replay_options.backend = replay_backend;
+    return replay(replay_options);
+  }
+  if (stages_command->parsed()) return bench_stages(bench_options);
   return 2;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::set_terminate(end_with_status);
+  try {
+    return run_command_line(argc, argv);
+  } catch (...) {
+    return status_of_exception();
+  }
 }

@@ -15,6 +15,7 @@ struct KernelOptions {
   int rotation_method = 5;  // layout.h; kNewton: the fastest of those that fail on no hard case (docs/rotations.md)
   SplitMethod split = SplitMethod::blocks;
   bool eager = false;  // gpu: kernels one by one, waiting for each condition, instead of one graph per span
+  double room = 1;     // for growth, of what a first cut needs at most; a backend doubles it when it must (for tests)
 };
 
 // Kernels on `threads` threads of the CPU.

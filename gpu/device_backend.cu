@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <cstdio>
 #include <map>
+#include <memory>
 #include <type_traits>
 #include <utility>
 
 #include "gpu/backends.h"
 #include "gpu/cuda_check.h"
+#include "gpu/cuda_handles.h"
 #include "gpu/device_launcher.cuh"
 #include "gpu/frame.h"
 #include "gpu/image.h"
@@ -26,23 +28,11 @@ class DeviceWorld {
     image.each(world_, [this](auto& vector, auto& pointer, bool) {
       using T = typename std::decay_t<decltype(vector)>::value_type;
       const std::size_t bytes = vector.size() * sizeof(T);
-      void* memory = nullptr;
       // Never empty: a null pointer would be taken for an array that is not there.
-      CUTPROOF_CUDA(cudaMalloc(&memory, bytes == 0 ? sizeof(T) : bytes));
-      memory_.push_back(memory);
-      pointer = static_cast<T*>(memory);
-      CUTPROOF_CUDA(cudaMemcpy(memory, vector.data(), bytes, cudaMemcpyHostToDevice));
+      memory_.push_back(make_device_memory(bytes == 0 ? sizeof(T) : bytes));
+      pointer = static_cast<T*>(memory_.back().get());
+      CUTPROOF_CUDA(cudaMemcpy(pointer, vector.data(), bytes, cudaMemcpyHostToDevice));
     });
-  }
-  ~DeviceWorld() {
-    for (void* memory : memory_) static_cast<void>(cudaFree(memory));
-  }
-  DeviceWorld(DeviceWorld&& other) noexcept
-      : world_(std::exchange(other.world_, {})), memory_(std::exchange(other.memory_, {})) {}
-  DeviceWorld& operator=(DeviceWorld&& other) noexcept {
-    std::swap(world_, other.world_);
-    std::swap(memory_, other.memory_);
-    return *this;
   }
 
   const World& world() const { return world_; }
@@ -59,26 +49,17 @@ class DeviceWorld {
 
  private:
   World world_;
-  std::vector<void*> memory_;
+  std::vector<DeviceMemory> memory_;
 };
 
 class GpuBackend final : public Backend {
  public:
   explicit GpuBackend(KernelOptions options) : options_(options) {
-    CUTPROOF_CUDA(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking));
-    CUTPROOF_CUDA(cudaEventCreate(&begin_));
-    for (cudaEvent_t& event : end_) CUTPROOF_CUDA(cudaEventCreate(&event));
-    CUTPROOF_CUDA(cudaMallocHost(&counters_, kInFlight * sizeof(Counters)));
-    for (std::size_t k = 0; k < kInFlight; ++k) counters_[k] = Counters{};
+    for (Event& event : end_) event = make_event();
+    std::uninitialized_fill_n(counters(), kInFlight, Counters{});
   }
-  ~GpuBackend() override {
-    static_cast<void>(cudaStreamSynchronize(stream_));
-    graphs_.clear();
-    static_cast<void>(cudaFreeHost(counters_));
-    static_cast<void>(cudaEventDestroy(begin_));
-    for (cudaEvent_t event : end_) static_cast<void>(cudaEventDestroy(event));
-    static_cast<void>(cudaStreamDestroy(stream_));
-  }
+  // Nothing is given back that the device still uses.
+  ~GpuBackend() override { static_cast<void>(cudaStreamSynchronize(stream_.get())); }
   GpuBackend(const GpuBackend&) = delete;
   GpuBackend& operator=(const GpuBackend&) = delete;
 
@@ -87,7 +68,7 @@ class GpuBackend final : public Backend {
   bool can_run(Span) const override { return true; }
 
   void load(std::vector<Setup> setups, std::vector<State> states) override {
-    load_with(Room{}, std::move(setups), std::move(states));
+    load_with(Room{options_.room}, std::move(setups), std::move(states));
   }
 
   // Starts the span and returns. Whether more room is wanted is read from what the counters were kInFlight calls ago:
@@ -95,8 +76,8 @@ class GpuBackend final : public Backend {
   // room at the same places and have the same bits.
   void run(Span span) override {
     if (runs_ >= kInFlight) {
-      CUTPROOF_CUDA(cudaEventSynchronize(end_[slot()]));
-      const Counters& then = counters_[slot()];
+      CUTPROOF_CUDA(cudaEventSynchronize(end_[slot()].get()));
+      const Counters& then = counters()[slot()];
       require_no_fault(then);
       if (wants_room(device_.world(), then)) {
         std::vector<State> states = snapshot();
@@ -104,11 +85,11 @@ class GpuBackend final : public Backend {
       }
     }
     if (options_.eager) {
-      DeviceLauncher launcher(stream_);
-      CUTPROOF_CUDA(cudaEventRecord(begin_, stream_));
+      DeviceLauncher launcher(stream_.get());
+      CUTPROOF_CUDA(cudaEventRecord(begin_.get(), stream_.get()));
       enqueue_span(launcher, device_.world(), plan_, span, [](Stage) {});
       finish(span);
-      CUTPROOF_CUDA(cudaStreamSynchronize(stream_));  // the launcher's temporary memory goes with it
+      CUTPROOF_CUDA(cudaStreamSynchronize(stream_.get()));  // the launcher's temporary memory goes with it
       return;
     }
     const auto key = std::pair(static_cast<int>(span.first), static_cast<int>(span.last));
@@ -118,8 +99,8 @@ class GpuBackend final : public Backend {
           [&](DeviceLauncher& launcher) { enqueue_span(launcher, device_.world(), plan_, span, [](Stage) {}); });
       found = graphs_.emplace(key, std::move(graph)).first;
     }
-    CUTPROOF_CUDA(cudaEventRecord(begin_, stream_));
-    found->second.launch(stream_);
+    CUTPROOF_CUDA(cudaEventRecord(begin_.get(), stream_.get()));
+    found->second.launch(stream_.get());
     finish(span);
   }
 
@@ -133,9 +114,9 @@ class GpuBackend final : public Backend {
     SpanReport report;
     if (runs_ == 0) return report;
     wait();
-    for (std::size_t s = 0; s < 6; ++s) report.ran[s] = counters_[last()].stage_ran[s] != 0;
+    for (std::size_t s = 0; s < 6; ++s) report.ran[s] = counters()[last()].stage_ran[s] != 0;
     float milliseconds = 0;
-    CUTPROOF_CUDA(cudaEventElapsedTime(&milliseconds, begin_, end_[last()]));
+    CUTPROOF_CUDA(cudaEventElapsedTime(&milliseconds, begin_.get(), end_[last()].get()));
     report.total_seconds = 1e-3 * milliseconds;
     if (span_.first == span_.last) report.seconds[static_cast<std::size_t>(span_.first)] = report.total_seconds;
     return report;
@@ -143,7 +124,7 @@ class GpuBackend final : public Backend {
 
  private:
   void load_with(Room room, std::vector<Setup> setups, std::vector<State> states) {
-    CUTPROOF_CUDA(cudaStreamSynchronize(stream_));
+    CUTPROOF_CUDA(cudaStreamSynchronize(stream_.get()));
     Image image = make_image(setups, states, options_.rotation_method, room);
     plan_ = make_plan(setups, states, options_.rotation_method, options_.split);
     graphs_.clear();
@@ -158,26 +139,29 @@ class GpuBackend final : public Backend {
   std::size_t slot() const { return static_cast<std::size_t>(runs_ % kInFlight); }
   std::size_t last() const { return static_cast<std::size_t>((runs_ - 1) % kInFlight); }
 
+  // [kInFlight] of the last runs, in turn.
+  Counters* counters() const { return static_cast<Counters*>(counters_.get()); }
+
   // The counters come back on their own.
   void finish(Span span) {
-    CUTPROOF_CUDA(cudaMemcpyAsync(&counters_[slot()], device_.world().counters, sizeof(Counters),
-                                  cudaMemcpyDeviceToHost, stream_));
-    CUTPROOF_CUDA(cudaEventRecord(end_[slot()], stream_));
+    CUTPROOF_CUDA(cudaMemcpyAsync(&counters()[slot()], device_.world().counters, sizeof(Counters),
+                                  cudaMemcpyDeviceToHost, stream_.get()));
+    CUTPROOF_CUDA(cudaEventRecord(end_[slot()].get(), stream_.get()));
     ++runs_;
     span_ = span;
   }
   void wait() const {
-    CUTPROOF_CUDA(cudaStreamSynchronize(stream_));
-    if (runs_ > 0) require_no_fault(counters_[last()]);
+    CUTPROOF_CUDA(cudaStreamSynchronize(stream_.get()));
+    if (runs_ > 0) require_no_fault(counters()[last()]);
   }
 
   KernelOptions options_;
   Room room_;
-  cudaStream_t stream_ = nullptr;
-  cudaEvent_t begin_ = nullptr;
-  std::array<cudaEvent_t, kInFlight> end_ = {};
-  Counters* counters_ = nullptr;  // [kInFlight] pinned; of the last runs, in turn
-  uint64_t runs_ = 0;             // since the load
+  Stream stream_ = make_stream();
+  Event begin_ = make_event();
+  std::array<Event, kInFlight> end_;
+  PinnedMemory counters_ = make_pinned_memory(kInFlight * sizeof(Counters));
+  uint64_t runs_ = 0;  // since the load
   Span span_;
   std::vector<Setup> setups_;
   mutable Image image_;  // host side of snapshots
@@ -193,7 +177,8 @@ std::string device_description(std::string& why) {
   const cudaError_t status = cudaGetDeviceCount(&count);
   if (status != cudaSuccess || count == 0) {
     static_cast<void>(cudaGetLastError());
-    why = status != cudaSuccess ? cudaGetErrorString(status) : "no CUDA device";
+    why = status != cudaSuccess ? std::string("cudaGetDeviceCount says: ") + cudaGetErrorString(status)
+                                : "no CUDA device";
     return {};
   }
   cudaDeviceProp properties;

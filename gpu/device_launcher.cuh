@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "gpu/cuda_check.h"
+#include "gpu/cuda_handles.h"
 #include "gpu/device_block.cuh"
 #include "gpu/launcher.h"
 
@@ -120,36 +121,26 @@ struct DeviceResources {
   int multiprocessors = 0;
   std::size_t required = 0;  // most bytes of temporary memory that any launch asked for
   std::size_t allocated = 0;
-  void* temporary = nullptr;
-  std::vector<cudaStream_t> inner;  // for capturing bodies of conditions, by depth
+  DeviceMemory temporary;
+  std::vector<Stream> inner;  // for capturing bodies of conditions, by depth
 
   DeviceResources() {
     int device = 0;
     CUTPROOF_CUDA(cudaGetDevice(&device));
     CUTPROOF_CUDA(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device));
   }
-  ~DeviceResources() {
-    for (cudaStream_t stream : inner) static_cast<void>(cudaStreamDestroy(stream));
-    static_cast<void>(cudaFree(temporary));
-  }
-  DeviceResources(const DeviceResources&) = delete;
-  DeviceResources& operator=(const DeviceResources&) = delete;
 
   // Frees what was there; nothing may be using it.
   void allocate() {
     if (required <= allocated) return;
-    CUTPROOF_CUDA(cudaFree(temporary));
-    temporary = nullptr, allocated = 0;
-    CUTPROOF_CUDA(cudaMalloc(&temporary, required));
+    temporary.reset();
+    allocated = 0;
+    temporary = make_device_memory(required);
     allocated = required;
   }
   cudaStream_t stream(std::size_t depth) {
-    while (inner.size() <= depth) {
-      cudaStream_t stream = nullptr;
-      CUTPROOF_CUDA(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
-      inner.push_back(stream);
-    }
-    return inner[depth];
+    while (inner.size() <= depth) inner.push_back(make_stream());
+    return inner[depth].get();
   }
 };
 
@@ -187,26 +178,16 @@ inline cudaGraphNode_t append_node(cudaStream_t stream, cudaGraphNodeParams* par
 class DeviceGraph {
  public:
   DeviceGraph() = default;
-  DeviceGraph(cudaGraphExec_t executable, std::shared_ptr<detail::DeviceResources> resources)
-      : executable_(executable), resources_(std::move(resources)) {}
-  DeviceGraph(DeviceGraph&& other) noexcept
-      : executable_(std::exchange(other.executable_, nullptr)), resources_(std::move(other.resources_)) {}
-  DeviceGraph& operator=(DeviceGraph&& other) noexcept {
-    std::swap(executable_, other.executable_);
-    std::swap(resources_, other.resources_);
-    return *this;
-  }
-  ~DeviceGraph() {
-    if (executable_ != nullptr) static_cast<void>(cudaGraphExecDestroy(executable_));
-  }
+  DeviceGraph(ExecutableGraph executable, std::shared_ptr<detail::DeviceResources> resources)
+      : resources_(std::move(resources)), executable_(std::move(executable)) {}
 
   // Does not wait for the device.
-  void launch(cudaStream_t stream) const { CUTPROOF_CUDA(cudaGraphLaunch(executable_, stream)); }
+  void launch(cudaStream_t stream) const { CUTPROOF_CUDA(cudaGraphLaunch(executable_.get(), stream)); }
   explicit operator bool() const { return executable_ != nullptr; }
 
  private:
-  cudaGraphExec_t executable_ = nullptr;
   std::shared_ptr<detail::DeviceResources> resources_;
+  ExecutableGraph executable_;
 };
 
 class DeviceLauncher {
@@ -227,21 +208,18 @@ class DeviceLauncher {
     const cudaStream_t stream = resources->stream(0);
     CUTPROOF_CUDA(cudaStreamBeginCapture(stream, cudaStreamCaptureModeRelaxed));
     DeviceLauncher writing(Mode::capture, stream, resources, 0);
-    cudaGraph_t graph = nullptr;
+    cudaGraph_t captured = nullptr;
     try {
       work(writing);
     } catch (...) {
-      static_cast<void>(cudaStreamEndCapture(stream, &graph));
-      if (graph != nullptr) static_cast<void>(cudaGraphDestroy(graph));
+      static_cast<void>(cudaStreamEndCapture(stream, &captured));
+      const Graph dropped(captured);
       static_cast<void>(cudaGetLastError());
       throw;
     }
-    CUTPROOF_CUDA(cudaStreamEndCapture(stream, &graph));
-    cudaGraphExec_t executable = nullptr;
-    const cudaError_t status = cudaGraphInstantiate(&executable, graph, 0);
-    static_cast<void>(cudaGraphDestroy(graph));
-    CUTPROOF_CUDA(status);
-    return DeviceGraph(executable, std::move(resources));
+    CUTPROOF_CUDA(cudaStreamEndCapture(stream, &captured));
+    const Graph graph(captured);
+    return DeviceGraph(make_executable(graph.get()), std::move(resources));
   }
 
   template <class Kernel, class... Args>
@@ -277,14 +255,14 @@ class DeviceLauncher {
     const int n = narrow(count, "exclusive_scan");
     const auto input = thrust::make_transform_iterator(thrust::counting_iterator<int>(0), detail::ScanInput{in, n});
     const detail::ScanOutput output(out, n, total);
-    with_temporary([&](void* temporary, std::size_t& bytes) {
+    with_temporary("cub::DeviceScan::ExclusiveSum", [&](void* temporary, std::size_t& bytes) {
       return cub::DeviceScan::ExclusiveSum(temporary, bytes, input, output, n + 1, stream_);
     });
   }
   void select(const unsigned char* flags, std::int64_t count, int* selected, int* selected_count) {
     const int n = narrow(count, "select");
     if (n == 0) return clear(selected_count, sizeof(int));
-    with_temporary([&](void* temporary, std::size_t& bytes) {
+    with_temporary("cub::DeviceSelect::Flagged", [&](void* temporary, std::size_t& bytes) {
       return cub::DeviceSelect::Flagged(temporary, bytes, thrust::counting_iterator<int>(0), flags, selected,
                                         selected_count, n, stream_);
     });
@@ -296,7 +274,7 @@ class DeviceLauncher {
     if (mode_ != Mode::measure) {
       const int grid = static_cast<int>(std::min<std::int64_t>((n + 255) / 256, 8 * resources_->multiprocessors));
       detail::pad_keys_kernel<><<<grid, 256, 0, stream_>>>(keys, count, n);
-      CUTPROOF_CUDA(cudaGetLastError());
+      check_cuda(cudaGetLastError(), "pad_keys_kernel", __FILE__, __LINE__);
     }
     const auto sort = [&](void* temporary, std::size_t& bytes) {
       return cub::DeviceRadixSort::SortKeys(temporary, bytes, keys, sorted(), n, 0, 64, stream_);
@@ -304,12 +282,14 @@ class DeviceLauncher {
     const auto unique = [&](void* temporary, std::size_t& bytes) {
       return cub::DeviceSelect::Unique(temporary, bytes, sorted(), keys, count, n, stream_);
     };
-    require(sorted_bytes + std::max(bytes_of(sort), bytes_of(unique)));
-    with_temporary(sort, sorted_bytes);
-    with_temporary(unique, sorted_bytes);
+    constexpr const char* kSort = "cub::DeviceRadixSort::SortKeys";
+    constexpr const char* kUnique = "cub::DeviceSelect::Unique";
+    require(sorted_bytes + std::max(bytes_of(kSort, sort), bytes_of(kUnique, unique)));
+    with_temporary(kSort, sort, sorted_bytes);
+    with_temporary(kUnique, unique, sorted_bytes);
     if (mode_ != Mode::measure) {
       detail::drop_padding_kernel<><<<1, 1, 0, stream_>>>(keys, count);
-      CUTPROOF_CUDA(cudaGetLastError());
+      check_cuda(cudaGetLastError(), "drop_padding_kernel", __FILE__, __LINE__);
     }
   }
   void clear(void* data, std::size_t bytes) {
@@ -390,13 +370,13 @@ class DeviceLauncher {
   }
   static void set_condition(cudaGraphConditionalHandle handle, const int* flag, cudaStream_t stream) {
     detail::set_condition_kernel<><<<1, 1, 0, stream>>>(handle, flag);
-    CUTPROOF_CUDA(cudaGetLastError());
+    check_cuda(cudaGetLastError(), "set_condition_kernel", __FILE__, __LINE__);
   }
 
   template <class Call>
-  static std::size_t bytes_of(Call call) {
+  static std::size_t bytes_of(const char* name, Call call) {
     std::size_t bytes = 0;
-    CUTPROOF_CUDA(call(nullptr, bytes));
+    check_cuda(call(nullptr, bytes), name, __FILE__, __LINE__);
     return std::max<std::size_t>(bytes, 1);
   }
   // Makes sure of that much temporary memory; what it held may be lost.
@@ -411,13 +391,14 @@ class DeviceLauncher {
   }
   // Calls one of CUB's functions with the memory it asks for, behind `reserved` bytes that are the caller's.
   template <class Call>
-  void with_temporary(Call call, std::size_t reserved = 0) {
-    std::size_t bytes = bytes_of(call);
+  void with_temporary(const char* name, Call call, std::size_t reserved = 0) {
+    std::size_t bytes = bytes_of(name, call);
     require(reserved + bytes);
     if (mode_ == Mode::measure) return;
-    CUTPROOF_CUDA(call(static_cast<unsigned char*>(resources_->temporary) + reserved, bytes));
+    check_cuda(call(static_cast<unsigned char*>(resources_->temporary.get()) + reserved, bytes), name, __FILE__,
+               __LINE__);
   }
-  unsigned long long* sorted() const { return static_cast<unsigned long long*>(resources_->temporary); }
+  unsigned long long* sorted() const { return static_cast<unsigned long long*>(resources_->temporary.get()); }
 
   static int narrow(std::int64_t count, const char* what) {
     if (count < 0 || count >= INT_MAX) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "gpu/cuda_check.h"
+#include "gpu/cuda_handles.h"
 #include "gpu/floors.h"
 
 namespace cutproof::gpu {
@@ -16,33 +17,21 @@ __global__ void empty_kernel() {}
 // A stream with two events on it.
 class Stopwatch {
  public:
-  Stopwatch() {
-    CUTPROOF_CUDA(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking));
-    CUTPROOF_CUDA(cudaEventCreate(&begin_));
-    CUTPROOF_CUDA(cudaEventCreate(&end_));
-  }
-  ~Stopwatch() {
-    static_cast<void>(cudaEventDestroy(begin_));
-    static_cast<void>(cudaEventDestroy(end_));
-    static_cast<void>(cudaStreamDestroy(stream_));
-  }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-  cudaStream_t stream() const { return stream_; }
+  cudaStream_t stream() const { return stream_.get(); }
 
   // Seconds that one piece of work takes: median over `turns` of `repeat` pieces one after the other, so that handing
   // over costs nothing.
   template <class Work>
   double seconds(int turns, int repeat, Work work) {
-    for (int k = 0; k < repeat; ++k) work(stream_);
+    for (int k = 0; k < repeat; ++k) work(stream());
     std::vector<float> milliseconds;
     for (int turn = 0; turn < turns; ++turn) {
-      CUTPROOF_CUDA(cudaEventRecord(begin_, stream_));
-      for (int k = 0; k < repeat; ++k) work(stream_);
-      CUTPROOF_CUDA(cudaEventRecord(end_, stream_));
-      CUTPROOF_CUDA(cudaEventSynchronize(end_));
+      CUTPROOF_CUDA(cudaEventRecord(begin_.get(), stream()));
+      for (int k = 0; k < repeat; ++k) work(stream());
+      CUTPROOF_CUDA(cudaEventRecord(end_.get(), stream()));
+      CUTPROOF_CUDA(cudaEventSynchronize(end_.get()));
       float elapsed = 0;
-      CUTPROOF_CUDA(cudaEventElapsedTime(&elapsed, begin_, end_));
+      CUTPROOF_CUDA(cudaEventElapsedTime(&elapsed, begin_.get(), end_.get()));
       milliseconds.push_back(elapsed);
     }
     std::sort(milliseconds.begin(), milliseconds.end());
@@ -50,8 +39,8 @@ class Stopwatch {
   }
 
  private:
-  cudaStream_t stream_ = nullptr;
-  cudaEvent_t begin_ = nullptr, end_ = nullptr;
+  Stream stream_ = make_stream();
+  Event begin_ = make_event(), end_ = make_event();
 };
 
 class Chain {
@@ -59,35 +48,24 @@ class Chain {
   Chain(cudaStream_t stream, int kernels) {
     CUTPROOF_CUDA(cudaStreamBeginCapture(stream, cudaStreamCaptureModeRelaxed));
     for (int k = 0; k < kernels; ++k) empty_kernel<<<1, 32, 0, stream>>>();
-    cudaGraph_t graph = nullptr;
-    CUTPROOF_CUDA(cudaStreamEndCapture(stream, &graph));
-    const cudaError_t status = cudaGraphInstantiate(&executable_, graph, 0);
-    static_cast<void>(cudaGraphDestroy(graph));
-    CUTPROOF_CUDA(status);
+    const cudaError_t launched = cudaGetLastError();
+    cudaGraph_t captured = nullptr;
+    CUTPROOF_CUDA(cudaStreamEndCapture(stream, &captured));
+    const Graph graph(captured);
+    check_cuda(launched, "empty_kernel", __FILE__, __LINE__);
+    executable_ = make_executable(graph.get());
   }
-  ~Chain() { static_cast<void>(cudaGraphExecDestroy(executable_)); }
-  Chain(const Chain&) = delete;
-  Chain& operator=(const Chain&) = delete;
-  void launch(cudaStream_t stream) const { CUTPROOF_CUDA(cudaGraphLaunch(executable_, stream)); }
+  void launch(cudaStream_t stream) const { CUTPROOF_CUDA(cudaGraphLaunch(executable_.get(), stream)); }
 
  private:
-  cudaGraphExec_t executable_ = nullptr;
+  ExecutableGraph executable_;
 };
 
-class DeviceBytes {
- public:
-  explicit DeviceBytes(std::size_t bytes) {
-    CUTPROOF_CUDA(cudaMalloc(&data_, bytes));
-    CUTPROOF_CUDA(cudaMemset(data_, 1, bytes));
-  }
-  ~DeviceBytes() { static_cast<void>(cudaFree(data_)); }
-  DeviceBytes(const DeviceBytes&) = delete;
-  DeviceBytes& operator=(const DeviceBytes&) = delete;
-  void* data() const { return data_; }
-
- private:
-  void* data_ = nullptr;
-};
+DeviceMemory filled_memory(std::size_t bytes) {
+  DeviceMemory memory = make_device_memory(bytes);
+  CUTPROOF_CUDA(cudaMemset(memory.get(), 1, bytes));
+  return memory;
+}
 
 }  // namespace
 
@@ -97,10 +75,10 @@ Floors measure_floors() {
   Stopwatch stopwatch;
   {
     constexpr std::size_t kBytes = std::size_t{1} << 30;
-    const DeviceBytes from(kBytes), to(kBytes);
+    const DeviceMemory from = filled_memory(kBytes), to = filled_memory(kBytes);
     CUTPROOF_CUDA(cudaDeviceSynchronize());
     const double seconds = stopwatch.seconds(kTurns, 4, [&](cudaStream_t stream) {
-      CUTPROOF_CUDA(cudaMemcpyAsync(to.data(), from.data(), kBytes, cudaMemcpyDeviceToDevice, stream));
+      CUTPROOF_CUDA(cudaMemcpyAsync(to.get(), from.get(), kBytes, cudaMemcpyDeviceToDevice, stream));
     });
     floors.copy_bytes_per_second = 2.0 * static_cast<double>(kBytes) / seconds;
   }

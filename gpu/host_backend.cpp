@@ -22,7 +22,7 @@ class HostBackend final : public Backend {
   bool can_run(Span) const override { return true; }
 
   void load(std::vector<Setup> setups, std::vector<State> states) override {
-    load_with(Room{}, std::move(setups), std::move(states));
+    load_with(Room{options_.room}, std::move(setups), std::move(states));
   }
 
   void run(Span span) override {

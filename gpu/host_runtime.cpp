@@ -11,10 +11,12 @@
 #include <cstring>
 #include <mutex>
 #include <new>
+#include <system_error>
 #include <thread>
 #include <utility>
 
 #include "gpu/host_block.h"
+#include "model/error.h"
 
 #if defined(__SANITIZE_ADDRESS__)
 #define CUTPROOF_ASAN 1
@@ -55,6 +57,11 @@ struct Fibre {
   void* fake_stack = nullptr;  // AddressSanitizer's
   void* tsan = nullptr;        // ThreadSanitizer's
 
+  Fibre() = default;
+  ~Fibre();
+  Fibre(const Fibre&) = delete;
+  Fibre& operator=(const Fibre&) = delete;
+
   static void begin(context::transfer_t from);
   void arrived(context::fcontext_t from);
 };
@@ -72,15 +79,13 @@ std::unique_ptr<Fibre> make_fibre(Worker* worker) {
   auto fibre = std::make_unique<Fibre>();
   fibre->worker = worker;
   const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+  void* const mapping = mmap(nullptr, kStackBytes + page, PROT_READ | PROT_WRITE,
+                             MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_STACK, -1, 0);
+  if (mapping == MAP_FAILED) throw std::bad_alloc();
+  fibre->mapping = mapping;
   fibre->mapped = kStackBytes + page;
-  fibre->mapping = mmap(nullptr, fibre->mapped, PROT_READ | PROT_WRITE,
-                        MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_STACK, -1, 0);
-  if (fibre->mapping == MAP_FAILED) throw std::bad_alloc();
   // Stacks grow downwards: running over the end is a segmentation fault, not silent damage.
-  if (mprotect(fibre->mapping, page, PROT_NONE) != 0) {
-    munmap(fibre->mapping, fibre->mapped);
-    throw std::bad_alloc();
-  }
+  if (mprotect(fibre->mapping, page, PROT_NONE) != 0) throw std::bad_alloc();
   fibre->bottom = static_cast<std::byte*>(fibre->mapping) + page;
   fibre->bytes = kStackBytes;
   fibre->at =
@@ -89,17 +94,6 @@ std::unique_ptr<Fibre> make_fibre(Worker* worker) {
   fibre->tsan = __tsan_create_fiber(0);
 #endif
   return fibre;
-}
-
-void destroy_fibre(Fibre& fibre) {
-  if (fibre.mapping == nullptr) return;
-#ifdef CUTPROOF_ASAN
-  ASAN_UNPOISON_MEMORY_REGION(fibre.bottom, fibre.bytes);
-#endif
-#ifdef CUTPROOF_TSAN
-  __tsan_destroy_fiber(fibre.tsan);
-#endif
-  munmap(fibre.mapping, fibre.mapped);
 }
 
 bool same(const Meeting& a, const Meeting& b) {
@@ -181,6 +175,17 @@ std::string describe_stop(const Job& job, const LiveBlock& block) {
 
 }  // namespace
 
+Fibre::~Fibre() {
+  if (mapping == nullptr) return;
+#ifdef CUTPROOF_ASAN
+  if (bottom != nullptr) ASAN_UNPOISON_MEMORY_REGION(bottom, bytes);
+#endif
+#ifdef CUTPROOF_TSAN
+  if (tsan != nullptr) __tsan_destroy_fiber(tsan);
+#endif
+  munmap(mapping, mapped);
+}
+
 // What must be told to the sanitizers when a stack is entered.
 void Fibre::arrived(context::fcontext_t from) {
   worker->previous_->at = from;
@@ -203,9 +208,7 @@ void Fibre::begin(context::transfer_t from) {
 
 Worker::Worker() : main_(std::make_unique<Fibre>()) { main_->worker = this; }
 
-Worker::~Worker() {
-  for (const auto& fibre : fibres_) destroy_fibre(*fibre);
-}
+Worker::~Worker() = default;
 
 void Worker::switch_to(Fibre* to) {
   Fibre* self = current_;
@@ -224,6 +227,8 @@ void Worker::switch_to(Fibre* to) {
 Fibre* Worker::free_fibre() {
   if (free_.empty()) {
     fibres_.push_back(make_fibre(this));
+    // Here, because a fibre gives itself back where nothing may be thrown.
+    free_.reserve(fibres_.capacity());
     return fibres_.back().get();
   }
   Fibre* fibre = free_.back();
@@ -251,31 +256,43 @@ bool Worker::start_block(LiveBlock& block) {
   return true;
 }
 
-void Worker::go() {
+// Executes the launch with up to `live_blocks` blocks at once. Never throws: other workers may be at it.
+void Worker::go(int live_blocks) {
   error = nullptr;
   error_block = -1;
-  for (const auto& block : blocks_) {
-    if (job_->shared_bytes > block->shared_capacity) {
-#ifdef CUTPROOF_ASAN
-      ASAN_UNPOISON_MEMORY_REGION(block->shared.get(), block->shared_capacity);
-#endif
-      block->shared_capacity = (job_->shared_bytes + 15) / 16 * 16;
-      block->shared = std::make_unique<std::byte[]>(block->shared_capacity);
-    }
-    block->requests.assign(1, {});  // so that start_block resets
-    block->done = LiveBlock::kAll;
-    runnable_[block->place] = 0;
-  }
   current_ = main_.get();
 #ifdef CUTPROOF_TSAN
   main_->tsan = __tsan_get_current_fiber();
 #endif
   try {
+    prepare(live_blocks);
     const Next next = pick();
     if (next.block != nullptr) enter(next);
-  } catch (...) {  // no memory for a stack
+  } catch (...) {  // no memory
     error = std::current_exception();
     failed_->store(true, std::memory_order_relaxed);
+  }
+}
+
+void Worker::prepare(int live_blocks) {
+  if (runnable_.size() < static_cast<std::size_t>(live_blocks)) runnable_.resize(live_blocks);
+  while (static_cast<int>(blocks_.size()) < live_blocks) {
+    blocks_.push_back(std::make_unique<LiveBlock>());
+    blocks_.back()->place = static_cast<int>(blocks_.size()) - 1;
+  }
+  for (const auto& block : blocks_) {
+    if (job_->shared_bytes > block->shared_capacity) {
+#ifdef CUTPROOF_ASAN
+      ASAN_UNPOISON_MEMORY_REGION(block->shared.get(), block->shared_capacity);
+#endif
+      const std::size_t capacity = (job_->shared_bytes + 15) / 16 * 16;
+      block->shared_capacity = 0;
+      block->shared = std::make_unique<std::byte[]>(capacity);
+      block->shared_capacity = capacity;
+    }
+    block->requests.assign(1, {});  // so that start_block resets
+    block->done = LiveBlock::kAll;
+    runnable_[block->place] = 0;
   }
 }
 
@@ -285,11 +302,7 @@ void Worker::run(const Job& job, std::atomic<int>& next, std::atomic<bool>& fail
   failed_ = &failed;
   alone_ = alone;
   simulation_ = nullptr;
-  if (blocks_.empty()) {
-    blocks_.push_back(std::make_unique<LiveBlock>());
-    runnable_.assign(1, 0);
-  }
-  go();
+  go(1);
 }
 
 void Worker::simulate(const Job& job, SimulationOptions& options, Schedule& recorded) {
@@ -303,12 +316,7 @@ void Worker::simulate(const Job& job, SimulationOptions& options, Schedule& reco
   recorded_ = &recorded;
   steps_ = 0;
   last_thread_ = 0;
-  while (static_cast<int>(blocks_.size()) < options.live_blocks) {
-    blocks_.push_back(std::make_unique<LiveBlock>());
-    blocks_.back()->place = static_cast<int>(blocks_.size()) - 1;
-    runnable_.push_back(0);
-  }
-  go();
+  go(options.live_blocks);
 }
 
 // Who goes on, taken out of the runnable; starts new blocks in the places of those that have ended.
@@ -363,8 +371,14 @@ void Worker::loop(Fibre* self) {
     }
     block.done |= bit(thread);
     block.fibre[thread] = nullptr;
-    check_progress(block);
-    const Next next = pick();
+    Next next{nullptr, 0};
+    try {
+      check_progress(block);
+      next = pick();
+    } catch (...) {  // no memory for a fault's text or for a choice; nothing is above this frame to catch it
+      fail(block, std::current_exception());
+      next = pick();  // asks nobody now
+    }
     if (next.block == nullptr) {
       free_.push_back(self);
       switch_to(main_.get());
@@ -511,8 +525,13 @@ HostRuntime::HostRuntime(int threads) {
   for (int i = 0; i < threads; ++i) workers_.push_back(std::make_unique<Worker>());
   if (threads == 1) return;
   pool_ = std::make_unique<Pool>();
-  for (int i = 1; i < threads; ++i) {
-    pool_->threads.emplace_back([pool = pool_.get(), worker = workers_[i].get()] { pool->serve(*worker); });
+  try {
+    for (int i = 1; i < threads; ++i) {
+      pool_->threads.emplace_back([pool = pool_.get(), worker = workers_[i].get()] { pool->serve(*worker); });
+    }
+  } catch (const std::system_error& error) {
+    throw MachineError("The machine cannot start " + std::to_string(threads - 1) +
+                       " threads for the kernels: " + error.code().message() + '.');
   }
 }
 

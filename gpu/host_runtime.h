@@ -129,7 +129,8 @@ class Worker {
     int thread;
   };
   void yield(LiveBlock& block, int thread);
-  void go();
+  void go(int live_blocks);
+  void prepare(int live_blocks);
   bool start_block(LiveBlock& block);
   Next pick();
   void enter(Next next);
@@ -161,7 +162,8 @@ class Worker {
 // All workers of a launcher.
 class HostRuntime {
  public:
-  explicit HostRuntime(int threads);  // requires threads >= 1
+  // Requires threads >= 1. Throws MachineError if the system refuses a thread.
+  explicit HostRuntime(int threads);
   explicit HostRuntime(SimulationOptions simulation);
   ~HostRuntime();
 

@@ -19,6 +19,8 @@ struct SpanReport {
   std::array<double, 6> seconds = {};  // by stage: wall time [s]; 0 where the span ran as one piece
 };
 
+// A member may throw MachineError or std::bad_alloc when the machine fails; after an exception a backend can only be
+// destroyed, or loaded anew.
 class Backend {
  public:
   virtual ~Backend() = default;

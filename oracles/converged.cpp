@@ -10,6 +10,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <new>
 #include <stdexcept>
 
 #include "oracles/shape_sums.h"
@@ -264,21 +265,59 @@ double greatest_change(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
 // --- For fixed rotations: E over x and t together
 // ---------------------------------------------------------------------
 
-// A sparse Cholesky factorisation, CHOLMOD's.
-class Cholesky {
+// CHOLMOD's parameters and workspace.
+class Cholmod {
  public:
-  Cholesky(cholmod_common& common, cholmod_sparse* matrix) : common_(common) {
-    factor_ = cholmod_analyze(matrix, &common_);
-    cholmod_factorize(matrix, factor_, &common_);
+  Cholmod() {
+    cholmod_start(&common_);
+    common_.print = 0;  // what fails is told by exceptions, not on standard output
+  }
+  ~Cholmod() { cholmod_finish(&common_); }
+  Cholmod(const Cholmod&) = delete;
+  Cholmod& operator=(const Cholmod&) = delete;
+  cholmod_common* get() { return &common_; }
+
+  // Throws if the last call failed.
+  void check() const {
+    if (common_.status == CHOLMOD_OUT_OF_MEMORY) throw std::bad_alloc();
     if (common_.status != CHOLMOD_OK) {
-      cholmod_free_factor(&factor_, &common_);
       throw std::runtime_error("CHOLMOD cannot factorise the system of a substep: its status is " +
                                std::to_string(common_.status));
     }
   }
-  ~Cholesky() { cholmod_free_factor(&factor_, &common_); }
-  Cholesky(const Cholesky&) = delete;
-  Cholesky& operator=(const Cholesky&) = delete;
+
+ private:
+  cholmod_common common_{};
+};
+
+// Something that CHOLMOD made.
+template <class T, int (*free)(T**, cholmod_common*)>
+class Made {
+ public:
+  Made(T* made, Cholmod& cholmod) : made_(made), cholmod_(cholmod) { cholmod.check(); }  // null after a failed call
+  ~Made() { free(&made_, cholmod_.get()); }
+  Made(const Made&) = delete;
+  Made& operator=(const Made&) = delete;
+  T* get() const { return made_; }
+  T* operator->() const { return made_; }
+
+ private:
+  T* made_;
+  Cholmod& cholmod_;
+};
+using Triplets = Made<cholmod_triplet, cholmod_free_triplet>;
+using Sparse = Made<cholmod_sparse, cholmod_free_sparse>;
+using Dense = Made<cholmod_dense, cholmod_free_dense>;
+using Factor = Made<cholmod_factor, cholmod_free_factor>;
+
+// A sparse Cholesky factorisation, CHOLMOD's.
+class Cholesky {
+ public:
+  Cholesky(Cholmod& cholmod, cholmod_sparse* matrix)
+      : cholmod_(cholmod), factor_(cholmod_analyze(matrix, cholmod.get()), cholmod) {
+    cholmod_factorize(matrix, factor_.get(), cholmod_.get());
+    cholmod_.check();
+  }
 
   std::vector<double> solve(std::vector<double> right) const {
     cholmod_dense b{};
@@ -287,29 +326,27 @@ class Cholesky {
     b.x = right.data();
     b.xtype = CHOLMOD_REAL;
     b.dtype = CHOLMOD_DOUBLE;
-    cholmod_dense* t = cholmod_solve(CHOLMOD_A, factor_, &b, &common_);
+    const Dense t(cholmod_solve(CHOLMOD_A, factor_.get(), &b, cholmod_.get()), cholmod_);
     const auto* values = static_cast<const double*>(t->x);
     std::copy(values, values + right.size(), right.begin());
-    cholmod_free_dense(&t, &common_);
     return right;
   }
 
  private:
-  cholmod_common& common_;
-  cholmod_factor* factor_ = nullptr;
+  Cholmod& cholmod_;
+  Factor factor_;
 };
 
 // The matrix on t along one axis after eliminating x: M_c δ_cc' − s Σ m_i / n_i² over the particles of both c and c'
 // that are not fixed. Diagonally dominant, because a row sums to at least (1 − s) M_c.
-std::shared_ptr<Cholesky> factorised(const Substep& substep, const std::vector<uint8_t>& fixed,
-                                     cholmod_common& common) {
+std::shared_ptr<Cholesky> factorised(const Substep& substep, const std::vector<uint8_t>& fixed, Cholmod& cholmod) {
   const auto count = at(substep.clusters.count());
   std::size_t entries = count;
   for (int32_t i = 0; i < substep.body.particle_count(); ++i) {
     const auto n = substep.holders.of(i).size();
     entries += n * (n + 1) / 2;
   }
-  cholmod_triplet* triplets = cholmod_allocate_triplet(count, count, entries, -1, CHOLMOD_REAL, &common);
+  const Triplets triplets(cholmod_allocate_triplet(count, count, entries, -1, CHOLMOD_REAL, cholmod.get()), cholmod);
   auto* rows = static_cast<int*>(triplets->i);
   auto* columns = static_cast<int*>(triplets->j);
   auto* values = static_cast<double*>(triplets->x);
@@ -331,11 +368,8 @@ std::shared_ptr<Cholesky> factorised(const Substep& substep, const std::vector<u
     }
   }
   for (std::size_t c = 0; c < count; ++c) add(static_cast<int32_t>(c), static_cast<int32_t>(c), mass[c]);
-  cholmod_sparse* matrix = cholmod_triplet_to_sparse(triplets, triplets->nnz, &common);
-  auto factor = std::make_shared<Cholesky>(common, matrix);
-  cholmod_free_sparse(&matrix, &common);
-  cholmod_free_triplet(&triplets, &common);
-  return factor;
+  const Sparse matrix(cholmod_triplet_to_sparse(triplets.get(), triplets->nnz, cholmod.get()), cholmod);
+  return std::make_shared<Cholesky>(cholmod, matrix.get());
 }
 
 // Why a coordinate of a particle is not solved for.
@@ -344,15 +378,8 @@ enum Fixed : uint8_t { kFree = 0, kOnLowWall, kOnHighWall, kGiven };
 class LinearStage {
  public:
   explicit LinearStage(const Substep& substep) : substep_(substep) {
-    cholmod_start(&common_);
     for (int axis = 0; axis < 3; ++axis) refactor(axis, given());
   }
-  ~LinearStage() {
-    for (auto& factor : factor_) factor.reset();
-    cholmod_finish(&common_);
-  }
-  LinearStage(const LinearStage&) = delete;
-  LinearStage& operator=(const LinearStage&) = delete;
 
   // Positions that minimise E over x and t with these rotations, walls held.
   std::vector<Vec3> positions(const std::vector<Mat3>& rotation) {
@@ -376,7 +403,7 @@ class LinearStage {
       if (factor_[other] && fixed_[other] == fixed) same = factor_[other];
     }
     fixed_[at(axis)] = std::move(fixed);
-    factor_[at(axis)] = same ? same : factorised(substep_, fixed_[at(axis)], common_);
+    factor_[at(axis)] = same ? same : factorised(substep_, fixed_[at(axis)], cholmod_);
   }
 
   // The sum over a particle's clusters of w · (its coordinate, as far as it does not depend on t).
@@ -427,7 +454,7 @@ class LinearStage {
   }
 
   const Substep& substep_;
-  cholmod_common common_{};
+  Cholmod cholmod_;                            // before the factors: it outlives them
   std::array<std::vector<uint8_t>, 3> fixed_;  // [axis][n] of Fixed
   std::array<std::shared_ptr<Cholesky>, 3> factor_;
 };

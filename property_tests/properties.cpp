@@ -17,6 +17,7 @@
 
 #include "gpu/backends.h"
 #include "oracles/two_runs.h"
+#include "property_tests/counterexample.h"
 #include "property_tests/dissection.h"
 #include "property_tests/random.h"
 #include "reference_cpu/reference.h"
@@ -206,22 +207,37 @@ std::string text_of(const Verdict& verdict) { return verdict.holds ? "" : descri
 
 // --- Properties ---------------------------------------------------------------------------------------------------
 
-TEST_P(EveryBackend, AgreesWithEveryOracleOnSavedCounterexamples) {
+std::vector<std::pair<std::string, Counterexample>> saved_counterexamples() {
   const char* folder = std::getenv("CUTPROOF_REGRESSIONS");
   const std::filesystem::path path = folder != nullptr ? folder : CUTPROOF_REGRESSIONS_FOLDER;
-  ASSERT_TRUE(std::filesystem::is_directory(path)) << path << " is not a folder";
-  std::vector<std::filesystem::path> files;
+  if (!std::filesystem::is_directory(path)) throw std::runtime_error(path.string() + " is not a folder");
+  std::vector<std::pair<std::string, Counterexample>> saved;
   for (const auto& entry : std::filesystem::directory_iterator(path)) {
-    if (entry.path().extension() == ".json") files.push_back(entry.path());
-  }
-  std::sort(files.begin(), files.end());
-  for (const auto& file : files) {
+    if (entry.path().extension() != ".json") continue;
     std::ostringstream text;
-    text << std::ifstream(file).rdbuf();
-    const auto judgement = dissect(*GetParam().make(), from_json(text.str()), true);
+    text << std::ifstream(entry.path()).rdbuf();
+    saved.emplace_back(entry.path().string(), counterexample_from_json(text.str(), entry.path().string()));
+  }
+  std::sort(saved.begin(), saved.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  return saved;
+}
+
+TEST_P(EveryBackend, AgreesWithEveryOracleOnSavedCounterexamples) {
+  const auto saved = saved_counterexamples();
+  for (const auto& [file, counterexample] : saved) {
+    const auto judgement = dissect(*GetParam().make(), counterexample.failing, true);
     if (judgement.failure) ADD_FAILURE() << file << ": " << describe(*judgement.failure);
   }
-  std::cout << files.size() << " saved counterexamples replayed" << std::endl;
+  std::cout << saved.size() << " saved counterexamples replayed" << std::endl;
+}
+
+TEST(SavedCounterexamples, HoldUnderTheScheduleThatBrokeThem) {
+  for (const auto& [file, counterexample] : saved_counterexamples()) {
+    if (counterexample.schedule.empty()) continue;
+    const auto backend = gpu::make_simulated_backend({gpu::replay(counterexample.schedule)});
+    const auto judgement = dissect(*backend, counterexample.failing, true);
+    if (judgement.failure) ADD_FAILURE() << file << ": " << describe(*judgement.failure);
+  }
 }
 
 TEST_P(EveryBackend, KeepsEveryInvariantAfterEveryStageOfARandomDissection) {

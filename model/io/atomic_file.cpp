@@ -9,6 +9,7 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
+#include <new>
 #include <system_error>
 
 #include "model/error.h"
@@ -87,6 +88,7 @@ void write_text(const std::string& path, const std::string& text) {
   File file(std::fopen(target.temporary().c_str(), "wb"));
   if (!file) {
     const int error = errno;
+    if (error == ENOMEM) throw std::bad_alloc();
     if (error == EACCES || error == EPERM || error == EROFS || error == ENOENT || error == ENAMETOOLONG) {
       throw InputError(path, "", fmt::format("The file cannot be created: {}.", reason(error)),
                        "Write to another folder or under another name.");
@@ -111,14 +113,21 @@ std::string read_text(const std::string& path) {
   }
   File file(std::fopen(path.c_str(), "rb"));
   if (!file) {
-    throw InputError(path, "", fmt::format("The file cannot be opened: {}.", reason(errno)),
+    const int error = errno;
+    if (error == ENOMEM) throw std::bad_alloc();
+    if (error == EMFILE || error == ENFILE) {
+      throw MachineError(fmt::format("{}: The file cannot be opened: {}.", path, reason(error)));
+    }
+    throw InputError(path, "", fmt::format("The file cannot be opened: {}.", reason(error)),
                      "Check its name and its permissions.");
   }
   std::string text;
   char block[1 << 16];
   while (const std::size_t count = std::fread(block, 1, sizeof block, file.get())) text.append(block, count);
   if (std::ferror(file.get()) != 0) {
-    throw InputError(path, "", fmt::format("The file cannot be read to the end: {}.", reason(errno)),
+    const int error = errno;
+    if (error == ENOMEM) throw std::bad_alloc();
+    throw InputError(path, "", fmt::format("The file cannot be read to the end: {}.", reason(error)),
                      "Check that the file is whole and its disk in order.");
   }
   return text;

@@ -3,8 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
+#include <exception>
 #include <filesystem>
 #include <limits>
+#include <memory>
+#include <new>
 #include <string_view>
 #include <utility>
 
@@ -19,6 +23,8 @@ namespace {
 constexpr hsize_t kChunkBytes = hsize_t{1} << 17;
 // Larger chunks than any writer of ours makes are a sign of damage: reading one row needs a whole chunk in memory.
 constexpr hsize_t kMostChunkBytes = hsize_t{1} << 26;
+// As stored, inflated, unshuffled, and in the table's cache.
+constexpr hsize_t kCopiesOfChunk = 4;
 // Deflate shrinks by at most 1032.
 constexpr uint64_t kMostCompression = 1100;
 
@@ -89,15 +95,50 @@ std::vector<hsize_t> extents(hsize_t rows, const Layout& row) {
   return dims;
 }
 
-herr_t keep_deepest(unsigned depth, const H5E_error2_t* error, void* text) {
-  if (depth == 0 && error->desc != nullptr) *static_cast<std::string*>(text) = error->desc;
+// More than one call needs for what it keeps and for its work on chunks of ours: 1 MiB is a table's cache.
+constexpr std::size_t kReserveBytes = std::size_t{8} << 20;
+
+struct Free {
+  void operator()(void* block) const { std::free(block); }
+};
+std::unique_ptr<void, Free> reserve;  // for closing what is open when an exception has been thrown
+
+void* allocated(std::size_t bytes) {
+  void* const block = std::malloc(bytes);
+  if (block == nullptr) {
+    release_memory();
+    throw std::bad_alloc();
+  }
+  return block;
+}
+
+// HDF5 1.10 does not survive an allocation that fails within it: it follows null pointers, ends the process or recurses
+// without end. So what it may need is asked for before it is called. `more`: bytes beyond what any call needs.
+void require_memory(std::size_t more = 0) {
+  if (reserve == nullptr) reserve.reset(allocated(kReserveBytes));
+  void* volatile block = allocated(kReserveBytes + more);  // volatile: or the compiler would see that nobody uses it
+  std::free(block);
+}
+
+struct Reason {
+  std::string text;
+  bool no_memory = false;
+};
+
+herr_t keep_deepest(unsigned depth, const H5E_error2_t* error, void* reason) {
+  auto& kept = *static_cast<Reason*>(reason);
+  if (depth == 0 && error->desc != nullptr) kept.text = error->desc;
+  kept.no_memory = kept.no_memory || error->min_num == H5E_NOSPACE || error->min_num == H5E_CANTALLOC;
   return 0;
 }
 
-// What the library says of the last call that failed: its innermost reason.
+// What the library says of the last call that failed: its innermost reason. Throws std::bad_alloc if that is a lack of
+// memory.
 std::string last_message() {
-  std::string text;
-  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep_deepest, &text);
+  Reason reason;
+  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep_deepest, &reason);
+  if (reason.no_memory) throw std::bad_alloc();
+  const std::string& text = reason.text;
   // Failures of the system come with addresses and times; what a person needs is in the quotation marks.
   constexpr std::string_view kSystem = "error message = '";
   if (const std::size_t at = text.find(kSystem); at != std::string::npos) {
@@ -135,6 +176,8 @@ bool is_type(const Id& type, Scalar scalar) { return H5Tequal(type.get(), file_t
 }  // namespace
 
 Quiet::Quiet() {
+  static const bool room = (require_memory(), true);  // for the library's own beginning
+  static_cast<void>(room);
   // Objects that could not be written stay open inside HDF5, and its clean-up at exit then crashes. We close what we
   // open, so there is nothing left for it to do. Counts only before the first call to the library.
   [[maybe_unused]] static const herr_t no_cleanup = H5dont_atexit();
@@ -143,6 +186,8 @@ Quiet::Quiet() {
 }
 
 Quiet::~Quiet() { H5Eset_auto2(H5E_DEFAULT, function_, data_); }
+
+void release_memory() { reserve.reset(); }
 
 Id::Id(hid_t id, Close closer, const std::string& where) : id_(id), close_(closer) {
   if (id < 0) throw Error(where, fmt::format("HDF5 says: {}.", last_message()));
@@ -157,14 +202,17 @@ Id& Id::operator=(Id&& other) noexcept {
 }
 
 Id::~Id() {
+  if (std::uncaught_exceptions() > 0) release_memory();
   if (id_ >= 0) close_(id_);
 }
 
 void Id::close(const std::string& where) {
+  require_memory();
   if (id_ >= 0) check(close_(std::exchange(id_, H5I_INVALID_HID)), where);
 }
 
 File File::create(const std::string& path) {
+  require_memory();
   const Id access = property_list(H5P_FILE_ACCESS);
   check(H5Pset_libver_bounds(access.get(), H5F_LIBVER_V110, H5F_LIBVER_V110), path);
   const Id creation = property_list(H5P_FILE_CREATE);
@@ -175,6 +223,7 @@ File File::create(const std::string& path) {
 }
 
 File File::open(const std::string& path) {
+  require_memory();
   File file;
   file.id_ = Id(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose, path);
   std::error_code error;
@@ -185,24 +234,33 @@ File File::open(const std::string& path) {
 
 void File::close() {
   if (id_.get() < 0) return;
+  require_memory();
   // Flushing first reports a full disk while the file can still be closed in order.
   check(H5Fflush(id_.get(), H5F_SCOPE_LOCAL), "file");
   id_.close("file");
 }
 
 Id create_group(hid_t parent, const std::string& name) {
+  require_memory();
   const Id creation = property_list(H5P_GROUP_CREATE);
   forget_times(creation);
   return Id(H5Gcreate2(parent, name.c_str(), H5P_DEFAULT, creation.get(), H5P_DEFAULT), H5Gclose, name);
 }
 
 Id open_group(hid_t parent, const std::string& name) {
+  require_memory();
   return Id(H5Gopen2(parent, name.c_str(), H5P_DEFAULT), H5Gclose, name);
 }
 
-bool has_attribute(hid_t object, const std::string& name) { return H5Aexists(object, name.c_str()) > 0; }
+bool has_attribute(hid_t object, const std::string& name) {
+  require_memory();
+  const htri_t found = H5Aexists(object, name.c_str());
+  check(found, name);
+  return found > 0;
+}
 
 void write_attribute(hid_t object, const std::string& name, const Layout& layout, const void* value) {
+  require_memory();
   const Id space = simple_space(layout.shape, name);
   const Id attribute(H5Acreate2(object, name.c_str(), file_type(layout.scalar), space.get(), H5P_DEFAULT, H5P_DEFAULT),
                      H5Aclose, name);
@@ -210,6 +268,7 @@ void write_attribute(hid_t object, const std::string& name, const Layout& layout
 }
 
 void read_attribute(hid_t object, const std::string& name, const Layout& layout, void* value) {
+  require_memory();
   const Id attribute(H5Aopen(object, name.c_str(), H5P_DEFAULT), H5Aclose, name);
   const Id type(H5Aget_type(attribute.get()), H5Tclose, name);
   const Id space(H5Aget_space(attribute.get()), H5Sclose, name);
@@ -220,6 +279,7 @@ void read_attribute(hid_t object, const std::string& name, const Layout& layout,
 }
 
 void write_text_attribute(hid_t object, const std::string& name, const std::string& text) {
+  require_memory();
   const bool ascii = std::all_of(text.begin(), text.end(), [](char c) { return static_cast<signed char>(c) >= 0; });
   const Id type(H5Tcopy(H5T_C_S1), H5Tclose, name);
   // A type of length zero does not exist: empty text is one NUL.
@@ -234,6 +294,7 @@ void write_text_attribute(hid_t object, const std::string& name, const std::stri
 }
 
 std::string read_text_attribute(hid_t object, const std::string& name) {
+  require_memory();
   const Id attribute(H5Aopen(object, name.c_str(), H5P_DEFAULT), H5Aclose, name);
   const Id type(H5Aget_type(attribute.get()), H5Tclose, name);
   const Id space(H5Aget_space(attribute.get()), H5Sclose, name);
@@ -248,6 +309,7 @@ std::string read_text_attribute(hid_t object, const std::string& name) {
 }
 
 RawTable RawTable::create(hid_t parent, const std::string& name, const Layout& row, int64_t expected_rows) {
+  require_memory();
   const hsize_t most = std::max<hsize_t>(1, kChunkBytes / row_bytes(row));
   const hsize_t rows = expected_rows > 0 ? std::min(most, static_cast<hsize_t>(expected_rows)) : most;
   const Id creation = property_list(H5P_DATASET_CREATE);
@@ -272,6 +334,7 @@ RawTable RawTable::create(hid_t parent, const std::string& name, const Layout& r
 }
 
 RawTable RawTable::open(hid_t parent, const std::string& name, const Layout& row, uint64_t file_bytes) {
+  require_memory();
   RawTable table;
   table.id_ = Id(H5Dopen2(parent, name.c_str(), H5P_DEFAULT), H5Dclose, name);
   table.row_ = row;
@@ -291,6 +354,7 @@ RawTable RawTable::open(hid_t parent, const std::string& name, const Layout& row
       if (extent > kMostChunkBytes / bytes) throw Error(name, "Its chunks are larger than any recording has.");
       bytes *= extent;
     }
+    table.chunk_bytes_ = bytes;
   }
   // A damaged extent must not make us allocate what the file cannot hold.
   const uint64_t stored = std::min<uint64_t>(H5Dget_storage_size(table.id_.get()), file_bytes);
@@ -307,6 +371,7 @@ RawTable RawTable::open(hid_t parent, const std::string& name, const Layout& row
 int64_t RawTable::append(const void* values, int64_t count) {
   const int64_t first = rows_;
   if (count == 0) return first;
+  require_memory();
   const std::vector<hsize_t> grown = extents(static_cast<hsize_t>(first + count), row_);
   check(H5Dset_extent(id_.get(), grown.data()), name_);
   const std::vector<hsize_t> block = extents(static_cast<hsize_t>(count), row_);
@@ -322,6 +387,7 @@ int64_t RawTable::append(const void* values, int64_t count) {
 
 void RawTable::read(int64_t first, int64_t count, void* values) const {
   if (count == 0) return;
+  require_memory(kCopiesOfChunk * chunk_bytes_);
   const std::vector<hsize_t> block = extents(static_cast<hsize_t>(count), row_);
   std::vector<hsize_t> start(block.size(), 0);
   start[0] = static_cast<hsize_t>(first);

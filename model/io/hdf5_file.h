@@ -1,5 +1,6 @@
 // A thin typed layer over the HDF5 library for recordings: handles that close themselves, tables that grow along
 // their first axis, attributes, and errors with HDF5's own message. HDF5 keeps global state: use from one thread.
+// Where the machine may not have the memory that HDF5 needs, std::bad_alloc is thrown before HDF5 is called.
 #pragma once
 #include <hdf5.h>
 
@@ -37,6 +38,10 @@ class Quiet {
   H5E_auto2_t function_ = nullptr;
   void* data_ = nullptr;
 };
+
+// Gives back the memory that is held for closing what is open. To be called before that is done, once nothing else will
+// be.
+void release_memory();
 
 // Owns one HDF5 identifier.
 class Id {
@@ -156,6 +161,7 @@ class RawTable {
   Id id_;
   Layout row_;
   int64_t rows_ = 0;
+  hsize_t chunk_bytes_ = 0;  // if opened: of a chunk, in memory
   std::string name_;
 };
 

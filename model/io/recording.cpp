@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <new>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -487,6 +489,7 @@ Recorder::Recorder(const std::string& name, const Setup& setup, const std::strin
 }
 
 Recorder::~Recorder() {
+  hdf5::release_memory();
   const hdf5::Quiet quiet;
   file_.reset();
 }
@@ -497,13 +500,14 @@ void Recorder::add(Stage stage, const State& state) {
   }
   require_lengths(file_->setup, state);
   const hdf5::Quiet quiet;
+  file_->broken = true;  // until all is done: after an exception its columns may differ in length
   try {
     file_->add(stage, state);
   } catch (const hdf5::Error& error) {
-    file_->broken = true;
     throw MachineError(fmt::format("{}: Snapshot {} cannot be written ({}). {}", file_->name,
                                    file_->snapshots.frame.size() - 1, error.where(), error.what()));
   }
+  file_->broken = false;
 }
 
 void Recorder::finish() {
@@ -543,8 +547,13 @@ hdf5::File open_part(const std::string& path, const char* kind) {
   }
   constexpr std::array<char, 8> kSignature = {'\x89', 'H', 'D', 'F', '\r', '\n', '\x1a', '\n'};
   std::array<char, 8> begin = {};
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw InputError(path, "", "The file cannot be opened.", "Check its permissions.");
+  std::ifstream stream;
+  stream.exceptions(std::ios::badbit);  // a lack of memory shows as what it is
+  stream.open(path, std::ios::binary);
+  if (!stream.is_open()) {
+    if (errno == ENOMEM) throw std::bad_alloc();
+    throw InputError(path, "", "The file cannot be opened.", "Check its permissions.");
+  }
   stream.read(begin.data(), begin.size());
   if (begin != kSignature) {
     const std::string what = stream.gcount() == 0 ? "The file is empty." : "This is not an HDF5 file.";
@@ -821,6 +830,7 @@ RecordingReader::RecordingReader(const std::string& name) {
 }
 
 RecordingReader::~RecordingReader() {
+  hdf5::release_memory();
   const hdf5::Quiet quiet;
   file_.reset();
 }
