@@ -234,7 +234,9 @@ TEST_P(EveryBackend, AgreesWithEveryOracleOnSavedCounterexamples) {
 TEST(SavedCounterexamples, HoldUnderTheScheduleThatBrokeThem) {
   for (const auto& [file, counterexample] : saved_counterexamples()) {
     if (counterexample.schedule.empty()) continue;
-    const auto backend = gpu::make_simulated_backend({gpu::replay(counterexample.schedule)});
+    gpu::KernelOptions options;
+    if (counterexample.split == "global") options.split = gpu::SplitMethod::global_labels;
+    const auto backend = gpu::make_simulated_backend({gpu::replay(counterexample.schedule)}, options);
     const auto judgement = dissect(*backend, counterexample.failing, true);
     if (judgement.failure) ADD_FAILURE() << file << ": " << describe(*judgement.failure);
   }
