@@ -34,7 +34,7 @@ try() {  # NAME COMMAND...
 for part in $parts; do
   case $part in
     primitives) try launch_device_test launch_device_test ;;
-    failures) try device_failures_test device_failures_test ;;
+    failures) try device_failures_test env CUTPROOF_CALLS=all device_failures_test ;;
     scenes)
       for scene in cuboid_press uniform_stretch uniform_stretch_strain three_cuts liver_cut kidney_arc \
           kidney_discontinuous irregular_sampled irregular_sampled_covered cluster_growth small_block kidney_101096; do
