@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "gpu/cuda_check.h"
+#include "gpu/cuda_handles.h"
 #include "gpu/device_launcher.cuh"
 #include "gpu/float3.h"
 #include "gpu/twins.h"
@@ -125,49 +126,35 @@ __global__ void __launch_bounds__(256) plain_sum_clusters_kernel(const __grid_co
 
 class Buffer {
  public:
-  explicit Buffer(std::size_t bytes) : bytes_(bytes) {
-    CUTPROOF_CUDA(cudaMalloc(&data_, bytes));
-    CUTPROOF_CUDA(cudaMemset(data_, 0, bytes));
+  explicit Buffer(std::size_t bytes) : data_(make_device_memory(bytes)), bytes_(bytes) {
+    CUTPROOF_CUDA(cudaMemset(data_.get(), 0, bytes));
   }
-  ~Buffer() { static_cast<void>(cudaFree(data_)); }
-  Buffer(const Buffer&) = delete;
-  Buffer& operator=(const Buffer&) = delete;
   template <class T>
   T* as() const {
-    return static_cast<T*>(data_);
+    return static_cast<T*>(data_.get());
   }
   template <class T>
   void fill(const std::vector<T>& values) {
-    CUTPROOF_CUDA(cudaMemcpy(data_, values.data(), values.size() * sizeof(T), cudaMemcpyHostToDevice));
+    CUTPROOF_CUDA(cudaMemcpy(data_.get(), values.data(), values.size() * sizeof(T), cudaMemcpyHostToDevice));
   }
   std::vector<unsigned char> read() const {
     std::vector<unsigned char> bytes(bytes_);
-    CUTPROOF_CUDA(cudaMemcpy(bytes.data(), data_, bytes_, cudaMemcpyDeviceToHost));
+    CUTPROOF_CUDA(cudaMemcpy(bytes.data(), data_.get(), bytes_, cudaMemcpyDeviceToHost));
     return bytes;
   }
 
  private:
-  void* data_ = nullptr;
+  DeviceMemory data_;
   std::size_t bytes_;
 };
 
-class Event {
- public:
-  Event() { CUTPROOF_CUDA(cudaEventCreate(&event_)); }
-  ~Event() { static_cast<void>(cudaEventDestroy(event_)); }
-  Event(const Event&) = delete;
-  Event& operator=(const Event&) = delete;
-  void record() { CUTPROOF_CUDA(cudaEventRecord(event_, nullptr)); }
-  double microseconds_since(const Event& start) const {
-    float milliseconds = 0;
-    CUTPROOF_CUDA(cudaEventSynchronize(event_));
-    CUTPROOF_CUDA(cudaEventElapsedTime(&milliseconds, start.event_, event_));
-    return 1e3 * static_cast<double>(milliseconds);
-  }
-
- private:
-  cudaEvent_t event_ = nullptr;
-};
+void record(const Event& event) { CUTPROOF_CUDA(cudaEventRecord(event.get(), nullptr)); }
+double microseconds_between(const Event& start, const Event& end) {
+  float milliseconds = 0;
+  CUTPROOF_CUDA(cudaEventSynchronize(end.get()));
+  CUTPROOF_CUDA(cudaEventElapsedTime(&milliseconds, start.get(), end.get()));
+  return 1e3 * static_cast<double>(milliseconds);
+}
 
 template <class Function>
 TwinCost resources_of(Function* function) {
@@ -190,26 +177,26 @@ double median(std::vector<double> values) {
 constexpr int kLaunchesInATurn = 16;
 template <class Layer, class Plain>
 void time_both(Layer layer, Plain plain, int launches, TwinResult& result) {
-  Event before, between, after;
+  const Event before = make_event(), between = make_event(), after = make_event();
   std::vector<double> layer_times, plain_times;
   constexpr int kWarmUp = 5;
   const auto turn = [](const auto& launch) {
     for (int k = 0; k < kLaunchesInATurn; ++k) launch();
   };
   for (int i = 0; i < launches + kWarmUp; ++i) {
-    before.record();
+    record(before);
     if (i % 2 == 0)
       turn(layer);
     else
       turn(plain);
-    between.record();
+    record(between);
     if (i % 2 == 0)
       turn(plain);
     else
       turn(layer);
-    after.record();
-    const double first = between.microseconds_since(before) / kLaunchesInATurn;
-    const double second = after.microseconds_since(between) / kLaunchesInATurn;
+    record(after);
+    const double first = microseconds_between(before, between) / kLaunchesInATurn;
+    const double second = microseconds_between(between, after) / kLaunchesInATurn;
     if (i < kWarmUp) continue;
     layer_times.push_back(i % 2 == 0 ? first : second);
     plain_times.push_back(i % 2 == 0 ? second : first);
