@@ -30,24 +30,26 @@ export TMPDIR
 trap 'rm -rf "$TMPDIR"' EXIT
 
 declare -A longest=([scene]=8192 [stl]=4096 [obj]=4096 [ply]=4096 [off]=4096 [recording]=65536 [recording_contents]=96)
-rm -rf "$build/seeds" "$build/findings"
 table=$(printf '%-20s %11s %8s %9s %7s %9s' target executions seconds coverage corpus findings)
 status=0
 for target in "${targets[@]}"; do
   fuzzer=$build/tests/input_fuzzing/fuzz_$target
   seeds=$build/seeds/$target corpus=$build/corpus/$target findings=$build/findings/$target
   regressions=fixtures/regressions/inputs/$target
+  rm -rf "$seeds" "$findings"
   mkdir -p "$corpus" "$findings"
   "$fuzzer" --make-seeds="$seeds"
   folders=("$corpus" "$seeds")
   [ -d "$regressions" ] && folders+=("$regressions")
+  words=()
+  [ -s "$seeds.dict" ] && words=(-dict="$seeds.dict")
   limits=(-max_len="${longest[$target]}" -rss_limit_mb=2048 -malloc_limit_mb=1024 -timeout=10)
 
   echo "== $target: $seconds s, seed $seed"
   log=$build/findings/$target.log
   result=0
   begin=$SECONDS
-  nice -n 15 "$fuzzer" -max_total_time="$seconds" -seed="$seed" -dict="$seeds.dict" -print_final_stats=1 \
+  nice -n 15 "$fuzzer" -max_total_time="$seconds" -seed="$seed" "${words[@]}" -print_final_stats=1 \
     "${limits[@]}" -artifact_prefix="$findings/" "${folders[@]}" > "$log" 2>&1 || result=$?
   took=$((SECONDS - begin))
 

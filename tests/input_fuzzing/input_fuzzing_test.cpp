@@ -105,5 +105,12 @@ TEST(InputFuzzingChecks, ARefusalWithoutARemedyBreaksTheContract) {
   EXPECT_THROW(outcome_of([] { throw MachineError("full"); }), MachineError);
 }
 
+TEST(InputFuzzingChecks, ARefusalShowsWhatItQuotesWithoutControlCharacters) {
+  using namespace std::string_literals;
+  const InputError error("a.json", "name", "is \"\0\x1b[2J\x7f é\""s, "Mend it.");
+  EXPECT_STREQ(error.what(), "a.json: name: is \"??[2J? é\"\n  remedy: Mend it.");
+  EXPECT_EQ(outcome_of([&] { throw error; }), Outcome::refused);
+}
+
 }  // namespace
 }  // namespace cutproof::input_fuzzing

@@ -19,7 +19,7 @@ constexpr const char* kScene = R"({
   "version": 1, "name": "small",
   "body": {"shape": {"kind": "box", "size": [0.03, 0.02, 0.02]}, "spacing": 0.01},
   "clusters": {"side": 2},
-  "frame": {"count": 4},
+  "frame": {"count": 2},
   "step": {"substeps": 2, "iterations": 2, "gravity": [0, 0, -9.81]},
   "detect": {"criterion": "geometric"},
   "ground": {"friction": 0.5},

@@ -11,7 +11,7 @@ namespace cutproof::input_fuzzing {
 // The files of a recording that its reader opens, as bytes: index, particles, skin.
 using RecordingBytes = std::array<std::string, 3>;
 
-// Of a run of the reference: a block of 3 × 2 × 2 particles with ground and grip, cut by a blade; four frames.
+// Of a run of the reference: a block of 3 × 2 × 2 particles with ground and grip, cut by a blade; two frames.
 const RecordingBytes& small_recording();
 
 // Where the file `part` of the recording that is fed to the reader lies.
