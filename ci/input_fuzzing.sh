@@ -43,7 +43,10 @@ for target in "${targets[@]}"; do
   [ -d "$regressions" ] && folders+=("$regressions")
   words=()
   [ -s "$seeds.dict" ] && words=(-dict="$seeds.dict")
-  limits=(-max_len="${longest[$target]}" -rss_limit_mb=2048 -malloc_limit_mb=1024 -timeout=10)
+  # HDF5 keeps what it frees, which looks like a leak after every input; the replay under ASan looks for leaks at its end.
+  leaks=1
+  [[ $target == recording* ]] && leaks=0
+  limits=(-detect_leaks="$leaks" -max_len="${longest[$target]}" -rss_limit_mb=2048 -malloc_limit_mb=1024 -timeout=20)
 
   echo "== $target: $seconds s, seed $seed"
   log=$build/findings/$target.log

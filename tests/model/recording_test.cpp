@@ -695,12 +695,15 @@ TEST_F(RecordingTest, IsRefusedIfItIsInconsistent) {
   attribute("/setup/step", "iterations", int32_t{-1});
   attribute("/setup/detect", "without_blade", uint8_t{2});
   attribute("/setup/blade", "thickness", kNan);
+  for (const char* name : {"length", "depth", "thickness", "friction"}) attribute("/setup/blade", name, -0.25);
+  attribute("/setup/expand", "depth", int32_t{0});
   refused("/setup/blade_moves",
           [](hid_t file) { set_attribute(file, "/setup/step", "substeps", std::numeric_limits<int32_t>::max()); });
   refused("/setup/blade_moves", [](hid_t file) { set_attribute(file, "/setup/blade", "present", uint8_t{0}); });
   entry("/setup/walls/axis", 0, int32_t{3});
   entry("/setup/walls/side", 0, int32_t{0});
   entry("/setup/walls/offset", 0, kNan);
+  entry("/setup/walls/friction", 0, -0.25);
   entry("/setup/grips/particles", 0, int32_t{8});
   entry("/setup/grips/particles", 0, int32_t{-1});
   entry("/setup/grips/particle_offsets", 1, int64_t{4});
