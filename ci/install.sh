@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # Installs what building and testing needs, from Debian or Ubuntu packages; does nothing if all of it is there.
+# Usage: ci/install.sh [fuzzing]     fuzzing: also what ci/input_fuzzing.sh needs, and nothing else does
 set -euo pipefail
 
 packages=(
@@ -9,6 +10,13 @@ packages=(
   libgtest-dev librapidcheck-dev
   python3 python3-h5py python3-numpy
 )
+# libFuzzer and the sanitizers of clang; llvm has the symbolizer that gives their reports file and line.
+fuzzing_packages=(clang libclang-rt-dev llvm)
+case "$*" in
+  "") ;;
+  fuzzing) packages+=("${fuzzing_packages[@]}") ;;
+  *) echo "ci/install.sh: \"$*\" is no list of packages; the only one is: fuzzing" >&2; exit 2 ;;
+esac
 
 missing=()
 for package in "${packages[@]}"; do

@@ -19,11 +19,13 @@ struct Shape {
   Vec3 size = {0.1, 0.1, 0.1};  // box: side lengths; kidney, liver: extents of the bounding box [m]
   double radius = 0.05;         // ball [m]
   std::vector<Shape> parts;     // union: all of them; difference: the first without the others
+  friend bool operator==(const Shape&, const Shape&) = default;
 };
 
 struct MeshSpec {
   std::string file;  // as written in the scene; relative to the scene's file
   double unit = 0;   // metres per unit of the file's numbers: 1e-3 for mm. Must be given.
+  friend bool operator==(const MeshSpec&, const MeshSpec&) = default;
 };
 
 struct BodySpec {
@@ -34,6 +36,7 @@ struct BodySpec {
   double density = 1000;  // [kg/m³]; m_i = density · h³
   bool align = true;      // turn the principal axes (longest, middle, shortest) to x, y, z
   Vec3 origin;            // where the body's frame lies in the world [m]
+  friend bool operator==(const BodySpec&, const BodySpec&) = default;
 };
 
 enum class Cooking { boxes, sampled };
@@ -44,6 +47,7 @@ struct ClusterSpec {
   double radius = 4.0;   // sampled: radius of the balls [h]
   double small = 0.5;    // tau = small · median size at cooking
   double cap = 1.4;      // cap = cap · largest size at cooking
+  friend bool operator==(const ClusterSpec&, const ClusterSpec&) = default;
 };
 
 // Points of paths and regions are in box coordinates: (0,0,0) is the lower, (1,1,1) the upper corner of the bounding
@@ -55,6 +59,7 @@ struct StrokeSpec {
   Vec3 back = {0, 0, 1};      // from the cutting edge to the back of the blade (metric direction)
   std::optional<Vec3> along;  // direction of the cutting edge; absent: the path's tangent, turning with it
   double pause = 0;           // [s] with the blade up, before the next stroke
+  friend bool operator==(const StrokeSpec&, const StrokeSpec&) = default;
 };
 
 struct BladeSpec {
@@ -65,6 +70,7 @@ struct BladeSpec {
   double speed = 0.1;  // of the middle of the edge [m/s]
   double start = 0;    // time at which the first stroke begins [s]
   std::vector<StrokeSpec> strokes;
+  friend bool operator==(const BladeSpec&, const BladeSpec&) = default;
 };
 
 struct WallSpec {
@@ -72,6 +78,7 @@ struct WallSpec {
   int32_t side = +1;
   double offset = 0;  // box coordinate along the axis; the ground is axis 2, side +1, offset 0
   double friction = 0;
+  friend bool operator==(const WallSpec&, const WallSpec&) = default;
 };
 
 struct GripSpec {
@@ -80,11 +87,13 @@ struct GripSpec {
   double end = -1;             // [s]; < 0: until the scene ends
   bool after_strokes = false;  // start and end count from the end of the last stroke
   Vec3 velocity;               // [m/s]; zero: pinned
+  friend bool operator==(const GripSpec&, const GripSpec&) = default;
 };
 
 // What `cutproof run --check` enforces. Absent: not enforced.
 struct Range {
   double low = 0, high = 0;  // both included
+  friend bool operator==(const Range&, const Range&) = default;
 };
 struct Expectations {
   std::vector<int64_t> components_after_stroke;  // of G, one entry per stroke
@@ -97,6 +106,7 @@ struct Expectations {
   std::optional<Range> particles;                // of the body
   std::optional<Range> dent;                     // greatest depth of the surface dent before the first removal [h]
   std::optional<Range> greatest_stretch;         // greatest neighbour distance in any frame [h]
+  friend bool operator==(const Expectations&, const Expectations&) = default;
 };
 
 struct Scene {
@@ -119,6 +129,7 @@ struct Scene {
   std::vector<WallSpec> walls;
   std::vector<GripSpec> grips;
   Expectations expect;
+  friend bool operator==(const Scene&, const Scene&) = default;
 };
 
 }  // namespace cutproof

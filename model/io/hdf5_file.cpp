@@ -12,6 +12,11 @@
 #include <string_view>
 #include <utility>
 
+#if defined(__has_feature)  // clang
+#if __has_feature(address_sanitizer)
+#define __SANITIZE_ADDRESS__ 1  // as gcc has it
+#endif
+#endif
 #ifdef __SANITIZE_ADDRESS__
 // HDF5 1.10 loses the memory of a damaged object header that it refuses to read. Not ours to mend.
 extern "C" const char* __lsan_default_suppressions() { return "leak:libhdf5"; }

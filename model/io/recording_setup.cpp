@@ -281,13 +281,24 @@ Defect parameter_defect(const Setup& setup) {
       {"step/substeps", {setup.step.substeps, 1}},
       {"step/iterations", {setup.step.iterations, 0}},
       {"split/debris", {setup.split.debris, 0}},
+      {"expand/depth", {setup.expand.depth, 1}},
   };
   for (const auto& [field, value] : least) {
     if (value.first < value.second) {
       return SetupDefect{field, fmt::format("This is {}, and should be at least {}.", value.first, value.second)};
     }
   }
+  const std::pair<const char*, double> not_negative[] = {
+      {"blade/length", setup.blade.length},
+      {"blade/depth", setup.blade.depth},
+      {"blade/thickness", setup.blade.thickness},
+      {"blade/friction", setup.blade.friction},
+  };
+  for (const auto& [field, value] : not_negative) {
+    if (value < 0) return SetupDefect{field, fmt::format("This is {}, and should not be negative.", value)};
+  }
   for (const Wall& wall : setup.walls) {
+    if (wall.friction < 0) return SetupDefect{"walls/friction", "These should not be negative."};
     if (wall.axis < 0 || wall.axis > 2) {
       return SetupDefect{"walls/axis", fmt::format("An axis is {}, and should be 0, 1 or 2.", wall.axis)};
     }

@@ -438,8 +438,8 @@ class Reader {
   void finish() const {
     for (const auto& [key, value] : object_.items()) {
       if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
-      const auto nearest = std::min_element(known_.begin(), known_.end(), [&key](auto a, auto b) {
-        return edit_distance(key, a) < edit_distance(key, b);
+      const auto nearest = std::min_element(known_.begin(), known_.end(), [&given = key](auto a, auto b) {
+        return edit_distance(given, a) < edit_distance(given, b);
       });
       const bool near = edit_distance(key, *nearest) <= std::max<std::size_t>(2, nearest->size() / 2);
       at_.inner(key).fail(
