@@ -17,6 +17,7 @@ not compile is an error, not a find. Writes docs/planted_faults.md unless --only
 was found, 1 one was not or the unchanged code fails, 2 bad usage or a bad patch.
 """
 import argparse
+import contextlib
 import dataclasses
 import filecmp
 import json
@@ -116,9 +117,16 @@ def apply(fault, check_only=False, tree=TREE):
         raise BadFault(f"{fault.path.name} does not apply: {done.stderr.strip()}")
 
 
-def restore(fault):
-    for file in fault.files:
-        (TREE / file).write_bytes((ROOT / file).read_bytes())
+@contextlib.contextmanager
+def planted(fault):
+    """The fault is in the copy as long as this lasts."""
+    before = {file: (TREE / file).read_bytes() for file in fault.files}
+    apply(fault)
+    try:
+        yield
+    finally:
+        for file, content in before.items():
+            (TREE / file).write_bytes(content)
 
 
 def configure():
@@ -236,11 +244,9 @@ def plural(count, noun):
 
 def judge(fault, jobs):
     """Plants one fault. Returns the outcome and the command that gave it; (None, None) if the fault survives."""
-    apply(fault)
-    try:
-        commands = fault.suspects + fallbacks(fault)
+    with planted(fault):
         built = set()
-        for command in commands:
+        for command in fault.suspects + fallbacks(fault):
             needed = {target_of(c) for c in (fault.suspects if command in fault.suspects else [command])}
             if not needed <= built:
                 build(needed, jobs)
@@ -248,9 +254,7 @@ def judge(fault, jobs):
             outcome = run(command, fault.livelock)
             if outcome.found:
                 return outcome, command
-        return None, None
-    finally:
-        restore(fault)
+    return None, None
 
 
 def passes_unchanged(command, jobs):
