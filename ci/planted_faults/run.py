@@ -40,7 +40,7 @@ STAGES = ("step", "detect", "split", "merge", "expand", "skin", "launch")
 FIELDS = ("Stage", "Fault", "Suspect", "Livelock")
 MOST_SECONDS = 420  # of one command
 FUZZ_SECONDS = 300  # of the last resort
-FUZZ_FAILS = re.compile(r"case (\d+) FAILS: '([^']*)' fails")
+FUZZ_FAILS = re.compile(r"case (\d+) FAILS: '(.*?)' fails after")
 
 
 class BadFault(Exception):
