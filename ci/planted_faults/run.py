@@ -152,11 +152,13 @@ def target_of(command):
 
 
 def fallbacks(fault):
-    reference = fault.code == "reference_cpu"
-    backend = "reference" if reference else "host"
-    tests = {"launch": ["launch_test", "backend_test"]}.get(
-        fault.stage, [f"{fault.stage}_test"] if reference else [f"gpu_{fault.stage}_test"])
-    return tests + [f"property_tests --gtest_filter='*/{'reference' if reference else '[hs]*'}'",
+    if fault.code == "reference_cpu":
+        backend, kinds = "reference", "*/reference*"
+        tests = ["backend_test"] if fault.stage == "launch" else [f"{fault.stage}_test"]
+    else:
+        backend, kinds = "host", "*/host*:*/simulated*"
+        tests = ["launch_test"] if fault.stage == "launch" else [f"gpu_{fault.stage}_test"]
+    return tests + [f"property_tests --gtest_filter='{kinds}'",
                     f"cutproof fuzz --backend {backend} --cases 1000000000 --seconds {FUZZ_SECONDS}"]
 
 
