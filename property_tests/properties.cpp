@@ -15,6 +15,7 @@
 #include <iostream>
 #include <sstream>
 
+#include "fixtures/cook.h"
 #include "gpu/backends.h"
 #include "oracles/two_runs.h"
 #include "property_tests/counterexample.h"
@@ -347,6 +348,33 @@ TEST_P(EveryBackend, StepsACutBodyWithoutGhostForcesAndWithoutEnergyFromNowhere)
   EXPECT_GT(iterations, 0);
 }
 
+// Blades push against tissue that walls on all three lower sides hold, so that both act on the same particles and are
+// projected in turn. Without friction that has an energy.
+TEST_P(EveryBackend, GainsNoEnergyBetweenBladeAndWalls) {
+  const auto backend = GetParam().make();
+  int64_t iterations = 0;
+  check(id(), cases_of(10), GetParam().most_size, [&](const Case& c) {
+    Case moving = c;
+    moving.moves = true;
+    Loaded loaded = load_for(*backend, moving);
+    auto& setup = loaded.setup;
+    setup.step.gravity = {-9.81, -9.81, -9.81};
+    setup.walls.clear();
+    for (int axis = 0; axis < 3; ++axis) setup.walls.push_back({axis, +1, 0.75 * c.spacing, 0});
+    constexpr int64_t kFrames = 4;
+    for (int64_t frame = 0; frame < std::min(kFrames, setup.frame_count()); ++frame) {
+      const Verdict verdict = oracles::energy_is_monotone(*backend, setup, loaded.state, 4);
+      iterations += verdict.checked;
+      if (!verdict.holds) return describe(verdict);
+      backend->load({setup}, {loaded.state});
+      backend->run({});
+      loaded.state = backend->snapshot().front();
+    }
+    return std::string();
+  });
+  if (ran_in_full()) EXPECT_GT(iterations, 0);
+}
+
 // Particle counts around the sizes of warps and blocks, and clusters of one to three particles; a cut through the
 // middle.
 TEST_P(EveryBackend, DissectsBodiesOfSizesAroundThoseOfBlocks) {
@@ -380,6 +408,62 @@ TEST_P(EveryBackend, DissectsBodiesOfSizesAroundThoseOfBlocks) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Over, EveryBackend, ::testing::ValuesIn(all_backends()),
+                         [](const auto& tested) { return tested.param.name; });
+
+// --- Bodies too large for simulated schedules -----------------------------------------------------------------------
+
+class LargeBodies : public ::testing::TestWithParam<NamedBackend> {};
+
+// Wires beside each other, and a cluster for every 21 particles in a row. Cutting every third particle out makes far
+// more clusters than a load has room for; so the kernels' backends have to make room between frames.
+TEST_P(LargeBodies, FindRoomForMoreClustersThanTheirLoadHadRoomFor) {
+  constexpr int32_t kWires = 14, kLength = 90, kInARow = 21;  // kWires along each of two axes
+  Case c;
+  for (int32_t i = 0; i < kWires; ++i) {
+    for (int32_t j = 0; j < kWires; ++j) {
+      for (int32_t k = 0; k < kLength; ++k) c.nodes.push_back({2 * i, 2 * j, k});
+    }
+  }
+  c.merge = MergeRule::none;
+  c.expand = ExpandRule::none;
+  c.blade_thickness = 0;
+  for (int32_t k = 1; k < kLength; k += 3) {
+    c.strokes.push_back({{-8, -8, 4 * k}, {8 * kWires, -8, 4 * k}, 2, true, Link::apart});
+  }
+  Loaded loaded = load(c);
+  loaded.setup.skin.wanted = false;
+  const Body& body = loaded.setup.body;
+  std::vector<std::vector<int32_t>> clusters;
+  for (int32_t p = 0; p < body.particle_count(); ++p) {
+    std::vector<int32_t> row = {p};
+    for (int32_t q = p; q >= 0 && static_cast<int32_t>(row.size()) < kInARow;) {
+      q = body.neighbour(q, 4);
+      if (q >= 0) row.push_back(q);
+    }
+    if (static_cast<int32_t>(row.size()) == kInARow) clusters.push_back(std::move(row));
+  }
+  const auto before = static_cast<int64_t>(clusters.size());
+  loaded.state = fixtures::foreign_state(body, std::move(clusters), 0, kInARow);
+
+  const auto backend = GetParam().make(), reference = reference::make_backend();
+  for (Backend* each : {backend.get(), reference.get()}) {
+    each->load({loaded.setup}, {loaded.state});
+    for (int64_t frame = 0; frame < loaded.setup.frame_count(); ++frame) ASSERT_NO_THROW(each->run({})) << frame;
+  }
+  const State found = backend->snapshot().front(), expected = reference->snapshot().front();
+  EXPECT_EQ(found.alive, expected.alive);
+  EXPECT_EQ(found.clusters.number, expected.clusters.number);
+  EXPECT_EQ(found.clusters.offsets, expected.clusters.offsets);
+  EXPECT_EQ(found.clusters.members, expected.clusters.members);
+  EXPECT_GT(found.clusters.count(), 5 * before);
+}
+
+std::vector<NamedBackend> backends_for_large_bodies() {
+  std::vector<NamedBackend> backends = all_backends();
+  std::erase_if(backends, [](const NamedBackend& backend) { return backend.most_size < 100; });
+  return backends;
+}
+INSTANTIATE_TEST_SUITE_P(Over, LargeBodies, ::testing::ValuesIn(backends_for_large_bodies()),
                          [](const auto& tested) { return tested.param.name; });
 
 // --- The generators themselves ------------------------------------------------------------------------------------
