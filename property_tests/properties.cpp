@@ -372,7 +372,9 @@ TEST_P(EveryBackend, GainsNoEnergyBetweenBladeAndWalls) {
     }
     return std::string();
   });
-  if (ran_in_full()) EXPECT_GT(iterations, 0);
+  if (ran_in_full()) {
+    EXPECT_GT(iterations, 0);
+  }
 }
 
 // Particle counts around the sizes of warps and blocks, and clusters of one to three particles; a cut through the

@@ -107,8 +107,8 @@ void write_text(const std::string& path, const std::string& text) {
 }
 
 std::string read_text(const std::string& path) {
-  std::error_code error;
-  if (fs::is_directory(path, error)) {
+  std::error_code ignored;
+  if (fs::is_directory(path, ignored)) {
     throw InputError(path, "", "This is a folder, and a file is to be read.", "Give a file inside it.");
   }
   File file(std::fopen(path.c_str(), "rb"));
