@@ -273,7 +273,7 @@ def write_table(rows):
     lines = [
         "# Planted faults",
         "",
-        "Written by `ci/planted_faults.sh`; every fault is a patch in `ci/planted_faults/faults/`. Each is a wrong program"
+        "Written by `ci/planted_faults/run.py`; every fault is a patch in `ci/planted_faults/faults/`. Each is a wrong program"
         " of the kind that people write: it is planted into a copy of the code, built, and given to the gate (tests,"
         " properties, `cutproof fuzz`), which also passes the unchanged code. A run stops at the first find and begins"
         " with the suspected property. *Took*: cases of a random property or campaign until the find, schedules of a"
