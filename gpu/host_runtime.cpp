@@ -107,6 +107,8 @@ const char* name(Operation operation) {
       return "sync";
     case Operation::sum:
       return "sum";
+    case Operation::warp_sum:
+      return "warp_sum";
     case Operation::smallest:
       return "smallest";
     case Operation::any:

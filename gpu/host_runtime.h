@@ -33,7 +33,7 @@ class HostBlock;
 class Worker;
 struct Fibre;
 
-enum class Operation : unsigned char { sync, sum, smallest, any, exclusive_scan, ballot, shuffle };
+enum class Operation : unsigned char { sync, sum, warp_sum, smallest, any, exclusive_scan, ballot, shuffle };
 
 // A place in a kernel. (std::source_location is not known to the Clang of Debian 12.)
 struct Where {

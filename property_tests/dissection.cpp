@@ -191,6 +191,9 @@ std::vector<Trail> run_cases(Backend& backend, std::vector<Loaded>& loaded) {
         trails.front().failure = broken_contract(due ? "a stage that is due runs" : "only what is due runs", stage,
                                                  states.front(), backend.name());
       }
+      // Where no body had anything to do, looking once a frame shows that nothing was done: skin always looks, as it
+      // counts up the frame.
+      if (!due && stage != Stage::skin) continue;
       std::vector<State> next = backend.snapshot();
       for (std::size_t b = 0; b < loaded.size(); ++b) {
         if (states[b].frame < setups[b].frame_count()) {
