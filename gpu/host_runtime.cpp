@@ -323,6 +323,11 @@ void Worker::simulate(const Job& job, SimulationOptions& options, Schedule& reco
 
 // Who goes on, taken out of the runnable; starts new blocks in the places of those that have ended.
 Worker::Next Worker::pick() {
+  if (simulation_ == nullptr && runnable_[0] != 0) {  // as below, for the one block that there is
+    const int thread = std::countr_zero(runnable_[0]);
+    runnable_[0] &= runnable_[0] - 1;
+    return {blocks_.front().get(), thread};
+  }
   for (const auto& block : blocks_) {
     if (block->done == LiveBlock::kAll && !start_block(*block)) runnable_[block->place] = 0;
   }

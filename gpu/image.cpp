@@ -485,13 +485,23 @@ Plan make_plan(const std::vector<Setup>& setups, const std::vector<State>& state
 }
 
 std::vector<State> extract_states(const Image& image, const std::vector<Setup>& setups) {
+  KnownSkins skins(setups.size());
+  return extract_states(image, setups, std::vector<bool>(setups.size(), true), skins);
+}
+
+std::vector<State> extract_states(const Image& image, const std::vector<Setup>& setups, const std::vector<bool>& wanted,
+                                  KnownSkins& skins) {
   const std::size_t bodies = setups.size();
   const Counters& counters = image.counters.front();
   const ByBody slots = by_body(bodies, counters.slots_used,
                                [&](int s) { return image.slot_size[at(s)] == 0 ? -1 : image.slot_body[at(s)]; });
   ByBody vertices, cells;
   std::vector<int32_t> place;
-  if (std::any_of(image.skin_made.begin(), image.skin_made.end(), [](int made) { return made != 0; })) {
+  bool any_new_skin = false;
+  for (std::size_t b = 0; b < bodies; ++b) {
+    if (wanted.at(b) && image.skin_made[b] && !skins.at(b)) any_new_skin = true;
+  }
+  if (any_new_skin) {
     vertices = by_body(bodies, counters.vertices_used, [&](int v) {
       const int p = image.vertex_owner[at(v)];
       return p < 0 ? -1 : image.body_of[at(p)];
@@ -507,11 +517,12 @@ std::vector<State> extract_states(const Image& image, const std::vector<Setup>& 
     });
     place.assign(at(counters.vertices_used), -1);
   }
-  std::vector<State> states;
+  std::vector<State> states(bodies);
   for (std::size_t b = 0; b < bodies; ++b) {
+    if (!wanted[b]) continue;
     const Setup& setup = setups[b];
     const BodyConstants& body = image.body[b];
-    State state;
+    State& state = states[b];
     state.frame = image.frame[b];
     const auto n = at(setup.body.particle_count());
     state.x.reserve(n);
@@ -533,10 +544,11 @@ std::vector<State> extract_states(const Image& image, const std::vector<Setup>& 
     state.tau = body.tau;
     state.cap = body.cap;
     state.edge_covered = image.edge_covered[b] != 0;
-    state.skin = image.skin_made[b] ? extract_skin(image, setup, body, range(vertices, 0), range(vertices, 1),
-                                                   range(cells, 0), range(cells, 1), place)
-                                    : image.loaded_skin[b];
-    states.push_back(std::move(state));
+    if (image.skin_made[b] && !skins[b]) {
+      skins[b] = extract_skin(image, setup, body, range(vertices, 0), range(vertices, 1), range(cells, 0),
+                              range(cells, 1), place);
+    }
+    state.skin = image.skin_made[b] ? *skins[b] : image.loaded_skin[b];
   }
   return states;
 }
