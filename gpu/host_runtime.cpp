@@ -425,8 +425,15 @@ void Worker::fail(const LiveBlock& block, std::exception_ptr what) {
 bool Worker::arrive(LiveBlock& block, int thread, const Meeting& meeting) {
   if ((meeting.mask & bit(thread)) == 0) fault(block, thread, "calls " + describe(meeting) + ", which leaves it out");
   block.meeting[thread] = meeting;
+  if (block.waiting == 0) {
+    block.first_waiting = thread;
+    block.agreeing = true;
+  } else if (block.agreeing) {
+    block.agreeing = same(block.meeting[block.first_waiting], meeting);
+  }
   block.waiting |= bit(thread);
   if ((block.waiting & meeting.mask) != meeting.mask) return false;
+  if (block.agreeing) return true;
   for (std::uint32_t rest = meeting.mask; rest != 0; rest &= rest - 1) {
     if (!same(block.meeting[std::countr_zero(rest)], meeting)) return false;
   }

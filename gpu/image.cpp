@@ -461,6 +461,7 @@ Plan make_plan(const std::vector<Setup>& setups, const std::vector<State>& state
     plan.substeps = std::max(plan.substeps, setup.step.substeps);
     plan.iterations = std::max(plan.iterations, setup.step.iterations);
     plan.contacts = plan.contacts || setup.has_blade || !setup.walls.empty() || !setup.grips.empty();
+    plan.grips = plan.grips || !setup.grips.empty();
     const bool detection = needs_detection(setup);
     plan.detection = plan.detection || detection;
     plan.distance = plan.distance || (detection && setup.detect.criterion == Criterion::distance);
