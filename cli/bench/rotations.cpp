@@ -221,6 +221,7 @@ struct RotationOptions {
   std::string backend = "reference";
   RotationCounts counts;
   std::optional<int64_t> timed;
+  bool cases = false;  // a table of every case, too
   std::string json;
 };
 
@@ -236,7 +237,9 @@ int bench_rotations(const RotationOptions& options) {
              counts.matrices, counts.timed, counts.repeats, counts.seed, 1e-9 * machine.copy_bytes_per_second);
   const RotationReport report = measure_rotations(rotation_methods(options.backend), counts,
                                                   rotation_of(BackendChoice{}), machine.copy_bytes_per_second);
-  for (const Precision precision : {Precision::single, Precision::twice}) print_cases(report, precision);
+  if (options.cases) {
+    for (const Precision precision : {Precision::single, Precision::twice}) print_cases(report, precision);
+  }
   print_methods(report);
   const fixtures::RotationBounds single = fixtures::rotation_bounds(Precision::single),
                                  twice = fixtures::rotation_bounds(Precision::twice);
@@ -290,7 +293,9 @@ Suite rotations_suite() {
                 ->check(CLI::Range(1, 10'000));
             command.add_option("--seed", options->counts.seed, "added to the seeds of the cases")
                 ->capture_default_str()
-                ->type_name("N");
+                ->type_name("N")
+                ->check(CLI::NonNegativeNumber);
+            command.add_flag("--cases", options->cases, "print the worst gap in every case as well");
             command.add_option("--json", options->json, "write errors, times and floors")->type_name("F");
             return [options] { return bench_rotations(*options); };
           }};
