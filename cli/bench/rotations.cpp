@@ -67,7 +67,8 @@ void mark_front(std::vector<RotationResult>& results) {
   for (RotationResult& one : results) {
     one.on_front = std::none_of(results.begin(), results.end(), [&](const RotationResult& other) {
       const bool better = gap(other) < gap(one) || other.near.median < one.near.median;
-      return better && gap(other) <= gap(one) && other.near.median <= one.near.median;
+      return other.precision == one.precision && better && gap(other) <= gap(one) &&
+             other.near.median <= one.near.median;
     });
   }
 }

@@ -23,7 +23,7 @@ struct RotationResult {
   std::vector<RotationCaseResult> cases;
   Times near, cold;        // [s] per million matrices
   double floor = 0;        // [s] per million matrices: bytes / copy bandwidth
-  bool on_front = false;   // no other is both at least as exact and at least as fast
+  bool on_front = false;   // no other of its precision is at least as exact and as fast, and better in one of both
   double worst_gap = 0;    // over all cases
   std::string worst_case;  // where that is
   double worst_orthogonality = 0, worst_deviation = 0;

@@ -240,6 +240,11 @@ TEST(RotationFront, HoldsWhatNoOtherMethodBeats) {
   cutproof::cli::mark_front(results);
   EXPECT_TRUE(results[0].on_front && results[1].on_front && results[2].on_front);
   EXPECT_FALSE(results[3].on_front || results[4].on_front);
+  // What is exact in double does not stand in the way of what kernels can use.
+  results.push_back(method(1e-15, 0.5));
+  results.back().precision = Precision::twice;
+  cutproof::cli::mark_front(results);
+  EXPECT_TRUE(results[0].on_front && results[1].on_front && results[2].on_front && results[5].on_front);
 }
 
 TEST(RotationMethods, OfKernelsAreAllSelectableAndTheOthersAreNot) {
