@@ -39,9 +39,10 @@ struct RotationCounts {
 
 struct RotationReport {
   std::vector<RotationResult> results;
-  double reference_error_single = 0,
-         reference_error_double = 0;  // greatest, of the best values that were compared with
-  bool default_holds() const;         // the default is there, and none of its answers is wrong
+  // The greatest, of the best values that were compared with.
+  double reference_error_single = 0, reference_error_double = 0;
+  // The default is there, and none of its answers is wrong.
+  bool default_holds() const;
 };
 
 // `copy_bytes_per_second` for the floors. The default is the selectable method named `default_name`.
