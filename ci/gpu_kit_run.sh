@@ -69,6 +69,8 @@ for part in $parts; do
           fixtures/scenes/small_block.json --backend gpu-eager
       done ;;
     timings)
+      try rotations cutproof bench rotations --backend gpu --cases --json "$results/rotations.json"
+      try floors cutproof bench floors --backend gpu --json "$results/floors.json"
       try timings cutproof bench stages --backend gpu --split both --json "$results/stages.json"
       # A body of ten million particles for 100 frames, a blade cutting.
       try ten_million cutproof bench stages --backend gpu --sizes 10000000 --frames 100 --json "$results/stages_10M.json" ;;

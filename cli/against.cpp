@@ -7,6 +7,7 @@
 #include <iterator>
 #include <random>
 
+#include "cli/json_number.h"
 #include "oracles/oracles.h"
 #include "reference_cpu/reference.h"
 
@@ -132,12 +133,6 @@ std::vector<int32_t> symmetric_difference(const std::vector<int32_t>& a, const s
   std::vector<int32_t> result;
   std::set_symmetric_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(result));
   return result;
-}
-
-nlohmann::json number(double value) {
-  if (std::isnan(value)) return "nan";
-  if (std::isinf(value)) return value > 0 ? "inf" : "-inf";
-  return value;
 }
 
 constexpr const char* kSource = "accuracy_and_speed.md §1";
@@ -490,8 +485,8 @@ nlohmann::json Against::to_json() const {
       frames[name] = std::move(values);
     };
     const auto spread = [&](const std::string& name, Spread LockstepFrame::*member) {
-      column((name + "_max").c_str(), [&](const LockstepFrame& f) { return number((f.*member).greatest); });
-      column((name + "_rms").c_str(), [&](const LockstepFrame& f) { return number((f.*member).rms()); });
+      column((name + "_max").c_str(), [&](const LockstepFrame& f) { return json_number((f.*member).greatest); });
+      column((name + "_rms").c_str(), [&](const LockstepFrame& f) { return json_number((f.*member).rms()); });
     };
     column("frame", [](const LockstepFrame& f) { return f.frame; });
     spread("position", &LockstepFrame::position);
@@ -513,8 +508,8 @@ nlohmann::json Against::to_json() const {
       constexpr std::array<const char*, kMeasures> kKeys = {"position",    "velocity", "rotation",
                                                             "rest_center", "mass",     "skin"};
       const Track& track = tracks_[which];
-      greatest[kKeys[which]] = {{"max", number(track.all.greatest)},
-                                {"rms", number(track.all.rms())},
+      greatest[kKeys[which]] = {{"max", json_number(track.all.greatest)},
+                                {"rms", json_number(track.all.rms())},
                                 {"frame", track.worst_frame},
                                 {"stage", name_of(track.worst_stage)}};
     }
@@ -524,8 +519,8 @@ nlohmann::json Against::to_json() const {
     json frames = {{"frame", json::array()}, {"position_max", json::array()}, {"position_rms", json::array()}};
     for (const ShadowFrame& frame : shadow_) {
       frames["frame"].push_back(frame.frame);
-      frames["position_max"].push_back(number(frame.position.greatest));
-      frames["position_rms"].push_back(number(frame.position.rms()));
+      frames["position_max"].push_back(json_number(frame.position.greatest));
+      frames["position_rms"].push_back(json_number(frame.position.rms()));
     }
     json first = nullptr;
     if (first_difference_) {
@@ -535,9 +530,9 @@ nlohmann::json Against::to_json() const {
                {"particles", first_difference_->what.particles},
                {"clusters", first_difference_->what.clusters},
                {"margin", nullptr},
-               {"reach", number(first_difference_->reach)},
+               {"reach", json_number(first_difference_->reach)},
                {"explained", first_difference_->explained}};
-      if (first_difference_->margin) first["margin"] = number(*first_difference_->margin);
+      if (first_difference_->margin) first["margin"] = json_number(*first_difference_->margin);
     }
     result["shadow"] = {{"frames", std::move(frames)}, {"first_difference", std::move(first)}};
   }

@@ -36,16 +36,6 @@ struct InfoOptions {
 };
 int info(const InfoOptions& options);
 
-struct BenchOptions {
-  std::string backend = "reference";
-  std::vector<int64_t> sizes;     // particles; empty: by backend
-  std::optional<int64_t> frames;  // timed; absent: by backend
-  std::string split;              // blocks, global or both; empty: blocks
-  std::string rotation;           // empty: the kernels' default
-  std::string json;
-};
-int bench_stages(const BenchOptions& options);
-
 struct FuzzOptions {
   BackendChoice backend{"host", {}, {}, "random", 1, 0};
   std::optional<int64_t> cases;  // default: 1000, or as many as `seconds` allow

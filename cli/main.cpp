@@ -2,8 +2,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <functional>
 #include <new>
 
+#include "cli/bench/suites.h"
 #include "cli/commands.h"
 #include "model/error.h"
 
@@ -114,25 +116,7 @@ int run_command_line(int argc, char** argv) {
   CLI::App* info_command = app.add_subcommand("info", "version, backends, devices");
   info_command->add_flag("--scene", info_options.scene, "list every field of a scene file");
 
-  BenchOptions bench_options;
-  CLI::App* bench_command = app.add_subcommand("bench", "times, each beside its error");
-  bench_command->require_subcommand(1);
-  CLI::App* stages_command = bench_command->add_subcommand("stages", "whole frames and each stage, a blade cutting");
-  stages_command->add_option("--backend", bench_options.backend, "who is timed; `cutproof info` lists them")
-      ->capture_default_str()
-      ->type_name("B");
-  stages_command
-      ->add_option("--sizes", bench_options.sizes,
-                   "particles, separated by commas (default: 1000,10000; gpu: 1000,101096,1000000,10000000)")
-      ->delimiter(',')
-      ->type_name("N,N...");
-  stages_command->add_option("--frames", bench_options.frames, "timed frames (default: 10; gpu: 20)")
-      ->type_name("N")
-      ->check(CLI::Range(1, 10'000));
-  stages_command->add_option("--split", bench_options.split, "kernels: how clusters are split, blocks, global or both")
-      ->type_name("M");
-  stages_command->add_option("--rotation", bench_options.rotation, "kernels: how rotations are found")->type_name("M");
-  stages_command->add_option("--json", bench_options.json, "write times, errors and floors")->type_name("F");
+  const std::function<int()> bench = add_bench(app);
 
   FuzzOptions fuzz_options;
   CLI::App* fuzz_command = app.add_subcommand("fuzz", "random dissections until one is wrong, and that one simplified");
@@ -203,8 +187,7 @@ int run_command_line(int argc, char** argv) {
     if (!replay_backend.name.empty()) replay_options.backend = replay_backend;
     return replay(replay_options);
   }
-  if (stages_command->parsed()) return bench_stages(bench_options);
-  return 2;
+  return bench();
 }
 
 }  // namespace

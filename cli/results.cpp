@@ -1,20 +1,12 @@
 #include "cli/results.h"
 
-#include <cmath>
-
 #include "cli/commands.h"
+#include "cli/json_number.h"
 #include "model/stage.h"
 
 namespace cutproof::cli {
 
 namespace {
-
-// JSON has no NaN and no infinity; they are written as the words that a reader can tell from a number.
-nlohmann::json number(double value) {
-  if (std::isnan(value)) return "nan";
-  if (std::isinf(value)) return value > 0 ? "inf" : "-inf";
-  return value;
-}
 
 nlohmann::json to_json(const FrameResult& frame, bool timed) {
   nlohmann::json stages = nlohmann::json::array();
@@ -44,8 +36,8 @@ nlohmann::json to_json(const Verdict& verdict, bool expected_failure) {
                            {"frame", verdict.frame},
                            {"body", verdict.body},
                            {"holds", verdict.holds},
-                           {"measured", number(verdict.measured)},
-                           {"bound", number(verdict.bound)},
+                           {"measured", json_number(verdict.measured)},
+                           {"bound", json_number(verdict.bound)},
                            {"unit", verdict.unit},
                            {"bound_source", verdict.bound_source},
                            {"checked", verdict.checked}};

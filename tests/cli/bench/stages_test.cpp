@@ -1,5 +1,5 @@
 // `cutproof bench stages`: no time without its error, no error that goes unseen. What the times are is not tested.
-#include "cli/bench.h"
+#include "cli/bench/stages.h"
 
 #include <gtest/gtest.h>
 
@@ -35,7 +35,7 @@ class Bench : public Program {
   json result(const std::string& name) const { return json::parse(read(name)); }
 };
 
-// Every row that bench.cpp owes, each with an error where it ran.
+// Every row that stages.cpp owes, each with an error where it ran.
 void expect_rows(const json& document, const std::string& backend, const std::string& precision,
                  const std::set<std::string>& scenes, const std::set<std::string>& splits) {
   const std::set<std::string> wanted = {"frame", "frame, cutting", "step",   "detect",
@@ -112,7 +112,10 @@ TEST_F(Bench, TellsBothWaysOfSplittingOnTheHost) {
 
 TEST_F(Bench, RefusesBadUsage) {
   const std::pair<const char*, const char*> cases[] = {
-      {"", "subcommand"},
+      {"", "use one of stages"},
+      {"nothing", "there is no suite 'nothing'"},
+      {"nothing", "use one of stages"},
+      {"nothing stages --sizes 1000", "there is no suite 'nothing'"},
       {"stages --backend nobody", "nobody"},
       {"stages --sizes 5", "--sizes"},
       {"stages --sizes 1000,many", "sizes"},

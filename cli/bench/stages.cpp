@@ -1,36 +1,31 @@
-#include "cli/bench.h"
+#include "cli/bench/stages.h"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <cstring>
-#include <ctime>
-#include <fstream>
 #include <iterator>
 #include <limits>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <thread>
 #include <utility>
 
-#include "cli/commands.h"
+#include "cli/backends.h"
+#include "cli/bench/floors.h"
+#include "cli/bench/report.h"
+#include "cli/bench/suites.h"
+#include "cli/json_number.h"
 #include "cli/results.h"
 #include "fixtures/bodies.h"
 #include "fixtures/build.h"
 #include "fixtures/cook.h"
-#include "gpu/backends.h"
 #include "model/error.h"
-#include "model/io/atomic_file.h"
 #include "oracles/oracles.h"
 #include "reference_cpu/reference.h"
 #if CUTPROOF_HAS_CUDA
-#include "gpu/floors.h"
 #include "gpu/twins.h"
 #endif
 
@@ -39,9 +34,6 @@ namespace cutproof::cli {
 namespace {
 
 using nlohmann::json;
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
 std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
 
@@ -120,13 +112,6 @@ BenchScene make_bench_scene(int64_t particles, int64_t frames) {
 }
 
 // --- Times -----------------------------------------------------------------------------------------------------------
-
-Times times_of(std::vector<double> seconds) {
-  if (seconds.empty()) return {};
-  std::sort(seconds.begin(), seconds.end());
-  const std::size_t n = seconds.size();
-  return {(seconds[(n - 1) / 2] + seconds[n / 2]) / 2, seconds.front(), seconds.back(), static_cast<int64_t>(n)};
-}
 
 namespace {
 
@@ -370,52 +355,19 @@ StepFloor step_floor(const Setup& setup, const State& state) {
 
 namespace {
 
-// What the machine can do, measured in the same run.
-struct MachineFloors {
-  double copy_bytes_per_second = 0;          // read + written
-  std::optional<double> graph_node_seconds;  // device only
-  std::optional<double> chain_seconds;       // of a graph of 40 empty kernels; device only
+struct StagesOptions {
+  std::string backend = "reference";
+  std::vector<int64_t> sizes;     // particles; empty: by backend
+  std::optional<int64_t> frames;  // timed; absent: by backend
+  std::string split;              // blocks, global or both; empty: blocks
+  std::string rotation;           // empty: the kernels' default
+  std::string json;
 };
-
-// Copies with `threads` threads of the CPU between buffers beyond any cache.
-double cpu_copy_bandwidth(int threads) {
-  const std::size_t each = (std::size_t{256} << 20) / static_cast<std::size_t>(threads);
-  std::vector<std::vector<char>> from(static_cast<std::size_t>(threads)), to(static_cast<std::size_t>(threads));
-  const auto on_all = [&](auto work) {
-    std::vector<std::thread> pool;
-    for (std::size_t t = 0; t < from.size(); ++t) pool.emplace_back([&, t] { work(t); });
-    for (std::thread& thread : pool) thread.join();
-  };
-  on_all([&](std::size_t t) {
-    from[t].assign(each, 1);
-    to[t].assign(each, 0);
-  });
-  std::vector<double> seconds;
-  for (int turn = 0; turn < 7; ++turn) {
-    const auto begin = Clock::now();
-    on_all([&](std::size_t t) { std::memcpy(to[t].data(), from[t].data(), each); });
-    seconds.push_back(seconds_since(begin));
-  }
-  return 2.0 * static_cast<double>(each) * threads / times_of(seconds).median;
-}
-
-std::string cpu_description() {
-  std::ifstream file("/proc/cpuinfo");
-  std::string name = "CPU";
-  for (std::string line; std::getline(file, line);) {
-    const std::size_t colon = line.find(": ");
-    if (line.rfind("model name", 0) == 0 && colon != std::string::npos) {
-      name = line.substr(colon + 2);
-      break;
-    }
-  }
-  return name;
-}
 
 // --- Who is timed ----------------------------------------------------------------------------------------------------
 
 struct Contender {
-  std::string backend, device, precision, rotation, split;
+  std::string backend, precision, rotation, split;
   bool pipelined = false;     // run() does not wait
   bool kernel_bytes = false;  // its step moves what step_floor counts
   std::unique_ptr<Backend> instance;
@@ -430,36 +382,21 @@ std::vector<std::string> split_names(const std::string& wanted) {
 
 Contender make_contender(const BackendChoice& choice) {
   const bool kernels = choice.name != "reference";
-  Contender contender{choice.name,
-                      "",
-                      kernels ? "single" : "double",
-                      kernels ? rotation_of(choice) : "horn",
-                      kernels ? choice.split : "search",
-                      false,
-                      kernels,
-                      make_backend(choice)};
-  contender.device =
-      kernels ? fmt::format("{}, {} threads", cpu_description(), cpu_threads()) : cpu_description() + ", 1 thread";
-#if CUTPROOF_HAS_CUDA
-  if (choice.name == "gpu") {
-    std::string why;
-    contender.pipelined = true;
-    contender.device = gpu::device_description(why);
-  }
-#endif
-  return contender;
+  return {choice.name,
+          kernels ? "single" : "double",
+          kernels ? rotation_of(choice) : "horn",
+          kernels ? choice.split : "search",
+          choice.name == "gpu",
+          kernels,
+          make_backend(choice)};
 }
 
-std::vector<Contender> make_contenders(const BenchOptions& options) {
+std::vector<Contender> make_contenders(const StagesOptions& options) {
   BackendChoice choice;
   choice.name = options.backend;
   choice.rotation = options.rotation;
   choice.split = options.split;
-  if (choice.name == "simulated" || choice.name == "gpu-eager") {
-    throw InputError("command line", "--backend",
-                     fmt::format("'{}' is for finding faults, not for timing", choice.name),
-                     "use reference, host or gpu");
-  }
+  require_timed_backend(choice.name);
   std::vector<Contender> contenders;
   if (choice.name == "host" || choice.name == "gpu") {
     for (const std::string& split : split_names(options.split.empty() ? "blocks" : options.split)) {
@@ -472,7 +409,7 @@ std::vector<Contender> make_contenders(const BenchOptions& options) {
   return contenders;
 }
 
-std::vector<int64_t> sizes_of(const BenchOptions& options) {
+std::vector<int64_t> sizes_of(const StagesOptions& options) {
   constexpr int64_t kLeast = 100, kMost = 1'000'000'000;
   std::vector<int64_t> sizes = options.sizes;
   if (sizes.empty() && options.backend == "gpu") sizes = {1000, 101'096, 1'000'000, 10'000'000};
@@ -487,17 +424,9 @@ std::vector<int64_t> sizes_of(const BenchOptions& options) {
 
 // --- What is told ----------------------------------------------------------------------------------------------------
 
-// JSON has no infinity.
-json number(double value) {
-  if (std::isfinite(value)) return value;
-  return std::isnan(value) ? "nan" : "inf";
+json to_json(const Distances& d) {
+  return {{"max_h", json_number(d.max)}, {"rms_h", json_number(d.rms)}, {"beyond", d.beyond}};
 }
-
-json to_json(const Times& times) {
-  if (times.count == 0) return nullptr;
-  return {{"median", times.median}, {"min", times.min}, {"max", times.max}};
-}
-json to_json(const Distances& d) { return {{"max_h", number(d.max)}, {"rms_h", number(d.rms)}, {"beyond", d.beyond}}; }
 std::string in_words(const Distances& d) {
   std::string text = fmt::format("{:.2g} h max, {:.2g} h RMS", d.max, d.rms);
   if (d.beyond > 0) text += fmt::format(", {} beyond {:.0e} h", d.beyond, kDistanceBound);
@@ -642,35 +571,14 @@ void report_scene(Report& report, const Contender& contender, const BenchScene& 
   std::fflush(stdout);
 }
 
-MachineFloors measure_machine(const std::string& backend) {
-  MachineFloors floors;
-#if CUTPROOF_HAS_CUDA
-  if (backend == "gpu") {
-    const gpu::Floors measured = gpu::measure_floors();
-    return {measured.copy_bytes_per_second, measured.graph_node_seconds, measured.chain_seconds};
-  }
-#endif
-  floors.copy_bytes_per_second = cpu_copy_bandwidth(backend == "reference" ? 1 : cpu_threads());
-  return floors;
-}
-
-void write_json(const std::string& path, const json& document) {
-  io::AtomicFile file(path);
-  io::write_text(file.temporary(), document.dump(1) + "\n");
-  file.commit();
-}
-
-}  // namespace
-
-int bench_stages(const BenchOptions& options) {
+int bench_stages(const StagesOptions& options) {
   const std::vector<int64_t> sizes = sizes_of(options);
   const int64_t frames = options.frames.value_or(options.backend == "gpu" ? 20 : 10);
   const std::vector<Contender> contenders = make_contenders(options);
-  if (!options.json.empty()) io::AtomicFile{options.json};  // a folder that cannot be written to is found out now
+  require_writable(options.json);
 
-  const std::string date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
-  const std::string device = contenders.front().device;
-  fmt::print("{} on {}, {}\n", options.backend, device, date);
+  json document = begin_report("stages", options.backend);
+  document["frames"] = frames;
   const MachineFloors machine = measure_machine(options.backend);
   fmt::print("copy, read + written: {:.4g} GB/s", 1e-9 * machine.copy_bytes_per_second);
   if (machine.graph_node_seconds) {
@@ -679,11 +587,6 @@ int bench_stages(const BenchOptions& options) {
   }
   fmt::print("\n");
 
-  json document = {{"format", "cutproof.bench"}, {"format_version", 1}, {"cutproof", kVersion}, {"date", date},
-                   {"backend", options.backend}, {"device", device},    {"frames", frames},     {"complete", false}};
-  if (const char* commit = std::getenv("CUTPROOF_COMMIT"); commit != nullptr && *commit != '\0') {
-    document["commit"] = commit;
-  }
   document["floors"] = {{"copy_bytes_per_second", machine.copy_bytes_per_second}};
   if (machine.graph_node_seconds) {
     document["floors"]["graph_node_seconds"] = *machine.graph_node_seconds;
@@ -711,11 +614,35 @@ int bench_stages(const BenchOptions& options) {
       document["scenes"] = report.scenes;
       document["holds"] = report.holds;
       document["complete"] = k + 1 == sizes.size() && &contender == &contenders.back();
-      if (!options.json.empty()) write_json(options.json, document);
+      write_report(options.json, document);
     }
   }
   if (!options.json.empty()) fmt::print("\nwrote {}\n", options.json);
   return report.holds ? 0 : 1;
+}
+
+}  // namespace
+
+Suite stages_suite() {
+  return {"stages", "whole frames and each stage, a blade cutting", [](CLI::App& command) {
+            const auto options = std::make_shared<StagesOptions>();
+            command.add_option("--backend", options->backend, "who is timed; `cutproof info` lists them")
+                ->capture_default_str()
+                ->type_name("B");
+            command
+                .add_option("--sizes", options->sizes,
+                            "particles, separated by commas (default: 1000,10000; gpu: 1000,101096,1000000,10000000)")
+                ->delimiter(',')
+                ->type_name("N,N...");
+            command.add_option("--frames", options->frames, "timed frames (default: 10; gpu: 20)")
+                ->type_name("N")
+                ->check(CLI::Range(1, 10'000));
+            command.add_option("--split", options->split, "kernels: how clusters are split, blocks, global or both")
+                ->type_name("M");
+            command.add_option("--rotation", options->rotation, "kernels: how rotations are found")->type_name("M");
+            command.add_option("--json", options->json, "write times, errors and floors")->type_name("F");
+            return [options] { return bench_stages(*options); };
+          }};
 }
 
 }  // namespace cutproof::cli

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/bench/report.h"
 #include "model/backend.h"
 #include "model/verdict.h"
 
@@ -30,12 +31,6 @@ inline constexpr int64_t kJudgedFrames = 4;
 // held. Throws InputError if no body has so many particles, within 2 %.
 inline constexpr int64_t kLargestBox = 2000;
 BenchScene make_bench_scene(int64_t particles, int64_t frames);
-
-struct Times {
-  double median = 0, min = 0, max = 0;  // [s]
-  int64_t count = 0;                    // of samples; 0: nothing was measured
-};
-Times times_of(std::vector<double> seconds);
 
 // What timing one backend on one scene gives. All three passes start from the same state, so they see the same frames.
 struct Timings {
