@@ -8,6 +8,7 @@
 #include "cli/bench/suites.h"
 #include "cli/commands.h"
 #include "model/error.h"
+#include "model/io/atomic_file.h"
 
 namespace {
 
@@ -51,6 +52,7 @@ int status_of_exception() noexcept {
 [[noreturn]] void end_with_status() {
   const int status = std::current_exception() != nullptr ? status_of_exception() : say("a defect of this program", 3);
   std::fflush(stdout);
+  cutproof::io::AtomicFile::remove_unfinished();
   std::_Exit(status);
 }
 

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <new>
 #include <system_error>
 
@@ -62,6 +63,10 @@ void require_writable_folder(const std::string& path) {
   }
 }
 
+// A list without allocations, because it is gone through when there is no memory.
+std::mutex living_guard;
+AtomicFile* living = nullptr;
+
 }  // namespace
 
 AtomicFile::AtomicFile(std::string path) : path_(resolved(path)) {
@@ -70,10 +75,25 @@ AtomicFile::AtomicFile(std::string path) : path_(resolved(path)) {
   const fs::file_status status = fs::status(path_, error);
   const bool replaceable = !fs::exists(status) || fs::is_regular_file(status);
   temporary_ = replaceable ? temporary_name(path_) : path_;
+  const std::lock_guard lock(living_guard);
+  next_ = living;
+  if (next_ != nullptr) next_->previous_ = this;
+  living = this;
 }
 
 AtomicFile::~AtomicFile() {
+  remove_temporary();
+  const std::lock_guard lock(living_guard);
+  (previous_ != nullptr ? previous_->next_ : living) = next_;
+  if (next_ != nullptr) next_->previous_ = previous_;
+}
+
+void AtomicFile::remove_temporary() noexcept {
   if (!committed_ && temporary_ != path_) std::remove(temporary_.c_str());
+}
+
+void AtomicFile::remove_unfinished() noexcept {
+  for (AtomicFile* file = living; file != nullptr; file = file->next_) file->remove_temporary();
 }
 
 void AtomicFile::commit() {

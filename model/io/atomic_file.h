@@ -16,10 +16,15 @@ class AtomicFile {
   AtomicFile& operator=(const AtomicFile&) = delete;
   const std::string& temporary() const { return temporary_; }
   void commit();  // throws MachineError if the rename fails
+  // For a program that ends without unwinding: removes what every AtomicFile of the process has not committed. Allocates
+  // nothing. No other thread may be making or destroying one.
+  static void remove_unfinished() noexcept;
 
  private:
+  void remove_temporary() noexcept;
   std::string path_, temporary_;
   bool committed_ = false;
+  AtomicFile *previous_ = nullptr, *next_ = nullptr;  // of all that live
 };
 
 // Throws InputError if the folder is not there or not writable, MachineError if the disk fails.

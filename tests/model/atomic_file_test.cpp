@@ -47,6 +47,19 @@ TEST_F(AtomicFileTest, NothingIsLeftWithoutACommit) {
   EXPECT_EQ(read_text(in_folder("a")), "old");
 }
 
+TEST_F(AtomicFileTest, NothingIsLeftWhereAProgramEndsWithoutUnwinding) {
+  AtomicFile finished(in_folder("a")), unfinished(in_folder("b"));
+  {
+    const AtomicFile gone(in_folder("c"));
+  }
+  std::ofstream(finished.temporary()) << "new";
+  std::ofstream(unfinished.temporary()) << "half";
+  finished.commit();
+  AtomicFile::remove_unfinished();
+  EXPECT_EQ(entries(), 1u);
+  EXPECT_EQ(read_text(in_folder("a")), "new");
+}
+
 TEST_F(AtomicFileTest, TheTemporaryNameLiesInTheSameFolderAndIsNeverUsedTwice) {
   AtomicFile first(in_folder("a")), second(in_folder("a"));
   EXPECT_EQ(fs::path(first.temporary()).parent_path(), folder_);
