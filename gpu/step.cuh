@@ -390,15 +390,16 @@ CUTPROOF_DEVICE void update_positions_kernel(Block& block, const World& w, int s
       }
       const Float3 plain = from + s * pull;
       Float3 free = plain;
-      // The first iteration is plain.
+      // The first iteration is plain, and the last has no next one to keep anything for.
       [[maybe_unused]] const bool combined = body.acceleration == kChebyshev && iteration > 0;
+      [[maybe_unused]] const bool kept = body.acceleration == kChebyshev && iteration + 1 < updates;
       [[maybe_unused]] Combination combination;
       if constexpr (kAccelerated) {
         if (combined) {
           combination = chebyshev(kdt2, iteration);
           free = combination(plain, x, xyz(w.earlier[p]));
         }
-        w.earlier[p] = now;
+        if (kept) w.earlier[p] = now;
       }
       next = free;
       if constexpr (kContacts) {
@@ -422,7 +423,7 @@ CUTPROOF_DEVICE void update_positions_kernel(Block& block, const World& w, int s
         Float3 carried = (implicit ? s : 1.0f) * before;
         if constexpr (kAccelerated) {
           if (combined) carried = combination(carried, before, xyz(w.pushed_earlier[p]));
-          w.pushed_earlier[p] = pushed;
+          if (kept) w.pushed_earlier[p] = pushed;
         }
         pushed = with_w(carried + (next - free), 0.0f);
       }

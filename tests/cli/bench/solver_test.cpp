@@ -30,7 +30,7 @@ class SolverBench : public Program {};
 
 TEST_F(SolverBench, TellsEveryTimeWithItsErrorAndWhatTheToleranceCosts) {
   const Outcome outcome = cutproof(
-      "bench solver --backend host --stiffness 1e5,1e6 --substeps 1,2 --iterations 1,8,64 --particles 512 --samples 1 "
+      "bench solver --backend host --stiffness 1e5,1e6 --substeps 1,2 --iterations 1,4,64 --particles 512 --samples 1 "
       "--json out.json");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
   const json document = json::parse(read("out.json"));
@@ -48,9 +48,9 @@ TEST_F(SolverBench, TellsEveryTimeWithItsErrorAndWhatTheToleranceCosts) {
       EXPECT_EQ(row.at("energy_gap").is_null(), scene.at("substeps") != 1) << row;
     }
     for (const char* acceleration : {"none", "chebyshev"}) {
-      for (const int iterations : {1, 8, 64}) ASSERT_TRUE(errors[acceleration].contains(iterations)) << iterations;
-      EXPECT_GT(errors[acceleration][1], errors[acceleration][8]);
-      EXPECT_GT(errors[acceleration][8], errors[acceleration][64]);
+      for (const int iterations : {1, 4, 64}) ASSERT_TRUE(errors[acceleration].contains(iterations)) << iterations;
+      EXPECT_GT(errors[acceleration][1], errors[acceleration][4]);
+      EXPECT_LT(errors[acceleration][64], 1e-2);
     }
     EXPECT_EQ(errors["none"][1], errors["chebyshev"][1]) << "the first iteration is plain";
     ASSERT_EQ(scene.at("to_tolerance").size(), 2U);
