@@ -70,6 +70,8 @@ for part in $parts; do
           fixtures/scenes/small_block.json --backend gpu-eager
       done ;;
     timings)
+      try rotations cutproof bench rotations --backend gpu --cases --json "$results/rotations.json"
+      try floors cutproof bench floors --backend gpu --json "$results/floors.json"
       try timings cutproof bench stages --backend gpu --split both --json "$results/stages.json"
       try solver cutproof bench solver --backend gpu --json "$results/solver.json"
       # A body of ten million particles for 100 frames, a blade cutting.

@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <thread>
 
 #include "gpu/backends.h"
@@ -15,8 +14,6 @@ namespace cutproof::cli {
 
 namespace {
 
-// In the order of layout.h.
-constexpr std::array<const char*, 6> kRotationNames = {"jacobi4", "mueller", "apd", "svd", "quest", "newton"};
 // Preemptions that PCT spreads over so many decisions: about what a frame of a small body has.
 constexpr int kPctDepth = 3;
 constexpr std::int64_t kPctLength = 100'000;
@@ -35,12 +32,12 @@ gpu::KernelOptions kernel_options(const BackendChoice& choice) {
     refuse("--split", fmt::format("there is no split method '{}'", choice.split), "use blocks or global");
   }
   if (!choice.rotation.empty()) {
-    const auto found = std::find(kRotationNames.begin(), kRotationNames.end(), choice.rotation);
-    if (found == kRotationNames.end()) {
+    const auto found = std::find(rotation_names().begin(), rotation_names().end(), choice.rotation);
+    if (found == rotation_names().end()) {
       refuse("--rotation", fmt::format("there is no rotation method '{}'", choice.rotation),
-             fmt::format("use one of {}", fmt::join(kRotationNames, ", ")));
+             fmt::format("use one of {}", fmt::join(rotation_names(), ", ")));
     }
-    options.rotation_method = static_cast<int>(found - kRotationNames.begin());
+    options.rotation_method = static_cast<int>(found - rotation_names().begin());
   }
   return options;
 }
@@ -64,6 +61,11 @@ std::unique_ptr<Backend> make_simulated(gpu::Generator schedule, const BackendCh
 
 }  // namespace
 
+const std::vector<std::string>& rotation_names() {
+  static const std::vector<std::string> names = {"jacobi4", "mueller", "apd", "svd", "quest", "newton"};
+  return names;
+}
+
 const std::vector<std::string>& schedule_names() {
   static const std::vector<std::string> names = {"forward", "reverse", "round_robin", "random", "pct"};
   return names;
@@ -72,7 +74,7 @@ const std::vector<std::string>& schedule_names() {
 int cpu_threads() { return static_cast<int>(std::max(1u, std::thread::hardware_concurrency())); }
 
 std::string rotation_of(const BackendChoice& choice) {
-  return kRotationNames[static_cast<std::size_t>(kernel_options(choice).rotation_method)];
+  return rotation_names()[static_cast<std::size_t>(kernel_options(choice).rotation_method)];
 }
 
 std::unique_ptr<Backend> make_backend(const BackendChoice& choice) {

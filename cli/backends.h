@@ -26,6 +26,8 @@ std::unique_ptr<Backend> make_backend(const BackendChoice& choice);
 std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice, std::shared_ptr<gpu::Schedule> record);
 std::unique_ptr<Backend> make_replaying_backend(const BackendChoice& choice, gpu::Schedule schedule);
 
+// By the number in gpu/layout.h.
+const std::vector<std::string>& rotation_names();
 // The name of the rotation method that kernels will use.
 std::string rotation_of(const BackendChoice& choice);
 const std::vector<std::string>& schedule_names();

@@ -75,6 +75,7 @@ class GpuBackend final : public Backend {
   // by then they have nearly always arrived, and the answer does not depend on how fast the device is, so two runs make
   // room at the same places and have the same bits.
   void run(Span span) override {
+    if (span.contains(Stage::skin)) skins_.assign(setups_.size(), std::nullopt);
     if (runs_ >= kInFlight) {
       CUTPROOF_CUDA(cudaEventSynchronize(end_[slot()].get()));
       const Counters& then = counters()[slot()];
@@ -104,10 +105,11 @@ class GpuBackend final : public Backend {
     finish(span);
   }
 
-  std::vector<State> snapshot() const override {
+  std::vector<State> snapshot() const override { return snapshot_of(std::vector<bool>(setups_.size(), true)); }
+  std::vector<State> snapshot_of(const std::vector<bool>& wanted) const override {
     wait();
     device_.download(image_);
-    return extract_states(image_, setups_);
+    return extract_states(image_, setups_, wanted, skins_);
   }
 
   SpanReport report() const override {
@@ -132,6 +134,7 @@ class GpuBackend final : public Backend {
     device_ = DeviceWorld(image);
     image_ = std::move(image);
     setups_ = std::move(setups);
+    skins_.assign(setups_.size(), std::nullopt);
     runs_ = 0;
     room_ = room;
   }
@@ -164,7 +167,8 @@ class GpuBackend final : public Backend {
   uint64_t runs_ = 0;  // since the load
   Span span_;
   std::vector<Setup> setups_;
-  mutable Image image_;  // host side of snapshots
+  mutable Image image_;       // host side of snapshots
+  mutable KnownSkins skins_;  // of the last skin stage, as far as snapshots have asked for them
   DeviceWorld device_;
   Plan plan_;
   std::map<std::pair<int, int>, DeviceGraph> graphs_;

@@ -38,6 +38,10 @@ class DeviceBlock {
     return reduce<true>(value, [](T a, T b) { return a + b; });
   }
   template <class T>
+  __device__ T warp_sum(T value) {
+    return reduce_warp(value, [](T a, T b) { return a + b; });
+  }
+  template <class T>
   __device__ T smallest(T value) {
     return reduce<std::is_integral_v<T>>(value, [](T a, T b) { return b < a ? b : a; });
   }

@@ -19,12 +19,12 @@ class Stopwatch {
  public:
   cudaStream_t stream() const { return stream_.get(); }
 
-  // Seconds that one piece of work takes: median over `turns` of `repeat` pieces one after the other, so that handing
+  // Seconds that one piece of work takes, `turns` times: each of `repeat` pieces one after the other, so that handing
   // over costs nothing.
   template <class Work>
-  double seconds(int turns, int repeat, Work work) {
+  std::vector<double> seconds(int turns, int repeat, Work work) {
     for (int k = 0; k < repeat; ++k) work(stream());
-    std::vector<float> milliseconds;
+    std::vector<double> samples;
     for (int turn = 0; turn < turns; ++turn) {
       CUTPROOF_CUDA(cudaEventRecord(begin_.get(), stream()));
       for (int k = 0; k < repeat; ++k) work(stream());
@@ -32,10 +32,9 @@ class Stopwatch {
       CUTPROOF_CUDA(cudaEventSynchronize(end_.get()));
       float elapsed = 0;
       CUTPROOF_CUDA(cudaEventElapsedTime(&elapsed, begin_.get(), end_.get()));
-      milliseconds.push_back(elapsed);
+      samples.push_back(1e-3 * static_cast<double>(elapsed) / repeat);
     }
-    std::sort(milliseconds.begin(), milliseconds.end());
-    return 1e-3 * static_cast<double>(milliseconds[milliseconds.size() / 2]) / repeat;
+    return samples;
   }
 
  private:
@@ -61,31 +60,42 @@ class Chain {
   ExecutableGraph executable_;
 };
 
-DeviceMemory filled_memory(std::size_t bytes) {
+double median(std::vector<double> samples) {
+  std::sort(samples.begin(), samples.end());
+  return samples[samples.size() / 2];
+}
+
+DeviceMemory filled_memory(std::size_t bytes, int value) {
   DeviceMemory memory = make_device_memory(bytes);
-  CUTPROOF_CUDA(cudaMemset(memory.get(), 1, bytes));
+  CUTPROOF_CUDA(cudaMemset(memory.get(), value, bytes));
   return memory;
 }
 
 }  // namespace
 
-Floors measure_floors() {
-  constexpr int kShort = 40, kLong = 400, kTurns = 21;
+Floors measure_floors(int repeats) {
+  constexpr int kShort = 40, kLong = 400;
   Floors floors;
   Stopwatch stopwatch;
   {
-    constexpr std::size_t kBytes = std::size_t{1} << 30;
-    const DeviceMemory from = filled_memory(kBytes), to = filled_memory(kBytes);
+    constexpr std::size_t kBytes = std::size_t{1} << 30, kChecked = std::size_t{16} << 20;
+    const DeviceMemory from = filled_memory(kBytes, 1), to = filled_memory(kBytes, 0);
     CUTPROOF_CUDA(cudaDeviceSynchronize());
-    const double seconds = stopwatch.seconds(kTurns, 4, [&](cudaStream_t stream) {
+    floors.copy = stopwatch.seconds(repeats, 4, [&](cudaStream_t stream) {
       CUTPROOF_CUDA(cudaMemcpyAsync(to.get(), from.get(), kBytes, cudaMemcpyDeviceToDevice, stream));
     });
-    floors.copy_bytes_per_second = 2.0 * static_cast<double>(kBytes) / seconds;
+    floors.copy_bytes = 2.0 * static_cast<double>(kBytes);
+    floors.copy_bytes_per_second = floors.copy_bytes / median(floors.copy);
+    std::vector<unsigned char> end(kChecked);
+    CUTPROOF_CUDA(cudaMemcpy(end.data(), static_cast<const unsigned char*>(to.get()) + (kBytes - kChecked), kChecked,
+                             cudaMemcpyDeviceToHost));
+    floors.bytes_lost = std::count_if(end.begin(), end.end(), [](unsigned char byte) { return byte != 1; });
   }
   const Chain few(stopwatch.stream(), kShort), many(stopwatch.stream(), kLong);
-  floors.chain_seconds = stopwatch.seconds(kTurns, 1, [&](cudaStream_t stream) { few.launch(stream); });
-  const double longer = stopwatch.seconds(kTurns, 1, [&](cudaStream_t stream) { many.launch(stream); });
-  floors.graph_node_seconds = (longer - floors.chain_seconds) / (kLong - kShort);
+  floors.short_chain = stopwatch.seconds(repeats, 1, [&](cudaStream_t stream) { few.launch(stream); });
+  floors.long_chain = stopwatch.seconds(repeats, 1, [&](cudaStream_t stream) { many.launch(stream); });
+  floors.chain_seconds = median(floors.short_chain);
+  floors.graph_node_seconds = (median(floors.long_chain) - floors.chain_seconds) / (kLong - kShort);
   return floors;
 }
 

@@ -69,23 +69,35 @@ CUTPROOF_DEVICE void flag_live_slots_kernel(Block& block, World w) {
 }
 CUTPROOF_KERNEL(flag_live_slots_kernel);
 
-// slot_scratch[slot_capacity + s]: live slots before s, over all bodies; numbers start at 0 in each body.
+// slot_scratch[slot_capacity + s]: live slots before s. Requires a World of one body.
 template <class Block>
 CUTPROOF_DEVICE void number_slots_kernel(Block& block, World w) {
   for (int64_t s = block.first(); s < w.counters->slots_used; s += block.stride()) {
-    if (w.slot_size[s] == 0 || !running(w, w.slot_body[s])) continue;
-    // Bodies' slots interleave once clusters have split, so with several bodies the rank counts within the body.
-    int rank = w.slot_scratch[w.slot_capacity + s];
-    if (w.bodies > 1) {
-      rank = 0;
-      for (int64_t before = 0; before < s; ++before) {
-        rank += w.slot_size[before] > 0 && w.slot_body[before] == w.slot_body[s];
-      }
-    }
-    w.slot_number[s] = rank;
+    if (w.slot_size[s] > 0 && running(w, w.slot_body[s])) w.slot_number[s] = w.slot_scratch[w.slot_capacity + s];
   }
 }
 CUTPROOF_KERNEL(number_slots_kernel);
+
+// The same for several bodies, each of which counts from 0; their slots interleave once clusters have split. A block
+// for each body, whose threads take consecutive parts of the slots: count, add up, count again.
+template <class Block>
+CUTPROOF_DEVICE void number_slots_by_body_kernel(Block& block, World w) {
+  const int used = w.counters->slots_used;
+  const int part = (used + block.size() - 1) / block.size();
+  for (int b = block.index(); b < w.bodies; b += block.count()) {
+    if (!running(w, b)) continue;
+    const int begin = part * block.thread() < used ? part * block.thread() : used;
+    const int end = begin + part < used ? begin + part : used;
+    const auto mine = [&](int s) { return w.slot_body[s] == b && w.slot_size[s] > 0; };
+    int count = 0, total = 0;
+    for (int s = begin; s < end; ++s) count += mine(s) ? 1 : 0;
+    int number = block.exclusive_scan(count, total);
+    for (int s = begin; s < end; ++s) {
+      if (mine(s)) w.slot_number[s] = number++;
+    }
+  }
+}
+CUTPROOF_KERNEL(number_slots_by_body_kernel);
 
 template <class Block>
 CUTPROOF_DEVICE void end_frame_kernel(Block& block, World w) {
@@ -144,6 +156,10 @@ void enqueue_span(Launcher& launcher, const World& w, const Plan& plan, Span spa
       enqueue_skin_positions(launcher, w, plan);
     }
     launcher.if_nonzero(&w.counters->cut, [&](Launcher& inner) {
+      if (w.bodies > 1) {
+        inner.blocks(number_slots_by_body_kernel_object{}, w.bodies, 256, 0, w);
+        return;
+      }
       inner.items(flag_live_slots_kernel_object{}, w.slot_capacity, w);
       inner.exclusive_scan(w.slot_scratch, w.slot_scratch + w.slot_capacity, w.slot_capacity, &w.counters->scratch[0]);
       inner.items(number_slots_kernel_object{}, w.slot_capacity, w);

@@ -31,6 +31,7 @@ class HostBackend final : public Backend {
       load_with(Room{2 * room_.factor}, std::move(setups_), std::move(states));
     }
     report_ = {};
+    if (span.contains(Stage::skin)) skins_.assign(setups_.size(), std::nullopt);
     // Work is done when it is handed over, so the time between two marks is that of the stage between them.
     const auto begin = Clock::now();
     auto since = begin;
@@ -51,7 +52,10 @@ class HostBackend final : public Backend {
     require_no_fault(counters);
   }
 
-  std::vector<State> snapshot() const override { return extract_states(image_, setups_); }
+  std::vector<State> snapshot() const override { return snapshot_of(std::vector<bool>(setups_.size(), true)); }
+  std::vector<State> snapshot_of(const std::vector<bool>& wanted) const override {
+    return extract_states(image_, setups_, wanted, skins_);
+  }
   SpanReport report() const override { return report_; }
 
  private:
@@ -61,6 +65,7 @@ class HostBackend final : public Backend {
     image_ = std::move(image);
     setups_ = std::move(setups);
     world_ = image_.world();
+    skins_.assign(setups_.size(), std::nullopt);
     report_ = {};
     room_ = room;
   }
@@ -75,6 +80,7 @@ class HostBackend final : public Backend {
   World world_;
   Plan plan_;
   SpanReport report_;
+  mutable KnownSkins skins_;  // of the last skin stage, as far as snapshots have asked for them
 };
 
 }  // namespace

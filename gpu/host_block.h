@@ -46,6 +46,10 @@ class HostBlock {
     return reduce(Operation::sum, value, where, [](T a, T b) { return a + b; });
   }
   template <class T>
+  T warp_sum(T value, Where where = Where::here()) {
+    return reduce(Operation::warp_sum, value, where, [](T a, T b) { return a + b; });
+  }
+  template <class T>
   T smallest(T value, Where where = Where::here()) {
     return reduce(Operation::smallest, value, where, [](T a, T b) { return b < a ? b : a; });
   }

@@ -107,6 +107,8 @@ const char* name(Operation operation) {
       return "sync";
     case Operation::sum:
       return "sum";
+    case Operation::warp_sum:
+      return "warp_sum";
     case Operation::smallest:
       return "smallest";
     case Operation::any:
@@ -321,6 +323,11 @@ void Worker::simulate(const Job& job, SimulationOptions& options, Schedule& reco
 
 // Who goes on, taken out of the runnable; starts new blocks in the places of those that have ended.
 Worker::Next Worker::pick() {
+  if (simulation_ == nullptr && runnable_[0] != 0) {  // as below, for the one block that there is
+    const int thread = std::countr_zero(runnable_[0]);
+    runnable_[0] &= runnable_[0] - 1;
+    return {blocks_.front().get(), thread};
+  }
   for (const auto& block : blocks_) {
     if (block->done == LiveBlock::kAll && !start_block(*block)) runnable_[block->place] = 0;
   }
@@ -418,8 +425,15 @@ void Worker::fail(const LiveBlock& block, std::exception_ptr what) {
 bool Worker::arrive(LiveBlock& block, int thread, const Meeting& meeting) {
   if ((meeting.mask & bit(thread)) == 0) fault(block, thread, "calls " + describe(meeting) + ", which leaves it out");
   block.meeting[thread] = meeting;
+  if (block.waiting == 0) {
+    block.first_waiting = thread;
+    block.agreeing = true;
+  } else if (block.agreeing) {
+    block.agreeing = same(block.meeting[block.first_waiting], meeting);
+  }
   block.waiting |= bit(thread);
   if ((block.waiting & meeting.mask) != meeting.mask) return false;
+  if (block.agreeing) return true;
   for (std::uint32_t rest = meeting.mask; rest != 0; rest &= rest - 1) {
     if (!same(block.meeting[std::countr_zero(rest)], meeting)) return false;
   }

@@ -33,7 +33,7 @@ class HostBlock;
 class Worker;
 struct Fibre;
 
-enum class Operation : unsigned char { sync, sum, smallest, any, exclusive_scan, ballot, shuffle };
+enum class Operation : unsigned char { sync, sum, warp_sum, smallest, any, exclusive_scan, ballot, shuffle };
 
 // A place in a kernel. (std::source_location is not known to the Clang of Debian 12.)
 struct Where {
@@ -67,6 +67,8 @@ struct LiveBlock {
   std::uint32_t started = 0, waiting = 0, done = kAll;
   bool cancelled = false;  // something failed: threads unwind when they are resumed
   Meeting meeting[kHostThreads];
+  int first_waiting = 0;  // the first of those that are waiting to have come
+  bool agreeing = true;   // all that are waiting wait at the same place as that one
   Fibre* fibre[kHostThreads] = {};
 
   // Shared memory: poisoned with 0xff bytes where it is first asked for.

@@ -324,10 +324,45 @@ void make_room(Image& image, Room room) {
   image.cell_scratch.assign(at(nodes), 0);
 }
 
-Clusters extract_clusters(const Image& image, const BodyConstants& body, double spacing, int body_index) {
+// Which slots, skin vertices and cells each body has: they interleave once clusters have split and skins have grown.
+// Entries of body b: list[begin[b] .. begin[b + 1]), ascending.
+struct ByBody {
+  std::vector<int> list;
+  std::vector<std::size_t> begin;
+};
+
+// body_of(k): the body of entry k of 0 .. count - 1, or -1 to leave it out.
+template <class BodyOf>
+ByBody by_body(std::size_t bodies, int count, const BodyOf& body_of) {
+  ByBody sorted;
+  sorted.begin.assign(bodies + 1, 0);
+  for (int k = 0; k < count; ++k) {
+    if (const int b = body_of(k); b >= 0) ++sorted.begin[at(b) + 1];
+  }
+  for (std::size_t b = 0; b < bodies; ++b) sorted.begin[b + 1] += sorted.begin[b];
+  sorted.list.resize(sorted.begin.back());
+  std::vector<std::size_t> next(sorted.begin.begin(), sorted.begin.end() - 1);
+  for (int k = 0; k < count; ++k) {
+    if (const int b = body_of(k); b >= 0) sorted.list[next[at(b)]++] = k;
+  }
+  return sorted;
+}
+
+Clusters extract_clusters(const Image& image, const BodyConstants& body, double spacing, const int* slot,
+                          const int* slots_end) {
   Clusters clusters;
-  for (int s = 0; s < image.counters.front().slots_used; ++s) {
-    if (image.slot_size[at(s)] == 0 || image.slot_body[at(s)] != body_index) continue;
+  const auto count = static_cast<std::size_t>(slots_end - slot);
+  clusters.offsets.reserve(count + 1);
+  clusters.number.reserve(count);
+  clusters.rotation.reserve(count);
+  clusters.rest_center.reserve(count);
+  clusters.mass.reserve(count);
+  clusters.degenerate.reserve(count);
+  int64_t members = 0;
+  for (const int* s = slot; s != slots_end; ++s) members += image.slot_size[at(*s)];
+  clusters.members.reserve(at(members));
+  for (; slot != slots_end; ++slot) {
+    const int s = *slot;
     for (int k = 0; k < image.slot_size[at(s)]; ++k) {
       clusters.members.push_back(image.members[at(image.slot_begin[at(s)] + k)] - body.particle_begin);
     }
@@ -348,44 +383,41 @@ Clusters extract_clusters(const Image& image, const BodyConstants& body, double 
   return clusters;
 }
 
-// Vertices in the order (owner, direction), triangles in the order of their cells.
-Skin extract_skin(const Image& image, const Setup& setup, const BodyConstants& body) {
-  struct Vertex {
-    int owner, direction, index;
-  };
-  const Counters& counters = image.counters.front();
-  std::vector<Vertex> vertices;
-  for (int v = 0; v < counters.vertices_used; ++v) {
-    const int p = image.vertex_owner[at(v)];
-    if (p >= body.particle_begin && p < body.particle_end) {
-      vertices.push_back({p - body.particle_begin, image.vertex_direction[at(v)], v});
-    }
+// Vertices in the order (owner, direction), triangles in the order of their cells. `place`: scratch, one entry for
+// each vertex of the World.
+Skin extract_skin(const Image& image, const Setup& setup, const BodyConstants& body, const int* vertex,
+                  const int* vertices_end, const int* cell, const int* cells_end, std::vector<int32_t>& place) {
+  // (6 · owner + direction, index)
+  std::vector<std::pair<int64_t, int>> vertices;
+  vertices.reserve(static_cast<std::size_t>(vertices_end - vertex));
+  for (; vertex != vertices_end; ++vertex) {
+    const int64_t owner = image.vertex_owner[at(*vertex)] - body.particle_begin;
+    vertices.emplace_back(6 * owner + image.vertex_direction[at(*vertex)], *vertex);
   }
-  std::sort(vertices.begin(), vertices.end(), [](const Vertex& a, const Vertex& b) {
-    return a.owner != b.owner ? a.owner < b.owner : a.direction < b.direction;
-  });
+  std::sort(vertices.begin(), vertices.end());
   Skin skin;
-  std::vector<int32_t> place(at(counters.vertices_used), -1);
+  skin.owner.reserve(vertices.size());
+  skin.direction.reserve(vertices.size());
+  skin.position.reserve(vertices.size());
   const double h = setup.body.grid.spacing;
-  for (const Vertex& vertex : vertices) {
-    place[at(vertex.index)] = static_cast<int32_t>(skin.owner.size());
-    const auto& e = kDirections[at(vertex.direction)];
-    const Vec3 rest = setup.body.rest_position(vertex.owner) +
-                      (setup.skin.alpha * h) * Vec3{double(e[0]), double(e[1]), double(e[2])};
-    skin.owner.push_back(vertex.owner);
-    skin.direction.push_back(static_cast<uint8_t>(vertex.direction));
-    skin.position.push_back(rest + d(xyz(image.vertex_position[at(vertex.index)])));
+  for (const auto& [name, index] : vertices) {
+    place[at(index)] = static_cast<int32_t>(skin.owner.size());
+    const auto owner = static_cast<int32_t>(name / 6);
+    const auto direction = static_cast<uint8_t>(name % 6);
+    const auto& e = kDirections[direction];
+    const Vec3 rest =
+        setup.body.rest_position(owner) + (setup.skin.alpha * h) * Vec3{double(e[0]), double(e[1]), double(e[2])};
+    skin.owner.push_back(owner);
+    skin.direction.push_back(direction);
+    skin.position.push_back(rest + d(xyz(image.vertex_position[at(index)])));
   }
   std::vector<std::pair<int, int>> cells;  // node, cell
-  const int64_t nodes = setup.body.grid.node_count();
-  for (int c = 0; c < counters.cells_used; ++c) {
-    const int64_t node = image.cell_node[at(c)];
-    if (node >= body.node_begin && node < body.node_begin + nodes) cells.emplace_back(image.cell_node[at(c)], c);
-  }
+  cells.reserve(static_cast<std::size_t>(cells_end - cell));
+  for (; cell != cells_end; ++cell) cells.emplace_back(image.cell_node[at(*cell)], *cell);
   std::sort(cells.begin(), cells.end());
-  for (const auto& [node, cell] : cells) {
+  for (const auto& [node, c] : cells) {
     for (int t = 0; t < 5; ++t) {
-      const int* corner = &image.cell_triangles[at(15 * int64_t{cell} + 3 * t)];
+      const int* corner = &image.cell_triangles[at(15 * int64_t{c} + 3 * t)];
       if (corner[0] < 0) continue;
       skin.triangles.push_back({place[at(corner[0])], place[at(corner[1])], place[at(corner[2])]});
     }
@@ -440,6 +472,7 @@ Plan make_plan(const std::vector<Setup>& setups, const std::vector<State>& state
     plan.iterations = std::max(plan.iterations, setup.step.iterations);
     plan.accelerated = plan.accelerated || setup.step.acceleration != Acceleration::none;
     plan.contacts = plan.contacts || setup.has_blade || !setup.walls.empty() || !setup.grips.empty();
+    plan.grips = plan.grips || !setup.grips.empty();
     const bool detection = needs_detection(setup);
     plan.detection = plan.detection || detection;
     plan.distance = plan.distance || (detection && setup.detect.criterion == Criterion::distance);
@@ -464,12 +497,49 @@ Plan make_plan(const std::vector<Setup>& setups, const std::vector<State>& state
 }
 
 std::vector<State> extract_states(const Image& image, const std::vector<Setup>& setups) {
-  std::vector<State> states;
-  for (std::size_t b = 0; b < setups.size(); ++b) {
+  KnownSkins skins(setups.size());
+  return extract_states(image, setups, std::vector<bool>(setups.size(), true), skins);
+}
+
+std::vector<State> extract_states(const Image& image, const std::vector<Setup>& setups, const std::vector<bool>& wanted,
+                                  KnownSkins& skins) {
+  const std::size_t bodies = setups.size();
+  const Counters& counters = image.counters.front();
+  const ByBody slots = by_body(bodies, counters.slots_used,
+                               [&](int s) { return image.slot_size[at(s)] == 0 ? -1 : image.slot_body[at(s)]; });
+  ByBody vertices, cells;
+  std::vector<int32_t> place;
+  bool any_new_skin = false;
+  for (std::size_t b = 0; b < bodies; ++b) {
+    if (wanted.at(b) && image.skin_made[b] && !skins.at(b)) any_new_skin = true;
+  }
+  if (any_new_skin) {
+    vertices = by_body(bodies, counters.vertices_used, [&](int v) {
+      const int p = image.vertex_owner[at(v)];
+      return p < 0 ? -1 : image.body_of[at(p)];
+    });
+    const auto body_of_node = [&](int64_t node) {
+      const auto after = std::upper_bound(image.body.begin(), image.body.end(), node,
+                                          [](int64_t n, const BodyConstants& body) { return n < body.node_begin; });
+      return static_cast<int>(after - image.body.begin()) - 1;
+    };
+    cells = by_body(bodies, counters.cells_used, [&](int c) {
+      const int node = image.cell_node[at(c)];
+      return node < 0 ? -1 : body_of_node(node);
+    });
+    place.assign(at(counters.vertices_used), -1);
+  }
+  std::vector<State> states(bodies);
+  for (std::size_t b = 0; b < bodies; ++b) {
+    if (!wanted[b]) continue;
     const Setup& setup = setups[b];
     const BodyConstants& body = image.body[b];
-    State state;
+    State& state = states[b];
     state.frame = image.frame[b];
+    const auto n = at(setup.body.particle_count());
+    state.x.reserve(n);
+    state.v.reserve(n);
+    state.alive.reserve(n);
     Vec3 impulse;
     for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
       const std::size_t p = at(body.particle_begin + i);
@@ -481,12 +551,16 @@ std::vector<State> extract_states(const Image& image, const std::vector<Setup>& 
       if (image.cut[b] >= 0 && image.death[p] == image.cut[b] + 1) state.debris.push_back(i);
     }
     state.impulse = impulse;
-    state.clusters = extract_clusters(image, body, setup.body.grid.spacing, static_cast<int>(b));
+    const auto range = [b](const ByBody& of, std::size_t past) { return of.list.data() + of.begin[b + past]; };
+    state.clusters = extract_clusters(image, body, setup.body.grid.spacing, range(slots, 0), range(slots, 1));
     state.tau = body.tau;
     state.cap = body.cap;
     state.edge_covered = image.edge_covered[b] != 0;
-    state.skin = image.skin_made[b] ? extract_skin(image, setup, body) : image.loaded_skin[b];
-    states.push_back(std::move(state));
+    if (image.skin_made[b] && !skins[b]) {
+      skins[b] = extract_skin(image, setup, body, range(vertices, 0), range(vertices, 1), range(cells, 0),
+                              range(cells, 1), place);
+    }
+    state.skin = image.skin_made[b] ? *skins[b] : image.loaded_skin[b];
   }
   return states;
 }

@@ -2,6 +2,7 @@
 // states from. The host backend works on it directly.
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "gpu/layout.h"
@@ -74,6 +75,11 @@ Plan make_plan(const std::vector<Setup>& setups, const std::vector<State>& state
 // The inverse of make_image, after kernels have worked on it. Skin vertices come in the order (owner, direction),
 // triangles in the order of their cells.
 std::vector<State> extract_states(const Image& image, const std::vector<Setup>& setups);
+// Only of the bodies that are wanted; the others' states are empty. `skins`: what an earlier call has found for bodies
+// whose skin stage has not run since; filled where it is empty.
+using KnownSkins = std::vector<std::optional<Skin>>;
+std::vector<State> extract_states(const Image& image, const std::vector<Setup>& setups, const std::vector<bool>& wanted,
+                                  KnownSkins& skins);
 
 // Something is at least three quarters full, so the next load should have more room.
 bool wants_room(const World& world, const Counters& counters);

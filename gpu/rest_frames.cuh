@@ -25,18 +25,23 @@ CUTPROOF_DEVICE void recompute_rest_frame(Block& block, const World& w, int s) {
       add(w.displacement[p].w / static_cast<float>(w.share[p]), from_base);
     }
   };
-  float mass = 0;
-  Float3 moment;
+  struct Sums {
+    Float3 moment;
+    float mass = 0;
+    CUTPROOF_DEVICE Sums operator+(const Sums& other) const { return {moment + other.moment, mass + other.mass}; }
+  };
+  Sums sums;
   weighted([&](float weight, Float3 x) {
-    mass += weight;
-    moment = moment + weight * x;
+    sums.mass += weight;
+    sums.moment = sums.moment + weight * x;
   });
-  mass = block.sum(mass);
-  moment = {block.sum(moment.x), block.sum(moment.y), block.sum(moment.z)};
+  sums = block.sum(sums);
+  const float mass = sums.mass;
+  const Float3 moment = sums.moment;
   const Float3 first = {moment.x / mass, moment.y / mass, moment.z / mass};
   Float3 residual;
   weighted([&](float weight, Float3 x) { residual = residual + weight * (x - first); });
-  residual = {block.sum(residual.x), block.sum(residual.y), block.sum(residual.z)};
+  residual = block.sum(residual);
   if (block.thread() == 0) {
     w.mass[s] = mass;
     w.rest_base[3 * s] = base.i;

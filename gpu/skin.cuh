@@ -230,11 +230,13 @@ void enqueue_skin_cells(Launcher& launcher, const World& w, const Plan&) {
 // cluster, so that the order of its sums depends on nothing else.
 template <class Block>
 CUTPROOF_DEVICE void recenter_clusters_kernel(Block& block, const World& w) {
-  constexpr unsigned kWarp = 0xffffffffu;
   struct Sums {
-    Float3 moved;  // Σ w (d - d of the first member)
-    Float3 rest;   // Σ w (X - T): zero but for the rounding of T
-    float mass;    // Σ w
+    Float3 moved;    // Σ w (d - d of the first member)
+    Float3 rest;     // Σ w (X - T): zero but for the rounding of T
+    float mass = 0;  // Σ w
+    CUTPROOF_DEVICE Sums operator+(const Sums& other) const {
+      return {moved + other.moved, rest + other.rest, mass + other.mass};
+    }
   };
   for (int64_t i = block.first() / 32; i < w.counters->slots_used; i += block.stride() / 32) {
     const int s = static_cast<int>(i);
@@ -242,7 +244,7 @@ CUTPROOF_DEVICE void recenter_clusters_kernel(Block& block, const World& w) {
     if (size == 0 || !skin_detail::skinned(w, b)) continue;
     const int* members = w.members + w.slot_begin[s];
     const Float3 base = xyz(w.displacement[members[0]]);
-    Sums sums = {{}, {}, 0};
+    Sums sums;
     for (int k = block.lane(); k < size; k += 32) {
       const int p = members[k];
       const Float4 now = w.displacement[p];
@@ -251,12 +253,7 @@ CUTPROOF_DEVICE void recenter_clusters_kernel(Block& block, const World& w) {
       sums.rest = sums.rest + weight * from_rest_center(w, w.body[b], p, s);
       sums.mass += weight;
     }
-    for (int bit = 16; bit > 0; bit /= 2) {
-      const Sums other = block.shuffle(kWarp, sums, block.lane() ^ bit);
-      sums.moved = sums.moved + other.moved;
-      sums.rest = sums.rest + other.rest;
-      sums.mass += other.mass;
-    }
+    sums = block.warp_sum(sums);
     if (block.lane() != 0) continue;
     // The rounded T must not move the cluster (docs/decisions.md, Momentum and the rounding of sums).
     const Float3 turned = w.rotation[s] * sums.rest - sums.rest;

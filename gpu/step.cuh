@@ -477,7 +477,7 @@ void enqueue(Launcher& launcher, const World& w, const Plan& plan) {
   const int64_t jobs = w.slot_capacity < kMatchBlocks ? w.slot_capacity : kMatchBlocks;
   launcher.items(begin_frame_kernel_object<kContacts>{}, particles, w);
   for (int substep = 0; substep < plan.substeps; ++substep) {
-    if (kContacts) launcher.items(hold_particles_kernel_object{}, particles, w, substep);
+    if (plan.grips) launcher.items(hold_particles_kernel_object{}, particles, w, substep);
     for (int iteration = 0; iteration < plan.iterations || iteration == 0; ++iteration) {
       if (iteration < plan.iterations) {
         launcher.blocks(match_shapes_kernel_object<Method>{}, jobs, kMatchThreads, kMatchShared, w, substep, iteration);

@@ -5,6 +5,7 @@
 // the state; the caller adds stage, backend and body. None throws on a broken state, however broken: offsets out of
 // range, particles that do not exist and NaN are verdicts.
 #pragma once
+#include <memory>
 #include <vector>
 
 #include "model/setup.h"
@@ -60,7 +61,25 @@ Verdict momentum(const Setup& setup, const State& before, const State& after);
 // Nothing but what a stage may change has changed (positions by split, clusters by step, …).
 Verdict untouched(const Setup& setup, Stage stage, const State& before, const State& after);
 
+// All of the above that apply to a stage, and those of the state after it that are this stage's promise.
 std::vector<Verdict> judge_stage(const Setup& setup, Stage stage, const State& before, const State& after);
+
+// --- Many states of one body -----------------------------------------------------------------------------------------
+// judge and judge_stage for states that follow one another. A verdict that held is repeated and not computed again as
+// long as every part of the state that it rests on keeps its bits.
+class Judge {
+ public:
+  // Keeps a reference: the setup must live as long as this and stay as it is.
+  explicit Judge(const Setup& setup);
+  ~Judge();
+  // The last state that was given must stay as it is, and where it is, until another was given.
+  std::vector<Verdict> state(const State& state, Stage after, bool thorough);
+  std::vector<Verdict> stage(Stage stage, const State& before, const State& after);
+
+ private:
+  struct Memory;
+  std::unique_ptr<Memory> memory_;
+};
 
 // --- Components, for reports and expectations ------------------------------------------------------------------------
 struct Partition {

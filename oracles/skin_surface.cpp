@@ -563,14 +563,11 @@ Verdict skin_geometry(const Setup& setup, const State& state) {
   return verdict;
 }
 
-Verdict skin_vertices(const Setup& setup, const State& state) {
+Verdict check_skin_vertices(const Setup& setup, const State& state) {
   Verdict verdict = start_verdict("skin vertices", state, "h", "docs/tolerances.md, One goal position");
   const Skin& skin = state.skin;
   verdict.checked = static_cast<int64_t>(skin.owner.size());
   if (skin.owner.empty() && skin.triangles.empty() && !skin_is_missing(setup, state)) return verdict;
-  const Verdict formed = well_formed(setup, state);
-  if (!formed.holds)
-    return not_judged(std::move(verdict), "the state is not well formed (" + formed.witness.text + ")");
   const Body& body = setup.body;
   if (const auto defect = array_defect(skin, body.particle_count())) {
     return not_judged(std::move(verdict), "the skin's arrays are not in order (" + defect->text + ")");
@@ -652,6 +649,11 @@ Verdict skin_vertices(const Setup& setup, const State& state) {
                 {owner});
   }
   return verdict;
+}
+
+Verdict skin_vertices(const Setup& setup, const State& state) {
+  const Verdict form = well_formed(setup, state);
+  return form.holds ? check_skin_vertices(setup, state) : oracles::not_judged("skin vertices", form);
 }
 
 ShellCount skin_shells(const Skin& skin) {

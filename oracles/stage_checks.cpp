@@ -7,6 +7,7 @@
 #include <numeric>
 #include <optional>
 #include <span>
+#include <stdexcept>
 
 #include "oracles/support.h"
 
@@ -998,68 +999,64 @@ Verdict check_untouched(const Setup& setup, Stage stage, const State& before, co
 // --- Both states well formed -----------------------------------------------------------------------------------------
 
 template <typename Check>
-Verdict gated(const char* property, const Setup& setup, const State& before, const State& after, Check check) {
-  for (const State* state : {&before, &after}) {
-    const Verdict form = well_formed(setup, *state);
-    if (form.holds) continue;
-    Verdict verdict = not_judged(property, form);
-    verdict.witness.text += state == &before ? " (before the stage)" : " (after the stage)";
+Verdict gated(const char* property, const Verdict& form_before, const Verdict& form_after, Check check) {
+  for (const Verdict* form : {&form_before, &form_after}) {
+    if (form->holds) continue;
+    Verdict verdict = not_judged(property, *form);
+    verdict.witness.text += form == &form_before ? " (before the stage)" : " (after the stage)";
     return verdict;
   }
-  return check(setup, before, after);
+  return check();
 }
 
 }  // namespace
 
-Verdict detection(const Setup& setup, const State& before, const State& after) {
-  return gated("detection", setup, before, after, check_detection);
-}
-Verdict split_exactness(const Setup& setup, const State& before, const State& after) {
-  return gated("split exactness", setup, before, after, check_split);
-}
-Verdict merge_legality(const Setup& setup, const State& before, const State& after) {
-  return gated("merge legality", setup, before, after, check_merge);
-}
-Verdict expansion(const Setup& setup, const State& before, const State& after) {
-  return gated("expansion", setup, before, after, check_expansion);
-}
-Verdict untouched(const Setup& setup, Stage stage, const State& before, const State& after) {
-  return gated("untouched", setup, before, after,
-               [stage](const Setup& s, const State& a, const State& b) { return check_untouched(s, stage, a, b); });
-}
-
-std::vector<Verdict> judge_stage(const Setup& setup, Stage stage, const State& before, const State& after) {
-  std::vector<Verdict> verdicts;
+Verdict stage_verdict(const Setup& setup, Stage stage, const State& before, const Verdict& form_before,
+                      const State& after, const Verdict& form_after) {
+  const auto answer = [&](const char* property, auto check) {
+    return gated(property, form_before, form_after, [&] { return check(setup, before, after); });
+  };
   switch (stage) {
-    case Stage::step:
-      verdicts.push_back(momentum(setup, before, after));
-      verdicts.push_back(finite(setup, after));
-      break;
     case Stage::detect:
-      verdicts.push_back(detection(setup, before, after));
-      if (setup.has_blade) verdicts.push_back(no_pass(setup, after));
-      break;
+      return answer("detection", check_detection);
     case Stage::split:
-      verdicts.push_back(split_exactness(setup, before, after));
-      verdicts.push_back(rest_frames(setup, after));
-      break;
+      return answer("split exactness", check_split);
     case Stage::merge:
-      verdicts.push_back(merge_legality(setup, before, after));
-      if (setup.merge.rule == MergeRule::deterministic || setup.merge.rule == MergeRule::published) {
-        verdicts.push_back(merge_maximality(setup, after));
-      }
-      verdicts.push_back(rest_frames(setup, after));
-      break;
+      return answer("merge legality", check_merge);
     case Stage::expand:
-      verdicts.push_back(expansion(setup, before, after));
-      verdicts.push_back(rest_frames(setup, after));
-      break;
+      return answer("expansion", check_expansion);
+    case Stage::step:
     case Stage::skin:
       break;
   }
-  verdicts.push_back(untouched(setup, stage, before, after));
-  for (Verdict& verdict : verdicts) verdict.stage = stage;
-  return verdicts;
+  throw std::invalid_argument(fmt::format("stage_verdict: {} has no oracle of its own", name_of(stage)));
+}
+
+Verdict untouched_verdict(const Setup& setup, Stage stage, const State& before, const Verdict& form_before,
+                          const State& after, const Verdict& form_after) {
+  return gated("untouched", form_before, form_after, [&] { return check_untouched(setup, stage, before, after); });
+}
+
+namespace {
+Verdict verdict_on(const Setup& setup, Stage stage, const State& before, const State& after) {
+  return stage_verdict(setup, stage, before, well_formed(setup, before), after, well_formed(setup, after));
+}
+}  // namespace
+
+Verdict detection(const Setup& setup, const State& before, const State& after) {
+  return verdict_on(setup, Stage::detect, before, after);
+}
+Verdict split_exactness(const Setup& setup, const State& before, const State& after) {
+  return verdict_on(setup, Stage::split, before, after);
+}
+Verdict merge_legality(const Setup& setup, const State& before, const State& after) {
+  return verdict_on(setup, Stage::merge, before, after);
+}
+Verdict expansion(const Setup& setup, const State& before, const State& after) {
+  return verdict_on(setup, Stage::expand, before, after);
+}
+Verdict untouched(const Setup& setup, Stage stage, const State& before, const State& after) {
+  return untouched_verdict(setup, stage, before, well_formed(setup, before), after, well_formed(setup, after));
 }
 
 }  // namespace cutproof::oracles

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 #include <optional>
 #include <span>
@@ -162,10 +163,10 @@ void check_skin_form(const Skin& skin, int32_t n, Verdict& verdict) {
   }
 }
 
-Verdict check_form(const Setup& setup, const State& state) {
+Verdict check_form(const Setup& setup, const State& state, bool body_is_known_good = false) {
   Verdict verdict = start_verdict("well formed", state, "1", "model/state.h, model/clusters.h, model/skin.h");
   const auto reject = [&](std::string text) { violate(verdict, std::move(text)); };
-  if (!body_is_well_formed(setup, verdict)) return verdict;
+  if (!body_is_known_good && !body_is_well_formed(setup, verdict)) return verdict;
   const int32_t n = setup.body.particle_count();
   if (state.x.size() != at(n) || state.v.size() != at(n) || state.alive.size() != at(n)) {
     reject(fmt::format("{} particles, but {} positions, {} velocities, {} alive flags", n, state.x.size(),
@@ -417,7 +418,7 @@ Shells shells_of(Judged& judged) {
   return shells;
 }
 
-void match_skin(Judged& judged, Verdict& verdict) {
+void match_skin(Judged& judged, Verdict& verdict, bool with_cgal) {
   const Skin& skin = judged.state.skin;
   const Partition& components = judged.components();
   const Shells shells = shells_of(judged);
@@ -476,6 +477,7 @@ void match_skin(Judged& judged, Verdict& verdict) {
   if (inner != cavities) {
     violate(verdict, fmt::format("the skin has {} inner shells, but the tissue has {} cavities", inner, cavities));
   }
+  if (!with_cgal) return;
   const ShellCount counted = skin_shells(skin);
   if (counted.outer + counted.inner != shell_count) {
     violate(verdict, fmt::format("CGAL counts {} shells of the skin, joining triangles at vertices gives "
@@ -489,7 +491,11 @@ bool skin_is_due(const Judged& judged) {
   return judged.has_skin() || (judged.setup.skin.wanted && judged.state.frame > 0);
 }
 
-Verdict check_component_match(Judged& judged, bool with_skin) {
+// How far component match looks at the skin. Shells are counted by joining triangles at their vertices; CGAL joins them
+// at their edges. On a surface that is a manifold, which "skin surface" shows, both are the same.
+enum class SkinMatch { none, shells, shells_by_cgal_too };
+
+Verdict check_component_match(Judged& judged, SkinMatch skin) {
   Verdict verdict = start_verdict("component match", judged.state, "1", "method.md §2, I3; §8, lemma");
   const Partition& components = judged.components();
   const Partition& coupling = judged.coupling();
@@ -505,7 +511,7 @@ Verdict check_component_match(Judged& judged, bool with_skin) {
   }
   if (ghosts > 0) violate(verdict, first_ghost_coupling(judged));
   verdict.measured = static_cast<double>(surplus + ghosts);
-  if (with_skin && skin_is_due(judged)) match_skin(judged, verdict);
+  if (skin != SkinMatch::none && skin_is_due(judged)) match_skin(judged, verdict, skin == SkinMatch::shells_by_cgal_too);
   for (const int32_t label : components.label) verdict.checked += label >= 0 ? 1 : 0;
   return verdict;
 }
@@ -790,7 +796,9 @@ Verdict cluster_connectivity(const Setup& setup, const State& state) {
 }
 Verdict coverage(const Setup& setup, const State& state) { return gated("coverage", setup, state, check_coverage); }
 Verdict component_match(const Setup& setup, const State& state) {
-  return gated("component match", setup, state, [](Judged& judged) { return check_component_match(judged, true); });
+  return gated("component match", setup, state, [](Judged& judged) {
+    return check_component_match(judged, SkinMatch::shells_by_cgal_too);
+  });
 }
 Verdict isolation(const Setup& setup, const State& state) { return gated("isolation", setup, state, check_isolation); }
 Verdict edge_cover(const Setup& setup, const State& state) {
@@ -805,43 +813,194 @@ Verdict merge_maximality(const Setup& setup, const State& state) {
   return gated("merge maximality", setup, state, check_merge_maximality);
 }
 
-std::vector<Verdict> judge(const Setup& setup, const State& state, Stage after, bool thorough) {
+// --- All of them -----------------------------------------------------------------------------------------------------
+
+namespace {
+
+// Parts of a state, as bits of what an oracle reads.
+enum Part : unsigned {
+  kMotion = 1,      // x, v, impulse
+  kAlive = 2,       // alive
+  kCut = 4,         // removed, debris
+  kSets = 8,        // offsets and members of clusters
+  kFrames = 16,     // rest centers and masses
+  kRotations = 32,  // rotations and degenerate flags
+  kSkin = 64,
+  kLimits = 128,  // tau, cap, edge_covered
+  kAll = 255
+};
+
+template <typename T>
+bool same(const std::vector<T>& a, const std::vector<T>& b) {
+  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
+}
+
+unsigned parts_that_differ(const State& a, const State& b) {
+  const Clusters &c = a.clusters, &d = b.clusters;
+  const Skin &s = a.skin, &t = b.skin;
+  unsigned parts = 0;
+  const auto note = [&](Part part, bool equal) { parts |= equal ? 0u : part; };
+  note(kMotion, same(a.x, b.x) && same(a.v, b.v) && same_bits(a.impulse, b.impulse));
+  note(kAlive, same(a.alive, b.alive));
+  note(kCut, same(a.removed, b.removed) && same(a.debris, b.debris));
+  note(kSets, same(c.offsets, d.offsets) && same(c.members, d.members));
+  note(kFrames, same(c.rest_center, d.rest_center) && same(c.mass, d.mass));
+  note(kRotations, same(c.rotation, d.rotation) && same(c.degenerate, d.degenerate));
+  note(kSkin, same(s.owner, t.owner) && same(s.direction, t.direction) && same(s.position, t.position) &&
+                  same(s.triangles, t.triangles));
+  note(kLimits, a.tau == b.tau && a.cap == b.cap && a.edge_covered == b.edge_covered);
+  return parts;
+}
+
+}  // namespace
+
+struct Judge::Memory {
+  explicit Memory(const Setup& of_setup) : setup(of_setup) {}
+
+  // A verdict that holds, of a state that had the same bits in all parts that it rests on.
+  struct Held {
+    std::string property;
+    SkinMatch skin;  // of "component match"
+    unsigned parts;
+    Verdict verdict;
+  };
+
+  const Setup& setup;
+  bool body_is_known_good = false;
+  const State* last = nullptr;
+  std::optional<Judged> judged;  // `last`, where it is well formed
+  Verdict form;                  // of `last`
+  std::vector<Held> held;
+
+  // Makes `state` the last one, and forgets what rests on parts that have changed.
+  void look_at(const State& state) {
+    if (&state == last) return;
+    const unsigned changed = last == nullptr ? kAll : parts_that_differ(*last, state);
+    std::erase_if(held, [&](const Held& h) { return (h.parts & changed) != 0; });
+    form = check_form(setup, state, body_is_known_good);
+    if (form.holds) body_is_known_good = true;
+    judged.emplace(setup, state);
+    last = &state;
+  }
+
+  template <typename Check>
+  Verdict ask(const char* property, unsigned parts, Check check, SkinMatch skin = SkinMatch::none) {
+    if (!form.holds) return not_judged(property, form);
+    const auto known = std::find_if(held.begin(), held.end(), [&](const Held& h) {
+      return h.property == property && h.skin == skin;
+    });
+    if (known != held.end()) {
+      Verdict verdict = known->verdict;
+      verdict.frame = last->frame;
+      return verdict;
+    }
+    Verdict verdict = check(*judged);
+    if (verdict.holds) held.push_back({property, skin, parts, verdict});
+    return verdict;
+  }
+
+  Verdict ask_finite() { return ask("finite", kMotion | kFrames | kRotations | kSkin, check_finite); }
+  Verdict ask_rest_frames() { return ask("rest frames", kSets | kFrames, check_rest_frames); }
+  Verdict ask_merge_maximality() {
+    return ask("merge maximality", kAlive | kSets | kLimits, check_merge_maximality);
+  }
+  // Not kept: it rests on the frame's blade.
+  Verdict ask_no_pass() { return form.holds ? check_no_pass(*judged) : not_judged("no pass", form); }
+};
+
+Judge::Judge(const Setup& setup) : memory_(std::make_unique<Memory>(setup)) {}
+Judge::~Judge() = default;
+
+std::vector<Verdict> Judge::state(const State& state, Stage after, bool thorough) {
   // Between detect and split clusters hold dead particles. Until expansion, groups may be uncoupled, unless I4
   // forbids it. Expansion may leave clusters that could merge. The skin is up to date only after its own stage.
+  Memory& m = *memory_;
+  m.look_at(state);
+  const Setup& setup = m.setup;
   const bool split_done = after != Stage::detect;
   const bool coupled = split_done && (after == Stage::step || after >= Stage::expand || state.edge_covered);
   const bool merged = split_done && after != Stage::split &&
                       (after == Stage::merge || state.edge_covered || setup.expand.rule == ExpandRule::none);
-  const bool skin_done = after == Stage::skin;
+  const bool maximal = setup.merge.rule == MergeRule::deterministic || setup.merge.rule == MergeRule::published;
+  const bool skin_here = after == Stage::skin && skin_is_due(*m.judged);
 
-  std::vector<Verdict> verdicts = {check_form(setup, state)};
-  const bool well = verdicts.front().holds;
-  Judged judged(setup, state);
-  const auto add = [&](const char* property, bool applies, auto check) {
-    if (!applies) return;
-    verdicts.push_back(well ? check() : not_judged(property, verdicts.front()));
+  std::vector<Verdict> verdicts = {m.form};
+  const auto add = [&](bool applies, auto ask) {
+    if (applies) verdicts.push_back(ask());
   };
-  const auto maximal = setup.merge.rule == MergeRule::deterministic || setup.merge.rule == MergeRule::published;
-  add("finite", true, [&] { return check_finite(judged); });
-  add("cluster connectivity", split_done, [&] { return check_connectivity(judged); });
-  add("coverage", split_done, [&] { return check_coverage(judged); });
-  add("component match", coupled, [&] { return check_component_match(judged, skin_done); });
-  add("isolation", coupled, [&] { return check_isolation(judged); });
-  add("edge cover", split_done && state.edge_covered, [&] { return check_edge_cover(judged); });
-  add("rest frames", true, [&] { return check_rest_frames(judged); });
-  add("rotation", true, [&] { return rotation_quality(setup, state); });
-  add("merge maximality", merged && maximal, [&] { return check_merge_maximality(judged); });
-  add("no pass", after == Stage::detect && setup.has_blade, [&] { return check_no_pass(judged); });
-  const bool skin_here = skin_done && skin_is_due(judged);
-  add("skin surface", skin_here, [&] { return skin_surface(setup, state); });
-  add("skin vertices", skin_here, [&] { return skin_vertices(setup, state); });
-  add("skin geometry", skin_here && thorough, [&] { return skin_geometry(setup, state); });
+  const auto of_skin = [&](auto check) {
+    return [&setup, &state, check](Judged&) { return check(setup, state); };
+  };
+  add(true, [&] { return m.ask_finite(); });
+  add(split_done, [&] { return m.ask("cluster connectivity", kAlive | kSets, check_connectivity); });
+  add(split_done, [&] { return m.ask("coverage", kAlive | kSets | kCut, check_coverage); });
+  add(coupled, [&] {
+    const SkinMatch skin = !skin_here ? SkinMatch::none : thorough ? SkinMatch::shells_by_cgal_too : SkinMatch::shells;
+    return m.ask(
+        "component match", kAlive | kSets | (skin_here ? kSkin : 0u),
+        [&](Judged& judged) { return check_component_match(judged, skin); }, skin);
+  });
+  add(coupled, [&] { return m.ask("isolation", kAlive | kSets, check_isolation); });
+  add(split_done && state.edge_covered,
+      [&] { return m.ask("edge cover", kAlive | kSets | kLimits, check_edge_cover); });
+  add(true, [&] { return m.ask_rest_frames(); });
+  add(true, [&] { return m.ask("rotation", kRotations, of_skin(check_rotation_quality)); });
+  add(merged && maximal, [&] { return m.ask_merge_maximality(); });
+  add(after == Stage::detect && setup.has_blade, [&] { return m.ask_no_pass(); });
+  add(skin_here, [&] { return m.ask("skin surface", kAlive | kSkin, of_skin(skin_surface)); });
+  add(skin_here, [&] {
+    return m.ask("skin vertices", kAlive | kSkin | kSets | kFrames | kRotations | kMotion, of_skin(check_skin_vertices));
+  });
+  add(skin_here && thorough, [&] { return m.ask("skin geometry", kAlive | kSkin, of_skin(skin_geometry)); });
   for (Verdict& verdict : verdicts) verdict.stage = after;
   return verdicts;
 }
 
+std::vector<Verdict> Judge::stage(Stage stage, const State& before, const State& after) {
+  Memory& m = *memory_;
+  m.look_at(before);
+  const Verdict form_before = m.form;
+  m.look_at(after);
+  std::vector<Verdict> verdicts;
+  const auto add = [&](Verdict verdict) { verdicts.push_back(std::move(verdict)); };
+  const auto add_own = [&] { add(stage_verdict(m.setup, stage, before, form_before, after, m.form)); };
+  switch (stage) {
+    case Stage::step:
+      add(momentum(m.setup, before, after));
+      add(m.ask_finite());
+      break;
+    case Stage::detect:
+      add_own();
+      if (m.setup.has_blade) add(m.ask_no_pass());
+      break;
+    case Stage::merge:
+      add_own();
+      if (m.setup.merge.rule == MergeRule::deterministic || m.setup.merge.rule == MergeRule::published) {
+        add(m.ask_merge_maximality());
+      }
+      add(m.ask_rest_frames());
+      break;
+    case Stage::split:
+    case Stage::expand:
+      add_own();
+      add(m.ask_rest_frames());
+      break;
+    case Stage::skin:
+      break;
+  }
+  add(untouched_verdict(m.setup, stage, before, form_before, after, m.form));
+  for (Verdict& verdict : verdicts) verdict.stage = stage;
+  return verdicts;
+}
+
+std::vector<Verdict> judge(const Setup& setup, const State& state, Stage after, bool thorough) {
+  return Judge(setup).state(state, after, thorough);
+}
 std::vector<Verdict> judge(const Setup& setup, const State& state, bool thorough) {
   return judge(setup, state, Stage::skin, thorough);
+}
+std::vector<Verdict> judge_stage(const Setup& setup, Stage stage, const State& before, const State& after) {
+  return Judge(setup).stage(stage, before, after);
 }
 
 }  // namespace cutproof::oracles

@@ -120,12 +120,10 @@ Verdict momentum(const Setup& setup, const State& before, const State& after) {
   return verdict;
 }
 
-Verdict rotation_quality(const Setup& setup, const State& state) {
+Verdict check_rotation_quality(const Setup&, const State& state) {
   // In whatever precision a backend computes.
   constexpr double kMostDefect = 5e-6;
   Verdict verdict = start_verdict("rotation", state, "1", "accuracy_and_speed.md §3");
-  const Verdict form = well_formed(setup, state);
-  if (!form.holds) return not_judged(verdict.property, form);
   verdict.bound = kMostDefect;
   for (int32_t c = 0; c < state.clusters.count(); ++c) {
     const Mat3& r = state.clusters.rotation[at(c)];
@@ -143,6 +141,10 @@ Verdict rotation_quality(const Setup& setup, const State& state) {
             : fmt::format("the rotation of cluster {} is off by {} from an orthogonal matrix", number, defect);
   }
   return verdict;
+}
+Verdict rotation_quality(const Setup& setup, const State& state) {
+  const Verdict form = well_formed(setup, state);
+  return form.holds ? check_rotation_quality(setup, state) : not_judged("rotation", form);
 }
 
 }  // namespace cutproof::oracles

@@ -109,6 +109,15 @@ inline Verdict not_judged(std::string property, const Verdict& form) {
   return verdict;
 }
 
+// Oracles of well-formed states, and those of a stage given whether its two states are well formed.
+Verdict check_rotation_quality(const Setup& setup, const State& state);
+Verdict check_skin_vertices(const Setup& setup, const State& state);
+// Of any stage but step and skin.
+Verdict stage_verdict(const Setup& setup, Stage stage, const State& before, const Verdict& form_before,
+                      const State& after, const Verdict& form_after);
+Verdict untouched_verdict(const Setup& setup, Stage stage, const State& before, const Verdict& form_before,
+                          const State& after, const Verdict& form_after);
+
 // The partitions themselves, of a well-formed state.
 Partition components_of_graph(const TissueGraph& graph);
 Partition components_of_coupling(const TissueGraph& graph, const Clusters& clusters);

@@ -220,29 +220,43 @@ Vec3 edge_direction(const Stroke& stroke) {
   return norm(across) > 0 ? normalized(across) : direction_vector((stroke.back + 2) % 6);
 }
 
-// One frame, or as many as the blade needs so that it does not pass what it pushes (Setup's timetable).
-void add_frames(const Stroke& stroke, Vec3 first_node, const Case& c, Setup& setup) {
+// One substep, or if the body moves as many frames as the blade needs so that it does not pass what it pushes.
+void add_moves(const Stroke& stroke, Vec3 first_node, const Case& c, Setup& setup) {
   const double h = c.spacing;
   const Vec3 from = first_node + metric(stroke.from, h), to = first_node + metric(stroke.to, h);
-  const int32_t substeps = setup.step.substeps;
-  int64_t frames = 1;
+  int64_t moves = 1;
   if (c.moves) {
-    const double most = blade_clearance(setup) * substeps;
-    frames = std::max<int64_t>(1, static_cast<int64_t>(std::ceil(norm(to - from) / most)));
+    const double most = blade_clearance(setup) * setup.step.substeps;
+    const auto frames = std::max<int64_t>(1, static_cast<int64_t>(std::ceil(norm(to - from) / most)));
+    moves = frames * setup.step.substeps;
   }
   const auto number = static_cast<int32_t>(setup.stroke_end.size());
   BladeMove move;
   move.from = {from, edge_direction(stroke), direction_vector(stroke.back)};
   move.down = stroke.down;
   move.stroke = stroke.down ? number : -1;
-  for (int64_t k = 1; k <= frames * substeps; ++k) {
+  for (int64_t k = 1; k <= moves; ++k) {
     move.to = move.from;
-    move.to.edge = from + (static_cast<double>(k) / static_cast<double>(frames * substeps)) * (to - from);
+    move.to.edge = from + (static_cast<double>(k) / static_cast<double>(moves)) * (to - from);
     setup.blade_moves.push_back(move);
     move.from = move.to;
   }
-  for (int64_t f = 0; f < frames; ++f) setup.substep_length.push_back(0.001);
-  if (stroke.down) setup.stroke_end.push_back(setup.frame_count() - 1);
+  const auto substeps = static_cast<int64_t>(setup.blade_moves.size());
+  if (stroke.down) setup.stroke_end.push_back((substeps - 1) / setup.step.substeps);
+}
+
+// The timetable (Setup): the strokes one after the other; in what is left of the last frame the blade is lifted.
+void add_timetable(const Case& c, Vec3 first_node, Setup& setup) {
+  for (const Stroke& stroke : resolved_strokes(c)) add_moves(stroke, first_node, c, setup);
+  const auto substeps = static_cast<std::size_t>(setup.step.substeps);
+  while (setup.blade_moves.size() % substeps != 0) {
+    BladeMove lifted = setup.blade_moves.back();
+    lifted.from = lifted.to;
+    lifted.down = false;
+    lifted.stroke = -1;
+    setup.blade_moves.push_back(lifted);
+  }
+  setup.substep_length.assign(setup.blade_moves.size() / substeps, 0.001);
 }
 
 // Without iterations rotations stay as they are loaded. Each cluster gets one of its own, so that a stage that gives a
@@ -293,6 +307,7 @@ Case draw_case(uint64_t seed, int size) {
   c.blade_thickness = random.chance(0.5) ? random.between(0, 10) : random.pick({0, 4, 8, 16, 100});
   const int32_t strokes = random.between(0, 1 + size / 15);
   for (int32_t s = 0; s < strokes; ++s) c.strokes.push_back(draw_stroke(random, dims));
+  c.together = random.pick({1, 2, 3, 8, 8});
   return c;
 }
 
@@ -325,7 +340,7 @@ Loaded load(const Case& c) {
   Setup& setup = loaded.setup;
   const double h = c.spacing;
   setup.body = fixtures::body_from_nodes(c.nodes, h);
-  setup.step.substeps = c.moves ? c.substeps : 1;
+  setup.step.substeps = c.moves ? c.substeps : c.together;
   setup.step.iterations = c.moves ? c.iterations : 0;
   setup.step.stiffness = std::pow(10.0, c.stiffness);
   setup.step.acceleration = c.acceleration;
@@ -342,7 +357,7 @@ Loaded load(const Case& c) {
     setup.step.gravity = {0, 0, -9.81};
     setup.walls = {{2, +1, first_node.z - 0.5 * h, 0.3}};
   }
-  for (const Stroke& stroke : resolved_strokes(c)) add_frames(stroke, first_node, c, setup);
+  add_timetable(c, first_node, setup);
 
   if (c.clusters == ClusterKind::foreign) {
     loaded.state = fixtures::foreign_state(setup.body, connected_cover(setup.body, c.most, c.seed), c.tau, c.cap);
@@ -448,6 +463,7 @@ std::vector<std::function<void(Case&)>> simplifications(const Case& c) {
   towards(c, &Case::moves, false, edits);
   towards(c, &Case::ground, false, edits);
   towards(c, &Case::acceleration, Acceleration::none, edits);
+  towards(c, &Case::together, 1, edits);
   towards(c, &Case::substeps, 1, edits);
   towards(c, &Case::iterations, 1, edits);
   towards(c, &Case::stiffness, 5, edits);
@@ -512,8 +528,8 @@ namespace cutproof::property_tests {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Case, nodes, spacing, clusters, side, seed_spacing, ball_radius, most, tau, cap,
                                    seed, merge, expand, expand_depth, debris, blade_length, blade_depth,
-                                   blade_thickness, strokes, moves, substeps, iterations, stiffness, acceleration,
-                                   ground)
+                                   blade_thickness, strokes, together, moves, substeps, iterations, stiffness,
+                                   acceleration, ground)
 
 std::string to_json(const Case& c) { return nlohmann::json(c).dump(); }
 
@@ -541,6 +557,7 @@ void require_sane(const Case& c) {
   require(c.expand_depth >= 1, "expand_depth", ">= 1");
   require(c.debris >= 0, "debris", ">= 0");
   require(c.blade_length > 0 && c.blade_depth > 0 && c.blade_thickness >= 0, "blade_…", "> 0 (thickness: >= 0)");
+  require(c.together >= 1 && c.together <= 1000, "together", "in [1, 1000]");
   require(c.substeps >= 1 && c.substeps <= 1000, "substeps", "in [1, 1000]");
   require(c.iterations >= 0 && c.iterations <= 1000, "iterations", "in [0, 1000]");
   require(c.stiffness >= 0 && c.stiffness <= 12, "stiffness", "in [0, 12]");

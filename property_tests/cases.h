@@ -47,7 +47,8 @@ struct Case {
 
   int32_t blade_length = 400, blade_depth = 400;  // [quarters], > 0
   int32_t blade_thickness = 4;                    // [quarters], >= 0
-  std::vector<Stroke> strokes;                    // one frame each; more if the body moves
+  std::vector<Stroke> strokes;                    // in this order; if the body moves, each takes whole frames
+  int32_t together = 1;                           // strokes of one frame, where nothing moves; >= 1
 
   // false: nothing moves, and cuts are geometric. true: the body is soft, and the blade cuts what it stretches apart.
   bool moves = false;
@@ -65,8 +66,8 @@ Case draw_case(uint64_t seed, int size);
 // The same body, clusters and strokes, and it moves.
 Case draw_moving_case(uint64_t seed, int size);
 
-// Strokes with links resolved, and what a backend loads. If nothing moves: geometric cuts, one stroke a frame, one
-// substep, no iteration.
+// Strokes with links resolved, and what a backend loads. If nothing moves: geometric cuts, one stroke a substep, no
+// iteration.
 std::vector<Stroke> resolved_strokes(const Case& c);
 struct Loaded {
   Setup setup;

@@ -41,6 +41,8 @@ FIELDS = ("Stage", "Fault", "Suspect", "Livelock")
 MOST_SECONDS = 420  # of one command
 FUZZ_SECONDS = 300  # of the last resort
 FUZZ_FAILS = re.compile(r"case (\d+) FAILS: '(.*?)' fails after")
+# What a counterexample should be at most, for a person to see through it; and in how many of ten.
+MOST_STROKES, MOST_PARTICLES, WANTED_SIMPLE = 3, 30, 0.8
 
 
 class BadFault(Exception):
@@ -168,6 +170,8 @@ class Outcome:
     by: str = ""      # which property or test
     took: str = ""    # how many cases, for a person
     message: str = ""
+    strokes: int = None  # of the simplified counterexample; None: there is none
+    particles: int = None
 
 
 def run(command, may_hang=False):
@@ -180,7 +184,12 @@ def run(command, may_hang=False):
     if not is_fuzz:
         arguments.append("--gtest_fail_fast")
     RUN.mkdir(exist_ok=True)
-    # Nobody reads the counterexamples, so they are not simplified: rapidcheck is told, fuzz is ended.
+    # Counterexamples of `cutproof fuzz` are simplified and counted; nobody reads those of rapidcheck.
+    saved = RUN / "counterexamples"
+    shutil.rmtree(saved, ignore_errors=True)
+    saved.mkdir()
+    if is_fuzz:
+        arguments += ["--save", str(saved)]
     environment = dict(os.environ, RC_PARAMS="noshrink=1 seed=1")
     process = subprocess.Popen([str(programs[0]), *arguments], cwd=RUN, env=environment, stdout=subprocess.PIPE,
                                stderr=subprocess.STDOUT, text=True, errors="replace")
@@ -191,13 +200,10 @@ def run(command, may_hang=False):
     violation = False
     for line in process.stdout:
         text += line
-        violation = is_fuzz and FUZZ_FAILS.match(line) is not None
-        if violation:
-            process.kill()
-            break
+        violation = violation or (is_fuzz and FUZZ_FAILS.match(line) is not None)
     status = process.wait()
     timer.cancel()
-    if late.is_set():
+    if late.is_set() and not violation:
         if may_hang:
             return Outcome(True, f"`{command}`", "livelock", f"does not end within {MOST_SECONDS} s")
         raise BadFault(f"'{command}' does not end within {MOST_SECONDS} s, and the fault is not marked as a livelock")
@@ -207,6 +213,11 @@ def run(command, may_hang=False):
     outcome.found = status != 0
     if not outcome.found:
         return outcome
+    for path in saved.glob("*.json"):
+        document = json.loads(path.read_text())
+        if document.get("format") == "cutproof.counterexample":
+            outcome.strokes = len(document["case"]["strokes"])
+            outcome.particles = len(document["case"]["nodes"])
     if status < 0 and not violation:
         outcome.took = f"crash, signal {-status}"
     if not outcome.by:
@@ -269,6 +280,17 @@ def passes_unchanged(command, jobs):
 
 # --- Results ---------------------------------------------------------------------------------------------------------
 
+def is_simple(row):
+    return row["strokes"] <= MOST_STROKES and row["particles"] <= MOST_PARTICLES
+
+
+def simplicity(rows):
+    sized = [row for row in rows if row["strokes"] is not None]
+    simple = sum(1 for row in sized if is_simple(row))
+    return (f"Of {plural(len(sized), 'counterexample')} that `cutproof fuzz` has simplified, {simple} "
+            f"{'has' if simple == 1 else 'have'} at most {MOST_STROKES} strokes and {MOST_PARTICLES} particles.")
+
+
 def write_table(rows):
     lines = [
         "# Planted faults",
@@ -277,18 +299,21 @@ def write_table(rows):
         " of the kind that people write: it is planted into a copy of the code, built, and given to the gate (tests,"
         " properties, `cutproof fuzz`), which also passes the unchanged code. A run stops at the first find and begins"
         " with the suspected property. *Took*: cases of a random property or campaign until the find, schedules of a"
-        " simulated machine, or a unit test.",
+        " simulated machine, or a unit test. *Counterexample*: what `cutproof fuzz` has made of the case that it found.",
         "",
-        f"{sum(1 for row in rows if row['found'])} of {len(rows)} found.",
+        f"{sum(1 for row in rows if row['found'])} of {len(rows)} found. {simplicity(rows)}",
     ]
     for stage in STAGES:
         of_stage = [row for row in rows if row["stage"] == stage]
         if not of_stage:
             continue
-        lines += ["", f"## {stage}", "", "| fault | what is wrong | in | found by | took |", "|---|---|---|---|---|"]
+        lines += ["", f"## {stage}", "", "| fault | what is wrong | in | found by | took | counterexample |",
+                  "|---|---|---|---|---|---|"]
         for row in of_stage:
             by = row["by"] if row["found"] else "**not found**"
-            cells = [row["name"], row["fault"], row["code"], by, row["took"]]
+            size = (f"{plural(row['strokes'], 'stroke')}, {plural(row['particles'], 'particle')}"
+                    if row["strokes"] is not None else "")
+            cells = [row["name"], row["fault"], row["code"], by, row["took"], size]
             lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     TABLE.write_text("\n".join(lines) + "\n")
 
@@ -342,9 +367,13 @@ def main():
         row = {"name": fault.name, "stage": fault.stage, "fault": fault.text, "code": fault.code,
                "found": outcome is not None, "command": command or "", "by": outcome.by if outcome else "",
                "took": outcome.took if outcome else "", "message": outcome.message if outcome else "",
+               "strokes": outcome.strokes if outcome else None,
+               "particles": outcome.particles if outcome else None,
                "suspected": command in fault.suspects, "seconds": round(time.monotonic() - begin, 1)}
         rows.append(row)
         result = f"{row['by']} ({row['took']})" if outcome else "NOT FOUND"
+        if row["strokes"] is not None:
+            result += f", {plural(row['strokes'], 'stroke')}, {plural(row['particles'], 'particle')}"
         note = "" if row["suspected"] or not outcome else " [not by its suspect]"
         print(f"{fault.name}: {result}{note} ({row['seconds']:.0f} s)", flush=True)
         if options.json:
@@ -354,6 +383,7 @@ def main():
     if not options.only:
         write_table(rows)
     survivors = [row["name"] for row in rows if not row["found"]]
+    print(simplicity(rows))
     print(f"{len(rows) - len(survivors)} of {plural(len(rows), 'fault')} found"
           + (", not found: " + ", ".join(survivors) if survivors else ""))
     return 0 if holds and not survivors else 1

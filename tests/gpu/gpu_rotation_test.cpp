@@ -1,20 +1,17 @@
-// The rotation of one cluster in single precision: every method on every set of hard cases of accuracy_and_speed.md §3,
-// judged by a singular value decomposition in double precision of the same single-precision matrix. The table that the
-// first test prints is the one in docs/rotations.md.
+// The rotation of one cluster: every method, in both precisions, on every hard case of accuracy_and_speed.md §3
+// (fixtures/hard_matrices.h). `cutproof bench rotations` prints what each reaches.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
-#include <array>
 #include <cmath>
-#include <cstdio>
-#include <functional>
-#include <limits>
 #include <numbers>
 #include <random>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "fixtures/rotation_answers.h"
 #include "gpu/rotation.cuh"
 
 namespace cutproof::gpu {
@@ -67,239 +64,83 @@ class Random {
   std::uniform_real_distribution<double> uniform_;
 };
 
-// A with the given signed singular values: U diag(σ) Vᵀ, U and V rotations.
-Matrix3d with_spectrum(Random& random, const Vector3d& sigma) {
-  return random.rotation() * sigma.asDiagonal() * random.rotation().transpose();
-}
-
-// A from a cloud of particles as a cluster makes it: Σ (x - t)(X - T)ᵀ.
-Matrix3d cloud(const std::vector<Vector3d>& now, const std::vector<Vector3d>& rest, const std::vector<double>& mass) {
-  double total = 0;
-  Vector3d t = Vector3d::Zero(), rest_center = Vector3d::Zero();
-  for (std::size_t i = 0; i < now.size(); ++i) {
-    total += mass[i];
-    t += mass[i] * now[i];
-    rest_center += mass[i] * rest[i];
-  }
-  Matrix3d a = Matrix3d::Zero();
-  for (std::size_t i = 0; i < now.size(); ++i) {
-    a += mass[i] * (now[i] - t / total) * (rest[i] - rest_center / total).transpose();
-  }
-  return a;
-}
-
-struct Problem {
-  Matrix3 a;
-  Matrix3 previous;
-};
-
-struct Set {
-  std::string name;
-  std::function<Problem(Random&)> make;
-};
-
-std::vector<Set> hard_cases() {
-  const auto cold = [](Matrix3d a) { return Problem{from(a), Matrix3{}}; };
-  const auto warm = [](Random& random, const Matrix3d& a, const Matrix3d& r) {
-    return Problem{from(a), from(turn(random.uniform(0, 0.1), random.vector()) * r)};
-  };
-  const auto spectrum = [cold](Vector3d sigma) {
-    return [cold, sigma](Random& random) { return cold(with_spectrum(random, sigma)); };
-  };
-  return {
-      {"pure rotation", [cold](Random& random) { return cold(random.rotation()); }},
-      {"rotation x (1 ± 1e-6)",
-       [cold](Random& random) { return cold((1 + random.uniform(-1e-6, 1e-6)) * random.rotation()); }},
-      {"stretched, turned ≤ 0.1 since",
-       [warm](Random& random) {
-         const Matrix3d r = random.rotation(), v = random.rotation();
-         const Vector3d sigma(random.uniform(0.5, 2), random.uniform(0.5, 2), random.uniform(0.5, 2));
-         return warm(random, r * v * sigma.asDiagonal() * v.transpose(), r);
-       }},
-      {"half turn about an axis",
-       [cold](Random& random) {
-         const int axis = static_cast<int>(random.uniform(0, 3));
-         return cold(random.uniform(0.5, 2) * turn(kPi, Vector3d::Unit(axis)));
-       }},
-      {"half turn, any axis", [cold](Random& random) { return cold(turn(kPi, random.vector())); }},
-      {"120° from cold", [cold](Random& random) { return cold(turn(2 * kPi / 3, random.vector())); }},
-      {"any matrix", [cold](Random& random) { return cold(random.matrix()); }},
-      {"reflection, separated",
-       [cold](Random& random) {
-         return cold(
-             with_spectrum(random, {random.uniform(1.5, 2), random.uniform(0.8, 1.2), -random.uniform(0.1, 0.5)}));
-       }},
-      {"reflection, σ2 ≈ |σ3|",
-       [cold](Random& random) {
-         const double s = random.uniform(0.2, 0.9);
-         return cold(with_spectrum(random, {1, s, -s * (1 - std::pow(10, random.uniform(-8, -2)))}));
-       }},
-      {"(1, 1, -1)", spectrum({1, 1, -1})},
-      {"-I and -R",
-       [cold](Random& random) {
-         return cold(random.uniform(0, 1) < 0.5 ? Matrix3d(-Matrix3d::Identity()) : Matrix3d(-random.rotation()));
-       }},
-      {"rank 2 (a sheet)",
-       [cold](Random& random) {
-         return cold(with_spectrum(random, {1, random.uniform(0.1, 1), 0}));
-       }},
-      {"rank 1 (a wire)",
-       [warm](Random& random) {
-         return warm(random, random.vector() * random.vector().transpose(), random.rotation());
-       }},
-      {"nearly rank 1",
-       [cold](Random& random) {
-         const double s = std::pow(10, random.uniform(-8, -4));
-         return cold(with_spectrum(random, {1, s, random.uniform(-1, 1) * s}));
-       }},
-      {"(1, 1e-3, 1e-6)", spectrum({1, 1e-3, 1e-6})},
-      {"(1, 1e-3, -1e-6)", spectrum({1, 1e-3, -1e-6})},
-      {"scale 1e-30", [cold](Random& random) { return cold(1e-30 * random.matrix()); }},
-      {"scale 1e30", [cold](Random& random) { return cold(1e30 * random.matrix()); }},
-      {"denormals", [cold](Random& random) { return cold(std::pow(10, random.uniform(-44, -38)) * random.matrix()); }},
-      {"through σ2 + σ3 = 0",
-       [warm](Random& random) {
-         const Matrix3d u = random.rotation(), v = random.rotation();
-         const Vector3d sigma(1, 0.4, -0.4 + random.uniform(-1e-5, 1e-5));
-         return warm(random, u * sigma.asDiagonal() * v.transpose(), u * v.transpose());
-       }},
-      {"mass ratio 1e6",
-       [cold](Random& random) {
-         const Matrix3d r = random.rotation();
-         std::vector<Vector3d> now, rest;
-         std::vector<double> mass;
-         for (int i = 0; i < 20; ++i) {
-           rest.push_back(random.vector());
-           now.push_back(r * rest.back() + 0.2 * random.vector());
-           mass.push_back(std::pow(10, random.uniform(-6, 0)));
-         }
-         return cold(cloud(now, rest, mass));
-       }},
-      {"far from the origin",
-       [cold](Random& random) {
-         const Matrix3d r = random.rotation();
-         const Vector3d place = 1e6 * random.vector();
-         std::vector<Vector3d> now, rest;
-         for (int i = 0; i < 20; ++i) {
-           rest.push_back(random.vector());
-           now.push_back(r * rest.back() + 0.2 * random.vector() + place);
-         }
-         return cold(cloud(now, rest, std::vector<double>(20, 1.0)));
-       }},
-  };
-}
-
-// (best - reached) / Σ|σ|, with the best value σ1 + σ2 + sign(det A) σ3.
-double objective_gap(const Matrix3& a, const Matrix3& r) {
-  Matrix3d scaled = to(a);
-  scaled /= scaled.cwiseAbs().maxCoeff();
-  const Eigen::JacobiSVD<Matrix3d> svd(scaled, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Vector3d sigma = svd.singularValues();
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  return (sigma[0] + sigma[1] + sign * sigma[2] - (to(r).transpose() * scaled).trace()) / sigma.sum();
-}
-
-struct Worst {
-  double gap = 0, orthogonality = 0;
-  int wrong = 0;       // gap above 1e-6, orthogonality above 5e-6, a reflection, or not finite
-  int not_finite = 0;  // among them
-};
-
-template <int Method>
-Worst worst_of(const Set& set, uint64_t seed) {
-  Random random(seed);
-  Worst worst;
-  for (int trial = 0; trial < kTrials; ++trial) {
-    const Problem problem = set.make(random);
-    double greatest = 0;
-    for (const float entry : problem.a.m) greatest = std::max(greatest, std::abs(double{entry}));
-    if (greatest == 0) continue;  // a denormal that became zero
-    const Matrix3 r = rotate<Method>(problem.a, problem.previous).r;
-    const Matrix3d rd = to(r);
-    if (!rd.allFinite()) {
-      ++worst.not_finite;
-      ++worst.wrong;
-      continue;
+// What a method answers, as fixtures::judge asks for it.
+template <int Method, class Real>
+fixtures::Answers solve(const std::vector<Mat3>& a, const std::vector<Mat3>& previous) {
+  fixtures::Answers answers;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    Matrix3x3<Real> matrix, before;
+    for (std::size_t k = 0; k < 9; ++k) {
+      matrix.m[k] = static_cast<Real>(a[i].m[k]);
+      before.m[k] = static_cast<Real>(previous[i].m[k]);
     }
-    const double gap = objective_gap(problem.a, r);
-    const double orthogonality = (rd.transpose() * rd - Matrix3d::Identity()).norm();
-    worst.gap = std::max(worst.gap, gap);
-    worst.orthogonality = std::max(worst.orthogonality, orthogonality);
-    worst.wrong += !(gap <= 1e-6 && orthogonality <= 5e-6 && rd.determinant() > 0);
+    const auto rotation = rotate<Method>(matrix, before);
+    Mat3& r = answers.r.emplace_back();
+    for (std::size_t k = 0; k < 9; ++k) r.m[k] = static_cast<double>(rotation.r.m[k]);
+    answers.flagged.push_back(rotation.degenerate);
   }
-  return worst;
+  return answers;
+}
+
+struct Method {
+  const char* name;
+  fixtures::Precision precision;
+  fixtures::Solve solve;
+};
+template <class Real>
+std::vector<Method> methods_in(fixtures::Precision precision) {
+  return {{"jacobi4", precision, solve<kJacobi4, Real>}, {"mueller", precision, solve<kMueller2016, Real>},
+          {"apd", precision, solve<kApd, Real>},         {"svd", precision, solve<kSvd, Real>},
+          {"quest", precision, solve<kQuest, Real>},     {"newton", precision, solve<kNewton, Real>}};
+}
+std::vector<Method> methods() {
+  std::vector<Method> all = methods_in<float>(fixtures::Precision::single);
+  for (const Method& method : methods_in<double>(fixtures::Precision::twice)) all.push_back(method);
+  return all;
+}
+
+fixtures::Judged judged(const std::string& name, const Method& method) {
+  return fixtures::judge(fixtures::pose(fixtures::hard_case(name), kTrials, method.precision), method.solve);
 }
 
 TEST(GpuRotation, TheDefaultReachesTheGoalOnEveryHardCaseAndNoMethodGivesNaN) {
-  std::printf("%-32s", "worst gap (wrong of 2,000)");
-  for (const char* name : {"jacobi4", "mueller2016", "apd", "svd", "quest", "newton"}) std::printf("%20s", name);
-  std::printf("\n");
-  std::array<double, 6> orthogonality = {};
-  uint64_t seed = 100;
-  for (const Set& set : hard_cases()) {
-    ++seed;
-    const std::array<Worst, 6> worst = {worst_of<kJacobi4>(set, seed), worst_of<kMueller2016>(set, seed),
-                                        worst_of<kApd>(set, seed),     worst_of<kSvd>(set, seed),
-                                        worst_of<kQuest>(set, seed),   worst_of<kNewton>(set, seed)};
-    std::printf("%-32s", set.name.c_str());
-    for (std::size_t method = 0; method < 6; ++method) {
-      const Worst& w = worst[method];
-      std::printf("%12.1e (%5d)", w.gap, w.wrong);
-      orthogonality[method] = std::max(orthogonality[method], w.orthogonality);
-      EXPECT_EQ(w.not_finite, 0) << set.name << ", method " << method;
+  const std::set<std::string> reliable = {"jacobi4", "newton", "svd"};
+  for (const fixtures::HardCase& hard : fixtures::hard_cases()) {
+    for (const fixtures::Precision precision : {fixtures::Precision::single, fixtures::Precision::twice}) {
+      const fixtures::Problems problems = fixtures::pose(hard, kTrials, precision);
+      for (const Method& method : methods()) {
+        if (method.precision != precision) continue;
+        const fixtures::Judged result = fixtures::judge(problems, method.solve);
+        const std::string where = hard.name + ", " + method.name +
+                                  (precision == fixtures::Precision::single ? ", single" : ", double") + ", seed " +
+                                  std::to_string(hard.seed) + ": " + result.first_wrong;
+        EXPECT_EQ(result.not_finite, 0) << where;
+        EXPECT_EQ(result.reflections, 0) << where;
+        if (reliable.count(method.name) > 0) {
+          EXPECT_EQ(result.wrong, 0) << where;
+        }
+      }
     }
-    std::printf("\n");
-    EXPECT_EQ(worst[kJacobi4].wrong, 0) << set.name << ", gap " << worst[kJacobi4].gap << ", orthogonality "
-                                        << worst[kJacobi4].orthogonality << ", seed " << seed;
-    EXPECT_EQ(worst[kNewton].wrong, 0) << set.name << ", gap " << worst[kNewton].gap << ", seed " << seed;
-    EXPECT_EQ(worst[kSvd].wrong, 0) << set.name << ", gap " << worst[kSvd].gap << ", seed " << seed;
   }
-  std::printf("%-32s", "worst |RᵀR - I|");
-  for (const double value : orthogonality) std::printf("%12.1e        ", value);
-  std::printf("\n");
 }
 
 TEST(GpuRotation, TheOthersAreRightWhereTheyAreSaidToBe) {
   // What docs/rotations.md says of them; a method that stops being right there has a fault.
-  for (const Set& set : hard_cases()) {
-    if (set.name == "stretched, turned ≤ 0.1 since") {
-      EXPECT_EQ(worst_of<kMueller2016>(set, 1).wrong, 0);
-      EXPECT_EQ(worst_of<kApd>(set, 1).wrong, 0);
+  for (const Method& method : methods()) {
+    const std::string name = method.name;
+    if (name == "mueller" && method.precision == fixtures::Precision::twice) continue;  // has not converged by then
+    if (name == "mueller" || name == "apd") {
+      EXPECT_EQ(judged("near", method).wrong, 0) << name;
     }
-    if (set.name == "pure rotation") {
-      EXPECT_EQ(worst_of<kQuest>(set, 1).wrong, 0);
+    if (name == "quest") {
+      EXPECT_EQ(judged("pure_rotation", method).wrong, 0);
     }
-  }
-}
-
-template <int Method>
-void expect_previous_kept() {
-  const Matrix3 previous = from(turn(2.0, Vector3d(1, 1, 0)));
-  constexpr float kNaN = std::numeric_limits<float>::quiet_NaN(), kInf = std::numeric_limits<float>::infinity();
-  Random random(5);
-  for (int place = 0; place < 9; ++place) {
-    for (const float poison : {kNaN, kInf, -kInf}) {
-      Matrix3 a = from(random.matrix());
-      a.m[place] = poison;
-      const Rotation rotation = rotate<Method>(a, previous);
-      EXPECT_TRUE(rotation.degenerate);
-      for (int k = 0; k < 9; ++k) EXPECT_EQ(rotation.r.m[k], previous.m[k]);
+    // All keep what they had, and say so, where nothing is known.
+    for (const char* nothing : {"zero", "one_particle", "coincident_particles", "nan_and_inf"}) {
+      const fixtures::Judged result = judged(nothing, method);
+      EXPECT_EQ(result.wrong, 0) << name << ", " << nothing << ": " << result.first_wrong;
     }
   }
-  Matrix3 zero;
-  for (float& entry : zero.m) entry = 0;
-  const Rotation rotation = rotate<Method>(zero, previous);
-  EXPECT_TRUE(rotation.degenerate);
-  for (int k = 0; k < 9; ++k) EXPECT_EQ(rotation.r.m[k], previous.m[k]);
-}
-
-TEST(GpuRotation, KeepsThePreviousOneAndFlagsItWhereNothingIsKnown) {
-  expect_previous_kept<kJacobi4>();
-  expect_previous_kept<kMueller2016>();
-  expect_previous_kept<kApd>();
-  expect_previous_kept<kSvd>();
-  expect_previous_kept<kQuest>();
-  expect_previous_kept<kNewton>();
 }
 
 template <int Method>

@@ -100,6 +100,7 @@ struct Warped {
   int* from_leader;  // within the parity
   unsigned long long* wide;
   Float3* vector;
+  Float3* vector_sum;
 };
 
 template <class Block>
@@ -111,6 +112,7 @@ CUTPROOF_DEVICE void warp_kernel(Block& block, Warped out) {
   out.rotated[at] = block.shuffle(everyone, static_cast<int>(at), (lane + 1) % 32);
   out.wide[at] = block.shuffle(everyone, (1ull << 40) + static_cast<unsigned long long>(at), 31 - lane);
   out.vector[at] = block.shuffle(everyone, Float3{static_cast<float>(lane), 2.0f, -static_cast<float>(lane)}, lane ^ 5);
+  out.vector_sum[at] = block.warp_sum(Float3{static_cast<float>(at), 1.0f, -static_cast<float>(lane)});
   if (lane % 2 == 0) {
     out.half[at] = block.ballot(0x55555555u, lane < 16);
     out.from_leader[at] = block.shuffle(0x55555555u, static_cast<int>(at), 0);
@@ -292,9 +294,9 @@ void check_warp_operations(Machine& machine) {
   auto unsigneds = machine.array(std::vector<unsigned>(2 * kThreads));
   auto ints = machine.array(std::vector<int>(2 * kThreads));
   auto wides = machine.array(std::vector<unsigned long long>(kThreads));
-  auto vectors = machine.array(std::vector<Float3>(kThreads));
+  auto vectors = machine.array(std::vector<Float3>(2 * kThreads));
   const Warped out{unsigneds.at(), unsigneds.at() + kThreads, ints.at(), ints.at() + kThreads, wides.at(),
-                   vectors.at()};
+                   vectors.at(),    vectors.at() + kThreads};
   machine.run([&](auto& launcher) { launcher.items(warp_kernel_object{}, kThreads, out); });
   for (int at = 0; at < kThreads; ++at) {
     const int lane = at % 32, warp = at - lane;
@@ -306,6 +308,9 @@ void check_warp_operations(Machine& machine) {
     EXPECT_EQ(vectors.get()[at].x, static_cast<float>(lane ^ 5));
     EXPECT_EQ(vectors.get()[at].y, 2.0f);
     EXPECT_EQ(vectors.get()[at].z, -static_cast<float>(lane ^ 5));
+    EXPECT_EQ(vectors.get()[kThreads + at].x, static_cast<float>(32 * warp + 496));
+    EXPECT_EQ(vectors.get()[kThreads + at].y, 32.0f);
+    EXPECT_EQ(vectors.get()[kThreads + at].z, -496.0f);
   }
 }
 

@@ -1,0 +1,54 @@
+// Ways to solve many rotation problems at once, each with its times; on the CPU and, in builds that have it, on a CUDA
+// device.
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "fixtures/rotation_answers.h"
+
+namespace cutproof::cli {
+
+struct TimedAnswers {
+  fixtures::Answers answers;
+  std::vector<double> seconds;  // [repeats] for all matrices together, of what was done after a first time
+};
+
+struct RotationMethod {
+  std::string name;
+  fixtures::Precision precision = fixtures::Precision::single;
+  bool selectable = false;  // by `--rotation`, on backends that run the kernels
+  int64_t bytes = 0;        // read and written for each matrix
+  // Matrix i starts from previous[i], every time.
+  std::function<TimedAnswers(const std::vector<Mat3>& a, const std::vector<Mat3>& previous, int repeats)> solve;
+};
+
+// `reference`: one after the other, on one thread. `host`: as a kernel, on all threads. `gpu`: as a kernel; timed by
+// CUDA events around the launch. The methods of kernels in both precisions, and beside them Müller's from a cold start,
+// McAdams', and on the CPU Eigen's JacobiSVD and, in double, the reference's (horn).
+std::vector<RotationMethod> rotation_methods(const std::string& backend);
+
+#if CUTPROOF_HAS_CUDA
+std::vector<RotationMethod> device_rotation_methods();
+#endif
+
+// How matrices lie in memory: entry k of matrix i at [k · n + i] (rotation_kernel.cuh).
+template <class Real>
+std::vector<Real> interleaved(const std::vector<Mat3>& matrices) {
+  std::vector<Real> values(9 * matrices.size());
+  for (std::size_t i = 0; i < matrices.size(); ++i) {
+    for (std::size_t k = 0; k < 9; ++k) values[k * matrices.size() + i] = static_cast<Real>(matrices[i].m[k]);
+  }
+  return values;
+}
+template <class Real>
+std::vector<Mat3> separated(const std::vector<Real>& values) {
+  std::vector<Mat3> matrices(values.size() / 9);
+  for (std::size_t i = 0; i < matrices.size(); ++i) {
+    for (std::size_t k = 0; k < 9; ++k) matrices[i].m[k] = static_cast<double>(values[k * matrices.size() + i]);
+  }
+  return matrices;
+}
+
+}  // namespace cutproof::cli

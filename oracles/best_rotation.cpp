@@ -1,0 +1,74 @@
+#include "oracles/best_rotation.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <cmath>
+#include <limits>
+
+namespace cutproof::oracles {
+
+namespace {
+
+using Real = long double;
+using Matrix = Eigen::Matrix<Real, 3, 3>;
+using Vector = Eigen::Matrix<Real, 3, 1>;
+
+template <class Numbers>
+Matrix to_matrix(const Numbers& m) {
+  Matrix result;
+  for (int k = 0; k < 9; ++k) result(k / 3, k % 3) = m[static_cast<std::size_t>(k)];
+  return result;
+}
+
+}  // namespace
+
+BestRotation best_rotation(const Mat3& given) {
+  Matrix a = to_matrix(given.m);
+  int exponent = 0;
+  static_cast<void>(std::frexp(a.cwiseAbs().maxCoeff(), &exponent));
+  for (int k = 0; k < 9; ++k) a(k / 3, k % 3) = std::ldexp(a(k / 3, k % 3), -exponent);
+  const Eigen::JacobiSVD<Matrix> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Matrix &u = svd.matrixU(), &v = svd.matrixV();
+  const Vector& sigma = svd.singularValues();
+  const Real sign = u.determinant() * v.determinant() < 0 ? -1 : 1;
+
+  BestRotation best;
+  for (int k = 0; k < 9; ++k) best.a[static_cast<std::size_t>(k)] = a(k / 3, k % 3);
+  best.sum = sigma.sum();
+  best.value = sigma[0] + sigma[1] + sign * sigma[2];
+  best.separation = static_cast<double>((sigma[1] + sign * sigma[2]) / sigma[0]);
+  for (int k = 0; k < 3; ++k) {
+    best.u[static_cast<std::size_t>(k)] = static_cast<double>(u(k, 0));
+    best.v[static_cast<std::size_t>(k)] = static_cast<double>(v(k, 0));
+  }
+  // With U' and V' the orthogonal matrices nearest to U and V (at a distance of at most ‖UᵀU - I‖), A differs from
+  // U' Σ V'ᵀ, whose value is the one above, by no more than the residual and what U - U' and V - V' make of Σ. A value
+  // changes by at most √3 times the Frobenius norm of a change of A. Each product of two 3 × 3 matrices here is off by
+  // 6 units of its entries, which are below 3.
+  const Real loss = (u.transpose() * u - Matrix::Identity()).norm() + (v.transpose() * v - Matrix::Identity()).norm();
+  const Real residual = (a - u * sigma.asDiagonal() * v.transpose()).norm();
+  const Real unit = std::numeric_limits<Real>::epsilon() / 2;
+  best.error =
+      static_cast<double>(std::sqrt(Real(3)) * (residual + loss * sigma[0] + 100 * unit * best.sum) / best.sum);
+  return best;
+}
+
+double objective_gap(const BestRotation& best, const Mat3& r) {
+  Real reached = 0;
+  for (std::size_t k = 0; k < 9; ++k) reached += best.a[k] * r.m[k];
+  return static_cast<double>((best.value - reached) / best.sum);
+}
+
+NearestRotation nearest_of_rank_one(const BestRotation& best, const Mat3& p) {
+  const Matrix previous = to_matrix(p.m);
+  const Vector u(best.u[0], best.u[1], best.u[2]), v(best.v[0], best.v[1], best.v[2]);
+  const Vector from = previous * v;
+  const Matrix nearest = Eigen::Quaternion<Real>::FromTwoVectors(from, u).toRotationMatrix() * previous;
+  NearestRotation result;
+  for (int k = 0; k < 9; ++k) result.r.m[static_cast<std::size_t>(k)] = static_cast<double>(nearest(k / 3, k % 3));
+  result.weight = static_cast<double>((1 + from.normalized().dot(u)) / 2);
+  return result;
+}
+
+}  // namespace cutproof::oracles
