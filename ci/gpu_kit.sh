@@ -8,7 +8,8 @@ cd "$(dirname "$0")/.."
 build=${1:-build/default}
 kit=${2:-gpu_kit}
 
-programs=(cli/cutproof tests/gpu/launch_device_test tests/gpu/device_failures_test property_tests/property_tests)
+programs=(cli/cutproof tests/gpu/launch_device_test tests/gpu/device_failures_test tests/gpu/acceleration_test
+  property_tests/property_tests)
 for program in "${programs[@]}"; do
   [ -x "$build/$program" ] || { echo "ci/gpu_kit.sh: $build/$program is not there: build it with a CUDA toolkit first" >&2; exit 2; }
 done

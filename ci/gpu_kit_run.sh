@@ -58,6 +58,7 @@ for part in $parts; do
         --save "$results" --json "$results/fuzz_global_labels.json"
       try fuzz_dynamics cutproof fuzz --backend gpu --dynamics --cases 10000 --seed 2000001 \
         --save "$results" --json "$results/fuzz_dynamics.json"
+      try acceleration acceleration_test --gtest_filter='*/gpu'
       try rapidcheck property_tests --gtest_filter='*/gpu*:Cases*' ;;
     sanitizer)
       for tool in memcheck racecheck initcheck synccheck; do
@@ -72,6 +73,7 @@ for part in $parts; do
       try rotations cutproof bench rotations --backend gpu --cases --json "$results/rotations.json"
       try floors cutproof bench floors --backend gpu --json "$results/floors.json"
       try timings cutproof bench stages --backend gpu --split both --json "$results/stages.json"
+      try solver cutproof bench solver --backend gpu --json "$results/solver.json"
       # A body of ten million particles for 100 frames, a blade cutting.
       try ten_million cutproof bench stages --backend gpu --sizes 10000000 --frames 100 --json "$results/stages_10M.json" ;;
     *) echo "run.sh: there is no part '$part'" >&2; exit 2 ;;

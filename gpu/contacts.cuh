@@ -191,4 +191,20 @@ CUTPROOF_DEVICE inline Float3 project(const Contacts& contacts, const RestPoint&
   return allowed(contacts, rest, result, side, in_turn);
 }
 
+// The same for a solver that comes from x and would go to `free`. Where blade and walls hold at once, projecting in
+// turn need not give the nearest point: never one that is worse than x, so that the energy cannot grow. Elsewhere the
+// projection is the nearest point, and asking would refuse motions below the root of the rounding.
+CUTPROOF_DEVICE inline Float3 next_position(const Contacts& contacts, const RestPoint& rest, Float3 free, float side,
+                                            Float3 start, Float3 x) {
+  bool in_turn = false;
+  const Float3 next = project(contacts, rest, free, side, start, in_turn);
+  const bool worse = dot(next - free, next - free) > dot(x - free, x - free);
+  return in_turn && contacts.frictionless && worse ? x : next;
+}
+
+// Friction, or room that is not convex: an iteration can have several fixed points.
+CUTPROOF_DEVICE inline bool path_matters(const Contacts& contacts) {
+  return contacts.move != nullptr || !contacts.frictionless;
+}
+
 }  // namespace cutproof::gpu

@@ -105,6 +105,7 @@ void add_constants(Image& image, const Setup& setup, const State& state, int64_t
   body.by_layer = divider_of(std::max(1, body.nodes[0] * body.nodes[1]));
   body.h = f(setup.body.grid.spacing);
   body.solver = setup.step.solver == Solver::implicit ? kImplicit : kPublished;
+  body.acceleration = setup.step.acceleration == Acceleration::chebyshev ? kChebyshev : kPlain;
   body.substeps = setup.step.substeps;
   body.iterations = setup.step.iterations;
   body.stiffness = f(setup.step.stiffness);
@@ -255,6 +256,13 @@ int64_t additions_bound(const Image& image) {
   return additions;
 }
 
+// Whether some body has a blade, a wall or a grip.
+bool has_contact(const Image& image) {
+  return std::any_of(image.body.begin(), image.body.end(), [](const BodyConstants& b) {
+    return b.has_blade || b.wall_end > b.wall_begin || b.grip_end > b.grip_begin;
+  });
+}
+
 void make_room(Image& image, Room room) {
   const auto n = static_cast<int64_t>(image.node.size());
   const auto nodes = static_cast<int64_t>(image.particle_at.size());
@@ -280,6 +288,10 @@ void make_room(Image& image, Room room) {
   image.counters = {counters};
 
   for (std::vector<Float4>* v : {&image.start, &image.predicted, &image.pushed}) v->assign(at(n), {});
+  const bool accelerated = std::any_of(image.body.begin(), image.body.end(),
+                                       [](const BodyConstants& b) { return b.acceleration != kPlain; });
+  image.earlier.assign(accelerated ? at(n) : 0, {});
+  image.pushed_earlier.assign(accelerated && has_contact(image) ? at(n) : 0, {});
   image.particle_flag.assign(at(n), 0);
   image.particle_scratch.assign(at(2 * n), 0);
   for (std::vector<int>* v :
@@ -426,9 +438,7 @@ World Image::world() {
   w.cell_capacity = static_cast<int>(cell_node.size());
   w.addition_capacity = static_cast<int>(additions.size());
   w.rotation_method = rotation_method;
-  for (const BodyConstants& b : body) {
-    w.any_contact = w.any_contact || b.has_blade || b.wall_end > b.wall_begin || b.grip_end > b.grip_begin;
-  }
+  w.any_contact = has_contact(*this);
   each(w, [](auto& vector, auto& pointer, bool) { pointer = vector.data(); });
   return w;
 }
@@ -460,6 +470,7 @@ Plan make_plan(const std::vector<Setup>& setups, const std::vector<State>& state
     const Setup& setup = setups[b];
     plan.substeps = std::max(plan.substeps, setup.step.substeps);
     plan.iterations = std::max(plan.iterations, setup.step.iterations);
+    plan.accelerated = plan.accelerated || setup.step.acceleration != Acceleration::none;
     plan.contacts = plan.contacts || setup.has_blade || !setup.walls.empty() || !setup.grips.empty();
     plan.grips = plan.grips || !setup.grips.empty();
     const bool detection = needs_detection(setup);

@@ -30,7 +30,7 @@ struct Image {
   std::vector<Float3> grip_displacement;
 
   std::vector<int> body_of, node, particle_at, death;
-  std::vector<Float4> displacement, velocity, start, predicted, pushed, impulse;
+  std::vector<Float4> displacement, velocity, start, predicted, pushed, earlier, pushed_earlier, impulse;
   std::vector<int> share, holder_begin, holders;
 
   std::vector<int> slot_begin, slot_size, slot_number, slot_body;
@@ -110,6 +110,8 @@ void Image::each(World& w, Visit&& visit) {
   visit(start, w.start, kScratch);
   visit(predicted, w.predicted, kScratch);
   visit(pushed, w.pushed, kScratch);
+  visit(earlier, w.earlier, kScratch);
+  visit(pushed_earlier, w.pushed_earlier, kScratch);
   visit(impulse, w.impulse, kKeep);
   visit(share, w.share, kScratch);
   visit(holder_begin, w.holder_begin, kScratch);

@@ -14,6 +14,7 @@
 namespace cutproof::gpu {
 
 enum : int { kImplicit = 0, kPublished = 1 };                                           // Solver
+enum : int { kPlain = 0, kChebyshev = 1 };                                              // Acceleration
 enum : int { kNoCriterion = 0, kDistance = 1, kGeometric = 2, kStrain = 3 };            // Criterion
 enum : int { kNoMerge = 0, kDeterministic = 1, kPublishedMerge = 2, kSinglePass = 3 };  // MergeRule
 enum : int { kNoExpand = 0, kEdgeCover = 1, kPublishedExpand = 2 };                     // ExpandRule
@@ -47,7 +48,7 @@ struct BodyConstants {
   int nodes[3];              // of its grid
   Divider by_row, by_layer;  // by nodes[0] and by nodes[0] · nodes[1]
   float h;
-  int solver, substeps, iterations;
+  int solver, acceleration, substeps, iterations;
   float stiffness, relaxation, damping;
   Float3 gravity;
   int criterion, needs_detection;
@@ -143,14 +144,16 @@ struct World {
                                    // at frame f; kDeadBefore: dead at load and in neither
   Float4* displacement = nullptr;  // d; w: mass m_i
   Float4* velocity = nullptr;
-  Float4* start = nullptr;      // d when the substep began
-  Float4* predicted = nullptr;  // d~ of x~; w: side of the blade, +1 or -1; 0: held by a grip
-  Float4* pushed = nullptr;     // displacement by contacts and grips, carried through the iterations
-  Float4* impulse = nullptr;    // per mass, this frame; Σ m_i impulse_i = State::impulse
-  int* share = nullptr;         // n_i: how many clusters hold it
-  int* holder_begin = nullptr;  // [particles + 1] holders of p: holders[holder_begin[p] .. holder_begin[p + 1])
-  int* holders = nullptr;       // [member_capacity] slots, -1: none (any more); in no particular but a
-                                // reproducible order
+  Float4* start = nullptr;           // d when the substep began
+  Float4* predicted = nullptr;       // d~ of x~; w: side of the blade, +1 or -1; 0: held by a grip
+  Float4* pushed = nullptr;          // displacement by contacts and grips, carried through the iterations
+  Float4* earlier = nullptr;         // d of one iteration ago; empty unless some body is accelerated
+  Float4* pushed_earlier = nullptr;  // pushed of one iteration ago; empty too without contacts
+  Float4* impulse = nullptr;         // per mass, this frame; Σ m_i impulse_i = State::impulse
+  int* share = nullptr;              // n_i: how many clusters hold it
+  int* holder_begin = nullptr;       // [particles + 1] holders of p: holders[holder_begin[p] .. holder_begin[p + 1])
+  int* holders = nullptr;            // [member_capacity] slots, -1: none (any more); in no particular but a
+                                     // reproducible order
 
   // Clusters, [slot_capacity] each. Slots are given out in ascending order of number and never reused within a load
   // (the backend compacts them between frames), so the order of slots is the order of numbers.

@@ -254,6 +254,37 @@ CUTPROOF_DEVICE inline void begin_substep(const World& w, const BodyConstants& b
   }
 }
 
+// Chebyshev semi-iteration (docs/acceleration.md), order >= 1: x + pull (g - x) + carry (x - earlier), with g where the
+// plain iteration goes from x. The recurrence of the weights in closed form:
+// omega_j = (1 + q) (1 + q^(j-1)) / (1 + q^j) for j >= 2, with q = ((1 - r) / (1 + r))², r² = 1 - b.
+struct Combination {
+  float pull, carry;
+  CUTPROOF_DEVICE Float3 operator()(Float3 plain, Float3 now, Float3 earlier) const {
+    return now + (pull * (plain - now) + carry * (now - earlier));
+  }
+};
+
+// 1 - b: the eigenvalues that the weights are made for are those of [0, b], b = min(s, 0.95).
+inline constexpr float kLeastGap = 0.05f;
+
+CUTPROOF_DEVICE inline Combination chebyshev(float kdt2, int order) {
+  const float gap = 1.0f / (1.0f + kdt2);
+  const float r2 = gap > kLeastGap ? gap : kLeastGap;
+  const float r = sqrtf(r2);
+  const float root = (1.0f - r) / (1.0f + r);
+  const float q = root * root;
+  float omega = 1;
+  if (order > 1) {
+    float power = 1, square = q;  // power: q^(order - 1)
+    for (int n = order - 1; n > 0; n /= 2) {
+      if (n % 2 != 0) power *= square;
+      square *= square;
+    }
+    omega = (1.0f + q) * (1.0f + power) / (1.0f + q * power);
+  }
+  return {omega * (2.0f / (1.0f + r2)), omega - 1.0f};
+}
+
 CUTPROOF_DEVICE inline float substep_length(const World& w, const BodyConstants& body, int frame) {
   return w.substep_length[body.frame_begin + frame];
 }
@@ -315,7 +346,7 @@ CUTPROOF_DEVICE void hold_particles_kernel(Block& block, const World& w, int sub
 }
 CUTPROOF_KERNEL(hold_particles_kernel);
 
-template <bool kContacts, class Block>
+template <bool kContacts, bool kAccelerated, class Block>
 CUTPROOF_DEVICE void update_positions_kernel(Block& block, const World& w, int substep, int iteration) {
   using namespace step_detail;
   for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
@@ -357,7 +388,19 @@ CUTPROOF_DEVICE void update_positions_kernel(Block& block, const World& w, int s
         }
         pull = (1.0f / static_cast<float>(share)) * sum;
       }
-      const Float3 free = from + s * pull;
+      const Float3 plain = from + s * pull;
+      Float3 free = plain;
+      // The first iteration is plain, and the last has no next one to keep anything for.
+      [[maybe_unused]] const bool combined = body.acceleration == kChebyshev && iteration > 0;
+      [[maybe_unused]] const bool kept = body.acceleration == kChebyshev && iteration + 1 < updates;
+      [[maybe_unused]] Combination combination;
+      if constexpr (kAccelerated) {
+        if (combined) {
+          combination = chebyshev(kdt2, iteration);
+          free = combination(plain, x, xyz(w.earlier[p]));
+        }
+        if (kept) w.earlier[p] = now;
+      }
       next = free;
       if constexpr (kContacts) {
         pushed = w.pushed[p];
@@ -366,14 +409,23 @@ CUTPROOF_DEVICE void update_positions_kernel(Block& block, const World& w, int s
         } else {
           const Contacts contacts = contacts_of(w, body, frame, substep);
           const RestPoint rest = {body.h, grid_node(body, w.node[p])};
-          bool in_turn = false;
-          next = project(contacts, rest, free, predicted.w, xyz(w.start[p]), in_turn);
-          // Where blade and walls hold at once, projecting in turn need not give the nearest point: never one that is
-          // worse than the present one, so that the energy cannot grow. Elsewhere the projection is the nearest point,
-          // and asking would refuse motions below the root of the rounding.
-          if (in_turn && contacts.frictionless && dot(next - free, next - free) > dot(x - free, x - free)) next = x;
+          const Float3 start = xyz(w.start[p]);
+          next = next_position(contacts, rest, free, predicted.w, start, x);
+          if constexpr (kAccelerated) {
+            // Where several answers are right, the way there decides: touched particles go the plain way.
+            if (combined && path_matters(contacts)) {
+              const Float3 allowed = next_position(contacts, rest, plain, predicted.w, start, x);
+              if (!contacts_detail::same(next, free) || !contacts_detail::same(allowed, plain)) next = allowed;
+            }
+          }
         }
-        pushed = with_w((implicit ? s : 1.0f) * xyz(pushed) + (next - free), 0.0f);
+        const Float3 before = xyz(pushed);
+        Float3 carried = (implicit ? s : 1.0f) * before;
+        if constexpr (kAccelerated) {
+          if (combined) carried = combination(carried, before, xyz(w.pushed_earlier[p]));
+          if (kept) w.pushed_earlier[p] = pushed;
+        }
+        pushed = with_w(carried + (next - free), 0.0f);
       }
     } else if constexpr (kContacts) {
       pushed = w.pushed[p];
@@ -407,19 +459,19 @@ struct begin_frame_kernel_object {
     begin_frame_kernel<kContacts>(block, w);
   }
 };
-template <bool kContacts>
+template <bool kContacts, bool kAccelerated>
 struct update_positions_kernel_object {
   static constexpr const char* kName = "update_positions_kernel";
   static constexpr int kMaxThreads = 256;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const World& w, int substep, int iteration) const {
-    update_positions_kernel<kContacts>(block, w, substep, iteration);
+    update_positions_kernel<kContacts, kAccelerated>(block, w, substep, iteration);
   }
 };
 
 namespace step_detail {
 
-template <int Method, bool kContacts, class Launcher>
+template <int Method, bool kContacts, bool kAccelerated, class Launcher>
 void enqueue(Launcher& launcher, const World& w, const Plan& plan) {
   const int64_t particles = w.particles > w.bodies ? w.particles : w.bodies;
   const int64_t jobs = w.slot_capacity < kMatchBlocks ? w.slot_capacity : kMatchBlocks;
@@ -430,17 +482,21 @@ void enqueue(Launcher& launcher, const World& w, const Plan& plan) {
       if (iteration < plan.iterations) {
         launcher.blocks(match_shapes_kernel_object<Method>{}, jobs, kMatchThreads, kMatchShared, w, substep, iteration);
       }
-      launcher.items(update_positions_kernel_object<kContacts>{}, particles, w, substep, iteration);
+      launcher.items(update_positions_kernel_object<kContacts, kAccelerated>{}, particles, w, substep, iteration);
     }
   }
 }
 
 template <int Method, class Launcher>
 void enqueue(Launcher& launcher, const World& w, const Plan& plan) {
-  if (plan.contacts) {
-    enqueue<Method, true>(launcher, w, plan);
+  if (plan.contacts && plan.accelerated) {
+    enqueue<Method, true, true>(launcher, w, plan);
+  } else if (plan.contacts) {
+    enqueue<Method, true, false>(launcher, w, plan);
+  } else if (plan.accelerated) {
+    enqueue<Method, false, true>(launcher, w, plan);
   } else {
-    enqueue<Method, false>(launcher, w, plan);
+    enqueue<Method, false, false>(launcher, w, plan);
   }
 }
 

@@ -11,18 +11,20 @@
 namespace cutproof {
 
 enum class Solver { implicit, published };                             // method.md §3
+enum class Acceleration { none, chebyshev };                           // of the implicit solver, docs/acceleration.md
 enum class Criterion { none, distance, geometric, strain };            // method.md §4; none: nothing is ever removed
 enum class MergeRule { none, deterministic, published, single_pass };  // method.md §6
 enum class ExpandRule { none, edge_cover, published };                 // method.md §7
 
 struct StepParameters {
   Solver solver = Solver::implicit;
-  int32_t substeps = 4;     // per frame, >= 1
-  int32_t iterations = 4;   // K per substep, >= 0
-  double stiffness = 1e5;   // k [1/s²], implicit: s = k dt² / (1 + k dt²)
-  double relaxation = 0.5;  // s in (0, 1], published
-  double damping = 0;       // c [1/s]: v = exp(-c dt) (x - x_prev) / dt
-  Vec3 gravity;             // [m/s²], body frame
+  int32_t substeps = 4;                            // per frame, >= 1
+  int32_t iterations = 4;                          // K per substep, >= 0
+  double stiffness = 1e5;                          // k [1/s²], implicit: s = k dt² / (1 + k dt²)
+  double relaxation = 0.5;                         // s in (0, 1], published
+  Acceleration acceleration = Acceleration::none;  // implicit only
+  double damping = 0;                              // c [1/s]: v = exp(-c dt) (x - x_prev) / dt
+  Vec3 gravity;                                    // [m/s²], body frame
   friend bool operator==(const StepParameters&, const StepParameters&) = default;
 };
 

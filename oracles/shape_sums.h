@@ -80,4 +80,10 @@ inline double goal_rounding(const RoundingScale& scale) {
   return 3.0 * std::sqrt(3.0) * operations * scale.unit_roundoff * scale.extent;
 }
 
+// To what a single error of an iterate can grow in later iterations, at most: the plain iteration never lengthens it;
+// Chebyshev's weights carry it on (docs/acceleration.md, Rounding: 6.3).
+inline double error_growth(const StepParameters& step) {
+  return step.acceleration == Acceleration::chebyshev ? 7.0 : 1.0;
+}
+
 }  // namespace cutproof::oracles

@@ -104,7 +104,7 @@ Verdict momentum(const Setup& setup, const State& before, const State& after) {
   const double step_length = setup.unit_roundoff * std::max(scale.extent, later.extent);
   const double goal = std::sqrt(2.0 * static_cast<double>(scale.largest_cluster) + 16) * masses.clusters +
                       std::sqrt(scale.most_memberships + 16.0) * masses.particles;
-  const double evaluations = step.substeps * (step.iterations + 1.0);
+  const double evaluations = step.substeps * (step.iterations + 1.0) * error_growth(step);
   const double sums = std::sqrt(static_cast<double>(verdict.checked) * evaluations) + 16 * step.substeps;
   verdict.bound =
       kLambda * (evaluations * goal * step_length / dt +

@@ -30,7 +30,8 @@ Verdict refinement(Backend& backend, const Setup& more, const State& state, int6
 Verdict rest_is_fixed(Backend& backend, const Setup& setup, const State& state);
 // A rigid translation is reproduced exactly (no damping, pins, friction).
 Verdict translation_is_exact(Backend& backend, const Setup& setup, const State& state, Vec3 velocity);
-// Implicit: E(x_k) never grows over k = 0 .. iterations in one substep (iterates from runs with k iterations).
+// Implicit: E(x_k) never grows over k = 0 .. iterations in one substep (iterates from runs with k iterations); with an
+// acceleration over the first alone, which is plain.
 Verdict energy_is_monotone(Backend& backend, const Setup& setup, const State& state, int32_t iterations);
 
 // The first substep of `frame` as a scene of its own: one frame of one substep.

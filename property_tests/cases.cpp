@@ -319,6 +319,7 @@ Case draw_moving_case(uint64_t seed, int size) {
   c.iterations = random.between(1, 4);
   c.stiffness = random.between(3, 6);
   c.ground = random.chance(0.5);
+  c.acceleration = random.chance(0.5) ? Acceleration::chebyshev : Acceleration::none;
   return c;
 }
 
@@ -342,6 +343,7 @@ Loaded load(const Case& c) {
   setup.step.substeps = c.moves ? c.substeps : c.together;
   setup.step.iterations = c.moves ? c.iterations : 0;
   setup.step.stiffness = std::pow(10.0, c.stiffness);
+  setup.step.acceleration = c.acceleration;
   setup.detect.criterion = c.moves ? Criterion::distance : Criterion::geometric;
   setup.split.debris = c.debris;
   setup.merge.rule = c.merge;
@@ -460,6 +462,7 @@ std::vector<std::function<void(Case&)>> simplifications(const Case& c) {
 
   towards(c, &Case::moves, false, edits);
   towards(c, &Case::ground, false, edits);
+  towards(c, &Case::acceleration, Acceleration::none, edits);
   towards(c, &Case::together, 1, edits);
   towards(c, &Case::substeps, 1, edits);
   towards(c, &Case::iterations, 1, edits);
@@ -518,13 +521,15 @@ NLOHMANN_JSON_SERIALIZE_ENUM(MergeRule, {{MergeRule::none, "none"},
 NLOHMANN_JSON_SERIALIZE_ENUM(ExpandRule, {{ExpandRule::none, "none"},
                                           {ExpandRule::edge_cover, "edge_cover"},
                                           {ExpandRule::published, "published"}})
+NLOHMANN_JSON_SERIALIZE_ENUM(Acceleration, {{Acceleration::none, "none"}, {Acceleration::chebyshev, "chebyshev"}})
 }  // namespace cutproof
 
 namespace cutproof::property_tests {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Case, nodes, spacing, clusters, side, seed_spacing, ball_radius, most, tau, cap,
                                    seed, merge, expand, expand_depth, debris, blade_length, blade_depth,
-                                   blade_thickness, strokes, together, moves, substeps, iterations, stiffness, ground)
+                                   blade_thickness, strokes, together, moves, substeps, iterations, stiffness,
+                                   acceleration, ground)
 
 std::string to_json(const Case& c) { return nlohmann::json(c).dump(); }
 
@@ -566,7 +571,9 @@ void require_sane(const Case& c) {
 
 Case from_json(const std::string& text) {
   try {
-    const auto document = nlohmann::json::parse(text);
+    auto document = nlohmann::json::parse(text);
+    // Cases that were saved before there was this field.
+    if (document.is_object()) document.emplace("acceleration", Acceleration::none);
     const Case c = document.get<Case>();
     // What nlohmann reads without a word, such as a rule that does not exist, does not come back as it was.
     const nlohmann::json again = c;

@@ -52,9 +52,10 @@ struct Case {
 
   // false: nothing moves, and cuts are geometric. true: the body is soft, and the blade cuts what it stretches apart.
   bool moves = false;
-  int32_t substeps = 2, iterations = 2;  // moves: of a frame, of a substep
-  int32_t stiffness = 5;                 // moves: log10 of k [1/s²]
-  bool ground = false;                   // moves: gravity, and a floor half a spacing below the lowest node
+  int32_t substeps = 2, iterations = 2;            // moves: of a frame, of a substep
+  int32_t stiffness = 5;                           // moves: log10 of k [1/s²]
+  Acceleration acceleration = Acceleration::none;  // moves
+  bool ground = false;                             // moves: gravity, and a floor half a spacing below the lowest node
 
   friend bool operator==(const Case&, const Case&) = default;
 };

@@ -319,6 +319,7 @@ Loaded cut_and_disturbed(Backend& backend, const Case& c) {
   loaded.setup.substep_length = {random.real(0.0005, 0.02)};
   loaded.setup.step.iterations = 3;
   loaded.setup.step.stiffness = std::pow(10, random.real(2, 7));
+  loaded.setup.step.acceleration = random.chance(0.5) ? Acceleration::chebyshev : Acceleration::none;
   return loaded;
 }
 
@@ -475,6 +476,16 @@ TEST(Cases, ComeBackFromJsonAsTheyWere) {
     const Case c = draw_case(seed, static_cast<int>(seed));
     EXPECT_EQ(from_json(to_json(c)), c);
   }
+  // A case that was saved before there were accelerations.
+  const Case plain = draw_case(3, 20);
+  std::string old = to_json(plain);
+  const std::string field = "\"acceleration\":\"none\",";
+  ASSERT_NE(old.find(field), std::string::npos);
+  old.erase(old.find(field), field.size());
+  EXPECT_EQ(from_json(old), plain);
+  std::string unknown = to_json(plain);
+  unknown.replace(unknown.find(field), field.size(), "\"acceleration\":\"anderson\",");
+  EXPECT_THROW(from_json(unknown), std::invalid_argument);
   EXPECT_THROW(from_json("{}"), std::invalid_argument);
   EXPECT_THROW(from_json("not a case"), std::invalid_argument);
 }

@@ -118,4 +118,10 @@ Vec3 Contacts::project_with_friction(Vec3 x, int side, Vec3 start) const {
   return project(result, side);
 }
 
+Vec3 Contacts::next_position(Vec3 free, int side, Vec3 start, Vec3 x) const {
+  const Vec3 next = project_with_friction(free, side, start);
+  const bool worse = dot(next - free, next - free) > dot(x - free, x - free);
+  return takes_turns() && frictionless() && worse ? x : next;
+}
+
 }  // namespace cutproof::reference

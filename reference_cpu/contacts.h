@@ -21,10 +21,17 @@ class Contacts {
   // The same with friction: `start` is where the particle was when the substep began.
   Vec3 project_with_friction(Vec3 x, int side, Vec3 start) const;
 
+  // The same for a solver that comes from x and would go to `free`. Where blade and walls are projected in turn, that
+  // need not give the nearest point; one that is farther from `free` than x is not taken, so that the energy cannot
+  // grow. Elsewhere the projection is exact, and asking would only let rounding decide.
+  Vec3 next_position(Vec3 free, int side, Vec3 start, Vec3 x) const;
+
   bool any() const { return has_blade_ || !setup_.walls.empty(); }
   // Blade and walls are projected in turn, which need not give the nearest point.
   bool takes_turns() const { return has_blade_ && !setup_.walls.empty(); }
   bool frictionless() const { return frictionless_; }
+  // Friction, or room that is not convex: an iteration can have several fixed points.
+  bool path_matters() const { return has_blade_ || !frictionless_; }
 
  private:
   struct Frame {

@@ -1,4 +1,5 @@
 // Stage step (method.md §3): position-based dynamics with shape matching constraints.
+#include <algorithm>
 #include <cmath>
 
 #include "reference_cpu/contacts.h"
@@ -33,6 +34,35 @@ Held held_particles(const Setup& setup, int64_t substep) {
   }
   return held;
 }
+
+// Chebyshev semi-iteration (Golub and Varga 1961; docs/acceleration.md), restarted in every substep: with g_j where the
+// plain iteration goes from x_j,  x_j+1 = x_j + pull (g_j - x_j) + carry (x_j - x_j-1). The first iteration is plain.
+class Chebyshev {
+ public:
+  explicit Chebyshev(double kdt2) {
+    const double greatest = std::min(kdt2 / (1 + kdt2), kGreatestEigenvalue);
+    radius_ = greatest / (2 - greatest);
+    stretch_ = 2 / (2 - greatest);
+  }
+
+  Vec3 combine(Vec3 plain, Vec3 now, Vec3 earlier) const {
+    if (order_ == 0) return plain;
+    const double pull = omega_ * stretch_, carry = omega_ - 1;
+    return now + (pull * (plain - now) + carry * (now - earlier));
+  }
+
+  void next() {
+    ++order_;
+    omega_ = order_ == 1 ? 1 : order_ == 2 ? 2 / (2 - radius_ * radius_) : 4 / (4 - radius_ * radius_ * omega_);
+  }
+
+ private:
+  // End of the interval [0, b] of eigenvalues that the weights are made for. Beyond it, rotations that are far from
+  // their answer would be overshot again and again.
+  static constexpr double kGreatestEigenvalue = 0.95;
+  double radius_, stretch_, omega_ = 1;
+  int64_t order_ = 0;
+};
 
 // t_c = Σ w x / M, A = Σ w (x - t)(X - T)ᵀ, R_c = argmax tr(Rᵀ A).
 std::vector<Pose> match_shapes(const Body& body, const Memberships& memberships, const std::vector<Vec3>& x,
@@ -98,6 +128,8 @@ void substep(const Setup& setup, const Memberships& memberships, int64_t index, 
   // What contacts and grips have displaced, times mass: Σ m (x - where the solver alone would have put it), carried
   // through the iterations as the solver carries positions. Divided by dt it is their impulse.
   Vec3 pushed;
+  const bool accelerated = parameters.acceleration == Acceleration::chebyshev;
+  Chebyshev chebyshev(kdt2);
 
   for (int32_t i = 0; i < n; ++i) {
     if (!state.alive[at(i)]) continue;
@@ -108,30 +140,38 @@ void substep(const Setup& setup, const Memberships& memberships, int64_t index, 
     pushed += body.mass[at(i)] * (state.x[at(i)] - predicted[at(i)]);
   }
 
+  std::vector<Vec3> earlier = state.x;  // one iteration ago
+  Vec3 pushed_earlier = pushed;
   for (int32_t iteration = 0; iteration < parameters.iterations; ++iteration) {
     const std::vector<Pose> poses = match_shapes(body, memberships, state.x, state.clusters);
+    const std::vector<Vec3> now = state.x;
     Vec3 pushed_now;
     for (int32_t i = 0; i < n; ++i) {
       if (!state.alive[at(i)]) continue;
-      const Vec3 x = state.x[at(i)];
+      const Vec3 x = now[at(i)];
       const Vec3 g = goal(body, memberships, state.clusters, poses, i, x);
-      const Vec3 free = implicit ? predicted[at(i)] + s * (g - predicted[at(i)]) : x + s * (g - x);
+      const Vec3 plain = implicit ? predicted[at(i)] + s * (g - predicted[at(i)]) : x + s * (g - x);
+      const Vec3 free = accelerated ? chebyshev.combine(plain, x, earlier[at(i)]) : plain;
       Vec3 next = x;  // a held particle stays where its grip has put it
       if (!held.yes[at(i)]) {
-        next = contacts.project_with_friction(free, side[at(i)], start[at(i)]);
-        // Where blade and walls are projected in turn, that need not give the nearest point. Never accept one that is
-        // worse than the present one, so that the energy cannot grow. Elsewhere the projection is exact, and asking
-        // would only let rounding decide.
-        if (contacts.takes_turns() && contacts.frictionless() &&
-            dot(next - free, next - free) > dot(x - free, x - free)) {
-          next = x;
+        next = contacts.next_position(free, side[at(i)], start[at(i)], x);
+        // Where several answers are right, the way there decides: touched particles go the plain way.
+        if (accelerated && contacts.path_matters()) {
+          const Vec3 allowed = contacts.next_position(plain, side[at(i)], start[at(i)], x);
+          if (!(next == free && allowed == plain)) next = allowed;
         }
       }
       pushed_now += body.mass[at(i)] * (next - free);
       state.x[at(i)] = next;
     }
-    // Both solvers carry Σ m x from one iteration to the next exactly: the implicit one draws it to x~ by 1 - s.
-    pushed = (implicit ? s : 1.0) * pushed + pushed_now;
+    // Both solvers carry Σ m x from one iteration to the next exactly: the implicit one draws it to x~ by 1 - s, and
+    // acceleration combines the sums as it does the positions.
+    Vec3 carried = (implicit ? s : 1.0) * pushed;
+    if (accelerated) carried = chebyshev.combine(carried, pushed, pushed_earlier);
+    pushed_earlier = pushed;
+    pushed = carried + pushed_now;
+    earlier = now;
+    chebyshev.next();
   }
 
   const double decay = std::exp(-parameters.damping * dt);

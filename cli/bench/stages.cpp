@@ -342,7 +342,10 @@ StepFloor step_floor(const Setup& setup, const State& state) {
   const double match = 4 * memberships + 24 * particles + 124 * clusters;
   // update_positions. Member: its slot. Particle: displacement in and out 32, predicted 16, node, share, first holder,
   // death 16; with contacts start 16, pushed in and out 32. Cluster: rest frame 24, rotation 36, centre 12.
-  const double update = 4 * memberships + (64 + (contacts ? 48 : 0)) * particles + 72 * clusters;
+  // Accelerated, the same of one iteration ago: displacement in and out 32, with contacts pushed in and out 32.
+  const bool accelerated = setup.step.acceleration != Acceleration::none;
+  const double earlier = accelerated ? (contacts ? 64 : 32) : 0;
+  const double update = 4 * memberships + (64 + (contacts ? 48 : 0) + earlier) * particles + 72 * clusters;
   // Once a substep. Out: start 16, predicted 16; in: start 16 without contacts; with contacts impulse in and out 32.
   const double substep = (32 + (contacts ? 32 : 16)) * particles;
   // Once a frame, begin_frame and the last velocity. Displacement in and out 32, velocity in and out 32, node and death

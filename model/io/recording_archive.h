@@ -30,6 +30,11 @@ class WritingArchive {
   void choice(const std::string& name, E value, std::span<const std::string_view> names) {
     text(name, std::string(names[static_cast<std::size_t>(value)]));
   }
+  // A choice that files of older programs do not have.
+  template <class E>
+  void later_choice(const std::string& name, E value, std::span<const std::string_view> names) {
+    choice(name, value, names);
+  }
   // An array, as a dataset.
   template <class T>
   void array(const std::string& name, const std::vector<T>& values) {
@@ -77,6 +82,10 @@ class ReadingArchive {
       }
     }
     throw hdf5::Error(path_ + "/" + name, fmt::format("This is \"{}\", which is none of its names.", found));
+  }
+  template <class E>
+  void later_choice(const std::string& name, E& value, std::span<const std::string_view> names) const {
+    if (hdf5::has_attribute(group_, name)) choice(name, value, names);
   }
   template <class T>
   void array(const std::string& name, std::vector<T>& values) const {

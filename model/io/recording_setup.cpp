@@ -14,6 +14,7 @@ namespace cutproof::io {
 namespace {
 
 constexpr std::array<std::string_view, 2> kSolverNames = {"implicit", "published"};
+constexpr std::array<std::string_view, 2> kAccelerationNames = {"none", "chebyshev"};
 constexpr std::array<std::string_view, 4> kCriterionNames = {"none", "distance", "geometric", "strain"};
 constexpr std::array<std::string_view, 4> kMergeRuleNames = {"none", "deterministic", "published", "single_pass"};
 constexpr std::array<std::string_view, 3> kExpandRuleNames = {"none", "edge_cover", "published"};
@@ -145,6 +146,7 @@ void walk(Archive& archive, S& setup) {
     a.value("iterations", setup.step.iterations);
     a.value("stiffness", setup.step.stiffness);
     a.value("relaxation", setup.step.relaxation);
+    a.later_choice("acceleration", setup.step.acceleration, kAccelerationNames);
     a.value("damping", setup.step.damping);
     a.value("gravity", setup.step.gravity);
   });
@@ -276,6 +278,9 @@ Defect parameter_defect(const Setup& setup) {
   };
   for (const auto& [field, value] : finite) {
     if (!std::isfinite(value)) return SetupDefect{field, fmt::format("This is {}, and should be finite.", value)};
+  }
+  if (setup.step.solver == Solver::published && setup.step.acceleration != Acceleration::none) {
+    return SetupDefect{"step/acceleration", "The solver \"published\" has no acceleration."};
   }
   const std::pair<const char*, std::pair<int32_t, int32_t>> least[] = {
       {"step/substeps", {setup.step.substeps, 1}},

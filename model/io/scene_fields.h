@@ -57,6 +57,9 @@ inline constexpr auto words(Cooking) {
 inline constexpr auto words(Solver) {
   return std::array<Words<Solver>, 2>{{{Solver::implicit, "implicit"}, {Solver::published, "published"}}};
 }
+inline constexpr auto words(Acceleration) {
+  return std::array<Words<Acceleration>, 2>{{{Acceleration::none, "none"}, {Acceleration::chebyshev, "chebyshev"}}};
+}
 inline constexpr auto words(Criterion) {
   using enum Criterion;
   return std::array<Words<Criterion>, 4>{
@@ -199,6 +202,10 @@ void describe(Visitor& v, StepParameters& s) {
            .doc = "k, stiffness per mass. `implicit` only: s = k dt² / (1 + k dt²)."},
           s.stiffness);
   v.field({.name = "relaxation", .bounds = above(0, 1), .doc = "s, `published` only."}, s.relaxation);
+  v.field({.name = "acceleration",
+           .doc = "`implicit` only. `chebyshev`: the same answer in fewer iterations, each of which costs a little "
+                  "more; the energy need not fall in every one (docs/acceleration.md)."},
+          s.acceleration);
   v.field({.name = "damping", .unit = "1/s", .bounds = between(0, 1e9), .doc = "c: velocities decay as exp(−c t)."},
           s.damping);
   v.field({.name = "gravity", .unit = "m/s²", .bounds = between(-1e6, 1e6), .doc = "In the body's frame."}, s.gravity);

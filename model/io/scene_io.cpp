@@ -356,6 +356,14 @@ void check(const MeshSpec& s, const Place& at) {
   if (s.file.empty()) at.inner("file").fail("The file's name is empty.", "Name a mesh file.");
 }
 
+void check(const StepParameters& s, const Place& at) {
+  if (s.solver == Solver::published && s.acceleration != Acceleration::none) {
+    at.inner("acceleration")
+        .fail("The solver \"published\" has no converged answer that it could reach sooner.",
+              "Choose \"solver\": \"implicit\", or \"acceleration\": \"none\".");
+  }
+}
+
 void check(const StrokeSpec& s, const Place& at) {
   const Place points = at.inner("points");
   if (s.points.size() < 2) {

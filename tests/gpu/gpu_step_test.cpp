@@ -169,14 +169,23 @@ void add_contacts(Setup& setup, double friction, Random& random) {
   setup.grips = {grip};
 }
 
+struct Iteration {
+  Solver solver;
+  Acceleration acceleration;
+};
+constexpr Iteration kIterations[] = {{Solver::implicit, Acceleration::none},
+                                     {Solver::implicit, Acceleration::chebyshev},
+                                     {Solver::published, Acceleration::none}};
+
 TEST(GpuStep, MeetsTheReferenceWithinItsRounding) {
   Random random(21);
   double worst = 0;
-  for (const Solver solver : {Solver::implicit, Solver::published}) {
+  for (const auto& [solver, acceleration] : kIterations) {
     for (int trial = 0; trial < 32; ++trial) {
       const auto below = [&](int count) { return static_cast<int>(uniform(random, 0, count)); };
       cutproof::Setup setup = setup_of(fixtures::block(3 + below(8), 3 + below(8), 3 + below(8), 0.01));
       setup.step.solver = solver;
+      setup.step.acceleration = acceleration;
       setup.step.substeps = 1 + below(4);
       setup.step.iterations = below(6);
       setup.step.stiffness = std::pow(10, uniform(random, 3, 6));
@@ -226,10 +235,11 @@ TEST(GpuStep, MeetsTheReferenceWithEveryRotationMethodNearRest) {
 }
 
 TEST(GpuStep, LeavesTheRestStateWhereItIsToTheBit) {
-  for (const Solver solver : {Solver::implicit, Solver::published}) {
+  for (const auto& [solver, acceleration] : kIterations) {
     for (const int method : {kJacobi4, kMueller2016, kApd, kNewton}) {
       cutproof::Setup setup = setup_of(fixtures::block(9, 6, 5, 0.01), 0.004, 5);
       setup.step.solver = solver;
+      setup.step.acceleration = acceleration;
       const State state = cooked(setup);
       HostLauncher launcher;
       const State reached = kernel_steps(launcher, {setup}, {state}, 5, method).front();

@@ -49,6 +49,7 @@ inline std::string bits_of(const Setup& s) {
   bits.add(s.body.name).add(s.body.grid.nodes).add(s.body.grid.spacing).add(s.body.node).add(s.body.particle_at);
   bits.add(s.body.mass).add(s.body.origin).add(s.body.orientation);
   bits.add(s.step.solver).add(s.step.substeps).add(s.step.iterations).add(s.step.stiffness).add(s.step.relaxation);
+  bits.add(s.step.acceleration);
   bits.add(s.step.damping).add(s.step.gravity);
   bits.add(s.detect.criterion).add(s.detect.epsilon).add(s.detect.strain).add(s.detect.without_blade);
   bits.add(s.split.debris).add(s.merge.rule).add(s.expand.rule).add(s.expand.depth);
