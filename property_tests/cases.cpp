@@ -307,6 +307,15 @@ Case draw_moving_case(uint64_t seed, int size) {
   return c;
 }
 
+Stroke draw_stroke(uint64_t seed, const Case& c) {
+  Random random(seed);
+  Node dims = {1, 1, 1};
+  for (const Node& node : c.nodes) {
+    for (std::size_t axis = 0; axis < 3; ++axis) dims[axis] = std::max(dims[axis], node[axis] + 1);
+  }
+  return draw_stroke(random, dims);
+}
+
 std::vector<Stroke> resolved_strokes(const Case& c) {
   std::vector<Stroke> strokes = c.strokes;
   for (std::size_t s = 1; s < strokes.size(); ++s) {
@@ -319,9 +328,8 @@ std::vector<Stroke> resolved_strokes(const Case& c) {
   return strokes;
 }
 
-Loaded load(const Case& c) {
-  Loaded loaded;
-  Setup& setup = loaded.setup;
+Setup setup_of(const Case& c) {
+  Setup setup;
   const double h = c.spacing;
   setup.body = fixtures::body_from_nodes(c.nodes, h);
   setup.step.substeps = c.moves ? c.substeps : 1;
@@ -341,7 +349,12 @@ Loaded load(const Case& c) {
     setup.walls = {{2, +1, first_node.z - 0.5 * h, 0.3}};
   }
   for (const Stroke& stroke : resolved_strokes(c)) add_frames(stroke, first_node, c, setup);
+  return setup;
+}
 
+Loaded load(const Case& c) {
+  Loaded loaded = {setup_of(c), {}};
+  const Setup& setup = loaded.setup;
   if (c.clusters == ClusterKind::foreign) {
     loaded.state = fixtures::foreign_state(setup.body, connected_cover(setup.body, c.most, c.seed), c.tau, c.cap);
   } else {

@@ -77,7 +77,8 @@ bool is_promised(const Verdict& verdict, Stage stage, const State& state, bool h
   return true;
 }
 
-// Which stages the contract launches for a body in this state (model/backend.h).
+}  // namespace
+
 bool is_due(const Setup& setup, Stage stage, const State& before) {
   const bool cut = !before.removed.empty();
   switch (stage) {
@@ -108,6 +109,8 @@ Verdict broken_contract(const std::string& what, Stage stage, const State& state
   verdict.bound_source = "model/backend.h";
   return verdict;
 }
+
+namespace {
 
 void run_stage_of_reference(const Setup& setup, Stage stage, State& state) {
   switch (stage) {
@@ -213,7 +216,7 @@ Judgement judge_trail(const Case& c, const Loaded& loaded, const Trail& trail, c
   note_what_is_given(c, loaded, judgement);
   judgement.failure = trail.failure;
 
-  bool has_expanded = c.clusters == ClusterKind::foreign;  // foreign clusters begin anywhere
+  bool has_expanded = trail.has_expanded || c.clusters == ClusterKind::foreign;  // foreign clusters begin anywhere
   const auto take = [&](std::vector<Verdict> verdicts, Stage stage, const State& state) {
     for (Verdict& verdict : verdicts) {
       if (!verdict.holds && !is_promised(verdict, stage, state, has_expanded)) {
