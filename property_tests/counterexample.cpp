@@ -22,14 +22,14 @@ std::string to_json(const Counterexample& counterexample) {
     if (counterexample.schedule[k] != 0) choices.push_back({k, counterexample.schedule[k]});
   }
   nlohmann::json document = {{"format", kFormat},
-                        {"format_version", kVersion},
-                        {"backend", counterexample.backend},
-                        {"split", counterexample.split},
-                        {"schedule", choices},
-                        {"found", counterexample.found},
-                        {"seed", counterexample.seed},
-                        {"index", counterexample.index},
-                        {"case", nlohmann::json::parse(to_json(counterexample.failing))}};
+                             {"format_version", kVersion},
+                             {"backend", counterexample.backend},
+                             {"split", counterexample.split},
+                             {"schedule", choices},
+                             {"found", counterexample.found},
+                             {"seed", counterexample.seed},
+                             {"index", counterexample.index},
+                             {"case", nlohmann::json::parse(to_json(counterexample.failing))}};
   for (const Command& command : counterexample.commands) {
     document["commands"].push_back(nlohmann::json::parse(to_json(command)));
   }

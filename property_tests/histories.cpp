@@ -227,7 +227,9 @@ void History::run_span(Span span, bool whole) {
   require_same(whole ? "a span is the composition of its stages" : "same input, same bits", state_,
                whole_->snapshot().front());
   if (cuts && whole && span.last == Stage::skin) note(HistoryHappened::cut_as_one_span);
-  if (cuts && unloaded_beside_ && span.last == Stage::skin) note(HistoryHappened::went_on_without_a_load);
+  if (!state_.removed.empty() && unloaded_beside_ && span.last == Stage::skin) {
+    note(HistoryHappened::went_on_without_a_load);
+  }
 }
 
 // Each pause takes one frame.
@@ -351,7 +353,8 @@ void History::require_same(const char* property, const State& expected, const St
   const std::string what = difference(expected, found, but_for_rounding);
   if (what.empty()) return;
   Verdict verdict = broken_contract(property, before(next_), expected, staged_->name());
-  verdict.witness.text = what + " differ";
+  verdict.measured = 1;
+  verdict.witness.text = "different: " + what;
   fail(std::move(verdict));
 }
 

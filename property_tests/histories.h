@@ -63,7 +63,7 @@ enum class HistoryHappened {
   loaded_with_debris,      // of the frame in progress
   read_from_files,         // with a skin
   cut_as_one_span,         // detection to the end of the frame, and something was removed
-  went_on_without_a_load,  // an unloaded backend beside a loaded one, through a frame that cuts
+  went_on_without_a_load,  // an unloaded backend beside a loaded one, to the end of a frame that cuts
   kicked_beside_others,
   removal_after_a_kick,
   separation,  // a cut that the history itself asked for
