@@ -82,7 +82,7 @@ std::string difference(const State& a, const State& b, bool but_for_rounding) {
 // --- Commands -----------------------------------------------------------------------------------------------------
 
 Position after(Position at, const Command& command) {
-  if (const Run* run = std::get_if<Run>(&command)) {
+  if (const RunStages* run = std::get_if<RunStages>(&command)) {
     const int32_t index = static_cast<int32_t>(at.next) + run->stages;
     return {at.frame + index / 6, stage_at(index)};
   }
@@ -91,7 +91,7 @@ Position after(Position at, const Command& command) {
 
 namespace {
 
-nlohmann::json json_of(const Run& run) { return {{"run", run.stages}, {"whole", run.whole}}; }
+nlohmann::json json_of(const RunStages& run) { return {{"run", run.stages}, {"whole", run.whole}}; }
 // Strokes are written and read as parts of a case, which knows what is a stroke.
 nlohmann::json json_of(const Cut& cut) {
   Case c;
@@ -104,7 +104,7 @@ nlohmann::json json_of(const SaveAndLoad& load) { return {{"save_and_load", load
 Command command_of(const nlohmann::json& given) {
   Command command;
   if (given.contains("run")) {
-    command = Run{given.at("run").get<int32_t>(), given.at("whole").get<bool>()};
+    command = RunStages{given.at("run").get<int32_t>(), given.at("whole").get<bool>()};
   } else if (given.contains("cut")) {
     auto document = nlohmann::json::parse(to_json(Case{}));
     document["strokes"] = {given.at("cut")};
@@ -135,7 +135,7 @@ std::vector<Command> commands_from_json(const std::string& list) {
     throw std::invalid_argument(std::string("commands: ") + error.what());
   }
   for (const Command& command : commands) {
-    const Run* run = std::get_if<Run>(&command);
+    const RunStages* run = std::get_if<RunStages>(&command);
     const Kick* kick = std::get_if<Kick>(&command);
     if (run && (run->stages < 1 || run->stages > kMost)) throw std::invalid_argument("run must be in [1, 1000]");
     if (kick && (kick->component < 0 || std::any_of(kick->velocity.begin(), kick->velocity.end(),
@@ -162,7 +162,7 @@ void History::execute(const Command& command) {
   std::visit(
       [this](const auto& one) {
         using One = std::decay_t<decltype(one)>;
-        if constexpr (std::is_same_v<One, Run>) run(one);
+        if constexpr (std::is_same_v<One, RunStages>) run(one);
         if constexpr (std::is_same_v<One, Cut>) cut(one);
         if constexpr (std::is_same_v<One, Kick>) kick(one);
         if constexpr (std::is_same_v<One, SaveAndLoad>) save_and_load(one);
@@ -173,7 +173,7 @@ void History::execute(const Command& command) {
   }
 }
 
-void History::run(const Run& command) {
+void History::run(const RunStages& command) {
   for (int32_t left = command.stages; left > 0 && !failure_;) {
     wait_for_frames(1);
     const int32_t first = static_cast<int32_t>(next_), count = std::min(left, 6 - first);

@@ -17,10 +17,10 @@ namespace cutproof::property_tests {
 
 // The next `stages` stages in order, beyond the end of a frame into the next one. Where the timetable is over, the
 // blade stays up for a frame.
-struct Run {
+struct RunStages {
   int32_t stages = 1;
   bool whole = false;  // as one span for each frame, not stage by stage
-  friend bool operator==(const Run&, const Run&) = default;
+  friend bool operator==(const RunStages&, const RunStages&) = default;
 };
 // One more stroke, after those that are still to come.
 struct Cut {
@@ -38,7 +38,7 @@ struct SaveAndLoad {
   bool through_files = false;
   friend bool operator==(const SaveAndLoad&, const SaveAndLoad&) = default;
 };
-using Command = std::variant<Run, Cut, Kick, SaveAndLoad>;
+using Command = std::variant<RunStages, Cut, Kick, SaveAndLoad>;
 
 // One line of JSON, for people and for files. commands_from_json throws std::invalid_argument for anything else.
 std::string to_json(const Command& command);
@@ -109,7 +109,7 @@ class History {
   int64_t verdicts() const { return verdicts_; }
 
  private:
-  void run(const Run& command);
+  void run(const RunStages& command);
   void cut(const Cut& command);
   void kick(const Kick& command);
   void save_and_load(const SaveAndLoad& command);

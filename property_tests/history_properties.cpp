@@ -63,7 +63,7 @@ rc::Gen<CommandPointer> random_commands(const Case& c, Position at) {
   const auto coin = rc::gen::resize(100, rc::gen::arbitrary<bool>());
   const auto runs = rc::gen::apply(
       [=](int32_t stages, bool whole) {
-        return given(Run{stages, whole});
+        return given(RunStages{stages, whole});
       },
       between(1, 9), coin);
   const auto cuts = rc::gen::map(random_strokes(c), [=](const Stroke& stroke) { return given(Cut{stroke}); });
