@@ -26,6 +26,11 @@ template <typename T>
 bool same_bits(const T& a, const T& b) {
   return std::memcmp(&a, &b, sizeof(T)) == 0;
 }
+template <typename T>
+bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
+  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(),
+                                            [](const T& p, const T& q) { return std::memcmp(&p, &q, sizeof(T)) == 0; });
+}
 
 // A folder that goes with everything in it.
 class TemporaryFolder {
@@ -51,14 +56,14 @@ class TemporaryFolder {
 // been rounded to single precision (each once, the impulse in parts: its bound is twice as wide).
 std::string difference(const State& a, const State& b, bool but_for_rounding) {
   const auto near = [&](Vec3 p, Vec3 q) {
-    if (!but_for_rounding) return p == q;
+    if (!but_for_rounding) return same_bits(p, q);
     for (int axis = 0; axis < 3; ++axis) {
       if (!(std::abs(p[axis] - q[axis]) <= 0x1p-23 * std::abs(p[axis]))) return false;
     }
     return true;
   };
   if (a.frame != b.frame) return "the frame";
-  if (a.x != b.x) return "positions";
+  if (!same_bits(a.x, b.x)) return "positions";
   if (!std::equal(a.v.begin(), a.v.end(), b.v.begin(), b.v.end(), near)) return "velocities";
   if (a.alive != b.alive) return "alive particles";
   if (a.removed != b.removed) return "removed particles";
@@ -66,14 +71,14 @@ std::string difference(const State& a, const State& b, bool but_for_rounding) {
   if (a.clusters.offsets != b.clusters.offsets) return "sizes of clusters";
   if (a.clusters.members != b.clusters.members) return "members of clusters";
   if (a.clusters.number != b.clusters.number) return "numbers of clusters";
-  if (a.clusters.rotation != b.clusters.rotation) return "rotations of clusters";
-  if (a.clusters.rest_center != b.clusters.rest_center) return "rest centers of clusters";
-  if (a.clusters.mass != b.clusters.mass) return "masses of clusters";
+  if (!same_bits(a.clusters.rotation, b.clusters.rotation)) return "rotations of clusters";
+  if (!same_bits(a.clusters.rest_center, b.clusters.rest_center)) return "rest centers of clusters";
+  if (!same_bits(a.clusters.mass, b.clusters.mass)) return "masses of clusters";
   if (a.clusters.degenerate != b.clusters.degenerate) return "degenerate rotations";
   if (a.tau != b.tau || a.cap != b.cap) return "tau or cap";
   if (a.edge_covered != b.edge_covered) return "edge_covered";
   if (!near(a.impulse, b.impulse)) return "the impulse";
-  if (!(a.skin == b.skin)) return "the skin";
+  if (!(a.skin == b.skin) || !same_bits(a.skin.position, b.skin.position)) return "the skin";
   return {};
 }
 
@@ -358,12 +363,6 @@ void History::require_same(const char* property, const State& expected, const St
   fail(std::move(verdict));
 }
 
-History history_of(History::Source make, const Case& c, const std::vector<Command>& commands) {
-  History history(std::move(make), c);
-  for (const Command& command : commands) history.execute(command);
-  return history;
-}
-
 void History::fail(Verdict verdict) {
   if (!failure_) failure_ = std::move(verdict);
 }
@@ -375,6 +374,12 @@ void History::note_load() {
   if (!state_.debris.empty()) note(HistoryHappened::loaded_with_debris);
   constexpr auto kBeforeSplit = static_cast<int>(HistoryHappened::loaded_before_split);
   note(static_cast<HistoryHappened>(kBeforeSplit + static_cast<int>(next_) - static_cast<int>(Stage::split)));
+}
+
+History history_of(History::Source make, const Case& c, const std::vector<Command>& commands) {
+  History history(std::move(make), c);
+  for (const Command& command : commands) history.execute(command);
+  return history;
 }
 
 }  // namespace cutproof::property_tests

@@ -87,11 +87,11 @@ inline constexpr std::array<const char*, kHistoryHappenedCount> kHistoryHappened
 
 // Runs a history and judges it. After every stage: all oracles, and the reference's answer to the same state
 // (judge_trail). Beyond these:
-// - Loading changes nothing. In double precision, and in single as long as nothing has moved, a backend that is saved
-//   and loaded has the same bits for the rest of the history as one beside it that is not. In single a displacement
-//   keeps fewer bits beside a rest position in a state than in a kernel (of those below 2⁻⁵³ of the position); there
-//   both are loaded, the state itself comes back with the same bits, and the sum of the impulses up to its rounding.
-// - Spans that run whole give the same bits as their stages, which a second backend runs one by one.
+// - Loading changes nothing: the state comes back with the same bits, in single precision the impulse (a sum over
+//   particles there) up to rounding. In double precision, and in single as long as nothing has moved, a backend that is
+//   saved and loaded also goes on with the same bits as one beside it that is not. A state has positions and kernels
+//   have displacements, of which those below 2⁻²⁹ of a position lose bits in it; so where they move, both are loaded.
+// - Spans that run whole give the same bits as their stages, which another backend runs one by one.
 // - A kick of one component leaves the bits of all others alone, until all stages that see velocities have run.
 // Where a merge rule lets a schedule decide (`published`), equal bits are not asked for.
 class History {

@@ -7,7 +7,6 @@
 #include "property_tests/checking.h"
 #include "property_tests/counterexample.h"
 #include "property_tests/histories.h"
-#include "property_tests/random.h"
 
 namespace cutproof::property_tests {
 namespace {
@@ -55,7 +54,7 @@ rc::Gen<Stroke> random_strokes(const Case& c) {
   };
 }
 
-// Between frames more strokes, within them more loads: what a load may forget there is a state's only copy.
+// Between frames more strokes; within them more loads, for there they have more to forget.
 rc::Gen<CommandPointer> random_commands(const Case& c, Position at) {
   const auto given = [](property_tests::Command command) -> CommandPointer {
     return std::make_shared<GivenCommand>(std::move(command));
