@@ -420,9 +420,16 @@ int replay(const ReplayOptions& options) {
     choice.split = counterexample.split;
   }
   const Case& c = counterexample.failing;
-  fmt::print("{}: {} particles, {} strokes, backend {}\n", file, c.nodes.size(), c.strokes.size(), choice.name);
+  const bool is_history = !counterexample.commands.empty();
+  if (is_history && !options.record.empty()) {
+    refuse("--record", file + " is a history of commands, which no recording holds", "leave it out");
+  }
+  fmt::print("{}: {} particles, {} strokes, {}backend {}\n", file, c.nodes.size(), c.strokes.size(),
+             is_history ? fmt::format("{} commands, ", counterexample.commands.size()) : "", choice.name);
   if (!counterexample.found.empty()) fmt::print("found as: {}\n", counterexample.found);
-  const Judgement judgement = dissect_alone([&] { return backend_of(counterexample, choice); }, c, true);
+  const auto make = [&] { return backend_of(counterexample, choice); };
+  const Judgement judgement =
+      is_history ? history_alone(make, c, counterexample.commands) : dissect_alone(make, c, true);
   if (!options.record.empty()) record_alone(options.record, backend_of(counterexample, choice), c);
   if (judgement.failure) {
     fmt::print("FAILS: {}\n", describe(*judgement.failure));

@@ -60,6 +60,14 @@ CUTPROOF_DEVICE void note_stage_kernel(Block& block, World w, int stage) {
 }
 CUTPROOF_KERNEL(note_stage_kernel);
 
+// Split and merge rename holders in place. Before anything is summed over them again they are brought into the order
+// that a load gives them, so that sums have the same bits however often a state was loaded on the way.
+template <class Block>
+CUTPROOF_DEVICE void sort_holders_kernel(Block& block, World w) {
+  for (int64_t p = block.first(); p < w.particles; p += block.stride()) sort_holders(w, p);
+}
+CUTPROOF_KERNEL(sort_holders_kernel);
+
 // Numbers in the order of slots, and the frame counts up.
 template <class Block>
 CUTPROOF_DEVICE void flag_live_slots_kernel(Block& block, World w) {
@@ -150,12 +158,8 @@ void enqueue_span(Launcher& launcher, const World& w, const Plan& plan, Span spa
   }
   if (span.contains(Stage::skin)) {
     mark(Stage::skin);
-    if (plan.skin) {
-      ran(Stage::skin);
-      launcher.if_nonzero(&w.counters->extracting, [&](Launcher& inner) { enqueue_skin_cells(inner, w, plan); });
-      enqueue_skin_positions(launcher, w, plan);
-    }
     launcher.if_nonzero(&w.counters->cut, [&](Launcher& inner) {
+      inner.items(sort_holders_kernel_object{}, w.particles, w);
       if (w.bodies > 1) {
         inner.blocks(number_slots_by_body_kernel_object{}, w.bodies, 256, 0, w);
         return;
@@ -164,6 +168,11 @@ void enqueue_span(Launcher& launcher, const World& w, const Plan& plan, Span spa
       inner.exclusive_scan(w.slot_scratch, w.slot_scratch + w.slot_capacity, w.slot_capacity, &w.counters->scratch[0]);
       inner.items(number_slots_kernel_object{}, w.slot_capacity, w);
     });
+    if (plan.skin) {
+      ran(Stage::skin);
+      launcher.if_nonzero(&w.counters->extracting, [&](Launcher& inner) { enqueue_skin_cells(inner, w, plan); });
+      enqueue_skin_positions(launcher, w, plan);
+    }
     launcher.items(end_frame_kernel_object{}, w.bodies, w);
   }
 }

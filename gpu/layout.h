@@ -152,8 +152,8 @@ struct World {
   Float4* impulse = nullptr;         // per mass, this frame; Σ m_i impulse_i = State::impulse
   int* share = nullptr;              // n_i: how many clusters hold it
   int* holder_begin = nullptr;       // [particles + 1] holders of p: holders[holder_begin[p] .. holder_begin[p + 1])
-  int* holders = nullptr;            // [member_capacity] slots, -1: none (any more); in no particular but a
-                                     // reproducible order
+  int* holders = nullptr;            // [member_capacity] slots, ascending, -1: none (any more) last; in no
+                                     // particular but a reproducible order from split to the beginning of skin
 
   // Clusters, [slot_capacity] each. Slots are given out in ascending order of number and never reused within a load
   // (the backend compacts them between frames), so the order of slots is the order of numbers.

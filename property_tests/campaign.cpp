@@ -199,17 +199,36 @@ Campaign run_campaign(const CampaignOptions& options, const BackendSource& sourc
   return Runner(options, source, progress).run();
 }
 
-Judgement dissect_alone(const std::function<std::unique_ptr<Backend>()>& make, const Case& c, bool thorough) {
-  const std::unique_ptr<Backend> backend = make();
+namespace {
+
+Judgement alone(const std::string& backend, const std::function<Judgement()>& judged) {
   try {
-    return dissect(*backend, c, thorough);
+    return judged();
   } catch (const MachineError&) {
     throw;
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception& error) {
-    return thrown(backend->name(), error.what());
+    return thrown(backend, error.what());
   }
+}
+
+}  // namespace
+
+Judgement dissect_alone(const std::function<std::unique_ptr<Backend>()>& make, const Case& c, bool thorough) {
+  const std::unique_ptr<Backend> backend = make();
+  return alone(backend->name(), [&] { return dissect(*backend, c, thorough); });
+}
+
+Judgement history_alone(const std::function<std::unique_ptr<Backend>()>& make, const Case& c,
+                        const std::vector<Command>& commands) {
+  return alone(make()->name(), [&] {
+    const History history = history_of(make, c, commands);
+    Judgement judgement;
+    judgement.verdicts = history.verdicts();
+    judgement.failure = history.failure();
+    return judgement;
+  });
 }
 
 }  // namespace cutproof::property_tests

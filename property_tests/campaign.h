@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "property_tests/dissection.h"
+#include "property_tests/histories.h"
 
 namespace cutproof::property_tests {
 
@@ -58,5 +59,8 @@ Campaign run_campaign(const CampaignOptions& options, const BackendSource& sourc
 
 // One case alone; a backend that throws gives a failing verdict.
 Judgement dissect_alone(const std::function<std::unique_ptr<Backend>()>& make, const Case& c, bool thorough);
+// The same of a history. It needs more than one backend, so `make` is called several times.
+Judgement history_alone(const std::function<std::unique_ptr<Backend>()>& make, const Case& c,
+                        const std::vector<Command>& commands);
 
 }  // namespace cutproof::property_tests

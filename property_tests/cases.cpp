@@ -323,6 +323,15 @@ Case draw_moving_case(uint64_t seed, int size) {
   return c;
 }
 
+Stroke draw_stroke(uint64_t seed, const Case& c) {
+  Random random(seed);
+  Node dims = {1, 1, 1};
+  for (const Node& node : c.nodes) {
+    for (std::size_t axis = 0; axis < 3; ++axis) dims[axis] = std::max(dims[axis], node[axis] + 1);
+  }
+  return draw_stroke(random, dims);
+}
+
 std::vector<Stroke> resolved_strokes(const Case& c) {
   std::vector<Stroke> strokes = c.strokes;
   for (std::size_t s = 1; s < strokes.size(); ++s) {
@@ -335,9 +344,8 @@ std::vector<Stroke> resolved_strokes(const Case& c) {
   return strokes;
 }
 
-Loaded load(const Case& c) {
-  Loaded loaded;
-  Setup& setup = loaded.setup;
+Setup setup_of(const Case& c) {
+  Setup setup;
   const double h = c.spacing;
   setup.body = fixtures::body_from_nodes(c.nodes, h);
   setup.step.substeps = c.moves ? c.substeps : c.together;
@@ -358,7 +366,12 @@ Loaded load(const Case& c) {
     setup.walls = {{2, +1, first_node.z - 0.5 * h, 0.3}};
   }
   add_timetable(c, first_node, setup);
+  return setup;
+}
 
+Loaded load(const Case& c) {
+  Loaded loaded = {setup_of(c), {}};
+  const Setup& setup = loaded.setup;
   if (c.clusters == ClusterKind::foreign) {
     loaded.state = fixtures::foreign_state(setup.body, connected_cover(setup.body, c.most, c.seed), c.tau, c.cap);
   } else {
@@ -572,8 +585,11 @@ void require_sane(const Case& c) {
 Case from_json(const std::string& text) {
   try {
     auto document = nlohmann::json::parse(text);
-    // Cases that were saved before there was this field.
-    if (document.is_object()) document.emplace("acceleration", Acceleration::none);
+    // Cases that were saved before there were these fields.
+    if (document.is_object()) {
+      document.emplace("acceleration", Acceleration::none);
+      document.emplace("together", 1);
+    }
     const Case c = document.get<Case>();
     // What nlohmann reads without a word, such as a rule that does not exist, does not come back as it was.
     const nlohmann::json again = c;

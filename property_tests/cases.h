@@ -65,6 +65,8 @@ struct Case {
 Case draw_case(uint64_t seed, int size);
 // The same body, clusters and strokes, and it moves.
 Case draw_moving_case(uint64_t seed, int size);
+// A stroke of the kind that those cases have, for the body of `c`.
+Stroke draw_stroke(uint64_t seed, const Case& c);
 
 // Strokes with links resolved, and what a backend loads. If nothing moves: geometric cuts, one stroke a substep, no
 // iteration.
@@ -74,6 +76,8 @@ struct Loaded {
   State state;
 };
 Loaded load(const Case& c);
+// Its setup alone. A stroke that is appended leaves the frames of those before it as they are.
+Setup setup_of(const Case& c);
 
 // Edits that each make this case simpler (or leave it as it is), the most drastic first: fewer strokes, fewer
 // particles, plainer parameters. Repeated as long as one of them keeps a failure, they end: each moves some part

@@ -21,16 +21,19 @@ std::string to_json(const Counterexample& counterexample) {
   for (std::size_t k = 0; k < counterexample.schedule.size(); ++k) {
     if (counterexample.schedule[k] != 0) choices.push_back({k, counterexample.schedule[k]});
   }
-  return nlohmann::json{{"format", kFormat},
-                        {"format_version", kVersion},
-                        {"backend", counterexample.backend},
-                        {"split", counterexample.split},
-                        {"schedule", choices},
-                        {"found", counterexample.found},
-                        {"seed", counterexample.seed},
-                        {"index", counterexample.index},
-                        {"case", nlohmann::json::parse(to_json(counterexample.failing))}}
-      .dump();
+  nlohmann::json document = {{"format", kFormat},
+                             {"format_version", kVersion},
+                             {"backend", counterexample.backend},
+                             {"split", counterexample.split},
+                             {"schedule", choices},
+                             {"found", counterexample.found},
+                             {"seed", counterexample.seed},
+                             {"index", counterexample.index},
+                             {"case", nlohmann::json::parse(to_json(counterexample.failing))}};
+  for (const Command& command : counterexample.commands) {
+    document["commands"].push_back(nlohmann::json::parse(to_json(command)));
+  }
+  return document.dump();
 }
 
 Counterexample counterexample_from_json(const std::string& text, const std::string& file) {
@@ -73,6 +76,8 @@ Counterexample counterexample_from_json(const std::string& text, const std::stri
     }
     field = "case";
     result.failing = from_json(document.at("case").dump());
+    field = "commands";
+    if (document.contains("commands")) result.commands = commands_from_json(document.at("commands").dump());
     return result;
   } catch (const nlohmann::json::exception& error) {
     throw refuse(field, error.what());

@@ -3,15 +3,18 @@
 #pragma once
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "gpu/schedule.h"
 #include "property_tests/cases.h"
+#include "property_tests/histories.h"
 
 namespace cutproof::property_tests {
 
 struct Counterexample {
   Case failing;
-  std::string backend;  // on which it was found, and how its clusters were split; empty: nothing is known
+  std::vector<Command> commands;  // a history of that case; empty: it is dissected from beginning to end
+  std::string backend;            // on which it was found, and how its clusters were split; empty: nothing is known
   std::string split;
   gpu::Schedule schedule;  // `simulated`: the choices that make it fail; empty: none were recorded
   std::string found;       // what was wrong, for a person

@@ -79,7 +79,8 @@ bool is_promised(const Verdict& verdict, Stage stage, const State& state, bool h
   return true;
 }
 
-// Which stages the contract launches for a body in this state (model/backend.h).
+}  // namespace
+
 bool is_due(const Setup& setup, Stage stage, const State& before) {
   const bool cut = !before.removed.empty();
   switch (stage) {
@@ -110,6 +111,8 @@ Verdict broken_contract(const std::string& what, Stage stage, const State& state
   verdict.bound_source = "model/backend.h";
   return verdict;
 }
+
+namespace {
 
 // Which stages' topology has to be the reference's. Detection may differ within its rounding band, which is the
 // detection oracle's to judge; other rules of merging leave open who merges with whom.
@@ -223,7 +226,7 @@ Judgement judge_trail(const Case& c, const Loaded& loaded, const Trail& trail, c
   note_what_is_given(c, loaded, judgement);
   judgement.failure = trail.failure;
 
-  bool has_expanded = c.clusters == ClusterKind::foreign;  // foreign clusters begin anywhere
+  bool has_expanded = trail.has_expanded || c.clusters == ClusterKind::foreign;  // foreign clusters begin anywhere
   const auto take = [&](std::vector<Verdict> verdicts, Stage stage, const State& state) {
     for (Verdict& verdict : verdicts) {
       if (!verdict.holds && !is_promised(verdict, stage, state, has_expanded)) {

@@ -83,6 +83,7 @@ struct Trail {
     State state;
   };
   std::vector<Step> steps;
+  bool has_expanded = false;       // before `initial`: an expansion has changed clusters
   std::optional<Verdict> failure;  // of the contract, seen while running
 };
 
@@ -97,6 +98,11 @@ Judgement judge_trail(const Case& c, const Loaded& loaded, const Trail& trail, c
 
 // Both, for one case alone.
 Judgement dissect(Backend& backend, const Case& c, bool thorough);
+
+// Which stages the contract launches for a body in this state (model/backend.h).
+bool is_due(const Setup& setup, Stage stage, const State& before);
+// A failing verdict: something that model/backend.h promises does not hold.
+Verdict broken_contract(const std::string& what, Stage stage, const State& state, const std::string& backend);
 
 // One line for a person.
 std::string describe(const Verdict& verdict);

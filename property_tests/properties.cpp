@@ -1,13 +1,7 @@
 // Properties of every backend over random dissections (oracles_and_tests.md §2).
-//
-// Environment: CUTPROOF_CASES, how many cases of the first property (default 2000; the others take shares of it);
-// CUTPROOF_SEED, what they are drawn from (default 1); RC_PARAMS, anything that rapidcheck takes, such as the
-// reproduce=… that a failure prints; CUTPROOF_REGRESSIONS, the folder of saved counterexamples.
 #include <gtest/gtest.h>
-#include <rapidcheck.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -18,64 +12,14 @@
 #include "fixtures/cook.h"
 #include "gpu/backends.h"
 #include "oracles/two_runs.h"
+#include "property_tests/checking.h"
 #include "property_tests/counterexample.h"
 #include "property_tests/dissection.h"
 #include "property_tests/random.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::property_tests {
-
-void showValue(const Case& c, std::ostream& os) { os << to_json(c); }
-
 namespace {
-
-// --- Settings -----------------------------------------------------------------------------------------------------
-
-// Throws std::invalid_argument (or out_of_range) unless the variable is a number.
-int64_t number_from_environment(const char* name, int64_t otherwise) {
-  const char* text = std::getenv(name);
-  return text == nullptr ? otherwise : std::stoll(text);
-}
-
-int64_t wanted_cases() { return number_from_environment("CUTPROOF_CASES", 2000); }
-uint64_t wanted_seed() { return static_cast<uint64_t>(number_from_environment("CUTPROOF_SEED", 1)); }
-
-// RC_PARAMS as it was given.
-std::string g_rapidcheck_parameters;
-
-struct NamedBackend {
-  std::string name;
-  std::function<std::unique_ptr<Backend>()> make;
-  int64_t fraction = 1;  // one in so many of the wanted cases: what a schedule costs buys fewer of them
-  int most_size = 100;   // of a case: every access of a simulated schedule is a decision
-};
-void PrintTo(const NamedBackend& backend, std::ostream* os) { *os << backend.name; }
-
-// Every backend that this build has: each property runs over each of them, under its name.
-std::vector<NamedBackend> all_backends() {
-  const auto with = [](gpu::SplitMethod split) {
-    gpu::KernelOptions options;
-    options.split = split;
-    return options;
-  };
-  std::vector<NamedBackend> backends = {
-      {"reference", reference::make_backend},
-      {"host", [=] { return gpu::make_host_backend(2, with(gpu::SplitMethod::blocks)); }},
-      {"host_global_labels", [=] { return gpu::make_host_backend(1, with(gpu::SplitMethod::global_labels)); }, 4},
-      {"simulated_random", [] { return gpu::make_simulated_backend({gpu::random_walk(wanted_seed())}); }, 2, 35},
-      {"simulated_pct", [] { return gpu::make_simulated_backend({gpu::pct(wanted_seed(), 3, 1'000'000)}); }, 2, 35},
-      {"simulated_reverse",
-       [=] { return gpu::make_simulated_backend({gpu::reverse()}, with(gpu::SplitMethod::global_labels)); }, 2, 35}};
-#if CUTPROOF_HAS_CUDA
-  std::string why;
-  if (!gpu::device_description(why).empty()) {
-    backends.push_back({"gpu", [=] { return gpu::make_gpu_backend(with(gpu::SplitMethod::blocks)); }});
-    backends.push_back(
-        {"gpu_global_labels", [=] { return gpu::make_gpu_backend(with(gpu::SplitMethod::global_labels)); }, 4});
-  }
-#endif
-  return backends;
-}
 
 // What a backend loads, and what its arithmetic allows.
 Loaded load_for(const Backend& backend, const Case& c) {
@@ -84,125 +28,12 @@ Loaded load_for(const Backend& backend, const Case& c) {
   return loaded;
 }
 
-// --- Cases for rapidcheck -----------------------------------------------------------------------------------------
-
-// Shrinking has no bound of its own: after the first failure it may take this long.
-constexpr std::chrono::seconds kShrinkingTime{60};
-
-struct Deadline {
-  std::optional<std::chrono::steady_clock::time_point> at;
-  void start() {
-    if (!at) at = std::chrono::steady_clock::now() + kShrinkingTime;
-  }
-  bool is_over() const { return at && std::chrono::steady_clock::now() > *at; }
-};
-
-// The sequence of simpler cases.
-class SimplerCases {
- public:
-  SimplerCases(Case c, std::shared_ptr<const Deadline> deadline)
-      : case_(std::move(c)),
-        edits_(std::make_shared<const std::vector<std::function<void(Case&)>>>(simplifications(case_))),
-        deadline_(std::move(deadline)) {}
-  rc::Maybe<Case> operator()() {
-    while (next_ < edits_->size() && !deadline_->is_over()) {
-      Case simpler = case_;
-      (*edits_)[next_++](simpler);
-      if (!(simpler == case_)) return simpler;
-    }
-    return rc::Nothing;
-  }
-
- private:
-  Case case_;
-  std::shared_ptr<const std::vector<std::function<void(Case&)>>> edits_;
-  std::shared_ptr<const Deadline> deadline_;
-  std::size_t next_ = 0;
-};
-
-rc::Gen<Case> random_cases(std::shared_ptr<const Deadline> deadline) {
-  return [deadline](const rc::Random& random, int size) {
-    rc::Random source(random);
-    return rc::shrinkable::shrinkRecur(draw_case(source.next(), size), [deadline](Case c) {
-      return rc::makeSeq<SimplerCases>(std::move(c), deadline);
-    });
-  };
-}
-
-// --- Checking -----------------------------------------------------------------------------------------------------
-
-// Empty: the property holds. Otherwise what is wrong, for a person.
-using Property = std::function<std::string(const Case&)>;
-
-// Checks `cases` random cases; on a failure prints the simplest case found, and the line that replays it.
-void check(const std::string& id, int64_t cases, int most_size, const Property& property) {
-  namespace detail = rc::detail;
-  detail::TestMetadata metadata;
-  metadata.id = metadata.description = id;
-  detail::TestParams params = detail::configuration().testParams;
-  if (g_rapidcheck_parameters.find("max_success") == std::string::npos) params.maxSuccess = static_cast<int>(cases);
-  params.maxSize = std::min(params.maxSize, most_size);
-  std::cout << id << ": seed " << params.seed << ", " << params.maxSuccess << " cases" << std::endl;
-
-  const auto deadline = std::make_shared<Deadline>();
-  const auto cases_of = random_cases(deadline);
-  std::string simplest;
-  const auto testable = [&] {
-    const Case c = *cases_of;
-    std::string problem;
-    try {
-      problem = property(c);
-    } catch (const std::exception& error) {
-      problem = std::string("throws: ") + error.what();
-    }
-    if (problem.empty()) return;
-    deadline->start();
-    simplest = to_json(c);
-    RC_FAIL(problem);
-  };
-  const detail::TestResult result = detail::checkTestable(testable, metadata, params);
-  if (result.is<detail::SuccessResult>()) return;
-
-  std::ostringstream message;
-  detail::printResultMessage(result, message);
-  if (result.is<detail::FailureResult>()) {
-    detail::Configuration replay;
-    replay.reproduce[id] = result.get<detail::FailureResult>().reproduce;
-    std::istringstream parameters(detail::configToMinimalString(replay));
-    std::string reproduce;  // the seed that follows it plays no part
-    while (parameters >> reproduce && reproduce.rfind("reproduce=", 0) != 0) {
-    }
-    message << "\nReplay: RC_PARAMS=\"" << reproduce << "\" property_tests --gtest_filter='" << id << "'"
-            << "\nTo keep it, save this line as fixtures/regressions/NAME.json (replayed first on every run):\n"
-            << simplest << "\n";
-  }
-  ADD_FAILURE() << message.str();
-}
-
-// Whether all cases ran as planned, so that empty classes mean something.
-bool ran_in_full() {
-  return g_rapidcheck_parameters.empty() && wanted_cases() >= 2000 && !::testing::Test::HasFailure();
-}
-
 // Claims by compare-and-swap are legal under every schedule and not the same under each, so what is asked of bits is
 // asked of the rule that promises them.
 Case without_claims(Case c) {
   if (c.merge != MergeRule::none) c.merge = MergeRule::deterministic;
   return c;
 }
-
-class EveryBackend : public ::testing::TestWithParam<NamedBackend> {
- protected:
-  std::string id() const {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    return std::string(test->test_suite_name()) + "." + test->name();
-  }
-  int64_t cases_of(int64_t fraction) const {
-    return std::max<int64_t>(wanted_cases() / (fraction * GetParam().fraction), 5);
-  }
-  // Whether every class of cases must have occurred.
-  bool ran_in_full() const { return property_tests::ran_in_full() && GetParam().fraction == 1; }
-};
 
 std::string text_of(const Verdict& verdict) { return verdict.holds ? "" : describe(verdict); }
 
@@ -226,8 +57,10 @@ std::vector<std::pair<std::string, Counterexample>> saved_counterexamples() {
 TEST_P(EveryBackend, AgreesWithEveryOracleOnSavedCounterexamples) {
   const auto saved = saved_counterexamples();
   for (const auto& [file, counterexample] : saved) {
-    const auto judgement = dissect(*GetParam().make(), counterexample.failing, true);
-    if (judgement.failure) ADD_FAILURE() << file << ": " << describe(*judgement.failure);
+    const auto failure = counterexample.commands.empty()
+                             ? dissect(*GetParam().make(), counterexample.failing, true).failure
+                             : history_of(GetParam().make, counterexample.failing, counterexample.commands).failure();
+    if (failure) ADD_FAILURE() << file << ": " << describe(*failure);
   }
   std::cout << saved.size() << " saved counterexamples replayed" << std::endl;
 }
@@ -410,9 +243,6 @@ TEST_P(EveryBackend, DissectsBodiesOfSizesAroundThoseOfBlocks) {
   EXPECT_GT(verdicts, 100);
 }
 
-INSTANTIATE_TEST_SUITE_P(Over, EveryBackend, ::testing::ValuesIn(all_backends()),
-                         [](const auto& tested) { return tested.param.name; });
-
 // --- Bodies too large for simulated schedules -----------------------------------------------------------------------
 
 class LargeBodies : public ::testing::TestWithParam<NamedBackend> {};
@@ -512,10 +342,7 @@ TEST(Cases, ShrinkToTheFewestParticlesAndStrokesThatAPlantedFaultNeeds) {
 }  // namespace cutproof::property_tests
 
 int main(int argc, char** argv) {
-  using namespace cutproof::property_tests;
   ::testing::InitGoogleTest(&argc, argv);
-  if (const char* given = std::getenv("RC_PARAMS")) g_rapidcheck_parameters = given;
-  // Without a seed rapidcheck takes one from the clock.
-  if (g_rapidcheck_parameters.empty()) setenv("RC_PARAMS", ("seed=" + std::to_string(wanted_seed())).c_str(), 1);
+  cutproof::property_tests::set_up_rapidcheck();
   return RUN_ALL_TESTS();
 }

@@ -15,13 +15,16 @@ class Fuzz : public Program {
  protected:
   json result(const std::string& name) const { return json::parse(read(name)); }
   // A body of six particles that one stroke parts.
-  void write_counterexample(const std::string& name, const std::string& backend) const {
+  void write_counterexample(const std::string& name, const std::string& backend,
+                            const json& commands = json()) const {
     Counterexample counterexample;
     for (int32_t i = 0; i < 6; ++i) counterexample.failing.nodes.push_back({i, 0, 0});
     counterexample.failing.strokes = {{{10, -4, -4}, {10, -4, 4}, 2, true, Link::apart}};
     counterexample.backend = backend;
     counterexample.found = "something of long ago";
-    write(name, to_json(counterexample));
+    json document = json::parse(to_json(counterexample));
+    if (!commands.is_null()) document["commands"] = commands;
+    write(name, document.dump());
   }
 };
 
@@ -102,6 +105,16 @@ TEST_F(Fuzz, ReplaysWhereItWasFoundOrElsewhereAndRecords) {
   ASSERT_EQ(cutproof("replay case.json --record r").status, 0);
   const Outcome checked = cutproof("check r");
   EXPECT_EQ(checked.status, 0) << checked.output;
+
+  json history = json::parse(R"([{"run": 2, "whole": false}, {"save_and_load": "files"}, {"run": 10, "whole": true}])");
+  write_counterexample("history.json", "host", history);
+  const Outcome relived = cutproof("replay history.json");
+  EXPECT_EQ(relived.status, 0) << relived.output;
+  EXPECT_NE(relived.output.find("3 commands"), std::string::npos) << relived.output;
+  expect_refused("replay history.json --record r", {"history.json", "--record"});
+  history[0]["run"] = 0;
+  write_counterexample("bad_history.json", "host", history);
+  expect_refused("replay bad_history.json", {"bad_history.json", "commands", "run"});
 
   expect_refused("replay none.json", {"none.json"});
   write("bad.json", "{\"format\": \"cutproof.counterexample\"}");

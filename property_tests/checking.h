@@ -1,0 +1,80 @@
+// What the property tests share: over which backends they run, what rapidcheck draws, and how a failure is told.
+//
+// Environment: CUTPROOF_CASES, how many cases of the first property (default 2000; the others take shares of it);
+// CUTPROOF_SEED, what they are drawn from (default 1); RC_PARAMS, anything that rapidcheck takes, such as the
+// reproduce=… that a failure prints; CUTPROOF_REGRESSIONS, the folder of saved counterexamples.
+#pragma once
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "model/backend.h"
+#include "property_tests/cases.h"
+
+namespace cutproof::property_tests {
+
+void showValue(const Case& c, std::ostream& os);
+
+// To be called before any property is checked.
+void set_up_rapidcheck();
+
+// Both throw std::invalid_argument (or out_of_range) unless the variable is a number.
+int64_t wanted_cases();
+uint64_t wanted_seed();
+
+struct NamedBackend {
+  std::string name;
+  std::function<std::unique_ptr<Backend>()> make;
+  int64_t fraction = 1;  // one in so many of the wanted cases: what a schedule costs buys fewer of them
+  int most_size = 100;   // of a case: every access of a simulated schedule is a decision
+};
+void PrintTo(const NamedBackend& backend, std::ostream* os);
+
+// Every backend that this build has: each property runs over each of them, under its name.
+std::vector<NamedBackend> all_backends();
+
+class EveryBackend : public ::testing::TestWithParam<NamedBackend> {
+ protected:
+  std::string id() const;
+  int64_t cases_of(int64_t fraction) const;
+  // Whether all cases ran as planned and every class of cases must have occurred.
+  bool ran_in_full() const;
+};
+
+// Shrinking has no bound of its own: after the first failure it may take a minute.
+struct Deadline {
+  std::optional<std::chrono::steady_clock::time_point> at;
+  void start();
+  bool is_over() const { return at && std::chrono::steady_clock::now() > *at; }
+};
+
+// What `draw` makes of a seed and a size; it shrinks by simplifications(), until the deadline is over.
+using Draw = Case (*)(uint64_t seed, int size);
+rc::Gen<Case> random_cases(std::shared_ptr<const Deadline> deadline, Draw draw = draw_case);
+
+// What was drawn, as the line that a counterexample is saved as, and what is wrong with it, for a person; empty: the
+// property holds.
+struct Example {
+  std::string line, problem;
+};
+// Draws (by the operator * of a Gen, from the calling thread) and judges.
+using Attempt = std::function<Example()>;
+
+// Makes `attempts` of them; on a failure prints the simplest example found, and the line that replays it.
+void check(const std::string& id, int64_t attempts, int most_size, Deadline& deadline, const Attempt& attempt);
+
+// Empty: the property holds. Otherwise what is wrong, for a person. What it throws is wrong, too.
+using Property = std::function<std::string(const Case&)>;
+
+// The same over random cases.
+void check(const std::string& id, int64_t cases, int most_size, const Property& property);
+
+}  // namespace cutproof::property_tests

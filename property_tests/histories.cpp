@@ -1,0 +1,385 @@
+#include "property_tests/histories.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "model/error.h"
+#include "model/io/recording.h"
+#include "oracles/oracles.h"
+
+namespace cutproof::property_tests {
+namespace {
+
+constexpr double kDouble = 0x1p-53;
+
+Stage stage_at(int32_t index) { return kStages[static_cast<std::size_t>(index % 6)]; }
+
+// The last stage that ran, as recordings name it.
+Stage before(Stage next) { return stage_at(static_cast<int32_t>(next) + 5); }
+
+template <typename T>
+bool same_bits(const T& a, const T& b) {
+  return std::memcmp(&a, &b, sizeof(T)) == 0;
+}
+template <typename T>
+bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
+  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(),
+                                            [](const T& p, const T& q) { return std::memcmp(&p, &q, sizeof(T)) == 0; });
+}
+
+// A folder that goes with everything in it.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "cutproof_history_XXXXXX").string();
+    if (mkdtemp(pattern.data()) == nullptr) throw MachineError(pattern + ": The folder cannot be made.");
+    path_ = pattern;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  std::string file(const char* name) const { return (path_ / name).string(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
+// The first thing in which two states differ, empty if in none. but_for_rounding: velocities and the impulse may have
+// been rounded to single precision (each once, the impulse in parts: its bound is twice as wide).
+std::string difference(const State& a, const State& b, bool but_for_rounding) {
+  const auto near = [&](Vec3 p, Vec3 q) {
+    if (!but_for_rounding) return same_bits(p, q);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(std::abs(p[axis] - q[axis]) <= 0x1p-23 * std::abs(p[axis]))) return false;
+    }
+    return true;
+  };
+  if (a.frame != b.frame) return "the frame";
+  if (!same_bits(a.x, b.x)) return "positions";
+  if (!std::equal(a.v.begin(), a.v.end(), b.v.begin(), b.v.end(), near)) return "velocities";
+  if (a.alive != b.alive) return "alive particles";
+  if (a.removed != b.removed) return "removed particles";
+  if (a.debris != b.debris) return "debris";
+  if (a.clusters.offsets != b.clusters.offsets) return "sizes of clusters";
+  if (a.clusters.members != b.clusters.members) return "members of clusters";
+  if (a.clusters.number != b.clusters.number) return "numbers of clusters";
+  if (!same_bits(a.clusters.rotation, b.clusters.rotation)) return "rotations of clusters";
+  if (!same_bits(a.clusters.rest_center, b.clusters.rest_center)) return "rest centers of clusters";
+  if (!same_bits(a.clusters.mass, b.clusters.mass)) return "masses of clusters";
+  if (a.clusters.degenerate != b.clusters.degenerate) return "degenerate rotations";
+  if (a.tau != b.tau || a.cap != b.cap) return "tau or cap";
+  if (a.edge_covered != b.edge_covered) return "edge_covered";
+  if (!near(a.impulse, b.impulse)) return "the impulse";
+  if (!(a.skin == b.skin) || !same_bits(a.skin.position, b.skin.position)) return "the skin";
+  return {};
+}
+
+}  // namespace
+
+// --- Commands -----------------------------------------------------------------------------------------------------
+
+Position after(Position at, const Command& command) {
+  if (const RunStages* run = std::get_if<RunStages>(&command)) {
+    const int32_t index = static_cast<int32_t>(at.next) + run->stages;
+    return {at.frame + index / 6, stage_at(index)};
+  }
+  return at;
+}
+
+namespace {
+
+nlohmann::json json_of(const RunStages& run) { return {{"run", run.stages}, {"whole", run.whole}}; }
+// Strokes are written and read as parts of a case, which knows what is a stroke.
+nlohmann::json json_of(const Cut& cut) {
+  Case c;
+  c.strokes = {cut.stroke};
+  return {{"cut", nlohmann::json::parse(to_json(c)).at("strokes").at(0)}};
+}
+nlohmann::json json_of(const Kick& kick) { return {{"kick", kick.component}, {"velocity", kick.velocity}}; }
+nlohmann::json json_of(const SaveAndLoad& load) { return {{"save_and_load", load.through_files ? "files" : "memory"}}; }
+
+Command command_of(const nlohmann::json& given) {
+  Command command;
+  if (given.contains("run")) {
+    command = RunStages{given.at("run").get<int32_t>(), given.at("whole").get<bool>()};
+  } else if (given.contains("cut")) {
+    auto document = nlohmann::json::parse(to_json(Case{}));
+    document["strokes"] = {given.at("cut")};
+    command = Cut{from_json(document.dump()).strokes.at(0)};
+  } else if (given.contains("kick")) {
+    command = Kick{given.at("kick").get<int32_t>(), given.at("velocity").get<Quarters>()};
+  } else {
+    command = SaveAndLoad{given.at("save_and_load").get<std::string>() == "files"};
+  }
+  if (nlohmann::json::parse(to_json(command)) != given) {
+    throw std::invalid_argument("commands: " + given.dump().substr(0, 60) + " is not known");
+  }
+  return command;
+}
+
+}  // namespace
+
+std::string to_json(const Command& command) {
+  return std::visit([](const auto& one) { return json_of(one).dump(); }, command);
+}
+
+std::vector<Command> commands_from_json(const std::string& list) {
+  constexpr int32_t kMost = 1000;  // stages of a run, quarters of a velocity; no generator asks for more
+  std::vector<Command> commands;
+  try {
+    for (const auto& given : nlohmann::json::parse(list)) commands.push_back(command_of(given));
+  } catch (const nlohmann::json::exception& error) {
+    throw std::invalid_argument(std::string("commands: ") + error.what());
+  }
+  for (const Command& command : commands) {
+    const RunStages* run = std::get_if<RunStages>(&command);
+    const Kick* kick = std::get_if<Kick>(&command);
+    if (run && (run->stages < 1 || run->stages > kMost)) throw std::invalid_argument("run must be in [1, 1000]");
+    if (kick && (kick->component < 0 || std::any_of(kick->velocity.begin(), kick->velocity.end(),
+                                                    [](int32_t q) { return std::abs(q) > kMost; }))) {
+      throw std::invalid_argument("kick must be >= 0, and velocity within 1000 quarters");
+    }
+  }
+  return commands;
+}
+
+// --- History ------------------------------------------------------------------------------------------------------
+
+History::History(Source make, Case c)
+    : make_(std::move(make)), case_(std::move(c)), loaded_(load(case_)), staged_(make_()), state_(loaded_.state) {
+  if (case_.merge != MergeRule::published && case_.merge != MergeRule::single_pass) whole_ = make_();
+  given_strokes_ = static_cast<int32_t>(loaded_.setup.stroke_end.size());
+  loaded_.setup.unit_roundoff = staged_->unit_roundoff();
+  load_both(true);
+}
+
+void History::execute(const Command& command) {
+  if (failure_) return;
+  const Position expected = after(position(), command);
+  std::visit(
+      [this](const auto& one) {
+        using One = std::decay_t<decltype(one)>;
+        if constexpr (std::is_same_v<One, RunStages>) run(one);
+        if constexpr (std::is_same_v<One, Cut>) cut(one);
+        if constexpr (std::is_same_v<One, Kick>) kick(one);
+        if constexpr (std::is_same_v<One, SaveAndLoad>) save_and_load(one);
+      },
+      command);
+  if (!failure_ && !(position() == expected)) {
+    fail(broken_contract("a frame ends with skin and nowhere else", next_, state_, staged_->name()));
+  }
+}
+
+void History::run(const RunStages& command) {
+  for (int32_t left = command.stages; left > 0 && !failure_;) {
+    wait_for_frames(1);
+    const int32_t first = static_cast<int32_t>(next_), count = std::min(left, 6 - first);
+    run_span({next_, stage_at(first + count - 1)}, command.whole);
+    left -= count;
+  }
+}
+
+void History::run_span(Span span, bool whole) {
+  const std::string name = staged_->name();
+  const State start = state_;
+  Trail trail;
+  trail.initial = start;
+  trail.has_expanded = has_expanded_;
+  std::array<bool, 6> ran = {};
+  for (const Stage stage : kStages) {
+    if (!span.contains(stage)) continue;
+    const auto s = static_cast<std::size_t>(stage);
+    const bool due = is_due(loaded_.setup, stage, state_);
+    staged_->run({stage, stage});
+    ran[s] = staged_->report().ran[s];
+    State next = staged_->snapshot().front();
+    if (ran[s] != due && !trail.failure) {
+      trail.failure = broken_contract(due ? "a stage that is due runs" : "only what is due runs", stage, next, name);
+    }
+    if (stage == Stage::expand && next.clusters.members != state_.clusters.members) has_expanded_ = true;
+    state_ = next;
+    trail.steps.push_back({stage, std::move(next)});
+  }
+  next_ = stage_at(static_cast<int32_t>(span.last) + 1);
+
+  Judgement judgement = judge_trail(case_, loaded_, trail, name, false);
+  verdicts_ += judgement.verdicts;
+  if (judgement.failure) return fail(std::move(*judgement.failure));
+
+  const bool cuts = judgement[Happened::removal];
+  if (cuts && has_kicked_) note(HistoryHappened::removal_after_a_kick);
+  if (judgement[Happened::separation]) {
+    const auto move = static_cast<std::size_t>(start.frame * loaded_.setup.step.substeps);
+    if (loaded_.setup.blade_moves[move].stroke >= given_strokes_) note(HistoryHappened::separation);
+  }
+  if (!whole_) return;
+  if (whole) {
+    whole_->run(span);
+    if (whole_->report().ran != ran) {
+      return fail(broken_contract("a whole span runs the stages that are due", span.last, state_, name));
+    }
+  } else {
+    for (const auto& step : trail.steps) whole_->run({step.stage, step.stage});
+  }
+  require_same(whole ? "a span is the composition of its stages" : "same input, same bits", state_,
+               whole_->snapshot().front());
+  if (cuts && whole && span.last == Stage::skin) note(HistoryHappened::cut_as_one_span);
+  if (!state_.removed.empty() && unloaded_beside_ && span.last == Stage::skin) {
+    note(HistoryHappened::went_on_without_a_load);
+  }
+}
+
+// Each pause takes one frame.
+void History::wait_for_frames(int64_t count) {
+  const int64_t missing = count - (loaded_.setup.frame_count() - state_.frame);
+  if (missing <= 0) return;
+  Stroke pause;
+  pause.down = false;
+  if (!case_.strokes.empty()) pause.from = pause.to = resolved_strokes(case_).back().to;
+  case_.strokes.insert(case_.strokes.end(), static_cast<std::size_t>(missing), pause);
+  change_timetable();
+}
+
+void History::cut(const Cut& command) {
+  case_.strokes.push_back(command.stroke);
+  change_timetable();
+}
+
+void History::change_timetable() {
+  loaded_.setup = setup_of(case_);
+  loaded_.setup.unit_roundoff = staged_->unit_roundoff();
+  load_both();
+}
+
+void History::kick(const Kick& command) {
+  wait_for_frames(2);  // to see in the next one what came of it
+  const Setup& setup = loaded_.setup;
+  const oracles::Partition components = oracles::graph_components(setup, state_);
+  if (components.count == 0 || failure_) return;
+  const int32_t component = command.component % components.count;
+  const double quarter = case_.spacing / 4, dt = setup.substep_length[static_cast<std::size_t>(state_.frame)];
+  State kicked = state_;
+  for (std::size_t i = 0; i < kicked.v.size(); ++i) {
+    if (components.label[i] != component) continue;
+    for (int axis = 0; axis < 3; ++axis) {
+      kicked.v[i][axis] += command.velocity[static_cast<std::size_t>(axis)] * quarter / dt;
+    }
+  }
+  if (whole_ && components.count > 1) {
+    require_no_ghost_force(kicked, components.label, component);
+    note(HistoryHappened::kicked_beside_others);
+  }
+  has_kicked_ = true;
+  state_ = std::move(kicked);
+  load_both();
+}
+
+// Both bodies in one load, so that neither may disturb the other. Stages until the next step do not see velocities;
+// what that step moves may then be removed by the next detection. Later stages may differ: whether small clusters are
+// merged depends on whether anything at all was removed.
+void History::require_no_ghost_force(const State& kicked, const std::vector<int32_t>& component_of, int32_t component) {
+  whole_->load({loaded_.setup, loaded_.setup}, {state_, kicked});
+  if (next_ != Stage::step) whole_->run({next_, Stage::skin});
+  whole_->run({Stage::step, Stage::detect});
+  const std::vector<State> both = whole_->snapshot();
+  ++verdicts_;
+  for (std::size_t i = 0; i < component_of.size(); ++i) {
+    if (component_of[i] == component) continue;
+    if (same_bits(both[0].x[i], both[1].x[i]) && same_bits(both[0].v[i], both[1].v[i]) &&
+        both[0].alive[i] == both[1].alive[i]) {
+      continue;
+    }
+    Verdict verdict = broken_contract("no ghost force", Stage::step, state_, staged_->name());
+    verdict.bound_source = "oracles_and_tests.md §1";
+    verdict.witness.particles = {static_cast<int32_t>(i)};
+    verdict.witness.text = "particle " + std::to_string(i) + " moves otherwise when another component is kicked";
+    return fail(std::move(verdict));
+  }
+}
+
+void History::save_and_load(const SaveAndLoad& command) {
+  note_load();
+  State saved = staged_->snapshot().front();
+  require_same("a snapshot changes nothing", state_, saved);
+  Setup setup = loaded_.setup;
+  if (command.through_files) {
+    const TemporaryFolder folder;
+    const std::string name = folder.file("history");
+    io::Recorder recorder(name, setup, "{}", staged_->name());
+    recorder.add(before(next_), saved);
+    recorder.finish();
+    const io::RecordingReader reader(name);
+    io::Snapshot read = reader.snapshot(0);
+    require_same("a recording gives back what was recorded", saved, read.state);
+    saved = std::move(read.state);
+    setup = reader.header().setup;
+    if (!saved.skin.owner.empty()) note(HistoryHappened::read_from_files);
+    staged_ = make_();
+  }
+  staged_->load({setup}, {saved});
+  State taken = staged_->snapshot().front();
+  require_same("loading changes nothing", state_, taken, staged_->unit_roundoff() != kDouble);
+  state_ = std::move(taken);
+  unloaded_beside_ = whole_ && loads_in_bits();
+  if (whole_ && !unloaded_beside_) {
+    require_same("same input, same bits", state_, loaded_into(*whole_, saved));
+  }
+}
+
+// A displacement of a single precision that is not zero may lose its last bits beside a rest position.
+bool History::loads_in_bits() const { return staged_->unit_roundoff() == kDouble || (!case_.moves && !has_kicked_); }
+
+State History::loaded_into(Backend& backend, const State& state) {
+  backend.load({loaded_.setup}, {state});
+  return backend.snapshot().front();
+}
+
+void History::load_both(bool is_first) {
+  const bool is_single = staged_->unit_roundoff() != kDouble;
+  State taken = loaded_into(*staged_, state_);
+  // The first state was not made by this backend, so in single precision more than velocities is rounded.
+  if (!is_first || !is_single) require_same("loading changes nothing", state_, taken, is_single);
+  if (is_single) require_same("loading what is rounded changes nothing", taken, loaded_into(*staged_, taken));
+  if (whole_) require_same("same input, same bits", taken, loaded_into(*whole_, taken));
+  state_ = std::move(taken);
+  unloaded_beside_ = false;
+}
+
+void History::require_same(const char* property, const State& expected, const State& found, bool but_for_rounding) {
+  ++verdicts_;
+  const std::string what = difference(expected, found, but_for_rounding);
+  if (what.empty()) return;
+  Verdict verdict = broken_contract(property, before(next_), expected, staged_->name());
+  verdict.measured = 1;
+  verdict.witness.text = "different: " + what;
+  fail(std::move(verdict));
+}
+
+void History::fail(Verdict verdict) {
+  if (!failure_) failure_ = std::move(verdict);
+}
+
+void History::note_load() {
+  if (next_ == Stage::step) return note(HistoryHappened::loaded_between_frames);
+  if (next_ == Stage::detect) return note(HistoryHappened::loaded_before_detect);
+  if (state_.removed.empty()) return;
+  if (!state_.debris.empty()) note(HistoryHappened::loaded_with_debris);
+  constexpr auto kBeforeSplit = static_cast<int>(HistoryHappened::loaded_before_split);
+  note(static_cast<HistoryHappened>(kBeforeSplit + static_cast<int>(next_) - static_cast<int>(Stage::split)));
+}
+
+History history_of(History::Source make, const Case& c, const std::vector<Command>& commands) {
+  History history(std::move(make), c);
+  for (const Command& command : commands) history.execute(command);
+  return history;
+}
+
+}  // namespace cutproof::property_tests

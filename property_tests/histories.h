@@ -1,0 +1,148 @@
+// A history: one random body to which commands are given, one after the other. Between any two stages it may be saved
+// and loaded, kicked, or get another stroke to cut; all that a backend promises has to hold all the same
+// (oracles_and_tests.md §2).
+#pragma once
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "property_tests/dissection.h"
+
+namespace cutproof::property_tests {
+
+// The next `stages` stages in order, beyond the end of a frame into the next one. Where the timetable is over, the
+// blade stays up for a frame.
+struct RunStages {
+  int32_t stages = 1;
+  bool whole = false;  // as one span for each frame, not stage by stage
+  friend bool operator==(const RunStages&, const RunStages&) = default;
+};
+// One more stroke, after those that are still to come.
+struct Cut {
+  Stroke stroke;
+  friend bool operator==(const Cut&, const Cut&) = default;
+};
+// All of one component of the tissue gets a velocity on top of its own.
+struct Kick {
+  int32_t component = 0;          // modulo the number of components
+  Quarters velocity = {0, 0, 0};  // [quarters per substep]
+  friend bool operator==(const Kick&, const Kick&) = default;
+};
+// To be gone on with by the same backend, or through a recording's files by another of its kind.
+struct SaveAndLoad {
+  bool through_files = false;
+  friend bool operator==(const SaveAndLoad&, const SaveAndLoad&) = default;
+};
+using Command = std::variant<RunStages, Cut, Kick, SaveAndLoad>;
+
+// One line of JSON, for people and for files. commands_from_json throws std::invalid_argument for anything else.
+std::string to_json(const Command& command);
+std::vector<Command> commands_from_json(const std::string& list);
+
+// Where a history is: nothing more is needed to say which command may come next.
+struct Position {
+  int64_t frame = 0;
+  Stage next = Stage::step;
+  friend bool operator==(const Position&, const Position&) = default;
+};
+Position after(Position at, const Command& command);
+
+// What happened in histories. As in `Happened`, a class that never occurs means that nothing was tested there.
+enum class HistoryHappened {
+  loaded_between_frames,
+  loaded_before_detect,
+  loaded_before_split,  // this and the following ones: in a frame that has removed particles
+  loaded_before_merge,
+  loaded_before_expand,
+  loaded_before_skin,
+  loaded_with_debris,      // of the frame in progress
+  read_from_files,         // with a skin
+  cut_as_one_span,         // detection to the end of the frame, and something was removed
+  went_on_without_a_load,  // an unloaded backend beside a loaded one, to the end of a frame that cuts
+  kicked_beside_others,
+  removal_after_a_kick,
+  separation,  // a cut that the history itself asked for
+  count
+};
+inline constexpr std::size_t kHistoryHappenedCount = static_cast<std::size_t>(HistoryHappened::count);
+inline constexpr std::array<const char*, kHistoryHappenedCount> kHistoryHappenedNames = {
+    "load between frames",
+    "load before detect",
+    "load before split",
+    "load before merge",
+    "load before expand",
+    "load before skin",
+    "load with debris",
+    "skin read from files",
+    "cut in one span",
+    "cut with and without a load",
+    "kick beside other components",
+    "removal after a kick",
+    "separation by a stroke that came later"};
+
+// Runs a history and judges it. After every stage: all oracles, and the reference's answer to the same state
+// (judge_trail). Beyond these:
+// - Loading changes nothing: the state comes back with the same bits, in single precision the impulse (a sum over
+//   particles there) up to rounding. In double precision, and in single as long as nothing has moved, a backend that is
+//   saved and loaded also goes on with the same bits as one beside it that is not. A state has positions and kernels
+//   have displacements, of which those below 2⁻²⁹ of a position lose bits in it; so where they move, both are loaded.
+// - Spans that run whole give the same bits as their stages, which another backend runs one by one.
+// - A kick of one component leaves the bits of all others alone, until all stages that see velocities have run.
+// Where a merge rule lets a schedule decide (`published`), equal bits are not asked for.
+class History {
+ public:
+  using Source = std::function<std::unique_ptr<Backend>()>;
+  // Loads the case.
+  History(Source make, Case c);
+
+  // Does nothing once there is a failure. Throws what backends throw.
+  void execute(const Command& command);
+  Position position() const { return {state_.frame, next_}; }
+
+  const std::optional<Verdict>& failure() const { return failure_; }
+  const std::array<int64_t, kHistoryHappenedCount>& happened() const { return happened_; }
+  int64_t verdicts() const { return verdicts_; }
+
+ private:
+  void run(const RunStages& command);
+  void cut(const Cut& command);
+  void kick(const Kick& command);
+  void save_and_load(const SaveAndLoad& command);
+
+  void run_span(Span span, bool whole);
+  void wait_for_frames(int64_t count);
+  void change_timetable();
+  void load_both(bool is_first = false);
+  State loaded_into(Backend& backend, const State& state);
+  void require_same(const char* property, const State& expected, const State& found, bool but_for_rounding = false);
+  void require_no_ghost_force(const State& kicked, const std::vector<int32_t>& component_of, int32_t component);
+  bool loads_in_bits() const;
+  void fail(Verdict verdict);
+  void note(HistoryHappened what) { ++happened_[static_cast<std::size_t>(what)]; }
+  void note_load();
+
+  Source make_;
+  Case case_;  // the strokes of the history's own are appended
+  Loaded loaded_;
+  std::unique_ptr<Backend> staged_;  // runs stage by stage, is judged, saved and loaded
+  std::unique_ptr<Backend> whole_;   // beside it; null if equal bits are not asked for
+  State state_;                      // of staged_
+  Stage next_ = Stage::step;
+  int32_t given_strokes_ = 0;  // with the blade down, of the case as it was drawn
+  bool has_expanded_ = false;
+  bool has_kicked_ = false;
+  bool unloaded_beside_ = false;  // whole_ went on as it was when staged_ was last loaded
+  std::optional<Verdict> failure_;
+  std::array<int64_t, kHistoryHappenedCount> happened_ = {};
+  int64_t verdicts_ = 0;
+};
+
+// A whole history: all of its commands, unless one fails before. Throws what backends throw.
+History history_of(History::Source make, const Case& c, const std::vector<Command>& commands);
+
+}  // namespace cutproof::property_tests
