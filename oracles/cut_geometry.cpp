@@ -533,7 +533,7 @@ Interpenetration interpenetration(const Setup& setup, const State& state) {
   Interpenetration best;
   best.bound = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {
-    const Lattice lattice = lattice_over(*region, axis, h / kLinesPerSpacing);
+    const Lattice lattice = lattice_over(*region, axis, h / kColumnsPerSpacing);
     std::vector<Stretch> stretches;
     add_insides(pieces, lattice, stretches);
     add_skins(pieces, lattice, stretches);

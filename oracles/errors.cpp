@@ -227,12 +227,12 @@ double elastic_energy(const Setup& setup, State state) {
 
 void set_in_motion(const Setup& setup, State& state) {
   const double h = setup.body.grid.spacing, dt = setup.substep_length.at(0);
-  const Vec3 axis = normalized({1, 2, 3}), drift = (0.02 * h / dt) * normalized({2, -1, 1});
+  const Vec3 axis = normalized({1, 2, 3}), drift = (0.002 * h / dt) * normalized({2, -1, 1});
   const Vec3 center = totals_of(setup.body, state).center();
   for (std::size_t i = 0; i < state.x.size(); ++i) {
     if (!state.alive[i]) continue;
     const Vec3 arm = state.x[i] - center;
-    state.v[i] = drift + (0.002 / dt) * cross(axis, arm) + (0.001 / dt) * dot(axis, arm) * axis;
+    state.v[i] = drift + (0.01 / dt) * cross(axis, arm) + (0.001 / dt) * dot(axis, arm) * axis;
   }
 }
 

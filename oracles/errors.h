@@ -98,9 +98,10 @@ inline constexpr int kLinesPerSpacing = 4;
 // after.frame, and `after` with the skin of its alive particles; without one there are no distances.
 CutGeometry cut_geometry(const Setup& setup, const State& before, const State& after);
 
-// Space that is inside the skins of two or more components of G [h³]: every line of a lattice parallel to an axis, h /
-// kLinesPerSpacing apart, knows exactly how much of it is (docs/tolerances.md, Interpenetration). `bound`: how far the
-// volume may be from the truth, for the axis where this is least.
+// Space that is inside the skins of two or more components of G [h³]: every line of a lattice parallel to an axis, at
+// most h / kColumnsPerSpacing apart, knows exactly how much of it is. `bound`: how far the volume may be from the
+// truth, for the axis where this is least (docs/tolerances.md, Interpenetration).
+inline constexpr int kColumnsPerSpacing = 8;
 struct Interpenetration {
   double volume = 0, bound = 0;
 };
@@ -111,8 +112,8 @@ Interpenetration interpenetration(const Setup& setup, const State& state);
 // The body alone: no blade, walls, grips, gravity, damping, detection or skin; `frames` frames like the one of
 // state.frame.
 Setup free_setup(const Setup& setup, int64_t frame, int64_t frames);
-// What it does in the beginning, so that there is something to conserve: all particles drift by 0.02 h a substep, spin
-// with 0.002 radians a substep, and stretch by 0.001 a substep along the axis of spin, (1, 2, 3).
+// What it does in the beginning, so that there is something to conserve: it drifts by 0.002 h a substep, spins by 0.01
+// radians a substep about (1, 2, 3), and stretches by 0.001 a substep along that axis.
 void set_in_motion(const Setup& setup, State& state);
 
 struct Conservation {

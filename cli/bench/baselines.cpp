@@ -73,7 +73,7 @@ BaselineScene make_baseline_scene(const Baseline& baseline, int64_t particles, u
   scene.body.particles = particles;
   scene.clusters.method = Cooking::sampled;
   scene.clusters.spacing = 2;
-  scene.clusters.radius = 2;
+  scene.clusters.radius = 1.7;
   scene.step.damping = 5;
   scene.detect.criterion = baseline.criterion;
   scene.merge.rule = baseline.merge;
@@ -103,7 +103,7 @@ BaselineScene make_baseline_scene(const Baseline& baseline, int64_t particles, u
   GripSpec push = right;
   push.after_strokes = true;
   push.end = kPush;
-  push.velocity = {-0.1, 0, 0};
+  push.velocity = {-0.06, 0, 0};
   scene.grips.push_back(push);
   fixtures::resolve_timetable(scene, "command line", {}, built.setup);
   return {std::move(built.setup), std::move(built.state)};
