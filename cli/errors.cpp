@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <sstream>
 
@@ -108,7 +109,10 @@ void Errors::frame_ends(const State& state) {
   }
   if (wanted_.geometry && looked_at(frame)) {
     const oracles::Interpenetration found = oracles::interpenetration(setup_, state);
-    if (!overlap_ || found.volume > overlap_->found.volume) overlap_ = Overlap{frame, found};
+    // What is not a number stays.
+    if (!overlap_ || !(found.volume <= overlap_->found.volume || std::isnan(overlap_->found.volume))) {
+      overlap_ = Overlap{frame, found};
+    }
   }
 }
 
@@ -133,8 +137,8 @@ void Errors::finish(const State& end, const Against* against) {
 bool Errors::holds() const { return !conservation_ || conserved(setup_, *conservation_); }
 
 json to_json(const oracles::CutGeometry& geometry) {
-  return {{"cut_area", geometry.cut_area},
-          {"lost_volume", geometry.lost_volume},
+  return {{"cut_area", json_number(geometry.cut_area)},
+          {"lost_volume", json_number(geometry.lost_volume)},
           {"lost_per_area", number_or_null(geometry.lost_per_area)},
           {"least_per_area", number_or_null(geometry.least_per_area)},
           {"hausdorff", number_or_null(geometry.hausdorff())},
@@ -143,7 +147,9 @@ json to_json(const oracles::CutGeometry& geometry) {
           {"sampling", {{"skin_to_ideal", geometry.sampling_skin}, {"ideal_to_skin", geometry.sampling_ideal}}}};
 }
 
-json to_json(const oracles::Interpenetration& found) { return {{"volume", found.volume}, {"bound", found.bound}}; }
+json to_json(const oracles::Interpenetration& found) {
+  return {{"volume", json_number(found.volume)}, {"bound", json_number(found.bound)}};
+}
 
 json Errors::to_json() const {
   json result = json::object();

@@ -293,6 +293,10 @@ CutGeometry cut_geometry(const Setup& setup, const State& before, const State& a
   const Body& body = setup.body;
   const double h = body.grid.spacing;
   CutGeometry geometry;
+  if (!well_formed(setup, before).holds || !well_formed(setup, after).holds) {
+    geometry.cut_area = geometry.lost_volume = std::numeric_limits<double>::quiet_NaN();
+    return geometry;
+  }
   for (std::size_t i = 0; i < before.alive.size(); ++i) geometry.lost_volume += before.alive[i] && !after.alive[i];
   const std::vector<Triangle> surface = swept_surface(setup, before.frame, after.frame);
   const IdealCut ideal = ideal_cut(body, before, surface);
@@ -346,18 +350,21 @@ struct Pieces {
   std::vector<Triangle> triangles;
   std::vector<int32_t> component;
   int32_t count = 0;
+  bool in_order = true;  // every triangle belongs to a component and lies somewhere
 };
 
 Pieces pieces_of(const Setup& setup, const State& state) {
-  const Partition partition = graph_components(setup, state);
   Pieces pieces;
+  pieces.in_order = well_formed(setup, state).holds;
+  if (!pieces.in_order) return pieces;
+  const Partition partition = graph_components(setup, state);
   pieces.count = partition.count;
   for (const auto& [a, b, c] : state.skin.triangles) {
     const Skin& skin = state.skin;
-    if (!is_finite(skin.position[at(a)]) || !is_finite(skin.position[at(b)]) || !is_finite(skin.position[at(c)]))
-      continue;
     pieces.triangles.push_back({skin.position[at(a)], skin.position[at(b)], skin.position[at(c)]});
     pieces.component.push_back(partition.label[at(skin.owner[at(a)])]);
+    pieces.in_order = pieces.in_order && pieces.component.back() >= 0 && is_finite(skin.position[at(a)]) &&
+                      is_finite(skin.position[at(b)]) && is_finite(skin.position[at(c)]);
   }
   return pieces;
 }
@@ -527,6 +534,9 @@ Lengths lengths_of(std::vector<Stretch> stretches, int32_t components) {
 
 Interpenetration interpenetration(const Setup& setup, const State& state) {
   const Pieces pieces = pieces_of(setup, state);
+  if (!pieces.in_order) {
+    return {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()};
+  }
   const std::optional<Box> region = shared_region(pieces);
   if (!region) return {};
   const double h = setup.body.grid.spacing, cube = h * h * h;

@@ -32,6 +32,18 @@ bool has_energy(const Setup& setup, const State& state) {
          !setup.blade_moves[at(state.frame * setup.step.substeps)].down;
 }
 
+// What nothing can be measured of, because it is broken or not a number: infinitely wrong.
+Spread infinite() {
+  Spread spread;
+  spread.add(std::numeric_limits<double>::infinity(), -1);
+  return spread;
+}
+
+bool measurable(const Setup& setup, const State& state) {
+  return well_formed(setup, state).holds && std::all_of(state.x.begin(), state.x.end(), is_finite) &&
+         std::all_of(state.v.begin(), state.v.end(), is_finite);
+}
+
 struct Answer {
   std::vector<Vec3> x;
   bool converged = false;
@@ -91,6 +103,10 @@ std::optional<SolverError> solver_error(Backend& judged, Backend& exact, const S
   start.frame = 0;
 
   SolverError error;
+  if (!measurable(setup, state)) {
+    error.position = infinite();
+    return error;
+  }
   error.by_energy = has_energy(one, start);
   Answer answer;
   double least = 0;
@@ -104,9 +120,11 @@ std::optional<SolverError> solver_error(Backend& judged, Backend& exact, const S
   error.converged = answer.converged;
 
   // What is judged begins where the answer does: at the state as the backend holds it, which may be rounded.
-  const std::vector<Vec3> x = after_frame(judged, one, start).x;
-  error.position = positions_apart(one, answer.x, x, start.alive);
-  if (error.by_energy && least > 0) error.energy = (substep_energy(one, start, x) - least) / least;
+  const State end = after_frame(judged, one, start);
+  error.position = measurable(one, end) ? positions_apart(one, answer.x, end.x, start.alive) : infinite();
+  if (error.by_energy && least > 0 && std::isfinite(error.position.greatest)) {
+    error.energy = (substep_energy(one, start, end.x) - least) / least;
+  }
   return error;
 }
 
@@ -150,6 +168,10 @@ TimeStepError time_step_error(const MakeBackend& make, const Setup& setup, const
     coarse->run(kFrame);
     fine->run(kFrame);
     const State a = std::move(fine->snapshot().front()), b = std::move(coarse->snapshot().front());
+    if (!measurable(setup, a) || !measurable(setup, b)) {
+      error.position.push_back(infinite());
+      break;
+    }
     for (std::size_t i = 0; i < a.alive.size() && !error.first_difference; ++i) {
       if (a.alive[i] == b.alive[i]) continue;
       error.first_difference = frame;
@@ -187,7 +209,7 @@ struct Totals {
   long double kinetic = 0, speed = 0;                                // ½ Σ m v², Σ m |v|
   double extent = 0;
 
-  Vec3 mean_momentum() const { return vector(momentum); }
+  Vec3 total_momentum() const { return vector(momentum); }
   Vec3 center() const { return vector(moment) / static_cast<double>(mass); }
   // About the center of mass: J − c × p.
   Vec3 angular_momentum() const { return vector(spin) - cross(center(), vector(momentum)); }
@@ -223,6 +245,11 @@ double elastic_energy(const Setup& setup, State state) {
   return substep_energy(setup, state, state.x);
 }
 
+// What is not a number is infinitely much.
+void raise(double& greatest, double value) {
+  greatest = std::max(greatest, std::isfinite(value) ? value : std::numeric_limits<double>::infinity());
+}
+
 }  // namespace
 
 void set_in_motion(const Setup& setup, State& state) {
@@ -248,7 +275,7 @@ Conservation conservation(Backend& backend, const Setup& setup, const State& sta
 
   const Totals first = totals_of(setup.body, start);
   const auto mass = static_cast<double>(first.mass);
-  const Vec3 p = first.mean_momentum(), j = first.angular_momentum();
+  const Vec3 p = first.total_momentum(), j = first.angular_momentum();
   const double energy = energy_of(start, first);
   double lowest = energy, growth = 0, turned = 0, change = 0;
   Conservation result;
@@ -256,13 +283,19 @@ Conservation conservation(Backend& backend, const Setup& setup, const State& sta
   for (int64_t frame = 0; frame < setup.frame_count(); ++frame) {
     backend.run(kFrame);
     const State now = std::move(backend.snapshot().front());
+    if (!measurable(setup, now)) {
+      for (double* figure : {&change, &turned, &growth, &result.mass}) {
+        *figure = std::numeric_limits<double>::infinity();
+      }
+      break;
+    }
     const Totals totals = totals_of(setup.body, now);
-    change = std::max(change, norm(totals.mean_momentum() - p));
-    turned = std::max(turned, norm(totals.angular_momentum() - j));
-    result.mass = std::max(result.mass, static_cast<double>(std::abs(totals.mass - first.mass)) / mass);
+    raise(change, norm(totals.total_momentum() - p));
+    raise(turned, norm(totals.angular_momentum() - j));
+    raise(result.mass, static_cast<double>(std::abs(totals.mass - first.mass)) / mass);
     result.extent = std::max(result.extent, totals.extent);
     const double present = energy_of(now, totals);
-    growth = std::max(growth, present - lowest);
+    raise(growth, present - lowest);
     lowest = std::min(lowest, present);
   }
   const double dt = setup.substep_length.at(0), speed = static_cast<double>(first.speed);

@@ -2,7 +2,8 @@
 // means and what it does not. Implementation and topology are compared with the reference, which no oracle knows: these
 // two stand in cli/against.h; their distances are here.
 //
-// Lengths are told in h, the spacing of the grid.
+// Lengths are told in h, the spacing of the grid. What is broken or not a number is infinitely wrong, or, where a
+// volume would have no meaning, not a number; nothing of it is left out.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -48,7 +49,7 @@ struct SolverError {
   bool converged = false;        // the answer was found within its tolerance
 };
 // The first substep of frame state.frame; nothing after the end of the timetable, nor with Solver::published, whose
-// iteration has no limit but a rigid body (method.md §3). Loads both backends. Requires a well-formed state.
+// iteration has no limit but a rigid body (method.md §3). Loads both backends.
 std::optional<SolverError> solver_error(Backend& judged, Backend& exact, const Setup& setup, const State& state);
 
 // --- Time step -------------------------------------------------------------------------------------------------------
@@ -94,8 +95,8 @@ struct CutGeometry {
 };
 inline constexpr int kLinesPerSpacing = 4;
 // New skin: triangles all of whose vertices lie on grid edges whose other end died, and such vertices by themselves.
-// Absent distances: no new skin, or no cut inside the tissue. Requires well-formed states with before.frame <=
-// after.frame, and `after` with the skin of its alive particles; without one there are no distances.
+// Absent distances: no new skin, or no cut inside the tissue. Requires before.frame <= after.frame, and `after` with
+// the skin of its alive particles; without one there are no distances.
 CutGeometry cut_geometry(const Setup& setup, const State& before, const State& after);
 
 // Space that is inside the skins of two or more components of G [h³]: every line of a lattice parallel to an axis, at

@@ -1,6 +1,4 @@
 // Errors where the answer is known by hand, and where something is wrong.
-#include "oracles/errors.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,6 +6,7 @@
 
 #include "gpu/backends.h"
 #include "oracles/converged.h"
+#include "oracles/errors.h"
 #include "oracles/oracles.h"
 #include "oracles/surface_distance.h"
 #include "reference_cpu/reference.h"
@@ -307,7 +306,22 @@ TEST(Interpenetration, IsNoneApartAndNoneOfAPieceWithItself) {
   one.add(0, {0, 0, 0}, {3, 2, 2});
   one.add(0, {2, 0, 0}, {5, 2, 2});
   EXPECT_EQ(interpenetration(one.setup, one.state).volume, 0);
-  EXPECT_EQ(interpenetration(one.setup, State{}).volume, 0) << "no skin";
+  one.state.skin = {};
+  EXPECT_EQ(interpenetration(one.setup, one.state).volume, 0) << "no skin";
+}
+
+TEST(Interpenetration, OfABrokenSkinIsNotANumber) {
+  for (const int defect : {0, 1, 2}) {
+    TwoBoxes boxes;
+    boxes.add(0, {0, 0, 0}, {3, 2, 2});
+    boxes.add(1, {2.6, 0, 0}, {5, 2, 2});
+    if (defect == 0) boxes.state.skin.position[3].y = std::nan("");
+    if (defect == 1) boxes.state.skin.owner[3] = 7;
+    if (defect == 2) boxes.state.alive[1] = 0;  // the skin of a dead particle belongs to no component
+    const Interpenetration found = interpenetration(boxes.setup, boxes.state);
+    EXPECT_TRUE(std::isnan(found.volume)) << defect;
+    EXPECT_TRUE(std::isinf(found.bound)) << defect;
+  }
 }
 
 // A hollow is no tissue: nothing is shared with what stands in it.
@@ -523,6 +537,21 @@ TEST(Conservation, ALeakIsSeen) {
   EXPECT_NEAR(found.momentum, 100 * 1e-9, 1e-12);
   EXPECT_GT(found.momentum_relative, 1e-10);
   EXPECT_GT(found.momentum, found.momentum_bound);
+}
+
+TEST(Conservation, WhatIsNotANumberIsNotConserved) {
+  Leaking backend(std::nan(""));
+  const Moving scene = free_block(backend, 3);
+  const Conservation found = conservation(backend, scene.setup, scene.state);
+  EXPECT_TRUE(std::isinf(found.momentum));
+  EXPECT_TRUE(std::isinf(found.momentum_relative));
+  EXPECT_TRUE(std::isinf(found.mass));
+  EXPECT_TRUE(std::isinf(found.energy.value()));
+  const TimeStepError time_step =
+      time_step_error([] { return std::make_unique<Leaking>(std::nan("")); }, scene.setup, scene.state, 3);
+  ASSERT_EQ(time_step.position.size(), 1u) << "there is nothing to compare any more";
+  EXPECT_TRUE(std::isinf(time_step.greatest_rms()));
+  EXPECT_TRUE(std::isinf(solver_error(backend, backend, scene.setup, scene.state)->position.greatest));
 }
 
 TEST(Conservation, GrowingEnergyIsSeen) {
