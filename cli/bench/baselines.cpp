@@ -177,11 +177,10 @@ BaselineRow run_baseline(Backend& backend, const Baseline& baseline, BaselineSce
     state = std::move(backend.snapshot().front());
     row.removed += static_cast<int64_t>(state.removed.size() + state.debris.size());
     const bool last = frame + 1 == scene.setup.frame_count();
-    if (last || !state.removed.empty()) {
-      row.end = topology_of(scene.setup, state);
-      row.isolated = std::max(row.isolated, row.end.isolated);
-      row.unequal_frames += !row.end.equal;
-    }
+    // Where nothing was removed, all is connected and coupled as before.
+    if (frame == 0 || last || !state.removed.empty()) row.end = topology_of(scene.setup, state);
+    row.isolated = std::max(row.isolated, row.end.isolated);
+    row.unequal_frames += !row.end.equal;
     if (last || frame % kOverlapEvery == 0) {
       const oracles::Interpenetration found = oracles::interpenetration(scene.setup, state);
       if (found.volume > row.overlap.volume) row.overlap = found;
