@@ -20,6 +20,7 @@ struct RunOptions {
   bool check = false;
   std::string against;        // "" or "reference"
   std::string mode = "both";  // of the comparison: lockstep, shadow, both
+  std::string errors;         // names of errors with commas between them, or "all"; empty: none
   std::string record;
   std::string json;
 };

@@ -122,35 +122,9 @@ std::optional<Difference> difference_of_lists(const std::vector<int32_t>& expect
 
 }  // namespace
 
-void Spread::add(double deviation, int32_t index) {
-  if (!std::isfinite(deviation)) deviation = std::numeric_limits<double>::infinity();
-  ++count;
-  sum_of_squares += deviation * deviation;
-  if (deviation > greatest || where < 0) {
-    greatest = deviation;
-    where = index;
-  }
-}
-
-void Spread::join(const Spread& other) {
-  if (other.count == 0) return;
-  if (other.greatest > greatest || where < 0) {
-    greatest = other.greatest;
-    where = other.where;
-  }
-  sum_of_squares += other.sum_of_squares;
-  count += other.count;
-}
-
-double Spread::rms() const { return count == 0 ? 0 : std::sqrt(sum_of_squares / static_cast<double>(count)); }
-
 Spread positions_apart(const Setup& setup, const State& expected, const State& actual,
                        const std::vector<uint8_t>& mask) {
-  Spread spread;
-  for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
-    if (mask[at(i)]) spread.add(norm(actual.x[at(i)] - expected.x[at(i)]) / setup.body.grid.spacing, i);
-  }
-  return spread;
+  return oracles::positions_apart(setup, expected.x, actual.x, mask);
 }
 
 Spread velocities_apart(const Setup& setup, const State& expected, const State& actual, double dt,

@@ -8,20 +8,11 @@
 
 #include "model/setup.h"
 #include "model/state.h"
+#include "oracles/errors.h"
 
 namespace cutproof::cli {
 
-// Deviations of many things of one kind.
-struct Spread {
-  double greatest = 0;  // infinite if something was not a number
-  int32_t where = -1;   // index of the greatest
-  double sum_of_squares = 0;
-  int64_t count = 0;
-
-  void add(double deviation, int32_t index);
-  void join(const Spread& other);
-  double rms() const;
-};
+using oracles::Spread;
 
 // Distances of positions of the particles in `mask` [h]. Both states need one position per particle.
 Spread positions_apart(const Setup& setup, const State& expected, const State& actual,

@@ -103,6 +103,11 @@ int run_command_line(int argc, char** argv) {
       ->type_name("M")
       ->check(CLI::IsMember({"lockstep", "shadow", "both"}))
       ->needs("--against");
+  run_command
+      ->add_option("--errors", run_options.errors,
+                   "measure errors: all, or some of implementation (as --against reference), solver, time_step, "
+                   "geometry, topology, conservation")
+      ->type_name("E,…");
   run_command->add_option("--record", run_options.record, "keep every frame, for `cutproof check` and ParaView")
       ->type_name("F");
   run_command->add_option("--json", run_options.json, "write verdicts, stage times and counts")->type_name("F");

@@ -7,6 +7,7 @@
 #include "cli/against.h"
 #include "cli/backends.h"
 #include "cli/commands.h"
+#include "cli/errors.h"
 #include "cli/gate.h"
 #include "cli/results.h"
 #include "cli/terminal.h"
@@ -136,6 +137,9 @@ void print_summary(const RunResult& result) {
 int run(const RunOptions& options) {
   std::optional<AgainstMode> mode;
   if (!options.against.empty()) mode = against_mode(options);
+  const ErrorsWanted wanted = errors_wanted(options.errors);
+  if (wanted.implementation)
+    mode = mode.value_or(AgainstMode::lockstep) == AgainstMode::lockstep ? AgainstMode::lockstep : AgainstMode::both;
   fixtures::BuildOptions build_options;
   if (!options.mesh.empty()) build_options.mesh = MeshSpec{options.mesh, metres_per(options.unit)};
   build_options.particles = options.particles;
@@ -153,6 +157,7 @@ int run(const RunOptions& options) {
     recorder.emplace(options.record, built.setup, io::write_scene(scene), options.backend.name);
   std::optional<Gate> gate;
   std::optional<Against> against;
+  std::optional<Errors> errors;
   print_header(scene, built, options);
 
   RunResult result{"run",
@@ -171,6 +176,9 @@ int run(const RunOptions& options) {
   const State initial = backend->snapshot().front();
   if (options.check) gate.emplace(built.setup, scene.expect, options.backend.name, initial);
   if (mode) against.emplace(built.setup, built.state, initial, options.backend.name, *mode);
+  if (!options.errors.empty()) {
+    errors.emplace(wanted, built.setup, initial, [&] { return make_backend(options.backend); });
+  }
   if (recorder) recorder->add(Stage::skin, initial);
   {
     Progress progress("frame", built.setup.frame_count());
@@ -179,7 +187,10 @@ int run(const RunOptions& options) {
         if (gate) gate->see(stage, state);
         if (recorder) recorder->add(stage, state);
       };
+      const bool looked_at = errors && errors->wants(frame);
+      if (looked_at) errors->frame_begins(backend->snapshot().front());
       result.frames.push_back(run_frame(*backend, gate || recorder, see, against ? &*against : nullptr));
+      if (looked_at) errors->frame_ends(backend->snapshot().front());
       progress.show(frame + 1, fmt::format("{} clusters, {} particles", result.frames.back().clusters,
                                            result.frames.back().alive));
     }
@@ -190,6 +201,10 @@ int run(const RunOptions& options) {
     print_verdicts(*gate);
   }
   if (against) print_against(*against);
+  if (errors) {
+    errors->finish(backend->snapshot().front(), against ? &*against : nullptr);
+    errors->print();
+  }
   if (recorder) {
     recorder->finish();
     const io::RecordingPaths paths = io::recording_paths(options.record);
@@ -203,12 +218,13 @@ int run(const RunOptions& options) {
         document["against"]["verdicts"].push_back(to_json(verdict, false));
       }
     }
+    if (errors) document["errors"] = errors->to_json();
     io::write_text(json_file->temporary(), document.dump(1) + "\n");
     json_file->commit();
     fmt::print("wrote {}\n", options.json);
   }
   if (!gate && !against) fmt::print("nothing was judged: add --check for that\n");
-  return (!gate || gate->holds()) && (!against || against->holds()) ? 0 : 1;
+  return (!gate || gate->holds()) && (!against || against->holds()) && (!errors || errors->holds()) ? 0 : 1;
 }
 
 }  // namespace cutproof::cli

@@ -78,6 +78,10 @@ Counterexample counterexample_from_json(const std::string& text, const std::stri
     result.failing = from_json(document.at("case").dump());
     field = "commands";
     if (document.contains("commands")) result.commands = commands_from_json(document.at("commands").dump());
+    if (!result.commands.empty() && result.failing.together != 1) {
+      throw refuse("case.together", "the case of a history must have one stroke a frame, not " +
+                                        std::to_string(result.failing.together));
+    }
     return result;
   } catch (const nlohmann::json::exception& error) {
     throw refuse(field, error.what());

@@ -155,6 +155,7 @@ std::vector<Command> commands_from_json(const std::string& list) {
 
 History::History(Source make, Case c)
     : make_(std::move(make)), case_(std::move(c)), loaded_(load(case_)), staged_(make_()), state_(loaded_.state) {
+  if (case_.together != 1) throw std::invalid_argument("a history needs a case with one stroke a frame (together: 1)");
   if (case_.merge != MergeRule::published && case_.merge != MergeRule::single_pass) whole_ = make_();
   given_strokes_ = static_cast<int32_t>(loaded_.setup.stroke_end.size());
   loaded_.setup.unit_roundoff = staged_->unit_roundoff();

@@ -81,6 +81,7 @@ rc::Gen<CommandPointer> random_commands(const Case& c, Position at) {
 Case draw_any_case(uint64_t seed, int size) {
   Case c = seed % 2 == 0 ? draw_case(seed, size) : draw_moving_case(seed, size);
   c.strokes.resize(std::min<std::size_t>(c.strokes.size(), 1));
+  c.together = 1;
   return c;
 }
 
