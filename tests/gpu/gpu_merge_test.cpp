@@ -203,12 +203,27 @@ TEST(GpuMerge, RestFramesOfEveryClusterThatSharesAParticleAreRecomputed) {
                             hand_made(body, {range(0, 3), range(2, 4), range(2, 8)}, 3, 4), true);
 }
 
-// One cluster touches more clusters than the table of candidates holds, and may join only one of them. Slot k of those
-// it touches begins with particle 900 + k; the first window of candidates ends with slot 512.
+// Slot 0 alone is small, touches 600 clusters, and may join only one of them: all the others are the same, and too
+// large by one. They do not fit into the table of candidates, whose first window is slots 1 to 512.
+TEST(GpuMerge, TheOneLegalTargetIsFoundInAnyPlaceOfAWindowOfCandidates) {
+  HostLauncher launcher;
+  const Body body = block_body(41, 1, 1);
+  for (const std::size_t place : {1, 2, 511, 512, 513, 514, 599, 600}) {
+    SCOPED_TRACE("target in slot " + std::to_string(place));
+    Lists lists(601, range(19, 41));
+    lists[0] = range(0, 20);
+    lists[place] = range(19, 40);
+    Bodies bodies = hand_made(body, lists, 21, 40);
+    ASSERT_EQ(reference_merge(bodies.setups[0], bodies.states[0]).clusters.count(), 600);
+    expect_equal_to_reference(launcher, std::move(bodies), true);
+  }
+}
+
+// One cluster touches more clusters than the table of candidates holds, and may join only one of them.
 TEST(GpuMerge, AClusterThatTouchesAThousandOthersFindsItsTarget) {
   HostLauncher launcher(HostLauncher::Threads{2});
   const Body body = block_body(30, 30, 2);
-  for (const int32_t single : {901, 902, 1003, 1234, 1411, 1412, 1413, 1414, 1600, 1798, 1799}) {
+  for (const int32_t single : {901, 950, 1003, 1111, 1234, 1313, 1499, 1600, 1750, 1799}) {
     SCOPED_TRACE("single particle " + std::to_string(single));
     Lists lists = {range(0, 900)};
     for (int32_t p = 901; p < 1800; ++p) lists.push_back(p == single ? range(p, p + 1) : range(p - 1, p + 1));
