@@ -72,8 +72,14 @@ for part in $parts; do
     timings)
       try rotations cutproof bench rotations --backend gpu --cases --json "$results/rotations.json"
       try floors cutproof bench floors --backend gpu --json "$results/floors.json"
-      try timings cutproof bench stages --backend gpu --split both --json "$results/stages.json"
+      try stages cutproof bench stages --backend gpu --split both --json "$results/stages.json"
+      try sizes cutproof bench stages --backend gpu --split both --sizes 1000,101096,1000000,10000000 \
+        --json "$results/stages_sizes.json"
+      try sampling cutproof bench sampling --backend gpu --json "$results/sampling.json"
+      try clusters cutproof bench clusters --backend gpu --json "$results/clusters.json"
+      try scale cutproof bench scale --backend gpu --split both --json "$results/scale.json"
       try solver cutproof bench solver --backend gpu --json "$results/solver.json"
+      try baselines cutproof bench baselines --backend gpu --json "$results/baselines.json"
       # A body of ten million particles for 100 frames, a blade cutting.
       try ten_million cutproof bench stages --backend gpu --sizes 10000000 --frames 100 --json "$results/stages_10M.json" ;;
     *) echo "run.sh: there is no part '$part'" >&2; exit 2 ;;

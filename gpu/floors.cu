@@ -99,4 +99,10 @@ Floors measure_floors(int repeats) {
   return floors;
 }
 
+int64_t device_bytes_in_use() {
+  std::size_t free = 0, all = 0;
+  CUTPROOF_CUDA(cudaMemGetInfo(&free, &all));
+  return static_cast<int64_t>(all - free);
+}
+
 }  // namespace cutproof::gpu

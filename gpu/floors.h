@@ -20,4 +20,7 @@ struct Floors {
 // CUDA fails.
 Floors measure_floors(int repeats = 21);
 
+// Bytes of the current device's memory that are in use, by whomever. Throws MachineError if CUDA fails.
+int64_t device_bytes_in_use();
+
 }  // namespace cutproof::gpu

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <iterator>
 #include <limits>
 #include <map>
@@ -15,6 +16,7 @@
 
 #include "cli/backends.h"
 #include "cli/bench/floors.h"
+#include "cli/bench/paper.h"
 #include "cli/bench/report.h"
 #include "cli/bench/suites.h"
 #include "cli/json_number.h"
@@ -38,9 +40,6 @@ using nlohmann::json;
 std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
 
 constexpr Span kWholeFrame = {Stage::step, Stage::skin};
-
-// Beyond this, one frame of the reference and the oracles take minutes on one core.
-constexpr int64_t kMostJudgedParticles = 12'000'000;
 
 // What counts as "beyond" in Distances [h].
 constexpr double kDistanceBound = 1e-4;
@@ -124,35 +123,40 @@ void warm_up(Backend& backend, const BenchScene& scene) {
 
 }  // namespace
 
-Timings time_stages(Backend& backend, const BenchScene& scene, int64_t frames, bool pipelined) {
+Timings time_stages(Backend& backend, const BenchScene& scene, int64_t frames, bool pipelined, int64_t repeats) {
   Timings timings;
-  std::vector<double> whole, cutting;
-  warm_up(backend, scene);
-  for (int64_t frame = 0; frame < frames; ++frame) {
-    backend.run(kWholeFrame);
-    const SpanReport report = backend.report();
-    whole.push_back(report.total_seconds);
-    if (report.ran[at(Stage::split)]) cutting.push_back(report.total_seconds);
+  std::vector<double> whole, cutting, back_to_back;
+  for (int64_t repeat = 0; repeat < repeats; ++repeat) {
+    warm_up(backend, scene);
+    for (int64_t frame = 0; frame < frames; ++frame) {
+      backend.run(kWholeFrame);
+      const SpanReport report = backend.report();
+      whole.push_back(report.total_seconds);
+      if (report.ran[at(Stage::split)]) cutting.push_back(report.total_seconds);
+    }
   }
   timings.frame = times_of(whole);
   timings.cutting = times_of(cutting);
 
-  if (pipelined) {
+  for (int64_t repeat = 0; pipelined && repeat < repeats; ++repeat) {
     warm_up(backend, scene);
     const auto begin = Clock::now();
     for (int64_t frame = 0; frame < frames; ++frame) backend.run(kWholeFrame);
     static_cast<void>(backend.report());
-    timings.back_to_back = seconds_since(begin) / static_cast<double>(frames);
+    back_to_back.push_back(seconds_since(begin) / static_cast<double>(frames));
   }
+  timings.back_to_back = times_of(back_to_back);
 
   // Last, so that the backend is left where the timed frames end.
   std::array<std::vector<double>, 6> alone;
-  warm_up(backend, scene);
-  for (int64_t frame = 0; frame < frames; ++frame) {
-    for (const Stage stage : kStages) {
-      backend.run({stage, stage});
-      const SpanReport report = backend.report();
-      if (report.ran[at(stage)]) alone[at(stage)].push_back(report.total_seconds);
+  for (int64_t repeat = 0; repeat < repeats; ++repeat) {
+    warm_up(backend, scene);
+    for (int64_t frame = 0; frame < frames; ++frame) {
+      for (const Stage stage : kStages) {
+        backend.run({stage, stage});
+        const SpanReport report = backend.report();
+        if (report.ran[at(stage)]) alone[at(stage)].push_back(report.total_seconds);
+      }
     }
   }
   for (const Stage stage : kStages) timings.stage[at(stage)] = times_of(alone[at(stage)]);
@@ -322,11 +326,14 @@ FrameErrors judge_frames(Backend& backend, const Setup& setup) {
     }
     ++errors.frames;
   }
-  for (const auto oracle :
-       {oracles::cluster_connectivity, oracles::coverage, oracles::edge_cover, oracles::component_match}) {
+  std::vector<Verdict (*)(const Setup&, const State&)> asked = {oracles::cluster_connectivity, oracles::coverage,
+                                                                oracles::edge_cover};
+  if (state.edge_covered) asked.push_back(oracles::component_match);
+  for (const auto oracle : asked) {
     errors.topology.push_back(oracle(setup, state));
     errors.topology.back().backend = backend.name();
   }
+  errors.isolated_groups = oracles::isolation(setup, state).measured;
   return errors;
 }
 
@@ -358,23 +365,7 @@ StepFloor step_floor(const Setup& setup, const State& state) {
 
 namespace {
 
-struct StagesOptions {
-  std::string backend = "reference";
-  std::vector<int64_t> sizes;     // particles; empty: by backend
-  std::optional<int64_t> frames;  // timed; absent: by backend
-  std::string split;              // blocks, global or both; empty: blocks
-  std::string rotation;           // empty: the kernels' default
-  std::string json;
-};
-
 // --- Who is timed ----------------------------------------------------------------------------------------------------
-
-struct Contender {
-  std::string backend, precision, rotation, split;
-  bool pipelined = false;     // run() does not wait
-  bool kernel_bytes = false;  // its step moves what step_floor counts
-  std::unique_ptr<Backend> instance;
-};
 
 std::vector<std::string> split_names(const std::string& wanted) {
   if (wanted == "blocks" || wanted == "global") return {wanted};
@@ -394,16 +385,19 @@ Contender make_contender(const BackendChoice& choice) {
           make_backend(choice)};
 }
 
-std::vector<Contender> make_contenders(const StagesOptions& options) {
+}  // namespace
+
+std::vector<Contender> make_contenders(const std::string& backend, const std::string& split,
+                                       const std::string& rotation) {
   BackendChoice choice;
-  choice.name = options.backend;
-  choice.rotation = options.rotation;
-  choice.split = options.split;
+  choice.name = backend;
+  choice.rotation = rotation;
+  choice.split = split;
   require_timed_backend(choice.name);
   std::vector<Contender> contenders;
   if (choice.name == "host" || choice.name == "gpu") {
-    for (const std::string& split : split_names(options.split.empty() ? "blocks" : options.split)) {
-      choice.split = split;
+    for (const std::string& name : split_names(split.empty() ? "blocks" : split)) {
+      choice.split = name;
       contenders.push_back(make_contender(choice));
     }
   } else {
@@ -412,18 +406,27 @@ std::vector<Contender> make_contenders(const StagesOptions& options) {
   return contenders;
 }
 
-std::vector<int64_t> sizes_of(const StagesOptions& options) {
+void require_timed_sizes(const std::vector<int64_t>& sizes) {
   constexpr int64_t kLeast = 100, kMost = 1'000'000'000;
-  std::vector<int64_t> sizes = options.sizes;
-  if (sizes.empty() && options.backend == "gpu") sizes = {1000, 101'096, 1'000'000, 10'000'000};
-  if (sizes.empty()) sizes = {1000, 10'000};
   for (const int64_t size : sizes) {
     if (size >= kLeast && size <= kMost) continue;
     throw InputError("command line", "--sizes", fmt::format("{} particles cannot be timed", size),
                      fmt::format("give numbers from {} to {}, separated by commas", kLeast, kMost));
   }
-  return sizes;
 }
+
+Measured measure(const Contender& contender, BenchScene& scene, int64_t frames, int64_t repeats) {
+  Backend& backend = *contender.instance;
+  scene.setup.unit_roundoff = backend.unit_roundoff();
+  Measured measured;
+  measured.timings = time_stages(backend, scene, frames, contender.pipelined, repeats);
+  const auto begin = Clock::now();
+  if (scene.setup.body.particle_count() <= kMostJudgedParticles) measured.judged = judge_frames(backend, scene.setup);
+  measured.judge_seconds = seconds_since(begin);
+  return measured;
+}
+
+namespace {
 
 // --- What is told ----------------------------------------------------------------------------------------------------
 
@@ -436,11 +439,8 @@ std::string in_words(const Distances& d) {
   return text;
 }
 
-// One row's error, for people and for machines. `judged` is null if it was not measured.
-struct ErrorColumn {
-  std::string text;
-  json value;
-};
+}  // namespace
+
 ErrorColumn error_of(Stage stage, const FrameErrors* judged) {
   if (judged == nullptr) return {"not measured", nullptr};
   switch (stage) {
@@ -471,13 +471,63 @@ ErrorColumn error_of(Stage stage, const FrameErrors* judged) {
 ErrorColumn error_of_frame(const FrameErrors* judged) {
   if (judged == nullptr) return {"not measured", nullptr};
   const bool holds = judged->topology_holds();
-  return {holds ? "topology holds" : "topology FAILS", {{"topology_holds", holds}}};
+  std::string text = holds ? "topology holds" : "topology FAILS";
+  if (judged->isolated_groups > 0) text += fmt::format(", {} isolated groups", judged->isolated_groups);
+  return {text, {{"topology_holds", holds}, {"isolated_groups", judged->isolated_groups}}};
 }
 
-void print_row(const std::string& what, const Times& times, int64_t of, const std::string& error) {
-  const auto ms = [&](double seconds) { return times.count == 0 ? "-" : fmt::format("{:.4f}", 1e3 * seconds); };
-  fmt::print("  {:<14} {:>11} {:>11} {:>11} {:>9}  {}\n", what, ms(times.median), ms(times.min), ms(times.max),
-             fmt::format("{}/{}", times.count, of), error);
+json seconds_by_stage(const Timings& timings) {
+  json seconds = {{"frame", to_json(timings.frame)}, {"frame, cutting", to_json(timings.cutting)}};
+  if (timings.back_to_back.count > 0) seconds["back to back"] = to_json(timings.back_to_back);
+  for (const Stage stage : kStages) seconds[std::string(name_of(stage))] = to_json(timings.stage[at(stage)]);
+  return seconds;
+}
+
+json errors_by_stage(const FrameErrors* judged) {
+  json errors = {{"frame", error_of_frame(judged).value}};
+  for (const Stage stage : kStages) errors[std::string(name_of(stage))] = error_of(stage, judged).value;
+  return errors;
+}
+
+void print_failures(const FrameErrors& judged) {
+  for (const Verdict& verdict : judged.topology) {
+    if (!verdict.holds) fmt::print("  FAILS: {}: {}\n", verdict.property, verdict.witness.text);
+  }
+}
+
+std::string ms(const Times& times) { return times.count == 0 ? "-" : fmt::format("{:.4g}", 1e3 * times.median); }
+
+void declare(TimingOptions& options, CLI::App& command) {
+  command.add_option("--backend", options.backend, "who is timed; `cutproof info` lists them")
+      ->capture_default_str()
+      ->type_name("B");
+  command.add_option("--frames", options.frames, "timed frames of each repeat (default: 10; gpu: 20)")
+      ->type_name("N")
+      ->check(CLI::Range(1, 10'000));
+  command.add_option("--repeats", options.repeats, "how often they are timed, each time after a warm-up")
+      ->capture_default_str()
+      ->type_name("N")
+      ->check(CLI::Range(1, 1'000));
+  command.add_option("--split", options.split, "kernels: how clusters are split, blocks, global or both")
+      ->type_name("M");
+  command.add_option("--rotation", options.rotation, "kernels: how rotations are found")->type_name("M");
+  command.add_option("--json", options.json, "write times and errors")->type_name("F");
+}
+
+namespace {
+
+struct StagesOptions : TimingOptions {
+  std::vector<int64_t> sizes;                                       // particles; if given, not the scenes
+  std::vector<std::string> scenes = {"cuboid", "liver", "kidney"};  // of Table 1
+  std::vector<std::string> cooking = {"boxes", "sampled"};
+  bool full = false;  // the scenes at the paper's size
+};
+
+void print_row(const std::string& what, const Times& times, int64_t of, const std::string& paper,
+               const std::string& error) {
+  const auto one = [&](double seconds) { return times.count == 0 ? "-" : fmt::format("{:.4f}", 1e3 * seconds); };
+  fmt::print("  {:<14} {:>11} {:>11} {:>11} {:>9} {:>9}  {}\n", what, one(times.median), one(times.min), one(times.max),
+             fmt::format("{}/{}", times.count, of), paper, error);
 }
 
 struct Report {
@@ -485,22 +535,29 @@ struct Report {
   bool holds = true;
 };
 
-void report_scene(Report& report, const Contender& contender, const BenchScene& scene, const Timings& timings,
-                  const FrameErrors* judged, double judge_seconds, const MachineFloors& machine, int64_t frames) {
+void report_scene(Report& report, const Contender& contender, const BenchScene& scene, const Measured& measured,
+                  const MachineFloors& machine, int64_t frames, int64_t repeats) {
   const Setup& setup = scene.setup;
+  const Timings& timings = measured.timings;
+  const FrameErrors* judged = measured.errors();
   const int64_t particles = setup.body.particle_count();
   const auto memberships = static_cast<int64_t>(scene.state.clusters.members.size());
-  fmt::print("\n{}: {} particles, {} clusters, {} memberships, h = {:.4g} mm; the blade cuts on by {:.2g} h a frame\n",
-             scene.name, particles, scene.state.clusters.count(), memberships, 1e3 * setup.body.grid.spacing,
-             scene.advance);
+  fmt::print(
+      "\n{}: {} particles, {} clusters ({}), {} memberships, h = {:.4g} mm; the blade goes on by {:.2g} h a frame\n",
+      scene.name, particles, scene.state.clusters.count(), scene.cooking, memberships, 1e3 * setup.body.grid.spacing,
+      scene.advance);
   fmt::print("{}, {} precision, {} substeps × {} iterations, rotation {}, split {}\n", contender.backend,
              contender.precision, setup.step.substeps, setup.step.iterations, contender.rotation, contender.split);
-  fmt::print("  {:<14} {:>11} {:>11} {:>11} {:>9}  {}\n", "", "median ms", "least ms", "most ms", "frames", "error");
+  fmt::print("  {:<14} {:>11} {:>11} {:>11} {:>9} {:>9}  {}\n", "", "median ms", "least ms", "most ms", "frames",
+             "paper ms", "error");
 
-  const auto add = [&](const std::string& what, const Times& times, const ErrorColumn& error) {
-    print_row(what, times, frames, error.text);
+  const PaperScene* const paper = find_paper_scene(scene.name);
+  const auto add = [&](const std::string& what, const Times& times, std::optional<double> paper_ms,
+                       const ErrorColumn& error) {
+    print_row(what, times, frames * repeats, paper_ms ? fmt::format("{:.2f}", *paper_ms) : "", error.text);
     report.rows.push_back({{"scene", scene.name},
                            {"particles", particles},
+                           {"cooking", scene.cooking},
                            {"backend", contender.backend},
                            {"precision", contender.precision},
                            {"substeps", setup.step.substeps},
@@ -510,22 +567,22 @@ void report_scene(Report& report, const Contender& contender, const BenchScene& 
                            {"what", what},
                            {"seconds", to_json(times)},
                            {"frames", times.count},
-                           {"of", frames},
+                           {"of", frames * repeats},
+                           {"paper_seconds", paper_ms ? json(1e-3 * *paper_ms) : json(nullptr)},
                            {"error", error.value},
                            {"error_text", error.text}});
   };
   const ErrorColumn frame_error = error_of_frame(judged);
-  add("frame", timings.frame, frame_error);
-  add("frame, cutting", timings.cutting, frame_error);
-  if (timings.back_to_back) {
-    const double each = *timings.back_to_back;
-    add("back to back", {each, each, each, frames}, frame_error);
-  }
+  add("frame", timings.frame, paper ? std::optional(paper->frame_ms) : std::nullopt, frame_error);
+  add("frame, cutting", timings.cutting, std::nullopt, frame_error);
+  if (timings.back_to_back.count > 0) add("back to back", timings.back_to_back, std::nullopt, frame_error);
   for (const Stage stage : kStages) {
-    add(std::string(name_of(stage)), timings.stage[at(stage)], error_of(stage, judged));
+    add(std::string(name_of(stage)), timings.stage[at(stage)],
+        paper ? std::optional(paper->stage_ms[at(stage)]) : std::nullopt, error_of(stage, judged));
   }
 
   json entry = {{"scene", scene.name},
+                {"cooking", scene.cooking},
                 {"backend", contender.backend},
                 {"rotation", contender.rotation},
                 {"split", contender.split},
@@ -541,18 +598,16 @@ void report_scene(Report& report, const Contender& contender, const BenchScene& 
                 {"blade_advance_h", scene.advance},
                 {"warm_up", scene.warm_up},
                 {"frames", frames},
+                {"repeats", repeats},
                 {"build_seconds", scene.build_seconds},
                 {"judged_frames", judged ? judged->frames : 0},
-                {"judge_seconds", judge_seconds}};
+                {"judge_seconds", measured.judge_seconds}};
+  report.holds = report.holds && measured.holds();
   if (judged != nullptr) {
+    entry["isolated_groups"] = judged->isolated_groups;
     entry["topology"] = json::array();
-    for (const Verdict& verdict : judged->topology) {
-      entry["topology"].push_back(cli::to_json(verdict, false));
-      if (!verdict.holds) {
-        report.holds = false;
-        fmt::print("  FAILS: {}: {}\n", verdict.property, verdict.witness.text);
-      }
-    }
+    for (const Verdict& verdict : judged->topology) entry["topology"].push_back(cli::to_json(verdict, false));
+    print_failures(*judged);
   } else {
     fmt::print("  errors not measured: beyond {} particles the reference takes minutes\n", kMostJudgedParticles);
   }
@@ -574,14 +629,75 @@ void report_scene(Report& report, const Contender& contender, const BenchScene& 
   std::fflush(stdout);
 }
 
+// What stands in Table 1 for one scene, one way of cooking and one contender.
+struct Column {
+  std::string scene, cooking, split;
+  int64_t particles = 0, clusters = 0;
+  Timings timings;
+};
+
+// As the paper has it: a row for each stage, a column for each scene, here for each way of cooking, and the paper's
+// figures beside them.
+void print_table_1(const std::vector<Column>& columns) {
+  std::vector<std::string> head = {"Table 1, median ms"}, cooking = {""}, particles = {"particles"},
+                           clusters = {"clusters"}, frame = {"frame"};
+  std::array<std::vector<std::string>, 6> stages;
+  for (const Stage stage : kStages) stages[at(stage)] = {std::string(name_of(stage))};
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    const Column& column = columns[k];
+    head.push_back(column.scene);
+    cooking.push_back(column.split == "global" ? column.cooking + ", global" : column.cooking);
+    particles.push_back(fmt::format("{}", column.particles));
+    clusters.push_back(fmt::format("{}", column.clusters));
+    frame.push_back(ms(column.timings.frame));
+    for (const Stage stage : kStages) stages[at(stage)].push_back(ms(column.timings.stage[at(stage)]));
+    if (k + 1 < columns.size() && columns[k + 1].scene == column.scene) continue;
+    const PaperScene& paper = *find_paper_scene(column.scene);
+    head.push_back(column.scene);
+    cooking.push_back("paper");
+    particles.push_back(paper.particles ? fmt::format("{}", *paper.particles) : "?");
+    clusters.push_back(paper.clusters ? fmt::format("{}", *paper.clusters) : "?");
+    frame.push_back(fmt::format("{:.2f}", paper.frame_ms));
+    for (const Stage stage : kStages) stages[at(stage)].push_back(fmt::format("{:.2f}", paper.stage_ms[at(stage)]));
+  }
+  Table table(head);
+  for (const auto& row : {cooking, particles, clusters}) table.add(row);
+  for (const auto& row : stages) table.add(row);
+  table.add(frame);
+  fmt::print("\n{}", table.text());
+}
+
+// The scenes that are asked for, made one after the other.
+std::vector<std::function<BenchScene()>> scenes_of(const StagesOptions& options, int64_t frames) {
+  std::vector<std::function<BenchScene()>> makers;
+  require_timed_sizes(options.sizes);
+  for (const int64_t size : options.sizes) makers.push_back([=] { return make_bench_scene(size, frames); });
+  if (!makers.empty()) return makers;
+  for (const std::string& name : options.scenes) {
+    const PaperScene* const scene = find_paper_scene(name);
+    if (scene == nullptr) {
+      throw InputError("command line", "--scenes", fmt::format("there is no scene '{}' in Table 1", name),
+                       "use cuboid, liver and kidney");
+    }
+    for (const std::string& cooking : options.cooking) {
+      const Cooking method = cooking_of(cooking);
+      const int64_t particles =
+          options.full || options.backend == "gpu" ? scene->full_particles : scene->small_particles;
+      makers.push_back([=] { return make_paper_scene(scene->file, scene->name, particles, method, frames); });
+    }
+  }
+  return makers;
+}
+
 int bench_stages(const StagesOptions& options) {
-  const std::vector<int64_t> sizes = sizes_of(options);
-  const int64_t frames = options.frames.value_or(options.backend == "gpu" ? 20 : 10);
-  const std::vector<Contender> contenders = make_contenders(options);
+  const int64_t frames = options.frames_or_default();
+  const auto scenes = scenes_of(options, frames);
+  const std::vector<Contender> contenders = make_contenders(options.backend, options.split, options.rotation);
   require_writable(options.json);
 
   json document = begin_report("stages", options.backend);
   document["frames"] = frames;
+  document["repeats"] = options.repeats;
   const MachineFloors machine = measure_machine(options.backend);
   fmt::print("copy, read + written: {:.4g} GB/s", 1e-9 * machine.copy_bytes_per_second);
   if (machine.graph_node_seconds) {
@@ -601,25 +717,23 @@ int bench_stages(const StagesOptions& options) {
 #endif
 
   Report report;
-  for (std::size_t k = 0; k < sizes.size(); ++k) {
-    BenchScene scene = make_bench_scene(sizes[k], frames);
+  std::vector<Column> columns;
+  for (std::size_t k = 0; k < scenes.size(); ++k) {
+    BenchScene scene = scenes[k]();
     for (const Contender& contender : contenders) {
-      Backend& backend = *contender.instance;
-      scene.setup.unit_roundoff = backend.unit_roundoff();
-      const Timings timings = time_stages(backend, scene, frames, contender.pipelined);
-      std::optional<FrameErrors> judged;
-      const auto begin = Clock::now();
-      if (scene.setup.body.particle_count() <= kMostJudgedParticles) judged = judge_frames(backend, scene.setup);
-      report_scene(report, contender, scene, timings, judged ? &*judged : nullptr, seconds_since(begin), machine,
-                   frames);
-      // After each size, so that what has been measured is kept if a later one fails.
+      const Measured measured = measure(contender, scene, frames, options.repeats);
+      report_scene(report, contender, scene, measured, machine, frames, options.repeats);
+      columns.push_back({scene.name, scene.cooking, contender.split, scene.setup.body.particle_count(),
+                         scene.state.clusters.count(), measured.timings});
+      // After each scene, so that what has been measured is kept if a later one fails.
       document["rows"] = report.rows;
       document["scenes"] = report.scenes;
       document["holds"] = report.holds;
-      document["complete"] = k + 1 == sizes.size() && &contender == &contenders.back();
+      document["complete"] = k + 1 == scenes.size() && &contender == &contenders.back();
       write_report(options.json, document);
     }
   }
+  if (options.sizes.empty()) print_table_1(columns);
   if (!options.json.empty()) fmt::print("\nwrote {}\n", options.json);
   return report.holds ? 0 : 1;
 }
@@ -627,23 +741,24 @@ int bench_stages(const StagesOptions& options) {
 }  // namespace
 
 Suite stages_suite() {
-  return {"stages", "whole frames and each stage, a blade cutting", [](CLI::App& command) {
+  return {"stages", "whole frames and each stage, a blade cutting: Table 1, or boxes and kidneys of given sizes",
+          [](CLI::App& command) {
             const auto options = std::make_shared<StagesOptions>();
-            command.add_option("--backend", options->backend, "who is timed; `cutproof info` lists them")
+            declare(*options, command);
+            command.add_option("--scenes", options->scenes, "of Table 1, separated by commas")
                 ->capture_default_str()
-                ->type_name("B");
+                ->delimiter(',')
+                ->type_name("S,S...");
+            command.add_option("--clusters", options->cooking, "how they are cooked, separated by commas")
+                ->capture_default_str()
+                ->delimiter(',')
+                ->type_name("C,C...");
+            command.add_flag("--full", options->full, "the scenes at the paper's size, as always on gpu");
             command
                 .add_option("--sizes", options->sizes,
-                            "particles, separated by commas (default: 1000,10000; gpu: 1000,101096,1000000,10000000)")
+                            "instead of the scenes: bodies with so many particles, separated by commas")
                 ->delimiter(',')
                 ->type_name("N,N...");
-            command.add_option("--frames", options->frames, "timed frames (default: 10; gpu: 20)")
-                ->type_name("N")
-                ->check(CLI::Range(1, 10'000));
-            command.add_option("--split", options->split, "kernels: how clusters are split, blocks, global or both")
-                ->type_name("M");
-            command.add_option("--rotation", options->rotation, "kernels: how rotations are found")->type_name("M");
-            command.add_option("--json", options->json, "write times, errors and floors")->type_name("F");
             return [options] { return bench_stages(*options); };
           }};
 }

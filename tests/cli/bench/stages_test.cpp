@@ -82,7 +82,7 @@ void expect_rows(const json& document, const std::string& backend, const std::st
 
 TEST_F(Bench, TellsEveryTimeOfTheReferenceWithItsError) {
   const Outcome outcome =
-      bench("stages --sizes 1000,3000 --frames 3 --json out.json", "CUTPROOF_COMMIT=0123456789ab-dirty");
+      bench("stages --sizes 1000,3000 --frames 3 --repeats 1 --json out.json", "CUTPROOF_COMMIT=0123456789ab-dirty");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
   const json document = result("out.json");
   expect_rows(document, "reference", "double", {"box_1000", "kidney_3000"}, {"search"});
@@ -98,7 +98,8 @@ TEST_F(Bench, TellsEveryTimeOfTheReferenceWithItsError) {
 }
 
 TEST_F(Bench, TellsBothWaysOfSplittingOnTheHost) {
-  const Outcome outcome = bench("stages --backend host --sizes 1000 --frames 3 --split both --json out.json");
+  const Outcome outcome =
+      bench("stages --backend host --sizes 1000 --frames 3 --repeats 1 --split both --json out.json");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
   const json document = result("out.json");
   expect_rows(document, "host", "single", {"box_1000"}, {"blocks", "global"});
@@ -108,6 +109,38 @@ TEST_F(Bench, TellsBothWaysOfSplittingOnTheHost) {
     EXPECT_GT(row.at("error").at("max_h"), 0) << "single precision has its rounding";
   }
   for (const json& scene : document.at("scenes")) EXPECT_GT(scene.at("step_floor").at("bytes"), 0);
+}
+
+// The scenes of Table 1 with both ways of cooking: what the paper timed has its time, and an expansion that really ran.
+TEST_F(Bench, ReproducesTable1WithBoxesAndSampledClusters) {
+  const Outcome outcome = bench("stages --frames 2 --repeats 2 --json out.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  const json document = result("out.json");
+  std::set<std::array<std::string, 2>> seen;
+  for (const json& scene : document.at("scenes")) {
+    seen.insert({scene.at("scene").get<std::string>(), scene.at("cooking").get<std::string>()});
+    EXPECT_EQ(scene.at("topology").size(), scene.at("cooking") == "boxes" ? 4U : 3U);
+    EXPECT_GE(scene.at("isolated_groups"), 0);
+  }
+  std::set<std::array<std::string, 2>> expected;
+  for (const char* scene : {"cuboid", "liver", "kidney"}) {
+    for (const char* cooking : {"boxes", "sampled"}) expected.insert({scene, cooking});
+  }
+  EXPECT_EQ(seen, expected);
+  int64_t expansions = 0;
+  for (const json& row : document.at("rows")) {
+    const auto what = row.at("what").get<std::string>();
+    EXPECT_EQ(row.at("of"), 4);
+    EXPECT_EQ(row.at("paper_seconds").is_null(), what == "frame, cutting") << row;
+    if (what == "expand" && row.at("cooking") == "sampled") expansions += row.at("frames").get<int64_t>();
+    if (what == "expand" && row.at("cooking") == "boxes") {
+      EXPECT_EQ(row.at("frames"), 0);
+    }
+  }
+  EXPECT_GT(expansions, 0);
+  for (const char* words : {"Table 1", "paper", "31.79", "10.77", "101096"}) {
+    EXPECT_NE(outcome.output.find(words), std::string::npos) << "no '" << words << "' in:\n" << outcome.output;
+  }
 }
 
 TEST_F(Bench, RefusesBadUsage) {
@@ -120,6 +153,10 @@ TEST_F(Bench, RefusesBadUsage) {
       {"stages --sizes 5", "--sizes"},
       {"stages --sizes 1000,many", "sizes"},
       {"stages --frames 0", "frames"},
+      {"stages --repeats 0", "repeats"},
+      {"stages --scenes cuboid,heart", "heart"},
+      {"stages --clusters spheres", "spheres"},
+      {"stages --scenes cuboid --frames 1000", "--frames"},
       {"stages --backend host --split halves", "halves"},
       {"stages --backend host --rotation guess", "guess"},
       {"stages --split blocks", "--split"},
