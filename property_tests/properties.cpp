@@ -20,6 +20,7 @@
 #include "oracles/two_runs.h"
 #include "property_tests/counterexample.h"
 #include "property_tests/dissection.h"
+#include "property_tests/every_backend.h"
 #include "property_tests/random.h"
 #include "reference_cpu/reference.h"
 
@@ -31,51 +32,10 @@ namespace {
 
 // --- Settings -----------------------------------------------------------------------------------------------------
 
-// Throws std::invalid_argument (or out_of_range) unless the variable is a number.
-int64_t number_from_environment(const char* name, int64_t otherwise) {
-  const char* text = std::getenv(name);
-  return text == nullptr ? otherwise : std::stoll(text);
-}
-
 int64_t wanted_cases() { return number_from_environment("CUTPROOF_CASES", 2000); }
-uint64_t wanted_seed() { return static_cast<uint64_t>(number_from_environment("CUTPROOF_SEED", 1)); }
 
 // RC_PARAMS as it was given.
 std::string g_rapidcheck_parameters;
-
-struct NamedBackend {
-  std::string name;
-  std::function<std::unique_ptr<Backend>()> make;
-  int64_t fraction = 1;  // one in so many of the wanted cases: what a schedule costs buys fewer of them
-  int most_size = 100;   // of a case: every access of a simulated schedule is a decision
-};
-void PrintTo(const NamedBackend& backend, std::ostream* os) { *os << backend.name; }
-
-// Every backend that this build has: each property runs over each of them, under its name.
-std::vector<NamedBackend> all_backends() {
-  const auto with = [](gpu::SplitMethod split) {
-    gpu::KernelOptions options;
-    options.split = split;
-    return options;
-  };
-  std::vector<NamedBackend> backends = {
-      {"reference", reference::make_backend},
-      {"host", [=] { return gpu::make_host_backend(2, with(gpu::SplitMethod::blocks)); }},
-      {"host_global_labels", [=] { return gpu::make_host_backend(1, with(gpu::SplitMethod::global_labels)); }, 4},
-      {"simulated_random", [] { return gpu::make_simulated_backend({gpu::random_walk(wanted_seed())}); }, 2, 35},
-      {"simulated_pct", [] { return gpu::make_simulated_backend({gpu::pct(wanted_seed(), 3, 1'000'000)}); }, 2, 35},
-      {"simulated_reverse",
-       [=] { return gpu::make_simulated_backend({gpu::reverse()}, with(gpu::SplitMethod::global_labels)); }, 2, 35}};
-#if CUTPROOF_HAS_CUDA
-  std::string why;
-  if (!gpu::device_description(why).empty()) {
-    backends.push_back({"gpu", [=] { return gpu::make_gpu_backend(with(gpu::SplitMethod::blocks)); }});
-    backends.push_back(
-        {"gpu_global_labels", [=] { return gpu::make_gpu_backend(with(gpu::SplitMethod::global_labels)); }, 4});
-  }
-#endif
-  return backends;
-}
 
 // What a backend loads, and what its arithmetic allows.
 Loaded load_for(const Backend& backend, const Case& c) {
