@@ -32,9 +32,11 @@ void note_what_a_stage_did(const Setup& setup, Stage stage, const State& before,
   const auto clusters_before = before.clusters.count(), clusters_after = after.clusters.count();
   switch (stage) {
     case Stage::detect: {
-      const auto first = setup.blade_moves.begin() + before.frame * setup.step.substeps;
-      const bool down =
-          std::any_of(first, first + setup.step.substeps, [](const BladeMove& move) { return move.down; });
+      const auto is_down = [&](int64_t substep) { return setup.blade_moves[static_cast<std::size_t>(substep)].down; };
+      bool down = false;  // detection may also run without a blade
+      for (int32_t s = 0; setup.has_blade && s < setup.step.substeps; ++s) {
+        down = down || is_down(before.frame * setup.step.substeps + s);
+      }
       if (!after.removed.empty()) judgement[Happened::removal] = true;
       if (after.removed.empty() && down && alive_count(before) > 0) judgement[Happened::miss] = true;
       if (oracles::graph_components(setup, after).count > oracles::graph_components(setup, before).count) {

@@ -13,7 +13,7 @@
 
 namespace cutproof::cli {
 
-// A column of Table 1.
+// A column of Table 1; or the irregular path of Fig. 13, which the paper shows and does not time.
 struct PaperScene {
   std::string name;                            // of the column
   std::string file;                            // the scene in fixtures/scenes that restates the figure
@@ -22,11 +22,15 @@ struct PaperScene {
   // enclose the scene's (cuboid: 12,800 particles in 20.2 ms, 37,704 in 42.1; liver: 63,649 in 48.34, 101,096
   // in 59.75).
   int64_t full_particles = 0;
-  int64_t small_particles = 0;          // where nobody wants to wait
-  std::array<double, 6> stage_ms = {};  // in the order of the stages
-  double frame_ms = 0;                  // less than their sum: the paper overlaps stages
+  int64_t small_particles = 0;  // where nobody wants to wait
+  struct Milliseconds {
+    std::array<double, 6> stage = {};  // in the order of the stages
+    double frame = 0;                  // less than their sum: the paper overlaps stages
+  };
+  std::optional<Milliseconds> paper;
+  bool sampled_only = false;  // the figure is about clusters that leave edges uncovered
 };
-// cuboid, liver, kidney. find: null if there is none of that name.
+// cuboid, liver, kidney, irregular. find: null if there is none of that name.
 const std::vector<PaperScene>& paper_scenes();
 const PaperScene* find_paper_scene(const std::string& name);
 
@@ -47,10 +51,10 @@ Cooking cooking_of(const std::string& name);
 // std::out_of_range for a scene that is none of those.
 Scene paper_scene(const std::string& file);
 
-// The scene `file`, called `name`, with so many particles. `sampled`: as many balls as the paper has clusters; they do
-// not cover every edge, with the paper's expansion, which is due in every frame that removes something. The timed
-// frames are those around the middle of the last stroke. Throws InputError if that stroke and what comes after it have
-// fewer frames than are wanted.
+// A scene with so many particles. `sampled`: balls that do not cover every edge, with the paper's expansion, which is
+// due in every frame that removes something; as many of them as the paper has clusters, unless the scene says how large
+// they are. The timed frames are those around the middle of the last stroke. Throws InputError if that stroke and what
+// comes after it have fewer frames than are wanted.
 BenchScene make_paper_scene(const std::string& file, const std::string& name, int64_t particles, Cooking cooking,
                             int64_t frames);
 

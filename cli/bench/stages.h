@@ -66,6 +66,7 @@ struct FrameErrors {
   };
   std::optional<Detection> detect;
   std::array<std::optional<bool>, 6> clusters_equal;  // split, merge, expand: same clusters, same numbers
+  int64_t added = 0;                                  // memberships, by expansion in the timed frames (measure)
   struct Surface {
     Distances vertices;
     bool triangles_equal = true;  // as sets; vertices named by owner and direction
