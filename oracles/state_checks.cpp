@@ -511,7 +511,8 @@ Verdict check_component_match(Judged& judged, SkinMatch skin) {
   }
   if (ghosts > 0) violate(verdict, first_ghost_coupling(judged));
   verdict.measured = static_cast<double>(surplus + ghosts);
-  if (skin != SkinMatch::none && skin_is_due(judged)) match_skin(judged, verdict, skin == SkinMatch::shells_by_cgal_too);
+  if (skin != SkinMatch::none && skin_is_due(judged))
+    match_skin(judged, verdict, skin == SkinMatch::shells_by_cgal_too);
   for (const int32_t label : components.label) verdict.checked += label >= 0 ? 1 : 0;
   return verdict;
 }
@@ -796,9 +797,8 @@ Verdict cluster_connectivity(const Setup& setup, const State& state) {
 }
 Verdict coverage(const Setup& setup, const State& state) { return gated("coverage", setup, state, check_coverage); }
 Verdict component_match(const Setup& setup, const State& state) {
-  return gated("component match", setup, state, [](Judged& judged) {
-    return check_component_match(judged, SkinMatch::shells_by_cgal_too);
-  });
+  return gated("component match", setup, state,
+               [](Judged& judged) { return check_component_match(judged, SkinMatch::shells_by_cgal_too); });
 }
 Verdict isolation(const Setup& setup, const State& state) { return gated("isolation", setup, state, check_isolation); }
 Verdict edge_cover(const Setup& setup, const State& state) {
@@ -886,9 +886,8 @@ struct Judge::Memory {
   template <typename Check>
   Verdict ask(const char* property, unsigned parts, Check check, SkinMatch skin = SkinMatch::none) {
     if (!form.holds) return not_judged(property, form);
-    const auto known = std::find_if(held.begin(), held.end(), [&](const Held& h) {
-      return h.property == property && h.skin == skin;
-    });
+    const auto known =
+        std::find_if(held.begin(), held.end(), [&](const Held& h) { return h.property == property && h.skin == skin; });
     if (known != held.end()) {
       Verdict verdict = known->verdict;
       verdict.frame = last->frame;
@@ -901,9 +900,7 @@ struct Judge::Memory {
 
   Verdict ask_finite() { return ask("finite", kMotion | kFrames | kRotations | kSkin, check_finite); }
   Verdict ask_rest_frames() { return ask("rest frames", kSets | kFrames, check_rest_frames); }
-  Verdict ask_merge_maximality() {
-    return ask("merge maximality", kAlive | kSets | kLimits, check_merge_maximality);
-  }
+  Verdict ask_merge_maximality() { return ask("merge maximality", kAlive | kSets | kLimits, check_merge_maximality); }
   // Not kept: it rests on the frame's blade.
   Verdict ask_no_pass() { return form.holds ? check_no_pass(*judged) : not_judged("no pass", form); }
 };
@@ -928,9 +925,7 @@ std::vector<Verdict> Judge::state(const State& state, Stage after, bool thorough
   const auto add = [&](bool applies, auto ask) {
     if (applies) verdicts.push_back(ask());
   };
-  const auto of_skin = [&](auto check) {
-    return [&setup, &state, check](Judged&) { return check(setup, state); };
-  };
+  const auto of_skin = [&](auto check) { return [&setup, &state, check](Judged&) { return check(setup, state); }; };
   add(true, [&] { return m.ask_finite(); });
   add(split_done, [&] { return m.ask("cluster connectivity", kAlive | kSets, check_connectivity); });
   add(split_done, [&] { return m.ask("coverage", kAlive | kSets | kCut, check_coverage); });
@@ -949,7 +944,8 @@ std::vector<Verdict> Judge::state(const State& state, Stage after, bool thorough
   add(after == Stage::detect && setup.has_blade, [&] { return m.ask_no_pass(); });
   add(skin_here, [&] { return m.ask("skin surface", kAlive | kSkin, of_skin(skin_surface)); });
   add(skin_here, [&] {
-    return m.ask("skin vertices", kAlive | kSkin | kSets | kFrames | kRotations | kMotion, of_skin(check_skin_vertices));
+    return m.ask("skin vertices", kAlive | kSkin | kSets | kFrames | kRotations | kMotion,
+                 of_skin(check_skin_vertices));
   });
   add(skin_here && thorough, [&] { return m.ask("skin geometry", kAlive | kSkin, of_skin(skin_geometry)); });
   for (Verdict& verdict : verdicts) verdict.stage = after;

@@ -97,8 +97,8 @@ inline constexpr std::array<const char*, kHistoryHappenedCount> kHistoryHappened
 class History {
  public:
   using Source = std::function<std::unique_ptr<Backend>()>;
-  // Loads the case. Requires one stroke a frame (Case::together): a stroke that is added later takes a frame of its own.
-  // Throws std::invalid_argument.
+  // Loads the case. Requires one stroke a frame (Case::together): a stroke that is added later takes a frame of its
+  // own. Throws std::invalid_argument.
   History(Source make, Case c);
 
   // Does nothing once there is a failure. Throws what backends throw.

@@ -16,8 +16,8 @@ class AtomicFile {
   AtomicFile& operator=(const AtomicFile&) = delete;
   const std::string& temporary() const { return temporary_; }
   void commit();  // throws MachineError if the rename fails
-  // For a program that ends without unwinding: removes what every AtomicFile of the process has not committed. Allocates
-  // nothing. No other thread may be making or destroying one.
+  // For a program that ends without unwinding: removes what every AtomicFile of the process has not committed.
+  // Allocates nothing. No other thread may be making or destroying one.
   static void remove_unfinished() noexcept;
 
  private:

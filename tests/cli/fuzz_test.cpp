@@ -15,8 +15,7 @@ class Fuzz : public Program {
  protected:
   json result(const std::string& name) const { return json::parse(read(name)); }
   // A body of six particles that one stroke parts.
-  void write_counterexample(const std::string& name, const std::string& backend,
-                            const json& commands = json()) const {
+  void write_counterexample(const std::string& name, const std::string& backend, const json& commands = json()) const {
     Counterexample counterexample;
     for (int32_t i = 0; i < 6; ++i) counterexample.failing.nodes.push_back({i, 0, 0});
     counterexample.failing.strokes = {{{10, -4, -4}, {10, -4, 4}, 2, true, Link::apart}};

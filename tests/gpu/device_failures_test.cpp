@@ -156,7 +156,7 @@ INTERCEPT(cudaEventElapsedTime, (float* milliseconds, cudaEvent_t begin, cudaEve
 INTERCEPT(cudaEventRecord, (cudaEvent_t event, cudaStream_t stream), (event, stream))
 INTERCEPT_WAIT(cudaEventSynchronize, (cudaEvent_t event), (event))
 INTERCEPT_WAIT(cudaStreamSynchronize, (cudaStream_t stream), (stream))
-INTERCEPT(cudaMemGetInfo, (size_t* free, size_t* all), (free, all))
+INTERCEPT(cudaMemGetInfo, (size_t * free, size_t* all), (free, all))
 INTERCEPT(cudaMemcpy, (void* to, const void* from, size_t bytes, cudaMemcpyKind kind), (to, from, bytes, kind))
 INTERCEPT(cudaMemcpyAsync, (void* to, const void* from, size_t bytes, cudaMemcpyKind kind, cudaStream_t stream),
           (to, from, bytes, kind, stream))

@@ -296,7 +296,7 @@ void check_warp_operations(Machine& machine) {
   auto wides = machine.array(std::vector<unsigned long long>(kThreads));
   auto vectors = machine.array(std::vector<Float3>(2 * kThreads));
   const Warped out{unsigneds.at(), unsigneds.at() + kThreads, ints.at(), ints.at() + kThreads, wides.at(),
-                   vectors.at(),    vectors.at() + kThreads};
+                   vectors.at(),   vectors.at() + kThreads};
   machine.run([&](auto& launcher) { launcher.items(warp_kernel_object{}, kThreads, out); });
   for (int at = 0; at < kThreads; ++at) {
     const int lane = at % 32, warp = at - lane;

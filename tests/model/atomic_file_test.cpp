@@ -49,9 +49,7 @@ TEST_F(AtomicFileTest, NothingIsLeftWithoutACommit) {
 
 TEST_F(AtomicFileTest, NothingIsLeftWhereAProgramEndsWithoutUnwinding) {
   AtomicFile finished(in_folder("a")), unfinished(in_folder("b"));
-  {
-    const AtomicFile gone(in_folder("c"));
-  }
+  { const AtomicFile gone(in_folder("c")); }
   std::ofstream(finished.temporary()) << "new";
   std::ofstream(unfinished.temporary()) << "half";
   finished.commit();
