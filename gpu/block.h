@@ -18,12 +18,12 @@
 // Members of a Block, B standing for DeviceBlock or HostBlock:
 //   static constexpr bool on_device;
 //   int thread(), size(), index(), count();     thread in block, threads per block, block in grid, blocks in grid;
-//   sizes
-//                                               are multiples of 32
-//   int64_t first(), stride();                  for grid-stride loops over single items: index·size + thread,
-//   count·size void sync(); T* shared<T>(int count);                    aligned to 16 bytes; counts against the
-//   launch's shared_bytes, rounded up
-//                                               to a multiple of 16
+//                                               sizes are multiples of 32
+//   int64_t first(), stride();                  for grid-stride loops over single items:
+//                                               index·size + thread, count·size
+//   void sync();
+//   T* shared<T>(int count);                    aligned to 16 bytes; counts against the launch's shared_bytes,
+//                                               rounded up to a multiple of 16
 //   T sum<T>(T), T smallest<T>(T), bool any(bool);   to all threads; in a fixed order, so floats are reproducible for
 //                                               equal block sizes. T: trivially copyable, at most 60 bytes, with + or <
 //   int exclusive_scan(int value, int& total);  in thread order
