@@ -61,6 +61,19 @@ struct ReplayOptions {
 };
 int replay(const ReplayOptions& options);
 
+struct TuneOptions {
+  std::string scene;
+  BackendChoice backend;
+  double tolerance = 0;          // [h]
+  std::string answer = "limit";  // what errors are distances from: limit, substeps
+  std::optional<int64_t> frames;
+  bool without_skin = false;
+  int repeats = 3;    // timed runs of a configuration
+  std::string write;  // the scene that was found; empty: NAME_tuned.json in the working folder
+  std::string json;
+};
+int tune(const TuneOptions& options);
+
 inline constexpr const char* kVersion = CUTPROOF_VERSION;
 
 }  // namespace cutproof::cli

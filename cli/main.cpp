@@ -125,6 +125,35 @@ int run_command_line(int argc, char** argv) {
 
   const std::function<int()> bench = add_bench(app);
 
+  TuneOptions tune_options;
+  CLI::App* tune_command = app.add_subcommand("tune", "find the cheapest configuration of a scene within a tolerance");
+  tune_command->add_option("scene", tune_options.scene, "scene file (JSON); see `cutproof info --scene`")
+      ->required()
+      ->type_name("SCENE");
+  tune_command
+      ->add_option("--tolerance", tune_options.tolerance, "greatest RMS distance from the answer in any frame [h]")
+      ->required()
+      ->type_name("T")
+      ->check(CLI::PositiveNumber);
+  tune_command
+      ->add_option("--answer", tune_options.answer,
+                   "limit: of ever shorter time steps; substeps: the scene's own, each solved until it is converged")
+      ->capture_default_str()
+      ->type_name("A")
+      ->check(CLI::IsMember({"limit", "substeps"}));
+  add_backend(*tune_command, tune_options.backend, "who is timed; `cutproof info` lists them");
+  tune_command->add_option("--frames", tune_options.frames, "look at so many frames of the scene only")
+      ->type_name("N")
+      ->check(CLI::PositiveNumber);
+  tune_command->add_flag("--without-skin", tune_options.without_skin, "nobody looks at the skin: it need not be made");
+  tune_command->add_option("--repeats", tune_options.repeats, "timed runs of each configuration")
+      ->capture_default_str()
+      ->type_name("N")
+      ->check(CLI::Range(1, 1000));
+  tune_command->add_option("--write", tune_options.write, "the scene that was found (default: NAME_tuned.json here)")
+      ->type_name("F");
+  tune_command->add_option("--json", tune_options.json, "write everything that was tried")->type_name("F");
+
   FuzzOptions fuzz_options;
   CLI::App* fuzz_command = app.add_subcommand("fuzz", "random dissections until one is wrong, and that one simplified");
   add_backend(*fuzz_command, fuzz_options.backend, "whom to find faults in; `cutproof info` lists them");
@@ -189,6 +218,7 @@ int run_command_line(int argc, char** argv) {
   }
   if (check_command->parsed()) return check(check_options);
   if (info_command->parsed()) return info(info_options);
+  if (tune_command->parsed()) return tune(tune_options);
   if (fuzz_command->parsed()) return fuzz(fuzz_options);
   if (replay_command->parsed()) {
     if (!replay_backend.name.empty()) replay_options.backend = replay_backend;

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <functional>
 #include <map>
 #include <optional>
 
@@ -8,6 +7,7 @@
 #include "cli/backends.h"
 #include "cli/commands.h"
 #include "cli/errors.h"
+#include "cli/frame.h"
 #include "cli/gate.h"
 #include "cli/results.h"
 #include "cli/terminal.h"
@@ -39,54 +39,6 @@ AgainstMode against_mode(const RunOptions& options) {
   return options.mode == "lockstep" ? AgainstMode::lockstep
          : options.mode == "shadow" ? AgainstMode::shadow
                                     : AgainstMode::both;
-}
-
-// Runs one frame and hands its snapshots to `see`: after every stage that ran from detect on if something was removed,
-// else once, after the last stage. `against`, if not null, sees every stage. Without anyone to see them the frame runs
-// whole.
-FrameResult run_frame(Backend& backend, bool watched, const std::function<void(Stage, const State&)>& see,
-                      Against* against) {
-  FrameResult result;
-  const auto run = [&](Span span) {
-    backend.run(span);
-    const SpanReport report = backend.report();
-    result.total_seconds += report.total_seconds;
-    for (const Stage stage : kStages) {
-      const auto s = static_cast<std::size_t>(stage);
-      result.ran[s] = result.ran[s] || report.ran[s];
-      result.seconds[s] += report.seconds[s];
-    }
-  };
-  const auto ran = [&](Stage stage) { return result.ran[static_cast<std::size_t>(stage)]; };
-
-  const auto run_stage = [&](Stage stage) {
-    run({stage, stage});
-    if (against == nullptr) return;
-    against->see(stage, backend.snapshot().front(), backend.report().ran[static_cast<std::size_t>(stage)]);
-  };
-
-  if (!watched && against == nullptr) {
-    run({Stage::step, Stage::skin});
-  } else {
-    run_stage(Stage::step);
-    run_stage(Stage::detect);
-    const bool cut = ran(Stage::detect) && !backend.snapshot().front().removed.empty();
-    if (cut) see(Stage::detect, backend.snapshot().front());
-    for (const Stage stage : {Stage::split, Stage::merge, Stage::expand}) {
-      run_stage(stage);
-      if (cut && ran(stage)) see(stage, backend.snapshot().front());
-    }
-    run_stage(Stage::skin);
-  }
-  const State state = backend.snapshot().front();
-  if (watched) see(Stage::skin, state);
-  result.frame = state.frame - 1;
-  result.removed = static_cast<int64_t>(state.removed.size());
-  result.debris = static_cast<int64_t>(state.debris.size());
-  for (const uint8_t alive : state.alive) result.alive += alive;
-  result.clusters = state.clusters.count();
-  result.triangles = static_cast<int64_t>(state.skin.triangles.size());
-  return result;
 }
 
 void print_header(const Scene& scene, const fixtures::Built& built, const RunOptions& options) {
@@ -189,7 +141,9 @@ int run(const RunOptions& options) {
       };
       const bool looked_at = errors && errors->wants(frame);
       if (looked_at) errors->frame_begins(backend->snapshot().front());
-      result.frames.push_back(run_frame(*backend, gate || recorder, see, against ? &*against : nullptr));
+      const auto compare = [&](Stage stage, const State& state, bool ran) { against->see(stage, state, ran); };
+      result.frames.push_back(
+          run_frame(*backend, gate || recorder ? SeeState(see) : nullptr, against ? SeeStage(compare) : nullptr));
       if (looked_at) errors->frame_ends(backend->snapshot().front());
       progress.show(frame + 1, fmt::format("{} clusters, {} particles", result.frames.back().clusters,
                                            result.frames.back().alive));

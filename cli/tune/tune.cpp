@@ -1,0 +1,413 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/backends.h"
+#include "cli/bench/report.h"
+#include "cli/commands.h"
+#include "cli/frame.h"
+#include "cli/gate.h"
+#include "cli/json_number.h"
+#include "cli/terminal.h"
+#include "cli/tune/answer.h"
+#include "cli/tune/search.h"
+#include "model/error.h"
+#include "model/io/atomic_file.h"
+#include "model/io/scene_io.h"
+
+namespace cutproof::cli {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr Span kFrame = {Stage::step, Stage::skin};
+// The answer is refined until this part of the tolerance is left for what is not known of it, if it can be.
+constexpr double kUnknownShare = 0.25;
+
+// Methods that give no wrong answer to any hard case (docs/rotations.md). Another might be within the tolerance on this
+// scene and fail on the next cut.
+const std::vector<std::string>& sound_rotations() {
+  static const std::vector<std::string> names = {"newton", "jacobi4", "svd"};
+  return names;
+}
+
+// How far a backend goes from an answer, frame by frame.
+class Comparison {
+ public:
+  Comparison(const Setup& setup, const Course& answer) : setup_(setup), answer_(answer) {}
+
+  void add(const State& state) {
+    const std::size_t f = course_.frames.size();
+    course_.frames.push_back(oracles::pose_of(setup_, state, f == 0 ? nullptr : &course_.frames.back()));
+    if (f >= answer_.frames.size()) return;
+    const oracles::Apart apart = oracles::poses_apart(setup_, answer_.frames[f], course_.frames.back());
+    rms_h_.push_back(apart.position.rms());
+    greatest_h_ = std::max(greatest_h_, apart.position.greatest);
+    removed_otherwise_ = apart.alive_in_one;
+  }
+  double greatest_rms() const { return rms_h_.empty() ? 0 : *std::max_element(rms_h_.begin(), rms_h_.end()); }
+  void report(Trial& trial) const {
+    trial.rms_h = rms_h_;
+    trial.greatest_rms_h = greatest_rms();
+    trial.greatest_h = greatest_h_;
+    trial.removed_otherwise = removed_otherwise_;
+  }
+  Course& course() { return course_; }
+
+ private:
+  const Setup& setup_;
+  const Course& answer_;
+  Course course_;
+  std::vector<double> rms_h_;
+  double greatest_h_ = 0;
+  int64_t removed_otherwise_ = 0;
+};
+
+class Tuner {
+ public:
+  explicit Tuner(const TuneOptions& options);
+  int run();
+
+ private:
+  std::unique_ptr<Backend> backend_for(const Configuration& configuration) const {
+    BackendChoice choice = options_.backend;
+    choice.rotation = configuration.rotation;
+    return make_backend(choice);
+  }
+  Staged staged(const Configuration& configuration, const Backend& backend) const {
+    return {configuration.scene, options_.scene, options_.frames, backend.unit_roundoff()};
+  }
+  bool is_given(const Configuration& configuration) const { return configuration == given_; }
+  // From the answer as it is known: what is left of the tolerance.
+  double allowed() const { return options_.tolerance - answer_->known_to_h(); }
+  SearchSpace space() const;
+  Trial measure(const Configuration& configuration, std::optional<double> limit) const;
+  std::string text_of(const Configuration& configuration) const;
+
+  // What was written, read back and run by a fresh backend: every oracle and every expectation of the scene, and the
+  // distance from an answer that the search has not seen.
+  struct Verified {
+    Trial trial;
+    int64_t verdicts = 0;
+    std::string failure;  // empty: it holds
+  };
+  Verified verify(const Configuration& configuration, const std::string& text) const;
+
+  void print_answer() const;
+  void print(const std::vector<Trial>& trials) const;
+  json json_of(const Trial& trial) const;
+
+  const TuneOptions& options_;
+  std::string path_;  // of the scene that is written
+  Configuration given_;
+  std::optional<Answer> answer_;
+};
+
+std::string path_to_write(const TuneOptions& options) {
+  namespace fs = std::filesystem;
+  const fs::path path = options.write.empty() ? fs::path(options.scene).stem().string() + "_tuned.json" : options.write;
+  std::error_code error;
+  if (fs::equivalent(path, options.scene, error)) {
+    throw InputError("command line", "--write", fmt::format("'{}' is the scene that is tuned", path.string()),
+                     "give another name");
+  }
+  return path.string();
+}
+
+Tuner::Tuner(const TuneOptions& options)
+    : options_(options), path_(path_to_write(options)), given_{io::read_scene(options.scene), ""} {
+  if (given_.scene.step.solver != Solver::implicit) {
+    throw InputError(options.scene, "step.solver",
+                     "'published' has no answer that it comes closer to: its stiffness depends on the number of "
+                     "iterations and substeps",
+                     "use \"implicit\" with a stiffness");
+  }
+  if (options.backend.name != "reference") given_.rotation = rotation_of(options.backend);
+}
+
+SearchSpace Tuner::space() const {
+  SearchSpace space;
+  const int32_t given = given_.scene.step.substeps;
+  space.substeps = substeps_to_try(given, std::max(Answer::kMostSubsteps / 4, given));
+  space.most_iterations = std::max(64, given_.scene.step.iterations);
+  if (options_.backend.name != "reference") {
+    for (const std::string& rotation : sound_rotations()) {
+      if (rotation != given_.rotation) space.rotations.push_back(rotation);
+    }
+  }
+  space.nothing_removed = answer_->nothing_removed();
+  space.resize = !given_.scene.expect.clusters.has_value();
+  space.skin = !options_.without_skin;
+  return space;
+}
+
+double seconds_of_frames(Backend& backend, const Staged& staged) {
+  double seconds = 0;
+  backend.load({staged.setup()}, {staged.start()});
+  for (int64_t frame = 0; frame < staged.frame_count(); ++frame) {
+    staged.run_frame(frame, [&] {
+      backend.run(kFrame);
+      seconds += backend.report().total_seconds;
+    });
+  }
+  return seconds / static_cast<double>(std::max<int64_t>(1, staged.frame_count()));
+}
+
+Trial Tuner::measure(const Configuration& configuration, std::optional<double> limit) const {
+  Trial trial;
+  trial.configuration = configuration;
+  const bool to_the_end = is_given(configuration);
+  const std::unique_ptr<Backend> backend = backend_for(configuration);
+  std::optional<Staged> scene;
+  try {
+    scene.emplace(staged(configuration, *backend));
+  } catch (const InputError& error) {  // such as a blade that few substeps cannot follow
+    if (to_the_end) throw;
+    trial.why = error.what();
+    return trial;
+  }
+  Comparison comparison(scene->setup(), answer_->course());
+  double seconds = 0;
+  backend->load({scene->setup()}, {scene->start()});
+  for (int64_t frame = 0; frame < scene->frame_count(); ++frame) {
+    scene->run_frame(frame, [&] {
+      backend->run(kFrame);
+      seconds += backend->report().total_seconds;
+    });
+    comparison.add(backend->snapshot().front());
+    if (to_the_end) continue;
+    if (!(comparison.greatest_rms() <= allowed())) {
+      trial.why = fmt::format("given up in frame {} of {}", frame, scene->frame_count());
+      comparison.report(trial);
+      return trial;
+    }
+    // What is dearer by its first run may be a little less so by its median.
+    if (limit && seconds > 1.5 * *limit * static_cast<double>(scene->frame_count())) {
+      comparison.report(trial);
+      trial.outcome = Outcome::dearer;
+      trial.why = fmt::format("given up in frame {} of {}", frame, scene->frame_count());
+      return trial;
+    }
+  }
+  comparison.report(trial);
+  comparison.course().stroke_end = scene->stroke_end();
+  trial.why = other_parts(answer_->course(), comparison.course());
+  trial.outcome = !trial.why.empty()                       ? Outcome::topology
+                  : comparison.greatest_rms() <= allowed() ? Outcome::within
+                                                           : Outcome::over;
+  if (trial.outcome == Outcome::within || to_the_end) {
+    std::vector<double> samples;
+    for (int repeat = 0; repeat < options_.repeats; ++repeat) samples.push_back(seconds_of_frames(*backend, *scene));
+    trial.frame = times_of(samples);
+  }
+  return trial;
+}
+
+std::string Tuner::text_of(const Configuration& configuration) const {
+  namespace fs = std::filesystem;
+  Scene scene = configuration.scene;
+  if (scene.body.mesh && fs::path(scene.body.mesh->file).is_relative()) {
+    // Named from where the new scene lies.
+    const fs::path file = fs::absolute(fs::path(options_.scene)).parent_path() / scene.body.mesh->file;
+    scene.body.mesh->file = file.lexically_proximate(fs::absolute(fs::path(path_)).parent_path()).string();
+  }
+  return io::write_scene(scene);
+}
+
+Tuner::Verified Tuner::verify(const Configuration& configuration, const std::string& text) const {
+  Verified verified;
+  verified.trial.configuration = configuration;
+  const Scene scene = io::parse_scene(text, path_);
+  const std::unique_ptr<Backend> backend = backend_for(configuration);
+  const Staged staged(scene, path_, options_.frames, backend->unit_roundoff());
+  backend->load({staged.setup()}, {staged.start()});
+  // What a scene expects is of all of it.
+  const Expectations expected = options_.frames ? Expectations{} : scene.expect;
+  Gate gate(staged.setup(), expected, options_.backend.name, backend->snapshot().front());
+  Comparison comparison(staged.setup(), answer_->course());
+  for (int64_t frame = 0; frame < staged.frame_count(); ++frame) {
+    staged.run_frame(
+        frame, [&] { run_frame(*backend, [&](Stage stage, const State& state) { gate.see(stage, state); }, {}); });
+    comparison.add(backend->snapshot().front());
+  }
+  gate.finish();
+  comparison.report(verified.trial);
+  comparison.course().stroke_end = staged.stroke_end();
+  verified.verdicts = static_cast<int64_t>(gate.verdicts().size());
+  verified.failure = other_parts(answer_->course(), comparison.course());
+  if (verified.failure.empty() && !(comparison.greatest_rms() <= allowed())) {
+    verified.failure = fmt::format("it is {:.2g} h from a finer answer, known to {:.2g} h", comparison.greatest_rms(),
+                                   answer_->known_to_h());
+  }
+  for (const Verdict& verdict : gate.verdicts()) {
+    if (!verified.failure.empty()) break;
+    if (verdict.holds || gate.expected_failure(verdict)) continue;
+    verified.failure = fmt::format("{} fails in frame {}: {}", verdict.property, verdict.frame, verdict.witness.text);
+  }
+  return verified;
+}
+
+void Tuner::print_answer() const {
+  fmt::print("the answer: {}\n", options_.answer == "limit" ? "the limit of short time steps"
+                                                            : "the scene's own substeps, each solved until converged");
+  for (const Level& level : answer_->levels()) {
+    fmt::print("  reference, {} × {}{}\n", level.substeps, level.iterations,
+               level.apart_h ? fmt::format(": {:.2g} h from the one before", *level.apart_h) : "");
+  }
+  std::fflush(stdout);
+}
+
+const char* name_of(Acceleration acceleration) { return acceleration == Acceleration::none ? "none" : "chebyshev"; }
+
+void Tuner::print(const std::vector<Trial>& trials) const {
+  Table table({"substeps × iterations", "acceleration", "RMS h", "max h", "removed otherwise", "ms a frame", "of given",
+               "outcome", "else"});
+  const double given = trials.front().frame.median;
+  for (const Trial& trial : trials) {
+    const StepParameters& step = trial.configuration.scene.step;
+    const bool timed = trial.frame.count > 0;
+    std::string other = differences(trial.configuration, given_);
+    if (!trial.why.empty()) other += (other.empty() ? "" : "; ") + trial.why;
+    table.add({fmt::format("{} × {}", step.substeps, step.iterations), name_of(step.acceleration),
+               fmt::format("{:.2g}", trial.greatest_rms_h), fmt::format("{:.2g}", trial.greatest_h),
+               fmt::format("{}", trial.removed_otherwise),
+               timed ? fmt::format("{:.3f}", 1e3 * trial.frame.median) : "-",
+               timed ? fmt::format("{:.2f}", trial.frame.median / given) : "-", name_of(trial.outcome), other});
+  }
+  fmt::print("\n{}", table.text());
+}
+
+json Tuner::json_of(const Trial& trial) const {
+  const Scene& scene = trial.configuration.scene;
+  json rms = json::array();
+  for (const double value : trial.rms_h) rms.push_back(json_number(value));
+  return {{"substeps", scene.step.substeps},
+          {"iterations", scene.step.iterations},
+          {"acceleration", name_of(scene.step.acceleration)},
+          {"rotation", trial.configuration.rotation.empty() ? json(nullptr) : json(trial.configuration.rotation)},
+          {"differences", differences(trial.configuration, given_)},
+          {"outcome", name_of(trial.outcome)},
+          {"why", trial.why},
+          {"rms_h", json_number(trial.greatest_rms_h)},
+          {"max_h", json_number(trial.greatest_h)},
+          {"rms_h_by_frame", rms},
+          {"removed_otherwise", trial.removed_otherwise},
+          {"seconds_per_frame", to_json(trial.frame)}};
+}
+
+int Tuner::run() {
+  require_timed_backend(options_.backend.name);
+  require_writable(options_.json);
+  require_writable(path_);
+  json document = begin_report("tune", options_.backend.name);
+  const auto finish = [&](int status) {
+    document["complete"] = true;
+    write_report(options_.json, document);
+    if (!options_.json.empty()) fmt::print("wrote {}\n", options_.json);
+    return status;
+  };
+  fmt::print("scene {}: {}\n", given_.scene.name, given_.scene.description);
+  const AnswerKind kind = options_.answer == "limit" ? AnswerKind::limit : AnswerKind::substeps;
+  answer_.emplace(kind, given_.scene, options_.scene, options_.frames, kUnknownShare * options_.tolerance);
+  print_answer();
+  document["scene"] = options_.scene;
+  document["tolerance_h"] = options_.tolerance;
+  document["repeats"] = options_.repeats;
+  document["trials"] = json::array();
+  document["found"] = nullptr;
+  const auto report_answer = [&] {
+    json levels = json::array();
+    for (const Level& level : answer_->levels()) {
+      levels.push_back({{"substeps", level.substeps},
+                        {"iterations", level.iterations},
+                        {"apart_h", level.apart_h ? json_number(*level.apart_h) : json(nullptr)}});
+    }
+    document["answer"] = {{"kind", options_.answer}, {"levels", levels}};
+  };
+  report_answer();
+  if (!(answer_->known_to_h() < options_.tolerance)) {
+    fmt::print(
+        "the answer is known to {:.2g} h only, so nothing can be said to be within {:g} h of it.\n"
+        "  Give a greater tolerance{}.\n",
+        answer_->known_to_h(), options_.tolerance,
+        kind == AnswerKind::limit ? ", fewer --frames, or --answer substeps, which takes the scene's time step as given"
+                                  : " or fewer --frames");
+    return finish(1);
+  }
+
+  const std::vector<Trial> trials = search(
+      given_, space(),
+      [&](const Configuration& configuration, std::optional<double> limit) { return measure(configuration, limit); });
+  print(trials);
+  for (const Trial& trial : trials) document["trials"].push_back(json_of(trial));
+  const std::vector<std::size_t> candidates = by_cost(trials);
+  if (candidates.empty()) {
+    fmt::print("none of {} configurations is within {:g} h of the answer, itself known to {:.2g} h\n", trials.size(),
+               options_.tolerance, answer_->known_to_h());
+    return finish(1);
+  }
+
+  answer_->refine();
+  report_answer();
+  for (const std::size_t index : candidates) {
+    const Configuration& found = trials[index].configuration;
+    const std::string text = text_of(found);
+    const Verified verified = verify(found, text);
+    const std::string name = fmt::format("{} × {}, acceleration {}", found.scene.step.substeps,
+                                         found.scene.step.iterations, name_of(found.scene.step.acceleration));
+    if (!verified.failure.empty()) {
+      fmt::print("{} is not taken: {}\n", name, verified.failure);
+      continue;
+    }
+    // Taken in turns, so that what the machine does meanwhile falls on both; and anew, because the least of many
+    // figures is too good.
+    std::vector<double> before, after;
+    for (int repeat = 0; repeat < options_.repeats; ++repeat) {
+      for (const bool given : {true, false}) {
+        const Configuration& timed = given ? given_ : found;
+        const std::unique_ptr<Backend> backend = backend_for(timed);
+        (given ? before : after).push_back(seconds_of_frames(*backend, staged(timed, *backend)));
+      }
+    }
+    const Times given = times_of(before), tuned = times_of(after);
+    io::AtomicFile file(path_);
+    io::write_text(file.temporary(), text);
+    file.commit();
+    const std::string other = differences(found, given_);
+    fmt::print(
+        "\nfound: {}{}\n"
+        "  {:.3f} ms a frame ({:.3f} to {:.3f}), as given {:.3f} ({:.3f} to {:.3f}): {:.2f} times cheaper\n"
+        "  verified: RMS {:.2g} h, max {:.2g} h from the reference's {} × {}, {:.2g} h from the one before; "
+        "{} verdicts hold\n"
+        "wrote {}\n",
+        name, other.empty() ? "" : ", " + other, 1e3 * tuned.median, 1e3 * tuned.min, 1e3 * tuned.max,
+        1e3 * given.median, 1e3 * given.min, 1e3 * given.max, given.median / tuned.median,
+        verified.trial.greatest_rms_h, verified.trial.greatest_h, answer_->levels().back().substeps,
+        answer_->levels().back().iterations, answer_->known_to_h(), verified.verdicts, path_);
+    if (found.rotation != given_.rotation) {
+      fmt::print("  rotations are no part of a scene: run it with --rotation {}\n", found.rotation);
+    }
+    document["found"] = {{"trial", index},
+                         {"verified", json_of(verified.trial)},
+                         {"verdicts", verified.verdicts},
+                         {"seconds_per_frame", cli::to_json(tuned)},
+                         {"seconds_per_frame_as_given", cli::to_json(given)},
+                         {"times_cheaper", given.median / tuned.median}};
+    return finish(0);
+  }
+  fmt::print("no configuration that seemed to be within {:g} h holds when it is verified\n", options_.tolerance);
+  return finish(1);
+}
+
+}  // namespace
+
+int tune(const TuneOptions& options) { return Tuner(options).run(); }
+
+}  // namespace cutproof::cli
