@@ -68,7 +68,7 @@ std::vector<int32_t> substeps_to_try(int32_t given, int32_t most);
 // Nothing is tried twice.
 inline constexpr double kHelps = 0.05;
 // A configuration counts as cheaper than another if its median is by this much less: below it is the timer's noise.
-inline constexpr double kCheaper = 0.02;
+inline constexpr double kCheaper = 0.05;
 std::vector<Trial> search(const Configuration& given, const SearchSpace& space, const Measure& measure);
 
 // Indices of those within, the cheapest first.

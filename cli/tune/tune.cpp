@@ -382,15 +382,16 @@ void Tuner::print(const Found& found, const Configuration& configuration) const 
     fmt::print("\nfound: {} × {}, acceleration {}{}\n", step.substeps, step.iterations, name_of(step.acceleration),
                other.empty() ? "" : ", " + other);
   }
+  const double ratio = given.median / tuned.median;
+  fmt::print("  {:.3f} ms a frame ({:.3f} to {:.3f}), as given {:.3f} ({:.3f} to {:.3f}): {}\n", 1e3 * tuned.median,
+             1e3 * tuned.min, 1e3 * tuned.max, 1e3 * given.median, 1e3 * given.min, 1e3 * given.max,
+             ratio >= 1 ? fmt::format("{:.2f} times cheaper", ratio)
+                        : fmt::format("{:.2f} times as dear, and what was given is not within", 1 / ratio));
   fmt::print(
-      "  {:.3f} ms a frame ({:.3f} to {:.3f}), as given {:.3f} ({:.3f} to {:.3f}): {:.2f} times cheaper\n"
       "  verified: RMS {:.2g} h, max {:.2g} h from the reference's {} × {}, {:.2g} h from the one before; "
-      "{} verdicts hold\n"
-      "wrote {}\n",
-      1e3 * tuned.median, 1e3 * tuned.min, 1e3 * tuned.max, 1e3 * given.median, 1e3 * given.min, 1e3 * given.max,
-      given.median / tuned.median, found.verified.trial.greatest_rms_h, found.verified.trial.greatest_h,
-      answer_->levels().back().substeps, answer_->levels().back().iterations, answer_->known_to_h(),
-      found.verified.verdicts, path_);
+      "{} verdicts hold\nwrote {}\n",
+      found.verified.trial.greatest_rms_h, found.verified.trial.greatest_h, answer_->levels().back().substeps,
+      answer_->levels().back().iterations, answer_->known_to_h(), found.verified.verdicts, path_);
   if (configuration.rotation != given_.rotation) {
     fmt::print("  rotations are no part of a scene: run it with --rotation {}\n", configuration.rotation);
   }
