@@ -195,12 +195,19 @@ std::vector<Trial> search(const Configuration& given, const SearchSpace& space, 
 }
 
 std::vector<std::size_t> by_cost(const std::vector<Trial>& trials) {
-  std::vector<std::size_t> order;
+  std::vector<std::size_t> left, order;
   for (std::size_t t = 0; t < trials.size(); ++t) {
-    if (trials[t].outcome == Outcome::within) order.push_back(t);
+    if (trials[t].outcome == Outcome::within) left.push_back(t);
   }
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return trials[a].frame.median < trials[b].frame.median; });
+  const auto cost = [&](std::size_t t) { return trials[t].frame.median; };
+  while (!left.empty()) {
+    const double least = cost(
+        *std::min_element(left.begin(), left.end(), [&](std::size_t a, std::size_t b) { return cost(a) < cost(b); }));
+    const auto next =
+        std::find_if(left.begin(), left.end(), [&](std::size_t t) { return (1 - kCheaper) * cost(t) <= least; });
+    order.push_back(*next);
+    left.erase(next);
+  }
   return order;
 }
 

@@ -71,7 +71,8 @@ inline constexpr double kHelps = 0.05;
 inline constexpr double kCheaper = 0.05;
 std::vector<Trial> search(const Configuration& given, const SearchSpace& space, const Measure& measure);
 
-// Indices of those within, the cheapest first.
+// Indices of those within, the cheapest first; of those that cost the same but for noise (kCheaper), the one that was
+// tried first, which has less changed.
 std::vector<std::size_t> by_cost(const std::vector<Trial>& trials);
 
 }  // namespace cutproof::cli
