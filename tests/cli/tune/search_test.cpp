@@ -145,9 +145,9 @@ TEST(Search, DropsStagesThatNobodyNeeds) {
     Trial trial = model(configuration, limit);
     if (trial.outcome != Outcome::within) return trial;
     double seconds = trial.frame.median;
-    seconds += 4.0 * scene.skin.wanted + 4.0 * (scene.expand.rule != ExpandRule::none);
-    seconds += 4.0 * (scene.detect.criterion != Criterion::none) + 60.0 / scene.clusters.side;
-    seconds += (configuration.rotation == "quick" ? 0.0 : 4.0) + (scene.split.debris == 8 ? 0.0 : 4.0);
+    seconds += 6.0 * scene.skin.wanted + 6.0 * (scene.expand.rule != ExpandRule::none);
+    seconds += 6.0 * (scene.detect.criterion != Criterion::none) + 120.0 / scene.clusters.side;
+    seconds += (configuration.rotation == "quick" ? 0.0 : 6.0) + (scene.split.debris == 8 ? 0.0 : 6.0);
     trial.frame = {seconds, seconds, seconds, 1};
     if (scene.clusters.side > 6) {
       trial.outcome = Outcome::over;
