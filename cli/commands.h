@@ -68,6 +68,7 @@ struct TuneOptions {
   std::string answer = "limit";  // what errors are distances from: limit, substeps
   std::optional<int64_t> frames;
   bool without_skin = false;
+  bool full = false;  // nothing is given up: errors and times of all that is tried
   int repeats = 3;    // timed runs of a configuration
   std::string write;  // the scene that was found; empty: NAME_tuned.json in the working folder
   std::string json;

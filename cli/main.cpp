@@ -146,6 +146,10 @@ int run_command_line(int argc, char** argv) {
       ->type_name("N")
       ->check(CLI::PositiveNumber);
   tune_command->add_flag("--without-skin", tune_options.without_skin, "nobody looks at the skin: it need not be made");
+  tune_command->add_flag(
+      "--full", tune_options.full,
+      "run and time everything to its end, for a curve; else what is beyond the tolerance, or dearer "
+      "than what was found, is given up");
   tune_command->add_option("--repeats", tune_options.repeats, "timed runs of each configuration")
       ->capture_default_str()
       ->type_name("N")

@@ -39,7 +39,7 @@ struct Trial {
   double greatest_rms_h = 0, greatest_h = 0;  // over these frames [h]
   int64_t removed_otherwise = 0;              // particles that only this or only the answer has, in the last of them
   std::string why;                            // what a table says about a trial that is not within
-  Times frame;                                // seconds per frame of the scene; no samples if it is not within
+  Times frame;                                // seconds per frame of the scene; no samples if it was given up
 };
 
 // Runs and times a configuration. `limit`: the seconds per frame beyond which it may be given up as dearer.

@@ -188,13 +188,13 @@ double seconds_of_frames(Backend& backend, const Staged& staged) {
 Trial Tuner::measure(const Configuration& configuration, std::optional<double> limit) const {
   Trial trial;
   trial.configuration = configuration;
-  const bool to_the_end = is_given(configuration);
+  const bool to_the_end = options_.full || is_given(configuration);
   const std::unique_ptr<Backend> backend = backend_for(configuration);
   std::optional<Staged> scene;
   try {
     scene.emplace(staged(configuration, *backend));
   } catch (const InputError& error) {  // such as a blade that few substeps cannot follow
-    if (to_the_end) throw;
+    if (is_given(configuration)) throw;
     trial.why = error.what();
     return trial;
   }
