@@ -85,7 +85,7 @@ def picture(document):
         marks.append(((1e3 * found["seconds_per_frame"]["median"], found["rms_h"], found), "found"))
     for (x, y, trial), name in marks:
         parts.append(f'<circle cx="{px(x):.1f}" cy="{py(y):.1f}" r="8" fill="none" stroke="{MARK}" stroke-width="2"/>')
-        text(px(x) + 11, py(y) + 4, f"{name}: {trial['substeps']} × {trial['iterations']}", extra=f'fill="{MARK}"')
+        text(px(x) + 11, py(y) + 4, f"{name}: {trial['substeps']} × {trial['iterations']}", extra=f'fill="{MARK}" stroke="white" stroke-width="4" paint-order="stroke"')
     for k, (what, colour, fill) in enumerate(
         [("none", PLAIN, PLAIN), ("chebyshev", ACCELERATED, ACCELERATED), ("other parts", PLAIN, "white")]
     ):
