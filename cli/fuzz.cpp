@@ -58,9 +58,10 @@ CampaignOptions campaign_options(const FuzzOptions& options) {
   campaign.seed = options.seed;
   campaign.seconds = options.seconds;
   campaign.cases = options.cases.value_or(options.seconds ? std::numeric_limits<int64_t>::max() / 2 : 1000);
-  const std::string sizes_remedy = "give the least and the greatest size, such as 0-79; sizes go from 0 to 100";
+  const std::string sizes_remedy =
+      fmt::format("give the least and the greatest size, such as 0-79; sizes go from 0 to {}", kMostSize);
   const auto [least, most] = two_numbers(options.sizes, '-', "--sizes", sizes_remedy);
-  if (least > most || most > 100) refuse("--sizes", fmt::format("'{}' is no range", options.sizes), sizes_remedy);
+  if (least > most || most > kMostSize) refuse("--sizes", fmt::format("'{}' is no range", options.sizes), sizes_remedy);
   campaign.least_size = static_cast<int>(least);
   campaign.most_size = static_cast<int>(most);
   campaign.dynamics = options.dynamics;

@@ -170,7 +170,7 @@ int run_command_line(int argc, char** argv) {
   fuzz_command->add_option("--seed", fuzz_options.seed, "what cases are drawn from")
       ->capture_default_str()
       ->type_name("N");
-  fuzz_command->add_option("--sizes", fuzz_options.sizes, "least and greatest size of a case, within 0-100")
+  fuzz_command->add_option("--sizes", fuzz_options.sizes, "least and greatest size of a case, within 0-110")
       ->capture_default_str()
       ->type_name("A-B");
   fuzz_command->add_flag("--dynamics", fuzz_options.dynamics, "bodies move and blades push what they cut");

@@ -276,7 +276,7 @@ void tell_apart(Clusters& clusters) {
 Case draw_case(uint64_t seed, int size) {
   Random random(seed);
   Case c;
-  const double u = std::clamp(size, 0, 100) / 100.0;
+  const double u = std::clamp(size, 0, kMostSize) / 100.0;
   const auto longest = static_cast<int32_t>(3 + 24 * u * u * u + 4 * u);
   const Node dims = {random.between(1, longest), random.between(1, longest), random.between(1, longest)};
   c.nodes = draw_body(random, dims);
