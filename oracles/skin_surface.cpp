@@ -48,13 +48,14 @@ struct HalfEdges {
     const auto i = static_cast<std::size_t>(v);
     return {edges.data() + offsets[i], static_cast<std::size_t>(offsets[i + 1] - offsets[i])};
   }
-  // Half-edges from a to b; a surface has at most one.
-  std::vector<HalfEdge> between(int32_t a, int32_t b) const {
-    std::vector<HalfEdge> found;
-    for (const HalfEdge& e : of(a)) {
-      if (e.to == b) found.push_back(e);
+  // The first half-edge from a to b, and the next one if a surface has more than it may; null: there is none.
+  const HalfEdge* between(int32_t a, int32_t b, const HalfEdge* after = nullptr) const {
+    const auto leaving = of(a);
+    const HalfEdge* const end = leaving.data() + leaving.size();
+    for (const HalfEdge* e = after == nullptr ? leaving.data() : after + 1; e != end; ++e) {
+      if (e->to == b) return e;
     }
-    return found;
+    return nullptr;
   }
 };
 
@@ -132,15 +133,15 @@ std::optional<Defect> duplicate_defect(const Skin& skin, int32_t particle_count)
 std::optional<Defect> edge_defect(const Skin& skin, const HalfEdges& half_edges) {
   for (int32_t a = 0; a < static_cast<int32_t>(skin.owner.size()); ++a) {
     for (const HalfEdge& e : half_edges.of(a)) {
-      const auto same = half_edges.between(a, e.to);
-      if (same.size() > 1) {
+      const HalfEdge* const first = half_edges.between(a, e.to);
+      if (const HalfEdge* const second = half_edges.between(a, e.to, first)) {
         return Defect{
             fmt::format("triangles {} and {} both run from vertex {} to vertex {}: one is flipped, doubled, or "
                         "the edge has more than two triangles",
-                        same[0].triangle, same[1].triangle, a, e.to),
+                        first->triangle, second->triangle, a, e.to),
             {a, e.to}};
       }
-      if (half_edges.between(e.to, a).empty()) {
+      if (half_edges.between(e.to, a) == nullptr) {
         return Defect{
             fmt::format("the surface is open: triangle {} runs from vertex {} to vertex {}, and none runs back",
                         e.triangle, a, e.to),
@@ -157,11 +158,11 @@ std::optional<Defect> fan_defect(const Skin& skin, const HalfEdges& half_edges) 
     const auto fan = half_edges.of(v);
     if (fan.empty()) return Defect{fmt::format("no triangle uses vertex {}", v), {v}};
     std::size_t length = 0;
-    HalfEdge at = fan[0];
+    const HalfEdge* at = &fan[0];
     do {
       ++length;
-      at = half_edges.between(v, at.after).front();
-    } while (at.triangle != fan[0].triangle && length <= fan.size());
+      at = half_edges.between(v, at->after);
+    } while (at->triangle != fan[0].triangle && length <= fan.size());
     if (length != fan.size()) {
       return Defect{fmt::format("the surface is pinched at vertex {}: {} triangles meet there, but only {} of them lie "
                                 "in one cycle",
@@ -612,19 +613,17 @@ Verdict check_skin_vertices(const Setup& setup, const State& state) {
   // Their places.
   const Clusters& clusters = state.clusters;
   const std::vector<int32_t> counts = membership_counts(clusters, body.particle_count());
-  std::vector<std::vector<int32_t>> clusters_of(static_cast<std::size_t>(body.particle_count()));
+  const Holders holders_of_all = holders_of(clusters, body.particle_count());
   std::vector<ClusterMeans> means;
-  for (int32_t c = 0; c < clusters.count(); ++c) {
-    means.push_back(cluster_means(body, clusters, counts, state.x, c));
-    for (const int32_t i : clusters.of(c)) clusters_of[static_cast<std::size_t>(i)].push_back(c);
-  }
+  means.reserve(static_cast<std::size_t>(clusters.count()));
+  for (int32_t c = 0; c < clusters.count(); ++c) means.push_back(cluster_means(body, clusters, counts, state.x, c));
   const double h = body.grid.spacing;
   const double bound = 2 * goal_rounding(rounding_scale(setup, state)) / h;
   verdict.bound = bound;
   std::size_t worst = 0;
   for (std::size_t v = 0; v < skin.owner.size(); ++v) {
     const int32_t owner = skin.owner[v];
-    const auto& holders = clusters_of[static_cast<std::size_t>(owner)];
+    const auto holders = holders_of_all.of(owner);
     if (holders.empty())
       return fail(fmt::format("particle {} owns vertex {} and lies in no cluster", owner, v), {owner});
     const auto& step = kDirections[skin.direction[v]];

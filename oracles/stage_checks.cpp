@@ -585,6 +585,12 @@ class MergeDecomposition {
     return -1;
   }
 
+  // The result is the input whose number it keeps, to the bit.
+  bool is_unchanged(int32_t r) const {
+    const auto now = after_.of(r), then = before_.of(kept_[at(r)]);
+    return std::equal(now.begin(), now.end(), then.begin(), then.end());
+  }
+
   // Whether `inputs` explain result r: their union is r, and they touch each other. If not, says why.
   bool explains(int32_t r, const std::vector<int32_t>& inputs, Witness* why) {
     const auto members = after_.of(r);
@@ -648,6 +654,7 @@ class MergeDecomposition {
     }
     std::vector<int32_t> needy;  // results that what is certainly theirs does not explain
     for (int32_t r = 0; r < after_.count(); ++r) {
+      if (given_[at(r)].size() == 1 && is_unchanged(r)) continue;  // its only input is what it is
       if (explains(r, given_[at(r)], nullptr)) continue;
       std::vector<int32_t> all = given_[at(r)];
       all.insert(all.end(), possible[at(r)].begin(), possible[at(r)].end());
@@ -660,22 +667,20 @@ class MergeDecomposition {
     }
     if (!verdict.holds || needy.empty()) return;
 
-    // An input that only one needy result could use goes there at once; the rest is searched.
-    std::vector<int32_t> wanted_by(at(before_.count()), 0);
-    for (const int32_t r : needy) {
-      for (const int32_t c : possible[at(r)]) ++wanted_by[at(c)];
-    }
-    std::vector<int32_t> contested;
-    for (const int32_t r : needy) {
-      for (const int32_t c : possible[at(r)]) {
-        if (wanted_by[at(c)] == 1) given_[at(r)].push_back(c);
-        if (wanted_by[at(c)] > 1) contested.push_back(c);
+    std::vector<uint8_t> is_needy(at(after_.count()), 0);
+    for (const int32_t r : needy) is_needy[at(r)] = 1;
+    takers_.resize(at(before_.count()));
+    wanted_.resize(at(after_.count()));
+    for (int32_t c = 0; c < before_.count(); ++c) {
+      if (result_of_[at(c)] >= 0 || candidates_[at(c)].size() == 1) continue;
+      for (const int32_t r : candidates_[at(c)]) {
+        if (is_needy[at(r)] == 0) continue;
+        takers_[at(c)].push_back(r);
+        wanted_[at(r)].push_back(c);
       }
     }
-    std::sort(contested.begin(), contested.end());
-    contested.erase(std::unique(contested.begin(), contested.end()), contested.end());
     budget_ = kSearchBudget;
-    if (search(needy, contested, 0)) return;
+    if (search(needy, needy)) return;
     if (budget_ <= 0) {
       // Each result has an explanation of its own; that all have one at once was not refuted.
       verdict.bound_source += "; simultaneous assignment not decided";
@@ -686,19 +691,74 @@ class MergeDecomposition {
     violate(verdict, "these clusters can be explained one by one, but only by using a cluster twice", numbers);
   }
 
-  // Gives contested[next..] to needy results in every way; the last level asks whether all are explained.
-  bool search(const std::vector<int32_t>& needy, const std::vector<int32_t>& contested, std::size_t next) {
-    if (--budget_ <= 0) return false;
-    if (next == contested.size()) {
-      return std::all_of(needy.begin(), needy.end(), [&](int32_t r) { return explains(r, given_[at(r)], nullptr); });
+  // Whether result r is explained by what it was given and all that it still wants, but for input `without`. No input
+  // hurts a result that contains it, so if this is false, no way to give the rest explains the result.
+  bool can_be_explained(int32_t r, int32_t without = -1) {
+    --budget_;
+    std::vector<int32_t> inputs = given_[at(r)];
+    for (const int32_t c : wanted_[at(r)]) {
+      if (c != without) inputs.push_back(c);
     }
-    for (const int32_t r : candidates_[at(contested[next])]) {
-      if (std::find(needy.begin(), needy.end(), r) == needy.end()) continue;
-      given_[at(r)].push_back(contested[next]);
-      if (search(needy, contested, next + 1)) return true;
-      given_[at(r)].pop_back();
+    return explains(r, inputs, nullptr);
+  }
+
+  // Result r gets none of `unwanted`. Who is left alone with one of them is looked at again.
+  void renounce(int32_t r, const std::vector<int32_t>& unwanted, std::vector<int32_t>& again) {
+    for (const int32_t c : unwanted) {
+      std::erase(wanted_[at(r)], c);
+      std::erase(takers_[at(c)], r);
+      if (takers_[at(c)].size() == 1) again.push_back(takers_[at(c)].front());
     }
-    return false;
+  }
+
+  void give(int32_t c, int32_t r, std::vector<int32_t>& again) {
+    given_[at(r)].push_back(c);
+    for (const int32_t taker : takers_[at(c)]) {
+      std::erase(wanted_[at(taker)], c);
+      if (taker != r) again.push_back(taker);
+    }
+    takers_[at(c)].clear();
+  }
+
+  // Does, beginning with the results `again`, what every answer must do or may do: a result that is explained wants
+  // nothing more; an input that a result cannot do without, or that nobody else wants, goes there. False: there is no
+  // answer, or the budget is spent. If no result wants anything then, all are explained.
+  bool settle(std::vector<int32_t> again) {
+    while (!again.empty()) {
+      const int32_t r = again.back();
+      again.pop_back();
+      if (budget_ <= 0 || !can_be_explained(r)) return false;
+      const std::vector<int32_t> wanted = wanted_[at(r)];
+      if (explains(r, given_[at(r)], nullptr)) {
+        renounce(r, wanted, again);
+        continue;
+      }
+      for (const int32_t c : wanted) {
+        if (takers_[at(c)].size() == 1 || !can_be_explained(r, c)) give(c, r, again);
+      }
+      if (explains(r, given_[at(r)], nullptr)) renounce(r, std::vector<int32_t>(wanted_[at(r)]), again);
+    }
+    return true;
+  }
+
+  // Gives wanted inputs to needy results so that all are explained, if there is a way: settles what it can, then tries
+  // both answers to whether a result gets an input that it wants.
+  bool search(const std::vector<int32_t>& needy, std::vector<int32_t> again) {
+    if (!settle(std::move(again))) return false;
+    const auto wants = [&](int32_t r) { return !wanted_[at(r)].empty(); };
+    const auto open = std::find_if(needy.begin(), needy.end(), wants);
+    if (open == needy.end()) return true;
+    const int32_t r = *open, c = wanted_[at(r)].front();
+    const auto given = given_, wanted = wanted_, takers = takers_;
+    again = {r};
+    give(c, r, again);
+    if (search(needy, again)) return true;
+    given_ = given;
+    wanted_ = wanted;
+    takers_ = takers;
+    again = {r};
+    renounce(r, {c}, again);
+    return search(needy, again);
   }
 
   // Larger than cap only if nothing grew: the result is the cluster whose number it keeps, and others lay inside it.
@@ -714,7 +774,7 @@ class MergeDecomposition {
     }
   }
 
-  static constexpr int64_t kSearchBudget = 10'000;
+  static constexpr int64_t kSearchBudget = 10'000;  // of questions whether a result can be explained
   const TissueGraph& graph_;
   const Clusters& before_;
   const Clusters& after_;
@@ -723,6 +783,8 @@ class MergeDecomposition {
   std::vector<int32_t> kept_;                     // [after] input with the same number
   std::vector<std::vector<int32_t>> candidates_;  // [before] results that contain it
   std::vector<std::vector<int32_t>> given_;       // [after] inputs
+  std::vector<std::vector<int32_t>> takers_;      // [before] needy results that could use it
+  std::vector<std::vector<int32_t>> wanted_;      // [after] and the other way round, ascending
   std::vector<int32_t> holder_;                   // [n] scratch, -1 between uses
   int64_t budget_ = 0;
 };

@@ -58,6 +58,13 @@ class ReferenceBackend final : public Backend {
   }
 
   std::vector<State> snapshot() const override { return states_; }
+  std::vector<State> snapshot_of(const std::vector<bool>& wanted) const override {
+    std::vector<State> states(states_.size());
+    for (std::size_t b = 0; b < states.size(); ++b) {
+      if (wanted.at(b)) states[b] = states_[b];
+    }
+    return states;
+  }
   SpanReport report() const override { return report_; }
 
  private:

@@ -39,50 +39,67 @@ struct Sweep {
   double slack = 0;
 };
 
-// Distance from x to { edge + u·along + w·back + t·way : |u| <= L/2, 0 <= w <= D, 0 <= t <= 1 }: a least squares
-// problem in a box. The minimum lies inside one of the box's 27 faces, where it solves the normal equations of the
-// free unknowns; those that are singular have a minimum on a smaller face as well.
-double distance_to_sweep(const Blade& blade, const Sweep& sweep, Vec3 x) {
-  const Vec3 direction[3] = {sweep.pose.along, sweep.pose.back, sweep.way};
-  const double low[3] = {-blade.length / 2, 0, 0};
-  const double high[3] = {blade.length / 2, blade.depth, 1};
-  double best = std::numeric_limits<double>::infinity();
-  for (int face = 0; face < 27; ++face) {
-    const int kind[3] = {face % 3, face / 3 % 3, face / 9};  // 0: at low, 1: at high, 2: free
-    Vec3 rest = x - sweep.pose.edge;
-    Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3> free_directions(3, 0);
-    std::vector<int> unknown;
-    for (int k = 0; k < 3; ++k) {
-      if (kind[k] == 2) {
-        unknown.push_back(k);
-      } else {
-        rest -= (kind[k] == 0 ? low[k] : high[k]) * direction[k];
+// Whether a point is within reach of { edge + u·along + w·back + t·way : |u| <= L/2, 0 <= w <= D, 0 <= t <= 1 }: its
+// distance is that of a least squares problem in a box. The minimum lies inside one of the box's 27 faces, where it
+// solves the normal equations of the free unknowns; those that are singular have a minimum on a smaller face as well.
+// All but the point is the same for every particle, so it is decomposed once.
+class SweepFaces {
+ public:
+  SweepFaces(const Blade& blade, const Sweep& sweep) : edge_(sweep.pose.edge) {
+    const Vec3 direction[3] = {sweep.pose.along, sweep.pose.back, sweep.way};
+    const double low[3] = {-blade.length / 2, 0, 0};
+    const double high[3] = {blade.length / 2, blade.depth, 1};
+    for (int face = 26; face >= 0; --face) {               // from the inside of the box to its corners
+      const int kind[3] = {face % 3, face / 3 % 3, face / 9};  // 0: at low, 1: at high, 2: free
+      Face found;
+      for (int k = 0; k < 3; ++k) {
+        if (kind[k] == 2) {
+          const Eigen::Index column = found.count++;
+          found.directions.col(column) << direction[k].x, direction[k].y, direction[k].z;
+          found.low[column] = low[k];
+          found.high[column] = high[k];
+        } else {
+          found.fixed.push_back((kind[k] == 0 ? low[k] : high[k]) * direction[k]);
+        }
       }
-    }
-    const auto count = static_cast<Eigen::Index>(unknown.size());
-    free_directions.resize(3, count);
-    for (Eigen::Index k = 0; k < count; ++k) {
-      const Vec3 d = direction[unknown[at(k)]];
-      free_directions.col(k) << d.x, d.y, d.z;
-    }
-    if (count > 0) {
-      const Eigen::Vector3d target(rest.x, rest.y, rest.z);
-      const auto qr = free_directions.colPivHouseholderQr();
-      if (qr.rank() < count) continue;
-      const Eigen::VectorXd solution = qr.solve(target);
-      bool inside = true;
-      for (Eigen::Index k = 0; k < count; ++k) {
-        const int which = unknown[at(k)];
-        inside = inside && low[which] <= solution[k] && solution[k] <= high[which];
+      if (found.count > 0) {
+        found.qr.compute(found.directions.leftCols(found.count));
+        if (found.qr.rank() < found.count) continue;
       }
-      if (!inside) continue;
-      const Eigen::Vector3d left = target - free_directions * solution;
-      rest = {left.x(), left.y(), left.z()};
+      faces_.push_back(std::move(found));
     }
-    best = std::min(best, norm(rest));
   }
-  return best;
-}
+
+  bool within(Vec3 x, double reach) const {
+    return std::any_of(faces_.begin(), faces_.end(),
+                       [&](const Face& face) { return distance(face, x - edge_) <= reach; });
+  }
+
+ private:
+  struct Face {
+    std::vector<Vec3> fixed;  // what the unknowns that are not free contribute
+    Eigen::Index count = 0;   // of free unknowns
+    Eigen::Matrix3d directions;
+    double low[3], high[3];
+    Eigen::ColPivHouseholderQR<Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3>> qr;
+  };
+
+  // Distance to the point of the face's own plane that is nearest, if that lies in the face; otherwise infinite.
+  static double distance(const Face& face, Vec3 rest) {
+    for (const Vec3 part : face.fixed) rest -= part;
+    if (face.count == 0) return norm(rest);
+    const Eigen::Vector3d target(rest.x, rest.y, rest.z);
+    const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1> solution = face.qr.solve(target);
+    for (Eigen::Index k = 0; k < face.count; ++k) {
+      if (!(face.low[k] <= solution[k] && solution[k] <= face.high[k])) return std::numeric_limits<double>::infinity();
+    }
+    const Eigen::Vector3d left = target - face.directions.leftCols(face.count) * solution;
+    return norm({left.x(), left.y(), left.z()});
+  }
+
+  Vec3 edge_;
+  std::vector<Face> faces_;
+};
 
 Vec3 turned(Vec3 v, Vec3 axis, double angle) {  // Rodrigues
   return std::cos(angle) * v + std::sin(angle) * cross(axis, v) + (1 - std::cos(angle)) * dot(axis, v) * axis;
@@ -123,10 +140,15 @@ std::vector<uint8_t> swept_over(const Setup& setup, const State& state) {
   constexpr double kTie = 1 + 1e-9;
   const double h = setup.body.grid.spacing;
   std::vector<uint8_t> found(state.alive.size(), 0);
+  std::vector<double> longest(state.alive.size(), h);
+  for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
+    if (state.alive[at(i)]) longest[at(i)] = std::max(h, greatest_neighbour_distance(setup.body, state, i));
+  }
   for (int32_t s = 0; s < setup.step.substeps; ++s) {
     const BladeMove& move = setup.blade_moves[at(state.frame * setup.step.substeps + s)];
     if (!move.down) continue;
     for (const Sweep& sweep : sweeps_of(setup.blade, move, h)) {
+      const SweepFaces faces(setup.blade, sweep);
       const Vec3 normal = cross(sweep.pose.along, sweep.pose.back);
       // The sweep's bounding box in the blade's own directions spares most particles the exact distance.
       const Vec3 axes[3] = {sweep.pose.along, sweep.pose.back, normal};
@@ -137,15 +159,14 @@ std::vector<uint8_t> swept_over(const Setup& setup, const State& state) {
       }
       for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
         if (!state.alive[at(i)] || found[at(i)]) continue;
-        const double longest = std::max(h, greatest_neighbour_distance(setup.body, state, i));
-        const double reach = std::max(setup.blade.thickness, longest) / 2 * kTie + sweep.slack;
+        const double reach = std::max(setup.blade.thickness, longest[at(i)]) / 2 * kTie + sweep.slack;
         bool outside = false;
         for (int k = 0; k < 3; ++k) {
           const double c = dot(state.x[at(i)] - sweep.pose.edge, axes[k]);
           outside = outside || c < low[k] - reach || c > high[k] + reach;
         }
         if (outside) continue;
-        found[at(i)] = distance_to_sweep(setup.blade, sweep, state.x[at(i)]) <= reach;
+        found[at(i)] = faces.within(state.x[at(i)], reach);
       }
     }
   }

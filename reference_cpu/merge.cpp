@@ -3,6 +3,7 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <tuple>
 #include <utility>
 
@@ -16,20 +17,28 @@ namespace {
 // into another one has a dead slot.
 class MergingSets {
  public:
-  MergingSets(const Body& body, const std::vector<uint8_t>& alive, const std::vector<std::vector<int32_t>>& sets,
+  MergingSets(const Body& body, const std::vector<uint8_t>& alive, std::vector<std::vector<int32_t>> sets,
               const std::vector<int32_t>& numbers, int64_t tau, int64_t cap)
       : body_(body),
         alive_(alive),
         numbers_(numbers),
         tau_(tau),
         cap_(cap),
-        sets_(sets),
-        exists_(sets.size(), 1),
-        holders_(static_cast<std::size_t>(body.particle_count())),
-        shared_(sets.size(), 0),
-        seen_(sets.size(), 0) {
-    for (std::size_t slot = 0; slot < sets.size(); ++slot) {
-      for (const int32_t p : sets[slot]) holders_[at(p)].push_back(static_cast<int32_t>(slot));
+        sets_(std::move(sets)),
+        exists_(sets_.size(), 1),
+        first_holder_(static_cast<std::size_t>(body.particle_count()) + 1, 0),
+        holder_count_(static_cast<std::size_t>(body.particle_count()), 0),
+        shared_(sets_.size(), 0),
+        seen_(sets_.size(), 0) {
+    for (const auto& set : sets_) {
+      for (const int32_t p : set) ++first_holder_[at(p) + 1];
+    }
+    std::partial_sum(first_holder_.begin(), first_holder_.end(), first_holder_.begin());
+    holders_.resize(first_holder_.back());
+    for (std::size_t slot = 0; slot < sets_.size(); ++slot) {
+      for (const int32_t p : sets_[slot]) {
+        holders_[first_holder_[at(p)] + holder_count_[at(p)]++] = static_cast<int32_t>(slot);
+      }
       if (size(static_cast<int32_t>(slot)) < tau) small_.push_back(static_cast<int32_t>(slot));
     }
     std::sort(small_.begin(), small_.end(), [&](int32_t a, int32_t b) { return number(a) < number(b); });
@@ -51,11 +60,11 @@ class MergingSets {
       shared_[at(slot)] += shares;
     };
     for (const int32_t p : sets_[at(s)]) {
-      for (const int32_t slot : holders_[at(p)]) touch(slot, 1);
+      for (const int32_t slot : holders_of(p)) touch(slot, 1);
       for (int direction = 0; direction < 6 && alive_[at(p)]; ++direction) {
         const int32_t q = body_.neighbour(p, direction);
         if (q < 0 || !alive_[at(q)]) continue;
-        for (const int32_t slot : holders_[at(q)]) touch(slot, 0);
+        for (const int32_t slot : holders_of(q)) touch(slot, 0);
       }
     }
 
@@ -74,9 +83,14 @@ class MergingSets {
     std::vector<int32_t>& from = sets_[at(source)];
     std::vector<int32_t>& to = sets_[at(target)];
     for (const int32_t p : from) {
-      auto& holders = holders_[at(p)];
-      holders.erase(std::find(holders.begin(), holders.end(), source));
-      if (std::find(holders.begin(), holders.end(), target) == holders.end()) holders.push_back(target);
+      const auto holders = holders_of(p);
+      const auto place = std::find(holders.begin(), holders.end(), source);
+      if (std::find(holders.begin(), holders.end(), target) == holders.end()) {
+        *place = target;
+      } else {
+        *place = holders.back();
+        --holder_count_[at(p)];
+      }
     }
     std::vector<int32_t> both;
     both.reserve(from.size() + to.size());
@@ -107,6 +121,8 @@ class MergingSets {
 
  private:
   static std::size_t at(int32_t index) { return static_cast<std::size_t>(index); }
+  // Slots of the sets that hold a particle, in no order. Joining never makes them more.
+  std::span<int32_t> holders_of(int32_t p) { return {holders_.data() + first_holder_[at(p)], holder_count_[at(p)]}; }
 
   const Body& body_;
   const std::vector<uint8_t>& alive_;
@@ -114,7 +130,9 @@ class MergingSets {
   int64_t tau_, cap_;
   std::vector<std::vector<int32_t>> sets_;     // by slot
   std::vector<uint8_t> exists_;                // by slot
-  std::vector<std::vector<int32_t>> holders_;  // by particle: slots of the sets that hold it
+  std::vector<std::size_t> first_holder_;      // [n + 1] where a particle's row of holders_ begins
+  std::vector<std::size_t> holder_count_;      // [n] how much of its row is in use
+  std::vector<int32_t> holders_;
   std::vector<int32_t> small_;
   std::vector<int64_t> shared_;  // scratch of preferred_target, by slot; zero between calls
   std::vector<uint8_t> seen_;    // likewise
@@ -241,12 +259,13 @@ void merge_single_pass(MergingSets& sets, std::size_t slot_count) {
 
 }  // namespace
 
-Merged merge_sets(const Body& body, const std::vector<uint8_t>& alive, const std::vector<std::vector<int32_t>>& sets,
+Merged merge_sets(const Body& body, const std::vector<uint8_t>& alive, std::vector<std::vector<int32_t>> sets,
                   const std::vector<int32_t>& numbers, MergeRule rule, int64_t tau, int64_t cap) {
-  MergingSets merging(body, alive, sets, numbers, tau, cap);
-  if (rule == MergeRule::deterministic) merge_deterministic(merging, sets.size());
-  if (rule == MergeRule::published) merge_published(merging, sets.size());
-  if (rule == MergeRule::single_pass) merge_single_pass(merging, sets.size());
+  const std::size_t slot_count = sets.size();
+  MergingSets merging(body, alive, std::move(sets), numbers, tau, cap);
+  if (rule == MergeRule::deterministic) merge_deterministic(merging, slot_count);
+  if (rule == MergeRule::published) merge_published(merging, slot_count);
+  if (rule == MergeRule::single_pass) merge_single_pass(merging, slot_count);
   return std::move(merging).result();
 }
 
@@ -258,8 +277,8 @@ void merge(const Setup& setup, State& state) {
   for (int32_t c = 0; c < before.count(); ++c) sets.emplace_back(before.of(c).begin(), before.of(c).end());
 
   const Merged merged =
-      merge_sets(setup.body, state.alive, sets, before.number, setup.merge.rule, state.tau, state.cap);
-  if (merged.sets.size() == sets.size()) return;
+      merge_sets(setup.body, state.alive, std::move(sets), before.number, setup.merge.rule, state.tau, state.cap);
+  if (static_cast<int32_t>(merged.sets.size()) == before.count()) return;
 
   Clusters after;
   for (std::size_t k = 0; k < merged.sets.size(); ++k) {

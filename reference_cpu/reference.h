@@ -59,7 +59,7 @@ struct Merged {
   std::vector<std::vector<int32_t>> sets;  // unions, in the order of their numbers
   std::vector<int32_t> survivor;  // for each set of the result the index of the input set whose number it keeps
 };
-Merged merge_sets(const Body& body, const std::vector<uint8_t>& alive, const std::vector<std::vector<int32_t>>& sets,
+Merged merge_sets(const Body& body, const std::vector<uint8_t>& alive, std::vector<std::vector<int32_t>> sets,
                   const std::vector<int32_t>& numbers, MergeRule rule, int64_t tau, int64_t cap);
 
 }  // namespace cutproof::reference
