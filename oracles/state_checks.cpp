@@ -12,6 +12,42 @@
 namespace cutproof::oracles {
 namespace {
 
+// Parts of a state, as bits of what an oracle reads.
+enum Part : unsigned {
+  kMotion = 1,      // x, v, impulse
+  kAlive = 2,       // alive
+  kCut = 4,         // removed, debris
+  kSets = 8,        // offsets and members of clusters
+  kFrames = 16,     // rest centers and masses
+  kRotations = 32,  // rotations and degenerate flags
+  kSkin = 64,
+  kLimits = 128,  // tau, cap, edge_covered
+  kAll = 255,
+  kBody = 256  // the body, which does not change
+};
+
+template <typename T>
+bool same(const std::vector<T>& a, const std::vector<T>& b) {
+  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
+}
+
+unsigned parts_that_differ(const State& a, const State& b) {
+  const Clusters &c = a.clusters, &d = b.clusters;
+  const Skin &s = a.skin, &t = b.skin;
+  unsigned parts = 0;
+  const auto note = [&](Part part, bool equal) { parts |= equal ? 0u : part; };
+  note(kMotion, same(a.x, b.x) && same(a.v, b.v) && same_bits(a.impulse, b.impulse));
+  note(kAlive, same(a.alive, b.alive));
+  note(kCut, same(a.removed, b.removed) && same(a.debris, b.debris));
+  note(kSets, same(c.offsets, d.offsets) && same(c.members, d.members));
+  note(kFrames, same(c.rest_center, d.rest_center) && same(c.mass, d.mass));
+  note(kRotations, same(c.rotation, d.rotation) && same(c.degenerate, d.degenerate));
+  note(kSkin, same(s.owner, t.owner) && same(s.direction, t.direction) && same(s.position, t.position) &&
+                  same(s.triangles, t.triangles));
+  note(kLimits, a.tau == b.tau && a.cap == b.cap && a.edge_covered == b.edge_covered);
+  return parts;
+}
+
 // A well-formed state with what several oracles derive from it, derived once.
 class Judged {
  public:
@@ -30,6 +66,26 @@ class Judged {
     if (!coupling_) coupling_ = components_of_coupling(graph, clusters);
     return *coupling_;
   }
+  // Takes over what was derived from another state of the same body and rests on none of the parts that `differ`.
+  void take_over(Judged& last, unsigned differ) {
+    if ((differ & kAlive) == 0) components_ = std::move(last.components_);
+    if ((differ & (kAlive | kSets)) == 0) coupling_ = std::move(last.coupling_);
+    connected = std::move(last.connected);
+    if (connected.empty() || (differ & (kAlive | kSets)) == 0) return;
+    // Whether a cluster is connected depends on its members, on which of them are alive, and on the grid. So it stays
+    // known of each cluster whose members are those of the cluster that had its number, if none of them lives or is
+    // dead that was not before.
+    std::vector<uint8_t> known(at(clusters.count()), 0);
+    for (int32_t c = 0, before = 0; c < clusters.count(); ++c) {
+      while (before < last.clusters.count() && last.number(before) < number(c)) ++before;
+      if (before == last.clusters.count()) break;
+      if (last.number(before) != number(c) || connected[at(before)] == 0) continue;
+      const auto now = clusters.of(c), then = last.clusters.of(before);
+      known[at(c)] = std::equal(now.begin(), now.end(), then.begin(), then.end()) &&
+                     std::all_of(now.begin(), now.end(), [&](int32_t i) { return alive(i) == last.alive(i); });
+    }
+    connected = std::move(known);
+  }
   int32_t number(int32_t cluster) const { return clusters.number[at(cluster)]; }
   bool alive(int32_t particle) const { return state.alive[at(particle)] != 0; }
   bool has_skin() const { return !state.skin.owner.empty() || !state.skin.triangles.empty(); }
@@ -39,6 +95,7 @@ class Judged {
   const Body& body;
   const Clusters& clusters;
   const TissueGraph graph;
+  std::vector<uint8_t> connected;  // [m] 1: check_connectivity has found the cluster to be; empty: it knows of none
 
  private:
   std::optional<Partition> components_, coupling_;
@@ -108,7 +165,7 @@ void check_particle_list(const std::vector<int32_t>& list, const char* name, int
   }
 }
 
-void check_clusters_form(const Clusters& clusters, int32_t n, Verdict& verdict) {
+void check_clusters_form(const Clusters& clusters, bool members_exist, int32_t n, Verdict& verdict) {
   const auto reject = [&](std::string text) { violate(verdict, std::move(text)); };
   if (clusters.offsets.empty()) return reject("cluster offsets are empty");
   const std::size_t m = clusters.offsets.size() - 1;
@@ -134,6 +191,7 @@ void check_clusters_form(const Clusters& clusters, int32_t n, Verdict& verdict) 
       violate(verdict, fmt::format("cluster numbers do not ascend at {}", number), {number});
     }
   }
+  if (members_exist) return;
   for (const int32_t i : clusters.members) {
     if (i < 0 || i >= n) {
       violate(verdict, fmt::format("a cluster holds particle {}, but there are {}", i, n), {}, {i});
@@ -163,24 +221,28 @@ void check_skin_form(const Skin& skin, int32_t n, Verdict& verdict) {
   }
 }
 
-Verdict check_form(const Setup& setup, const State& state, bool body_is_known_good = false) {
+// `known`: parts that have the bits of a state of the same body that was well formed. Of those only the sizes that they
+// share with others are looked at again.
+Verdict check_form(const Setup& setup, const State& state, unsigned known = 0) {
   Verdict verdict = start_verdict("well formed", state, "1", "model/state.h, model/clusters.h, model/skin.h");
   const auto reject = [&](std::string text) { violate(verdict, std::move(text)); };
-  if (!body_is_known_good && !body_is_well_formed(setup, verdict)) return verdict;
+  if (known == 0 && !body_is_well_formed(setup, verdict)) return verdict;
   const int32_t n = setup.body.particle_count();
   if (state.x.size() != at(n) || state.v.size() != at(n) || state.alive.size() != at(n)) {
     reject(fmt::format("{} particles, but {} positions, {} velocities, {} alive flags", n, state.x.size(),
                        state.v.size(), state.alive.size()));
   }
-  for (std::size_t i = 0; i < state.alive.size(); ++i) {
+  for (std::size_t i = 0; (known & kAlive) == 0 && i < state.alive.size(); ++i) {
     if (state.alive[i] > 1) {
       violate(verdict, fmt::format("particle {} is neither alive nor dead", i), {}, {static_cast<int32_t>(i)});
     }
   }
-  check_particle_list(state.removed, "removed", n, verdict);
-  check_particle_list(state.debris, "debris", n, verdict);
-  check_clusters_form(state.clusters, n, verdict);
-  check_skin_form(state.skin, n, verdict);
+  if ((known & kCut) == 0) {
+    check_particle_list(state.removed, "removed", n, verdict);
+    check_particle_list(state.debris, "debris", n, verdict);
+  }
+  check_clusters_form(state.clusters, (known & kSets) != 0, n, verdict);
+  if ((known & kSkin) == 0) check_skin_form(state.skin, n, verdict);
   if (state.frame < 0) reject(fmt::format("the frame is {}", state.frame));
   verdict.checked = static_cast<int64_t>(n) + static_cast<int64_t>(state.clusters.offsets.size()) +
                     static_cast<int64_t>(state.clusters.members.size()) +
@@ -196,8 +258,10 @@ Verdict check_connectivity(Judged& judged) {
   std::vector<int32_t> member_of(at(judged.body.particle_count()), -1);   // the last cluster seen to hold it
   std::vector<int32_t> reached_in(at(judged.body.particle_count()), -1);  // the last cluster it was reached in
   std::vector<int32_t> queue;
+  judged.connected.resize(at(judged.clusters.count()), 0);
   for (int32_t c = 0; c < judged.clusters.count(); ++c) {
     ++verdict.checked;
+    if (judged.connected[at(c)] != 0) continue;
     int32_t seed = -1, size = 0;
     for (const int32_t i : judged.clusters.of(c)) {
       if (!judged.alive(i) || member_of[at(i)] == c) continue;
@@ -205,6 +269,7 @@ Verdict check_connectivity(Judged& judged) {
       ++size;
       if (seed < 0) seed = i;
     }
+    judged.connected[at(c)] = 1;
     if (seed < 0) continue;
     queue.assign(1, seed);
     reached_in[at(seed)] = c;
@@ -218,6 +283,7 @@ Verdict check_connectivity(Judged& judged) {
     }
     const auto reached = static_cast<int32_t>(queue.size());
     if (reached == size) continue;
+    judged.connected[at(c)] = 0;
     Witness witness;
     if (verdict.holds) {
       for (const int32_t i : judged.clusters.of(c)) {
@@ -381,15 +447,15 @@ int32_t count_cavities(Judged& judged) {
   return cavities;
 }
 
-// The skin's shells, found from the triangles alone; inside and outside are told apart by the sign of the volume *at
-// rest*, because a body that is turned inside out in motion still has the same skin.
+// The skin's shells, found from the triangles alone; inside and outside are told apart by the sign of the volume, *at
+// rest* where it is judged, because a body that is turned inside out in motion still has the same skin.
 struct Shells {
   std::vector<int32_t> of_vertex;  // [v] shell, -1 if no triangle uses the vertex
-  std::vector<double> volume;      // [shells] at rest, six times [m³]
+  std::vector<double> volume;      // [shells] six times [m³]
 };
 
-Shells shells_of(Judged& judged) {
-  const Skin& skin = judged.state.skin;
+// `points`: where the vertices are.
+Shells shells_of(const Skin& skin, const std::vector<Vec3>& points) {
   DisjointSets sets(static_cast<int64_t>(skin.owner.size()));
   std::vector<uint8_t> used(skin.owner.size(), 0);
   for (const auto& t : skin.triangles) {
@@ -406,22 +472,27 @@ Shells shells_of(Judged& judged) {
     shells.of_vertex[v] = root == v ? count++ : shells.of_vertex[root];
   }
   shells.volume.assign(at(count), 0.0);
-  std::vector<Vec3> rest(skin.owner.size());
-  for (std::size_t v = 0; v < rest.size(); ++v) {
-    const auto& d = kDirections[skin.direction[v]];
-    const double reach = judged.setup.skin.alpha * judged.body.grid.spacing;
-    rest[v] = judged.body.rest_position(skin.owner[v]) + Vec3{reach * d[0], reach * d[1], reach * d[2]};
-  }
   for (const auto& t : skin.triangles) {
-    shells.volume[at(shells.of_vertex[at(t[0])])] += dot(rest[at(t[0])], cross(rest[at(t[1])], rest[at(t[2])]));
+    shells.volume[at(shells.of_vertex[at(t[0])])] += dot(points[at(t[0])], cross(points[at(t[1])], points[at(t[2])]));
   }
   return shells;
+}
+
+std::vector<Vec3> points_at_rest(const Judged& judged) {
+  const Skin& skin = judged.state.skin;
+  const double reach = judged.setup.skin.alpha * judged.body.grid.spacing;
+  std::vector<Vec3> points(skin.owner.size());
+  for (std::size_t v = 0; v < points.size(); ++v) {
+    const auto& d = kDirections[skin.direction[v]];
+    points[v] = judged.body.rest_position(skin.owner[v]) + Vec3{reach * d[0], reach * d[1], reach * d[2]};
+  }
+  return points;
 }
 
 void match_skin(Judged& judged, Verdict& verdict, bool with_cgal) {
   const Skin& skin = judged.state.skin;
   const Partition& components = judged.components();
-  const Shells shells = shells_of(judged);
+  const Shells shells = shells_of(skin, points_at_rest(judged));
   const auto shell_count = static_cast<int32_t>(shells.volume.size());
 
   std::vector<int32_t> first_owner(at(shell_count), -1);
@@ -815,45 +886,6 @@ Verdict merge_maximality(const Setup& setup, const State& state) {
 
 // --- All of them -----------------------------------------------------------------------------------------------------
 
-namespace {
-
-// Parts of a state, as bits of what an oracle reads.
-enum Part : unsigned {
-  kMotion = 1,      // x, v, impulse
-  kAlive = 2,       // alive
-  kCut = 4,         // removed, debris
-  kSets = 8,        // offsets and members of clusters
-  kFrames = 16,     // rest centers and masses
-  kRotations = 32,  // rotations and degenerate flags
-  kSkin = 64,
-  kLimits = 128,  // tau, cap, edge_covered
-  kAll = 255
-};
-
-template <typename T>
-bool same(const std::vector<T>& a, const std::vector<T>& b) {
-  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
-}
-
-unsigned parts_that_differ(const State& a, const State& b) {
-  const Clusters &c = a.clusters, &d = b.clusters;
-  const Skin &s = a.skin, &t = b.skin;
-  unsigned parts = 0;
-  const auto note = [&](Part part, bool equal) { parts |= equal ? 0u : part; };
-  note(kMotion, same(a.x, b.x) && same(a.v, b.v) && same_bits(a.impulse, b.impulse));
-  note(kAlive, same(a.alive, b.alive));
-  note(kCut, same(a.removed, b.removed) && same(a.debris, b.debris));
-  note(kSets, same(c.offsets, d.offsets) && same(c.members, d.members));
-  note(kFrames, same(c.rest_center, d.rest_center) && same(c.mass, d.mass));
-  note(kRotations, same(c.rotation, d.rotation) && same(c.degenerate, d.degenerate));
-  note(kSkin, same(s.owner, t.owner) && same(s.direction, t.direction) && same(s.position, t.position) &&
-                  same(s.triangles, t.triangles));
-  note(kLimits, a.tau == b.tau && a.cap == b.cap && a.edge_covered == b.edge_covered);
-  return parts;
-}
-
-}  // namespace
-
 struct Judge::Memory {
   explicit Memory(const Setup& of_setup) : setup(of_setup) {}
 
@@ -868,7 +900,7 @@ struct Judge::Memory {
   const Setup& setup;
   bool body_is_known_good = false;
   const State* last = nullptr;
-  std::optional<Judged> judged;  // `last`, where it is well formed
+  std::unique_ptr<Judged> judged;  // `last`, where it is well formed
   Verdict form;                  // of `last`
   std::vector<Held> held;
 
@@ -877,9 +909,12 @@ struct Judge::Memory {
     if (&state == last) return;
     const unsigned changed = last == nullptr ? kAll : parts_that_differ(*last, state);
     std::erase_if(held, [&](const Held& h) { return (h.parts & changed) != 0; });
-    form = check_form(setup, state, body_is_known_good);
+    const bool last_is_good = last != nullptr && form.holds;
+    form = check_form(setup, state, last_is_good ? kBody | (kAll & ~changed) : body_is_known_good ? kBody : 0u);
     if (form.holds) body_is_known_good = true;
-    judged.emplace(setup, state);
+    auto next = std::make_unique<Judged>(setup, state);
+    if (last_is_good && form.holds) next->take_over(*judged, changed);
+    judged = std::move(next);
     last = &state;
   }
 
@@ -907,6 +942,19 @@ struct Judge::Memory {
 
 Judge::Judge(const Setup& setup) : memory_(std::make_unique<Memory>(setup)) {}
 Judge::~Judge() = default;
+
+int32_t Judge::component_count(const State& state) {
+  memory_->look_at(state);
+  return memory_->form.holds ? memory_->judged->components().count : 0;
+}
+
+int32_t Judge::inner_shells(const State& state) {
+  memory_->look_at(state);
+  if (!memory_->form.holds) return 0;
+  const Shells shells = shells_of(state.skin, state.skin.position);
+  return static_cast<int32_t>(
+      std::count_if(shells.volume.begin(), shells.volume.end(), [](double volume) { return !(volume > 0); }));
+}
 
 std::vector<Verdict> Judge::state(const State& state, Stage after, bool thorough) {
   // Between detect and split clusters hold dead particles. Until expansion, groups may be uncoupled, unless I4
@@ -962,7 +1010,7 @@ std::vector<Verdict> Judge::stage(Stage stage, const State& before, const State&
   const auto add_own = [&] { add(stage_verdict(m.setup, stage, before, form_before, after, m.form)); };
   switch (stage) {
     case Stage::step:
-      add(momentum(m.setup, before, after));
+      add(momentum_verdict(m.setup, before, form_before, after, m.form));
       add(m.ask_finite());
       break;
     case Stage::detect:

@@ -72,11 +72,11 @@ IndependentMasses independent_masses(const Body& body, const State& state) {
 
 // p is damped with v and gains M g dt in each substep; contacts, pins and grips give J, which the state adds up with
 // the same damping. So p after S substeps is D^S p + M g dt (D + … + D^S) + I, with D = e^(−c dt).
-Verdict momentum(const Setup& setup, const State& before, const State& after) {
+Verdict momentum_verdict(const Setup& setup, const State& before, const Verdict& form_before, const State& after,
+                         const Verdict& form_after) {
   Verdict verdict = start_verdict("linear momentum", after, "kg m/s", "docs/tolerances.md, Linear momentum");
-  for (const State* state : {&before, &after}) {
-    const Verdict form = well_formed(setup, *state);
-    if (!form.holds) return not_judged(verdict.property, form);
+  for (const Verdict* form : {&form_before, &form_after}) {
+    if (!form->holds) return not_judged(verdict.property, *form);
   }
   if (before.frame < 0 || before.frame >= setup.frame_count()) return verdict;  // the timetable is over: vacuous
   const StepParameters& step = setup.step;
@@ -118,6 +118,10 @@ Verdict momentum(const Setup& setup, const State& before, const State& after) {
         end.momentum.y, end.momentum.z);
   }
   return verdict;
+}
+
+Verdict momentum(const Setup& setup, const State& before, const State& after) {
+  return momentum_verdict(setup, before, well_formed(setup, before), after, well_formed(setup, after));
 }
 
 Verdict check_rotation_quality(const Setup&, const State& state) {

@@ -115,6 +115,8 @@ Verdict check_skin_vertices(const Setup& setup, const State& state);
 // Of any stage but step and skin.
 Verdict stage_verdict(const Setup& setup, Stage stage, const State& before, const Verdict& form_before,
                       const State& after, const Verdict& form_after);
+Verdict momentum_verdict(const Setup& setup, const State& before, const Verdict& form_before, const State& after,
+                         const Verdict& form_after);
 Verdict untouched_verdict(const Setup& setup, Stage stage, const State& before, const Verdict& form_before,
                           const State& after, const Verdict& form_after);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <sstream>
+#include <utility>
 
 #include "oracles/oracles.h"
 #include "reference_cpu/reference.h"
@@ -15,7 +16,6 @@ void note_what_is_given(const Case& c, const Loaded& loaded, Judgement& judgemen
   const auto n = loaded.setup.body.particle_count();
   judgement[Happened::no_particles] = n == 0;
   judgement[Happened::one_particle] = n == 1;
-  judgement[Happened::several_components] = oracles::graph_components(loaded.setup, loaded.state).count > 1;
   judgement[Happened::boxes] = c.clusters == ClusterKind::boxes;
   judgement[Happened::sampled] = c.clusters == ClusterKind::sampled;
   judgement[Happened::foreign] = c.clusters == ClusterKind::foreign;
@@ -39,9 +39,6 @@ void note_what_a_stage_did(const Setup& setup, Stage stage, const State& before,
       }
       if (!after.removed.empty()) judgement[Happened::removal] = true;
       if (after.removed.empty() && down && alive_count(before) > 0) judgement[Happened::miss] = true;
-      if (oracles::graph_components(setup, after).count > oracles::graph_components(setup, before).count) {
-        judgement[Happened::separation] = true;
-      }
       break;
     }
     case Stage::split:
@@ -243,6 +240,8 @@ Judgement judge_trail(const Case& c, const Loaded& loaded, const Trail& trail, c
   };
 
   oracles::Judge judge(setup);
+  int32_t components = judge.component_count(trail.initial);
+  judgement[Happened::several_components] = components > 1;
   const State* before = &trail.initial;
   const State* compared_skin = nullptr;  // equal to the reference's
   for (const auto& [stage, after] : trail.steps) {
@@ -251,6 +250,8 @@ Judgement judge_trail(const Case& c, const Loaded& loaded, const Trail& trail, c
     if (is_due(setup, stage, *before)) {
       note_what_a_stage_did(setup, stage, *before, after, judgement);
       take(judge.stage(stage, *before, after), stage, after);
+      const int32_t components_before = std::exchange(components, judge.component_count(after));
+      if (stage == Stage::detect && components > components_before) judgement[Happened::separation] = true;
       if (stage != Stage::step) take(judge.state(after, stage, thorough), stage, after);
       if (backend != "reference" && is_compared(setup, stage)) {
         ++judgement.verdicts;
@@ -275,7 +276,7 @@ Judgement judge_trail(const Case& c, const Loaded& loaded, const Trail& trail, c
     }
     before = &after;
   }
-  if (!before->skin.owner.empty() && oracles::skin_shells(before->skin).inner > 0) judgement[Happened::cavity] = true;
+  judgement[Happened::cavity] = judge.inner_shells(*before) > 0;
   return judgement;
 }
 
