@@ -99,9 +99,10 @@ Substep substep_of(const Setup& setup, const State& state) {
   for (int32_t i = 0; i < body.particle_count(); ++i) {
     if (counts[at(i)] > 0) substep.weight[at(i)] = weight_of(body, counts, i);
   }
+  const WeightedRest rest = weighted_rest(body, counts);
   for (int32_t c = 0; c < state.clusters.count(); ++c) {
-    const Vec3 center = cluster_means(body, state.clusters, counts, state.x, c).rest;
-    for (const int32_t i : state.clusters.of(c)) substep.offset.push_back(body.rest_position(i) - center);
+    const Vec3 center = cluster_means(rest, state.clusters, state.x, c).rest;
+    for (const int32_t i : state.clusters.of(c)) substep.offset.push_back(rest.position[at(i)] - center);
   }
   return substep;
 }

@@ -34,14 +34,31 @@ struct ClusterMeans {
   Vec3 current;     // t_c [m]
 };
 
-inline ClusterMeans cluster_means(const Body& body, const Clusters& clusters, const std::vector<int32_t>& counts,
-                                  const std::vector<Vec3>& x, int32_t cluster) {
+// What the means of many clusters are made of, looked up once for each particle.
+struct WeightedRest {
+  std::vector<double> weight;  // [n] w_ic; of no meaning where the particle lies in no cluster
+  std::vector<Vec3> position;  // [n] X_i [m]
+};
+
+inline WeightedRest weighted_rest(const Body& body, const std::vector<int32_t>& counts) {
+  WeightedRest rest;
+  rest.weight.reserve(body.node.size());
+  rest.position.reserve(body.node.size());
+  for (int32_t i = 0; i < body.particle_count(); ++i) {
+    rest.weight.push_back(weight_of(body, counts, i));
+    rest.position.push_back(body.rest_position(i));
+  }
+  return rest;
+}
+
+inline ClusterMeans cluster_means(const WeightedRest& rest, const Clusters& clusters, const std::vector<Vec3>& x,
+                                  int32_t cluster) {
   ClusterMeans means;
-  for (const int32_t i : clusters.of(cluster)) {
-    const double w = weight_of(body, counts, i);
-    means.mass += w;
-    means.rest += w * body.rest_position(i);
-    means.current += w * x[static_cast<std::size_t>(i)];
+  for (const int32_t particle : clusters.of(cluster)) {
+    const auto i = static_cast<std::size_t>(particle);
+    means.mass += rest.weight[i];
+    means.rest += rest.weight[i] * rest.position[i];
+    means.current += rest.weight[i] * x[i];
   }
   means.rest = means.rest / means.mass;
   means.current = means.current / means.mass;

@@ -612,11 +612,11 @@ Verdict check_skin_vertices(const Setup& setup, const State& state) {
 
   // Their places.
   const Clusters& clusters = state.clusters;
-  const std::vector<int32_t> counts = membership_counts(clusters, body.particle_count());
+  const WeightedRest weighted = weighted_rest(body, membership_counts(clusters, body.particle_count()));
   const Holders holders_of_all = holders_of(clusters, body.particle_count());
   std::vector<ClusterMeans> means;
   means.reserve(static_cast<std::size_t>(clusters.count()));
-  for (int32_t c = 0; c < clusters.count(); ++c) means.push_back(cluster_means(body, clusters, counts, state.x, c));
+  for (int32_t c = 0; c < clusters.count(); ++c) means.push_back(cluster_means(weighted, clusters, state.x, c));
   const double h = body.grid.spacing;
   const double bound = 2 * goal_rounding(rounding_scale(setup, state)) / h;
   verdict.bound = bound;

@@ -27,9 +27,11 @@ Stretch stretch_of(const TissueGraph& graph, const std::vector<Vec3>& x, int32_t
   for (int direction = 0; direction < 6; ++direction) {
     const int32_t other = graph.neighbour(i, direction);
     if (other < 0) continue;
-    const double distance = norm(x[at(i)] - x[at(other)]);
-    if (distance > stretch.distance || stretch.neighbour < 0) stretch = {distance, other};
+    const Vec3 d = x[at(i)] - x[at(other)];
+    const double square = dot(d, d);
+    if (square > stretch.distance || stretch.neighbour < 0) stretch = {square, other};
   }
+  stretch.distance = std::sqrt(stretch.distance);  // the root ascends: of the greatest square it is the greatest distance
   return stretch;
 }
 
@@ -204,7 +206,9 @@ class Swept {
       const BladeMove& move = setup.blade_moves[at(s)];
       if (!move.down) continue;
       const bool turns = move.from.along != move.to.along || move.from.back != move.to.back;
-      moves_.push_back({&move, turns, turns ? turn_between(move.from, move.to) : Turn{}});
+      const double way = norm(move.to.edge - move.from.edge);
+      moves_.push_back({&move, std::hypot(setup.blade.length / 2, setup.blade.depth) + way, turns,
+                        turns ? turn_between(move.from, move.to) : Turn{}});
     }
   }
 
@@ -213,10 +217,8 @@ class Swept {
     const double h = setup_.body.grid.spacing;
     const double reach = std::max({blade.thickness, h, stretch}) / 2;
     Demand demand = Demand::keep;
-    for (const auto& [move, turns, turn] : moves_) {
+    for (const auto& [move, extent, turns, turn] : moves_) {
       const Vec3 way = move->to.edge - move->from.edge;
-      // Nothing of the blade is farther from the edge's middle than this.
-      const double extent = std::hypot(blade.length / 2, blade.depth) + norm(way);
       if (norm(x - move->from.edge) > extent + reach + kTurningSlack * h) continue;
       Demand here = Demand::either;
       // A distance between places in the body is rounded as the places are; a backend lengthens its reach by as much,
@@ -238,6 +240,7 @@ class Swept {
  private:
   struct Move {
     const BladeMove* move;
+    double extent;  // nothing of the blade is farther from where the edge's middle began
     bool turns;
     Turn turn;
   };
@@ -892,8 +895,9 @@ Verdict check_expansion(const Setup& setup, const State& before, const State& af
   }
   const TissueGraph graph(setup.body, before.alive);
   const bool idle = setup.expand.rule == ExpandRule::none || before.edge_covered;
-  const std::vector<uint8_t> covered = covered_edges(graph, a);
-  const std::vector<uint8_t> isolated_before = singly_isolated(graph, a);
+  const bool published = setup.expand.rule == ExpandRule::published;
+  std::optional<std::vector<uint8_t>> covered;  // once a cluster has grown
+  const std::vector<uint8_t> isolated_before = published ? singly_isolated(graph, a) : std::vector<uint8_t>{};
   std::vector<int32_t> layer(at(graph.particle_count()), -1);
   std::vector<int32_t> old_members, new_members, added, lost;
   for (int32_t c = 0; c < a.count(); ++c) {
@@ -922,12 +926,13 @@ Verdict check_expansion(const Setup& setup, const State& before, const State& af
               {number}, {added.front()});
       continue;
     }
-    if (setup.expand.rule == ExpandRule::published && isolated_before[at(c)] == 0) {
+    if (published && isolated_before[at(c)] == 0) {
       violate(verdict, fmt::format("cluster {} took in particle {}, but it was not isolated", number, added.front()),
               {number}, {added.front()});
       continue;
     }
-    check_additions(setup, graph, a, c, added, covered, layer, verdict);
+    if (!covered) covered = covered_edges(graph, a);
+    check_additions(setup, graph, a, c, added, *covered, layer, verdict);
   }
 
   if (setup.expand.rule == ExpandRule::edge_cover) {
@@ -939,7 +944,7 @@ Verdict check_expansion(const Setup& setup, const State& before, const State& af
       violate(verdict, "every edge is covered, but edge_covered does not say so");
     }
   }
-  if (setup.expand.rule == ExpandRule::published && !idle) {
+  if (published && !idle) {
     const std::vector<uint8_t> isolated = singly_isolated(graph, b);
     for (int32_t c = 0; c < b.count(); ++c) {
       if (isolated[at(c)] == 0) continue;

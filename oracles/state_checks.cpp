@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 
+#include "oracles/shape_sums.h"
 #include "oracles/support.h"
 
 namespace cutproof::oracles {
@@ -650,10 +651,9 @@ Verdict check_rest_frames(Judged& judged) {
   const double h = judged.body.grid.spacing;
   const int32_t n = judged.body.particle_count();
   // Dead members count too: between detect and split the frames are those of before.
-  std::vector<int32_t> holders(at(n), 0);
-  for (const int32_t i : judged.clusters.members) ++holders[at(i)];
+  const WeightedRest weighted = weighted_rest(judged.body, membership_counts(judged.clusters, n));
   double reach = h;
-  for (int32_t i = 0; i < n; ++i) reach = std::max(reach, norm(judged.body.rest_position(i)));
+  for (const Vec3 position : weighted.position) reach = std::max(reach, norm(position));
   int64_t largest = 0;
   int32_t worst = -1;
   for (int32_t c = 0; c < judged.clusters.count(); ++c) {
@@ -663,9 +663,8 @@ Verdict check_rest_frames(Judged& judged) {
     Vec3 sum;
     double mass = 0;
     for (const int32_t i : judged.clusters.of(c)) {
-      const double w = judged.body.mass[at(i)] / holders[at(i)];
-      sum += w * judged.body.rest_position(i);
-      mass += w;
+      sum += weighted.weight[at(i)] * weighted.position[at(i)];
+      mass += weighted.weight[at(i)];
     }
     const double center_error = norm(judged.clusters.rest_center[at(c)] - sum / mass) / h;
     const double mass_error = std::abs(judged.clusters.mass[at(c)] - mass) / mass;

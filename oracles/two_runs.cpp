@@ -133,13 +133,14 @@ Verdict fail_on(Verdict verdict, const std::string& where, const Difference& dif
 double greatest_amplification(const Body& body, const Clusters& clusters, const std::vector<int32_t>& counts,
                               const std::vector<Vec3>& rest) {
   double greatest = 0;
+  const WeightedRest weighted = weighted_rest(body, counts);
   for (int32_t c = 0; c < clusters.count(); ++c) {
-    const ClusterMeans means = cluster_means(body, clusters, counts, rest, c);
+    const ClusterMeans means = cluster_means(weighted, clusters, rest, c);
     Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
     double moment = 0, radius = 0;
     for (const int32_t i : clusters.of(c)) {
       const Vec3 d = rest[at(i)] - means.rest;
-      const double w = weight_of(body, counts, i);
+      const double w = weighted.weight[at(i)];
       a += w * Eigen::Vector3d(d.x, d.y, d.z) * Eigen::RowVector3d(d.x, d.y, d.z);
       moment += w * norm(d);
       radius = std::max(radius, norm(d));

@@ -175,45 +175,47 @@ std::vector<Trail> run_cases(Backend& backend, std::vector<Loaded>& loaded) {
     states.push_back(one.state);
     frames = std::max(frames, one.setup.frame_count() - one.state.frame);
   }
-  backend.load(setups, states);
+  backend.load(std::move(setups), std::move(states));
   std::vector<Trail> trails(loaded.size());
   states = backend.snapshot();
   for (std::size_t b = 0; b < loaded.size(); ++b) {
-    trails[b].initial = states[b];
+    trails[b].initial = std::move(states[b]);
     // In single precision what is loaded is rounded; in double it comes back as it is.
-    if (backend.unit_roundoff() == 0x1p-53 && !(states[b] == loaded[b].state)) {
-      trails[b].failure = broken_contract("loading changes nothing", Stage::step, states[b], backend.name());
+    if (backend.unit_roundoff() == 0x1p-53 && !(trails[b].initial == loaded[b].state)) {
+      trails[b].failure = broken_contract("loading changes nothing", Stage::step, trails[b].initial, backend.name());
     }
   }
+  const auto present = [&](std::size_t b) -> const State& {
+    return trails[b].steps.empty() ? trails[b].initial : trails[b].steps.back().state;
+  };
   for (int64_t frame = 0; frame < frames; ++frame) {
     for (const Stage stage : kStages) {
       bool due = false;
       for (std::size_t b = 0; b < loaded.size(); ++b) {
-        due = due || (states[b].frame < setups[b].frame_count() && is_due(setups[b], stage, states[b]));
+        const Setup& setup = loaded[b].setup;
+        due = due || (present(b).frame < setup.frame_count() && is_due(setup, stage, present(b)));
       }
       backend.run({stage, stage});
       if (backend.report().ran[static_cast<std::size_t>(stage)] != due) {
         trails.front().failure = broken_contract(due ? "a stage that is due runs" : "only what is due runs", stage,
-                                                 states.front(), backend.name());
+                                                 present(0), backend.name());
       }
       // Where no body had anything to do, looking once a frame shows that nothing was done: skin always looks, as it
       // counts up the frame.
       if (!due && stage != Stage::skin) continue;
       std::vector<bool> goes_on(loaded.size());
-      for (std::size_t b = 0; b < loaded.size(); ++b) goes_on[b] = states[b].frame < setups[b].frame_count();
-      std::vector<State> next = backend.snapshot_of(goes_on);
+      for (std::size_t b = 0; b < loaded.size(); ++b) goes_on[b] = present(b).frame < loaded[b].setup.frame_count();
+      states = backend.snapshot_of(goes_on);
       for (std::size_t b = 0; b < loaded.size(); ++b) {
-        if (!goes_on[b]) continue;
-        states[b] = std::move(next[b]);
-        trails[b].steps.push_back({stage, states[b]});
+        if (goes_on[b]) trails[b].steps.push_back({stage, std::move(states[b])});
       }
     }
   }
-  const std::vector<State> last = backend.snapshot();
+  states = backend.snapshot();
   for (std::size_t b = 0; b < loaded.size(); ++b) {
-    if (last[b] == states[b] || trails[b].failure) continue;
+    if (states[b] == present(b) || trails[b].failure) continue;
     trails[b].failure =
-        broken_contract("a body whose timetable is over stays as it is", Stage::skin, states[b], backend.name());
+        broken_contract("a body whose timetable is over stays as it is", Stage::skin, present(b), backend.name());
   }
   return trails;
 }

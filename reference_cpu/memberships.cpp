@@ -21,18 +21,25 @@ Memberships memberships_of(const Clusters& clusters, int32_t particle_count) {
 void update_rest_frames(const Body& body, Clusters& clusters) {
   const Memberships memberships = memberships_of(clusters, body.particle_count());
   const auto count = static_cast<std::size_t>(clusters.count());
+  std::vector<double> weight(body.node.size());  // w_ic, the same for every cluster of i
+  std::vector<Vec3> rest(body.node.size());
+  for (std::size_t i = 0; i < rest.size(); ++i) {
+    const auto particle = static_cast<int32_t>(i);
+    weight[i] = body.mass[i] / static_cast<double>(memberships.count(particle));
+    rest[i] = body.rest_position(particle);
+  }
   clusters.mass.assign(count, 0.0);
   clusters.rest_center.assign(count, Vec3{});
   for (int32_t c = 0; c < clusters.count(); ++c) {
     // Relative to one member: an error of T_c pushes the cluster the same way in every iteration, so it is kept to the
     // rounding of the result.
-    const Vec3 base = body.rest_position(clusters.of(c).front());
+    const Vec3 base = rest[static_cast<std::size_t>(clusters.of(c).front())];
     double mass = 0;
     Vec3 moment;
-    for (const int32_t i : clusters.of(c)) {
-      const double weight = body.mass[static_cast<std::size_t>(i)] / static_cast<double>(memberships.count(i));
-      mass += weight;
-      moment += weight * (body.rest_position(i) - base);
+    for (const int32_t particle : clusters.of(c)) {
+      const auto i = static_cast<std::size_t>(particle);
+      mass += weight[i];
+      moment += weight[i] * (rest[i] - base);
     }
     clusters.mass[static_cast<std::size_t>(c)] = mass;
     clusters.rest_center[static_cast<std::size_t>(c)] = base + moment / mass;
