@@ -551,6 +551,7 @@ class MergeDecomposition {
     std::vector<int32_t> met;
     candidates_.resize(at(before_.count()));
     for (int32_t c = 0; c < before_.count(); ++c) {
+      if (result_of_[at(c)] >= 0 && is_unchanged(result_of_[at(c)])) continue;  // and whom else it lies in matters to none
       met.clear();
       int32_t lonely = -1;  // a particle that no result with which c shares the others holds
       for (const int32_t i : before_.of(c)) {

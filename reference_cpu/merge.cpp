@@ -30,6 +30,7 @@ class MergingSets {
         holder_count_(static_cast<std::size_t>(body.particle_count()), 0),
         shared_(sets_.size(), 0),
         seen_(sets_.size(), 0),
+        visited_(static_cast<std::size_t>(body.particle_count()), 0),
         last_join_(sets_.size(), 0),
         answers_(sets_.size()) {
     for (const auto& set : sets_) {
@@ -68,11 +69,15 @@ class MergingSets {
       if (!std::exchange(seen_[at(slot)], uint8_t{1})) touching.push_back(slot);
       shared_[at(slot)] += shares;
     };
+    ++visit_;
     for (const int32_t p : sets_[at(s)]) {
+      visited_[at(p)] = visit_;
       for (const int32_t slot : holders_of(p)) touch(slot, 1);
+    }
+    for (const int32_t p : sets_[at(s)]) {
       for (int direction = 0; direction < 6 && alive_[at(p)]; ++direction) {
         const int32_t q = body_.neighbour(p, direction);
-        if (q < 0 || !alive_[at(q)]) continue;
+        if (q < 0 || !alive_[at(q)] || std::exchange(visited_[at(q)], visit_) == visit_) continue;
         for (const int32_t slot : holders_of(q)) touch(slot, 0);
       }
     }
@@ -149,6 +154,8 @@ class MergingSets {
   std::vector<int32_t> small_;
   std::vector<int64_t> shared_;  // scratch of preferred_target, by slot; zero between calls
   std::vector<uint8_t> seen_;    // likewise
+  int64_t visit_ = 0;            // calls so far that looked
+  std::vector<int64_t> visited_;  // by particle: the last of them that looked at it
 
   // The last answer of preferred_target.
   struct Answer {

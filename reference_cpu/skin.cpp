@@ -29,22 +29,23 @@ void extract(const Body& body, const std::vector<uint8_t>& alive, Skin& skin) {
   skin.position.resize(skin.owner.size());
 
   const Grid& grid = body.grid;
+  std::vector<uint8_t> tissue(static_cast<std::size_t>(grid.node_count()), 0);  // by node
+  for (std::size_t p = 0; p < body.node.size(); ++p) tissue[static_cast<std::size_t>(body.node[p])] = alive[p] != 0;
   std::array<int64_t, 8> corner_step = {};
   for (int c = 0; c < 8; ++c) corner_step[static_cast<std::size_t>(c)] = grid.index(c & 1, c >> 1 & 1, c >> 2 & 1);
   for (int32_t k = 0; k + 1 < grid.nodes[2]; ++k) {
     for (int32_t j = 0; j + 1 < grid.nodes[1]; ++j) {
       for (int32_t i = 0; i + 1 < grid.nodes[0]; ++i) {
-        std::array<int32_t, 8> corner = {};
+        const int64_t lowest = grid.index(i, j, k);
+        const auto corner = [&](int c) {
+          return static_cast<std::size_t>(lowest + corner_step[static_cast<std::size_t>(c)]);
+        };
         int inside = 0;
-        for (std::size_t c = 0; c < 8; ++c) {
-          corner[c] = body.particle_at[static_cast<std::size_t>(grid.index(i, j, k) + corner_step[c])];
-          if (is_tissue(corner[c])) inside |= 1 << c;
-        }
+        for (int c = 0; c < 8; ++c) inside |= tissue[corner(c)] << c;
         const auto vertex_on = [&](int cell_edge) {
           const CellEdge& edge = cell_edges()[static_cast<std::size_t>(cell_edge)];
           const bool low_owns = (inside >> edge.low & 1) != 0;
-          const auto owner =
-              static_cast<std::size_t>(corner[static_cast<std::size_t>(low_owns ? edge.low : edge.high)]);
+          const auto owner = static_cast<std::size_t>(body.particle_at[corner(low_owns ? edge.low : edge.high)]);
           return vertex[owner * 6 + static_cast<std::size_t>(2 * edge.axis + (low_owns ? 0 : 1))];
         };
         for (const auto& [a, b, c] : skin_cases()[static_cast<std::size_t>(inside)].triangles) {
