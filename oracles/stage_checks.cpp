@@ -67,12 +67,22 @@ double distance_to_rectangle(const Blade& blade, Local p) {
   return std::sqrt(du * du + p.n * p.n + dw * dw);
 }
 
+// A lower bound of the distance to the sum of the rectangle at `p` and a way `d`, all in the rectangle's own axes: how far
+// the point lies outside of the sum's bounding box along one of them. Off by rounding of coordinates, as the distance is.
+double least_distance_to_translated(const Blade& blade, Local p, Local d) {
+  const auto beyond = [](double start, double rate, double low, double high) {
+    return std::max(low + std::min(rate, 0.0) - start, start - (high + std::max(rate, 0.0)));
+  };
+  return std::max({beyond(p.u, d.u, -blade.length / 2, blade.length / 2), beyond(p.n, d.n, 0, 0),
+                   beyond(p.w, d.w, 0, blade.depth)});
+}
+
 // Distance to the Minkowski sum of the rectangle and the segment [0, way]: the minimum over u, w, t of a convex
 // quadratic in a box. For a given t the best u and w are clamped coordinates, because the axes are orthogonal; what is
 // left is convex and piecewise quadratic in t, and changes its pieces where a coordinate starts or stops to be clamped.
 // So it is exact: the least over the pieces' ends and over each piece's own stationary point.
-double distance_to_translated(const Blade& blade, const BladePose& from, Vec3 way, Vec3 x) {
-  const Local p = to_local(from, x - from.edge), d = to_local(from, way);
+// `p` and `d`: the point from the edge's middle, and the way, in the rectangle's own axes.
+double distance_to_translated(const Blade& blade, Local p, Local d) {
   const auto place = [&](double t) { return Local{p.u - t * d.u, p.n - t * d.n, p.w - t * d.w}; };
   std::array<double, 6> ends = {0, 1};  // ascending
   std::size_t count = 2;
@@ -227,9 +237,12 @@ class Swept {
       if (turns) {
         here = demand_of_turning(blade, *move, turn, h, reach, x);
       } else {
-        const double distance = distance_to_translated(blade, move->from, way, x);
+        const double most = reach * (1 + kTie + kSweepBand) + places;
+        const Local p = to_local(move->from, x - move->from.edge), d = to_local(move->from, way);
+        if (least_distance_to_translated(blade, p, d) > most) continue;
+        const double distance = distance_to_translated(blade, p, d);
         if (distance <= reach * (1 + kTie - kSweepBand)) here = Demand::remove;
-        if (distance > reach * (1 + kTie + kSweepBand) + places) here = Demand::keep;
+        if (distance > most) here = Demand::keep;
       }
       if (here == Demand::remove) return here;
       if (here == Demand::either) demand = here;

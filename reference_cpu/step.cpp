@@ -187,7 +187,9 @@ void step(const Setup& setup, State& state) {
   state.removed.clear();
   state.debris.clear();
   state.impulse = {};
-  const Memberships memberships = memberships_of(state.clusters, setup.body.particle_count());
+  // Without iterations nobody asks who holds what.
+  const Memberships memberships =
+      setup.step.iterations > 0 ? memberships_of(state.clusters, setup.body.particle_count()) : Memberships{};
   const double dt = setup.substep_length[at(state.frame)];
   for (int32_t s = 0; s < setup.step.substeps; ++s) {
     substep(setup, memberships, state.frame * setup.step.substeps + s, dt, state);
