@@ -76,8 +76,8 @@ class Judge {
   std::vector<Verdict> state(const State& state, Stage after, bool thorough);
   std::vector<Verdict> stage(Stage stage, const State& before, const State& after);
 
-  // For reports. Components of G, and shells of the skin whose volume at `position` is not positive, triangles joined at
-  // their vertices; 0 if the state is not well formed.
+  // For reports. Components of G, and shells of the skin whose volume at `position` is not positive, triangles joined
+  // at their vertices; 0 if the state is not well formed.
   int32_t component_count(const State& state);
   int32_t inner_shells(const State& state);
 

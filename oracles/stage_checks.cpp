@@ -31,7 +31,8 @@ Stretch stretch_of(const TissueGraph& graph, const std::vector<Vec3>& x, int32_t
     const double square = dot(d, d);
     if (square > stretch.distance || stretch.neighbour < 0) stretch = {square, other};
   }
-  stretch.distance = std::sqrt(stretch.distance);  // the root ascends: of the greatest square it is the greatest distance
+  stretch.distance =
+      std::sqrt(stretch.distance);  // the root ascends: of the greatest square it is the greatest distance
   return stretch;
 }
 
@@ -67,8 +68,9 @@ double distance_to_rectangle(const Blade& blade, Local p) {
   return std::sqrt(du * du + p.n * p.n + dw * dw);
 }
 
-// A lower bound of the distance to the sum of the rectangle at `p` and a way `d`, all in the rectangle's own axes: how far
-// the point lies outside of the sum's bounding box along one of them. Off by rounding of coordinates, as the distance is.
+// A lower bound of the distance to the sum of the rectangle at `p` and a way `d`, all in the rectangle's own axes: how
+// far the point lies outside of the sum's bounding box along one of them. Off by rounding of coordinates, as the
+// distance is.
 double least_distance_to_translated(const Blade& blade, Local p, Local d) {
   const auto beyond = [](double start, double rate, double low, double high) {
     return std::max(low + std::min(rate, 0.0) - start, start - (high + std::max(rate, 0.0)));
@@ -564,7 +566,8 @@ class MergeDecomposition {
     std::vector<int32_t> met;
     candidates_.resize(at(before_.count()));
     for (int32_t c = 0; c < before_.count(); ++c) {
-      if (result_of_[at(c)] >= 0 && is_unchanged(result_of_[at(c)])) continue;  // and whom else it lies in matters to none
+      if (result_of_[at(c)] >= 0 && is_unchanged(result_of_[at(c)]))
+        continue;  // and whom else it lies in matters to none
       met.clear();
       int32_t lonely = -1;  // a particle that no result with which c shares the others holds
       for (const int32_t i : before_.of(c)) {

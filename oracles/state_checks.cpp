@@ -898,7 +898,7 @@ struct Judge::Memory {
   bool body_is_known_good = false;
   const State* last = nullptr;
   std::unique_ptr<Judged> judged;  // `last`, where it is well formed
-  Verdict form;                  // of `last`
+  Verdict form;                    // of `last`
   std::vector<Held> held;
 
   // Makes `state` the last one, and forgets what rests on parts that have changed.

@@ -49,7 +49,7 @@ class SweepFaces {
     const Vec3 direction[3] = {sweep.pose.along, sweep.pose.back, sweep.way};
     const double low[3] = {-blade.length / 2, 0, 0};
     const double high[3] = {blade.length / 2, blade.depth, 1};
-    for (int face = 26; face >= 0; --face) {               // from the inside of the box to its corners
+    for (int face = 26; face >= 0; --face) {                   // from the inside of the box to its corners
       const int kind[3] = {face % 3, face / 3 % 3, face / 9};  // 0: at low, 1: at high, 2: free
       Face found;
       for (int k = 0; k < 3; ++k) {

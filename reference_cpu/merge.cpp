@@ -28,9 +28,8 @@ class MergingSets {
         exists_(sets_.size(), 1),
         first_holder_(static_cast<std::size_t>(body.particle_count()) + 1, 0),
         holder_count_(static_cast<std::size_t>(body.particle_count()), 0),
-        shared_(sets_.size(), 0),
-        seen_(sets_.size(), 0),
         visited_(static_cast<std::size_t>(body.particle_count()), 0),
+        touches_(sets_.size()),
         last_join_(sets_.size(), 0),
         answers_(sets_.size()) {
     for (const auto& set : sets_) {
@@ -64,12 +63,15 @@ class MergingSets {
     }
     std::vector<int32_t>& touching = answer.touching;
     touching.clear();
-    const auto touch = [&](int32_t slot, int64_t shares) {
-      if (slot == s) return;
-      if (!std::exchange(seen_[at(slot)], uint8_t{1})) touching.push_back(slot);
-      shared_[at(slot)] += shares;
-    };
     ++visit_;
+    const auto touch = [&](int32_t slot, int32_t shares) {
+      Touch& touched = touches_[at(slot)];
+      if (touched.visit != visit_) {
+        touched = {visit_, 0};
+        if (slot != s) touching.push_back(slot);
+      }
+      touched.shared += shares;
+    };
     for (const int32_t p : sets_[at(s)]) {
       visited_[at(p)] = visit_;
       for (const int32_t slot : holders_of(p)) touch(slot, 1);
@@ -84,8 +86,7 @@ class MergingSets {
 
     std::optional<int32_t> best;
     for (const int32_t t : touching) {
-      const int64_t shared = std::exchange(shared_[at(t)], 0);
-      seen_[at(t)] = 0;
+      const int64_t shared = touches_[at(t)].shared;
       const bool legal = shared == size(s) || size(s) + size(t) - shared <= cap_;
       if (legal && (!best || std::pair(size(t), number(t)) < std::pair(size(*best), number(*best)))) best = t;
     }
@@ -146,16 +147,20 @@ class MergingSets {
   const std::vector<uint8_t>& alive_;
   const std::vector<int32_t>& numbers_;
   int64_t tau_, cap_;
-  std::vector<std::vector<int32_t>> sets_;     // by slot
-  std::vector<uint8_t> exists_;                // by slot
-  std::vector<std::size_t> first_holder_;      // [n + 1] where a particle's row of holders_ begins
-  std::vector<std::size_t> holder_count_;      // [n] how much of its row is in use
+  std::vector<std::vector<int32_t>> sets_;  // by slot
+  std::vector<uint8_t> exists_;             // by slot
+  std::vector<std::size_t> first_holder_;   // [n + 1] where a particle's row of holders_ begins
+  std::vector<std::size_t> holder_count_;   // [n] how much of its row is in use
   std::vector<int32_t> holders_;
   std::vector<int32_t> small_;
-  std::vector<int64_t> shared_;  // scratch of preferred_target, by slot; zero between calls
-  std::vector<uint8_t> seen_;    // likewise
-  int64_t visit_ = 0;            // calls so far that looked
-  std::vector<int64_t> visited_;  // by particle: the last of them that looked at it
+  // Scratch of preferred_target.
+  struct Touch {
+    int32_t visit = 0;   // the last call that met the set
+    int32_t shared = 0;  // particles of it that it shares with the one asked about
+  };
+  int32_t visit_ = 0;             // calls so far that looked
+  std::vector<int32_t> visited_;  // by particle: the last of them that looked at it
+  std::vector<Touch> touches_;    // by slot
 
   // The last answer of preferred_target.
   struct Answer {
