@@ -29,9 +29,7 @@ class MergingSets {
         first_holder_(static_cast<std::size_t>(body.particle_count()) + 1, 0),
         holder_count_(static_cast<std::size_t>(body.particle_count()), 0),
         visited_(static_cast<std::size_t>(body.particle_count()), 0),
-        touches_(sets_.size()),
-        last_join_(sets_.size(), 0),
-        answers_(sets_.size()) {
+        touches_(sets_.size()) {
     for (const auto& set : sets_) {
       for (const int32_t p : set) ++first_holder_[at(p) + 1];
     }
@@ -55,14 +53,7 @@ class MergingSets {
   // The set that `s` would join: it touches s (shares a particle, or an edge of G joins them), the union has at most
   // cap particles or s lies inside it; the smallest such, then the one with the lowest number.
   std::optional<int32_t> preferred_target(int32_t s) {
-    // The answer depends on s and on what touches s alone: it stays as long as none of them was joined with another.
-    Answer& answer = answers_[at(s)];
-    const auto is_as_it_was = [&](int32_t slot) { return last_join_[at(slot)] <= answer.joins; };
-    if (answer.known && is_as_it_was(s) && std::all_of(answer.touching.begin(), answer.touching.end(), is_as_it_was)) {
-      return answer.target;
-    }
-    std::vector<int32_t>& touching = answer.touching;
-    touching.clear();
+    std::vector<int32_t> touching;
     ++visit_;
     const auto touch = [&](int32_t slot, int32_t shares) {
       Touch& touched = touches_[at(slot)];
@@ -90,9 +81,6 @@ class MergingSets {
       const bool legal = shared == size(s) || size(s) + size(t) - shared <= cap_;
       if (legal && (!best || std::pair(size(t), number(t)) < std::pair(size(*best), number(*best)))) best = t;
     }
-    answer.known = true;
-    answer.joins = joins_;
-    answer.target = best;
     return best;
   }
 
@@ -116,7 +104,6 @@ class MergingSets {
     to = std::move(both);
     from.clear();
     exists_[at(source)] = 0;
-    last_join_[at(source)] = last_join_[at(target)] = ++joins_;
   }
 
   // To be called after joins: drops from small() what is merged or has grown.
@@ -161,17 +148,6 @@ class MergingSets {
   int32_t visit_ = 0;             // calls so far that looked
   std::vector<int32_t> visited_;  // by particle: the last of them that looked at it
   std::vector<Touch> touches_;    // by slot
-
-  // The last answer of preferred_target.
-  struct Answer {
-    bool known = false;
-    int64_t joins = 0;              // how many there had been
-    std::vector<int32_t> touching;  // slots of the sets that touched it
-    std::optional<int32_t> target;
-  };
-  int64_t joins_ = 0;               // so far
-  std::vector<int64_t> last_join_;  // by slot: the last join that it took part in, counted from 1
-  std::vector<Answer> answers_;     // by slot
 };
 
 struct Proposal {
