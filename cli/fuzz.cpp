@@ -34,6 +34,7 @@ constexpr int kSizeThatMeetsEveryClass = 79;
 // A GPU is busy with so many loads at once; more only take memory.
 constexpr int kLoadsOnTheDevice = 6;
 constexpr int kSchedulesTried = 50;
+constexpr int kBodiesOnACpu = 16;
 
 [[noreturn]] void refuse(const std::string& option, const std::string& problem, const std::string& remedy) {
   throw InputError("command line", option, problem, remedy);
@@ -65,7 +66,9 @@ CampaignOptions campaign_options(const FuzzOptions& options) {
   campaign.least_size = static_cast<int>(least);
   campaign.most_size = static_cast<int>(most);
   campaign.dynamics = options.dynamics;
-  campaign.batch = options.batch;
+  // One kernel for many bodies keeps a GPU busy; on a CPU what a few bodies need stays in its caches.
+  const bool cpu = options.backend.name == "reference" || options.backend.name == "host";
+  campaign.batch = options.batch > 0 ? options.batch : cpu ? kBodiesOnACpu : CampaignOptions{}.batch;
   campaign.threads = options.threads > 0 ? options.threads : cpu_threads();
   const bool device = options.backend.name.starts_with("gpu");
   campaign.backends = device ? std::min(campaign.threads, kLoadsOnTheDevice) : campaign.threads;
@@ -340,7 +343,7 @@ std::unique_ptr<Backend> backend_of(const Counterexample& counterexample, const 
 }
 
 // Simplifies, saves, records; returns the file's name.
-std::string keep(const Violation& violation, const FuzzOptions& options, const BackendChoice& choice) {
+std::string keep(const Violation& violation, const FuzzOptions& options, const BackendChoice& choice, int batch) {
   fmt::print("case {} FAILS: {}\n", violation.index, describe(violation.verdict));
   std::fflush(stdout);
   Simplified simplified = simplify(violation, choice);
@@ -359,7 +362,7 @@ std::string keep(const Violation& violation, const FuzzOptions& options, const B
     record_alone(stem, backend_of(found, choice), found.failing);
   } else {
     fmt::print("alone it does not fail, only with the other bodies of its load: fuzz again with --seed {} --batch {}\n",
-               options.seed, options.batch);
+               options.seed, batch);
   }
   fmt::print("saved; to see it again: cutproof replay {}\n", file);
   return file;
@@ -400,7 +403,8 @@ int fuzz(const FuzzOptions& options) {
   json violations = json::array();
   for (const Violation& violation : campaign.violations) {
     const int64_t load = (violation.index - asked.shard) / asked.shards / asked.batch;
-    violations.push_back(violation_json(violation, keep(violation, options, choice_for(options.backend, load))));
+    violations.push_back(
+        violation_json(violation, keep(violation, options, choice_for(options.backend, load), asked.batch)));
   }
   const json document = campaign_json(options, asked, campaign, violations);
   if (json_file) {
