@@ -17,11 +17,11 @@
 #include <memory>
 #include <new>
 #include <nlohmann/json.hpp>
-#include <random>
 #include <string>
 #include <system_error>
 #include <vector>
 
+#include "tests/cli/chosen_allocations.h"
 #include "tests/cli/cut_scene.h"
 #include "tests/cli/failing_allocations.h"
 
@@ -214,31 +214,12 @@ class Allocations : public testing::TestWithParam<Case> {
     ASSERT_GT(made_, 500u) << "nothing counts";
   }
 
-  // CUTPROOF_ALLOCATIONS: "all", or how many of each case are made to fail.
-  static std::string setting(const char* name, const std::string& otherwise) {
-    const char* const text = std::getenv(name);
-    return text == nullptr ? otherwise : text;
-  }
-  static bool all() { return setting("CUTPROOF_ALLOCATIONS", "") == "all"; }
-  static uint64_t wanted() { return std::stoull(setting("CUTPROOF_ALLOCATIONS", "100")); }
-  static uint64_t seed() { return std::stoull(setting("CUTPROOF_SEED", std::to_string(std::random_device{}()))); }
-
-  // Numbers from 1 to `most`: all, or one from each of as many equal parts as are wanted.
-  static std::vector<uint64_t> numbers(uint64_t most, uint64_t seed) {
-    const uint64_t parts = all() ? most : std::min(wanted(), most);
-    std::mt19937_64 random(seed);
-    std::vector<uint64_t> chosen;
-    for (uint64_t part = 0; part < parts; ++part) {
-      const uint64_t from = part * most / parts, to = (part + 1) * most / parts;
-      chosen.push_back(1 + from + random() % (to - from));
-    }
-    return chosen;
-  }
+  static WantedAllocations wanted() { return wanted_allocations(100); }
 
   void fail_in_turn(uint64_t fail_count) {
-    const uint64_t with = seed();
+    const uint64_t with = sample_seed();
     std::map<int, int> ended;
-    for (const uint64_t number : numbers(made_, with)) {
+    for (const uint64_t number : chosen_numbers(made_, wanted(), with)) {
       const Outcome outcome = program_->run(number, fail_count, 0);
       ++ended[outcome.status];
       EXPECT_EQ(defect_of(outcome, undisturbed_), "")
@@ -275,8 +256,13 @@ TEST_P(Allocations, EachThatFailsWithAllAfterItEndsTheRunInOrder) { fail_in_turn
 // A machine with less and less memory: what takes the run beyond the limit fails, in HDF5 too. The next limit is just
 // enough for the first that failed.
 TEST_P(Allocations, AnyAmountOfMemoryThatIsTooLittleEndsTheRunInOrder) {
-  const int64_t step = all() ? 1 : std::max<int64_t>(1, most_ / 20000);
-  int64_t limit = 1;
+  const WantedAllocations want = wanted();
+  const int64_t step = want.all ? 1 : std::max<int64_t>(1, most_ / 20000);
+  // A share begins where the one before it ends; the last goes on until there is enough.
+  const auto begins = [&](uint64_t share) {
+    return 1 + static_cast<int64_t>((share - 1) * static_cast<uint64_t>(most_) / want.shares);
+  };
+  int64_t limit = begins(want.share);
   std::map<int, int> ended;
   for (;;) {
     const Outcome outcome = program_->run(0, 1, limit);
@@ -288,8 +274,9 @@ TEST_P(Allocations, AnyAmountOfMemoryThatIsTooLittleEndsTheRunInOrder) {
     }
     ASSERT_LT(limit, 2 * most_ + (int64_t{1} << 20)) << "there is no end to it";
     limit = std::max(limit, program_->control().wanted.load()) + step;
+    if (want.share < want.shares && limit >= begins(want.share + 1)) break;
   }
-  EXPECT_GT(ended[3], 1);
+  EXPECT_GT(ended[3], want.shares == 1 ? 1 : 0);
   print(ended, 0);
 }
 

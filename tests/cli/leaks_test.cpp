@@ -27,6 +27,7 @@
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
 #include "reference_cpu/reference.h"
+#include "tests/cli/chosen_allocations.h"
 #include "tests/cli/cut_scene.h"
 #include "tests/cli/failing_allocations.h"
 
@@ -82,8 +83,8 @@ class Leaks : public testing::Test {
     static_cast<void>(backend.snapshot());
   }
 
-  // Lets allocations of `call` fail, one in each run: all, or one from each of 150 equal parts. `may_terminate`: a
-  // destructor of a library that needs memory is in it. `may_lose`: as many blocks, in a library.
+  // Lets allocations of `call` fail, one in each run. `may_terminate`: a destructor of a library that needs memory is in
+  // it. `may_lose`: as many blocks, in a library.
   void fail_each(const std::function<void()>& call, bool may_terminate = false, int64_t may_lose = 0) {
     if (std::string(CUTPROOF_SANITIZERS) != "") {
       GTEST_SKIP() << "leaks were not run: sanitizers (" CUTPROOF_SANITIZERS ") bring their own allocator";
@@ -91,15 +92,9 @@ class Leaks : public testing::Test {
     call();  // what the libraries keep for good
     const uint64_t made = count(call);
     ASSERT_GT(made, 0u);
-    const char* const wanted = std::getenv("CUTPROOF_ALLOCATIONS");
-    const uint64_t parts = wanted != nullptr && wanted == std::string("all") ? made : std::min<uint64_t>(made, 150);
-    const char* const given = std::getenv("CUTPROOF_SEED");
-    const uint64_t seed = given == nullptr ? std::random_device{}() : std::strtoull(given, nullptr, 10);
-    std::mt19937_64 random(seed);
+    const uint64_t seed = sample_seed();
     std::map<int, int> ended;
-    for (uint64_t part = 0; part < parts; ++part) {
-      const uint64_t from = part * made / parts, to = (part + 1) * made / parts;
-      const uint64_t number = 1 + from + random() % (to - from);
+    for (const uint64_t number : chosen_numbers(made, wanted_allocations(150), seed)) {
       const int ending = in_a_process(call, number, may_lose);
       ++ended[ending];
       if (ending == kThrew || ending == kSurvived || (ending == kTerminated && may_terminate)) continue;
