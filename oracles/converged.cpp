@@ -2,17 +2,15 @@
 // rotations, and by the plain iteration. Both work on the same Substep below and share nothing with a backend.
 #include "oracles/converged.h"
 
-#include <cholmod.h>
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <new>
 #include <stdexcept>
 
+#include "oracles/cluster_system.h"
 #include "oracles/shape_sums.h"
 #include "oracles/support.h"
 
@@ -263,115 +261,26 @@ double greatest_change(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   return change;
 }
 
-// --- For fixed rotations: E over x and t together
-// ---------------------------------------------------------------------
+// --- For fixed rotations: E over x and t together --------------------------------------------------------------------
 
-// CHOLMOD's parameters and workspace.
-class Cholmod {
- public:
-  Cholmod() {
-    cholmod_start(&common_);
-    common_.print = 0;  // what fails is told by exceptions, not on standard output
-  }
-  ~Cholmod() { cholmod_finish(&common_); }
-  Cholmod(const Cholmod&) = delete;
-  Cholmod& operator=(const Cholmod&) = delete;
-  cholmod_common* get() { return &common_; }
-
-  // Throws if the last call failed.
-  void check() const {
-    if (common_.status == CHOLMOD_OUT_OF_MEMORY) throw std::bad_alloc();
-    if (common_.status != CHOLMOD_OK) {
-      throw std::runtime_error("CHOLMOD cannot factorise the system of a substep: its status is " +
-                               std::to_string(common_.status));
-    }
-  }
-
- private:
-  cholmod_common common_{};
-};
-
-// Something that CHOLMOD made.
-template <class T, int (*free)(T**, cholmod_common*)>
-class Made {
- public:
-  Made(T* made, Cholmod& cholmod) : made_(made), cholmod_(cholmod) { cholmod.check(); }  // null after a failed call
-  ~Made() { free(&made_, cholmod_.get()); }
-  Made(const Made&) = delete;
-  Made& operator=(const Made&) = delete;
-  T* get() const { return made_; }
-  T* operator->() const { return made_; }
-
- private:
-  T* made_;
-  Cholmod& cholmod_;
-};
-using Triplets = Made<cholmod_triplet, cholmod_free_triplet>;
-using Sparse = Made<cholmod_sparse, cholmod_free_sparse>;
-using Dense = Made<cholmod_dense, cholmod_free_dense>;
-using Factor = Made<cholmod_factor, cholmod_free_factor>;
-
-// A sparse Cholesky factorisation, CHOLMOD's.
+// The factor of a substep's system along one axis. That it is made anew for every substep and every set of fixed
+// particles is what was measured to be best (docs/accuracy_and_speed.md §6).
 class Cholesky {
  public:
-  Cholesky(Cholmod& cholmod, cholmod_sparse* matrix)
-      : cholmod_(cholmod), factor_(cholmod_analyze(matrix, cholmod.get()), cholmod) {
-    cholmod_factorize(matrix, factor_.get(), cholmod_.get());
+  Cholesky(Cholmod& cholmod, const Sparse& matrix)
+      : cholmod_(cholmod), factor_(cholmod_analyze(matrix.get(), cholmod.get()), cholmod) {
+    cholmod_factorize(matrix.get(), factor_.get(), cholmod_.get());
     cholmod_.check();
   }
 
   std::vector<double> solve(std::vector<double> right) const {
-    cholmod_dense b{};
-    b.nrow = b.d = b.nzmax = right.size();
-    b.ncol = 1;
-    b.x = right.data();
-    b.xtype = CHOLMOD_REAL;
-    b.dtype = CHOLMOD_DOUBLE;
-    const Dense t(cholmod_solve(CHOLMOD_A, factor_.get(), &b, cholmod_.get()), cholmod_);
-    const auto* values = static_cast<const double*>(t->x);
-    std::copy(values, values + right.size(), right.begin());
-    return right;
+    return oracles::solve(cholmod_, factor_.get(), std::move(right));
   }
 
  private:
   Cholmod& cholmod_;
   Factor factor_;
 };
-
-// The matrix on t along one axis after eliminating x: M_c δ_cc' − s Σ m_i / n_i² over the particles of both c and c'
-// that are not fixed. Diagonally dominant, because a row sums to at least (1 − s) M_c.
-std::shared_ptr<Cholesky> factorised(const Substep& substep, const std::vector<uint8_t>& fixed, Cholmod& cholmod) {
-  const auto count = at(substep.clusters.count());
-  std::size_t entries = count;
-  for (int32_t i = 0; i < substep.body.particle_count(); ++i) {
-    const auto n = substep.holders.of(i).size();
-    entries += n * (n + 1) / 2;
-  }
-  const Triplets triplets(cholmod_allocate_triplet(count, count, entries, -1, CHOLMOD_REAL, cholmod.get()), cholmod);
-  auto* rows = static_cast<int*>(triplets->i);
-  auto* columns = static_cast<int*>(triplets->j);
-  auto* values = static_cast<double*>(triplets->x);
-  const auto add = [&](int32_t row, int32_t column, double value) {
-    rows[triplets->nnz] = row;
-    columns[triplets->nnz] = column;
-    values[triplets->nnz++] = value;
-  };
-  std::vector<double> mass(count, 0.0);
-  for (int32_t i = 0; i < substep.body.particle_count(); ++i) {
-    const auto clusters = substep.holders.of(i);
-    const double w = substep.weight[at(i)];
-    for (std::size_t p = 0; p < clusters.size(); ++p) {
-      mass[at(clusters[p])] += w;
-      if (fixed[at(i)] != 0) continue;
-      for (std::size_t q = 0; q <= p; ++q) {
-        add(clusters[p], clusters[q], -substep.s * w / static_cast<double>(clusters.size()));
-      }
-    }
-  }
-  for (std::size_t c = 0; c < count; ++c) add(static_cast<int32_t>(c), static_cast<int32_t>(c), mass[c]);
-  const Sparse matrix(cholmod_triplet_to_sparse(triplets.get(), triplets->nnz, cholmod.get()), cholmod);
-  return std::make_shared<Cholesky>(cholmod, matrix.get());
-}
 
 // Why a coordinate of a particle is not solved for.
 enum Fixed : uint8_t { kFree = 0, kOnLowWall, kOnHighWall, kGiven };
@@ -404,7 +313,11 @@ class LinearStage {
       if (factor_[other] && fixed_[other] == fixed) same = factor_[other];
     }
     fixed_[at(axis)] = std::move(fixed);
-    factor_[at(axis)] = same ? same : factorised(substep_, fixed_[at(axis)], cholmod_);
+    if (!same) {
+      const ClusterSystem system = cluster_system(substep_.body, substep_.clusters, substep_.s, fixed_[at(axis)]);
+      same = std::make_shared<Cholesky>(cholmod_, matrix_of(system, cholmod_));
+    }
+    factor_[at(axis)] = std::move(same);
   }
 
   // The sum over a particle's clusters of w · (its coordinate, as far as it does not depend on t).

@@ -98,6 +98,12 @@ void write_report(const std::string& path, const nlohmann::json& document) {
   file.commit();
 }
 
+std::vector<std::string> joined(std::initializer_list<std::vector<std::string>> parts) {
+  std::vector<std::string> all;
+  for (const std::vector<std::string>& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
 std::string Table::text() const {
   std::vector<std::size_t> widths;
   for (const std::vector<std::string>& row : rows_) {

@@ -2,6 +2,7 @@
 #pragma once
 #include <chrono>
 #include <cstdint>
+#include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -33,6 +34,9 @@ nlohmann::json begin_report(const std::string& suite, const std::string& backend
 void require_writable(const std::string& path);
 // The whole document or nothing; nothing if `path` is empty.
 void write_report(const std::string& path, const nlohmann::json& document);
+
+// Lists one after the other: a table's row from its parts.
+std::vector<std::string> joined(std::initializer_list<std::vector<std::string>> parts);
 
 // Columns as wide as what stands in them; the first is flush left, the others flush right.
 class Table {

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -43,12 +42,10 @@ int bench_sampling(const SamplingOptions& options) {
   document["rows"] = json::array();
   document["holds"] = true;
 
-  std::vector<std::string> head = {"median ms", "particles", "clusters", "paper's"};
-  for (const Stage stage : kStages) head.emplace_back(name_of(stage));
-  for (const char* word : {"frame", "least", "most", "to first", "paper ms", "to first", "error of step", "topology"}) {
-    head.emplace_back(word);
-  }
-  Table table(head);
+  Table table(joined({{"median ms", "particles", "clusters", "paper's"},
+                      scene_row_times(),
+                      {"to first", "paper ms", "to first"},
+                      scene_row_errors()}));
   for (const Contender& contender : contenders) {
     double first_frame = 0;
     for (const PaperSampling& paper : paper_samplings()) {
@@ -59,45 +56,20 @@ int bench_sampling(const SamplingOptions& options) {
       if (first_frame == 0) first_frame = frame.median;
       const double growth = frame.median / first_frame;
       const double paper_growth = paper.frame_ms / paper_samplings().front().frame_ms;
-      const int64_t particles = scene.setup.body.particle_count();
-      const int64_t clusters = scene.state.clusters.count();
+      SceneRow row = scene_row(scene, contender, measured);
+      table.add(joined({row.counts,
+                        {full ? fmt::format("{}", paper.clusters) : "-"},
+                        row.times,
+                        {percent(growth), fmt::format("{:.2f}", paper.frame_ms), percent(paper_growth)},
+                        row.errors}));
+      print_measured(scene, contender, measured);
 
-      std::vector<std::string> row = {scene.name, fmt::format("{}", particles), fmt::format("{}", clusters),
-                                      full ? fmt::format("{}", paper.clusters) : "-"};
-      for (const Stage stage : kStages) row.push_back(ms(measured.timings.stage[static_cast<std::size_t>(stage)]));
-      row.push_back(ms(frame));
-      row.push_back(fmt::format("{:.4g}", 1e3 * frame.min));
-      row.push_back(fmt::format("{:.4g}", 1e3 * frame.max));
-      row.push_back(percent(growth));
-      row.push_back(fmt::format("{:.2f}", paper.frame_ms));
-      row.push_back(percent(paper_growth));
-      row.push_back(error_of(Stage::step, measured.errors()).text);
-      row.push_back(error_of_frame(measured.errors()).text);
-      table.add(row);
-      fmt::print("{}, split {}: {} particles, frame {} ms\n", scene.name, contender.split, particles, ms(frame));
-      if (measured.judged) print_failures(*measured.judged);
-      std::fflush(stdout);
-
-      document["rows"].push_back({{"scene", scene.name},
-                                  {"particles", particles},
-                                  {"clusters", clusters},
-                                  {"memberships", scene.state.clusters.members.size()},
-                                  {"spacing", scene.setup.body.grid.spacing},
-                                  {"backend", contender.backend},
-                                  {"precision", contender.precision},
-                                  {"substeps", scene.setup.step.substeps},
-                                  {"iterations", scene.setup.step.iterations},
-                                  {"rotation", contender.rotation},
-                                  {"split", contender.split},
-                                  {"seconds", seconds_by_stage(measured.timings)},
-                                  {"frame_to_first", growth},
-                                  {"error", errors_by_stage(measured.errors())},
-                                  {"judged_frames", measured.judged ? measured.judged->frames : 0},
-                                  {"paper",
-                                   {{"particles", paper.particles},
-                                    {"clusters", paper.clusters},
-                                    {"frame_seconds", 1e-3 * paper.frame_ms},
-                                    {"frame_to_first", paper_growth}}}});
+      row.json["frame_to_first"] = growth;
+      row.json["paper"] = {{"particles", paper.particles},
+                           {"clusters", paper.clusters},
+                           {"frame_seconds", 1e-3 * paper.frame_ms},
+                           {"frame_to_first", paper_growth}};
+      document["rows"].push_back(std::move(row.json));
       document["holds"] = document["holds"].get<bool>() && measured.holds();
       document["complete"] = &contender == &contenders.back() && &paper == &paper_samplings().back();
       write_report(options.json, document);

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -44,13 +43,10 @@ int bench_scale(const ScaleOptions& options) {
   document["rows"] = json::array();
   document["holds"] = true;
 
-  std::vector<std::string> head = {"median ms", "particles", "clusters"};
-  for (const Stage stage : kStages) head.emplace_back(name_of(stage));
-  for (const char* word :
-       {"frame", "least", "most", "M particles/s", "MB", "B/particle", "error of step", "topology"}) {
-    head.emplace_back(word);
-  }
-  Table table(head);
+  Table table(joined({{"median ms", "particles", "clusters"},
+                      scene_row_times(),
+                      {"M particles/s", "MB", "B/particle"},
+                      scene_row_errors()}));
   for (const int64_t size : sizes) {
     BenchScene scene = make_bench_scene(size, frames);
     // New ones for each size, so that what one keeps is what this size needs.
@@ -59,44 +55,23 @@ int bench_scale(const ScaleOptions& options) {
       const std::optional<int64_t> before = bytes_in_use(options.backend);
       const Measured measured = measure(contender, scene, frames, options.repeats);
       const std::optional<int64_t> after = bytes_in_use(options.backend);
-      const int64_t particles = scene.setup.body.particle_count();
-      const Times& frame = measured.timings.frame;
-      const double rate = static_cast<double>(particles) / frame.median;
+      const auto particles = static_cast<double>(scene.setup.body.particle_count());
+      const double rate = particles / measured.timings.frame.median;
       std::optional<int64_t> kept;
       if (before && after && *after > *before) kept = *after - *before;
 
-      std::vector<std::string> row = {scene.name, fmt::format("{}", particles),
-                                      fmt::format("{}", scene.state.clusters.count())};
-      for (const Stage stage : kStages) row.push_back(ms(measured.timings.stage[static_cast<std::size_t>(stage)]));
-      row.push_back(ms(frame));
-      row.push_back(fmt::format("{:.4g}", 1e3 * frame.min));
-      row.push_back(fmt::format("{:.4g}", 1e3 * frame.max));
-      row.push_back(fmt::format("{:.4g}", 1e-6 * rate));
-      row.push_back(kept ? fmt::format("{:.4g}", 1e-6 * static_cast<double>(*kept)) : "-");
-      row.push_back(kept ? fmt::format("{:.0f}", static_cast<double>(*kept) / static_cast<double>(particles)) : "-");
-      row.push_back(error_of(Stage::step, measured.errors()).text);
-      row.push_back(error_of_frame(measured.errors()).text);
-      table.add(row);
-      fmt::print("{}, split {}: {} particles, frame {} ms\n", scene.name, contender.split, particles, ms(frame));
-      if (measured.judged) print_failures(*measured.judged);
-      std::fflush(stdout);
+      SceneRow row = scene_row(scene, contender, measured);
+      table.add(joined(
+          {row.counts,
+           row.times,
+           {fmt::format("{:.4g}", 1e-6 * rate), kept ? fmt::format("{:.4g}", 1e-6 * static_cast<double>(*kept)) : "-",
+            kept ? fmt::format("{:.0f}", static_cast<double>(*kept) / particles) : "-"},
+           row.errors}));
+      print_measured(scene, contender, measured);
 
-      document["rows"].push_back({{"scene", scene.name},
-                                  {"particles", particles},
-                                  {"clusters", scene.state.clusters.count()},
-                                  {"memberships", scene.state.clusters.members.size()},
-                                  {"spacing", scene.setup.body.grid.spacing},
-                                  {"backend", contender.backend},
-                                  {"precision", contender.precision},
-                                  {"substeps", scene.setup.step.substeps},
-                                  {"iterations", scene.setup.step.iterations},
-                                  {"rotation", contender.rotation},
-                                  {"split", contender.split},
-                                  {"seconds", seconds_by_stage(measured.timings)},
-                                  {"particles_per_second", rate},
-                                  {"bytes", kept ? json(*kept) : json(nullptr)},
-                                  {"error", errors_by_stage(measured.errors())},
-                                  {"judged_frames", measured.judged ? measured.judged->frames : 0}});
+      row.json["particles_per_second"] = rate;
+      row.json["bytes"] = kept ? json(*kept) : json(nullptr);
+      document["rows"].push_back(std::move(row.json));
       document["holds"] = document["holds"].get<bool>() && measured.holds();
       document["complete"] = size == sizes.back() && &contender == &contenders.back();
       // After each size, so that what has been measured is kept if a later one fails.

@@ -526,6 +526,50 @@ void print_failures(const FrameErrors& judged) {
 
 std::string ms(const Times& times) { return times.count == 0 ? "-" : fmt::format("{:.4g}", 1e3 * times.median); }
 
+SceneRow scene_row(const BenchScene& scene, const Contender& contender, const Measured& measured) {
+  const Setup& setup = scene.setup;
+  const Clusters& clusters = scene.state.clusters;
+  const Times& frame = measured.timings.frame;
+  SceneRow row;
+  row.counts = {scene.name, fmt::format("{}", setup.body.particle_count()), fmt::format("{}", clusters.count())};
+  for (const Stage stage : kStages) row.times.push_back(ms(measured.timings.stage[at(stage)]));
+  row.times.push_back(ms(frame));
+  row.times.push_back(fmt::format("{:.4g}", 1e3 * frame.min));
+  row.times.push_back(fmt::format("{:.4g}", 1e3 * frame.max));
+  row.errors = {error_of(Stage::step, measured.errors()).text, error_of_frame(measured.errors()).text};
+  row.json = {{"scene", scene.name},
+              {"particles", setup.body.particle_count()},
+              {"clusters", clusters.count()},
+              {"memberships", clusters.members.size()},
+              {"spacing", setup.body.grid.spacing},
+              {"backend", contender.backend},
+              {"precision", contender.precision},
+              {"substeps", setup.step.substeps},
+              {"iterations", setup.step.iterations},
+              {"rotation", contender.rotation},
+              {"split", contender.split},
+              {"seconds", seconds_by_stage(measured.timings)},
+              {"error", errors_by_stage(measured.errors())},
+              {"judged_frames", measured.judged ? measured.judged->frames : 0}};
+  return row;
+}
+
+std::vector<std::string> scene_row_times() {
+  std::vector<std::string> names;
+  for (const Stage stage : kStages) names.emplace_back(name_of(stage));
+  names.insert(names.end(), {"frame", "least", "most"});
+  return names;
+}
+
+std::vector<std::string> scene_row_errors() { return {"error of step", "topology"}; }
+
+void print_measured(const BenchScene& scene, const Contender& contender, const Measured& measured) {
+  fmt::print("{}, split {}: {} particles, frame {} ms\n", scene.name, contender.split,
+             scene.setup.body.particle_count(), ms(measured.timings.frame));
+  if (measured.judged) print_failures(*measured.judged);
+  std::fflush(stdout);
+}
+
 void declare(TimingOptions& options, CLI::App& command) {
   command.add_option("--backend", options.backend, "who is timed; `cutproof info` lists them")
       ->capture_default_str()

@@ -136,6 +136,19 @@ Measured measure(const Contender& contender, BenchScene& scene, int64_t frames, 
 // Milliseconds for a table; "-" if nothing was measured.
 std::string ms(const Times& times);
 
+// A row of a suite that times whole scenes, without what only that suite tells.
+struct SceneRow {
+  std::vector<std::string> counts;  // of the table: scene, particles, clusters
+  std::vector<std::string> times;   // as scene_row_times() names them
+  std::vector<std::string> errors;  // as scene_row_errors() names them
+  nlohmann::json json;
+};
+SceneRow scene_row(const BenchScene& scene, const Contender& contender, const Measured& measured);
+std::vector<std::string> scene_row_times();
+std::vector<std::string> scene_row_errors();
+// One line for who waits, and the verdicts that fail.
+void print_measured(const BenchScene& scene, const Contender& contender, const Measured& measured);
+
 // The options that these suites have in common.
 struct TimingOptions {
   std::string backend = "reference";

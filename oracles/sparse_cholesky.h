@@ -1,0 +1,72 @@
+// CHOLMOD (Chen, Davis, Hager and Rajamanickam 2008) as values: what it makes is freed, what fails is thrown.
+#pragma once
+#include <cholmod.h>
+
+#include <algorithm>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace cutproof::oracles {
+
+// CHOLMOD's parameters and workspace.
+class Cholmod {
+ public:
+  Cholmod() {
+    cholmod_start(&common_);
+    common_.print = 0;  // what fails is told by exceptions, not on standard output
+  }
+  ~Cholmod() { cholmod_finish(&common_); }
+  Cholmod(const Cholmod&) = delete;
+  Cholmod& operator=(const Cholmod&) = delete;
+  cholmod_common* get() { return &common_; }
+
+  // Throws if the last call failed.
+  void check() const {
+    if (common_.status == CHOLMOD_OUT_OF_MEMORY) throw std::bad_alloc();
+    if (common_.status != CHOLMOD_OK) {
+      throw std::runtime_error("CHOLMOD cannot factorise the system of a substep: its status is " +
+                               std::to_string(common_.status));
+    }
+  }
+
+ private:
+  cholmod_common common_{};
+};
+
+// Something that CHOLMOD made.
+template <class T, int (*free)(T**, cholmod_common*)>
+class Made {
+ public:
+  Made(T* made, Cholmod& cholmod) : made_(made), cholmod_(cholmod) { cholmod.check(); }  // null after a failed call
+  ~Made() { free(&made_, cholmod_.get()); }
+  Made(const Made&) = delete;
+  Made& operator=(const Made&) = delete;
+  T* get() const { return made_; }
+  T* operator->() const { return made_; }
+
+ private:
+  T* made_;
+  Cholmod& cholmod_;
+};
+using Triplets = Made<cholmod_triplet, cholmod_free_triplet>;
+using Sparse = Made<cholmod_sparse, cholmod_free_sparse>;
+using Dense = Made<cholmod_dense, cholmod_free_dense>;
+using Factor = Made<cholmod_factor, cholmod_free_factor>;
+
+// x of A x = right by A's factor.
+inline std::vector<double> solve(Cholmod& cholmod, cholmod_factor* factor, std::vector<double> right) {
+  cholmod_dense b{};
+  b.nrow = b.d = b.nzmax = right.size();
+  b.ncol = 1;
+  b.x = right.data();
+  b.xtype = CHOLMOD_REAL;
+  b.dtype = CHOLMOD_DOUBLE;
+  const Dense x(cholmod_solve(CHOLMOD_A, factor, &b, cholmod.get()), cholmod);
+  const auto* values = static_cast<const double*>(x->x);
+  std::copy(values, values + right.size(), right.begin());
+  return right;
+}
+
+}  // namespace cutproof::oracles
