@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <random>
 
 #include "cli/json_number.h"
 #include "oracles/oracles.h"
@@ -15,17 +14,6 @@ namespace cutproof::cli {
 
 namespace {
 
-// Issue bounds of the error of one frame (accuracy_and_speed.md §1) [h].
-constexpr double kBound = 1e-4;
-constexpr double kBoundOfLargeBodies = 3e-4;
-constexpr double kLargeBody = 100;  // [h] across
-// A particle this near to the blade's plane, in units of the rounding of its place and the blade's, may count as being
-// on either side of it.
-constexpr double kSideBand = 32;
-// A particle beyond the bound is measured for how far roundings of the frame's start carry it (docs/tolerances.md,
-// Against the reference), in so many runs, from a fixed seed.
-constexpr uint32_t kDisturbedRuns = 4;
-constexpr uint32_t kDisturbanceSeed = 1;
 // Rounding of a neighbour distance, in units of u h.
 constexpr double kDistanceBand = 64;
 
@@ -37,97 +25,6 @@ std::size_t at(int64_t index) { return static_cast<std::size_t>(index); }
 
 bool wants_lockstep(AgainstMode mode) { return mode != AgainstMode::shadow; }
 bool wants_shadow(AgainstMode mode) { return mode != AgainstMode::lockstep; }
-
-// The same body in one frame of one substep, filled in by take_substep().
-Setup single_substep(const Setup& setup) {
-  Setup single = setup;
-  single.step.substeps = 1;
-  single.substep_length.assign(1, 0);
-  single.blade_moves.resize(setup.has_blade ? 1 : 0);
-  for (Grip& grip : single.grips) {
-    grip.active.assign(1, 0);
-    grip.displacement.assign(1, {});
-  }
-  return single;
-}
-
-void take_substep(const Setup& setup, int64_t frame, int64_t substep, Setup& single) {
-  single.substep_length[0] = setup.substep_length[at(frame)];
-  if (setup.has_blade) single.blade_moves[0] = setup.blade_moves[at(substep)];
-  for (std::size_t g = 0; g < setup.grips.size(); ++g) {
-    single.grips[g].active[0] = setup.grips[g].active[at(substep)];
-    single.grips[g].displacement[0] = setup.grips[g].displacement[at(substep)];
-  }
-}
-
-double height_over(const BladePose& pose, Vec3 x) { return dot(x - pose.edge, cross(pose.along, pose.back)); }
-
-struct Stepped {
-  State state;
-  std::vector<uint8_t> tied;  // [n] 1: in the blade's plane, up to rounding, when some substep began
-  int64_t led = 0;            // particles that were moved across the plane
-};
-
-// The reference's step of frame before.frame, substep by substep, which gives the same bits as all at once. A tied
-// particle is led to the side `wanted` [n] (0: none) by moving it across the plane, within its rounding.
-Stepped step_reference(const Setup& setup, const State& before, const std::vector<int8_t>& wanted, Setup& single) {
-  Stepped result{before, std::vector<uint8_t>(before.x.size(), 0), 0};
-  State& state = result.state;
-  state.frame = 0;
-  const bool touches = setup.has_blade && setup.detect.criterion != Criterion::geometric;
-  for (int32_t s = 0; s < setup.step.substeps; ++s) {
-    take_substep(setup, before.frame, before.frame * setup.step.substeps + s, single);
-    if (touches && single.blade_moves[0].down) {
-      const BladePose& pose = single.blade_moves[0].from;
-      for (std::size_t i = 0; i < state.x.size(); ++i) {
-        if (!state.alive[i]) continue;
-        const double height = height_over(pose, state.x[i]);
-        const double rounding = setup.unit_roundoff * (norm(state.x[i]) + norm(pose.edge));
-        if (!(std::abs(height) <= kSideBand * rounding)) continue;
-        result.tied[i] = 1;
-        const int side = height < 0 ? -1 : +1;
-        if (wanted[i] == 0 || wanted[i] == side) continue;
-        const double other = wanted[i] * std::max(std::abs(height), rounding);
-        state.x[i] += (other - height) * cross(pose.along, pose.back);
-        ++result.led;
-      }
-    }
-    reference::step(single, state);
-  }
-  state.frame = before.frame;
-  return result;
-}
-
-std::vector<uint8_t> without(std::vector<uint8_t> mask, const std::vector<uint8_t>& excluded) {
-  for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = mask[i] && !excluded[i];
-  return mask;
-}
-
-// [n] How far each particle ends from where it should, if every coordinate of the start is off by one rounding of a
-// position, up or down [h]. Over the runs each particle goes along all four diagonals, so none is missed along which it
-// matters; particles are out of step with each other.
-std::vector<double> growth_of_rounding(const Setup& setup, const State& before, const State& expected,
-                                       const std::vector<int8_t>& wanted, Setup& single) {
-  std::vector<double> growth(before.x.size(), 0);
-  std::vector<uint32_t> phase(before.x.size());
-  std::mt19937 random(kDisturbanceSeed);
-  for (uint32_t& p : phase) p = static_cast<uint32_t>(random());
-  for (uint32_t run = 0; run < kDisturbedRuns; ++run) {
-    State disturbed = before;
-    for (std::size_t i = 0; i < phase.size(); ++i) {
-      Vec3& x = disturbed.x[i];
-      const double up = ((phase[i] >> 8) & 1) != 0 ? 1 : -1;
-      const double rounding = up * setup.unit_roundoff * norm(x);
-      const int reversed = static_cast<int>((phase[i] + run) % 4);  // 3: none
-      for (int axis = 0; axis < 3; ++axis) x[axis] += axis == reversed ? -rounding : rounding;
-    }
-    const State end = step_reference(setup, disturbed, wanted, single).state;
-    for (std::size_t i = 0; i < growth.size(); ++i) {
-      growth[i] = std::max(growth[i], norm(end.x[i] - expected.x[i]) / setup.body.grid.spacing);
-    }
-  }
-  return growth;
-}
 
 std::vector<int32_t> symmetric_difference(const std::vector<int32_t>& a, const std::vector<int32_t>& b) {
   std::vector<int32_t> result;
@@ -153,7 +50,7 @@ Against::Against(const Setup& setup, const State& start, const State& loaded, st
     : setup_(setup),
       backend_(std::move(backend)),
       mode_(mode),
-      position_bound_(body_extent(setup.body) > kLargeBody ? kBoundOfLargeBodies : kBound),
+      position_bound_(oracles::position_bound(setup.body)),
       frame_(loaded.frame),
       before_(loaded) {
   const Verdict form = oracles::well_formed(setup_, loaded);
@@ -168,7 +65,7 @@ Against::Against(const Setup& setup, const State& start, const State& loaded, st
     free_reference_->load({setup}, {start});
   }
   if (!wants_lockstep(mode)) return;
-  one_substep_ = single_substep(setup);
+  comparison_.emplace(setup_, reference::step);
   reference_ = reference::make_backend();
   // What the backend has made of what it was given.
   if (auto difference = topological_difference(start, loaded, false)) {
@@ -237,58 +134,20 @@ void Against::see_lockstep(Stage stage, const State& after, bool launched) {
 
 void Against::compare_step(const State& after, LockstepFrame& frame) {
   ++stages_compared_;
-  std::vector<int8_t> wanted(before_.x.size(), 0);
-  Stepped expected = step_reference(setup_, before_, wanted, one_substep_);
-  const auto apart = [&](const Stepped& stepped, const std::vector<uint8_t>& mask) {
-    return positions_apart(setup_, stepped.state, after, mask);
-  };
-  std::vector<uint8_t> mask = without(before_.alive, expected.tied);
-  // A tie that the backend has broken the other way moves the particle, and with it its clusters, to the other side of
-  // the blade. Then the reference is asked again, with these particles on the backend's side.
-  if (std::find(expected.tied.begin(), expected.tied.end(), 1) != expected.tied.end() &&
-      apart(expected, before_.alive).greatest > position_bound_) {
-    const BladePose& pose = setup_.blade_moves[at((before_.frame + 1) * setup_.step.substeps - 1)].to;
-    for (std::size_t i = 0; i < wanted.size(); ++i) {
-      if (expected.tied[i]) wanted[i] = height_over(pose, after.x[i]) < 0 ? -1 : +1;
-    }
-    Stepped led = step_reference(setup_, before_, wanted, one_substep_);
-    const std::vector<uint8_t> led_mask = without(before_.alive, led.tied);
-    if (apart(led, led_mask).greatest < apart(expected, mask).greatest) {
-      expected = std::move(led);
-      mask = led_mask;
-    } else {
-      std::fill(wanted.begin(), wanted.end(), int8_t{0});
-    }
-  }
-  frame.sides_either = std::count(expected.tied.begin(), expected.tied.end(), 1);
-  frame.sides_taken_otherwise = expected.led;
-
-  if (const auto difference = topological_difference(expected.state, after, false)) {
+  const oracles::StepDifference found = comparison_->compare(before_, after);
+  frame.sides_either = found.sides_either;
+  frame.sides_taken_otherwise = found.sides_taken_otherwise;
+  frame.sensitive_either = found.sensitive_either;
+  frame.particles_excluded = found.particles_excluded;
+  if (const auto difference = topological_difference(found.expected, after, false)) {
     differ(Stage::step, *difference);
   } else {
-    const RotationSpread rotations = rotations_apart(setup_, expected.state, after);
-    frame.rotations_either = static_cast<int64_t>(rotations.either.size());
-    frame.angle.join(rotations.angle);
-    note(rotation, Stage::step, rotations.displacement, frame.rotation);
-    for (const int32_t i : rotations.moved_by_either) mask[at(i)] = 0;
+    frame.rotations_either = found.rotations_either;
+    frame.angle.join(found.angle);
+    note(rotation, Stage::step, found.rotation, frame.rotation);
   }
-  if (apart(expected, mask).greatest > position_bound_) {
-    const std::vector<double> growth = growth_of_rounding(setup_, before_, expected.state, wanted, one_substep_);
-    // Each evaluation of the positions rounds again, independently of the others.
-    const double evaluations = setup_.step.substeps * (setup_.step.iterations + 1.0);
-    for (std::size_t i = 0; i < mask.size(); ++i) {
-      if (!mask[i]) continue;
-      const double deviation = norm(after.x[i] - expected.state.x[i]) / setup_.body.grid.spacing;
-      if (!(deviation > position_bound_ && deviation <= std::sqrt(evaluations) * growth[i])) continue;
-      mask[i] = 0;
-      ++frame.sensitive_either;
-    }
-  }
-  frame.particles_excluded = std::count(before_.alive.begin(), before_.alive.end(), 1) -
-                             std::count_if(mask.begin(), mask.end(), [](uint8_t m) { return m != 0; });
-  note(position, Stage::step, apart(expected, mask), frame.position);
-  note(velocity, Stage::step, velocities_apart(setup_, expected.state, after, setup_.substep_length[at(frame_)], mask),
-       frame.velocity);
+  note(position, Stage::step, found.position, frame.position);
+  note(velocity, Stage::step, found.velocity, frame.velocity);
 }
 
 // Where backend and reference remove different particles, the oracle says whether each of them lies within its rounding

@@ -108,7 +108,7 @@ class Against {
   State before_;         // the backend's last snapshot
   bool broken_ = false;  // a snapshot could not be read: nothing can be compared any more
 
-  Setup one_substep_;  // scratch: a setup of a single frame of a single substep
+  std::optional<oracles::StepComparison> comparison_;
   std::unique_ptr<Backend> reference_;
   std::vector<LockstepFrame> lockstep_;
   std::array<Track, kMeasures> tracks_;

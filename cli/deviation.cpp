@@ -2,11 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "reference_cpu/reference.h"
@@ -127,78 +125,6 @@ Spread positions_apart(const Setup& setup, const State& expected, const State& a
   return oracles::positions_apart(setup, expected.x, actual.x, mask);
 }
 
-Spread velocities_apart(const Setup& setup, const State& expected, const State& actual, double dt,
-                        const std::vector<uint8_t>& mask) {
-  Spread spread;
-  for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
-    if (mask[at(i)]) spread.add(norm(actual.v[at(i)] - expected.v[at(i)]) * dt / setup.body.grid.spacing, i);
-  }
-  return spread;
-}
-
-RotationSpread rotations_apart(const Setup& setup, const State& expected, const State& actual) {
-  RotationSpread spread;
-  const Body& body = setup.body;
-  const Clusters& clusters = expected.clusters;
-  std::vector<int32_t> held_by(body.node.size(), 0);
-  for (const int32_t i : clusters.members) ++held_by[at(i)];
-  for (int32_t c = 0; c < clusters.count(); ++c) {
-    double squared = 0;
-    for (std::size_t k = 0; k < 9; ++k) {
-      const double d = actual.clusters.rotation[at(c)].m[k] - clusters.rotation[at(c)].m[k];
-      squared += d * d;
-    }
-    if (squared == 0) {
-      spread.angle.add(0, c);
-      spread.displacement.add(0, c);
-      continue;
-    }
-    Vec3 center, rest_center;
-    double mass = 0;
-    for (const int32_t i : clusters.of(c)) {
-      const double w = body.mass[at(i)] / held_by[at(i)];
-      mass += w;
-      center += w * expected.x[at(i)];
-      rest_center += w * body.rest_position(i);
-    }
-    center = center / mass;
-    rest_center = rest_center / mass;
-    Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
-    double arm = 0;  // Σ w |X - T|
-    for (const int32_t i : clusters.of(c)) {
-      const double w = body.mass[at(i)] / held_by[at(i)];
-      const Vec3 now = expected.x[at(i)] - center, rest = body.rest_position(i) - rest_center;
-      arm += w * norm(rest);
-      for (int row = 0; row < 3; ++row) {
-        for (int column = 0; column < 3; ++column) a(row, column) += w * now[row] * rest[column];
-      }
-    }
-    if (!a.allFinite()) {
-      spread.either.push_back(c);  // no rotation of such a matrix is right; its positions tell of it
-      continue;
-    }
-    // Singular values as roots of the eigenvalues of AᵀA: exact to about 1e-8 of the greatest, which is far below
-    // kUniqueRotation.
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> squares(a.transpose() * a, Eigen::EigenvaluesOnly);
-    Eigen::Vector3d sigma = squares.eigenvalues().reverse().cwiseMax(0.0).cwiseSqrt();
-    if (a.determinant() < 0) sigma[2] = -sigma[2];
-    if (!(sigma[1] + sigma[2] >= kUniqueRotation * sigma[0]) || sigma[0] == 0) {
-      spread.either.push_back(c);
-      if (sigma[1] > kUniqueRotation * sigma[0]) {
-        const auto members = clusters.of(c);
-        spread.moved_by_either.insert(spread.moved_by_either.end(), members.begin(), members.end());
-      }
-      continue;
-    }
-    // ‖R - R'‖² = 8 sin²(angle / 2): exact for small angles, where the trace loses all digits.
-    const double angle = 2 * std::asin(std::min(1.0, std::sqrt(squared / 8)));
-    spread.angle.add(std::isnan(squared) ? squared : angle, c);
-    spread.displacement.add(
-        std::isnan(squared) ? squared : angle * (sigma[1] + sigma[2]) / (std::sqrt(2.0) * arm * body.grid.spacing), c);
-  }
-  return spread;
-}
-
 RestFrameSpread rest_frames_apart(const Setup& setup, const State& actual) {
   Clusters fresh = actual.clusters;
   reference::update_rest_frames(setup.body, fresh);
@@ -246,20 +172,6 @@ std::optional<Difference> topological_difference(const State& expected, const St
     }
   }
   return difference_of_skins(expected.skin, actual.skin);
-}
-
-double body_extent(const Body& body) {
-  std::array<int32_t, 3> low = body.grid.nodes, high = {0, 0, 0};
-  for (const int64_t node : body.node) {
-    const auto c = body.grid.coordinates(node);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], c[axis]);
-      high[axis] = std::max(high[axis], c[axis]);
-    }
-  }
-  int32_t extent = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) extent = std::max(extent, high[axis] - low[axis]);
-  return extent;
 }
 
 double greatest_neighbour_distance(const Setup& setup, const State& state, int32_t particle) {

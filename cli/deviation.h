@@ -9,33 +9,16 @@
 #include "model/setup.h"
 #include "model/state.h"
 #include "oracles/errors.h"
+#include "oracles/step_comparison.h"
 
 namespace cutproof::cli {
 
 using oracles::Spread;
+using oracles::velocities_apart;
 
 // Distances of positions of the particles in `mask` [h]. Both states need one position per particle.
 Spread positions_apart(const Setup& setup, const State& expected, const State& actual,
                        const std::vector<uint8_t>& mask);
-// Differences of velocities of the particles in `mask`, as a part of h / dt.
-Spread velocities_apart(const Setup& setup, const State& expected, const State& actual, double dt,
-                        const std::vector<uint8_t>& mask);
-
-// Rotations of the same clusters, compared where the best rotation of the cluster at expected.x is unique:
-// (σ2 + σ3) / σ1 >= kUniqueRotation, with σ3 negative for a reflection.
-inline constexpr double kUniqueRotation = 1e-4;
-struct RotationSpread {
-  Spread angle;  // [rad]
-  // What moved positions of members would explain the angle: |angle| (σ2 + σ3) / (√2 Σ w |X - T|) [h]. Positions off by
-  // δ change A by at most Σ w |X - T| δ, and this turns R by at most √2 / (σ2 + σ3) of that (docs/tolerances.md, One
-  // substep).
-  Spread displacement;
-  std::vector<int32_t> either;  // clusters that differ, but whose rotation is not unique
-  // Particles that such a rotation moves; a collinear cluster's free axis moves none of them.
-  std::vector<int32_t> moved_by_either;
-};
-RotationSpread rotations_apart(const Setup& setup, const State& expected, const State& actual);
-
 // Rest centers [h] and masses [1] against those recomputed by the reference from the state's own memberships.
 struct RestFrameSpread {
   Spread center, mass;
@@ -55,9 +38,6 @@ struct Difference {
 // with their numbers, tau, cap, edge_covered, frame, skin vertices and triangles up to rotation. `sets_are_open`: the
 // rule leaves several answers, so clusters and edge_covered are not compared.
 std::optional<Difference> topological_difference(const State& expected, const State& actual, bool sets_are_open);
-
-// Greatest extent of the body at rest, over the three axes [h].
-double body_extent(const Body& body);
 
 // d_i of method.md §4, among neighbours alive in `state` [m].
 double greatest_neighbour_distance(const Setup& setup, const State& state, int32_t particle);

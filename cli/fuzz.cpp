@@ -10,6 +10,7 @@
 #include <set>
 
 #include "cli/commands.h"
+#include "cli/json_number.h"
 #include "cli/terminal.h"
 #include "model/error.h"
 #include "model/io/atomic_file.h"
@@ -134,6 +135,13 @@ json campaign_json(const FuzzOptions& options, const CampaignOptions& asked, con
       {"happened", happened},
       {"violations", violations},
       {"holds", violations.empty()}};
+  if (asked.dynamics && options.backend.name != "reference") {
+    const StepsCompared& compared = campaign.compared;
+    document["steps_compared"] = {{"steps", compared.steps},
+                                  {"particles", compared.particles},
+                                  {"either", compared.either},
+                                  {"greatest_h", json_number(compared.greatest)}};
+  }
   if (options.seconds) {
     document["seconds_asked"] = *options.seconds;
   } else {
@@ -161,6 +169,12 @@ int conclude(const json& document, bool whole) {
   fmt::print("{} cases of {:.0f} particles on average, {} verdicts, {:.1f} s, {:.0f} cases/s\n", cases,
              document.at("mean_particles").get<double>(), document.at("verdicts").get<int64_t>(),
              document.at("seconds").get<double>(), document.at("cases_per_second").get<double>());
+  if (document.contains("steps_compared")) {
+    const json& compared = document.at("steps_compared");
+    fmt::print("{} steps beside the reference's: {} positions at most {} h apart, {} either way\n",
+               compared.at("steps").get<int64_t>(), compared.at("particles").get<int64_t>(),
+               compared.at("greatest_h").dump(), compared.at("either").get<int64_t>());
+  }
   const std::size_t violations = document.at("violations").size();
   if (violations > 0) {
     fmt::print("FAILS: {} of {} cases\n", violations, cases);
@@ -221,6 +235,18 @@ int merge(const FuzzOptions& options) {
       }
       for (auto& [name, count] : whole.at("happened").items()) {
         count = count.get<int64_t>() + part.at("happened").at(name).get<int64_t>();
+      }
+      if (whole.contains("steps_compared")) {
+        json& compared = whole.at("steps_compared");
+        const json& more = part.at("steps_compared");
+        for (const char* field : {"steps", "particles", "either"}) {
+          compared[field] = compared.at(field).get<int64_t>() + more.at(field).get<int64_t>();
+        }
+        // A number, or of what failed the string "inf".
+        const json &here = compared.at("greatest_h"), &there = more.at("greatest_h");
+        if (there.is_string() || (here.is_number() && there.get<double>() > here.get<double>())) {
+          compared["greatest_h"] = there;
+        }
       }
       for (const json& violation : part.at("violations")) whole["violations"].push_back(violation);
     } catch (const json::exception& error) {

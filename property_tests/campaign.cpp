@@ -165,6 +165,7 @@ class Runner {
       campaign_.verdicts += judgement.verdicts;
       campaign_.particles += load.loaded[k].setup.body.particle_count();
       for (std::size_t h = 0; h < kHappenedCount; ++h) campaign_.happened[h] += judgement.happened[h];
+      campaign_.compared.join(judgement.compared);
       if (!judgement.failure) continue;
       campaign_.violations.push_back({load.indices[k], load.cases[k], std::move(*judgement.failure)});
       if (!options_.keep_going) stop_ = true;

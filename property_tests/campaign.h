@@ -43,6 +43,7 @@ struct Violation {
 struct Campaign {
   int64_t cases = 0, verdicts = 0, particles = 0;
   std::array<int64_t, kHappenedCount> happened = {};
+  StepsCompared compared;
   std::vector<Violation> violations;  // by index; without keep_going the first alone
   double seconds = 0;                 // wall time
   // Of all threads together [s].

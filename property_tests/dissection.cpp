@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "oracles/oracles.h"
+#include "oracles/step_comparison.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::property_tests {
@@ -163,7 +164,49 @@ std::string topological_difference(Stage stage, const State& expected, const Sta
   return {};
 }
 
+// How far a step is from the reference's, within docs/tolerances.md, Against the reference.
+std::vector<Verdict> beside_the_reference(oracles::StepComparison& comparison, const Setup& setup, const State& before,
+                                          const State& after, StepsCompared& compared) {
+  const oracles::StepDifference found = comparison.compare(before, after);
+  ++compared.steps;
+  compared.particles += found.position.count;
+  compared.either += found.particles_excluded;
+  compared.greatest = std::max(compared.greatest, found.position.greatest);
+  const double bound = oracles::position_bound(setup.body);
+  std::vector<Verdict> verdicts;
+  const auto judge = [&](const char* what, const oracles::Spread& apart, double most, const char* unit,
+                         bool of_clusters) {
+    Verdict verdict;
+    verdict.property = std::string("the reference's ") + what;
+    verdict.stage = Stage::step;
+    verdict.frame = before.frame;
+    verdict.measured = apart.greatest;
+    verdict.bound = most;
+    verdict.unit = unit;
+    verdict.bound_source = "docs/tolerances.md, Against the reference";
+    verdict.checked = apart.count;
+    verdict.holds = apart.greatest <= most;
+    if (!verdict.holds) {
+      (of_clusters ? verdict.witness.clusters : verdict.witness.particles) = {apart.where};
+      verdict.witness.text = std::string(of_clusters ? "cluster " : "particle ") + std::to_string(apart.where) +
+                             " is that far from where the same step takes it in the reference";
+    }
+    verdicts.push_back(std::move(verdict));
+  };
+  judge("positions", found.position, bound, "h", false);
+  judge("velocities", found.velocity, 2 * bound, "h/dt", false);
+  judge("rotations", found.rotation, bound, "h", true);
+  return verdicts;
+}
+
 }  // namespace
+
+void StepsCompared::join(const StepsCompared& other) {
+  steps += other.steps;
+  particles += other.particles;
+  either += other.either;
+  greatest = std::max(greatest, other.greatest);
+}
 
 std::vector<Trail> run_cases(Backend& backend, std::vector<Loaded>& loaded) {
   std::vector<Setup> setups;
@@ -244,6 +287,8 @@ Judgement judge_trail(const Case& c, const Loaded& loaded, const Trail& trail, c
   oracles::Judge judge(setup);
   int32_t components = judge.component_count(trail.initial);
   judgement[Happened::several_components] = components > 1;
+  std::optional<oracles::StepComparison> steps;
+  if (c.moves && backend != "reference") steps.emplace(setup, reference::step);
   const State* before = &trail.initial;
   const State* compared_skin = nullptr;  // equal to the reference's
   for (const auto& [stage, after] : trail.steps) {
@@ -255,6 +300,9 @@ Judgement judge_trail(const Case& c, const Loaded& loaded, const Trail& trail, c
       const int32_t components_before = std::exchange(components, judge.component_count(after));
       if (stage == Stage::detect && components > components_before) judgement[Happened::separation] = true;
       if (stage != Stage::step) take(judge.state(after, stage, thorough), stage, after);
+      if (stage == Stage::step && steps && !judgement.failure) {
+        take(beside_the_reference(*steps, setup, *before, after, judgement.compared), stage, after);
+      }
       if (backend != "reference" && is_compared(setup, stage)) {
         ++judgement.verdicts;
         // The topology of the skin is a function of what is alive.

@@ -67,8 +67,17 @@ inline constexpr std::array<const char*, kHappenedCount> kHappenedNames = {"no p
                                                                            "cavity",
                                                                            "consumed body"};
 
+// Steps of moving bodies beside the reference's.
+struct StepsCompared {
+  int64_t steps = 0;
+  int64_t particles = 0, either = 0;  // of all steps; either: rounding decides where they go, so they are not measured
+  double greatest = 0;                // distance of positions [h]
+  void join(const StepsCompared& other);
+};
+
 struct Judgement {
   std::array<bool, kHappenedCount> happened = {};
+  StepsCompared compared;
   int64_t verdicts = 0;            // how many were asked for
   std::optional<Verdict> failure;  // the first that does not hold
 
@@ -91,7 +100,8 @@ struct Trail {
 std::vector<Trail> run_cases(Backend& backend, std::vector<Loaded>& loaded);
 
 // Puts every oracle that applies to the trail of one case; and compares every stage with what the reference makes of
-// the same state: equal clusters, components, triangles (method.md: merge only where it is `deterministic`).
+// the same state: equal clusters, components, triangles (method.md: merge only where it is `deterministic`); of a body
+// that moves also positions, velocities and rotations after each step.
 // `thorough`: with CGAL's geometric check of every skin.
 Judgement judge_trail(const Case& c, const Loaded& loaded, const Trail& trail, const std::string& backend,
                       bool thorough);

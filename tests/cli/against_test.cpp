@@ -481,10 +481,10 @@ TEST(WithinItsRounding, AFreeAxisOfACollinearClusterIsEither) {
   state.clusters.rotation.resize(1);
   State turned = state;
   turned.clusters.rotation[0] = Mat3{{1, 0, 0, 0, 0, -1, 0, 1, 0}};  // about the wire
-  const RotationSpread spread = rotations_apart(setup, state, turned);
-  EXPECT_EQ(spread.either, std::vector<int32_t>{0});
-  EXPECT_EQ(spread.angle.count, 0);
-  EXPECT_TRUE(spread.moved_by_either.empty()) << "its free axis moves no member";
+  const std::vector<oracles::Turn> turns = oracles::turns_apart(setup, state, turned);
+  ASSERT_EQ(turns.size(), 1u);
+  EXPECT_FALSE(turns[0].unique);
+  EXPECT_FALSE(turns[0].moves_members) << "its free axis moves no member";
 }
 
 // --- The program ----------------------------------------------------------------------------------------------------
