@@ -168,6 +168,8 @@ int run(const RunOptions& options) {
     nlohmann::json document = to_json(result, gate ? &*gate : nullptr);
     if (against) {
       document["against"] = against->to_json();
+      // A list that push_back makes of null is broken where there is no memory for it (nlohmann::json 3.11).
+      document["against"]["verdicts"] = nlohmann::json::array();
       for (const Verdict& verdict : against->verdicts()) {
         document["against"]["verdicts"].push_back(to_json(verdict, false));
       }

@@ -40,8 +40,29 @@ TEST_F(Fuzz, HoldsOnEveryBackendOfEveryMachineAndMeetsEveryClass) {
   }
   const Outcome simulated = cutproof("fuzz --backend simulated --cases 260 --sizes 0-20 --seed 7");
   EXPECT_EQ(simulated.status, 0) << simulated.output;
-  const Outcome moving = cutproof("fuzz --backend host --dynamics --cases 200 --seed 7");
-  EXPECT_EQ(moving.status, 0) << moving.output;
+}
+
+TEST_F(Fuzz, ComparesEveryStepOfAMovingBodyWithTheReferences) {
+  const std::string moving = "fuzz --backend host --dynamics --cases 200 --seed 7 --json ";
+  const Outcome outcome = cutproof(moving + "whole.json");
+  EXPECT_EQ(outcome.status, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("steps beside the reference's"), std::string::npos) << outcome.output;
+  const json compared = result("whole.json").at("steps_compared");
+  EXPECT_GE(compared.at("steps"), 200);
+  EXPECT_GT(compared.at("particles"), 1000);
+  EXPECT_LT(compared.at("either").get<double>(), 0.05 * compared.at("particles").get<double>());
+  EXPECT_GT(compared.at("greatest_h"), 0);
+  EXPECT_LE(compared.at("greatest_h"), 1e-4);
+  for (const std::string shard : {"1", "2"}) {
+    ASSERT_EQ(cutproof(moving + shard + ".json --shard " + shard + "/2").status, 0);
+  }
+  ASSERT_EQ(cutproof("fuzz --merge 1.json 2.json --json merged.json").status, 0);
+  EXPECT_EQ(result("merged.json").at("steps_compared"), compared);
+
+  // Nothing is compared with itself, and what does not move has no step to speak of.
+  ASSERT_EQ(cutproof("fuzz --backend reference --dynamics --cases 20 --json a.json").status, 0);
+  ASSERT_EQ(cutproof("fuzz --backend host --cases 20 --json b.json").status, 0);
+  EXPECT_FALSE(result("a.json").contains("steps_compared") || result("b.json").contains("steps_compared"));
 }
 
 TEST_F(Fuzz, PutsShardsTogetherToTheWhole) {
