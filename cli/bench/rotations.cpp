@@ -117,7 +117,7 @@ RotationReport measure_rotations(const std::vector<RotationMethod>& methods, con
 }
 
 json to_json(const RotationReport& report) {
-  json document;
+  json document = json::object();
   const auto bounds = [](Precision precision, double reference_error) -> json {
     const fixtures::RotationBounds bound = fixtures::rotation_bounds(precision);
     return {{"gap", bound.gap},
