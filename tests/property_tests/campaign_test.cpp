@@ -19,13 +19,13 @@ namespace {
 class Planted final : public Backend {
  public:
   using Change = std::function<void(State&)>;
-  using Refusal = std::function<void(const Setup&)>;
-  explicit Planted(Change change, Refusal refuse = {}) : change_(std::move(change)), refuse_(std::move(refuse)) {}
+  using OnLoad = std::function<void(Setup&)>;
+  explicit Planted(Change change, OnLoad on_load = {}) : change_(std::move(change)), on_load_(std::move(on_load)) {}
 
   std::string name() const override { return "planted"; }
   bool can_run(Span span) const override { return inner_->can_run(span); }
   void load(std::vector<Setup> setups, std::vector<State> states) override {
-    if (refuse_) std::for_each(setups.begin(), setups.end(), refuse_);
+    if (on_load_) std::for_each(setups.begin(), setups.end(), on_load_);
     inner_->load(std::move(setups), std::move(states));
   }
   void run(Span span) override { inner_->run(span); }
@@ -39,7 +39,7 @@ class Planted final : public Backend {
  private:
   std::unique_ptr<Backend> inner_ = reference::make_backend();
   Change change_;
-  Refusal refuse_;
+  OnLoad on_load_;
 };
 
 // Wrong after the second frame, if something was removed in it.
@@ -110,6 +110,33 @@ TEST(Campaign, FindsTheFirstViolationWhateverTheLoadsAndThreads) {
   EXPECT_EQ(all.cases, 400);
   EXPECT_GT(all.violations.size(), 1u);
   EXPECT_EQ(all.violations.front().index, one.violations.front().index);
+}
+
+TEST(Campaign, FindsAStepThatIsNotTheReferencesWhereNothingElseIsWrong) {
+  CampaignOptions options = small_campaign(60);
+  options.dynamics = true;
+  const auto with = [](Planted::OnLoad on_load) {
+    return BackendSource{[on_load](int64_t) { return std::make_unique<Planted>(Planted::Change(), on_load); }, false};
+  };
+  const Campaign right = run_campaign(options, with({}), {});
+  EXPECT_TRUE(right.violations.empty());
+  EXPECT_GE(right.compared.steps, 60);
+  EXPECT_GT(right.compared.particles, 100);
+  EXPECT_EQ(right.compared.greatest, 0);
+  EXPECT_EQ(run_campaign(options, kReference, {}).compared.steps, 0) << "it is not compared with itself";
+
+  const Campaign soft = run_campaign(options, with([](cutproof::Setup& setup) { setup.step.stiffness /= 2; }), {});
+  ASSERT_EQ(soft.violations.size(), 1u);
+  const Verdict& verdict = soft.violations.front().verdict;
+  EXPECT_EQ(verdict.property, "the reference's positions");
+  EXPECT_GT(verdict.measured, verdict.bound);
+  EXPECT_EQ(verdict.witness.particles.size(), 1u);
+
+  // What nothing moves takes no step that could differ.
+  options.dynamics = false;
+  const Campaign still = run_campaign(options, with([](cutproof::Setup& setup) { setup.step.stiffness /= 2; }), {});
+  EXPECT_TRUE(still.violations.empty());
+  EXPECT_EQ(still.compared.steps, 0);
 }
 
 TEST(Campaign, NamesTheCaseWhoseBodyTheBackendThrowsOver) {
