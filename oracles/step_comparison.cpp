@@ -7,6 +7,7 @@
 #include <random>
 #include <utility>
 
+#include "oracles/shape_sums.h"
 #include "oracles/support.h"
 
 namespace cutproof::oracles {
@@ -76,36 +77,15 @@ struct Shape {
   double arm = 0;               // Σ w |X − T|
 };
 
-std::vector<int32_t> held_by(const Body& body, const Clusters& clusters) {
-  std::vector<int32_t> counts(body.node.size(), 0);
-  for (const int32_t i : clusters.members) ++counts[at(i)];
-  return counts;
-}
-
-// Descending singular values as roots of the eigenvalues of MᵀM: exact to about 1e-8 of the greatest, which is far
-// below kUniqueRotation.
-Eigen::Vector3d singular_values(const Eigen::Matrix3d& m) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> squares(m.transpose() * m, Eigen::EigenvaluesOnly);
-  return squares.eigenvalues().reverse().cwiseMax(0.0).cwiseSqrt();
-}
-
 Shape shape_of(const Body& body, const Clusters& clusters, const std::vector<int32_t>& counts,
                const std::vector<Vec3>& x, int32_t c) {
-  Vec3 center, rest_center;
-  double mass = 0;
-  for (const int32_t i : clusters.of(c)) {
-    const double w = body.mass[at(i)] / counts[at(i)];
-    mass += w;
-    center += w * x[at(i)];
-    rest_center += w * body.rest_position(i);
-  }
-  center = center / mass;
-  rest_center = rest_center / mass;
-  Eigen::Matrix3d a = Eigen::Matrix3d::Zero(), of_rest = a;
+  using Eigen::Matrix3d, Eigen::Vector3d;
+  const ClusterMeans means = cluster_means(body, clusters, counts, x, c);
+  Matrix3d a = Matrix3d::Zero(), of_rest = Matrix3d::Zero();
   Shape shape;
   for (const int32_t i : clusters.of(c)) {
-    const double w = body.mass[at(i)] / counts[at(i)];
-    const Vec3 now = x[at(i)] - center, rest = body.rest_position(i) - rest_center;
+    const double w = weight_of(body, counts, i);
+    const Vec3 now = x[at(i)] - means.current, rest = body.rest_position(i) - means.rest;
     shape.arm += w * norm(rest);
     for (int row = 0; row < 3; ++row) {
       for (int column = 0; column < 3; ++column) {
@@ -114,11 +94,14 @@ Shape shape_of(const Body& body, const Clusters& clusters, const std::vector<int
       }
     }
   }
+  const Vector3d widths = Eigen::SelfAdjointEigenSolver<Matrix3d>(of_rest, Eigen::EigenvaluesOnly).eigenvalues();
+  shape.line = !(widths[1] > kUniqueRotation * kUniqueRotation * widths[2]);  // of lengths squared
   shape.finite = a.allFinite();
-  const Eigen::Vector3d rest_sigma = singular_values(of_rest);
-  shape.line = !(rest_sigma[1] > kUniqueRotation * rest_sigma[0]);
   if (!shape.finite) return shape;
-  Eigen::Vector3d sigma = singular_values(a);
+  // Singular values as roots of the eigenvalues of AᵀA: exact to about 1e-8 of the greatest, which is far below
+  // kUniqueRotation.
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> squares(a.transpose() * a, Eigen::EigenvaluesOnly);
+  Vector3d sigma = squares.eigenvalues().reverse().cwiseMax(0.0).cwiseSqrt();
   if (a.determinant() < 0) sigma[2] = -sigma[2];
   shape.second_and_third = sigma[1] + sigma[2];
   shape.unique = shape.second_and_third >= kUniqueRotation * sigma[0] && sigma[0] > 0;
@@ -130,7 +113,7 @@ Shape shape_of(const Body& body, const Clusters& clusters, const std::vector<int
 std::vector<Turn> turns_apart(const Setup& setup, const State& expected, const State& actual) {
   const Clusters& clusters = expected.clusters;
   std::vector<Turn> turns(at(clusters.count()));
-  const std::vector<int32_t> counts = held_by(setup.body, clusters);
+  const std::vector<int32_t> counts = membership_counts(clusters, setup.body.particle_count());
   for (int32_t c = 0; c < clusters.count(); ++c) {
     double squared = 0;
     for (std::size_t k = 0; k < 9; ++k) {
@@ -238,7 +221,7 @@ StepComparison::Growth StepComparison::growth_of_rounding(const State& before, c
 std::vector<uint8_t> StepComparison::open_on_the_way(const State& before, const std::vector<int8_t>& wanted) {
   std::vector<State> starts;
   step(before, wanted, &starts);
-  const std::vector<int32_t> counts = held_by(setup_.body, before.clusters);
+  const std::vector<int32_t> counts = membership_counts(before.clusters, setup_.body.particle_count());
   std::vector<uint8_t> open(at(before.clusters.count()), 0);
   for (std::size_t s = 0; s < starts.size(); ++s) {
     Setup fewer = one_substep_;
