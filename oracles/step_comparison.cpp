@@ -108,6 +108,24 @@ Shape shape_of(const Body& body, const Clusters& clusters, const std::vector<int
   return shape;
 }
 
+// Each iteration carries what a particle does to the others of its clusters.
+void spread(std::vector<uint8_t>& particles, const Clusters& clusters, int64_t iterations) {
+  for (bool grows = true; grows && iterations > 0; --iterations) {
+    grows = false;
+    std::vector<uint8_t> next = particles;
+    for (int32_t c = 0; c < clusters.count(); ++c) {
+      const auto members = clusters.of(c);
+      const auto reached = [&](int32_t i) { return particles[at(i)] != 0; };
+      if (std::none_of(members.begin(), members.end(), reached)) continue;
+      for (const int32_t i : members) {
+        grows |= next[at(i)] == 0;
+        next[at(i)] = 1;
+      }
+    }
+    particles = std::move(next);
+  }
+}
+
 }  // namespace
 
 std::vector<Turn> turns_apart(const Setup& setup, const State& expected, const State& actual) {
@@ -185,8 +203,9 @@ StepComparison::Stepped StepComparison::step(const State& before, const std::vec
 }
 
 // If every coordinate of the start is off by one rounding of a position, where it begins or where it ends, whichever is
-// more, up or down. In each four runs a particle goes along all four diagonals, so none is missed along which it
-// matters; particles are out of step with each other.
+// more, up or down, and every velocity by what one such rounding at the end of a substep makes of it. In each four runs
+// a particle goes along all four diagonals, so none is missed along which it matters; particles are out of step with
+// each other.
 StepComparison::Growth StepComparison::growth_of_rounding(const State& before, const State& expected,
                                                           const std::vector<int8_t>& wanted) {
   const Setup& setup = setup_;
@@ -203,7 +222,11 @@ StepComparison::Growth StepComparison::growth_of_rounding(const State& before, c
       const double up = ((phase[i] >> 8) & 1) != 0 ? 1 : -1;
       const double rounding = up * setup.unit_roundoff * std::max(norm(x), norm(expected.x[i]));
       const int reversed = static_cast<int>((phase[i] + run) % 4);  // 3: none
-      for (int axis = 0; axis < 3; ++axis) x[axis] += axis == reversed ? -rounding : rounding;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double off = axis == reversed ? -rounding : rounding;
+        x[axis] += off;
+        disturbed.v[i][axis] += off / setup.substep_length[at(before.frame)];
+      }
     }
     const State end = step(disturbed, wanted).state;
     for (std::size_t i = 0; i < growth.position.size(); ++i) {
@@ -286,22 +309,24 @@ StepDifference StepComparison::compare(const State& before, const State& after) 
       std::any_of(turns.begin(), turns.end(), [&](const Turn& turn) { return !(turn.displacement <= bound_); });
   std::vector<uint8_t> turn_is_sensitive(turns.size(), 0);
   if (turned_too_far || apart(expected, mask).greatest > bound_) {
-    const std::vector<uint8_t> open = open_on_the_way(before, wanted);
-    for (std::size_t c = 0; c < turns.size(); ++c) {
-      if (!open[c]) continue;
-      turns[c].unique = false;
-      for (const int32_t i : mine.of(static_cast<int32_t>(c))) mask[at(i)] = 0;
-    }
     const Growth growth = growth_of_rounding(before, expected.state, wanted);
     // Each evaluation of the positions rounds again, independently of the others.
     const double grown = std::sqrt(setup_.step.substeps * (setup_.step.iterations + 1.0));
-    for (std::size_t i = 0; i < mask.size(); ++i) {
-      if (!mask[i]) continue;
-      const double deviation = norm(after.x[i] - expected.state.x[i]) / setup_.body.grid.spacing;
-      if (!(deviation > bound_ && deviation <= grown * growth.position[i])) continue;
-      mask[i] = 0;
-      ++difference.sensitive_either;
+    const std::vector<uint8_t> open = open_on_the_way(before, wanted);
+    std::vector<uint8_t> decided(mask.size(), 0);  // by rounding, and beyond the bound
+    for (std::size_t c = 0; c < turns.size(); ++c) {
+      if (!open[c]) continue;
+      turns[c].unique = false;
+      for (const int32_t i : mine.of(static_cast<int32_t>(c))) decided[at(i)] = 1;
     }
+    for (std::size_t i = 0; i < mask.size(); ++i) {
+      const double deviation = norm(after.x[i] - expected.state.x[i]) / setup_.body.grid.spacing;
+      const bool sensitive = mask[i] && deviation <= grown * growth.position[i];
+      decided[i] = before.alive[i] && deviation > bound_ && (decided[i] || expected.tied[i] || sensitive);
+      if (decided[i] && sensitive) ++difference.sensitive_either;
+    }
+    if (same_clusters) spread(decided, mine, setup_.step.substeps * int64_t{setup_.step.iterations});
+    mask = without(std::move(mask), decided);
     for (std::size_t c = 0; c < turns.size(); ++c) {
       turn_is_sensitive[c] = turns[c].displacement > bound_ && turns[c].displacement <= grown * growth.turn[c];
     }

@@ -57,11 +57,10 @@ enum class Way {
 inline constexpr Way kWays[] = {Way::analyse, Way::ordered, Way::numeric, Way::updown, Way::rows};
 const char* name_of(Way way);
 
-// ‖b − B x‖ / (‖B‖ ‖x‖) in the greatest norm, x by the factor.
 struct Factorised {
   double seconds = 0;        // of everything after the changed system is known
   double solve_seconds = 0;  // of one right-hand side
-  double residual = 0;
+  double residual = 0;       // ‖right − B x‖ / (‖B‖ ‖x‖) in the greatest norm
   int64_t entries = 0;    // of the factor
   std::vector<double> x;  // [rows]
 };
