@@ -44,7 +44,7 @@ struct FuzzOptions {
   uint64_t seed = 1;
   std::string sizes = "0-79";  // of cases, which take turns: 0 is nothing, 100 up to about 20,000 particles
   bool dynamics = false;
-  int batch = 0;      // bodies in one load; 0: as many as the backend likes best
+  int batch = 0;      // bodies in one load; 0: 16 for the reference, else 64
   int threads = 0;    // 0: as many as the machine has
   std::string shard;  // "i/N"; empty: all
   bool keep_going = false;

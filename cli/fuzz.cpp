@@ -35,7 +35,7 @@ constexpr int kSizeThatMeetsEveryClass = 79;
 // A GPU is busy with so many loads at once; more only take memory.
 constexpr int kLoadsOnTheDevice = 6;
 constexpr int kSchedulesTried = 50;
-constexpr int kBodiesOnACpu = 16;
+constexpr int kBodiesOfTheReference = 16;
 
 [[noreturn]] void refuse(const std::string& option, const std::string& problem, const std::string& remedy) {
   throw InputError("command line", option, problem, remedy);
@@ -67,9 +67,10 @@ CampaignOptions campaign_options(const FuzzOptions& options) {
   campaign.least_size = static_cast<int>(least);
   campaign.most_size = static_cast<int>(most);
   campaign.dynamics = options.dynamics;
-  // One kernel for many bodies keeps a GPU busy; on a CPU what a few bodies need stays in its caches.
-  const bool cpu = options.backend.name == "reference" || options.backend.name == "host";
-  campaign.batch = options.batch > 0 ? options.batch : cpu ? kBodiesOnACpu : CampaignOptions{}.batch;
+  // One kernel for many bodies keeps a GPU busy, and on the host many bodies in one load are part of what is tested.
+  // The reference takes body by body, and what a few bodies need stays in the caches.
+  const int by_default = options.backend.name == "reference" ? kBodiesOfTheReference : CampaignOptions{}.batch;
+  campaign.batch = options.batch > 0 ? options.batch : by_default;
   campaign.threads = options.threads > 0 ? options.threads : cpu_threads();
   const bool device = options.backend.name.starts_with("gpu");
   campaign.backends = device ? std::min(campaign.threads, kLoadsOnTheDevice) : campaign.threads;

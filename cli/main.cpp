@@ -174,7 +174,7 @@ int run_command_line(int argc, char** argv) {
       ->capture_default_str()
       ->type_name("A-B");
   fuzz_command->add_flag("--dynamics", fuzz_options.dynamics, "bodies move and blades push what they cut");
-  fuzz_command->add_option("--batch", fuzz_options.batch, "bodies in one load (default: 16 on a CPU, else 64)")
+  fuzz_command->add_option("--batch", fuzz_options.batch, "bodies in one load (default: 16 for the reference, else 64)")
       ->type_name("N")
       ->check(CLI::Range(1, 100'000));
   fuzz_command->add_option("--threads", fuzz_options.threads, "that generate and judge (default: all)")

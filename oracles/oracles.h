@@ -66,7 +66,8 @@ std::vector<Verdict> judge_stage(const Setup& setup, Stage stage, const State& b
 
 // --- Many states of one body -----------------------------------------------------------------------------------------
 // judge and judge_stage for states that follow one another. A verdict that held is repeated and not computed again as
-// long as every part of the state that it rests on keeps its bits.
+// long as every part of the state that it rests on keeps its bits; so is what verdicts are derived from, and that a
+// cluster is connected as long as its members and their being alive stay the same.
 class Judge {
  public:
   // Keeps a reference: the setup must live as long as this and stay as it is.

@@ -1,6 +1,8 @@
 // Each oracle of one state: a right state is accepted, a state broken by hand is rejected with the right witness.
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <deque>
 #include <functional>
 #include <limits>
 #include <random>
@@ -730,6 +732,71 @@ TEST(Judge, JudgesNothingElseOfAStateThatIsNotWellFormed) {
   Block block;
   block.state.clusters.offsets[1] = -7;
   for (const Verdict& verdict : judge(block.setup, block.state, true)) EXPECT_FALSE(verdict.holds) << verdict.property;
+}
+
+// What Judge keeps from state to state must never change what it says: it is asked beside one that has seen nothing.
+void expect_same(const std::vector<Verdict>& remembering, const std::vector<Verdict>& fresh) {
+  ASSERT_EQ(remembering.size(), fresh.size());
+  for (std::size_t k = 0; k < fresh.size(); ++k) {
+    SCOPED_TRACE(fresh[k].property);
+    EXPECT_EQ(remembering[k].property, fresh[k].property);
+    EXPECT_EQ(remembering[k].stage, fresh[k].stage);
+    EXPECT_EQ(remembering[k].frame, fresh[k].frame);
+    EXPECT_EQ(remembering[k].holds, fresh[k].holds);
+    EXPECT_EQ(remembering[k].checked, fresh[k].checked);
+    EXPECT_EQ(remembering[k].witness, fresh[k].witness);
+    EXPECT_EQ(std::isnan(remembering[k].measured), std::isnan(fresh[k].measured));
+    if (!std::isnan(fresh[k].measured)) {
+      EXPECT_EQ(remembering[k].measured, fresh[k].measured);
+    }
+  }
+}
+
+TEST(Judge, SaysTheSameWhateverItHasSeenBefore) {
+  constexpr uint64_t kSeed = 11;
+  SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
+  std::mt19937_64 random(kSeed);
+  int64_t held = 0, failed = 0;
+  for (int round = 0; round < 150 && !HasFailure(); ++round) {
+    const Block block(3, 3, 2);
+    Judge judging(block.setup);
+    std::deque<State> states = {block.state};  // each must stay where it is
+    for (int step = 0; step < 12; ++step) {
+      const State& last = states.back();
+      // Now and then back to a good state, so that not everything stays broken.
+      State next = random() % 3 == 0 ? block.state : last;
+      if (random() % 2 == 0 && !next.alive.empty()) next.alive[random() % next.alive.size()] ^= 1;
+      if (random() % 2 == 0) corrupt(next, random);
+      states.push_back(std::move(next));
+      const State& now = states.back();
+      const Stage stage = kStages[random() % kStages.size()];
+      const auto of_state = judge(block.setup, now, stage, false);
+      expect_same(judging.stage(stage, last, now), judge_stage(block.setup, stage, last, now));
+      expect_same(judging.state(now, stage, false), of_state);
+      EXPECT_EQ(judging.component_count(now), graph_components(block.setup, now).count);
+      for (const Verdict& verdict : of_state) ++(verdict.holds ? held : failed);
+    }
+  }
+  EXPECT_GT(held, 1000);
+  EXPECT_GT(failed, 1000);
+}
+
+TEST(Judge, SeesAClusterFallApartUnderTheSameNumber) {
+  Row row(5, {{0, 1, 2, 3, 4}});
+  Judge judging(row.setup);
+  const auto connectivity = [&](const State& state) {
+    for (const Verdict& verdict : judging.state(state, Stage::split, false)) {
+      if (verdict.property == "cluster connectivity") return verdict.holds;
+    }
+    return false;
+  };
+  EXPECT_TRUE(connectivity(row.state));
+  State cut = row.state;  // the same members, one of them dead
+  remove_particles(cut, {2});
+  EXPECT_FALSE(connectivity(cut));
+  EXPECT_TRUE(connectivity(row.state));
+  Row gap(5, {{0, 1, 3, 4}});  // all alive, other members
+  EXPECT_FALSE(connectivity(gap.state));
 }
 
 }  // namespace
