@@ -77,15 +77,14 @@ struct Shape {
   double arm = 0;               // Σ w |X − T|
 };
 
-Shape shape_of(const Body& body, const Clusters& clusters, const std::vector<int32_t>& counts,
-               const std::vector<Vec3>& x, int32_t c) {
+Shape shape_of(const WeightedRest& body, const Clusters& clusters, const std::vector<Vec3>& x, int32_t c) {
   using Eigen::Matrix3d, Eigen::Vector3d;
-  const ClusterMeans means = cluster_means(body, clusters, counts, x, c);
+  const ClusterMeans means = cluster_means(body, clusters, x, c);
   Matrix3d a = Matrix3d::Zero(), of_rest = Matrix3d::Zero();
   Shape shape;
   for (const int32_t i : clusters.of(c)) {
-    const double w = weight_of(body, counts, i);
-    const Vec3 now = x[at(i)] - means.current, rest = body.rest_position(i) - means.rest;
+    const double w = body.weight[at(i)];
+    const Vec3 now = x[at(i)] - means.current, rest = body.position[at(i)] - means.rest;
     shape.arm += w * norm(rest);
     for (int row = 0; row < 3; ++row) {
       for (int column = 0; column < 3; ++column) {
@@ -131,7 +130,7 @@ void spread(std::vector<uint8_t>& particles, const Clusters& clusters, int64_t i
 std::vector<Turn> turns_apart(const Setup& setup, const State& expected, const State& actual) {
   const Clusters& clusters = expected.clusters;
   std::vector<Turn> turns(at(clusters.count()));
-  const std::vector<int32_t> counts = membership_counts(clusters, setup.body.particle_count());
+  const WeightedRest rest = weighted_rest(setup.body, membership_counts(clusters, setup.body.particle_count()));
   for (int32_t c = 0; c < clusters.count(); ++c) {
     double squared = 0;
     for (std::size_t k = 0; k < 9; ++k) {
@@ -140,7 +139,7 @@ std::vector<Turn> turns_apart(const Setup& setup, const State& expected, const S
     }
     if (squared == 0) continue;
     Turn& turn = turns[at(c)];
-    const Shape shape = shape_of(setup.body, clusters, counts, expected.x, c);
+    const Shape shape = shape_of(rest, clusters, expected.x, c);
     if (!shape.finite || !shape.unique) {
       turn.unique = false;
       turn.moves_members = shape.finite && !shape.line;  // if it is not finite, its positions tell of it
@@ -244,7 +243,8 @@ StepComparison::Growth StepComparison::growth_of_rounding(const State& before, c
 std::vector<uint8_t> StepComparison::open_on_the_way(const State& before, const std::vector<int8_t>& wanted) {
   std::vector<State> starts;
   step(before, wanted, &starts);
-  const std::vector<int32_t> counts = membership_counts(before.clusters, setup_.body.particle_count());
+  const WeightedRest rest =
+      weighted_rest(setup_.body, membership_counts(before.clusters, setup_.body.particle_count()));
   std::vector<uint8_t> open(at(before.clusters.count()), 0);
   for (std::size_t s = 0; s < starts.size(); ++s) {
     Setup fewer = one_substep_;
@@ -253,7 +253,7 @@ std::vector<uint8_t> StepComparison::open_on_the_way(const State& before, const 
       State state = starts[s];
       reference_step_(fewer, state);
       for (int32_t c = 0; c < before.clusters.count(); ++c) {
-        const Shape shape = shape_of(setup_.body, before.clusters, counts, state.x, c);
+        const Shape shape = shape_of(rest, before.clusters, state.x, c);
         if (shape.finite && !shape.unique && !shape.line) open[at(c)] = 1;
       }
     }
