@@ -50,6 +50,14 @@ void take_substep(const Setup& setup, int64_t frame, int64_t substep, Setup& sin
 
 double height_over(const BladePose& pose, Vec3 x) { return dot(x - pose.edge, cross(pose.along, pose.back)); }
 
+// Over one of the four sides of the blade's rectangle, up to rounding: whether it is over the rectangle decides which
+// way it is pushed. Going round a side, a particle is put exactly there.
+bool on_a_border(const Setup& setup, const BladePose& pose, Vec3 x) {
+  const double band = kSideBand * setup.unit_roundoff * (norm(x) + norm(pose.edge));
+  const double u = std::abs(dot(x - pose.edge, pose.along)), w = dot(x - pose.edge, pose.back);
+  return std::abs(u - setup.blade.length / 2) <= band || std::abs(w) <= band || std::abs(w - setup.blade.depth) <= band;
+}
+
 std::vector<uint8_t> without(std::vector<uint8_t> mask, const std::vector<uint8_t>& excluded) {
   for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = mask[i] && !excluded[i];
   return mask;
@@ -239,13 +247,14 @@ StepComparison::Growth StepComparison::growth_of_rounding(const State& before, c
   return growth;
 }
 
-// [m] 1: somewhere in the step the cluster's rotation is nearly not unique, and moves its members.
-std::vector<uint8_t> StepComparison::open_on_the_way(const State& before, const std::vector<int8_t>& wanted) {
+// What rounding may decide somewhere in the step, though nothing at its start or end tells.
+StepComparison::OnTheWay StepComparison::open_on_the_way(const State& before, const std::vector<int8_t>& wanted) {
   std::vector<State> starts;
   step(before, wanted, &starts);
   const WeightedRest rest =
       weighted_rest(setup_.body, membership_counts(before.clusters, setup_.body.particle_count()));
-  std::vector<uint8_t> open(at(before.clusters.count()), 0);
+  OnTheWay open{std::vector<uint8_t>(at(before.clusters.count()), 0), std::vector<uint8_t>(before.x.size(), 0)};
+  const bool touches = setup_.has_blade && setup_.detect.criterion != Criterion::geometric;
   for (std::size_t s = 0; s < starts.size(); ++s) {
     Setup fewer = one_substep_;
     take_substep(setup_, before.frame, before.frame * setup_.step.substeps + static_cast<int64_t>(s), fewer);
@@ -254,7 +263,11 @@ std::vector<uint8_t> StepComparison::open_on_the_way(const State& before, const 
       reference_step_(fewer, state);
       for (int32_t c = 0; c < before.clusters.count(); ++c) {
         const Shape shape = shape_of(rest, before.clusters, state.x, c);
-        if (shape.finite && !shape.unique && !shape.line) open[at(c)] = 1;
+        if (shape.finite && !shape.unique && !shape.line) open.turning[at(c)] = 1;
+      }
+      if (!touches || !fewer.blade_moves[0].down) continue;
+      for (std::size_t i = 0; i < state.x.size(); ++i) {
+        if (on_a_border(setup_, fewer.blade_moves[0].to, state.x[i])) open.bordering[i] = 1;
       }
     }
   }
@@ -312,10 +325,10 @@ StepDifference StepComparison::compare(const State& before, const State& after) 
     const Growth growth = growth_of_rounding(before, expected.state, wanted);
     // Each evaluation of the positions rounds again, independently of the others.
     const double grown = std::sqrt(setup_.step.substeps * (setup_.step.iterations + 1.0));
-    const std::vector<uint8_t> open = open_on_the_way(before, wanted);
-    std::vector<uint8_t> decided(mask.size(), 0);  // by rounding, and beyond the bound
+    const OnTheWay open = open_on_the_way(before, wanted);
+    std::vector<uint8_t> decided = open.bordering;  // by rounding, and beyond the bound
     for (std::size_t c = 0; c < turns.size(); ++c) {
-      if (!open[c]) continue;
+      if (!open.turning[c]) continue;
       turns[c].unique = false;
       for (const int32_t i : mine.of(static_cast<int32_t>(c))) decided[at(i)] = 1;
     }

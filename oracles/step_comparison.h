@@ -68,7 +68,11 @@ class StepComparison {
   };
   // `starts`: of each substep, if wanted.
   Stepped step(const State& before, const std::vector<int8_t>& wanted, std::vector<State>* starts = nullptr);
-  std::vector<uint8_t> open_on_the_way(const State& before, const std::vector<int8_t>& wanted);
+  struct OnTheWay {
+    std::vector<uint8_t> turning;    // [m] 1: the rotation is nearly not unique, and moves its members
+    std::vector<uint8_t> bordering;  // [n] 1: over a side of the blade's rectangle
+  };
+  OnTheWay open_on_the_way(const State& before, const std::vector<int8_t>& wanted);
   // How far positions [n] and rotations [m], as displacements, are carried by roundings of the start [h].
   struct Growth {
     std::vector<double> position, turn;
