@@ -28,12 +28,8 @@ class MergingSets {
         exists_(sets_.size(), 1),
         first_holder_(static_cast<std::size_t>(body.particle_count()) + 1, 0),
         holder_count_(static_cast<std::size_t>(body.particle_count()), 0),
-        last_join_(sets_.size(), 0),
-        joined_into_(sets_.size(), -1),
-        touching_(sets_.size()),
-        looked_at_(static_cast<std::size_t>(body.particle_count()), 0),
-        met_(sets_.size(), 0),
-        place_(sets_.size(), 0) {
+        visited_(static_cast<std::size_t>(body.particle_count()), 0),
+        touches_(sets_.size()) {
     for (const auto& set : sets_) {
       for (const int32_t p : set) ++first_holder_[at(p) + 1];
     }
@@ -57,8 +53,31 @@ class MergingSets {
   // The set that `s` would join: it touches s (shares a particle, or an edge of G joins them), the union has at most
   // cap particles or s lies inside it; the smallest such, then the one with the lowest number.
   std::optional<int32_t> preferred_target(int32_t s) {
+    std::vector<int32_t> touching;
+    ++visit_;
+    const auto touch = [&](int32_t slot, int32_t shares) {
+      Touch& touched = touches_[at(slot)];
+      if (touched.visit != visit_) {
+        touched = {visit_, 0};
+        if (slot != s) touching.push_back(slot);
+      }
+      touched.shared += shares;
+    };
+    for (const int32_t p : sets_[at(s)]) {
+      visited_[at(p)] = visit_;
+      for (const int32_t slot : holders_of(p)) touch(slot, 1);
+    }
+    for (const int32_t p : sets_[at(s)]) {
+      for (int direction = 0; direction < 6 && alive_[at(p)]; ++direction) {
+        const int32_t q = body_.neighbour(p, direction);
+        if (q < 0 || !alive_[at(q)] || std::exchange(visited_[at(q)], visit_) == visit_) continue;
+        for (const int32_t slot : holders_of(q)) touch(slot, 0);
+      }
+    }
+
     std::optional<int32_t> best;
-    for (const auto& [t, shared] : touching(s)) {
+    for (const int32_t t : touching) {
+      const int64_t shared = touches_[at(t)].shared;
       const bool legal = shared == size(s) || size(s) + size(t) - shared <= cap_;
       if (legal && (!best || std::pair(size(t), number(t)) < std::pair(size(*best), number(*best)))) best = t;
     }
@@ -85,8 +104,6 @@ class MergingSets {
     to = std::move(both);
     from.clear();
     exists_[at(source)] = 0;
-    joined_into_[at(source)] = target;
-    last_join_[at(source)] = last_join_[at(target)] = ++joins_;
   }
 
   // To be called after joins: drops from small() what is merged or has grown.
@@ -113,77 +130,6 @@ class MergingSets {
   // Slots of the sets that hold a particle, in no order. Joining never makes them more.
   std::span<int32_t> holders_of(int32_t p) { return {holders_.data() + first_holder_[at(p)], holder_count_[at(p)]}; }
 
-  // A set that touches the one asked about, and how many particles they share.
-  struct Touch {
-    int32_t slot = -1;
-    int64_t shared = 0;
-  };
-  struct Touching {
-    int64_t joins = -1;  // how many there had been when it was found out; -1: it never was
-    std::vector<Touch> sets;
-  };
-
-  // What touches s. Joins change it little: a set that touched s and took part in one lies now in a set that touches s,
-  // and no other set has come or gone or grown.
-  const std::vector<Touch>& touching(int32_t s) {
-    Touching& known = touching_[at(s)];
-    if (known.joins < last_join_[at(s)]) {
-      known.sets = look(s);
-    } else if (known.joins < joins_) {
-      std::vector<int32_t> grown;
-      std::erase_if(known.sets, [&](const Touch& touch) {
-        if (last_join_[at(touch.slot)] <= known.joins) return false;
-        int32_t now = touch.slot;
-        while (exists_[at(now)] == 0) now = joined_into_[at(now)];
-        grown.push_back(now);
-        return true;
-      });
-      std::sort(grown.begin(), grown.end());
-      grown.erase(std::unique(grown.begin(), grown.end()), grown.end());
-      for (const int32_t t : grown) known.sets.push_back({t, shared_particles(s, t)});
-    }
-    known.joins = joins_;
-    return known.sets;
-  }
-
-  // The same, from the particles of s and their neighbours.
-  std::vector<Touch> look(int32_t s) {
-    ++look_;
-    std::vector<Touch> found;
-    const auto meet = [&](int32_t slot, int64_t shares) {
-      if (slot == s) return;
-      if (std::exchange(met_[at(slot)], look_) != look_) {
-        place_[at(slot)] = static_cast<int32_t>(found.size());
-        found.push_back({slot, 0});
-      }
-      found[at(place_[at(slot)])].shared += shares;
-    };
-    for (const int32_t p : sets_[at(s)]) {
-      looked_at_[at(p)] = look_;
-      for (const int32_t slot : holders_of(p)) meet(slot, 1);
-    }
-    for (const int32_t p : sets_[at(s)]) {
-      for (int direction = 0; direction < 6 && alive_[at(p)]; ++direction) {
-        const int32_t q = body_.neighbour(p, direction);
-        if (q < 0 || !alive_[at(q)] || std::exchange(looked_at_[at(q)], look_) == look_) continue;
-        for (const int32_t slot : holders_of(q)) meet(slot, 0);
-      }
-    }
-    return found;
-  }
-
-  int64_t shared_particles(int32_t a, int32_t b) const {
-    const std::vector<int32_t>&one = sets_[at(a)], &other = sets_[at(b)];
-    int64_t shared = 0;
-    for (auto i = one.begin(), k = other.begin(); i != one.end() && k != other.end();) {
-      shared += *i == *k;
-      const bool one_is_first = *i <= *k, other_is_first = *k <= *i;
-      i += one_is_first;
-      k += other_is_first;
-    }
-    return shared;
-  }
-
   const Body& body_;
   const std::vector<uint8_t>& alive_;
   const std::vector<int32_t>& numbers_;
@@ -194,16 +140,14 @@ class MergingSets {
   std::vector<std::size_t> holder_count_;   // [n] how much of its row is in use
   std::vector<int32_t> holders_;
   std::vector<int32_t> small_;
-  int64_t joins_ = 0;                 // so far
-  std::vector<int64_t> last_join_;    // by slot: the last join that it took part in, counted from 1; 0: none
-  std::vector<int32_t> joined_into_;  // by dead slot
-
-  std::vector<Touching> touching_;  // by slot
-  // Scratch of look.
-  int32_t look_ = 0;                // calls so far
-  std::vector<int32_t> looked_at_;  // by particle: the last of them that looked at it
-  std::vector<int32_t> met_;        // by slot: the last of them that met it
-  std::vector<int32_t> place_;      // by slot: where in that one's result
+  // Scratch of preferred_target.
+  struct Touch {
+    int32_t visit = 0;   // the last call that met the set
+    int32_t shared = 0;  // particles of it that it shares with the one asked about
+  };
+  int32_t visit_ = 0;             // calls so far that looked
+  std::vector<int32_t> visited_;  // by particle: the last of them that looked at it
+  std::vector<Touch> touches_;    // by slot
 };
 
 struct Proposal {
