@@ -61,7 +61,7 @@ struct Case {
 };
 
 // A case of a given size, 0 .. kMostSize: from nothing to at most some ten thousand particles, growing slowly (at size
-// 100 they are 1,600 on average, at 104 about 2,000); about 30 % of the bodies and of the strokes are degenerate. The
+// 100 they are 1,600 on average, at 106 about 2,000); about 30 % of the bodies and of the strokes are degenerate. The
 // same case for the same arguments on every platform.
 inline constexpr int kMostSize = 110;
 Case draw_case(uint64_t seed, int size);
