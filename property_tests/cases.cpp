@@ -273,6 +273,8 @@ void tell_apart(Clusters& clusters) {
 
 }  // namespace
 
+constexpr int kSizeOfSparseBalls = 80;
+
 Case draw_case(uint64_t seed, int size) {
   Random random(seed);
   Case c;
@@ -289,8 +291,10 @@ Case draw_case(uint64_t seed, int size) {
   c.seed_spacing = random.between(2, 14);
   c.ball_radius = random.between(4, 18);
   // Balls of nine times their spacing hold every particle a thousand times: legal, and paid for by every other case, so
-  // they are small and rare.
+  // they are small and rare. In the largest bodies even three times is much: five thousand balls that share each
+  // particle with seventy others cost as much as 400 cases.
   if (size > 40 || random.chance(0.9)) c.seed_spacing = std::max(c.seed_spacing, (c.ball_radius + 2) / 3);
+  if (size > kSizeOfSparseBalls) c.seed_spacing = std::max(c.seed_spacing, 2 * c.ball_radius / 3);
   c.most = random.between(1, 30);
   c.tau = random.between(0, c.most);
   c.cap = random.between(c.most, 3 * c.most);

@@ -169,7 +169,8 @@ SearchSpace Tuner::space() const {
   }
   space.nothing_removed = answer_->nothing_removed();
   space.resize = !given_.scene.expect.clusters.has_value();
-  space.skin = !options_.without_skin;
+  // A scene that counts the skin's shells looks at it.
+  space.skin = !options_.without_skin || given_.scene.expect.shells_at_end.has_value();
   return space;
 }
 
