@@ -6,9 +6,9 @@
 #include <cmath>
 #include <future>
 #include <limits>
+#include <memory>
 
 #include "fixtures/build.h"
-#include "oracles/oracles.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::cli {
@@ -59,7 +59,9 @@ std::string other_parts(const Course& expected, const Course& actual) {
     return e.components == a.components ? std::string()
                                         : fmt::format("{} parts {}, expected {}", a.components, when, e.components);
   };
-  const auto frame = [](const Course& course, int64_t f) { return course.frames[static_cast<std::size_t>(f)]; };
+  const auto frame = [](const Course& course, int64_t f) -> const oracles::Pose& {
+    return course.frames[static_cast<std::size_t>(f)];
+  };
   for (std::size_t s = 0; s < std::min(expected.stroke_end.size(), actual.stroke_end.size()); ++s) {
     const int64_t e = expected.stroke_end[s], a = actual.stroke_end[s];
     if (e < 0 || a < 0) continue;
@@ -111,7 +113,7 @@ Course Answer::run(const Level& level) const {
   Course course;
   course.stroke_end = staged.stroke_end();
   for (int64_t frame = 0; frame < staged.frame_count(); ++frame) {
-    staged.run_frame(frame, [&] { reference->run(kFrame); });
+    staged.for_parts_of(frame, [&] { reference->run(kFrame); });
     course.frames.push_back(oracles::pose_of(staged.setup(), reference->snapshot().front(),
                                              course.frames.empty() ? nullptr : &course.frames.back()));
   }
@@ -123,8 +125,10 @@ void Answer::take(Level level, Course course) {
   for (std::size_t f = 0; f < std::min(course.frames.size(), course_.frames.size()); ++f) {
     apart = std::max(apart, oracles::poses_apart(setup_, course.frames[f], course_.frames[f]).position.rms());
   }
-  // Levels between which the tissue falls into other parts say nothing about where anything is.
-  if (!other_parts(course, course_).empty()) apart = std::numeric_limits<double>::infinity();
+  // Levels between which the tissue falls into other parts, or whose blades arrive in other frames, say nothing about
+  // where anything is.
+  if (!other_parts(course, course_).empty() || course.frames.size() != course_.frames.size())
+    apart = std::numeric_limits<double>::infinity();
   level.apart_h = apart;
   levels_.push_back(level);
   course_ = std::move(course);

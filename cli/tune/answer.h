@@ -16,7 +16,6 @@ namespace cutproof::cli {
 struct Course {
   std::vector<oracles::Pose> frames;  // at the end of each
   std::vector<int64_t> stroke_end;    // [strokes] the frame at whose end a stroke is complete; -1: the run ends before
-  double seconds = 0;                 // that the backend took for all of it
 };
 
 // In which way the tissue is in a different number of parts at the end of a stroke, which each of the two may reach in
@@ -32,9 +31,9 @@ class Staged {
   const State& start() const { return start_; }
   int64_t frame_count() const { return static_cast<int64_t>(last_of_.size()); }
 
-  // Runs a frame of the scene by whatever `run` does with each part of it.
+  // Calls `run` for each part into which a frame of the scene is divided.
   template <typename Run>
-  void run_frame(int64_t frame, const Run& run) const {
+  void for_parts_of(int64_t frame, const Run& run) const {
     const int64_t first = frame == 0 ? 0 : last_of_[static_cast<std::size_t>(frame) - 1] + 1;
     for (int64_t part = first; part <= last_of_[static_cast<std::size_t>(frame)]; ++part) run();
   }

@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 
 namespace cutproof::cli {
 
@@ -34,6 +33,10 @@ const char* name_of(Outcome outcome) {
       return "over";
     case Outcome::topology:
       return "topology";
+    case Outcome::timetable:
+      return "timetable";
+    case Outcome::refused:
+      return "refused";
     case Outcome::dearer:
       return "dearer";
   }
@@ -87,8 +90,11 @@ class Searcher {
         break;
       }
       below = iterations;
-      if (trials_[now].outcome == Outcome::dearer || iterations >= most) return std::nullopt;
-      if (before && !helps(trials_[*before], trials_[now])) return std::nullopt;
+      const Trial& trial = trials_[now];
+      const bool whatever_the_iterations =
+          trial.outcome == Outcome::dearer || trial.outcome == Outcome::timetable || trial.outcome == Outcome::refused;
+      if (whatever_the_iterations || iterations >= most) return std::nullopt;
+      if (before && !helps(trials_[*before], trial)) return std::nullopt;
       before = now;
     }
     while (*enough - below > 1) {
@@ -128,7 +134,7 @@ class Searcher {
       field = value;
       return changes;
     };
-    if (!space_.skin) attempt_with([&](Configuration& c) { return set(c.scene.skin.wanted, false); });
+    if (space_.may_drop_skin) attempt_with([&](Configuration& c) { return set(c.scene.skin.wanted, false); });
     if (space_.nothing_removed) {
       attempt_with([&](Configuration& c) {
         return !c.scene.blade && c.scene.detect.without_blade && set(c.scene.detect.criterion, Criterion::none);
@@ -151,7 +157,7 @@ class Searcher {
         return true;
       });
     };
-    if (space_.resize) {
+    if (space_.may_resize) {
       bool larger = false;
       while (resize(true)) larger = true;
       while (!larger && resize(false)) {
@@ -168,18 +174,16 @@ class Searcher {
 
   std::vector<Trial> run(const Configuration& given) {
     attempt(given);
-    // The given one is a mark to beat, but a search that finds nothing cheaper than it has not ended.
-    if (given.scene.step.iterations > 0) search_steps(given);
+    search_steps(given);
     if (vary()) least_iterations(trials_[*cheapest_].configuration, 1, space_.most_iterations);
     return std::move(trials_);
   }
 
  private:
   static bool helps(const Trial& fewer, const Trial& more) {
-    if (fewer.rms_h.empty()) return true;
-    const std::size_t frame = fewer.rms_h.size() - 1;
-    if (more.rms_h.size() <= frame) return false;
-    return more.rms_h[frame] < (1 - kHelps) * fewer.rms_h[frame];
+    if (!fewer.first_beyond) return true;  // it was not the error
+    const std::size_t frame = *fewer.first_beyond;
+    return more.rms_h.size() > frame && more.rms_h[frame] < (1 - kHelps) * fewer.rms_h[frame];
   }
 
   const SearchSpace& space_;

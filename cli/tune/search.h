@@ -22,10 +22,12 @@ struct Configuration {
 std::string differences(const Configuration& configuration, const Configuration& given);
 
 enum class Outcome {
-  within,    // the error is within the tolerance, and the tissue falls into the same parts
-  over,      // the error is beyond it
-  topology,  // at the end of a stroke or of the scene the tissue is in a different number of parts
-  dearer,    // given up: before its end it had cost more than the cheapest that is within
+  within,     // the error is within the tolerance, and the tissue falls into the same parts
+  over,       // the error is beyond it
+  topology,   // at the end of a stroke or of the scene the tissue is in a different number of parts
+  timetable,  // the scene has another number of frames: a blade takes whole substeps for each piece of its path
+  refused,    // the scene cannot be built like this
+  dearer,     // given up: before its end it had cost more than the cheapest that is within
 };
 const char* name_of(Outcome outcome);
 
@@ -37,6 +39,7 @@ struct Trial {
   // what is not a number is infinite.
   std::vector<double> rms_h;
   double greatest_rms_h = 0, greatest_h = 0;  // over these frames [h]
+  std::optional<std::size_t> first_beyond;    // the first of them that is beyond the tolerance
   int64_t removed_otherwise = 0;              // particles that only this or only the answer has, in the last of them
   std::string why;                            // what a table says about a trial that is not within
   Times frame;                                // seconds per frame of the scene; no samples if it was given up
@@ -50,9 +53,9 @@ struct SearchSpace {
   std::vector<int32_t> substeps;  // ascending
   int32_t most_iterations = 64;
   std::vector<std::string> rotations;  // that differ from the given one
-  bool resize = true;                  // false: the size of clusters is part of what the scene expects
+  bool may_resize = true;              // false: the number of clusters is part of what the scene expects
+  bool may_drop_skin = false;          // nobody looks at it
   bool nothing_removed = false;        // in the answer: a scene without a blade then needs no detection
-  bool skin = true;                    // false: nobody looks at the skin
 };
 // 1, 2, 3, 4, 6, 8, 12, … up to `most`, and `given`.
 std::vector<int32_t> substeps_to_try(int32_t given, int32_t most);
@@ -60,8 +63,8 @@ std::vector<int32_t> substeps_to_try(int32_t given, int32_t most);
 // All that was tried, in order; the first is the given configuration.
 // 1. For each number of substeps, from the least, and each acceleration: the least number of iterations that is within
 //    the tolerance, found by doubling and halving; more iterations are taken to be no less accurate and no cheaper.
-//    Doubling ends where it no longer helps: where the error in the frame in which the one before was given up has
-//    not fallen by kHelps.
+//    Doubling ends where it no longer helps: where the error, in the first frame in which the one before was beyond the
+//    tolerance, has not fallen by kHelps; and where nothing but the number of substeps decides (timetable, refused).
 // 2. From the cheapest of these: stages without which the scene's course is the same, sizes of clusters, debris and
 //    rotation methods, one after the other; each is kept if it is within the tolerance and cheaper.
 // 3. If one was kept: the least number of iterations once more.

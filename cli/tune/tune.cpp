@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -43,7 +42,9 @@ const std::vector<std::string>& sound_rotations() {
 // How far a backend goes from an answer, frame by frame.
 class Comparison {
  public:
-  Comparison(const Setup& setup, const Course& answer) : setup_(setup), answer_(answer) {}
+  // `allowed`: the RMS distance up to which a frame is within [h].
+  Comparison(const Setup& setup, const Course& answer, double allowed)
+      : setup_(setup), answer_(answer), allowed_(allowed) {}
 
   void add(const State& state) {
     const std::size_t f = course_.frames.size();
@@ -51,13 +52,15 @@ class Comparison {
     if (f >= answer_.frames.size()) return;
     const oracles::Apart apart = oracles::poses_apart(setup_, answer_.frames[f], course_.frames.back());
     rms_h_.push_back(apart.position.rms());
+    if (!(rms_h_.back() <= allowed_) && !first_beyond_) first_beyond_ = f;
     greatest_h_ = std::max(greatest_h_, apart.position.greatest);
     removed_otherwise_ = apart.alive_in_one;
   }
-  double greatest_rms() const { return rms_h_.empty() ? 0 : *std::max_element(rms_h_.begin(), rms_h_.end()); }
+  bool beyond() const { return first_beyond_.has_value(); }
   void report(Trial& trial) const {
     trial.rms_h = rms_h_;
-    trial.greatest_rms_h = greatest_rms();
+    trial.greatest_rms_h = rms_h_.empty() ? 0 : *std::max_element(rms_h_.begin(), rms_h_.end());
+    trial.first_beyond = first_beyond_;
     trial.greatest_h = greatest_h_;
     trial.removed_otherwise = removed_otherwise_;
   }
@@ -66,8 +69,10 @@ class Comparison {
  private:
   const Setup& setup_;
   const Course& answer_;
+  double allowed_;
   Course course_;
   std::vector<double> rms_h_;
+  std::optional<std::size_t> first_beyond_;
   double greatest_h_ = 0;
   int64_t removed_otherwise_ = 0;
 };
@@ -93,8 +98,8 @@ class Tuner {
   Trial measure(const Configuration& configuration, std::optional<double> limit) const;
   std::string text_of(const Configuration& configuration) const;
 
-  // What was written, read back and run by a fresh backend: every oracle and every expectation of the scene, and the
-  // distance from an answer that the search has not seen.
+  // The text of the scene, read back and run by a fresh backend: every oracle and every expectation of the scene, and
+  // the distance from an answer that the search has not seen.
   struct Verified {
     Trial trial;
     int64_t verdicts = 0;
@@ -116,7 +121,7 @@ class Tuner {
     InTurns times;
   };
   // The cheapest that holds when it is verified and, timed again, is still cheaper than what was given.
-  std::optional<Found> take_cheapest(const std::vector<Trial>& trials) const;
+  std::optional<Found> take_cheapest(const std::vector<Trial>& trials);
 
   void print_answer() const;
   void print(const std::vector<Trial>& trials) const;
@@ -128,16 +133,26 @@ class Tuner {
   std::string path_;  // of the scene that is written
   Configuration given_;
   std::optional<Answer> answer_;
+  std::size_t searched_level_ = 0;  // of the answer, from which trials are measured
+  json document_;
 };
 
+// Throws InputError if two of the three files are one.
 std::string path_to_write(const TuneOptions& options) {
   namespace fs = std::filesystem;
   const fs::path path = options.write.empty() ? fs::path(options.scene).stem().string() + "_tuned.json" : options.write;
-  std::error_code error;
-  if (fs::equivalent(path, options.scene, error)) {
-    throw InputError("command line", "--write", fmt::format("'{}' is the scene that is tuned", path.string()),
-                     "give another name");
+  const auto same = [](const fs::path& a, const fs::path& b) {
+    std::error_code error;
+    return fs::weakly_canonical(a, error) == fs::weakly_canonical(b, error);
+  };
+  const auto refuse = [](const char* option, const fs::path& file, const char* what) {
+    throw InputError("command line", option, fmt::format("'{}' is {}", file.string(), what), "give another name");
+  };
+  if (same(path, options.scene)) refuse("--write", path, "the scene that is tuned");
+  if (!options.json.empty() && same(options.json, options.scene)) {
+    refuse("--json", options.json, "the scene that is tuned");
   }
+  if (!options.json.empty() && same(options.json, path)) refuse("--json", path, "the scene that is written");
   return path.string();
 }
 
@@ -152,8 +167,13 @@ Tuner::Tuner(const TuneOptions& options)
   if (!std::isfinite(options.tolerance)) {
     throw InputError("command line", "--tolerance", "it is not a number", "give a length in h, such as 0.05");
   }
+  // Whatever is wrong with the choice of a backend, or with the scene, is found out now.
   require_timed_backend(options.backend.name);
-  make_backend(options.backend);  // whatever is wrong with the choice is found out now
+  make_backend(options.backend);
+  if (Staged(given_.scene, options.scene, options.frames).frame_count() == 0) {
+    throw InputError(options.scene, "frame.count", "the scene has no frame, so nothing happens that could be compared",
+                     "give a number of frames, a blade, or a grip that ends");
+  }
   if (options.backend.name != "reference") given_.rotation = rotation_of(options.backend);
 }
 
@@ -168,9 +188,9 @@ SearchSpace Tuner::space() const {
     }
   }
   space.nothing_removed = answer_->nothing_removed();
-  space.resize = !given_.scene.expect.clusters.has_value();
+  space.may_resize = !given_.scene.expect.clusters.has_value();
   // A scene that counts the skin's shells looks at it.
-  space.skin = !options_.without_skin || given_.scene.expect.shells_at_end.has_value();
+  space.may_drop_skin = options_.without_skin && !given_.scene.expect.shells_at_end;
   return space;
 }
 
@@ -178,7 +198,7 @@ double seconds_of_frames(Backend& backend, const Staged& staged) {
   double seconds = 0;
   backend.load({staged.setup()}, {staged.start()});
   for (int64_t frame = 0; frame < staged.frame_count(); ++frame) {
-    staged.run_frame(frame, [&] {
+    staged.for_parts_of(frame, [&] {
       backend.run(kFrame);
       seconds += backend.report().total_seconds;
     });
@@ -196,20 +216,28 @@ Trial Tuner::measure(const Configuration& configuration, std::optional<double> l
     scene.emplace(staged(configuration, *backend));
   } catch (const InputError& error) {  // such as a blade that few substeps cannot follow
     if (is_given(configuration)) throw;
+    trial.outcome = Outcome::refused;
     trial.why = error.what();
     return trial;
   }
-  Comparison comparison(scene->setup(), answer_->course());
+  const auto frames = static_cast<int64_t>(answer_->course().frames.size());
+  const bool other_timetable = scene->frame_count() != frames;
+  if (other_timetable) {
+    trial.outcome = Outcome::timetable;
+    trial.why = fmt::format("{} frames, the answer has {}", scene->frame_count(), frames);
+    if (!to_the_end) return trial;
+  }
+  Comparison comparison(scene->setup(), answer_->course(), allowed());
   double seconds = 0;
   backend->load({scene->setup()}, {scene->start()});
   for (int64_t frame = 0; frame < scene->frame_count(); ++frame) {
-    scene->run_frame(frame, [&] {
+    scene->for_parts_of(frame, [&] {
       backend->run(kFrame);
       seconds += backend->report().total_seconds;
     });
     comparison.add(backend->snapshot().front());
     if (to_the_end) continue;
-    if (!(comparison.greatest_rms() <= allowed())) {
+    if (comparison.beyond()) {
       trial.why = fmt::format("given up in frame {} of {}", frame, scene->frame_count());
       comparison.report(trial);
       return trial;
@@ -224,10 +252,10 @@ Trial Tuner::measure(const Configuration& configuration, std::optional<double> l
   }
   comparison.report(trial);
   comparison.course().stroke_end = scene->stroke_end();
-  trial.why = other_parts(answer_->course(), comparison.course());
-  trial.outcome = !trial.why.empty()                       ? Outcome::topology
-                  : comparison.greatest_rms() <= allowed() ? Outcome::within
-                                                           : Outcome::over;
+  if (!other_timetable) {
+    trial.why = other_parts(answer_->course(), comparison.course());
+    trial.outcome = !trial.why.empty() ? Outcome::topology : comparison.beyond() ? Outcome::over : Outcome::within;
+  }
   if (trial.outcome == Outcome::within || to_the_end) {
     std::vector<double> samples;
     for (int repeat = 0; repeat < options_.repeats; ++repeat) samples.push_back(seconds_of_frames(*backend, *scene));
@@ -240,9 +268,11 @@ std::string Tuner::text_of(const Configuration& configuration) const {
   namespace fs = std::filesystem;
   Scene scene = configuration.scene;
   if (scene.body.mesh && fs::path(scene.body.mesh->file).is_relative()) {
-    // Named from where the new scene lies.
-    const fs::path file = fs::absolute(fs::path(options_.scene)).parent_path() / scene.body.mesh->file;
-    scene.body.mesh->file = file.lexically_proximate(fs::absolute(fs::path(path_)).parent_path()).string();
+    // Named from where the new scene lies, whatever links lead there.
+    const fs::path file = fs::canonical(fs::path(options_.scene).parent_path() / scene.body.mesh->file);
+    std::error_code none;
+    const fs::path near = fs::proximate(file, fs::canonical(fs::absolute(path_).parent_path()), none);
+    scene.body.mesh->file = (none ? file : near).string();
   }
   return io::write_scene(scene);
 }
@@ -254,12 +284,18 @@ Tuner::Verified Tuner::verify(const Configuration& configuration, const std::str
   const std::unique_ptr<Backend> backend = backend_for(configuration);
   const Staged staged(scene, path_, options_.frames, backend->unit_roundoff());
   backend->load({staged.setup()}, {staged.start()});
-  // What a scene expects is of all of it.
-  const Expectations expected = options_.frames ? Expectations{} : scene.expect;
+  // What a scene expects is of all of it; but isolation that it expects fails no verdict in a part of it either.
+  Expectations expected = scene.expect;
+  if (options_.frames) {
+    expected = {};
+    if (scene.expect.isolated_clusters && scene.expect.isolated_clusters->low >= 1) {
+      expected.isolated_clusters = scene.expect.isolated_clusters;
+    }
+  }
   Gate gate(staged.setup(), expected, options_.backend.name, backend->snapshot().front());
-  Comparison comparison(staged.setup(), answer_->course());
+  Comparison comparison(staged.setup(), answer_->course(), allowed());
   for (int64_t frame = 0; frame < staged.frame_count(); ++frame) {
-    staged.run_frame(
+    staged.for_parts_of(
         frame, [&] { run_frame(*backend, [&](Stage stage, const State& state) { gate.see(stage, state); }, {}); });
     comparison.add(backend->snapshot().front());
   }
@@ -267,10 +303,17 @@ Tuner::Verified Tuner::verify(const Configuration& configuration, const std::str
   comparison.report(verified.trial);
   comparison.course().stroke_end = staged.stroke_end();
   verified.verdicts = static_cast<int64_t>(gate.verdicts().size());
-  verified.failure = other_parts(answer_->course(), comparison.course());
-  if (verified.failure.empty() && !(comparison.greatest_rms() <= allowed())) {
-    verified.failure = fmt::format("it is {:.2g} h from a finer answer, known to {:.2g} h", comparison.greatest_rms(),
-                                   answer_->known_to_h());
+  if (answer_->course().frames.size() != comparison.course().frames.size()) {
+    verified.failure = "it has another number of frames than a finer answer";
+    verified.trial.outcome = Outcome::timetable;
+  } else if (verified.failure = other_parts(answer_->course(), comparison.course()); !verified.failure.empty()) {
+    verified.trial.outcome = Outcome::topology;
+  } else if (comparison.beyond()) {
+    verified.failure = fmt::format("it is {:.2g} h from a finer answer, known to {:.2g} h",
+                                   verified.trial.greatest_rms_h, answer_->known_to_h());
+    verified.trial.outcome = Outcome::over;
+  } else {
+    verified.trial.outcome = Outcome::within;
   }
   for (const Verdict& verdict : gate.verdicts()) {
     if (!verified.failure.empty()) break;
@@ -333,7 +376,7 @@ json Tuner::json_of_answer() const {
                       {"iterations", level.iterations},
                       {"apart_h", level.apart_h ? json_number(*level.apart_h) : json(nullptr)}});
   }
-  return {{"kind", options_.answer}, {"levels", levels}};
+  return {{"kind", options_.answer}, {"levels", levels}, {"searched_level", searched_level_}};
 }
 
 Tuner::InTurns Tuner::time_in_turns(const Configuration& found) const {
@@ -348,29 +391,41 @@ Tuner::InTurns Tuner::time_in_turns(const Configuration& found) const {
   return {times_of(before), times_of(after)};
 }
 
-std::optional<Tuner::Found> Tuner::take_cheapest(const std::vector<Trial>& trials) const {
-  const bool given_is_within = trials.front().outcome == Outcome::within;
+std::optional<Tuner::Found> Tuner::take_cheapest(const std::vector<Trial>& trials) {
+  const auto leave = [&](std::size_t index, const std::string& why) {
+    const StepParameters& step = trials[index].configuration.scene.step;
+    fmt::print("{} × {}, acceleration {}, is not taken: {}\n", step.substeps, step.iterations,
+               name_of(step.acceleration), why);
+    document_["left"].push_back({{"trial", index}, {"why", why}});
+  };
+  std::optional<Found> given;  // if it holds
+  if (trials.front().outcome == Outcome::within) {
+    Found found{0, text_of(given_), {}, {}};
+    found.verified = verify(given_, found.text);
+    if (found.verified.failure.empty()) given = std::move(found);
+  }
   for (const std::size_t index : by_cost(trials)) {
     const Configuration& configuration = trials[index].configuration;
+    if (index == 0) {
+      if (given) break;
+      leave(index, "it is not within when it is verified");
+      continue;
+    }
     Found found{index, text_of(configuration), {}, {}};
-    const auto leave = [&](const std::string& why) {
-      const StepParameters& step = configuration.scene.step;
-      fmt::print("{} × {}, acceleration {}, is not taken: {}\n", step.substeps, step.iterations,
-                 name_of(step.acceleration), why);
-    };
     found.verified = verify(configuration, found.text);
     if (!found.verified.failure.empty()) {
-      leave(found.verified.failure);
+      leave(index, found.verified.failure);
       continue;
     }
     found.times = time_in_turns(configuration);
-    if (given_is_within && index != 0 && found.times.found.median > (1 - kCheaper) * found.times.given.median) {
-      leave("timed again it is no cheaper than what was given");
+    if (given && found.times.found.median > (1 - kCheaper) * found.times.given.median) {
+      leave(index, "timed again it is no cheaper than what was given");
       continue;
     }
     return found;
   }
-  return std::nullopt;
+  if (given) given->times = {trials.front().frame, trials.front().frame};
+  return given;
 }
 
 void Tuner::print(const Found& found, const Configuration& configuration) const {
@@ -378,16 +433,20 @@ void Tuner::print(const Found& found, const Configuration& configuration) const 
   const auto& [given, tuned] = found.times;
   const std::string other = differences(configuration, given_);
   if (found.trial == 0) {
-    fmt::print("\nfound: nothing that is cheaper; the scene as it was given is within the tolerance\n");
+    fmt::print(
+        "\nfound: nothing that is cheaper; the scene as it was given is within the tolerance\n"
+        "  {:.3f} ms a frame ({:.3f} to {:.3f})\n",
+        1e3 * given.median, 1e3 * given.min, 1e3 * given.max);
   } else {
-    fmt::print("\nfound: {} × {}, acceleration {}{}\n", step.substeps, step.iterations, name_of(step.acceleration),
-               other.empty() ? "" : ", " + other);
+    const double ratio = given.median / tuned.median;
+    fmt::print(
+        "\nfound: {} × {}, acceleration {}{}\n"
+        "  {:.3f} ms a frame ({:.3f} to {:.3f}), as given {:.3f} ({:.3f} to {:.3f}): {}\n",
+        step.substeps, step.iterations, name_of(step.acceleration), other.empty() ? "" : ", " + other,
+        1e3 * tuned.median, 1e3 * tuned.min, 1e3 * tuned.max, 1e3 * given.median, 1e3 * given.min, 1e3 * given.max,
+        ratio >= 1 ? fmt::format("{:.2f} times cheaper", ratio)
+                   : fmt::format("{:.2f} times as dear, and what was given is not within", 1 / ratio));
   }
-  const double ratio = given.median / tuned.median;
-  fmt::print("  {:.3f} ms a frame ({:.3f} to {:.3f}), as given {:.3f} ({:.3f} to {:.3f}): {}\n", 1e3 * tuned.median,
-             1e3 * tuned.min, 1e3 * tuned.max, 1e3 * given.median, 1e3 * given.min, 1e3 * given.max,
-             ratio >= 1 ? fmt::format("{:.2f} times cheaper", ratio)
-                        : fmt::format("{:.2f} times as dear, and what was given is not within", 1 / ratio));
   fmt::print(
       "  verified: RMS {:.2g} h, max {:.2g} h from the reference's {} × {}, {:.2g} h from the one before; "
       "{} verdicts hold\nwrote {}\n",
@@ -401,7 +460,8 @@ void Tuner::print(const Found& found, const Configuration& configuration) const 
 int Tuner::run() {
   require_writable(options_.json);
   require_writable(path_);
-  json document = begin_report("tune", options_.backend.name);
+  json& document = document_;
+  document = begin_report("tune", options_.backend.name);
   const auto finish = [&](int status) {
     document["complete"] = true;
     write_report(options_.json, document);
@@ -409,14 +469,23 @@ int Tuner::run() {
     return status;
   };
   fmt::print("scene {}: {}\n", given_.scene.name, given_.scene.description);
-  const AnswerKind kind = options_.answer == "limit" ? AnswerKind::limit : AnswerKind::substeps;
-  answer_.emplace(kind, given_.scene, options_.scene, options_.frames, kUnknownShare * options_.tolerance);
-  print_answer();
+  if (options_.without_skin && given_.scene.expect.shells_at_end) {
+    fmt::print("--without-skin does nothing: the scene expects shells of its skin\n");
+  }
   document["scene"] = options_.scene;
   document["tolerance_h"] = options_.tolerance;
   document["repeats"] = options_.repeats;
+  document["frames"] = options_.frames ? json(*options_.frames) : json(nullptr);
+  document["full"] = options_.full;
+  document["without_skin"] = options_.without_skin;
   document["trials"] = json::array();
+  document["left"] = json::array();
   document["found"] = nullptr;
+
+  const AnswerKind kind = options_.answer == "limit" ? AnswerKind::limit : AnswerKind::substeps;
+  answer_.emplace(kind, given_.scene, options_.scene, options_.frames, kUnknownShare * options_.tolerance);
+  searched_level_ = answer_->levels().size() - 1;
+  print_answer();
   document["answer"] = json_of_answer();
   if (!(allowed() > 0)) {
     fmt::print(
@@ -428,11 +497,15 @@ int Tuner::run() {
     return finish(1);
   }
 
-  const std::vector<Trial> trials = search(
-      given_, space(),
-      [&](const Configuration& configuration, std::optional<double> limit) { return measure(configuration, limit); });
+  // Written after each, so that what has been measured is kept if a later one fails.
+  const std::vector<Trial> trials =
+      search(given_, space(), [&](const Configuration& configuration, std::optional<double> limit) {
+        Trial trial = measure(configuration, limit);
+        document["trials"].push_back(json_of(trial));
+        write_report(options_.json, document);
+        return trial;
+      });
   print(trials);
-  for (const Trial& trial : trials) document["trials"].push_back(json_of(trial));
   if (by_cost(trials).empty()) {
     fmt::print("none of {} configurations is within {:g} h of the answer, itself known to {:.2g} h\n", trials.size(),
                options_.tolerance, answer_->known_to_h());
@@ -443,13 +516,17 @@ int Tuner::run() {
   document["answer"] = json_of_answer();
   const std::optional<Found> found = take_cheapest(trials);
   if (!found) {
-    fmt::print("no configuration that seemed to be within {:g} h holds when it is verified\n", options_.tolerance);
+    fmt::print("none of the configurations that seemed to be within {:g} h holds when it is verified\n",
+               options_.tolerance);
     return finish(1);
   }
   io::AtomicFile file(path_);
   io::write_text(file.temporary(), found->text);
   file.commit();
   print(*found, trials[found->trial].configuration);
+  if (options_.frames) {
+    fmt::print("  the scene was written whole, and looked at for {} frames only\n", *options_.frames);
+  }
   document["found"] = {{"trial", found->trial},
                        {"verified", json_of(found->verified.trial)},
                        {"verdicts", found->verified.verdicts},

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -30,7 +31,8 @@ struct Model {
     trial.greatest_rms_h = error(configuration.scene, weight);
     trial.rms_h = {trial.greatest_rms_h};
     const double seconds = cost(configuration.scene);
-    trial.outcome = trial.greatest_rms_h > tolerance  ? Outcome::over
+    if (trial.greatest_rms_h > tolerance) trial.first_beyond = 0;
+    trial.outcome = trial.first_beyond                ? Outcome::over
                     : limit && seconds > 1.5 * *limit ? Outcome::dearer
                                                       : Outcome::within;
     if (trial.outcome == Outcome::within) trial.frame = {seconds, seconds, seconds, 1};
@@ -48,7 +50,7 @@ Configuration given() {
 SearchSpace space_of_steps() {
   SearchSpace space;
   space.substeps = substeps_to_try(8, 64);
-  space.resize = false;
+  space.may_resize = false;
   return space;
 }
 
@@ -119,6 +121,50 @@ TEST(Search, EndsDoublingWhereItDoesNotHelp) {
   for (const Trial& trial : trials) EXPECT_LE(trial.configuration.scene.step.iterations, 32);
 }
 
+// Of several frames, in which errors grow. The given configuration is run to its end and the others are given up, so
+// that what helps has to be seen where the given one was first beyond.
+TEST(Search, GoesOnFromAGivenOneThatWasRunToItsEnd) {
+  const double tolerance = 0.1;
+  Configuration start = given();
+  start.scene.step.iterations = 4;
+  const auto measure = [&](const Configuration& configuration, std::optional<double>) {
+    Trial trial;
+    trial.configuration = configuration;
+    const int32_t iterations = configuration.scene.step.iterations;
+    for (int frame = 1; frame <= 20 && (!trial.first_beyond || configuration == start); ++frame) {
+      trial.rms_h.push_back(0.02 * frame * std::pow(0.8, iterations));
+      if (trial.rms_h.back() > tolerance && !trial.first_beyond) trial.first_beyond = trial.rms_h.size() - 1;
+    }
+    trial.greatest_rms_h = trial.rms_h.back();
+    trial.outcome = trial.first_beyond ? Outcome::over : Outcome::within;
+    trial.frame = {1.0 * iterations, 1.0 * iterations, 1.0 * iterations, 1};
+    return trial;
+  };
+  // 0.4 · 0.8^K at the end: 7 iterations are enough.
+  SearchSpace space = space_of_steps();
+  space.substeps = {8};
+  const std::vector<Trial> trials = search(start, space, measure);
+  const std::vector<std::size_t> order = by_cost(trials);
+  ASSERT_FALSE(order.empty());
+  EXPECT_EQ(trials[order.front()].configuration.scene.step.iterations, 7);
+}
+
+TEST(Search, LeavesANumberOfSubstepsThatCannotBe) {
+  const Model model{2.0, 0.4};
+  const auto measure = [&](const Configuration& configuration, std::optional<double> limit) {
+    Trial trial = model(configuration, limit);
+    const int32_t substeps = configuration.scene.step.substeps;
+    if (substeps == 1) trial.outcome = Outcome::refused;
+    if (substeps == 2) trial.outcome = Outcome::timetable;
+    return trial;
+  };
+  const std::vector<Trial> trials = search(given(), space_of_steps(), measure);
+  EXPECT_EQ(std::count_if(trials.begin(), trials.end(), [](const Trial& t) { return t.outcome == Outcome::refused; }),
+            2)
+      << "once for each acceleration";
+  EXPECT_EQ(trials[by_cost(trials).front()].configuration.scene.step.substeps, 3);
+}
+
 // Another number of parts is not within, however near the rest is.
 TEST(Search, GoesOnFromOtherParts) {
   const Model model{2.0, 0.4};
@@ -166,8 +212,8 @@ TEST(Search, DropsStagesThatNobodyNeeds) {
   Configuration found = cheapest();
   EXPECT_EQ(differences(found, start), "debris 8, no expansion");
 
-  space.resize = true;
-  space.skin = false;
+  space.may_resize = true;
+  space.may_drop_skin = true;
   space.nothing_removed = true;
   space.rotations = {"slow", "quick"};
   found = cheapest();
@@ -190,7 +236,7 @@ TEST(Search, SizesSampledClustersByBothTheirLengths) {
   Configuration start = given();
   start.scene.clusters.method = Cooking::sampled;
   SearchSpace space = space_of_steps();
-  space.resize = true;
+  space.may_resize = true;
   const std::vector<Trial> trials = search(start, space, measure);
   const ClusterSpec& found = trials[by_cost(trials).front()].configuration.scene.clusters;
   EXPECT_NEAR(found.radius, 2.56, 1e-12);

@@ -1,6 +1,8 @@
 // `cutproof tune` as a user meets it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "cli/tune/answer.h"
@@ -44,8 +46,8 @@ double greatest_rms_h(const Scene& tuned, Scene scene, int substeps, int iterati
   double greatest = 0;
   for (int64_t frame = 0; frame < a.frame_count(); ++frame) {
     const auto run = [](cutproof::Backend& backend) { backend.run({cutproof::Stage::step, cutproof::Stage::skin}); };
-    a.run_frame(frame, [&] { run(*first); });
-    b.run_frame(frame, [&] { run(*second); });
+    a.for_parts_of(frame, [&] { run(*first); });
+    b.for_parts_of(frame, [&] { run(*second); });
     const cutproof::State x = first->snapshot().front(), y = second->snapshot().front();
     double squares = 0, count = 0;
     for (std::size_t i = 0; i < x.x.size(); ++i) {
@@ -84,6 +86,7 @@ TEST_F(Tune, WritesACheaperSceneWithinTheTolerance) {
     EXPECT_EQ(trials.at(0).at("rotation").is_null(), backend == "reference");
     // What it has tried and found wanting is told.
     EXPECT_TRUE(std::any_of(trials.begin(), trials.end(), [](const json& t) { return t.at("outcome") == "over"; }));
+    EXPECT_EQ(found.at("verified").at("outcome"), "within");
     EXPECT_EQ(trials.at(found.at("trial").get<std::size_t>()).at("outcome"), "within");
     for (const json& trial : trials) {
       EXPECT_EQ(trial.at("seconds_per_frame").is_null(), trial.at("outcome") != "within") << trial;
@@ -103,7 +106,7 @@ TEST_F(Tune, AgainstTheLimitOfShortTimeSteps) {
 }
 
 TEST_F(Tune, SaysThatThereIsNone) {
-  // One substep of a fixed number cannot come this close to the limit, nor is the limit known so well.
+  // The limit is not known so well.
   const Outcome unknown = tune("--tolerance 1e-9 --frames 2");
   EXPECT_EQ(unknown.status, 1) << unknown.output;
   EXPECT_NE(unknown.output.find("is known to"), std::string::npos) << unknown.output;
@@ -139,6 +142,37 @@ TEST_F(Tune, WithoutASkin) {
   const Outcome outcome = tune("--tolerance 0.05 --answer substeps --without-skin --backend host");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("no skin"), std::string::npos) << outcome.output;
+
+  // Who counts shells looks at the skin.
+  write("scene.json",
+        std::string(kScene).replace(std::string(kScene).find("\"components_at_end\": 2"), 0, "\"shells_at_end\": 2, "));
+  const Outcome with_shells = tune("--tolerance 0.05 --answer substeps --without-skin --backend host --json out.json");
+  ASSERT_EQ(with_shells.status, 0) << with_shells.output;
+  EXPECT_NE(with_shells.output.find("--without-skin does nothing"), std::string::npos) << with_shells.output;
+  const json document = json::parse(read("out.json"));
+  for (const json& trial : document.at("trials")) {
+    EXPECT_EQ(trial.at("differences").get<std::string>().find("no skin"), std::string::npos);
+  }
+}
+
+// A path of several pieces takes whole substeps for each, so another number of substeps may take another number of
+// frames. Such runs are not compared.
+TEST_F(Tune, LeavesWhatHasAnotherTimetable) {
+  write("scene.json", R"({"version": 1, "body": {"shape": {"kind": "box", "size": [0.05, 0.03, 0.03]}, "spacing": 0.01},
+    "frame": {"length": 0.016}, "detect": {"criterion": "geometric"}, "step": {"substeps": 4, "iterations": 2},
+    "blade": {"speed": 0.5, "strokes": [{"along": [0, 1, 0], "points": [[0.5, 0.5, 1.3], [0.5, 0.5, 1.29],
+    [0.5, 0.5, 1.2], [0.5, 0.5, 1.19], [0.5, 0.5, 1.0], [0.5, 0.5, 0.99], [0.5, 0.5, 0.5]]}]}})");
+  const Outcome outcome = tune("--tolerance 0.5 --answer substeps --json out.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  const json trials = json::parse(read("out.json")).at("trials");
+  EXPECT_TRUE(std::any_of(trials.begin(), trials.end(), [](const json& t) { return t.at("outcome") == "timetable"; }))
+      << outcome.output;
+}
+
+TEST_F(Tune, LooksAtTheFirstFrames) {
+  const Outcome outcome = tune("--tolerance 0.1 --answer substeps --frames 1");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("looked at for 1 frames only"), std::string::npos) << outcome.output;
 }
 
 TEST_F(Tune, RefusesWhatItCannotTune) {
@@ -155,12 +189,16 @@ TEST_F(Tune, RefusesWhatItCannotTune) {
   refused("scene.json --tolerance 1 --backend simulated", "--backend");
   refused("scene.json --tolerance 1 --rotation svd", "--rotation");
   refused("scene.json --tolerance 1 --write scene.json", "--write");
+  refused("scene.json --tolerance 1 --json scene.json", "--json");
+  refused("scene.json --tolerance 1 --json found.json --write found.json", "--json");
   refused("scene.json --tolerance 1 --write nowhere/found.json", "nowhere");
   refused("missing.json --tolerance 1", "missing.json");
   write("published.json", R"({"version": 1, "body": {"shape": {"kind": "box"}, "particles": 100},
     "frame": {"count": 1}, "step": {"solver": "published"}})");
   refused("published.json --tolerance 1", "step.solver");
-  EXPECT_EQ(listing(), (std::set<std::string>{"published.json", "scene.json"}));
+  write("still.json", R"({"version": 1, "body": {"shape": {"kind": "box"}, "spacing": 0.02}})");
+  refused("still.json --tolerance 1", "frame.count");
+  EXPECT_EQ(listing(), (std::set<std::string>{"published.json", "scene.json", "still.json"}));
 }
 
 }  // namespace
