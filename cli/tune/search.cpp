@@ -19,7 +19,6 @@ std::string differences(const Configuration& configuration, const Configuration&
   note(clusters.radius != old.radius, fmt::format("clusters.radius {:g}", clusters.radius));
   note(scene.detect.criterion != before.detect.criterion, "no detection");
   note(scene.split.debris != before.split.debris, fmt::format("debris {}", scene.split.debris));
-  note(scene.expand.rule != before.expand.rule, "no expansion");
   note(scene.skin.wanted != before.skin.wanted, "no skin");
   note(configuration.rotation != given.rotation, "rotation " + configuration.rotation);
   return fmt::format("{}", fmt::join(found, ", "));
@@ -140,10 +139,6 @@ class Searcher {
         return !c.scene.blade && c.scene.detect.without_blade && set(c.scene.detect.criterion, Criterion::none);
       });
     }
-    // Boxes cover every edge, and every stage keeps it so (method.md §7).
-    attempt_with([&](Configuration& c) {
-      return c.scene.clusters.method == Cooking::boxes && set(c.scene.expand.rule, ExpandRule::none);
-    });
     // Larger clusters as long as they pay, else smaller ones.
     const auto resize = [&](bool larger) {
       return attempt_with([&](Configuration& c) {

@@ -191,7 +191,7 @@ TEST(Search, DropsStagesThatNobodyNeeds) {
     Trial trial = model(configuration, limit);
     if (trial.outcome != Outcome::within) return trial;
     double seconds = trial.frame.median;
-    seconds += 6.0 * scene.skin.wanted + 6.0 * (scene.expand.rule != ExpandRule::none);
+    seconds += 6.0 * scene.skin.wanted;
     seconds += 6.0 * (scene.detect.criterion != Criterion::none) + 120.0 / scene.clusters.side;
     seconds += (configuration.rotation == "quick" ? 0.0 : 6.0) + (scene.split.debris == 8 ? 0.0 : 6.0);
     trial.frame = {seconds, seconds, seconds, 1};
@@ -210,15 +210,14 @@ TEST(Search, DropsStagesThatNobodyNeeds) {
   };
 
   Configuration found = cheapest();
-  EXPECT_EQ(differences(found, start), "debris 8, no expansion");
+  EXPECT_EQ(differences(found, start), "debris 8");
 
   space.may_resize = true;
   space.may_drop_skin = true;
   space.nothing_removed = true;
   space.rotations = {"slow", "quick"};
   found = cheapest();
-  EXPECT_EQ(differences(found, start),
-            "clusters.side 6, no detection, debris 8, no expansion, no skin, rotation quick");
+  EXPECT_EQ(differences(found, start), "clusters.side 6, no detection, debris 8, no skin, rotation quick");
 
   // With a blade there is something to detect, whatever this run removed.
   start.scene.blade.emplace();
