@@ -1,7 +1,6 @@
 #include "oracles/trajectory.h"
 
 #include "oracles/oracles.h"
-#include "oracles/support.h"
 
 namespace cutproof::oracles {
 

@@ -271,9 +271,9 @@ void tell_apart(Clusters& clusters) {
   }
 }
 
-}  // namespace
-
 constexpr int kSizeOfSparseBalls = 80;
+
+}  // namespace
 
 Case draw_case(uint64_t seed, int size) {
   Random random(seed);

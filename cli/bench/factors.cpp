@@ -65,12 +65,7 @@ CutCube make_cut_cube(int32_t side, int32_t core) {
   cube.name = spec.name;
   Setup& setup = cube.setup;
   setup.body = fixtures::block(side, side, side, kSpacing);
-  setup.step = spec.step;
-  setup.detect = spec.detect;
-  setup.split = spec.split;
-  setup.merge = spec.merge;
-  setup.expand = spec.expand;
-  setup.skin = spec.skin;
+  fixtures::take_stage_parameters(spec, setup);
   BladeSpec blade;
   blade.thickness = 0.5;
   blade.speed = kSpacing / spec.frame_length;

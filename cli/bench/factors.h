@@ -61,8 +61,8 @@ struct Factorised {
   double seconds = 0;        // of everything after the changed system is known
   double solve_seconds = 0;  // of one right-hand side
   double residual = 0;       // ‖right − B x‖ / (‖B‖ ‖x‖) in the greatest norm
-  int64_t entries = 0;    // of the factor
-  std::vector<double> x;  // [rows]
+  int64_t entries = 0;       // of the factor
+  std::vector<double> x;     // [rows]
 };
 // Nothing where the way does not exist. What the earlier factor takes is not in the times; for `updown` and `rows` it
 // is in the form and has the order that they need, with the new rows in it.

@@ -72,12 +72,7 @@ BenchScene make_bench_scene(int64_t particles, int64_t frames) {
   scene.name = spec.name;
   Setup& setup = scene.setup;
   setup.body = fixtures::sample(fixtures::solid_from_shape(shape, kind), spec.body, "command line");
-  setup.step = spec.step;
-  setup.detect = spec.detect;
-  setup.split = spec.split;
-  setup.merge = spec.merge;
-  setup.expand = spec.expand;
-  setup.skin = spec.skin;
+  fixtures::take_stage_parameters(spec, setup);
 
   // The blade goes along x. It is well under way after a quarter of the body and has still something to cut at the end.
   const fixtures::Bounds bounds = fixtures::path_box(setup.body);

@@ -15,7 +15,6 @@ namespace cutproof::cli {
 
 namespace {
 
-constexpr Span kFrame = {Stage::step, Stage::skin};
 // What is left, at most, of the error that a substep starts with.
 constexpr double kLeft = 1e-4;
 constexpr int32_t kLeastSubsteps = 32, kLeastIterations = 16;
@@ -43,6 +42,19 @@ Staged::Staged(const Scene& scene, const std::string& source, std::optional<int6
     if (f + 1 == scene_frame.size() || scene_frame[f + 1] != scene_frame[f])
       last_of_.push_back(static_cast<int64_t>(f));
   }
+}
+
+double Staged::run(Backend& backend, const std::function<bool(double seconds)>& see) const {
+  double seconds = 0;
+  backend.load({setup_}, {start_});
+  for (int64_t frame = 0; frame < frame_count(); ++frame) {
+    for_parts_of(frame, [&] {
+      backend.run({Stage::step, Stage::skin});
+      seconds += backend.report().total_seconds;
+    });
+    if (see && !see(seconds)) break;
+  }
+  return seconds;
 }
 
 std::vector<int64_t> Staged::stroke_end() const {
@@ -109,14 +121,13 @@ Course Answer::run(const Level& level) const {
   scene.step.iterations = level.iterations;
   const Staged staged(scene, source_, frames_);
   const std::unique_ptr<Backend> reference = reference::make_backend();
-  reference->load({staged.setup()}, {staged.start()});
   Course course;
   course.stroke_end = staged.stroke_end();
-  for (int64_t frame = 0; frame < staged.frame_count(); ++frame) {
-    staged.for_parts_of(frame, [&] { reference->run(kFrame); });
+  staged.run(*reference, [&](double) {
     course.frames.push_back(oracles::pose_of(staged.setup(), reference->snapshot().front(),
                                              course.frames.empty() ? nullptr : &course.frames.back()));
-  }
+    return true;
+  });
   return course;
 }
 

@@ -2,6 +2,7 @@
 // known.
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,6 +38,9 @@ class Staged {
     const int64_t first = frame == 0 ? 0 : last_of_[static_cast<std::size_t>(frame) - 1] + 1;
     for (int64_t part = first; part <= last_of_[static_cast<std::size_t>(frame)]; ++part) run();
   }
+  // Loads it and runs whole frames. `see`, unless it is empty, is called after each frame of the scene with the seconds
+  // that the backend has taken so far; the run ends where it says false. Returns the seconds.
+  double run(Backend& backend, const std::function<bool(double seconds)>& see) const;
   std::vector<int64_t> stroke_end() const;
 
  private:

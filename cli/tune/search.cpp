@@ -109,7 +109,8 @@ class Searcher {
       configuration.scene.step.substeps = substeps;
       configuration.scene.step.acceleration = Acceleration::none;
       const std::optional<int32_t> plain = least_iterations(configuration, 1, space_.most_iterations);
-      // The first iteration is the plain one, so acceleration can only help where at least two are left out of three.
+      // The first iteration is a plain one, so only two or more can be accelerated; and fewer than the plain ones, or
+      // nothing is gained.
       const int32_t most = plain ? *plain - 1 : space_.most_iterations;
       if (most < 2) continue;
       configuration.scene.step.acceleration = Acceleration::chebyshev;

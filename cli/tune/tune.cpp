@@ -13,7 +13,6 @@
 #include "cli/frame.h"
 #include "cli/gate.h"
 #include "cli/json_number.h"
-#include "cli/terminal.h"
 #include "cli/tune/answer.h"
 #include "cli/tune/search.h"
 #include "model/error.h"
@@ -26,7 +25,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr Span kFrame = {Stage::step, Stage::skin};
 // The answer is refined until this part of the tolerance is left for what is not known of it, if it can be.
 constexpr double kUnknownShare = 0.25;
 
@@ -194,16 +192,8 @@ SearchSpace Tuner::space() const {
   return space;
 }
 
-double seconds_of_frames(Backend& backend, const Staged& staged) {
-  double seconds = 0;
-  backend.load({staged.setup()}, {staged.start()});
-  for (int64_t frame = 0; frame < staged.frame_count(); ++frame) {
-    staged.for_parts_of(frame, [&] {
-      backend.run(kFrame);
-      seconds += backend.report().total_seconds;
-    });
-  }
-  return seconds / static_cast<double>(std::max<int64_t>(1, staged.frame_count()));
+double seconds_per_frame(Backend& backend, const Staged& staged) {
+  return staged.run(backend, {}) / static_cast<double>(staged.frame_count());
 }
 
 Trial Tuner::measure(const Configuration& configuration, std::optional<double> limit) const {
@@ -228,29 +218,21 @@ Trial Tuner::measure(const Configuration& configuration, std::optional<double> l
     if (!to_the_end) return trial;
   }
   Comparison comparison(scene->setup(), answer_->course(), allowed());
-  double seconds = 0;
-  backend->load({scene->setup()}, {scene->start()});
-  for (int64_t frame = 0; frame < scene->frame_count(); ++frame) {
-    scene->for_parts_of(frame, [&] {
-      backend->run(kFrame);
-      seconds += backend->report().total_seconds;
-    });
+  bool given_up = false;
+  scene->run(*backend, [&](double seconds) {
     comparison.add(backend->snapshot().front());
-    if (to_the_end) continue;
-    if (comparison.beyond()) {
-      trial.why = fmt::format("given up in frame {} of {}", frame, scene->frame_count());
-      comparison.report(trial);
-      return trial;
-    }
+    if (to_the_end) return true;
     // What is dearer by its first run may be a little less so by its median.
-    if (limit && seconds > 1.5 * *limit * static_cast<double>(scene->frame_count())) {
-      comparison.report(trial);
-      trial.outcome = Outcome::dearer;
-      trial.why = fmt::format("given up in frame {} of {}", frame, scene->frame_count());
-      return trial;
-    }
-  }
+    const bool dearer = limit && seconds > 1.5 * *limit * static_cast<double>(frames);
+    given_up = comparison.beyond() || dearer;
+    if (given_up) trial.outcome = comparison.beyond() ? Outcome::over : Outcome::dearer;
+    return !given_up;
+  });
   comparison.report(trial);
+  if (given_up) {
+    trial.why = fmt::format("given up in frame {} of {}", trial.rms_h.size() - 1, frames);
+    return trial;
+  }
   comparison.course().stroke_end = scene->stroke_end();
   if (!other_timetable) {
     trial.why = other_parts(answer_->course(), comparison.course());
@@ -258,7 +240,7 @@ Trial Tuner::measure(const Configuration& configuration, std::optional<double> l
   }
   if (trial.outcome == Outcome::within || to_the_end) {
     std::vector<double> samples;
-    for (int repeat = 0; repeat < options_.repeats; ++repeat) samples.push_back(seconds_of_frames(*backend, *scene));
+    for (int repeat = 0; repeat < options_.repeats; ++repeat) samples.push_back(seconds_per_frame(*backend, *scene));
     trial.frame = times_of(samples);
   }
   return trial;
@@ -385,7 +367,7 @@ Tuner::InTurns Tuner::time_in_turns(const Configuration& found) const {
     for (const bool given : {true, false}) {
       const Configuration& timed = given ? given_ : found;
       const std::unique_ptr<Backend> backend = backend_for(timed);
-      (given ? before : after).push_back(seconds_of_frames(*backend, staged(timed, *backend)));
+      (given ? before : after).push_back(seconds_per_frame(*backend, staged(timed, *backend)));
     }
   }
   return {times_of(before), times_of(after)};

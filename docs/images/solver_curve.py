@@ -7,11 +7,10 @@ import argparse
 import json
 import math
 import sys
-from html import escape
+
+from log_axes import TOP, LogAxes
 
 COLOURS = ["#1b6ca8", "#c1572b", "#3c8d40", "#7b4ea3", "#8a6d1f"]
-WIDTH, HEIGHT = 760, 470
-LEFT, RIGHT, TOP, BOTTOM = 70, 190, 40, 50
 
 
 def curves(document, scene, substeps, x):
@@ -37,45 +36,21 @@ def decades(values):
 def picture(found, title, x_label, tolerance):
     xs = [p[0] for _, _, points in found for p in points]
     ys = [p[1] for _, _, points in found for p in points] + [tolerance]
-    (x0, x1), (y0, y1) = decades(xs), decades(ys)
-    right, bottom = WIDTH - RIGHT, HEIGHT - BOTTOM
-
-    def px(value):
-        return LEFT + (math.log10(value) - x0) / (x1 - x0) * (right - LEFT)
-
-    def py(value):
-        return bottom - (math.log10(value) - y0) / (y1 - y0) * (bottom - TOP)
-
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" font-size="13">',
-        f'<rect width="{WIDTH}" height="{HEIGHT}" fill="white"/>',
-        f'<text x="{LEFT}" y="24" font-size="15">{escape(title)}</text>',
-    ]
-
-    def line(a, b, c, d, style):
-        parts.append(f'<line x1="{a:.1f}" y1="{b:.1f}" x2="{c:.1f}" y2="{d:.1f}" {style}/>')
-
-    for e in range(x0, x1 + 1):
-        line(px(10.0**e), TOP, px(10.0**e), bottom, 'stroke="#dddddd"')
-        parts.append(f'<text x="{px(10.0**e):.1f}" y="{bottom + 18}" text-anchor="middle">{10.0**e:g}</text>')
-    for e in range(y0, y1 + 1):
-        line(LEFT, py(10.0**e), right, py(10.0**e), 'stroke="#dddddd"')
-        parts.append(f'<text x="{LEFT - 8}" y="{py(10.0**e) + 4:.1f}" text-anchor="end">1e{e}</text>')
-    line(LEFT, py(tolerance), right, py(tolerance), 'stroke="#444444" stroke-dasharray="2 3"')
-    parts.append(f'<text x="{(LEFT + right) / 2}" y="{HEIGHT - 12}" text-anchor="middle">{escape(x_label)}</text>')
-    parts.append(f'<text x="18" y="{(TOP + bottom) / 2}" text-anchor="middle" '
-                 f'transform="rotate(-90 18 {(TOP + bottom) / 2})">greatest error [h]</text>')
+    axes = LogAxes(decades(xs), decades(ys), title)
+    powers = lambda ends: [10.0**e for e in range(ends[0], ends[1] + 1)]
+    axes.ticks(powers(axes.x), powers(axes.y), y_name=lambda value: f"1e{round(math.log10(value))}")
+    axes.tolerance(tolerance)
+    axes.labels(x_label, "greatest error [h]")
     stiffnesses = sorted({k for k, _, _ in found})
     for n, (stiffness, acceleration, points) in enumerate(found):
         colour = COLOURS[stiffnesses.index(stiffness) % len(COLOURS)]
         dash = ' stroke-dasharray="6 4"' if acceleration == "none" else ""
-        path = " ".join(f"{px(a):.1f},{py(b):.1f}" for a, b in points)
-        parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="2"{dash}/>')
+        path = " ".join(f"{axes.px(a):.1f},{axes.py(b):.1f}" for a, b in points)
+        axes.parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="2"{dash}/>')
         row = TOP + 14 + 20 * n
-        line(right + 12, row - 4, right + 42, row - 4, f'stroke="{colour}" stroke-width="2"{dash}')
-        parts.append(f'<text x="{right + 48}" y="{row}">k = {stiffness:.0e}, {acceleration}</text>')
-    parts.append("</svg>")
-    return "\n".join(parts) + "\n"
+        axes.line(axes.right + 12, row - 4, axes.right + 42, row - 4, f'stroke="{colour}" stroke-width="2"{dash}')
+        axes.text(axes.right + 48, row, f"k = {stiffness:.0e}, {acceleration}")
+    return axes.svg()
 
 
 def main():

@@ -6,11 +6,10 @@ Usage: docs/images/tune_curve.py TUNE.json -o F.svg
 import argparse
 import json
 import math
-from html import escape
+
+from log_axes import TOP, LogAxes
 
 PLAIN, ACCELERATED, MARK = "#1b6ca8", "#c1572b", "#3c8d40"
-WIDTH, HEIGHT = 760, 470
-LEFT, RIGHT, TOP, BOTTOM = 70, 190, 40, 50
 
 
 def points_of(document):
@@ -38,40 +37,17 @@ def picture(document):
     # Half decades: a whole one leaves the picture empty.
     x0, x1 = math.floor(2 * math.log10(min(xs))) / 2, math.ceil(2 * math.log10(max(xs))) / 2
     y0, y1 = math.floor(2 * math.log10(min(ys))) / 2, math.ceil(2 * math.log10(max(ys))) / 2
-    right, bottom = WIDTH - RIGHT, HEIGHT - BOTTOM
-
-    def px(value):
-        return LEFT + (math.log10(value) - x0) / (x1 - x0) * (right - LEFT)
-
-    def py(value):
-        return bottom - (math.log10(value) - y0) / (y1 - y0) * (bottom - TOP)
-
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" font-size="13">',
-        f'<rect width="{WIDTH}" height="{HEIGHT}" fill="white"/>',
-        f'<text x="{LEFT}" y="24" font-size="15">{escape(title_of(document))}</text>',
-    ]
-
-    def line(a, b, c, d, style):
-        parts.append(f'<line x1="{a:.1f}" y1="{b:.1f}" x2="{c:.1f}" y2="{d:.1f}" {style}/>')
-
-    def text(x, y, what, anchor="start", extra=""):
-        parts.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" {extra}>{escape(what)}</text>')
+    axes = LogAxes((x0, x1), (y0, y1), title_of(document))
+    px, py, right, parts = axes.px, axes.py, axes.right, axes.parts
 
     def ticks(low, high):
         return [m * 10.0**e for e in range(math.floor(low), math.ceil(high) + 1) for m in (1, 2, 5)
                 if low - 1e-9 <= math.log10(m * 10.0**e) <= high + 1e-9]
 
-    for value in ticks(x0, x1):
-        line(px(value), TOP, px(value), bottom, 'stroke="#e4e4e4"')
-        text(px(value), bottom + 18, f"{value:g}", "middle")
-    for value in ticks(y0, y1):
-        line(LEFT, py(value), right, py(value), 'stroke="#e4e4e4"')
-        text(LEFT - 8, py(value) + 4, f"{value:g}", "end")
-    text((LEFT + right) / 2, HEIGHT - 12, "ms a frame", "middle")
-    text(18, (TOP + bottom) / 2, "greatest RMS error [h]", "middle", f'transform="rotate(-90 18 {(TOP + bottom) / 2:.0f})"')
-    line(LEFT, py(document["tolerance_h"]), right, py(document["tolerance_h"]), 'stroke="#555" stroke-dasharray="6 4"')
-    text(right + 6, py(document["tolerance_h"]) + 4, f"tolerance {document['tolerance_h']:g} h")
+    axes.ticks(ticks(x0, x1), ticks(y0, y1))
+    axes.labels("ms a frame", "greatest RMS error [h]")
+    axes.tolerance(document["tolerance_h"])
+    axes.text(right + 6, py(document["tolerance_h"]) + 4, f"tolerance {document['tolerance_h']:g} h")
 
     corners = " ".join(f"{px(x):.1f},{py(y):.1f}" for x, y, _ in front_of(points))
     parts.append(f'<polyline points="{corners}" fill="none" stroke="#999" stroke-width="1.5"/>')
@@ -85,16 +61,16 @@ def picture(document):
         marks.append(((1e3 * found["seconds_per_frame"]["median"], found["rms_h"], found), "found"))
     for (x, y, trial), name in marks:
         parts.append(f'<circle cx="{px(x):.1f}" cy="{py(y):.1f}" r="8" fill="none" stroke="{MARK}" stroke-width="2"/>')
-        text(px(x) + 11, py(y) + 4, f"{name}: {trial['substeps']} × {trial['iterations']}", extra=f'fill="{MARK}" stroke="white" stroke-width="4" paint-order="stroke"')
+        axes.text(px(x) + 11, py(y) + 4, f"{name}: {trial['substeps']} × {trial['iterations']}", extra=f'fill="{MARK}" stroke="white" stroke-width="4" paint-order="stroke"')
     for k, (what, colour, fill) in enumerate(
         [("none", PLAIN, PLAIN), ("chebyshev", ACCELERATED, ACCELERATED), ("other parts", PLAIN, "white")]
     ):
         y = TOP + 14 + 20 * k
         parts.append(f'<circle cx="{right + 14}" cy="{y}" r="4" fill="{fill}" stroke="{colour}"/>')
-        text(right + 24, y + 4, what)
-    text(right + 8, TOP + 14 + 60, "grey: none is both")
-    text(right + 8, TOP + 14 + 76, "cheaper and nearer")
-    return "\n".join(parts + ["</svg>"]) + "\n"
+        axes.text(right + 24, y + 4, what)
+    axes.text(right + 8, TOP + 14 + 60, "grey: none is both")
+    axes.text(right + 8, TOP + 14 + 76, "cheaper and nearer")
+    return axes.svg()
 
 
 def title_of(document):

@@ -83,8 +83,8 @@ class Leaks : public testing::Test {
     static_cast<void>(backend.snapshot());
   }
 
-  // Lets allocations of `call` fail, one in each run. `may_terminate`: a destructor of a library that needs memory is in
-  // it. `may_lose`: as many blocks, in a library.
+  // Lets allocations of `call` fail, one in each run. `may_terminate`: a destructor of a library that needs memory is
+  // in it. `may_lose`: as many blocks, in a library.
   void fail_each(const std::function<void()>& call, bool may_terminate = false, int64_t may_lose = 0) {
     if (std::string(CUTPROOF_SANITIZERS) != "") {
       GTEST_SKIP() << "leaks were not run: sanitizers (" CUTPROOF_SANITIZERS ") bring their own allocator";
