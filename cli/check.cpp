@@ -3,9 +3,9 @@
 #include <optional>
 
 #include "cli/commands.h"
-#include "cli/gate.h"
 #include "cli/results.h"
 #include "cli/terminal.h"
+#include "harness/judge.h"
 #include "model/io/atomic_file.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"

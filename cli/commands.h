@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/backends.h"
+#include "harness/backends.h"
 
 namespace cutproof::cli {
 

@@ -5,7 +5,7 @@
 #include <functional>
 #include <new>
 
-#include "cli/bench/suites.h"
+#include "benchmarks/suites.h"
 #include "cli/commands.h"
 #include "model/error.h"
 #include "model/io/atomic_file.h"

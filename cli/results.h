@@ -6,13 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "cli/gate.h"
+#include "harness/judge.h"
 #include "model/backend.h"
 #include "model/scene.h"
 
 namespace cutproof::cli {
 
-// What one frame of the timetable did.
+// What one frame of the schedule did.
 struct FrameResult {
   int64_t frame = 0;
   std::array<bool, 6> ran = {};

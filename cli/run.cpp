@@ -3,16 +3,16 @@
 #include <map>
 #include <optional>
 
-#include "cli/against.h"
-#include "cli/backends.h"
 #include "cli/commands.h"
-#include "cli/errors.h"
-#include "cli/frame.h"
-#include "cli/gate.h"
 #include "cli/results.h"
 #include "cli/terminal.h"
 #include "fixtures/bodies.h"
 #include "fixtures/build.h"
+#include "harness/against.h"
+#include "harness/backends.h"
+#include "harness/errors.h"
+#include "harness/frame_runner.h"
+#include "harness/judge.h"
 #include "model/error.h"
 #include "model/io/atomic_file.h"
 #include "model/io/recording.h"
@@ -100,7 +100,6 @@ int run(const RunOptions& options) {
 
   const Scene scene = io::read_scene(options.scene);
   fixtures::Built built = fixtures::build(scene, options.scene, build_options);
-  built.setup.unit_roundoff = backend->unit_roundoff();
   // Opened before the work, so that a folder that cannot be written to is found out now and not after it.
   std::optional<io::AtomicFile> json_file;
   if (!options.json.empty()) json_file.emplace(options.json);

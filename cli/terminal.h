@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "cli/gate.h"
+#include "harness/judge.h"
 
 namespace cutproof::cli {
 

@@ -1,7 +1,8 @@
-# cutproof_test(name LIBRARIES...): an executable from name.cpp in the current folder, each of its tests known to CTest.
+# cutproof_test(path LIBRARIES...): an executable from path.cpp, named as the file is, each of its tests known to CTest.
 include(GoogleTest)
-function(cutproof_test name)
-  add_executable(${name} ${name}.cpp)
+function(cutproof_test path)
+  get_filename_component(name ${path} NAME)
+  add_executable(${name} ${path}.cpp)
   target_link_libraries(${name} PRIVATE cutproof_options ${ARGN} GTest::gtest GTest::gtest_main)
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT 600)
 endfunction()

@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "gpu/host_launcher.h"
-#include "gpu/plan.h"
+#include "gpu/host/host_launcher.h"
+#include "gpu/launch/plan.h"
 #include "model/backend.h"
 
 namespace cutproof::gpu {

@@ -1,5 +1,6 @@
 // The contract of a dissection backend: the one interface in this project (architecture.md, Backends).
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -28,8 +29,8 @@ class Backend {
   // "reference", "host", "gpu", or the name of a plugin.
   virtual std::string name() const = 0;
 
-  // Unit roundoff of its arithmetic: 2⁻⁵³ or 2⁻²⁴. Whoever judges it puts this into the setup's unit_roundoff.
-  virtual double unit_roundoff() const { return 0x1p-53; }
+  // Of its arithmetic. Its states say so too (State::precision).
+  virtual Precision precision() const { return Precision::binary64; }
 
   // Which contiguous runs of stages it can execute. Whole frames are always among them.
   virtual bool can_run(Span span) const = 0;
@@ -39,7 +40,7 @@ class Backend {
   // fit its setup.
   virtual void load(std::vector<Setup> setups, std::vector<State> states) = 0;
 
-  // Executes the stages of `span` on every body whose timetable is not over. What a scene does not need is not
+  // Executes the stages of `span` on every body whose schedule is not over. What a scene does not need is not
   // launched: no blade and no other cause, no detect; nothing removed, no split, merge, expand, and no new cells of
   // skin. A span that ends with skin ends the frame: numbers are compacted and state.frame counts up.
   // The same state comes out whether a frame is run whole or span by span, bit for bit.
@@ -60,6 +61,12 @@ inline std::vector<State> Backend::snapshot_of(const std::vector<bool>& wanted) 
     if (!wanted.at(b)) states[b] = State{};
   }
   return states;
+}
+
+// A state as this backend will know it once it is loaded.
+inline State in_arithmetic_of(const Backend& backend, State state) {
+  state.precision = std::max(state.precision, backend.precision());
+  return state;
 }
 
 }  // namespace cutproof

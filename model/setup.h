@@ -83,12 +83,11 @@ struct Setup {
   MergeParameters merge;
   ExpandParameters expand;
   SkinParameters skin;
-  double unit_roundoff = 0x1p-53;  // u of the backend's arithmetic: what the bounds of the oracles allow for
   std::vector<Wall> walls;
   std::vector<Grip> grips;
   bool has_blade = false;
   Blade blade;
-  // The timetable. Frame f consists of substeps f·S .. f·S + S - 1 with S = step.substeps. A scene's frame in which
+  // The schedule. Frame f consists of substeps f·S .. f·S + S - 1 with S = step.substeps. A scene's frame in which
   // the blade would be too fast is already divided into equal frames here (method.md §3, Blade).
   std::vector<double> substep_length;  // [frames] dt [s], > 0
   std::vector<BladeMove> blade_moves;  // [frames · S], empty if there is no blade

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "model/clusters.h"
+#include "model/precision.h"
 #include "model/skin.h"
 #include "model/vec.h"
 
@@ -22,8 +23,14 @@ struct State {
   bool edge_covered = false;  // I4 is known to hold, so no expansion stage is needed (method.md §7)
   Vec3 impulse;               // what contacts, pins and grips gave in this frame, damped as v is [kg m/s]
   Skin skin;
+  // The coarsest arithmetic in which any part of this was computed: a backend makes it coarser where its own is, and
+  // never finer.
+  Precision precision = Precision::binary64;
 
   friend bool operator==(const State&, const State&) = default;
 };
+
+// u of the arithmetic that made this state.
+inline double unit_roundoff(const State& state) { return unit_roundoff(state.precision); }
 
 }  // namespace cutproof

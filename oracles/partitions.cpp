@@ -3,17 +3,17 @@
 
 namespace cutproof::oracles {
 
-Holders holders_of(const Clusters& clusters, int32_t particle_count) {
-  Holders holders;
-  holders.offsets.assign(at(particle_count) + 1, 0);
-  for (const int32_t i : clusters.members) ++holders.offsets[at(i) + 1];
-  for (std::size_t i = 0; i < at(particle_count); ++i) holders.offsets[i + 1] += holders.offsets[i];
-  holders.clusters.resize(clusters.members.size());
-  std::vector<int64_t> next(holders.offsets.begin(), holders.offsets.end() - 1);
+Memberships memberships_of(const Clusters& clusters, int32_t particle_count) {
+  Memberships memberships;
+  memberships.offsets.assign(at(particle_count) + 1, 0);
+  for (const int32_t i : clusters.members) ++memberships.offsets[at(i) + 1];
+  for (std::size_t i = 0; i < at(particle_count); ++i) memberships.offsets[i + 1] += memberships.offsets[i];
+  memberships.clusters.resize(clusters.members.size());
+  std::vector<int64_t> next(memberships.offsets.begin(), memberships.offsets.end() - 1);
   for (int32_t c = 0; c < clusters.count(); ++c) {
-    for (const int32_t i : clusters.of(c)) holders.clusters[at(next[at(i)]++)] = c;
+    for (const int32_t i : clusters.of(c)) memberships.clusters[at(next[at(i)]++)] = c;
   }
-  return holders;
+  return memberships;
 }
 
 Partition components_of_graph(const TissueGraph& graph) {
@@ -122,7 +122,7 @@ WeakCouplings weak_couplings(const Setup& setup, const State& state) {
   if (!well_formed(setup, state).holds) return weak;
   const Body& body = setup.body;
   const Clusters& clusters = state.clusters;
-  const Holders holders = holders_of(clusters, body.particle_count());
+  const Memberships memberships = memberships_of(clusters, body.particle_count());
   // What cluster c shares with each later cluster: how many particles, the first two, and whether all are collinear.
   struct Shared {
     int32_t count = 0, first = -1, second = -1;
@@ -133,7 +133,7 @@ WeakCouplings weak_couplings(const Setup& setup, const State& state) {
   for (int32_t c = 0; c < clusters.count(); ++c) {
     partners.clear();
     for (const int32_t i : clusters.of(c)) {
-      for (const int32_t other : holders.of(i)) {
+      for (const int32_t other : memberships.of(i)) {
         if (other <= c || state.alive[at(i)] == 0) continue;
         Shared& s = shared[at(other)];
         if (s.count++ == 0) {

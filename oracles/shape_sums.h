@@ -75,7 +75,7 @@ struct RoundingScale {
 
 inline RoundingScale rounding_scale(const Setup& setup, const State& state) {
   RoundingScale scale;
-  scale.unit_roundoff = setup.unit_roundoff;
+  scale.unit_roundoff = unit_roundoff(state);
   for (int32_t c = 0; c < state.clusters.count(); ++c) {
     scale.largest_cluster = std::max(scale.largest_cluster, state.clusters.size(c));
   }

@@ -224,7 +224,7 @@ class Swept {
     }
   }
 
-  Demand demand_of(double stretch, Vec3 x) const {
+  Demand demand_of(double stretch, Vec3 x, double u) const {
     const Blade& blade = setup_.blade;
     const double h = setup_.body.grid.spacing;
     const double reach = std::max({blade.thickness, h, stretch}) / 2;
@@ -235,7 +235,7 @@ class Swept {
       Demand here = Demand::either;
       // A distance between places in the body is rounded as the places are; a backend lengthens its reach by as much,
       // so that ties still go to removal. In double precision this is far below the band.
-      const double places = kPlacesBand * setup_.unit_roundoff * (reach + norm(x) + norm(move->from.edge));
+      const double places = kPlacesBand * u * (reach + norm(x) + norm(move->from.edge));
       if (turns) {
         here = demand_of_turning(blade, *move, turn, h, reach, x);
       } else {
@@ -285,10 +285,10 @@ Verdict check_detection(const Setup& setup, const State& before, const State& af
       case Criterion::none:
         break;
       case Criterion::distance:
-        demand = demand_of_distance(stretch.distance, limit, setup.unit_roundoff);
+        demand = demand_of_distance(stretch.distance, limit, unit_roundoff(before));
         break;
       case Criterion::geometric:
-        demand = swept.demand_of(stretch.distance, before.x[at(i)]);
+        demand = swept.demand_of(stretch.distance, before.x[at(i)], unit_roundoff(before));
         break;
       case Criterion::strain:
         demand = Demand::either;
@@ -561,7 +561,7 @@ class MergeDecomposition {
 
   // For each input the results that contain it: the one with its number must; a vanished one needs at least one.
   void find_candidates(Verdict& verdict) {
-    const Holders holders = holders_of(after_, graph_.particle_count());
+    const Memberships memberships = memberships_of(after_, graph_.particle_count());
     std::vector<int64_t> shared(at(after_.count()), 0);
     std::vector<int32_t> met;
     candidates_.resize(at(before_.count()));
@@ -571,8 +571,8 @@ class MergeDecomposition {
       met.clear();
       int32_t lonely = -1;  // a particle that no result with which c shares the others holds
       for (const int32_t i : before_.of(c)) {
-        if (holders.of(i).empty()) lonely = i;
-        for (const int32_t r : holders.of(i)) {
+        if (memberships.of(i).empty()) lonely = i;
+        for (const int32_t r : memberships.of(i)) {
           if (shared[at(r)]++ == 0) met.push_back(r);
         }
       }
@@ -829,12 +829,12 @@ Verdict check_merge(const Setup& setup, const State& before, const State& after)
 // A cluster is isolated by itself if it shares no particle with another while edges of G leave it (method.md §7,
 // published). [m] 1 for those.
 std::vector<uint8_t> singly_isolated(const TissueGraph& graph, const Clusters& clusters) {
-  std::vector<int32_t> holders(at(graph.particle_count()), 0), held_by(at(graph.particle_count()), -1);
-  for (const int32_t i : clusters.members) ++holders[at(i)];
+  std::vector<int32_t> memberships(at(graph.particle_count()), 0), held_by(at(graph.particle_count()), -1);
+  for (const int32_t i : clusters.members) ++memberships[at(i)];
   std::vector<uint8_t> isolated(at(clusters.count()), 0);
   for (int32_t c = 0; c < clusters.count(); ++c) {
     const auto members = clusters.of(c);
-    if (std::any_of(members.begin(), members.end(), [&](int32_t i) { return holders[at(i)] > 1; })) continue;
+    if (std::any_of(members.begin(), members.end(), [&](int32_t i) { return memberships[at(i)] > 1; })) continue;
     for (const int32_t i : members) held_by[at(i)] = c;
     for (const int32_t i : members) {
       for (int direction = 0; direction < 6 && graph.alive(i); ++direction) {

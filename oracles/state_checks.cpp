@@ -675,7 +675,7 @@ Verdict check_rest_frames(Judged& judged) {
       worst = c;
     }
   }
-  verdict.bound = 8.0 * static_cast<double>(largest + 2) * judged.setup.unit_roundoff * reach / h;
+  verdict.bound = 8.0 * static_cast<double>(largest + 2) * unit_roundoff(judged.state) * reach / h;
   verdict.holds = verdict.measured <= verdict.bound;
   if (!verdict.holds) {
     const Vec3 t = judged.clusters.rest_center[at(worst)];
@@ -801,7 +801,7 @@ Verdict check_merge_maximality(Judged& judged) {
   const MergeRule rule = judged.setup.merge.rule;
   if (rule != MergeRule::deterministic && rule != MergeRule::published) return verdict;
   const Clusters& clusters = judged.clusters;
-  const Holders holders = holders_of(clusters, judged.body.particle_count());
+  const Memberships memberships = memberships_of(clusters, judged.body.particle_count());
   std::vector<int32_t> seen_by(at(clusters.count()), -1);  // the last small cluster that touched it
   std::vector<int64_t> shared(at(clusters.count()), 0);    // particles shared with that one
   std::vector<Edge> contact(at(clusters.count()));         // where they touch
@@ -819,7 +819,7 @@ Verdict check_merge_maximality(Judged& judged) {
       touched.push_back(t);
     };
     for (const int32_t i : clusters.of(s)) {
-      for (const int32_t t : holders.of(i)) {
+      for (const int32_t t : memberships.of(i)) {
         touch(t, i, i);
         ++shared[at(t)];
       }
@@ -827,7 +827,7 @@ Verdict check_merge_maximality(Judged& judged) {
       for (int direction = 0; direction < 6; ++direction) {
         const int32_t other = judged.graph.neighbour(i, direction);
         if (other < 0) continue;
-        for (const int32_t t : holders.of(other)) touch(t, i, other);
+        for (const int32_t t : memberships.of(other)) touch(t, i, other);
       }
     }
     for (const int32_t t : touched) {

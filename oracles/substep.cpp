@@ -78,7 +78,7 @@ Verdict momentum_verdict(const Setup& setup, const State& before, const Verdict&
   for (const Verdict* form : {&form_before, &form_after}) {
     if (!form->holds) return not_judged(verdict.property, *form);
   }
-  if (before.frame < 0 || before.frame >= setup.frame_count()) return verdict;  // the timetable is over: vacuous
+  if (before.frame < 0 || before.frame >= setup.frame_count()) return verdict;  // the schedule is over: vacuous
   const StepParameters& step = setup.step;
   const double dt = setup.substep_length[static_cast<std::size_t>(before.frame)];
   const double decay = std::exp(-step.damping * dt);
@@ -99,16 +99,18 @@ Verdict momentum_verdict(const Setup& setup, const State& before, const Verdict&
   // probability 2 exp(−λ² / 2) < 3e-14. Errors that stay the same from one iteration to the next (of T_c and M_c) are
   // not: they count linearly.
   constexpr double kLambda = 8;
-  const RoundingScale scale = rounding_scale(setup, before), later = rounding_scale(setup, after);
+  RoundingScale scale = rounding_scale(setup, before);
+  const RoundingScale later = rounding_scale(setup, after);
+  scale.unit_roundoff = std::max(scale.unit_roundoff, later.unit_roundoff);
   const IndependentMasses masses = independent_masses(setup.body, before);
-  const double step_length = setup.unit_roundoff * std::max(scale.extent, later.extent);
+  const double step_length = unit_roundoff(after) * std::max(scale.extent, later.extent);
   const double goal = std::sqrt(2.0 * static_cast<double>(scale.largest_cluster) + 16) * masses.clusters +
                       std::sqrt(scale.most_memberships + 16.0) * masses.particles;
   const double evaluations = step.substeps * (step.iterations + 1.0) * error_growth(step);
   const double sums = std::sqrt(static_cast<double>(verdict.checked) * evaluations) + 16 * step.substeps;
   verdict.bound =
       kLambda * (evaluations * goal * step_length / dt +
-                 sums * setup.unit_roundoff * (start.magnitude + end.magnitude + gained + norm(after.impulse)));
+                 sums * unit_roundoff(after) * (start.magnitude + end.magnitude + gained + norm(after.impulse)));
   if (!(verdict.measured <= verdict.bound)) {
     verdict.holds = false;
     verdict.witness.text = fmt::format(

@@ -63,7 +63,7 @@ class DisjointSets {
 };
 
 // For each particle the clusters (indices, ascending) that hold it, as compressed rows.
-struct Holders {
+struct Memberships {
   std::vector<int64_t> offsets;  // [n + 1]
   std::vector<int32_t> clusters;
   std::span<const int32_t> of(int32_t particle) const {
@@ -71,7 +71,7 @@ struct Holders {
     return {clusters.data() + offsets[i], at(offsets[i + 1] - offsets[i])};
   }
 };
-Holders holders_of(const Clusters& clusters, int32_t particle_count);
+Memberships memberships_of(const Clusters& clusters, int32_t particle_count);
 
 // Equal bits: also of NaN, and 0 is not -0.
 template <typename T>

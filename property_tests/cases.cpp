@@ -245,8 +245,8 @@ void add_moves(const Stroke& stroke, Vec3 first_node, const Case& c, Setup& setu
   if (stroke.down) setup.stroke_end.push_back((substeps - 1) / setup.step.substeps);
 }
 
-// The timetable (Setup): the strokes one after the other; in what is left of the last frame the blade is lifted.
-void add_timetable(const Case& c, Vec3 first_node, Setup& setup) {
+// The schedule (Setup): the strokes one after the other; in what is left of the last frame the blade is lifted.
+void add_schedule(const Case& c, Vec3 first_node, Setup& setup) {
   for (const Stroke& stroke : resolved_strokes(c)) add_moves(stroke, first_node, c, setup);
   const auto substeps = static_cast<std::size_t>(setup.step.substeps);
   while (setup.blade_moves.size() % substeps != 0) {
@@ -369,7 +369,7 @@ Setup setup_of(const Case& c) {
     setup.step.gravity = {0, 0, -9.81};
     setup.walls = {{2, +1, first_node.z - 0.5 * h, 0.3}};
   }
-  add_timetable(c, first_node, setup);
+  add_schedule(c, first_node, setup);
   return setup;
 }
 

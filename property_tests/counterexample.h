@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "gpu/schedule.h"
+#include "gpu/host/thread_schedule.h"
 #include "property_tests/cases.h"
 #include "property_tests/histories.h"
 

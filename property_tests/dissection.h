@@ -96,7 +96,7 @@ struct Trail {
   std::optional<Verdict> failure;  // of the contract, seen while running
 };
 
-// Loads all cases at once and runs them to their ends, stage by stage. Sets unit_roundoff in every setup.
+// Loads all cases at once and runs them to their ends, stage by stage.
 std::vector<Trail> run_cases(Backend& backend, std::vector<Loaded>& loaded);
 
 // Puts every oracle that applies to the trail of one case; and compares every stage with what the reference makes of

@@ -13,7 +13,7 @@
 #include "fixtures/build.h"
 #include "fixtures/cook.h"
 #include "oracles/oracles.h"
-#include "oracles/two_runs.h"
+#include "oracles/relations/relations.h"
 #include "property_tests/checking.h"
 #include "property_tests/dissection.h"
 #include "property_tests/random.h"
@@ -110,7 +110,7 @@ class HardCases : public ::testing::TestWithParam<NamedBackend> {
     loaded.setup.blade_moves.clear();
     loaded.setup.stroke_end.clear();
     loaded.setup.substep_length.assign(static_cast<std::size_t>(frames), dt);
-    loaded.setup.unit_roundoff = backend_->unit_roundoff();
+    loaded.state = in_arithmetic_of(*backend_, std::move(loaded.state));
     return loaded;
   }
 

@@ -15,8 +15,6 @@
 namespace cutproof::property_tests {
 namespace {
 
-constexpr double kDouble = 0x1p-53;
-
 Stage stage_at(int32_t index) { return kStages[static_cast<std::size_t>(index % 6)]; }
 
 // The last stage that ran, as recordings name it.
@@ -158,7 +156,6 @@ History::History(Source make, Case c)
   if (case_.together != 1) throw std::invalid_argument("a history needs a case with one stroke a frame (together: 1)");
   if (case_.merge != MergeRule::published && case_.merge != MergeRule::single_pass) whole_ = make_();
   given_strokes_ = static_cast<int32_t>(loaded_.setup.stroke_end.size());
-  loaded_.setup.unit_roundoff = staged_->unit_roundoff();
   load_both(true);
 }
 
@@ -246,17 +243,16 @@ void History::wait_for_frames(int64_t count) {
   pause.down = false;
   if (!case_.strokes.empty()) pause.from = pause.to = resolved_strokes(case_).back().to;
   case_.strokes.insert(case_.strokes.end(), static_cast<std::size_t>(missing), pause);
-  change_timetable();
+  change_schedule();
 }
 
 void History::cut(const Cut& command) {
   case_.strokes.push_back(command.stroke);
-  change_timetable();
+  change_schedule();
 }
 
-void History::change_timetable() {
+void History::change_schedule() {
   loaded_.setup = setup_of(case_);
-  loaded_.setup.unit_roundoff = staged_->unit_roundoff();
   load_both();
 }
 
@@ -327,7 +323,7 @@ void History::save_and_load(const SaveAndLoad& command) {
   }
   staged_->load({setup}, {saved});
   State taken = staged_->snapshot().front();
-  require_same("loading changes nothing", state_, taken, staged_->unit_roundoff() != kDouble);
+  require_same("loading changes nothing", state_, taken, staged_->precision() != Precision::binary64);
   state_ = std::move(taken);
   unloaded_beside_ = whole_ && loads_in_bits();
   if (whole_ && !unloaded_beside_) {
@@ -336,7 +332,7 @@ void History::save_and_load(const SaveAndLoad& command) {
 }
 
 // A displacement of a single precision that is not zero may lose its last bits beside a rest position.
-bool History::loads_in_bits() const { return staged_->unit_roundoff() == kDouble || (!case_.moves && !has_kicked_); }
+bool History::loads_in_bits() const { return staged_->precision() == Precision::binary64 || (!case_.moves && !has_kicked_); }
 
 State History::loaded_into(Backend& backend, const State& state) {
   backend.load({loaded_.setup}, {state});
@@ -344,7 +340,7 @@ State History::loaded_into(Backend& backend, const State& state) {
 }
 
 void History::load_both(bool is_first) {
-  const bool is_single = staged_->unit_roundoff() != kDouble;
+  const bool is_single = staged_->precision() != Precision::binary64;
   State taken = loaded_into(*staged_, state_);
   // The first state was not made by this backend, so in single precision more than velocities is rounded.
   if (!is_first || !is_single) require_same("loading changes nothing", state_, taken, is_single);

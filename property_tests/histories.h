@@ -15,7 +15,7 @@
 
 namespace cutproof::property_tests {
 
-// The next `stages` stages in order, beyond the end of a frame into the next one. Where the timetable is over, the
+// The next `stages` stages in order, beyond the end of a frame into the next one. Where the schedule is over, the
 // blade stays up for a frame.
 struct RunStages {
   int32_t stages = 1;
@@ -117,7 +117,7 @@ class History {
 
   void run_span(Span span, bool whole);
   void wait_for_frames(int64_t count);
-  void change_timetable();
+  void change_schedule();
   void load_both(bool is_first = false);
   State loaded_into(Backend& backend, const State& state);
   void require_same(const char* property, const State& expected, const State& found, bool but_for_rounding = false);

@@ -11,7 +11,7 @@
 
 #include "fixtures/cook.h"
 #include "gpu/backends.h"
-#include "oracles/two_runs.h"
+#include "oracles/relations/relations.h"
 #include "property_tests/checking.h"
 #include "property_tests/counterexample.h"
 #include "property_tests/dissection.h"
@@ -21,10 +21,10 @@
 namespace cutproof::property_tests {
 namespace {
 
-// What a backend loads, and what its arithmetic allows.
+// What a backend loads, in its arithmetic.
 Loaded load_for(const Backend& backend, const Case& c) {
   Loaded loaded = load(c);
-  loaded.setup.unit_roundoff = backend.unit_roundoff();
+  loaded.state = in_arithmetic_of(backend, std::move(loaded.state));
   return loaded;
 }
 

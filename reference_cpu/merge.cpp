@@ -34,10 +34,10 @@ class MergingSets {
       for (const int32_t p : set) ++first_holder_[at(p) + 1];
     }
     std::partial_sum(first_holder_.begin(), first_holder_.end(), first_holder_.begin());
-    holders_.resize(first_holder_.back());
+    memberships_.resize(first_holder_.back());
     for (std::size_t slot = 0; slot < sets_.size(); ++slot) {
       for (const int32_t p : sets_[slot]) {
-        holders_[first_holder_[at(p)] + holder_count_[at(p)]++] = static_cast<int32_t>(slot);
+        memberships_[first_holder_[at(p)] + holder_count_[at(p)]++] = static_cast<int32_t>(slot);
       }
       if (size(static_cast<int32_t>(slot)) < tau) small_.push_back(static_cast<int32_t>(slot));
     }
@@ -65,13 +65,13 @@ class MergingSets {
     };
     for (const int32_t p : sets_[at(s)]) {
       visited_[at(p)] = visit_;
-      for (const int32_t slot : holders_of(p)) touch(slot, 1);
+      for (const int32_t slot : memberships_of(p)) touch(slot, 1);
     }
     for (const int32_t p : sets_[at(s)]) {
       for (int direction = 0; direction < 6 && alive_[at(p)]; ++direction) {
         const int32_t q = body_.neighbour(p, direction);
         if (q < 0 || !alive_[at(q)] || std::exchange(visited_[at(q)], visit_) == visit_) continue;
-        for (const int32_t slot : holders_of(q)) touch(slot, 0);
+        for (const int32_t slot : memberships_of(q)) touch(slot, 0);
       }
     }
 
@@ -89,12 +89,12 @@ class MergingSets {
     std::vector<int32_t>& from = sets_[at(source)];
     std::vector<int32_t>& to = sets_[at(target)];
     for (const int32_t p : from) {
-      const auto holders = holders_of(p);
-      const auto place = std::find(holders.begin(), holders.end(), source);
-      if (std::find(holders.begin(), holders.end(), target) == holders.end()) {
+      const auto memberships = memberships_of(p);
+      const auto place = std::find(memberships.begin(), memberships.end(), source);
+      if (std::find(memberships.begin(), memberships.end(), target) == memberships.end()) {
         *place = target;
       } else {
-        *place = holders.back();
+        *place = memberships.back();
         --holder_count_[at(p)];
       }
     }
@@ -128,7 +128,9 @@ class MergingSets {
  private:
   static std::size_t at(int32_t index) { return static_cast<std::size_t>(index); }
   // Slots of the sets that hold a particle, in no order. Joining never makes them more.
-  std::span<int32_t> holders_of(int32_t p) { return {holders_.data() + first_holder_[at(p)], holder_count_[at(p)]}; }
+  std::span<int32_t> memberships_of(int32_t p) {
+    return {memberships_.data() + first_holder_[at(p)], holder_count_[at(p)]};
+  }
 
   const Body& body_;
   const std::vector<uint8_t>& alive_;
@@ -136,9 +138,9 @@ class MergingSets {
   int64_t tau_, cap_;
   std::vector<std::vector<int32_t>> sets_;  // by slot
   std::vector<uint8_t> exists_;             // by slot
-  std::vector<std::size_t> first_holder_;   // [n + 1] where a particle's row of holders_ begins
+  std::vector<std::size_t> first_holder_;   // [n + 1] where a particle's row of memberships_ begins
   std::vector<std::size_t> holder_count_;   // [n] how much of its row is in use
-  std::vector<int32_t> holders_;
+  std::vector<int32_t> memberships_;
   std::vector<int32_t> small_;
   // Scratch of preferred_target.
   struct Touch {

@@ -24,7 +24,7 @@
 namespace cutproof::io {
 namespace {
 
-constexpr int32_t kFormatVersion = 1;
+constexpr int32_t kFormatVersion = 2;
 constexpr std::string_view kIndexSuffix = ".cutproof.h5";
 
 // What stands in the root attribute cutproof_file of each of the four files.
@@ -208,6 +208,14 @@ int64_t frames_done(Stage stage, int64_t frame) {
   return within ? frame + 1 : frame;
 }
 
+// A recording is of one backend, so all of its states are of one precision.
+void require_precision(std::optional<Precision>& of_all, const State& state) {
+  if (of_all.value_or(state.precision) != state.precision) {
+    throw std::invalid_argument("The states of a recording must have been computed in one precision.");
+  }
+  of_all = state.precision;
+}
+
 void require_lengths(const Setup& setup, const State& state) {
   const std::size_t n = setup.body.node.size();
   const Clusters& c = state.clusters;
@@ -249,6 +257,7 @@ struct Recorder::File {
   Setup setup;
   std::vector<double> time;  // [frames + 1] at the start of each frame [s]
   Digest digest;
+  std::optional<Precision> precision;  // of all states
   bool broken = false, finished = false;
 
   hdf5::File index;
@@ -438,6 +447,7 @@ void Recorder::File::finish() {
   {
     WritingArchive root(index.id());
     root.group("snapshots", [&](auto& archive) { walk(archive, snapshots); });
+    root.value("unit_roundoff", unit_roundoff(precision.value_or(Precision::binary64)));
     WritingArchive inner(cluster_group.get());
     inner.group("sets", [&](auto& archive) { walk_sets(archive, sets); });
   }
@@ -499,6 +509,7 @@ void Recorder::add(Stage stage, const State& state) {
     throw std::logic_error("A recording that is finished or that failed takes no further snapshot.");
   }
   require_lengths(file_->setup, state);
+  require_precision(file_->precision, state);
   const hdf5::Quiet quiet;
   file_->broken = true;  // until all is done: after an exception its columns may differ in length
   try {
@@ -577,8 +588,10 @@ hdf5::File open_part(const std::string& path, const char* kind) {
           fmt::format("The recording has format {}, and this program reads up to {}.", version, kFormatVersion),
           "Use a newer cutproof.");
     }
-    if (version < 1) {
-      throw InputError(path, "cutproof_format", fmt::format("There is no format {}.", version), kRemedy);
+    if (version < kFormatVersion) {
+      throw InputError(path, "cutproof_format",
+                       fmt::format("The recording has format {}, and this program reads {}.", version, kFormatVersion),
+                       "Record the scene again.");
     }
     return file;
   } catch (const hdf5::Error& error) {
@@ -671,6 +684,12 @@ RecordingReader::File::File(const std::string& name) : paths(recording_paths(nam
     root.array("scene", scene);
     header.scene_json.assign(scene.begin(), scene.end());
     header.setup = read_setup(index.id(), index.bytes());
+    double u = 0;
+    root.value("unit_roundoff", u);
+    header.precision = u == unit_roundoff(Precision::binary64) ? Precision::binary64 : Precision::binary32;
+    if (u != unit_roundoff(header.precision)) {
+      throw hdf5::Error("/unit_roundoff", fmt::format("This is {}, and should be 2^-53 or 2^-24.", u));
+    }
     if (const auto defect = defect_of(header.setup)) throw hdf5::Error("/setup/" + defect->field, defect->problem);
     root.group("snapshots", [&](auto& archive) { walk(archive, snapshots); });
     root.group("clusters", [&](auto& archive) {
@@ -784,6 +803,7 @@ Snapshot RecordingReader::File::snapshot(std::size_t i) const {
   snapshot.stage = static_cast<Stage>(s.stage[i]);
   State& state = snapshot.state;
   state.frame = s.frame[i];
+  state.precision = header.precision;
   state.tau = s.tau[i];
   state.cap = s.cap[i];
   state.edge_covered = s.edge_covered[i] == 1;

@@ -53,6 +53,7 @@ struct Recording {
   Setup setup;
   std::string scene_json;
   std::string backend;
+  Precision precision = Precision::binary64;  // of all states
   int64_t snapshot_count = 0;
 };
 

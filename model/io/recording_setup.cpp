@@ -201,7 +201,6 @@ void walk(Archive& archive, S& setup) {
     a.array("stroke", columns.stroke);
     if constexpr (Archive::kReading) setup.blade_moves = moves_of(columns);
   });
-  archive.value("unit_roundoff", setup.unit_roundoff);
   archive.array("substep_length", setup.substep_length);
   archive.array("stroke_end", setup.stroke_end);
 }
@@ -320,7 +319,7 @@ bool is_finite(const BladePose& pose) {
   return cutproof::is_finite(pose.edge) && cutproof::is_finite(pose.along) && cutproof::is_finite(pose.back);
 }
 
-Defect timetable_defect(const Setup& setup) {
+Defect schedule_defect(const Setup& setup) {
   for (std::size_t f = 0; f < setup.substep_length.size(); ++f) {
     if (!is_positive(setup.substep_length[f])) {
       return SetupDefect{"substep_length",
@@ -332,7 +331,6 @@ Defect timetable_defect(const Setup& setup) {
     return SetupDefect{"blade_moves", fmt::format("There are {} moves of the blade, and there should be {}.",
                                                   setup.blade_moves.size(), setup.has_blade ? substeps : 0)};
   }
-  if (!is_positive(setup.unit_roundoff)) return SetupDefect{"unit_roundoff", "This should be positive."};
   for (const int64_t frame : setup.stroke_end) {
     if (frame < -1 || frame >= setup.frame_count()) {
       return SetupDefect{"stroke_end", fmt::format("A stroke ends with frame {}, and there are {} frames.", frame,
@@ -373,7 +371,7 @@ Defect timetable_defect(const Setup& setup) {
 std::optional<SetupDefect> defect_of(const Setup& setup) {
   if (Defect defect = body_defect(setup.body)) return defect;
   if (Defect defect = parameter_defect(setup)) return defect;
-  return timetable_defect(setup);
+  return schedule_defect(setup);
 }
 
 void write_setup(hid_t file, const Setup& setup) {

@@ -21,9 +21,9 @@
 #include <utility>
 #include <vector>
 
-#include "cli/gate.h"
 #include "fixtures/build.h"
 #include "gpu/backends.h"
+#include "harness/judge.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
 #include "reference_cpu/reference.h"

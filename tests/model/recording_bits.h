@@ -57,7 +57,7 @@ inline std::string bits_of(const Setup& s) {
   for (const Wall& wall : s.walls) bits.add(wall.axis).add(wall.side).add(wall.offset).add(wall.friction);
   for (const Grip& grip : s.grips) bits.add(grip.particles).add(grip.active).add(grip.displacement);
   bits.add(s.has_blade).add(s.blade.length).add(s.blade.depth).add(s.blade.thickness).add(s.blade.friction);
-  bits.add(s.substep_length).add(s.stroke_end).add(s.unit_roundoff);
+  bits.add(s.substep_length).add(s.stroke_end);
   for (const BladeMove& move : s.blade_moves) bits.add(move.from).add(move.to).add(move.down).add(move.stroke);
   return bits.bytes();
 }

@@ -625,7 +625,7 @@ TEST(NoPass, IsVacuousWithoutADynamicCut) {
   vacuous([](Pressed& p) { p.setup.detect.criterion = Criterion::none; });
   vacuous([](Pressed& p) { p.setup.blade_moves[3].down = false; });
   vacuous([](Pressed& p) { p.setup.has_blade = false; });
-  vacuous([](Pressed& p) { p.state.frame = 1; });  // the timetable is over
+  vacuous([](Pressed& p) { p.state.frame = 1; });  // the schedule is over
 }
 
 // --- Merge maximality ------------------------------------------------------------------------------------------------

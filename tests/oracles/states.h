@@ -58,15 +58,15 @@ inline Setup setup_of(Body body, int64_t frames = 1) {
 
 // T_c, M_c of every cluster, with w_ic = m_i / n_i (method.md §2, §3).
 inline void set_rest_frames(const Body& body, Clusters& clusters) {
-  std::vector<int32_t> holders(body.node.size(), 0);
-  for (const int32_t i : clusters.members) ++holders[static_cast<std::size_t>(i)];
+  std::vector<int32_t> memberships(body.node.size(), 0);
+  for (const int32_t i : clusters.members) ++memberships[static_cast<std::size_t>(i)];
   clusters.rest_center.assign(static_cast<std::size_t>(clusters.count()), Vec3{});
   clusters.mass.assign(static_cast<std::size_t>(clusters.count()), 0.0);
   for (int32_t c = 0; c < clusters.count(); ++c) {
     Vec3 sum;
     double mass = 0;
     for (const int32_t i : clusters.of(c)) {
-      const double w = body.mass[static_cast<std::size_t>(i)] / holders[static_cast<std::size_t>(i)];
+      const double w = body.mass[static_cast<std::size_t>(i)] / memberships[static_cast<std::size_t>(i)];
       sum += w * body.rest_position(i);
       mass += w;
     }

@@ -122,7 +122,7 @@ TEST(ReferenceBackend, RunsManyBodiesAsItRunsEach) {
   }
   EXPECT_EQ(together->snapshot()[0], first->snapshot()[0]);
   EXPECT_EQ(together->snapshot()[1], second->snapshot()[0]);
-  EXPECT_EQ(together->snapshot()[1].frame, 3) << "its timetable was over";
+  EXPECT_EQ(together->snapshot()[1].frame, 3) << "its schedule was over";
 }
 
 TEST(ReferenceBackend, RefusesAStateThatDoesNotFitItsSetup) {

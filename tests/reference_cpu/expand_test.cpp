@@ -33,7 +33,7 @@ TEST(EdgeCover, LetsTheLowerNumberTakeInTheOtherEndAmongEquals) {
 }
 
 TEST(EdgeCover, LooksAtEveryClusterThatHoldsAnEnd) {
-  // Particle 2 is held by {0, 1, 2} and by {2} alone: the smallest of all holders takes in particle 3.
+  // Particle 2 is held by {0, 1, 2} and by {2} alone: the smallest of all memberships takes in particle 3.
   EXPECT_EQ(expanded(block_body(6, 1, 1), {{0, 1, 2}, {3, 4, 5}, {2}}, ExpandRule::edge_cover),
             (Lists{{0, 1, 2}, {3, 4, 5}, {2, 3}}));
 }

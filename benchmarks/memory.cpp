@@ -1,0 +1,25 @@
+#include "benchmarks/memory.h"
+
+#include <malloc.h>
+
+#if CUTPROOF_HAS_CUDA
+#include "benchmarks/device_limits.h"
+#endif
+
+namespace cutproof::cli {
+
+std::optional<int64_t> bytes_in_use(const std::string& backend) {
+#if CUTPROOF_HAS_CUDA
+  if (backend == "gpu") return gpu::device_bytes_in_use();
+#else
+  static_cast<void>(backend);
+#endif
+#ifdef __GLIBC__
+  const struct mallinfo2 info = mallinfo2();
+  // Nothing at all: another allocator took its place, as a sanitizer's does.
+  if (info.uordblks + info.hblkhd > 0) return static_cast<int64_t>(info.uordblks + info.hblkhd);
+#endif
+  return std::nullopt;
+}
+
+}  // namespace cutproof::cli

@@ -1,0 +1,104 @@
+#include "benchmarks/rotation_methods.h"
+
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <memory>
+
+#include "benchmarks/report.h"
+#include "benchmarks/rotation_kernel.cuh"
+#include "gpu/host/host_launcher.h"
+#include "harness/backends.h"
+#include "reference_cpu/reference.h"
+
+namespace cutproof::cli {
+
+namespace {
+
+using fixtures::Precision;
+
+// Scaled and guarded as the kernels' methods are, so that only the decomposition is compared.
+struct EigenSvd {
+  static constexpr const char* kName = "eigen_svd";
+  template <class Real>
+  static gpu::Rotation<Real> rotate(gpu::Matrix3x3<Real> a, const gpu::Matrix3x3<Real>& previous) {
+    using Matrix = Eigen::Matrix<Real, 3, 3, Eigen::RowMajor>;
+    if (!gpu::rotation_detail::scale_to_one(a)) return {previous, true};
+    const Eigen::JacobiSVD<Matrix> svd(Eigen::Map<const Matrix>(a.m), Eigen::ComputeFullU | Eigen::ComputeFullV);
+    Matrix u = svd.matrixU();
+    if (u.determinant() * svd.matrixV().determinant() < 0) u.col(2) *= -1;
+    gpu::Rotation<Real> result;
+    Eigen::Map<Matrix>(result.r.m) = u * svd.matrixV().transpose();
+    return result;
+  }
+};
+
+// What the CPU reference does in a step.
+struct Horn {
+  static constexpr const char* kName = "horn";
+  static gpu::Rotation<double> rotate(const gpu::Matrix3x3<double>& a, const gpu::Matrix3x3<double>& previous) {
+    Mat3 from, before;
+    std::copy(a.m, a.m + 9, from.m.begin());
+    std::copy(previous.m, previous.m + 9, before.m.begin());
+    const reference::Rotation best = reference::closest_rotation(from, before);
+    gpu::Rotation<double> result;
+    std::copy(best.r.m.begin(), best.r.m.end(), result.r.m);
+    result.degenerate = best.degenerate;
+    return result;
+  }
+};
+
+template <class Method, class Real>
+RotationMethod on_cpu(std::string name, bool selectable, const std::shared_ptr<gpu::HostLauncher>& launcher) {
+  RotationMethod method;
+  method.name = std::move(name);
+  method.precision = sizeof(Real) == sizeof(float) ? Precision::single : Precision::twice;
+  method.selectable = selectable;
+  method.bytes = kRotationBytes<Real>;
+  method.solve = [launcher](const std::vector<Mat3>& a, const std::vector<Mat3>& previous, int repeats) {
+    const std::vector<Real> matrices = interleaved<Real>(a), before = interleaved<Real>(previous);
+    std::vector<Real> r(matrices.size());
+    TimedAnswers timed;
+    timed.answers.flagged.resize(a.size());
+    const RotationBatch<Real> batch = {matrices.data(), before.data(), r.data(), timed.answers.flagged.data(),
+                                       static_cast<std::int64_t>(a.size())};
+    const auto run = [&] {
+      if (launcher) {
+        launcher->items(rotate_matrices_kernel_object<Method, Real>{}, batch.count, batch);
+      } else {
+        for (std::int64_t i = 0; i < batch.count; ++i) rotate_one<Method>(batch, i);
+      }
+    };
+    run();
+    for (int turn = 0; turn < repeats; ++turn) {
+      const auto begin = Clock::now();
+      run();
+      timed.seconds.push_back(seconds_since(begin));
+    }
+    timed.answers.r = separated(r);
+    return timed;
+  };
+  return method;
+}
+
+}  // namespace
+
+std::vector<RotationMethod> rotation_methods(const std::string& backend) {
+#if CUTPROOF_HAS_CUDA
+  if (backend == "gpu") return device_rotation_methods();
+#endif
+  std::shared_ptr<gpu::HostLauncher> launcher;
+  if (backend == "host") launcher = std::make_shared<gpu::HostLauncher>(gpu::HostLauncher::Threads{cpu_threads()});
+  std::vector<RotationMethod> methods;
+  each_kernel_method([&]<class Method>(Method, int number) {
+    const std::string name = name_of_method<Method>(number);
+    methods.push_back(on_cpu<Method, float>(name, number >= 0, launcher));
+    methods.push_back(on_cpu<Method, double>(name, false, launcher));
+  });
+  methods.push_back(on_cpu<EigenSvd, float>(EigenSvd::kName, false, launcher));
+  methods.push_back(on_cpu<EigenSvd, double>(EigenSvd::kName, false, launcher));
+  methods.push_back(on_cpu<Horn, double>(Horn::kName, false, launcher));
+  return methods;
+}
+
+}  // namespace cutproof::cli

@@ -1,0 +1,57 @@
+// Pieces of `cutproof bench rotations`: methods for the rotation of a cluster, each with its errors on every hard case
+// and its times (docs/rotations.md).
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "benchmarks/report.h"
+#include "benchmarks/rotation_methods.h"
+
+namespace cutproof::cli {
+
+struct RotationCaseResult {
+  std::string name;  // of the case
+  fixtures::Judged judged;
+};
+
+// One method in one precision.
+struct RotationResult {
+  std::string method;
+  fixtures::Precision precision = fixtures::Precision::single;
+  bool selectable = false, is_default = false;
+  std::vector<RotationCaseResult> cases;
+  Times near, cold;        // [s] per million matrices
+  double floor = 0;        // [s] per million matrices: bytes / copy bandwidth
+  bool on_front = false;   // no other of its precision is at least as exact and as fast, and better in one of both
+  double worst_gap = 0;    // over all cases
+  std::string worst_case;  // where that is
+  double worst_orthogonality = 0, worst_deviation = 0;
+  int64_t answers = 0, wrong = 0, not_finite = 0, flagged = 0;
+};
+
+struct RotationCounts {
+  int64_t matrices = 2000;  // of each case
+  int64_t timed = 20'000;
+  int repeats = 9;
+  uint64_t seed = 0;
+};
+
+struct RotationReport {
+  std::vector<RotationResult> results;
+  // The greatest, of the best values that were compared with.
+  double reference_error_single = 0, reference_error_double = 0;
+  // The default is there, and none of its answers is wrong.
+  bool default_holds() const;
+};
+
+// `copy_bytes_per_second` for the floors. The default is the selectable method named `default_name`.
+RotationReport measure_rotations(const std::vector<RotationMethod>& methods, const RotationCounts& counts,
+                                 const std::string& default_name, double copy_bytes_per_second);
+
+// Marks on_front: the worst gap against the median time near the answer.
+void mark_front(std::vector<RotationResult>& results);
+
+nlohmann::json to_json(const RotationReport& report);
+
+}  // namespace cutproof::cli

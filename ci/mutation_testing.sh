@@ -1,0 +1,6 @@
+#!/usr/bin/env bash
+# Plants faults into a copy of the code and asks the gate to find each of them (ci/mutation_testing/run.py).
+set -euo pipefail
+cd "$(dirname "$0")/.."
+ci/install.sh
+exec python3 ci/mutation_testing/run.py "$@"

@@ -1,0 +1,397 @@
+#!/usr/bin/env python3
+"""Plants faults into a copy of the code, one at a time, and asks the gate to find each of them.
+
+Usage: run.py [--only NAME...] [--jobs N] [--json F] [--check]
+
+A fault is a patch, mutants/NN_name.patch, with a head of lines `Field: text` (a line that begins with a space goes on):
+  Stage     step detect split merge expand skin, or launch: what runs kernels and puts frames together
+  Fault     what is wrong with the program, for a person
+  Suspect   the gate's command that is expected to find it; may be given several times, tried in this order. A program
+            is known by its name, which is that of its CMake target.
+  Livelock  yes: the fault may show as a program that does not end, so running out of time counts as found
+
+There is one copy (build/mutation_testing/tree) with one build folder, without CUDA. The unchanged code must pass every
+command that is used. Then for each fault: patch, build what its suspects need, run them until one finds it; if none
+does, the tests of its stage, the properties, and five minutes of `cutproof fuzz`. A fault that does not apply or does
+not compile is an error, not a find. Writes docs/mutation_testing.md unless --only is given. Exit status: 0 every fault
+was found, 1 one was not or the unchanged code fails, 2 bad usage or a bad patch.
+"""
+import argparse
+import contextlib
+import dataclasses
+import filecmp
+import json
+import os
+import pathlib
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import threading
+import time
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+WORK = ROOT / "build" / "mutation_testing"
+TREE, BUILD, RUN = WORK / "tree", WORK / "build", WORK / "run"
+TABLE = ROOT / "docs" / "mutation_testing.md"
+STAGES = ("step", "detect", "split", "merge", "expand", "skin", "launch")
+FIELDS = ("Stage", "Fault", "Suspect", "Livelock")
+MOST_SECONDS = 420  # of one command
+FUZZ_SECONDS = 300  # of the last resort
+FUZZ_FAILS = re.compile(r"case (\d+) FAILS: '(.*?)' fails after")
+# What a counterexample should be at most, for a person to see through it; and in how many of ten.
+MOST_STROKES, MOST_PARTICLES, WANTED_SIMPLE = 3, 30, 0.8
+
+
+class BadFault(Exception):
+    """A fault that says nothing about the gate: it does not apply, does not compile, or its suspect runs nothing."""
+
+
+@dataclasses.dataclass
+class Fault:
+    name: str
+    path: pathlib.Path
+    stage: str
+    text: str
+    suspects: list
+    livelock: bool
+    files: list  # that it patches
+
+    @property
+    def code(self):
+        folders = {file.split("/")[0] for file in self.files}
+        return " and ".join(sorted(folders))
+
+
+def read_fault(path):
+    fields = {}
+    last = None
+    lines = path.read_text().splitlines()
+    for number, line in enumerate(lines):
+        if line.startswith("--- "):
+            break
+        if line.startswith(" ") and last:
+            fields[last][-1] += " " + line.strip()
+            continue
+        last, separator, text = line.partition(":")
+        if not separator or last not in FIELDS:
+            raise BadFault(f"{path.name}, line {number + 1}: '{line}' is none of {', '.join(FIELDS)}")
+        fields.setdefault(last, []).append(text.strip())
+    missing = [field for field in ("Stage", "Fault", "Suspect") if field not in fields]
+    if missing:
+        raise BadFault(f"{path.name}: {', '.join(missing)} is missing in its head")
+    stage = fields["Stage"][0]
+    if stage not in STAGES:
+        raise BadFault(f"{path.name}: Stage: '{stage}' is none of {', '.join(STAGES)}")
+    files = [line[6:].split("\t")[0] for line in lines if line.startswith("+++ b/")]
+    if not files or any(file.split("/")[0] not in ("gpu", "reference_cpu") for file in files):
+        raise BadFault(f"{path.name}: a fault patches files of gpu/ or reference_cpu/, and nothing else")
+    return Fault(path.stem, path, stage, fields["Fault"][0], fields["Suspect"],
+                 fields.get("Livelock") == ["yes"], files)
+
+
+# --- The copy --------------------------------------------------------------------------------------------------------
+
+def copy_tree():
+    """Makes TREE the working tree; files that are the same keep their times, so that little is built again."""
+    listed = subprocess.run(["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], cwd=ROOT,
+                            check=True, capture_output=True, text=True).stdout.split("\0")
+    wanted = {name for name in listed if name and (ROOT / name).is_file()}
+    for name in wanted:
+        source, copy = ROOT / name, TREE / name
+        if copy.is_file() and filecmp.cmp(source, copy, shallow=False):
+            continue
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(source, copy)
+    for copy in TREE.rglob("*"):
+        if copy.is_file() and str(copy.relative_to(TREE)) not in wanted:
+            copy.unlink()
+
+
+def apply(fault, check_only=False, tree=TREE):
+    # Outside of any repository, as far as git can see: inside one it would skip files that are ignored.
+    environment = dict(os.environ, GIT_CEILING_DIRECTORIES=str(tree.parent))
+    command = ["git", "apply", "--whitespace=nowarn"] + (["--check"] if check_only else []) + [str(fault.path)]
+    done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise BadFault(f"{fault.path.name} does not apply: {done.stderr.strip()}")
+
+
+@contextlib.contextmanager
+def planted(fault):
+    """The fault is in the copy as long as this lasts."""
+    before = {file: (TREE / file).read_bytes() for file in fault.files}
+    apply(fault)
+    try:
+        yield
+    finally:
+        for file, content in before.items():
+            (TREE / file).write_bytes(content)
+
+
+def configure():
+    environment = dict(os.environ, CCACHE_BASEDIR=str(TREE))
+    command = ["cmake", "-S", str(TREE), "-B", str(BUILD), "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release",
+               "-DCUTPROOF_CUDA=OFF", "-DBUILD_TESTING=ON"]
+    subprocess.run(command, check=True, env=environment, stdout=subprocess.DEVNULL)
+
+
+def build(targets, jobs):
+    environment = dict(os.environ, CCACHE_BASEDIR=str(TREE))
+    done = subprocess.run(["cmake", "--build", str(BUILD), "-j", str(jobs), "--target", *sorted(targets)],
+                          env=environment, capture_output=True, text=True)
+    if done.returncode != 0:
+        errors = [line for line in done.stdout.splitlines() if "error:" in line or "FAILED" in line]
+        raise BadFault("does not compile: " + "\n  ".join(errors[:5] or done.stdout.splitlines()[-5:]))
+
+
+# --- The gate --------------------------------------------------------------------------------------------------------
+
+def target_of(command):
+    return shlex.split(command)[0]
+
+
+def fallbacks(fault):
+    if fault.code == "reference_cpu":
+        backend, kinds = "reference", "*/reference*"
+        tests = ["backend_test"] if fault.stage == "launch" else [f"{fault.stage}_test"]
+    else:
+        backend, kinds = "host", "*/host*:*/simulated*"
+        tests = ["launch_test"] if fault.stage == "launch" else [f"gpu_{fault.stage}_test"]
+    return tests + [f"property_tests --gtest_filter='{kinds}'",
+                    f"cutproof fuzz --backend {backend} --cases 1000000000 --seconds {FUZZ_SECONDS}"]
+
+
+@dataclasses.dataclass
+class Outcome:
+    found: bool
+    by: str = ""      # which property or test
+    took: str = ""    # how many cases, for a person
+    message: str = ""
+    strokes: int = None  # of the simplified counterexample; None: there is none
+    particles: int = None
+
+
+def run(command, may_hang=False):
+    """One command of the gate. Raises BadFault if it says nothing: it ran no test, or did not understand its options."""
+    name, *arguments = shlex.split(command)
+    programs = [path for path in BUILD.glob(f"**/{name}") if path.is_file() and os.access(path, os.X_OK)]
+    if len(programs) != 1:
+        raise BadFault(f"'{command}': there is no program '{name}'")
+    is_fuzz = name == "cutproof"
+    if not is_fuzz:
+        arguments.append("--gtest_fail_fast")
+    RUN.mkdir(exist_ok=True)
+    # Counterexamples of `cutproof fuzz` are simplified and counted; nobody reads those of rapidcheck.
+    saved = RUN / "counterexamples"
+    shutil.rmtree(saved, ignore_errors=True)
+    saved.mkdir()
+    if is_fuzz:
+        arguments += ["--save", str(saved)]
+    environment = dict(os.environ, RC_PARAMS="noshrink=1 seed=1")
+    process = subprocess.Popen([str(programs[0]), *arguments], cwd=RUN, env=environment, stdout=subprocess.PIPE,
+                               stderr=subprocess.STDOUT, text=True, errors="replace")
+    late = threading.Event()
+    timer = threading.Timer(MOST_SECONDS, lambda: (late.set(), process.kill()))
+    timer.start()
+    text = ""
+    violation = False
+    for line in process.stdout:
+        text += line
+        violation = violation or (is_fuzz and FUZZ_FAILS.match(line) is not None)
+    status = process.wait()
+    timer.cancel()
+    if late.is_set() and not violation:
+        if may_hang:
+            return Outcome(True, f"`{command}`", "livelock", f"does not end within {MOST_SECONDS} s")
+        raise BadFault(f"'{command}' does not end within {MOST_SECONDS} s, and the fault is not marked as a livelock")
+    if is_fuzz and status == 2:
+        raise BadFault(f"'{command}': {text.strip()}")
+    outcome = (read_fuzz if is_fuzz else read_tests)(text)
+    outcome.found = status != 0
+    if not outcome.found:
+        return outcome
+    for path in saved.glob("*.json"):
+        document = json.loads(path.read_text())
+        if document.get("format") == "cutproof.counterexample":
+            outcome.strokes = len(document["case"]["strokes"])
+            outcome.particles = len(document["case"]["nodes"])
+    if status < 0 and not violation:
+        outcome.took = f"crash, signal {-status}"
+    if not outcome.by:
+        outcome.by, outcome.message = f"`{command}`", text.strip()[-300:]
+    return outcome
+
+
+def read_fuzz(text):
+    failure = next((match for match in map(FUZZ_FAILS.match, text.splitlines()) if match), None)
+    if not failure:
+        return Outcome(False)
+    backend = re.search(r"^fuzzing backend ([^:]+)", text, re.MULTILINE).group(1)
+    return Outcome(True, f"fuzz on {backend}: {failure.group(2)}", plural(int(failure.group(1)) + 1, "case"),
+                   failure.group(0))
+
+
+def read_tests(text):
+    ran = re.search(r"^\[==========\] Running (\d+) test", text, re.MULTILINE)
+    if not ran or int(ran.group(1)) == 0:
+        raise BadFault("its suspect runs no test: " + text.strip()[-200:])
+    tests = re.findall(r"^\[ RUN      \] (\S+)", text, re.MULTILINE)
+    if "[  FAILED  ]" not in text:
+        # A crash names no test: it is the last one that began. Otherwise nothing failed.
+        return Outcome(False, by=tests[-1] if tests and "[  PASSED  ]" not in text else "")
+    failed = re.search(r"^\[  FAILED  \] (\S+?),? ", text, re.MULTILINE).group(1)
+    cases = re.search(r"Falsifiable after (\d+) test", text)
+    schedules = re.search(r"after (\d+) schedules?\b", text)
+    took = (plural(int(cases.group(1)), "case") if cases else
+            plural(int(schedules.group(1)), "schedule") if schedules else "unit test")
+    failure = re.search(r"Failure\n(.*(?:\n.*){0,4})", text)
+    return Outcome(True, failed, took, failure.group(1) if failure else "")
+
+
+def plural(count, noun):
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def judge(fault, jobs):
+    """Plants one fault. Returns the outcome and the command that gave it; (None, None) if the fault survives."""
+    with planted(fault):
+        built = set()
+        for command in fault.suspects + fallbacks(fault):
+            needed = {target_of(c) for c in (fault.suspects if command in fault.suspects else [command])}
+            if not needed <= built:
+                build(needed, jobs)
+                built |= needed
+            outcome = run(command, fault.livelock)
+            if outcome.found:
+                return outcome, command
+    return None, None
+
+
+def passes_unchanged(command, jobs):
+    build({target_of(command)}, jobs)
+    outcome = run(command)
+    if outcome.found:
+        print(f"FAILS on the unchanged code: {command}: {outcome.by}: {outcome.message}", flush=True)
+    return not outcome.found
+
+
+# --- Results ---------------------------------------------------------------------------------------------------------
+
+def is_simple(row):
+    return row["strokes"] <= MOST_STROKES and row["particles"] <= MOST_PARTICLES
+
+
+def simplicity(rows):
+    sized = [row for row in rows if row["strokes"] is not None]
+    simple = sum(1 for row in sized if is_simple(row))
+    return (f"Of {plural(len(sized), 'counterexample')} that `cutproof fuzz` has simplified, {simple} "
+            f"{'has' if simple == 1 else 'have'} at most {MOST_STROKES} strokes and {MOST_PARTICLES} particles.")
+
+
+def write_table(rows):
+    lines = [
+        "# Planted faults",
+        "",
+        "Written by `ci/mutation_testing/run.py`; every fault is a patch in `ci/mutation_testing/mutants/`. Each is a wrong program"
+        " of the kind that people write: it is planted into a copy of the code, built, and given to the gate (tests,"
+        " properties, `cutproof fuzz`), which also passes the unchanged code. A run stops at the first find and begins"
+        " with the suspected property. *Took*: cases of a random property or campaign until the find, schedules of a"
+        " simulated machine, or a unit test. *Counterexample*: what `cutproof fuzz` has made of the case that it found.",
+        "",
+        f"{sum(1 for row in rows if row['found'])} of {len(rows)} found. {simplicity(rows)}",
+    ]
+    for stage in STAGES:
+        of_stage = [row for row in rows if row["stage"] == stage]
+        if not of_stage:
+            continue
+        lines += ["", f"## {stage}", "", "| fault | what is wrong | in | found by | took | counterexample |",
+                  "|---|---|---|---|---|---|"]
+        for row in of_stage:
+            by = row["by"] if row["found"] else "**not found**"
+            size = (f"{plural(row['strokes'], 'stroke')}, {plural(row['particles'], 'particle')}"
+                    if row["strokes"] is not None else "")
+            cells = [row["name"], row["fault"], row["code"], by, row["took"], size]
+            lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    TABLE.write_text("\n".join(lines) + "\n")
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Plants faults and asks the gate to find them.")
+    parser.add_argument("--only", nargs="+", metavar="NAME", help="faults whose name begins with one of these")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="of the builds")
+    parser.add_argument("--json", metavar="F", help="write the results there as well")
+    parser.add_argument("--check", action="store_true", help="only whether every fault applies to the code as it is")
+    options = parser.parse_args()
+
+    paths = sorted((HERE / "mutants").glob("*.patch"))
+    if options.only:
+        for name in options.only:
+            if not any(path.stem.startswith(name) for path in paths):
+                raise BadFault(f"--only: there is no fault '{name}' in {HERE / 'faults'}")
+        paths = [path for path in paths if any(path.stem.startswith(name) for name in options.only)]
+    faults = [read_fault(path) for path in paths]
+    if not faults:
+        raise BadFault(f"there are no faults in {HERE / 'faults'}")
+    if options.check:
+        for fault in faults:
+            apply(fault, check_only=True, tree=ROOT)
+        print(plural(len(faults), "fault") + " apply")
+        return 0
+
+    copy_tree()
+    for fault in faults:
+        apply(fault, check_only=True)
+    configure()
+    holds = True
+    commands = sorted({command for fault in faults for command in fault.suspects})
+    build({target_of(command) for command in commands}, options.jobs)
+    begin = time.monotonic()
+    for command in commands:
+        holds = passes_unchanged(command, options.jobs) and holds
+    print(f"unchanged: {plural(len(commands), 'command')}, {'all pass' if holds else 'FAILS'}"
+          f" ({time.monotonic() - begin:.0f} s)", flush=True)
+
+    rows = []
+    for fault in faults:
+        begin = time.monotonic()
+        try:
+            outcome, command = judge(fault, options.jobs)
+        except BadFault as error:
+            raise BadFault(f"{fault.path.name}: {error}") from None
+        # A command that nobody suspected has not been asked about the unchanged code.
+        if outcome and command not in commands:
+            holds = passes_unchanged(command, options.jobs) and holds
+        row = {"name": fault.name, "stage": fault.stage, "fault": fault.text, "code": fault.code,
+               "found": outcome is not None, "command": command or "", "by": outcome.by if outcome else "",
+               "took": outcome.took if outcome else "", "message": outcome.message if outcome else "",
+               "strokes": outcome.strokes if outcome else None,
+               "particles": outcome.particles if outcome else None,
+               "suspected": command in fault.suspects, "seconds": round(time.monotonic() - begin, 1)}
+        rows.append(row)
+        result = f"{row['by']} ({row['took']})" if outcome else "NOT FOUND"
+        if row["strokes"] is not None:
+            result += f", {plural(row['strokes'], 'stroke')}, {plural(row['particles'], 'particle')}"
+        note = "" if row["suspected"] or not outcome else " [not by its suspect]"
+        print(f"{fault.name}: {result}{note} ({row['seconds']:.0f} s)", flush=True)
+        if options.json:
+            pathlib.Path(options.json).write_text(json.dumps(
+                {"format": "cutproof.mutation_testing", "format_version": 1, "unchanged_passes": holds, "faults": rows},
+                indent=1) + "\n")
+    if not options.only:
+        write_table(rows)
+    survivors = [row["name"] for row in rows if not row["found"]]
+    print(simplicity(rows))
+    print(f"{len(rows) - len(survivors)} of {plural(len(rows), 'fault')} found"
+          + (", not found: " + ", ".join(survivors) if survivors else ""))
+    return 0 if holds and not survivors else 1
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except BadFault as error:
+        print(f"planted faults: {error}", file=sys.stderr)
+        sys.exit(2)

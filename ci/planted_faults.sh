@@ -1,6 +1,0 @@
-#!/usr/bin/env bash
-# Plants faults into a copy of the code and asks the gate to find each of them (ci/planted_faults/run.py).
-set -euo pipefail
-cd "$(dirname "$0")/.."
-ci/install.sh
-exec python3 ci/planted_faults/run.py "$@"

@@ -1,0 +1,58 @@
+// What CUDA hands out, given back by destructors, also where a constructor fails half-way. Giving back is not checked:
+// it meets only errors that the call before has told, and nobody could be told.
+#pragma once
+#include <cuda_runtime_api.h>
+
+#include <cstddef>
+#include <memory>
+#include <type_traits>
+
+#include "gpu/device/cuda_check.h"
+
+namespace cutproof::gpu {
+
+template <auto release>
+struct Release {
+  template <class T>
+  void operator()(T* held) const {
+    static_cast<void>(release(held));
+  }
+};
+template <class Handle, auto release>
+using Held = std::unique_ptr<std::remove_pointer_t<Handle>, Release<release>>;
+
+using Stream = Held<cudaStream_t, cudaStreamDestroy>;
+using Event = Held<cudaEvent_t, cudaEventDestroy>;
+using Graph = Held<cudaGraph_t, cudaGraphDestroy>;
+using ExecutableGraph = Held<cudaGraphExec_t, cudaGraphExecDestroy>;
+using DeviceMemory = Held<void*, cudaFree>;
+using PinnedMemory = Held<void*, cudaFreeHost>;
+
+// All throw MachineError.
+inline Stream make_stream() {
+  cudaStream_t stream = nullptr;
+  CUTPROOF_CUDA(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
+  return Stream(stream);
+}
+inline Event make_event() {
+  cudaEvent_t event = nullptr;
+  CUTPROOF_CUDA(cudaEventCreate(&event));
+  return Event(event);
+}
+inline DeviceMemory make_device_memory(std::size_t bytes) {
+  void* memory = nullptr;
+  CUTPROOF_CUDA(cudaMalloc(&memory, bytes));
+  return DeviceMemory(memory);
+}
+inline PinnedMemory make_pinned_memory(std::size_t bytes) {
+  void* memory = nullptr;
+  CUTPROOF_CUDA(cudaMallocHost(&memory, bytes));
+  return PinnedMemory(memory);
+}
+inline ExecutableGraph make_executable(cudaGraph_t graph) {
+  cudaGraphExec_t executable = nullptr;
+  CUTPROOF_CUDA(cudaGraphInstantiate(&executable, graph, 0));
+  return ExecutableGraph(executable);
+}
+
+}  // namespace cutproof::gpu

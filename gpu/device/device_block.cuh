@@ -1,0 +1,206 @@
+// The Block of kernels on the device (block.h): everything is inlined to what a plain CUDA kernel would say, and what
+// a kernel does not use costs nothing. Block sizes are multiples of 32 (launcher.h checks). Collectives take a number
+// of threads known at run time and combine in a fixed order, so equal block sizes give equal bits.
+#pragma once
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+
+#include "gpu/launch/block.h"
+
+namespace cutproof::gpu {
+
+class DeviceBlock {
+ public:
+  static constexpr bool on_device = true;
+
+  __device__ int thread() const { return static_cast<int>(threadIdx.x); }
+  __device__ int size() const { return static_cast<int>(blockDim.x); }
+  __device__ int index() const { return static_cast<int>(blockIdx.x); }
+  __device__ int count() const { return static_cast<int>(gridDim.x); }
+  __device__ std::int64_t first() const { return static_cast<std::int64_t>(blockIdx.x) * blockDim.x + threadIdx.x; }
+  __device__ std::int64_t stride() const { return static_cast<std::int64_t>(gridDim.x) * blockDim.x; }
+  __device__ int lane() const { return static_cast<int>(threadIdx.x & 31u); }
+
+  __device__ void sync() { __syncthreads(); }
+
+  template <class T>
+  __device__ T* shared(int count) {
+    static_assert(alignof(T) <= 16);
+    extern __shared__ uint4 cutproof_dynamic_shared[];
+    T* const taken = reinterpret_cast<T*>(reinterpret_cast<unsigned char*>(cutproof_dynamic_shared) + shared_used_);
+    shared_used_ += (static_cast<unsigned>(count) * static_cast<unsigned>(sizeof(T)) + 15u) & ~15u;
+    return taken;
+  }
+
+  template <class T>
+  __device__ T sum(T value) {
+    return reduce<true>(value, [](T a, T b) { return a + b; });
+  }
+  template <class T>
+  __device__ T warp_sum(T value) {
+    return reduce_warp(value, [](T a, T b) { return a + b; });
+  }
+  template <class T>
+  __device__ T smallest(T value) {
+    return reduce<std::is_integral_v<T>>(value, [](T a, T b) { return b < a ? b : a; });
+  }
+  __device__ bool any(bool value) { return __syncthreads_or(value) != 0; }
+  __device__ int exclusive_scan(int value, int& total) {
+    int through = inclusive_scan_in_warp(value);
+    if (blockDim.x == 32) {
+      total = __shfl_sync(kWarp, through, 31);
+      return through - value;
+    }
+    __shared__ int partial[32];
+    const int warp = thread() / 32;
+    __syncthreads();  // everyone is done with the last use of `partial`
+    if (lane() == 31) partial[warp] = through;
+    __syncthreads();
+    const int warps = size() / 32;
+    const int through_warps = inclusive_scan_in_warp(lane() < warps ? partial[lane()] : 0);
+    total = __shfl_sync(kWarp, through_warps, 31);
+    const int before = __shfl_sync(kWarp, through_warps, warp == 0 ? 0 : warp - 1);
+    return through - value + (warp == 0 ? 0 : before);
+  }
+
+  __device__ unsigned ballot(unsigned mask, bool value) { return __ballot_sync(mask, value); }
+  template <class T>
+  __device__ T shuffle(unsigned mask, T value, int lane) {
+    return by_words(value, [=](unsigned word) { return __shfl_sync(mask, word, lane); });
+  }
+
+  // T: int, unsigned or unsigned long long.
+  template <class T>
+  __device__ T atomic_add(T* at, std::type_identity_t<T> value) {
+    return atomicAdd(at, value);
+  }
+  template <class T>
+  __device__ T atomic_min(T* at, std::type_identity_t<T> value) {
+    return atomicMin(at, value);
+  }
+  template <class T>
+  __device__ T atomic_max(T* at, std::type_identity_t<T> value) {
+    return atomicMax(at, value);
+  }
+  template <class T>
+  __device__ T atomic_or(T* at, std::type_identity_t<T> value) {
+    return atomicOr(at, value);
+  }
+  template <class T>
+  __device__ T atomic_exchange(T* at, std::type_identity_t<T> value) {
+    return atomicExch(at, value);
+  }
+  template <class T>
+  __device__ T atomic_cas(T* at, std::type_identity_t<T> expected, std::type_identity_t<T> desired) {
+    return atomicCAS(at, expected, desired);
+  }
+  template <class T>
+  __device__ T load(const T* at) {
+    static_assert(sizeof(T) == 4 || sizeof(T) == 8);
+    T value;
+    if constexpr (sizeof(T) == 4) {
+      unsigned bits;
+      asm volatile("ld.relaxed.gpu.u32 %0, [%1];" : "=r"(bits) : "l"(at));
+      memcpy(&value, &bits, 4);
+    } else {
+      unsigned long long bits;
+      asm volatile("ld.relaxed.gpu.u64 %0, [%1];" : "=l"(bits) : "l"(at));
+      memcpy(&value, &bits, 8);
+    }
+    return value;
+  }
+  template <class T>
+  __device__ void store(T* at, std::type_identity_t<T> value) {
+    static_assert(sizeof(T) == 4 || sizeof(T) == 8);
+    if constexpr (sizeof(T) == 4) {
+      unsigned bits;
+      memcpy(&bits, &value, 4);
+      asm volatile("st.relaxed.gpu.u32 [%0], %1;" ::"l"(at), "r"(bits));
+    } else {
+      unsigned long long bits;
+      memcpy(&bits, &value, 8);
+      asm volatile("st.relaxed.gpu.u64 [%0], %1;" ::"l"(at), "l"(bits));
+    }
+  }
+  __device__ void fence() { __threadfence(); }
+
+ private:
+  static constexpr unsigned kWarp = 0xffffffffu;
+
+  // Applies `exchange` to every 32-bit word of a value.
+  template <class T, class Exchange>
+  __device__ static T by_words(T value, Exchange exchange) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    constexpr int kWords = static_cast<int>((sizeof(T) + 3) / 4);
+    unsigned words[kWords] = {};
+    memcpy(words, &value, sizeof(T));
+#pragma unroll
+    for (int i = 0; i < kWords; ++i) words[i] = exchange(words[i]);
+    memcpy(&value, words, sizeof(T));
+    return value;
+  }
+
+  // Word by word: for a whole struct the compiler branches, which made block sums 5 % slower than plain CUDA.
+  template <class T>
+  __device__ static T select(bool first, T a, const T& b) {
+    static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % 4 == 0);
+    constexpr int kWords = static_cast<int>(sizeof(T) / 4);
+    unsigned from_a[kWords], from_b[kWords];
+    memcpy(from_a, &a, sizeof(T));
+    memcpy(from_b, &b, sizeof(T));
+#pragma unroll
+    for (int i = 0; i < kWords; ++i) from_a[i] = first ? from_a[i] : from_b[i];
+    memcpy(&a, from_a, sizeof(T));
+    return a;
+  }
+
+  // A butterfly, as HostBlock does it. Every lane combines the same terms, in one order or the other.
+  template <class T, class Combine>
+  __device__ static T reduce_warp(T value, Combine combine) {
+#pragma unroll
+    for (int distance = 16; distance > 0; distance /= 2) {
+      value = combine(value, by_words(value, [=](unsigned word) { return __shfl_xor_sync(kWarp, word, distance); }));
+    }
+    return value;
+  }
+
+  // `symmetric`: combine(a, b) and combine(b, a) have the same bits, so every lane has the result already. (Minima of
+  // floats are not: the sign of a zero, NaN.)
+  template <bool symmetric, class T, class Combine>
+  __device__ static T reduce(T value, Combine combine) {
+    const auto from_first = [](T own) {
+      return by_words(own, [](unsigned word) { return __shfl_sync(kWarp, word, 0); });
+    };
+    value = reduce_warp(value, combine);
+    const int warps = static_cast<int>(blockDim.x / 32u);
+    if (warps == 1) return symmetric ? value : from_first(value);
+    alignas(16) __shared__ unsigned char storage[32 * sizeof(T)];
+    T* const partial = reinterpret_cast<T*>(storage);
+    const int lane = static_cast<int>(threadIdx.x & 31u);
+    __syncthreads();  // everyone is done with the last use of `partial`
+    if (lane == 0) partial[threadIdx.x / 32] = value;
+    __syncthreads();
+    // Every warp adds up the partial results of all; the tree leaves out what is beyond the last warp.
+    value = partial[lane < warps ? lane : 0];
+#pragma unroll
+    for (int distance = 16; distance > 0; distance /= 2) {
+      const T other = by_words(value, [=](unsigned word) { return __shfl_down_sync(kWarp, word, distance); });
+      value = select(lane + distance < warps, combine(value, other), value);
+    }
+    return from_first(value);
+  }
+
+  __device__ int inclusive_scan_in_warp(int value) const {
+#pragma unroll
+    for (int distance = 1; distance < 32; distance *= 2) {
+      const int other = __shfl_up_sync(kWarp, value, distance);
+      if (lane() >= distance) value += other;
+    }
+    return value;
+  }
+
+  unsigned shared_used_ = 0;
+};
+
+}  // namespace cutproof::gpu

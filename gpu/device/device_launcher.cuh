@@ -1,0 +1,417 @@
+// The Launcher of launcher.h for the device. capture() writes work down as a CUDA graph, conditions and loops included,
+// which then runs any number of times without the host; a DeviceLauncher made from a stream starts work at once
+// instead, and waits for the device where a condition must be known (for tests and loading).
+#pragma once
+#include <cuda_runtime.h>
+#include <thrust/iterator/counting_iterator.h>
+#include <thrust/iterator/transform_iterator.h>
+
+#include <algorithm>
+#include <climits>
+#include <cstddef>
+#include <cstdint>
+#include <cub/device/device_radix_sort.cuh>
+#include <cub/device/device_scan.cuh>
+#include <cub/device/device_select.cuh>
+#include <iterator>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gpu/device/cuda_check.h"
+#include "gpu/device/cuda_handles.h"
+#include "gpu/device/device_block.cuh"
+#include "gpu/launch/launcher.h"
+
+namespace cutproof::gpu {
+
+namespace detail {
+
+// The arguments of a launch as one parameter. (Not std::tuple, whose members device code may not touch, and not a pack
+// of parameters, whose kernel has no address that GCC could find.)
+template <class... Args>
+struct Arguments {
+  template <class Call, class... Before>
+  __device__ void apply(Call call, const Before&... before) const {
+    call(before...);
+  }
+};
+template <class First, class... Rest>
+struct Arguments<First, Rest...> {
+  First first;
+  Arguments<Rest...> rest;
+  template <class Call, class... Before>
+  __device__ void apply(Call call, const Before&... before) const {
+    rest.apply(call, before..., first);
+  }
+};
+inline Arguments<> bundle() { return {}; }
+template <class First, class... Rest>
+Arguments<First, Rest...> bundle(const First& first, const Rest&... rest) {
+  return {first, bundle(rest...)};
+}
+
+}  // namespace detail
+
+// Arguments stay in constant memory: nothing is copied to the stack for kernels that take addresses of them.
+template <class Kernel, class Arguments>
+__global__ void __launch_bounds__(max_threads<Kernel>()) run_kernel(const __grid_constant__ Arguments arguments) {
+  arguments.apply([](const auto&... args) {
+    DeviceBlock block;
+    Kernel{}(block, args...);
+  });
+}
+
+namespace detail {
+
+template <class = void>
+__global__ void set_condition_kernel(cudaGraphConditionalHandle handle, const int* flag) {
+  cudaGraphSetConditional(handle, *flag != 0 ? 1u : 0u);
+}
+
+// Keys beyond *count become the greatest number, which sorting puts last.
+template <class = void>
+__global__ void pad_keys_kernel(unsigned long long* keys, const int* count, int capacity) {
+  const std::int64_t stride = static_cast<std::int64_t>(gridDim.x) * blockDim.x;
+  std::int64_t i = *count + static_cast<std::int64_t>(blockIdx.x) * blockDim.x + threadIdx.x;
+  for (; i < capacity; i += stride) keys[i] = ~0ull;
+}
+template <class = void>
+__global__ void drop_padding_kernel(const unsigned long long* keys, int* count) {
+  if (*count > 0 && keys[*count - 1] == ~0ull) --*count;
+}
+
+// Scanning one item more than there are, which counts as 0, leaves the total in the place beyond the last.
+struct ScanInput {
+  const int* in;
+  int count;
+  __host__ __device__ int operator()(int i) const { return i < count ? in[i] : 0; }
+};
+class ScanOutput {
+ public:
+  using iterator_category = std::random_access_iterator_tag;
+  using value_type = int;
+  using difference_type = std::ptrdiff_t;
+  using pointer = int*;
+  using reference = int&;
+  ScanOutput(int* out, int count, int* total) : out_(out), total_(total), count_(count) {}
+  __host__ __device__ int& operator[](std::ptrdiff_t i) const { return i + at_ < count_ ? out_[i + at_] : *total_; }
+  __host__ __device__ int& operator*() const { return (*this)[0]; }
+  __host__ __device__ ScanOutput operator+(std::ptrdiff_t n) const {
+    ScanOutput moved = *this;
+    moved.at_ += n;
+    return moved;
+  }
+  __host__ __device__ ScanOutput& operator+=(std::ptrdiff_t n) {
+    at_ += n;
+    return *this;
+  }
+
+ private:
+  int* out_;
+  int* total_;
+  std::ptrdiff_t count_;
+  std::ptrdiff_t at_ = 0;
+};
+
+// What the launches of a launcher or graph share. They never overlap: a graph is one chain of nodes.
+struct DeviceResources {
+  int multiprocessors = 0;
+  std::size_t required = 0;  // most bytes of temporary memory that any launch asked for
+  std::size_t allocated = 0;
+  DeviceMemory temporary;
+  std::vector<Stream> inner;  // for capturing bodies of conditions, by depth
+
+  DeviceResources() {
+    int device = 0;
+    CUTPROOF_CUDA(cudaGetDevice(&device));
+    CUTPROOF_CUDA(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device));
+  }
+
+  // Frees what was there; nothing may be using it.
+  void allocate() {
+    if (required <= allocated) return;
+    temporary.reset();
+    allocated = 0;
+    temporary = make_device_memory(required);
+    allocated = required;
+  }
+  cudaStream_t stream(std::size_t depth) {
+    while (inner.size() <= depth) inner.push_back(make_stream());
+    return inner[depth].get();
+  }
+};
+
+// CUDA 13 gave the functions with edge data the plain names.
+inline void capture_info(cudaStream_t stream, cudaGraph_t* graph, const cudaGraphNode_t** dependencies,
+                         const cudaGraphEdgeData** edges, std::size_t* count) {
+  cudaStreamCaptureStatus status = cudaStreamCaptureStatusNone;
+#if CUDART_VERSION >= 13000
+  CUTPROOF_CUDA(cudaStreamGetCaptureInfo(stream, &status, nullptr, graph, dependencies, edges, count));
+#else
+  CUTPROOF_CUDA(cudaStreamGetCaptureInfo_v3(stream, &status, nullptr, graph, dependencies, edges, count));
+#endif
+  if (status != cudaStreamCaptureStatusActive) throw MachineError("CUDA failed: a stream stopped being captured.");
+}
+inline cudaGraphNode_t append_node(cudaStream_t stream, cudaGraphNodeParams* parameters) {
+  cudaGraph_t graph = nullptr;
+  const cudaGraphNode_t* dependencies = nullptr;
+  const cudaGraphEdgeData* edges = nullptr;
+  std::size_t count = 0;
+  capture_info(stream, &graph, &dependencies, &edges, &count);
+  cudaGraphNode_t node = nullptr;
+#if CUDART_VERSION >= 13000
+  CUTPROOF_CUDA(cudaGraphAddNode(&node, graph, dependencies, edges, count, parameters));
+  CUTPROOF_CUDA(cudaStreamUpdateCaptureDependencies(stream, &node, nullptr, 1, cudaStreamSetCaptureDependencies));
+#else
+  CUTPROOF_CUDA(cudaGraphAddNode_v2(&node, graph, dependencies, edges, count, parameters));
+  CUTPROOF_CUDA(cudaStreamUpdateCaptureDependencies_v2(stream, &node, nullptr, 1, cudaStreamSetCaptureDependencies));
+#endif
+  return node;
+}
+
+}  // namespace detail
+
+// Work written down. Its launches must not overlap: they share temporary memory.
+class DeviceGraph {
+ public:
+  DeviceGraph() = default;
+  DeviceGraph(ExecutableGraph executable, std::shared_ptr<detail::DeviceResources> resources)
+      : resources_(std::move(resources)), executable_(std::move(executable)) {}
+
+  // Does not wait for the device.
+  void launch(cudaStream_t stream) const { CUTPROOF_CUDA(cudaGraphLaunch(executable_.get(), stream)); }
+  explicit operator bool() const { return executable_ != nullptr; }
+
+ private:
+  std::shared_ptr<detail::DeviceResources> resources_;
+  ExecutableGraph executable_;
+};
+
+class DeviceLauncher {
+ public:
+  // Starts work on `stream` at once.
+  explicit DeviceLauncher(cudaStream_t stream)
+      : mode_(Mode::at_once), stream_(stream), resources_(std::make_shared<detail::DeviceResources>()) {}
+
+  // What `work`, a callable that takes a DeviceLauncher&, launches, as a graph. `work` is called twice: first only to
+  // learn how much temporary memory it needs. Nothing is executed.
+  template <class Work>
+  static DeviceGraph capture(Work work) {
+    auto resources = std::make_shared<detail::DeviceResources>();
+    DeviceLauncher measuring(Mode::measure, nullptr, resources, 0);
+    work(measuring);
+    resources->allocate();
+
+    const cudaStream_t stream = resources->stream(0);
+    CUTPROOF_CUDA(cudaStreamBeginCapture(stream, cudaStreamCaptureModeRelaxed));
+    DeviceLauncher writing(Mode::capture, stream, resources, 0);
+    cudaGraph_t captured = nullptr;
+    try {
+      work(writing);
+    } catch (...) {
+      static_cast<void>(cudaStreamEndCapture(stream, &captured));
+      const Graph dropped(captured);
+      static_cast<void>(cudaGetLastError());
+      throw;
+    }
+    CUTPROOF_CUDA(cudaStreamEndCapture(stream, &captured));
+    const Graph graph(captured);
+    return DeviceGraph(make_executable(graph.get()), std::move(resources));
+  }
+
+  template <class Kernel, class... Args>
+  void items(Kernel, std::int64_t capacity, Args... args) {
+    constexpr int kThreads = std::min(256, max_threads<Kernel>());
+    // A few waves of full blocks: enough to balance, few enough that empty ones cost little.
+    launch<Kernel>((capacity + kThreads - 1) / kThreads, 32 * 256 / kThreads, kThreads, 0, args...);
+  }
+  template <class Kernel, class... Args>
+  void blocks(Kernel, std::int64_t capacity, int threads, std::size_t shared_bytes, Args... args) {
+    check_threads<Kernel>(threads);
+    launch<Kernel>(capacity, 4 * 2048 / threads, threads, shared_bytes, args...);
+  }
+
+  template <class Body>
+  void if_nonzero(const int* flag, Body body) {
+    if (mode_ == Mode::at_once) {
+      if (read(flag) != 0) body(*this);
+    } else {
+      conditional(flag, cudaGraphCondTypeIf, body);
+    }
+  }
+  template <class Body>
+  void while_nonzero(int* flag, Body body) {
+    if (mode_ == Mode::at_once) {
+      while (read(flag) != 0) body(*this);
+    } else {
+      conditional(flag, cudaGraphCondTypeWhile, body);
+    }
+  }
+
+  void exclusive_scan(const int* in, int* out, std::int64_t count, int* total) {
+    const int n = narrow(count, "exclusive_scan");
+    const auto input = thrust::make_transform_iterator(thrust::counting_iterator<int>(0), detail::ScanInput{in, n});
+    const detail::ScanOutput output(out, n, total);
+    with_temporary("cub::DeviceScan::ExclusiveSum", [&](void* temporary, std::size_t& bytes) {
+      return cub::DeviceScan::ExclusiveSum(temporary, bytes, input, output, n + 1, stream_);
+    });
+  }
+  void select(const unsigned char* flags, std::int64_t count, int* selected, int* selected_count) {
+    const int n = narrow(count, "select");
+    if (n == 0) return clear(selected_count, sizeof(int));
+    with_temporary("cub::DeviceSelect::Flagged", [&](void* temporary, std::size_t& bytes) {
+      return cub::DeviceSelect::Flagged(temporary, bytes, thrust::counting_iterator<int>(0), flags, selected,
+                                        selected_count, n, stream_);
+    });
+  }
+  void sort_unique(unsigned long long* keys, int* count, std::int64_t capacity) {
+    const int n = narrow(capacity, "sort_unique");
+    if (n == 0) return;
+    const std::size_t sorted_bytes = (static_cast<std::size_t>(n) * sizeof(unsigned long long) + 255) / 256 * 256;
+    if (mode_ != Mode::measure) {
+      const int grid = static_cast<int>(std::min<std::int64_t>((n + 255) / 256, 8 * resources_->multiprocessors));
+      detail::pad_keys_kernel<><<<grid, 256, 0, stream_>>>(keys, count, n);
+      check_cuda(cudaGetLastError(), "pad_keys_kernel", __FILE__, __LINE__);
+    }
+    const auto sort = [&](void* temporary, std::size_t& bytes) {
+      return cub::DeviceRadixSort::SortKeys(temporary, bytes, keys, sorted(), n, 0, 64, stream_);
+    };
+    const auto unique = [&](void* temporary, std::size_t& bytes) {
+      return cub::DeviceSelect::Unique(temporary, bytes, sorted(), keys, count, n, stream_);
+    };
+    constexpr const char* kSort = "cub::DeviceRadixSort::SortKeys";
+    constexpr const char* kUnique = "cub::DeviceSelect::Unique";
+    require(sorted_bytes + std::max(bytes_of(kSort, sort), bytes_of(kUnique, unique)));
+    with_temporary(kSort, sort, sorted_bytes);
+    with_temporary(kUnique, unique, sorted_bytes);
+    if (mode_ != Mode::measure) {
+      detail::drop_padding_kernel<><<<1, 1, 0, stream_>>>(keys, count);
+      check_cuda(cudaGetLastError(), "drop_padding_kernel", __FILE__, __LINE__);
+    }
+  }
+  void clear(void* data, std::size_t bytes) {
+    if (bytes > 0 && mode_ != Mode::measure) CUTPROOF_CUDA(cudaMemsetAsync(data, 0, bytes, stream_));
+  }
+
+ private:
+  enum class Mode { at_once, measure, capture };
+
+  DeviceLauncher(Mode mode, cudaStream_t stream, std::shared_ptr<detail::DeviceResources> resources, std::size_t depth)
+      : mode_(mode), stream_(stream), resources_(std::move(resources)), depth_(depth) {}
+
+  template <class Kernel, class... Args>
+  void launch(std::int64_t wanted, int most_per_multiprocessor, int threads, std::size_t shared_bytes,
+              const Args&... args) {
+    const auto arguments = detail::bundle(args...);
+    const auto kernel = &run_kernel<Kernel, detail::Arguments<Args...>>;
+    // Beyond this a kernel must ask; what collectives use (up to 6 KB) counts as well.
+    constexpr std::size_t kWithoutAsking = 40 * 1024;
+    if (shared_bytes > kWithoutAsking && mode_ != Mode::capture) {
+      check_cuda(
+          cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(shared_bytes)),
+          kernel_name<Kernel>(), __FILE__, __LINE__);
+    }
+    if (mode_ == Mode::measure) return;
+    const std::int64_t most = static_cast<std::int64_t>(most_per_multiprocessor) * resources_->multiprocessors;
+    const auto grid = static_cast<unsigned>(std::clamp<std::int64_t>(wanted, 1, most));
+    kernel<<<grid, static_cast<unsigned>(threads), shared_bytes, stream_>>>(arguments);
+    check_cuda(cudaGetLastError(), kernel_name<Kernel>(), __FILE__, __LINE__);
+  }
+
+  int read(const int* flag) {
+    int value = 0;
+    CUTPROOF_CUDA(cudaMemcpyAsync(&value, flag, sizeof value, cudaMemcpyDeviceToHost, stream_));
+    CUTPROOF_CUDA(cudaStreamSynchronize(stream_));
+    return value;
+  }
+
+  // A kernel that reads the flag, then a node that runs the body's graph or not; a loop reads the flag again at its
+  // end.
+  template <class Body>
+  void conditional(const int* flag, cudaGraphConditionalNodeType type, Body& body) {
+    if (mode_ == Mode::measure) {
+      DeviceLauncher inside(mode_, nullptr, resources_, depth_ + 1);
+      body(inside);
+      resources_->stream(depth_ + 1);
+      return;
+    }
+    cudaGraph_t graph = nullptr;
+    const cudaGraphNode_t* dependencies = nullptr;
+    const cudaGraphEdgeData* edges = nullptr;
+    std::size_t count = 0;
+    detail::capture_info(stream_, &graph, &dependencies, &edges, &count);
+    cudaGraphConditionalHandle handle{};
+    CUTPROOF_CUDA(cudaGraphConditionalHandleCreate(&handle, graph, 0, cudaGraphCondAssignDefault));
+    set_condition(handle, flag, stream_);
+
+    cudaGraphNodeParams parameters = {};
+    parameters.type = cudaGraphNodeTypeConditional;
+    parameters.conditional.handle = handle;
+    parameters.conditional.type = type;
+    parameters.conditional.size = 1;
+    detail::append_node(stream_, &parameters);
+
+    const cudaStream_t stream = resources_->stream(depth_ + 1);
+    CUTPROOF_CUDA(cudaStreamBeginCaptureToGraph(stream, parameters.conditional.phGraph_out[0], nullptr, nullptr, 0,
+                                                cudaStreamCaptureModeRelaxed));
+    cudaGraph_t captured = nullptr;  // the node's own graph: not ours to destroy
+    try {
+      DeviceLauncher inside(mode_, stream, resources_, depth_ + 1);
+      body(inside);
+      if (type == cudaGraphCondTypeWhile) set_condition(handle, flag, stream);
+    } catch (...) {
+      static_cast<void>(cudaStreamEndCapture(stream, &captured));
+      throw;
+    }
+    CUTPROOF_CUDA(cudaStreamEndCapture(stream, &captured));
+  }
+  static void set_condition(cudaGraphConditionalHandle handle, const int* flag, cudaStream_t stream) {
+    detail::set_condition_kernel<><<<1, 1, 0, stream>>>(handle, flag);
+    check_cuda(cudaGetLastError(), "set_condition_kernel", __FILE__, __LINE__);
+  }
+
+  template <class Call>
+  static std::size_t bytes_of(const char* name, Call call) {
+    std::size_t bytes = 0;
+    check_cuda(call(nullptr, bytes), name, __FILE__, __LINE__);
+    return std::max<std::size_t>(bytes, 1);
+  }
+  // Makes sure of that much temporary memory; what it held may be lost.
+  void require(std::size_t bytes) {
+    resources_->required = std::max(resources_->required, bytes);
+    if (mode_ == Mode::measure || resources_->required <= resources_->allocated) return;
+    if (mode_ == Mode::capture) {
+      throw std::logic_error("DeviceLauncher: the work that was captured is not the work that was measured.");
+    }
+    CUTPROOF_CUDA(cudaStreamSynchronize(stream_));
+    resources_->allocate();
+  }
+  // Calls one of CUB's functions with the memory it asks for, behind `reserved` bytes that are the caller's.
+  template <class Call>
+  void with_temporary(const char* name, Call call, std::size_t reserved = 0) {
+    std::size_t bytes = bytes_of(name, call);
+    require(reserved + bytes);
+    if (mode_ == Mode::measure) return;
+    check_cuda(call(static_cast<unsigned char*>(resources_->temporary.get()) + reserved, bytes), name, __FILE__,
+               __LINE__);
+  }
+  unsigned long long* sorted() const { return static_cast<unsigned long long*>(resources_->temporary.get()); }
+
+  static int narrow(std::int64_t count, const char* what) {
+    if (count < 0 || count >= INT_MAX) {
+      throw std::logic_error(std::string(what) + ": " + std::to_string(count) +
+                             " items are not between 0 and 2^31 - 2.");
+    }
+    return static_cast<int>(count);
+  }
+
+  Mode mode_;
+  cudaStream_t stream_;
+  std::shared_ptr<detail::DeviceResources> resources_;
+  std::size_t depth_ = 0;
+};
+
+}  // namespace cutproof::gpu

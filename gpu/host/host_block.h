@@ -1,0 +1,226 @@
+// The Block of kernels on the host (block.h): 32 threads, each a fibre. Every rule of block.h that a kernel breaks is a
+// KernelFault: a barrier or collective that not all threads reach, a warp operation whose mask names a lane that does
+// not come, shared memory beyond what the launch granted or taken in different order.
+#pragma once
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <type_traits>
+
+#include "gpu/host/host_runtime.h"
+#include "gpu/launch/block.h"
+
+namespace cutproof::gpu {
+
+class HostBlock {
+ public:
+  static constexpr bool on_device = false;
+
+  HostBlock(Worker& worker, LiveBlock& state, int thread)
+      : worker_(worker), state_(state), thread_(thread), count_(worker.job().blocks) {}
+
+  int thread() const { return thread_; }
+  static constexpr int size() { return kHostThreads; }
+  int index() const { return state_.index; }
+  int count() const { return count_; }
+  std::int64_t first() const { return static_cast<std::int64_t>(state_.index) * kHostThreads + thread_; }
+  std::int64_t stride() const { return static_cast<std::int64_t>(count_) * kHostThreads; }
+  int lane() const { return thread_; }
+
+  void sync(Where where = Where::here()) {
+    meet(Operation::sync, kEveryone, where, [] {});
+  }
+
+  template <class T>
+  T* shared(int count) {
+    static_assert(std::is_trivially_copyable_v<T> && alignof(T) <= 16);
+    return static_cast<T*>(worker_.shared(state_, thread_, static_cast<std::size_t>(count) * sizeof(T)));
+  }
+
+  // Sums and minima in the order of a butterfly, as a warp on the device does, so that equal block sizes give equal
+  // bits.
+  template <class T>
+  T sum(T value, Where where = Where::here()) {
+    return reduce(Operation::sum, value, where, [](T a, T b) { return a + b; });
+  }
+  template <class T>
+  T warp_sum(T value, Where where = Where::here()) {
+    return reduce(Operation::warp_sum, value, where, [](T a, T b) { return a + b; });
+  }
+  template <class T>
+  T smallest(T value, Where where = Where::here()) {
+    return reduce(Operation::smallest, value, where, [](T a, T b) { return b < a ? b : a; });
+  }
+  bool any(bool value, Where where = Where::here()) {
+    return reduce(Operation::any, static_cast<int>(value), where, [](int a, int b) { return a | b; }) != 0;
+  }
+  int exclusive_scan(int value, int& total, Where where = Where::here()) {
+    bring(value);
+    meet(Operation::exclusive_scan, kEveryone, where, [&] {
+      int before = 0;
+      for (int i = 0; i < kHostThreads; ++i) {
+        put(i, before);
+        before += brought<int>(i);
+      }
+      for (int i = 0; i < kHostThreads; ++i) std::memcpy(state_.result[i] + sizeof(int), &before, sizeof(int));
+    });
+    std::memcpy(&total, state_.result[thread_] + sizeof(int), sizeof(int));
+    return taken<int>();
+  }
+
+  unsigned ballot(unsigned mask, bool value, Where where = Where::here()) {
+    bring(static_cast<unsigned>(value));
+    meet(Operation::ballot, mask, where, [&] {
+      unsigned votes = 0;
+      for_lanes(mask, [&](int i) { votes |= brought<unsigned>(i) << i; });
+      for_lanes(mask, [&](int i) { put(i, votes); });
+    });
+    return taken<unsigned>();
+  }
+  template <class T>
+  T shuffle(unsigned mask, T value, int lane, Where where = Where::here()) {
+    if (lane < 0 || lane >= kHostThreads || (mask >> lane & 1u) == 0) {
+      worker_.fault(state_, thread_, "shuffles from lane " + std::to_string(lane) + ", which is not in its mask");
+    }
+    bring(value);
+    source_lane() = lane;
+    meet(Operation::shuffle, mask, where, [&] { for_lanes(mask, [&](int i) { put(i, brought<T>(source_lane(i))); }); });
+    return taken<T>();
+  }
+
+  // T: int, unsigned or unsigned long long.
+  template <class T>
+  T atomic_add(T* at, std::type_identity_t<T> value) {
+    return update(at, [value](T old) { return static_cast<T>(old + value); });
+  }
+  template <class T>
+  T atomic_min(T* at, std::type_identity_t<T> value) {
+    return update(at, [value](T old) { return std::min(old, value); });
+  }
+  template <class T>
+  T atomic_max(T* at, std::type_identity_t<T> value) {
+    return update(at, [value](T old) { return std::max(old, value); });
+  }
+  template <class T>
+  T atomic_or(T* at, std::type_identity_t<T> value) {
+    return update(at, [value](T old) { return static_cast<T>(old | value); });
+  }
+  template <class T>
+  T atomic_exchange(T* at, std::type_identity_t<T> value) {
+    return update(at, [value](T) { return value; });
+  }
+  template <class T>
+  T atomic_cas(T* at, std::type_identity_t<T> expected, std::type_identity_t<T> desired) {
+    worker_.before_access(state_, thread_);
+    if (worker_.alone()) {
+      const T old = *at;
+      if (old == expected) *at = desired;
+      return old;
+    }
+    std::atomic_ref<T>(*at).compare_exchange_strong(expected, desired, std::memory_order_relaxed);
+    return expected;
+  }
+  template <class T>
+  T load(const T* at) {
+    worker_.before_access(state_, thread_);
+    // atomic_ref takes no const until C++26.
+    return std::atomic_ref<T>(*const_cast<T*>(at)).load(std::memory_order_relaxed);
+  }
+  template <class T>
+  void store(T* at, std::type_identity_t<T> value) {
+    worker_.before_access(state_, thread_);
+    std::atomic_ref<T>(*at).store(value, std::memory_order_relaxed);
+  }
+  void fence() {
+#if defined(__SANITIZE_THREAD__)
+    // ThreadSanitizer knows no fences; a read-modify-write of one place orders the same.
+    static std::atomic<int> everyone{0};
+    everyone.fetch_add(1, std::memory_order_seq_cst);
+#else
+    std::atomic_thread_fence(std::memory_order_seq_cst);
+#endif
+  }
+
+ private:
+  static constexpr unsigned kEveryone = LiveBlock::kAll;
+
+  // The last to arrive does `complete` for everyone.
+  template <class Complete>
+  void meet(Operation operation, unsigned mask, const Where& where, Complete complete) {
+    if (worker_.arrive(state_, thread_, {operation, mask, where})) {
+      complete();
+      worker_.release(state_, thread_);
+    } else {
+      worker_.wait(state_);
+    }
+  }
+
+  template <class T, class Combine>
+  T reduce(Operation operation, T value, const Where& where, Combine combine) {
+    bring(value);
+    meet(operation, kEveryone, where, [&] {
+      T level[kHostThreads];
+      for (int i = 0; i < kHostThreads; ++i) level[i] = brought<T>(i);
+      for (int half = kHostThreads / 2; half > 0; half /= 2) {
+        for (int i = 0; i < half; ++i) level[i] = combine(level[i], level[i + half]);
+      }
+      for (int i = 0; i < kHostThreads; ++i) put(i, level[0]);
+    });
+    return taken<T>();
+  }
+
+  template <class T>
+  void bring(const T& value) {
+    static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= kMostValueBytes - sizeof(int));
+    std::memcpy(state_.value[thread_], &value, sizeof(T));
+  }
+  template <class T>
+  T brought(int thread) const {
+    T value;
+    std::memcpy(&value, state_.value[thread], sizeof(T));
+    return value;
+  }
+  template <class T>
+  void put(int thread, const T& value) {
+    std::memcpy(state_.result[thread], &value, sizeof(T));
+  }
+  template <class T>
+  T taken() const {
+    T value;
+    std::memcpy(&value, state_.result[thread_], sizeof(T));
+    return value;
+  }
+  int& source_lane() { return state_.source_lane[thread_]; }
+  int source_lane(int thread) const { return state_.source_lane[thread]; }
+
+  template <class Do>
+  static void for_lanes(unsigned mask, Do what) {
+    for (int i = 0; i < kHostThreads; ++i) {
+      if ((mask >> i & 1u) != 0) what(i);
+    }
+  }
+
+  template <class T, class Change>
+  T update(T* at, Change change) {
+    worker_.before_access(state_, thread_);
+    if (worker_.alone()) {
+      const T old = *at;
+      *at = change(old);
+      return old;
+    }
+    std::atomic_ref<T> place(*at);
+    T old = place.load(std::memory_order_relaxed);
+    while (!place.compare_exchange_weak(old, change(old), std::memory_order_relaxed)) {
+    }
+    return old;
+  }
+
+  Worker& worker_;
+  LiveBlock& state_;
+  int thread_;
+  int count_;
+};
+
+}  // namespace cutproof::gpu

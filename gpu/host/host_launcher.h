@@ -1,0 +1,118 @@
+// The Launcher of launcher.h that carries out work on the host, at once: when a member returns, its work is done.
+// Kernels are executed by operating-system threads, or simulated under a schedule (schedule.h). Results do not depend
+// on the number of threads if the kernels keep the rules of block.h.
+#pragma once
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+#include <utility>
+
+#include "gpu/host/host_block.h"
+#include "gpu/host/host_runtime.h"
+#include "gpu/launch/launcher.h"
+
+namespace cutproof::gpu {
+
+class HostLauncher {
+ public:
+  struct Threads {
+    int count = 1;  // operating-system threads, the caller's included
+  };
+  using Simulated = SimulationOptions;
+
+  static constexpr int kMostBlocks = 64;                  // of a launch; simulated: SimulationOptions::live_blocks
+  static constexpr std::int64_t kMostRounds = 1'000'000;  // of a while_nonzero, beyond which it counts as a livelock
+
+  explicit HostLauncher(Threads mode) : runtime_(std::make_unique<HostRuntime>(mode.count)), blocks_(kMostBlocks) {}
+  explicit HostLauncher(Simulated mode) {
+    blocks_ = mode.live_blocks;
+    runtime_ = std::make_unique<HostRuntime>(std::move(mode));
+  }
+  HostLauncher() : HostLauncher(Threads{}) {}
+
+  template <class Kernel, class... Args>
+  void items(Kernel kernel, std::int64_t capacity, Args... args) {
+    // Every thread has at most about 8 items, so that what its neighbours read next is still in the cache; an odd
+    // number of blocks, so that its items do not all fall into the same lines of it.
+    const std::int64_t all = (capacity + kHostThreads - 1) / kHostThreads;
+    const std::int64_t most = runtime_->simulated() ? blocks_ : std::max<std::int64_t>(kMostBlocks, all / 8 | 1);
+    launch(kernel, std::min(all, most), 0, args...);
+  }
+  template <class Kernel, class... Args>
+  void blocks(Kernel kernel, std::int64_t capacity, int threads, std::size_t shared_bytes, Args... args) {
+    check_threads<Kernel>(threads);
+    launch(kernel, std::min<std::int64_t>(capacity, blocks_), shared_bytes, args...);
+  }
+
+  template <class Body>
+  void if_nonzero(const int* flag, Body body) {
+    if (*flag != 0) body(*this);
+  }
+  template <class Body>
+  void while_nonzero(int* flag, Body body) {
+    for (std::int64_t round = 0; *flag != 0; ++round) {
+      if (round == kMostRounds) {
+        throw KernelFault("livelock: a loop did not end within " + std::to_string(kMostRounds) + " rounds.");
+      }
+      body(*this);
+    }
+  }
+
+  void exclusive_scan(const int* in, int* out, std::int64_t count, int* total) {
+    const int sum = std::accumulate(in, in + count, 0);
+    std::exclusive_scan(in, in + count, out, 0);
+    *total = sum;
+  }
+  void select(const unsigned char* flags, std::int64_t count, int* selected, int* selected_count) {
+    int* end = selected;
+    for (std::int64_t i = 0; i < count; ++i) {
+      if (flags[i] != 0) *end++ = static_cast<int>(i);
+    }
+    *selected_count = static_cast<int>(end - selected);
+  }
+  void sort_unique(unsigned long long* keys, int* count, std::int64_t capacity) {
+    if (*count < 0 || *count > capacity) {
+      throw KernelFault("sort_unique: " + std::to_string(*count) + " keys with a capacity of " +
+                        std::to_string(capacity) + '.');
+    }
+    std::sort(keys, keys + *count);
+    if (*count > 0 && keys[*count - 1] == ~0ull) throw KernelFault("sort_unique: ~0 is not a key.");
+    unsigned long long* const end = std::unique(keys, keys + *count);
+    std::fill(end, keys + *count, ~0ull);  // so that nobody relies on what is there
+    *count = static_cast<int>(end - keys);
+  }
+  void clear(void* data, std::size_t bytes) {
+    if (bytes > 0) std::memset(data, 0, bytes);
+  }
+
+  // All choices so far, if SimulationOptions::record was set.
+  const Schedule& recorded() const { return runtime_->recorded(); }
+  // Goes on under another schedule, with nothing recorded. Cheaper than another launcher: stacks are kept. Requires a
+  // launcher that is simulated.
+  void reschedule(Generator schedule) { runtime_->reschedule(std::move(schedule)); }
+  bool simulated() const { return runtime_->simulated(); }
+
+ private:
+  template <class Kernel, class... Args>
+  void launch(const Kernel& kernel, std::int64_t blocks, std::size_t shared_bytes, const Args&... args) {
+    const auto call = [&](HostBlock& block) { kernel(block, args...); };
+    Job job;
+    job.kernel = kernel_name<Kernel>();
+    job.run = [](const void* closure, HostBlock& block) { (*static_cast<decltype(&call)>(closure))(block); };
+    job.call = &call;
+    job.blocks = static_cast<int>(std::max<std::int64_t>(blocks, 1));
+    job.shared_bytes = shared_bytes;
+    runtime_->run(job);
+  }
+
+  std::unique_ptr<HostRuntime> runtime_;
+  int blocks_ = kMostBlocks;
+};
+
+}  // namespace cutproof::gpu

@@ -1,0 +1,210 @@
+// Contacts of one particle with the blade and the walls within one substep (method.md §3, Blade; docs/decisions.md,
+// Contacts with the blade). Everything works on displacements from rest: a distance to the blade is
+// (X - edge) + d with X - edge formed once and rounded once, and a projection is added to d, so that a particle far
+// from the body's origin loses no more than that one rounding.
+#pragma once
+#include "gpu/kernels/float3.h"
+#include "gpu/state/device_view.h"
+
+namespace cutproof::gpu {
+
+// A particle at rest: h · node, with node exact.
+struct RestPoint {
+  float h;
+  Float3 node;
+  // X - origin, rounded once.
+  CUTPROOF_DEVICE Float3 from(Float3 origin) const {
+    return {fmaf(h, node.x, -origin.x), fmaf(h, node.y, -origin.y), fmaf(h, node.z, -origin.z)};
+  }
+};
+
+// What a body's particles may not enter during one substep.
+struct Contacts {
+  const WallF* walls;
+  int wall_count;
+  const MoveF* move;  // null: no blade here
+  float half_length, depth, clearance, blade_friction;
+  bool frictionless;
+};
+
+CUTPROOF_DEVICE inline Contacts contacts_of(const DeviceView& w, const BodyConstants& body, int frame, int substep) {
+  Contacts contacts;
+  contacts.walls = w.walls + body.wall_begin;
+  contacts.wall_count = body.wall_end - body.wall_begin;
+  contacts.move = nullptr;
+  // A geometric blade removes what it sweeps and touches nothing.
+  if (body.has_blade && body.criterion != kGeometric) {
+    const MoveF* move = w.moves + (body.schedule + static_cast<int64_t>(frame) * body.substeps + substep);
+    if (move->down) contacts.move = move;
+  }
+  contacts.half_length = 0.5f * body.blade_length;
+  contacts.depth = body.blade_depth;
+  contacts.clearance = body.clearance;
+  contacts.blade_friction = contacts.move != nullptr ? body.blade_friction : 0.0f;
+  contacts.frictionless = contacts.blade_friction == 0;
+  for (int k = 0; k < contacts.wall_count; ++k) {
+    if (contacts.walls[k].friction != 0) contacts.frictionless = false;
+  }
+  return contacts;
+}
+
+namespace contacts_detail {
+
+// In the blade's frame: along the cutting edge, towards the back, along the positive normal.
+CUTPROOF_DEVICE inline Float3 into_frame(const PoseF& pose, Float3 from_edge) {
+  return {dot(from_edge, pose.along), dot(from_edge, pose.back), dot(from_edge, cross(pose.along, pose.back))};
+}
+CUTPROOF_DEVICE inline Float3 out_of_frame(const PoseF& pose, Float3 local) {
+  return local.x * pose.along + local.y * pose.back + local.z * cross(pose.along, pose.back);
+}
+CUTPROOF_DEVICE inline bool same(Float3 a, Float3 b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+
+CUTPROOF_DEVICE inline float along_axis(Float3 a, int axis) { return axis == 0 ? a.x : axis == 1 ? a.y : a.z; }
+CUTPROOF_DEVICE inline void set_axis(Float3& a, int axis, float value) {
+  a.x = axis == 0 ? value : a.x;
+  a.y = axis == 1 ? value : a.y;
+  a.z = axis == 2 ? value : a.z;
+}
+
+// How deep a particle is in a wall; not positive: outside.
+CUTPROOF_DEVICE inline float depth_in(const WallF& wall, const RestPoint& rest, Float3 d) {
+  const float to_wall = fmaf(-rest.h, along_axis(rest.node, wall.axis), wall.offset);  // offset - X
+  return static_cast<float>(wall.side) * (to_wall - along_axis(d, wall.axis));
+}
+
+CUTPROOF_DEVICE inline Float3 off_walls(const Contacts& contacts, const RestPoint& rest, Float3 d) {
+  for (int k = 0; k < contacts.wall_count; ++k) {
+    const WallF wall = contacts.walls[k];
+    if (depth_in(wall, rest, d) > 0) {
+      set_axis(d, wall.axis, fmaf(-rest.h, along_axis(rest.node, wall.axis), wall.offset));
+    }
+  }
+  return d;
+}
+
+// By how much, in the blade's frame, one has to move that came through the plate: back to its own side, or round one of
+// the four sides of the rectangle to where it clears the rounded rim. The shortest way, its own side first.
+CUTPROOF_DEVICE inline Float3 way_out(const Contacts& contacts, Float3 c, float side) {
+  Float3 best = {0, 0, side * contacts.clearance - c.z};
+  float shortest = dot(best, best);
+  const float beyond = -side * fmaxf(fabsf(c.z), contacts.clearance) - c.z;
+  const auto consider = [&](float u, float back) {
+    const Float3 way = {u, back, beyond};
+    const float length = dot(way, way);
+    if (length < shortest) {
+      best = way;
+      shortest = length;
+    }
+  };
+  consider(0, -c.y);
+  consider(0, contacts.depth - c.y);
+  consider(-contacts.half_length - c.x, 0);
+  consider(contacts.half_length - c.x, 0);
+  return best;
+}
+
+// Forbidden is what is nearer than the clearance to the mid-surface, and what lies over it on the other side than where
+// the particle began. Requires contacts.move.
+CUTPROOF_DEVICE inline Float3 off_blade(const Contacts& contacts, const RestPoint& rest, Float3 d, float side) {
+  const PoseF& pose = contacts.move->to;
+  const Float3 c = into_frame(pose, rest.from(pose.edge) + d);
+  Float3 way;
+  if (fabsf(c.x) < contacts.half_length && c.y > 0 && c.y < contacts.depth) {
+    const float height = side * c.z;
+    if (height >= contacts.clearance) return d;
+    way = height >= 0 ? Float3{0, 0, side * contacts.clearance - c.z} : way_out(contacts, c, side);
+  } else {
+    const Float3 offset = {c.x - fminf(fmaxf(c.x, -contacts.half_length), contacts.half_length),
+                           c.y - fminf(fmaxf(c.y, 0.0f), contacts.depth), c.z};
+    const float distance = norm(offset);
+    if (distance >= contacts.clearance) return d;
+    way =
+        distance > 0 ? ((contacts.clearance - distance) / distance) * offset : Float3{0, 0, side * contacts.clearance};
+  }
+  return d + out_of_frame(pose, way);
+}
+
+inline constexpr int kMostTurns = 16;  // of blade and walls, where both hold at once
+
+// The allowed point nearest to d: exactly, unless blade and walls both move it. Then they do in turn, the blade last,
+// and `in_turn` is set.
+CUTPROOF_DEVICE inline Float3 allowed(const Contacts& contacts, const RestPoint& rest, Float3 d, float side,
+                                      bool& in_turn) {
+  if (contacts.move == nullptr) return off_walls(contacts, rest, d);
+  Float3 result = off_blade(contacts, rest, d, side);
+  bool by_blade = !same(result, d);
+  for (int turn = 0; turn < kMostTurns; ++turn) {
+    const Float3 inside = off_walls(contacts, rest, result);
+    if (same(inside, result)) return result;
+    result = off_blade(contacts, rest, inside, side);
+    by_blade = by_blade || !same(result, inside);
+    in_turn = by_blade;
+    if (same(result, inside)) return result;
+  }
+  return result;
+}
+
+// Takes back at most `reach` of the sliding `slid` along the surface with the given normal.
+CUTPROOF_DEVICE inline Float3 rubbed(Float3 d, Float3 slid, Float3 normal, float reach) {
+  const Float3 along = slid - dot(slid, normal) * normal;
+  const float length = norm(along);
+  return length > 0 ? d - fminf(1.0f, reach / length) * along : d;
+}
+
+}  // namespace contacts_detail
+
+// The side of the blade, +1 or -1, on which a particle stands when the substep begins.
+CUTPROOF_DEVICE inline float blade_side(const Contacts& contacts, const RestPoint& rest, Float3 d) {
+  if (contacts.move == nullptr) return 1.0f;
+  const PoseF& pose = contacts.move->from;
+  return contacts_detail::into_frame(pose, rest.from(pose.edge) + d).z < 0 ? -1.0f : 1.0f;
+}
+
+// Where contacts let a particle be that wants to be at d, began the substep at `start` and on side `side`. Sets
+// `in_turn` where that need not be the nearest allowed point, and leaves it alone elsewhere.
+CUTPROOF_DEVICE inline Float3 project(const Contacts& contacts, const RestPoint& rest, Float3 d, float side,
+                                      Float3 start, bool& in_turn) {
+  using namespace contacts_detail;
+  const Float3 projected = allowed(contacts, rest, d, side, in_turn);
+  if (contacts.frictionless || same(projected, d)) return projected;
+  Float3 result = projected;
+  for (int k = 0; k < contacts.wall_count; ++k) {
+    const WallF wall = contacts.walls[k];
+    const float depth = depth_in(wall, rest, d);
+    if (depth <= 0 || wall.friction == 0) continue;
+    Float3 normal;
+    set_axis(normal, wall.axis, static_cast<float>(wall.side));
+    result = rubbed(result, result - start, normal, wall.friction * depth);
+  }
+  if (contacts.blade_friction > 0) {
+    const Float3 pushed = off_blade(contacts, rest, d, side) - d;
+    const float depth = norm(pushed);
+    if (depth > 0) {
+      // The blade's own point under the particle has moved too; only sliding against it rubs.
+      const PoseF &from = contacts.move->from, &to = contacts.move->to;
+      const Float3 c = into_frame(to, rest.from(to.edge) + result);
+      const Float3 carried = (to.edge - from.edge) + c.x * (to.along - from.along) + c.y * (to.back - from.back) +
+                             c.z * (cross(to.along, to.back) - cross(from.along, from.back));
+      result = rubbed(result, result - start - carried, (1.0f / depth) * pushed, contacts.blade_friction * depth);
+    }
+  }
+  return allowed(contacts, rest, result, side, in_turn);
+}
+
+// The same for a solver that comes from x and would go to `free`. Where blade and walls hold at once, projecting in
+// turn need not give the nearest point: never one that is worse than x, so that the energy cannot grow. Elsewhere the
+// projection is the nearest point, and asking would refuse motions below the root of the rounding.
+CUTPROOF_DEVICE inline Float3 next_position(const Contacts& contacts, const RestPoint& rest, Float3 free, float side,
+                                            Float3 start, Float3 x) {
+  bool in_turn = false;
+  const Float3 next = project(contacts, rest, free, side, start, in_turn);
+  const bool worse = dot(next - free, next - free) > dot(x - free, x - free);
+  return in_turn && contacts.frictionless && worse ? x : next;
+}
+
+// Friction, or room that is not convex: an iteration can have several fixed points.
+CUTPROOF_DEVICE inline bool path_matters(const Contacts& contacts) {
+  return contacts.move != nullptr || !contacts.frictionless;
+}
+
+}  // namespace cutproof::gpu

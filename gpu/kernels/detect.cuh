@@ -1,0 +1,439 @@
+// Stage detect (method.md §4): which particles a cut takes out of the tissue. Every particle is judged first, by what
+// was alive before the stage; then all of them go at once.
+//
+// Rounding, with u = 2^-24, of the decisions compared with exact arithmetic on the same stored numbers:
+// - distance: d_i > epsilon h may come out either way where |d_i - epsilon h| <= 8 u (1 + epsilon) h. An edge is h e
+// plus
+//   a difference of displacements, so where the body is does not matter: u for the difference, u for the sum, 1.5 u for
+//   the squares and their sum, and u each for h, epsilon, their product and its square.
+// - geometric: distances to the blade are between places in the body, so they carry 10 u |x| + 8 u |edge|: u each for
+// h,
+//   X, X + d and the stored edge, and for x - edge the difference, the stored axes and the products with them. Ties go
+//   to removal, so the reach is longer by swept_slack(), which is more than that: what is within the reach always goes,
+//   and what is farther by up to twice the slack may go.
+#pragma once
+#include "gpu/launch/launcher.h"
+#include "gpu/launch/plan.h"
+#include "gpu/state/device_view.h"
+
+namespace cutproof::gpu {
+
+namespace detect_detail {
+
+enum : unsigned char { kStays = 0, kGoes = 1, kWentBefore = 2 };  // DeviceView::particle_flag
+
+inline constexpr float kRounding = 0x1p-24f;
+
+CUTPROOF_DEVICE inline int body_index(const DeviceView& w, int p) { return w.bodies == 1 ? 0 : w.body_of[p]; }
+
+CUTPROOF_DEVICE inline bool detects(const DeviceView& w, int b) { return w.body[b].needs_detection && running(w, b); }
+
+// The code of particles that detection removes in the frame in progress.
+CUTPROOF_DEVICE inline int removal_code(const DeviceView& w, int b) { return 2 * w.frame[b] + 2; }
+
+// d_i²: the greatest squared distance to a neighbour in G; 0 without neighbours. Each edge is evaluated from its lower
+// to its upper end, so both ends get the same bits.
+CUTPROOF_DEVICE inline float greatest_squared_edge(const DeviceView& w, const BodyConstants& body, int p) {
+  const Float3 here = xyz(w.displacement[p]);
+  float greatest = 0;
+  for (int direction = 0; direction < 6; ++direction) {
+    const int q = neighbour(w, body, p, direction);
+    if (q < 0 || !alive(w, q)) continue;
+    const Float3 there = xyz(w.displacement[q]);
+    const Float3 difference = direction % 2 == 0 ? there - here : here - there;
+    const int axis = direction / 2;
+    const Float3 edge = {axis == 0 ? body.h + difference.x : difference.x,
+                         axis == 1 ? body.h + difference.y : difference.y,
+                         axis == 2 ? body.h + difference.z : difference.z};
+    const float squared = dot(edge, edge);
+    greatest = squared > greatest ? squared : greatest;
+  }
+  return greatest;
+}
+
+// ---- the swept mid-surface
+
+// Directions along the cutting edge, to the back, and normal to both.
+struct Axes {
+  Float3 along, back, normal;
+};
+CUTPROOF_DEVICE inline Float3 in_axes(const Axes& axes, Float3 v) {
+  return {dot(v, axes.along), dot(v, axes.back), dot(v, axes.normal)};
+}
+
+// How far c lies beyond [low, high], with its sign.
+CUTPROOF_DEVICE inline float beyond(float c, float low, float high) {
+  return c < low ? c - low : c > high ? c - high : 0.0f;
+}
+
+// The vector from the rectangle |x| <= half, 0 <= y <= depth, z = 0 to a point.
+struct Rectangle {
+  float half, depth;
+};
+CUTPROOF_DEVICE inline Float3 from_rectangle(Rectangle r, Float3 c) {
+  return {beyond(c.x, -r.half, r.half), beyond(c.y, 0.0f, r.depth), c.z};
+}
+
+// The least distance between a point and the rectangle while the latter goes along `way`; all in the rectangle's axes.
+//
+// Half the square of the distance at time t in [0, 1] is convex with the slope -way · from_rectangle(c - t way), which
+// is linear between the times at which a coordinate enters or leaves its range. Those times narrow down where the
+// slope changes its sign, until it is linear there and its zero can be written down.
+CUTPROOF_DEVICE inline float distance_to_sweep(Rectangle r, Float3 c, Float3 way) {
+  const auto slope = [&](float t) { return -dot(way, from_rectangle(r, c - t * way)); };
+  float low = 0, high = 1, t = 0;
+  float slope_low = slope(low), slope_high = slope(high);
+  if (slope_low >= 0) {
+    t = 0;
+  } else if (slope_high <= 0) {
+    t = 1;
+  } else {
+    const float bounds[4] = {-r.half, r.half, 0, r.depth};
+    for (int k = 0; k < 4; ++k) {
+      const float speed = k < 2 ? way.x : way.y;
+      const float crossing = ((k < 2 ? c.x : c.y) - bounds[k]) / speed;  // not in (low, high) if it is never crossed
+      if (!(crossing > low && crossing < high)) continue;
+      const float here = slope(crossing);
+      if (here < 0) {
+        low = crossing;
+        slope_low = here;
+      } else {
+        high = crossing;
+        slope_high = here;
+      }
+    }
+    t = low + (high - low) * (slope_low / (slope_low - slope_high));
+  }
+  return norm(from_rectangle(r, c - t * way));
+}
+
+// A turn about `axis` by an angle in [0, π], given by its cosine and sine.
+struct Turn {
+  Float3 axis;
+  float cosine, sine;
+};
+struct Angle {
+  float cosine, sine;
+};
+
+CUTPROOF_DEVICE inline Float3 turned(Float3 v, Float3 axis, Angle a) {  // Rodrigues
+  return a.cosine * v + a.sine * cross(axis, v) + ((1.0f - a.cosine) * dot(axis, v)) * axis;
+}
+CUTPROOF_DEVICE inline Angle half_of(Angle a) {  // of an angle in [0, π]
+  const float larger = sqrtf((1.0f + fabsf(a.cosine)) / 2.0f), smaller = a.sine / (2.0f * larger);
+  return a.cosine < 0 ? Angle{smaller, larger} : Angle{larger, smaller};
+}
+CUTPROOF_DEVICE inline Angle between(Angle a, Angle b) {  // half way; the two are at most a quarter turn apart
+  const float c = a.cosine + b.cosine, s = a.sine + b.sine;
+  const float length = sqrtf(c * c + s * s);
+  return {c / length, s / length};
+}
+// At least the angle between two: that of a chord x is 2 asin(x / 2) = x + x³ / 24 + …
+CUTPROOF_DEVICE inline float angle_between(Angle a, Angle b) {
+  const float c = a.cosine - b.cosine, s = a.sine - b.sine;
+  const float chord = sqrtf(c * c + s * s);
+  return chord <= 1.0f ? chord * (1.0f + chord * chord / 20.0f) : 1.5708f * chord;
+}
+
+// The rotation Σ to_k from_kᵀ that takes one set of axes to the other.
+CUTPROOF_DEVICE inline Turn turn_between(const Axes& from, const Axes& to) {
+  const auto entry = [&](int row, int column) {
+    return to.along[row] * from.along[column] + to.back[row] * from.back[column] + to.normal[row] * from.normal[column];
+  };
+  const Float3 diagonal = {entry(0, 0), entry(1, 1), entry(2, 2)};
+  const Float3 twice_sine = {entry(2, 1) - entry(1, 2), entry(0, 2) - entry(2, 0), entry(1, 0) - entry(0, 1)};
+  const float length = norm(twice_sine);
+  Turn turn = {{0, 0, 1}, (diagonal.x + diagonal.y + diagonal.z - 1.0f) / 2.0f, length / 2.0f};
+  if (turn.cosine > 0) {
+    if (length > 0) turn.axis = (1.0f / length) * twice_sine;
+  } else {
+    // Near half a turn the sine says little: (R + Rᵀ) / 2 = cos + (1 - cos) axis axisᵀ, whose longest column it is.
+    const int k = diagonal.x >= diagonal.y && diagonal.x >= diagonal.z ? 0 : diagonal.y >= diagonal.z ? 1 : 2;
+    const auto symmetric = [&](int row) {
+      return (entry(row, k) + entry(k, row)) / 2.0f - (row == k ? turn.cosine : 0.0f);
+    };
+    const Float3 column = {symmetric(0), symmetric(1), symmetric(2)};
+    const float sign = dot(column, twice_sine) < 0 ? -1.0f : 1.0f;
+    turn.axis = (sign / norm(column)) * column;
+  }
+  const float scale = 1.0f / sqrtf(turn.cosine * turn.cosine + turn.sine * turn.sine);
+  turn.cosine *= scale;
+  turn.sine *= scale;
+  return turn;
+}
+
+// By how much the reach is lengthened for ties to go to removal, given the length of |x| + |edge|.
+CUTPROOF_DEVICE inline float swept_slack(float reach, float places) {
+  return 16.0f * kRounding * reach + 12.0f * kRounding * places;
+}
+
+// Whether the plate, turning while its edge goes along `way`, comes as near as `reach` to x. A part of the move counts
+// as a translation, from which the plate is never farther than its radius times the angle of that part; parts for which
+// this is more than h / 25 are halved where it matters.
+CUTPROOF_DEVICE inline bool turning_comes_near(const BodyConstants& body, const PoseF& from, const Axes& axes,
+                                               const Axes& last, Float3 way, float reach, Float3 x) {
+  constexpr int kMostHalvings = 24;
+  const Rectangle rectangle = {body.blade_length / 2.0f, body.blade_depth};
+  const float radius = sqrtf(rectangle.half * rectangle.half + rectangle.depth * rectangle.depth);
+  const Turn turn = turn_between(axes, last);
+  // The binary tree of parts in depth-first order: at `level` there are 2^level parts, of which this is `part`.
+  int level = 0;
+  unsigned part = 0;
+  for (;;) {
+    Angle a = {1, 0}, b = {turn.cosine, turn.sine};
+    for (int bit = level - 1; bit >= 0; --bit) {
+      const Angle middle = bit == level - 1 ? half_of(b) : between(a, b);
+      (part >> bit & 1u ? a : b) = middle;
+    }
+    const float length = ldexpf(1.0f, -level);
+    const float begin = static_cast<float>(part) * length;
+    const float slack = radius * angle_between(a, b);
+    const Axes now = {turned(axes.along, turn.axis, a), turned(axes.back, turn.axis, a),
+                      turned(axes.normal, turn.axis, a)};
+    const float distance =
+        distance_to_sweep(rectangle, in_axes(now, x - from.edge - begin * way), length * in_axes(now, way));
+    const bool near = distance <= reach + slack;
+    const bool fine = slack <= 0.04f * body.h || level == kMostHalvings;
+    if (near && (fine || distance + slack <= reach)) return true;
+    if (near && !fine) {
+      ++level;
+      part *= 2;
+      continue;
+    }
+    for (; part & 1u; part /= 2) --level;
+    if (level == 0) return false;
+    ++part;
+  }
+}
+
+CUTPROOF_DEVICE inline bool same(Float3 a, Float3 b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+
+// Whether the blade comes as near as max(thickness, h, d_i) / 2 to a particle at x in this move: whichever edge it
+// crosses then loses an end, also where tissue is stretched.
+CUTPROOF_DEVICE inline bool is_swept(const BodyConstants& body, const MoveF& move, float longest_edge, Float3 x) {
+  const PoseF &from = move.from, &to = move.to;
+  const Axes axes = {from.along, from.back, cross(from.along, from.back)};
+  const Rectangle rectangle = {body.blade_length / 2.0f, body.blade_depth};
+  const float longest = longest_edge > body.h ? longest_edge : body.h;
+  const float half = (body.blade_thickness > longest ? body.blade_thickness : longest) / 2.0f;
+  const float reach = half + swept_slack(half, norm(x) + norm(from.edge));
+
+  const bool turns = !same(from.along, to.along) || !same(from.back, to.back);
+  const Axes last = {to.along, to.back, cross(to.along, to.back)};
+  float arc = 0;
+  if (turns) {
+    // Σ |e' - e|² over three orthonormal e is 8 sin²(angle / 2), and angle <= π sin(angle / 2).
+    const Float3 a = last.along - axes.along, b = last.back - axes.back, c = last.normal - axes.normal;
+    const float radius = sqrtf(rectangle.half * rectangle.half + rectangle.depth * rectangle.depth);
+    arc = radius * 3.1416f * sqrtf((dot(a, a) + dot(b, b) + dot(c, c)) / 8.0f);
+  }
+
+  // The sweep's bounding box spares most particles the rest.
+  const Float3 way = to.edge - from.edge;
+  const Float3 at = in_axes(axes, x - from.edge), moved = in_axes(axes, way);
+  const float margin = reach + arc;
+  const auto outside = [&](float c, float low, float high, float goes) {
+    return c < low + (goes < 0 ? goes : 0.0f) - margin || c > high + (goes > 0 ? goes : 0.0f) + margin;
+  };
+  if (outside(at.x, -rectangle.half, rectangle.half, moved.x) || outside(at.y, 0, rectangle.depth, moved.y) ||
+      outside(at.z, 0, 0, moved.z)) {
+    return false;
+  }
+  if (turns) return turning_comes_near(body, from, axes, last, way, reach, x);
+  return distance_to_sweep(rectangle, at, moved) <= reach;
+}
+
+// ---- strain
+
+// The eigenvalues of a symmetric matrix, which is left on the diagonal of `n`, and its eigenvectors, the columns of
+// `v`: cyclic Jacobi.
+CUTPROOF_DEVICE inline void diagonalise(float (&n)[3][3], float (&v)[3][3]) {
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) v[row][column] = row == column ? 1.0f : 0.0f;
+  }
+  for (int sweep = 0; sweep < 6; ++sweep) {
+    for (int pair = 0; pair < 3; ++pair) {
+      const int p = pair == 2 ? 1 : 0, q = pair == 0 ? 1 : 2, r = 3 - p - q;
+      if (n[p][q] == 0) continue;
+      const float theta = (n[q][q] - n[p][p]) / (2.0f * n[p][q]);
+      const float t = copysignf(1.0f, theta) / (fabsf(theta) + sqrtf(1.0f + theta * theta));
+      const float c = 1.0f / sqrtf(1.0f + t * t), s = t * c;
+      n[p][p] -= t * n[p][q];
+      n[q][q] += t * n[p][q];
+      n[p][q] = n[q][p] = 0;
+      const float rp = n[r][p], rq = n[r][q];
+      n[r][p] = n[p][r] = c * rp - s * rq;
+      n[r][q] = n[q][r] = s * rp + c * rq;
+      for (int k = 0; k < 3; ++k) {
+        const float vp = v[k][p], vq = v[k][q];
+        v[k][p] = c * vp - s * vq;
+        v[k][q] = s * vp + c * vq;
+      }
+    }
+  }
+}
+
+// The greatest stretch of the deformation gradient A A0⁺, with A0 = Σ w r rᵀ (r = X - T) and A = A0 + B, B = Σ w e rᵀ
+// (e: displacement less its mean). Directions without extent are left out, as the pseudo-inverse does. Not finite if B
+// is not.
+CUTPROOF_DEVICE inline float greatest_stretch(const float (&a0)[3][3], const float (&b)[3][3]) {
+  // An eigenvalue of a flat cluster is a sum of exact zeros, because connected ones are flat along the axes only.
+  constexpr float kNoExtent = 0x1p-22f;
+  float n[3][3], v[3][3];
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) n[row][column] = a0[row][column];
+  }
+  diagonalise(n, v);
+  const float most = fmaxf(n[0][0], fmaxf(n[1][1], n[2][2]));
+  // With A0 = V Λ Vᵀ the gradient times V has the columns v_k + B v_k / λ_k, or 0.
+  float f[3][3];
+  for (int k = 0; k < 3; ++k) {
+    const float inverse = n[k][k] > kNoExtent * most ? 1.0f / n[k][k] : 0.0f;
+    for (int row = 0; row < 3; ++row) {
+      const float bv = b[row][0] * v[0][k] + b[row][1] * v[1][k] + b[row][2] * v[2][k];
+      f[row][k] = inverse > 0 ? v[row][k] + inverse * bv : 0.0f;
+    }
+  }
+  float c[3][3], unused[3][3];
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      c[row][column] = f[0][row] * f[0][column] + f[1][row] * f[1][column] + f[2][row] * f[2][column];
+    }
+  }
+  const float trace = c[0][0] + c[1][1] + c[2][2];
+  if (!(trace <= 3.0e38f)) return trace;
+  diagonalise(c, unused);
+  return sqrtf(fmaxf(c[0][0], fmaxf(c[1][1], c[2][2])));
+}
+
+inline constexpr int kStrainThreads = 32;  // as many as a host block has: host and device add in the same order
+
+}  // namespace detect_detail
+
+// slot_flag: clusters that are stretched too much in some direction. The criterion that the paper rejects (its Fig. 7),
+// kept as a baseline.
+template <class Block>
+CUTPROOF_DEVICE void flag_strained_clusters_kernel(Block& block, DeviceView w) {
+  using namespace detect_detail;
+  for (int s = block.index(); s < w.counters->slots_used; s += block.count()) {
+    const int b = w.slot_body[s], begin = w.slot_begin[s], size = w.slot_size[s];
+    const BodyConstants& body = w.body[b];
+    if (size == 0 || body.criterion != kStrain || !detects(w, b)) continue;
+    const Float3 base = xyz(w.displacement[w.members[begin]]);
+    const auto weighted = [&](auto add) {
+      for (int k = block.thread(); k < size; k += block.size()) {
+        const int p = w.members[begin + k];
+        const Float4 now = w.displacement[p];
+        add(p, now.w / static_cast<float>(w.membership_count[p]), xyz(now) - base);
+      }
+    };
+    Float3 mean;
+    weighted([&](int, float weight, Float3 e) { mean = mean + weight * e; });
+    mean = (1.0f / w.mass[s]) * Float3{block.sum(mean.x), block.sum(mean.y), block.sum(mean.z)};
+    float a0[3][3] = {}, moved[3][3] = {};
+    weighted([&](int p, float weight, Float3 e) {
+      const Float3 r = from_rest_center(w, body, p, s), d = e - mean;
+      for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column) {
+          a0[row][column] += weight * (r[row] * r[column]);
+          moved[row][column] += weight * (d[row] * r[column]);
+        }
+      }
+    });
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) {
+        a0[row][column] = block.sum(a0[row][column]);
+        moved[row][column] = block.sum(moved[row][column]);
+      }
+    }
+    if (block.thread() == 0) {
+      const float stretch = greatest_stretch(a0, moved);
+      w.slot_flag[s] = stretch > body.strain && stretch <= 3.0e38f;
+    }
+  }
+}
+CUTPROOF_KERNEL(flag_strained_clusters_kernel);
+
+// Judges the particles of every body, but those of geometric cuts.
+template <class Block>
+CUTPROOF_DEVICE void flag_particles_kernel(Block& block, DeviceView w) {
+  using namespace detect_detail;
+  if (block.first() == 0) w.counters->removed = 0;
+  for (int64_t b = block.first(); b < w.bodies; b += block.stride()) {
+    if (detects(w, static_cast<int>(b))) w.cut[b] = -1;
+  }
+  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
+    const int p = static_cast<int>(i), b = body_index(w, p);
+    const BodyConstants& body = w.body[b];
+    unsigned char flag = kStays;
+    if (detects(w, b)) {
+      if (!alive(w, p)) {
+        if (w.death[p] == removal_code(w, b)) flag = kWentBefore;
+      } else if (body.criterion == kDistance) {
+        const float limit = body.epsilon * body.h;
+        if (greatest_squared_edge(w, body, p) > limit * limit) flag = kGoes;
+      } else if (body.criterion == kStrain) {
+        for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
+          const int s = w.memberships[k];
+          if (s >= 0 && w.slot_flag[s]) flag = kGoes;
+        }
+      }
+    }
+    w.particle_flag[p] = flag;
+  }
+}
+CUTPROOF_KERNEL(flag_particles_kernel);
+
+template <class Block>
+CUTPROOF_DEVICE void flag_swept_particles_kernel(Block& block, DeviceView w) {
+  using namespace detect_detail;
+  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
+    const int p = static_cast<int>(i), b = body_index(w, p);
+    const BodyConstants& body = w.body[b];
+    if (body.criterion != kGeometric || !body.has_blade || !detects(w, b) || !alive(w, p)) continue;
+    const MoveF* const moves = w.moves + body.schedule + int64_t{w.frame[b]} * body.substeps;
+    float longest = -1;
+    for (int s = 0; s < body.substeps; ++s) {
+      if (!moves[s].down) continue;
+      if (longest < 0) longest = sqrtf(greatest_squared_edge(w, body, p));
+      if (is_swept(body, moves[s], longest, rest_position(body, w.node[p]) + xyz(w.displacement[p]))) {
+        w.particle_flag[p] = kGoes;
+        break;
+      }
+    }
+  }
+}
+CUTPROOF_KERNEL(flag_swept_particles_kernel);
+
+// What a detection earlier in this frame has removed leaves the list, which this one replaces.
+template <class Block>
+CUTPROOF_DEVICE void remove_particles_kernel(Block& block, DeviceView w) {
+  using namespace detect_detail;
+  int removed = 0;
+  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
+    const int p = static_cast<int>(i);
+    const unsigned char flag = w.particle_flag[p];
+    if (flag == kStays) continue;
+    if (flag == kWentBefore) {
+      w.death[p] = kDeadBefore;
+      continue;
+    }
+    const int b = body_index(w, p), code = removal_code(w, b);
+    w.death[p] = code;
+    block.store(&w.cut[b], code);
+    ++removed;
+  }
+  if (removed > 0) block.atomic_add(&w.counters->removed, removed);
+}
+CUTPROOF_KERNEL(remove_particles_kernel);
+
+template <class Launcher>
+void enqueue_detect(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+  using namespace detect_detail;
+  if (plan.strain) launcher.blocks(flag_strained_clusters_kernel_object{}, w.slot_capacity, kStrainThreads, 0, w);
+  launcher.items(flag_particles_kernel_object{}, w.particles, w);
+  if (plan.geometric) launcher.items(flag_swept_particles_kernel_object{}, w.particles, w);
+  launcher.items(remove_particles_kernel_object{}, w.particles, w);
+}
+
+}  // namespace cutproof::gpu

@@ -1,0 +1,565 @@
+// Merge (method.md §6): small clusters of the bodies that were cut join clusters that they touch.
+//
+// A round is two launches. First every small cluster s looks for the cluster t that it would join and writes it to
+// proposal[s]; a proposal asks for both s and t, and best[s] and best[t] decide whose they become: under
+// `deterministic` the proposer with the smallest key, under `published` whoever was first. Then the proposals that got
+// both of theirs are carried out: those pairs are disjoint, so each union is as legal as its proposal.
+//
+// Rounds end when nobody proposes. A small cluster without a legal target will never have one, so it need not be asked
+// again: a union u ∪ t that would be legal for it contains a u or t that it touches and that was legal before.
+//
+// Unions are written to new room behind the present members. When that is used up, the lists are moved together and the
+// round goes on: its unions are disjoint, so they need no more room than all lists together, and a merge begins only if
+// there is as much.
+#pragma once
+#include <cstdint>
+
+#include "gpu/kernels/rest_frames.cuh"
+#include "gpu/kernels/sorted_lists.cuh"
+#include "gpu/launch/launcher.h"
+#include "gpu/launch/plan.h"
+#include "gpu/state/device_view.h"
+
+namespace cutproof::gpu {
+
+// Scratch of merge in DeviceView::slot_scratch, by slot: where lists go when they are moved together.
+CUTPROOF_BOTH inline int* moved_begin(const DeviceView& w) { return w.slot_scratch; }
+// r + 1: in round r the cluster itself, or one that it touches, has changed. What it proposes stands until then.
+CUTPROOF_BOTH inline int* changed_after(const DeviceView& w) { return w.slot_scratch + w.slot_capacity; }
+// Not 0: a particle of the cluster is in fewer or more clusters than before, or the cluster has grown.
+CUTPROOF_BOTH inline int* rest_marks(const DeviceView& w) { return w.slot_scratch + int64_t{3} * w.slot_capacity; }
+// DeviceView::best of even and odd rounds. A round writes to one and clears what the round before wrote to the other.
+CUTPROOF_BOTH inline int* best_of_round(const DeviceView& w, int round) {
+  return round % 2 == 0 ? w.best : w.slot_scratch + int64_t{2} * w.slot_capacity;
+}
+
+CUTPROOF_BOTH inline bool merges_now(const DeviceView& w, int b) {
+  return cut_now(w, b) && w.body[b].merge_rule != kNoMerge;
+}
+
+// --- Who may join whom -----------------------------------------------------------------------------------------------
+
+// A hash table of the clusters that a small cluster touches, in shared memory. Should it overflow, which takes a
+// cluster with hundreds of neighbours, they are gone through in windows of slots instead.
+inline constexpr int kCandidates = 512, kProbes = 24;
+struct TouchTable {
+  int* slot;      // [kCandidates] -1: free
+  int* shares;    // [kCandidates] how many particles it shares with the small cluster
+  int* overflow;  // [1]
+};
+inline constexpr std::size_t kCandidateBytes = 2 * kCandidates * sizeof(int) + 16;
+
+template <class Block>
+CUTPROOF_DEVICE TouchTable take_candidate_table(Block& block) {
+  int* slot = block.template shared<int>(kCandidates);
+  int* shares = block.template shared<int>(kCandidates);
+  return {slot, shares, block.template shared<int>(1)};
+}
+
+template <class Block>
+CUTPROOF_DEVICE void add_candidate(Block& block, const TouchTable& table, int t, bool shares) {
+  unsigned place = static_cast<unsigned>(t) * 0x9E3779B9u >> 23;  // the upper 9 bits
+  static_assert(kCandidates == 1 << 9);
+  for (int probe = 0; probe < kProbes; ++probe) {
+    const int there = block.atomic_cas(&table.slot[place], -1, t);
+    if (there == -1 || there == t) {
+      if (shares) block.atomic_add(&table.shares[place], 1);
+      return;
+    }
+    place = (place + 1) % kCandidates;
+  }
+  block.store(table.overflow, 1);
+}
+
+// Calls visit(t, shares) for memberships t of the members of s (shares: true) and of their neighbours in G, many of
+// them several times. The threads of the block share the work.
+template <class Block, class Visit>
+CUTPROOF_DEVICE void for_touching(Block& block, const DeviceView& w, int s, Visit visit) {
+  const BodyConstants& body = w.body[w.slot_body[s]];
+  const int* members = w.members + w.slot_begin[s];
+  const int64_t looks = int64_t{7} * w.slot_size[s];
+  for (int64_t i = block.thread(); i < looks; i += block.size()) {
+    const int p = members[i / 7];
+    const int direction = static_cast<int>(i % 7) - 1;
+    int q = p;
+    if (direction >= 0) {
+      q = alive(w, p) ? neighbour(w, body, p, direction) : -1;
+      if (q < 0 || !alive(w, q)) continue;
+    }
+    for (int h = w.membership_begin[q]; h < w.membership_begin[q + 1]; ++h) {
+      const int t = block.load(&w.memberships[h]);
+      if (t >= 0 && t != s) visit(t, direction < 0);
+    }
+  }
+}
+
+// Preference as a number: smallest t first, then the lowest number, which is the lowest slot; ~0: not legal.
+CUTPROOF_DEVICE inline unsigned long long preference(const DeviceView& w, int s, int t, int shares) {
+  const int size = w.slot_size[s], target_size = w.slot_size[t];
+  const bool contained = shares == size;
+  const int64_t joined = int64_t{size} + target_size - shares;
+  if (!contained && joined > w.body[w.slot_body[s]].cap) return ~0ull;
+  return static_cast<unsigned long long>(target_size) << 32 | static_cast<unsigned>(t);
+}
+
+// The cluster that s would join, or -1; the same for all threads. s is not empty.
+template <class Block>
+CUTPROOF_DEVICE int preferred_target(Block& block, const DeviceView& w, int s, const TouchTable& table) {
+  for (int i = block.thread(); i < kCandidates; i += block.size()) {
+    table.slot[i] = -1;
+    table.shares[i] = 0;
+  }
+  if (block.thread() == 0) *table.overflow = 0;
+  block.sync();
+  for_touching(block, w, s, [&](int t, bool shares) { add_candidate(block, table, t, shares); });
+  block.sync();
+
+  unsigned long long least = ~0ull;
+  if (*table.overflow == 0) {
+    for (int i = block.thread(); i < kCandidates; i += block.size()) {
+      if (table.slot[i] < 0) continue;
+      const unsigned long long found = preference(w, s, table.slot[i], table.shares[i]);
+      if (found < least) least = found;
+    }
+    least = block.smallest(least);
+  } else {
+    // Slot by slot in windows as wide as the table, which then needs no search: where hundreds of clusters overlap, one
+    // walk for each of them would take forever.
+    constexpr int kNone = 0x7fffffff;
+    for (int begin = 0;;) {
+      block.sync();  // the last window has been read
+      for (int i = block.thread(); i < kCandidates; i += block.size()) {
+        table.slot[i] = -1;
+        table.shares[i] = 0;
+      }
+      int first = kNone;
+      for_touching(block, w, s, [&](int t, bool) {
+        if (t >= begin && t < first) first = t;
+      });
+      first = block.smallest(first);
+      if (first == kNone) break;
+      block.sync();
+      for_touching(block, w, s, [&](int t, bool shares) {
+        if (t < first || t - first >= kCandidates) return;
+        block.store(&table.slot[t - first], t);
+        if (shares) block.atomic_add(&table.shares[t - first], 1);
+      });
+      block.sync();
+      for (int i = block.thread(); i < kCandidates; i += block.size()) {
+        if (table.slot[i] < 0) continue;
+        const unsigned long long found = preference(w, s, table.slot[i], table.shares[i]);
+        if (found < least) least = found;
+      }
+      if (first > kNone - kCandidates) break;
+      begin = first + kCandidates;
+    }
+    least = block.smallest(least);
+  }
+  return least == ~0ull ? -1 : static_cast<int>(least & 0xffffffffu);
+}
+
+// --- Who gets whom ---------------------------------------------------------------------------------------------------
+
+// A bijection of 32-bit words that scatters neighbouring values (method.md §6).
+CUTPROOF_BOTH inline unsigned scatter(unsigned x) {
+  x ^= x >> 16;
+  x *= 0x7feb352du;
+  x ^= x >> 15;
+  x *= 0x846ca68bu;
+  x ^= x >> 16;
+  return x;
+}
+
+struct ProposalKey {
+  unsigned word;
+  int low, high, source;  // numbers
+};
+CUTPROOF_BOTH inline ProposalKey proposal_key(int source, int target, int round) {
+  const int low = source < target ? source : target;
+  const int high = source < target ? target : source;
+  const unsigned word = 0x9E3779B9u * static_cast<unsigned>(low) ^ 0x85EBCA6Bu * static_cast<unsigned>(high) ^
+                        0xC2B2AE35u * static_cast<unsigned>(round);
+  return {scatter(word), low, high, source};
+}
+CUTPROOF_BOTH inline bool precedes(const ProposalKey& a, const ProposalKey& b) {
+  if (a.word != b.word) return a.word < b.word;
+  if (a.low != b.low) return a.low < b.low;
+  if (a.high != b.high) return a.high < b.high;
+  return a.source < b.source;
+}
+
+// best[named] becomes s unless a proposal with a smaller key is there. One thread; proposal[s] is visible to all.
+template <class Block>
+CUTPROOF_DEVICE void offer_key(Block& block, const DeviceView& w, int* best, int named, int s, int t, int round) {
+  const ProposalKey own = proposal_key(w.slot_number[s], w.slot_number[t], round);
+  int other = block.load(&best[named]);
+  for (;;) {
+    if (other >= 0) {
+      block.fence();  // its proposal was written before it came here
+      const int target = block.load(&w.proposal[other]);
+      if (!precedes(own, proposal_key(w.slot_number[other], w.slot_number[target], round))) return;
+    }
+    const int seen = block.atomic_cas(&best[named], other, s);
+    if (seen == other) return;
+    other = seen;
+  }
+}
+
+// Takes both ends or none. The lower end first: then the claims that are turned away in a pass each waited for a
+// higher end than the last, so in every schedule the last one is not turned away, and every pass merges something.
+template <class Block>
+CUTPROOF_DEVICE void claim_both(Block& block, int* best, int s, int t) {
+  const int low = s < t ? s : t, high = s < t ? t : s;
+  if (block.atomic_cas(&best[low], -1, s) != -1) return;
+  if (block.atomic_cas(&best[high], -1, s) != -1) block.store(&best[low], -1);
+}
+
+// Small clusters propose, in round Counters::round.
+template <class Block>
+CUTPROOF_DEVICE void propose_merges_kernel(Block& block, DeviceView w) {
+  const TouchTable table = take_candidate_table(block);
+  Counters& c = *w.counters;
+  if (c.failed) return;
+  const int round = c.round;
+  int* best = best_of_round(w, round);
+  int* best_before = best_of_round(w, round + 1);
+  if (block.first() == 0) c.merging_round = round;
+  for (int job = block.index(); job < c.small; job += block.count()) {
+    const int s = w.small_clusters[job];
+    const BodyConstants& body = w.body[w.slot_body[s]];
+    if (body.merge_rule == kSinglePass) continue;
+    const int before = w.proposal[s];
+    if (round > 0 && before < 0) continue;  // never again
+    // Many clusters may wait for the same target, round after round: looking again only where something has changed
+    // keeps that from costing a search each.
+    int t = before;
+    const bool stands = round > 0 && block.load(&changed_after(w)[s]) != round;
+    if (!stands) {
+      t = -1;
+      if (w.slot_size[s] > 0 && w.slot_size[s] < body.tau) t = preferred_target(block, w, s, table);
+      block.sync();  // everyone has read proposal[s]
+    }
+    if (block.thread() != 0) continue;
+    if (before >= 0) {
+      block.store(&best_before[s], -1);
+      block.store(&best_before[before], -1);
+    }
+    block.store(&w.proposal[s], t);
+    if (t < 0) continue;
+    block.store(&c.changed, 1);
+    if (body.merge_rule == kDeterministic) {
+      block.fence();
+      offer_key(block, w, best, s, s, t, round);
+      offer_key(block, w, best, t, s, t, round);
+    } else {
+      claim_both(block, best, s, t);
+    }
+  }
+}
+CUTPROOF_KERNEL(propose_merges_kernel);
+
+// --- Merging ---------------------------------------------------------------------------------------------------------
+
+// The first place of room for `count` members; -1: there is none, and the lists are to be moved together. One thread.
+template <class Block>
+CUTPROOF_DEVICE int reserve_members(Block& block, const DeviceView& w, int count) {
+  Counters& c = *w.counters;
+  const int begin = block.atomic_add(&c.members_used, count);
+  if (begin <= w.member_capacity - count) return begin;
+  block.atomic_add(&c.members_used, -count);
+  block.store(&c.failed, 1);
+  return -1;
+}
+
+// Particles that s holds are held by t instead, or once less if t, whose members are `list`, holds them already. Other
+// blocks do the same for other pairs in the same rows of memberships, in other places of them.
+template <class Block>
+CUTPROOF_DEVICE void hand_over(Block& block, const DeviceView& w, int s, int t, const int* list, int size) {
+  int* marks = rest_marks(w);
+  const int* members = w.members + w.slot_begin[s];
+  for (int k = block.thread(); k < w.slot_size[s]; k += block.size()) {
+    const int p = members[k];
+    const bool twice = contains(list, size, p);
+    const int begin = w.membership_begin[p], end = w.membership_begin[p + 1];
+    for (int h = begin; h < end; ++h) {
+      if (block.load(&w.memberships[h]) == s) block.store(&w.memberships[h], twice ? -1 : t);
+    }
+    if (!twice) continue;
+    block.atomic_add(&w.membership_count[p], -1);
+    for (int h = begin; h < end; ++h) {
+      const int holder = block.load(&w.memberships[h]);
+      if (holder >= 0) block.store(&marks[holder], 1);
+    }
+  }
+}
+
+// Carries out the proposals that got both ends: those of them, if it is called again, that found no room.
+template <class Block>
+CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, DeviceView w) {
+  int* place = block.template shared<int>(1);
+  Counters& c = *w.counters;
+  const int* best = best_of_round(w, c.merging_round);
+  const bool failed = block.any(block.thread() == 0 && block.load(&c.failed) != 0);
+  for (int job = block.index(); job < c.small && !failed; job += block.count()) {
+    const int s = w.small_clusters[job];
+    const int t = w.proposal[s];
+    if (t < 0 || best[s] != s || best[t] != s || w.body[w.slot_body[s]].merge_rule == kSinglePass) continue;
+    if (w.slot_size[s] == 0) continue;  // done
+    const int size = w.slot_size[s], target_size = w.slot_size[t];
+    const int* members = w.members + w.slot_begin[s];
+    const int* target = w.members + w.slot_begin[t];
+    const int missing = count_missing(block, members, size, target, target_size);
+    if (missing > 0) {
+      if (block.thread() == 0) *place = reserve_members(block, w, target_size + missing);
+      block.sync();
+      if (*place >= 0) write_union(block, target, target_size, members, size, w.members + *place);
+    }
+    const bool fits = missing == 0 || *place >= 0;
+    if (fits) {
+      // Others hand over at the same time: who is read here may be gone, but then whoever took it in says so itself.
+      int* changed = changed_after(w);
+      const auto note = [&](int touched, bool) { block.store(&changed[touched], c.merging_round + 1); };
+      for_touching(block, w, s, note);
+      for_touching(block, w, t, note);
+      if (block.thread() == 0) {
+        note(s, true);
+        note(t, true);
+      }
+      hand_over(block, w, s, t, target, target_size);
+    }
+    block.sync();
+    if (block.thread() == 0 && fits) {
+      if (missing > 0) w.slot_begin[t] = *place;
+      w.slot_size[t] = target_size + missing;
+      w.slot_size[s] = 0;
+      block.store(&rest_marks(w)[t], 1);
+    }
+  }
+  if (block.first() != 0) return;
+  c.merging = c.changed;
+  c.round = c.merging_round + 1;
+  c.changed = 0;
+}
+CUTPROOF_KERNEL(merge_pairs_kernel);
+
+// --- single_pass: the paper's strategy as printed, a baseline --------------------------------------------------------
+
+// Every small cluster tries once to own its target; nothing keeps an owned cluster from owning. best: owner.
+template <class Block>
+CUTPROOF_DEVICE void propose_once_kernel(Block& block, DeviceView w) {
+  const TouchTable table = take_candidate_table(block);
+  for (int job = block.index(); job < w.counters->small; job += block.count()) {
+    const int s = w.small_clusters[job];
+    if (w.body[w.slot_body[s]].merge_rule != kSinglePass) continue;
+    const int t = preferred_target(block, w, s, table);
+    if (block.thread() != 0 || t < 0) continue;
+    w.proposal[s] = t;
+    block.atomic_cas(&w.best[t], -1, s);
+  }
+}
+CUTPROOF_KERNEL(propose_once_kernel);
+
+CUTPROOF_DEVICE inline bool owns_target(const DeviceView& w, int s) {
+  return w.proposal[s] >= 0 && w.best[w.proposal[s]] == s;
+}
+
+// The chain whose last owner is s; or, if s is the lowest of a cycle, that cycle without the claim of s.
+struct OwnerChain {
+  int end = -1;    // takes in the others; -1: there is no such chain
+  int first = -1;  // its owner, whose owner is the next, until none is left or the end comes again
+};
+CUTPROOF_DEVICE inline OwnerChain chain_of(const DeviceView& w, int s) {
+  if (!owns_target(w, s)) return {};
+  int at = w.proposal[s];
+  if (!owns_target(w, at)) return {at, s};
+  while (at > s && owns_target(w, at)) at = w.proposal[at];
+  return at == s ? OwnerChain{s, w.best[s]} : OwnerChain{};
+}
+
+// Owners and owned form chains and cycles, each of which becomes one cluster, above the cap or not.
+template <class Block>
+CUTPROOF_DEVICE void merge_chains_kernel(Block& block, DeviceView w) {
+  int* place = block.template shared<int>(1);
+  for (int job = block.index(); job < w.counters->small; job += block.count()) {
+    if (w.body[w.slot_body[w.small_clusters[job]]].merge_rule != kSinglePass) continue;
+    const auto [end, first] = chain_of(w, w.small_clusters[job]);
+    if (end < 0 || w.slot_size[first] == 0) continue;  // not here, or done
+    const auto is_source = [end = end](int s) { return s >= 0 && s != end; };
+    if (block.thread() == 0) {
+      int room = w.slot_size[end];
+      for (int s = first; is_source(s); s = w.best[s]) room += w.slot_size[s];
+      *place = reserve_members(block, w, room);
+    }
+    block.sync();
+    const int begin = *place;
+    block.sync();  // everyone has read it
+    if (begin < 0) continue;
+
+    // The union so far lies in its new room or, in turn, in the same places of DeviceView::label.
+    const int* united = w.members + w.slot_begin[end];
+    int size = w.slot_size[end];
+    int* out = w.members + begin;
+    for (int s = first; is_source(s); s = w.best[s]) {
+      hand_over(block, w, s, end, united, size);
+      size = write_union(block, united, size, w.members + w.slot_begin[s], w.slot_size[s], out);
+      block.sync();
+      united = out;
+      out = out == w.members + begin ? w.label + begin : w.members + begin;
+    }
+    if (united == w.label + begin) {
+      for (int k = block.thread(); k < size; k += block.size()) w.members[begin + k] = w.label[begin + k];
+    }
+    block.sync();
+    if (block.thread() != 0) continue;
+    for (int s = first; is_source(s); s = w.best[s]) w.slot_size[s] = 0;
+    w.slot_begin[end] = begin;
+    w.slot_size[end] = size;
+    block.store(&rest_marks(w)[end], 1);
+  }
+}
+CUTPROOF_KERNEL(merge_chains_kernel);
+
+// --- Beginning and end -----------------------------------------------------------------------------------------------
+
+// A merge does not begin after a fault: what the faulty stage left may still hold dead particles.
+template <class Block>
+CUTPROOF_DEVICE void begin_merge_kernel(Block& block, DeviceView w) {
+  Counters& c = *w.counters;
+  int live = 0;
+  for (int64_t s = block.first(); s < w.slot_capacity; s += block.stride()) {
+    w.slot_flag[s] = 0;
+    if (s >= c.slots_used) continue;
+    live += w.slot_size[s];
+    if (c.fault != 0 || !merges_now(w, w.slot_body[s])) continue;
+    w.proposal[s] = -1;
+    best_of_round(w, 0)[s] = -1;
+    best_of_round(w, 1)[s] = -1;
+    rest_marks(w)[s] = 0;
+    changed_after(w)[s] = 0;
+    w.slot_flag[s] = w.slot_size[s] > 0 && w.slot_size[s] < w.body[w.slot_body[s]].tau;
+  }
+  live = block.sum(live);
+  if (block.thread() == 0 && live > 0) block.atomic_add(&c.live_members, live);
+}
+CUTPROOF_KERNEL(begin_merge_kernel);
+
+// Whether a round surely finds room: it unites each list at most once, and each small cluster with one other to at most
+// cap members.
+template <class Block>
+CUTPROOF_DEVICE void begin_rounds_kernel(Block& block, DeviceView w) {
+  if (block.first() != 0) return;
+  Counters& c = *w.counters;
+  int cap = 0;
+  for (int b = 0; b < w.bodies; ++b) {
+    const BodyConstants& body = w.body[b];
+    if (!merges_now(w, b)) continue;
+    // A chain of single_pass grows beyond the cap.
+    cap = body.merge_rule == kSinglePass ? c.live_members : body.cap > cap ? body.cap : cap;
+  }
+  int64_t most = int64_t{c.small} * cap;
+  if (most > c.live_members) most = c.live_members;
+  if (c.live_members + most > w.member_capacity) {
+    c.small = 0;
+    block.atomic_or(&c.fault, kMembersFull);
+  }
+  c.merging = c.small > 0;
+  c.round = 0;
+  c.changed = 0;
+  c.failed = 0;
+}
+CUTPROOF_KERNEL(begin_rounds_kernel);
+
+template <class Block>
+CUTPROOF_DEVICE void note_rest_dirty_kernel(Block& block, DeviceView w) {
+  for (int64_t s = block.first(); s < w.counters->slots_used; s += block.stride()) {
+    if (merges_now(w, w.slot_body[s]) && w.slot_size[s] > 0 && rest_marks(w)[s] != 0) w.rest_dirty[s] = 1;
+  }
+}
+CUTPROOF_KERNEL(note_rest_dirty_kernel);
+
+// --- Moving all lists together ---------------------------------------------------------------------------------------
+
+// To DeviceView::label, in the order of slots.
+template <class Block>
+CUTPROOF_DEVICE void gather_members_kernel(Block& block, DeviceView w) {
+  for (int s = block.index(); s < w.counters->slots_used; s += block.count()) {
+    const int from = w.slot_begin[s], to = moved_begin(w)[s];
+    for (int k = block.thread(); k < w.slot_size[s]; k += block.size()) w.label[to + k] = w.members[from + k];
+  }
+}
+CUTPROOF_KERNEL(gather_members_kernel);
+
+// And back. What found no room tries again, and rounds go on.
+template <class Block>
+CUTPROOF_DEVICE void place_members_kernel(Block& block, DeviceView w) {
+  for (int64_t q = block.first(); q < w.counters->members_used; q += block.stride()) w.members[q] = w.label[q];
+  for (int64_t s = block.first(); s < w.counters->slots_used; s += block.stride()) w.slot_begin[s] = moved_begin(w)[s];
+  if (block.first() != 0) return;
+  w.counters->failed = 0;
+  w.counters->changed = 1;
+}
+CUTPROOF_KERNEL(place_members_kernel);
+
+template <class Launcher>
+void enqueue_move_together(Launcher& launcher, const DeviceView& w) {
+  launcher.exclusive_scan(w.slot_size, moved_begin(w), w.slot_capacity, &w.counters->members_used);
+  launcher.blocks(gather_members_kernel_object{}, w.slot_capacity, 128, 0, w);
+  launcher.items(place_members_kernel_object{}, w.member_capacity, w);
+}
+
+// Memberships of a particle in ascending order, -1 last.
+CUTPROOF_DEVICE inline void sort_memberships(const DeviceView& w, int64_t p) {
+  for (int end = w.membership_begin[p] + 1; end < w.membership_begin[p + 1]; ++end) {
+    const int moving = w.memberships[end];
+    int h = end;
+    for (; h > w.membership_begin[p] && static_cast<unsigned>(w.memberships[h - 1]) > static_cast<unsigned>(moving);
+         --h) {
+      w.memberships[h] = w.memberships[h - 1];
+    }
+    w.memberships[h] = moving;
+  }
+}
+
+// The work that follows a cut is small, so grids are kept small too: blocks take several clusters if there are many.
+inline constexpr int kMergeBlocks = 2048, kMergeThreads = 128;
+
+template <class Launcher>
+void enqueue_merge(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+  Counters* const c = w.counters;
+  const int64_t most = w.slot_capacity < kMergeBlocks ? w.slot_capacity : kMergeBlocks;
+  const auto propose = [&](Launcher& on, auto kernel) { on.blocks(kernel, most, kMergeThreads, kCandidateBytes, w); };
+  const auto carry_out = [&](Launcher& on, auto kernel) { on.blocks(kernel, most, kMergeThreads, 16, w); };
+  const auto rounds = [&](Launcher& on) {
+    on.while_nonzero(&c->merging, [&](Launcher& round) {
+      propose(round, propose_merges_kernel_object{});
+      carry_out(round, merge_pairs_kernel_object{});
+    });
+  };
+
+  launcher.clear(&c->live_members, sizeof(int));
+  launcher.items(begin_merge_kernel_object{}, w.slot_capacity, w);
+  launcher.select(w.slot_flag, w.slot_capacity, w.small_clusters, &c->small);
+  launcher.items(begin_rounds_kernel_object{}, 1, w);
+  if (plan.single_pass_merge) {
+    propose(launcher, propose_once_kernel_object{});
+    carry_out(launcher, merge_chains_kernel_object{});
+    launcher.if_nonzero(&c->failed, [&](Launcher& again) {
+      enqueue_move_together(again, w);
+      carry_out(again, merge_chains_kernel_object{});
+    });
+  }
+  if (plan.deterministic_merge || plan.published_merge) {
+    rounds(launcher);
+    launcher.while_nonzero(&c->failed, [&](Launcher& again) {
+      enqueue_move_together(again, w);
+      carry_out(again, merge_pairs_kernel_object{});
+      rounds(again);
+    });
+  }
+  launcher.if_nonzero(&c->small, [&](Launcher& inner) {
+    inner.items(note_rest_dirty_kernel_object{}, w.slot_capacity, w);
+    enqueue_rest_frames(inner, w);
+  });
+}
+
+}  // namespace cutproof::gpu

@@ -1,0 +1,66 @@
+// Ascending lists of different numbers: searching in one, uniting two. Merge and expand use them on the members of
+// clusters. A list is anything that operator[] gives numbers of.
+#pragma once
+#include "gpu/launch/block.h"
+
+namespace cutproof::gpu {
+
+// How many numbers of the list are less than `value`.
+template <class List, class Value>
+CUTPROOF_DEVICE inline int lower_bound(const List& list, int size, Value value) {
+  int low = 0;
+  while (size > 0) {
+    const int half = size / 2;
+    if (list[low + half] < value) {
+      low += half + 1;
+      size -= half + 1;
+    } else {
+      size = half;
+    }
+  }
+  return low;
+}
+
+template <class List>
+CUTPROOF_DEVICE inline bool contains(const List& list, int size, int value) {
+  const int place = lower_bound(list, size, value);
+  return place < size && list[place] == value;
+}
+
+// Which numbers of `list` are missing in `other`: a count for the whole block.
+template <class Block, class List, class Other>
+CUTPROOF_DEVICE int count_missing(Block& block, const List& list, int size, const Other& other, int other_size) {
+  int missing = 0;
+  for (int k = block.thread(); k < size; k += block.size()) missing += !contains(other, other_size, list[k]);
+  return block.sum(missing);
+}
+
+// Writes those numbers of `list` that go into the union of `list` and `other` where they belong: all of them, or only
+// those that `other` does not have.
+template <class Block, class List, class Other>
+CUTPROOF_DEVICE int write_part_of_union(Block& block, const List& list, int size, const Other& other, int other_size,
+                                        bool common_too, int* out) {
+  int common = 0;  // numbers that both have, so far
+  for (int begin = 0; begin < size; begin += block.size()) {
+    const int k = begin + block.thread();
+    const int value = k < size ? list[k] : 0;
+    const int place = k < size ? lower_bound(other, other_size, value) : 0;
+    const bool in_both = k < size && place < other_size && other[place] == value;
+    int found = 0;
+    const int before = block.exclusive_scan(in_both ? 1 : 0, found);
+    if (k < size && (common_too || !in_both)) out[k + place - common - before] = value;
+    common += found;
+  }
+  return common;
+}
+
+// Writes the union of `a` and `b` to `out`, which overlaps neither, and gives its size. All threads of the block call
+// this; the result is there for all of them after the next sync().
+template <class Block, class A, class B>
+CUTPROOF_DEVICE int write_union(Block& block, const A& a, int a_size, const B& b, int b_size, int* out) {
+  write_part_of_union(block, a, a_size, b, b_size, true, out);
+  const int common = write_part_of_union(block, b, b_size, a, a_size, false, out);
+  return a_size + b_size - common;
+}
+
+}  // namespace cutproof::gpu

@@ -1,0 +1,515 @@
+// Stage split (method.md §5): every cluster that holds a particle that is dead becomes the connected components of what
+// is left of it, all clusters at once.
+//
+// The graph to be labelled has a node for each (cluster, particle) pair, known by its place in DeviceView::members, and
+// an edge where two particles of one cluster are neighbours in G. Members ascend within a cluster, so the place of a
+// component's smallest particle is its smallest place, and that is its label, whichever way it was found:
+// - SplitMethod::global_labels: hooking over all pairs at once in global memory, in the manner of ECL-CC;
+// - SplitMethod::blocks: a block for each cluster, which does the same in shared memory.
+//
+// Then components are counted, which gives each its slot and number, and the members of a cluster are regrouped within
+// the places that they have: a split needs new slots, but no new places.
+#pragma once
+#include <cstdint>
+
+#include "gpu/kernels/rest_frames.cuh"
+#include "gpu/kernels/sorted_lists.cuh"
+#include "gpu/kernels/union_find.cuh"
+#include "gpu/launch/launcher.h"
+#include "gpu/launch/plan.h"
+#include "gpu/state/device_view.h"
+
+namespace cutproof::gpu {
+
+// A cluster with more members is labelled in global memory whatever the plan says.
+inline constexpr int kMostInBlock = 4096;
+
+namespace split_detail {
+
+inline constexpr int kRegroupThreads = 128;
+// How many blocks share the pairs of one cluster in global_labels.
+inline constexpr int kPairsPerBlock = 1024;
+inline constexpr int kMostShares = 64;
+
+// The directions of a particle's lower neighbours, smallest first, d = 0, 1, 2: -z, -y, -x. Particles are numbered as
+// their nodes are.
+CUTPROOF_BOTH inline constexpr int lower_direction(int d) { return 5 - 2 * d; }
+
+CUTPROOF_DEVICE inline int body_index(const DeviceView& w, int p) { return w.bodies == 1 ? 0 : w.body_of[p]; }
+
+// What Counters::scratch holds.
+enum : int { kNewClusters = 0, kFirstNewSlot = 1, kFirstNewNumber = 2, kTooLarge = 3 };
+
+// The quarters of DeviceView::slot_scratch. By place in DeviceView::affected: how many components need a new slot; the
+// same of all before; several bodies: the number of the first of them. By slot: marks, then places that are filled
+// next.
+CUTPROOF_BOTH inline int* extra_components(const DeviceView& w) { return w.slot_scratch; }
+CUTPROOF_BOTH inline int* extra_before(const DeviceView& w) { return w.slot_scratch + int64_t{1} * w.slot_capacity; }
+CUTPROOF_BOTH inline int* first_number(const DeviceView& w) { return w.slot_scratch + int64_t{2} * w.slot_capacity; }
+CUTPROOF_BOTH inline int* by_slot(const DeviceView& w) { return w.slot_scratch + int64_t{3} * w.slot_capacity; }
+
+// Where among the k smallest members of a cluster the neighbour of member k in a lower direction stands; -1: nowhere.
+template <class Members>
+CUTPROOF_DEVICE int place_of_lower(const Members& members, int k, int neighbour, int direction) {
+  if (direction == 1) {  // the neighbour at -x, if there is one, is the particle before
+    return k > 0 && members[k - 1] == neighbour ? k - 1 : -1;
+  }
+  const int place = lower_bound(members, k, neighbour);
+  return place < k && members[place] == neighbour ? place : -1;
+}
+
+// ---- debris
+
+// Bodies whose small components are to be taken out now.
+CUTPROOF_DEVICE inline bool drops_debris(const DeviceView& w, int b) { return w.body[b].debris > 0 && cut_now(w, b); }
+
+// DeviceView::particle_scratch: the parents of the particles, then the sizes of their components.
+CUTPROOF_BOTH inline int* component_size(const DeviceView& w) { return w.particle_scratch + w.particles; }
+
+}  // namespace split_detail
+
+template <class Block>
+CUTPROOF_DEVICE void link_tissue_kernel(Block& block, DeviceView w) {
+  using namespace split_detail;
+  if (block.first() == 0) w.counters->debris = 0;
+  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
+    const int p = static_cast<int>(i), b = body_index(w, p);
+    if (!drops_debris(w, b)) continue;
+    int parent = p;
+    for (int d = 0; d < 3 && parent == p && alive(w, p); ++d) {
+      const int q = neighbour(w, w.body[b], p, lower_direction(d));
+      if (q >= 0 && alive(w, q)) parent = q;
+    }
+    w.particle_scratch[p] = parent;
+    component_size(w)[p] = 0;
+  }
+}
+CUTPROOF_KERNEL(link_tissue_kernel);
+
+// link_tissue has seen to the direction -z.
+template <class Block>
+CUTPROOF_DEVICE void hook_tissue_kernel(Block& block, DeviceView w) {
+  using namespace split_detail;
+  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
+    const int p = static_cast<int>(i), b = body_index(w, p);
+    if (!drops_debris(w, b) || !alive(w, p)) continue;
+    for (int d = 1; d < 3; ++d) {
+      const int q = neighbour(w, w.body[b], p, lower_direction(d));
+      if (q >= 0 && alive(w, q)) unite(block, w.particle_scratch, p, q);
+    }
+  }
+}
+CUTPROOF_KERNEL(hook_tissue_kernel);
+
+// Sizes are counted up to where they no longer matter. What a split earlier in this frame has taken out leaves the list
+// of debris, which this one replaces.
+template <class Block>
+CUTPROOF_DEVICE void measure_tissue_kernel(Block& block, DeviceView w) {
+  using namespace split_detail;
+  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
+    const int p = static_cast<int>(i), b = body_index(w, p);
+    if (!drops_debris(w, b)) continue;
+    if (!alive(w, p)) {
+      if (w.death[p] == w.cut[b] + 1) w.death[p] = kDeadBefore;
+      continue;
+    }
+    const int root = final_root(block, w.particle_scratch, p);
+    block.store(&w.particle_scratch[p], root);
+    int* const size = &component_size(w)[root];
+    if (block.load(size) < w.body[b].debris) block.atomic_add(size, 1);
+  }
+}
+CUTPROOF_KERNEL(measure_tissue_kernel);
+
+template <class Block>
+CUTPROOF_DEVICE void remove_debris_kernel(Block& block, DeviceView w) {
+  using namespace split_detail;
+  int removed = 0;
+  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
+    const int p = static_cast<int>(i), b = body_index(w, p);
+    if (!drops_debris(w, b) || !alive(w, p)) continue;
+    if (component_size(w)[w.particle_scratch[p]] >= w.body[b].debris) continue;
+    w.death[p] = w.cut[b] + 1;
+    ++removed;
+  }
+  if (removed > 0) block.atomic_add(&w.counters->debris, removed);
+}
+CUTPROOF_KERNEL(remove_debris_kernel);
+
+// The stage has found no room for its slots.
+template <class Block>
+CUTPROOF_DEVICE void put_debris_back_kernel(Block& block, DeviceView w) {
+  using namespace split_detail;
+  if (block.first() == 0) w.counters->debris = 0;
+  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
+    const int p = static_cast<int>(i), b = body_index(w, p);
+    if (drops_debris(w, b) && w.death[p] == w.cut[b] + 1) w.death[p] = -1;
+  }
+}
+CUTPROOF_KERNEL(put_debris_back_kernel);
+
+// ---- which clusters
+
+// By I2 no cluster held a dead particle when the frame began: one that holds one now has lost it.
+template <class Block>
+CUTPROOF_DEVICE void mark_affected_kernel(Block& block, DeviceView w) {
+  using namespace split_detail;
+  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
+    const int p = static_cast<int>(i);
+    if (alive(w, p) || w.membership_count[p] == 0 || !cut_now(w, body_index(w, p))) continue;
+    for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
+      if (w.memberships[k] >= 0) block.store(&by_slot(w)[w.memberships[k]], 1);
+    }
+  }
+}
+CUTPROOF_KERNEL(mark_affected_kernel);
+
+template <class Block>
+CUTPROOF_DEVICE void flag_affected_kernel(Block& block, DeviceView w) {
+  using namespace split_detail;
+  if (block.first() == 0) {
+    w.counters->failed = 0;
+    w.counters->scratch[kTooLarge] = 0;
+  }
+  for (int64_t s = block.first(); s < w.slot_capacity; s += block.stride()) {
+    w.slot_flag[s] = by_slot(w)[s] != 0;
+    extra_components(w)[s] = 0;
+  }
+}
+CUTPROOF_KERNEL(flag_affected_kernel);
+
+// ---- labels
+
+// A block for each affected cluster of at most `most` members; its shared memory holds them and their parents.
+template <class Block>
+CUTPROOF_DEVICE void label_in_blocks_kernel(Block& block, DeviceView w, int most) {
+  using namespace split_detail;
+  int* const members = block.template shared<int>(most);
+  int* const parent = block.template shared<int>(most);
+  for (int a = block.index(); a < w.counters->affected; a += block.count()) {
+    const int s = w.affected[a], begin = w.slot_begin[s], size = w.slot_size[s];
+    const BodyConstants& body = w.body[w.slot_body[s]];
+    if (size > most) {
+      if (block.thread() == 0) block.store(&w.counters->scratch[kTooLarge], 1);
+      continue;
+    }
+    for (int k = block.thread(); k < size; k += block.size()) {
+      const int p = w.members[begin + k];
+      members[k] = p;
+      parent[k] = alive(w, p) ? k : -1;
+    }
+    block.sync();
+    for (int k = block.thread(); k < size; k += block.size()) {
+      if (peek<Memory::shared>(block, &parent[k]) < 0) continue;
+      for (int d = 0; d < 3; ++d) {
+        const int q = neighbour(w, body, members[k], lower_direction(d));
+        if (q < 0) continue;
+        const int place = place_of_lower(members, k, q, lower_direction(d));
+        if (place >= 0 && peek<Memory::shared>(block, &parent[place]) >= 0) {
+          unite<Memory::shared>(block, parent, k, place);
+        }
+      }
+    }
+    block.sync();
+    int roots = 0;
+    for (int k = block.thread(); k < size; k += block.size()) {
+      int root = parent[k];
+      while (root >= 0 && parent[root] != root) root = parent[root];
+      w.label[begin + k] = root < 0 ? -1 : begin + root;
+      roots += root == k;
+    }
+    roots = block.sum(roots);
+    if (block.thread() == 0) extra_components(w)[a] = roots > 1 ? roots - 1 : 0;
+    block.sync();
+  }
+}
+CUTPROOF_KERNEL(label_in_blocks_kernel);
+
+// The pairs of each affected cluster with more than `most` members, shared out among `shares` blocks: calls
+// visit(slot, members, k) for k in [0, slot_size).
+namespace split_detail {
+template <class Block, class Visit>
+CUTPROOF_DEVICE void for_large_clusters(Block& block, const DeviceView& w, int most, int shares, Visit visit) {
+  const int64_t jobs = int64_t{shares} * w.counters->affected;
+  for (int64_t job = block.index(); job < jobs; job += block.count()) {
+    const int s = w.affected[job / shares], size = w.slot_size[s];
+    if (size <= most) continue;
+    const int64_t first = job % shares * block.size() + block.thread();
+    for (int64_t k = first; k < size; k += int64_t{shares} * block.size()) visit(s, static_cast<int>(k));
+  }
+}
+}  // namespace split_detail
+
+template <class Block>
+CUTPROOF_DEVICE void link_pairs_kernel(Block& block, DeviceView w, int most, int shares) {
+  using namespace split_detail;
+  for_large_clusters(block, w, most, shares, [&](int s, int k) {
+    const int begin = w.slot_begin[s];
+    const int* const members = w.members + begin;
+    int parent = -1;
+    if (alive(w, members[k])) {
+      parent = k;
+      for (int d = 0; d < 3 && parent == k; ++d) {
+        const int q = neighbour(w, w.body[w.slot_body[s]], members[k], lower_direction(d));
+        if (q < 0 || !alive(w, q)) continue;
+        const int place = place_of_lower(members, k, q, lower_direction(d));
+        if (place >= 0) parent = place;
+      }
+    }
+    w.label[begin + k] = parent < 0 ? -1 : begin + parent;
+  });
+}
+CUTPROOF_KERNEL(link_pairs_kernel);
+
+// link_pairs has seen to the direction -z.
+template <class Block>
+CUTPROOF_DEVICE void hook_pairs_kernel(Block& block, DeviceView w, int most, int shares) {
+  using namespace split_detail;
+  for_large_clusters(block, w, most, shares, [&](int s, int k) {
+    const int begin = w.slot_begin[s];
+    const int* const members = w.members + begin;
+    if (!alive(w, members[k])) return;
+    for (int d = 1; d < 3; ++d) {
+      const int q = neighbour(w, w.body[w.slot_body[s]], members[k], lower_direction(d));
+      if (q < 0 || !alive(w, q)) continue;
+      const int place = place_of_lower(members, k, q, lower_direction(d));
+      if (place >= 0) unite(block, w.label, begin + k, begin + place);
+    }
+  });
+}
+CUTPROOF_KERNEL(hook_pairs_kernel);
+
+// A block for each of these clusters, because components are counted.
+template <class Block>
+CUTPROOF_DEVICE void flatten_pairs_kernel(Block& block, DeviceView w, int most) {
+  using namespace split_detail;
+  for (int a = block.index(); a < w.counters->affected; a += block.count()) {
+    const int s = w.affected[a], begin = w.slot_begin[s], size = w.slot_size[s];
+    if (size <= most) continue;
+    int roots = 0;
+    for (int q = begin + block.thread(); q < begin + size; q += block.size()) {
+      if (block.load(&w.label[q]) < 0) continue;
+      const int root = final_root(block, w.label, q);
+      block.store(&w.label[q], root);
+      roots += root == q;
+    }
+    roots = block.sum(roots);
+    if (block.thread() == 0) extra_components(w)[a] = roots > 1 ? roots - 1 : 0;
+  }
+}
+CUTPROOF_KERNEL(flatten_pairs_kernel);
+
+// ---- slots and numbers
+
+// New numbers go on from the highest that the body uses, in the order (cluster, smallest particle). A block for each
+// body. Also looks whether there is room.
+template <class Block>
+CUTPROOF_DEVICE void number_components_kernel(Block& block, DeviceView w) {
+  using namespace split_detail;
+  Counters& counters = *w.counters;
+  if (block.first() == 0) {
+    counters.scratch[kFirstNewSlot] = counters.slots_used;
+    if (counters.slots_used + int64_t{counters.scratch[kNewClusters]} > w.slot_capacity) {
+      counters.failed = 1;
+      block.atomic_or(&counters.fault, kSlotsFull);
+    }
+  }
+  for (int b = block.index(); b < w.bodies; b += block.count()) {
+    if (!cut_now(w, b)) continue;
+    // In a body numbers ascend with slots, so the last of its clusters has the highest.
+    int highest = -1;
+    for (int end = counters.slots_used; end > 0 && highest < 0; end -= block.size()) {
+      const int s = end - 1 - block.thread();
+      const bool mine = s >= 0 && w.slot_size[s] > 0 && w.slot_body[s] == b;
+      highest = -block.smallest(mine ? -w.slot_number[s] : 1);
+    }
+    if (w.bodies == 1) {
+      if (block.thread() == 0) counters.scratch[kFirstNewNumber] = highest + 1;
+      continue;
+    }
+    int next = highest + 1;
+    for (int begin = 0; begin < counters.affected; begin += block.size()) {
+      const int a = begin + block.thread();
+      const bool mine = a < counters.affected && w.slot_body[w.affected[a]] == b;
+      int total = 0;
+      const int before = block.exclusive_scan(mine ? extra_components(w)[a] : 0, total);
+      if (mine) first_number(w)[a] = next + before;
+      next += total;
+    }
+  }
+}
+CUTPROOF_KERNEL(number_components_kernel);
+
+// ---- regrouping
+
+namespace split_detail {
+
+// In the list of p's clusters `to` takes the place of `from`. Each block renames a slot of its own.
+template <class Block>
+CUTPROOF_DEVICE void rename_holder(Block& block, const DeviceView& w, int p, int from, int to) {
+  for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
+    if (block.load(&w.memberships[k]) == from) {
+      block.store(&w.memberships[k], to);
+      return;
+    }
+  }
+}
+
+}  // namespace split_detail
+
+// A block for each affected cluster. Its first component keeps slot and number; component c > 0, in the order of
+// smallest particles, gets the c-th of the cluster's new slots. Members stay within their places: component after
+// component, each ascending; the places of the dead are left over at the end.
+template <class Block>
+CUTPROOF_DEVICE void regroup_members_kernel(Block& block, DeviceView w) {
+  using namespace split_detail;
+  const Counters& counters = *w.counters;
+  int* const chunk = block.template shared<int>(block.size());
+  if (counters.failed) return;
+  for (int a = block.index(); a < counters.affected; a += block.count()) {
+    const int s = w.affected[a], begin = w.slot_begin[s], size = w.slot_size[s];
+    const int first_new = counters.scratch[kFirstNewSlot] + extra_before(w)[a];
+    const int number = w.bodies == 1 ? counters.scratch[kFirstNewNumber] + extra_before(w)[a] : first_number(w)[a];
+    int* const fill = by_slot(w);  // first the size of a component, then the place that it fills next
+    int* const slot_of_root = w.member_scratch + begin;
+    int* const regrouped = w.member_scratch;
+
+    int components = 0;
+    for (int from = 0; from < size; from += block.size()) {
+      const int k = from + block.thread();
+      const bool root = k < size && w.label[begin + k] == begin + k;
+      int total = 0;
+      const int c = components + block.exclusive_scan(root ? 1 : 0, total);
+      components += total;
+      if (!root) continue;
+      const int t = c == 0 ? s : first_new + c - 1;
+      slot_of_root[k] = t;
+      fill[t] = 0;
+      if (c == 0) continue;
+      w.slot_number[t] = number + c - 1;
+      w.slot_body[t] = w.slot_body[s];
+      w.rotation[t] = w.rotation[s];
+      w.degenerate[t] = w.degenerate[s];
+    }
+    block.sync();
+
+    // Labels become slots.
+    for (int k = block.thread(); k < size; k += block.size()) {
+      const int root = w.label[begin + k];
+      if (root < 0) continue;
+      const int t = slot_of_root[root - begin];
+      w.label[begin + k] = t;
+      block.atomic_add(&fill[t], 1);
+    }
+    block.sync();
+
+    int left = 0;  // places taken by components before
+    for (int from = 0; from < components; from += block.size()) {
+      const int c = from + block.thread();
+      const int t = c == 0 ? s : first_new + c - 1;
+      const int members = c < components ? fill[t] : 0;
+      int total = 0;
+      const int before = left + block.exclusive_scan(members, total);
+      left += total;
+      if (c >= components) continue;
+      w.slot_begin[t] = begin + before;
+      w.slot_size[t] = members;
+      w.rest_dirty[t] = 1;
+      fill[t] = begin + before;
+    }
+    if (components == 0 && block.thread() == 0) w.slot_size[s] = 0;
+    block.sync();
+
+    // Members in ascending order, a chunk at a time: each goes behind those of its component in this chunk.
+    for (int from = 0; from < size; from += block.size()) {
+      const int k = from + block.thread();
+      const int t = k < size ? w.label[begin + k] : -1;
+      chunk[block.thread()] = t;
+      block.sync();
+      int before = 0;
+      bool last = true;
+      if (k < size) {
+        const int p = w.members[begin + k];
+        if (t != s) rename_holder(block, w, p, s, t);
+        if (t >= 0) {
+          for (int j = 0; j < block.size(); ++j) {
+            before += j < block.thread() && chunk[j] == t;
+            last = last && (j <= block.thread() || chunk[j] != t);
+          }
+          before += fill[t];
+          regrouped[before] = p;
+        } else {
+          block.store(&w.membership_count[p], 0);
+        }
+      }
+      block.sync();
+      if (t >= 0 && last) fill[t] = before + 1;
+    }
+    block.sync();
+    for (int k = block.thread(); k < left; k += block.size()) w.members[begin + k] = regrouped[begin + k];
+    block.sync();
+  }
+}
+CUTPROOF_KERNEL(regroup_members_kernel);
+
+// Of what is left of affected clusters, and of the new ones; their slots count as given out from now on.
+template <class Block>
+CUTPROOF_DEVICE void rest_frames_of_components_kernel(Block& block, DeviceView w) {
+  using namespace split_detail;
+  Counters& counters = *w.counters;
+  if (counters.failed) return;
+  const int first_new = counters.scratch[kFirstNewSlot], added = counters.scratch[kNewClusters];
+  if (block.first() == 0) counters.slots_used = first_new + added;
+  for (int job = block.index(); job < counters.affected + added; job += block.count()) {
+    const int s = job < counters.affected ? w.affected[job] : first_new + job - counters.affected;
+    if (w.slot_size[s] > 0) recompute_rest_frame(block, w, s);
+  }
+}
+CUTPROOF_KERNEL(rest_frames_of_components_kernel);
+
+template <class Launcher>
+void enqueue_split(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+  using namespace split_detail;
+  if (plan.debris) {
+    launcher.items(link_tissue_kernel_object{}, w.particles, w);
+    launcher.items(hook_tissue_kernel_object{}, w.particles, w);
+    launcher.items(measure_tissue_kernel_object{}, w.particles, w);
+    launcher.items(remove_debris_kernel_object{}, w.particles, w);
+  }
+  Counters* const counters = w.counters;
+  launcher.clear(by_slot(w), sizeof(int) * static_cast<std::size_t>(w.slot_capacity));
+  launcher.items(mark_affected_kernel_object{}, w.particles, w);
+  launcher.items(flag_affected_kernel_object{}, w.slot_capacity, w);
+  launcher.select(w.slot_flag, w.slot_capacity, w.affected, &counters->affected);
+
+  // Merging keeps to the cap, which plan.largest_cluster includes; expansion may pass any size.
+  const int largest = plan.largest_cluster < 1 ? 1 : plan.largest_cluster;
+  const bool in_blocks = plan.split == SplitMethod::blocks;
+  const int most = !in_blocks ? 0 : largest < kMostInBlock ? (largest + 31) / 32 * 32 : kMostInBlock;
+  const auto label_large = [&](Launcher& inner) {
+    const int wanted = (largest + kPairsPerBlock - 1) / kPairsPerBlock;
+    const int shares = wanted < kMostShares ? wanted : kMostShares;
+    inner.blocks(link_pairs_kernel_object{}, int64_t{shares} * w.slot_capacity, 128, 0, w, most, shares);
+    inner.blocks(hook_pairs_kernel_object{}, int64_t{shares} * w.slot_capacity, 128, 0, w, most, shares);
+    inner.blocks(flatten_pairs_kernel_object{}, w.slot_capacity, 128, 0, w, most);
+  };
+  if (in_blocks) {
+    const int threads = most <= 1024 ? 128 : 256;
+    launcher.blocks(label_in_blocks_kernel_object{}, w.slot_capacity, threads,
+                    2 * sizeof(int) * static_cast<std::size_t>(most), w, most);
+    if (plan.expand || largest > most) launcher.if_nonzero(&counters->scratch[kTooLarge], label_large);
+  } else {
+    label_large(launcher);
+  }
+
+  launcher.exclusive_scan(extra_components(w), extra_before(w), w.slot_capacity, &counters->scratch[kNewClusters]);
+  launcher.blocks(number_components_kernel_object{}, w.bodies, 256, 0, w);
+  launcher.blocks(regroup_members_kernel_object{}, w.slot_capacity, kRegroupThreads, sizeof(int) * kRegroupThreads, w);
+  launcher.blocks(rest_frames_of_components_kernel_object{}, 2 * int64_t{w.slot_capacity}, kRestThreads, 0, w);
+  if (plan.debris) {
+    launcher.if_nonzero(&counters->failed,
+                        [&](Launcher& inner) { inner.items(put_debris_back_kernel_object{}, w.particles, w); });
+  }
+}
+
+}  // namespace cutproof::gpu

@@ -1,0 +1,45 @@
+// What a kernel sees of the machine (docs/architecture.md, Kernels). Every kernel is one function template
+//
+//   template <class Block> CUTPROOF_DEVICE void verb_noun_kernel(Block& block, DeviceView view, ...);
+//
+// that is instantiated with DeviceBlock (device_block.cuh: inlined intrinsics and CUB) by nvcc and with HostBlock
+// (host_block.h: each thread a stackful fibre) by any C++20 compiler. Rules that make both the same program:
+//
+// - Loops are block-stride (or grid-stride) and assume no block size. Host blocks have 32 threads.
+// - sync() and the collectives sum, smallest, any and exclusive_scan are reached by all threads of the block.
+// - Warp operations name their participants in `mask`; each of those reaches the same operation with the same mask.
+// - Shared memory is taken with shared<T>(count), in the same order by all threads, and holds garbage at first.
+// - Memory that other threads write in the same launch is touched through load, store and the atomics only.
+// - No float atomics: sums must not depend on the schedule.
+//
+// HostBlock throws a KernelFault where it sees one of these broken. In the simulated mode every atomic, load and store
+// lets another thread go first if the schedule says so; plain accesses do not.
+//
+// Members of a Block, B standing for DeviceBlock or HostBlock:
+//   static constexpr bool on_device;
+//   int thread(), size(), index(), count();     thread in block, threads per block, block in grid, blocks in grid;
+//                                               sizes are multiples of 32
+//   int64_t first(), stride();                  for grid-stride loops over single items:
+//                                               index·size + thread, count·size
+//   void sync();
+//   T* shared<T>(int count);                    aligned to 16 bytes; counts against the launch's shared_bytes,
+//                                               rounded up to a multiple of 16
+//   T sum<T>(T), T smallest<T>(T), bool any(bool);   to all threads; in a fixed order, so floats are reproducible for
+//                                               equal block sizes. T: trivially copyable, at most 60 bytes, with + or <
+//   int exclusive_scan(int value, int& total);  in thread order
+//   T warp_sum<T>(T);                           as sum, over the lanes of this warp; reached by all of them
+//   unsigned ballot(unsigned mask, bool); T shuffle<T>(unsigned mask, T, int lane); int lane();
+//   T atomic_add(T*, T), atomic_min(T*, T), atomic_max(T*, T), atomic_exchange(T*, T),
+//     atomic_cas(T*, T expected, T desired), atomic_or(T*, T);   all return the old value, relaxed; T: int, unsigned or
+//                                               unsigned long long
+//   T load(const T*); void store(T*, T);        relaxed; T of 4 or 8 bytes
+//   void fence();                               orders this thread's memory operations for the whole grid
+#pragma once
+
+#if defined(__CUDACC__)
+#define CUTPROOF_DEVICE __device__
+#define CUTPROOF_BOTH __host__ __device__
+#else
+#define CUTPROOF_DEVICE
+#define CUTPROOF_BOTH
+#endif

@@ -1,0 +1,76 @@
+// How kernels are started. A Launcher is used by frame.h to write down the work of a frame once; DeviceLauncher
+// (device_launcher.cuh) captures it into a CUDA graph, HostLauncher (host_launcher.h) carries it out on the spot.
+//
+// Members of a Launcher:
+//   template <class Kernel, class... Args>
+//   void items(Kernel, int64_t capacity, Args...);             grid-stride kernels: as many threads as is sensible for
+//                                                              up to `capacity` items; no shared memory
+//   template <class Kernel, class... Args>
+//   void blocks(Kernel, int64_t capacity, int threads, std::size_t shared_bytes, Args...);
+//                                                              block-stride over up to `capacity` jobs, one block each;
+//                                                              `threads` is for the device (host: 32), a multiple of
+//                                                              32, at most kMaxThreads of the kernel
+//   void if_nonzero(const int* flag, Body);                    what `Body` (a callable that launches) does happens only
+//                                                              if *flag is not 0 when the work before it is done
+//   void while_nonzero(int* flag, Body);                       again and again while *flag is not 0
+//   void exclusive_scan(const int* in, int* out, int64_t count, int* total);   out[i] = Σ in[0..i), *total = Σ all;
+//                                                              in == out is allowed
+//   void select(const unsigned char* flags, int64_t count, int* selected, int* selected_count);
+//                                                              indices with a flag, ascending
+//   void sort_unique(unsigned long long* keys, int* count, int64_t capacity);  ascending, duplicates gone, in place;
+//                                                              *count <= capacity valid keys before and after; what
+//                                                              lies beyond them is overwritten; ~0 is not a key
+//   void clear(void* data, std::size_t bytes);                 zero bytes
+// `Body` takes the Launcher to use inside as its argument. Even with a capacity of 0 one block runs: a kernel may
+// have something to do once.
+//
+// A kernel is handed over as an object, because a function template cannot be: CUTPROOF_KERNEL(verb_noun_kernel)
+// defines the type verb_noun_kernel_object, whose operator() calls it. CUTPROOF_KERNEL_THREADS(verb_noun_kernel, n)
+// allows blocks of up to n threads on the device instead of 256 (the compiler then has 65536 / n registers a thread).
+#pragma once
+#include <stdexcept>
+#include <string>
+
+#include "gpu/launch/block.h"
+
+#define CUTPROOF_KERNEL_THREADS(name, most_threads)                            \
+  struct name##_object {                                                       \
+    static constexpr const char* kName = #name;                                \
+    [[maybe_unused]] static constexpr int kMaxThreads = most_threads;          \
+    template <class Block, class... Args>                                      \
+    CUTPROOF_DEVICE void operator()(Block& block, const Args&... args) const { \
+      name(block, args...);                                                    \
+    }                                                                          \
+  }
+#define CUTPROOF_KERNEL(name) CUTPROOF_KERNEL_THREADS(name, 256)
+
+namespace cutproof::gpu {
+
+template <class Kernel>
+constexpr const char* kernel_name() {
+  if constexpr (requires { Kernel::kName; }) {
+    return Kernel::kName;
+  } else {
+    return "kernel";
+  }
+}
+
+template <class Kernel>
+constexpr int max_threads() {
+  if constexpr (requires { Kernel::kMaxThreads; }) {
+    return Kernel::kMaxThreads;
+  } else {
+    return 256;
+  }
+}
+
+template <class Kernel>
+void check_threads(int threads) {
+  if (threads < 32 || threads > max_threads<Kernel>() || threads % 32 != 0) {
+    throw std::logic_error(std::string(kernel_name<Kernel>()) + ": a block of " + std::to_string(threads) +
+                           " threads was asked for; allowed are multiples of 32 up to " +
+                           std::to_string(max_threads<Kernel>()) + '.');
+  }
+}
+
+}  // namespace cutproof::gpu

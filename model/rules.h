@@ -1,0 +1,101 @@
+// Every choice that a scene makes by name, described once: its name in files, and what its answer promises.
+#pragma once
+#include <array>
+#include <span>
+#include <string_view>
+
+#include "model/setup.h"
+
+namespace cutproof {
+
+// Names in files, in the order of the enumerators.
+inline constexpr std::array<std::string_view, 2> kSolverNames = {"implicit", "published"};
+inline constexpr std::array<std::string_view, 2> kAccelerationNames = {"none", "chebyshev"};
+inline constexpr std::array<std::string_view, 4> kCriterionNames = {"none", "distance", "geometric", "strain"};
+inline constexpr std::array<std::string_view, 4> kMergeRuleNames = {"none", "deterministic", "published",
+                                                                    "single_pass"};
+inline constexpr std::array<std::string_view, 3> kExpandRuleNames = {"none", "edge_cover", "published"};
+
+constexpr std::string_view name_of(Solver solver) { return kSolverNames[static_cast<std::size_t>(solver)]; }
+constexpr std::string_view name_of(Acceleration rule) { return kAccelerationNames[static_cast<std::size_t>(rule)]; }
+constexpr std::string_view name_of(Criterion rule) { return kCriterionNames[static_cast<std::size_t>(rule)]; }
+constexpr std::string_view name_of(MergeRule rule) { return kMergeRuleNames[static_cast<std::size_t>(rule)]; }
+constexpr std::string_view name_of(ExpandRule rule) { return kExpandRuleNames[static_cast<std::size_t>(rule)]; }
+
+// What a rule of merging promises (method.md §6).
+struct MergePromise {
+  bool unique;     // a function of the input alone: two right backends give the same clusters
+  bool maximal;    // no small cluster is left that could still merge
+  bool keeps_cap;  // unions have at most `cap` particles
+};
+constexpr MergePromise promise_of(MergeRule rule) {
+  switch (rule) {
+    case MergeRule::none:
+      return {true, false, true};
+    case MergeRule::deterministic:
+      return {true, true, true};
+    case MergeRule::published:
+      return {false, true, true};
+    case MergeRule::single_pass:
+      break;
+  }
+  return {false, false, true};
+}
+
+// What a rule of expansion promises (method.md §7).
+struct ExpandPromise {
+  bool covers_edges;  // I4 holds afterwards, so no tissue is uncoupled
+  bool runs_always;   // in every frame that cuts; else only until I4 is known to hold
+};
+constexpr ExpandPromise promise_of(ExpandRule rule) {
+  switch (rule) {
+    case ExpandRule::none:
+      return {false, false};
+    case ExpandRule::edge_cover:
+      return {true, false};
+    case ExpandRule::published:
+      break;
+  }
+  return {false, true};
+}
+
+// What a criterion promises (method.md §4).
+struct CriterionPromise {
+  bool keeps_blade_out;  // no tissue stands across the blade
+  bool is_decidable;     // from the state alone whether a particle must go
+};
+constexpr CriterionPromise promise_of(Criterion criterion) {
+  switch (criterion) {
+    case Criterion::none:
+    case Criterion::geometric:
+      return {false, true};
+    case Criterion::distance:
+      return {true, true};
+    case Criterion::strain:
+      break;
+  }
+  return {false, false};
+}
+
+// Whether a body in this state is due a stage (model/backend.h, run), given the state before the stage.
+// A backend writes its own rule of this: it is tested against this one.
+inline bool is_due(const Setup& setup, Stage stage, bool something_removed, bool edge_covered) {
+  switch (stage) {
+    case Stage::step:
+      return true;
+    case Stage::detect:
+      return needs_detection(setup);
+    case Stage::split:
+      return something_removed;
+    case Stage::merge:
+      return something_removed && setup.merge.rule != MergeRule::none;
+    case Stage::expand:
+      return something_removed && (promise_of(setup.expand.rule).runs_always ||
+                                   (promise_of(setup.expand.rule).covers_edges && !edge_covered));
+    case Stage::skin:
+      return setup.skin.wanted;
+  }
+  return false;
+}
+
+}  // namespace cutproof

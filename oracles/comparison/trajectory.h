@@ -1,0 +1,32 @@
+// Where a body is at the end of every frame of a scene, and how far two runs of one scene are apart. Runs may divide
+// frames differently and have different clusters, so nothing but particles is compared (docs/tune.md).
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "model/state.h"
+#include "oracles/comparison/errors.h"
+
+namespace cutproof::oracles {
+
+struct Pose {
+  std::vector<Vec3> x;         // [n] body frame [m]
+  std::vector<uint8_t> alive;  // [n]
+  int32_t components = 0;      // of the tissue
+
+  bool removed_some_since(const Pose& earlier) const { return alive != earlier.alive; }
+};
+
+// Of a well-formed state. `earlier` is a pose of the same body, whose components are taken over where nothing was
+// removed since; null: they are counted.
+Pose pose_of(const Setup& setup, const State& state, const Pose* earlier);
+
+// Particles that only one of the two has are counted, and nothing else is asked of them: in a cut that is decided by
+// the tissue's motion, layers next to it may or may not go.
+struct Apart {
+  Spread position;           // of particles alive in both [h]; infinite if one is not a number
+  int64_t alive_in_one = 0;  // particles that only one of the two still has
+};
+Apart poses_apart(const Setup& setup, const Pose& expected, const Pose& actual);
+
+}  // namespace cutproof::oracles

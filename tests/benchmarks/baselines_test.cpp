@@ -1,0 +1,129 @@
+// `cutproof bench baselines`: deletion by hand, and what each row must show. What the times are is not tested.
+#include "benchmarks/baselines.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "benchmarks/suites.h"
+#include "oracles/oracles.h"
+#include "tests/cli/program.h"
+#include "tests/oracles/states.h"
+
+namespace cutproof::cli {
+namespace {
+
+using cutproof::testing::Lists;
+using cutproof::testing::lists_of;
+using nlohmann::json;
+
+// Seven particles in a row in three clusters; the middle one, which only the second cluster holds, has been cut.
+struct Row {
+  Setup setup = cutproof::testing::setup_of(cutproof::testing::block_body(7, 1, 1));
+  State state = cutproof::testing::state_of(setup.body, {{0, 1, 2}, {1, 2, 3, 4}, {4, 5, 6}});
+  Row() {
+    cutproof::testing::remove_particles(state, {3});
+    state.clusters.rotation[2] = {{0, -1, 0, 1, 0, 0, 0, 0, 1}};
+  }
+};
+
+TEST(Deletion, OfParticlesLeavesClustersWhole) {
+  Row row;
+  delete_from_clusters(row.setup, Deletion::particles, row.state);
+  EXPECT_EQ(lists_of(row.state.clusters), (Lists{{0, 1, 2}, {1, 2, 4}, {4, 5, 6}}));
+  EXPECT_EQ(row.state.removed, (std::vector<int32_t>{3}));
+  EXPECT_TRUE(oracles::rest_frames(row.setup, row.state).holds);
+  EXPECT_EQ(row.state.clusters.rotation[2](0, 1), -1);
+  const Verdict connected = oracles::cluster_connectivity(row.setup, row.state);
+  EXPECT_FALSE(connected.holds) << "it couples what is cut apart";
+  const TopologyFigures figures = topology_of(row.setup, row.state);
+  EXPECT_EQ(figures.components, 2);
+  EXPECT_EQ(figures.couplings, 1);
+  EXPECT_FALSE(figures.equal);
+}
+
+TEST(Deletion, OfClustersTakesParticlesThatNoOtherHolds) {
+  Row row;
+  row.state.clusters = cutproof::testing::clusters_of(row.setup.body, {{0, 1}, {1, 2, 3, 4}, {4, 5, 6}});
+  delete_from_clusters(row.setup, Deletion::clusters, row.state);
+  EXPECT_EQ(lists_of(row.state.clusters), (Lists{{0, 1}, {4, 5, 6}}));
+  EXPECT_EQ(row.state.clusters.number, (std::vector<int32_t>{0, 2}));
+  EXPECT_EQ(row.state.removed, (std::vector<int32_t>{2, 3}));
+  EXPECT_EQ(row.state.alive, (std::vector<uint8_t>{1, 1, 0, 0, 1, 1, 1}));
+  EXPECT_TRUE(oracles::rest_frames(row.setup, row.state).holds);
+  EXPECT_TRUE(oracles::coverage(row.setup, row.state).holds);
+}
+
+TEST(Deletion, OfAClusterOfWhichNothingIsLeftLeavesNone) {
+  Row row;
+  row.state.clusters = cutproof::testing::clusters_of(row.setup.body, {{0, 1, 2}, {3}, {4, 5, 6}});
+  delete_from_clusters(row.setup, Deletion::particles, row.state);
+  EXPECT_EQ(lists_of(row.state.clusters), (Lists{{0, 1, 2}, {4, 5, 6}}));
+}
+
+TEST(Baselines, DifferInOneSettingFromThisMethod) {
+  const Baseline& ours = baselines().front();
+  for (std::size_t b = 1; b < baselines().size(); ++b) {
+    const Baseline& other = baselines()[b];
+    EXPECT_EQ((other.expand != ours.expand) + (other.merge != ours.merge) + (other.criterion != ours.criterion) +
+                  (other.deletion != ours.deletion),
+              1)
+        << other.name;
+  }
+}
+
+class BenchBaselines : public Program {};
+
+TEST_F(BenchBaselines, TellsOfEveryMethodWhatItCosts) {
+  for (const std::string backend : {"reference", "host"}) {
+    const Outcome outcome = cutproof("bench baselines --particles 400 --seed 3 --json out.json --backend " + backend);
+    ASSERT_EQ(outcome.status, 0) << outcome.output;
+    const json document = json::parse(read("out.json"));
+    EXPECT_EQ(document.at("suite"), "baselines");
+    EXPECT_EQ(document.at("seed"), 3);
+    EXPECT_NE(outcome.output.find("seed 3"), std::string::npos);
+    EXPECT_TRUE(document.at("complete") && document.at("holds"));
+    std::map<std::string, json> rows;
+    for (const json& row : document.at("rows")) {
+      const auto name = row.at("name").get<std::string>();
+      rows[name] = row;
+      EXPECT_NE(outcome.output.find(name), std::string::npos);
+      EXPECT_GT(row.at("seconds").at("median"), 0);
+      EXPECT_GT(row.at("removed"), 0) << name;
+      const json& geometry = row.at("geometry");
+      EXPECT_NEAR(geometry.at("lost_per_area").get<double>(),
+                  geometry.at("lost_volume").get<double>() / geometry.at("cut_area").get<double>(), 1e-12);
+      // The ideal cut and what is the least are those of the blade's path, which is the same for all.
+      EXPECT_EQ(geometry.at("cut_area"), document.at("rows")[0].at("geometry").at("cut_area"));
+      EXPECT_EQ(geometry.at("least_per_area"), document.at("rows")[0].at("geometry").at("least_per_area"));
+      EXPECT_EQ(row.at("equal"),
+                row.at("components") == row.at("couplings") && row.at("components") == row.at("shells"))
+          << row;
+      EXPECT_EQ(geometry.at("lost_volume"), row.at("removed"));
+    }
+    EXPECT_EQ(rows.size(), baselines().size());
+    const json &ours = rows.at("this method"), &unsplit = rows.at("particles deleted, no split"),
+               &deleted = rows.at("clusters deleted, no split");
+    EXPECT_EQ(ours.at("isolated"), 0);
+    EXPECT_EQ(ours.at("unequal_frames"), 0);
+    EXPECT_GE(ours.at("components"), 2) << "the second stroke goes through";
+    EXPECT_GT(ours.at("interpenetration").at("volume"), 0) << "the pieces are pushed into each other";
+    EXPECT_GT(unsplit.at("unequal_frames"), 0) << "pieces stay coupled";
+    EXPECT_LT(unsplit.at("couplings"), unsplit.at("components"));
+    EXPECT_GT(deleted.at("geometry").at("lost_per_area"), ours.at("geometry").at("lost_per_area"))
+        << "what the paper calls burning";
+    EXPECT_GT(deleted.at("geometry").at("hausdorff"), ours.at("geometry").at("hausdorff"));
+  }
+}
+
+TEST_F(BenchBaselines, RefusesBadUsage) {
+  expect_refused("bench baselines --backend nobody", {"nobody"});
+  expect_refused("bench baselines --particles 10", {"particles"});
+  expect_refused("bench baselines --json nowhere/out.json", {"nowhere"});
+}
+
+}  // namespace
+}  // namespace cutproof::cli

@@ -1,0 +1,48 @@
+// `cutproof bench sampling`: Table 2 in its structure, each row with its error. What the times are is not tested.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "benchmarks/paper.h"
+#include "tests/cli/program.h"
+
+namespace {
+
+using nlohmann::json;
+
+class BenchSampling : public Program {};
+
+TEST_F(BenchSampling, HasARowForEachOfTable2WithThePapersFigures) {
+  const Outcome outcome = cutproof("bench sampling --frames 2 --repeats 2 --json out.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  const json document = json::parse(read("out.json"));
+  EXPECT_EQ(document.at("suite"), "sampling");
+  EXPECT_EQ(document.at("complete"), true);
+  EXPECT_EQ(document.at("holds"), true);
+  const auto& table_2 = cutproof::cli::paper_samplings();
+  ASSERT_EQ(document.at("rows").size(), table_2.size());
+  for (std::size_t k = 0; k < table_2.size(); ++k) {
+    const json& row = document.at("rows")[k];
+    EXPECT_EQ(row.at("paper").at("particles"), table_2[k].particles);
+    EXPECT_EQ(row.at("paper").at("clusters"), table_2[k].clusters);
+    const double wanted = static_cast<double>(table_2[k].particles) / document.at("scaled_down").get<double>();
+    EXPECT_LE(std::abs(row.at("particles").get<double>() - wanted), 0.02 * wanted + 1);
+    for (const char* what : {"frame", "step", "detect", "split", "merge", "skin"}) {
+      EXPECT_TRUE(row.at("seconds").at(what).is_object()) << what << " in " << row;
+      EXPECT_TRUE(row.at("error").at(what).is_object()) << what << " in " << row;
+    }
+    EXPECT_EQ(row.at("error").at("step").at("max_h"), 0) << "the reference against itself";
+    EXPECT_EQ(row.at("error").at("frame").at("topology_holds"), true);
+    EXPECT_NE(outcome.output.find(row.at("scene").get<std::string>()), std::string::npos) << outcome.output;
+  }
+}
+
+TEST_F(BenchSampling, RefusesBadUsage) {
+  expect_refused("bench sampling --clusters spheres", {"spheres", "boxes or sampled"});
+  expect_refused("bench sampling --backend simulated", {"simulated"});
+  expect_refused("bench sampling --frames 5000", {"--frames", "at most"});
+  expect_refused("bench sampling --json nowhere/out.json", {"nowhere"});
+}
+
+}  // namespace

@@ -1,0 +1,303 @@
+// `cutproof bench stages`: no time without its error, no error that goes unseen. What the times are is not tested.
+#include "benchmarks/stages.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "reference_cpu/reference.h"
+#include "tests/cli/program.h"
+
+namespace {
+
+using cutproof::Backend;
+using cutproof::Setup;
+using cutproof::Span;
+using cutproof::SpanReport;
+using cutproof::Stage;
+using cutproof::State;
+using cutproof::cli::FrameErrors;
+using nlohmann::json;
+
+// --- The program -----------------------------------------------------------------------------------------------------
+
+class Bench : public Program {
+ protected:
+  Outcome bench(const std::string& arguments, const std::string& environment = "") const {
+    return cutproof("bench " + arguments, environment);
+  }
+  json result(const std::string& name) const { return json::parse(read(name)); }
+};
+
+// Every row that stages.cpp owes, each with an error where it ran.
+void expect_rows(const json& document, const std::string& backend, const std::string& precision,
+                 const std::set<std::string>& scenes, const std::set<std::string>& splits) {
+  const std::set<std::string> wanted = {"frame", "frame, cutting", "step",   "detect",
+                                        "split", "merge",          "expand", "skin"};
+  std::set<std::array<std::string, 3>> seen, expected;
+  for (const std::string& scene : scenes) {
+    for (const std::string& split : splits) {
+      for (const std::string& what : wanted) expected.insert({scene, split, what});
+    }
+  }
+  for (const json& row : document.at("rows")) {
+    const auto text = [&](const char* field) { return row.at(field).get<std::string>(); };
+    seen.insert(std::array<std::string, 3>{text("scene"), text("split"), text("what")});
+    EXPECT_EQ(row.at("backend"), backend);
+    EXPECT_EQ(row.at("precision"), precision);
+    EXPECT_EQ(row.at("substeps"), 4);
+    EXPECT_EQ(row.at("iterations"), 4);
+    EXPECT_FALSE(row.at("rotation").get<std::string>().empty());
+    EXPECT_EQ(row.at("of"), 3);
+    if (row.at("what") == "expand") {  // clusters that cover every edge never need it
+      EXPECT_EQ(row.at("frames"), 0);
+      EXPECT_TRUE(row.at("seconds").is_null());
+      continue;
+    }
+    EXPECT_GT(row.at("frames"), 0) << row;
+    EXPECT_LE(row.at("seconds").at("min"), row.at("seconds").at("median")) << row;
+    EXPECT_LE(row.at("seconds").at("median"), row.at("seconds").at("max")) << row;
+    EXPECT_TRUE(row.at("error").is_object() && !row.at("error").empty()) << row;
+  }
+  EXPECT_EQ(seen, expected);
+  EXPECT_EQ(document.at("rows").size(), expected.size());
+  ASSERT_EQ(document.at("scenes").size(), scenes.size() * splits.size());
+  for (const json& scene : document.at("scenes")) {
+    EXPECT_EQ(scene.at("topology").size(), 4U);
+    for (const json& verdict : scene.at("topology")) EXPECT_TRUE(verdict.at("holds")) << verdict;
+    EXPECT_GE(scene.at("judged_frames"), 1);
+  }
+  EXPECT_EQ(document.at("format"), "cutproof.bench");
+  EXPECT_EQ(document.at("complete"), true);
+  EXPECT_EQ(document.at("holds"), true);
+  EXPECT_GT(document.at("floors").at("copy_bytes_per_second"), 0);
+  EXPECT_FALSE(document.at("device").get<std::string>().empty());
+}
+
+TEST_F(Bench, TellsEveryTimeOfTheReferenceWithItsError) {
+  const Outcome outcome =
+      bench("stages --sizes 1000,3000 --frames 3 --repeats 1 --json out.json", "CUTPROOF_COMMIT=0123456789ab-dirty");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  const json document = result("out.json");
+  expect_rows(document, "reference", "double", {"box_1000", "kidney_3000"}, {"search"});
+  EXPECT_EQ(document.at("commit"), "0123456789ab-dirty");
+  for (const json& row : document.at("rows")) {
+    if (row.at("what") != "step") continue;
+    EXPECT_EQ(row.at("error").at("max_h"), 0) << "the reference against itself";
+  }
+  for (const char* words : {"box_1000", "kidney_3000", "double precision", "4 substeps × 4 iterations", "  frame ",
+                            "  step ", "  detect ", "  split ", "  merge ", "  expand ", "  skin ", "topology holds"}) {
+    EXPECT_NE(outcome.output.find(words), std::string::npos) << "no '" << words << "' in:\n" << outcome.output;
+  }
+}
+
+TEST_F(Bench, TellsBothWaysOfSplittingOnTheHost) {
+  const Outcome outcome =
+      bench("stages --backend host --sizes 1000 --frames 3 --repeats 1 --split both --json out.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  const json document = result("out.json");
+  expect_rows(document, "host", "single", {"box_1000"}, {"blocks", "global"});
+  EXPECT_FALSE(document.contains("commit"));
+  for (const json& row : document.at("rows")) {
+    if (row.at("what") != "step") continue;
+    EXPECT_GT(row.at("error").at("max_h"), 0) << "single precision has its rounding";
+  }
+  for (const json& scene : document.at("scenes")) EXPECT_GT(scene.at("step_floor").at("bytes"), 0);
+}
+
+// The scenes of Table 1 with both ways of cooking: what the paper timed has its time, and an expansion that really ran.
+TEST_F(Bench, ReproducesTable1WithBoxesAndSampledClusters) {
+  const Outcome outcome = bench("stages --frames 8 --repeats 2 --json out.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  const json document = result("out.json");
+  std::set<std::array<std::string, 2>> seen;
+  for (const json& scene : document.at("scenes")) {
+    seen.insert({scene.at("scene").get<std::string>(), scene.at("cooking").get<std::string>()});
+    // Whether coupling matches is asked where clusters cover every edge.
+    EXPECT_EQ(scene.at("topology").size(), scene.at("cooking") == "boxes" ? 4U : 3U);
+    EXPECT_GE(scene.at("isolated_groups"), 0);
+  }
+  std::set<std::array<std::string, 2>> expected;
+  for (const char* scene : {"cuboid", "liver", "kidney"}) {
+    for (const char* cooking : {"boxes", "sampled"}) expected.insert({scene, cooking});
+  }
+  expected.insert({"irregular", "sampled"});
+  EXPECT_EQ(seen, expected);
+  int64_t expansions = 0;
+  for (const json& row : document.at("rows")) {
+    const auto what = row.at("what").get<std::string>();
+    EXPECT_EQ(row.at("of"), 16);
+    EXPECT_EQ(row.at("paper_seconds").is_null(), what == "frame, cutting" || row.at("scene") == "irregular") << row;
+    if (what == "expand" && row.at("scene") == "irregular") {
+      EXPECT_GT(row.at("error").at("added"), 0) << "nothing was expanded";
+    }
+    if (what == "expand" && row.at("cooking") == "sampled") expansions += row.at("frames").get<int64_t>();
+    if (what == "expand" && row.at("cooking") == "boxes") {
+      EXPECT_EQ(row.at("frames"), 0);
+    }
+  }
+  EXPECT_GT(expansions, 0);
+  for (const char* words : {"Table 1", "paper", "31.79", "10.77", "101096"}) {
+    EXPECT_NE(outcome.output.find(words), std::string::npos) << "no '" << words << "' in:\n" << outcome.output;
+  }
+}
+
+TEST_F(Bench, RefusesBadUsage) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"", "use one of stages"},
+      {"nothing", "there is no suite 'nothing'"},
+      {"nothing", "use one of stages"},
+      {"nothing stages --sizes 1000", "there is no suite 'nothing'"},
+      {"stages --backend nobody", "nobody"},
+      {"stages --sizes 5", "--sizes"},
+      {"stages --sizes 1000,many", "sizes"},
+      {"stages --frames 0", "frames"},
+      {"stages --repeats 0", "repeats"},
+      {"stages --scenes cuboid,heart", "heart"},
+      {"stages --clusters spheres", "spheres"},
+      {"stages --scenes cuboid --frames 1000", "--frames"},
+      {"stages --backend host --split halves", "halves"},
+      {"stages --backend host --rotation guess", "guess"},
+      {"stages --split blocks", "--split"},
+      {"stages --sizes 1000 --json nowhere/out.json", "nowhere"},
+      {"stages --sizes 200000000000", "--sizes"},
+  };
+  for (const auto& [arguments, word] : cases) {
+    const Outcome outcome = bench(arguments);
+    EXPECT_EQ(outcome.status, 2) << arguments << "\n" << outcome.output;
+    EXPECT_NE(outcome.output.find(word), std::string::npos) << arguments << "\n" << outcome.output;
+  }
+  EXPECT_TRUE(files::is_empty(folder_));
+}
+
+// --- What judge_frames sees ------------------------------------------------------------------------------------------
+
+// The reference with a fault: `spoil` changes the state after each span of one stage.
+class Spoiled final : public Backend {
+ public:
+  using Spoil = void (*)(const Setup&, State&);
+  Spoiled(Stage stage, Spoil spoil) : stage_(stage), spoil_(spoil) {}
+  std::string name() const override { return "spoiled"; }
+  bool can_run(Span) const override { return true; }
+  void load(std::vector<Setup> setups, std::vector<State> states) override {
+    setups_ = setups;
+    inner_->load(std::move(setups), std::move(states));
+  }
+  void run(Span span) override {
+    inner_->run(span);
+    report_ = inner_->report();
+    if (span != Span{stage_, stage_} || !report_.ran[static_cast<std::size_t>(stage_)]) return;
+    std::vector<State> states = inner_->snapshot();
+    spoil_(setups_.front(), states.front());
+    inner_->load(setups_, std::move(states));
+  }
+  std::vector<State> snapshot() const override { return inner_->snapshot(); }
+  SpanReport report() const override { return report_; }
+
+ private:
+  Stage stage_;
+  Spoil spoil_;
+  std::unique_ptr<Backend> inner_ = cutproof::reference::make_backend();
+  std::vector<Setup> setups_;
+  SpanReport report_;
+};
+
+FrameErrors judge_spoiled(Stage stage, Spoiled::Spoil spoil) {
+  const cutproof::cli::BenchScene scene = cutproof::cli::make_bench_scene(3000, 2);
+  Spoiled backend(stage, spoil);
+  backend.load({scene.setup}, {scene.state});
+  for (int64_t frame = 0; frame < scene.warm_up; ++frame) backend.run({});
+  return cutproof::cli::judge_frames(backend, scene.setup);
+}
+
+// GoogleTest's own Setup hides the model's inside tests, so the faults stand here.
+void spoil_nothing(const Setup&, State&) {}
+void move_one_particle(const Setup& setup, State& state) {
+  state.x.front() += cutproof::Vec3{0, 1e-3 * setup.body.grid.spacing, 0};
+}
+void lose_a_position(const Setup&, State& state) { state.x.front().x = NAN; }
+void spare_one_particle(const Setup&, State& state) {
+  if (state.removed.empty()) return;
+  state.alive[static_cast<std::size_t>(state.removed.back())] = 1;
+  state.removed.pop_back();
+}
+void change_one_number(const Setup&, State& state) { ++state.clusters.number.back(); }
+void tear_the_skin(const Setup&, State& state) { state.skin.triangles.pop_back(); }
+void drop_the_last_cluster(const Setup&, State& state) {
+  cutproof::Clusters& c = state.clusters;
+  c.offsets.pop_back();
+  c.members.resize(static_cast<std::size_t>(c.offsets.back()));
+  c.number.pop_back();
+  c.rotation.pop_back();
+  c.rest_center.pop_back();
+  c.mass.pop_back();
+  c.degenerate.pop_back();
+}
+
+TEST(JudgeFrames, FindsNoErrorInTheReference) {
+  const FrameErrors errors = judge_spoiled(Stage::step, spoil_nothing);
+  ASSERT_TRUE(errors.step && errors.detect && errors.skin);
+  EXPECT_EQ(errors.step->max, 0);
+  EXPECT_EQ(errors.detect->differing, 0);
+  EXPECT_GT(errors.detect->removed, 0) << "the judged frames must cut";
+  EXPECT_EQ(errors.clusters_equal[static_cast<std::size_t>(Stage::split)], true);
+  EXPECT_EQ(errors.clusters_equal[static_cast<std::size_t>(Stage::merge)], true);
+  EXPECT_TRUE(errors.skin->triangles_equal);
+  EXPECT_EQ(errors.skin->vertices.max, 0);
+  EXPECT_TRUE(errors.topology_holds());
+}
+
+TEST(JudgeFrames, SeesOneParticleMovedByTheStep) {
+  const FrameErrors errors = judge_spoiled(Stage::step, move_one_particle);
+  ASSERT_TRUE(errors.step);
+  EXPECT_NEAR(errors.step->max, 1e-3, 1e-9);
+  EXPECT_EQ(errors.step->beyond, errors.frames);
+}
+
+TEST(JudgeFrames, SeesAPositionThatIsNoNumber) {
+  const FrameErrors errors = judge_spoiled(Stage::step, lose_a_position);
+  ASSERT_TRUE(errors.step);
+  EXPECT_TRUE(std::isinf(errors.step->max));
+}
+
+TEST(JudgeFrames, SeesOneRemovalTooFew) {
+  const FrameErrors errors = judge_spoiled(Stage::detect, spare_one_particle);
+  ASSERT_TRUE(errors.detect);
+  EXPECT_GE(errors.detect->differing, 1);
+  EXPECT_FALSE(errors.detect->within_rounding);
+}
+
+TEST(JudgeFrames, SeesClustersThatDifferByOneNumber) {
+  for (const Stage stage : {Stage::split, Stage::merge}) {
+    const FrameErrors errors = judge_spoiled(stage, change_one_number);
+    EXPECT_EQ(errors.clusters_equal[static_cast<std::size_t>(stage)], false) << cutproof::name_of(stage);
+  }
+}
+
+TEST(JudgeFrames, SeesAHoleInTheSkin) {
+  const FrameErrors errors = judge_spoiled(Stage::skin, tear_the_skin);
+  ASSERT_TRUE(errors.skin);
+  EXPECT_FALSE(errors.skin->triangles_equal);
+}
+
+TEST(JudgeFrames, SeesTissueThatNoClusterHolds) {
+  EXPECT_FALSE(judge_spoiled(Stage::skin, drop_the_last_cluster).topology_holds());
+}
+
+TEST(Times, AreTheMedianTheLeastAndTheMost) {
+  const cutproof::cli::Times odd = cutproof::cli::times_of({5, 1, 3});
+  EXPECT_EQ(odd.median, 3);
+  EXPECT_EQ(odd.min, 1);
+  EXPECT_EQ(odd.max, 5);
+  EXPECT_EQ(odd.count, 3);
+  EXPECT_EQ(cutproof::cli::times_of({4, 1, 2, 8}).median, 3);
+  EXPECT_EQ(cutproof::cli::times_of({}).count, 0);
+}
+
+}  // namespace

@@ -1,0 +1,445 @@
+// Each CUDA call of the backend `gpu` fails in turn on a small scene. The calls are taken over when this program is
+// linked (--wrap, see CMakeLists.txt), so what is tested is the library as it is.
+#include <cuda_runtime_api.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <functional>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <random>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "benchmarks/device_limits.h"
+#include "fixtures/build.h"
+#include "gpu/backends.h"
+#include "gpu/state/staging.h"
+#include "model/error.h"
+#include "model/io/scene_io.h"
+
+namespace {
+
+enum class Failing {
+  once,     // one call is refused, as cudaMalloc is when memory is short
+  for_good  // every call from one on reports an error, as all do after a kernel has failed; giving back still works
+};
+
+// What stands between the library and CUDA. Calls are counted from 1.
+struct Interceptor {
+  uint64_t fail_at = 0;  // 0: none fails
+  Failing failing = Failing::once;
+  uint64_t made = 0;
+  const char* failed = nullptr;                    // the first call that was made to fail
+  cudaError_t pending = cudaSuccess;               // what cudaGetLastError has not given out yet
+  std::vector<const char*> trace;                  // the calls that were made
+  std::map<const void*, const char*> outstanding;  // what was handed out and not given back, and by which call
+  std::set<cudaStream_t> own_captures;             // streams whose capture will end in a graph that is ours to destroy
+
+  bool counting = false;  // not while things are given back
+
+  void start(uint64_t at, Failing how) {
+    counting = true;
+    fail_at = at;
+    failing = how;
+    made = 0;
+    failed = nullptr;
+    pending = cudaSuccess;
+    trace.clear();
+  }
+  void stop() { counting = false; }
+  bool lost() const { return failed != nullptr && failing == Failing::for_good; }
+};
+Interceptor calls;
+
+cudaError_t error_of(const std::string& call) {
+  if (call == "cudaMalloc" || call == "cudaMallocHost" || call == "cudaGraphInstantiate") {
+    return cudaErrorMemoryAllocation;
+  }
+  if (call == "__cudaLaunchKernel") return cudaErrorLaunchOutOfResources;
+  return cudaErrorLaunchFailure;
+}
+
+// The error that the call `name` is to report, or cudaSuccess.
+cudaError_t injected(const char* name) {
+  if (!calls.counting) return calls.lost() ? error_of(calls.failed) : cudaSuccess;
+  ++calls.made;
+  calls.trace.push_back(name);
+  if (calls.fail_at == 0 || calls.made < calls.fail_at) return cudaSuccess;
+  if (calls.failing == Failing::once && calls.made > calls.fail_at) return cudaSuccess;
+  if (calls.failed == nullptr) calls.failed = name;
+  return calls.pending = error_of(calls.failed);
+}
+
+template <class Call>
+cudaError_t call_or_fail(const char* name, Call call) {
+  const cudaError_t error = injected(name);
+  return error != cudaSuccess ? error : call();
+}
+// Of a call that hands out *handle.
+template <class Handle, class Call>
+cudaError_t hand_out(const char* name, Handle* handle, Call call) {
+  const cudaError_t error = call_or_fail(name, call);
+  if (error == cudaSuccess) calls.outstanding[*handle] = name;
+  return error;
+}
+// Giving back is always carried out.
+template <class Call>
+cudaError_t give_back(const void* handle, Call call) {
+  calls.outstanding.erase(handle);
+  const cudaError_t error = call();
+  return calls.lost() ? error_of(calls.failed) : error;
+}
+
+}  // namespace
+
+// NAME (PARAMETERS) fails in its turn; ARGUMENTS are the names of the parameters.
+#define INTERCEPT(name, parameters, arguments)                           \
+  extern "C" cudaError_t __real_##name parameters;                       \
+  extern "C" cudaError_t __wrap_##name parameters;                       \
+  cudaError_t __wrap_##name parameters {                                 \
+    return call_or_fail(#name, [&] { return __real_##name arguments; }); \
+  }
+// A wait that tells of a failure has waited all the same.
+#define INTERCEPT_WAIT(name, parameters, arguments)   \
+  extern "C" cudaError_t __real_##name parameters;    \
+  extern "C" cudaError_t __wrap_##name parameters;    \
+  cudaError_t __wrap_##name parameters {              \
+    const cudaError_t error = injected(#name);        \
+    const cudaError_t real = __real_##name arguments; \
+    return error != cudaSuccess ? error : real;       \
+  }
+#define INTERCEPT_HAND_OUT(name, parameters, arguments, handle)              \
+  extern "C" cudaError_t __real_##name parameters;                           \
+  extern "C" cudaError_t __wrap_##name parameters;                           \
+  cudaError_t __wrap_##name parameters {                                     \
+    return hand_out(#name, handle, [&] { return __real_##name arguments; }); \
+  }
+#define INTERCEPT_GIVE_BACK(name, parameter, handle)                 \
+  extern "C" cudaError_t __real_##name(parameter handle);            \
+  extern "C" cudaError_t __wrap_##name(parameter handle);            \
+  cudaError_t __wrap_##name(parameter handle) {                      \
+    return give_back(handle, [&] { return __real_##name(handle); }); \
+  }
+
+INTERCEPT_HAND_OUT(cudaMalloc, (void** memory, size_t bytes), (memory, bytes), memory)
+INTERCEPT_HAND_OUT(cudaMallocHost, (void** memory, size_t bytes), (memory, bytes), memory)
+INTERCEPT_HAND_OUT(cudaStreamCreateWithFlags, (cudaStream_t * stream, unsigned flags), (stream, flags), stream)
+INTERCEPT_HAND_OUT(cudaEventCreate, (cudaEvent_t * event), (event), event)
+INTERCEPT_HAND_OUT(cudaGraphInstantiate, (cudaGraphExec_t * executable, cudaGraph_t graph, unsigned long long flags),
+                   (executable, graph, flags), executable)
+INTERCEPT_GIVE_BACK(cudaFree, void*, memory)
+INTERCEPT_GIVE_BACK(cudaFreeHost, void*, memory)
+INTERCEPT_GIVE_BACK(cudaStreamDestroy, cudaStream_t, stream)
+INTERCEPT_GIVE_BACK(cudaEventDestroy, cudaEvent_t, event)
+INTERCEPT_GIVE_BACK(cudaGraphDestroy, cudaGraph_t, graph)
+INTERCEPT_GIVE_BACK(cudaGraphExecDestroy, cudaGraphExec_t, executable)
+
+INTERCEPT(cudaGetDeviceCount, (int* count), (count))
+INTERCEPT(cudaGetDevice, (int* device), (device))
+INTERCEPT(cudaSetDevice, (int device), (device))
+INTERCEPT(cudaGetDeviceProperties, (cudaDeviceProp * properties, int device), (properties, device))
+INTERCEPT(cudaDeviceGetAttribute, (int* value, cudaDeviceAttr attribute, int device), (value, attribute, device))
+INTERCEPT_WAIT(cudaDeviceSynchronize, (), ())
+INTERCEPT(cudaFuncGetAttributes, (cudaFuncAttributes * attributes, const void* function), (attributes, function))
+INTERCEPT(cudaFuncSetAttribute, (const void* function, cudaFuncAttribute attribute, int value),
+          (function, attribute, value))
+INTERCEPT(cudaOccupancyMaxActiveBlocksPerMultiprocessorWithFlags,
+          (int* blocks, const void* function, int threads, size_t shared_bytes, unsigned flags),
+          (blocks, function, threads, shared_bytes, flags))
+INTERCEPT(cudaEventElapsedTime, (float* milliseconds, cudaEvent_t begin, cudaEvent_t end), (milliseconds, begin, end))
+INTERCEPT(cudaEventRecord, (cudaEvent_t event, cudaStream_t stream), (event, stream))
+INTERCEPT_WAIT(cudaEventSynchronize, (cudaEvent_t event), (event))
+INTERCEPT_WAIT(cudaStreamSynchronize, (cudaStream_t stream), (stream))
+INTERCEPT(cudaMemGetInfo, (size_t * free, size_t* all), (free, all))
+INTERCEPT(cudaMemcpy, (void* to, const void* from, size_t bytes, cudaMemcpyKind kind), (to, from, bytes, kind))
+INTERCEPT(cudaMemcpyAsync, (void* to, const void* from, size_t bytes, cudaMemcpyKind kind, cudaStream_t stream),
+          (to, from, bytes, kind, stream))
+INTERCEPT(cudaMemset, (void* data, int value, size_t bytes), (data, value, bytes))
+INTERCEPT(cudaMemsetAsync, (void* data, int value, size_t bytes, cudaStream_t stream), (data, value, bytes, stream))
+INTERCEPT(cudaGraphLaunch, (cudaGraphExec_t executable, cudaStream_t stream), (executable, stream))
+INTERCEPT(cudaGraphConditionalHandleCreate,
+          (cudaGraphConditionalHandle * handle, cudaGraph_t graph, unsigned value, unsigned flags),
+          (handle, graph, value, flags))
+INTERCEPT(cudaGraphAddNode,
+          (cudaGraphNode_t * node, cudaGraph_t graph, const cudaGraphNode_t* dependencies,
+           const cudaGraphEdgeData* edges, size_t count, cudaGraphNodeParams* parameters),
+          (node, graph, dependencies, edges, count, parameters))
+INTERCEPT(cudaStreamGetCaptureInfo,
+          (cudaStream_t stream, cudaStreamCaptureStatus* status, unsigned long long* id, cudaGraph_t* graph,
+           const cudaGraphNode_t** dependencies, const cudaGraphEdgeData** edges, size_t* count),
+          (stream, status, id, graph, dependencies, edges, count))
+INTERCEPT(cudaStreamUpdateCaptureDependencies,
+          (cudaStream_t stream, cudaGraphNode_t* dependencies, const cudaGraphEdgeData* edges, size_t count,
+           unsigned flags),
+          (stream, dependencies, edges, count, flags))
+INTERCEPT(cudaStreamBeginCaptureToGraph,
+          (cudaStream_t stream, cudaGraph_t graph, const cudaGraphNode_t* dependencies, const cudaGraphEdgeData* edges,
+           size_t count, cudaStreamCaptureMode mode),
+          (stream, graph, dependencies, edges, count, mode))
+// What <<< >>> becomes. It reports nothing itself: the error is for cudaGetLastError.
+INTERCEPT(__cudaLaunchKernel,
+          (cudaKernel_t kernel, dim3 grid, dim3 block, void** arguments, size_t shared_bytes, cudaStream_t stream),
+          (kernel, grid, block, arguments, shared_bytes, stream))
+
+extern "C" {
+cudaError_t __real_cudaGetLastError();
+cudaError_t __real_cudaPeekAtLastError();
+cudaError_t __real_cudaStreamBeginCapture(cudaStream_t stream, cudaStreamCaptureMode mode);
+cudaError_t __real_cudaStreamEndCapture(cudaStream_t stream, cudaGraph_t* graph);
+
+cudaError_t __wrap_cudaPeekAtLastError() {
+  return calls.pending != cudaSuccess ? calls.pending : __real_cudaPeekAtLastError();
+}
+cudaError_t __wrap_cudaGetLastError() {
+  const cudaError_t real = __real_cudaGetLastError();
+  if (calls.pending == cudaSuccess) return real;
+  return calls.failing == Failing::for_good ? calls.pending : std::exchange(calls.pending, cudaSuccess);
+}
+cudaError_t __wrap_cudaStreamBeginCapture(cudaStream_t stream, cudaStreamCaptureMode mode) {
+  const cudaError_t error =
+      call_or_fail("cudaStreamBeginCapture", [&] { return __real_cudaStreamBeginCapture(stream, mode); });
+  if (error == cudaSuccess) calls.own_captures.insert(stream);
+  return error;
+}
+// A capture is over also when its end fails; then there is no graph.
+cudaError_t __wrap_cudaStreamEndCapture(cudaStream_t stream, cudaGraph_t* graph) {
+  const cudaError_t error = injected("cudaStreamEndCapture");
+  const cudaError_t real = __real_cudaStreamEndCapture(stream, graph);
+  const bool own = calls.own_captures.erase(stream) != 0;
+  if (error != cudaSuccess) {
+    if (own && *graph != nullptr) static_cast<void>(__real_cudaGraphDestroy(*graph));
+    *graph = nullptr;
+    return error;
+  }
+  if (own && *graph != nullptr) calls.outstanding[*graph] = "cudaStreamEndCapture";
+  return real;
+}
+}
+
+namespace cutproof::gpu {
+namespace {
+
+constexpr Span kFrame{Stage::step, Stage::skin};
+// So little that the backend makes room once after the first frames.
+constexpr double kRoom = 1.0 / 16;
+
+// 120 particles in clusters of one node grown by one, cut in two.
+constexpr const char* kScene = R"({"version": 1, "name": "small",
+  "body": {"shape": {"kind": "box", "size": [0.06, 0.05, 0.04]}, "spacing": 0.01},
+  "clusters": {"method": "boxes", "side": 1}, "frame": {"settle": 0.048},
+  "detect": {"criterion": "geometric"}, "ground": {"friction": 0.5},
+  "blade": {"speed": 1, "strokes": [{"points": [[0.45, 0.5, 1.3], [0.45, 0.5, -0.3]], "along": [0, 1, 0]}]}})";
+
+const fixtures::Built& small_body() {
+  static const fixtures::Built built = fixtures::build(io::parse_scene(kScene, "the test's scene"), "the test's scene");
+  return built;
+}
+
+KernelOptions options(bool eager) {
+  KernelOptions options;
+  options.eager = eager;
+  options.room = kRoom;
+  return options;
+}
+
+// Call names that do not stand in a message where CUB made the call or <<< >>> did: the kernel's or CUB's does.
+const std::set<std::string>& called_within() {
+  static const std::set<std::string> names = {"__cudaLaunchKernel",
+                                              "cudaGetDevice",
+                                              "cudaSetDevice",
+                                              "cudaDeviceGetAttribute",
+                                              "cudaFuncGetAttributes",
+                                              "cudaFuncSetAttribute",
+                                              "cudaOccupancyMaxActiveBlocksPerMultiprocessorWithFlags"};
+  return names;
+}
+
+// All that a backend does: makes room by the way, and runs whole frames and stages one by one.
+State load_and_run(Backend& backend) {
+  const fixtures::Built& built = small_body();
+  backend.load({built.setup}, {built.state});
+  for (int64_t frame = 0; frame < built.setup.frame_count(); ++frame) {
+    if (frame != 1) {
+      backend.run(kFrame);
+    } else {
+      for (const Stage stage : kStages) backend.run({stage, stage});
+    }
+  }
+  static_cast<void>(backend.report());
+  return backend.snapshot().front();
+}
+
+std::string setting(const char* name, const std::string& otherwise) {
+  const char* const text = std::getenv(name);
+  return text == nullptr ? otherwise : text;
+}
+
+class DeviceFailures : public testing::Test {
+ protected:
+  void SetUp() override {
+    int devices = 0;
+    const cudaError_t status = __real_cudaGetDeviceCount(&devices);
+    if (status != cudaSuccess || devices == 0) {
+      GTEST_SKIP() << "gpu was not run: no device (" << cudaGetErrorString(status) << ")";
+    }
+    seed_ = std::stoull(setting("CUTPROOF_SEED", std::to_string(std::random_device{}())));
+  }
+
+  // Which calls to fail: the first and the last of each name, and one from each of `parts` equal parts of the rest.
+  // CUTPROOF_CALLS=all: every one.
+  std::vector<uint64_t> chosen(const std::vector<const char*>& trace, uint64_t parts) const {
+    const uint64_t most = trace.size();
+    if (setting("CUTPROOF_CALLS", "") == "all") parts = most;
+    parts = std::min(parts, most);
+    std::set<uint64_t> numbers;
+    std::map<std::string, uint64_t> last;
+    for (uint64_t k = 0; k < most; ++k) {
+      if (last.count(trace[k]) == 0) numbers.insert(k + 1);
+      last[trace[k]] = k + 1;
+    }
+    for (const auto& [name, number] : last) numbers.insert(number);
+    std::mt19937_64 random(seed_);
+    for (uint64_t part = 0; part < parts; ++part) {
+      const uint64_t from = part * most / parts, to = (part + 1) * most / parts;
+      numbers.insert(1 + from + random() % (to - from));
+    }
+    return {numbers.begin(), numbers.end()};
+  }
+
+  static void expect_nothing_outstanding() {
+    for (const auto& [handle, name] : calls.outstanding) ADD_FAILURE() << "what " << name << " gave is lost";
+    calls.outstanding.clear();
+    EXPECT_EQ(__real_cudaGetLastError(), cudaSuccess);
+  }
+
+  // Whether a message says which call failed. A failed launch, and what CUB calls, is told by the kernel's name or by
+  // that of CUB's function.
+  static bool names(const std::string& message, const std::string& call) {
+    if (call == "cudaGetDeviceCount") return message.find("cudaGetDeviceCount says: ") != std::string::npos;
+    const std::size_t in = message.find(") in ");
+    if (!message.starts_with("CUDA failed: ") || in == std::string::npos) return false;
+    const std::string where = message.substr(in);
+    if (where.find(call + "(") != std::string::npos) return true;
+    return called_within().count(call) != 0 &&
+           (where.find("kernel") != std::string::npos || where.find("cub::") != std::string::npos);
+  }
+
+  // Does `work` with call `number` failing; it has to end in a MachineError that names the call. What CUB asks of the
+  // device it may also do without: then the state has to be the right one.
+  static void fail(uint64_t number, Failing failing, const std::function<bool()>& work_is_right) {
+    calls.start(number, failing);
+    std::string defect;
+    try {
+      const bool right = work_is_right();
+      const std::string call = calls.failed == nullptr ? "" : calls.failed;
+      const bool may_do_without = called_within().count(call) != 0 && call != "__cudaLaunchKernel";
+      if (!right || !may_do_without) defect = "its failure was not noticed";
+    } catch (const MachineError& error) {
+      if (calls.failed == nullptr || !names(error.what(), calls.failed)) defect = error.what();
+    } catch (const std::exception& error) {
+      defect = std::string("not a MachineError but ") + error.what();
+    }
+    EXPECT_EQ(defect, "") << "call " << number << ", " << (calls.failed == nullptr ? "not reached" : calls.failed);
+    calls.start(0, Failing::once);
+    calls.stop();
+  }
+
+  // Each of the chosen calls fails; afterwards nothing is left, and now and then a fresh backend is tried.
+  void fail_each(bool eager, Failing failing, uint64_t parts) {
+    const auto work = [&] {
+      const std::unique_ptr<Backend> backend = make_gpu_backend(options(eager));
+      State state = load_and_run(*backend);
+      calls.stop();
+      return state;
+    };
+    const State right = work();  // also fills what CUB and the runtime keep for the process
+    calls.start(0, failing);
+    ASSERT_TRUE(work() == right) << "two runs differ";
+    const std::vector<const char*> trace = calls.trace;
+    expect_nothing_outstanding();
+
+    const std::vector<uint64_t> numbers = chosen(trace, parts);
+    const std::size_t every = std::max<std::size_t>(1, numbers.size() / 20);
+    const auto& result = *testing::UnitTest::GetInstance()->current_test_info()->result();
+    for (std::size_t k = 0; k < numbers.size() && result.total_part_count() < 20; ++k) {
+      SCOPED_TRACE("seed " + std::to_string(seed_));
+      fail(numbers[k], failing, [&] { return work() == right; });
+      expect_nothing_outstanding();
+      if (k % every != 0 && k + 1 != numbers.size()) continue;
+      EXPECT_TRUE(work() == right) << "after call " << numbers[k] << ", " << trace[numbers[k] - 1];
+      expect_nothing_outstanding();
+    }
+    std::cout << numbers.size() << " of " << trace.size() << " calls failed, seed " << seed_ << std::endl;
+  }
+
+  uint64_t seed_ = 0;
+};
+
+TEST_F(DeviceFailures, TheSceneMakesTheBackendEnlarge) {
+  const fixtures::Built& built = small_body();
+  const auto wants = [&](double factor) {
+    StagingBuffers staging =
+        make_staging_buffers({built.setup}, {built.state}, KernelOptions{}.rotation_method, Capacity{factor});
+    return wants_capacity(staging.view(), staging.counters.front());
+  };
+  EXPECT_TRUE(wants(kRoom));
+  EXPECT_FALSE(wants(2 * kRoom));
+  const auto memories = [](double room) {
+    KernelOptions with;
+    with.room = room;
+    calls.start(0, Failing::once);
+    static_cast<void>(load_and_run(*make_gpu_backend(with)));
+    return std::count(calls.trace.begin(), calls.trace.end(), std::string("cudaMalloc"));
+  };
+  EXPECT_GT(memories(kRoom), memories(1) * 3 / 2);
+  expect_nothing_outstanding();
+}
+
+TEST_F(DeviceFailures, ACallThatFailsInTheGraphModeLeavesNothing) { fail_each(false, Failing::once, 300); }
+
+TEST_F(DeviceFailures, ADeviceThatIsLostInTheGraphModeLeavesNothing) { fail_each(false, Failing::for_good, 100); }
+
+TEST_F(DeviceFailures, ACallThatFailsInTheEagerModeLeavesNothing) { fail_each(true, Failing::once, 60); }
+
+TEST_F(DeviceFailures, ADeviceThatIsLostInTheEagerModeLeavesNothing) { fail_each(true, Failing::for_good, 20); }
+
+TEST_F(DeviceFailures, ABackendWhoseCallFailedCanBeLoadedAnew) {
+  for (const bool eager : {false, true}) {
+    const State right = load_and_run(*make_gpu_backend(options(eager)));
+    std::unique_ptr<Backend> backend = make_gpu_backend(options(eager));
+    calls.start(0, Failing::once);
+    static_cast<void>(load_and_run(*backend));
+    calls.stop();
+    const std::vector<const char*> trace = calls.trace;
+    for (const uint64_t number : chosen(trace, 0)) {
+      SCOPED_TRACE("call " + std::to_string(number) + ", " + trace[number - 1] + (eager ? ", eager" : ", graph"));
+      // Graphs are captured only once a load, so a backend that has run makes the same calls as the first time.
+      fail(number, Failing::once, [&] { return load_and_run(*backend) == right; });
+      ASSERT_TRUE(load_and_run(*backend) == right);
+    }
+    backend.reset();
+    expect_nothing_outstanding();
+  }
+}
+
+TEST_F(DeviceFailures, FloorsThatCannotBeMeasuredLeaveNothing) {
+  calls.start(0, Failing::once);
+  const auto measure = [] { return measure_floors().chain_seconds > 0 && device_bytes_in_use() > 0; };
+  EXPECT_TRUE(measure());
+  calls.stop();
+  const std::vector<const char*> trace = calls.trace;
+  expect_nothing_outstanding();
+  for (const uint64_t number : chosen(trace, 0)) {
+    fail(number, Failing::once, measure);
+    expect_nothing_outstanding();
+  }
+}
+
+}  // namespace
+}  // namespace cutproof::gpu

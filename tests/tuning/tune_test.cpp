@@ -1,0 +1,204 @@
+// `cutproof tune` as a user meets it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "model/io/scene_io.h"
+#include "reference_cpu/reference.h"
+#include "tests/cli/program.h"
+#include "tuning/answer.h"
+
+namespace {
+
+using cutproof::Scene;
+using nlohmann::json;
+
+// A block hangs from its end while a blade cuts off another. Sixteen iterations are many more than it needs.
+constexpr const char* kScene = R"({"version": 1, "name": "hanging",
+  "body": {"shape": {"kind": "box", "size": [0.08, 0.03, 0.03]}, "spacing": 0.01}, "clusters": {"side": 2},
+  "frame": {"settle": 0.064}, "detect": {"criterion": "geometric"},
+  "step": {"substeps": 4, "iterations": 16, "gravity": [0, 0, -9.81], "damping": 5},
+  "grips": [{"low": [0, 0, 0], "high": [0.2, 1, 1]}, {"low": [0.8, 0, 0], "high": [1, 1, 1]}],
+  "blade": {"speed": 1, "strokes": [{"points": [[0.45, 0.5, 1.3], [0.45, 0.5, -0.3]], "along": [0, 1, 0]}]},
+  "expect": {"components_after_stroke": [2], "components_at_end": 2}})";
+
+class Tune : public Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    write("scene.json", kScene);
+  }
+  Outcome tune(const std::string& arguments) { return cutproof("tune scene.json --repeats 1 " + arguments); }
+};
+
+// RMS distance of a scene's run from that of the same scene with other substeps and iterations: without the library's
+// notion of an answer.
+double greatest_rms_h(const Scene& tuned, Scene scene, int substeps, int iterations) {
+  scene.step.substeps = substeps;
+  scene.step.iterations = iterations;
+  const cutproof::cli::Staged a(scene, "test", {}), b(tuned, "test", {});
+  const auto first = cutproof::reference::make_backend(), second = cutproof::reference::make_backend();
+  first->load({a.setup()}, {a.start()});
+  second->load({b.setup()}, {b.start()});
+  EXPECT_EQ(a.frame_count(), b.frame_count());
+  double greatest = 0;
+  for (int64_t frame = 0; frame < a.frame_count(); ++frame) {
+    const auto run = [](cutproof::Backend& backend) { backend.run({cutproof::Stage::step, cutproof::Stage::skin}); };
+    a.for_parts_of(frame, [&] { run(*first); });
+    b.for_parts_of(frame, [&] { run(*second); });
+    const cutproof::State x = first->snapshot().front(), y = second->snapshot().front();
+    double squares = 0, count = 0;
+    for (std::size_t i = 0; i < x.x.size(); ++i) {
+      if (!x.alive[i] || !y.alive[i]) continue;
+      const cutproof::Vec3 d = x.x[i] - y.x[i];
+      squares += dot(d, d);
+      count += 1;
+    }
+    greatest = std::max(greatest, std::sqrt(squares / count) / a.setup().body.grid.spacing);
+  }
+  return greatest;
+}
+
+TEST_F(Tune, WritesACheaperSceneWithinTheTolerance) {
+  for (const std::string backend : {"reference", "host"}) {
+    const Outcome outcome = tune("--tolerance 0.05 --answer substeps --json out.json --backend " + backend);
+    ASSERT_EQ(outcome.status, 0) << outcome.output;
+    EXPECT_NE(outcome.output.find("\nfound: "), std::string::npos) << outcome.output;
+    const Scene tuned = cutproof::io::read_scene(path("scene_tuned.json"));
+    const Scene given = cutproof::io::read_scene(path("scene.json"));
+    EXPECT_LT(tuned.step.substeps * tuned.step.iterations, 4 * 16);
+    const double error = greatest_rms_h(tuned, given, 4, 200);
+    EXPECT_LE(error, 0.05);
+
+    const json document = json::parse(read("out.json"));
+    EXPECT_TRUE(document.at("complete"));
+    EXPECT_EQ(document.at("tolerance_h"), 0.05);
+    EXPECT_EQ(document.at("answer").at("kind"), "substeps");
+    const json& found = document.at("found");
+    EXPECT_NEAR(found.at("verified").at("rms_h").get<double>(), error, backend == "host" ? 1e-4 : 1e-8);
+    EXPECT_GT(found.at("verdicts"), 10);
+    const json& trials = document.at("trials");
+    EXPECT_EQ(trials.at(0).at("substeps"), 4);
+    EXPECT_EQ(trials.at(0).at("iterations"), 16);
+    EXPECT_EQ(trials.at(0).at("outcome"), "within");
+    EXPECT_EQ(trials.at(0).at("rotation").is_null(), backend == "reference");
+    // What it has tried and found wanting is told.
+    EXPECT_TRUE(std::any_of(trials.begin(), trials.end(), [](const json& t) { return t.at("outcome") == "over"; }));
+    EXPECT_EQ(found.at("verified").at("outcome"), "within");
+    EXPECT_EQ(trials.at(found.at("trial").get<std::size_t>()).at("outcome"), "within");
+    for (const json& trial : trials) {
+      EXPECT_EQ(trial.at("seconds_per_frame").is_null(), trial.at("outcome") != "within") << trial;
+      if (trial.at("outcome") == "within") {
+        EXPECT_LE(trial.at("rms_h"), 0.05);
+      }
+    }
+    EXPECT_EQ(cutproof("run scene_tuned.json --check --backend " + backend).status, 0);
+  }
+}
+
+TEST_F(Tune, AgainstTheLimitOfShortTimeSteps) {
+  const Outcome outcome = tune("--tolerance 0.3 --write found.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  const Scene given = cutproof::io::read_scene(path("scene.json"));
+  EXPECT_LE(greatest_rms_h(cutproof::io::read_scene(path("found.json")), given, 512, 4), 0.3);
+}
+
+TEST_F(Tune, SaysThatThereIsNone) {
+  // The limit is not known so well.
+  const Outcome unknown = tune("--tolerance 1e-9 --frames 2");
+  EXPECT_EQ(unknown.status, 1) << unknown.output;
+  EXPECT_NE(unknown.output.find("is known to"), std::string::npos) << unknown.output;
+  EXPECT_EQ(listing(), std::set<std::string>{"scene.json"}) << "nothing was found, so nothing is written";
+}
+
+TEST_F(Tune, KeepsAMeshWithinReach) {
+  files::create_directories(path("meshes"));
+  files::create_directories(path("found"));
+  write("meshes/tetrahedron.off", "OFF\n4 4 0\n0 0 0\n60 0 0\n0 60 0\n0 0 60\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n");
+  write("scene.json", R"({"version": 1, "body": {"mesh": {"file": "meshes/tetrahedron.off", "unit": 0.001},
+    "spacing": 0.008}, "frame": {"count": 2}, "step": {"gravity": [0, 0, -9.81]}})");
+  const Outcome outcome = tune("--tolerance 0.2 --answer substeps --write found/tuned.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  EXPECT_EQ(cutproof::io::read_scene(path("found/tuned.json")).body.mesh->file, "../meshes/tetrahedron.off");
+  EXPECT_EQ(cutproof("run found/tuned.json --check").status, 0);
+}
+
+TEST_F(Tune, RunsEverythingToItsEndForACurve) {
+  const Outcome outcome = tune("--tolerance 0.02 --answer substeps --full --json out.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  int over = 0;
+  const json document = json::parse(read("out.json"));
+  for (const json& trial : document.at("trials")) {
+    EXPECT_FALSE(trial.at("seconds_per_frame").is_null());
+    EXPECT_EQ(trial.at("rms_h_by_frame").size(), document.at("trials").at(0).at("rms_h_by_frame").size());
+    over += trial.at("outcome") == "over";
+  }
+  EXPECT_GT(over, 0);
+}
+
+TEST_F(Tune, WithoutASkin) {
+  const Outcome outcome = tune("--tolerance 0.05 --answer substeps --without-skin --backend host");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("no skin"), std::string::npos) << outcome.output;
+
+  // Who counts shells looks at the skin.
+  write("scene.json",
+        std::string(kScene).replace(std::string(kScene).find("\"components_at_end\": 2"), 0, "\"shells_at_end\": 2, "));
+  const Outcome with_shells = tune("--tolerance 0.05 --answer substeps --without-skin --backend host --json out.json");
+  ASSERT_EQ(with_shells.status, 0) << with_shells.output;
+  EXPECT_NE(with_shells.output.find("--without-skin does nothing"), std::string::npos) << with_shells.output;
+  const json document = json::parse(read("out.json"));
+  for (const json& trial : document.at("trials")) {
+    EXPECT_EQ(trial.at("differences").get<std::string>().find("no skin"), std::string::npos);
+  }
+}
+
+// A path of several pieces takes whole substeps for each, so another number of substeps may take another number of
+// frames. Such runs are not compared.
+TEST_F(Tune, LeavesWhatHasAnotherSchedule) {
+  write("scene.json", R"({"version": 1, "body": {"shape": {"kind": "box", "size": [0.05, 0.03, 0.03]}, "spacing": 0.01},
+    "frame": {"length": 0.016}, "detect": {"criterion": "geometric"}, "step": {"substeps": 4, "iterations": 2},
+    "blade": {"speed": 0.5, "strokes": [{"along": [0, 1, 0], "points": [[0.5, 0.5, 1.3], [0.5, 0.5, 1.29],
+    [0.5, 0.5, 1.2], [0.5, 0.5, 1.19], [0.5, 0.5, 1.0], [0.5, 0.5, 0.99], [0.5, 0.5, 0.5]]}]}})");
+  const Outcome outcome = tune("--tolerance 0.5 --answer substeps --json out.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  const json trials = json::parse(read("out.json")).at("trials");
+  EXPECT_TRUE(std::any_of(trials.begin(), trials.end(), [](const json& t) { return t.at("outcome") == "schedule"; }))
+      << outcome.output;
+}
+
+TEST_F(Tune, LooksAtTheFirstFrames) {
+  const Outcome outcome = tune("--tolerance 0.1 --answer substeps --frames 1");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("looked at for 1 frames only"), std::string::npos) << outcome.output;
+}
+
+TEST_F(Tune, RefusesWhatItCannotTune) {
+  const auto refused = [&](const std::string& arguments, const std::string& says) {
+    const Outcome outcome = cutproof("tune " + arguments);
+    EXPECT_EQ(outcome.status, 2) << outcome.output;
+    EXPECT_NE(outcome.output.find(says), std::string::npos) << outcome.output;
+  };
+  refused("", "scene");
+  refused("scene.json", "--tolerance");
+  refused("scene.json --tolerance -1", "--tolerance");
+  refused("scene.json --tolerance nan", "--tolerance");
+  refused("scene.json --tolerance 1 --answer best", "--answer");
+  refused("scene.json --tolerance 1 --backend simulated", "--backend");
+  refused("scene.json --tolerance 1 --rotation svd", "--rotation");
+  refused("scene.json --tolerance 1 --write scene.json", "--write");
+  refused("scene.json --tolerance 1 --json scene.json", "--json");
+  refused("scene.json --tolerance 1 --json found.json --write found.json", "--json");
+  refused("scene.json --tolerance 1 --write nowhere/found.json", "nowhere");
+  refused("missing.json --tolerance 1", "missing.json");
+  write("published.json", R"({"version": 1, "body": {"shape": {"kind": "box"}, "particles": 100},
+    "frame": {"count": 1}, "step": {"solver": "published"}})");
+  refused("published.json --tolerance 1", "step.solver");
+  write("still.json", R"({"version": 1, "body": {"shape": {"kind": "box"}, "spacing": 0.02}})");
+  refused("still.json --tolerance 1", "frame.count");
+  EXPECT_EQ(listing(), (std::set<std::string>{"published.json", "scene.json", "still.json"}));
+}
+
+}  // namespace
