@@ -14,7 +14,7 @@
 
 namespace cutproof::gpu {
 
-using Schedule = std::vector<std::uint16_t>;
+using ThreadSchedule = std::vector<std::uint16_t>;
 
 // The threads that can run at a decision: bit t of masks[place] is thread place · 32 + t. Never empty.
 struct Candidates {
@@ -40,12 +40,13 @@ Generator random_walk(std::uint64_t seed);
 // `length` decisions at which the running thread falls behind all others. Finds a bug of depth d in a run of k
 // decisions with n threads with probability at least 1 / (n k^(d-1)). Requires 1 <= depth <= 4, length >= 1.
 Generator pct(std::uint64_t seed, int depth, std::int64_t length);
-Generator replay(Schedule schedule);
+Generator replay(ThreadSchedule schedule);
 
 // A schedule that still `fails`, with as few preemptions as removing ever smaller pieces gives. Requires
 // fails(schedule); calls it at most `budget` times.
-Schedule shrink(Schedule schedule, const std::function<bool(const Schedule&)>& fails, int budget = 2000);
+ThreadSchedule shrink(ThreadSchedule schedule, const std::function<bool(const ThreadSchedule&)>& fails,
+                      int budget = 2000);
 // Choices that are not 0.
-int preemptions(const Schedule& schedule);
+int preemptions(const ThreadSchedule& schedule);
 
 }  // namespace cutproof::gpu

@@ -128,8 +128,8 @@ CUTPROOF_DEVICE void count_new_cells_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL(count_new_cells_kernel);
 
-// Takes the room for new vertices and cells, or says that there is none. After a fault the skin stays as it is. One
-// thread.
+// Gives out places for new vertices and cells, or says that there are too few. After a fault the skin stays as it is.
+// One thread.
 template <class Block>
 CUTPROOF_DEVICE void reserve_skin_kernel(Block& block, const DeviceView& w) {
   using namespace skin_detail;

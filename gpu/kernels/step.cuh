@@ -371,9 +371,9 @@ CUTPROOF_DEVICE void update_positions_kernel(Block& block, const DeviceView& w, 
       const Float4 predicted = w.predicted[p];
       const Float3 from = implicit ? xyz(predicted) : x;
       // Mean of the goals, less `from`: small numbers, so that summing them costs no digits of d.
-      const int share = w.membership_count[p];
+      const int clusters = w.membership_count[p];
       Float3 pull = x - from;  // a particle in no cluster stays where it is
-      if (share > 0) {
+      if (clusters > 0) {
         const Coordinates c = coordinates(body, w.node[p]);
         Float3 sum;
         const int end = w.membership_begin[p + 1];
@@ -387,7 +387,7 @@ CUTPROOF_DEVICE void update_positions_kernel(Block& block, const DeviceView& w, 
           turn(2, 2) -= 1.0f;
           sum = sum + ((w.center[slot] - from) + turn * r);
         }
-        pull = (1.0f / static_cast<float>(share)) * sum;
+        pull = (1.0f / static_cast<float>(clusters)) * sum;
       }
       const Float3 plain = from + s * pull;
       Float3 free = plain;

@@ -84,7 +84,7 @@ bool is_either(const Setup& setup, const State& state, int32_t i) {
   return std::abs(distance - epsilon * h) <= 8 * kUnit * (1 + epsilon) * h;
 }
 
-TEST(GpuDetectByDistance, EqualsTheReferenceOutsideItsBandForManyBodiesInOneWorld) {
+TEST(GpuDetectByDistance, EqualsTheReferenceOutsideItsBandForManyBodiesInOneLoad) {
   Random random(1);
   int64_t removed = 0, stayed = 0, either = 0;
   for (int round = 0; round < 20; ++round) {
@@ -462,7 +462,7 @@ TEST(GpuDetectByStrain, CutsUniformStretchFalselyAndRigidMotionNever) {
 
 // ---- All together
 
-TEST(GpuDetect, JudgesEachBodyOfAWorldByItsOwnCriterionUnderAnySchedule) {
+TEST(GpuDetect, JudgesEachBodyOfALoadByItsOwnCriterionUnderAnySchedule) {
   std::vector<cutproof::Setup> setups;
   std::vector<State> states;
   for (const Criterion criterion : {Criterion::geometric, Criterion::distance, Criterion::none, Criterion::strain,
