@@ -1,5 +1,8 @@
-// The work of a frame, written down once for every launcher: which kernels run, in which order, and under which
-// condition. No size is known here; all of them live in DeviceView::counters.
+// gpu/launch: what host and device have in common when they run kernels: the contracts of a Block (block.h) and of a
+// Launcher (launcher.h), and what is known of a load (plan.h, load.h).
+//
+// This file: the work of a frame, written down once for every launcher: which kernels run, in which order, and under
+// which condition. No size is known here; all of them live in DeviceView::counters.
 #pragma once
 #include "gpu/kernels/detect.cuh"
 #include "gpu/kernels/expand.cuh"

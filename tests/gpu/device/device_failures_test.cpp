@@ -105,7 +105,7 @@ cudaError_t give_back(const void* handle, Call call) {
   cudaError_t __wrap_##name parameters {                                 \
     return call_or_fail(#name, [&] { return __real_##name arguments; }); \
   }
-// A wait that tells of a failure has waited all the same.
+// A wait that reports a failure has waited all the same.
 #define INTERCEPT_WAIT(name, parameters, arguments)   \
   extern "C" cudaError_t __real_##name parameters;    \
   extern "C" cudaError_t __wrap_##name parameters;    \
@@ -318,7 +318,7 @@ class DeviceFailures : public testing::Test {
     EXPECT_EQ(__real_cudaGetLastError(), cudaSuccess);
   }
 
-  // Whether a message says which call failed. A failed launch, and what CUB calls, is told by the kernel's name or by
+  // Whether a message says which call failed. A failed launch, and what CUB calls, is named by the kernel's name or by
   // that of CUB's function.
   static bool names(const std::string& message, const std::string& call) {
     if (call == "cudaGetDeviceCount") return message.find("cudaGetDeviceCount says: ") != std::string::npos;
