@@ -34,14 +34,13 @@ void SceneJudge::finish() {
     if (!holds) verdict.witness.text = text;
     judge_.add(std::move(verdict));
   };
-  int64_t checked = 0;
-  for (const Verdict& verdict : judge_.verdicts()) checked += verdict.checked;
   for (Verdict& verdict : expectations_.verdicts()) judge_.add(std::move(verdict));
   const auto frames = static_cast<double>(setup_.frame_count()), seen = static_cast<double>(judge_.frame());
   whole("the run is whole", seen == frames, seen, frames,
         fmt::format("it ends after frame {} of {}", judge_.frame(), setup_.frame_count()));
-  whole("something was judged", checked > 0, static_cast<double>(checked), 1,
-        "no property looked at anything: there are no frames, or the body has no particles");
+  const double moments = seen * setup_.body.particle_count();
+  whole("something was judged", moments > 0, moments, 1,
+        "there was nothing to judge: there are no frames, or the body has no particles");
 }
 
 bool SceneJudge::holds() const {
