@@ -12,11 +12,11 @@ export PATH="$here/bin:$PATH:/usr/local/cuda/bin"
 cases=${CUTPROOF_CASES:-100000}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-tar -xzf "$here/fixtures.tar.gz" -C "$work" || exit 3
-export CUTPROOF_REGRESSIONS="$work/fixtures/regressions"
+[ -d "$here/bin" ] || tar -xzf "$here/contents.tar.gz" -C "$here" || exit 3
+export CUTPROOF_REGRESSIONS="$here/fixtures/regressions"
 status=0
 lines=()
-cd "$work"
+cd "$here"
 
 note() {  # NAME STATUS SECONDS
   lines+=("    {\"name\": \"$1\", \"status\": $2, \"seconds\": $3}")
