@@ -43,8 +43,7 @@ struct StagingBuffers : Extents {
 #include "gpu/state/arrays.inc"
   }
 
-  // Gives every array its extent. What is there stays, and new elements are unset. Elements beyond an
-  // extent are lost.
+  // Gives every array its extent. What is there stays, and new elements are unset; those beyond an extent are lost.
   void allocate();
 
   // A DeviceView over these vectors.
