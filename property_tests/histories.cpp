@@ -10,6 +10,7 @@
 
 #include "model/error.h"
 #include "model/io/recording.h"
+#include "model/rules.h"
 #include "oracles/oracles.h"
 
 namespace cutproof::property_tests {
@@ -154,7 +155,7 @@ std::vector<Command> commands_from_json(const std::string& list) {
 History::History(Source make, Case c)
     : make_(std::move(make)), case_(std::move(c)), loaded_(load(case_)), staged_(make_()), state_(loaded_.state) {
   if (case_.together != 1) throw std::invalid_argument("a history needs a case with one stroke a frame (together: 1)");
-  if (case_.merge != MergeRule::published && case_.merge != MergeRule::single_pass) whole_ = make_();
+  if (promise_of(case_.merge).unique) whole_ = make_();
   given_strokes_ = static_cast<int32_t>(loaded_.setup.stroke_end.size());
   load_both(true);
 }
@@ -172,7 +173,7 @@ void History::execute(const Command& command) {
       },
       command);
   if (!failure_ && !(position() == expected)) {
-    fail(broken_contract("a frame ends with skin and nowhere else", next_, state_, staged_->name()));
+    fail(broken("a frame ends with skin and nowhere else", next_));
   }
 }
 
@@ -188,27 +189,30 @@ void History::run(const RunStages& command) {
 void History::run_span(Span span, bool whole) {
   const std::string name = staged_->name();
   const State start = state_;
-  Trail trail;
-  trail.initial = start;
-  trail.has_expanded = has_expanded_;
+  CaseRun run;
+  run.trace.initial = std::make_shared<const State>(start);
+  run.has_expanded = has_expanded_;
+  harness::Snapshot present = run.trace.initial;
   std::array<bool, 6> ran = {};
   for (const Stage stage : kStages) {
     if (!span.contains(stage)) continue;
     const auto s = static_cast<std::size_t>(stage);
-    const bool due = is_due(loaded_.setup, stage, state_);
+    const bool due = is_due(loaded_.setup, stage, !state_.removed.empty(), state_.edge_covered);
     staged_->run({stage, stage});
     ran[s] = staged_->report().ran[s];
     State next = staged_->snapshot().front();
-    if (ran[s] != due && !trail.failure) {
-      trail.failure = broken_contract(due ? "a stage that is due runs" : "only what is due runs", stage, next, name);
+    if (ran[s] != due && !run.failure) {
+      run.failure =
+          harness::broken_contract(due ? "a stage that is due runs" : "only what is due runs", stage, next.frame);
     }
     if (stage == Stage::expand && next.clusters.members != state_.clusters.members) has_expanded_ = true;
     state_ = next;
-    trail.steps.push_back({stage, std::move(next)});
+    const auto after = std::make_shared<const State>(std::move(next));
+    run.trace.moments.push_back({0, {stage, stage}, std::exchange(present, after), after, true});
   }
   next_ = stage_at(static_cast<int32_t>(span.last) + 1);
 
-  Judgement judgement = judge_trail(case_, loaded_, trail, name, false);
+  Judgement judgement = judge_case(case_, loaded_, run, name, false);
   verdicts_ += judgement.verdicts;
   if (judgement.failure) return fail(std::move(*judgement.failure));
 
@@ -222,10 +226,10 @@ void History::run_span(Span span, bool whole) {
   if (whole) {
     whole_->run(span);
     if (whole_->report().ran != ran) {
-      return fail(broken_contract("a whole span runs the stages that are due", span.last, state_, name));
+      return fail(broken("a whole span runs the stages that are due", span.last));
     }
   } else {
-    for (const auto& step : trail.steps) whole_->run({step.stage, step.stage});
+    for (const harness::Moment& moment : run.trace.moments) whole_->run(moment.span);
   }
   require_same(whole ? "a span is the composition of its stages" : "same input, same bits", state_,
                whole_->snapshot().front());
@@ -294,7 +298,7 @@ void History::require_no_ghost_force(const State& kicked, const std::vector<int3
         both[0].alive[i] == both[1].alive[i]) {
       continue;
     }
-    Verdict verdict = broken_contract("no ghost force", Stage::step, state_, staged_->name());
+    Verdict verdict = broken("no ghost force", Stage::step);
     verdict.bound_source = "oracles_and_tests.md §1";
     verdict.witness.particles = {static_cast<int32_t>(i)};
     verdict.witness.text = "particle " + std::to_string(i) + " moves otherwise when another component is kicked";
@@ -332,7 +336,9 @@ void History::save_and_load(const SaveAndLoad& command) {
 }
 
 // A displacement of a single precision that is not zero may lose its last bits beside a rest position.
-bool History::loads_in_bits() const { return staged_->precision() == Precision::binary64 || (!case_.moves && !has_kicked_); }
+bool History::loads_in_bits() const {
+  return staged_->precision() == Precision::binary64 || (!case_.moves && !has_kicked_);
+}
 
 State History::loaded_into(Backend& backend, const State& state) {
   backend.load({loaded_.setup}, {state});
@@ -354,10 +360,16 @@ void History::require_same(const char* property, const State& expected, const St
   ++verdicts_;
   const std::string what = difference(expected, found, but_for_rounding);
   if (what.empty()) return;
-  Verdict verdict = broken_contract(property, before(next_), expected, staged_->name());
+  Verdict verdict = broken(property, before(next_));
   verdict.measured = 1;
   verdict.witness.text = "different: " + what;
   fail(std::move(verdict));
+}
+
+Verdict History::broken(const char* what, Stage stage) const {
+  Verdict verdict = harness::broken_contract(what, stage, state_.frame);
+  verdict.backend = staged_->name();
+  return verdict;
 }
 
 void History::fail(Verdict verdict) {

@@ -86,7 +86,7 @@ inline constexpr std::array<const char*, kHistoryHappenedCount> kHistoryHappened
     "separation by a stroke that came later"};
 
 // Runs a history and judges it. After every stage: all oracles, and the reference's answer to the same state
-// (judge_trail). Beyond these:
+// (judge_case). Beyond these:
 // - Loading changes nothing: the state comes back with the same bits, in single precision the impulse (a sum over
 //   particles there) up to rounding. In double precision, and in single as long as nothing has moved, a backend that is
 //   saved and loaded also goes on with the same bits as one beside it that is not. A state has positions and kernels
@@ -123,6 +123,7 @@ class History {
   void require_same(const char* property, const State& expected, const State& found, bool but_for_rounding = false);
   void require_no_ghost_force(const State& kicked, const std::vector<int32_t>& component_of, int32_t component);
   bool loads_in_bits() const;
+  Verdict broken(const char* what, Stage stage) const;
   void fail(Verdict verdict);
   void note(HistoryHappened what) { ++happened_[static_cast<std::size_t>(what)]; }
   void note_load();
