@@ -68,7 +68,7 @@ bool FrameRunner::is_over() const {
 
 void FrameRunner::hand_over(bool to_backend) {
   if (to_backend == at_backend_) return;
-  std::vector<State> states = snapshot_of(std::vector<bool>(setups_.size(), true));
+  std::vector<State> states = snapshot();
   if (!to_backend && !reference_) reference_ = reference::make_backend();
   (to_backend ? backend_ : *reference_).load(setups_, std::move(states));
   at_backend_ = to_backend;
@@ -92,6 +92,7 @@ SpanReport FrameRunner::run_piece(const PlannedSpan& piece) {
 }
 
 void FrameRunner::run(Span span, const Observer& observe) {
+  frame_ = {};
   const std::size_t bodies = setups_.size();
   for (const PlannedSpan& piece : plan_spans(backend_, span, observe != nullptr)) {
     std::vector<bool> goes_on(bodies);
@@ -128,20 +129,20 @@ void FrameRunner::run(Span span, const Observer& observe) {
     }
   }
   if (observe) return;
-  std::vector<State> states = snapshot_of(std::vector<bool>(bodies, true));
+  std::vector<State> states = snapshot();
   for (std::size_t b = 0; b < bodies; ++b) present_[b] = std::make_shared<const State>(std::move(states[b]));
 }
 
 FrameResult FrameRunner::run_frame(const Observer& observe) {
-  frame_ = {};
-  frame_.frame = present_.empty() ? 0 : present_.front()->frame;
+  const int64_t frame = present_.empty() ? 0 : present_.front()->frame;
   run({Stage::step, Stage::skin}, observe);
+  frame_.frame = frame;
   for (const Snapshot& state : present_) count(frame_, *state);
   return frame_;
 }
 
 void FrameRunner::look_again() {
-  const std::vector<State> last = snapshot_of(std::vector<bool>(setups_.size(), true));
+  const std::vector<State> last = snapshot();
   for (std::size_t b = 0; b < last.size(); ++b) {
     if (last[b] == *present_[b]) continue;
     broken_.push_back(broken_contract("a body whose schedule is over stays as it is", Stage::skin, present_[b]->frame,

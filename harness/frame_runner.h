@@ -36,9 +36,13 @@ class FrameRunner {
   // a moment of each body after each piece in which a stage was due for any, and at the end of a frame. Without one in
   // as few as can be, and states() is brought up to date at their end.
   void run(Span span, const Observer& observe);
+  // By stage: whether any body launched it in the last call of run() or run_frame().
+  const std::array<bool, 6>& ran() const { return frame_.ran; }
   // The same for a frame.
   FrameResult run_frame(const Observer& observe);
 
+  // The same from the backend once more.
+  std::vector<State> snapshot() const { return snapshot_of(std::vector<bool>(setups_.size(), true)); }
   // Looks once more at bodies whose schedule may have been over before others'.
   void look_again();
   // What the backend did that its contract does not allow, seen on the way: stages that ran undue, or did not run; a
