@@ -1,4 +1,5 @@
-// What the device can do at best, measured: times are given as multiples of these (docs/accuracy_and_speed.md §5).
+// What the device can do at best, measured: times are given as multiples of these (docs/guide/measuring.md,
+// Benchmarks).
 #pragma once
 #include <cstdint>
 #include <vector>

@@ -1,6 +1,6 @@
-// Who runs next when kernels are executed under a simulated schedule (docs/architecture.md, Kernels;
-// oracles_and_tests.md §3). Threads of a launch are numbered place · 32 + thread, where place is that of a block among
-// the blocks that are alive at once.
+// Who runs next when kernels are executed under a simulated schedule (docs/design/architecture.md, Kernels;
+// docs/design/testing.md, Schedules). Threads of a launch are numbered place · 32 + thread, where place is that of a
+// block among the blocks that are alive at once.
 //
 // A schedule is written down as a vector of choices, one for each decision at which more than one thread could run:
 // choice k is the k-th of those threads, counted in cyclic order from the thread that ran last (itself included if it

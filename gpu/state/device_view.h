@@ -6,7 +6,7 @@
 // the order of model/; s slot of a cluster, over all bodies; q place in the array of members.
 //
 // Positions are kept as displacements from rest in single precision, x = X + d: what is rounded is then the motion and
-// not the place, so a body of 200 spacings loses no digits to its size (docs/tolerances.md).
+// not the place, so a body of 200 spacings loses no digits to its size (docs/design/tolerances.md).
 #pragma once
 #include <cstdint>
 
@@ -24,7 +24,7 @@ enum : int { kNoExpand = 0, kEdgeCover = 1, kPublishedExpand = 2 };             
 // nothing.
 enum : int { kSlotsFull = 1, kMembersFull = 2, kVerticesFull = 4, kCellsFull = 8, kAdditionsFull = 16 };
 
-// Which rotation method match_shapes uses (rotation.cuh); chosen by measurement, docs/rotations.md.
+// Which rotation method match_shapes uses (rotation.cuh); chosen by measurement, docs/design/solvers.md.
 enum : int { kJacobi4 = 0, kMueller2016 = 1, kApd = 2, kSvd = 3, kQuest = 4, kNewton = 5 };
 
 // Division by a number that is known before: n / d = n · multiplier >> shift for every 0 <= n < 2^31 (Granlund and
