@@ -3,14 +3,14 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-# NAME TARGET FOLDER... : a component, its library, and the folders whose headers belong to it. A component comes after
-# those that it links.
+# NAME TARGET [FOLDER]: a component, its library, and the folder whose headers are installed with it (once for each
+# folder). A component comes after those that it links.
 set(cutproof_components
   "model cutproof_model model"
-  "io cutproof_io model/io"
+  "io cutproof_io"
   "reference cutproof_reference reference_cpu"
-  "host_kernels cutproof_host gpu gpu/host gpu/kernels gpu/launch gpu/state"
-  "oracles cutproof_oracles oracles oracles/relations oracles/comparison oracles/surface")
+  "host_kernels cutproof_host gpu"
+  "oracles cutproof_oracles oracles")
 
 # What the installed libraries need of others, by target: what an installation says to find it. The empty ones are headers
 # alone that only our own sources include.
@@ -41,8 +41,8 @@ foreach(component IN LISTS cutproof_components)
   install(TARGETS ${target} EXPORT cutproof_${name}
     ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/cutproof)
   foreach(folder IN LISTS folders)
-    file(GLOB headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${folder}/*.h ${PROJECT_SOURCE_DIR}/${folder}/*.cuh)
-    install(FILES ${headers} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/cutproof/${folder})
+    install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/cutproof/${folder}
+      FILES_MATCHING PATTERN "*.h" PATTERN "*.cuh")
   endforeach()
 
   # From what the library links follows what has to be found first.
