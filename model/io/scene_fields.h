@@ -11,7 +11,9 @@
 #include <limits>
 #include <string_view>
 #include <utility>
+#include <vector>
 
+#include "model/rules.h"
 #include "model/scene.h"
 
 namespace cutproof::io {
@@ -54,27 +56,15 @@ inline constexpr auto words(Shape::Kind) {
 inline constexpr auto words(Cooking) {
   return std::array<Words<Cooking>, 2>{{{Cooking::boxes, "boxes"}, {Cooking::sampled, "sampled"}}};
 }
-inline constexpr auto words(Solver) {
-  return std::array<Words<Solver>, 2>{{{Solver::implicit, "implicit"}, {Solver::published, "published"}}};
-}
-inline constexpr auto words(Acceleration) {
-  return std::array<Words<Acceleration>, 2>{{{Acceleration::none, "none"}, {Acceleration::chebyshev, "chebyshev"}}};
-}
-inline constexpr auto words(Criterion) {
-  using enum Criterion;
-  return std::array<Words<Criterion>, 4>{
-      {{none, "none"}, {distance, "distance"}, {geometric, "geometric"}, {strain, "strain"}}};
-}
-inline constexpr auto words(MergeRule) {
-  using enum MergeRule;
-  return std::array<Words<MergeRule>, 4>{
-      {{none, "none"}, {deterministic, "deterministic"}, {published, "published"}, {single_pass, "single_pass"}}};
-}
-inline constexpr auto words(ExpandRule) {
-  using enum ExpandRule;
-  return std::array<Words<ExpandRule>, 3>{{{none, "none"}, {edge_cover, "edge_cover"}, {published, "published"}}};
-}
 inline constexpr auto words(Curve) { return std::array<Words<Curve>, 2>{{{Curve::line, "line"}, {Curve::arc, "arc"}}}; }
+
+// Choices that setups have too are named in model/rules.h.
+template <NamedChoice E>
+std::vector<Words<E>> words(E choice) {
+  std::vector<Words<E>> words;
+  for (const std::string_view name : names_of(choice)) words.emplace_back(static_cast<E>(words.size()), name);
+  return words;
+}
 
 // --- The fields ----------------------------------------------------------------------------------------------------
 inline constexpr double kLongest = 1e6;  // of any length [m] and coordinate
