@@ -9,7 +9,7 @@ preset=${CUTPROOF_PRESET:-default}
 ci/install.sh
 werror=()
 [ "${CI:-}" = true ] && werror=(-DCUTPROOF_WERROR=ON)
-cmake --preset "$preset" "${werror[@]}" >/dev/null
+cmake --preset "$preset" -DBUILD_TESTING=ON "${werror[@]}" >/dev/null
 build=build/$preset
 cmake --build "$build"
 
