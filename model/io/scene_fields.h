@@ -1,5 +1,5 @@
 // The table of all fields of a scene: name, unit, bounds and meaning, once. A visitor that goes through it reads,
-// writes or documents a scene (scene_io.cpp). Defaults are those of the structs in model/scene.h and model/setup.h.
+// writes or documents a scene (scene_reader.cpp, scene_writer.cpp). Defaults are those of the structs in model/scene.h and model/setup.h.
 //
 // A visitor has
 //   field(const Field&, T&)      T: bool, a number, std::string, Vec3, Range, an enumeration, a struct described here,
