@@ -1,5 +1,5 @@
-// What the recorder and the reader of recordings must agree on (docs/recording.md). Where each field of a State lies
-// follows from model/fields.h.
+// What the recorder and the reader of recordings must agree on (docs/reference/recording.md). Where each field of a
+// State lies follows from model/fields.h.
 #pragma once
 #include <array>
 #include <cstddef>

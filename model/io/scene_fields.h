@@ -1,5 +1,6 @@
 // The table of all fields of a scene: name, unit, bounds and meaning, once. A visitor that goes through it reads,
-// writes or documents a scene (scene_reader.cpp, scene_writer.cpp). Defaults are those of the structs in model/scene.h and model/setup.h.
+// writes or documents a scene (scene_reader.cpp, scene_writer.cpp). Defaults are those of the structs in model/scene.h
+// and model/setup.h.
 //
 // A visitor has
 //   field(const Field&, T&)      T: bool, a number, std::string, Vec3, Range, an enumeration, a struct described here,
@@ -194,7 +195,7 @@ void describe(Visitor& v, StepParameters& s) {
   v.field({.name = "relaxation", .bounds = above(0, 1), .doc = "s, `published` only."}, s.relaxation);
   v.field({.name = "acceleration",
            .doc = "`implicit` only. `chebyshev`: the same answer in fewer iterations, each of which costs a little "
-                  "more; the energy need not fall in every one (docs/acceleration.md)."},
+                  "more; the energy need not fall in every one (docs/design/solvers.md)."},
           s.acceleration);
   v.field({.name = "damping", .unit = "1/s", .bounds = between(0, 1e9), .doc = "c: velocities decay as exp(−c t)."},
           s.damping);

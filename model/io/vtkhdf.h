@@ -1,6 +1,6 @@
 // Writes one temporal VTKHDF 2.0 file of type PolyData: points, one kind of cells, and data on the points, for each
 // of a growing number of steps. What did not change is written once and shared by steps through offsets.
-// Layout: docs/recording.md, and https://docs.vtk.org, VTKHDF File Format.
+// Layout: docs/reference/recording.md, and https://docs.vtk.org, VTKHDF File Format.
 #pragma once
 #include <cstdint>
 #include <span>

@@ -155,7 +155,7 @@ def check_cut(folder):
         require(index.attrs["backend"] == b"reference", "the backend")
         require(list(index["snapshots/stage"]) == [5, 5, 1, 2, 3, 5, 5], "stages")
         require(list(index["snapshots/frame"]) == [0, 1, 1, 1, 1, 2, 3], "frames")
-        # The example of docs/recording.md: the clusters of one snapshot.
+        # The example of docs/reference/recording.md: the clusters of one snapshot.
         i = 3
         s, clusters = index["snapshots"], index["clusters"]
         row = s["offsets_row"][i]
