@@ -99,7 +99,7 @@ BaselineScene make_baseline_scene(const Baseline& baseline, int64_t particles, u
 
   // The right grip lets go where the push begins, and only the schedule knows when that is.
   fixtures::Built built = fixtures::build(scene, "command line");
-  scene.grips[1].end = built.timeline.time[at(built.setup.stroke_end.back() + 1)];
+  scene.grips[1].end = built.schedule.time[at(built.setup.stroke_end.back() + 1)];
   GripSpec push = right;
   push.after_strokes = true;
   push.end = kPush;
