@@ -3,14 +3,15 @@
 #include <map>
 #include <optional>
 
+#include "cli/against_report.h"
 #include "cli/commands.h"
+#include "cli/errors_report.h"
 #include "cli/results.h"
 #include "cli/terminal.h"
 #include "fixtures/bodies.h"
 #include "fixtures/build.h"
 #include "harness/against.h"
 #include "harness/backends.h"
-#include "harness/errors.h"
 #include "harness/frame_runner.h"
 #include "harness/judge.h"
 #include "model/error.h"
@@ -31,14 +32,17 @@ double metres_per(const std::string& unit) {
   return found->second;
 }
 
+using harness::Against;
+using harness::AgainstMode;
+
 AgainstMode against_mode(const RunOptions& options) {
   if (options.against != "reference") {
     throw InputError("command line", "--against", fmt::format("'{}' is nothing to compare with", options.against),
                      "use --against reference");
   }
-  return options.mode == "lockstep" ? AgainstMode::lockstep
-         : options.mode == "shadow" ? AgainstMode::shadow
-                                    : AgainstMode::both;
+  return options.mode == "lockstep"       ? AgainstMode::lockstep
+         : options.mode == "free-running" ? AgainstMode::free_running
+                                          : AgainstMode::both;
 }
 
 void print_header(const Scene& scene, const fixtures::Built& built, const RunOptions& options) {
@@ -89,7 +93,7 @@ void print_summary(const RunResult& result) {
 int run(const RunOptions& options) {
   std::optional<AgainstMode> mode;
   if (!options.against.empty()) mode = against_mode(options);
-  const ErrorsWanted wanted = errors_wanted(options.errors);
+  const harness::ErrorsWanted wanted = errors_wanted(options.errors);
   if (wanted.implementation)
     mode = mode.value_or(AgainstMode::lockstep) == AgainstMode::lockstep ? AgainstMode::lockstep : AgainstMode::both;
   fixtures::BuildOptions build_options;
@@ -108,7 +112,7 @@ int run(const RunOptions& options) {
     recorder.emplace(options.record, built.setup, io::write_scene(scene), options.backend.name);
   std::optional<Gate> gate;
   std::optional<Against> against;
-  std::optional<Errors> errors;
+  std::optional<harness::Errors> errors;
   print_header(scene, built, options);
 
   RunResult result{"run",
@@ -154,9 +158,10 @@ int run(const RunOptions& options) {
     print_verdicts(*gate);
   }
   if (against) print_against(*against);
+  const harness::Lockstep* const implementation = wanted.implementation && against ? &*against->lockstep : nullptr;
   if (errors) {
-    errors->finish(backend->snapshot().front(), against ? &*against : nullptr);
-    errors->print();
+    errors->finish(backend->snapshot().front());
+    print_errors(*errors, implementation);
   }
   if (recorder) {
     recorder->finish();
@@ -166,14 +171,14 @@ int run(const RunOptions& options) {
   if (json_file) {
     nlohmann::json document = to_json(result, gate ? &*gate : nullptr);
     if (against) {
-      document["against"] = against->to_json();
+      document["against"] = to_json(*against, built.setup);
       // A list that push_back makes of null is broken where there is no memory for it (nlohmann::json 3.11).
       document["against"]["verdicts"] = nlohmann::json::array();
       for (const Verdict& verdict : against->verdicts()) {
         document["against"]["verdicts"].push_back(to_json(verdict, false));
       }
     }
-    if (errors) document["errors"] = errors->to_json();
+    if (errors) document["errors"] = to_json(*errors, implementation);
     io::write_text(json_file->temporary(), document.dump(1) + "\n");
     json_file->commit();
     fmt::print("wrote {}\n", options.json);

@@ -4,9 +4,8 @@
 #include <sstream>
 #include <utility>
 
-#include "oracles/comparison/step_comparison.h"
+#include "harness/reference_stages.h"
 #include "oracles/oracles.h"
-#include "reference_cpu/reference.h"
 
 namespace cutproof::property_tests {
 namespace {
@@ -112,99 +111,18 @@ Verdict broken_contract(const std::string& what, Stage stage, const State& state
   return verdict;
 }
 
-namespace {
-
-// Which stages' topology has to be the reference's. Detection may differ within its rounding band, which is the
-// detection oracle's to judge; other rules of merging leave open who merges with whom.
-bool is_compared(const Setup& setup, Stage stage) {
-  if (stage == Stage::merge) return setup.merge.rule == MergeRule::deterministic;
-  return stage != Stage::step && stage != Stage::detect;
+void StepsCompared::add(const oracles::StageDifference& step) {
+  const oracles::ErrorNorm& position = step.error(oracles::Measure::position).norm;
+  ++steps;
+  particles += position.count;
+  undecidable += step.undecidable.particles_excluded;
+  greatest = std::max(greatest, position.max);
 }
-
-void run_stage_of_reference(const Setup& setup, Stage stage, State& state) {
-  switch (stage) {
-    case Stage::step:
-    case Stage::detect:
-      break;
-    case Stage::split:
-      reference::split(setup, state);
-      break;
-    case Stage::merge:
-      reference::merge(setup, state);
-      break;
-    case Stage::expand:
-      reference::expand(setup, state);
-      break;
-    case Stage::skin:
-      reference::skin(setup, state);
-      break;
-  }
-}
-
-std::vector<std::array<int32_t, 3>> sorted_triangles(const Skin& skin) {
-  std::vector<std::array<int32_t, 3>> triangles = skin.triangles;
-  for (auto& t : triangles) std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
-  std::sort(triangles.begin(), triangles.end());
-  return triangles;
-}
-
-// The first thing in which the topology of two states differs; empty if in none.
-std::string topological_difference(Stage stage, const State& expected, const State& actual) {
-  if (expected.alive != actual.alive) return "alive particles";
-  if (expected.debris != actual.debris) return "debris";
-  if (expected.clusters.offsets != actual.clusters.offsets) return "sizes of clusters";
-  if (expected.clusters.members != actual.clusters.members) return "members of clusters";
-  if (stage != Stage::skin && expected.clusters.number != actual.clusters.number) return "numbers of clusters";
-  if (expected.edge_covered != actual.edge_covered) return "edge_covered";
-  if (stage != Stage::skin) return {};
-  if (expected.skin.owner != actual.skin.owner || expected.skin.direction != actual.skin.direction) {
-    return "skin vertices";
-  }
-  if (sorted_triangles(expected.skin) != sorted_triangles(actual.skin)) return "skin triangles";
-  return {};
-}
-
-// How far a step is from the reference's, within docs/tolerances.md, Against the reference.
-std::vector<Verdict> beside_the_reference(oracles::StepComparison& comparison, const Setup& setup, const State& before,
-                                          const State& after, StepsCompared& compared) {
-  const oracles::StepDifference found = comparison.compare(before, after);
-  ++compared.steps;
-  compared.particles += found.position.count;
-  compared.either += found.particles_excluded;
-  compared.greatest = std::max(compared.greatest, found.position.greatest);
-  const double bound = oracles::position_bound(setup.body);
-  std::vector<Verdict> verdicts;
-  const auto judge = [&](const char* what, const oracles::Spread& apart, double most, const char* unit,
-                         bool of_clusters) {
-    Verdict verdict;
-    verdict.property = std::string("the reference's ") + what;
-    verdict.stage = Stage::step;
-    verdict.frame = before.frame;
-    verdict.measured = apart.greatest;
-    verdict.bound = most;
-    verdict.unit = unit;
-    verdict.bound_source = "docs/tolerances.md, Against the reference";
-    verdict.checked = apart.count;
-    verdict.holds = apart.greatest <= most;
-    if (!verdict.holds) {
-      (of_clusters ? verdict.witness.clusters : verdict.witness.particles) = {apart.where};
-      verdict.witness.text = std::string(of_clusters ? "cluster " : "particle ") + std::to_string(apart.where) +
-                             " is that far from where the same step takes it in the reference";
-    }
-    verdicts.push_back(std::move(verdict));
-  };
-  judge("positions", found.position, bound, "h", false);
-  judge("velocities", found.velocity, 2 * bound, "h/dt", false);
-  judge("rotations", found.rotation, bound, "h", true);
-  return verdicts;
-}
-
-}  // namespace
 
 void StepsCompared::join(const StepsCompared& other) {
   steps += other.steps;
   particles += other.particles;
-  either += other.either;
+  undecidable += other.undecidable;
   greatest = std::max(greatest, other.greatest);
 }
 
@@ -286,8 +204,8 @@ Judgement judge_trail(const Case& c, const Loaded& loaded, const Trail& trail, c
   oracles::Judge judge(setup);
   int32_t components = judge.component_count(trail.initial);
   judgement[Happened::several_components] = components > 1;
-  std::optional<oracles::StepComparison> steps;
-  if (c.moves && backend != "reference") steps.emplace(setup, reference::step);
+  std::optional<oracles::StageComparison> comparison;
+  if (backend != "reference") comparison.emplace(setup, harness::reference_stages());
   const State* before = &trail.initial;
   const State* compared_skin = nullptr;  // equal to the reference's
   for (const auto& [stage, after] : trail.steps) {
@@ -299,26 +217,16 @@ Judgement judge_trail(const Case& c, const Loaded& loaded, const Trail& trail, c
       const int32_t components_before = std::exchange(components, judge.component_count(after));
       if (stage == Stage::detect && components > components_before) judgement[Happened::separation] = true;
       if (stage != Stage::step) take(judge.state(after, stage, thorough), stage, after);
-      if (stage == Stage::step && steps && !judgement.failure) {
-        take(beside_the_reference(*steps, setup, *before, after, judgement.compared), stage, after);
-      }
-      if (backend != "reference" && is_compared(setup, stage)) {
-        ++judgement.verdicts;
-        // The topology of the skin is a function of what is alive.
-        const bool known = stage == Stage::skin && compared_skin != nullptr && compared_skin->alive == after.alive &&
-                           compared_skin->skin.owner == after.skin.owner &&
-                           compared_skin->skin.direction == after.skin.direction &&
-                           compared_skin->skin.triangles == after.skin.triangles;
-        if (!known) {
-          State expected = *before;
-          run_stage_of_reference(setup, stage, expected);
-          const std::string difference = topological_difference(stage, expected, after);
-          if (!difference.empty() && !judgement.failure) {
-            judgement.failure = broken_contract("the reference's topology", stage, *before, backend);
-            judgement.failure->witness.text = difference + " differ";
-          }
-        }
-        if (stage == Stage::skin) compared_skin = &after;
+      // The topology of the skin is a function of what is alive.
+      const bool is_known = stage == Stage::skin && compared_skin != nullptr && compared_skin->alive == after.alive &&
+                            compared_skin->skin.owner == after.skin.owner &&
+                            compared_skin->skin.direction == after.skin.direction &&
+                            compared_skin->skin.triangles == after.skin.triangles;
+      if (stage == Stage::skin) compared_skin = &after;
+      if (comparison && !judgement.failure && !is_known && (stage != Stage::step || c.moves)) {
+        const oracles::StageDifference found = comparison->compare(stage, *before, after, true);
+        if (stage == Stage::step) judgement.compared.add(found);
+        take(found.verdicts("the reference's "), stage, after);
       }
     } else if (stage != Stage::skin && !(after == *before)) {
       judgement.failure = broken_contract("a stage that does not run changes nothing", stage, *before, backend);

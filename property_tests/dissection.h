@@ -10,6 +10,7 @@
 
 #include "model/backend.h"
 #include "model/verdict.h"
+#include "oracles/comparison/stage_comparison.h"
 #include "property_tests/cases.h"
 
 namespace cutproof::property_tests {
@@ -70,8 +71,9 @@ inline constexpr std::array<const char*, kHappenedCount> kHappenedNames = {"no p
 // Steps of moving bodies beside the reference's.
 struct StepsCompared {
   int64_t steps = 0;
-  int64_t particles = 0, either = 0;  // of all steps; either: rounding decides where they go, so they are not measured
-  double greatest = 0;                // distance of positions [h]
+  int64_t particles = 0, undecidable = 0;  // of all steps; rounding decides where the latter go: they are not measured
+  double greatest = 0;                     // distance of positions [h]
+  void add(const oracles::StageDifference& step);
   void join(const StepsCompared& other);
 };
 
@@ -100,8 +102,7 @@ struct Trail {
 std::vector<Trail> run_cases(Backend& backend, std::vector<Loaded>& loaded);
 
 // Puts every oracle that applies to the trail of one case; and compares every stage with what the reference makes of
-// the same state: equal clusters, components, triangles (method.md: merge only where it is `deterministic`); of a body
-// that moves also positions, velocities and rotations after each step.
+// the same state (oracles/comparison/stage_comparison.h), the step only of a body that moves.
 // `thorough`: with CGAL's geometric check of every skin.
 Judgement judge_trail(const Case& c, const Loaded& loaded, const Trail& trail, const std::string& backend,
                       bool thorough);

@@ -1,6 +1,6 @@
-// The converged answer of one implicit substep (method.md §3), twice: by alternating a sparse Cholesky solve with the
+// The reference solution of one implicit substep (method.md §3), twice: by alternating a sparse Cholesky solve with the
 // rotations, and by the plain iteration. Both work on the same Substep below and share nothing with a backend.
-#include "oracles/comparison/converged.h"
+#include "oracles/comparison/reference_solution.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -45,7 +45,7 @@ struct Substep {
 };
 
 void require(bool condition, const char* what) {
-  if (!condition) throw std::invalid_argument(std::string("the converged answer of a substep: ") + what);
+  if (!condition) throw std::invalid_argument(std::string("the reference solution of a substep: ") + what);
 }
 
 Substep substep_of(const Setup& setup, const State& state) {
@@ -375,11 +375,11 @@ class LinearStage {
 
 }  // namespace
 
-Converged converged_substep(const Setup& setup, const State& state) {
+ReferenceSolution reference_solution(const Setup& setup, const State& state) {
   const Substep substep = substep_of(setup, state);
   require_solvable(setup, state, substep);
   const double h = setup.body.grid.spacing;
-  Converged result;
+  ReferenceSolution result;
   result.x = first_positions(substep);
   Poses poses = poses_at(substep, result.x, state.clusters.rotation);
   if (state.clusters.count() > 0) {
