@@ -90,13 +90,13 @@ void print_summary(const RunResult& result) {
 }
 
 // The comparison goes stage by stage.
-void compare(Against& against, const Setup& setup, const harness::Moment& moment) {
+void compare(Against& against, const Setup& setup, const harness::Moment& moment, const std::array<bool, 6>& ran) {
   const auto due = harness::due_stages(setup, *moment.before, moment.span, *moment.after);
   if (std::count(due.begin(), due.end(), true) > 1) {
     throw InputError("command line", "--against", "this backend runs several stages in one piece",
                      "choose one that runs them one by one, or leave --against out");
   }
-  against.see(moment.span.last, *moment.after, due[static_cast<std::size_t>(moment.span.last)]);
+  against.see(moment.span.last, *moment.after, ran[static_cast<std::size_t>(moment.span.last)]);
 }
 
 }  // namespace
@@ -148,7 +148,7 @@ int run(const RunOptions& options) {
   const harness::Observer see = [&](const harness::Moment& moment) {
     if (judge) judge->see(moment);
     if (recorder) recorder->add(moment.span.last, *moment.after);
-    if (against) compare(*against, built.setup, moment);
+    if (against) compare(*against, built.setup, moment, runner.ran());
   };
   {
     Progress progress("frame", built.setup.frame_count());
