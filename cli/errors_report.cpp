@@ -22,7 +22,7 @@ using nlohmann::json;
 
 json number_or_null(const std::optional<double>& value) { return value ? json_number(*value) : json(nullptr); }
 
-// Frames of the lookup table: name on the command line, member, in the order of accuracy_and_speed.md §1.
+// Frames of the lookup table: name on the command line, member, in the order of measuring.md, Errors.
 struct Kind {
   const char* name;
   bool ErrorsWanted::*member;

@@ -1,4 +1,5 @@
-// `cutproof run --errors`: which errors are asked for, and how they are printed and written (docs/results_schema.md).
+// `cutproof run --errors`: which errors are asked for, and how they are printed and written
+// (docs/reference/results_schema.md).
 #pragma once
 #include <nlohmann/json.hpp>
 #include <string>

@@ -96,7 +96,7 @@ Verdict FreeRunning::verdict() const {
                   .stage = Stage::step,
                   .backend = backend_,
                   .unit = "h",
-                  .bound_source = "docs/tolerances.md, Against the reference",
+                  .bound_source = "docs/design/tolerances.md, Against the reference",
                   .checked = static_cast<int64_t>(frames_.size()),
                   .witness = {}};
   if (!first_difference_) return verdict;

@@ -1,5 +1,5 @@
 // A backend and the reference that start alike and run freely, until the first decision in which they differ
-// (accuracy_and_speed.md §1).
+// (measuring.md, Errors).
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -43,7 +43,7 @@ class FreeRunning {
   // difference.
   void see(Stage stage, const State& after);
 
-  // "free-running: decisions"; see docs/results_schema.md.
+  // "free-running: decisions"; see docs/reference/results_schema.md.
   Verdict verdict() const;
 
   const std::vector<FreeFrame>& frames() const { return frames_; }

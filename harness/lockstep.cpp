@@ -23,7 +23,7 @@ Verdict verdict_of(const char* property, const std::string& backend) {
           .stage = Stage::step,
           .backend = backend,
           .unit = "1",
-          .bound_source = "docs/tolerances.md, Against the reference",
+          .bound_source = "docs/design/tolerances.md, Against the reference",
           .witness = {}};
 }
 

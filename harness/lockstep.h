@@ -1,5 +1,5 @@
 // A backend's run beside the reference, in lockstep: before each stage the reference takes the backend's state, then
-// both run the stage (accuracy_and_speed.md §1). What is measured is the error of one frame, and a decision that falls
+// both run the stage (measuring.md, Errors). What is measured is the error of one frame, and a decision that falls
 // within its rounding band does not spread to the next stage.
 #pragma once
 #include <array>
@@ -44,7 +44,7 @@ class Lockstep {
   // A state that is not well formed is a difference, and ends the comparison.
   void see(Stage stage, const State& after, bool launched);
 
-  // One verdict for each thing that was measured, over the whole run so far; see docs/results_schema.md.
+  // One verdict for each thing that was measured, over the whole run so far; see docs/reference/results_schema.md.
   std::vector<Verdict> verdicts() const;
   bool holds() const;
 

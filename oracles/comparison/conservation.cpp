@@ -137,7 +137,7 @@ Conservation conservation(Backend& backend, const Setup& setup, const State& sta
   result.momentum_bound =
       0.25 * static_cast<double>(result.substeps) * unit_roundoff(backend.precision()) * result.extent / dt;
   if (implicit) result.energy = growth / energy;
-  // Velocities off by δ in the mean: at most δ Σ m |v| + M δ² / 2 (docs/tolerances.md, Conservation).
+  // Velocities off by δ in the mean: at most δ Σ m |v| + M δ² / 2 (docs/design/tolerances.md, Conservation).
   result.energy_bound = result.momentum_bound * (speed + mass * result.momentum_bound / 2) / energy;
   result.angular_momentum = norm(j) > 0 ? turned / norm(j) : 0;
   return result;

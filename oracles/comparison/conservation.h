@@ -1,5 +1,5 @@
-// What a body that meets nothing must keep (accuracy_and_speed.md §1): momentum and mass, and of energy that it does
-// not grow. docs/errors.md says what each figure means and what it does not.
+// What a body that meets nothing must keep (measuring.md, Errors): momentum and mass, and of energy that it does
+// not grow. docs/guide/measuring.md says what each figure means and what it does not.
 #pragma once
 #include <optional>
 
@@ -18,7 +18,7 @@ struct Conservation {
   int64_t substeps = 0;
   double momentum = 0;           // greatest |p − p0| / M [m/s]
   double momentum_relative = 0;  // greatest |p − p0| / Σ m |v0| [1]
-  double momentum_bound = 0;     // 0.25 n u L / dt [m/s], with u of the states (docs/tolerances.md)
+  double momentum_bound = 0;     // 0.25 n u L / dt [m/s], with u of the states (docs/design/tolerances.md)
   double mass = 0;               // greatest |M − M0| / M0 [1]
   std::optional<double> energy;  // greatest growth above an earlier value / the first value [1]; implicit solver only
   double energy_bound = 0;       // [1] what momentum_bound allows

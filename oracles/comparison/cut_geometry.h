@@ -1,5 +1,6 @@
-// The shape of a cut beside the ideal one (accuracy_and_speed.md §1). Figures, not verdicts: docs/errors.md says what
-// each of them means and what it does not. Where something is broken a figure is not a number; nothing is left out.
+// The shape of a cut beside the ideal one (measuring.md, Errors). Figures, not verdicts: docs/guide/measuring.md says
+// what each of them means and what it does not. Where something is broken a figure is not a number; nothing is left
+// out.
 #pragma once
 #include <array>
 #include <cstdint>

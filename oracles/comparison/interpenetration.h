@@ -1,5 +1,5 @@
-// How far separated pieces stand in each other (accuracy_and_speed.md §1). Figures, not verdicts: docs/errors.md says
-// what they mean and what they do not.
+// How far separated pieces stand in each other (measuring.md, Errors). Figures, not verdicts: docs/guide/measuring.md
+// says what they mean and what they do not.
 #pragma once
 #include "model/setup.h"
 #include "model/state.h"
@@ -8,7 +8,7 @@ namespace cutproof::oracles {
 
 // Space that is inside the skins of two or more components of G [h³]: every line of a lattice parallel to an axis, at
 // most h / kColumnsPerSpacing apart, knows exactly how much of it is. `bound`: how far the volume may be from the
-// truth, for the axis where this is least (docs/tolerances.md, Interpenetration).
+// truth, for the axis where this is least (docs/design/tolerances.md, Interpenetration).
 inline constexpr int kColumnsPerSpacing = 8;
 // Not a number if the skin is broken.
 struct Interpenetration {

@@ -14,7 +14,7 @@ namespace cutproof::oracles {
 
 namespace {
 
-constexpr const char* kBoundSource = "docs/tolerances.md, Against the reference";
+constexpr const char* kBoundSource = "docs/design/tolerances.md, Against the reference";
 
 // Of a frame after its last stage (model/backend.h, run).
 void end_frame(State& state) {

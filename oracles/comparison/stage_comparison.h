@@ -1,5 +1,5 @@
 // A stage of a backend beside the reference's from the same state: the one comparison with the reference, which
-// lockstep, the property tests and the benchmarks share (docs/tolerances.md, Against the reference).
+// lockstep, the property tests and the benchmarks share (docs/design/tolerances.md, Against the reference).
 #pragma once
 #include <array>
 #include <cstdint>

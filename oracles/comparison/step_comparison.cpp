@@ -15,14 +15,14 @@ namespace cutproof::oracles {
 
 namespace {
 
-// Of larger bodies the project asks for less (accuracy_and_speed.md §1) [h].
+// Of larger bodies the project asks for less (measuring.md, Errors) [h].
 constexpr double kBoundOfLargeBodies = 3e-4;
 constexpr double kLargeBody = 100;  // [h] across
 // A particle this near to the blade's plane, in units of the rounding of its place and the blade's, may count as being
 // on either side of it.
 constexpr double kSideBand = 32;
-// A particle beyond the bound is measured for how far roundings of the frame's start carry it (docs/tolerances.md,
-// Against the reference), in so many runs, from a fixed seed.
+// A particle beyond the bound is measured for how far roundings of the frame's start carry it
+// (docs/design/tolerances.md, Against the reference), in so many runs, from a fixed seed.
 constexpr uint32_t kDisturbedRuns = 16;
 constexpr uint32_t kDisturbanceSeed = 1;
 

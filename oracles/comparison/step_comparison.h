@@ -1,5 +1,5 @@
-// A step of a backend beside the reference's from the same state (accuracy_and_speed.md §1, implementation): how far
-// they are apart, and what rounding decides, so that both answers are right (docs/tolerances.md, Against the
+// A step of a backend beside the reference's from the same state (measuring.md, Errors, implementation): how far
+// they are apart, and what rounding decides, so that both answers are right (docs/design/tolerances.md, Against the
 // reference).
 #pragma once
 #include <cstdint>
@@ -18,8 +18,8 @@ inline constexpr double kUniqueRotation = 1e-4;
 struct RotationDifference {
   double angle = 0;  // [rad]
   // What moved positions of members would explain the angle: |angle| (σ2 + σ3) / (√2 Σ w |X - T|) [h]. Positions off by
-  // δ change A by at most Σ w |X - T| δ, and this turns R by at most √2 / (σ2 + σ3) of that (docs/tolerances.md, One
-  // substep).
+  // δ change A by at most Σ w |X - T| δ, and this turns R by at most √2 / (σ2 + σ3) of that (docs/design/tolerances.md,
+  // One substep).
   double displacement = 0;
   bool unique = true;          // false: they differ, and both may be right
   bool moves_members = false;  // if not unique; the free axis of a cluster that is collinear at rest moves none
