@@ -1,4 +1,4 @@
-// The errors of measuring.md, Errors of one run (docs/guide/measuring.md).
+// The errors of one run (docs/guide/measuring.md, Errors).
 #pragma once
 #include <cstdint>
 #include <memory>

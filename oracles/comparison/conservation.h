@@ -1,4 +1,4 @@
-// What a body that meets nothing must keep (measuring.md, Errors): momentum and mass, and of energy that it does
+// What a body that meets nothing must keep: momentum and mass, and of energy that it does
 // not grow. docs/guide/measuring.md says what each figure means and what it does not.
 #pragma once
 #include <optional>

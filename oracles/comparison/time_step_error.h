@@ -1,4 +1,4 @@
-// The error that is left because time goes in steps (measuring.md, Errors). Figures, not verdicts:
+// The error that is left because time goes in steps. Figures, not verdicts:
 // docs/guide/measuring.md says what each of them means and what it does not. Lengths are told in h, the spacing of the
 // grid; what is broken or not a number is infinitely wrong.
 #pragma once
