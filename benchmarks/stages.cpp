@@ -508,7 +508,7 @@ struct Report {
 };
 
 void report_scene(Report& report, const Contender& contender, const BenchScene& scene, const Measured& measured,
-                  const MachineFloors& machine, int64_t frames, int64_t repeats) {
+                  const MachineLimits& machine, int64_t frames, int64_t repeats) {
   const Setup& setup = scene.setup;
   const Timings& timings = measured.timings;
   const FrameErrors* judged = measured.errors();
@@ -673,7 +673,7 @@ int bench_stages(const StagesOptions& options) {
   json document = begin_report("stages", options.backend);
   document["frames"] = frames;
   document["repeats"] = options.repeats;
-  const MachineFloors machine = measure_machine(options.backend);
+  const MachineLimits machine = measure_machine(options.backend);
   fmt::print("copy, read + written: {:.4g} GB/s", 1e-9 * machine.copy_bytes_per_second);
   if (machine.graph_node_seconds) {
     fmt::print("; one node of a graph {:.2f} µs (40 empty kernels {:.1f} µs)", 1e6 * *machine.graph_node_seconds,
@@ -681,14 +681,14 @@ int bench_stages(const StagesOptions& options) {
   }
   fmt::print("\n");
 
-  document["floors"] = {{"copy_bytes_per_second", machine.copy_bytes_per_second}};
+  document["machine_limits"] = {{"copy_bytes_per_second", machine.copy_bytes_per_second}};
   if (machine.graph_node_seconds) {
-    document["floors"]["graph_node_seconds"] = *machine.graph_node_seconds;
-    document["floors"]["chain_of_40_seconds"] = *machine.chain_seconds;
+    document["machine_limits"]["graph_node_seconds"] = *machine.graph_node_seconds;
+    document["machine_limits"]["chain_of_40_seconds"] = *machine.chain_seconds;
   }
 #if CUTPROOF_HAS_CUDA
   if (options.backend == "gpu")
-    document["launch_layer"] = json::parse(gpu::twins_json(gpu::compare_twins(1'000'000, 200)));
+    document["launch_layer"] = json::parse(gpu::raw_baseline_json(gpu::compare_with_raw(1'000'000, 200)));
 #endif
 
   Report report;

@@ -76,7 +76,7 @@ void expect_rows(const json& document, const std::string& backend, const std::st
   EXPECT_EQ(document.at("format"), "cutproof.bench");
   EXPECT_EQ(document.at("complete"), true);
   EXPECT_EQ(document.at("holds"), true);
-  EXPECT_GT(document.at("floors").at("copy_bytes_per_second"), 0);
+  EXPECT_GT(document.at("machine_limits").at("copy_bytes_per_second"), 0);
   EXPECT_FALSE(document.at("device").get<std::string>().empty());
 }
 

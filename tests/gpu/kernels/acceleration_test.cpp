@@ -1,4 +1,4 @@
-// The accelerated iteration (docs/acceleration.md) on every backend: the same answer as the plain one, sooner, and
+// The accelerated iteration (docs/design/solvers.md) on every backend: the same answer as the plain one, sooner, and
 // everything else that a step must keep.
 #include <gtest/gtest.h>
 
@@ -52,7 +52,7 @@ class Accelerated : public ::testing::TestWithParam<NamedBackend> {
     return backend_->snapshot().front();
   }
   // What of an error in double precision is asked for [h], and what rounding leaves in single: as in
-  // docs/tolerances.md, Against the reference.
+  // docs/design/tolerances.md, Against the reference.
   double tolerance(double in_double) const { return backend_->precision() == Precision::binary64 ? in_double : 1e-4; }
 
   std::unique_ptr<Backend> backend_ = GetParam().make();
