@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "benchmarks/suites.h"
+#include "cli/errors_report.h"
 #include "fixtures/bodies.h"
 #include "fixtures/build.h"
 #include "harness/backends.h"
@@ -177,7 +178,7 @@ BaselineRow run_baseline(Backend& backend, const Baseline& baseline, BaselineSce
     row.removed += static_cast<int64_t>(state.removed.size() + state.debris.size());
     const bool last = frame + 1 == scene.setup.frame_count();
     // Where nothing was removed, all is connected and coupled as before.
-    if (frame == 0 || last || !state.removed.empty()) row.end = topology_of(scene.setup, state);
+    if (frame == 0 || last || !state.removed.empty()) row.end = harness::topology_of(scene.setup, state);
     row.isolated = std::max(row.isolated, row.end.isolated);
     row.unequal_frames += !row.end.equal;
     if (last || frame % kOverlapEvery == 0) {
