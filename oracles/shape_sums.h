@@ -8,18 +8,12 @@
 
 #include "model/setup.h"
 #include "model/state.h"
+#include "oracles/memberships.h"
 
 namespace cutproof::oracles {
 
 // u: relative error of one rounding in double precision.
 inline constexpr double kUnitRoundoff = 0x1p-53;
-
-// n_i: in how many clusters each particle lies.
-inline std::vector<int32_t> membership_counts(const Clusters& clusters, int32_t particle_count) {
-  std::vector<int32_t> count(static_cast<std::size_t>(particle_count), 0);
-  for (const int32_t particle : clusters.members) ++count[static_cast<std::size_t>(particle)];
-  return count;
-}
 
 // w_ic = m_i / n_i, the same for every cluster of i. Requires i to lie in a cluster.
 inline double weight_of(const Body& body, const std::vector<int32_t>& counts, int32_t particle) {

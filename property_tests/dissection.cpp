@@ -6,6 +6,7 @@
 
 #include "oracles/comparison/step_comparison.h"
 #include "oracles/oracles.h"
+#include "oracles/surface/surface.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::property_tests {
@@ -283,7 +284,7 @@ Judgement judge_trail(const Case& c, const Loaded& loaded, const Trail& trail, c
     }
   };
 
-  oracles::Judge judge(setup);
+  oracles::Judge judge(setup, oracles::properties());
   int32_t components = judge.component_count(trail.initial);
   judgement[Happened::several_components] = components > 1;
   std::optional<oracles::StepComparison> steps;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "model/error.h"
+#include "model/fields.h"
 #include "model/io/recording.h"
 #include "oracles/oracles.h"
 
@@ -19,16 +20,6 @@ Stage stage_at(int32_t index) { return kStages[static_cast<std::size_t>(index % 
 
 // The last stage that ran, as recordings name it.
 Stage before(Stage next) { return stage_at(static_cast<int32_t>(next) + 5); }
-
-template <typename T>
-bool same_bits(const T& a, const T& b) {
-  return std::memcmp(&a, &b, sizeof(T)) == 0;
-}
-template <typename T>
-bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
-  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(),
-                                            [](const T& p, const T& q) { return std::memcmp(&p, &q, sizeof(T)) == 0; });
-}
 
 // A folder that goes with everything in it.
 class TemporaryFolder {

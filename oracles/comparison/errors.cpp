@@ -6,7 +6,8 @@
 
 #include "oracles/blade_motion.h"
 #include "oracles/comparison/converged.h"
-#include "oracles/relations/relations.h"
+#include "oracles/oracles.h"
+#include "oracles/single_substep.h"
 #include "oracles/support.h"
 
 namespace cutproof::oracles {

@@ -135,9 +135,9 @@ void spread(std::vector<uint8_t>& particles, const Clusters& clusters, int64_t i
 
 }  // namespace
 
-std::vector<Turn> turns_apart(const Setup& setup, const State& expected, const State& actual) {
+std::vector<RotationDifference> turns_apart(const Setup& setup, const State& expected, const State& actual) {
   const Clusters& clusters = expected.clusters;
-  std::vector<Turn> turns(at(clusters.count()));
+  std::vector<RotationDifference> turns(at(clusters.count()));
   const WeightedRest rest = weighted_rest(setup.body, membership_counts(clusters, setup.body.particle_count()));
   for (int32_t c = 0; c < clusters.count(); ++c) {
     double squared = 0;
@@ -146,7 +146,7 @@ std::vector<Turn> turns_apart(const Setup& setup, const State& expected, const S
       squared += d * d;
     }
     if (squared == 0) continue;
-    Turn& turn = turns[at(c)];
+    RotationDifference& turn = turns[at(c)];
     const Shape shape = shape_of(rest, clusters, expected.x, c);
     if (!shape.finite || !shape.unique) {
       turn.unique = false;
@@ -239,7 +239,7 @@ StepComparison::Growth StepComparison::growth_of_rounding(const State& before, c
     for (std::size_t i = 0; i < growth.position.size(); ++i) {
       growth.position[i] = std::max(growth.position[i], norm(end.x[i] - expected.x[i]) / setup.body.grid.spacing);
     }
-    const std::vector<Turn> turns = turns_apart(setup, expected, end);
+    const std::vector<RotationDifference> turns = turns_apart(setup, expected, end);
     for (std::size_t c = 0; c < turns.size(); ++c) {
       growth.turn[c] = std::max(growth.turn[c], turns[c].displacement);
     }
@@ -312,14 +312,14 @@ StepDifference StepComparison::compare(const State& before, const State& after) 
 
   const Clusters &mine = expected.state.clusters, &others = after.clusters;
   const bool same_clusters = mine.offsets == others.offsets && mine.members == others.members;
-  std::vector<Turn> turns;
+  std::vector<RotationDifference> turns;
   if (same_clusters) turns = turns_apart(setup_, expected.state, after);
   for (int32_t c = 0; c < static_cast<int32_t>(turns.size()); ++c) {
     if (!turns[at(c)].moves_members) continue;
     for (const int32_t i : mine.of(c)) mask[at(i)] = 0;
   }
-  const bool turned_too_far =
-      std::any_of(turns.begin(), turns.end(), [&](const Turn& turn) { return !(turn.displacement <= bound_); });
+  const bool turned_too_far = std::any_of(
+      turns.begin(), turns.end(), [&](const RotationDifference& turn) { return !(turn.displacement <= bound_); });
   std::vector<uint8_t> turn_is_sensitive(turns.size(), 0);
   if (turned_too_far || apart(expected, mask).greatest > bound_) {
     const Growth growth = growth_of_rounding(before, expected.state, wanted);
@@ -346,7 +346,7 @@ StepDifference StepComparison::compare(const State& before, const State& after) 
   }
   // A cluster follows its particles: where one of them may go either way, so may its rotation.
   for (int32_t c = 0; c < static_cast<int32_t>(turns.size()); ++c) {
-    const Turn& turn = turns[at(c)];
+    const RotationDifference& turn = turns[at(c)];
     const auto members = mine.of(c);
     const bool either = !turn.unique || turn_is_sensitive[at(c)] ||
                         (turn.displacement > bound_ &&

@@ -18,7 +18,7 @@ Spread velocities_apart(const Setup& setup, const State& expected, const State& 
 // How far apart the rotations of a cluster are, where the best rotation of the cluster at expected.x is unique:
 // (σ2 + σ3) / σ1 >= kUniqueRotation, with σ3 negative for a reflection.
 inline constexpr double kUniqueRotation = 1e-4;
-struct Turn {
+struct RotationDifference {
   double angle = 0;  // [rad]
   // What moved positions of members would explain the angle: |angle| (σ2 + σ3) / (√2 Σ w |X - T|) [h]. Positions off by
   // δ change A by at most Σ w |X - T| δ, and this turns R by at most √2 / (σ2 + σ3) of that (docs/tolerances.md, One
@@ -28,7 +28,7 @@ struct Turn {
   bool moves_members = false;  // if not unique; the free axis of a cluster that is collinear at rest moves none
 };
 // [m]. Both states have the same clusters.
-std::vector<Turn> turns_apart(const Setup& setup, const State& expected, const State& actual);
+std::vector<RotationDifference> turns_apart(const Setup& setup, const State& expected, const State& actual);
 
 // Greatest extent of the body at rest, over the three axes [h].
 double body_extent(const Body& body);

@@ -480,7 +480,7 @@ TEST(WithinItsRounding, AFreeAxisOfACollinearClusterIsEither) {
   state.clusters.rotation.resize(1);
   State turned = state;
   turned.clusters.rotation[0] = Mat3{{1, 0, 0, 0, 0, -1, 0, 1, 0}};  // about the wire
-  const std::vector<oracles::Turn> turns = oracles::turns_apart(setup, state, turned);
+  const std::vector<oracles::RotationDifference> turns = oracles::turns_apart(setup, state, turned);
   ASSERT_EQ(turns.size(), 1u);
   EXPECT_FALSE(turns[0].unique);
   EXPECT_FALSE(turns[0].moves_members) << "its free axis moves no member";
