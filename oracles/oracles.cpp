@@ -31,6 +31,9 @@ Verdict skin_vertices(const Setup& setup, const State& state) { return of_state(
 Verdict momentum(const Setup& setup, const State& before, const State& after) {
   return of_stage("linear momentum", setup, Stage::step, before, after);
 }
+Verdict motion(const Setup& setup, const State& before, const State& after) {
+  return of_stage("motion", setup, Stage::step, before, after);
+}
 Verdict detection(const Setup& setup, const State& before, const State& after) {
   return of_stage("detection", setup, Stage::detect, before, after);
 }

@@ -42,6 +42,16 @@ Verdict skin_vertices(const Setup& setup, const State& state);
 // --- One stage: the state before and after it -----------------------------------------------------------------------
 // Linear momentum over one frame: M v' = decay of M v + gravity + impulse (state.impulse).
 Verdict momentum(const Setup& setup, const State& before, const State& after);
+// Positions and velocities before and after the step of one frame belong together. What can be said of it without
+// running the step again:
+// - one substep a frame: each particle has moved by dt v' / D, with D = e^(−c dt);
+// - a particle that a grip holds throughout has followed the grip's path, and one that it holds in the last substep has
+//   the path's velocity;
+// - along each axis in which no contact can push, the centre of mass has moved as momentum and gravity say; along one
+//   in which contacts push to one side only, by what the frame's impulse can add at its latest and at its earliest.
+// `measured` and `bound` are those of the comparison that comes nearest to its bound or goes farthest beyond [h].
+// Vacuous where none of these can be asked: a blade that is down, friction or a grip may push to any side.
+Verdict motion(const Setup& setup, const State& before, const State& after);
 Verdict detection(const Setup& setup, const State& before,
                   const State& after);  // removed <=> d_i > εh outside the band
 Verdict split_exactness(const Setup& setup, const State& before, const State& after);

@@ -58,6 +58,8 @@ PropertyList make_core_properties() {
        nullptr},
       of_stage("linear momentum", "docs/tolerances.md, Linear momentum", "kg m/s", stages(step), "nothing is alive",
                check_momentum),
+      of_stage("motion", "method.md §3; docs/tolerances.md, Motion", "h", stages(step),
+               "nothing is alive, or a blade that is down, friction or a grip may push to any side", check_motion),
       of_stage("detection", "method.md §4; docs/oracles.md, Rounding", "1", stages(detect), "nothing was alive",
                check_detection),
       of_stage("split exactness", "method.md §5", "1", stages(split), "no cluster", check_split_exactness),

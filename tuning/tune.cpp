@@ -12,7 +12,7 @@
 #include "cli/json_number.h"
 #include "harness/backends.h"
 #include "harness/frame_runner.h"
-#include "harness/judge.h"
+#include "harness/scene_judge.h"
 #include "model/error.h"
 #include "model/io/atomic_file.h"
 #include "model/io/scene_io.h"
@@ -265,7 +265,7 @@ Tuner::Verified Tuner::verify(const Configuration& configuration, const std::str
   const Scene scene = io::parse_scene(text, path_);
   const std::unique_ptr<Backend> backend = backend_for(configuration);
   const Staged staged(scene, path_, options_.frames);
-  backend->load({staged.setup()}, {staged.start()});
+  harness::FrameRunner runner(*backend, {staged.setup()}, {staged.start()});
   // What a scene expects is of all of it; but isolation that it expects fails no verdict in a part of it either.
   Expectations expected = scene.expect;
   if (options_.frames) {
@@ -274,17 +274,17 @@ Tuner::Verified Tuner::verify(const Configuration& configuration, const std::str
       expected.isolated_clusters = scene.expect.isolated_clusters;
     }
   }
-  Gate gate(staged.setup(), expected, options_.backend.name, backend->snapshot().front());
+  harness::SceneJudge judge(staged.setup(), expected, options_.backend.name, runner.states().front());
   Comparison comparison(staged.setup(), answer_->course(), allowed());
   for (int64_t frame = 0; frame < staged.frame_count(); ++frame) {
-    staged.for_parts_of(
-        frame, [&] { run_frame(*backend, [&](Stage stage, const State& state) { gate.see(stage, state); }, {}); });
-    comparison.add(backend->snapshot().front());
+    staged.for_parts_of(frame, [&] { runner.run_frame([&](const harness::Moment& moment) { judge.see(moment); }); });
+    comparison.add(*runner.states().front());
   }
-  gate.finish();
+  for (Verdict& verdict : runner.take_broken_contracts()) judge.add(std::move(verdict));
+  judge.finish();
   comparison.report(verified.trial);
   comparison.course().stroke_end = staged.stroke_end();
-  verified.verdicts = static_cast<int64_t>(gate.verdicts().size());
+  verified.verdicts = static_cast<int64_t>(judge.verdicts().size());
   if (answer_->course().frames.size() != comparison.course().frames.size()) {
     verified.failure = "it has another number of frames than a finer answer";
     verified.trial.outcome = Outcome::schedule;
@@ -297,9 +297,9 @@ Tuner::Verified Tuner::verify(const Configuration& configuration, const std::str
   } else {
     verified.trial.outcome = Outcome::within;
   }
-  for (const Verdict& verdict : gate.verdicts()) {
+  for (const Verdict& verdict : judge.verdicts()) {
     if (!verified.failure.empty()) break;
-    if (verdict.holds || gate.expected_failure(verdict)) continue;
+    if (verdict.holds || judge.is_expected_failure(verdict)) continue;
     verified.failure = fmt::format("{} fails in frame {}: {}", verdict.property, verdict.frame, verdict.witness.text);
   }
   return verified;
