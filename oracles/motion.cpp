@@ -1,5 +1,5 @@
 // How far a step moved the body, held against the velocities and impulses that the states name (method.md §3; bounds:
-// docs/tolerances.md, Motion).
+// tolerances.md, Motion).
 #include <fmt/format.h>
 
 #include <algorithm>

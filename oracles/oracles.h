@@ -1,4 +1,4 @@
-// Oracles: const state in, verdict out (oracles_and_tests.md §1). None of them knows how a stage was computed; each
+// Oracles: const state in, verdict out (oracles.md). None of them knows how a stage was computed; each
 // certifies the answer. They depend on model/ only: no line is shared with reference_cpu/ or gpu/.
 //
 // Every function fills property, holds, measured, bound, unit, bound_source, checked, vacuous and witness, and the

@@ -33,7 +33,7 @@ Sums sums_of(const Body& body, const State& state, const std::vector<uint8_t>& a
 }
 
 // Root of the sum of squares of the clusters' and of the particles' masses: how independent errors of goal positions
-// and of single positions add up in the momentum (docs/tolerances.md, Linear momentum).
+// and of single positions add up in the momentum (tolerances.md, Linear momentum).
 struct IndependentMasses {
   double clusters = 0, particles = 0;
 };

@@ -8,7 +8,7 @@ namespace cutproof::oracles {
 namespace {
 
 Verdict run_twice(Backend& backend, const Setup& setup, const State& state, int64_t frames) {
-  Verdict verdict = begin("determinism", backend, state, "1", "oracles_and_tests.md §1: the same bits");
+  Verdict verdict = begin("determinism", backend, state, "1", "oracles.md, Relations: the same bits");
   if (auto unjudged = unable(verdict, backend, kFrame)) return *unjudged;
   std::vector<State> first;
   backend.load({setup}, {state});

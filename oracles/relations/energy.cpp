@@ -15,7 +15,7 @@ namespace {
 
 Verdict watch_energy(Backend& backend, const Setup& setup, const State& given, int32_t iterations) {
   const State state = in_arithmetic_of(backend, given);
-  Verdict verdict = begin("energy is monotone", backend, state, "J", "docs/tolerances.md, Energy");
+  Verdict verdict = begin("energy is monotone", backend, state, "J", "tolerances.md, Energy");
   if (auto unjudged = unfit(verdict, setup, state)) return *unjudged;
   if (auto unjudged = unable(verdict, backend, step_span(backend))) return *unjudged;
   if (setup.step.solver != Solver::implicit) return vacuous(verdict, "only the implicit solver has an energy");

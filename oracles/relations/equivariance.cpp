@@ -52,7 +52,7 @@ Verdict judge_exactly(Verdict verdict, const std::string& how, const State& expe
 }
 
 Verdict run_transformed(Backend& backend, const Setup& setup, const State& state, Span span, uint64_t seed) {
-  Verdict verdict = begin("equivariance", backend, state, "1", "docs/tolerances.md, A scene transformed along");
+  Verdict verdict = begin("equivariance", backend, state, "1", "tolerances.md, A transformed scene");
   if (auto unjudged = unfit(verdict, setup, state)) return *unjudged;
   if (auto unjudged = unable(verdict, backend, span)) return *unjudged;
   const uint64_t kind = seed % kEquivarianceKinds;

@@ -10,7 +10,7 @@ namespace {
 
 Verdict kick_one_component(Backend& backend, const Setup& setup, const State& state, int32_t particle, Vec3 kick,
                            int64_t frames) {
-  Verdict verdict = begin("no ghost force", backend, state, "1", "oracles_and_tests.md §1: the same bits");
+  Verdict verdict = begin("no ghost force", backend, state, "1", "oracles.md, Relations: the same bits");
   if (auto unjudged = unfit(verdict, setup, state)) return *unjudged;
   if (auto unjudged = unable(verdict, backend, kFrame)) return *unjudged;
   if (particle < 0 || particle >= setup.body.particle_count() || !state.alive[at(particle)]) {

@@ -9,7 +9,7 @@ namespace cutproof::oracles {
 namespace {
 
 Verdict run_fewer_and_more(Backend& backend, const Setup& more, const State& state, int64_t fewer_frames) {
-  Verdict verdict = begin("refinement", backend, state, "1", "oracles_and_tests.md §1: a stroke only refines");
+  Verdict verdict = begin("refinement", backend, state, "1", "oracles.md, Relations: a stroke only refines");
   if (auto unjudged = unfit(verdict, more, state)) return *unjudged;
   if (auto unjudged = unable(verdict, backend, kFrame)) return *unjudged;
   Setup fewer = more;

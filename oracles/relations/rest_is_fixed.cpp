@@ -11,7 +11,7 @@ namespace {
 
 Verdict let_rest(Backend& backend, const Setup& setup, const State& given) {
   const State state = in_arithmetic_of(backend, given);
-  Verdict verdict = begin("rest is fixed", backend, state, "h", "docs/tolerances.md, One substep");
+  Verdict verdict = begin("rest is fixed", backend, state, "h", "tolerances.md, One substep");
   if (auto unjudged = unfit(verdict, setup, state)) return *unjudged;
   if (auto unjudged = unable(verdict, backend, step_span(backend))) return *unjudged;
   if (setup.frame_count() == 0) return vacuous(verdict, "the schedule has no frames");

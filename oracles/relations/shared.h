@@ -49,7 +49,7 @@ Verdict fail_on(Verdict verdict, const std::string& where, const BitDifference& 
 
 // --- One substep near rest -------------------------------------------------------------------------------------------
 
-// How far rounding can carry a particle in one substep near the rest state [m] (docs/tolerances.md, "One substep").
+// How far rounding can carry a particle in one substep near the rest state [m] (tolerances.md, "One substep").
 double substep_rounding(const Setup& setup, const State& state);
 // The greatest distance of an alive particle from where it is expected [m]; `where`: which one.
 double greatest_distance(const State& state, const std::vector<Vec3>& expected, int32_t& where);

@@ -1,4 +1,4 @@
-// A frame equals the composition of its spans (architecture.md, Contract).
+// A frame equals the composition of its spans (architecture.md, Backends).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@ namespace cutproof::oracles {
 namespace {
 
 Verdict compose_frames(Backend& backend, const Setup& setup, const State& state, int64_t frames) {
-  Verdict verdict = begin("span composition", backend, state, "1", "architecture.md, Contract: bit for bit");
+  Verdict verdict = begin("span composition", backend, state, "1", "architecture.md, Backends: bit for bit");
   if (auto unjudged = unable(verdict, backend, kFrame)) return *unjudged;
   std::vector<std::vector<Span>> ways(1);
   for (const Stage stage : kStages) ways[0].push_back({stage, stage});

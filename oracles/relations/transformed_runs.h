@@ -10,7 +10,7 @@ namespace cutproof::oracles {
 // splitmix64 (Steele, Lea and Flood 2014).
 uint64_t mixed(uint64_t& seed);
 
-// Decisions, clusters and skin vertices exactly, numbers up to rounding (docs/tolerances.md, A scene carried along).
+// Decisions, clusters and skin vertices exactly, numbers up to rounding (tolerances.md, A transformed scene).
 // Requires that the backend can run the span. `how`: in the witness; `seed`: of the disturbances that show how
 // sensitive the scene is.
 Verdict judge_transformed(const Verdict& verdict, const std::string& how, Backend& backend, const Setup& setup,

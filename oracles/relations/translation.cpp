@@ -11,7 +11,7 @@ namespace {
 
 Verdict throw_at_rest(Backend& backend, const Setup& setup, const State& given, Vec3 velocity) {
   const State state = in_arithmetic_of(backend, given);
-  Verdict verdict = begin("translation is exact", backend, state, "h", "docs/tolerances.md, One substep");
+  Verdict verdict = begin("translation is exact", backend, state, "h", "tolerances.md, One substep");
   if (auto unjudged = unfit(verdict, setup, state)) return *unjudged;
   if (auto unjudged = unable(verdict, backend, step_span(backend))) return *unjudged;
   if (setup.frame_count() == 0) return vacuous(verdict, "the schedule has no frames");
@@ -40,10 +40,10 @@ Verdict throw_at_rest(Backend& backend, const Setup& setup, const State& given, 
   }
   verdict.checked = static_cast<int64_t>(std::count(start.alive.begin(), start.alive.end(), 1));
   if (verdict.measured <= verdict.bound) return verdict;
-  return fail(std::move(verdict),
-              fmt::format("particle {} of a body that is only carried along ends {} h from where it should", where,
-                          verdict.measured),
-              {where});
+  return fail(
+      std::move(verdict),
+      fmt::format("particle {} of a body that is thrown ends {} h from where it should", where, verdict.measured),
+      {where});
 }
 
 }  // namespace

@@ -222,8 +222,8 @@ const PropertyList& surface_properties() {
   static const PropertyList list = {
       {"skin shells", "method.md §8, lemma: counted a second time", "1", kSkin | kAlive, Cost::thorough, stages(),
        kWhen, skin_is_there, "no skin", check_skin_shells, nullptr},
-      {"skin geometry", "method.md §8, lemma; docs/tolerances.md, Volume of the skin", "1", kAlive | kSkin,
-       Cost::thorough, stages(), kWhen, skin_is_there, "no skin", check_skin_geometry, nullptr}};
+      {"skin geometry", "method.md §8, lemma; tolerances.md, Volume of the skin", "1", kAlive | kSkin, Cost::thorough,
+       stages(), kWhen, skin_is_there, "no skin", check_skin_geometry, nullptr}};
   return list;
 }
 
