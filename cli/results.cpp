@@ -41,6 +41,7 @@ nlohmann::json to_json(const Verdict& verdict, bool expected_failure) {
                            {"unit", verdict.unit},
                            {"bound_source", verdict.bound_source},
                            {"checked", verdict.checked}};
+  if (!verdict.vacuous.empty()) result["vacuous"] = verdict.vacuous;
   if (expected_failure && !verdict.holds) result["expected_failure"] = true;
   if (!verdict.holds) {
     result["witness"] = {{"text", verdict.witness.text},

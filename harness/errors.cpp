@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "oracles/oracles.h"
+#include "oracles/surface/surface.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::harness {
@@ -13,7 +14,8 @@ TopologyFigures topology_of(const Setup& setup, const State& state) {
   TopologyFigures figures;
   figures.components = oracles::graph_components(setup, state).count;
   figures.couplings = oracles::coupling_components(setup, state).count;
-  figures.shells = oracles::skin_shells(state.skin).outer;
+  const auto shells = oracles::skin_shells(state.skin);
+  figures.shells = shells ? shells->outer : -1;
   figures.isolated = static_cast<int64_t>(oracles::isolation(setup, state).measured);
   figures.equal = oracles::component_match(setup, state).holds;
   return figures;

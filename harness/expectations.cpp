@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "oracles/oracles.h"
+#include "oracles/surface/surface.h"
 
 namespace cutproof::harness {
 
@@ -119,8 +120,8 @@ std::vector<Verdict> ExpectationCheck::verdicts() const {
           "at the end", "");
   }
   if (expectations_.shells_at_end) {
-    const oracles::ShellCount shells = oracles::skin_shells(last.skin);
-    equal("shells at the end", shells.outer >= 0 ? std::optional<int64_t>(shells.outer) : std::nullopt,
+    const std::optional<oracles::ShellCount> shells = oracles::skin_shells(last.skin);
+    equal("shells at the end", shells ? std::optional<int64_t>(shells->outer) : std::nullopt,
           *expectations_.shells_at_end, "at the end",
           "the shells of the skin at the end cannot be counted: its triangles are no closed surface");
   }

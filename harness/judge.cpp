@@ -6,7 +6,7 @@
 #include "model/fields.h"
 #include "model/rules.h"
 #include "oracles/comparison/state_difference.h"
-#include "oracles/motion.h"
+#include "oracles/surface/surface.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::harness {
@@ -56,7 +56,11 @@ State before_skin(const State& before, const State& end) {
 }  // namespace
 
 Judge::Judge(const Setup& setup, std::string backend, Promises promises, Thorough thorough)
-    : setup_(setup), backend_(std::move(backend)), promises_(promises), thorough_(thorough), judge_(setup) {}
+    : setup_(setup),
+      backend_(std::move(backend)),
+      promises_(promises),
+      thorough_(thorough),
+      judge_(setup, oracles::properties()) {}
 Judge::~Judge() = default;
 
 void Judge::begin(const Snapshot& initial, bool has_expanded) {
@@ -153,10 +157,7 @@ void Judge::see(const Moment& moment) {
 void Judge::see_stage(Stage stage, const State& before, const State& after) {
   if (stage == Stage::expand && before.clusters.members != after.clusters.members) has_expanded_ = true;
   std::vector<Verdict> found = judge_.stage(stage, before, after);
-  if (stage == Stage::step) {
-    found.push_back(oracles::motion(setup_, before, after));
-    return take(std::move(found), stage, after);
-  }
+  if (stage == Stage::step) return take(std::move(found), stage, after);
   const bool cut = !after.removed.empty() || !after.debris.empty();
   const bool thorough = thorough_ == Thorough::always ||
                         (thorough_ == Thorough::when_cut && setup_.skin.wanted && (cut || !skin_judged_));
@@ -201,6 +202,7 @@ void Judge::see_several(const Moment& moment, const std::array<bool, 6>& seen) {
     verdict.bound_source = "method.md §5 to §8: the reference's answer to the same removal";
     verdict.unit = "1";
     verdict.checked = unique ? end.clusters.count() : 0;
+    if (verdict.checked == 0) verdict.vacuous = unique ? "no cluster" : "the merge rule leaves several right answers";
     const auto sets = unique ? oracles::Sets::compared : oracles::Sets::open;
     if (const auto difference = oracles::difference_of_decisions(expected, end, sets)) {
       verdict.holds = false;

@@ -1,12 +1,12 @@
-#include "oracles/motion.h"
-
+// How far a step moved the body, held against the velocities and impulses that the states name (method.md §3; bounds:
+// tolerances.md, Motion).
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "oracles/support.h"
+#include "oracles/checks.h"
 
 namespace cutproof::oracles {
 namespace {
@@ -70,21 +70,21 @@ Centre centre_of(const Body& body, const State& state, const std::vector<uint8_t
 
 class Motion {
  public:
-  Motion(const Setup& setup, const State& before, const State& after)
-      : setup_(setup),
-        before_(before),
-        after_(after),
-        h_(setup.body.grid.spacing),
-        dt_(setup.substep_length[at(before.frame)]),
-        decay_(std::exp(-setup.step.damping * dt_)),
-        u_(std::max(unit_roundoff(before), unit_roundoff(after))) {}
+  Motion(const StageRun& run, Verdict& verdict)
+      : run_(run),
+        setup_(run.setup),
+        before_(run.before),
+        after_(run.after),
+        verdict_(verdict),
+        h_(setup_.body.grid.spacing),
+        dt_(setup_.substep_length[at(before_.frame)]),
+        decay_(std::exp(-setup_.step.damping * dt_)),
+        u_(std::max(unit_roundoff(before_), unit_roundoff(after_))) {}
 
-  Verdict judged() {
-    verdict_ = start_verdict("motion", after_, "h", "method.md §3; docs/tolerances.md, Motion");
+  void judge() {
     if (setup_.step.substeps == 1) judge_single_substep();
     judge_held();
     judge_centre();
-    return std::move(verdict_);
   }
 
  private:
@@ -164,17 +164,19 @@ class Motion {
     const Centre end = centre_of(setup_.body, after_, before_.alive);
     const int32_t substeps = setup_.step.substeps;
     Vec3 moved, velocity = start.momentum / start.mass;
-    double earliest = 0, powers = 0, decay = 1;  // 1 + D + … and D^k
+    double powers = 0, decay = 1;  // 1 + D + … and D^k
     for (int32_t s = 0; s < substeps; ++s) {
       moved += dt_ * (velocity + dt_ * setup_.step.gravity);
       velocity = decay_ * (velocity + dt_ * setup_.step.gravity);
       powers += decay;
       decay *= decay_;
     }
-    earliest = dt_ * powers / (decay * start.mass);
+    const double earliest = dt_ * powers / (decay * start.mass);
     const double latest = dt_ / (decay_ * start.mass);
     // Each substep's mean velocity is off by as much as the momentum of the frame may be (Linear momentum).
-    const double rounding = 2 * substeps * dt_ / decay * momentum(setup_, before_, after_).bound / start.mass +
+    Verdict momentum;
+    check_momentum(run_, momentum);
+    const double rounding = 2 * substeps * dt_ / decay * momentum.bound / start.mass +
                             8 * kStored * (norm(start.position) + norm(end.position));
     const std::array<Pushes, 3> pushes = pushes_of(setup_, before_);
     for (int axis = 0; axis < 3; ++axis) {
@@ -203,24 +205,22 @@ class Motion {
     }
   }
 
+  const StageRun& run_;
   const Setup& setup_;
   const State &before_, &after_;
+  Verdict& verdict_;
   const double h_, dt_, decay_, u_;
-  Verdict verdict_;
   double worst_ = -1;
 };
 
 }  // namespace
 
-Verdict motion(const Setup& setup, const State& before, const State& after) {
-  for (const State* state : {&before, &after}) {
-    const Verdict form = well_formed(setup, *state);
-    if (!form.holds) return not_judged("motion", form);
+void check_motion(const StageRun& run, Verdict& verdict) {
+  if (run.before.frame < 0 || run.before.frame >= run.setup.frame_count()) {
+    verdict.vacuous = "the schedule is over";
+    return;
   }
-  if (before.frame < 0 || before.frame >= setup.frame_count()) {
-    return start_verdict("motion", after, "h", "the schedule is over");
-  }
-  return Motion(setup, before, after).judged();
+  Motion(run, verdict).judge();
 }
 
 }  // namespace cutproof::oracles

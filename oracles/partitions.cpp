@@ -1,20 +1,8 @@
 // Partitions of the alive particles: components of the tissue graph, and of the coupling by clusters.
+#include "oracles/oracles.h"
 #include "oracles/support.h"
 
 namespace cutproof::oracles {
-
-Memberships memberships_of(const Clusters& clusters, int32_t particle_count) {
-  Memberships memberships;
-  memberships.offsets.assign(at(particle_count) + 1, 0);
-  for (const int32_t i : clusters.members) ++memberships.offsets[at(i) + 1];
-  for (std::size_t i = 0; i < at(particle_count); ++i) memberships.offsets[i + 1] += memberships.offsets[i];
-  memberships.clusters.resize(clusters.members.size());
-  std::vector<int64_t> next(memberships.offsets.begin(), memberships.offsets.end() - 1);
-  for (int32_t c = 0; c < clusters.count(); ++c) {
-    for (const int32_t i : clusters.of(c)) memberships.clusters[at(next[at(i)]++)] = c;
-  }
-  return memberships;
-}
 
 Partition components_of_graph(const TissueGraph& graph) {
   const int32_t n = graph.particle_count();
@@ -59,6 +47,28 @@ Partition components_of_coupling(const TissueGraph& graph, const Clusters& clust
     partition.label[at(i)] = root == i ? partition.count++ : partition.label[at(root)];
   }
   return partition;
+}
+
+int64_t distinct_pairs(const Partition& a, const Partition& b) {
+  // Particles in the order of their label in a, by counting.
+  std::vector<int64_t> next(at(a.count) + 1, 0);
+  for (const int32_t label : a.label) {
+    if (label >= 0) ++next[at(label) + 1];
+  }
+  for (std::size_t k = 0; k < at(a.count); ++k) next[k + 1] += next[k];
+  std::vector<int32_t> order(at(next.back()));
+  for (std::size_t i = 0; i < a.label.size(); ++i) {
+    if (a.label[i] >= 0) order[at(next[at(a.label[i])]++)] = static_cast<int32_t>(i);
+  }
+  std::vector<int32_t> seen_with(at(b.count), -1);
+  int64_t pairs = 0;
+  for (const int32_t i : order) {
+    int32_t& seen = seen_with[at(b.label[at(i)])];
+    if (seen == a.label[at(i)]) continue;
+    seen = a.label[at(i)];
+    ++pairs;
+  }
+  return pairs;
 }
 
 std::vector<uint8_t> covered_edges(const TissueGraph& graph, const Clusters& clusters) {

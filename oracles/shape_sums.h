@@ -1,5 +1,5 @@
 // Internal to oracles/: the sums of shape matching (method.md §2, §3), written down a second time so that no oracle
-// trusts what a backend stored, and the constants of the rounding bounds of docs/tolerances.md.
+// trusts what a backend stored, and the constants of the rounding bounds of tolerances.md.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -8,18 +8,12 @@
 
 #include "model/setup.h"
 #include "model/state.h"
+#include "oracles/memberships.h"
 
 namespace cutproof::oracles {
 
 // u: relative error of one rounding in double precision.
 inline constexpr double kUnitRoundoff = 0x1p-53;
-
-// n_i: in how many clusters each particle lies.
-inline std::vector<int32_t> membership_counts(const Clusters& clusters, int32_t particle_count) {
-  std::vector<int32_t> count(static_cast<std::size_t>(particle_count), 0);
-  for (const int32_t particle : clusters.members) ++count[static_cast<std::size_t>(particle)];
-  return count;
-}
 
 // w_ic = m_i / n_i, the same for every cluster of i. Requires i to lie in a cluster.
 inline double weight_of(const Body& body, const std::vector<int32_t>& counts, int32_t particle) {
@@ -65,7 +59,7 @@ inline ClusterMeans cluster_means(const WeightedRest& rest, const Clusters& clus
   return means;
 }
 
-// Figures that enter every rounding bound of docs/tolerances.md.
+// Figures that enter every rounding bound of tolerances.md.
 struct RoundingScale {
   int64_t largest_cluster = 0;     // N: most particles in one cluster
   int32_t most_memberships = 0;    // n: most clusters of one particle
@@ -90,7 +84,7 @@ inline RoundingScale rounding_scale(const Setup& setup, const State& state) {
   return scale;
 }
 
-// docs/tolerances.md, "One goal position": the error of one evaluation of g_i or of a skin vertex, given the
+// tolerances.md, "One goal position": the error of one evaluation of g_i or of a skin vertex, given the
 // rotations [m].
 inline double goal_rounding(const RoundingScale& scale) {
   const double operations = 2.0 * static_cast<double>(scale.largest_cluster) + scale.most_memberships + 16.0;
@@ -98,7 +92,7 @@ inline double goal_rounding(const RoundingScale& scale) {
 }
 
 // To what a single error of an iterate can grow in later iterations, at most: the plain iteration never lengthens it;
-// Chebyshev's weights carry it on (docs/acceleration.md, Rounding: 6.3).
+// Chebyshev's weights carry it on (solvers.md, Rounding: 6.3).
 inline double error_growth(const StepParameters& step) {
   return step.acceleration == Acceleration::chebyshev ? 7.0 : 1.0;
 }

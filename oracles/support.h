@@ -1,14 +1,20 @@
 // What several oracles of topology need: grid edges between alive particles, disjoint sets, and verdicts that are not
 // judged because the state is not well formed. Internal to oracles/.
 #pragma once
+#include <fmt/format.h>
+
 #include <array>
+#include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
-#include "oracles/oracles.h"
+#include "model/fields.h"
+#include "model/verdict.h"
+#include "oracles/memberships.h"
+#include "oracles/partitions.h"
 
 namespace cutproof::oracles {
 
@@ -62,23 +68,6 @@ class DisjointSets {
   std::vector<int32_t> parent_;
 };
 
-// For each particle the clusters (indices, ascending) that hold it, as compressed rows.
-struct Memberships {
-  std::vector<int64_t> offsets;  // [n + 1]
-  std::vector<int32_t> clusters;
-  std::span<const int32_t> of(int32_t particle) const {
-    const auto i = at(particle);
-    return {clusters.data() + offsets[i], at(offsets[i + 1] - offsets[i])};
-  }
-};
-Memberships memberships_of(const Clusters& clusters, int32_t particle_count);
-
-// Equal bits: also of NaN, and 0 is not -0.
-template <typename T>
-bool same_bits(const T& a, const T& b) {
-  return std::memcmp(&a, &b, sizeof(T)) == 0;
-}
-
 // A verdict that holds so far.
 inline Verdict start_verdict(std::string property, const State& state, std::string unit, std::string bound_source) {
   Verdict verdict;
@@ -100,6 +89,20 @@ inline void violate(Verdict& verdict, std::string text, std::vector<int32_t> clu
   violate(verdict, Witness{std::move(clusters), std::move(particles), std::move(path), std::move(text)});
 }
 
+// A verdict as it is given out. What was measured against a bound says nothing where one of the two is not finite, so
+// it does not hold; and where nothing was checked it says why: `nothing`, unless the check has said so itself.
+inline Verdict conclude(Verdict verdict, std::string_view nothing) {
+  if (verdict.holds && !(std::isfinite(verdict.measured) && std::isfinite(verdict.bound))) {
+    verdict.holds = false;
+    verdict.witness.text = fmt::format("what was measured, {} {}, or its bound, {} {}, is not finite", verdict.measured,
+                                       verdict.unit, verdict.bound, verdict.unit);
+  }
+  const bool is_vacuous = verdict.holds && verdict.checked == 0;
+  if (!is_vacuous) verdict.vacuous.clear();
+  if (is_vacuous && verdict.vacuous.empty()) verdict.vacuous = nothing;
+  return verdict;
+}
+
 // The answer of every oracle on a state that is not well formed. `form` is the failing verdict of well_formed.
 inline Verdict not_judged(std::string property, const Verdict& form) {
   Verdict verdict = form;
@@ -109,20 +112,16 @@ inline Verdict not_judged(std::string property, const Verdict& form) {
   return verdict;
 }
 
-// Oracles of well-formed states, and those of a stage given whether its two states are well formed.
-Verdict check_rotation_quality(const Setup& setup, const State& state);
-Verdict check_skin_vertices(const Setup& setup, const State& state);
-// Of any stage but step and skin.
-Verdict stage_verdict(const Setup& setup, Stage stage, const State& before, const Verdict& form_before,
-                      const State& after, const Verdict& form_after);
-Verdict momentum_verdict(const Setup& setup, const State& before, const Verdict& form_before, const State& after,
-                         const Verdict& form_after);
-Verdict untouched_verdict(const Setup& setup, Stage stage, const State& before, const Verdict& form_before,
-                          const State& after, const Verdict& form_after);
-
 // The partitions themselves, of a well-formed state.
 Partition components_of_graph(const TissueGraph& graph);
 Partition components_of_coupling(const TissueGraph& graph, const Clusters& clusters);
+// How many different pairs of labels occur among particles. Equal to a.count exactly if a refines b, and to b.count
+// exactly if b refines a.
+int64_t distinct_pairs(const Partition& a, const Partition& b);
+
+struct Edge {
+  int32_t a = -1, b = -1;
+};
 
 // The first edge of G that no cluster contains, and how many there are, in a well-formed state (I4).
 struct UncoveredEdges {

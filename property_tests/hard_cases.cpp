@@ -14,6 +14,7 @@
 #include "fixtures/cook.h"
 #include "oracles/oracles.h"
 #include "oracles/relations/relations.h"
+#include "oracles/surface/surface.h"
 #include "property_tests/checking.h"
 #include "property_tests/dissection.h"
 #include "property_tests/random.h"

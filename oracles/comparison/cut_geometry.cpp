@@ -6,6 +6,7 @@
 
 #include "oracles/blade_motion.h"
 #include "oracles/comparison/lattice_lines.h"
+#include "oracles/oracles.h"
 #include "oracles/support.h"
 #include "oracles/surface/surface_distance.h"
 

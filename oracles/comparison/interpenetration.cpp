@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "oracles/comparison/lattice_lines.h"
+#include "oracles/oracles.h"
 #include "oracles/support.h"
 
 namespace cutproof::oracles {

@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "oracles/comparison/cluster_system.h"
+#include "oracles/oracles.h"
 #include "oracles/shape_sums.h"
 #include "oracles/support.h"
 

@@ -1,8 +1,10 @@
-// Oracles that need two runs of one backend (oracles_and_tests.md §1). Each loads, runs and compares; the backend is
-// used only through its contract, so they judge any backend.
+// Relations between runs of one backend (metamorphic testing; oracles.md, Relations). Each loads, runs and compares;
+// the backend is used only through its contract, so they judge any backend. What a backend cannot run is not asked of
+// it: then the verdict is vacuous and says why, and nothing throws. Target cutproof_relations.
 #pragma once
 #include "model/backend.h"
 #include "model/verdict.h"
+#include "oracles/single_substep.h"
 
 namespace cutproof::oracles {
 
@@ -14,13 +16,13 @@ Verdict no_ghost_force(Backend& backend, const Setup& setup, const State& state,
 Verdict determinism(Backend& backend, const Setup& setup, const State& state, int64_t frames);
 // A frame equals the composition of its spans, bit for bit: whole, six single stages, and every cut in two.
 Verdict span_composition(Backend& backend, const Setup& setup, const State& state, int64_t frames);
-// The same scene carried along must give the same answer, carried along (oracles_and_tests.md §1). seed mod 6 chooses
+// The same scene transformed must give the same answer, transformed (oracles.md, Relations). seed mod 6 chooses
 // 0: turned by a multiple of 90° (mirrored axes excluded), which renumbers particles, and clusters in another order;
 // 1: shifted on the grid; 2: clusters in another order; 3: scaled by a power of two; 4: elsewhere in the world;
 // 5: duplicated as two bodies. The rest of the seed chooses by how much. 3 to 5 in bits; 0 to 2: decisions, clusters
-// and skin vertices exactly, numbers up to rounding (docs/tolerances.md, A scene carried along), merge and expand up to
+// and skin vertices exactly, numbers up to rounding (tolerances.md, A transformed scene), merge and expand up to
 // ties, and the fans of the skin's polygons not at all (they follow the numbering of grid edges). A removal that a
-// disturbance of 1e-7 h also changes is "either": then the verdict holds with checked = 0.
+// disturbance of 1e-7 h also changes is undecidable within rounding: then the verdict holds and is vacuous.
 inline constexpr uint64_t kEquivarianceKinds = 6;
 Verdict equivariance(Backend& backend, const Setup& setup, const State& state, Span span, uint64_t seed);
 // Geometric cuts: what is separate after fewer strokes stays separate after more (setup with all strokes, without
@@ -33,8 +35,5 @@ Verdict translation_is_exact(Backend& backend, const Setup& setup, const State& 
 // Implicit: E(x_k) never grows over k = 0 .. iterations in one substep (iterates from runs with k iterations); with an
 // acceleration over the first alone, which is plain.
 Verdict energy_is_monotone(Backend& backend, const Setup& setup, const State& state, int32_t iterations);
-
-// The first substep of `frame` as a scene of its own: one frame of one substep.
-Setup single_substep_setup(const Setup& setup, int64_t frame);
 
 }  // namespace cutproof::oracles

@@ -3,6 +3,7 @@
 
 #include <random>
 
+#include "oracles/comparison/sparse_components.h"
 #include "oracles/oracles.h"
 #include "tests/oracles/states.h"
 

@@ -1,5 +1,5 @@
-// The oracles of two runs: the reference passes all of them, and backends made wrong on purpose are rejected with the
-// right witness.
+// The relations between runs: the reference passes all of them, and backends made wrong on purpose are rejected with
+// the right witness.
 #include "oracles/relations/relations.h"
 
 #include <gtest/gtest.h>
@@ -8,7 +8,9 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <optional>
 #include <random>
+#include <stdexcept>
 #include <string>
 
 #include "oracles/oracles.h"
@@ -33,12 +35,13 @@ class FakeBackend final : public Backend {
  public:
   explicit FakeBackend(std::array<StageFunction, 6> stages) : stages_(std::move(stages)) {}
   std::string name() const override { return "fake"; }
-  bool can_run(Span span) const override { return single_stages || span == Span{}; }
+  bool can_run(Span span) const override { return only ? span == Span{*only, *only} : single_stages || span == Span{}; }
   void load(std::vector<cutproof::Setup> setups, std::vector<State> states) override {
     setups_ = std::move(setups);
     states_ = std::move(states);
   }
   void run(Span span) override {
+    if (!can_run(span)) throw std::invalid_argument("this backend was asked for what it cannot run");
     last_span = span;
     for (body = 0; body < states_.size(); ++body) {
       State& state = states_[body];
@@ -54,8 +57,9 @@ class FakeBackend final : public Backend {
   SpanReport report() const override { return {}; }
 
   bool single_stages = true;
-  Span last_span;        // for faults that depend on how they are called
-  std::size_t body = 0;  // which one is being run
+  std::optional<Stage> only;  // the one stage that it can run
+  Span last_span;             // for faults that depend on how they are called
+  std::size_t body = 0;       // which one is being run
 
  private:
   std::array<StageFunction, 6> stages_;
@@ -155,7 +159,7 @@ void expect_holds(const Verdict& verdict) {
 
 // --- Who is right passes ---------------------------------------------------------------------------------------------
 
-TEST(TwoRuns, TheReferenceIsDeterministicAndComposesFromSpans) {
+TEST(Relations, TheReferenceIsDeterministicAndComposesFromSpans) {
   const auto backend = reference::make_backend();
   for (const Scene& scene : {spinning_block(), spinning_block(Solver::published), cut_block(Criterion::geometric),
                              cut_block(Criterion::distance)}) {
@@ -167,7 +171,7 @@ TEST(TwoRuns, TheReferenceIsDeterministicAndComposesFromSpans) {
   }
 }
 
-TEST(TwoRuns, TheReferenceHasNoGhostForce) {
+TEST(Relations, TheReferenceHasNoGhostForce) {
   const auto backend = reference::make_backend();
   const Scene scene = two_blocks();
   const Verdict verdict = no_ghost_force(*backend, scene.setup, scene.state, 0, {3, -2, 1}, 3);
@@ -175,7 +179,7 @@ TEST(TwoRuns, TheReferenceHasNoGhostForce) {
   EXPECT_EQ(verdict.checked, 27);
 }
 
-TEST(TwoRuns, TheReferenceKeepsRestAndTranslations) {
+TEST(Relations, TheReferenceKeepsRestAndTranslations) {
   const auto backend = reference::make_backend();
   for (const Solver solver : {Solver::implicit, Solver::published}) {
     for (const int32_t iterations : {0, 1, 4, 50}) {
@@ -194,7 +198,7 @@ TEST(TwoRuns, TheReferenceKeepsRestAndTranslations) {
   expect_holds(translation_is_exact(*backend, wire.setup, wire.state, {0, 5, 0}));
 }
 
-TEST(TwoRuns, TheReferencesEnergyNeverGrows) {
+TEST(Relations, TheReferencesEnergyNeverGrows) {
   const auto backend = reference::make_backend();
   for (const double stiffness : {1e3, 1e5, 1e7}) {
     Scene scene = spinning_block();
@@ -215,7 +219,7 @@ TEST(TwoRuns, TheReferencesEnergyNeverGrows) {
   EXPECT_EQ(energy_is_monotone(*backend, rubbing.setup, rubbing.state, 4).checked, 0) << "friction has no energy";
 }
 
-TEST(TwoRuns, TheReferenceIsEquivariant) {
+TEST(Relations, TheReferenceIsEquivariant) {
   const auto backend = reference::make_backend();
   const std::array<Span, 3> spans = {Span{}, Span{Stage::step, Stage::step}, Span{Stage::detect, Stage::skin}};
   std::array<int, kEquivarianceKinds> judged{};
@@ -238,7 +242,7 @@ TEST(TwoRuns, TheReferenceIsEquivariant) {
   for (const int count : judged) EXPECT_GT(count, 12) << "of 24 runs of each kind most must be decided";
 }
 
-TEST(TwoRuns, MoreStrokesOnlyRefineTheReferencesComponents) {
+TEST(Relations, MoreStrokesOnlyRefineTheReferencesComponents) {
   const auto backend = reference::make_backend();
   Scene scene = cut_block(Criterion::geometric, 6);
   for (const int64_t fewer : {1, 3, 5}) {
@@ -249,7 +253,7 @@ TEST(TwoRuns, MoreStrokesOnlyRefineTheReferencesComponents) {
   EXPECT_EQ(graph_components(scene.setup, backend->snapshot()[0]).count, 2) << "the cut must be complete";
 }
 
-TEST(TwoRuns, ABackendThatLeavesEverythingAsItIsPassesWhatItMust) {
+TEST(Relations, ABackendThatLeavesEverythingAsItIsPassesWhatItMust) {
   FakeBackend still = fake_step({});
   const Scene scene = two_blocks();
   expect_holds(determinism(still, scene.setup, scene.state, 2));
@@ -263,13 +267,63 @@ TEST(TwoRuns, ABackendThatLeavesEverythingAsItIsPassesWhatItMust) {
   expect_holds(translation_is_exact(coasting, scene.setup, scene.state, {1, 0, 0}));
 }
 
-TEST(TwoRuns, WorkWithBackendsThatRunOnlyWholeFrames) {
+TEST(Relations, WorkWithBackendsThatRunOnlyWholeFrames) {
   FakeBackend backend = fake_step(coast);
   backend.single_stages = false;
   const Scene scene = two_blocks();
-  EXPECT_EQ(span_composition(backend, scene.setup, scene.state, 2).checked, 0);
+  const Verdict composition = span_composition(backend, scene.setup, scene.state, 2);
+  EXPECT_TRUE(composition.holds);
+  EXPECT_EQ(composition.checked, 0);
+  EXPECT_EQ(composition.vacuous, "the backend runs whole frames only");
+  const Verdict step = equivariance(backend, scene.setup, scene.state, {Stage::step, Stage::step}, 1);
+  EXPECT_TRUE(step.holds);
+  EXPECT_EQ(step.vacuous, "the backend cannot run step by itself");
   expect_holds(translation_is_exact(backend, scene.setup, scene.state, {1, 0, 0}));
   for (uint64_t seed = 0; seed < 6; ++seed) expect_holds(equivariance(backend, scene.setup, scene.state, Span{}, seed));
+}
+
+TEST(Relations, SayWhatABackendOfOneStageCannotBeAskedFor) {
+  FakeBackend backend = fake_stage(Stage::split, {});
+  backend.only = Stage::split;
+  const Scene scene = two_blocks();
+  for (const Verdict& verdict :
+       {determinism(backend, scene.setup, scene.state, 2), span_composition(backend, scene.setup, scene.state, 2),
+        no_ghost_force(backend, scene.setup, scene.state, 0, {1, 1, 1}, 2),
+        refinement(backend, scene.setup, scene.state, 1), rest_is_fixed(backend, scene.setup, scene.state),
+        translation_is_exact(backend, scene.setup, scene.state, {1, 0, 0}),
+        energy_is_monotone(backend, scene.setup, scene.state, 3),
+        equivariance(backend, scene.setup, scene.state, Span{}, 0)}) {
+    EXPECT_TRUE(verdict.holds) << verdict.property;
+    EXPECT_EQ(verdict.checked, 0) << verdict.property;
+    EXPECT_EQ(verdict.vacuous, "the backend cannot run step to skin") << verdict.property;
+  }
+  for (uint64_t seed = 0; seed < 6; ++seed) {
+    expect_holds(equivariance(backend, scene.setup, scene.state, {Stage::split, Stage::split}, seed));
+  }
+}
+
+TEST(Relations, VerdictsThatCheckedNothingSayWhy) {
+  const auto backend = reference::make_backend();
+  Scene scene = spinning_block();
+  EXPECT_EQ(determinism(*backend, scene.setup, scene.state, 0).vacuous, "no frame was run");
+  EXPECT_EQ(energy_is_monotone(*backend, scene.setup, scene.state, 0).vacuous, "no iteration was run");
+  EXPECT_EQ(no_ghost_force(*backend, scene.setup, scene.state, 0, {1, 0, 0}, 1).vacuous, "no other component is alive");
+  scene.setup.walls[0].friction = 0.5;
+  EXPECT_EQ(energy_is_monotone(*backend, scene.setup, scene.state, 3).vacuous, "friction has no energy");
+  scene.setup.step.solver = Solver::published;
+  EXPECT_EQ(energy_is_monotone(*backend, scene.setup, scene.state, 3).vacuous,
+            "only the implicit solver has an energy");
+}
+
+// A backend may answer anything.
+TEST(Relations, AnswersThatAreNotWellFormedAreNotRead) {
+  FakeBackend broken = fake_step([](const cutproof::Setup&, State& state) { state.skin.owner = {1000}; });
+  const Scene scene = two_blocks();
+  for (const uint64_t seed : {0, 1, 2, 3}) {
+    const Verdict verdict = equivariance(broken, scene.setup, scene.state, Span{}, seed);
+    EXPECT_FALSE(verdict.holds);
+    EXPECT_TRUE(mentions(verdict, "not well formed")) << verdict.witness.text;
+  }
 }
 
 // --- Who is wrong does not
@@ -324,7 +378,8 @@ TEST(SpanComposition, RejectsAFusedFrameThatDiffersFromItsStages) {
   const Scene scene = two_blocks();
   const Verdict verdict = span_composition(fused, scene.setup, scene.state, 2);
   EXPECT_FALSE(verdict.holds);
-  EXPECT_TRUE(mentions(verdict, "step-detect split-skin: the removed particles differ")) << verdict.witness.text;
+  EXPECT_TRUE(mentions(verdict, "step-detect split-skin: the list of removed particles differs"))
+      << verdict.witness.text;
 }
 
 TEST(RestIsFixed, RejectsABackendThatDrifts) {
@@ -547,7 +602,7 @@ TEST(Equivariance, CallsARemovalInsideTheRoundingBandEither) {
   EXPECT_EQ(verdict.checked, 0);
 }
 
-TEST(TwoRuns, StatesThatAreNotWellFormedAreNotJudged) {
+TEST(Relations, StatesThatAreNotWellFormedAreNotJudged) {
   const auto backend = reference::make_backend();
   Scene scene = spinning_block();
   scene.state.clusters.members[3] = 9999;

@@ -1,5 +1,4 @@
-// Momentum over a frame and rotations: accepted where the reference computed them, rejected where they were broken by
-// hand.
+// Momentum over a frame: accepted where the reference computed it, rejected where it was broken by hand.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,16 +7,12 @@
 
 #include "oracles/oracles.h"
 #include "reference_cpu/reference.h"
-#include "tests/oracles/states.h"
+#include "tests/oracles/expectations.h"
 
 namespace cutproof::oracles {
 namespace {
 
-using testing::block_body;
-using testing::box_clusters;
-using testing::range;
-using testing::setup_of;
-using testing::state_of;
+using namespace cutproof::testing;
 
 struct Scene {
   cutproof::Setup setup;
@@ -110,30 +105,6 @@ TEST(Momentum, CountsOnlyWhatIsAliveBeforeDetection) {
   const Verdict verdict = momentum(scene.setup, scene.before, scene.after);
   EXPECT_TRUE(verdict.holds) << verdict.witness.text;
   EXPECT_EQ(verdict.checked, 119);
-}
-
-TEST(RotationQuality, RejectsAReflectionAndNamesItsCluster) {
-  const auto setup = setup_of(block_body(4, 4, 4));
-  State state = state_of(setup.body, box_clusters(4, 4, 4, 2));
-  EXPECT_TRUE(rotation_quality(setup, state).holds);
-  EXPECT_EQ(rotation_quality(setup, state).checked, 8);
-  state.clusters.number[5] = 5;
-  state.clusters.rotation[5] = {{1, 0, 0, 0, 1, 0, 0, 0, -1}};
-  const Verdict verdict = rotation_quality(setup, state);
-  EXPECT_FALSE(verdict.holds);
-  EXPECT_EQ(verdict.witness.clusters, std::vector<int32_t>{5});
-  EXPECT_NE(verdict.witness.text.find("reflection"), std::string::npos);
-}
-
-TEST(RotationQuality, RejectsWhatIsNotOrthogonal) {
-  const auto setup = setup_of(block_body(4, 4, 4));
-  for (const double wrong : {1e-4, -0.5, std::numeric_limits<double>::quiet_NaN()}) {
-    State state = state_of(setup.body, box_clusters(4, 4, 4, 2));
-    state.clusters.rotation[2](0, 1) += wrong;
-    const Verdict verdict = rotation_quality(setup, state);
-    EXPECT_FALSE(verdict.holds) << wrong;
-    EXPECT_EQ(verdict.witness.clusters, std::vector<int32_t>{2});
-  }
 }
 
 }  // namespace

@@ -1,30 +1,14 @@
-// What one frame of the step stage must keep: linear momentum, and rotations that are rotations.
+// What one frame of the step stage must keep: linear momentum.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "oracles/checks.h"
 #include "oracles/shape_sums.h"
-#include "oracles/support.h"
 
 namespace cutproof::oracles {
 namespace {
-
-// ‖RᵀR − I‖, Frobenius.
-double orthogonality_defect(const Mat3& r) {
-  double sum = 0;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      double entry = i == j ? -1 : 0;
-      for (int row = 0; row < 3; ++row) entry += r(row, i) * r(row, j);
-      sum += entry * entry;
-    }
-  }
-  return std::sqrt(sum);
-}
-
-double determinant(const Mat3& r) {
-  return dot({r(0, 0), r(0, 1), r(0, 2)}, cross({r(1, 0), r(1, 1), r(1, 2)}, {r(2, 0), r(2, 1), r(2, 2)}));
-}
 
 struct Sums {
   double mass = 0;
@@ -49,7 +33,7 @@ Sums sums_of(const Body& body, const State& state, const std::vector<uint8_t>& a
 }
 
 // Root of the sum of squares of the clusters' and of the particles' masses: how independent errors of goal positions
-// and of single positions add up in the momentum (docs/tolerances.md, Linear momentum).
+// and of single positions add up in the momentum (tolerances.md, Linear momentum).
 struct IndependentMasses {
   double clusters = 0, particles = 0;
 };
@@ -72,13 +56,13 @@ IndependentMasses independent_masses(const Body& body, const State& state) {
 
 // p is damped with v and gains M g dt in each substep; contacts, pins and grips give J, which the state adds up with
 // the same damping. So p after S substeps is D^S p + M g dt (D + … + D^S) + I, with D = e^(−c dt).
-Verdict momentum_verdict(const Setup& setup, const State& before, const Verdict& form_before, const State& after,
-                         const Verdict& form_after) {
-  Verdict verdict = start_verdict("linear momentum", after, "kg m/s", "docs/tolerances.md, Linear momentum");
-  for (const Verdict* form : {&form_before, &form_after}) {
-    if (!form->holds) return not_judged(verdict.property, *form);
+void check_momentum(const StageRun& run, Verdict& verdict) {
+  const Setup& setup = run.setup;
+  const State &before = run.before, &after = run.after;
+  if (before.frame < 0 || before.frame >= setup.frame_count()) {
+    verdict.vacuous = "the schedule is over";
+    return;
   }
-  if (before.frame < 0 || before.frame >= setup.frame_count()) return verdict;  // the schedule is over: vacuous
   const StepParameters& step = setup.step;
   const double dt = setup.substep_length[static_cast<std::size_t>(before.frame)];
   const double decay = std::exp(-step.damping * dt);
@@ -119,38 +103,6 @@ Verdict momentum_verdict(const Setup& setup, const State& before, const Verdict&
         start.momentum.x, start.momentum.y, start.momentum.z, expected.x, expected.y, expected.z, end.momentum.x,
         end.momentum.y, end.momentum.z);
   }
-  return verdict;
-}
-
-Verdict momentum(const Setup& setup, const State& before, const State& after) {
-  return momentum_verdict(setup, before, well_formed(setup, before), after, well_formed(setup, after));
-}
-
-Verdict check_rotation_quality(const Setup&, const State& state) {
-  // In whatever precision a backend computes.
-  constexpr double kMostDefect = 5e-6;
-  Verdict verdict = start_verdict("rotation", state, "1", "accuracy_and_speed.md §3");
-  verdict.bound = kMostDefect;
-  for (int32_t c = 0; c < state.clusters.count(); ++c) {
-    const Mat3& r = state.clusters.rotation[at(c)];
-    const double defect = orthogonality_defect(r);
-    ++verdict.checked;
-    const bool reflects = !(determinant(r) > 0);
-    if (!(defect <= verdict.measured)) verdict.measured = defect;
-    if (!verdict.holds || (defect <= kMostDefect && !reflects)) continue;
-    const int32_t number = state.clusters.number[at(c)];
-    verdict.holds = false;
-    verdict.witness.clusters = {number};
-    verdict.witness.text =
-        reflects && defect <= kMostDefect
-            ? fmt::format("the rotation of cluster {} is a reflection: its determinant is {}", number, determinant(r))
-            : fmt::format("the rotation of cluster {} is off by {} from an orthogonal matrix", number, defect);
-  }
-  return verdict;
-}
-Verdict rotation_quality(const Setup& setup, const State& state) {
-  const Verdict form = well_formed(setup, state);
-  return form.holds ? check_rotation_quality(setup, state) : not_judged("rotation", form);
 }
 
 }  // namespace cutproof::oracles

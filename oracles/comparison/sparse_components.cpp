@@ -1,8 +1,11 @@
 // The number of components of G twice more, through SuiteSparse: nothing here searches a graph.
+#include "oracles/comparison/sparse_components.h"
+
 #include <btf.h>
 
 #include <SuiteSparseQR.hpp>
 
+#include "oracles/oracles.h"
 #include "oracles/support.h"
 
 namespace cutproof::oracles {

@@ -1,0 +1,47 @@
+// The checks behind oracles/registry.cpp, one file each. Internal to oracles/.
+#pragma once
+#include "oracles/judged.h"
+#include "oracles/registry.h"
+
+namespace cutproof::oracles {
+
+// "well formed" itself: the only check of states about which nothing is known. `known`: parts that have the bits of a
+// state of the same body that was well formed; of those only the sizes that they share with others are looked at again.
+// kBody: the body was found well formed.
+inline constexpr unsigned kBody = 1u << 31;
+Verdict check_form(const Setup& setup, const State& state, unsigned known);
+
+// Of a state.
+void check_finite(Judged& judged, Verdict& verdict);
+void check_cluster_connectivity(Judged& judged, Verdict& verdict);
+void check_coverage(Judged& judged, Verdict& verdict);
+void check_component_match(Judged& judged, Verdict& verdict);
+void check_isolation(Judged& judged, Verdict& verdict);
+void check_edge_cover(Judged& judged, Verdict& verdict);
+void check_rest_frames(Judged& judged, Verdict& verdict);
+void check_rotation_quality(Judged& judged, Verdict& verdict);
+void check_merge_maximality(Judged& judged, Verdict& verdict);
+void check_no_pass(Judged& judged, Verdict& verdict);
+void check_skin_surface(Judged& judged, Verdict& verdict);
+void check_skin_vertices(Judged& judged, Verdict& verdict);
+
+// Of a stage.
+void check_momentum(const StageRun& run, Verdict& verdict);
+void check_motion(const StageRun& run, Verdict& verdict);
+void check_detection(const StageRun& run, Verdict& verdict);
+void check_split_exactness(const StageRun& run, Verdict& verdict);
+void check_merge_legality(const StageRun& run, Verdict& verdict);
+void check_expansion(const StageRun& run, Verdict& verdict);
+void check_untouched(const StageRun& run, Verdict& verdict);
+
+// --- When there must be a skin ---------------------------------------------------------------------------------------
+
+inline bool has_skin(const State& state) { return !state.skin.owner.empty() || !state.skin.triangles.empty(); }
+// A frame that has ended has a skin if the scene wants one. Before the first frame ends there may be none yet.
+inline bool skin_is_due(const Setup& setup, const State& state) {
+  return has_skin(state) || (setup.skin.wanted && state.frame > 0);
+}
+// Only where nothing is alive may it have no triangles.
+bool skin_is_missing(const Setup& setup, const State& state);
+
+}  // namespace cutproof::oracles

@@ -1,0 +1,268 @@
+// Detection (method.md §4): removed is what the criterion demands, up to rounding.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "oracles/blade_motion.h"
+#include "oracles/checks.h"
+
+namespace cutproof::oracles {
+namespace {
+
+// d_i: greatest current distance from an alive particle to its neighbours in G, and that neighbour.
+struct Stretch {
+  double distance = 0;
+  int32_t neighbour = -1;
+};
+
+Stretch stretch_of(const TissueGraph& graph, const std::vector<Vec3>& x, int32_t i) {
+  Stretch stretch;
+  for (int direction = 0; direction < 6; ++direction) {
+    const int32_t other = graph.neighbour(i, direction);
+    if (other < 0) continue;
+    const Vec3 d = x[at(i)] - x[at(other)];
+    const double square = dot(d, d);
+    if (square > stretch.distance || stretch.neighbour < 0) stretch = {square, other};
+  }
+  stretch.distance =
+      std::sqrt(stretch.distance);  // the root ascends: of the greatest square it is the greatest distance
+  return stretch;
+}
+
+enum class Demand { keep, either, remove };
+
+// Rounding band of d_i > εh, with u the unit roundoff of what is judged. From the stored positions: each difference is
+// off by u relative to itself, its square by 3u, their sum by at most 5u, and the root by 2.5u + u. So every way to
+// compute d_i in double is off by at most 4u d_i, every way to compute εh by u (squared and compared: 3u on
+// squares, 1.5u here). What is compared here has the same errors once more: 2 (4u + 2u) = 12u; 16u leaves room for the
+// terms of second order.
+constexpr double kStretchBand = 16;  // [u]
+
+Demand demand_of_distance(double distance, double limit, double u) {
+  if (distance > limit * (1 + kStretchBand * u)) return Demand::remove;
+  if (distance < limit * (1 - kStretchBand * u)) return Demand::keep;
+  return Demand::either;
+}
+
+double distance_to_rectangle(const Blade& blade, Local p) {
+  const double du = p.u - std::clamp(p.u, -blade.length / 2, blade.length / 2);
+  const double dw = p.w - std::clamp(p.w, 0.0, blade.depth);
+  return std::sqrt(du * du + p.n * p.n + dw * dw);
+}
+
+// A lower bound of the distance to the sum of the rectangle at `p` and a way `d`, all in the rectangle's own axes: how
+// far the point lies outside of the sum's bounding box along one of them. Off by rounding of coordinates, as the
+// distance is.
+double least_distance_to_translated(const Blade& blade, Local p, Local d) {
+  const auto beyond = [](double start, double rate, double low, double high) {
+    return std::max(low + std::min(rate, 0.0) - start, start - (high + std::max(rate, 0.0)));
+  };
+  return std::max({beyond(p.u, d.u, -blade.length / 2, blade.length / 2), beyond(p.n, d.n, 0, 0),
+                   beyond(p.w, d.w, 0, blade.depth)});
+}
+
+// Distance to the Minkowski sum of the rectangle and the segment [0, way]: the minimum over u, w, t of a convex
+// quadratic in a box. For a given t the best u and w are clamped coordinates, because the axes are orthogonal; what is
+// left is convex and piecewise quadratic in t, and changes its pieces where a coordinate starts or stops to be clamped.
+// So it is exact: the least over the pieces' ends and over each piece's own stationary point.
+// `p` and `d`: the point from the edge's middle, and the way, in the rectangle's own axes.
+double distance_to_translated(const Blade& blade, Local p, Local d) {
+  const auto place = [&](double t) { return Local{p.u - t * d.u, p.n - t * d.n, p.w - t * d.w}; };
+  std::array<double, 6> ends = {0, 1};  // ascending
+  std::size_t count = 2;
+  const auto add_end = [&](double start, double rate, double bound) {
+    if (rate == 0) return;
+    const double t = (start - bound) / rate;
+    if (!(t > 0 && t < 1)) return;
+    std::size_t k = count++;
+    for (; ends[k - 1] > t; --k) ends[k] = ends[k - 1];
+    ends[k] = t;
+  };
+  add_end(p.u, d.u, -blade.length / 2);
+  add_end(p.u, d.u, blade.length / 2);
+  add_end(p.w, d.w, 0);
+  add_end(p.w, d.w, blade.depth);
+
+  double least = distance_to_rectangle(blade, place(0));
+  for (std::size_t k = 1; k < count; ++k) {
+    least = std::min(least, distance_to_rectangle(blade, place(ends[k])));
+    // Within the piece the clamped coordinates are out, n always counts: minimise Σ (start - t rate)² over them.
+    const Local middle = place((ends[k - 1] + ends[k]) / 2);
+    double numerator = p.n * d.n, denominator = d.n * d.n;
+    const auto count_in = [&](double at_middle, double start, double rate, double low, double high) {
+      if (at_middle >= low && at_middle <= high) return;
+      const double bound = at_middle < low ? low : high;
+      numerator += (start - bound) * rate;
+      denominator += rate * rate;
+    };
+    count_in(middle.u, p.u, d.u, -blade.length / 2, blade.length / 2);
+    count_in(middle.w, p.w, d.w, 0, blade.depth);
+    if (denominator == 0) continue;
+    const double t = std::clamp(numerator / denominator, ends[k - 1], ends[k]);
+    least = std::min(least, distance_to_rectangle(blade, place(t)));
+  }
+  return least;
+}
+
+// Ties go to removal, also when rounding lifts them a little: a blade halfway between two layers takes both, because if
+// it took none it would not separate them. So the limit is reach · (1 + kTie), and rounding, about 1e-13 of it on a
+// body of a thousand spacings, is far inside the band around that.
+constexpr double kTie = 1e-9;
+constexpr double kSweepBand = 5e-10;
+constexpr double kPlacesBand = 32;  // [u]: twice the lengthening of 16 u reach + 12 u (|x| + |edge|), and rounding
+
+// A turning sweep has no closed form, and a backend may replace it by translations that are off by a little: between
+// `reach` and `reach` + kTurningSlack · h either answer is right. The distance to the pose at t changes by at most
+// |way| + radius · angle per unit of t, so halving intervals and dropping those that cannot matter finds the answer;
+// what is undecided when the distance is known to kTurningStep · h is "either".
+constexpr double kTurningSlack = 0.1;
+constexpr double kTurningStep = 1e-3;
+
+Demand demand_of_turning(const Blade& blade, const BladeMove& move, const Turn& turn, double h, double reach, Vec3 x) {
+  const Vec3 way = move.to.edge - move.from.edge;
+  const double rate = norm(way) + std::hypot(blade.length / 2, blade.depth) * turn.angle;
+  const double must = reach * (1 + kTie - kSweepBand), most = reach + kTurningSlack * h;
+  const auto distance = [&](double t) {
+    const BladePose pose = {move.from.edge + t * way, rotated(move.from.along, turn, t),
+                            rotated(move.from.back, turn, t)};
+    return distance_to_rectangle(blade, to_local(pose, x - pose.edge));
+  };
+  Demand demand = Demand::keep;
+  struct Interval {
+    double middle, half;
+  };
+  std::vector<Interval> open = {{0.5, 0.5}};
+  while (!open.empty()) {
+    const auto [middle, half] = open.back();
+    open.pop_back();
+    const double here = distance(middle);
+    if (here <= must) return Demand::remove;
+    if (here <= most) demand = Demand::either;
+    const double least = here - rate * half;
+    if (!(least <= (demand == Demand::keep ? most : must))) continue;
+    if (rate * half < kTurningStep * h) {
+      demand = Demand::either;
+      continue;
+    }
+    open.push_back({middle - half / 2, half / 2});
+    open.push_back({middle + half / 2, half / 2});
+  }
+  return demand;
+}
+
+// All that the blade swept in one frame. Nodes go at a distance of at most max(thickness, h, d_i) / 2: whichever edge
+// the blade crosses then loses an end, stretched ones too.
+class Swept {
+ public:
+  Swept(const Setup& setup, int64_t frame) : setup_(setup) {
+    const int64_t substeps = setup.step.substeps;
+    if (!setup.has_blade || frame >= setup.frame_count()) return;
+    for (int64_t s = frame * substeps; s < (frame + 1) * substeps; ++s) {
+      const BladeMove& move = setup.blade_moves[at(s)];
+      if (!move.down) continue;
+      const bool turns = move.from.along != move.to.along || move.from.back != move.to.back;
+      const double way = norm(move.to.edge - move.from.edge);
+      moves_.push_back({&move, std::hypot(setup.blade.length / 2, setup.blade.depth) + way, turns,
+                        turns ? turn_between(move.from, move.to) : Turn{}});
+    }
+  }
+
+  Demand demand_of(double stretch, Vec3 x, double u) const {
+    const Blade& blade = setup_.blade;
+    const double h = setup_.body.grid.spacing;
+    const double reach = std::max({blade.thickness, h, stretch}) / 2;
+    Demand demand = Demand::keep;
+    for (const auto& [move, extent, turns, turn] : moves_) {
+      const Vec3 way = move->to.edge - move->from.edge;
+      if (norm(x - move->from.edge) > extent + reach + kTurningSlack * h) continue;
+      Demand here = Demand::either;
+      // A distance between places in the body is rounded as the places are; a backend lengthens its reach by as much,
+      // so that ties still go to removal. In double precision this is far below the band.
+      const double places = kPlacesBand * u * (reach + norm(x) + norm(move->from.edge));
+      if (turns) {
+        here = demand_of_turning(blade, *move, turn, h, reach, x);
+      } else {
+        const double most = reach * (1 + kTie + kSweepBand) + places;
+        const Local p = to_local(move->from, x - move->from.edge), d = to_local(move->from, way);
+        if (least_distance_to_translated(blade, p, d) > most) continue;
+        const double distance = distance_to_translated(blade, p, d);
+        if (distance <= reach * (1 + kTie - kSweepBand)) here = Demand::remove;
+        if (distance > most) here = Demand::keep;
+      }
+      if (here == Demand::remove) return here;
+      if (here == Demand::either) demand = here;
+    }
+    return demand;
+  }
+
+ private:
+  struct Move {
+    const BladeMove* move;
+    double extent;  // nothing of the blade is farther from where the edge's middle began
+    bool turns;
+    Turn turn;
+  };
+  const Setup& setup_;
+  std::vector<Move> moves_;
+};
+
+}  // namespace
+
+void check_detection(const StageRun& run, Verdict& verdict) {
+  const Setup& setup = run.setup;
+  const State &before = run.before, &after = run.after;
+  const TissueGraph graph(setup.body, before.alive);
+  const double h = setup.body.grid.spacing;
+  const double limit = setup.detect.epsilon * h;
+  const Criterion criterion = needs_detection(setup) ? setup.detect.criterion : Criterion::none;
+  const Swept swept(setup, criterion == Criterion::geometric ? before.frame : setup.frame_count());
+  std::vector<int32_t> gone;
+  for (int32_t i = 0; i < graph.particle_count(); ++i) {
+    const bool was = before.alive[at(i)] != 0, is = after.alive[at(i)] != 0;
+    if (!was) {
+      if (is) violate(verdict, fmt::format("particle {} was dead and is alive again", i), {}, {i});
+      continue;
+    }
+    ++verdict.checked;
+    if (!is) gone.push_back(i);
+    const Stretch stretch = stretch_of(graph, before.x, i);
+    Demand demand = Demand::keep;
+    switch (criterion) {
+      case Criterion::none:
+        break;
+      case Criterion::distance:
+        demand = demand_of_distance(stretch.distance, limit, unit_roundoff(before));
+        break;
+      case Criterion::geometric:
+        demand = swept.demand_of(stretch.distance, before.x[at(i)], unit_roundoff(before));
+        break;
+      case Criterion::strain:
+        demand = Demand::either;
+        break;
+    }
+    if (demand == Demand::either || (demand == Demand::remove) == !is) continue;
+    std::vector<int32_t> particles = {i};
+    if (stretch.neighbour >= 0) particles.push_back(stretch.neighbour);
+    violate(verdict,
+            fmt::format("particle {} {} removed, but should {}have been: its greatest neighbour distance is "
+                        "{:.17g} h{}",
+                        i, is ? "was not" : "was", is ? "" : "not ", stretch.distance / h,
+                        criterion == Criterion::distance ? fmt::format(", epsilon = {}", setup.detect.epsilon) : ""),
+            {}, particles);
+  }
+  if (gone != after.removed) {
+    const auto [mine, listed] = std::mismatch(gone.begin(), gone.end(), after.removed.begin(), after.removed.end());
+    const bool lists_more = mine == gone.end() || (listed != after.removed.end() && *listed < *mine);
+    const int32_t first = lists_more ? *listed : *mine;
+    violate(verdict,
+            fmt::format("particle {} {}", first,
+                        lists_more ? "is listed as removed, but did not die in this stage"
+                                   : "died, but is not listed as removed"),
+            {}, {first});
+  }
+}
+
+}  // namespace cutproof::oracles

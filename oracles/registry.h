@@ -1,0 +1,65 @@
+// What can be judged: every property once, with its name, where it comes from, what it rests on, when it applies, and
+// the check. Who judges walks such a list and names no property by itself.
+#pragma once
+#include <string_view>
+#include <vector>
+
+#include "model/fields.h"
+#include "model/setup.h"
+#include "model/state.h"
+#include "model/verdict.h"
+
+namespace cutproof::oracles {
+
+class Judged;  // oracles/judged.h: a well-formed state and what follows from it
+
+// A stage that was run: the states before and after it, both well formed.
+struct StageRun {
+  const Setup& setup;
+  Stage stage;
+  const State& before;
+  const State& after;
+};
+
+// What a check costs beside a frame of the reference: less, or more.
+enum class Cost { cheap, thorough };
+
+// A property is one of a state (`check_state`) or one of a stage (`check_stage`): exactly one of the two is there. A
+// check fills holds, measured, bound, checked and witness of a verdict that holds so far, and may say in `vacuous` why
+// there was nothing to check. It must not throw on any well-formed state, however wrong.
+struct Property {
+  std::string_view name;    // as verdicts name it, unique among all lists
+  std::string_view source;  // section of the docs that demands it or derives its bound
+  std::string_view unit;    // of what is measured
+  unsigned rests_on;        // parts of the state, and of nothing else but the setup (model/fields.h, Part)
+  Cost cost;
+  StageSet promised_by;     // stages whose answer it belongs to: asked when such a stage is judged
+  std::string_view due_if;  // a property of a state: when it applies, in words …
+  // … and as a function: whether a state in which `after` was the last stage must have it. What later stages still owe
+  // is not asked for. Must be safe on states that are not well formed.
+  bool (*is_due)(const Setup& setup, const State& state, Stage after);
+  std::string_view nothing;  // why nothing was checked, where nothing was
+  void (*check_state)(Judged& judged, Verdict& verdict);
+  void (*check_stage)(const StageRun& run, Verdict& verdict);
+};
+
+using PropertyList = std::vector<Property>;
+using PropertyLists = std::vector<const PropertyList*>;
+
+// All that needs neither CGAL nor SuiteSparse. The first is "well formed": no other is asked of a state without it.
+// Those that need CGAL stand in oracles/surface/surface.h.
+const PropertyList& core_properties();
+
+// Throws std::out_of_range if the list has no property of this name.
+const Property& property_named(const PropertyList& list, std::string_view name);
+
+// The verdict of one property, whether or not it is due. `frame` is that of the (later) state; stage, backend and body
+// are the caller's to fill. None throws on a broken state, however broken.
+Verdict ask(const Property& property, const Setup& setup, const State& state);
+Verdict ask(const Property& property, const Setup& setup, Stage stage, const State& before, const State& after);
+
+// The same of states that are known to be well formed, and of stages given what "well formed" said of both states.
+Verdict ask(const Property& property, Judged& judged);
+Verdict ask(const Property& property, const StageRun& run, const Verdict& form_before, const Verdict& form_after);
+
+}  // namespace cutproof::oracles

@@ -1,0 +1,28 @@
+// The skin's shells and the tissue's cavities, which the lemma of method.md §8 compares.
+#pragma once
+#include "model/skin.h"
+#include "oracles/judged.h"
+
+namespace cutproof::oracles {
+
+// Found from the triangles alone, joined at their vertices. Inside and outside are told apart by the sign of the
+// volume, *at rest* where it is judged, because a body that is turned inside out in motion still has the same skin.
+struct Shells {
+  std::vector<int32_t> of_vertex;  // [v] shell, -1 if no triangle uses the vertex
+  std::vector<double> volume;      // [shells] six times [m³]
+};
+// `points`: where the vertices are [v]. Requires triangles to name vertices that exist.
+Shells shells_of(const Skin& skin, const std::vector<Vec3>& points);
+
+struct ShellCount {
+  int32_t outer = 0, inner = 0;
+  friend bool operator==(const ShellCount&, const ShellCount&) = default;
+};
+// By the sign of the volume at `position`; a shell without volume counts as an inner one. On a surface that is a
+// manifold, which "skin surface" shows, these are the shells of triangles joined at their edges.
+ShellCount count_shells(const Skin& skin);
+
+// Components of the empty nodes (18 neighbours) that do not reach the outer ring.
+int32_t count_cavities(const Judged& judged);
+
+}  // namespace cutproof::oracles

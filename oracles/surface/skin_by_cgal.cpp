@@ -1,0 +1,236 @@
+// The skin as a surface at rest (method.md §8), by CGAL. With surface_distance.cpp the only files of the oracles that
+// include it.
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_mesh_processing/connected_components.h>
+#include <CGAL/Polygon_mesh_processing/repair_degeneracies.h>
+#include <CGAL/Polygon_mesh_processing/self_intersections.h>
+#include <CGAL/Surface_mesh.h>
+#include <fmt/format.h>
+
+#include <array>
+#include <optional>
+#include <set>
+
+#include "oracles/checks.h"
+#include "oracles/shape_sums.h"
+#include "oracles/surface/surface.h"
+#include "oracles/surface/tissue_volume.h"
+
+namespace cutproof::oracles {
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
+namespace pmp = CGAL::Polygon_mesh_processing;
+
+// [node_count] 1 where an alive particle sits.
+std::vector<uint8_t> tissue_nodes(const Body& body, const State& state) {
+  std::vector<uint8_t> tissue(static_cast<std::size_t>(body.grid.node_count()), 0);
+  for (std::size_t i = 0; i < body.node.size(); ++i) tissue[static_cast<std::size_t>(body.node[i])] = state.alive[i];
+  return tissue;
+}
+
+// Nothing if the triangles are not those of a manifold with boundary.
+std::optional<Mesh> mesh_of(const Skin& skin, const std::vector<Vec3>& points) {
+  const auto vertex_count = static_cast<int32_t>(points.size());
+  Mesh mesh;
+  for (const Vec3 p : points) mesh.add_vertex({p.x, p.y, p.z});
+  for (const auto& [a, b, c] : skin.triangles) {
+    if (std::min({a, b, c}) < 0 || std::max({a, b, c}) >= vertex_count || a == b || b == c || c == a) {
+      return std::nullopt;
+    }
+    const auto vertex = [](int32_t v) { return Mesh::Vertex_index(static_cast<uint32_t>(v)); };
+    if (mesh.add_face(vertex(a), vertex(b), vertex(c)) == Mesh::null_face()) return std::nullopt;
+  }
+  return mesh;
+}
+
+struct MeshShells {
+  std::vector<double> volume;      // [shells] signed [cube of the unit of `points`]
+  std::vector<double> magnitude;   // [shells] sum of the absolute terms of that sum, for its rounding bound
+  std::vector<int64_t> euler;      // [shells] V − E + F
+  std::vector<int64_t> triangles;  // [shells]
+  std::vector<int32_t> some_vertex;
+};
+
+// Volume of a closed surface as the sum over its triangles of projected area times mean height: with vertices at
+// multiples of 1/2 every term is exact.
+MeshShells shells_of(Mesh& mesh, const Skin& skin, const std::vector<Vec3>& points) {
+  auto label = mesh.add_property_map<Mesh::Face_index, std::size_t>("f:shell", 0).first;
+  const std::size_t count = pmp::connected_components(mesh, label);
+  MeshShells shells;
+  shells.volume.assign(count, 0);
+  shells.magnitude.assign(count, 0);
+  shells.euler.assign(count, 0);
+  shells.triangles.assign(count, 0);
+  shells.some_vertex.assign(count, -1);
+  std::vector<uint8_t> counted(points.size(), 0);
+  for (std::size_t t = 0; t < skin.triangles.size(); ++t) {
+    const std::size_t shell = label[Mesh::Face_index(static_cast<uint32_t>(t))];
+    const auto& triangle = skin.triangles[t];
+    const Vec3 a = points[static_cast<std::size_t>(triangle[0])];
+    const Vec3 b = points[static_cast<std::size_t>(triangle[1])] - a;
+    const Vec3 c = points[static_cast<std::size_t>(triangle[2])] - a;
+    const double height = 3 * a.z + b.z + c.z;
+    shells.volume[shell] += height * (b.x * c.y - b.y * c.x);
+    shells.magnitude[shell] += std::abs(height) * (std::abs(b.x * c.y) + std::abs(b.y * c.x));
+    ++shells.triangles[shell];
+    shells.some_vertex[shell] = triangle[0];
+    for (const int32_t v : triangle) {
+      if (counted[static_cast<std::size_t>(v)]) continue;
+      counted[static_cast<std::size_t>(v)] = 1;
+      ++shells.euler[shell];
+    }
+  }
+  for (std::size_t s = 0; s < count; ++s) {
+    shells.volume[s] /= 6;
+    shells.magnitude[s] /= 6;
+    shells.euler[s] += shells.triangles[s] - 3 * shells.triangles[s] / 2;
+  }
+  return shells;
+}
+
+// Every vertex where it is at rest, in units of h.
+std::vector<Vec3> rest_points(const Setup& setup, const Skin& skin) {
+  std::vector<Vec3> points(skin.owner.size());
+  for (std::size_t v = 0; v < points.size(); ++v) {
+    const auto node = setup.body.grid.coordinates(setup.body.node[static_cast<std::size_t>(skin.owner[v])]);
+    const auto& step = kDirections[skin.direction[v]];
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto i = static_cast<std::size_t>(axis);
+      points[v][axis] = node[i] + setup.skin.alpha * step[i];
+    }
+  }
+  return points;
+}
+
+// CGAL joins triangles at their edges; "component match" joins them at their vertices.
+void check_skin_shells(Judged& judged, Verdict& verdict) {
+  const Skin& skin = judged.state.skin;
+  if (!has_skin(judged.state) && !skin_is_missing(judged.setup, judged.state)) return;
+  verdict.checked = static_cast<int64_t>(skin.triangles.size());
+  const ShellCount joined = count_shells(skin);
+  const std::optional<ShellCount> counted = skin_shells(skin);
+  if (!counted) {
+    violate(verdict, "CGAL does not take the triangles as a surface, so its shells cannot be counted");
+  } else if (counted->outer + counted->inner != joined.outer + joined.inner) {
+    violate(verdict, fmt::format("CGAL counts {} shells of the skin, joining triangles at vertices gives {}: shells "
+                                 "touch",
+                                 counted->outer + counted->inner, joined.outer + joined.inner));
+  }
+}
+
+void check_skin_geometry(Judged& judged, Verdict& verdict) {
+  const Setup& setup = judged.setup;
+  const State& state = judged.state;
+  const Skin& skin = state.skin;
+  verdict.checked = static_cast<int64_t>(skin.triangles.size());
+  if (!has_skin(state) && !skin_is_missing(setup, state)) return;
+  const auto not_judged = [&](const std::string& why) {
+    verdict.holds = false;
+    verdict.witness.text = "not judged: " + why;
+  };
+  const Verdict surface = ask(property_named(core_properties(), "skin surface"), judged);
+  if (!surface.holds) return not_judged("the skin is not a closed surface (" + surface.witness.text + ")");
+  const auto fail = [&](const std::string& text, const std::vector<int32_t>& vertices) {
+    verdict.holds = false;
+    verdict.witness.text = text;
+    std::set<int32_t> owners;
+    for (const int32_t v : vertices) owners.insert(skin.owner[at(v)]);
+    verdict.witness.particles.assign(owners.begin(), owners.end());
+  };
+  const auto vertices_of = [&](Mesh::Face_index face) {
+    const auto& t = skin.triangles[static_cast<std::size_t>(face)];
+    return std::vector<int32_t>{t.begin(), t.end()};
+  };
+
+  const std::vector<Vec3> points = rest_points(setup, skin);
+  std::optional<Mesh> mesh = mesh_of(skin, points);
+  if (!mesh) return not_judged("CGAL does not take the triangles as a surface");
+
+  std::vector<Mesh::Face_index> degenerate;
+  pmp::degenerate_faces(*mesh, std::back_inserter(degenerate));
+  if (!degenerate.empty()) {
+    verdict.measured = static_cast<double>(degenerate.size());
+    return fail(fmt::format("triangle {} has no area at rest", static_cast<uint32_t>(degenerate[0])),
+                vertices_of(degenerate[0]));
+  }
+  std::vector<std::pair<Mesh::Face_index, Mesh::Face_index>> crossing;
+  pmp::self_intersections(*mesh, std::back_inserter(crossing));
+  if (!crossing.empty()) {
+    verdict.measured = static_cast<double>(crossing.size());
+    auto vertices = vertices_of(crossing[0].first);
+    for (const int32_t v : vertices_of(crossing[0].second)) vertices.push_back(v);
+    return fail(fmt::format("triangles {} and {} intersect at rest", static_cast<uint32_t>(crossing[0].first),
+                            static_cast<uint32_t>(crossing[0].second)),
+                vertices);
+  }
+
+  const MeshShells shells = shells_of(*mesh, skin, points);
+  double volume = 0, magnitude = 0;
+  int32_t outer = 0, inner = 0;
+  for (std::size_t s = 0; s < shells.volume.size(); ++s) {
+    volume += shells.volume[s];
+    magnitude += shells.magnitude[s];
+    (shells.volume[s] > 0 ? outer : inner) += 1;
+    if (shells.euler[s] % 2 != 0 || shells.euler[s] > 2) {
+      verdict.measured = static_cast<double>(shells.euler[s]);
+      return fail(fmt::format("a shell has Euler number {}, which no closed surface has", shells.euler[s]),
+                  {shells.some_vertex[s]});
+    }
+  }
+  const std::vector<uint8_t> tissue = tissue_nodes(setup.body, state);
+  const int32_t components = judged.components().count, cavities = count_cavities(judged);
+  if (outer != components || inner != cavities) {
+    verdict.measured = std::abs(outer - components) + std::abs(inner - cavities);
+    return fail(fmt::format("the skin has {} outward and {} inward shells, and the tissue has {} components and {} "
+                            "cavities",
+                            outer, inner, components, cavities),
+                {});
+  }
+
+  const VolumeRange range = tissue_volume(setup.body.grid, tissue, setup.skin.alpha);
+  const double rounding =
+      (static_cast<double>(skin.triangles.size()) + 512) * kUnitRoundoff * (magnitude + std::abs(range.high));
+  const double outside = std::max(range.low - volume, volume - range.high);
+  verdict.measured = std::max(0.0, outside);
+  verdict.bound = rounding;
+  verdict.unit = "h³";
+  if (!(outside <= rounding)) {
+    return fail(
+        fmt::format("the skin holds {} h³, and this tissue between {} and {} h³", volume, range.low, range.high), {});
+  }
+}
+
+}  // namespace
+
+std::optional<ShellCount> skin_shells(const Skin& skin) {
+  std::optional<Mesh> mesh = mesh_of(skin, skin.position);
+  if (!mesh) return std::nullopt;
+  ShellCount count;
+  for (const double volume : shells_of(*mesh, skin, skin.position).volume) {
+    (volume > 0 ? count.outer : count.inner) += 1;
+  }
+  return count;
+}
+
+const PropertyList& surface_properties() {
+  constexpr const char* kWhen = "at the end of a frame, if there is a skin or must be one";
+  const auto skin_is_there = [](const Setup& setup, const State& state, Stage after) {
+    return after == Stage::skin && skin_is_due(setup, state);
+  };
+  static const PropertyList list = {
+      {"skin shells", "method.md §8, lemma: counted a second time", "1", kSkin | kAlive, Cost::thorough, stages(),
+       kWhen, skin_is_there, "no skin", check_skin_shells, nullptr},
+      {"skin geometry", "method.md §8, lemma; tolerances.md, Volume of the skin", "1", kAlive | kSkin, Cost::thorough,
+       stages(), kWhen, skin_is_there, "no skin", check_skin_geometry, nullptr}};
+  return list;
+}
+
+PropertyLists properties() { return {&core_properties(), &surface_properties()}; }
+
+Verdict skin_geometry(const Setup& setup, const State& state) {
+  return ask(property_named(surface_properties(), "skin geometry"), setup, state);
+}
+
+}  // namespace cutproof::oracles

@@ -1,0 +1,149 @@
+#include "oracles/surface/tissue_volume.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <map>
+
+namespace cutproof::oracles {
+namespace {
+
+std::array<int, 3> corner_coordinates(int corner) { return {corner & 1, (corner >> 1) & 1, (corner >> 2) & 1}; }
+
+// The four corners of each face of a cell, counter-clockwise seen from outside the cell. Corner number: x + 2y + 4z.
+constexpr std::array<std::array<int, 4>, 6> kFaceCorners = {
+    {{1, 3, 7, 5}, {0, 4, 6, 2}, {2, 6, 7, 3}, {0, 1, 5, 4}, {4, 5, 7, 6}, {0, 2, 3, 1}}};
+
+// A skin vertex inside a cell, by the two ends of its edge.
+struct CellVertex {
+  int inside = 0, outside = 0;
+  friend auto operator<=>(const CellVertex&, const CellVertex&) = default;
+};
+
+// Relative to the middle of the cell, in units of h.
+Vec3 cell_position(CellVertex v, double alpha) {
+  const auto a = corner_coordinates(v.inside), b = corner_coordinates(v.outside);
+  Vec3 p;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    p[axis] = a[i] + alpha * (b[i] - a[i]) - 0.5;
+  }
+  return p;
+}
+
+// The closed polygons in which the skin meets a cell, outward. On each face every run of inside corners is cut off by
+// one segment from where the run is entered to where it is left, which keeps diagonal inside corners apart.
+std::vector<std::vector<CellVertex>> cell_loops(int pattern) {
+  const auto inside = [pattern](int corner) { return ((pattern >> corner) & 1) != 0; };
+  std::map<CellVertex, CellVertex> next;
+  for (const auto& face : kFaceCorners) {
+    for (std::size_t first = 0; first < 4; ++first) {
+      const int before = face[(first + 3) % 4];
+      if (!inside(face[first]) || inside(before)) continue;
+      std::size_t last = first;
+      while (inside(face[(last + 1) % 4])) ++last;
+      next[{face[first], before}] = {face[last % 4], face[(last + 1) % 4]};
+    }
+  }
+  std::vector<std::vector<CellVertex>> loops;
+  while (!next.empty()) {
+    std::vector<CellVertex> loop;
+    for (auto at = next.begin(); at != next.end(); at = next.find(loop.back())) {
+      loop.push_back(at->second);
+      next.erase(at);
+    }
+    loops.push_back(std::move(loop));
+  }
+  return loops;
+}
+
+double cone_volume(Vec3 a, Vec3 b, Vec3 c) { return dot(a, cross(b, c)) / 6; }
+
+// Least and greatest volume under any triangulation of one polygon, as cones to the middle of the cell.
+VolumeRange polygon_volume(const std::vector<Vec3>& p) {
+  const std::size_t n = p.size();
+  std::vector<std::vector<VolumeRange>> best(n, std::vector<VolumeRange>(n));
+  for (std::size_t width = 2; width < n; ++width) {
+    for (std::size_t i = 0; i + width < n; ++i) {
+      const std::size_t j = i + width;
+      VolumeRange range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+      for (std::size_t k = i + 1; k < j; ++k) {
+        const double volume = cone_volume(p[i], p[k], p[j]);
+        range.low = std::min(range.low, best[i][k].low + best[k][j].low + volume);
+        range.high = std::max(range.high, best[i][k].high + best[k][j].high + volume);
+      }
+      best[i][j] = range;
+    }
+  }
+  return best[0][n - 1];
+}
+
+// Area of tissue on a face of a cell: marching squares, diagonal inside corners apart.
+double face_area(int pattern, const std::array<int, 4>& face, double alpha) {
+  std::array<bool, 4> in{};
+  int count = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    in[i] = ((pattern >> face[i]) & 1) != 0;
+    count += in[i];
+  }
+  switch (count) {
+    case 0:
+      return 0;
+    case 1:
+      return alpha * alpha / 2;
+    case 2:
+      return in[0] == in[2] ? alpha * alpha : alpha;
+    case 3:
+      return 1 - (1 - alpha) * (1 - alpha) / 2;
+    default:
+      return 1;
+  }
+}
+
+VolumeRange cell_volume(int pattern, double alpha) {
+  VolumeRange total;
+  for (const auto& face : kFaceCorners) {
+    const double cone = face_area(pattern, face, alpha) / 6;  // area times half an edge over three
+    total.low += cone;
+    total.high += cone;
+  }
+  for (const auto& loop : cell_loops(pattern)) {
+    std::vector<Vec3> points;
+    for (const CellVertex v : loop) points.push_back(cell_position(v, alpha));
+    const VolumeRange range = polygon_volume(points);
+    total.low += range.low;
+    total.high += range.high;
+  }
+  return total;
+}
+
+}  // namespace
+
+VolumeRange tissue_volume(const Grid& grid, const std::vector<uint8_t>& tissue, double alpha) {
+  std::array<int64_t, 256> cells{};
+  for (int32_t k = 0; k + 1 < grid.nodes[2]; ++k) {
+    for (int32_t j = 0; j + 1 < grid.nodes[1]; ++j) {
+      for (int32_t i = 0; i + 1 < grid.nodes[0]; ++i) {
+        const int64_t node = grid.index(i, j, k);
+        int pattern = 0;
+        for (int corner = 0; corner < 8; ++corner) {
+          const auto c = corner_coordinates(corner);
+          const int64_t at = node + c[0] + int64_t{grid.nodes[0]} * (c[1] + int64_t{grid.nodes[1]} * c[2]);
+          pattern |= tissue[static_cast<std::size_t>(at)] << corner;
+        }
+        ++cells[static_cast<std::size_t>(pattern)];
+      }
+    }
+  }
+  VolumeRange total;
+  for (int pattern = 1; pattern < 256; ++pattern) {
+    const auto count = static_cast<double>(cells[static_cast<std::size_t>(pattern)]);
+    if (count == 0) continue;
+    const VolumeRange range = cell_volume(pattern, alpha);
+    total.low += count * range.low;
+    total.high += count * range.high;
+  }
+  return total;
+}
+
+}  // namespace cutproof::oracles

@@ -1,0 +1,18 @@
+// How much room a skin at rest may enclose (tolerances.md, "Volume of the skin"). Internal to oracles/.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "model/grid.h"
+
+namespace cutproof::oracles {
+
+struct VolumeRange {
+  double low = 0, high = 0;  // [h³]
+};
+
+// Least and greatest volume under any triangulation of the cells' polygons. `tissue`: [node_count] 1 where an alive
+// particle sits; `alpha`: where along its grid edge a vertex lies.
+VolumeRange tissue_volume(const Grid& grid, const std::vector<uint8_t>& tissue, double alpha);
+
+}  // namespace cutproof::oracles

@@ -1,0 +1,279 @@
+// Detection: removed is what the criterion demands, up to rounding.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "oracles/oracles.h"
+#include "tests/oracles/expectations.h"
+
+namespace cutproof::oracles {
+namespace {
+
+using namespace cutproof::testing;
+
+// A row of four with h = 1 and epsilon = 1.5 whose last particle is pulled away: 0 1 2 → 3.
+Pair pulled(double distance) {
+  Pair pair = pair_of(block_body(4, 1, 1), {{0, 1, 2, 3}}, {{0, 1, 2, 3}});
+  pair.setup.detect.without_blade = true;
+  pair.before.x[3].x = pair.before.x[2].x + distance;
+  pair.after.x = pair.before.x;
+  return pair;
+}
+
+TEST(Detection, AcceptsBothEndsOfALongEdgeAndNothingElse) {
+  Pair pair = pulled(1.6);
+  remove_particles(pair.after, {2, 3});
+  expect_holds(detection(pair.setup, pair.before, pair.after));
+  EXPECT_EQ(detection(pair.setup, pair.before, pair.after).checked, 4);
+}
+
+TEST(Detection, RejectsAnEdgeOfWhichOneEndWasForgotten) {
+  Pair pair = pulled(1.6);
+  remove_particles(pair.after, {3});
+  expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {2, 3});
+}
+
+TEST(Detection, RejectsRemovalOfWhatIsNotStretched) {
+  Pair pair = pulled(1.4);
+  remove_particles(pair.after, {1});
+  const Verdict verdict = detection(pair.setup, pair.before, pair.after);
+  EXPECT_FALSE(verdict.holds);
+  ASSERT_FALSE(verdict.witness.particles.empty());
+  EXPECT_EQ(verdict.witness.particles[0], 1);
+}
+
+TEST(Detection, CallsEitherOnlyWhatRoundingCanTip) {
+  for (const bool removes : {false, true}) {
+    // Within a few ulp of εh both answers are right.
+    Pair tie = pulled(1.5);
+    if (removes) remove_particles(tie.after, {2, 3});
+    expect_holds(detection(tie.setup, tie.before, tie.after));
+    // 1e-14 away only one is.
+    Pair over = pulled(1.5 * (1 + 1e-14)), under = pulled(1.5 * (1 - 1e-14));
+    if (removes) {
+      remove_particles(over.after, {2, 3});
+      remove_particles(under.after, {2, 3});
+    }
+    EXPECT_EQ(detection(over.setup, over.before, over.after).holds, removes);
+    EXPECT_EQ(detection(under.setup, under.before, under.after).holds, !removes);
+  }
+}
+
+TEST(Detection, RejectsDistancesToNeighboursThatWereDeadBefore) {
+  Pair pair = pulled(5);
+  pair.before.alive[3] = 0;
+  pair.after.alive[3] = 0;
+  expect_holds(detection(pair.setup, pair.before, pair.after));
+  remove_particles(pair.after, {2});
+  expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {2, 1});
+}
+
+TEST(Detection, RejectsAListThatIsNotWhatDied) {
+  Pair pair = pulled(1.6);
+  remove_particles(pair.after, {2, 3});
+  pair.after.removed = {2};
+  expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {3});
+  pair.after.removed = {1, 2, 3};
+  expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {1});
+}
+
+TEST(Detection, RejectsTheDeadComingBack) {
+  Pair pair = pulled(1);
+  pair.before.alive[1] = 0;
+  expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {1});
+}
+
+TEST(Detection, RejectsRemovalWhereNothingIsEverRemoved) {
+  for (const bool without_blade : {false, true}) {
+    Pair pair = pulled(2);
+    if (without_blade) {
+      pair.setup.detect.criterion = Criterion::none;
+    } else {
+      pair.setup.detect.without_blade = false;
+    }
+    expect_holds(detection(pair.setup, pair.before, pair.after));
+    remove_particles(pair.after, {2, 3});
+    expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {2, 3});
+  }
+}
+
+TEST(Detection, OfStrainChecksTheListOnly) {
+  Pair pair = pulled(1);
+  pair.setup.detect.criterion = Criterion::strain;
+  remove_particles(pair.after, {0});
+  expect_holds(detection(pair.setup, pair.before, pair.after));
+  pair.after.removed = {};
+  expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {0});
+}
+
+// A 5 × 1 × 5 sheet in the plane y = 1, x and z from 1 to 5, and a blade that comes down at x = `place`, its edge
+// along y, from z = 10 to z = 3.
+Pair struck(double place, double thickness) {
+  Pair pair = pair_of(block_body(5, 1, 5), {range(0, 25)}, {range(0, 25)});
+  pair.setup.detect.criterion = Criterion::geometric;
+  pair.setup.has_blade = true;
+  pair.setup.blade = {4, 6, thickness, 0};
+  for (int s = 0; s < 4; ++s) {
+    const auto pose = [&](double t) { return BladePose{{place, 1, 10 - 7 * t}, {0, 1, 0}, {0, 0, 1}}; };
+    pair.setup.blade_moves.push_back({pose(s / 4.0), pose((s + 1) / 4.0), true, 0});
+  }
+  return pair;
+}
+
+TEST(Detection, OfAGeometricCutTakesWhatLiesWithinHalfASpacingOfTheSweep) {
+  Pair pair = struck(3.2, 0.1);
+  // x = 3 (third column), z >= 3 - 0.5: rows z = 3, 4, 5 with k = 2, 3, 4.
+  remove_particles(pair.after, {12, 17, 22});
+  expect_holds(detection(pair.setup, pair.before, pair.after));
+  State forgot = pair.before;
+  remove_particles(forgot, {17, 22});
+  EXPECT_EQ(detection(pair.setup, pair.before, forgot).witness.particles.at(0), 12);
+  State more = pair.before;
+  remove_particles(more, {7, 12, 17, 22});
+  EXPECT_EQ(detection(pair.setup, pair.before, more).witness.particles.at(0), 7);
+}
+
+TEST(Detection, OfAGeometricCutTakesBothLayersOfATie) {
+  Pair pair = struck(3.5, 0.1);
+  remove_particles(pair.after, {12, 13, 17, 18, 22, 23});
+  expect_holds(detection(pair.setup, pair.before, pair.after));
+  State none = pair.before;
+  EXPECT_FALSE(detection(pair.setup, pair.before, none).holds);
+}
+
+TEST(Detection, OfAThickBladeTakesItsThickness) {
+  Pair pair = struck(3, 2.2);
+  remove_particles(pair.after, {6, 7, 8, 11, 12, 13, 16, 17, 18, 21, 22, 23});
+  // z >= 3 - 1.1: the middle column from z = 2 on; its neighbours there are sqrt(2) away.
+  pair.after.alive[6] = pair.after.alive[8] = 1;
+  std::erase_if(pair.after.removed, [](int32_t i) { return i == 6 || i == 8; });
+  expect_holds(detection(pair.setup, pair.before, pair.after));
+}
+
+TEST(Detection, OfAGeometricCutReachesFartherWhereTissueIsStretched) {
+  Pair pair = struck(3.5, 0.1);
+  // The edge from 3 to 4 along x is stretched to 2.2; the blade passes 1.1 from both ends.
+  for (std::size_t i = 0; i < 25; ++i) {
+    if (i % 5 >= 3) pair.before.x[i].x += 1.2;
+  }
+  for (auto& move : pair.setup.blade_moves) move.from.edge.x = move.to.edge.x = 4.1;
+  pair.after.x = pair.before.x;
+  remove_particles(pair.after, {12, 13, 17, 18, 22, 23});
+  expect_holds(detection(pair.setup, pair.before, pair.after));
+  EXPECT_FALSE(detection(pair.setup, pair.before, pair.before).holds);
+}
+
+TEST(Detection, OfAGeometricCutIgnoresABladeThatIsUp) {
+  Pair pair = struck(3.2, 0.1);
+  for (auto& move : pair.setup.blade_moves) move.down = false;
+  expect_holds(detection(pair.setup, pair.before, pair.after));
+}
+
+// Particles far from each other (so that d_i = 0), anywhere; whoever brute force leaves in doubt is dead from the
+// start.
+TEST(Detection, OfAGeometricCutAgreesWithBruteForceForAnyMove) {
+  constexpr uint64_t kSeed = 11;
+  SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
+  std::mt19937_64 random(kSeed);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  const auto direction = [&] {
+    for (;;) {
+      const Vec3 v = {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
+      if (norm(v) > 0.1 && norm(v) < 1) return normalized(v);
+    }
+  };
+  std::vector<Node> nodes;
+  for (int32_t i = 0; i < 400; ++i) nodes.push_back({2 * (i % 20), 2 * (i / 20), 0});
+  int64_t hits = 0, misses = 0;
+  for (int round = 0; round < 60; ++round) {
+    Pair pair = pair_of(body_of(nodes), {range(0, 400)}, {range(0, 400)});
+    pair.setup.step.substeps = 1;
+    pair.setup.detect.criterion = Criterion::geometric;
+    pair.setup.has_blade = true;
+    pair.setup.blade = {uniform(0.5, 3), uniform(0.5, 3), uniform(0, 2), 0};
+    BladeMove move;
+    move.down = true;
+    move.from.along = direction();
+    move.from.back = normalized(cross(move.from.along, direction()));
+    move.to = move.from;
+    move.to.edge = uniform(0, 2) * direction();
+    if (round % 3 == 1) move.to.edge = uniform(-2, 2) * move.from.along + uniform(-1, 1) * move.from.back;  // coplanar
+    if (round % 12 == 3) move.to.edge = {};                                                                 // at rest
+    const bool turns = round % 2 == 1;
+    const Vec3 axis = direction();
+    const double angle = turns ? uniform(0.05, 0.6) : 0;
+    const auto rotated = [&](Vec3 v, double t) {
+      return std::cos(t * angle) * v + std::sin(t * angle) * cross(axis, v) +
+             (1 - std::cos(t * angle)) * dot(axis, v) * axis;
+    };
+    if (turns) {
+      move.to.along = rotated(move.from.along, 1);
+      move.to.back = rotated(move.from.back, 1);
+    }
+    pair.setup.blade_moves = {move};
+
+    const double reach = std::max(pair.setup.blade.thickness, 1.0) / 2;
+    Numbers removed;
+    for (int32_t i = 0; i < 400; ++i) {
+      const auto p = static_cast<std::size_t>(i);
+      const Vec3 x = {uniform(-3, 3), uniform(-3, 3), uniform(-3, 3)};
+      pair.before.x[p] = x;
+      constexpr int kSteps = 1000;
+      double least = std::numeric_limits<double>::infinity();
+      for (int k = 0; k <= kSteps; ++k) {
+        const double t = static_cast<double>(k) / kSteps;
+        const Vec3 d = x - t * move.to.edge;
+        const Vec3 along = rotated(move.from.along, t), back = rotated(move.from.back, t);
+        const double u = std::clamp(dot(d, along), -pair.setup.blade.length / 2, pair.setup.blade.length / 2);
+        const double w = std::clamp(dot(d, back), 0.0, pair.setup.blade.depth);
+        least = std::min(least, norm(d - u * along - w * back));
+      }
+      const double doubt = (norm(move.to.edge) + 3.4 * angle) / kSteps;  // to the nearest sample
+      if (least <= reach - 2e-9) {
+        removed.push_back(i);
+        ++hits;
+      } else if (least - doubt > reach + (turns ? 0.1 : 0) + 2e-9) {
+        ++misses;
+      } else {
+        pair.before.alive[p] = 0;
+      }
+    }
+    pair.after.x = pair.before.x;
+    pair.after.alive = pair.before.alive;
+    remove_particles(pair.after, removed);
+    const Verdict verdict = detection(pair.setup, pair.before, pair.after);
+    EXPECT_TRUE(verdict.holds) << "round " << round << ": " << verdict.witness.text;
+    // And the oracle is not simply content: whichever answer is turned round is noticed.
+    const std::size_t odd = random() % 400;
+    if (pair.before.alive[odd] == 0) continue;
+    pair.after.alive[odd] ^= 1;
+    pair.after.removed.clear();
+    for (int32_t i = 0; i < 400; ++i) {
+      const auto p = static_cast<std::size_t>(i);
+      if (pair.before.alive[p] != 0 && pair.after.alive[p] == 0) pair.after.removed.push_back(i);
+    }
+    EXPECT_FALSE(detection(pair.setup, pair.before, pair.after).holds) << "round " << round;
+  }
+  EXPECT_GT(hits, 1000);
+  EXPECT_GT(misses, 1000);
+}
+
+TEST(Detection, AcceptsABodyOfNoneAndOfOneParticle) {
+  Pair none = pair_of(body_of({}), {}, {});
+  none.setup.detect.without_blade = true;
+  expect_holds(detection(none.setup, none.before, none.after));
+  EXPECT_EQ(detection(none.setup, none.before, none.after).checked, 0);
+  Pair one = pair_of(block_body(1, 1, 1), {{0}}, {{0}});
+  one.setup.detect.without_blade = true;
+  expect_holds(detection(one.setup, one.before, one.after));
+  remove_particles(one.after, {0});
+  expect_rejected(detection(one.setup, one.before, one.after), {}, {0});
+}
+
+}  // namespace
+}  // namespace cutproof::oracles

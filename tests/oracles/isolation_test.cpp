@@ -1,0 +1,35 @@
+// Groups of clusters that are isolated within connected tissue are named.
+#include <gtest/gtest.h>
+
+#include "oracles/oracles.h"
+#include "tests/oracles/expectations.h"
+
+namespace cutproof::oracles {
+namespace {
+
+using namespace cutproof::testing;
+
+TEST(Isolation, RejectsAGroupOfClustersThatOverlapEachOtherOnly) {
+  Row row(8, {{0, 1, 2, 3}, {3, 4}, {5, 6}, {6, 7}});
+  const Verdict verdict = isolation(row.setup, row.state);
+  expect_rejected(verdict, {2, 3}, {5, 4});
+  EXPECT_EQ(verdict.witness.path, Numbers({5, 4}));
+  EXPECT_EQ(verdict.measured, 1);
+  EXPECT_EQ(verdict.bound, 0);
+}
+
+TEST(Isolation, IsAboutConnectedTissueOnly) {
+  Row row(5, {{0, 1}, {3, 4}});
+  remove_particles(row.state, {2});
+  expect_holds(isolation(row.setup, row.state));
+}
+
+TEST(Isolation, IsNotHiddenByAClusterThatCouplesAcrossAGap) {
+  // As many couplings as components, yet {2} is isolated from {0, 1}.
+  Row row(7, {{0, 1}, {1, 4}, {2}, {5, 6}, {4, 5}});
+  remove_particles(row.state, {3});
+  expect_rejected(isolation(row.setup, row.state), {2}, {2, 1});
+}
+
+}  // namespace
+}  // namespace cutproof::oracles

@@ -1,0 +1,134 @@
+// The shape of the skin at rest and its shells, by CGAL.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <string>
+
+#include "tests/oracles/skins.h"
+
+namespace cutproof::oracles {
+namespace {
+
+using namespace cutproof::testing;
+
+TEST(SkinGeometry, RejectsASkinTurnedInsideOut) {
+  Scene scene = scene_of(block_nodes({0, 0, 0}, {2, 2, 2}));
+  for (auto& t : scene.state.skin.triangles) std::swap(t[0], t[1]);
+  EXPECT_TRUE(skin_surface(scene.setup, scene.state).holds) << "it is a closed surface all the same";
+  const Verdict verdict = skin_geometry(scene.setup, scene.state);
+  EXPECT_FALSE(verdict.holds);
+  EXPECT_TRUE(mentions(verdict, "0 outward and 1 inward")) << verdict.witness.text;
+}
+
+TEST(SkinGeometry, RejectsTrianglesThatIntersect) {
+  Scene scene = scene_of(block_nodes({0, 0, 0}, {3, 3, 1}));
+  Skin& skin = scene.state.skin;
+  // The tip above the middle of the plate changes places with the one below: combinatorially the same surface.
+  const int32_t above = vertex_of(skin, 4, 4), below = vertex_of(skin, 4, 5);
+  std::swap(skin.direction[static_cast<std::size_t>(above)], skin.direction[static_cast<std::size_t>(below)]);
+  EXPECT_TRUE(skin_surface(scene.setup, scene.state).holds);
+  const Verdict verdict = skin_geometry(scene.setup, scene.state);
+  EXPECT_FALSE(verdict.holds);
+  EXPECT_TRUE(mentions(verdict, "intersect at rest")) << verdict.witness.text;
+  EXPECT_FALSE(verdict.witness.particles.empty());
+}
+
+TEST(SkinGeometry, RejectsATriangleWithoutArea) {
+  // Above a row of three particles three vertices lie on a line.
+  Scene scene = scene_of(block_nodes({0, 0, 0}, {3, 1, 1}));
+  const Skin& skin = scene.state.skin;
+  // A tetrahedron on these and the one below the middle.
+  Skin small;
+  for (const int32_t v : {vertex_of(skin, 0, 4), vertex_of(skin, 1, 4), vertex_of(skin, 2, 4), vertex_of(skin, 1, 5)}) {
+    small.owner.push_back(skin.owner[static_cast<std::size_t>(v)]);
+    small.direction.push_back(skin.direction[static_cast<std::size_t>(v)]);
+    small.position.push_back(skin.position[static_cast<std::size_t>(v)]);
+  }
+  small.triangles = {{0, 1, 3}, {1, 2, 3}, {2, 0, 3}, {0, 2, 1}};
+  scene.state.skin = small;
+  ASSERT_TRUE(skin_surface(scene.setup, scene.state).holds);
+  const Verdict verdict = skin_geometry(scene.setup, scene.state);
+  EXPECT_FALSE(verdict.holds);
+  EXPECT_TRUE(mentions(verdict, "has no area")) << verdict.witness.text;
+}
+
+TEST(SkinGeometry, RejectsASkinThatForgetsAComponentOrACavity) {
+  Scene two = scene_of({{0, 0, 0}, {3, 0, 0}});
+  const Scene one = scene_of({{0, 0, 0}});
+  two.state.skin = one.state.skin;
+  const Verdict component = skin_geometry(two.setup, two.state);
+  EXPECT_FALSE(component.holds);
+  EXPECT_TRUE(mentions(component, "1 outward and 0 inward shells, and the tissue has 2 components and 0 cavities"))
+      << component.witness.text;
+
+  const auto nodes = block_nodes({0, 0, 0}, {5, 5, 5});
+  Scene full = scene_of(nodes);
+  const Skin skin = full.state.skin;
+  const int32_t middle = 62;
+  full.state.alive[middle] = 0;
+  const Verdict cavity = skin_geometry(full.setup, full.state);
+  EXPECT_FALSE(cavity.holds);
+  EXPECT_TRUE(mentions(cavity, "1 components and 1 cavities")) << cavity.witness.text;
+}
+
+// A cavity that touches the outside only across an edge of the grid is open by 18 neighbours: no cavity.
+TEST(SkinGeometry, CountsCavitiesWith18Neighbours) {
+  Scene scene = scene_of(without(block_nodes({0, 0, 0}, {4, 4, 4}), {{1, 1, 1}, {0, 0, 1}}));
+  scene.state.skin = scene_of({{0, 0, 0}}).state.skin;  // some sphere: right number of shells, wrong volume
+  const Verdict verdict = skin_geometry(scene.setup, scene.state);
+  EXPECT_FALSE(verdict.holds);
+  EXPECT_TRUE(mentions(verdict, "h³")) << verdict.witness.text;  // shells agree, so the volume is what is wrong
+}
+
+TEST(SkinGeometry, RejectsASkinOfTheRightShapeAndTheWrongVolume) {
+  // The skin of a block without one corner, on a block that has that corner.
+  const auto nodes = block_nodes({0, 0, 0}, {3, 3, 3});
+  Scene scene = scene_of(nodes);
+  State smaller = scene.state;
+  smaller.alive[0] = 0;
+  // No ambiguous cell: a missing corner cuts each of its cells in one polygon.
+  smaller.skin = scene.state.skin = convex_cell_skin(scene.setup, smaller);
+  ASSERT_TRUE(skin_geometry(scene.setup, smaller).holds) << skin_geometry(scene.setup, smaller).witness.text;
+  const Verdict verdict = skin_geometry(scene.setup, scene.state);
+  EXPECT_FALSE(verdict.holds);
+  EXPECT_EQ(verdict.unit, "h³");
+  EXPECT_GT(verdict.measured, 0.4) << "a corner holds about half a cell";
+}
+
+TEST(SkinShells, AgreeWithShellsJoinedAtVerticesOnEverySurface) {
+  const Property& shells = property_named(surface_properties(), "skin shells");
+  for (const auto& nodes : {block_nodes({0, 0, 0}, {2, 2, 2}), without(block_nodes({0, 0, 0}, {3, 3, 3}), {{1, 1, 1}}),
+                            std::vector<Node>{{0, 0, 0}, {3, 0, 0}}}) {
+    const Scene scene = scene_of(nodes);
+    const Verdict verdict = ask(shells, scene.setup, scene.state);
+    EXPECT_TRUE(verdict.holds) << verdict.witness.text;
+    EXPECT_GT(verdict.checked, 0);
+    const auto counted = skin_shells(scene.state.skin);
+    ASSERT_TRUE(counted.has_value());
+    EXPECT_EQ(*counted, count_shells(scene.state.skin));
+  }
+}
+
+TEST(SkinShells, CannotBeCountedWhereTrianglesAreNoSurface) {
+  Scene scene = scene_of({{0, 0, 0}});
+  scene.state.skin.triangles.push_back(scene.state.skin.triangles.front());
+  EXPECT_FALSE(skin_shells(scene.state.skin).has_value());
+  const Verdict verdict = ask(property_named(surface_properties(), "skin shells"), scene.setup, scene.state);
+  EXPECT_FALSE(verdict.holds);
+  EXPECT_TRUE(mentions(verdict, "cannot be counted")) << verdict.witness.text;
+}
+
+TEST(SkinShells, AreVacuousWithoutASkin) {
+  Scene scene = scene_of({{0, 0, 0}});
+  scene.state.skin = {};
+  for (const Property& property : surface_properties()) {
+    const Verdict verdict = ask(property, scene.setup, scene.state);
+    EXPECT_TRUE(verdict.holds);
+    EXPECT_EQ(verdict.checked, 0);
+    EXPECT_EQ(verdict.vacuous, "no skin");
+  }
+}
+
+}  // namespace
+}  // namespace cutproof::oracles
