@@ -22,7 +22,7 @@
 #include "fixtures/build.h"
 #include "fixtures/cook.h"
 #include "model/error.h"
-#include "oracles/comparison/converged.h"
+#include "oracles/comparison/reference_solution.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::cli {
@@ -533,7 +533,7 @@ json whole_substep(const CutCube& cube, State state, std::mt19937_64& random) {
   state.frame = 0;
   const Setup& setup = cube.setup;
   const auto begin = Clock::now();
-  const oracles::Converged answer = oracles::converged_substep(setup, state);
+  const oracles::ReferenceSolution answer = oracles::reference_solution(setup, state);
   const double seconds = seconds_since(begin);
   fmt::print("  a converged answer of one substep: {:.4g} s, {} alternations{}\n", seconds, answer.alternations,
              answer.converged ? "" : ", NOT converged");

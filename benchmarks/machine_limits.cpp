@@ -22,7 +22,7 @@ namespace {
 constexpr int kRepeats = 7;
 
 // Copies with `threads` threads of the CPU between buffers beyond any cache.
-Floor copy_on_cpu(int threads, int repeats) {
+MachineLimit copy_on_cpu(int threads, int repeats) {
   const std::size_t each = (std::size_t{256} << 20) / static_cast<std::size_t>(threads);
   std::vector<std::vector<char>> from(static_cast<std::size_t>(threads)), to(static_cast<std::size_t>(threads));
   const auto on_all = [&](auto work) {
@@ -54,7 +54,7 @@ CUTPROOF_KERNEL(count_launch_kernel);
 
 // A kernel that does next to nothing, on the host's threads; many in a row, because one is below the clock's
 // resolution.
-Floor launch_on_host(int threads, int blocks, int repeats) {
+MachineLimit launch_on_host(int threads, int blocks, int repeats) {
   constexpr int kLaunches = 200;
   gpu::HostLauncher launcher(gpu::HostLauncher::Threads{threads});
   std::int64_t launches = 0;
@@ -74,47 +74,47 @@ Floor launch_on_host(int threads, int blocks, int repeats) {
 
 }  // namespace
 
-MachineFloors measure_machine(const std::string& backend) {
-  MachineFloors floors;
+MachineLimits measure_machine(const std::string& backend) {
+  MachineLimits limits;
 #if CUTPROOF_HAS_CUDA
   if (backend == "gpu") {
-    const gpu::Floors measured = gpu::measure_floors();
+    const gpu::DeviceLimits measured = gpu::measure_device_limits();
     return {measured.copy_bytes_per_second, measured.graph_node_seconds, measured.chain_seconds};
   }
 #endif
-  const Floor copy = copy_on_cpu(backend == "reference" ? 1 : cpu_threads(), kRepeats);
-  floors.copy_bytes_per_second = copy.bytes / copy.seconds.median;
-  return floors;
+  const MachineLimit copy = copy_on_cpu(backend == "reference" ? 1 : cpu_threads(), kRepeats);
+  limits.copy_bytes_per_second = copy.bytes / copy.seconds.median;
+  return limits;
 }
 
-std::vector<Floor> measure_floors(const std::string& backend, int repeats) {
+std::vector<MachineLimit> measure_machine_limits(const std::string& backend, int repeats) {
 #if CUTPROOF_HAS_CUDA
   if (backend == "gpu") {
-    const gpu::Floors measured = gpu::measure_floors(repeats);
+    const gpu::DeviceLimits measured = gpu::measure_device_limits(repeats);
     return {{"copy, device to device", times_of(measured.copy), measured.copy_bytes, measured.bytes_lost},
             {"graph of 40 empty kernels", times_of(measured.short_chain), 0, {}},
             {"graph of 400 empty kernels", times_of(measured.long_chain), 0, {}}};
   }
 #endif
-  std::vector<Floor> floors = {copy_on_cpu(1, repeats)};
+  std::vector<MachineLimit> limits = {copy_on_cpu(1, repeats)};
   if (backend == "host") {
-    if (cpu_threads() > 1) floors.push_back(copy_on_cpu(cpu_threads(), repeats));
+    if (cpu_threads() > 1) limits.push_back(copy_on_cpu(cpu_threads(), repeats));
     for (const int blocks : {1, gpu::HostLauncher::kMostBlocks}) {
-      floors.push_back(launch_on_host(cpu_threads(), blocks, repeats));
+      limits.push_back(launch_on_host(cpu_threads(), blocks, repeats));
     }
   }
-  return floors;
+  return limits;
 }
 
-nlohmann::json to_json(const std::vector<Floor>& floors) {
+nlohmann::json to_json(const std::vector<MachineLimit>& limits) {
   nlohmann::json rows = nlohmann::json::array();
-  for (const Floor& floor : floors) {
-    nlohmann::json row = {{"what", floor.what}, {"seconds", to_json(floor.seconds)}, {"lost", nullptr}};
-    if (floor.bytes > 0) {
-      row["bytes"] = floor.bytes;
-      row["bytes_per_second"] = floor.bytes / floor.seconds.median;
+  for (const MachineLimit& limit : limits) {
+    nlohmann::json row = {{"what", limit.what}, {"seconds", to_json(limit.seconds)}, {"lost", nullptr}};
+    if (limit.bytes > 0) {
+      row["bytes"] = limit.bytes;
+      row["bytes_per_second"] = limit.bytes / limit.seconds.median;
     }
-    if (floor.lost) row["lost"] = *floor.lost;
+    if (limit.lost) row["lost"] = *limit.lost;
     rows.push_back(std::move(row));
   }
   return rows;
@@ -122,30 +122,30 @@ nlohmann::json to_json(const std::vector<Floor>& floors) {
 
 namespace {
 
-struct FloorsOptions {
+struct Options {
   std::string backend = "reference", json;
   int repeats = 21;
 };
 
-int bench_machine_limits(const FloorsOptions& options) {
+int bench_machine_limits(const Options& options) {
   require_timed_backend(options.backend);
   require_writable(options.json);
-  nlohmann::json document = begin_report("floors", options.backend);
-  const std::vector<Floor> floors = measure_floors(options.backend, options.repeats);
+  nlohmann::json document = begin_report("machine_limits", options.backend);
+  const std::vector<MachineLimit> limits = measure_machine_limits(options.backend, options.repeats);
   Table table({"", "median µs", "least", "most", "GB/s", "lost"});
-  for (const Floor& floor : floors) {
+  for (const MachineLimit& limit : limits) {
     const auto microseconds = [](double seconds) { return fmt::format("{:.4g}", 1e6 * seconds); };
-    table.add({floor.what, microseconds(floor.seconds.median), microseconds(floor.seconds.min),
-               microseconds(floor.seconds.max),
-               floor.bytes > 0 ? fmt::format("{:.4g}", 1e-9 * floor.bytes / floor.seconds.median) : "-",
-               floor.lost ? fmt::format("{}", *floor.lost) : "-"});
+    table.add({limit.what, microseconds(limit.seconds.median), microseconds(limit.seconds.min),
+               microseconds(limit.seconds.max),
+               limit.bytes > 0 ? fmt::format("{:.4g}", 1e-9 * limit.bytes / limit.seconds.median) : "-",
+               limit.lost ? fmt::format("{}", *limit.lost) : "-"});
   }
   fmt::print("\n{}", table.text());
   const bool holds =
-      std::all_of(floors.begin(), floors.end(), [](const Floor& floor) { return floor.lost.value_or(0) == 0; });
+      std::all_of(limits.begin(), limits.end(), [](const MachineLimit& limit) { return limit.lost.value_or(0) == 0; });
   if (!holds) fmt::print("FAILS: something that was timed did not do its work\n");
   document["repeats"] = options.repeats;
-  document["rows"] = to_json(floors);
+  document["rows"] = to_json(limits);
   document["holds"] = holds;
   document["complete"] = true;
   write_report(options.json, document);
@@ -157,7 +157,7 @@ int bench_machine_limits(const FloorsOptions& options) {
 
 Suite machine_limits_suite() {
   return {"machine_limits", "what the machine can do at best: copies, launches", [](CLI::App& command) {
-            const auto options = std::make_shared<FloorsOptions>();
+            const auto options = std::make_shared<Options>();
             command.add_option("--backend", options->backend, "whose machine: reference, host or gpu")
                 ->capture_default_str()
                 ->type_name("B");

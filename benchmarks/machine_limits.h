@@ -1,5 +1,5 @@
-// What the machine can do at best, measured in the same run as what is told as a multiple of it; by itself it is the
-// suite `floors`.
+// What the machine can do at best, measured in the same run as what is given as a multiple of it; by itself it is the
+// suite `machine_limits`.
 #pragma once
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -11,17 +11,17 @@
 
 namespace cutproof::cli {
 
-struct MachineFloors {
+struct MachineLimits {
   double copy_bytes_per_second = 0;          // read + written
   std::optional<double> graph_node_seconds;  // device only
   std::optional<double> chain_seconds;       // of a graph of 40 empty kernels; device only
 };
 
 // By the device, or by as many threads of the CPU as the backend uses.
-MachineFloors measure_machine(const std::string& backend);
+MachineLimits measure_machine(const std::string& backend);
 
 // One thing of which nothing can be faster.
-struct Floor {
+struct MachineLimit {
   std::string what;
   Times seconds;                // of it once
   double bytes = 0;             // read + written; 0: it moves nothing
@@ -29,8 +29,8 @@ struct Floor {
 };
 // `reference`: a copy by one thread. `host`: copies by one and by all threads, launches of an empty kernel with one
 // block and with as many as a launch has at most. `gpu`: a copy, graphs that are chains of 40 and of 400 empty kernels.
-std::vector<Floor> measure_floors(const std::string& backend, int repeats);
+std::vector<MachineLimit> measure_machine_limits(const std::string& backend, int repeats);
 
-nlohmann::json to_json(const std::vector<Floor>& floors);
+nlohmann::json to_json(const std::vector<MachineLimit>& limits);
 
 }  // namespace cutproof::cli

@@ -78,7 +78,7 @@ nlohmann::json begin_report(const std::string& suite, const std::string& backend
   const std::string date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
   const std::string device = device_of(backend);
   fmt::print("{} on {}, {}\n", backend, device, date);
-  nlohmann::json document = {{"format", "cutproof.bench"}, {"format_version", 1}, {"suite", suite},
+  nlohmann::json document = {{"format", "cutproof.bench"}, {"format_version", 2}, {"suite", suite},
                              {"cutproof", kVersion},       {"date", date},        {"backend", backend},
                              {"device", device},           {"complete", false}};
   if (const char* commit = std::getenv("CUTPROOF_COMMIT"); commit != nullptr && *commit != '\0') {

@@ -233,7 +233,7 @@ int bench_rotations(const RotationOptions& options) {
   counts.timed = options.timed.value_or(options.backend == "gpu" ? 1'000'000 : 20'000);
 
   json document = begin_report("rotations", options.backend);
-  const MachineFloors machine = measure_machine(options.backend);
+  const MachineLimits machine = measure_machine(options.backend);
   fmt::print("{} matrices of each case, {} timed {} times, seed {}; copy, read + written: {:.4g} GB/s\n",
              counts.matrices, counts.timed, counts.repeats, counts.seed, 1e-9 * machine.copy_bytes_per_second);
   const RotationReport report = measure_rotations(rotation_methods(options.backend), counts,
@@ -263,7 +263,7 @@ int bench_rotations(const RotationOptions& options) {
   document["timed"] = counts.timed;
   document["repeats"] = counts.repeats;
   document["seed"] = counts.seed;
-  document["floors"] = {{"copy_bytes_per_second", machine.copy_bytes_per_second}};
+  document["machine_limits"] = {{"copy_bytes_per_second", machine.copy_bytes_per_second}};
   document.update(to_json(report));
   document["complete"] = true;
   write_report(options.json, document);

@@ -18,7 +18,7 @@
 #include "fixtures/cook.h"
 #include "harness/backends.h"
 #include "model/error.h"
-#include "oracles/comparison/converged.h"
+#include "oracles/comparison/reference_solution.h"
 #include "oracles/relations/relations.h"
 
 namespace cutproof::cli {
@@ -111,7 +111,7 @@ FrameAnswer converged_frame(const Setup& setup, const State& state) {
   FrameAnswer answer;
   State now = state;
   for (int32_t substep = 0; substep < setup.step.substeps; ++substep) {
-    oracles::Converged converged = oracles::converged_substep(single, now);
+    oracles::ReferenceSolution converged = oracles::reference_solution(single, now);
     answer.converged &= converged.converged;
     for (std::size_t i = 0; i < now.x.size(); ++i) now.v[i] = (decay / dt) * (converged.x[i] - now.x[i]);
     now.x = std::move(converged.x);

@@ -7,13 +7,13 @@ here=$(cd "$(dirname "$0")" && pwd)
 results=$(mkdir -p "$1" && cd "$1" && pwd)
 shift
 parts=${*:-primitives failures scenes lockstep determinism properties sanitizer timings}
-export CUTPROOF_REGRESSIONS="$here/fixtures/regressions"
 export CUTPROOF_COMMIT=$(cat "$here/commit")
-export LD_LIBRARY_PATH="$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
 export PATH="$here/bin:$PATH:/usr/local/cuda/bin"
 cases=${CUTPROOF_CASES:-100000}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
+[ -d "$here/bin" ] || tar -xzf "$here/contents.tar.gz" -C "$here" || exit 3
+export CUTPROOF_REGRESSIONS="$here/fixtures/regressions"
 status=0
 lines=()
 cd "$here"
@@ -71,7 +71,7 @@ for part in $parts; do
       done ;;
     timings)
       try rotations cutproof bench rotations --backend gpu --cases --json "$results/rotations.json"
-      try floors cutproof bench floors --backend gpu --json "$results/floors.json"
+      try machine_limits cutproof bench machine_limits --backend gpu --json "$results/machine_limits.json"
       try stages cutproof bench stages --backend gpu --split both --json "$results/stages.json"
       try sizes cutproof bench stages --backend gpu --split both --sizes 1000,101096,1000000,10000000 \
         --json "$results/stages_sizes.json"
@@ -89,7 +89,7 @@ done
 device=$(nvidia-smi --query-gpu=name,driver_version,memory.total --format=csv,noheader 2>/dev/null | head -1)
 {
   echo "{"
-  echo "  \"commit\": \"$(cat commit)\","
+  echo "  \"commit\": \"$CUTPROOF_COMMIT\","
   echo "  \"device\": \"$device\","
   echo "  \"date\": \"$(date -u +%Y-%m-%dT%H:%M:%SZ)\","
   echo "  \"steps\": ["

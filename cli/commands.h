@@ -19,7 +19,7 @@ struct RunOptions {
   std::optional<int64_t> frames;     // at most this many of the scene's frames
   bool check = false;
   std::string against;        // "" or "reference"
-  std::string mode = "both";  // of the comparison: lockstep, shadow, both
+  std::string mode = "both";  // of the comparison: lockstep, free-running, both
   std::string errors;         // names of errors with commas between them, or "all"; empty: none
   std::string record;
   std::string json;

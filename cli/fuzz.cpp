@@ -27,14 +27,14 @@ using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
 constexpr const char* kFormat = "cutproof.fuzz";
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;
 constexpr std::chrono::seconds kSimplifyingTime{60};
 // Classes of cases are rare: below this many cases, or with small ones only, an empty class says nothing.
 constexpr int64_t kCasesThatMeetEveryClass = 1000;
 constexpr int kSizeThatMeetsEveryClass = 79;
 // Of positions after a step, as many as rounding may decide: 0.5 to 0.8 % in campaigns of thousands. A comparison that
 // grants everything compares nothing.
-constexpr double kMostEither = 0.05;
+constexpr double kMostUndecidable = 0.05;
 // A GPU is busy with so many loads at once; more only take memory.
 constexpr int kLoadsOnTheDevice = 6;
 constexpr int kSchedulesTried = 50;
@@ -142,7 +142,7 @@ json campaign_json(const FuzzOptions& options, const CampaignOptions& asked, con
     const StepsCompared& compared = campaign.compared;
     document["steps_compared"] = {{"steps", compared.steps},
                                   {"particles", compared.particles},
-                                  {"either", compared.either},
+                                  {"undecidable", compared.undecidable},
                                   {"greatest_h", json_number(compared.greatest)}};
   }
   if (options.seconds) {
@@ -174,9 +174,9 @@ int conclude(const json& document, bool whole) {
              document.at("seconds").get<double>(), document.at("cases_per_second").get<double>());
   if (document.contains("steps_compared")) {
     const json& compared = document.at("steps_compared");
-    fmt::print("{} steps beside the reference's: {} positions at most {} h apart, {} either way\n",
+    fmt::print("{} steps beside the reference's: {} positions at most {} h apart, {} undecidable within rounding\n",
                compared.at("steps").get<int64_t>(), compared.at("particles").get<int64_t>(),
-               compared.at("greatest_h").dump(), compared.at("either").get<int64_t>());
+               compared.at("greatest_h").dump(), compared.at("undecidable").get<int64_t>());
   }
   const std::size_t violations = document.at("violations").size();
   if (violations > 0) {
@@ -190,10 +190,12 @@ int conclude(const json& document, bool whole) {
   }
   if (whole && cases >= kCasesThatMeetEveryClass && document.contains("steps_compared")) {
     const json& compared = document.at("steps_compared");
-    const double either = compared.at("either").get<double>(), measured = compared.at("particles").get<double>();
-    if (!(either <= kMostEither * (either + measured)) || measured == 0) {
-      fmt::print("FAILS: {:.0f} positions after a step were either way and {:.0f} compared, so too little was tested\n",
-                 either, measured);
+    const double undecidable = compared.at("undecidable").get<double>(),
+                 measured = compared.at("particles").get<double>();
+    if (!(undecidable <= kMostUndecidable * (undecidable + measured)) || measured == 0) {
+      fmt::print(
+          "FAILS: {:.0f} positions after a step were undecidable and {:.0f} compared, so too little was tested\n",
+          undecidable, measured);
       return 1;
     }
   }
@@ -251,7 +253,7 @@ int merge(const FuzzOptions& options) {
       if (whole.contains("steps_compared")) {
         json& compared = whole.at("steps_compared");
         const json& more = part.at("steps_compared");
-        for (const char* field : {"steps", "particles", "either"}) {
+        for (const char* field : {"steps", "particles", "undecidable"}) {
           compared[field] = compared.at(field).get<int64_t>() + more.at(field).get<int64_t>();
         }
         // A number, or of what failed the string "inf".
@@ -352,10 +354,10 @@ Simplified simplify(const Violation& violation, const BackendChoice& choice) {
   const auto is_over = [&] { return Clock::now() > until; };
   found.failing = simplest(violation.failing, fails, is_over);
   if (simulated) {
-    const auto schedule = std::make_shared<gpu::Schedule>();
+    const auto schedule = std::make_shared<gpu::ThreadSchedule>();
     static_cast<void>(
         dissect_alone([&] { return make_recorded_backend(failing_choice, schedule); }, found.failing, true));
-    found.schedule = gpu::shrink(*schedule, [&](const gpu::Schedule& tried) {
+    found.schedule = gpu::shrink(*schedule, [&](const gpu::ThreadSchedule& tried) {
       if (is_over()) return false;
       return dissect_alone([&] { return make_replaying_backend(failing_choice, tried); }, found.failing, true)
           .failure.has_value();

@@ -98,10 +98,10 @@ int run_command_line(int argc, char** argv) {
                         "judge every frame with every oracle, and the scene's expectations");
   run_command->add_option("--against", run_options.against, "compare every stage with this backend: reference")
       ->type_name("B");
-  run_command->add_option("--mode", run_options.mode, "of the comparison: lockstep, shadow or both")
+  run_command->add_option("--mode", run_options.mode, "of the comparison: lockstep, free-running or both")
       ->capture_default_str()
       ->type_name("M")
-      ->check(CLI::IsMember({"lockstep", "shadow", "both"}))
+      ->check(CLI::IsMember({"lockstep", "free-running", "both"}))
       ->needs("--against");
   run_command
       ->add_option("--errors", run_options.errors,

@@ -4,14 +4,15 @@
 #include <map>
 #include <optional>
 
+#include "cli/against_report.h"
 #include "cli/commands.h"
+#include "cli/errors_report.h"
 #include "cli/results.h"
 #include "cli/terminal.h"
 #include "fixtures/bodies.h"
 #include "fixtures/build.h"
 #include "harness/against.h"
 #include "harness/backends.h"
-#include "harness/errors.h"
 #include "harness/frame_runner.h"
 #include "harness/scene_judge.h"
 #include "model/error.h"
@@ -32,14 +33,17 @@ double metres_per(const std::string& unit) {
   return found->second;
 }
 
+using harness::Against;
+using harness::AgainstMode;
+
 AgainstMode against_mode(const RunOptions& options) {
   if (options.against != "reference") {
     throw InputError("command line", "--against", fmt::format("'{}' is nothing to compare with", options.against),
                      "use --against reference");
   }
-  return options.mode == "lockstep" ? AgainstMode::lockstep
-         : options.mode == "shadow" ? AgainstMode::shadow
-                                    : AgainstMode::both;
+  return options.mode == "lockstep"       ? AgainstMode::lockstep
+         : options.mode == "free-running" ? AgainstMode::free_running
+                                          : AgainstMode::both;
 }
 
 void print_header(const Scene& scene, const fixtures::Built& built, const RunOptions& options) {
@@ -86,13 +90,13 @@ void print_summary(const RunResult& result) {
 }
 
 // The comparison goes stage by stage.
-void compare(Against& against, const Setup& setup, const harness::Moment& moment) {
+void compare(Against& against, const Setup& setup, const harness::Moment& moment, const std::array<bool, 6>& ran) {
   const auto due = harness::due_stages(setup, *moment.before, moment.span, *moment.after);
   if (std::count(due.begin(), due.end(), true) > 1) {
     throw InputError("command line", "--against", "this backend runs several stages in one piece",
                      "choose one that runs them one by one, or leave --against out");
   }
-  against.see(moment.span.last, *moment.after, due[static_cast<std::size_t>(moment.span.last)]);
+  against.see(moment.span.last, *moment.after, ran[static_cast<std::size_t>(moment.span.last)]);
 }
 
 }  // namespace
@@ -100,7 +104,7 @@ void compare(Against& against, const Setup& setup, const harness::Moment& moment
 int run(const RunOptions& options) {
   std::optional<AgainstMode> mode;
   if (!options.against.empty()) mode = against_mode(options);
-  const ErrorsWanted wanted = errors_wanted(options.errors);
+  const harness::ErrorsWanted wanted = errors_wanted(options.errors);
   if (wanted.implementation)
     mode = mode.value_or(AgainstMode::lockstep) == AgainstMode::lockstep ? AgainstMode::lockstep : AgainstMode::both;
   fixtures::BuildOptions build_options;
@@ -119,7 +123,7 @@ int run(const RunOptions& options) {
     recorder.emplace(options.record, built.setup, io::write_scene(scene), options.backend.name);
   std::optional<harness::SceneJudge> judge;
   std::optional<Against> against;
-  std::optional<Errors> errors;
+  std::optional<harness::Errors> errors;
   print_header(scene, built, options);
 
   RunResult result{"run",
@@ -144,7 +148,7 @@ int run(const RunOptions& options) {
   const harness::Observer see = [&](const harness::Moment& moment) {
     if (judge) judge->see(moment);
     if (recorder) recorder->add(moment.span.last, *moment.after);
-    if (against) compare(*against, built.setup, moment);
+    if (against) compare(*against, built.setup, moment, runner.ran());
   };
   {
     Progress progress("frame", built.setup.frame_count());
@@ -165,9 +169,10 @@ int run(const RunOptions& options) {
     print_verdicts(*judge);
   }
   if (against) print_against(*against);
+  const harness::Lockstep* const implementation = wanted.implementation && against ? &*against->lockstep : nullptr;
   if (errors) {
-    errors->finish(state(), against ? &*against : nullptr);
-    errors->print();
+    errors->finish(state());
+    print_errors(*errors, implementation);
   }
   if (recorder) {
     recorder->finish();
@@ -177,14 +182,14 @@ int run(const RunOptions& options) {
   if (json_file) {
     nlohmann::json document = to_json(result, judge ? &*judge : nullptr);
     if (against) {
-      document["against"] = against->to_json();
+      document["against"] = to_json(*against, built.setup);
       // A list that push_back makes of null is broken where there is no memory for it (nlohmann::json 3.11).
       document["against"]["verdicts"] = nlohmann::json::array();
       for (const Verdict& verdict : against->verdicts()) {
         document["against"]["verdicts"].push_back(to_json(verdict, false));
       }
     }
-    if (errors) document["errors"] = errors->to_json();
+    if (errors) document["errors"] = to_json(*errors, implementation);
     io::write_text(json_file->temporary(), document.dump(1) + "\n");
     json_file->commit();
     fmt::print("wrote {}\n", options.json);

@@ -103,7 +103,7 @@ std::unique_ptr<Backend> make_backend(const BackendChoice& choice) {
          "use one of those that `cutproof info` lists: reference, host, simulated, gpu, gpu-eager");
 }
 
-std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice, std::shared_ptr<gpu::Schedule> record) {
+std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice, std::shared_ptr<gpu::ThreadSchedule> record) {
   return make_simulated(
       [inner = generator(choice), record](const gpu::Candidates& candidates) {
         const int thread = inner(candidates);
@@ -113,7 +113,7 @@ std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice, std:
       choice);
 }
 
-std::unique_ptr<Backend> make_replaying_backend(const BackendChoice& choice, gpu::Schedule schedule) {
+std::unique_ptr<Backend> make_replaying_backend(const BackendChoice& choice, gpu::ThreadSchedule schedule) {
   return make_simulated(gpu::replay(std::move(schedule)), choice);
 }
 

@@ -23,8 +23,8 @@ struct BackendChoice {
 // to the reference; MachineError if there is no device.
 std::unique_ptr<Backend> make_backend(const BackendChoice& choice);
 // The same, whose schedule is written down as it is made (docs/oracles_and_tests.md §3); `simulated` only.
-std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice, std::shared_ptr<gpu::Schedule> record);
-std::unique_ptr<Backend> make_replaying_backend(const BackendChoice& choice, gpu::Schedule schedule);
+std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice, std::shared_ptr<gpu::ThreadSchedule> record);
+std::unique_ptr<Backend> make_replaying_backend(const BackendChoice& choice, gpu::ThreadSchedule schedule);
 
 // By the number in gpu/state/device_view.h.
 const std::vector<std::string>& rotation_names();

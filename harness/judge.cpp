@@ -203,7 +203,8 @@ void Judge::see_several(const Moment& moment, const std::array<bool, 6>& seen) {
     verdict.unit = "1";
     verdict.checked = unique ? end.clusters.count() : 0;
     if (verdict.checked == 0) verdict.vacuous = unique ? "no cluster" : "the merge rule leaves several right answers";
-    if (const auto difference = oracles::topological_difference(expected, end, !unique)) {
+    const auto sets = unique ? oracles::Sets::compared : oracles::Sets::open;
+    if (const auto difference = oracles::difference_of_decisions(expected, end, sets)) {
       verdict.holds = false;
       verdict.measured = 1;
       verdict.witness = {difference->clusters, difference->particles, {}, difference->text};

@@ -51,7 +51,7 @@ class Comparison {
     const oracles::Apart apart = oracles::poses_apart(setup_, answer_.frames[f], course_.frames.back());
     rms_h_.push_back(apart.position.rms());
     if (!(rms_h_.back() <= allowed_) && !first_beyond_) first_beyond_ = f;
-    greatest_h_ = std::max(greatest_h_, apart.position.greatest);
+    greatest_h_ = std::max(greatest_h_, apart.position.max);
     removed_otherwise_ = apart.alive_in_one;
   }
   bool beyond() const { return first_beyond_.has_value(); }

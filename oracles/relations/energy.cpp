@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "oracles/comparison/converged.h"
+#include "oracles/comparison/reference_solution.h"
 #include "oracles/relations/relations.h"
 #include "oracles/relations/shared.h"
 #include "oracles/shape_sums.h"
