@@ -10,7 +10,10 @@ set(cutproof_components
   "io cutproof_io"
   "reference cutproof_reference reference_cpu"
   "host_kernels cutproof_host gpu"
-  "oracles cutproof_oracles oracles")
+  "oracles cutproof_oracles oracles"
+  "surface_oracles cutproof_surface_oracles"
+  "comparison cutproof_comparison"
+  "relations cutproof_relations")
 
 # What the installed libraries need of others, by target: what an installation says to find it. The empty ones are headers
 # alone that only our own sources include.

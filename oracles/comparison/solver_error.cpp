@@ -6,7 +6,7 @@
 #include "oracles/comparison/measurable.h"
 #include "oracles/comparison/reference_solution.h"
 #include "oracles/comparison/state_difference.h"
-#include "oracles/relations/relations.h"
+#include "oracles/single_substep.h"
 #include "oracles/support.h"
 
 namespace cutproof::oracles {

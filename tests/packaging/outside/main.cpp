@@ -1,5 +1,5 @@
-// A bar of 6 × 3 × 3 particles, made by hand and held together by two clusters. The oracles certify it, reject it once it
-// is broken, and certify what the reference and the kernels make of it in one frame.
+// A bar of 6 × 3 × 3 particles, made by hand and held together by two clusters. The oracles certify it, reject it once
+// it is broken, and certify what the reference and the kernels make of it in one frame.
 #include <cutproof/gpu/backends.h>
 #include <cutproof/model/backend.h>
 #include <cutproof/model/setup.h>
@@ -77,7 +77,7 @@ void require(bool holds, const std::string& what) {
 
 void require_all_hold(const Setup& setup, const State& state, const std::string& what) {
   int64_t checked = 0;
-  for (const Verdict& verdict : oracles::judge(setup, state, true)) {
+  for (const Verdict& verdict : oracles::judge(setup, state, true, {&oracles::core_properties()})) {
     require(verdict.holds, what + ": " + verdict.property + ": " + verdict.witness.text);
     checked += verdict.checked;
   }
