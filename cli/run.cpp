@@ -163,8 +163,9 @@ int run(const RunOptions& options) {
     }
   }
   print_summary(result);
+  const std::vector<Verdict> broken = runner.take_broken_contracts();
   if (judge) {
-    for (Verdict& verdict : runner.take_broken_contracts()) judge->add(std::move(verdict));
+    for (const Verdict& verdict : broken) judge->add(verdict);
     judge->finish();
     print_verdicts(*judge);
   }
@@ -195,7 +196,12 @@ int run(const RunOptions& options) {
     fmt::print("wrote {}\n", options.json);
   }
   if (!judge && !against) fmt::print("nothing was judged: add --check for that\n");
-  return (!judge || judge->holds()) && (!against || against->holds()) && (!errors || errors->holds()) ? 0 : 1;
+  if (!judge) {
+    for (const Verdict& verdict : broken) {
+      fmt::print("FAILS: {}: {} in frame {}\n", verdict.property, name_of(verdict.stage), verdict.frame);
+    }
+  }
+  return broken.empty() && (!judge || judge->holds()) && (!against || against->holds()) && (!errors || errors->holds()) ? 0 : 1;
 }
 
 }  // namespace cutproof::cli

@@ -34,10 +34,26 @@ void SceneJudge::finish() {
     if (!holds) verdict.witness.text = text;
     judge_.add(std::move(verdict));
   };
+  // A property that looked at nothing in the whole run has to have said why.
+  struct Looked {
+    int64_t checked = 0;
+    bool excused = false;
+  };
+  std::map<std::string, Looked> properties;
+  for (const Verdict& verdict : judge_.verdicts()) {
+    Looked& looked = properties[verdict.property];
+    looked.checked += verdict.checked;
+    looked.excused = looked.excused || !verdict.vacuous.empty() || !verdict.holds;
+  }
   for (Verdict& verdict : expectations_.verdicts()) judge_.add(std::move(verdict));
   const auto frames = static_cast<double>(setup_.frame_count()), seen = static_cast<double>(judge_.frame());
   whole("the run is whole", seen == frames, seen, frames,
         fmt::format("it ends after frame {} of {}", judge_.frame(), setup_.frame_count()));
+  for (const auto& [property, looked] : properties) {
+    if (looked.checked > 0 || looked.excused) continue;
+    whole("every property looked at something", false, 0, 1,
+          fmt::format("'{}' holds, but it looked at nothing and does not say why", property));
+  }
   const double moments = seen * setup_.body.particle_count();
   whole("something was judged", moments > 0, moments, 1,
         "there was nothing to judge: there are no frames, or the body has no particles");

@@ -155,7 +155,8 @@ TEST_F(WrongRecording, WithAMalformedSnapshotFailsThereAndNowhereElse) {
   const auto judge = recorded.judged();
   EXPECT_THAT(failing(*judge), ElementsAre("well formed"));
   for (const Verdict& verdict : judge->verdicts()) {
-    if (!verdict.holds) EXPECT_EQ(verdict.frame, 1);
+    if (verdict.holds) continue;
+    EXPECT_EQ(verdict.frame, 1);
   }
   int64_t last = 0;
   for (const Verdict& verdict : judge->verdicts()) last = std::max(last, verdict.frame);
