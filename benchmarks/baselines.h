@@ -1,15 +1,15 @@
-// Pieces of `cutproof bench baselines`: what is compared with this method, and how.
+// Other methods of cutting, and how they are compared with this one.
 #pragma once
 #include <cstdint>
 #include <string>
 #include <vector>
 
-#include "benchmarks/report.h"
+#include "benchmarks/times.h"
 #include "harness/errors.h"
 #include "model/backend.h"
 #include "model/scene.h"
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 
 // What becomes of clusters that lost particles, where no stage of a backend does that.
 enum class Deletion {
@@ -45,7 +45,7 @@ void delete_from_clusters(const Setup& setup, Deletion deletion, State& state);
 struct BaselineRow {
   Times frame;  // [s] deletion: of step, detect and skin
   int64_t frames = 0, removed = 0, clusters_before = 0, clusters = 0;
-  TopologyFigures end;
+  cli::TopologyFigures end;
   int64_t isolated = 0;        // the most in one frame
   int64_t unequal_frames = 0;  // in which tissue, coupling and skin do not have the same components
   oracles::CutGeometry geometry;
@@ -53,4 +53,4 @@ struct BaselineRow {
 };
 BaselineRow run_baseline(Backend& backend, const Baseline& baseline, BaselineScene scene);
 
-}  // namespace cutproof::cli
+}  // namespace cutproof::benchmarks

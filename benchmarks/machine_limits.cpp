@@ -2,27 +2,23 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstring>
-#include <memory>
 #include <thread>
 
-#include "benchmarks/suites.h"
 #include "gpu/host/host_launcher.h"
-#include "harness/backends.h"
 #if CUTPROOF_HAS_CUDA
 #include "benchmarks/device_limits.h"
 #endif
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 
 namespace {
 
 constexpr int kRepeats = 7;
 
 // Copies with `threads` threads of the CPU between buffers beyond any cache.
-Floor copy_on_cpu(int threads, int repeats) {
+MachineLimit copy_on_cpu(int threads, int repeats) {
   const std::size_t each = (std::size_t{256} << 20) / static_cast<std::size_t>(threads);
   std::vector<std::vector<char>> from(static_cast<std::size_t>(threads)), to(static_cast<std::size_t>(threads));
   const auto on_all = [&](auto work) {
@@ -54,7 +50,7 @@ CUTPROOF_KERNEL(count_launch_kernel);
 
 // A kernel that does next to nothing, on the host's threads; many in a row, because one is below the clock's
 // resolution.
-Floor launch_on_host(int threads, int blocks, int repeats) {
+MachineLimit launch_on_host(int threads, int blocks, int repeats) {
   constexpr int kLaunches = 200;
   gpu::HostLauncher launcher(gpu::HostLauncher::Threads{threads});
   std::int64_t launches = 0;
@@ -74,100 +70,47 @@ Floor launch_on_host(int threads, int blocks, int repeats) {
 
 }  // namespace
 
-MachineFloors measure_machine(const std::string& backend) {
-  MachineFloors floors;
+MachineLimits measure_machine(const harness::BackendDescriptor& backend) {
+  using harness::Processor;
 #if CUTPROOF_HAS_CUDA
-  if (backend == "gpu") {
+  if (backend.processor == Processor::device) {
     const gpu::Floors measured = gpu::measure_floors();
     return {measured.copy_bytes_per_second, measured.graph_node_seconds, measured.chain_seconds};
   }
 #endif
-  const Floor copy = copy_on_cpu(backend == "reference" ? 1 : cpu_threads(), kRepeats);
-  floors.copy_bytes_per_second = copy.bytes / copy.seconds.median;
-  return floors;
+  const int threads = backend.processor == Processor::one_thread ? 1 : harness::cpu_threads();
+  const MachineLimit copy = copy_on_cpu(threads, kRepeats);
+  return {copy.bytes / copy.seconds.median, {}, {}};
 }
 
-std::vector<Floor> measure_floors(const std::string& backend, int repeats) {
+nlohmann::json to_json(const MachineLimits& machine) {
+  nlohmann::json result = {{"copy_bytes_per_second", machine.copy_bytes_per_second}};
+  if (machine.graph_node_seconds) {
+    result["graph_node_seconds"] = *machine.graph_node_seconds;
+    result["chain_of_40_seconds"] = *machine.chain_seconds;
+  }
+  return result;
+}
+
+std::vector<MachineLimit> measure_machine_limits(const harness::BackendDescriptor& backend, int repeats) {
+  using harness::Processor;
 #if CUTPROOF_HAS_CUDA
-  if (backend == "gpu") {
+  if (backend.processor == Processor::device) {
     const gpu::Floors measured = gpu::measure_floors(repeats);
     return {{"copy, device to device", times_of(measured.copy), measured.copy_bytes, measured.bytes_lost},
             {"graph of 40 empty kernels", times_of(measured.short_chain), 0, {}},
             {"graph of 400 empty kernels", times_of(measured.long_chain), 0, {}}};
   }
 #endif
-  std::vector<Floor> floors = {copy_on_cpu(1, repeats)};
-  if (backend == "host") {
-    if (cpu_threads() > 1) floors.push_back(copy_on_cpu(cpu_threads(), repeats));
+  std::vector<MachineLimit> limits = {copy_on_cpu(1, repeats)};
+  if (backend.processor == Processor::all_threads) {
+    const int threads = harness::cpu_threads();
+    if (threads > 1) limits.push_back(copy_on_cpu(threads, repeats));
     for (const int blocks : {1, gpu::HostLauncher::kMostBlocks}) {
-      floors.push_back(launch_on_host(cpu_threads(), blocks, repeats));
+      limits.push_back(launch_on_host(threads, blocks, repeats));
     }
   }
-  return floors;
+  return limits;
 }
 
-nlohmann::json to_json(const std::vector<Floor>& floors) {
-  nlohmann::json rows = nlohmann::json::array();
-  for (const Floor& floor : floors) {
-    nlohmann::json row = {{"what", floor.what}, {"seconds", to_json(floor.seconds)}, {"lost", nullptr}};
-    if (floor.bytes > 0) {
-      row["bytes"] = floor.bytes;
-      row["bytes_per_second"] = floor.bytes / floor.seconds.median;
-    }
-    if (floor.lost) row["lost"] = *floor.lost;
-    rows.push_back(std::move(row));
-  }
-  return rows;
-}
-
-namespace {
-
-struct FloorsOptions {
-  std::string backend = "reference", json;
-  int repeats = 21;
-};
-
-int bench_machine_limits(const FloorsOptions& options) {
-  require_timed_backend(options.backend);
-  require_writable(options.json);
-  nlohmann::json document = begin_report("floors", options.backend);
-  const std::vector<Floor> floors = measure_floors(options.backend, options.repeats);
-  Table table({"", "median µs", "least", "most", "GB/s", "lost"});
-  for (const Floor& floor : floors) {
-    const auto microseconds = [](double seconds) { return fmt::format("{:.4g}", 1e6 * seconds); };
-    table.add({floor.what, microseconds(floor.seconds.median), microseconds(floor.seconds.min),
-               microseconds(floor.seconds.max),
-               floor.bytes > 0 ? fmt::format("{:.4g}", 1e-9 * floor.bytes / floor.seconds.median) : "-",
-               floor.lost ? fmt::format("{}", *floor.lost) : "-"});
-  }
-  fmt::print("\n{}", table.text());
-  const bool holds =
-      std::all_of(floors.begin(), floors.end(), [](const Floor& floor) { return floor.lost.value_or(0) == 0; });
-  if (!holds) fmt::print("FAILS: something that was timed did not do its work\n");
-  document["repeats"] = options.repeats;
-  document["rows"] = to_json(floors);
-  document["holds"] = holds;
-  document["complete"] = true;
-  write_report(options.json, document);
-  if (!options.json.empty()) fmt::print("\nwrote {}\n", options.json);
-  return holds ? 0 : 1;
-}
-
-}  // namespace
-
-Suite machine_limits_suite() {
-  return {"machine_limits", "what the machine can do at best: copies, launches", [](CLI::App& command) {
-            const auto options = std::make_shared<FloorsOptions>();
-            command.add_option("--backend", options->backend, "whose machine: reference, host or gpu")
-                ->capture_default_str()
-                ->type_name("B");
-            command.add_option("--repeats", options->repeats, "of each timing")
-                ->capture_default_str()
-                ->type_name("N")
-                ->check(CLI::Range(1, 10'000));
-            command.add_option("--json", options->json, "write times")->type_name("F");
-            return [options] { return bench_machine_limits(*options); };
-          }};
-}
-
-}  // namespace cutproof::cli
+}  // namespace cutproof::benchmarks

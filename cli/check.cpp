@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
+#include <memory>
 #include <optional>
 
 #include "cli/commands.h"
+#include "cli/options.h"
 #include "cli/results.h"
 #include "cli/terminal.h"
 #include "harness/judge.h"
@@ -13,6 +15,11 @@
 namespace cutproof::cli {
 
 namespace {
+
+struct CheckOptions {
+  std::string recording;
+  std::string json;
+};
 
 // Which stages a recorded frame shows to have run: those it has snapshots of, and the ones that always run.
 FrameResult frame_of(const State& last, const std::vector<Stage>& seen, const Setup& setup) {
@@ -29,8 +36,6 @@ FrameResult frame_of(const State& last, const std::vector<Stage>& seen, const Se
   frame.triangles = static_cast<int64_t>(last.skin.triangles.size());
   return frame;
 }
-
-}  // namespace
 
 int check(const CheckOptions& options) {
   const io::RecordingReader reader(options.recording);
@@ -77,6 +82,16 @@ int check(const CheckOptions& options) {
     fmt::print("wrote {}\n", options.json);
   }
   return gate.holds() ? 0 : 1;
+}
+
+}  // namespace
+
+void add_check(CLI::App& program, Work& work) {
+  const auto options = std::make_shared<CheckOptions>();
+  CLI::App* const command = program.add_subcommand("check", "judge a recording");
+  command->add_option("recording", options->recording, "what --record was given")->required()->type_name("RECORDING");
+  add_json(*command, options->json, "write verdicts and counts");
+  command->callback([options, &work] { work = [options] { return check(*options); }; });
 }
 
 }  // namespace cutproof::cli

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "cli/json_number.h"
+#include "model/io/json_number.h"
 #include "oracles/oracles.h"
 #include "reference_cpu/reference.h"
 

@@ -7,7 +7,7 @@
 #include <map>
 #include <sstream>
 
-#include "cli/json_number.h"
+#include "model/io/json_number.h"
 #include "model/error.h"
 #include "oracles/oracles.h"
 #include "reference_cpu/reference.h"

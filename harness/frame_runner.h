@@ -2,7 +2,7 @@
 #pragma once
 #include <functional>
 
-#include "cli/results.h"
+#include "harness/frame_result.h"
 #include "model/backend.h"
 
 namespace cutproof::cli {

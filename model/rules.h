@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "model/setup.h"
+#include "model/stage.h"
 
 namespace cutproof {
 
