@@ -18,13 +18,8 @@ std::vector<std::string> split_names(const std::string& wanted) {
 
 Contender make_contender(const harness::BackendDescriptor& backend, const harness::BackendChoice& choice) {
   std::unique_ptr<Backend> instance = harness::make_backend(choice);
-  return {choice.name,
-          name_of(backend.precision),
-          harness::rotation_of(choice),
-          harness::split_of(choice),
-          backend.pipelines,
-          backend.takes_kernel_options,
-          std::move(instance)};
+  return {choice.name,       name_of(backend.precision),   harness::rotation_of(choice), harness::split_of(choice),
+          backend.pipelines, backend.takes_kernel_options, std::move(instance)};
 }
 
 }  // namespace

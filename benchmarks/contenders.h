@@ -10,8 +10,8 @@ namespace cutproof::benchmarks {
 
 struct Contender {
   std::string backend, precision, rotation, split;
-  bool pipelined = false;      // run() does not wait
-  bool runs_kernels = false;   // its step moves what step_traffic counts
+  bool pipelined = false;     // run() does not wait
+  bool runs_kernels = false;  // its step moves what step_traffic counts
   std::unique_ptr<Backend> instance;
 };
 // One for each way of splitting: `split` is blocks, global, both, or empty for the default. Throws InputError, or

@@ -9,8 +9,8 @@
 
 namespace cutproof::benchmarks {
 
-inline constexpr double kCutCubeSpacing = 0.01;        // [m]
-inline constexpr double kCutCubeStiffness = 1e6;       // [1/s²]
+inline constexpr double kCutCubeSpacing = 0.01;         // [m]
+inline constexpr double kCutCubeStiffness = 1e6;        // [1/s²]
 inline constexpr double kCutCubeSubstepLength = 0.004;  // [s]
 
 // A cube at rest that a geometric cut goes through, a spacing a frame, a third of a spacing off a layer of nodes.

@@ -23,14 +23,10 @@ Provenance provenance_of(const std::string& suite, const std::string& backend) {
 }
 
 nlohmann::json begin_document(const Provenance& provenance, bool complete) {
-  nlohmann::json document = {{"format", "cutproof.bench"},
-                             {"format_version", kFormatVersion},
-                             {"suite", provenance.suite},
-                             {"cutproof", CUTPROOF_VERSION},
-                             {"date", provenance.date},
-                             {"backend", provenance.backend},
-                             {"device", provenance.device},
-                             {"complete", complete}};
+  nlohmann::json document = {{"format", "cutproof.bench"},  {"format_version", kFormatVersion},
+                             {"suite", provenance.suite},   {"cutproof", CUTPROOF_VERSION},
+                             {"date", provenance.date},     {"backend", provenance.backend},
+                             {"device", provenance.device}, {"complete", complete}};
   if (!provenance.commit.empty()) document["commit"] = provenance.commit;
   return document;
 }

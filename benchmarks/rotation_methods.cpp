@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <memory>
 
-#include "benchmarks/times.h"
 #include "benchmarks/rotation_kernel.cuh"
+#include "benchmarks/times.h"
 #include "gpu/host/host_launcher.h"
 #include "reference_cpu/reference.h"
 

@@ -129,8 +129,8 @@ SolverError solver_error(Backend& backend, const Setup& setup, const State& stat
   return error;
 }
 
-std::optional<int32_t> least_iterations(Backend& backend, Setup setup, const State& state, const FrameSolution& solution,
-                                        double tolerance, int32_t above, int32_t below) {
+std::optional<int32_t> least_iterations(Backend& backend, Setup setup, const State& state,
+                                        const FrameSolution& solution, double tolerance, int32_t above, int32_t below) {
   for (int32_t iterations = above + 1; iterations <= below; ++iterations) {
     setup.step.iterations = iterations;
     if (solver_error(backend, setup, state, solution).max_h < tolerance) return iterations;

@@ -43,7 +43,7 @@ SolverError solver_error(Backend& backend, const Setup& setup, const State& stat
 
 // The least number of iterations with which the greatest distance is below `tolerance` [h], where `above` are too few
 // and `below` are enough; nullopt if none of those between is.
-std::optional<int32_t> least_iterations(Backend& backend, Setup setup, const State& state, const FrameSolution& solution,
-                                        double tolerance, int32_t above, int32_t below);
+std::optional<int32_t> least_iterations(Backend& backend, Setup setup, const State& state,
+                                        const FrameSolution& solution, double tolerance, int32_t above, int32_t below);
 
 }  // namespace cutproof::benchmarks

@@ -71,7 +71,7 @@ for part in $parts; do
       done ;;
     timings)
       try rotations cutproof bench rotations --backend gpu --cases --json "$results/rotations.json"
-      try floors cutproof bench floors --backend gpu --json "$results/floors.json"
+      try machine_limits cutproof bench machine_limits --backend gpu --json "$results/machine_limits.json"
       try stages cutproof bench stages --backend gpu --split both --json "$results/stages.json"
       try sizes cutproof bench stages --backend gpu --split both --sizes 1000,101096,1000000,10000000 \
         --json "$results/stages_sizes.json"

@@ -72,8 +72,8 @@ CampaignOptions campaign_options(const FuzzOptions& options) {
   campaign.dynamics = options.dynamics;
   campaign.batch = options.batch > 0 ? options.batch : backend.bodies_in_a_load;
   campaign.threads = options.threads > 0 ? options.threads : harness::cpu_threads();
-  campaign.backends = backend.most_parallel_loads > 0 ? std::min(campaign.threads, backend.most_parallel_loads)
-                                                      : campaign.threads;
+  campaign.backends =
+      backend.most_parallel_loads > 0 ? std::min(campaign.threads, backend.most_parallel_loads) : campaign.threads;
   campaign.keep_going = options.keep_going;
   if (!options.shard.empty()) {
     const std::string remedy = "give i/N with i from 1 to N, such as 2/8";
@@ -199,13 +199,17 @@ int fuzz(const FuzzOptions& options) {
 
 void add_fuzz(CLI::App& program, Work& work) {
   const auto options = std::make_shared<FuzzOptions>();
-  CLI::App* const command = program.add_subcommand("fuzz", "random dissections until one is wrong, and that one simplified");
+  CLI::App* const command =
+      program.add_subcommand("fuzz", "random dissections until one is wrong, and that one simplified");
   add_backend(*command, options->backend, "backend under test");
   command->add_option("--cases", options->cases, "how many (default: 1000)")
       ->type_name("N")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--seconds", options->seconds, "for how long")->type_name("S")->check(CLI::NonNegativeNumber);
-  command->add_option("--seed", options->seed, "what cases are drawn from")->capture_default_str()->type_name("N");
+  command->add_option("--seed", options->seed, "what cases are drawn from")
+      ->capture_default_str()
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber);
   command->add_option("--sizes", options->sizes, "least and greatest size of a case, within 0-110")
       ->capture_default_str()
       ->type_name("A-B");

@@ -43,7 +43,8 @@ void add_backend(CLI::App& command, harness::BackendChoice& choice, const std::s
       ->type_name("S");
   command.add_option("--schedule-seed", choice.seed, scheduled + ": what random and pct are drawn from")
       ->capture_default_str()
-      ->type_name("N");
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber);  // a negative one would wrap around
 }
 
 bool is_timed(const harness::BackendDescriptor& backend) { return backend.is_timed; }

@@ -50,8 +50,8 @@ int replay(const ReplayOptions& options) {
       is_history ? history_alone(make, c, counterexample.commands) : dissect_alone(make, c, true);
   if (!options.record.empty()) {
     const std::string problem = record_case(options.record, make(), c);
-    fmt::print("{}\n", problem.empty() ? "recorded " + io::recording_paths(options.record).index
-                                       : "not recorded: " + problem);
+    fmt::print("{}\n",
+               problem.empty() ? "recorded " + io::recording_paths(options.record).index : "not recorded: " + problem);
   }
   if (judgement.failure) {
     fmt::print("FAILS: {}\n", describe(*judgement.failure));

@@ -46,7 +46,7 @@ void settle_files(Asked& asked) {
 }
 
 void print_beginning(const TuneResult& result) {
-  fmt::print("tune on {}, {}, {}\n", result.provenance.backend, result.provenance.device, result.provenance.date);
+  fmt::print("{} on {}, {}\n", result.provenance.backend, result.provenance.device, result.provenance.date);
   fmt::print("scene {}: {}\n", result.given.scene.name, result.given.scene.description);
   if (result.skin_is_expected) fmt::print("--without-skin does nothing: the scene expects shells of its skin\n");
 }
@@ -189,7 +189,8 @@ void add_tune(CLI::App& program, Work& work) {
       ->required()
       ->type_name("SCENE");
   command
-      ->add_option("--tolerance", options.tolerance, "greatest RMS distance from the reference solution in any frame [h]")
+      ->add_option("--tolerance", options.tolerance,
+                   "greatest RMS distance from the reference solution in any frame [h]")
       ->required()
       ->type_name("T")
       ->check(CLI::PositiveNumber);

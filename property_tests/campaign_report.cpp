@@ -33,10 +33,10 @@ void add_shard(json& whole, const json& part, const std::string& file, const std
   for (const char* field : {"version", "backend", "split", "seed", "sizes", "dynamics", "shards", "cases_asked",
                             "seconds_asked", "commit"}) {
     if (part.value(field, json()) == whole.value(field, json())) continue;
-    throw InputError(file, field,
-                     fmt::format("{} here, {} in {}", part.value(field, json()).dump(),
-                                 whole.value(field, json()).dump(), first),
-                     kRemedy);
+    throw InputError(
+        file, field,
+        fmt::format("{} here, {} in {}", part.value(field, json()).dump(), whole.value(field, json()).dump(), first),
+        kRemedy);
   }
   const double particles =
       whole.at("mean_particles").get<double>() * static_cast<double>(whole.at("cases").get<int64_t>()) +
@@ -80,8 +80,8 @@ json violation_json(const Violation& violation, const std::string& file) {
           {"file", file}};
 }
 
-json campaign_document(const harness::BackendChoice& backend, const CampaignOptions& options,
-                       const Campaign& campaign, const json& violations) {
+json campaign_document(const harness::BackendChoice& backend, const CampaignOptions& options, const Campaign& campaign,
+                       const json& violations) {
   const harness::BackendDescriptor& described = harness::described_backend(backend.name);
   json happened = json::object();
   for (std::size_t h = 0; h < kHappenedCount; ++h) happened[kHappenedNames[h]] = campaign.happened[h];
@@ -179,9 +179,8 @@ CampaignConclusion conclude(const json& document, bool whole) {
     const json& compared = document.at("steps_compared");
     const double either = compared.at("either").get<double>(), measured = compared.at("particles").get<double>();
     if (!(either <= kMostEither * (either + measured)) || measured == 0) {
-      return {fmt::format(
-          "{:.0f} positions after a step were either way and {:.0f} compared, so too little was tested", either,
-          measured)};
+      return {fmt::format("{:.0f} positions after a step were either way and {:.0f} compared, so too little was tested",
+                          either, measured)};
     }
   }
   return {};

@@ -28,7 +28,8 @@ int32_t enough_iterations(const Scene& scene, int32_t substeps) {
 
 }  // namespace
 
-ReferenceSolution::ReferenceSolution(ReferenceKind kind, const Scene& scene, std::string source, std::optional<int64_t> frames, double known)
+ReferenceSolution::ReferenceSolution(ReferenceKind kind, const Scene& scene, std::string source,
+                                     std::optional<int64_t> frames, double known)
     : kind_(kind), scene_(scene), source_(std::move(source)), frames_(frames) {
   scene_.skin.wanted = false;  // nothing moves with it
   scene_.step.acceleration = Acceleration::none;
@@ -69,7 +70,7 @@ Trajectory ReferenceSolution::run(const RefinementLevel& level) const {
   trajectory.stroke_end = prepared.stroke_end();
   prepared.run(*reference, [&](double) {
     trajectory.frames.push_back(oracles::pose_of(prepared.setup(), reference->snapshot().front(),
-                                             trajectory.frames.empty() ? nullptr : &trajectory.frames.back()));
+                                                 trajectory.frames.empty() ? nullptr : &trajectory.frames.back()));
     return true;
   });
   return trajectory;
@@ -80,8 +81,8 @@ void ReferenceSolution::take(RefinementLevel level, Trajectory trajectory) {
   for (std::size_t f = 0; f < std::min(trajectory.frames.size(), trajectory_.frames.size()); ++f) {
     apart = std::max(apart, oracles::poses_apart(setup_, trajectory.frames[f], trajectory_.frames[f]).position.rms());
   }
-  // Refinement levels between which the tissue falls into other parts, or whose blades arrive in other frames, say nothing about
-  // where anything is.
+  // Refinement levels between which the tissue falls into other parts, or whose blades arrive in other frames, say
+  // nothing about where anything is.
   if (!difference_in_parts(trajectory, trajectory_).empty() || trajectory.frames.size() != trajectory_.frames.size())
     apart = std::numeric_limits<double>::infinity();
   level.apart_h = apart;

@@ -27,7 +27,8 @@ class ReferenceSolution {
  public:
   // Refines, a factor of 2 at a time, until two levels are apart by at most `known` [h], or no further level is allowed
   // (kMostSubsteps, kMostIterations). The scene must have the implicit solver.
-  ReferenceSolution(ReferenceKind kind, const Scene& scene, std::string source, std::optional<int64_t> frames, double known);
+  ReferenceSolution(ReferenceKind kind, const Scene& scene, std::string source, std::optional<int64_t> frames,
+                    double known);
 
   const Trajectory& trajectory() const { return trajectory_; }
   const std::vector<RefinementLevel>& levels() const { return levels_; }

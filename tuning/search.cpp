@@ -53,8 +53,8 @@ class Searcher {
       }
       below = iterations;
       const Trial& trial = trials_[now];
-      const bool whatever_the_iterations =
-          trial.outcome == Outcome::more_expensive || trial.outcome == Outcome::schedule || trial.outcome == Outcome::refused;
+      const bool whatever_the_iterations = trial.outcome == Outcome::more_expensive ||
+                                           trial.outcome == Outcome::schedule || trial.outcome == Outcome::refused;
       if (whatever_the_iterations || iterations >= most) return std::nullopt;
       if (before && !helps(trials_[*before], trial)) return std::nullopt;
       before = now;

@@ -28,8 +28,9 @@ const std::vector<std::string>& sound_rotations() {
 
 // Whatever is wrong with the choice of a backend, or with the scene, is found out here.
 Measuring prepare(const TuneOptions& options) {
-  Measuring measuring{options.scene,     options.backend,   {io::read_scene(options.scene), ""}, options.frames,
-                      options.tolerance, options.full,      options.repeats};
+  Measuring measuring{options.scene,  options.backend,   {io::read_scene(options.scene), ""},
+                      options.frames, options.tolerance, options.full,
+                      options.repeats};
   const Scene& scene = measuring.given.scene;
   if (scene.step.solver != Solver::implicit) {
     throw InputError(options.scene, "step.solver",
@@ -180,8 +181,8 @@ TuneResult run_tune(const TuneOptions& options, const TuneProgress& progress) {
 
   reference.refine();
   note_reference();
-  std::optional<TuneResult::Found> found = take_cheapest(
-      measuring, reference, result.trials, options.write, [&](std::size_t trial, const std::string& why) {
+  std::optional<TuneResult::Found> found =
+      take_cheapest(measuring, reference, result.trials, options.write, [&](std::size_t trial, const std::string& why) {
         result.not_taken.push_back({trial, why});
         progress(result, TuneStep::not_taken);
       });

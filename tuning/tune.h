@@ -49,12 +49,12 @@ struct TuneResult {
   benchmarks::Provenance provenance;
   TuneOptions options;
   Configuration given;
-  bool skin_is_expected = false;         // so it is made, though nobody looks at it
-  std::vector<RefinementLevel> levels;   // of the reference solution; the last is what is verified against
-  std::size_t searched_level = 0;        // from which trials are measured
-  double known_to_h = 0;                 // by how much the reference solution may be off
-  std::vector<Trial> trials;             // in the order in which they were tried, the first as given
-  std::vector<NotTaken> not_taken;       // cheaper, but they do not hold
+  bool skin_is_expected = false;        // so it is made, though nobody looks at it
+  std::vector<RefinementLevel> levels;  // of the reference solution; the last is what is verified against
+  std::size_t searched_level = 0;       // from which trials are measured
+  double known_to_h = 0;                // by how much the reference solution may be off
+  std::vector<Trial> trials;            // in the order in which they were tried, the first as given
+  std::vector<NotTaken> not_taken;      // cheaper, but they do not hold
   std::optional<Found> found;
   std::optional<Conclusion> conclusion;  // absent before the end
 };

@@ -107,15 +107,14 @@ json to_json(const FactorsResult& result) {
   for (const FactorsScene& scene : result.scenes) {
     json rows = json::array();
     for (const FactorsRow& row : scene.rows) rows.push_back(row_json(row));
-    document["scenes"].push_back({{"scene", scene.scene},
-                                  {"particles", scene.particles},
-                                  {"clusters", scene.clusters},
-                                  {"memberships", scene.memberships},
-                                  {"rows", rows},
-                                  {"converged_substep",
-                                   {{"seconds", scene.substep_seconds},
-                                    {"alternations", scene.alternations},
-                                    {"converged", scene.converged}}}});
+    document["scenes"].push_back(
+        {{"scene", scene.scene},
+         {"particles", scene.particles},
+         {"clusters", scene.clusters},
+         {"memberships", scene.memberships},
+         {"rows", rows},
+         {"converged_substep",
+          {{"seconds", scene.substep_seconds}, {"alternations", scene.alternations}, {"converged", scene.converged}}}});
   }
   return document;
 }

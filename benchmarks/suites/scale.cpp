@@ -57,8 +57,7 @@ ScaleResult run_scale(const ScaleOptions& options, const Progress<ScaleResult>& 
       Measured measured = measure(contender, scene, result.frames, options.repeats);
       const std::optional<int64_t> after = bytes_in_use(options.described());
       ScaleRow row{scene_row(scene, contender, std::move(measured)), 0, {}};
-      row.particles_per_second =
-          static_cast<double>(row.scene.particles) / row.scene.measured.timings.frame.median;
+      row.particles_per_second = static_cast<double>(row.scene.particles) / row.scene.measured.timings.frame.median;
       if (before && after && *after > *before) row.bytes = *after - *before;
       result.rows.push_back(std::move(row));
       result.complete = k + 1 == sizes.size() && &contender == &contenders.back();

@@ -72,15 +72,10 @@ SolverCurve measure_curve(Backend& backend, const SolverOptions& options, Setup 
 }
 
 json entry_json(const SolverEntry& entry) {
-  json result = {{"scene", entry.scene},
-                 {"particles", entry.particles},
-                 {"clusters", entry.clusters},
-                 {"stiffness", entry.stiffness},
-                 {"substeps", entry.substeps},
-                 {"substep_seconds", entry.substep_seconds},
-                 {"converged", entry.converged},
-                 {"rows", json::array()},
-                 {"to_tolerance", json::array()}};
+  json result = {
+      {"scene", entry.scene},         {"particles", entry.particles}, {"clusters", entry.clusters},
+      {"stiffness", entry.stiffness}, {"substeps", entry.substeps},   {"substep_seconds", entry.substep_seconds},
+      {"converged", entry.converged}, {"rows", json::array()},        {"to_tolerance", json::array()}};
   for (const SolverCurve& curve : entry.curves) {
     for (const auto& [iterations, row] : curve.rows) {
       const SolverError& error = row.error;
@@ -134,8 +129,8 @@ SolverResult run_solver(const SolverOptions& options, const Progress<SolverResul
         Setup setup = with_substeps(scene, substeps);
         setup.step.stiffness = stiffness;
         const FrameSolution solution = converged_frame(setup, scene.state);
-        SolverEntry entry{scene.name, setup.body.particle_count(), scene.state.clusters.count(), stiffness, substeps,
-                          setup.substep_length[0], solution.converged, {}};
+        SolverEntry entry{scene.name, setup.body.particle_count(), scene.state.clusters.count(), stiffness,
+                          substeps,   setup.substep_length[0],     solution.converged,           {}};
         for (const Acceleration acceleration : kAccelerations) {
           setup.step.acceleration = acceleration;
           entry.curves.push_back(measure_curve(*backend, options, setup, scene.state, solution));

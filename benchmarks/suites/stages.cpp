@@ -77,9 +77,9 @@ StagesScene stages_scene(const BenchScene& scene, const Contender& contender, Me
 }
 
 json to_json(const StepLimit& limit) {
-  json result = {{"bytes", limit.traffic.bytes},  {"launches", limit.traffic.launches},
+  json result = {{"bytes", limit.traffic.bytes},         {"launches", limit.traffic.launches},
                  {"bytes_seconds", limit.bytes_seconds}, {"seconds", limit.seconds},
-                 {"multiple", limit.multiple},    {"multiple_of_bytes", limit.multiple_of_bytes}};
+                 {"multiple", limit.multiple},           {"multiple_of_bytes", limit.multiple_of_bytes}};
   if (limit.launch_seconds) result["launch_seconds"] = *limit.launch_seconds;
   return result;
 }
@@ -190,8 +190,8 @@ StagesResult run_stages(const StagesOptions& options, const Progress<StagesResul
   for (std::size_t k = 0; k < scenes.size(); ++k) {
     const BenchScene scene = scenes[k]();
     for (const Contender& contender : contenders) {
-      result.scenes.push_back(stages_scene(scene, contender, measure(contender, scene, result.frames, result.repeats),
-                                           result.machine));
+      result.scenes.push_back(
+          stages_scene(scene, contender, measure(contender, scene, result.frames, result.repeats), result.machine));
       result.complete = k + 1 == scenes.size() && &contender == &contenders.back();
       progress(result);
     }

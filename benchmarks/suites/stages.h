@@ -25,9 +25,9 @@ struct StagesOptions : TimingOptions {
 // The step beside what the machine can do at best.
 struct StepLimit {
   StepTraffic traffic;
-  double bytes_seconds = 0;              // bytes / copy bandwidth
-  std::optional<double> launch_seconds;  // launches × graph node; device only
-  double seconds = 0;                    // the greater of the two
+  double bytes_seconds = 0;                    // bytes / copy bandwidth
+  std::optional<double> launch_seconds;        // launches × graph node; device only
+  double seconds = 0;                          // the greater of the two
   double multiple = 0, multiple_of_bytes = 0;  // median of the step over `seconds` and over `bytes_seconds`
 };
 

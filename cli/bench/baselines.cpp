@@ -48,7 +48,10 @@ void add_baselines(CLI::App& bench, Work& work) {
       ->capture_default_str()
       ->type_name("N")
       ->check(CLI::Range(int64_t{100}, int64_t{2'000'000}));
-  command->add_option("--seed", asked->seed, "of the clusters")->capture_default_str()->type_name("N");
+  command->add_option("--seed", asked->seed, "of the clusters")
+      ->capture_default_str()
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber);
   add_json(*command, asked->json, "write times and errors");
   command->callback([asked, &work] { work = [asked] { return baselines(*asked); }; });
 }

@@ -53,7 +53,10 @@ void add_factors(CLI::App& bench, Work& work) {
       ->capture_default_str()
       ->type_name("N")
       ->check(CLI::Range(1, 1000));
-  command->add_option("--seed", asked->seed, "of right-hand sides and velocities")->capture_default_str();
+  command->add_option("--seed", asked->seed, "of right-hand sides and velocities")
+      ->capture_default_str()
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber);
   add_json(*command, asked->json, "write every row");
   command->callback([asked, &work] { work = [asked] { return factors(*asked); }; });
 }

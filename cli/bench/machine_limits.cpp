@@ -14,8 +14,7 @@ void print_table(const MachineLimitsResult& result) {
   Table table({"", "median µs", "least", "most", "GB/s", "lost"});
   const auto microseconds = [](double seconds) { return fmt::format("{:.4g}", 1e6 * seconds); };
   for (const MachineLimit& row : result.rows) {
-    table.add({row.what, microseconds(row.seconds.median), microseconds(row.seconds.min),
-               microseconds(row.seconds.max),
+    table.add({row.what, microseconds(row.seconds.median), microseconds(row.seconds.min), microseconds(row.seconds.max),
                row.bytes > 0 ? fmt::format("{:.4g}", 1e-9 * row.bytes / row.seconds.median) : "-",
                row.lost ? fmt::format("{}", *row.lost) : "-"});
   }
@@ -35,8 +34,7 @@ int machine_limits(const Asked<MachineLimitsOptions>& asked) {
 
 void add_machine_limits(CLI::App& bench, Work& work) {
   const auto asked = std::make_shared<Asked<MachineLimitsOptions>>();
-  CLI::App* const command =
-      bench.add_subcommand("machine_limits", "what the machine can do at best: copies, launches");
+  CLI::App* const command = bench.add_subcommand("machine_limits", "what the machine can do at best: copies, launches");
   add_backend_name(*command, asked->backend, "whose machine", is_timed);
   command->add_option("--repeats", asked->repeats, "of each timing")
       ->capture_default_str()

@@ -7,11 +7,11 @@ namespace cutproof::cli {
 
 namespace {
 
+using benchmarks::RotationCaseResult;
 using benchmarks::RotationReport;
 using benchmarks::RotationResult;
 using benchmarks::RotationsOptions;
 using benchmarks::RotationsResult;
-using benchmarks::RotationCaseResult;
 using fixtures::Precision;
 
 struct AskedRotations : Asked<RotationsOptions> {
@@ -93,8 +93,8 @@ int rotations(const AskedRotations& asked) {
     if (!progress) progress.emplace("case", static_cast<int64_t>(fixtures::hard_cases().size()));
     progress->show(cases_begun, what);
   };
-  const RotationsResult result = benchmarks::run_rotations(
-      asked, reporting<RotationsResult>(asked.json, print_begin, kNothing), show);
+  const RotationsResult result =
+      benchmarks::run_rotations(asked, reporting<RotationsResult>(asked.json, print_begin, kNothing), show);
   progress.reset();
   if (asked.cases) {
     for (const Precision precision : {Precision::single, Precision::twice}) print_cases(result.report, precision);
@@ -115,9 +115,7 @@ void add_rotations(CLI::App& bench, Work& work) {
       ->capture_default_str()
       ->type_name("N")
       ->check(CLI::Range(1, 10'000'000));
-  command
-      ->add_option("--timed", asked->timed,
-                   "matrices that are timed together (default: 20000; on a device 1000000)")
+  command->add_option("--timed", asked->timed, "matrices that are timed together (default: 20000; on a device 1000000)")
       ->type_name("N")
       ->check(CLI::Range(1, 100'000'000));
   command->add_option("--repeats", asked->counts.repeats, "of each timing, after one that does not count")

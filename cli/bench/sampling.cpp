@@ -18,12 +18,12 @@ void print_table(const SamplingResult& result) {
                       {"to first", "paper ms", "to first"},
                       scene_error_names()}));
   for (const SamplingRow& row : result.rows) {
-    table.add(joined({scene_counts(row.scene),
-                      {result.scaled_down == 1 ? fmt::format("{}", row.paper.clusters) : "-"},
-                      scene_times(row.scene),
-                      {percent(row.frame_to_first), fmt::format("{:.2f}", row.paper.frame_ms),
-                       percent(row.paper_frame_to_first)},
-                      scene_errors(row.scene)}));
+    table.add(joined(
+        {scene_counts(row.scene),
+         {result.scaled_down == 1 ? fmt::format("{}", row.paper.clusters) : "-"},
+         scene_times(row.scene),
+         {percent(row.frame_to_first), fmt::format("{:.2f}", row.paper.frame_ms), percent(row.paper_frame_to_first)},
+         scene_errors(row.scene)}));
   }
   fmt::print("\n{}", table.text());
   if (result.scaled_down > 1) {

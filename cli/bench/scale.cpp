@@ -17,12 +17,12 @@ void print_table(const ScaleResult& result) {
                       scene_error_names()}));
   for (const ScaleRow& row : result.rows) {
     const auto bytes = static_cast<double>(row.bytes.value_or(0)), particles = static_cast<double>(row.scene.particles);
-    table.add(joined({scene_counts(row.scene),
-                      scene_times(row.scene),
-                      {fmt::format("{:.4g}", 1e-6 * row.particles_per_second),
-                       row.bytes ? fmt::format("{:.4g}", 1e-6 * bytes) : "-",
-                       row.bytes ? fmt::format("{:.0f}", bytes / particles) : "-"},
-                      scene_errors(row.scene)}));
+    table.add(joined(
+        {scene_counts(row.scene),
+         scene_times(row.scene),
+         {fmt::format("{:.4g}", 1e-6 * row.particles_per_second), row.bytes ? fmt::format("{:.4g}", 1e-6 * bytes) : "-",
+          row.bytes ? fmt::format("{:.0f}", bytes / particles) : "-"},
+         scene_errors(row.scene)}));
   }
   fmt::print("\n{}", table.text());
 }

@@ -38,8 +38,7 @@ void print_entry(const SolverResult& so_far) {
 
 int solver(const Asked<SolverOptions>& asked) {
   require_writable(asked.json);
-  const SolverResult result =
-      benchmarks::run_solver(asked, reporting<SolverResult>(asked.json, kNothing, print_entry));
+  const SolverResult result = benchmarks::run_solver(asked, reporting<SolverResult>(asked.json, kNothing, print_entry));
   return conclude_suite(asked.json, result.scenes.size(), true);
 }
 

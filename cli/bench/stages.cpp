@@ -41,8 +41,7 @@ void print_limit(const StepLimit& limit) {
   fmt::print("  limit of step: {:.4g} MB at the copy's bandwidth {:.4f} ms", 1e-6 * limit.traffic.bytes,
              1e3 * limit.bytes_seconds);
   if (limit.launch_seconds) fmt::print(", {} launches {:.4f} ms", limit.traffic.launches, 1e3 * *limit.launch_seconds);
-  fmt::print("; step takes {:.2f} × its limit ({:.2f} × bytes / bandwidth)\n", limit.multiple,
-             limit.multiple_of_bytes);
+  fmt::print("; step takes {:.2f} × its limit ({:.2f} × bytes / bandwidth)\n", limit.multiple, limit.multiple_of_bytes);
 }
 
 void print_row(const StagesResult& so_far) {
@@ -112,8 +111,7 @@ void add_stages(CLI::App& bench, Work& work) {
   CLI::App* const command = bench.add_subcommand(
       "stages", "whole frames and each stage, a blade cutting: Table 1, or boxes and kidneys of given sizes");
   add_timing(*command, *asked);
-  command
-      ->add_option("--scenes", asked->scenes, "of Table 1, and the irregular path of Fig. 13, separated by commas")
+  command->add_option("--scenes", asked->scenes, "of Table 1, and the irregular path of Fig. 13, separated by commas")
       ->capture_default_str()
       ->delimiter(',')
       ->type_name("S,S...");
@@ -123,8 +121,7 @@ void add_stages(CLI::App& bench, Work& work) {
       ->type_name("C,C...");
   command->add_flag("--full", asked->full, "the scenes at the paper's size, as always on a device");
   command
-      ->add_option("--sizes", asked->sizes,
-                   "instead of the scenes: bodies with so many particles, separated by commas")
+      ->add_option("--sizes", asked->sizes, "instead of the scenes: bodies with so many particles, separated by commas")
       ->delimiter(',')
       ->type_name("N,N...");
   add_json(*command, asked->json, "write times and errors");

@@ -8,12 +8,11 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "benchmarks/suites.h"
 #include "oracles/oracles.h"
 #include "tests/cli/program.h"
 #include "tests/oracles/states.h"
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 namespace {
 
 using cutproof::testing::Lists;
@@ -39,7 +38,7 @@ TEST(Deletion, OfParticlesLeavesClustersWhole) {
   EXPECT_EQ(row.state.clusters.rotation[2](0, 1), -1);
   const Verdict connected = oracles::cluster_connectivity(row.setup, row.state);
   EXPECT_FALSE(connected.holds) << "it couples what is cut apart";
-  const TopologyFigures figures = topology_of(row.setup, row.state);
+  const cutproof::cli::TopologyFigures figures = cutproof::cli::topology_of(row.setup, row.state);
   EXPECT_EQ(figures.components, 2);
   EXPECT_EQ(figures.couplings, 1);
   EXPECT_FALSE(figures.equal);
@@ -126,4 +125,4 @@ TEST_F(BenchBaselines, RefusesBadUsage) {
 }
 
 }  // namespace
-}  // namespace cutproof::cli
+}  // namespace cutproof::benchmarks

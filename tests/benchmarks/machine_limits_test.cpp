@@ -1,6 +1,4 @@
-// `cutproof bench floors`: what is timed has to have happened. What the times are is not tested.
-#include "benchmarks/machine_limits.h"
-
+// `cutproof bench machine_limits`: what is timed has to have happened. What the times are is not tested.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -14,14 +12,14 @@ namespace {
 
 using nlohmann::json;
 
-class BenchFloors : public Program {};
+class BenchMachineLimits : public Program {};
 
-TEST_F(BenchFloors, TellsEveryFloorWithWhatWasLost) {
+TEST_F(BenchMachineLimits, HasEveryLimitWithWhatWasLost) {
   for (const std::string backend : {"reference", "host"}) {
-    const Outcome outcome = cutproof("bench floors --repeats 3 --json out.json --backend " + backend);
+    const Outcome outcome = cutproof("bench machine_limits --repeats 3 --json out.json --backend " + backend);
     ASSERT_EQ(outcome.status, 0) << outcome.output;
     const json document = json::parse(read("out.json"));
-    EXPECT_EQ(document.at("suite"), "floors");
+    EXPECT_EQ(document.at("suite"), "machine_limits");
     EXPECT_EQ(document.at("backend"), backend);
     EXPECT_EQ(document.at("repeats"), 3);
     EXPECT_TRUE(document.at("complete"));
@@ -38,7 +36,7 @@ TEST_F(BenchFloors, TellsEveryFloorWithWhatWasLost) {
     }
     if (backend == "host") {
       wanted.insert({"launch of 1 block", "launch of 64 blocks"});
-      if (const int threads = cutproof::cli::cpu_threads(); threads > 1) {
+      if (const int threads = cutproof::harness::cpu_threads(); threads > 1) {
         wanted.insert("copy, " + std::to_string(threads) + " threads");
       }
     }
@@ -46,21 +44,11 @@ TEST_F(BenchFloors, TellsEveryFloorWithWhatWasLost) {
   }
 }
 
-TEST_F(BenchFloors, RefusesBadUsage) {
-  expect_refused("bench floors --backend nobody", {"nobody"});
-  expect_refused("bench floors --backend gpu-eager", {"finding faults"});
-  expect_refused("bench floors --repeats 0", {"repeats"});
-  expect_refused("bench floors --json nowhere/out.json", {"nowhere"});
-}
-
-TEST(Table, HasColumnsAsWideAsWhatStandsInThem) {
-  cutproof::cli::Table table({"", "‖RᵀR‖", "ms"});
-  table.add({"jacobi4", "1", "10.25"});
-  table.add({"x", "1234567", ""});
-  EXPECT_EQ(table.text(),
-            "             ‖RᵀR‖     ms\n"
-            "  jacobi4        1  10.25\n"
-            "  x        1234567\n");
+TEST_F(BenchMachineLimits, RefusesBadUsage) {
+  expect_refused("bench machine_limits --backend nobody", {"nobody"});
+  expect_refused("bench machine_limits --backend gpu-eager", {"finding faults"});
+  expect_refused("bench machine_limits --repeats 0", {"repeats"});
+  expect_refused("bench machine_limits --json nowhere/out.json", {"nowhere"});
 }
 
 }  // namespace
