@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Plants faults into a copy of the code and asks the gate to find each of them (ci/mutation_testing/run.py).
+# Mutation testing: applies mutants to a copy of the code and asks the gate to find each (ci/mutation_testing/run.py).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 ci/install.sh

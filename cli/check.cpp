@@ -7,7 +7,8 @@
 #include "cli/options.h"
 #include "cli/results.h"
 #include "cli/terminal.h"
-#include "harness/judge.h"
+#include "harness/recorded_run.h"
+#include "harness/scene_judge.h"
 #include "model/io/atomic_file.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
@@ -21,22 +22,6 @@ struct CheckOptions {
   std::string json;
 };
 
-// Which stages a recorded frame shows to have run: those it has snapshots of, and the ones that always run.
-FrameResult frame_of(const State& last, const std::vector<Stage>& seen, const Setup& setup) {
-  FrameResult frame;
-  frame.frame = last.frame - 1;
-  for (const Stage stage : seen) frame.ran[static_cast<std::size_t>(stage)] = true;
-  frame.ran[static_cast<std::size_t>(Stage::step)] = true;
-  frame.ran[static_cast<std::size_t>(Stage::detect)] = needs_detection(setup);
-  frame.ran[static_cast<std::size_t>(Stage::skin)] = setup.skin.wanted;
-  frame.removed = static_cast<int64_t>(last.removed.size());
-  frame.debris = static_cast<int64_t>(last.debris.size());
-  for (const uint8_t alive : last.alive) frame.alive += alive;
-  frame.clusters = last.clusters.count();
-  frame.triangles = static_cast<int64_t>(last.skin.triangles.size());
-  return frame;
-}
-
 int check(const CheckOptions& options) {
   const io::RecordingReader reader(options.recording);
   const io::Recording& recording = reader.header();
@@ -45,11 +30,11 @@ int check(const CheckOptions& options) {
   std::optional<io::AtomicFile> json_file;
   if (!options.json.empty()) json_file.emplace(options.json);
 
-  const State initial = reader.snapshot(0).state;
+  const auto initial = std::make_shared<const State>(reader.snapshot(0).state);
   fmt::print("recording {}: scene {}, backend {}, {} snapshots of {} particles\n", options.recording,
              scene.name.empty() ? "(none)" : scene.name, recording.backend, recording.snapshot_count,
              recording.setup.body.particle_count());
-  Gate gate(recording.setup, scene.expect, recording.backend, initial);
+  harness::SceneJudge judge(recording.setup, scene.expect, recording.backend, initial);
   RunResult result{"check",
                    options.recording,
                    scene.name,
@@ -58,30 +43,27 @@ int check(const CheckOptions& options) {
                    recording.setup.body.name,
                    recording.setup.body.grid.spacing,
                    recording.setup.body.particle_count(),
-                   initial.clusters.count(),
+                   initial->clusters.count(),
                    false,
                    {}};
   {
     Progress progress("frame", recording.setup.frame_count());
-    std::vector<Stage> seen;
-    for (int64_t index = 1; index < recording.snapshot_count; ++index) {
-      const io::Snapshot snapshot = reader.snapshot(index);
-      gate.see(snapshot.stage, snapshot.state);
-      seen.push_back(snapshot.stage);
-      if (snapshot.stage != Stage::skin) continue;
-      result.frames.push_back(frame_of(snapshot.state, seen, recording.setup));
-      seen.clear();
-      progress.show(snapshot.state.frame, "judging");
-    }
+    const auto wrong = harness::walk_recording(
+        reader, initial, [&](const harness::Moment& moment) { judge.see(moment); },
+        [&](const harness::FrameResult& frame) {
+          result.frames.push_back(frame);
+          progress.show(frame.frame + 1, "judging");
+        });
+    for (const Verdict& verdict : wrong) judge.add(verdict);
   }
-  gate.finish();
-  print_verdicts(gate);
+  judge.finish();
+  print_verdicts(judge);
   if (json_file) {
-    io::write_text(json_file->temporary(), to_json(result, &gate).dump(1) + "\n");
+    io::write_text(json_file->temporary(), to_json(result, &judge).dump(1) + "\n");
     json_file->commit();
     fmt::print("wrote {}\n", options.json);
   }
-  return gate.holds() ? 0 : 1;
+  return judge.holds() ? 0 : 1;
 }
 
 }  // namespace

@@ -8,7 +8,7 @@ namespace cutproof::cli {
 
 namespace {
 
-nlohmann::json to_json(const FrameResult& frame, bool timed) {
+nlohmann::json to_json(const harness::FrameResult& frame, bool timed) {
   nlohmann::json stages = nlohmann::json::array();
   nlohmann::json seconds = nlohmann::json::object();
   for (const Stage stage : kStages) {
@@ -29,7 +29,7 @@ nlohmann::json to_json(const FrameResult& frame, bool timed) {
 
 }  // namespace
 
-nlohmann::json to_json(const RunResult& result, const Gate* gate) {
+nlohmann::json to_json(const RunResult& result, const harness::SceneJudge* judge) {
   nlohmann::json document = {{"format", "cutproof." + result.command},
                              {"format_version", 1},
                              {"cutproof", kVersion},
@@ -43,20 +43,21 @@ nlohmann::json to_json(const RunResult& result, const Gate* gate) {
                                {"particles", result.particles},
                                {"clusters", result.clusters_at_start}}}};
   document["frames"] = nlohmann::json::array();
-  for (const FrameResult& frame : result.frames) document["frames"].push_back(to_json(frame, result.timed));
-  document["checked"] = gate != nullptr;
-  if (gate != nullptr) {
+  for (const harness::FrameResult& frame : result.frames) document["frames"].push_back(to_json(frame, result.timed));
+  document["checked"] = judge != nullptr;
+  if (judge != nullptr) {
     document["verdicts"] = nlohmann::json::array();
     int64_t failed = 0, expected = 0;
-    for (const Verdict& verdict : gate->verdicts()) {
-      const bool foreseen = gate->expected_failure(verdict);
+    for (const Verdict& verdict : judge->verdicts()) {
+      const bool foreseen = judge->is_expected_failure(verdict);
       document["verdicts"].push_back(io::verdict_json(verdict, foreseen));
       if (!verdict.holds) ++(foreseen ? expected : failed);
     }
-    document["summary"] = {{"holds", gate->holds()},
-                           {"verdicts", gate->verdicts().size()},
+    document["summary"] = {{"holds", judge->holds()},
+                           {"verdicts", judge->verdicts().size()},
                            {"failed", failed},
                            {"failed_as_expected", expected}};
+    document["notes"] = judge->notes();
   }
   return document;
 }

@@ -1,12 +1,13 @@
 // --json: the machine's interface; docs/results_schema.md describes every field.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
-#include "harness/frame_result.h"
-#include "harness/judge.h"
+#include "harness/scene_judge.h"
+#include "model/backend.h"
 #include "model/scene.h"
 
 namespace cutproof::cli {
@@ -21,10 +22,10 @@ struct RunResult {
   double spacing = 0;
   int64_t particles = 0, clusters_at_start = 0;
   bool timed = false;  // seconds are measured (a recording has none)
-  std::vector<FrameResult> frames;
+  std::vector<harness::FrameResult> frames;
 };
 
-// `gate` is null if nothing was checked.
-nlohmann::json to_json(const RunResult& result, const Gate* gate);
+// `judge` is null if nothing was checked.
+nlohmann::json to_json(const RunResult& result, const harness::SceneJudge* judge);
 
 }  // namespace cutproof::cli

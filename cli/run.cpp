@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <map>
 #include <memory>
@@ -15,7 +16,7 @@
 #include "harness/backends.h"
 #include "harness/errors.h"
 #include "harness/frame_runner.h"
-#include "harness/judge.h"
+#include "harness/scene_judge.h"
 #include "model/error.h"
 #include "model/io/atomic_file.h"
 #include "model/io/recording.h"
@@ -91,7 +92,7 @@ void print_summary(const RunResult& result) {
   std::array<double, 6> seconds = {};
   std::array<int64_t, 6> launched = {};
   int64_t removed = 0, debris = 0;
-  for (const FrameResult& frame : result.frames) {
+  for (const harness::FrameResult& frame : result.frames) {
     total += frame.total_seconds;
     for (std::size_t s = 0; s < 6; ++s) {
       seconds[s] += frame.seconds[s];
@@ -117,6 +118,16 @@ void print_summary(const RunResult& result) {
              result.clusters_at_start, clusters);
 }
 
+// The comparison goes stage by stage.
+void compare(Against& against, const Setup& setup, const harness::Moment& moment) {
+  const auto due = harness::due_stages(setup, *moment.before, moment.span, *moment.after);
+  if (std::count(due.begin(), due.end(), true) > 1) {
+    throw InputError("command line", "--against", "this backend runs several stages in one piece",
+                     "choose one that runs them one by one, or leave --against out");
+  }
+  against.see(moment.span.last, *moment.after, due[static_cast<std::size_t>(moment.span.last)]);
+}
+
 int run(const RunOptions& options) {
   std::optional<AgainstMode> mode;
   if (!options.against.empty()) mode = against_mode(options);
@@ -137,7 +148,7 @@ int run(const RunOptions& options) {
   std::optional<io::Recorder> recorder;
   if (!options.record.empty())
     recorder.emplace(options.record, built.setup, io::write_scene(scene), options.backend.name);
-  std::optional<Gate> gate;
+  std::optional<harness::SceneJudge> judge;
   std::optional<Against> against;
   std::optional<Errors> errors;
   print_header(scene, built, options);
@@ -153,40 +164,40 @@ int run(const RunOptions& options) {
                    built.state.clusters.count(),
                    true,
                    {}};
-  backend->load({built.setup}, {built.state});
-  // What the backend has made of the state: one in single precision has rounded it.
-  const State initial = backend->snapshot().front();
-  if (options.check) gate.emplace(built.setup, scene.expect, options.backend.name, initial);
-  if (mode) against.emplace(built.setup, built.state, initial, options.backend.name, *mode);
+  harness::FrameRunner runner(*backend, {built.setup}, {built.state});
+  const auto state = [&]() -> const State& { return *runner.states().front(); };
+  if (options.check) judge.emplace(built.setup, scene.expect, options.backend.name, runner.states().front());
+  if (mode) against.emplace(built.setup, built.state, state(), options.backend.name, *mode);
   if (!options.errors.empty()) {
-    errors.emplace(wanted, built.setup, initial, [&] { return make_backend(options.backend); });
+    errors.emplace(wanted, built.setup, state(), [&] { return make_backend(options.backend); });
   }
-  if (recorder) recorder->add(Stage::skin, initial);
+  if (recorder) recorder->add(Stage::skin, state());
+  const harness::Observer see = [&](const harness::Moment& moment) {
+    if (judge) judge->see(moment);
+    if (recorder) recorder->add(moment.span.last, *moment.after);
+    if (against) compare(*against, built.setup, moment);
+  };
   {
     Progress progress("frame", built.setup.frame_count());
-    for (int64_t frame = 0; frame < built.setup.frame_count(); ++frame) {
-      const auto see = [&](Stage stage, const State& state) {
-        if (gate) gate->see(stage, state);
-        if (recorder) recorder->add(stage, state);
-      };
+    while (!runner.is_over()) {
+      const int64_t frame = state().frame;
       const bool looked_at = errors && errors->wants(frame);
-      if (looked_at) errors->frame_begins(backend->snapshot().front());
-      const auto compare = [&](Stage stage, const State& state, bool ran) { against->see(stage, state, ran); };
-      result.frames.push_back(
-          run_frame(*backend, gate || recorder ? SeeState(see) : nullptr, against ? SeeStage(compare) : nullptr));
-      if (looked_at) errors->frame_ends(backend->snapshot().front());
+      if (looked_at) errors->frame_begins(state());
+      result.frames.push_back(runner.run_frame(judge || recorder || against ? see : nullptr));
+      if (looked_at) errors->frame_ends(state());
       progress.show(frame + 1, fmt::format("{} clusters, {} particles", result.frames.back().clusters,
                                            result.frames.back().alive));
     }
   }
   print_summary(result);
-  if (gate) {
-    gate->finish();
-    print_verdicts(*gate);
+  if (judge) {
+    for (Verdict& verdict : runner.take_broken_contracts()) judge->add(std::move(verdict));
+    judge->finish();
+    print_verdicts(*judge);
   }
   if (against) print_against(*against);
   if (errors) {
-    errors->finish(backend->snapshot().front(), against ? &*against : nullptr);
+    errors->finish(state(), against ? &*against : nullptr);
     errors->print();
   }
   if (recorder) {
@@ -195,7 +206,7 @@ int run(const RunOptions& options) {
     fmt::print("recorded {} (for ParaView: {}, {}, {})\n", paths.index, paths.particles, paths.skin, paths.blade);
   }
   if (json_file) {
-    nlohmann::json document = to_json(result, gate ? &*gate : nullptr);
+    nlohmann::json document = to_json(result, judge ? &*judge : nullptr);
     if (against) {
       document["against"] = against->to_json();
       // A list that push_back makes of null is broken where there is no memory for it (nlohmann::json 3.11).
@@ -209,8 +220,8 @@ int run(const RunOptions& options) {
     json_file->commit();
     fmt::print("wrote {}\n", options.json);
   }
-  if (!gate && !against) fmt::print("nothing was judged: add --check for that\n");
-  return (!gate || gate->holds()) && (!against || against->holds()) && (!errors || errors->holds()) ? 0 : 1;
+  if (!judge && !against) fmt::print("nothing was judged: add --check for that\n");
+  return (!judge || judge->holds()) && (!against || against->holds()) && (!errors || errors->holds()) ? 0 : 1;
 }
 
 }  // namespace

@@ -47,9 +47,9 @@ void Progress::show(int64_t done, const std::string& what) {
   width_ = line.size();
 }
 
-void print_verdicts(const Gate& gate) {
+void print_verdicts(const harness::SceneJudge& judge) {
   std::vector<std::pair<std::string, Row>> rows;  // in order of first appearance
-  for (const Verdict& verdict : gate.verdicts()) {
+  for (const Verdict& verdict : judge.verdicts()) {
     // Expectations are read one by one; properties are gathered over frames.
     const std::string key = fmt::format("{}\t{}", verdict.property, name_of(verdict.stage));
     auto found = rows.begin();
@@ -58,7 +58,7 @@ void print_verdicts(const Gate& gate) {
     Row& row = found->second;
     row.frames += verdict.checked > 0 || !verdict.holds;
     row.checked += verdict.checked;
-    if (!verdict.holds) ++(gate.expected_failure(verdict) ? row.expected : row.failed);
+    if (!verdict.holds) ++(judge.is_expected_failure(verdict) ? row.expected : row.failed);
     const bool worse = row.worst == nullptr || (row.worst->holds && !verdict.holds) ||
                        (row.worst->holds == verdict.holds && verdict.measured > row.worst->measured);
     if (worse) row.worst = &verdict;
@@ -76,8 +76,8 @@ void print_verdicts(const Gate& gate) {
                worst.unit, mark);
   }
   std::size_t failures = 0;
-  for (const Verdict& verdict : gate.verdicts()) {
-    if (verdict.holds || gate.expected_failure(verdict)) continue;
+  for (const Verdict& verdict : judge.verdicts()) {
+    if (verdict.holds || judge.is_expected_failure(verdict)) continue;
     if (++failures > kMostFailuresShown) continue;
     fmt::print("\nFAILS: {} after {}, frame {}, backend {}\n  measured {} {}, bound {} ({})\n  {}\n", verdict.property,
                name_of(verdict.stage), verdict.frame, verdict.backend, figure(verdict.measured), verdict.unit,
@@ -86,8 +86,9 @@ void print_verdicts(const Gate& gate) {
   if (failures > kMostFailuresShown) {
     fmt::print("\n… and {} more failing verdicts; --json holds all of them.\n", failures - kMostFailuresShown);
   }
-  fmt::print("\n{} verdicts, {} failed: {}\n", gate.verdicts().size(), failures,
-             gate.holds() ? "everything holds." : "NOT everything holds.");
+  for (const std::string& note : judge.notes()) fmt::print("\nnote: {}\n", note);
+  fmt::print("\n{} verdicts, {} failed: {}\n", judge.verdicts().size(), failures,
+             judge.holds() ? "everything holds." : "NOT everything holds.");
 }
 
 }  // namespace cutproof::cli

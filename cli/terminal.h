@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "harness/judge.h"
+#include "harness/scene_judge.h"
 
 namespace cutproof::cli {
 
@@ -25,6 +25,6 @@ class Progress {
 
 // One row per property and stage: how often judged, how often it failed, the worst figure beside its bound; then the
 // first failures with their witnesses, and one line that says whether everything holds.
-void print_verdicts(const Gate& gate);
+void print_verdicts(const harness::SceneJudge& judge);
 
 }  // namespace cutproof::cli

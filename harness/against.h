@@ -20,8 +20,8 @@
 namespace cutproof::cli {
 
 using oracles::Difference;
-using oracles::positions_apart;
 using oracles::greatest_neighbour_distance;
+using oracles::positions_apart;
 using oracles::rest_frames_apart;
 using oracles::RestFrameSpread;
 using oracles::skins_apart;

@@ -34,7 +34,7 @@ constexpr std::array<Kind, 6> kKinds = {{{"implementation", &ErrorsWanted::imple
 
 bool conserved(Precision precision, const oracles::Conservation& found) {
   const bool momentum = precision == Precision::binary64 ? found.momentum_relative <= kDoubleDrift
-                                                            : found.momentum <= found.momentum_bound;
+                                                         : found.momentum <= found.momentum_bound;
   return momentum && found.mass == 0 && (!found.energy || *found.energy <= found.energy_bound);
 }
 
@@ -266,7 +266,7 @@ void Errors::print() const {
         "angular momentum {:.3g}; over {} substeps\n",
         holds() ? "holds" : "FAILS", c.momentum, c.momentum_relative,
         precision_ == Precision::binary64 ? fmt::format("{:.2g} relative", kDoubleDrift)
-                                             : fmt::format("{:.2g} m/s", c.momentum_bound),
+                                          : fmt::format("{:.2g} m/s", c.momentum_bound),
         or_dash(c.energy), c.energy_bound, c.angular_momentum, c.substeps);
   }
 }

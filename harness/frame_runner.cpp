@@ -1,50 +1,168 @@
 #include "harness/frame_runner.h"
 
-namespace cutproof::cli {
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
 
-FrameResult run_frame(Backend& backend, const SeeState& see, const SeeStage& see_stage) {
-  FrameResult result;
-  const auto run = [&](Span span) {
-    backend.run(span);
-    const SpanReport report = backend.report();
-    result.total_seconds += report.total_seconds;
-    for (const Stage stage : kStages) {
-      const auto s = static_cast<std::size_t>(stage);
-      result.ran[s] = result.ran[s] || report.ran[s];
-      result.seconds[s] += report.seconds[s];
-    }
+#include "reference_cpu/reference.h"
+
+namespace cutproof::harness {
+
+namespace {
+
+std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
+Stage stage_at(std::size_t index) { return static_cast<Stage>(index); }
+
+}  // namespace
+
+std::vector<PlannedSpan> plan_spans(const Backend& backend, Span span, bool finest) {
+  // Best way to come to each boundary between stages: stages that the backend runs, then pieces.
+  struct Way {
+    int stages = -1, pieces = 0;
+    std::size_t from = 0;
+    bool by_backend = true;
   };
-  const auto ran = [&](Stage stage) { return result.ran[static_cast<std::size_t>(stage)]; };
-
-  const auto run_stage = [&](Stage stage) {
-    run({stage, stage});
-    if (see_stage) {
-      see_stage(stage, backend.snapshot().front(), backend.report().ran[static_cast<std::size_t>(stage)]);
+  const std::size_t first = at(span.first), end = at(span.last) + 1;
+  std::array<Way, 7> ways;
+  ways[first] = {0, 0, first, true};
+  for (std::size_t to = first + 1; to <= end; ++to) {
+    const auto offer = [&](std::size_t from, bool by_backend) {
+      const Way& before = ways[from];
+      const Way way = {before.stages + (by_backend ? static_cast<int>(to - from) : 0),
+                       before.pieces + (finest ? 1 : -1), from, by_backend};
+      if (std::pair(way.stages, way.pieces) > std::pair(ways[to].stages, ways[to].pieces) || ways[to].stages < 0) {
+        ways[to] = way;
+      }
+    };
+    offer(to - 1, false);
+    for (std::size_t from = first; from < to; ++from) {
+      if (backend.can_run({stage_at(from), stage_at(to - 1)})) offer(from, true);
     }
-  };
-
-  if (!see && !see_stage) {
-    run({Stage::step, Stage::skin});
-  } else {
-    run_stage(Stage::step);
-    run_stage(Stage::detect);
-    const bool cut = see && ran(Stage::detect) && !backend.snapshot().front().removed.empty();
-    if (cut) see(Stage::detect, backend.snapshot().front());
-    for (const Stage stage : {Stage::split, Stage::merge, Stage::expand}) {
-      run_stage(stage);
-      if (cut && ran(stage)) see(stage, backend.snapshot().front());
-    }
-    run_stage(Stage::skin);
   }
-  const State state = backend.snapshot().front();
-  if (see) see(Stage::skin, state);
-  result.frame = state.frame - 1;
-  result.removed = static_cast<int64_t>(state.removed.size());
-  result.debris = static_cast<int64_t>(state.debris.size());
-  for (const uint8_t alive : state.alive) result.alive += alive;
-  result.clusters = state.clusters.count();
-  result.triangles = static_cast<int64_t>(state.skin.triangles.size());
-  return result;
+  std::vector<PlannedSpan> plan;
+  for (std::size_t to = end; to > first; to = ways[to].from) {
+    plan.push_back({{stage_at(ways[to].from), stage_at(to - 1)}, ways[to].by_backend});
+  }
+  std::reverse(plan.begin(), plan.end());
+  return plan;
 }
 
-}  // namespace cutproof::cli
+FrameRunner::FrameRunner(Backend& backend, std::vector<Setup> setups, const std::vector<State>& states)
+    : backend_(backend), setups_(std::move(setups)) {
+  backend_.load(setups_, states);
+  for (State& state : backend_.snapshot()) present_.push_back(std::make_shared<const State>(std::move(state)));
+  if (present_.size() != setups_.size()) {
+    throw std::runtime_error("The backend " + backend_.name() + " gave " + std::to_string(present_.size()) +
+                             " states of " + std::to_string(setups_.size()) + " bodies.");
+  }
+}
+
+FrameRunner::~FrameRunner() = default;
+
+bool FrameRunner::is_over() const {
+  for (std::size_t b = 0; b < setups_.size(); ++b) {
+    if (present_[b]->frame < setups_[b].frame_count()) return false;
+  }
+  return true;
+}
+
+void FrameRunner::hand_over(bool to_backend) {
+  if (to_backend == at_backend_) return;
+  std::vector<State> states = snapshot();
+  if (!to_backend && !reference_) reference_ = reference::make_backend();
+  (to_backend ? backend_ : *reference_).load(setups_, std::move(states));
+  at_backend_ = to_backend;
+}
+
+std::vector<State> FrameRunner::snapshot_of(const std::vector<bool>& wanted) const {
+  return (at_backend_ ? backend_ : *reference_).snapshot_of(wanted);
+}
+
+SpanReport FrameRunner::run_piece(const PlannedSpan& piece) {
+  hand_over(piece.by_backend);
+  Backend& runner = piece.by_backend ? backend_ : *reference_;
+  runner.run(piece.span);
+  const SpanReport report = runner.report();
+  frame_.total_seconds += report.total_seconds;
+  for (const Stage stage : kStages) {
+    frame_.ran[at(stage)] = frame_.ran[at(stage)] || report.ran[at(stage)];
+    frame_.seconds[at(stage)] += report.seconds[at(stage)];
+  }
+  return report;
+}
+
+void FrameRunner::run(Span span, const Observer& observe) {
+  frame_ = {};
+  const std::size_t bodies = setups_.size();
+  for (const PlannedSpan& piece : plan_spans(backend_, span, observe != nullptr)) {
+    std::vector<bool> goes_on(bodies);
+    for (std::size_t b = 0; b < bodies; ++b) goes_on[b] = present_[b]->frame < setups_[b].frame_count();
+    const SpanReport report = run_piece(piece);
+    if (!observe) continue;
+    // What is due after a detection within the piece depends on what it removed.
+    std::array<bool, 6> due = {};
+    std::vector<State> states;
+    const bool detects = piece.span.contains(Stage::detect) && piece.span.last > Stage::detect;
+    const auto add_due = [&](std::size_t b, const State& after) {
+      const auto of_body = due_stages(setups_[b], *present_[b], piece.span, after);
+      for (const Stage stage : kStages) due[at(stage)] = due[at(stage)] || of_body[at(stage)];
+    };
+    if (detects) states = snapshot_of(goes_on);
+    for (std::size_t b = 0; b < bodies; ++b) {
+      if (goes_on[b]) add_due(b, detects ? states[b] : *present_[b]);
+    }
+    for (const Stage stage : kStages) {
+      if (!piece.span.contains(stage) || !piece.by_backend || report.ran[at(stage)] == due[at(stage)]) continue;
+      broken_.push_back(broken_contract(due[at(stage)] ? "a stage that is due runs" : "only what is due runs", stage,
+                                        present_.empty() ? 0 : present_.front()->frame));
+    }
+    // Where no body had anything to do, looking once a frame shows that nothing was done: at its end.
+    const bool any_due = std::any_of(due.begin(), due.end(), [](bool d) { return d; });
+    if (!any_due && !piece.span.contains(Stage::skin)) continue;
+    if (states.empty()) states = snapshot_of(goes_on);
+    for (std::size_t b = 0; b < bodies; ++b) {
+      if (!goes_on[b]) continue;
+      const auto after = std::make_shared<const State>(std::move(states[b]));
+      const Moment moment = {static_cast<int32_t>(b), piece.span, std::exchange(present_[b], after), after,
+                             piece.by_backend};
+      observe(moment);
+    }
+  }
+  if (observe) return;
+  std::vector<State> states = snapshot();
+  for (std::size_t b = 0; b < bodies; ++b) present_[b] = std::make_shared<const State>(std::move(states[b]));
+}
+
+FrameResult FrameRunner::run_frame(const Observer& observe) {
+  const int64_t frame = present_.empty() ? 0 : present_.front()->frame;
+  run({Stage::step, Stage::skin}, observe);
+  frame_.frame = frame;
+  for (const Snapshot& state : present_) count(frame_, *state);
+  return frame_;
+}
+
+void FrameRunner::look_again() {
+  const std::vector<State> last = snapshot();
+  for (std::size_t b = 0; b < last.size(); ++b) {
+    if (last[b] == *present_[b]) continue;
+    broken_.push_back(broken_contract("a body whose schedule is over stays as it is", Stage::skin, present_[b]->frame,
+                                      static_cast<int32_t>(b)));
+  }
+}
+
+std::vector<Verdict> FrameRunner::take_broken_contracts() { return std::exchange(broken_, {}); }
+
+Traces run_to_the_end(Backend& backend, std::vector<Setup> setups, const std::vector<State>& states) {
+  FrameRunner runner(backend, std::move(setups), states);
+  Traces traces;
+  for (const Snapshot& state : runner.states()) traces.of_body.push_back({state, {}});
+  const auto keep = [&](const Moment& moment) {
+    traces.of_body[static_cast<std::size_t>(moment.body)].moments.push_back(moment);
+  };
+  while (!runner.is_over()) runner.run_frame(keep);
+  runner.look_again();
+  traces.broken_contracts = runner.take_broken_contracts();
+  return traces;
+}
+
+}  // namespace cutproof::harness

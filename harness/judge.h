@@ -1,55 +1,84 @@
-// The gate: puts every oracle that applies to the snapshots of one body, in order, and holds the outcome against what
-// the scene expects. `run --check` and `check` feed it the same snapshots, so they give the same verdicts.
+// The judge of a run: puts every property that applies to each moment of one body. Whoever looks at a run, live or
+// recorded, scene or random case, has it judged here.
 #pragma once
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "model/scene.h"
-#include "model/state.h"
+#include "harness/moments.h"
 #include "model/verdict.h"
+#include "oracles/oracles.h"
 
-namespace cutproof::cli {
+namespace cutproof::harness {
 
-class Gate {
- public:
-  // `initial` is the state as loaded.
-  Gate(const Setup& setup, const Expectations& expectations, std::string backend, const State& initial);
+// For which properties somebody vouches. What nobody does is not judged, and said so (Judge::unpromised).
+struct Promises {
+  // Connected tissue is coupled. Only rules that keep I4 promise it (method.md §2); a scene that was written down
+  // promises it unless it expects otherwise.
+  bool coupling_without_edge_cover = true;
+  // No small cluster could still merge, also after an expansion: clusters that have grown may touch others that they
+  // did not touch, so this is the promise of the merge stage alone.
+  bool maximality_after_expansion = true;
+};
+// What the rules of a setup promise whatever clusters a body was given.
+inline constexpr Promises kPromisesOfRules = {false, false};
 
-  // One snapshot of a frame: after a stage from detect on in frames that removed something, and after the last stage
-  // of every frame, which is passed as Stage::skin.
-  void see(Stage stage, const State& state);
-
-  // After the last snapshot: the scene's expectations as verdicts.
-  void finish();
-
-  const std::vector<Verdict>& verdicts() const { return verdicts_; }
-  bool holds() const;
-  // A failure that the scene expects: its `expect.isolated_clusters` asks for at least one.
-  bool expected_failure(const Verdict& verdict) const;
-
- private:
-  void add(std::vector<Verdict> found, Stage stage, int64_t frame);
-  void note_progress(const State& state, int64_t frame);
-  void expect(const std::string& what, double measured, double low, double high, const std::string& unit,
-              const std::string& text);
-
-  const Setup& setup_;
-  Expectations expectations_;
-  std::string backend_;
-  std::vector<Verdict> verdicts_;
-  State previous_;            // the last snapshot
-  State frame_start_;         // the state when the present frame began
-  int64_t frame_ = 0;         // the frame in progress
-  bool frame_begun_ = false;  // a snapshot of the frame in progress has been seen
-  bool skin_judged_ = false;  // the present triangles have been judged thoroughly
-  // What the expectations are held against.
-  int64_t initial_clusters_ = 0;
-  int64_t removed_ = 0;
-  double dent_ = 0;
-  double greatest_stretch_ = 0;
-  double isolated_ = 0;
-  std::vector<int64_t> components_after_stroke_;
+enum class Thorough {
+  never,
+  when_cut,  // the first skin, and after every cut
+  always
 };
 
-}  // namespace cutproof::cli
+class Judge {
+ public:
+  // `setup` must outlive this. `backend` is the name that verdicts carry.
+  Judge(const Setup& setup, std::string backend, Promises promises, Thorough thorough);
+  ~Judge();
+
+  // The state as loaded. `has_expanded`: an expansion may have changed its clusters already.
+  void begin(const Snapshot& initial, bool has_expanded = false);
+  // Moments in order, each beginning where the one before ended. What somebody else ran for the backend is not judged.
+  void see(const Moment& moment);
+  // A verdict of somebody else's on this run, such as a broken contract.
+  void add(Verdict verdict);
+
+  const std::vector<Verdict>& verdicts() const { return verdicts_; }
+  std::vector<Verdict> take_verdicts();
+
+  // States of which a property was not promised, and in how many of them it did not hold.
+  struct Unpromised {
+    std::string property;
+    int64_t states = 0, failing = 0;
+  };
+  const std::vector<Unpromised>& unpromised() const { return unpromised_; }
+  bool has_expanded() const { return has_expanded_; }
+  int64_t frame() const { return frame_; }  // in progress
+
+  // For reports, computed from what is known already. Of the last state seen, 0 if that is not well formed.
+  int32_t component_count();
+  int32_t inner_shells();
+
+ private:
+  void see_stage(Stage stage, const State& before, const State& after);
+  void see_several(const Moment& moment, const std::array<bool, 6>& due);
+  void take(std::vector<Verdict> found, Stage stage, const State& state);
+  bool is_promised(const Verdict& verdict, Stage stage, const State& state) const;
+
+  const Setup& setup_;
+  std::string backend_;
+  Promises promises_;
+  Thorough thorough_;
+  oracles::Judge judge_;
+  std::vector<Verdict> verdicts_;
+  std::vector<Unpromised> unpromised_;
+  std::vector<Snapshot> kept_;  // what judge_ may still look at
+  Snapshot last_;
+  int64_t frame_ = 0;
+  bool has_expanded_ = false;
+  bool skin_judged_ = false;  // the present triangles have been judged thoroughly
+  bool lost_ = false;         // the last state is not well formed, so the next one cannot be compared with it
+};
+
+}  // namespace cutproof::harness

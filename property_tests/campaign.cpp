@@ -123,10 +123,10 @@ class Runner {
     std::unique_ptr<Backend> backend = pool_.take(number);
     const Clock::time_point running_since = Clock::now();
     const std::string name = backend->name();
-    std::vector<Trail> trails;
+    std::vector<CaseRun> runs;
     std::string problem;
     try {
-      trails = run_cases(*backend, load.loaded);
+      runs = run_cases(*backend, load.loaded);
       pool_.give(std::move(backend));
     } catch (const MachineError&) {
       pool_.give(nullptr);
@@ -142,8 +142,8 @@ class Runner {
     const Clock::time_point judging_since = Clock::now();
     std::vector<Judgement> judgements(load.cases.size());
     for (std::size_t k = 0; k < load.cases.size(); ++k) {
-      judgements[k] = problem.empty() ? judge_trail(load.cases[k], load.loaded[k], trails[k], name,
-                                                    load.indices[k] % options_.thorough == 0)
+      judgements[k] = problem.empty() ? judge_case(load.cases[k], load.loaded[k], runs[k], name,
+                                                   load.indices[k] % options_.thorough == 0)
                                       : dissect_alone([&] { return source_.make(number); }, load.cases[k], true);
     }
     if (!problem.empty() &&

@@ -4,6 +4,9 @@
 #include <sstream>
 #include <utility>
 
+#include "harness/frame_runner.h"
+#include "harness/judge.h"
+#include "model/rules.h"
 #include "oracles/comparison/step_comparison.h"
 #include "oracles/oracles.h"
 #include "reference_cpu/reference.h"
@@ -69,55 +72,10 @@ void note_what_a_stage_did(const Setup& setup, Stage stage, const State& before,
   }
 }
 
-// The state with which a frame begins is nobody's promise yet where clusters came from outside, and neither `none` nor
-// `published` promises coupled tissue at all (method.md §2): without I4 the coupling is noted and not demanded.
-// A cluster that has grown may touch others that it did not touch: maximality is the promise of the merge stage, and
-// of every later stage only as long as no expansion changes clusters.
-bool is_promised(const Verdict& verdict, Stage stage, const State& state, bool has_expanded) {
-  if (verdict.property == "component match" || verdict.property == "isolation") return state.edge_covered;
-  if (verdict.property == "merge maximality") return stage == Stage::merge || !has_expanded;
-  return true;
-}
-
-}  // namespace
-
-bool is_due(const Setup& setup, Stage stage, const State& before) {
-  const bool cut = !before.removed.empty();
-  switch (stage) {
-    case Stage::step:
-      return true;
-    case Stage::detect:
-      return needs_detection(setup);
-    case Stage::split:
-      return cut;
-    case Stage::merge:
-      return cut && setup.merge.rule != MergeRule::none;
-    case Stage::expand:
-      return cut && (setup.expand.rule == ExpandRule::published ||
-                     (setup.expand.rule == ExpandRule::edge_cover && !before.edge_covered));
-    case Stage::skin:
-      return setup.skin.wanted;
-  }
-  return false;
-}
-
-Verdict broken_contract(const std::string& what, Stage stage, const State& state, const std::string& backend) {
-  Verdict verdict;
-  verdict.property = what;
-  verdict.stage = stage;
-  verdict.frame = state.frame;
-  verdict.backend = backend;
-  verdict.holds = false;
-  verdict.bound_source = "model/backend.h";
-  return verdict;
-}
-
-namespace {
-
 // Which stages' topology has to be the reference's. Detection may differ within its rounding band, which is the
 // detection oracle's to judge; other rules of merging leave open who merges with whom.
 bool is_compared(const Setup& setup, Stage stage) {
-  if (stage == Stage::merge) return setup.merge.rule == MergeRule::deterministic;
+  if (stage == Stage::merge) return promise_of(setup.merge.rule).unique;
   return stage != Stage::step && stage != Stage::detect;
 }
 
@@ -208,131 +166,101 @@ void StepsCompared::join(const StepsCompared& other) {
   greatest = std::max(greatest, other.greatest);
 }
 
-std::vector<Trail> run_cases(Backend& backend, std::vector<Loaded>& loaded) {
+std::vector<CaseRun> run_cases(Backend& backend, const std::vector<Loaded>& loaded) {
   std::vector<Setup> setups;
   std::vector<State> states;
-  int64_t frames = 0;
-  for (Loaded& one : loaded) {
+  for (const Loaded& one : loaded) {
     setups.push_back(one.setup);
     states.push_back(one.state);
-    frames = std::max(frames, one.setup.frame_count() - one.state.frame);
   }
-  backend.load(std::move(setups), std::move(states));
-  std::vector<Trail> trails(loaded.size());
-  states = backend.snapshot();
+  harness::Traces traces = harness::run_to_the_end(backend, std::move(setups), states);
+  std::vector<CaseRun> runs(loaded.size());
   for (std::size_t b = 0; b < loaded.size(); ++b) {
-    trails[b].initial = std::move(states[b]);
+    runs[b].trace = std::move(traces.of_body[b]);
+    const State& initial = *runs[b].trace.initial;
     // In single precision what is loaded is rounded; in double it comes back as it is.
-    if (backend.precision() == Precision::binary64 && !(trails[b].initial == loaded[b].state)) {
-      trails[b].failure = broken_contract("loading changes nothing", Stage::step, trails[b].initial, backend.name());
+    if (backend.precision() == Precision::binary64 && !(initial == loaded[b].state)) {
+      runs[b].failure = harness::broken_contract("loading changes nothing", Stage::step, initial.frame);
     }
   }
-  const auto present = [&](std::size_t b) -> const State& {
-    return trails[b].steps.empty() ? trails[b].initial : trails[b].steps.back().state;
-  };
-  for (int64_t frame = 0; frame < frames; ++frame) {
-    for (const Stage stage : kStages) {
-      bool due = false;
-      for (std::size_t b = 0; b < loaded.size(); ++b) {
-        const Setup& setup = loaded[b].setup;
-        due = due || (present(b).frame < setup.frame_count() && is_due(setup, stage, present(b)));
-      }
-      backend.run({stage, stage});
-      if (backend.report().ran[static_cast<std::size_t>(stage)] != due) {
-        trails.front().failure = broken_contract(due ? "a stage that is due runs" : "only what is due runs", stage,
-                                                 present(0), backend.name());
-      }
-      // Where no body had anything to do, looking once a frame shows that nothing was done: skin always looks, as it
-      // counts up the frame.
-      if (!due && stage != Stage::skin) continue;
-      std::vector<bool> goes_on(loaded.size());
-      for (std::size_t b = 0; b < loaded.size(); ++b) goes_on[b] = present(b).frame < loaded[b].setup.frame_count();
-      states = backend.snapshot_of(goes_on);
-      for (std::size_t b = 0; b < loaded.size(); ++b) {
-        if (goes_on[b]) trails[b].steps.push_back({stage, std::move(states[b])});
-      }
-    }
+  for (Verdict& broken : traces.broken_contracts) {
+    std::optional<Verdict>& failure = runs[static_cast<std::size_t>(broken.body)].failure;
+    if (!failure) failure = std::move(broken);
   }
-  states = backend.snapshot();
-  for (std::size_t b = 0; b < loaded.size(); ++b) {
-    if (states[b] == present(b) || trails[b].failure) continue;
-    trails[b].failure =
-        broken_contract("a body whose schedule is over stays as it is", Stage::skin, present(b), backend.name());
-  }
-  return trails;
+  return runs;
 }
 
-Judgement judge_trail(const Case& c, const Loaded& loaded, const Trail& trail, const std::string& backend,
-                      bool thorough) {
+Judgement judge_case(const Case& c, const Loaded& loaded, const CaseRun& run, const std::string& backend,
+                     bool thorough) {
   Judgement judgement;
   const Setup& setup = loaded.setup;
   note_what_is_given(c, loaded, judgement);
-  judgement.failure = trail.failure;
+  judgement.failure = run.failure;
 
-  bool has_expanded = trail.has_expanded || c.clusters == ClusterKind::foreign;  // foreign clusters begin anywhere
-  const auto take = [&](std::vector<Verdict> verdicts, Stage stage, const State& state) {
+  harness::Judge judge(setup, backend, harness::kPromisesOfRules,
+                       thorough ? harness::Thorough::always : harness::Thorough::never);
+  judge.begin(run.trace.initial, run.has_expanded || c.clusters == ClusterKind::foreign);  // those begin anywhere
+  const auto take = [&](std::vector<Verdict> verdicts) {
     for (Verdict& verdict : verdicts) {
-      if (!verdict.holds && !is_promised(verdict, stage, state, has_expanded)) {
-        if (verdict.property == "isolation") judgement[Happened::uncoupled] = true;
-        continue;
-      }
       ++judgement.verdicts;
       if (verdict.holds || judgement.failure) continue;
       verdict.backend = backend;
       judgement.failure = std::move(verdict);
     }
   };
-
-  oracles::Judge judge(setup);
-  int32_t components = judge.component_count(trail.initial);
+  take(judge.take_verdicts());
+  int32_t components = judge.component_count();
   judgement[Happened::several_components] = components > 1;
   std::optional<oracles::StepComparison> steps;
   if (c.moves && backend != "reference") steps.emplace(setup, reference::step);
-  const State* before = &trail.initial;
-  const State* compared_skin = nullptr;  // equal to the reference's
-  for (const auto& [stage, after] : trail.steps) {
+  harness::Snapshot compared_skin;  // equal to the reference's
+  for (const harness::Moment& moment : run.trace.moments) {
     if (judgement.failure) break;
-    if (stage == Stage::expand && after.clusters.members != before->clusters.members) has_expanded = true;
-    if (is_due(setup, stage, *before)) {
-      note_what_a_stage_did(setup, stage, *before, after, judgement);
-      take(judge.stage(stage, *before, after), stage, after);
-      const int32_t components_before = std::exchange(components, judge.component_count(after));
-      if (stage == Stage::detect && components > components_before) judgement[Happened::separation] = true;
-      if (stage != Stage::step) take(judge.state(after, stage, thorough), stage, after);
-      if (stage == Stage::step && steps && !judgement.failure) {
-        take(beside_the_reference(*steps, setup, *before, after, judgement.compared), stage, after);
-      }
-      if (backend != "reference" && is_compared(setup, stage)) {
-        ++judgement.verdicts;
-        // The topology of the skin is a function of what is alive.
-        const bool known = stage == Stage::skin && compared_skin != nullptr && compared_skin->alive == after.alive &&
-                           compared_skin->skin.owner == after.skin.owner &&
-                           compared_skin->skin.direction == after.skin.direction &&
-                           compared_skin->skin.triangles == after.skin.triangles;
-        if (!known) {
-          State expected = *before;
-          run_stage_of_reference(setup, stage, expected);
-          const std::string difference = topological_difference(stage, expected, after);
-          if (!difference.empty() && !judgement.failure) {
-            judgement.failure = broken_contract("the reference's topology", stage, *before, backend);
-            judgement.failure->witness.text = difference + " differ";
-          }
-        }
-        if (stage == Stage::skin) compared_skin = &after;
-      }
-    } else if (stage != Stage::skin && !(after == *before)) {
-      judgement.failure = broken_contract("a stage that does not run changes nothing", stage, *before, backend);
+    const State &before = *moment.before, &after = *moment.after;
+    judge.see(moment);
+    take(judge.take_verdicts());
+    for (const harness::Judge::Unpromised& u : judge.unpromised()) {
+      if (u.property == "isolation" && u.failing > 0) judgement[Happened::uncoupled] = true;
     }
-    before = &after;
+    if (judgement.failure) break;
+    const auto due = harness::due_stages(setup, before, moment.span, after);
+    for (const Stage stage : kStages) {
+      if (due[static_cast<std::size_t>(stage)]) note_what_a_stage_did(setup, stage, before, after, judgement);
+    }
+    const int32_t components_before = std::exchange(components, judge.component_count());
+    if (moment.span.contains(Stage::detect) && components > components_before) judgement[Happened::separation] = true;
+    if (backend == "reference" || !moment.by_backend || std::count(due.begin(), due.end(), true) != 1) continue;
+    const auto stage = static_cast<Stage>(std::find(due.begin(), due.end(), true) - due.begin());
+    if (stage == Stage::step && steps) {
+      take(beside_the_reference(*steps, setup, before, after, judgement.compared));
+    }
+    if (!is_compared(setup, stage)) continue;
+    ++judgement.verdicts;
+    // The topology of the skin is a function of what is alive.
+    const bool known = stage == Stage::skin && compared_skin && compared_skin->alive == after.alive &&
+                       compared_skin->skin.owner == after.skin.owner &&
+                       compared_skin->skin.direction == after.skin.direction &&
+                       compared_skin->skin.triangles == after.skin.triangles;
+    if (!known) {
+      State expected = before;
+      run_stage_of_reference(setup, stage, expected);
+      const std::string difference = topological_difference(stage, expected, after);
+      if (!difference.empty() && !judgement.failure) {
+        judgement.failure = harness::broken_contract("the reference's topology", stage, before.frame);
+        judgement.failure->backend = backend;
+        judgement.failure->witness.text = difference + " differ";
+      }
+    }
+    if (stage == Stage::skin) compared_skin = moment.after;
   }
-  judgement[Happened::cavity] = judge.inner_shells(*before) > 0;
+  judgement[Happened::cavity] = judge.inner_shells() > 0;
   return judgement;
 }
 
 Judgement dissect(Backend& backend, const Case& c, bool thorough) {
-  std::vector<Loaded> loaded = {load(c)};
-  const Trail trail = run_cases(backend, loaded).front();
-  return judge_trail(c, loaded.front(), trail, backend.name(), thorough);
+  const std::vector<Loaded> loaded = {load(c)};
+  const CaseRun run = run_cases(backend, loaded).front();
+  return judge_case(c, loaded.front(), run, backend.name(), thorough);
 }
 
 std::string describe(const Verdict& verdict) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/moments.h"
 #include "model/backend.h"
 #include "model/verdict.h"
 #include "property_tests/cases.h"
@@ -84,35 +85,25 @@ struct Judgement {
   bool& operator[](Happened what) { return happened[static_cast<std::size_t>(what)]; }
 };
 
-// What a backend made of one case: the state as it was loaded, and the state after each stage of each frame.
-struct Trail {
-  State initial;
-  struct Step {
-    Stage stage;
-    State state;
-  };
-  std::vector<Step> steps;
-  bool has_expanded = false;       // before `initial`: an expansion has changed clusters
-  std::optional<Verdict> failure;  // of the contract, seen while running
+// What a backend made of one case: the run, and what of the contract it broke on the way.
+struct CaseRun {
+  harness::Trace trace;
+  bool has_expanded = false;       // before the first state: an expansion has changed clusters
+  std::optional<Verdict> failure;  // of the contract
 };
 
-// Loads all cases at once and runs them to their ends, stage by stage.
-std::vector<Trail> run_cases(Backend& backend, std::vector<Loaded>& loaded);
+// Loads all cases at once and runs them to their ends, stage by stage as far as the backend can.
+std::vector<CaseRun> run_cases(Backend& backend, const std::vector<Loaded>& loaded);
 
-// Puts every oracle that applies to the trail of one case; and compares every stage with what the reference makes of
-// the same state: equal clusters, components, triangles (method.md: merge only where it is `deterministic`); of a body
-// that moves also positions, velocities and rotations after each step.
+// Has the run of one case judged, with the promises of its rules; and compares every stage with what the reference
+// makes of the same state: equal clusters, components, triangles (method.md: merge only where its answer is unique); of
+// a body that moves also positions, velocities and rotations after each step.
 // `thorough`: with CGAL's geometric check of every skin.
-Judgement judge_trail(const Case& c, const Loaded& loaded, const Trail& trail, const std::string& backend,
-                      bool thorough);
+Judgement judge_case(const Case& c, const Loaded& loaded, const CaseRun& run, const std::string& backend,
+                     bool thorough);
 
 // Both, for one case alone.
 Judgement dissect(Backend& backend, const Case& c, bool thorough);
-
-// Which stages the contract launches for a body in this state (model/backend.h).
-bool is_due(const Setup& setup, Stage stage, const State& before);
-// A failing verdict: something that model/backend.h promises does not hold.
-Verdict broken_contract(const std::string& what, Stage stage, const State& state, const std::string& backend);
 
 // One line for a person.
 std::string describe(const Verdict& verdict);

@@ -1,5 +1,5 @@
 // The hard cases of accuracy_and_speed.md §4, each with the behaviour that is expected of every backend. After every
-// stage every oracle is asked, and every stage is compared with the reference's from the same state (judge_trail).
+// stage every oracle is asked, and every stage is compared with the reference's from the same state (judge_case).
 // Particle counts around the sizes of warps and blocks: properties.cpp, DissectsBodiesOfSizesAroundThoseOfBlocks.
 // Rotations have hard cases of their own: fixtures/hard_matrices.h.
 #include <gtest/gtest.h>
@@ -71,12 +71,14 @@ double greatest_strain(const Setup& setup, const State& state) {
 // A case that has run to its end.
 struct Outcome {
   Setup setup;
-  Trail trail;
+  CaseRun run;
   int64_t verdicts = 0;
-  const State& last() const { return trail.steps.empty() ? trail.initial : trail.steps.back().state; }
+  const State& last() const { return run.trace.moments.empty() ? *run.trace.initial : *run.trace.moments.back().after; }
   int64_t removed() const {
     int64_t count = 0;
-    for (const auto& [stage, state] : trail.steps) {
+    for (const harness::Moment& moment : run.trace.moments) {
+      const Stage stage = moment.span.last;
+      const State& state = *moment.after;
       if (stage == Stage::detect) count += static_cast<int64_t>(state.removed.size());
     }
     return count;
@@ -93,12 +95,12 @@ class HardCases : public ::testing::TestWithParam<NamedBackend> {
   Outcome run(const Case& c, Loaded loaded, bool thorough = true) {
     std::vector<Loaded> all = {std::move(loaded)};
     Outcome outcome;
-    outcome.trail = std::move(run_cases(*backend_, all).front());
+    outcome.run = std::move(run_cases(*backend_, all).front());
     outcome.setup = all.front().setup;
-    const Judgement judgement = judge_trail(c, all.front(), outcome.trail, backend_->name(), thorough);
+    const Judgement judgement = judge_case(c, all.front(), outcome.run, backend_->name(), thorough);
     outcome.verdicts = judgement.verdicts;
     EXPECT_FALSE(judgement.failure) << describe(*judgement.failure);
-    EXPECT_GT(outcome.verdicts + (outcome.trail.steps.empty() ? 1 : 0), 0);
+    EXPECT_GT(outcome.verdicts + (outcome.run.trace.moments.empty() ? 1 : 0), 0);
     return outcome;
   }
   Outcome run(const Case& c) { return run(c, load(c)); }
@@ -251,7 +253,9 @@ TEST_P(HardCases, ARetracedCutTakesNothingMore) {
     c.strokes = {slanted ? Stroke{{-8, -3, 13}, {33, 30, 5}, 4, true, Link::apart} : through_x(10), back, back};
     const Outcome cut = run(c);
     std::vector<int64_t> removed;
-    for (const auto& [stage, state] : cut.trail.steps) {
+    for (const harness::Moment& moment : cut.run.trace.moments) {
+      const Stage stage = moment.span.last;
+      const State& state = *moment.after;
       if (stage == Stage::detect) removed.push_back(static_cast<int64_t>(state.removed.size()));
     }
     ASSERT_EQ(removed.size(), 3U);
@@ -358,7 +362,8 @@ TEST_P(HardCases, InvertedAndFlattenedBodiesComeBackToTheirShape) {
       for (int axis = 0; axis < 3; ++axis) x[axis] = center[axis] + factor[axis] * (x[axis] - center[axis]);
     }
     const Outcome outcome = run(c, loaded, false);
-    for (const auto& [stage, state] : outcome.trail.steps) {
+    for (const harness::Moment& moment : outcome.run.trace.moments) {
+      const State& state = *moment.after;
       for (const Vec3& x : state.x) ASSERT_TRUE(std::isfinite(x.x) && std::isfinite(x.y) && std::isfinite(x.z));
     }
     EXPECT_LT(greatest_strain(outcome.setup, outcome.last()), 1e-2);
@@ -473,7 +478,9 @@ TEST_P(HardCases, AThousandStrokesOnOneBodyKeepEveryInvariant) {
   const Outcome cut = run(c, load(c), false);
   EXPECT_EQ(cut.last().frame, strokes / 4);
   int64_t frames_with_removals = 0, before = static_cast<int64_t>(c.nodes.size());
-  for (const auto& [stage, state] : cut.trail.steps) {
+  for (const harness::Moment& moment : cut.run.trace.moments) {
+    const Stage stage = moment.span.last;
+    const State& state = *moment.after;
     if (stage != Stage::skin) continue;
     frames_with_removals += alive_in(state) < before;
     EXPECT_LE(alive_in(state), before) << "what is dead stays dead";
@@ -499,10 +506,11 @@ TEST_P(HardCases, ABodyAMillionSpacingsFromTheWorldsOriginGivesTheSameBits) {
   Loaded far = near;
   far.setup.body.origin = {1e6 * c.spacing, -1e6 * c.spacing, 1e6 * c.spacing};
   const Outcome a = run(c, near, false), b = run(c, far, false);
-  ASSERT_EQ(a.trail.steps.size(), b.trail.steps.size());
+  const auto &of_a = a.run.trace.moments, &of_b = b.run.trace.moments;
+  ASSERT_EQ(of_a.size(), of_b.size());
   ASSERT_GT(a.removed(), 0);
-  for (std::size_t k = 0; k < a.trail.steps.size(); ++k) {
-    ASSERT_TRUE(a.trail.steps[k].state == b.trail.steps[k].state) << "after stage " << k;
+  for (std::size_t k = 0; k < of_a.size(); ++k) {
+    ASSERT_TRUE(*of_a[k].after == *of_b[k].after) << "after stage " << k;
   }
 }
 

@@ -10,6 +10,7 @@
 
 #include "model/error.h"
 #include "model/io/recording.h"
+#include "model/rules.h"
 #include "oracles/oracles.h"
 
 namespace cutproof::property_tests {
@@ -154,7 +155,7 @@ std::vector<Command> commands_from_json(const std::string& list) {
 History::History(Source make, Case c)
     : make_(std::move(make)), case_(std::move(c)), loaded_(load(case_)), staged_(make_()), state_(loaded_.state) {
   if (case_.together != 1) throw std::invalid_argument("a history needs a case with one stroke a frame (together: 1)");
-  if (case_.merge != MergeRule::published && case_.merge != MergeRule::single_pass) whole_ = make_();
+  if (promise_of(case_.merge).unique) whole_ = make_();
   given_strokes_ = static_cast<int32_t>(loaded_.setup.stroke_end.size());
   load_both(true);
 }
@@ -172,7 +173,7 @@ void History::execute(const Command& command) {
       },
       command);
   if (!failure_ && !(position() == expected)) {
-    fail(broken_contract("a frame ends with skin and nowhere else", next_, state_, staged_->name()));
+    fail(broken("a frame ends with skin and nowhere else", next_));
   }
 }
 
@@ -188,27 +189,20 @@ void History::run(const RunStages& command) {
 void History::run_span(Span span, bool whole) {
   const std::string name = staged_->name();
   const State start = state_;
-  Trail trail;
-  trail.initial = start;
-  trail.has_expanded = has_expanded_;
-  std::array<bool, 6> ran = {};
-  for (const Stage stage : kStages) {
-    if (!span.contains(stage)) continue;
-    const auto s = static_cast<std::size_t>(stage);
-    const bool due = is_due(loaded_.setup, stage, state_);
-    staged_->run({stage, stage});
-    ran[s] = staged_->report().ran[s];
-    State next = staged_->snapshot().front();
-    if (ran[s] != due && !trail.failure) {
-      trail.failure = broken_contract(due ? "a stage that is due runs" : "only what is due runs", stage, next, name);
-    }
-    if (stage == Stage::expand && next.clusters.members != state_.clusters.members) has_expanded_ = true;
-    state_ = next;
-    trail.steps.push_back({stage, std::move(next)});
-  }
+  CaseRun run;
+  run.trace.initial = std::make_shared<const State>(start);
+  run.has_expanded = has_expanded_;
+  staged_run_->run(span, [&](const harness::Moment& moment) {
+    run.trace.moments.push_back(moment);
+    const Clusters &before = moment.before->clusters, &after = moment.after->clusters;
+    if (moment.span.contains(Stage::expand) && before.members != after.members) has_expanded_ = true;
+  });
+  const std::vector<Verdict> broken_contracts = staged_run_->take_broken_contracts();
+  if (!broken_contracts.empty()) run.failure = broken_contracts.front();
+  state_ = *staged_run_->states().front();
   next_ = stage_at(static_cast<int32_t>(span.last) + 1);
 
-  Judgement judgement = judge_trail(case_, loaded_, trail, name, false);
+  Judgement judgement = judge_case(case_, loaded_, run, name, false);
   verdicts_ += judgement.verdicts;
   if (judgement.failure) return fail(std::move(*judgement.failure));
 
@@ -220,15 +214,15 @@ void History::run_span(Span span, bool whole) {
   }
   if (!whole_) return;
   if (whole) {
-    whole_->run(span);
-    if (whole_->report().ran != ran) {
-      return fail(broken_contract("a whole span runs the stages that are due", span.last, state_, name));
+    whole_run_->run(span, nullptr);
+    if (whole_run_->ran() != staged_run_->ran()) {
+      return fail(broken("a whole span runs the stages that are due", span.last));
     }
   } else {
-    for (const auto& step : trail.steps) whole_->run({step.stage, step.stage});
+    whole_run_->run(span, [](const harness::Moment&) {});
   }
   require_same(whole ? "a span is the composition of its stages" : "same input, same bits", state_,
-               whole_->snapshot().front());
+               *whole_run_->states().front());
   if (cuts && whole && span.last == Stage::skin) note(HistoryHappened::cut_as_one_span);
   if (!state_.removed.empty() && unloaded_beside_ && span.last == Stage::skin) {
     note(HistoryHappened::went_on_without_a_load);
@@ -283,18 +277,17 @@ void History::kick(const Kick& command) {
 // what that step moves may then be removed by the next detection. Later stages may differ: whether small clusters are
 // merged depends on whether anything at all was removed.
 void History::require_no_ghost_force(const State& kicked, const std::vector<int32_t>& component_of, int32_t component) {
-  whole_->load({loaded_.setup, loaded_.setup}, {state_, kicked});
-  if (next_ != Stage::step) whole_->run({next_, Stage::skin});
-  whole_->run({Stage::step, Stage::detect});
-  const std::vector<State> both = whole_->snapshot();
+  harness::FrameRunner run(*whole_, {loaded_.setup, loaded_.setup}, {state_, kicked});
+  if (next_ != Stage::step) run.run({next_, Stage::skin}, nullptr);
+  run.run({Stage::step, Stage::detect}, nullptr);
+  const State &still = *run.states()[0], &pushed = *run.states()[1];
   ++verdicts_;
   for (std::size_t i = 0; i < component_of.size(); ++i) {
     if (component_of[i] == component) continue;
-    if (same_bits(both[0].x[i], both[1].x[i]) && same_bits(both[0].v[i], both[1].v[i]) &&
-        both[0].alive[i] == both[1].alive[i]) {
+    if (same_bits(still.x[i], pushed.x[i]) && same_bits(still.v[i], pushed.v[i]) && still.alive[i] == pushed.alive[i]) {
       continue;
     }
-    Verdict verdict = broken_contract("no ghost force", Stage::step, state_, staged_->name());
+    Verdict verdict = broken("no ghost force", Stage::step);
     verdict.bound_source = "oracles_and_tests.md §1";
     verdict.witness.particles = {static_cast<int32_t>(i)};
     verdict.witness.text = "particle " + std::to_string(i) + " moves otherwise when another component is kicked";
@@ -304,7 +297,7 @@ void History::require_no_ghost_force(const State& kicked, const std::vector<int3
 
 void History::save_and_load(const SaveAndLoad& command) {
   note_load();
-  State saved = staged_->snapshot().front();
+  State saved = staged_run_->snapshot().front();
   require_same("a snapshot changes nothing", state_, saved);
   Setup setup = loaded_.setup;
   if (command.through_files) {
@@ -319,33 +312,37 @@ void History::save_and_load(const SaveAndLoad& command) {
     saved = std::move(read.state);
     setup = reader.header().setup;
     if (!saved.skin.owner.empty()) note(HistoryHappened::read_from_files);
+    staged_run_.reset();
     staged_ = make_();
   }
-  staged_->load({setup}, {saved});
-  State taken = staged_->snapshot().front();
+  loaded_.setup = setup;
+  State taken = loaded_into(staged_run_, *staged_, saved);
   require_same("loading changes nothing", state_, taken, staged_->precision() != Precision::binary64);
   state_ = std::move(taken);
   unloaded_beside_ = whole_ && loads_in_bits();
   if (whole_ && !unloaded_beside_) {
-    require_same("same input, same bits", state_, loaded_into(*whole_, saved));
+    require_same("same input, same bits", state_, loaded_into(whole_run_, *whole_, saved));
   }
 }
 
 // A displacement of a single precision that is not zero may lose its last bits beside a rest position.
-bool History::loads_in_bits() const { return staged_->precision() == Precision::binary64 || (!case_.moves && !has_kicked_); }
+bool History::loads_in_bits() const {
+  return staged_->precision() == Precision::binary64 || (!case_.moves && !has_kicked_);
+}
 
-State History::loaded_into(Backend& backend, const State& state) {
-  backend.load({loaded_.setup}, {state});
-  return backend.snapshot().front();
+State History::loaded_into(std::unique_ptr<harness::FrameRunner>& run, Backend& backend, const State& state) {
+  run = std::make_unique<harness::FrameRunner>(backend, std::vector<Setup>{loaded_.setup}, std::vector<State>{state});
+  return *run->states().front();
 }
 
 void History::load_both(bool is_first) {
   const bool is_single = staged_->precision() != Precision::binary64;
-  State taken = loaded_into(*staged_, state_);
+  State taken = loaded_into(staged_run_, *staged_, state_);
   // The first state was not made by this backend, so in single precision more than velocities is rounded.
   if (!is_first || !is_single) require_same("loading changes nothing", state_, taken, is_single);
-  if (is_single) require_same("loading what is rounded changes nothing", taken, loaded_into(*staged_, taken));
-  if (whole_) require_same("same input, same bits", taken, loaded_into(*whole_, taken));
+  if (is_single)
+    require_same("loading what is rounded changes nothing", taken, loaded_into(staged_run_, *staged_, taken));
+  if (whole_) require_same("same input, same bits", taken, loaded_into(whole_run_, *whole_, taken));
   state_ = std::move(taken);
   unloaded_beside_ = false;
 }
@@ -354,10 +351,16 @@ void History::require_same(const char* property, const State& expected, const St
   ++verdicts_;
   const std::string what = difference(expected, found, but_for_rounding);
   if (what.empty()) return;
-  Verdict verdict = broken_contract(property, before(next_), expected, staged_->name());
+  Verdict verdict = broken(property, before(next_));
   verdict.measured = 1;
   verdict.witness.text = "different: " + what;
   fail(std::move(verdict));
+}
+
+Verdict History::broken(const char* what, Stage stage) const {
+  Verdict verdict = harness::broken_contract(what, stage, state_.frame);
+  verdict.backend = staged_->name();
+  return verdict;
 }
 
 void History::fail(Verdict verdict) {

@@ -11,6 +11,7 @@
 #include <variant>
 #include <vector>
 
+#include "harness/frame_runner.h"
 #include "property_tests/dissection.h"
 
 namespace cutproof::property_tests {
@@ -86,7 +87,7 @@ inline constexpr std::array<const char*, kHistoryHappenedCount> kHistoryHappened
     "separation by a stroke that came later"};
 
 // Runs a history and judges it. After every stage: all oracles, and the reference's answer to the same state
-// (judge_trail). Beyond these:
+// (judge_case). Beyond these:
 // - Loading changes nothing: the state comes back with the same bits, in single precision the impulse (a sum over
 //   particles there) up to rounding. In double precision, and in single as long as nothing has moved, a backend that is
 //   saved and loaded also goes on with the same bits as one beside it that is not. A state has positions and kernels
@@ -119,10 +120,11 @@ class History {
   void wait_for_frames(int64_t count);
   void change_schedule();
   void load_both(bool is_first = false);
-  State loaded_into(Backend& backend, const State& state);
+  State loaded_into(std::unique_ptr<harness::FrameRunner>& run, Backend& backend, const State& state);
   void require_same(const char* property, const State& expected, const State& found, bool but_for_rounding = false);
   void require_no_ghost_force(const State& kicked, const std::vector<int32_t>& component_of, int32_t component);
   bool loads_in_bits() const;
+  Verdict broken(const char* what, Stage stage) const;
   void fail(Verdict verdict);
   void note(HistoryHappened what) { ++happened_[static_cast<std::size_t>(what)]; }
   void note_load();
@@ -132,7 +134,8 @@ class History {
   Loaded loaded_;
   std::unique_ptr<Backend> staged_;  // runs stage by stage, is judged, saved and loaded
   std::unique_ptr<Backend> whole_;   // beside it; null if equal bits are not asked for
-  State state_;                      // of staged_
+  std::unique_ptr<harness::FrameRunner> staged_run_, whole_run_;
+  State state_;  // of staged_
   Stage next_ = Stage::step;
   int32_t given_strokes_ = 0;  // with the blade down, of the case as it was drawn
   bool has_expanded_ = false;

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Plants faults into a copy of the code, one at a time, and asks the gate to find each of them.
+"""Mutation testing: applies one mutant at a time to a copy of the code and asks the gate to find it.
 
 Usage: run.py [--only NAME...] [--jobs N] [--json F] [--check]
 
@@ -13,8 +13,8 @@ A fault is a patch, mutants/NN_name.patch, with a head of lines `Field: text` (a
 There is one copy (build/mutation_testing/tree) with one build folder, without CUDA. The unchanged code must pass every
 command that is used. Then for each fault: patch, build what its suspects need, run them until one finds it; if none
 does, the tests of its stage, the properties, and five minutes of `cutproof fuzz`. A fault that does not apply or does
-not compile is an error, not a find. Writes docs/mutation_testing.md unless --only is given. Exit status: 0 every fault
-was found, 1 one was not or the unchanged code fails, 2 bad usage or a bad patch.
+not compile is an error, not a find. Writes docs/results/mutation_testing.md unless --only is given. Exit status: 0
+every fault was found, 1 one was not or the unchanged code fails, 2 bad usage or a bad patch.
 """
 import argparse
 import contextlib
@@ -35,7 +35,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 WORK = ROOT / "build" / "mutation_testing"
 TREE, BUILD, RUN = WORK / "tree", WORK / "build", WORK / "run"
-TABLE = ROOT / "docs" / "mutation_testing.md"
+TABLE = ROOT / "docs" / "results" / "mutation_testing.md"
 STAGES = ("step", "detect", "split", "merge", "expand", "skin", "launch")
 FIELDS = ("Stage", "Fault", "Suspect", "Livelock")
 MOST_SECONDS = 420  # of one command
@@ -120,8 +120,8 @@ def apply(fault, check_only=False, tree=TREE):
 
 
 @contextlib.contextmanager
-def planted(fault):
-    """The fault is in the copy as long as this lasts."""
+def applied(fault):
+    """The mutant is in the copy as long as this lasts."""
     before = {file: (TREE / file).read_bytes() for file in fault.files}
     apply(fault)
     try:
@@ -257,7 +257,7 @@ def plural(count, noun):
 
 def judge(fault, jobs):
     """Plants one fault. Returns the outcome and the command that gave it; (None, None) if the fault survives."""
-    with planted(fault):
+    with applied(fault):
         built = set()
         for command in fault.suspects + fallbacks(fault):
             needed = {target_of(c) for c in (fault.suspects if command in fault.suspects else [command])}
@@ -293,13 +293,13 @@ def simplicity(rows):
 
 def write_table(rows):
     lines = [
-        "# Planted faults",
+        "# Mutation testing",
         "",
-        "Written by `ci/mutation_testing/run.py`; every fault is a patch in `ci/mutation_testing/mutants/`. Each is a wrong program"
-        " of the kind that people write: it is planted into a copy of the code, built, and given to the gate (tests,"
-        " properties, `cutproof fuzz`), which also passes the unchanged code. A run stops at the first find and begins"
-        " with the suspected property. *Took*: cases of a random property or campaign until the find, schedules of a"
-        " simulated machine, or a unit test. *Counterexample*: what `cutproof fuzz` has made of the case that it found.",
+        "Written by `ci/mutation_testing/run.py`. Each mutant is a patch in `ci/mutation_testing/mutants/`: a wrong program"
+        " of the kind that people write. It is applied to a copy of the code, built, and given to the gate (tests,"
+        " properties, `cutproof fuzz`), which passes the unchanged code. A run stops at the first find and begins with the"
+        " suspected property. *Took*: cases of a random property or campaign until the find, schedules of a simulated"
+        " machine, or a unit test. *Counterexample*: what `cutproof fuzz` has made of the case that it found.",
         "",
         f"{sum(1 for row in rows if row['found'])} of {len(rows)} found. {simplicity(rows)}",
     ]
@@ -307,7 +307,7 @@ def write_table(rows):
         of_stage = [row for row in rows if row["stage"] == stage]
         if not of_stage:
             continue
-        lines += ["", f"## {stage}", "", "| fault | what is wrong | in | found by | took | counterexample |",
+        lines += ["", f"## {stage}", "", "| mutant | what is wrong | in | found by | took | counterexample |",
                   "|---|---|---|---|---|---|"]
         for row in of_stage:
             by = row["by"] if row["found"] else "**not found**"
@@ -319,7 +319,7 @@ def write_table(rows):
 
 
 def main():
-    parser = argparse.ArgumentParser(description="Plants faults and asks the gate to find them.")
+    parser = argparse.ArgumentParser(description="Applies mutants and asks the gate to find them.")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="faults whose name begins with one of these")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="of the builds")
     parser.add_argument("--json", metavar="F", help="write the results there as well")
@@ -330,11 +330,11 @@ def main():
     if options.only:
         for name in options.only:
             if not any(path.stem.startswith(name) for path in paths):
-                raise BadFault(f"--only: there is no fault '{name}' in {HERE / 'faults'}")
+                raise BadFault(f"--only: there is no fault '{name}' in {HERE / 'mutants'}")
         paths = [path for path in paths if any(path.stem.startswith(name) for name in options.only)]
     faults = [read_fault(path) for path in paths]
     if not faults:
-        raise BadFault(f"there are no faults in {HERE / 'faults'}")
+        raise BadFault(f"there are no faults in {HERE / 'mutants'}")
     if options.check:
         for fault in faults:
             apply(fault, check_only=True, tree=ROOT)
@@ -393,5 +393,5 @@ if __name__ == "__main__":
     try:
         sys.exit(main())
     except BadFault as error:
-        print(f"planted faults: {error}", file=sys.stderr)
+        print(f"mutation testing: {error}", file=sys.stderr)
         sys.exit(2)

@@ -23,7 +23,7 @@
 
 #include "fixtures/build.h"
 #include "gpu/backends.h"
-#include "harness/judge.h"
+#include "harness/scene_judge.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
 #include "reference_cpu/reference.h"
@@ -62,14 +62,18 @@ class Leaks : public testing::Test {
     for (int64_t frame = 0; frame < built.setup.frame_count(); ++frame) {
       for (const Stage stage : kStages) {
         backend->run({stage, stage});
-        if (stage >= Stage::detect) snapshots.push_back({stage, backend->snapshot().front()});
+        snapshots.push_back({stage, backend->snapshot().front()});
       }
     }
   }
   void judge() const {
-    cli::Gate gate(built.setup, scene.expect, "reference", built.state);
-    for (std::size_t k = 1; k < snapshots.size(); ++k) gate.see(snapshots[k].stage, snapshots[k].state);
-    gate.finish();
+    harness::Snapshot before = std::make_shared<const State>(snapshots.front().state);
+    harness::SceneJudge judge(built.setup, scene.expect, "reference", before);
+    for (std::size_t k = 1; k < snapshots.size(); ++k) {
+      const auto after = std::make_shared<const State>(snapshots[k].state);
+      judge.see({0, {snapshots[k].stage, snapshots[k].stage}, std::exchange(before, after), after, true});
+    }
+    judge.finish();
   }
   std::string recording() const { return (folder / "r").string(); }
   void record() const {

@@ -71,7 +71,8 @@ fixtures::Built build(const std::string& name, std::optional<int64_t> particles 
   return fixtures::build(io::read_scene(file), file, options);
 }
 
-// Runs at most `frames` frames. `precision`: of the state that is loaded, so that the comparison allows for at least that.
+// Runs at most `frames` frames. `precision`: of the state that is loaded, so that the comparison allows for at least
+// that.
 Against compare(Backend& backend, fixtures::Built& built, int64_t frames, AgainstMode mode = AgainstMode::both,
                 Precision precision = Precision::binary64) {
   built.state.precision = precision;

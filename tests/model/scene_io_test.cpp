@@ -497,8 +497,8 @@ TEST(SceneReference, NamesEveryFieldThatIsWritten) {
 }
 
 TEST(SceneReference, IsThePageOfTheDocumentation) {
-  const std::string page = read_text(std::string(CUTPROOF_SOURCE_DIR) + "/docs/scene.md");
-  EXPECT_EQ(page, scene_reference()) << "Regenerate it: cutproof info --scene > docs/scene.md";
+  const std::string page = read_text(std::string(CUTPROOF_SOURCE_DIR) + "/docs/reference/scene.md");
+  EXPECT_EQ(page, scene_reference()) << "Regenerate it: cutproof info --scene > docs/reference/scene.md";
 }
 
 }  // namespace

@@ -1,0 +1,53 @@
+// A run as those see it who look at it: a sequence of moments, each the state of one body before and after a span of
+// stages, whoever ran them and whether they run now or were recorded.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "model/setup.h"
+#include "model/stage.h"
+#include "model/state.h"
+#include "model/verdict.h"
+
+namespace cutproof::harness {
+
+// A state that nobody changes any more; whoever wants to keep it keeps the pointer.
+using Snapshot = std::shared_ptr<const State>;
+
+struct Moment {
+  int32_t body = 0;
+  Span span;
+  Snapshot before, after;
+  // False: the backend cannot run these stages, so the reference ran them for it, and they are nobody's to be judged.
+  bool by_backend = true;
+};
+using Observer = std::function<void(const Moment&)>;
+
+// One body's run: the state as loaded, and what came of it.
+struct Trace {
+  Snapshot initial;
+  std::vector<Moment> moments;
+};
+
+// The stages of a span that model/backend.h has a body run, given the states before and after it (`after` is asked only
+// for what was removed in it). The skin stage ends the frame whether a skin is wanted or not.
+std::array<bool, 6> due_stages(const Setup& setup, const State& before, Span span, const State& after);
+
+// A failing verdict: something that model/backend.h promises does not hold.
+Verdict broken_contract(std::string what, Stage stage, int64_t frame, int32_t body = 0);
+
+// What one frame did, over all bodies.
+struct FrameResult {
+  int64_t frame = 0;
+  std::array<bool, 6> ran = {};        // by stage
+  double total_seconds = 0;            // 0: not timed
+  std::array<double, 6> seconds = {};  // by stage; 0 where several ran as one piece
+  int64_t removed = 0, debris = 0, alive = 0, clusters = 0, triangles = 0;
+};
+// Adds the counts of a body's state at the end of a frame.
+void count(FrameResult& frame, const State& state);
+
+}  // namespace cutproof::harness

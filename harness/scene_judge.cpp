@@ -1,0 +1,62 @@
+#include "harness/scene_judge.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+namespace cutproof::harness {
+
+SceneJudge::SceneJudge(const Setup& setup, const Expectations& expectations, std::string backend,
+                       const Snapshot& initial)
+    : setup_(setup),
+      judge_(setup, std::move(backend), Promises{}, Thorough::when_cut),
+      expectations_(setup, expectations, initial) {
+  judge_.begin(initial);
+}
+
+void SceneJudge::see(const Moment& moment) {
+  judge_.see(moment);
+  expectations_.see(moment);
+}
+
+void SceneJudge::finish() {
+  const auto whole = [&](const char* what, bool holds, double measured, double bound, const std::string& text) {
+    Verdict verdict;
+    verdict.property = what;
+    verdict.frame = std::max<int64_t>(judge_.frame() - 1, 0);
+    verdict.holds = holds;
+    verdict.measured = measured;
+    verdict.bound = bound;
+    verdict.unit = "1";
+    verdict.bound_source = "docs/oracles.md, A whole run";
+    verdict.checked = 1;
+    if (!holds) verdict.witness.text = text;
+    judge_.add(std::move(verdict));
+  };
+  for (Verdict& verdict : expectations_.verdicts()) judge_.add(std::move(verdict));
+  const auto frames = static_cast<double>(setup_.frame_count()), seen = static_cast<double>(judge_.frame());
+  whole("the run is whole", seen == frames, seen, frames,
+        fmt::format("it ends after frame {} of {}", judge_.frame(), setup_.frame_count()));
+  const double moments = seen * setup_.body.particle_count();
+  whole("something was judged", moments > 0, moments, 1,
+        "there was nothing to judge: there are no frames, or the body has no particles");
+}
+
+bool SceneJudge::holds() const {
+  const auto& all = verdicts();
+  return std::all_of(all.begin(), all.end(),
+                     [this](const Verdict& verdict) { return verdict.holds || is_expected_failure(verdict); });
+}
+
+std::vector<std::string> SceneJudge::notes() const {
+  std::vector<std::string> notes;
+  if (!expectations_.any()) notes.push_back("The scene expects nothing: no outcome was held against it.");
+  for (const Judge::Unpromised& u : judge_.unpromised()) {
+    notes.push_back(fmt::format("'{}' is not promised here: of {} states it would not hold in {}.", u.property,
+                                u.states, u.failing));
+  }
+  return notes;
+}
+
+}  // namespace cutproof::harness

@@ -1,0 +1,226 @@
+#include "oracles/motion.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "oracles/support.h"
+
+namespace cutproof::oracles {
+namespace {
+
+constexpr double kStored = 0x1p-53;  // positions of a state are doubles, whatever they were computed in
+
+// What may push along an axis in one frame.
+enum class Pushes { none, up, down, any };
+
+std::array<Pushes, 3> pushes_of(const Setup& setup, const State& before) {
+  const int64_t substeps = setup.step.substeps, first = before.frame * substeps;
+  bool any = false;
+  for (int64_t s = first; s < first + substeps; ++s) {
+    any = any || (setup.has_blade && setup.blade_moves[at(s)].down);
+    for (const Grip& grip : setup.grips) any = any || (grip.active[at(s)] != 0 && !grip.particles.empty());
+  }
+  // Accelerated iterations weigh earlier pushes negatively, so that their sum may have any sign.
+  any = any || (!setup.walls.empty() && setup.step.acceleration != Acceleration::none);
+  std::array<Pushes, 3> pushes = {Pushes::none, Pushes::none, Pushes::none};
+  for (const Wall& wall : setup.walls) {
+    for (int axis = 0; axis < 3; ++axis) {
+      Pushes& present = pushes[at(axis)];
+      const Pushes more = axis != wall.axis ? (wall.friction > 0 ? Pushes::any : Pushes::none)
+                          : wall.side > 0   ? Pushes::up
+                                            : Pushes::down;
+      if (more == Pushes::none) continue;
+      present = present == Pushes::none || present == more ? more : Pushes::any;
+    }
+  }
+  if (any) pushes.fill(Pushes::any);
+  return pushes;
+}
+
+struct Centre {
+  double mass = 0;
+  Vec3 position, momentum;
+};
+
+// Of the particles in `mask`, summed in extended precision.
+Centre centre_of(const Body& body, const State& state, const std::vector<uint8_t>& mask) {
+  long double mass = 0;
+  std::array<long double, 3> position = {}, momentum = {};
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    if (mask[i] == 0) continue;
+    const long double m = body.mass[i];
+    mass += m;
+    for (int axis = 0; axis < 3; ++axis) {
+      position[at(axis)] += m * state.x[i][axis];
+      momentum[at(axis)] += m * state.v[i][axis];
+    }
+  }
+  Centre centre;
+  centre.mass = static_cast<double>(mass);
+  if (!(centre.mass > 0)) return centre;
+  for (int axis = 0; axis < 3; ++axis) {
+    centre.position[axis] = static_cast<double>(position[at(axis)] / mass);
+    centre.momentum[axis] = static_cast<double>(momentum[at(axis)]);
+  }
+  return centre;
+}
+
+class Motion {
+ public:
+  Motion(const Setup& setup, const State& before, const State& after)
+      : setup_(setup),
+        before_(before),
+        after_(after),
+        h_(setup.body.grid.spacing),
+        dt_(setup.substep_length[at(before.frame)]),
+        decay_(std::exp(-setup.step.damping * dt_)),
+        u_(std::max(unit_roundoff(before), unit_roundoff(after))) {}
+
+  Verdict judged() {
+    verdict_ = start_verdict("motion", after_, "h", "method.md §3; docs/tolerances.md, Motion");
+    if (setup_.step.substeps == 1) judge_single_substep();
+    judge_held();
+    judge_centre();
+    return std::move(verdict_);
+  }
+
+ private:
+  Vec3 displacement(const State& state, std::size_t i) const {
+    return state.x[i] - setup_.body.rest_position(static_cast<int32_t>(i));
+  }
+  double stored(std::size_t i) const { return 4 * kStored * (norm(before_.x[i]) + norm(after_.x[i])); }
+
+  // [m] off by `distance`, of which rounding explains `bound`.
+  template <class Text>
+  void compare(double distance, double bound, std::vector<int32_t> particles, Text text) {
+    ++verdict_.checked;
+    const bool holds = distance <= bound && std::isfinite(bound);
+    const double ratio = holds ? (bound > 0 ? distance / bound : 0) : std::numeric_limits<double>::infinity();
+    if (verdict_.holds && (ratio > worst_ || verdict_.checked == 1)) {
+      worst_ = ratio;
+      verdict_.measured = distance / h_;
+      verdict_.bound = bound / h_;
+      if (!holds) verdict_.witness = {{}, std::move(particles), {}, text()};
+    }
+    verdict_.holds = verdict_.holds && holds;
+  }
+
+  void judge_single_substep() {
+    for (std::size_t i = 0; i < before_.alive.size(); ++i) {
+      if (before_.alive[i] == 0) continue;
+      const Vec3 moved = after_.x[i] - before_.x[i], told = (dt_ / decay_) * after_.v[i];
+      const double rounding = 8 * u_ * norm(moved) + stored(i);
+      compare(norm(moved - told), rounding, {static_cast<int32_t>(i)}, [&] {
+        return fmt::format("particle {} moved by {:.6g} h in one substep, its velocity says {:.6g} h", i,
+                           norm(moved) / h_, norm(told) / h_);
+      });
+    }
+  }
+
+  void judge_held() {
+    const int64_t substeps = setup_.step.substeps, first = before_.frame * substeps, last = first + substeps - 1;
+    for (const Grip& grip : setup_.grips) {
+      Vec3 path;
+      double length = 0;
+      bool throughout = true;
+      for (int64_t s = first; s <= last; ++s) {
+        throughout = throughout && grip.active[at(s)] != 0;
+        path += grip.displacement[at(s)];
+        length += norm(grip.displacement[at(s)]);
+      }
+      const Vec3 pull = grip.displacement[at(last)];
+      for (const int32_t particle : grip.particles) {
+        const std::size_t i = at(particle);
+        if (before_.alive[i] == 0) continue;
+        const double reach = norm(displacement(before_, i)) + norm(displacement(after_, i)) + length;
+        const double rounding = 2 * u_ * static_cast<double>(substeps + 1) * reach +
+                                static_cast<double>(substeps) * (stored(i) + 4 * kStored * length);
+        if (throughout) {
+          compare(norm(after_.x[i] - before_.x[i] - path), rounding, {particle}, [&] {
+            return fmt::format("particle {} is held and should have moved by {:.6g} h, it moved by {:.6g} h", particle,
+                               norm(path) / h_, norm(after_.x[i] - before_.x[i]) / h_);
+          });
+        }
+        if (grip.active[at(last)] != 0) {
+          compare(norm((dt_ / decay_) * after_.v[i] - pull), rounding + 8 * u_ * norm(pull), {particle}, [&] {
+            return fmt::format(
+                "particle {} is held and moved by {:.6g} h in the last substep, its velocity says {:.6g}", particle,
+                norm(pull) / h_, norm((dt_ / decay_) * after_.v[i]) / h_);
+          });
+        }
+      }
+    }
+  }
+
+  // With x_s = x_(s−1) + dt (V_(s−1) + dt g + J_s / M) and V_s = D (V_(s−1) + dt g + J_s / M), an impulse that counts
+  // as I_s in the state has moved the centre by a_s I_s, a_s = dt / M · (1 + D + … + D^(S−s)) / D^(S−s+1), which is
+  // greatest for the first substep and least for the last.
+  void judge_centre() {
+    const Centre start = centre_of(setup_.body, before_, before_.alive);
+    if (!(start.mass > 0)) return;
+    const Centre end = centre_of(setup_.body, after_, before_.alive);
+    const int32_t substeps = setup_.step.substeps;
+    Vec3 moved, velocity = start.momentum / start.mass;
+    double earliest = 0, powers = 0, decay = 1;  // 1 + D + … and D^k
+    for (int32_t s = 0; s < substeps; ++s) {
+      moved += dt_ * (velocity + dt_ * setup_.step.gravity);
+      velocity = decay_ * (velocity + dt_ * setup_.step.gravity);
+      powers += decay;
+      decay *= decay_;
+    }
+    earliest = dt_ * powers / (decay * start.mass);
+    const double latest = dt_ / (decay_ * start.mass);
+    // Each substep's mean velocity is off by as much as the momentum of the frame may be (Linear momentum).
+    const double rounding = 2 * substeps * dt_ / decay * momentum(setup_, before_, after_).bound / start.mass +
+                            8 * kStored * (norm(start.position) + norm(end.position));
+    const std::array<Pushes, 3> pushes = pushes_of(setup_, before_);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double impulse = after_.impulse[axis];
+      const Pushes from = pushes[at(axis)];
+      if (from == Pushes::any) continue;
+      const double least = std::min(latest * impulse, earliest * impulse),
+                   most = std::max(latest * impulse, earliest * impulse);
+      const double beyond = end.position[axis] - start.position[axis] - moved[axis];
+      const double off = beyond < least          ? least - beyond
+                         : beyond > most         ? beyond - most
+                         : std::isfinite(beyond) ? 0.0
+                                                 : beyond;
+      compare(off, rounding, {}, [&] {
+        return fmt::format(
+            "the centre of mass moved by {:.6g} h along axis {}; momentum and gravity account for {:.6g} h, and {} for "
+            "{:.6g} to {:.6g} h",
+            (end.position[axis] - start.position[axis]) / h_, axis, moved[axis] / h_,
+            from == Pushes::none ? "an impulse that nothing can have given" : "contacts", least / h_, most / h_);
+      });
+    }
+    if (setup_.walls.empty() && pushes[0] == Pushes::none) {
+      compare(h_ * norm(after_.impulse), 0, {}, [&] {
+        return fmt::format("an impulse of {:.6g} kg m/s is told, but nothing touches the body", norm(after_.impulse));
+      });
+    }
+  }
+
+  const Setup& setup_;
+  const State &before_, &after_;
+  const double h_, dt_, decay_, u_;
+  Verdict verdict_;
+  double worst_ = -1;
+};
+
+}  // namespace
+
+Verdict motion(const Setup& setup, const State& before, const State& after) {
+  for (const State* state : {&before, &after}) {
+    const Verdict form = well_formed(setup, *state);
+    if (!form.holds) return not_judged("motion", form);
+  }
+  if (before.frame < 0 || before.frame >= setup.frame_count()) {
+    return start_verdict("motion", after, "h", "the schedule is over");
+  }
+  return Motion(setup, before, after).judged();
+}
+
+}  // namespace cutproof::oracles

@@ -1,0 +1,166 @@
+// Backends that can run some spans only are run, and judged on what they run.
+#include "harness/frame_runner.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "property_tests/campaign.h"
+#include "reference_cpu/reference.h"
+#include "tests/cli/cut_scene.h"
+#include "tests/harness/recorded_scene.h"
+
+namespace cutproof {
+namespace {
+
+using harness::plan_spans;
+using harness::PlannedSpan;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using tests::failing;
+
+// The reference, but for what it can run, and what goes wrong in it.
+class Partial final : public Backend {
+ public:
+  using Can = std::function<bool(Span)>;
+  using Fault = std::function<void(Span, State&)>;
+  explicit Partial(Can can, Fault fault = {}) : can_(std::move(can)), fault_(std::move(fault)) {}
+
+  std::string name() const override { return "partial"; }
+  bool can_run(Span span) const override { return can_(span); }
+  void load(std::vector<Setup> setups, std::vector<State> states) override {
+    setups_ = setups;
+    inner_->load(std::move(setups), std::move(states));
+  }
+  void run(Span span) override {
+    EXPECT_TRUE(can_(span)) << "asked to run " << name_of(span.first) << " to " << name_of(span.last);
+    inner_->run(span);
+    report_ = inner_->report();
+    if (!fault_) return;
+    std::vector<State> states = inner_->snapshot();
+    for (State& state : states) fault_(span, state);
+    inner_->load(setups_, std::move(states));
+  }
+  std::vector<State> snapshot() const override { return inner_->snapshot(); }
+  SpanReport report() const override { return report_; }
+
+ private:
+  Can can_;
+  Fault fault_;
+  std::unique_ptr<Backend> inner_ = reference::make_backend();
+  std::vector<Setup> setups_;
+  SpanReport report_;
+};
+
+bool whole_frames_only(Span span) { return span == Span{}; }
+bool split_only(Span span) { return span == Span{Stage::split, Stage::split}; }
+bool step_and_the_rest(Span span) {
+  return span == Span{Stage::step, Stage::step} || span == Span{Stage::detect, Stage::skin};
+}
+
+std::unique_ptr<harness::SceneJudge> judged_live(Backend& backend, const std::string& json) {
+  static std::vector<std::unique_ptr<fixtures::Built>> kept;  // judges refer to their setups
+  const Scene scene = io::parse_scene(json, "the test's scene");
+  kept.push_back(std::make_unique<fixtures::Built>(fixtures::build(scene, "the test's scene")));
+  const fixtures::Built& built = *kept.back();
+  harness::FrameRunner runner(backend, {built.setup}, {built.state});
+  auto judge =
+      std::make_unique<harness::SceneJudge>(built.setup, scene.expect, backend.name(), runner.states().front());
+  while (!runner.is_over()) runner.run_frame([&](const harness::Moment& moment) { judge->see(moment); });
+  for (Verdict& verdict : runner.take_broken_contracts()) judge->add(std::move(verdict));
+  judge->finish();
+  return judge;
+}
+
+TEST(Plan, GivesTheBackendAsManyStagesAsItCanRun) {
+  const Partial whole(whole_frames_only), split(split_only), two(step_and_the_rest), all([](Span) { return true; }),
+      none([](Span) { return false; });
+  EXPECT_THAT(plan_spans(whole, {}, true), ElementsAre(PlannedSpan{{}, true}));
+  const auto of_split = plan_spans(split, {}, true);
+  ASSERT_EQ(of_split.size(), 6u);
+  for (const PlannedSpan& piece : of_split) EXPECT_EQ(piece.by_backend, piece.span.first == Stage::split);
+  EXPECT_THAT(plan_spans(two, {}, true), ElementsAre(PlannedSpan{{Stage::step, Stage::step}, true},
+                                                     PlannedSpan{{Stage::detect, Stage::skin}, true}));
+  EXPECT_EQ(plan_spans(all, {}, true).size(), 6u);
+  EXPECT_THAT(plan_spans(all, {}, false), ElementsAre(PlannedSpan{{}, true}));
+  for (const PlannedSpan& piece : plan_spans(none, {}, true)) EXPECT_FALSE(piece.by_backend);
+}
+
+TEST(PartialBackend, ThatRunsWholeFramesOnlyIsJudged) {
+  Partial right(whole_frames_only);
+  const auto judge = judged_live(right, tests::kCutScene);
+  EXPECT_THAT(failing(*judge), IsEmpty());
+  EXPECT_GT(judge->verdicts().size(), 50u);
+}
+
+// A particle goes over from one cluster of the result to another: what is left is connected, covered and small enough,
+// so only the reference's answer to the same removal shows it.
+TEST(PartialBackend, ThatRunsWholeFramesOnlyIsFoundWrong) {
+  Partial wrong(whole_frames_only, [](Span, State& state) {
+    if (!state.removed.empty()) state.clusters.rotation.front().m = {0, -1, 0, 1, 0, 0, 0, 0, 1};
+  });
+  EXPECT_FALSE(judged_live(wrong, tests::kCutScene)->holds());
+  Partial keeps_a_cluster(whole_frames_only, [](Span, State& state) {
+    if (state.removed.empty()) return;
+    std::swap(state.clusters.rest_center.front(), state.clusters.rest_center.back());
+  });
+  EXPECT_FALSE(judged_live(keeps_a_cluster, tests::kCutScene)->holds());
+  Partial revives(whole_frames_only, [](Span, State& state) {
+    if (!state.removed.empty()) state.removed.pop_back();
+  });
+  EXPECT_THAT(failing(*judged_live(revives, tests::kCutScene)), Contains("detection"));
+}
+
+TEST(PartialBackend, ThatRunsOnlySplitIsJudgedOnThatAlone) {
+  Partial right(split_only);
+  const auto judge = judged_live(right, tests::kCutScene);
+  bool split_judged = false;
+  for (const Verdict& verdict : judge->verdicts()) {
+    split_judged = split_judged || verdict.property == "split exactness";
+    EXPECT_NE(verdict.property, "linear momentum") << "the reference's step is not judged";
+  }
+  EXPECT_TRUE(split_judged);
+  EXPECT_THAT(failing(*judge), IsEmpty());
+}
+
+TEST(PartialBackend, ThatRunsOnlySplitIsFoundWrong) {
+  Partial wrong(split_only, [](Span, State& state) {
+    if (state.clusters.count() > 1) std::swap(state.clusters.rotation.front(), state.clusters.rotation.back());
+    if (state.clusters.count() > 1) state.clusters.rotation.front().m[0] += 1e-9;
+  });
+  EXPECT_THAT(failing(*judged_live(wrong, tests::kCutScene)), Contains("split exactness"));
+}
+
+// --- By `fuzz` -------------------------------------------------------------------------------------------------------
+
+property_tests::Campaign fuzzed(const Partial::Can& can, const Partial::Fault& fault) {
+  property_tests::CampaignOptions options;
+  options.cases = 200;
+  options.keep_going = true;
+  return property_tests::run_campaign(options, {[&](int64_t) { return std::make_unique<Partial>(can, fault); }, false},
+                                      nullptr);
+}
+
+TEST(PartialBackend, IsJudgedByFuzzWhateverItCanRun) {
+  for (const Partial::Can can : {whole_frames_only, split_only, step_and_the_rest}) {
+    const property_tests::Campaign campaign = fuzzed(can, {});
+    EXPECT_TRUE(campaign.violations.empty());
+    EXPECT_GT(campaign.verdicts, 1000);
+  }
+}
+
+TEST(PartialBackend, IsFoundWrongByFuzzWhateverItCanRun) {
+  const auto forgets_a_member = [](Span span, State& state) {
+    if (!span.contains(Stage::split) || state.removed.empty() || state.clusters.count() == 0) return;
+    const auto last = state.clusters.count() - 1;
+    if (state.clusters.size(last) < 2) return;
+    state.clusters.members.pop_back();
+    --state.clusters.offsets.back();
+  };
+  for (const Partial::Can can : {whole_frames_only, split_only, step_and_the_rest}) {
+    EXPECT_FALSE(fuzzed(can, forgets_a_member).violations.empty());
+  }
+}
+
+}  // namespace
+}  // namespace cutproof

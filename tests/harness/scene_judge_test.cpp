@@ -1,0 +1,281 @@
+// What let wrong states through once: each recording here is wrong in one place, and is rejected there.
+#include "harness/scene_judge.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "reference_cpu/reference.h"
+#include "tests/cli/cut_scene.h"
+#include "tests/harness/recorded_scene.h"
+
+namespace cutproof {
+namespace {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using tests::failing;
+using tests::RecordedScene;
+
+// Two clusters that overlap; nothing touches the body, and nobody looks for cuts.
+constexpr const char* kFallingScene = R"({"version": 1, "name": "falling",
+  "body": {"shape": {"kind": "box", "size": [0.08, 0.04, 0.04]}, "spacing": 0.01}, "clusters": {"side": 4},
+  "frame": {"count": 4}, "step": {"gravity": [0, 0, -9.81], "damping": 2}})";
+
+class WrongRecording : public testing::Test {
+ protected:
+  const std::unique_ptr<Backend> reference_ = reference::make_backend();
+};
+
+TEST_F(WrongRecording, IsNotAnUntouchedOneWhicheverSnapshotsItHas) {
+  for (const char* json : {tests::kCutScene, kFallingScene}) {
+    RecordedScene recorded(json, *reference_);
+    EXPECT_THAT(failing(*recorded.judged()), IsEmpty());
+    recorded.keep_ends_of_frames();
+    EXPECT_THAT(failing(*recorded.judged()), IsEmpty()) << "ends of frames alone";
+  }
+}
+
+// --- Between the last stage and the end of the frame -----------------------------------------------------------------
+
+TEST_F(WrongRecording, WithNumbersThatAreNotCompactAtTheEndOfAFrame) {
+  for (const bool cutting : {false, true}) {
+    for (const bool ends_only : {false, true}) {
+      RecordedScene recorded(tests::kCutScene, *reference_);
+      if (ends_only) recorded.keep_ends_of_frames();
+      recorded.first(Stage::skin, cutting).clusters.number.back() += 1;
+      EXPECT_THAT(failing(*recorded.judged()), Contains("untouched")) << cutting << ends_only;
+    }
+  }
+}
+
+TEST_F(WrongRecording, WithVelocitiesExchangedAfterTheStep) {
+  for (const bool cutting : {false, true}) {
+    RecordedScene recorded(tests::kCutScene, *reference_);
+    State& end = recorded.first(Stage::skin, cutting);
+    end.v[0] = {1, 0, 0};
+    std::swap(end.v[0], end.v[1]);
+    EXPECT_THAT(failing(*recorded.judged()), Contains("untouched")) << cutting;
+  }
+}
+
+TEST_F(WrongRecording, WithTheImpulseChangedAfterTheStep) {
+  RecordedScene recorded(tests::kCutScene, *reference_);
+  recorded.first(Stage::skin, true).impulse.x += 1e-9;
+  EXPECT_THAT(failing(*recorded.judged()), Contains("untouched"));
+}
+
+TEST_F(WrongRecording, WithADegenerateFlagChangedAfterTheStep) {
+  RecordedScene recorded(tests::kCutScene, *reference_);
+  recorded.first(Stage::skin, true).clusters.degenerate.front() ^= 1;
+  EXPECT_THAT(failing(*recorded.judged()), Contains("untouched"));
+}
+
+// A cluster takes in a neighbour of its members; its rest frame and all others are right for it.
+void take_in_a_neighbour(const Setup& setup, State& state) {
+  Clusters& clusters = state.clusters;
+  for (const int32_t i : clusters.of(0)) {
+    for (int direction = 0; direction < 6; ++direction) {
+      const int32_t other = setup.body.neighbour(i, direction);
+      const auto members = clusters.of(0);
+      if (other < 0 || state.alive[static_cast<std::size_t>(other)] == 0) continue;
+      if (std::find(members.begin(), members.end(), other) != members.end()) continue;
+      const auto place = std::lower_bound(members.begin(), members.end(), other) - members.begin();
+      clusters.members.insert(clusters.members.begin() + place, other);
+      for (std::size_t c = 1; c < clusters.offsets.size(); ++c) ++clusters.offsets[c];
+      reference::update_rest_frames(setup.body, clusters);
+      return;
+    }
+  }
+  FAIL() << "no cluster has a neighbour";
+}
+
+TEST_F(WrongRecording, InWhichAClusterGrowsAfterExpansion) {
+  RecordedScene recorded(kFallingScene, *reference_);
+  const auto at = recorded.snapshots.size() - 1;
+  ASSERT_EQ(recorded.snapshots[at].stage, Stage::skin);
+  take_in_a_neighbour(recorded.built.setup, recorded.snapshots[at].state);
+  EXPECT_THAT(failing(*recorded.judged()), Contains("untouched"));
+}
+
+// --- Where no detection is launched ----------------------------------------------------------------------------------
+
+TEST_F(WrongRecording, InWhichAParticleDiesUnlistedWhereNothingDetects) {
+  for (const bool ends_only : {false, true}) {
+    RecordedScene recorded(kFallingScene, *reference_);
+    if (ends_only) recorded.keep_ends_of_frames();
+    for (std::size_t k = recorded.snapshots.size() / 2; k < recorded.snapshots.size(); ++k) {
+      recorded.snapshots[k].state.alive[5] = 0;
+    }
+    EXPECT_THAT(failing(*recorded.judged()), Contains("untouched")) << ends_only;
+  }
+}
+
+TEST_F(WrongRecording, InWhichAClusterGrowsWhereNothingDetects) {
+  RecordedScene recorded(kFallingScene, *reference_);
+  recorded.keep_ends_of_frames();
+  for (std::size_t k = 2; k < recorded.snapshots.size(); ++k) {
+    take_in_a_neighbour(recorded.built.setup, recorded.snapshots[k].state);
+  }
+  EXPECT_THAT(failing(*recorded.judged()), Contains("untouched"));
+}
+
+// --- Frames ----------------------------------------------------------------------------------------------------------
+
+TEST_F(WrongRecording, WithAWrongFrameNumberInItsLastSnapshot) {
+  RecordedScene recorded(tests::kCutScene, *reference_);
+  recorded.snapshots.back().state.frame += 1;
+  EXPECT_THAT(failing(*recorded.judged()), ElementsAre("a frame ends with skin and nowhere else"));
+}
+
+TEST_F(WrongRecording, WithoutItsLastFrames) {
+  RecordedScene recorded(kFallingScene, *reference_);
+  recorded.keep_ends_of_frames();
+  recorded.snapshots.pop_back();
+  const auto judge = recorded.judged();
+  EXPECT_THAT(failing(*judge), ElementsAre("the run is whole"));
+  EXPECT_EQ(judge->verdicts().back().property, "something was judged");
+}
+
+TEST_F(WrongRecording, WithSnapshotsInAnotherOrder) {
+  RecordedScene recorded(kFallingScene, *reference_);
+  ASSERT_EQ(recorded.snapshots[1].stage, Stage::step);
+  std::swap(recorded.snapshots[1], recorded.snapshots[2]);
+  EXPECT_THAT(failing(*recorded.judged()), Contains("snapshots come in the order of stages"));
+}
+
+TEST_F(WrongRecording, WithAMalformedSnapshotFailsThereAndNowhereElse) {
+  RecordedScene recorded(kFallingScene, *reference_);
+  recorded.keep_ends_of_frames();
+  State& broken = recorded.snapshots[2].state;  // of frame 1
+  broken.clusters.members[0] = 1'000'000;
+  const auto judge = recorded.judged();
+  EXPECT_THAT(failing(*judge), ElementsAre("well formed"));
+  for (const Verdict& verdict : judge->verdicts()) {
+    if (!verdict.holds) EXPECT_EQ(verdict.frame, 1);
+  }
+  int64_t last = 0;
+  for (const Verdict& verdict : judge->verdicts()) last = std::max(last, verdict.frame);
+  EXPECT_EQ(last, recorded.built.setup.frame_count() - 1) << "frames are counted on";
+}
+
+TEST_F(WrongRecording, WithoutExpectationsIsSaidToHaveNone) {
+  RecordedScene recorded(tests::kCutScene, *reference_);
+  EXPECT_THAT(recorded.judged()->notes(), IsEmpty());
+  recorded.scene.expect = {};
+  const auto notes = recorded.judged()->notes();
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_NE(notes[0].find("expects nothing"), std::string::npos) << notes[0];
+}
+
+TEST_F(WrongRecording, WhoseShellsCannotBeCountedIsSaidToHaveThem) {
+  RecordedScene recorded(tests::kCutScene, *reference_);
+  auto& triangles = recorded.snapshots.back().state.skin.triangles;
+  triangles.push_back(triangles.front());
+  const auto judge = recorded.judged();
+  for (const Verdict& verdict : judge->verdicts()) {
+    if (verdict.holds) continue;
+    EXPECT_EQ(verdict.witness.text.find("counts -"), std::string::npos) << verdict.witness.text;
+    if (verdict.property != "expected shells at the end") continue;
+    EXPECT_NE(verdict.witness.text.find("cannot be counted"), std::string::npos) << verdict.witness.text;
+  }
+  EXPECT_THAT(failing(*judge), Contains("expected shells at the end"));
+}
+
+// --- What links a frame to the next ----------------------------------------------------------------------------------
+
+void one_substep(Setup& setup, State&) {
+  setup.step.substeps = 1;
+  setup.blade_moves.clear();
+}
+
+void unchanged(Setup&, State&) {}
+
+void shift(State& state, Vec3 by) {
+  for (Vec3& x : state.x) x += by;
+  for (Vec3& x : state.skin.position) x += by;
+}
+
+// The least shifts that are found, and what is still within rounding: what a judge cannot tell apart it must not.
+TEST_F(WrongRecording, WhoseBodyAndSkinAreShiftedInOneFrame) {
+  for (const double by : {1.0, 1e-3, 1e-9}) {
+    for (const bool single : {false, true}) {
+      RecordedScene recorded(kFallingScene, *reference_, single ? one_substep : unchanged);
+      recorded.keep_ends_of_frames();
+      for (std::size_t k = 2; k < recorded.snapshots.size(); ++k) shift(recorded.snapshots[k].state, {by, 0, 0});
+      EXPECT_THAT(failing(*recorded.judged()), ElementsAre("motion")) << by << " m, " << single;
+    }
+  }
+  RecordedScene recorded(kFallingScene, *reference_);
+  recorded.keep_ends_of_frames();
+  for (std::size_t k = 2; k < recorded.snapshots.size(); ++k) shift(recorded.snapshots[k].state, {1e-17, 0, 0});
+  EXPECT_THAT(failing(*recorded.judged()), IsEmpty());
+}
+
+TEST_F(WrongRecording, WhoseVelocitiesAreNotThoseOfItsPositions) {
+  for (const double by : {100.0, 1e-9}) {
+    RecordedScene recorded(kFallingScene, *reference_, one_substep);
+    recorded.keep_ends_of_frames();
+    State& last = recorded.snapshots.back().state;
+    for (std::size_t i = 0; i < last.v.size(); ++i) last.v[i].x += i % 2 == 0 ? by : -by;
+    EXPECT_THAT(failing(*recorded.judged()), ElementsAre("motion")) << by << " m/s, in sum none";
+  }
+}
+
+TEST_F(WrongRecording, InWhichAGripDoesNotHoldWhatItHolds) {
+  constexpr const char* kPulled = R"({"version": 1, "name": "pulled",
+    "body": {"shape": {"kind": "box", "size": [0.08, 0.02, 0.02]}, "spacing": 0.01}, "clusters": {"side": 4},
+    "frame": {"count": 4}, "grips": [{"low": [0, 0, 0], "high": [0.2, 1, 1]},
+      {"low": [0.8, 0, 0], "high": [1, 1, 1], "velocity": [0.1, 0, 0]}]})";
+  RecordedScene right(kPulled, *reference_);
+  EXPECT_THAT(failing(*right.judged()), IsEmpty());
+  RecordedScene shifted(kPulled, *reference_);
+  shifted.keep_ends_of_frames();
+  for (std::size_t k = 2; k < shifted.snapshots.size(); ++k) shift(shifted.snapshots[k].state, {0, 1, 0});
+  EXPECT_THAT(failing(*shifted.judged()), ElementsAre("motion"));
+}
+
+// On a wall that pushes to one side only: by more than the impulse can do at its earliest (2.5 mm here), or by less
+// than at its latest (0.6 mm); it does about 1 to 1.6 mm, so a shift of less than that cannot be told without running
+// the step.
+TEST_F(WrongRecording, InWhichTheGroundPushesFartherThanItsImpulse) {
+  constexpr const char* kStanding = R"({"version": 1, "name": "standing",
+    "body": {"shape": {"kind": "box", "size": [0.04, 0.02, 0.02]}, "spacing": 0.01}, "frame": {"count": 4},
+    "step": {"gravity": [0, 0, -9.81]}, "ground": {"friction": 0}})";
+  RecordedScene right(kStanding, *reference_);
+  EXPECT_THAT(failing(*right.judged()), IsEmpty());
+  for (const double by : {2e-3, -1e-3}) {
+    RecordedScene shifted(kStanding, *reference_);
+    shifted.keep_ends_of_frames();
+    for (std::size_t k = 2; k < shifted.snapshots.size(); ++k) shift(shifted.snapshots[k].state, {0, 0, by});
+    EXPECT_THAT(failing(*shifted.judged()), Contains("motion")) << by;
+  }
+}
+
+// --- Nothing to judge ------------------------------------------------------------------------------------------------
+
+TEST_F(WrongRecording, OfABodyWithoutParticlesOrOfNoFramesJudgesNothingAndFails) {
+  RecordedScene recorded(kFallingScene, *reference_);
+  recorded.snapshots.resize(1);
+  recorded.built.setup.substep_length.clear();
+  EXPECT_THAT(failing(*recorded.judged()), ElementsAre("something was judged"));
+
+  cutproof::Setup empty;
+  empty.body.grid = {{2, 2, 2}, 0.01};
+  empty.body.particle_at.assign(8, -1);
+  empty.substep_length = {0.004};
+  empty.skin.wanted = false;
+  const auto before = std::make_shared<const State>();
+  State after;
+  after.frame = 1;
+  harness::SceneJudge judge(empty, {}, "a backend", before);
+  judge.see({0, {}, before, std::make_shared<const State>(after), true});
+  judge.finish();
+  EXPECT_FALSE(judge.holds());
+}
+
+}  // namespace
+}  // namespace cutproof
