@@ -74,7 +74,7 @@ BaselineScene make_baseline_scene(const Baseline& baseline, int64_t particles, u
 
   // The right grip lets go where the push begins, and only the schedule knows when that is.
   fixtures::Built built = fixtures::build(scene, "command line");
-  scene.grips[1].end = built.timeline.time[at(built.setup.stroke_end.back() + 1)];
+  scene.grips[1].end = built.schedule.time[at(built.setup.stroke_end.back() + 1)];
   GripSpec push = right;
   push.after_strokes = true;
   push.end = kPush;
@@ -152,7 +152,7 @@ BaselineRow run_baseline(Backend& backend, const Baseline& baseline, BaselineSce
     row.removed += static_cast<int64_t>(state.removed.size() + state.debris.size());
     const bool last = frame + 1 == scene.setup.frame_count();
     // Where nothing was removed, all is connected and coupled as before.
-    if (frame == 0 || last || !state.removed.empty()) row.end = cli::topology_of(scene.setup, state);
+    if (frame == 0 || last || !state.removed.empty()) row.end = harness::topology_of(scene.setup, state);
     row.isolated = std::max(row.isolated, row.end.isolated);
     row.unequal_frames += !row.end.equal;
     if (last || frame % kOverlapEvery == 0) {

@@ -45,7 +45,7 @@ void delete_from_clusters(const Setup& setup, Deletion deletion, State& state);
 struct BaselineRow {
   Times frame;  // [s] deletion: of step, detect and skin
   int64_t frames = 0, removed = 0, clusters_before = 0, clusters = 0;
-  cli::TopologyFigures end;
+  harness::TopologyFigures end;
   int64_t isolated = 0;        // the most in one frame
   int64_t unequal_frames = 0;  // in which tissue, coupling and skin do not have the same components
   oracles::CutGeometry geometry;

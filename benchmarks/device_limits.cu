@@ -73,30 +73,30 @@ DeviceMemory filled_memory(std::size_t bytes, int value) {
 
 }  // namespace
 
-Floors measure_floors(int repeats) {
+DeviceLimits measure_device_limits(int repeats) {
   constexpr int kShort = 40, kLong = 400;
-  Floors floors;
+  DeviceLimits limits;
   Stopwatch stopwatch;
   {
     constexpr std::size_t kBytes = std::size_t{1} << 30, kChecked = std::size_t{16} << 20;
     const DeviceMemory from = filled_memory(kBytes, 1), to = filled_memory(kBytes, 0);
     CUTPROOF_CUDA(cudaDeviceSynchronize());
-    floors.copy = stopwatch.seconds(repeats, 4, [&](cudaStream_t stream) {
+    limits.copy = stopwatch.seconds(repeats, 4, [&](cudaStream_t stream) {
       CUTPROOF_CUDA(cudaMemcpyAsync(to.get(), from.get(), kBytes, cudaMemcpyDeviceToDevice, stream));
     });
-    floors.copy_bytes = 2.0 * static_cast<double>(kBytes);
-    floors.copy_bytes_per_second = floors.copy_bytes / median(floors.copy);
+    limits.copy_bytes = 2.0 * static_cast<double>(kBytes);
+    limits.copy_bytes_per_second = limits.copy_bytes / median(limits.copy);
     std::vector<unsigned char> end(kChecked);
     CUTPROOF_CUDA(cudaMemcpy(end.data(), static_cast<const unsigned char*>(to.get()) + (kBytes - kChecked), kChecked,
                              cudaMemcpyDeviceToHost));
-    floors.bytes_lost = std::count_if(end.begin(), end.end(), [](unsigned char byte) { return byte != 1; });
+    limits.bytes_lost = std::count_if(end.begin(), end.end(), [](unsigned char byte) { return byte != 1; });
   }
   const Chain few(stopwatch.stream(), kShort), many(stopwatch.stream(), kLong);
-  floors.short_chain = stopwatch.seconds(repeats, 1, [&](cudaStream_t stream) { few.launch(stream); });
-  floors.long_chain = stopwatch.seconds(repeats, 1, [&](cudaStream_t stream) { many.launch(stream); });
-  floors.chain_seconds = median(floors.short_chain);
-  floors.graph_node_seconds = (median(floors.long_chain) - floors.chain_seconds) / (kLong - kShort);
-  return floors;
+  limits.short_chain = stopwatch.seconds(repeats, 1, [&](cudaStream_t stream) { few.launch(stream); });
+  limits.long_chain = stopwatch.seconds(repeats, 1, [&](cudaStream_t stream) { many.launch(stream); });
+  limits.chain_seconds = median(limits.short_chain);
+  limits.graph_node_seconds = (median(limits.long_chain) - limits.chain_seconds) / (kLong - kShort);
+  return limits;
 }
 
 int64_t device_bytes_in_use() {

@@ -1,11 +1,12 @@
-// What the device can do at best, measured: times are told as multiples of these (docs/accuracy_and_speed.md §5).
+// What the device can do at best, measured: times are given as multiples of these (docs/guide/measuring.md,
+// Benchmarks).
 #pragma once
 #include <cstdint>
 #include <vector>
 
 namespace cutproof::gpu {
 
-struct Floors {
+struct DeviceLimits {
   double copy_bytes_per_second = 0;  // device to device, read + written, buffers beyond the caches
   double graph_node_seconds = 0;     // what one more empty kernel costs in a graph that is a chain
   double chain_seconds = 0;          // of a graph of 40 empty kernels, one after the other
@@ -18,7 +19,7 @@ struct Floors {
 
 // On the current device, in less than a second with few repeats; medians. Requires repeats >= 1. Throws MachineError if
 // CUDA fails.
-Floors measure_floors(int repeats = 21);
+DeviceLimits measure_device_limits(int repeats = 21);
 
 // Bytes of the current device's memory that are in use, by whomever. Throws MachineError if CUDA fails.
 int64_t device_bytes_in_use();

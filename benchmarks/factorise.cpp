@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "benchmarks/times.h"
-#include "oracles/comparison/converged.h"
+#include "oracles/comparison/reference_solution.h"
 
 namespace cutproof::benchmarks {
 

@@ -74,7 +74,7 @@ MachineLimits measure_machine(const harness::BackendDescriptor& backend) {
   using harness::Processor;
 #if CUTPROOF_HAS_CUDA
   if (backend.processor == Processor::device) {
-    const gpu::Floors measured = gpu::measure_floors();
+    const gpu::DeviceLimits measured = gpu::measure_device_limits();
     return {measured.copy_bytes_per_second, measured.graph_node_seconds, measured.chain_seconds};
   }
 #endif
@@ -96,7 +96,7 @@ std::vector<MachineLimit> measure_machine_limits(const harness::BackendDescripto
   using harness::Processor;
 #if CUTPROOF_HAS_CUDA
   if (backend.processor == Processor::device) {
-    const gpu::Floors measured = gpu::measure_floors(repeats);
+    const gpu::DeviceLimits measured = gpu::measure_device_limits(repeats);
     return {{"copy, device to device", times_of(measured.copy), measured.copy_bytes, measured.bytes_lost},
             {"graph of 40 empty kernels", times_of(measured.short_chain), 0, {}},
             {"graph of 400 empty kernels", times_of(measured.long_chain), 0, {}}};

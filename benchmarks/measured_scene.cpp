@@ -13,12 +13,12 @@ using nlohmann::json;
 
 std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
 
-json to_json(const Distances& d) {
-  return {{"max_h", json_number(d.max)}, {"rms_h", json_number(d.rms)}, {"beyond", d.beyond}};
+json to_json(const oracles::ErrorNorm& norm) {
+  return {{"max_h", json_number(norm.max)}, {"rms_h", json_number(norm.rms())}, {"beyond", norm.beyond}};
 }
-std::string in_words(const Distances& d) {
-  std::string text = fmt::format("{:.2g} h max, {:.2g} h RMS", d.max, d.rms);
-  if (d.beyond > 0) text += fmt::format(", {} beyond {:.0e} h", d.beyond, kDistanceBound);
+std::string in_words(const oracles::ErrorNorm& norm) {
+  std::string text = fmt::format("{:.2g} h max, {:.2g} h RMS", norm.max, norm.rms());
+  if (norm.beyond > 0) text += fmt::format(", {} beyond {:.0e} h", norm.beyond, oracles::kPositionsWanted);
   return text;
 }
 
@@ -43,7 +43,12 @@ ErrorColumn error_of(Stage stage, const Measured& measured) {
   const FrameErrors* const judged = &*measured.judged;
   switch (stage) {
     case Stage::step:
-      if (judged->step) return {in_words(*judged->step), to_json(*judged->step)};
+      if (const auto& s = judged->step) {
+        ErrorColumn error = {in_words(s->position), to_json(s->position)};
+        error.value["undecidable"] = s->undecidable;
+        if (s->undecidable > 0) error.text += fmt::format(", {} undecidable within rounding", s->undecidable);
+        return error;
+      }
       break;
     case Stage::detect:
       if (const auto& d = judged->detect) {

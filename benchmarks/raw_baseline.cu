@@ -33,12 +33,12 @@ CUTPROOF_DEVICE inline void update_particle(const Particles& p, std::int64_t i) 
 }
 
 template <class Block>
-CUTPROOF_DEVICE void twin_update_particles_kernel(Block& block, Particles p) {
+CUTPROOF_DEVICE void update_particles_kernel(Block& block, Particles p) {
   for (std::int64_t i = block.first(); i < p.count; i += block.stride()) update_particle(p, i);
 }
-CUTPROOF_KERNEL(twin_update_particles_kernel);
+CUTPROOF_KERNEL(update_particles_kernel);
 
-__global__ void __launch_bounds__(256) plain_update_particles_kernel(const __grid_constant__ Particles p) {
+__global__ void __launch_bounds__(256) raw_update_particles_kernel(const __grid_constant__ Particles p) {
   const std::int64_t stride = static_cast<std::int64_t>(gridDim.x) * blockDim.x;
   for (std::int64_t i = static_cast<std::int64_t>(blockIdx.x) * blockDim.x + threadIdx.x; i < p.count; i += stride) {
     update_particle(p, i);
@@ -56,7 +56,7 @@ struct Clusters {
 };
 
 template <class Block>
-CUTPROOF_DEVICE void twin_sum_clusters_kernel(Block& block, Clusters c) {
+CUTPROOF_DEVICE void sum_clusters_kernel(Block& block, Clusters c) {
   int* members = block.template shared<int>(kClusterSize);
   for (int s = block.index(); s < c.count; s += block.count()) {
     for (int i = block.thread(); i < kClusterSize; i += block.size()) members[i] = c.members[s * kClusterSize + i];
@@ -75,15 +75,15 @@ CUTPROOF_DEVICE void twin_sum_clusters_kernel(Block& block, Clusters c) {
     block.sync();
   }
 }
-CUTPROOF_KERNEL(twin_sum_clusters_kernel);
+CUTPROOF_KERNEL(sum_clusters_kernel);
 
-__device__ inline float plain_warp_sum(float value) {
+__device__ inline float raw_warp_sum(float value) {
 #pragma unroll
   for (int distance = 16; distance > 0; distance /= 2) value += __shfl_xor_sync(0xffffffffu, value, distance);
   return value;
 }
 
-__global__ void __launch_bounds__(256) plain_sum_clusters_kernel(const __grid_constant__ Clusters c) {
+__global__ void __launch_bounds__(256) raw_sum_clusters_kernel(const __grid_constant__ Clusters c) {
   extern __shared__ int members[];
   __shared__ float partial[32][3];
   const int lane = static_cast<int>(threadIdx.x % 32), warp = static_cast<int>(threadIdx.x / 32);
@@ -99,7 +99,7 @@ __global__ void __launch_bounds__(256) plain_sum_clusters_kernel(const __grid_co
       y += at.w * at.y;
       z += at.w * at.z;
     }
-    x = plain_warp_sum(x), y = plain_warp_sum(y), z = plain_warp_sum(z);
+    x = raw_warp_sum(x), y = raw_warp_sum(y), z = raw_warp_sum(z);
     __syncthreads();
     if (lane == 0) partial[warp][0] = x, partial[warp][1] = y, partial[warp][2] = z;
     __syncthreads();
@@ -157,10 +157,10 @@ double microseconds_between(const Event& start, const Event& end) {
 }
 
 template <class Function>
-TwinCost resources_of(Function* function) {
+KernelCost resources_of(Function* function) {
   cudaFuncAttributes attributes{};
   CUTPROOF_CUDA(cudaFuncGetAttributes(&attributes, function));
-  TwinCost cost;
+  KernelCost cost;
   cost.registers = attributes.numRegs;
   cost.stack = attributes.localSizeBytes;
   cost.shared = attributes.sharedSizeBytes;
@@ -175,10 +175,10 @@ double median(std::vector<double> values) {
 // Both in turns, so that clocks and caches treat them alike; the first turns do not count. A turn is a queue of
 // launches: of a single one the host's own time to launch it would be part.
 constexpr int kLaunchesInATurn = 16;
-template <class Layer, class Plain>
-void time_both(Layer layer, Plain plain, int launches, TwinResult& result) {
+template <class Layer, class Raw>
+void time_both(Layer layer, Raw raw, int launches, KernelComparison& result) {
   const Event before = make_event(), between = make_event(), after = make_event();
-  std::vector<double> layer_times, plain_times;
+  std::vector<double> layer_times, raw_times;
   constexpr int kWarmUp = 5;
   const auto turn = [](const auto& launch) {
     for (int k = 0; k < kLaunchesInATurn; ++k) launch();
@@ -188,10 +188,10 @@ void time_both(Layer layer, Plain plain, int launches, TwinResult& result) {
     if (i % 2 == 0)
       turn(layer);
     else
-      turn(plain);
+      turn(raw);
     record(between);
     if (i % 2 == 0)
-      turn(plain);
+      turn(raw);
     else
       turn(layer);
     record(after);
@@ -199,10 +199,10 @@ void time_both(Layer layer, Plain plain, int launches, TwinResult& result) {
     const double second = microseconds_between(between, after) / kLaunchesInATurn;
     if (i < kWarmUp) continue;
     layer_times.push_back(i % 2 == 0 ? first : second);
-    plain_times.push_back(i % 2 == 0 ? second : first);
+    raw_times.push_back(i % 2 == 0 ? second : first);
   }
   result.layer.microseconds = median(std::move(layer_times));
-  result.plain.microseconds = median(std::move(plain_times));
+  result.raw.microseconds = median(std::move(raw_times));
 }
 
 std::vector<Float4> some_positions(std::size_t count, unsigned seed) {
@@ -218,8 +218,8 @@ std::vector<Float4> some_positions(std::size_t count, unsigned seed) {
 
 }  // namespace
 
-std::vector<TwinResult> compare_twins(long long particles, int launches) {
-  std::vector<TwinResult> results;
+std::vector<KernelComparison> compare_with_raw(long long particles, int launches) {
+  std::vector<KernelComparison> results;
   int device = 0, multiprocessors = 0;
   CUTPROOF_CUDA(cudaGetDevice(&device));
   CUTPROOF_CUDA(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device));
@@ -227,7 +227,7 @@ std::vector<TwinResult> compare_twins(long long particles, int launches) {
   const std::size_t bytes = count * sizeof(Float4);
   {
     Buffer predicted(bytes), goal(bytes), start(bytes), position(bytes), velocity(bytes);
-    Buffer plain_position(bytes), plain_velocity(bytes);
+    Buffer raw_position(bytes), raw_velocity(bytes);
     predicted.fill(some_positions(count, 1));
     goal.fill(some_positions(count, 2));
     start.fill(some_positions(count, 3));
@@ -240,79 +240,79 @@ std::vector<TwinResult> compare_twins(long long particles, int launches) {
                           0.99f,
                           250.0f,
                           static_cast<int>(count)};
-    Particles plain = layer;
-    plain.position = plain_position.as<Float4>();
-    plain.velocity = plain_velocity.as<Float4>();
+    Particles raw = layer;
+    raw.position = raw_position.as<Float4>();
+    raw.velocity = raw_velocity.as<Float4>();
 
-    TwinResult result;
+    KernelComparison result;
     result.kernel = "update_particles";
     result.items = particles;
-    result.layer = resources_of(&run_kernel<twin_update_particles_kernel_object, detail::Arguments<Particles>>);
-    result.plain = resources_of(&plain_update_particles_kernel);
+    result.layer = resources_of(&run_kernel<update_particles_kernel_object, detail::Arguments<Particles>>);
+    result.raw = resources_of(&raw_update_particles_kernel);
     DeviceLauncher launcher(nullptr);
     const auto grid = static_cast<unsigned>(
         std::min<std::int64_t>((particles + 255) / 256, static_cast<std::int64_t>(32) * multiprocessors));
-    time_both([&] { launcher.items(twin_update_particles_kernel_object{}, particles, layer); },
+    time_both([&] { launcher.items(update_particles_kernel_object{}, particles, layer); },
               [&] {
-                plain_update_particles_kernel<<<grid, 256>>>(plain);
+                raw_update_particles_kernel<<<grid, 256>>>(raw);
                 CUTPROOF_CUDA(cudaGetLastError());
               },
               launches, result);
-    result.same_bits = position.read() == plain_position.read() && velocity.read() == plain_velocity.read();
+    result.same_bits = position.read() == raw_position.read() && velocity.read() == raw_velocity.read();
     results.push_back(result);
   }
   {
     const auto clusters = static_cast<int>(std::max<long long>(1, particles / kClusterSize));
     Buffer position(bytes), members(static_cast<std::size_t>(clusters) * kClusterSize * sizeof(int));
     const std::size_t offset_bytes = static_cast<std::size_t>(clusters) * kClusterSize * sizeof(Float4);
-    Buffer offset(offset_bytes), plain_offset(offset_bytes);
+    Buffer offset(offset_bytes), raw_offset(offset_bytes);
     position.fill(some_positions(count, 4));
     std::vector<int> member(static_cast<std::size_t>(clusters) * kClusterSize);
     for (std::size_t i = 0; i < member.size(); ++i) member[i] = static_cast<int>((i * 7) % count);
     members.fill(member);
     const Clusters layer{position.as<Float4>(), members.as<int>(), offset.as<Float4>(), clusters};
-    Clusters plain = layer;
-    plain.offset = plain_offset.as<Float4>();
+    Clusters raw = layer;
+    raw.offset = raw_offset.as<Float4>();
 
-    TwinResult result;
+    KernelComparison result;
     result.kernel = "sum_clusters";
     result.items = clusters;
-    result.layer = resources_of(&run_kernel<twin_sum_clusters_kernel_object, detail::Arguments<Clusters>>);
-    result.plain = resources_of(&plain_sum_clusters_kernel);
+    result.layer = resources_of(&run_kernel<sum_clusters_kernel_object, detail::Arguments<Clusters>>);
+    result.raw = resources_of(&raw_sum_clusters_kernel);
     DeviceLauncher launcher(nullptr);
     constexpr int kThreads = 128;
     constexpr std::size_t kShared = kClusterSize * sizeof(int);
     const auto grid = static_cast<unsigned>(std::min(clusters, 4 * 2048 / kThreads * multiprocessors));
-    time_both([&] { launcher.blocks(twin_sum_clusters_kernel_object{}, clusters, kThreads, kShared, layer); },
+    time_both([&] { launcher.blocks(sum_clusters_kernel_object{}, clusters, kThreads, kShared, layer); },
               [&] {
-                plain_sum_clusters_kernel<<<grid, kThreads, kShared>>>(plain);
+                raw_sum_clusters_kernel<<<grid, kThreads, kShared>>>(raw);
                 CUTPROOF_CUDA(cudaGetLastError());
               },
               launches, result);
-    result.same_bits = offset.read() == plain_offset.read();
+    result.same_bits = offset.read() == raw_offset.read();
     results.push_back(result);
   }
   return results;
 }
 
-std::string twins_json(const std::vector<TwinResult>& results) {
+std::string raw_baseline_json(const std::vector<KernelComparison>& results) {
   int device = 0;
   cudaDeviceProp properties{};
   CUTPROOF_CUDA(cudaGetDevice(&device));
   CUTPROOF_CUDA(cudaGetDeviceProperties(&properties, device));
   std::ostringstream json;
-  const auto cost = [&](const char* name, const TwinCost& c) {
+  const auto cost = [&](const char* name, const KernelCost& c) {
     json << "\"" << name << "\": {\"registers\": " << c.registers << ", \"stack_bytes\": " << c.stack
          << ", \"shared_bytes\": " << c.shared << ", \"microseconds\": " << c.microseconds << "}";
   };
-  json << "{\"device\": \"" << properties.name << "\", \"twins\": [";
+  json << "{\"device\": \"" << properties.name << "\", \"kernels\": [";
   for (std::size_t i = 0; i < results.size(); ++i) {
     json << (i == 0 ? "\n  {" : ",\n  {") << "\"kernel\": \"" << results[i].kernel
          << "\", \"items\": " << results[i].items << ", ";
     cost("layer", results[i].layer);
     json << ", ";
-    cost("plain", results[i].plain);
-    json << ", \"time_ratio\": " << results[i].layer.microseconds / results[i].plain.microseconds
+    cost("raw", results[i].raw);
+    json << ", \"time_ratio\": " << results[i].layer.microseconds / results[i].raw.microseconds
          << ", \"same_bits\": " << (results[i].same_bits ? "true" : "false") << "}";
   }
   json << "\n]}";

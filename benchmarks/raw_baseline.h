@@ -1,30 +1,30 @@
 // Kernels that are written twice, against DeviceBlock and as plain CUDA, to show that the launch layer costs nothing
-// (docs/architecture.md, Kernels): registers and time within 2 %.
+// (docs/design/architecture.md, Kernels): registers and time within 2 %.
 #pragma once
 #include <string>
 #include <vector>
 
 namespace cutproof::gpu {
 
-struct TwinCost {
+struct KernelCost {
   int registers = 0;        // per thread
   std::size_t stack = 0;    // bytes of local memory per thread, spills included
   std::size_t shared = 0;   // bytes of shared memory per block that the code asks for by itself
   double microseconds = 0;  // median of the launches
 };
 
-struct TwinResult {
+struct KernelComparison {
   std::string kernel;
   long long items = 0;
-  TwinCost layer, plain;
+  KernelCost layer, raw;   // against DeviceBlock; as plain CUDA
   bool same_bits = false;  // both wrote the same
 };
 
-// Runs both twins of each kernel `launches` times in turns on the current device, for about `particles` particles.
+// Runs both versions of each kernel `launches` times in turns on the current device, for about `particles` particles.
 // Requires particles >= 1, launches >= 1. Throws MachineError if CUDA fails.
-std::vector<TwinResult> compare_twins(long long particles, int launches);
+std::vector<KernelComparison> compare_with_raw(long long particles, int launches);
 
 // The device's name and the results, as a JSON object.
-std::string twins_json(const std::vector<TwinResult>& results);
+std::string raw_baseline_json(const std::vector<KernelComparison>& results);
 
 }  // namespace cutproof::gpu

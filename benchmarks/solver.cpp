@@ -7,7 +7,7 @@
 #include "benchmarks/scene.h"
 #include "fixtures/bodies.h"
 #include "fixtures/cook.h"
-#include "oracles/comparison/converged.h"
+#include "oracles/comparison/reference_solution.h"
 #include "oracles/relations/relations.h"
 
 namespace cutproof::benchmarks {
@@ -98,7 +98,7 @@ FrameSolution converged_frame(const Setup& setup, const State& state) {
   FrameSolution solution;
   State now = state;
   for (int32_t substep = 0; substep < setup.step.substeps; ++substep) {
-    oracles::Converged converged = oracles::converged_substep(single, now);
+    oracles::ReferenceSolution converged = oracles::reference_solution(single, now);
     solution.converged &= converged.converged;
     for (std::size_t i = 0; i < now.x.size(); ++i) now.v[i] = (decay / dt) * (converged.x[i] - now.x[i]);
     now.x = std::move(converged.x);

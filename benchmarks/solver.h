@@ -26,7 +26,7 @@ SolverScene make_body_scene(int64_t particles);
 // The same free motion of the frame, in so many substeps.
 Setup with_substeps(const SolverScene& scene, int32_t substeps);
 
-// Where the frame ends if every substep is solved exactly (oracles::converged_substep).
+// Where the frame ends if every substep is solved exactly (oracles::reference_solution).
 struct FrameSolution {
   std::vector<Vec3> x;           // [n]
   std::optional<double> energy;  // [J] of the substep, if there is only one

@@ -4,11 +4,12 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 ci/install.sh
-cmake --preset default -DBUILD_TESTING=OFF >/dev/null
-cmake --build build/default --target cutproof
+# A folder of its own, without what a demonstration does not run: tests, benchmarks, the GPU.
+cmake --preset demo >/dev/null
+cmake --build build/demo --target cutproof
 mkdir -p demo_output
-build/default/cli/cutproof run fixtures/scenes/kidney_discontinuous.json --check \
+build/demo/cli/cutproof run fixtures/scenes/kidney_discontinuous.json --check \
   --record demo_output/kidney --json demo_output/kidney.json
 echo
 echo "demo_output/ holds the recording: open kidney.skin.vtkhdf in ParaView (5.12 or later), or judge it again with"
-echo "  build/default/cli/cutproof check demo_output/kidney"
+echo "  build/demo/cli/cutproof check demo_output/kidney"

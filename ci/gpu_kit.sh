@@ -1,29 +1,36 @@
 #!/usr/bin/env bash
-# Packs what a GPU machine needs that has nothing but a driver: programs, their libraries, scenes, and run.sh.
-# Usage: ci/gpu_kit.sh [BUILD] [KIT]     BUILD: a build folder with the gpu backend (default build/default);
-#                                        KIT: the folder to make (default gpu_kit)
-# On that machine: KIT/run.sh RESULTS    writes JSON and logs into RESULTS; exit status 0 if everything held.
+# Packs what a GPU machine needs that has nothing but a driver: programs, their libraries, scenes, regressions, run.sh.
+# Usage: ci/gpu_kit.sh [BUILD] [KIT]     BUILD: a build folder configured with the gpu backend (default build/default),
+#                                        which this builds; KIT: the folder to make (default gpu_kit)
+# On that machine: KIT/run.sh RESULTS    unpacks KIT/contents.tar.gz into KIT the first time, and writes JSON and logs into
+#                                        RESULTS; exit status 0 if everything held.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 build=${1:-build/default}
 kit=${2:-gpu_kit}
+most_bytes=60000000  # as much as can be sent to such a machine beside the code
 
 programs=(cli/cutproof tests/gpu/launch_device_test tests/gpu/device_failures_test tests/gpu/acceleration_test
   property_tests/property_tests)
-for program in "${programs[@]}"; do
-  [ -x "$build/$program" ] || { echo "ci/gpu_kit.sh: $build/$program is not there: build it with a CUDA toolkit first" >&2; exit 2; }
-done
+[ -f "$build/CMakeCache.txt" ] || { echo "ci/gpu_kit.sh: $build is no build folder: cmake --preset default -B $build first" >&2; exit 2; }
+# The programs look for their libraries beside themselves, and for those that these need as well (a runpath, which is
+# what linkers write nowadays, does not count for those).
+cmake -B "$build" -DCMAKE_BUILD_RPATH='$ORIGIN/../lib' -DCMAKE_EXE_LINKER_FLAGS=-Wl,--disable-new-dtags > /dev/null
+grep -q '^CMAKE_CUDA_COMPILER:.*nvcc' "$build/CMakeCache.txt" ||
+  { echo "ci/gpu_kit.sh: $build has no gpu backend: it needs a CUDA toolkit" >&2; exit 2; }
+cmake --build "$build" --target "${programs[@]##*/}"
 
 rm -rf "$kit.new"
-mkdir -p "$kit.new/bin" "$kit.new/lib"
+mkdir -p "$kit.new/bin" "$kit.new/lib" "$kit.new/fixtures"
 for program in "${programs[@]}"; do
   install -s "$build/$program" "$kit.new/bin/"
   # The C library and the driver are the machine's own.
-  ldd "$build/$program" | awk '$3 ~ /^\// {print $3}' | grep -vE '/(libc|libm|libpthread|libdl|librt|ld-linux[^/]*|libcuda|libresolv)\.so' |
-    while read -r library; do cp -Ln "$library" "$kit.new/lib/"; done
+  ldd "$build/$program" | awk '$3 ~ /^\// {print $3}' | grep -vE '/(libc|libm|libpthread|libdl|librt|ld-linux[^/]*|libcuda|libresolv)\.so'
+done | sort -u | while read -r library; do
+  install -s "$(readlink -f "$library")" "$kit.new/lib/${library##*/}"
 done
-cp -r fixtures "$kit.new/fixtures"
-find "$kit.new/fixtures" -name '*.cpp' -delete -o -name '*.h' -delete -o -name CMakeLists.txt -delete
+cp -r fixtures/scenes fixtures/regressions "$kit.new/fixtures/"
+rm -rf "$kit.new/fixtures/regressions/inputs"  # of readers, which need no GPU
 # kidney_discontinuous at rest for long enough to make 1,000 frames of it.
 python3 - "$kit.new/fixtures/scenes" <<'PYTHON'
 import json, sys
@@ -34,8 +41,15 @@ scene["frame"]["count"] = 1000
 scene["frame"].pop("settle", None)
 json.dump(scene, open(folder + "/kidney_1000_frames.json", "w"))
 PYTHON
+tar -C "$kit.new" -czf "$kit.new/contents.tar.gz" bin lib fixtures
+rm -r "$kit.new"/{bin,lib,fixtures}
 cp ci/gpu_kit_run.sh "$kit.new/run.sh"
 git describe --always --dirty --abbrev=12 > "$kit.new/commit"
+bytes=$(du -sb "$kit.new" | cut -f1)
+if [ "$bytes" -gt "$most_bytes" ]; then
+  echo "ci/gpu_kit.sh: the kit has $bytes bytes, more than $most_bytes" >&2
+  exit 1
+fi
 rm -rf "$kit"
 mv "$kit.new" "$kit"
-du -sh "$kit" | cut -f1
+echo "$kit: $((bytes / 1000000)) MB"

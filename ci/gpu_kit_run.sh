@@ -7,13 +7,13 @@ here=$(cd "$(dirname "$0")" && pwd)
 results=$(mkdir -p "$1" && cd "$1" && pwd)
 shift
 parts=${*:-primitives failures scenes lockstep determinism properties sanitizer timings}
-export CUTPROOF_REGRESSIONS="$here/fixtures/regressions"
 export CUTPROOF_COMMIT=$(cat "$here/commit")
-export LD_LIBRARY_PATH="$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
 export PATH="$here/bin:$PATH:/usr/local/cuda/bin"
 cases=${CUTPROOF_CASES:-100000}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
+[ -d "$here/bin" ] || tar -xzf "$here/contents.tar.gz" -C "$here" || exit 3
+export CUTPROOF_REGRESSIONS="$here/fixtures/regressions"
 status=0
 lines=()
 cd "$here"
@@ -89,7 +89,7 @@ done
 device=$(nvidia-smi --query-gpu=name,driver_version,memory.total --format=csv,noheader 2>/dev/null | head -1)
 {
   echo "{"
-  echo "  \"commit\": \"$(cat commit)\","
+  echo "  \"commit\": \"$CUTPROOF_COMMIT\","
   echo "  \"device\": \"$device\","
   echo "  \"date\": \"$(date -u +%Y-%m-%dT%H:%M:%SZ)\","
   echo "  \"steps\": ["

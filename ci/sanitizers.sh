@@ -1,8 +1,16 @@
 #!/usr/bin/env bash
-# Every test under AddressSanitizer and UndefinedBehaviorSanitizer, then the same under ThreadSanitizer.
+# Every test under AddressSanitizer and UndefinedBehaviorSanitizer, then the same under ThreadSanitizer; and the program
+# linked as a whole, where two definitions of one class are an error (odr).
+# Usage: ci/sanitizers.sh [asan] [tsan] [odr]     default: all
 set -euo pipefail
 cd "$(dirname "$0")/.."
-for preset in ${*:-asan tsan}; do
+for preset in ${*:-asan tsan odr}; do
   echo "== $preset"
-  CUTPROOF_PRESET=$preset ci/test.sh
+  if [ "$preset" = odr ]; then
+    ci/install.sh
+    cmake --preset odr >/dev/null
+    cmake --build build/odr --target cutproof
+  else
+    CUTPROOF_PRESET=$preset ci/test.sh
+  fi
 done

@@ -9,7 +9,6 @@ preset=${CUTPROOF_PRESET:-default}
 ci/install.sh
 werror=()
 [ "${CI:-}" = true ] && werror=(-DCUTPROOF_WERROR=ON)
-# Said outright: the demo configures the same folder without tests.
 cmake --preset "$preset" -DBUILD_TESTING=ON "${werror[@]}" >/dev/null
 build=build/$preset
 cmake --build "$build"

@@ -96,9 +96,9 @@ int print_conclusion(const json& document, bool whole) {
              document.at("cases_per_second").get<double>());
   if (document.contains("steps_compared")) {
     const json& compared = document.at("steps_compared");
-    fmt::print("{} steps beside the reference's: {} positions at most {} h apart, {} either way\n",
+    fmt::print("{} steps beside the reference's: {} positions at most {} h apart, {} undecidable within rounding\n",
                compared.at("steps").get<int64_t>(), compared.at("particles").get<int64_t>(),
-               compared.at("greatest_h").dump(), compared.at("either").get<int64_t>());
+               compared.at("greatest_h").dump(), compared.at("undecidable").get<int64_t>());
   }
   const CampaignConclusion conclusion = conclude(document, whole);
   if (conclusion.holds()) {

@@ -31,7 +31,7 @@ nlohmann::json to_json(const harness::FrameResult& frame, bool timed) {
 
 nlohmann::json to_json(const RunResult& result, const harness::SceneJudge* judge) {
   nlohmann::json document = {{"format", "cutproof." + result.command},
-                             {"format_version", 1},
+                             {"format_version", 2},
                              {"cutproof", kVersion},
                              {"source", result.source},
                              {"scene", result.scene},

@@ -6,7 +6,9 @@
 #include <memory>
 #include <optional>
 
+#include "cli/against_report.h"
 #include "cli/commands.h"
+#include "cli/errors_report.h"
 #include "cli/options.h"
 #include "cli/results.h"
 #include "cli/terminal.h"
@@ -14,7 +16,6 @@
 #include "fixtures/build.h"
 #include "harness/against.h"
 #include "harness/backends.h"
-#include "harness/errors.h"
 #include "harness/frame_runner.h"
 #include "harness/scene_judge.h"
 #include "model/error.h"
@@ -38,7 +39,7 @@ struct RunOptions {
   std::optional<int64_t> frames;     // at most this many of the scene's frames
   bool check = false;
   std::string against;        // "" or the reference
-  std::string mode = "both";  // of the comparison: lockstep, shadow, both
+  std::string mode = "both";  // of the comparison: lockstep, free-running, both
   std::string errors;         // names of errors with commas between them, or "all"; empty: none
   std::string record;
   std::string json;
@@ -64,15 +65,18 @@ double metres_per(const std::string& unit) {
   return found->second;
 }
 
+using harness::Against;
+using harness::AgainstMode;
+
 AgainstMode against_mode(const RunOptions& options) {
   const harness::BackendDescriptor* const other = harness::find_backend(options.against);
   if (other == nullptr || !other->is_the_reference) {
     throw InputError("command line", "--against", fmt::format("'{}' is nothing to compare with", options.against),
                      fmt::format("use --against {}", harness::reference_backend().name));
   }
-  return options.mode == "lockstep" ? AgainstMode::lockstep
-         : options.mode == "shadow" ? AgainstMode::shadow
-                                    : AgainstMode::both;
+  return options.mode == "lockstep"       ? AgainstMode::lockstep
+         : options.mode == "free-running" ? AgainstMode::free_running
+                                          : AgainstMode::both;
 }
 
 void print_header(const Scene& scene, const fixtures::Built& built, const RunOptions& options) {
@@ -119,19 +123,19 @@ void print_summary(const RunResult& result) {
 }
 
 // The comparison goes stage by stage.
-void compare(Against& against, const Setup& setup, const harness::Moment& moment) {
+void compare(Against& against, const Setup& setup, const harness::Moment& moment, const std::array<bool, 6>& ran) {
   const auto due = harness::due_stages(setup, *moment.before, moment.span, *moment.after);
   if (std::count(due.begin(), due.end(), true) > 1) {
     throw InputError("command line", "--against", "this backend runs several stages in one piece",
                      "choose one that runs them one by one, or leave --against out");
   }
-  against.see(moment.span.last, *moment.after, due[static_cast<std::size_t>(moment.span.last)]);
+  against.see(moment.span.last, *moment.after, ran[static_cast<std::size_t>(moment.span.last)]);
 }
 
 int run(const RunOptions& options) {
   std::optional<AgainstMode> mode;
   if (!options.against.empty()) mode = against_mode(options);
-  const ErrorsWanted wanted = errors_wanted(options.errors);
+  const harness::ErrorsWanted wanted = errors_wanted(options.errors);
   if (wanted.implementation)
     mode = mode.value_or(AgainstMode::lockstep) == AgainstMode::lockstep ? AgainstMode::lockstep : AgainstMode::both;
   fixtures::BuildOptions build_options;
@@ -150,7 +154,7 @@ int run(const RunOptions& options) {
     recorder.emplace(options.record, built.setup, io::write_scene(scene), options.backend.name);
   std::optional<harness::SceneJudge> judge;
   std::optional<Against> against;
-  std::optional<Errors> errors;
+  std::optional<harness::Errors> errors;
   print_header(scene, built, options);
 
   RunResult result{"run",
@@ -175,7 +179,7 @@ int run(const RunOptions& options) {
   const harness::Observer see = [&](const harness::Moment& moment) {
     if (judge) judge->see(moment);
     if (recorder) recorder->add(moment.span.last, *moment.after);
-    if (against) compare(*against, built.setup, moment);
+    if (against) compare(*against, built.setup, moment, runner.ran());
   };
   {
     Progress progress("frame", built.setup.frame_count());
@@ -196,9 +200,10 @@ int run(const RunOptions& options) {
     print_verdicts(*judge);
   }
   if (against) print_against(*against);
+  const harness::Lockstep* const implementation = wanted.implementation && against ? &*against->lockstep : nullptr;
   if (errors) {
-    errors->finish(state(), against ? &*against : nullptr);
-    errors->print();
+    errors->finish(state());
+    print_errors(*errors, implementation);
   }
   if (recorder) {
     recorder->finish();
@@ -208,14 +213,14 @@ int run(const RunOptions& options) {
   if (json_file) {
     nlohmann::json document = to_json(result, judge ? &*judge : nullptr);
     if (against) {
-      document["against"] = against->to_json();
+      document["against"] = to_json(*against, built.setup);
       // A list that push_back makes of null is broken where there is no memory for it (nlohmann::json 3.11).
       document["against"]["verdicts"] = nlohmann::json::array();
       for (const Verdict& verdict : against->verdicts()) {
         document["against"]["verdicts"].push_back(io::verdict_json(verdict, false));
       }
     }
-    if (errors) document["errors"] = errors->to_json();
+    if (errors) document["errors"] = to_json(*errors, implementation);
     io::write_text(json_file->temporary(), document.dump(1) + "\n");
     json_file->commit();
     fmt::print("wrote {}\n", options.json);
@@ -248,10 +253,10 @@ void add_run(CLI::App& program, Work& work) {
       ->add_option("--against", options->against,
                    fmt::format("compare every stage with this backend: {}", harness::reference_backend().name))
       ->type_name("B");
-  command->add_option("--mode", options->mode, "of the comparison: lockstep, shadow or both")
+  command->add_option("--mode", options->mode, "of the comparison: lockstep, free-running or both")
       ->capture_default_str()
       ->type_name("M")
-      ->check(CLI::IsMember({"lockstep", "shadow", "both"}))
+      ->check(CLI::IsMember({"lockstep", "free-running", "both"}))
       ->needs("--against");
   command
       ->add_option("--errors", options->errors,

@@ -1,5 +1,9 @@
 # Whether kernels are built for the GPU. Sets CUTPROOF_HAS_CUDA. Without CUDA everything but the `gpu` backend is built.
-set(CUTPROOF_CUDA AUTO CACHE STRING "Build the gpu backend: AUTO (if a CUDA toolkit is found), ON or OFF")
+set(default OFF)
+if(PROJECT_IS_TOP_LEVEL)
+  set(default AUTO)
+endif()
+set(CUTPROOF_CUDA ${default} CACHE STRING "Build the gpu backend: AUTO (if a CUDA toolkit is found), ON or OFF")
 set_property(CACHE CUTPROOF_CUDA PROPERTY STRINGS AUTO ON OFF)
 
 set(CUTPROOF_HAS_CUDA OFF)
@@ -24,7 +28,7 @@ endif()
 if(CUTPROOF_HAS_CUDA)
   # Code for the H200, and portable code that the driver compiles for any other GPU from Turing on.
   if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
-    set(CMAKE_CUDA_ARCHITECTURES 75-virtual 90a-real CACHE STRING "CUDA architectures")
+    set(CMAKE_CUDA_ARCHITECTURES 75-virtual 90a-real)
   endif()
   set(CMAKE_CUDA_RUNTIME_LIBRARY Static)  # programs run where there is only a driver
   if(CCACHE)
@@ -38,10 +42,6 @@ if(CUTPROOF_HAS_CUDA)
     set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION "-std=c++20")
     set(CMAKE_CUDA20_EXTENSION_COMPILE_OPTION "-std=c++20")
   endif()
-  target_compile_options(cutproof_options INTERFACE
-    # No fused multiply-add, as on the host: the same bits where the same operations are done. Its cost stands in
-    # docs/results/.
-    "$<$<COMPILE_LANGUAGE:CUDA>:--fmad=false;--expt-relaxed-constexpr;-Xcompiler=-Wall,-ffp-contract=off>")
   message(STATUS "CUDA ${CUDAToolkit_VERSION}: the gpu backend is built for ${CMAKE_CUDA_ARCHITECTURES}")
 else()
   if(CUTPROOF_CUDA STREQUAL "ON")

@@ -1,7 +1,10 @@
 # Debian's SuiteSparse comes without a CMake package. Targets: SuiteSparse::cholmod, ::spqr, ::btf.
+if(TARGET SuiteSparse::cholmod)
+  return()
+endif()
 foreach(part cholmod spqr btf)
   find_library(SUITESPARSE_${part} ${part} REQUIRED)
-  add_library(SuiteSparse::${part} UNKNOWN IMPORTED)
+  add_library(SuiteSparse::${part} UNKNOWN IMPORTED GLOBAL)
   set_target_properties(SuiteSparse::${part} PROPERTIES IMPORTED_LOCATION ${SUITESPARSE_${part}})
 endforeach()
 find_path(SUITESPARSE_INCLUDE cholmod.h PATH_SUFFIXES suitesparse REQUIRED)

@@ -6,21 +6,14 @@
 #include <string>
 
 #include "gpu/host/host_launcher.h"
-#include "gpu/launch/plan.h"
+#include "gpu/launch/load.h"
 #include "model/backend.h"
 
 namespace cutproof::gpu {
 
-struct KernelOptions {
-  int rotation_method = 5;  // layout.h; kNewton: the fastest of those that fail on no hard case (docs/rotations.md)
-  SplitMethod split = SplitMethod::blocks;
-  bool eager = false;  // gpu: kernels one by one, waiting for each condition, instead of one graph per span
-  double room = 1;     // for growth, of what a first cut needs at most; a backend doubles it when it must (for tests)
-};
-
 // Kernels on `threads` threads of the CPU.
 std::unique_ptr<Backend> make_host_backend(int threads = 1, KernelOptions options = {});
-// Kernels under a simulated schedule (schedule.h).
+// Kernels under a simulated schedule (thread_schedule.h).
 std::unique_ptr<Backend> make_simulated_backend(HostLauncher::Simulated simulation, KernelOptions options = {});
 
 #if CUTPROOF_HAS_CUDA

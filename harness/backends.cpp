@@ -222,7 +222,7 @@ std::unique_ptr<Backend> make_backend(const BackendChoice& choice) {
   return backend.make(choice);
 }
 
-std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice, std::shared_ptr<gpu::Schedule> record) {
+std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice, std::shared_ptr<gpu::ThreadSchedule> record) {
   return make_simulated(
       [inner = generator(choice), record](const gpu::Candidates& candidates) {
         const int thread = inner(candidates);
@@ -232,7 +232,7 @@ std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice, std:
       choice);
 }
 
-std::unique_ptr<Backend> make_replaying_backend(const BackendChoice& choice, gpu::Schedule schedule) {
+std::unique_ptr<Backend> make_replaying_backend(const BackendChoice& choice, gpu::ThreadSchedule schedule) {
   return make_simulated(gpu::replay(std::move(schedule)), choice);
 }
 

@@ -79,8 +79,8 @@ std::string processor_of(const BackendDescriptor& backend);
 std::unique_ptr<Backend> make_backend(const BackendChoice& choice);
 // The same, whose schedule is written down as it is made (docs/oracles_and_tests.md §3). Requires a backend that takes
 // a schedule.
-std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice, std::shared_ptr<gpu::Schedule> record);
-std::unique_ptr<Backend> make_replaying_backend(const BackendChoice& choice, gpu::Schedule schedule);
+std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice, std::shared_ptr<gpu::ThreadSchedule> record);
+std::unique_ptr<Backend> make_replaying_backend(const BackendChoice& choice, gpu::ThreadSchedule schedule);
 
 // For one of many loads that run beside each other: each has a schedule of its own, whose kinds take turns; and one
 // thread, because there are as many loads as threads.

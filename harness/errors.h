@@ -1,28 +1,29 @@
-// `cutproof run --errors`: the errors of accuracy_and_speed.md §1 of one run (docs/errors.md).
+// The errors of one run (docs/guide/measuring.md, Errors).
 #pragma once
 #include <cstdint>
-#include <nlohmann/json.hpp>
+#include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
-#include "harness/against.h"
-#include "oracles/comparison/errors.h"
+#include "oracles/comparison/conservation.h"
+#include "oracles/comparison/cut_geometry.h"
+#include "oracles/comparison/interpenetration.h"
+#include "oracles/comparison/solver_error.h"
+#include "oracles/comparison/time_step_error.h"
 
-namespace cutproof::cli {
+namespace cutproof::harness {
 
+// `implementation` is measured by Lockstep and not here.
 struct ErrorsWanted {
   bool implementation = false, solver = false, time_step = false, geometry = false, topology = false,
        conservation = false;
 };
-// Names with commas between them, or `all`. Throws InputError.
-ErrorsWanted errors_wanted(const std::string& list);
 
 // Frames in which solver error and interpenetration are looked at, evenly over the run; the last one among them.
 inline constexpr int64_t kLookedAt = 8;
 // Of the free body whose momentum and energy are followed.
 inline constexpr int64_t kFreeFrames = 1000;
-// Bound of the relative drift of momentum, in double precision (accuracy_and_speed.md §1).
+// Bound of the relative drift of momentum, in double precision (measuring.md, Errors).
 inline constexpr double kDoubleDrift = 1e-10;
 
 // Components counted three ways, in a frame's last state.
@@ -37,23 +38,6 @@ TopologyFigures topology_of(const Setup& setup, const State& state);
 
 class Errors {
  public:
-  // `make` gives more backends of the kind that is judged. `setup` must outlive this.
-  // `start` is what was loaded.
-  Errors(const ErrorsWanted& wanted, const Setup& setup, const State& start, oracles::MakeBackend make);
-
-  // The backend's states at the beginning and the end of every frame, in order; whether it is wanted.
-  bool wants(int64_t frame) const;
-  void frame_begins(const State& state);
-  void frame_ends(const State& state);
-  // After the last frame: what takes runs of its own. `against` is null without the implementation error.
-  void finish(const State& end, const Against* against);
-
-  // Whether what has a bound is within it: conservation. (The implementation's bounds are verdicts of `against`.)
-  bool holds() const;
-  nlohmann::json to_json() const;
-  void print() const;
-
- private:
   struct Solver {
     int64_t frame;
     oracles::SolverError error;
@@ -70,6 +54,31 @@ class Errors {
     oracles::Interpenetration found;
   };
 
+  // `make` gives more backends of the kind that is judged. `setup` must outlive this.
+  // `start` is what was loaded.
+  Errors(const ErrorsWanted& wanted, const Setup& setup, const State& start, oracles::MakeBackend make);
+
+  // The backend's states at the beginning and the end of every frame, in order; whether it is wanted.
+  bool wants(int64_t frame) const;
+  void frame_begins(const State& state);
+  void frame_ends(const State& state);
+  // After the last frame: what takes runs of its own.
+  void finish(const State& end);
+
+  // Whether what has a bound is within it: conservation.
+  bool holds() const;
+
+  // What was measured. What was not wanted, or what this run has not, is empty.
+  const ErrorsWanted& wanted() const { return wanted_; }
+  Precision precision() const { return precision_; }  // which bound of momentum holds
+  const std::vector<Solver>& solver() const { return solver_; }
+  const Topology& topology() const { return topology_; }
+  const std::optional<Overlap>& overlap() const { return overlap_; }
+  const std::optional<oracles::TimeStepError>& time_step() const { return time_step_; }
+  const std::optional<oracles::CutGeometry>& geometry() const { return geometry_; }
+  const std::optional<oracles::Conservation>& conservation() const { return conservation_; }
+
+ private:
   bool looked_at(int64_t frame) const;
 
   ErrorsWanted wanted_;
@@ -84,11 +93,6 @@ class Errors {
   std::optional<oracles::TimeStepError> time_step_;
   std::optional<oracles::CutGeometry> geometry_;
   std::optional<oracles::Conservation> conservation_;
-  nlohmann::json implementation_;
 };
 
-// null where something is absent.
-nlohmann::json to_json(const oracles::CutGeometry& geometry);
-nlohmann::json to_json(const oracles::Interpenetration& found);
-
-}  // namespace cutproof::cli
+}  // namespace cutproof::harness

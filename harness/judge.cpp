@@ -201,7 +201,8 @@ void Judge::see_several(const Moment& moment, const std::array<bool, 6>& seen) {
     verdict.bound_source = "method.md §5 to §8: the reference's answer to the same removal";
     verdict.unit = "1";
     verdict.checked = unique ? end.clusters.count() : 0;
-    if (const auto difference = oracles::topological_difference(expected, end, !unique)) {
+    const auto sets = unique ? oracles::Sets::compared : oracles::Sets::open;
+    if (const auto difference = oracles::difference_of_decisions(expected, end, sets)) {
       verdict.holds = false;
       verdict.measured = 1;
       verdict.witness = {difference->clusters, difference->particles, {}, difference->text};

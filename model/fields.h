@@ -122,6 +122,27 @@ inline void know_every_member(const State& state) {
 }
 }  // namespace fields_detail
 
+// How many entries a field of an index space has in a well-formed state; of IndexSpace::state this says nothing.
+inline int64_t count_of(IndexSpace space, const State& state) {
+  switch (space) {
+    case IndexSpace::state:
+      break;
+    case IndexSpace::particle:
+      return static_cast<int64_t>(state.x.size());
+    case IndexSpace::cluster:
+      return static_cast<int64_t>(state.clusters.number.size());
+    case IndexSpace::cluster_end:
+      return static_cast<int64_t>(state.clusters.number.size()) + 1;
+    case IndexSpace::member:
+      return static_cast<int64_t>(state.clusters.members.size());
+    case IndexSpace::vertex:
+      return static_cast<int64_t>(state.skin.owner.size());
+    case IndexSpace::triangle:
+      return static_cast<int64_t>(state.skin.triangles.size());
+  }
+  return 0;
+}
+
 // Equal bits, where == would call NaN unequal to itself and -0 equal to 0.
 template <class T>
 requires std::is_trivially_copyable_v<T>

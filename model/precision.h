@@ -1,4 +1,4 @@
-// In what arithmetic numbers were computed. The bounds of the oracles follow from it (docs/tolerances.md).
+// In what arithmetic numbers were computed. The bounds of the oracles follow from it (docs/design/tolerances.md).
 #pragma once
 
 namespace cutproof {

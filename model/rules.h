@@ -3,6 +3,7 @@
 #include <array>
 #include <span>
 #include <string_view>
+#include <type_traits>
 
 #include "model/setup.h"
 #include "model/stage.h"
@@ -17,11 +18,22 @@ inline constexpr std::array<std::string_view, 4> kMergeRuleNames = {"none", "det
                                                                     "single_pass"};
 inline constexpr std::array<std::string_view, 3> kExpandRuleNames = {"none", "edge_cover", "published"};
 
-constexpr std::string_view name_of(Solver solver) { return kSolverNames[static_cast<std::size_t>(solver)]; }
-constexpr std::string_view name_of(Acceleration rule) { return kAccelerationNames[static_cast<std::size_t>(rule)]; }
-constexpr std::string_view name_of(Criterion rule) { return kCriterionNames[static_cast<std::size_t>(rule)]; }
-constexpr std::string_view name_of(MergeRule rule) { return kMergeRuleNames[static_cast<std::size_t>(rule)]; }
-constexpr std::string_view name_of(ExpandRule rule) { return kExpandRuleNames[static_cast<std::size_t>(rule)]; }
+constexpr std::span<const std::string_view> names_of(Solver) { return kSolverNames; }
+constexpr std::span<const std::string_view> names_of(Acceleration) { return kAccelerationNames; }
+constexpr std::span<const std::string_view> names_of(Criterion) { return kCriterionNames; }
+constexpr std::span<const std::string_view> names_of(MergeRule) { return kMergeRuleNames; }
+constexpr std::span<const std::string_view> names_of(ExpandRule) { return kExpandRuleNames; }
+
+// Choices of which the names are listed above.
+template <class E>
+concept NamedChoice = std::is_enum_v<E> && requires(E choice) {
+  names_of(choice);
+};
+
+template <NamedChoice E>
+constexpr std::string_view name_of(E choice) {
+  return names_of(choice)[static_cast<std::size_t>(choice)];
+}
 
 // What a rule of merging promises (method.md §6).
 struct MergePromise {

@@ -1,6 +1,6 @@
 // A scene as a person writes it: a body, how it is simulated, what is done to it, and what must come out. Free of
 // any particular resolution: the same scene runs on any organ. Field by field documentation with unit, default and
-// bounds is generated from the reader: docs/scene.md.
+// bounds is generated from the reader: docs/reference/scene.md.
 #pragma once
 #include <cstdint>
 #include <optional>

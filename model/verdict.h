@@ -1,4 +1,4 @@
-// What an oracle says of a state (oracles_and_tests.md §1). A wrong simulation is a failing verdict, never an
+// What an oracle says of a state (docs/reference/oracles.md). A wrong simulation is a failing verdict, never an
 // exception.
 #pragma once
 #include <cstdint>
@@ -20,7 +20,7 @@ struct Witness {
 };
 
 struct Verdict {
-  std::string property;       // "cluster connectivity", "coverage", …: the names of oracles_and_tests.md §1
+  std::string property;       // "cluster connectivity", "coverage", …: the names of docs/reference/oracles.md
   Stage stage = Stage::skin;  // after which stage the state was judged
   std::string backend;
   int64_t frame = 0;

@@ -18,13 +18,13 @@ namespace {
 using nlohmann::json;
 
 constexpr const char* kFormat = "cutproof.fuzz";
-constexpr int kFormatVersion = 1;
+constexpr int kFormatVersion = 2;
 // Classes of cases are rare: below this many cases, or with small ones only, an empty class says nothing.
 constexpr int64_t kCasesThatMeetEveryClass = 1000;
 constexpr int kSizeThatMeetsEveryClass = 79;
 // Of positions after a step, as many as rounding may decide: 0.5 to 0.8 % in campaigns of thousands. A comparison that
 // grants everything compares nothing.
-constexpr double kMostEither = 0.05;
+constexpr double kMostUndecidable = 0.05;
 
 constexpr const char* kRemedy = "give the results (--json) of all shards of one campaign, each once";
 
@@ -58,7 +58,7 @@ void add_shard(json& whole, const json& part, const std::string& file, const std
   if (whole.contains("steps_compared")) {
     json& compared = whole.at("steps_compared");
     const json& more = part.at("steps_compared");
-    for (const char* field : {"steps", "particles", "either"}) {
+    for (const char* field : {"steps", "particles", "undecidable"}) {
       compared[field] = compared.at(field).get<int64_t>() + more.at(field).get<int64_t>();
     }
     // A number, or of what failed the string "inf".
@@ -113,7 +113,7 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
     const StepsCompared& compared = campaign.compared;
     document["steps_compared"] = {{"steps", compared.steps},
                                   {"particles", compared.particles},
-                                  {"either", compared.either},
+                                  {"undecidable", compared.undecidable},
                                   {"greatest_h", json_number(compared.greatest)}};
   }
   if (options.seconds) {
@@ -177,10 +177,9 @@ CampaignConclusion conclude(const json& document, bool whole) {
   }
   if (document.contains("steps_compared")) {
     const json& compared = document.at("steps_compared");
-    const double either = compared.at("either").get<double>(), measured = compared.at("particles").get<double>();
-    if (!(either <= kMostEither * (either + measured)) || measured == 0) {
-      return {fmt::format("{:.0f} positions after a step were either way and {:.0f} compared, so too little was tested",
-                          either, measured)};
+    const double undecidable = compared.at("undecidable").get<double>(), measured = compared.at("particles").get<double>();
+    if (!(undecidable <= kMostUndecidable * (undecidable + measured)) || measured == 0) {
+      return {fmt::format("{:.0f} positions after a step were undecidable and {:.0f} compared, so too little was tested", undecidable, measured)};
     }
   }
   return {};

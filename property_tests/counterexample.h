@@ -16,7 +16,7 @@ struct Counterexample {
   std::vector<Command> commands;  // a history of that case; empty: it is dissected from beginning to end
   std::string backend;            // on which it was found, and how its clusters were split; empty: nothing is known
   std::string split;
-  gpu::Schedule schedule;  // `simulated`: the choices that make it fail; empty: none were recorded
+  gpu::ThreadSchedule schedule;  // `simulated`: the choices that make it fail; empty: none were recorded
   std::string found;       // what was wrong, for a person
   uint64_t seed = 0;       // of the campaign
   int64_t index = 0;       // of the case in it, before it was simplified

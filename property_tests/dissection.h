@@ -11,6 +11,7 @@
 #include "harness/moments.h"
 #include "model/backend.h"
 #include "model/verdict.h"
+#include "oracles/comparison/stage_comparison.h"
 #include "property_tests/cases.h"
 
 namespace cutproof::property_tests {
@@ -71,8 +72,9 @@ inline constexpr std::array<const char*, kHappenedCount> kHappenedNames = {"no p
 // Steps of moving bodies beside the reference's.
 struct StepsCompared {
   int64_t steps = 0;
-  int64_t particles = 0, either = 0;  // of all steps; either: rounding decides where they go, so they are not measured
-  double greatest = 0;                // distance of positions [h]
+  int64_t particles = 0, undecidable = 0;  // of all steps; rounding decides where the latter go: they are not measured
+  double greatest = 0;                     // distance of positions [h]
+  void add(const oracles::StageDifference& step);
   void join(const StepsCompared& other);
 };
 
@@ -96,8 +98,7 @@ struct CaseRun {
 std::vector<CaseRun> run_cases(Backend& backend, const std::vector<Loaded>& loaded);
 
 // Has the run of one case judged, with the promises of its rules; and compares every stage with what the reference
-// makes of the same state: equal clusters, components, triangles (method.md: merge only where its answer is unique); of
-// a body that moves also positions, velocities and rotations after each step.
+// makes of the same state (oracles/comparison/stage_comparison.h), the step only of a body that moves.
 // `thorough`: with CGAL's geometric check of every skin.
 Judgement judge_case(const Case& c, const Loaded& loaded, const CaseRun& run, const std::string& backend,
                      bool thorough);

@@ -2,15 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
 #include "model/error.h"
+#include "model/fields.h"
 #include "model/io/recording.h"
 #include "model/rules.h"
+#include "oracles/comparison/state_difference.h"
 #include "oracles/oracles.h"
 
 namespace cutproof::property_tests {
@@ -20,16 +21,6 @@ Stage stage_at(int32_t index) { return kStages[static_cast<std::size_t>(index % 
 
 // The last stage that ran, as recordings name it.
 Stage before(Stage next) { return stage_at(static_cast<int32_t>(next) + 5); }
-
-template <typename T>
-bool same_bits(const T& a, const T& b) {
-  return std::memcmp(&a, &b, sizeof(T)) == 0;
-}
-template <typename T>
-bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
-  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(),
-                                            [](const T& p, const T& q) { return std::memcmp(&p, &q, sizeof(T)) == 0; });
-}
 
 // A folder that goes with everything in it.
 class TemporaryFolder {
@@ -50,36 +41,6 @@ class TemporaryFolder {
  private:
   std::filesystem::path path_;
 };
-
-// The first thing in which two states differ, empty if in none. but_for_rounding: velocities and the impulse may have
-// been rounded to single precision (each once, the impulse in parts: its bound is twice as wide).
-std::string difference(const State& a, const State& b, bool but_for_rounding) {
-  const auto near = [&](Vec3 p, Vec3 q) {
-    if (!but_for_rounding) return same_bits(p, q);
-    for (int axis = 0; axis < 3; ++axis) {
-      if (!(std::abs(p[axis] - q[axis]) <= 0x1p-23 * std::abs(p[axis]))) return false;
-    }
-    return true;
-  };
-  if (a.frame != b.frame) return "the frame";
-  if (!same_bits(a.x, b.x)) return "positions";
-  if (!std::equal(a.v.begin(), a.v.end(), b.v.begin(), b.v.end(), near)) return "velocities";
-  if (a.alive != b.alive) return "alive particles";
-  if (a.removed != b.removed) return "removed particles";
-  if (a.debris != b.debris) return "debris";
-  if (a.clusters.offsets != b.clusters.offsets) return "sizes of clusters";
-  if (a.clusters.members != b.clusters.members) return "members of clusters";
-  if (a.clusters.number != b.clusters.number) return "numbers of clusters";
-  if (!same_bits(a.clusters.rotation, b.clusters.rotation)) return "rotations of clusters";
-  if (!same_bits(a.clusters.rest_center, b.clusters.rest_center)) return "rest centers of clusters";
-  if (!same_bits(a.clusters.mass, b.clusters.mass)) return "masses of clusters";
-  if (a.clusters.degenerate != b.clusters.degenerate) return "degenerate rotations";
-  if (a.tau != b.tau || a.cap != b.cap) return "tau or cap";
-  if (a.edge_covered != b.edge_covered) return "edge_covered";
-  if (!near(a.impulse, b.impulse)) return "the impulse";
-  if (!(a.skin == b.skin) || !same_bits(a.skin.position, b.skin.position)) return "the skin";
-  return {};
-}
 
 }  // namespace
 
@@ -349,11 +310,11 @@ void History::load_both(bool is_first) {
 
 void History::require_same(const char* property, const State& expected, const State& found, bool but_for_rounding) {
   ++verdicts_;
-  const std::string what = difference(expected, found, but_for_rounding);
-  if (what.empty()) return;
+  const auto difference = oracles::first_difference_in_bits(expected, found, but_for_rounding);
+  if (!difference) return;
   Verdict verdict = broken(property, before(next_));
   verdict.measured = 1;
-  verdict.witness.text = "different: " + what;
+  verdict.witness.text = std::string(difference->text) + " differs, entry " + std::to_string(difference->index);
   fail(std::move(verdict));
 }
 

@@ -47,10 +47,10 @@ Simplified simplify(const Violation& violation, const BackendChoice& choice) {
   const auto is_over = [&] { return Clock::now() > until; };
   found.failing = simplest(violation.failing, fails, is_over);
   if (scheduled) {
-    const auto schedule = std::make_shared<gpu::Schedule>();
+    const auto schedule = std::make_shared<gpu::ThreadSchedule>();
     static_cast<void>(
         dissect_alone([&] { return harness::make_recorded_backend(failing_choice, schedule); }, found.failing, true));
-    found.schedule = gpu::shrink(*schedule, [&](const gpu::Schedule& tried) {
+    found.schedule = gpu::shrink(*schedule, [&](const gpu::ThreadSchedule& tried) {
       if (is_over()) return false;
       return dissect_alone([&] { return harness::make_replaying_backend(failing_choice, tried); }, found.failing, true)
           .failure.has_value();

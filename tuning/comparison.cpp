@@ -11,7 +11,7 @@ void Comparison::add(const State& state) {
   const oracles::Apart apart = oracles::poses_apart(setup_, reference_.frames[f], trajectory_.frames.back());
   rms_h_.push_back(apart.position.rms());
   if (!(rms_h_.back() <= allowed_) && !first_beyond_) first_beyond_ = f;
-  greatest_h_ = std::max(greatest_h_, apart.position.greatest);
+  greatest_h_ = std::max(greatest_h_, apart.position.max);
   removed_otherwise_ = apart.alive_in_one;
 }
 

@@ -12,7 +12,7 @@ PreparedScene::PreparedScene(const Scene& scene, const std::string& source, std:
   fixtures::Built built = fixtures::build(scene, source, options);
   setup_ = std::move(built.setup);
   start_ = std::move(built.state);
-  const std::vector<int32_t>& scene_frame = built.timeline.scene_frame;
+  const std::vector<int32_t>& scene_frame = built.schedule.scene_frame;
   for (std::size_t f = 0; f < scene_frame.size(); ++f) {
     if (f + 1 == scene_frame.size() || scene_frame[f + 1] != scene_frame[f])
       last_of_.push_back(static_cast<int64_t>(f));

@@ -3,6 +3,7 @@
 #include <array>
 #include <memory>
 
+#include "harness/geometry_json.h"
 #include "model/rules.h"
 
 namespace cutproof::benchmarks {
@@ -35,8 +36,8 @@ json row_json(const Baseline& baseline, const BaselineRow& row) {
           {"equal", row.end.equal},
           {"unequal_frames", row.unequal_frames},
           {"isolated", row.isolated},
-          {"geometry", cli::to_json(row.geometry)},
-          {"interpenetration", cli::to_json(row.overlap)}};
+          {"geometry", harness::to_json(row.geometry)},
+          {"interpenetration", harness::to_json(row.overlap)}};
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ ClustersRow run_cut(const Contender& contender, std::optional<double> tau, int64
     backend.run({});
     curve.seconds.push_back(backend.report().total_seconds);
     const State state = std::move(backend.snapshot().front());
-    curve.scene_frame.push_back(built.timeline.scene_frame[static_cast<std::size_t>(frame)] + 1);
+    curve.scene_frame.push_back(built.schedule.scene_frame[static_cast<std::size_t>(frame)] + 1);
     curve.clusters.push_back(state.clusters.count());
     curve.removed += static_cast<int64_t>(state.removed.size() + state.debris.size());
     for (const auto oracle :

@@ -8,7 +8,7 @@
 
 #include "benchmarks/cut_cube.h"
 #include "model/error.h"
-#include "oracles/comparison/converged.h"
+#include "oracles/comparison/reference_solution.h"
 
 namespace cutproof::benchmarks {
 
@@ -68,7 +68,7 @@ void measure_whole_substep(const CutCube& cube, State state, std::mt19937_64& ra
   for (Vec3& v : state.v) v = {speed(random), speed(random), speed(random)};
   state.frame = 0;
   const auto begin = Clock::now();
-  const oracles::Converged converged = oracles::converged_substep(cube.setup, state);
+  const oracles::ReferenceSolution converged = oracles::reference_solution(cube.setup, state);
   scene.substep_seconds = seconds_since(begin);
   scene.alternations = static_cast<int>(converged.alternations);
   scene.converged = converged.converged;

@@ -183,7 +183,7 @@ StagesResult run_stages(const StagesOptions& options, const Progress<StagesResul
   result.machine = measure_machine(options.described());
 #if CUTPROOF_HAS_CUDA
   if (options.described().needs_device()) {
-    result.launch_layer = json::parse(gpu::twins_json(gpu::compare_twins(1'000'000, 200)));
+    result.launch_layer = json::parse(gpu::raw_baseline_json(gpu::compare_with_raw(1'000'000, 200)));
   }
 #endif
   progress(result);

@@ -1,5 +1,5 @@
 // What CUDA hands out, given back by destructors, also where a constructor fails half-way. Giving back is not checked:
-// it meets only errors that the call before has told, and nobody could be told.
+// it meets only errors that the call before has reported, and a destructor has no way to report one.
 #pragma once
 #include <cuda_runtime_api.h>
 

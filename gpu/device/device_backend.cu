@@ -13,24 +13,23 @@
 #include "gpu/device/cuda_handles.h"
 #include "gpu/device/device_launcher.cuh"
 #include "gpu/launch/frame.h"
-#include "gpu/state/staging.h"
 
 namespace cutproof::gpu {
 
 namespace {
 
 // The arrays of a DeviceView on the device.
-class DeviceWorld {
+class DeviceArrays {
  public:
-  DeviceWorld() = default;
-  explicit DeviceWorld(StagingBuffers& staging) {
+  DeviceArrays() = default;
+  explicit DeviceArrays(StagingBuffers& staging) {
     view_ = staging.view();
-    staging.each(view_, [this](auto& vector, auto& pointer, bool) {
-      using T = typename std::decay_t<decltype(vector)>::value_type;
-      const std::size_t bytes = vector.size() * sizeof(T);
+    staging.each(view_, [this](const auto&, const auto& vector, auto& pointer) {
+      using Pointer = std::remove_reference_t<decltype(pointer)>;
+      const std::size_t bytes = vector.size() * sizeof(*pointer);
       // Never empty: a null pointer would be taken for an array that is not there.
-      memory_.push_back(make_device_memory(bytes == 0 ? sizeof(T) : bytes));
-      pointer = static_cast<T*>(memory_.back().get());
+      memory_.push_back(make_device_memory(bytes == 0 ? sizeof(*pointer) : bytes));
+      pointer = static_cast<Pointer>(memory_.back().get());
       CUTPROOF_CUDA(cudaMemcpy(pointer, vector.data(), bytes, cudaMemcpyHostToDevice));
     });
   }
@@ -40,10 +39,9 @@ class DeviceWorld {
   // Copies what belongs to the state into the staging's vectors.
   void download(StagingBuffers& staging) const {
     DeviceView pointers = view_;
-    staging.each(pointers, [](auto& vector, auto& pointer, bool keep) {
-      using T = typename std::decay_t<decltype(vector)>::value_type;
-      if (!keep) return;
-      CUTPROOF_CUDA(cudaMemcpy(vector.data(), pointer, vector.size() * sizeof(T), cudaMemcpyDeviceToHost));
+    staging.each(pointers, [](const auto& array, auto& vector, auto& pointer) {
+      if (array.lifetime != Lifetime::state) return;
+      CUTPROOF_CUDA(cudaMemcpy(vector.data(), pointer, vector.size() * sizeof(*pointer), cudaMemcpyDeviceToHost));
     });
   }
 
@@ -68,27 +66,24 @@ class GpuBackend final : public Backend {
   bool can_run(Span) const override { return true; }
 
   void load(std::vector<Setup> setups, std::vector<State> states) override {
-    load_with(Capacity{options_.room}, std::move(setups), std::move(states));
+    take(Load(std::move(setups), states, options_, options_.capacity));
   }
 
-  // Starts the span and returns. Whether more room is wanted is read from what the counters were kInFlight calls ago:
-  // by then they have nearly always arrived, and the answer does not depend on how fast the device is, so two runs make
-  // room at the same places and have the same bits.
+  // Starts the span and returns. Whether more capacity is wanted is read from what the counters were kInFlight calls
+  // ago: by then they have nearly always arrived, and the answer does not depend on how fast the device is, so two runs
+  // enlarge their arrays at the same places and have the same bits.
   void run(Span span) override {
-    if (span.contains(Stage::skin)) skins_.assign(setups_.size(), std::nullopt);
+    if (span.contains(Stage::skin)) load_.forget_skins();
     if (runs_ >= kInFlight) {
       CUTPROOF_CUDA(cudaEventSynchronize(end_[slot()].get()));
       const Counters& then = counters()[slot()];
       require_no_fault(then);
-      if (wants_capacity(device_.view(), then)) {
-        std::vector<State> states = snapshot();
-        load_with(Capacity{2 * capacity_.factor}, std::move(setups_), std::move(states));
-      }
+      if (wants_capacity(device_.view(), then)) take(load_.enlarged(snapshot(), options_));
     }
     if (options_.eager) {
       DeviceLauncher launcher(stream_.get());
       CUTPROOF_CUDA(cudaEventRecord(begin_.get(), stream_.get()));
-      enqueue_span(launcher, device_.view(), plan_, span, [](Stage) {});
+      enqueue_span(launcher, device_.view(), load_.plan, span, [](Stage) {});
       finish(span);
       CUTPROOF_CUDA(cudaStreamSynchronize(stream_.get()));  // the launcher's temporary memory goes with it
       return;
@@ -97,7 +92,7 @@ class GpuBackend final : public Backend {
     auto found = graphs_.find(key);
     if (found == graphs_.end()) {
       DeviceGraph graph = DeviceLauncher::capture(
-          [&](DeviceLauncher& launcher) { enqueue_span(launcher, device_.view(), plan_, span, [](Stage) {}); });
+          [&](DeviceLauncher& launcher) { enqueue_span(launcher, device_.view(), load_.plan, span, [](Stage) {}); });
       found = graphs_.emplace(key, std::move(graph)).first;
     }
     CUTPROOF_CUDA(cudaEventRecord(begin_.get(), stream_.get()));
@@ -105,11 +100,11 @@ class GpuBackend final : public Backend {
     finish(span);
   }
 
-  std::vector<State> snapshot() const override { return snapshot_of(std::vector<bool>(setups_.size(), true)); }
+  std::vector<State> snapshot() const override { return snapshot_of(std::vector<bool>(load_.setups.size(), true)); }
   std::vector<State> snapshot_of(const std::vector<bool>& wanted) const override {
     wait();
-    device_.download(staging_);
-    return extract_states(staging_, setups_, wanted, skins_);
+    device_.download(load_.staging);
+    return load_.states_of(wanted);
   }
 
   SpanReport report() const override {
@@ -125,18 +120,13 @@ class GpuBackend final : public Backend {
   }
 
  private:
-  void load_with(Capacity room, std::vector<Setup> setups, std::vector<State> states) {
+  void take(Load load) {
     CUTPROOF_CUDA(cudaStreamSynchronize(stream_.get()));
-    StagingBuffers staging = make_staging_buffers(setups, states, options_.rotation_method, room);
-    plan_ = make_plan(setups, states, options_.rotation_method, options_.split);
     graphs_.clear();
-    device_ = DeviceWorld();  // gives the old memory back before the new is asked for
-    device_ = DeviceWorld(staging);
-    staging_ = std::move(staging);
-    setups_ = std::move(setups);
-    skins_.assign(setups_.size(), std::nullopt);
+    device_ = DeviceArrays();  // gives the old memory back before the new is asked for
+    device_ = DeviceArrays(load.staging);
+    load_ = std::move(load);
     runs_ = 0;
-    capacity_ = room;
   }
   static constexpr std::size_t kInFlight = 4;
   std::size_t slot() const { return static_cast<std::size_t>(runs_ % kInFlight); }
@@ -159,18 +149,14 @@ class GpuBackend final : public Backend {
   }
 
   KernelOptions options_;
-  Capacity capacity_;
   Stream stream_ = make_stream();
   Event begin_ = make_event();
   std::array<Event, kInFlight> end_;
   PinnedMemory counters_ = make_pinned_memory(kInFlight * sizeof(Counters));
   uint64_t runs_ = 0;  // since the load
   Span span_;
-  std::vector<Setup> setups_;
-  mutable StagingBuffers staging_;  // host side of snapshots
-  mutable KnownSkins skins_;        // of the last skin stage, as far as snapshots have asked for them
-  DeviceWorld device_;
-  Plan plan_;
+  mutable Load load_;  // snapshots download to its staging buffers
+  DeviceArrays device_;
   std::map<std::pair<int, int>, DeviceGraph> graphs_;
 };
 

@@ -1,10 +1,8 @@
-#include <array>
 #include <chrono>
 #include <utility>
 
 #include "gpu/backends.h"
 #include "gpu/launch/frame.h"
-#include "gpu/state/staging.h"
 
 namespace cutproof::gpu {
 
@@ -22,16 +20,13 @@ class HostBackend final : public Backend {
   bool can_run(Span) const override { return true; }
 
   void load(std::vector<Setup> setups, std::vector<State> states) override {
-    load_with(Capacity{options_.room}, std::move(setups), std::move(states));
+    take(Load(std::move(setups), states, options_, options_.capacity));
   }
 
   void run(Span span) override {
-    if (wants_capacity(view_, staging_.counters.front())) {
-      std::vector<State> states = snapshot();
-      load_with(Capacity{2 * capacity_.factor}, std::move(setups_), std::move(states));
-    }
+    if (wants_capacity(view_, load_.staging.counters.front())) take(load_.enlarged(snapshot(), options_));
     report_ = {};
-    if (span.contains(Stage::skin)) skins_.assign(setups_.size(), std::nullopt);
+    if (span.contains(Stage::skin)) load_.forget_skins();
     // Work is done when it is handed over, so the time between two marks is that of the stage between them.
     const auto begin = Clock::now();
     auto since = begin;
@@ -40,47 +35,36 @@ class HostBackend final : public Backend {
       if (stage >= 0) report_.seconds[static_cast<std::size_t>(stage)] += seconds(now - since);
       since = now;
     };
-    enqueue_span(launcher_, view_, plan_, span, [&](Stage next) {
+    enqueue_span(launcher_, view_, load_.plan, span, [&](Stage next) {
       close(Clock::now());
       stage = static_cast<int>(next);
     });
     const auto end = Clock::now();
     close(end);
     report_.total_seconds = seconds(end - begin);
-    const Counters& counters = staging_.counters.front();
+    const Counters& counters = load_.staging.counters.front();
     for (std::size_t s = 0; s < 6; ++s) report_.ran[s] = counters.stage_ran[s] != 0;
     require_no_fault(counters);
   }
 
-  std::vector<State> snapshot() const override { return snapshot_of(std::vector<bool>(setups_.size(), true)); }
-  std::vector<State> snapshot_of(const std::vector<bool>& wanted) const override {
-    return extract_states(staging_, setups_, wanted, skins_);
-  }
+  std::vector<State> snapshot() const override { return snapshot_of(std::vector<bool>(load_.setups.size(), true)); }
+  std::vector<State> snapshot_of(const std::vector<bool>& wanted) const override { return load_.states_of(wanted); }
   SpanReport report() const override { return report_; }
 
  private:
-  void load_with(Capacity room, std::vector<Setup> setups, std::vector<State> states) {
-    StagingBuffers staging = make_staging_buffers(setups, states, options_.rotation_method, room);
-    plan_ = make_plan(setups, states, options_.rotation_method, options_.split);
-    staging_ = std::move(staging);
-    setups_ = std::move(setups);
-    view_ = staging_.view();
-    skins_.assign(setups_.size(), std::nullopt);
+  void take(Load load) {
+    load_ = std::move(load);
+    view_ = load_.staging.view();
     report_ = {};
-    capacity_ = room;
   }
   static double seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
   std::string name_;
   HostLauncher launcher_;
   KernelOptions options_;
-  Capacity capacity_;
-  std::vector<Setup> setups_;
-  StagingBuffers staging_;
+  mutable Load load_;  // snapshots add to its skins
   DeviceView view_;
-  Plan plan_;
   SpanReport report_;
-  mutable KnownSkins skins_;  // of the last skin stage, as far as snapshots have asked for them
 };
 
 }  // namespace

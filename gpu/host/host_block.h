@@ -9,7 +9,7 @@
 #include <string>
 #include <type_traits>
 
-#include "gpu/host/host_runtime.h"
+#include "gpu/host/worker.h"
 #include "gpu/launch/block.h"
 
 namespace cutproof::gpu {

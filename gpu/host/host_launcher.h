@@ -1,6 +1,6 @@
 // The Launcher of launcher.h that carries out work on the host, at once: when a member returns, its work is done.
-// Kernels are executed by operating-system threads, or simulated under a schedule (schedule.h). Results do not depend
-// on the number of threads if the kernels keep the rules of block.h.
+// Kernels are executed by operating-system threads, or simulated under a schedule (thread_schedule.h). Results do not
+// depend on the number of threads if the kernels keep the rules of block.h.
 #pragma once
 #include <algorithm>
 #include <cstddef>
@@ -92,7 +92,7 @@ class HostLauncher {
   }
 
   // All choices so far, if SimulationOptions::record was set.
-  const Schedule& recorded() const { return runtime_->recorded(); }
+  const ThreadSchedule& recorded() const { return runtime_->recorded(); }
   // Goes on under another schedule, with nothing recorded. Cheaper than another launcher: stacks are kept. Requires a
   // launcher that is simulated.
   void reschedule(Generator schedule) { runtime_->reschedule(std::move(schedule)); }

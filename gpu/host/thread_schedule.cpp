@@ -138,48 +138,48 @@ Generator pct(std::uint64_t seed, int depth, std::int64_t length) {
   };
 }
 
-Generator replay(Schedule schedule) {
+Generator replay(ThreadSchedule schedule) {
   return [schedule = std::move(schedule), next = std::size_t{0}](const Candidates& candidates) mutable {
     const int wanted = next < schedule.size() ? schedule[next++] : 0;
     return candidates.nth(wanted == 0 ? 0 : std::min(wanted, candidates.count() - 1));
   };
 }
 
-int preemptions(const Schedule& schedule) {
+int preemptions(const ThreadSchedule& schedule) {
   return static_cast<int>(std::count_if(schedule.begin(), schedule.end(), [](auto choice) { return choice != 0; }));
 }
 
-Schedule shrink(Schedule schedule, const std::function<bool(const Schedule&)>& fails, int budget) {
-  const auto without_tail_of_zeros = [](Schedule s) {
+ThreadSchedule shrink(ThreadSchedule schedule, const std::function<bool(const ThreadSchedule&)>& fails, int budget) {
+  const auto without_tail_of_zeros = [](ThreadSchedule s) {
     while (!s.empty() && s.back() == 0) s.pop_back();
     return s;
   };
-  const auto still_fails = [&](const Schedule& candidate) { return budget-- > 0 && fails(candidate); };
+  const auto still_fails = [&](const ThreadSchedule& candidate) { return budget-- > 0 && fails(candidate); };
   // First the end, by bisection: the shortest beginning that still fails is usually much shorter than the whole.
   for (std::size_t cut = schedule.size() / 2; cut > 0; cut /= 2) {
     while (schedule.size() > cut) {
-      Schedule shorter(schedule.begin(), schedule.end() - static_cast<std::ptrdiff_t>(cut));
+      ThreadSchedule shorter(schedule.begin(), schedule.end() - static_cast<std::ptrdiff_t>(cut));
       if (!still_fails(shorter)) break;
       schedule = std::move(shorter);
     }
   }
   // Then pieces, halving them (delta debugging, Zeller and Hildebrandt 2002): without the preemptions of a piece,
   // without its decisions altogether, with the nearest thread instead of a far one.
-  using Change = std::function<Schedule(const Schedule&, std::size_t begin, std::size_t end)>;
-  const Change calm = [](Schedule s, std::size_t begin, std::size_t end) {
+  using Change = std::function<ThreadSchedule(const ThreadSchedule&, std::size_t begin, std::size_t end)>;
+  const Change calm = [](ThreadSchedule s, std::size_t begin, std::size_t end) {
     std::fill(s.begin() + static_cast<std::ptrdiff_t>(begin), s.begin() + static_cast<std::ptrdiff_t>(end), 0);
     return s;
   };
-  const Change drop = [](Schedule s, std::size_t begin, std::size_t end) {
+  const Change drop = [](ThreadSchedule s, std::size_t begin, std::size_t end) {
     s.erase(s.begin() + static_cast<std::ptrdiff_t>(begin), s.begin() + static_cast<std::ptrdiff_t>(end));
     return s;
   };
-  const Change near = [](Schedule s, std::size_t begin, std::size_t end) {
+  const Change near = [](ThreadSchedule s, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) s[i] = std::min<std::uint16_t>(s[i], 1);
     return s;
   };
   // Fewer preemptions, then fewer decisions, then nearer threads.
-  const auto size_of = [](const Schedule& s) {
+  const auto size_of = [](const ThreadSchedule& s) {
     return std::tuple(preemptions(s), s.size(), std::accumulate(s.begin(), s.end(), std::int64_t{0}));
   };
   for (bool progress = true; progress && budget > 0;) {
@@ -187,7 +187,7 @@ Schedule shrink(Schedule schedule, const std::function<bool(const Schedule&)>& f
     for (const Change& change : {calm, drop, near}) {
       for (std::size_t piece = std::max<std::size_t>(schedule.size() / 2, 1); piece > 0 && budget > 0; piece /= 2) {
         for (std::size_t begin = 0; begin < schedule.size() && budget > 0;) {
-          Schedule smaller = change(schedule, begin, std::min(begin + piece, schedule.size()));
+          ThreadSchedule smaller = change(schedule, begin, std::min(begin + piece, schedule.size()));
           if (size_of(smaller) < size_of(schedule) && still_fails(smaller)) {
             progress = true;
             if (smaller.size() == schedule.size()) begin += piece;

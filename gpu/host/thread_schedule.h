@@ -1,6 +1,6 @@
-// Who runs next when kernels are executed under a simulated schedule (docs/architecture.md, Kernels;
-// oracles_and_tests.md §3). Threads of a launch are numbered place · 32 + thread, where place is that of a block among
-// the blocks that are alive at once.
+// Who runs next when kernels are executed under a simulated schedule (docs/design/architecture.md, Kernels;
+// docs/design/testing.md, Schedules). Threads of a launch are numbered place · 32 + thread, where place is that of a
+// block among the blocks that are alive at once.
 //
 // A schedule is written down as a vector of choices, one for each decision at which more than one thread could run:
 // choice k is the k-th of those threads, counted in cyclic order from the thread that ran last (itself included if it
@@ -14,7 +14,7 @@
 
 namespace cutproof::gpu {
 
-using Schedule = std::vector<std::uint16_t>;
+using ThreadSchedule = std::vector<std::uint16_t>;
 
 // The threads that can run at a decision: bit t of masks[place] is thread place · 32 + t. Never empty.
 struct Candidates {
@@ -40,12 +40,13 @@ Generator random_walk(std::uint64_t seed);
 // `length` decisions at which the running thread falls behind all others. Finds a bug of depth d in a run of k
 // decisions with n threads with probability at least 1 / (n k^(d-1)). Requires 1 <= depth <= 4, length >= 1.
 Generator pct(std::uint64_t seed, int depth, std::int64_t length);
-Generator replay(Schedule schedule);
+Generator replay(ThreadSchedule schedule);
 
 // A schedule that still `fails`, with as few preemptions as removing ever smaller pieces gives. Requires
 // fails(schedule); calls it at most `budget` times.
-Schedule shrink(Schedule schedule, const std::function<bool(const Schedule&)>& fails, int budget = 2000);
+ThreadSchedule shrink(ThreadSchedule schedule, const std::function<bool(const ThreadSchedule&)>& fails,
+                      int budget = 2000);
 // Choices that are not 0.
-int preemptions(const Schedule& schedule);
+int preemptions(const ThreadSchedule& schedule);
 
 }  // namespace cutproof::gpu

@@ -1,7 +1,7 @@
-// Contacts of one particle with the blade and the walls within one substep (method.md §3, Blade; docs/decisions.md,
-// Contacts with the blade). Everything works on displacements from rest: a distance to the blade is
-// (X - edge) + d with X - edge formed once and rounded once, and a projection is added to d, so that a particle far
-// from the body's origin loses no more than that one rounding.
+// Contacts of one particle with the blade and the walls within one substep (method.md §3, Blade;
+// docs/design/decisions.md, Contacts with the blade). Everything works on displacements from rest: a distance to the
+// blade is (X - edge) + d with X - edge formed once and rounded once, and a projection is added to d, so that a
+// particle far from the body's origin loses no more than that one rounding.
 #pragma once
 #include "gpu/kernels/float3.h"
 #include "gpu/state/device_view.h"

@@ -2,8 +2,8 @@
 // until edge_cover has once been done, or, under `published`, in every frame that cuts.
 //
 // An addition is a pair (cluster, particle). All of them are found on the clusters as they are at the beginning, then
-// carried out at once: enlarged lists go to new room, and the memberships of all particles are laid out again. Only
-// when it is known that everything fits is anything written.
+// carried out at once: enlarged lists go behind the present ones, and the memberships of all particles are laid out
+// again. Only when it is known that everything fits is anything written.
 #pragma once
 #include <cstdint>
 
@@ -39,7 +39,7 @@ CUTPROOF_DEVICE inline bool share_a_cluster(const DeviceView& w, int p, int q) {
   return false;
 }
 
-// Keeps counting when there is no more room, so that check_additions sees it.
+// Keeps counting beyond the capacity, so that check_additions sees it.
 template <class Block>
 CUTPROOF_DEVICE void add_addition(Block& block, const DeviceView& w, int s, int p) {
   const int place = block.atomic_add(&w.counters->additions, 1);
@@ -129,7 +129,7 @@ CUTPROOF_DEVICE void add_layer_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(add_layer_kernel);
 
-// No room for all additions means none.
+// Too few places for all additions: none is carried out.
 template <class Block>
 CUTPROOF_DEVICE void check_additions_kernel(Block& block, DeviceView w) {
   Counters& c = *w.counters;

@@ -8,8 +8,8 @@
 // Rounds end when nobody proposes. A small cluster without a legal target will never have one, so it need not be asked
 // again: a union u ∪ t that would be legal for it contains a u or t that it touches and that was legal before.
 //
-// Unions are written to new room behind the present members. When that is used up, the lists are moved together and the
-// round goes on: its unions are disjoint, so they need no more room than all lists together, and a merge begins only if
+// Unions are written behind the present members. When the capacity there is used up, the lists are moved together and
+// the round goes on: its unions are disjoint, so they need no more than all lists together, and a merge begins only if
 // there is as much.
 #pragma once
 #include <cstdint>
@@ -260,7 +260,8 @@ CUTPROOF_KERNEL(propose_merges_kernel);
 
 // --- Merging ---------------------------------------------------------------------------------------------------------
 
-// The first place of room for `count` members; -1: there is none, and the lists are to be moved together. One thread.
+// The first of `count` free places for members; -1: there are too few, and the lists are to be moved together. One
+// thread.
 template <class Block>
 CUTPROOF_DEVICE int reserve_members(Block& block, const DeviceView& w, int count) {
   Counters& c = *w.counters;
@@ -271,8 +272,8 @@ CUTPROOF_DEVICE int reserve_members(Block& block, const DeviceView& w, int count
   return -1;
 }
 
-// Particles that s holds are held by t instead, or once less if t, whose members are `list`, holds them already. Other
-// blocks do the same for other pairs in the same rows of memberships, in other places of them.
+// Members of s become members of t instead, or of one cluster less if they are in `list`, the members of t, already.
+// Other blocks do the same for other pairs in the same rows of memberships, in other places of them.
 template <class Block>
 CUTPROOF_DEVICE void hand_over(Block& block, const DeviceView& w, int s, int t, const int* list, int size) {
   int* marks = rest_marks(w);
@@ -287,13 +288,13 @@ CUTPROOF_DEVICE void hand_over(Block& block, const DeviceView& w, int s, int t, 
     if (!twice) continue;
     block.atomic_add(&w.membership_count[p], -1);
     for (int h = begin; h < end; ++h) {
-      const int holder = block.load(&w.memberships[h]);
-      if (holder >= 0) block.store(&marks[holder], 1);
+      const int slot = block.load(&w.memberships[h]);
+      if (slot >= 0) block.store(&marks[slot], 1);
     }
   }
 }
 
-// Carries out the proposals that got both ends: those of them, if it is called again, that found no room.
+// Carries out the proposals that got both ends: those of them, if it is called again, that found no places.
 template <class Block>
 CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, DeviceView w) {
   int* place = block.template shared<int>(1);
@@ -386,16 +387,16 @@ CUTPROOF_DEVICE void merge_chains_kernel(Block& block, DeviceView w) {
     if (end < 0 || w.slot_size[first] == 0) continue;  // not here, or done
     const auto is_source = [end = end](int s) { return s >= 0 && s != end; };
     if (block.thread() == 0) {
-      int room = w.slot_size[end];
-      for (int s = first; is_source(s); s = w.best[s]) room += w.slot_size[s];
-      *place = reserve_members(block, w, room);
+      int needed = w.slot_size[end];
+      for (int s = first; is_source(s); s = w.best[s]) needed += w.slot_size[s];
+      *place = reserve_members(block, w, needed);
     }
     block.sync();
     const int begin = *place;
     block.sync();  // everyone has read it
     if (begin < 0) continue;
 
-    // The union so far lies in its new room or, in turn, in the same places of DeviceView::label.
+    // The union so far lies in its new places or, in turn, in the same places of DeviceView::label.
     const int* united = w.members + w.slot_begin[end];
     int size = w.slot_size[end];
     int* out = w.members + begin;
@@ -443,8 +444,8 @@ CUTPROOF_DEVICE void begin_merge_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(begin_merge_kernel);
 
-// Whether a round surely finds room: it unites each list at most once, and each small cluster with one other to at most
-// cap members.
+// Whether the capacity surely suffices for a round: it unites each list at most once, and each small cluster with one
+// other to at most cap members.
 template <class Block>
 CUTPROOF_DEVICE void begin_rounds_kernel(Block& block, DeviceView w) {
   if (block.first() != 0) return;
@@ -489,7 +490,7 @@ CUTPROOF_DEVICE void gather_members_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(gather_members_kernel);
 
-// And back. What found no room tries again, and rounds go on.
+// And back. What found no places tries again, and rounds go on.
 template <class Block>
 CUTPROOF_DEVICE void place_members_kernel(Block& block, DeviceView w) {
   for (int64_t q = block.first(); q < w.counters->members_used; q += block.stride()) w.members[q] = w.label[q];
@@ -505,19 +506,6 @@ void enqueue_move_together(Launcher& launcher, const DeviceView& w) {
   launcher.exclusive_scan(w.slot_size, moved_begin(w), w.slot_capacity, &w.counters->members_used);
   launcher.blocks(gather_members_kernel_object{}, w.slot_capacity, 128, 0, w);
   launcher.items(place_members_kernel_object{}, w.member_capacity, w);
-}
-
-// Memberships of a particle in ascending order, -1 last.
-CUTPROOF_DEVICE inline void sort_memberships(const DeviceView& w, int64_t p) {
-  for (int end = w.membership_begin[p] + 1; end < w.membership_begin[p + 1]; ++end) {
-    const int moving = w.memberships[end];
-    int h = end;
-    for (; h > w.membership_begin[p] && static_cast<unsigned>(w.memberships[h - 1]) > static_cast<unsigned>(moving);
-         --h) {
-      w.memberships[h] = w.memberships[h - 1];
-    }
-    w.memberships[h] = moving;
-  }
 }
 
 // The work that follows a cut is small, so grids are kept small too: blocks take several clusters if there are many.

@@ -1,5 +1,5 @@
-// Stage skin (docs/method.md §8). enqueue_skin_cells extracts again the cells that lost a corner in this frame, or
-// every cell of a body that has no skin yet; enqueue_skin_positions puts all vertices where the clusters carry them.
+// Stage skin (docs/design/method.md §8). enqueue_skin_cells extracts again the cells that lost a corner in this frame,
+// or every cell of a body that has no skin yet; enqueue_skin_positions puts all vertices where the clusters carry them.
 //
 // A vertex is known by its owner and direction. It is made when the particle beyond its grid edge dies (or with the
 // body's first skin) and lasts as long as its owner, because the dead do not come back; so cells that kept all
@@ -128,8 +128,8 @@ CUTPROOF_DEVICE void count_new_cells_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL(count_new_cells_kernel);
 
-// Takes the room for new vertices and cells, or says that there is none. After a fault the skin stays as it is. One
-// thread.
+// Gives out places for new vertices and cells, or says that there are too few. After a fault the skin stays as it is.
+// One thread.
 template <class Block>
 CUTPROOF_DEVICE void reserve_skin_kernel(Block& block, const DeviceView& w) {
   using namespace skin_detail;
@@ -255,7 +255,7 @@ CUTPROOF_DEVICE void recenter_clusters_kernel(Block& block, const DeviceView& w)
     }
     sums = block.warp_sum(sums);
     if (block.lane() != 0) continue;
-    // The rounded T must not move the cluster (docs/decisions.md, Momentum and the rounding of sums).
+    // The rounded T must not move the cluster (docs/design/decisions.md, Momentum and the rounding of sums).
     const Float3 turned = w.rotation[s] * sums.rest - sums.rest;
     w.center[s] = base + (1.0f / sums.mass) * (sums.moved - turned);
   }

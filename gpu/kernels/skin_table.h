@@ -1,4 +1,4 @@
-// The 256 cases of a grid cell (docs/method.md §8), derived by the compiler from the section's rules.
+// The 256 cases of a grid cell (docs/design/method.md §8), derived by the compiler from the section's rules.
 //
 // Corner c of a cell is the node (bit 0, bit 1, bit 2 of c) away from the cell's lowest node. In case k corner c is
 // tissue if bit c of k is set. The twelve cell edges are numbered by their lower corner, then by axis.

@@ -2,6 +2,7 @@
 // clusters. A list is anything that operator[] gives numbers of.
 #pragma once
 #include "gpu/launch/block.h"
+#include "gpu/state/device_view.h"
 
 namespace cutproof::gpu {
 
@@ -61,6 +62,19 @@ CUTPROOF_DEVICE int write_union(Block& block, const A& a, int a_size, const B& b
   write_part_of_union(block, a, a_size, b, b_size, true, out);
   const int common = write_part_of_union(block, b, b_size, a, a_size, false, out);
   return a_size + b_size - common;
+}
+
+// Memberships of a particle in ascending order, -1 last.
+CUTPROOF_DEVICE inline void sort_memberships(const DeviceView& w, int64_t p) {
+  for (int end = w.membership_begin[p] + 1; end < w.membership_begin[p + 1]; ++end) {
+    const int moving = w.memberships[end];
+    int h = end;
+    for (; h > w.membership_begin[p] && static_cast<unsigned>(w.memberships[h - 1]) > static_cast<unsigned>(moving);
+         --h) {
+      w.memberships[h] = w.memberships[h - 1];
+    }
+    w.memberships[h] = moving;
+  }
 }
 
 }  // namespace cutproof::gpu

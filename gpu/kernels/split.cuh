@@ -136,7 +136,7 @@ CUTPROOF_DEVICE void remove_debris_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(remove_debris_kernel);
 
-// The stage has found no room for its slots.
+// The slots that are left are too few for the stage.
 template <class Block>
 CUTPROOF_DEVICE void put_debris_back_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
@@ -302,7 +302,7 @@ CUTPROOF_KERNEL(flatten_pairs_kernel);
 // ---- slots and numbers
 
 // New numbers go on from the highest that the body uses, in the order (cluster, smallest particle). A block for each
-// body. Also looks whether there is room.
+// body. Also looks whether the capacity suffices.
 template <class Block>
 CUTPROOF_DEVICE void number_components_kernel(Block& block, DeviceView w) {
   using namespace split_detail;

@@ -158,8 +158,8 @@ CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const floa
   const Rotation best = rotate<Method>(a, w.rotation[s]);
   w.rotation[s] = best.r;
   w.degenerate[s] = best.degenerate;
-  // Such that Σ w (goal) = Σ w x to the rounding of these two sums (docs/decisions.md, Momentum and the rounding of
-  // sums): the rounded T must not push the cluster.
+  // Such that Σ w (goal) = Σ w x to the rounding of these two sums (docs/design/decisions.md, Momentum and the rounding
+  // of sums): the rounded T must not push the cluster.
   const Float3 turned = best.r * rest - rest;
   const Float3 base = xyz(w.displacement[w.members[w.slot_begin[s]]]);
   w.center[s] = base + (1.0f / mass) * (moved - body.h * turned);
@@ -255,9 +255,9 @@ CUTPROOF_DEVICE inline void begin_substep(const DeviceView& w, const BodyConstan
   }
 }
 
-// Chebyshev semi-iteration (docs/acceleration.md), order >= 1: x + pull (g - x) + carry (x - earlier), with g where the
-// plain iteration goes from x. The recurrence of the weights in closed form:
-// omega_j = (1 + q) (1 + q^(j-1)) / (1 + q^j) for j >= 2, with q = ((1 - r) / (1 + r))², r² = 1 - b.
+// Chebyshev semi-iteration (docs/design/solvers.md), order >= 1: x + pull (g - x) + carry (x - earlier), with g where
+// the plain iteration goes from x. The recurrence of the weights in closed form: omega_j = (1 + q) (1 + q^(j-1)) / (1 +
+// q^j) for j >= 2, with q = ((1 - r) / (1 + r))², r² = 1 - b.
 struct Combination {
   float pull, carry;
   CUTPROOF_DEVICE Float3 operator()(Float3 plain, Float3 now, Float3 earlier) const {
@@ -371,9 +371,9 @@ CUTPROOF_DEVICE void update_positions_kernel(Block& block, const DeviceView& w, 
       const Float4 predicted = w.predicted[p];
       const Float3 from = implicit ? xyz(predicted) : x;
       // Mean of the goals, less `from`: small numbers, so that summing them costs no digits of d.
-      const int share = w.membership_count[p];
+      const int clusters = w.membership_count[p];
       Float3 pull = x - from;  // a particle in no cluster stays where it is
-      if (share > 0) {
+      if (clusters > 0) {
         const Coordinates c = coordinates(body, w.node[p]);
         Float3 sum;
         const int end = w.membership_begin[p + 1];
@@ -387,7 +387,7 @@ CUTPROOF_DEVICE void update_positions_kernel(Block& block, const DeviceView& w, 
           turn(2, 2) -= 1.0f;
           sum = sum + ((w.center[slot] - from) + turn * r);
         }
-        pull = (1.0f / static_cast<float>(share)) * sum;
+        pull = (1.0f / static_cast<float>(clusters)) * sum;
       }
       const Float3 plain = from + s * pull;
       Float3 free = plain;

@@ -1,8 +1,12 @@
-// The work of a frame, written down once for every launcher: which kernels run, in which order, and under which
-// condition. No size is known here; all of them live in DeviceView::counters.
+// gpu/launch: what host and device have in common when they run kernels: the contracts of a Block (block.h) and of a
+// Launcher (launcher.h), and what is known of a load (plan.h, load.h).
+//
+// This file: the work of a frame, written down once for every launcher: which kernels run, in which order, and under
+// which condition. No size is known here; all of them live in DeviceView::counters.
 #pragma once
 #include "gpu/kernels/detect.cuh"
 #include "gpu/kernels/expand.cuh"
+#include "gpu/kernels/frame.cuh"
 #include "gpu/kernels/merge.cuh"
 #include "gpu/kernels/skin.cuh"
 #include "gpu/kernels/split.cuh"
@@ -13,107 +17,6 @@
 #include "model/stage.h"
 
 namespace cutproof::gpu {
-
-// Whether a stage has anything to do for a body (model/backend.h, run).
-CUTPROOF_DEVICE inline bool is_due(const DeviceView& w, int b, int stage) {
-  const BodyConstants& body = w.body[b];
-  switch (stage) {
-    case static_cast<int>(Stage::step):
-      return running(w, b);
-    case static_cast<int>(Stage::detect):
-      return running(w, b) && body.needs_detection != 0;
-    case static_cast<int>(Stage::split):
-      return cut_now(w, b);
-    case static_cast<int>(Stage::merge):
-      return cut_now(w, b) && body.merge_rule != kNoMerge;
-    case static_cast<int>(Stage::expand):
-      return cut_now(w, b) &&
-             (body.expand_rule == kPublishedExpand || (body.expand_rule == kEdgeCover && w.edge_covered[b] == 0));
-    default:
-      return running(w, b) && body.skin_wanted != 0;
-  }
-}
-
-// What the conditions of a span ask for. One thread.
-template <class Block>
-CUTPROOF_DEVICE void note_cuts_kernel(Block& block, DeviceView w) {
-  if (block.first() != 0) return;
-  Counters& c = *w.counters;
-  c.cut = 0;
-  c.expanding = 0;
-  c.extracting = 0;
-  for (int b = 0; b < w.bodies; ++b) {
-    if (is_due(w, b, static_cast<int>(Stage::split))) c.cut = 1;
-    if (is_due(w, b, static_cast<int>(Stage::expand))) c.expanding = 1;
-    if (is_due(w, b, static_cast<int>(Stage::skin)) && (w.cut[b] >= 0 || w.skin_made[b] == 0)) c.extracting = 1;
-  }
-}
-CUTPROOF_KERNEL(note_cuts_kernel);
-
-// One thread: reports a stage as run if some body had it due.
-template <class Block>
-CUTPROOF_DEVICE void note_stage_kernel(Block& block, DeviceView w, int stage) {
-  if (block.first() != 0) return;
-  for (int b = 0; b < w.bodies; ++b) {
-    if (is_due(w, b, stage)) w.counters->stage_ran[stage] = 1;
-  }
-}
-CUTPROOF_KERNEL(note_stage_kernel);
-
-// Split and merge rename memberships in place. Before anything is summed over them again they are brought into the
-// order that a load gives them, so that sums have the same bits however often a state was loaded on the way.
-template <class Block>
-CUTPROOF_DEVICE void sort_memberships_kernel(Block& block, DeviceView w) {
-  for (int64_t p = block.first(); p < w.particles; p += block.stride()) sort_memberships(w, p);
-}
-CUTPROOF_KERNEL(sort_memberships_kernel);
-
-// Numbers in the order of slots, and the frame counts up.
-template <class Block>
-CUTPROOF_DEVICE void flag_live_slots_kernel(Block& block, DeviceView w) {
-  for (int64_t s = block.first(); s < w.slot_capacity; s += block.stride()) {
-    w.slot_scratch[s] = s < w.counters->slots_used && w.slot_size[s] > 0;
-  }
-}
-CUTPROOF_KERNEL(flag_live_slots_kernel);
-
-// slot_scratch[slot_capacity + s]: live slots before s. Requires a DeviceView of one body.
-template <class Block>
-CUTPROOF_DEVICE void number_slots_kernel(Block& block, DeviceView w) {
-  for (int64_t s = block.first(); s < w.counters->slots_used; s += block.stride()) {
-    if (w.slot_size[s] > 0 && running(w, w.slot_body[s])) w.slot_number[s] = w.slot_scratch[w.slot_capacity + s];
-  }
-}
-CUTPROOF_KERNEL(number_slots_kernel);
-
-// The same for several bodies, each of which counts from 0; their slots interleave once clusters have split. A block
-// for each body, whose threads take consecutive parts of the slots: count, add up, count again.
-template <class Block>
-CUTPROOF_DEVICE void number_slots_by_body_kernel(Block& block, DeviceView w) {
-  const int used = w.counters->slots_used;
-  const int part = (used + block.size() - 1) / block.size();
-  for (int b = block.index(); b < w.bodies; b += block.count()) {
-    if (!running(w, b)) continue;
-    const int begin = part * block.thread() < used ? part * block.thread() : used;
-    const int end = begin + part < used ? begin + part : used;
-    const auto mine = [&](int s) { return w.slot_body[s] == b && w.slot_size[s] > 0; };
-    int count = 0, total = 0;
-    for (int s = begin; s < end; ++s) count += mine(s) ? 1 : 0;
-    int number = block.exclusive_scan(count, total);
-    for (int s = begin; s < end; ++s) {
-      if (mine(s)) w.slot_number[s] = number++;
-    }
-  }
-}
-CUTPROOF_KERNEL(number_slots_by_body_kernel);
-
-template <class Block>
-CUTPROOF_DEVICE void end_frame_kernel(Block& block, DeviceView w) {
-  for (int64_t b = block.first(); b < w.bodies; b += block.stride()) {
-    if (running(w, static_cast<int>(b))) ++w.frame[b];
-  }
-}
-CUTPROOF_KERNEL(end_frame_kernel);
 
 // `mark` is called with each stage before its work is handed over (a launcher that works at once can take times).
 template <class Launcher, class Mark>

@@ -1,6 +1,10 @@
 // What is known of a load before it runs: which stages any of its bodies can need, and the longest loops. Decides
 // which kernels are in the graph at all.
 #pragma once
+#include <vector>
+
+#include "model/setup.h"
+#include "model/state.h"
 
 namespace cutproof::gpu {
 
@@ -21,8 +25,13 @@ struct Plan {
   bool edge_cover = false, published_expand = false;
   bool skin = false;
   SplitMethod split = SplitMethod::blocks;
-  int rotation_method = 0;  // layout.h
+  int rotation_method = 0;  // device_view.h
   int largest_cluster = 0;  // particles; a cluster beyond kMostInBlock is split by global labels whatever `split` says
 };
+
+// Requires states that fit their setups (state/staging.h make_staging_buffers). Throws MachineError if a cluster has
+// more members than 32 bits can count.
+Plan make_plan(const std::vector<Setup>& setups, const std::vector<State>& states, int rotation_method,
+               SplitMethod split);
 
 }  // namespace cutproof::gpu

@@ -1,11 +1,12 @@
-// How a state lies in memory while kernels work on it: one DeviceView for all bodies of a load, arrays one after the
-// other. Plain pointers and numbers, passed to kernels by value. Who allocates: backend (state_transfer.h).
+// gpu/state: how a state lies in memory while kernels work on it. One DeviceView for all bodies of a load, arrays one
+// after the other: plain pointers and numbers, passed to kernels by value. arrays.inc lists the arrays, each once;
+// staging.h has them in the host's memory, makes them from states and states from them, and says how large they are.
 //
 // Indices: b body; p particle, over all bodies (body b has [particle_begin[b], particle_begin[b + 1])), in each body in
 // the order of model/; s slot of a cluster, over all bodies; q place in the array of members.
 //
 // Positions are kept as displacements from rest in single precision, x = X + d: what is rounded is then the motion and
-// not the place, so a body of 200 spacings loses no digits to its size (docs/tolerances.md).
+// not the place, so a body of 200 spacings loses no digits to its size (docs/design/tolerances.md).
 #pragma once
 #include <cstdint>
 
@@ -23,7 +24,7 @@ enum : int { kNoExpand = 0, kEdgeCover = 1, kPublishedExpand = 2 };             
 // nothing.
 enum : int { kSlotsFull = 1, kMembersFull = 2, kVerticesFull = 4, kCellsFull = 8, kAdditionsFull = 16 };
 
-// Which rotation method match_shapes uses (rotation.cuh); chosen by measurement, docs/rotations.md.
+// Which rotation method match_shapes uses (rotation.cuh); chosen by measurement, docs/design/solvers.md.
 enum : int { kJacobi4 = 0, kMueller2016 = 1, kApd = 2, kSvd = 3, kQuest = 4, kNewton = 5 };
 
 // Division by a number that is known before: n / d = n · multiplier >> shift for every 0 <= n < 2^31 (Granlund and
@@ -108,93 +109,29 @@ struct Counters {
   int dirty_cells;         // skin cells to be extracted again
   int stage_ran[6];        // by stage: launched in this span
   int changed;             // scratch of a stage's loop
-  int failed;              // the stage in progress has found no room
+  int failed;              // a capacity was too small for the stage in progress
   int additions_before;    // expand: length of DeviceView::additions before the layer in progress
   int growth;              // expand: members that the enlarged clusters need
   int memberships_before;  // expand: length of DeviceView::memberships in use before it
   int scratch[8];
 };
 
-struct DeviceView {
+// What decides how large the arrays are.
+struct Extents {
   int bodies = 0, particles = 0;
-  int64_t nodes = 0;  // over all bodies
+  int64_t nodes = 0;                                   // over all bodies
+  int64_t schedule_frames = 0, schedule_substeps = 0;  // of the schedules of all bodies, one after the other
+  int wall_count = 0, grip_count = 0, held_count = 0;  // held: particles that grips hold
+  int64_t grip_substeps = 0;                           // substeps of each grip's schedule, over all grips
+  int accelerated = 0;                                 // some body's iterations are
+  int any_contact = 0;                                 // some body has a blade, a wall or a grip
   int slot_capacity = 0, member_capacity = 0, vertex_capacity = 0, cell_capacity = 0, addition_capacity = 0;
+};
+
+struct DeviceView : Extents {
   int rotation_method = kJacobi4;
-  int any_contact = 0;  // some body has a blade, a wall or a grip
-
-  BodyConstants* body = nullptr;    // [bodies]
-  int* frame = nullptr;             // [bodies] State::frame
-  int* cut = nullptr;               // [bodies] code of this frame's removals (see death); -1: nothing was removed
-  int* edge_covered = nullptr;      // [bodies]
-  int* skin_made = nullptr;         // [bodies] 0: the next skin stage extracts every cell
-  float* substep_length = nullptr;  // see BodyConstants::frame_begin
-  MoveF* moves = nullptr;
-  WallF* walls = nullptr;
-  GripF* grips = nullptr;
-  int* grip_particles = nullptr;  // p
-  unsigned char* grip_active = nullptr;
-  Float3* grip_displacement = nullptr;
-
-  // Particles, [particles] each.
-  int* body_of = nullptr;
-  int* node = nullptr;             // in its body's grid
-  int* particle_at = nullptr;      // [nodes] p or -1
-  int* death = nullptr;            // -1: alive; 2 f + 2: removed by detection in frame f; 2 f + 3: as debris by
-                                   // its split; 2 f and 2 f + 1: in the removed and debris lists of a state loaded
-                                   // at frame f; kDeadBefore: dead at load and in neither
-  Float4* displacement = nullptr;  // d; w: mass m_i
-  Float4* velocity = nullptr;
-  Float4* start = nullptr;           // d when the substep began
-  Float4* predicted = nullptr;       // d~ of x~; w: side of the blade, +1 or -1; 0: held by a grip
-  Float4* pushed = nullptr;          // displacement by contacts and grips, carried through the iterations
-  Float4* earlier = nullptr;         // d of one iteration ago; empty unless some body is accelerated
-  Float4* pushed_earlier = nullptr;  // pushed of one iteration ago; empty too without contacts
-  Float4* impulse = nullptr;         // per mass, this frame; Σ m_i impulse_i = State::impulse
-  int* membership_count = nullptr;   // n_i: how many clusters hold it
-  int* membership_begin =
-      nullptr;  // [particles + 1] memberships of p: memberships[membership_begin[p] .. membership_begin[p + 1])
-  int* memberships = nullptr;  // [member_capacity] slots, ascending, -1: none (any more) last; in no
-                               // particular but a reproducible order from split to the beginning of skin
-
-  // Clusters, [slot_capacity] each. Slots are given out in ascending order of number and never reused within a load
-  // (the backend compacts them between frames), so the order of slots is the order of numbers.
-  int* slot_begin = nullptr;  // members[slot_begin .. slot_begin + slot_size)
-  int* slot_size = nullptr;   // 0: the cluster is gone
-  int* slot_number = nullptr;
-  int* slot_body = nullptr;
-  Matrix3* rotation = nullptr;  // last R_c
-  int* degenerate = nullptr;
-  float* mass = nullptr;                // M_c
-  int* rest_base = nullptr;             // [3 · slot_capacity] grid coordinates of one member
-  Float3* rest_offset = nullptr;        // T_c = h · (rest_base + rest_offset)
-  Float3* center = nullptr;             // t_c - T_c
-  int* members = nullptr;               // [member_capacity] p, ascending within a cluster
-  unsigned char* slot_flag = nullptr;   // scratch of a stage
-  unsigned char* rest_dirty = nullptr;  // rest frame is to be recomputed
-  int* affected = nullptr;              // slots that lost a particle in this frame, ascending
-  int* slot_scratch = nullptr;          // [4 · slot_capacity]
-  int* label = nullptr;                 // [member_capacity] scratch of split: by place in members
-  int* member_scratch = nullptr;        // [member_capacity] scratch of split: by place in members
-  int* proposal = nullptr;              // merge: the t that slot s proposes, or -1
-  int* best = nullptr;                  // merge: the s whose proposal has the smallest key of those naming this slot
-  int* small_clusters = nullptr;        // slots
-  unsigned long long* additions = nullptr;  // [addition_capacity] expand: slot · 2^32 + particle
-  unsigned char* particle_flag = nullptr;   // [particles] scratch
-  int* particle_scratch = nullptr;          // [2 · particles]
-
-  // Skin.
-  int* vertex_of = nullptr;     // [6 · particles] vertex of owner p in direction d, or -1
-  int* vertex_owner = nullptr;  // [vertex_capacity] p; -1: gone
-  unsigned char* vertex_direction = nullptr;
-  Float4* vertex_position = nullptr;    // displacement from X_v
-  int* cell_of = nullptr;               // [nodes] the skin cell whose lowest corner is the node, or -1
-  int* cell_node = nullptr;             // [cell_capacity] node over all bodies
-  int* cell_triangles = nullptr;        // [cell_capacity · 15] up to 5 triangles, vertices; -1: none
-  unsigned char* cell_dirty = nullptr;  // [nodes]
-  int* dirty_cells = nullptr;           // [nodes] nodes of cells to be extracted again, ascending
-  int* cell_scratch = nullptr;          // [nodes]
-
-  Counters* counters = nullptr;
+#define ARRAY(name, Element, extent, lifetime, unset) Element* name = nullptr;
+#include "gpu/state/arrays.inc"
 };
 
 inline constexpr int kDeadBefore = 0x7fffffff;

@@ -257,6 +257,11 @@ Id open_group(hid_t parent, const std::string& name) {
   return Id(H5Gopen2(parent, name.c_str(), H5P_DEFAULT), H5Gclose, name);
 }
 
+bool has_link(hid_t parent, const std::string& name) {
+  require_memory();
+  return H5Lexists(parent, name.c_str(), H5P_DEFAULT) > 0;
+}
+
 bool has_attribute(hid_t object, const std::string& name) {
   require_memory();
   const htri_t found = H5Aexists(object, name.c_str());

@@ -76,6 +76,11 @@ struct LayoutOf<double> {
   static Layout get() { return {Scalar::f64, {}}; }
 };
 template <>
+struct LayoutOf<bool> {
+  static_assert(sizeof(bool) == 1);
+  static Layout get() { return {Scalar::u8, {}}; }
+};
+template <>
 struct LayoutOf<int32_t> {
   static Layout get() { return {Scalar::i32, {}}; }
 };
@@ -124,6 +129,7 @@ class File {
 
 Id create_group(hid_t parent, const std::string& name);
 Id open_group(hid_t parent, const std::string& name);
+bool has_link(hid_t parent, const std::string& name);
 bool has_attribute(hid_t object, const std::string& name);
 
 void write_attribute(hid_t object, const std::string& name, const Layout& layout, const void* value);

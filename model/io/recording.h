@@ -1,5 +1,5 @@
-// Recordings: temporal VTKHDF 2.0, one file per dataset (particles, skin, blade) and an index file (architecture.md,
-// Recordings; docs/recording.md).
+// Recordings: temporal VTKHDF 2.0, one file per dataset (particles, skin, blade) and an index file
+// (docs/reference/recording.md).
 #pragma once
 #include <cstdint>
 #include <memory>

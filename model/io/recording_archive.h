@@ -30,19 +30,16 @@ class WritingArchive {
   void choice(const std::string& name, E value, std::span<const std::string_view> names) {
     text(name, std::string(names[static_cast<std::size_t>(value)]));
   }
-  // A choice that files of older programs do not have.
-  template <class E>
-  void later_choice(const std::string& name, E value, std::span<const std::string_view> names) {
-    choice(name, value, names);
-  }
   // An array, as a dataset.
   template <class T>
   void array(const std::string& name, const std::vector<T>& values) {
     hdf5::write_table(group_, name, values);
   }
+  // Adds to a group, which is made if it is not there.
   template <class F>
   void group(const std::string& name, F&& fields) {
-    const hdf5::Id id = hdf5::create_group(group_, name);
+    const hdf5::Id id =
+        hdf5::has_link(group_, name) ? hdf5::open_group(group_, name) : hdf5::create_group(group_, name);
     WritingArchive inner(id.get());
     fields(inner);
   }
@@ -83,17 +80,12 @@ class ReadingArchive {
     }
     throw hdf5::Error(path_ + "/" + name, fmt::format("This is \"{}\", which is none of its names.", found));
   }
-  template <class E>
-  void later_choice(const std::string& name, E& value, std::span<const std::string_view> names) const {
-    if (hdf5::has_attribute(group_, name)) choice(name, value, names);
-  }
   template <class T>
   void array(const std::string& name, std::vector<T>& values) const {
     located(name, [&] { values = hdf5::Table<T>::open(group_, name, file_bytes_).read_all(); });
   }
-  template <class T>
-  void table(const std::string& name, hdf5::Table<T>& table) const {
-    located(name, [&] { table = hdf5::Table<T>::open(group_, name, file_bytes_); });
+  void table(const std::string& name, const hdf5::Layout& row, hdf5::RawTable& table) const {
+    located(name, [&] { table = hdf5::RawTable::open(group_, name, row, file_bytes_); });
   }
   template <class F>
   void group(const std::string& name, F&& fields) const {

@@ -2,19 +2,11 @@
 #pragma once
 #include <hdf5.h>
 
-#include <optional>
-#include <string>
+#include <cstdint>
 
 #include "model/setup.h"
 
 namespace cutproof::io {
-
-// The first thing that makes a setup unusable: a field by its path below /setup, and what is wrong, as a sentence.
-struct SetupDefect {
-  std::string field;
-  std::string problem;
-};
-std::optional<SetupDefect> defect_of(const Setup& setup);
 
 // Both throw hdf5::Error; what is read is not yet checked by defect_of.
 void write_setup(hid_t file, const Setup& setup);

@@ -1,5 +1,6 @@
 // The table of all fields of a scene: name, unit, bounds and meaning, once. A visitor that goes through it reads,
-// writes or documents a scene (scene_io.cpp). Defaults are those of the structs in model/scene.h and model/setup.h.
+// writes or documents a scene (scene_reader.cpp, scene_writer.cpp). Defaults are those of the structs in model/scene.h
+// and model/setup.h.
 //
 // A visitor has
 //   field(const Field&, T&)      T: bool, a number, std::string, Vec3, Range, an enumeration, a struct described here,
@@ -11,7 +12,9 @@
 #include <limits>
 #include <string_view>
 #include <utility>
+#include <vector>
 
+#include "model/rules.h"
 #include "model/scene.h"
 
 namespace cutproof::io {
@@ -54,27 +57,15 @@ inline constexpr auto words(Shape::Kind) {
 inline constexpr auto words(Cooking) {
   return std::array<Words<Cooking>, 2>{{{Cooking::boxes, "boxes"}, {Cooking::sampled, "sampled"}}};
 }
-inline constexpr auto words(Solver) {
-  return std::array<Words<Solver>, 2>{{{Solver::implicit, "implicit"}, {Solver::published, "published"}}};
-}
-inline constexpr auto words(Acceleration) {
-  return std::array<Words<Acceleration>, 2>{{{Acceleration::none, "none"}, {Acceleration::chebyshev, "chebyshev"}}};
-}
-inline constexpr auto words(Criterion) {
-  using enum Criterion;
-  return std::array<Words<Criterion>, 4>{
-      {{none, "none"}, {distance, "distance"}, {geometric, "geometric"}, {strain, "strain"}}};
-}
-inline constexpr auto words(MergeRule) {
-  using enum MergeRule;
-  return std::array<Words<MergeRule>, 4>{
-      {{none, "none"}, {deterministic, "deterministic"}, {published, "published"}, {single_pass, "single_pass"}}};
-}
-inline constexpr auto words(ExpandRule) {
-  using enum ExpandRule;
-  return std::array<Words<ExpandRule>, 3>{{{none, "none"}, {edge_cover, "edge_cover"}, {published, "published"}}};
-}
 inline constexpr auto words(Curve) { return std::array<Words<Curve>, 2>{{{Curve::line, "line"}, {Curve::arc, "arc"}}}; }
+
+// Choices that setups have too are named in model/rules.h.
+template <NamedChoice E>
+std::vector<Words<E>> words(E choice) {
+  std::vector<Words<E>> words;
+  for (const std::string_view name : names_of(choice)) words.emplace_back(static_cast<E>(words.size()), name);
+  return words;
+}
 
 // --- The fields ----------------------------------------------------------------------------------------------------
 inline constexpr double kLongest = 1e6;  // of any length [m] and coordinate
@@ -204,7 +195,7 @@ void describe(Visitor& v, StepParameters& s) {
   v.field({.name = "relaxation", .bounds = above(0, 1), .doc = "s, `published` only."}, s.relaxation);
   v.field({.name = "acceleration",
            .doc = "`implicit` only. `chebyshev`: the same answer in fewer iterations, each of which costs a little "
-                  "more; the energy need not fall in every one (docs/acceleration.md)."},
+                  "more; the energy need not fall in every one (docs/design/solvers.md)."},
           s.acceleration);
   v.field({.name = "damping", .unit = "1/s", .bounds = between(0, 1e9), .doc = "c: velocities decay as exp(−c t)."},
           s.damping);

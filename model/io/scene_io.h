@@ -13,7 +13,7 @@ Scene read_scene(const std::string& path);
 Scene parse_scene(const std::string& text, const std::string& name);
 // The whole scene, defaults included; parse_scene(write_scene(s)) gives s.
 std::string write_scene(const Scene& scene);
-// docs/scene.md: every field with type, unit, default, bounds and meaning.
+// docs/reference/scene.md: every field with type, unit, default, bounds and meaning.
 std::string scene_reference();
 
 }  // namespace cutproof::io

@@ -14,7 +14,7 @@ PolyDataFile::PolyDataFile(const std::string& path, Cells cells) : file_(hdf5::F
   root_ = hdf5::create_group(file_.id(), "VTKHDF");
   hdf5::write_attribute(root_.get(), "Version", std::array<int64_t, 2>{2, 0});
   hdf5::write_text_attribute(root_.get(), "Type", "PolyData");
-  points_ = hdf5::Table<Vec3>::create(root_.get(), "Points");
+  points_ = hdf5::RawTable::create(root_.get(), "Points", hdf5::LayoutOf<Vec3>::get(), 0);
   point_data_ = hdf5::create_group(root_.get(), "PointData");
   const hdf5::Id group = hdf5::create_group(root_.get(), kCellGroups[static_cast<std::size_t>(cells)]);
   // 64 bits: VTK needs offsets and connectivity to be of one type.

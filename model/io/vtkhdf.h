@@ -1,6 +1,6 @@
 // Writes one temporal VTKHDF 2.0 file of type PolyData: points, one kind of cells, and data on the points, for each
 // of a growing number of steps. What did not change is written once and shared by steps through offsets.
-// Layout: docs/recording.md, and https://docs.vtk.org, VTKHDF File Format.
+// Layout: docs/reference/recording.md, and https://docs.vtk.org, VTKHDF File Format.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -32,11 +32,11 @@ class PolyDataFile {
   PolyDataFile(const std::string& path, Cells cells);
 
   hdf5::File& file() { return file_; }
-  hdf5::Table<Vec3>& points() { return points_; }
-  template <class T>
-  hdf5::Table<T> make_point_data(const std::string& name) {
+  // Rows of three float64; closed by finish().
+  hdf5::RawTable& points() { return points_; }
+  hdf5::RawTable make_point_data(const std::string& name, const hdf5::Layout& row) {
     data_names_.push_back(name);
-    return hdf5::Table<T>::create(point_data_.get(), name);
+    return hdf5::RawTable::create(point_data_.get(), name, row, 0);
   }
   // Cell k has the points connectivity[offsets[k] .. offsets[k + 1]), counted within the part.
   Part add_part(int64_t point_count, std::span<const int64_t> offsets, std::span<const int64_t> connectivity);
@@ -55,7 +55,7 @@ class PolyDataFile {
   hdf5::File file_;
   Cells cells_;
   hdf5::Id root_, point_data_;
-  hdf5::Table<Vec3> points_;
+  hdf5::RawTable points_;
   hdf5::Table<int64_t> offsets_, connectivity_;
   std::vector<std::string> data_names_;
   std::vector<PartRecord> parts_;

@@ -1,42 +1,75 @@
-// How far a state of a backend is from the reference's: distances where a distance makes sense, and equality where only
-// equality does (accuracy_and_speed.md §1, implementation and topology).
+// Where two states differ, and by how much: walks model/fields.h and names no field by itself. Two right backends agree
+// on the bits of what they decide, and are near to each other in what they compute (Field::is_decision).
 #pragma once
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "model/setup.h"
 #include "model/state.h"
-#include "oracles/comparison/errors.h"
-#include "oracles/comparison/step_comparison.h"
+#include "oracles/comparison/error_norm.h"
 
 namespace cutproof::oracles {
 
-// Distances of positions of the particles in `mask` [h]. Both states need one position per particle.
-Spread positions_apart(const Setup& setup, const State& expected, const State& actual,
-                       const std::vector<uint8_t>& mask);
-// Rest centers [h] and masses [1] against those recomputed from the state's own memberships.
-struct RestFrameSpread {
-  Spread center, mass;
-};
-RestFrameSpread rest_frames_apart(const Setup& setup, const State& actual);
+// --- Bits ------------------------------------------------------------------------------------------------------------
 
-// Positions of skin vertices [h], vertices matched by (owner, direction). Requires equal topology.
-Spread skins_apart(const Setup& setup, const Skin& expected, const Skin& actual);
+struct FieldDifference {
+  std::string_view field;  // Field::name
+  std::string_view text;   // Field::text
+  int64_t index = 0;       // of the first entry that differs, or that only one of the two has; 0 of a single value
+};
+// The first field, in the order of model/fields.h, that differs by a bit. `rounded_once`: velocities and momenta may
+// differ as if those of `actual` had been rounded to single precision (each component once, sums of them in parts, so
+// twice half a unit in the last place).
+std::optional<FieldDifference> first_difference_in_bits(const State& expected, const State& actual,
+                                                        bool rounded_once = false);
+
+// --- Decisions -------------------------------------------------------------------------------------------------------
 
 // A difference for which there is no "close".
-struct Difference {
+struct DecisionDifference {
   std::string text;
   std::vector<int32_t> clusters;  // numbers
   std::vector<int32_t> particles;
+  std::string_view field = {};  // Field::name of the first that shows it; empty if it is none of a state
 };
-// The first difference in anything but numbers of arithmetic: alive and removed particles, debris, clusters as sets
-// with their numbers, tau, cap, edge_covered, frame, skin vertices and triangles up to rotation. `sets_are_open`: the
-// rule leaves several answers, so clusters and edge_covered are not compared.
-std::optional<Difference> topological_difference(const State& expected, const State& actual, bool sets_are_open);
+// Whether clusters, and what is derived from them, are compared: a rule may leave several answers (model/rules.h).
+enum class Sets { compared, open };
+// The first difference in what is decided, causes before what follows from them: frame, removed particles and debris,
+// alive particles, tau and cap, clusters, edge_covered, the skin. Clusters are compared as sets with their numbers, the
+// skin as triangles between vertices that are named by (owner, direction), each up to rotation; all else entry by
+// entry. Requires two well-formed states of one body.
+std::optional<DecisionDifference> difference_of_decisions(const State& expected, const State& actual,
+                                                          Sets sets = Sets::compared);
 
-// d_i of method.md §4, among neighbours alive in `state` [m].
-double greatest_neighbour_distance(const Setup& setup, const State& state, int32_t particle);
+// --- What is computed ------------------------------------------------------------------------------------------------
+
+// Distances of positions [h], and differences of velocities [h/dt], of the particles in `mask` [n].
+ErrorNorm position_error(const Setup& setup, const std::vector<Vec3>& expected, const std::vector<Vec3>& actual,
+                         const std::vector<uint8_t>& mask);
+ErrorNorm velocity_error(const Setup& setup, const std::vector<Vec3>& expected, const std::vector<Vec3>& actual,
+                         double dt, const std::vector<uint8_t>& mask);
+
+struct FieldError {
+  std::string_view field;  // Field::name
+  std::string_view unit;   // of `norm`
+  ErrorNorm norm;          // `where`: particle, cluster, or the owner of a skin vertex
+};
+// For each field that is no decision, in the order of model/fields.h: points [h], velocities [h/dt], masses relative to
+// `expected`, angles of rotations [rad], flags that differ [1], momenta [kg m/s]. Of particles those in `mask` [n]. The
+// norm of a field is empty where its entries have no counterpart, because clusters or skin differ as decisions.
+// Requires two well-formed states of one body; dt > 0 [s].
+std::vector<FieldError> errors_of_fields(const Setup& setup, const State& expected, const State& actual, double dt,
+                                         const std::vector<uint8_t>& mask);
+// Throws std::invalid_argument if there is no such field.
+const ErrorNorm& error_of(const std::vector<FieldError>& errors, std::string_view field);
+
+// Rest centers [h] and masses [1] against those recomputed from the state's own memberships.
+struct RestFrameErrors {
+  ErrorNorm center, mass;
+};
+RestFrameErrors rest_frame_errors(const Setup& setup, const State& actual);
 
 }  // namespace cutproof::oracles

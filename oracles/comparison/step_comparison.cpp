@@ -7,6 +7,7 @@
 #include <random>
 #include <utility>
 
+#include "oracles/comparison/state_difference.h"
 #include "oracles/shape_sums.h"
 #include "oracles/support.h"
 
@@ -14,15 +15,14 @@ namespace cutproof::oracles {
 
 namespace {
 
-// Issue bounds of the error of one frame (accuracy_and_speed.md §1) [h].
-constexpr double kBound = 1e-4;
+// Of larger bodies the project asks for less (measuring.md, Errors) [h].
 constexpr double kBoundOfLargeBodies = 3e-4;
 constexpr double kLargeBody = 100;  // [h] across
 // A particle this near to the blade's plane, in units of the rounding of its place and the blade's, may count as being
 // on either side of it.
 constexpr double kSideBand = 32;
-// A particle beyond the bound is measured for how far roundings of the frame's start carry it (docs/tolerances.md,
-// Against the reference), in so many runs, from a fixed seed.
+// A particle beyond the bound is measured for how far roundings of the frame's start carry it
+// (docs/design/tolerances.md, Against the reference), in so many runs, from a fixed seed.
 constexpr uint32_t kDisturbedRuns = 16;
 constexpr uint32_t kDisturbanceSeed = 1;
 
@@ -62,19 +62,6 @@ std::vector<uint8_t> without(std::vector<uint8_t> mask, const std::vector<uint8_
   for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = mask[i] && !excluded[i];
   return mask;
 }
-
-}  // namespace
-
-Spread velocities_apart(const Setup& setup, const State& expected, const State& actual, double dt,
-                        const std::vector<uint8_t>& mask) {
-  Spread spread;
-  for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
-    if (mask[at(i)]) spread.add(norm(actual.v[at(i)] - expected.v[at(i)]) * dt / setup.body.grid.spacing, i);
-  }
-  return spread;
-}
-
-namespace {
 
 // The matrix of which a cluster's rotation is the best one, Σ w (x − t) (X − T)ᵀ, as far as it says how sure that is.
 struct Shape {
@@ -135,9 +122,9 @@ void spread(std::vector<uint8_t>& particles, const Clusters& clusters, int64_t i
 
 }  // namespace
 
-std::vector<Turn> turns_apart(const Setup& setup, const State& expected, const State& actual) {
+std::vector<RotationDifference> rotation_differences(const Setup& setup, const State& expected, const State& actual) {
   const Clusters& clusters = expected.clusters;
-  std::vector<Turn> turns(at(clusters.count()));
+  std::vector<RotationDifference> turns(at(clusters.count()));
   const WeightedRest rest = weighted_rest(setup.body, membership_counts(clusters, setup.body.particle_count()));
   for (int32_t c = 0; c < clusters.count(); ++c) {
     double squared = 0;
@@ -146,7 +133,7 @@ std::vector<Turn> turns_apart(const Setup& setup, const State& expected, const S
       squared += d * d;
     }
     if (squared == 0) continue;
-    Turn& turn = turns[at(c)];
+    RotationDifference& turn = turns[at(c)];
     const Shape shape = shape_of(rest, clusters, expected.x, c);
     if (!shape.finite || !shape.unique) {
       turn.unique = false;
@@ -239,7 +226,7 @@ StepComparison::Growth StepComparison::growth_of_rounding(const State& before, c
     for (std::size_t i = 0; i < growth.position.size(); ++i) {
       growth.position[i] = std::max(growth.position[i], norm(end.x[i] - expected.x[i]) / setup.body.grid.spacing);
     }
-    const std::vector<Turn> turns = turns_apart(setup, expected, end);
+    const std::vector<RotationDifference> turns = rotation_differences(setup, expected, end);
     for (std::size_t c = 0; c < turns.size(); ++c) {
       growth.turn[c] = std::max(growth.turn[c], turns[c].displacement);
     }
@@ -274,11 +261,22 @@ StepComparison::OnTheWay StepComparison::open_on_the_way(const State& before, co
   return open;
 }
 
-double position_bound(const Body& body) { return body_extent(body) > kLargeBody ? kBoundOfLargeBodies : kBound; }
+void Undecidable::join(const Undecidable& other) {
+  removals += other.removals;
+  sides += other.sides;
+  sides_taken_otherwise += other.sides_taken_otherwise;
+  rotations += other.rotations;
+  sensitive += other.sensitive;
+  particles_excluded += other.particles_excluded;
+}
+
+double position_bound(const Body& body) {
+  return body_extent(body) > kLargeBody ? kBoundOfLargeBodies : kPositionsWanted;
+}
 
 StepComparison::StepComparison(const Setup& setup, ReferenceStep reference_step)
     : setup_(setup),
-      reference_step_(reference_step),
+      reference_step_(std::move(reference_step)),
       bound_(position_bound(setup.body)),
       one_substep_(single_substep(setup)) {}
 
@@ -286,20 +284,20 @@ StepDifference StepComparison::compare(const State& before, const State& after) 
   std::vector<int8_t> wanted(before.x.size(), 0);
   Stepped expected = step(before, wanted);
   const auto apart = [&](const Stepped& stepped, const std::vector<uint8_t>& mask) {
-    return positions_apart(setup_, stepped.state.x, after.x, mask);
+    return position_error(setup_, stepped.state.x, after.x, mask);
   };
   std::vector<uint8_t> mask = without(before.alive, expected.tied);
   // A tie that the backend has broken the other way moves the particle, and with it its clusters, to the other side of
   // the blade. Then the reference is asked again, with these particles on the backend's side.
   if (std::find(expected.tied.begin(), expected.tied.end(), 1) != expected.tied.end() &&
-      apart(expected, before.alive).greatest > bound_) {
+      apart(expected, before.alive).max > bound_) {
     const BladePose& pose = setup_.blade_moves[at((before.frame + 1) * setup_.step.substeps - 1)].to;
     for (std::size_t i = 0; i < wanted.size(); ++i) {
       if (expected.tied[i]) wanted[i] = height_over(pose, after.x[i]) < 0 ? -1 : +1;
     }
     Stepped led = step(before, wanted);
     const std::vector<uint8_t> led_mask = without(before.alive, led.tied);
-    if (apart(led, led_mask).greatest < apart(expected, mask).greatest) {
+    if (apart(led, led_mask).max < apart(expected, mask).max) {
       expected = std::move(led);
       mask = led_mask;
     } else {
@@ -307,21 +305,21 @@ StepDifference StepComparison::compare(const State& before, const State& after) 
     }
   }
   StepDifference difference;
-  difference.sides_either = std::count(expected.tied.begin(), expected.tied.end(), 1);
-  difference.sides_taken_otherwise = expected.led;
+  difference.undecidable.sides = std::count(expected.tied.begin(), expected.tied.end(), 1);
+  difference.undecidable.sides_taken_otherwise = expected.led;
 
   const Clusters &mine = expected.state.clusters, &others = after.clusters;
   const bool same_clusters = mine.offsets == others.offsets && mine.members == others.members;
-  std::vector<Turn> turns;
-  if (same_clusters) turns = turns_apart(setup_, expected.state, after);
+  std::vector<RotationDifference> turns;
+  if (same_clusters) turns = rotation_differences(setup_, expected.state, after);
   for (int32_t c = 0; c < static_cast<int32_t>(turns.size()); ++c) {
     if (!turns[at(c)].moves_members) continue;
     for (const int32_t i : mine.of(c)) mask[at(i)] = 0;
   }
-  const bool turned_too_far =
-      std::any_of(turns.begin(), turns.end(), [&](const Turn& turn) { return !(turn.displacement <= bound_); });
+  const bool turned_too_far = std::any_of(
+      turns.begin(), turns.end(), [&](const RotationDifference& turn) { return !(turn.displacement <= bound_); });
   std::vector<uint8_t> turn_is_sensitive(turns.size(), 0);
-  if (turned_too_far || apart(expected, mask).greatest > bound_) {
+  if (turned_too_far || apart(expected, mask).max > bound_) {
     const Growth growth = growth_of_rounding(before, expected.state, wanted);
     // Each evaluation of the positions rounds again, independently of the others.
     const double grown = std::sqrt(setup_.step.substeps * (setup_.step.iterations + 1.0));
@@ -336,7 +334,7 @@ StepDifference StepComparison::compare(const State& before, const State& after) 
       const double deviation = norm(after.x[i] - expected.state.x[i]) / setup_.body.grid.spacing;
       const bool sensitive = mask[i] && deviation <= grown * growth.position[i];
       decided[i] = before.alive[i] && deviation > bound_ && (decided[i] || expected.tied[i] || sensitive);
-      if (decided[i] && sensitive) ++difference.sensitive_either;
+      if (decided[i] && sensitive) ++difference.undecidable.sensitive;
     }
     if (same_clusters) spread(decided, mine, setup_.step.substeps * int64_t{setup_.step.iterations});
     mask = without(std::move(mask), decided);
@@ -346,22 +344,23 @@ StepDifference StepComparison::compare(const State& before, const State& after) 
   }
   // A cluster follows its particles: where one of them may go either way, so may its rotation.
   for (int32_t c = 0; c < static_cast<int32_t>(turns.size()); ++c) {
-    const Turn& turn = turns[at(c)];
+    const RotationDifference& turn = turns[at(c)];
     const auto members = mine.of(c);
-    const bool either = !turn.unique || turn_is_sensitive[at(c)] ||
-                        (turn.displacement > bound_ &&
-                         std::any_of(members.begin(), members.end(), [&](int32_t i) { return mask[at(i)] == 0; }));
-    if (either) {
-      ++difference.rotations_either;
+    const bool undecidable = !turn.unique || turn_is_sensitive[at(c)] ||
+                             (turn.displacement > bound_ &&
+                              std::any_of(members.begin(), members.end(), [&](int32_t i) { return mask[at(i)] == 0; }));
+    if (undecidable) {
+      ++difference.undecidable.rotations;
     } else {
       difference.angle.add(turn.angle, c);
       difference.rotation.add(turn.displacement, c);
     }
   }
-  difference.particles_excluded = std::count(before.alive.begin(), before.alive.end(), 1) -
-                                  std::count_if(mask.begin(), mask.end(), [](uint8_t m) { return m != 0; });
+  difference.undecidable.particles_excluded = std::count(before.alive.begin(), before.alive.end(), 1) -
+                                              std::count_if(mask.begin(), mask.end(), [](uint8_t m) { return m != 0; });
   difference.position = apart(expected, mask);
-  difference.velocity = velocities_apart(setup_, expected.state, after, setup_.substep_length[at(before.frame)], mask);
+  difference.velocity =
+      velocity_error(setup_, expected.state.v, after.v, setup_.substep_length[at(before.frame)], mask);
   difference.expected = std::move(expected.state);
   return difference;
 }

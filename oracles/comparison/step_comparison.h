@@ -1,34 +1,31 @@
-// A step of a backend beside the reference's from the same state (accuracy_and_speed.md §1, implementation): how far
-// they are apart, and what rounding decides, so that both answers are right (docs/tolerances.md, Against the
+// A step of a backend beside the reference's from the same state (measuring.md, Errors, implementation): how far
+// they are apart, and what rounding decides, so that both answers are right (docs/design/tolerances.md, Against the
 // reference).
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "model/setup.h"
 #include "model/state.h"
-#include "oracles/comparison/errors.h"
+#include "oracles/comparison/error_norm.h"
 
 namespace cutproof::oracles {
-
-// Differences of velocities of the particles in `mask`, as a part of h / dt.
-Spread velocities_apart(const Setup& setup, const State& expected, const State& actual, double dt,
-                        const std::vector<uint8_t>& mask);
 
 // How far apart the rotations of a cluster are, where the best rotation of the cluster at expected.x is unique:
 // (σ2 + σ3) / σ1 >= kUniqueRotation, with σ3 negative for a reflection.
 inline constexpr double kUniqueRotation = 1e-4;
-struct Turn {
+struct RotationDifference {
   double angle = 0;  // [rad]
   // What moved positions of members would explain the angle: |angle| (σ2 + σ3) / (√2 Σ w |X - T|) [h]. Positions off by
-  // δ change A by at most Σ w |X - T| δ, and this turns R by at most √2 / (σ2 + σ3) of that (docs/tolerances.md, One
-  // substep).
+  // δ change A by at most Σ w |X - T| δ, and this turns R by at most √2 / (σ2 + σ3) of that (docs/design/tolerances.md,
+  // One substep).
   double displacement = 0;
   bool unique = true;          // false: they differ, and both may be right
   bool moves_members = false;  // if not unique; the free axis of a cluster that is collinear at rest moves none
 };
 // [m]. Both states have the same clusters.
-std::vector<Turn> turns_apart(const Setup& setup, const State& expected, const State& actual);
+std::vector<RotationDifference> rotation_differences(const Setup& setup, const State& expected, const State& actual);
 
 // Greatest extent of the body at rest, over the three axes [h].
 double body_extent(const Body& body);
@@ -37,23 +34,30 @@ double body_extent(const Body& body);
 // difference of two positions.
 double position_bound(const Body& body);
 
-// "Either" is what rounding decides; it is counted and not measured.
-struct StepDifference {
-  State expected;                     // what the reference makes of the step
-  Spread position, velocity;          // [h], [h/dt]
-  Spread angle, rotation;             // [rad], and as displacements [h]; empty if the clusters are not the same
-  int64_t rotations_either = 0;       // clusters: not unique, of a particle that is "either", or as sensitive
-  int64_t sides_either = 0;           // particles in the blade's plane at the start of a substep
+// What rounding decides within a step, so that both answers are right: counted, and not measured.
+struct Undecidable {
+  int64_t removals = 0;               // particles removed by one only, within the rounding band of detection
+  int64_t sides = 0;                  // particles in the blade's plane at the start of a substep
   int64_t sides_taken_otherwise = 0;  // of these: the reference was led to the backend's side
-  int64_t sensitive_either = 0;       // particles beyond the bound that one rounding of the start carries as far
+  int64_t rotations = 0;              // clusters: not unique, of a particle that is undecidable, or as sensitive
+  int64_t sensitive = 0;              // particles beyond the bound that one rounding of the start carries as far
   int64_t particles_excluded = 0;     // from position and velocity, for any of these reasons or by a rotation's
+
+  void join(const Undecidable& other);
+};
+
+struct StepDifference {
+  State expected;                // what the reference makes of the step
+  ErrorNorm position, velocity;  // [h], [h/dt]
+  ErrorNorm angle, rotation;     // [rad], and as displacements [h]; empty if the clusters are not the same
+  Undecidable undecidable;
 };
 
 // Compares steps of one body, frame after frame.
 class StepComparison {
  public:
   // The step of a frame on the state of its start: the reference's, which no oracle knows.
-  using ReferenceStep = void (*)(const Setup& setup, State& state);
+  using ReferenceStep = std::function<void(const Setup& setup, State& state)>;
   // `setup` must outlive this.
   StepComparison(const Setup& setup, ReferenceStep reference_step);
 

@@ -1,5 +1,6 @@
 #include "oracles/comparison/trajectory.h"
 
+#include "oracles/comparison/state_difference.h"
 #include "oracles/oracles.h"
 
 namespace cutproof::oracles {
@@ -18,7 +19,7 @@ Apart poses_apart(const Setup& setup, const Pose& expected, const Pose& actual) 
     both[i] = expected.alive[i] && actual.alive[i];
     apart.alive_in_one += expected.alive[i] != actual.alive[i];
   }
-  apart.position = positions_apart(setup, expected.x, actual.x, both);
+  apart.position = position_error(setup, expected.x, actual.x, both);
   return apart;
 }
 

@@ -1,11 +1,13 @@
 // Where a body is at the end of every frame of a scene, and how far two runs of one scene are apart. Runs may divide
-// frames differently and have different clusters, so nothing but particles is compared (docs/tune.md).
+// frames differently and have different clusters, so nothing but particles is compared (docs/guide/measuring.md,
+// Tuning).
 #pragma once
 #include <cstdint>
 #include <vector>
 
+#include "model/setup.h"
 #include "model/state.h"
-#include "oracles/comparison/errors.h"
+#include "oracles/comparison/error_norm.h"
 
 namespace cutproof::oracles {
 
@@ -24,7 +26,7 @@ Pose pose_of(const Setup& setup, const State& state, const Pose* earlier);
 // Particles that only one of the two has are counted, and nothing else is asked of them: in a cut that is decided by
 // the tissue's motion, layers next to it may or may not go.
 struct Apart {
-  Spread position;           // of particles alive in both [h]; infinite if one is not a number
+  ErrorNorm position;        // of particles alive in both [h]; infinite if one is not a number
   int64_t alive_in_one = 0;  // particles that only one of the two still has
 };
 Apart poses_apart(const Setup& setup, const Pose& expected, const Pose& actual);

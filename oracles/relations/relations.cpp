@@ -10,7 +10,7 @@
 #include <numeric>
 #include <optional>
 
-#include "oracles/comparison/converged.h"
+#include "oracles/comparison/reference_solution.h"
 #include "oracles/relations/transformed_scene.h"
 #include "oracles/shape_sums.h"
 #include "oracles/support.h"

@@ -38,7 +38,7 @@ TEST(Deletion, OfParticlesLeavesClustersWhole) {
   EXPECT_EQ(row.state.clusters.rotation[2](0, 1), -1);
   const Verdict connected = oracles::cluster_connectivity(row.setup, row.state);
   EXPECT_FALSE(connected.holds) << "it couples what is cut apart";
-  const cutproof::cli::TopologyFigures figures = cutproof::cli::topology_of(row.setup, row.state);
+  const harness::TopologyFigures figures = harness::topology_of(row.setup, row.state);
   EXPECT_EQ(figures.components, 2);
   EXPECT_EQ(figures.couplings, 1);
   EXPECT_FALSE(figures.equal);

@@ -10,7 +10,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "oracles/comparison/converged.h"
+#include "oracles/comparison/reference_solution.h"
 #include "reference_cpu/reference.h"
 #include "tests/cli/program.h"
 

@@ -245,7 +245,7 @@ void drop_the_last_cluster(const Setup&, State& state) {
 TEST(JudgeFrames, FindsNoErrorInTheReference) {
   const FrameErrors errors = judge_spoiled(Stage::step, spoil_nothing);
   ASSERT_TRUE(errors.step && errors.detect && errors.skin);
-  EXPECT_EQ(errors.step->max, 0);
+  EXPECT_EQ(errors.step->position.max, 0);
   EXPECT_EQ(errors.detect->differing, 0);
   EXPECT_GT(errors.detect->removed, 0) << "the judged frames must cut";
   EXPECT_EQ(errors.clusters_equal[static_cast<std::size_t>(Stage::split)], true);
@@ -258,14 +258,14 @@ TEST(JudgeFrames, FindsNoErrorInTheReference) {
 TEST(JudgeFrames, SeesOneParticleMovedByTheStep) {
   const FrameErrors errors = judge_spoiled(Stage::step, move_one_particle);
   ASSERT_TRUE(errors.step);
-  EXPECT_NEAR(errors.step->max, 1e-3, 1e-9);
-  EXPECT_EQ(errors.step->beyond, errors.frames);
+  EXPECT_NEAR(errors.step->position.max, 1e-3, 1e-9);
+  EXPECT_EQ(errors.step->position.beyond, errors.frames);
 }
 
 TEST(JudgeFrames, SeesAPositionThatIsNoNumber) {
   const FrameErrors errors = judge_spoiled(Stage::step, lose_a_position);
   ASSERT_TRUE(errors.step);
-  EXPECT_TRUE(std::isinf(errors.step->max));
+  EXPECT_TRUE(std::isinf(errors.step->position.max));
 }
 
 TEST(JudgeFrames, SeesOneRemovalTooFew) {

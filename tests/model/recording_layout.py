@@ -155,14 +155,13 @@ def check_cut(folder):
         require(index.attrs["backend"] == b"reference", "the backend")
         require(list(index["snapshots/stage"]) == [5, 5, 1, 2, 3, 5, 5], "stages")
         require(list(index["snapshots/frame"]) == [0, 1, 1, 1, 1, 2, 3], "frames")
-        # The example of docs/recording.md: the clusters of one snapshot.
+        # The example of docs/reference/recording.md: the clusters of one snapshot.
         i = 3
-        s, sets, clusters = index["snapshots"], index["clusters/sets"], index["clusters"]
-        k = s["cluster_set"][i]
-        m, row = sets["clusters"][k], sets["offset_row"][k]
-        offsets = clusters["offsets"][row : row + m + 1]
-        row = sets["member_row"][k]
-        members = clusters["members"][row : row + sets["members"][k]]
+        s, clusters = index["snapshots"], index["clusters"]
+        row = s["offsets_row"][i]
+        offsets = clusters["offsets"][row : row + s["cluster_count"][i] + 1]
+        row = s["members_row"][i]
+        members = clusters["members"][row : row + s["member_count"][i]]
         found = [list(members[a:b]) for a, b in zip(offsets[:-1], offsets[1:])]
         require(found == [[1, 2, 4], [4, 5, 6], [6, 7]], f"clusters after split are {found}")
         removed = s["removed"][s["removed_offsets"][2] : s["removed_offsets"][3]]

@@ -706,7 +706,7 @@ TEST_F(RecordingTest, IsRefusedIfItIsInconsistent) {
   entry("/setup/walls/friction", 0, -0.25);
   entry("/setup/grips/particles", 0, int32_t{8});
   entry("/setup/grips/particles", 0, int32_t{-1});
-  entry("/setup/grips/particle_offsets", 1, int64_t{4});
+  entry("/setup/grips/particles_offsets", 1, int64_t{4});
   entry("/setup/grips/active", 1, uint8_t{7});
   entry("/setup/grips/displacement", 1, kNan);
   entry("/setup/substep_length", 0, kNan);
@@ -723,18 +723,19 @@ TEST_F(RecordingTest, IsRefusedIfItIsInconsistent) {
   entry("/snapshots/position_row", 0, kHuge);
   entry("/snapshots/velocity_row", 6, int64_t{25});  // 8 rows from there are one too many
   entry("/snapshots/alive_row", 1, kHuge);
-  entry("/snapshots/cluster_set", 2, int64_t{2});
-  entry("/snapshots/cluster_set", 2, int64_t{-1});
+  entry("/setup/grips/active_offsets", 1, int64_t{-1});
   entry("/snapshots/rotation_row", 2, kHuge);
   entry("/snapshots/degenerate_row", 2, int64_t{-5});
-  refused("/snapshots/skin_owner_row", [&](hid_t file) { set_entry(file, "/snapshots/skin_vertices", 1, kHuge); });
-  refused("/snapshots/skin_owner_row",
-          [&](hid_t file) { set_entry(file, "/snapshots/skin_vertices", 1, int64_t{-1}); });
-  refused("/snapshots/skin_triangle_row", [&](hid_t file) { set_entry(file, "/snapshots/skin_triangles", 1, kHuge); });
-  refused("/clusters/sets/offset_row", [&](hid_t file) { set_entry(file, "/clusters/sets/clusters", 1, int64_t{4}); });
-  refused("/clusters/sets/offset_row", [&](hid_t file) { set_entry(file, "/clusters/sets/clusters", 1, kHuge); });
-  entry("/clusters/sets/cluster_row", 1, int64_t{3});
-  refused("/clusters/sets/member_row", [&](hid_t file) { set_entry(file, "/clusters/sets/members", 0, int64_t{-1}); });
+  entry("/snapshots/number_row", 4, int64_t{4});  // 3 rows from there are more than are stored
+  entry("/snapshots/members_row", 0, int64_t{-1});
+  for (const char* count : {"cluster_count", "member_count", "vertex_count", "triangle_count"}) {
+    entry(std::string("/snapshots/") + count, 1, int64_t{-1});
+  }
+  refused("/snapshots/owner_row", [&](hid_t file) { set_entry(file, "/snapshots/vertex_count", 1, kHuge); });
+  refused("/snapshots/triangles_row", [&](hid_t file) { set_entry(file, "/snapshots/triangle_count", 1, kHuge); });
+  refused("/snapshots/offsets_row", [&](hid_t file) { set_entry(file, "/snapshots/cluster_count", 1, int64_t{400}); });
+  refused("/snapshots/offsets_row", [&](hid_t file) { set_entry(file, "/snapshots/cluster_count", 1, kHuge); });
+  refused("/snapshots/members_row", [&](hid_t file) { set_entry(file, "/snapshots/member_count", 0, kHuge); });
   refused("/snapshots/tau", [](hid_t file) { H5Ldelete(file, "/snapshots/tau", H5P_DEFAULT); });
   refused("/setup/skin", [](hid_t file) { H5Ldelete(file, "/setup/skin", H5P_DEFAULT); });
   refused("/clusters/members", [](hid_t file) {

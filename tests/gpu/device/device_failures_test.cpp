@@ -105,7 +105,7 @@ cudaError_t give_back(const void* handle, Call call) {
   cudaError_t __wrap_##name parameters {                                 \
     return call_or_fail(#name, [&] { return __real_##name arguments; }); \
   }
-// A wait that tells of a failure has waited all the same.
+// A wait that reports a failure has waited all the same.
 #define INTERCEPT_WAIT(name, parameters, arguments)   \
   extern "C" cudaError_t __real_##name parameters;    \
   extern "C" cudaError_t __wrap_##name parameters;    \
@@ -226,8 +226,8 @@ namespace cutproof::gpu {
 namespace {
 
 constexpr Span kFrame{Stage::step, Stage::skin};
-// So little that the backend makes room once after the first frames.
-constexpr double kRoom = 1.0 / 16;
+// So little that the backend enlarges its arrays once after the first frames.
+constexpr Capacity kLittle{1.0 / 16};
 
 // 120 particles in clusters of one node grown by one, cut in two.
 constexpr const char* kScene = R"({"version": 1, "name": "small",
@@ -244,7 +244,7 @@ const fixtures::Built& small_body() {
 KernelOptions options(bool eager) {
   KernelOptions options;
   options.eager = eager;
-  options.room = kRoom;
+  options.capacity = kLittle;
   return options;
 }
 
@@ -260,7 +260,7 @@ const std::set<std::string>& called_within() {
   return names;
 }
 
-// All that a backend does: makes room by the way, and runs whole frames and stages one by one.
+// All that a backend does: enlarges its arrays by the way, and runs whole frames and stages one by one.
 State load_and_run(Backend& backend) {
   const fixtures::Built& built = small_body();
   backend.load({built.setup}, {built.state});
@@ -318,7 +318,7 @@ class DeviceFailures : public testing::Test {
     EXPECT_EQ(__real_cudaGetLastError(), cudaSuccess);
   }
 
-  // Whether a message says which call failed. A failed launch, and what CUB calls, is told by the kernel's name or by
+  // Whether a message says which call failed. A failed launch, and what CUB calls, is named by the kernel's name or by
   // that of CUB's function.
   static bool names(const std::string& message, const std::string& call) {
     if (call == "cudaGetDeviceCount") return message.find("cudaGetDeviceCount says: ") != std::string::npos;
@@ -388,16 +388,16 @@ TEST_F(DeviceFailures, TheSceneMakesTheBackendEnlarge) {
         make_staging_buffers({built.setup}, {built.state}, KernelOptions{}.rotation_method, Capacity{factor});
     return wants_capacity(staging.view(), staging.counters.front());
   };
-  EXPECT_TRUE(wants(kRoom));
-  EXPECT_FALSE(wants(2 * kRoom));
-  const auto memories = [](double room) {
+  EXPECT_TRUE(wants(kLittle.factor));
+  EXPECT_FALSE(wants(2 * kLittle.factor));
+  const auto memories = [](Capacity capacity) {
     KernelOptions with;
-    with.room = room;
+    with.capacity = capacity;
     calls.start(0, Failing::once);
     static_cast<void>(load_and_run(*make_gpu_backend(with)));
     return std::count(calls.trace.begin(), calls.trace.end(), std::string("cudaMalloc"));
   };
-  EXPECT_GT(memories(kRoom), memories(1) * 3 / 2);
+  EXPECT_GT(memories(kLittle), memories(Capacity{}) * 3 / 2);
   expect_nothing_outstanding();
 }
 
@@ -428,9 +428,9 @@ TEST_F(DeviceFailures, ABackendWhoseCallFailedCanBeLoadedAnew) {
   }
 }
 
-TEST_F(DeviceFailures, FloorsThatCannotBeMeasuredLeaveNothing) {
+TEST_F(DeviceFailures, LimitsThatCannotBeMeasuredLeaveNothing) {
   calls.start(0, Failing::once);
-  const auto measure = [] { return measure_floors().chain_seconds > 0 && device_bytes_in_use() > 0; };
+  const auto measure = [] { return measure_device_limits().chain_seconds > 0 && device_bytes_in_use() > 0; };
   EXPECT_TRUE(measure());
   calls.stop();
   const std::vector<const char*> trace = calls.trace;

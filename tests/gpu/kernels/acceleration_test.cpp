@@ -1,4 +1,4 @@
-// The accelerated iteration (docs/acceleration.md) on every backend: the same answer as the plain one, sooner, and
+// The accelerated iteration (docs/design/solvers.md) on every backend: the same answer as the plain one, sooner, and
 // everything else that a step must keep.
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include "fixtures/bodies.h"
 #include "fixtures/cook.h"
 #include "gpu/backends.h"
-#include "oracles/comparison/converged.h"
+#include "oracles/comparison/reference_solution.h"
 #include "oracles/oracles.h"
 #include "oracles/relations/relations.h"
 #include "reference_cpu/reference.h"
@@ -52,7 +52,7 @@ class Accelerated : public ::testing::TestWithParam<NamedBackend> {
     return backend_->snapshot().front();
   }
   // What of an error in double precision is asked for [h], and what rounding leaves in single: as in
-  // docs/tolerances.md, Against the reference.
+  // docs/design/tolerances.md, Against the reference.
   double tolerance(double in_double) const { return backend_->precision() == Precision::binary64 ? in_double : 1e-4; }
 
   std::unique_ptr<Backend> backend_ = GetParam().make();
@@ -76,13 +76,13 @@ TEST_P(Accelerated, ReachesTheConvergedAnswerInAFourthOfTheIterations) {
   for (const double stiffness : {1e4, 1e5, 1e6, 1e8}) {
     Scene scene = twisted_block(12, 3.0, 1.8, 0.01);
     scene.setup.step.stiffness = stiffness;
-    const oracles::Converged answer = oracles::converged_substep(scene.setup, scene.state);
+    const oracles::ReferenceSolution answer = oracles::reference_solution(scene.setup, scene.state);
     ASSERT_TRUE(answer.converged);
     const auto error = [&](Acceleration acceleration, int32_t iterations) {
       return distance(scene.setup, step(scene.setup, scene.state, acceleration, iterations).x, answer.x);
     };
     const double reached = error(Acceleration::chebyshev, 150);
-    std::printf("k = %g: %.1e h from the converged answer\n", stiffness, reached);
+    std::printf("k = %g: %.1e h from the reference solution\n", stiffness, reached);
     EXPECT_LT(reached, tolerance(1e-9)) << stiffness;
     if (stiffness < 1e6) continue;
     // The goal: 1e-2 h, for which the plain iteration needs 61 iterations (1e6) and 100 (1e8).
@@ -112,7 +112,7 @@ TEST_P(Accelerated, ConvergesFromHardStates) {
       EXPECT_LT(energy(settled), 1.001 * energy(step(scene.setup, scene.state, Acceleration::none, 400)))
           << shape.x << shape.z << " " << stiffness;
       if (stiffness == 1e4) {
-        const oracles::Converged answer = oracles::converged_substep(scene.setup, scene.state);
+        const oracles::ReferenceSolution answer = oracles::reference_solution(scene.setup, scene.state);
         EXPECT_LT(distance(scene.setup, settled.x, answer.x), tolerance(1e-9)) << shape.x << shape.z;
       }
       expect_holds(oracles::rotation_quality(scene.setup, settled));
@@ -143,7 +143,7 @@ TEST_P(Accelerated, StaysFiniteForEveryStiffnessAndStep) {
 TEST_P(Accelerated, MeetsWallsAndHeldParticlesExactly) {
   for (const double stiffness : {1e4, 1e6}) {
     const Scene scene = obstructed_block(stiffness);
-    const oracles::Converged answer = oracles::converged_substep(scene.setup, scene.state);
+    const oracles::ReferenceSolution answer = oracles::reference_solution(scene.setup, scene.state);
     ASSERT_TRUE(answer.converged);
     const State reached = step(scene.setup, scene.state, Acceleration::chebyshev, 300);
     EXPECT_LT(distance(scene.setup, answer.x, reached.x), tolerance(1e-9)) << stiffness;

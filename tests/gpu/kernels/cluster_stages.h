@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <string>
 #include <utility>
 #include <vector>
@@ -28,7 +29,7 @@ struct Bodies {
   }
 };
 
-// A world whose host memory is at hand.
+// A load whose staging buffers the kernels work on.
 struct Bench {
   Bodies bodies;
   StagingBuffers staging;
@@ -50,18 +51,16 @@ struct Bench {
 
   // What stages find is as a load has left it, but nowhere does a stage rely on scratch memory.
   void spoil_scratch() {
-    for (std::vector<int>* v : {&staging.slot_scratch, &staging.label, &staging.proposal, &staging.best,
-                                &staging.small_clusters, &staging.particle_scratch}) {
-      std::fill(v->begin(), v->end(), 0x5a5a5a);
-    }
-    std::fill(staging.slot_flag.begin(), staging.slot_flag.end(), static_cast<unsigned char>(1));
-    std::fill(staging.additions.begin(), staging.additions.end(), 0x5a5a5a5a5aull);
+    staging.each(view, [](const auto& array, auto& vector, auto&) {
+      if (array.lifetime != Lifetime::scratch || vector.empty()) return;
+      std::memset(static_cast<void*>(vector.data()), 0x5a, vector.size() * sizeof vector.front());
+    });
   }
   std::vector<State> states() const { return extract_states(staging, bodies.setups); }
   int fault() const { return staging.counters.front().fault; }
 };
 
-// share, membership_begin and memberships say the same as the lists of members.
+// membership_count, membership_begin and memberships say the same as the lists of members.
 inline void expect_memberships_agree(const StagingBuffers& staging) {
   std::vector<std::vector<int>> expected(staging.node.size());
   for (int s = 0; s < staging.counters.front().slots_used; ++s) {
@@ -79,7 +78,7 @@ inline void expect_memberships_agree(const StagingBuffers& staging) {
     }
     std::sort(found.begin(), found.end());
     ASSERT_EQ(found, expected[p]) << "memberships of particle " << p;
-    ASSERT_EQ(staging.membership_count[p], static_cast<int>(expected[p].size())) << "share of particle " << p;
+    ASSERT_EQ(staging.membership_count[p], static_cast<int>(expected[p].size())) << "memberships of particle " << p;
   }
 }
 

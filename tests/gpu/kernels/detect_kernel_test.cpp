@@ -78,15 +78,15 @@ double greatest_neighbour_distance(const Body& body, const State& state, int32_t
 // ---- Distance
 
 // The band of detect.cuh.
-bool is_either(const Setup& setup, const State& state, int32_t i) {
+bool is_undecidable(const Setup& setup, const State& state, int32_t i) {
   const double h = setup.body.grid.spacing, epsilon = setup.detect.epsilon;
   const double distance = greatest_neighbour_distance(setup.body, state, i);
   return std::abs(distance - epsilon * h) <= 8 * kUnit * (1 + epsilon) * h;
 }
 
-TEST(GpuDetectByDistance, EqualsTheReferenceOutsideItsBandForManyBodiesInOneWorld) {
+TEST(GpuDetectByDistance, EqualsTheReferenceOutsideItsBandForManyBodiesInOneLoad) {
   Random random(1);
-  int64_t removed = 0, stayed = 0, either = 0;
+  int64_t removed = 0, stayed = 0, undecidable = 0;
   for (int round = 0; round < 20; ++round) {
     std::vector<cutproof::Setup> setups;
     std::vector<State> states;
@@ -114,8 +114,8 @@ TEST(GpuDetectByDistance, EqualsTheReferenceOutsideItsBandForManyBodiesInOneWorl
       std::vector<int32_t> gone;
       for (int32_t i = 0; i < setups[b].body.particle_count(); ++i) {
         if (states[b].alive[at(i)] && !actual[b].alive[at(i)]) gone.push_back(i);
-        if (is_either(setups[b], states[b], i)) {
-          ++either;
+        if (is_undecidable(setups[b], states[b], i)) {
+          ++undecidable;
           continue;
         }
         ASSERT_EQ(actual[b].alive[at(i)], exact.alive[at(i)]) << "round " << round << ", body " << b << ", " << i;
@@ -127,7 +127,7 @@ TEST(GpuDetectByDistance, EqualsTheReferenceOutsideItsBandForManyBodiesInOneWorl
   }
   EXPECT_GT(removed, 500);
   EXPECT_GT(stayed, 500);
-  EXPECT_LT(either, 5);
+  EXPECT_LT(undecidable, 5);
 }
 
 // A wire whose edges are within a few units in the last place of the limit, in all directions.
@@ -253,7 +253,7 @@ BladePose random_pose(Random& random, Vec3 edge) {
 
 TEST(GpuDetectGeometric, TakesWhatATranslatedBladeComesNearAndNothingBeyondItsSlack) {
   Random random(3);
-  int removed = 0, stayed = 0, either = 0;
+  int removed = 0, stayed = 0, undecidable = 0;
   for (int trial = 0; trial < 150; ++trial) {
     const double h = trial % 2 ? 1.0 : 0.013;
     cutproof::Setup setup = setup_of(fixtures::block(9, 8, 7, h), Criterion::geometric);
@@ -279,7 +279,7 @@ TEST(GpuDetectGeometric, TakesWhatATranslatedBladeComesNearAndNothingBeyondItsSl
       const double distance = distance_to_translated(setup.blade, from, to, state.x[at(i)]);
       const double slack = 16 * kUnit * reach + 12 * kUnit * (norm(state.x[at(i)]) + norm(from.edge));
       if (distance > reach && distance <= reach + 2 * slack) {
-        ++either;
+        ++undecidable;
         continue;
       }
       ASSERT_EQ(after.alive[at(i)] == 0, distance <= reach) << "trial " << trial << ", " << i << ", " << distance / h;
@@ -289,7 +289,7 @@ TEST(GpuDetectGeometric, TakesWhatATranslatedBladeComesNearAndNothingBeyondItsSl
   }
   EXPECT_GT(removed, 3000);
   EXPECT_GT(stayed, 5000);
-  EXPECT_LT(either, 5);
+  EXPECT_LT(undecidable, 5);
 }
 
 TEST(GpuDetectGeometric, TakesWhatATurningBladeComesNearAndNothingBeyondAFewHundredthsOfASpacing) {
@@ -462,7 +462,7 @@ TEST(GpuDetectByStrain, CutsUniformStretchFalselyAndRigidMotionNever) {
 
 // ---- All together
 
-TEST(GpuDetect, JudgesEachBodyOfAWorldByItsOwnCriterionUnderAnySchedule) {
+TEST(GpuDetect, JudgesEachBodyOfALoadByItsOwnCriterionUnderAnySchedule) {
   std::vector<cutproof::Setup> setups;
   std::vector<State> states;
   for (const Criterion criterion : {Criterion::geometric, Criterion::distance, Criterion::none, Criterion::strain,

@@ -190,7 +190,7 @@ TEST(GpuExpand, ABodyThatCountsAsCoveredIsLeftAsItIsBesideOneThatDoesNot) {
   EXPECT_EQ(after[1], bench.loaded[1]);
 }
 
-TEST(GpuExpand, BodiesOfOneWorldKeepTheirOwnRulesAndDepths) {
+TEST(GpuExpand, BodiesOfOneLoadKeepTheirOwnRulesAndDepths) {
   HostLauncher launcher(HostLauncher::Threads{2});
   for (std::uint32_t seed = 0; seed < 200; seed += 10) {
     SCOPED_TRACE("seed " + std::to_string(seed));
@@ -262,24 +262,27 @@ TEST(GpuExpand, WithoutRoomAnExpansionIsFlaggedAndChangesNothing) {
   // Ten runs of two particles: nine clusters take in one particle each and need 27 places.
   Lists lists;
   for (int32_t c = 0; c < 10; ++c) lists.push_back(range(2 * c, 2 * c + 2));
-  for (const int room : {0, 9, 26, 27}) {
+  for (const int spare : {0, 9, 26, 27}) {
     Bench bench(hand_made(block_body(20, 1, 1), lists, kCover), true);
-    bench.staging.members.resize(static_cast<std::size_t>(20 + room));
+    bench.staging.member_capacity = 20 + spare;
+    bench.staging.allocate();
     bench.view = bench.staging.view();
-    judge(bench, room < 27 ? kMembersFull : 0);
+    judge(bench, spare < 27 ? kMembersFull : 0);
   }
-  for (const int room : {0, 1, 8, 9}) {
+  for (const int spare : {0, 1, 8, 9}) {
     Bench bench(hand_made(block_body(20, 1, 1), lists, kCover), true);
-    bench.staging.additions.resize(static_cast<std::size_t>(room));
+    bench.staging.addition_capacity = spare;
+    bench.staging.allocate();
     bench.view = bench.staging.view();
-    judge(bench, room < 9 ? kAdditionsFull : 0);
+    judge(bench, spare < 9 ? kAdditionsFull : 0);
   }
   // Capacity that a deeper layer exceeds.
-  for (const int room : {9, 12, 1000}) {
+  for (const int spare : {9, 12, 1000}) {
     Bench bench(hand_made(block_body(20, 1, 1), lists, {ExpandRule::edge_cover, 3}), true);
-    bench.staging.additions.resize(static_cast<std::size_t>(room));
+    bench.staging.addition_capacity = spare;
+    bench.staging.allocate();
     bench.view = bench.staging.view();
-    judge(bench, room < 1000 ? kAdditionsFull : 0);
+    judge(bench, spare < 1000 ? kAdditionsFull : 0);
   }
 }
 
@@ -291,7 +294,7 @@ TEST(GpuExpand, AfterAFaultOfAnEarlierStageNothingExpands) {
   EXPECT_EQ(bench.states(), bench.loaded);
 }
 
-TEST(GpuExpand, AWorldWithoutBodiesOrClustersIsLeftAlone) {
+TEST(GpuExpand, ALoadWithoutBodiesOrClustersIsLeftAlone) {
   HostLauncher launcher;
   Bench empty((Bodies()));
   expand_on(launcher, empty);

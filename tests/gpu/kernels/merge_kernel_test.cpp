@@ -175,7 +175,7 @@ TEST(GpuMerge, AContainedClusterMergesAboveTheCap) {
   HostLauncher launcher;
   merge_on(launcher, bench);
   EXPECT_EQ(lists_of(bench.states().front().clusters), (Lists{range(0, 8), range(7, 9)}));
-  EXPECT_EQ(bench.staging.counters.front().members_used, members_before) << "a contained cluster needs no room";
+  EXPECT_EQ(bench.staging.counters.front().members_used, members_before) << "a contained cluster needs no new places";
   expect_memberships_agree(bench.staging);
 }
 
@@ -358,7 +358,7 @@ TEST(GpuMerge, SinglePassMergesAChainAndACycleOfOwners) {
   expect_equal_to_reference(launcher, wire(std::vector<int32_t>(500, 2), 3, 4, MergeRule::single_pass), true);
 }
 
-TEST(GpuMerge, BodiesOfOneWorldKeepTheirOwnRules) {
+TEST(GpuMerge, BodiesOfOneLoadKeepTheirOwnRules) {
   HostLauncher launcher(HostLauncher::Threads{2});
   const auto judge = [&](std::uint32_t seed) {
     Bodies bodies;
@@ -401,7 +401,7 @@ TEST(GpuMerge, BodiesOfOneWorldKeepTheirOwnRules) {
   }
 }
 
-// Room for all lists twice is enough for any merge; it is used up in the middle of rounds, again and again.
+// A capacity for all lists twice is enough for any merge; it is used up in the middle of rounds, again and again.
 TEST(GpuMerge, WhenRoomIsUsedUpListsAreMovedTogetherAndNothingElseChanges) {
   HostLauncher launcher(HostLauncher::Threads{2});
   for (const MergeRule rule : {MergeRule::deterministic, MergeRule::published, MergeRule::single_pass}) {
@@ -410,7 +410,8 @@ TEST(GpuMerge, WhenRoomIsUsedUpListsAreMovedTogetherAndNothingElseChanges) {
       Bodies bodies = seed == 0 ? wire(std::vector<int32_t>(300, 2), 11, 12, rule) : random_foreign(seed, rule);
       Bench bench(bodies, true);
       const int used = bench.staging.counters.front().members_used;
-      bench.staging.members.resize(static_cast<std::size_t>(2 * used));
+      bench.staging.member_capacity = 2 * used;
+      bench.staging.allocate();
       bench.view = bench.staging.view();
       merge_on(launcher, bench);
       ASSERT_EQ(bench.fault(), 0);
@@ -432,10 +433,11 @@ TEST(GpuMerge, WhenRoomIsUsedUpListsAreMovedTogetherAndNothingElseChanges) {
 TEST(GpuMerge, WithoutRoomForItsUnionsAMergeIsFlaggedAndChangesNothing) {
   HostLauncher launcher;
   for (const MergeRule rule : {MergeRule::deterministic, MergeRule::published, MergeRule::single_pass}) {
-    for (const int room : {0, 1, 100, 199}) {
+    for (const int spare : {0, 1, 100, 199}) {
       Bench bench(wire(std::vector<int32_t>(100, 2), 5, 12, rule), true);
       const int used = bench.staging.counters.front().members_used;
-      bench.staging.members.resize(static_cast<std::size_t>(used + room));
+      bench.staging.member_capacity = used + spare;
+      bench.staging.allocate();
       bench.view = bench.staging.view();
       merge_on(launcher, bench);
       EXPECT_EQ(bench.fault(), kMembersFull);
@@ -447,7 +449,8 @@ TEST(GpuMerge, WithoutRoomForItsUnionsAMergeIsFlaggedAndChangesNothing) {
   }
   // One small cluster needs no more than its union.
   Bench bench(wire({8, 1, 8}, 2, 9), true);
-  bench.staging.members.resize(17 + 9);
+  bench.staging.member_capacity = 17 + 9;
+  bench.staging.allocate();
   bench.view = bench.staging.view();
   merge_on(launcher, bench);
   EXPECT_EQ(bench.fault(), 0);
@@ -463,7 +466,7 @@ TEST(GpuMerge, AfterAFaultOfAnEarlierStageNothingMerges) {
   EXPECT_EQ(bench.states(), before);
 }
 
-TEST(GpuMerge, AWorldWithoutBodiesOrClustersIsLeftAlone) {
+TEST(GpuMerge, ALoadWithoutBodiesOrClustersIsLeftAlone) {
   HostLauncher launcher;
   Bench empty((Bodies()));
   merge_on(launcher, empty);

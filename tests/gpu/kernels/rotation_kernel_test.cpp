@@ -125,7 +125,7 @@ TEST(GpuRotation, TheDefaultReachesTheGoalOnEveryHardCaseAndNoMethodGivesNaN) {
 }
 
 TEST(GpuRotation, TheOthersAreRightWhereTheyAreSaidToBe) {
-  // What docs/rotations.md says of them; a method that stops being right there has a fault.
+  // What docs/design/solvers.md says of them; a method that stops being right there has a fault.
   for (const Method& method : methods()) {
     const std::string name = method.name;
     if (name == "mueller" && method.precision == fixtures::Precision::twice) continue;  // has not converged by then

@@ -152,7 +152,7 @@ TEST(GpuSkinTable, SeparatesTheInsideCornersOfAnAmbiguousFace) {
   EXPECT_GT(diagonals, 0);
 }
 
-// ---- Skins of worlds
+// ---- Skins of loads
 
 using Setups = std::vector<Setup>;  // in a test, Setup alone is a member of testing::Test
 
@@ -521,7 +521,7 @@ TEST(GpuSkin, WritesNothingWhereRoomIsShort) {
       EXPECT_EQ(after.counters[0].vertices_used, before.counters[0].vertices_used);
       EXPECT_EQ(after.counters[0].cells_used, before.counters[0].cells_used);
 
-      // With just enough room it goes through.
+      // With just enough capacity it goes through.
       w.vertex_capacity = vertices_needed;
       w.cell_capacity = cells_needed;
       w.counters->fault = 0;

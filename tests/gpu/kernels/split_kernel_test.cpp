@@ -94,7 +94,7 @@ void add_random_body(Random& random, Scene& scene, int32_t n, int32_t most, doub
   scene.add(std::move(setup), std::move(state));
 }
 
-// What every stage relies on: memberships and shares say what the clusters say, and no rest frame is left dirty.
+// What every stage relies on: memberships and their counts say what the clusters say, and no rest frame is left dirty.
 void expect_consistent(const StagingBuffers& staging) {
   const Counters& counters = staging.counters.front();
   std::vector<std::multiset<int>> held(staging.node.size()), listed(staging.node.size());
@@ -165,7 +165,8 @@ std::string bits(const StagingBuffers& staging) {
   const auto add = [&](const auto& vector) {
     all.append(reinterpret_cast<const char*>(vector.data()), vector.size() * sizeof(vector[0]));
   };
-  add(staging.death), add(staging.membership_count), add(staging.memberships), add(staging.slot_begin), add(staging.slot_size);
+  add(staging.death), add(staging.membership_count), add(staging.memberships), add(staging.slot_begin),
+      add(staging.slot_size);
   add(staging.slot_number), add(staging.slot_body), add(staging.rotation), add(staging.degenerate), add(staging.mass);
   add(staging.rest_base), add(staging.rest_offset), add(staging.members), add(staging.affected),
       add(staging.rest_dirty);
@@ -193,7 +194,7 @@ TEST(GpuSplit, EqualsTheReferenceOnRandomBodiesCoversAndRemovals) {
   EXPECT_GT(vanished, 20);
 }
 
-TEST(GpuSplit, EqualsTheReferenceForManyBodiesWithDifferentRulesInOneWorld) {
+TEST(GpuSplit, EqualsTheReferenceForManyBodiesWithDifferentRulesInOneLoad) {
   constexpr uint32_t kSeed = 72;
   Random random(kSeed);
   int64_t debris = 0;
@@ -370,13 +371,13 @@ TEST(GpuSplit, WritesNothingAndSaysSoWhenSlotsRunOut) {
       added += std::count_if(now.number.begin(), now.number.end(), [&](int32_t n) { return n > old.number.back(); });
     }
     ASSERT_GT(added, 0);
-    for (const bool room : {false, true}) {
+    for (const bool enough : {false, true}) {
       StagingBuffers staging = scene.staging();
       DeviceView view = staging.view();
-      view.slot_capacity = static_cast<int>(staging.counters[0].slots_used + added - (room ? 0 : 1));
+      view.slot_capacity = static_cast<int>(staging.counters[0].slots_used + added - (enough ? 0 : 1));
       HostLauncher launcher;
       enqueue_split(launcher, view, scene.plan(SplitMethod::blocks));
-      if (room) {
+      if (enough) {
         EXPECT_EQ(staging.counters[0].fault, 0);
         expect_equal(scene, extract_states(staging, scene.setups));
         continue;

@@ -103,7 +103,7 @@ bool same_bits(const State& a, const State& b) {
 }
 
 // Error of one frame from rounding, without contacts. An evaluation of a goal or position errs by a few units u of D +
-// l, D the greatest displacement and l the half diagonal of a cluster: centre 1, rotation 5 (docs/rotations.md),
+// l, D the greatest displacement and l the half diagonal of a cluster: centre 1, rotation 5 (docs/design/solvers.md),
 // update 2. A velocity carries the error of a substep to all later ones: S (S + 1) / 2 in all. Iterations do not add
 // up: what one hands to the next is averaged over the members of a cluster.
 double frame_bound(const Setup& setup, const State& before, const State& after) {
@@ -192,7 +192,8 @@ TEST(GpuStep, MeetsTheReferenceWithinItsRounding) {
       setup.step.damping = below(3);
       setup.step.gravity = {0.1, 0, -9.81};
       // Nothing, the blade, walls, and all at once with friction. Not all at once without: the two sides would accept
-      // or refuse a point between blade and wall (docs/decisions.md) by comparing distances that differ by rounding.
+      // or refuse a point between blade and wall (docs/design/decisions.md) by comparing distances that differ by
+      // rounding.
       const int kind = trial % 4;
       if (kind > 0) add_contacts(setup, kind == 3 ? 0.4 : 0.0, random);
       if (kind == 1) setup.walls.clear();

@@ -476,13 +476,13 @@ TEST(PlantedUnionFindFaults, AScheduleThatShowsOneShrinksToFewPreemptions) {
   ASSERT_GE(seed, 0);
   HostLauncher launcher = exploring(exploration(seed));
   joins_rightly(kCheckThenStore, seed, launcher);
-  const Schedule found = launcher.recorded();
-  const auto fails = [&](const Schedule& schedule) {
+  const ThreadSchedule found = launcher.recorded();
+  const auto fails = [&](const ThreadSchedule& schedule) {
     launcher.reschedule(replay(schedule));
     return !joins_rightly(kCheckThenStore, seed, launcher);
   };
   ASSERT_TRUE(fails(found));
-  const Schedule small = shrink(found, fails);
+  const ThreadSchedule small = shrink(found, fails);
   EXPECT_TRUE(fails(small));
   // One thread must be stopped between its check and its store, and another let through in between.
   EXPECT_LE(preemptions(small), 4) << "of " << preemptions(found) << ": " << testing::PrintToString(small);

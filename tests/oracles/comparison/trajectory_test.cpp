@@ -26,12 +26,12 @@ struct Wire {
 TEST(PosesApart, AreTheDistancesOfWhatBothHave) {
   const Wire wire;
   const Pose rest = pose_of(wire.setup, wire.state, nullptr);
-  EXPECT_EQ(poses_apart(wire.setup, rest, rest).position.greatest, 0);
+  EXPECT_EQ(poses_apart(wire.setup, rest, rest).position.max, 0);
   State moved = wire.state;
   moved.x[0] += Vec3{0, 3 * kH, 0};
   moved.x[2] += Vec3{0, 0, 4 * kH};
   Apart apart = poses_apart(wire.setup, rest, pose_of(wire.setup, moved, nullptr));
-  EXPECT_NEAR(apart.position.greatest, 4, 1e-12);
+  EXPECT_NEAR(apart.position.max, 4, 1e-12);
   EXPECT_EQ(apart.position.where, 2);
   EXPECT_NEAR(apart.position.rms(), std::sqrt((9.0 + 16.0) / 4), 1e-12);
   EXPECT_EQ(apart.alive_in_one, 0);
@@ -52,7 +52,7 @@ TEST(PosesApart, OfWhatIsNoNumberAreInfinite) {
   broken.x[1].y = std::numeric_limits<double>::quiet_NaN();
   const Apart apart =
       poses_apart(wire.setup, pose_of(wire.setup, wire.state, nullptr), pose_of(wire.setup, broken, nullptr));
-  EXPECT_TRUE(std::isinf(apart.position.greatest));
+  EXPECT_TRUE(std::isinf(apart.position.max));
   EXPECT_TRUE(std::isinf(apart.position.rms()));
 }
 

@@ -1,6 +1,6 @@
-// The converged answer of a substep, against the plain iteration, against the reference, and in the trial of
+// The reference solution of a substep, against the plain iteration, against the reference, and in the trial of
 // method.md §3.
-#include "oracles/comparison/converged.h"
+#include "oracles/comparison/reference_solution.h"
 
 #include <gtest/gtest.h>
 
@@ -37,7 +37,7 @@ double energy_rounding(const Scene& scene, double energy) {
   return 4 * static_cast<double>(scene.state.x.size() + scene.state.clusters.members.size()) * 0x1p-53 * energy;
 }
 
-TEST(Converged, TrialOfTheMethodComesOutAgain) {
+TEST(ReferenceSolution, TrialOfTheMethodComesOutAgain) {
   // method.md §3 records 12³ particles in 27 clusters and dt = 4 ms, but not the twist. Nearly half a turn (3
   // radians) and a stretch of 1.8 give its figures within a factor of two; these two for all six.
   constexpr double kFactor = 2.5;
@@ -54,7 +54,7 @@ TEST(Converged, TrialOfTheMethodComesOutAgain) {
                          Row{1e6, 64, 4e-3}}) {
     Scene scene = trial;
     scene.setup.step.stiffness = row.stiffness;
-    const Converged answer = converged_substep(scene.setup, scene.state);
+    const ReferenceSolution answer = reference_solution(scene.setup, scene.state);
     ASSERT_TRUE(answer.converged);
     const double error = distance(scene, plain_limit(scene.setup, scene.state, 0, row.iterations).x, answer.x);
     std::printf("%12g %4d %11.2g %10.2g\n", row.stiffness, row.iterations, error, row.recorded);
@@ -63,11 +63,11 @@ TEST(Converged, TrialOfTheMethodComesOutAgain) {
   }
 }
 
-TEST(Converged, PlainIterationKeepsMomentumLowersEnergyAndMeetsTheSparseSolution) {
+TEST(ReferenceSolution, PlainIterationKeepsMomentumLowersEnergyAndMeetsTheSparseSolution) {
   for (const double stiffness : {1e4, 1e5, 1e6}) {
     Scene scene = twisted_block(12, 3.0, 1.8);
     scene.setup.step.stiffness = stiffness;
-    const Converged answer = converged_substep(scene.setup, scene.state);
+    const ReferenceSolution answer = reference_solution(scene.setup, scene.state);
     const PlainLimit limit = plain_limit(scene.setup, scene.state, 0, stiffness == 1e6 ? 4000 : 400);
     const double apart = distance(scene, answer.x, limit.x);
     const double drift = *std::max_element(limit.momentum_drift.begin(), limit.momentum_drift.end());
@@ -88,7 +88,7 @@ TEST(Converged, PlainIterationKeepsMomentumLowersEnergyAndMeetsTheSparseSolution
 }
 
 // The first iteration has no torque either, because x~ itself is what its rotations fit; the second one has.
-TEST(Converged, InternalTorqueVanishesAtTheAnswerAndNotOnTheWay) {
+TEST(ReferenceSolution, InternalTorqueVanishesAtTheAnswerAndNotOnTheWay) {
   Scene scene = twisted_block(6, 2.0, 1.5);
   for (std::size_t i = 0; i < scene.state.x.size() / 3; ++i) scene.state.v[i] += Vec3{800, 100, 0};
   const double dt = scene.setup.substep_length[0];
@@ -102,16 +102,16 @@ TEST(Converged, InternalTorqueVanishesAtTheAnswerAndNotOnTheWay) {
     }
     return norm(sum) / scale;
   };
-  EXPECT_LT(torque(converged_substep(scene.setup, scene.state).x), 1e-12);
+  EXPECT_LT(torque(reference_solution(scene.setup, scene.state).x), 1e-12);
   EXPECT_GT(torque(plain_limit(scene.setup, scene.state, 0, 2).x), 1e-6);
 }
 
-TEST(Converged, TheReferencesIterationConvergesToIt) {
+TEST(ReferenceSolution, TheReferencesIterationConvergesToIt) {
   for (const double stiffness : {1e4, 1e5, 1e6}) {
     Scene scene = twisted_block(8, 1.0, 1.3, 0.01);
     scene.setup.step.stiffness = stiffness;
     scene.setup.step.gravity = {0, 0, -9.81};
-    const Converged answer = converged_substep(scene.setup, scene.state);
+    const ReferenceSolution answer = reference_solution(scene.setup, scene.state);
     ASSERT_TRUE(answer.converged);
     scene.setup.step.iterations = 600;
     State state = scene.state;
@@ -125,10 +125,10 @@ TEST(Converged, TheReferencesIterationConvergesToIt) {
   }
 }
 
-TEST(Converged, WallsAndHeldParticlesAreMetExactly) {
+TEST(ReferenceSolution, WallsAndHeldParticlesAreMetExactly) {
   for (const double stiffness : {1e4, 1e6}) {
     Scene scene = obstructed_block(stiffness);
-    const Converged answer = converged_substep(scene.setup, scene.state);
+    const ReferenceSolution answer = reference_solution(scene.setup, scene.state);
     ASSERT_TRUE(answer.converged);
     const PlainLimit limit = plain_limit(scene.setup, scene.state, 1e-15, 4000);
     EXPECT_LT(distance(scene, answer.x, limit.x), 1e-11) << stiffness;
@@ -160,10 +160,10 @@ TEST(Converged, WallsAndHeldParticlesAreMetExactly) {
 }
 
 // No small change of the answer that walls and grips allow has less energy.
-TEST(Converged, NoNeighbourHasLessEnergy) {
+TEST(ReferenceSolution, NoNeighbourHasLessEnergy) {
   for (const bool obstructed : {false, true}) {
     const Scene scene = obstructed ? obstructed_block(1e5) : twisted_block(6, 2.0, 1.5, 0.01);
-    const Converged answer = converged_substep(scene.setup, scene.state);
+    const ReferenceSolution answer = reference_solution(scene.setup, scene.state);
     const double lowest = substep_energy(scene.setup, scene.state, answer.x);
     for (int round = 0; round < 60; ++round) {
       std::vector<Vec3> x = answer.x;
@@ -181,13 +181,13 @@ TEST(Converged, NoNeighbourHasLessEnergy) {
 
 // By hand: two particles in one cluster, drawn apart along their line. The middle stays, and each keeps the share
 // 1 − s of what it moved: x = x~ + s (X − x~).
-TEST(Converged, TwoParticlesAreDrawnBackByTheShareS) {
+TEST(ReferenceSolution, TwoParticlesAreDrawnBackByTheShareS) {
   Scene scene{setup_of(block_body(2, 1, 1, 1.0, 2.0)), {}};
   scene.state = state_of(scene.setup.body, {{0, 1}});
   scene.setup.step.stiffness = 1e5;
   const double dt = 0.004, s = 1.6 / 2.6;
   scene.state.v = {Vec3{-0.1, 0, 0} / dt, Vec3{0.1, 0, 0} / dt};
-  const Converged answer = converged_substep(scene.setup, scene.state);
+  const ReferenceSolution answer = reference_solution(scene.setup, scene.state);
   EXPECT_NEAR(answer.x[0].x, 1 - 0.1 * (1 - s), 1e-14);
   EXPECT_NEAR(answer.x[1].x, 2 + 0.1 * (1 - s), 1e-14);
   // Both move 0.1 s from x~ and stay 0.1 (1 − s) from the cluster's shape, each with mass 2.
@@ -200,7 +200,7 @@ TEST(Converged, TwoParticlesAreDrawnBackByTheShareS) {
 
 // Rotations that are not unique must not break the answer: a collinear cluster, a single particle, coincident
 // positions, a reflected cluster, a half turn.
-TEST(Converged, MeetsThePlainLimitWhereRotationsAreNotUnique) {
+TEST(ReferenceSolution, MeetsThePlainLimitWhereRotationsAreNotUnique) {
   std::vector<Scene> scenes;
   {
     Scene wire{setup_of(block_body(5, 1, 1)), {}};
@@ -228,53 +228,53 @@ TEST(Converged, MeetsThePlainLimitWhereRotationsAreNotUnique) {
     scenes.push_back(turned);
   }
   for (std::size_t n = 0; n < scenes.size(); ++n) {
-    const Converged answer = converged_substep(scenes[n].setup, scenes[n].state);
+    const ReferenceSolution answer = reference_solution(scenes[n].setup, scenes[n].state);
     EXPECT_TRUE(answer.converged) << n;
     for (const Vec3 x : answer.x) EXPECT_TRUE(is_finite(x)) << n;
     const PlainLimit limit = plain_limit(scenes[n].setup, scenes[n].state, 1e-15, 2000);
     EXPECT_LT(distance(scenes[n], answer.x, limit.x), 1e-9) << n;
   }
   // A cluster turned by half a turn is at rest: nothing may pull it.
-  EXPECT_LT(distance(scenes[3], converged_substep(scenes[3].setup, scenes[3].state).x, scenes[3].state.x), 1e-12);
+  EXPECT_LT(distance(scenes[3], reference_solution(scenes[3].setup, scenes[3].state).x, scenes[3].state.x), 1e-12);
 }
 
-TEST(Converged, BodiesOfOneParticleAndOfNoneHaveAnAnswer) {
+TEST(ReferenceSolution, BodiesOfOneParticleAndOfNoneHaveAnAnswer) {
   Scene one{setup_of(block_body(1, 1, 1)), {}};
   one.state = state_of(one.setup.body, {{0}});
   one.state.v[0] = {1, 2, 3};
-  const Converged answer = converged_substep(one.setup, one.state);
+  const ReferenceSolution answer = reference_solution(one.setup, one.state);
   EXPECT_TRUE(answer.converged);
   EXPECT_LT(norm(answer.x[0] - Vec3{1.004, 1.008, 1.012}), 1e-15);
   Scene none{setup_of(testing::body_of({})), {}};
   none.state = state_of(none.setup.body, {});
-  EXPECT_TRUE(converged_substep(none.setup, none.state).converged);
-  EXPECT_TRUE(converged_substep(none.setup, none.state).x.empty());
+  EXPECT_TRUE(reference_solution(none.setup, none.state).converged);
+  EXPECT_TRUE(reference_solution(none.setup, none.state).x.empty());
 }
 
-TEST(Converged, RefusesWhatHasNoConvergedAnswer) {
+TEST(ReferenceSolution, RefusesWhatHasNoConvergedAnswer) {
   const Scene good = twisted_block(3, 0.1, 1.1);
-  EXPECT_NO_THROW(converged_substep(good.setup, good.state));
+  EXPECT_NO_THROW(reference_solution(good.setup, good.state));
   Scene scene = good;
   scene.setup.step.solver = Solver::published;
-  EXPECT_THROW(converged_substep(scene.setup, scene.state), std::invalid_argument);
+  EXPECT_THROW(reference_solution(scene.setup, scene.state), std::invalid_argument);
   EXPECT_THROW(substep_energy(scene.setup, scene.state, scene.state.x), std::invalid_argument);
   scene = good;
   scene.setup.walls = {{.friction = 0.1}};
-  EXPECT_THROW(converged_substep(scene.setup, scene.state), std::invalid_argument);
+  EXPECT_THROW(reference_solution(scene.setup, scene.state), std::invalid_argument);
   EXPECT_THROW(plain_limit(scene.setup, scene.state, 0, 1), std::invalid_argument);
   scene = good;
   scene.setup.walls = {{.axis = 1, .side = 1, .offset = 2}, {.axis = 1, .side = -1, .offset = 1}};
-  EXPECT_THROW(converged_substep(scene.setup, scene.state), std::invalid_argument);
+  EXPECT_THROW(reference_solution(scene.setup, scene.state), std::invalid_argument);
   scene = good;
   scene.setup.has_blade = true;
   scene.setup.blade = {1, 1, 0.1, 0};
   scene.setup.blade_moves = {BladeMove{{}, {}, true, 0}};
-  EXPECT_THROW(converged_substep(scene.setup, scene.state), std::invalid_argument);
+  EXPECT_THROW(reference_solution(scene.setup, scene.state), std::invalid_argument);
   scene.setup.blade_moves[0].down = false;
-  EXPECT_NO_THROW(converged_substep(scene.setup, scene.state));
+  EXPECT_NO_THROW(reference_solution(scene.setup, scene.state));
   scene = good;
   scene.state.frame = 1;
-  EXPECT_THROW(converged_substep(scene.setup, scene.state), std::invalid_argument);
+  EXPECT_THROW(reference_solution(scene.setup, scene.state), std::invalid_argument);
 }
 
 }  // namespace

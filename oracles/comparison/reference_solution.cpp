@@ -1,6 +1,6 @@
-// The converged answer of one implicit substep (method.md §3), twice: by alternating a sparse Cholesky solve with the
+// The reference solution of one implicit substep (method.md §3), twice: by alternating a sparse Cholesky solve with the
 // rotations, and by the plain iteration. Both work on the same Substep below and share nothing with a backend.
-#include "oracles/comparison/converged.h"
+#include "oracles/comparison/reference_solution.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -45,7 +45,7 @@ struct Substep {
 };
 
 void require(bool condition, const char* what) {
-  if (!condition) throw std::invalid_argument(std::string("the converged answer of a substep: ") + what);
+  if (!condition) throw std::invalid_argument(std::string("the reference solution of a substep: ") + what);
 }
 
 Substep substep_of(const Setup& setup, const State& state) {
@@ -264,7 +264,7 @@ double greatest_change(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
 // --- For fixed rotations: E over x and t together --------------------------------------------------------------------
 
 // The factor of a substep's system along one axis. That it is made anew for every substep and every set of fixed
-// particles is what was measured to be best (docs/accuracy_and_speed.md §6).
+// particles is what was measured to be best (docs/design/solvers.md).
 class Cholesky {
  public:
   Cholesky(Cholmod& cholmod, const Sparse& matrix)
@@ -375,11 +375,11 @@ class LinearStage {
 
 }  // namespace
 
-Converged converged_substep(const Setup& setup, const State& state) {
+ReferenceSolution reference_solution(const Setup& setup, const State& state) {
   const Substep substep = substep_of(setup, state);
   require_solvable(setup, state, substep);
   const double h = setup.body.grid.spacing;
-  Converged result;
+  ReferenceSolution result;
   result.x = first_positions(substep);
   Poses poses = poses_at(substep, result.x, state.clusters.rotation);
   if (state.clusters.count() > 0) {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "model/io/scene_io.h"
-#include "oracles/comparison/converged.h"
+#include "oracles/comparison/reference_solution.h"
 #include "oracles/relations/relations.h"
 #include "tuning/prepared_scene.h"
 
@@ -66,16 +66,16 @@ TEST(ReferenceSolution, OfItsOwnSubstepsIsWhatASparseFactorisationFinds) {
   const double dt = single.substep_length.front(), decay = std::exp(-single.step.damping * dt);
   for (std::size_t f = 0; f < 5; ++f) {
     for (int substep = 0; substep < 2; ++substep) {
-      oracles::Converged exact = oracles::converged_substep(single, state);
+      oracles::ReferenceSolution exact = oracles::reference_solution(single, state);
       ASSERT_TRUE(exact.converged);
       for (std::size_t i = 0; i < state.x.size(); ++i) state.v[i] = (decay / dt) * (exact.x[i] - state.x[i]);
       state.x = std::move(exact.x);
       state.clusters.rotation = std::move(exact.rotation);
     }
     const oracles::Pose pose{state.x, state.alive, 1}, rest{prepared.start().x, state.alive, 1};
-    EXPECT_LE(oracles::poses_apart(prepared.setup(), pose, solution.trajectory().frames[f]).position.greatest, 1e-8)
+    EXPECT_LE(oracles::poses_apart(prepared.setup(), pose, solution.trajectory().frames[f]).position.max, 1e-8)
         << f;
-    moved = std::max(moved, oracles::poses_apart(prepared.setup(), pose, rest).position.greatest);
+    moved = std::max(moved, oracles::poses_apart(prepared.setup(), pose, rest).position.max);
   }
   EXPECT_GT(moved, 0.05) << "it hangs from a grip: it has to move, else nothing is compared";
 }

@@ -1,5 +1,3 @@
-#include "model/io/scene_io.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,39 +7,22 @@
 #include <optional>
 #include <set>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "model/error.h"
 #include "model/io/atomic_file.h"
 #include "model/io/scene_fields.h"
+#include "model/io/scene_io.h"
+#include "model/io/scene_text.h"
 
 namespace cutproof::io {
 namespace {
 
 using nlohmann::json;
-using nlohmann::ordered_json;
-
-template <class T>
-inline constexpr bool is_vector = false;
-template <class T>
-inline constexpr bool is_vector<std::vector<T>> = true;
-template <class T>
-inline constexpr bool is_optional = false;
-template <class T>
-inline constexpr bool is_optional<std::optional<T>> = true;
-template <class T>
-inline constexpr bool is_integer = std::is_integral_v<T> && !std::is_same_v<T, bool>;
 
 // Shapes inside shapes: deeper than any person writes, shallower than what recursion could not bear.
 constexpr int kDeepest = 64;
-// How far from the left a small array or object may reach on one line.
-constexpr std::size_t kLineLength = 100;
-
-std::string join(const std::string& path, std::string_view name) {
-  return path.empty() ? std::string(name) : fmt::format("{}.{}", path, name);
-}
-
-std::string number_text(double x) { return fmt::format("{}", x); }
 
 std::string bounds_text(const Bounds& b, std::string_view unit) {
   const bool low = std::isfinite(b.low), high = std::isfinite(b.high);
@@ -52,23 +33,6 @@ std::string bounds_text(const Bounds& b, std::string_view unit) {
     text += fmt::format("{} {}", b.open_high ? "less than" : "at most", number_text(b.high));
   }
   if (!unit.empty() && !text.empty()) text += fmt::format(" [{}]", unit);
-  return text;
-}
-
-template <class E>
-std::string word_of(E value) {
-  for (const auto& [enumerator, word] : words(E{})) {
-    if (enumerator == value) return std::string(word);
-  }
-  return "";
-}
-
-template <class E>
-std::string all_words(const char* quote) {
-  std::string text;
-  for (const auto& [enumerator, word] : words(E{})) {
-    text += fmt::format("{}{}{}{}", text.empty() ? "" : ", ", quote, word, quote);
-  }
   return text;
 }
 
@@ -150,7 +114,7 @@ std::string parser_message(const std::string& what) {
 
 json parse_tree(const std::string& text, const std::string& name) {
   if (text.find_first_not_of(" \t\r\n") == std::string::npos) {
-    throw InputError(name, "", "The file is empty.", "A scene is a JSON object; docs/scene.md lists its fields.");
+    throw InputError(name, "", "The file is empty.", "A scene is a JSON object; docs/reference/scene.md lists its fields.");
   }
   PathTracker tracker(name);
   try {
@@ -489,228 +453,6 @@ void require_version(const json& tree, const std::string& name) {
   }
 }
 
-// --- Writing ---------------------------------------------------------------------------------------------------------
-
-class Writer;
-
-template <class T>
-ordered_json written(const T& value);
-
-class Writer {
- public:
-  template <class T>
-  void field(const Field& f, const T& value) {
-    const std::string name(f.name);
-    if constexpr (is_optional<T>) {
-      if (value) object[name] = written(*value);
-    } else if constexpr (is_vector<T>) {
-      if (!value.empty() || f.required) object[name] = written(value);
-    } else {
-      object[name] = written(value);
-      if constexpr (std::is_arithmetic_v<T>) {
-        if (f.zero_is_absent && value == T{}) object.erase(name);
-      }
-    }
-  }
-  template <class Describe>
-  void group(const Field& f, Describe&& describe_fields) {
-    Writer inner;
-    describe_fields(inner);
-    object[std::string(f.name)] = std::move(inner.object);
-  }
-  bool applies(bool condition) const { return condition; }
-
-  ordered_json object = ordered_json::object();
-};
-
-template <class T>
-ordered_json written(const T& value) {
-  if constexpr (std::is_enum_v<T>) {
-    return word_of(value);
-  } else if constexpr (std::is_same_v<T, Vec3>) {
-    return ordered_json::array({value.x, value.y, value.z});
-  } else if constexpr (std::is_same_v<T, Range>) {
-    if (value.low == value.high) return value.low;
-    ordered_json range = ordered_json::object();
-    if (std::isfinite(value.low)) range["at_least"] = value.low;
-    if (std::isfinite(value.high)) range["at_most"] = value.high;
-    return range;
-  } else if constexpr (is_vector<T>) {
-    ordered_json list = ordered_json::array();
-    for (const auto& entry : value) list.push_back(written(entry));
-    return list;
-  } else if constexpr (std::is_class_v<T> && !std::is_same_v<T, std::string>) {
-    Writer writer;
-    T copy = value;  // the table of fields is written for values that can be changed
-    describe(writer, copy);
-    return std::move(writer.object);
-  } else {
-    return value;
-  }
-}
-
-std::string on_one_line(const ordered_json& value) {
-  std::string text;
-  if (value.is_object()) {
-    for (const auto& [key, entry] : value.items()) {
-      text += fmt::format("{}{}: {}", text.empty() ? "" : ", ", ordered_json(key).dump(), on_one_line(entry));
-    }
-    return "{" + text + "}";
-  }
-  if (value.is_array()) {
-    for (const auto& entry : value) text += (text.empty() ? "" : ", ") + on_one_line(entry);
-    return "[" + text + "]";
-  }
-  return value.dump();
-}
-
-// Indented, but what is short stays on one line: three numbers are one thing to a reader.
-std::string pretty(const ordered_json& value, std::size_t indent) {
-  std::string line = on_one_line(value);
-  const bool whole_scene = indent == 0;
-  if (!value.is_structured() || value.empty() || (!whole_scene && indent + line.size() <= kLineLength)) return line;
-  const std::string margin(indent + 2, ' ');
-  std::string text;
-  const bool is_object = value.is_object();
-  for (const auto& [key, entry] : value.items()) {
-    text += fmt::format("{}{}{}{}", text.empty() ? "\n" : ",\n", margin,
-                        is_object ? ordered_json(key).dump() + ": " : "", pretty(entry, indent + 2));
-  }
-  return fmt::format("{}{}\n{}{}", is_object ? '{' : '[', text, std::string(indent, ' '), is_object ? '}' : ']');
-}
-
-// --- Documentation ---------------------------------------------------------------------------------------------------
-
-template <class T>
-std::string type_name() {
-  if constexpr (is_optional<T>) {
-    return type_name<typename T::value_type>();
-  } else if constexpr (is_vector<T>) {
-    return "list of " + type_name<typename T::value_type>();
-  } else if constexpr (std::is_enum_v<T>) {
-    return all_words<T>("`");
-  } else if constexpr (std::is_same_v<T, Vec3>) {
-    return "[x, y, z]";
-  } else if constexpr (std::is_same_v<T, Range>) {
-    return "range";
-  } else if constexpr (std::is_same_v<T, bool>) {
-    return "true or false";
-  } else if constexpr (std::is_same_v<T, std::string>) {
-    return "text";
-  } else if constexpr (std::is_class_v<T>) {
-    return "object";
-  } else {
-    return is_integer<T> ? "whole number" : "number";
-  }
-}
-
-template <class T>
-struct Innermost {
-  using type = T;
-};
-template <class T>
-struct Innermost<std::optional<T>> : Innermost<T> {};
-template <class T>
-struct Innermost<std::vector<T>> : Innermost<T> {};
-
-template <class T>
-inline constexpr bool has_fields =
-    std::is_class_v<T> && !std::is_same_v<T, std::string> && !std::is_same_v<T, Vec3> && !std::is_same_v<T, Range>;
-
-std::string interval_text(const Bounds& b) {
-  if (!std::isfinite(b.low) && !std::isfinite(b.high)) return "";
-  return fmt::format("{}{}, {}{}", b.open_low ? "(" : "[", number_text(b.low), number_text(b.high),
-                     b.open_high ? ")" : "]");
-}
-
-// One table per object. Shapes contain shapes, so an object that has its table already gets none again.
-class Documenter {
- public:
-  Documenter(std::string path, std::vector<std::string>& sections) : path_(std::move(path)), sections_(sections) {
-    slot_ = sections_.size();
-    sections_.emplace_back();
-    text_ = fmt::format("## {}\n\n| field | type | unit | default | bounds | meaning |\n|---|---|---|---|---|---|\n",
-                        path_.empty() ? "The scene" : "`" + path_ + "`");
-  }
-  ~Documenter() { sections_[slot_] = text_; }
-  Documenter(const Documenter&) = delete;
-  Documenter& operator=(const Documenter&) = delete;
-
-  template <class T>
-  void field(const Field& f, T& value) {
-    using Inner = typename Innermost<T>::type;
-    add_row(f, type_name<T>(), default_text(f, value));
-    if constexpr (has_fields<Inner>) {
-      const bool recursive = std::is_same_v<Inner, Shape> && f.name == "parts";
-      if (!recursive) {
-        Documenter inner(join(path_, f.name) + (is_vector<T> ? "[]" : ""), sections_);
-        Inner fresh;
-        describe(inner, fresh);
-      }
-    }
-  }
-
-  template <class Describe>
-  void group(const Field& f, Describe&& describe_fields) {
-    add_row(f, "object", "see below");
-    Documenter inner(join(path_, f.name), sections_);
-    describe_fields(inner);
-  }
-
-  bool applies(bool) const { return true; }
-
- private:
-  template <class T>
-  static std::string default_text(const Field& f, const T& value) {
-    if (f.required) return "required";
-    if constexpr (is_optional<T>) {
-      return "absent";
-    } else if constexpr (is_vector<T>) {
-      return "[]";
-    } else if constexpr (has_fields<T>) {
-      return "see below";
-    } else {
-      return f.zero_is_absent ? "absent" : fmt::format("`{}`", on_one_line(written(value)));
-    }
-  }
-
-  void add_row(const Field& f, const std::string& type, const std::string& default_value) {
-    text_ += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", f.name, type, f.unit, default_value,
-                         interval_text(f.bounds), f.doc);
-  }
-
-  std::string path_;
-  std::vector<std::string>& sections_;
-  std::size_t slot_;
-  std::string text_;
-};
-
-constexpr std::string_view kReferenceHead =
-    R"(# Scenes
-
-This page is what `cutproof info --scene` prints: it is generated from the table of fields that also reads and checks
-scenes, and a test sees to it that the two are equal.
-
-A scene is a JSON file (UTF-8, no comments). It says what is cut, how it is simulated, what the blade does, and what
-must come out. Fields that are absent have their default; a field that is not listed here, or that is given twice, is
-an error, and so is a value out of bounds. Units are SI unless stated:
-
-- **box**: coordinates in the bounding box of the body's particles at rest, after alignment: (0, 0, 0) is its lower
-  corner and (1, 1, 1) its upper one, half a spacing beyond the outermost particles. Points may lie outside. A path in
-  these coordinates runs on any organ.
-- **h**: the spacing of the background grid. **extents**: multiples of the bounding box's width along a direction.
-- Directions (`back`, `along`, `velocity`, `gravity`) are metric and in the body's frame.
-- A **range** is a number (exactly that), or `{"at_least": a}`, `{"at_most": b}`, or both.
-- In bounds, a square bracket includes the number and a round one does not. They hold for each component of a vector,
-  each entry of a list and both ends of a range.
-
-Time is divided into frames of `frame.length`, and these into `step.substeps`. With a dynamic criterion (anything but
-`geometric`), a frame in which the blade would be too fast for its own thickness is divided into the least number of
-equal shorter frames in which, per substep, no corner of the blade moves by more than
-1.001 · max(thickness, epsilon · h) / 2, and none moves, by turning, by more than half of the shorter of length and
-depth (method.md §3, Blade).
-)";
-
 }  // namespace
 
 Scene parse_scene(const std::string& text, const std::string& name) {
@@ -722,17 +464,5 @@ Scene parse_scene(const std::string& text, const std::string& name) {
 }
 
 Scene read_scene(const std::string& path) { return parse_scene(read_text(path), path); }
-
-std::string write_scene(const Scene& scene) { return pretty(written(scene), 0) + "\n"; }
-
-std::string scene_reference() {
-  std::vector<std::string> sections;
-  {
-    Documenter documenter("", sections);
-    Scene scene;
-    describe(documenter, scene);
-  }
-  return fmt::format("{}\n{}", kReferenceHead, fmt::join(sections, "\n"));
-}
 
 }  // namespace cutproof::io

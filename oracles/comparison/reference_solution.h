@@ -1,4 +1,4 @@
-// The converged answer of one implicit substep (method.md §3), by CHOLMOD: for fixed rotations minimise E over x and
+// The reference solution of one implicit substep (method.md §3), by CHOLMOD: for fixed rotations minimise E over x and
 // t together, alternate with the rotations. With frictionless walls and pinned particles.
 #pragma once
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace cutproof::oracles {
 
-struct Converged {
+struct ReferenceSolution {
   std::vector<Vec3> x;         // [n] the minimiser [m]; dead particles keep their position
   std::vector<Mat3> rotation;  // [m]
   double energy = 0;           // E(x) [kg m²/s²]
@@ -19,7 +19,7 @@ struct Converged {
 
 // The first substep of frame state.frame. Requires Solver::implicit; no blade down, no friction (throws
 // std::invalid_argument).
-Converged converged_substep(const Setup& setup, const State& state);
+ReferenceSolution reference_solution(const Setup& setup, const State& state);
 
 // E of method.md §3 at positions x, minimised over t and R: what `energy_is_monotone` compares. x~ is computed from
 // the state; it is the free motion, before contacts: walls bound x, and held particles have no inertia. Blade and
@@ -28,7 +28,7 @@ double substep_energy(const Setup& setup, const State& state, const std::vector<
 
 // The limit of the plain iteration, in double, written down a second time without reference_cpu/: iterates until the
 // change is below `tolerance` · h or `most` iterations are done. With tolerance 0 exactly `most` are done. Throws as
-// converged_substep does.
+// reference_solution does.
 struct PlainLimit {
   std::vector<Vec3> x;
   std::vector<double> energy;          // after each iteration, from x~ on

@@ -1,0 +1,158 @@
+#include "cli/against_report.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "model/io/json_number.h"
+
+namespace cutproof::cli {
+
+using harness::Against;
+using harness::FirstDifference;
+using harness::FreeFrame;
+using harness::LockstepFrame;
+using nlohmann::json;
+using oracles::ErrorNorm;
+using oracles::Measure;
+using oracles::Undecidable;
+
+json worst_json(const harness::Lockstep& lockstep) {
+  json result = json::object();
+  for (std::size_t m = 0; m < oracles::kMeasures.size(); ++m) {
+    const harness::LockstepWorst& worst = lockstep.worst(static_cast<Measure>(m));
+    result[std::string(oracles::kMeasures[m].key)] = {{"max", json_number(worst.norm.max)},
+                                                      {"rms", json_number(worst.norm.rms())},
+                                                      {"frame", worst.frame},
+                                                      {"stage", name_of(worst.stage)}};
+  }
+  return result;
+}
+
+namespace {
+
+json lockstep_json(const harness::Lockstep& lockstep) {
+  json frames = json::object();
+  const auto column = [&](const std::string& name, auto value) {
+    json values = json::array();
+    for (const LockstepFrame& frame : lockstep.frames()) values.push_back(value(frame));
+    frames[name] = std::move(values);
+  };
+  const auto norm = [&](const std::string& name, auto norm_of) {
+    column(name + "_max", [&](const LockstepFrame& f) { return json_number(norm_of(f).max); });
+    column(name + "_rms", [&](const LockstepFrame& f) { return json_number(norm_of(f).rms()); });
+  };
+  column("frame", [](const LockstepFrame& f) { return f.frame; });
+  norm("angle", [](const LockstepFrame& f) { return f.angle; });
+  for (std::size_t m = 0; m < oracles::kMeasures.size(); ++m) {
+    norm(std::string(oracles::kMeasures[m].key), [m](const LockstepFrame& f) { return f.errors[m]; });
+  }
+  column("topology_differences", [](const LockstepFrame& f) { return f.topology_differences; });
+  column("removals_undecidable", [](const LockstepFrame& f) { return f.undecidable.removals; });
+  column("sides_undecidable", [](const LockstepFrame& f) { return f.undecidable.sides; });
+  column("sides_taken_otherwise", [](const LockstepFrame& f) { return f.undecidable.sides_taken_otherwise; });
+  column("rotations_undecidable", [](const LockstepFrame& f) { return f.undecidable.rotations; });
+  column("sensitive_undecidable", [](const LockstepFrame& f) { return f.undecidable.sensitive; });
+  column("particles_excluded", [](const LockstepFrame& f) { return f.undecidable.particles_excluded; });
+  return {{"frames", std::move(frames)}, {"greatest", worst_json(lockstep)}};
+}
+
+json free_running_json(const harness::FreeRunning& run) {
+  json frames = {{"frame", json::array()}, {"position_max", json::array()}, {"position_rms", json::array()}};
+  for (const FreeFrame& frame : run.frames()) {
+    frames["frame"].push_back(frame.frame);
+    frames["position_max"].push_back(json_number(frame.position.max));
+    frames["position_rms"].push_back(json_number(frame.position.rms()));
+  }
+  json first = nullptr;
+  if (const auto& found = run.first_difference()) {
+    first = {{"frame", found->frame},
+             {"stage", name_of(found->stage)},
+             {"text", found->what.text},
+             {"particles", found->what.particles},
+             {"clusters", found->what.clusters},
+             {"margin", nullptr},
+             {"reach", json_number(found->reach)},
+             {"explained", found->explained}};
+    if (found->margin) first["margin"] = json_number(*found->margin);
+  }
+  return {{"frames", std::move(frames)}, {"first_difference", std::move(first)}};
+}
+
+void print_lockstep(const harness::Lockstep& lockstep) {
+  ErrorNorm angle;
+  std::array<ErrorNorm, 6> errors;
+  Undecidable undecidable;
+  for (const LockstepFrame& frame : lockstep.frames()) {
+    angle.join(frame.angle);
+    for (std::size_t m = 0; m < errors.size(); ++m) errors[m].join(frame.errors[m]);
+    undecidable.join(frame.undecidable);
+  }
+  fmt::print("\nagainst the reference, lockstep, {} frames: errors of one frame\n", lockstep.frames().size());
+  fmt::print("{:<14} {:>11} {:>11} {:<5}\n", "", "greatest", "RMS", "unit");
+  const auto row = [](std::string_view name, const ErrorNorm& norm, std::string_view unit) {
+    if (norm.count > 0) fmt::print("{:<14} {:>11.3g} {:>11.3g} {:<5}\n", name, norm.max, norm.rms(), unit);
+  };
+  for (std::size_t m = 0; m < errors.size(); ++m) {
+    const bool rotations = static_cast<Measure>(m) == Measure::rotation;
+    if (rotations) row(oracles::kMeasures[m].name, angle, "rad");
+    row(rotations ? "" : oracles::kMeasures[m].name, errors[m], oracles::kMeasures[m].unit);
+  }
+  fmt::print("undecidable within rounding, so not measured:\n");
+  fmt::print("{:>8} removals within the rounding band\n", undecidable.removals);
+  fmt::print("{:>8} particles in the blade's plane; {} of them on the other side in the end\n", undecidable.sides,
+             undecidable.sides_taken_otherwise);
+  fmt::print("{:>8} rotations that are not unique\n", undecidable.rotations);
+  fmt::print("{:>8} particles that one rounding carries beyond the bound\n", undecidable.sensitive);
+}
+
+void print_free_running(const harness::FreeRunning& run) {
+  fmt::print("\nagainst the reference, free-running: both run freely\n");
+  if (!run.frames().empty()) {
+    const FreeFrame& last = run.frames().back();
+    fmt::print("positions in frame {}: greatest {:.3g} h, RMS {:.3g} h\n", last.frame, last.position.max,
+               last.position.rms());
+  }
+  if (!run.first_difference()) {
+    fmt::print("no decision differs in {} frames\n", run.frames().size());
+    return;
+  }
+  const FirstDifference& first = *run.first_difference();
+  fmt::print("first difference: frame {}, {}: {}\n", first.frame, name_of(first.stage), first.what.text);
+  if (first.margin) {
+    fmt::print("  margin {:.3g} h; positions are so far apart that up to {:.3g} h is {}\n", *first.margin, first.reach,
+               first.explained ? "explained" : "explained, and this is not");
+  }
+}
+
+}  // namespace
+
+json to_json(const Against& against, const Setup& setup) {
+  const char* const mode = !against.free_running ? "lockstep" : !against.lockstep ? "free-running" : "both";
+  json result = {{"reference", "reference"},
+                 {"mode", mode},
+                 {"position_bound", oracles::position_bound(setup.body)},
+                 {"holds", against.holds()}};
+  if (against.lockstep) result["lockstep"] = lockstep_json(*against.lockstep);
+  if (against.free_running) result["free_running"] = free_running_json(*against.free_running);
+  return result;
+}
+
+void print_against(const Against& against) {
+  if (against.lockstep) print_lockstep(*against.lockstep);
+  if (against.free_running) print_free_running(*against.free_running);
+  fmt::print("\n");
+  for (const Verdict& verdict : against.verdicts()) {
+    fmt::print("{:<28} {:<8} {:.4g} {}, bound {:.4g} (frame {}, {})\n", verdict.property,
+               !verdict.holds         ? "FAILS"
+               : verdict.checked == 0 ? "vacuous"
+                                      : "holds",
+               verdict.measured, verdict.unit, verdict.bound, verdict.frame, name_of(verdict.stage));
+    if (!verdict.holds) fmt::print("  {}\n", verdict.witness.text);
+  }
+}
+
+}  // namespace cutproof::cli

@@ -1,0 +1,19 @@
+// `cutproof run --errors`: which errors are asked for, and how they are printed and written
+// (docs/reference/results_schema.md).
+#pragma once
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "harness/errors.h"
+#include "harness/lockstep.h"
+
+namespace cutproof::cli {
+
+// Names with commas between them, or `all`. Throws InputError.
+harness::ErrorsWanted errors_wanted(const std::string& list);
+
+// `lockstep` is null without the implementation error.
+nlohmann::json to_json(const harness::Errors& errors, const harness::Lockstep* lockstep);
+void print_errors(const harness::Errors& errors, const harness::Lockstep* lockstep);
+
+}  // namespace cutproof::cli

@@ -1,0 +1,40 @@
+// What a backend keeps of the bodies that it has loaded, wherever its kernels run.
+#pragma once
+#include <vector>
+
+#include "gpu/launch/plan.h"
+#include "gpu/state/staging.h"
+#include "model/setup.h"
+#include "model/state.h"
+
+namespace cutproof::gpu {
+
+struct KernelOptions {
+  int rotation_method = kNewton;  // the fastest of those that fail on no hard case (docs/design/solvers.md)
+  SplitMethod split = SplitMethod::blocks;
+  bool eager = false;  // gpu: kernels one by one, waiting for each condition, instead of one graph per span
+  Capacity capacity;   // at load; a backend doubles it when it must (for tests)
+};
+
+struct Load {
+  std::vector<Setup> setups;
+  Capacity capacity;
+  StagingBuffers staging;
+  Plan plan;
+  KnownSkins skins;  // of the last skin stage, as far as snapshots have asked for them
+
+  Load() = default;
+  // Throws what make_staging_buffers throws.
+  Load(std::vector<Setup> bodies, const std::vector<State>& states, const KernelOptions& options, Capacity with);
+
+  // The same bodies, now in these states, with twice the capacity. Leaves this load without its setups.
+  Load enlarged(const std::vector<State>& states, const KernelOptions& options);
+  // To be called before a skin stage.
+  void forget_skins() { skins.assign(setups.size(), std::nullopt); }
+  // As extract_states; `staging` holds what is to be extracted.
+  std::vector<State> states_of(const std::vector<bool>& wanted) {
+    return extract_states(staging, setups, wanted, skins);
+  }
+};
+
+}  // namespace cutproof::gpu

@@ -1,0 +1,45 @@
+#include "gpu/launch/plan.h"
+
+#include <algorithm>
+
+#include "gpu/state/indices.h"
+#include "model/body.h"
+
+namespace cutproof::gpu {
+
+Plan make_plan(const std::vector<Setup>& setups, const std::vector<State>& states, int rotation_method,
+               SplitMethod split) {
+  Plan plan;
+  plan.rotation_method = rotation_method;
+  plan.split = split;
+  for (std::size_t b = 0; b < setups.size(); ++b) {
+    const Setup& setup = setups[b];
+    plan.substeps = std::max(plan.substeps, setup.step.substeps);
+    plan.iterations = std::max(plan.iterations, setup.step.iterations);
+    plan.accelerated = plan.accelerated || setup.step.acceleration != Acceleration::none;
+    plan.contacts = plan.contacts || setup.has_blade || !setup.walls.empty() || !setup.grips.empty();
+    plan.grips = plan.grips || !setup.grips.empty();
+    const bool detection = needs_detection(setup);
+    plan.detection = plan.detection || detection;
+    plan.distance = plan.distance || (detection && setup.detect.criterion == Criterion::distance);
+    plan.geometric = plan.geometric || (detection && setup.detect.criterion == Criterion::geometric);
+    plan.strain = plan.strain || (detection && setup.detect.criterion == Criterion::strain);
+    plan.debris = plan.debris || setup.split.debris > 0;
+    plan.merge = plan.merge || setup.merge.rule != MergeRule::none;
+    plan.deterministic_merge = plan.deterministic_merge || setup.merge.rule == MergeRule::deterministic;
+    plan.published_merge = plan.published_merge || setup.merge.rule == MergeRule::published;
+    plan.single_pass_merge = plan.single_pass_merge || setup.merge.rule == MergeRule::single_pass;
+    plan.edge_cover = plan.edge_cover || (setup.expand.rule == ExpandRule::edge_cover && !states[b].edge_covered);
+    plan.published_expand = plan.published_expand || setup.expand.rule == ExpandRule::published;
+    plan.skin = plan.skin || setup.skin.wanted;
+    for (int32_t c = 0; c < states[b].clusters.count(); ++c) {
+      plan.largest_cluster =
+          std::max(plan.largest_cluster, narrow(states[b].clusters.size(c), "members of one cluster"));
+    }
+    plan.largest_cluster = std::max(plan.largest_cluster, int{states[b].cap});
+  }
+  plan.expand = plan.edge_cover || plan.published_expand;
+  return plan;
+}
+
+}  // namespace cutproof::gpu

@@ -1,0 +1,113 @@
+#include "harness/free_running.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "model/rules.h"
+#include "oracles/comparison/stage_comparison.h"
+#include "oracles/oracles.h"
+#include "reference_cpu/reference.h"
+
+namespace cutproof::harness {
+
+namespace {
+
+// Rounding of a neighbour distance, in units of u h.
+constexpr double kDistanceBand = 64;
+
+// d_i of method.md §4, among neighbours alive in `state` [m].
+double greatest_neighbour_distance(const Setup& setup, const State& state, int32_t particle) {
+  const auto at = [](int32_t index) { return static_cast<std::size_t>(index); };
+  double greatest = 0;
+  for (int direction = 0; direction < 6; ++direction) {
+    const int32_t other = setup.body.neighbour(particle, direction);
+    if (other < 0 || !state.alive[at(other)]) continue;
+    greatest = std::max(greatest, norm(state.x[at(particle)] - state.x[at(other)]));
+  }
+  return greatest;
+}
+
+}  // namespace
+
+FreeRunning::FreeRunning(const Setup& setup, const State& start, const State& loaded, std::string backend)
+    : setup_(setup), backend_(std::move(backend)), frame_(loaded.frame), before_(loaded) {
+  const Verdict form = oracles::well_formed(setup, loaded);
+  if (!form.holds) {
+    end_with(Stage::step, {"as loaded: " + form.witness.text, form.witness.clusters, form.witness.particles});
+    return;
+  }
+  reference_ = reference::make_backend();
+  reference_->load({setup}, {start});
+}
+
+FirstDifference& FreeRunning::end_with(Stage stage, oracles::DecisionDifference what) {
+  reference_.reset();
+  FirstDifference& first = first_difference_.emplace();
+  first.frame = frame_;
+  first.stage = stage;
+  first.what = std::move(what);
+  return first;
+}
+
+void FreeRunning::see(Stage stage, const State& after) {
+  if (!reference_) return;
+  const Verdict form = oracles::well_formed(setup_, after);
+  if (!form.holds) {
+    end_with(stage, {form.witness.text, form.witness.clusters, form.witness.particles});
+    return;
+  }
+  reference_->run({stage, stage});
+  const State expected = reference_->snapshot().front();
+  if (stage == Stage::step) {
+    frames_.push_back({frame_, oracles::position_error(setup_, expected.x, after.x, after.alive)});
+  }
+  if (auto difference = oracles::difference_of_decisions(expected, after)) {
+    FirstDifference& first = end_with(stage, std::move(*difference));
+    const std::vector<int32_t> undecided = oracles::in_one_only(expected.removed, after.removed);
+    if (stage == Stage::detect && !undecided.empty()) {
+      first.what.particles = undecided;
+      // Both may be right, each for its own positions.
+      first.explained = oracles::detection(setup_, before_, after).holds;
+      if (setup_.detect.criterion == Criterion::distance) {
+        State present = expected;
+        for (const int32_t i : expected.removed) present.alive[static_cast<std::size_t>(i)] = 1;
+        const double h = setup_.body.grid.spacing;
+        double margin = 0;
+        for (const int32_t i : undecided) {
+          margin =
+              std::max(margin, std::abs(greatest_neighbour_distance(setup_, present, i) / h - setup_.detect.epsilon));
+        }
+        first.margin = margin;
+        // Each end of an edge is off by at most the greatest error, so the edge's length by at most twice that.
+        first.reach = 2 * frames_.back().position.max + kDistanceBand * unit_roundoff(after);
+        first.explained = first.explained && std::isfinite(first.reach) && margin <= first.reach;
+      }
+    }
+    if (stage == Stage::merge && !promise_of(setup_.merge.rule).unique) first.explained = true;
+    return;
+  }
+  before_ = after;
+  if (stage == Stage::skin) ++frame_;
+}
+
+Verdict FreeRunning::verdict() const {
+  Verdict verdict{.property = "free-running: decisions",
+                  .stage = Stage::step,
+                  .backend = backend_,
+                  .unit = "h",
+                  .bound_source = "docs/design/tolerances.md, Against the reference",
+                  .checked = static_cast<int64_t>(frames_.size()),
+                  .witness = {}};
+  if (!first_difference_) return verdict;
+  const FirstDifference& first = *first_difference_;
+  verdict.frame = first.frame;
+  verdict.stage = first.stage;
+  verdict.holds = first.explained;
+  verdict.measured = first.margin.value_or(0);
+  verdict.bound = first.reach;
+  if (!verdict.holds) verdict.witness = {first.what.clusters, first.what.particles, {}, first.what.text};
+  return verdict;
+}
+
+}  // namespace cutproof::harness

@@ -1,0 +1,64 @@
+// A backend and the reference that start alike and run freely, until the first decision in which they differ
+// (measuring.md, Errors).
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "model/backend.h"
+#include "model/verdict.h"
+#include "oracles/comparison/error_norm.h"
+#include "oracles/comparison/state_difference.h"
+
+namespace cutproof::harness {
+
+// One frame, at the end of its step.
+struct FreeFrame {
+  int64_t frame = 0;
+  oracles::ErrorNorm position;  // [h]
+};
+
+// The first decision in which the two runs differ.
+struct FirstDifference {
+  int64_t frame = 0;
+  Stage stage = Stage::step;
+  oracles::DecisionDifference what;
+  // Distance criterion, removals: greatest |d_i - εh| / h of the particles that only one of them removed, in the
+  // reference's positions, and by how much their d_i may differ, given how far the positions are apart.
+  std::optional<double> margin;
+  double reach = 0;  // [h]
+  // Both may be right: the backend's removals are those that its own positions ask for and the margin is within reach,
+  // or the rule leaves several answers.
+  bool explained = false;
+};
+
+class FreeRunning {
+ public:
+  // `start` is what was loaded, `loaded` the backend's first snapshot. `setup` must outlive this.
+  FreeRunning(const Setup& setup, const State& start, const State& loaded, std::string backend);
+
+  // The backend's state after `stage`, of every stage of every frame, in order. A state that is not well formed is a
+  // difference.
+  void see(Stage stage, const State& after);
+
+  // "free-running: decisions"; see docs/reference/results_schema.md.
+  Verdict verdict() const;
+
+  const std::vector<FreeFrame>& frames() const { return frames_; }
+  const std::optional<FirstDifference>& first_difference() const { return first_difference_; }
+
+ private:
+  FirstDifference& end_with(Stage stage, oracles::DecisionDifference what);
+
+  const Setup& setup_;
+  std::string backend_;
+  int64_t frame_ = 0;                   // in progress
+  State before_;                        // the backend's last snapshot
+  std::unique_ptr<Backend> reference_;  // null once the runs differ
+  std::vector<FreeFrame> frames_;
+  std::optional<FirstDifference> first_difference_;
+};
+
+}  // namespace cutproof::harness

@@ -1,0 +1,80 @@
+// A backend's run beside the reference, in lockstep: before each stage the reference takes the backend's state, then
+// both run the stage (measuring.md, Errors). What is measured is the error of one frame, and a decision that falls
+// within its rounding band does not spread to the next stage.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "model/setup.h"
+#include "model/state.h"
+#include "model/verdict.h"
+#include "oracles/comparison/stage_comparison.h"
+
+namespace cutproof::harness {
+
+// One frame in lockstep.
+struct LockstepFrame {
+  int64_t frame = 0;
+  oracles::ErrorNorm angle;                  // of rotations [rad]
+  std::array<oracles::ErrorNorm, 6> errors;  // by Measure; rest frames only if clusters have changed
+  int64_t topology_differences = 0;          // stages that differ in what must be equal
+  oracles::Undecidable undecidable;
+
+  oracles::ErrorNorm& error(oracles::Measure which) { return errors[static_cast<std::size_t>(which)]; }
+  const oracles::ErrorNorm& error(oracles::Measure which) const { return errors[static_cast<std::size_t>(which)]; }
+};
+
+// The worst of one measure over the run so far.
+struct LockstepWorst {
+  oracles::ErrorNorm norm;  // of all frames
+  double bound = 0;         // the greatest; each stage is held against its own
+  int64_t frame = 0;
+  Stage stage = Stage::step;
+};
+
+class Lockstep {
+ public:
+  // `start` is what was loaded, `loaded` the backend's first snapshot. `setup` must outlive this.
+  Lockstep(const Setup& setup, const State& start, const State& loaded, std::string backend);
+
+  // The backend's state after `stage`, of every stage of every frame, in order; whether the backend launched it.
+  // A state that is not well formed is a difference, and ends the comparison.
+  void see(Stage stage, const State& after, bool launched);
+
+  // One verdict for each thing that was measured, over the whole run so far; see docs/reference/results_schema.md.
+  std::vector<Verdict> verdicts() const;
+  bool holds() const;
+
+  const std::vector<LockstepFrame>& frames() const { return frames_; }
+  const LockstepWorst& worst(oracles::Measure which) const { return tracks_[static_cast<std::size_t>(which)].worst; }
+
+ private:
+  // What one verdict is made from.
+  struct Track {
+    LockstepWorst worst;
+    std::optional<Verdict> failure;  // the first
+    int64_t failures = 0;
+  };
+  struct Count {
+    std::optional<Verdict> failure;  // the first
+    int64_t failures = 0, checked = 0;
+  };
+
+  void note(oracles::Measure which, Stage stage, const oracles::MeasuredError& error, oracles::ErrorNorm& of_frame);
+  void differ(Stage stage, const oracles::DecisionDifference& difference);
+
+  const Setup& setup_;
+  std::string backend_;
+  int64_t frame_ = 0;    // in progress
+  State before_;         // the backend's last snapshot
+  bool broken_ = false;  // a snapshot could not be read: nothing can be compared any more
+  oracles::StageComparison comparison_;
+  std::vector<LockstepFrame> frames_;
+  std::array<Track, 6> tracks_;
+  Count topology_, removals_;
+};
+
+}  // namespace cutproof::harness

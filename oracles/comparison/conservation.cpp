@@ -1,0 +1,146 @@
+#include "oracles/comparison/conservation.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "oracles/comparison/measurable.h"
+#include "oracles/comparison/reference_solution.h"
+#include "oracles/support.h"
+
+namespace cutproof::oracles {
+
+namespace {
+
+constexpr Span kFrame{Stage::step, Stage::skin};
+
+}  // namespace
+
+Setup free_setup(const Setup& setup, int64_t frame, int64_t frames) {
+  Setup free = setup;
+  free.has_blade = false;
+  free.blade_moves.clear();
+  free.stroke_end.clear();
+  free.walls.clear();
+  free.grips.clear();
+  free.step.gravity = {};
+  free.step.damping = 0;
+  free.detect.criterion = Criterion::none;
+  free.skin.wanted = false;
+  free.substep_length.assign(at(frames), setup.substep_length.at(at(frame)));
+  return free;
+}
+
+namespace {
+
+// Of the alive particles, summed in extended precision, so that only what the backend rounds is left.
+struct Totals {
+  long double mass = 0;
+  std::array<long double, 3> momentum = {}, moment = {}, spin = {};  // Σ m v, Σ m x, Σ m x × v about the body's origin
+  long double kinetic = 0, speed = 0;                                // ½ Σ m v², Σ m |v|
+  double extent = 0;
+
+  Vec3 total_momentum() const { return vector(momentum); }
+  Vec3 center() const { return vector(moment) / static_cast<double>(mass); }
+  // About the center of mass: J − c × p.
+  Vec3 angular_momentum() const { return vector(spin) - cross(center(), vector(momentum)); }
+  static Vec3 vector(const std::array<long double, 3>& v) {
+    return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
+  }
+};
+
+Totals totals_of(const Body& body, const State& state) {
+  Totals totals;
+  for (std::size_t i = 0; i < state.alive.size(); ++i) {
+    if (!state.alive[i]) continue;
+    const long double m = body.mass[i];
+    const Vec3 x = state.x[i], v = state.v[i], j = cross(x, v);
+    totals.mass += m;
+    for (int axis = 0; axis < 3; ++axis) {
+      totals.momentum[at(axis)] += m * v[axis];
+      totals.moment[at(axis)] += m * x[axis];
+      totals.spin[at(axis)] += m * j[axis];
+    }
+    totals.kinetic += m * dot(v, v) / 2;
+    totals.speed += m * norm(v);
+    totals.extent = std::max(totals.extent, norm(x));
+  }
+  return totals;
+}
+
+// (k/2) Σ w |x − t − R (X − T)|² with the best t and R: the energy of a substep that begins here without a velocity and
+// ends where it begins. Requires free_setup and Solver::implicit.
+double elastic_energy(const Setup& setup, State state) {
+  state.frame = 0;
+  std::fill(state.v.begin(), state.v.end(), Vec3{});
+  return substep_energy(setup, state, state.x);
+}
+
+// What is not a number is infinitely much.
+void raise(double& greatest, double value) {
+  greatest = std::max(greatest, std::isfinite(value) ? value : std::numeric_limits<double>::infinity());
+}
+
+}  // namespace
+
+void set_in_motion(const Setup& setup, State& state) {
+  const double h = setup.body.grid.spacing, dt = setup.substep_length.at(0);
+  const Vec3 axis = normalized({1, 2, 3}), drift = (0.002 * h / dt) * normalized({2, -1, 1});
+  const Vec3 center = totals_of(setup.body, state).center();
+  for (std::size_t i = 0; i < state.x.size(); ++i) {
+    if (!state.alive[i]) continue;
+    const Vec3 arm = state.x[i] - center;
+    state.v[i] = drift + (0.01 / dt) * cross(axis, arm) + (0.001 / dt) * dot(axis, arm) * axis;
+  }
+}
+
+Conservation conservation(Backend& backend, const Setup& setup, const State& state) {
+  State start = state;
+  start.frame = 0;
+  backend.load({setup}, {start});
+  start = std::move(backend.snapshot().front());  // as the backend holds it
+  const bool implicit = setup.step.solver == Solver::implicit;
+  const auto energy_of = [&](const State& s, const Totals& totals) {
+    return static_cast<double>(totals.kinetic) + (implicit ? elastic_energy(setup, s) : 0);
+  };
+
+  const Totals first = totals_of(setup.body, start);
+  const auto mass = static_cast<double>(first.mass);
+  const Vec3 p = first.total_momentum(), j = first.angular_momentum();
+  const double energy = energy_of(start, first);
+  double lowest = energy, growth = 0, turned = 0, change = 0;
+  Conservation result;
+  result.extent = first.extent;
+  for (int64_t frame = 0; frame < setup.frame_count(); ++frame) {
+    backend.run(kFrame);
+    const State now = std::move(backend.snapshot().front());
+    if (!measurable(setup, now)) {
+      for (double* figure : {&change, &turned, &growth, &result.mass}) {
+        *figure = std::numeric_limits<double>::infinity();
+      }
+      break;
+    }
+    const Totals totals = totals_of(setup.body, now);
+    raise(change, norm(totals.total_momentum() - p));
+    raise(turned, norm(totals.angular_momentum() - j));
+    raise(result.mass, static_cast<double>(std::abs(totals.mass - first.mass)) / mass);
+    result.extent = std::max(result.extent, totals.extent);
+    const double present = energy_of(now, totals);
+    raise(growth, present - lowest);
+    lowest = std::min(lowest, present);
+  }
+  const double dt = setup.substep_length.at(0), speed = static_cast<double>(first.speed);
+  result.substeps = setup.frame_count() * setup.step.substeps;
+  result.momentum = change / mass;
+  result.momentum_relative = change / speed;
+  result.momentum_bound =
+      0.25 * static_cast<double>(result.substeps) * unit_roundoff(backend.precision()) * result.extent / dt;
+  if (implicit) result.energy = growth / energy;
+  // Velocities off by δ in the mean: at most δ Σ m |v| + M δ² / 2 (docs/design/tolerances.md, Conservation).
+  result.energy_bound = result.momentum_bound * (speed + mass * result.momentum_bound / 2) / energy;
+  result.angular_momentum = norm(j) > 0 ? turned / norm(j) : 0;
+  return result;
+}
+
+}  // namespace cutproof::oracles

@@ -1,0 +1,42 @@
+// The shape of a cut beside the ideal one. Figures, not verdicts: docs/guide/measuring.md says
+// what each of them means and what it does not. Where something is broken a figure is not a number; nothing is left
+// out.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "model/setup.h"
+#include "model/state.h"
+
+namespace cutproof::oracles {
+
+// The ideal cut is what the blade's mid-surface sweeps in frames before.frame .. after.frame - 1, where it is down: its
+// rectangle where it is put down and lifted, and the ruled surfaces that its four sides sweep in between. A plate that
+// moves in its own plane sweeps a surface; of one that turns on the spot this is the hull of what it passes through.
+std::vector<std::array<Vec3, 3>> swept_surface(const Setup& setup, int64_t first_frame, int64_t end_frame);
+
+// The cut at rest: before it is what was alive in `before`. Tissue that has moved by the time the blade comes by is cut
+// elsewhere, and that counts as an error.
+struct CutGeometry {
+  // Area of the ideal cut inside the tissue, which is the union of the cubes of side h around the particles [h²].
+  // Counted along lines parallel to the axes, h / kLinesPerSpacing apart, that cross it: dA = Σ_a |n_a| · |n_a| dA, and
+  // |n_a| dA is what the lines along axis a count. What the blade passes twice counts once.
+  double cut_area = 0;
+  double lost_volume = 0;                // of the particles that died [h³]
+  std::optional<double> lost_per_area;   // [h]; absent without a cut
+  std::optional<double> least_per_area;  // [h] the ideal: the fewest particles whose removal leaves no edge of the grid
+                                         // that the ideal cut crosses (of those along one axis), per cut area
+  std::optional<double> skin_to_ideal;   // [h] greatest distance of the new skin at rest from the ideal cut
+  std::optional<double> ideal_to_skin;   // [h] greatest distance of the ideal cut inside the tissue from the new skin
+  double sampling_skin = 0, sampling_ideal = 0;  // [h] by how much these two may be too small
+  std::optional<double> hausdorff() const;       // the greater of the two
+};
+inline constexpr int kLinesPerSpacing = 4;
+// New skin: triangles all of whose vertices lie on grid edges whose other end died, and such vertices by themselves.
+// Absent distances: no new skin, or no cut inside the tissue. Requires before.frame <= after.frame, and `after` with
+// the skin of its alive particles; without one there are no distances.
+CutGeometry cut_geometry(const Setup& setup, const State& before, const State& after);
+
+}  // namespace cutproof::oracles

@@ -1,0 +1,198 @@
+#include "oracles/comparison/stage_comparison.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "model/rules.h"
+#include "oracles/oracles.h"
+#include "oracles/support.h"
+
+namespace cutproof::oracles {
+
+namespace {
+
+constexpr const char* kBoundSource = "docs/design/tolerances.md, Against the reference";
+
+// Of a frame after its last stage (model/backend.h, run).
+void end_frame(State& state) {
+  for (int32_t c = 0; c < state.clusters.count(); ++c) state.clusters.number[at(c)] = c;
+  ++state.frame;
+}
+
+Verdict verdict_on(const StageDifference& difference, std::string property) {
+  return {.property = std::move(property),
+          .stage = difference.stage,
+          .backend = {},
+          .frame = difference.frame,
+          .unit = "1",
+          .bound_source = kBoundSource,
+          .checked = 1,
+          .witness = {}};
+}
+
+// Where the stage moves nothing each of these is zero, and its count would only thin out the step's.
+void note_if_any(MeasuredError& error, const ErrorNorm& norm) {
+  if (norm.max > 0) error.norm = norm;
+}
+
+}  // namespace
+
+std::vector<int32_t> in_one_only(const std::vector<int32_t>& a, const std::vector<int32_t>& b) {
+  std::vector<int32_t> result;
+  std::set_symmetric_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(result));
+  return result;
+}
+
+RestFrameComparison compare_rest_frames(const Setup& setup, const State& state) {
+  const RestFrameErrors errors = rest_frame_errors(setup, state);
+  int64_t largest = 0;
+  for (int32_t c = 0; c < state.clusters.count(); ++c) largest = std::max(largest, state.clusters.size(c));
+  // Each weight carries one rounding, a sum of N positive terms at most N - 1, on both sides; and the state's.
+  const double bound_of_mass = 2 * static_cast<double>(largest + 4) * unit_roundoff(state);
+  return {{errors.center, position_bound(setup.body)}, {errors.mass, bound_of_mass}};
+}
+
+StageComparison::StageComparison(const Setup& setup, ReferenceStages reference)
+    : setup_(setup), reference_(std::move(reference)) {}
+
+StageDifference StageComparison::compare(Stage stage, const State& before, const State& after, bool launched) {
+  StageDifference found;
+  found.stage = stage;
+  found.frame = before.frame;
+  found.due =
+      before.frame < setup_.frame_count() && is_due(setup_, stage, !before.removed.empty(), before.edge_covered);
+  const double bound = position_bound(setup_.body);
+  for (const Measure which : {Measure::position, Measure::rotation, Measure::skin}) found.error(which).bound = bound;
+  found.error(Measure::velocity).bound = 2 * bound;  // the difference of two positions over dt
+
+  const Verdict form = well_formed(setup_, after);
+  if (!form.holds) {
+    found.is_readable = false;
+    found.decisions.push_back({form.witness.text, form.witness.clusters, form.witness.particles});
+    return found;
+  }
+  if (launched != found.due) {
+    found.decisions.push_back(
+        {found.due ? "the stage was due, but did not run" : "the stage ran, but was not due", {}, {}});
+  }
+  if (stage == Stage::step && found.due) {
+    compare_step(before, after, found);
+  } else {
+    compare_later_stage(before, after, launched, found);
+  }
+  return found;
+}
+
+void StageComparison::compare_step(const State& before, const State& after, StageDifference& found) {
+  if (!steps_) steps_.emplace(setup_, reference_[at(static_cast<int>(Stage::step))]);
+  StepDifference step = steps_->compare(before, after);
+  found.undecidable = step.undecidable;
+  found.error(Measure::position).norm = step.position;
+  found.error(Measure::velocity).norm = step.velocity;
+  if (auto difference = difference_of_decisions(step.expected, after)) {
+    found.decisions.push_back(std::move(*difference));
+    found.undecidable.rotations = 0;
+  } else {
+    found.angle = step.angle;
+    found.error(Measure::rotation).norm = step.rotation;
+  }
+  found.expected = std::move(step.expected);
+}
+
+void StageComparison::compare_later_stage(const State& before, const State& after, bool launched,
+                                          StageDifference& found) {
+  State expected = before;
+  if (found.due) reference_[at(static_cast<int>(found.stage))](setup_, expected);
+  if (found.stage == Stage::skin) end_frame(expected);
+
+  // Where both remove different particles, the oracle says whether each of them lies within its rounding band. After
+  // that the reference goes on with the backend's choice.
+  if (found.stage == Stage::detect && found.due) {
+    found.removals = in_one_only(expected.removed, after.removed);
+    if (!found.removals.empty()) {
+      found.detection = detection(setup_, before, after);
+      if (found.detection->holds) found.undecidable.removals = static_cast<int64_t>(found.removals.size());
+      expected.removed = after.removed;
+      expected.alive = before.alive;
+      for (const int32_t i : after.removed) expected.alive[at(i)] = 0;
+    }
+  }
+
+  found.sets_are_open = found.stage == Stage::merge && found.due && !promise_of(setup_.merge.rule).unique;
+  auto difference = difference_of_decisions(expected, after, found.sets_are_open ? Sets::open : Sets::compared);
+  if (!difference && !found.sets_are_open && expected.clusters.rotation != after.clusters.rotation) {
+    const auto [mine, theirs] = std::mismatch(expected.clusters.rotation.begin(), expected.clusters.rotation.end(),
+                                              after.clusters.rotation.begin());
+    const int32_t cluster = after.clusters.number[at(theirs - after.clusters.rotation.begin())];
+    difference =
+        DecisionDifference{fmt::format("cluster {} has not the rotation that it inherits", cluster), {cluster}, {}};
+  }
+
+  const double dt =
+      setup_.substep_length.empty() ? 1 : setup_.substep_length[at(std::min(before.frame, setup_.frame_count() - 1))];
+  note_if_any(found.error(Measure::position), position_error(setup_, expected.x, after.x, before.alive));
+  note_if_any(found.error(Measure::velocity), velocity_error(setup_, expected.v, after.v, dt, before.alive));
+  if (launched && found.stage != Stage::detect && found.stage != Stage::skin && found.stage != Stage::step) {
+    const RestFrameComparison rest = compare_rest_frames(setup_, after);
+    found.error(Measure::rest_center) = rest.center;
+    found.error(Measure::mass) = rest.mass;
+  }
+  if (found.stage == Stage::skin && found.due && !difference) {
+    found.error(Measure::skin).norm =
+        error_of(errors_of_fields(setup_, expected, after, dt, before.alive), "skin_position");
+  }
+  if (difference) found.decisions.push_back(std::move(*difference));
+  found.expected = std::move(expected);
+}
+
+Verdict verdict_of(Measure which, const MeasuredError& error, Stage stage, int64_t frame, const std::string& prefix) {
+  const MeasureInfo& info = info_of(which);
+  Verdict verdict;
+  verdict.property = fmt::format("{}{}", prefix, info.name);
+  verdict.stage = stage;
+  verdict.frame = frame;
+  verdict.holds = error.holds();
+  verdict.measured = error.norm.max;
+  verdict.bound = error.bound;
+  verdict.unit = info.unit;
+  verdict.bound_source = kBoundSource;
+  verdict.checked = error.norm.count;
+  if (verdict.holds) return verdict;
+  (info.of_clusters ? verdict.witness.clusters : verdict.witness.particles) = {error.norm.where};
+  verdict.witness.text =
+      fmt::format("{} of {} {} are {:.3g} {} from the reference's", info.name,
+                  info.of_clusters ? "cluster" : "particle", error.norm.where, error.norm.max, info.unit);
+  return verdict;
+}
+
+std::vector<Verdict> StageDifference::verdicts(const std::string& prefix) const {
+  std::vector<Verdict> verdicts = {verdict_on(*this, fmt::format("{}topology", prefix))};
+  if (!decisions.empty()) {
+    Verdict& topology = verdicts.back();
+    topology.holds = false;
+    topology.measured = static_cast<double>(decisions.size());
+    topology.witness = {decisions.front().clusters, decisions.front().particles, {}, decisions.front().text};
+  }
+  if (stage == Stage::detect && due) {
+    verdicts.push_back(verdict_on(*this, fmt::format("{}removed particles", prefix)));
+    if (detection && !detection->holds) {
+      Verdict& removed = verdicts.back();
+      removed.holds = false;
+      removed.measured = detection->measured;
+      removed.bound = detection->bound;
+      removed.unit = detection->unit;
+      removed.bound_source = detection->bound_source;
+      removed.witness = detection->witness;
+    }
+  }
+  for (std::size_t m = 0; m < errors.size(); ++m) {
+    if (errors[m].norm.count == 0) continue;
+    verdicts.push_back(verdict_of(static_cast<Measure>(m), errors[m], stage, frame, prefix));
+  }
+  return verdicts;
+}
+
+}  // namespace cutproof::oracles

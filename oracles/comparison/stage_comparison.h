@@ -1,0 +1,105 @@
+// A stage of a backend beside the reference's from the same state: the one comparison with the reference, which
+// lockstep, the property tests and the benchmarks share (docs/design/tolerances.md, Against the reference).
+#pragma once
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "model/setup.h"
+#include "model/stage.h"
+#include "model/state.h"
+#include "model/verdict.h"
+#include "oracles/comparison/error_norm.h"
+#include "oracles/comparison/state_difference.h"
+#include "oracles/comparison/step_comparison.h"
+
+namespace cutproof::oracles {
+
+// The reference's stages, in the order of kStages, which no oracle knows by itself: each takes a state before the
+// stage, which is due, and leaves the one after it. The end of the frame after skin is no part of them.
+using ReferenceStages = std::array<std::function<void(const Setup& setup, State& state)>, 6>;
+
+// What is measured, each with a bound of its own.
+enum class Measure { position, velocity, rotation, rest_center, mass, skin };
+struct MeasureInfo {
+  std::string_view name;  // of the property
+  std::string_view key;   // in files
+  std::string_view unit;
+  bool of_clusters;  // `where` is the index of a cluster; otherwise a particle
+};
+inline constexpr std::array<MeasureInfo, 6> kMeasures = {{{"positions", "position", "h", false},
+                                                          {"velocities", "velocity", "h/dt", false},
+                                                          {"rotations", "rotation", "h", true},
+                                                          {"rest centers", "rest_center", "h", true},
+                                                          {"masses", "mass", "1", true},
+                                                          {"skin vertices", "skin", "h", false}}};
+constexpr const MeasureInfo& info_of(Measure which) { return kMeasures[static_cast<std::size_t>(which)]; }
+
+// An empty norm holds: nothing was measured.
+struct MeasuredError {
+  ErrorNorm norm;
+  double bound = 0;
+  bool holds() const { return norm.count == 0 || norm.max <= bound; }
+};
+
+// What one stage of a backend is beside the reference's.
+struct StageDifference {
+  Stage stage = Stage::step;
+  int64_t frame = 0;
+  bool is_readable = true;  // `after` is well formed; otherwise decisions.front() says why, and there is nothing else
+  bool due = false;
+  State expected;  // what the reference makes of the same state; of undecidable removals it takes the backend's
+  // Whether the stage ran exactly if it was due, and then the first decision that differs; at most one of each.
+  std::vector<DecisionDifference> decisions;
+  bool sets_are_open = false;        // the rule leaves several answers, so clusters are not among them
+  std::vector<int32_t> removals;     // detect: particles that only one of the two removes
+  std::optional<Verdict> detection;  // where there are some: the oracle's, whether each lies within its rounding band
+  Undecidable undecidable;
+  ErrorNorm angle;                           // of rotations [rad]
+  std::array<MeasuredError, 6> errors = {};  // by Measure
+
+  MeasuredError& error(Measure which) { return errors[static_cast<std::size_t>(which)]; }
+  const MeasuredError& error(Measure which) const { return errors[static_cast<std::size_t>(which)]; }
+
+  // One for decisions (`topology`), one for removals where the stage is a detection that was due, one for each measure
+  // that was taken. Their properties begin with `prefix`.
+  std::vector<Verdict> verdicts(const std::string& prefix) const;
+};
+
+// The verdict on one measure after a stage of a frame, as in StageDifference::verdicts.
+Verdict verdict_of(Measure which, const MeasuredError& error, Stage stage, int64_t frame, const std::string& prefix);
+
+// Compares stages of one body, one after the other.
+class StageComparison {
+ public:
+  // `setup` must outlive this.
+  StageComparison(const Setup& setup, ReferenceStages reference);
+
+  // `before` and `after`: the backend's states around the stage of frame before.frame; `before` well formed.
+  // `launched`: whether the backend ran the stage. Of an `after` that is not well formed nothing is compared: that is
+  // its difference.
+  StageDifference compare(Stage stage, const State& before, const State& after, bool launched);
+
+ private:
+  void compare_step(const State& before, const State& after, StageDifference& found);
+  void compare_later_stage(const State& before, const State& after, bool launched, StageDifference& found);
+
+  const Setup& setup_;
+  ReferenceStages reference_;
+  std::optional<StepComparison> steps_;  // made for the first step
+};
+
+// Rest centers and masses of `state` against those that its own memberships give, with their bounds.
+struct RestFrameComparison {
+  MeasuredError center, mass;
+};
+RestFrameComparison compare_rest_frames(const Setup& setup, const State& state);
+
+// Particles that stand in one of two ascending lists only.
+std::vector<int32_t> in_one_only(const std::vector<int32_t>& a, const std::vector<int32_t>& b);
+
+}  // namespace cutproof::oracles

@@ -1,0 +1,151 @@
+// What gpu/state/arrays.inc says of each array holds: constant ones are not written, a snapshot needs no others than
+// those of the state, and no stage relies on what it finds in scratch memory.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gpu/host/host_launcher.h"
+#include "gpu/launch/frame.h"
+#include "gpu/state/staging.h"
+#include "model/stage.h"
+#include "property_tests/cases.h"
+#include "property_tests/random.h"
+
+namespace cutproof::gpu {
+namespace {
+
+struct Bodies {
+  std::vector<Setup> setups;
+  std::vector<State> states;
+};
+
+Bodies some_bodies(std::uint64_t seed, int count) {
+  property_tests::Random random(seed);
+  Bodies bodies;
+  for (int k = 0; k < count; ++k) {
+    auto [setup, state] = property_tests::load(property_tests::draw_case(random.seed(), 40));
+    bodies.setups.push_back(std::move(setup));
+    bodies.states.push_back(std::move(state));
+  }
+  return bodies;
+}
+
+template <class Which>
+void spoil(StagingBuffers& staging, Which which) {
+  DeviceView unused;
+  staging.each(unused, [&](const auto& array, auto& vector, auto&) {
+    if (!which(array.lifetime) || vector.empty()) return;
+    std::memset(static_cast<void*>(vector.data()), 0x5a, vector.size() * sizeof vector.front());
+  });
+}
+
+std::map<std::string, std::string> bytes_of(StagingBuffers& staging, Lifetime lifetime) {
+  std::map<std::string, std::string> bytes;
+  DeviceView unused;
+  staging.each(unused, [&](const auto& array, const auto& vector, auto&) {
+    if (array.lifetime != lifetime) return;
+    bytes[array.name].assign(reinterpret_cast<const char*>(vector.data()), vector.size() * sizeof(*vector.data()));
+  });
+  return bytes;
+}
+
+struct Trace {
+  std::vector<std::vector<State>> states;  // after each stage of each frame
+  std::array<int, 6> ran{};                // how many times, by stage
+};
+
+// Runs all frames, stage by stage; calls before(staging) before each of them.
+template <class Before>
+Trace run_all(const Bodies& bodies, Before before) {
+  StagingBuffers staging = make_staging_buffers(bodies.setups, bodies.states, kNewton, Capacity{});
+  const Plan plan = make_plan(bodies.setups, bodies.states, kNewton, SplitMethod::blocks);
+  const DeviceView view = staging.view();
+  HostLauncher launcher;
+  std::int64_t frames = 0;
+  for (const Setup& setup : bodies.setups) frames = std::max(frames, setup.frame_count());
+  Trace run;
+  for (std::int64_t frame = 0; frame < frames; ++frame) {
+    for (const Stage stage : kStages) {
+      before(staging);
+      enqueue_span(launcher, view, plan, Span{stage, stage}, [](Stage) {});
+      require_no_fault(staging.counters.front());
+      run.states.push_back(extract_states(staging, bodies.setups));
+      const auto s = static_cast<std::size_t>(stage);
+      run.ran[s] += staging.counters.front().stage_ran[s];
+    }
+  }
+  return run;
+}
+
+TEST(Arrays, AreAsLongAsTheirExtentsSay) {
+  const Bodies bodies = some_bodies(1, 5);
+  StagingBuffers staging = make_staging_buffers(bodies.setups, bodies.states, kNewton, Capacity{});
+  DeviceView view = staging.view();
+  int arrays = 0;
+  staging.each(view, [&](const auto& array, const auto& vector, auto& pointer) {
+    EXPECT_EQ(static_cast<std::int64_t>(vector.size()), array.extent) << array.name;
+    EXPECT_EQ(pointer, vector.data()) << array.name;
+    ++arrays;
+  });
+  EXPECT_GT(arrays, 50);
+  EXPECT_EQ(view.bodies, 5);
+  EXPECT_EQ(view.slot_capacity, staging.slot_capacity);
+}
+
+TEST(Arrays, OfScratchMemoryAreNothingThatAStageReliesOn) {
+  std::array<int, 6> ran{};
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(seed);
+    const Bodies bodies = some_bodies(seed, 8);
+    const Trace expected = run_all(bodies, [](StagingBuffers&) {});
+    const Trace found = run_all(bodies, [](StagingBuffers& staging) {
+      spoil(staging, [](Lifetime lifetime) { return lifetime == Lifetime::scratch; });
+    });
+    ASSERT_EQ(found.states.size(), expected.states.size());
+    for (std::size_t k = 0; k < found.states.size(); ++k) {
+      ASSERT_TRUE(found.states[k] == expected.states[k])
+          << "after stage " << name_of(kStages[k % 6]) << " of frame " << k / 6;
+    }
+    for (std::size_t s = 0; s < 6; ++s) ran[s] += found.ran[s];
+  }
+  for (const Stage stage : kStages) EXPECT_GT(ran[static_cast<std::size_t>(stage)], 10) << name_of(stage);
+}
+
+TEST(Arrays, OfTheStateAreAllThatASnapshotNeedsBesideTheConstantOnes) {
+  int skins = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(seed);
+    const Bodies bodies = some_bodies(seed, 8);
+    run_all(bodies, [&](StagingBuffers& staging) {
+      const std::vector<State> expected = extract_states(staging, bodies.setups);
+      for (const State& state : expected) skins += !state.skin.triangles.empty();
+      StagingBuffers spoiled = staging;
+      spoil(spoiled, [](Lifetime lifetime) { return lifetime == Lifetime::scratch || lifetime == Lifetime::derived; });
+      ASSERT_TRUE(extract_states(spoiled, bodies.setups) == expected);
+    });
+  }
+  EXPECT_GT(skins, 10);
+}
+
+TEST(Arrays, ThatAreConstantAreNotWritten) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(seed);
+    std::map<std::string, std::string> first;
+    run_all(some_bodies(seed, 8), [&](StagingBuffers& staging) {
+      const auto now = bytes_of(staging, Lifetime::constant);
+      if (first.empty()) first = now;
+      for (const auto& [name, bytes] : now) ASSERT_TRUE(bytes == first.at(name)) << name;
+    });
+    ASSERT_GT(first.size(), 10u);
+  }
+}
+
+}  // namespace
+}  // namespace cutproof::gpu
