@@ -8,8 +8,8 @@
 
 #include "cli/against_report.h"
 #include "harness/geometry_json.h"
-#include "model/io/json_number.h"
 #include "model/error.h"
+#include "model/io/json_number.h"
 
 namespace cutproof::cli {
 

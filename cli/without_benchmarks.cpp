@@ -11,8 +11,8 @@ namespace cutproof::cli {
 namespace {
 
 void add_refused(CLI::App& program, Work& work, const std::string& verb) {
-  CLI::App* const command = program.add_subcommand(
-      verb, verb + " is not in this build: configure with -DCUTPROOF_BENCHMARKS=ON");
+  CLI::App* const command =
+      program.add_subcommand(verb, verb + " is not in this build: configure with -DCUTPROOF_BENCHMARKS=ON");
   command->allow_extras();
   command->callback([verb, &work] {
     work = [verb]() -> int {

@@ -177,9 +177,12 @@ CampaignConclusion conclude(const json& document, bool whole) {
   }
   if (document.contains("steps_compared")) {
     const json& compared = document.at("steps_compared");
-    const double undecidable = compared.at("undecidable").get<double>(), measured = compared.at("particles").get<double>();
+    const double undecidable = compared.at("undecidable").get<double>(),
+                 measured = compared.at("particles").get<double>();
     if (!(undecidable <= kMostUndecidable * (undecidable + measured)) || measured == 0) {
-      return {fmt::format("{:.0f} positions after a step were undecidable and {:.0f} compared, so too little was tested", undecidable, measured)};
+      return {
+          fmt::format("{:.0f} positions after a step were undecidable and {:.0f} compared, so too little was tested",
+                      undecidable, measured)};
     }
   }
   return {};

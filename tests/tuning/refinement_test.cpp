@@ -1,6 +1,4 @@
 // The reference solution against solutions that owe nothing to it: a parabola, and a sparse factorisation.
-#include "tuning/reference_solution.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +7,7 @@
 #include "oracles/comparison/reference_solution.h"
 #include "oracles/relations/relations.h"
 #include "tuning/prepared_scene.h"
+#include "tuning/reference_solution.h"
 
 namespace cutproof::tuning {
 namespace {
@@ -73,8 +72,7 @@ TEST(ReferenceSolution, OfItsOwnSubstepsIsWhatASparseFactorisationFinds) {
       state.clusters.rotation = std::move(exact.rotation);
     }
     const oracles::Pose pose{state.x, state.alive, 1}, rest{prepared.start().x, state.alive, 1};
-    EXPECT_LE(oracles::poses_apart(prepared.setup(), pose, solution.trajectory().frames[f]).position.max, 1e-8)
-        << f;
+    EXPECT_LE(oracles::poses_apart(prepared.setup(), pose, solution.trajectory().frames[f]).position.max, 1e-8) << f;
     moved = std::max(moved, oracles::poses_apart(prepared.setup(), pose, rest).position.max);
   }
   EXPECT_GT(moved, 0.05) << "it hangs from a grip: it has to move, else nothing is compared";
