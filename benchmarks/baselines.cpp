@@ -1,24 +1,14 @@
 #include "benchmarks/baselines.h"
 
-#include <fmt/format.h>
-
-#include <CLI/CLI.hpp>
 #include <algorithm>
-#include <memory>
 
-#include "benchmarks/suites.h"
-#include "cli/errors_report.h"
 #include "fixtures/bodies.h"
 #include "fixtures/build.h"
-#include "harness/backends.h"
-#include "model/error.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 
 namespace {
-
-using nlohmann::json;
 
 constexpr Span kWholeFrame = {Stage::step, Stage::skin};
 
@@ -26,22 +16,6 @@ std::size_t at(int64_t index) { return static_cast<std::size_t>(index); }
 
 // Frames between two in which interpenetration is measured.
 constexpr int64_t kOverlapEvery = 8;
-
-const char* name_of(ExpandRule rule) {
-  return rule == ExpandRule::none ? "none" : rule == ExpandRule::edge_cover ? "edge_cover" : "published";
-}
-const char* name_of(MergeRule rule) {
-  constexpr std::array<const char*, 4> kNames = {"none", "deterministic", "published", "single_pass"};
-  return kNames[static_cast<std::size_t>(rule)];
-}
-const char* name_of(Criterion criterion) {
-  constexpr std::array<const char*, 4> kNames = {"none", "distance", "geometric", "strain"};
-  return kNames[static_cast<std::size_t>(criterion)];
-}
-const char* name_of(Deletion deletion) {
-  constexpr std::array<const char*, 3> kNames = {"none", "particles", "clusters"};
-  return kNames[static_cast<std::size_t>(deletion)];
-}
 
 }  // namespace
 
@@ -193,95 +167,4 @@ BaselineRow run_baseline(Backend& backend, const Baseline& baseline, BaselineSce
   return row;
 }
 
-namespace {
-
-struct BaselinesOptions {
-  std::string backend = "reference", json;
-  int64_t particles = 1500;
-  uint64_t seed = 1;
-};
-
-json to_json(const Baseline& baseline, const BaselineRow& row) {
-  return {{"name", baseline.name},
-          {"source", baseline.source},
-          {"settings",
-           {{"expand", name_of(baseline.expand)},
-            {"merge", name_of(baseline.merge)},
-            {"detect", name_of(baseline.criterion)},
-            {"deletion", name_of(baseline.deletion)}}},
-          {"frames", row.frames},
-          {"seconds", cli::to_json(row.frame)},
-          {"removed", row.removed},
-          {"clusters_before", row.clusters_before},
-          {"clusters", row.clusters},
-          {"components", row.end.components},
-          {"couplings", row.end.couplings},
-          {"shells", row.end.shells},
-          {"equal", row.end.equal},
-          {"unequal_frames", row.unequal_frames},
-          {"isolated", row.isolated},
-          {"geometry", cli::to_json(row.geometry)},
-          {"interpenetration", cli::to_json(row.overlap)}};
-}
-
-int bench_baselines(const BaselinesOptions& options) {
-  require_timed_backend(options.backend);
-  require_writable(options.json);
-  json document = begin_report("baselines", options.backend);
-  document["particles_asked"] = options.particles;
-  document["seed"] = options.seed;
-  document["rows"] = json::array();
-  fmt::print("seed {}\n", options.seed);
-  Table table({"", "ms per frame", "isolated", "tissue/coupling/skin", "unequal frames", "lost/area [h]", "ideal [h]",
-               "Hausdorff [h]", "interpenetration [h³]", "clusters"});
-  bool holds = true;
-  for (const Baseline& baseline : baselines()) {
-    BackendChoice choice;
-    choice.name = options.backend;
-    const std::unique_ptr<Backend> backend = make_backend(choice);
-    BaselineScene scene = make_baseline_scene(baseline, options.particles, options.seed);
-    document["particles"] = scene.setup.body.particle_count();
-    document["spacing"] = scene.setup.body.grid.spacing;
-    const BaselineRow row = run_baseline(*backend, baseline, std::move(scene));
-    if (&baseline == &baselines().front()) holds = row.isolated == 0 && row.unequal_frames == 0;
-    document["rows"].push_back(to_json(baseline, row));
-    const auto or_dash = [](const std::optional<double>& value) { return value ? fmt::format("{:.3g}", *value) : "-"; };
-    table.add({baseline.name, fmt::format("{:.3g}", 1e3 * row.frame.median), fmt::format("{}", row.isolated),
-               fmt::format("{}/{}/{}", row.end.components, row.end.couplings, row.end.shells),
-               fmt::format("{} of {}", row.unequal_frames, row.frames), or_dash(row.geometry.lost_per_area),
-               or_dash(row.geometry.least_per_area), or_dash(row.geometry.hausdorff()),
-               fmt::format("{:.3g} ± {:.2g}", row.overlap.volume, row.overlap.bound),
-               fmt::format("{} -> {}", row.clusters_before, row.clusters)});
-    write_report(options.json, document);  // what there is, should a later row fail
-  }
-  fmt::print("\n{}\n", table.text());
-  fmt::print(
-      "ideal: the least that removing particles can lose; a blade without thickness would lose nothing.\n"
-      "The two that delete are emulated beside the backend: their time is that of step, detect and skin.\n");
-  if (!holds) fmt::print("FAILS: this method left clusters isolated, or components that are not the same\n");
-  document["holds"] = holds;
-  document["complete"] = true;
-  write_report(options.json, document);
-  if (!options.json.empty()) fmt::print("\nwrote {}\n", options.json);
-  return holds ? 0 : 1;
-}
-
-}  // namespace
-
-Suite baselines_suite() {
-  return {"baselines", "this method beside deletion, other expansion, detection and merging", [](CLI::App& command) {
-            const auto options = std::make_shared<BaselinesOptions>();
-            command.add_option("--backend", options->backend, "who simulates: reference, host or gpu")
-                ->capture_default_str()
-                ->type_name("B");
-            command.add_option("--particles", options->particles, "of the kidney")
-                ->capture_default_str()
-                ->type_name("N")
-                ->check(CLI::Range(int64_t{100}, int64_t{2'000'000}));
-            command.add_option("--seed", options->seed, "of the clusters")->capture_default_str()->type_name("N");
-            command.add_option("--json", options->json, "write times and errors")->type_name("F");
-            return [options] { return bench_baselines(*options); };
-          }};
-}
-
-}  // namespace cutproof::cli
+}  // namespace cutproof::benchmarks

@@ -1,15 +1,15 @@
-// Pieces of `cutproof bench baselines`: what is compared with this method, and how.
+// Other methods of cutting, and how they are compared with this one.
 #pragma once
 #include <cstdint>
 #include <string>
 #include <vector>
 
-#include "benchmarks/report.h"
+#include "benchmarks/times.h"
 #include "harness/errors.h"
 #include "model/backend.h"
 #include "model/scene.h"
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 
 // What becomes of clusters that lost particles, where no stage of a backend does that.
 enum class Deletion {
@@ -53,4 +53,4 @@ struct BaselineRow {
 };
 BaselineRow run_baseline(Backend& backend, const Baseline& baseline, BaselineScene scene);
 
-}  // namespace cutproof::cli
+}  // namespace cutproof::benchmarks

@@ -2,20 +2,16 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstring>
-#include <memory>
 #include <thread>
 
-#include "benchmarks/suites.h"
 #include "gpu/host/host_launcher.h"
-#include "harness/backends.h"
 #if CUTPROOF_HAS_CUDA
 #include "benchmarks/device_limits.h"
 #endif
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 
 namespace {
 
@@ -74,22 +70,32 @@ MachineLimit launch_on_host(int threads, int blocks, int repeats) {
 
 }  // namespace
 
-MachineLimits measure_machine(const std::string& backend) {
-  MachineLimits limits;
+MachineLimits measure_machine(const harness::BackendDescriptor& backend) {
+  using harness::Processor;
 #if CUTPROOF_HAS_CUDA
-  if (backend == "gpu") {
+  if (backend.processor == Processor::device) {
     const gpu::DeviceLimits measured = gpu::measure_device_limits();
     return {measured.copy_bytes_per_second, measured.graph_node_seconds, measured.chain_seconds};
   }
 #endif
-  const MachineLimit copy = copy_on_cpu(backend == "reference" ? 1 : cpu_threads(), kRepeats);
-  limits.copy_bytes_per_second = copy.bytes / copy.seconds.median;
-  return limits;
+  const int threads = backend.processor == Processor::one_thread ? 1 : harness::cpu_threads();
+  const MachineLimit copy = copy_on_cpu(threads, kRepeats);
+  return {copy.bytes / copy.seconds.median, {}, {}};
 }
 
-std::vector<MachineLimit> measure_machine_limits(const std::string& backend, int repeats) {
+nlohmann::json to_json(const MachineLimits& machine) {
+  nlohmann::json result = {{"copy_bytes_per_second", machine.copy_bytes_per_second}};
+  if (machine.graph_node_seconds) {
+    result["graph_node_seconds"] = *machine.graph_node_seconds;
+    result["chain_of_40_seconds"] = *machine.chain_seconds;
+  }
+  return result;
+}
+
+std::vector<MachineLimit> measure_machine_limits(const harness::BackendDescriptor& backend, int repeats) {
+  using harness::Processor;
 #if CUTPROOF_HAS_CUDA
-  if (backend == "gpu") {
+  if (backend.processor == Processor::device) {
     const gpu::DeviceLimits measured = gpu::measure_device_limits(repeats);
     return {{"copy, device to device", times_of(measured.copy), measured.copy_bytes, measured.bytes_lost},
             {"graph of 40 empty kernels", times_of(measured.short_chain), 0, {}},
@@ -97,77 +103,14 @@ std::vector<MachineLimit> measure_machine_limits(const std::string& backend, int
   }
 #endif
   std::vector<MachineLimit> limits = {copy_on_cpu(1, repeats)};
-  if (backend == "host") {
-    if (cpu_threads() > 1) limits.push_back(copy_on_cpu(cpu_threads(), repeats));
+  if (backend.processor == Processor::all_threads) {
+    const int threads = harness::cpu_threads();
+    if (threads > 1) limits.push_back(copy_on_cpu(threads, repeats));
     for (const int blocks : {1, gpu::HostLauncher::kMostBlocks}) {
-      limits.push_back(launch_on_host(cpu_threads(), blocks, repeats));
+      limits.push_back(launch_on_host(threads, blocks, repeats));
     }
   }
   return limits;
 }
 
-nlohmann::json to_json(const std::vector<MachineLimit>& limits) {
-  nlohmann::json rows = nlohmann::json::array();
-  for (const MachineLimit& limit : limits) {
-    nlohmann::json row = {{"what", limit.what}, {"seconds", to_json(limit.seconds)}, {"lost", nullptr}};
-    if (limit.bytes > 0) {
-      row["bytes"] = limit.bytes;
-      row["bytes_per_second"] = limit.bytes / limit.seconds.median;
-    }
-    if (limit.lost) row["lost"] = *limit.lost;
-    rows.push_back(std::move(row));
-  }
-  return rows;
-}
-
-namespace {
-
-struct Options {
-  std::string backend = "reference", json;
-  int repeats = 21;
-};
-
-int bench_machine_limits(const Options& options) {
-  require_timed_backend(options.backend);
-  require_writable(options.json);
-  nlohmann::json document = begin_report("machine_limits", options.backend);
-  const std::vector<MachineLimit> limits = measure_machine_limits(options.backend, options.repeats);
-  Table table({"", "median µs", "least", "most", "GB/s", "lost"});
-  for (const MachineLimit& limit : limits) {
-    const auto microseconds = [](double seconds) { return fmt::format("{:.4g}", 1e6 * seconds); };
-    table.add({limit.what, microseconds(limit.seconds.median), microseconds(limit.seconds.min),
-               microseconds(limit.seconds.max),
-               limit.bytes > 0 ? fmt::format("{:.4g}", 1e-9 * limit.bytes / limit.seconds.median) : "-",
-               limit.lost ? fmt::format("{}", *limit.lost) : "-"});
-  }
-  fmt::print("\n{}", table.text());
-  const bool holds =
-      std::all_of(limits.begin(), limits.end(), [](const MachineLimit& limit) { return limit.lost.value_or(0) == 0; });
-  if (!holds) fmt::print("FAILS: something that was timed did not do its work\n");
-  document["repeats"] = options.repeats;
-  document["rows"] = to_json(limits);
-  document["holds"] = holds;
-  document["complete"] = true;
-  write_report(options.json, document);
-  if (!options.json.empty()) fmt::print("\nwrote {}\n", options.json);
-  return holds ? 0 : 1;
-}
-
-}  // namespace
-
-Suite machine_limits_suite() {
-  return {"machine_limits", "what the machine can do at best: copies, launches", [](CLI::App& command) {
-            const auto options = std::make_shared<Options>();
-            command.add_option("--backend", options->backend, "whose machine: reference, host or gpu")
-                ->capture_default_str()
-                ->type_name("B");
-            command.add_option("--repeats", options->repeats, "of each timing")
-                ->capture_default_str()
-                ->type_name("N")
-                ->check(CLI::Range(1, 10'000));
-            command.add_option("--json", options->json, "write times")->type_name("F");
-            return [options] { return bench_machine_limits(*options); };
-          }};
-}
-
-}  // namespace cutproof::cli
+}  // namespace cutproof::benchmarks

@@ -1,5 +1,4 @@
-// What the machine can do at best, measured in the same run as what is given as a multiple of it; by itself it is the
-// suite `machine_limits`.
+// What the machine can do at best, measured in the same run as the times that are given as multiples of it.
 #pragma once
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -7,18 +6,19 @@
 #include <string>
 #include <vector>
 
-#include "benchmarks/report.h"
+#include "benchmarks/times.h"
+#include "harness/backends.h"
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 
 struct MachineLimits {
   double copy_bytes_per_second = 0;          // read + written
   std::optional<double> graph_node_seconds;  // device only
   std::optional<double> chain_seconds;       // of a graph of 40 empty kernels; device only
 };
-
 // By the device, or by as many threads of the CPU as the backend uses.
-MachineLimits measure_machine(const std::string& backend);
+MachineLimits measure_machine(const harness::BackendDescriptor& backend);
+nlohmann::json to_json(const MachineLimits& machine);
 
 // One thing of which nothing can be faster.
 struct MachineLimit {
@@ -27,10 +27,8 @@ struct MachineLimit {
   double bytes = 0;             // read + written; 0: it moves nothing
   std::optional<int64_t> lost;  // bytes that are not what was copied, launches that did nothing; absent: no result
 };
-// `reference`: a copy by one thread. `host`: copies by one and by all threads, launches of an empty kernel with one
-// block and with as many as a launch has at most. `gpu`: a copy, graphs that are chains of 40 and of 400 empty kernels.
-std::vector<MachineLimit> measure_machine_limits(const std::string& backend, int repeats);
+// One thread: a copy. All threads: copies by one and by all of them, launches of an empty kernel with one block and
+// with as many as a launch has at most. A device: a copy, graphs that are chains of 40 and of 400 empty kernels.
+std::vector<MachineLimit> measure_machine_limits(const harness::BackendDescriptor& backend, int repeats);
 
-nlohmann::json to_json(const std::vector<MachineLimit>& limits);
-
-}  // namespace cutproof::cli
+}  // namespace cutproof::benchmarks

@@ -6,13 +6,11 @@
 #include "benchmarks/device_limits.h"
 #endif
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 
-std::optional<int64_t> bytes_in_use(const std::string& backend) {
+std::optional<int64_t> bytes_in_use([[maybe_unused]] const harness::BackendDescriptor& backend) {
 #if CUTPROOF_HAS_CUDA
-  if (backend == "gpu") return gpu::device_bytes_in_use();
-#else
-  static_cast<void>(backend);
+  if (backend.needs_device()) return gpu::device_bytes_in_use();
 #endif
 #ifdef __GLIBC__
   const struct mallinfo2 info = mallinfo2();
@@ -22,4 +20,4 @@ std::optional<int64_t> bytes_in_use(const std::string& backend) {
   return std::nullopt;
 }
 
-}  // namespace cutproof::cli
+}  // namespace cutproof::benchmarks

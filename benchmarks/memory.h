@@ -2,12 +2,13 @@
 #pragma once
 #include <cstdint>
 #include <optional>
-#include <string>
 
-namespace cutproof::cli {
+#include "harness/backends.h"
 
-// Bytes in use where `backend` keeps its state: on the device for `gpu`, else by this process, as its allocator counts
-// them; absent where that is not known. Throws MachineError if CUDA fails.
-std::optional<int64_t> bytes_in_use(const std::string& backend);
+namespace cutproof::benchmarks {
 
-}  // namespace cutproof::cli
+// Bytes in use where `backend` keeps its state: on the device, or by this process, as its allocator counts them;
+// absent where that is not known. Throws MachineError if CUDA fails.
+std::optional<int64_t> bytes_in_use(const harness::BackendDescriptor& backend);
+
+}  // namespace cutproof::benchmarks

@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <map>
 
+#include "benchmarks/times.h"
 #include "model/error.h"
 #include "model/io/scene_io.h"
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 
 const std::vector<PaperScene>& paper_scenes() {
   using Paper = PaperScene::Milliseconds;
@@ -104,4 +105,4 @@ BenchScene make_paper_scene(const std::string& file, const std::string& name, in
   return scene;
 }
 
-}  // namespace cutproof::cli
+}  // namespace cutproof::benchmarks

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "benchmarks/stages.h"
+#include "benchmarks/scene.h"
 #include "fixtures/build.h"
 #include "model/scene.h"
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 
 // A column of Table 1; or the irregular path of Fig. 13, which the paper shows and does not time.
 struct PaperScene {
@@ -58,4 +58,4 @@ Scene paper_scene(const std::string& file);
 BenchScene make_paper_scene(const std::string& file, const std::string& name, int64_t particles, Cooking cooking,
                             int64_t frames);
 
-}  // namespace cutproof::cli
+}  // namespace cutproof::benchmarks

@@ -8,7 +8,7 @@
 #include "gpu/launch/launcher.h"
 #include "harness/backends.h"
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 
 // Entry k of matrix i at [k · count + i], so that neighbouring threads read neighbouring numbers.
 template <class Real>
@@ -184,7 +184,7 @@ std::string name_of_method(int number) {
   if constexpr (requires { Method::kName; }) {
     return Method::kName;
   } else {
-    return rotation_names()[static_cast<std::size_t>(number)];
+    return harness::rotation_names()[static_cast<std::size_t>(number)];
   }
 }
 
@@ -202,4 +202,4 @@ void each_kernel_method(Visit visit) {
   visit(McAdams{}, -1);
 }
 
-}  // namespace cutproof::cli
+}  // namespace cutproof::benchmarks

@@ -5,13 +5,12 @@
 #include <algorithm>
 #include <memory>
 
-#include "benchmarks/report.h"
 #include "benchmarks/rotation_kernel.cuh"
+#include "benchmarks/times.h"
 #include "gpu/host/host_launcher.h"
-#include "harness/backends.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 
 namespace {
 
@@ -83,12 +82,15 @@ RotationMethod on_cpu(std::string name, bool selectable, const std::shared_ptr<g
 
 }  // namespace
 
-std::vector<RotationMethod> rotation_methods(const std::string& backend) {
+std::vector<RotationMethod> rotation_methods(const harness::BackendDescriptor& backend) {
+  using harness::Processor;
 #if CUTPROOF_HAS_CUDA
-  if (backend == "gpu") return device_rotation_methods();
+  if (backend.processor == Processor::device) return device_rotation_methods();
 #endif
   std::shared_ptr<gpu::HostLauncher> launcher;
-  if (backend == "host") launcher = std::make_shared<gpu::HostLauncher>(gpu::HostLauncher::Threads{cpu_threads()});
+  if (backend.processor == Processor::all_threads) {
+    launcher = std::make_shared<gpu::HostLauncher>(gpu::HostLauncher::Threads{harness::cpu_threads()});
+  }
   std::vector<RotationMethod> methods;
   each_kernel_method([&]<class Method>(Method, int number) {
     const std::string name = name_of_method<Method>(number);
@@ -101,4 +103,4 @@ std::vector<RotationMethod> rotation_methods(const std::string& backend) {
   return methods;
 }
 
-}  // namespace cutproof::cli
+}  // namespace cutproof::benchmarks

@@ -7,8 +7,9 @@
 #include <vector>
 
 #include "fixtures/rotation_answers.h"
+#include "harness/backends.h"
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 
 struct TimedAnswers {
   fixtures::Answers answers;
@@ -24,10 +25,10 @@ struct RotationMethod {
   std::function<TimedAnswers(const std::vector<Mat3>& a, const std::vector<Mat3>& previous, int repeats)> solve;
 };
 
-// `reference`: one after the other, on one thread. `host`: as a kernel, on all threads. `gpu`: as a kernel; timed by
-// CUDA events around the launch. The methods of kernels in both precisions, and beside them Müller's from a cold start,
+// On one thread: one after the other. On all threads: as a kernel. On a device: as a kernel, timed by CUDA events
+// around the launch. The methods of kernels in both precisions, and beside them Müller's from a cold start,
 // McAdams', and on the CPU Eigen's JacobiSVD and, in double, the reference's (horn).
-std::vector<RotationMethod> rotation_methods(const std::string& backend);
+std::vector<RotationMethod> rotation_methods(const harness::BackendDescriptor& backend);
 
 #if CUTPROOF_HAS_CUDA
 std::vector<RotationMethod> device_rotation_methods();
@@ -51,4 +52,4 @@ std::vector<Mat3> separated(const std::vector<Real>& values) {
   return matrices;
 }
 
-}  // namespace cutproof::cli
+}  // namespace cutproof::benchmarks

@@ -1,32 +1,20 @@
 #include "benchmarks/rotations.h"
 
-#include <fmt/format.h>
-
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <optional>
 
-#include "benchmarks/machine_limits.h"
-#include "benchmarks/suites.h"
-#include "cli/json_number.h"
-#include "cli/terminal.h"
-#include "harness/backends.h"
+#include "model/io/json_number.h"
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 
 namespace {
 
 using fixtures::Precision;
 using nlohmann::json;
 
-// What counts as near the answer [rad]: an ordinary substep turns a cluster by less.
-constexpr double kNearTurn = 0.02;
 constexpr double kColdStart = -1;
-
-std::string name_of(Precision precision) { return precision == Precision::single ? "single" : "double"; }
 
 Times per_million(const RotationMethod& method, const fixtures::Frame& frame, int repeats) {
   std::vector<double> seconds = method.solve(frame.a, frame.previous, repeats).seconds;
@@ -54,6 +42,8 @@ json to_json(const std::optional<double>& value) { return value ? json_number(*v
 
 }  // namespace
 
+const char* name_of(Precision precision) { return precision == Precision::single ? "single" : "double"; }
+
 bool RotationReport::default_holds() const {
   return std::any_of(results.begin(), results.end(), [](const auto& r) { return r.is_default; }) &&
          std::all_of(results.begin(), results.end(), [](const auto& r) { return !r.is_default || r.wrong == 0; });
@@ -74,7 +64,11 @@ void mark_front(std::vector<RotationResult>& results) {
 }
 
 RotationReport measure_rotations(const std::vector<RotationMethod>& methods, const RotationCounts& counts,
-                                 const std::string& default_name, double copy_bytes_per_second) {
+                                 const std::string& default_name, double copy_bytes_per_second,
+                                 const RotationProgress& progress) {
+  const auto show = [&](int64_t begun, const std::string& what) {
+    if (progress) progress(begun, what);
+  };
   RotationReport report;
   for (const RotationMethod& method : methods) {
     RotationResult& result = report.results.emplace_back();
@@ -82,12 +76,11 @@ RotationReport measure_rotations(const std::vector<RotationMethod>& methods, con
     result.precision = method.precision;
     result.selectable = method.selectable;
     result.is_default = method.selectable && method.name == default_name;
-    result.floor = 1e6 * static_cast<double>(method.bytes) / copy_bytes_per_second;
+    result.limit = 1e6 * static_cast<double>(method.bytes) / copy_bytes_per_second;
   }
-  Progress progress("case", static_cast<int64_t>(fixtures::hard_cases().size()));
   int64_t done = 0;
   for (const fixtures::HardCase& hard : fixtures::hard_cases()) {
-    progress.show(++done, hard.name);
+    show(++done, hard.name);
     for (const Precision precision : {Precision::single, Precision::twice}) {
       const fixtures::Problems problems = pose(hard, std::max(counts.matrices, hard.fewest), precision, counts.seed);
       double& error = precision == Precision::single ? report.reference_error_single : report.reference_error_double;
@@ -106,7 +99,7 @@ RotationReport measure_rotations(const std::vector<RotationMethod>& methods, con
     const fixtures::Frame cold = fixtures::draw_ordinary(counts.timed, precision, kColdStart, counts.seed);
     for (std::size_t k = 0; k < methods.size(); ++k) {
       if (methods[k].precision != precision) continue;
-      progress.show(done, "times of " + methods[k].name);
+      show(done, "times of " + methods[k].name);
       report.results[k].near = per_million(methods[k], near, counts.repeats);
       report.results[k].cold = per_million(methods[k], cold, counts.repeats);
     }
@@ -150,8 +143,8 @@ json to_json(const RotationReport& report) {
                                    {"worst_deviation", json_number(r.worst_deviation)},
                                    {"near_seconds_per_million", to_json(r.near)},
                                    {"cold_seconds_per_million", to_json(r.cold)},
-                                   {"floor_seconds_per_million", r.floor},
-                                   {"multiple_of_floor", r.near.median / r.floor}});
+                                   {"limit_seconds_per_million", r.limit},
+                                   {"multiple_of_limit", r.near.median / r.limit}});
     for (const RotationCaseResult& entry : r.cases) {
       const fixtures::Judged& judged = entry.judged;
       json row = {{"method", r.method},
@@ -174,132 +167,4 @@ json to_json(const RotationReport& report) {
   return document;
 }
 
-namespace {
-
-std::string milliseconds(double seconds) { return fmt::format("{:.4g}", 1e3 * seconds); }
-
-// One line for each method.
-void print_methods(const RotationReport& report) {
-  Table table({"method", "precision", "worst gap", "in case", "‖RᵀR - I‖", "wrong", "NaN", "near ms", "least", "most",
-               "cold ms", "× floor", ""});
-  for (const RotationResult& r : report.results) {
-    std::string marks = r.on_front ? "front" : "";
-    if (r.is_default) marks += marks.empty() ? "default" : ", default";
-    table.add({r.method, name_of(r.precision), fmt::format("{:.1e}", r.worst_gap), r.worst_case,
-               fmt::format("{:.1e}", r.worst_orthogonality), fmt::format("{}", r.wrong),
-               fmt::format("{}", r.not_finite), milliseconds(r.near.median), milliseconds(r.near.min),
-               milliseconds(r.near.max), milliseconds(r.cold.median), fmt::format("{:.1f}", r.near.median / r.floor),
-               marks});
-  }
-  fmt::print("\n{}", table.text());
-}
-
-// One line for each case: the worst gap, and how many are wrong, of each method.
-void print_cases(const RotationReport& report, Precision precision) {
-  std::vector<const RotationResult*> columns;
-  std::vector<std::string> head = {name_of(precision) + ": worst gap (wrong)"};
-  for (const RotationResult& r : report.results) {
-    if (r.precision != precision) continue;
-    columns.push_back(&r);
-    head.push_back(r.method);
-  }
-  Table table(head);
-  const auto& cases = fixtures::hard_cases();
-  for (std::size_t k = 0; k < cases.size(); ++k) {
-    std::vector<std::string> row = {cases[k].name};
-    for (const RotationResult* r : columns) {
-      const fixtures::Judged& judged = r->cases[k].judged;
-      std::string cell = judged.worst_gap ? fmt::format("{:.1e}", *judged.worst_gap) : "-";
-      if (judged.wrong > 0) cell += fmt::format(" ({})", judged.wrong);
-      row.push_back(cell);
-    }
-    table.add(row);
-  }
-  fmt::print("\n{}", table.text());
-}
-
-struct RotationOptions {
-  std::string backend = "reference";
-  RotationCounts counts;
-  std::optional<int64_t> timed;
-  bool cases = false;  // a table of every case, too
-  std::string json;
-};
-
-int bench_rotations(const RotationOptions& options) {
-  require_timed_backend(options.backend);
-  require_writable(options.json);
-  RotationCounts counts = options.counts;
-  counts.timed = options.timed.value_or(options.backend == "gpu" ? 1'000'000 : 20'000);
-
-  json document = begin_report("rotations", options.backend);
-  const MachineLimits machine = measure_machine(options.backend);
-  fmt::print("{} matrices of each case, {} timed {} times, seed {}; copy, read + written: {:.4g} GB/s\n",
-             counts.matrices, counts.timed, counts.repeats, counts.seed, 1e-9 * machine.copy_bytes_per_second);
-  const RotationReport report = measure_rotations(rotation_methods(options.backend), counts,
-                                                  rotation_of(BackendChoice{}), machine.copy_bytes_per_second);
-  if (options.cases) {
-    for (const Precision precision : {Precision::single, Precision::twice}) print_cases(report, precision);
-  }
-  print_methods(report);
-  const fixtures::RotationBounds single = fixtures::rotation_bounds(Precision::single),
-                                 twice = fixtures::rotation_bounds(Precision::twice);
-  fmt::print(
-      "\nTimes are of a million matrices, near the answer ({} rad) and from the identity. An answer is wrong beyond a\n"
-      "gap of {:.1e} or ‖RᵀR - I‖ = {:.1e} (double: {:.1e}, {:.1e}), or where the case expects another. The best "
-      "values\n"
-      "that answers are compared with are certain to {:.1e} (double: {:.1e}).\n",
-      kNearTurn, single.gap, single.orthogonality, twice.gap, twice.orthogonality, report.reference_error_single,
-      report.reference_error_double);
-  for (const RotationResult& r : report.results) {
-    if (!r.is_default) continue;
-    fmt::print("The default, {} in {} precision, is wrong in {} of {} answers.\n", r.method, name_of(r.precision),
-               r.wrong, r.answers);
-    for (const RotationCaseResult& entry : r.cases) {
-      if (entry.judged.wrong > 0) fmt::print("  FAILS: {}: {}\n", entry.name, entry.judged.first_wrong);
-    }
-  }
-  document["matrices"] = counts.matrices;
-  document["timed"] = counts.timed;
-  document["repeats"] = counts.repeats;
-  document["seed"] = counts.seed;
-  document["machine_limits"] = {{"copy_bytes_per_second", machine.copy_bytes_per_second}};
-  document.update(to_json(report));
-  document["complete"] = true;
-  write_report(options.json, document);
-  if (!options.json.empty()) fmt::print("\nwrote {}\n", options.json);
-  return report.default_holds() ? 0 : 1;
-}
-
-}  // namespace
-
-Suite rotations_suite() {
-  return {"rotations", "methods for the rotation of a cluster, on every hard case", [](CLI::App& command) {
-            const auto options = std::make_shared<RotationOptions>();
-            command.add_option("--backend", options->backend, "where: reference, host or gpu")
-                ->capture_default_str()
-                ->type_name("B");
-            command.add_option("--matrices", options->counts.matrices, "of each case")
-                ->capture_default_str()
-                ->type_name("N")
-                ->check(CLI::Range(1, 10'000'000));
-            command
-                .add_option("--timed", options->timed,
-                            "matrices that are timed together (default: 20000; gpu: 1000000)")
-                ->type_name("N")
-                ->check(CLI::Range(1, 100'000'000));
-            command.add_option("--repeats", options->counts.repeats, "of each timing, after one that does not count")
-                ->capture_default_str()
-                ->type_name("N")
-                ->check(CLI::Range(1, 10'000));
-            command.add_option("--seed", options->counts.seed, "added to the seeds of the cases")
-                ->capture_default_str()
-                ->type_name("N")
-                ->check(CLI::NonNegativeNumber);
-            command.add_flag("--cases", options->cases, "print the worst gap in every case as well");
-            command.add_option("--json", options->json, "write errors, times and floors")->type_name("F");
-            return [options] { return bench_rotations(*options); };
-          }};
-}
-
-}  // namespace cutproof::cli
+}  // namespace cutproof::benchmarks

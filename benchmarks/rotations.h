@@ -1,14 +1,15 @@
-// Pieces of `cutproof bench rotations`: methods for the rotation of a cluster, each with its errors on every hard case
-// and its times (docs/rotations.md).
+// Methods for the rotation of a cluster, each with its errors on every hard case and its times (docs/rotations.md).
 #pragma once
 #include <cstdint>
+#include <functional>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
-#include "benchmarks/report.h"
 #include "benchmarks/rotation_methods.h"
+#include "benchmarks/times.h"
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 
 struct RotationCaseResult {
   std::string name;  // of the case
@@ -22,7 +23,7 @@ struct RotationResult {
   bool selectable = false, is_default = false;
   std::vector<RotationCaseResult> cases;
   Times near, cold;        // [s] per million matrices
-  double floor = 0;        // [s] per million matrices: bytes / copy bandwidth
+  double limit = 0;        // [s] per million matrices: bytes / copy bandwidth
   bool on_front = false;   // no other of its precision is at least as exact and as fast, and better in one of both
   double worst_gap = 0;    // over all cases
   std::string worst_case;  // where that is
@@ -45,13 +46,23 @@ struct RotationReport {
   bool default_holds() const;
 };
 
-// `copy_bytes_per_second` for the floors. The default is the selectable method named `default_name`.
+// Called before each case, and before each method is timed: how many cases have begun, and what is done now.
+using RotationProgress = std::function<void(int64_t cases_begun, const std::string& what)>;
+
+// `copy_bytes_per_second` for the limits. The default is the selectable method named `default_name`.
 RotationReport measure_rotations(const std::vector<RotationMethod>& methods, const RotationCounts& counts,
-                                 const std::string& default_name, double copy_bytes_per_second);
+                                 const std::string& default_name, double copy_bytes_per_second,
+                                 const RotationProgress& progress = {});
 
 // Marks on_front: the worst gap against the median time near the answer.
 void mark_front(std::vector<RotationResult>& results);
 
+// What counts as near the answer [rad]: an ordinary substep turns a cluster by less.
+inline constexpr double kNearTurn = 0.02;
+
+// The fields `bounds`, `cases`, `methods`, `rows` and `holds` of the document.
 nlohmann::json to_json(const RotationReport& report);
 
-}  // namespace cutproof::cli
+const char* name_of(fixtures::Precision precision);
+
+}  // namespace cutproof::benchmarks

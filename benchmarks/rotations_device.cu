@@ -7,7 +7,7 @@
 #include "gpu/device/device_launcher.cuh"
 #include "harness/backends.h"
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 
 namespace {
 
@@ -64,4 +64,4 @@ std::vector<RotationMethod> device_rotation_methods() {
   return methods;
 }
 
-}  // namespace cutproof::cli
+}  // namespace cutproof::benchmarks

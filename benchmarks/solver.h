@@ -1,15 +1,13 @@
-// Pieces of `cutproof bench solver`: frames that begin far from their answer, and how near to it so many iterations
-// come.
+// Frames that begin far from where they end if they are solved exactly, and how near to that so many iterations come.
 #pragma once
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "benchmarks/report.h"
 #include "model/backend.h"
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 
 // A frame of one substep without a blade. Velocities are such that its free motion ends with the two ends of the
 // longest axis turned against each other and the body drawn out.
@@ -29,23 +27,23 @@ SolverScene make_body_scene(int64_t particles);
 Setup with_substeps(const SolverScene& scene, int32_t substeps);
 
 // Where the frame ends if every substep is solved exactly (oracles::reference_solution).
-struct FrameAnswer {
+struct FrameSolution {
   std::vector<Vec3> x;           // [n]
   std::optional<double> energy;  // [J] of the substep, if there is only one
-  bool converged = true;         // every substep's answer is
+  bool converged = true;         // every substep's solution is
 };
-FrameAnswer converged_frame(const Setup& setup, const State& state);
+FrameSolution converged_frame(const Setup& setup, const State& state);
 
 struct SolverError {
-  double max_h = 0, rms_h = 0;       // distance from the answer [h]; infinite where a position is no number
-  std::optional<double> energy_gap;  // (E − E of the answer) / E of the answer
+  double max_h = 0, rms_h = 0;       // distance from the solution [h]; infinite where a position is no number
+  std::optional<double> energy_gap;  // (E − E of the solution) / E of the solution
 };
 // The first step from `state`, which the backend loads.
-SolverError solver_error(Backend& backend, const Setup& setup, const State& state, const FrameAnswer& answer);
+SolverError solver_error(Backend& backend, const Setup& setup, const State& state, const FrameSolution& solution);
 
 // The least number of iterations with which the greatest distance is below `tolerance` [h], where `above` are too few
 // and `below` are enough; nullopt if none of those between is.
-std::optional<int32_t> least_iterations(Backend& backend, Setup setup, const State& state, const FrameAnswer& answer,
-                                        double tolerance, int32_t above, int32_t below);
+std::optional<int32_t> least_iterations(Backend& backend, Setup setup, const State& state,
+                                        const FrameSolution& solution, double tolerance, int32_t above, int32_t below);
 
-}  // namespace cutproof::cli
+}  // namespace cutproof::benchmarks

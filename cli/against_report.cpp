@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "cli/json_number.h"
+#include "model/io/json_number.h"
 
 namespace cutproof::cli {
 

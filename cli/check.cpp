@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "cli/commands.h"
+#include "cli/options.h"
 #include "cli/results.h"
 #include "cli/terminal.h"
 #include "harness/recorded_run.h"
@@ -13,6 +14,13 @@
 #include "model/io/scene_io.h"
 
 namespace cutproof::cli {
+
+namespace {
+
+struct CheckOptions {
+  std::string recording;
+  std::string json;
+};
 
 int check(const CheckOptions& options) {
   const io::RecordingReader reader(options.recording);
@@ -56,6 +64,16 @@ int check(const CheckOptions& options) {
     fmt::print("wrote {}\n", options.json);
   }
   return judge.holds() ? 0 : 1;
+}
+
+}  // namespace
+
+void add_check(CLI::App& program, Work& work) {
+  const auto options = std::make_shared<CheckOptions>();
+  CLI::App* const command = program.add_subcommand("check", "judge a recording");
+  command->add_option("recording", options->recording, "what --record was given")->required()->type_name("RECORDING");
+  add_json(*command, options->json, "write verdicts and counts");
+  command->callback([options, &work] { work = [options] { return check(*options); }; });
 }
 
 }  // namespace cutproof::cli

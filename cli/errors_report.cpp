@@ -7,10 +7,13 @@
 #include <sstream>
 
 #include "cli/against_report.h"
-#include "cli/json_number.h"
+#include "harness/geometry_json.h"
 #include "model/error.h"
+#include "model/io/json_number.h"
 
 namespace cutproof::cli {
+
+using harness::to_json;
 
 using harness::Errors;
 using harness::ErrorsWanted;
@@ -62,21 +65,6 @@ ErrorsWanted errors_wanted(const std::string& list) {
     }
   }
   return wanted;
-}
-
-json to_json(const oracles::CutGeometry& geometry) {
-  return {{"cut_area", json_number(geometry.cut_area)},
-          {"lost_volume", json_number(geometry.lost_volume)},
-          {"lost_per_area", number_or_null(geometry.lost_per_area)},
-          {"least_per_area", number_or_null(geometry.least_per_area)},
-          {"hausdorff", number_or_null(geometry.hausdorff())},
-          {"skin_to_ideal", number_or_null(geometry.skin_to_ideal)},
-          {"ideal_to_skin", number_or_null(geometry.ideal_to_skin)},
-          {"sampling", {{"skin_to_ideal", geometry.sampling_skin}, {"ideal_to_skin", geometry.sampling_ideal}}}};
-}
-
-json to_json(const oracles::Interpenetration& found) {
-  return {{"volume", json_number(found.volume)}, {"bound", json_number(found.bound)}};
 }
 
 json to_json(const Errors& errors, const harness::Lockstep* lockstep) {

@@ -16,8 +16,4 @@ harness::ErrorsWanted errors_wanted(const std::string& list);
 nlohmann::json to_json(const harness::Errors& errors, const harness::Lockstep* lockstep);
 void print_errors(const harness::Errors& errors, const harness::Lockstep* lockstep);
 
-// null where something is absent.
-nlohmann::json to_json(const oracles::CutGeometry& geometry);
-nlohmann::json to_json(const oracles::Interpenetration& found);
-
 }  // namespace cutproof::cli

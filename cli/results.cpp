@@ -1,7 +1,7 @@
 #include "cli/results.h"
 
 #include "cli/commands.h"
-#include "cli/json_number.h"
+#include "model/io/verdict_json.h"
 #include "model/stage.h"
 
 namespace cutproof::cli {
@@ -29,29 +29,6 @@ nlohmann::json to_json(const harness::FrameResult& frame, bool timed) {
 
 }  // namespace
 
-nlohmann::json to_json(const Verdict& verdict, bool expected_failure) {
-  nlohmann::json result = {{"property", verdict.property},
-                           {"stage", name_of(verdict.stage)},
-                           {"backend", verdict.backend},
-                           {"frame", verdict.frame},
-                           {"body", verdict.body},
-                           {"holds", verdict.holds},
-                           {"measured", json_number(verdict.measured)},
-                           {"bound", json_number(verdict.bound)},
-                           {"unit", verdict.unit},
-                           {"bound_source", verdict.bound_source},
-                           {"checked", verdict.checked}};
-  if (!verdict.vacuous.empty()) result["vacuous"] = verdict.vacuous;
-  if (expected_failure && !verdict.holds) result["expected_failure"] = true;
-  if (!verdict.holds) {
-    result["witness"] = {{"text", verdict.witness.text},
-                         {"clusters", verdict.witness.clusters},
-                         {"particles", verdict.witness.particles},
-                         {"path", verdict.witness.path}};
-  }
-  return result;
-}
-
 nlohmann::json to_json(const RunResult& result, const harness::SceneJudge* judge) {
   nlohmann::json document = {{"format", "cutproof." + result.command},
                              {"format_version", 2},
@@ -73,7 +50,7 @@ nlohmann::json to_json(const RunResult& result, const harness::SceneJudge* judge
     int64_t failed = 0, expected = 0;
     for (const Verdict& verdict : judge->verdicts()) {
       const bool foreseen = judge->is_expected_failure(verdict);
-      document["verdicts"].push_back(to_json(verdict, foreseen));
+      document["verdicts"].push_back(io::verdict_json(verdict, foreseen));
       if (!verdict.holds) ++(foreseen ? expected : failed);
     }
     document["summary"] = {{"holds", judge->holds()},

@@ -25,7 +25,6 @@ struct RunResult {
   std::vector<harness::FrameResult> frames;
 };
 
-nlohmann::json to_json(const Verdict& verdict, bool expected_failure);
 // `judge` is null if nothing was checked.
 nlohmann::json to_json(const RunResult& result, const harness::SceneJudge* judge);
 

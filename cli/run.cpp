@@ -1,12 +1,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <map>
+#include <memory>
 #include <optional>
 
 #include "cli/against_report.h"
 #include "cli/commands.h"
 #include "cli/errors_report.h"
+#include "cli/options.h"
 #include "cli/results.h"
 #include "cli/terminal.h"
 #include "fixtures/bodies.h"
@@ -19,10 +22,39 @@
 #include "model/io/atomic_file.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
+#include "model/io/verdict_json.h"
 
 namespace cutproof::cli {
 
+using harness::make_backend;
+
 namespace {
+
+struct RunOptions {
+  std::string scene;
+  harness::BackendChoice backend;
+  std::string mesh;                  // takes the place of the scene's body
+  std::string unit = "mm";           // of the mesh's numbers
+  std::optional<int64_t> particles;  // wanted count
+  std::optional<int64_t> frames;     // at most this many of the scene's frames
+  bool check = false;
+  std::string against;        // "" or the reference
+  std::string mode = "both";  // of the comparison: lockstep, free-running, both
+  std::string errors;         // names of errors with commas between them, or "all"; empty: none
+  std::string record;
+  std::string json;
+};
+
+constexpr const char* kNextSteps =
+    "cutproof run needs a scene. Try\n"
+    "  cutproof run fixtures/scenes/kidney_discontinuous.json --check\n"
+    "      cuts a kidney in two steps and certifies every frame\n"
+    "  cutproof run fixtures/scenes/kidney_discontinuous.json --check --mesh KIDNEY.stl --unit mm\n"
+    "      does the same on your own closed surface mesh (STL, OBJ, PLY, OFF)\n"
+    "  cutproof run fixtures/scenes/three_cuts.json --check --record cuts --json cuts.json\n"
+    "      keeps a recording for ParaView and `cutproof check`, and the verdicts for a machine\n"
+    "  cutproof info --scene\n"
+    "      lists every field of a scene file\n";
 
 double metres_per(const std::string& unit) {
   static const std::map<std::string, double> kUnits = {{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}};
@@ -37,9 +69,10 @@ using harness::Against;
 using harness::AgainstMode;
 
 AgainstMode against_mode(const RunOptions& options) {
-  if (options.against != "reference") {
+  const harness::BackendDescriptor* const other = harness::find_backend(options.against);
+  if (other == nullptr || !other->is_the_reference) {
     throw InputError("command line", "--against", fmt::format("'{}' is nothing to compare with", options.against),
-                     "use --against reference");
+                     fmt::format("use --against {}", harness::reference_backend().name));
   }
   return options.mode == "lockstep"       ? AgainstMode::lockstep
          : options.mode == "free-running" ? AgainstMode::free_running
@@ -98,8 +131,6 @@ void compare(Against& against, const Setup& setup, const harness::Moment& moment
   }
   against.see(moment.span.last, *moment.after, ran[static_cast<std::size_t>(moment.span.last)]);
 }
-
-}  // namespace
 
 int run(const RunOptions& options) {
   std::optional<AgainstMode> mode;
@@ -187,7 +218,7 @@ int run(const RunOptions& options) {
       // A list that push_back makes of null is broken where there is no memory for it (nlohmann::json 3.11).
       document["against"]["verdicts"] = nlohmann::json::array();
       for (const Verdict& verdict : against->verdicts()) {
-        document["against"]["verdicts"].push_back(to_json(verdict, false));
+        document["against"]["verdicts"].push_back(io::verdict_json(verdict, false));
       }
     }
     if (errors) document["errors"] = to_json(*errors, implementation);
@@ -202,6 +233,52 @@ int run(const RunOptions& options) {
     }
   }
   return broken.empty() && (!judge || judge->holds()) && (!against || against->holds()) && (!errors || errors->holds()) ? 0 : 1;
+}
+
+}  // namespace
+
+void add_run(CLI::App& program, Work& work) {
+  const auto options = std::make_shared<RunOptions>();
+  CLI::App* const command = program.add_subcommand("run", "simulate a scene, and judge it with --check");
+  command->add_option("scene", options->scene, "scene file (JSON); see `cutproof info --scene`")->type_name("SCENE");
+  add_backend(*command, options->backend, "backend under test");
+  command->add_option("--mesh", options->mesh, "closed surface mesh that takes the place of the scene's body")
+      ->type_name("FILE");
+  command->add_option("--unit", options->unit, "what one unit of the mesh is: mm, cm or m")
+      ->capture_default_str()
+      ->type_name("U")
+      ->needs("--mesh");
+  command->add_option("--particles", options->particles, "how many particles the body is to have")
+      ->type_name("N")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--frames", options->frames, "stop after this many frames of the scene")
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag("--check", options->check, "judge every frame with every oracle, and the scene's expectations");
+  command
+      ->add_option("--against", options->against,
+                   fmt::format("compare every stage with this backend: {}", harness::reference_backend().name))
+      ->type_name("B");
+  command->add_option("--mode", options->mode, "of the comparison: lockstep, free-running or both")
+      ->capture_default_str()
+      ->type_name("M")
+      ->check(CLI::IsMember({"lockstep", "free-running", "both"}))
+      ->needs("--against");
+  command
+      ->add_option("--errors", options->errors,
+                   "measure errors: all, or some of implementation (as --against reference), solver, time_step, "
+                   "geometry, topology, conservation")
+      ->type_name("E,…");
+  command->add_option("--record", options->record, "keep every frame, for `cutproof check` and ParaView")
+      ->type_name("F");
+  add_json(*command, options->json, "write verdicts, stage times and counts");
+  command->callback([options, &work] {
+    work = [options] {
+      if (!options->scene.empty()) return run(*options);
+      std::fputs(kNextSteps, stderr);
+      return 2;
+    };
+  });
 }
 
 }  // namespace cutproof::cli

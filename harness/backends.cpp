@@ -4,13 +4,15 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
+#include <fstream>
 #include <thread>
 
 #include "gpu/backends.h"
 #include "model/error.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::cli {
+namespace cutproof::harness {
 
 namespace {
 
@@ -59,48 +61,165 @@ std::unique_ptr<Backend> make_simulated(gpu::Generator schedule, const BackendCh
   return gpu::make_simulated_backend(std::move(simulation), kernel_options(choice));
 }
 
+#if CUTPROOF_HAS_CUDA
+std::unique_ptr<Backend> make_gpu(const BackendChoice& choice) { return gpu::make_gpu_backend(kernel_options(choice)); }
+std::unique_ptr<Backend> make_eager_gpu(const BackendChoice& choice) {
+  gpu::KernelOptions options = kernel_options(choice);
+  options.eager = true;
+  return gpu::make_gpu_backend(options);
+}
+#else
+constexpr std::unique_ptr<Backend> (*make_gpu)(const BackendChoice&) = nullptr;
+constexpr std::unique_ptr<Backend> (*make_eager_gpu)(const BackendChoice&) = nullptr;
+#endif
+
+constexpr bool any_span(Span) { return true; }
+
+// No strings that allocate: this table is there before main() and where there is no memory.
+constexpr std::array kBackends = {
+    BackendDescriptor{
+        .name = kReferenceName,
+        .summary = "CPU, double precision, serial: the oracle that everything else is compared with",
+        .is_the_reference = true,
+        .only_split = "search",
+        .only_rotation = "horn",
+        .can_run = any_span,
+        // It takes body by body, and what a few bodies need stays in the caches.
+        .bodies_in_a_load = 16,
+        .make = [](const BackendChoice&) { return reference::make_backend(); },
+    },
+    BackendDescriptor{
+        .name = kHostName,
+        .summary = "the CUDA kernels' source, single precision, on the threads of this CPU",
+        .precision = Precision::binary32,
+        .processor = Processor::all_threads,
+        .takes_kernel_options = true,
+        .can_run = any_span,
+        .make =
+            [](const BackendChoice& choice) {
+              return gpu::make_host_backend(choice.threads > 0 ? choice.threads : cpu_threads(),
+                                            kernel_options(choice));
+            },
+    },
+    BackendDescriptor{
+        .name = "simulated",
+        .summary = "the same on one thread, under a schedule that is chosen and can be replayed",
+        .precision = Precision::binary32,
+        .is_timed = false,
+        .takes_kernel_options = true,
+        .takes_schedule = true,
+        .can_run = any_span,
+        .make = [](const BackendChoice& choice) { return make_simulated(generator(choice), choice); },
+    },
+    BackendDescriptor{
+        .name = "gpu",
+        .summary = "the CUDA kernels, single precision",
+        .precision = Precision::binary32,
+        .processor = Processor::device,
+        .pipelines = true,
+        .takes_kernel_options = true,
+        .can_run = any_span,
+        .takes_full_size = true,
+        .timed_frames = 20,
+        // It is busy with so many loads at once; more only take memory.
+        .most_parallel_loads = 6,
+        .make = make_gpu,
+    },
+    BackendDescriptor{
+        .name = "gpu-eager",
+        .summary = "the same, launch by launch instead of as a graph",
+        .precision = Precision::binary32,
+        .processor = Processor::device,
+        .is_timed = false,
+        .takes_kernel_options = true,
+        .can_run = any_span,
+        .most_parallel_loads = 6,
+        .make = make_eager_gpu,
+    },
+};
+
+std::string cpu_name() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);) {
+    const std::size_t colon = line.find(": ");
+    if (line.rfind("model name", 0) == 0 && colon != std::string::npos) return line.substr(colon + 2);
+  }
+  return "CPU";
+}
+
+// Empty if there is no device, and then `why` says why.
+std::string device_name([[maybe_unused]] std::string& why) {
+#if CUTPROOF_HAS_CUDA
+  return gpu::device_description(why);
+#else
+  return {};
+#endif
+}
+
+constexpr const char* kToolkitWanted = "no CUDA toolkit of version 12.4 or newer was there";
+
 }  // namespace
 
-const std::vector<std::string>& rotation_names() {
-  static const std::vector<std::string> names = {"jacobi4", "mueller", "apd", "svd", "quest", "newton"};
-  return names;
+std::span<const BackendDescriptor> backends() { return kBackends; }
+
+const BackendDescriptor* find_backend(std::string_view name) {
+  const auto found = std::find_if(kBackends.begin(), kBackends.end(), [&](const auto& b) { return b.name == name; });
+  return found == kBackends.end() ? nullptr : &*found;
 }
 
-const std::vector<std::string>& schedule_names() {
-  static const std::vector<std::string> names = {"forward", "reverse", "round_robin", "random", "pct"};
-  return names;
+const BackendDescriptor& described_backend(std::string_view name) {
+  const BackendDescriptor* const found = find_backend(name);
+  if (found == nullptr) {
+    refuse("--backend", fmt::format("there is no backend '{}'", name),
+           fmt::format("use one of those that `cutproof info` lists: {}", backend_names()));
+  }
+  return *found;
 }
 
-int cpu_threads() { return static_cast<int>(std::max(1u, std::thread::hardware_concurrency())); }
+const BackendDescriptor& reference_backend() { return *find_backend(kReferenceName); }
 
-std::string rotation_of(const BackendChoice& choice) {
-  return rotation_names()[static_cast<std::size_t>(kernel_options(choice).rotation_method)];
+std::string backend_names(const std::function<bool(const BackendDescriptor&)>& wanted) {
+  std::vector<std::string_view> names;
+  for (const BackendDescriptor& backend : kBackends) {
+    if (!wanted || wanted(backend)) names.push_back(backend.name);
+  }
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+std::string description_of(const BackendDescriptor& backend) {
+  if (!backend.is_built()) return fmt::format("not built: {}", kToolkitWanted);
+  if (!backend.needs_device()) return std::string(backend.summary);
+  std::string why;
+  const std::string device = device_name(why);
+  return fmt::format("{}; device: {}", backend.summary, device.empty() ? "none (" + why + ")" : device);
+}
+
+std::string processor_of(const BackendDescriptor& backend) {
+  switch (backend.processor) {
+    case Processor::one_thread:
+      return cpu_name() + ", 1 thread";
+    case Processor::all_threads:
+      return fmt::format("{}, {} threads", cpu_name(), cpu_threads());
+    case Processor::device: {
+      std::string why;
+      return device_name(why);
+    }
+  }
+  return {};
 }
 
 std::unique_ptr<Backend> make_backend(const BackendChoice& choice) {
-  if (choice.name == "reference") {
-    if (!choice.split.empty() || !choice.rotation.empty()) {
-      refuse(choice.split.empty() ? "--rotation" : "--split", "the reference has one way only",
-             "leave it out, or choose --backend host or gpu");
-    }
-    return reference::make_backend();
-  }
-  if (choice.name == "host") {
-    return gpu::make_host_backend(choice.threads > 0 ? choice.threads : cpu_threads(), kernel_options(choice));
-  }
-  if (choice.name == "simulated") return make_simulated(generator(choice), choice);
-  if (choice.name == "gpu" || choice.name == "gpu-eager") {
-#if CUTPROOF_HAS_CUDA
-    gpu::KernelOptions options = kernel_options(choice);
-    options.eager = choice.name == "gpu-eager";
-    return gpu::make_gpu_backend(options);
-#else
+  const BackendDescriptor& backend = described_backend(choice.name);
+  if (!backend.is_built()) {
     refuse("--backend", "this cutproof was built without CUDA",
            "build it where a CUDA toolkit of version 12.4 or newer is installed");
-#endif
   }
-  refuse("--backend", fmt::format("there is no backend '{}'", choice.name),
-         "use one of those that `cutproof info` lists: reference, host, simulated, gpu, gpu-eager");
+  if (!backend.takes_kernel_options && !(choice.split.empty() && choice.rotation.empty())) {
+    refuse(choice.split.empty() ? "--rotation" : "--split", fmt::format("the {} has one way only", backend.name),
+           fmt::format("leave it out, or choose --backend {}",
+                       backend_names([](const auto& other) { return other.takes_kernel_options; })));
+  }
+  return backend.make(choice);
 }
 
 std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice, std::shared_ptr<gpu::ThreadSchedule> record) {
@@ -117,4 +236,43 @@ std::unique_ptr<Backend> make_replaying_backend(const BackendChoice& choice, gpu
   return make_simulated(gpu::replay(std::move(schedule)), choice);
 }
 
-}  // namespace cutproof::cli
+BackendChoice choice_for_load(BackendChoice choice, int64_t load) {
+  const BackendDescriptor& backend = described_backend(choice.name);
+  if (backend.processor == Processor::all_threads) choice.threads = 1;
+  if (backend.takes_schedule) {
+    static const std::array<const char*, 4> kinds = {"random", "pct", "reverse", "round_robin"};
+    choice.schedule = kinds[static_cast<std::size_t>(load) % kinds.size()];
+    choice.seed += static_cast<uint64_t>(load);
+  }
+  return choice;
+}
+
+const std::vector<std::string>& rotation_names() {
+  static const std::vector<std::string> names = {"jacobi4", "mueller", "apd", "svd", "quest", "newton"};
+  return names;
+}
+
+const std::vector<std::string>& schedule_names() {
+  static const std::vector<std::string> names = {"forward", "reverse", "round_robin", "random", "pct"};
+  return names;
+}
+
+const std::string& default_rotation() {
+  return rotation_names()[static_cast<std::size_t>(gpu::KernelOptions{}.rotation_method)];
+}
+
+std::string rotation_of(const BackendChoice& choice) {
+  const BackendDescriptor& backend = described_backend(choice.name);
+  if (!backend.takes_kernel_options) return std::string(backend.only_rotation);
+  return rotation_names()[static_cast<std::size_t>(kernel_options(choice).rotation_method)];
+}
+
+std::string split_of(const BackendChoice& choice) {
+  const BackendDescriptor& backend = described_backend(choice.name);
+  if (!backend.takes_kernel_options) return std::string(backend.only_split);
+  return kernel_options(choice).split == gpu::SplitMethod::global_labels ? "global" : "blocks";
+}
+
+int cpu_threads() { return static_cast<int>(std::max(1u, std::thread::hardware_concurrency())); }
+
+}  // namespace cutproof::harness

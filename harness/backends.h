@@ -1,36 +1,99 @@
-// Backends by name, for every command.
+// Every backend described once: what it is called, what it can do, how it is made. Verbs, benchmarks, property tests
+// and help texts follow from these descriptions and compare no names.
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "gpu/host/thread_schedule.h"
 #include "model/backend.h"
 
-namespace cutproof::cli {
+namespace cutproof::harness {
+
+// What a verb takes if no backend is named: the reference, or the kernels on this machine's CPU.
+inline constexpr const char* kReferenceName = "reference";
+inline constexpr const char* kHostName = "host";
 
 struct BackendChoice {
-  std::string name = "reference";   // `cutproof info` lists them
+  std::string name = kReferenceName;
   std::string split;                // kernels: blocks or global; empty: blocks
   std::string rotation;             // kernels: how rotations are found; empty: KernelOptions' default
-  std::string schedule = "random";  // simulated: one of schedule_names()
+  std::string schedule = "random";  // of backends that take one: one of schedule_names()
   uint64_t seed = 1;                // of the schedule
-  int threads = 0;                  // host; 0: as many as the machine has
+  int threads = 0;                  // of backends that use all threads; 0: as many as the machine has
 };
 
+enum class Processor { one_thread, all_threads, device };
+
+struct BackendDescriptor {
+  std::string_view name;
+  std::string_view summary;  // one line for people
+  Precision precision = Precision::binary64;
+  // All others are compared with it; it is not compared with itself.
+  bool is_the_reference = false;
+  Processor processor = Processor::one_thread;
+  bool is_timed = true;               // else it only finds faults: what it takes says nothing
+  bool pipelines = false;             // run() does not wait: frames can be handed over back to back
+  bool takes_kernel_options = false;  // it runs the kernels: --split, --rotation
+  bool takes_schedule = false;        // --schedule, --schedule-seed: its interleaving is chosen and can be replayed
+  // How it splits clusters and finds rotations where nothing can be chosen.
+  std::string_view only_split = {}, only_rotation = {};
+  bool (*can_run)(Span span) = nullptr;  // as Backend::can_run
+
+  // Benchmarks: whether bodies are as large as the paper's unless somebody asks for others, and how many frames are
+  // timed.
+  bool takes_full_size = false;
+  int64_t timed_frames = 10;
+  // Campaigns: how many bodies one load has; how many loads at once keep it busy (0: as many as there are threads).
+  int bodies_in_a_load = 64;
+  int most_parallel_loads = 0;
+
+  // Null where this build does not have it.
+  std::unique_ptr<Backend> (*make)(const BackendChoice& choice) = nullptr;
+
+  bool needs_device() const { return processor == Processor::device; }
+  bool is_built() const { return make != nullptr; }
+};
+
+// In the order in which people read about them; also those that this build does not have.
+std::span<const BackendDescriptor> backends();
+// Null if there is none of that name.
+const BackendDescriptor* find_backend(std::string_view name);
+// Throws InputError, naming --backend, if there is none of that name.
+const BackendDescriptor& described_backend(std::string_view name);
+const BackendDescriptor& reference_backend();
+
+// "reference, host, …": those of which `wanted` holds.
+std::string backend_names(const std::function<bool(const BackendDescriptor&)>& wanted = {});
+// Summary, device, or why it is not there: for `cutproof info`. Does not throw.
+std::string description_of(const BackendDescriptor& backend);
+// The processor and how many of its threads work, or the CUDA device; empty if that is not there.
+std::string processor_of(const BackendDescriptor& backend);
+
 // Throws InputError, naming the option, for what does not exist, is not in this build, or says something about kernels
-// to the reference; MachineError if there is no device.
+// to a backend that does not run them; MachineError if there is no device.
 std::unique_ptr<Backend> make_backend(const BackendChoice& choice);
-// The same, whose schedule is written down as it is made (docs/oracles_and_tests.md §3); `simulated` only.
+// The same, whose schedule is written down as it is made (docs/oracles_and_tests.md §3). Requires a backend that takes
+// a schedule.
 std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice, std::shared_ptr<gpu::ThreadSchedule> record);
 std::unique_ptr<Backend> make_replaying_backend(const BackendChoice& choice, gpu::ThreadSchedule schedule);
 
+// For one of many loads that run beside each other: each has a schedule of its own, whose kinds take turns; and one
+// thread, because there are as many loads as threads.
+BackendChoice choice_for_load(BackendChoice choice, int64_t load);
+
 // By the number in gpu/state/device_view.h.
 const std::vector<std::string>& rotation_names();
-// The name of the rotation method that kernels will use.
-std::string rotation_of(const BackendChoice& choice);
 const std::vector<std::string>& schedule_names();
+// The kernels', where none is chosen.
+const std::string& default_rotation();
+// The methods that the chosen backend will use. Throw InputError as make_backend() does.
+std::string rotation_of(const BackendChoice& choice);
+std::string split_of(const BackendChoice& choice);
 int cpu_threads();
 
-}  // namespace cutproof::cli
+}  // namespace cutproof::harness

@@ -1,46 +1,9 @@
 #include "tuning/search.h"
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include <algorithm>
+#include <utility>
 
-namespace cutproof::cli {
-
-std::string differences(const Configuration& configuration, const Configuration& given) {
-  const Scene &scene = configuration.scene, &before = given.scene;
-  std::vector<std::string> found;
-  const auto note = [&](bool differs, const std::string& text) {
-    if (differs) found.push_back(text);
-  };
-  const ClusterSpec &clusters = scene.clusters, &old = before.clusters;
-  note(clusters.side != old.side, fmt::format("clusters.side {}", clusters.side));
-  note(clusters.spacing != old.spacing, fmt::format("clusters.spacing {:g}", clusters.spacing));
-  note(clusters.radius != old.radius, fmt::format("clusters.radius {:g}", clusters.radius));
-  note(scene.detect.criterion != before.detect.criterion, "no detection");
-  note(scene.split.debris != before.split.debris, fmt::format("debris {}", scene.split.debris));
-  note(scene.skin.wanted != before.skin.wanted, "no skin");
-  note(configuration.rotation != given.rotation, "rotation " + configuration.rotation);
-  return fmt::format("{}", fmt::join(found, ", "));
-}
-
-const char* name_of(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::within:
-      return "within";
-    case Outcome::over:
-      return "over";
-    case Outcome::topology:
-      return "topology";
-    case Outcome::schedule:
-      return "schedule";
-    case Outcome::refused:
-      return "refused";
-    case Outcome::dearer:
-      return "dearer";
-  }
-  return "";
-}
+namespace cutproof::tuning {
 
 std::vector<int32_t> substeps_to_try(int32_t given, int32_t most) {
   std::vector<int32_t> substeps = {given};
@@ -59,7 +22,7 @@ class Searcher {
  public:
   Searcher(const SearchSpace& space, const Measure& measure) : space_(space), measure_(measure) {}
 
-  // The index of its trial. Where it was tried before, and given up as too dear under a limit that can only have
+  // The index of its trial. Where it was tried before, and given up as too expensive under a limit that can only have
   // fallen since, or carried through, that trial stands.
   std::size_t attempt(const Configuration& configuration) {
     for (std::size_t t = 0; t < trials_.size(); ++t) {
@@ -90,8 +53,8 @@ class Searcher {
       }
       below = iterations;
       const Trial& trial = trials_[now];
-      const bool whatever_the_iterations =
-          trial.outcome == Outcome::dearer || trial.outcome == Outcome::schedule || trial.outcome == Outcome::refused;
+      const bool whatever_the_iterations = trial.outcome == Outcome::more_expensive ||
+                                           trial.outcome == Outcome::schedule || trial.outcome == Outcome::refused;
       if (whatever_the_iterations || iterations >= most) return std::nullopt;
       if (before && !helps(trials_[*before], trial)) return std::nullopt;
       before = now;
@@ -211,4 +174,4 @@ std::vector<std::size_t> by_cost(const std::vector<Trial>& trials) {
   return order;
 }
 
-}  // namespace cutproof::cli
+}  // namespace cutproof::tuning

@@ -1,5 +1,5 @@
 // Which configurations of a scene `cutproof tune` tries, and in which order. Knows nothing of backends: what a
-// configuration costs and how far it is from the answer is asked of `Measure`.
+// configuration costs and how far it is from the reference solution is asked of `Measure`.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -7,45 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "benchmarks/report.h"
-#include "model/scene.h"
+#include "tuning/trial.h"
 
-namespace cutproof::cli {
+namespace cutproof::tuning {
 
-struct Configuration {
-  Scene scene;
-  std::string rotation;  // kernels: how rotations are found; empty: the backend's default
-  friend bool operator==(const Configuration&, const Configuration&) = default;
-};
-// What differs from `given` apart from substeps, iterations and acceleration, as a person would write it; empty:
-// nothing.
-std::string differences(const Configuration& configuration, const Configuration& given);
-
-enum class Outcome {
-  within,    // the error is within the tolerance, and the tissue falls into the same parts
-  over,      // the error is beyond it
-  topology,  // at the end of a stroke or of the scene the tissue is in a different number of parts
-  schedule,  // the scene has another number of frames: a blade takes whole substeps for each piece of its path
-  refused,   // the scene cannot be built like this
-  dearer,    // given up: before its end it had cost more than the cheapest that is within
-};
-const char* name_of(Outcome outcome);
-
-// One configuration that was tried.
-struct Trial {
-  Configuration configuration;
-  Outcome outcome = Outcome::over;
-  // RMS distance from the answer at the end of each frame of the scene [h], up to the frame in which it was given up;
-  // what is not a number is infinite.
-  std::vector<double> rms_h;
-  double greatest_rms_h = 0, greatest_h = 0;  // over these frames [h]
-  std::optional<std::size_t> first_beyond;    // the first of them that is beyond the tolerance
-  int64_t removed_otherwise = 0;              // particles that only this or only the answer has, in the last of them
-  std::string why;                            // what a table says about a trial that is not within
-  Times frame;                                // seconds per frame of the scene; no samples if it was given up
-};
-
-// Runs and times a configuration. `limit`: the seconds per frame beyond which it may be given up as dearer.
+// Runs and times a configuration. `limit`: the seconds per frame beyond which it may be given up as too expensive.
 using Measure = std::function<Trial(const Configuration& configuration, std::optional<double> limit)>;
 
 // What may be changed.
@@ -55,7 +21,7 @@ struct SearchSpace {
   std::vector<std::string> rotations;  // that differ from the given one
   bool may_resize = true;              // false: the number of clusters is part of what the scene expects
   bool may_drop_skin = false;          // nobody looks at it
-  bool nothing_removed = false;        // in the answer: a scene without a blade then needs no detection
+  bool nothing_removed = false;        // in the reference solution: a scene without a blade then needs no detection
 };
 // 1, 2, 3, 4, 6, 8, 12, … up to `most`, and `given`.
 std::vector<int32_t> substeps_to_try(int32_t given, int32_t most);
@@ -65,7 +31,7 @@ std::vector<int32_t> substeps_to_try(int32_t given, int32_t most);
 //    the tolerance, found by doubling and halving; more iterations are taken to be no less accurate and no cheaper.
 //    Doubling ends where it no longer helps: where the error, in the first frame in which the one before was beyond the
 //    tolerance, has not fallen by kHelps; and where nothing but the number of substeps decides (schedule, refused).
-// 2. From the cheapest of these: stages without which the scene's course is the same, sizes of clusters, debris and
+// 2. From the cheapest of these: stages without which the scene's trajectory is the same, sizes of clusters, debris and
 //    rotation methods, one after the other; each is kept if it is within the tolerance and cheaper.
 // 3. If one was kept: the least number of iterations once more.
 // Nothing is tried twice.
@@ -78,4 +44,4 @@ std::vector<Trial> search(const Configuration& given, const SearchSpace& space, 
 // tried first, which has less changed.
 std::vector<std::size_t> by_cost(const std::vector<Trial>& trials);
 
-}  // namespace cutproof::cli
+}  // namespace cutproof::tuning

@@ -75,7 +75,7 @@ def picture(document):
 
 def title_of(document):
     name = document["scene"].rsplit("/", 1)[-1].removesuffix(".json")
-    kind = {"limit": "the limit of short time steps", "substeps": "its own substeps, converged"}[document["answer"]["kind"]]
+    kind = {"limit": "the limit of short time steps", "substeps": "its own substeps, converged"}[(document.get("reference") or document["answer"])["kind"]]
     return f"{name}, {document['backend']}: error from {kind}"
 
 

@@ -8,12 +8,11 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "benchmarks/suites.h"
 #include "oracles/oracles.h"
 #include "tests/cli/program.h"
 #include "tests/oracles/states.h"
 
-namespace cutproof::cli {
+namespace cutproof::benchmarks {
 namespace {
 
 using cutproof::testing::Lists;
@@ -126,4 +125,4 @@ TEST_F(BenchBaselines, RefusesBadUsage) {
 }
 
 }  // namespace
-}  // namespace cutproof::cli
+}  // namespace cutproof::benchmarks

@@ -1,7 +1,5 @@
 // `cutproof bench factors`: every way of having the factor after a cut solves the changed system to its derived bound.
 // What the times are is not tested.
-#include "benchmarks/factors.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +8,8 @@
 #include <random>
 #include <set>
 
+#include "benchmarks/cut_cube.h"
+#include "benchmarks/factorise.h"
 #include "fixtures/bodies.h"
 #include "fixtures/cook.h"
 #include "reference_cpu/reference.h"
@@ -19,15 +19,15 @@ namespace {
 
 using cutproof::Body;
 using cutproof::State;
-using cutproof::cli::change_of;
-using cutproof::cli::Cut;
-using cutproof::cli::CutCube;
-using cutproof::cli::factorise;
-using cutproof::cli::kWays;
-using cutproof::cli::name_of;
-using cutproof::cli::residual_bound;
-using cutproof::cli::SystemChange;
-using cutproof::cli::Way;
+using cutproof::benchmarks::change_of;
+using cutproof::benchmarks::Cut;
+using cutproof::benchmarks::CutCube;
+using cutproof::benchmarks::factorise;
+using cutproof::benchmarks::kWays;
+using cutproof::benchmarks::name_of;
+using cutproof::benchmarks::residual_bound;
+using cutproof::benchmarks::SystemChange;
+using cutproof::benchmarks::Way;
 using cutproof::oracles::ClusterSystem;
 using nlohmann::json;
 
@@ -82,7 +82,7 @@ TEST(ClusterSystem, IsWhatTheClustersSay) {
 
 TEST(Factors, EveryWaySolvesTheSystemAfterEveryCut) {
   for (const auto& [side, core] : {std::pair{12, 3}, std::pair{9, 2}, std::pair{10, 5}}) {
-    const CutCube cube = cutproof::cli::make_cut_cube(side, core);
+    const CutCube cube = cutproof::benchmarks::make_cut_cube(side, core);
     std::set<Way> ran;
     for (const Cut& cut : cuts_of(cube)) {
       ASSERT_NE(cut.before.alive, cut.after.alive) << cut.name;

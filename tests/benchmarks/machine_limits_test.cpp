@@ -1,6 +1,4 @@
 // `cutproof bench machine_limits`: what is timed has to have happened. What the times are is not tested.
-#include "benchmarks/machine_limits.h"
-
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -16,7 +14,7 @@ using nlohmann::json;
 
 class BenchMachineLimits : public Program {};
 
-TEST_F(BenchMachineLimits, GivesEveryLimitWithWhatWasLost) {
+TEST_F(BenchMachineLimits, HasEveryLimitWithWhatWasLost) {
   for (const std::string backend : {"reference", "host"}) {
     const Outcome outcome = cutproof("bench machine_limits --repeats 3 --json out.json --backend " + backend);
     ASSERT_EQ(outcome.status, 0) << outcome.output;
@@ -38,7 +36,7 @@ TEST_F(BenchMachineLimits, GivesEveryLimitWithWhatWasLost) {
     }
     if (backend == "host") {
       wanted.insert({"launch of 1 block", "launch of 64 blocks"});
-      if (const int threads = cutproof::cli::cpu_threads(); threads > 1) {
+      if (const int threads = cutproof::harness::cpu_threads(); threads > 1) {
         wanted.insert("copy, " + std::to_string(threads) + " threads");
       }
     }
@@ -51,16 +49,6 @@ TEST_F(BenchMachineLimits, RefusesBadUsage) {
   expect_refused("bench machine_limits --backend gpu-eager", {"finding faults"});
   expect_refused("bench machine_limits --repeats 0", {"repeats"});
   expect_refused("bench machine_limits --json nowhere/out.json", {"nowhere"});
-}
-
-TEST(Table, HasColumnsAsWideAsWhatStandsInThem) {
-  cutproof::cli::Table table({"", "‖RᵀR‖", "ms"});
-  table.add({"jacobi4", "1", "10.25"});
-  table.add({"x", "1234567", ""});
-  EXPECT_EQ(table.text(),
-            "             ‖RᵀR‖     ms\n"
-            "  jacobi4        1  10.25\n"
-            "  x        1234567\n");
 }
 
 }  // namespace

@@ -17,10 +17,10 @@
 namespace {
 
 using cutproof::Mat3;
-using cutproof::cli::RotationCounts;
-using cutproof::cli::RotationMethod;
-using cutproof::cli::RotationReport;
-using cutproof::cli::RotationResult;
+using cutproof::benchmarks::RotationCounts;
+using cutproof::benchmarks::RotationMethod;
+using cutproof::benchmarks::RotationReport;
+using cutproof::benchmarks::RotationResult;
 using cutproof::fixtures::Precision;
 using nlohmann::json;
 
@@ -82,8 +82,8 @@ void expect_complete(const json& document, const std::set<std::pair<std::string,
     }
     expect_times(method.at("near_seconds_per_million"));
     expect_times(method.at("cold_seconds_per_million"));
-    EXPECT_GT(method.at("floor_seconds_per_million"), 0);
-    EXPECT_GT(method.at("multiple_of_floor"), 0);
+    EXPECT_GT(method.at("limit_seconds_per_million"), 0);
+    EXPECT_GT(method.at("multiple_of_limit"), 0);
     EXPECT_EQ(cases.count(method.at("worst_case").get<std::string>()), 1U) << method;
     EXPECT_LE(method.at("wrong"), method.at("answers"));
   }
@@ -163,7 +163,7 @@ TEST_F(BenchRotations, RefusesBadUsage) {
 constexpr RotationCounts kFew = {30, 50, 3, 0};
 
 RotationMethod method_named(const std::string& name, Precision precision) {
-  for (const RotationMethod& method : cutproof::cli::rotation_methods("reference")) {
+  for (const RotationMethod& method : cutproof::benchmarks::rotation_methods(cutproof::harness::reference_backend())) {
     if (method.name == name && method.precision == precision) return method;
   }
   throw std::out_of_range(name);
@@ -179,7 +179,7 @@ RotationReport report_of_spoiled(Spoil spoil) {
     spoil(timed.answers, a);
     return timed;
   };
-  return cutproof::cli::measure_rotations({spoiled}, kFew, "newton", 1e9);
+  return cutproof::benchmarks::measure_rotations({spoiled}, kFew, "newton", 1e9);
 }
 
 TEST(MeasureRotations, CountsEveryReflectionOfABrokenDefault) {
@@ -221,7 +221,7 @@ TEST(MeasureRotations, CountsWhatIsNoNumber) {
 
 TEST(MeasureRotations, DoesNotHoldWithoutADefault) {
   const RotationReport report =
-      cutproof::cli::measure_rotations({method_named("svd", Precision::single)}, kFew, "newton", 1e9);
+      cutproof::benchmarks::measure_rotations({method_named("svd", Precision::single)}, kFew, "newton", 1e9);
   EXPECT_EQ(report.results.front().wrong, 0);
   EXPECT_FALSE(report.default_holds());
 }
@@ -237,26 +237,27 @@ TEST(RotationFront, HoldsWhatNoOtherMethodBeats) {
   // Exact and slow, both middling, quick and wrong; then one that is beaten, and one whose worst gap is hidden by NaN.
   std::vector<RotationResult> results = {method(1e-9, 3), method(1e-7, 2), method(1, 1), method(1e-7, 2.5),
                                          method(0, 4, 1)};
-  cutproof::cli::mark_front(results);
+  cutproof::benchmarks::mark_front(results);
   EXPECT_TRUE(results[0].on_front && results[1].on_front && results[2].on_front);
   EXPECT_FALSE(results[3].on_front || results[4].on_front);
   // What is exact in double does not stand in the way of what kernels can use.
   results.push_back(method(1e-15, 0.5));
   results.back().precision = Precision::twice;
-  cutproof::cli::mark_front(results);
+  cutproof::benchmarks::mark_front(results);
   EXPECT_TRUE(results[0].on_front && results[1].on_front && results[2].on_front && results[5].on_front);
 }
 
 TEST(RotationMethods, OfKernelsAreAllSelectableAndTheOthersAreNot) {
   std::set<std::string> selectable;
-  for (const RotationMethod& method : cutproof::cli::rotation_methods("host")) {
+  for (const RotationMethod& method :
+       cutproof::benchmarks::rotation_methods(cutproof::harness::described_backend("host"))) {
     if (method.selectable) {
       EXPECT_EQ(method.precision, Precision::single) << method.name;
       selectable.insert(method.name);
     }
     EXPECT_EQ(method.bytes, method.precision == Precision::single ? 109 : 217);
   }
-  const auto& names = cutproof::cli::rotation_names();
+  const auto& names = cutproof::harness::rotation_names();
   EXPECT_EQ(selectable, std::set<std::string>(names.begin(), names.end()));
 }
 

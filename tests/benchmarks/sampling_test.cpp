@@ -20,7 +20,7 @@ TEST_F(BenchSampling, HasARowForEachOfTable2WithThePapersFigures) {
   EXPECT_EQ(document.at("suite"), "sampling");
   EXPECT_EQ(document.at("complete"), true);
   EXPECT_EQ(document.at("holds"), true);
-  const auto& table_2 = cutproof::cli::paper_samplings();
+  const auto& table_2 = cutproof::benchmarks::paper_samplings();
   ASSERT_EQ(document.at("rows").size(), table_2.size());
   for (std::size_t k = 0; k < table_2.size(); ++k) {
     const json& row = document.at("rows")[k];

@@ -28,7 +28,8 @@ TEST_F(BenchScale, TellsTimeMemoryAndErrorOfEachSize) {
       EXPECT_GT(row.at("particles_per_second"), 0);
       EXPECT_EQ(row.at("error").at("frame").at("topology_holds"), true);
       EXPECT_TRUE(row.at("error").at("step").is_object());
-      if (!cutproof::cli::bytes_in_use(backend)) continue;  // a sanitizer's allocator does not count
+      if (!cutproof::benchmarks::bytes_in_use(cutproof::harness::described_backend(backend)))
+        continue;  // a sanitizer's allocator does not count
       // At the very least position and velocity of each particle in single precision.
       EXPECT_GT(row.at("bytes"), 24 * row.at("particles").get<int64_t>());
       EXPECT_GT(row.at("bytes"), before);
@@ -38,11 +39,11 @@ TEST_F(BenchScale, TellsTimeMemoryAndErrorOfEachSize) {
 }
 
 TEST(BytesInUse, CountWhatIsAllocated) {
-  const auto before = cutproof::cli::bytes_in_use("reference");
+  const auto before = cutproof::benchmarks::bytes_in_use(cutproof::harness::reference_backend());
   if (!before) GTEST_SKIP() << "this allocator does not count";
   constexpr int64_t kSmall = 4096, kLarge = int64_t{64} << 20;  // the large one comes from the system by itself
   const auto small = std::make_unique<char[]>(kSmall), large = std::make_unique<char[]>(kLarge);
-  const int64_t found = *cutproof::cli::bytes_in_use("reference") - *before;
+  const int64_t found = *cutproof::benchmarks::bytes_in_use(cutproof::harness::reference_backend()) - *before;
   EXPECT_GE(found, kSmall + kLarge);
   EXPECT_LE(found, kSmall + kLarge + 65536);
 }

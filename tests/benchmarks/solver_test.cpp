@@ -22,8 +22,8 @@ using cutproof::Setup;
 using cutproof::Span;
 using cutproof::SpanReport;
 using cutproof::State;
-using cutproof::cli::SolverError;
-using cutproof::cli::SolverScene;
+using cutproof::benchmarks::SolverError;
+using cutproof::benchmarks::SolverScene;
 using nlohmann::json;
 
 class SolverBench : public Program {};
@@ -81,16 +81,16 @@ TEST_F(SolverBench, RefusesBadUsage) {
 }
 
 TEST(SolverErrors, VanishAtTheAnswerOfEverySubstep) {
-  const SolverScene scene = cutproof::cli::make_block_scene();
+  const SolverScene scene = cutproof::benchmarks::make_block_scene();
   const auto backend = cutproof::reference::make_backend();
   for (const int32_t substeps : {1, 3}) {
-    cutproof::Setup setup = cutproof::cli::with_substeps(scene, substeps);
+    cutproof::Setup setup = cutproof::benchmarks::with_substeps(scene, substeps);
     EXPECT_DOUBLE_EQ(setup.substep_length.at(0) * substeps, scene.setup.substep_length.at(0));
     setup.step.stiffness = 1e5;
     setup.step.iterations = 200;
-    const auto answer = cutproof::cli::converged_frame(setup, scene.state);
-    EXPECT_TRUE(answer.converged);
-    const SolverError error = cutproof::cli::solver_error(*backend, setup, scene.state, answer);
+    const auto solution = cutproof::benchmarks::converged_frame(setup, scene.state);
+    EXPECT_TRUE(solution.converged);
+    const SolverError error = cutproof::benchmarks::solver_error(*backend, setup, scene.state, solution);
     EXPECT_LT(error.max_h, 1e-10);
     EXPECT_EQ(error.energy_gap.has_value(), substeps == 1);
     if (error.energy_gap) {
@@ -100,20 +100,21 @@ TEST(SolverErrors, VanishAtTheAnswerOfEverySubstep) {
 }
 
 TEST(SolverErrors, FindTheLeastIterationsThatAreEnough) {
-  const SolverScene scene = cutproof::cli::make_block_scene();
+  const SolverScene scene = cutproof::benchmarks::make_block_scene();
   const auto backend = cutproof::reference::make_backend();
   cutproof::Setup setup = scene.setup;
   setup.step.stiffness = 1e5;
-  const auto answer = cutproof::cli::converged_frame(setup, scene.state);
-  const auto least = cutproof::cli::least_iterations(*backend, setup, scene.state, answer, 1e-2, 0, 32);
+  const auto solution = cutproof::benchmarks::converged_frame(setup, scene.state);
+  const auto least = cutproof::benchmarks::least_iterations(*backend, setup, scene.state, solution, 1e-2, 0, 32);
   ASSERT_TRUE(least.has_value());
   const auto error = [&](int32_t iterations) {
     setup.step.iterations = iterations;
-    return cutproof::cli::solver_error(*backend, setup, scene.state, answer).max_h;
+    return cutproof::benchmarks::solver_error(*backend, setup, scene.state, solution).max_h;
   };
   EXPECT_LT(error(*least), 1e-2);
   EXPECT_GE(error(*least - 1), 1e-2);
-  EXPECT_FALSE(cutproof::cli::least_iterations(*backend, setup, scene.state, answer, 1e-2, 0, *least - 1).has_value());
+  EXPECT_FALSE(
+      cutproof::benchmarks::least_iterations(*backend, setup, scene.state, solution, 1e-2, 0, *least - 1).has_value());
 }
 
 // A backend whose step puts one particle somewhere.
@@ -133,16 +134,16 @@ class Misplacing final : public Backend {
 };
 
 TEST(SolverErrors, SeeOneParticleOutOfPlace) {
-  const SolverScene scene = cutproof::cli::make_block_scene();
-  cutproof::cli::FrameAnswer answer;
-  answer.x = scene.state.x;
+  const SolverScene scene = cutproof::benchmarks::make_block_scene();
+  cutproof::benchmarks::FrameSolution solution;
+  solution.x = scene.state.x;
   const double h = scene.setup.body.grid.spacing;
   Misplacing off(scene.state.x[7] + cutproof::Vec3{0, 0.5 * h, 0});
-  const SolverError error = cutproof::cli::solver_error(off, scene.setup, scene.state, answer);
+  const SolverError error = cutproof::benchmarks::solver_error(off, scene.setup, scene.state, solution);
   EXPECT_NEAR(error.max_h, 0.5, 1e-12);
   EXPECT_NEAR(error.rms_h, 0.5 / std::sqrt(1728.0), 1e-12);
   Misplacing lost({std::numeric_limits<double>::quiet_NaN(), 0, 0});
-  EXPECT_TRUE(std::isinf(cutproof::cli::solver_error(lost, scene.setup, scene.state, answer).max_h));
+  EXPECT_TRUE(std::isinf(cutproof::benchmarks::solver_error(lost, scene.setup, scene.state, solution).max_h));
 }
 
 }  // namespace

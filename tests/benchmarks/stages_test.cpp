@@ -11,6 +11,8 @@
 #include <string>
 #include <utility>
 
+#include "benchmarks/scene.h"
+#include "benchmarks/times.h"
 #include "reference_cpu/reference.h"
 #include "tests/cli/program.h"
 
@@ -22,7 +24,7 @@ using cutproof::Span;
 using cutproof::SpanReport;
 using cutproof::Stage;
 using cutproof::State;
-using cutproof::cli::FrameErrors;
+using cutproof::benchmarks::FrameErrors;
 using nlohmann::json;
 
 // --- The program -----------------------------------------------------------------------------------------------------
@@ -108,7 +110,7 @@ TEST_F(Bench, TellsBothWaysOfSplittingOnTheHost) {
     if (row.at("what") != "step") continue;
     EXPECT_GT(row.at("error").at("max_h"), 0) << "single precision has its rounding";
   }
-  for (const json& scene : document.at("scenes")) EXPECT_GT(scene.at("step_floor").at("bytes"), 0);
+  for (const json& scene : document.at("scenes")) EXPECT_GT(scene.at("step_limit").at("bytes"), 0);
 }
 
 // The scenes of Table 1 with both ways of cooking: what the paper timed has its time, and an expansion that really ran.
@@ -209,11 +211,11 @@ class Spoiled final : public Backend {
 };
 
 FrameErrors judge_spoiled(Stage stage, Spoiled::Spoil spoil) {
-  const cutproof::cli::BenchScene scene = cutproof::cli::make_bench_scene(3000, 2);
+  const cutproof::benchmarks::BenchScene scene = cutproof::benchmarks::make_bench_scene(3000, 2);
   Spoiled backend(stage, spoil);
   backend.load({scene.setup}, {scene.state});
   for (int64_t frame = 0; frame < scene.warm_up; ++frame) backend.run({});
-  return cutproof::cli::judge_frames(backend, scene.setup);
+  return cutproof::benchmarks::judge_frames(backend, scene.setup);
 }
 
 // GoogleTest's own Setup hides the model's inside tests, so the faults stand here.
@@ -291,13 +293,13 @@ TEST(JudgeFrames, SeesTissueThatNoClusterHolds) {
 }
 
 TEST(Times, AreTheMedianTheLeastAndTheMost) {
-  const cutproof::cli::Times odd = cutproof::cli::times_of({5, 1, 3});
+  const cutproof::benchmarks::Times odd = cutproof::benchmarks::times_of({5, 1, 3});
   EXPECT_EQ(odd.median, 3);
   EXPECT_EQ(odd.min, 1);
   EXPECT_EQ(odd.max, 5);
   EXPECT_EQ(odd.count, 3);
-  EXPECT_EQ(cutproof::cli::times_of({4, 1, 2, 8}).median, 3);
-  EXPECT_EQ(cutproof::cli::times_of({}).count, 0);
+  EXPECT_EQ(cutproof::benchmarks::times_of({4, 1, 2, 8}).median, 3);
+  EXPECT_EQ(cutproof::benchmarks::times_of({}).count, 0);
 }
 
 }  // namespace

@@ -7,11 +7,11 @@
 #include <cmath>
 #include <limits>
 
-namespace cutproof::cli {
+namespace cutproof::tuning {
 namespace {
 
 // A body of one frame: a time step error 1 / substeps, and a solver error that each iteration shrinks, accelerated ones
-// more. An accelerated iteration is a little dearer.
+// more. An accelerated iteration is a little more expensive.
 struct Model {
   double tolerance = 0.2;
   double weight = 0.4;  // of the solver error
@@ -33,7 +33,7 @@ struct Model {
     const double seconds = cost(configuration.scene);
     if (trial.greatest_rms_h > tolerance) trial.first_beyond = 0;
     trial.outcome = trial.first_beyond                ? Outcome::over
-                    : limit && seconds > 1.5 * *limit ? Outcome::dearer
+                    : limit && seconds > 1.5 * *limit ? Outcome::more_expensive
                                                       : Outcome::within;
     if (trial.outcome == Outcome::within) trial.frame = {seconds, seconds, seconds, 1};
     return trial;
@@ -100,7 +100,7 @@ TEST(ByCost, TakesTheFirstOfThoseThatCostTheSameButForNoise) {
   EXPECT_EQ(by_cost({trial(1.0), trial(0.96), trial(0.1, Outcome::over), trial(2.0)}),
             (std::vector<std::size_t>{0, 1, 3}));
   EXPECT_EQ(by_cost({trial(1.0), trial(0.94), trial(0.93), trial(0.5)}), (std::vector<std::size_t>{3, 1, 2, 0}));
-  EXPECT_TRUE(by_cost({trial(1, Outcome::dearer)}).empty());
+  EXPECT_TRUE(by_cost({trial(1, Outcome::more_expensive)}).empty());
 }
 
 TEST(Search, TriesTheGivenFirstAndNothingTwice) {
@@ -243,4 +243,4 @@ TEST(Search, SizesSampledClustersByBothTheirLengths) {
 }
 
 }  // namespace
-}  // namespace cutproof::cli
+}  // namespace cutproof::tuning

@@ -8,7 +8,7 @@
 #include "model/io/scene_io.h"
 #include "reference_cpu/reference.h"
 #include "tests/cli/program.h"
-#include "tuning/answer.h"
+#include "tuning/prepared_scene.h"
 
 namespace {
 
@@ -34,11 +34,11 @@ class Tune : public Program {
 };
 
 // RMS distance of a scene's run from that of the same scene with other substeps and iterations: without the library's
-// notion of an answer.
+// notion of a reference solution.
 double greatest_rms_h(const Scene& tuned, Scene scene, int substeps, int iterations) {
   scene.step.substeps = substeps;
   scene.step.iterations = iterations;
-  const cutproof::cli::Staged a(scene, "test", {}), b(tuned, "test", {});
+  const cutproof::tuning::PreparedScene a(scene, "test", {}), b(tuned, "test", {});
   const auto first = cutproof::reference::make_backend(), second = cutproof::reference::make_backend();
   first->load({a.setup()}, {a.start()});
   second->load({b.setup()}, {b.start()});
@@ -63,7 +63,7 @@ double greatest_rms_h(const Scene& tuned, Scene scene, int substeps, int iterati
 
 TEST_F(Tune, WritesACheaperSceneWithinTheTolerance) {
   for (const std::string backend : {"reference", "host"}) {
-    const Outcome outcome = tune("--tolerance 0.05 --answer substeps --json out.json --backend " + backend);
+    const Outcome outcome = tune("--tolerance 0.05 --reference substeps --json out.json --backend " + backend);
     ASSERT_EQ(outcome.status, 0) << outcome.output;
     EXPECT_NE(outcome.output.find("\nfound: "), std::string::npos) << outcome.output;
     const Scene tuned = cutproof::io::read_scene(path("scene_tuned.json"));
@@ -75,7 +75,7 @@ TEST_F(Tune, WritesACheaperSceneWithinTheTolerance) {
     const json document = json::parse(read("out.json"));
     EXPECT_TRUE(document.at("complete"));
     EXPECT_EQ(document.at("tolerance_h"), 0.05);
-    EXPECT_EQ(document.at("answer").at("kind"), "substeps");
+    EXPECT_EQ(document.at("reference").at("kind"), "substeps");
     const json& found = document.at("found");
     EXPECT_NEAR(found.at("verified").at("rms_h").get<double>(), error, backend == "host" ? 1e-4 : 1e-8);
     EXPECT_GT(found.at("verdicts"), 10);
@@ -84,7 +84,7 @@ TEST_F(Tune, WritesACheaperSceneWithinTheTolerance) {
     EXPECT_EQ(trials.at(0).at("iterations"), 16);
     EXPECT_EQ(trials.at(0).at("outcome"), "within");
     EXPECT_EQ(trials.at(0).at("rotation").is_null(), backend == "reference");
-    // What it has tried and found wanting is told.
+    // What it has tried and found wanting is written too.
     EXPECT_TRUE(std::any_of(trials.begin(), trials.end(), [](const json& t) { return t.at("outcome") == "over"; }));
     EXPECT_EQ(found.at("verified").at("outcome"), "within");
     EXPECT_EQ(trials.at(found.at("trial").get<std::size_t>()).at("outcome"), "within");
@@ -119,14 +119,14 @@ TEST_F(Tune, KeepsAMeshWithinReach) {
   write("meshes/tetrahedron.off", "OFF\n4 4 0\n0 0 0\n60 0 0\n0 60 0\n0 0 60\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n");
   write("scene.json", R"({"version": 1, "body": {"mesh": {"file": "meshes/tetrahedron.off", "unit": 0.001},
     "spacing": 0.008}, "frame": {"count": 2}, "step": {"gravity": [0, 0, -9.81]}})");
-  const Outcome outcome = tune("--tolerance 0.2 --answer substeps --write found/tuned.json");
+  const Outcome outcome = tune("--tolerance 0.2 --reference substeps --write found/tuned.json");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
   EXPECT_EQ(cutproof::io::read_scene(path("found/tuned.json")).body.mesh->file, "../meshes/tetrahedron.off");
   EXPECT_EQ(cutproof("run found/tuned.json --check").status, 0);
 }
 
 TEST_F(Tune, RunsEverythingToItsEndForACurve) {
-  const Outcome outcome = tune("--tolerance 0.02 --answer substeps --full --json out.json");
+  const Outcome outcome = tune("--tolerance 0.02 --reference substeps --full --json out.json");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
   int over = 0;
   const json document = json::parse(read("out.json"));
@@ -139,14 +139,15 @@ TEST_F(Tune, RunsEverythingToItsEndForACurve) {
 }
 
 TEST_F(Tune, WithoutASkin) {
-  const Outcome outcome = tune("--tolerance 0.05 --answer substeps --without-skin --backend host");
+  const Outcome outcome = tune("--tolerance 0.05 --reference substeps --without-skin --backend host");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("no skin"), std::string::npos) << outcome.output;
 
   // Who counts shells looks at the skin.
   write("scene.json",
         std::string(kScene).replace(std::string(kScene).find("\"components_at_end\": 2"), 0, "\"shells_at_end\": 2, "));
-  const Outcome with_shells = tune("--tolerance 0.05 --answer substeps --without-skin --backend host --json out.json");
+  const Outcome with_shells =
+      tune("--tolerance 0.05 --reference substeps --without-skin --backend host --json out.json");
   ASSERT_EQ(with_shells.status, 0) << with_shells.output;
   EXPECT_NE(with_shells.output.find("--without-skin does nothing"), std::string::npos) << with_shells.output;
   const json document = json::parse(read("out.json"));
@@ -162,7 +163,7 @@ TEST_F(Tune, LeavesWhatHasAnotherSchedule) {
     "frame": {"length": 0.016}, "detect": {"criterion": "geometric"}, "step": {"substeps": 4, "iterations": 2},
     "blade": {"speed": 0.5, "strokes": [{"along": [0, 1, 0], "points": [[0.5, 0.5, 1.3], [0.5, 0.5, 1.29],
     [0.5, 0.5, 1.2], [0.5, 0.5, 1.19], [0.5, 0.5, 1.0], [0.5, 0.5, 0.99], [0.5, 0.5, 0.5]]}]}})");
-  const Outcome outcome = tune("--tolerance 0.5 --answer substeps --json out.json");
+  const Outcome outcome = tune("--tolerance 0.5 --reference substeps --json out.json");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
   const json trials = json::parse(read("out.json")).at("trials");
   EXPECT_TRUE(std::any_of(trials.begin(), trials.end(), [](const json& t) { return t.at("outcome") == "schedule"; }))
@@ -170,7 +171,7 @@ TEST_F(Tune, LeavesWhatHasAnotherSchedule) {
 }
 
 TEST_F(Tune, LooksAtTheFirstFrames) {
-  const Outcome outcome = tune("--tolerance 0.1 --answer substeps --frames 1");
+  const Outcome outcome = tune("--tolerance 0.1 --reference substeps --frames 1");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("looked at for 1 frames only"), std::string::npos) << outcome.output;
 }
@@ -185,7 +186,7 @@ TEST_F(Tune, RefusesWhatItCannotTune) {
   refused("scene.json", "--tolerance");
   refused("scene.json --tolerance -1", "--tolerance");
   refused("scene.json --tolerance nan", "--tolerance");
-  refused("scene.json --tolerance 1 --answer best", "--answer");
+  refused("scene.json --tolerance 1 --reference best", "--reference");
   refused("scene.json --tolerance 1 --backend simulated", "--backend");
   refused("scene.json --tolerance 1 --rotation svd", "--rotation");
   refused("scene.json --tolerance 1 --write scene.json", "--write");

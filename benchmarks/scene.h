@@ -1,0 +1,36 @@
+// Bodies that a blade is cutting while they are timed.
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "model/setup.h"
+#include "model/state.h"
+
+namespace cutproof::benchmarks {
+
+// A body that a blade is cutting. From frame `warm_up` on, for as many frames as were asked for and kJudgedFrames
+// more, the blade's edge is inside the tissue and moves on.
+struct BenchScene {
+  std::string name;  // shape and particles
+  Setup setup;
+  State state;                    // at rest, before frame 0
+  int64_t warm_up = 0;            // frames until the cut is well under way
+  double advance = 0;             // of the blade's edge in one frame [h]
+  double build_seconds = 0;       // sampling and cooking
+  std::string cooking = "boxes";  // how its clusters were made
+};
+
+// The most frames that are judged after the timed ones: until one of them has removed something.
+inline constexpr int64_t kJudgedFrames = 4;
+
+// A box up to kLargestBox particles, a kidney beyond; `boxes` clusters; 4 substeps × 4 iterations; k = 1e5; the blade
+// enters at the upper end of the longest axis and follows it, halfway between two layers of nodes. The other end is
+// held. Throws InputError if no body has so many particles, within 2 %.
+inline constexpr int64_t kLargestBox = 2000;
+BenchScene make_bench_scene(int64_t particles, int64_t frames);
+
+// Throws InputError, naming --sizes, for a number of particles that cannot be timed.
+void require_timed_sizes(const std::vector<int64_t>& sizes);
+
+}  // namespace cutproof::benchmarks

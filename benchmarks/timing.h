@@ -1,0 +1,29 @@
+// How frames and stages are timed.
+#pragma once
+#include <array>
+#include <cstdint>
+
+#include "benchmarks/scene.h"
+#include "benchmarks/times.h"
+#include "model/backend.h"
+
+namespace cutproof::benchmarks {
+
+// What timing one backend on one scene gives. All three passes start from the same state, so they see the same frames.
+struct Timings {
+  Times frame;                 // whole frames, each waited for
+  Times cutting;               // those of them that removed something
+  Times back_to_back;          // per frame, when the frames are handed over without waiting for any; one per repeat
+  std::array<Times, 6> stage;  // spans of one stage; only frames in which the stage ran
+};
+// Every pass `repeats` times, each after a warm-up of its own. back_to_back only if `pipelined`, for backends whose
+// run() does not wait. The backend is left where the timed frames end.
+Timings time_stages(Backend& backend, const BenchScene& scene, int64_t frames, bool pipelined, int64_t repeats = 1);
+
+// Under the name of each stage, `frame`, `frame, cutting`, and `back to back` where it was timed.
+nlohmann::json seconds_by_stage(const Timings& timings);
+
+// Memberships that expansion adds in the timed frames. Leaves the backend where these end.
+int64_t count_added_memberships(Backend& backend, const BenchScene& scene, int64_t frames);
+
+}  // namespace cutproof::benchmarks

@@ -1,0 +1,56 @@
+#include "cli/options.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "model/error.h"
+
+namespace cutproof::cli {
+
+void refuse(const std::string& option, const std::string& problem, const std::string& remedy) {
+  throw InputError("command line", option, problem, remedy);
+}
+
+void refuse_empty(const CLI::App& command) {
+  for (const CLI::Option* const option : command.get_options()) {
+    for (const std::string& given : option->results()) {
+      if (given.empty()) refuse(option->get_name(), "it is given but empty", "give a value, or leave the option out");
+    }
+  }
+  for (const CLI::App* const named : command.get_subcommands()) refuse_empty(*named);
+}
+
+void add_backend_name(CLI::App& command, std::string& name, const std::string& what,
+                      const std::function<bool(const harness::BackendDescriptor&)>& offered) {
+  command.add_option("--backend", name, fmt::format("{}: {}", what, harness::backend_names(offered)))
+      ->capture_default_str()
+      ->type_name("B");
+}
+
+void add_backend(CLI::App& command, harness::BackendChoice& choice, const std::string& what,
+                 const std::function<bool(const harness::BackendDescriptor&)>& offered) {
+  add_backend_name(command, choice.name, what, offered);
+  command.add_option("--split", choice.split, "kernels: how clusters are split, blocks or global")->type_name("M");
+  command
+      .add_option("--rotation", choice.rotation,
+                  fmt::format("kernels: how rotations are found, {}", fmt::join(harness::rotation_names(), ", ")))
+      ->type_name("M");
+  const std::string scheduled = harness::backend_names([](const auto& backend) { return backend.takes_schedule; });
+  command
+      .add_option("--schedule", choice.schedule,
+                  fmt::format("{}: {}", scheduled, fmt::join(harness::schedule_names(), ", ")))
+      ->capture_default_str()
+      ->type_name("S");
+  command.add_option("--schedule-seed", choice.seed, scheduled + ": what random and pct are drawn from")
+      ->capture_default_str()
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber);  // a negative one would wrap around
+}
+
+bool is_timed(const harness::BackendDescriptor& backend) { return backend.is_timed; }
+
+void add_json(CLI::App& command, std::string& path, const std::string& what) {
+  command.add_option("--json", path, what)->type_name("F");
+}
+
+}  // namespace cutproof::cli

@@ -1,0 +1,32 @@
+#include "cli/output.h"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+
+#include "model/error.h"
+#include "model/io/atomic_file.h"
+
+namespace cutproof::cli {
+
+void flush_output() {
+  errno = 0;
+  const bool failed = std::fflush(stdout) != 0;
+  const int why = errno;
+  if (!failed && std::ferror(stdout) == 0) return;
+  throw MachineError(std::string("standard output cannot be written to") +
+                     (why != 0 ? std::string(": ") + std::strerror(why) : ""));
+}
+
+void require_writable(const std::string& path) {
+  if (!path.empty()) io::AtomicFile{path};
+}
+
+void write_document(const std::string& path, const nlohmann::json& document) {
+  if (path.empty()) return;
+  io::AtomicFile file(path);
+  io::write_text(file.temporary(), document.dump(1) + "\n");
+  file.commit();
+}
+
+}  // namespace cutproof::cli

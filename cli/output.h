@@ -1,0 +1,17 @@
+// What the program writes: standard output, and documents.
+#pragma once
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace cutproof::cli {
+
+// Hands what was printed to the system. Throws MachineError if it, or anything before it, cannot be written.
+void flush_output();
+
+// Nothing if `path` is empty, else a failure now rather than after the measurements: throws InputError if the folder is
+// not there or not writable.
+void require_writable(const std::string& path);
+// The whole document or nothing; nothing if `path` is empty.
+void write_document(const std::string& path, const nlohmann::json& document);
+
+}  // namespace cutproof::cli

@@ -1,0 +1,83 @@
+// `cutproof replay`: a counterexample once more.
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "cli/commands.h"
+#include "cli/options.h"
+#include "model/io/atomic_file.h"
+#include "model/io/recording.h"
+#include "property_tests/campaign.h"
+#include "property_tests/counterexample.h"
+#include "property_tests/recorded_case.h"
+#include "property_tests/simplify.h"
+
+namespace cutproof::cli {
+
+namespace {
+
+using namespace property_tests;
+using harness::BackendChoice;
+
+struct ReplayOptions {
+  std::string counterexample;
+  BackendChoice backend;  // without a name: the one on which it was found
+  std::string record;
+};
+
+BackendChoice choice_of(const ReplayOptions& options, const Counterexample& counterexample) {
+  if (!options.backend.name.empty()) return options.backend;
+  BackendChoice choice;
+  if (!counterexample.backend.empty()) choice.name = counterexample.backend;
+  choice.split = counterexample.split;
+  return choice;
+}
+
+int replay(const ReplayOptions& options) {
+  const std::string& file = options.counterexample;
+  const Counterexample counterexample = counterexample_from_json(io::read_text(file), file);
+  const BackendChoice choice = choice_of(options, counterexample);
+  const Case& c = counterexample.failing;
+  const bool is_history = !counterexample.commands.empty();
+  if (is_history && !options.record.empty()) {
+    refuse("--record", file + " is a history of commands, which no recording holds", "leave it out");
+  }
+  fmt::print("{}: {} particles, {} strokes, {}backend {}\n", file, c.nodes.size(), c.strokes.size(),
+             is_history ? fmt::format("{} commands, ", counterexample.commands.size()) : "", choice.name);
+  if (!counterexample.found.empty()) fmt::print("found as: {}\n", counterexample.found);
+  const auto make = [&] { return backend_of(counterexample, choice); };
+  const Judgement judgement =
+      is_history ? history_alone(make, c, counterexample.commands) : dissect_alone(make, c, true);
+  if (!options.record.empty()) {
+    const std::string problem = record_case(options.record, make(), c);
+    fmt::print("{}\n",
+               problem.empty() ? "recorded " + io::recording_paths(options.record).index : "not recorded: " + problem);
+  }
+  if (judgement.failure) {
+    fmt::print("FAILS: {}\n", describe(*judgement.failure));
+    return 1;
+  }
+  if (judgement.verdicts == 0) {
+    fmt::print("FAILS: nothing was judged\n");
+    return 1;
+  }
+  fmt::print("holds: {} verdicts\n", judgement.verdicts);
+  return 0;
+}
+
+}  // namespace
+
+void add_replay(CLI::App& program, Work& work) {
+  const auto options = std::make_shared<ReplayOptions>();
+  options->backend.name.clear();
+  CLI::App* const command = program.add_subcommand("replay", "run a counterexample again");
+  command->add_option("counterexample", options->counterexample, "what `cutproof fuzz` has saved")
+      ->required()
+      ->type_name("CASE");
+  add_backend(*command, options->backend, "backend under test (default: where it was found)");
+  command->add_option("--record", options->record, "keep every frame, for `cutproof check` and ParaView")
+      ->type_name("F");
+  command->callback([options, &work] { work = [options] { return replay(*options); }; });
+}
+
+}  // namespace cutproof::cli

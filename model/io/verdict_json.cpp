@@ -1,0 +1,31 @@
+#include "model/io/verdict_json.h"
+
+#include "model/io/json_number.h"
+#include "model/stage.h"
+
+namespace cutproof::io {
+
+nlohmann::json verdict_json(const Verdict& verdict, bool expected_failure) {
+  nlohmann::json result = {{"property", verdict.property},
+                           {"stage", name_of(verdict.stage)},
+                           {"backend", verdict.backend},
+                           {"frame", verdict.frame},
+                           {"body", verdict.body},
+                           {"holds", verdict.holds},
+                           {"measured", json_number(verdict.measured)},
+                           {"bound", json_number(verdict.bound)},
+                           {"unit", verdict.unit},
+                           {"bound_source", verdict.bound_source},
+                           {"checked", verdict.checked}};
+  if (!verdict.vacuous.empty()) result["vacuous"] = verdict.vacuous;
+  if (expected_failure && !verdict.holds) result["expected_failure"] = true;
+  if (!verdict.holds) {
+    result["witness"] = {{"text", verdict.witness.text},
+                         {"clusters", verdict.witness.clusters},
+                         {"particles", verdict.witness.particles},
+                         {"path", verdict.witness.path}};
+  }
+  return result;
+}
+
+}  // namespace cutproof::io

@@ -1,0 +1,12 @@
+// A verdict in a result document (docs/results_schema.md, Verdicts).
+#pragma once
+#include <nlohmann/json.hpp>
+
+#include "model/verdict.h"
+
+namespace cutproof::io {
+
+// `expected_failure`: that it fails is what the scene expects.
+nlohmann::json verdict_json(const Verdict& verdict, bool expected_failure);
+
+}  // namespace cutproof::io

@@ -1,0 +1,191 @@
+#include "property_tests/campaign_report.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <set>
+
+#include "model/error.h"
+#include "model/io/atomic_file.h"
+#include "model/io/json_number.h"
+
+namespace cutproof::property_tests {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kFormat = "cutproof.fuzz";
+constexpr int kFormatVersion = 2;
+// Classes of cases are rare: below this many cases, or with small ones only, an empty class says nothing.
+constexpr int64_t kCasesThatMeetEveryClass = 1000;
+constexpr int kSizeThatMeetsEveryClass = 79;
+// Of positions after a step, as many as rounding may decide: 0.5 to 0.8 % in campaigns of thousands. A comparison that
+// grants everything compares nothing.
+constexpr double kMostUndecidable = 0.05;
+
+constexpr const char* kRemedy = "give the results (--json) of all shards of one campaign, each once";
+
+// `part` is added to `whole`; `first`: the file that `whole` began with.
+void add_shard(json& whole, const json& part, const std::string& file, const std::string& first) {
+  for (const char* field : {"version", "backend", "split", "seed", "sizes", "dynamics", "shards", "cases_asked",
+                            "seconds_asked", "commit"}) {
+    if (part.value(field, json()) == whole.value(field, json())) continue;
+    throw InputError(
+        file, field,
+        fmt::format("{} here, {} in {}", part.value(field, json()).dump(), whole.value(field, json()).dump(), first),
+        kRemedy);
+  }
+  const double particles =
+      whole.at("mean_particles").get<double>() * static_cast<double>(whole.at("cases").get<int64_t>()) +
+      part.at("mean_particles").get<double>() * static_cast<double>(part.at("cases").get<int64_t>());
+  for (const char* field : {"cases", "verdicts"}) {
+    whole[field] = whole.at(field).get<int64_t>() + part.at(field).get<int64_t>();
+  }
+  const auto cases = static_cast<double>(whole.at("cases").get<int64_t>());
+  whole["mean_particles"] = cases > 0 ? particles / cases : 0.0;
+  // Shards run beside each other: together they take as long as the slowest, and do what all of them do.
+  whole["seconds"] = std::max(whole.at("seconds").get<double>(), part.at("seconds").get<double>());
+  whole["cases_per_second"] = whole.at("cases_per_second").get<double>() + part.at("cases_per_second").get<double>();
+  for (auto& [name, seconds] : whole.at("thread_seconds").items()) {
+    seconds = seconds.get<double>() + part.at("thread_seconds").at(name).get<double>();
+  }
+  for (auto& [name, count] : whole.at("happened").items()) {
+    count = count.get<int64_t>() + part.at("happened").at(name).get<int64_t>();
+  }
+  if (whole.contains("steps_compared")) {
+    json& compared = whole.at("steps_compared");
+    const json& more = part.at("steps_compared");
+    for (const char* field : {"steps", "particles", "undecidable"}) {
+      compared[field] = compared.at(field).get<int64_t>() + more.at(field).get<int64_t>();
+    }
+    // A number, or of what failed the string "inf".
+    const json &here = compared.at("greatest_h"), &there = more.at("greatest_h");
+    if (there.is_string() || (here.is_number() && there.get<double>() > here.get<double>())) {
+      compared["greatest_h"] = there;
+    }
+  }
+  for (const json& violation : part.at("violations")) whole["violations"].push_back(violation);
+}
+
+}  // namespace
+
+json violation_json(const Violation& violation, const std::string& file) {
+  return {{"index", violation.index},
+          {"property", violation.verdict.property},
+          {"stage", name_of(violation.verdict.stage)},
+          {"text", describe(violation.verdict)},
+          {"file", file}};
+}
+
+json campaign_document(const harness::BackendChoice& backend, const CampaignOptions& options, const Campaign& campaign,
+                       const json& violations) {
+  const harness::BackendDescriptor& described = harness::described_backend(backend.name);
+  json happened = json::object();
+  for (std::size_t h = 0; h < kHappenedCount; ++h) happened[kHappenedNames[h]] = campaign.happened[h];
+  json document = {
+      {"format", kFormat},
+      {"format_version", kFormatVersion},
+      {"version", CUTPROOF_VERSION},
+      {"backend", backend.name},
+      {"split", backend.split.empty() ? "blocks" : backend.split},
+      {"seed", options.seed},
+      {"sizes", {options.least_size, options.most_size}},
+      {"dynamics", options.dynamics},
+      {"batch", options.batch},
+      {"threads", options.threads},
+      {"shard", options.shard + 1},
+      {"shards", options.shards},
+      {"cases", campaign.cases},
+      {"verdicts", campaign.verdicts},
+      {"mean_particles",
+       campaign.cases == 0 ? 0.0 : static_cast<double>(campaign.particles) / static_cast<double>(campaign.cases)},
+      {"seconds", campaign.seconds},
+      {"cases_per_second", campaign.seconds > 0 ? static_cast<double>(campaign.cases) / campaign.seconds : 0.0},
+      {"thread_seconds",
+       {{"generating", campaign.generating}, {"running", campaign.running}, {"judging", campaign.judging}}},
+      {"happened", happened},
+      {"violations", violations},
+      {"holds", violations.empty() && campaign.verdicts > 0}};
+  if (options.dynamics && !described.is_the_reference) {
+    const StepsCompared& compared = campaign.compared;
+    document["steps_compared"] = {{"steps", compared.steps},
+                                  {"particles", compared.particles},
+                                  {"undecidable", compared.undecidable},
+                                  {"greatest_h", json_number(compared.greatest)}};
+  }
+  if (options.seconds) {
+    document["seconds_asked"] = *options.seconds;
+  } else {
+    document["cases_asked"] = options.cases;
+  }
+  if (const char* commit = std::getenv("CUTPROOF_COMMIT")) document["commit"] = commit;
+  return document;
+}
+
+json merge_shards(const std::vector<std::string>& files) {
+  json whole;
+  std::set<int64_t> shards;
+  for (const std::string& file : files) {
+    try {
+      const json part = json::parse(io::read_text(file));
+      if (part.at("format") != kFormat || part.at("format_version") != kFormatVersion) {
+        throw InputError(file, "format", "this is not a result of `cutproof fuzz` of this version", kRemedy);
+      }
+      if (!shards.insert(part.at("shard").get<int64_t>()).second) {
+        throw InputError(file, "shard", fmt::format("shard {} was given already", part.at("shard").dump()), kRemedy);
+      }
+      if (whole.is_null()) {
+        whole = part;
+      } else {
+        add_shard(whole, part, file, files.front());
+      }
+    } catch (const json::exception& error) {
+      throw InputError(file, "", fmt::format("this is not a result of `cutproof fuzz` ({})", error.what()), kRemedy);
+    }
+  }
+  const auto expected = whole.at("shards").get<int64_t>();
+  std::vector<int64_t> missing;
+  for (int64_t shard = 1; shard <= expected; ++shard) {
+    if (!shards.contains(shard)) missing.push_back(shard);
+  }
+  if (!missing.empty()) {
+    throw InputError("command line", "--merge",
+                     fmt::format("of {} shards these are missing: {}", expected, fmt::join(missing, ", ")), kRemedy);
+  }
+  whole["holds"] = whole.at("violations").empty() && whole.at("verdicts").get<int64_t>() > 0;
+  whole["shard"] = 1;
+  whole["shards"] = 1;
+  whole["merged_shards"] = expected;
+  return whole;
+}
+
+CampaignConclusion conclude(const json& document, bool whole) {
+  const auto cases = document.at("cases").get<int64_t>();
+  if (cases == 0 || document.at("verdicts").get<int64_t>() == 0) return {"nothing was judged"};
+  const std::size_t violations = document.at("violations").size();
+  if (violations > 0) return {fmt::format("{} of {} cases", violations, cases)};
+  if (!whole || cases < kCasesThatMeetEveryClass) return {};
+  std::vector<std::string> empty;
+  for (const char* name : kHappenedNames) {
+    if (document.at("happened").at(name).get<int64_t>() == 0) empty.emplace_back(name);
+  }
+  if (document.at("sizes").at(1).get<int>() >= kSizeThatMeetsEveryClass && !empty.empty()) {
+    return {fmt::format("no case had: {}, so nothing was tested there", fmt::join(empty, ", "))};
+  }
+  if (document.contains("steps_compared")) {
+    const json& compared = document.at("steps_compared");
+    const double undecidable = compared.at("undecidable").get<double>(),
+                 measured = compared.at("particles").get<double>();
+    if (!(undecidable <= kMostUndecidable * (undecidable + measured)) || measured == 0) {
+      return {
+          fmt::format("{:.0f} positions after a step were undecidable and {:.0f} compared, so too little was tested",
+                      undecidable, measured)};
+    }
+  }
+  return {};
+}
+
+}  // namespace cutproof::property_tests

@@ -1,0 +1,30 @@
+// Campaigns as documents (docs/results_schema.md, fuzz): one for each shard, put together to one of the whole, and what
+// follows from it.
+#pragma once
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "harness/backends.h"
+#include "property_tests/campaign.h"
+
+namespace cutproof::property_tests {
+
+// `file`: where the counterexample was saved.
+nlohmann::json violation_json(const Violation& violation, const std::string& file);
+// `violations`: an array of violation_json(). A campaign that judged nothing does not hold.
+nlohmann::json campaign_document(const harness::BackendChoice& backend, const CampaignOptions& options,
+                                 const Campaign& campaign, const nlohmann::json& violations);
+
+// The document of the whole from the documents (files) of all its shards. Throws InputError, naming the file, for
+// anything that is not the result of a shard of one campaign, each once.
+nlohmann::json merge_shards(const std::vector<std::string>& files);
+
+// What follows from a document. `whole`: it is of all shards, so classes of cases that never occurred say something.
+struct CampaignConclusion {
+  std::string failure;  // what is wrong, as a sentence without an end; empty: all hold
+  bool holds() const { return failure.empty(); }
+};
+CampaignConclusion conclude(const nlohmann::json& document, bool whole);
+
+}  // namespace cutproof::property_tests

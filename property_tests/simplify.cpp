@@ -1,0 +1,70 @@
+#include "property_tests/simplify.h"
+
+#include <chrono>
+
+namespace cutproof::property_tests {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using harness::BackendChoice;
+
+constexpr std::chrono::seconds kSimplifyingTime{60};
+constexpr int kSchedulesTried = 50;
+
+bool takes_schedule(const BackendChoice& choice) { return harness::described_backend(choice.name).takes_schedule; }
+
+}  // namespace
+
+Simplified simplify(const Violation& violation, const BackendChoice& choice) {
+  Simplified result;
+  Counterexample& found = result.counterexample;
+  found.failing = violation.failing;
+  found.backend = choice.name;
+  found.split = choice.split;
+  found.index = violation.index;
+  result.text = describe(violation.verdict);
+
+  // Another case is another run of the schedule, so several are tried.
+  const bool scheduled = takes_schedule(choice);
+  BackendChoice failing_choice = choice;
+  const auto fails = [&](const Case& c) {
+    for (int k = 0; k < (scheduled ? kSchedulesTried : 1); ++k) {
+      BackendChoice tried = failing_choice;
+      tried.seed += static_cast<uint64_t>(k);
+      if (k > 0) tried.schedule = k % 2 == 0 ? "pct" : "random";
+      const Judgement judgement = dissect_alone([&] { return harness::make_backend(tried); }, c, true);
+      if (!judgement.failure) continue;
+      failing_choice = tried;
+      result.text = describe(*judgement.failure);
+      return true;
+    }
+    return false;
+  };
+  if (!fails(violation.failing)) return result;
+  result.alone = true;
+  const Clock::time_point until = Clock::now() + kSimplifyingTime;
+  const auto is_over = [&] { return Clock::now() > until; };
+  found.failing = simplest(violation.failing, fails, is_over);
+  if (scheduled) {
+    const auto schedule = std::make_shared<gpu::ThreadSchedule>();
+    static_cast<void>(
+        dissect_alone([&] { return harness::make_recorded_backend(failing_choice, schedule); }, found.failing, true));
+    found.schedule = gpu::shrink(*schedule, [&](const gpu::ThreadSchedule& tried) {
+      if (is_over()) return false;
+      return dissect_alone([&] { return harness::make_replaying_backend(failing_choice, tried); }, found.failing, true)
+          .failure.has_value();
+    });
+  }
+  found.found = result.text;
+  return result;
+}
+
+std::unique_ptr<Backend> backend_of(const Counterexample& counterexample, const BackendChoice& choice) {
+  if (takes_schedule(choice) && !counterexample.schedule.empty()) {
+    return harness::make_replaying_backend(choice, counterexample.schedule);
+  }
+  return harness::make_backend(choice);
+}
+
+}  // namespace cutproof::property_tests

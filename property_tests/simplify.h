@@ -1,0 +1,23 @@
+// The simplest case that still fails.
+#pragma once
+#include <memory>
+#include <string>
+
+#include "harness/backends.h"
+#include "property_tests/campaign.h"
+#include "property_tests/counterexample.h"
+
+namespace cutproof::property_tests {
+
+struct Simplified {
+  Counterexample counterexample;
+  std::string text;    // what fails now
+  bool alone = false;  // fails without the other bodies of its load
+};
+// The simplest case, and under a chosen schedule the fewest preemptions, that still fail; as far as a minute reaches.
+Simplified simplify(const Violation& violation, const harness::BackendChoice& choice);
+
+// The backend with which a counterexample is run again: under its schedule, if it has one and the backend takes one.
+std::unique_ptr<Backend> backend_of(const Counterexample& counterexample, const harness::BackendChoice& choice);
+
+}  // namespace cutproof::property_tests

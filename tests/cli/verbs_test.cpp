@@ -1,0 +1,196 @@
+// Usage, standard output and gates that judged nothing, of every verb.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "tests/cli/program.h"
+
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kScene = R"({"version": 1, "name": "small",
+  "body": {"shape": {"kind": "box", "size": [0.04, 0.03, 0.03]}, "spacing": 0.01}, "frame": {"count": 2},
+  "step": {"gravity": [0, 0, -9.81]}})";
+
+class Verbs : public Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    write("cut.json", kScene);
+  }
+  std::string counterexample() const {
+    return (files::path(CUTPROOF_SOURCE) / "fixtures/regressions/skin_cell_not_renewed.json").string();
+  }
+  // One command line of each verb and suite that would succeed.
+  std::vector<std::string> commands() const {
+    return {"info",
+            "info --scene",
+            "--help",
+            "--version",
+            "run cut.json --check",
+            "check seen",
+            "fuzz --cases 20 --sizes 0-20",
+            "replay '" + counterexample() + "'",
+            "tune cut.json --tolerance 0.5 --reference substeps --repeats 1 --frames 1",
+            "bench stages --sizes 1000 --frames 1 --repeats 1",
+            "bench machine_limits --repeats 1"};
+  }
+  void record() { ASSERT_EQ(cutproof("run cut.json --record seen").status, 0); }
+};
+
+// --- Standard output
+// --------------------------------------------------------------------------------------------------
+
+TEST_F(Verbs, EndWithStatusThreeAndOneMessageIfStandardOutputCannotBeWritten) {
+  if (!files::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
+  record();
+  for (const std::string& command : commands()) {
+    const Outcome outcome = cutproof(command + " 2> error > /dev/full; exit $? #");
+    EXPECT_EQ(outcome.status, 3) << command;
+    const std::string error = read("error");
+    EXPECT_TRUE(error.starts_with("cutproof: ")) << command << ": " << error;
+    EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 1) << command << ": " << error;
+    // The reason, unless a library has swallowed it.
+    const bool says_why = error.find("No space left on device") != std::string::npos;
+    EXPECT_TRUE(says_why || error.find("standard output") != std::string::npos) << command << ": " << error;
+  }
+}
+
+TEST_F(Verbs, SucceedIfItCan) {
+  record();
+  for (const std::string& command : commands()) {
+    const Outcome outcome = cutproof(command);
+    EXPECT_EQ(outcome.status, 0) << command << "\n" << outcome.output;
+  }
+}
+
+// A result that cannot be shown is written down all the same, so the status is not that of a run that holds.
+TEST_F(Verbs, WriteTheirDocumentEvenIfStandardOutputCannotBeWritten) {
+  if (!files::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
+  EXPECT_EQ(cutproof("run cut.json --check --json out.json 2> error > /dev/full; exit $? #").status, 3);
+  EXPECT_TRUE(json::parse(read("out.json")).at("summary").at("holds"));
+}
+
+// --- Usage
+// ------------------------------------------------------------------------------------------------------------
+
+TEST_F(Verbs, RefuseWhatIsGivenButEmpty) {
+  record();
+  for (const auto& [command, option] :
+       std::vector<std::pair<std::string, std::string>>{{"run cut.json --json ''", "--json"},
+                                                        {"run cut.json --json=", "--json"},
+                                                        {"run cut.json --record ''", "--record"},
+                                                        {"run cut.json --errors ''", "--errors"},
+                                                        {"run cut.json --against ''", "--against"},
+                                                        {"run cut.json --backend ''", "--backend"},
+                                                        {"run cut.json --mesh ''", "--mesh"},
+                                                        {"run ''", "scene"},
+                                                        {"check seen --json ''", "--json"},
+                                                        {"check ''", "recording"},
+                                                        {"fuzz --cases 5 --json ''", "--json"},
+                                                        {"fuzz --cases 5 --shard ''", "--shard"},
+                                                        {"fuzz --cases 5 --save ''", "--save"},
+                                                        {"fuzz --merge ''", "--merge"},
+                                                        {"replay '" + counterexample() + "' --record ''", "--record"},
+                                                        {"replay '" + counterexample() + "' --backend ''", "--backend"},
+                                                        {"tune cut.json --tolerance 1 --json ''", "--json"},
+                                                        {"tune cut.json --tolerance 1 --write ''", "--write"},
+                                                        {"bench stages --sizes 1000 --json ''", "--json"},
+                                                        {"bench stages --scenes ''", "--scenes"},
+                                                        {"bench sampling --json ''", "--json"},
+                                                        {"bench clusters --json ''", "--json"},
+                                                        {"bench scale --json ''", "--json"},
+                                                        {"bench rotations --json ''", "--json"},
+                                                        {"bench machine_limits --json ''", "--json"},
+                                                        {"bench solver --json ''", "--json"},
+                                                        {"bench baselines --json ''", "--json"},
+                                                        {"bench factors --json ''", "--json"}}) {
+    expect_refused(command, {option});
+  }
+}
+
+TEST_F(Verbs, RefuseUnknownOptionsMissingValuesAndNegativeCounts) {
+  for (const auto& [command, word] :
+       std::vector<std::pair<std::string, std::string>>{{"run cut.json --frobnicate", "--frobnicate"},
+                                                        {"run cut.json more.json", "more.json"},
+                                                        {"run cut.json --json", "--json"},
+                                                        {"run cut.json --frames -1", "--frames"},
+                                                        {"run cut.json --particles -1", "--particles"},
+                                                        {"check seen --frobnicate", "--frobnicate"},
+                                                        {"check seen --json", "--json"},
+                                                        {"info --frobnicate", "--frobnicate"},
+                                                        {"fuzz --frobnicate", "--frobnicate"},
+                                                        {"fuzz --cases", "--cases"},
+                                                        {"fuzz --cases -1", "--cases"},
+                                                        {"fuzz --cases 1.5", "--cases"},
+                                                        {"fuzz --seconds -1", "--seconds"},
+                                                        {"fuzz --seed -1", "--seed"},
+                                                        {"fuzz --batch 0", "--batch"},
+                                                        {"fuzz --threads -1", "--threads"},
+                                                        {"replay case.json --frobnicate", "--frobnicate"},
+                                                        {"replay case.json --record", "--record"},
+                                                        {"tune cut.json --tolerance 1 --frobnicate", "--frobnicate"},
+                                                        {"tune cut.json --tolerance", "--tolerance"},
+                                                        {"tune cut.json --tolerance 1 --frames 0", "--frames"},
+                                                        {"tune cut.json --tolerance 1 --repeats -1", "--repeats"},
+                                                        {"tune cut.json --tolerance 1 --answer limit", "--answer"},
+                                                        {"bench stages --frobnicate", "--frobnicate"},
+                                                        {"bench stages --frames -1", "--frames"},
+                                                        {"bench stages --sizes -1000", "--sizes"},
+                                                        {"bench sampling --repeats -1", "--repeats"},
+                                                        {"bench clusters --particles -1", "--particles"},
+                                                        {"bench scale --sizes", "--sizes"},
+                                                        {"bench rotations --matrices -1", "--matrices"},
+                                                        {"bench machine_limits --repeats -1", "--repeats"},
+                                                        {"bench floors", "machine_limits"},
+                                                        {"bench solver --samples -1", "--samples"},
+                                                        {"bench solver --particles -1", "--particles"},
+                                                        {"bench baselines --particles -1", "--particles"},
+                                                        {"bench factors --repeats -1", "--repeats"},
+                                                        {"bench factors --seed -1", "--seed"}}) {
+    expect_refused(command, {word});
+  }
+}
+
+// --- Gates that judged nothing
+// ----------------------------------------------------------------------------------------
+
+TEST_F(Verbs, FailACampaignThatJudgedNothing) {
+  for (const char* nothing : {"--cases 0", "--seconds 0", "--cases 1 --shard 2/2"}) {
+    const Outcome outcome = cutproof(std::string("fuzz --json out.json ") + nothing);
+    EXPECT_EQ(outcome.status, 1) << nothing << "\n" << outcome.output;
+    EXPECT_NE(outcome.output.find("FAILS: nothing was judged"), std::string::npos) << outcome.output;
+    EXPECT_EQ(outcome.output.find("all hold"), std::string::npos) << outcome.output;
+    const json document = json::parse(read("out.json"));
+    EXPECT_EQ(document.at("cases"), 0);
+    EXPECT_FALSE(document.at("holds"));
+  }
+  // Nor do all shards together hold, if none of them judged anything.
+  for (const std::string shard : {"1", "2"}) {
+    EXPECT_EQ(cutproof("fuzz --cases 0 --shard " + shard + "/2 --json " + shard + ".json").status, 1);
+  }
+  const Outcome merged = cutproof("fuzz --merge 1.json 2.json --json merged.json");
+  EXPECT_EQ(merged.status, 1) << merged.output;
+  EXPECT_NE(merged.output.find("nothing was judged"), std::string::npos) << merged.output;
+  EXPECT_FALSE(json::parse(read("merged.json")).at("holds"));
+}
+
+// The irregular path has no body of boxes.
+TEST_F(Verbs, FailABenchmarkThatMeasuredNothing) {
+  const Outcome outcome = cutproof("bench stages --scenes irregular --clusters boxes --json out.json");
+  EXPECT_EQ(outcome.status, 1) << outcome.output;
+  EXPECT_NE(outcome.output.find("nothing was measured"), std::string::npos) << outcome.output;
+  EXPECT_FALSE(files::exists(path("out.json")));
+}
+
+TEST_F(Verbs, FailATuningThatFoundNothing) {
+  const Outcome outcome = cutproof("tune cut.json --tolerance 1e-9 --frames 1 --repeats 1 --json out.json");
+  EXPECT_EQ(outcome.status, 1) << outcome.output;
+  const json document = json::parse(read("out.json"));
+  EXPECT_TRUE(document.at("trials").empty());
+  EXPECT_TRUE(document.at("found").is_null());
+}
+
+}  // namespace

@@ -1,0 +1,115 @@
+// Every backend is what its description says.
+#include "harness/backends.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "model/error.h"
+#include "tests/cli/program.h"
+
+namespace {
+
+using namespace cutproof::harness;
+using cutproof::kStages;
+using cutproof::Span;
+using cutproof::Stage;
+
+// Where there is no device, those that need one are not made.
+std::vector<const BackendDescriptor*> backends_of_this_machine() {
+  std::vector<const BackendDescriptor*> found;
+  for (const BackendDescriptor& backend : backends()) {
+    if (backend.is_built() && !processor_of(backend).empty()) found.push_back(&backend);
+  }
+  return found;
+}
+
+BackendChoice choice_of(const BackendDescriptor& backend) {
+  BackendChoice choice;
+  choice.name = backend.name;
+  return choice;
+}
+
+TEST(Backends, HaveTheArithmeticAndTheSpansOfTheirDescription) {
+  ASSERT_GE(backends_of_this_machine().size(), 3U);
+  for (const BackendDescriptor* const described : backends_of_this_machine()) {
+    const auto backend = make_backend(choice_of(*described));
+    EXPECT_EQ(backend->precision(), described->precision) << described->name;
+    for (const Stage first : kStages) {
+      for (const Stage last : kStages) {
+        if (first <= last) {
+          EXPECT_EQ(backend->can_run({first, last}), described->can_run({first, last})) << described->name;
+        }
+      }
+    }
+    EXPECT_TRUE(described->can_run(Span{})) << "whole frames are always among them";
+  }
+}
+
+TEST(Backends, HaveNamesOfTheirOwnAndOneReference) {
+  std::set<std::string_view> names;
+  int references = 0;
+  for (const BackendDescriptor& backend : backends()) {
+    EXPECT_TRUE(names.insert(backend.name).second) << backend.name;
+    EXPECT_EQ(find_backend(backend.name), &backend);
+    EXPECT_FALSE(backend.summary.empty());
+    EXPECT_GT(backend.timed_frames, 0);
+    EXPECT_GT(backend.bodies_in_a_load, 0);
+    references += backend.is_the_reference;
+  }
+  EXPECT_EQ(references, 1);
+  EXPECT_TRUE(reference_backend().is_the_reference);
+  EXPECT_EQ(find_backend("nobody"), nullptr);
+}
+
+TEST(Backends, TakeKernelOptionsIfTheyRunTheKernels) {
+  for (const BackendDescriptor* const described : backends_of_this_machine()) {
+    BackendChoice choice = choice_of(*described);
+    choice.split = "global";
+    choice.rotation = "svd";
+    if (described->takes_kernel_options) {
+      EXPECT_NO_THROW(make_backend(choice)) << described->name;
+      EXPECT_EQ(rotation_of(choice), "svd");
+      EXPECT_EQ(split_of(choice), "global");
+      EXPECT_EQ(rotation_of(choice_of(*described)), default_rotation());
+    } else {
+      EXPECT_THROW(make_backend(choice), cutproof::InputError) << described->name;
+      EXPECT_FALSE(rotation_of(choice).empty());
+      EXPECT_FALSE(split_of(choice).empty());
+    }
+  }
+}
+
+// Loads beside each other: no two share threads, and each has a schedule of its own.
+TEST(Backends, AreMadeForLoadsBesideEachOther) {
+  for (const BackendDescriptor& backend : backends()) {
+    const BackendChoice first = choice_for_load(choice_of(backend), 0), second = choice_for_load(choice_of(backend), 1);
+    EXPECT_EQ(first.threads, backend.processor == Processor::all_threads ? 1 : 0) << backend.name;
+    EXPECT_EQ(first.seed != second.seed && first.schedule != second.schedule, backend.takes_schedule) << backend.name;
+  }
+}
+
+using BackendsOfTheProgram = Program;
+
+TEST_F(BackendsOfTheProgram, AreListedByInfoByHelpAndWhereOneIsUnknown) {
+  const Outcome info = cutproof("info"), help = cutproof("run --help"),
+                unknown = cutproof("run x.json --backend nobody");
+  EXPECT_EQ(unknown.status, 2);
+  for (const BackendDescriptor& backend : backends()) {
+    for (const Outcome* const outcome : {&info, &help, &unknown}) {
+      EXPECT_NE(outcome->output.find(backend.name), std::string::npos) << backend.name << " in:\n" << outcome->output;
+    }
+    EXPECT_NE(info.output.find(backend.is_built() ? std::string(backend.summary) : "not built"), std::string::npos);
+  }
+}
+
+TEST_F(BackendsOfTheProgram, AreTimedOnlyIfWhatTheyTakeSaysSomething) {
+  for (const BackendDescriptor& backend : backends()) {
+    if (backend.is_timed) continue;
+    for (const char* command : {"bench stages --sizes 1000 --backend ", "bench machine_limits --backend "}) {
+      expect_refused(command + std::string(backend.name), {std::string(backend.name), "finding faults"});
+    }
+  }
+}
+
+}  // namespace

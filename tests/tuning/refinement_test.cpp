@@ -1,0 +1,102 @@
+// The reference solution against solutions that owe nothing to it: a parabola, and a sparse factorisation.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "model/io/scene_io.h"
+#include "oracles/comparison/reference_solution.h"
+#include "oracles/relations/relations.h"
+#include "tuning/prepared_scene.h"
+#include "tuning/reference_solution.h"
+
+namespace cutproof::tuning {
+namespace {
+
+Scene scene_of(const std::string& text) { return io::parse_scene(text, "test"); }
+
+constexpr const char* kFalling = R"({"version": 1, "name": "falling",
+  "body": {"shape": {"kind": "box", "size": [0.04, 0.03, 0.03]}, "spacing": 0.01},
+  "frame": {"length": 0.016, "count": 6}, "step": {"gravity": [0, 0, -9.81]}})";
+
+// A body that falls freely: x = g t² / 2. Implicit Euler falls g t dt / 2 farther.
+TEST(ReferenceSolution, OfShortTimeStepsIsTheParabola) {
+  const ReferenceSolution solution(ReferenceKind::limit, scene_of(kFalling), "test", {}, 1e-6);
+  const double h = 0.01, g = 9.81, t = 6 * 0.016;
+  ASSERT_EQ(solution.trajectory().frames.size(), 6u);
+  const PreparedScene prepared(scene_of(kFalling), "test", {});
+  const double fallen = solution.trajectory().frames.back().x[0].z - prepared.start().x[0].z;
+  // 1e-6 h cannot be reached: the last level allowed is taken.
+  const int32_t substeps = solution.levels().back().substeps;
+  EXPECT_EQ(substeps, ReferenceSolution::kMostSubsteps);
+  const double dt = 0.016 / substeps;
+  EXPECT_NEAR(fallen, -g * t * t / 2 - g * t * dt / 2, 1e-9 * h);
+  EXPECT_NEAR(solution.known_to_h(), g * t * dt / 2 / h, 1e-9);
+  EXPECT_LE(std::abs(fallen + g * t * t / 2) / h, 1.0001 * solution.known_to_h());
+}
+
+TEST(ReferenceSolution, IsRefinedUntilItIsKnown) {
+  const ReferenceSolution rough(ReferenceKind::limit, scene_of(kFalling), "test", {}, 1);
+  EXPECT_EQ(rough.levels().size(), 2u);
+  EXPECT_FALSE(rough.levels().front().apart_h);
+  ReferenceSolution fine(ReferenceKind::limit, scene_of(kFalling), "test", {}, 0.005);
+  EXPECT_GT(fine.levels().size(), 2u);
+  EXPECT_LE(fine.known_to_h(), 0.005);
+  const std::size_t levels = fine.levels().size();
+  fine.refine();
+  EXPECT_EQ(fine.levels().size(), levels + 1);
+  EXPECT_TRUE(fine.nothing_removed());
+}
+
+// Each substep solved exactly, one after the other, by Cholesky factorisation.
+TEST(ReferenceSolution, OfItsOwnSubstepsIsWhatASparseFactorisationFinds) {
+  const Scene scene = scene_of(R"({"version": 1, "name": "hanging",
+    "body": {"shape": {"kind": "box", "size": [0.08, 0.03, 0.03]}, "spacing": 0.01}, "clusters": {"side": 2},
+    "frame": {"length": 0.016, "count": 5}, "step": {"substeps": 2, "gravity": [0, 0, -9.81], "damping": 3},
+    "grips": [{"low": [0, 0, 0], "high": [0.2, 1, 1]}]})");
+  const ReferenceSolution solution(ReferenceKind::substeps, scene, "test", {}, 1e-9);
+  EXPECT_EQ(solution.levels().back().substeps, 2);
+  EXPECT_LE(solution.known_to_h(), 1e-9);
+
+  const PreparedScene prepared(scene, "test", {});
+  State state = prepared.start();
+  double moved = 0;
+  // Every substep is like the first: no blade, and what is held stays where it is.
+  const cutproof::Setup single = oracles::single_substep_setup(prepared.setup(), 0);
+  const double dt = single.substep_length.front(), decay = std::exp(-single.step.damping * dt);
+  for (std::size_t f = 0; f < 5; ++f) {
+    for (int substep = 0; substep < 2; ++substep) {
+      oracles::ReferenceSolution exact = oracles::reference_solution(single, state);
+      ASSERT_TRUE(exact.converged);
+      for (std::size_t i = 0; i < state.x.size(); ++i) state.v[i] = (decay / dt) * (exact.x[i] - state.x[i]);
+      state.x = std::move(exact.x);
+      state.clusters.rotation = std::move(exact.rotation);
+    }
+    const oracles::Pose pose{state.x, state.alive, 1}, rest{prepared.start().x, state.alive, 1};
+    EXPECT_LE(oracles::poses_apart(prepared.setup(), pose, solution.trajectory().frames[f]).position.max, 1e-8) << f;
+    moved = std::max(moved, oracles::poses_apart(prepared.setup(), pose, rest).position.max);
+  }
+  EXPECT_GT(moved, 0.05) << "it hangs from a grip: it has to move, else nothing is compared";
+}
+
+Trajectory trajectory(std::vector<int32_t> components, std::vector<int64_t> stroke_end) {
+  Trajectory made;
+  for (const int32_t count : components) made.frames.push_back({{}, {}, count});
+  made.stroke_end = std::move(stroke_end);
+  return made;
+}
+
+TEST(DifferenceInParts, IsSeenAtTheEndOfStrokesAndOfTheScene) {
+  const Trajectory solution = trajectory({1, 1, 2, 2}, {1, 2});
+  EXPECT_EQ(difference_in_parts(solution, solution), "");
+  // A stroke may end in another frame: a blade takes whole substeps.
+  EXPECT_EQ(difference_in_parts(solution, trajectory({1, 1, 1, 2, 2}, {1, 3})), "");
+  EXPECT_NE(difference_in_parts(solution, trajectory({1, 2, 2, 2}, {1, 2})).find("after stroke 1"), std::string::npos);
+  EXPECT_NE(difference_in_parts(solution, trajectory({1, 1, 2, 3}, {1, 2})).find("at the end"), std::string::npos);
+  // Between them parts may come a frame earlier or later.
+  EXPECT_EQ(difference_in_parts(trajectory({1, 1, 2, 2}, {}), trajectory({1, 2, 2, 2}, {})), "");
+  // A stroke that one of the two does not reach is not compared.
+  EXPECT_EQ(difference_in_parts(trajectory({1, 1}, {0, -1}), trajectory({1, 1}, {0, 1})), "");
+}
+
+}  // namespace
+}  // namespace cutproof::tuning

@@ -1,0 +1,90 @@
+#include "tuning/measurement.h"
+
+#include <fmt/format.h>
+
+#include <vector>
+
+#include "model/error.h"
+#include "tuning/comparison.h"
+
+namespace cutproof::tuning {
+
+namespace {
+
+double seconds_per_frame(Backend& backend, const PreparedScene& scene) {
+  return scene.run(backend, {}) / static_cast<double>(scene.frame_count());
+}
+
+}  // namespace
+
+std::unique_ptr<Backend> Measuring::backend_for(const Configuration& configuration) const {
+  harness::BackendChoice choice = backend;
+  choice.rotation = configuration.rotation;
+  return harness::make_backend(choice);
+}
+
+Trial measure(const Measuring& measuring, const ReferenceSolution& reference, const Configuration& configuration,
+              std::optional<double> limit) {
+  Trial trial;
+  trial.configuration = configuration;
+  const bool is_given = configuration == measuring.given, to_the_end = measuring.full || is_given;
+  const std::unique_ptr<Backend> backend = measuring.backend_for(configuration);
+  std::optional<PreparedScene> scene;
+  try {
+    scene.emplace(configuration.scene, measuring.source, measuring.frames);
+  } catch (const InputError& error) {  // such as a blade that few substeps cannot follow
+    if (is_given) throw;
+    trial.outcome = Outcome::refused;
+    trial.why = error.what();
+    return trial;
+  }
+  const auto frames = static_cast<int64_t>(reference.trajectory().frames.size());
+  const bool other_schedule = scene->frame_count() != frames;
+  if (other_schedule) {
+    trial.outcome = Outcome::schedule;
+    trial.why = fmt::format("{} frames, the reference solution has {}", scene->frame_count(), frames);
+    if (!to_the_end) return trial;
+  }
+  Comparison comparison(scene->setup(), reference.trajectory(), measuring.allowed(reference));
+  bool given_up = false;
+  scene->run(*backend, [&](double seconds) {
+    comparison.add(backend->snapshot().front());
+    if (to_the_end) return true;
+    // What is more expensive by its first run may be a little less so by its median.
+    const bool more_expensive = limit && seconds > 1.5 * *limit * static_cast<double>(frames);
+    given_up = comparison.beyond() || more_expensive;
+    if (given_up) trial.outcome = comparison.beyond() ? Outcome::over : Outcome::more_expensive;
+    return !given_up;
+  });
+  comparison.report(trial);
+  if (given_up) {
+    trial.why = fmt::format("given up in frame {} of {}", trial.rms_h.size() - 1, frames);
+    return trial;
+  }
+  comparison.trajectory().stroke_end = scene->stroke_end();
+  if (!other_schedule) {
+    trial.why = difference_in_parts(reference.trajectory(), comparison.trajectory());
+    trial.outcome = !trial.why.empty() ? Outcome::topology : comparison.beyond() ? Outcome::over : Outcome::within;
+  }
+  if (trial.outcome == Outcome::within || to_the_end) {
+    std::vector<double> samples;
+    for (int repeat = 0; repeat < measuring.repeats; ++repeat) samples.push_back(seconds_per_frame(*backend, *scene));
+    trial.frame = benchmarks::times_of(samples);
+  }
+  return trial;
+}
+
+TimedInTurns time_in_turns(const Measuring& measuring, const Configuration& found) {
+  std::vector<double> before, after;
+  for (int repeat = 0; repeat < measuring.repeats; ++repeat) {
+    for (const bool given : {true, false}) {
+      const Configuration& timed = given ? measuring.given : found;
+      const std::unique_ptr<Backend> backend = measuring.backend_for(timed);
+      const PreparedScene scene(timed.scene, measuring.source, measuring.frames);
+      (given ? before : after).push_back(seconds_per_frame(*backend, scene));
+    }
+  }
+  return {benchmarks::times_of(before), benchmarks::times_of(after)};
+}
+
+}  // namespace cutproof::tuning

@@ -1,0 +1,41 @@
+// What a configuration of a scene costs on a backend, and how far it is from the reference solution.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "harness/backends.h"
+#include "tuning/prepared_scene.h"
+#include "tuning/reference_solution.h"
+#include "tuning/trial.h"
+
+namespace cutproof::tuning {
+
+// What is measured, and how.
+struct Measuring {
+  std::string source;  // the file of the scene, for messages
+  harness::BackendChoice backend;
+  Configuration given;
+  std::optional<int64_t> frames;  // at most so many of the scene's
+  double tolerance = 0;           // [h]
+  bool full = false;              // nothing is given up
+  int repeats = 3;                // timed runs of a configuration
+
+  // What is left of the tolerance where the reference solution is not known better.
+  double allowed(const ReferenceSolution& reference) const { return tolerance - reference.known_to_h(); }
+  std::unique_ptr<Backend> backend_for(const Configuration& configuration) const;
+};
+
+// `limit`: the seconds per frame beyond which it may be given up as too expensive.
+Trial measure(const Measuring& measuring, const ReferenceSolution& reference, const Configuration& configuration,
+              std::optional<double> limit);
+
+// Taken in turns, so that what the machine does meanwhile falls on both; and anew, because the least of many figures
+// is too good.
+struct TimedInTurns {
+  benchmarks::Times given, found;  // per frame
+};
+TimedInTurns time_in_turns(const Measuring& measuring, const Configuration& found);
+
+}  // namespace cutproof::tuning

@@ -1,0 +1,104 @@
+#include "tuning/reference_solution.h"
+
+#include <algorithm>
+#include <cmath>
+#include <future>
+#include <limits>
+#include <memory>
+
+#include "reference_cpu/reference.h"
+#include "tuning/prepared_scene.h"
+
+namespace cutproof::tuning {
+
+namespace {
+
+// What is left, at most, of the error that a substep starts with.
+constexpr double kLeft = 1e-4;
+constexpr int32_t kLeastSubsteps = 32, kLeastIterations = 16;
+
+// Iterations that shrink every error of a substep to kLeft: with rotations held, each multiplies it by at most
+// s = k dt² / (1 + k dt²) (method.md §3).
+int32_t enough_iterations(const Scene& scene, int32_t substeps) {
+  const double dt = scene.frame_length / substeps, kdt2 = scene.step.stiffness * dt * dt, s = kdt2 / (1 + kdt2);
+  if (s < kLeft) return 2;
+  const double iterations = std::ceil(std::log(kLeft) / std::log(s));
+  return static_cast<int32_t>(std::clamp(iterations, 2.0, 1.0 * ReferenceSolution::kMostIterations));
+}
+
+}  // namespace
+
+ReferenceSolution::ReferenceSolution(ReferenceKind kind, const Scene& scene, std::string source,
+                                     std::optional<int64_t> frames, double known)
+    : kind_(kind), scene_(scene), source_(std::move(source)), frames_(frames) {
+  scene_.skin.wanted = false;  // nothing moves with it
+  scene_.step.acceleration = Acceleration::none;
+  setup_ = PreparedScene(scene_, source_, frames_).setup();
+  levels_ = {next_level()};
+  // At least two levels are needed. They know nothing of each other, so they are run at once.
+  const RefinementLevel first = levels_.front(), second = next_level();
+  std::future<Trajectory> finer = std::async(std::launch::async, [&] { return run(second); });
+  trajectory_ = run(first);
+  take(second, finer.get());
+  while (known_to_h() > known) {
+    const RefinementLevel next = next_level();
+    if (next.substeps > kMostSubsteps || next.iterations > kMostIterations) break;
+    refine();
+  }
+}
+
+RefinementLevel ReferenceSolution::next_level() const {
+  RefinementLevel level;
+  if (kind_ == ReferenceKind::substeps) {
+    level.substeps = scene_.step.substeps;
+    level.iterations =
+        levels_.empty() ? std::max(kLeastIterations, scene_.step.iterations) : 2 * levels_.back().iterations;
+  } else {
+    level.substeps = levels_.empty() ? std::max(kLeastSubsteps, 4 * scene_.step.substeps) : 2 * levels_.back().substeps;
+    level.iterations = enough_iterations(scene_, level.substeps);
+  }
+  return level;
+}
+
+Trajectory ReferenceSolution::run(const RefinementLevel& level) const {
+  Scene scene = scene_;
+  scene.step.substeps = level.substeps;
+  scene.step.iterations = level.iterations;
+  const PreparedScene prepared(scene, source_, frames_);
+  const std::unique_ptr<Backend> reference = reference::make_backend();
+  Trajectory trajectory;
+  trajectory.stroke_end = prepared.stroke_end();
+  prepared.run(*reference, [&](double) {
+    trajectory.frames.push_back(oracles::pose_of(prepared.setup(), reference->snapshot().front(),
+                                                 trajectory.frames.empty() ? nullptr : &trajectory.frames.back()));
+    return true;
+  });
+  return trajectory;
+}
+
+void ReferenceSolution::take(RefinementLevel level, Trajectory trajectory) {
+  double apart = 0;
+  for (std::size_t f = 0; f < std::min(trajectory.frames.size(), trajectory_.frames.size()); ++f) {
+    apart = std::max(apart, oracles::poses_apart(setup_, trajectory.frames[f], trajectory_.frames[f]).position.rms());
+  }
+  // Refinement levels between which the tissue falls into other parts, or whose blades arrive in other frames, say
+  // nothing about where anything is.
+  if (!difference_in_parts(trajectory, trajectory_).empty() || trajectory.frames.size() != trajectory_.frames.size())
+    apart = std::numeric_limits<double>::infinity();
+  level.apart_h = apart;
+  levels_.push_back(level);
+  trajectory_ = std::move(trajectory);
+}
+
+void ReferenceSolution::refine() {
+  const RefinementLevel next = next_level();
+  take(next, run(next));
+}
+
+bool ReferenceSolution::nothing_removed() const {
+  return std::all_of(trajectory_.frames.begin(), trajectory_.frames.end(), [](const oracles::Pose& pose) {
+    return std::find(pose.alive.begin(), pose.alive.end(), 0) == pose.alive.end();
+  });
+}
+
+}  // namespace cutproof::tuning

@@ -1,0 +1,49 @@
+// One configuration of a scene that was tried, and what came of it.
+#pragma once
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "benchmarks/times.h"
+#include "model/scene.h"
+
+namespace cutproof::tuning {
+
+struct Configuration {
+  Scene scene;
+  std::string rotation;  // kernels: how rotations are found; empty: the backend's default
+  friend bool operator==(const Configuration&, const Configuration&) = default;
+};
+// What differs from `given` apart from substeps, iterations and acceleration, as a person would write it; empty:
+// nothing.
+std::string differences(const Configuration& configuration, const Configuration& given);
+
+enum class Outcome {
+  within,          // the error is within the tolerance, and the tissue falls into the same parts
+  over,            // the error is beyond it
+  topology,        // at the end of a stroke or of the scene the tissue is in a different number of parts
+  schedule,        // the scene has another number of frames: a blade takes whole substeps for each piece of its path
+  refused,         // the scene cannot be built like this
+  more_expensive,  // given up: before its end it had cost more than the cheapest that is within
+};
+const char* name_of(Outcome outcome);
+
+// One configuration that was tried.
+struct Trial {
+  Configuration configuration;
+  Outcome outcome = Outcome::over;
+  // RMS distance from the reference solution at the end of each frame of the scene [h], up to the frame in which it was
+  // given up; what is not a number is infinite.
+  std::vector<double> rms_h;
+  double greatest_rms_h = 0, greatest_h = 0;  // over these frames [h]
+  std::optional<std::size_t> first_beyond;    // the first of them that is beyond the tolerance
+  int64_t removed_otherwise = 0;  // particles that only this or only the reference solution has, in the last of them
+  std::string why;                // what a table says about a trial that is not within
+  benchmarks::Times frame;        // seconds per frame of the scene; no samples if it was given up
+};
+// The fields of docs/results_schema.md.
+nlohmann::json to_json(const Trial& trial, const Configuration& given);
+
+}  // namespace cutproof::tuning
