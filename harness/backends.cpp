@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "gpu/backends.h"
+#include "harness/partial_backend.h"
 #include "model/error.h"
 #include "reference_cpu/reference.h"
 
@@ -74,6 +75,12 @@ constexpr std::unique_ptr<Backend> (*make_eager_gpu)(const BackendChoice&) = nul
 #endif
 
 constexpr bool any_span(Span) { return true; }
+constexpr bool whole_frames(Span span) { return span.first == Stage::step && span.last == Stage::skin; }
+constexpr bool split_alone(Span span) { return span.first == Stage::split && span.last == Stage::split; }
+
+std::unique_ptr<Backend> make_host(const BackendChoice& choice) {
+  return gpu::make_host_backend(choice.threads > 0 ? choice.threads : cpu_threads(), kernel_options(choice));
+}
 
 // No strings that allocate: this table is there before main() and where there is no memory.
 constexpr std::array kBackends = {
@@ -95,11 +102,27 @@ constexpr std::array kBackends = {
         .processor = Processor::all_threads,
         .takes_kernel_options = true,
         .can_run = any_span,
-        .make =
-            [](const BackendChoice& choice) {
-              return gpu::make_host_backend(choice.threads > 0 ? choice.threads : cpu_threads(),
-                                            kernel_options(choice));
-            },
+        .make = make_host,
+    },
+    BackendDescriptor{
+        .name = "host-frames",
+        .summary = "the same, whole frames only: what a guest that cannot be asked for a stage is judged on",
+        .precision = Precision::binary32,
+        .processor = Processor::all_threads,
+        .is_timed = false,
+        .takes_kernel_options = true,
+        .can_run = whole_frames,
+        .make = [](const BackendChoice& choice) { return offer_only(make_host(choice), "host-frames", whole_frames); },
+    },
+    BackendDescriptor{
+        .name = "host-split",
+        .summary = "the same, the split stage only; all others are the reference's",
+        .precision = Precision::binary32,
+        .processor = Processor::all_threads,
+        .is_timed = false,
+        .takes_kernel_options = true,
+        .can_run = split_alone,
+        .make = [](const BackendChoice& choice) { return offer_only(make_host(choice), "host-split", split_alone); },
     },
     BackendDescriptor{
         .name = "simulated",

@@ -4,6 +4,7 @@
 #include <sstream>
 #include <utility>
 
+#include "harness/backends.h"
 #include "harness/frame_runner.h"
 #include "harness/judge.h"
 #include "harness/reference_stages.h"
@@ -118,6 +119,8 @@ Judgement judge_case(const Case& c, const Loaded& loaded, const CaseRun& run, co
   note_what_is_given(c, loaded, judgement);
   judgement.failure = run.failure;
 
+  const harness::BackendDescriptor* const described = harness::find_backend(backend);  // a test's has no description
+  const bool is_the_reference = described != nullptr && described->is_the_reference;
   harness::Judge judge(setup, backend, harness::kPromisesOfRules,
                        thorough ? harness::Thorough::always : harness::Thorough::never);
   judge.begin(run.trace.initial, run.has_expanded || c.clusters == ClusterKind::foreign);  // those begin anywhere
@@ -149,7 +152,7 @@ Judgement judge_case(const Case& c, const Loaded& loaded, const CaseRun& run, co
     }
     const int32_t components_before = std::exchange(components, judge.component_count());
     if (moment.span.contains(Stage::detect) && components > components_before) judgement[Happened::separation] = true;
-    if (backend == "reference" || !moment.by_backend || std::count(due.begin(), due.end(), true) != 1) continue;
+    if (is_the_reference || !moment.by_backend || std::count(due.begin(), due.end(), true) != 1) continue;
     const auto stage = static_cast<Stage>(std::find(due.begin(), due.end(), true) - due.begin());
     if (stage == Stage::step && !c.moves) continue;
     // Nothing is compared with the middle of a span that goes on to the end of the frame.
