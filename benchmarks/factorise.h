@@ -29,7 +29,7 @@ struct Factorised {
 // is in the form and has the order that they need, with the new rows in it.
 std::optional<Factorised> factorise(const SystemChange& change, Way way, const std::vector<double>& right);
 
-// By how much the residual may differ from 0 (docs/accuracy_and_speed.md §6).
+// By how much the residual may differ from 0 (tolerances.md, Residual of a factor).
 double residual_bound(const SystemChange& change, Way way);
 
 }  // namespace cutproof::benchmarks

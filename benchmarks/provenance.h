@@ -1,5 +1,5 @@
 // Where a result comes from: the fields with which every document of `bench` and `tune` begins
-// (docs/results_schema.md).
+// (results_schema.md).
 #pragma once
 #include <functional>
 #include <nlohmann/json.hpp>

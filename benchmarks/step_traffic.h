@@ -1,4 +1,4 @@
-// The memory traffic that a step cannot do without, and what that takes at best (docs/results_schema.md, The limit of
+// The memory traffic that a step cannot do without, and what that takes at best (results_schema.md, The limit of
 // step).
 #pragma once
 #include <cstdint>

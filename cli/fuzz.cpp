@@ -87,8 +87,8 @@ CampaignOptions campaign_options(const FuzzOptions& options) {
 
 // Exit status of a campaign as it is written down; says why.
 int print_conclusion(const json& document, bool whole) {
-  for (const char* name : kHappenedNames) {
-    fmt::print("  {:<28} {:>9}\n", name, document.at("happened").at(name).get<int64_t>());
+  for (const char* name : kCoverageClassNames) {
+    fmt::print("  {:<28} {:>9}\n", name, document.at("coverage").at(name).get<int64_t>());
   }
   fmt::print("{} cases of {:.0f} particles on average, {} verdicts, {:.1f} s, {:.0f} cases/s\n",
              document.at("cases").get<int64_t>(), document.at("mean_particles").get<double>(),
@@ -156,10 +156,10 @@ Campaign run(const FuzzOptions& options, const CampaignOptions& asked) {
   const int64_t of_this_shard = (asked.cases - asked.shard + asked.shards - 1) / asked.shards;
   Progress progress("case", options.seconds ? 0 : of_this_shard);
   return run_campaign(asked, source, [&](const Campaign& so_far) {
-    const auto classes = std::count_if(so_far.happened.begin(), so_far.happened.end(), [](int64_t n) { return n > 0; });
+    const auto classes = std::count_if(so_far.coverage.begin(), so_far.coverage.end(), [](int64_t n) { return n > 0; });
     progress.show(so_far.cases, fmt::format("{:.0f} cases/s, {} of {} classes met, {} violations",
-                                            static_cast<double>(so_far.cases) / so_far.seconds, classes, kHappenedCount,
-                                            so_far.violations.size()));
+                                            static_cast<double>(so_far.cases) / so_far.seconds, classes,
+                                            kCoverageClassCount, so_far.violations.size()));
   });
 }
 

@@ -1,4 +1,4 @@
-// --json: the machine's interface; docs/results_schema.md describes every field.
+// --json: the machine's interface; results_schema.md describes every field.
 #pragma once
 #include <array>
 #include <cstdint>

@@ -232,7 +232,9 @@ int run(const RunOptions& options) {
       fmt::print("FAILS: {}: {} in frame {}\n", verdict.property, name_of(verdict.stage), verdict.frame);
     }
   }
-  return broken.empty() && (!judge || judge->holds()) && (!against || against->holds()) && (!errors || errors->holds()) ? 0 : 1;
+  return broken.empty() && (!judge || judge->holds()) && (!against || against->holds()) && (!errors || errors->holds())
+             ? 0
+             : 1;
 }
 
 }  // namespace

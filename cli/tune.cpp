@@ -1,4 +1,4 @@
-// `cutproof tune`: the cheapest configuration of a scene within a tolerance (docs/tune.md).
+// `cutproof tune`: the cheapest configuration of a scene within a tolerance (measuring.md, Tuning).
 #include "tuning/tune.h"
 
 #include <fmt/format.h>

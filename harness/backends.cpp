@@ -245,7 +245,8 @@ std::unique_ptr<Backend> make_backend(const BackendChoice& choice) {
   return backend.make(choice);
 }
 
-std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice, std::shared_ptr<gpu::ThreadSchedule> record) {
+std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice,
+                                               std::shared_ptr<gpu::ThreadSchedule> record) {
   return make_simulated(
       [inner = generator(choice), record](const gpu::Candidates& candidates) {
         const int thread = inner(candidates);

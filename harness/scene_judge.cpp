@@ -29,7 +29,7 @@ void SceneJudge::finish() {
     verdict.measured = measured;
     verdict.bound = bound;
     verdict.unit = "1";
-    verdict.bound_source = "docs/oracles.md, A whole run";
+    verdict.bound_source = "oracles.md, A whole run";
     verdict.checked = 1;
     if (!holds) verdict.witness.text = text;
     judge_.add(std::move(verdict));

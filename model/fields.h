@@ -27,7 +27,7 @@ enum class IndexSpace {
 // What a value is, and so what becomes of it where the body is turned, shifted, scaled or numbered otherwise.
 enum class Quantity { number, particle, vertices, flag, mass, point, velocity, momentum, rotation, direction };
 
-// Groups of fields, as bits, by which it is told what a verdict rests on.
+// Groups of fields, as bits, that say what a verdict rests on.
 enum Part : unsigned {
   kMotion = 1,      // x, v, impulse
   kAlive = 2,       // alive

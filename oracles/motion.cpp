@@ -111,11 +111,11 @@ class Motion {
   void judge_single_substep() {
     for (std::size_t i = 0; i < before_.alive.size(); ++i) {
       if (before_.alive[i] == 0) continue;
-      const Vec3 moved = after_.x[i] - before_.x[i], told = (dt_ / decay_) * after_.v[i];
+      const Vec3 moved = after_.x[i] - before_.x[i], expected = (dt_ / decay_) * after_.v[i];
       const double rounding = 8 * u_ * norm(moved) + stored(i);
-      compare(norm(moved - told), rounding, {static_cast<int32_t>(i)}, [&] {
+      compare(norm(moved - expected), rounding, {static_cast<int32_t>(i)}, [&] {
         return fmt::format("particle {} moved by {:.6g} h in one substep, its velocity says {:.6g} h", i,
-                           norm(moved) / h_, norm(told) / h_);
+                           norm(moved) / h_, norm(expected) / h_);
       });
     }
   }
@@ -200,7 +200,8 @@ class Motion {
     }
     if (setup_.walls.empty() && pushes[0] == Pushes::none) {
       compare(h_ * norm(after_.impulse), 0, {}, [&] {
-        return fmt::format("an impulse of {:.6g} kg m/s is told, but nothing touches the body", norm(after_.impulse));
+        return fmt::format("the state names an impulse of {:.6g} kg m/s, but nothing touches the body",
+                           norm(after_.impulse));
       });
     }
   }

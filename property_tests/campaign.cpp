@@ -69,7 +69,7 @@ class Pool {
 struct Load {
   std::vector<int64_t> indices;
   std::vector<Case> cases;
-  std::vector<Loaded> loaded;
+  std::vector<Instance> loaded;
 };
 
 class Runner {
@@ -115,7 +115,7 @@ class Runner {
       if (index >= options_.cases) break;
       load.indices.push_back(index);
       load.cases.push_back(case_at(options_, index));
-      load.loaded.push_back(property_tests::load(load.cases.back()));
+      load.loaded.push_back(property_tests::instance_of(load.cases.back()));
     }
     if (load.cases.empty()) return false;
     const double generating = seconds_since(begin);
@@ -164,7 +164,7 @@ class Runner {
       ++campaign_.cases;
       campaign_.verdicts += judgement.verdicts;
       campaign_.particles += load.loaded[k].setup.body.particle_count();
-      for (std::size_t h = 0; h < kHappenedCount; ++h) campaign_.happened[h] += judgement.happened[h];
+      for (std::size_t h = 0; h < kCoverageClassCount; ++h) campaign_.coverage[h] += judgement.coverage[h];
       campaign_.compared.join(judgement.compared);
       if (!judgement.failure) continue;
       campaign_.violations.push_back({load.indices[k], load.cases[k], std::move(*judgement.failure)});

@@ -23,7 +23,7 @@ struct CampaignOptions {
   int batch = 64;                      // bodies in one load
   int threads = 1;                     // each generates, loads, runs and judges whole loads
   int backends = 1;                    // how many of them may run at once
-  int thorough = 50;                   // every so manieth case with CGAL's geometric check
+  int thorough = 50;                   // every n-th case with CGAL's geometric check
   int64_t shard = 0, shards = 1;       // of cases 0, 1, 2, …: those that are `shard` modulo `shards`
   bool keep_going = false;             // beyond the first violation
 };
@@ -42,7 +42,7 @@ struct Violation {
 
 struct Campaign {
   int64_t cases = 0, verdicts = 0, particles = 0;
-  std::array<int64_t, kHappenedCount> happened = {};
+  std::array<int64_t, kCoverageClassCount> coverage = {};
   StepsCompared compared;
   std::vector<Violation> violations;  // by index; without keep_going the first alone
   double seconds = 0;                 // wall time

@@ -52,8 +52,8 @@ void add_shard(json& whole, const json& part, const std::string& file, const std
   for (auto& [name, seconds] : whole.at("thread_seconds").items()) {
     seconds = seconds.get<double>() + part.at("thread_seconds").at(name).get<double>();
   }
-  for (auto& [name, count] : whole.at("happened").items()) {
-    count = count.get<int64_t>() + part.at("happened").at(name).get<int64_t>();
+  for (auto& [name, count] : whole.at("coverage").items()) {
+    count = count.get<int64_t>() + part.at("coverage").at(name).get<int64_t>();
   }
   if (whole.contains("steps_compared")) {
     json& compared = whole.at("steps_compared");
@@ -83,8 +83,8 @@ json violation_json(const Violation& violation, const std::string& file) {
 json campaign_document(const harness::BackendChoice& backend, const CampaignOptions& options, const Campaign& campaign,
                        const json& violations) {
   const harness::BackendDescriptor& described = harness::described_backend(backend.name);
-  json happened = json::object();
-  for (std::size_t h = 0; h < kHappenedCount; ++h) happened[kHappenedNames[h]] = campaign.happened[h];
+  json coverage = json::object();
+  for (std::size_t h = 0; h < kCoverageClassCount; ++h) coverage[kCoverageClassNames[h]] = campaign.coverage[h];
   json document = {
       {"format", kFormat},
       {"format_version", kFormatVersion},
@@ -106,7 +106,7 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
       {"cases_per_second", campaign.seconds > 0 ? static_cast<double>(campaign.cases) / campaign.seconds : 0.0},
       {"thread_seconds",
        {{"generating", campaign.generating}, {"running", campaign.running}, {"judging", campaign.judging}}},
-      {"happened", happened},
+      {"coverage", coverage},
       {"violations", violations},
       {"holds", violations.empty() && campaign.verdicts > 0}};
   if (options.dynamics && !described.is_the_reference) {
@@ -169,8 +169,8 @@ CampaignConclusion conclude(const json& document, bool whole) {
   if (violations > 0) return {fmt::format("{} of {} cases", violations, cases)};
   if (!whole || cases < kCasesThatMeetEveryClass) return {};
   std::vector<std::string> empty;
-  for (const char* name : kHappenedNames) {
-    if (document.at("happened").at(name).get<int64_t>() == 0) empty.emplace_back(name);
+  for (const char* name : kCoverageClassNames) {
+    if (document.at("coverage").at(name).get<int64_t>() == 0) empty.emplace_back(name);
   }
   if (document.at("sizes").at(1).get<int>() >= kSizeThatMeetsEveryClass && !empty.empty()) {
     return {fmt::format("no case had: {}, so nothing was tested there", fmt::join(empty, ", "))};

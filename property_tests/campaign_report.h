@@ -1,4 +1,4 @@
-// Campaigns as documents (docs/results_schema.md, fuzz): one for each shard, put together to one of the whole, and what
+// Campaigns as documents (results_schema.md, fuzz): one for each shard, put together to one of the whole, and what
 // follows from it.
 #pragma once
 #include <nlohmann/json.hpp>

@@ -373,8 +373,8 @@ Setup setup_of(const Case& c) {
   return setup;
 }
 
-Loaded load(const Case& c) {
-  Loaded loaded = {setup_of(c), {}};
+Instance instance_of(const Case& c) {
+  Instance loaded = {setup_of(c), {}};
   const Setup& setup = loaded.setup;
   if (c.clusters == ClusterKind::foreign) {
     loaded.state = fixtures::foreign_state(setup.body, connected_cover(setup.body, c.most, c.seed), c.tau, c.cap);

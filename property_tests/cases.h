@@ -73,11 +73,11 @@ Stroke draw_stroke(uint64_t seed, const Case& c);
 // Strokes with links resolved, and what a backend loads. If nothing moves: geometric cuts, one stroke a substep, no
 // iteration.
 std::vector<Stroke> resolved_strokes(const Case& c);
-struct Loaded {
+struct Instance {
   Setup setup;
   State state;
 };
-Loaded load(const Case& c);
+Instance instance_of(const Case& c);
 // Its setup alone. A stroke that is appended leaves the frames of those before it as they are.
 Setup setup_of(const Case& c);
 

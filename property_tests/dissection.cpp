@@ -15,18 +15,18 @@ namespace {
 
 int64_t alive_count(const State& state) { return std::count(state.alive.begin(), state.alive.end(), 1); }
 
-void note_what_is_given(const Case& c, const Loaded& loaded, Judgement& judgement) {
+void note_what_is_given(const Case& c, const Instance& loaded, Judgement& judgement) {
   const auto n = loaded.setup.body.particle_count();
-  judgement[Happened::no_particles] = n == 0;
-  judgement[Happened::one_particle] = n == 1;
-  judgement[Happened::boxes] = c.clusters == ClusterKind::boxes;
-  judgement[Happened::sampled] = c.clusters == ClusterKind::sampled;
-  judgement[Happened::foreign] = c.clusters == ClusterKind::foreign;
-  judgement[Happened::thin_blade] = c.blade_thickness == 0 && !c.strokes.empty();
+  judgement[CoverageClass::no_particles] = n == 0;
+  judgement[CoverageClass::one_particle] = n == 1;
+  judgement[CoverageClass::boxes] = c.clusters == ClusterKind::boxes;
+  judgement[CoverageClass::sampled] = c.clusters == ClusterKind::sampled;
+  judgement[CoverageClass::foreign] = c.clusters == ClusterKind::foreign;
+  judgement[CoverageClass::thin_blade] = c.blade_thickness == 0 && !c.strokes.empty();
   for (const Stroke& stroke : resolved_strokes(c)) {
-    if (!stroke.down) judgement[Happened::pen_up] = true;
-    if (stroke.link == Link::retraced) judgement[Happened::retraced_stroke] = true;
-    if (stroke.down && stroke.from == stroke.to) judgement[Happened::zero_length_stroke] = true;
+    if (!stroke.down) judgement[CoverageClass::pen_up] = true;
+    if (stroke.link == Link::retraced) judgement[CoverageClass::retraced_stroke] = true;
+    if (stroke.down && stroke.from == stroke.to) judgement[CoverageClass::zero_length_stroke] = true;
   }
 }
 
@@ -40,29 +40,30 @@ void note_what_a_stage_did(const Setup& setup, Stage stage, const State& before,
       for (int32_t s = 0; setup.has_blade && s < setup.step.substeps; ++s) {
         down = down || is_down(before.frame * setup.step.substeps + s);
       }
-      if (!after.removed.empty()) judgement[Happened::removal] = true;
-      if (after.removed.empty() && down && alive_count(before) > 0) judgement[Happened::miss] = true;
+      if (!after.removed.empty()) judgement[CoverageClass::removal] = true;
+      if (after.removed.empty() && down && alive_count(before) > 0) judgement[CoverageClass::miss] = true;
       break;
     }
     case Stage::split:
-      if (clusters_after > clusters_before) judgement[Happened::split] = true;
-      if (!after.debris.empty()) judgement[Happened::debris] = true;
+      if (clusters_after > clusters_before) judgement[CoverageClass::split] = true;
+      if (!after.debris.empty()) judgement[CoverageClass::debris] = true;
       for (const int32_t number : before.clusters.number) {
         const auto& numbers = after.clusters.number;
-        if (!std::binary_search(numbers.begin(), numbers.end(), number)) judgement[Happened::vanished_cluster] = true;
+        if (!std::binary_search(numbers.begin(), numbers.end(), number))
+          judgement[CoverageClass::vanished_cluster] = true;
       }
-      if (alive_count(after) == 0) judgement[Happened::consumed] = true;
+      if (alive_count(after) == 0) judgement[CoverageClass::consumed] = true;
       break;
     case Stage::merge:
       if (clusters_after < clusters_before) {
-        judgement[Happened::merge] = true;
-        if (setup.merge.rule == MergeRule::published) judgement[Happened::published_merge] = true;
+        judgement[CoverageClass::merge] = true;
+        if (setup.merge.rule == MergeRule::published) judgement[CoverageClass::published_merge] = true;
       }
       break;
     case Stage::expand:
       if (after.clusters.members.size() > before.clusters.members.size()) {
-        judgement[Happened::expansion] = true;
-        if (setup.expand.rule == ExpandRule::published) judgement[Happened::published_expansion] = true;
+        judgement[CoverageClass::expansion] = true;
+        if (setup.expand.rule == ExpandRule::published) judgement[CoverageClass::published_expansion] = true;
       }
       break;
     case Stage::step:
@@ -88,10 +89,10 @@ void StepsCompared::join(const StepsCompared& other) {
   greatest = std::max(greatest, other.greatest);
 }
 
-std::vector<CaseRun> run_cases(Backend& backend, const std::vector<Loaded>& loaded) {
+std::vector<CaseRun> run_cases(Backend& backend, const std::vector<Instance>& loaded) {
   std::vector<Setup> setups;
   std::vector<State> states;
-  for (const Loaded& one : loaded) {
+  for (const Instance& one : loaded) {
     setups.push_back(one.setup);
     states.push_back(one.state);
   }
@@ -112,7 +113,7 @@ std::vector<CaseRun> run_cases(Backend& backend, const std::vector<Loaded>& load
   return runs;
 }
 
-Judgement judge_case(const Case& c, const Loaded& loaded, const CaseRun& run, const std::string& backend,
+Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, const std::string& backend,
                      bool thorough) {
   Judgement judgement;
   const Setup& setup = loaded.setup;
@@ -134,7 +135,7 @@ Judgement judge_case(const Case& c, const Loaded& loaded, const CaseRun& run, co
   };
   take(judge.take_verdicts());
   int32_t components = judge.component_count();
-  judgement[Happened::several_components] = components > 1;
+  judgement[CoverageClass::several_components] = components > 1;
   oracles::StageComparison comparison(setup, harness::reference_stages());
   harness::Snapshot compared_skin;  // equal to the reference's
   for (const harness::Moment& moment : run.trace.moments) {
@@ -143,7 +144,7 @@ Judgement judge_case(const Case& c, const Loaded& loaded, const CaseRun& run, co
     judge.see(moment);
     take(judge.take_verdicts());
     for (const harness::Judge::Unpromised& u : judge.unpromised()) {
-      if (u.property == "isolation" && u.failing > 0) judgement[Happened::uncoupled] = true;
+      if (u.property == "isolation" && u.failing > 0) judgement[CoverageClass::uncoupled] = true;
     }
     if (judgement.failure) break;
     const auto due = harness::due_stages(setup, before, moment.span, after);
@@ -151,7 +152,8 @@ Judgement judge_case(const Case& c, const Loaded& loaded, const CaseRun& run, co
       if (due[static_cast<std::size_t>(stage)]) note_what_a_stage_did(setup, stage, before, after, judgement);
     }
     const int32_t components_before = std::exchange(components, judge.component_count());
-    if (moment.span.contains(Stage::detect) && components > components_before) judgement[Happened::separation] = true;
+    if (moment.span.contains(Stage::detect) && components > components_before)
+      judgement[CoverageClass::separation] = true;
     if (is_the_reference || !moment.by_backend || std::count(due.begin(), due.end(), true) != 1) continue;
     const auto stage = static_cast<Stage>(std::find(due.begin(), due.end(), true) - due.begin());
     if (stage == Stage::step && !c.moves) continue;
@@ -168,12 +170,12 @@ Judgement judge_case(const Case& c, const Loaded& loaded, const CaseRun& run, co
     if (stage == Stage::step) judgement.compared.add(found);
     take(found.verdicts("the reference's "));
   }
-  judgement[Happened::cavity] = judge.inner_shells() > 0;
+  judgement[CoverageClass::cavity] = judge.inner_shells() > 0;
   return judgement;
 }
 
 Judgement dissect(Backend& backend, const Case& c, bool thorough) {
-  const std::vector<Loaded> loaded = {load(c)};
+  const std::vector<Instance> loaded = {instance_of(c)};
   const CaseRun run = run_cases(backend, loaded).front();
   return judge_case(c, loaded.front(), run, backend.name(), thorough);
 }

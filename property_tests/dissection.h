@@ -17,8 +17,8 @@
 namespace cutproof::property_tests {
 
 // What happened in a case. A class of cases that never occurs means that nothing was tested there, so every class
-// must (oracles_and_tests.md §2: rapidcheck has no coverage assertions).
-enum class Happened {
+// must (testing.md, Properties: rapidcheck has no coverage assertions).
+enum class CoverageClass {
   no_particles,  // the body is empty
   one_particle,
   several_components,  // already before the first cut
@@ -44,30 +44,30 @@ enum class Happened {
   consumed,   // a body is cut away entirely
   count
 };
-inline constexpr std::size_t kHappenedCount = static_cast<std::size_t>(Happened::count);
-inline constexpr std::array<const char*, kHappenedCount> kHappenedNames = {"no particles",
-                                                                           "one particle",
-                                                                           "several components",
-                                                                           "boxes",
-                                                                           "sampled clusters",
-                                                                           "foreign clusters",
-                                                                           "removal",
-                                                                           "miss",
-                                                                           "pen up",
-                                                                           "retraced stroke",
-                                                                           "zero length stroke",
-                                                                           "blade of thickness 0",
-                                                                           "split",
-                                                                           "vanished cluster",
-                                                                           "debris",
-                                                                           "separation",
-                                                                           "merge",
-                                                                           "expansion",
-                                                                           "published merge",
-                                                                           "published expansion",
-                                                                           "uncoupled without promise",
-                                                                           "cavity",
-                                                                           "consumed body"};
+inline constexpr std::size_t kCoverageClassCount = static_cast<std::size_t>(CoverageClass::count);
+inline constexpr std::array<const char*, kCoverageClassCount> kCoverageClassNames = {"no particles",
+                                                                                     "one particle",
+                                                                                     "several components",
+                                                                                     "boxes",
+                                                                                     "sampled clusters",
+                                                                                     "foreign clusters",
+                                                                                     "removal",
+                                                                                     "miss",
+                                                                                     "pen up",
+                                                                                     "retraced stroke",
+                                                                                     "zero length stroke",
+                                                                                     "blade of thickness 0",
+                                                                                     "split",
+                                                                                     "vanished cluster",
+                                                                                     "debris",
+                                                                                     "separation",
+                                                                                     "merge",
+                                                                                     "expansion",
+                                                                                     "published merge",
+                                                                                     "published expansion",
+                                                                                     "uncoupled without promise",
+                                                                                     "cavity",
+                                                                                     "consumed body"};
 
 // Steps of moving bodies beside the reference's.
 struct StepsCompared {
@@ -79,12 +79,12 @@ struct StepsCompared {
 };
 
 struct Judgement {
-  std::array<bool, kHappenedCount> happened = {};
+  std::array<bool, kCoverageClassCount> coverage = {};
   StepsCompared compared;
   int64_t verdicts = 0;            // how many were asked for
   std::optional<Verdict> failure;  // the first that does not hold
 
-  bool& operator[](Happened what) { return happened[static_cast<std::size_t>(what)]; }
+  bool& operator[](CoverageClass what) { return coverage[static_cast<std::size_t>(what)]; }
 };
 
 // What a backend made of one case: the run, and what of the contract it broke on the way.
@@ -95,12 +95,12 @@ struct CaseRun {
 };
 
 // Loads all cases at once and runs them to their ends, stage by stage as far as the backend can.
-std::vector<CaseRun> run_cases(Backend& backend, const std::vector<Loaded>& loaded);
+std::vector<CaseRun> run_cases(Backend& backend, const std::vector<Instance>& loaded);
 
 // Has the run of one case judged, with the promises of its rules; and compares every stage with what the reference
 // makes of the same state (oracles/comparison/stage_comparison.h), the step only of a body that moves.
 // `thorough`: with CGAL's geometric check of every skin.
-Judgement judge_case(const Case& c, const Loaded& loaded, const CaseRun& run, const std::string& backend,
+Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, const std::string& backend,
                      bool thorough);
 
 // Both, for one case alone.

@@ -1,4 +1,4 @@
-// The hard cases of accuracy_and_speed.md §4, each with the behaviour that is expected of every backend. After every
+// The hard cases of testing.md, Hard cases, each with the behaviour that is expected of every backend. After every
 // stage every oracle is asked, and every stage is compared with the reference's from the same state (judge_case).
 // Particle counts around the sizes of warps and blocks: properties.cpp, DissectsBodiesOfSizesAroundThoseOfBlocks.
 // Rotations have hard cases of their own: fixtures/hard_matrices.h.
@@ -93,8 +93,8 @@ class HardCases : public ::testing::TestWithParam<NamedBackend> {
   bool is_slow() const { return GetParam().most_size < 100; }
 
   // Runs the case to its end and asks every oracle; none may fail. `thorough`: with CGAL's checks of every skin.
-  Outcome run(const Case& c, Loaded loaded, bool thorough = true) {
-    std::vector<Loaded> all = {std::move(loaded)};
+  Outcome run(const Case& c, Instance loaded, bool thorough = true) {
+    std::vector<Instance> all = {std::move(loaded)};
     Outcome outcome;
     outcome.run = std::move(run_cases(*backend_, all).front());
     outcome.setup = all.front().setup;
@@ -104,11 +104,11 @@ class HardCases : public ::testing::TestWithParam<NamedBackend> {
     EXPECT_GT(outcome.verdicts + (outcome.run.trace.moments.empty() ? 1 : 0), 0);
     return outcome;
   }
-  Outcome run(const Case& c) { return run(c, load(c)); }
+  Outcome run(const Case& c) { return run(c, instance_of(c)); }
 
   // A body that nothing cuts, for so many frames.
-  Loaded undisturbed(const Case& c, int64_t frames, double dt) const {
-    Loaded loaded = load(c);
+  Instance undisturbed(const Case& c, int64_t frames, double dt) const {
+    Instance loaded = instance_of(c);
     loaded.setup.has_blade = false;
     loaded.setup.blade_moves.clear();
     loaded.setup.stroke_end.clear();
@@ -158,7 +158,7 @@ TEST_P(HardCases, ClustersOfOneTwoAndThreeParticlesStayCoupledWhereTissueIsConne
     c.tau = 2;
     c.cap = 2 * most;
     c.strokes = {through_x(8), through_z(100)};  // the second misses
-    const Loaded loaded = load(c);
+    const Instance loaded = instance_of(c);
     for (int32_t k = 0; k < loaded.state.clusters.count(); ++k) ASSERT_LE(loaded.state.clusters.size(k), most);
     const Outcome cut = run(c);
     EXPECT_EQ(cut.removed(), 16);
@@ -355,7 +355,7 @@ TEST_P(HardCases, InvertedAndFlattenedBodiesComeBackToTheirShape) {
     c.iterations = 2;
     c.moves = true;
     c.stiffness = 6;
-    Loaded loaded = undisturbed(c, 40, 0.004);
+    Instance loaded = undisturbed(c, 40, 0.004);
     ASSERT_EQ(loaded.state.clusters.count(), 1);
     loaded.setup.step.damping = 20;
     const Vec3 center = loaded.state.clusters.rest_center.front();
@@ -380,7 +380,7 @@ TEST_P(HardCases, SeveralInvertedClustersStayFiniteAndTheirRotationsRotations) {
   c.iterations = 2;
   c.stiffness = 6;
   for (const double factor : {-1.0, 0.0, 1e-9}) {
-    Loaded loaded = undisturbed(c, 20, 0.004);
+    Instance loaded = undisturbed(c, 20, 0.004);
     ASSERT_GT(loaded.state.clusters.count(), 1);
     for (Vec3& x : loaded.state.x) x.z = 2.5 + factor * (x.z - 2.5);
     run(c, loaded, false);  // finite, rotation, momentum: after every step
@@ -394,7 +394,7 @@ TEST_P(HardCases, StiffnessFromNoneToAllGoesFromFreeParticlesToARigidBody) {
   c.substeps = 1;
   c.iterations = 1;
   const auto strain_after = [&](auto change) {
-    Loaded loaded = undisturbed(c, 1, 0.004);
+    Instance loaded = undisturbed(c, 1, 0.004);
     EXPECT_EQ(loaded.state.clusters.count(), 1);
     loaded.state.clusters.rotation.front() = Mat3{{1, 0, 0, 0, 1, 0, 0, 0, 1}};
     for (Vec3& x : loaded.state.x) x.x *= 1.25;
@@ -428,7 +428,7 @@ TEST_P(HardCases, StepsFromAMicrosecondToATenthOfASecondFallFreelyAndGainNoEnerg
     c.substeps = 4;
     c.iterations = 3;
     c.stiffness = 5;
-    Loaded loaded = undisturbed(c, 2, dt);
+    Instance loaded = undisturbed(c, 2, dt);
     loaded.setup.step.gravity = {0, 0, -9.81};
     // Rest rotations, or the clusters' own would strain it.
     loaded.state = fixtures::cook(loaded.setup.body, {}, loaded.setup.expand, loaded.setup.merge, 1);
@@ -476,7 +476,7 @@ TEST_P(HardCases, AThousandStrokesOnOneBodyKeepEveryInvariant) {
     stroke.back = random.between(0, 5);
     c.strokes.push_back(stroke);
   }
-  const Outcome cut = run(c, load(c), false);
+  const Outcome cut = run(c, instance_of(c), false);
   EXPECT_EQ(cut.last().frame, strokes / 4);
   int64_t frames_with_removals = 0, before = static_cast<int64_t>(c.nodes.size());
   for (const harness::Moment& moment : cut.run.trace.moments) {
@@ -503,8 +503,8 @@ TEST_P(HardCases, ABodyAMillionSpacingsFromTheWorldsOriginGivesTheSameBits) {
   c.ground = true;
   c.stiffness = 5;
   c.strokes = {{{10, 6, 24}, {10, 6, -4}, 4, true, Link::apart}};
-  Loaded near = load(c);
-  Loaded far = near;
+  Instance near = instance_of(c);
+  Instance far = near;
   far.setup.body.origin = {1e6 * c.spacing, -1e6 * c.spacing, 1e6 * c.spacing};
   const Outcome a = run(c, near, false), b = run(c, far, false);
   const auto &of_a = a.run.trace.moments, &of_b = b.run.trace.moments;
@@ -520,36 +520,36 @@ TEST_P(HardCases, ABodyAMillionSpacingsFromTheWorldsOriginGivesTheSameBits) {
 struct Extreme {
   const char* name;
   void (*edit_case)(Case&);
-  void (*edit)(Loaded&);
+  void (*edit)(Instance&);
 };
 
 TEST_P(HardCases, ParametersAtTheirBoundsKeepEveryInvariant) {
   const auto keep_case = [](Case&) {};
-  const auto keep = [](Loaded&) {};
+  const auto keep = [](Instance&) {};
   const Extreme extremes[] = {
       {"one substep", [](Case& c) { c.substeps = 1; }, keep},
       {"forty substeps", [](Case& c) { c.substeps = 40; }, keep},
       {"no iteration", [](Case& c) { c.iterations = 0; }, keep},
       {"a hundred iterations", [](Case& c) { c.iterations = 100; }, keep},
-      {"stiffness 0", keep_case, [](Loaded& l) { l.setup.step.stiffness = 0; }},
-      {"stiffness 1e15", keep_case, [](Loaded& l) { l.setup.step.stiffness = 1e15; }},
-      {"damping 0", keep_case, [](Loaded& l) { l.setup.step.damping = 0; }},
-      {"damping 1e9", keep_case, [](Loaded& l) { l.setup.step.damping = 1e9; }},
+      {"stiffness 0", keep_case, [](Instance& l) { l.setup.step.stiffness = 0; }},
+      {"stiffness 1e15", keep_case, [](Instance& l) { l.setup.step.stiffness = 1e15; }},
+      {"damping 0", keep_case, [](Instance& l) { l.setup.step.damping = 0; }},
+      {"damping 1e9", keep_case, [](Instance& l) { l.setup.step.damping = 1e9; }},
       {"relaxation 1", keep_case,
-       [](Loaded& l) {
+       [](Instance& l) {
          l.setup.step.solver = Solver::published;
          l.setup.step.relaxation = 1;
        }},
       {"relaxation 1e-12", keep_case,
-       [](Loaded& l) {
+       [](Instance& l) {
          l.setup.step.solver = Solver::published;
          l.setup.step.relaxation = 1e-12;
        }},
       {"gravity 1e6", keep_case,
-       [](Loaded& l) {
+       [](Instance& l) {
          l.setup.step.gravity = {0, 0, -1e6};
        }},
-      {"debris of everything", keep_case, [](Loaded& l) { l.setup.split.debris = 1'000'000'000; }},
+      {"debris of everything", keep_case, [](Instance& l) { l.setup.split.debris = 1'000'000'000; }},
       {"expansion by a thousand layers",
        [](Case& c) {
          c.clusters = ClusterKind::foreign;
@@ -558,16 +558,16 @@ TEST_P(HardCases, ParametersAtTheirBoundsKeepEveryInvariant) {
        },
        keep},
       {"tau 0, cap 1", keep_case,
-       [](Loaded& l) {
+       [](Instance& l) {
          l.state.tau = 0;
          l.state.cap = 1;
        }},
       {"everything small and no cap", keep_case,
-       [](Loaded& l) { l.state.tau = l.state.cap = std::numeric_limits<int32_t>::max(); }},
-      {"skin at its particles", keep_case, [](Loaded& l) { l.setup.skin.alpha = 0.01; }},
-      {"skin at the next nodes", keep_case, [](Loaded& l) { l.setup.skin.alpha = 0.99; }},
+       [](Instance& l) { l.state.tau = l.state.cap = std::numeric_limits<int32_t>::max(); }},
+      {"skin at its particles", keep_case, [](Instance& l) { l.setup.skin.alpha = 0.01; }},
+      {"skin at the next nodes", keep_case, [](Instance& l) { l.setup.skin.alpha = 0.99; }},
       {"friction 1e6", keep_case,
-       [](Loaded& l) {
+       [](Instance& l) {
          l.setup.blade.friction = 1e6;
          for (Wall& wall : l.setup.walls) wall.friction = 1e6;
        }},
@@ -589,7 +589,7 @@ TEST_P(HardCases, ParametersAtTheirBoundsKeepEveryInvariant) {
     c.stiffness = 4;
     c.strokes = {{{8, 4, 18}, {8, 4, 2}, 4, true, Link::apart}};
     extreme.edit_case(c);
-    Loaded loaded = load(c);
+    Instance loaded = instance_of(c);
     extreme.edit(loaded);
     const Outcome outcome = run(c, loaded, false);
     EXPECT_EQ(outcome.last().frame, outcome.setup.frame_count());
@@ -599,7 +599,7 @@ TEST_P(HardCases, ParametersAtTheirBoundsKeepEveryInvariant) {
 TEST_P(HardCases, AThresholdBelowASpacingRemovesTissueAtRestAndAHugeOneRemovesNothing) {
   Case c = with_thin_blade(block(4, 3, 3));
   c.strokes = {through_x(6)};
-  Loaded loaded = load(c);
+  Instance loaded = instance_of(c);
   loaded.setup.detect.criterion = Criterion::distance;
   for (const double epsilon : {1e-9, 0.99}) {
     loaded.setup.detect.epsilon = epsilon;
@@ -617,21 +617,21 @@ TEST_P(HardCases, AThresholdBelowASpacingRemovesTissueAtRestAndAHugeOneRemovesNo
 TEST_P(HardCases, StatesThatDoNotFitTheirSetupAreRefused) {
   Case c = with_thin_blade(block(3, 3, 3));
   c.strokes = {through_x(4)};
-  const Loaded good = load(c);
+  const Instance good = instance_of(c);
   const auto refused = [&](auto spoil) {
-    Loaded bad = good;
+    Instance bad = good;
     spoil(bad);
     EXPECT_THROW(backend_->load({bad.setup}, {bad.state}), std::invalid_argument);
   };
-  refused([](Loaded& l) { l.state.x.pop_back(); });
-  refused([](Loaded& l) { l.state.v.emplace_back(); });
-  refused([](Loaded& l) { l.state.alive.clear(); });
-  refused([](Loaded& l) { l.setup.body.mass.pop_back(); });
-  refused([](Loaded& l) { l.setup.blade_moves.pop_back(); });
-  refused([](Loaded& l) { l.state.clusters.number.pop_back(); });
-  refused([](Loaded& l) { l.state.clusters.members.back() = 27; });
-  refused([](Loaded& l) { l.state.clusters.members.front() = -1; });
-  refused([](Loaded& l) { l.state.clusters.offsets.back() += 1; });
+  refused([](Instance& l) { l.state.x.pop_back(); });
+  refused([](Instance& l) { l.state.v.emplace_back(); });
+  refused([](Instance& l) { l.state.alive.clear(); });
+  refused([](Instance& l) { l.setup.body.mass.pop_back(); });
+  refused([](Instance& l) { l.setup.blade_moves.pop_back(); });
+  refused([](Instance& l) { l.state.clusters.number.pop_back(); });
+  refused([](Instance& l) { l.state.clusters.members.back() = 27; });
+  refused([](Instance& l) { l.state.clusters.members.front() = -1; });
+  refused([](Instance& l) { l.state.clusters.offsets.back() += 1; });
   EXPECT_THROW(backend_->load({good.setup, good.setup}, {good.state}), std::invalid_argument);
   run(c);  // and can be loaded anew
 }

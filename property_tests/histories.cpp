@@ -114,7 +114,11 @@ std::vector<Command> commands_from_json(const std::string& list) {
 // --- History ------------------------------------------------------------------------------------------------------
 
 History::History(Source make, Case c)
-    : make_(std::move(make)), case_(std::move(c)), loaded_(load(case_)), staged_(make_()), state_(loaded_.state) {
+    : make_(std::move(make)),
+      case_(std::move(c)),
+      loaded_(instance_of(case_)),
+      staged_(make_()),
+      state_(loaded_.state) {
   if (case_.together != 1) throw std::invalid_argument("a history needs a case with one stroke a frame (together: 1)");
   if (promise_of(case_.merge).unique) whole_ = make_();
   given_strokes_ = static_cast<int32_t>(loaded_.setup.stroke_end.size());
@@ -167,11 +171,11 @@ void History::run_span(Span span, bool whole) {
   verdicts_ += judgement.verdicts;
   if (judgement.failure) return fail(std::move(*judgement.failure));
 
-  const bool cuts = judgement[Happened::removal];
-  if (cuts && has_kicked_) note(HistoryHappened::removal_after_a_kick);
-  if (judgement[Happened::separation]) {
+  const bool cuts = judgement[CoverageClass::removal];
+  if (cuts && has_kicked_) note(HistoryClass::removal_after_a_kick);
+  if (judgement[CoverageClass::separation]) {
     const auto move = static_cast<std::size_t>(start.frame * loaded_.setup.step.substeps);
-    if (loaded_.setup.blade_moves[move].stroke >= given_strokes_) note(HistoryHappened::separation);
+    if (loaded_.setup.blade_moves[move].stroke >= given_strokes_) note(HistoryClass::separation);
   }
   if (!whole_) return;
   if (whole) {
@@ -184,9 +188,9 @@ void History::run_span(Span span, bool whole) {
   }
   require_same(whole ? "a span is the composition of its stages" : "same input, same bits", state_,
                *whole_run_->states().front());
-  if (cuts && whole && span.last == Stage::skin) note(HistoryHappened::cut_as_one_span);
+  if (cuts && whole && span.last == Stage::skin) note(HistoryClass::cut_as_one_span);
   if (!state_.removed.empty() && unloaded_beside_ && span.last == Stage::skin) {
-    note(HistoryHappened::went_on_without_a_load);
+    note(HistoryClass::went_on_without_a_load);
   }
 }
 
@@ -227,7 +231,7 @@ void History::kick(const Kick& command) {
   }
   if (whole_ && components.count > 1) {
     require_no_ghost_force(kicked, components.label, component);
-    note(HistoryHappened::kicked_beside_others);
+    note(HistoryClass::kicked_beside_others);
   }
   has_kicked_ = true;
   state_ = std::move(kicked);
@@ -249,7 +253,7 @@ void History::require_no_ghost_force(const State& kicked, const std::vector<int3
       continue;
     }
     Verdict verdict = broken("no ghost force", Stage::step);
-    verdict.bound_source = "oracles_and_tests.md §1";
+    verdict.bound_source = "oracles.md, Relations";
     verdict.witness.particles = {static_cast<int32_t>(i)};
     verdict.witness.text = "particle " + std::to_string(i) + " moves otherwise when another component is kicked";
     return fail(std::move(verdict));
@@ -272,7 +276,7 @@ void History::save_and_load(const SaveAndLoad& command) {
     require_same("a recording gives back what was recorded", saved, read.state);
     saved = std::move(read.state);
     setup = reader.header().setup;
-    if (!saved.skin.owner.empty()) note(HistoryHappened::read_from_files);
+    if (!saved.skin.owner.empty()) note(HistoryClass::read_from_files);
     staged_run_.reset();
     staged_ = make_();
   }
@@ -329,12 +333,12 @@ void History::fail(Verdict verdict) {
 }
 
 void History::note_load() {
-  if (next_ == Stage::step) return note(HistoryHappened::loaded_between_frames);
-  if (next_ == Stage::detect) return note(HistoryHappened::loaded_before_detect);
+  if (next_ == Stage::step) return note(HistoryClass::loaded_between_frames);
+  if (next_ == Stage::detect) return note(HistoryClass::loaded_before_detect);
   if (state_.removed.empty()) return;
-  if (!state_.debris.empty()) note(HistoryHappened::loaded_with_debris);
-  constexpr auto kBeforeSplit = static_cast<int>(HistoryHappened::loaded_before_split);
-  note(static_cast<HistoryHappened>(kBeforeSplit + static_cast<int>(next_) - static_cast<int>(Stage::split)));
+  if (!state_.debris.empty()) note(HistoryClass::loaded_with_debris);
+  constexpr auto kBeforeSplit = static_cast<int>(HistoryClass::loaded_before_split);
+  note(static_cast<HistoryClass>(kBeforeSplit + static_cast<int>(next_) - static_cast<int>(Stage::split)));
 }
 
 History history_of(History::Source make, const Case& c, const std::vector<Command>& commands) {

@@ -1,6 +1,6 @@
 // A history: one random body to which commands are given, one after the other. Between any two stages it may be saved
 // and loaded, kicked, or get another stroke to cut; all that a backend promises has to hold all the same
-// (oracles_and_tests.md §2).
+// (testing.md, Properties).
 #pragma once
 #include <array>
 #include <cstdint>
@@ -53,8 +53,8 @@ struct Position {
 };
 Position after(Position at, const Command& command);
 
-// What happened in histories. As in `Happened`, a class that never occurs means that nothing was tested there.
-enum class HistoryHappened {
+// What happened in histories. As in `CoverageClass`, a class that never occurs means that nothing was tested there.
+enum class HistoryClass {
   loaded_between_frames,
   loaded_before_detect,
   loaded_before_split,  // this and the following ones: in a frame that has removed particles
@@ -70,8 +70,8 @@ enum class HistoryHappened {
   separation,  // a cut that the history itself asked for
   count
 };
-inline constexpr std::size_t kHistoryHappenedCount = static_cast<std::size_t>(HistoryHappened::count);
-inline constexpr std::array<const char*, kHistoryHappenedCount> kHistoryHappenedNames = {
+inline constexpr std::size_t kHistoryClassCount = static_cast<std::size_t>(HistoryClass::count);
+inline constexpr std::array<const char*, kHistoryClassCount> kHistoryClassNames = {
     "load between frames",
     "load before detect",
     "load before split",
@@ -107,7 +107,7 @@ class History {
   Position position() const { return {state_.frame, next_}; }
 
   const std::optional<Verdict>& failure() const { return failure_; }
-  const std::array<int64_t, kHistoryHappenedCount>& happened() const { return happened_; }
+  const std::array<int64_t, kHistoryClassCount>& coverage() const { return coverage_; }
   int64_t verdicts() const { return verdicts_; }
 
  private:
@@ -126,12 +126,12 @@ class History {
   bool loads_in_bits() const;
   Verdict broken(const char* what, Stage stage) const;
   void fail(Verdict verdict);
-  void note(HistoryHappened what) { ++happened_[static_cast<std::size_t>(what)]; }
+  void note(HistoryClass what) { ++coverage_[static_cast<std::size_t>(what)]; }
   void note_load();
 
   Source make_;
   Case case_;  // the strokes of the history's own are appended
-  Loaded loaded_;
+  Instance loaded_;
   std::unique_ptr<Backend> staged_;  // runs stage by stage, is judged, saved and loaded
   std::unique_ptr<Backend> whole_;   // beside it; null if equal bits are not asked for
   std::unique_ptr<harness::FrameRunner> staged_run_, whole_run_;
@@ -142,7 +142,7 @@ class History {
   bool has_kicked_ = false;
   bool unloaded_beside_ = false;  // whole_ went on as it was when staged_ was last loaded
   std::optional<Verdict> failure_;
-  std::array<int64_t, kHistoryHappenedCount> happened_ = {};
+  std::array<int64_t, kHistoryClassCount> coverage_ = {};
   int64_t verdicts_ = 0;
 };
 

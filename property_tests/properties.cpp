@@ -1,4 +1,4 @@
-// Properties of every backend over random dissections (oracles_and_tests.md §2).
+// Properties of every backend over random dissections (testing.md, Properties).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,8 +22,8 @@ namespace cutproof::property_tests {
 namespace {
 
 // What a backend loads, in its arithmetic.
-Loaded load_for(const Backend& backend, const Case& c) {
-  Loaded loaded = load(c);
+Instance load_for(const Backend& backend, const Case& c) {
+  Instance loaded = instance_of(c);
   loaded.state = in_arithmetic_of(backend, std::move(loaded.state));
   return loaded;
 }
@@ -78,28 +78,28 @@ TEST(SavedCounterexamples, HoldUnderTheScheduleThatBrokeThem) {
 
 TEST_P(EveryBackend, KeepsEveryInvariantAfterEveryStageOfARandomDissection) {
   const auto backend = GetParam().make();
-  std::array<int64_t, kHappenedCount> seen = {};
+  std::array<int64_t, kCoverageClassCount> seen = {};
   int64_t cases = 0, verdicts = 0;
   check(id(), cases_of(1), GetParam().most_size, [&](const Case& c) {
     const Judgement judgement = dissect(*backend, c, cases % 50 == 0);
     ++cases;
     verdicts += judgement.verdicts;
-    for (std::size_t k = 0; k < kHappenedCount; ++k) seen[k] += judgement.happened[k];
+    for (std::size_t k = 0; k < kCoverageClassCount; ++k) seen[k] += judgement.coverage[k];
     return judgement.failure ? describe(*judgement.failure) : "";
   });
   std::cout << cases << " cases, " << verdicts << " verdicts; cases with:";
-  for (std::size_t k = 0; k < kHappenedCount; ++k)
-    std::cout << (k == 0 ? " " : ", ") << kHappenedNames[k] << " " << seen[k];
+  for (std::size_t k = 0; k < kCoverageClassCount; ++k)
+    std::cout << (k == 0 ? " " : ", ") << kCoverageClassNames[k] << " " << seen[k];
   std::cout << std::endl;
-  for (std::size_t k = 0; k < kHappenedCount && ran_in_full(); ++k) {
-    EXPECT_GT(seen[k], 0) << "no case with '" << kHappenedNames[k] << "': nothing was tested there";
+  for (std::size_t k = 0; k < kCoverageClassCount && ran_in_full(); ++k) {
+    EXPECT_GT(seen[k], 0) << "no case with '" << kCoverageClassNames[k] << "': nothing was tested there";
   }
 }
 
 TEST_P(EveryBackend, OnlyRefinesTheComponentsWithEveryStroke) {
   const auto backend = GetParam().make();
   check(id(), cases_of(10), GetParam().most_size, [&](const Case& c) {
-    const Loaded loaded = load_for(*backend, c);
+    const Instance loaded = load_for(*backend, c);
     const int64_t strokes = loaded.setup.frame_count();
     if (strokes == 0) return std::string();
     return text_of(oracles::refinement(*backend, loaded.setup, loaded.state,
@@ -110,7 +110,7 @@ TEST_P(EveryBackend, OnlyRefinesTheComponentsWithEveryStroke) {
 TEST_P(EveryBackend, GivesTheSameBitsTwice) {
   const auto backend = GetParam().make();
   check(id(), cases_of(20), GetParam().most_size, [&](const Case& c) {
-    const Loaded loaded = load_for(*backend, without_claims(c));
+    const Instance loaded = load_for(*backend, without_claims(c));
     return text_of(oracles::determinism(*backend, loaded.setup, loaded.state, loaded.setup.frame_count()));
   });
 }
@@ -118,7 +118,7 @@ TEST_P(EveryBackend, GivesTheSameBitsTwice) {
 TEST_P(EveryBackend, RunsAFrameAsTheCompositionOfItsSpans) {
   const auto backend = GetParam().make();
   check(id(), cases_of(20), GetParam().most_size, [&](const Case& c) {
-    const Loaded loaded = load_for(*backend, without_claims(c));
+    const Instance loaded = load_for(*backend, without_claims(c));
     return text_of(oracles::span_composition(*backend, loaded.setup, loaded.state, loaded.setup.frame_count()));
   });
 }
@@ -126,7 +126,7 @@ TEST_P(EveryBackend, RunsAFrameAsTheCompositionOfItsSpans) {
 TEST_P(EveryBackend, GivesTheSameAnswerToASceneTurnedShiftedScaledOrRenumbered) {
   const auto backend = GetParam().make();
   check(id(), cases_of(10), GetParam().most_size, [&](const Case& c) {
-    const Loaded loaded = load_for(*backend, without_claims(c));
+    const Instance loaded = load_for(*backend, without_claims(c));
     if (loaded.setup.frame_count() == 0) return std::string();
     // Which clusters are merged depends on their numbers; without I4 so does what is coupled afterwards.
     const bool decided = loaded.state.edge_covered || c.merge == MergeRule::none;
@@ -137,8 +137,8 @@ TEST_P(EveryBackend, GivesTheSameAnswerToASceneTurnedShiftedScaledOrRenumbered) 
 
 // What is left of a body after all strokes, every particle displaced by up to 0.3 h along each axis, and a setup that
 // moves it: one frame of one substep of 3 iterations, without a blade.
-Loaded cut_and_disturbed(Backend& backend, const Case& c) {
-  Loaded loaded = load_for(backend, c);
+Instance cut_and_disturbed(Backend& backend, const Case& c) {
+  Instance loaded = load_for(backend, c);
   backend.load({loaded.setup}, {loaded.state});
   for (int64_t frame = 0; frame < loaded.setup.frame_count(); ++frame) backend.run({});
   loaded.state = backend.snapshot().front();
@@ -160,7 +160,7 @@ TEST_P(EveryBackend, StepsACutBodyWithoutGhostForcesAndWithoutEnergyFromNowhere)
   const auto backend = GetParam().make();
   int64_t compared = 0, iterations = 0;
   check(id(), cases_of(10), GetParam().most_size, [&](const Case& c) {
-    const Loaded cut = cut_and_disturbed(*backend, c);
+    const Instance cut = cut_and_disturbed(*backend, c);
     int32_t kicked = 0;
     while (kicked < cut.setup.body.particle_count() && !cut.state.alive[static_cast<std::size_t>(kicked)]) ++kicked;
     const Vec3 kick = {0.7 * c.spacing, -0.4 * c.spacing, 1.3 * c.spacing};
@@ -190,7 +190,7 @@ TEST_P(EveryBackend, GainsNoEnergyBetweenBladeAndWalls) {
   check(id(), cases_of(10), GetParam().most_size, [&](const Case& c) {
     Case moving = c;
     moving.moves = true;
-    Loaded loaded = load_for(*backend, moving);
+    Instance loaded = load_for(*backend, moving);
     auto& setup = loaded.setup;
     setup.step.gravity = {-9.81, -9.81, -9.81};
     setup.walls.clear();
@@ -263,7 +263,7 @@ TEST_P(LargeBodies, FindRoomForMoreClustersThanTheirLoadHadRoomFor) {
   for (int32_t k = 1; k < kLength; k += 3) {
     c.strokes.push_back({{-8, -8, 4 * k}, {8 * kWires, -8, 4 * k}, 2, true, Link::apart});
   }
-  Loaded loaded = load(c);
+  Instance loaded = instance_of(c);
   loaded.setup.skin.wanted = false;
   const Body& body = loaded.setup.body;
   std::vector<std::vector<int32_t>> clusters;
@@ -321,7 +321,7 @@ TEST(Cases, ComeBackFromJsonAsTheyWere) {
 }
 
 TEST(Cases, ShrinkToTheFewestParticlesAndStrokesThatAPlantedFaultNeeds) {
-  // The planted fault: a stroke straight down a column of three tissue nodes is not survived.
+  // The mutant: a stroke straight down a column of three tissue nodes is not survived.
   const auto fails = [](const Case& c) {
     const auto has = [&](Node node) { return std::find(c.nodes.begin(), c.nodes.end(), node) != c.nodes.end(); };
     const bool column = has({0, 0, 0}) && has({0, 0, 1}) && has({0, 0, 2});

@@ -11,7 +11,7 @@ namespace cutproof::property_tests {
 namespace {
 
 // Frames as a recording holds them (io::Recorder).
-void record(const std::string& name, const Loaded& loaded, const harness::Trace& trace, const std::string& backend) {
+void record(const std::string& name, const Instance& loaded, const harness::Trace& trace, const std::string& backend) {
   io::Recorder recorder(name, loaded.setup, "", backend);
   recorder.add(Stage::skin, *trace.initial);
   for (const harness::Moment& moment : trace.moments) recorder.add(moment.span.last, *moment.after);
@@ -22,7 +22,7 @@ void record(const std::string& name, const Loaded& loaded, const harness::Trace&
 
 std::string record_case(const std::string& name, const std::unique_ptr<Backend>& backend, const Case& c) {
   try {
-    std::vector<Loaded> loaded = {load(c)};
+    std::vector<Instance> loaded = {instance_of(c)};
     const std::vector<CaseRun> runs = run_cases(*backend, loaded);
     record(name, loaded.front(), runs.front().trace, backend->name());
     return {};

@@ -9,17 +9,17 @@
 
 namespace cutproof::reference {
 
-// Method.md §3: all substeps of frame state.frame; starts a frame, so it clears state.removed, .debris, .impulse.
+// method.md §3: all substeps of frame state.frame; starts a frame, so it clears state.removed, .debris, .impulse.
 void step(const Setup& setup, State& state);
-// Method.md §4: marks removed particles dead and lists them in state.removed.
+// method.md §4: marks removed particles dead and lists them in state.removed.
 void detect(const Setup& setup, State& state);
-// Method.md §5: replaces every cluster that lost a particle by the connected components of the rest.
+// method.md §5: replaces every cluster that lost a particle by the connected components of the rest.
 void split(const Setup& setup, State& state);
-// Method.md §6: joins small clusters with neighbours.
+// method.md §6: joins small clusters with neighbours.
 void merge(const Setup& setup, State& state);
-// Method.md §7: lets clusters take in particles until no tissue is uncoupled.
+// method.md §7: lets clusters take in particles until no tissue is uncoupled.
 void expand(const Setup& setup, State& state);
-// Method.md §8: triangles where something changed (always, if state.skin is empty), then all vertex positions.
+// method.md §8: triangles where something changed (always, if state.skin is empty), then all vertex positions.
 void skin(const Setup& setup, State& state);
 
 std::unique_ptr<Backend> make_backend();
@@ -53,7 +53,7 @@ struct Rotation {
 };
 Rotation closest_rotation(const Mat3& a, const Mat3& previous);
 
-// Method.md §6 on any family of sets (each strictly ascending), overlapping or not: a set with fewer than tau
+// method.md §6 on any family of sets (each strictly ascending), overlapping or not: a set with fewer than tau
 // particles is small. `numbers` are distinct. Does not touch rest frames. `rule` must not be none.
 struct Merged {
   std::vector<std::vector<int32_t>> sets;  // unions, in the order of their numbers

@@ -1,4 +1,4 @@
-// `cutproof bench rotations`: methods for the rotation of a cluster, on every hard case (docs/rotations.md).
+// `cutproof bench rotations`: methods for the rotation of a cluster, on every hard case (solvers.md, Rotations).
 #pragma once
 #include <cstdint>
 #include <nlohmann/json.hpp>

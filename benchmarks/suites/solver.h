@@ -1,4 +1,4 @@
-// `cutproof bench solver`: iterations of the step against its error, plain and accelerated (docs/acceleration.md).
+// `cutproof bench solver`: iterations of the step against its error, plain and accelerated (solvers.md).
 #pragma once
 #include <cstdint>
 #include <map>

@@ -114,7 +114,8 @@ std::string parser_message(const std::string& what) {
 
 json parse_tree(const std::string& text, const std::string& name) {
   if (text.find_first_not_of(" \t\r\n") == std::string::npos) {
-    throw InputError(name, "", "The file is empty.", "A scene is a JSON object; docs/reference/scene.md lists its fields.");
+    throw InputError(name, "", "The file is empty.",
+                     "A scene is a JSON object; docs/reference/scene.md lists its fields.");
   }
   PathTracker tracker(name);
   try {

@@ -1,4 +1,4 @@
-// A verdict in a result document (docs/results_schema.md, Verdicts).
+// A verdict in a result document (results_schema.md, Verdicts).
 #pragma once
 #include <nlohmann/json.hpp>
 

@@ -51,7 +51,7 @@ int64_t first_unequal(const std::vector<T>& a, const std::vector<T>& b, bool rou
 constexpr unsigned kNumberedSets = kSets | kNumbers;
 constexpr unsigned kTriangleSets = kSkin;
 
-// In this order differences are told; among them those that are derived from others last.
+// Differences are reported in this order; among them those that are derived from others last.
 constexpr std::array<unsigned, 6> kOrderOfDecisions = {kTime, kCut, kAlive, kLimits, kNumberedSets, kTriangleSets};
 
 // Clusters as sets with their numbers, in an order that depends on nothing else.

@@ -41,7 +41,7 @@ void expect_times(const json& seconds) {
   EXPECT_LE(seconds.at("median"), seconds.at("max"));
 }
 
-// What docs/results_schema.md promises, for these methods in these precisions and every case.
+// What results_schema.md promises, for these methods in these precisions and every case.
 void expect_complete(const json& document, const std::set<std::pair<std::string, std::string>>& methods) {
   EXPECT_EQ(document.at("format"), "cutproof.bench");
   EXPECT_EQ(document.at("format_version"), 2);

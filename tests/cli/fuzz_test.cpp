@@ -36,7 +36,7 @@ TEST_F(Fuzz, HoldsOnEveryBackendOfEveryMachineAndMeetsEveryClass) {
     EXPECT_EQ(document["format"], "cutproof.fuzz");
     EXPECT_EQ(document["cases"], 1000);
     EXPECT_EQ(document["holds"], true);
-    for (const auto& [name, count] : document["happened"].items()) EXPECT_GT(count, 0) << name;
+    for (const auto& [name, count] : document["coverage"].items()) EXPECT_GT(count, 0) << name;
   }
   const Outcome simulated = cutproof("fuzz --backend simulated --cases 260 --sizes 0-20 --seed 7");
   EXPECT_EQ(simulated.status, 0) << simulated.output;
@@ -76,7 +76,7 @@ TEST_F(Fuzz, PutsShardsTogetherToTheWhole) {
   const Outcome merged = cutproof("fuzz --merge 1.json 2.json 3.json --json merged.json");
   EXPECT_EQ(merged.status, 0) << merged.output;
   const json whole = result("whole.json"), together = result("merged.json");
-  for (const char* field : {"cases", "verdicts", "happened", "holds"})
+  for (const char* field : {"cases", "verdicts", "coverage", "holds"})
     EXPECT_EQ(together[field], whole[field]) << field;
 
   expect_refused("fuzz --merge 1.json 2.json", {"--merge", "missing: 3"});

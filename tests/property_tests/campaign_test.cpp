@@ -69,7 +69,7 @@ TEST(Campaign, JudgesEveryCaseOnceWhateverTheLoadsAndThreads) {
   EXPECT_EQ(other.cases, one.cases);
   EXPECT_EQ(other.verdicts, one.verdicts);
   EXPECT_EQ(other.particles, one.particles);
-  EXPECT_EQ(other.happened, one.happened);
+  EXPECT_EQ(other.coverage, one.coverage);
 }
 
 TEST(Campaign, ShardsAreTheWhole) {
@@ -188,7 +188,7 @@ TEST(AMovingCase, HasAsManyFramesAsTheBladeNeeds) {
   int64_t divided = 0;
   for (uint64_t seed = 0; seed < 40; ++seed) {
     const Case c = draw_moving_case(seed, 50);
-    const cutproof::Setup setup = load(c).setup;
+    const cutproof::Setup setup = instance_of(c).setup;
     const double most = blade_clearance(setup) * (1 + 1e-12);
     for (const BladeMove& move : setup.blade_moves) EXPECT_LE(norm(move.to.edge - move.from.edge), most);
     divided += setup.frame_count() > static_cast<int64_t>(c.strokes.size());

@@ -80,9 +80,9 @@ TEST(Histories, HoldOnTheReferenceAndOnKernels) {
     const History history = history_of(make, wire(), commands);
     EXPECT_FALSE(history.failure()) << describe(*history.failure());
     EXPECT_EQ(history.position(), (Position{2, Stage::expand}));
-    for (const auto what : {HistoryHappened::loaded_before_split, HistoryHappened::kicked_beside_others,
-                            HistoryHappened::went_on_without_a_load}) {
-      EXPECT_GT(history.happened()[static_cast<std::size_t>(what)], 0) << static_cast<int>(what);
+    for (const auto what : {HistoryClass::loaded_before_split, HistoryClass::kicked_beside_others,
+                            HistoryClass::went_on_without_a_load}) {
+      EXPECT_GT(history.coverage()[static_cast<std::size_t>(what)], 0) << static_cast<int>(what);
     }
   }
 }

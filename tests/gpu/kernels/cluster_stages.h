@@ -107,7 +107,7 @@ void for_random_states(std::uint64_t seed, int cases, int size, Stage stage, Vis
   for (int k = 0; k < cases; ++k) {
     const std::uint64_t case_seed = random.seed();
     SCOPED_TRACE("draw_case(" + std::to_string(case_seed) + ", " + std::to_string(size) + ')');
-    auto [setup, state] = property_tests::load(property_tests::draw_case(case_seed, size));
+    auto [setup, state] = property_tests::instance_of(property_tests::draw_case(case_seed, size));
     const auto backend = reference::make_backend();
     const std::int64_t frames = setup.frame_count();
     backend->load({setup}, {state});

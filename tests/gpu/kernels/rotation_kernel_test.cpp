@@ -1,4 +1,4 @@
-// The rotation of one cluster: every method, in both precisions, on every hard case of accuracy_and_speed.md §3
+// The rotation of one cluster: every method, in both precisions, on every hard case of solvers.md, Hard cases
 // (fixtures/hard_matrices.h). `cutproof bench rotations` prints what each reaches.
 #include <gtest/gtest.h>
 

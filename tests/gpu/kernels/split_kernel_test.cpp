@@ -442,7 +442,7 @@ TEST(GpuDetectAndSplit, EqualTheReferenceInEveryFrameOfRandomDissections) {
   HostLauncher launcher;
   int64_t cuts = 0, frames = 0;
   for (int seed = 0; seed < 600; ++seed) {
-    const property_tests::Loaded loaded = property_tests::load(property_tests::draw_case(at(seed), seed % 60));
+    const property_tests::Instance loaded = property_tests::instance_of(property_tests::draw_case(at(seed), seed % 60));
     const auto backend = reference::make_backend();
     backend->load({loaded.setup}, {loaded.state});
     for (int64_t f = 0; f < loaded.setup.frame_count(); ++f) {

@@ -206,7 +206,7 @@ TEST(GpuStep, MeetsTheReferenceWithinItsRounding) {
       const State reached = kernel_step(setup, state);
       const double h = setup.body.grid.spacing, dt = setup.substep_length[0];
       double bound = frame_bound(setup, state, expected);
-      EXPECT_LE(bound, 1e-4 * h) << "the goal of accuracy_and_speed.md";
+      EXPECT_LE(bound, 1e-4 * h) << "the goal of tolerances.md, Against the reference";
       if (kind > 0) bound += 5 * response(setup, state, expected, random);
       const double error = greatest_distance(reached.x, expected.x);
       worst = std::max(worst, error / h);
@@ -285,7 +285,7 @@ TEST(GpuStep, ConservesLinearMomentum) {
       const double mass = total_mass(setup);
       const double drift = norm(momentum(setup, reached) - momentum(setup, state)) / mass;
       const double substeps = 50.0 * setup.step.substeps;
-      // accuracy_and_speed.md §1: 0.25 n u L / dt, per mass.
+      // measuring.md, Conservation: 0.25 n u L / dt, per mass.
       EXPECT_LE(drift, 0.25 * substeps * kUnit * farthest / 0.004) << stiffness;
       std::printf("solver %d, k %.0e: drift %.1e of the bound\n", static_cast<int>(solver), stiffness,
                   drift / (0.25 * substeps * kUnit * farthest / 0.004));

@@ -30,7 +30,7 @@ Bodies some_bodies(std::uint64_t seed, int count) {
   property_tests::Random random(seed);
   Bodies bodies;
   for (int k = 0; k < count; ++k) {
-    auto [setup, state] = property_tests::load(property_tests::draw_case(random.seed(), 40));
+    auto [setup, state] = property_tests::instance_of(property_tests::draw_case(random.seed(), 40));
     bodies.setups.push_back(std::move(setup));
     bodies.states.push_back(std::move(state));
   }
