@@ -9,12 +9,12 @@ namespace {
 
 class PartialBackend final : public Backend {
  public:
-  PartialBackend(std::unique_ptr<Backend> inner, std::string name, bool (*can_run)(Span))
-      : inner_(std::move(inner)), name_(std::move(name)), can_run_(can_run) {}
+  PartialBackend(std::unique_ptr<Backend> inner, std::string name, bool (*offers)(Span))
+      : inner_(std::move(inner)), name_(std::move(name)), offers_(offers) {}
 
   std::string name() const override { return name_; }
   Precision precision() const override { return inner_->precision(); }
-  bool can_run(Span span) const override { return can_run_(span) && inner_->can_run(span); }
+  bool can_run(Span span) const override { return offers_(span) && inner_->can_run(span); }
   void load(std::vector<Setup> setups, std::vector<State> states) override {
     inner_->load(std::move(setups), std::move(states));
   }
@@ -32,7 +32,7 @@ class PartialBackend final : public Backend {
  private:
   std::unique_ptr<Backend> inner_;
   std::string name_;
-  bool (*can_run_)(Span);
+  bool (*offers_)(Span);
 };
 
 }  // namespace

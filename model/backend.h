@@ -32,7 +32,8 @@ class Backend {
   // Of its arithmetic. Its states say so too (State::precision).
   virtual Precision precision() const { return Precision::binary64; }
 
-  // Which contiguous runs of stages it can execute. Whole frames are always among them.
+  // Which contiguous runs of stages it can execute: perhaps every one, whole frames only, or a single stage. What it
+  // cannot run, others run for it, and it is not judged on that (harness/frame_runner.h).
   virtual bool can_run(Span span) const = 0;
 
   // Takes one or more bodies, each with its own parameters. Changes nothing in them: a state in the middle of a

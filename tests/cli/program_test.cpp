@@ -201,6 +201,29 @@ TEST_F(Program, RefusesARecordingThatIsCutOffOrNone) {
   expect_refused("check nothing_there", {"nothing_there", "remedy"});
 }
 
+// --- Backends that can run some spans only ---------------------------------------------------------------------------
+
+TEST_F(Program, JudgesBackendsOfWholeFramesAndOfOneStageOnWhatTheyRun) {
+  write("cut.json", small_block().dump());
+  for (const std::string backend : {"host-frames", "host-split"}) {
+    const Outcome run = cutproof("run cut.json --check --json out.json --backend " + backend);
+    EXPECT_EQ(run.status, 0) << run.output;
+    const json document = json::parse(read("out.json"));
+    std::set<std::string> judged;
+    for (const json& verdict : document["verdicts"]) {
+      if (verdict["checked"] > 0) judged.insert(verdict["property"]);
+    }
+    EXPECT_EQ(judged.contains("linear momentum"), backend == "host-frames");
+    EXPECT_EQ(judged.contains("split exactness"), backend == "host-split");
+    EXPECT_EQ(judged.contains("stages in one piece"), backend == "host-frames");
+    const Outcome fuzz = cutproof("fuzz --cases 60 --backend " + backend);
+    EXPECT_EQ(fuzz.status, 0) << fuzz.output;
+  }
+  const Outcome against = cutproof("run cut.json --against reference --backend host-frames");
+  EXPECT_EQ(against.status, 2) << against.output;
+  EXPECT_NE(against.output.find("--against"), std::string::npos);
+}
+
 // --- Bad input ------------------------------------------------------------------------------------------------------
 
 TEST_F(Program, SaysWhatToDoNextWhenRunHasNoScene) {
