@@ -45,7 +45,7 @@ foreach(component IN LISTS cutproof_components)
     ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/cutproof)
   foreach(folder IN LISTS folders)
     install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/cutproof/${folder}
-      FILES_MATCHING PATTERN "*.h" PATTERN "*.cuh")
+      FILES_MATCHING PATTERN "*.h" PATTERN "*.cuh" PATTERN "*.inc")
   endforeach()
 
   # From what the library links follows what has to be found first.

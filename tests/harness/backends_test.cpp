@@ -35,14 +35,15 @@ TEST(Backends, HaveTheArithmeticAndTheSpansOfTheirDescription) {
   for (const BackendDescriptor* const described : backends_of_this_machine()) {
     const auto backend = make_backend(choice_of(*described));
     EXPECT_EQ(backend->precision(), described->precision) << described->name;
+    int spans = 0;
     for (const Stage first : kStages) {
       for (const Stage last : kStages) {
-        if (first <= last) {
-          EXPECT_EQ(backend->can_run({first, last}), described->can_run({first, last})) << described->name;
-        }
+        if (first > last) continue;
+        EXPECT_EQ(backend->can_run({first, last}), described->can_run({first, last})) << described->name;
+        spans += described->can_run({first, last});
       }
     }
-    EXPECT_TRUE(described->can_run(Span{})) << "whole frames are always among them";
+    EXPECT_GT(spans, 0) << described->name;
   }
 }
 
