@@ -72,6 +72,11 @@ void FrameRunner::hand_over(bool to_backend) {
   if (!to_backend && !reference_) reference_ = reference::make_backend();
   (to_backend ? backend_ : *reference_).load(setups_, std::move(states));
   at_backend_ = to_backend;
+  // In single precision what is loaded is rounded: the next span begins with that.
+  std::vector<State> taken = snapshot();
+  for (std::size_t b = 0; b < taken.size(); ++b) {
+    if (!(taken[b] == *present_[b])) present_[b] = std::make_shared<const State>(std::move(taken[b]));
+  }
 }
 
 std::vector<State> FrameRunner::snapshot_of(const std::vector<bool>& wanted) const {

@@ -20,22 +20,6 @@ bool same_sets(const Clusters& a, const Clusters& b) { return a.offsets == b.off
 // A span of several stages shows only its end. What an earlier stage left follows from that exactly, as far as no later
 // one may have touched it; of the rest nothing is assumed (the state before stands in for it).
 
-// Nothing moves after step, and rotations stay with clusters that stay.
-State after_step(const State& before, const State& end) {
-  State state = before;
-  state.x = end.x;
-  state.v = end.v;
-  state.impulse = end.impulse;
-  state.precision = end.precision;
-  state.removed.clear();
-  state.debris.clear();
-  if (same_sets(before.clusters, end.clusters)) {
-    state.clusters.rotation = end.clusters.rotation;
-    state.clusters.degenerate = end.clusters.degenerate;
-  }
-  return state;
-}
-
 State after_detection(State before, const State& end) {
   before.removed = end.removed;
   for (const int32_t i : end.removed) {
@@ -54,6 +38,22 @@ State before_skin(const State& before, const State& end) {
 }
 
 }  // namespace
+
+// Nothing moves after step, and rotations stay with clusters that stay.
+State after_step(const State& before, const State& end) {
+  State state = before;
+  state.x = end.x;
+  state.v = end.v;
+  state.impulse = end.impulse;
+  state.precision = end.precision;
+  state.removed.clear();
+  state.debris.clear();
+  if (same_sets(before.clusters, end.clusters)) {
+    state.clusters.rotation = end.clusters.rotation;
+    state.clusters.degenerate = end.clusters.degenerate;
+  }
+  return state;
+}
 
 Judge::Judge(const Setup& setup, std::string backend, Promises promises, Thorough thorough)
     : setup_(setup),

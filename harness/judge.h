@@ -39,7 +39,7 @@ class Judge {
 
   // The state as loaded. `has_expanded`: an expansion may have changed its clusters already.
   void begin(const Snapshot& initial, bool has_expanded = false);
-  // Moments in order, each beginning where the one before ended. What somebody else ran for the backend is not judged.
+  // Moments in order. What somebody else ran for the backend is not judged.
   void see(const Moment& moment);
   // A verdict of somebody else's on this run, such as a broken contract.
   void add(Verdict verdict);
@@ -80,5 +80,9 @@ class Judge {
   bool skin_judged_ = false;  // the present triangles have been judged thoroughly
   bool lost_ = false;         // the last state is not well formed, so the next one cannot be compared with it
 };
+
+// A span that begins with step and shows only its end: what step left, as far as no later stage may have touched it. Of
+// the rest nothing is assumed (the state before stands in for it).
+State after_step(const State& before, const State& end);
 
 }  // namespace cutproof::harness

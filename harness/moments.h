@@ -14,6 +14,9 @@
 
 namespace cutproof::harness {
 
+// A moment begins with the state in which the one before ended, as whoever runs it holds it: loaded into single
+// precision it may have been rounded.
+//
 // A state that nobody changes any more; whoever wants to keep it keeps the pointer.
 using Snapshot = std::shared_ptr<const State>;
 

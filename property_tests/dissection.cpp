@@ -146,6 +146,10 @@ Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, 
     for (const harness::Judge::Unpromised& u : judge.unpromised()) {
       if (u.property == "isolation" && u.failing > 0) judgement[CoverageClass::uncoupled] = true;
     }
+    // What others ran for the backend is not judged, but it happened in the case all the same.
+    if (!moment.by_backend && moment.span.contains(Stage::skin) && !oracles::isolation(setup, after).holds) {
+      judgement[CoverageClass::uncoupled] = true;
+    }
     if (judgement.failure) break;
     const auto due = harness::due_stages(setup, before, moment.span, after);
     for (const Stage stage : kStages) {
@@ -154,6 +158,15 @@ Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, 
     const int32_t components_before = std::exchange(components, judge.component_count());
     if (moment.span.contains(Stage::detect) && components > components_before)
       judgement[CoverageClass::separation] = true;
+    // A step that came together with other stages can still be compared: later ones move nothing, and where no cluster
+    // has changed, they turn nothing either.
+    if (c.moves && moment.by_backend && due[0] && std::count(due.begin(), due.end(), true) > 1 &&
+        before.clusters.members == after.clusters.members) {
+      const oracles::StageDifference found =
+          comparison.compare(Stage::step, before, harness::after_step(before, after), true);
+      judgement.compared.add(found);
+      take(found.verdicts("the reference's "));
+    }
     if (is_the_reference || !moment.by_backend || std::count(due.begin(), due.end(), true) != 1) continue;
     const auto stage = static_cast<Stage>(std::find(due.begin(), due.end(), true) - due.begin());
     if (stage == Stage::step && !c.moves) continue;

@@ -159,7 +159,7 @@ def fallbacks(fault):
         tests = ["backend_test"] if fault.stage == "launch" else [f"{fault.stage}_test"]
     else:
         backend, kinds = "host", "*/host*:*/simulated*"
-        tests = ["launch_test"] if fault.stage == "launch" else [f"gpu_{fault.stage}_test"]
+        tests = ["launch_test"] if fault.stage == "launch" else [f"{fault.stage}_kernel_test"]
     return tests + [f"property_tests --gtest_filter='{kinds}'",
                     f"cutproof fuzz --backend {backend} --cases 1000000000 --seconds {FUZZ_SECONDS}"]
 

@@ -220,7 +220,7 @@ TEST_F(Program, JudgesBackendsOfWholeFramesAndOfOneStageOnWhatTheyRun) {
     EXPECT_EQ(judged.contains("linear momentum"), backend == "host-frames");
     EXPECT_EQ(judged.contains("split exactness"), backend == "host-split");
     EXPECT_EQ(judged.contains("stages in one piece"), backend == "host-frames");
-    const Outcome fuzz = cutproof("fuzz --cases 60 --backend " + backend);
+    const Outcome fuzz = cutproof("fuzz --cases 300 --backend " + backend);
     EXPECT_EQ(fuzz.status, 0) << fuzz.output;
   }
   const Outcome against = cutproof("run cut.json --against reference --backend host-frames");
