@@ -12,9 +12,9 @@
 
 namespace cutproof::io {
 
-// One moment of one body: the state after a span of stages. Who records a run keeps one after each stage that was due and
-// at the end of each frame; who looks on from farther off may keep the ends of frames alone. Snapshot 0 is the state as
-// loaded (stage: skin).
+// One moment of one body: the state after a span of stages. Who records a run keeps one after each stage that was due
+// and at the end of each frame; who looks on from farther off may keep the ends of frames alone. Snapshot 0 is the
+// state as loaded (stage: skin).
 struct Snapshot {
   Stage stage = Stage::skin;
   State state;

@@ -256,6 +256,25 @@ TEST_F(WrongRecording, InWhichTheGroundPushesFartherThanItsImpulse) {
   }
 }
 
+// From about 1e160 on squares overflow, and an infinite distance is within an infinite bound.
+TEST_F(WrongRecording, WhosePositionsOrVelocitiesAreSoLargeThatNoBoundIsFinite) {
+  for (const double huge : {1e150, 1e160, 1e300}) {
+    for (const bool positions : {true, false}) {
+      RecordedScene recorded(kFallingScene, *reference_);
+      recorded.keep_ends_of_frames();
+      for (Vec3& v : positions ? recorded.snapshots.back().state.x : recorded.snapshots.back().state.v) {
+        v = {huge, huge, huge};
+      }
+      const auto judge = recorded.judged();
+      EXPECT_FALSE(judge->holds()) << huge;
+      for (const Verdict& verdict : judge->verdicts()) {
+        EXPECT_TRUE(!verdict.holds || (std::isfinite(verdict.measured) && std::isfinite(verdict.bound)))
+            << verdict.property << " of " << huge;
+      }
+    }
+  }
+}
+
 // --- Nothing to judge ------------------------------------------------------------------------------------------------
 
 TEST_F(WrongRecording, OfABodyWithoutParticlesOrOfNoFramesJudgesNothingAndFails) {
