@@ -14,8 +14,6 @@ namespace cutproof::benchmarks {
 
 namespace {
 
-using fixtures::Precision;
-
 // Scaled and guarded as the kernels' methods are, so that only the decomposition is compared.
 struct EigenSvd {
   static constexpr const char* kName = "eigen_svd";
@@ -51,7 +49,7 @@ template <class Method, class Real>
 RotationMethod on_cpu(std::string name, bool selectable, const std::shared_ptr<gpu::HostLauncher>& launcher) {
   RotationMethod method;
   method.name = std::move(name);
-  method.precision = sizeof(Real) == sizeof(float) ? Precision::single : Precision::twice;
+  method.precision = sizeof(Real) == sizeof(float) ? Precision::binary32 : Precision::binary64;
   method.selectable = selectable;
   method.bytes = kRotationBytes<Real>;
   method.solve = [launcher](const std::vector<Mat3>& a, const std::vector<Mat3>& previous, int repeats) {

@@ -18,7 +18,7 @@ struct TimedAnswers {
 
 struct RotationMethod {
   std::string name;
-  fixtures::Precision precision = fixtures::Precision::single;
+  Precision precision = Precision::binary32;
   bool selectable = false;  // by `--rotation`, on backends that run the kernels
   int64_t bytes = 0;        // read and written for each matrix
   // Matrix i starts from previous[i], every time.

@@ -5,13 +5,13 @@
 #include <limits>
 #include <optional>
 
+#include "benchmarks/contenders.h"
 #include "model/io/json_number.h"
 
 namespace cutproof::benchmarks {
 
 namespace {
 
-using fixtures::Precision;
 using nlohmann::json;
 
 constexpr double kColdStart = -1;
@@ -41,8 +41,6 @@ void sum_up(RotationResult& result) {
 json to_json(const std::optional<double>& value) { return value ? json_number(*value) : json(nullptr); }
 
 }  // namespace
-
-const char* name_of(Precision precision) { return precision == Precision::single ? "single" : "double"; }
 
 bool RotationReport::default_holds() const {
   return std::any_of(results.begin(), results.end(), [](const auto& r) { return r.is_default; }) &&
@@ -81,9 +79,9 @@ RotationReport measure_rotations(const std::vector<RotationMethod>& methods, con
   int64_t done = 0;
   for (const fixtures::HardCase& hard : fixtures::hard_cases()) {
     show(++done, hard.name);
-    for (const Precision precision : {Precision::single, Precision::twice}) {
+    for (const Precision precision : {Precision::binary32, Precision::binary64}) {
       const fixtures::Problems problems = pose(hard, std::max(counts.matrices, hard.fewest), precision, counts.seed);
-      double& error = precision == Precision::single ? report.reference_error_single : report.reference_error_double;
+      double& error = precision == Precision::binary32 ? report.reference_error_single : report.reference_error_double;
       error = std::max(error, problems.reference_error);
       for (std::size_t k = 0; k < methods.size(); ++k) {
         if (methods[k].precision != precision) continue;
@@ -94,7 +92,7 @@ RotationReport measure_rotations(const std::vector<RotationMethod>& methods, con
       }
     }
   }
-  for (const Precision precision : {Precision::single, Precision::twice}) {
+  for (const Precision precision : {Precision::binary32, Precision::binary64}) {
     const fixtures::Frame near = fixtures::draw_ordinary(counts.timed, precision, kNearTurn, counts.seed);
     const fixtures::Frame cold = fixtures::draw_ordinary(counts.timed, precision, kColdStart, counts.seed);
     for (std::size_t k = 0; k < methods.size(); ++k) {
@@ -118,8 +116,8 @@ json to_json(const RotationReport& report) {
             {"deviation", bound.deviation},
             {"reference_error", reference_error}};
   };
-  document["bounds"] = {{"single", bounds(Precision::single, report.reference_error_single)},
-                        {"double", bounds(Precision::twice, report.reference_error_double)}};
+  document["bounds"] = {{"single", bounds(Precision::binary32, report.reference_error_single)},
+                        {"double", bounds(Precision::binary64, report.reference_error_double)}};
   document["cases"] = json::array();
   for (const fixtures::HardCase& hard : fixtures::hard_cases()) {
     document["cases"].push_back(

@@ -19,7 +19,7 @@ struct RotationCaseResult {
 // One method in one precision.
 struct RotationResult {
   std::string method;
-  fixtures::Precision precision = fixtures::Precision::single;
+  Precision precision = Precision::binary32;
   bool selectable = false, is_default = false;
   std::vector<RotationCaseResult> cases;
   Times near, cold;        // [s] per million matrices
@@ -62,7 +62,5 @@ inline constexpr double kNearTurn = 0.02;
 
 // The fields `bounds`, `cases`, `methods`, `rows` and `holds` of the document.
 nlohmann::json to_json(const RotationReport& report);
-
-const char* name_of(fixtures::Precision precision);
 
 }  // namespace cutproof::benchmarks

@@ -1,5 +1,6 @@
 #include "benchmarks/suites/rotations.h"
 
+#include "benchmarks/contenders.h"
 #include "cli/bench/suites.h"
 #include "cli/terminal.h"
 
@@ -12,7 +13,6 @@ using benchmarks::RotationReport;
 using benchmarks::RotationResult;
 using benchmarks::RotationsOptions;
 using benchmarks::RotationsResult;
-using fixtures::Precision;
 
 struct AskedRotations : Asked<RotationsOptions> {
   bool cases = false;  // a table of every case, too
@@ -67,8 +67,8 @@ void print_begin(const RotationsResult& result) {
 }
 
 void print_what_is_wrong(const RotationReport& report) {
-  const fixtures::RotationBounds single = fixtures::rotation_bounds(Precision::single),
-                                 twice = fixtures::rotation_bounds(Precision::twice);
+  const fixtures::RotationBounds single = fixtures::rotation_bounds(Precision::binary32),
+                                 twice = fixtures::rotation_bounds(Precision::binary64);
   fmt::print(
       "\nTimes are of a million matrices, near the answer ({} rad) and from the identity. An answer is wrong beyond a\n"
       "gap of {:.1e} or ‖RᵀR - I‖ = {:.1e} (double: {:.1e}, {:.1e}), or where the case expects another. The best "
@@ -97,7 +97,7 @@ int rotations(const AskedRotations& asked) {
       benchmarks::run_rotations(asked, reporting<RotationsResult>(asked.json, print_begin, kNothing), show);
   progress.reset();
   if (asked.cases) {
-    for (const Precision precision : {Precision::single, Precision::twice}) print_cases(result.report, precision);
+    for (const Precision precision : {Precision::binary32, Precision::binary64}) print_cases(result.report, precision);
   }
   print_methods(result.report);
   print_what_is_wrong(result.report);

@@ -17,11 +17,11 @@
 namespace {
 
 using cutproof::Mat3;
+using cutproof::Precision;
 using cutproof::benchmarks::RotationCounts;
 using cutproof::benchmarks::RotationMethod;
 using cutproof::benchmarks::RotationReport;
 using cutproof::benchmarks::RotationResult;
-using cutproof::fixtures::Precision;
 using nlohmann::json;
 
 // --- The program -----------------------------------------------------------------------------------------------------
@@ -172,7 +172,7 @@ RotationMethod method_named(const std::string& name, Precision precision) {
 // The default with a fault.
 using Spoil = void (*)(cutproof::fixtures::Answers& answers, const std::vector<Mat3>& a);
 RotationReport report_of_spoiled(Spoil spoil) {
-  RotationMethod spoiled = method_named("newton", Precision::single);
+  RotationMethod spoiled = method_named("newton", Precision::binary32);
   spoiled.solve = [inner = spoiled.solve, spoil](const std::vector<Mat3>& a, const std::vector<Mat3>& previous,
                                                  int repeats) {
     auto timed = inner(a, previous, repeats);
@@ -221,7 +221,7 @@ TEST(MeasureRotations, CountsWhatIsNoNumber) {
 
 TEST(MeasureRotations, DoesNotHoldWithoutADefault) {
   const RotationReport report =
-      cutproof::benchmarks::measure_rotations({method_named("svd", Precision::single)}, kFew, "newton", 1e9);
+      cutproof::benchmarks::measure_rotations({method_named("svd", Precision::binary32)}, kFew, "newton", 1e9);
   EXPECT_EQ(report.results.front().wrong, 0);
   EXPECT_FALSE(report.default_holds());
 }
@@ -242,7 +242,7 @@ TEST(RotationFront, HoldsWhatNoOtherMethodBeats) {
   EXPECT_FALSE(results[3].on_front || results[4].on_front);
   // What is exact in double does not stand in the way of what kernels can use.
   results.push_back(method(1e-15, 0.5));
-  results.back().precision = Precision::twice;
+  results.back().precision = Precision::binary64;
   cutproof::benchmarks::mark_front(results);
   EXPECT_TRUE(results[0].on_front && results[1].on_front && results[2].on_front && results[5].on_front);
 }
@@ -252,10 +252,10 @@ TEST(RotationMethods, OfKernelsAreAllSelectableAndTheOthersAreNot) {
   for (const RotationMethod& method :
        cutproof::benchmarks::rotation_methods(cutproof::harness::described_backend("host"))) {
     if (method.selectable) {
-      EXPECT_EQ(method.precision, Precision::single) << method.name;
+      EXPECT_EQ(method.precision, Precision::binary32) << method.name;
       selectable.insert(method.name);
     }
-    EXPECT_EQ(method.bytes, method.precision == Precision::single ? 109 : 217);
+    EXPECT_EQ(method.bytes, method.precision == Precision::binary32 ? 109 : 217);
   }
   const auto& names = cutproof::harness::rotation_names();
   EXPECT_EQ(selectable, std::set<std::string>(names.begin(), names.end()));

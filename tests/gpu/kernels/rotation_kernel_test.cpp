@@ -84,18 +84,18 @@ fixtures::Answers solve(const std::vector<Mat3>& a, const std::vector<Mat3>& pre
 
 struct Method {
   const char* name;
-  fixtures::Precision precision;
+  Precision precision;
   fixtures::Solve solve;
 };
 template <class Real>
-std::vector<Method> methods_in(fixtures::Precision precision) {
+std::vector<Method> methods_in(Precision precision) {
   return {{"jacobi4", precision, solve<kJacobi4, Real>}, {"mueller", precision, solve<kMueller2016, Real>},
           {"apd", precision, solve<kApd, Real>},         {"svd", precision, solve<kSvd, Real>},
           {"quest", precision, solve<kQuest, Real>},     {"newton", precision, solve<kNewton, Real>}};
 }
 std::vector<Method> methods() {
-  std::vector<Method> all = methods_in<float>(fixtures::Precision::single);
-  for (const Method& method : methods_in<double>(fixtures::Precision::twice)) all.push_back(method);
+  std::vector<Method> all = methods_in<float>(Precision::binary32);
+  for (const Method& method : methods_in<double>(Precision::binary64)) all.push_back(method);
   return all;
 }
 
@@ -106,13 +106,13 @@ fixtures::Judged judged(const std::string& name, const Method& method) {
 TEST(GpuRotation, TheDefaultReachesTheGoalOnEveryHardCaseAndNoMethodGivesNaN) {
   const std::set<std::string> reliable = {"jacobi4", "newton", "svd"};
   for (const fixtures::HardCase& hard : fixtures::hard_cases()) {
-    for (const fixtures::Precision precision : {fixtures::Precision::single, fixtures::Precision::twice}) {
+    for (const Precision precision : {Precision::binary32, Precision::binary64}) {
       const fixtures::Problems problems = fixtures::pose(hard, kTrials, precision);
       for (const Method& method : methods()) {
         if (method.precision != precision) continue;
         const fixtures::Judged result = fixtures::judge(problems, method.solve);
         const std::string where = hard.name + ", " + method.name +
-                                  (precision == fixtures::Precision::single ? ", single" : ", double") + ", seed " +
+                                  (precision == Precision::binary32 ? ", single" : ", double") + ", seed " +
                                   std::to_string(hard.seed) + ": " + result.first_wrong;
         EXPECT_EQ(result.not_finite, 0) << where;
         EXPECT_EQ(result.reflections, 0) << where;
@@ -128,7 +128,7 @@ TEST(GpuRotation, TheOthersAreRightWhereTheyAreSaidToBe) {
   // What docs/design/solvers.md says of them; a method that stops being right there has a fault.
   for (const Method& method : methods()) {
     const std::string name = method.name;
-    if (name == "mueller" && method.precision == fixtures::Precision::twice) continue;  // has not converged by then
+    if (name == "mueller" && method.precision == Precision::binary64) continue;  // has not converged by then
     if (name == "mueller" || name == "apd") {
       EXPECT_EQ(judged("near", method).wrong, 0) << name;
     }
