@@ -131,6 +131,32 @@ TEST(PartialBackend, ThatRunsOnlySplitIsFoundWrong) {
   EXPECT_THAT(failing(*judged_live(wrong, tests::kCutScene)), Contains("split exactness"));
 }
 
+// What it is handed in the middle of a frame it must begin with: else it would be judged on a state of its own making.
+TEST(PartialBackend, ThatLoadsSomethingElseIsFoundWrong) {
+  class Forgetful final : public Backend {
+   public:
+    std::string name() const override { return "forgetful"; }
+    bool can_run(Span span) const override { return split_only(span); }
+    void load(std::vector<cutproof::Setup> setups, std::vector<State> states) override {
+      for (State& state : states) state.tau += 1;
+      inner_->load(std::move(setups), std::move(states));
+    }
+    void run(Span span) override { inner_->run(span); }
+    std::vector<State> snapshot() const override { return inner_->snapshot(); }
+    SpanReport report() const override { return inner_->report(); }
+
+   private:
+    std::unique_ptr<Backend> inner_ = reference::make_backend();
+  } forgetful;
+  const Scene scene = io::parse_scene(tests::kCutScene, "the test's scene");
+  const fixtures::Built built = fixtures::build(scene, "the test's scene");
+  harness::FrameRunner runner(forgetful, {built.setup}, {built.state});
+  runner.run_frame([](const harness::Moment&) {});
+  const std::vector<Verdict> broken = runner.take_broken_contracts();
+  ASSERT_FALSE(broken.empty());
+  EXPECT_EQ(broken.front().property, "loading changes nothing");
+}
+
 // --- By `fuzz` -------------------------------------------------------------------------------------------------------
 
 property_tests::Campaign fuzzed(const Partial::Can& can, const Partial::Fault& fault) {
