@@ -9,9 +9,8 @@
 namespace cutproof::benchmarks {
 
 struct Contender {
-  std::string backend, precision, rotation, split;
-  bool pipelined = false;     // run() does not wait
-  bool runs_kernels = false;  // its step moves what step_traffic counts
+  const harness::BackendDescriptor* described = nullptr;
+  std::string rotation, split;
   std::unique_ptr<Backend> instance;
 };
 // One for each way of splitting: `split` is blocks, global, both, or empty for the default. Throws InputError, or

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include "benchmarks/times.h"
+#include "model/io/filled.h"
 #include "model/io/json_number.h"
+#include "model/io/verdict_json.h"
 
 namespace cutproof::benchmarks {
 
@@ -16,10 +18,24 @@ std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
 json to_json(const oracles::ErrorNorm& norm) {
   return {{"max_h", json_number(norm.max)}, {"rms_h", json_number(norm.rms())}, {"beyond", norm.beyond}};
 }
-std::string in_words(const oracles::ErrorNorm& norm) {
-  std::string text = fmt::format("{:.2g} h max, {:.2g} h RMS", norm.max, norm.rms());
-  if (norm.beyond > 0) text += fmt::format(", {} beyond {:.0e} h", norm.beyond, oracles::kPositionsWanted);
-  return text;
+
+json error_of_stage(Stage stage, const Measured& measured) {
+  const FrameErrors& judged = *measured.judged;
+  json error;
+  if (stage == Stage::step && judged.step) {
+    error = to_json(judged.step->position);
+    error["undecidable"] = judged.step->undecidable;
+  } else if (stage == Stage::detect && judged.detect) {
+    const auto& [removed, differing, within_rounding] = *judged.detect;
+    error = {{"removed", removed}, {"differing", differing}, {"within_rounding", within_rounding}};
+  } else if (stage == Stage::skin && judged.skin) {
+    error = to_json(judged.skin->vertices);
+    error["triangles_equal"] = judged.skin->triangles_equal;
+  } else if (const auto equal = judged.clusters_equal[at(stage)]) {
+    error = {{"clusters_equal", *equal}};
+    if (stage == Stage::expand) error["added"] = measured.added;
+  }
+  return error;
 }
 
 }  // namespace
@@ -27,7 +43,7 @@ std::string in_words(const oracles::ErrorNorm& norm) {
 Measured measure(const Contender& contender, const BenchScene& scene, int64_t frames, int64_t repeats) {
   Backend& backend = *contender.instance;
   Measured measured;
-  measured.timings = time_stages(backend, scene, frames, contender.pipelined, repeats);
+  measured.timings = time_stages(backend, scene, frames, contender.described->pipelines, repeats);
   const auto begin = Clock::now();
   if (scene.setup.body.particle_count() <= kMostJudgedParticles) {
     const bool expands = measured.timings.stage[at(Stage::expand)].count > 0;
@@ -38,92 +54,68 @@ Measured measure(const Contender& contender, const BenchScene& scene, int64_t fr
   return measured;
 }
 
-ErrorColumn error_of(Stage stage, const Measured& measured) {
-  if (!measured.judged) return {"not measured", nullptr};
-  const FrameErrors* const judged = &*measured.judged;
-  switch (stage) {
-    case Stage::step:
-      if (const auto& s = judged->step) {
-        ErrorColumn error = {in_words(s->position), to_json(s->position)};
-        error.value["undecidable"] = s->undecidable;
-        if (s->undecidable > 0) error.text += fmt::format(", {} undecidable within rounding", s->undecidable);
-        return error;
-      }
-      break;
-    case Stage::detect:
-      if (const auto& d = judged->detect) {
-        std::string text = fmt::format("{} of {} removals differ", d->differing, d->removed);
-        if (d->differing > 0) text += d->within_rounding ? ", all within rounding" : ", NOT all within rounding";
-        return {text, {{"removed", d->removed}, {"differing", d->differing}, {"within_rounding", d->within_rounding}}};
-      }
-      break;
-    case Stage::skin:
-      if (const auto& s = judged->skin) {
-        json value = to_json(s->vertices);
-        value["triangles_equal"] = s->triangles_equal;
-        return {in_words(s->vertices) + (s->triangles_equal ? ", triangles equal" : ", triangles NOT equal"), value};
-      }
-      break;
-    default:
-      if (const auto equal = judged->clusters_equal[at(stage)]) {
-        ErrorColumn error = {*equal ? "clusters equal" : "clusters NOT equal", {{"clusters_equal", *equal}}};
-        if (stage == Stage::expand) {
-          error.text += fmt::format(", {} memberships added", measured.added);
-          error.value["added"] = measured.added;
-        }
-        return error;
-      }
+json error_of(const std::string& what, const Measured& measured) {
+  if (!measured.judged) return nullptr;
+  for (const Stage stage : kStages) {
+    if (what == name_of(stage)) return error_of_stage(stage, measured);
   }
-  return {"did not run", nullptr};
+  json error = {{"topology_holds", measured.judged->topology_holds()},
+                {"isolated_groups", measured.judged->isolated_groups}};
+  json failed = json::array();
+  for (const Verdict& verdict : measured.judged->topology) {
+    if (!verdict.holds) failed.push_back(io::verdict_json(verdict, false));
+  }
+  if (!failed.empty()) error["failed"] = std::move(failed);
+  return error;
 }
 
-ErrorColumn error_of_frame(const Measured& measured) {
-  if (!measured.judged) return {"not measured", nullptr};
-  const bool holds = measured.judged->topology_holds();
-  const double isolated = measured.judged->isolated_groups;
-  std::string text = holds ? "topology holds" : "topology FAILS";
-  if (isolated > 0) text += fmt::format(", {} isolated groups", isolated);
-  return {text, {{"topology_holds", holds}, {"isolated_groups", isolated}}};
+std::string in_words(const json& error, const std::string& nothing) {
+  if (error.is_null()) return nothing;
+  std::string text;
+  const auto say = [&](bool applies, const char* words) {
+    if (applies) text += (text.empty() ? "" : ", ") + io::filled(words, error);
+  };
+  const auto say_whether = [&](const char* field, const char* yes, const char* no) {
+    if (error.contains(field)) say(true, error.at(field) ? yes : no);
+  };
+  const auto some = [&](const char* field) { return error.value(field, 0.0) > 0; };
+  say(error.contains("max_h"), "{max_h:.2g} h max, {rms_h:.2g} h RMS");
+  say(some("beyond"), "{beyond} beyond 1e-04 h");  // oracles::kPositionsWanted
+  say(some("undecidable"), "{undecidable} undecidable within rounding");
+  say_whether("triangles_equal", "triangles equal", "triangles NOT equal");
+  say(error.contains("removed"), "{differing} of {removed} removals differ");
+  if (some("differing")) say_whether("within_rounding", "all within rounding", "NOT all within rounding");
+  say_whether("clusters_equal", "clusters equal", "clusters NOT equal");
+  say(error.contains("added"), "{added} memberships added");
+  say_whether("topology_holds", "topology holds", "topology FAILS");
+  say(some("isolated_groups"), "{isolated_groups:g} isolated groups");
+  return text;
 }
 
-json errors_by_stage(const Measured& measured) {
-  json errors = {{"frame", error_of_frame(measured).value}};
-  for (const Stage stage : kStages) errors[std::string(name_of(stage))] = error_of(stage, measured).value;
-  return errors;
-}
-
-SceneRow scene_row(const BenchScene& scene, const Contender& contender, Measured measured) {
+json run_fields(const BenchScene& scene, const Contender& contender) {
   const Setup& setup = scene.setup;
-  const Clusters& clusters = scene.state.clusters;
-  return {scene.name,
-          setup.body.particle_count(),
-          clusters.count(),
-          static_cast<int64_t>(clusters.members.size()),
-          setup.body.grid.spacing,
-          contender.backend,
-          contender.precision,
-          contender.rotation,
-          contender.split,
-          setup.step.substeps,
-          setup.step.iterations,
-          std::move(measured)};
+  return {{"scene", scene.name},
+          {"particles", setup.body.particle_count()},
+          {"backend", contender.described->name},
+          {"precision", name_of(contender.described->precision)},
+          {"substeps", setup.step.substeps},
+          {"iterations", setup.step.iterations},
+          {"rotation", contender.rotation},
+          {"split", contender.split}};
 }
 
-json to_json(const SceneRow& row) {
-  return {{"scene", row.scene},
-          {"particles", row.particles},
-          {"clusters", row.clusters},
-          {"memberships", row.memberships},
-          {"spacing", row.spacing},
-          {"backend", row.backend},
-          {"precision", row.precision},
-          {"substeps", row.substeps},
-          {"iterations", row.iterations},
-          {"rotation", row.rotation},
-          {"split", row.split},
-          {"seconds", seconds_by_stage(row.measured.timings)},
-          {"error", errors_by_stage(row.measured)},
-          {"judged_frames", row.measured.judged ? row.measured.judged->frames : 0}};
+json scene_row(const BenchScene& scene, const Contender& contender, const Measured& measured) {
+  json row = run_fields(scene, contender);
+  row["clusters"] = scene.state.clusters.count();
+  row["memberships"] = scene.state.clusters.members.size();
+  row["spacing"] = scene.setup.body.grid.spacing;
+  row["judged_frames"] = measured.judged ? measured.judged->frames : 0;
+  json seconds = json::object(), errors = {{"frame", error_of("frame", measured)}};
+  for (const auto& [what, times] : measured.timings.named()) seconds[what] = to_json(times);
+  for (const std::string_view stage : kStageNames) errors[std::string(stage)] = error_of(std::string(stage), measured);
+  row["seconds"] = std::move(seconds);
+  row["error"] = std::move(errors);
+  return row;
 }
 
 }  // namespace cutproof::benchmarks

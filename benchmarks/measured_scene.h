@@ -1,4 +1,4 @@
-// What one backend makes of one scene: times, then errors; and how both stand in tables and documents.
+// What one backend makes of one scene: times, then errors; and how both stand in documents.
 #pragma once
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -6,8 +6,8 @@
 #include <string>
 
 #include "benchmarks/contenders.h"
+#include "benchmarks/frame_errors.h"
 #include "benchmarks/scene.h"
-#include "benchmarks/stages.h"
 #include "benchmarks/timing.h"
 
 namespace cutproof::benchmarks {
@@ -24,27 +24,15 @@ struct Measured {
 };
 Measured measure(const Contender& contender, const BenchScene& scene, int64_t frames, int64_t repeats);
 
-// One row's error, in words and for machines.
-struct ErrorColumn {
-  std::string text;
-  nlohmann::json value;  // null if it was not measured
-};
-ErrorColumn error_of(Stage stage, const Measured& measured);
-ErrorColumn error_of_frame(const Measured& measured);
-// Under the name of each stage and `frame`.
-nlohmann::json errors_by_stage(const Measured& measured);
+// The error of what was timed under this name (Timings::named); null if it was not measured, or did not run.
+nlohmann::json error_of(const std::string& what, const Measured& measured);
+// The same for people. `nothing` if there is none.
+std::string in_words(const nlohmann::json& error, const std::string& nothing);
 
-// A row of a suite that times whole scenes, without what belongs to that suite alone.
-struct SceneRow {
-  std::string scene;
-  int64_t particles = 0, clusters = 0, memberships = 0;
-  double spacing = 0;  // [m]
-  std::string backend, precision, rotation, split;
-  int32_t substeps = 0, iterations = 0;
-  Measured measured;
-};
-SceneRow scene_row(const BenchScene& scene, const Contender& contender, Measured measured);
-nlohmann::json to_json(const SceneRow& row);
+// Which scene, on which backend, solved how.
+nlohmann::json run_fields(const BenchScene& scene, const Contender& contender);
+// A row of `sampling` and `scale`, without what belongs to one of them alone.
+nlohmann::json scene_row(const BenchScene& scene, const Contender& contender, const Measured& measured);
 
 // What the suites that time whole scenes are asked for.
 struct TimingOptions {

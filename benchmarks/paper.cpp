@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <map>
 
+#include "benchmarks/report.h"
 #include "benchmarks/times.h"
-#include "model/error.h"
 #include "model/io/scene_io.h"
 
 namespace cutproof::benchmarks {
@@ -24,6 +24,14 @@ const std::vector<PaperScene>& paper_scenes() {
   return scenes;
 }
 
+std::optional<double> PaperScene::paper_ms(const std::string& what) const {
+  if (!paper) return {};
+  if (what == "frame") return paper->frame;
+  const auto stage = std::find(kStageNames.begin(), kStageNames.end(), what);
+  if (stage == kStageNames.end()) return {};
+  return paper->stage[static_cast<std::size_t>(stage - kStageNames.begin())];
+}
+
 const PaperScene* find_paper_scene(const std::string& name) {
   const std::vector<PaperScene>& scenes = paper_scenes();
   const auto found = std::find_if(scenes.begin(), scenes.end(), [&](const auto& scene) { return scene.name == name; });
@@ -38,9 +46,9 @@ const std::vector<PaperSampling>& paper_samplings() {
 
 Cooking cooking_of(const std::string& name) {
   if (name == "boxes") return Cooking::boxes;
-  if (name == "sampled") return Cooking::sampled;
-  throw InputError("command line", "--clusters", fmt::format("clusters cannot be cooked by '{}'", name),
-                   "use boxes or sampled");
+  require_option(name == "sampled", "--clusters", fmt::format("clusters cannot be cooked by '{}'", name),
+                 "use boxes or sampled");
+  return Cooking::sampled;
 }
 
 Scene paper_scene(const std::string& file) {
@@ -89,11 +97,9 @@ BenchScene make_paper_scene(const std::string& file, const std::string& name, in
   scene.cooking = cooking == Cooking::boxes ? "boxes" : "sampled";
   const auto [first, last] = last_stroke(built.setup);
   const int64_t available = last + 1 - first - kJudgedFrames;
-  if (frames > available) {
-    throw InputError("command line", "--frames",
-                     fmt::format("the last stroke of {} has only {} frames that can be timed", name, available),
-                     fmt::format("give at most {}", available));
-  }
+  require_option(frames <= available, "--frames",
+                 fmt::format("the last stroke of {} has only {} frames that can be timed", name, available),
+                 fmt::format("give at most {}", available));
   scene.warm_up = first + (available - frames) / 2;
   const BladeMove* const moves =
       &built.setup.blade_moves[static_cast<std::size_t>(scene.warm_up * built.setup.step.substeps)];

@@ -10,6 +10,7 @@
 #include "benchmarks/scene.h"
 #include "fixtures/build.h"
 #include "model/scene.h"
+#include "model/stage.h"
 
 namespace cutproof::benchmarks {
 
@@ -28,6 +29,8 @@ struct PaperScene {
     double frame = 0;                  // less than their sum: the paper overlaps stages
   };
   std::optional<Milliseconds> paper;
+  // Of `frame` or of a stage by its name; nothing where the paper has nothing.
+  std::optional<double> paper_ms(const std::string& what) const;
   bool sampled_only = false;  // the figure is about clusters that leave edges uncovered
 };
 // cuboid, liver, kidney, irregular. find: null if there is none of that name.

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "benchmarks/report.h"
 #include "benchmarks/times.h"
 #include "fixtures/bodies.h"
 #include "fixtures/build.h"
 #include "fixtures/cook.h"
-#include "model/error.h"
 
 namespace cutproof::benchmarks {
 
@@ -77,9 +77,8 @@ BenchScene make_bench_scene(int64_t particles, int64_t frames) {
 void require_timed_sizes(const std::vector<int64_t>& sizes) {
   constexpr int64_t kLeast = 100, kMost = 1'000'000'000;
   for (const int64_t size : sizes) {
-    if (size >= kLeast && size <= kMost) continue;
-    throw InputError("command line", "--sizes", fmt::format("{} particles cannot be timed", size),
-                     fmt::format("give numbers from {} to {}, separated by commas", kLeast, kMost));
+    require_option(size >= kLeast && size <= kMost, "--sizes", fmt::format("{} particles cannot be timed", size),
+                   fmt::format("give numbers from {} to {}, separated by commas", kLeast, kMost));
   }
 }
 

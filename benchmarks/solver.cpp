@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "benchmarks/scene.h"
 #include "fixtures/bodies.h"
 #include "fixtures/cook.h"
 #include "oracles/comparison/reference_solution.h"
+#include "oracles/comparison/state_difference.h"
 #include "oracles/relations/relations.h"
 
 namespace cutproof::benchmarks {
@@ -115,14 +115,7 @@ SolverError solver_error(Backend& backend, const Setup& setup, const State& stat
   backend.run(kStep);
   const State reached = backend.snapshot().front();
   SolverError error;
-  double squares = 0;
-  for (std::size_t i = 0; i < reached.x.size(); ++i) {
-    double distance = norm(reached.x[i] - solution.x[i]) / setup.body.grid.spacing;
-    if (!std::isfinite(distance)) distance = std::numeric_limits<double>::infinity();
-    error.max_h = std::max(error.max_h, distance);
-    squares += distance * distance;
-  }
-  error.rms_h = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, reached.x.size())));
+  error.position = oracles::position_error(setup, solution.x, reached.x, state.alive);
   if (solution.energy) {
     error.energy_gap = (oracles::substep_energy(setup, state, reached.x) - *solution.energy) / *solution.energy;
   }
@@ -133,7 +126,7 @@ std::optional<int32_t> least_iterations(Backend& backend, Setup setup, const Sta
                                         const FrameSolution& solution, double tolerance, int32_t above, int32_t below) {
   for (int32_t iterations = above + 1; iterations <= below; ++iterations) {
     setup.step.iterations = iterations;
-    if (solver_error(backend, setup, state, solution).max_h < tolerance) return iterations;
+    if (solver_error(backend, setup, state, solution).position.max < tolerance) return iterations;
   }
   return std::nullopt;
 }

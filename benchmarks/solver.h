@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "model/backend.h"
+#include "oracles/comparison/error_norm.h"
 
 namespace cutproof::benchmarks {
 
@@ -35,7 +36,7 @@ struct FrameSolution {
 FrameSolution converged_frame(const Setup& setup, const State& state);
 
 struct SolverError {
-  double max_h = 0, rms_h = 0;       // distance from the solution [h]; infinite where a position is no number
+  oracles::ErrorNorm position;       // distance from the solution [h]; infinite where a position is no number
   std::optional<double> energy_gap;  // (E − E of the solution) / E of the solution
 };
 // The first step from `state`, which the backend loads.

@@ -1,13 +1,8 @@
 #include "benchmarks/timing.h"
 
-#include <utility>
-#include <vector>
-
 namespace cutproof::benchmarks {
 
 namespace {
-
-using nlohmann::json;
 
 constexpr Span kWholeFrame = {Stage::step, Stage::skin};
 
@@ -62,11 +57,11 @@ Timings time_stages(Backend& backend, const BenchScene& scene, int64_t frames, b
   return timings;
 }
 
-json seconds_by_stage(const Timings& timings) {
-  json seconds = {{"frame", to_json(timings.frame)}, {"frame, cutting", to_json(timings.cutting)}};
-  if (timings.back_to_back.count > 0) seconds["back to back"] = to_json(timings.back_to_back);
-  for (const Stage stage : kStages) seconds[std::string(name_of(stage))] = to_json(timings.stage[at(stage)]);
-  return seconds;
+std::vector<std::pair<std::string, Times>> Timings::named() const {
+  std::vector<std::pair<std::string, Times>> all = {{"frame", frame}, {"frame, cutting", cutting}};
+  if (back_to_back.count > 0) all.emplace_back("back to back", back_to_back);
+  for (const Stage one : kStages) all.emplace_back(name_of(one), stage[at(one)]);
+  return all;
 }
 
 int64_t count_added_memberships(Backend& backend, const BenchScene& scene, int64_t frames) {

@@ -2,6 +2,9 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "benchmarks/scene.h"
 #include "benchmarks/times.h"
@@ -15,13 +18,13 @@ struct Timings {
   Times cutting;               // those of them that removed something
   Times back_to_back;          // per frame, when the frames are handed over without waiting for any; one per repeat
   std::array<Times, 6> stage;  // spans of one stage; only frames in which the stage ran
+
+  // `frame`, `frame, cutting`, `back to back` where it was timed, and the stages.
+  std::vector<std::pair<std::string, Times>> named() const;
 };
 // Every pass `repeats` times, each after a warm-up of its own. back_to_back only if `pipelined`, for backends whose
 // run() does not wait. The backend is left where the timed frames end.
 Timings time_stages(Backend& backend, const BenchScene& scene, int64_t frames, bool pipelined, int64_t repeats = 1);
-
-// Under the name of each stage, `frame`, `frame, cutting`, and `back to back` where it was timed.
-nlohmann::json seconds_by_stage(const Timings& timings);
 
 // Memberships that expansion adds in the timed frames. Leaves the backend where these end.
 int64_t count_added_memberships(Backend& backend, const BenchScene& scene, int64_t frames);

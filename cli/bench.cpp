@@ -3,9 +3,11 @@
 #include <fmt/ranges.h>
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "cli/bench/suites.h"
+#include "cli/output.h"
 
 namespace cutproof::cli {
 
@@ -33,71 +35,76 @@ void add_bench(CLI::App& program, Work& work) {
   });
 }
 
+void add_suite(CLI::App& command, Work& work, const std::string& what, Suite suite) {
+  const auto path = std::make_shared<std::string>();
+  add_json(command, *path, what);
+  command.callback([path, suite, &work] {
+    work = [path, suite] {
+      require_writable(*path);
+      bool begun = false;
+      const nlohmann::json document = suite.run([&](const nlohmann::json& so_far) {
+        if (std::exchange(begun, true)) {
+          suite.row(so_far);
+          write_document(*path, so_far);
+        } else {
+          print_filled(kHead, so_far);
+          suite.begin(so_far);
+        }
+        flush_output();
+      });
+      if (document.at(suite.rows).empty()) {
+        fmt::print("FAILS: nothing was measured\n");
+        return 1;
+      }
+      write_document(*path, document);
+      suite.end(document);
+      if (!path->empty()) fmt::print("\nwrote {}\n", *path);
+      return document.value("holds", true) ? 0 : 1;
+    };
+  });
+}
+
 void add_timing(CLI::App& command, benchmarks::TimingOptions& options) {
   add_backend_name(command, options.backend, "backend under test", is_timed);
-  command.add_option("--frames", options.frames, "timed frames of each repeat (default: by backend)")
-      ->type_name("N")
-      ->check(CLI::Range(1, 10'000));
-  command.add_option("--repeats", options.repeats, "how often they are timed, each time after a warm-up")
-      ->capture_default_str()
-      ->type_name("N")
-      ->check(CLI::Range(1, 1'000));
+  add_count(command, "--frames", options.frames, "timed frames of each repeat (default: by backend)", 1, 10'000);
+  add_count(command, "--repeats", options.repeats, "how often they are timed, each time after a warm-up", 1, 1'000);
   command.add_option("--split", options.split, "kernels: how clusters are split, blocks, global or both")
       ->type_name("M");
   command.add_option("--rotation", options.rotation, "kernels: how rotations are found")->type_name("M");
 }
 
-void print_head(const benchmarks::Provenance& provenance) {
-  fmt::print("{} on {}, {}\n", provenance.backend, provenance.device, provenance.date);
+void print_scene(const nlohmann::json& document) {
+  const nlohmann::json& row = document.at("rows").back();
+  print_filled("{scene}, split {split}: {particles} particles, frame {1e3*seconds/frame/median:.4g} ms\n", row);
+  print_failures(row.at("error").at("frame"));
 }
 
-int conclude_suite(const std::string& json, std::size_t rows, bool holds) {
-  if (rows == 0) {
-    fmt::print("FAILS: nothing was measured\n");
-    return 1;
+void print_scenes(const nlohmann::json& document, const std::vector<Column>& beside_clusters,
+                  const std::vector<Column>& beside_times) {
+  std::vector<Column> columns = {{"median ms", "{scene}"}, {"particles", "{particles}"}, {"clusters", "{clusters}"}};
+  columns.insert(columns.end(), beside_clusters.begin(), beside_clusters.end());
+  for (const std::string_view stage : kStageNames) {
+    columns.emplace_back(std::string(stage), fmt::format("{{1e3*seconds/{}/median:.4g}}", stage));
   }
-  if (!json.empty()) fmt::print("\nwrote {}\n", json);
-  return holds ? 0 : 1;
+  columns.emplace_back("frame", "{1e3*seconds/frame/median:.4g}");
+  columns.emplace_back("least", "{1e3*seconds/frame/min:.4g}");
+  columns.emplace_back("most", "{1e3*seconds/frame/max:.4g}");
+  columns.insert(columns.end(), beside_times.begin(), beside_times.end());
+  for (const auto& [head, what] : {std::pair{"error of step", "step"}, {"topology", "frame"}}) {
+    columns.emplace_back(head, [what = what](const nlohmann::json& row) {
+      return benchmarks::in_words(row.at("error").at(what), "not measured");
+    });
+  }
+  fmt::print("\n{}", table_of(document.at("rows"), columns));
 }
 
-std::vector<std::string> scene_counts(const benchmarks::SceneRow& row) {
-  return {row.scene, fmt::format("{}", row.particles), fmt::format("{}", row.clusters)};
-}
-
-std::vector<std::string> scene_time_names() {
-  std::vector<std::string> names;
-  for (const Stage stage : kStages) names.emplace_back(name_of(stage));
-  names.insert(names.end(), {"frame", "least", "most"});
-  return names;
-}
-
-std::vector<std::string> scene_times(const benchmarks::SceneRow& row) {
-  const benchmarks::Timings& timings = row.measured.timings;
-  std::vector<std::string> times;
-  for (const benchmarks::Times& stage : timings.stage) times.push_back(ms(stage));
-  times.push_back(ms(timings.frame));
-  times.push_back(fmt::format("{:.4g}", 1e3 * timings.frame.min));
-  times.push_back(fmt::format("{:.4g}", 1e3 * timings.frame.max));
-  return times;
-}
-
-std::vector<std::string> scene_error_names() { return {"error of step", "topology"}; }
-
-std::vector<std::string> scene_errors(const benchmarks::SceneRow& row) {
-  return {benchmarks::error_of(Stage::step, row.measured).text, benchmarks::error_of_frame(row.measured).text};
-}
-
-void print_scene(const benchmarks::SceneRow& row) {
-  fmt::print("{}, split {}: {} particles, frame {} ms\n", row.scene, row.split, row.particles,
-             ms(row.measured.timings.frame));
-  print_failures(row.measured);
-}
-
-void print_failures(const benchmarks::Measured& measured) {
-  if (!measured.judged) return;
-  for (const Verdict& verdict : measured.judged->topology) {
-    if (!verdict.holds) fmt::print("  FAILS: {}: {}\n", verdict.property, verdict.witness.text);
+void print_failures(const nlohmann::json& frame_error) {
+  if (!frame_error.contains("failed")) return;
+  for (const nlohmann::json& verdict : frame_error.at("failed")) {
+    print_filled("  FAILS: {property}: {witness/text}\n", verdict);
   }
 }
+
+std::string percent(double change) { return fmt::format("{:+.1f} %", 100 * change); }
 
 }  // namespace cutproof::cli

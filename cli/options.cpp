@@ -41,13 +41,14 @@ void add_backend(CLI::App& command, harness::BackendChoice& choice, const std::s
                   fmt::format("{}: {}", scheduled, fmt::join(harness::schedule_names(), ", ")))
       ->capture_default_str()
       ->type_name("S");
-  command.add_option("--schedule-seed", choice.seed, scheduled + ": what random and pct are drawn from")
-      ->capture_default_str()
-      ->type_name("N")
-      ->check(CLI::NonNegativeNumber);  // a negative one would wrap around
+  add_seed(command, choice.seed, scheduled + ": what random and pct are drawn from", "--schedule-seed");
 }
 
 bool is_timed(const harness::BackendDescriptor& backend) { return backend.is_timed; }
+
+void add_seed(CLI::App& command, uint64_t& seed, const std::string& what, const std::string& name) {
+  command.add_option(name, seed, what)->capture_default_str()->type_name("N")->check(CLI::NonNegativeNumber);
+}
 
 void add_json(CLI::App& command, std::string& path, const std::string& what) {
   command.add_option("--json", path, what)->type_name("F");

@@ -21,6 +21,25 @@ void add_backend(CLI::App& command, harness::BackendChoice& choice, const std::s
 // For what is timed.
 bool is_timed(const harness::BackendDescriptor& backend);
 
+// --name N, from `least` to `most`.
+template <class Integer>
+CLI::Option* add_count(CLI::App& command, const std::string& name, Integer& value, const std::string& what,
+                       int64_t least, int64_t most) {
+  CLI::Option* const option = command.add_option(name, value, what)->type_name("N")->check(CLI::Range(least, most));
+  if constexpr (std::is_integral_v<Integer>) option->capture_default_str();
+  return option;
+}
+// --seed N. A negative one would wrap around.
+void add_seed(CLI::App& command, uint64_t& seed, const std::string& what, const std::string& name = "--seed");
+// --name X,X..., of which `letter` is X; the default, if there is one, is told.
+template <class Value>
+void add_list(CLI::App& command, const std::string& name, std::vector<Value>& list, const std::string& what,
+              const std::string& letter = "N") {
+  CLI::Option* const option = command.add_option(name, list, what + ", separated by commas");
+  option->delimiter(',')->type_name(letter + "," + letter + "...");
+  if (!list.empty()) option->capture_default_str();
+}
+
 void add_json(CLI::App& command, std::string& path, const std::string& what);
 
 }  // namespace cutproof::cli

@@ -8,6 +8,9 @@ namespace cutproof::cli {
 // Hands what was printed to the system. Throws MachineError if it, or anything before it, cannot be written.
 void flush_output();
 
+// With what the output of every suite and of `tune` begins, of the head of its document (io::filled).
+inline constexpr const char* kHead = "{backend} on {device}, {date}\n";
+
 // Nothing if `path` is empty, else a failure now rather than after the measurements: throws InputError if the folder is
 // not there or not writable.
 void require_writable(const std::string& path);

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "model/io/filled.h"
+
 namespace cutproof::cli {
 
 namespace {
@@ -15,12 +17,6 @@ std::size_t width_of(const std::string& text) {
 }
 
 }  // namespace
-
-std::vector<std::string> joined(std::initializer_list<std::vector<std::string>> parts) {
-  std::vector<std::string> all;
-  for (const std::vector<std::string>& part : parts) all.insert(all.end(), part.begin(), part.end());
-  return all;
-}
 
 std::string Table::text() const {
   std::vector<std::size_t> widths;
@@ -40,8 +36,21 @@ std::string Table::text() const {
   return text;
 }
 
-std::string ms(const benchmarks::Times& times) {
-  return times.count == 0 ? "-" : fmt::format("{:.4g}", 1e3 * times.median);
+Column::Column(std::string above, const std::string& text)
+    : Column(std::move(above), [text](const nlohmann::json& row) { return io::filled(text, row); }) {}
+
+std::string table_of(const nlohmann::json& rows, const std::vector<Column>& columns) {
+  std::vector<std::string> head;
+  for (const Column& column : columns) head.push_back(column.head);
+  Table table(head);
+  for (const nlohmann::json& row : rows) {
+    std::vector<std::string> cells;
+    for (const Column& column : columns) cells.push_back(column.cell(row));
+    table.add(cells);
+  }
+  return table.text();
 }
+
+void print_filled(const std::string& text, const nlohmann::json& values) { fmt::print("{}", io::filled(text, values)); }
 
 }  // namespace cutproof::cli

@@ -1,16 +1,16 @@
 // Tables on the terminal.
 #pragma once
-#include <initializer_list>
+#include <functional>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
-
-#include "benchmarks/times.h"
 
 namespace cutproof::cli {
 
 // Columns as wide as what stands in them; the first is flush left, the others flush right.
 class Table {
  public:
+  Table() = default;
   explicit Table(std::vector<std::string> head) { rows_.push_back(std::move(head)); }
   void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
   std::string text() const;
@@ -19,10 +19,18 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
-// Lists one after the other: a table's row from its parts.
-std::vector<std::string> joined(std::initializer_list<std::vector<std::string>> parts);
+// A column of a table of rows from a document: what stands above it, and in it, of a row's fields.
+struct Column {
+  using Cell = std::function<std::string(const nlohmann::json& row)>;
+  std::string head;
+  Cell cell;
+  Column(std::string above, Cell text) : head(std::move(above)), cell(std::move(text)) {}
+  // `text`: see io::filled.
+  Column(std::string above, const std::string& text);
+};
+std::string table_of(const nlohmann::json& rows, const std::vector<Column>& columns);
 
-// Milliseconds of the median; "-" if nothing was measured.
-std::string ms(const benchmarks::Times& times);
+// Prints io::filled.
+void print_filled(const std::string& text, const nlohmann::json& values);
 
 }  // namespace cutproof::cli

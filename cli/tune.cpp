@@ -46,7 +46,7 @@ void settle_files(Asked& asked) {
 }
 
 void print_beginning(const TuneResult& result) {
-  fmt::print("{} on {}, {}\n", result.provenance.backend, result.provenance.device, result.provenance.date);
+  print_filled(kHead, result.head);
   fmt::print("scene {}: {}\n", result.given.scene.name, result.given.scene.description);
   if (result.skin_is_expected) fmt::print("--without-skin does nothing: the scene expects shells of its skin\n");
 }

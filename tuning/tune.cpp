@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "benchmarks/report.h"
 #include "model/error.h"
 #include "model/io/json_number.h"
 #include "model/io/scene_io.h"
@@ -113,7 +114,8 @@ const char* name_of(ReferenceKind kind) { return kind == ReferenceKind::limit ? 
 
 json to_json(const TuneResult& result) {
   const TuneOptions& options = result.options;
-  json document = benchmarks::begin_document(result.provenance, result.conclusion.has_value());
+  json document = result.head;
+  document["complete"] = result.conclusion.has_value();
   document["scene"] = options.scene;
   document["tolerance_h"] = options.tolerance;
   document["repeats"] = options.repeats;
@@ -148,7 +150,7 @@ json to_json(const TuneResult& result) {
 TuneResult run_tune(const TuneOptions& options, const TuneProgress& progress) {
   const Measuring measuring = prepare(options);
   TuneResult result;
-  result.provenance = benchmarks::provenance_of("tune", options.backend.name);
+  result.head = benchmarks::begin_document("tune", options.backend.name);
   result.options = options;
   result.given = measuring.given;
   result.skin_is_expected = options.without_skin && measuring.given.scene.expect.shells_at_end;

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "benchmarks/provenance.h"
 #include "harness/backends.h"
 #include "tuning/measurement.h"
 #include "tuning/reference_solution.h"
@@ -46,7 +45,7 @@ struct TuneResult {
     TimedInTurns times;
   };
 
-  benchmarks::Provenance provenance;
+  nlohmann::json head;  // with what its document begins
   TuneOptions options;
   Configuration given;
   bool skin_is_expected = false;        // so it is made, though nobody looks at it

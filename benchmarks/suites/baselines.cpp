@@ -1,8 +1,9 @@
-#include "benchmarks/suites/baselines.h"
+#include "benchmarks/baselines.h"
 
 #include <array>
 #include <memory>
 
+#include "benchmarks/suites/suites.h"
 #include "harness/geometry_json.h"
 #include "model/rules.h"
 
@@ -42,41 +43,23 @@ json row_json(const Baseline& baseline, const BaselineRow& row) {
 
 }  // namespace
 
-bool BaselinesResult::holds() const {
-  return !rows.empty() && rows.front().found.isolated == 0 && rows.front().found.unequal_frames == 0;
-}
-
-json to_json(const BaselinesResult& result) {
-  json document = begin_document(result.provenance, result.complete);
-  document["particles_asked"] = result.particles_asked;
-  document["particles"] = result.particles;
-  document["spacing"] = result.spacing;
-  document["seed"] = result.seed;
-  document["holds"] = result.holds();
-  document["rows"] = json::array();
-  for (const auto& [baseline, found] : result.rows) document["rows"].push_back(row_json(baseline, found));
-  return document;
-}
-
-BaselinesResult run_baselines(const BaselinesOptions& options, const Progress<BaselinesResult>& progress) {
+json run_baselines(const BaselinesOptions& options, const Progress& progress) {
   require_timed_backend(options.backend);
-  BaselinesResult result;
-  result.provenance = provenance_of("baselines", options.backend);
-  result.particles_asked = options.particles;
-  result.seed = options.seed;
-  progress(result);
+  Report report("baselines", options.backend,
+                {{"particles_asked", options.particles}, {"seed", options.seed}, {"holds", true}}, progress);
   for (const Baseline& baseline : baselines()) {
     harness::BackendChoice choice;
     choice.name = options.backend;
     const std::unique_ptr<Backend> backend = harness::make_backend(choice);
     BaselineScene scene = make_baseline_scene(baseline, options.particles, options.seed);
-    result.particles = scene.setup.body.particle_count();
-    result.spacing = scene.setup.body.grid.spacing;
-    result.rows.push_back({baseline, run_baseline(*backend, baseline, std::move(scene))});
-    result.complete = result.rows.size() == baselines().size();
-    progress(result);
+    report.document["particles"] = scene.setup.body.particle_count();
+    report.document["spacing"] = scene.setup.body.grid.spacing;
+    const BaselineRow row = run_baseline(*backend, baseline, std::move(scene));
+    // This method, the first, must leave nothing isolated and all components equal, in every frame.
+    const bool is_ours = &baseline == &baselines().front();
+    report.add(row_json(baseline, row), !is_ours || (row.isolated == 0 && row.unequal_frames == 0));
   }
-  return result;
+  return report.complete();
 }
 
 }  // namespace cutproof::benchmarks

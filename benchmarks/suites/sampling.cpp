@@ -1,8 +1,7 @@
-#include "benchmarks/suites/sampling.h"
-
 #include <fmt/format.h>
 
-#include <algorithm>
+#include "benchmarks/paper.h"
+#include "benchmarks/suites/suites.h"
 
 namespace cutproof::benchmarks {
 
@@ -13,57 +12,37 @@ constexpr int64_t kScaledDown = 16;
 
 }  // namespace
 
-bool SamplingResult::holds() const {
-  return std::all_of(rows.begin(), rows.end(), [](const SamplingRow& row) { return row.scene.measured.holds(); });
-}
-
-nlohmann::json to_json(const SamplingResult& result) {
-  nlohmann::json document = begin_document(result.provenance, result.complete);
-  document["frames"] = result.frames;
-  document["repeats"] = result.repeats;
-  document["cooking"] = result.cooking;
-  document["scaled_down"] = result.scaled_down;
-  document["holds"] = result.holds();
-  document["rows"] = nlohmann::json::array();
-  for (const SamplingRow& row : result.rows) {
-    nlohmann::json entry = to_json(row.scene);
-    entry["frame_to_first"] = row.frame_to_first;
-    entry["paper"] = {{"particles", row.paper.particles},
-                      {"clusters", row.paper.clusters},
-                      {"frame_seconds", 1e-3 * row.paper.frame_ms},
-                      {"frame_to_first", row.paper_frame_to_first}};
-    document["rows"].push_back(std::move(entry));
-  }
-  return document;
-}
-
-SamplingResult run_sampling(const SamplingOptions& options, const Progress<SamplingResult>& progress) {
+nlohmann::json run_sampling(const SamplingOptions& options, const Progress& progress) {
   const Cooking cooking = cooking_of(options.cooking);
   const std::vector<Contender> contenders = make_contenders(options.backend, options.split, options.rotation);
-  SamplingResult result;
-  result.provenance = provenance_of("sampling", options.backend);
-  result.frames = options.frames_or_default();
-  result.repeats = options.repeats;
-  result.cooking = options.cooking;
-  result.scaled_down = options.full || options.described().takes_full_size ? 1 : kScaledDown;
-  progress(result);
+  const int64_t frames = options.frames_or_default();
+  const int64_t scaled_down = options.full || options.described().takes_full_size ? 1 : kScaledDown;
+  Report report("sampling", options.backend,
+                {{"frames", frames},
+                 {"repeats", options.repeats},
+                 {"cooking", options.cooking},
+                 {"scaled_down", scaled_down},
+                 {"holds", true}},
+                progress);
   for (const Contender& contender : contenders) {
     double first_frame = 0;
     for (const PaperSampling& paper : paper_samplings()) {
-      const int64_t wanted = paper.particles / result.scaled_down;
+      const int64_t wanted = paper.particles / scaled_down;
       const BenchScene scene =
-          make_paper_scene("kidney_101096", fmt::format("kidney_{}", wanted), wanted, cooking, result.frames);
-      SamplingRow row{scene_row(scene, contender, measure(contender, scene, result.frames, options.repeats)), paper, 0,
-                      paper.frame_ms / paper_samplings().front().frame_ms};
-      const double frame = row.scene.measured.timings.frame.median;
+          make_paper_scene("kidney_101096", fmt::format("kidney_{}", wanted), wanted, cooking, frames);
+      const Measured measured = measure(contender, scene, frames, options.repeats);
+      const double frame = measured.timings.frame.median;
       if (first_frame == 0) first_frame = frame;
-      row.frame_to_first = frame / first_frame;
-      result.rows.push_back(std::move(row));
-      result.complete = &contender == &contenders.back() && &paper == &paper_samplings().back();
-      progress(result);
+      nlohmann::json row = scene_row(scene, contender, measured);
+      row["frame_to_first"] = frame / first_frame;
+      row["paper"] = {{"particles", paper.particles},
+                      {"clusters", paper.clusters},
+                      {"frame_seconds", 1e-3 * paper.frame_ms},
+                      {"frame_to_first", paper.frame_ms / paper_samplings().front().frame_ms}};
+      report.add(std::move(row), measured.holds());
     }
   }
-  return result;
+  return report.complete();
 }
 
 }  // namespace cutproof::benchmarks

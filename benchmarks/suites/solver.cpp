@@ -1,9 +1,11 @@
-#include "benchmarks/suites/solver.h"
+#include "benchmarks/solver.h"
 
 #include <fmt/format.h>
 
+#include <map>
+
 #include "benchmarks/contenders.h"
-#include "model/error.h"
+#include "benchmarks/suites/suites.h"
 #include "model/io/json_number.h"
 #include "model/rules.h"
 
@@ -14,28 +16,24 @@ namespace {
 using nlohmann::json;
 
 constexpr Span kStep = {Stage::step, Stage::step};
-constexpr Acceleration kAccelerations[] = {Acceleration::none, Acceleration::chebyshev};
 
 void check(const SolverOptions& options) {
-  const auto refuse = [](const char* option, const std::string& problem, const char* remedy) {
-    throw InputError("command line", option, problem, remedy);
-  };
   for (const double k : options.stiffness) {
-    if (!(k > 0 && k <= 1e15)) refuse("--stiffness", fmt::format("{} is out of bounds", k), "give k in (0, 1e15]");
+    require_option(k > 0 && k <= 1e15, "--stiffness", fmt::format("{} is out of bounds", k), "give k in (0, 1e15]");
   }
   for (const int32_t s : options.substeps) {
-    if (s < 1 || s > 1000) refuse("--substeps", fmt::format("{} is out of bounds", s), "give numbers from 1 to 1000");
+    require_option(s >= 1 && s <= 1000, "--substeps", fmt::format("{} is out of bounds", s),
+                   "give numbers from 1 to 1000");
   }
-  for (std::size_t i = 0; i < options.iterations.size(); ++i) {
-    const int32_t k = options.iterations[i];
-    if (k < 1 || k > 10'000 || (i > 0 && k <= options.iterations[i - 1])) {
-      refuse("--iterations", fmt::format("{} is out of bounds or out of order", k),
-             "give numbers from 1 to 10000, the least first");
-    }
+  int32_t before = 0;
+  for (const int32_t k : options.iterations) {
+    require_option(k > before && k <= 10'000, "--iterations", fmt::format("{} is out of bounds or out of order", k),
+                   "give numbers from 1 to 10000, the least first");
+    before = k;
   }
-  if (options.particles && *options.particles != 0 && *options.particles < 100) {
-    refuse("--particles", fmt::format("{} particles are too few", *options.particles), "give at least 100, or 0");
-  }
+  const int64_t particles = options.particles.value_or(0);
+  require_option(particles == 0 || particles >= 100, "--particles", fmt::format("{} particles are too few", particles),
+                 "give at least 100, or 0");
 }
 
 // Steps from the state that the backend has, one after the other: what a step costs does not depend on where it begins.
@@ -48,65 +46,44 @@ Times time_steps(Backend& backend, int32_t samples) {
   return times_of(seconds);
 }
 
-SolverCurve measure_curve(Backend& backend, const SolverOptions& options, Setup setup, const State& state,
-                          const FrameSolution& solution) {
-  SolverCurve curve;
-  curve.acceleration = setup.step.acceleration;
+// One body with one acceleration. Adds rows by iterations: those that were asked for, and the least that comes within
+// the tolerance, which is added to `to_tolerance` too.
+void measure_curve(Backend& backend, const SolverOptions& options, Setup setup, const State& state,
+                   const FrameSolution& solution, json& entry) {
+  const std::string acceleration(name_of(setup.step.acceleration));
+  std::map<int32_t, json> rows;
   const auto measure = [&](int32_t iterations) {
     setup.step.iterations = iterations;
     const SolverError error = solver_error(backend, setup, state, solution);
-    curve.rows[iterations] = {error, time_steps(backend, options.samples)};
+    rows[iterations] = {{"acceleration", acceleration},
+                        {"iterations", iterations},
+                        {"max_h", json_number(error.position.max)},
+                        {"rms_h", json_number(error.position.rms())},
+                        {"energy_gap", error.energy_gap ? json_number(*error.energy_gap) : json(nullptr)},
+                        {"seconds", to_json(time_steps(backend, options.samples))}};
+    return error.position.max < options.tolerance;
   };
   int32_t above = 0;
   std::optional<int32_t> below;
   for (const int32_t iterations : options.iterations) {
-    measure(iterations);
-    const bool within = curve.rows[iterations].error.max_h < options.tolerance;
+    const bool within = measure(iterations);
     if (!within) above = iterations;
     below = within ? below.value_or(iterations) : std::optional<int32_t>();
   }
-  if (!below) return curve;
-  curve.least = least_iterations(backend, setup, state, solution, options.tolerance, above, *below);
-  if (curve.least && !curve.rows.contains(*curve.least)) measure(*curve.least);
-  return curve;
-}
-
-json entry_json(const SolverEntry& entry) {
-  json result = {
-      {"scene", entry.scene},         {"particles", entry.particles}, {"clusters", entry.clusters},
-      {"stiffness", entry.stiffness}, {"substeps", entry.substeps},   {"substep_seconds", entry.substep_seconds},
-      {"converged", entry.converged}, {"rows", json::array()},        {"to_tolerance", json::array()}};
-  for (const SolverCurve& curve : entry.curves) {
-    for (const auto& [iterations, row] : curve.rows) {
-      const SolverError& error = row.error;
-      result["rows"].push_back({{"acceleration", name_of(curve.acceleration)},
-                                {"iterations", iterations},
-                                {"max_h", json_number(error.max_h)},
-                                {"rms_h", json_number(error.rms_h)},
-                                {"energy_gap", error.energy_gap ? json_number(*error.energy_gap) : json(nullptr)},
-                                {"seconds", to_json(row.times)}});
-    }
-    if (!curve.least) continue;
-    result["to_tolerance"].push_back({{"acceleration", name_of(curve.acceleration)},
-                                      {"iterations", *curve.least},
-                                      {"seconds", curve.rows.at(*curve.least).times.median}});
+  std::optional<int32_t> least;
+  if (below) least = least_iterations(backend, setup, state, solution, options.tolerance, above, *below);
+  if (least) {
+    if (!rows.contains(*least)) measure(*least);
+    entry["to_tolerance"].push_back({{"acceleration", acceleration},
+                                     {"iterations", *least},
+                                     {"seconds", rows.at(*least).at("seconds").at("median")}});
   }
-  return result;
+  for (auto& [iterations, row] : rows) entry["rows"].push_back(std::move(row));
 }
 
 }  // namespace
 
-json to_json(const SolverResult& result) {
-  json document = begin_document(result.provenance, result.complete);
-  document["precision"] = result.precision;
-  document["tolerance_h"] = result.tolerance;
-  document["samples"] = result.samples;
-  document["scenes"] = json::array();
-  for (const SolverEntry& entry : result.scenes) document["scenes"].push_back(entry_json(entry));
-  return document;
-}
-
-SolverResult run_solver(const SolverOptions& options, const Progress<SolverResult>& progress) {
+json run_solver(const SolverOptions& options, const Progress& progress) {
   check(options);
   const harness::BackendDescriptor& described = require_timed_backend(options.backend);
   harness::BackendChoice choice;
@@ -117,31 +94,34 @@ SolverResult run_solver(const SolverOptions& options, const Progress<SolverResul
   std::vector<SolverScene> scenes = {make_block_scene()};
   if (particles > 0) scenes.push_back(make_body_scene(particles));
 
-  SolverResult result;
-  result.provenance = provenance_of("solver", options.backend);
-  result.precision = name_of(backend->precision());
-  result.tolerance = options.tolerance;
-  result.samples = options.samples;
-  progress(result);
+  Report report(
+      "solver", options.backend,
+      {{"precision", name_of(backend->precision())}, {"tolerance_h", options.tolerance}, {"samples", options.samples}},
+      progress, "scenes");
   for (const SolverScene& scene : scenes) {
     for (const double stiffness : options.stiffness) {
       for (const int32_t substeps : options.substeps) {
         Setup setup = with_substeps(scene, substeps);
         setup.step.stiffness = stiffness;
         const FrameSolution solution = converged_frame(setup, scene.state);
-        SolverEntry entry{scene.name, setup.body.particle_count(), scene.state.clusters.count(), stiffness,
-                          substeps,   setup.substep_length[0],     solution.converged,           {}};
-        for (const Acceleration acceleration : kAccelerations) {
+        json entry = {{"scene", scene.name},
+                      {"particles", setup.body.particle_count()},
+                      {"clusters", scene.state.clusters.count()},
+                      {"stiffness", stiffness},
+                      {"substeps", substeps},
+                      {"substep_seconds", setup.substep_length[0]},
+                      {"converged", solution.converged},
+                      {"rows", json::array()},
+                      {"to_tolerance", json::array()}};
+        for (const Acceleration acceleration : {Acceleration::none, Acceleration::chebyshev}) {
           setup.step.acceleration = acceleration;
-          entry.curves.push_back(measure_curve(*backend, options, setup, scene.state, solution));
+          measure_curve(*backend, options, setup, scene.state, solution, entry);
         }
-        result.scenes.push_back(std::move(entry));
-        result.complete = result.scenes.size() == scenes.size() * options.stiffness.size() * options.substeps.size();
-        progress(result);
+        report.add(std::move(entry));
       }
     }
   }
-  return result;
+  return report.complete();
 }
 
 }  // namespace cutproof::benchmarks

@@ -1,12 +1,12 @@
-#include "benchmarks/suites/stages.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <functional>
 
+#include "benchmarks/machine_limits.h"
 #include "benchmarks/paper.h"
-#include "model/error.h"
+#include "benchmarks/step_traffic.h"
+#include "benchmarks/suites/suites.h"
 #include "model/io/verdict_json.h"
 #if CUTPROOF_HAS_CUDA
 #include "benchmarks/raw_baseline.h"
@@ -18,8 +18,6 @@ namespace {
 
 using nlohmann::json;
 
-std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
-
 // The scenes that are asked for, made one after the other.
 std::vector<std::function<BenchScene()>> scenes_of(const StagesOptions& options, int64_t frames) {
   std::vector<std::function<BenchScene()>> makers;
@@ -28,10 +26,8 @@ std::vector<std::function<BenchScene()>> scenes_of(const StagesOptions& options,
   if (!makers.empty()) return makers;
   for (const std::string& name : options.scenes) {
     const PaperScene* const scene = find_paper_scene(name);
-    if (scene == nullptr) {
-      throw InputError("command line", "--scenes", fmt::format("there is no scene '{}'", name),
-                       "use cuboid, liver, kidney and irregular");
-    }
+    require_option(scene != nullptr, "--scenes", fmt::format("there is no scene '{}'", name),
+                   "use cuboid, liver, kidney and irregular");
     for (const std::string& cooking : options.cooking) {
       const Cooking method = cooking_of(cooking);
       if (scene->sampled_only && method != Cooking::sampled) continue;
@@ -43,160 +39,103 @@ std::vector<std::function<BenchScene()>> scenes_of(const StagesOptions& options,
   return makers;
 }
 
-StepLimit step_limit(const BenchScene& scene, const Times& step, const MachineLimits& machine) {
-  StepLimit limit;
-  limit.traffic = step_traffic(scene.setup, scene.state);
-  limit.bytes_seconds = limit.traffic.bytes / machine.copy_bytes_per_second;
-  limit.seconds = limit.bytes_seconds;
-  if (machine.graph_node_seconds) {
-    limit.launch_seconds = static_cast<double>(limit.traffic.launches) * *machine.graph_node_seconds;
-    limit.seconds = std::max(limit.seconds, *limit.launch_seconds);
-  }
-  limit.multiple = step.median / limit.seconds;
-  limit.multiple_of_bytes = step.median / limit.bytes_seconds;
+// The step, of which one takes `median` [s], beside what the machine can do at best.
+json step_limit(const BenchScene& scene, double median, const MachineLimits& machine) {
+  const StepTraffic traffic = step_traffic(scene.setup, scene.state);
+  const double bytes_seconds = traffic.bytes / machine.copy_bytes_per_second;
+  const double launch_seconds = static_cast<double>(traffic.launches) * machine.graph_node_seconds.value_or(0);
+  const double seconds = std::max(bytes_seconds, launch_seconds);
+  json limit = {{"bytes", traffic.bytes},         {"launches", traffic.launches},
+                {"bytes_seconds", bytes_seconds}, {"seconds", seconds},
+                {"multiple", median / seconds},   {"multiple_of_bytes", median / bytes_seconds}};
+  if (machine.graph_node_seconds) limit["launch_seconds"] = launch_seconds;
   return limit;
 }
 
-StagesScene stages_scene(const BenchScene& scene, const Contender& contender, Measured measured,
-                         const MachineLimits& machine) {
-  StagesScene result;
+json scene_json(const BenchScene& scene, const Contender& contender, const Measured& measured) {
   const Setup& setup = scene.setup;
-  result.cooking = scene.cooking;
-  result.body = setup.body.name;
-  result.nodes = setup.body.grid.nodes;
-  result.stiffness = setup.step.stiffness;
-  result.damping = setup.step.damping;
-  result.advance = scene.advance;
-  result.warm_up = scene.warm_up;
-  result.build_seconds = scene.build_seconds;
-  if (contender.runs_kernels) {
-    result.step_limit = step_limit(scene, measured.timings.stage[at(Stage::step)], machine);
-  }
-  result.row = scene_row(scene, contender, std::move(measured));
-  return result;
-}
-
-json to_json(const StepLimit& limit) {
-  json result = {{"bytes", limit.traffic.bytes},         {"launches", limit.traffic.launches},
-                 {"bytes_seconds", limit.bytes_seconds}, {"seconds", limit.seconds},
-                 {"multiple", limit.multiple},           {"multiple_of_bytes", limit.multiple_of_bytes}};
-  if (limit.launch_seconds) result["launch_seconds"] = *limit.launch_seconds;
-  return result;
-}
-
-json scene_json(const StagesScene& scene, const StagesResult& result) {
-  const SceneRow& row = scene.row;
-  const std::optional<FrameErrors>& judged = row.measured.judged;
-  json entry = {{"scene", row.scene},
+  json entry = {{"scene", scene.name},
                 {"cooking", scene.cooking},
-                {"backend", row.backend},
-                {"rotation", row.rotation},
-                {"split", row.split},
+                {"backend", contender.described->name},
+                {"rotation", contender.rotation},
+                {"split", contender.split},
                 {"body",
-                 {{"name", scene.body},
-                  {"particles", row.particles},
-                  {"clusters", row.clusters},
-                  {"memberships", row.memberships},
-                  {"spacing", row.spacing},
-                  {"nodes", scene.nodes}}},
-                {"stiffness", scene.stiffness},
-                {"damping", scene.damping},
+                 {{"name", setup.body.name},
+                  {"particles", setup.body.particle_count()},
+                  {"clusters", scene.state.clusters.count()},
+                  {"memberships", scene.state.clusters.members.size()},
+                  {"spacing", setup.body.grid.spacing},
+                  {"nodes", setup.body.grid.nodes}}},
+                {"stiffness", setup.step.stiffness},
+                {"damping", setup.step.damping},
                 {"blade_advance_h", scene.advance},
                 {"warm_up", scene.warm_up},
-                {"frames", result.frames},
-                {"repeats", result.repeats},
                 {"build_seconds", scene.build_seconds},
-                {"judged_frames", judged ? judged->frames : 0},
-                {"judge_seconds", row.measured.judge_seconds}};
-  if (judged) {
-    entry["isolated_groups"] = judged->isolated_groups;
-    entry["topology"] = json::array();
-    for (const Verdict& verdict : judged->topology) entry["topology"].push_back(io::verdict_json(verdict, false));
+                {"judged_frames", 0},
+                {"judge_seconds", measured.judge_seconds}};
+  if (measured.judged) {
+    json topology = json::array();
+    for (const Verdict& verdict : measured.judged->topology) topology.push_back(io::verdict_json(verdict, false));
+    entry["judged_frames"] = measured.judged->frames;
+    entry["isolated_groups"] = measured.judged->isolated_groups;
+    entry["topology"] = std::move(topology);
   }
-  if (scene.step_limit) entry["step_limit"] = to_json(*scene.step_limit);
   return entry;
+}
+
+// A row for whole frames and for each stage: its time and its error.
+void add_rows(const BenchScene& scene, const Contender& contender, const Measured& measured, json& document) {
+  const PaperScene* const known = find_paper_scene(scene.name);
+  for (const auto& [what, times] : measured.timings.named()) {
+    json row = run_fields(scene, contender);
+    const json error = error_of(what, measured);
+    row["cooking"] = scene.cooking;
+    row["what"] = what;
+    row["seconds"] = to_json(times);
+    row["frames"] = times.count;
+    row["of"] = document.at("frames").get<int64_t>() * document.at("repeats").get<int64_t>();
+    row["paper_seconds"] = nullptr;
+    if (const auto ms = known == nullptr ? std::nullopt : known->paper_ms(what)) row["paper_seconds"] = 1e-3 * *ms;
+    row["error"] = error;
+    row["error_text"] = in_words(error, measured.judged ? "did not run" : "not measured");
+    document["rows"].push_back(std::move(row));
+  }
 }
 
 }  // namespace
 
-std::vector<StagesScene::Timed> StagesScene::timed() const {
-  const Timings& timings = row.measured.timings;
-  const PaperScene* const known = find_paper_scene(row.scene);
-  const PaperScene::Milliseconds* const paper = known && known->paper ? &*known->paper : nullptr;
-  const ErrorColumn frame_error = error_of_frame(row.measured);
-  std::vector<Timed> all;
-  all.push_back({"frame", timings.frame, paper ? std::optional(paper->frame) : std::nullopt, frame_error});
-  all.push_back({"frame, cutting", timings.cutting, {}, frame_error});
-  if (timings.back_to_back.count > 0) all.push_back({"back to back", timings.back_to_back, {}, frame_error});
-  for (const Stage stage : kStages) {
-    all.push_back({std::string(name_of(stage)), timings.stage[at(stage)],
-                   paper ? std::optional(paper->stage[at(stage)]) : std::nullopt, error_of(stage, row.measured)});
-  }
-  return all;
-}
-
-bool StagesResult::holds() const {
-  return std::all_of(scenes.begin(), scenes.end(), [](const auto& scene) { return scene.row.measured.holds(); });
-}
-
-json to_json(const StagesResult& result) {
-  json document = begin_document(result.provenance, result.complete);
-  document["frames"] = result.frames;
-  document["repeats"] = result.repeats;
-  document["machine_limits"] = to_json(result.machine);
-  if (!result.launch_layer.is_null()) document["launch_layer"] = result.launch_layer;
-  document["holds"] = result.holds();
-  document["rows"] = json::array();
-  document["scenes"] = json::array();
-  for (const StagesScene& scene : result.scenes) {
-    for (const StagesScene::Timed& timed : scene.timed()) {
-      document["rows"].push_back({{"scene", scene.row.scene},
-                                  {"particles", scene.row.particles},
-                                  {"cooking", scene.cooking},
-                                  {"backend", scene.row.backend},
-                                  {"precision", scene.row.precision},
-                                  {"substeps", scene.row.substeps},
-                                  {"iterations", scene.row.iterations},
-                                  {"rotation", scene.row.rotation},
-                                  {"split", scene.row.split},
-                                  {"what", timed.what},
-                                  {"seconds", to_json(timed.seconds)},
-                                  {"frames", timed.seconds.count},
-                                  {"of", result.frames * result.repeats},
-                                  {"paper_seconds", timed.paper_ms ? json(1e-3 * *timed.paper_ms) : json(nullptr)},
-                                  {"error", timed.error.value},
-                                  {"error_text", timed.error.text}});
-    }
-    document["scenes"].push_back(scene_json(scene, result));
-  }
-  return document;
-}
-
-StagesResult run_stages(const StagesOptions& options, const Progress<StagesResult>& progress) {
-  StagesResult result;
-  result.frames = options.frames_or_default();
-  result.repeats = options.repeats;
-  result.is_table_1 = options.sizes.empty();
-  const auto scenes = scenes_of(options, result.frames);
+json run_stages(const StagesOptions& options, const Progress& progress) {
+  const int64_t frames = options.frames_or_default();
+  const auto scenes = scenes_of(options, frames);
   const std::vector<Contender> contenders = make_contenders(options.backend, options.split, options.rotation);
-  result.provenance = provenance_of("stages", options.backend);
-  result.machine = measure_machine(options.described());
+  const MachineLimits machine = measure_machine(options.described());
+  json fields = {{"frames", frames},
+                 {"repeats", options.repeats},
+                 {"machine_limits", to_json(machine)},
+                 {"holds", true},
+                 {"rows", json::array()}};
 #if CUTPROOF_HAS_CUDA
   if (options.described().needs_device()) {
-    result.launch_layer = json::parse(gpu::raw_baseline_json(gpu::compare_with_raw(1'000'000, 200)));
+    fields["launch_layer"] = json::parse(gpu::raw_baseline_json(gpu::compare_with_raw(1'000'000, 200)));
   }
 #endif
-  progress(result);
-  for (std::size_t k = 0; k < scenes.size(); ++k) {
-    const BenchScene scene = scenes[k]();
+  Report report("stages", options.backend, fields, progress, "scenes");
+  for (const auto& make_scene : scenes) {
+    const BenchScene scene = make_scene();
     for (const Contender& contender : contenders) {
-      result.scenes.push_back(
-          stages_scene(scene, contender, measure(contender, scene, result.frames, result.repeats), result.machine));
-      result.complete = k + 1 == scenes.size() && &contender == &contenders.back();
-      progress(result);
+      const Measured measured = measure(contender, scene, frames, options.repeats);
+      add_rows(scene, contender, measured, report.document);
+      json entry = scene_json(scene, contender, measured);
+      entry["frames"] = frames;
+      entry["repeats"] = options.repeats;
+      if (contender.described->takes_kernel_options) {  // what its step moves is counted
+        const Times& step = measured.timings.stage[static_cast<std::size_t>(Stage::step)];
+        entry["step_limit"] = step_limit(scene, step.median, machine);
+      }
+      report.add(std::move(entry), measured.holds());
     }
   }
-  return result;
+  return report.complete();
 }
 
 }  // namespace cutproof::benchmarks

@@ -1,6 +1,4 @@
-#include "benchmarks/suites/clusters.h"
-
-#include <span>
+#include <algorithm>
 
 #include "benchmarks/paper.h"
 #include "cli/bench/suites.h"
@@ -9,87 +7,88 @@ namespace cutproof::cli {
 
 namespace {
 
-using benchmarks::ClustersOptions;
-using benchmarks::ClustersResult;
-using Curve = benchmarks::ClustersRow;
+using nlohmann::json;
 
-std::string percent(double growth) { return fmt::format("{:+.1f} %", 100 * growth); }
+std::string name_of(const json& curve) {
+  return curve.at("tau").is_null() ? "no merging" : io::filled("τ = {tau:g}", curve);
+}
 
-void print_curves(std::span<const Curve> curves) {
-  std::vector<std::string> head = {"clusters after frame"};
-  for (const Curve& curve : curves) head.push_back(curve.name());
-  head.emplace_back("paper");
-  Table table(head);
-  const auto add = [&](const std::string& name, const auto& text_of, const std::string& paper) {
+// At the end of that frame of the scene.
+std::string clusters_at(const json& curve, int64_t scene_frame_end) {
+  const auto frames = curve.at("scene_frame").get<std::vector<int64_t>>();
+  const auto after = std::upper_bound(frames.begin(), frames.end(), scene_frame_end);
+  return curve.at("clusters").at(static_cast<std::size_t>(after - frames.begin() - 1)).dump();
+}
+
+// A line for each figure, a column for each curve.
+void print_curves(const std::vector<json>& curves) {
+  Table table;
+  const auto add = [&](const std::string& name, const Column::Cell& text_of, const std::string& paper = "") {
     std::vector<std::string> row = {name};
-    for (const Curve& curve : curves) row.push_back(text_of(curve));
+    for (const json& curve : curves) row.push_back(text_of(curve));
     row.push_back(paper);
     table.add(row);
   };
-  for (int64_t frame = 0; frame <= curves.front().scene_frame.back(); frame += 8) {
-    add(
-        fmt::format("{}", frame), [&](const Curve& c) { return fmt::format("{}", c.clusters_at(frame)); }, "");
+  const auto change = [](const char* field) {
+    return [field](const json& curve) { return percent(curve.at(field).get<double>()); };
+  };
+  const auto cell = [](const char* text) { return [text](const json& curve) { return io::filled(text, curve); }; };
+  add("clusters after frame", name_of, "paper");
+  for (int64_t frame = 0; frame <= curves.front().at("scene_frame").back().get<int64_t>(); frame += 8) {
+    add(fmt::format("{}", frame), [&](const json& curve) { return clusters_at(curve, frame); });
   }
-  add(
-      "growth at the end", [](const Curve& c) { return percent(c.growth()); }, percent(benchmarks::kPaperGrowth));
-  add(
-      "greatest", [](const Curve& c) { return percent(c.greatest_growth()); }, "");
-  add(
-      "particles removed", [](const Curve& c) { return fmt::format("{}", c.removed); }, "");
-  add(
-      "frame, median ms", [](const Curve& c) { return ms(benchmarks::times_of(c.seconds)); }, "");
-  add(
-      "error: verdicts that fail", [](const Curve& c) { return fmt::format("{} of {}", c.failed.size(), c.judged); },
-      "");
+  add("growth at the end", change("growth"), percent(benchmarks::kPaperGrowth));
+  add("greatest", change("greatest_growth"));
+  add("particles removed", cell("{removed}"));
+  add("frame, median ms", cell("{1e3*seconds/median:.4g}"));
+  add("error: verdicts that fail", [](const json& curve) {
+    return fmt::format("{} of {}", curve.at("error").at("failed").size(), curve.at("error").at("verdicts").dump());
+  });
   fmt::print("\n{}", table.text());
 }
 
-void print_row(const ClustersResult& so_far) {
-  const Curve& curve = so_far.rows.back();
-  fmt::print("{}, split {}: {} particles, {} to {} clusters\n", curve.name(), curve.split, curve.particles,
-             curve.clusters.front(), curve.clusters.back());
-  for (const Verdict& verdict : curve.failed) {
-    fmt::print("  FAILS in frame {}: {}: {}\n", verdict.frame, verdict.property, verdict.witness.text);
+void print_row(const json& document) {
+  const json& curve = document.at("rows").back();
+  fmt::print("{}, ", name_of(curve));
+  print_filled("split {split}: {particles} particles, ", curve);
+  fmt::print("{} to {} clusters\n", curve.at("clusters").front().dump(), curve.at("clusters").back().dump());
+  for (const json& verdict : curve.at("error").at("failed")) {
+    print_filled("  FAILS in frame {frame}: {property}: {witness/text}\n", verdict);
   }
 }
 
-int clusters(const Asked<ClustersOptions>& asked) {
-  require_writable(asked.json);
-  const ClustersResult result =
-      benchmarks::run_clusters(asked, reporting<ClustersResult>(asked.json, kNothing, print_row));
-  // One table for each contender.
-  const std::size_t curves = asked.taus.size() + 1;
-  for (std::size_t first = 0; first < result.rows.size(); first += curves) {
-    print_curves(std::span(result.rows).subspan(first, curves));
+// One table for each contender.
+void print_tables(const json& document) {
+  std::vector<json> curves;
+  for (const json& curve : document.at("rows")) {
+    curves.push_back(curve);
+    if (!curve.at("tau").is_null()) continue;
+    print_curves(curves);
+    curves.clear();
   }
-  if (!result.rows.empty() && result.rows.front().particles < benchmarks::kPaperParticles * 98 / 100) {
-    fmt::print("at {} particles a cluster more or less is much; --full takes {}\n", result.rows.front().particles,
+  const auto particles = document.at("rows").front().at("particles").get<int64_t>();
+  if (particles < benchmarks::kPaperParticles * 98 / 100) {
+    fmt::print("at {} particles a cluster more or less is much; --full takes {}\n", particles,
                benchmarks::kPaperParticles);
   }
-  return conclude_suite(asked.json, result.rows.size(), result.holds());
 }
 
 }  // namespace
 
 void add_clusters(CLI::App& bench, Work& work) {
-  const auto asked = std::make_shared<Asked<ClustersOptions>>();
+  const auto options = std::make_shared<benchmarks::ClustersOptions>();
   CLI::App* const command =
       bench.add_subcommand("clusters", "how the number of clusters changes during a cut: Fig. 10");
-  add_backend_name(*command, asked->backend, "backend under test", is_timed);
-  command
-      ->add_option("--tau", asked->taus,
-                   "below which multiple of the median size a cluster is small, separated by commas")
-      ->capture_default_str()
-      ->delimiter(',')
-      ->type_name("T,T...");
-  command->add_option("--particles", asked->particles, "of the kidney")
-      ->type_name("N")
-      ->check(CLI::Range(500, 100'000'000));
-  command->add_flag("--full", asked->full, "37,704 particles, as always on a device");
-  command->add_option("--split", asked->split, "kernels: how clusters are split, blocks, global or both")
+  add_backend_name(*command, options->backend, "backend under test", is_timed);
+  add_list(*command, "--tau", options->taus, "below which multiple of the median size a cluster is small", "T");
+  add_count(*command, "--particles", options->particles, "of the kidney", 500, 100'000'000);
+  command->add_flag("--full", options->full, "37,704 particles, as always on a device");
+  command->add_option("--split", options->split, "kernels: how clusters are split, blocks, global or both")
       ->type_name("M");
-  add_json(*command, asked->json, "write curves, times and errors");
-  command->callback([asked, &work] { work = [asked] { return clusters(*asked); }; });
+  add_suite(*command, work, "write curves, times and errors",
+            {.run = [options](const auto& progress) { return run_clusters(*options, progress); },
+             .row = print_row,
+             .end = print_tables});
 }
 
 }  // namespace cutproof::cli

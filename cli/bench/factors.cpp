@@ -1,64 +1,52 @@
-#include "benchmarks/suites/factors.h"
-
 #include "cli/bench/suites.h"
 
 namespace cutproof::cli {
 
 namespace {
 
-using benchmarks::FactorsOptions;
-using benchmarks::FactorsResult;
-using benchmarks::FactorsRow;
-using benchmarks::FactorsScene;
-
-void print_scene_rows(const FactorsResult& so_far) {
-  const FactorsScene& scene = so_far.scenes.back();
-  fmt::print("\n{}: {} particles, {} clusters\n", scene.scene, scene.particles, scene.clusters);
-  Table table({"cut", "removed", "rows changed", "new", "way", "median ms", "least", "solve ms", "entries", "residual",
-               "bound"});
-  for (const FactorsRow& row : scene.rows) {
-    table.add({row.cut, fmt::format("{}", row.removed), fmt::format("{}", row.changed_rows),
-               fmt::format("{}", row.new_rows), name_of(row.way), ms(row.seconds),
-               fmt::format("{:.4g}", 1e3 * row.seconds.min), ms(row.solve_seconds), fmt::format("{}", row.entries),
-               fmt::format("{:.1e}", row.residual),
-               fmt::format("{:.1e}{}", row.residual_bound, row.within() ? "" : " EXCEEDED")});
-  }
-  fmt::print("{}", table.text());
-  fmt::print("  a converged substep: {:.4g} s, {} alternations{}\n", scene.substep_seconds, scene.alternations,
-             scene.converged ? "" : ", NOT converged");
-}
-
-int factors(const Asked<FactorsOptions>& asked) {
-  require_writable(asked.json);
-  const FactorsResult result =
-      benchmarks::run_factors(asked, reporting<FactorsResult>(asked.json, kNothing, print_scene_rows));
-  return conclude_suite(asked.json, result.scenes.size(), result.holds());
+void print_factors(const nlohmann::json& document) {
+  const nlohmann::json& scene = document.at("scenes").back();
+  const auto bound = [](const nlohmann::json& row) {
+    const bool within = row.at("residual") <= row.at("residual_bound");
+    return io::filled(within ? "{residual_bound:.1e}" : "{residual_bound:.1e} EXCEEDED", row);
+  };
+  print_filled("\n{scene}: {particles} particles, {clusters} clusters\n", scene);
+  fmt::print("{}", table_of(scene.at("rows"), {{"cut", "{cut}"},
+                                               {"removed", "{removed}"},
+                                               {"rows changed", "{changed_rows}"},
+                                               {"new", "{new_rows}"},
+                                               {"way", "{way}"},
+                                               {"median ms", "{1e3*seconds/median:.4g}"},
+                                               {"least", "{1e3*seconds/min:.4g}"},
+                                               {"solve ms", "{1e3*solve_seconds/median:.4g}"},
+                                               {"entries", "{entries}"},
+                                               {"residual", "{residual:.1e}"},
+                                               {"bound", bound}}));
+  const nlohmann::json& substep = scene.at("converged_substep");
+  print_filled("  a converged substep: {seconds:.4g} s, {alternations} alternations", substep);
+  fmt::print("{}\n", substep.at("converged") ? "" : ", NOT converged");
 }
 
 }  // namespace
 
 void add_factors(CLI::App& bench, Work& work) {
-  const auto asked = std::make_shared<Asked<FactorsOptions>>();
+  const auto options = std::make_shared<benchmarks::FactorsOptions>();
   CLI::App* const command =
       bench.add_subcommand("factors", "a cut body's linear system: its factor updated, or made anew");
-  command->add_option("--sides", asked->sides, "particles along a cube, clusters of cores of 5³")
+  command->add_option("--sides", options->sides, "particles along a cube, clusters of cores of 5³")
       ->delimiter(',')
       ->capture_default_str()
       ->type_name("N,N...");
-  command->add_option("--fine-sides", asked->fine_sides, "the same with many clusters, of cores of 2³")
+  command->add_option("--fine-sides", options->fine_sides, "the same with many clusters, of cores of 2³")
       ->delimiter(',')
       ->capture_default_str()
       ->type_name("N,N...");
-  command->add_option("--repeats", asked->repeats, "of each measurement")
-      ->capture_default_str()
-      ->type_name("N")
-      ->check(CLI::Range(1, 1000));
-  command->add_option("--seed", asked->seed, "of right-hand sides and velocities")
-      ->capture_default_str()
-      ->type_name("N")
-      ->check(CLI::NonNegativeNumber);
-  add_json(*command, asked->json, "write every row");
-  command->callback([asked, &work] { work = [asked] { return factors(*asked); }; });
+  add_count(*command, "--repeats", options->repeats, "of each measurement", 1, 1000);
+  add_seed(*command, options->seed, "of right-hand sides and velocities");
+  add_suite(*command, work, "write every row",
+            {.run = [options](const auto& progress) { return run_factors(*options, progress); },
+             .row = print_factors,
+             .rows = "scenes"});
 }
 
 }  // namespace cutproof::cli

@@ -1,6 +1,4 @@
-#include "benchmarks/suites/stages.h"
-
-#include <array>
+#include <map>
 
 #include "benchmarks/paper.h"
 #include "cli/bench/suites.h"
@@ -9,123 +7,119 @@ namespace cutproof::cli {
 
 namespace {
 
-using benchmarks::MachineLimits;
 using benchmarks::PaperScene;
-using benchmarks::StagesOptions;
-using benchmarks::StagesResult;
-using benchmarks::StagesScene;
-using benchmarks::StepLimit;
-using benchmarks::Times;
+using nlohmann::json;
 
-std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
-
-void print_machine(const StagesResult& result) {
-  const MachineLimits& machine = result.machine;
-  fmt::print("copy, read + written: {:.4g} GB/s", 1e-9 * machine.copy_bytes_per_second);
-  if (machine.graph_node_seconds) {
-    fmt::print("; one node of a graph {:.2f} µs (40 empty kernels {:.1f} µs)", 1e6 * *machine.graph_node_seconds,
-               1e6 * *machine.chain_seconds);
+void print_machine(const json& document) {
+  const json& machine = document.at("machine_limits");
+  print_filled("copy, read + written: {1e-9*copy_bytes_per_second:.4g} GB/s", machine);
+  if (machine.contains("graph_node_seconds")) {
+    print_filled(
+        "; one node of a graph {1e6*graph_node_seconds:.2f} µs (40 empty kernels {1e6*chain_of_40_seconds:.1f} µs)",
+        machine);
   }
   fmt::print("\n");
 }
 
-void print_timed(const StagesScene::Timed& timed, int64_t of) {
-  const Times& times = timed.seconds;
-  const auto one = [&](double seconds) { return times.count == 0 ? "-" : fmt::format("{:.4f}", 1e3 * seconds); };
-  fmt::print("  {:<14} {:>11} {:>11} {:>11} {:>9} {:>9}  {}\n", timed.what, one(times.median), one(times.min),
-             one(times.max), fmt::format("{}/{}", times.count, of),
-             timed.paper_ms ? fmt::format("{:.2f}", *timed.paper_ms) : "", timed.error.text);
+void print_limit(const json& limit) {
+  print_filled("  limit of step: {1e-6*bytes:.4g} MB at the copy's bandwidth {1e3*bytes_seconds:.4f} ms", limit);
+  if (limit.contains("launch_seconds")) print_filled(", {launches} launches {1e3*launch_seconds:.4f} ms", limit);
+  print_filled("; step takes {multiple:.2f} × its limit ({multiple_of_bytes:.2f} × bytes / bandwidth)\n", limit);
 }
 
-void print_limit(const StepLimit& limit) {
-  fmt::print("  limit of step: {:.4g} MB at the copy's bandwidth {:.4f} ms", 1e-6 * limit.traffic.bytes,
-             1e3 * limit.bytes_seconds);
-  if (limit.launch_seconds) fmt::print(", {} launches {:.4f} ms", limit.traffic.launches, 1e3 * *limit.launch_seconds);
-  fmt::print("; step takes {:.2f} × its limit ({:.2f} × bytes / bandwidth)\n", limit.multiple, limit.multiple_of_bytes);
+// [scenes] the rows of each, which stand one after the other and begin with whole frames.
+std::vector<std::vector<json>> rows_by_scene(const json& document) {
+  std::vector<std::vector<json>> scenes;
+  for (const json& row : document.at("rows")) {
+    if (row.at("what") == "frame") scenes.emplace_back();
+    scenes.back().push_back(row);
+  }
+  return scenes;
 }
 
-void print_row(const StagesResult& so_far) {
-  const StagesScene& scene = so_far.scenes.back();
-  const benchmarks::SceneRow& row = scene.row;
-  fmt::print(
-      "\n{}: {} particles, {} clusters ({}), {} memberships, h = {:.4g} mm; the blade goes on by {:.2g} h a frame\n",
-      row.scene, row.particles, row.clusters, scene.cooking, row.memberships, 1e3 * row.spacing, scene.advance);
-  fmt::print("{}, {} precision, {} substeps × {} iterations, rotation {}, split {}\n", row.backend, row.precision,
-             row.substeps, row.iterations, row.rotation, row.split);
-  fmt::print("  {:<14} {:>11} {:>11} {:>11} {:>9} {:>9}  {}\n", "", "median ms", "least ms", "most ms", "frames",
-             "paper ms", "error");
-  for (const StagesScene::Timed& timed : scene.timed()) print_timed(timed, so_far.frames * so_far.repeats);
-  print_failures(row.measured);
-  if (!row.measured.judged) {
+void print_last_scene(const json& document) {
+  const json& scene = document.at("scenes").back();
+  const std::vector<json> rows = rows_by_scene(document).back();
+  print_filled("\n{scene}: {body/particles} particles, {body/clusters} clusters ({cooking}), ", scene);
+  print_filled("{body/memberships} memberships, h = {1e3*body/spacing:.4g} mm; ", scene);
+  print_filled("the blade goes on by {blade_advance_h:.2g} h a frame\n", scene);
+  print_filled("{backend}, {precision} precision, {substeps} substeps × {iterations} iterations, ", rows.front());
+  print_filled("rotation {rotation}, split {split}\n", rows.front());
+  const auto line = [](auto what, auto median, auto least, auto most, auto frames, auto paper, auto error) {
+    fmt::print("  {:<14} {:>11} {:>11} {:>11} {:>9} {:>9}  {}\n", what, median, least, most, frames, paper, error);
+  };
+  line("", "median ms", "least ms", "most ms", "frames", "paper ms", "error");
+  for (const json& row : rows) {
+    const auto text = [&](const char* cell) { return io::filled(cell, row); };
+    line(text("{what}"), text("{1e3*seconds/median:.4f}"), text("{1e3*seconds/min:.4f}"), text("{1e3*seconds/max:.4f}"),
+         text("{frames}/{of}"), row.at("paper_seconds").is_null() ? "" : text("{1e3*paper_seconds:.2f}"),
+         text("{error_text}"));
+  }
+  if (scene.contains("topology")) {
+    print_failures(rows.front().at("error"));
+  } else {
     fmt::print("  errors not measured: beyond {} particles the reference takes minutes\n",
                benchmarks::kMostJudgedParticles);
   }
-  if (scene.step_limit) print_limit(*scene.step_limit);
+  if (scene.contains("step_limit")) print_limit(scene.at("step_limit"));
 }
 
 // As the paper has it: a row for each stage, a column for each scene, here for each way of cooking, and the paper's
 // figures beside them.
-void print_table_1(const std::vector<StagesScene>& scenes) {
-  std::vector<std::string> head = {"Table 1, median ms"}, cooking = {""}, particles = {"particles"},
-                           clusters = {"clusters"}, frame = {"frame"};
-  std::array<std::vector<std::string>, 6> stages;
-  for (const Stage stage : kStages) stages[at(stage)] = {std::string(name_of(stage))};
+void print_table_1(const json& document) {
+  const std::vector<std::vector<json>> scenes = rows_by_scene(document);
+  std::vector<std::string> whats(kStageNames.begin(), kStageNames.end());
+  whats.emplace_back("frame");
+  std::vector<std::vector<std::string>> lines = {{"Table 1, median ms"}, {""}, {"particles"}, {"clusters"}};
+  for (const std::string& what : whats) lines.push_back({what});
+  const auto add_column = [&](const std::vector<std::string>& cells) {
+    for (std::size_t k = 0; k < lines.size(); ++k) lines[k].push_back(cells[k]);
+  };
   for (std::size_t k = 0; k < scenes.size(); ++k) {
-    const StagesScene& column = scenes[k];
-    const benchmarks::SceneRow& row = column.row;
-    head.push_back(row.scene);
-    cooking.push_back(row.split == "global" ? column.cooking + ", global" : column.cooking);
-    particles.push_back(fmt::format("{}", row.particles));
-    clusters.push_back(fmt::format("{}", row.clusters));
-    frame.push_back(ms(row.measured.timings.frame));
-    for (const Stage stage : kStages) stages[at(stage)].push_back(ms(row.measured.timings.stage[at(stage)]));
-    if (k + 1 < scenes.size() && scenes[k + 1].row.scene == row.scene) continue;
-    const PaperScene& paper = *benchmarks::find_paper_scene(row.scene);
+    const json &body = document.at("scenes")[k].at("body"), &any = scenes[k].front();
+    std::map<std::string, std::string> ours, papers;
+    for (const json& row : scenes[k]) {
+      ours[row.at("what")] = io::filled("{1e3*seconds/median:.4g}", row);
+      papers[row.at("what")] = io::filled("{1e3*paper_seconds:.2f}", row);
+    }
+    std::vector<std::string> column = {any.at("scene"), any.at("cooking"), io::filled("{particles}", body),
+                                       io::filled("{clusters}", body)};
+    if (any.at("split") == "global") column[1] += ", global";
+    for (const std::string& what : whats) column.push_back(ours.at(what));
+    add_column(column);
+    if (k + 1 < scenes.size() && scenes[k + 1].front().at("scene") == any.at("scene")) continue;
+    const PaperScene& paper = *benchmarks::find_paper_scene(any.at("scene"));
     if (!paper.paper) continue;
-    head.push_back(row.scene);
-    cooking.push_back("paper");
-    particles.push_back(paper.particles ? fmt::format("{}", *paper.particles) : "?");
-    clusters.push_back(paper.clusters ? fmt::format("{}", *paper.clusters) : "?");
-    frame.push_back(fmt::format("{:.2f}", paper.paper->frame));
-    for (const Stage stage : kStages) stages[at(stage)].push_back(fmt::format("{:.2f}", paper.paper->stage[at(stage)]));
+    column = {paper.name, "paper", paper.particles ? fmt::format("{}", *paper.particles) : "?",
+              paper.clusters ? fmt::format("{}", *paper.clusters) : "?"};
+    for (const std::string& what : whats) column.push_back(papers.at(what));
+    add_column(column);
   }
-  Table table(head);
-  for (const auto& row : {cooking, particles, clusters}) table.add(row);
-  for (const auto& row : stages) table.add(row);
-  table.add(frame);
+  Table table;
+  for (const std::vector<std::string>& line : lines) table.add(line);
   fmt::print("\n{}", table.text());
-}
-
-int stages(const Asked<StagesOptions>& asked) {
-  require_writable(asked.json);
-  const StagesResult result =
-      benchmarks::run_stages(asked, reporting<StagesResult>(asked.json, print_machine, print_row));
-  if (result.is_table_1 && !result.scenes.empty()) print_table_1(result.scenes);
-  return conclude_suite(asked.json, result.scenes.size(), result.holds());
 }
 
 }  // namespace
 
 void add_stages(CLI::App& bench, Work& work) {
-  const auto asked = std::make_shared<Asked<StagesOptions>>();
+  const auto options = std::make_shared<benchmarks::StagesOptions>();
   CLI::App* const command = bench.add_subcommand(
       "stages", "whole frames and each stage, a blade cutting: Table 1, or boxes and kidneys of given sizes");
-  add_timing(*command, *asked);
-  command->add_option("--scenes", asked->scenes, "of Table 1, and the irregular path of Fig. 13, separated by commas")
-      ->capture_default_str()
-      ->delimiter(',')
-      ->type_name("S,S...");
-  command->add_option("--clusters", asked->cooking, "how they are cooked, separated by commas")
-      ->capture_default_str()
-      ->delimiter(',')
-      ->type_name("C,C...");
-  command->add_flag("--full", asked->full, "the scenes at the paper's size, as always on a device");
-  command
-      ->add_option("--sizes", asked->sizes, "instead of the scenes: bodies with so many particles, separated by commas")
-      ->delimiter(',')
-      ->type_name("N,N...");
-  add_json(*command, asked->json, "write times and errors");
-  command->callback([asked, &work] { work = [asked] { return stages(*asked); }; });
+  add_timing(*command, *options);
+  add_list(*command, "--scenes", options->scenes, "of Table 1, and the irregular path of Fig. 13", "S");
+  add_list(*command, "--clusters", options->cooking, "how they are cooked", "C");
+  command->add_flag("--full", options->full, "the scenes at the paper's size, as always on a device");
+  add_list(*command, "--sizes", options->sizes, "instead of the scenes: bodies with so many particles");
+  const auto print_all = [options](const json& document) {
+    if (options->sizes.empty()) print_table_1(document);
+  };
+  add_suite(*command, work, "write times and errors",
+            {.run = [options](const auto& progress) { return run_stages(*options, progress); },
+             .begin = print_machine,
+             .row = print_last_scene,
+             .end = print_all,
+             .rows = "scenes"});
 }
 
 }  // namespace cutproof::cli

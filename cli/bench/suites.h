@@ -1,17 +1,18 @@
-// The suites of `cutproof bench`. Each has a file here: it declares the options, calls the suite, prints its table.
+// The suites of `cutproof bench`. Each has a file here: it declares the options, calls the suite, and says what a
+// person sees of the document.
 #pragma once
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <functional>
 #include <memory>
 #include <string>
 
-#include "benchmarks/measured_scene.h"
-#include "benchmarks/provenance.h"
+#include "benchmarks/suites/suites.h"
 #include "cli/commands.h"
 #include "cli/options.h"
-#include "cli/output.h"
 #include "cli/table.h"
+#include "model/io/filled.h"
 
 namespace cutproof::cli {
 
@@ -25,48 +26,31 @@ void add_solver(CLI::App& bench, Work& work);
 void add_baselines(CLI::App& bench, Work& work);
 void add_factors(CLI::App& bench, Work& work);
 
-// The options of a suite, and where its document goes.
-template <class Options>
-struct Asked : Options {
-  std::string json;
+// What a suite does, and what it shows of its document: once before the first row, after each row, and in the end.
+struct Suite {
+  using Show = std::function<void(const nlohmann::json& document)>;
+  static void nothing(const nlohmann::json&) {}
+
+  std::function<nlohmann::json(const benchmarks::Progress& progress)> run;
+  Show begin = nothing, row = nothing, end = nothing;
+  std::string rows = "rows";  // the list of the document that must not be empty
 };
+// Adds --json, which writes `what`, and sets `work` if the command line names this suite. The document is written after
+// each row, so that what has been measured is kept if a later row fails.
+void add_suite(CLI::App& command, Work& work, const std::string& what, Suite suite);
 
 // The options that suites which time whole scenes have in common.
 void add_timing(CLI::App& command, benchmarks::TimingOptions& options);
 
-// The line with which every suite's output begins.
-void print_head(const benchmarks::Provenance& provenance);
+// Of a suite that times whole scenes: a line for each row as soon as it is there, and a table of all, with columns of
+// the suite's own beside the clusters and beside the times.
+void print_scene(const nlohmann::json& document);
+void print_scenes(const nlohmann::json& document, const std::vector<Column>& beside_clusters,
+                  const std::vector<Column>& beside_times);
+// The verdicts that fail, of a row's error of whole frames.
+void print_failures(const nlohmann::json& frame_error);
 
-// Shows what a suite finds as it finds it, and writes it down after each row, so that what has been measured is kept if
-// a later row fails. `begin` is shown first, `row` whenever there is a new one.
-template <class Result, class Begin, class Row>
-benchmarks::Progress<Result> reporting(const std::string& json, Begin begin, Row row) {
-  return [json, begin, row, begun = false](const Result& so_far) mutable {
-    if (begun) {
-      row(so_far);
-      write_document(json, to_json(so_far));
-    } else {
-      print_head(so_far.provenance);
-      begin(so_far);
-      begun = true;
-    }
-    flush_output();
-  };
-}
-// For suites that show nothing before their first row.
-inline constexpr auto kNothing = [](const auto&) {};
-
-// The end of a suite's output, and its exit status. `rows`: how many there are; a suite that measured nothing fails.
-int conclude_suite(const std::string& json, std::size_t rows, bool holds);
-
-// A row of a suite that times whole scenes: the parts that such suites have in common.
-std::vector<std::string> scene_counts(const benchmarks::SceneRow& row);  // scene, particles, clusters
-std::vector<std::string> scene_time_names();
-std::vector<std::string> scene_times(const benchmarks::SceneRow& row);
-std::vector<std::string> scene_error_names();
-std::vector<std::string> scene_errors(const benchmarks::SceneRow& row);
-// One line for each row as soon as it is there, and the verdicts that fail.
-void print_scene(const benchmarks::SceneRow& row);
-void print_failures(const benchmarks::Measured& measured);
+// The cell of a change: "+1.0 %".
+std::string percent(double change);
 
 }  // namespace cutproof::cli

@@ -91,7 +91,7 @@ TEST(SolverErrors, VanishAtTheAnswerOfEverySubstep) {
     const auto solution = cutproof::benchmarks::converged_frame(setup, scene.state);
     EXPECT_TRUE(solution.converged);
     const SolverError error = cutproof::benchmarks::solver_error(*backend, setup, scene.state, solution);
-    EXPECT_LT(error.max_h, 1e-10);
+    EXPECT_LT(error.position.max, 1e-10);
     EXPECT_EQ(error.energy_gap.has_value(), substeps == 1);
     if (error.energy_gap) {
       EXPECT_LT(std::abs(*error.energy_gap), 1e-12);
@@ -109,7 +109,7 @@ TEST(SolverErrors, FindTheLeastIterationsThatAreEnough) {
   ASSERT_TRUE(least.has_value());
   const auto error = [&](int32_t iterations) {
     setup.step.iterations = iterations;
-    return cutproof::benchmarks::solver_error(*backend, setup, scene.state, solution).max_h;
+    return cutproof::benchmarks::solver_error(*backend, setup, scene.state, solution).position.max;
   };
   EXPECT_LT(error(*least), 1e-2);
   EXPECT_GE(error(*least - 1), 1e-2);
@@ -140,10 +140,10 @@ TEST(SolverErrors, SeeOneParticleOutOfPlace) {
   const double h = scene.setup.body.grid.spacing;
   Misplacing off(scene.state.x[7] + cutproof::Vec3{0, 0.5 * h, 0});
   const SolverError error = cutproof::benchmarks::solver_error(off, scene.setup, scene.state, solution);
-  EXPECT_NEAR(error.max_h, 0.5, 1e-12);
-  EXPECT_NEAR(error.rms_h, 0.5 / std::sqrt(1728.0), 1e-12);
+  EXPECT_NEAR(error.position.max, 0.5, 1e-12);
+  EXPECT_NEAR(error.position.rms(), 0.5 / std::sqrt(1728.0), 1e-12);
   Misplacing lost({std::numeric_limits<double>::quiet_NaN(), 0, 0});
-  EXPECT_TRUE(std::isinf(cutproof::benchmarks::solver_error(lost, scene.setup, scene.state, solution).max_h));
+  EXPECT_TRUE(std::isinf(cutproof::benchmarks::solver_error(lost, scene.setup, scene.state, solution).position.max));
 }
 
 }  // namespace

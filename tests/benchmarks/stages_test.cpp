@@ -1,5 +1,5 @@
 // `cutproof bench stages`: no time without its error, no error that goes unseen. What the times are is not tested.
-#include "benchmarks/stages.h"
+#include "benchmarks/frame_errors.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "benchmarks/stages.h"
+#include "benchmarks/frame_errors.h"
 
 #include <algorithm>
 #include <utility>
@@ -15,10 +15,6 @@ namespace {
 
 std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
 
-}  // namespace
-
-namespace {
-
 State take_snapshot(const Backend& backend) {
   std::vector<State> states = backend.snapshot();
   return std::move(states.front());
@@ -27,28 +23,22 @@ State take_snapshot(const Backend& backend) {
 void note(FrameErrors& errors, const oracles::StageDifference& found, const State& after) {
   const bool equal = found.decisions.empty();
   switch (found.stage) {
-    case Stage::step: {
-      FrameErrors::Step step = errors.step.value_or(FrameErrors::Step{});
-      step.position.join(found.error(oracles::Measure::position).norm);
-      step.undecidable += found.undecidable.particles_excluded;
-      errors.step = step;
+    case Stage::step:
+      if (!errors.step) errors.step.emplace();
+      errors.step->position.join(found.error(oracles::Measure::position).norm);
+      errors.step->undecidable += found.undecidable.particles_excluded;
       break;
-    }
-    case Stage::detect: {
-      FrameErrors::Detection detection = errors.detect.value_or(FrameErrors::Detection{});
-      detection.removed += static_cast<int64_t>(after.removed.size());
-      detection.differing += static_cast<int64_t>(found.removals.size());
-      detection.within_rounding &= equal && (!found.detection || found.detection->holds);
-      errors.detect = detection;
+    case Stage::detect:
+      if (!errors.detect) errors.detect.emplace();
+      errors.detect->removed += static_cast<int64_t>(after.removed.size());
+      errors.detect->differing += static_cast<int64_t>(found.removals.size());
+      errors.detect->within_rounding &= equal && (!found.detection || found.detection->holds);
       break;
-    }
-    case Stage::skin: {
-      FrameErrors::Surface surface = errors.skin.value_or(FrameErrors::Surface{});
-      surface.vertices.join(found.error(oracles::Measure::skin).norm);
-      surface.triangles_equal &= equal;
-      errors.skin = surface;
+    case Stage::skin:
+      if (!errors.skin) errors.skin.emplace();
+      errors.skin->vertices.join(found.error(oracles::Measure::skin).norm);
+      errors.skin->triangles_equal &= equal;
       break;
-    }
     default:
       if (found.sets_are_open) break;
       errors.clusters_equal[at(found.stage)] = errors.clusters_equal[at(found.stage)].value_or(true) && equal;

@@ -1,0 +1,90 @@
+// The suites of `cutproof bench`: options in, a document out, whose fields results_schema.md describes. All throw
+// InputError for options that make no sense, MachineError if the machine fails.
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "benchmarks/measured_scene.h"
+#include "benchmarks/report.h"
+#include "benchmarks/rotations.h"
+
+namespace cutproof::benchmarks {
+
+// Whole frames and each stage, a blade cutting: Table 1 of the paper, or boxes and kidneys of given sizes.
+struct StagesOptions : TimingOptions {
+  std::vector<int64_t> sizes;  // particles; if given, not the scenes
+  std::vector<std::string> scenes = {"cuboid", "liver", "kidney", "irregular"};
+  std::vector<std::string> cooking = {"boxes", "sampled"};
+  bool full = false;  // the scenes at the paper's size
+};
+nlohmann::json run_stages(const StagesOptions& options, const Progress& progress);
+
+// Table 2 of the paper, a kidney's discontinuous cut at four samplings.
+struct SamplingOptions : TimingOptions {
+  std::string cooking = "boxes";
+  bool full = false;  // the paper's counts of particles
+};
+nlohmann::json run_sampling(const SamplingOptions& options, const Progress& progress);
+
+// Fig. 10 of the paper, how the number of clusters changes while a kidney is cut through.
+struct ClustersOptions {
+  std::string backend = harness::kReferenceName, split;
+  std::vector<double> taus = {0.25, 0.5, 0.75};  // each a curve, and one without merging
+  std::optional<int64_t> particles;
+  bool full = false;  // the paper's count of particles
+};
+inline constexpr int64_t kPaperParticles = 37'704;  // of the scene: the first row of Table 2
+nlohmann::json run_clusters(const ClustersOptions& options, const Progress& progress);
+
+// What a frame takes from a thousand particles to ten million.
+struct ScaleOptions : TimingOptions {
+  std::vector<int64_t> sizes;  // particles; empty: by backend
+};
+nlohmann::json run_scale(const ScaleOptions& options, const Progress& progress);
+
+// Methods for the rotation of a cluster, on every hard case (solvers.md, Rotations).
+struct RotationsOptions {
+  std::string backend = harness::kReferenceName;
+  RotationCounts counts;
+  std::optional<int64_t> timed;  // matrices that are timed together; absent: by backend
+};
+nlohmann::json run_rotations(const RotationsOptions& options, const Progress& progress, const RotationProgress& step);
+
+// What nothing on this machine can be faster than.
+struct MachineLimitsOptions {
+  std::string backend = harness::kReferenceName;
+  int repeats = 21;
+};
+nlohmann::json run_machine_limits(const MachineLimitsOptions& options, const Progress& progress);
+
+// Iterations of the step against its error, plain and accelerated (solvers.md).
+struct SolverOptions {
+  std::string backend = harness::kReferenceName;
+  std::vector<double> stiffness = {1e4, 1e5, 1e6};  // [1/s²]
+  std::vector<int32_t> substeps = {1, 4};
+  std::vector<int32_t> iterations = {1, 2, 4, 8, 12, 16, 24, 32, 48, 64, 96};  // ascending
+  std::optional<int64_t> particles;  // of the second body; 0: none; absent: by backend
+  double tolerance = 1e-2;           // [h]
+  int32_t samples = 9;
+};
+nlohmann::json run_solver(const SolverOptions& options, const Progress& progress);
+
+// This method beside deletion, other expansion, detection and merging.
+struct BaselinesOptions {
+  std::string backend = harness::kReferenceName;
+  int64_t particles = 1500;
+  uint64_t seed = 1;  // of the clusters
+};
+nlohmann::json run_baselines(const BaselinesOptions& options, const Progress& progress);
+
+// After a cut, is a factor of the substep's system updated or made anew? (solvers.md, The factor after a cut)
+struct FactorsOptions {
+  std::vector<int32_t> sides = {10, 20, 30, 40, 50}, fine_sides = {20, 54};  // particles along a cube
+  int64_t repeats = 5;
+  uint64_t seed = 1;  // of right-hand sides and velocities
+};
+nlohmann::json run_factors(const FactorsOptions& options, const Progress& progress);
+
+}  // namespace cutproof::benchmarks
