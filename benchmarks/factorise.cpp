@@ -1,5 +1,6 @@
 #include "benchmarks/factorise.h"
 
+#include <Eigen/CholmodSupport>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -25,46 +26,11 @@ std::size_t at(Integer index) {
   return static_cast<std::size_t>(index);
 }
 
-}  // namespace
-
-const char* name_of(Way way) {
-  switch (way) {
-    case Way::analyse:
-      return "analyse";
-    case Way::ordered:
-      return "ordered";
-    case Way::numeric:
-      return "numeric";
-    case Way::updown:
-      return "updown";
-    case Way::rows:
-      return "rows";
-  }
-  return "";
-}
-
-namespace {
-
-// Rank-one terms C C' of a change, in permuted rows: C, which the caller owns.
-cholmod_sparse* columns_of(const std::vector<std::vector<std::pair<int32_t, double>>>& columns, std::size_t rows,
-                           Cholmod& cholmod) {
-  std::size_t entries = 0;
-  for (const auto& column : columns) entries += column.size();
-  cholmod_sparse* const matrix = cholmod_allocate_sparse(rows, columns.size(), entries, /*sorted=*/1, /*packed=*/1, 0,
-                                                         CHOLMOD_REAL, cholmod.get());
-  cholmod.check();
-  auto* starts = static_cast<int*>(matrix->p);
-  auto* indices = static_cast<int*>(matrix->i);
-  auto* values = static_cast<double*>(matrix->x);
-  int end = 0;
-  for (std::size_t k = 0; k < columns.size(); ++k) {
-    starts[k] = end;
-    for (const auto& [row, value] : columns[k]) {
-      indices[end] = row;
-      values[end++] = value;
-    }
-  }
-  starts[columns.size()] = end;
+// Columns of the given entries, sorted by row.
+using Columns = Eigen::SparseMatrix<double>;
+Columns columns_of(std::size_t rows, std::size_t columns, const std::vector<Eigen::Triplet<double>>& entries) {
+  Columns matrix(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(columns));
+  matrix.setFromTriplets(entries.begin(), entries.end());
   return matrix;
 }
 
@@ -95,45 +61,19 @@ std::vector<int> order_of(const SystemChange& change, const cholmod_factor& befo
   return order;
 }
 
-// What stands in `common` for as long as this lives: the given order, and nothing else tried.
-class GivenOrder {
- public:
-  GivenOrder(Cholmod& cholmod, bool postorder) : common_(*cholmod.get()), before_(common_) {
-    common_.nmethods = 1;
-    common_.method[0].ordering = CHOLMOD_GIVEN;
-    common_.postorder = postorder ? 1 : 0;
-  }
-  ~GivenOrder() {
-    common_.nmethods = before_.nmethods;
-    common_.method[0].ordering = before_.method[0].ordering;
-    common_.postorder = before_.postorder;
-  }
-  GivenOrder(const GivenOrder&) = delete;
-  GivenOrder& operator=(const GivenOrder&) = delete;
+// From here on the order is the given one, and no other is tried.
+void take_given_order(Cholmod& cholmod, bool postorder) {
+  cholmod.get()->nmethods = 1;
+  cholmod.get()->method[0].ordering = CHOLMOD_GIVEN;
+  cholmod.get()->postorder = postorder ? 1 : 0;
+}
 
- private:
-  cholmod_common& common_;
-  cholmod_common before_;
-};
-
-// As L D L', column by column with room to grow: what can be updated.
-class Updatable {
- public:
-  explicit Updatable(Cholmod& cholmod) : common_(*cholmod.get()) {
-    common_.supernodal = CHOLMOD_SIMPLICIAL;
-    common_.final_ll = 0;
-    common_.final_pack = 0;
-  }
-  ~Updatable() {
-    common_.supernodal = CHOLMOD_AUTO;
-    common_.final_pack = 1;
-  }
-  Updatable(const Updatable&) = delete;
-  Updatable& operator=(const Updatable&) = delete;
-
- private:
-  cholmod_common& common_;
-};
+// From here on factors are L D L', column by column with room to grow: what can be updated.
+void make_updatable(Cholmod& cholmod) {
+  cholmod.get()->supernodal = CHOLMOD_SIMPLICIAL;
+  cholmod.get()->final_ll = 0;
+  cholmod.get()->final_pack = 0;
+}
 
 bool within_pattern(const cholmod_sparse& before, const cholmod_sparse& after) {
   const auto *p = static_cast<const int*>(before.p), *q = static_cast<const int*>(after.p);
@@ -147,20 +87,25 @@ bool within_pattern(const cholmod_sparse& before, const cholmod_sparse& after) {
 void update_by_rank_one(const SystemChange& change, const SystemDifferences& found, cholmod_factor* factor,
                         Cholmod& cholmod) {
   const std::vector<int32_t> place = places_in(*factor);
-  std::vector<std::vector<std::pair<int32_t, double>>> up, down;
+  // Rank-one terms C C', a column C for each.
+  std::vector<Eigen::Triplet<double>> up, down;
+  int ups = 0, downs = 0;
   for (const auto& [clusters, weight] : found.shared) {
     // B has −weight u u'.
-    auto& column = (weight < 0 ? up : down).emplace_back();
-    for (const int32_t r : clusters) column.emplace_back(place[at(r)], std::sqrt(std::abs(weight)));
-    std::sort(column.begin(), column.end());
+    const int column = weight < 0 ? ups++ : downs++;
+    for (const int32_t r : clusters) {
+      (weight < 0 ? up : down).emplace_back(place[at(r)], column, std::sqrt(std::abs(weight)));
+    }
   }
   for (const auto& [r, mass] : found.mass) {
-    (mass > 0 ? up : down).push_back({{place[at(r)], std::sqrt(std::abs(mass))}});
+    const int column = mass > 0 ? ups++ : downs++;
+    (mass > 0 ? up : down).emplace_back(place[at(r)], column, std::sqrt(std::abs(mass)));
   }
   // What adds comes first: then every matrix on the way is at least the last one, so all are positive definite.
   for (const bool add : {true, false}) {
-    const Sparse columns(columns_of(add ? up : down, change.origin.size(), cholmod), cholmod);
-    cholmod_updown(add ? 1 : 0, columns.get(), factor, cholmod.get());
+    Columns columns = columns_of(change.origin.size(), at(add ? ups : downs), add ? up : down);
+    cholmod_sparse view = Eigen::viewAsCholmod(columns);
+    cholmod_updown(add ? 1 : 0, &view, factor, cholmod.get());
     cholmod.check();
   }
 }
@@ -179,13 +124,13 @@ void replace_rows(const SystemChange& change, const Sparse& rows, cholmod_factor
   const auto* values = static_cast<const double*>(rows->x);
   for (const int32_t r : change.changed) {
     absent[at(r)] = 0;
-    std::vector<std::pair<int32_t, double>> row;
+    std::vector<Eigen::Triplet<double>> row;
     for (int k = starts[r]; k < starts[r + 1]; ++k) {
-      if (!absent[at(indices[k])]) row.emplace_back(place[at(indices[k])], values[k]);
+      if (!absent[at(indices[k])]) row.emplace_back(place[at(indices[k])], 0, values[k]);
     }
-    std::sort(row.begin(), row.end());
-    const Sparse column(columns_of({row}, change.origin.size(), cholmod), cholmod);
-    cholmod_rowadd(at(place[at(r)]), column.get(), factor, cholmod.get());
+    Columns column = columns_of(change.origin.size(), 1, row);
+    cholmod_sparse view = Eigen::viewAsCholmod(column);
+    cholmod_rowadd(at(place[at(r)]), &view, factor, cholmod.get());
     cholmod.check();
   }
 }
@@ -234,7 +179,7 @@ std::optional<Factorised> factorise(const SystemChange& change, Way way, const s
   const Sparse both_triangles(cholmod_copy(after.get(), 0, 1, cholmod.get()), cholmod);
   const Factor analysed(cholmod_analyze(before.get(), cholmod.get()), cholmod);
   const auto analyse_in_order = [&](const Sparse& matrix, bool postorder) {
-    const GivenOrder given(cholmod, postorder);
+    take_given_order(cholmod, postorder);
     std::vector<int> order = order_of(change, *analysed.get());
     return cholmod_analyze_p(matrix.get(), order.data(), nullptr, 0, cholmod.get());
   };
@@ -265,8 +210,8 @@ std::optional<Factorised> factorise(const SystemChange& change, Way way, const s
       numerically(after);
       break;
     case Way::updown:
-    case Way::rows: {
-      const Updatable updatable(cholmod);
+    case Way::rows:
+      make_updatable(cholmod);
       make(analyse_in_order(before, false));
       numerically(before);
       begin = Clock::now();
@@ -276,7 +221,6 @@ std::optional<Factorised> factorise(const SystemChange& change, Way way, const s
         replace_rows(change, both_triangles, factor->get(), cholmod);
       }
       break;
-    }
   }
   Factorised result;
   result.seconds = seconds_since(begin);

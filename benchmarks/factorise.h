@@ -16,7 +16,8 @@ enum class Way {
   rows,     // each changed row deleted from the factor and added again
 };
 inline constexpr Way kWays[] = {Way::analyse, Way::ordered, Way::numeric, Way::updown, Way::rows};
-const char* name_of(Way way);
+inline constexpr const char* kWayNames[] = {"analyse", "ordered", "numeric", "updown", "rows"};
+constexpr const char* name_of(Way way) { return kWayNames[static_cast<std::size_t>(way)]; }
 
 struct Factorised {
   double seconds = 0;        // of everything after the changed system is known

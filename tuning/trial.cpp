@@ -27,24 +27,6 @@ std::string differences(const Configuration& configuration, const Configuration&
   return fmt::format("{}", fmt::join(found, ", "));
 }
 
-const char* name_of(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::within:
-      return "within";
-    case Outcome::over:
-      return "over";
-    case Outcome::topology:
-      return "topology";
-    case Outcome::schedule:
-      return "schedule";
-    case Outcome::refused:
-      return "refused";
-    case Outcome::more_expensive:
-      return "more_expensive";
-  }
-  return "";
-}
-
 json to_json(const Trial& trial, const Configuration& given) {
   const Scene& scene = trial.configuration.scene;
   json rms = json::array();

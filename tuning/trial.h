@@ -28,7 +28,8 @@ enum class Outcome {
   refused,         // the scene cannot be built like this
   more_expensive,  // given up: before its end it had cost more than the cheapest that is within
 };
-const char* name_of(Outcome outcome);
+inline constexpr const char* kOutcomeNames[] = {"within", "over", "topology", "schedule", "refused", "more_expensive"};
+constexpr const char* name_of(Outcome outcome) { return kOutcomeNames[static_cast<std::size_t>(outcome)]; }
 
 // One configuration that was tried.
 struct Trial {
