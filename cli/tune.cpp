@@ -10,13 +10,13 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/table.h"
-#include "model/rules.h"
+#include "model/io/filled.h"
 
 namespace cutproof::cli {
 
 namespace {
 
-using benchmarks::Times;
+using nlohmann::json;
 using namespace tuning;
 
 struct Asked {
@@ -45,137 +45,132 @@ void settle_files(Asked& asked) {
   require_writable(options.write);
 }
 
-void print_beginning(const TuneResult& result) {
-  print_filled(kHead, result.head);
-  fmt::print("scene {}: {}\n", result.given.scene.name, result.given.scene.description);
-  if (result.skin_is_expected) fmt::print("--without-skin does nothing: the scene expects shells of its skin\n");
+void print_beginning(const TuneOptions& options, const json& document, const Scene& given) {
+  print_filled(kHead, document);
+  fmt::print("scene {}: {}\n", given.name, given.description);
+  if (options.without_skin && given.expect.shells_at_end) {
+    fmt::print("--without-skin does nothing: the scene expects shells of its skin\n");
+  }
 }
 
-void print_reference(const TuneResult& result) {
-  fmt::print("the reference solution: {}\n", result.options.reference == ReferenceKind::limit
+void print_reference(const TuneOptions& options, const json& reference) {
+  fmt::print("the reference solution: {}\n", options.reference == ReferenceKind::limit
                                                  ? "the limit of short time steps"
                                                  : "the scene's own substeps, each solved until converged");
-  for (const RefinementLevel& level : result.levels) {
-    fmt::print("  reference, {} × {}{}\n", level.substeps, level.iterations,
-               level.apart_h ? fmt::format(": {:.2g} h from the one before", *level.apart_h) : "");
+  for (const json& level : reference.at("levels")) {
+    print_filled("  reference, {substeps} × {iterations}", level);
+    if (!level.at("apart_h").is_null()) print_filled(": {apart_h:.2g} h from the one before", level);
+    fmt::print("\n");
   }
 }
 
-void print_trials(const TuneResult& result) {
-  Table table({"substeps × iterations", "acceleration", "RMS h", "max h", "removed otherwise", "ms a frame", "of given",
-               "outcome", "else"});
-  const double given = result.trials.front().frame.median;
-  for (const Trial& trial : result.trials) {
-    const StepParameters& step = trial.configuration.scene.step;
-    const bool timed = trial.frame.count > 0;
-    std::string other = differences(trial.configuration, result.given);
-    if (!trial.why.empty()) other += (other.empty() ? "" : "; ") + trial.why;
-    table.add({fmt::format("{} × {}", step.substeps, step.iterations), std::string(name_of(step.acceleration)),
-               fmt::format("{:.2g}", trial.greatest_rms_h), fmt::format("{:.2g}", trial.greatest_h),
-               fmt::format("{}", trial.removed_otherwise),
-               timed ? fmt::format("{:.3f}", 1e3 * trial.frame.median) : "-",
-               timed ? fmt::format("{:.2f}", trial.frame.median / given) : "-", name_of(trial.outcome), other});
-  }
-  fmt::print("\n{}", table.text());
+void print_trials(const json& trials) {
+  const auto of_given = [&](const json& trial) {
+    const json &seconds = trial.at("seconds_per_frame"), &given = trials.front().at("seconds_per_frame");
+    if (seconds.is_null()) return std::string("-");
+    return fmt::format("{:.2f}", seconds.at("median").get<double>() / given.at("median").get<double>());
+  };
+  const auto more = [](const json& trial) {
+    const bool both = trial.at("differences") != "" && trial.at("why") != "";
+    return io::filled(both ? "{differences}; {why}" : "{differences}{why}", trial);
+  };
+  fmt::print("\n{}", table_of(trials, {{"substeps × iterations", "{substeps} × {iterations}"},
+                                       {"acceleration", "{acceleration}"},
+                                       {"RMS h", "{rms_h:.2g}"},
+                                       {"max h", "{max_h:.2g}"},
+                                       {"removed otherwise", "{removed_otherwise}"},
+                                       {"ms a frame", "{1e3*seconds_per_frame/median:.3f}"},
+                                       {"of given", of_given},
+                                       {"outcome", "{outcome}"},
+                                       {"else", more}}));
 }
 
-void print_not_taken(const TuneResult& result) {
-  const auto& [trial, why] = result.not_taken.back();
-  const StepParameters& step = result.trials[trial].configuration.scene.step;
-  fmt::print("{} × {}, acceleration {}, is not taken: {}\n", step.substeps, step.iterations, name_of(step.acceleration),
-             why);
+void print_not_taken(const json& document) {
+  const json& left = document.at("left").back();
+  print_filled("{substeps} × {iterations}, acceleration {acceleration}, is not taken",
+               document.at("trials").at(left.at("trial").get<std::size_t>()));
+  print_filled(": {why}\n", left);
 }
 
-std::string ms_and_range(const Times& times) {
-  return fmt::format("{:.3f} ({:.3f} to {:.3f})", 1e3 * times.median, 1e3 * times.min, 1e3 * times.max);
-}
-
-void print_found(const TuneResult& result) {
-  const TuneResult::Found& found = *result.found;
-  const Configuration& configuration = result.trials[found.trial].configuration;
-  const StepParameters& step = configuration.scene.step;
-  const auto& [given, tuned] = found.times;
-  const std::string other = differences(configuration, result.given);
-  if (found.trial == 0) {
-    fmt::print(
-        "\nfound: nothing that is cheaper; the scene as it was given is within the tolerance\n"
-        "  {:.3f} ms a frame ({:.3f} to {:.3f})\n",
-        1e3 * given.median, 1e3 * given.min, 1e3 * given.max);
+void print_found(const TuneOptions& options, const json& document) {
+  const json &found = document.at("found"), &given = document.at("trials").front();
+  const auto index = found.at("trial").get<std::size_t>();
+  const json& trial = document.at("trials").at(index);
+  const auto ms_and_range = [](const json& times) {
+    return io::filled("{1e3*median:.3f} ({1e3*min:.3f} to {1e3*max:.3f})", times);
+  };
+  const std::string tuned =
+      io::filled("{1e3*median:.3f} ms a frame ({1e3*min:.3f} to {1e3*max:.3f})", found.at("seconds_per_frame"));
+  if (index == 0) {
+    fmt::print("\nfound: nothing that is cheaper; the scene as it was given is within the tolerance\n  {}\n", tuned);
   } else {
-    const double ratio = given.median / tuned.median;
-    fmt::print(
-        "\nfound: {} × {}, acceleration {}{}\n"
-        "  {:.3f} ms a frame ({:.3f} to {:.3f}), as given {}: {}\n",
-        step.substeps, step.iterations, name_of(step.acceleration), other.empty() ? "" : ", " + other,
-        1e3 * tuned.median, 1e3 * tuned.min, 1e3 * tuned.max, ms_and_range(given),
-        ratio >= 1 ? fmt::format("{:.2f} times cheaper", ratio)
-                   : fmt::format("{:.2f} times as expensive, and what was given is not within", 1 / ratio));
+    const auto ratio = found.at("times_cheaper").get<double>();
+    print_filled("\nfound: {substeps} × {iterations}, acceleration {acceleration}", trial);
+    if (trial.at("differences") != "") print_filled(", {differences}", trial);
+    fmt::print("\n  {}, as given {}: {}\n", tuned, ms_and_range(found.at("seconds_per_frame_as_given")),
+               ratio >= 1 ? fmt::format("{:.2f} times cheaper", ratio)
+                          : fmt::format("{:.2f} times as expensive, and what was given is not within", 1 / ratio));
   }
-  const RefinementLevel& finest = result.levels.back();
-  fmt::print(
-      "  verified: RMS {:.2g} h, max {:.2g} h from the reference's {} × {}, {:.2g} h from the one before; "
-      "{} verdicts hold\nwrote {}\n",
-      found.verified.trial.greatest_rms_h, found.verified.trial.greatest_h, finest.substeps, finest.iterations,
-      result.known_to_h, found.verified.verdicts, result.options.write);
-  if (configuration.rotation != result.given.rotation) {
-    fmt::print("  rotations are no part of a scene: run it with --rotation {}\n", configuration.rotation);
+  print_filled("  verified: RMS {rms_h:.2g} h, max {max_h:.2g} h ", found.at("verified"));
+  print_filled("from the reference's {substeps} × {iterations}, {apart_h:.2g} h from the one before; ",
+               document.at("reference").at("levels").back());
+  print_filled("{verdicts} verdicts hold\n", found);
+  fmt::print("wrote {}\n", options.write);
+  if (trial.at("rotation") != given.at("rotation")) {
+    print_filled("  rotations are no part of a scene: run it with --rotation {rotation}\n", trial);
   }
-  if (result.options.frames) {
-    fmt::print("  the scene was written whole, and looked at for {} frames only\n", *result.options.frames);
-  }
+  if (options.frames) print_filled("  the scene was written whole, and looked at for {frames} frames only\n", document);
 }
 
-void print_conclusion(const TuneResult& result) {
-  const double tolerance = result.options.tolerance;
-  switch (*result.conclusion) {
-    case TuneResult::Conclusion::found:
-      return print_found(result);
-    case TuneResult::Conclusion::reference_unknown:
-      fmt::print(
-          "the reference solution is known to {:.2g} h only, so nothing can be said to be within {:g} h of it.\n"
-          "  Give a greater tolerance{}.\n",
-          result.known_to_h, tolerance,
-          result.options.reference == ReferenceKind::limit
-              ? ", fewer --frames, or --reference substeps, which takes the scene's time step as given"
-              : " or fewer --frames");
-      return;
-    case TuneResult::Conclusion::none_within:
-      fmt::print("none of {} configurations is within {:g} h of the reference solution, itself known to {:.2g} h\n",
-                 result.trials.size(), tolerance, result.known_to_h);
-      return;
-    case TuneResult::Conclusion::none_verified:
-      fmt::print("none of the configurations that seemed to be within {:g} h holds when it is verified\n", tolerance);
-  }
+// How well the reference solution is known.
+std::string known_to(const json& document) {
+  return io::filled("known to {apart_h:.2g} h", document.at("reference").at("levels").back());
 }
 
-void print(const TuneResult& result, TuneStep step) {
+void print(const TuneOptions& options, TuneStep step, const json& document, const Scene& given) {
   switch (step) {
     case TuneStep::begun:
-      return print_beginning(result);
+      return print_beginning(options, document, given);
     case TuneStep::reference_known:
-      return print_reference(result);
+      return print_reference(options, document.at("reference"));
     case TuneStep::trial:
       return;
     case TuneStep::searched:
-      return print_trials(result);
+      return print_trials(document.at("trials"));
     case TuneStep::not_taken:
-      return print_not_taken(result);
-    case TuneStep::concluded:
-      return print_conclusion(result);
+      return print_not_taken(document);
+    case TuneStep::found:
+      return print_found(options, document);
+    case TuneStep::reference_unknown:
+      fmt::print(
+          "the reference solution is {} only, so nothing can be said to be within {:g} h of it.\n"
+          "  Give a greater tolerance{}.\n",
+          known_to(document), options.tolerance,
+          options.reference == ReferenceKind::limit
+              ? ", fewer --frames, or --reference substeps, which takes the scene's time step as given"
+              : " or fewer --frames");
+      return;
+    case TuneStep::none_within:
+      fmt::print("none of {} configurations is within {:g} h of the reference solution, itself {}\n",
+                 document.at("trials").size(), options.tolerance, known_to(document));
+      return;
+    case TuneStep::none_verified:
+      fmt::print("none of the configurations that seemed to be within {:g} h holds when it is verified\n",
+                 options.tolerance);
   }
 }
 
 int tune(Asked asked) {
   asked.tune.reference = asked.reference == "limit" ? ReferenceKind::limit : ReferenceKind::substeps;
   settle_files(asked);
-  const TuneResult result = run_tune(asked.tune, [&](const TuneResult& so_far, TuneStep step) {
-    print(so_far, step);
+  const bool found = run_tune(asked.tune, [&](TuneStep step, const json& document, const Scene& given) {
+    print(asked.tune, step, document, given);
     flush_output();
-    // After each trial, so that what has been measured is kept if a later one fails.
-    if (step == TuneStep::trial || step == TuneStep::concluded) write_document(asked.json, to_json(so_far));
+    // After each trial, so that what has been measured is kept if a later one fails; and in the end.
+    if (step == TuneStep::trial || document.at("complete")) write_document(asked.json, document);
   });
   if (!asked.json.empty()) fmt::print("wrote {}\n", asked.json);
-  return result.conclusion == TuneResult::Conclusion::found ? 0 : 1;
+  return found ? 0 : 1;
 }
 
 }  // namespace
@@ -209,10 +204,7 @@ void add_tune(CLI::App& program, Work& work) {
   command->add_flag("--full", options.full,
                     "run and time everything to its end, for a curve; else what is beyond the tolerance, or more "
                     "expensive than what was found, is given up");
-  command->add_option("--repeats", options.repeats, "timed runs of each configuration")
-      ->capture_default_str()
-      ->type_name("N")
-      ->check(CLI::Range(1, 1000));
+  add_count(*command, "--repeats", options.repeats, "timed runs of each configuration", 1, 1000);
   command->add_option("--write", options.write, "the scene that was found (default: NAME_tuned.json here)")
       ->type_name("F");
   add_json(*command, asked->json, "write everything that was tried");

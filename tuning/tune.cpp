@@ -10,6 +10,7 @@
 #include "model/io/scene_io.h"
 #include "tuning/search.h"
 #include "tuning/tuned_scene.h"
+#include "tuning/verification.h"
 
 namespace cutproof::tuning {
 
@@ -70,11 +71,18 @@ SearchSpace space_of(const Measuring& measuring, const TuneOptions& options, con
   return space;
 }
 
+// A trial that was verified, as the scene that would be written.
+struct Found {
+  std::size_t trial = 0;
+  std::string text;
+  Verified verified;
+  TimedInTurns times;
+};
+
 // The cheapest that holds when it is verified and, timed again, is still cheaper than what was given.
-std::optional<TuneResult::Found> take_cheapest(const Measuring& measuring, const ReferenceSolution& reference,
-                                               const std::vector<Trial>& trials, const std::string& path,
-                                               const std::function<void(std::size_t, const std::string&)>& leave) {
-  using Found = TuneResult::Found;
+std::optional<Found> take_cheapest(const Measuring& measuring, const ReferenceSolution& reference,
+                                   const std::vector<Trial>& trials, const std::string& path,
+                                   const std::function<void(std::size_t, const std::string&)>& leave) {
   const auto verified = [&](std::size_t index) {
     const Configuration& configuration = trials[index].configuration;
     Found found{index, tuned_scene_text(configuration, measuring.source, path), {}, {}};
@@ -108,90 +116,72 @@ std::optional<TuneResult::Found> take_cheapest(const Measuring& measuring, const
   return given;
 }
 
-}  // namespace
-
-const char* name_of(ReferenceKind kind) { return kind == ReferenceKind::limit ? "limit" : "substeps"; }
-
-json to_json(const TuneResult& result) {
-  const TuneOptions& options = result.options;
-  json document = result.head;
-  document["complete"] = result.conclusion.has_value();
-  document["scene"] = options.scene;
-  document["tolerance_h"] = options.tolerance;
-  document["repeats"] = options.repeats;
-  document["frames"] = options.frames ? json(*options.frames) : json(nullptr);
-  document["full"] = options.full;
-  document["without_skin"] = options.without_skin;
+json levels_json(const ReferenceSolution& reference) {
   json levels = json::array();
-  for (const RefinementLevel& level : result.levels) {
+  for (const RefinementLevel& level : reference.levels()) {
     levels.push_back({{"substeps", level.substeps},
                       {"iterations", level.iterations},
                       {"apart_h", level.apart_h ? json_number(*level.apart_h) : json(nullptr)}});
   }
-  document["reference"] = {
-      {"kind", name_of(options.reference)}, {"levels", levels}, {"searched_level", result.searched_level}};
-  document["trials"] = json::array();
-  for (const Trial& trial : result.trials) document["trials"].push_back(to_json(trial, result.given));
-  document["left"] = json::array();
-  for (const auto& [trial, why] : result.not_taken) document["left"].push_back({{"trial", trial}, {"why", why}});
-  document["found"] = nullptr;
-  if (result.found) {
-    const auto& [trial, text, verified, times] = *result.found;
-    document["found"] = {{"trial", trial},
-                         {"verified", to_json(verified.trial, result.given)},
-                         {"verdicts", verified.verdicts},
-                         {"seconds_per_frame", benchmarks::to_json(times.found)},
-                         {"seconds_per_frame_as_given", benchmarks::to_json(times.given)},
-                         {"times_cheaper", times.given.median / times.found.median}};
-  }
-  return document;
+  return levels;
 }
 
-TuneResult run_tune(const TuneOptions& options, const TuneProgress& progress) {
+}  // namespace
+
+bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
   const Measuring measuring = prepare(options);
-  TuneResult result;
-  result.head = benchmarks::begin_document("tune", options.backend.name);
-  result.options = options;
-  result.given = measuring.given;
-  result.skin_is_expected = options.without_skin && measuring.given.scene.expect.shells_at_end;
-  progress(result, TuneStep::begun);
-  const auto conclude = [&](TuneResult::Conclusion conclusion) {
-    result.conclusion = conclusion;
-    progress(result, TuneStep::concluded);
-    return result;
+  json document = benchmarks::begin_document("tune", options.backend.name);
+  document.update({{"scene", options.scene},
+                   {"tolerance_h", options.tolerance},
+                   {"repeats", options.repeats},
+                   {"frames", options.frames ? json(*options.frames) : json(nullptr)},
+                   {"full", options.full},
+                   {"without_skin", options.without_skin},
+                   {"trials", json::array()},
+                   {"left", json::array()},
+                   {"found", nullptr}});
+  const auto show = [&](TuneStep step) { progress(step, document, measuring.given.scene); };
+  const auto conclude = [&](TuneStep conclusion) {
+    document["complete"] = true;
+    show(conclusion);
+    return conclusion == TuneStep::found;
   };
+  show(TuneStep::begun);
 
   ReferenceSolution reference(options.reference, measuring.given.scene, options.scene, options.frames,
                               kUnknownShare * options.tolerance);
-  const auto note_reference = [&] {
-    result.levels = reference.levels();
-    result.known_to_h = reference.known_to_h();
-  };
-  note_reference();
-  result.searched_level = result.levels.size() - 1;
-  progress(result, TuneStep::reference_known);
-  if (!(measuring.allowed(reference) > 0)) return conclude(TuneResult::Conclusion::reference_unknown);
+  document["reference"] = {{"kind", options.reference == ReferenceKind::limit ? "limit" : "substeps"},
+                           {"levels", levels_json(reference)},
+                           {"searched_level", reference.levels().size() - 1}};
+  show(TuneStep::reference_known);
+  if (!(measuring.allowed(reference) > 0)) return conclude(TuneStep::reference_unknown);
 
-  search(measuring.given, space_of(measuring, options, reference),
-         [&](const Configuration& configuration, std::optional<double> limit) {
-           result.trials.push_back(measure(measuring, reference, configuration, limit));
-           progress(result, TuneStep::trial);
-           return result.trials.back();
-         });
-  progress(result, TuneStep::searched);
-  if (by_cost(result.trials).empty()) return conclude(TuneResult::Conclusion::none_within);
+  const std::vector<Trial> trials = search(measuring.given, space_of(measuring, options, reference),
+                                           [&](const Configuration& configuration, std::optional<double> limit) {
+                                             Trial trial = measure(measuring, reference, configuration, limit);
+                                             document["trials"].push_back(to_json(trial, measuring.given));
+                                             show(TuneStep::trial);
+                                             return trial;
+                                           });
+  show(TuneStep::searched);
+  if (by_cost(trials).empty()) return conclude(TuneStep::none_within);
 
   reference.refine();
-  note_reference();
-  std::optional<TuneResult::Found> found =
-      take_cheapest(measuring, reference, result.trials, options.write, [&](std::size_t trial, const std::string& why) {
-        result.not_taken.push_back({trial, why});
-        progress(result, TuneStep::not_taken);
+  document["reference"]["levels"] = levels_json(reference);
+  const std::optional<Found> found =
+      take_cheapest(measuring, reference, trials, options.write, [&](std::size_t trial, const std::string& why) {
+        document["left"].push_back({{"trial", trial}, {"why", why}});
+        show(TuneStep::not_taken);
       });
-  if (!found) return conclude(TuneResult::Conclusion::none_verified);
+  if (!found) return conclude(TuneStep::none_verified);
   write_tuned_scene(found->text, options.write);
-  result.found = std::move(found);
-  return conclude(TuneResult::Conclusion::found);
+  document["found"] = {{"trial", found->trial},
+                       {"verified", to_json(found->verified.trial, measuring.given)},
+                       {"verdicts", found->verified.verdicts},
+                       {"seconds_per_frame", benchmarks::to_json(found->times.found)},
+                       {"seconds_per_frame_as_given", benchmarks::to_json(found->times.given)},
+                       {"times_cheaper", found->times.given.median / found->times.found.median}};
+  return conclude(TuneStep::found);
 }
 
 }  // namespace cutproof::tuning

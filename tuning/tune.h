@@ -5,13 +5,10 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "harness/backends.h"
-#include "tuning/measurement.h"
+#include "model/scene.h"
 #include "tuning/reference_solution.h"
-#include "tuning/trial.h"
-#include "tuning/verification.h"
 
 namespace cutproof::tuning {
 
@@ -27,46 +24,23 @@ struct TuneOptions {
   int repeats = 3;                                 // timed runs of a configuration
 };
 
-struct TuneResult {
-  enum class Conclusion {
-    found,
-    reference_unknown,  // the reference solution is not known well enough to say
-    none_within,
-    none_verified  // of those that seemed to be within
-  };
-  struct NotTaken {
-    std::size_t trial;
-    std::string why;
-  };
-  struct Found {
-    std::size_t trial = 0;
-    std::string text;  // of the scene
-    Verified verified;
-    TimedInTurns times;
-  };
-
-  nlohmann::json head;  // with what its document begins
-  TuneOptions options;
-  Configuration given;
-  bool skin_is_expected = false;        // so it is made, though nobody looks at it
-  std::vector<RefinementLevel> levels;  // of the reference solution; the last is what is verified against
-  std::size_t searched_level = 0;       // from which trials are measured
-  double known_to_h = 0;                // by how much the reference solution may be off
-  std::vector<Trial> trials;            // in the order in which they were tried, the first as given
-  std::vector<NotTaken> not_taken;      // cheaper, but they do not hold
-  std::optional<Found> found;
-  std::optional<Conclusion> conclusion;  // absent before the end
+// What has just been added to the document; the last four conclude.
+enum class TuneStep {
+  begun,
+  reference_known,
+  trial,
+  searched,
+  not_taken,  // a trial that was cheaper and does not hold
+  found,
+  reference_unknown,  // the reference solution is not known well enough to say
+  none_within,
+  none_verified  // of those that seemed to be within
 };
-nlohmann::json to_json(const TuneResult& result);
-// `limit` or `substeps`.
-const char* name_of(ReferenceKind kind);
+// `so_far`: the fields of results_schema.md. `given`: the scene that is tuned.
+using TuneProgress = std::function<void(TuneStep step, const nlohmann::json& so_far, const Scene& given)>;
 
-// What has just been added to a result.
-enum class TuneStep { begun, reference_known, trial, searched, not_taken, concluded };
-using TuneProgress = std::function<void(const TuneResult& so_far, TuneStep step)>;
-
-// Writes the scene that is found. Throws InputError for a scene, a backend or an option that cannot be tuned,
-// MachineError if the machine fails.
-TuneResult run_tune(const TuneOptions& options, const TuneProgress& progress);
+// Writes the scene that is found, and returns whether one is. Throws InputError for a scene, a backend or an option
+// that cannot be tuned, MachineError if the machine fails.
+bool run_tune(const TuneOptions& options, const TuneProgress& progress);
 
 }  // namespace cutproof::tuning
