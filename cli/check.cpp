@@ -1,15 +1,14 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <optional>
 
 #include "cli/commands.h"
 #include "cli/options.h"
+#include "cli/output.h"
 #include "cli/results.h"
 #include "cli/terminal.h"
 #include "harness/recorded_run.h"
 #include "harness/scene_judge.h"
-#include "model/io/atomic_file.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
 
@@ -27,25 +26,15 @@ int check(const CheckOptions& options) {
   const io::Recording& recording = reader.header();
   Scene scene;
   if (!recording.scene_json.empty()) scene = io::parse_scene(recording.scene_json, options.recording + " (its scene)");
-  std::optional<io::AtomicFile> json_file;
-  if (!options.json.empty()) json_file.emplace(options.json);
+  require_writable(options.json);
 
   const auto initial = std::make_shared<const State>(reader.snapshot(0).state);
   fmt::print("recording {}: scene {}, backend {}, {} snapshots of {} particles\n", options.recording,
              scene.name.empty() ? "(none)" : scene.name, recording.backend, recording.snapshot_count,
              recording.setup.body.particle_count());
   harness::SceneJudge judge(recording.setup, scene.expect, recording.backend, initial);
-  RunResult result{"check",
-                   options.recording,
-                   scene.name,
-                   recording.backend,
-                   scene.seed,
-                   recording.setup.body.name,
-                   recording.setup.body.grid.spacing,
-                   recording.setup.body.particle_count(),
-                   initial->clusters.count(),
-                   false,
-                   {}};
+  RunResult result{"check", options.recording,    recording.backend,
+                   scene,   recording.setup.body, initial->clusters.count()};
   {
     Progress progress("frame", recording.setup.frame_count());
     const auto wrong = harness::walk_recording(
@@ -58,9 +47,8 @@ int check(const CheckOptions& options) {
   }
   judge.finish();
   print_verdicts(judge);
-  if (json_file) {
-    io::write_text(json_file->temporary(), to_json(result, &judge).dump(1) + "\n");
-    json_file->commit();
+  if (!options.json.empty()) {
+    write_document(options.json, to_json(result, &judge));
     fmt::print("wrote {}\n", options.json);
   }
   return judge.holds() ? 0 : 1;

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "cli/against_report.h"
+#include "cli/terminal.h"
 #include "harness/geometry_json.h"
 #include "model/error.h"
 #include "model/io/json_number.h"
@@ -134,60 +135,49 @@ json to_json(const Errors& errors, const harness::Lockstep* lockstep) {
   return result;
 }
 
-void print_errors(const Errors& errors, const harness::Lockstep* lockstep) {
-  const auto or_dash = [](const std::optional<double>& value) { return value ? fmt::format("{:.3g}", *value) : "-"; };
+void print_errors(const Errors& errors, const json& document) {
   fmt::print("\nerrors\n");
-  if (errors.wanted().implementation && lockstep != nullptr) {
-    fmt::print("implementation  the table above\n");
+  // What was not measured is not there, or null.
+  const auto print = [&](const char* kind, const std::string& text) {
+    if (document.contains(kind) && !document.at(kind).is_null()) print_filled(text, document.at(kind));
+  };
+  print("implementation", "implementation  the table above\n");
+  std::optional<double> energy;
+  int64_t unconverged = 0;
+  for (const auto& [frame, error] : errors.solver()) {
+    if (error.energy) energy = std::max(energy.value_or(0), *error.energy);
+    unconverged += !error.converged;
   }
-  if (errors.wanted().solver) {
-    ErrorNorm all;
-    std::optional<double> energy;
-    int64_t unconverged = 0;
-    for (const auto& [frame, error] : errors.solver()) {
-      all.join(error.position);
-      if (error.energy) energy = std::max(energy.value_or(0), *error.energy);
-      unconverged += !error.converged;
-    }
-    fmt::print("solver          max {:.3g} h, RMS {:.3g} h, energy {} above the least; {} substeps{}\n", all.max,
-               all.rms(), or_dash(energy), errors.solver().size(),
-               unconverged > 0 ? fmt::format(", {} without a reference solution", unconverged) : "");
+  print("solver", fmt::format("solver          max {{max:.3g}} h, RMS {{rms:.3g}} h, energy {} above the least; {} "
+                              "substeps{}\n",
+                              energy ? fmt::format("{:.3g}", *energy) : "-", errors.solver().size(),
+                              unconverged > 0 ? fmt::format(", {} without a reference solution", unconverged) : ""));
+  print("time_step",
+        "time step       RMS up to {greatest_rms:.3g} h against {factor} × the substeps, over {frames} frames");
+  if (const auto& found = errors.time_step()) {
+    fmt::print("{}\n", found->first_difference
+                           ? fmt::format(", until particle {} is removed by one only", *found->removed_otherwise)
+                           : "");
   }
-  if (errors.time_step()) {
-    fmt::print("time step       RMS up to {:.3g} h against 8 × the substeps, over {} frames{}\n",
-               errors.time_step()->greatest_rms(), errors.time_step()->position.size(),
-               errors.time_step()->first_difference
-                   ? fmt::format(", until particle {} is removed by one only", *errors.time_step()->removed_otherwise)
-                   : "");
+  print("geometry",
+        "geometry        Hausdorff {hausdorff:.3g} h (skin to ideal {skin_to_ideal:.3g}, ideal to skin "
+        "{ideal_to_skin:.3g}), {lost_per_area:.3g} h lost per cut area of {cut_area:.4g} h², at least "
+        "{least_per_area:.3g}\n");
+  if (errors.overlap()) {
+    print("geometry",
+          "                pieces share up to {interpenetration/volume:.3g} h³ (± {interpenetration/bound:.2g}), in "
+          "frame {interpenetration/frame}\n");
   }
-  if (errors.geometry()) {
-    const oracles::CutGeometry& g = *errors.geometry();
-    fmt::print(
-        "geometry        Hausdorff {} h (skin to ideal {}, ideal to skin {}), {} h lost per cut area of {:.4g} h², "
-        "at least {}\n",
-        or_dash(g.hausdorff()), or_dash(g.skin_to_ideal), or_dash(g.ideal_to_skin), or_dash(g.lost_per_area),
-        g.cut_area, or_dash(g.least_per_area));
-    if (errors.overlap()) {
-      fmt::print("                pieces share up to {:.3g} h³ (± {:.2g}), in frame {}\n",
-                 errors.overlap()->found.volume, errors.overlap()->found.bound, errors.overlap()->frame);
-    }
-  }
-  if (errors.wanted().topology) {
-    fmt::print(
-        "topology        {} components, {} couplings, {} shells; unequal in {} of {} frames; {} isolated groups\n",
-        errors.topology().end.components, errors.topology().end.couplings, errors.topology().end.shells,
-        errors.topology().unequal, errors.topology().frames, errors.topology().isolated);
-  }
-  if (errors.conservation()) {
-    const oracles::Conservation& c = *errors.conservation();
-    fmt::print(
-        "conservation    {}: momentum {:.3g} m/s per mass ({:.3g} relative), bound {}; energy {}, bound {:.2g}; "
-        "angular momentum {:.3g}; over {} substeps\n",
-        errors.holds() ? "holds" : "FAILS", c.momentum, c.momentum_relative,
-        errors.precision() == Precision::binary64 ? fmt::format("{:.2g} relative", harness::kDoubleDrift)
-                                                  : fmt::format("{:.2g} m/s", c.momentum_bound),
-        or_dash(c.energy), c.energy_bound, c.angular_momentum, c.substeps);
-  }
+  print("topology",
+        "topology        {components} components, {couplings} couplings, {shells} shells; unequal in {unequal} of "
+        "{frames} frames; {isolated} isolated groups\n");
+  const bool is_double = errors.precision() == Precision::binary64;
+  print("conservation",
+        fmt::format("conservation    {}: momentum {{momentum:.3g}} m/s per mass ({{momentum_relative:.3g}} relative), "
+                    "bound {}; energy {{energy:.3g}}, bound {{energy_bound:.2g}}; angular momentum "
+                    "{{angular_momentum:.3g}}; over {{substeps}} substeps\n",
+                    errors.holds() ? "holds" : "FAILS",
+                    is_double ? fmt::format("{:.2g} relative", harness::kDoubleDrift) : "{momentum_bound:.2g} m/s"));
 }
 
 }  // namespace cutproof::cli

@@ -14,6 +14,7 @@ harness::ErrorsWanted errors_wanted(const std::string& list);
 
 // `lockstep` is null without the implementation error.
 nlohmann::json to_json(const harness::Errors& errors, const harness::Lockstep* lockstep);
-void print_errors(const harness::Errors& errors, const harness::Lockstep* lockstep);
+// `document`: what to_json made of them.
+void print_errors(const harness::Errors& errors, const nlohmann::json& document);
 
 }  // namespace cutproof::cli

@@ -90,15 +90,15 @@ int print_conclusion(const json& document, bool whole) {
   for (const char* name : kCoverageClassNames) {
     fmt::print("  {:<28} {:>9}\n", name, document.at("coverage").at(name).get<int64_t>());
   }
-  fmt::print("{} cases of {:.0f} particles on average, {} verdicts, {:.1f} s, {:.0f} cases/s\n",
-             document.at("cases").get<int64_t>(), document.at("mean_particles").get<double>(),
-             document.at("verdicts").get<int64_t>(), document.at("seconds").get<double>(),
-             document.at("cases_per_second").get<double>());
+  print_filled(
+      "{cases} cases of {mean_particles:.0f} particles on average, {verdicts} verdicts, {seconds:.1f} s, "
+      "{cases_per_second:.0f} cases/s\n",
+      document);
   if (document.contains("steps_compared")) {
-    const json& compared = document.at("steps_compared");
-    fmt::print("{} steps beside the reference's: {} positions at most {} h apart, {} undecidable within rounding\n",
-               compared.at("steps").get<int64_t>(), compared.at("particles").get<int64_t>(),
-               compared.at("greatest_h").dump(), compared.at("undecidable").get<int64_t>());
+    print_filled(
+        "{steps} steps beside the reference's: {particles} positions at most {greatest_h} h apart, {undecidable} "
+        "undecidable within rounding\n",
+        document.at("steps_compared"));
   }
   const CampaignConclusion conclusion = conclude(document, whole);
   if (conclusion.holds()) {
@@ -111,12 +111,9 @@ int print_conclusion(const json& document, bool whole) {
 
 int merge(const FuzzOptions& options) {
   const json whole = merge_shards(options.merge);
-  if (!options.json.empty()) io::write_text(options.json, whole.dump(1) + "\n");
-  fmt::print("{} shards, backend {}, seed {}\n", whole.at("merged_shards").get<int64_t>(),
-             whole.at("backend").get<std::string>(), whole.at("seed").get<uint64_t>());
-  for (const json& violation : whole.at("violations")) {
-    fmt::print("case {}: {}\n", violation.at("index").get<int64_t>(), violation.at("text").get<std::string>());
-  }
+  write_document(options.json, whole);
+  print_filled("{merged_shards} shards, backend {backend}, seed {seed}\n", whole);
+  for (const json& violation : whole.at("violations")) print_filled("case {index}: {text}\n", violation);
   return print_conclusion(whole, true);
 }
 
@@ -171,8 +168,7 @@ int fuzz(const FuzzOptions& options) {
   if (!std::filesystem::is_directory(options.save)) {
     refuse("--save", fmt::format("'{}' is not a folder", options.save), "create it first");
   }
-  std::optional<io::AtomicFile> json_file;
-  if (!options.json.empty()) json_file.emplace(options.json);
+  require_writable(options.json);
 
   fmt::print("fuzzing backend {}: {}{} from seed {}{}, {} bodies a load, {} threads\n", options.backend.name,
              options.seconds ? fmt::format("{:g} s of cases", *options.seconds) : fmt::format("{} cases", asked.cases),
@@ -188,10 +184,7 @@ int fuzz(const FuzzOptions& options) {
         violation, keep(violation, options, harness::choice_for_load(options.backend, load), asked.batch)));
   }
   const json document = campaign_document(options.backend, asked, campaign, violations);
-  if (json_file) {
-    io::write_text(json_file->temporary(), document.dump(1) + "\n");
-    json_file->commit();
-  }
+  write_document(options.json, document);
   return print_conclusion(document, asked.shards == 1);
 }
 
@@ -206,20 +199,13 @@ void add_fuzz(CLI::App& program, Work& work) {
       ->type_name("N")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--seconds", options->seconds, "for how long")->type_name("S")->check(CLI::NonNegativeNumber);
-  command->add_option("--seed", options->seed, "what cases are drawn from")
-      ->capture_default_str()
-      ->type_name("N")
-      ->check(CLI::NonNegativeNumber);
+  add_seed(*command, options->seed, "what cases are drawn from");
   command->add_option("--sizes", options->sizes, "least and greatest size of a case, within 0-110")
       ->capture_default_str()
       ->type_name("A-B");
   command->add_flag("--dynamics", options->dynamics, "bodies move and blades push what they cut");
-  command->add_option("--batch", options->batch, "bodies in one load (default: by backend)")
-      ->type_name("N")
-      ->check(CLI::Range(1, 100'000));
-  command->add_option("--threads", options->threads, "that generate and judge (default: all)")
-      ->type_name("N")
-      ->check(CLI::Range(1, 4096));
+  add_count(*command, "--batch", options->batch, "bodies in one load (default: by backend)", 1, 100'000);
+  add_count(*command, "--threads", options->threads, "that generate and judge (default: all)", 1, 4096);
   command->add_option("--shard", options->shard, "only part i of N of the cases")->type_name("i/N");
   command->add_flag("--keep-going", options->keep_going, "beyond the first violation");
   command->add_option("--save", options->save, "folder for counterexamples")->capture_default_str()->type_name("DIR");

@@ -21,13 +21,14 @@ void add_backend(CLI::App& command, harness::BackendChoice& choice, const std::s
 // For what is timed.
 bool is_timed(const harness::BackendDescriptor& backend);
 
-// --name N, from `least` to `most`.
+// --name N, from `least` to `most`. A default of 0 says that there is none, and is not told.
 template <class Integer>
-CLI::Option* add_count(CLI::App& command, const std::string& name, Integer& value, const std::string& what,
-                       int64_t least, int64_t most) {
+void add_count(CLI::App& command, const std::string& name, Integer& value, const std::string& what, int64_t least,
+               int64_t most) {
   CLI::Option* const option = command.add_option(name, value, what)->type_name("N")->check(CLI::Range(least, most));
-  if constexpr (std::is_integral_v<Integer>) option->capture_default_str();
-  return option;
+  if constexpr (std::is_integral_v<Integer>) {
+    if (value != 0) option->capture_default_str();
+  }
 }
 // --seed N. A negative one would wrap around.
 void add_seed(CLI::App& command, uint64_t& seed, const std::string& what, const std::string& name = "--seed");

@@ -34,16 +34,17 @@ nlohmann::json to_json(const RunResult& result, const harness::SceneJudge* judge
                              {"format_version", 2},
                              {"cutproof", kVersion},
                              {"source", result.source},
-                             {"scene", result.scene},
+                             {"scene", result.scene.name},
                              {"backend", result.backend},
-                             {"seed", result.seed},
+                             {"seed", result.scene.seed},
                              {"body",
-                              {{"name", result.body},
-                               {"spacing", result.spacing},
-                               {"particles", result.particles},
+                              {{"name", result.body.name},
+                               {"spacing", result.body.grid.spacing},
+                               {"particles", result.body.particle_count()},
                                {"clusters", result.clusters_at_start}}}};
   document["frames"] = nlohmann::json::array();
-  for (const harness::FrameResult& frame : result.frames) document["frames"].push_back(to_json(frame, result.timed));
+  const bool timed = result.command == "run";
+  for (const harness::FrameResult& frame : result.frames) document["frames"].push_back(to_json(frame, timed));
   document["checked"] = judge != nullptr;
   if (judge != nullptr) {
     document["verdicts"] = nlohmann::json::array();

@@ -1,6 +1,5 @@
 // --json: the machine's interface; results_schema.md describes every field.
 #pragma once
-#include <array>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -12,17 +11,15 @@
 
 namespace cutproof::cli {
 
+// Refers to the scene and the body, which must outlive it.
 struct RunResult {
-  std::string command;  // "run" or "check"
+  std::string command;  // "run", whose frames were timed, or "check"
   std::string source;   // the scene's or the recording's file name
-  std::string scene;    // the scene's name
   std::string backend;
-  uint64_t seed = 0;
-  std::string body;
-  double spacing = 0;
-  int64_t particles = 0, clusters_at_start = 0;
-  bool timed = false;  // seconds are measured (a recording has none)
-  std::vector<harness::FrameResult> frames;
+  const Scene& scene;
+  const Body& body;
+  int64_t clusters_at_start = 0;
+  std::vector<harness::FrameResult> frames = {};
 };
 
 // `judge` is null if nothing was checked.

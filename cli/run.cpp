@@ -10,6 +10,7 @@
 #include "cli/commands.h"
 #include "cli/errors_report.h"
 #include "cli/options.h"
+#include "cli/output.h"
 #include "cli/results.h"
 #include "cli/terminal.h"
 #include "fixtures/bodies.h"
@@ -19,7 +20,6 @@
 #include "harness/frame_runner.h"
 #include "harness/scene_judge.h"
 #include "model/error.h"
-#include "model/io/atomic_file.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
 #include "model/io/verdict_json.h"
@@ -146,9 +146,7 @@ int run(const RunOptions& options) {
 
   const Scene scene = io::read_scene(options.scene);
   fixtures::Built built = fixtures::build(scene, options.scene, build_options);
-  // Opened before the work, so that a folder that cannot be written to is found out now and not after it.
-  std::optional<io::AtomicFile> json_file;
-  if (!options.json.empty()) json_file.emplace(options.json);
+  require_writable(options.json);
   std::optional<io::Recorder> recorder;
   if (!options.record.empty())
     recorder.emplace(options.record, built.setup, io::write_scene(scene), options.backend.name);
@@ -157,17 +155,7 @@ int run(const RunOptions& options) {
   std::optional<harness::Errors> errors;
   print_header(scene, built, options);
 
-  RunResult result{"run",
-                   options.scene,
-                   scene.name,
-                   options.backend.name,
-                   scene.seed,
-                   built.setup.body.name,
-                   built.setup.body.grid.spacing,
-                   built.setup.body.particle_count(),
-                   built.state.clusters.count(),
-                   true,
-                   {}};
+  RunResult result{"run", options.scene, options.backend.name, scene, built.setup.body, built.state.clusters.count()};
   harness::FrameRunner runner(*backend, {built.setup}, {built.state});
   const auto state = [&]() -> const State& { return *runner.states().front(); };
   if (options.check) judge.emplace(built.setup, scene.expect, options.backend.name, runner.states().front());
@@ -201,17 +189,18 @@ int run(const RunOptions& options) {
     print_verdicts(*judge);
   }
   if (against) print_against(*against);
-  const harness::Lockstep* const implementation = wanted.implementation && against ? &*against->lockstep : nullptr;
+  nlohmann::json errors_document;
   if (errors) {
     errors->finish(state());
-    print_errors(*errors, implementation);
+    errors_document = to_json(*errors, wanted.implementation && against ? &*against->lockstep : nullptr);
+    print_errors(*errors, errors_document);
   }
   if (recorder) {
     recorder->finish();
     const io::RecordingPaths paths = io::recording_paths(options.record);
     fmt::print("recorded {} (for ParaView: {}, {}, {})\n", paths.index, paths.particles, paths.skin, paths.blade);
   }
-  if (json_file) {
+  if (!options.json.empty()) {
     nlohmann::json document = to_json(result, judge ? &*judge : nullptr);
     if (against) {
       document["against"] = to_json(*against, built.setup);
@@ -221,9 +210,8 @@ int run(const RunOptions& options) {
         document["against"]["verdicts"].push_back(io::verdict_json(verdict, false));
       }
     }
-    if (errors) document["errors"] = to_json(*errors, implementation);
-    io::write_text(json_file->temporary(), document.dump(1) + "\n");
-    json_file->commit();
+    if (errors) document["errors"] = errors_document;
+    write_document(options.json, document);
     fmt::print("wrote {}\n", options.json);
   }
   if (!judge && !against) fmt::print("nothing was judged: add --check for that\n");

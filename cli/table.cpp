@@ -51,6 +51,4 @@ std::string table_of(const nlohmann::json& rows, const std::vector<Column>& colu
   return table.text();
 }
 
-void print_filled(const std::string& text, const nlohmann::json& values) { fmt::print("{}", io::filled(text, values)); }
-
 }  // namespace cutproof::cli

@@ -30,7 +30,4 @@ struct Column {
 };
 std::string table_of(const nlohmann::json& rows, const std::vector<Column>& columns);
 
-// Prints io::filled.
-void print_filled(const std::string& text, const nlohmann::json& values);
-
 }  // namespace cutproof::cli

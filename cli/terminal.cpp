@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <vector>
 
+#include "model/io/filled.h"
+
 namespace cutproof::cli {
 
 namespace {
@@ -46,6 +48,8 @@ void Progress::show(int64_t done, const std::string& what) {
   std::fflush(stderr);
   width_ = line.size();
 }
+
+void print_filled(const std::string& text, const nlohmann::json& values) { fmt::print("{}", io::filled(text, values)); }
 
 void print_verdicts(const harness::SceneJudge& judge) {
   std::vector<std::pair<std::string, Row>> rows;  // in order of first appearance

@@ -1,6 +1,7 @@
 // What a person sees: progress on a terminal (silent when piped) and the table of verdicts.
 #pragma once
 #include <cstdint>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "harness/scene_judge.h"
@@ -22,6 +23,9 @@ class Progress {
   std::size_t width_ = 0;
   double last_ = -1;
 };
+
+// Prints io::filled.
+void print_filled(const std::string& text, const nlohmann::json& values);
 
 // One row per property and stage: how often judged, how often it failed, the worst figure beside its bound; then the
 // first failures with their witnesses, and one line that says whether everything holds.

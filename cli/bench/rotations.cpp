@@ -1,7 +1,6 @@
 #include <optional>
 
 #include "cli/bench/suites.h"
-#include "cli/terminal.h"
 
 namespace cutproof::cli {
 
