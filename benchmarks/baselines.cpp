@@ -2,8 +2,12 @@
 
 #include <algorithm>
 
-#include "fixtures/bodies.h"
+#include "benchmarks/paper.h"
+#include "benchmarks/times.h"
 #include "fixtures/build.h"
+#include "harness/errors.h"
+#include "harness/geometry_json.h"
+#include "model/rules.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::benchmarks {
@@ -13,6 +17,8 @@ namespace {
 constexpr Span kWholeFrame = {Stage::step, Stage::skin};
 
 std::size_t at(int64_t index) { return static_cast<std::size_t>(index); }
+
+constexpr const char* kDeletionNames[] = {"none", "particles", "clusters"};
 
 // Frames between two in which interpenetration is measured.
 constexpr int64_t kOverlapEvery = 8;
@@ -37,48 +43,17 @@ const std::vector<Baseline>& baselines() {
 }
 
 BaselineScene make_baseline_scene(const Baseline& baseline, int64_t particles, uint64_t seed) {
-  constexpr double kPush = 0.16;  // [s]
-  Scene scene;
-  scene.name = "baselines";
+  Scene scene = embedded_scene("baselines");
   scene.seed = seed;
-  Shape shape;
-  shape.kind = Shape::Kind::kidney;
-  shape.size = {0.11, 0.06, 0.05};
-  scene.body.shape = shape;
   scene.body.particles = particles;
-  scene.clusters.method = Cooking::sampled;
-  scene.clusters.spacing = 2;
-  scene.clusters.radius = 1.7;
-  scene.step.damping = 5;
   scene.detect.criterion = baseline.criterion;
   scene.merge.rule = baseline.merge;
   scene.expand.rule = baseline.expand;
-  scene.settle = 2 * kPush;
-  BladeSpec blade;
-  blade.length = 0.06;
-  blade.depth = 2;
-  blade.thickness = 0.5;
-  blade.speed = 0.2;
-  StrokeSpec irregular;
-  irregular.points = {{0.2, -0.1, 0.25},  {0.27, 0.45, 0.25}, {0.36, 0.15, 0.25}, {0.4, 0.6, 0.25}, {0.5, 0.3, 0.25},
-                      {0.54, 0.75, 0.25}, {0.64, 0.35, 0.25}, {0.68, 0.8, 0.25},  {0.8, 0.4, 0.25}, {0.82, 0.75, 0.25}};
-  StrokeSpec through;
-  through.points = {{0.57, -0.2, -0.2}, {0.57, 1.2, -0.2}};
-  blade.strokes = {irregular, through};
-  scene.blade = blade;
-  GripSpec left, right;
-  left.high = {0.12, 1, 1};
-  right.low = {0.9, 0, 0};
-  right.high = {1, 1, 1};
-  scene.grips = {left, right};
-
   // The right grip lets go where the push begins, and only the schedule knows when that is.
+  const GripSpec push = scene.grips.back();
+  scene.grips.pop_back();
   fixtures::Built built = fixtures::build(scene, "command line");
-  scene.grips[1].end = built.schedule.time[at(built.setup.stroke_end.back() + 1)];
-  GripSpec push = right;
-  push.after_strokes = true;
-  push.end = kPush;
-  push.velocity = {-0.06, 0, 0};
+  scene.grips.back().end = built.schedule.time[at(built.setup.stroke_end.back() + 1)];
   scene.grips.push_back(push);
   fixtures::resolve_schedule(scene, "command line", {}, built.setup);
   return {std::move(built.setup), std::move(built.state)};
@@ -123,14 +98,17 @@ void delete_from_clusters(const Setup& setup, Deletion deletion, State& state) {
   state.skin = {};
 }
 
-BaselineRow run_baseline(Backend& backend, const Baseline& baseline, BaselineScene scene) {
+nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const BaselineScene& scene) {
   backend.load({scene.setup}, {scene.state});
   const State start = std::move(backend.snapshot().front());
-  BaselineRow row;
-  row.clusters_before = start.clusters.count();
+  const int64_t frames = scene.setup.frame_count();
   std::vector<double> seconds;
+  std::size_t removed = 0;
+  int64_t isolated = 0, unequal_frames = 0;
+  harness::TopologyFigures end;
+  oracles::Interpenetration overlap;  // the greatest of those looked at
   State state = start;
-  for (int64_t frame = 0; frame < scene.setup.frame_count(); ++frame) {
+  for (int64_t frame = 0; frame < frames; ++frame) {
     double spent = 0;
     const auto run = [&](Span span) {
       backend.run(span);
@@ -149,22 +127,37 @@ BaselineRow run_baseline(Backend& backend, const Baseline& baseline, BaselineSce
     }
     seconds.push_back(spent);
     state = std::move(backend.snapshot().front());
-    row.removed += static_cast<int64_t>(state.removed.size() + state.debris.size());
-    const bool last = frame + 1 == scene.setup.frame_count();
+    removed += state.removed.size() + state.debris.size();
+    const bool last = frame + 1 == frames;
     // Where nothing was removed, all is connected and coupled as before.
-    if (frame == 0 || last || !state.removed.empty()) row.end = harness::topology_of(scene.setup, state);
-    row.isolated = std::max(row.isolated, row.end.isolated);
-    row.unequal_frames += !row.end.equal;
+    if (frame == 0 || last || !state.removed.empty()) end = harness::topology_of(scene.setup, state);
+    isolated = std::max(isolated, end.isolated);
+    unequal_frames += !end.equal;
     if (last || frame % kOverlapEvery == 0) {
       const oracles::Interpenetration found = oracles::interpenetration(scene.setup, state);
-      if (found.volume > row.overlap.volume) row.overlap = found;
+      if (found.volume > overlap.volume) overlap = found;
     }
   }
-  row.frame = times_of(std::move(seconds));
-  row.frames = scene.setup.frame_count();
-  row.clusters = state.clusters.count();
-  row.geometry = oracles::cut_geometry(scene.setup, start, state);
-  return row;
+  return {{"name", baseline.name},
+          {"source", baseline.source},
+          {"settings",
+           {{"expand", name_of(baseline.expand)},
+            {"merge", name_of(baseline.merge)},
+            {"detect", name_of(baseline.criterion)},
+            {"deletion", kDeletionNames[static_cast<std::size_t>(baseline.deletion)]}}},
+          {"frames", frames},
+          {"seconds", to_json(times_of(std::move(seconds)))},
+          {"removed", removed},
+          {"clusters_before", start.clusters.count()},
+          {"clusters", state.clusters.count()},
+          {"components", end.components},
+          {"couplings", end.couplings},
+          {"shells", end.shells},
+          {"equal", end.equal},
+          {"unequal_frames", unequal_frames},
+          {"isolated", isolated},
+          {"geometry", harness::to_json(oracles::cut_geometry(scene.setup, start, state))},
+          {"interpenetration", harness::to_json(overlap)}};
 }
 
 }  // namespace cutproof::benchmarks

@@ -1,11 +1,10 @@
 // Other methods of cutting, and how they are compared with this one.
 #pragma once
 #include <cstdint>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
-#include "benchmarks/times.h"
-#include "harness/errors.h"
 #include "model/backend.h"
 #include "model/scene.h"
 
@@ -29,8 +28,7 @@ struct Baseline {
 // This method first.
 const std::vector<Baseline>& baselines();
 
-// A kidney of sampled clusters, held at both ends; a blade goes an irregular way through its upper part, then straight
-// through all of it, and the ends are pushed towards each other. The clusters are cooked with the baseline's rules.
+// The scene baselines.json, its clusters cooked with the baseline's rules.
 struct BaselineScene {
   Setup setup;
   State state;
@@ -42,15 +40,7 @@ BaselineScene make_baseline_scene(const Baseline& baseline, int64_t particles, u
 // to state.removed. The skin is dropped, so that the next skin stage makes it anew. Requires a state after detection.
 void delete_from_clusters(const Setup& setup, Deletion deletion, State& state);
 
-struct BaselineRow {
-  Times frame;  // [s] deletion: of step, detect and skin
-  int64_t frames = 0, removed = 0, clusters_before = 0, clusters = 0;
-  harness::TopologyFigures end;
-  int64_t isolated = 0;        // the most in one frame
-  int64_t unequal_frames = 0;  // in which tissue, coupling and skin do not have the same components
-  oracles::CutGeometry geometry;
-  oracles::Interpenetration overlap;  // the greatest of those looked at
-};
-BaselineRow run_baseline(Backend& backend, const Baseline& baseline, BaselineScene scene);
+// Its row of the document (results_schema.md). Seconds with a deletion: of step, detect and skin.
+nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const BaselineScene& scene);
 
 }  // namespace cutproof::benchmarks

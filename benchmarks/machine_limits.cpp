@@ -30,12 +30,8 @@ MachineLimit copy_on_cpu(int threads, int repeats) {
     from[t].assign(each, 1);
     to[t].assign(each, 0);
   });
-  std::vector<double> seconds;
-  for (int turn = 0; turn < repeats; ++turn) {
-    const auto begin = Clock::now();
-    on_all([&](std::size_t t) { std::memcpy(to[t].data(), from[t].data(), each); });
-    seconds.push_back(seconds_since(begin));
-  }
+  std::vector<double> seconds =
+      seconds_of(repeats, [&] { on_all([&](std::size_t t) { std::memcpy(to[t].data(), from[t].data(), each); }); });
   int64_t lost = 0;
   for (const std::vector<char>& copy : to) lost += static_cast<int64_t>(each) - std::count(copy.begin(), copy.end(), 1);
   return {fmt::format("copy, {} {}", threads, threads == 1 ? "thread" : "threads"), times_of(std::move(seconds)),
@@ -58,12 +54,8 @@ MachineLimit launch_on_host(int threads, int blocks, int repeats) {
     for (int k = 0; k < kLaunches; ++k) launcher.blocks(count_launch_kernel_object{}, blocks, 32, 0, &launches);
   };
   launch_all();
-  std::vector<double> seconds;
-  for (int turn = 0; turn < repeats; ++turn) {
-    const auto begin = Clock::now();
-    launch_all();
-    seconds.push_back(seconds_since(begin) / kLaunches);
-  }
+  std::vector<double> seconds = seconds_of(repeats, launch_all);
+  for (double& of_all : seconds) of_all /= kLaunches;
   return {fmt::format("launch of {} {}", blocks, blocks == 1 ? "block" : "blocks"), times_of(std::move(seconds)), 0,
           int64_t{kLaunches} * (repeats + 1) - launches};
 }

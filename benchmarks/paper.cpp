@@ -51,10 +51,10 @@ Cooking cooking_of(const std::string& name) {
   return Cooking::sampled;
 }
 
-Scene paper_scene(const std::string& file) {
+Scene embedded_scene(const std::string& file) {
   static const std::map<std::string, std::string> texts = {
 #define SCENE(name, text) {name, text},
-#include "benchmarks/paper_scenes.inc"
+#include "benchmarks/embedded_scenes.inc"
 #undef SCENE
   };
   return io::parse_scene(texts.at(file), file + ".json");
@@ -79,7 +79,7 @@ std::pair<int64_t, int64_t> last_stroke(const Setup& setup) {
 BenchScene make_paper_scene(const std::string& file, const std::string& name, int64_t particles, Cooking cooking,
                             int64_t frames) {
   const auto begin = Clock::now();
-  Scene spec = paper_scene(file);
+  Scene spec = embedded_scene(file);
   const bool as_it_is = spec.clusters.method == Cooking::sampled;
   spec.clusters.method = cooking;
   if (cooking == Cooking::sampled) spec.expand.rule = ExpandRule::published;

@@ -50,9 +50,9 @@ inline constexpr double kPaperGrowth = 0.01;
 // `boxes` or `sampled`; throws InputError, naming --clusters, for anything else.
 Cooking cooking_of(const std::string& name);
 
-// A scene of fixtures/scenes by its name without the ending. It is part of the program, which so needs no file. Throws
-// std::out_of_range for a scene that is none of those.
-Scene paper_scene(const std::string& file);
+// A scene that is part of the program, which so needs no file, by the name of its file without the ending
+// (benchmarks/CMakeLists.txt). Throws std::out_of_range for a scene that is none of those.
+Scene embedded_scene(const std::string& file);
 
 // A scene with so many particles. `sampled`: balls that do not cover every edge, with the paper's expansion, which is
 // due in every frame that removes something; as many of them as the paper has clusters, unless the scene says how large

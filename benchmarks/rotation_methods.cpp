@@ -67,11 +67,7 @@ RotationMethod on_cpu(std::string name, bool selectable, const std::shared_ptr<g
       }
     };
     run();
-    for (int turn = 0; turn < repeats; ++turn) {
-      const auto begin = Clock::now();
-      run();
-      timed.seconds.push_back(seconds_since(begin));
-    }
+    timed.seconds = seconds_of(repeats, run);
     timed.answers.r = separated(r);
     return timed;
   };

@@ -42,20 +42,25 @@ void throw_body(SolverScene& scene, double twist, double stretch) {
   }
 }
 
+// One frame of so many substeps in which what is held stays where it is.
+void divide_frame(Setup& setup, int32_t substeps) {
+  setup.step.substeps = substeps;
+  setup.substep_length = {kFrameLength / substeps};
+  for (Grip& grip : setup.grips) {
+    grip.active.assign(static_cast<std::size_t>(substeps), 1);
+    grip.displacement.assign(static_cast<std::size_t>(substeps), {});
+  }
+}
+
 // Nothing but the step, in one frame of one substep.
 void keep_the_step(Setup& setup) {
-  setup.step.substeps = 1;
   setup.step.damping = 0;
   setup.detect.criterion = Criterion::none;
   setup.skin.wanted = false;
   setup.has_blade = false;
   setup.blade_moves.clear();
   setup.stroke_end.clear();
-  setup.substep_length = {kFrameLength};
-  for (Grip& grip : setup.grips) {
-    grip.active = {1};
-    grip.displacement.assign(1, {});
-  }
+  divide_frame(setup, 1);
 }
 
 }  // namespace
@@ -82,12 +87,7 @@ SolverScene make_body_scene(int64_t particles) {
 
 Setup with_substeps(const SolverScene& scene, int32_t substeps) {
   Setup setup = scene.setup;
-  setup.step.substeps = substeps;
-  setup.substep_length = {kFrameLength / substeps};
-  for (Grip& grip : setup.grips) {
-    grip.active.assign(static_cast<std::size_t>(substeps), 1);
-    grip.displacement.assign(static_cast<std::size_t>(substeps), {});
-  }
+  divide_frame(setup, substeps);
   return setup;
 }
 

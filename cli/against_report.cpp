@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -34,13 +33,17 @@ json worst_json(const harness::Lockstep& lockstep) {
 
 namespace {
 
+// [frames] what `value` says of each.
+template <class Frame, class Value>
+json column_of(const std::vector<Frame>& frames, Value value) {
+  json values = json::array();
+  for (const Frame& frame : frames) values.push_back(value(frame));
+  return values;
+}
+
 json lockstep_json(const harness::Lockstep& lockstep) {
   json frames = json::object();
-  const auto column = [&](const std::string& name, auto value) {
-    json values = json::array();
-    for (const LockstepFrame& frame : lockstep.frames()) values.push_back(value(frame));
-    frames[name] = std::move(values);
-  };
+  const auto column = [&](const std::string& name, auto value) { frames[name] = column_of(lockstep.frames(), value); };
   const auto norm = [&](const std::string& name, auto norm_of) {
     column(name + "_max", [&](const LockstepFrame& f) { return json_number(norm_of(f).max); });
     column(name + "_rms", [&](const LockstepFrame& f) { return json_number(norm_of(f).rms()); });
@@ -61,12 +64,10 @@ json lockstep_json(const harness::Lockstep& lockstep) {
 }
 
 json free_running_json(const harness::FreeRunning& run) {
-  json frames = {{"frame", json::array()}, {"position_max", json::array()}, {"position_rms", json::array()}};
-  for (const FreeFrame& frame : run.frames()) {
-    frames["frame"].push_back(frame.frame);
-    frames["position_max"].push_back(json_number(frame.position.max));
-    frames["position_rms"].push_back(json_number(frame.position.rms()));
-  }
+  const auto column = [&](auto value) { return column_of(run.frames(), value); };
+  json frames = {{"frame", column([](const FreeFrame& f) { return f.frame; })},
+                 {"position_max", column([](const FreeFrame& f) { return json_number(f.position.max); })},
+                 {"position_rms", column([](const FreeFrame& f) { return json_number(f.position.rms()); })}};
   json first = nullptr;
   if (const auto& found = run.first_difference()) {
     first = {{"frame", found->frame},
@@ -84,11 +85,9 @@ json free_running_json(const harness::FreeRunning& run) {
 
 void print_lockstep(const harness::Lockstep& lockstep) {
   ErrorNorm angle;
-  std::array<ErrorNorm, 6> errors;
   Undecidable undecidable;
   for (const LockstepFrame& frame : lockstep.frames()) {
     angle.join(frame.angle);
-    for (std::size_t m = 0; m < errors.size(); ++m) errors[m].join(frame.errors[m]);
     undecidable.join(frame.undecidable);
   }
   fmt::print("\nagainst the reference, lockstep, {} frames: errors of one frame\n", lockstep.frames().size());
@@ -96,10 +95,11 @@ void print_lockstep(const harness::Lockstep& lockstep) {
   const auto row = [](std::string_view name, const ErrorNorm& norm, std::string_view unit) {
     if (norm.count > 0) fmt::print("{:<14} {:>11.3g} {:>11.3g} {:<5}\n", name, norm.max, norm.rms(), unit);
   };
-  for (std::size_t m = 0; m < errors.size(); ++m) {
-    const bool rotations = static_cast<Measure>(m) == Measure::rotation;
+  for (std::size_t m = 0; m < oracles::kMeasures.size(); ++m) {
+    const auto measure = static_cast<Measure>(m);
+    const bool rotations = measure == Measure::rotation;
     if (rotations) row(oracles::kMeasures[m].name, angle, "rad");
-    row(rotations ? "" : oracles::kMeasures[m].name, errors[m], oracles::kMeasures[m].unit);
+    row(rotations ? "" : oracles::kMeasures[m].name, lockstep.worst(measure).norm, oracles::kMeasures[m].unit);
   }
   fmt::print("undecidable within rounding, so not measured:\n");
   fmt::print("{:>8} removals within the rounding band\n", undecidable.removals);

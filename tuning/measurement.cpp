@@ -18,7 +18,7 @@ double seconds_per_frame(Backend& backend, const PreparedScene& scene) {
 }  // namespace
 
 std::unique_ptr<Backend> Measuring::backend_for(const Configuration& configuration) const {
-  harness::BackendChoice choice = backend;
+  harness::BackendChoice choice = asked.backend;
   choice.rotation = configuration.rotation;
   return harness::make_backend(choice);
 }
@@ -27,11 +27,11 @@ Trial measure(const Measuring& measuring, const ReferenceSolution& reference, co
               std::optional<double> limit) {
   Trial trial;
   trial.configuration = configuration;
-  const bool is_given = configuration == measuring.given, to_the_end = measuring.full || is_given;
+  const bool is_given = configuration == measuring.given, to_the_end = measuring.asked.full || is_given;
   const std::unique_ptr<Backend> backend = measuring.backend_for(configuration);
   std::optional<PreparedScene> scene;
   try {
-    scene.emplace(configuration.scene, measuring.source, measuring.frames);
+    scene.emplace(configuration.scene, measuring.asked.scene, measuring.asked.frames);
   } catch (const InputError& error) {  // such as a blade that few substeps cannot follow
     if (is_given) throw;
     trial.outcome = Outcome::refused;
@@ -45,7 +45,7 @@ Trial measure(const Measuring& measuring, const ReferenceSolution& reference, co
     trial.why = fmt::format("{} frames, the reference solution has {}", scene->frame_count(), frames);
     if (!to_the_end) return trial;
   }
-  Comparison comparison(scene->setup(), reference.trajectory(), measuring.allowed(reference));
+  Comparison comparison(scene->setup(), reference.trajectory(), measuring.allowed(reference), trial);
   bool given_up = false;
   scene->run(*backend, [&](double seconds) {
     comparison.add(backend->snapshot().front());
@@ -56,7 +56,6 @@ Trial measure(const Measuring& measuring, const ReferenceSolution& reference, co
     if (given_up) trial.outcome = comparison.beyond() ? Outcome::over : Outcome::more_expensive;
     return !given_up;
   });
-  comparison.report(trial);
   if (given_up) {
     trial.why = fmt::format("given up in frame {} of {}", trial.rms_h.size() - 1, frames);
     return trial;
@@ -68,7 +67,8 @@ Trial measure(const Measuring& measuring, const ReferenceSolution& reference, co
   }
   if (trial.outcome == Outcome::within || to_the_end) {
     std::vector<double> samples;
-    for (int repeat = 0; repeat < measuring.repeats; ++repeat) samples.push_back(seconds_per_frame(*backend, *scene));
+    for (int repeat = 0; repeat < measuring.asked.repeats; ++repeat)
+      samples.push_back(seconds_per_frame(*backend, *scene));
     trial.frame = benchmarks::times_of(samples);
   }
   return trial;
@@ -76,11 +76,11 @@ Trial measure(const Measuring& measuring, const ReferenceSolution& reference, co
 
 TimedInTurns time_in_turns(const Measuring& measuring, const Configuration& found) {
   std::vector<double> before, after;
-  for (int repeat = 0; repeat < measuring.repeats; ++repeat) {
+  for (int repeat = 0; repeat < measuring.asked.repeats; ++repeat) {
     for (const bool given : {true, false}) {
       const Configuration& timed = given ? measuring.given : found;
       const std::unique_ptr<Backend> backend = measuring.backend_for(timed);
-      const PreparedScene scene(timed.scene, measuring.source, measuring.frames);
+      const PreparedScene scene(timed.scene, measuring.asked.scene, measuring.asked.frames);
       (given ? before : after).push_back(seconds_per_frame(*backend, scene));
     }
   }

@@ -12,18 +12,25 @@
 
 namespace cutproof::tuning {
 
-// What is measured, and how.
-struct Measuring {
-  std::string source;  // the file of the scene, for messages
+struct TuneOptions {
+  std::string scene;  // its file
+  std::string write;  // where the scene that is found is written
   harness::BackendChoice backend;
+  double tolerance = 0;                            // [h]
+  ReferenceKind reference = ReferenceKind::limit;  // what errors are distances from
+  std::optional<int64_t> frames;                   // looks at so many of the scene's only
+  bool without_skin = false;                       // nobody looks at it
+  bool full = false;                               // nothing is given up: errors and times of all that is tried
+  int repeats = 3;                                 // timed runs of a configuration
+};
+
+// What is measured, and how. `asked` must outlive it.
+struct Measuring {
+  const TuneOptions& asked;
   Configuration given;
-  std::optional<int64_t> frames;  // at most so many of the scene's
-  double tolerance = 0;           // [h]
-  bool full = false;              // nothing is given up
-  int repeats = 3;                // timed runs of a configuration
 
   // What is left of the tolerance where the reference solution is not known better.
-  double allowed(const ReferenceSolution& reference) const { return tolerance - reference.known_to_h(); }
+  double allowed(const ReferenceSolution& reference) const { return asked.tolerance - reference.known_to_h(); }
   std::unique_ptr<Backend> backend_for(const Configuration& configuration) const;
 };
 

@@ -30,9 +30,7 @@ const std::vector<std::string>& sound_rotations() {
 
 // Whatever is wrong with the choice of a backend, or with the scene, is found out here.
 Measuring prepare(const TuneOptions& options) {
-  Measuring measuring{options.scene,  options.backend,   {io::read_scene(options.scene), ""},
-                      options.frames, options.tolerance, options.full,
-                      options.repeats};
+  Measuring measuring{options, {io::read_scene(options.scene), ""}};
   const Scene& scene = measuring.given.scene;
   if (scene.step.solver != Solver::implicit) {
     throw InputError(options.scene, "step.solver",
@@ -85,7 +83,7 @@ std::optional<Found> take_cheapest(const Measuring& measuring, const ReferenceSo
                                    const std::function<void(std::size_t, const std::string&)>& leave) {
   const auto verified = [&](std::size_t index) {
     const Configuration& configuration = trials[index].configuration;
-    Found found{index, tuned_scene_text(configuration, measuring.source, path), {}, {}};
+    Found found{index, tuned_scene_text(configuration, measuring.asked.scene, path), {}, {}};
     found.verified = verify(measuring, reference, configuration, found.text, path);
     return found;
   };

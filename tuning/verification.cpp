@@ -17,25 +17,24 @@ Verified verify(const Measuring& measuring, const ReferenceSolution& reference, 
   verified.trial.configuration = configuration;
   const Scene scene = io::parse_scene(text, path);
   const std::unique_ptr<Backend> backend = measuring.backend_for(configuration);
-  const PreparedScene prepared(scene, path, measuring.frames);
+  const PreparedScene prepared(scene, path, measuring.asked.frames);
   harness::FrameRunner runner(*backend, {prepared.setup()}, {prepared.start()});
   // What a scene expects is of all of it; but isolation that it expects fails no verdict in a part of it either.
   Expectations expected = scene.expect;
-  if (measuring.frames) {
+  if (measuring.asked.frames) {
     expected = {};
     if (scene.expect.isolated_clusters && scene.expect.isolated_clusters->low >= 1) {
       expected.isolated_clusters = scene.expect.isolated_clusters;
     }
   }
-  harness::SceneJudge judge(prepared.setup(), expected, measuring.backend.name, runner.states().front());
-  Comparison comparison(prepared.setup(), reference.trajectory(), measuring.allowed(reference));
+  harness::SceneJudge judge(prepared.setup(), expected, measuring.asked.backend.name, runner.states().front());
+  Comparison comparison(prepared.setup(), reference.trajectory(), measuring.allowed(reference), verified.trial);
   for (int64_t frame = 0; frame < prepared.frame_count(); ++frame) {
     prepared.for_parts_of(frame, [&] { runner.run_frame([&](const harness::Moment& moment) { judge.see(moment); }); });
     comparison.add(*runner.states().front());
   }
   for (Verdict& verdict : runner.take_broken_contracts()) judge.add(std::move(verdict));
   judge.finish();
-  comparison.report(verified.trial);
   comparison.trajectory().stroke_end = prepared.stroke_end();
   verified.verdicts = static_cast<int64_t>(judge.verdicts().size());
   const Trajectory& wanted = reference.trajectory();

@@ -27,7 +27,7 @@ double change(const std::vector<int64_t>& clusters, int64_t to) {
 // Every frame is timed as a whole and then judged: its topology has to be right whatever the number of clusters is.
 // Without a τ nothing is merged.
 json run_cut(const Contender& contender, std::optional<double> tau, int64_t particles) {
-  Scene scene = paper_scene(kScene);
+  Scene scene = embedded_scene(kScene);
   if (tau) {
     scene.clusters.small = *tau;
   } else {
