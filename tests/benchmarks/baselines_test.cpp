@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "harness/errors.h"
 #include "oracles/oracles.h"
 #include "tests/cli/program.h"
 #include "tests/oracles/states.h"

@@ -315,6 +315,24 @@ TEST_F(Program, TellsItsVersionBackendsAndSceneFields) {
   }
 }
 
+TEST_F(Program, ListsEveryPropertyThatARunIsJudgedByWithItsSourceAndWhenItApplies) {
+  write("cut.json", small_block().dump());
+  ASSERT_EQ(cutproof("run cut.json --check --json out.json").status, 0);
+  const std::string listed = cutproof("info").output;
+  for (const json& verdict : json::parse(read("out.json")).at("verdicts")) {
+    const auto property = verdict.at("property").get<std::string>();
+    if (property.starts_with("expected ")) continue;  // by the scene
+    EXPECT_NE(listed.find("\n  " + property + " "), std::string::npos) << property;
+  }
+  for (const char* line :
+       {"  cluster connectivity  method.md §2, I1\n",
+        "  not between detection and split; rests on alive, offsets, members\n",
+        "  motion                method.md §3; tolerances.md, Motion\n", "  after step; rests on the whole state\n",
+        "  skin geometry         method.md §8, lemma;"}) {
+    EXPECT_NE(listed.find(line), std::string::npos) << line << listed;
+  }
+}
+
 TEST_F(Program, LetsTheRestOfTheKidneyEndWithTheSameBitsWhetherOrNotThePieceIsPulledAway) {
   std::ifstream file(scene("kidney_discontinuous"));
   json pulled = json::parse(file);
