@@ -84,20 +84,19 @@ bool within_pattern(const cholmod_sparse& before, const cholmod_sparse& after) {
   return true;
 }
 
-void update_by_rank_one(const SystemChange& change, const SystemDifferences& found, cholmod_factor* factor,
-                        Cholmod& cholmod) {
+void update_by_rank_one(const SystemChange& change, cholmod_factor* factor, Cholmod& cholmod) {
   const std::vector<int32_t> place = places_in(*factor);
   // Rank-one terms C C', a column C for each.
   std::vector<Eigen::Triplet<double>> up, down;
   int ups = 0, downs = 0;
-  for (const auto& [clusters, weight] : found.shared) {
+  for (const auto& [clusters, weight] : change.shared) {
     // B has −weight u u'.
     const int column = weight < 0 ? ups++ : downs++;
     for (const int32_t r : clusters) {
       (weight < 0 ? up : down).emplace_back(place[at(r)], column, std::sqrt(std::abs(weight)));
     }
   }
-  for (const auto& [r, mass] : found.mass) {
+  for (const auto& [r, mass] : change.mass) {
     const int column = mass > 0 ? ups++ : downs++;
     (mass > 0 ? up : down).emplace_back(place[at(r)], column, std::sqrt(std::abs(mass)));
   }
@@ -175,7 +174,6 @@ double residual_of(const ClusterSystem& system, const std::vector<double>& right
 std::optional<Factorised> factorise(const SystemChange& change, Way way, const std::vector<double>& right) {
   Cholmod cholmod;
   const Sparse before = matrix_of(change.before, cholmod), after = matrix_of(change.after, cholmod);
-  const SystemDifferences found = differences(change);
   const Sparse both_triangles(cholmod_copy(after.get(), 0, 1, cholmod.get()), cholmod);
   const Factor analysed(cholmod_analyze(before.get(), cholmod.get()), cholmod);
   const auto analyse_in_order = [&](const Sparse& matrix, bool postorder) {
@@ -216,7 +214,7 @@ std::optional<Factorised> factorise(const SystemChange& change, Way way, const s
       numerically(before);
       begin = Clock::now();
       if (way == Way::updown) {
-        update_by_rank_one(change, found, factor->get(), cholmod);
+        update_by_rank_one(change, factor->get(), cholmod);
       } else {
         replace_rows(change, both_triangles, factor->get(), cholmod);
       }
@@ -243,15 +241,14 @@ double residual_bound(const SystemChange& change, Way way) {
   if (way == Way::updown) {
     std::vector<double> sums = row_sums(change.before);
     double steps = 0;
-    const SystemDifferences found = differences(change);
-    for (const auto& [clusters, weight] : found.shared) {
+    for (const auto& [clusters, weight] : change.shared) {
       ++steps;
       for (const int32_t r : clusters) {
         if (weight < 0) sums[at(r)] -= weight * static_cast<double>(clusters.size());
         if (weight > 0) steps += weight * amplified / change.after.mass[at(r)];
       }
     }
-    for (const auto& [r, mass] : found.mass) {
+    for (const auto& [r, mass] : change.mass) {
       ++steps;
       if (mass > 0) sums[at(r)] += mass;
       if (mass < 0) steps += -mass * amplified / change.after.mass[at(r)];

@@ -54,10 +54,14 @@ const harness::BackendDescriptor& require_timed_backend(const std::string& backe
   const harness::BackendDescriptor& found = harness::described_backend(backend);
   require_option(found.is_timed, "--backend", fmt::format("'{}' is for finding faults, not for timing", backend),
                  fmt::format("use one of {}", harness::backend_names([](const auto& b) { return b.is_timed; })));
+  static_cast<void>(make_timed_backend(backend));
+  return found;
+}
+
+std::unique_ptr<Backend> make_timed_backend(const std::string& backend) {
   harness::BackendChoice choice;
   choice.name = backend;
-  static_cast<void>(harness::make_backend(choice));
-  return found;
+  return harness::make_backend(choice);
 }
 
 void require_option(bool fine, const std::string& option, const std::string& problem, const std::string& remedy) {

@@ -1,6 +1,7 @@
 // The document that a suite of `bench`, or `tune`, leaves: results_schema.md says what each field means.
 #pragma once
 #include <functional>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -37,6 +38,8 @@ class Report {
 // Refuses what cannot be timed: throws InputError for a backend that does not exist, is not in this build or is for
 // finding faults, MachineError if there is no device.
 const harness::BackendDescriptor& require_timed_backend(const std::string& backend);
+// One that is not refused.
+std::unique_ptr<Backend> make_timed_backend(const std::string& backend);
 
 // Throws InputError for an option of the command line unless `fine`.
 void require_option(bool fine, const std::string& option, const std::string& problem, const std::string& remedy);

@@ -23,34 +23,46 @@ Times per_million(const RotationMethod& method, const fixtures::Frame& frame, in
 }
 
 void sum_up(RotationResult& result) {
+  fixtures::Judged& all = result.all;
   for (const RotationCaseResult& entry : result.cases) {
     const fixtures::Judged& judged = entry.judged;
-    result.answers += judged.answers;
-    result.wrong += judged.wrong;
-    result.not_finite += judged.not_finite;
-    result.flagged += judged.flagged;
-    result.worst_orthogonality = std::max(result.worst_orthogonality, judged.worst_orthogonality);
-    result.worst_deviation = std::max(result.worst_deviation, judged.worst_deviation);
-    if (judged.worst_gap && (result.worst_case.empty() || *judged.worst_gap > result.worst_gap)) {
-      result.worst_gap = *judged.worst_gap;
+    all.answers += judged.answers;
+    all.wrong += judged.wrong;
+    all.not_finite += judged.not_finite;
+    all.flagged += judged.flagged;
+    all.worst_orthogonality = std::max(all.worst_orthogonality, judged.worst_orthogonality);
+    all.worst_deviation = std::max(all.worst_deviation, judged.worst_deviation);
+    if (judged.worst_gap > all.worst_gap) {  // an absent one is less than any
+      all.worst_gap = judged.worst_gap;
       result.worst_case = entry.name;
     }
   }
 }
 
-json to_json(const std::optional<double>& value) { return value ? json_number(*value) : json(nullptr); }
+// What a method's sums and each of its cases have in common.
+json row_of(const RotationResult& result, const fixtures::Judged& judged) {
+  return {{"method", result.method},
+          {"precision", name_of(result.precision)},
+          {"answers", judged.answers},
+          {"wrong", judged.wrong},
+          {"not_finite", judged.not_finite},
+          {"flagged", judged.flagged},
+          {"worst_gap", json_number(judged.worst_gap)},
+          {"worst_orthogonality", json_number(judged.worst_orthogonality)},
+          {"worst_deviation", json_number(judged.worst_deviation)}};
+}
 
 }  // namespace
 
 bool RotationReport::default_holds() const {
   return std::any_of(results.begin(), results.end(), [](const auto& r) { return r.is_default; }) &&
-         std::all_of(results.begin(), results.end(), [](const auto& r) { return !r.is_default || r.wrong == 0; });
+         std::all_of(results.begin(), results.end(), [](const auto& r) { return !r.is_default || r.all.wrong == 0; });
 }
 
 void mark_front(std::vector<RotationResult>& results) {
   // A method with answers that are not finite has no worst gap.
   const auto gap = [](const RotationResult& r) {
-    return r.not_finite > 0 ? std::numeric_limits<double>::infinity() : r.worst_gap;
+    return r.all.not_finite > 0 ? std::numeric_limits<double>::infinity() : r.all.worst_gap.value_or(0);
   };
   for (RotationResult& one : results) {
     one.on_front = std::none_of(results.begin(), results.end(), [&](const RotationResult& other) {
@@ -126,37 +138,20 @@ json to_json(const RotationReport& report) {
   document["methods"] = json::array();
   document["rows"] = json::array();
   for (const RotationResult& r : report.results) {
-    document["methods"].push_back({{"method", r.method},
-                                   {"precision", name_of(r.precision)},
-                                   {"selectable", r.selectable},
-                                   {"default", r.is_default},
-                                   {"on_front", r.on_front},
-                                   {"answers", r.answers},
-                                   {"wrong", r.wrong},
-                                   {"not_finite", r.not_finite},
-                                   {"flagged", r.flagged},
-                                   {"worst_gap", json_number(r.worst_gap)},
-                                   {"worst_case", r.worst_case},
-                                   {"worst_orthogonality", json_number(r.worst_orthogonality)},
-                                   {"worst_deviation", json_number(r.worst_deviation)},
-                                   {"near_seconds_per_million", to_json(r.near)},
-                                   {"cold_seconds_per_million", to_json(r.cold)},
-                                   {"limit_seconds_per_million", r.limit},
-                                   {"multiple_of_limit", r.near.median / r.limit}});
-    for (const RotationCaseResult& entry : r.cases) {
-      const fixtures::Judged& judged = entry.judged;
-      json row = {{"method", r.method},
-                  {"precision", name_of(r.precision)},
-                  {"case", entry.name},
-                  {"answers", judged.answers},
-                  {"wrong", judged.wrong},
-                  {"not_finite", judged.not_finite},
-                  {"reflections", judged.reflections},
-                  {"flagged", judged.flagged},
-                  {"worst_gap", to_json(judged.worst_gap)},
-                  {"median_gap", to_json(judged.median_gap)},
-                  {"worst_orthogonality", json_number(judged.worst_orthogonality)},
-                  {"worst_deviation", json_number(judged.worst_deviation)}};
+    json method = row_of(r, r.all);
+    method.update({{"selectable", r.selectable},
+                   {"default", r.is_default},
+                   {"on_front", r.on_front},
+                   {"worst_gap", json_number(r.all.worst_gap.value_or(0))},
+                   {"worst_case", r.worst_case},
+                   {"near_seconds_per_million", to_json(r.near)},
+                   {"cold_seconds_per_million", to_json(r.cold)},
+                   {"limit_seconds_per_million", r.limit},
+                   {"multiple_of_limit", r.near.median / r.limit}});
+    document["methods"].push_back(std::move(method));
+    for (const auto& [name, judged] : r.cases) {
+      json row = row_of(r, judged);
+      row.update({{"case", name}, {"reflections", judged.reflections}, {"median_gap", json_number(judged.median_gap)}});
       if (judged.wrong > 0) row["first_wrong"] = judged.first_wrong;
       document["rows"].push_back(std::move(row));
     }

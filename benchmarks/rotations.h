@@ -25,10 +25,8 @@ struct RotationResult {
   Times near, cold;        // [s] per million matrices
   double limit = 0;        // [s] per million matrices: bytes / copy bandwidth
   bool on_front = false;   // no other of its precision is at least as exact and as fast, and better in one of both
-  double worst_gap = 0;    // over all cases
-  std::string worst_case;  // where that is
-  double worst_orthogonality = 0, worst_deviation = 0;
-  int64_t answers = 0, wrong = 0, not_finite = 0, flagged = 0;
+  fixtures::Judged all;    // over all cases: sums, and the worst
+  std::string worst_case;  // where its worst gap is
 };
 
 struct RotationCounts {

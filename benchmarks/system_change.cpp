@@ -77,29 +77,32 @@ ClusterSystem in_rows(const ClusterSystem& system, const std::vector<int32_t>& r
   return result;
 }
 
-}  // namespace
-
-SystemDifferences differences(const SystemChange& change) {
+// Notes by how much the two systems differ, and the rows of which an entry does.
+void compare(SystemChange& change) {
   // Sums of the same terms in another order are not a difference.
   constexpr double kSame = 1e-12;
   std::map<std::vector<int32_t>, std::pair<double, double>> weights;
   for (const auto& [clusters, weight] : change.before.shared) weights[clusters].first = weight;
   for (const auto& [clusters, weight] : change.after.shared) weights[clusters].second = weight;
-  SystemDifferences found;
+  std::vector<uint8_t> differs(change.origin.size(), 0);
   for (const auto& [clusters, weight] : weights) {
     const double difference = weight.second - weight.first;
     if (std::abs(difference) > kSame * std::max(weight.first, weight.second)) {
-      found.shared.push_back({clusters, difference});
+      change.shared.push_back({clusters, difference});
+      for (const int32_t r : clusters) differs[at(r)] = 1;
     }
   }
   for (std::size_t r = 0; r < change.before.mass.size(); ++r) {
     const double difference = change.after.mass[r] - change.before.mass[r];
     if (std::abs(difference) > kSame * change.before.mass[r]) {
-      found.mass.emplace_back(static_cast<int32_t>(r), difference);
+      change.mass.emplace_back(static_cast<int32_t>(r), difference);
+      differs[r] = 1;
     }
+    if (differs[r]) change.changed.push_back(static_cast<int32_t>(r));
   }
-  return found;
 }
+
+}  // namespace
 
 SystemChange change_of(const Body& body, const State& before, const State& after, double s) {
   const std::vector<uint8_t> fixed(body.node.size(), 0);
@@ -115,15 +118,7 @@ SystemChange change_of(const Body& body, const State& before, const State& after
   change.before = in_rows(first, kept, rows, mean);
   change.after = in_rows(second, row, rows, mean);
   change.new_rows = static_cast<int32_t>(rows - first.mass.size());
-  const SystemDifferences found = differences(change);
-  std::vector<uint8_t> differs(rows, 0);
-  for (const auto& [clusters, weight] : found.shared) {
-    for (const int32_t r : clusters) differs[at(r)] = 1;
-  }
-  for (const auto& [r, mass] : found.mass) differs[at(r)] = 1;
-  for (std::size_t r = 0; r < rows; ++r) {
-    if (differs[r]) change.changed.push_back(static_cast<int32_t>(r));
-  }
+  compare(change);
   return change;
 }
 

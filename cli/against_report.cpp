@@ -75,10 +75,9 @@ json free_running_json(const harness::FreeRunning& run) {
              {"text", found->what.text},
              {"particles", found->what.particles},
              {"clusters", found->what.clusters},
-             {"margin", nullptr},
+             {"margin", json_number(found->margin)},
              {"reach", json_number(found->reach)},
              {"explained", found->explained}};
-    if (found->margin) first["margin"] = json_number(*found->margin);
   }
   return {{"frames", std::move(frames)}, {"first_difference", std::move(first)}};
 }

@@ -66,8 +66,10 @@ void add_suite(CLI::App& command, Work& work, const std::string& what, Suite sui
 
 void add_timing(CLI::App& command, benchmarks::TimingOptions& options) {
   add_backend_name(command, options.backend, "backend under test", is_timed);
-  add_count(command, "--frames", options.frames, "timed frames of each repeat (default: by backend)", 1, 10'000);
-  add_count(command, "--repeats", options.repeats, "how often they are timed, each time after a warm-up", 1, 1'000);
+  add_count(command, "--frames", options.frames, "timed frames of each repeat (default: by backend)",
+            CLI::Range(1, 10'000));
+  add_count(command, "--repeats", options.repeats, "how often they are timed, each time after a warm-up",
+            CLI::Range(1, 1'000));
   command.add_option("--split", options.split, "kernels: how clusters are split, blocks, global or both")
       ->type_name("M");
   command.add_option("--rotation", options.rotation, "kernels: how rotations are found")->type_name("M");

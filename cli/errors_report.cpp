@@ -24,8 +24,6 @@ namespace {
 
 using nlohmann::json;
 
-json number_or_null(const std::optional<double>& value) { return value ? json_number(*value) : json(nullptr); }
-
 // Frames of the lookup table: name on the command line, member, in the order of measuring.md, Errors.
 struct Kind {
   const char* name;
@@ -78,7 +76,7 @@ json to_json(const Errors& errors, const harness::Lockstep* lockstep) {
       frames.push_back({{"frame", frame},
                         {"max", json_number(error.position.max)},
                         {"rms", json_number(error.position.rms())},
-                        {"energy", number_or_null(error.energy)},
+                        {"energy", json_number(error.energy)},
                         {"by_energy", error.by_energy},
                         {"converged", error.converged}});
       all.join(error.position);
@@ -126,7 +124,7 @@ json to_json(const Errors& errors, const harness::Lockstep* lockstep) {
                                 {"momentum_relative", json_number(c.momentum_relative)},
                                 {"momentum_bound", c.momentum_bound},
                                 {"mass", json_number(c.mass)},
-                                {"energy", number_or_null(c.energy)},
+                                {"energy", json_number(c.energy)},
                                 {"energy_bound", c.energy_bound},
                                 {"angular_momentum", json_number(c.angular_momentum)},
                                 {"holds", errors.holds()}};

@@ -29,16 +29,13 @@ using nlohmann::json;
 
 struct FuzzOptions {
   BackendChoice backend = {.name = harness::kHostName, .split = {}, .rotation = {}};
-  std::optional<int64_t> cases;  // default: 1000, or as many as `seconds` allow
-  std::optional<double> seconds;
-  uint64_t seed = 1;
-  std::string sizes = "0-79";  // of cases, which take turns: 0 is nothing, 100 up to about 20,000 particles
-  bool dynamics = false;
-  int batch = 0;      // bodies in one load; 0: by backend
-  int threads = 0;    // 0: as many as the machine has
-  std::string shard;  // "i/N"; empty: all
-  bool keep_going = false;
-  std::string save = ".";  // the folder for counterexamples
+  CampaignOptions campaign;
+  std::optional<int64_t> cases;  // default: 1000, or as many as its `seconds` allow
+  std::string sizes = "0-79";    // of cases, which take turns: 0 is nothing, 100 up to about 20,000 particles
+  int batch = 0;                 // bodies in one load; 0: by backend
+  int threads = 0;               // 0: as many as the machine has
+  std::string shard;             // "i/N"; empty: all
+  std::string save = ".";        // the folder for counterexamples
   std::string json;
   std::vector<std::string> merge;  // results of shards, to be put together; nothing is run
 };
@@ -59,22 +56,18 @@ std::pair<int64_t, int64_t> two_numbers(const std::string& text, char separator,
 
 CampaignOptions campaign_options(const FuzzOptions& options) {
   const harness::BackendDescriptor& backend = harness::described_backend(options.backend.name);
-  CampaignOptions campaign;
-  campaign.seed = options.seed;
-  campaign.seconds = options.seconds;
-  campaign.cases = options.cases.value_or(options.seconds ? std::numeric_limits<int64_t>::max() / 2 : 1000);
+  CampaignOptions campaign = options.campaign;
+  campaign.cases = options.cases.value_or(campaign.seconds ? std::numeric_limits<int64_t>::max() / 2 : 1000);
   const std::string sizes_remedy =
       fmt::format("give the least and the greatest size, such as 0-79; sizes go from 0 to {}", kMostSize);
   const auto [least, most] = two_numbers(options.sizes, '-', "--sizes", sizes_remedy);
   if (least > most || most > kMostSize) refuse("--sizes", fmt::format("'{}' is no range", options.sizes), sizes_remedy);
   campaign.least_size = static_cast<int>(least);
   campaign.most_size = static_cast<int>(most);
-  campaign.dynamics = options.dynamics;
   campaign.batch = options.batch > 0 ? options.batch : backend.bodies_in_a_load;
   campaign.threads = options.threads > 0 ? options.threads : harness::cpu_threads();
   campaign.backends =
       backend.most_parallel_loads > 0 ? std::min(campaign.threads, backend.most_parallel_loads) : campaign.threads;
-  campaign.keep_going = options.keep_going;
   if (!options.shard.empty()) {
     const std::string remedy = "give i/N with i from 1 to N, such as 2/8";
     const auto [shard, shards] = two_numbers(options.shard, '/', "--shard", remedy);
@@ -122,11 +115,11 @@ std::string keep(const Violation& violation, const FuzzOptions& options, const B
   fmt::print("case {} FAILS: {}\n", violation.index, describe(violation.verdict));
   flush_output();
   Simplified simplified = simplify(violation, choice);
-  simplified.counterexample.seed = options.seed;
+  simplified.counterexample.seed = options.campaign.seed;
   const Counterexample& found = simplified.counterexample;
-  const std::string stem =
-      (std::filesystem::path(options.save) / fmt::format("{}_{}_{}", choice.name, options.seed, violation.index))
-          .string();
+  const std::string stem = (std::filesystem::path(options.save) /
+                            fmt::format("{}_{}_{}", choice.name, options.campaign.seed, violation.index))
+                               .string();
   const std::string file = stem + ".json";
   io::write_text(file, to_json(found) + "\n");
   if (simplified.alone) {
@@ -140,7 +133,7 @@ std::string keep(const Violation& violation, const FuzzOptions& options, const B
     fmt::print("{}\n", problem.empty() ? "recorded " + io::recording_paths(stem).index : "not recorded: " + problem);
   } else {
     fmt::print("alone it does not fail, only with the other bodies of its load: fuzz again with --seed {} --batch {}\n",
-               options.seed, batch);
+               options.campaign.seed, batch);
   }
   fmt::print("saved; to see it again: cutproof replay {}\n", file);
   return file;
@@ -151,7 +144,7 @@ Campaign run(const FuzzOptions& options, const CampaignOptions& asked) {
       [&](int64_t load) { return harness::make_backend(harness::choice_for_load(options.backend, load)); },
       harness::described_backend(options.backend.name).takes_schedule};
   const int64_t of_this_shard = (asked.cases - asked.shard + asked.shards - 1) / asked.shards;
-  Progress progress("case", options.seconds ? 0 : of_this_shard);
+  Progress progress("case", options.campaign.seconds ? 0 : of_this_shard);
   return run_campaign(asked, source, [&](const Campaign& so_far) {
     const auto classes = std::count_if(so_far.coverage.begin(), so_far.coverage.end(), [](int64_t n) { return n > 0; });
     progress.show(so_far.cases, fmt::format("{:.0f} cases/s, {} of {} classes met, {} violations",
@@ -171,7 +164,8 @@ int fuzz(const FuzzOptions& options) {
   require_writable(options.json);
 
   fmt::print("fuzzing backend {}: {}{} from seed {}{}, {} bodies a load, {} threads\n", options.backend.name,
-             options.seconds ? fmt::format("{:g} s of cases", *options.seconds) : fmt::format("{} cases", asked.cases),
+             options.campaign.seconds ? fmt::format("{:g} s of cases", *options.campaign.seconds)
+                                      : fmt::format("{} cases", asked.cases),
              asked.dynamics ? " with dynamics" : "", asked.seed,
              asked.shards > 1 ? fmt::format(", shard {} of {}", asked.shard + 1, asked.shards) : "", asked.batch,
              asked.threads);
@@ -195,19 +189,19 @@ void add_fuzz(CLI::App& program, Work& work) {
   CLI::App* const command =
       program.add_subcommand("fuzz", "random dissections until one is wrong, and that one simplified");
   add_backend(*command, options->backend, "backend under test");
-  command->add_option("--cases", options->cases, "how many (default: 1000)")
-      ->type_name("N")
+  add_count(*command, "--cases", options->cases, "how many (default: 1000)", CLI::NonNegativeNumber);
+  command->add_option("--seconds", options->campaign.seconds, "for how long")
+      ->type_name("S")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--seconds", options->seconds, "for how long")->type_name("S")->check(CLI::NonNegativeNumber);
-  add_seed(*command, options->seed, "what cases are drawn from");
+  add_seed(*command, options->campaign.seed, "what cases are drawn from");
   command->add_option("--sizes", options->sizes, "least and greatest size of a case, within 0-110")
       ->capture_default_str()
       ->type_name("A-B");
-  command->add_flag("--dynamics", options->dynamics, "bodies move and blades push what they cut");
-  add_count(*command, "--batch", options->batch, "bodies in one load (default: by backend)", 1, 100'000);
-  add_count(*command, "--threads", options->threads, "that generate and judge (default: all)", 1, 4096);
+  command->add_flag("--dynamics", options->campaign.dynamics, "bodies move and blades push what they cut");
+  add_count(*command, "--batch", options->batch, "bodies in one load (default: by backend)", CLI::Range(1, 100'000));
+  add_count(*command, "--threads", options->threads, "that generate and judge (default: all)", CLI::Range(1, 4096));
   command->add_option("--shard", options->shard, "only part i of N of the cases")->type_name("i/N");
-  command->add_flag("--keep-going", options->keep_going, "beyond the first violation");
+  command->add_flag("--keep-going", options->campaign.keep_going, "beyond the first violation");
   command->add_option("--save", options->save, "folder for counterexamples")->capture_default_str()->type_name("DIR");
   add_json(*command, options->json, "write counts, classes and violations");
   command->add_option("--merge", options->merge, "put the results of all shards together; runs nothing")

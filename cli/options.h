@@ -21,11 +21,11 @@ void add_backend(CLI::App& command, harness::BackendChoice& choice, const std::s
 // For what is timed.
 bool is_timed(const harness::BackendDescriptor& backend);
 
-// --name N, from `least` to `most`. A default of 0 says that there is none, and is not told.
+// --name N. A default of 0 says that there is none, and is not told.
 template <class Integer>
-void add_count(CLI::App& command, const std::string& name, Integer& value, const std::string& what, int64_t least,
-               int64_t most) {
-  CLI::Option* const option = command.add_option(name, value, what)->type_name("N")->check(CLI::Range(least, most));
+void add_count(CLI::App& command, const std::string& name, Integer& value, const std::string& what,
+               const CLI::Validator& allowed) {
+  CLI::Option* const option = command.add_option(name, value, what)->type_name("N")->check(allowed);
   if constexpr (std::is_integral_v<Integer>) {
     if (value != 0) option->capture_default_str();
   }

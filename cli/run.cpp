@@ -19,7 +19,6 @@
 #include "harness/backends.h"
 #include "harness/frame_runner.h"
 #include "harness/scene_judge.h"
-#include "model/error.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
 #include "model/io/verdict_json.h"
@@ -33,10 +32,9 @@ namespace {
 struct RunOptions {
   std::string scene;
   harness::BackendChoice backend;
-  std::string mesh;                  // takes the place of the scene's body
-  std::string unit = "mm";           // of the mesh's numbers
-  std::optional<int64_t> particles;  // wanted count
-  std::optional<int64_t> frames;     // at most this many of the scene's frames
+  fixtures::BuildOptions build;  // but for its mesh
+  std::string mesh;              // takes the place of the scene's body
+  std::string unit = "mm";       // of the mesh's numbers
   bool check = false;
   std::string against;        // "" or the reference
   std::string mode = "both";  // of the comparison: lockstep, free-running, both
@@ -59,9 +57,7 @@ constexpr const char* kNextSteps =
 double metres_per(const std::string& unit) {
   static const std::map<std::string, double> kUnits = {{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}};
   const auto found = kUnits.find(unit);
-  if (found == kUnits.end()) {
-    throw InputError("command line", "--unit", fmt::format("'{}' is not a unit", unit), "use mm, cm or m");
-  }
+  if (found == kUnits.end()) refuse("--unit", fmt::format("'{}' is not a unit", unit), "use mm, cm or m");
   return found->second;
 }
 
@@ -71,8 +67,8 @@ using harness::AgainstMode;
 AgainstMode against_mode(const RunOptions& options) {
   const harness::BackendDescriptor* const other = harness::find_backend(options.against);
   if (other == nullptr || !other->is_the_reference) {
-    throw InputError("command line", "--against", fmt::format("'{}' is nothing to compare with", options.against),
-                     fmt::format("use --against {}", harness::reference_backend().name));
+    refuse("--against", fmt::format("'{}' is nothing to compare with", options.against),
+           fmt::format("use --against {}", harness::reference_backend().name));
   }
   return options.mode == "lockstep"       ? AgainstMode::lockstep
          : options.mode == "free-running" ? AgainstMode::free_running
@@ -126,8 +122,8 @@ void print_summary(const RunResult& result) {
 void compare(Against& against, const Setup& setup, const harness::Moment& moment, const std::array<bool, 6>& ran) {
   const auto due = harness::due_stages(setup, *moment.before, moment.span, *moment.after);
   if (std::count(due.begin(), due.end(), true) > 1) {
-    throw InputError("command line", "--against", "this backend runs several stages in one piece",
-                     "choose one that runs them one by one, or leave --against out");
+    refuse("--against", "this backend runs several stages in one piece",
+           "choose one that runs them one by one, or leave --against out");
   }
   against.see(moment.span.last, *moment.after, ran[static_cast<std::size_t>(moment.span.last)]);
 }
@@ -138,10 +134,8 @@ int run(const RunOptions& options) {
   const harness::ErrorsWanted wanted = errors_wanted(options.errors);
   if (wanted.implementation)
     mode = mode.value_or(AgainstMode::lockstep) == AgainstMode::lockstep ? AgainstMode::lockstep : AgainstMode::both;
-  fixtures::BuildOptions build_options;
+  fixtures::BuildOptions build_options = options.build;
   if (!options.mesh.empty()) build_options.mesh = MeshSpec{options.mesh, metres_per(options.unit)};
-  build_options.particles = options.particles;
-  build_options.frames = options.frames;
   const std::unique_ptr<Backend> backend = make_backend(options.backend);
 
   const Scene scene = io::read_scene(options.scene);
@@ -204,11 +198,7 @@ int run(const RunOptions& options) {
     nlohmann::json document = to_json(result, judge ? &*judge : nullptr);
     if (against) {
       document["against"] = to_json(*against, built.setup);
-      // A list that push_back makes of null is broken where there is no memory for it (nlohmann::json 3.11).
-      document["against"]["verdicts"] = nlohmann::json::array();
-      for (const Verdict& verdict : against->verdicts()) {
-        document["against"]["verdicts"].push_back(io::verdict_json(verdict, false));
-      }
+      document["against"]["verdicts"] = io::verdicts_json(against->verdicts());
     }
     if (errors) document["errors"] = errors_document;
     write_document(options.json, document);
@@ -238,12 +228,10 @@ void add_run(CLI::App& program, Work& work) {
       ->capture_default_str()
       ->type_name("U")
       ->needs("--mesh");
-  command->add_option("--particles", options->particles, "how many particles the body is to have")
-      ->type_name("N")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--frames", options->frames, "stop after this many frames of the scene")
-      ->type_name("N")
-      ->check(CLI::NonNegativeNumber);
+  add_count(*command, "--particles", options->build.particles, "how many particles the body is to have",
+            CLI::PositiveNumber);
+  add_count(*command, "--frames", options->build.frames, "stop after this many frames of the scene",
+            CLI::NonNegativeNumber);
   command->add_flag("--check", options->check, "judge every frame with every oracle, and the scene's expectations");
   command
       ->add_option("--against", options->against,

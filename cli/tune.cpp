@@ -198,14 +198,12 @@ void add_tune(CLI::App& program, Work& work) {
       ->type_name("R")
       ->check(CLI::IsMember({"limit", "substeps"}));
   add_backend(*command, options.backend, "backend under test", is_timed);
-  command->add_option("--frames", options.frames, "look at this many frames of the scene only")
-      ->type_name("N")
-      ->check(CLI::PositiveNumber);
+  add_count(*command, "--frames", options.frames, "look at this many frames of the scene only", CLI::PositiveNumber);
   command->add_flag("--without-skin", options.without_skin, "nobody looks at the skin: it need not be made");
   command->add_flag("--full", options.full,
                     "run and time everything to its end, for a curve; else what is beyond the tolerance, or more "
                     "expensive than what was found, is given up");
-  add_count(*command, "--repeats", options.repeats, "timed runs of each configuration", 1, 1000);
+  add_count(*command, "--repeats", options.repeats, "timed runs of each configuration", CLI::Range(1, 1000));
   command->add_option("--write", options.write, "the scene that was found (default: NAME_tuned.json here)")
       ->type_name("F");
   add_json(*command, asked->json, "write everything that was tried");

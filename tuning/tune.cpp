@@ -117,9 +117,8 @@ std::optional<Found> take_cheapest(const Measuring& measuring, const ReferenceSo
 json levels_json(const ReferenceSolution& reference) {
   json levels = json::array();
   for (const RefinementLevel& level : reference.levels()) {
-    levels.push_back({{"substeps", level.substeps},
-                      {"iterations", level.iterations},
-                      {"apart_h", level.apart_h ? json_number(*level.apart_h) : json(nullptr)}});
+    levels.push_back(
+        {{"substeps", level.substeps}, {"iterations", level.iterations}, {"apart_h", json_number(level.apart_h)}});
   }
   return levels;
 }

@@ -11,9 +11,7 @@ nlohmann::json run_baselines(const BaselinesOptions& options, const Progress& pr
   Report report("baselines", options.backend,
                 {{"particles_asked", options.particles}, {"seed", options.seed}, {"holds", true}}, progress);
   for (const Baseline& baseline : baselines()) {
-    harness::BackendChoice choice;
-    choice.name = options.backend;
-    const std::unique_ptr<Backend> backend = harness::make_backend(choice);
+    const std::unique_ptr<Backend> backend = make_timed_backend(options.backend);
     const BaselineScene scene = make_baseline_scene(baseline, options.particles, options.seed);
     report.document["particles"] = scene.setup.body.particle_count();
     report.document["spacing"] = scene.setup.body.grid.spacing;

@@ -59,7 +59,7 @@ void measure_curve(Backend& backend, const SolverOptions& options, Setup setup, 
                         {"iterations", iterations},
                         {"max_h", json_number(error.position.max)},
                         {"rms_h", json_number(error.position.rms())},
-                        {"energy_gap", error.energy_gap ? json_number(*error.energy_gap) : json(nullptr)},
+                        {"energy_gap", json_number(error.energy_gap)},
                         {"seconds", to_json(time_steps(backend, options.samples))}};
     return error.position.max < options.tolerance;
   };
@@ -86,10 +86,7 @@ void measure_curve(Backend& backend, const SolverOptions& options, Setup setup, 
 json run_solver(const SolverOptions& options, const Progress& progress) {
   check(options);
   const harness::BackendDescriptor& described = require_timed_backend(options.backend);
-  harness::BackendChoice choice;
-  choice.name = options.backend;
-  const std::unique_ptr<Backend> backend = harness::make_backend(choice);
-
+  const std::unique_ptr<Backend> backend = make_timed_backend(options.backend);
   const int64_t particles = options.particles.value_or(described.takes_full_size ? 101'096 : 2000);
   std::vector<SolverScene> scenes = {make_block_scene()};
   if (particles > 0) scenes.push_back(make_body_scene(particles));

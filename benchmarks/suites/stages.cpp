@@ -74,11 +74,9 @@ json scene_json(const BenchScene& scene, const Contender& contender, const Measu
                 {"judged_frames", 0},
                 {"judge_seconds", measured.judge_seconds}};
   if (measured.judged) {
-    json topology = json::array();
-    for (const Verdict& verdict : measured.judged->topology) topology.push_back(io::verdict_json(verdict, false));
     entry["judged_frames"] = measured.judged->frames;
     entry["isolated_groups"] = measured.judged->isolated_groups;
-    entry["topology"] = std::move(topology);
+    entry["topology"] = io::verdicts_json(measured.judged->topology);
   }
   return entry;
 }

@@ -81,7 +81,7 @@ void add_clusters(CLI::App& bench, Work& work) {
       bench.add_subcommand("clusters", "how the number of clusters changes during a cut: Fig. 10");
   add_backend_name(*command, options->backend, "backend under test", is_timed);
   add_list(*command, "--tau", options->taus, "below which multiple of the median size a cluster is small", "T");
-  add_count(*command, "--particles", options->particles, "of the kidney", 500, 100'000'000);
+  add_count(*command, "--particles", options->particles, "of the kidney", CLI::Range(500, 100'000'000));
   command->add_flag("--full", options->full, "37,704 particles, as always on a device");
   command->add_option("--split", options->split, "kernels: how clusters are split, blocks, global or both")
       ->type_name("M");

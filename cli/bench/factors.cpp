@@ -41,7 +41,7 @@ void add_factors(CLI::App& bench, Work& work) {
       ->delimiter(',')
       ->capture_default_str()
       ->type_name("N,N...");
-  add_count(*command, "--repeats", options->repeats, "of each measurement", 1, 1000);
+  add_count(*command, "--repeats", options->repeats, "of each measurement", CLI::Range(1, 1000));
   add_seed(*command, options->seed, "of right-hand sides and velocities");
   add_suite(*command, work, "write every row",
             {.run = [options](const auto& progress) { return run_factors(*options, progress); },

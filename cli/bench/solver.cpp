@@ -42,7 +42,7 @@ void add_solver(CLI::App& bench, Work& work) {
       ->capture_default_str()
       ->type_name("H")
       ->check(CLI::PositiveNumber);
-  add_count(*command, "--samples", options->samples, "timed steps of each row", 1, 10'000);
+  add_count(*command, "--samples", options->samples, "timed steps of each row", CLI::Range(1, 10'000));
   add_suite(*command, work, "write every row",
             {.run = [options](const auto& progress) { return run_solver(*options, progress); },
              .row = print_entry,

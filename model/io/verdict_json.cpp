@@ -28,4 +28,11 @@ nlohmann::json verdict_json(const Verdict& verdict, bool expected_failure) {
   return result;
 }
 
+nlohmann::json verdicts_json(const std::vector<Verdict>& verdicts) {
+  // A list that push_back makes of null is broken where there is no memory for it (nlohmann::json 3.11).
+  nlohmann::json list = nlohmann::json::array();
+  for (const Verdict& verdict : verdicts) list.push_back(verdict_json(verdict, false));
+  return list;
+}
+
 }  // namespace cutproof::io

@@ -192,7 +192,7 @@ TEST(MeasureRotations, CountsEveryReflectionOfABrokenDefault) {
   const RotationResult& result = report.results.front();
   EXPECT_TRUE(result.is_default);
   EXPECT_FALSE(report.default_holds());
-  EXPECT_EQ(result.wrong, result.answers);
+  EXPECT_EQ(result.all.wrong, result.all.answers);
   for (const auto& entry : result.cases) EXPECT_EQ(entry.judged.reflections, entry.judged.answers) << entry.name;
   EXPECT_FALSE(to_json(report).at("holds"));
 }
@@ -206,32 +206,32 @@ TEST(MeasureRotations, CountsOneWrongAnswerAmongAll) {
   });
   const RotationResult& result = report.results.front();
   EXPECT_FALSE(report.default_holds());
-  EXPECT_EQ(result.wrong, 1);
+  EXPECT_EQ(result.all.wrong, 1);
   EXPECT_EQ(result.worst_case, "half_turn_axis");
-  EXPECT_NEAR(result.worst_gap, 4.0 / 3, 1e-6);
+  EXPECT_NEAR(result.all.worst_gap.value_or(0), 4.0 / 3, 1e-6);
 }
 
 TEST(MeasureRotations, CountsWhatIsNoNumber) {
   const RotationReport report = report_of_spoiled([](cutproof::fixtures::Answers& answers, const std::vector<Mat3>&) {
     for (Mat3& r : answers.r) r.m[0] = std::numeric_limits<double>::quiet_NaN();
   });
-  EXPECT_EQ(report.results.front().not_finite, report.results.front().answers);
-  EXPECT_EQ(report.results.front().wrong, report.results.front().answers);
+  EXPECT_EQ(report.results.front().all.not_finite, report.results.front().all.answers);
+  EXPECT_EQ(report.results.front().all.wrong, report.results.front().all.answers);
 }
 
 TEST(MeasureRotations, DoesNotHoldWithoutADefault) {
   const RotationReport report =
       cutproof::benchmarks::measure_rotations({method_named("svd", Precision::binary32)}, kFew, "newton", 1e9);
-  EXPECT_EQ(report.results.front().wrong, 0);
+  EXPECT_EQ(report.results.front().all.wrong, 0);
   EXPECT_FALSE(report.default_holds());
 }
 
 TEST(RotationFront, HoldsWhatNoOtherMethodBeats) {
   const auto method = [](double gap, double seconds, int64_t not_finite = 0) {
     RotationResult result;
-    result.worst_gap = gap;
+    result.all.worst_gap = gap;
     result.near.median = seconds;
-    result.not_finite = not_finite;
+    result.all.not_finite = not_finite;
     return result;
   };
   // Exact and slow, both middling, quick and wrong; then one that is beaten, and one whose worst gap is hidden by NaN.

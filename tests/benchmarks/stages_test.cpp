@@ -1,6 +1,4 @@
 // `cutproof bench stages`: no time without its error, no error that goes unseen. What the times are is not tested.
-#include "benchmarks/frame_errors.h"
-
 #include <gtest/gtest.h>
 
 #include <array>
@@ -11,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "benchmarks/frame_errors.h"
 #include "benchmarks/scene.h"
 #include "benchmarks/times.h"
 #include "reference_cpu/reference.h"
