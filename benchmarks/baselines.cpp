@@ -2,8 +2,9 @@
 
 #include <algorithm>
 
+#include "benchmarks/index.h"
 #include "benchmarks/paper.h"
-#include "benchmarks/times.h"
+#include "benchmarks/timing.h"
 #include "fixtures/build.h"
 #include "harness/errors.h"
 #include "harness/geometry_json.h"
@@ -13,10 +14,6 @@
 namespace cutproof::benchmarks {
 
 namespace {
-
-constexpr Span kWholeFrame = {Stage::step, Stage::skin};
-
-std::size_t at(int64_t index) { return static_cast<std::size_t>(index); }
 
 constexpr const char* kDeletionNames[] = {"none", "particles", "clusters"};
 
@@ -42,7 +39,7 @@ const std::vector<Baseline>& baselines() {
   return kAll;
 }
 
-BaselineScene make_baseline_scene(const Baseline& baseline, int64_t particles, uint64_t seed) {
+ReadyScene make_baseline_scene(const Baseline& baseline, int64_t particles, uint64_t seed) {
   Scene scene = embedded_scene("baselines");
   scene.seed = seed;
   scene.body.particles = particles;
@@ -56,7 +53,7 @@ BaselineScene make_baseline_scene(const Baseline& baseline, int64_t particles, u
   scene.grips.back().end = built.schedule.time[at(built.setup.stroke_end.back() + 1)];
   scene.grips.push_back(push);
   fixtures::resolve_schedule(scene, "command line", {}, built.setup);
-  return {std::move(built.setup), std::move(built.state)};
+  return {scene.name, std::move(built.setup), std::move(built.state)};
 }
 
 void delete_from_clusters(const Setup& setup, Deletion deletion, State& state) {
@@ -98,7 +95,7 @@ void delete_from_clusters(const Setup& setup, Deletion deletion, State& state) {
   state.skin = {};
 }
 
-nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const BaselineScene& scene) {
+nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const ReadyScene& scene) {
   backend.load({scene.setup}, {scene.state});
   const State start = std::move(backend.snapshot().front());
   const int64_t frames = scene.setup.frame_count();

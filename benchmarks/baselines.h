@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "benchmarks/scene.h"
 #include "model/backend.h"
 #include "model/scene.h"
 
@@ -29,18 +30,14 @@ struct Baseline {
 const std::vector<Baseline>& baselines();
 
 // The scene baselines.json, its clusters cooked with the baseline's rules.
-struct BaselineScene {
-  Setup setup;
-  State state;
-};
 // Throws InputError if no kidney has so many particles, within 2 %.
-BaselineScene make_baseline_scene(const Baseline& baseline, int64_t particles, uint64_t seed);
+ReadyScene make_baseline_scene(const Baseline& baseline, int64_t particles, uint64_t seed);
 
 // Takes dead particles out of the clusters, in one of the two ways; recomputes rest frames. Whoever dies too is added
 // to state.removed. The skin is dropped, so that the next skin stage makes it anew. Requires a state after detection.
 void delete_from_clusters(const Setup& setup, Deletion deletion, State& state);
 
 // Its row of the document (results_schema.md). Seconds with a deletion: of step, detect and skin.
-nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const BaselineScene& scene);
+nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const ReadyScene& scene);
 
 }  // namespace cutproof::benchmarks

@@ -12,7 +12,7 @@
 
 namespace cutproof::benchmarks {
 
-CutCube make_cut_cube(int32_t side, int32_t core) {
+ReadyScene make_cut_cube(int32_t side, int32_t core) {
   Scene spec;
   spec.name = fmt::format("cube_{}_cores_{}", side, core);
   spec.frame_length = kCutCubeSubstepLength;
@@ -23,7 +23,7 @@ CutCube make_cut_cube(int32_t side, int32_t core) {
   spec.detect.criterion = Criterion::geometric;
   spec.skin.wanted = false;
 
-  CutCube cube;
+  ReadyScene cube;
   cube.name = spec.name;
   Setup& setup = cube.setup;
   setup.body = fixtures::block(side, side, side, kCutCubeSpacing);
@@ -43,7 +43,7 @@ CutCube make_cut_cube(int32_t side, int32_t core) {
   return cube;
 }
 
-std::vector<Cut> cuts_of(const CutCube& cube) {
+std::vector<Cut> cuts_of(const ReadyScene& cube) {
   const auto backend = reference::make_backend();
   backend->load({cube.setup}, {cube.state});
   auto run_to = [&, frame = int64_t{0}](int64_t end) mutable {

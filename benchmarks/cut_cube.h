@@ -4,8 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "model/setup.h"
-#include "model/state.h"
+#include "benchmarks/scene.h"
 
 namespace cutproof::benchmarks {
 
@@ -14,19 +13,14 @@ inline constexpr double kCutCubeStiffness = 1e6;        // [1/s²]
 inline constexpr double kCutCubeSubstepLength = 0.004;  // [s]
 
 // A cube at rest that a geometric cut goes through, a spacing a frame, a third of a spacing off a layer of nodes.
-struct CutCube {
-  std::string name;
-  Setup setup;
-  State state;  // before frame 0
-};
-// side³ particles, `boxes` clusters with cores of core³.
-CutCube make_cut_cube(int32_t side, int32_t core);
+// It has side³ particles and `boxes` clusters with cores of core³.
+ReadyScene make_cut_cube(int32_t side, int32_t core);
 
 // Three cuts of it: what lies between two states.
 struct Cut {
   std::string name;  // "one frame", "quarter", "whole"
   State before, after;
 };
-std::vector<Cut> cuts_of(const CutCube& cube);
+std::vector<Cut> cuts_of(const ReadyScene& cube);
 
 }  // namespace cutproof::benchmarks

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "benchmarks/index.h"
 #include "benchmarks/times.h"
 #include "oracles/comparison/reference_solution.h"
 
@@ -20,11 +21,6 @@ using oracles::ClusterSystem;
 using oracles::Factor;
 using oracles::matrix_of;
 using oracles::Sparse;
-
-template <typename Integer>
-std::size_t at(Integer index) {
-  return static_cast<std::size_t>(index);
-}
 
 // Columns of the given entries, sorted by row.
 using Columns = Eigen::SparseMatrix<double>;

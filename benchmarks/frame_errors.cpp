@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "benchmarks/index.h"
 #include "benchmarks/scene.h"
 #include "harness/reference_stages.h"
 #include "model/rules.h"
@@ -12,8 +13,6 @@
 namespace cutproof::benchmarks {
 
 namespace {
-
-std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
 
 State take_snapshot(const Backend& backend) {
   std::vector<State> states = backend.snapshot();

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "benchmarks/index.h"
 #include "benchmarks/times.h"
 #include "model/io/filled.h"
 #include "model/io/json_number.h"
@@ -12,8 +13,6 @@ namespace cutproof::benchmarks {
 namespace {
 
 using nlohmann::json;
-
-std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
 
 json to_json(const oracles::ErrorNorm& norm) {
   return {{"max_h", json_number(norm.max)}, {"rms_h", json_number(norm.rms())}, {"beyond", norm.beyond}};

@@ -13,13 +13,6 @@
 
 namespace cutproof::benchmarks {
 
-namespace {
-
-Vec3 kidney_size() { return {0.11, 0.06, 0.05}; }  // [m]
-Vec3 box_size() { return {0.2, 0.1, 0.05}; }       // [m]
-
-}  // namespace
-
 BenchScene make_bench_scene(int64_t particles, int64_t frames) {
   const bool box = particles <= kLargestBox;
   const std::string kind = box ? "box" : "kidney";
@@ -29,7 +22,7 @@ BenchScene make_bench_scene(int64_t particles, int64_t frames) {
   spec.name = fmt::format("{}_{}", kind, particles);
   Shape shape;
   shape.kind = box ? Shape::Kind::box : Shape::Kind::kidney;
-  shape.size = box ? box_size() : kidney_size();
+  shape.size = box ? Vec3{0.2, 0.1, 0.05} : Vec3{0.11, 0.06, 0.05};  // [m]
   spec.body.shape = shape;
   spec.body.particles = particles;
   spec.step.substeps = 4;

@@ -9,12 +9,15 @@
 
 namespace cutproof::benchmarks {
 
-// A body that a blade is cutting. From frame `warm_up` on, for as many frames as were asked for and kJudgedFrames
-// more, the blade's edge is inside the tissue and moves on.
-struct BenchScene {
-  std::string name;  // shape and particles
+struct ReadyScene {
+  std::string name;
   Setup setup;
-  State state;                    // at rest, before frame 0
+  State state;  // before frame 0
+};
+
+// A body that a blade is cutting, named by shape and particles, at rest before frame 0. From frame `warm_up` on, for as
+// many frames as were asked for and kJudgedFrames more, the blade's edge is inside the tissue and moves on.
+struct BenchScene : ReadyScene {
   int64_t warm_up = 0;            // frames until the cut is well under way
   double advance = 0;             // of the blade's edge in one frame [h]
   double build_seconds = 0;       // sampling and cooking

@@ -15,10 +15,9 @@ namespace cutproof::benchmarks {
 namespace {
 
 constexpr double kFrameLength = 0.004;  // [s]
-constexpr Span kStep = {Stage::step, Stage::step};
 
 // Turned about the longest axis and drawn out along it, when the free motion of the frame is over.
-void throw_body(SolverScene& scene, double twist, double stretch) {
+void throw_body(ReadyScene& scene, double twist, double stretch) {
   const Body& body = scene.setup.body;
   Vec3 low, high;
   for (int32_t i = 0; i < body.particle_count(); ++i) {
@@ -65,8 +64,8 @@ void keep_the_step(Setup& setup) {
 
 }  // namespace
 
-SolverScene make_block_scene() {
-  SolverScene scene;
+ReadyScene make_block_scene() {
+  ReadyScene scene;
   scene.name = "block";
   scene.setup.body = fixtures::block(12, 12, 12, 0.01);
   keep_the_step(scene.setup);
@@ -77,15 +76,15 @@ SolverScene make_block_scene() {
   return scene;
 }
 
-SolverScene make_body_scene(int64_t particles) {
+ReadyScene make_body_scene(int64_t particles) {
   BenchScene bench = make_bench_scene(particles, 1);
-  SolverScene scene{bench.name, std::move(bench.setup), std::move(bench.state)};
+  ReadyScene scene{std::move(bench.name), std::move(bench.setup), std::move(bench.state)};
   keep_the_step(scene.setup);
   throw_body(scene, 1.0, 1.2);
   return scene;
 }
 
-Setup with_substeps(const SolverScene& scene, int32_t substeps) {
+Setup with_substeps(const ReadyScene& scene, int32_t substeps) {
   Setup setup = scene.setup;
   divide_frame(setup, substeps);
   return setup;

@@ -5,27 +5,26 @@
 #include <string>
 #include <vector>
 
+#include "benchmarks/scene.h"
 #include "model/backend.h"
 #include "oracles/comparison/error_norm.h"
 
 namespace cutproof::benchmarks {
 
-// A frame of one substep without a blade. Velocities are such that its free motion ends with the two ends of the
-// longest axis turned against each other and the body drawn out.
-struct SolverScene {
-  std::string name;
-  Setup setup;
-  State state;  // at rest but for its velocities
-};
+inline constexpr Span kStep = {Stage::step, Stage::step};
+
+// Both scenes have a frame of one substep without a blade, and rest but for their velocities: these are such that the
+// frame's free motion ends with the two ends of the longest axis turned against each other and the body drawn out.
+
 // The block of method.md §3: 12³ particles, 27 clusters, 4 ms, turned by 3 radians and drawn out to 1.8 times its
 // length.
-SolverScene make_block_scene();
+ReadyScene make_block_scene();
 // The body of make_bench_scene, held at one end, turned by 1 radian and drawn out to 1.2 times its length in 4 ms.
 // Throws InputError as that does.
-SolverScene make_body_scene(int64_t particles);
+ReadyScene make_body_scene(int64_t particles);
 
 // The same free motion of the frame, in so many substeps.
-Setup with_substeps(const SolverScene& scene, int32_t substeps);
+Setup with_substeps(const ReadyScene& scene, int32_t substeps);
 
 // Where the frame ends if every substep is solved exactly (oracles::reference_solution).
 struct FrameSolution {

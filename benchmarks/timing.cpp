@@ -1,12 +1,10 @@
 #include "benchmarks/timing.h"
 
+#include "benchmarks/index.h"
+
 namespace cutproof::benchmarks {
 
 namespace {
-
-constexpr Span kWholeFrame = {Stage::step, Stage::skin};
-
-std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
 
 // Brings the backend to where the timed frames begin.
 void warm_up(Backend& backend, const BenchScene& scene) {

@@ -12,6 +12,8 @@
 
 namespace cutproof::benchmarks {
 
+inline constexpr Span kWholeFrame = {Stage::step, Stage::skin};
+
 // What timing one backend on one scene gives. All three passes start from the same state, so they see the same frames.
 struct Timings {
   Times frame;                 // whole frames, each waited for

@@ -23,10 +23,7 @@ void require_writable(const std::string& path) {
 }
 
 void write_document(const std::string& path, const nlohmann::json& document) {
-  if (path.empty()) return;
-  io::AtomicFile file(path);
-  io::write_text(file.temporary(), document.dump(1) + "\n");
-  file.commit();
+  if (!path.empty()) io::write_text(path, document.dump(1) + "\n");
 }
 
 }  // namespace cutproof::cli

@@ -6,6 +6,7 @@
 
 #include "benchmarks/report.h"
 #include "model/error.h"
+#include "model/io/atomic_file.h"
 #include "model/io/json_number.h"
 #include "model/io/scene_io.h"
 #include "tuning/search.h"
@@ -171,7 +172,7 @@ bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
         show(TuneStep::not_taken);
       });
   if (!found) return conclude(TuneStep::none_verified);
-  write_tuned_scene(found->text, options.write);
+  io::write_text(options.write, found->text);
   document["found"] = {{"trial", found->trial},
                        {"verified", to_json(found->verified.trial, measuring.given)},
                        {"verdicts", found->verified.verdicts},

@@ -2,7 +2,6 @@
 
 #include <filesystem>
 
-#include "model/io/atomic_file.h"
 #include "model/io/scene_io.h"
 
 namespace cutproof::tuning {
@@ -19,12 +18,6 @@ std::string tuned_scene_text(const Configuration& configuration, const std::stri
     scene.body.mesh->file = (none ? file : near).string();
   }
   return io::write_scene(scene);
-}
-
-void write_tuned_scene(const std::string& text, const std::string& path) {
-  io::AtomicFile file(path);
-  io::write_text(file.temporary(), text);
-  file.commit();
 }
 
 }  // namespace cutproof::tuning

@@ -9,7 +9,5 @@ namespace cutproof::tuning {
 // A mesh that the scene names is named from where the new scene lies. `source`: the file of the given scene; `path`:
 // where the new one will be written.
 std::string tuned_scene_text(const Configuration& configuration, const std::string& source, const std::string& path);
-// The whole file or nothing.
-void write_tuned_scene(const std::string& text, const std::string& path);
 
 }  // namespace cutproof::tuning

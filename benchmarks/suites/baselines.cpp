@@ -12,7 +12,7 @@ nlohmann::json run_baselines(const BaselinesOptions& options, const Progress& pr
                 {{"particles_asked", options.particles}, {"seed", options.seed}, {"holds", true}}, progress);
   for (const Baseline& baseline : baselines()) {
     const std::unique_ptr<Backend> backend = make_timed_backend(options.backend);
-    const BaselineScene scene = make_baseline_scene(baseline, options.particles, options.seed);
+    const ReadyScene scene = make_baseline_scene(baseline, options.particles, options.seed);
     report.document["particles"] = scene.setup.body.particle_count();
     report.document["spacing"] = scene.setup.body.grid.spacing;
     nlohmann::json row = run_baseline(*backend, baseline, scene);

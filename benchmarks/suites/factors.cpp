@@ -16,7 +16,7 @@ namespace {
 using nlohmann::json;
 
 // Every way of having a factor after one cut, and whether each solves the system.
-bool measure_cut(const CutCube& cube, const Cut& cut, int64_t repeats, std::mt19937_64& random, json& rows) {
+bool measure_cut(const ReadyScene& cube, const Cut& cut, int64_t repeats, std::mt19937_64& random, json& rows) {
   const double kdt2 = kCutCubeStiffness * kCutCubeSubstepLength * kCutCubeSubstepLength;
   const SystemChange change = change_of(cube.setup.body, cut.before, cut.after, kdt2 / (1 + kdt2));
   std::vector<double> right(change.origin.size());
@@ -51,7 +51,7 @@ bool measure_cut(const CutCube& cube, const Cut& cut, int64_t repeats, std::mt19
 }
 
 // Of the cut body, when everything in it moves.
-json converged_substep(const CutCube& cube, State state, std::mt19937_64& random) {
+json converged_substep(const ReadyScene& cube, State state, std::mt19937_64& random) {
   constexpr double kMost = 0.1 * kCutCubeSpacing / kCutCubeSubstepLength;  // [m/s]
   std::uniform_real_distribution<double> speed(-kMost, kMost);
   for (Vec3& v : state.v) v = {speed(random), speed(random), speed(random)};
@@ -84,7 +84,7 @@ json run_factors(const FactorsOptions& options, const Progress& progress) {
                 progress, "scenes");
   for (const auto& [side, core] : scenes) {
     std::mt19937_64 random(options.seed);
-    const CutCube cube = make_cut_cube(side, core);
+    const ReadyScene cube = make_cut_cube(side, core);
     const std::vector<Cut> cuts = cuts_of(cube);
     json rows = json::array();
     bool holds = true;

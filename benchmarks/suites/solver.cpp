@@ -15,8 +15,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr Span kStep = {Stage::step, Stage::step};
-
 void check(const SolverOptions& options) {
   for (const double k : options.stiffness) {
     require_option(k > 0 && k <= 1e15, "--stiffness", fmt::format("{} is out of bounds", k), "give k in (0, 1e15]");
@@ -88,14 +86,14 @@ json run_solver(const SolverOptions& options, const Progress& progress) {
   const harness::BackendDescriptor& described = require_timed_backend(options.backend);
   const std::unique_ptr<Backend> backend = make_timed_backend(options.backend);
   const int64_t particles = options.particles.value_or(described.takes_full_size ? 101'096 : 2000);
-  std::vector<SolverScene> scenes = {make_block_scene()};
+  std::vector<ReadyScene> scenes = {make_block_scene()};
   if (particles > 0) scenes.push_back(make_body_scene(particles));
 
   Report report(
       "solver", options.backend,
       {{"precision", name_of(backend->precision())}, {"tolerance_h", options.tolerance}, {"samples", options.samples}},
       progress, "scenes");
-  for (const SolverScene& scene : scenes) {
+  for (const ReadyScene& scene : scenes) {
     for (const double stiffness : options.stiffness) {
       for (const int32_t substeps : options.substeps) {
         Setup setup = with_substeps(scene, substeps);

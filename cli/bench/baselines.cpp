@@ -6,7 +6,7 @@ namespace {
 
 void print_seed(const nlohmann::json& document) { print_filled("seed {seed}\n", document); }
 
-void print_table(const nlohmann::json& document) {
+void print_baselines(const nlohmann::json& document) {
   const std::vector<Column> columns = {
       {"", "{name}"},
       {"ms per frame", "{1e3*seconds/median:.3g}"},
@@ -39,7 +39,7 @@ void add_baselines(CLI::App& bench, Work& work) {
   add_suite(*command, work, "write times and errors",
             {.run = [options](const auto& progress) { return run_baselines(*options, progress); },
              .begin = print_seed,
-             .end = print_table});
+             .end = print_baselines});
 }
 
 }  // namespace cutproof::cli

@@ -33,14 +33,8 @@ void add_factors(CLI::App& bench, Work& work) {
   const auto options = std::make_shared<benchmarks::FactorsOptions>();
   CLI::App* const command =
       bench.add_subcommand("factors", "a cut body's linear system: its factor updated, or made anew");
-  command->add_option("--sides", options->sides, "particles along a cube, clusters of cores of 5³")
-      ->delimiter(',')
-      ->capture_default_str()
-      ->type_name("N,N...");
-  command->add_option("--fine-sides", options->fine_sides, "the same with many clusters, of cores of 2³")
-      ->delimiter(',')
-      ->capture_default_str()
-      ->type_name("N,N...");
+  add_list(*command, "--sides", options->sides, "particles along a cube, clusters of cores of 5³");
+  add_list(*command, "--fine-sides", options->fine_sides, "the same with many clusters, of cores of 2³");
   add_count(*command, "--repeats", options->repeats, "of each measurement", CLI::Range(1, 1000));
   add_seed(*command, options->seed, "of right-hand sides and velocities");
   add_suite(*command, work, "write every row",

@@ -4,7 +4,7 @@ namespace cutproof::cli {
 
 namespace {
 
-void print_table(const nlohmann::json& document) {
+void print_machine_limits(const nlohmann::json& document) {
   const auto speed = [](const nlohmann::json& row) {
     return row.contains("bytes") ? io::filled("{1e-9*bytes_per_second:.4g}", row) : "-";
   };
@@ -24,9 +24,9 @@ void add_machine_limits(CLI::App& bench, Work& work) {
   CLI::App* const command = bench.add_subcommand("machine_limits", "what the machine can do at best: copies, launches");
   add_backend_name(*command, options->backend, "whose machine", is_timed);
   add_count(*command, "--repeats", options->repeats, "of each timing", CLI::Range(1, 10'000));
-  add_suite(
-      *command, work, "write times",
-      {.run = [options](const auto& progress) { return run_machine_limits(*options, progress); }, .end = print_table});
+  add_suite(*command, work, "write times",
+            {.run = [options](const auto& progress) { return run_machine_limits(*options, progress); },
+             .end = print_machine_limits});
 }
 
 }  // namespace cutproof::cli

@@ -4,7 +4,7 @@ namespace cutproof::cli {
 
 namespace {
 
-void print_table(const nlohmann::json& document) {
+void print_sampling(const nlohmann::json& document) {
   const bool whole = document.at("scaled_down") == 1;
   const auto to_first = [](const nlohmann::json& of) { return percent(of.at("frame_to_first").get<double>() - 1); };
   print_scenes(document, {{"paper's", whole ? "{paper/clusters}" : "-"}},
@@ -27,7 +27,7 @@ void add_sampling(CLI::App& bench, Work& work) {
   add_suite(*command, work, "write times and errors",
             {.run = [options](const auto& progress) { return run_sampling(*options, progress); },
              .row = print_scene,
-             .end = print_table});
+             .end = print_sampling});
 }
 
 }  // namespace cutproof::cli

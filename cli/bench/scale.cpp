@@ -4,7 +4,7 @@ namespace cutproof::cli {
 
 namespace {
 
-void print_table(const nlohmann::json& document) {
+void print_scale(const nlohmann::json& document) {
   const auto bytes_of_a_particle = [](const nlohmann::json& row) {
     if (row.at("bytes").is_null()) return std::string("-");
     return fmt::format("{:.0f}", row.at("bytes").get<double>() / row.at("particles").get<double>());
@@ -30,7 +30,7 @@ void add_scale(CLI::App& bench, Work& work) {
   add_suite(*command, work, "write times and errors",
             {.run = [options](const auto& progress) { return run_scale(*options, progress); },
              .row = print_scene,
-             .end = print_table});
+             .end = print_scale});
 }
 
 }  // namespace cutproof::cli

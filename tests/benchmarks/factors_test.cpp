@@ -21,10 +21,10 @@ using cutproof::Body;
 using cutproof::State;
 using cutproof::benchmarks::change_of;
 using cutproof::benchmarks::Cut;
-using cutproof::benchmarks::CutCube;
 using cutproof::benchmarks::factorise;
 using cutproof::benchmarks::kWays;
 using cutproof::benchmarks::name_of;
+using cutproof::benchmarks::ReadyScene;
 using cutproof::benchmarks::residual_bound;
 using cutproof::benchmarks::SystemChange;
 using cutproof::benchmarks::Way;
@@ -82,7 +82,7 @@ TEST(ClusterSystem, IsWhatTheClustersSay) {
 
 TEST(Factors, EveryWaySolvesTheSystemAfterEveryCut) {
   for (const auto& [side, core] : {std::pair{12, 3}, std::pair{9, 2}, std::pair{10, 5}}) {
-    const CutCube cube = cutproof::benchmarks::make_cut_cube(side, core);
+    const ReadyScene cube = cutproof::benchmarks::make_cut_cube(side, core);
     std::set<Way> ran;
     for (const Cut& cut : cuts_of(cube)) {
       ASSERT_NE(cut.before.alive, cut.after.alive) << cut.name;

@@ -22,8 +22,8 @@ using cutproof::Setup;
 using cutproof::Span;
 using cutproof::SpanReport;
 using cutproof::State;
+using cutproof::benchmarks::ReadyScene;
 using cutproof::benchmarks::SolverError;
-using cutproof::benchmarks::SolverScene;
 using nlohmann::json;
 
 class SolverBench : public Program {};
@@ -81,7 +81,7 @@ TEST_F(SolverBench, RefusesBadUsage) {
 }
 
 TEST(SolverErrors, VanishAtTheAnswerOfEverySubstep) {
-  const SolverScene scene = cutproof::benchmarks::make_block_scene();
+  const ReadyScene scene = cutproof::benchmarks::make_block_scene();
   const auto backend = cutproof::reference::make_backend();
   for (const int32_t substeps : {1, 3}) {
     cutproof::Setup setup = cutproof::benchmarks::with_substeps(scene, substeps);
@@ -100,7 +100,7 @@ TEST(SolverErrors, VanishAtTheAnswerOfEverySubstep) {
 }
 
 TEST(SolverErrors, FindTheLeastIterationsThatAreEnough) {
-  const SolverScene scene = cutproof::benchmarks::make_block_scene();
+  const ReadyScene scene = cutproof::benchmarks::make_block_scene();
   const auto backend = cutproof::reference::make_backend();
   cutproof::Setup setup = scene.setup;
   setup.step.stiffness = 1e5;
@@ -134,7 +134,7 @@ class Misplacing final : public Backend {
 };
 
 TEST(SolverErrors, SeeOneParticleOutOfPlace) {
-  const SolverScene scene = cutproof::benchmarks::make_block_scene();
+  const ReadyScene scene = cutproof::benchmarks::make_block_scene();
   cutproof::benchmarks::FrameSolution solution;
   solution.x = scene.state.x;
   const double h = scene.setup.body.grid.spacing;

@@ -325,9 +325,9 @@ TEST_F(Program, ListsEveryPropertyThatARunIsJudgedByWithItsSourceAndWhenItApplie
     EXPECT_NE(listed.find("\n  " + property + " "), std::string::npos) << property;
   }
   for (const char* line :
-       {"  cluster connectivity  method.md §2, I1\n",
+       {"  cluster connectivity  method.md §2, I1",
         "  not between detection and split; rests on alive, offsets, members\n",
-        "  motion                method.md §3; tolerances.md, Motion\n", "  after step; rests on the whole state\n",
+        "  motion                method.md §3; tolerances.md, Motion", "  after step; rests on the whole state\n",
         "  skin geometry         method.md §8, lemma;"}) {
     EXPECT_NE(listed.find(line), std::string::npos) << line << listed;
   }
