@@ -35,7 +35,7 @@ Held held_particles(const Setup& setup, int64_t substep) {
   return held;
 }
 
-// Chebyshev semi-iteration (Golub and Varga 1961; solvers.md), restarted in every substep: with g_j where the
+// Chebyshev semi-iteration (Golub and Varga 1961; method.md §11), restarted in every substep: with g_j where the
 // plain iteration goes from x_j,  x_j+1 = x_j + pull (g_j - x_j) + carry (x_j - x_j-1). The first iteration is plain.
 class Chebyshev {
  public:

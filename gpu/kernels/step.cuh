@@ -255,9 +255,9 @@ CUTPROOF_DEVICE inline void begin_substep(const DeviceView& w, const BodyConstan
   }
 }
 
-// Chebyshev semi-iteration (docs/design/solvers.md), order >= 1: x + pull (g - x) + carry (x - earlier), with g where
-// the plain iteration goes from x. The recurrence of the weights in closed form: omega_j = (1 + q) (1 + q^(j-1)) / (1 +
-// q^j) for j >= 2, with q = ((1 - r) / (1 + r))², r² = 1 - b.
+// Chebyshev semi-iteration (docs/design/method.md §11), order >= 1: x + pull (g - x) + carry (x - earlier), with g
+// where the plain iteration goes from x. The recurrence of the weights in closed form: omega_j = (1 + q) (1 + q^(j-1))
+// / (1 + q^j) for j >= 2, with q = ((1 - r) / (1 + r))², r² = 1 - b.
 struct Combination {
   float pull, carry;
   CUTPROOF_DEVICE Float3 operator()(Float3 plain, Float3 now, Float3 earlier) const {

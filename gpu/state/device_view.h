@@ -24,7 +24,7 @@ enum : int { kNoExpand = 0, kEdgeCover = 1, kPublishedExpand = 2 };             
 // nothing.
 enum : int { kSlotsFull = 1, kMembersFull = 2, kVerticesFull = 4, kCellsFull = 8, kAdditionsFull = 16 };
 
-// Which rotation method match_shapes uses (rotation.cuh); chosen by measurement, docs/design/solvers.md.
+// Which rotation method match_shapes uses (rotation.cuh); chosen by measurement, docs/results/accuracy.md, Rotations.
 enum : int { kJacobi4 = 0, kMueller2016 = 1, kApd = 2, kSvd = 3, kQuest = 4, kNewton = 5 };
 
 // Division by a number that is known before: n / d = n · multiplier >> shift for every 0 <= n < 2^31 (Granlund and
