@@ -16,6 +16,8 @@ const char* name(Operation operation) {
       return "sum";
     case Operation::warp_sum:
       return "warp_sum";
+    case Operation::warp_sums:
+      return "warp_sums";
     case Operation::smallest:
       return "smallest";
     case Operation::any:
