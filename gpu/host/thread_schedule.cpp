@@ -64,8 +64,7 @@ int Candidates::highest() const {
 int Candidates::nth(int k) const {
   const int places = static_cast<int>(masks.size());
   const int start = current / 32, bit = current % 32;
-  for (int step = 0; step <= places; ++step) {
-    const int place = (start + step) % places;
+  for (int step = 0, place = start; step <= places; ++step, place = place + 1 < places ? place + 1 : 0) {
     std::uint32_t mask = masks[place];
     if (step == 0) mask &= bits_from(bit);
     if (step == places) mask &= ~bits_from(bit);
