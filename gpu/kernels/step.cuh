@@ -339,7 +339,7 @@ CUTPROOF_DEVICE void update_positions_kernel(Block& block, const DeviceView& w, 
     Float4 pushed;
 
     if (body.iterations > 0) {
-      const bool implicit = body.solver == kImplicit;
+      const bool implicit = body.solver == Solver::implicit;
       const float kdt2 = body.stiffness * dt * dt;
       const float s = implicit ? kdt2 / (1.0f + kdt2) : body.relaxation;
       const Float4 predicted = w.predicted[p];
@@ -366,8 +366,8 @@ CUTPROOF_DEVICE void update_positions_kernel(Block& block, const DeviceView& w, 
       const Float3 plain = from + s * pull;
       Float3 free = plain;
       // The first iteration is plain, and the last has no next one to keep anything for.
-      [[maybe_unused]] const bool combined = body.acceleration == kChebyshev && iteration > 0;
-      [[maybe_unused]] const bool kept = body.acceleration == kChebyshev && iteration + 1 < updates;
+      [[maybe_unused]] const bool combined = body.acceleration == Acceleration::chebyshev && iteration > 0;
+      [[maybe_unused]] const bool kept = body.acceleration == Acceleration::chebyshev && iteration + 1 < updates;
       [[maybe_unused]] Combination combination;
       if constexpr (kAccelerated) {
         if (combined) {
