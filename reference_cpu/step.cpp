@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/at.h"
 #include "reference_cpu/contacts.h"
 #include "reference_cpu/reference.h"
 
@@ -14,8 +15,6 @@ struct Pose {
   Vec3 center;
   Mat3 rotation;
 };
-
-std::size_t at(int64_t index) { return static_cast<std::size_t>(index); }
 
 // For every particle: how far a grip moves it in the substep, or not held at all.
 struct Held {
