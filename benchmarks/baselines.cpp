@@ -2,12 +2,12 @@
 
 #include <algorithm>
 
-#include "benchmarks/index.h"
 #include "benchmarks/paper.h"
 #include "benchmarks/timing.h"
 #include "fixtures/build.h"
 #include "harness/errors.h"
 #include "harness/geometry_json.h"
+#include "model/at.h"
 #include "model/rules.h"
 #include "reference_cpu/reference.h"
 

@@ -8,8 +8,8 @@
 #include <numeric>
 #include <utility>
 
-#include "benchmarks/index.h"
 #include "benchmarks/times.h"
+#include "model/at.h"
 #include "oracles/comparison/reference_solution.h"
 
 namespace cutproof::benchmarks {

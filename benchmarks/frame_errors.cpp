@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <utility>
 
-#include "benchmarks/index.h"
 #include "benchmarks/scene.h"
 #include "harness/reference_stages.h"
+#include "model/at.h"
 #include "model/rules.h"
 #include "oracles/comparison/stage_comparison.h"
 #include "oracles/oracles.h"

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "benchmarks/index.h"
 #include "benchmarks/times.h"
+#include "model/at.h"
 #include "model/io/filled.h"
 #include "model/io/json_number.h"
 #include "model/io/verdict_json.h"

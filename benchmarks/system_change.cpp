@@ -5,7 +5,7 @@
 #include <map>
 #include <numeric>
 
-#include "benchmarks/index.h"
+#include "model/at.h"
 
 namespace cutproof::benchmarks {
 

@@ -1,6 +1,6 @@
 #include "benchmarks/timing.h"
 
-#include "benchmarks/index.h"
+#include "model/at.h"
 
 namespace cutproof::benchmarks {
 

@@ -24,7 +24,7 @@ namespace {
 
 using nlohmann::json;
 
-// Frames of the lookup table: name on the command line, member, in the order of measuring.md, Errors.
+// Frames of the lookup table: name on the command line, member, in the order of guide.md, Errors.
 struct Kind {
   const char* name;
   bool ErrorsWanted::*member;

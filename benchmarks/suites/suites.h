@@ -44,7 +44,7 @@ struct ScaleOptions : TimingOptions {
 };
 nlohmann::json run_scale(const ScaleOptions& options, const Progress& progress);
 
-// Methods for the rotation of a cluster, on every hard case (solvers.md, Rotations).
+// Methods for the rotation of a cluster, on every hard case (method.md, Rotations).
 struct RotationsOptions {
   std::string backend = harness::kReferenceName;
   RotationCounts counts;
@@ -59,7 +59,7 @@ struct MachineLimitsOptions {
 };
 nlohmann::json run_machine_limits(const MachineLimitsOptions& options, const Progress& progress);
 
-// Iterations of the step against its error, plain and accelerated (solvers.md).
+// Iterations of the step against its error, plain and accelerated (method.md §11).
 struct SolverOptions {
   std::string backend = harness::kReferenceName;
   std::vector<double> stiffness = {1e4, 1e5, 1e6};  // [1/s²]
@@ -79,7 +79,7 @@ struct BaselinesOptions {
 };
 nlohmann::json run_baselines(const BaselinesOptions& options, const Progress& progress);
 
-// After a cut, is a factor of the substep's system updated or made anew? (solvers.md, The factor after a cut)
+// After a cut, is a factor of the substep's system updated or made anew? (accuracy.md, The factor after a cut)
 struct FactorsOptions {
   std::vector<int32_t> sides = {10, 20, 30, 40, 50}, fine_sides = {20, 54};  // particles along a cube
   int64_t repeats = 5;
