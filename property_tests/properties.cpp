@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "fixtures/cook.h"
-#include "gpu/backends.h"
+#include "harness/backends.h"
 #include "oracles/relations/relations.h"
 #include "property_tests/checking.h"
 #include "property_tests/counterexample.h"
@@ -68,9 +68,9 @@ TEST_P(EveryBackend, AgreesWithEveryOracleOnSavedCounterexamples) {
 TEST(SavedCounterexamples, HoldUnderTheScheduleThatBrokeThem) {
   for (const auto& [file, counterexample] : saved_counterexamples()) {
     if (counterexample.schedule.empty()) continue;
-    gpu::KernelOptions options;
-    if (counterexample.split == "global") options.split = gpu::SplitMethod::global_labels;
-    const auto backend = gpu::make_simulated_backend({gpu::replay(counterexample.schedule)}, options);
+    harness::BackendChoice choice;
+    choice.split = counterexample.split;
+    const auto backend = harness::make_replaying_backend(choice, counterexample.schedule);
     const auto judgement = dissect(*backend, counterexample.failing, true);
     if (judgement.failure) ADD_FAILURE() << file << ": " << describe(*judgement.failure);
   }
@@ -78,22 +78,17 @@ TEST(SavedCounterexamples, HoldUnderTheScheduleThatBrokeThem) {
 
 TEST_P(EveryBackend, KeepsEveryInvariantAfterEveryStageOfARandomDissection) {
   const auto backend = GetParam().make();
-  std::array<int64_t, kCoverageClassCount> seen = {};
+  CaseCoverage seen;
   int64_t cases = 0, verdicts = 0;
   check(id(), cases_of(1), GetParam().most_size, [&](const Case& c) {
     const Judgement judgement = dissect(*backend, c, cases % 50 == 0);
     ++cases;
     verdicts += judgement.verdicts;
-    for (std::size_t k = 0; k < kCoverageClassCount; ++k) seen[k] += judgement.coverage[k];
+    seen.add(judgement.coverage);
     return judgement.failure ? describe(*judgement.failure) : "";
   });
   std::cout << cases << " cases, " << verdicts << " verdicts; cases with:";
-  for (std::size_t k = 0; k < kCoverageClassCount; ++k)
-    std::cout << (k == 0 ? " " : ", ") << kCoverageClassNames[k] << " " << seen[k];
-  std::cout << std::endl;
-  for (std::size_t k = 0; k < kCoverageClassCount && ran_in_full(); ++k) {
-    EXPECT_GT(seen[k], 0) << "no case with '" << kCoverageClassNames[k] << "': nothing was tested there";
-  }
+  report(seen, "case");
 }
 
 TEST_P(EveryBackend, OnlyRefinesTheComponentsWithEveryStroke) {
