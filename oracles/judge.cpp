@@ -47,7 +47,7 @@ struct Judge::Memory {
 
   Verdict answer(const Property& property, Stage after) {
     if (&property == &core_properties().front()) return form;
-    if (!form.holds) return not_judged(std::string(property.name), form);
+    if (!form.holds) return not_judged(property.name, form);
     judged->skin_is_current = after == Stage::skin;
     const auto known = std::find_if(held.begin(), held.end(), [&](const Held& h) {
       return h.property == &property && h.skin_is_current == judged->skin_is_current;

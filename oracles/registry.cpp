@@ -90,7 +90,7 @@ PropertyList make_core_properties() {
 }
 
 Verdict begin(const Property& property, const State& state) {
-  return start_verdict(std::string(property.name), state, std::string(property.unit), std::string(property.source));
+  return start_verdict(property.name, state, property.unit, property.source);
 }
 
 }  // namespace
@@ -116,7 +116,7 @@ Verdict ask(const Property& property, Judged& judged) {
 Verdict ask(const Property& property, const StageRun& run, const Verdict& form_before, const Verdict& form_after) {
   for (const Verdict* form : {&form_before, &form_after}) {
     if (form->holds) continue;
-    Verdict verdict = not_judged(std::string(property.name), *form);
+    Verdict verdict = not_judged(property.name, *form);
     verdict.witness.text += form == &form_before ? " (before the stage)" : " (after the stage)";
     verdict.frame = run.after.frame;
     return verdict;
@@ -129,7 +129,7 @@ Verdict ask(const Property& property, const StageRun& run, const Verdict& form_b
 Verdict ask(const Property& property, const Setup& setup, const State& state) {
   Verdict form = check_form(setup, state, 0);
   if (property.name == form.property) return conclude(std::move(form), property.nothing);
-  if (!form.holds) return not_judged(std::string(property.name), form);
+  if (!form.holds) return not_judged(property.name, form);
   Judged judged(setup, state);
   return ask(property, judged);
 }

@@ -124,12 +124,13 @@ std::optional<OneSided<T>> first_in_one_only(const std::vector<T>& a, const std:
 }
 
 // A verdict that holds so far.
-inline Verdict start_verdict(std::string property, const State& state, std::string unit, std::string bound_source) {
+inline Verdict start_verdict(std::string_view property, const State& state, std::string_view unit,
+                             std::string_view bound_source) {
   Verdict verdict;
-  verdict.property = std::move(property);
+  verdict.property = property;
   verdict.frame = state.frame;
-  verdict.unit = std::move(unit);
-  verdict.bound_source = std::move(bound_source);
+  verdict.unit = unit;
+  verdict.bound_source = bound_source;
   return verdict;
 }
 
@@ -178,9 +179,9 @@ inline Verdict conclude(Verdict verdict, std::string_view nothing) {
 }
 
 // The answer of every oracle on a state that is not well formed. `form` is the failing verdict of well_formed.
-inline Verdict not_judged(std::string property, const Verdict& form) {
+inline Verdict not_judged(std::string_view property, const Verdict& form) {
   Verdict verdict = form;
-  verdict.property = std::move(property);
+  verdict.property = property;
   verdict.witness.text = "not judged: the state is not well formed: " + form.witness.text;
   verdict.checked = 0;
   return verdict;

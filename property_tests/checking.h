@@ -46,6 +46,7 @@ std::vector<NamedBackend> all_backends();
 
 class EveryBackend : public ::testing::TestWithParam<NamedBackend> {
  protected:
+  const std::unique_ptr<Backend> backend_ = GetParam().make();
   std::string id() const;
   int64_t cases_of(int64_t fraction) const;
   // Whether all cases ran as planned and every class of cases must have occurred.

@@ -237,22 +237,12 @@ double greatest_change(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
 
 // The factor of a substep's system along one axis. That it is made anew for every substep and every set of fixed
 // particles is what was measured to be best (docs/design/solvers.md).
-class Cholesky {
- public:
-  Cholesky(Cholmod& cholmod, const Sparse& matrix)
-      : cholmod_(cholmod), factor_(cholmod_analyze(matrix.get(), cholmod.get()), cholmod) {
-    cholmod_factorize(matrix.get(), factor_.get(), cholmod_.get());
-    cholmod_.check();
-  }
-
-  std::vector<double> solve(std::vector<double> right) const {
-    return oracles::solve(cholmod_, factor_.get(), std::move(right));
-  }
-
- private:
-  Cholmod& cholmod_;
-  Factor factor_;
-};
+std::shared_ptr<const Factor> factorised(const Sparse& matrix, Cholmod& cholmod) {
+  auto factor = std::make_shared<const Factor>(cholmod_analyze(matrix.get(), cholmod.get()), cholmod);
+  cholmod_factorize(matrix.get(), factor->get(), cholmod.get());
+  cholmod.check();
+  return factor;
+}
 
 // Why a coordinate of a particle is not solved for.
 enum Fixed : uint8_t { kFree = 0, kOnLowWall, kOnHighWall, kGiven };
@@ -280,14 +270,14 @@ class LinearStage {
 
   // Axes with the same fixed particles share one factorisation.
   void refactor(int axis, std::vector<uint8_t> fixed) {
-    std::shared_ptr<Cholesky> same;
+    std::shared_ptr<const Factor> same;
     for (std::size_t other = 0; other < 3; ++other) {
       if (factor_[other] && fixed_[other] == fixed) same = factor_[other];
     }
     fixed_[at(axis)] = std::move(fixed);
     if (!same) {
       const ClusterSystem system = cluster_system(substep_.body, substep_.clusters, substep_.s, fixed_[at(axis)]);
-      same = std::make_shared<Cholesky>(cholmod_, matrix_of(system, cholmod_));
+      same = factorised(matrix_of(system, cholmod_), cholmod_);
     }
     factor_[at(axis)] = std::move(same);
   }
@@ -326,7 +316,7 @@ class LinearStage {
         const double moment = substep_.rest.weight[at(i)] * known_part(i, axis, turned);
         for (const int32_t c : substep_.memberships.of(i)) right[at(c)] += moment;
       }
-      const std::vector<double> t = factor_[at(axis)]->solve(std::move(right));
+      const std::vector<double> t = solve(cholmod_, factor_[at(axis)]->get(), std::move(right));
       std::vector<uint8_t> next = given();
       for (int32_t i = 0; i < substep_.body.particle_count(); ++i) {
         if (!substep_.is_free(i)) continue;
@@ -342,7 +332,7 @@ class LinearStage {
   const Substep& substep_;
   Cholmod cholmod_;                            // before the factors: it outlives them
   std::array<std::vector<uint8_t>, 3> fixed_;  // [axis][n] of Fixed
-  std::array<std::shared_ptr<Cholesky>, 3> factor_;
+  std::array<std::shared_ptr<const Factor>, 3> factor_;
 };
 
 }  // namespace
@@ -356,8 +346,8 @@ ReferenceSolution reference_solution(const Setup& setup, const State& state) {
   Poses poses = poses_at(substep, result.x, state.clusters.rotation);
   if (state.clusters.count() > 0) {
     LinearStage linear(substep);
-    double left =
-        std::numeric_limits<double>::infinity();  // of the way to the limit, if changes go on shrinking so [h]
+    // Of the way to the limit, if changes go on shrinking so [h].
+    double left = std::numeric_limits<double>::infinity();
     while (result.alternations < kMostAlternations && !(result.converged && left < kConverged / 10)) {
       std::vector<Vec3> x = linear.positions(poses.rotation);
       const double change = greatest_change(x, result.x) / h;
@@ -400,8 +390,11 @@ PlainLimit plain_limit(const Setup& setup, const State& state, double tolerance,
   PlainLimit result;
   result.x = first_positions(substep);
   Poses poses = poses_at(substep, result.x, state.clusters.rotation);
-  result.energy.push_back(energy_at(substep, result.x, poses));
-  result.momentum_drift.push_back(drift(result.x));
+  const auto note = [&] {
+    result.energy.push_back(energy_at(substep, result.x, poses));
+    result.momentum_drift.push_back(drift(result.x));
+  };
+  note();
   while (result.iterations < most) {
     const std::vector<Vec3> goal = goals_of(substep, poses);
     std::vector<Vec3> x = result.x;
@@ -414,8 +407,7 @@ PlainLimit plain_limit(const Setup& setup, const State& state, double tolerance,
     result.last_change = greatest_change(x, result.x) / h;
     result.x = std::move(x);
     poses = poses_at(substep, result.x, poses.rotation);
-    result.energy.push_back(energy_at(substep, result.x, poses));
-    result.momentum_drift.push_back(drift(result.x));
+    note();
     ++result.iterations;
     if (result.last_change < tolerance) break;
   }

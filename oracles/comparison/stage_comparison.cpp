@@ -22,15 +22,15 @@ void end_frame(State& state) {
   ++state.frame;
 }
 
-Verdict verdict_on(const StageDifference& difference, std::string property) {
-  return {.property = std::move(property),
-          .stage = difference.stage,
-          .backend = {},
-          .frame = difference.frame,
-          .unit = "1",
-          .bound_source = kBoundSource,
-          .checked = 1,
-          .witness = {}};
+Verdict start_verdict(std::string property, Stage stage, int64_t frame) {
+  Verdict verdict;
+  verdict.property = std::move(property);
+  verdict.stage = stage;
+  verdict.frame = frame;
+  verdict.unit = "1";
+  verdict.bound_source = kBoundSource;
+  verdict.checked = 1;
+  return verdict;
 }
 
 // Where the stage moves nothing each of these is zero, and its count would only thin out the step's.
@@ -158,34 +158,27 @@ void StageComparison::compare_later_stage(const State& before, const State& afte
 
 Verdict verdict_of(Measure which, const MeasuredError& error, Stage stage, int64_t frame, const std::string& prefix) {
   const MeasureInfo& info = info_of(which);
-  Verdict verdict;
-  verdict.property = fmt::format("{}{}", prefix, info.name);
-  verdict.stage = stage;
-  verdict.frame = frame;
-  verdict.holds = error.holds();
-  verdict.measured = error.norm.max;
+  const ErrorNorm& norm = error.norm;
+  Verdict verdict = start_verdict(prefix + std::string(info.name), stage, frame);
+  verdict.measured = norm.max;
   verdict.bound = error.bound;
   verdict.unit = info.unit;
-  verdict.bound_source = kBoundSource;
-  verdict.checked = error.norm.count;
-  if (verdict.holds) return verdict;
-  (info.of_clusters ? verdict.witness.clusters : verdict.witness.particles) = {error.norm.where};
-  verdict.witness.text =
-      fmt::format("{} of {} {} are {:.3g} {} from the reference's", info.name,
-                  info.of_clusters ? "cluster" : "particle", error.norm.where, error.norm.max, info.unit);
+  verdict.checked = norm.count;
+  if (error.holds()) return verdict;
+  const Concerned concerned = info.of_clusters ? Concerned{{norm.where}} : Concerned{{}, {norm.where}};
+  fail(verdict, concerned, "{} of {} {} are {:.3g} {} from the reference's", info.name,
+       info.of_clusters ? "cluster" : "particle", norm.where, norm.max, info.unit);
   return verdict;
 }
 
 std::vector<Verdict> StageDifference::verdicts(const std::string& prefix) const {
-  std::vector<Verdict> verdicts = {verdict_on(*this, fmt::format("{}topology", prefix))};
+  std::vector<Verdict> verdicts = {start_verdict(prefix + "topology", stage, frame)};
   if (!decisions.empty()) {
-    Verdict& topology = verdicts.back();
-    topology.holds = false;
-    topology.measured = static_cast<double>(decisions.size());
-    topology.witness = decisions.front();
+    verdicts.back().measured = static_cast<double>(decisions.size());
+    fail(verdicts.back(), decisions.front());
   }
   if (stage == Stage::detect && due) {
-    verdicts.push_back(verdict_on(*this, fmt::format("{}removed particles", prefix)));
+    verdicts.push_back(start_verdict(prefix + "removed particles", stage, frame));
     if (detection && !detection->holds) {
       Verdict& removed = verdicts.back();
       removed.holds = false;

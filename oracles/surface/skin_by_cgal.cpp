@@ -9,6 +9,7 @@
 
 #include <array>
 #include <optional>
+#include <utility>
 
 #include "oracles/checks.h"
 #include "oracles/shape_sums.h"
@@ -44,47 +45,37 @@ std::optional<Mesh> mesh_of(const Skin& skin, const std::vector<Vec3>& points) {
   return mesh;
 }
 
-struct MeshShells {
-  std::vector<double> volume;      // [shells] signed [cube of the unit of `points`]
-  std::vector<double> magnitude;   // [shells] sum of the absolute terms of that sum, for its rounding bound
-  std::vector<int64_t> euler;      // [shells] V − E + F
-  std::vector<int64_t> triangles;  // [shells]
-  std::vector<int32_t> some_vertex;
+struct MeshShell {
+  double volume = 0;     // signed [cube of the unit of `points`]
+  double magnitude = 0;  // sum of the absolute terms of that sum, for its rounding bound
+  int64_t euler = 0;     // V − E + F
+  int64_t triangles = 0;
+  int32_t some_vertex = -1;
 };
 
 // Volume of a closed surface as the sum over its triangles of projected area times mean height: with vertices at
 // multiples of 1/2 every term is exact.
-MeshShells shells_of(Mesh& mesh, const Skin& skin, const std::vector<Vec3>& points) {
+std::vector<MeshShell> shells_of(Mesh& mesh, const Skin& skin, const std::vector<Vec3>& points) {
   auto label = mesh.add_property_map<Mesh::Face_index, std::size_t>("f:shell", 0).first;
-  const std::size_t count = pmp::connected_components(mesh, label);
-  MeshShells shells;
-  shells.volume.assign(count, 0);
-  shells.magnitude.assign(count, 0);
-  shells.euler.assign(count, 0);
-  shells.triangles.assign(count, 0);
-  shells.some_vertex.assign(count, -1);
+  std::vector<MeshShell> shells(pmp::connected_components(mesh, label));
   std::vector<uint8_t> counted(points.size(), 0);
   for (std::size_t t = 0; t < skin.triangles.size(); ++t) {
-    const std::size_t shell = label[Mesh::Face_index(static_cast<uint32_t>(t))];
+    MeshShell& shell = shells[label[Mesh::Face_index(static_cast<uint32_t>(t))]];
     const auto& triangle = skin.triangles[t];
-    const Vec3 a = points[at(triangle[0])];
-    const Vec3 b = points[at(triangle[1])] - a;
-    const Vec3 c = points[at(triangle[2])] - a;
+    const Vec3 a = points[at(triangle[0])], b = points[at(triangle[1])] - a, c = points[at(triangle[2])] - a;
     const double height = 3 * a.z + b.z + c.z;
-    shells.volume[shell] += height * (b.x * c.y - b.y * c.x);
-    shells.magnitude[shell] += std::abs(height) * (std::abs(b.x * c.y) + std::abs(b.y * c.x));
-    ++shells.triangles[shell];
-    shells.some_vertex[shell] = triangle[0];
+    shell.volume += height * (b.x * c.y - b.y * c.x);
+    shell.magnitude += std::abs(height) * (std::abs(b.x * c.y) + std::abs(b.y * c.x));
+    ++shell.triangles;
+    shell.some_vertex = triangle[0];
     for (const int32_t v : triangle) {
-      if (counted[at(v)]) continue;
-      counted[at(v)] = 1;
-      ++shells.euler[shell];
+      if (std::exchange(counted[at(v)], uint8_t{1}) == 0) ++shell.euler;
     }
   }
-  for (std::size_t s = 0; s < count; ++s) {
-    shells.volume[s] /= 6;
-    shells.magnitude[s] /= 6;
-    shells.euler[s] += shells.triangles[s] - 3 * shells.triangles[s] / 2;
+  for (MeshShell& shell : shells) {
+    shell.volume /= 6;
+    shell.magnitude /= 6;
+    shell.euler += shell.triangles - 3 * shell.triangles / 2;
   }
   return shells;
 }
@@ -156,17 +147,16 @@ void check_skin_geometry(Judged& judged, Verdict& verdict) {
                 static_cast<uint32_t>(crossing[0].first), static_cast<uint32_t>(crossing[0].second));
   }
 
-  const MeshShells shells = shells_of(*mesh, skin, points);
   double volume = 0, magnitude = 0;
   int32_t outer = 0, inner = 0;
-  for (std::size_t s = 0; s < shells.volume.size(); ++s) {
-    volume += shells.volume[s];
-    magnitude += shells.magnitude[s];
-    (shells.volume[s] > 0 ? outer : inner) += 1;
-    if (shells.euler[s] % 2 != 0 || shells.euler[s] > 2) {
-      verdict.measured = static_cast<double>(shells.euler[s]);
-      return fail(verdict, owners_of(skin, {shells.some_vertex[s]}),
-                  "a shell has Euler number {}, which no closed surface has", shells.euler[s]);
+  for (const MeshShell& shell : shells_of(*mesh, skin, points)) {
+    volume += shell.volume;
+    magnitude += shell.magnitude;
+    (shell.volume > 0 ? outer : inner) += 1;
+    if (shell.euler % 2 != 0 || shell.euler > 2) {
+      verdict.measured = static_cast<double>(shell.euler);
+      return fail(verdict, owners_of(skin, {shell.some_vertex}),
+                  "a shell has Euler number {}, which no closed surface has", shell.euler);
     }
   }
   const std::vector<uint8_t> tissue = tissue_nodes(setup.body, state);
@@ -198,8 +188,8 @@ std::optional<ShellCount> skin_shells(const Skin& skin) {
   std::optional<Mesh> mesh = mesh_of(skin, skin.position);
   if (!mesh) return std::nullopt;
   ShellCount count;
-  for (const double volume : shells_of(*mesh, skin, skin.position).volume) {
-    (volume > 0 ? count.outer : count.inner) += 1;
+  for (const MeshShell& shell : shells_of(*mesh, skin, skin.position)) {
+    (shell.volume > 0 ? count.outer : count.inner) += 1;
   }
   return count;
 }
