@@ -189,7 +189,7 @@ void check_detection(const StageRun& run, Verdict& verdict) {
   const State &before = run.before, &after = run.after;
   const TissueGraph graph(setup.body, before.alive);
   const double h = setup.body.grid.spacing;
-  const double limit = setup.detect.epsilon * h;
+  const double limit = setup.detect.epsilon * h, u = unit_roundoff(before);
   const Criterion criterion = needs_detection(setup) ? setup.detect.criterion : Criterion::none;
   const Swept swept(setup, criterion == Criterion::geometric ? before.frame : setup.frame_count());
   std::vector<int32_t> gone;
@@ -202,20 +202,10 @@ void check_detection(const StageRun& run, Verdict& verdict) {
     ++verdict.checked;
     if (!is) gone.push_back(i);
     const Stretch stretch = stretch_of(graph, before.x, i);
-    Demand demand = Demand::keep;
-    switch (criterion) {
-      case Criterion::none:
-        break;
-      case Criterion::distance:
-        demand = demand_of_distance(stretch.distance, limit, unit_roundoff(before));
-        break;
-      case Criterion::geometric:
-        demand = swept.demand_of(stretch.distance, before.x[at(i)], unit_roundoff(before));
-        break;
-      case Criterion::strain:
-        demand = Demand::either;
-        break;
-    }
+    const Demand demand = criterion == Criterion::distance    ? demand_of_distance(stretch.distance, limit, u)
+                          : criterion == Criterion::geometric ? swept.demand_of(stretch.distance, before.x[at(i)], u)
+                          : criterion == Criterion::strain    ? Demand::either
+                                                              : Demand::keep;
     if (demand == Demand::either || (demand == Demand::remove) == !is) continue;
     std::vector<int32_t> particles = {i};
     if (stretch.neighbour >= 0) particles.push_back(stretch.neighbour);

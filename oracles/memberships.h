@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "model/at.h"
 #include "model/clusters.h"
 
 namespace cutproof::oracles {
@@ -14,15 +15,14 @@ namespace cutproof::oracles {
 template <class T>
 class Rows {
  public:
-  Rows(int32_t keys, const std::vector<std::pair<int32_t, T>>& given)
-      : offsets_(static_cast<std::size_t>(keys) + 1), values_(given.size()) {
-    for (const auto& [key, value] : given) ++offsets_[static_cast<std::size_t>(key) + 1];
+  Rows(int32_t keys, const std::vector<std::pair<int32_t, T>>& given) : offsets_(at(keys) + 1), values_(given.size()) {
+    for (const auto& [key, value] : given) ++offsets_[at(key) + 1];
     std::partial_sum(offsets_.begin(), offsets_.end(), offsets_.begin());
     std::vector<std::size_t> next = offsets_;
-    for (const auto& [key, value] : given) values_[next[static_cast<std::size_t>(key)]++] = value;
+    for (const auto& [key, value] : given) values_[next[at(key)]++] = value;
   }
   std::span<const T> of(int32_t key) const {
-    const auto k = static_cast<std::size_t>(key);
+    const auto k = at(key);
     return {values_.data() + offsets_[k], offsets_[k + 1] - offsets_[k]};
   }
 

@@ -46,7 +46,7 @@ std::string problem_of(const std::function<void()>& run) {
 // Backends that nobody else uses for as long as they are lent.
 class Pool {
  public:
-  explicit Pool(int count) : idle_(static_cast<std::size_t>(count)) {}
+  explicit Pool(int count) : idle_(at(count)) {}
 
   std::unique_ptr<Backend> take() {
     std::unique_lock lock(guard_);

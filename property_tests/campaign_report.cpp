@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* kFormat = "cutproof.fuzz";
+constexpr const char* kResultFormat = "cutproof.fuzz";
 constexpr int kFormatVersion = 2;
 // Classes of cases are rare: below this many cases, or with small ones only, an empty class says nothing.
 constexpr int64_t kCasesThatMeetEveryClass = 1000;
@@ -89,7 +89,7 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
   json coverage = json::object();
   for (std::size_t h = 0; h < kCoverageClassCount; ++h) coverage[kCoverageClassNames[h]] = campaign.coverage.begin()[h];
   json document = {
-      {"format", kFormat},
+      {"format", kResultFormat},
       {"format_version", kFormatVersion},
       {"version", CUTPROOF_VERSION},
       {"backend", backend.name},
@@ -134,7 +134,7 @@ json merge_shards(const std::vector<std::string>& files) {
   for (const std::string& file : files) {
     try {
       const json part = json::parse(io::read_text(file));
-      if (part.at("format") != kFormat || part.at("format_version") != kFormatVersion) {
+      if (part.at("format") != kResultFormat || part.at("format_version") != kFormatVersion) {
         throw InputError(file, "format", "this is not a result of `cutproof fuzz` of this version", kRemedy);
       }
       if (!shards.insert(part.at("shard").get<int64_t>()).second) {

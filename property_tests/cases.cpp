@@ -62,14 +62,14 @@ std::vector<Node> sheet(Random& random, Node dims) {
 // A random walk on the grid that seldom turns.
 std::vector<Node> wire(Random& random, Node dims) {
   std::set<Node> nodes;
-  Node at = {random.between(0, dims[0] - 1), random.between(0, dims[1] - 1), random.between(0, dims[2] - 1)};
+  Node place = {random.between(0, dims[0] - 1), random.between(0, dims[1] - 1), random.between(0, dims[2] - 1)};
   const int32_t steps = 3 * (dims[0] + dims[1] + dims[2]);
   auto direction = random.index(6);
   for (int32_t s = 0; s < steps; ++s) {
-    nodes.insert(at);
+    nodes.insert(place);
     if (random.chance(0.2)) direction = random.index(6);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      at[axis] = std::clamp(at[axis] + kDirections[direction][axis], 0, dims[axis] - 1);
+      place[axis] = std::clamp(place[axis] + kDirections[direction][axis], 0, dims[axis] - 1);
     }
   }
   return {nodes.begin(), nodes.end()};
@@ -162,7 +162,7 @@ Stroke draw_stroke(Random& random, Node dims) {
 // Connected sets of at most `most` particles that cover the body: I1, I2 and nothing more.
 std::vector<std::vector<int32_t>> connected_cover(const Body& body, int32_t most, uint64_t seed) {
   Random random(seed);
-  std::vector<uint8_t> covered(static_cast<std::size_t>(body.particle_count()), 0);
+  std::vector<uint8_t> covered(at(body.particle_count()), 0);
   std::vector<int32_t> order(body.node.size());
   std::iota(order.begin(), order.end(), 0);
   for (std::size_t k = order.size(); k > 1; --k) {
@@ -170,16 +170,16 @@ std::vector<std::vector<int32_t>> connected_cover(const Body& body, int32_t most
   }
   std::vector<std::vector<int32_t>> clusters;
   for (const int32_t start : order) {
-    if (covered[static_cast<std::size_t>(start)]) continue;
+    if (covered[at(start)]) continue;
     std::vector<int32_t> members = {start};
-    const auto wanted = static_cast<std::size_t>(random.between(1, most));
+    const auto wanted = at(random.between(1, most));
     for (int32_t attempt = 0; attempt < 6 * most && members.size() < wanted; ++attempt) {
       const int32_t from = members[random.index(members.size())];
       const int32_t next = body.neighbour(from, random.between(0, 5));
       if (next >= 0 && std::find(members.begin(), members.end(), next) == members.end()) members.push_back(next);
     }
     std::sort(members.begin(), members.end());
-    for (const int32_t p : members) covered[static_cast<std::size_t>(p)] = 1;
+    for (const int32_t p : members) covered[at(p)] = 1;
     clusters.push_back(std::move(members));
   }
   return clusters;
@@ -190,7 +190,7 @@ std::vector<std::vector<int32_t>> connected_cover(const Body& body, int32_t most
 Vec3 metric(Quarters p, double h) { return (h / 4) * Vec3{1.0 * p[0], 1.0 * p[1], 1.0 * p[2]}; }
 
 Vec3 direction_vector(int32_t direction) {
-  const auto& d = kDirections[static_cast<std::size_t>(direction)];
+  const auto& d = kDirections[at(direction)];
   return {1.0 * d[0], 1.0 * d[1], 1.0 * d[2]};
 }
 
@@ -231,7 +231,7 @@ void add_moves(const Stroke& stroke, Vec3 first_node, const Case& c, Setup& setu
 // The schedule (Setup): the strokes one after the other; in what is left of the last frame the blade is lifted.
 void add_schedule(const Case& c, Vec3 first_node, Setup& setup) {
   for (const Stroke& stroke : resolved_strokes(c)) add_moves(stroke, first_node, c, setup);
-  const auto substeps = static_cast<std::size_t>(setup.step.substeps);
+  const auto substeps = at(setup.step.substeps);
   while (setup.blade_moves.size() % substeps != 0) {
     BladeMove lifted = setup.blade_moves.back();
     lifted.from = lifted.to;
@@ -249,8 +249,8 @@ void tell_apart(Clusters& clusters) {
   for (int32_t c = 0; c < clusters.count(); ++c) {
     const double angle = kGreatestAngle * (c + 1) / clusters.count();
     const double cosine = std::cos(angle), sine = std::sin(angle);
-    clusters.rotation[static_cast<std::size_t>(c)] = {{cosine, -sine, 0, sine, cosine, 0, 0, 0, 1}};
-    clusters.degenerate[static_cast<std::size_t>(c)] = c % 3 == 1;
+    clusters.rotation[at(c)] = {{cosine, -sine, 0, sine, cosine, 0, 0, 0, 1}};
+    clusters.degenerate[at(c)] = c % 3 == 1;
   }
 }
 

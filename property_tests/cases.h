@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "model/at.h"
 #include "model/setup.h"
 #include "model/state.h"
 

@@ -1,5 +1,5 @@
 // Which classes of cases, or of histories, have occurred, and how often. A class that never occurs means that nothing
-// was tested there, so every class must (testing.md, Properties: rapidcheck has no coverage assertions).
+// was tested there, so every class must (architecture.md, Properties: rapidcheck has no coverage assertions).
 #pragma once
 #include <algorithm>
 #include <array>
@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+
+#include "model/at.h"
 
 namespace cutproof::property_tests {
 
@@ -18,7 +20,7 @@ class Coverage {
   int64_t& operator[](std::string_view name) {
     const auto found = std::find(names.begin(), names.end(), name);
     if (found == names.end()) throw std::logic_error("There is no class named '" + std::string(name) + "'.");
-    return counts_[static_cast<std::size_t>(found - names.begin())];
+    return counts_[at(found - names.begin())];
   }
   void add(const Coverage& other) {
     for (std::size_t k = 0; k < names.size(); ++k) counts_[k] += other.counts_[k];

@@ -36,10 +36,9 @@ void note_what_a_stage_did(const Setup& setup, Stage stage, const State& before,
   const auto clusters_before = before.clusters.count(), clusters_after = after.clusters.count();
   switch (stage) {
     case Stage::detect: {
-      const auto is_down = [&](int64_t substep) { return setup.blade_moves[static_cast<std::size_t>(substep)].down; };
       bool down = false;  // detection may also run without a blade
       for (int32_t s = 0; setup.has_blade && s < setup.step.substeps; ++s) {
-        down = down || is_down(before.frame * setup.step.substeps + s);
+        down = down || setup.blade_moves[at(before.frame * setup.step.substeps + s)].down;
       }
       if (!after.removed.empty()) seen["removal"] = true;
       if (after.removed.empty() && down && alive_count(before) > 0) seen["miss"] = true;
@@ -107,7 +106,7 @@ std::vector<CaseRun> run_cases(Backend& backend, const std::vector<Instance>& lo
     }
   }
   for (Verdict& broken : traces.broken_contracts) {
-    std::optional<Verdict>& failure = runs[static_cast<std::size_t>(broken.body)].failure;
+    std::optional<Verdict>& failure = runs[at(broken.body)].failure;
     if (!failure) failure = std::move(broken);
   }
   return runs;
@@ -160,7 +159,7 @@ Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, 
     const auto due = harness::due_stages(setup, before, moment.span, after);
     const auto due_count = std::count(due.begin(), due.end(), true);
     for (const Stage stage : kStages) {
-      if (due[static_cast<std::size_t>(stage)]) note_what_a_stage_did(setup, stage, before, after, seen);
+      if (due[at(stage)]) note_what_a_stage_did(setup, stage, before, after, seen);
     }
     const int32_t components_before = std::exchange(components, judge.component_count());
     if (moment.span.contains(Stage::detect) && components > components_before) seen["separation"] = true;

@@ -1,4 +1,4 @@
-// The hard cases of testing.md, Hard cases, each with the behaviour that is expected of every backend. After every
+// The hard cases of architecture.md, Hard cases, each with the behaviour that is expected of every backend. After every
 // stage every oracle is asked, and every stage is compared with the reference's from the same state (judge_case).
 // Particle counts around the sizes of warps and blocks: properties.cpp, DissectsBodiesOfSizesAroundThoseOfBlocks.
 // Rotations have hard cases of their own: fixtures/hard_matrices.h.
@@ -70,8 +70,8 @@ double greatest_strain(const Setup& setup, const State& state) {
   for (int32_t p = 0; p < body.particle_count(); ++p) {
     for (int direction = 0; direction < 6; direction += 2) {
       const int32_t q = body.neighbour(p, direction);
-      if (q < 0 || !state.alive[static_cast<std::size_t>(p)] || !state.alive[static_cast<std::size_t>(q)]) continue;
-      const double length = norm(state.x[static_cast<std::size_t>(p)] - state.x[static_cast<std::size_t>(q)]);
+      if (q < 0 || !state.alive[at(p)] || !state.alive[at(q)]) continue;
+      const double length = norm(state.x[at(p)] - state.x[at(q)]);
       most = std::max(most, std::abs(length / body.grid.spacing - 1));
     }
   }
@@ -123,7 +123,7 @@ class HardCases : public ::testing::TestWithParam<NamedBackend> {
   Instance undisturbed(const Case& c, int64_t frames, double dt) const {
     Instance loaded = instance_of(c);
     without_blade(loaded.setup);
-    loaded.setup.substep_length.assign(static_cast<std::size_t>(frames), dt);
+    loaded.setup.substep_length.assign(at(frames), dt);
     loaded.state = in_arithmetic_of(*backend_, std::move(loaded.state));
     return loaded;
   }
@@ -468,7 +468,7 @@ TEST_P(HardCases, AThousandStrokesOnOneBodyKeepEveryInvariant) {
     EXPECT_LE(alive_in(*state), before) << "what is dead stays dead";
     before = alive_in(*state);
     for (int32_t k = 0; k < state->clusters.count(); ++k) {
-      ASSERT_EQ(state->clusters.number[static_cast<std::size_t>(k)], k) << "numbers are compact after a frame";
+      ASSERT_EQ(state->clusters.number[at(k)], k) << "numbers are compact after a frame";
     }
   }
   EXPECT_GT(frames_with_removals, strokes / 16);

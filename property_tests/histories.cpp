@@ -17,7 +17,7 @@
 namespace cutproof::property_tests {
 namespace {
 
-Stage stage_at(int32_t index) { return kStages[static_cast<std::size_t>(index % 6)]; }
+Stage stage_at(int32_t index) { return kStages[at(index % 6)]; }
 
 // The last stage that ran, as recordings name it.
 Stage before(Stage next) { return stage_at(static_cast<int32_t>(next) + 5); }
@@ -166,7 +166,7 @@ void History::run_span(Span span, bool whole) {
   const bool cuts = judgement.coverage["removal"] > 0;
   if (cuts && has_kicked_) ++coverage_["removal after a kick"];
   if (judgement.coverage["separation"] > 0) {
-    const auto move = static_cast<std::size_t>(start.frame * loaded_.setup.step.substeps);
+    const auto move = at(start.frame * loaded_.setup.step.substeps);
     if (loaded_.setup.blade_moves[move].stroke >= given_strokes_) ++coverage_["separation by a stroke that came later"];
   }
   if (!whole_) return;
@@ -190,7 +190,7 @@ void History::wait_for_frames(int64_t count) {
   Stroke pause;
   pause.down = false;
   if (!case_.strokes.empty()) pause.from = pause.to = resolved_strokes(case_).back().to;
-  case_.strokes.insert(case_.strokes.end(), static_cast<std::size_t>(missing), pause);
+  case_.strokes.insert(case_.strokes.end(), at(missing), pause);
   change_schedule();
 }
 
@@ -210,7 +210,7 @@ void History::carry_out(const Kick& command) {
   const oracles::Partition components = oracles::graph_components(setup, state_);
   if (components.count == 0 || failure_) return;
   const int32_t component = command.component % components.count;
-  const double quarter = case_.spacing / 4, dt = setup.substep_length[static_cast<std::size_t>(state_.frame)];
+  const double quarter = case_.spacing / 4, dt = setup.substep_length[at(state_.frame)];
   const auto [u, v, w] = command.velocity;
   State kicked = state_;
   for (std::size_t i = 0; i < kicked.v.size(); ++i) {

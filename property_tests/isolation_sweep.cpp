@@ -1,5 +1,5 @@
-// The experiment of method.md §2: how often do cuts leave connected tissue whose clusters are no longer coupled, and
-// what does expansion do about it?
+// The experiment of accuracy.md, Claims of the paper: how often do cuts leave connected tissue whose clusters are no
+// longer coupled, and what does expansion do about it?
 //
 // Random bodies of up to 19 × 19 × 10 nodes get `sampled` clusters with a ball radius of 1.6 to 3.27 nodes and a
 // spacing of the radius divided by a ratio, which is swept; then 1 to 4 partial planar cuts of half-thickness 0.45
@@ -58,19 +58,19 @@ Body random_body(Random& random) {
 
 // Particles within the half-thickness of a plane, on one side of a line in it: a cut that ends inside the body.
 std::vector<uint8_t> random_cuts(Random& random, const Body& body) {
-  std::vector<uint8_t> removed(static_cast<std::size_t>(body.particle_count()), 0);
+  std::vector<uint8_t> removed(at(body.particle_count()), 0);
   const int32_t cuts = random.between(1, kMostCuts);
   for (int32_t cut = 0; cut < cuts; ++cut) {
     Vec3 through;
     for (int axis = 0; axis < 3; ++axis) {
-      through[axis] = random.real(1, body.grid.nodes[static_cast<std::size_t>(axis)] - 2);
+      through[axis] = random.real(1, body.grid.nodes[at(axis)] - 2);
     }
     const Vec3 normal = random_direction(random), forward = random_direction(random);
     const double half_thickness = random.real(kLeastHalfThickness, kGreatestHalfThickness);
     for (int32_t p = 0; p < body.particle_count(); ++p) {
       const Vec3 way = body.rest_position(p) - through;  // spacing 1
       if (std::abs(dot(normal, way)) <= half_thickness && dot(forward, way) >= 0) {
-        removed[static_cast<std::size_t>(p)] = 1;
+        removed[at(p)] = 1;
       }
     }
   }
@@ -123,7 +123,7 @@ void print(const std::string& name, const Row& row) {
 
 int sweep(int64_t bodies, uint64_t seed) {
   fmt::print(
-      "Uncoupled connected tissue after cuts (method.md, section 2)\n"
+      "Uncoupled connected tissue after cuts (accuracy.md, Claims of the paper)\n"
       "seed {}; {} bodies of up to {} x {} x {} nodes; ball radius {} to {} nodes, spacing = radius / ratio;\n"
       "1 to {} partial planar cuts of half-thickness {} to {} nodes at once; no merging\n\n",
       seed, bodies, kMostNodes[0], kMostNodes[1], kMostNodes[2], kLeastRadius, kGreatestRadius, kMostCuts,

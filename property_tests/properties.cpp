@@ -1,4 +1,4 @@
-// Properties of every backend over random dissections (testing.md, Properties).
+// Properties of every backend over random dissections (architecture.md, Properties).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -137,8 +137,7 @@ Instance cut_and_disturbed(Backend& backend, const Case& c) {
   for (Vec3& x : loaded.state.x) {
     for (int axis = 0; axis < 3; ++axis) x[axis] += random.real(-0.3, 0.3) * c.spacing;
   }
-  loaded.setup.has_blade = false;
-  loaded.setup.blade_moves.clear();
+  without_blade(loaded.setup);
   loaded.setup.substep_length = {random.real(0.0005, 0.02)};
   loaded.setup.step.iterations = 3;
   loaded.setup.step.stiffness = std::pow(10, random.real(2, 7));
@@ -151,7 +150,7 @@ TEST_P(EveryBackend, StepsACutBodyWithoutGhostForcesAndWithoutEnergyFromNowhere)
   check(id(), cases_of(10), GetParam().most_size, [&](const Case& c) {
     const Instance cut = cut_and_disturbed(*backend_, c);
     int32_t kicked = 0;
-    while (kicked < cut.setup.body.particle_count() && !cut.state.alive[static_cast<std::size_t>(kicked)]) ++kicked;
+    while (kicked < cut.setup.body.particle_count() && !cut.state.alive[at(kicked)]) ++kicked;
     const Vec3 kick = {0.7 * c.spacing, -0.4 * c.spacing, 1.3 * c.spacing};
     const Verdict verdicts[] = {
         oracles::no_ghost_force(*backend_, cut.setup, cut.state, kicked, kick, 1),

@@ -5,6 +5,8 @@
 #include <initializer_list>
 #include <random>
 
+#include "model/at.h"
+
 namespace cutproof::property_tests {
 
 class Random {

@@ -195,7 +195,7 @@ void describe(Visitor& v, StepParameters& s) {
   v.field({.name = "relaxation", .bounds = above(0, 1), .doc = "s, `published` only."}, s.relaxation);
   v.field({.name = "acceleration",
            .doc = "`implicit` only. `chebyshev`: the same answer in fewer iterations, each of which costs a little "
-                  "more; the energy need not fall in every one (docs/design/solvers.md)."},
+                  "more; the energy need not fall in every one (method.md §11)."},
           s.acceleration);
   v.field({.name = "damping", .unit = "1/s", .bounds = between(0, 1e9), .doc = "c: velocities decay as exp(−c t)."},
           s.damping);

@@ -165,18 +165,11 @@ struct Scale {
 };
 
 std::string_view unit_of(Quantity quantity) {
-  switch (quantity) {
-    case Quantity::point:
-      return "h";
-    case Quantity::velocity:
-      return "h/dt";
-    case Quantity::momentum:
-      return "kg m/s";
-    case Quantity::rotation:
-      return "rad";
-    default:
-      return "1";
-  }
+  return quantity == Quantity::point      ? "h"
+         : quantity == Quantity::velocity ? "h/dt"
+         : quantity == Quantity::momentum ? "kg m/s"
+         : quantity == Quantity::rotation ? "rad"
+                                          : "1";
 }
 
 template <class T>

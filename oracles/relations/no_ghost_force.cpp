@@ -28,9 +28,9 @@ Verdict no_ghost_force(Backend& backend, const Setup& setup, const State& state,
     for (std::size_t i = 0; i < state.x.size(); ++i) {
       if (!state.alive[i] || partition.label[i] == kicked) continue;
       ++verdict.checked;
-      const bool same =
-          same_bits(quiet.x[i], moved.x[i]) && same_bits(quiet.v[i], moved.v[i]) && quiet.alive[i] == moved.alive[i];
-      if (same) continue;
+      if (same_bits(quiet.x[i], moved.x[i]) && same_bits(quiet.v[i], moved.v[i]) && quiet.alive[i] == moved.alive[i]) {
+        continue;
+      }
       violate(verdict, {{}, {particle, static_cast<int32_t>(i)}},
               "particle {} ends {} m elsewhere because the component of particle {}, to which it is not connected, was "
               "kicked",
