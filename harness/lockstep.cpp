@@ -44,8 +44,9 @@ Lockstep::Lockstep(const Setup& setup, const State& start, const State& loaded, 
   // What the backend has made of what it was given.
   const Verdict form = oracles::well_formed(setup_, loaded);
   if (!form.holds) {
-    differ(Stage::step,
-           {fmt::format("as loaded: {}", form.witness.text), form.witness.clusters, form.witness.particles});
+    oracles::DecisionDifference difference{form.witness};
+    difference.text = fmt::format("as loaded: {}", form.witness.text);
+    differ(Stage::step, difference);
     broken_ = true;
     return;
   }
@@ -99,7 +100,7 @@ void Lockstep::differ(Stage stage, const oracles::DecisionDifference& difference
   topology_.failure->frame = frame_;
   topology_.failure->stage = stage;
   topology_.failure->holds = false;
-  topology_.failure->witness = {difference.clusters, difference.particles, {}, difference.text};
+  topology_.failure->witness = difference;
 }
 
 void Lockstep::note(Measure which, Stage stage, const MeasuredError& error, oracles::ErrorNorm& of_frame) {
