@@ -21,7 +21,7 @@ struct InfoOptions {
 
 // When it is judged: a property of a state says so itself, one of a stage after the stages that promise it.
 std::string due_of(const oracles::Property& property) {
-  if (property.check_state != nullptr) return std::string(property.due_if);
+  if (property.check_state != nullptr) return std::string(property.due.text);
   std::vector<std::string_view> names;
   for (const Stage stage : kStages) {
     if (property.promised_by.contains(stage)) names.push_back(name_of(stage));
