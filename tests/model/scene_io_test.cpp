@@ -12,6 +12,7 @@
 #include "model/error.h"
 #include "model/io/atomic_file.h"
 #include "model/io/scene_fields.h"
+#include "model/rules.h"
 
 namespace cutproof::io {
 namespace {
@@ -50,12 +51,8 @@ void expect_error(const json& scene, const std::string& field, const std::vector
 class Scrambler {
  public:
   template <class T>
-  void field(const Field& f, T& value) {
+  void field(T& value, const Field& f) {
     change(f, value);
-  }
-  template <class Describe>
-  void group(const Field&, Describe&& describe_fields) {
-    describe_fields(*this);
   }
   bool applies(bool condition) const { return condition; }
 
@@ -87,7 +84,8 @@ class Scrambler {
   }
   template <class E>
   requires(std::is_enum_v<E>) void change(const Field&, E& value) {
-    if constexpr (!std::is_same_v<E, Shape::Kind> && !std::is_same_v<E, Curve>) value = words(E{}).back().first;
+    if constexpr (!std::is_same_v<E, Shape::Kind> && !std::is_same_v<E, Curve>)
+      value = static_cast<E>(names_of(E{}).size() - 1);
   }
   template <class T>
   void change(const Field& f, std::optional<T>& value) {
@@ -122,11 +120,11 @@ Scene scrambled() {
 struct Probe {
   std::string path;
   std::vector<std::pair<std::string, Bounds>> found;
-  void field(const Field&, bool&) {}
-  void field(const Field& f, double&) { found.emplace_back(f.name, f.bounds); }
-  void field(const Field& f, int32_t&) { found.emplace_back(f.name, f.bounds); }
+  void field(bool&, const Field&) {}
+  void field(double&, const Field& f) { found.emplace_back(f.name, f.bounds); }
+  void field(int32_t&, const Field& f) { found.emplace_back(f.name, f.bounds); }
   template <class T>
-  void field(const Field&, T&) {}
+  void field(T&, const Field&) {}
   bool applies(bool) const { return true; }
 };
 
@@ -203,24 +201,27 @@ TEST(SceneIo, NumbersKeepAllTheirBits) {
 
 TEST(SceneIo, EveryWordOfEveryEnumerationIsReadBack) {
   Scene scene = parse_scene(kSmallest, "scene.json");
-  for (const auto& [criterion, word] : words(Criterion{})) {
-    for (const auto& [merge, merge_word] : words(MergeRule{})) {
-      for (const auto& [expand, expand_word] : words(ExpandRule{})) {
+  const auto each = []<class E>(E, auto&& visit) {
+    for (std::size_t i = 0; i < names_of(E{}).size(); ++i) visit(static_cast<E>(i));
+  };
+  each(Criterion{}, [&](Criterion criterion) {
+    each(MergeRule{}, [&](MergeRule merge) {
+      each(ExpandRule{}, [&](ExpandRule expand) {
         scene.detect.criterion = criterion;
         scene.merge.rule = merge;
         scene.expand.rule = expand;
         const Scene back = parse_scene(write_scene(scene), "scene.json");
-        EXPECT_EQ(back.detect.criterion, criterion) << word;
-        EXPECT_EQ(back.merge.rule, merge) << merge_word;
-        EXPECT_EQ(back.expand.rule, expand) << expand_word;
-      }
-    }
-  }
-  for (const auto& [kind, word] : words(Shape::Kind{})) {
+        EXPECT_EQ(back.detect.criterion, criterion) << name_of(criterion);
+        EXPECT_EQ(back.merge.rule, merge) << name_of(merge);
+        EXPECT_EQ(back.expand.rule, expand) << name_of(expand);
+      });
+    });
+  });
+  each(Shape::Kind{}, [&](Shape::Kind kind) {
     scene.body.shape->kind = kind;
     scene.body.shape->parts.assign(2, Shape{});
-    EXPECT_EQ(parse_scene(write_scene(scene), "scene.json").body.shape->kind, kind) << word;
-  }
+    EXPECT_EQ(parse_scene(write_scene(scene), "scene.json").body.shape->kind, kind) << name_of(kind);
+  });
   EXPECT_NE(write_scene(parse_scene(R"({"version": 1, "body": {"shape": {"kind": "union", "parts": [{"kind": "box"}]},
             "spacing": 1}})",
                                     "s"))
