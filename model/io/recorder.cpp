@@ -139,8 +139,18 @@ struct Recorder::File {
   void add(Stage stage, const State& state);
   void finish();
 
-  // Declared first, so that temporary files are removed after HDF5 has let go of them.
-  AtomicFile index_target, particles_target, skin_target, blade_target;
+  // A file for ParaView.
+  struct Shown {
+    Shown(const std::string& path, PolyDataFile::Cells cells) : target(path), file(target.temporary(), cells) {}
+    void show(PolyDataFile::Step step, bool instead_of_last) {
+      if (instead_of_last) steps.pop_back();
+      steps.push_back(std::move(step));
+    }
+    AtomicFile target;  // declared first, so that the temporary file is removed after HDF5 has let go of it
+    PolyDataFile file;
+    std::vector<PolyDataFile::Step> steps;
+  };
+
   std::string name;
   Setup setup;
   std::vector<double> time;  // [frames + 1] at the start of each frame [s]
@@ -148,8 +158,9 @@ struct Recorder::File {
   std::optional<Precision> precision;  // of all states
   bool is_open = true;                 // false: finished, or something could not be written
 
+  AtomicFile index_target;
   hdf5::File index;
-  PolyDataFile particles, skin, blade;
+  Shown particles, skin, blade;
   hdf5::Table particle_table, cluster_table;
 
   // One row per snapshot. Whatever did not change since the snapshot before is stored once.
@@ -159,7 +170,6 @@ struct Recorder::File {
 
   PolyDataFile::Part body_part = PolyDataFile::kNothing, skin_part = PolyDataFile::kNothing,
                      blade_part = PolyDataFile::kNothing;
-  std::vector<PolyDataFile::Step> particle_steps, skin_steps, blade_steps;
   std::optional<int64_t> step_frames;  // frames_done of the last step
 
  private:
@@ -174,17 +184,14 @@ struct Recorder::File {
 
 Recorder::File::File(const std::string& given_name, const Setup& given, const std::string& scene_json,
                      const std::string& backend)
-    : index_target(recording_paths(given_name).index),
-      particles_target(recording_paths(given_name).particles),
-      skin_target(recording_paths(given_name).skin),
-      blade_target(recording_paths(given_name).blade),
-      name(recording_paths(given_name).index),
+    : name(recording_paths(given_name).index),
       setup(given),
       time(1, 0.0),
+      index_target(name),
       index(hdf5::File::create(index_target.temporary())),
-      particles(particles_target.temporary(), PolyDataFile::Cells::vertices),
-      skin(skin_target.temporary(), PolyDataFile::Cells::polygons),
-      blade(blade_target.temporary(), PolyDataFile::Cells::polygons) {
+      particles(recording_paths(given_name).particles, PolyDataFile::Cells::vertices),
+      skin(recording_paths(given_name).skin, PolyDataFile::Cells::polygons),
+      blade(recording_paths(given_name).blade, PolyDataFile::Cells::polygons) {
   for (const double dt : setup.substep_length) time.push_back(time.back() + dt * setup.step.substeps);
 
   digest.add(setup.body.node);
@@ -195,7 +202,7 @@ Recorder::File::File(const std::string& given_name, const Setup& given, const st
   write_setup(index.id(), setup);
 
   // Point data is made in the order of the fields, after `particle` and before `cluster`.
-  particle_table = particles.make_point_data("particle", hdf5::layout_of<int32_t>());
+  particle_table = particles.file.make_point_data("particle", hdf5::layout_of<int32_t>());
   const hdf5::Id cluster_group = hdf5::create_group(index.id(), "clusters");
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     const RecordedField& recorded = recorded_fields()[k];
@@ -203,7 +210,7 @@ Recorder::File::File(const std::string& given_name, const Setup& given, const st
     if (recorded.storage != Storage::rows) continue;
     Track& track = tracks[k];
     const bool on_particles = recorded.field.space == IndexSpace::particle;
-    PolyDataFile& file = on_particles ? particles : skin;
+    PolyDataFile& file = on_particles ? particles.file : skin.file;
     track.table = &track.own;
     if (!on_particles && recorded.field.space != IndexSpace::vertex) {
       track.own = hdf5::Table::create(cluster_group.get(), recorded.name(), recorded.entry);
@@ -213,7 +220,7 @@ Recorder::File::File(const std::string& given_name, const Setup& given, const st
       track.own = file.make_point_data(recorded.name(), recorded.entry);
     }
   }
-  cluster_table = particles.make_point_data("cluster", hdf5::layout_of<int32_t>());
+  cluster_table = particles.file.make_point_data("cluster", hdf5::layout_of<int32_t>());
 
   const auto n = setup.body.particle_count();
   if (n > 0) {
@@ -221,7 +228,7 @@ Recorder::File::File(const std::string& given_name, const Setup& given, const st
     std::iota(vertex_offsets.begin(), vertex_offsets.end(), 0);
     const std::span<const int64_t> vertices = std::span(vertex_offsets).first(static_cast<std::size_t>(n));
     particle_table.append(bytes_of(std::vector<int32_t>(vertices.begin(), vertices.end())));
-    body_part = particles.add_part(n, vertex_offsets, vertices);
+    body_part = particles.file.add_part(n, vertex_offsets, vertices);
   }
 }
 
@@ -246,9 +253,10 @@ int64_t Recorder::File::store_triangles(Latest& latest, const State& state, bool
       connectivity.insert(connectivity.end(), triangle.begin(), triangle.end());
       offsets.push_back(static_cast<int64_t>(connectivity.size()));
     }
-    skin_part = skin.add_part(vertices, offsets, connectivity);
+    skin_part = skin.file.add_part(vertices, offsets, connectivity);
   }
-  latest.set(bytes_of(triangles), skin_part == PolyDataFile::kNothing ? 0 : skin.first_connectivity(skin_part) / 3);
+  latest.set(bytes_of(triangles),
+             skin_part == PolyDataFile::kNothing ? 0 : skin.file.first_connectivity(skin_part) / 3);
   return latest.row;
 }
 
@@ -274,10 +282,10 @@ PolyDataFile::Step Recorder::File::blade_step(int64_t frames, double seconds) {
   const int64_t last = std::clamp<int64_t>(frames, 0, setup.frame_count()) * setup.step.substeps - 1;
   const BladeMove& move = setup.blade_moves[static_cast<std::size_t>(std::max<int64_t>(last, 0))];
   if (!move.down) return step;
-  if (blade_part == PolyDataFile::kNothing) blade_part = blade.add_part(8, kBoxOffsets, kBoxCorners);
+  if (blade_part == PolyDataFile::kNothing) blade_part = blade.file.add_part(8, kBoxOffsets, kBoxCorners);
   step.part = blade_part;
   const std::vector<Vec3> corners = blade_corners(setup.blade, last < 0 ? move.from : move.to);
-  step.point_row = blade_points.store(blade.points(), bytes_of(corners));
+  step.point_row = blade_points.store(blade.file.points(), bytes_of(corners));
   return step;
 }
 
@@ -308,20 +316,16 @@ void Recorder::File::add(Stage stage, const State& state) {
 
   // ParaView sees one step per frame: a later snapshot of a frame takes the place of an earlier one.
   const int64_t frames = frames_done(stage, state.frame);
-  if (step_frames == frames) {
-    particle_steps.pop_back();
-    skin_steps.pop_back();
-    blade_steps.pop_back();
-  }
+  const bool again = step_frames == frames;
   step_frames = frames;
   const double seconds = time_at(frames);
   PolyDataFile::Step particle_step = step_on(IndexSpace::particle, seconds, body_part);
   particle_step.data_rows.insert(particle_step.data_rows.begin(), 0);  // `particle` is written once
   particle_step.data_rows.push_back(
       cluster_of.store(cluster_table, bytes_of(cluster_of_particles(state.clusters, state.x.size()))));
-  particle_steps.push_back(std::move(particle_step));
-  skin_steps.push_back(step_on(IndexSpace::vertex, seconds, skin_part));
-  blade_steps.push_back(blade_step(frames, seconds));
+  particles.show(std::move(particle_step), again);
+  skin.show(step_on(IndexSpace::vertex, seconds, skin_part), again);
+  blade.show(blade_step(frames, seconds), again);
 }
 
 void Recorder::File::finish() {
@@ -329,9 +333,9 @@ void Recorder::File::finish() {
   root("unit_roundoff", unit_roundoff(precision.value_or(Precision::binary64)));
   root.group("snapshots", [&](auto& archive) { walk(archive, columns); });
   const std::pair<hid_t, const char*> kinds[] = {{index.id(), kIndexKind},
-                                                 {particles.file().id(), kParticlesKind},
-                                                 {skin.file().id(), kSkinKind},
-                                                 {blade.file().id(), kBladeKind}};
+                                                 {particles.file.id(), kParticlesKind},
+                                                 {skin.file.id(), kSkinKind},
+                                                 {blade.file.id(), kBladeKind}};
   for (const auto& [file, kind] : kinds) {
     hdf5::write_text_attribute(file, "cutproof_file", kind);
     hdf5::write_attribute(file, "cutproof_format", kFormatVersion);
@@ -340,14 +344,10 @@ void Recorder::File::finish() {
   for (Track& track : tracks) track.own.close();
   particle_table.close();
   cluster_table.close();
-  particles.finish(particle_steps);
-  skin.finish(skin_steps);
-  blade.finish(blade_steps);
+  for (Shown* shown : {&particles, &skin, &blade}) shown->file.finish(shown->steps);
   index.close();
   // The index comes last: whoever finds it finds all of them.
-  particles_target.commit();
-  skin_target.commit();
-  blade_target.commit();
+  for (Shown* shown : {&particles, &skin, &blade}) shown->target.commit();
   index_target.commit();
 }
 

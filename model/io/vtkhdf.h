@@ -31,7 +31,7 @@ class PolyDataFile {
   // Throws hdf5::Error, as all the others do.
   PolyDataFile(const std::string& path, Cells cells);
 
-  hdf5::File& file() { return file_; }
+  hid_t id() const { return file_.id(); }
   // Rows of three float64; closed by finish().
   hdf5::Table& points() { return points_; }
   hdf5::Table make_point_data(const std::string& name, const hdf5::Layout& row) {
