@@ -4,6 +4,7 @@
 
 #include "fixtures/bodies.h"
 #include "fixtures/build.h"
+#include "model/at.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::benchmarks {
@@ -11,8 +12,6 @@ namespace cutproof::benchmarks {
 namespace {
 
 constexpr Span kWholeFrame = {Stage::step, Stage::skin};
-
-std::size_t at(int64_t index) { return static_cast<std::size_t>(index); }
 
 // Frames between two in which interpenetration is measured.
 constexpr int64_t kOverlapEvery = 8;

@@ -1,5 +1,5 @@
-// What the device can do at best, measured: times are given as multiples of these (docs/guide/measuring.md,
-// Benchmarks).
+// What the device can do at best, measured: times are given as multiples of these (results_schema.md,
+// cutproof bench machine_limits).
 #pragma once
 #include <cstdint>
 #include <vector>

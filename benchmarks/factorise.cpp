@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "benchmarks/times.h"
+#include "model/at.h"
 #include "oracles/comparison/reference_solution.h"
 
 namespace cutproof::benchmarks {
@@ -19,11 +20,6 @@ using oracles::ClusterSystem;
 using oracles::Factor;
 using oracles::matrix_of;
 using oracles::Sparse;
-
-template <typename Integer>
-std::size_t at(Integer index) {
-  return static_cast<std::size_t>(index);
-}
 
 }  // namespace
 

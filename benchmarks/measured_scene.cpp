@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "benchmarks/times.h"
+#include "model/at.h"
 #include "model/io/json_number.h"
 
 namespace cutproof::benchmarks {
@@ -10,8 +11,6 @@ namespace cutproof::benchmarks {
 namespace {
 
 using nlohmann::json;
-
-std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
 
 json to_json(const oracles::ErrorNorm& norm) {
   return {{"max_h", json_number(norm.max)}, {"rms_h", json_number(norm.rms())}, {"beyond", norm.beyond}};

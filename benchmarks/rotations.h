@@ -1,4 +1,4 @@
-// Methods for the rotation of a cluster, each with its errors on every hard case and its times (solvers.md, Rotations).
+// Methods for the rotation of a cluster, each with its errors on every hard case and its times (method.md, Rotations).
 #pragma once
 #include <cstdint>
 #include <functional>

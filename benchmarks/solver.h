@@ -16,8 +16,8 @@ struct SolverScene {
   Setup setup;
   State state;  // at rest but for its velocities
 };
-// The block of method.md §3: 12³ particles, 27 clusters, 4 ms, turned by 3 radians and drawn out to 1.8 times its
-// length.
+// The twisted block of tolerances.md, Reference solution: 12³ particles, 27 clusters, 4 ms, turned by 3 radians and
+// drawn out to 1.8 times its length.
 SolverScene make_block_scene();
 // The body of make_bench_scene, held at one end, turned by 1 radian and drawn out to 1.2 times its length in 4 ms.
 // Throws InputError as that does.

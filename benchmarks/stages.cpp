@@ -5,17 +5,12 @@
 
 #include "benchmarks/scene.h"
 #include "harness/reference_stages.h"
+#include "model/at.h"
 #include "model/rules.h"
 #include "oracles/comparison/stage_comparison.h"
 #include "oracles/oracles.h"
 
 namespace cutproof::benchmarks {
-
-namespace {
-
-std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
-
-}  // namespace
 
 namespace {
 

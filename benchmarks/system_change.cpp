@@ -5,17 +5,14 @@
 #include <map>
 #include <numeric>
 
+#include "model/at.h"
+
 namespace cutproof::benchmarks {
 
 namespace {
 
 using oracles::cluster_system;
 using oracles::ClusterSystem;
-
-template <typename Integer>
-std::size_t at(Integer index) {
-  return static_cast<std::size_t>(index);
-}
 
 // [clusters after] the row of each, and the origins of new rows.
 std::vector<int32_t> rows_after(const Clusters& before, const Clusters& after, std::vector<int32_t>& origin) {

@@ -3,6 +3,8 @@
 #include <utility>
 #include <vector>
 
+#include "model/at.h"
+
 namespace cutproof::benchmarks {
 
 namespace {
@@ -10,8 +12,6 @@ namespace {
 using nlohmann::json;
 
 constexpr Span kWholeFrame = {Stage::step, Stage::skin};
-
-std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
 
 // Brings the backend to where the timed frames begin.
 void warm_up(Backend& backend, const BenchScene& scene) {

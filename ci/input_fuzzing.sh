@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Feeds arbitrary bytes to every reader of files: libFuzzer with ASan and UBSan, one target after the other. The last
-# lines are a table; the exit status is 1 if anything was found. docs/design/testing.md says what to do then.
+# lines are a table; the exit status is 1 if anything was found. What to do then: docs/design/architecture.md, Input
+# fuzzing.
 # Usage: ci/input_fuzzing.sh [SECONDS_PER_TARGET] [TARGET...]     default: 600, all targets
 # CUTPROOF_FUZZING_SEED: libFuzzer's seed (default 1). build/fuzzing/corpus keeps what was learnt, so a further run
 # goes on from there; remove it to begin again.

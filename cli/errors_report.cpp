@@ -25,7 +25,7 @@ using nlohmann::json;
 
 json number_or_null(const std::optional<double>& value) { return value ? json_number(*value) : json(nullptr); }
 
-// Frames of the lookup table: name on the command line, member, in the order of measuring.md, Errors.
+// Frames of the lookup table: name on the command line, member, in the order of guide.md, Errors.
 struct Kind {
   const char* name;
   bool ErrorsWanted::*member;

@@ -9,7 +9,7 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_L
 endif()
 if(CUTPROOF_HAS_CUDA)
   add_compile_options(
-    # The cost of --fmad=false stands in docs/results/.
+    # --fmad=false as -ffp-contract=off above, for the same bits.
     "$<$<COMPILE_LANGUAGE:CUDA>:--fmad=false;--expt-relaxed-constexpr;-Xcompiler=-Wall,-ffp-contract=off>")
 endif()
 if(CUTPROOF_WERROR)

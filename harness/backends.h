@@ -77,7 +77,7 @@ std::string processor_of(const BackendDescriptor& backend);
 // Throws InputError, naming the option, for what does not exist, is not in this build, or says something about kernels
 // to a backend that does not run them; MachineError if there is no device.
 std::unique_ptr<Backend> make_backend(const BackendChoice& choice);
-// The same, whose schedule is written down as it is made (testing.md, Schedules). Requires a backend that takes
+// The same, whose schedule is written down as it is made (architecture.md, Schedules). Requires a backend that takes
 // a schedule.
 std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice,
                                                std::shared_ptr<gpu::ThreadSchedule> record);

@@ -1,4 +1,4 @@
-// The errors of one run (docs/guide/measuring.md, Errors).
+// The errors of one run (docs/guide.md, Errors).
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -23,7 +23,7 @@ struct ErrorsWanted {
 inline constexpr int64_t kLookedAt = 8;
 // Of the free body whose momentum and energy are followed.
 inline constexpr int64_t kFreeFrames = 1000;
-// Bound of the relative drift of momentum, in double precision (measuring.md, Errors).
+// Bound of the relative drift of momentum, in double precision (tolerances.md, Conservation).
 inline constexpr double kDoubleDrift = 1e-10;
 
 // Components counted three ways, in a frame's last state.

@@ -5,14 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/at.h"
 #include "oracles/oracles.h"
 #include "oracles/surface/surface.h"
 
 namespace cutproof::harness {
 
 namespace {
-
-std::size_t at(int64_t index) { return static_cast<std::size_t>(index); }
 
 double greatest_stretch(const Setup& setup, const State& state) {
   double greatest = 0;

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "model/at.h"
 #include "oracles/comparison/state_difference.h"
 #include "reference_cpu/reference.h"
 
@@ -11,7 +12,6 @@ namespace cutproof::harness {
 
 namespace {
 
-std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
 Stage stage_at(std::size_t index) { return static_cast<Stage>(index); }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // A backend and the reference that start alike and run freely, until the first decision in which they differ
-// (measuring.md, Errors).
+// (guide.md, Implementation).
 #pragma once
 #include <cstdint>
 #include <memory>

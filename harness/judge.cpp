@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "model/at.h"
 #include "model/fields.h"
 #include "model/rules.h"
 #include "oracles/comparison/state_difference.h"
@@ -12,8 +13,6 @@
 namespace cutproof::harness {
 
 namespace {
-
-std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
 
 bool same_sets(const Clusters& a, const Clusters& b) { return a.offsets == b.offsets && a.members == b.members; }
 

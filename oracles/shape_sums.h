@@ -92,7 +92,7 @@ inline double goal_rounding(const RoundingScale& scale) {
 }
 
 // To what a single error of an iterate can grow in later iterations, at most: the plain iteration never lengthens it;
-// Chebyshev's weights carry it on (solvers.md, Rounding: 6.3).
+// Chebyshev's weights carry it on (tolerances.md, Accelerated steps: 6.3).
 inline double error_growth(const StepParameters& step) {
   return step.acceleration == Acceleration::chebyshev ? 7.0 : 1.0;
 }

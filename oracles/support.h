@@ -11,18 +11,13 @@
 #include <utility>
 #include <vector>
 
+#include "model/at.h"
 #include "model/fields.h"
 #include "model/verdict.h"
 #include "oracles/memberships.h"
 #include "oracles/partitions.h"
 
 namespace cutproof::oracles {
-
-// Tells that a vector's index is meant to be an index: members, particles and numbers are int32_t everywhere.
-template <typename Integer>
-constexpr std::size_t at(Integer index) {
-  return static_cast<std::size_t>(index);
-}
 
 // The graph G of a well-formed state (method.md §1). `alive` may be that of another moment.
 class TissueGraph {

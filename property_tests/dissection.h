@@ -17,7 +17,7 @@
 namespace cutproof::property_tests {
 
 // What happened in a case. A class of cases that never occurs means that nothing was tested there, so every class
-// must (testing.md, Properties: rapidcheck has no coverage assertions).
+// must (architecture.md, Properties: rapidcheck has no coverage assertions).
 enum class CoverageClass {
   no_particles,  // the body is empty
   one_particle,

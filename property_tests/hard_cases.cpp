@@ -1,4 +1,4 @@
-// The hard cases of testing.md, Hard cases, each with the behaviour that is expected of every backend. After every
+// The hard cases of architecture.md, Hard cases, each with the behaviour that is expected of every backend. After every
 // stage every oracle is asked, and every stage is compared with the reference's from the same state (judge_case).
 // Particle counts around the sizes of warps and blocks: properties.cpp, DissectsBodiesOfSizesAroundThoseOfBlocks.
 // Rotations have hard cases of their own: fixtures/hard_matrices.h.

@@ -1,6 +1,6 @@
 // A history: one random body to which commands are given, one after the other. Between any two stages it may be saved
 // and loaded, kicked, or get another stroke to cut; all that a backend promises has to hold all the same
-// (testing.md, Properties).
+// (architecture.md, Properties).
 #pragma once
 #include <array>
 #include <cstdint>

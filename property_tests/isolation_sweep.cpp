@@ -1,5 +1,5 @@
-// The experiment of method.md §2: how often do cuts leave connected tissue whose clusters are no longer coupled, and
-// what does expansion do about it?
+// The experiment of accuracy.md, Claims of the paper: how often do cuts leave connected tissue whose clusters are no
+// longer coupled, and what does expansion do about it?
 //
 // Random bodies of up to 19 × 19 × 10 nodes get `sampled` clusters with a ball radius of 1.6 to 3.27 nodes and a
 // spacing of the radius divided by a ratio, which is swept; then 1 to 4 partial planar cuts of half-thickness 0.45
@@ -137,7 +137,7 @@ void print(const std::string& name, const Row& row) {
 
 int sweep(int64_t bodies, uint64_t seed) {
   fmt::print(
-      "Uncoupled connected tissue after cuts (method.md, section 2)\n"
+      "Uncoupled connected tissue after cuts (accuracy.md, Claims of the paper)\n"
       "seed {}; {} bodies of up to {} x {} x {} nodes; ball radius {} to {} nodes, spacing = radius / ratio;\n"
       "1 to {} partial planar cuts of half-thickness {} to {} nodes at once; no merging\n\n",
       seed, bodies, kMostNodes[0], kMostNodes[1], kMostNodes[2], kLeastRadius, kGreatestRadius, kMostCuts,

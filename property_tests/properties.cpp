@@ -1,4 +1,4 @@
-// Properties of every backend over random dissections (testing.md, Properties).
+// Properties of every backend over random dissections (architecture.md, Properties).
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -4,13 +4,12 @@
 #include <cmath>
 #include <limits>
 
+#include "model/at.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::reference {
 
 namespace {
-
-std::size_t at(int64_t index) { return static_cast<std::size_t>(index); }
 
 // d_i: greatest current distance from particle i to a neighbour in G; 0 without neighbours.
 double greatest_neighbour_distance(const Body& body, const State& state, int32_t i) {

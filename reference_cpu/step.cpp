@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/at.h"
 #include "reference_cpu/contacts.h"
 #include "reference_cpu/reference.h"
 
@@ -14,8 +15,6 @@ struct Pose {
   Vec3 center;
   Mat3 rotation;
 };
-
-std::size_t at(int64_t index) { return static_cast<std::size_t>(index); }
 
 // For every particle: how far a grip moves it in the substep, or not held at all.
 struct Held {
@@ -35,7 +34,7 @@ Held held_particles(const Setup& setup, int64_t substep) {
   return held;
 }
 
-// Chebyshev semi-iteration (Golub and Varga 1961; solvers.md), restarted in every substep: with g_j where the
+// Chebyshev semi-iteration (Golub and Varga 1961; method.md §11), restarted in every substep: with g_j where the
 // plain iteration goes from x_j,  x_j+1 = x_j + pull (g_j - x_j) + carry (x_j - x_j-1). The first iteration is plain.
 class Chebyshev {
  public:

@@ -19,8 +19,8 @@ using nlohmann::json;
 // The reference solution is refined until this part of the tolerance is left for what is not known of it, if it can be.
 constexpr double kUnknownShare = 0.25;
 
-// Methods that fail on no hard case (solvers.md). Another might be within the tolerance on this scene and fail
-// on the next cut.
+// Methods that fail on no hard case (accuracy.md, Rotations). Another might be within the tolerance on this scene and
+// fail on the next cut.
 const std::vector<std::string>& sound_rotations() {
   static const std::vector<std::string> names = {"newton", "jacobi4", "svd"};
   return names;

@@ -1,4 +1,4 @@
-// The cheapest configuration of a scene whose error is within a tolerance (measuring.md, Tuning).
+// The cheapest configuration of a scene whose error is within a tolerance (guide.md, Tuning).
 #pragma once
 #include <cstdint>
 #include <functional>

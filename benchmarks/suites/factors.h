@@ -1,5 +1,5 @@
 // `cutproof bench factors`: after a cut, is a factor of the substep's system updated or made anew?
-// (solvers.md, The factor after a cut)
+// (accuracy.md, The factor after a cut)
 #pragma once
 #include <cstdint>
 #include <nlohmann/json.hpp>

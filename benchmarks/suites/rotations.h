@@ -1,4 +1,4 @@
-// `cutproof bench rotations`: methods for the rotation of a cluster, on every hard case (solvers.md, Rotations).
+// `cutproof bench rotations`: methods for the rotation of a cluster, on every hard case (method.md, Rotations).
 #pragma once
 #include <cstdint>
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-// `cutproof bench solver`: iterations of the step against its error, plain and accelerated (solvers.md).
+// `cutproof bench solver`: iterations of the step against its error, plain and accelerated (method.md §11).
 #pragma once
 #include <cstdint>
 #include <map>

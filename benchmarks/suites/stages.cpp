@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "benchmarks/paper.h"
+#include "model/at.h"
 #include "model/error.h"
 #include "model/io/verdict_json.h"
 #if CUTPROOF_HAS_CUDA
@@ -17,8 +18,6 @@ namespace cutproof::benchmarks {
 namespace {
 
 using nlohmann::json;
-
-std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
 
 // The scenes that are asked for, made one after the other.
 std::vector<std::function<BenchScene()>> scenes_of(const StagesOptions& options, int64_t frames) {

@@ -295,9 +295,8 @@ def write_table(rows):
     lines = [
         "# Mutation testing",
         "",
-        "Written by `ci/mutation_testing/run.py`. Each mutant is a patch in `ci/mutation_testing/mutants/`: a wrong program"
-        " of the kind that people write. It is applied to a copy of the code, built, and given to the gate (tests,"
-        " properties, `cutproof fuzz`), which passes the unchanged code. A run stops at the first find and begins with the"
+        "Written by `ci/mutation_testing/run.py`. Each mutant is a patch, whose head says what is wrong with the program"
+        " ([how it works](../design/architecture.md#mutation-testing)). A run stops at the first find and begins with the"
         " suspected property. *Took*: cases of a random property or campaign until the find, schedules of a simulated"
         " machine, or a unit test. *Counterexample*: what `cutproof fuzz` has made of the case that it found.",
         "",
@@ -307,13 +306,13 @@ def write_table(rows):
         of_stage = [row for row in rows if row["stage"] == stage]
         if not of_stage:
             continue
-        lines += ["", f"## {stage}", "", "| mutant | what is wrong | in | found by | took | counterexample |",
-                  "|---|---|---|---|---|---|"]
+        lines += ["", f"## {stage}", "", "| mutant | found by | took | counterexample |", "|---|---|---|---|"]
         for row in of_stage:
             by = row["by"] if row["found"] else "**not found**"
             size = (f"{plural(row['strokes'], 'stroke')}, {plural(row['particles'], 'particle')}"
                     if row["strokes"] is not None else "")
-            cells = [row["name"], row["fault"], row["code"], by, row["took"], size]
+            patch = f"[{row['name']}](../../ci/mutation_testing/mutants/{row['name']}.patch)"
+            cells = [patch, by, row["took"], size]
             lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     TABLE.write_text("\n".join(lines) + "\n")
 

@@ -4,6 +4,7 @@
 
 #include "benchmarks/paper.h"
 #include "cli/bench/suites.h"
+#include "model/at.h"
 
 namespace cutproof::cli {
 
@@ -16,8 +17,6 @@ using benchmarks::StagesResult;
 using benchmarks::StagesScene;
 using benchmarks::StepLimit;
 using benchmarks::Times;
-
-std::size_t at(Stage stage) { return static_cast<std::size_t>(stage); }
 
 void print_machine(const StagesResult& result) {
   const MachineLimits& machine = result.machine;

@@ -49,6 +49,20 @@ class HostBlock {
   T warp_sum(T value, Where where = Where::here()) {
     return reduce(Operation::warp_sum, value, where, [](T a, T b) { return a + b; });
   }
+  float warp_sums(const float (&values)[16], Where where = Where::here()) {
+    bring(values);
+    meet(Operation::warp_sums, kEveryone, where, [&] {
+      float level[kHostThreads][16];
+      std::memcpy(level, state_.value, sizeof level);
+      for (int half = kHostThreads / 2; half > 0; half /= 2) {
+        for (int i = 0; i < half; ++i) {
+          for (int k = 0; k < 16; ++k) level[i][k] += level[i + half][k];
+        }
+      }
+      for (int i = 0; i < kHostThreads; ++i) put(i, level[0][i / 2]);
+    });
+    return taken<float>();
+  }
   template <class T>
   T smallest(T value, Where where = Where::here()) {
     return reduce(Operation::smallest, value, where, [](T a, T b) { return b < a ? b : a; });
@@ -173,7 +187,7 @@ class HostBlock {
 
   template <class T>
   void bring(const T& value) {
-    static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= kMostValueBytes - sizeof(int));
+    static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= kMostValueBytes);
     std::memcpy(state_.value[thread_], &value, sizeof(T));
   }
   template <class T>

@@ -8,27 +8,9 @@ namespace cutproof::gpu {
 
 namespace {
 
-const char* name(Operation operation) {
-  switch (operation) {
-    case Operation::sync:
-      return "sync";
-    case Operation::sum:
-      return "sum";
-    case Operation::warp_sum:
-      return "warp_sum";
-    case Operation::smallest:
-      return "smallest";
-    case Operation::any:
-      return "any";
-    case Operation::exclusive_scan:
-      return "exclusive_scan";
-    case Operation::ballot:
-      return "ballot";
-    case Operation::shuffle:
-      return "shuffle";
-  }
-  return "?";
-}
+// In the order of the enumerators.
+constexpr const char* kOperationNames[] = {"sync",           "sum",    "warp_sum", "warp_sums", "smallest", "any",
+                                           "exclusive_scan", "ballot", "shuffle"};
 
 bool of_warp(Operation operation) { return operation == Operation::ballot || operation == Operation::shuffle; }
 
@@ -52,7 +34,7 @@ std::string list(std::uint32_t mask) {
 std::string describe(const Meeting& meeting) {
   const char* file = meeting.where.file;
   const char* slash = std::strrchr(file, '/');
-  std::string text = name(meeting.operation);
+  std::string text = kOperationNames[static_cast<int>(meeting.operation)];
   if (of_warp(meeting.operation)) {
     char mask[16];
     std::snprintf(mask, sizeof mask, "0x%08x", meeting.mask);

@@ -14,7 +14,7 @@ inline constexpr std::size_t kMostValueBytes = 64;  // of a value that collectiv
 class HostBlock;
 struct Runner;
 
-enum class Operation : unsigned char { sync, sum, warp_sum, smallest, any, exclusive_scan, ballot, shuffle };
+enum class Operation : unsigned char { sync, sum, warp_sum, warp_sums, smallest, any, exclusive_scan, ballot, shuffle };
 
 // A place in a kernel. (std::source_location is not known to the Clang of Debian 12.)
 struct Where {

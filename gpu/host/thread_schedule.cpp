@@ -24,6 +24,13 @@ struct SplitMix {
   int below(int bound) { return static_cast<int>(operator()() % static_cast<std::uint64_t>(bound)); }
 };
 
+// std::popcount calls a function of libgcc where processors without the instruction are to be served.
+int count_of(std::uint32_t mask) {
+  mask -= mask >> 1 & 0x55555555u;
+  mask = (mask & 0x33333333u) + (mask >> 2 & 0x33333333u);
+  return static_cast<int>(((mask + (mask >> 4)) & 0x0f0f0f0fu) * 0x01010101u >> 24);
+}
+
 // Position of the n-th set bit, n from 0.
 int nth_bit(std::uint32_t mask, int n) {
   for (; n > 0; --n) mask &= mask - 1;
@@ -36,7 +43,7 @@ std::uint32_t bits_from(int bit) { return ~0u << bit; }
 
 int Candidates::count() const {
   int sum = 0;
-  for (const std::uint32_t mask : masks) sum += std::popcount(mask);
+  for (const std::uint32_t mask : masks) sum += count_of(mask);
   return sum;
 }
 
@@ -57,12 +64,11 @@ int Candidates::highest() const {
 int Candidates::nth(int k) const {
   const int places = static_cast<int>(masks.size());
   const int start = current / 32, bit = current % 32;
-  for (int step = 0; step <= places; ++step) {
-    const int place = (start + step) % places;
+  for (int step = 0, place = start; step <= places; ++step, place = place + 1 < places ? place + 1 : 0) {
     std::uint32_t mask = masks[place];
     if (step == 0) mask &= bits_from(bit);
     if (step == places) mask &= ~bits_from(bit);
-    const int here = std::popcount(mask);
+    const int here = count_of(mask);
     if (k < here) return place * 32 + nth_bit(mask, k);
     k -= here;
   }
@@ -73,8 +79,8 @@ int Candidates::rank(int thread) const {
   const int places = static_cast<int>(masks.size());
   const auto before = [&](int bound) {  // candidates with a smaller number
     int sum = 0;
-    for (int place = 0; place < bound / 32; ++place) sum += std::popcount(masks[place]);
-    if (bound / 32 < places) sum += std::popcount(masks[bound / 32] & ~bits_from(bound % 32));
+    for (int place = 0; place < bound / 32; ++place) sum += count_of(masks[place]);
+    if (bound / 32 < places) sum += count_of(masks[bound / 32] & ~bits_from(bound % 32));
     return sum;
   };
   const int difference = before(thread) - before(current);

@@ -1,5 +1,5 @@
 // Who runs next when kernels are executed under a simulated schedule (docs/design/architecture.md, Kernels;
-// docs/design/testing.md, Schedules). Threads of a launch are numbered place · 32 + thread, where place is that of a
+// architecture.md, Schedules). Threads of a launch are numbered place · 32 + thread, where place is that of a
 // block among the blocks that are alive at once.
 //
 // A schedule is written down as a vector of choices, one for each decision at which more than one thread could run:

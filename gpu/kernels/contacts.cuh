@@ -33,7 +33,7 @@ CUTPROOF_DEVICE inline Contacts contacts_of(const DeviceView& w, const BodyConst
   contacts.wall_count = body.wall_end - body.wall_begin;
   contacts.move = nullptr;
   // A geometric blade removes what it sweeps and touches nothing.
-  if (body.has_blade && body.criterion != kGeometric) {
+  if (body.has_blade && body.criterion != Criterion::geometric) {
     const MoveF* move = w.moves + (body.schedule + static_cast<int64_t>(frame) * body.substeps + substep);
     if (move->down) contacts.move = move;
   }

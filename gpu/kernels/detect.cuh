@@ -318,7 +318,7 @@ CUTPROOF_DEVICE void flag_strained_clusters_kernel(Block& block, DeviceView w) {
   for (int s = block.index(); s < w.counters->slots_used; s += block.count()) {
     const int b = w.slot_body[s], begin = w.slot_begin[s], size = w.slot_size[s];
     const BodyConstants& body = w.body[b];
-    if (size == 0 || body.criterion != kStrain || !detects(w, b)) continue;
+    if (size == 0 || body.criterion != Criterion::strain || !detects(w, b)) continue;
     const Float3 base = xyz(w.displacement[w.members[begin]]);
     const auto weighted = [&](auto add) {
       for (int k = block.thread(); k < size; k += block.size()) {
@@ -369,10 +369,10 @@ CUTPROOF_DEVICE void flag_particles_kernel(Block& block, DeviceView w) {
     if (detects(w, b)) {
       if (!alive(w, p)) {
         if (w.death[p] == removal_code(w, b)) flag = kWentBefore;
-      } else if (body.criterion == kDistance) {
+      } else if (body.criterion == Criterion::distance) {
         const float limit = body.epsilon * body.h;
         if (greatest_squared_edge(w, body, p) > limit * limit) flag = kGoes;
-      } else if (body.criterion == kStrain) {
+      } else if (body.criterion == Criterion::strain) {
         for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
           const int s = w.memberships[k];
           if (s >= 0 && w.slot_flag[s]) flag = kGoes;
@@ -390,7 +390,7 @@ CUTPROOF_DEVICE void flag_swept_particles_kernel(Block& block, DeviceView w) {
   for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
     const int p = static_cast<int>(i), b = body_index(w, p);
     const BodyConstants& body = w.body[b];
-    if (body.criterion != kGeometric || !body.has_blade || !detects(w, b) || !alive(w, p)) continue;
+    if (body.criterion != Criterion::geometric || !body.has_blade || !detects(w, b) || !alive(w, p)) continue;
     const MoveF* const moves = w.moves + body.schedule + int64_t{w.frame[b]} * body.substeps;
     float longest = -1;
     for (int s = 0; s < body.substeps; ++s) {

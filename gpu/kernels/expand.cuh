@@ -19,8 +19,8 @@ namespace cutproof::gpu {
 // After a fault nothing expands: what the faulty stage left may still hold dead particles.
 CUTPROOF_BOTH inline bool expands_now(const DeviceView& w, int b) {
   if (!cut_now(w, b) || w.counters->fault != 0) return false;
-  const int rule = w.body[b].expand_rule;
-  return rule == kPublishedExpand || (rule == kEdgeCover && !w.edge_covered[b]);
+  const ExpandRule rule = w.body[b].expand_rule;
+  return rule == ExpandRule::published || (rule == ExpandRule::edge_cover && !w.edge_covered[b]);
 }
 
 CUTPROOF_BOTH inline int cluster_of(unsigned long long addition) { return static_cast<int>(addition >> 32); }
@@ -65,7 +65,7 @@ template <class Block>
 CUTPROOF_DEVICE void cover_edges_kernel(Block& block, DeviceView w) {
   for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
     const int p = static_cast<int>(i), b = w.body_of[p];
-    if (!alive(w, p) || w.body[b].expand_rule != kEdgeCover || !expands_now(w, b)) continue;
+    if (!alive(w, p) || w.body[b].expand_rule != ExpandRule::edge_cover || !expands_now(w, b)) continue;
     for (int direction = 0; direction < 6; direction += 2) {
       const int q = neighbour(w, w.body[b], p, direction);
       if (q < 0 || !alive(w, q) || share_a_cluster(w, p, q)) continue;
@@ -92,7 +92,7 @@ template <class Block>
 CUTPROOF_DEVICE void free_lone_clusters_kernel(Block& block, DeviceView w) {
   for (int s = block.index(); s < w.counters->slots_used; s += block.count()) {
     const int b = w.slot_body[s];
-    if (w.slot_size[s] == 0 || w.body[b].expand_rule != kPublishedExpand || !expands_now(w, b)) continue;
+    if (w.slot_size[s] == 0 || w.body[b].expand_rule != ExpandRule::published || !expands_now(w, b)) continue;
     const int* members = w.members + w.slot_begin[s];
     bool shared = false;
     for (int k = block.thread(); k < w.slot_size[s]; k += block.size())
@@ -285,7 +285,7 @@ template <class Block>
 CUTPROOF_DEVICE void note_edge_covered_kernel(Block& block, DeviceView w) {
   for (int64_t i = block.first(); i < w.bodies; i += block.stride()) {
     const int b = static_cast<int>(i);
-    if (expands_now(w, b) && w.body[b].expand_rule == kEdgeCover) w.edge_covered[b] = 1;
+    if (expands_now(w, b) && w.body[b].expand_rule == ExpandRule::edge_cover) w.edge_covered[b] = 1;
   }
 }
 CUTPROOF_KERNEL(note_edge_covered_kernel);

@@ -1,5 +1,5 @@
 // Vectors and matrices of the kernels, which work in single precision. What a rotation needs is written for double as
-// well: rotations are measured in both (docs/design/solvers.md).
+// well: rotations are measured in both (docs/results/accuracy.md, Rotations).
 #pragma once
 #include <cmath>
 

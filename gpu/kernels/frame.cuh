@@ -24,10 +24,10 @@ CUTPROOF_DEVICE inline bool is_due(const DeviceView& w, int b, int stage) {
     case static_cast<int>(Stage::split):
       return cut_now(w, b);
     case static_cast<int>(Stage::merge):
-      return cut_now(w, b) && body.merge_rule != kNoMerge;
+      return cut_now(w, b) && body.merge_rule != MergeRule::none;
     case static_cast<int>(Stage::expand):
-      return cut_now(w, b) &&
-             (body.expand_rule == kPublishedExpand || (body.expand_rule == kEdgeCover && w.edge_covered[b] == 0));
+      return cut_now(w, b) && (body.expand_rule == ExpandRule::published ||
+                               (body.expand_rule == ExpandRule::edge_cover && w.edge_covered[b] == 0));
     default:
       return running(w, b) && body.skin_wanted != 0;
   }

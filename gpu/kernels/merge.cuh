@@ -34,7 +34,7 @@ CUTPROOF_BOTH inline int* best_of_round(const DeviceView& w, int round) {
 }
 
 CUTPROOF_BOTH inline bool merges_now(const DeviceView& w, int b) {
-  return cut_now(w, b) && w.body[b].merge_rule != kNoMerge;
+  return cut_now(w, b) && w.body[b].merge_rule != MergeRule::none;
 }
 
 // --- Who may join whom -----------------------------------------------------------------------------------------------
@@ -227,7 +227,7 @@ CUTPROOF_DEVICE void propose_merges_kernel(Block& block, DeviceView w) {
   for (int job = block.index(); job < c.small; job += block.count()) {
     const int s = w.small_clusters[job];
     const BodyConstants& body = w.body[w.slot_body[s]];
-    if (body.merge_rule == kSinglePass) continue;
+    if (body.merge_rule == MergeRule::single_pass) continue;
     const int before = w.proposal[s];
     if (round > 0 && before < 0) continue;  // never again
     // Many clusters may wait for the same target, round after round: looking again only where something has changed
@@ -247,7 +247,7 @@ CUTPROOF_DEVICE void propose_merges_kernel(Block& block, DeviceView w) {
     block.store(&w.proposal[s], t);
     if (t < 0) continue;
     block.store(&c.changed, 1);
-    if (body.merge_rule == kDeterministic) {
+    if (body.merge_rule == MergeRule::deterministic) {
       block.fence();
       offer_key(block, w, best, s, s, t, round);
       offer_key(block, w, best, t, s, t, round);
@@ -304,7 +304,7 @@ CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, DeviceView w) {
   for (int job = block.index(); job < c.small && !failed; job += block.count()) {
     const int s = w.small_clusters[job];
     const int t = w.proposal[s];
-    if (t < 0 || best[s] != s || best[t] != s || w.body[w.slot_body[s]].merge_rule == kSinglePass) continue;
+    if (t < 0 || best[s] != s || best[t] != s || w.body[w.slot_body[s]].merge_rule == MergeRule::single_pass) continue;
     if (w.slot_size[s] == 0) continue;  // done
     const int size = w.slot_size[s], target_size = w.slot_size[t];
     const int* members = w.members + w.slot_begin[s];
@@ -351,7 +351,7 @@ CUTPROOF_DEVICE void propose_once_kernel(Block& block, DeviceView w) {
   const TouchTable table = take_candidate_table(block);
   for (int job = block.index(); job < w.counters->small; job += block.count()) {
     const int s = w.small_clusters[job];
-    if (w.body[w.slot_body[s]].merge_rule != kSinglePass) continue;
+    if (w.body[w.slot_body[s]].merge_rule != MergeRule::single_pass) continue;
     const int t = preferred_target(block, w, s, table);
     if (block.thread() != 0 || t < 0) continue;
     w.proposal[s] = t;
@@ -382,7 +382,7 @@ template <class Block>
 CUTPROOF_DEVICE void merge_chains_kernel(Block& block, DeviceView w) {
   int* place = block.template shared<int>(1);
   for (int job = block.index(); job < w.counters->small; job += block.count()) {
-    if (w.body[w.slot_body[w.small_clusters[job]]].merge_rule != kSinglePass) continue;
+    if (w.body[w.slot_body[w.small_clusters[job]]].merge_rule != MergeRule::single_pass) continue;
     const auto [end, first] = chain_of(w, w.small_clusters[job]);
     if (end < 0 || w.slot_size[first] == 0) continue;  // not here, or done
     const auto is_source = [end = end](int s) { return s >= 0 && s != end; };
@@ -455,7 +455,7 @@ CUTPROOF_DEVICE void begin_rounds_kernel(Block& block, DeviceView w) {
     const BodyConstants& body = w.body[b];
     if (!merges_now(w, b)) continue;
     // A chain of single_pass grows beyond the cap.
-    cap = body.merge_rule == kSinglePass ? c.live_members : body.cap > cap ? body.cap : cap;
+    cap = body.merge_rule == MergeRule::single_pass ? c.live_members : body.cap > cap ? body.cap : cap;
   }
   int64_t most = int64_t{c.small} * cap;
   if (most > c.live_members) most = c.live_members;

@@ -1,6 +1,6 @@
 // The rotation of one cluster: argmax over rotations R of tr(Rᵀ A), by several methods that can be exchanged for one
 // another (device_view.h kJacobi4 …). Kernels use single precision; every method is there in double too, so that the
-// cost of precision can be measured. What each of them is worth: docs/design/solvers.md.
+// cost of precision can be measured. What each of them is worth: docs/results/accuracy.md, Rotations.
 #pragma once
 #include <limits>
 

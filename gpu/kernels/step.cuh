@@ -117,32 +117,6 @@ CUTPROOF_DEVICE inline Floats<kSums> sum_part(const DeviceView& w, const BodyCon
   return sums;
 }
 
-// One step of the butterfly in reduce_over_warp: lanes whose bit N is set keep the upper half of their sums, the
-// others the lower, and each gets the other's share of what it keeps.
-template <int N, class Block>
-CUTPROOF_DEVICE inline Floats<N> halve(Block& block, const Floats<2 * N>& sums, int bit) {
-  const bool upper = (block.lane() & bit) != 0;
-  Floats<N> kept, given;
-  for (int k = 0; k < N; ++k) {
-    kept.v[k] = upper ? sums.v[k + N] : sums.v[k];
-    given.v[k] = upper ? sums.v[k] : sums.v[k + N];
-  }
-  const Floats<N> received = block.shuffle(kWarp, given, block.lane() ^ bit);
-  for (int k = 0; k < N; ++k) kept.v[k] += received.v[k];
-  return kept;
-}
-
-// Adds up each of the sums over the lanes of a warp, 16 words exchanged instead of 80: lanes 2 k and 2 k + 1 end with
-// sum k.
-template <class Block>
-CUTPROOF_DEVICE inline float reduce_over_warp(Block& block, const Floats<kSums>& sums) {
-  const Floats<8> eight = halve<8>(block, sums, 16);
-  const Floats<4> four = halve<4>(block, eight, 8);
-  const Floats<2> two = halve<2>(block, four, 4);
-  const Floats<1> one = halve<1>(block, two, 2);
-  return one.v[0] + block.shuffle(kWarp, one.v[0], block.lane() ^ 1);
-}
-
 // Centre and rotation of a cluster from its sums.
 template <int Method>
 CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const float* sums) {
@@ -195,7 +169,7 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
         for (int part = 1; part < kParts; ++part) {
           for (int k = 0; k < kSums; ++k) mine.v[k] += parts[((part - 1) * kSums + k) * 32 + lane];
         }
-        const float total = reduce_over_warp(block, mine);
+        const float total = block.warp_sums(mine.v);
         if (lane % 2 == 0) sums[lane / 2] = total;
       }
     } else {
@@ -208,7 +182,7 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
           const Floats<kSums> more = sum_part(w, body, s, part, lane);
           for (int j = 0; j < kSums; ++j) mine.v[j] += more.v[j];
         }
-        const float total = reduce_over_warp(block, mine);
+        const float total = block.warp_sums(mine.v);
         if (lane % 2 == 0) sums[k * kSums + lane / 2] = total;
       }
     }
@@ -255,9 +229,9 @@ CUTPROOF_DEVICE inline void begin_substep(const DeviceView& w, const BodyConstan
   }
 }
 
-// Chebyshev semi-iteration (docs/design/solvers.md), order >= 1: x + pull (g - x) + carry (x - earlier), with g where
-// the plain iteration goes from x. The recurrence of the weights in closed form: omega_j = (1 + q) (1 + q^(j-1)) / (1 +
-// q^j) for j >= 2, with q = ((1 - r) / (1 + r))², r² = 1 - b.
+// Chebyshev semi-iteration (docs/design/method.md §11), order >= 1: x + pull (g - x) + carry (x - earlier), with g
+// where the plain iteration goes from x. The recurrence of the weights in closed form: omega_j = (1 + q) (1 + q^(j-1))
+// / (1 + q^j) for j >= 2, with q = ((1 - r) / (1 + r))², r² = 1 - b.
 struct Combination {
   float pull, carry;
   CUTPROOF_DEVICE Float3 operator()(Float3 plain, Float3 now, Float3 earlier) const {
@@ -365,7 +339,7 @@ CUTPROOF_DEVICE void update_positions_kernel(Block& block, const DeviceView& w, 
     Float4 pushed;
 
     if (body.iterations > 0) {
-      const bool implicit = body.solver == kImplicit;
+      const bool implicit = body.solver == Solver::implicit;
       const float kdt2 = body.stiffness * dt * dt;
       const float s = implicit ? kdt2 / (1.0f + kdt2) : body.relaxation;
       const Float4 predicted = w.predicted[p];
@@ -392,8 +366,8 @@ CUTPROOF_DEVICE void update_positions_kernel(Block& block, const DeviceView& w, 
       const Float3 plain = from + s * pull;
       Float3 free = plain;
       // The first iteration is plain, and the last has no next one to keep anything for.
-      [[maybe_unused]] const bool combined = body.acceleration == kChebyshev && iteration > 0;
-      [[maybe_unused]] const bool kept = body.acceleration == kChebyshev && iteration + 1 < updates;
+      [[maybe_unused]] const bool combined = body.acceleration == Acceleration::chebyshev && iteration > 0;
+      [[maybe_unused]] const bool kept = body.acceleration == Acceleration::chebyshev && iteration + 1 < updates;
       [[maybe_unused]] Combination combination;
       if constexpr (kAccelerated) {
         if (combined) {

@@ -25,9 +25,11 @@
 //   T* shared<T>(int count);                    aligned to 16 bytes; counts against the launch's shared_bytes,
 //                                               rounded up to a multiple of 16
 //   T sum<T>(T), T smallest<T>(T), bool any(bool);   to all threads; in a fixed order, so floats are reproducible for
-//                                               equal block sizes. T: trivially copyable, at most 60 bytes, with + or <
+//                                               equal block sizes. T: trivially copyable, at most 64 bytes, with + or <
 //   int exclusive_scan(int value, int& total);  in thread order
 //   T warp_sum<T>(T);                           as sum, over the lanes of this warp; reached by all of them
+//   float warp_sums(const float (&)[16]);       as 16 times warp_sum, with the same bits, and a fifth of its exchanges:
+//                                               lanes 2 k and 2 k + 1 get the sum of value k
 //   unsigned ballot(unsigned mask, bool); T shuffle<T>(unsigned mask, T, int lane); int lane();
 //   T atomic_add(T*, T), atomic_min(T*, T), atomic_max(T*, T), atomic_exchange(T*, T),
 //     atomic_cas(T*, T expected, T desired), atomic_or(T*, T);   all return the old value, relaxed; T: int, unsigned or

@@ -10,7 +10,7 @@
 namespace cutproof::gpu {
 
 struct KernelOptions {
-  int rotation_method = kNewton;  // the fastest of those that fail on no hard case (docs/design/solvers.md)
+  int rotation_method = kNewton;  // the fastest of those that fail on no hard case (accuracy.md, Rotations)
   SplitMethod split = SplitMethod::blocks;
   bool eager = false;  // gpu: kernels one by one, waiting for each condition, instead of one graph per span
   Capacity capacity;   // at load; a backend doubles it when it must (for tests)

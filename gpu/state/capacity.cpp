@@ -15,8 +15,8 @@ int64_t additions_bound(const StagingBuffers& staging) {
   int64_t additions = 0;
   for (std::size_t b = 0; b < staging.body.size(); ++b) {
     const BodyConstants& body = staging.body[b];
-    const bool covered = body.expand_rule == kEdgeCover && staging.edge_covered[b];
-    if (body.expand_rule == kNoExpand || covered) continue;
+    const bool covered = body.expand_rule == ExpandRule::edge_cover && staging.edge_covered[b];
+    if (body.expand_rule == ExpandRule::none || covered) continue;
     const int64_t r = std::min(body.depth, 64);  // more would pass the limit below for any body
     const int64_t around = r <= 1 ? 1 : (2 * r + 1) * (2 * r * r + 2 * r + 3) / 3;  // grid nodes within r edges of one
     additions += 6 * int64_t{body.particle_end - body.particle_begin} * around;
@@ -46,7 +46,7 @@ Extents extents_of(const StagingBuffers& loaded, Capacity capacity) {
   extents.grip_count = narrow(size(loaded.grips), "grips");
   extents.held_count = narrow(size(loaded.grip_particles), "held particles");
   extents.grip_substeps = size(loaded.grip_active);
-  extents.accelerated = some_body(loaded, [](const BodyConstants& b) { return b.acceleration != kPlain; });
+  extents.accelerated = some_body(loaded, [](const BodyConstants& b) { return b.acceleration != Acceleration::none; });
   extents.any_contact = some_body(loaded, [](const BodyConstants& b) {
     return b.has_blade || b.wall_end > b.wall_begin || b.grip_end > b.grip_begin;
   });

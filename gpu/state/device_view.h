@@ -11,20 +11,15 @@
 #include <cstdint>
 
 #include "gpu/kernels/float3.h"
+#include "model/setup.h"
 
 namespace cutproof::gpu {
-
-enum : int { kImplicit = 0, kPublished = 1 };                                           // Solver
-enum : int { kPlain = 0, kChebyshev = 1 };                                              // Acceleration
-enum : int { kNoCriterion = 0, kDistance = 1, kGeometric = 2, kStrain = 3 };            // Criterion
-enum : int { kNoMerge = 0, kDeterministic = 1, kPublishedMerge = 2, kSinglePass = 3 };  // MergeRule
-enum : int { kNoExpand = 0, kEdgeCover = 1, kPublishedExpand = 2 };                     // ExpandRule
 
 // Why a run had to stop; written with atomic_or into Counters::fault. The stage that would have overflowed has written
 // nothing.
 enum : int { kSlotsFull = 1, kMembersFull = 2, kVerticesFull = 4, kCellsFull = 8, kAdditionsFull = 16 };
 
-// Which rotation method match_shapes uses (rotation.cuh); chosen by measurement, docs/design/solvers.md.
+// Which rotation method match_shapes uses (rotation.cuh); chosen by measurement, docs/results/accuracy.md, Rotations.
 enum : int { kJacobi4 = 0, kMueller2016 = 1, kApd = 2, kSvd = 3, kQuest = 4, kNewton = 5 };
 
 // Division by a number that is known before: n / d = n · multiplier >> shift for every 0 <= n < 2^31 (Granlund and
@@ -49,14 +44,19 @@ struct BodyConstants {
   int nodes[3];              // of its grid
   Divider by_row, by_layer;  // by nodes[0] and by nodes[0] · nodes[1]
   float h;
-  int solver, acceleration, substeps, iterations;
+  Solver solver;
+  Acceleration acceleration;
+  int substeps, iterations;
   float stiffness, relaxation, damping;
   Float3 gravity;
-  int criterion, needs_detection;
+  Criterion criterion;
+  int needs_detection;
   float epsilon, strain;
   int debris;
-  int merge_rule, tau, cap;
-  int expand_rule, depth;
+  MergeRule merge_rule;
+  int tau, cap;
+  ExpandRule expand_rule;
+  int depth;
   int skin_wanted;
   float alpha;
   int wall_begin, wall_end;  // in DeviceView::walls

@@ -5,11 +5,10 @@
 #include <limits>
 #include <string>
 
+#include "model/at.h"
 #include "model/error.h"
 
 namespace cutproof::gpu {
-
-inline std::size_t at(int64_t index) { return static_cast<std::size_t>(index); }
 
 // Throws MachineError if there are more of them than kernels can index. `what`: of what, in the plural.
 inline int narrow(int64_t value, const char* what) {

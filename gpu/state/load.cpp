@@ -43,46 +43,6 @@ void require_fit(const Setup& setup, const State& state) {
   }
 }
 
-int criterion_of(Criterion criterion) {
-  switch (criterion) {
-    case Criterion::none:
-      return kNoCriterion;
-    case Criterion::distance:
-      return kDistance;
-    case Criterion::geometric:
-      return kGeometric;
-    case Criterion::strain:
-      return kStrain;
-  }
-  return kNoCriterion;
-}
-
-int merge_of(MergeRule rule) {
-  switch (rule) {
-    case MergeRule::none:
-      return kNoMerge;
-    case MergeRule::deterministic:
-      return kDeterministic;
-    case MergeRule::published:
-      return kPublishedMerge;
-    case MergeRule::single_pass:
-      return kSinglePass;
-  }
-  return kNoMerge;
-}
-
-int expand_of(ExpandRule rule) {
-  switch (rule) {
-    case ExpandRule::none:
-      return kNoExpand;
-    case ExpandRule::edge_cover:
-      return kEdgeCover;
-    case ExpandRule::published:
-      return kPublishedExpand;
-  }
-  return kNoExpand;
-}
-
 void add_constants(StagingBuffers& staging, const Setup& setup, const State& state, int64_t particles, int64_t nodes) {
   BodyConstants body{};
   body.particle_begin = narrow(particles, "particles");
@@ -93,23 +53,23 @@ void add_constants(StagingBuffers& staging, const Setup& setup, const State& sta
   body.by_row = divider_of(std::max(1, body.nodes[0]));
   body.by_layer = divider_of(std::max(1, body.nodes[0] * body.nodes[1]));
   body.h = f(setup.body.grid.spacing);
-  body.solver = setup.step.solver == Solver::implicit ? kImplicit : kPublished;
-  body.acceleration = setup.step.acceleration == Acceleration::chebyshev ? kChebyshev : kPlain;
+  body.solver = setup.step.solver;
+  body.acceleration = setup.step.acceleration;
   body.substeps = setup.step.substeps;
   body.iterations = setup.step.iterations;
   body.stiffness = f(setup.step.stiffness);
   body.relaxation = f(setup.step.relaxation);
   body.damping = f(setup.step.damping);
   body.gravity = f(setup.step.gravity);
-  body.criterion = criterion_of(setup.detect.criterion);
+  body.criterion = setup.detect.criterion;
   body.needs_detection = needs_detection(setup);
   body.epsilon = f(setup.detect.epsilon);
   body.strain = f(setup.detect.strain);
   body.debris = setup.split.debris;
-  body.merge_rule = merge_of(setup.merge.rule);
+  body.merge_rule = setup.merge.rule;
   body.tau = state.tau;
   body.cap = state.cap;
-  body.expand_rule = expand_of(setup.expand.rule);
+  body.expand_rule = setup.expand.rule;
   body.depth = setup.expand.depth;
   body.skin_wanted = setup.skin.wanted;
   body.alpha = f(setup.skin.alpha);

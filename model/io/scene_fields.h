@@ -136,7 +136,7 @@ void describe(auto& v, StepParameters& s) {
   v.field(s.relaxation, {"relaxation", "s, `published` only.", above(0, 1)});
   v.field(s.acceleration, {"acceleration",
                            "`implicit` only. `chebyshev`: the same answer in fewer iterations, each of which costs a "
-                           "little more; the energy need not fall in every one (docs/design/solvers.md)."});
+                           "little more; the energy need not fall in every one (method.md §11)."});
   v.field(s.damping, {"damping", "c: velocities decay as exp(−c t).", between(0, 1e9, "1/s")});
   v.field(s.gravity, {"gravity", "In the body's frame.", between(-1e6, 1e6, "m/s²")});
 }

@@ -1,5 +1,5 @@
 // What a body that meets nothing must keep: momentum and mass, and of energy that it does
-// not grow. docs/guide/measuring.md says what each figure means and what it does not.
+// not grow. docs/guide.md, Conservation says what each figure means and what it does not.
 #pragma once
 #include <optional>
 

@@ -1,4 +1,4 @@
-// The shape of a cut beside the ideal one. Figures, not verdicts: docs/guide/measuring.md says
+// The shape of a cut beside the ideal one. Figures, not verdicts: docs/guide.md, Geometry says
 // what each of them means and what it does not. Where something is broken a figure is not a number; nothing is left
 // out.
 #pragma once

@@ -6,7 +6,7 @@
 
 namespace cutproof::oracles {
 
-// What the project asks of positions after one stage (measuring.md, Errors) [h].
+// What the project asks of positions after one stage (tolerances.md, Against the reference) [h].
 inline constexpr double kPositionsWanted = 1e-4;
 
 // What is not a number counts as infinite.

@@ -1,4 +1,4 @@
-// How far separated pieces stand in each other. Figures, not verdicts: docs/guide/measuring.md
+// How far separated pieces stand in each other. Figures, not verdicts: docs/guide.md, Geometry
 // says what they mean and what they do not.
 #pragma once
 #include "model/setup.h"

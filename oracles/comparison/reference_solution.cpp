@@ -265,7 +265,7 @@ double greatest_change(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
 // --- For fixed rotations: E over x and t together --------------------------------------------------------------------
 
 // The factor of a substep's system along one axis. That it is made anew for every substep and every set of fixed
-// particles is what was measured to be best (docs/design/solvers.md).
+// particles is what was measured to be best (docs/results/accuracy.md, The factor after a cut).
 class Cholesky {
  public:
   Cholesky(Cholmod& cholmod, const Sparse& matrix)

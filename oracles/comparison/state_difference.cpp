@@ -9,14 +9,13 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "model/at.h"
 #include "model/fields.h"
 #include "oracles/shape_sums.h"
 
 namespace cutproof::oracles {
 
 namespace {
-
-std::size_t at(int64_t index) { return static_cast<std::size_t>(index); }
 
 // --- Bits ------------------------------------------------------------------------------------------------------------
 

@@ -15,7 +15,7 @@ namespace cutproof::oracles {
 
 namespace {
 
-// Of larger bodies the project asks for less (measuring.md, Errors) [h].
+// Of larger bodies the project asks for less (tolerances.md, Against the reference) [h].
 constexpr double kBoundOfLargeBodies = 3e-4;
 constexpr double kLargeBody = 100;  // [h] across
 // A particle this near to the blade's plane, in units of the rounding of its place and the blade's, may count as being

@@ -1,4 +1,4 @@
-// A step of a backend beside the reference's from the same state (measuring.md, Errors, implementation): how far
+// A step of a backend beside the reference's from the same state (guide.md, Errors, implementation): how far
 // they are apart, and what rounding decides, so that both answers are right (docs/design/tolerances.md, Against the
 // reference).
 #pragma once

@@ -1,5 +1,5 @@
 // The program on a machine without enough memory, or without the GPU it is told to use: each allocation of a run on a
-// small scene fails in turn. testing.md, When the machine fails, says what is promised.
+// small scene fails in turn. architecture.md, When the machine fails, says what is promised.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/mman.h>

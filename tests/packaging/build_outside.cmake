@@ -3,9 +3,9 @@ function(run)
   execute_process(COMMAND ${ARGN} COMMAND_ERROR_IS_FATAL ANY)
 endfunction()
 
-# All libraries are compiled once more here, so without optimising them: that they build is what is tested.
+# All libraries are compiled once more here, each file by itself and without flags: that they build is what is tested.
 if(WAY STREQUAL "subdirectory")
-  set(CONFIG Debug)
+  set(CONFIG None)
 endif()
 set(arguments -G Ninja -DCMAKE_BUILD_TYPE=${CONFIG} -DCMAKE_CXX_COMPILER=${CXX})
 if(SANITIZE)

@@ -1,4 +1,4 @@
-// The rotation of one cluster, on the hard cases of solvers.md, Hard cases, judged by a singular value decomposition,
+// The rotation of one cluster, on the hard cases of method.md, Hard cases, judged by a singular value decomposition,
 // which the reference does not use.
 #include <gtest/gtest.h>
 

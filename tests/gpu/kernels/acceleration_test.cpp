@@ -1,4 +1,4 @@
-// The accelerated iteration (docs/design/solvers.md) on every backend: the same answer as the plain one, sooner, and
+// The accelerated iteration (docs/design/method.md §11) on every backend: the same answer as the plain one, sooner, and
 // everything else that a step must keep.
 #include <gtest/gtest.h>
 

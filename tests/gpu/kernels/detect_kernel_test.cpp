@@ -12,6 +12,7 @@
 #include "gpu/host/host_launcher.h"
 #include "gpu/kernels/detect.cuh"
 #include "gpu/state/staging.h"
+#include "model/at.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::gpu {
@@ -20,7 +21,6 @@ namespace {
 using Random = std::mt19937_64;
 constexpr double kUnit = 0x1p-24;
 
-std::size_t at(int64_t index) { return static_cast<std::size_t>(index); }
 double uniform(Random& random, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(random);
 }

@@ -1,4 +1,4 @@
-// The rotation of one cluster: every method, in both precisions, on every hard case of solvers.md, Hard cases
+// The rotation of one cluster: every method, in both precisions, on every hard case of method.md, Hard cases
 // (fixtures/hard_matrices.h). `cutproof bench rotations` prints what each reaches.
 #include <gtest/gtest.h>
 
@@ -125,7 +125,7 @@ TEST(GpuRotation, TheDefaultReachesTheGoalOnEveryHardCaseAndNoMethodGivesNaN) {
 }
 
 TEST(GpuRotation, TheOthersAreRightWhereTheyAreSaidToBe) {
-  // What docs/design/solvers.md says of them; a method that stops being right there has a fault.
+  // What docs/results/accuracy.md, Rotations, says of them; a method that stops being right there has a fault.
   for (const Method& method : methods()) {
     const std::string name = method.name;
     if (name == "mueller" && method.precision == Precision::binary64) continue;  // has not converged by then

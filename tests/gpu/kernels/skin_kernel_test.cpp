@@ -10,6 +10,7 @@
 #include "gpu/host/host_launcher.h"
 #include "gpu/kernels/skin.cuh"
 #include "gpu/state/staging.h"
+#include "model/at.h"
 #include "reference_cpu/reference.h"
 #include "tests/reference_cpu/random_covers.h"
 
@@ -17,8 +18,6 @@ namespace cutproof::gpu {
 namespace {
 
 using namespace cutproof::testing;
-
-std::size_t at(int64_t index) { return static_cast<std::size_t>(index); }
 
 // ---- The case table, without the reference
 

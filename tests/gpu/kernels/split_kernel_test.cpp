@@ -10,6 +10,7 @@
 #include "gpu/kernels/detect.cuh"
 #include "gpu/kernels/split.cuh"
 #include "gpu/state/staging.h"
+#include "model/at.h"
 #include "property_tests/cases.h"
 #include "reference_cpu/reference.h"
 #include "tests/reference_cpu/random_covers.h"
@@ -19,8 +20,6 @@ namespace {
 
 using namespace cutproof::testing;
 using Random = std::mt19937;
-
-std::size_t at(int64_t index) { return static_cast<std::size_t>(index); }
 
 // One DeviceView of bodies in the middle of a frame, after their detection.
 struct Scene {

@@ -103,7 +103,7 @@ bool same_bits(const State& a, const State& b) {
 }
 
 // Error of one frame from rounding, without contacts. An evaluation of a goal or position errs by a few units u of D +
-// l, D the greatest displacement and l the half diagonal of a cluster: centre 1, rotation 5 (docs/design/solvers.md),
+// l, D the greatest displacement and l the half diagonal of a cluster: centre 1, rotation 5,
 // update 2. A velocity carries the error of a substep to all later ones: S (S + 1) / 2 in all. Iterations do not add
 // up: what one hands to the next is averaged over the members of a cluster.
 double frame_bound(const Setup& setup, const State& before, const State& after) {
@@ -285,7 +285,7 @@ TEST(GpuStep, ConservesLinearMomentum) {
       const double mass = total_mass(setup);
       const double drift = norm(momentum(setup, reached) - momentum(setup, state)) / mass;
       const double substeps = 50.0 * setup.step.substeps;
-      // measuring.md, Conservation: 0.25 n u L / dt, per mass.
+      // tolerances.md, Conservation: 0.25 n u L / dt, per mass.
       EXPECT_LE(drift, 0.25 * substeps * kUnit * farthest / 0.004) << stiffness;
       std::printf("solver %d, k %.0e: drift %.1e of the bound\n", static_cast<int>(solver), stiffness,
                   drift / (0.25 * substeps * kUnit * farthest / 0.004));

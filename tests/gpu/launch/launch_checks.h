@@ -101,6 +101,8 @@ struct Warped {
   unsigned long long* wide;
   Float3* vector;
   Float3* vector_sum;
+  float* sums;      // sixteen at once
+  float* own_sums;  // each by itself
 };
 
 template <class Block>
@@ -113,6 +115,13 @@ CUTPROOF_DEVICE void warp_kernel(Block& block, Warped out) {
   out.wide[at] = block.shuffle(everyone, (1ull << 40) + static_cast<unsigned long long>(at), 31 - lane);
   out.vector[at] = block.shuffle(everyone, Float3{static_cast<float>(lane), 2.0f, -static_cast<float>(lane)}, lane ^ 5);
   out.vector_sum[at] = block.warp_sum(Float3{static_cast<float>(at), 1.0f, -static_cast<float>(lane)});
+  float values[16];
+  for (int k = 0; k < 16; ++k) values[k] = any_float(k, static_cast<int>(at));
+  out.sums[at] = block.warp_sums(values);
+  for (int k = 0; k < 16; ++k) {
+    const float sum = block.warp_sum(values[k]);
+    if (k == lane / 2) out.own_sums[at] = sum;
+  }
   if (lane % 2 == 0) {
     out.half[at] = block.ballot(0x55555555u, lane < 16);
     out.from_leader[at] = block.shuffle(0x55555555u, static_cast<int>(at), 0);
@@ -295,8 +304,9 @@ void check_warp_operations(Machine& machine) {
   auto ints = machine.array(std::vector<int>(2 * kThreads));
   auto wides = machine.array(std::vector<unsigned long long>(kThreads));
   auto vectors = machine.array(std::vector<Float3>(2 * kThreads));
-  const Warped out{unsigneds.at(), unsigneds.at() + kThreads, ints.at(), ints.at() + kThreads, wides.at(),
-                   vectors.at(),   vectors.at() + kThreads};
+  auto floats = machine.array(std::vector<float>(2 * kThreads));
+  const Warped out{unsigneds.at(), unsigneds.at() + kThreads, ints.at(),   ints.at() + kThreads,  wides.at(),
+                   vectors.at(),   vectors.at() + kThreads,   floats.at(), floats.at() + kThreads};
   machine.run([&](auto& launcher) { launcher.items(warp_kernel_object{}, kThreads, out); });
   for (int at = 0; at < kThreads; ++at) {
     const int lane = at % 32, warp = at - lane;
@@ -311,6 +321,7 @@ void check_warp_operations(Machine& machine) {
     EXPECT_EQ(vectors.get()[kThreads + at].x, static_cast<float>(32 * warp + 496));
     EXPECT_EQ(vectors.get()[kThreads + at].y, 32.0f);
     EXPECT_EQ(vectors.get()[kThreads + at].z, -496.0f);
+    EXPECT_EQ(floats.get()[at], floats.get()[kThreads + at]);  // bit by bit: terms cancel, so any other order shows
   }
 }
 

@@ -1,5 +1,5 @@
 // The reference solution of a substep, against the plain iteration, against the reference, and in the trial of
-// method.md §3.
+// tolerances.md, Reference solution.
 #include "oracles/comparison/reference_solution.h"
 
 #include <gtest/gtest.h>
@@ -38,7 +38,7 @@ double energy_rounding(const Scene& scene, double energy) {
 }
 
 TEST(ReferenceSolution, TrialOfTheMethodComesOutAgain) {
-  // method.md §3 records 12³ particles in 27 clusters and dt = 4 ms, but not the twist. Nearly half a turn (3
+  // The trial recorded 12³ particles in 27 clusters and dt = 4 ms, but not the twist. Nearly half a turn (3
   // radians) and a stretch of 1.8 give its figures within a factor of two; these two for all six.
   constexpr double kFactor = 2.5;
   const Scene trial = twisted_block(12, 3.0, 1.8);

@@ -1,5 +1,5 @@
-// The block of method.md §3's trial, and the same one among walls and a grip: a first substep that is far from its
-// answer.
+// The twisted block of tolerances.md, Reference solution, and the same one among walls and a grip: a first substep that
+// is far from its answer.
 #pragma once
 #include <cmath>
 
