@@ -10,6 +10,7 @@
 
 #include "gpu/backends.h"
 #include "harness/partial_backend.h"
+#include "model/at.h"
 #include "model/error.h"
 #include "reference_cpu/reference.h"
 
@@ -265,14 +266,12 @@ const std::vector<std::string>& schedule_names() {
   return names;
 }
 
-const std::string& default_rotation() {
-  return rotation_names()[static_cast<std::size_t>(gpu::KernelOptions{}.rotation_method)];
-}
+const std::string& default_rotation() { return rotation_names()[at(gpu::KernelOptions{}.rotation_method)]; }
 
 std::string rotation_of(const BackendChoice& choice) {
   const BackendDescriptor& backend = described_backend(choice.name);
   if (!backend.takes_kernel_options) return std::string(backend.only_rotation);
-  return rotation_names()[static_cast<std::size_t>(kernel_options(choice).rotation_method)];
+  return rotation_names()[at(kernel_options(choice).rotation_method)];
 }
 
 std::string split_of(const BackendChoice& choice) {

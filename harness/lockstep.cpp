@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "harness/reference_stages.h"
+#include "model/at.h"
 #include "oracles/oracles.h"
 
 namespace cutproof::harness {
@@ -21,6 +22,7 @@ constexpr const char* kPrefix = "lockstep: ";
 Verdict verdict_of(const char* property) {
   return {.property = fmt::format("{}{}", kPrefix, property),
           .stage = Stage::step,
+          .backend = {},
           .unit = "1",
           .bound_source = "docs/design/tolerances.md, Against the reference",
           .witness = {}};
@@ -45,9 +47,9 @@ Lockstep::Lockstep(const Setup& setup, const State& start, const State& loaded, 
       comparison_(setup, reference_stages()) {
   const double bound = oracles::position_bound(setup.body);
   for (const Measure which : {Measure::position, Measure::rotation, Measure::rest_center, Measure::skin}) {
-    tracks_[static_cast<std::size_t>(which)].worst.bound = bound;
+    tracks_[at(which)].worst.bound = bound;
   }
-  tracks_[static_cast<std::size_t>(Measure::velocity)].worst.bound = 2 * bound;
+  tracks_[at(Measure::velocity)].worst.bound = 2 * bound;
 
   // What the backend has made of what it was given.
   const Verdict form = oracles::well_formed(setup_, loaded);
@@ -101,7 +103,7 @@ void Lockstep::differ(Stage stage, const oracles::DecisionDifference& difference
 void Lockstep::note(Measure which, Stage stage, const MeasuredError& error, oracles::ErrorNorm& of_frame) {
   if (error.norm.count == 0) return;
   of_frame.join(error.norm);
-  Track& track = tracks_[static_cast<std::size_t>(which)];
+  Track& track = tracks_[at(which)];
   LockstepWorst& worst = track.worst;
   if (error.norm.max > worst.norm.max || worst.norm.count == 0) {
     worst.frame = frame_;

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "model/at.h"
 #include "model/setup.h"
 #include "model/state.h"
 #include "model/verdict.h"
@@ -24,8 +25,8 @@ struct LockstepFrame {
   int64_t topology_differences = 0;          // stages that differ in what must be equal
   oracles::Undecidable undecidable;
 
-  oracles::ErrorNorm& error(oracles::Measure which) { return errors[static_cast<std::size_t>(which)]; }
-  const oracles::ErrorNorm& error(oracles::Measure which) const { return errors[static_cast<std::size_t>(which)]; }
+  oracles::ErrorNorm& error(oracles::Measure which) { return errors[at(which)]; }
+  const oracles::ErrorNorm& error(oracles::Measure which) const { return errors[at(which)]; }
 };
 
 // The worst of one measure over the run so far.
@@ -49,7 +50,7 @@ class Lockstep {
   std::vector<Verdict> verdicts() const;
 
   const std::vector<LockstepFrame>& frames() const { return frames_; }
-  const LockstepWorst& worst(oracles::Measure which) const { return tracks_[static_cast<std::size_t>(which)].worst; }
+  const LockstepWorst& worst(oracles::Measure which) const { return tracks_[at(which)].worst; }
 
  private:
   // What one verdict is made from, but for how much was checked.

@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "model/at.h"
 #include "model/digest.h"
 #include "model/error.h"
 #include "model/io/atomic_file.h"
@@ -31,27 +32,6 @@ Bytes bytes_of(const T& values) {
   return std::as_bytes(std::span(values));
 }
 
-// The rows of a table that were written last, to be named again while they do not change.
-struct Latest {
-  bool is_stored = false;
-  std::vector<std::byte> bytes;
-  int64_t row = 0;
-
-  bool is(Bytes values) const { return is_stored && std::ranges::equal(bytes, values); }
-  void set(Bytes values, int64_t at) { *this = {true, {values.begin(), values.end()}, at}; }
-  int64_t store(hdf5::Table& table, Bytes values, bool anew = false) {
-    if (anew || !is(values)) set(values, table.append(values));
-    return row;
-  }
-};
-
-// Where the rows of a field go, and what is there.
-struct Track {
-  hdf5::Table own;               // unless they are the points of a VTKHDF file
-  hdf5::Table* table = nullptr;  // where they go
-  Latest latest;
-};
-
 // For each particle the number of the first cluster that holds it, -1 if none does. Makes sense of any clusters, also
 // of broken ones.
 std::vector<int32_t> cluster_of_particles(const Clusters& clusters, std::size_t particles) {
@@ -60,9 +40,9 @@ std::vector<int32_t> cluster_of_particles(const Clusters& clusters, std::size_t 
   for (std::size_t c = 0; c + 1 < clusters.offsets.size(); ++c) {
     const int64_t from = std::max<int64_t>(clusters.offsets[c], 0), to = std::min(clusters.offsets[c + 1], most);
     for (int64_t k = from; k < to; ++k) {
-      const int32_t particle = clusters.members[static_cast<std::size_t>(k)];
+      const int32_t particle = clusters.members[at(k)];
       if (particle < 0 || static_cast<std::size_t>(particle) >= particles) continue;
-      int32_t& number = found[static_cast<std::size_t>(particle)];
+      int32_t& number = found[at(particle)];
       if (number == -1) number = clusters.number[c];
     }
   }
@@ -139,6 +119,26 @@ struct Recorder::File {
   void add(Stage stage, const State& state);
   void finish();
 
+  // The rows of a table that were written last, to be named again while they do not change.
+  struct Latest {
+    bool is_stored = false;
+    std::vector<std::byte> bytes;
+    int64_t row = 0;
+
+    bool is(Bytes values) const { return is_stored && std::ranges::equal(bytes, values); }
+    void set(Bytes values, int64_t at) { *this = {true, {values.begin(), values.end()}, at}; }
+    int64_t store(hdf5::Table& table, Bytes values, bool anew = false) {
+      if (anew || !is(values)) set(values, table.append(values));
+      return row;
+    }
+  };
+
+  // Where the rows of a field go, and what is there.
+  struct Track {
+    hdf5::Table own;               // unless they are the points of a VTKHDF file
+    hdf5::Table* table = nullptr;  // where they go
+    Latest latest;
+  };
   // A file for ParaView.
   struct Shown {
     Shown(const std::string& path, PolyDataFile::Cells cells) : target(path), file(target.temporary(), cells) {}
@@ -177,9 +177,7 @@ struct Recorder::File {
   int64_t store_triangles(Latest& latest, const State& state, bool anew);
   PolyDataFile::Step step_on(IndexSpace points, double seconds, PolyDataFile::Part part) const;
   PolyDataFile::Step blade_step(int64_t frames, double seconds);
-  double time_at(int64_t frames) const {
-    return time[static_cast<std::size_t>(std::clamp<int64_t>(frames, 0, setup.frame_count()))];
-  }
+  double time_at(int64_t frames) const { return time[at(std::clamp<int64_t>(frames, 0, setup.frame_count()))]; }
 };
 
 Recorder::File::File(const std::string& given_name, const Setup& given, const std::string& scene_json,
@@ -280,7 +278,7 @@ PolyDataFile::Step Recorder::File::blade_step(int64_t frames, double seconds) {
   if (!setup.has_blade || setup.blade_moves.empty()) return step;
   // Where it stands at the end of the frames that are over; before the first one, where it begins.
   const int64_t last = std::clamp<int64_t>(frames, 0, setup.frame_count()) * setup.step.substeps - 1;
-  const BladeMove& move = setup.blade_moves[static_cast<std::size_t>(std::max<int64_t>(last, 0))];
+  const BladeMove& move = setup.blade_moves[at(std::max<int64_t>(last, 0))];
   if (!move.down) return step;
   if (blade_part == PolyDataFile::kNothing) blade_part = blade.file.add_part(8, kBoxOffsets, kBoxCorners);
   step.part = blade_part;
@@ -331,7 +329,7 @@ void Recorder::File::add(Stage stage, const State& state) {
 void Recorder::File::finish() {
   WritingArchive root(index.id());
   root("unit_roundoff", unit_roundoff(precision.value_or(Precision::binary64)));
-  root.group("snapshots", [&](auto& archive) { walk(archive, columns); });
+  root.group("snapshots", [&](auto& archive) { walk_snapshots(archive, columns); });
   const std::pair<hid_t, const char*> kinds[] = {{index.id(), kIndexKind},
                                                  {particles.file.id(), kParticlesKind},
                                                  {skin.file.id(), kSkinKind},

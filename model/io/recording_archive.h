@@ -1,5 +1,5 @@
 // One description of what a recording's index holds, walked by a writer or by a reader, so that the two cannot drift
-// apart: walk(archive, value) names each field once. Single values, names and texts lie in the file as attributes,
+// apart: archive(name, value) for each field once. Single values, names and texts lie in the file as attributes,
 // arrays as datasets.
 #pragma once
 #include <fmt/format.h>
@@ -11,15 +11,11 @@
 #include <type_traits>
 #include <vector>
 
+#include "model/io/container_types.h"
 #include "model/io/hdf5_file.h"
 #include "model/rules.h"
 
 namespace cutproof::io {
-
-template <class T>
-inline constexpr bool is_vector = false;
-template <class T>
-inline constexpr bool is_vector<std::vector<T>> = true;
 
 class WritingArchive {
  public:

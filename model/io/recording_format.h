@@ -70,7 +70,7 @@ struct SnapshotColumns {
 
 // Columns is SnapshotColumns or const SnapshotColumns.
 template <class Archive, class Columns>
-void walk(Archive& archive, Columns& columns) {
+void walk_snapshots(Archive& archive, Columns& columns) {
   archive("stage", columns.stage);
   for (std::size_t c = 0; c < kCountColumns.size(); ++c) archive(kCountColumns[c].name, columns.counts[c]);
   for (std::size_t k = 0; k < columns.fields.size(); ++k) {

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <utility>
 
+#include "model/at.h"
 #include "model/error.h"
 #include "model/io/hdf5_file.h"
 #include "model/io/recording.h"
@@ -188,7 +189,7 @@ void RecordingReader::File::read_index(const ReadingArchive& root) {
     throw hdf5::Error("/unit_roundoff", fmt::format("This is {}, and should be 2^-53 or 2^-24.", u));
   }
   if (const auto defect = defect_of(header.setup)) throw hdf5::Error("/setup/" + defect->field, defect->problem);
-  root.group("snapshots", [&](auto& archive) { walk(archive, columns); });
+  root.group("snapshots", [&](auto& archive) { walk_snapshots(archive, columns); });
 }
 
 // The file with the rows of a field.
@@ -203,7 +204,7 @@ int64_t RecordingReader::File::count_in(IndexSpace space, std::size_t i) const {
   if (space == IndexSpace::particle) return header.setup.body.particle_count();
   const bool ends = space == IndexSpace::cluster_end;
   const auto column = std::ranges::find(kCountColumns, ends ? IndexSpace::cluster : space, &CountColumn::space);
-  const int64_t count = columns.counts[static_cast<std::size_t>(column - kCountColumns.begin())][i];
+  const int64_t count = columns.counts[at(column - kCountColumns.begin())][i];
   return ends && count < std::numeric_limits<int64_t>::max() ? count + 1 : count;
 }
 

@@ -75,7 +75,7 @@ void read_entries(const ReadingArchive& archive, std::vector<Entry>& entries) {
 
 // The whole of /setup. S is Setup or const Setup.
 template <class Archive, class S>
-void walk(Archive& archive, S& setup) {
+void walk_setup(Archive& archive, S& setup) {
   for_each_setup_field([&](const SetupField& field, auto get) {
     const auto add = [&](auto& group) {
       if constexpr (!is_list_of_entries<std::remove_cvref_t<decltype(get(setup))>>) {
@@ -98,13 +98,13 @@ void walk(Archive& archive, S& setup) {
 
 void write_setup(hid_t file, const Setup& setup) {
   WritingArchive root(file);
-  root.group("setup", [&](auto& archive) { walk(archive, setup); });
+  root.group("setup", [&](auto& archive) { walk_setup(archive, setup); });
 }
 
 Setup read_setup(hid_t file, uint64_t file_bytes) {
   Setup setup;
   const ReadingArchive root(file, "", file_bytes);
-  root.group("setup", [&](auto& archive) { walk(archive, setup); });
+  root.group("setup", [&](auto& archive) { walk_setup(archive, setup); });
   return setup;
 }
 

@@ -3,7 +3,8 @@
 // and model/setup.h.
 //
 // A visitor has
-//   field(T&, const Field&)      T: bool, a number, std::string, Vec3, Range, an enumeration, a struct described here,
+//   field(T&, const SceneField&)      T: bool, a number, std::string, Vec3, Range, an enumeration, a struct described
+//   here,
 //                                or a std::optional or std::vector of one of these
 //   applies(condition)           whether fields that make sense only under `condition` are to be visited
 #pragma once
@@ -36,7 +37,7 @@ enum Presence {
   kZeroIsAbsent  // zero stands for "not given": neither written nor accepted
 };
 
-struct Field {
+struct SceneField {
   std::string_view name;
   std::string_view doc;
   Bounds bounds = {};

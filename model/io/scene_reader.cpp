@@ -186,7 +186,7 @@ void require(bool is_given, const std::string& needed, const json& value, const 
   if (!is_given) at.fail(fmt::format("{} is needed, and this is {}.", needed, type_text(value)), remedy);
 }
 
-void require_bounds(double value, const std::string& text, const Field& field, const Place& at) {
+void require_bounds(double value, const std::string& text, const SceneField& field, const Place& at) {
   if (field.bounds.contains(value)) return;
   at.fail(fmt::format("The value {} is out of bounds.", text),
           fmt::format("Give a number {}.", bounds_text(field.bounds)));
@@ -194,7 +194,7 @@ void require_bounds(double value, const std::string& text, const Field& field, c
 
 template <class T>
 requires std::is_floating_point_v<T>
-void read(const json& value, const Place& at, const Field& field, T& out) {
+void read(const json& value, const Place& at, const SceneField& field, T& out) {
   require(value.is_number(), "A number", value, at, "Give a number without quotation marks.");
   const double number = value.get<double>();
   require_bounds(number, value.dump(), field, at);
@@ -203,7 +203,7 @@ void read(const json& value, const Place& at, const Field& field, T& out) {
 
 template <class T>
 requires is_integer<T>
-void read(const json& value, const Place& at, const Field& field, T& out) {
+void read(const json& value, const Place& at, const SceneField& field, T& out) {
   // 1e5 and 5.0 are whole numbers too, although JSON's grammar does not call them integers.
   const bool whole =
       value.is_number_integer() || (value.is_number_float() && std::floor(value.get<double>()) == value.get<double>());
@@ -218,17 +218,17 @@ void read(const json& value, const Place& at, const Field& field, T& out) {
   out = value.is_number_integer() ? value.get<T>() : static_cast<T>(approximate);
 }
 
-void read(const json& value, const Place& at, const Field&, bool& out) {
+void read(const json& value, const Place& at, const SceneField&, bool& out) {
   require(value.is_boolean(), "true or false", value, at, "Write true or false without quotation marks.");
   out = value.get<bool>();
 }
 
-void read(const json& value, const Place& at, const Field&, std::string& out) {
+void read(const json& value, const Place& at, const SceneField&, std::string& out) {
   require(value.is_string(), "A text", value, at, "Put it in quotation marks.");
   out = value.get<std::string>();
 }
 
-void read(const json& value, const Place& at, const Field& field, Vec3& out) {
+void read(const json& value, const Place& at, const SceneField& field, Vec3& out) {
   if (!value.is_array() || value.size() != 3) {
     at.fail(fmt::format("A vector is needed, and this is {}{}.", type_text(value),
                         value.is_array() ? fmt::format(" of {} entries", value.size()) : ""),
@@ -239,7 +239,7 @@ void read(const json& value, const Place& at, const Field& field, Vec3& out) {
   }
 }
 
-void read(const json& value, const Place& at, const Field& field, Range& out) {
+void read(const json& value, const Place& at, const SceneField& field, Range& out) {
   if (value.is_number()) {
     read(value, at, field, out.low);
     out.high = out.low;
@@ -261,7 +261,7 @@ void read(const json& value, const Place& at, const Field& field, Range& out) {
 }
 
 template <NamedChoice E>
-void read(const json& value, const Place& at, const Field&, E& out) {
+void read(const json& value, const Place& at, const SceneField&, E& out) {
   const auto names = names_of(E{});
   const auto found = value.is_string() ? std::ranges::find(names, value.get<std::string>()) : names.end();
   if (found == names.end()) {
@@ -274,15 +274,15 @@ void read(const json& value, const Place& at, const Field&, E& out) {
 // Structs with fields, lists and optional values refer to each other.
 template <class T>
 requires std::is_class_v<T>
-void read(const json& value, const Place& at, const Field& field, T& out);
+void read(const json& value, const Place& at, const SceneField& field, T& out);
 
 template <class T>
-void read(const json& value, const Place& at, const Field& field, std::optional<T>& out) {
+void read(const json& value, const Place& at, const SceneField& field, std::optional<T>& out) {
   read(value, at, field, out.emplace());
 }
 
 template <class T>
-void read(const json& value, const Place& at, const Field& field, std::vector<T>& out) {
+void read(const json& value, const Place& at, const SceneField& field, std::vector<T>& out) {
   require(value.is_array(), "A list", value, at, "Put the entries in square brackets.");
   out.clear();
   for (std::size_t i = 0; i < value.size(); ++i) read(value[i], at.entry(i), field, out.emplace_back());
@@ -374,7 +374,7 @@ class Reader {
   }
 
   template <class T>
-  void field(T& value, const Field& f) {
+  void field(T& value, const SceneField& f) {
     known_.push_back(f.name);
     const auto found = object_.find(std::string(f.name));
     if (found != object_.end()) {
@@ -410,7 +410,7 @@ class Reader {
 
 template <class T>
 requires std::is_class_v<T>
-void read(const json& value, const Place& at, const Field&, T& out) {
+void read(const json& value, const Place& at, const SceneField&, T& out) {
   Reader reader(value, at);
   describe(reader, out);
   reader.finish();
@@ -439,7 +439,7 @@ Scene parse_scene(const std::string& text, const std::string& name) {
   const json tree = parse_tree(text, name);
   require_version(tree, name);
   Scene scene;
-  read(tree, Place{name, "", 0}, Field{}, scene);
+  read(tree, Place{name, "", 0}, SceneField{}, scene);
   return scene;
 }
 

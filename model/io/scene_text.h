@@ -2,25 +2,16 @@
 #pragma once
 #include <fmt/format.h>
 
-#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
-#include <vector>
 
+#include "model/io/container_types.h"
 #include "model/io/scene_fields.h"
 #include "model/rules.h"
 
 namespace cutproof::io {
 
-template <class T>
-inline constexpr bool is_vector = false;
-template <class T>
-inline constexpr bool is_vector<std::vector<T>> = true;
-template <class T>
-inline constexpr bool is_optional = false;
-template <class T>
-inline constexpr bool is_optional<std::optional<T>> = true;
 template <class T>
 inline constexpr bool is_integer = std::is_integral_v<T> && !std::is_same_v<T, bool>;
 

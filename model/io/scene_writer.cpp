@@ -26,7 +26,7 @@ ordered_json written(const T& value);
 class Writer {
  public:
   template <class T>
-  void field(const T& value, const Field& f) {
+  void field(const T& value, const SceneField& f) {
     const std::string name(f.name);
     if constexpr (is_optional<T>) {
       if (value) object[name] = written(*value);
@@ -140,7 +140,7 @@ class Documenter {
   explicit Documenter(const std::string& path) : path_(path) {}
 
   template <class T>
-  void field(T& value, const Field& f) {
+  void field(T& value, const SceneField& f) {
     rows_ += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", f.name, type_name<T>(), f.bounds.unit,
                          default_text(value, f), interval_text(f.bounds), f.doc);
     const std::string path = join(path_, f.name);
@@ -162,7 +162,7 @@ class Documenter {
 
  private:
   template <class T>
-  static std::string default_text(const T& value, const Field& f) {
+  static std::string default_text(const T& value, const SceneField& f) {
     if (f.presence == kRequired) return "required";
     if constexpr (is_optional<T>) {
       return "absent";

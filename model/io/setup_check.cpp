@@ -8,6 +8,7 @@
 #include <limits>
 #include <string_view>
 
+#include "model/at.h"
 #include "model/setup_fields.h"
 
 namespace cutproof::io {
@@ -107,7 +108,7 @@ Defect body_defect(const Body& body) {
                                                     i)};
       }
     }
-    if (body.particle_at[static_cast<std::size_t>(body.node[i])] != static_cast<int32_t>(i)) {
+    if (body.particle_at[at(body.node[i])] != static_cast<int32_t>(i)) {
       return SetupDefect{"body/particle_at", fmt::format("The node of particle {} does not name it.", i)};
     }
   }

@@ -25,8 +25,8 @@ PolyDataFile::PolyDataFile(const std::string& path, Cells cells) : file_(hdf5::F
 PolyDataFile::Part PolyDataFile::add_part(int64_t point_count, std::span<const int64_t> offsets,
                                           std::span<const int64_t> connectivity) {
   first_cell_.push_back(cells_of_.empty() ? 0 : first_cell_.back() + cells_of_.back());
-  first_connectivity_.push_back(connectivity_.append(std::as_bytes(connectivity)));
   offsets_.append(std::as_bytes(offsets));
+  first_connectivity_.push_back(connectivity_.append(std::as_bytes(connectivity)));
   points_of_.push_back(point_count);
   cells_of_.push_back(static_cast<int64_t>(offsets.size()) - 1);
   connectivity_of_.push_back(static_cast<int64_t>(connectivity.size()));
