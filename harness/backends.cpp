@@ -10,6 +10,7 @@
 
 #include "gpu/backends.h"
 #include "harness/partial_backend.h"
+#include "model/at.h"
 #include "model/error.h"
 #include "reference_cpu/reference.h"
 
@@ -74,7 +75,6 @@ constexpr std::unique_ptr<Backend> (*make_gpu)(const BackendChoice&) = nullptr;
 constexpr std::unique_ptr<Backend> (*make_eager_gpu)(const BackendChoice&) = nullptr;
 #endif
 
-constexpr bool any_span(Span) { return true; }
 constexpr bool whole_frames(Span span) { return span.first == Stage::step && span.last == Stage::skin; }
 constexpr bool split_alone(Span span) { return span.first == Stage::split && span.last == Stage::split; }
 
@@ -87,10 +87,11 @@ constexpr std::array kBackends = {
     BackendDescriptor{
         .name = kReferenceName,
         .summary = "CPU, double precision, serial: the oracle that everything else is compared with",
+        .precision = Precision::binary64,
         .is_the_reference = true,
+        .takes_kernel_options = false,
         .only_split = "search",
         .only_rotation = "horn",
-        .can_run = any_span,
         // It takes body by body, and what a few bodies need stays in the caches.
         .bodies_in_a_load = 16,
         .make = [](const BackendChoice&) { return reference::make_backend(); },
@@ -98,50 +99,37 @@ constexpr std::array kBackends = {
     BackendDescriptor{
         .name = kHostName,
         .summary = "the CUDA kernels' source, single precision, on the threads of this CPU",
-        .precision = Precision::binary32,
         .processor = Processor::all_threads,
-        .takes_kernel_options = true,
-        .can_run = any_span,
         .make = make_host,
     },
     BackendDescriptor{
         .name = "host-frames",
         .summary = "the same, whole frames only: what a guest that cannot be asked for a stage is judged on",
-        .precision = Precision::binary32,
         .processor = Processor::all_threads,
         .is_timed = false,
-        .takes_kernel_options = true,
         .can_run = whole_frames,
         .make = [](const BackendChoice& choice) { return offer_only(make_host(choice), "host-frames", whole_frames); },
     },
     BackendDescriptor{
         .name = "host-split",
         .summary = "the same, the split stage only; all others are the reference's",
-        .precision = Precision::binary32,
         .processor = Processor::all_threads,
         .is_timed = false,
-        .takes_kernel_options = true,
         .can_run = split_alone,
         .make = [](const BackendChoice& choice) { return offer_only(make_host(choice), "host-split", split_alone); },
     },
     BackendDescriptor{
         .name = "simulated",
         .summary = "the same on one thread, under a schedule that is chosen and can be replayed",
-        .precision = Precision::binary32,
         .is_timed = false,
-        .takes_kernel_options = true,
         .takes_schedule = true,
-        .can_run = any_span,
         .make = [](const BackendChoice& choice) { return make_simulated(generator(choice), choice); },
     },
     BackendDescriptor{
         .name = "gpu",
         .summary = "the CUDA kernels, single precision",
-        .precision = Precision::binary32,
         .processor = Processor::device,
         .pipelines = true,
-        .takes_kernel_options = true,
-        .can_run = any_span,
         .takes_full_size = true,
         .timed_frames = 20,
         // It is busy with so many loads at once; more only take memory.
@@ -151,11 +139,8 @@ constexpr std::array kBackends = {
     BackendDescriptor{
         .name = "gpu-eager",
         .summary = "the same, launch by launch instead of as a graph",
-        .precision = Precision::binary32,
         .processor = Processor::device,
         .is_timed = false,
-        .takes_kernel_options = true,
-        .can_run = any_span,
         .most_parallel_loads = 6,
         .make = make_eager_gpu,
     },
@@ -281,14 +266,12 @@ const std::vector<std::string>& schedule_names() {
   return names;
 }
 
-const std::string& default_rotation() {
-  return rotation_names()[static_cast<std::size_t>(gpu::KernelOptions{}.rotation_method)];
-}
+const std::string& default_rotation() { return rotation_names()[at(gpu::KernelOptions{}.rotation_method)]; }
 
 std::string rotation_of(const BackendChoice& choice) {
   const BackendDescriptor& backend = described_backend(choice.name);
   if (!backend.takes_kernel_options) return std::string(backend.only_rotation);
-  return rotation_names()[static_cast<std::size_t>(kernel_options(choice).rotation_method)];
+  return rotation_names()[at(kernel_options(choice).rotation_method)];
 }
 
 std::string split_of(const BackendChoice& choice) {

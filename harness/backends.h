@@ -32,17 +32,17 @@ enum class Processor { one_thread, all_threads, device };
 struct BackendDescriptor {
   std::string_view name;
   std::string_view summary;  // one line for people
-  Precision precision = Precision::binary64;
+  Precision precision = Precision::binary32;
   // All others are compared with it; it is not compared with itself.
   bool is_the_reference = false;
   Processor processor = Processor::one_thread;
-  bool is_timed = true;               // else it only finds faults: what it takes says nothing
-  bool pipelines = false;             // run() does not wait: frames can be handed over back to back
-  bool takes_kernel_options = false;  // it runs the kernels: --split, --rotation
-  bool takes_schedule = false;        // --schedule, --schedule-seed: its interleaving is chosen and can be replayed
+  bool is_timed = true;              // else it only finds faults: what it takes says nothing
+  bool pipelines = false;            // run() does not wait: frames can be handed over back to back
+  bool takes_kernel_options = true;  // it runs the kernels: --split, --rotation
+  bool takes_schedule = false;       // --schedule, --schedule-seed: its interleaving is chosen and can be replayed
   // How it splits clusters and finds rotations where nothing can be chosen.
   std::string_view only_split = {}, only_rotation = {};
-  bool (*can_run)(Span span) = nullptr;  // as Backend::can_run
+  bool (*can_run)(Span span) = [](Span) { return true; };  // as Backend::can_run
 
   // Benchmarks: whether bodies are as large as the paper's unless somebody asks for others, and how many frames are
   // timed.

@@ -168,9 +168,7 @@ Traces run_to_the_end(Backend& backend, std::vector<Setup> setups, const std::ve
   FrameRunner runner(backend, std::move(setups), states);
   Traces traces;
   for (const Snapshot& state : runner.states()) traces.of_body.push_back({state, {}});
-  const auto keep = [&](const Moment& moment) {
-    traces.of_body[static_cast<std::size_t>(moment.body)].moments.push_back(moment);
-  };
+  const auto keep = [&](const Moment& moment) { traces.of_body[at(moment.body)].moments.push_back(moment); };
   while (!runner.is_over()) runner.run_frame(keep);
   runner.look_again();
   traces.broken_contracts = runner.take_broken_contracts();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "model/at.h"
 #include "model/rules.h"
 #include "oracles/comparison/stage_comparison.h"
 #include "oracles/oracles.h"
@@ -18,7 +19,6 @@ constexpr double kDistanceBand = 64;
 
 // d_i of method.md §4, among neighbours alive in `state` [m].
 double greatest_neighbour_distance(const Setup& setup, const State& state, int32_t particle) {
-  const auto at = [](int32_t index) { return static_cast<std::size_t>(index); };
   double greatest = 0;
   for (int direction = 0; direction < 6; ++direction) {
     const int32_t other = setup.body.neighbour(particle, direction);
@@ -71,7 +71,7 @@ void FreeRunning::see(Stage stage, const State& after) {
       first.explained = oracles::detection(setup_, before_, after).holds;
       if (setup_.detect.criterion == Criterion::distance) {
         State present = expected;
-        for (const int32_t i : expected.removed) present.alive[static_cast<std::size_t>(i)] = 1;
+        for (const int32_t i : expected.removed) present.alive[at(i)] = 1;
         const double h = setup_.body.grid.spacing;
         double margin = 0;
         for (const int32_t i : undecided) {

@@ -22,7 +22,7 @@ bool same_sets(const Clusters& a, const Clusters& b) { return a.offsets == b.off
 State after_detection(State before, const State& end) {
   before.removed = end.removed;
   for (const int32_t i : end.removed) {
-    if (i >= 0 && static_cast<std::size_t>(i) < before.alive.size()) before.alive[static_cast<std::size_t>(i)] = 0;
+    if (i >= 0 && static_cast<std::size_t>(i) < before.alive.size()) before.alive[at(i)] = 0;
   }
   return before;
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "harness/reference_stages.h"
+#include "model/at.h"
 #include "oracles/oracles.h"
 
 namespace cutproof::harness {
@@ -18,13 +19,22 @@ namespace {
 
 constexpr const char* kPrefix = "lockstep: ";
 
-Verdict verdict_of(const char* property, const std::string& backend) {
+Verdict verdict_of(const char* property) {
   return {.property = fmt::format("{}{}", kPrefix, property),
           .stage = Stage::step,
-          .backend = backend,
+          .backend = {},
           .unit = "1",
           .bound_source = "docs/design/tolerances.md, Against the reference",
           .witness = {}};
+}
+
+Verdict failing(const char* property, Stage stage, int64_t frame, Witness witness) {
+  Verdict verdict = verdict_of(property);
+  verdict.stage = stage;
+  verdict.frame = frame;
+  verdict.holds = false;
+  verdict.witness = std::move(witness);
+  return verdict;
 }
 
 }  // namespace
@@ -37,9 +47,9 @@ Lockstep::Lockstep(const Setup& setup, const State& start, const State& loaded, 
       comparison_(setup, reference_stages()) {
   const double bound = oracles::position_bound(setup.body);
   for (const Measure which : {Measure::position, Measure::rotation, Measure::rest_center, Measure::skin}) {
-    tracks_[static_cast<std::size_t>(which)].worst.bound = bound;
+    tracks_[at(which)].worst.bound = bound;
   }
-  tracks_[static_cast<std::size_t>(Measure::velocity)].worst.bound = 2 * bound;
+  tracks_[at(Measure::velocity)].worst.bound = 2 * bound;
 
   // What the backend has made of what it was given.
   const Verdict form = oracles::well_formed(setup_, loaded);
@@ -69,19 +79,13 @@ void Lockstep::see(Stage stage, const State& after, bool launched) {
   if (broken_) return differ(stage, found.decisions.front());
   if (stage == Stage::step) frames_.emplace_back().frame = frame_;
   LockstepFrame& frame = frames_.back();
-  ++topology_.checked;
+  ++stages_;
   for (const oracles::DecisionDifference& difference : found.decisions) differ(stage, difference);
-  if (stage == Stage::detect && found.due) ++removals_.checked;
+  if (stage == Stage::detect && found.due) ++detections_;
   if (found.detection && !found.detection->holds) {
-    ++removals_.failures;
-    if (!removals_.failure) {
-      removals_.failure = verdict_of("removed particles", backend_);
-      removals_.failure->bound_source = found.detection->bound_source;
-      removals_.failure->frame = frame_;
-      removals_.failure->stage = stage;
-      removals_.failure->holds = false;
-      removals_.failure->witness = found.detection->witness;
-    }
+    Verdict failure = failing("removed particles", stage, frame_, found.detection->witness);
+    failure.bound_source = found.detection->bound_source;
+    removals_.add(std::move(failure));
   }
   frame.undecidable.join(found.undecidable);
   frame.angle.join(found.angle);
@@ -94,19 +98,13 @@ void Lockstep::see(Stage stage, const State& after, bool launched) {
 
 void Lockstep::differ(Stage stage, const oracles::DecisionDifference& difference) {
   if (!frames_.empty()) ++frames_.back().topology_differences;
-  ++topology_.failures;
-  if (topology_.failure) return;
-  topology_.failure = verdict_of("topology", backend_);
-  topology_.failure->frame = frame_;
-  topology_.failure->stage = stage;
-  topology_.failure->holds = false;
-  topology_.failure->witness = difference;
+  topology_.add(failing("topology", stage, frame_, difference));
 }
 
 void Lockstep::note(Measure which, Stage stage, const MeasuredError& error, oracles::ErrorNorm& of_frame) {
   if (error.norm.count == 0) return;
   of_frame.join(error.norm);
-  Track& track = tracks_[static_cast<std::size_t>(which)];
+  Track& track = tracks_[at(which)];
   LockstepWorst& worst = track.worst;
   if (error.norm.max > worst.norm.max || worst.norm.count == 0) {
     worst.frame = frame_;
@@ -114,49 +112,36 @@ void Lockstep::note(Measure which, Stage stage, const MeasuredError& error, orac
   }
   worst.norm.join(error.norm);
   worst.bound = std::max(worst.bound, error.bound);
-  if (error.holds()) return;
-  ++track.failures;
-  if (track.failure) return;
-  track.failure = oracles::verdict_of(which, error, stage, frame_, kPrefix);
-  track.failure->backend = backend_;
+  if (!error.holds()) track.failures.add(oracles::verdict_of(which, error, stage, frame_, kPrefix));
 }
 
 std::vector<Verdict> Lockstep::verdicts() const {
   std::vector<Verdict> verdicts;
-  const auto counted = [&](const char* property, const Count& count) {
-    Verdict verdict = count.failure ? *count.failure : verdict_of(property, backend_);
-    if (count.failure && count.failures > 1)
-      verdict.witness.text += fmt::format(" ({} stages differ, this is the first)", count.failures);
-    verdict.measured = static_cast<double>(count.failures);
-    verdict.checked = count.checked;
-    verdicts.push_back(std::move(verdict));
+  const auto counted = [&](const char* property, const Failures& failures, int64_t checked) {
+    Verdict& verdict = verdicts.emplace_back(failures.count > 0 ? failures.first : verdict_of(property));
+    if (failures.count > 1) {
+      verdict.witness.text += fmt::format(" ({} stages differ, this is the first)", failures.count);
+    }
+    verdict.measured = static_cast<double>(failures.count);
+    verdict.checked = checked;
   };
-  counted("topology", topology_);
-  counted("removed particles", removals_);
+  counted("topology", topology_, stages_);
+  counted("removed particles", removals_, detections_);
   for (std::size_t m = 0; m < tracks_.size(); ++m) {
-    const Track& track = tracks_[m];
-    const LockstepWorst& worst = track.worst;
-    Verdict verdict =
-        oracles::verdict_of(static_cast<Measure>(m), {worst.norm, worst.bound}, worst.stage, worst.frame, kPrefix);
-    verdict.backend = backend_;
-    if (track.failure) {
-      verdict = *track.failure;
-      if (track.failures > 1) {
-        verdict.witness.text += fmt::format(
-            " ({} frames or stages are beyond the bound, this is the first; the worst, {:.3g} {}, is in frame {} after "
-            "{})",
-            track.failures, worst.norm.max, verdict.unit, worst.frame, name_of(worst.stage));
-      }
+    const auto& [worst, failures] = tracks_[m];
+    Verdict& verdict = verdicts.emplace_back(
+        oracles::verdict_of(static_cast<Measure>(m), {worst.norm, worst.bound}, worst.stage, worst.frame, kPrefix));
+    if (failures.count > 0) verdict = failures.first;
+    if (failures.count > 1) {
+      verdict.witness.text += fmt::format(
+          " ({} frames or stages are beyond the bound, this is the first; the worst, {:.3g} {}, is in frame {} after "
+          "{})",
+          failures.count, worst.norm.max, verdict.unit, worst.frame, name_of(worst.stage));
     }
     verdict.checked = worst.norm.count;
-    verdicts.push_back(std::move(verdict));
   }
+  for (Verdict& verdict : verdicts) verdict.backend = backend_;
   return verdicts;
-}
-
-bool Lockstep::holds() const {
-  const auto all = verdicts();
-  return std::all_of(all.begin(), all.end(), [](const Verdict& verdict) { return verdict.holds; });
 }
 
 }  // namespace cutproof::harness

@@ -6,8 +6,10 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "model/at.h"
 #include "model/setup.h"
 #include "model/state.h"
 #include "model/verdict.h"
@@ -23,8 +25,8 @@ struct LockstepFrame {
   int64_t topology_differences = 0;          // stages that differ in what must be equal
   oracles::Undecidable undecidable;
 
-  oracles::ErrorNorm& error(oracles::Measure which) { return errors[static_cast<std::size_t>(which)]; }
-  const oracles::ErrorNorm& error(oracles::Measure which) const { return errors[static_cast<std::size_t>(which)]; }
+  oracles::ErrorNorm& error(oracles::Measure which) { return errors[at(which)]; }
+  const oracles::ErrorNorm& error(oracles::Measure which) const { return errors[at(which)]; }
 };
 
 // The worst of one measure over the run so far.
@@ -46,21 +48,22 @@ class Lockstep {
 
   // One verdict for each thing that was measured, over the whole run so far; see docs/reference/results_schema.md.
   std::vector<Verdict> verdicts() const;
-  bool holds() const;
 
   const std::vector<LockstepFrame>& frames() const { return frames_; }
-  const LockstepWorst& worst(oracles::Measure which) const { return tracks_[static_cast<std::size_t>(which)].worst; }
+  const LockstepWorst& worst(oracles::Measure which) const { return tracks_[at(which)].worst; }
 
  private:
-  // What one verdict is made from.
+  // What one verdict is made from, but for how much was checked.
+  struct Failures {
+    Verdict first;
+    int64_t count = 0;
+    void add(Verdict failure) {
+      if (count++ == 0) first = std::move(failure);
+    }
+  };
   struct Track {
     LockstepWorst worst;
-    std::optional<Verdict> failure;  // the first
-    int64_t failures = 0;
-  };
-  struct Count {
-    std::optional<Verdict> failure;  // the first
-    int64_t failures = 0, checked = 0;
+    Failures failures;
   };
 
   void note(oracles::Measure which, Stage stage, const oracles::MeasuredError& error, oracles::ErrorNorm& of_frame);
@@ -74,7 +77,8 @@ class Lockstep {
   oracles::StageComparison comparison_;
   std::vector<LockstepFrame> frames_;
   std::array<Track, 6> tracks_;
-  Count topology_, removals_;
+  Failures topology_, removals_;
+  int64_t stages_ = 0, detections_ = 0;  // that were compared
 };
 
 }  // namespace cutproof::harness

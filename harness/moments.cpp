@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "model/at.h"
 #include "model/rules.h"
 
 namespace cutproof::harness {
@@ -12,7 +13,7 @@ std::array<bool, 6> due_stages(const Setup& setup, const State& before, Span spa
   const bool detects = span.contains(Stage::detect) && needs_detection(setup);
   const bool removed = detects ? !after.removed.empty() : !span.contains(Stage::step) && !before.removed.empty();
   for (const Stage stage : kStages) {
-    due[static_cast<std::size_t>(stage)] = span.contains(stage) && is_due(setup, stage, removed, before.edge_covered);
+    due[at(stage)] = span.contains(stage) && is_due(setup, stage, removed, before.edge_covered);
   }
   return due;
 }

@@ -124,23 +124,16 @@ inline void know_every_member(const State& state) {
 
 // How many entries a field of an index space has in a well-formed state; of IndexSpace::state this says nothing.
 inline int64_t count_of(IndexSpace space, const State& state) {
-  switch (space) {
-    case IndexSpace::state:
-      break;
-    case IndexSpace::particle:
-      return static_cast<int64_t>(state.x.size());
-    case IndexSpace::cluster:
-      return static_cast<int64_t>(state.clusters.number.size());
-    case IndexSpace::cluster_end:
-      return static_cast<int64_t>(state.clusters.number.size()) + 1;
-    case IndexSpace::member:
-      return static_cast<int64_t>(state.clusters.members.size());
-    case IndexSpace::vertex:
-      return static_cast<int64_t>(state.skin.owner.size());
-    case IndexSpace::triangle:
-      return static_cast<int64_t>(state.skin.triangles.size());
-  }
-  return 0;
+  const auto clusters = std::ssize(state.clusters.number);
+  // In the order of IndexSpace.
+  const std::array<int64_t, 7> counts = {0,
+                                         std::ssize(state.x),
+                                         clusters,
+                                         clusters + 1,
+                                         std::ssize(state.clusters.members),
+                                         std::ssize(state.skin.owner),
+                                         std::ssize(state.skin.triangles)};
+  return counts[static_cast<std::size_t>(space)];
 }
 
 // Equal bits, where == would call NaN unequal to itself and -0 equal to 0.

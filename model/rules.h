@@ -37,22 +37,12 @@ constexpr std::string_view name_of(E choice) {
 
 // What a rule of merging promises (method.md §6).
 struct MergePromise {
-  bool unique;     // a function of the input alone: two right backends give the same clusters
-  bool maximal;    // no small cluster is left that could still merge
-  bool keeps_cap;  // unions have at most `cap` particles
+  bool unique;   // a function of the input alone: two right backends give the same clusters
+  bool maximal;  // no small cluster is left that could still merge
 };
 constexpr MergePromise promise_of(MergeRule rule) {
-  switch (rule) {
-    case MergeRule::none:
-      return {true, false, true};
-    case MergeRule::deterministic:
-      return {true, true, true};
-    case MergeRule::published:
-      return {false, true, true};
-    case MergeRule::single_pass:
-      break;
-  }
-  return {false, false, true};
+  using enum MergeRule;
+  return {.unique = rule == none || rule == deterministic, .maximal = rule == deterministic || rule == published};
 }
 
 // What a rule of expansion promises (method.md §7).
@@ -61,33 +51,15 @@ struct ExpandPromise {
   bool runs_always;   // in every frame that cuts; else only until I4 is known to hold
 };
 constexpr ExpandPromise promise_of(ExpandRule rule) {
-  switch (rule) {
-    case ExpandRule::none:
-      return {false, false};
-    case ExpandRule::edge_cover:
-      return {true, false};
-    case ExpandRule::published:
-      break;
-  }
-  return {false, true};
+  return {.covers_edges = rule == ExpandRule::edge_cover, .runs_always = rule == ExpandRule::published};
 }
 
 // What a criterion promises (method.md §4).
 struct CriterionPromise {
   bool keeps_blade_out;  // no tissue stands across the blade
-  bool is_decidable;     // from the state alone whether a particle must go
 };
 constexpr CriterionPromise promise_of(Criterion criterion) {
-  switch (criterion) {
-    case Criterion::none:
-    case Criterion::geometric:
-      return {false, true};
-    case Criterion::distance:
-      return {true, true};
-    case Criterion::strain:
-      break;
-  }
-  return {false, false};
+  return {.keeps_blade_out = criterion == Criterion::distance};
 }
 
 // Whether a body in this state is due a stage (model/backend.h, run), given the state before the stage.

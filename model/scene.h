@@ -2,9 +2,12 @@
 // any particular resolution: the same scene runs on any organ. Field by field documentation with unit, default and
 // bounds is generated from the reader: docs/reference/scene.md.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "model/setup.h"
@@ -13,7 +16,7 @@ namespace cutproof {
 
 // A closed implicit shape, or a tree of them. Lengths in metres, in the shape's own frame.
 struct Shape {
-  enum class Kind { box, ball, kidney, liver, union_of, difference };  // JSON: "union" for union_of
+  enum class Kind { box, ball, kidney, liver, union_of, difference };
   Kind kind = Kind::box;
   Vec3 center;                  // of box, ball, kidney, liver [m]
   Vec3 size = {0.1, 0.1, 0.1};  // box: side lengths; kidney, liver: extents of the bounding box [m]
@@ -131,5 +134,15 @@ struct Scene {
   Expectations expect;
   friend bool operator==(const Scene&, const Scene&) = default;
 };
+
+// Names in files, in the order of the enumerators; those of the other choices are in model/rules.h.
+inline constexpr std::array<std::string_view, 6> kShapeNames = {"box",   "ball",  "kidney",
+                                                                "liver", "union", "difference"};
+inline constexpr std::array<std::string_view, 2> kCookingNames = {"boxes", "sampled"};
+inline constexpr std::array<std::string_view, 2> kCurveNames = {"line", "arc"};
+
+constexpr std::span<const std::string_view> names_of(Shape::Kind) { return kShapeNames; }
+constexpr std::span<const std::string_view> names_of(Cooking) { return kCookingNames; }
+constexpr std::span<const std::string_view> names_of(Curve) { return kCurveNames; }
 
 }  // namespace cutproof

@@ -137,12 +137,8 @@ constexpr void for_each_entry_field(Visit&& visit) {
 
 // Whether T is a list of structs that have fields of their own.
 template <class T>
-inline constexpr bool is_list_of_entries = false;
-template <>
-inline constexpr bool is_list_of_entries<std::vector<Wall>> = true;
-template <>
-inline constexpr bool is_list_of_entries<std::vector<Grip>> = true;
-template <>
-inline constexpr bool is_list_of_entries<std::vector<BladeMove>> = true;
+inline constexpr bool is_list_of_entries =
+    std::is_same_v<T, std::vector<Wall>> || std::is_same_v<T, std::vector<Grip>> ||
+    std::is_same_v<T, std::vector<BladeMove>>;
 
 }  // namespace cutproof

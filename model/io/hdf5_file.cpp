@@ -33,62 +33,24 @@ constexpr hsize_t kCopiesOfChunk = 4;
 // Deflate shrinks by at most 1032.
 constexpr uint64_t kMostCompression = 1100;
 
-// Little-endian on every machine.
-hid_t file_type(Scalar scalar) {
-  switch (scalar) {
-    case Scalar::f64:
-      return H5T_IEEE_F64LE;
-    case Scalar::i32:
-      return H5T_STD_I32LE;
-    case Scalar::i64:
-      return H5T_STD_I64LE;
-    case Scalar::u8:
-      return H5T_STD_U8LE;
-    case Scalar::u64:
-      return H5T_STD_U64LE;
-  }
-  throw std::logic_error("There is no such scalar type.");
-}
+// In the order of Scalar. HDF5's types exist only once the library runs.
+struct ScalarType {
+  const char* name;
+  std::size_t bytes;
+  hid_t (*in_file)();  // little-endian on every machine
+  hid_t (*in_memory)();
+};
+constexpr std::array<ScalarType, 5> kScalarTypes = {
+    {{"float64", 8, [] { return H5T_IEEE_F64LE; }, [] { return H5T_NATIVE_DOUBLE; }},
+     {"int32", 4, [] { return H5T_STD_I32LE; }, [] { return H5T_NATIVE_INT32; }},
+     {"int64", 8, [] { return H5T_STD_I64LE; }, [] { return H5T_NATIVE_INT64; }},
+     {"uint8", 1, [] { return H5T_STD_U8LE; }, [] { return H5T_NATIVE_UINT8; }},
+     {"uint64", 8, [] { return H5T_STD_U64LE; }, [] { return H5T_NATIVE_UINT64; }}}};
 
-hid_t memory_type(Scalar scalar) {
-  switch (scalar) {
-    case Scalar::f64:
-      return H5T_NATIVE_DOUBLE;
-    case Scalar::i32:
-      return H5T_NATIVE_INT32;
-    case Scalar::i64:
-      return H5T_NATIVE_INT64;
-    case Scalar::u8:
-      return H5T_NATIVE_UINT8;
-    case Scalar::u64:
-      return H5T_NATIVE_UINT64;
-  }
-  throw std::logic_error("There is no such scalar type.");
-}
-
-hsize_t scalar_bytes(Scalar scalar) {
-  switch (scalar) {
-    case Scalar::f64:
-    case Scalar::i64:
-    case Scalar::u64:
-      return 8;
-    case Scalar::i32:
-      return 4;
-    case Scalar::u8:
-      return 1;
-  }
-  throw std::logic_error("There is no such scalar type.");
-}
-
-hsize_t row_bytes(const Layout& row) {
-  hsize_t bytes = scalar_bytes(row.scalar);
-  for (const hsize_t extent : row.shape) bytes *= extent;
-  return bytes;
-}
+const ScalarType& type_of(const Layout& layout) { return kScalarTypes[static_cast<std::size_t>(layout.scalar)]; }
 
 std::string describe(const Layout& row) {
-  constexpr std::array<const char*, 5> kNames = {"float64", "int32", "int64", "uint8", "uint64"};
-  std::string text = kNames[static_cast<std::size_t>(row.scalar)];
+  std::string text = type_of(row).name;
   for (const hsize_t extent : row.shape) text += fmt::format("[{}]", extent);
   return text;
 }
@@ -176,9 +138,15 @@ std::vector<hsize_t> dimensions(const Id& space, const std::string& where) {
   return dims;
 }
 
-bool is_type(const Id& type, Scalar scalar) { return H5Tequal(type.get(), file_type(scalar)) > 0; }
+bool is_type(const Id& type, const Layout& layout) { return H5Tequal(type.get(), type_of(layout).in_file()) > 0; }
 
 }  // namespace
+
+std::size_t Layout::bytes() const {
+  std::size_t bytes = type_of(*this).bytes;
+  for (const hsize_t extent : shape) bytes *= extent;
+  return bytes;
+}
 
 Quiet::Quiet() {
   static const bool room = (require_memory(), true);  // for the library's own beginning
@@ -257,9 +225,9 @@ Id open_group(hid_t parent, const std::string& name) {
   return Id(H5Gopen2(parent, name.c_str(), H5P_DEFAULT), H5Gclose, name);
 }
 
-bool has_link(hid_t parent, const std::string& name) {
+Id group_in(hid_t parent, const std::string& name) {
   require_memory();
-  return H5Lexists(parent, name.c_str(), H5P_DEFAULT) > 0;
+  return H5Lexists(parent, name.c_str(), H5P_DEFAULT) > 0 ? open_group(parent, name) : create_group(parent, name);
 }
 
 bool has_attribute(hid_t object, const std::string& name) {
@@ -272,9 +240,9 @@ bool has_attribute(hid_t object, const std::string& name) {
 void write_attribute(hid_t object, const std::string& name, const Layout& layout, const void* value) {
   require_memory();
   const Id space = simple_space(layout.shape, name);
-  const Id attribute(H5Acreate2(object, name.c_str(), file_type(layout.scalar), space.get(), H5P_DEFAULT, H5P_DEFAULT),
+  const Id attribute(H5Acreate2(object, name.c_str(), type_of(layout).in_file(), space.get(), H5P_DEFAULT, H5P_DEFAULT),
                      H5Aclose, name);
-  check(H5Awrite(attribute.get(), memory_type(layout.scalar), value), name);
+  check(H5Awrite(attribute.get(), type_of(layout).in_memory(), value), name);
 }
 
 void read_attribute(hid_t object, const std::string& name, const Layout& layout, void* value) {
@@ -282,10 +250,10 @@ void read_attribute(hid_t object, const std::string& name, const Layout& layout,
   const Id attribute(H5Aopen(object, name.c_str(), H5P_DEFAULT), H5Aclose, name);
   const Id type(H5Aget_type(attribute.get()), H5Tclose, name);
   const Id space(H5Aget_space(attribute.get()), H5Sclose, name);
-  if (!is_type(type, layout.scalar) || dimensions(space, name) != layout.shape) {
+  if (!is_type(type, layout) || dimensions(space, name) != layout.shape) {
     throw Error(name, fmt::format("This attribute should be {}.", describe(layout)));
   }
-  check(H5Aread(attribute.get(), memory_type(layout.scalar), value), name);
+  check(H5Aread(attribute.get(), type_of(layout).in_memory(), value), name);
 }
 
 void write_text_attribute(hid_t object, const std::string& name, const std::string& text) {
@@ -318,9 +286,9 @@ std::string read_text_attribute(hid_t object, const std::string& name) {
   return text;
 }
 
-RawTable RawTable::create(hid_t parent, const std::string& name, const Layout& row, int64_t expected_rows) {
+Table Table::create(hid_t parent, const std::string& name, const Layout& row, int64_t expected_rows) {
   require_memory();
-  const hsize_t most = std::max<hsize_t>(1, kChunkBytes / row_bytes(row));
+  const hsize_t most = std::max<hsize_t>(1, kChunkBytes / row.bytes());
   const hsize_t rows = expected_rows > 0 ? std::min(most, static_cast<hsize_t>(expected_rows)) : most;
   const Id creation = property_list(H5P_DATASET_CREATE);
   const std::vector<hsize_t> chunk = extents(rows, row);
@@ -334,32 +302,32 @@ RawTable RawTable::create(hid_t parent, const std::string& name, const Layout& r
   const std::vector<hsize_t> none = extents(0, row);
   const std::vector<hsize_t> unlimited = extents(H5S_UNLIMITED, row);
   const Id space(H5Screate_simple(static_cast<int>(none.size()), none.data(), unlimited.data()), H5Sclose, name);
-  RawTable table;
-  table.id_ =
-      Id(H5Dcreate2(parent, name.c_str(), file_type(row.scalar), space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT),
-         H5Dclose, name);
+  Table table;
+  table.id_ = Id(
+      H5Dcreate2(parent, name.c_str(), type_of(row).in_file(), space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT),
+      H5Dclose, name);
   table.row_ = row;
   table.name_ = name;
   return table;
 }
 
-RawTable RawTable::open(hid_t parent, const std::string& name, const Layout& row, uint64_t file_bytes) {
+Table Table::open(hid_t parent, const std::string& name, const Layout& row, uint64_t file_bytes) {
   require_memory();
-  RawTable table;
+  Table table;
   table.id_ = Id(H5Dopen2(parent, name.c_str(), H5P_DEFAULT), H5Dclose, name);
   table.row_ = row;
   table.name_ = name;
   const Id type(H5Dget_type(table.id_.get()), H5Tclose, name);
   const Id space(H5Dget_space(table.id_.get()), H5Sclose, name);
   const std::vector<hsize_t> dims = dimensions(space, name);
-  if (!is_type(type, row.scalar) || dims.empty() || dims != extents(dims[0], row)) {
+  if (!is_type(type, row) || dims.empty() || dims != extents(dims[0], row)) {
     throw Error(name, fmt::format("This dataset should hold rows of {}.", describe(row)));
   }
   const Id creation(H5Dget_create_plist(table.id_.get()), H5Pclose, name);
   if (H5Pget_layout(creation.get()) == H5D_CHUNKED) {
     std::vector<hsize_t> chunk(dims.size());
     check(H5Pget_chunk(creation.get(), static_cast<int>(chunk.size()), chunk.data()), name);
-    hsize_t bytes = scalar_bytes(row.scalar);
+    hsize_t bytes = type_of(row).bytes;
     for (const hsize_t extent : chunk) {
       if (extent > kMostChunkBytes / bytes) throw Error(name, "Its chunks are larger than any recording has.");
       bytes *= extent;
@@ -371,40 +339,45 @@ RawTable RawTable::open(hid_t parent, const std::string& name, const Layout& row
   const uint64_t most = stored > std::numeric_limits<uint64_t>::max() / kMostCompression
                             ? std::numeric_limits<uint64_t>::max()
                             : stored * kMostCompression;
-  if (dims[0] > most / row_bytes(row)) {
+  if (dims[0] > most / row.bytes()) {
     throw Error(name, fmt::format("It claims {} rows, and only {} bytes are stored for it.", dims[0], stored));
   }
   table.rows_ = static_cast<int64_t>(dims[0]);
   return table;
 }
 
-int64_t RawTable::append(const void* values, int64_t count) {
-  const int64_t first = rows_;
-  if (count == 0) return first;
-  require_memory();
-  const std::vector<hsize_t> grown = extents(static_cast<hsize_t>(first + count), row_);
-  check(H5Dset_extent(id_.get(), grown.data()), name_);
+template <class Transfer>
+void Table::transfer(int64_t first, int64_t count, const Transfer& call) const {
   const std::vector<hsize_t> block = extents(static_cast<hsize_t>(count), row_);
   std::vector<hsize_t> start(block.size(), 0);
   start[0] = static_cast<hsize_t>(first);
   const Id memory = simple_space(block, name_);
   const Id file(H5Dget_space(id_.get()), H5Sclose, name_);
   check(H5Sselect_hyperslab(file.get(), H5S_SELECT_SET, start.data(), nullptr, block.data(), nullptr), name_);
-  check(H5Dwrite(id_.get(), memory_type(row_.scalar), memory.get(), file.get(), H5P_DEFAULT, values), name_);
+  check(call(id_.get(), type_of(row_).in_memory(), memory.get(), file.get(), H5P_DEFAULT), name_);
+}
+
+int64_t Table::append(std::span<const std::byte> rows) {
+  const int64_t first = rows_;
+  if (rows.empty()) return first;
+  require_memory();
+  const auto count = static_cast<int64_t>(rows.size() / row_.bytes());
+  check(H5Dset_extent(id_.get(), extents(static_cast<hsize_t>(first + count), row_).data()), name_);
+  transfer(first, count, [&](auto... arguments) { return H5Dwrite(arguments..., rows.data()); });
   rows_ = first + count;
   return first;
 }
 
-void RawTable::read(int64_t first, int64_t count, void* values) const {
+void Table::read(int64_t first, int64_t count, void* values) const {
   if (count == 0) return;
   require_memory(kCopiesOfChunk * chunk_bytes_);
-  const std::vector<hsize_t> block = extents(static_cast<hsize_t>(count), row_);
-  std::vector<hsize_t> start(block.size(), 0);
-  start[0] = static_cast<hsize_t>(first);
-  const Id memory = simple_space(block, name_);
-  const Id file(H5Dget_space(id_.get()), H5Sclose, name_);
-  check(H5Sselect_hyperslab(file.get(), H5S_SELECT_SET, start.data(), nullptr, block.data(), nullptr), name_);
-  check(H5Dread(id_.get(), memory_type(row_.scalar), memory.get(), file.get(), H5P_DEFAULT, values), name_);
+  transfer(first, count, [&](auto... arguments) { return H5Dread(arguments..., values); });
+}
+
+void write_table(hid_t parent, const std::string& name, const Layout& row, std::span<const std::byte> rows) {
+  Table table = Table::create(parent, name, row, static_cast<int64_t>(rows.size() / row.bytes()));
+  table.append(rows);
+  table.close();
 }
 
 }  // namespace cutproof::io::hdf5

@@ -5,10 +5,12 @@
 #include <hdf5.h>
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "model/vec.h"
@@ -68,48 +70,28 @@ enum class Scalar { f64, i32, i64, u8, u64 };
 struct Layout {
   Scalar scalar;
   std::vector<hsize_t> shape;
+  std::size_t bytes() const;
 };
 template <class T>
-struct LayoutOf;
-template <>
-struct LayoutOf<double> {
-  static Layout get() { return {Scalar::f64, {}}; }
-};
-template <>
-struct LayoutOf<bool> {
-  static_assert(sizeof(bool) == 1);
-  static Layout get() { return {Scalar::u8, {}}; }
-};
-template <>
-struct LayoutOf<int32_t> {
-  static Layout get() { return {Scalar::i32, {}}; }
-};
-template <>
-struct LayoutOf<int64_t> {
-  static Layout get() { return {Scalar::i64, {}}; }
-};
-template <>
-struct LayoutOf<uint8_t> {
-  static Layout get() { return {Scalar::u8, {}}; }
-};
-template <>
-struct LayoutOf<uint64_t> {
-  static Layout get() { return {Scalar::u64, {}}; }
-};
-template <>
-struct LayoutOf<Vec3> {
-  static_assert(sizeof(Vec3) == 3 * sizeof(double));
-  static Layout get() { return {Scalar::f64, {3}}; }
-};
-template <>
-struct LayoutOf<Mat3> {
-  static_assert(sizeof(Mat3) == 9 * sizeof(double));
-  static Layout get() { return {Scalar::f64, {3, 3}}; }
-};
-template <class T, std::size_t N>
-struct LayoutOf<std::array<T, N>> {
-  static Layout get() { return {LayoutOf<T>::get().scalar, {N}}; }
-};
+Layout layout_of() {
+  static_assert(sizeof(bool) == 1 && sizeof(Vec3) == 3 * sizeof(double) && sizeof(Mat3) == 9 * sizeof(double));
+  if constexpr (std::is_same_v<T, Vec3>) {
+    return {Scalar::f64, {3}};
+  } else if constexpr (std::is_same_v<T, Mat3>) {
+    return {Scalar::f64, {3, 3}};
+  } else if constexpr (std::is_class_v<T>) {  // std::array
+    return {layout_of<typename T::value_type>().scalar, {std::tuple_size_v<T>}};
+  } else if constexpr (std::is_same_v<T, double>) {
+    return {Scalar::f64, {}};
+  } else if constexpr (std::is_same_v<T, bool> || std::is_same_v<T, uint8_t>) {
+    return {Scalar::u8, {}};
+  } else if constexpr (std::is_same_v<T, uint64_t>) {
+    return {Scalar::u64, {}};
+  } else {
+    static_assert(std::is_same_v<T, int32_t> || std::is_same_v<T, int64_t>);
+    return {sizeof(T) == 4 ? Scalar::i32 : Scalar::i64, {}};
+  }
+}
 
 // An HDF5 file. Its format has checksums on all metadata (HDF5 1.10), so that damage is noticed.
 class File {
@@ -129,19 +111,19 @@ class File {
 
 Id create_group(hid_t parent, const std::string& name);
 Id open_group(hid_t parent, const std::string& name);
-bool has_link(hid_t parent, const std::string& name);
+Id group_in(hid_t parent, const std::string& name);  // which is made if it is not there
 bool has_attribute(hid_t object, const std::string& name);
 
 void write_attribute(hid_t object, const std::string& name, const Layout& layout, const void* value);
 void read_attribute(hid_t object, const std::string& name, const Layout& layout, void* value);
 template <class T>
 void write_attribute(hid_t object, const std::string& name, const T& value) {
-  write_attribute(object, name, LayoutOf<T>::get(), &value);
+  write_attribute(object, name, layout_of<T>(), &value);
 }
 template <class T>
 T read_attribute(hid_t object, const std::string& name) {
   T value{};
-  read_attribute(object, name, LayoutOf<T>::get(), &value);
+  read_attribute(object, name, layout_of<T>(), &value);
   return value;
 }
 // Fixed-length text, padded with NUL, UTF-8 (ASCII if it is that); at most 64 KiB. Text must not end in NUL.
@@ -149,21 +131,25 @@ void write_text_attribute(hid_t object, const std::string& name, const std::stri
 std::string read_text_attribute(hid_t object, const std::string& name);
 
 // A dataset of rows: compressed, with a checksum per chunk, extendible.
-class RawTable {
+class Table {
  public:
-  RawTable() = default;
+  Table() = default;
   // `expected_rows`: how many will be written, or 0 for a table that grows.
-  static RawTable create(hid_t parent, const std::string& name, const Layout& row, int64_t expected_rows);
+  static Table create(hid_t parent, const std::string& name, const Layout& row, int64_t expected_rows = 0);
   // Throws Error if it is missing, or of another type or shape, or claims more rows than `file_bytes` can hold.
-  static RawTable open(hid_t parent, const std::string& name, const Layout& row, uint64_t file_bytes);
+  static Table open(hid_t parent, const std::string& name, const Layout& row, uint64_t file_bytes);
   int64_t rows() const { return rows_; }
-  int64_t append(const void* values, int64_t count);  // returns the index of the first new row
+  int64_t append(std::span<const std::byte> rows);  // whole ones; returns the index of the first new row
+  // Requires 0 <= first, 0 <= count, first + count <= rows().
   void read(int64_t first, int64_t count, void* values) const;
   // Writes out what is buffered; throws Error where the destructor would stay silent.
   void close() { id_.close(name_); }
-  const std::string& name() const { return name_; }
 
  private:
+  // Calls H5Dread or H5Dwrite, with the types and spaces that they need, for `count` rows from `first`.
+  template <class Transfer>
+  void transfer(int64_t first, int64_t count, const Transfer& call) const;
+
   Id id_;
   Layout row_;
   int64_t rows_ = 0;
@@ -171,42 +157,11 @@ class RawTable {
   std::string name_;
 };
 
-template <class T>
-class Table {
- public:
-  Table() = default;
-  static Table create(hid_t parent, const std::string& name, int64_t expected_rows = 0) {
-    return Table(RawTable::create(parent, name, LayoutOf<T>::get(), expected_rows));
-  }
-  static Table open(hid_t parent, const std::string& name, uint64_t file_bytes) {
-    return Table(RawTable::open(parent, name, LayoutOf<T>::get(), file_bytes));
-  }
-  int64_t rows() const { return raw_.rows(); }
-  const std::string& name() const { return raw_.name(); }
-  void close() { raw_.close(); }
-  int64_t append(std::span<const T> values) { return raw_.append(values.data(), static_cast<int64_t>(values.size())); }
-  // Requires 0 <= first, 0 <= count, first + count <= rows(); throws Error otherwise.
-  std::vector<T> read(int64_t first, int64_t count) const {
-    if (first < 0 || count < 0 || first > rows() - count) {
-      throw Error(name(), "Rows are asked for that the table does not have.");
-    }
-    std::vector<T> values(static_cast<std::size_t>(count));
-    raw_.read(first, count, values.data());
-    return values;
-  }
-  std::vector<T> read_all() const { return read(0, rows()); }
-
- private:
-  explicit Table(RawTable raw) : raw_(std::move(raw)) {}
-  RawTable raw_;
-};
-
 // A whole table at once.
+void write_table(hid_t parent, const std::string& name, const Layout& row, std::span<const std::byte> rows);
 template <class T>
 void write_table(hid_t parent, const std::string& name, const std::vector<T>& values) {
-  Table<T> table = Table<T>::create(parent, name, static_cast<int64_t>(values.size()));
-  table.append(values);
-  table.close();
+  write_table(parent, name, layout_of<T>(), std::as_bytes(std::span(values)));
 }
 
 }  // namespace cutproof::io::hdf5

@@ -1,15 +1,19 @@
 // One description of what a recording's index holds, walked by a writer or by a reader, so that the two cannot drift
-// apart: walk(archive, value) names each field once.
+// apart: archive(name, value) for each field once. Single values, names and texts lie in the file as attributes,
+// arrays as datasets.
 #pragma once
 #include <fmt/format.h>
 
-#include <span>
+#include <algorithm>
+#include <cstddef>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <vector>
 
+#include "model/io/container_types.h"
 #include "model/io/hdf5_file.h"
+#include "model/rules.h"
 
 namespace cutproof::io {
 
@@ -18,28 +22,25 @@ class WritingArchive {
   static constexpr bool kReading = false;
   explicit WritingArchive(hid_t group) : group_(group) {}
 
-  // A scalar or small vector, as an attribute.
   template <class T>
-  void value(const std::string& name, const T& value) {
-    hdf5::write_attribute(group_, name, value);
+  void operator()(const std::string& name, const T& value) {
+    if constexpr (NamedChoice<T>) {
+      hdf5::write_text_attribute(group_, name, std::string(name_of(value)));
+    } else if constexpr (std::is_same_v<T, std::string>) {
+      hdf5::write_text_attribute(group_, name, value);
+    } else if constexpr (is_vector<T>) {
+      hdf5::write_table(group_, name, value);
+    } else {
+      hdf5::write_attribute(group_, name, value);
+    }
   }
-  void flag(const std::string& name, bool value) { hdf5::write_attribute(group_, name, uint8_t{value}); }
-  void text(const std::string& name, const std::string& value) { hdf5::write_text_attribute(group_, name, value); }
-  // An enumerator by its name; `names` in the order of the enumerators.
-  template <class E>
-  void choice(const std::string& name, E value, std::span<const std::string_view> names) {
-    text(name, std::string(names[static_cast<std::size_t>(value)]));
-  }
-  // An array, as a dataset.
-  template <class T>
-  void array(const std::string& name, const std::vector<T>& values) {
-    hdf5::write_table(group_, name, values);
+  void rows(const std::string& name, const hdf5::Layout& row, const std::vector<std::byte>& bytes) {
+    hdf5::write_table(group_, name, row, bytes);
   }
   // Adds to a group, which is made if it is not there.
   template <class F>
   void group(const std::string& name, F&& fields) {
-    const hdf5::Id id =
-        hdf5::has_link(group_, name) ? hdf5::open_group(group_, name) : hdf5::create_group(group_, name);
+    const hdf5::Id id = hdf5::group_in(group_, name);
     WritingArchive inner(id.get());
     fields(inner);
   }
@@ -56,50 +57,54 @@ class ReadingArchive {
       : group_(group), path_(std::move(path)), file_bytes_(file_bytes) {}
 
   template <class T>
-  void value(const std::string& name, T& value) const {
-    located(name, [&] { value = hdf5::read_attribute<T>(group_, name); });
-  }
-  void flag(const std::string& name, bool& value) const {
-    uint8_t bit = 0;
-    this->value(name, bit);
-    if (bit > 1) throw hdf5::Error(path_ + "/" + name, fmt::format("This is {}, and should be 0 or 1.", bit));
-    value = bit == 1;
-  }
-  void text(const std::string& name, std::string& value) const {
-    located(name, [&] { value = hdf5::read_text_attribute(group_, name); });
-  }
-  template <class E>
-  void choice(const std::string& name, E& value, std::span<const std::string_view> names) const {
-    std::string found;
-    text(name, found);
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      if (found == names[i]) {
-        value = static_cast<E>(i);
-        return;
+  void operator()(const std::string& name, T& value) const {
+    located(name, [&] {
+      if constexpr (NamedChoice<T>) {
+        const std::string found = hdf5::read_text_attribute(group_, name);
+        const auto names = names_of(T{});
+        const auto at = std::find(names.begin(), names.end(), found);
+        if (at == names.end()) {
+          throw hdf5::Error(name, fmt::format("This is \"{}\", which is none of its names.", found));
+        }
+        value = static_cast<T>(at - names.begin());
+      } else if constexpr (std::is_same_v<T, std::string>) {
+        value = hdf5::read_text_attribute(group_, name);
+      } else if constexpr (std::is_same_v<T, bool>) {
+        const auto bit = hdf5::read_attribute<uint8_t>(group_, name);
+        if (bit > 1) throw hdf5::Error(name, fmt::format("This is {}, and should be 0 or 1.", bit));
+        value = bit == 1;
+      } else if constexpr (is_vector<T>) {
+        const hdf5::Table table =
+            hdf5::Table::open(group_, name, hdf5::layout_of<typename T::value_type>(), file_bytes_);
+        value.resize(static_cast<std::size_t>(table.rows()));
+        table.read(0, table.rows(), value.data());
+      } else {
+        value = hdf5::read_attribute<T>(group_, name);
       }
-    }
-    throw hdf5::Error(path_ + "/" + name, fmt::format("This is \"{}\", which is none of its names.", found));
+    });
   }
-  template <class T>
-  void array(const std::string& name, std::vector<T>& values) const {
-    located(name, [&] { values = hdf5::Table<T>::open(group_, name, file_bytes_).read_all(); });
+  void rows(const std::string& name, const hdf5::Layout& row, std::vector<std::byte>& bytes) const {
+    const hdf5::Table stored = table(name, row);
+    located(name, [&] {
+      bytes.resize(static_cast<std::size_t>(stored.rows()) * row.bytes());
+      stored.read(0, stored.rows(), bytes.data());
+    });
   }
-  void table(const std::string& name, const hdf5::Layout& row, hdf5::RawTable& table) const {
-    located(name, [&] { table = hdf5::RawTable::open(group_, name, row, file_bytes_); });
+  hdf5::Table table(const std::string& name, const hdf5::Layout& row) const {
+    return located(name, [&] { return hdf5::Table::open(group_, name, row, file_bytes_); });
   }
   template <class F>
   void group(const std::string& name, F&& fields) const {
-    hdf5::Id id;
-    located(name, [&] { id = hdf5::open_group(group_, name); });
+    const hdf5::Id id = located(name, [&] { return hdf5::open_group(group_, name); });
     ReadingArchive inner(id.get(), path_ + "/" + name, file_bytes_);
     fields(inner);
   }
 
  private:
   template <class F>
-  void located(const std::string& name, F&& action) const {
+  std::invoke_result_t<F> located(const std::string& name, F&& action) const {
     try {
-      action();
+      return action();
     } catch (const hdf5::Error& error) {
       throw hdf5::Error(path_ + "/" + name, error.what());
     }
@@ -109,5 +114,19 @@ class ReadingArchive {
   std::string path_;
   uint64_t file_bytes_;
 };
+
+// What is read has to fit together; `field` is its full path. These throw hdf5::Error.
+inline void require_offsets(const std::string& field, const std::vector<int64_t>& offsets, std::size_t values) {
+  if (offsets.empty() || offsets.front() != 0 || !std::is_sorted(offsets.begin(), offsets.end()) ||
+      offsets.back() != static_cast<int64_t>(values)) {
+    throw hdf5::Error(field, fmt::format("These offsets should rise from 0 to {} without ever falling.", values));
+  }
+}
+template <class Byte>
+void require_flags(const std::string& field, const std::vector<Byte>& flags) {
+  if (!std::ranges::all_of(flags, [](Byte flag) { return flag <= Byte{1}; })) {
+    throw hdf5::Error(field, "These should be 0 or 1.");
+  }
+}
 
 }  // namespace cutproof::io

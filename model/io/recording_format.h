@@ -4,11 +4,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
+#include <span>
 #include <string>
 #include <string_view>
-#include <type_traits>
-#include <utility>
 #include <vector>
 
 #include "model/fields.h"
@@ -33,32 +31,20 @@ enum class Storage {
   cells   // as rows, but of triangles: three rows of a table of corners each
 };
 
-template <class T>
-inline constexpr bool is_vector = false;
-template <class T>
-inline constexpr bool is_vector<std::vector<T>> = true;
+// A field of a State by the bytes of its entries.
+struct RecordedField {
+  Field field;
+  Storage storage;
+  hdf5::Layout entry;
+  std::span<const std::byte> (*bytes)(const State& state);
+  std::byte* (*make_room)(State& state, int64_t entries);
 
-// T: the type of the field.
-template <class T>
-constexpr Storage storage_of(const Field& field) {
-  if (!is_vector<T>) return Storage::value;
-  if (field.space == IndexSpace::state) return Storage::list;
-  return field.space == IndexSpace::triangle ? Storage::cells : Storage::rows;
-}
-
-// One entry of a field in a file. T: the type of the field.
-template <class T>
-struct EntryOf {
-  using type = T;
+  std::string name() const { return std::string(field.name); }
+  // Of the tables on particles and skin vertices: the points of that VTKHDF file; all others are point data.
+  bool is_points() const { return field.quantity == Quantity::point; }
 };
-template <class T>
-struct EntryOf<std::vector<T>> {
-  using type = T;
-};
-template <class T>
-hdf5::Layout entry_layout() {
-  return hdf5::LayoutOf<typename EntryOf<T>::type>::get();
-}
+// In the order of model/fields.h.
+const std::vector<RecordedField>& recorded_fields();
 
 // Lengths that vary from snapshot to snapshot: a column each. They are stored and not derived from the offsets of
 // clusters: a recorded state may be broken, and the oracles are to see it as it was.
@@ -71,49 +57,29 @@ inline constexpr std::array<CountColumn, 4> kCountColumns = {{{"cluster_count", 
                                                               {"vertex_count", IndexSpace::vertex},
                                                               {"triangle_count", IndexSpace::triangle}}};
 
-constexpr std::size_t count_fields() {
-  std::size_t count = 0;
-  for_each_field([&](const Field&, auto) { ++count; });
-  return count;
-}
-inline constexpr std::size_t kFieldCount = count_fields();
-
-// visit(field, get, k) for each field, k counting from 0.
-template <class Visit>
-void for_each_numbered_field(Visit&& visit) {
-  std::size_t k = 0;
-  for_each_field([&](const Field& field, auto get) { visit(field, get, k++); });
-}
-
-// The type of the field that `get` gives.
-template <class Get>
-using FieldType = std::remove_cvref_t<decltype(std::declval<Get>()(std::declval<State&>()))>;
-
-// One Of<T> for each field, T being its type. Of must have a name of its own in the whole program: GCC 12 gives a
-// template whose argument is a template of an unnamed namespace one definition for all files.
-template <template <class> class Of>
-class PerField {
- public:
-  PerField() {
-    for_each_numbered_field(
-        [this]<class Get>(const Field&, Get, std::size_t k) { all_[k] = std::make_shared<Of<FieldType<Get>>>(); });
-  }
-  // visit(field, get, of) for each field.
-  template <class Visit>
-  void for_each(Visit&& visit) const {
-    for_each_numbered_field([&]<class Get>(const Field& field, Get get, std::size_t k) {
-      visit(field, get, *static_cast<Of<FieldType<Get>>*>(all_[k].get()));
-    });
-  }
-
- private:
-  std::array<std::shared_ptr<void>, kFieldCount> all_;
+// The group /snapshots.
+struct SnapshotColumns {
+  struct OfField {
+    std::vector<std::byte> values;  // value, list: the entries of all snapshots
+    std::vector<int64_t> index;     // list: offsets, [snapshots + 1]; rows, cells: the first row, [snapshots]
+  };
+  std::vector<uint8_t> stage;
+  std::array<std::vector<int64_t>, kCountColumns.size()> counts;
+  std::vector<OfField> fields = std::vector<OfField>(recorded_fields().size());
 };
 
-// The points of a VTKHDF file; every other field on particles or skin vertices is point data of its name.
-constexpr bool is_points(const Field& field) {
-  return field.quantity == Quantity::point &&
-         (field.space == IndexSpace::particle || field.space == IndexSpace::vertex);
+// Columns is SnapshotColumns or const SnapshotColumns.
+template <class Archive, class Columns>
+void walk_snapshots(Archive& archive, Columns& columns) {
+  archive("stage", columns.stage);
+  for (std::size_t c = 0; c < kCountColumns.size(); ++c) archive(kCountColumns[c].name, columns.counts[c]);
+  for (std::size_t k = 0; k < columns.fields.size(); ++k) {
+    const RecordedField& field = recorded_fields()[k];
+    const bool elsewhere = field.storage == Storage::rows || field.storage == Storage::cells;
+    if (elsewhere) archive(field.name() + "_row", columns.fields[k].index);
+    if (field.storage == Storage::list) archive(field.name() + "_offsets", columns.fields[k].index);
+    if (!elsewhere) archive.rows(field.name(), field.entry, columns.fields[k].values);
+  }
 }
 
 // F for F and for F.cutproof.h5.

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <utility>
 
+#include "model/at.h"
 #include "model/error.h"
 #include "model/io/hdf5_file.h"
 #include "model/io/recording.h"
@@ -65,16 +66,12 @@ hdf5::File open_part(const std::string& path, const char* kind) {
                        "Give the name of the index, which ends in \".cutproof.h5\".");
     }
     const auto version = hdf5::read_attribute<int32_t>(file.id(), "cutproof_format");
-    if (version > kFormatVersion) {
-      throw InputError(
-          path, "cutproof_format",
-          fmt::format("The recording has format {}, and this program reads up to {}.", version, kFormatVersion),
-          "Use a newer cutproof.");
-    }
-    if (version < kFormatVersion) {
+    if (version != kFormatVersion) {
+      const bool newer = version > kFormatVersion;
       throw InputError(path, "cutproof_format",
-                       fmt::format("The recording has format {}, and this program reads {}.", version, kFormatVersion),
-                       "Record the scene again.");
+                       fmt::format("The recording has format {}, and this program reads {}{}.", version,
+                                   newer ? "up to " : "", kFormatVersion),
+                       newer ? "Use a newer cutproof." : "Record the scene again.");
     }
     return file;
   } catch (const hdf5::Error& error) {
@@ -82,39 +79,20 @@ hdf5::File open_part(const std::string& path, const char* kind) {
   }
 }
 
-// Whether `count` rows from `first` are rows of a table.
-bool fits(int64_t first, int64_t count, int64_t rows) {
-  return first >= 0 && count >= 0 && count <= rows && first <= rows - count;
+// `count` rows from `first`, as entry i of a column says, must be among `rows`.
+void require_block(const std::string& column, std::size_t i, int64_t first, int64_t count, int64_t rows) {
+  if (first >= 0 && count >= 0 && count <= rows && first <= rows - count) return;
+  throw hdf5::Error(column, fmt::format("Entry {} is {}: {} rows from there are not among the {} that are stored.", i,
+                                        first, count, rows));
 }
 
-void require_blocks(const std::string& field, const std::vector<int64_t>& first, const std::vector<int64_t>& counts,
-                    int64_t rows) {
-  for (std::size_t i = 0; i < first.size(); ++i) {
-    if (!fits(first[i], counts[i], rows)) {
-      throw hdf5::Error(field, fmt::format("Entry {} is {}: {} rows from there are not among the {} that are stored.",
-                                           i, first[i], counts[i], rows));
-    }
-  }
-}
-
-template <class T>
-void require_length(const std::string& field, const std::vector<T>& values, std::size_t length) {
-  if (values.size() != length) {
-    throw hdf5::Error(field, fmt::format("This has {} entries, and should have {}.", values.size(), length));
-  }
-}
-
-void require_offsets(const std::string& field, const std::vector<int64_t>& offsets, std::size_t count,
-                     std::size_t values) {
-  require_length(field, offsets, count + 1);
-  if (offsets.front() != 0 || !std::is_sorted(offsets.begin(), offsets.end()) ||
-      offsets.back() != static_cast<int64_t>(values)) {
-    throw hdf5::Error(field, fmt::format("These offsets should rise from 0 to {} without ever falling.", values));
-  }
+void require_length(const std::string& field, std::size_t entries, std::size_t wanted) {
+  if (entries == wanted) return;
+  throw hdf5::Error(field, fmt::format("This has {} entries, and should have {}.", entries, wanted));
 }
 
 // Triangles `first` to `first + count` of a table of corners; of snapshot i, for the error.
-std::vector<std::array<int32_t, 3>> triangles_in(const hdf5::RawTable& table, int64_t first, int64_t count,
+std::vector<std::array<int32_t, 3>> triangles_in(const hdf5::Table& table, int64_t first, int64_t count,
                                                  std::size_t i) {
   std::vector<int64_t> corners(static_cast<std::size_t>(3 * count));
   table.read(3 * first, 3 * count, corners.data());
@@ -129,137 +107,96 @@ std::vector<std::array<int32_t, 3>> triangles_in(const hdf5::RawTable& table, in
   return triangles;
 }
 
-// What the reader keeps of a field of type T.
-template <class T>
-struct ReadField {
-  std::vector<std::conditional_t<std::is_same_v<T, bool>, uint8_t, T>> values;  // of each snapshot
-};
-template <class E>
-struct ReadField<std::vector<E>> {
-  // A list.
-  std::vector<int64_t> offsets;  // [snapshots + 1]
-  std::vector<E> values;
-  // Rows, cells.
-  hdf5::RawTable table;
-  std::vector<int64_t> first;  // row of each snapshot
-};
-
 }  // namespace
 
 struct RecordingReader::File {
   explicit File(const std::string& name);
   Snapshot snapshot(std::size_t i) const;
 
-  RecordingPaths paths;
   Recording header;
+  std::string index_path;
 
  private:
-  void read_columns(const ReadingArchive& archive);
-  void open_tables(const ReadingArchive& archive, IndexSpace points);
-  void check_ranges() const;
-  int64_t count_in(IndexSpace space, std::size_t i) const;
+  // One of the files.
+  struct Part {
+    std::string path;
+    hdf5::File file;
 
-  hdf5::File index, particles, skin;
-  std::vector<uint8_t> stage;
-  std::array<std::vector<int64_t>, kCountColumns.size()> counts;
-  PerField<ReadField> fields;
-
-  template <class F>
-  void reading(const std::string& path, F&& action) const {
-    try {
-      action();
-    } catch (const hdf5::Error& error) {
-      throw InputError(path, error.where(), error.what(), kRemedy);
-    }
-  }
-};
-
-RecordingReader::File::File(const std::string& name) : paths(recording_paths(name)) {
-  index = open_part(paths.index, kIndexKind);
-  particles = open_part(paths.particles, kParticlesKind);
-  skin = open_part(paths.skin, kSkinKind);
-
-  uint64_t recording = 0;
-  const ReadingArchive root(index.id(), "", index.bytes());
-  reading(paths.index, [&] {
-    root.value("cutproof_recording", recording);
-    root.text("backend", header.backend);
-    std::vector<uint8_t> scene;
-    root.array("scene", scene);
-    header.scene_json.assign(scene.begin(), scene.end());
-    header.setup = read_setup(index.id(), index.bytes());
-    double u = 0;
-    root.value("unit_roundoff", u);
-    header.precision = u == unit_roundoff(Precision::binary64) ? Precision::binary64 : Precision::binary32;
-    if (u != unit_roundoff(header.precision)) {
-      throw hdf5::Error("/unit_roundoff", fmt::format("This is {}, and should be 2^-53 or 2^-24.", u));
-    }
-    if (const auto defect = defect_of(header.setup)) throw hdf5::Error("/setup/" + defect->field, defect->problem);
-    root.group("snapshots", [&](auto& archive) { read_columns(archive); });
-    root.group("clusters", [&](auto& archive) {
-      fields.for_each([&]<class T>(const Field& field, auto, ReadField<T>& track) {
-        if constexpr (is_vector<T>) {
-          const bool elsewhere = field.space == IndexSpace::particle || field.space == IndexSpace::vertex;
-          if (storage_of<T>(field) != Storage::rows || elsewhere) return;
-          archive.table(std::string(field.name), entry_layout<T>(), track.table);
-        }
-      });
-    });
-  });
-  const auto same_recording = [&](const std::string& path, const ReadingArchive& archive) {
-    uint64_t found = 0;
-    archive.value("cutproof_recording", found);
-    if (found != recording) {
-      throw InputError(path, "cutproof_recording", "This file belongs to another recording than the index.", kRemedy);
+    // Runs an action on what it holds.
+    template <class F>
+    void reading(F&& action) const {
+      try {
+        action(ReadingArchive(file.id(), "", file.bytes()));
+      } catch (const hdf5::Error& error) {
+        throw InputError(path, error.where(), error.what(), kRemedy);
+      }
     }
   };
-  reading(paths.particles, [&] {
-    const ReadingArchive archive(particles.id(), "", particles.bytes());
-    same_recording(paths.particles, archive);
-    open_tables(archive, IndexSpace::particle);
-  });
-  reading(paths.skin, [&] {
-    const ReadingArchive archive(skin.id(), "", skin.bytes());
-    same_recording(paths.skin, archive);
-    open_tables(archive, IndexSpace::vertex);
-  });
-  reading(paths.index, [&] { check_ranges(); });
-  header.snapshot_count = static_cast<int64_t>(stage.size());
-}
+  void read_index(const ReadingArchive& root);
+  void check_ranges() const;
+  const Part& part_of(const RecordedField& recorded) const;
+  int64_t count_in(IndexSpace space, std::size_t i) const;
 
-void RecordingReader::File::read_columns(const ReadingArchive& archive) {
-  archive.array("stage", stage);
-  for (std::size_t c = 0; c < counts.size(); ++c) archive.array(kCountColumns[c].name, counts[c]);
-  fields.for_each([&]<class T>(const Field& field, auto, ReadField<T>& track) {
-    const std::string column(field.name);
-    if constexpr (!is_vector<T>) {
-      archive.array(column, track.values);
-    } else if (storage_of<T>(field) == Storage::list) {
-      archive.array(column + "_offsets", track.offsets);
-      archive.array(column, track.values);
-    } else {
-      archive.array(column + "_row", track.first);
-    }
-  });
-}
+  Part index, particles, skin;
+  uint64_t recording = 0;
+  SnapshotColumns columns;
+  std::vector<hdf5::Table> tables = std::vector<hdf5::Table>(recorded_fields().size());  // of rows and cells
+};
 
-// The tables of a VTKHDF file whose points are the particles or the vertices of the skin.
-void RecordingReader::File::open_tables(const ReadingArchive& archive, IndexSpace points) {
-  archive.group("VTKHDF", [&](auto& a) {
-    fields.for_each([&]<class T>(const Field& field, auto, ReadField<T>& track) {
-      if constexpr (is_vector<T>) {
-        if (field.space == points && is_points(field)) {
-          a.table("Points", entry_layout<T>(), track.table);
-        } else if (field.space == points) {
-          a.group("PointData",
-                  [&](auto& data) { data.table(std::string(field.name), entry_layout<T>(), track.table); });
-        } else if (storage_of<T>(field) == Storage::cells && points == IndexSpace::vertex) {
-          a.group("Polygons",
-                  [&](auto& cells) { cells.table("Connectivity", hdf5::LayoutOf<int64_t>::get(), track.table); });
+RecordingReader::File::File(const std::string& name) {
+  const RecordingPaths paths = recording_paths(name);
+  index_path = paths.index;
+  index = {paths.index, open_part(paths.index, kIndexKind)};
+  particles = {paths.particles, open_part(paths.particles, kParticlesKind)};
+  skin = {paths.skin, open_part(paths.skin, kSkinKind)};
+  index.reading([&](const ReadingArchive& root) { read_index(root); });
+  for (const Part* part : {&index, &particles, &skin}) {
+    part->reading([&](const ReadingArchive& archive) {
+      uint64_t found = 0;
+      archive("cutproof_recording", found);
+      if (found != recording) {
+        throw InputError(part->path, "cutproof_recording", "This file belongs to another recording than the index.",
+                         kRemedy);
+      }
+      for (std::size_t k = 0; k < tables.size(); ++k) {
+        const RecordedField& recorded = recorded_fields()[k];
+        if (&part_of(recorded) != part) continue;
+        if (recorded.storage == Storage::cells) {
+          tables[k] = archive.table("VTKHDF/Polygons/Connectivity", hdf5::layout_of<int64_t>());
+        } else if (recorded.storage == Storage::rows) {
+          const std::string data = part == &index ? "clusters/" : "VTKHDF/PointData/";
+          const bool is_points = part != &index && recorded.is_points();
+          tables[k] = archive.table(is_points ? "VTKHDF/Points" : data + recorded.name(), recorded.entry);
         }
       }
     });
-  });
+  }
+  index.reading([&](const ReadingArchive&) { check_ranges(); });
+  header.snapshot_count = static_cast<int64_t>(columns.stage.size());
+}
+
+void RecordingReader::File::read_index(const ReadingArchive& root) {
+  root("cutproof_recording", recording);
+  root("backend", header.backend);
+  std::vector<uint8_t> scene;
+  root("scene", scene);
+  header.scene_json.assign(scene.begin(), scene.end());
+  header.setup = read_setup(index.file.id(), index.file.bytes());
+  double u = 0;
+  root("unit_roundoff", u);
+  header.precision = u == unit_roundoff(Precision::binary64) ? Precision::binary64 : Precision::binary32;
+  if (u != unit_roundoff(header.precision)) {
+    throw hdf5::Error("/unit_roundoff", fmt::format("This is {}, and should be 2^-53 or 2^-24.", u));
+  }
+  if (const auto defect = defect_of(header.setup)) throw hdf5::Error("/setup/" + defect->field, defect->problem);
+  root.group("snapshots", [&](auto& archive) { walk_snapshots(archive, columns); });
+}
+
+// The file with the rows of a field.
+const RecordingReader::File::Part& RecordingReader::File::part_of(const RecordedField& recorded) const {
+  const IndexSpace space = recorded.field.space;
+  if (space == IndexSpace::particle) return particles;
+  return space == IndexSpace::vertex || space == IndexSpace::triangle ? skin : index;
 }
 
 // How many entries a field of this index space has in snapshot i.
@@ -267,74 +204,74 @@ int64_t RecordingReader::File::count_in(IndexSpace space, std::size_t i) const {
   if (space == IndexSpace::particle) return header.setup.body.particle_count();
   const bool ends = space == IndexSpace::cluster_end;
   const auto column = std::ranges::find(kCountColumns, ends ? IndexSpace::cluster : space, &CountColumn::space);
-  const int64_t count = counts[static_cast<std::size_t>(column - kCountColumns.begin())][i];
+  const int64_t count = columns.counts[at(column - kCountColumns.begin())][i];
   return ends && count < std::numeric_limits<int64_t>::max() ? count + 1 : count;
 }
 
 void RecordingReader::File::check_ranges() const {
-  const std::size_t count = stage.size();
+  const std::size_t count = columns.stage.size();
   const std::string at = "/snapshots/";
-  if (!std::all_of(stage.begin(), stage.end(), [](uint8_t s) { return s < kStages.size(); })) {
+  if (!std::ranges::all_of(columns.stage, [](uint8_t s) { return s < kStages.size(); })) {
     throw hdf5::Error(at + "stage", "A stage is not one of 0 (step) to 5 (skin).");
   }
-  for (std::size_t c = 0; c < counts.size(); ++c) {
+  for (std::size_t c = 0; c < kCountColumns.size(); ++c) {
     const std::string column = at + kCountColumns[c].name;
-    require_length(column, counts[c], count);
-    if (std::ranges::any_of(counts[c], [](int64_t entry) { return entry < 0; })) {
+    require_length(column, columns.counts[c].size(), count);
+    if (std::ranges::any_of(columns.counts[c], [](int64_t entry) { return entry < 0; })) {
       throw hdf5::Error(column, "A count is negative.");
     }
   }
-  fields.for_each([&]<class T>(const Field& field, auto, const ReadField<T>& track) {
-    const std::string column = at + std::string(field.name);
-    if constexpr (std::is_same_v<T, bool>) {
-      if (std::ranges::any_of(track.values, [](uint8_t flag) { return flag > 1; })) {
-        throw hdf5::Error(column, "These should be 0 or 1.");
-      }
+  for (std::size_t k = 0; k < tables.size(); ++k) {
+    const RecordedField& recorded = recorded_fields()[k];
+    const auto& [values, index_column] = columns.fields[k];
+    const std::string column = at + recorded.name();
+    const std::size_t entries = values.size() / recorded.entry.bytes();
+    switch (recorded.storage) {
+      case Storage::value:
+        require_length(column, entries, count);
+        if (recorded.field.quantity == Quantity::flag) require_flags(column, values);
+        break;
+      case Storage::list:
+        require_length(column + "_offsets", index_column.size(), count + 1);
+        require_offsets(column + "_offsets", index_column, entries);
+        break;
+      case Storage::rows:
+      case Storage::cells:
+        require_length(column + "_row", index_column.size(), count);
+        const int64_t rows = tables[k].rows() / (recorded.storage == Storage::cells ? 3 : 1);
+        for (std::size_t i = 0; i < count; ++i) {
+          require_block(column + "_row", i, index_column[i], count_in(recorded.field.space, i), rows);
+        }
     }
-    if constexpr (!is_vector<T>) {
-      require_length(column, track.values, count);
-    } else if (storage_of<T>(field) == Storage::list) {
-      require_offsets(column + "_offsets", track.offsets, count, track.values.size());
-    } else {
-      require_length(column + "_row", track.first, count);
-      const bool corners = storage_of<T>(field) == Storage::cells;
-      std::vector<int64_t> lengths(count);
-      for (std::size_t i = 0; i < count; ++i) lengths[i] = count_in(field.space, i);
-      require_blocks(column + "_row", track.first, lengths, track.table.rows() / (corners ? 3 : 1));
-    }
-  });
+  }
 }
 
 Snapshot RecordingReader::File::snapshot(std::size_t i) const {
   Snapshot snapshot;
-  snapshot.stage = static_cast<Stage>(stage[i]);
+  snapshot.stage = static_cast<Stage>(columns.stage[i]);
   State& state = snapshot.state;
   state.precision = header.precision;
-  fields.for_each([&]<class T>(const Field& field, auto get, const ReadField<T>& track) {
-    T& value = get(state);
-    if constexpr (std::is_same_v<T, bool>) {
-      value = track.values[i] == 1;
-    } else if constexpr (!is_vector<T>) {
-      value = track.values[i];
-    } else if (storage_of<T>(field) == Storage::list) {
-      value.assign(track.values.begin() + track.offsets[i], track.values.begin() + track.offsets[i + 1]);
-    } else {
-      const bool on_particles = field.space == IndexSpace::particle;
-      const bool on_skin = field.space == IndexSpace::vertex || field.space == IndexSpace::triangle;
-      reading(on_particles ? paths.particles
-              : on_skin    ? paths.skin
-                           : paths.index,
-              [&] {
-                const int64_t count = count_in(field.space, i);
-                if constexpr (std::is_same_v<T, std::vector<std::array<int32_t, 3>>>) {
-                  value = triangles_in(track.table, track.first[i], count, i);
-                } else {
-                  value.resize(static_cast<std::size_t>(count));
-                  track.table.read(track.first[i], count, value.data());
-                }
-              });
+  for (std::size_t k = 0; k < tables.size(); ++k) {
+    const RecordedField& recorded = recorded_fields()[k];
+    const auto& [values, index_column] = columns.fields[k];
+    if (recorded.storage == Storage::value || recorded.storage == Storage::list) {
+      const bool is_list = recorded.storage == Storage::list;
+      const int64_t first = is_list ? index_column[i] : static_cast<int64_t>(i);
+      const int64_t end = is_list ? index_column[i + 1] : first + 1;
+      std::byte* const room = recorded.make_room(state, end - first);
+      const auto size = static_cast<int64_t>(recorded.entry.bytes());
+      std::copy(values.begin() + first * size, values.begin() + end * size, room);
+      continue;
     }
-  });
+    part_of(recorded).reading([&](const ReadingArchive&) {
+      const int64_t first = index_column[i], count = count_in(recorded.field.space, i);
+      if (recorded.storage == Storage::cells) {
+        state.skin.triangles = triangles_in(tables[k], first, count, i);
+      } else {
+        tables[k].read(first, count, recorded.make_room(state, count));
+      }
+    });
+  }
   return snapshot;
 }
 
@@ -353,7 +290,7 @@ const Recording& RecordingReader::header() const { return file_->header; }
 
 Snapshot RecordingReader::snapshot(int64_t index) const {
   if (index < 0 || index >= file_->header.snapshot_count) {
-    throw std::out_of_range(fmt::format("There is no snapshot {} in {}, which has {}.", index, file_->paths.index,
+    throw std::out_of_range(fmt::format("There is no snapshot {} in {}, which has {}.", index, file_->index_path,
                                         file_->header.snapshot_count));
   }
   const hdf5::Quiet quiet;

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "model/io/recording_archive.h"
@@ -12,11 +12,6 @@
 
 namespace cutproof::io {
 namespace {
-
-template <class T>
-inline constexpr bool is_vector = false;
-template <class T>
-inline constexpr bool is_vector<std::vector<T>> = true;
 
 // Lists of structs lie in the file as one array per field, and a field that is an array itself as all of them in a row,
 // with offsets.
@@ -35,12 +30,12 @@ void write_entries(WritingArchive& archive, const std::vector<Entry>& entries) {
         all.insert(all.end(), get(entry).begin(), get(entry).end());
         offsets.push_back(static_cast<int64_t>(all.size()));
       }
-      archive.array(name + "_offsets", offsets);
-      archive.array(name, all);
+      archive(name + "_offsets", offsets);
+      archive(name, all);
     } else {
       std::vector<Stored<T>> column;
       for (const Entry& entry : entries) column.push_back(get(entry));
-      archive.array(name, column);
+      archive(name, column);
     }
   });
 }
@@ -49,8 +44,7 @@ template <class Entry>
 void read_entries(const ReadingArchive& archive, std::vector<Entry>& entries) {
   bool is_first = true;
   const auto take_count = [&](const SetupField& field, std::size_t count) {
-    if (is_first) entries.resize(count);
-    is_first = false;
+    if (std::exchange(is_first, false)) entries.resize(count);
     if (entries.size() != count) {
       throw hdf5::Error(fmt::format("/setup/{}", field.group), "The arrays of this group should be of equal length.");
     }
@@ -62,65 +56,40 @@ void read_entries(const ReadingArchive& archive, std::vector<Entry>& entries) {
     if constexpr (is_vector<T>) {
       std::vector<int64_t> offsets;
       T all;
-      archive.array(name + "_offsets", offsets);
-      archive.array(name, all);
-      if (offsets.empty() || offsets.front() != 0 || !std::is_sorted(offsets.begin(), offsets.end()) ||
-          offsets.back() != static_cast<int64_t>(all.size())) {
-        throw hdf5::Error(where + "_offsets",
-                          fmt::format("These offsets should rise from 0 to {} without ever falling.", all.size()));
-      }
+      archive(name + "_offsets", offsets);
+      archive(name, all);
+      require_offsets(where + "_offsets", offsets, all.size());
       take_count(field, offsets.size() - 1);
       for (std::size_t i = 0; i < entries.size(); ++i) {
         get(entries[i]).assign(all.begin() + offsets[i], all.begin() + offsets[i + 1]);
       }
     } else {
       std::vector<Stored<T>> column;
-      archive.array(name, column);
+      archive(name, column);
       take_count(field, column.size());
-      for (std::size_t i = 0; i < entries.size(); ++i) {
-        if constexpr (std::is_same_v<T, bool>) {
-          if (column[i] > 1) throw hdf5::Error(where, "These should be 0 or 1.");
-          get(entries[i]) = column[i] == 1;
-        } else {
-          get(entries[i]) = column[i];
-        }
-      }
+      if constexpr (std::is_same_v<T, bool>) require_flags(where, column);
+      for (std::size_t i = 0; i < entries.size(); ++i) get(entries[i]) = static_cast<T>(column[i]);
     }
   });
 }
 
-// Single values lie in the file as attributes, arrays as datasets. Value is what a field holds, or const.
-template <class Archive, class Value>
-void walk_field(Archive& archive, const std::string& name, Value& value) {
-  using T = std::remove_const_t<Value>;
-  if constexpr (is_list_of_entries<T>) {
-    if constexpr (Archive::kReading) {
-      read_entries(archive, value);
-    } else {
-      write_entries(archive, value);
-    }
-  } else if constexpr (NamedChoice<T>) {
-    archive.choice(name, value, names_of(T{}));
-  } else if constexpr (std::is_same_v<T, bool>) {
-    archive.flag(name, value);
-  } else if constexpr (std::is_same_v<T, std::string>) {
-    archive.text(name, value);
-  } else if constexpr (is_vector<T>) {
-    archive.array(name, value);
-  } else {
-    archive.value(name, value);
-  }
-}
-
 // The whole of /setup. S is Setup or const Setup.
 template <class Archive, class S>
-void walk(Archive& archive, S& setup) {
+void walk_setup(Archive& archive, S& setup) {
   for_each_setup_field([&](const SetupField& field, auto get) {
-    const std::string name(field.name);
+    const auto add = [&](auto& group) {
+      if constexpr (!is_list_of_entries<std::remove_cvref_t<decltype(get(setup))>>) {
+        group(std::string(field.name), get(setup));
+      } else if constexpr (Archive::kReading) {
+        read_entries(group, get(setup));
+      } else {
+        write_entries(group, get(setup));
+      }
+    };
     if (field.group.empty()) {
-      walk_field(archive, name, get(setup));
+      add(archive);
     } else {
-      archive.group(std::string(field.group), [&](auto& group) { walk_field(group, name, get(setup)); });
+      archive.group(std::string(field.group), add);
     }
   });
 }
@@ -129,13 +98,13 @@ void walk(Archive& archive, S& setup) {
 
 void write_setup(hid_t file, const Setup& setup) {
   WritingArchive root(file);
-  root.group("setup", [&](auto& archive) { walk(archive, setup); });
+  root.group("setup", [&](auto& archive) { walk_setup(archive, setup); });
 }
 
 Setup read_setup(hid_t file, uint64_t file_bytes) {
   Setup setup;
   const ReadingArchive root(file, "", file_bytes);
-  root.group("setup", [&](auto& archive) { walk(archive, setup); });
+  root.group("setup", [&](auto& archive) { walk_setup(archive, setup); });
   return setup;
 }
 

@@ -24,7 +24,7 @@ using nlohmann::json;
 // Shapes inside shapes: deeper than any person writes, shallower than what recursion could not bear.
 constexpr int kDeepest = 64;
 
-std::string bounds_text(const Bounds& b, std::string_view unit) {
+std::string bounds_text(const Bounds& b) {
   const bool low = std::isfinite(b.low), high = std::isfinite(b.high);
   std::string text;
   if (low) text = fmt::format("{} {}", b.open_low ? "greater than" : "at least", number_text(b.low));
@@ -32,7 +32,7 @@ std::string bounds_text(const Bounds& b, std::string_view unit) {
     if (low) text += " and ";
     text += fmt::format("{} {}", b.open_high ? "less than" : "at most", number_text(b.high));
   }
-  if (!unit.empty() && !text.empty()) text += fmt::format(" [{}]", unit);
+  if (!b.unit.empty() && !text.empty()) text += fmt::format(" [{}]", b.unit);
   return text;
 }
 
@@ -181,18 +181,21 @@ struct Place {
   }
 };
 
-void require_bounds(double value, const std::string& text, const Field& field, const Place& at) {
+// `needed` begins a sentence; `is_given`: whether this is it.
+void require(bool is_given, const std::string& needed, const json& value, const Place& at, const std::string& remedy) {
+  if (!is_given) at.fail(fmt::format("{} is needed, and this is {}.", needed, type_text(value)), remedy);
+}
+
+void require_bounds(double value, const std::string& text, const SceneField& field, const Place& at) {
   if (field.bounds.contains(value)) return;
   at.fail(fmt::format("The value {} is out of bounds.", text),
-          fmt::format("Give a number {}.", bounds_text(field.bounds, field.unit)));
+          fmt::format("Give a number {}.", bounds_text(field.bounds)));
 }
 
 template <class T>
 requires std::is_floating_point_v<T>
-void read(const json& value, const Place& at, const Field& field, T& out) {
-  if (!value.is_number())
-    at.fail(fmt::format("A number is needed, and this is {}.", type_text(value)),
-            "Give a number without quotation marks.");
+void read(const json& value, const Place& at, const SceneField& field, T& out) {
+  require(value.is_number(), "A number", value, at, "Give a number without quotation marks.");
   const double number = value.get<double>();
   require_bounds(number, value.dump(), field, at);
   out = number;
@@ -200,13 +203,11 @@ void read(const json& value, const Place& at, const Field& field, T& out) {
 
 template <class T>
 requires is_integer<T>
-void read(const json& value, const Place& at, const Field& field, T& out) {
+void read(const json& value, const Place& at, const SceneField& field, T& out) {
   // 1e5 and 5.0 are whole numbers too, although JSON's grammar does not call them integers.
   const bool whole =
       value.is_number_integer() || (value.is_number_float() && std::floor(value.get<double>()) == value.get<double>());
-  if (!whole)
-    at.fail(fmt::format("A whole number is needed, and this is {}.", type_text(value)),
-            "Give a whole number without quotation marks.");
+  require(whole, "A whole number", value, at, "Give a whole number without quotation marks.");
   const double approximate = value.get<double>();
   require_bounds(approximate, value.dump(), field, at);
   // 2^53: beyond it a number written with a fraction or an exponent is not exact.
@@ -217,20 +218,17 @@ void read(const json& value, const Place& at, const Field& field, T& out) {
   out = value.is_number_integer() ? value.get<T>() : static_cast<T>(approximate);
 }
 
-void read(const json& value, const Place& at, const Field&, bool& out) {
-  if (!value.is_boolean())
-    at.fail(fmt::format("true or false is needed, and this is {}.", type_text(value)),
-            "Write true or false without quotation marks.");
+void read(const json& value, const Place& at, const SceneField&, bool& out) {
+  require(value.is_boolean(), "true or false", value, at, "Write true or false without quotation marks.");
   out = value.get<bool>();
 }
 
-void read(const json& value, const Place& at, const Field&, std::string& out) {
-  if (!value.is_string())
-    at.fail(fmt::format("A text is needed, and this is {}.", type_text(value)), "Put it in quotation marks.");
+void read(const json& value, const Place& at, const SceneField&, std::string& out) {
+  require(value.is_string(), "A text", value, at, "Put it in quotation marks.");
   out = value.get<std::string>();
 }
 
-void read(const json& value, const Place& at, const Field& field, Vec3& out) {
+void read(const json& value, const Place& at, const SceneField& field, Vec3& out) {
   if (!value.is_array() || value.size() != 3) {
     at.fail(fmt::format("A vector is needed, and this is {}{}.", type_text(value),
                         value.is_array() ? fmt::format(" of {} entries", value.size()) : ""),
@@ -241,7 +239,7 @@ void read(const json& value, const Place& at, const Field& field, Vec3& out) {
   }
 }
 
-void read(const json& value, const Place& at, const Field& field, Range& out) {
+void read(const json& value, const Place& at, const SceneField& field, Range& out) {
   if (value.is_number()) {
     read(value, at, field, out.low);
     out.high = out.low;
@@ -262,36 +260,30 @@ void read(const json& value, const Place& at, const Field& field, Range& out) {
   }
 }
 
-template <class E>
-requires std::is_enum_v<E>
-void read(const json& value, const Place& at, const Field&, E& out) {
-  if (value.is_string()) {
-    const auto given = value.get<std::string>();
-    for (const auto& [enumerator, word] : words(E{})) {
-      if (word == given) {
-        out = enumerator;
-        return;
-      }
-    }
+template <NamedChoice E>
+void read(const json& value, const Place& at, const SceneField&, E& out) {
+  const auto names = names_of(E{});
+  const auto found = value.is_string() ? std::ranges::find(names, value.get<std::string>()) : names.end();
+  if (found == names.end()) {
+    at.fail(fmt::format("{} is none of the known words.", type_text(value)),
+            fmt::format("Give one of {}.", all_names<E>("\"")));
   }
-  at.fail(fmt::format("{} is none of the known words.", type_text(value)),
-          fmt::format("Give one of {}.", all_words<E>("\"")));
+  out = static_cast<E>(found - names.begin());
 }
 
 // Structs with fields, lists and optional values refer to each other.
 template <class T>
 requires std::is_class_v<T>
-void read(const json& value, const Place& at, const Field& field, T& out);
+void read(const json& value, const Place& at, const SceneField& field, T& out);
 
 template <class T>
-void read(const json& value, const Place& at, const Field& field, std::optional<T>& out) {
+void read(const json& value, const Place& at, const SceneField& field, std::optional<T>& out) {
   read(value, at, field, out.emplace());
 }
 
 template <class T>
-void read(const json& value, const Place& at, const Field& field, std::vector<T>& out) {
-  if (!value.is_array())
-    at.fail(fmt::format("A list is needed, and this is {}.", type_text(value)), "Put the entries in square brackets.");
+void read(const json& value, const Place& at, const SceneField& field, std::vector<T>& out) {
+  require(value.is_array(), "A list", value, at, "Put the entries in square brackets.");
   out.clear();
   for (std::size_t i = 0; i < value.size(); ++i) read(value[i], at.entry(i), field, out.emplace_back());
 }
@@ -377,32 +369,19 @@ void check(const GripSpec& s, const Place& at) {
 class Reader {
  public:
   Reader(const json& object, Place at) : object_(object), at_(std::move(at)) {
-    if (!object.is_object()) {
-      at_.fail(fmt::format("An object is needed, and this is {}.", type_text(object)),
-               "Put its fields in braces: {\"name\": value, ...}.");
-    }
+    require(object.is_object(), "An object", object, at_, "Put its fields in braces: {\"name\": value, ...}.");
     if (at_.depth > kDeepest) at_.fail("Objects are nested too deeply.", "Nest at most 30 shapes.");
   }
 
   template <class T>
-  void field(const Field& f, T& value) {
+  void field(T& value, const SceneField& f) {
     known_.push_back(f.name);
     const auto found = object_.find(std::string(f.name));
-    if (found == object_.end()) {
-      if (f.required) missing_.push_back(f.name);
-    } else {
+    if (found != object_.end()) {
       read(*found, at_.inner(f.name), f, value);
+    } else if (f.presence == kRequired) {
+      missing_.push_back(f.name);
     }
-  }
-
-  template <class Describe>
-  void group(const Field& f, Describe&& describe_fields) {
-    known_.push_back(f.name);
-    const auto found = object_.find(std::string(f.name));
-    if (found == object_.end()) return;
-    Reader inner(*found, at_.inner(f.name));
-    describe_fields(inner);
-    inner.finish();
   }
 
   bool applies(bool condition) const { return condition; }
@@ -431,7 +410,7 @@ class Reader {
 
 template <class T>
 requires std::is_class_v<T>
-void read(const json& value, const Place& at, const Field&, T& out) {
+void read(const json& value, const Place& at, const SceneField&, T& out) {
   Reader reader(value, at);
   describe(reader, out);
   reader.finish();
@@ -460,7 +439,7 @@ Scene parse_scene(const std::string& text, const std::string& name) {
   const json tree = parse_tree(text, name);
   require_version(tree, name);
   Scene scene;
-  read(tree, Place{name, "", 0}, Field{}, scene);
+  read(tree, Place{name, "", 0}, SceneField{}, scene);
   return scene;
 }
 

@@ -2,26 +2,24 @@
 #pragma once
 #include <fmt/format.h>
 
-#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
-#include <vector>
 
+#include "model/io/container_types.h"
 #include "model/io/scene_fields.h"
+#include "model/rules.h"
 
 namespace cutproof::io {
 
 template <class T>
-inline constexpr bool is_vector = false;
-template <class T>
-inline constexpr bool is_vector<std::vector<T>> = true;
-template <class T>
-inline constexpr bool is_optional = false;
-template <class T>
-inline constexpr bool is_optional<std::optional<T>> = true;
-template <class T>
 inline constexpr bool is_integer = std::is_integral_v<T> && !std::is_same_v<T, bool>;
+
+// Whether the table describes T.
+template <class T>
+inline constexpr bool has_fields = requires(int& visitor, T& value) {
+  describe(visitor, value);
+};
 
 inline std::string join(const std::string& path, std::string_view name) {
   return path.empty() ? std::string(name) : fmt::format("{}.{}", path, name);
@@ -29,13 +27,10 @@ inline std::string join(const std::string& path, std::string_view name) {
 
 inline std::string number_text(double x) { return fmt::format("{}", x); }
 
-template <class E>
-std::string all_words(const char* quote) {
-  std::string text;
-  for (const auto& [enumerator, word] : words(E{})) {
-    text += fmt::format("{}{}{}{}", text.empty() ? "" : ", ", quote, word, quote);
-  }
-  return text;
+// The names of a choice, each in quotes.
+template <NamedChoice E>
+std::string all_names(const std::string& quote) {
+  return quote + fmt::format("{}", fmt::join(names_of(E{}), quote + ", " + quote)) + quote;
 }
 
 }  // namespace cutproof::io

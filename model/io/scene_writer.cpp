@@ -20,40 +20,24 @@ using nlohmann::ordered_json;
 // How far from the left a small array or object may reach on one line.
 constexpr std::size_t kLineLength = 100;
 
-template <class E>
-std::string word_of(E value) {
-  for (const auto& [enumerator, word] : words(E{})) {
-    if (enumerator == value) return std::string(word);
-  }
-  return "";
-}
-
-class Writer;
-
 template <class T>
 ordered_json written(const T& value);
 
 class Writer {
  public:
   template <class T>
-  void field(const Field& f, const T& value) {
+  void field(const T& value, const SceneField& f) {
     const std::string name(f.name);
     if constexpr (is_optional<T>) {
       if (value) object[name] = written(*value);
     } else if constexpr (is_vector<T>) {
-      if (!value.empty() || f.required) object[name] = written(value);
+      if (!value.empty() || f.presence == kRequired) object[name] = written(value);
     } else {
-      object[name] = written(value);
       if constexpr (std::is_arithmetic_v<T>) {
-        if (f.zero_is_absent && value == T{}) object.erase(name);
+        if (f.presence == kZeroIsAbsent && value == T{}) return;
       }
+      object[name] = written(value);
     }
-  }
-  template <class Describe>
-  void group(const Field& f, Describe&& describe_fields) {
-    Writer inner;
-    describe_fields(inner);
-    object[std::string(f.name)] = std::move(inner.object);
   }
   bool applies(bool condition) const { return condition; }
 
@@ -63,7 +47,7 @@ class Writer {
 template <class T>
 ordered_json written(const T& value) {
   if constexpr (std::is_enum_v<T>) {
-    return word_of(value);
+    return name_of(value);
   } else if constexpr (std::is_same_v<T, Vec3>) {
     return ordered_json::array({value.x, value.y, value.z});
   } else if constexpr (std::is_same_v<T, Range>) {
@@ -76,7 +60,7 @@ ordered_json written(const T& value) {
     ordered_json list = ordered_json::array();
     for (const auto& entry : value) list.push_back(written(entry));
     return list;
-  } else if constexpr (std::is_class_v<T> && !std::is_same_v<T, std::string>) {
+  } else if constexpr (has_fields<T>) {
     Writer writer;
     T copy = value;  // the table of fields is written for values that can be changed
     describe(writer, copy);
@@ -125,7 +109,7 @@ std::string type_name() {
   } else if constexpr (is_vector<T>) {
     return "list of " + type_name<typename T::value_type>();
   } else if constexpr (std::is_enum_v<T>) {
-    return all_words<T>("`");
+    return all_names<T>("`");
   } else if constexpr (std::is_same_v<T, Vec3>) {
     return "[x, y, z]";
   } else if constexpr (std::is_same_v<T, Range>) {
@@ -134,25 +118,12 @@ std::string type_name() {
     return "true or false";
   } else if constexpr (std::is_same_v<T, std::string>) {
     return "text";
-  } else if constexpr (std::is_class_v<T>) {
+  } else if constexpr (has_fields<T>) {
     return "object";
   } else {
     return is_integer<T> ? "whole number" : "number";
   }
 }
-
-template <class T>
-struct Innermost {
-  using type = T;
-};
-template <class T>
-struct Innermost<std::optional<T>> : Innermost<T> {};
-template <class T>
-struct Innermost<std::vector<T>> : Innermost<T> {};
-
-template <class T>
-inline constexpr bool has_fields =
-    std::is_class_v<T> && !std::is_same_v<T, std::string> && !std::is_same_v<T, Vec3> && !std::is_same_v<T, Range>;
 
 std::string interval_text(const Bounds& b) {
   if (!std::isfinite(b.low) && !std::isfinite(b.high)) return "";
@@ -160,46 +131,39 @@ std::string interval_text(const Bounds& b) {
                      b.open_high ? ")" : "]");
 }
 
-// One table per object. Shapes contain shapes, so an object that has its table already gets none again.
+// The table of one object, and below it those of the objects in it.
+template <class T>
+std::string section(const std::string& path, T& value);
+
 class Documenter {
  public:
-  Documenter(std::string path, std::vector<std::string>& sections) : path_(std::move(path)), sections_(sections) {
-    slot_ = sections_.size();
-    sections_.emplace_back();
-    text_ = fmt::format("## {}\n\n| field | type | unit | default | bounds | meaning |\n|---|---|---|---|---|---|\n",
-                        path_.empty() ? "The scene" : "`" + path_ + "`");
-  }
-  ~Documenter() { sections_[slot_] = text_; }
-  Documenter(const Documenter&) = delete;
-  Documenter& operator=(const Documenter&) = delete;
+  explicit Documenter(const std::string& path) : path_(path) {}
 
   template <class T>
-  void field(const Field& f, T& value) {
-    using Inner = typename Innermost<T>::type;
-    add_row(f, type_name<T>(), default_text(f, value));
-    if constexpr (has_fields<Inner>) {
-      const bool recursive = std::is_same_v<Inner, Shape> && f.name == "parts";
-      if (!recursive) {
-        Documenter inner(join(path_, f.name) + (is_vector<T> ? "[]" : ""), sections_);
-        Inner fresh;
-        describe(inner, fresh);
-      }
+  void field(T& value, const SceneField& f) {
+    rows_ += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", f.name, type_name<T>(), f.bounds.unit,
+                         default_text(value, f), interval_text(f.bounds), f.doc);
+    const std::string path = join(path_, f.name);
+    if constexpr (has_fields<T>) {
+      inner_ += "\n" + section(path, value);
+    } else if constexpr (is_optional<T>) {
+      if constexpr (has_fields<typename T::value_type>) inner_ += "\n" + section(path, value.emplace());
+    } else if constexpr (is_vector<T> && !std::is_same_v<T, std::vector<Shape>>) {  // shapes contain shapes
+      if constexpr (has_fields<typename T::value_type>) inner_ += "\n" + section(path + "[]", value.emplace_back());
     }
-  }
-
-  template <class Describe>
-  void group(const Field& f, Describe&& describe_fields) {
-    add_row(f, "object", "see below");
-    Documenter inner(join(path_, f.name), sections_);
-    describe_fields(inner);
   }
 
   bool applies(bool) const { return true; }
 
+  std::string text() const {
+    return fmt::format("## {}\n\n| field | type | unit | default | bounds | meaning |\n|---|---|---|---|---|---|\n{}{}",
+                       path_.empty() ? "The scene" : "`" + path_ + "`", rows_, inner_);
+  }
+
  private:
   template <class T>
-  static std::string default_text(const Field& f, const T& value) {
-    if (f.required) return "required";
+  static std::string default_text(const T& value, const SceneField& f) {
+    if (f.presence == kRequired) return "required";
     if constexpr (is_optional<T>) {
       return "absent";
     } else if constexpr (is_vector<T>) {
@@ -207,20 +171,19 @@ class Documenter {
     } else if constexpr (has_fields<T>) {
       return "see below";
     } else {
-      return f.zero_is_absent ? "absent" : fmt::format("`{}`", on_one_line(written(value)));
+      return f.presence == kZeroIsAbsent ? "absent" : fmt::format("`{}`", on_one_line(written(value)));
     }
   }
 
-  void add_row(const Field& f, const std::string& type, const std::string& default_value) {
-    text_ += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", f.name, type, f.unit, default_value,
-                         interval_text(f.bounds), f.doc);
-  }
-
-  std::string path_;
-  std::vector<std::string>& sections_;
-  std::size_t slot_;
-  std::string text_;
+  std::string path_, rows_, inner_;
 };
+
+template <class T>
+std::string section(const std::string& path, T& value) {
+  Documenter documenter(path);
+  describe(documenter, value);
+  return documenter.text();
+}
 
 constexpr std::string_view kReferenceHead =
     R"(# Scenes
@@ -253,13 +216,8 @@ depth (method.md §3, Blade).
 std::string write_scene(const Scene& scene) { return pretty(written(scene), 0) + "\n"; }
 
 std::string scene_reference() {
-  std::vector<std::string> sections;
-  {
-    Documenter documenter("", sections);
-    Scene scene;
-    describe(documenter, scene);
-  }
-  return fmt::format("{}\n{}", kReferenceHead, fmt::join(sections, "\n"));
+  Scene scene;
+  return fmt::format("{}\n{}", kReferenceHead, section("", scene));
 }
 
 }  // namespace cutproof::io

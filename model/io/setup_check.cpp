@@ -8,6 +8,7 @@
 #include <limits>
 #include <string_view>
 
+#include "model/at.h"
 #include "model/setup_fields.h"
 
 namespace cutproof::io {
@@ -25,28 +26,21 @@ std::optional<std::string> problem_of(const SetupField& field, double value) {
   return fmt::format("is {}, and should {}.", value, field.above ? "be positive" : "not be negative");
 }
 template <class T>
-requires std::is_arithmetic_v<T> std::optional<std::string> problem_of(const SetupField& field, T value) {
-  return problem_of(field, static_cast<double>(value));
-}
-std::optional<std::string> problem_of(const SetupField& field, Vec3 value) {
-  for (const double component : {value.x, value.y, value.z}) {
-    if (auto problem = problem_of(field, component)) return problem;
+std::optional<std::string> problem_of(const SetupField& field, const T& value) {
+  if constexpr (std::is_same_v<T, bool> || std::is_same_v<T, std::string> || std::is_enum_v<T>) {
+    return std::nullopt;
+  } else if constexpr (std::is_arithmetic_v<T>) {
+    return problem_of(field, static_cast<double>(value));
+  } else if constexpr (std::is_same_v<T, Vec3>) {
+    return problem_of(field, std::array{value.x, value.y, value.z});
+  } else if constexpr (std::is_same_v<T, Mat3>) {
+    return problem_of(field, value.m);
+  } else {  // std::array
+    for (const auto& component : value) {
+      if (auto problem = problem_of(field, component)) return problem;
+    }
+    return std::nullopt;
   }
-  return std::nullopt;
-}
-template <class T, std::size_t N>
-std::optional<std::string> problem_of(const SetupField& field, const std::array<T, N>& value) {
-  for (const T component : value) {
-    if (auto problem = problem_of(field, component)) return problem;
-  }
-  return std::nullopt;
-}
-std::optional<std::string> problem_of(const SetupField& field, const Mat3& value) { return problem_of(field, value.m); }
-std::optional<std::string> problem_of(const SetupField&, bool) { return std::nullopt; }
-std::optional<std::string> problem_of(const SetupField&, const std::string&) { return std::nullopt; }
-template <NamedChoice E>
-std::optional<std::string> problem_of(const SetupField&, E) {
-  return std::nullopt;
 }
 
 template <class T>
@@ -114,7 +108,7 @@ Defect body_defect(const Body& body) {
                                                     i)};
       }
     }
-    if (body.particle_at[static_cast<std::size_t>(body.node[i])] != static_cast<int32_t>(i)) {
+    if (body.particle_at[at(body.node[i])] != static_cast<int32_t>(i)) {
       return SetupDefect{"body/particle_at", fmt::format("The node of particle {} does not name it.", i)};
     }
   }

@@ -14,26 +14,23 @@ PolyDataFile::PolyDataFile(const std::string& path, Cells cells) : file_(hdf5::F
   root_ = hdf5::create_group(file_.id(), "VTKHDF");
   hdf5::write_attribute(root_.get(), "Version", std::array<int64_t, 2>{2, 0});
   hdf5::write_text_attribute(root_.get(), "Type", "PolyData");
-  points_ = hdf5::RawTable::create(root_.get(), "Points", hdf5::LayoutOf<Vec3>::get(), 0);
+  points_ = hdf5::Table::create(root_.get(), "Points", hdf5::layout_of<Vec3>());
   point_data_ = hdf5::create_group(root_.get(), "PointData");
   const hdf5::Id group = hdf5::create_group(root_.get(), kCellGroups[static_cast<std::size_t>(cells)]);
   // 64 bits: VTK needs offsets and connectivity to be of one type.
-  offsets_ = hdf5::Table<int64_t>::create(group.get(), "Offsets");
-  connectivity_ = hdf5::Table<int64_t>::create(group.get(), "Connectivity");
+  offsets_ = hdf5::Table::create(group.get(), "Offsets", hdf5::layout_of<int64_t>());
+  connectivity_ = hdf5::Table::create(group.get(), "Connectivity", hdf5::layout_of<int64_t>());
 }
 
 PolyDataFile::Part PolyDataFile::add_part(int64_t point_count, std::span<const int64_t> offsets,
                                           std::span<const int64_t> connectivity) {
-  PartRecord part = next_;
-  part.points = point_count;
-  part.cells = static_cast<int64_t>(offsets.size()) - 1;
-  part.connectivity = static_cast<int64_t>(connectivity.size());
-  offsets_.append(offsets);
-  connectivity_.append(connectivity);
-  parts_.push_back(part);
-  next_.first_cell += part.cells;
-  next_.first_connectivity += part.connectivity;
-  return static_cast<Part>(parts_.size()) - 1;
+  first_cell_.push_back(cells_of_.empty() ? 0 : first_cell_.back() + cells_of_.back());
+  offsets_.append(std::as_bytes(offsets));
+  first_connectivity_.push_back(connectivity_.append(std::as_bytes(connectivity)));
+  points_of_.push_back(point_count);
+  cells_of_.push_back(static_cast<int64_t>(offsets.size()) - 1);
+  connectivity_of_.push_back(static_cast<int64_t>(connectivity.size()));
+  return static_cast<Part>(points_of_.size()) - 1;
 }
 
 void PolyDataFile::finish(const std::vector<Step>& given) {
@@ -52,37 +49,28 @@ void PolyDataFile::finish(const std::vector<Step>& given) {
     }
   }
 
-  std::vector<int64_t> part_points, part_cells, part_connectivity;
-  for (const PartRecord& part : parts_) {
-    part_points.push_back(part.points);
-    part_cells.push_back(part.cells);
-    part_connectivity.push_back(part.connectivity);
-  }
-  const std::vector<int64_t> zeros(parts_.size(), 0);
-  hdf5::write_table(root_.get(), "NumberOfPoints", part_points);
+  const std::vector<int64_t> zeros(points_of_.size(), 0);
+  hdf5::write_table(root_.get(), "NumberOfPoints", points_of_);
   for (std::size_t kind = 0; kind < kCellGroups.size(); ++kind) {
     const bool ours = kind == static_cast<std::size_t>(cells_);
-    const hdf5::Id group =
-        ours ? hdf5::open_group(root_.get(), kCellGroups[kind]) : hdf5::create_group(root_.get(), kCellGroups[kind]);
-    hdf5::write_table(group.get(), "NumberOfCells", ours ? part_cells : zeros);
-    hdf5::write_table(group.get(), "NumberOfConnectivityIds", ours ? part_connectivity : zeros);
-    if (!ours) {
-      hdf5::write_table(group.get(), "Offsets", zeros);  // a part without cells has one offset
-      hdf5::write_table(group.get(), "Connectivity", std::vector<int64_t>());
-    }
+    const hdf5::Id group = hdf5::group_in(root_.get(), kCellGroups[kind]);
+    hdf5::write_table(group.get(), "NumberOfCells", ours ? cells_of_ : zeros);
+    hdf5::write_table(group.get(), "NumberOfConnectivityIds", ours ? connectivity_of_ : zeros);
+    if (ours) continue;
+    hdf5::write_table(group.get(), "Offsets", zeros);  // a part without cells has one offset
+    hdf5::write_table(group.get(), "Connectivity", std::vector<int64_t>());
   }
 
   std::vector<double> values;
   std::vector<int64_t> part_offsets, point_offsets;
   std::vector<std::array<int64_t, 4>> cell_offsets, connectivity_offsets;
   for (const Step& step : steps) {
-    const PartRecord& part = parts_[static_cast<std::size_t>(step.part)];
-    const auto kind = static_cast<std::size_t>(cells_);
+    const auto part = static_cast<std::size_t>(step.part), kind = static_cast<std::size_t>(cells_);
     values.push_back(step.time);
     part_offsets.push_back(step.part);
     point_offsets.push_back(step.point_row);
-    cell_offsets.emplace_back()[kind] = part.first_cell;
-    connectivity_offsets.emplace_back()[kind] = part.first_connectivity;
+    cell_offsets.emplace_back()[kind] = first_cell_[part];
+    connectivity_offsets.emplace_back()[kind] = first_connectivity_[part];
   }
   const hdf5::Id group = hdf5::create_group(root_.get(), "Steps");
   hdf5::write_attribute(group.get(), "NSteps", static_cast<int64_t>(steps.size()));

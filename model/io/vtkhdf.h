@@ -31,35 +31,30 @@ class PolyDataFile {
   // Throws hdf5::Error, as all the others do.
   PolyDataFile(const std::string& path, Cells cells);
 
-  hdf5::File& file() { return file_; }
+  hid_t id() const { return file_.id(); }
   // Rows of three float64; closed by finish().
-  hdf5::RawTable& points() { return points_; }
-  hdf5::RawTable make_point_data(const std::string& name, const hdf5::Layout& row) {
+  hdf5::Table& points() { return points_; }
+  hdf5::Table make_point_data(const std::string& name, const hdf5::Layout& row) {
     data_names_.push_back(name);
-    return hdf5::RawTable::create(point_data_.get(), name, row, 0);
+    return hdf5::Table::create(point_data_.get(), name, row);
   }
   // Cell k has the points connectivity[offsets[k] .. offsets[k + 1]), counted within the part.
   Part add_part(int64_t point_count, std::span<const int64_t> offsets, std::span<const int64_t> connectivity);
   // Rows of the first point index of each part in the table of connectivity.
-  int64_t first_connectivity(Part part) const { return parts_[static_cast<std::size_t>(part)].first_connectivity; }
+  int64_t first_connectivity(Part part) const { return first_connectivity_[static_cast<std::size_t>(part)]; }
 
   // Writes the tables of parts and steps and closes the file. The tables handed out must be closed before.
   void finish(const std::vector<Step>& steps);
 
  private:
-  struct PartRecord {
-    int64_t points = 0, cells = 0, connectivity = 0;  // counts
-    int64_t first_cell = 0, first_connectivity = 0;   // rows
-  };
-
   hdf5::File file_;
   Cells cells_;
   hdf5::Id root_, point_data_;
-  hdf5::RawTable points_;
-  hdf5::Table<int64_t> offsets_, connectivity_;
+  hdf5::Table points_;
+  hdf5::Table offsets_, connectivity_;
   std::vector<std::string> data_names_;
-  std::vector<PartRecord> parts_;
-  PartRecord next_;  // where the next part will begin
+  // By part: how many points, cells and entries of connectivity, and the rows in which the latter two begin.
+  std::vector<int64_t> points_of_, cells_of_, connectivity_of_, first_cell_, first_connectivity_;
 };
 
 }  // namespace cutproof::io

@@ -12,6 +12,7 @@
 #include "model/error.h"
 #include "model/io/atomic_file.h"
 #include "model/io/scene_fields.h"
+#include "model/rules.h"
 
 namespace cutproof::io {
 namespace {
@@ -50,56 +51,55 @@ void expect_error(const json& scene, const std::string& field, const std::vector
 class Scrambler {
  public:
   template <class T>
-  void field(const Field& f, T& value) {
+  void field(T& value, const SceneField& f) {
     change(f, value);
-  }
-  template <class Describe>
-  void group(const Field&, Describe&& describe_fields) {
-    describe_fields(*this);
   }
   bool applies(bool condition) const { return condition; }
 
  private:
-  double number(const Field& f, double old) {
+  double number(const SceneField& f, double old) {
     const double low = std::max(f.bounds.low, -1e3), high = std::min(f.bounds.high, 1e3);
     fraction_ = fraction_ < 0.8 ? fraction_ + 1.0 / 64 + 1e-9 : 0.1;
     const double x = low + fraction_ * (high - low);
     return x == old ? (x + high) / 2 : x;
   }
-  void change(const Field& f, double& value) { value = number(f, value); }
+  void change(const SceneField& f, double& value) { value = number(f, value); }
   template <class T>
-  requires(std::is_integral_v<T>) void change(const Field& f, T& value) {
+  requires(std::is_integral_v<T>) void change(const SceneField& f, T& value) {
     if (f.name == "version") return;
     value = static_cast<T>(std::max(number(f, 0), f.bounds.low)) + 1;
     if (static_cast<double>(value) > f.bounds.high) value = static_cast<T>(f.bounds.high);
   }
-  void change(const Field&, bool& value) { value = !value; }
-  void change(const Field&, std::string& value) { value = "a \"text\" with \\ and é\n" + std::to_string(fraction_); }
-  void change(const Field& f, Vec3& value) {
+  void change(const SceneField&, bool& value) { value = !value; }
+  void change(const SceneField&, std::string& value) {
+    value = "a \"text\" with \\ and é\n" + std::to_string(fraction_);
+  }
+  void change(const SceneField& f, Vec3& value) {
     for (int axis = 0; axis < 3; ++axis) value[axis] = number(f, value[axis]);
     if (f.name == "high") value = {1000, 1000, 1000};  // above every "low"
   }
-  void change(const Field& f, Range& value) {
+  void change(const SceneField& f, Range& value) {
     value.low = number(f, 0);
     value.high = value.low + 0.5;
     if (++ranges_ % 3 == 0) value.high = value.low;
     if (ranges_ % 3 == 1) value.high = std::numeric_limits<double>::infinity();
   }
   template <class E>
-  requires(std::is_enum_v<E>) void change(const Field&, E& value) {
-    if constexpr (!std::is_same_v<E, Shape::Kind> && !std::is_same_v<E, Curve>) value = words(E{}).back().first;
+  requires(std::is_enum_v<E>) void change(const SceneField&, E& value) {
+    if constexpr (!std::is_same_v<E, Shape::Kind> && !std::is_same_v<E, Curve>)
+      value = static_cast<E>(names_of(E{}).size() - 1);
   }
   template <class T>
-  void change(const Field& f, std::optional<T>& value) {
+  void change(const SceneField& f, std::optional<T>& value) {
     if (f.name == "ground" || f.name == "mesh") return;  // another way to give walls; excludes the shape
     change(f, value.emplace());
   }
   template <class T>
-  void change(const Field& f, std::vector<T>& value) {
+  void change(const SceneField& f, std::vector<T>& value) {
     for (int i = 0; i < 2; ++i) change(f, value.emplace_back());
   }
   template <class T>
-  requires(std::is_class_v<T>) void change(const Field& f, T& value) {
+  requires(std::is_class_v<T>) void change(const SceneField& f, T& value) {
     describe(*this, value);
     if constexpr (std::is_same_v<T, BodySpec>) value.particles = 0;
     if constexpr (std::is_same_v<T, StepParameters>) value.acceleration = Acceleration::none;  // excludes `published`
@@ -122,11 +122,11 @@ Scene scrambled() {
 struct Probe {
   std::string path;
   std::vector<std::pair<std::string, Bounds>> found;
-  void field(const Field&, bool&) {}
-  void field(const Field& f, double&) { found.emplace_back(f.name, f.bounds); }
-  void field(const Field& f, int32_t&) { found.emplace_back(f.name, f.bounds); }
+  void field(bool&, const SceneField&) {}
+  void field(double&, const SceneField& f) { found.emplace_back(f.name, f.bounds); }
+  void field(int32_t&, const SceneField& f) { found.emplace_back(f.name, f.bounds); }
   template <class T>
-  void field(const Field&, T&) {}
+  void field(T&, const SceneField&) {}
   bool applies(bool) const { return true; }
 };
 
@@ -203,24 +203,27 @@ TEST(SceneIo, NumbersKeepAllTheirBits) {
 
 TEST(SceneIo, EveryWordOfEveryEnumerationIsReadBack) {
   Scene scene = parse_scene(kSmallest, "scene.json");
-  for (const auto& [criterion, word] : words(Criterion{})) {
-    for (const auto& [merge, merge_word] : words(MergeRule{})) {
-      for (const auto& [expand, expand_word] : words(ExpandRule{})) {
+  const auto each = []<class E>(E, auto&& visit) {
+    for (std::size_t i = 0; i < names_of(E{}).size(); ++i) visit(static_cast<E>(i));
+  };
+  each(Criterion{}, [&](Criterion criterion) {
+    each(MergeRule{}, [&](MergeRule merge) {
+      each(ExpandRule{}, [&](ExpandRule expand) {
         scene.detect.criterion = criterion;
         scene.merge.rule = merge;
         scene.expand.rule = expand;
         const Scene back = parse_scene(write_scene(scene), "scene.json");
-        EXPECT_EQ(back.detect.criterion, criterion) << word;
-        EXPECT_EQ(back.merge.rule, merge) << merge_word;
-        EXPECT_EQ(back.expand.rule, expand) << expand_word;
-      }
-    }
-  }
-  for (const auto& [kind, word] : words(Shape::Kind{})) {
+        EXPECT_EQ(back.detect.criterion, criterion) << name_of(criterion);
+        EXPECT_EQ(back.merge.rule, merge) << name_of(merge);
+        EXPECT_EQ(back.expand.rule, expand) << name_of(expand);
+      });
+    });
+  });
+  each(Shape::Kind{}, [&](Shape::Kind kind) {
     scene.body.shape->kind = kind;
     scene.body.shape->parts.assign(2, Shape{});
-    EXPECT_EQ(parse_scene(write_scene(scene), "scene.json").body.shape->kind, kind) << word;
-  }
+    EXPECT_EQ(parse_scene(write_scene(scene), "scene.json").body.shape->kind, kind) << name_of(kind);
+  });
   EXPECT_NE(write_scene(parse_scene(R"({"version": 1, "body": {"shape": {"kind": "union", "parts": [{"kind": "box"}]},
             "spacing": 1}})",
                                     "s"))
