@@ -22,9 +22,9 @@ TEST(Table, IsMadeOfTheFieldsOfADocument) {
       cutproof::cli::table_of(
           rows,
           {{"", "{name}"}, {"ms", "{1e3*seconds/median:.2f}"}, {"lost", "{lost:.1e} of {of}"}, {"twice", doubled}}),
-      "         ms       lost  twice\n"
-      "  a    1.25     - of 3      6\n"
-      "  b       -  inf of 12     24\n");
+      "       ms       lost  twice\n"
+      "  a  1.25     - of 3      6\n"
+      "  b     -  inf of 12     24\n");
 }
 
 }  // namespace
