@@ -34,7 +34,7 @@ FreeRunning::FreeRunning(const Setup& setup, const State& start, const State& lo
     : setup_(setup), backend_(std::move(backend)), frame_(loaded.frame), before_(loaded) {
   const Verdict form = oracles::well_formed(setup, loaded);
   if (!form.holds) {
-    end_with(Stage::step, {"as loaded: " + form.witness.text, form.witness.clusters, form.witness.particles});
+    end_with(Stage::step, {form.witness}).what.text = "as loaded: " + form.witness.text;
     return;
   }
   reference_ = reference::make_backend();
@@ -54,7 +54,7 @@ void FreeRunning::see(Stage stage, const State& after) {
   if (!reference_) return;
   const Verdict form = oracles::well_formed(setup_, after);
   if (!form.holds) {
-    end_with(stage, {form.witness.text, form.witness.clusters, form.witness.particles});
+    end_with(stage, {form.witness});
     return;
   }
   reference_->run({stage, stage});
@@ -106,7 +106,7 @@ Verdict FreeRunning::verdict() const {
   verdict.holds = first.explained;
   verdict.measured = first.margin.value_or(0);
   verdict.bound = first.reach;
-  if (!verdict.holds) verdict.witness = {first.what.clusters, first.what.particles, {}, first.what.text};
+  if (!verdict.holds) verdict.witness = first.what;
   return verdict;
 }
 

@@ -54,8 +54,9 @@ Lockstep::Lockstep(const Setup& setup, const State& start, const State& loaded, 
   // What the backend has made of what it was given.
   const Verdict form = oracles::well_formed(setup_, loaded);
   if (!form.holds) {
-    differ(Stage::step,
-           {fmt::format("as loaded: {}", form.witness.text), form.witness.clusters, form.witness.particles});
+    oracles::DecisionDifference difference{form.witness};
+    difference.text = fmt::format("as loaded: {}", form.witness.text);
+    differ(Stage::step, difference);
     broken_ = true;
     return;
   }
@@ -97,7 +98,7 @@ void Lockstep::see(Stage stage, const State& after, bool launched) {
 
 void Lockstep::differ(Stage stage, const oracles::DecisionDifference& difference) {
   if (!frames_.empty()) ++frames_.back().topology_differences;
-  topology_.add(failing("topology", stage, frame_, {difference.clusters, difference.particles, {}, difference.text}));
+  topology_.add(failing("topology", stage, frame_, difference));
 }
 
 void Lockstep::note(Measure which, Stage stage, const MeasuredError& error, oracles::ErrorNorm& of_frame) {

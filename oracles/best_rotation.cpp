@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "oracles/eigen.h"
+
 namespace cutproof::oracles {
 
 namespace {
@@ -14,20 +16,13 @@ using Real = long double;
 using Matrix = Eigen::Matrix<Real, 3, 3>;
 using Vector = Eigen::Matrix<Real, 3, 1>;
 
-template <class Numbers>
-Matrix to_matrix(const Numbers& m) {
-  Matrix result;
-  for (int k = 0; k < 9; ++k) result(k / 3, k % 3) = m[static_cast<std::size_t>(k)];
-  return result;
-}
-
 }  // namespace
 
 BestRotation best_rotation(const Mat3& given) {
-  Matrix a = to_matrix(given.m);
+  Matrix a = as_eigen(given).cast<Real>();
   int exponent = 0;
   static_cast<void>(std::frexp(a.cwiseAbs().maxCoeff(), &exponent));
-  for (int k = 0; k < 9; ++k) a(k / 3, k % 3) = std::ldexp(a(k / 3, k % 3), -exponent);
+  a *= std::ldexp(Real(1), -exponent);
   const Eigen::JacobiSVD<Matrix> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Matrix &u = svd.matrixU(), &v = svd.matrixV();
   const Vector& sigma = svd.singularValues();
@@ -61,14 +56,11 @@ double objective_gap(const BestRotation& best, const Mat3& r) {
 }
 
 NearestRotation nearest_of_rank_one(const BestRotation& best, const Mat3& p) {
-  const Matrix previous = to_matrix(p.m);
+  const Matrix previous = as_eigen(p).cast<Real>();
   const Vector u(best.u[0], best.u[1], best.u[2]), v(best.v[0], best.v[1], best.v[2]);
   const Vector from = previous * v;
   const Matrix nearest = Eigen::Quaternion<Real>::FromTwoVectors(from, u).toRotationMatrix() * previous;
-  NearestRotation result;
-  for (int k = 0; k < 9; ++k) result.r.m[static_cast<std::size_t>(k)] = static_cast<double>(nearest(k / 3, k % 3));
-  result.weight = static_cast<double>((1 + from.normalized().dot(u)) / 2);
-  return result;
+  return {to_mat3(nearest.cast<double>()), static_cast<double>((1 + from.normalized().dot(u)) / 2)};
 }
 
 }  // namespace cutproof::oracles

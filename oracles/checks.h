@@ -11,6 +11,12 @@ namespace cutproof::oracles {
 inline constexpr unsigned kBody = 1u << 31;
 Verdict check_form(const Setup& setup, const State& state, unsigned known);
 
+inline Property of_state(std::string_view name, std::string_view source, std::string_view unit, unsigned rests_on,
+                         const Due& due, std::string_view nothing, void (*check)(Judged&, Verdict&),
+                         StageSet promised_by = {}) {
+  return {name, source, unit, rests_on, Cost::cheap, promised_by, due, nothing, check, nullptr};
+}
+
 // Of a state.
 void check_finite(Judged& judged, Verdict& verdict);
 void check_cluster_connectivity(Judged& judged, Verdict& verdict);
@@ -41,7 +47,13 @@ inline bool has_skin(const State& state) { return !state.skin.owner.empty() || !
 inline bool skin_is_due(const Setup& setup, const State& state) {
   return has_skin(state) || (setup.skin.wanted && state.frame > 0);
 }
+inline constexpr Due kSkinThere = {"at the end of a frame, if there is a skin or must be one",
+                                   [](const Setup& setup, const State& state, Stage after) {
+                                     return after == Stage::skin && skin_is_due(setup, state);
+                                   }};
 // Only where nothing is alive may it have no triangles.
 bool skin_is_missing(const Setup& setup, const State& state);
+// For witnesses: the owners of these vertices.
+Concerned owners_of(const Skin& skin, const std::vector<int32_t>& vertices);
 
 }  // namespace cutproof::oracles

@@ -1,5 +1,5 @@
 // I1 (method.md §2): each cluster is connected in G.
-#include <fmt/format.h>
+#include <algorithm>
 
 #include "oracles/checks.h"
 
@@ -26,9 +26,8 @@ void check_cluster_connectivity(Judged& judged, Verdict& verdict) {
     queue.assign(1, seed);
     reached_in[at(seed)] = c;
     for (std::size_t head = 0; head < queue.size(); ++head) {
-      for (int direction = 0; direction < 6; ++direction) {
-        const int32_t other = judged.graph.neighbour(queue[head], direction);
-        if (other < 0 || member_of[at(other)] != c || reached_in[at(other)] == c) continue;
+      for (const int32_t other : judged.graph.neighbours(queue[head])) {
+        if (member_of[at(other)] != c || reached_in[at(other)] == c) continue;
         reached_in[at(other)] = c;
         queue.push_back(other);
       }
@@ -36,20 +35,12 @@ void check_cluster_connectivity(Judged& judged, Verdict& verdict) {
     const auto reached = static_cast<int32_t>(queue.size());
     if (reached == size) continue;
     judged.connected[at(c)] = 0;
-    Witness witness;
-    if (verdict.holds) {
-      for (const int32_t i : judged.clusters.of(c)) {
-        if (!judged.alive(i) || reached_in[at(i)] == c) continue;
-        witness = {{judged.number(c)},
-                   {seed, i},
-                   {},
-                   fmt::format("cluster {} is not connected: {} of its {} particles are reached from particle {}, "
-                               "particle {} is not",
-                               judged.number(c), reached, size, seed, i)};
-        break;
-      }
-    }
-    violate(verdict, witness);
+    const auto members = judged.clusters.of(c);
+    const int32_t missed = *std::find_if(members.begin(), members.end(),
+                                         [&](int32_t i) { return judged.alive(i) && reached_in[at(i)] != c; });
+    violate(verdict, {{judged.number(c)}, {seed, missed}},
+            "cluster {} is not connected: {} of its {} particles are reached from particle {}, particle {} is not",
+            judged.number(c), reached, size, seed, missed);
   }
 }
 

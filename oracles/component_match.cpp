@@ -11,7 +11,7 @@ namespace cutproof::oracles {
 namespace {
 
 // A cluster that holds particles of two components of G: if anything coupled is not connected there is one.
-Witness first_ghost_coupling(Judged& judged) {
+void tell_of_ghost_coupling(Judged& judged, Verdict& verdict) {
   const std::vector<int32_t>& component = judged.components().label;
   for (int32_t c = 0; c < judged.clusters.count(); ++c) {
     int32_t first = -1;
@@ -19,31 +19,19 @@ Witness first_ghost_coupling(Judged& judged) {
       if (!judged.alive(i)) continue;
       if (first < 0) first = i;
       if (component[at(i)] == component[at(first)]) continue;
-      return {{judged.number(c)},
-              {first, i},
-              {},
-              fmt::format("cluster {} couples particles {} and {}, which lie in components {} and {} of the tissue",
-                          judged.number(c), first, i, component[at(first)], component[at(i)])};
+      return violate(verdict, {{judged.number(c)}, {first, i}},
+                     "cluster {} couples particles {} and {}, which lie in components {} and {} of the tissue",
+                     judged.number(c), first, i, component[at(first)], component[at(i)]);
     }
   }
-  return {};
-}
-
-std::vector<Vec3> points_at_rest(const Judged& judged) {
-  const Skin& skin = judged.state.skin;
-  const double reach = judged.setup.skin.alpha * judged.body.grid.spacing;
-  std::vector<Vec3> points(skin.owner.size());
-  for (std::size_t v = 0; v < points.size(); ++v) {
-    const auto& d = kDirections[skin.direction[v]];
-    points[v] = judged.body.rest_position(skin.owner[v]) + Vec3{reach * d[0], reach * d[1], reach * d[2]};
-  }
-  return points;
 }
 
 void match_skin(Judged& judged, Verdict& verdict) {
   const Skin& skin = judged.state.skin;
   const Partition& components = judged.components();
-  const Shells shells = shells_of(skin, points_at_rest(judged));
+  std::vector<Vec3> at_rest;
+  for (std::size_t v = 0; v < skin.owner.size(); ++v) at_rest.push_back(vertex_at_rest(judged.setup, skin, v));
+  const Shells shells = shells_of(skin, at_rest);
   const auto shell_count = static_cast<int32_t>(shells.volume.size());
 
   std::vector<int32_t> first_owner(at(shell_count), -1);
@@ -51,17 +39,16 @@ void match_skin(Judged& judged, Verdict& verdict) {
     const int32_t shell = shells.of_vertex[v], owner = skin.owner[v];
     if (shell < 0) continue;
     if (!judged.alive(owner)) {
-      violate(verdict, fmt::format("skin vertex {} is owned by particle {}, which is dead", v, owner), {}, {owner});
+      violate(verdict, {{}, {owner}}, "skin vertex {} is owned by particle {}, which is dead", v, owner);
       continue;
     }
     int32_t& first = first_owner[at(shell)];
     if (first < 0) first = owner;
     if (components.label[at(first)] != components.label[at(owner)]) {
-      violate(verdict,
-              fmt::format("one shell of the skin joins particles {} and {}, which lie in components {} and "
-                          "{} of the tissue",
-                          first, owner, components.label[at(first)], components.label[at(owner)]),
-              {}, {first, owner});
+      violate(verdict, {{}, {first, owner}},
+              "one shell of the skin joins particles {} and {}, which lie in components {} and "
+              "{} of the tissue",
+              first, owner, components.label[at(first)], components.label[at(owner)]);
     }
   }
   // Exactly one outer shell for each component of the tissue.
@@ -76,10 +63,9 @@ void match_skin(Judged& judged, Verdict& verdict) {
     }
     int32_t& outer = outer_of[at(components.label[at(owner)])];
     if (outer >= 0) {
-      violate(verdict,
-              fmt::format("component {} of the tissue has two outer shells, at particles {} and {}",
-                          components.label[at(owner)], first_owner[at(outer)], owner),
-              {}, {first_owner[at(outer)], owner});
+      violate(verdict, {{}, {first_owner[at(outer)], owner}},
+              "component {} of the tissue has two outer shells, at particles {} and {}", components.label[at(owner)],
+              first_owner[at(outer)], owner);
     }
     outer = shell;
   }
@@ -87,17 +73,16 @@ void match_skin(Judged& judged, Verdict& verdict) {
     if (!judged.alive(i)) continue;
     int32_t& outer = outer_of[at(components.label[at(i)])];
     if (outer < 0) {
-      violate(verdict,
-              fmt::format("component {} of the tissue, which holds particle {}, has no outer "
-                          "shell",
-                          components.label[at(i)], i),
-              {}, {i});
+      violate(verdict, {{}, {i}},
+              "component {} of the tissue, which holds particle {}, has no outer "
+              "shell",
+              components.label[at(i)], i);
       outer = shell_count;  // told once
     }
   }
   const int32_t cavities = count_cavities(judged);
   if (inner != cavities) {
-    violate(verdict, fmt::format("the skin has {} inner shells, but the tissue has {} cavities", inner, cavities));
+    violate(verdict, {}, "the skin has {} inner shells, but the tissue has {} cavities", inner, cavities);
   }
 }
 
@@ -110,13 +95,12 @@ void check_component_match(Judged& judged, Verdict& verdict) {
   const int64_t surplus = pairs - components.count, ghosts = pairs - coupling.count;
   if (surplus > 0) {
     const Edge edge = judged.first_uncoupled_edge();
-    violate(verdict,
-            fmt::format("particles {} and {} are neighbours in component {} of the tissue, but no chain of "
-                        "clusters couples them",
-                        edge.a, edge.b, components.label[at(edge.a)]),
-            {}, {edge.a, edge.b}, {edge.a, edge.b});
+    violate(verdict, {{}, {edge.a, edge.b}, {edge.a, edge.b}},
+            "particles {} and {} are neighbours in component {} of the tissue, but no chain of "
+            "clusters couples them",
+            edge.a, edge.b, components.label[at(edge.a)]);
   }
-  if (ghosts > 0) violate(verdict, first_ghost_coupling(judged));
+  if (ghosts > 0) tell_of_ghost_coupling(judged, verdict);
   verdict.measured = static_cast<double>(surplus + ghosts);
   if (judged.skin_is_current && skin_is_due(judged.setup, judged.state)) match_skin(judged, verdict);
   for (const int32_t label : components.label) verdict.checked += label >= 0 ? 1 : 0;

@@ -10,28 +10,28 @@ void check_coverage(Judged& judged, Verdict& verdict) {
   for (int32_t c = 0; c < judged.clusters.count(); ++c) {
     const auto members = judged.clusters.of(c);
     const int32_t number = judged.number(c);
-    if (members.empty()) violate(verdict, fmt::format("cluster {} has no particles", number), {number});
+    if (members.empty()) violate(verdict, {{number}}, "cluster {} has no particles", number);
     for (std::size_t k = 0; k < members.size(); ++k) {
       const int32_t i = members[k];
       covered[at(i)] = 1;
       if (!judged.alive(i)) {
-        violate(verdict, fmt::format("cluster {} holds particle {}, which is dead", number, i), {number}, {i});
+        violate(verdict, {{number}, {i}}, "cluster {} holds particle {}, which is dead", number, i);
       }
       if (k > 0 && members[k] == members[k - 1]) {
-        violate(verdict, fmt::format("cluster {} holds particle {} twice", number, i), {number}, {i});
+        violate(verdict, {{number}, {i}}, "cluster {} holds particle {} twice", number, i);
       } else if (k > 0 && members[k] < members[k - 1]) {
-        violate(verdict, fmt::format("the members of cluster {} do not ascend", number), {number}, {members[k - 1], i});
+        violate(verdict, {{number}, {members[k - 1], i}}, "the members of cluster {} do not ascend", number);
       }
     }
   }
   for (int32_t i = 0; i < judged.body.particle_count(); ++i) {
     if (judged.alive(i) && covered[at(i)] == 0) {
-      violate(verdict, fmt::format("particle {} is alive and in no cluster", i), {}, {i});
+      violate(verdict, {{}, {i}}, "particle {} is alive and in no cluster", i);
     }
   }
   for (const auto* list : {&judged.state.removed, &judged.state.debris}) {
     for (const int32_t i : *list) {
-      if (judged.alive(i)) violate(verdict, fmt::format("particle {} was removed but is alive", i), {}, {i});
+      if (judged.alive(i)) violate(verdict, {{}, {i}}, "particle {} was removed but is alive", i);
     }
   }
   verdict.checked = judged.body.particle_count() + static_cast<int64_t>(judged.clusters.members.size());

@@ -13,13 +13,9 @@ void check_edge_cover(Judged& judged, Verdict& verdict) {
   const UncoveredEdges edges = uncovered_edges(judged.graph, judged.clusters);
   verdict.checked = edges.edges;
   verdict.measured = static_cast<double>(edges.uncovered);
-  verdict.holds = edges.uncovered == 0;
-  if (!verdict.holds) {
-    verdict.witness = {{},
-                       {edges.a, edges.b},
-                       {edges.a, edges.b},
-                       fmt::format("no cluster holds both ends of the edge from particle {} to {}", edges.a, edges.b)};
-  }
+  if (edges.uncovered == 0) return;
+  fail(verdict, {{}, {edges.a, edges.b}, {edges.a, edges.b}},
+       "no cluster holds both ends of the edge from particle {} to {}", edges.a, edges.b);
 }
 
 }  // namespace cutproof::oracles

@@ -20,9 +20,8 @@ std::vector<uint8_t> singly_isolated(const TissueGraph& graph, const Clusters& c
     if (std::any_of(members.begin(), members.end(), [&](int32_t i) { return memberships[at(i)] > 1; })) continue;
     for (const int32_t i : members) held_by[at(i)] = c;
     for (const int32_t i : members) {
-      for (int direction = 0; direction < 6 && graph.alive(i); ++direction) {
-        const int32_t other = graph.neighbour(i, direction);
-        if (other >= 0 && held_by[at(other)] != c) isolated[at(c)] = 1;
+      for (const int32_t other : graph.neighbours(i)) {
+        if (held_by[at(other)] != c) isolated[at(c)] = 1;
       }
     }
   }
@@ -37,10 +36,10 @@ void check_additions(const Setup& setup, const TissueGraph& graph, const Cluster
   const int32_t number = before.number[at(c)];
   // layer: 0 for old members, k for the k-th layer, -2 for additions not reached yet, -1 for all others.
   for (const int32_t i : before.of(c)) layer[at(i)] = 0;
-  std::vector<int32_t> front;
   for (const int32_t i : added) layer[at(i)] = -2;
   for (const int32_t i : added) {
-    bool adjacent = false, called_for = setup.expand.rule == ExpandRule::published;
+    if (setup.expand.rule == ExpandRule::published || setup.expand.depth > 1) break;
+    bool adjacent = false, called_for = false;
     for (int direction = 0; direction < 6 && graph.alive(i); ++direction) {
       const int32_t other = graph.neighbour(i, direction);
       if (other < 0 || layer[at(other)] != 0) continue;
@@ -48,37 +47,26 @@ void check_additions(const Setup& setup, const TissueGraph& graph, const Cluster
       const int32_t low = direction % 2 == 0 ? i : other;  // the end from which the edge leaves in + direction
       if (covered[at(low) * 3 + at(direction / 2)] == 0) called_for = true;
     }
-    if (!adjacent) continue;
-    front.push_back(i);
-    if (!called_for && setup.expand.depth <= 1) {
-      violate(verdict,
-              fmt::format("cluster {} took in particle {}, though other clusters held every "
-                          "edge between them already",
-                          number, i),
-              {number}, {i});
-    }
+    if (!adjacent || called_for) continue;
+    violate(verdict, {{number}, {i}},
+            "cluster {} took in particle {}, though other clusters held every edge between them already", number, i);
   }
-  for (const int32_t i : front) layer[at(i)] = 1;
-  for (int32_t depth = 2; depth <= setup.expand.depth && !front.empty(); ++depth) {
-    std::vector<int32_t> next;
-    for (const int32_t i : front) {
-      for (int direction = 0; direction < 6 && graph.alive(i); ++direction) {
-        const int32_t other = graph.neighbour(i, direction);
-        if (other < 0 || layer[at(other)] != -2) continue;
-        layer[at(other)] = depth;
-        next.push_back(other);
-      }
+  bool grows = true;
+  for (int32_t depth = 1; depth <= setup.expand.depth && grows; ++depth) {
+    grows = false;
+    for (const int32_t i : added) {
+      const auto others = graph.neighbours(i);
+      const auto is_before = [&](int32_t other) { return layer[at(other)] == depth - 1; };
+      if (layer[at(i)] != -2 || std::none_of(others.begin(), others.end(), is_before)) continue;
+      layer[at(i)] = depth;
+      grows = true;
     }
-    front = std::move(next);
   }
   for (const int32_t i : added) {
-    if (layer[at(i)] == -2) {
-      violate(verdict,
-              fmt::format("cluster {} took in particle {}, which no path of at most {} "
-                          "edges through added particles joins to it",
-                          number, i, setup.expand.depth),
-              {number}, {i});
-    }
+    if (layer[at(i)] != -2) continue;
+    violate(verdict, {{number}, {i}},
+            "cluster {} took in particle {}, which no path of at most {} edges through added particles joins to it",
+            number, i, setup.expand.depth);
   }
   for (const int32_t i : before.of(c)) layer[at(i)] = -1;
   for (const int32_t i : added) layer[at(i)] = -1;
@@ -93,7 +81,7 @@ void check_expansion(const StageRun& run, Verdict& verdict) {
   verdict.checked = a.count();
   if (a.number != b.number) {
     const auto [old, now] = std::mismatch(a.number.begin(), a.number.end(), b.number.begin(), b.number.end());
-    violate(verdict, "expansion changed the clusters' numbers", {old != a.number.end() ? *old : *now});
+    violate(verdict, {{old != a.number.end() ? *old : *now}}, "expansion changed the clusters' numbers");
     return;
   }
   const TissueGraph graph(setup.body, before.alive);
@@ -102,36 +90,25 @@ void check_expansion(const StageRun& run, Verdict& verdict) {
   std::optional<std::vector<uint8_t>> covered;  // once a cluster has grown
   const std::vector<uint8_t> isolated_before = published ? singly_isolated(graph, a) : std::vector<uint8_t>{};
   std::vector<int32_t> layer(at(graph.particle_count()), -1);
-  std::vector<int32_t> old_members, new_members, added, lost;
+
   for (int32_t c = 0; c < a.count(); ++c) {
     const int32_t number = a.number[at(c)];
     const auto old_span = a.of(c), new_span = b.of(c);
     if (std::equal(old_span.begin(), old_span.end(), new_span.begin(), new_span.end())) continue;
-    old_members.assign(old_span.begin(), old_span.end());
-    new_members.assign(new_span.begin(), new_span.end());
-    std::sort(old_members.begin(), old_members.end());
-    std::sort(new_members.begin(), new_members.end());
-    added.clear();
-    lost.clear();
-    std::set_difference(new_members.begin(), new_members.end(), old_members.begin(), old_members.end(),
-                        std::back_inserter(added));
-    std::set_difference(old_members.begin(), old_members.end(), new_members.begin(), new_members.end(),
-                        std::back_inserter(lost));
+    const auto [lost, added] = set_difference(old_span, new_span);
     if (!lost.empty()) {
-      violate(verdict, fmt::format("cluster {} lost particle {}", number, lost.front()), {number}, {lost.front()});
+      violate(verdict, {{number}, {lost.front()}}, "cluster {} lost particle {}", number, lost.front());
       continue;
     }
     if (added.empty()) continue;  // only the order changed: coverage rejects that
     if (idle) {
-      violate(verdict,
-              fmt::format("cluster {} took in particle {}, but {}", number, added.front(),
-                          before.edge_covered ? "every edge was covered already" : "the scene expands none"),
-              {number}, {added.front()});
+      violate(verdict, {{number}, {added.front()}}, "cluster {} took in particle {}, but {}", number, added.front(),
+              before.edge_covered ? "every edge was covered already" : "the scene expands none");
       continue;
     }
     if (published && isolated_before[at(c)] == 0) {
-      violate(verdict, fmt::format("cluster {} took in particle {}, but it was not isolated", number, added.front()),
-              {number}, {added.front()});
+      violate(verdict, {{number}, {added.front()}}, "cluster {} took in particle {}, but it was not isolated", number,
+              added.front());
       continue;
     }
     if (!covered) covered = covered_edges(graph, a);
@@ -141,21 +118,18 @@ void check_expansion(const StageRun& run, Verdict& verdict) {
   if (setup.expand.rule == ExpandRule::edge_cover) {
     const UncoveredEdges edges = uncovered_edges(graph, b);
     if (edges.uncovered > 0) {
-      violate(verdict, fmt::format("no cluster holds both ends of the edge from particle {} to {}", edges.a, edges.b),
-              {}, {edges.a, edges.b}, {edges.a, edges.b});
+      violate(verdict, {{}, {edges.a, edges.b}, {edges.a, edges.b}},
+              "no cluster holds both ends of the edge from particle {} to {}", edges.a, edges.b);
     } else if (!after.edge_covered) {
-      violate(verdict, "every edge is covered, but edge_covered does not say so");
+      violate(verdict, {}, "every edge is covered, but edge_covered does not say so");
     }
   }
   if (published && !idle) {
     const std::vector<uint8_t> isolated = singly_isolated(graph, b);
     for (int32_t c = 0; c < b.count(); ++c) {
       if (isolated[at(c)] == 0) continue;
-      violate(verdict,
-              fmt::format("cluster {} still shares no particle with another, though edges of the tissue leave "
-                          "it",
-                          b.number[at(c)]),
-              {b.number[at(c)]});
+      violate(verdict, {{b.number[at(c)]}},
+              "cluster {} still shares no particle with another, though edges of the tissue leave it", b.number[at(c)]);
     }
   }
 }

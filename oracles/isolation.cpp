@@ -11,8 +11,7 @@ void check_isolation(Judged& judged, Verdict& verdict) {
   const Partition& coupling = judged.coupling();
   verdict.checked = coupling.count;
   verdict.measured = static_cast<double>(judged.coupled_components() - judged.components().count);
-  verdict.holds = verdict.measured == 0;
-  if (verdict.holds) return;
+  if (verdict.measured == 0) return;
 
   // The smaller of the two groups that meet at an edge without coupling.
   Edge edge = judged.first_uncoupled_edge();
@@ -20,20 +19,18 @@ void check_isolation(Judged& judged, Verdict& verdict) {
     return std::count(coupling.label.begin(), coupling.label.end(), coupling.label[at(particle)]);
   };
   if (group_size(edge.b) < group_size(edge.a)) std::swap(edge.a, edge.b);
-  const int32_t group = coupling.label[at(edge.a)];
+  std::vector<int32_t> group;
   for (int32_t c = 0; c < judged.clusters.count(); ++c) {
     for (const int32_t i : judged.clusters.of(c)) {
       if (!judged.alive(i)) continue;
-      if (coupling.label[at(i)] == group) verdict.witness.clusters.push_back(judged.number(c));
+      if (coupling.label[at(i)] == coupling.label[at(edge.a)]) group.push_back(judged.number(c));
       break;
     }
   }
-  verdict.witness.particles = {edge.a, edge.b};
-  verdict.witness.path = {edge.a, edge.b};
-  verdict.witness.text = fmt::format(
-      "{} of {} clusters form a group of {} particles that shares no particle with any other cluster, though particle "
-      "{} of it is a neighbour of particle {}",
-      verdict.witness.clusters.size(), judged.clusters.count(), group_size(edge.a), edge.a, edge.b);
+  fail(verdict, {group, {edge.a, edge.b}, {edge.a, edge.b}},
+       "{} of {} clusters form a group of {} particles that shares no particle with any other cluster, though particle "
+       "{} of it is a neighbour of particle {}",
+       group.size(), judged.clusters.count(), group_size(edge.a), edge.a, edge.b);
 }
 
 }  // namespace cutproof::oracles

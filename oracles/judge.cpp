@@ -47,7 +47,7 @@ struct Judge::Memory {
 
   Verdict answer(const Property& property, Stage after) {
     if (&property == &core_properties().front()) return form;
-    if (!form.holds) return not_judged(std::string(property.name), form);
+    if (!form.holds) return not_judged(property.name, form);
     judged->skin_is_current = after == Stage::skin;
     const auto known = std::find_if(held.begin(), held.end(), [&](const Held& h) {
       return h.property == &property && h.skin_is_current == judged->skin_is_current;
@@ -79,7 +79,7 @@ std::vector<Verdict> Judge::state(const State& state, Stage after, bool thorough
   std::vector<Verdict> verdicts;
   m.for_each_property([&](const Property& property) {
     if (property.check_state == nullptr || (property.cost == Cost::thorough && !thorough)) return;
-    if (property.is_due(m.setup, state, after)) verdicts.push_back(m.answer(property, after));
+    if (property.due.holds(m.setup, state, after)) verdicts.push_back(m.answer(property, after));
   });
   for (Verdict& verdict : verdicts) verdict.stage = after;
   return verdicts;
@@ -95,7 +95,7 @@ std::vector<Verdict> Judge::stage(Stage stage, const State& before, const State&
     if (!property.promised_by.contains(stage)) return;
     if (property.check_stage != nullptr) {
       verdicts.push_back(ask(property, {m.setup, stage, before, after}, form_before, m.form));
-    } else if (property.is_due(m.setup, after, stage)) {
+    } else if (property.due.holds(m.setup, after, stage)) {
       verdicts.push_back(m.answer(property, stage));
     }
   });

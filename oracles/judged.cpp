@@ -34,10 +34,8 @@ const Memberships& Judged::memberships() {
 Edge Judged::first_uncoupled_edge() {
   const std::vector<int32_t>& coupled = coupling().label;
   for (int32_t i = 0; i < body.particle_count(); ++i) {
-    if (!alive(i)) continue;
-    for (int axis = 0; axis < 3; ++axis) {
-      const int32_t other = graph.neighbour(i, 2 * axis);
-      if (other >= 0 && coupled[at(i)] != coupled[at(other)]) return {i, other};
+    for (const int32_t other : graph.upper_neighbours(i)) {
+      if (coupled[at(i)] != coupled[at(other)]) return {i, other};
     }
   }
   return {};

@@ -5,16 +5,11 @@
 namespace cutproof::oracles {
 
 Memberships memberships_of(const Clusters& clusters, int32_t particle_count) {
-  Memberships memberships;
-  memberships.offsets.assign(at(particle_count) + 1, 0);
-  for (const int32_t i : clusters.members) ++memberships.offsets[at(i) + 1];
-  for (std::size_t i = 0; i < at(particle_count); ++i) memberships.offsets[i + 1] += memberships.offsets[i];
-  memberships.clusters.resize(clusters.members.size());
-  std::vector<int64_t> next(memberships.offsets.begin(), memberships.offsets.end() - 1);
+  std::vector<std::pair<int32_t, int32_t>> pairs;
   for (int32_t c = 0; c < clusters.count(); ++c) {
-    for (const int32_t i : clusters.of(c)) memberships.clusters[at(next[at(i)]++)] = c;
+    for (const int32_t i : clusters.of(c)) pairs.emplace_back(i, c);
   }
-  return memberships;
+  return {particle_count, pairs};
 }
 
 std::vector<int32_t> membership_counts(const Clusters& clusters, int32_t particle_count) {

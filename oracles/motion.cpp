@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "oracles/checks.h"
+#include "oracles/totals.h"
 
 namespace cutproof::oracles {
 namespace {
@@ -38,34 +39,6 @@ std::array<Pushes, 3> pushes_of(const Setup& setup, const State& before) {
   }
   if (any) pushes.fill(Pushes::any);
   return pushes;
-}
-
-struct Centre {
-  double mass = 0;
-  Vec3 position, momentum;
-};
-
-// Of the particles in `mask`, summed in extended precision.
-Centre centre_of(const Body& body, const State& state, const std::vector<uint8_t>& mask) {
-  long double mass = 0;
-  std::array<long double, 3> position = {}, momentum = {};
-  for (std::size_t i = 0; i < mask.size(); ++i) {
-    if (mask[i] == 0) continue;
-    const long double m = body.mass[i];
-    mass += m;
-    for (int axis = 0; axis < 3; ++axis) {
-      position[at(axis)] += m * state.x[i][axis];
-      momentum[at(axis)] += m * state.v[i][axis];
-    }
-  }
-  Centre centre;
-  centre.mass = static_cast<double>(mass);
-  if (!(centre.mass > 0)) return centre;
-  for (int axis = 0; axis < 3; ++axis) {
-    centre.position[axis] = static_cast<double>(position[at(axis)] / mass);
-    centre.momentum[axis] = static_cast<double>(momentum[at(axis)]);
-  }
-  return centre;
 }
 
 class Motion {
@@ -159,11 +132,12 @@ class Motion {
   // as I_s in the state has moved the centre by a_s I_s, a_s = dt / M · (1 + D + … + D^(S−s)) / D^(S−s+1), which is
   // greatest for the first substep and least for the last.
   void judge_centre() {
-    const Centre start = centre_of(setup_.body, before_, before_.alive);
-    if (!(start.mass > 0)) return;
-    const Centre end = centre_of(setup_.body, after_, before_.alive);
+    const Totals totals = totals_of(setup_.body, before_, before_.alive);
+    const auto mass = static_cast<double>(totals.mass);
+    if (!(mass > 0)) return;
+    const Vec3 start = totals.center(), end = totals_of(setup_.body, after_, before_.alive).center();
     const int32_t substeps = setup_.step.substeps;
-    Vec3 moved, velocity = start.momentum / start.mass;
+    Vec3 moved, velocity = totals.total_momentum() / mass;
     double powers = 0, decay = 1;  // 1 + D + … and D^k
     for (int32_t s = 0; s < substeps; ++s) {
       moved += dt_ * (velocity + dt_ * setup_.step.gravity);
@@ -171,30 +145,26 @@ class Motion {
       powers += decay;
       decay *= decay_;
     }
-    const double earliest = dt_ * powers / (decay * start.mass);
-    const double latest = dt_ / (decay_ * start.mass);
+    const double earliest = dt_ * powers / (decay * mass);
+    const double latest = dt_ / (decay_ * mass);
     // Each substep's mean velocity is off by as much as the momentum of the frame may be (Linear momentum).
-    Verdict momentum;
-    check_momentum(run_, momentum);
-    const double rounding = 2 * substeps * dt_ / decay * momentum.bound / start.mass +
-                            8 * kStored * (norm(start.position) + norm(end.position));
+    Verdict linear;
+    check_momentum(run_, linear);
+    const double rounding = 2 * substeps * dt_ / decay * linear.bound / mass + 8 * kStored * (norm(start) + norm(end));
     const std::array<Pushes, 3> pushes = pushes_of(setup_, before_);
     for (int axis = 0; axis < 3; ++axis) {
       const double impulse = after_.impulse[axis];
       const Pushes from = pushes[at(axis)];
       if (from == Pushes::any) continue;
-      const double least = std::min(latest * impulse, earliest * impulse),
-                   most = std::max(latest * impulse, earliest * impulse);
-      const double beyond = end.position[axis] - start.position[axis] - moved[axis];
-      const double off = beyond < least          ? least - beyond
-                         : beyond > most         ? beyond - most
-                         : std::isfinite(beyond) ? 0.0
-                                                 : beyond;
+      const double least = std::min(latest * impulse, earliest * impulse);
+      const double most = std::max(latest * impulse, earliest * impulse);
+      const double beyond = end[axis] - start[axis] - moved[axis];
+      const double off = std::isnan(beyond) ? beyond : std::max({least - beyond, beyond - most, 0.0});
       compare(off, rounding, {}, [&] {
         return fmt::format(
             "the centre of mass moved by {:.6g} h along axis {}; momentum and gravity account for {:.6g} h, and {} for "
             "{:.6g} to {:.6g} h",
-            (end.position[axis] - start.position[axis]) / h_, axis, moved[axis] / h_,
+            (end[axis] - start[axis]) / h_, axis, moved[axis] / h_,
             from == Pushes::none ? "an impulse that nothing can have given" : "contacts", least / h_, most / h_);
       });
     }
@@ -217,11 +187,8 @@ class Motion {
 }  // namespace
 
 void check_motion(const StageRun& run, Verdict& verdict) {
-  if (run.before.frame < 0 || run.before.frame >= run.setup.frame_count()) {
-    verdict.vacuous = "the schedule is over";
-    return;
-  }
-  Motion(run, verdict).judge();
+  if (run.before.frame < run.setup.frame_count()) return Motion(run, verdict).judge();
+  verdict.vacuous = "the schedule is over";
 }
 
 }  // namespace cutproof::oracles

@@ -61,10 +61,9 @@ void check_no_pass(Judged& judged, Verdict& verdict) {
       if (other < 0 || held[at(other)] != 0) continue;
       ++verdict.checked;
       if (!crosses(setup.blade, local[at(i)], local[at(other)])) continue;
-      violate(verdict,
-              fmt::format("the edge from particle {} to {}, {:.6g} h long, crosses the blade", i, other,
-                          norm(state.x[at(i)] - state.x[at(other)]) / judged.body.grid.spacing),
-              {}, {i, other}, {i, other});
+      violate(verdict, {{}, {i, other}, {i, other}},
+              "the edge from particle {} to {}, {:.6g} h long, crosses the blade", i, other,
+              norm(state.x[at(i)] - state.x[at(other)]) / judged.body.grid.spacing);
     }
   }
 }

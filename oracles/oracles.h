@@ -14,34 +14,53 @@
 
 namespace cutproof::oracles {
 
+// A property of a state, asked by itself.
+struct StateOracle {
+  const PropertyList& (*list)();
+  std::string_view name;
+  Verdict operator()(const Setup& setup, const State& state) const {
+    return ask(property_named(list(), name), setup, state);
+  }
+  friend bool operator==(const StateOracle&, const StateOracle&) = default;
+};
+// A property of a stage.
+struct StageOracle {
+  std::string_view name;
+  Stage stage;
+  Verdict operator()(const Setup& setup, const State& before, const State& after) const {
+    return ask(property_named(core_properties(), name), setup, stage, before, after);
+  }
+};
+
 // --- One state -----------------------------------------------------------------------------------------------------
 // First of all: sizes, offsets monotone, members in range.
-Verdict well_formed(const Setup& setup, const State& state);
-Verdict finite(const Setup& setup, const State& state);                // no NaN, no Inf anywhere
-Verdict cluster_connectivity(const Setup& setup, const State& state);  // I1, by BFS
-Verdict coverage(const Setup& setup, const State& state);              // I2; members sorted, unique, alive
+inline constexpr StateOracle well_formed{core_properties, "well formed"};
+inline constexpr StateOracle finite{core_properties, "finite"};                              // no NaN, no Inf anywhere
+inline constexpr StateOracle cluster_connectivity{core_properties, "cluster connectivity"};  // I1, by BFS
+inline constexpr StateOracle coverage{core_properties, "coverage"};  // I2; members sorted, unique, alive
 // I3 and the skin: components of G = of the coupling "shares a cluster" (both as partitions of the alive particles)
 // and, if the state has a skin, = outer shells of the skin (method.md §8). Witness of a failure: two particles and, if
 // they are connected, a path.
-Verdict component_match(const Setup& setup, const State& state);
+inline constexpr StateOracle component_match{core_properties, "component match"};
 // No cluster and no group of clusters isolated inside connected tissue; measured: number of surplus groups, that is
 // coupling components minus components of G (0 expected).
-Verdict isolation(const Setup& setup, const State& state);
-Verdict edge_cover(const Setup& setup, const State& state);        // I4, where state.edge_covered promises it
-Verdict rest_frames(const Setup& setup, const State& state);       // T_c and M_c of every cluster
-Verdict rotation_quality(const Setup& setup, const State& state);  // ‖RᵀR − I‖ and det > 0 of every cluster
+inline constexpr StateOracle isolation{core_properties, "isolation"};
+inline constexpr StateOracle edge_cover{core_properties, "edge cover"};    // I4, where state.edge_covered promises it
+inline constexpr StateOracle rest_frames{core_properties, "rest frames"};  // T_c and M_c of every cluster
+inline constexpr StateOracle rotation_quality{core_properties, "rotation"};  // ‖RᵀR − I‖ and det > 0 of every cluster
 // Small clusters that could still merge (method.md §6, maximal): none, given that nothing else is owed.
-Verdict merge_maximality(const Setup& setup, const State& state);
+inline constexpr StateOracle merge_maximality{core_properties, "merge maximality"};
 // No alive edge with two free ends crosses the blade where it stands at the end of the frame just simulated (pass
 // the state after detect, before the frame counts up). Dynamic criterion only.
-Verdict no_pass(const Setup& setup, const State& state);
-Verdict skin_surface(const Setup& setup, const State& state);  // closed, 2-manifold, oriented, by half-edges
+inline constexpr StateOracle no_pass{core_properties, "no pass"};
+inline constexpr StateOracle skin_surface{core_properties,
+                                          "skin surface"};  // closed, 2-manifold, oriented, by half-edges
 // Each vertex where its owner's clusters put it; owners alive, the other end of the edge empty.
-Verdict skin_vertices(const Setup& setup, const State& state);
+inline constexpr StateOracle skin_vertices{core_properties, "skin vertices"};
 
 // --- One stage: the state before and after it -----------------------------------------------------------------------
 // Linear momentum over one frame: M v' = decay of M v + gravity + impulse (state.impulse).
-Verdict momentum(const Setup& setup, const State& before, const State& after);
+inline constexpr StageOracle momentum{"linear momentum", Stage::step};
 // Positions and velocities before and after the step of one frame belong together. What can be said of it without
 // running the step again:
 // - one substep a frame: each particle has moved by dt v' / D, with D = e^(−c dt);
@@ -51,13 +70,14 @@ Verdict momentum(const Setup& setup, const State& before, const State& after);
 //   in which contacts push to one side only, by what the frame's impulse can add at its latest and at its earliest.
 // `measured` and `bound` are those of the comparison that comes nearest to its bound or goes farthest beyond [h].
 // Vacuous where none of these can be asked: a blade that is down, friction or a grip may push to any side.
-Verdict motion(const Setup& setup, const State& before, const State& after);
-Verdict detection(const Setup& setup, const State& before,
-                  const State& after);  // removed <=> d_i > εh outside the band
-Verdict split_exactness(const Setup& setup, const State& before, const State& after);
-Verdict merge_legality(const Setup& setup, const State& before, const State& after);
-Verdict expansion(const Setup& setup, const State& before, const State& after);
+inline constexpr StageOracle motion{"motion", Stage::step};
+inline constexpr StageOracle detection{"detection", Stage::detect};  // removed <=> d_i > εh outside the band
+inline constexpr StageOracle split_exactness{"split exactness", Stage::split};
+inline constexpr StageOracle merge_legality{"merge legality", Stage::merge};
+inline constexpr StageOracle expansion{"expansion", Stage::expand};
 // Nothing but what a stage may change has changed (positions by split, clusters by step, …).
-Verdict untouched(const Setup& setup, Stage stage, const State& before, const State& after);
+inline Verdict untouched(const Setup& setup, Stage stage, const State& before, const State& after) {
+  return StageOracle{"untouched", stage}(setup, before, after);
+}
 
 }  // namespace cutproof::oracles

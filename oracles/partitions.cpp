@@ -1,4 +1,8 @@
 // Partitions of the alive particles: components of the tissue graph, and of the coupling by clusters.
+#include <algorithm>
+#include <map>
+#include <set>
+
 #include "oracles/oracles.h"
 #include "oracles/support.h"
 
@@ -9,16 +13,14 @@ Partition components_of_graph(const TissueGraph& graph) {
   Partition partition;
   partition.label.assign(at(n), -1);
   std::vector<int32_t> queue;
-  queue.reserve(at(n));
+
   for (int32_t seed = 0; seed < n; ++seed) {
     if (!graph.alive(seed) || partition.label[at(seed)] >= 0) continue;
-    queue.clear();
-    queue.push_back(seed);
+    queue.assign(1, seed);
     partition.label[at(seed)] = partition.count;
     for (std::size_t head = 0; head < queue.size(); ++head) {
-      for (int direction = 0; direction < 6; ++direction) {
-        const int32_t other = graph.neighbour(queue[head], direction);
-        if (other < 0 || partition.label[at(other)] >= 0) continue;
+      for (const int32_t other : graph.neighbours(queue[head])) {
+        if (partition.label[at(other)] >= 0) continue;
         partition.label[at(other)] = partition.count;
         queue.push_back(other);
       }
@@ -50,25 +52,11 @@ Partition components_of_coupling(const TissueGraph& graph, const Clusters& clust
 }
 
 int64_t distinct_pairs(const Partition& a, const Partition& b) {
-  // Particles in the order of their label in a, by counting.
-  std::vector<int64_t> next(at(a.count) + 1, 0);
-  for (const int32_t label : a.label) {
-    if (label >= 0) ++next[at(label) + 1];
-  }
-  for (std::size_t k = 0; k < at(a.count); ++k) next[k + 1] += next[k];
-  std::vector<int32_t> order(at(next.back()));
+  std::set<std::pair<int32_t, int32_t>> pairs;
   for (std::size_t i = 0; i < a.label.size(); ++i) {
-    if (a.label[i] >= 0) order[at(next[at(a.label[i])]++)] = static_cast<int32_t>(i);
+    if (a.label[i] >= 0) pairs.emplace(a.label[i], b.label[i]);
   }
-  std::vector<int32_t> seen_with(at(b.count), -1);
-  int64_t pairs = 0;
-  for (const int32_t i : order) {
-    int32_t& seen = seen_with[at(b.label[at(i)])];
-    if (seen == a.label[at(i)]) continue;
-    seen = a.label[at(i)];
-    ++pairs;
-  }
-  return pairs;
+  return static_cast<int64_t>(pairs.size());
 }
 
 std::vector<uint8_t> covered_edges(const TissueGraph& graph, const Clusters& clusters) {
@@ -119,10 +107,11 @@ namespace {
 
 // Exact: nodes have integer coordinates.
 bool collinear(const Grid& grid, int64_t a, int64_t b, int64_t c) {
-  const auto p = grid.coordinates(a), q = grid.coordinates(b), r = grid.coordinates(c);
-  const std::array<int64_t, 3> u = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
-  const std::array<int64_t, 3> v = {r[0] - p[0], r[1] - p[1], r[2] - p[2]};
-  return u[1] * v[2] == u[2] * v[1] && u[2] * v[0] == u[0] * v[2] && u[0] * v[1] == u[1] * v[0];
+  const auto from_a = [&, p = grid.coordinates(a)](int64_t node) {
+    const auto q = grid.coordinates(node);
+    return Vec3{1.0 * (q[0] - p[0]), 1.0 * (q[1] - p[1]), 1.0 * (q[2] - p[2])};
+  };
+  return cross(from_a(b), from_a(c)) == Vec3{};
 }
 
 }  // namespace
@@ -133,37 +122,22 @@ WeakCouplings weak_couplings(const Setup& setup, const State& state) {
   const Body& body = setup.body;
   const Clusters& clusters = state.clusters;
   const Memberships memberships = memberships_of(clusters, body.particle_count());
-  // What cluster c shares with each later cluster: how many particles, the first two, and whether all are collinear.
-  struct Shared {
-    int32_t count = 0, first = -1, second = -1;
-    bool on_a_line = true;
-  };
-  std::vector<Shared> shared(at(clusters.count()));
-  std::vector<int32_t> partners;
   for (int32_t c = 0; c < clusters.count(); ++c) {
-    partners.clear();
+    std::map<int32_t, std::vector<int64_t>> shared;  // with each later cluster: the nodes of living particles
     for (const int32_t i : clusters.of(c)) {
       for (const int32_t other : memberships.of(i)) {
-        if (other <= c || state.alive[at(i)] == 0) continue;
-        Shared& s = shared[at(other)];
-        if (s.count++ == 0) {
-          partners.push_back(other);
-          s.first = i;
-        } else if (s.count == 2) {
-          s.second = i;
-        } else if (s.on_a_line) {
-          s.on_a_line = collinear(body.grid, body.node[at(s.first)], body.node[at(s.second)], body.node[at(i)]);
-        }
+        if (other > c && state.alive[at(i)] != 0) shared[other].push_back(body.node[at(i)]);
       }
     }
-    for (const int32_t other : partners) {
-      const Shared& s = shared[at(other)];
-      if (s.count == 1) {
+    for (const auto& [other, nodes] : shared) {
+      const auto on_a_line = [&grid = body.grid, a = nodes.front(), b = nodes.back()](int64_t node) {
+        return collinear(grid, a, b, node);
+      };
+      if (nodes.size() == 1) {
         ++weak.ball_joints;
-      } else if (s.on_a_line) {
+      } else if (std::all_of(nodes.begin(), nodes.end(), on_a_line)) {
         ++weak.hinges;
       }
-      shared[at(other)] = Shared{};
     }
   }
   return weak;

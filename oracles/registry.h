@@ -24,6 +24,13 @@ struct StageRun {
 // What a check costs beside a frame of the reference: less, or more.
 enum class Cost { cheap, thorough };
 
+// When a property of a state applies: in words, and whether a state in which `after` was the last stage must have it.
+// What later stages still owe is not asked for. Must be safe on states that are not well formed.
+struct Due {
+  std::string_view text = {};
+  bool (*holds)(const Setup& setup, const State& state, Stage after) = nullptr;
+};
+
 // A property is one of a state (`check_state`) or one of a stage (`check_stage`): exactly one of the two is there. A
 // check fills holds, measured, bound, checked and witness of a verdict that holds so far, and may say in `vacuous` why
 // there was nothing to check. It must not throw on any well-formed state, however wrong.
@@ -33,11 +40,8 @@ struct Property {
   std::string_view unit;    // of what is measured
   unsigned rests_on;        // parts of the state, and of nothing else but the setup (model/fields.h, Part)
   Cost cost;
-  StageSet promised_by;     // stages whose answer it belongs to: asked when such a stage is judged
-  std::string_view due_if;  // a property of a state: when it applies, in words …
-  // … and as a function: whether a state in which `after` was the last stage must have it. What later stages still owe
-  // is not asked for. Must be safe on states that are not well formed.
-  bool (*is_due)(const Setup& setup, const State& state, Stage after);
+  StageSet promised_by;      // stages whose answer it belongs to: asked when such a stage is judged
+  Due due;                   // of a property of a state
   std::string_view nothing;  // why nothing was checked, where nothing was
   void (*check_state)(Judged& judged, Verdict& verdict);
   void (*check_stage)(const StageRun& run, Verdict& verdict);

@@ -15,9 +15,8 @@ namespace cutproof::oracles {
 // round, √3 for three axes; 8 (k + 2) u L covers it. The mass obeys the same bound relative to itself, because L >= h.
 void check_rest_frames(Judged& judged, Verdict& verdict) {
   const double h = judged.body.grid.spacing;
-  const int32_t n = judged.body.particle_count();
   // Dead members count too: between detect and split the frames are those of before.
-  const WeightedRest weighted = weighted_rest(judged.body, membership_counts(judged.clusters, n));
+  const WeightedRest weighted = weighted_rest(judged.body, judged.clusters);
   double reach = h;
   for (const Vec3 position : weighted.position) reach = std::max(reach, norm(position));
   int64_t largest = 0;
@@ -37,18 +36,13 @@ void check_rest_frames(Judged& judged, Verdict& verdict) {
     }
   }
   verdict.bound = 8.0 * static_cast<double>(largest + 2) * unit_roundoff(judged.state) * reach / h;
-  verdict.holds = verdict.measured <= verdict.bound;
-  if (!verdict.holds) {
-    const Vec3 t = judged.clusters.rest_center[at(worst)];
-    verdict.witness = {
-        {judged.number(worst)},
-        {},
-        {},
-        fmt::format("rest center ({}, {}, {}) m or mass {} kg of cluster {} is not the weighted sum over "
-                    "its {} particles; off by {} h",
-                    t.x, t.y, t.z, judged.clusters.mass[at(worst)], judged.number(worst), judged.clusters.size(worst),
-                    verdict.measured)};
-  }
+  if (verdict.measured <= verdict.bound) return;
+  const Vec3 t = judged.clusters.rest_center[at(worst)];
+  fail(verdict, {{judged.number(worst)}},
+       "rest center ({}, {}, {}) m or mass {} kg of cluster {} is not the weighted sum over its {} particles; off by "
+       "{} h",
+       t.x, t.y, t.z, judged.clusters.mass[at(worst)], judged.number(worst), judged.clusters.size(worst),
+       verdict.measured);
 }
 
 }  // namespace cutproof::oracles

@@ -1,14 +1,17 @@
 // Rotations that are rotations.
 #include <fmt/format.h>
 
+#include <Eigen/LU>
 #include <cmath>
 
 #include "oracles/checks.h"
+#include "oracles/eigen.h"
 
 namespace cutproof::oracles {
+
 namespace {
 
-// ‖RᵀR − I‖, Frobenius.
+// ‖RᵀR − I‖, Frobenius; each entry of it is summed from −1 or 0 on, so that little is rounded.
 double orthogonality_defect(const Mat3& r) {
   double sum = 0;
   for (int i = 0; i < 3; ++i) {
@@ -21,10 +24,6 @@ double orthogonality_defect(const Mat3& r) {
   return std::sqrt(sum);
 }
 
-double determinant(const Mat3& r) {
-  return dot({r(0, 0), r(0, 1), r(0, 2)}, cross({r(1, 0), r(1, 1), r(1, 2)}, {r(2, 0), r(2, 1), r(2, 2)}));
-}
-
 }  // namespace
 
 void check_rotation_quality(Judged& judged, Verdict& verdict) {
@@ -34,18 +33,18 @@ void check_rotation_quality(Judged& judged, Verdict& verdict) {
   verdict.bound = kMostDefect;
   for (int32_t c = 0; c < clusters.count(); ++c) {
     const Mat3& r = clusters.rotation[at(c)];
-    const double defect = orthogonality_defect(r);
+    const double defect = orthogonality_defect(r), determinant = as_eigen(r).determinant();
     ++verdict.checked;
-    const bool reflects = !(determinant(r) > 0);
+    const bool reflects = !(determinant > 0);
     if (!(defect <= verdict.measured)) verdict.measured = defect;
     if (!verdict.holds || (defect <= kMostDefect && !reflects)) continue;
     const int32_t number = clusters.number[at(c)];
-    verdict.holds = false;
-    verdict.witness.clusters = {number};
-    verdict.witness.text =
-        reflects && defect <= kMostDefect
-            ? fmt::format("the rotation of cluster {} is a reflection: its determinant is {}", number, determinant(r))
-            : fmt::format("the rotation of cluster {} is off by {} from an orthogonal matrix", number, defect);
+    if (reflects && defect <= kMostDefect) {
+      fail(verdict, {{number}}, "the rotation of cluster {} is a reflection: its determinant is {}", number,
+           determinant);
+    } else {
+      fail(verdict, {{number}}, "the rotation of cluster {} is off by {} from an orthogonal matrix", number, defect);
+    }
   }
 }
 

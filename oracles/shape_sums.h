@@ -8,18 +8,12 @@
 
 #include "model/setup.h"
 #include "model/state.h"
-#include "oracles/memberships.h"
+#include "oracles/support.h"
 
 namespace cutproof::oracles {
 
 // u: relative error of one rounding in double precision.
 inline constexpr double kUnitRoundoff = 0x1p-53;
-
-// w_ic = m_i / n_i, the same for every cluster of i. Requires i to lie in a cluster.
-inline double weight_of(const Body& body, const std::vector<int32_t>& counts, int32_t particle) {
-  const auto i = static_cast<std::size_t>(particle);
-  return body.mass[i] / counts[i];
-}
 
 // A cluster's weighted means at rest and now, recomputed from the memberships.
 struct ClusterMeans {
@@ -30,16 +24,15 @@ struct ClusterMeans {
 
 // What the means of many clusters are made of, looked up once for each particle.
 struct WeightedRest {
-  std::vector<double> weight;  // [n] w_ic; of no meaning where the particle lies in no cluster
+  std::vector<double> weight;  // [n] w_ic = m_i / n_i, the same for every cluster of i; 0 if the particle lies in none
   std::vector<Vec3> position;  // [n] X_i [m]
 };
 
-inline WeightedRest weighted_rest(const Body& body, const std::vector<int32_t>& counts) {
+inline WeightedRest weighted_rest(const Body& body, const Clusters& clusters) {
   WeightedRest rest;
-  rest.weight.reserve(body.node.size());
-  rest.position.reserve(body.node.size());
+  const std::vector<int32_t> counts = membership_counts(clusters, body.particle_count());
   for (int32_t i = 0; i < body.particle_count(); ++i) {
-    rest.weight.push_back(weight_of(body, counts, i));
+    rest.weight.push_back(counts[at(i)] > 0 ? body.mass[at(i)] / counts[at(i)] : 0);
     rest.position.push_back(body.rest_position(i));
   }
   return rest;
@@ -49,10 +42,10 @@ inline ClusterMeans cluster_means(const WeightedRest& rest, const Clusters& clus
                                   int32_t cluster) {
   ClusterMeans means;
   for (const int32_t particle : clusters.of(cluster)) {
-    const auto i = static_cast<std::size_t>(particle);
-    means.mass += rest.weight[i];
-    means.rest += rest.weight[i] * rest.position[i];
-    means.current += rest.weight[i] * x[i];
+    const double w = rest.weight[at(particle)];
+    means.mass += w;
+    means.rest += w * rest.position[at(particle)];
+    means.current += w * x[at(particle)];
   }
   means.rest = means.rest / means.mass;
   means.current = means.current / means.mass;
@@ -77,9 +70,8 @@ inline RoundingScale rounding_scale(const Setup& setup, const State& state) {
     scale.most_memberships = std::max(scale.most_memberships, count);
   }
   for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
-    if (!state.alive[static_cast<std::size_t>(i)]) continue;
-    scale.extent =
-        std::max({scale.extent, norm(setup.body.rest_position(i)), norm(state.x[static_cast<std::size_t>(i)])});
+    if (!state.alive[at(i)]) continue;
+    scale.extent = std::max({scale.extent, norm(setup.body.rest_position(i)), norm(state.x[at(i)])});
   }
   return scale;
 }

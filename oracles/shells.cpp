@@ -7,9 +7,9 @@ namespace cutproof::oracles {
 
 int32_t count_cavities(const Judged& judged) {
   const Grid& grid = judged.body.grid;
-  const auto [nx, ny, nz] = grid.nodes;
   if (judged.body.particle_count() == 0) return 0;
-  std::vector<uint8_t> empty(at(grid.node_count()), 1);
+  const auto count = static_cast<int32_t>(grid.node_count());
+  std::vector<uint8_t> empty(at(count), 1);
   for (int32_t i = 0; i < judged.body.particle_count(); ++i) {
     if (judged.alive(i)) empty[at(judged.body.node[at(i)])] = 0;
   }
@@ -18,35 +18,22 @@ int32_t count_cavities(const Judged& judged) {
   for (int dk = -1; dk <= 1; ++dk) {
     for (int dj = -1; dj <= 1; ++dj) {
       for (int di = -1; di <= 1; ++di) {
-        const int64_t step = di + int64_t{nx} * (dj + int64_t{ny} * dk);
-        const int distance = std::abs(di) + std::abs(dj) + std::abs(dk);
-        if (step < 0 && distance <= 2) earlier.push_back(step);
+        const int64_t step = grid.index(di, dj, dk);
+        if (step < 0 && std::abs(di) + std::abs(dj) + std::abs(dk) <= 2) earlier.push_back(step);
       }
     }
   }
-  // Node 0 stands for the outside: every node of the ring, which are all empty, and all that touches it.
-  DisjointSets sets(grid.node_count());
-  const auto on_ring = [&](int32_t i, int32_t j, int32_t k) {
-    return i == 0 || j == 0 || k == 0 || i == nx - 1 || j == ny - 1 || k == nz - 1;
-  };
-  for (int32_t k = 0; k < nz; ++k) {
-    for (int32_t j = 0; j < ny; ++j) {
-      for (int32_t i = 0; i < nx; ++i) {
-        const auto node = static_cast<int32_t>(grid.index(i, j, k));
-        if (empty[at(node)] == 0) continue;
-        if (on_ring(i, j, k)) {
-          sets.unite(0, node);
-          continue;
-        }
-        for (const int64_t step : earlier) {
-          if (empty[at(node + step)] != 0) sets.unite(node, static_cast<int32_t>(node + step));
-        }
-        if (i == nx - 2 || j == ny - 2 || k == nz - 2) sets.unite(0, node);
-      }
+  // A step that leaves the grid comes back to it on the other side: from one node of the outer ring to another. They
+  // are all empty, and all belong to the outside, as node 0 does.
+  DisjointSets sets(count);
+  for (int32_t node = 0; node < count; ++node) {
+    for (const int64_t step : earlier) {
+      const int64_t other = node + step;
+      if (other >= 0 && empty[at(node)] != 0 && empty[at(other)] != 0) sets.unite(node, static_cast<int32_t>(other));
     }
   }
   int32_t cavities = 0;
-  for (int32_t node = 1; node < grid.node_count(); ++node) {
+  for (int32_t node = 1; node < count; ++node) {
     if (empty[at(node)] != 0 && sets.find(node) == node) ++cavities;
   }
   return cavities;

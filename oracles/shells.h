@@ -14,6 +14,13 @@ struct Shells {
 // `points`: where the vertices are [v]. Requires triangles to name vertices that exist.
 Shells shells_of(const Skin& skin, const std::vector<Vec3>& points);
 
+// Where a vertex is at rest [m].
+inline Vec3 vertex_at_rest(const Setup& setup, const Skin& skin, std::size_t v) {
+  const auto& d = kDirections[skin.direction[v]];
+  const double reach = setup.skin.alpha * setup.body.grid.spacing;
+  return setup.body.rest_position(skin.owner[v]) + reach * Vec3{1.0 * d[0], 1.0 * d[1], 1.0 * d[2]};
+}
+
 struct ShellCount {
   int32_t outer = 0, inner = 0;
   friend bool operator==(const ShellCount&, const ShellCount&) = default;

@@ -1,7 +1,7 @@
 // Split (method.md §5): exactly the components of what is left of each cluster.
-#include <fmt/format.h>
-
 #include <algorithm>
+#include <map>
+#include <set>
 #include <span>
 
 #include "oracles/checks.h"
@@ -17,37 +17,30 @@ struct ExpectedCluster {
   std::vector<int32_t> members;
 };
 
-// The components of what is left alive of one cluster, in the order of their smallest particles. `mark` [n] is
-// scratch, -1 wherever it is not in use.
-std::vector<std::vector<int32_t>> components_within(const TissueGraph& graph, std::span<const int32_t> members,
-                                                    std::vector<int32_t>& mark) {
-  std::vector<int32_t> left;
+// What is left alive of a cluster, ascending.
+std::vector<int32_t> left_of(const TissueGraph& graph, std::span<const int32_t> members) {
+  std::set<int32_t> left;
   for (const int32_t i : members) {
-    if (graph.alive(i)) left.push_back(i);
+    if (graph.alive(i)) left.insert(i);
   }
-  std::sort(left.begin(), left.end());
-  left.erase(std::unique(left.begin(), left.end()), left.end());
+  return {left.begin(), left.end()};
+}
+
+// Its components, in the order of their smallest particles. `mark` [n] is scratch, -1 wherever it is not in use.
+std::vector<std::vector<int32_t>> components_within(const TissueGraph& graph, const std::vector<int32_t>& left,
+                                                    std::vector<int32_t>& mark) {
   DisjointSets sets(static_cast<int64_t>(left.size()));
   for (std::size_t k = 0; k < left.size(); ++k) mark[at(left[k])] = static_cast<int32_t>(k);
   for (std::size_t k = 0; k < left.size(); ++k) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const int32_t other = graph.neighbour(left[k], 2 * axis);
-      if (other >= 0 && mark[at(other)] >= 0) sets.unite(static_cast<int32_t>(k), mark[at(other)]);
+    for (const int32_t other : graph.upper_neighbours(left[k])) {
+      if (mark[at(other)] >= 0) sets.unite(static_cast<int32_t>(k), mark[at(other)]);
     }
   }
   for (const int32_t i : left) mark[at(i)] = -1;
+  std::map<int32_t, std::vector<int32_t>> by_root;  // the root is the smallest of its set
+  for (std::size_t k = 0; k < left.size(); ++k) by_root[sets.find(static_cast<int32_t>(k))].push_back(left[k]);
   std::vector<std::vector<int32_t>> components;
-  std::vector<std::size_t> component_of(left.size());
-  for (std::size_t k = 0; k < left.size(); ++k) {
-    const auto root = at(sets.find(static_cast<int32_t>(k)));
-    if (root == k) {
-      component_of[k] = components.size();
-      components.emplace_back();
-    } else {
-      component_of[k] = component_of[root];
-    }
-    components[component_of[k]].push_back(left[k]);
-  }
+  for (auto& [root, component] : by_root) components.push_back(std::move(component));
   return components;
 }
 
@@ -61,7 +54,7 @@ std::vector<ExpectedCluster> expected_split(const TissueGraph& graph, const Clus
       expected.push_back({before.number[at(c)], c, false, {members.begin(), members.end()}});
       continue;
     }
-    auto components = components_within(graph, members, mark);
+    auto components = components_within(graph, left_of(graph, members), mark);
     for (std::size_t k = 0; k < components.size(); ++k) {
       (k == 0 ? expected : separated).push_back({before.number[at(c)], c, true, std::move(components[k])});
     }
@@ -74,34 +67,28 @@ std::vector<ExpectedCluster> expected_split(const TissueGraph& graph, const Clus
   return expected;
 }
 
-// Why a cluster is not the one that was expected under its number.
-Witness difference_of_sets(int32_t number, const std::vector<int32_t>& expected, std::span<const int32_t> found,
-                           const std::vector<int32_t>& component_of_parent) {
-  std::vector<int32_t> sorted(found.begin(), found.end());
-  std::sort(sorted.begin(), sorted.end());
-  std::vector<int32_t> surplus, missing;
-  std::set_difference(sorted.begin(), sorted.end(), expected.begin(), expected.end(), std::back_inserter(surplus));
-  std::set_difference(expected.begin(), expected.end(), sorted.begin(), sorted.end(), std::back_inserter(missing));
+// Why a cluster is not the one that was expected under its number. `left`: what is left of the old cluster.
+void tell_difference(Verdict& verdict, int32_t number, const std::vector<int32_t>& expected,
+                     std::span<const int32_t> found, const std::vector<int32_t>& left) {
+  if (expected.empty()) return violate(verdict, {{number}}, "cluster {} was empty and is not", number);
+  const auto [missing, surplus] = set_difference(expected, found);
+  const int32_t home = expected.front();
   if (!surplus.empty()) {
-    const int32_t i = surplus.front(), home = expected.front();
-    if (component_of_parent[at(i)] >= 0) {
-      return {{number},
-              {home, i},
-              {},
-              fmt::format("cluster {} holds particles {} and {}, which lie in different components of what is left of "
-                          "the old cluster",
-                          number, home, i)};
+    const int32_t i = surplus.front();
+    if (std::find(left.begin(), left.end(), i) == left.end()) {
+      return violate(verdict, {{number}, {i}}, "cluster {} holds particle {}, which does not belong to it", number, i);
     }
-    return {{number}, {i}, {}, fmt::format("cluster {} holds particle {}, which does not belong to it", number, i)};
+    return violate(
+        verdict, {{number}, {home, i}},
+        "cluster {} holds particles {} and {}, which lie in different components of what is left of the old cluster",
+        number, home, i);
   }
   if (!missing.empty()) {
-    return {{number},
-            {missing.front(), expected.front()},
-            {},
-            fmt::format("cluster {} lacks particle {}, which is connected to its particle {} within the old cluster",
-                        number, missing.front(), expected.front())};
+    return violate(verdict, {{number}, {missing.front(), home}},
+                   "cluster {} lacks particle {}, which is connected to its particle {} within the old cluster", number,
+                   missing.front(), home);
   }
-  return {{number}, {}, {}, fmt::format("the members of cluster {} are not in ascending order", number)};
+  violate(verdict, {{number}}, "the members of cluster {} are not in ascending order", number);
 }
 
 void check_debris(const Setup& setup, const State& before, const State& after, Verdict& verdict) {
@@ -118,22 +105,15 @@ void check_debris(const Setup& setup, const State& before, const State& after, V
       if (graph.alive(i) && size[at(components.label[at(i)])] < setup.split.debris) debris.push_back(i);
     }
   }
-  if (debris != after.debris) {
-    const auto [mine, listed] = std::mismatch(debris.begin(), debris.end(), after.debris.begin(), after.debris.end());
-    const bool lists_more = mine == debris.end() || (listed != after.debris.end() && *listed < *mine);
-    const int32_t first = lists_more ? *listed : *mine;
-    violate(verdict,
-            fmt::format("particle {} {} listed as debris; debris are the components of fewer than {} particles", first,
-                        lists_more ? "must not be" : "must be", setup.split.debris),
-            {}, {first});
+  if (const auto wrong = first_in_one_only(debris, after.debris)) {
+    violate(verdict, {{}, {wrong->element}},
+            "particle {} {} listed as debris; debris are the components of fewer than {} particles", wrong->element,
+            wrong->in_second ? "must not be" : "must be", setup.split.debris);
   }
-  std::size_t next = 0;
   for (int32_t i = 0; i < n; ++i) {
-    while (next < debris.size() && debris[next] < i) ++next;
-    const bool vanishes = next < debris.size() && debris[next] == i;
-    const bool expected = before.alive[at(i)] != 0 && !vanishes;
+    const bool expected = graph.alive(i) && !std::binary_search(debris.begin(), debris.end(), i);
     if (expected == (after.alive[at(i)] != 0)) continue;
-    violate(verdict, fmt::format("particle {} should be {} after the split", i, expected ? "alive" : "dead"), {}, {i});
+    violate(verdict, {{}, {i}}, "particle {} should be {} after the split", i, expected ? "alive" : "dead");
   }
 }
 
@@ -148,53 +128,37 @@ void check_split_exactness(const StageRun& run, Verdict& verdict) {
   const TissueGraph graph(setup.body, after.alive);
   const std::vector<ExpectedCluster> expected = expected_split(graph, before.clusters);
   const Clusters& found = after.clusters;
-  std::vector<int32_t> component_of_parent(at(graph.particle_count()), -1);
-
+  // The first of its members, if it has any.
+  const auto first_of = [](std::span<const int32_t> members) {
+    return std::vector<int32_t>(members.begin(), members.begin() + (members.empty() ? 0 : 1));
+  };
   // Both are in the order of numbers, so walk along both.
   std::size_t e = 0;
   int32_t f = 0;
   while (e < expected.size() || f < found.count()) {
-    const bool missing = f >= found.count() || (e < expected.size() && expected[e].number < found.number[at(f)]);
-    if (missing) {
+    if (f >= found.count() || (e < expected.size() && expected[e].number < found.number[at(f)])) {
       const ExpectedCluster& cluster = expected[e++];
-      std::vector<int32_t> first;
-      if (!cluster.members.empty()) first.push_back(cluster.members.front());
-      violate(
-          verdict,
-          fmt::format("cluster {} is missing: it holds {} particles{}, {} of cluster {}", cluster.number,
-                      cluster.members.size(),
-                      cluster.members.empty() ? "" : fmt::format(", the smallest {}", cluster.members.front()),
-                      cluster.lost ? "a component of what is left" : "all", before.clusters.number[at(cluster.parent)]),
-          {static_cast<int32_t>(cluster.number)}, first);
+      violate(verdict, {{static_cast<int32_t>(cluster.number)}, first_of(cluster.members)},
+              "cluster {} is missing: it holds {} particles{}, {} of cluster {}", cluster.number,
+              cluster.members.size(),
+              cluster.members.empty() ? "" : fmt::format(", the smallest {}", cluster.members.front()),
+              cluster.lost ? "a component of what is left" : "all", before.clusters.number[at(cluster.parent)]);
       continue;
     }
     const int32_t number = found.number[at(f)];
     const auto members = found.of(f);
     if (e >= expected.size() || number < expected[e].number) {
-      std::vector<int32_t> particles;
-      if (!members.empty()) particles.push_back(members.front());
-      violate(verdict, fmt::format("cluster {} comes from nowhere", number), {number}, particles);
+      violate(verdict, {{number}, first_of(members)}, "cluster {} comes from nowhere", number);
       ++f;
       continue;
     }
     const ExpectedCluster& cluster = expected[e];
     if (!std::equal(members.begin(), members.end(), cluster.members.begin(), cluster.members.end())) {
-      Witness witness;
-      if (verdict.holds) {
-        for (const int32_t i : before.clusters.of(cluster.parent)) {
-          if (graph.alive(i)) component_of_parent[at(i)] = cluster.parent;
-        }
-        witness = cluster.members.empty()
-                      ? Witness{{number}, {}, {}, fmt::format("cluster {} was empty and is not", number)}
-                      : difference_of_sets(number, cluster.members, members, component_of_parent);
-      }
-      violate(verdict, witness);
+      tell_difference(verdict, number, cluster.members, members, left_of(graph, before.clusters.of(cluster.parent)));
     } else if (!same_bits(found.rotation[at(f)], before.clusters.rotation[at(cluster.parent)]) ||
                found.degenerate[at(f)] != before.clusters.degenerate[at(cluster.parent)]) {
-      violate(verdict,
-              fmt::format("cluster {} did not inherit the rotation of cluster {}", number,
-                          before.clusters.number[at(cluster.parent)]),
-              {number});
+      violate(verdict, {{number}}, "cluster {} did not inherit the rotation of cluster {}", number,
+              before.clusters.number[at(cluster.parent)]);
     }
     ++e;
     ++f;

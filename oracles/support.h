@@ -3,9 +3,14 @@
 #pragma once
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
+#include <optional>
+#include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -33,7 +38,31 @@ class TissueGraph {
     return other >= 0 && alive_[at(other)] != 0 ? other : -1;
   }
 
+  // The other ends of the edges of G at a particle, in the order of kDirections; a dead one has none.
+  class Ends {
+   public:
+    const int32_t* begin() const { return ends_.data(); }
+    const int32_t* end() const { return ends_.data() + count_; }
+
+   private:
+    friend class TissueGraph;
+    std::array<int32_t, 6> ends_;
+    int count_ = 0;
+  };
+  Ends neighbours(int32_t particle) const { return ends(particle, 1); }
+  // Only those along +x, +y and +z: over all particles each edge once.
+  Ends upper_neighbours(int32_t particle) const { return ends(particle, 2); }
+
  private:
+  Ends ends(int32_t particle, int every) const {
+    Ends found;
+    for (int direction = 0; direction < 6 && alive(particle); direction += every) {
+      const int32_t other = neighbour(particle, direction);
+      if (other >= 0) found.ends_[at(found.count_++)] = other;
+    }
+    return found;
+  }
+
   const Body& body_;
   const std::vector<uint8_t>& alive_;
   std::array<int64_t, 6> steps_ = {};
@@ -63,25 +92,71 @@ class DisjointSets {
   std::vector<int32_t> parent_;
 };
 
+// What two sets, in any order, do not have in common; ascending.
+struct SetDifference {
+  std::vector<int32_t> only_first, only_second;
+};
+inline SetDifference set_difference(std::span<const int32_t> first, std::span<const int32_t> second) {
+  const std::set<int32_t> a(first.begin(), first.end()), b(second.begin(), second.end());
+  SetDifference found;
+  std::set_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(found.only_first));
+  std::set_difference(b.begin(), b.end(), a.begin(), a.end(), std::back_inserter(found.only_second));
+  return found;
+}
+
+// The first element that only one of two ascending lists has. `in_second`: the second; nothing if they are equal.
+template <class T>
+struct OneSided {
+  T element;
+  bool in_second;
+};
+template <class T>
+std::optional<OneSided<T>> first_in_one_only(const std::vector<T>& a, const std::vector<T>& b) {
+  const auto [p, q] = std::mismatch(a.begin(), a.end(), b.begin(), b.end());
+  if (p == a.end() && q == b.end()) return std::nullopt;
+  const bool in_second = p == a.end() || (q != b.end() && *q < *p);
+  return OneSided<T>{in_second ? *q : *p, in_second};
+}
+
 // A verdict that holds so far.
-inline Verdict start_verdict(std::string property, const State& state, std::string unit, std::string bound_source) {
+inline Verdict start_verdict(std::string_view property, const State& state, std::string_view unit,
+                             std::string_view bound_source) {
   Verdict verdict;
-  verdict.property = std::move(property);
+  verdict.property = property;
   verdict.frame = state.frame;
-  verdict.unit = std::move(unit);
-  verdict.bound_source = std::move(bound_source);
+  verdict.unit = unit;
+  verdict.bound_source = bound_source;
   return verdict;
 }
 
+// What a witness names: numbers of clusters, particles, and particles along a path of G that shows it.
+struct Concerned {
+  std::vector<int32_t> clusters = {}, particles = {}, path = {};
+};
+
+// With a sentence for a person.
+template <class... Args>
+Witness witness_of(Concerned concerned, fmt::format_string<Args...> text, Args&&... args) {
+  return {std::move(concerned.clusters), std::move(concerned.particles), std::move(concerned.path),
+          fmt::format(text, std::forward<Args>(args)...)};
+}
+
+// For a verdict that fills in by itself what was measured.
+inline void fail(Verdict& verdict, Witness witness) {
+  verdict.holds = false;
+  verdict.witness = std::move(witness);
+}
+template <class... Args>
+void fail(Verdict& verdict, Concerned concerned, fmt::format_string<Args...> text, Args&&... args) {
+  fail(verdict, witness_of(std::move(concerned), text, std::forward<Args>(args)...));
+}
+
 // Counts one more violation; the first one is the witness.
-inline void violate(Verdict& verdict, Witness witness) {
-  if (verdict.holds) verdict.witness = std::move(witness);
+template <class... Args>
+void violate(Verdict& verdict, Concerned concerned, fmt::format_string<Args...> text, Args&&... args) {
+  if (verdict.holds) verdict.witness = witness_of(std::move(concerned), text, std::forward<Args>(args)...);
   verdict.holds = false;
   verdict.measured += 1;
-}
-inline void violate(Verdict& verdict, std::string text, std::vector<int32_t> clusters = {},
-                    std::vector<int32_t> particles = {}, std::vector<int32_t> path = {}) {
-  violate(verdict, Witness{std::move(clusters), std::move(particles), std::move(path), std::move(text)});
 }
 
 // A verdict as it is given out. What was measured against a bound says nothing where one of the two is not finite, so
@@ -99,9 +174,9 @@ inline Verdict conclude(Verdict verdict, std::string_view nothing) {
 }
 
 // The answer of every oracle on a state that is not well formed. `form` is the failing verdict of well_formed.
-inline Verdict not_judged(std::string property, const Verdict& form) {
+inline Verdict not_judged(std::string_view property, const Verdict& form) {
   Verdict verdict = form;
-  verdict.property = std::move(property);
+  verdict.property = property;
   verdict.witness.text = "not judged: the state is not well formed: " + form.witness.text;
   verdict.checked = 0;
   return verdict;

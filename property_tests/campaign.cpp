@@ -29,26 +29,31 @@ Judgement thrown(const std::string& backend, const std::string& what) {
   return judgement;
 }
 
-// A backend that nobody else uses, for as long as this lives.
+// What `run` throws, in words; empty: nothing. What the machine throws goes on.
+std::string problem_of(const std::function<void()>& run) {
+  try {
+    run();
+    return {};
+  } catch (const MachineError&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
+// Backends that nobody else uses for as long as they are lent.
 class Pool {
  public:
-  Pool(const BackendSource& source, int count) : source_(source), idle_(static_cast<std::size_t>(count)) {}
+  explicit Pool(int count) : idle_(at(count)) {}
 
-  std::unique_ptr<Backend> take(int64_t load) {
-    std::unique_ptr<Backend> backend;
-    {
-      std::unique_lock lock(guard_);
-      returned_.wait(lock, [&] { return !idle_.empty(); });
-      backend = std::move(idle_.back());
-      idle_.pop_back();
-    }
-    if (backend && !source_.fresh) return backend;
-    try {
-      return source_.make(load);
-    } catch (...) {
-      give(nullptr);
-      throw;
-    }
+  std::unique_ptr<Backend> take() {
+    std::unique_lock lock(guard_);
+    returned_.wait(lock, [&] { return !idle_.empty(); });
+    std::unique_ptr<Backend> backend = std::move(idle_.back());
+    idle_.pop_back();
+    return backend;
   }
   void give(std::unique_ptr<Backend> backend) {
     {
@@ -59,10 +64,20 @@ class Pool {
   }
 
  private:
-  const BackendSource& source_;
   std::mutex guard_;
   std::condition_variable returned_;
-  std::vector<std::unique_ptr<Backend>> idle_;  // null: not made yet
+  std::vector<std::unique_ptr<Backend>> idle_;  // null: to be made
+};
+
+// A place in the pool, given back whatever happens; with its backend if that `works`: what threw is not used again.
+struct Loan {
+  explicit Loan(Pool& from) : pool(from), backend(from.take()) {}
+  ~Loan() { pool.give(works ? std::move(backend) : nullptr); }
+  Loan(const Loan&) = delete;
+  Loan& operator=(const Loan&) = delete;
+  Pool& pool;
+  std::unique_ptr<Backend> backend;
+  bool works = false;
 };
 
 // One load of cases.
@@ -76,7 +91,7 @@ class Runner {
  public:
   Runner(const CampaignOptions& options, const BackendSource& source,
          const std::function<void(const Campaign&)>& progress)
-      : options_(options), source_(source), progress_(progress), pool_(source, options.backends) {}
+      : options_(options), source_(source), progress_(progress), pool_(options.backends) {}
 
   Campaign run() {
     std::vector<std::thread> threads;
@@ -120,25 +135,18 @@ class Runner {
     if (load.cases.empty()) return false;
     const double generating = seconds_since(begin);
 
-    std::unique_ptr<Backend> backend = pool_.take(number);
-    const Clock::time_point running_since = Clock::now();
-    const std::string name = backend->name();
     std::vector<CaseRun> runs;
-    std::string problem;
-    try {
-      runs = run_cases(*backend, load.loaded);
-      pool_.give(std::move(backend));
-    } catch (const MachineError&) {
-      pool_.give(nullptr);
-      throw;
-    } catch (const std::bad_alloc&) {
-      pool_.give(nullptr);
-      throw;
-    } catch (const std::exception& error) {
-      problem = error.what();
-      pool_.give(nullptr);  // what threw is not used again
+    std::string name, problem;
+    double running = 0;
+    {
+      Loan loan(pool_);
+      if (!loan.backend || source_.fresh) loan.backend = source_.make(number);
+      name = loan.backend->name();
+      const Clock::time_point running_since = Clock::now();
+      problem = problem_of([&] { runs = run_cases(*loan.backend, load.loaded); });
+      running = seconds_since(running_since);
+      loan.works = problem.empty();
     }
-    const double running = seconds_since(running_since);
     const Clock::time_point judging_since = Clock::now();
     std::vector<Judgement> judgements(load.cases.size());
     for (std::size_t k = 0; k < load.cases.size(); ++k) {
@@ -164,7 +172,7 @@ class Runner {
       ++campaign_.cases;
       campaign_.verdicts += judgement.verdicts;
       campaign_.particles += load.loaded[k].setup.body.particle_count();
-      for (std::size_t h = 0; h < kCoverageClassCount; ++h) campaign_.coverage[h] += judgement.coverage[h];
+      campaign_.coverage.add(judgement.coverage);
       campaign_.compared.join(judgement.compared);
       if (!judgement.failure) continue;
       campaign_.violations.push_back({load.indices[k], load.cases[k], std::move(*judgement.failure)});
@@ -203,15 +211,9 @@ Campaign run_campaign(const CampaignOptions& options, const BackendSource& sourc
 namespace {
 
 Judgement alone(const std::string& backend, const std::function<Judgement()>& judged) {
-  try {
-    return judged();
-  } catch (const MachineError&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw;
-  } catch (const std::exception& error) {
-    return thrown(backend, error.what());
-  }
+  Judgement judgement;
+  const std::string problem = problem_of([&] { judgement = judged(); });
+  return problem.empty() ? judgement : thrown(backend, problem);
 }
 
 }  // namespace

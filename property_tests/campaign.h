@@ -42,7 +42,7 @@ struct Violation {
 
 struct Campaign {
   int64_t cases = 0, verdicts = 0, particles = 0;
-  std::array<int64_t, kCoverageClassCount> coverage = {};
+  CaseCoverage coverage;
   StepsCompared compared;
   std::vector<Violation> violations;  // by index; without keep_going the first alone
   double seconds = 0;                 // wall time

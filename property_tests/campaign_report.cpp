@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* kFormat = "cutproof.fuzz";
+constexpr const char* kResultFormat = "cutproof.fuzz";
 constexpr int kFormatVersion = 2;
 // Classes of cases are rare: below this many cases, or with small ones only, an empty class says nothing.
 constexpr int64_t kCasesThatMeetEveryClass = 1000;
@@ -27,6 +27,17 @@ constexpr int kSizeThatMeetsEveryClass = 79;
 constexpr double kMostUndecidable = 0.05;
 
 constexpr const char* kRemedy = "give the results (--json) of all shards of one campaign, each once";
+
+// `more` is added to `sum`: a number, or an object of numbers.
+void add(json& sum, const json& more) {
+  if (sum.is_object()) {
+    for (auto& [name, value] : sum.items()) add(value, more.at(name));
+  } else if (sum.is_number_integer()) {
+    sum = sum.get<int64_t>() + more.get<int64_t>();
+  } else {
+    sum = sum.get<double>() + more.get<double>();
+  }
+}
 
 // `part` is added to `whole`; `first`: the file that `whole` began with.
 void add_shard(json& whole, const json& part, const std::string& file, const std::string& first) {
@@ -38,29 +49,21 @@ void add_shard(json& whole, const json& part, const std::string& file, const std
         fmt::format("{} here, {} in {}", part.value(field, json()).dump(), whole.value(field, json()).dump(), first),
         kRemedy);
   }
-  const double particles =
-      whole.at("mean_particles").get<double>() * static_cast<double>(whole.at("cases").get<int64_t>()) +
-      part.at("mean_particles").get<double>() * static_cast<double>(part.at("cases").get<int64_t>());
-  for (const char* field : {"cases", "verdicts"}) {
-    whole[field] = whole.at(field).get<int64_t>() + part.at(field).get<int64_t>();
+  const auto cases_of = [](const json& document) { return document.at("cases").get<double>(); };
+  const auto particles_of = [&](const json& document) {
+    return document.at("mean_particles").get<double>() * cases_of(document);
+  };
+  const double particles = particles_of(whole) + particles_of(part);
+  for (const char* field : {"cases", "verdicts", "cases_per_second", "thread_seconds", "coverage"}) {
+    add(whole.at(field), part.at(field));
   }
-  const auto cases = static_cast<double>(whole.at("cases").get<int64_t>());
-  whole["mean_particles"] = cases > 0 ? particles / cases : 0.0;
+  whole["mean_particles"] = cases_of(whole) > 0 ? particles / cases_of(whole) : 0.0;
   // Shards run beside each other: together they take as long as the slowest, and do what all of them do.
   whole["seconds"] = std::max(whole.at("seconds").get<double>(), part.at("seconds").get<double>());
-  whole["cases_per_second"] = whole.at("cases_per_second").get<double>() + part.at("cases_per_second").get<double>();
-  for (auto& [name, seconds] : whole.at("thread_seconds").items()) {
-    seconds = seconds.get<double>() + part.at("thread_seconds").at(name).get<double>();
-  }
-  for (auto& [name, count] : whole.at("coverage").items()) {
-    count = count.get<int64_t>() + part.at("coverage").at(name).get<int64_t>();
-  }
   if (whole.contains("steps_compared")) {
     json& compared = whole.at("steps_compared");
     const json& more = part.at("steps_compared");
-    for (const char* field : {"steps", "particles", "undecidable"}) {
-      compared[field] = compared.at(field).get<int64_t>() + more.at(field).get<int64_t>();
-    }
+    for (const char* field : {"steps", "particles", "undecidable"}) add(compared.at(field), more.at(field));
     // A number, or of what failed the string "inf".
     const json &here = compared.at("greatest_h"), &there = more.at("greatest_h");
     if (there.is_string() || (here.is_number() && there.get<double>() > here.get<double>())) {
@@ -84,9 +87,9 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
                        const json& violations) {
   const harness::BackendDescriptor& described = harness::described_backend(backend.name);
   json coverage = json::object();
-  for (std::size_t h = 0; h < kCoverageClassCount; ++h) coverage[kCoverageClassNames[h]] = campaign.coverage[h];
+  for (std::size_t h = 0; h < kCoverageClassCount; ++h) coverage[kCoverageClassNames[h]] = campaign.coverage.begin()[h];
   json document = {
-      {"format", kFormat},
+      {"format", kResultFormat},
       {"format_version", kFormatVersion},
       {"version", CUTPROOF_VERSION},
       {"backend", backend.name},
@@ -131,7 +134,7 @@ json merge_shards(const std::vector<std::string>& files) {
   for (const std::string& file : files) {
     try {
       const json part = json::parse(io::read_text(file));
-      if (part.at("format") != kFormat || part.at("format_version") != kFormatVersion) {
+      if (part.at("format") != kResultFormat || part.at("format_version") != kFormatVersion) {
         throw InputError(file, "format", "this is not a result of `cutproof fuzz` of this version", kRemedy);
       }
       if (!shards.insert(part.at("shard").get<int64_t>()).second) {

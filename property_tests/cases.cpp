@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <set>
 #include <stdexcept>
 #include <type_traits>
@@ -10,26 +11,13 @@
 
 #include "fixtures/bodies.h"
 #include "fixtures/cook.h"
+#include "model/rules.h"
 #include "property_tests/random.h"
 
 namespace cutproof::property_tests {
 namespace {
 
 // --- Bodies -------------------------------------------------------------------------------------------------------
-
-using NodeTest = std::function<bool(Node)>;
-
-std::vector<Node> nodes_where(Node dims, const NodeTest& is_tissue) {
-  std::vector<Node> nodes;
-  for (int32_t k = 0; k < dims[2]; ++k) {
-    for (int32_t j = 0; j < dims[1]; ++j) {
-      for (int32_t i = 0; i < dims[0]; ++i) {
-        if (is_tissue({i, j, k})) nodes.push_back({i, j, k});
-      }
-    }
-  }
-  return nodes;
-}
 
 struct Ball {
   std::array<double, 3> center;
@@ -74,14 +62,14 @@ std::vector<Node> sheet(Random& random, Node dims) {
 // A random walk on the grid that seldom turns.
 std::vector<Node> wire(Random& random, Node dims) {
   std::set<Node> nodes;
-  Node at = {random.between(0, dims[0] - 1), random.between(0, dims[1] - 1), random.between(0, dims[2] - 1)};
+  Node place = {random.between(0, dims[0] - 1), random.between(0, dims[1] - 1), random.between(0, dims[2] - 1)};
   const int32_t steps = 3 * (dims[0] + dims[1] + dims[2]);
-  auto direction = static_cast<std::size_t>(random.between(0, 5));
+  auto direction = random.index(6);
   for (int32_t s = 0; s < steps; ++s) {
-    nodes.insert(at);
-    if (random.chance(0.2)) direction = static_cast<std::size_t>(random.between(0, 5));
+    nodes.insert(place);
+    if (random.chance(0.2)) direction = random.index(6);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      at[axis] = std::clamp(at[axis] + kDirections[direction][axis], 0, dims[axis] - 1);
+      place[axis] = std::clamp(place[axis] + kDirections[direction][axis], 0, dims[axis] - 1);
     }
   }
   return {nodes.begin(), nodes.end()};
@@ -137,7 +125,7 @@ Stroke draw_stroke(Random& random, Node dims) {
   };
   point(stroke.from);
   point(stroke.to);
-  if (random.chance(0.5)) stroke.to[static_cast<std::size_t>(random.between(0, 2))] = stroke.from[0];
+  if (random.chance(0.5)) stroke.to[random.index(3)] = stroke.from[0];
   if (!random.chance(0.3)) return stroke;
 
   const auto to_nodes = [](Quarters& p) {
@@ -151,11 +139,11 @@ Stroke draw_stroke(Random& random, Node dims) {
     case 1: {  // along one edge of the grid
       to_nodes(stroke.from);
       stroke.to = stroke.from;
-      stroke.to[static_cast<std::size_t>(random.between(0, 2))] += 4;
+      stroke.to[random.index(3)] += 4;
       break;
     }
     case 2: {  // in a plane of the grid, or halfway between two of them
-      const auto normal = static_cast<std::size_t>(random.between(0, 2));
+      const auto normal = random.index(3);
       stroke.from[normal] = stroke.to[normal] = 2 * (stroke.from[normal] / 2);
       stroke.back = static_cast<int32_t>(2 * ((normal + 1) % 3));
       break;
@@ -174,25 +162,24 @@ Stroke draw_stroke(Random& random, Node dims) {
 // Connected sets of at most `most` particles that cover the body: I1, I2 and nothing more.
 std::vector<std::vector<int32_t>> connected_cover(const Body& body, int32_t most, uint64_t seed) {
   Random random(seed);
-  std::vector<uint8_t> covered(static_cast<std::size_t>(body.particle_count()), 0);
-  std::vector<int32_t> order;
-  for (int32_t p = 0; p < body.particle_count(); ++p) order.push_back(p);
+  std::vector<uint8_t> covered(at(body.particle_count()), 0);
+  std::vector<int32_t> order(body.node.size());
+  std::iota(order.begin(), order.end(), 0);
   for (std::size_t k = order.size(); k > 1; --k) {
-    std::swap(order[k - 1], order[static_cast<std::size_t>(random.between(0, static_cast<int32_t>(k) - 1))]);
+    std::swap(order[k - 1], order[random.index(k)]);
   }
   std::vector<std::vector<int32_t>> clusters;
   for (const int32_t start : order) {
-    if (covered[static_cast<std::size_t>(start)]) continue;
+    if (covered[at(start)]) continue;
     std::vector<int32_t> members = {start};
-    const auto wanted = static_cast<std::size_t>(random.between(1, most));
+    const auto wanted = at(random.between(1, most));
     for (int32_t attempt = 0; attempt < 6 * most && members.size() < wanted; ++attempt) {
-      const int32_t from =
-          members[static_cast<std::size_t>(random.between(0, static_cast<int32_t>(members.size()) - 1))];
+      const int32_t from = members[random.index(members.size())];
       const int32_t next = body.neighbour(from, random.between(0, 5));
       if (next >= 0 && std::find(members.begin(), members.end(), next) == members.end()) members.push_back(next);
     }
     std::sort(members.begin(), members.end());
-    for (const int32_t p : members) covered[static_cast<std::size_t>(p)] = 1;
+    for (const int32_t p : members) covered[at(p)] = 1;
     clusters.push_back(std::move(members));
   }
   return clusters;
@@ -203,7 +190,7 @@ std::vector<std::vector<int32_t>> connected_cover(const Body& body, int32_t most
 Vec3 metric(Quarters p, double h) { return (h / 4) * Vec3{1.0 * p[0], 1.0 * p[1], 1.0 * p[2]}; }
 
 Vec3 direction_vector(int32_t direction) {
-  const auto& d = kDirections[static_cast<std::size_t>(direction)];
+  const auto& d = kDirections[at(direction)];
   return {1.0 * d[0], 1.0 * d[1], 1.0 * d[2]};
 }
 
@@ -211,11 +198,7 @@ Vec3 direction_vector(int32_t direction) {
 // length, has its edge along another axis.
 Vec3 edge_direction(const Stroke& stroke) {
   const Vec3 back = direction_vector(stroke.back);
-  Vec3 way;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto a = static_cast<std::size_t>(axis);
-    way[axis] = 1.0 * (stroke.to[a] - stroke.from[a]);
-  }
+  const Vec3 way = metric(stroke.to, 4) - metric(stroke.from, 4);  // [quarters]
   const Vec3 across = way - dot(way, back) * back;
   return norm(across) > 0 ? normalized(across) : direction_vector((stroke.back + 2) % 6);
 }
@@ -248,7 +231,7 @@ void add_moves(const Stroke& stroke, Vec3 first_node, const Case& c, Setup& setu
 // The schedule (Setup): the strokes one after the other; in what is left of the last frame the blade is lifted.
 void add_schedule(const Case& c, Vec3 first_node, Setup& setup) {
   for (const Stroke& stroke : resolved_strokes(c)) add_moves(stroke, first_node, c, setup);
-  const auto substeps = static_cast<std::size_t>(setup.step.substeps);
+  const auto substeps = at(setup.step.substeps);
   while (setup.blade_moves.size() % substeps != 0) {
     BladeMove lifted = setup.blade_moves.back();
     lifted.from = lifted.to;
@@ -266,14 +249,33 @@ void tell_apart(Clusters& clusters) {
   for (int32_t c = 0; c < clusters.count(); ++c) {
     const double angle = kGreatestAngle * (c + 1) / clusters.count();
     const double cosine = std::cos(angle), sine = std::sin(angle);
-    clusters.rotation[static_cast<std::size_t>(c)] = {{cosine, -sine, 0, sine, cosine, 0, 0, 0, 1}};
-    clusters.degenerate[static_cast<std::size_t>(c)] = c % 3 == 1;
+    clusters.rotation[at(c)] = {{cosine, -sine, 0, sine, cosine, 0, 0, 0, 1}};
+    clusters.degenerate[at(c)] = c % 3 == 1;
   }
 }
 
 constexpr int kSizeOfSparseBalls = 80;
 
 }  // namespace
+
+std::vector<Node> nodes_where(Node dims, const std::function<bool(Node)>& is_tissue) {
+  std::vector<Node> nodes;
+  for (int32_t k = 0; k < dims[2]; ++k) {
+    for (int32_t j = 0; j < dims[1]; ++j) {
+      for (int32_t i = 0; i < dims[0]; ++i) {
+        if (is_tissue({i, j, k})) nodes.push_back({i, j, k});
+      }
+    }
+  }
+  std::sort(nodes.begin(), nodes.end());
+  return nodes;
+}
+
+void without_blade(Setup& setup) {
+  setup.has_blade = false;
+  setup.blade_moves.clear();
+  setup.stroke_end.clear();
+}
 
 Case draw_case(uint64_t seed, int size) {
   Random random(seed);
@@ -530,15 +532,18 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Stroke, from, to, back, down, link)
 
 }  // namespace cutproof::property_tests
 
+// By their names in model/rules.h; what has none is read as the first of them.
 namespace cutproof {
-NLOHMANN_JSON_SERIALIZE_ENUM(MergeRule, {{MergeRule::none, "none"},
-                                         {MergeRule::deterministic, "deterministic"},
-                                         {MergeRule::published, "published"},
-                                         {MergeRule::single_pass, "single_pass"}})
-NLOHMANN_JSON_SERIALIZE_ENUM(ExpandRule, {{ExpandRule::none, "none"},
-                                          {ExpandRule::edge_cover, "edge_cover"},
-                                          {ExpandRule::published, "published"}})
-NLOHMANN_JSON_SERIALIZE_ENUM(Acceleration, {{Acceleration::none, "none"}, {Acceleration::chebyshev, "chebyshev"}})
+template <NamedChoice E>
+void to_json(nlohmann::json& json, E choice) {
+  json = name_of(choice);
+}
+template <NamedChoice E>
+void from_json(const nlohmann::json& json, E& choice) {
+  const auto names = names_of(choice);
+  const auto found = std::find(names.begin(), names.end(), json.get<std::string>());
+  choice = static_cast<E>(found == names.end() ? 0 : found - names.begin());
+}
 }  // namespace cutproof
 
 namespace cutproof::property_tests {

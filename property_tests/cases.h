@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "model/at.h"
 #include "model/setup.h"
 #include "model/state.h"
 
@@ -70,6 +71,9 @@ Case draw_moving_case(uint64_t seed, int size);
 // A stroke of the kind that those cases have, for the body of `c`.
 Stroke draw_stroke(uint64_t seed, const Case& c);
 
+// Those of a box that are tissue, ascending; asked in the order in which a grid counts them.
+std::vector<Node> nodes_where(Node dims, const std::function<bool(Node)>& is_tissue);
+
 // Strokes with links resolved, and what a backend loads. If nothing moves: geometric cuts, one stroke a substep, no
 // iteration.
 std::vector<Stroke> resolved_strokes(const Case& c);
@@ -80,6 +84,8 @@ struct Instance {
 Instance instance_of(const Case& c);
 // Its setup alone. A stroke that is appended leaves the frames of those before it as they are.
 Setup setup_of(const Case& c);
+
+void without_blade(Setup& setup);
 
 // Edits that each make this case simpler (or leave it as it is), the most drastic first: fewer strokes, fewer
 // particles, plainer parameters. Repeated as long as one of them keeps a failure, they end: each moves some part

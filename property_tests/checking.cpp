@@ -5,8 +5,7 @@
 #include <iostream>
 #include <sstream>
 
-#include "gpu/backends.h"
-#include "reference_cpu/reference.h"
+#include "harness/backends.h"
 
 namespace cutproof::property_tests {
 
@@ -38,28 +37,29 @@ void set_up_rapidcheck() {
 void PrintTo(const NamedBackend& backend, std::ostream* os) { *os << backend.name; }
 
 std::vector<NamedBackend> all_backends() {
-  const auto with = [](gpu::SplitMethod split) {
-    gpu::KernelOptions options;
-    options.split = split;
-    return options;
+  std::vector<NamedBackend> tested;
+  const auto add = [&](const harness::BackendDescriptor& backend, const char* variant, const char* split,
+                       const char* schedule, int64_t fraction, int most_size) {
+    harness::BackendChoice choice;
+    choice.name = backend.name;
+    choice.split = split;
+    choice.schedule = schedule;
+    choice.seed = wanted_seed();
+    choice.threads = 2;
+    tested.push_back({choice.name + variant, [choice] { return harness::make_backend(choice); }, fraction, most_size});
   };
-  std::vector<NamedBackend> backends = {
-      {"reference", reference::make_backend},
-      {"host", [=] { return gpu::make_host_backend(2, with(gpu::SplitMethod::blocks)); }},
-      {"host_global_labels", [=] { return gpu::make_host_backend(1, with(gpu::SplitMethod::global_labels)); }, 4},
-      {"simulated_random", [] { return gpu::make_simulated_backend({gpu::random_walk(wanted_seed())}); }, 2, 35},
-      {"simulated_pct", [] { return gpu::make_simulated_backend({gpu::pct(wanted_seed(), 3, 1'000'000)}); }, 2, 35},
-      {"simulated_reverse",
-       [=] { return gpu::make_simulated_backend({gpu::reverse()}, with(gpu::SplitMethod::global_labels)); }, 2, 35}};
-#if CUTPROOF_HAS_CUDA
-  std::string why;
-  if (!gpu::device_description(why).empty()) {
-    backends.push_back({"gpu", [=] { return gpu::make_gpu_backend(with(gpu::SplitMethod::blocks)); }});
-    backends.push_back(
-        {"gpu_global_labels", [=] { return gpu::make_gpu_backend(with(gpu::SplitMethod::global_labels)); }, 4});
+  for (const harness::BackendDescriptor& backend : harness::backends()) {
+    if (!backend.is_built() || (backend.needs_device() && harness::processor_of(backend).empty())) continue;
+    if (backend.takes_schedule) {
+      add(backend, "_random", "", "random", 2, 35);
+      add(backend, "_pct", "", "pct", 2, 35);
+      add(backend, "_reverse", "global", "reverse", 2, 35);
+    } else if (backend.is_timed) {
+      add(backend, "", "", "", 1, 100);
+      if (backend.takes_kernel_options) add(backend, "_global_labels", "global", "", 4, 100);
+    }
   }
-#endif
-  return backends;
+  return tested;
 }
 
 std::string EveryBackend::id() const {

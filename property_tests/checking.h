@@ -10,14 +10,15 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <iostream>
 #include <memory>
 #include <optional>
-#include <ostream>
 #include <string>
 #include <vector>
 
 #include "model/backend.h"
 #include "property_tests/cases.h"
+#include "property_tests/coverage.h"
 
 namespace cutproof::property_tests {
 
@@ -38,15 +39,29 @@ struct NamedBackend {
 };
 void PrintTo(const NamedBackend& backend, std::ostream* os);
 
-// Every backend that this build has: each property runs over each of them, under its name.
+// Every backend that this build has and that is there, the kernels with both methods of splitting, and under several
+// schedules where they can be chosen: each property runs over each of them, under its name. Backends that only find
+// faults run the kernels of another one in another way, and are left out unless their schedule is chosen.
 std::vector<NamedBackend> all_backends();
 
 class EveryBackend : public ::testing::TestWithParam<NamedBackend> {
  protected:
+  const std::unique_ptr<Backend> backend_ = GetParam().make();
   std::string id() const;
   int64_t cases_of(int64_t fraction) const;
   // Whether all cases ran as planned and every class of cases must have occurred.
   bool ran_in_full() const;
+  // Prints how many `things` were in each class; if all ran in full each class must have occurred.
+  template <const auto& names>
+  void report(const Coverage<names>& seen, const char* things) const {
+    for (std::size_t k = 0; k < names.size(); ++k) {
+      std::cout << (k == 0 ? " " : ", ") << names[k] << " " << seen.begin()[k];
+      if (ran_in_full()) {
+        EXPECT_GT(seen.begin()[k], 0) << "no " << things << " with '" << names[k] << "': nothing was tested there";
+      }
+    }
+    std::cout << std::endl;
+  }
 };
 
 // Shrinking has no bound of its own: after the first failure it may take a minute.

@@ -1,7 +1,8 @@
 #include "property_tests/dissection.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <sstream>
 #include <utility>
 
 #include "harness/backends.h"
@@ -15,55 +16,53 @@ namespace {
 
 int64_t alive_count(const State& state) { return std::count(state.alive.begin(), state.alive.end(), 1); }
 
-void note_what_is_given(const Case& c, const Instance& loaded, Judgement& judgement) {
+void note_what_is_given(const Case& c, const Instance& loaded, CaseCoverage& seen) {
   const auto n = loaded.setup.body.particle_count();
-  judgement[CoverageClass::no_particles] = n == 0;
-  judgement[CoverageClass::one_particle] = n == 1;
-  judgement[CoverageClass::boxes] = c.clusters == ClusterKind::boxes;
-  judgement[CoverageClass::sampled] = c.clusters == ClusterKind::sampled;
-  judgement[CoverageClass::foreign] = c.clusters == ClusterKind::foreign;
-  judgement[CoverageClass::thin_blade] = c.blade_thickness == 0 && !c.strokes.empty();
+  seen["no particles"] = n == 0;
+  seen["one particle"] = n == 1;
+  seen["boxes"] = c.clusters == ClusterKind::boxes;
+  seen["sampled clusters"] = c.clusters == ClusterKind::sampled;
+  seen["foreign clusters"] = c.clusters == ClusterKind::foreign;
+  seen["blade of thickness 0"] = c.blade_thickness == 0 && !c.strokes.empty();
   for (const Stroke& stroke : resolved_strokes(c)) {
-    if (!stroke.down) judgement[CoverageClass::pen_up] = true;
-    if (stroke.link == Link::retraced) judgement[CoverageClass::retraced_stroke] = true;
-    if (stroke.down && stroke.from == stroke.to) judgement[CoverageClass::zero_length_stroke] = true;
+    if (!stroke.down) seen["pen up"] = true;
+    if (stroke.link == Link::retraced) seen["retraced stroke"] = true;
+    if (stroke.down && stroke.from == stroke.to) seen["zero length stroke"] = true;
   }
 }
 
 void note_what_a_stage_did(const Setup& setup, Stage stage, const State& before, const State& after,
-                           Judgement& judgement) {
+                           CaseCoverage& seen) {
   const auto clusters_before = before.clusters.count(), clusters_after = after.clusters.count();
   switch (stage) {
     case Stage::detect: {
-      const auto is_down = [&](int64_t substep) { return setup.blade_moves[static_cast<std::size_t>(substep)].down; };
       bool down = false;  // detection may also run without a blade
       for (int32_t s = 0; setup.has_blade && s < setup.step.substeps; ++s) {
-        down = down || is_down(before.frame * setup.step.substeps + s);
+        down = down || setup.blade_moves[at(before.frame * setup.step.substeps + s)].down;
       }
-      if (!after.removed.empty()) judgement[CoverageClass::removal] = true;
-      if (after.removed.empty() && down && alive_count(before) > 0) judgement[CoverageClass::miss] = true;
+      if (!after.removed.empty()) seen["removal"] = true;
+      if (after.removed.empty() && down && alive_count(before) > 0) seen["miss"] = true;
       break;
     }
     case Stage::split:
-      if (clusters_after > clusters_before) judgement[CoverageClass::split] = true;
-      if (!after.debris.empty()) judgement[CoverageClass::debris] = true;
+      if (clusters_after > clusters_before) seen["split"] = true;
+      if (!after.debris.empty()) seen["debris"] = true;
       for (const int32_t number : before.clusters.number) {
         const auto& numbers = after.clusters.number;
-        if (!std::binary_search(numbers.begin(), numbers.end(), number))
-          judgement[CoverageClass::vanished_cluster] = true;
+        if (!std::binary_search(numbers.begin(), numbers.end(), number)) seen["vanished cluster"] = true;
       }
-      if (alive_count(after) == 0) judgement[CoverageClass::consumed] = true;
+      if (alive_count(after) == 0) seen["consumed body"] = true;
       break;
     case Stage::merge:
       if (clusters_after < clusters_before) {
-        judgement[CoverageClass::merge] = true;
-        if (setup.merge.rule == MergeRule::published) judgement[CoverageClass::published_merge] = true;
+        seen["merge"] = true;
+        if (setup.merge.rule == MergeRule::published) seen["published merge"] = true;
       }
       break;
     case Stage::expand:
       if (after.clusters.members.size() > before.clusters.members.size()) {
-        judgement[CoverageClass::expansion] = true;
-        if (setup.expand.rule == ExpandRule::published) judgement[CoverageClass::published_expansion] = true;
+        seen["expansion"] = true;
+        if (setup.expand.rule == ExpandRule::published) seen["published expansion"] = true;
       }
       break;
     case Stage::step:
@@ -107,7 +106,7 @@ std::vector<CaseRun> run_cases(Backend& backend, const std::vector<Instance>& lo
     }
   }
   for (Verdict& broken : traces.broken_contracts) {
-    std::optional<Verdict>& failure = runs[static_cast<std::size_t>(broken.body)].failure;
+    std::optional<Verdict>& failure = runs[at(broken.body)].failure;
     if (!failure) failure = std::move(broken);
   }
   return runs;
@@ -116,8 +115,9 @@ std::vector<CaseRun> run_cases(Backend& backend, const std::vector<Instance>& lo
 Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, const std::string& backend,
                      bool thorough) {
   Judgement judgement;
+  CaseCoverage& seen = judgement.coverage;
   const Setup& setup = loaded.setup;
-  note_what_is_given(c, loaded, judgement);
+  note_what_is_given(c, loaded, seen);
   judgement.failure = run.failure;
 
   const harness::BackendDescriptor* const described = harness::find_backend(backend);  // a test's has no description
@@ -135,8 +135,13 @@ Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, 
   };
   take(judge.take_verdicts());
   int32_t components = judge.component_count();
-  judgement[CoverageClass::several_components] = components > 1;
+  seen["several components"] = components > 1;
   oracles::StageComparison comparison(setup, harness::reference_stages());
+  const auto compare = [&](Stage stage, const State& before, const State& after) {
+    const oracles::StageDifference found = comparison.compare(stage, before, after, true);
+    if (stage == Stage::step) judgement.compared.add(found);
+    take(found.verdicts("the reference's "));
+  };
   harness::Snapshot compared_skin;  // equal to the reference's
   for (const harness::Moment& moment : run.trace.moments) {
     if (judgement.failure) break;
@@ -144,30 +149,26 @@ Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, 
     judge.see(moment);
     take(judge.take_verdicts());
     for (const harness::Judge::Unpromised& u : judge.unpromised()) {
-      if (u.property == "isolation" && u.failing > 0) judgement[CoverageClass::uncoupled] = true;
+      if (u.property == "isolation" && u.failing > 0) seen["uncoupled without promise"] = true;
     }
     // What others ran for the backend is not judged, but it happened in the case all the same.
     if (!moment.by_backend && moment.span.contains(Stage::skin) && !oracles::isolation(setup, after).holds) {
-      judgement[CoverageClass::uncoupled] = true;
+      seen["uncoupled without promise"] = true;
     }
     if (judgement.failure) break;
     const auto due = harness::due_stages(setup, before, moment.span, after);
+    const auto due_count = std::count(due.begin(), due.end(), true);
     for (const Stage stage : kStages) {
-      if (due[static_cast<std::size_t>(stage)]) note_what_a_stage_did(setup, stage, before, after, judgement);
+      if (due[at(stage)]) note_what_a_stage_did(setup, stage, before, after, seen);
     }
     const int32_t components_before = std::exchange(components, judge.component_count());
-    if (moment.span.contains(Stage::detect) && components > components_before)
-      judgement[CoverageClass::separation] = true;
+    if (moment.span.contains(Stage::detect) && components > components_before) seen["separation"] = true;
     // A step that came together with other stages can still be compared: later ones move nothing, and where no cluster
     // has changed, they turn nothing either.
-    if (c.moves && moment.by_backend && due[0] && std::count(due.begin(), due.end(), true) > 1 &&
-        before.clusters.members == after.clusters.members) {
-      const oracles::StageDifference found =
-          comparison.compare(Stage::step, before, harness::after_step(before, after), true);
-      judgement.compared.add(found);
-      take(found.verdicts("the reference's "));
+    if (c.moves && moment.by_backend && due[0] && due_count > 1 && before.clusters.members == after.clusters.members) {
+      compare(Stage::step, before, harness::after_step(before, after));
     }
-    if (is_the_reference || !moment.by_backend || std::count(due.begin(), due.end(), true) != 1) continue;
+    if (is_the_reference || !moment.by_backend || due_count != 1) continue;
     const auto stage = static_cast<Stage>(std::find(due.begin(), due.end(), true) - due.begin());
     if (stage == Stage::step && !c.moves) continue;
     // Nothing is compared with the middle of a span that goes on to the end of the frame.
@@ -179,11 +180,9 @@ Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, 
                        compared_skin->skin.triangles == after.skin.triangles;
     if (stage == Stage::skin) compared_skin = moment.after;
     if (known) continue;
-    const oracles::StageDifference found = comparison.compare(stage, before, after, true);
-    if (stage == Stage::step) judgement.compared.add(found);
-    take(found.verdicts("the reference's "));
+    compare(stage, before, after);
   }
-  judgement[CoverageClass::cavity] = judge.inner_shells() > 0;
+  seen["cavity"] = judge.inner_shells() > 0;
   return judgement;
 }
 
@@ -194,11 +193,9 @@ Judgement dissect(Backend& backend, const Case& c, bool thorough) {
 }
 
 std::string describe(const Verdict& verdict) {
-  std::ostringstream text;
-  text << "'" << verdict.property << "' fails after " << name_of(verdict.stage) << " in frame " << verdict.frame
-       << " on backend '" << verdict.backend << "': measured " << verdict.measured << " " << verdict.unit << ", bound "
-       << verdict.bound << " (" << verdict.bound_source << "). " << verdict.witness.text;
-  return text.str();
+  return fmt::format("'{}' fails after {} in frame {} on backend '{}': measured {:g} {}, bound {:g} ({}). {}",
+                     verdict.property, name_of(verdict.stage), verdict.frame, verdict.backend, verdict.measured,
+                     verdict.unit, verdict.bound, verdict.bound_source, verdict.witness.text);
 }
 
 }  // namespace cutproof::property_tests

@@ -13,61 +13,38 @@
 #include "model/verdict.h"
 #include "oracles/comparison/stage_comparison.h"
 #include "property_tests/cases.h"
+#include "property_tests/coverage.h"
 
 namespace cutproof::property_tests {
 
-// What happened in a case. A class of cases that never occurs means that nothing was tested there, so every class
-// must (architecture.md, Properties: rapidcheck has no coverage assertions).
-enum class CoverageClass {
-  no_particles,  // the body is empty
-  one_particle,
-  several_components,  // already before the first cut
-  boxes,
-  sampled,
-  foreign,
-  removal,  // a cut took particles out
-  miss,     // a frame with the blade down removed nothing
-  pen_up,
-  retraced_stroke,
-  zero_length_stroke,
-  thin_blade,  // thickness 0
-  split,       // a split made more clusters
-  vanished_cluster,
-  debris,
-  separation,  // G has more components than before a cut
-  merge,
-  expansion,
-  published_merge,
-  published_expansion,
-  uncoupled,  // connected tissue is uncoupled where no rule promises otherwise
-  cavity,     // the skin has an inner shell
-  consumed,   // a body is cut away entirely
-  count
+// What happened in a case.
+inline constexpr std::array<const char*, 23> kCoverageClassNames = {
+    "no particles",
+    "one particle",
+    "several components",  // already before the first cut
+    "boxes",
+    "sampled clusters",
+    "foreign clusters",
+    "removal",  // a cut took particles out
+    "miss",     // a frame with the blade down removed nothing
+    "pen up",
+    "retraced stroke",
+    "zero length stroke",
+    "blade of thickness 0",
+    "split",  // a split made more clusters
+    "vanished cluster",
+    "debris",
+    "separation",  // G has more components than before a cut
+    "merge",
+    "expansion",
+    "published merge",
+    "published expansion",
+    "uncoupled without promise",  // connected tissue is, where no rule promises otherwise
+    "cavity",                     // the skin has an inner shell
+    "consumed body",              // it is cut away entirely
 };
-inline constexpr std::size_t kCoverageClassCount = static_cast<std::size_t>(CoverageClass::count);
-inline constexpr std::array<const char*, kCoverageClassCount> kCoverageClassNames = {"no particles",
-                                                                                     "one particle",
-                                                                                     "several components",
-                                                                                     "boxes",
-                                                                                     "sampled clusters",
-                                                                                     "foreign clusters",
-                                                                                     "removal",
-                                                                                     "miss",
-                                                                                     "pen up",
-                                                                                     "retraced stroke",
-                                                                                     "zero length stroke",
-                                                                                     "blade of thickness 0",
-                                                                                     "split",
-                                                                                     "vanished cluster",
-                                                                                     "debris",
-                                                                                     "separation",
-                                                                                     "merge",
-                                                                                     "expansion",
-                                                                                     "published merge",
-                                                                                     "published expansion",
-                                                                                     "uncoupled without promise",
-                                                                                     "cavity",
-                                                                                     "consumed body"};
+inline constexpr std::size_t kCoverageClassCount = kCoverageClassNames.size();
+using CaseCoverage = Coverage<kCoverageClassNames>;
 
 // Steps of moving bodies beside the reference's.
 struct StepsCompared {
@@ -79,12 +56,10 @@ struct StepsCompared {
 };
 
 struct Judgement {
-  std::array<bool, kCoverageClassCount> coverage = {};
+  CaseCoverage coverage;  // 1 for what happened
   StepsCompared compared;
   int64_t verdicts = 0;            // how many were asked for
   std::optional<Verdict> failure;  // the first that does not hold
-
-  bool& operator[](CoverageClass what) { return coverage[static_cast<std::size_t>(what)]; }
 };
 
 // What a backend made of one case: the run, and what of the contract it broke on the way.

@@ -25,13 +25,7 @@ namespace {
 using Nodes = std::vector<Node>;
 
 Nodes block(int32_t nx, int32_t ny, int32_t nz) {
-  Nodes nodes;
-  for (int32_t i = 0; i < nx; ++i) {
-    for (int32_t j = 0; j < ny; ++j) {
-      for (int32_t k = 0; k < nz; ++k) nodes.push_back({i, j, k});
-    }
-  }
-  return nodes;
+  return nodes_where({nx, ny, nz}, [](Node) { return true; });
 }
 
 // A blade of thickness 0 and without ends, so that a cut takes exactly the nodes within h/2 of its plane. h = 1 m: the
@@ -43,12 +37,27 @@ Case with_thin_blade(Nodes nodes) {
   return c;
 }
 
+// The same of a body that moves.
+Case moving(Nodes nodes, int32_t substeps, int32_t iterations, int32_t stiffness) {
+  Case c = with_thin_blade(std::move(nodes));
+  c.moves = true;
+  c.substeps = substeps;
+  c.iterations = iterations;
+  c.stiffness = stiffness;
+  return c;
+}
+
 // Through everything along the plane x = quarters / 4, or z.
 constexpr int32_t kFar = 200;
 Stroke through_x(int32_t quarters) { return {{quarters, -kFar, -8}, {quarters, kFar, -8}, 4, true, Link::apart}; }
 Stroke through_z(int32_t quarters) { return {{-kFar, -8, quarters}, {kFar, -8, quarters}, 2, true, Link::apart}; }
 
 int64_t alive_in(const State& state) { return std::count(state.alive.begin(), state.alive.end(), 1); }
+
+void relax(StepParameters& step, double relaxation) {
+  step.solver = Solver::published;
+  step.relaxation = relaxation;
+}
 
 double determinant(const Mat3& r) {
   return dot({r(0, 0), r(0, 1), r(0, 2)}, cross({r(1, 0), r(1, 1), r(1, 2)}, {r(2, 0), r(2, 1), r(2, 2)}));
@@ -61,8 +70,8 @@ double greatest_strain(const Setup& setup, const State& state) {
   for (int32_t p = 0; p < body.particle_count(); ++p) {
     for (int direction = 0; direction < 6; direction += 2) {
       const int32_t q = body.neighbour(p, direction);
-      if (q < 0 || !state.alive[static_cast<std::size_t>(p)] || !state.alive[static_cast<std::size_t>(q)]) continue;
-      const double length = norm(state.x[static_cast<std::size_t>(p)] - state.x[static_cast<std::size_t>(q)]);
+      if (q < 0 || !state.alive[at(p)] || !state.alive[at(q)]) continue;
+      const double length = norm(state.x[at(p)] - state.x[at(q)]);
       most = std::max(most, std::abs(length / body.grid.spacing - 1));
     }
   }
@@ -75,13 +84,17 @@ struct Outcome {
   CaseRun run;
   int64_t verdicts = 0;
   const State& last() const { return run.trace.moments.empty() ? *run.trace.initial : *run.trace.moments.back().after; }
+  // After each run of `stage`.
+  std::vector<const State*> after_every(Stage stage) const {
+    std::vector<const State*> states;
+    for (const harness::Moment& moment : run.trace.moments) {
+      if (moment.span.last == stage) states.push_back(moment.after.get());
+    }
+    return states;
+  }
   int64_t removed() const {
     int64_t count = 0;
-    for (const harness::Moment& moment : run.trace.moments) {
-      const Stage stage = moment.span.last;
-      const State& state = *moment.after;
-      if (stage == Stage::detect) count += static_cast<int64_t>(state.removed.size());
-    }
+    for (const State* state : after_every(Stage::detect)) count += static_cast<int64_t>(state->removed.size());
     return count;
   }
   int32_t components() const { return oracles::graph_components(setup, last()).count; }
@@ -109,10 +122,8 @@ class HardCases : public ::testing::TestWithParam<NamedBackend> {
   // A body that nothing cuts, for so many frames.
   Instance undisturbed(const Case& c, int64_t frames, double dt) const {
     Instance loaded = instance_of(c);
-    loaded.setup.has_blade = false;
-    loaded.setup.blade_moves.clear();
-    loaded.setup.stroke_end.clear();
-    loaded.setup.substep_length.assign(static_cast<std::size_t>(frames), dt);
+    without_blade(loaded.setup);
+    loaded.setup.substep_length.assign(at(frames), dt);
     loaded.state = in_arithmetic_of(*backend_, std::move(loaded.state));
     return loaded;
   }
@@ -253,16 +264,11 @@ TEST_P(HardCases, ARetracedCutTakesNothingMore) {
     back.link = Link::retraced;
     c.strokes = {slanted ? Stroke{{-8, -3, 13}, {33, 30, 5}, 4, true, Link::apart} : through_x(10), back, back};
     const Outcome cut = run(c);
-    std::vector<int64_t> removed;
-    for (const harness::Moment& moment : cut.run.trace.moments) {
-      const Stage stage = moment.span.last;
-      const State& state = *moment.after;
-      if (stage == Stage::detect) removed.push_back(static_cast<int64_t>(state.removed.size()));
-    }
-    ASSERT_EQ(removed.size(), 3U);
-    EXPECT_GT(removed[0], 0);
-    EXPECT_EQ(removed[1], 0);
-    EXPECT_EQ(removed[2], 0);
+    const auto detected = cut.after_every(Stage::detect);
+    ASSERT_EQ(detected.size(), 3U);
+    EXPECT_FALSE(detected[0]->removed.empty());
+    EXPECT_TRUE(detected[1]->removed.empty());
+    EXPECT_TRUE(detected[2]->removed.empty());
   }
 }
 
@@ -282,9 +288,7 @@ TEST_P(HardCases, ABladeThinnerThanASpacingSeparatesInEveryPlane) {
 
 TEST_P(HardCases, ABladeThickerThanTheBodyPushesOrCutsAndKeepsEveryInvariant) {
   for (const int32_t thickness : {20, 100}) {
-    Case c = with_thin_blade(block(4, 4, 4));
-    c.moves = true;
-    c.substeps = 2;
+    Case c = moving(block(4, 4, 4), 2, 2, 5);
     c.blade_thickness = thickness;
     c.ground = true;
     // From above into the body and beyond.
@@ -350,11 +354,7 @@ TEST_P(HardCases, InvertedAndFlattenedBodiesComeBackToTheirShape) {
                      {"nearly flattened", {1, 1, 1e-9}}, {"a line", {1, 0, 0}},      {"a point", {0, 0, 0}}};
   for (const auto& [name, factor] : cases) {
     SCOPED_TRACE(name);
-    Case c = with_thin_blade(block(4, 4, 4));  // one cluster: several may hold each other in a twisted minimum
-    c.substeps = 2;
-    c.iterations = 2;
-    c.moves = true;
-    c.stiffness = 6;
+    const Case c = moving(block(4, 4, 4), 2, 2, 6);  // one cluster: several may hold each other in a twisted minimum
     Instance loaded = undisturbed(c, 40, 0.004);
     ASSERT_EQ(loaded.state.clusters.count(), 1);
     loaded.setup.step.damping = 20;
@@ -365,7 +365,7 @@ TEST_P(HardCases, InvertedAndFlattenedBodiesComeBackToTheirShape) {
     const Outcome outcome = run(c, loaded, false);
     for (const harness::Moment& moment : outcome.run.trace.moments) {
       const State& state = *moment.after;
-      for (const Vec3& x : state.x) ASSERT_TRUE(std::isfinite(x.x) && std::isfinite(x.y) && std::isfinite(x.z));
+      ASSERT_TRUE(std::all_of(state.x.begin(), state.x.end(), is_finite));
     }
     EXPECT_LT(greatest_strain(outcome.setup, outcome.last()), 1e-2);
     EXPECT_NEAR(determinant(outcome.last().clusters.rotation.front()), 1, 1e-5) << "a rotation, never a reflection";
@@ -373,12 +373,8 @@ TEST_P(HardCases, InvertedAndFlattenedBodiesComeBackToTheirShape) {
 }
 
 TEST_P(HardCases, SeveralInvertedClustersStayFiniteAndTheirRotationsRotations) {
-  Case c = with_thin_blade(block(6, 4, 4));
+  Case c = moving(block(6, 4, 4), 2, 2, 6);
   c.side = 3;
-  c.moves = true;
-  c.substeps = 2;
-  c.iterations = 2;
-  c.stiffness = 6;
   for (const double factor : {-1.0, 0.0, 1e-9}) {
     Instance loaded = undisturbed(c, 20, 0.004);
     ASSERT_GT(loaded.state.clusters.count(), 1);
@@ -389,26 +385,18 @@ TEST_P(HardCases, SeveralInvertedClustersStayFiniteAndTheirRotationsRotations) {
 
 // Without stiffness a particle is free; beyond any stiffness a cluster is rigid; in between nothing else happens.
 TEST_P(HardCases, StiffnessFromNoneToAllGoesFromFreeParticlesToARigidBody) {
-  Case c = with_thin_blade(block(4, 4, 4));
-  c.moves = true;
-  c.substeps = 1;
-  c.iterations = 1;
+  const Case c = moving(block(4, 4, 4), 1, 1, 5);
   const auto strain_after = [&](auto change) {
     Instance loaded = undisturbed(c, 1, 0.004);
     EXPECT_EQ(loaded.state.clusters.count(), 1);
-    loaded.state.clusters.rotation.front() = Mat3{{1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    loaded.state.clusters.rotation.front() = Mat3{};
     for (Vec3& x : loaded.state.x) x.x *= 1.25;
     change(loaded.setup.step);
     const Outcome outcome = run(c, loaded, false);
     return greatest_strain(outcome.setup, outcome.last());
   };
   const auto implicit = [&](double k) { return strain_after([k](StepParameters& step) { step.stiffness = k; }); };
-  const auto published = [&](double s) {
-    return strain_after([s](StepParameters& step) {
-      step.solver = Solver::published;
-      step.relaxation = s;
-    });
-  };
+  const auto published = [&](double s) { return strain_after([s](StepParameters& step) { relax(step, s); }); };
   constexpr double kClose = 1e-5;
   EXPECT_NEAR(implicit(0), 0.25, kClose);
   EXPECT_NEAR(implicit(1e-9), 0.25, kClose);
@@ -422,12 +410,8 @@ TEST_P(HardCases, StiffnessFromNoneToAllGoesFromFreeParticlesToARigidBody) {
 TEST_P(HardCases, StepsFromAMicrosecondToATenthOfASecondFallFreelyAndGainNoEnergy) {
   for (const double dt : {1e-6, 1e-4, 1e-2, 0.1}) {
     SCOPED_TRACE(testing::Message() << "dt = " << dt);
-    Case c = with_thin_blade(block(6, 3, 3));
+    Case c = moving(block(6, 3, 3), 4, 3, 5);
     c.side = 3;
-    c.moves = true;
-    c.substeps = 4;
-    c.iterations = 3;
-    c.stiffness = 5;
     Instance loaded = undisturbed(c, 2, dt);
     loaded.setup.step.gravity = {0, 0, -9.81};
     // Rest rotations, or the clusters' own would strain it.
@@ -479,15 +463,12 @@ TEST_P(HardCases, AThousandStrokesOnOneBodyKeepEveryInvariant) {
   const Outcome cut = run(c, instance_of(c), false);
   EXPECT_EQ(cut.last().frame, strokes / 4);
   int64_t frames_with_removals = 0, before = static_cast<int64_t>(c.nodes.size());
-  for (const harness::Moment& moment : cut.run.trace.moments) {
-    const Stage stage = moment.span.last;
-    const State& state = *moment.after;
-    if (stage != Stage::skin) continue;
-    frames_with_removals += alive_in(state) < before;
-    EXPECT_LE(alive_in(state), before) << "what is dead stays dead";
-    before = alive_in(state);
-    for (int32_t k = 0; k < state.clusters.count(); ++k) {
-      ASSERT_EQ(state.clusters.number[static_cast<std::size_t>(k)], k) << "numbers are compact after a frame";
+  for (const State* state : cut.after_every(Stage::skin)) {
+    frames_with_removals += alive_in(*state) < before;
+    EXPECT_LE(alive_in(*state), before) << "what is dead stays dead";
+    before = alive_in(*state);
+    for (int32_t k = 0; k < state->clusters.count(); ++k) {
+      ASSERT_EQ(state->clusters.number[at(k)], k) << "numbers are compact after a frame";
     }
   }
   EXPECT_GT(frames_with_removals, strokes / 16);
@@ -497,11 +478,9 @@ TEST_P(HardCases, AThousandStrokesOnOneBodyKeepEveryInvariant) {
 }
 
 TEST_P(HardCases, ABodyAMillionSpacingsFromTheWorldsOriginGivesTheSameBits) {
-  Case c = with_thin_blade(block(6, 4, 4));
+  Case c = moving(block(6, 4, 4), 2, 2, 5);
   c.spacing = 0.003;
-  c.moves = true;
   c.ground = true;
-  c.stiffness = 5;
   c.strokes = {{{10, 6, 24}, {10, 6, -4}, 4, true, Link::apart}};
   Instance near = instance_of(c);
   Instance far = near;
@@ -518,79 +497,64 @@ TEST_P(HardCases, ABodyAMillionSpacingsFromTheWorldsOriginGivesTheSameBits) {
 // What scenes beyond the bounds are answered with: tests/model/scene_io_test.cpp, for every field. Here: at the bounds,
 // or at the least and the most that can still be computed in a test, every backend keeps every invariant.
 struct Extreme {
+  Extreme(const char* what, void (*of_case)(Case&)) : name(what), edit_case(of_case) {}
+  Extreme(const char* what, void (*of_loaded)(Instance&)) : name(what), edit_loaded(of_loaded) {}
   const char* name;
-  void (*edit_case)(Case&);
-  void (*edit)(Instance&);
+  void (*edit_case)(Case&) = [](Case&) {};
+  void (*edit_loaded)(Instance&) = [](Instance&) {};
 };
 
 TEST_P(HardCases, ParametersAtTheirBoundsKeepEveryInvariant) {
-  const auto keep_case = [](Case&) {};
-  const auto keep = [](Instance&) {};
   const Extreme extremes[] = {
-      {"one substep", [](Case& c) { c.substeps = 1; }, keep},
-      {"forty substeps", [](Case& c) { c.substeps = 40; }, keep},
-      {"no iteration", [](Case& c) { c.iterations = 0; }, keep},
-      {"a hundred iterations", [](Case& c) { c.iterations = 100; }, keep},
-      {"stiffness 0", keep_case, [](Instance& l) { l.setup.step.stiffness = 0; }},
-      {"stiffness 1e15", keep_case, [](Instance& l) { l.setup.step.stiffness = 1e15; }},
-      {"damping 0", keep_case, [](Instance& l) { l.setup.step.damping = 0; }},
-      {"damping 1e9", keep_case, [](Instance& l) { l.setup.step.damping = 1e9; }},
-      {"relaxation 1", keep_case,
-       [](Instance& l) {
-         l.setup.step.solver = Solver::published;
-         l.setup.step.relaxation = 1;
-       }},
-      {"relaxation 1e-12", keep_case,
-       [](Instance& l) {
-         l.setup.step.solver = Solver::published;
-         l.setup.step.relaxation = 1e-12;
-       }},
-      {"gravity 1e6", keep_case,
-       [](Instance& l) {
-         l.setup.step.gravity = {0, 0, -1e6};
-       }},
-      {"debris of everything", keep_case, [](Instance& l) { l.setup.split.debris = 1'000'000'000; }},
+      {"one substep", [](Case& c) { c.substeps = 1; }},
+      {"forty substeps", [](Case& c) { c.substeps = 40; }},
+      {"no iteration", [](Case& c) { c.iterations = 0; }},
+      {"a hundred iterations", [](Case& c) { c.iterations = 100; }},
+      {"stiffness 0", [](Instance& l) { l.setup.step.stiffness = 0; }},
+      {"stiffness 1e15", [](Instance& l) { l.setup.step.stiffness = 1e15; }},
+      {"damping 0", [](Instance& l) { l.setup.step.damping = 0; }},
+      {"damping 1e9", [](Instance& l) { l.setup.step.damping = 1e9; }},
+      {"relaxation 1", [](Instance& l) { relax(l.setup.step, 1); }},
+      {"relaxation 1e-12", [](Instance& l) { relax(l.setup.step, 1e-12); }},
+      {"gravity 1e6", [](Instance& l) { l.setup.step.gravity.z = -1e6; }},
+      {"debris of everything", [](Instance& l) { l.setup.split.debris = 1'000'000'000; }},
       {"expansion by a thousand layers",
        [](Case& c) {
          c.clusters = ClusterKind::foreign;
          c.most = 2;
          c.expand_depth = 1000;
-       },
-       keep},
-      {"tau 0, cap 1", keep_case,
+       }},
+      {"tau 0, cap 1",
        [](Instance& l) {
          l.state.tau = 0;
          l.state.cap = 1;
        }},
-      {"everything small and no cap", keep_case,
+      {"everything small and no cap",
        [](Instance& l) { l.state.tau = l.state.cap = std::numeric_limits<int32_t>::max(); }},
-      {"skin at its particles", keep_case, [](Instance& l) { l.setup.skin.alpha = 0.01; }},
-      {"skin at the next nodes", keep_case, [](Instance& l) { l.setup.skin.alpha = 0.99; }},
-      {"friction 1e6", keep_case,
+      {"skin at its particles", [](Instance& l) { l.setup.skin.alpha = 0.01; }},
+      {"skin at the next nodes", [](Instance& l) { l.setup.skin.alpha = 0.99; }},
+      {"friction 1e6",
        [](Instance& l) {
          l.setup.blade.friction = 1e6;
          for (Wall& wall : l.setup.walls) wall.friction = 1e6;
        }},
-      {"the shortest blade", [](Case& c) { c.blade_length = c.blade_depth = 1; }, keep},
-      {"boxes of one node", [](Case& c) { c.side = 1; }, keep},
-      {"one box", [](Case& c) { c.side = 1000; }, keep},
+      {"the shortest blade", [](Case& c) { c.blade_length = c.blade_depth = 1; }},
+      {"boxes of one node", [](Case& c) { c.side = 1; }},
+      {"one box", [](Case& c) { c.side = 1000; }},
       {"balls of one node",
        [](Case& c) {
          c.clusters = ClusterKind::sampled;
          c.seed_spacing = c.ball_radius = 2;
-       },
-       keep},
+       }},
   };
   for (const Extreme& extreme : extremes) {
     SCOPED_TRACE(extreme.name);
-    Case c = with_thin_blade(block(5, 3, 4));
-    c.moves = true;
+    Case c = moving(block(5, 3, 4), 2, 2, 4);
     c.ground = true;
-    c.stiffness = 4;
     c.strokes = {{{8, 4, 18}, {8, 4, 2}, 4, true, Link::apart}};
     extreme.edit_case(c);
     Instance loaded = instance_of(c);
-    extreme.edit(loaded);
+    extreme.edit_loaded(loaded);
     const Outcome outcome = run(c, loaded, false);
     EXPECT_EQ(outcome.last().frame, outcome.setup.frame_count());
   }
@@ -607,8 +571,7 @@ TEST_P(HardCases, AThresholdBelowASpacingRemovesTissueAtRestAndAHugeOneRemovesNo
   }
   for (const double epsilon : {1.01, 1e6}) {
     loaded.setup.detect.epsilon = epsilon;
-    loaded.setup.has_blade = false;
-    loaded.setup.blade_moves.clear();
+    without_blade(loaded.setup);
     loaded.setup.detect.without_blade = true;
     EXPECT_EQ(run(c, loaded).removed(), 0);
   }

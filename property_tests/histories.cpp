@@ -17,7 +17,7 @@
 namespace cutproof::property_tests {
 namespace {
 
-Stage stage_at(int32_t index) { return kStages[static_cast<std::size_t>(index % 6)]; }
+Stage stage_at(int32_t index) { return kStages[at(index % 6)]; }
 
 // The last stage that ran, as recordings name it.
 Stage before(Stage next) { return stage_at(static_cast<int32_t>(next) + 5); }
@@ -99,12 +99,12 @@ std::vector<Command> commands_from_json(const std::string& list) {
   } catch (const nlohmann::json::exception& error) {
     throw std::invalid_argument(std::string("commands: ") + error.what());
   }
+  const auto is_fast = [](int32_t q) { return std::abs(q) > kMost; };
   for (const Command& command : commands) {
     const RunStages* run = std::get_if<RunStages>(&command);
     const Kick* kick = std::get_if<Kick>(&command);
     if (run && (run->stages < 1 || run->stages > kMost)) throw std::invalid_argument("run must be in [1, 1000]");
-    if (kick && (kick->component < 0 || std::any_of(kick->velocity.begin(), kick->velocity.end(),
-                                                    [](int32_t q) { return std::abs(q) > kMost; }))) {
+    if (kick && (kick->component < 0 || std::any_of(kick->velocity.begin(), kick->velocity.end(), is_fast))) {
       throw std::invalid_argument("kick must be >= 0, and velocity within 1000 quarters");
     }
   }
@@ -128,21 +128,13 @@ History::History(Source make, Case c)
 void History::execute(const Command& command) {
   if (failure_) return;
   const Position expected = after(position(), command);
-  std::visit(
-      [this](const auto& one) {
-        using One = std::decay_t<decltype(one)>;
-        if constexpr (std::is_same_v<One, RunStages>) run(one);
-        if constexpr (std::is_same_v<One, Cut>) cut(one);
-        if constexpr (std::is_same_v<One, Kick>) kick(one);
-        if constexpr (std::is_same_v<One, SaveAndLoad>) save_and_load(one);
-      },
-      command);
+  std::visit([this](const auto& one) { carry_out(one); }, command);
   if (!failure_ && !(position() == expected)) {
     fail(broken("a frame ends with skin and nowhere else", next_));
   }
 }
 
-void History::run(const RunStages& command) {
+void History::carry_out(const RunStages& command) {
   for (int32_t left = command.stages; left > 0 && !failure_;) {
     wait_for_frames(1);
     const int32_t first = static_cast<int32_t>(next_), count = std::min(left, 6 - first);
@@ -171,26 +163,23 @@ void History::run_span(Span span, bool whole) {
   verdicts_ += judgement.verdicts;
   if (judgement.failure) return fail(std::move(*judgement.failure));
 
-  const bool cuts = judgement[CoverageClass::removal];
-  if (cuts && has_kicked_) note(HistoryClass::removal_after_a_kick);
-  if (judgement[CoverageClass::separation]) {
-    const auto move = static_cast<std::size_t>(start.frame * loaded_.setup.step.substeps);
-    if (loaded_.setup.blade_moves[move].stroke >= given_strokes_) note(HistoryClass::separation);
+  const bool cuts = judgement.coverage["removal"] > 0;
+  if (cuts && has_kicked_) ++coverage_["removal after a kick"];
+  if (judgement.coverage["separation"] > 0) {
+    const auto move = at(start.frame * loaded_.setup.step.substeps);
+    if (loaded_.setup.blade_moves[move].stroke >= given_strokes_) ++coverage_["separation by a stroke that came later"];
   }
   if (!whole_) return;
-  if (whole) {
-    whole_run_->run(span, nullptr);
-    if (whole_run_->ran() != staged_run_->ran()) {
-      return fail(broken("a whole span runs the stages that are due", span.last));
-    }
-  } else {
-    whole_run_->run(span, [](const harness::Moment&) {});
+  whole_run_->run(
+      span, whole ? harness::Observer{} : [](const harness::Moment&) {});
+  if (whole && whole_run_->ran() != staged_run_->ran()) {
+    return fail(broken("a whole span runs the stages that are due", span.last));
   }
   require_same(whole ? "a span is the composition of its stages" : "same input, same bits", state_,
                *whole_run_->states().front());
-  if (cuts && whole && span.last == Stage::skin) note(HistoryClass::cut_as_one_span);
+  if (cuts && whole && span.last == Stage::skin) ++coverage_["cut in one span"];
   if (!state_.removed.empty() && unloaded_beside_ && span.last == Stage::skin) {
-    note(HistoryClass::went_on_without_a_load);
+    ++coverage_["cut with and without a load"];
   }
 }
 
@@ -201,11 +190,11 @@ void History::wait_for_frames(int64_t count) {
   Stroke pause;
   pause.down = false;
   if (!case_.strokes.empty()) pause.from = pause.to = resolved_strokes(case_).back().to;
-  case_.strokes.insert(case_.strokes.end(), static_cast<std::size_t>(missing), pause);
+  case_.strokes.insert(case_.strokes.end(), at(missing), pause);
   change_schedule();
 }
 
-void History::cut(const Cut& command) {
+void History::carry_out(const Cut& command) {
   case_.strokes.push_back(command.stroke);
   change_schedule();
 }
@@ -215,23 +204,21 @@ void History::change_schedule() {
   load_both();
 }
 
-void History::kick(const Kick& command) {
+void History::carry_out(const Kick& command) {
   wait_for_frames(2);  // to see in the next one what came of it
   const Setup& setup = loaded_.setup;
   const oracles::Partition components = oracles::graph_components(setup, state_);
   if (components.count == 0 || failure_) return;
   const int32_t component = command.component % components.count;
-  const double quarter = case_.spacing / 4, dt = setup.substep_length[static_cast<std::size_t>(state_.frame)];
+  const double quarter = case_.spacing / 4, dt = setup.substep_length[at(state_.frame)];
+  const auto [u, v, w] = command.velocity;
   State kicked = state_;
   for (std::size_t i = 0; i < kicked.v.size(); ++i) {
-    if (components.label[i] != component) continue;
-    for (int axis = 0; axis < 3; ++axis) {
-      kicked.v[i][axis] += command.velocity[static_cast<std::size_t>(axis)] * quarter / dt;
-    }
+    if (components.label[i] == component) kicked.v[i] += Vec3{u * quarter / dt, v * quarter / dt, w * quarter / dt};
   }
   if (whole_ && components.count > 1) {
     require_no_ghost_force(kicked, components.label, component);
-    note(HistoryClass::kicked_beside_others);
+    ++coverage_["kick beside other components"];
   }
   has_kicked_ = true;
   state_ = std::move(kicked);
@@ -260,7 +247,7 @@ void History::require_no_ghost_force(const State& kicked, const std::vector<int3
   }
 }
 
-void History::save_and_load(const SaveAndLoad& command) {
+void History::carry_out(const SaveAndLoad& command) {
   note_load();
   State saved = staged_run_->snapshot().front();
   require_same("a snapshot changes nothing", state_, saved);
@@ -276,7 +263,7 @@ void History::save_and_load(const SaveAndLoad& command) {
     require_same("a recording gives back what was recorded", saved, read.state);
     saved = std::move(read.state);
     setup = reader.header().setup;
-    if (!saved.skin.owner.empty()) note(HistoryClass::read_from_files);
+    if (!saved.skin.owner.empty()) ++coverage_["skin read from files"];
     staged_run_.reset();
     staged_ = make_();
   }
@@ -333,12 +320,9 @@ void History::fail(Verdict verdict) {
 }
 
 void History::note_load() {
-  if (next_ == Stage::step) return note(HistoryClass::loaded_between_frames);
-  if (next_ == Stage::detect) return note(HistoryClass::loaded_before_detect);
-  if (state_.removed.empty()) return;
-  if (!state_.debris.empty()) note(HistoryClass::loaded_with_debris);
-  constexpr auto kBeforeSplit = static_cast<int>(HistoryClass::loaded_before_split);
-  note(static_cast<HistoryClass>(kBeforeSplit + static_cast<int>(next_) - static_cast<int>(Stage::split)));
+  if (next_ > Stage::detect && state_.removed.empty()) return;
+  ++coverage_[next_ == Stage::step ? "load between frames" : "load before " + std::string(name_of(next_))];
+  if (next_ > Stage::detect && !state_.debris.empty()) ++coverage_["load with debris"];
 }
 
 History history_of(History::Source make, const Case& c, const std::vector<Command>& commands) {

@@ -53,38 +53,23 @@ struct Position {
 };
 Position after(Position at, const Command& command);
 
-// What happened in histories. As in `CoverageClass`, a class that never occurs means that nothing was tested there.
-enum class HistoryClass {
-  loaded_between_frames,
-  loaded_before_detect,
-  loaded_before_split,  // this and the following ones: in a frame that has removed particles
-  loaded_before_merge,
-  loaded_before_expand,
-  loaded_before_skin,
-  loaded_with_debris,      // of the frame in progress
-  read_from_files,         // with a skin
-  cut_as_one_span,         // detection to the end of the frame, and something was removed
-  went_on_without_a_load,  // an unloaded backend beside a loaded one, to the end of a frame that cuts
-  kicked_beside_others,
-  removal_after_a_kick,
-  separation,  // a cut that the history itself asked for
-  count
-};
-inline constexpr std::size_t kHistoryClassCount = static_cast<std::size_t>(HistoryClass::count);
-inline constexpr std::array<const char*, kHistoryClassCount> kHistoryClassNames = {
+// What happened in histories.
+inline constexpr std::array<const char*, 13> kHistoryClassNames = {
     "load between frames",
     "load before detect",
-    "load before split",
+    "load before split",  // this and the following ones: in a frame that has removed particles
     "load before merge",
     "load before expand",
     "load before skin",
-    "load with debris",
+    "load with debris",  // of the frame in progress
     "skin read from files",
-    "cut in one span",
-    "cut with and without a load",
+    "cut in one span",              // detection to the end of the frame, and something was removed
+    "cut with and without a load",  // by an unloaded backend beside a loaded one, to the end of a frame
     "kick beside other components",
     "removal after a kick",
-    "separation by a stroke that came later"};
+    "separation by a stroke that came later",
+};
+using HistoryCoverage = Coverage<kHistoryClassNames>;
 
 // Runs a history and judges it. After every stage: all oracles, and the reference's answer to the same state
 // (judge_case). Beyond these:
@@ -107,14 +92,14 @@ class History {
   Position position() const { return {state_.frame, next_}; }
 
   const std::optional<Verdict>& failure() const { return failure_; }
-  const std::array<int64_t, kHistoryClassCount>& coverage() const { return coverage_; }
+  const HistoryCoverage& coverage() const { return coverage_; }
   int64_t verdicts() const { return verdicts_; }
 
  private:
-  void run(const RunStages& command);
-  void cut(const Cut& command);
-  void kick(const Kick& command);
-  void save_and_load(const SaveAndLoad& command);
+  void carry_out(const RunStages& command);
+  void carry_out(const Cut& command);
+  void carry_out(const Kick& command);
+  void carry_out(const SaveAndLoad& command);
 
   void run_span(Span span, bool whole);
   void wait_for_frames(int64_t count);
@@ -126,7 +111,6 @@ class History {
   bool loads_in_bits() const;
   Verdict broken(const char* what, Stage stage) const;
   void fail(Verdict verdict);
-  void note(HistoryClass what) { ++coverage_[static_cast<std::size_t>(what)]; }
   void note_load();
 
   Source make_;
@@ -142,7 +126,7 @@ class History {
   bool has_kicked_ = false;
   bool unloaded_beside_ = false;  // whole_ went on as it was when staged_ was last loaded
   std::optional<Verdict> failure_;
-  std::array<int64_t, kHistoryClassCount> coverage_ = {};
+  HistoryCoverage coverage_;
   int64_t verdicts_ = 0;
 };
 

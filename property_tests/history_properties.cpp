@@ -87,7 +87,7 @@ Case draw_any_case(uint64_t seed, int size) {
 
 TEST_P(EveryBackend, KeepsEveryPromiseThroughHistoriesOfCommands) {
   constexpr int kMostSize = 55;
-  std::array<int64_t, kHistoryClassCount> seen = {};
+  HistoryCoverage seen;
   int64_t histories = 0, commands_given = 0, verdicts = 0;
   const auto deadline = std::make_shared<Deadline>();
   const auto cases = random_cases(deadline, draw_any_case);
@@ -107,7 +107,7 @@ TEST_P(EveryBackend, KeepsEveryPromiseThroughHistoriesOfCommands) {
       ++histories;
       commands_given += static_cast<int64_t>(commands.size());
       verdicts += history.verdicts();
-      for (std::size_t k = 0; k < kHistoryClassCount; ++k) seen[k] += history.coverage()[k];
+      seen.add(history.coverage());
       if (history.failure()) example.found = describe(*history.failure());
     } catch (const std::exception& error) {
       example.found = std::string("throws: ") + error.what();
@@ -115,13 +115,7 @@ TEST_P(EveryBackend, KeepsEveryPromiseThroughHistoriesOfCommands) {
     return Example{to_json(example), example.found};
   });
   std::cout << histories << " histories, " << commands_given << " commands, " << verdicts << " verdicts;";
-  for (std::size_t k = 0; k < kHistoryClassCount; ++k) {
-    std::cout << (k == 0 ? " " : ", ") << kHistoryClassNames[k] << " " << seen[k];
-  }
-  std::cout << std::endl;
-  for (std::size_t k = 0; k < kHistoryClassCount && ran_in_full(); ++k) {
-    EXPECT_GT(seen[k], 0) << "no history with '" << kHistoryClassNames[k] << "': nothing was tested there";
-  }
+  report(seen, "history");
 }
 
 }  // namespace

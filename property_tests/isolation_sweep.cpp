@@ -21,70 +21,56 @@
 #include "fixtures/cook.h"
 #include "model/setup.h"
 #include "oracles/oracles.h"
+#include "property_tests/cases.h"
 #include "property_tests/random.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::property_tests {
 namespace {
 
-constexpr std::array<int32_t, 3> kMostNodes = {19, 19, 10};
+constexpr Node kMostNodes = {19, 19, 10};
 constexpr double kLeastRadius = 1.6, kGreatestRadius = 3.27;                 // [nodes]
 constexpr double kLeastHalfThickness = 0.45, kGreatestHalfThickness = 1.05;  // [nodes]
 constexpr int32_t kMostCuts = 4;
 constexpr std::array<double, 7> kRatios = {1.0, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0};  // radius / spacing
 
-using Point = std::array<double, 3>;
-
-Point random_direction(Random& random) {
+Vec3 random_direction(Random& random) {
   for (;;) {
-    const Point p = {random.real(-1, 1), random.real(-1, 1), random.real(-1, 1)};
-    const double square = p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
-    if (square > 1 || square < 1e-4) continue;
-    return {p[0] / std::sqrt(square), p[1] / std::sqrt(square), p[2] / std::sqrt(square)};
+    Vec3 p;
+    for (int axis = 0; axis < 3; ++axis) p[axis] = random.real(-1, 1);
+    if (dot(p, p) <= 1 && dot(p, p) >= 1e-4) return normalized(p);
   }
-}
-
-double along(const Point& direction, const Point& from, const std::array<int32_t, 3>& to) {
-  double sum = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) sum += direction[axis] * (to[axis] - from[axis]);
-  return sum;
 }
 
 // A block or an ellipsoid, solid or with holes.
 Body random_body(Random& random) {
-  std::array<int32_t, 3> dims;
+  Node dims;
   for (std::size_t axis = 0; axis < 3; ++axis) dims[axis] = random.between(3, kMostNodes[axis]);
   const bool round = random.chance(0.5);
   const double fill = random.chance(0.5) ? 1.0 : random.real(0.6, 1.0);
-  std::vector<std::array<int32_t, 3>> nodes;
-  for (int32_t k = 0; k < dims[2]; ++k) {
-    for (int32_t j = 0; j < dims[1]; ++j) {
-      for (int32_t i = 0; i < dims[0]; ++i) {
-        const std::array<int32_t, 3> node = {i, j, k};
-        double square = 0;
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          square += std::pow((2.0 * node[axis] + 1) / dims[axis] - 1, 2);
-        }
-        if ((!round || square <= 1) && random.chance(fill)) nodes.push_back(node);
-      }
-    }
-  }
-  return fixtures::body_from_nodes(nodes, 1.0);
+  const auto is_tissue = [&](Node node) {
+    double square = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) square += std::pow((2.0 * node[axis] + 1) / dims[axis] - 1, 2);
+    return (!round || square <= 1) && random.chance(fill);
+  };
+  return fixtures::body_from_nodes(nodes_where(dims, is_tissue), 1.0);
 }
 
 // Particles within the half-thickness of a plane, on one side of a line in it: a cut that ends inside the body.
 std::vector<uint8_t> random_cuts(Random& random, const Body& body) {
-  std::vector<uint8_t> removed(static_cast<std::size_t>(body.particle_count()), 0);
+  std::vector<uint8_t> removed(at(body.particle_count()), 0);
   const int32_t cuts = random.between(1, kMostCuts);
   for (int32_t cut = 0; cut < cuts; ++cut) {
-    Point through;
-    for (std::size_t axis = 0; axis < 3; ++axis) through[axis] = random.real(1, body.grid.nodes[axis] - 2);
-    const Point normal = random_direction(random), forward = random_direction(random);
+    Vec3 through;
+    for (int axis = 0; axis < 3; ++axis) {
+      through[axis] = random.real(1, body.grid.nodes[at(axis)] - 2);
+    }
+    const Vec3 normal = random_direction(random), forward = random_direction(random);
     const double half_thickness = random.real(kLeastHalfThickness, kGreatestHalfThickness);
     for (int32_t p = 0; p < body.particle_count(); ++p) {
-      const auto at = body.grid.coordinates(body.node[static_cast<std::size_t>(p)]);
-      if (std::abs(along(normal, through, at)) <= half_thickness && along(forward, through, at) >= 0) {
-        removed[static_cast<std::size_t>(p)] = 1;
+      const Vec3 way = body.rest_position(p) - through;  // spacing 1
+      if (std::abs(dot(normal, way)) <= half_thickness && dot(forward, way) >= 0) {
+        removed[at(p)] = 1;
       }
     }
   }
@@ -153,15 +139,17 @@ int sweep(int64_t bodies, uint64_t seed) {
     const std::vector<uint8_t> removed = random_cuts(random, setup.body);
     const double radius = random.real(kLeastRadius, kGreatestRadius);
     const uint64_t cooking_seed = random.seed();
+    const auto run = [&](const ClusterSpec& spec, Row& row) {
+      const State cooked = fixtures::cook(setup.body, spec, {ExpandRule::none, 1}, {MergeRule::none}, cooking_seed);
+      run_once(setup, cooked, removed, row);
+    };
     ClusterSpec spec;
-    run_once(setup, fixtures::cook(setup.body, spec, {ExpandRule::none, 1}, {MergeRule::none}, cooking_seed), removed,
-             boxes);
+    run(spec, boxes);
     spec.method = Cooking::sampled;
     spec.radius = radius;
     for (std::size_t r = 0; r < kRatios.size(); ++r) {
       spec.spacing = radius / kRatios[r];
-      run_once(setup, fixtures::cook(setup.body, spec, {ExpandRule::none, 1}, {MergeRule::none}, cooking_seed), removed,
-               rows[r]);
+      run(spec, rows[r]);
     }
   }
 

@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "fixtures/cook.h"
-#include "gpu/backends.h"
+#include "harness/backends.h"
 #include "oracles/relations/relations.h"
 #include "property_tests/checking.h"
 #include "property_tests/counterexample.h"
@@ -68,70 +68,60 @@ TEST_P(EveryBackend, AgreesWithEveryOracleOnSavedCounterexamples) {
 TEST(SavedCounterexamples, HoldUnderTheScheduleThatBrokeThem) {
   for (const auto& [file, counterexample] : saved_counterexamples()) {
     if (counterexample.schedule.empty()) continue;
-    gpu::KernelOptions options;
-    if (counterexample.split == "global") options.split = gpu::SplitMethod::global_labels;
-    const auto backend = gpu::make_simulated_backend({gpu::replay(counterexample.schedule)}, options);
+    harness::BackendChoice choice;
+    choice.split = counterexample.split;
+    const auto backend = harness::make_replaying_backend(choice, counterexample.schedule);
     const auto judgement = dissect(*backend, counterexample.failing, true);
     if (judgement.failure) ADD_FAILURE() << file << ": " << describe(*judgement.failure);
   }
 }
 
 TEST_P(EveryBackend, KeepsEveryInvariantAfterEveryStageOfARandomDissection) {
-  const auto backend = GetParam().make();
-  std::array<int64_t, kCoverageClassCount> seen = {};
+  CaseCoverage seen;
   int64_t cases = 0, verdicts = 0;
   check(id(), cases_of(1), GetParam().most_size, [&](const Case& c) {
-    const Judgement judgement = dissect(*backend, c, cases % 50 == 0);
+    const Judgement judgement = dissect(*backend_, c, cases % 50 == 0);
     ++cases;
     verdicts += judgement.verdicts;
-    for (std::size_t k = 0; k < kCoverageClassCount; ++k) seen[k] += judgement.coverage[k];
+    seen.add(judgement.coverage);
     return judgement.failure ? describe(*judgement.failure) : "";
   });
   std::cout << cases << " cases, " << verdicts << " verdicts; cases with:";
-  for (std::size_t k = 0; k < kCoverageClassCount; ++k)
-    std::cout << (k == 0 ? " " : ", ") << kCoverageClassNames[k] << " " << seen[k];
-  std::cout << std::endl;
-  for (std::size_t k = 0; k < kCoverageClassCount && ran_in_full(); ++k) {
-    EXPECT_GT(seen[k], 0) << "no case with '" << kCoverageClassNames[k] << "': nothing was tested there";
-  }
+  report(seen, "case");
 }
 
 TEST_P(EveryBackend, OnlyRefinesTheComponentsWithEveryStroke) {
-  const auto backend = GetParam().make();
   check(id(), cases_of(10), GetParam().most_size, [&](const Case& c) {
-    const Instance loaded = load_for(*backend, c);
+    const Instance loaded = load_for(*backend_, c);
     const int64_t strokes = loaded.setup.frame_count();
     if (strokes == 0) return std::string();
-    return text_of(oracles::refinement(*backend, loaded.setup, loaded.state,
+    return text_of(oracles::refinement(*backend_, loaded.setup, loaded.state,
                                        static_cast<int64_t>(c.seed % static_cast<uint64_t>(strokes))));
   });
 }
 
 TEST_P(EveryBackend, GivesTheSameBitsTwice) {
-  const auto backend = GetParam().make();
   check(id(), cases_of(20), GetParam().most_size, [&](const Case& c) {
-    const Instance loaded = load_for(*backend, without_claims(c));
-    return text_of(oracles::determinism(*backend, loaded.setup, loaded.state, loaded.setup.frame_count()));
+    const Instance loaded = load_for(*backend_, without_claims(c));
+    return text_of(oracles::determinism(*backend_, loaded.setup, loaded.state, loaded.setup.frame_count()));
   });
 }
 
 TEST_P(EveryBackend, RunsAFrameAsTheCompositionOfItsSpans) {
-  const auto backend = GetParam().make();
   check(id(), cases_of(20), GetParam().most_size, [&](const Case& c) {
-    const Instance loaded = load_for(*backend, without_claims(c));
-    return text_of(oracles::span_composition(*backend, loaded.setup, loaded.state, loaded.setup.frame_count()));
+    const Instance loaded = load_for(*backend_, without_claims(c));
+    return text_of(oracles::span_composition(*backend_, loaded.setup, loaded.state, loaded.setup.frame_count()));
   });
 }
 
 TEST_P(EveryBackend, GivesTheSameAnswerToASceneTurnedShiftedScaledOrRenumbered) {
-  const auto backend = GetParam().make();
   check(id(), cases_of(10), GetParam().most_size, [&](const Case& c) {
-    const Instance loaded = load_for(*backend, without_claims(c));
+    const Instance loaded = load_for(*backend_, without_claims(c));
     if (loaded.setup.frame_count() == 0) return std::string();
     // Which clusters are merged depends on their numbers; without I4 so does what is coupled afterwards.
     const bool decided = loaded.state.edge_covered || c.merge == MergeRule::none;
     const Span span = decided ? Span{} : Span{Stage::step, Stage::split};
-    return text_of(oracles::equivariance(*backend, loaded.setup, loaded.state, span, c.seed));
+    return text_of(oracles::equivariance(*backend_, loaded.setup, loaded.state, span, c.seed));
   });
 }
 
@@ -147,8 +137,7 @@ Instance cut_and_disturbed(Backend& backend, const Case& c) {
   for (Vec3& x : loaded.state.x) {
     for (int axis = 0; axis < 3; ++axis) x[axis] += random.real(-0.3, 0.3) * c.spacing;
   }
-  loaded.setup.has_blade = false;
-  loaded.setup.blade_moves.clear();
+  without_blade(loaded.setup);
   loaded.setup.substep_length = {random.real(0.0005, 0.02)};
   loaded.setup.step.iterations = 3;
   loaded.setup.step.stiffness = std::pow(10, random.real(2, 7));
@@ -157,18 +146,17 @@ Instance cut_and_disturbed(Backend& backend, const Case& c) {
 }
 
 TEST_P(EveryBackend, StepsACutBodyWithoutGhostForcesAndWithoutEnergyFromNowhere) {
-  const auto backend = GetParam().make();
   int64_t compared = 0, iterations = 0;
   check(id(), cases_of(10), GetParam().most_size, [&](const Case& c) {
-    const Instance cut = cut_and_disturbed(*backend, c);
+    const Instance cut = cut_and_disturbed(*backend_, c);
     int32_t kicked = 0;
-    while (kicked < cut.setup.body.particle_count() && !cut.state.alive[static_cast<std::size_t>(kicked)]) ++kicked;
+    while (kicked < cut.setup.body.particle_count() && !cut.state.alive[at(kicked)]) ++kicked;
     const Vec3 kick = {0.7 * c.spacing, -0.4 * c.spacing, 1.3 * c.spacing};
     const Verdict verdicts[] = {
-        oracles::no_ghost_force(*backend, cut.setup, cut.state, kicked, kick, 1),
-        oracles::energy_is_monotone(*backend, cut.setup, cut.state, 6),
-        oracles::rest_is_fixed(*backend, cut.setup, cut.state),
-        oracles::translation_is_exact(*backend, cut.setup, cut.state, {0.3, -0.2, 0.1}),
+        oracles::no_ghost_force(*backend_, cut.setup, cut.state, kicked, kick, 1),
+        oracles::energy_is_monotone(*backend_, cut.setup, cut.state, 6),
+        oracles::rest_is_fixed(*backend_, cut.setup, cut.state),
+        oracles::translation_is_exact(*backend_, cut.setup, cut.state, {0.3, -0.2, 0.1}),
     };
     compared += verdicts[0].checked;
     iterations += verdicts[1].checked;
@@ -185,24 +173,23 @@ TEST_P(EveryBackend, StepsACutBodyWithoutGhostForcesAndWithoutEnergyFromNowhere)
 // Blades push against tissue that walls on all three lower sides hold, so that both act on the same particles and are
 // projected in turn. Without friction that has an energy.
 TEST_P(EveryBackend, GainsNoEnergyBetweenBladeAndWalls) {
-  const auto backend = GetParam().make();
   int64_t iterations = 0;
   check(id(), cases_of(10), GetParam().most_size, [&](const Case& c) {
     Case moving = c;
     moving.moves = true;
-    Instance loaded = load_for(*backend, moving);
+    Instance loaded = load_for(*backend_, moving);
     auto& setup = loaded.setup;
     setup.step.gravity = {-9.81, -9.81, -9.81};
     setup.walls.clear();
     for (int axis = 0; axis < 3; ++axis) setup.walls.push_back({axis, +1, 0.75 * c.spacing, 0});
     constexpr int64_t kFrames = 4;
     for (int64_t frame = 0; frame < std::min(kFrames, setup.frame_count()); ++frame) {
-      const Verdict verdict = oracles::energy_is_monotone(*backend, setup, loaded.state, 4);
+      const Verdict verdict = oracles::energy_is_monotone(*backend_, setup, loaded.state, 4);
       iterations += verdict.checked;
       if (!verdict.holds) return describe(verdict);
-      backend->load({setup}, {loaded.state});
-      backend->run({});
-      loaded.state = backend->snapshot().front();
+      backend_->load({setup}, {loaded.state});
+      backend_->run({});
+      loaded.state = backend_->snapshot().front();
     }
     return std::string();
   });
@@ -214,7 +201,6 @@ TEST_P(EveryBackend, GainsNoEnergyBetweenBladeAndWalls) {
 // Particle counts around the sizes of warps and blocks, and clusters of one to three particles; a cut through the
 // middle.
 TEST_P(EveryBackend, DissectsBodiesOfSizesAroundThoseOfBlocks) {
-  const auto backend = GetParam().make();
   int64_t verdicts = 0;
   for (const int32_t count : {0, 1, 2, 3, 31, 32, 33, 63, 64, 65, 255, 256, 257, 1023, 1024, 1025}) {
     for (const int32_t most : {0, 1, 3}) {  // 0: boxes
@@ -234,7 +220,7 @@ TEST_P(EveryBackend, DissectsBodiesOfSizesAroundThoseOfBlocks) {
       c.blade_thickness = 0;
       c.blade_length = 2;
       c.blade_depth = 2 * side + 1;
-      const Judgement judgement = dissect(*backend, c, true);
+      const Judgement judgement = dissect(*backend_, c, true);
       verdicts += judgement.verdicts;
       EXPECT_FALSE(judgement.failure) << count << " particles, clusters of at most " << most << ": "
                                       << describe(*judgement.failure);

@@ -5,6 +5,8 @@
 #include <initializer_list>
 #include <random>
 
+#include "model/at.h"
+
 namespace cutproof::property_tests {
 
 class Random {
@@ -15,12 +17,14 @@ class Random {
     const uint64_t count = static_cast<uint64_t>(int64_t{high} - low) + 1;
     return static_cast<int32_t>(low + static_cast<int64_t>(engine_() % count));
   }
+  // Of one of `count` things.
+  std::size_t index(std::size_t count) { return static_cast<std::size_t>(between(0, static_cast<int32_t>(count) - 1)); }
   double real(double low, double high) { return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1p-53; }
   bool chance(double probability) { return real(0, 1) < probability; }
   uint64_t seed() { return engine_(); }
   template <typename T>
   T pick(std::initializer_list<T> of) {
-    return of.begin()[between(0, static_cast<int32_t>(of.size()) - 1)];
+    return of.begin()[index(of.size())];
   }
 
  private:

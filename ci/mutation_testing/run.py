@@ -3,18 +3,18 @@
 
 Usage: run.py [--only NAME...] [--jobs N] [--json F] [--check]
 
-A fault is a patch, mutants/NN_name.patch, with a head of lines `Field: text` (a line that begins with a space goes on):
+A mutant is a patch, mutants/NN_name.patch, with a head of lines `Field: text` (a line that begins with a space goes on):
   Stage     step detect split merge expand skin, or launch: what runs kernels and puts frames together
   Fault     what is wrong with the program, for a person
   Suspect   the gate's command that is expected to find it; may be given several times, tried in this order. A program
             is known by its name, which is that of its CMake target.
-  Livelock  yes: the fault may show as a program that does not end, so running out of time counts as found
+  Livelock  yes: the mutant may show as a program that does not end, so running out of time counts as found
 
 There is one copy (build/mutation_testing/tree) with one build folder, without CUDA. The unchanged code must pass every
-command that is used. Then for each fault: patch, build what its suspects need, run them until one finds it; if none
-does, the tests of its stage, the properties, and five minutes of `cutproof fuzz`. A fault that does not apply or does
+command that is used. Then for each mutant: patch, build what its suspects need, run them until one finds it; if none
+does, the tests of its stage, the properties, and five minutes of `cutproof fuzz`. A mutant that does not apply or does
 not compile is an error, not a find. Writes docs/results/mutation_testing.md unless --only is given. Exit status: 0
-every fault was found, 1 one was not or the unchanged code fails, 2 bad usage or a bad patch.
+every mutant was found, 1 one was not or the unchanged code fails, 2 bad usage or a bad patch.
 """
 import argparse
 import contextlib
@@ -45,12 +45,12 @@ FUZZ_FAILS = re.compile(r"case (\d+) FAILS: '(.*?)' fails after")
 MOST_STROKES, MOST_PARTICLES, WANTED_SIMPLE = 3, 30, 0.8
 
 
-class BadFault(Exception):
-    """A fault that says nothing about the gate: it does not apply, does not compile, or its suspect runs nothing."""
+class BadMutant(Exception):
+    """A mutant that says nothing about the gate: it does not apply, does not compile, or its suspect runs nothing."""
 
 
 @dataclasses.dataclass
-class Fault:
+class Mutant:
     name: str
     path: pathlib.Path
     stage: str
@@ -65,7 +65,7 @@ class Fault:
         return " and ".join(sorted(folders))
 
 
-def read_fault(path):
+def read_mutant(path):
     fields = {}
     last = None
     lines = path.read_text().splitlines()
@@ -77,18 +77,18 @@ def read_fault(path):
             continue
         last, separator, text = line.partition(":")
         if not separator or last not in FIELDS:
-            raise BadFault(f"{path.name}, line {number + 1}: '{line}' is none of {', '.join(FIELDS)}")
+            raise BadMutant(f"{path.name}, line {number + 1}: '{line}' is none of {', '.join(FIELDS)}")
         fields.setdefault(last, []).append(text.strip())
     missing = [field for field in ("Stage", "Fault", "Suspect") if field not in fields]
     if missing:
-        raise BadFault(f"{path.name}: {', '.join(missing)} is missing in its head")
+        raise BadMutant(f"{path.name}: {', '.join(missing)} is missing in its head")
     stage = fields["Stage"][0]
     if stage not in STAGES:
-        raise BadFault(f"{path.name}: Stage: '{stage}' is none of {', '.join(STAGES)}")
+        raise BadMutant(f"{path.name}: Stage: '{stage}' is none of {', '.join(STAGES)}")
     files = [line[6:].split("\t")[0] for line in lines if line.startswith("+++ b/")]
     if not files or any(file.split("/")[0] not in ("gpu", "reference_cpu") for file in files):
-        raise BadFault(f"{path.name}: a fault patches files of gpu/ or reference_cpu/, and nothing else")
-    return Fault(path.stem, path, stage, fields["Fault"][0], fields["Suspect"],
+        raise BadMutant(f"{path.name}: a mutant patches files of gpu/ or reference_cpu/, and nothing else")
+    return Mutant(path.stem, path, stage, fields["Fault"][0], fields["Suspect"],
                  fields.get("Livelock") == ["yes"], files)
 
 
@@ -110,20 +110,20 @@ def copy_tree():
             copy.unlink()
 
 
-def apply(fault, check_only=False, tree=TREE):
+def apply(mutant, check_only=False, tree=TREE):
     # Outside of any repository, as far as git can see: inside one it would skip files that are ignored.
     environment = dict(os.environ, GIT_CEILING_DIRECTORIES=str(tree.parent))
-    command = ["git", "apply", "--whitespace=nowarn"] + (["--check"] if check_only else []) + [str(fault.path)]
+    command = ["git", "apply", "--whitespace=nowarn"] + (["--check"] if check_only else []) + [str(mutant.path)]
     done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True)
     if done.returncode != 0:
-        raise BadFault(f"{fault.path.name} does not apply: {done.stderr.strip()}")
+        raise BadMutant(f"{mutant.path.name} does not apply: {done.stderr.strip()}")
 
 
 @contextlib.contextmanager
-def applied(fault):
+def applied(mutant):
     """The mutant is in the copy as long as this lasts."""
-    before = {file: (TREE / file).read_bytes() for file in fault.files}
-    apply(fault)
+    before = {file: (TREE / file).read_bytes() for file in mutant.files}
+    apply(mutant)
     try:
         yield
     finally:
@@ -144,7 +144,7 @@ def build(targets, jobs):
                           env=environment, capture_output=True, text=True)
     if done.returncode != 0:
         errors = [line for line in done.stdout.splitlines() if "error:" in line or "FAILED" in line]
-        raise BadFault("does not compile: " + "\n  ".join(errors[:5] or done.stdout.splitlines()[-5:]))
+        raise BadMutant("does not compile: " + "\n  ".join(errors[:5] or done.stdout.splitlines()[-5:]))
 
 
 # --- The gate --------------------------------------------------------------------------------------------------------
@@ -153,13 +153,13 @@ def target_of(command):
     return shlex.split(command)[0]
 
 
-def fallbacks(fault):
-    if fault.code == "reference_cpu":
+def fallbacks(mutant):
+    if mutant.code == "reference_cpu":
         backend, kinds = "reference", "*/reference*"
-        tests = ["backend_test"] if fault.stage == "launch" else [f"{fault.stage}_test"]
+        tests = ["backend_test"] if mutant.stage == "launch" else [f"{mutant.stage}_test"]
     else:
         backend, kinds = "host", "*/host*:*/simulated*"
-        tests = ["launch_test"] if fault.stage == "launch" else [f"{fault.stage}_kernel_test"]
+        tests = ["launch_test"] if mutant.stage == "launch" else [f"{mutant.stage}_kernel_test"]
     return tests + [f"property_tests --gtest_filter='{kinds}'",
                     f"cutproof fuzz --backend {backend} --cases 1000000000 --seconds {FUZZ_SECONDS}"]
 
@@ -175,11 +175,11 @@ class Outcome:
 
 
 def run(command, may_hang=False):
-    """One command of the gate. Raises BadFault if it says nothing: it ran no test, or did not understand its options."""
+    """One command of the gate. Raises BadMutant if it says nothing: it ran no test, or did not understand its options."""
     name, *arguments = shlex.split(command)
     programs = [path for path in BUILD.glob(f"**/{name}") if path.is_file() and os.access(path, os.X_OK)]
     if len(programs) != 1:
-        raise BadFault(f"'{command}': there is no program '{name}'")
+        raise BadMutant(f"'{command}': there is no program '{name}'")
     is_fuzz = name == "cutproof"
     if not is_fuzz:
         arguments.append("--gtest_fail_fast")
@@ -206,9 +206,9 @@ def run(command, may_hang=False):
     if late.is_set() and not violation:
         if may_hang:
             return Outcome(True, f"`{command}`", "livelock", f"does not end within {MOST_SECONDS} s")
-        raise BadFault(f"'{command}' does not end within {MOST_SECONDS} s, and the fault is not marked as a livelock")
+        raise BadMutant(f"'{command}' does not end within {MOST_SECONDS} s, and the mutant is not marked as a livelock")
     if is_fuzz and status == 2:
-        raise BadFault(f"'{command}': {text.strip()}")
+        raise BadMutant(f"'{command}': {text.strip()}")
     outcome = (read_fuzz if is_fuzz else read_tests)(text)
     outcome.found = status != 0
     if not outcome.found:
@@ -237,7 +237,7 @@ def read_fuzz(text):
 def read_tests(text):
     ran = re.search(r"^\[==========\] Running (\d+) test", text, re.MULTILINE)
     if not ran or int(ran.group(1)) == 0:
-        raise BadFault("its suspect runs no test: " + text.strip()[-200:])
+        raise BadMutant("its suspect runs no test: " + text.strip()[-200:])
     tests = re.findall(r"^\[ RUN      \] (\S+)", text, re.MULTILINE)
     if "[  FAILED  ]" not in text:
         # A crash names no test: it is the last one that began. Otherwise nothing failed.
@@ -255,16 +255,16 @@ def plural(count, noun):
     return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
-def judge(fault, jobs):
-    """Plants one fault. Returns the outcome and the command that gave it; (None, None) if the fault survives."""
-    with applied(fault):
+def judge(mutant, jobs):
+    """Applies one mutant. Returns the outcome and the command that gave it; (None, None) if the mutant survives."""
+    with applied(mutant):
         built = set()
-        for command in fault.suspects + fallbacks(fault):
-            needed = {target_of(c) for c in (fault.suspects if command in fault.suspects else [command])}
+        for command in mutant.suspects + fallbacks(mutant):
+            needed = {target_of(c) for c in (mutant.suspects if command in mutant.suspects else [command])}
             if not needed <= built:
                 build(needed, jobs)
                 built |= needed
-            outcome = run(command, fault.livelock)
+            outcome = run(command, mutant.livelock)
             if outcome.found:
                 return outcome, command
     return None, None
@@ -319,33 +319,33 @@ def write_table(rows):
 
 def main():
     parser = argparse.ArgumentParser(description="Applies mutants and asks the gate to find them.")
-    parser.add_argument("--only", nargs="+", metavar="NAME", help="faults whose name begins with one of these")
+    parser.add_argument("--only", nargs="+", metavar="NAME", help="mutants whose name begins with one of these")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="of the builds")
     parser.add_argument("--json", metavar="F", help="write the results there as well")
-    parser.add_argument("--check", action="store_true", help="only whether every fault applies to the code as it is")
+    parser.add_argument("--check", action="store_true", help="only whether every mutant applies to the code as it is")
     options = parser.parse_args()
 
     paths = sorted((HERE / "mutants").glob("*.patch"))
     if options.only:
         for name in options.only:
             if not any(path.stem.startswith(name) for path in paths):
-                raise BadFault(f"--only: there is no fault '{name}' in {HERE / 'mutants'}")
+                raise BadMutant(f"--only: there is no mutant '{name}' in {HERE / 'mutants'}")
         paths = [path for path in paths if any(path.stem.startswith(name) for name in options.only)]
-    faults = [read_fault(path) for path in paths]
-    if not faults:
-        raise BadFault(f"there are no faults in {HERE / 'mutants'}")
+    mutants = [read_mutant(path) for path in paths]
+    if not mutants:
+        raise BadMutant(f"there are no mutants in {HERE / 'mutants'}")
     if options.check:
-        for fault in faults:
-            apply(fault, check_only=True, tree=ROOT)
-        print(plural(len(faults), "fault") + " apply")
+        for mutant in mutants:
+            apply(mutant, check_only=True, tree=ROOT)
+        print(plural(len(mutants), "mutant") + " apply")
         return 0
 
     copy_tree()
-    for fault in faults:
-        apply(fault, check_only=True)
+    for mutant in mutants:
+        apply(mutant, check_only=True)
     configure()
     holds = True
-    commands = sorted({command for fault in faults for command in fault.suspects})
+    commands = sorted({command for mutant in mutants for command in mutant.suspects})
     build({target_of(command) for command in commands}, options.jobs)
     begin = time.monotonic()
     for command in commands:
@@ -354,27 +354,27 @@ def main():
           f" ({time.monotonic() - begin:.0f} s)", flush=True)
 
     rows = []
-    for fault in faults:
+    for mutant in mutants:
         begin = time.monotonic()
         try:
-            outcome, command = judge(fault, options.jobs)
-        except BadFault as error:
-            raise BadFault(f"{fault.path.name}: {error}") from None
+            outcome, command = judge(mutant, options.jobs)
+        except BadMutant as error:
+            raise BadMutant(f"{mutant.path.name}: {error}") from None
         # A command that nobody suspected has not been asked about the unchanged code.
         if outcome and command not in commands:
             holds = passes_unchanged(command, options.jobs) and holds
-        row = {"name": fault.name, "stage": fault.stage, "fault": fault.text, "code": fault.code,
+        row = {"name": mutant.name, "stage": mutant.stage, "fault": mutant.text, "code": mutant.code,
                "found": outcome is not None, "command": command or "", "by": outcome.by if outcome else "",
                "took": outcome.took if outcome else "", "message": outcome.message if outcome else "",
                "strokes": outcome.strokes if outcome else None,
                "particles": outcome.particles if outcome else None,
-               "suspected": command in fault.suspects, "seconds": round(time.monotonic() - begin, 1)}
+               "suspected": command in mutant.suspects, "seconds": round(time.monotonic() - begin, 1)}
         rows.append(row)
         result = f"{row['by']} ({row['took']})" if outcome else "NOT FOUND"
         if row["strokes"] is not None:
             result += f", {plural(row['strokes'], 'stroke')}, {plural(row['particles'], 'particle')}"
         note = "" if row["suspected"] or not outcome else " [not by its suspect]"
-        print(f"{fault.name}: {result}{note} ({row['seconds']:.0f} s)", flush=True)
+        print(f"{mutant.name}: {result}{note} ({row['seconds']:.0f} s)", flush=True)
         if options.json:
             pathlib.Path(options.json).write_text(json.dumps(
                 {"format": "cutproof.mutation_testing", "format_version": 1, "unchanged_passes": holds, "faults": rows},
@@ -383,7 +383,7 @@ def main():
         write_table(rows)
     survivors = [row["name"] for row in rows if not row["found"]]
     print(simplicity(rows))
-    print(f"{len(rows) - len(survivors)} of {plural(len(rows), 'fault')} found"
+    print(f"{len(rows) - len(survivors)} of {plural(len(rows), 'mutant')} found"
           + (", not found: " + ", ".join(survivors) if survivors else ""))
     return 0 if holds and not survivors else 1
 
@@ -391,6 +391,6 @@ def main():
 if __name__ == "__main__":
     try:
         sys.exit(main())
-    except BadFault as error:
+    except BadMutant as error:
         print(f"mutation testing: {error}", file=sys.stderr)
         sys.exit(2)

@@ -7,67 +7,20 @@
 
 #include "oracles/comparison/measurable.h"
 #include "oracles/comparison/reference_solution.h"
-#include "oracles/support.h"
+#include "oracles/single_substep.h"
+#include "oracles/totals.h"
 
 namespace cutproof::oracles {
 
-namespace {
-
-constexpr Span kFrame{Stage::step, Stage::skin};
-
-}  // namespace
-
 Setup free_setup(const Setup& setup, int64_t frame, int64_t frames) {
-  Setup free = setup;
-  free.has_blade = false;
-  free.blade_moves.clear();
-  free.stroke_end.clear();
-  free.walls.clear();
-  free.grips.clear();
+  Setup free = undisturbed(setup);
   free.step.gravity = {};
   free.step.damping = 0;
-  free.detect.criterion = Criterion::none;
-  free.skin.wanted = false;
   free.substep_length.assign(at(frames), setup.substep_length.at(at(frame)));
   return free;
 }
 
 namespace {
-
-// Of the alive particles, summed in extended precision, so that only what the backend rounds is left.
-struct Totals {
-  long double mass = 0;
-  std::array<long double, 3> momentum = {}, moment = {}, spin = {};  // Σ m v, Σ m x, Σ m x × v about the body's origin
-  long double kinetic = 0, speed = 0;                                // ½ Σ m v², Σ m |v|
-  double extent = 0;
-
-  Vec3 total_momentum() const { return vector(momentum); }
-  Vec3 center() const { return vector(moment) / static_cast<double>(mass); }
-  // About the center of mass: J − c × p.
-  Vec3 angular_momentum() const { return vector(spin) - cross(center(), vector(momentum)); }
-  static Vec3 vector(const std::array<long double, 3>& v) {
-    return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
-  }
-};
-
-Totals totals_of(const Body& body, const State& state) {
-  Totals totals;
-  for (std::size_t i = 0; i < state.alive.size(); ++i) {
-    if (!state.alive[i]) continue;
-    const long double m = body.mass[i];
-    const Vec3 x = state.x[i], v = state.v[i], j = cross(x, v);
-    totals.mass += m;
-    for (int axis = 0; axis < 3; ++axis) {
-      totals.momentum[at(axis)] += m * v[axis];
-      totals.moment[at(axis)] += m * x[axis];
-      totals.spin[at(axis)] += m * j[axis];
-    }
-    totals.kinetic += m * dot(v, v) / 2;
-    totals.speed += m * norm(v);
-    totals.extent = std::max(totals.extent, norm(x));
-  }
-  return totals;
-}
 
 // (k/2) Σ w |x − t − R (X − T)|² with the best t and R: the energy of a substep that begins here without a velocity and
 // ends where it begins. Requires free_setup and Solver::implicit.
@@ -87,7 +40,7 @@ void raise(double& greatest, double value) {
 void set_in_motion(const Setup& setup, State& state) {
   const double h = setup.body.grid.spacing, dt = setup.substep_length.at(0);
   const Vec3 axis = normalized({1, 2, 3}), drift = (0.002 * h / dt) * normalized({2, -1, 1});
-  const Vec3 center = totals_of(setup.body, state).center();
+  const Vec3 center = totals_of(setup.body, state, state.alive).center();
   for (std::size_t i = 0; i < state.x.size(); ++i) {
     if (!state.alive[i]) continue;
     const Vec3 arm = state.x[i] - center;
@@ -105,7 +58,7 @@ Conservation conservation(Backend& backend, const Setup& setup, const State& sta
     return static_cast<double>(totals.kinetic) + (implicit ? elastic_energy(setup, s) : 0);
   };
 
-  const Totals first = totals_of(setup.body, start);
+  const Totals first = totals_of(setup.body, start, start.alive);
   const auto mass = static_cast<double>(first.mass);
   const Vec3 p = first.total_momentum(), j = first.angular_momentum();
   const double energy = energy_of(start, first);
@@ -113,15 +66,13 @@ Conservation conservation(Backend& backend, const Setup& setup, const State& sta
   Conservation result;
   result.extent = first.extent;
   for (int64_t frame = 0; frame < setup.frame_count(); ++frame) {
-    backend.run(kFrame);
+    backend.run({});
     const State now = std::move(backend.snapshot().front());
     if (!measurable(setup, now)) {
-      for (double* figure : {&change, &turned, &growth, &result.mass}) {
-        *figure = std::numeric_limits<double>::infinity();
-      }
+      change = turned = growth = result.mass = std::numeric_limits<double>::infinity();
       break;
     }
-    const Totals totals = totals_of(setup.body, now);
+    const Totals totals = totals_of(setup.body, now, now.alive);
     raise(change, norm(totals.total_momentum() - p));
     raise(turned, norm(totals.angular_momentum() - j));
     raise(result.mass, static_cast<double>(std::abs(totals.mass - first.mass)) / mass);

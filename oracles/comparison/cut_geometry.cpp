@@ -7,6 +7,7 @@
 #include "oracles/blade_motion.h"
 #include "oracles/comparison/lattice_lines.h"
 #include "oracles/oracles.h"
+#include "oracles/shells.h"
 #include "oracles/support.h"
 #include "oracles/surface/surface_distance.h"
 
@@ -139,8 +140,7 @@ NewSkin new_skin(const Setup& setup, const State& before, const State& after) {
   std::vector<Vec3> rest(skin.owner.size());
   for (std::size_t v = 0; v < skin.owner.size(); ++v) {
     const int32_t i = skin.owner[v], other = body.neighbour(i, skin.direction[v]);
-    const auto& d = kDirections[skin.direction[v]];
-    rest[v] = body.rest_position(i) + setup.skin.alpha * body.grid.spacing * Vec3{1.0 * d[0], 1.0 * d[1], 1.0 * d[2]};
+    rest[v] = vertex_at_rest(setup, skin, v);
     is_new[v] = other >= 0 && before.alive[at(other)] != 0 && after.alive[at(other)] == 0;
     if (is_new[v]) result.vertices.push_back(rest[v]);
   }

@@ -1,14 +1,15 @@
 #include "oracles/comparison/interpenetration.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <tuple>
 #include <vector>
 
 #include "oracles/comparison/lattice_lines.h"
+#include "oracles/eigen.h"
 #include "oracles/oracles.h"
 #include "oracles/support.h"
 
@@ -16,24 +17,13 @@ namespace cutproof::oracles {
 
 namespace {
 
-struct Box {
-  std::array<double, 3> low, high;
+using Box = Eigen::AlignedBox3d;
 
-  static Box of(const Triangle& t) {
-    Box box;
-    for (int k = 0; k < 3; ++k) {
-      box.low[at(k)] = std::min({t[0][k], t[1][k], t[2][k]});
-      box.high[at(k)] = std::max({t[0][k], t[1][k], t[2][k]});
-    }
-    return box;
-  }
-  void take(const Box& other) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      low[k] = std::min(low[k], other.low[k]);
-      high[k] = std::max(high[k], other.high[k]);
-    }
-  }
-};
+Box box_of(const Triangle& t) {
+  Box box;  // empty
+  for (const Vec3 corner : t) box.extend(as_eigen(corner));
+  return box;
+}
 
 // The skins of the components of G, as triangles with their component.
 struct Pieces {
@@ -59,35 +49,17 @@ Pieces pieces_of(const Setup& setup, const State& state) {
   return pieces;
 }
 
-// Where more than one component may be: where the boxes of two overlap.
-std::optional<Box> shared_region(const Pieces& pieces) {
-  std::vector<std::optional<Box>> box(at(pieces.count));
+// Where more than one component may be: around what the boxes of two have in common. Empty if there is nothing.
+Box shared_region(const Pieces& pieces) {
+  std::vector<Box> box(at(pieces.count));
   for (std::size_t t = 0; t < pieces.triangles.size(); ++t) {
-    auto& of_piece = box[at(pieces.component[t])];
-    const Box here = Box::of(pieces.triangles[t]);
-    if (of_piece) {
-      of_piece->take(here);
-    } else {
-      of_piece = here;
-    }
+    box[at(pieces.component[t])].extend(box_of(pieces.triangles[t]));
   }
-  std::optional<Box> region;
+  Box region;
   for (std::size_t a = 0; a < box.size(); ++a) {
     for (std::size_t b = 0; b < a; ++b) {
-      if (!box[a] || !box[b]) continue;
-      Box shared;
-      bool empty = false;
-      for (std::size_t k = 0; k < 3; ++k) {
-        shared.low[k] = std::max(box[a]->low[k], box[b]->low[k]);
-        shared.high[k] = std::min(box[a]->high[k], box[b]->high[k]);
-        empty = empty || shared.low[k] >= shared.high[k];
-      }
-      if (empty) continue;
-      if (region) {
-        region->take(shared);
-      } else {
-        region = shared;
-      }
+      const Box shared = box[a].intersection(box[b]);
+      if (shared.sizes().minCoeff() > 0) region.extend(shared);
     }
   }
   return region;
@@ -105,9 +77,9 @@ struct Stretch {
 Lattice lattice_over(const Box& region, int axis, double spacing) {
   Lattice lattice{axes_of(axis), {}, {}, {}};
   for (int w = 0; w < 2; ++w) {
-    const auto k = at(w == 0 ? lattice.axes.u : lattice.axes.v);
-    lattice.first[at(w)] = region.low[k];
-    const double width = region.high[k] - region.low[k];
+    const int k = w == 0 ? lattice.axes.u : lattice.axes.v;
+    lattice.first[at(w)] = region.min()[k];
+    const double width = region.sizes()[k];
     lattice.count[at(w)] = static_cast<int64_t>(std::ceil(width / spacing));
     lattice.spacing[at(w)] = width / static_cast<double>(lattice.count[at(w)]);
   }
@@ -149,23 +121,23 @@ void add_skins(const Pieces& pieces, const Lattice& lattice, std::vector<Stretch
   const auto [axis, u, v] = lattice.axes;
   for (std::size_t t = 0; t < pieces.triangles.size(); ++t) {
     const Triangle& triangle = pieces.triangles[t];
-    const Box box = Box::of(triangle);
+    const Box box = box_of(triangle);
     const Vec3 n = cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
     const double half = (std::abs(n[u]) * lattice.spacing[0] + std::abs(n[v]) * lattice.spacing[1]) / 2;
     std::array<int64_t, 2> first, end;
     for (std::size_t w = 0; w < 2; ++w) {
-      const auto k = at(w == 0 ? u : v);
+      const int k = w == 0 ? u : v;
       const auto most = static_cast<double>(lattice.count[w]);
       const auto column = [&](double x) { return (x - lattice.first[w]) / lattice.spacing[w]; };
-      first[w] = static_cast<int64_t>(std::clamp(std::floor(column(box.low[k])), 0.0, most));
-      end[w] = static_cast<int64_t>(std::clamp(std::floor(column(box.high[k])) + 1, 0.0, most));
+      first[w] = static_cast<int64_t>(std::clamp(std::floor(column(box.min()[k])), 0.0, most));
+      end[w] = static_cast<int64_t>(std::clamp(std::floor(column(box.max()[k])) + 1, 0.0, most));
     }
     for (int64_t j = first[1]; j < end[1]; ++j) {
       for (int64_t i = first[0]; i < end[0]; ++i) {
         // On the plane: n_axis (z − z0) = −aside, up to half.
         const double aside =
             n[u] * (lattice.place(0, i) - triangle[0][u]) + n[v] * (lattice.place(1, j) - triangle[0][v]);
-        double low = box.low[at(axis)], high = box.high[at(axis)];
+        double low = box.min()[axis], high = box.max()[axis];
         if (n[axis] == 0) {
           if (std::abs(aside) > half) continue;
         } else {
@@ -227,13 +199,13 @@ Interpenetration interpenetration(const Setup& setup, const State& state) {
   if (!pieces.in_order) {
     return {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()};
   }
-  const std::optional<Box> region = shared_region(pieces);
-  if (!region) return {};
+  const Box region = shared_region(pieces);
+  if (region.isEmpty()) return {};
   const double h = setup.body.grid.spacing, cube = h * h * h;
   Interpenetration best;
   best.bound = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {
-    const Lattice lattice = lattice_over(*region, axis, h / kColumnsPerSpacing);
+    const Lattice lattice = lattice_over(region, axis, h / kColumnsPerSpacing);
     std::vector<Stretch> stretches;
     add_insides(pieces, lattice, stretches);
     add_skins(pieces, lattice, stretches);

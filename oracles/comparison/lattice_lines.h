@@ -55,23 +55,16 @@ template <class See>
 void cross_lines(const Lattice& lattice, const Triangle& triangle, const See& see) {
   const auto [axis, u, v] = lattice.axes;
   std::array<std::array<double, 2>, 3> corner;
-  std::array<double, 2> low, high;
-  for (std::size_t k = 0; k < 3; ++k) {
-    corner[k] = {triangle[k][u], triangle[k][v]};
-    for (std::size_t w = 0; w < 2; ++w) {
-      low[w] = k == 0 ? corner[k][w] : std::min(low[w], corner[k][w]);
-      high[w] = k == 0 ? corner[k][w] : std::max(high[w], corner[k][w]);
-    }
-  }
+  for (std::size_t k = 0; k < 3; ++k) corner[k] = {triangle[k][u], triangle[k][v]};
   const Vec3 normal = cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
   const double area = norm(normal);
   if (!(area > 0) || normal[axis] == 0 || !std::isfinite(area)) return;
-  const auto range = [&](int which) {
-    const double a = (low[at(which)] - lattice.first[at(which)]) / lattice.spacing[at(which)] - 0.5;
-    const double b = (high[at(which)] - lattice.first[at(which)]) / lattice.spacing[at(which)] - 0.5;
-    const auto most = static_cast<double>(lattice.count[at(which)]);
-    return std::array<int64_t, 2>{static_cast<int64_t>(std::clamp(std::floor(a), 0.0, most)),
-                                  static_cast<int64_t>(std::clamp(std::ceil(b) + 1, 0.0, most))};
+  const auto range = [&](std::size_t w) {
+    const auto [low, high] = std::minmax({corner[0][w], corner[1][w], corner[2][w]});
+    const auto line = [&](double x) { return (x - lattice.first[w]) / lattice.spacing[w] - 0.5; };
+    const auto most = static_cast<double>(lattice.count[w]);
+    return std::array<int64_t, 2>{static_cast<int64_t>(std::clamp(std::floor(line(low)), 0.0, most)),
+                                  static_cast<int64_t>(std::clamp(std::ceil(line(high)) + 1, 0.0, most))};
   };
   const auto [u0, u1] = range(0);
   const auto [v0, v1] = range(1);

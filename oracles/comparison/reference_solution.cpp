@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "oracles/comparison/cluster_system.h"
+#include "oracles/eigen.h"
 #include "oracles/oracles.h"
 #include "oracles/shape_sums.h"
 #include "oracles/support.h"
@@ -36,8 +37,8 @@ struct Substep {
   std::vector<uint8_t> alive, held;
   std::vector<Vec3> start;      // x_prev
   std::vector<Vec3> predicted;  // x~ of method.md §3, before contacts; of held particles, where the grip puts them
-  std::vector<double> weight;   // [n] w_ic = m_i / n_i
-  std::vector<Vec3> offset;     // [members] X_i − T_c
+  WeightedRest rest;
+  std::vector<Vec3> offset;  // [members] X_i − T_c
   Memberships memberships;
   std::array<double, 3> low, high;  // walls: low <= x <= high
 
@@ -66,7 +67,7 @@ Substep substep_of(const Setup& setup, const State& state) {
                   .held = std::vector<uint8_t>(body.node.size(), 0),
                   .start = state.x,
                   .predicted = state.x,
-                  .weight = {},
+                  .rest = weighted_rest(body, state.clusters),
                   .offset = {},
                   .memberships = memberships_of(state.clusters, body.particle_count()),
                   .low = {-kInfinity, -kInfinity, -kInfinity},
@@ -93,15 +94,9 @@ Substep substep_of(const Setup& setup, const State& state) {
     }
   }
 
-  const std::vector<int32_t> counts = membership_counts(state.clusters, body.particle_count());
-  substep.weight.assign(body.node.size(), 0.0);
-  for (int32_t i = 0; i < body.particle_count(); ++i) {
-    if (counts[at(i)] > 0) substep.weight[at(i)] = weight_of(body, counts, i);
-  }
-  const WeightedRest rest = weighted_rest(body, counts);
   for (int32_t c = 0; c < state.clusters.count(); ++c) {
-    const Vec3 center = cluster_means(rest, state.clusters, state.x, c).rest;
-    for (const int32_t i : state.clusters.of(c)) substep.offset.push_back(rest.position[at(i)] - center);
+    const Vec3 center = cluster_means(substep.rest, state.clusters, state.x, c).rest;
+    for (const int32_t i : state.clusters.of(c)) substep.offset.push_back(substep.rest.position[at(i)] - center);
   }
   return substep;
 }
@@ -128,22 +123,6 @@ std::vector<Vec3> first_positions(const Substep& substep) {
 
 // --- Rotations -----------------------------------------------------------------------------------------------------
 
-Mat3 to_mat3(const Eigen::Matrix3d& m) {
-  Mat3 result;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) result(i, j) = m(i, j);
-  }
-  return result;
-}
-
-Eigen::Matrix3d to_eigen(const Mat3& m) {
-  Eigen::Matrix3d result;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) result(i, j) = m(i, j);
-  }
-  return result;
-}
-
 // argmax over rotations of tr(Rᵀ A), by SVD (Kabsch 1976, Umeyama 1991): A = U Σ Vᵀ, R = U diag(1, 1, d) Vᵀ with
 // d = det(U Vᵀ). Where σ2 + d σ3 = 0 a whole circle of rotations about u1 is as good (a sphere of them if σ1 = σ2
 // too); of these the one nearest to `previous`.
@@ -158,7 +137,7 @@ Mat3 best_rotation(const Eigen::Matrix3d& a, const Mat3& previous) {
   const Eigen::Matrix3d best = u * Eigen::Vector3d(1, 1, d).asDiagonal() * v.transpose();
   if (sigma[1] + d * sigma[2] > kSame * sigma[0]) return to_mat3(best);
 
-  const Eigen::Matrix3d before = to_eigen(previous);
+  const Eigen::Matrix3d before = as_eigen(previous);
   if (d < 0 && sigma[0] - sigma[1] <= kSame * sigma[0]) {
     // A = −σ Q: all Q (2 n nᵀ − I) are best, and tr(Rᵀ R_prev) = 2 nᵀ (Qᵀ R_prev) n − tr(Qᵀ R_prev).
     const Eigen::Matrix3d q = -(u * v.transpose());
@@ -185,19 +164,11 @@ Poses poses_at(const Substep& substep, const std::vector<Vec3>& x, const std::ve
   const Clusters& clusters = substep.clusters;
   Poses poses;
   for (int32_t c = 0; c < clusters.count(); ++c) {
-    Vec3 moment;
-    double mass = 0;
-    for (const int32_t i : clusters.of(c)) {
-      moment += substep.weight[at(i)] * x[at(i)];
-      mass += substep.weight[at(i)];
-    }
-    const Vec3 center = moment / mass;
+    const Vec3 center = cluster_means(substep.rest, clusters, x, c).current;
     Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
     auto offset = substep.offset.begin() + clusters.offsets[at(c)];
     for (const int32_t i : clusters.of(c)) {
-      const Vec3 now = substep.weight[at(i)] * (x[at(i)] - center);
-      const Vec3 rest = *offset++;
-      a += Eigen::Vector3d(now.x, now.y, now.z) * Eigen::RowVector3d(rest.x, rest.y, rest.z);
+      a += as_eigen(substep.rest.weight[at(i)] * (x[at(i)] - center)) * as_eigen(*offset++).transpose();
     }
     poses.center.push_back(center);
     poses.rotation.push_back(best_rotation(a, previous[at(c)]));
@@ -250,7 +221,7 @@ double energy_at(const Substep& substep, const std::vector<Vec3>& x, const Poses
     auto offset = substep.offset.begin() + substep.clusters.offsets[at(c)];
     for (const int32_t i : substep.clusters.of(c)) {
       const Vec3 d = x[at(i)] - poses.center[at(c)] - poses.rotation[at(c)] * *offset++;
-      elastic += substep.weight[at(i)] * dot(d, d);
+      elastic += substep.rest.weight[at(i)] * dot(d, d);
     }
   }
   return inertial / (2 * substep.dt * substep.dt) + substep.stiffness / 2 * elastic;
@@ -266,22 +237,12 @@ double greatest_change(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
 
 // The factor of a substep's system along one axis. That it is made anew for every substep and every set of fixed
 // particles is what was measured to be best (docs/results/accuracy.md, The factor after a cut).
-class Cholesky {
- public:
-  Cholesky(Cholmod& cholmod, const Sparse& matrix)
-      : cholmod_(cholmod), factor_(cholmod_analyze(matrix.get(), cholmod.get()), cholmod) {
-    cholmod_factorize(matrix.get(), factor_.get(), cholmod_.get());
-    cholmod_.check();
-  }
-
-  std::vector<double> solve(std::vector<double> right) const {
-    return oracles::solve(cholmod_, factor_.get(), std::move(right));
-  }
-
- private:
-  Cholmod& cholmod_;
-  Factor factor_;
-};
+std::shared_ptr<const Factor> factorised(const Sparse& matrix, Cholmod& cholmod) {
+  auto factor = std::make_shared<const Factor>(cholmod_analyze(matrix.get(), cholmod.get()), cholmod);
+  cholmod_factorize(matrix.get(), factor->get(), cholmod.get());
+  cholmod.check();
+  return factor;
+}
 
 // Why a coordinate of a particle is not solved for.
 enum Fixed : uint8_t { kFree = 0, kOnLowWall, kOnHighWall, kGiven };
@@ -309,14 +270,14 @@ class LinearStage {
 
   // Axes with the same fixed particles share one factorisation.
   void refactor(int axis, std::vector<uint8_t> fixed) {
-    std::shared_ptr<Cholesky> same;
+    std::shared_ptr<const Factor> same;
     for (std::size_t other = 0; other < 3; ++other) {
       if (factor_[other] && fixed_[other] == fixed) same = factor_[other];
     }
     fixed_[at(axis)] = std::move(fixed);
     if (!same) {
       const ClusterSystem system = cluster_system(substep_.body, substep_.clusters, substep_.s, fixed_[at(axis)]);
-      same = std::make_shared<Cholesky>(cholmod_, matrix_of(system, cholmod_));
+      same = factorised(matrix_of(system, cholmod_), cholmod_);
     }
     factor_[at(axis)] = std::move(same);
   }
@@ -352,10 +313,10 @@ class LinearStage {
     for (int round = 0; round < kMostActiveSets; ++round) {
       std::vector<double> right(at(substep_.clusters.count()), 0.0);
       for (int32_t i = 0; i < substep_.body.particle_count(); ++i) {
-        const double moment = substep_.weight[at(i)] * known_part(i, axis, turned);
+        const double moment = substep_.rest.weight[at(i)] * known_part(i, axis, turned);
         for (const int32_t c : substep_.memberships.of(i)) right[at(c)] += moment;
       }
-      const std::vector<double> t = factor_[at(axis)]->solve(std::move(right));
+      const std::vector<double> t = solve(cholmod_, factor_[at(axis)]->get(), std::move(right));
       std::vector<uint8_t> next = given();
       for (int32_t i = 0; i < substep_.body.particle_count(); ++i) {
         if (!substep_.is_free(i)) continue;
@@ -371,7 +332,7 @@ class LinearStage {
   const Substep& substep_;
   Cholmod cholmod_;                            // before the factors: it outlives them
   std::array<std::vector<uint8_t>, 3> fixed_;  // [axis][n] of Fixed
-  std::array<std::shared_ptr<Cholesky>, 3> factor_;
+  std::array<std::shared_ptr<const Factor>, 3> factor_;
 };
 
 }  // namespace
@@ -385,8 +346,8 @@ ReferenceSolution reference_solution(const Setup& setup, const State& state) {
   Poses poses = poses_at(substep, result.x, state.clusters.rotation);
   if (state.clusters.count() > 0) {
     LinearStage linear(substep);
-    double left =
-        std::numeric_limits<double>::infinity();  // of the way to the limit, if changes go on shrinking so [h]
+    // Of the way to the limit, if changes go on shrinking so [h].
+    double left = std::numeric_limits<double>::infinity();
     while (result.alternations < kMostAlternations && !(result.converged && left < kConverged / 10)) {
       std::vector<Vec3> x = linear.positions(poses.rotation);
       const double change = greatest_change(x, result.x) / h;
@@ -429,8 +390,11 @@ PlainLimit plain_limit(const Setup& setup, const State& state, double tolerance,
   PlainLimit result;
   result.x = first_positions(substep);
   Poses poses = poses_at(substep, result.x, state.clusters.rotation);
-  result.energy.push_back(energy_at(substep, result.x, poses));
-  result.momentum_drift.push_back(drift(result.x));
+  const auto note = [&] {
+    result.energy.push_back(energy_at(substep, result.x, poses));
+    result.momentum_drift.push_back(drift(result.x));
+  };
+  note();
   while (result.iterations < most) {
     const std::vector<Vec3> goal = goals_of(substep, poses);
     std::vector<Vec3> x = result.x;
@@ -443,8 +407,7 @@ PlainLimit plain_limit(const Setup& setup, const State& state, double tolerance,
     result.last_change = greatest_change(x, result.x) / h;
     result.x = std::move(x);
     poses = poses_at(substep, result.x, poses.rotation);
-    result.energy.push_back(energy_at(substep, result.x, poses));
-    result.momentum_drift.push_back(drift(result.x));
+    note();
     ++result.iterations;
     if (result.last_change < tolerance) break;
   }

@@ -13,21 +13,17 @@ namespace cutproof::oracles {
 
 namespace {
 
-constexpr Span kFrame{Stage::step, Stage::skin};
-constexpr Span kStep{Stage::step, Stage::step};
-
 State after_frame(Backend& backend, const Setup& setup, const State& state) {
+  constexpr Span kStep{Stage::step, Stage::step};
   backend.load({setup}, {state});
-  backend.run(backend.can_run(kStep) ? kStep : kFrame);
+  backend.run(backend.can_run(kStep) ? kStep : Span{});
   return std::move(backend.snapshot().front());
 }
 
 // Whether reference_solution takes the first substep of the state's frame.
 bool has_energy(const Setup& setup, const State& state) {
-  if (setup.step.solver != Solver::implicit) return false;
-  if (std::any_of(setup.walls.begin(), setup.walls.end(), [](const Wall& wall) { return wall.friction > 0; })) {
-    return false;
-  }
+  const auto has_friction = [](const Wall& wall) { return wall.friction > 0; };
+  if (std::any_of(setup.walls.begin(), setup.walls.end(), has_friction)) return false;
   return !setup.has_blade || setup.detect.criterion == Criterion::geometric ||
          !setup.blade_moves[at(state.frame * setup.step.substeps)].down;
 }

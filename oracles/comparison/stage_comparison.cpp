@@ -8,7 +8,7 @@
 
 #include "model/rules.h"
 #include "oracles/oracles.h"
-#include "oracles/support.h"
+#include "oracles/shape_sums.h"
 
 namespace cutproof::oracles {
 
@@ -22,15 +22,15 @@ void end_frame(State& state) {
   ++state.frame;
 }
 
-Verdict verdict_on(const StageDifference& difference, std::string property) {
-  return {.property = std::move(property),
-          .stage = difference.stage,
-          .backend = {},
-          .frame = difference.frame,
-          .unit = "1",
-          .bound_source = kBoundSource,
-          .checked = 1,
-          .witness = {}};
+Verdict start_verdict(std::string property, Stage stage, int64_t frame) {
+  Verdict verdict;
+  verdict.property = std::move(property);
+  verdict.stage = stage;
+  verdict.frame = frame;
+  verdict.unit = "1";
+  verdict.bound_source = kBoundSource;
+  verdict.checked = 1;
+  return verdict;
 }
 
 // Where the stage moves nothing each of these is zero, and its count would only thin out the step's.
@@ -47,12 +47,20 @@ std::vector<int32_t> in_one_only(const std::vector<int32_t>& a, const std::vecto
 }
 
 RestFrameComparison compare_rest_frames(const Setup& setup, const State& state) {
-  const RestFrameErrors errors = rest_frame_errors(setup, state);
+  const Clusters& clusters = state.clusters;
+  const WeightedRest rest = weighted_rest(setup.body, clusters);
+  RestFrameComparison found;
   int64_t largest = 0;
-  for (int32_t c = 0; c < state.clusters.count(); ++c) largest = std::max(largest, state.clusters.size(c));
+  for (int32_t c = 0; c < clusters.count(); ++c) {
+    const ClusterMeans fresh = cluster_means(rest, clusters, rest.position, c);
+    found.center.norm.add(norm(clusters.rest_center[at(c)] - fresh.rest) / setup.body.grid.spacing, c);
+    found.mass.norm.add(std::abs(clusters.mass[at(c)] - fresh.mass) / fresh.mass, c);
+    largest = std::max(largest, clusters.size(c));
+  }
+  found.center.bound = position_bound(setup.body);
   // Each weight carries one rounding, a sum of N positive terms at most N - 1, on both sides; and the state's.
-  const double bound_of_mass = 2 * static_cast<double>(largest + 4) * unit_roundoff(state);
-  return {{errors.center, position_bound(setup.body)}, {errors.mass, bound_of_mass}};
+  found.mass.bound = 2 * static_cast<double>(largest + 4) * unit_roundoff(state);
+  return found;
 }
 
 StageComparison::StageComparison(const Setup& setup, ReferenceStages reference)
@@ -71,12 +79,12 @@ StageDifference StageComparison::compare(Stage stage, const State& before, const
   const Verdict form = well_formed(setup_, after);
   if (!form.holds) {
     found.is_readable = false;
-    found.decisions.push_back({form.witness.text, form.witness.clusters, form.witness.particles});
+    found.decisions.push_back({form.witness});
     return found;
   }
   if (launched != found.due) {
     found.decisions.push_back(
-        {found.due ? "the stage was due, but did not run" : "the stage ran, but was not due", {}, {}});
+        {witness_of({}, "{}", found.due ? "the stage was due, but did not run" : "the stage ran, but was not due")});
   }
   if (stage == Stage::step && found.due) {
     compare_step(before, after, found);
@@ -128,7 +136,7 @@ void StageComparison::compare_later_stage(const State& before, const State& afte
                                               after.clusters.rotation.begin());
     const int32_t cluster = after.clusters.number[at(theirs - after.clusters.rotation.begin())];
     difference =
-        DecisionDifference{fmt::format("cluster {} has not the rotation that it inherits", cluster), {cluster}, {}};
+        DecisionDifference{witness_of({{cluster}}, "cluster {} has not the rotation that it inherits", cluster)};
   }
 
   const double dt =
@@ -150,34 +158,27 @@ void StageComparison::compare_later_stage(const State& before, const State& afte
 
 Verdict verdict_of(Measure which, const MeasuredError& error, Stage stage, int64_t frame, const std::string& prefix) {
   const MeasureInfo& info = info_of(which);
-  Verdict verdict;
-  verdict.property = fmt::format("{}{}", prefix, info.name);
-  verdict.stage = stage;
-  verdict.frame = frame;
-  verdict.holds = error.holds();
-  verdict.measured = error.norm.max;
+  const ErrorNorm& norm = error.norm;
+  Verdict verdict = start_verdict(prefix + std::string(info.name), stage, frame);
+  verdict.measured = norm.max;
   verdict.bound = error.bound;
   verdict.unit = info.unit;
-  verdict.bound_source = kBoundSource;
-  verdict.checked = error.norm.count;
-  if (verdict.holds) return verdict;
-  (info.of_clusters ? verdict.witness.clusters : verdict.witness.particles) = {error.norm.where};
-  verdict.witness.text =
-      fmt::format("{} of {} {} are {:.3g} {} from the reference's", info.name,
-                  info.of_clusters ? "cluster" : "particle", error.norm.where, error.norm.max, info.unit);
+  verdict.checked = norm.count;
+  if (error.holds()) return verdict;
+  const Concerned concerned = info.of_clusters ? Concerned{{norm.where}} : Concerned{{}, {norm.where}};
+  fail(verdict, concerned, "{} of {} {} are {:.3g} {} from the reference's", info.name,
+       info.of_clusters ? "cluster" : "particle", norm.where, norm.max, info.unit);
   return verdict;
 }
 
 std::vector<Verdict> StageDifference::verdicts(const std::string& prefix) const {
-  std::vector<Verdict> verdicts = {verdict_on(*this, fmt::format("{}topology", prefix))};
+  std::vector<Verdict> verdicts = {start_verdict(prefix + "topology", stage, frame)};
   if (!decisions.empty()) {
-    Verdict& topology = verdicts.back();
-    topology.holds = false;
-    topology.measured = static_cast<double>(decisions.size());
-    topology.witness = {decisions.front().clusters, decisions.front().particles, {}, decisions.front().text};
+    verdicts.back().measured = static_cast<double>(decisions.size());
+    fail(verdicts.back(), decisions.front());
   }
   if (stage == Stage::detect && due) {
-    verdicts.push_back(verdict_on(*this, fmt::format("{}removed particles", prefix)));
+    verdicts.push_back(start_verdict(prefix + "removed particles", stage, frame));
     if (detection && !detection->holds) {
       Verdict& removed = verdicts.back();
       removed.holds = false;

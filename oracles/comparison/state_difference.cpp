@@ -9,9 +9,7 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "model/at.h"
-#include "model/fields.h"
-#include "oracles/shape_sums.h"
+#include "oracles/support.h"
 
 namespace cutproof::oracles {
 
@@ -22,26 +20,22 @@ namespace {
 template <class T>
 bool equal(const T& a, const T& b, bool rounded_once) {
   if constexpr (std::is_same_v<T, Vec3>) {
-    if (rounded_once) {
-      for (int axis = 0; axis < 3; ++axis) {
-        if (!(std::abs(a[axis] - b[axis]) <= 0x1p-23 * std::abs(a[axis]))) return false;
-      }
-      return true;
-    }
+    const auto near = [&](int axis) { return std::abs(a[axis] - b[axis]) <= 0x1p-23 * std::abs(a[axis]); };
+    if (rounded_once) return near(0) && near(1) && near(2);
   }
   return same_bits(a, b);
 }
 // -1 if they are equal.
 template <class T>
 int64_t first_unequal(const T& a, const T& b, bool rounded_once) {
-  return equal(a, b, rounded_once) ? -1 : 0;
-}
-template <class T>
-int64_t first_unequal(const std::vector<T>& a, const std::vector<T>& b, bool rounded_once) {
   if (same_bits(a, b)) return -1;
-  const auto [p, q] = std::mismatch(a.begin(), a.end(), b.begin(), b.end(),
-                                    [&](const T& x, const T& y) { return equal(x, y, rounded_once); });
-  return p == a.end() && q == b.end() ? -1 : p - a.begin();
+  if constexpr (requires { a.size(); }) {
+    const auto [p, q] = std::mismatch(a.begin(), a.end(), b.begin(), b.end(),
+                                      [&](const auto& x, const auto& y) { return equal(x, y, rounded_once); });
+    return p == a.end() && q == b.end() ? -1 : p - a.begin();
+  } else {
+    return equal(a, b, rounded_once) ? -1 : 0;
+  }
 }
 
 // --- Decisions -------------------------------------------------------------------------------------------------------
@@ -64,6 +58,11 @@ std::vector<std::pair<std::vector<int32_t>, int32_t>> numbered_sets(const Cluste
   return sets;
 }
 
+template <class... Args>
+std::optional<DecisionDifference> differs(Concerned concerned, fmt::format_string<Args...> text, Args&&... args) {
+  return DecisionDifference{witness_of(std::move(concerned), text, std::forward<Args>(args)...), {}};
+}
+
 std::optional<DecisionDifference> difference_of_clusters(const Clusters& expected, const Clusters& actual) {
   if (expected.offsets == actual.offsets && expected.members == actual.members && expected.number == actual.number) {
     return {};
@@ -71,22 +70,18 @@ std::optional<DecisionDifference> difference_of_clusters(const Clusters& expecte
   const auto wanted = numbered_sets(expected), found = numbered_sets(actual);
   const auto [w, f] = std::mismatch(wanted.begin(), wanted.end(), found.begin(), found.end());
   if (w == wanted.end() && f == found.end()) {
-    return DecisionDifference{"the clusters are those of the reference, but not in the order of their numbers", {}, {}};
+    return differs({}, "the clusters are those of the reference, but not in the order of their numbers");
   }
   if (w != wanted.end() && f != found.end() && w->first == f->first) {
-    return DecisionDifference{
-        fmt::format("the cluster of {} particles around particle {} has the number {}, but {} in the reference",
-                    w->first.size(), w->first.front(), f->second, w->second),
-        {f->second, w->second},
-        {w->first.front()}};
+    const int32_t particle = w->first.front();
+    return differs({{f->second, w->second}, {particle}},
+                   "the cluster of {} particles around particle {} has the number {}, but {} in the reference",
+                   w->first.size(), particle, f->second, w->second);
   }
   const bool surplus = w == wanted.end() || (f != found.end() && f->first < w->first);
   const auto& [members, number] = surplus ? *f : *w;
-  return DecisionDifference{
-      fmt::format("cluster {}, of {} particles around particle {}, is {}", number, members.size(),
-                  members.empty() ? -1 : members.front(), surplus ? "not in the reference" : "only in the reference"),
-      {number},
-      members};
+  return differs({{number}, members}, "cluster {}, of {} particles around particle {}, is {}", number, members.size(),
+                 members.empty() ? -1 : members.front(), surplus ? "not in the reference" : "only in the reference");
 }
 
 // Vertices in the order of (owner, direction).
@@ -115,67 +110,49 @@ std::vector<std::array<int32_t, 3>> canonical_triangles(const Skin& skin, const 
 std::optional<DecisionDifference> difference_of_skins(const Skin& expected, const Skin& actual) {
   if (expected == actual) return {};
   if (actual.direction.size() != actual.owner.size() || actual.position.size() != actual.owner.size()) {
-    return DecisionDifference{"the skin's arrays of vertices have different lengths", {}, {}};
+    return differs({}, "the skin's arrays of vertices have different lengths");
   }
   const auto wanted = vertex_order(expected), found = vertex_order(actual);
   for (std::size_t k = 0; k < std::min(wanted.size(), found.size()); ++k) {
     const std::size_t w = at(wanted[k]), f = at(found[k]);
     if (expected.owner[w] == actual.owner[f] && expected.direction[w] == actual.direction[f]) continue;
-    return DecisionDifference{
-        fmt::format("skin vertex {} belongs to particle {}, direction {}, but in the reference to "
-                    "particle {}, direction {}",
-                    k, actual.owner[f], actual.direction[f], expected.owner[w], expected.direction[w]),
-        {},
-        {actual.owner[f], expected.owner[w]}};
+    return differs(
+        {{}, {actual.owner[f], expected.owner[w]}},
+        "skin vertex {} belongs to particle {}, direction {}, but in the reference to particle {}, direction {}", k,
+        actual.owner[f], actual.direction[f], expected.owner[w], expected.direction[w]);
   }
   if (wanted.size() != found.size()) {
-    return DecisionDifference{
-        fmt::format("the skin has {} vertices, but {} in the reference", found.size(), wanted.size()), {}, {}};
+    return differs({}, "the skin has {} vertices, but {} in the reference", found.size(), wanted.size());
   }
-  const auto triangles = canonical_triangles(expected, wanted), others = canonical_triangles(actual, found);
-  const auto [w, f] = std::mismatch(triangles.begin(), triangles.end(), others.begin(), others.end());
-  if (w == triangles.end() && f == others.end()) return {};
-  const bool surplus = w == triangles.end() || (f != others.end() && *f < *w);
-  DecisionDifference difference{
-      fmt::format("a skin triangle is {}", surplus ? "not in the reference" : "only in the reference"), {}, {}};
-  for (const int32_t place : surplus ? *f : *w) {
-    if (place >= 0) difference.particles.push_back(expected.owner[at(wanted[at(place)])]);
+  const auto first = first_in_one_only(canonical_triangles(expected, wanted), canonical_triangles(actual, found));
+  if (!first) return {};
+  std::vector<int32_t> owners;
+  for (const int32_t place : first->element) {
+    if (place >= 0) owners.push_back(expected.owner[at(wanted[at(place)])]);
   }
-  return difference;
+  return differs({{}, owners}, "a skin triangle is {}",
+                 first->in_second ? "not in the reference" : "only in the reference");
 }
 
-// The first particle in one ascending list and not in the other, said in a sentence.
-std::optional<DecisionDifference> difference_of_lists(const std::vector<int32_t>& expected,
-                                                      const std::vector<int32_t>& actual, std::string_view what) {
-  const auto [w, f] = std::mismatch(expected.begin(), expected.end(), actual.begin(), actual.end());
-  if (w == expected.end() && f == actual.end()) return {};
-  const bool surplus = w == expected.end() || (f != actual.end() && *f < *w);
-  const int32_t particle = surplus ? *f : *w;
-  return DecisionDifference{
-      fmt::format("particle {} is {} {}", particle, what, surplus ? "here only" : "in the reference only"),
-      {},
-      {particle}};
-}
-
-std::optional<DecisionDifference> difference_of_flags(const std::vector<uint8_t>& expected,
-                                                      const std::vector<uint8_t>& actual, std::string_view what) {
-  const auto [w, f] = std::mismatch(expected.begin(), expected.end(), actual.begin(), actual.end());
-  if (w == expected.end() || f == actual.end()) return {};
-  const auto particle = static_cast<int32_t>(w - expected.begin());
-  return DecisionDifference{
-      fmt::format("particle {} is {} {}", particle, what, *f ? "here only" : "in the reference only"), {}, {particle}};
+// A particle of which something holds in one state only.
+std::optional<DecisionDifference> differs_in(int32_t particle, std::string_view what, bool here) {
+  return differs({{}, {particle}}, "particle {} is {} {}", particle, what,
+                 here ? "here only" : "in the reference only");
 }
 
 template <class T>
 std::optional<DecisionDifference> difference_of_field(const Field& field, const T& expected, const T& actual) {
-  if constexpr (std::is_same_v<T, std::vector<int32_t>>) {
-    return difference_of_lists(expected, actual, field.name);
-  } else if constexpr (std::is_same_v<T, std::vector<uint8_t>>) {
-    return difference_of_flags(expected, actual, field.name);
+  if constexpr (std::is_same_v<T, std::vector<int32_t>>) {  // an ascending list
+    const auto first = first_in_one_only(expected, actual);
+    return first ? differs_in(first->element, field.name, first->in_second) : std::nullopt;
+  } else if constexpr (std::is_same_v<T, std::vector<uint8_t>>) {  // flags
+    const auto [w, f] = std::mismatch(expected.begin(), expected.end(), actual.begin(), actual.end());
+    if (w == expected.end() || f == actual.end()) return {};
+    return differs_in(static_cast<int32_t>(w - expected.begin()), field.name, *f != 0);
   } else if constexpr (std::is_arithmetic_v<T>) {
-    return DecisionDifference{fmt::format("{} is {}, but {} in the reference", field.text, actual, expected), {}, {}};
+    return differs({}, "{} is {}, but {} in the reference", field.text, actual, expected);
   } else {
-    return DecisionDifference{fmt::format("{} differs from the reference's", field.text), {}, {}};
+    return differs({}, "{} differs from the reference's", field.text);
   }
 }
 
@@ -188,18 +165,11 @@ struct Scale {
 };
 
 std::string_view unit_of(Quantity quantity) {
-  switch (quantity) {
-    case Quantity::point:
-      return "h";
-    case Quantity::velocity:
-      return "h/dt";
-    case Quantity::momentum:
-      return "kg m/s";
-    case Quantity::rotation:
-      return "rad";
-    default:
-      return "1";
-  }
+  return quantity == Quantity::point      ? "h"
+         : quantity == Quantity::velocity ? "h/dt"
+         : quantity == Quantity::momentum ? "kg m/s"
+         : quantity == Quantity::rotation ? "rad"
+                                          : "1";
 }
 
 template <class T>
@@ -210,10 +180,7 @@ double error_of_entry(Quantity quantity, const T& expected, const T& actual, Sca
     if (quantity == Quantity::velocity) return apart * scale.dt / scale.spacing;
     return apart;
   } else if constexpr (std::is_same_v<T, Mat3>) {
-    // ‖R − R'‖² = 8 sin²(angle / 2): exact for small angles, where the trace loses all digits.
-    double squared = 0;
-    for (std::size_t k = 0; k < 9; ++k) squared += (actual.m[k] - expected.m[k]) * (actual.m[k] - expected.m[k]);
-    return std::isnan(squared) ? squared : 2 * std::asin(std::min(1.0, std::sqrt(squared / 8)));
+    return angle_between(expected, actual);
   } else if constexpr (std::is_same_v<T, double>) {
     return expected == actual ? 0 : std::abs(actual - expected) / std::abs(expected);
   } else if constexpr (std::is_same_v<T, uint8_t>) {
@@ -234,42 +201,38 @@ ErrorNorm error_of_particles(Quantity quantity, const std::vector<T>& expected, 
   return norm;
 }
 
-// What corresponds to what: clusters by their order, skin vertices by (owner, direction).
-struct Correspondence {
-  bool clusters = false, skin = false;
+// Two states, and what in them corresponds to what: clusters by their order, skin vertices by (owner, direction).
+struct Pair {
+  Pair(const State& expected, const State& actual)
+      : skin(expected.skin),
+        same_clusters(!difference_of_clusters(expected.clusters, actual.clusters)),
+        same_skin(!difference_of_skins(expected.skin, actual.skin)) {
+    if (!same_skin) return;
+    expected_vertex = vertex_order(expected.skin);
+    actual_vertex = vertex_order(actual.skin);
+  }
+  const Skin& skin;
+  bool same_clusters, same_skin;
   std::vector<int32_t> expected_vertex, actual_vertex;
 };
-Correspondence correspondence_of(const State& expected, const State& actual) {
-  Correspondence found;
-  found.clusters = !difference_of_clusters(expected.clusters, actual.clusters);
-  found.skin = !difference_of_skins(expected.skin, actual.skin);
-  if (!found.skin) return found;
-  found.expected_vertex = vertex_order(expected.skin);
-  found.actual_vertex = vertex_order(actual.skin);
-  return found;
-}
 
 template <class T>
 ErrorNorm error_of_field(const Field& field, const T& expected, const T& actual, Scale scale,
-                         const std::vector<uint8_t>&, const Correspondence&, const Skin&) {
+                         const std::vector<uint8_t>& mask, const Pair& pair) {
   ErrorNorm norm;
-  norm.add(error_of_entry(field.quantity, expected, actual, scale), 0);
-  return norm;
-}
-template <class T>
-ErrorNorm error_of_field(const Field& field, const std::vector<T>& expected, const std::vector<T>& actual, Scale scale,
-                         const std::vector<uint8_t>& mask, const Correspondence& same, const Skin& skin) {
-  if (field.space == IndexSpace::particle) return error_of_particles(field.quantity, expected, actual, scale, mask);
-  ErrorNorm norm;
-  if (field.space == IndexSpace::cluster && same.clusters) {
-    for (std::size_t c = 0; c < expected.size(); ++c) {
-      norm.add(error_of_entry(field.quantity, expected[c], actual[c], scale), static_cast<int32_t>(c));
-    }
-  }
-  if (field.space == IndexSpace::vertex && same.skin) {
+  const auto add = [&](const auto& one, const auto& other, auto where) {
+    norm.add(error_of_entry(field.quantity, one, other, scale), static_cast<int32_t>(where));
+  };
+  if constexpr (!requires { expected.size(); }) {
+    add(expected, actual, 0);
+  } else if (field.space == IndexSpace::particle) {
+    return error_of_particles(field.quantity, expected, actual, scale, mask);
+  } else if (field.space == IndexSpace::cluster && pair.same_clusters) {
+    for (std::size_t c = 0; c < expected.size(); ++c) add(expected[c], actual[c], c);
+  } else if (field.space == IndexSpace::vertex && pair.same_skin) {
     for (std::size_t k = 0; k < expected.size(); ++k) {
-      const std::size_t v = at(same.expected_vertex[k]);
-      norm.add(error_of_entry(field.quantity, expected[v], actual[at(same.actual_vertex[k])], scale), skin.owner[v]);
+      const std::size_t v = at(pair.expected_vertex[k]);
+      add(expected[v], actual[at(pair.actual_vertex[k])], pair.skin.owner[v]);
     }
   }
   return norm;
@@ -277,15 +240,20 @@ ErrorNorm error_of_field(const Field& field, const std::vector<T>& expected, con
 
 }  // namespace
 
-std::optional<FieldDifference> first_difference_in_bits(const State& expected, const State& actual, bool rounded_once) {
-  std::optional<FieldDifference> found;
+std::vector<FieldDifference> differences_in_bits(const State& expected, const State& actual, bool rounded_once) {
+  std::vector<FieldDifference> found;
   for_each_field([&](const Field& field, auto get) {
-    if (found) return;
     const bool rounded = rounded_once && (field.quantity == Quantity::velocity || field.quantity == Quantity::momentum);
     const int64_t index = first_unequal(get(expected), get(actual), rounded);
-    if (index >= 0) found = FieldDifference{field.name, field.text, index};
+    constexpr bool is_list = requires { get(expected).size(); };
+    if (index >= 0) found.push_back({field.name, field.text, field.space, field.is_decision, is_list, index});
   });
   return found;
+}
+
+std::optional<FieldDifference> first_difference_in_bits(const State& expected, const State& actual, bool rounded_once) {
+  const std::vector<FieldDifference> found = differences_in_bits(expected, actual, rounded_once);
+  return found.empty() ? std::nullopt : std::optional(found.front());
 }
 
 std::optional<DecisionDifference> difference_of_decisions(const State& expected, const State& actual, Sets sets) {
@@ -328,12 +296,12 @@ ErrorNorm velocity_error(const Setup& setup, const std::vector<Vec3>& expected, 
 std::vector<FieldError> errors_of_fields(const Setup& setup, const State& expected, const State& actual, double dt,
                                          const std::vector<uint8_t>& mask) {
   const Scale scale{setup.body.grid.spacing, dt};
-  const Correspondence same = correspondence_of(expected, actual);
+  const Pair pair(expected, actual);
   std::vector<FieldError> errors;
   for_each_field([&](const Field& field, auto get) {
     if (field.is_decision) return;
-    errors.push_back({field.name, unit_of(field.quantity),
-                      error_of_field(field, get(expected), get(actual), scale, mask, same, expected.skin)});
+    errors.push_back(
+        {field.name, unit_of(field.quantity), error_of_field(field, get(expected), get(actual), scale, mask, pair)});
   });
   return errors;
 }
@@ -345,16 +313,10 @@ const ErrorNorm& error_of(const std::vector<FieldError>& errors, std::string_vie
   throw std::invalid_argument(fmt::format("no field that is computed is named '{}'", field));
 }
 
-RestFrameErrors rest_frame_errors(const Setup& setup, const State& actual) {
-  const Clusters& clusters = actual.clusters;
-  const WeightedRest rest = weighted_rest(setup.body, membership_counts(clusters, setup.body.particle_count()));
-  RestFrameErrors errors;
-  for (int32_t c = 0; c < clusters.count(); ++c) {
-    const ClusterMeans fresh = cluster_means(rest, clusters, rest.position, c);
-    errors.center.add(norm(clusters.rest_center[at(c)] - fresh.rest) / setup.body.grid.spacing, c);
-    errors.mass.add(std::abs(clusters.mass[at(c)] - fresh.mass) / fresh.mass, c);
-  }
-  return errors;
+double angle_between(const Mat3& a, const Mat3& b) {
+  double squared = 0;
+  for (std::size_t k = 0; k < 9; ++k) squared += (b.m[k] - a.m[k]) * (b.m[k] - a.m[k]);
+  return std::isnan(squared) ? squared : 2 * std::asin(std::min(1.0, std::sqrt(squared / 8)));
 }
 
 }  // namespace cutproof::oracles

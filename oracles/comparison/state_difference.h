@@ -7,8 +7,10 @@
 #include <string_view>
 #include <vector>
 
+#include "model/fields.h"
 #include "model/setup.h"
 #include "model/state.h"
+#include "model/verdict.h"
 #include "oracles/comparison/error_norm.h"
 
 namespace cutproof::oracles {
@@ -18,21 +20,22 @@ namespace cutproof::oracles {
 struct FieldDifference {
   std::string_view field;  // Field::name
   std::string_view text;   // Field::text
-  int64_t index = 0;       // of the first entry that differs, or that only one of the two has; 0 of a single value
+  IndexSpace space;
+  bool is_decision;
+  bool is_list;
+  int64_t index = 0;  // of the first entry that differs, or that only one of the two has; 0 of a single value
 };
-// The first field, in the order of model/fields.h, that differs by a bit. `rounded_once`: velocities and momenta may
-// differ as if those of `actual` had been rounded to single precision (each component once, sums of them in parts, so
-// twice half a unit in the last place).
+// The fields, in the order of model/fields.h, that differ by a bit; and the first of them. `rounded_once`: velocities
+// and momenta may differ as if those of `actual` had been rounded to single precision (each component once, sums of
+// them in parts, so twice half a unit in the last place).
+std::vector<FieldDifference> differences_in_bits(const State& expected, const State& actual, bool rounded_once = false);
 std::optional<FieldDifference> first_difference_in_bits(const State& expected, const State& actual,
                                                         bool rounded_once = false);
 
 // --- Decisions -------------------------------------------------------------------------------------------------------
 
 // A difference for which there is no "close".
-struct DecisionDifference {
-  std::string text;
-  std::vector<int32_t> clusters;  // numbers
-  std::vector<int32_t> particles;
+struct DecisionDifference : Witness {
   std::string_view field = {};  // Field::name of the first that shows it; empty if it is none of a state
 };
 // Whether clusters, and what is derived from them, are compared: a rule may leave several answers (model/rules.h).
@@ -66,10 +69,8 @@ std::vector<FieldError> errors_of_fields(const Setup& setup, const State& expect
 // Throws std::invalid_argument if there is no such field.
 const ErrorNorm& error_of(const std::vector<FieldError>& errors, std::string_view field);
 
-// Rest centers [h] and masses [1] against those recomputed from the state's own memberships.
-struct RestFrameErrors {
-  ErrorNorm center, mass;
-};
-RestFrameErrors rest_frame_errors(const Setup& setup, const State& actual);
+// The angle of the rotation from a to b [rad], by ‖R − R'‖² = 8 sin²(angle / 2): exact for small angles, where the
+// trace loses all digits. Not a number if an entry is none.
+double angle_between(const Mat3& a, const Mat3& b);
 
 }  // namespace cutproof::oracles

@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "oracles/comparison/state_difference.h"
+#include "oracles/eigen.h"
 #include "oracles/shape_sums.h"
+#include "oracles/single_substep.h"
 #include "oracles/support.h"
 
 namespace cutproof::oracles {
@@ -25,28 +27,6 @@ constexpr double kSideBand = 32;
 // (docs/design/tolerances.md, Against the reference), in so many runs, from a fixed seed.
 constexpr uint32_t kDisturbedRuns = 16;
 constexpr uint32_t kDisturbanceSeed = 1;
-
-// The same body in one frame of one substep, filled in by take_substep().
-Setup single_substep(const Setup& setup) {
-  Setup single = setup;
-  single.step.substeps = 1;
-  single.substep_length.assign(1, 0);
-  single.blade_moves.resize(setup.has_blade ? 1 : 0);
-  for (Grip& grip : single.grips) {
-    grip.active.assign(1, 0);
-    grip.displacement.assign(1, {});
-  }
-  return single;
-}
-
-void take_substep(const Setup& setup, int64_t frame, int64_t substep, Setup& single) {
-  single.substep_length[0] = setup.substep_length[at(frame)];
-  if (setup.has_blade) single.blade_moves[0] = setup.blade_moves[at(substep)];
-  for (std::size_t g = 0; g < setup.grips.size(); ++g) {
-    single.grips[g].active[0] = setup.grips[g].active[at(substep)];
-    single.grips[g].displacement[0] = setup.grips[g].displacement[at(substep)];
-  }
-}
 
 double height_over(const BladePose& pose, Vec3 x) { return dot(x - pose.edge, cross(pose.along, pose.back)); }
 
@@ -79,14 +59,11 @@ Shape shape_of(const WeightedRest& body, const Clusters& clusters, const std::ve
   Shape shape;
   for (const int32_t i : clusters.of(c)) {
     const double w = body.weight[at(i)];
-    const Vec3 now = x[at(i)] - means.current, rest = body.position[at(i)] - means.rest;
-    shape.arm += w * norm(rest);
-    for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 3; ++column) {
-        a(row, column) += w * now[row] * rest[column];
-        of_rest(row, column) += w * rest[row] * rest[column];
-      }
-    }
+    const Vec3 arm = body.position[at(i)] - means.rest;
+    shape.arm += w * norm(arm);
+    const Vector3d now = w * as_eigen(x[at(i)] - means.current), rest = as_eigen(arm);
+    a += now * rest.transpose();
+    of_rest += w * rest * rest.transpose();
   }
   const Vector3d widths = Eigen::SelfAdjointEigenSolver<Matrix3d>(of_rest, Eigen::EigenvaluesOnly).eigenvalues();
   shape.line = !(widths[1] > kUniqueRotation * kUniqueRotation * widths[2]);  // of lengths squared
@@ -125,14 +102,10 @@ void spread(std::vector<uint8_t>& particles, const Clusters& clusters, int64_t i
 std::vector<RotationDifference> rotation_differences(const Setup& setup, const State& expected, const State& actual) {
   const Clusters& clusters = expected.clusters;
   std::vector<RotationDifference> turns(at(clusters.count()));
-  const WeightedRest rest = weighted_rest(setup.body, membership_counts(clusters, setup.body.particle_count()));
+  const WeightedRest rest = weighted_rest(setup.body, clusters);
   for (int32_t c = 0; c < clusters.count(); ++c) {
-    double squared = 0;
-    for (std::size_t k = 0; k < 9; ++k) {
-      const double d = actual.clusters.rotation[at(c)].m[k] - clusters.rotation[at(c)].m[k];
-      squared += d * d;
-    }
-    if (squared == 0) continue;
+    const double angle = angle_between(clusters.rotation[at(c)], actual.clusters.rotation[at(c)]);
+    if (angle == 0) continue;
     RotationDifference& turn = turns[at(c)];
     const Shape shape = shape_of(rest, clusters, expected.x, c);
     if (!shape.finite || !shape.unique) {
@@ -140,26 +113,19 @@ std::vector<RotationDifference> rotation_differences(const Setup& setup, const S
       turn.moves_members = shape.finite && !shape.line;  // if it is not finite, its positions tell of it
       continue;
     }
-    // ‖R - R'‖² = 8 sin²(angle / 2): exact for small angles, where the trace loses all digits.
-    const double angle = 2 * std::asin(std::min(1.0, std::sqrt(squared / 8)));
-    turn.angle = std::isnan(squared) ? squared : angle;
-    turn.displacement = turn.angle * shape.second_and_third / (std::sqrt(2.0) * shape.arm * setup.body.grid.spacing);
+    turn.angle = angle;
+    turn.displacement = angle * shape.second_and_third / (std::sqrt(2.0) * shape.arm * setup.body.grid.spacing);
   }
   return turns;
 }
 
 double body_extent(const Body& body) {
-  std::array<int32_t, 3> low = body.grid.nodes, high = {0, 0, 0};
+  Eigen::AlignedBox<int32_t, 3> box;  // empty
   for (const int64_t node : body.node) {
     const auto c = body.grid.coordinates(node);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], c[axis]);
-      high[axis] = std::max(high[axis], c[axis]);
-    }
+    box.extend(Eigen::Vector3i(c[0], c[1], c[2]));
   }
-  int32_t extent = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) extent = std::max(extent, high[axis] - low[axis]);
-  return extent;
+  return box.isEmpty() ? 0 : box.sizes().maxCoeff();
 }
 
 // The reference's step of frame before.frame, substep by substep, which gives the same bits as all at once. A tied
@@ -173,7 +139,7 @@ StepComparison::Stepped StepComparison::step(const State& before, const std::vec
   state.frame = 0;
   const bool touches = setup.has_blade && setup.detect.criterion != Criterion::geometric;
   for (int32_t s = 0; s < setup.step.substeps; ++s) {
-    take_substep(setup, before.frame, before.frame * setup.step.substeps + s, single);
+    take_substep(setup, before.frame, s, single);
     if (touches && single.blade_moves[0].down) {
       const BladePose& pose = single.blade_moves[0].from;
       for (std::size_t i = 0; i < state.x.size(); ++i) {
@@ -238,13 +204,12 @@ StepComparison::Growth StepComparison::growth_of_rounding(const State& before, c
 StepComparison::OnTheWay StepComparison::open_on_the_way(const State& before, const std::vector<int8_t>& wanted) {
   std::vector<State> starts;
   step(before, wanted, &starts);
-  const WeightedRest rest =
-      weighted_rest(setup_.body, membership_counts(before.clusters, setup_.body.particle_count()));
+  const WeightedRest rest = weighted_rest(setup_.body, before.clusters);
   OnTheWay open{std::vector<uint8_t>(at(before.clusters.count()), 0), std::vector<uint8_t>(before.x.size(), 0)};
   const bool touches = setup_.has_blade && setup_.detect.criterion != Criterion::geometric;
   for (std::size_t s = 0; s < starts.size(); ++s) {
     Setup fewer = one_substep_;
-    take_substep(setup_, before.frame, before.frame * setup_.step.substeps + static_cast<int64_t>(s), fewer);
+    take_substep(setup_, before.frame, static_cast<int64_t>(s), fewer);
     for (fewer.step.iterations = 0; fewer.step.iterations < setup_.step.iterations; ++fewer.step.iterations) {
       State state = starts[s];
       reference_step_(fewer, state);
@@ -278,7 +243,7 @@ StepComparison::StepComparison(const Setup& setup, ReferenceStep reference_step)
     : setup_(setup),
       reference_step_(std::move(reference_step)),
       bound_(position_bound(setup.body)),
-      one_substep_(single_substep(setup)) {}
+      one_substep_(frame_of_one_substep(setup)) {}
 
 StepDifference StepComparison::compare(const State& before, const State& after) {
   std::vector<int8_t> wanted(before.x.size(), 0);

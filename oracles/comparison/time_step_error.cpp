@@ -9,12 +9,6 @@
 
 namespace cutproof::oracles {
 
-namespace {
-
-constexpr Span kFrame{Stage::step, Stage::skin};
-
-}  // namespace
-
 Setup with_more_substeps(const Setup& setup, int32_t factor) {
   Setup finer = setup;
   finer.step.substeps *= factor;
@@ -50,8 +44,8 @@ TimeStepError time_step_error(const MakeBackend& make, const Setup& setup, const
   fine->load({with_more_substeps(setup, factor)}, {state});
   TimeStepError error;
   for (int64_t frame = state.frame; frame < std::min(state.frame + frames, setup.frame_count()); ++frame) {
-    coarse->run(kFrame);
-    fine->run(kFrame);
+    coarse->run({});
+    fine->run({});
     const State a = std::move(fine->snapshot().front()), b = std::move(coarse->snapshot().front());
     if (!measurable(setup, a) || !measurable(setup, b)) {
       error.position.push_back(infinite_error());

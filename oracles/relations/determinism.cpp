@@ -5,33 +5,19 @@
 #include "oracles/relations/shared.h"
 
 namespace cutproof::oracles {
-namespace {
-
-Verdict run_twice(Backend& backend, const Setup& setup, const State& state, int64_t frames) {
-  Verdict verdict = begin("determinism", backend, state, "1", "oracles.md, Relations: the same bits");
-  if (auto unjudged = unable(verdict, backend, kFrame)) return *unjudged;
-  std::vector<State> first;
-  backend.load({setup}, {state});
-  for (int64_t f = 0; f < frames; ++f) {
-    backend.run(kFrame);
-    first.push_back(backend.snapshot().at(0));
-  }
-  backend.load({setup}, {state});
-  for (const State& expected : first) {
-    backend.run(kFrame);
-    ++verdict.checked;
-    if (const auto found = bit_difference(expected, backend.snapshot().at(0))) {
-      return fail_on(std::move(verdict), fmt::format("the second run, at the end of frame {}", expected.frame - 1),
-                     *found);
-    }
-  }
-  return verdict;
-}
-
-}  // namespace
 
 Verdict determinism(Backend& backend, const Setup& setup, const State& state, int64_t frames) {
-  return conclude(run_twice(backend, setup, state, frames), "no frame was run");
+  const Relation relation = {"determinism", "1", "oracles.md, Relations: the same bits", "no frame was run"};
+  return judge_relation(relation, backend, kFrame, setup, state, [&](Verdict& verdict) {
+    const std::vector<State> first = after_each(backend, setup, state, std::vector<Span>(at(frames), kFrame));
+    backend.load({setup}, {state});
+    for (const State& expected : first) {
+      backend.run(kFrame);
+      ++verdict.checked;
+      const std::string where = fmt::format("the second run, at the end of frame {}", expected.frame - 1);
+      if (!require_same_bits(verdict, where, expected, backend.snapshot().at(0))) return;
+    }
+  });
 }
 
 }  // namespace cutproof::oracles

@@ -45,77 +45,58 @@ std::string text_of(const Transform& transform) {
   return text;
 }
 
-Verdict judge_exactly(Verdict verdict, const std::string& how, const State& expected, const State& actual) {
-  verdict.checked += static_cast<int64_t>(expected.x.size());
-  if (const auto found = bit_difference(expected, actual)) return fail_on(std::move(verdict), how, *found);
-  return verdict;
-}
-
-Verdict run_transformed(Backend& backend, const Setup& setup, const State& state, Span span, uint64_t seed) {
-  Verdict verdict = begin("equivariance", backend, state, "1", "tolerances.md, A transformed scene");
-  if (auto unjudged = unfit(verdict, setup, state)) return *unjudged;
-  if (auto unjudged = unable(verdict, backend, span)) return *unjudged;
-  const uint64_t kind = seed % kEquivarianceKinds;
-  uint64_t random = seed;
-  Transform transform;
-  switch (kind) {
-    case 0: {  // turned
-      transform = random_turn(random);
-      for (int32_t& padding : transform.padding) padding = static_cast<int32_t>(mixed(random) % 3);
-      const TransformedScene scene(transform, setup);
-      const State transformed = reordered(scene.state(state), shuffled(state.clusters.count(), random));
-      return judge_transformed(verdict, "turned, " + text_of(transform), backend, setup, state, scene, transformed,
-                               span, random);
-    }
-    case 1: {  // shifted on the grid
-      for (int32_t& padding : transform.padding) padding = static_cast<int32_t>(mixed(random) % 8);
-      const TransformedScene scene(transform, setup);
-      return judge_transformed(std::move(verdict),
-                               fmt::format("shifted by ({}, {}, {}) nodes", transform.padding[0], transform.padding[1],
-                                           transform.padding[2]),
-                               backend, setup, state, scene, scene.state(state), span, random);
-    }
-    case 2: {  // clusters renumbered
-      const TransformedScene scene(transform, setup);
-      const State transformed = reordered(state, shuffled(state.clusters.count(), random));
-      return judge_transformed(verdict, "clusters in another order", backend, setup, state, scene, transformed, span,
-                               random);
-    }
-    case 3: {  // scaled by a power of two
-      const int power = static_cast<int>(mixed(random) % 17) - 8;
-      transform.scale = std::ldexp(1.0, power == 0 ? 9 : power);
-      const TransformedScene scene(transform, setup);
-      const State original = after(backend, setup, state, {span});
-      if (auto unjudged = unfit(verdict, setup, original)) return *unjudged;
-      const State expected = scene.state(original);
-      const State actual = after(backend, scene.setup(), scene.state(state), {span});
-      return judge_exactly(std::move(verdict), fmt::format("scaled by {}", transform.scale), expected, actual);
-    }
-    case 4: {  // elsewhere in the world
-      transform.world_shift = {1e6 * setup.body.grid.spacing, -3e5 * setup.body.grid.spacing, 0.1};
-      const TransformedScene scene(transform, setup);
-      const State expected = after(backend, setup, state, {span});
-      const State actual = after(backend, scene.setup(), state, {span});
-      return judge_exactly(std::move(verdict), "elsewhere in the world", expected, actual);
-    }
-    default: {  // two of them
-      const State expected = after(backend, setup, state, {span});
-      backend.load({setup, setup}, {state, state});
-      backend.run(span);
-      const std::vector<State> both = backend.snapshot();
-      for (std::size_t body = 0; body < 2 && verdict.holds; ++body) {
-        verdict =
-            judge_exactly(std::move(verdict), fmt::format("body {} of two equal ones", body), expected, both.at(body));
-      }
-      return verdict;
-    }
-  }
-}
-
 }  // namespace
 
 Verdict equivariance(Backend& backend, const Setup& setup, const State& state, Span span, uint64_t seed) {
-  return conclude(run_transformed(backend, setup, state, span, seed), "a body of no particles");
+  const Relation relation = {"equivariance", "1", "tolerances.md, A transformed scene", "a body of no particles"};
+  return judge_relation(relation, backend, span, setup, state, [&](Verdict& verdict) {
+    const uint64_t kind = seed % kEquivarianceKinds;
+    uint64_t random = seed;
+    Transform transform;
+    const auto pad = [&](uint64_t layers) {
+      for (int32_t& padding : transform.padding) padding = static_cast<int32_t>(mixed(random) % layers);
+    };
+    std::string how;
+    if (kind == 0) {
+      transform = random_turn(random);
+      pad(3);
+      how = "turned, " + text_of(transform);
+    } else if (kind == 1) {
+      pad(8);
+      const auto [i, j, k] = transform.padding;
+      how = fmt::format("shifted by ({}, {}, {}) nodes", i, j, k);
+    } else if (kind == 2) {
+      how = "clusters in another order";
+    } else if (kind == 3) {
+      const int power = static_cast<int>(mixed(random) % 17) - 8;
+      transform.scale = std::ldexp(1.0, power == 0 ? 9 : power);
+      how = fmt::format("scaled by {}", transform.scale);
+    } else if (kind == 4) {
+      transform.world_shift = {1e6 * setup.body.grid.spacing, -3e5 * setup.body.grid.spacing, 0.1};
+      how = "elsewhere in the world";
+    }
+    const TransformedScene scene(transform, setup);
+    State transformed = scene.state(state);
+    if (kind == 0 || kind == 2) transformed = reordered(transformed, shuffled(state.clusters.count(), random));
+    if (kind < 3) return judge_transformed(verdict, how, backend, setup, state, scene, transformed, span, random);
+
+    const State original = after(backend, setup, state, span);
+    if (!is_fit(verdict, setup, original)) return;
+    const auto judge_exactly = [&](const std::string& which, const State& actual) {
+      verdict.checked += static_cast<int64_t>(actual.x.size());
+      return require_same_bits(verdict, which, scene.state(original), actual);
+    };
+    if (kind < 5) {
+      judge_exactly(how, after(backend, scene.setup(), transformed, span));
+      return;
+    }
+    backend.load({setup, setup}, {state, state});
+    backend.run(span);
+    const std::vector<State> both = backend.snapshot();
+    for (std::size_t body = 0; body < 2; ++body) {
+      if (!judge_exactly(fmt::format("body {} of two equal ones", body), both.at(body))) return;
+    }
+  });
 }
 
 }  // namespace cutproof::oracles

@@ -33,17 +33,6 @@ std::vector<Span> pieces_of(const Backend& backend, Span span) {
   return pieces;
 }
 
-std::vector<State> after_each(Backend& backend, const Setup& setup, const State& state,
-                              const std::vector<Span>& pieces) {
-  std::vector<State> states;
-  backend.load({setup}, {state});
-  for (const Span piece : pieces) {
-    backend.run(piece);
-    states.push_back(backend.snapshot().at(0));
-  }
-  return states;
-}
-
 struct Tolerance {
   double position = 0;  // [m], also of velocities times dt and of what a rotation does to a member
   double skin = 0;      // [m]
@@ -64,15 +53,10 @@ std::multimap<std::vector<int32_t>, int32_t> places_by_members(const Clusters& c
   return places;
 }
 
-// Equal as families of sets.
 bool same_families(const Clusters& a, const Clusters& b) {
-  const auto sorted_lists = [](const Clusters& clusters) {
-    std::vector<std::vector<int32_t>> lists;
-    for (int32_t c = 0; c < clusters.count(); ++c) lists.push_back(members_of(clusters, c));
-    std::sort(lists.begin(), lists.end());
-    return lists;
-  };
-  return sorted_lists(a) == sorted_lists(b);
+  const auto of_a = places_by_members(a), of_b = places_by_members(b);
+  const auto same_members = [](const auto& one, const auto& other) { return one.first == other.first; };
+  return std::equal(of_a.begin(), of_a.end(), of_b.begin(), of_b.end(), same_members);
 }
 
 std::vector<int32_t> decided_differently(const State& a, const State& b) {
@@ -84,18 +68,14 @@ std::vector<int32_t> decided_differently(const State& a, const State& b) {
 }
 
 struct Measured {
-  double ratio = 0, distance = 0, bound = 0;  // the worst of all comparisons, by distance / bound
-  BitDifference difference;
+  double ratio = 0;  // the worst of all comparisons, by distance / bound
+  Witness difference;
   int64_t checked = 0;
-  void compare(double value, double limit, const char* what, std::vector<int32_t> particles,
-               std::vector<int32_t> clusters = {}) {
+  void compare(double value, double limit, const char* what, const Concerned& concerned) {
     ++checked;
     if (value <= limit * ratio) return;
     ratio = limit > 0 && !std::isnan(value) ? value / limit : std::numeric_limits<double>::infinity();
-    distance = value;
-    bound = limit;
-    difference = {fmt::format("{} differs by {}, more than {}", what, value, limit), std::move(particles),
-                  std::move(clusters)};
+    difference = witness_of(concerned, "{} differs by {}, more than {}", what, value, limit);
   }
 };
 
@@ -117,7 +97,7 @@ std::pair<double, int32_t> rotation_distance(const Body& body, const Clusters& c
 // Transform and impulse in two states with the same particles alive.
 void compare_motion(const State& expected, const State& actual, const Tolerance& tolerance, Measured& measured) {
   for (std::size_t i = 0; i < expected.x.size(); ++i) {
-    const std::vector<int32_t> particle = {static_cast<int32_t>(i)};
+    const Concerned particle = {{}, {static_cast<int32_t>(i)}};
     measured.compare(norm(expected.x[i] - actual.x[i]), tolerance.position, "a position [m]", particle);
     measured.compare(norm(expected.v[i] - actual.v[i]), tolerance.velocity, "a velocity [m/s]", particle);
   }
@@ -144,14 +124,14 @@ void compare_clusters(const Setup& setup, const Clusters& expected, const Cluste
   for (int32_t c = 0; c < actual.count(); ++c) {
     const auto members = members_of(actual, c);
     const auto k = at(c), j = at(places.find(members)->second);
-    const std::vector<int32_t> number = {actual.number[k]};
-    measured.compare(norm(expected.rest_center[j] - actual.rest_center[k]), tolerance.rest, "a rest center [m]", {},
-                     number);
+    const Concerned cluster = {{actual.number[k]}};
+    measured.compare(norm(expected.rest_center[j] - actual.rest_center[k]), tolerance.rest, "a rest center [m]",
+                     cluster);
     measured.compare(std::abs(expected.mass[j] - actual.mass[k]) * extent, tolerance.rest * expected.mass[j],
-                     "a cluster's mass, times the extent [kg m],", {}, number);
+                     "a cluster's mass, times the extent [kg m],", cluster);
     if (std::all_of(members.begin(), members.end(), [&](int32_t i) { return free_rotation[at(i)] != 0; })) continue;
     const auto [distance, member] = nearest_rotation(setup.body, expected, places, actual, c);
-    measured.compare(distance, tolerance.position, "where a rotation puts a member [m]", {member}, number);
+    measured.compare(distance, tolerance.position, "where a rotation puts a member [m]", {cluster.clusters, {member}});
   }
 }
 
@@ -182,44 +162,34 @@ std::map<std::pair<int32_t, uint8_t>, Vec3> vertices_of(const Skin& skin) {
 
 // The same vertices; as many triangles and shells. Which fan a polygon gets depends on the numbering of grid edges, so
 // triangles are not compared one by one.
-std::optional<BitDifference> compare_skins(const Setup& setup, const State& expected_state, const State& actual_state,
-                                           const std::vector<uint8_t>& free_rotation, const Tolerance& tolerance,
-                                           Measured& measured) {
+std::optional<Witness> compare_skins(const Setup& setup, const State& expected_state, const State& actual_state,
+                                     const std::vector<uint8_t>& free_rotation, const Tolerance& tolerance,
+                                     Measured& measured) {
   const Skin &expected = expected_state.skin, &actual = actual_state.skin;
   const auto a = vertices_of(expected), b = vertices_of(actual);
   for (const auto& [key, position] : a) {
     const auto other = b.find(key);
     if (other == b.end()) {
-      return BitDifference{
-          fmt::format("the skin's vertex of particle {} in direction {} is missing", key.first, key.second),
-          {key.first},
-          {}};
+      return witness_of({{}, {key.first}}, "the skin's vertex of particle {} in direction {} is missing", key.first,
+                        key.second);
     }
     if (free_rotation[at(key.first)]) continue;
-    measured.compare(norm(position - other->second), tolerance.skin, "a vertex of the skin [m]", {key.first});
+    measured.compare(norm(position - other->second), tolerance.skin, "a vertex of the skin [m]", {{}, {key.first}});
   }
   for (const auto& [key, position] : b) {
     if (a.count(key)) continue;
-    return BitDifference{
-        fmt::format("the skin has a vertex of particle {} in direction {} too many", key.first, key.second),
-        {key.first},
-        {}};
+    return witness_of({{}, {key.first}}, "the skin has a vertex of particle {} in direction {} too many", key.first,
+                      key.second);
   }
   // Shells joined at vertices are those joined at edges only where the surface is a manifold.
   const bool closed = skin_surface(setup, expected_state).holds;
   if (closed != skin_surface(setup, actual_state).holds) {
-    return BitDifference{
-        fmt::format("only the skin of {} is a closed surface", closed ? "the other run" : "this run"), {}, {}};
+    return witness_of({}, "only the skin of {} is a closed surface", closed ? "the other run" : "this run");
   }
   const ShellCount shells = count_shells(expected), other = count_shells(actual);
-  if (shells != other || expected.triangles.size() != actual.triangles.size()) {
-    return BitDifference{
-        fmt::format("the skins have {} + {} and {} + {} shells and {} and {} triangles", shells.outer, shells.inner,
-                    other.outer, other.inner, expected.triangles.size(), actual.triangles.size()),
-        {},
-        {}};
-  }
-  return std::nullopt;
+  if (shells == other && expected.triangles.size() == actual.triangles.size()) return std::nullopt;
+  return witness_of({}, "the skins have {} + {} and {} + {} shells and {} and {} triangles", shells.outer, shells.inner,
+                    other.outer, other.inner, expected.triangles.size(), actual.triangles.size());
 }
 
 // Relative size of the disturbances that show how sensitive a scene is: far above rounding, far below what tissue
@@ -259,9 +229,9 @@ std::vector<uint8_t> undecided(Backend& backend, const Setup& setup, const State
   const auto note = [&](const State& other) {
     for (const int32_t i : decided_differently(result, other)) undecidable[at(i)] = 1;
   };
-  note(after(backend, disturbed(setup, +kDisturbance), state, {span}));
-  note(after(backend, disturbed(setup, -kDisturbance), state, {span}));
-  note(after(backend, setup, jittered(setup, state, kDisturbance, seed), {span}));
+  note(after(backend, disturbed(setup, +kDisturbance), state, span));
+  note(after(backend, disturbed(setup, -kDisturbance), state, span));
+  note(after(backend, setup, jittered(setup, state, kDisturbance, seed), span));
   return undecidable;
 }
 
@@ -285,7 +255,7 @@ Setup moved_contacts(Setup setup, double amplitude, uint64_t& seed) {
 double sensitivity(Backend& backend, const Setup& setup, const State& state, Span span, const State& result,
                    double amplitude, uint64_t& seed) {
   const State other =
-      after(backend, moved_contacts(setup, amplitude, seed), jittered(setup, state, amplitude, seed), {span});
+      after(backend, moved_contacts(setup, amplitude, seed), jittered(setup, state, amplitude, seed), span);
   double greatest = 0;
   for (std::size_t i = 0; i < result.x.size(); ++i) {
     if (result.alive[i] && other.alive[i]) greatest = std::max(greatest, norm(result.x[i] - other.x[i]));
@@ -315,12 +285,15 @@ struct TransformedRuns {
   std::vector<Span> pieces;
   std::vector<State> original, transformed;  // after each piece
 
+  // The transformed state in which a piece began.
+  const State& before(std::size_t piece) const { return piece == 0 ? transformed_state : transformed[piece - 1]; }
+
   // What rounding may do to numbers, if disturbances of positions grow by `growth`.
   Tolerance tolerance(double growth) const {
     RoundingScale scale = rounding_scale(scene.setup(), transformed.back());
-    const RoundingScale before = rounding_scale(scene.setup(), transformed_state);
-    scale.extent = std::max(scale.extent, before.extent);
-    scale.largest_cluster = std::max(scale.largest_cluster, before.largest_cluster);
+    const RoundingScale first = rounding_scale(scene.setup(), transformed_state);
+    scale.extent = std::max(scale.extent, first.extent);
+    scale.largest_cluster = std::max(scale.largest_cluster, first.largest_cluster);
     const double goal = goal_rounding(scale);
     Tolerance result;
     result.rest = result.skin = 2 * goal;
@@ -337,43 +310,37 @@ struct TransformedRuns {
 };
 
 // The first particle (in the numbering of the original) that only one of the runs has removed, and that is not removed
-// or kept by a hair; -1 if all are. `differ` says whether there are any.
-int32_t wrongly_decided(const TransformedRuns& runs, std::size_t piece, uint64_t seed, bool& differ) {
+// or kept by a hair; -1 if there is none.
+int32_t wrongly_decided(const TransformedRuns& runs, std::size_t piece, uint64_t seed) {
   const State expected = runs.scene.state(runs.original[piece]);
-  const State& actual = runs.transformed[piece];
-  differ = !decided_differently(expected, actual).empty();
-  if (!differ) return -1;
   const std::vector<uint8_t> undecidable =
       undecided(runs.backend, runs.setup, runs.state, runs.span, runs.original.back(), seed);
   for (int32_t i = 0; i < runs.setup.body.particle_count(); ++i) {
     const auto j = at(runs.scene.particle(i));
-    if (expected.alive[j] != actual.alive[j] && !undecidable[at(i)]) return i;
+    if (expected.alive[j] != runs.transformed[piece].alive[j] && !undecidable[at(i)]) return i;
   }
   return -1;
 }
 
 // Clusters that differ are legal where merging or expansion met a tie: same coupling, and each stage within its rules.
-std::optional<BitDifference> illegal_clusters(const TransformedRuns& runs, std::size_t piece) {
+std::optional<Witness> illegal_clusters(const TransformedRuns& runs, std::size_t piece) {
   const Setup& setup = runs.scene.setup();
-  const State& actual = runs.transformed[piece];
-  const State& input = piece == 0 ? runs.transformed_state : runs.transformed[piece - 1];
+  const State &input = runs.before(piece), &actual = runs.transformed[piece];
   const State expected = runs.scene.state(runs.original[piece]);
   if (coupling_components(setup, expected).label != coupling_components(setup, actual).label) {
-    return BitDifference{"the clusters couple the particles differently", {}, {}};
+    return witness_of({}, "the clusters couple the particles differently");
   }
   const Span span = runs.pieces[piece];
   std::optional<Verdict> legal;
   if (span == Span{Stage::merge, Stage::merge}) legal = merge_legality(setup, input, actual);
   if (span == Span{Stage::expand, Stage::expand}) legal = expansion(setup, input, actual);
-  if (!legal || legal->holds) return std::nullopt;
-  return BitDifference{legal->witness.text, legal->witness.particles, legal->witness.clusters};
+  return legal && !legal->holds ? std::optional(legal->witness) : std::nullopt;
 }
 
-// Both runs, piece by piece, up to rounding and ties. `numbers_only` tells whether a failure is one of numbers.
-Verdict compare_runs(Verdict verdict, const std::string& how, const TransformedRuns& runs, const Tolerance& tolerance,
-                     uint64_t seed, bool& numbers_only) {
+// Both runs, piece by piece, up to rounding and ties. True: what fails are numbers and nothing else.
+bool compare_runs(Verdict& verdict, const std::string& how, const TransformedRuns& runs, const Tolerance& tolerance,
+                  uint64_t seed) {
   const Setup& setup = runs.scene.setup();
-  numbers_only = false;
   verdict.bound = 1;
   verdict.unit = "of the bound";
   bool families_agree = true;
@@ -383,30 +350,37 @@ Verdict compare_runs(Verdict verdict, const std::string& how, const TransformedR
     const State expected = runs.scene.state(runs.original[p]);
     const State& actual = runs.transformed[p];
     const std::string where = fmt::format("{}, after {}", how, name_of(piece.last));
+    const auto differ = [&](Witness difference) {
+      difference.text = where + ": " + difference.text;
+      fail(verdict, std::move(difference));
+      return false;
+    };
 
-    bool differ = false;
-    if (const int32_t i = wrongly_decided(runs, p, seed, differ); i >= 0) {
-      return fail(std::move(verdict),
-                  fmt::format("{}: particle {} is {} here and not in the other run", where, i,
-                              runs.original[p].alive[at(i)] ? "alive" : "dead"),
-                  {i});
+    if (!decided_differently(expected, actual).empty()) {
+      const int32_t i = wrongly_decided(runs, p, seed);
+      if (i >= 0) {
+        return differ(witness_of({{}, {i}}, "particle {} is {} here and not in the other run", i,
+                                 runs.original[p].alive[at(i)] ? "alive" : "dead"));
+      }
+      vacuous(verdict, "which particles are removed is undecidable within rounding");
+      return false;
     }
-    if (differ) return vacuous(std::move(verdict), "which particles are removed is undecidable within rounding");
     if (expected.removed != actual.removed || expected.debris != actual.debris || expected.frame != actual.frame ||
         expected.tau != actual.tau || expected.cap != actual.cap || expected.edge_covered != actual.edge_covered) {
-      return fail(std::move(verdict),
-                  where + ": the lists of removed particles, or frame, tau, cap or edge cover differ");
+      return differ(witness_of({}, "the lists of removed particles, or frame, tau, cap or edge cover differ"));
     }
 
     const bool may_tie = piece.contains(Stage::merge) || piece.contains(Stage::expand) || !families_agree;
     families_agree = same_families(expected.clusters, actual.clusters);
     if (!families_agree) {
-      if (!may_tie) return fail(std::move(verdict), where + ": the clusters differ");
-      if (const auto found = illegal_clusters(runs, p)) return fail_on(std::move(verdict), where, *found);
+      if (!may_tie) return differ(witness_of({}, "the clusters differ"));
+      if (const auto found = illegal_clusters(runs, p)) {
+        verdict.measured = 1;
+        return differ(*found);
+      }
       free_rotation.assign(free_rotation.size(), 1);
     } else if (piece.contains(Stage::merge)) {
-      const State& input = p == 0 ? runs.transformed_state : runs.transformed[p - 1];
-      mark_inherited_rotations(setup, input.clusters, expected.clusters, actual.clusters, tolerance.position,
+      mark_inherited_rotations(setup, runs.before(p).clusters, expected.clusters, actual.clusters, tolerance.position,
                                free_rotation);
     }
 
@@ -418,17 +392,19 @@ Verdict compare_runs(Verdict verdict, const std::string& how, const TransformedR
     }
     if (piece.contains(Stage::skin)) {
       const auto found = compare_skins(setup, expected, actual, free_rotation, tolerance, measured);
-      if (found) return fail_on(std::move(verdict), where, *found);
+      if (found) {
+        verdict.measured = 1;
+        return differ(*found);
+      }
     }
     verdict.checked += measured.checked;
     verdict.measured = std::max(verdict.measured, measured.ratio);
     if (measured.ratio > 1) {
-      numbers_only = true;
-      return fail(std::move(verdict), where + ": " + measured.difference.text, measured.difference.particles,
-                  measured.difference.clusters);
+      differ(measured.difference);
+      return true;
     }
   }
-  return verdict;
+  return false;
 }
 
 }  // namespace
@@ -440,27 +416,30 @@ uint64_t mixed(uint64_t& seed) {
   return z ^ (z >> 31);
 }
 
-Verdict judge_transformed(const Verdict& verdict, const std::string& how, Backend& backend, const Setup& setup,
-                          const State& state, const TransformedScene& scene, const State& transformed_state, Span span,
-                          uint64_t seed) {
+void judge_transformed(Verdict& verdict, const std::string& how, Backend& backend, const Setup& setup,
+                       const State& state, const TransformedScene& scene, const State& transformed_state, Span span,
+                       uint64_t seed) {
   TransformedRuns runs{backend, setup, state, scene, transformed_state, span, pieces_of(backend, span), {}, {}};
   runs.original = after_each(backend, setup, state, runs.pieces);
   runs.transformed = after_each(backend, scene.setup(), transformed_state, runs.pieces);
-  for (const auto* states : {&runs.original, &runs.transformed}) {
-    for (const State& answer : *states) {
-      if (auto unjudged = unfit(verdict, states == &runs.original ? setup : scene.setup(), answer)) return *unjudged;
-    }
+  for (const State& answer : runs.original) {
+    if (!is_fit(verdict, setup, answer)) return;
+  }
+  for (const State& answer : runs.transformed) {
+    if (!is_fit(verdict, scene.setup(), answer)) return;
   }
   const State& result = runs.original.back();
   double growth = runs.has_step() ? sensitivity(backend, setup, state, span, result, kDisturbance, seed) : 1;
-  bool numbers_only = false;
-  const Verdict first = compare_runs(verdict, how, runs, runs.tolerance(growth), seed, numbers_only);
-  if (first.holds || !numbers_only || !runs.has_step()) return first;
+  Verdict first = verdict;
+  if (!compare_runs(first, how, runs, runs.tolerance(growth), seed) || !runs.has_step()) {
+    verdict = first;
+    return;
+  }
   // A jump (a contact that lets go or not) hides below a disturbance that is larger than it. Look closer.
   for (int round = 0; round < kCloserLooks; ++round) {
     growth = std::max(growth, sensitivity(backend, setup, state, span, result, kCloserDisturbance, seed));
   }
-  return compare_runs(verdict, how, runs, runs.tolerance(kCloserFactor * growth), seed, numbers_only);
+  compare_runs(verdict, how, runs, runs.tolerance(kCloserFactor * growth), seed);
 }
 
 }  // namespace cutproof::oracles

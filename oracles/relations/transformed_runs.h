@@ -13,8 +13,8 @@ uint64_t mixed(uint64_t& seed);
 // Decisions, clusters and skin vertices exactly, numbers up to rounding (tolerances.md, A transformed scene).
 // Requires that the backend can run the span. `how`: in the witness; `seed`: of the disturbances that show how
 // sensitive the scene is.
-Verdict judge_transformed(const Verdict& verdict, const std::string& how, Backend& backend, const Setup& setup,
-                          const State& state, const TransformedScene& scene, const State& transformed_state, Span span,
-                          uint64_t seed);
+void judge_transformed(Verdict& verdict, const std::string& how, Backend& backend, const Setup& setup,
+                       const State& state, const TransformedScene& scene, const State& transformed_state, Span span,
+                       uint64_t seed);
 
 }  // namespace cutproof::oracles

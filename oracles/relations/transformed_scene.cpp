@@ -136,15 +136,19 @@ void sort_members(Clusters& clusters) {
 }  // namespace
 
 // One value of a field, by what it is.
-Vec3 TransformedScene::value(Quantity quantity, Vec3 v) const {
-  return quantity == Quantity::point ? point(v) : vector(v);
-}
-Mat3 TransformedScene::value(Quantity, const Mat3& r) const { return rotation(r); }
-int32_t TransformedScene::value(Quantity quantity, int32_t i) const {
-  return quantity == Quantity::particle ? particle(i) : i;
-}
-uint8_t TransformedScene::value(Quantity quantity, uint8_t d) const {
-  return quantity == Quantity::direction ? direction(d) : d;
+template <class T>
+T TransformedScene::value(Quantity quantity, const T& given) const {
+  if constexpr (std::is_same_v<T, Vec3>) {
+    return quantity == Quantity::point ? point(given) : vector(given);
+  } else if constexpr (std::is_same_v<T, Mat3>) {
+    return rotation(given);
+  } else if constexpr (std::is_same_v<T, int32_t>) {
+    return quantity == Quantity::particle ? particle(given) : given;
+  } else if constexpr (std::is_same_v<T, uint8_t>) {
+    return quantity == Quantity::direction ? direction(given) : given;
+  } else {
+    return given;
+  }
 }
 
 State TransformedScene::state(const State& state) const {

@@ -31,14 +31,8 @@ class TransformedScene {
   int32_t particle(int32_t i) const { return particle_[static_cast<std::size_t>(i)]; }
 
  private:
-  Vec3 value(Quantity quantity, Vec3 v) const;
-  Mat3 value(Quantity quantity, const Mat3& r) const;
-  int32_t value(Quantity quantity, int32_t i) const;
-  uint8_t value(Quantity quantity, uint8_t d) const;
   template <class T>
-  T value(Quantity, const T& same) const {
-    return same;
-  }
+  T value(Quantity quantity, const T& given) const;
   Vec3 vector(Vec3 v) const;  // free vectors: velocities, displacements
   Vec3 unit(Vec3 v) const;    // directions: not scaled
   Vec3 point(Vec3 p) const;   // positions

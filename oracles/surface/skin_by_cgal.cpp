@@ -9,7 +9,7 @@
 
 #include <array>
 #include <optional>
-#include <set>
+#include <utility>
 
 #include "oracles/checks.h"
 #include "oracles/shape_sums.h"
@@ -25,8 +25,8 @@ namespace pmp = CGAL::Polygon_mesh_processing;
 
 // [node_count] 1 where an alive particle sits.
 std::vector<uint8_t> tissue_nodes(const Body& body, const State& state) {
-  std::vector<uint8_t> tissue(static_cast<std::size_t>(body.grid.node_count()), 0);
-  for (std::size_t i = 0; i < body.node.size(); ++i) tissue[static_cast<std::size_t>(body.node[i])] = state.alive[i];
+  std::vector<uint8_t> tissue(at(body.grid.node_count()), 0);
+  for (std::size_t i = 0; i < body.node.size(); ++i) tissue[at(body.node[i])] = state.alive[i];
   return tissue;
 }
 
@@ -45,47 +45,37 @@ std::optional<Mesh> mesh_of(const Skin& skin, const std::vector<Vec3>& points) {
   return mesh;
 }
 
-struct MeshShells {
-  std::vector<double> volume;      // [shells] signed [cube of the unit of `points`]
-  std::vector<double> magnitude;   // [shells] sum of the absolute terms of that sum, for its rounding bound
-  std::vector<int64_t> euler;      // [shells] V − E + F
-  std::vector<int64_t> triangles;  // [shells]
-  std::vector<int32_t> some_vertex;
+struct MeshShell {
+  double volume = 0;     // signed [cube of the unit of `points`]
+  double magnitude = 0;  // sum of the absolute terms of that sum, for its rounding bound
+  int64_t euler = 0;     // V − E + F
+  int64_t triangles = 0;
+  int32_t some_vertex = -1;
 };
 
 // Volume of a closed surface as the sum over its triangles of projected area times mean height: with vertices at
 // multiples of 1/2 every term is exact.
-MeshShells shells_of(Mesh& mesh, const Skin& skin, const std::vector<Vec3>& points) {
+std::vector<MeshShell> shells_of(Mesh& mesh, const Skin& skin, const std::vector<Vec3>& points) {
   auto label = mesh.add_property_map<Mesh::Face_index, std::size_t>("f:shell", 0).first;
-  const std::size_t count = pmp::connected_components(mesh, label);
-  MeshShells shells;
-  shells.volume.assign(count, 0);
-  shells.magnitude.assign(count, 0);
-  shells.euler.assign(count, 0);
-  shells.triangles.assign(count, 0);
-  shells.some_vertex.assign(count, -1);
+  std::vector<MeshShell> shells(pmp::connected_components(mesh, label));
   std::vector<uint8_t> counted(points.size(), 0);
   for (std::size_t t = 0; t < skin.triangles.size(); ++t) {
-    const std::size_t shell = label[Mesh::Face_index(static_cast<uint32_t>(t))];
+    MeshShell& shell = shells[label[Mesh::Face_index(static_cast<uint32_t>(t))]];
     const auto& triangle = skin.triangles[t];
-    const Vec3 a = points[static_cast<std::size_t>(triangle[0])];
-    const Vec3 b = points[static_cast<std::size_t>(triangle[1])] - a;
-    const Vec3 c = points[static_cast<std::size_t>(triangle[2])] - a;
+    const Vec3 a = points[at(triangle[0])], b = points[at(triangle[1])] - a, c = points[at(triangle[2])] - a;
     const double height = 3 * a.z + b.z + c.z;
-    shells.volume[shell] += height * (b.x * c.y - b.y * c.x);
-    shells.magnitude[shell] += std::abs(height) * (std::abs(b.x * c.y) + std::abs(b.y * c.x));
-    ++shells.triangles[shell];
-    shells.some_vertex[shell] = triangle[0];
+    shell.volume += height * (b.x * c.y - b.y * c.x);
+    shell.magnitude += std::abs(height) * (std::abs(b.x * c.y) + std::abs(b.y * c.x));
+    ++shell.triangles;
+    shell.some_vertex = triangle[0];
     for (const int32_t v : triangle) {
-      if (counted[static_cast<std::size_t>(v)]) continue;
-      counted[static_cast<std::size_t>(v)] = 1;
-      ++shells.euler[shell];
+      if (std::exchange(counted[at(v)], uint8_t{1}) == 0) ++shell.euler;
     }
   }
-  for (std::size_t s = 0; s < count; ++s) {
-    shells.volume[s] /= 6;
-    shells.magnitude[s] /= 6;
-    shells.euler[s] += shells.triangles[s] - 3 * shells.triangles[s] / 2;
+  for (MeshShell& shell : shells) {
+    shell.volume /= 6;
+    shell.magnitude /= 6;
+    shell.euler += shell.triangles - 3 * shell.triangles / 2;
   }
   return shells;
 }
@@ -94,10 +84,10 @@ MeshShells shells_of(Mesh& mesh, const Skin& skin, const std::vector<Vec3>& poin
 std::vector<Vec3> rest_points(const Setup& setup, const Skin& skin) {
   std::vector<Vec3> points(skin.owner.size());
   for (std::size_t v = 0; v < points.size(); ++v) {
-    const auto node = setup.body.grid.coordinates(setup.body.node[static_cast<std::size_t>(skin.owner[v])]);
+    const auto node = setup.body.grid.coordinates(setup.body.node[at(skin.owner[v])]);
     const auto& step = kDirections[skin.direction[v]];
     for (int axis = 0; axis < 3; ++axis) {
-      const auto i = static_cast<std::size_t>(axis);
+      const auto i = at(axis);
       points[v][axis] = node[i] + setup.skin.alpha * step[i];
     }
   }
@@ -112,11 +102,12 @@ void check_skin_shells(Judged& judged, Verdict& verdict) {
   const ShellCount joined = count_shells(skin);
   const std::optional<ShellCount> counted = skin_shells(skin);
   if (!counted) {
-    violate(verdict, "CGAL does not take the triangles as a surface, so its shells cannot be counted");
+    violate(verdict, {}, "CGAL does not take the triangles as a surface, so its shells cannot be counted");
   } else if (counted->outer + counted->inner != joined.outer + joined.inner) {
-    violate(verdict, fmt::format("CGAL counts {} shells of the skin, joining triangles at vertices gives {}: shells "
-                                 "touch",
-                                 counted->outer + counted->inner, joined.outer + joined.inner));
+    violate(verdict, {},
+            "CGAL counts {} shells of the skin, joining triangles at vertices gives {}: shells "
+            "touch",
+            counted->outer + counted->inner, joined.outer + joined.inner);
   }
 }
 
@@ -126,34 +117,25 @@ void check_skin_geometry(Judged& judged, Verdict& verdict) {
   const Skin& skin = state.skin;
   verdict.checked = static_cast<int64_t>(skin.triangles.size());
   if (!has_skin(state) && !skin_is_missing(setup, state)) return;
-  const auto not_judged = [&](const std::string& why) {
-    verdict.holds = false;
-    verdict.witness.text = "not judged: " + why;
-  };
   const Verdict surface = ask(property_named(core_properties(), "skin surface"), judged);
-  if (!surface.holds) return not_judged("the skin is not a closed surface (" + surface.witness.text + ")");
-  const auto fail = [&](const std::string& text, const std::vector<int32_t>& vertices) {
-    verdict.holds = false;
-    verdict.witness.text = text;
-    std::set<int32_t> owners;
-    for (const int32_t v : vertices) owners.insert(skin.owner[at(v)]);
-    verdict.witness.particles.assign(owners.begin(), owners.end());
-  };
+  if (!surface.holds) {
+    return fail(verdict, {}, "not judged: the skin is not a closed surface ({})", surface.witness.text);
+  }
   const auto vertices_of = [&](Mesh::Face_index face) {
-    const auto& t = skin.triangles[static_cast<std::size_t>(face)];
+    const auto& t = skin.triangles[at(face)];
     return std::vector<int32_t>{t.begin(), t.end()};
   };
 
   const std::vector<Vec3> points = rest_points(setup, skin);
   std::optional<Mesh> mesh = mesh_of(skin, points);
-  if (!mesh) return not_judged("CGAL does not take the triangles as a surface");
+  if (!mesh) return fail(verdict, {}, "not judged: CGAL does not take the triangles as a surface");
 
   std::vector<Mesh::Face_index> degenerate;
   pmp::degenerate_faces(*mesh, std::back_inserter(degenerate));
   if (!degenerate.empty()) {
     verdict.measured = static_cast<double>(degenerate.size());
-    return fail(fmt::format("triangle {} has no area at rest", static_cast<uint32_t>(degenerate[0])),
-                vertices_of(degenerate[0]));
+    return fail(verdict, owners_of(skin, vertices_of(degenerate[0])), "triangle {} has no area at rest",
+                static_cast<uint32_t>(degenerate[0]));
   }
   std::vector<std::pair<Mesh::Face_index, Mesh::Face_index>> crossing;
   pmp::self_intersections(*mesh, std::back_inserter(crossing));
@@ -161,32 +143,30 @@ void check_skin_geometry(Judged& judged, Verdict& verdict) {
     verdict.measured = static_cast<double>(crossing.size());
     auto vertices = vertices_of(crossing[0].first);
     for (const int32_t v : vertices_of(crossing[0].second)) vertices.push_back(v);
-    return fail(fmt::format("triangles {} and {} intersect at rest", static_cast<uint32_t>(crossing[0].first),
-                            static_cast<uint32_t>(crossing[0].second)),
-                vertices);
+    return fail(verdict, owners_of(skin, vertices), "triangles {} and {} intersect at rest",
+                static_cast<uint32_t>(crossing[0].first), static_cast<uint32_t>(crossing[0].second));
   }
 
-  const MeshShells shells = shells_of(*mesh, skin, points);
   double volume = 0, magnitude = 0;
   int32_t outer = 0, inner = 0;
-  for (std::size_t s = 0; s < shells.volume.size(); ++s) {
-    volume += shells.volume[s];
-    magnitude += shells.magnitude[s];
-    (shells.volume[s] > 0 ? outer : inner) += 1;
-    if (shells.euler[s] % 2 != 0 || shells.euler[s] > 2) {
-      verdict.measured = static_cast<double>(shells.euler[s]);
-      return fail(fmt::format("a shell has Euler number {}, which no closed surface has", shells.euler[s]),
-                  {shells.some_vertex[s]});
+  for (const MeshShell& shell : shells_of(*mesh, skin, points)) {
+    volume += shell.volume;
+    magnitude += shell.magnitude;
+    (shell.volume > 0 ? outer : inner) += 1;
+    if (shell.euler % 2 != 0 || shell.euler > 2) {
+      verdict.measured = static_cast<double>(shell.euler);
+      return fail(verdict, owners_of(skin, {shell.some_vertex}),
+                  "a shell has Euler number {}, which no closed surface has", shell.euler);
     }
   }
   const std::vector<uint8_t> tissue = tissue_nodes(setup.body, state);
   const int32_t components = judged.components().count, cavities = count_cavities(judged);
   if (outer != components || inner != cavities) {
     verdict.measured = std::abs(outer - components) + std::abs(inner - cavities);
-    return fail(fmt::format("the skin has {} outward and {} inward shells, and the tissue has {} components and {} "
-                            "cavities",
-                            outer, inner, components, cavities),
-                {});
+    return fail(verdict, {},
+                "the skin has {} outward and {} inward shells, and the tissue has {} components and {} "
+                "cavities",
+                outer, inner, components, cavities);
   }
 
   const VolumeRange range = tissue_volume(setup.body.grid, tissue, setup.skin.alpha);
@@ -197,8 +177,8 @@ void check_skin_geometry(Judged& judged, Verdict& verdict) {
   verdict.bound = rounding;
   verdict.unit = "h³";
   if (!(outside <= rounding)) {
-    return fail(
-        fmt::format("the skin holds {} h³, and this tissue between {} and {} h³", volume, range.low, range.high), {});
+    return fail(verdict, {}, "the skin holds {} h³, and this tissue between {} and {} h³", volume, range.low,
+                range.high);
   }
 }
 
@@ -208,29 +188,25 @@ std::optional<ShellCount> skin_shells(const Skin& skin) {
   std::optional<Mesh> mesh = mesh_of(skin, skin.position);
   if (!mesh) return std::nullopt;
   ShellCount count;
-  for (const double volume : shells_of(*mesh, skin, skin.position).volume) {
-    (volume > 0 ? count.outer : count.inner) += 1;
+  for (const MeshShell& shell : shells_of(*mesh, skin, skin.position)) {
+    (shell.volume > 0 ? count.outer : count.inner) += 1;
   }
   return count;
 }
 
 const PropertyList& surface_properties() {
-  constexpr const char* kWhen = "at the end of a frame, if there is a skin or must be one";
-  const auto skin_is_there = [](const Setup& setup, const State& state, Stage after) {
-    return after == Stage::skin && skin_is_due(setup, state);
+  const auto thorough = [](Property property) {
+    property.cost = Cost::thorough;
+    return property;
   };
   static const PropertyList list = {
-      {"skin shells", "method.md §8, lemma: counted a second time", "1", kSkin | kAlive, Cost::thorough, stages(),
-       kWhen, skin_is_there, "no skin", check_skin_shells, nullptr},
-      {"skin geometry", "method.md §8, lemma; tolerances.md, Volume of the skin", "1", kAlive | kSkin, Cost::thorough,
-       stages(), kWhen, skin_is_there, "no skin", check_skin_geometry, nullptr}};
+      thorough(of_state("skin shells", "method.md §8, lemma: counted a second time", "1", kSkin | kAlive, kSkinThere,
+                        "no skin", check_skin_shells)),
+      thorough(of_state("skin geometry", "method.md §8, lemma; tolerances.md, Volume of the skin", "1", kAlive | kSkin,
+                        kSkinThere, "no skin", check_skin_geometry))};
   return list;
 }
 
 PropertyLists properties() { return {&core_properties(), &surface_properties()}; }
-
-Verdict skin_geometry(const Setup& setup, const State& state) {
-  return ask(property_named(surface_properties(), "skin geometry"), setup, state);
-}
 
 }  // namespace cutproof::oracles

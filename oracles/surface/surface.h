@@ -3,7 +3,7 @@
 #pragma once
 #include <optional>
 
-#include "oracles/judge.h"
+#include "oracles/oracles.h"
 #include "oracles/shells.h"
 
 namespace cutproof::oracles {
@@ -15,7 +15,7 @@ PropertyLists properties();
 
 // At rest (every X_v from the owner's rest position): no degenerate or self-intersecting triangle, outward, shells =
 // components + cavities (18 neighbours), Euler number, volume between bounds. Costs about 10 ms on 3,000 triangles.
-Verdict skin_geometry(const Setup& setup, const State& state);
+inline constexpr StateOracle skin_geometry{surface_properties, "skin geometry"};
 
 // Triangles joined at their edges; by sign of the volume at `position`. Nothing if the triangles are no surface.
 std::optional<ShellCount> skin_shells(const Skin& skin);

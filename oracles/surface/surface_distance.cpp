@@ -16,13 +16,13 @@ namespace cutproof::oracles {
 namespace {
 
 // Nothing is decided here, only measured: no exact predicates are needed.
-using Kernel = CGAL::Simple_cartesian<double>;
-using Triangle = Kernel::Triangle_3;
-using Primitive = CGAL::AABB_triangle_primitive<Kernel, std::vector<Triangle>::const_iterator>;
-using Triangles = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
-using Neighbours = CGAL::Orthogonal_k_neighbor_search<CGAL::Search_traits_3<Kernel>>;
+using Cartesian = CGAL::Simple_cartesian<double>;
+using Triangle = Cartesian::Triangle_3;
+using Primitive = CGAL::AABB_triangle_primitive<Cartesian, std::vector<Triangle>::const_iterator>;
+using Triangles = CGAL::AABB_tree<CGAL::AABB_traits<Cartesian, Primitive>>;
+using Neighbours = CGAL::Orthogonal_k_neighbor_search<CGAL::Search_traits_3<Cartesian>>;
 
-Kernel::Point_3 point(Vec3 p) { return {p.x, p.y, p.z}; }
+Cartesian::Point_3 point(Vec3 p) { return {p.x, p.y, p.z}; }
 
 }  // namespace
 

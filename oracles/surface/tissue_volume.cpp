@@ -81,38 +81,25 @@ VolumeRange polygon_volume(const std::vector<Vec3>& p) {
 // Area of tissue on a face of a cell: marching squares, diagonal inside corners apart.
 double face_area(int pattern, const std::array<int, 4>& face, double alpha) {
   std::array<bool, 4> in{};
-  int count = 0;
+  std::size_t count = 0;
   for (std::size_t i = 0; i < 4; ++i) {
     in[i] = ((pattern >> face[i]) & 1) != 0;
     count += in[i];
   }
-  switch (count) {
-    case 0:
-      return 0;
-    case 1:
-      return alpha * alpha / 2;
-    case 2:
-      return in[0] == in[2] ? alpha * alpha : alpha;
-    case 3:
-      return 1 - (1 - alpha) * (1 - alpha) / 2;
-    default:
-      return 1;
-  }
+  const double two = in[0] == in[2] ? alpha * alpha : alpha;  // diagonal, or side by side
+  return std::array{0.0, alpha * alpha / 2, two, 1 - (1 - alpha) * (1 - alpha) / 2, 1.0}[count];
 }
 
 VolumeRange cell_volume(int pattern, double alpha) {
   VolumeRange total;
   for (const auto& face : kFaceCorners) {
     const double cone = face_area(pattern, face, alpha) / 6;  // area times half an edge over three
-    total.low += cone;
-    total.high += cone;
+    total.add({cone, cone});
   }
   for (const auto& loop : cell_loops(pattern)) {
     std::vector<Vec3> points;
     for (const CellVertex v : loop) points.push_back(cell_position(v, alpha));
-    const VolumeRange range = polygon_volume(points);
-    total.low += range.low;
-    total.high += range.high;
+    total.add(polygon_volume(points));
   }
   return total;
 }
@@ -139,9 +126,7 @@ VolumeRange tissue_volume(const Grid& grid, const std::vector<uint8_t>& tissue, 
   for (int pattern = 1; pattern < 256; ++pattern) {
     const auto count = static_cast<double>(cells[static_cast<std::size_t>(pattern)]);
     if (count == 0) continue;
-    const VolumeRange range = cell_volume(pattern, alpha);
-    total.low += count * range.low;
-    total.high += count * range.high;
+    total.add(cell_volume(pattern, alpha), count);
   }
   return total;
 }

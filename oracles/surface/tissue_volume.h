@@ -9,6 +9,10 @@ namespace cutproof::oracles {
 
 struct VolumeRange {
   double low = 0, high = 0;  // [h³]
+  void add(const VolumeRange& other, double times = 1) {
+    low += times * other.low;
+    high += times * other.high;
+  }
 };
 
 // Least and greatest volume under any triangulation of the cells' polygons. `tissue`: [node_count] 1 where an alive

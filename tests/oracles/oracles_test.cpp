@@ -18,10 +18,9 @@ namespace {
 
 using namespace cutproof::testing;
 
-using OneStateOracle = Verdict (*)(const Setup&, const State&);
-constexpr std::array<OneStateOracle, 9> kOracles = {well_formed,     cluster_connectivity, coverage,    component_match,
-                                                    isolation,       edge_cover,           rest_frames, finite,
-                                                    merge_maximality};
+constexpr std::array<StateOracle, 9> kOracles = {well_formed,     cluster_connectivity, coverage,    component_match,
+                                                 isolation,       edge_cover,           rest_frames, finite,
+                                                 merge_maximality};
 
 TEST(OneStateOracles, AcceptASolidBlockWithItsSkin) {
   const Block block;

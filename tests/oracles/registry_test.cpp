@@ -26,8 +26,8 @@ TEST(Registry, SaysOfEachPropertyAllThatAJudgeMustKnow) {
     EXPECT_FALSE(property.nothing.empty());
     EXPECT_NE(property.rests_on & kAll, 0u);
     EXPECT_NE(property.check_state == nullptr, property.check_stage == nullptr) << "of a state or of a stage";
-    EXPECT_EQ(property.check_state == nullptr, property.is_due == nullptr);
-    EXPECT_EQ(property.check_state == nullptr, property.due_if.empty());
+    EXPECT_EQ(property.check_state == nullptr, property.due.holds == nullptr);
+    EXPECT_EQ(property.check_state == nullptr, property.due.text.empty());
     if (property.check_stage != nullptr) {
       EXPECT_NE(property.promised_by.bits, 0u) << "no stage asks for it";
     }
@@ -89,7 +89,7 @@ TEST(Registry, TakesAPropertyOfAGuest) {
                                for (std::size_t i = 0; i < judged.state.v.size(); ++i) {
                                  ++verdict.checked;
                                  if (norm(judged.state.v[i]) == 0) continue;
-                                 violate(verdict, "it moves", {}, {static_cast<int32_t>(i)});
+                                 violate(verdict, {{}, {static_cast<int32_t>(i)}}, "it moves");
                                }
                              },
                              nullptr}};
