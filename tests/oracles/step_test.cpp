@@ -14,15 +14,15 @@ namespace {
 
 using namespace cutproof::testing;
 
-struct Scene {
+struct ThrownBlock {
   cutproof::Setup setup;
   State before, after;
 };
 
 // A block that is thrown, spinning and stretched, with everything that gives momentum: gravity, damping, a wall with
 // friction that it hits, and a grip that pulls at one corner.
-Scene thrown_block(Solver solver) {
-  Scene scene{setup_of(block_body(6, 5, 4, 0.01, 0.002)), {}, {}};
+ThrownBlock thrown_block(Solver solver) {
+  ThrownBlock scene{setup_of(block_body(6, 5, 4, 0.01, 0.002)), {}, {}};
   scene.setup.step.solver = solver;
   scene.setup.step.gravity = {1, -2, -9.81};
   scene.setup.step.damping = 3;
@@ -41,7 +41,7 @@ Scene thrown_block(Solver solver) {
 
 TEST(Momentum, HoldsForTheReferenceWithEveryCauseAtWork) {
   for (const Solver solver : {Solver::implicit, Solver::published}) {
-    const Scene scene = thrown_block(solver);
+    const ThrownBlock scene = thrown_block(solver);
     ASSERT_GT(norm(scene.after.impulse), 0) << "wall and grip must have acted";
     const Verdict verdict = momentum(scene.setup, scene.before, scene.after);
     EXPECT_TRUE(verdict.holds) << verdict.witness.text;
@@ -54,7 +54,7 @@ TEST(Momentum, HoldsForTheReferenceWithEveryCauseAtWork) {
 }
 
 TEST(Momentum, RejectsAKickThatNobodyGave) {
-  Scene scene = thrown_block(Solver::implicit);
+  ThrownBlock scene = thrown_block(Solver::implicit);
   double momentum_scale = 0;
   for (const Vec3 v : scene.after.v) momentum_scale += 0.002 * norm(v);
   scene.after.v[7].x += 1e-9 * momentum_scale / 0.002;
@@ -65,8 +65,8 @@ TEST(Momentum, RejectsAKickThatNobodyGave) {
 }
 
 TEST(Momentum, RejectsAnImpulseThatWasForgottenOrLeaksThroughDamping) {
-  const Scene good = thrown_block(Solver::implicit);
-  Scene scene = good;
+  const ThrownBlock good = thrown_block(Solver::implicit);
+  ThrownBlock scene = good;
   scene.after.impulse = {};
   EXPECT_FALSE(momentum(scene.setup, scene.before, scene.after).holds);
   scene = good;
@@ -78,13 +78,13 @@ TEST(Momentum, RejectsAnImpulseThatWasForgottenOrLeaksThroughDamping) {
 }
 
 TEST(Momentum, RejectsAVelocityThatIsNotANumber) {
-  Scene scene = thrown_block(Solver::implicit);
+  ThrownBlock scene = thrown_block(Solver::implicit);
   scene.after.v[0].y = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(momentum(scene.setup, scene.before, scene.after).holds);
 }
 
 TEST(Momentum, IsNotJudgedOnAStateThatIsNotWellFormed) {
-  Scene scene = thrown_block(Solver::implicit);
+  ThrownBlock scene = thrown_block(Solver::implicit);
   scene.after.v.pop_back();
   const Verdict verdict = momentum(scene.setup, scene.before, scene.after);
   EXPECT_FALSE(verdict.holds);
@@ -92,7 +92,7 @@ TEST(Momentum, IsNotJudgedOnAStateThatIsNotWellFormed) {
 }
 
 TEST(Momentum, CountsOnlyWhatIsAliveBeforeDetection) {
-  Scene scene = thrown_block(Solver::implicit);
+  ThrownBlock scene = thrown_block(Solver::implicit);
   scene.before.alive[3] = 0;
   scene.before.clusters = testing::clusters_of(scene.setup.body, [] {
     auto lists = box_clusters(6, 5, 4, 2);
