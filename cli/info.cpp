@@ -61,7 +61,7 @@ int info(const InfoOptions& options) {
   print_properties();
   fmt::print(
       "scene files: version 1 (`cutproof info --scene` lists every field)\n"
-      "recordings: temporal VTKHDF 2.0, index version 1\n"
+      "recordings: temporal VTKHDF 2.0, index version 2\n"
       "licence: sources MIT; this program links CGAL and SuiteSparse, which makes it GPL\n");
   return 0;
 }

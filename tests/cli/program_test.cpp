@@ -37,13 +37,7 @@ std::vector<SceneOn> scenes_and_backends() {
   for (const char* scene : {"cuboid_press", "uniform_stretch", "uniform_stretch_strain", "three_cuts", "liver_cut",
                             "kidney_arc", "kidney_discontinuous", "irregular_sampled", "irregular_sampled_covered",
                             "cluster_growth", "small_block", "kidney_37704"}) {
-    // Under a simulated schedule each access is a decision, which takes most of the time of all tests. Of two scenes
-    // that differ in one stage only, the one that runs more kernels is enough there.
-    const bool has_a_twin = scene == std::string("uniform_stretch") || scene == std::string("irregular_sampled");
-    for (const char* backend : {"reference", "host", "simulated"}) {
-      if (backend == std::string("simulated") && has_a_twin) continue;
-      all.push_back({scene, backend});
-    }
+    for (const char* backend : {"reference", "host", "simulated"}) all.push_back({scene, backend});
   }
   return all;
 }
