@@ -42,10 +42,14 @@ Demand demand_of_distance(double distance, double limit, double u) {
   return Demand::either;
 }
 
+// From the nearest point of the rectangle to p.
+Local beyond_rectangle(const Blade& blade, Local p) {
+  return {p.u - std::clamp(p.u, -blade.length / 2, blade.length / 2), p.n, p.w - std::clamp(p.w, 0.0, blade.depth)};
+}
+
 double distance_to_rectangle(const Blade& blade, Local p) {
-  const double du = p.u - std::clamp(p.u, -blade.length / 2, blade.length / 2);
-  const double dw = p.w - std::clamp(p.w, 0.0, blade.depth);
-  return std::sqrt(du * du + p.n * p.n + dw * dw);
+  const Local out = beyond_rectangle(blade, p);
+  return std::sqrt(out.u * out.u + out.n * out.n + out.w * out.w);
 }
 
 // A lower bound of the distance to the sum of the rectangle at `p` and a way `d`, all in the rectangle's own axes: how
@@ -60,24 +64,19 @@ double least_distance_to_translated(const Blade& blade, Local p, Local d) {
 }
 
 // Distance to the Minkowski sum of the rectangle and the segment [0, way]: the least over t in [0, 1] of the distance
-// to the rectangle moved by t of the way, which is a convex function of t because the rectangle is convex. So of three
-// thirds of an interval one outer third cannot matter; what rounding misjudges is as good, up to that rounding. `p` and
-// `d`: the point from the edge's middle, and the way, in the rectangle's own axes.
+// to the rectangle moved by t of the way. Its square is convex, because the rectangle is, and falls as long as the way
+// goes towards the point; so halving finds where that ends. `p` and `d`: the point from the edge's middle, and the way,
+// in the rectangle's own axes.
 double distance_to_translated(const Blade& blade, Local p, Local d) {
-  constexpr int kThirds = 85;  // (2/3)^85 < 2e-15
-  const auto distance = [&](double t) {
-    return distance_to_rectangle(blade, {p.u - t * d.u, p.n - t * d.n, p.w - t * d.w});
-  };
+  const auto seen_at = [&](double t) { return Local{p.u - t * d.u, p.n - t * d.n, p.w - t * d.w}; };
   double low = 0, high = 1;
-  for (int k = 0; k < kThirds; ++k) {
-    const double third = (high - low) / 3;
-    if (distance(low + third) < distance(high - third)) {
-      high -= third;
-    } else {
-      low += third;
-    }
+  while (high - low > 1e-15) {
+    const double middle = (low + high) / 2;
+    const Local out = beyond_rectangle(blade, seen_at(middle));
+    (out.u * d.u + out.n * d.n + out.w * d.w > 0 ? low : high) = middle;
   }
-  return std::min({distance(0), distance(1), distance(low)});
+  return std::min({distance_to_rectangle(blade, p), distance_to_rectangle(blade, seen_at(1)),
+                   distance_to_rectangle(blade, seen_at(low))});
 }
 
 // Ties go to removal, also when rounding lifts them a little: a blade halfway between two layers takes both, because if

@@ -1,7 +1,6 @@
 // Sums over the particles of a body, in extended precision, so that only the rounding of what is judged is left.
 // Internal to oracles/.
 #pragma once
-#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -12,15 +11,12 @@
 namespace cutproof::oracles {
 
 struct Totals {
-  long double mass = 0;                                              // Σ m [kg]
-  std::array<long double, 3> momentum = {}, moment = {}, spin = {};  // Σ m v, Σ m x, Σ m x × v about the body's origin
-  long double kinetic = 0, speed = 0;                                // ½ Σ m v², Σ m |v|
-  double extent = 0;                                                 // greatest |x| [m]
+  long double mass = 0;                                   // Σ m [kg]
+  std::array<long double, 3> momentum = {}, moment = {};  // Σ m v, Σ m x
+  long double speed = 0;                                  // Σ m |v|
 
   Vec3 total_momentum() const { return vector(momentum, 1); }
   Vec3 center() const { return vector(moment, mass); }
-  // About the center of mass: J − c × p.
-  Vec3 angular_momentum() const { return vector(spin, 1) - cross(center(), total_momentum()); }
   static Vec3 vector(const std::array<long double, 3>& v, long double divisor) {
     return {static_cast<double>(v[0] / divisor), static_cast<double>(v[1] / divisor),
             static_cast<double>(v[2] / divisor)};
@@ -33,16 +29,13 @@ inline Totals totals_of(const Body& body, const State& state, const std::vector<
   for (std::size_t i = 0; i < mask.size(); ++i) {
     if (mask[i] == 0) continue;
     const long double m = body.mass[i];
-    const Vec3 x = state.x[i], v = state.v[i], j = cross(x, v);
+    const Vec3 x = state.x[i], v = state.v[i];
     totals.mass += m;
     for (int axis = 0; axis < 3; ++axis) {
       totals.momentum[at(axis)] += m * v[axis];
       totals.moment[at(axis)] += m * x[axis];
-      totals.spin[at(axis)] += m * j[axis];
     }
-    totals.kinetic += m * dot(v, v) / 2;
     totals.speed += m * norm(v);
-    totals.extent = std::max(totals.extent, norm(x));
   }
   return totals;
 }
