@@ -33,6 +33,7 @@ void check_skin_vertices(Judged& judged, Verdict& verdict);
 
 // Of a stage.
 void check_momentum(const StageRun& run, Verdict& verdict);
+void check_component_momentum(const StageRun& run, Verdict& verdict);
 void check_motion(const StageRun& run, Verdict& verdict);
 void check_detection(const StageRun& run, Verdict& verdict);
 void check_split_exactness(const StageRun& run, Verdict& verdict);

@@ -7,39 +7,13 @@
 #include <cmath>
 
 #include "oracles/checks.h"
+#include "oracles/pushes.h"
 #include "oracles/totals.h"
 
 namespace cutproof::oracles {
 namespace {
 
 constexpr double kStored = 0x1p-53;  // positions of a state are doubles, whatever they were computed in
-
-// What may push along an axis in one frame.
-enum class Pushes { none, up, down, any };
-
-std::array<Pushes, 3> pushes_of(const Setup& setup, const State& before) {
-  const int64_t substeps = setup.step.substeps, first = before.frame * substeps;
-  bool any = false;
-  for (int64_t s = first; s < first + substeps; ++s) {
-    any = any || (setup.has_blade && setup.blade_moves[at(s)].down);
-    for (const Grip& grip : setup.grips) any = any || (grip.active[at(s)] != 0 && !grip.particles.empty());
-  }
-  // Accelerated iterations weigh earlier pushes negatively, so that their sum may have any sign.
-  any = any || (!setup.walls.empty() && setup.step.acceleration != Acceleration::none);
-  std::array<Pushes, 3> pushes = {Pushes::none, Pushes::none, Pushes::none};
-  for (const Wall& wall : setup.walls) {
-    for (int axis = 0; axis < 3; ++axis) {
-      Pushes& present = pushes[at(axis)];
-      const Pushes more = axis != wall.axis ? (wall.friction > 0 ? Pushes::any : Pushes::none)
-                          : wall.side > 0   ? Pushes::up
-                                            : Pushes::down;
-      if (more == Pushes::none) continue;
-      present = present == Pushes::none || present == more ? more : Pushes::any;
-    }
-  }
-  if (any) pushes.fill(Pushes::any);
-  return pushes;
-}
 
 class Motion {
  public:

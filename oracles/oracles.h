@@ -61,6 +61,8 @@ inline constexpr StateOracle skin_vertices{core_properties, "skin vertices"};
 // --- One stage: the state before and after it -----------------------------------------------------------------------
 // Linear momentum over one frame: M v' = decay of M v + gravity + impulse (state.impulse).
 inline constexpr StageOracle momentum{"linear momentum", Stage::step};
+// The same of each component of G, along each axis on which nothing has pushed: no force joins separated pieces.
+inline constexpr StageOracle component_momentum{"component momentum", Stage::step};
 // Positions and velocities before and after the step of one frame belong together. What can be said of it without
 // running the step again:
 // - one substep a frame: each particle has moved by dt v' / D, with D = e^(−c dt);

@@ -54,6 +54,8 @@ PropertyList make_core_properties() {
                "a body of no particles", form),
       of_stage("linear momentum", "tolerances.md, Linear momentum", "kg m/s", stages(step), "nothing is alive",
                check_momentum),
+      of_stage("component momentum", "method.md §2, I3: no ghost force; tolerances.md, Linear momentum", "kg m/s",
+               stages(step), "one component, or none that nothing holds or pushes", check_component_momentum),
       of_stage("motion", "method.md §3; tolerances.md, Motion", "h", stages(step),
                "nothing is alive, or a blade that is down, friction or a grip may push to any side", check_motion),
       of_stage("detection", "method.md §4; tolerances.md, Detection and rest frames", "1", stages(detect),

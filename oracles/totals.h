@@ -15,6 +15,14 @@ struct Totals {
   std::array<long double, 3> momentum = {}, moment = {};  // Σ m v, Σ m x
   long double speed = 0;                                  // Σ m |v|
 
+  void add(long double m, Vec3 x, Vec3 v) {
+    mass += m;
+    for (int axis = 0; axis < 3; ++axis) {
+      momentum[at(axis)] += m * v[axis];
+      moment[at(axis)] += m * x[axis];
+    }
+    speed += m * norm(v);
+  }
   Vec3 total_momentum() const { return vector(momentum, 1); }
   Vec3 center() const { return vector(moment, mass); }
   static Vec3 vector(const std::array<long double, 3>& v, long double divisor) {
@@ -27,15 +35,7 @@ struct Totals {
 inline Totals totals_of(const Body& body, const State& state, const std::vector<uint8_t>& mask) {
   Totals totals;
   for (std::size_t i = 0; i < mask.size(); ++i) {
-    if (mask[i] == 0) continue;
-    const long double m = body.mass[i];
-    const Vec3 x = state.x[i], v = state.v[i];
-    totals.mass += m;
-    for (int axis = 0; axis < 3; ++axis) {
-      totals.momentum[at(axis)] += m * v[axis];
-      totals.moment[at(axis)] += m * x[axis];
-    }
-    totals.speed += m * norm(v);
+    if (mask[i] != 0) totals.add(body.mass[i], state.x[i], state.v[i]);
   }
   return totals;
 }
