@@ -20,6 +20,7 @@ void add_fuzz(CLI::App& program, Work& work);
 void add_replay(CLI::App& program, Work& work);
 void add_bench(CLI::App& program, Work& work);
 void add_tune(CLI::App& program, Work& work);
+void add_digest(CLI::App& program, Work& work);
 void add_info(CLI::App& program, Work& work);
 
 inline constexpr const char* kVersion = CUTPROOF_VERSION;

@@ -31,6 +31,7 @@ class Verbs : public Program {
             "--version",
             "run cut.json --check",
             "check seen",
+            "digest seen",
             "fuzz --cases 20 --sizes 0-20",
             "replay '" + counterexample() + "'",
             "tune cut.json --tolerance 0.5 --reference substeps --repeats 1 --frames 1",
@@ -73,6 +74,23 @@ TEST_F(Verbs, WriteTheirDocumentEvenIfStandardOutputCannotBeWritten) {
   EXPECT_TRUE(json::parse(read("out.json")).at("summary").at("holds"));
 }
 
+// --- digest ----------------------------------------------------------------------------------------------------------
+
+TEST_F(Verbs, DigestTellsRunsApartByTheirBits) {
+  record();
+  const std::string first = cutproof("digest seen").output;
+  EXPECT_EQ(std::count(first.begin(), first.end(), '\n'), 1 + 2 * 2 + 1) << "start, step and skin of two frames, all\n"
+                                                                         << first;
+  EXPECT_NE(first.find("snapshot 0, start, frame 0\n"), std::string::npos) << first;
+  EXPECT_NE(first.find("snapshot 4, skin, frame 1\n"), std::string::npos) << first;
+  record();
+  EXPECT_EQ(cutproof("digest seen").output, first);
+  ASSERT_EQ(cutproof("run cut.json --backend host --record seen").status, 0);
+  const std::string other = cutproof("digest seen").output;
+  EXPECT_NE(other.substr(0, 16), first.substr(0, 16)) << "single precision";
+  expect_refused("digest nowhere", {"nowhere"});
+}
+
 // --- Usage
 // ------------------------------------------------------------------------------------------------------------
 
@@ -89,6 +107,7 @@ TEST_F(Verbs, RefuseWhatIsGivenButEmpty) {
                                                         {"run ''", "scene"},
                                                         {"check seen --json ''", "--json"},
                                                         {"check ''", "recording"},
+                                                        {"digest ''", "recording"},
                                                         {"fuzz --cases 5 --json ''", "--json"},
                                                         {"fuzz --cases 5 --shard ''", "--shard"},
                                                         {"fuzz --cases 5 --save ''", "--save"},
@@ -119,6 +138,7 @@ TEST_F(Verbs, RefuseUnknownOptionsMissingValuesAndNegativeCounts) {
                                                         {"run cut.json --frames -1", "--frames"},
                                                         {"run cut.json --particles -1", "--particles"},
                                                         {"check seen --frobnicate", "--frobnicate"},
+                                                        {"digest seen --frobnicate", "--frobnicate"},
                                                         {"check seen --json", "--json"},
                                                         {"info --frobnicate", "--frobnicate"},
                                                         {"fuzz --frobnicate", "--frobnicate"},
