@@ -37,12 +37,15 @@ constexpr std::string_view name_of(E choice) {
 
 // What a rule of merging promises (method.md §6).
 struct MergePromise {
-  bool unique;   // a function of the input alone: two right backends give the same clusters
-  bool maximal;  // no small cluster is left that could still merge
+  bool unique;     // a function of the input alone: two right backends give the same clusters
+  bool maximal;    // no small cluster is left that could still merge
+  bool keeps_cap;  // unions have at most `cap` particles, however threads run
 };
 constexpr MergePromise promise_of(MergeRule rule) {
   using enum MergeRule;
-  return {.unique = rule == none || rule == deterministic, .maximal = rule == deterministic || rule == published};
+  return {.unique = rule == none || rule == deterministic,
+          .maximal = rule == deterministic || rule == published,
+          .keeps_cap = rule != single_pass};
 }
 
 // What a rule of expansion promises (method.md §7).

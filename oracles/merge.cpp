@@ -17,8 +17,9 @@ namespace {
 class MergeDecomposition {
  public:
   // `limits`: a state with the tau and the cap that hold.
-  MergeDecomposition(const TissueGraph& graph, const Clusters& before, const Clusters& after, const State& limits)
-      : graph_(graph), before_(before), after_(after), tau_(limits.tau), cap_(limits.cap) {}
+  MergeDecomposition(const TissueGraph& graph, MergeRule rule, const Clusters& before, const Clusters& after,
+                     const State& limits)
+      : graph_(graph), rule_(rule), before_(before), after_(after), tau_(limits.tau), cap_(limits.cap) {}
 
   void judge(Verdict& verdict) {
     match_numbers(verdict);
@@ -209,13 +210,14 @@ class MergeDecomposition {
       if (after_.size(r) <= cap_ || after_.size(r) == before_.size(kept_[at(r)])) continue;
       std::vector<int32_t> numbers;
       for (const int32_t c : given_[at(r)]) numbers.push_back(number_before(c));
-      violate(verdict, {numbers}, "cluster {} was merged to {} particles, more than cap = {}", after_.number[at(r)],
-              after_.size(r), cap_);
+      violate(verdict, {numbers}, "cluster {} was merged to {} particles, more than cap = {}{}", after_.number[at(r)],
+              after_.size(r), cap_, promise_of(rule_).keeps_cap ? "" : ", which this rule does not promise to keep");
     }
   }
 
   static constexpr int64_t kSearchBudget = 10'000;  // of questions whether a result can be explained
   const TissueGraph graph_;
+  const MergeRule rule_;
   const Clusters& before_;
   const Clusters& after_;
   int64_t tau_, cap_;
@@ -240,7 +242,7 @@ void check_merge_legality(const StageRun& run, Verdict& verdict) {
   const Clusters &a = before.clusters, &b = after.clusters;
   verdict.checked = a.count();
   if (setup.merge.rule != MergeRule::none) {
-    MergeDecomposition(TissueGraph(setup.body, before.alive), a, b, before).judge(verdict);
+    MergeDecomposition(TissueGraph(setup.body, before.alive), setup.merge.rule, a, b, before).judge(verdict);
   } else if (a.offsets != b.offsets || a.members != b.members || a.number != b.number) {
     violate(verdict, {}, "clusters changed, but the scene merges none");
   }
