@@ -14,8 +14,8 @@ namespace cutproof {
 inline constexpr std::array<std::string_view, 2> kSolverNames = {"implicit", "published"};
 inline constexpr std::array<std::string_view, 2> kAccelerationNames = {"none", "chebyshev"};
 inline constexpr std::array<std::string_view, 4> kCriterionNames = {"none", "distance", "geometric", "strain"};
-inline constexpr std::array<std::string_view, 5> kMergeRuleNames = {"none", "deterministic", "published", "single_pass",
-                                                                    "numbered"};
+inline constexpr std::array<std::string_view, 4> kMergeRuleNames = {"none", "deterministic", "published",
+                                                                    "single_pass"};
 inline constexpr std::array<std::string_view, 3> kExpandRuleNames = {"none", "edge_cover", "published"};
 
 constexpr std::span<const std::string_view> names_of(Solver) { return kSolverNames; }
@@ -43,8 +43,8 @@ struct MergePromise {
 };
 constexpr MergePromise promise_of(MergeRule rule) {
   using enum MergeRule;
-  return {.unique = rule == none || rule == deterministic || rule == numbered,
-          .maximal = rule == deterministic || rule == published || rule == numbered,
+  return {.unique = rule == none || rule == deterministic,
+          .maximal = rule == deterministic || rule == published,
           .keeps_cap = rule != single_pass};
 }
 

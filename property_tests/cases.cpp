@@ -301,10 +301,7 @@ Case draw_case(uint64_t seed, int size) {
   c.tau = random.between(0, c.most);
   c.cap = random.between(c.most, 3 * c.most);
   c.seed = random.seed();
-  c.merge = random.chance(0.1)   ? MergeRule::none
-            : random.chance(0.6) ? MergeRule::deterministic
-            : random.chance(0.5) ? MergeRule::numbered
-                                 : MergeRule::published;
+  c.merge = random.chance(0.1) ? MergeRule::none : random.chance(0.6) ? MergeRule::deterministic : MergeRule::published;
   c.expand = random.chance(0.1)   ? ExpandRule::none
              : random.chance(0.7) ? ExpandRule::edge_cover
                                   : ExpandRule::published;

@@ -170,16 +170,15 @@ uint32_t mix(uint32_t x) {
 
 using Key = std::tuple<uint32_t, int32_t, int32_t, int32_t>;
 
-// `hashed`: in the order of scattered words; otherwise of numbers.
-Key key_of(int32_t source_number, int32_t target_number, uint32_t round, bool hashed) {
+Key key_of(int32_t source_number, int32_t target_number, uint32_t round) {
   const auto [low, high] = std::minmax(source_number, target_number);
   const uint32_t word =
       0x9E3779B9u * static_cast<uint32_t>(low) ^ 0x85EBCA6Bu * static_cast<uint32_t>(high) ^ 0xC2B2AE35u * round;
-  return {hashed ? mix(word) : 0, low, high, source_number};
+  return {mix(word), low, high, source_number};
 }
 
 // The first round has the index 0.
-void merge_deterministic(MergingSets& sets, std::size_t slot_count, bool hashed) {
+void merge_deterministic(MergingSets& sets, std::size_t slot_count) {
   constexpr Key kNone = {std::numeric_limits<uint32_t>::max(), std::numeric_limits<int32_t>::max(),
                          std::numeric_limits<int32_t>::max(), std::numeric_limits<int32_t>::max()};
   std::vector<Key> least(slot_count, kNone);  // by slot: the smallest key of a proposal that names it
@@ -187,7 +186,7 @@ void merge_deterministic(MergingSets& sets, std::size_t slot_count, bool hashed)
     std::vector<std::pair<Key, Proposal>> proposals;
     for (const int32_t s : sets.small()) {
       if (const auto t = sets.preferred_target(s)) {
-        proposals.push_back({key_of(sets.number(s), sets.number(*t), round, hashed), {s, *t}});
+        proposals.push_back({key_of(sets.number(s), sets.number(*t), round), {s, *t}});
       }
     }
     if (proposals.empty()) return;
@@ -278,9 +277,7 @@ Merged merge_sets(const Body& body, const std::vector<uint8_t>& alive, std::vect
                   const std::vector<int32_t>& numbers, MergeRule rule, int64_t tau, int64_t cap) {
   const std::size_t slot_count = sets.size();
   MergingSets merging(body, alive, std::move(sets), numbers, tau, cap);
-  if (rule == MergeRule::deterministic || rule == MergeRule::numbered) {
-    merge_deterministic(merging, slot_count, rule == MergeRule::deterministic);
-  }
+  if (rule == MergeRule::deterministic) merge_deterministic(merging, slot_count);
   if (rule == MergeRule::published) merge_published(merging, slot_count);
   if (rule == MergeRule::single_pass) merge_single_pass(merging, slot_count);
   return std::move(merging).result();

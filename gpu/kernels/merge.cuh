@@ -174,12 +174,12 @@ struct ProposalKey {
   unsigned word;
   int low, high, source;  // numbers
 };
-CUTPROOF_BOTH inline ProposalKey proposal_key(int source, int target, int round, bool hashed) {
+CUTPROOF_BOTH inline ProposalKey proposal_key(int source, int target, int round) {
   const int low = source < target ? source : target;
   const int high = source < target ? target : source;
   const unsigned word = 0x9E3779B9u * static_cast<unsigned>(low) ^ 0x85EBCA6Bu * static_cast<unsigned>(high) ^
                         0xC2B2AE35u * static_cast<unsigned>(round);
-  return {hashed ? scatter(word) : 0, low, high, source};
+  return {scatter(word), low, high, source};
 }
 CUTPROOF_BOTH inline bool precedes(const ProposalKey& a, const ProposalKey& b) {
   if (a.word != b.word) return a.word < b.word;
@@ -191,14 +191,13 @@ CUTPROOF_BOTH inline bool precedes(const ProposalKey& a, const ProposalKey& b) {
 // best[named] becomes s unless a proposal with a smaller key is there. One thread; proposal[s] is visible to all.
 template <class Block>
 CUTPROOF_DEVICE void offer_key(Block& block, const DeviceView& w, int* best, int named, int s, int t, int round) {
-  const bool hashed = w.body[w.slot_body[s]].merge_rule == MergeRule::deterministic;
-  const ProposalKey own = proposal_key(w.slot_number[s], w.slot_number[t], round, hashed);
+  const ProposalKey own = proposal_key(w.slot_number[s], w.slot_number[t], round);
   int other = block.load(&best[named]);
   for (;;) {
     if (other >= 0) {
       block.fence();  // its proposal was written before it came here
       const int target = block.load(&w.proposal[other]);
-      if (!precedes(own, proposal_key(w.slot_number[other], w.slot_number[target], round, hashed))) return;
+      if (!precedes(own, proposal_key(w.slot_number[other], w.slot_number[target], round))) return;
     }
     const int seen = block.atomic_cas(&best[named], other, s);
     if (seen == other) return;
@@ -248,7 +247,7 @@ CUTPROOF_DEVICE void propose_merges_kernel(Block& block, DeviceView w) {
     block.store(&w.proposal[s], t);
     if (t < 0) continue;
     block.store(&c.changed, 1);
-    if (body.merge_rule == MergeRule::deterministic || body.merge_rule == MergeRule::numbered) {
+    if (body.merge_rule == MergeRule::deterministic) {
       block.fence();
       offer_key(block, w, best, s, s, t, round);
       offer_key(block, w, best, t, s, t, round);

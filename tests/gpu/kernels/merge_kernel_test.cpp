@@ -127,14 +127,6 @@ TEST(GpuMerge, EqualsTheReferenceOnForeignClusters) {
   }
 }
 
-TEST(GpuMerge, EqualsTheReferenceByNumbersToo) {
-  HostLauncher launcher(HostLauncher::Threads{2});
-  for (std::uint32_t seed = 1; seed <= 150; ++seed) {
-    SCOPED_TRACE("random_foreign(" + std::to_string(seed) + ')');
-    expect_equal_to_reference(launcher, random_foreign(seed, MergeRule::numbered), true);
-  }
-}
-
 TEST(GpuMerge, EqualsTheReferenceInEverySchedule) {
   for (std::uint32_t seed = 1000; seed < 1003; ++seed) {
     for_schedules(60, [&](HostLauncher& launcher) {
