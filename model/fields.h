@@ -36,7 +36,7 @@ enum Part : unsigned {
   kFrames = 16,     // rest centers and masses
   kRotations = 32,  // rotations and degenerate flags
   kSkin = 64,
-  kLimits = 128,   // tau, cap, edge_covered, expansions
+  kLimits = 128,   // tau, cap, edge_covered
   kNumbers = 256,  // numbers of clusters
   kTime = 512,     // frame
   kAll = 1023
@@ -81,7 +81,6 @@ constexpr void for_each_field(Visit&& visit) {
   CUTPROOF_FIELD(cap, "cap", "cap", state, Q::number, "1", kLimits, none, "", true);
   CUTPROOF_FIELD(edge_covered, "edge_covered", "edge_covered", state, Q::flag, "1", kLimits, stages(expand),
                  "alive, members", true);
-  CUTPROOF_FIELD(expansions, "expansions", "expansions", state, Q::number, "1", kLimits, stages(expand), "", true);
   CUTPROOF_FIELD(impulse, "impulse", "the impulse", state, Q::momentum, "kg m/s", kMotion, stages(step), "", false);
   CUTPROOF_FIELD(x, "position", "a position", particle, Q::point, "m", kMotion, stages(step), "", false);
   CUTPROOF_FIELD(v, "velocity", "a velocity", particle, Q::velocity, "m/s", kMotion, stages(step), "", false);
@@ -116,7 +115,7 @@ constexpr void for_each_field(Visit&& visit) {
 namespace fields_detail {
 // Does not compile when a member is added or taken away: then the list above is to be changed as well.
 inline void know_every_member(const State& state) {
-  [[maybe_unused]] const auto& [frame, x, v, alive, removed, debris, clusters, tau, cap, edge_covered, expansions, impulse, skin,
+  [[maybe_unused]] const auto& [frame, x, v, alive, removed, debris, clusters, tau, cap, edge_covered, impulse, skin,
                                 precision] = state;
   [[maybe_unused]] const auto& [offsets, members, number, rotation, rest_center, mass, degenerate] = clusters;
   [[maybe_unused]] const auto& [owner, direction, position, triangles] = skin;

@@ -119,7 +119,6 @@ Clusters grown(const Clusters& before, const std::vector<Addition>& additions) {
 void expand(const Setup& setup, State& state) {
   const ExpandRule rule = setup.expand.rule;
   if (rule == ExpandRule::none) return;
-  ++state.expansions;
   const Memberships memberships = memberships_of(state.clusters, setup.body.particle_count());
   std::vector<Addition> all = rule == ExpandRule::edge_cover ? cover_edges(setup.body, state, memberships)
                                                              : free_lone_clusters(setup.body, state, memberships);

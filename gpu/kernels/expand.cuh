@@ -285,9 +285,7 @@ template <class Block>
 CUTPROOF_DEVICE void note_edge_covered_kernel(Block& block, DeviceView w) {
   for (int64_t i = block.first(); i < w.bodies; i += block.stride()) {
     const int b = static_cast<int>(i);
-    if (!expands_now(w, b)) continue;
-    ++w.expansions[b];
-    if (w.body[b].expand_rule == ExpandRule::edge_cover) w.edge_covered[b] = 1;
+    if (expands_now(w, b) && w.body[b].expand_rule == ExpandRule::edge_cover) w.edge_covered[b] = 1;
   }
 }
 CUTPROOF_KERNEL(note_edge_covered_kernel);

@@ -176,7 +176,6 @@ std::vector<State> extract_states(const StagingBuffers& staging, const std::vect
     state.tau = body.tau;
     state.cap = body.cap;
     state.edge_covered = staging.edge_covered[b] != 0;
-    state.expansions = staging.expansions[b];
     if (staging.skin_made[b] && !skins[b]) {
       skins[b] = extract_skin(staging, setup, body, range(vertices, 0), range(vertices, 1), range(cells, 0),
                               range(cells, 1), place);

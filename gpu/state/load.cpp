@@ -146,7 +146,6 @@ void add_particles(StagingBuffers& staging, const Setup& setup, const State& sta
   staging.frame.push_back(narrow(state.frame, "frames"));
   staging.cut.push_back(state.removed.empty() ? -1 : code);
   staging.edge_covered.push_back(state.edge_covered);
-  staging.expansions.push_back(state.expansions);
   staging.skin_made.push_back(0);
   staging.loaded_skin.push_back(state.skin);
 }
