@@ -19,8 +19,6 @@ namespace cutproof::gpu {
 
 namespace step_detail {
 
-inline constexpr unsigned kWarp = 0xffffffffu;
-
 // Whether body b takes part in this iteration. A body with fewer substeps or iterations than others waits.
 CUTPROOF_DEVICE inline bool takes_part(const DeviceView& w, int b, int substep, int iteration) {
   return running(w, b) && substep < w.body[b].substeps && iteration < w.body[b].iterations;
