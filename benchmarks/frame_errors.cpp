@@ -25,7 +25,7 @@ void note(FrameErrors& errors, const oracles::StageDifference& found, const Stat
     case Stage::step:
       if (!errors.step) errors.step.emplace();
       errors.step->position.join(found.error(oracles::Measure::position).norm);
-      errors.step->undecidable += found.undecidable.particles_excluded;
+      errors.step->undecidable += found.undecidable.positions;
       break;
     case Stage::detect:
       if (!errors.detect) errors.detect.emplace();

@@ -55,11 +55,10 @@ json lockstep_json(const harness::Lockstep& lockstep) {
   }
   column("topology_differences", [](const LockstepFrame& f) { return f.topology_differences; });
   column("removals_undecidable", [](const LockstepFrame& f) { return f.undecidable.removals; });
-  column("sides_undecidable", [](const LockstepFrame& f) { return f.undecidable.sides; });
-  column("sides_taken_otherwise", [](const LockstepFrame& f) { return f.undecidable.sides_taken_otherwise; });
+  column("decisions_taken_otherwise", [](const LockstepFrame& f) { return f.undecidable.otherwise; });
+  column("positions_undecidable", [](const LockstepFrame& f) { return f.undecidable.positions; });
   column("rotations_undecidable", [](const LockstepFrame& f) { return f.undecidable.rotations; });
-  column("sensitive_undecidable", [](const LockstepFrame& f) { return f.undecidable.sensitive; });
-  column("particles_excluded", [](const LockstepFrame& f) { return f.undecidable.particles_excluded; });
+  column("positions_undecided", [](const LockstepFrame& f) { return f.undecidable.undecided; });
   return {{"frames", std::move(frames)}, {"greatest", worst_json(lockstep)}};
 }
 
@@ -100,12 +99,13 @@ void print_lockstep(const harness::Lockstep& lockstep) {
     if (rotations) row(oracles::kMeasures[m].name, angle, "rad");
     row(rotations ? "" : oracles::kMeasures[m].name, lockstep.worst(measure).norm, oracles::kMeasures[m].unit);
   }
-  fmt::print("undecidable within rounding, so not measured:\n");
+  fmt::print("undecidable within rounding:\n");
   fmt::print("{:>8} removals within the rounding band\n", undecidable.removals);
-  fmt::print("{:>8} particles in the blade's plane; {} of them on the other side in the end\n", undecidable.sides,
-             undecidable.sides_taken_otherwise);
-  fmt::print("{:>8} rotations that are not unique\n", undecidable.rotations);
-  fmt::print("{:>8} particles that one rounding carries beyond the bound\n", undecidable.sensitive);
+  fmt::print("{:>8} decisions of steps that the reference takes otherwise\n", undecidable.otherwise);
+  fmt::print("{:>8} positions that rounding carries beyond the bound: not measured, but judged\n",
+             undecidable.positions);
+  fmt::print("{:>8} rotations, the same\n", undecidable.rotations);
+  fmt::print("{:>8} positions that rounding carries so far that they are not judged sharply\n", undecidable.undecided);
 }
 
 void print_free_running(const harness::FreeRunning& run) {

@@ -87,6 +87,14 @@ void Lockstep::see(Stage stage, const State& after, bool launched) {
     failure.bound_source = found.detection->bound_source;
     removals_.add(std::move(failure));
   }
+  if (found.step) {
+    ++steps_;
+    if (!found.step->holds) {
+      Verdict failure = *found.step;
+      failure.property = kPrefix + failure.property;
+      steps_failed_.add(std::move(failure));
+    }
+  }
   frame.undecidable.join(found.undecidable);
   frame.angle.join(found.angle);
   for (std::size_t m = 0; m < tracks_.size(); ++m) {
@@ -127,6 +135,7 @@ std::vector<Verdict> Lockstep::verdicts() const {
   };
   counted("topology", topology_, stages_);
   counted("removed particles", removals_, detections_);
+  counted("admissible step", steps_failed_, steps_);
   for (std::size_t m = 0; m < tracks_.size(); ++m) {
     const auto& [worst, failures] = tracks_[m];
     Verdict& verdict = verdicts.emplace_back(

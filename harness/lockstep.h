@@ -77,8 +77,8 @@ class Lockstep {
   oracles::StageComparison comparison_;
   std::vector<LockstepFrame> frames_;
   std::array<Track, 6> tracks_;
-  Failures topology_, removals_;
-  int64_t stages_ = 0, detections_ = 0;  // that were compared
+  Failures topology_, removals_, steps_failed_;
+  int64_t stages_ = 0, detections_ = 0, steps_ = 0;  // that were compared
 };
 
 }  // namespace cutproof::harness

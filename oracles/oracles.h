@@ -27,8 +27,9 @@ struct StateOracle {
 struct StageOracle {
   std::string_view name;
   Stage stage;
+  const PropertyList& (*list)() = core_properties;
   Verdict operator()(const Setup& setup, const State& before, const State& after) const {
-    return ask(property_named(core_properties(), name), setup, stage, before, after);
+    return ask(property_named(list(), name), setup, stage, before, after);
   }
 };
 
@@ -73,6 +74,11 @@ inline constexpr StageOracle component_momentum{"component momentum", Stage::ste
 // `measured` and `bound` are those of the comparison that comes nearest to its bound or goes farthest beyond [h].
 // Vacuous where none of these can be asked: a blade that is down, friction or a grip may push to any side.
 inline constexpr StageOracle motion{"motion", Stage::step};
+// The step, computed again from the state before it, by an oracle that shares no line with any backend: where every
+// particle, velocity, rotation and the impulse may be, given the rounding of the state's precision. One outcome of what
+// rounding decides must explain all coupled particles. `measured` and `bound` as above; `undecided` counts particles of
+// which only a blunt question can be asked.
+inline constexpr StageOracle admissible_step{"admissible step", Stage::step, motion_properties};
 inline constexpr StageOracle detection{"detection", Stage::detect};  // removed <=> d_i > εh outside the band
 inline constexpr StageOracle split_exactness{"split exactness", Stage::split};
 inline constexpr StageOracle merge_legality{"merge legality", Stage::merge};

@@ -102,6 +102,12 @@ const PropertyList& core_properties() {
   return list;
 }
 
+const PropertyList& motion_properties() {
+  static const PropertyList list = {
+      of_stage(kAdmissibleStep, kAdmissibleStepSource, "h", stages(Stage::step), kNoStep, check_admissible_step)};
+  return list;
+}
+
 const Property& property_named(const PropertyList& list, std::string_view name) {
   for (const Property& property : list) {
     if (property.name == name) return property;

@@ -54,6 +54,9 @@ using PropertyLists = std::vector<const PropertyList*>;
 // Those that need CGAL stand in oracles/surface/surface.h.
 const PropertyList& core_properties();
 
+// The motion, computed again: what a step of the reference costs, and a few times that where rounding decides much.
+const PropertyList& motion_properties();
+
 // Throws std::out_of_range if the list has no property of this name.
 const Property& property_named(const PropertyList& list, std::string_view name);
 

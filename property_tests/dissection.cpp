@@ -77,7 +77,7 @@ void StepsCompared::add(const oracles::StageDifference& step) {
   const oracles::ErrorNorm& position = step.error(oracles::Measure::position).norm;
   ++steps;
   particles += position.count;
-  undecidable += step.undecidable.particles_excluded;
+  undecidable += step.undecidable.positions;
   greatest = std::max(greatest, position.max);
 }
 

@@ -127,7 +127,9 @@ CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const floa
   for (int row = 0; row < 3; ++row) {
     for (int k = 0; k < 3; ++k) a(row, k) = sums[7 + 3 * row + k] - shift[row] * rest[k];
   }
-  const Rotation best = rotate<Method>(a, w.rotation[s]);
+  // One particle has no extent: what is left of A is rounding, and rotate() would make a rotation of it.
+  Rotation best{w.rotation[s], true};
+  if (w.slot_size[s] > 1) best = rotate<Method>(a, w.rotation[s]);
   w.rotation[s] = best.r;
   w.degenerate[s] = best.degenerate;
   // Such that Σ w (goal) = Σ w x to the rounding of these two sums (docs/design/decisions.md, Momentum and the rounding

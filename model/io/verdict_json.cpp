@@ -17,6 +17,7 @@ nlohmann::json verdict_json(const Verdict& verdict, bool expected_failure) {
                            {"unit", verdict.unit},
                            {"bound_source", verdict.bound_source},
                            {"checked", verdict.checked}};
+  if (verdict.undecided > 0) result["undecided"] = verdict.undecided;
   if (!verdict.vacuous.empty()) result["vacuous"] = verdict.vacuous;
   if (expected_failure && !verdict.holds) result["expected_failure"] = true;
   if (!verdict.holds) {

@@ -15,13 +15,31 @@
 #include "model/verdict.h"
 #include "oracles/comparison/error_norm.h"
 #include "oracles/comparison/state_difference.h"
-#include "oracles/comparison/step_comparison.h"
 
 namespace cutproof::oracles {
 
 // The reference's stages, in the order of kStages, which no oracle knows by itself: each takes a state before the
 // stage, which is due, and leaves the one after it. The end of the frame after skin is no part of them.
 using ReferenceStages = std::array<std::function<void(const Setup& setup, State& state)>, 6>;
+
+// Greatest extent of the body at rest, over the three axes [h].
+double body_extent(const Body& body);
+
+// What the project asks of the positions after a step [h]; of velocities [h/dt] twice that, because each is the
+// difference of two positions.
+double position_bound(const Body& body);
+
+// What rounding decides, so that both answers are right: counted, and where it is more than the project asks of
+// positions, not measured.
+struct Undecidable {
+  int64_t removals = 0;   // particles removed by one only, within the rounding band of detection
+  int64_t otherwise = 0;  // decisions of steps that the backend has taken, within rounding, as the reference has not
+  int64_t positions = 0;  // particles that the rounding of a step carries farther than the bound
+  int64_t rotations = 0;  // clusters, the same
+  int64_t undecided = 0;  // of positions: so far that no sharp answer could be asked for (Verdict::undecided)
+
+  void join(const Undecidable& other);
+};
 
 // What is measured, each with a bound of its own.
 enum class Measure { position, velocity, rotation, rest_center, mass, skin };
@@ -58,6 +76,7 @@ struct StageDifference {
   bool sets_are_open = false;        // the rule leaves several answers, so clusters are not among them
   std::vector<int32_t> removals;     // detect: particles that only one of the two removes
   std::optional<Verdict> detection;  // where there are some: the oracle's, whether each lies within its rounding band
+  std::optional<Verdict> step;       // of a step that was due: the oracle's, whether it is admissible
   Undecidable undecidable;
   ErrorNorm angle;                           // of rotations [rad]
   std::array<MeasuredError, 6> errors = {};  // by Measure
@@ -65,8 +84,8 @@ struct StageDifference {
   MeasuredError& error(Measure which) { return errors[static_cast<std::size_t>(which)]; }
   const MeasuredError& error(Measure which) const { return errors[static_cast<std::size_t>(which)]; }
 
-  // One for decisions (`topology`), one for removals where the stage is a detection that was due, one for each measure
-  // that was taken. Their properties begin with `prefix`.
+  // One for decisions (`topology`), one for removals where the stage is a detection that was due, one for a step that
+  // was due (`admissible step`), one for each measure that was taken. Their properties begin with `prefix`.
   std::vector<Verdict> verdicts(const std::string& prefix) const;
 };
 
@@ -90,7 +109,6 @@ class StageComparison {
 
   const Setup& setup_;
   ReferenceStages reference_;
-  std::optional<StepComparison> steps_;  // made for the first step
 };
 
 // Rest centers and masses of `state` against those that its own memberships give, with their bounds.

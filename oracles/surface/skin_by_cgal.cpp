@@ -207,6 +207,6 @@ const PropertyList& surface_properties() {
   return list;
 }
 
-PropertyLists properties() { return {&core_properties(), &surface_properties()}; }
+PropertyLists properties() { return {&core_properties(), &motion_properties(), &surface_properties()}; }
 
 }  // namespace cutproof::oracles

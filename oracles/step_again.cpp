@@ -1,0 +1,56 @@
+// A step beside the same step computed again (tolerances.md, The step again).
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "oracles/checks.h"
+#include "oracles/step_model/admissible_step.h"
+
+namespace cutproof::oracles {
+
+StepAgain step_again(const Setup& setup, const State& before, const State& after) {
+  Verdict verdict = start_verdict(kAdmissibleStep, after, "h", kAdmissibleStepSource);
+  const auto done = [&] { return StepAgain{conclude(std::move(verdict), kNoStep)}; };
+  const Clusters &was = before.clusters, &is = after.clusters;
+  if (before.frame < 0 || before.frame >= setup.frame_count()) {
+    verdict.vacuous = "the schedule is over";
+    return done();
+  }
+  if (was.offsets != is.offsets || was.members != is.members || before.alive != after.alive) {
+    fail(verdict, {}, "the step has changed what is alive, or which clusters there are");
+    return done();
+  }
+  if (!std::all_of(before.x.begin(), before.x.end(), is_finite) ||
+      !std::all_of(before.v.begin(), before.v.end(), is_finite)) {
+    verdict.vacuous = "the step began with numbers that are none";
+    return done();
+  }
+  StepAgain again;
+  again.step = nearest_admissible_step(setup, before, after);
+  const AdmissibleStep& step = *again.step;
+  verdict.measured = step.measured;
+  verdict.bound = step.bound;
+  verdict.checked = step.checked;
+  verdict.undecided = step.undecided;
+  if (!step.holds) {
+    Concerned concerned;
+    std::string whose;
+    if (step.part == StepPart::rotation) {
+      concerned.clusters = {was.number[at(step.where)]};
+      whose = fmt::format(" of cluster {}", concerned.clusters.front());
+    } else if (step.part != StepPart::impulse) {
+      concerned.particles = {step.where};
+      whose = fmt::format(" of particle {}", step.where);
+    }
+    fail(verdict, concerned, "the {}{} is {:.3g} h from where an admissible step ends, rounding explains {:.3g} h",
+         name_of(step.part), whose, step.measured, step.bound);
+  }
+  again.verdict = conclude(std::move(verdict), kNoStep);
+  return again;
+}
+
+void check_admissible_step(const StageRun& run, Verdict& verdict) {
+  verdict = step_again(run.setup, run.before, run.after).verdict;
+}
+
+}  // namespace cutproof::oracles

@@ -1,0 +1,52 @@
+// Whether a step went where it may: within rounding of some admissible outcome, one for all particles that are coupled
+// (docs/design/tolerances.md, The step again). Internal to oracles/.
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "model/setup.h"
+#include "model/state.h"
+#include "model/verdict.h"
+#include "oracles/step_model/step_model.h"
+
+namespace cutproof::oracles {
+
+// What of a step is compared, each with its own bounds.
+enum class StepPart { position, velocity, rotation, impulse };
+constexpr const char* name_of(StepPart part) {
+  constexpr const char* kNames[] = {"position", "velocity", "rotation", "impulse"};
+  return kNames[static_cast<int>(part)];
+}
+
+struct AdmissibleStep {
+  StepOutcome outcome;  // the admissible one to which the step comes nearest
+  // Of the comparison that comes nearest to its bound, or goes farthest beyond.
+  StepPart part = StepPart::position;
+  int32_t where = -1;   // particle; of a rotation, index of the cluster; of the impulse -1
+  double measured = 0;  // [h]; velocities times dt, rotations by where they put the farthest member, impulses times dt
+  double bound = 0;     // [h]               / M
+  bool holds = true;
+  int64_t checked = 0;
+  int64_t otherwise = 0;  // decisions that the step has taken, within rounding, the other way than the numbers say
+  // Particles of which no sharp answer could be asked: rounding carries them farther than any rule of small changes
+  // holds, or more decisions are open than can be tried together. They lie within what rounding, or those decisions
+  // one by one, can do.
+  int64_t undecided = 0;
+  std::vector<double> position_bound;  // [n] what rounding does to the outcome [h]
+  std::vector<double> rotation_bound;  // [m] the same, where it puts the farthest member [h]
+  std::vector<double> reach;           // [m] of the farthest member from the center at rest, or 1 if that is less [h]
+};
+
+// `before` and `after`: well formed, of the same clusters; `before` finite, its schedule not over.
+AdmissibleStep nearest_admissible_step(const Setup& setup, const State& before, const State& after);
+
+// The same with its verdict, of any two well-formed states; without the step where none can be computed.
+struct StepAgain {
+  Verdict verdict;
+  std::optional<AdmissibleStep> step = {};
+};
+StepAgain step_again(const Setup& setup, const State& before, const State& after);
+
+}  // namespace cutproof::oracles

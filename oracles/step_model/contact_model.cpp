@@ -1,0 +1,153 @@
+#include "oracles/step_model/contact_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace cutproof::oracles {
+namespace {
+
+// How often blade and walls are projected in turn where both hold (decisions.md, Contacts with the blade).
+constexpr int kTurns = 16;
+
+// Takes back at most `most` of what `slid` has along a surface.
+Vec3 held_back(Vec3 x, Vec3 slid, Vec3 normal, double most) {
+  const Vec3 tangential = slid - dot(slid, normal) * normal;
+  const double length = norm(tangential);
+  return length > most ? x - (most / length) * tangential : x - tangential;
+}
+
+}  // namespace
+
+ContactModel::ContactModel(const Setup& setup, const BladeMove* move, const std::vector<Wall>& walls) : walls_(walls) {
+  friction_ = std::any_of(walls.begin(), walls.end(), [](const Wall& wall) { return wall.friction > 0; });
+  plate_ = move != nullptr && setup.detect.criterion != Criterion::geometric;
+  if (!plate_) return;
+  from_ = move->from;
+  to_ = move->to;
+  half_length_ = setup.blade.length / 2;
+  depth_ = setup.blade.depth;
+  clearance_ = blade_clearance(setup);
+  blade_friction_ = setup.blade.friction;
+  friction_ = friction_ || blade_friction_ > 0;
+}
+
+int ContactModel::side_of(const Began& began, Decisions& decisions) const {
+  return decisions.exceeds(DecisionKind::side, -began.height) ? -1 : +1;
+}
+
+Vec3 ContactModel::turned_back(Local c) const {
+  return to_.edge + c.u * to_.along + c.w * to_.back + c.n * cross(to_.along, to_.back);
+}
+
+Vec3 ContactModel::off_walls(Vec3 x) const {
+  for (const Wall& wall : walls_) {
+    const double inside = wall.side * (wall.offset - x[wall.axis]);
+    if (inside > 0) x[wall.axis] = wall.offset;
+  }
+  return x;
+}
+
+// Forbidden is what is nearer than ρ to the rectangle, and what lies over it on the side where the particle did not
+// begin.
+Vec3 ContactModel::off_plate(Vec3 x, const Began& began, Decisions& decisions) const {
+  const Local c = to_local(to_, x - to_.edge);
+  const double before_edge = -c.w, behind_back = c.w - depth_, beyond_end = std::abs(c.u) - half_length_;
+  if (before_edge < 0 && behind_back < 0 && beyond_end < 0) {
+    const int side = side_of(began, decisions);
+    const double height = side * c.n;
+    if (height >= clearance_) return x;
+    const Local lifted = {c.u, side * clearance_, c.w};
+    if (height >= 0) return turned_back(lifted);
+    // It came through the plate: back, or round one of the four sides, where the rounded rim has to be cleared too.
+    const double far = std::max(-height, clearance_), climb = far + height;
+    const double end = half_length_ - std::abs(c.u), other_end = half_length_ + std::abs(c.u);
+    const std::array<double, 5> ways = {clearance_ - height, std::hypot(c.w, climb), std::hypot(depth_ - c.w, climb),
+                                        std::hypot(end, climb), std::hypot(other_end, climb)};
+    Local out = {c.u, -side * far, c.w};
+    switch (decisions.least(DecisionKind::way_out, ways)) {
+      case 0:
+        return turned_back(lifted);
+      case 1:
+        out.w = 0;
+        break;
+      case 2:
+        out.w = depth_;
+        break;
+      case 3:
+        out.u = std::copysign(half_length_, c.u);
+        break;
+      default:
+        out.u = -std::copysign(half_length_, c.u);
+    }
+    return turned_back(out);
+  }
+  const Local on_plate = {std::clamp(c.u, -half_length_, half_length_), 0, std::clamp(c.w, 0.0, depth_)};
+  const Local away = {c.u - on_plate.u, c.n, c.w - on_plate.w};
+  const double distance = std::hypot(away.u, away.n, away.w);
+  if (distance >= clearance_) return x;
+  if (distance == 0) return turned_back({c.u, side_of(began, decisions) * clearance_, c.w});
+  const double scale = clearance_ / distance;
+  return turned_back({on_plate.u + scale * away.u, scale * away.n, on_plate.w + scale * away.w});
+}
+
+// `in_turn`: blade and walls have both moved it, so that this need not be the nearest point.
+Vec3 ContactModel::nearest(Vec3 x, const Began& began, Decisions& decisions, bool* in_turn) const {
+  if (!plate_) return off_walls(x);
+  Vec3 present = off_plate(x, began, decisions);
+  bool by_plate = !(present == x);
+  for (int turn = 0; turn < kTurns; ++turn) {
+    const Vec3 above = off_walls(present);
+    if (above == present) break;
+    present = off_plate(above, began, decisions);
+    by_plate = by_plate || !(present == above);
+    if (in_turn != nullptr && by_plate) *in_turn = true;
+    if (present == above) break;
+  }
+  return present;
+}
+
+double ContactModel::depth(Vec3 free, const Began& began, Decisions& decisions) const {
+  double deepest = -std::numeric_limits<double>::infinity();
+  for (const Wall& wall : walls_) deepest = std::max(deepest, wall.side * (wall.offset - free[wall.axis]));
+  if (!plate_) return deepest;
+  const Local c = to_local(to_, free - to_.edge);
+  if (std::abs(c.u) < half_length_ && c.w > 0 && c.w < depth_) {
+    return std::max(deepest, clearance_ - side_of(began, decisions) * c.n);
+  }
+  const double away =
+      std::hypot(c.u - std::clamp(c.u, -half_length_, half_length_), c.n, c.w - std::clamp(c.w, 0.0, depth_));
+  return std::max(deepest, clearance_ - away);
+}
+
+Vec3 ContactModel::place(Vec3 free, const Began& began, const Vec3* x, Decisions& decisions) const {
+  bool in_turn = false;
+  Vec3 placed = nearest(free, began, decisions, &in_turn);
+  if (friction_ && !(placed == free)) {
+    for (const Wall& wall : walls_) {
+      const double pressed = wall.side * (wall.offset - free[wall.axis]);
+      if (!(pressed > 0) || wall.friction == 0) continue;
+      Vec3 normal;
+      normal[wall.axis] = 1;
+      placed = held_back(placed, placed - began.start, normal, wall.friction * pressed);
+    }
+    const Vec3 pushed = blade_friction_ > 0 ? off_plate(free, began, decisions) - free : Vec3{};
+    const double pressed = norm(pushed);
+    if (pressed > 0) {
+      // Against the point of the blade that is under the particle, which has moved too.
+      const Local c = to_local(to_, placed - to_.edge);
+      const Vec3 was = from_.edge + c.u * from_.along + c.w * from_.back + c.n * cross(from_.along, from_.back);
+      const Vec3 blade_moved = placed - was;
+      placed = held_back(placed, placed - began.start - blade_moved, pushed / pressed, blade_friction_ * pressed);
+    }
+    placed = nearest(placed, began, decisions, &in_turn);
+  }
+  // Never what is worse than the present place, so that the energy cannot grow: only where turns were taken.
+  if (in_turn && !friction_ && x != nullptr &&
+      decisions.exceeds(DecisionKind::worse, norm(placed - free) - norm(*x - free))) {
+    return *x;
+  }
+  return placed;
+}
+
+}  // namespace cutproof::oracles

@@ -1,0 +1,50 @@
+// Where the blade and the walls let one particle be within one substep (method.md §3, Blade; decisions.md, Contacts
+// with the blade), written a second time: no line is shared with a backend. Internal to oracles/.
+#pragma once
+#include "model/setup.h"
+#include "oracles/blade_motion.h"
+#include "oracles/step_model/decisions.h"
+
+namespace cutproof::oracles {
+
+class ContactModel {
+ public:
+  // `move`: what the blade does in this substep; nullptr: none, or it is up. `walls` may differ from the setup's by a
+  // rounding, as may the move.
+  ContactModel(const Setup& setup, const BladeMove* move, const std::vector<Wall>& walls);
+
+  bool any() const { return plate_ || !walls_.empty(); }
+  bool has_plate() const { return plate_; }
+  // Friction, or room that is not convex.
+  bool path_matters() const { return plate_ || friction_; }
+
+  // Over the plane of the blade at the start of the substep [m]; its sign is the particle's side.
+  double height_at_start(Vec3 start) const { return plate_ ? to_local(from_, start - from_.edge).n : 1; }
+
+  // One particle in one substep: where it began, and how high over the blade's plane.
+  struct Began {
+    Vec3 start;
+    double height = 0;
+  };
+
+  // Where one may be that would go to `free`; coming from `x` it does not go where that is worse (nullptr: the
+  // prediction, which comes from nowhere).
+  Vec3 place(Vec3 free, const Began& began, const Vec3* x, Decisions& decisions) const;
+
+  // By how much one that would go to `free` is inside of what it may not enter [m]; <= 0: it stays there.
+  double depth(Vec3 free, const Began& began, Decisions& decisions) const;
+
+ private:
+  Vec3 off_plate(Vec3 x, const Began& began, Decisions& decisions) const;
+  Vec3 off_walls(Vec3 x) const;
+  Vec3 nearest(Vec3 x, const Began& began, Decisions& decisions, bool* in_turn = nullptr) const;
+  int side_of(const Began& began, Decisions& decisions) const;
+  Vec3 turned_back(Local c) const;
+
+  const std::vector<Wall>& walls_;
+  bool plate_ = false, friction_ = false;
+  BladePose from_, to_;
+  double half_length_ = 0, depth_ = 0, clearance_ = 0, blade_friction_ = 0;
+};
+
+}  // namespace cutproof::oracles

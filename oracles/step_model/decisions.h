@@ -1,0 +1,88 @@
+// Where a step does one thing or another and rounding may tip the scales: what was decided, and by how much. Internal
+// to oracles/.
+#pragma once
+#include <array>
+#include <cmath>
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <utility>
+#include <vector>
+
+namespace cutproof::oracles {
+
+enum class DecisionKind : uint8_t {
+  side,     // of the blade, on which a particle begins a substep: 0 positive, 1 negative
+  way_out,  // of one that came through the plate: 0 its own side, 1 the cutting edge, 2 the back, 3 and 4 the ends
+  touched,  // by a contact, in an accelerated iteration: 0 no, 1 yes
+  worse     // than where it was, where blade and walls are projected in turn: 0 no, 1 yes
+};
+
+// Names one decision of a step, the same in every run of it.
+struct DecisionKey {
+  int32_t substep = 0, evaluation = 0;  // evaluation 0: the predicted position; k: iteration k
+  int32_t particle = 0;
+  int32_t turn = 0;  // counts decisions of one kind within an evaluation of a particle
+  DecisionKind kind = DecisionKind::side;
+  friend auto operator<=>(const DecisionKey&, const DecisionKey&) = default;
+};
+
+// One that was near.
+struct NearDecision {
+  DecisionKey key;
+  int taken = 0, other = 0;
+  double lead = 0;  // of what was taken over the other [m]; below 0 where it was settled against the numbers
+};
+
+// Decisions that are settled from outside: their outcomes by their keys.
+using Settled = std::map<DecisionKey, int>;
+
+// Takes decisions of one run: as the numbers say, unless they are near and settled from outside.
+class Decisions {
+ public:
+  // `near`: what is decided by less is noted [m].
+  Decisions(const Settled& settled, double near) : settled_(settled), near_(near) {}
+
+  void begin(int32_t substep, int32_t evaluation, int32_t particle) {
+    key_ = {substep, evaluation, particle, 0, DecisionKind::side};
+  }
+
+  // Whether `lead`, of outcome 1 over outcome 0, is above 0 [m].
+  bool exceeds(DecisionKind kind, double lead) { return least(kind, std::array<double, 2>{lead, 0}) == 1; }
+
+  // The outcome of least cost, the first of several [m].
+  template <std::size_t N>
+  int least(DecisionKind kind, const std::array<double, N>& cost) {
+    DecisionKey key = key_;
+    key.kind = kind;
+    if (kind == DecisionKind::side) {
+      key.evaluation = 0;  // taken once a substep, asked for in every evaluation
+    } else {
+      key.turn = key_.turn++;
+    }
+    std::size_t taken = 0;
+    for (std::size_t k = 1; k < N; ++k) {
+      if (cost[k] < cost[taken]) taken = k;
+    }
+    const auto is_near = [&](std::size_t k) { return k != taken && std::abs(cost[k] - cost[taken]) <= near_; };
+    bool any = false;
+    for (std::size_t k = 0; k < N; ++k) any = any || is_near(k);
+    if (!any) return static_cast<int>(taken);
+    if (const auto known = settled_.find(key); known != settled_.end()) taken = static_cast<std::size_t>(known->second);
+    for (std::size_t k = 0; k < N; ++k) {
+      if (is_near(k)) noted_.push_back({key, static_cast<int>(taken), static_cast<int>(k), cost[k] - cost[taken]});
+    }
+    return static_cast<int>(taken);
+  }
+
+  std::vector<NearDecision> take_near() { return std::move(noted_); }
+
+ private:
+  const Settled& settled_;
+  double near_;
+  DecisionKey key_;
+  std::vector<NearDecision> noted_;
+};
+
+}  // namespace cutproof::oracles

@@ -1,0 +1,35 @@
+// Roundings at random, the same everywhere. Internal to oracles/.
+#pragma once
+#include <cmath>
+#include <cstdint>
+
+#include "model/vec.h"
+
+namespace cutproof::oracles {
+
+// Uniform in [-1, 1] (Vigna's splitmix64).
+class Noise {
+ public:
+  explicit Noise(uint64_t seed) : state_(seed * 0x9e3779b97f4a7c15u) {}
+  double operator()() {
+    uint64_t z = (state_ += 0x9e3779b97f4a7c15u);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    z ^= z >> 31;
+    return static_cast<double>(z >> 11) * 0x1p-52 - 1;
+  }
+  Vec3 vector() {
+    const double a = (*this)(), b = (*this)(), c = (*this)();
+    return {a, b, c};
+  }
+  // Each component by at most so much of its own size, and by at most `more`.
+  Vec3 off(Vec3 size, double more) {
+    const Vec3 r = vector();
+    return {r.x * (std::abs(size.x) + more), r.y * (std::abs(size.y) + more), r.z * (std::abs(size.z) + more)};
+  }
+
+ private:
+  uint64_t state_;
+};
+
+}  // namespace cutproof::oracles

@@ -1,0 +1,406 @@
+#include "oracles/step_model/step_model.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "model/at.h"
+#include "oracles/best_rotation.h"
+#include "oracles/eigen.h"
+#include "oracles/memberships.h"
+#include "oracles/shape_sums.h"
+#include "oracles/step_model/contact_model.h"
+#include "oracles/step_model/noise.h"
+
+namespace cutproof::oracles {
+namespace {
+
+// How much single operations round, in units of u times what they work on (tolerances.md, Rounding of a step).
+constexpr double kRotationRounds = 4;   // a rotation, about each axis, given its matrix
+constexpr double kParameterRounds = 4;  // what is made of parameters once: s, e^(-c dt), Chebyshev's weights
+constexpr double kContactRounds = 4;    // ways into the blade's frame and back
+// A sum of N terms: products and partial sums.
+double sum_rounds(double terms) { return 2 + std::sqrt(terms) / 2; }
+
+Vec3 turned_by(Vec3 rotation_vector, Vec3 v) { return v + cross(rotation_vector, v); }
+
+// Weights of Chebyshev's iteration j -> j + 1 by the ratio of Chebyshev polynomials (method.md §11): ω_j+1 =
+// 2 T_j(1/ρ) / (ρ T_j+1(1/ρ)), by the polynomials' own recurrence.
+struct ChebyshevWeights {
+  double pull = 1, carry = 0;
+};
+std::vector<ChebyshevWeights> chebyshev_weights(double s, int32_t iterations) {
+  const double greatest = std::min(s, 0.95), rho = greatest / (2 - greatest);
+  std::vector<ChebyshevWeights> weights(at(std::max(iterations, 1)));
+  if (!(rho > 0)) {
+    for (std::size_t j = 1; j < weights.size(); ++j) weights[j] = {2 / (2 - greatest), 0};
+    return weights;
+  }
+  // ratio = T_j−1 / T_j at 1 / ρ; both grow fast, their ratio does not.
+  double ratio = rho;  // T_0 / T_1
+  for (std::size_t j = 1; j < weights.size(); ++j) {
+    double omega = 1;
+    if (j > 1) {
+      const double next = 1 / (2 / rho - ratio);  // T_j−1 / T_j
+      omega = 2 / rho * next;
+      ratio = next;
+    }
+    weights[j] = {omega * 2 / (2 - greatest), omega - 1};
+  }
+  return weights;
+}
+
+bool is_on_a_line(const Body& body, std::span<const int32_t> members) {
+  const auto first = body.grid.coordinates(body.node[at(members.front())]);
+  std::array<int64_t, 3> way = {0, 0, 0};
+  for (const int32_t i : members) {
+    const auto c = body.grid.coordinates(body.node[at(i)]);
+    const std::array<int64_t, 3> d = {c[0] - first[0], c[1] - first[1], c[2] - first[2]};
+    if (way == std::array<int64_t, 3>{0, 0, 0}) way = d;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const std::size_t b = (a + 1) % 3;
+      if (way[a] * d[b] != way[b] * d[a]) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+StepModel::StepModel(const Setup& setup, const State& before, double unit_roundoff)
+    : setup_(setup), before_(before), u_(unit_roundoff) {
+  const Body& body = setup.body;
+  const Clusters& clusters = before.clusters;
+  const int32_t n = body.particle_count();
+  holders_ = membership_counts(clusters, n);
+  weight_.resize(at(n));
+  lever_.resize(at(n));
+  for (int32_t i = 0; i < n; ++i) weight_[at(i)] = holders_[at(i)] > 0 ? body.mass[at(i)] / holders_[at(i)] : 0;
+  clusters_.resize(at(clusters.count()));
+  arm_.resize(clusters.members.size());
+  for (int32_t c = 0; c < clusters.count(); ++c) {
+    Cluster& cluster = clusters_[at(c)];
+    const auto members = clusters.of(c);
+    cluster.begin = clusters.offsets[at(c)];
+    cluster.end = clusters.offsets[at(c + 1)];
+    const Vec3 base = body.rest_position(members.front());
+    Vec3 moment;
+    for (const int32_t i : members) {
+      cluster.mass += weight_[at(i)];
+      moment += weight_[at(i)] * (body.rest_position(i) - base);
+    }
+    const Vec3 from_base = moment / cluster.mass;
+    cluster.rest = base + from_base;
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      Vec3& arm = arm_[at(cluster.begin) + k];
+      arm = (body.rest_position(members[k]) - base) - from_base;
+      cluster.radius = std::max(cluster.radius, norm(arm));
+      lever_[at(members[k])] += dot(arm, arm);
+    }
+    cluster.extent = members.size() == 1           ? Cluster::Extent::point
+                     : is_on_a_line(body, members) ? Cluster::Extent::line
+                                                   : Cluster::Extent::more;
+  }
+  for (int32_t i = 0; i < n; ++i) {
+    if (holders_[at(i)] > 0) lever_[at(i)] = std::sqrt(lever_[at(i)]) / holders_[at(i)];
+  }
+}
+
+int64_t StepModel::evaluations() const {
+  return (setup_.step.iterations + int64_t{1}) * setup_.step.substeps *
+         static_cast<int64_t>(arm_.size() + weight_.size());
+}
+
+// One run: what changes from substep to substep.
+class StepModel::Run {
+ public:
+  Run(const StepModel& model, const Wanted& wanted)
+      : model_(model),
+        setup_(model.setup_),
+        body_(model.setup_.body),
+        before_(model.before_),
+        wanted_(wanted),
+        disturbed_(wanted.disturbance != 0),
+        noise_(wanted.disturbance),
+        u_(model.u_),
+        decisions_(wanted.settled, wanted.near),
+        stores_positions_(before_.precision != Precision::binary32) {
+    out_.x = before_.x;
+    out_.v = before_.v;
+    out_.rotation = before_.clusters.rotation;
+    out_.rounding.resize(out_.x.size());
+    out_.turn_rounding.resize(model.clusters_.size());
+    center_.resize(model.clusters_.size());
+    sum_.resize(out_.x.size());
+    goal_rounding_.resize(out_.x.size());
+    if (disturbed_) {
+      for (const Cluster& cluster : model.clusters_) {
+        rest_off_.push_back(u_ * noise_.off(stores_positions_ ? cluster.rest : Vec3{}, cluster.radius));
+      }
+      parameter_off_ = kParameterRounds * u_ * noise_();
+      step_off_ = u_ * noise_();
+    }
+  }
+
+  StepOutcome run() {
+    for (int32_t s = 0; s < setup_.step.substeps; ++s) substep(s);
+    out_.near = decisions_.take_near();
+    return std::move(out_);
+  }
+
+ private:
+  // The number that a backend stores of a place of particle i.
+  Vec3 stored(std::size_t i, Vec3 x) const {
+    return stores_positions_ ? x : x - body_.rest_position(static_cast<int32_t>(i));
+  }
+
+  std::vector<Wall> walls_now() {
+    std::vector<Wall> walls = setup_.walls;
+    if (disturbed_) {
+      for (Wall& wall : walls) wall.offset += u_ * wall.offset * noise_();
+    }
+    return walls;
+  }
+
+  BladeMove move_now(const BladeMove& move) {
+    if (!disturbed_) return move;
+    BladeMove off = move;
+    for (BladePose* pose : {&off.from, &off.to}) {
+      pose->edge += noise_.off(u_ * pose->edge, 0);
+      const Vec3 turn = (2 * u_) * noise_.vector();
+      pose->along = turned_by(turn, pose->along);
+      pose->back = turned_by(turn, pose->back);
+    }
+    return off;
+  }
+
+  void substep(int32_t s);
+  void match_shapes(bool is_last);
+  Mat3 rotation_of(int32_t c, const Eigen::Matrix3d& a, double size, bool is_last);
+  void note_rounding(std::size_t i, double amplitude) { rounding_now_[i] += amplitude * amplitude; }
+
+  const StepModel& model_;
+  const Setup& setup_;
+  const Body& body_;
+  const State& before_;
+  const Wanted& wanted_;
+  const bool disturbed_;
+  Noise noise_;
+  const double u_;
+  Decisions decisions_;
+  const bool stores_positions_;
+  StepOutcome out_;
+  std::vector<Vec3> center_;           // [m] t
+  std::vector<Vec3> sum_;              // [n] Σ_c t + R (X - T)
+  std::vector<double> goal_rounding_;  // [n] Σ_c of squares
+  std::vector<double> rounding_now_;   // [n] of this substep
+  std::vector<Vec3> rest_off_;         // [m]
+  double parameter_off_ = 0, step_off_ = 0;
+};
+
+// The best rotation; the previous one where there is no extent, the nearest to it along a line.
+Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double size, bool is_last) {
+  const Cluster& cluster = model_.clusters_[at(c)];
+  const Mat3& previous = out_.rotation[at(c)];
+  double& rounding = out_.turn_rounding[at(c)];
+  rounding = 0;
+  if (cluster.extent == Cluster::Extent::point || !a.allFinite() || a.cwiseAbs().maxCoeff() == 0) return previous;
+  const double sum_amplitude = sum_rounds(static_cast<double>(cluster.end - cluster.begin)) * u_ * size;
+  if (cluster.extent == Cluster::Extent::line) {
+    const BestRotation best = best_rotation(to_mat3(a));
+    rounding = u_ * kRotationRounds + sum_amplitude / a.norm();
+    rounding *= rounding;
+    return nearest_of_rank_one(best, previous).r;
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d u = svd.matrixU();
+  const Eigen::Matrix3d& v = svd.matrixV();
+  if (u.determinant() * v.determinant() < 0) u.col(2) *= -1;
+  const Eigen::Vector3d sigma = (u.transpose() * a * v).diagonal();
+  const double sure = sigma[1] + sigma[2];
+  rounding = u_ * kRotationRounds + (sure > 0 ? std::min(1.0, std::sqrt(2.0) * sum_amplitude / sure) : 1.0);
+  rounding *= rounding;
+  if (is_last && !wanted_.given.empty() && wanted_.given[at(c)] != nullptr) return *wanted_.given[at(c)];
+  return to_mat3(u * v.transpose());
+}
+
+void StepModel::Run::match_shapes(bool is_last) {
+  const Clusters& clusters = before_.clusters;
+  const std::vector<Vec3>& x = out_.x;
+  std::fill(sum_.begin(), sum_.end(), Vec3{});
+  if (!disturbed_) std::fill(goal_rounding_.begin(), goal_rounding_.end(), 0.0);
+  if (is_last) out_.shape.resize(model_.clusters_.size());
+  for (int32_t c = 0; c < clusters.count(); ++c) {
+    const Cluster& cluster = model_.clusters_[at(c)];
+    const auto members = clusters.of(c);
+    const Vec3* const arm = model_.arm_.data() + cluster.begin;
+    const auto terms = static_cast<double>(members.size());
+    const Vec3 base = x[at(members.front())];
+    Vec3 moment;
+    double spread = 0;
+    for (const int32_t i : members) {
+      const Vec3 e = x[at(i)] - base;
+      moment += model_.weight_[at(i)] * e;
+      spread += model_.weight_[at(i)] * norm(stored(at(i), x[at(i)]) - stored(at(members.front()), base));
+    }
+    const Vec3 from_base = moment / cluster.mass;
+    spread /= cluster.mass;
+    Eigen::Matrix3d a = Eigen::Matrix3d::Zero(), size = Eigen::Matrix3d::Zero();
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      const double w = model_.weight_[at(members[k])];
+      const Eigen::Vector3d now = as_eigen((x[at(members[k])] - base) - from_base), rest = as_eigen(arm[k]);
+      a += w * now * rest.transpose();
+      size += w * now.cwiseAbs() * rest.cwiseAbs().transpose();
+    }
+    if (is_last) out_.shape[at(c)] = to_mat3(a);
+    Vec3 t = base + from_base;
+    // The mean itself is stored, and its sum is taken relative to one member.
+    const double mean_amplitude = sum_rounds(terms) * u_ * spread;
+    const Vec3 center = stores_positions_ ? t : t - cluster.rest;
+    Mat3 r;
+    if (disturbed_) {
+      for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column) {
+          a(row, column) += sum_rounds(terms) * u_ * size(row, column) * noise_();
+        }
+      }
+      t += noise_.off((2 * u_) * center, mean_amplitude);
+      r = rotation_of(c, a, size.sum(), is_last);
+      const Vec3 turn = (kRotationRounds * u_) * noise_.vector();
+      if (cluster.extent != Cluster::Extent::point) {
+        for (int column = 0; column < 3; ++column) {
+          const Vec3 now = turned_by(turn, {r(0, column), r(1, column), r(2, column)});
+          for (int row = 0; row < 3; ++row) r(row, column) = now[row] + u_ * noise_();
+        }
+      }
+    } else {
+      r = rotation_of(c, a, size.sum(), is_last);
+    }
+    out_.rotation[at(c)] = r;
+    if (disturbed_) t -= r * rest_off_[at(c)];
+    const double center_rounding = 4 * u_ * u_ * dot(center, center) + 3 * mean_amplitude * mean_amplitude;
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      sum_[at(members[k])] += t + r * arm[k];
+      if (!disturbed_) {
+        goal_rounding_[at(members[k])] += center_rounding + out_.turn_rounding[at(c)] * dot(arm[k], arm[k]);
+      }
+    }
+  }
+}
+
+void StepModel::Run::substep(int32_t s) {
+  const StepParameters& step = setup_.step;
+  const int64_t index = before_.frame * step.substeps + s;
+  const double dt = setup_.substep_length[at(before_.frame)] * (1 + step_off_);
+  const bool implicit = step.solver == Solver::implicit;
+  const double kdt2 = step.stiffness * dt * dt * (1 + parameter_off_);
+  const double pull = implicit ? kdt2 / (1 + kdt2) : step.relaxation;
+  const bool accelerated = step.acceleration == Acceleration::chebyshev;
+  const std::vector<ChebyshevWeights> weights =
+      accelerated ? chebyshev_weights(pull, step.iterations) : std::vector<ChebyshevWeights>{};
+
+  const std::vector<Wall> walls = walls_now();
+  const bool down = setup_.has_blade && setup_.blade_moves[at(index)].down;
+  const BladeMove move = down ? move_now(setup_.blade_moves[at(index)]) : BladeMove{};
+  const ContactModel contacts(setup_, down ? &move : nullptr, walls);
+  std::vector<const Grip*> held(out_.x.size(), nullptr);
+  for (const Grip& grip : setup_.grips) {
+    if (grip.active[at(index)] == 0) continue;
+    for (const int32_t i : grip.particles) held[at(i)] = &grip;
+  }
+
+  const std::vector<Vec3> start = out_.x;
+  std::vector<Vec3> predicted(start.size());
+  std::vector<ContactModel::Began> began(start.size());
+  rounding_now_.assign(start.size(), 0);
+  // Rounds a place that contacts have made of `free`.
+  const auto settle = [&](std::size_t i, Vec3 free, Vec3& x, double more) {
+    double amplitude = more;
+    if (!(x == free) && contacts.has_plate()) amplitude += kContactRounds * u_ * norm(x - move.to.edge);
+    const Vec3 place = stored(i, x);
+    amplitude += kUnitRoundoff * norm(x);  // states hold places in double precision, whatever a backend stores
+    if (disturbed_) {
+      x += noise_.off(u_ * place, amplitude);
+    } else {
+      rounding_now_[i] += u_ * u_ * dot(place, place) + 3 * amplitude * amplitude;
+    }
+  };
+  for (std::size_t i = 0; i < start.size(); ++i) {
+    if (before_.alive[i] == 0) continue;
+    const Vec3 inertia = dt * out_.v[i] + (dt * dt) * step.gravity;
+    predicted[i] = start[i] + inertia;
+    if (disturbed_) predicted[i] += noise_.off(u_ * stored(i, predicted[i]), 2 * u_ * norm(inertia));
+    began[i] = {start[i], contacts.height_at_start(start[i])};
+    if (disturbed_ && contacts.has_plate()) {
+      began[i].height += kContactRounds * u_ * norm(start[i] - move.from.edge) * noise_();
+    }
+    decisions_.begin(s, 0, static_cast<int32_t>(i));
+    out_.x[i] = held[i] != nullptr ? start[i] + held[i]->displacement[at(index)]
+                : contacts.any()   ? contacts.place(predicted[i], began[i], nullptr, decisions_)
+                                   : predicted[i];
+    settle(i, predicted[i], out_.x[i], 2 * u_ * norm(inertia));
+  }
+
+  std::vector<Vec3> earlier = out_.x, now;
+  for (int32_t j = 0; j < step.iterations; ++j) {
+    match_shapes(s + 1 == step.substeps && j + 1 == step.iterations);
+    now = out_.x;
+    for (std::size_t i = 0; i < start.size(); ++i) {
+      if (before_.alive[i] == 0 || held[i] != nullptr) continue;
+      const double holders = model_.holders_[i];
+      const Vec3 goal = holders > 0 ? sum_[i] / holders : now[i];
+      const Vec3 from = implicit ? predicted[i] : now[i];
+      const Vec3 plain = from + pull * (goal - from);
+      Vec3 free = plain;
+      double carried = 0;
+      if (accelerated && j > 0) {
+        const Vec3 drawn = weights[at(j)].pull * (plain - now[i]), swung = weights[at(j)].carry * (now[i] - earlier[i]);
+        free = now[i] + drawn + swung;
+        carried = kParameterRounds * u_ * (norm(drawn) + norm(swung));
+      }
+      Vec3& next = out_.x[i];
+      next = free;
+      Vec3 wanted = free;
+      if (contacts.any()) {
+        decisions_.begin(s, j + 1, static_cast<int32_t>(i));
+        // Where several answers are right, the way there decides: touched particles go the plain way.
+        bool touched = true;
+        if (accelerated && j > 0 && contacts.path_matters()) {
+          const double deepest =
+              std::max(contacts.depth(free, began[i], decisions_), contacts.depth(plain, began[i], decisions_));
+          touched = decisions_.exceeds(DecisionKind::touched, deepest);
+          if (touched) wanted = plain;
+        }
+        if (touched) next = contacts.place(wanted, began[i], &now[i], decisions_);
+      }
+      settle(i, wanted, next, carried + u_ * pull * (2 * norm(goal - from) + 2 * model_.lever_[i]));
+      if (!disturbed_ && holders > 0) rounding_now_[i] += pull * pull * goal_rounding_[i] / (holders * holders);
+    }
+    earlier = now;
+  }
+
+  const double decay = std::exp(-step.damping * dt);
+  Vec3 pushed;
+  double pushed_rounding = 0, summed = 0;
+  const double carried_on = step.substeps - s;
+  for (std::size_t i = 0; i < start.size(); ++i) {
+    if (before_.alive[i] == 0) continue;
+    pushed += body_.mass[i] * (out_.x[i] - predicted[i]);
+    out_.v[i] = (decay / dt) * (out_.x[i] - start[i]);
+    if (disturbed_) out_.v[i] += noise_.off((kParameterRounds * u_) * out_.v[i], 0);
+    out_.rounding[i] += carried_on * carried_on * rounding_now_[i];
+    pushed_rounding += body_.mass[i] * body_.mass[i] * rounding_now_[i];
+    summed += body_.mass[i] * norm(out_.x[i] - predicted[i]);
+  }
+  // Partial sums, which are as large as the whole.
+  summed *= u_ * std::sqrt(static_cast<double>(start.size()));
+  pushed_rounding += 3 * summed * summed;
+  out_.impulse = decay * (out_.impulse + pushed / dt);
+  out_.impulse_rounding += pushed_rounding / (dt * dt);
+}
+
+StepOutcome StepModel::run(const Wanted& wanted) const { return Run(*this, wanted).run(); }
+
+}  // namespace cutproof::oracles

@@ -1,0 +1,66 @@
+// The step of one frame, written once more (method.md §3 and §11), by other means than any backend: rotations by
+// singular value decompositions, impulses from the balance of momentum. It can be asked what rounding does to it: a
+// disturbed run rounds at random wherever a backend has to. Internal to oracles/.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "model/setup.h"
+#include "model/state.h"
+#include "oracles/step_model/decisions.h"
+
+namespace cutproof::oracles {
+
+struct StepOutcome {
+  std::vector<Vec3> x, v;      // [n] [m], [m/s]
+  std::vector<Mat3> rotation;  // [m]
+  Vec3 impulse;                // as State::impulse
+  std::vector<NearDecision> near;
+  // Of the last iteration: Σ w (x − t)(X − T)ᵀ of each cluster [m], empty without iterations.
+  std::vector<Mat3> shape;
+  // Of an undisturbed run: the quadratic sums of what single evaluations round, as if none of it grew.
+  std::vector<double> rounding;       // [n] of positions [m²]
+  std::vector<double> turn_rounding;  // [m] of rotations [rad²]
+  double impulse_rounding = 0;        // [(kg m/s)²]
+};
+
+class StepModel {
+ public:
+  // `before`: the state in which the step of frame before.frame begins, well formed and finite; the schedule is not
+  // over. `unit_roundoff`: of the arithmetic whose rounding is looked at. Keeps references to both.
+  StepModel(const Setup& setup, const State& before, double unit_roundoff);
+
+  struct Wanted {
+    Settled settled = {};
+    uint64_t disturbance = 0;  // 0: none; else the seed of one
+    double near = 0;           // what is decided by less is noted [m]
+    // [m] Rotations that are given in the last iteration of the last substep, nullptr: the best one.
+    std::vector<const Mat3*> given = {};
+  };
+  StepOutcome run(const Wanted& wanted) const;
+
+  // Σ over substeps of evaluations of positions and particles: what a run costs.
+  int64_t evaluations() const;
+
+ private:
+  class Run;
+  struct Cluster {
+    int64_t begin = 0, end = 0;  // of members and arms
+    double mass = 0;
+    Vec3 rest;          // T
+    double radius = 0;  // greatest |X - T|
+    enum class Extent { point, line, more } extent = Extent::more;
+  };
+
+  const Setup& setup_;
+  const State& before_;
+  double u_;
+  std::vector<Cluster> clusters_;  // [m]
+  std::vector<Vec3> arm_;          // [members] X - T
+  std::vector<double> weight_;     // [n] m_i / n_i
+  std::vector<int32_t> holders_;   // [n] n_i
+  std::vector<double> lever_;      // [n] √(Σ_c |X − T_c|² / n_i²)
+};
+
+}  // namespace cutproof::oracles

@@ -1,0 +1,299 @@
+// A step computed again: the reference's holds, and what is least wrong does not.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <string>
+#include <utility>
+
+#include "oracles/oracles.h"
+#include "reference_cpu/reference.h"
+#include "tests/oracles/expectations.h"
+
+namespace cutproof::oracles {
+namespace {
+
+using namespace cutproof::testing;
+
+constexpr double kSpacing = 0.01;
+
+struct StepScene {
+  cutproof::Setup setup;
+  State before, after;
+  void take_step() {
+    after = before;
+    reference::step(setup, after);
+  }
+};
+
+// What single precision keeps of a state: displacements from rest, velocities and rotations.
+void round_to_single(const Body& body, State& state) {
+  const auto single = [](double value) { return static_cast<double>(static_cast<float>(value)); };
+  for (std::size_t i = 0; i < state.x.size(); ++i) {
+    const Vec3 rest = body.rest_position(static_cast<int32_t>(i));
+    for (int axis = 0; axis < 3; ++axis) {
+      state.x[i][axis] = rest[axis] + single(state.x[i][axis] - rest[axis]);
+      state.v[i][axis] = single(state.v[i][axis]);
+    }
+  }
+  for (Mat3& r : state.clusters.rotation) {
+    for (double& entry : r.m) entry = single(entry);
+  }
+  state.precision = Precision::binary32;
+}
+
+// A bent, spinning block on a floor with friction, held at one end, with a blade that presses its middle.
+StepScene pressed_block(Solver solver = Solver::implicit, Acceleration acceleration = Acceleration::none) {
+  StepScene scene{setup_of(block_body(9, 5, 4, kSpacing, 0.002)), {}, {}};
+  cutproof::Setup& setup = scene.setup;
+  setup.step.solver = solver;
+  setup.step.acceleration = acceleration;
+  setup.step.gravity = {1, -2, -9.81};
+  setup.step.damping = 3;
+  setup.walls = {{.axis = 2, .side = +1, .offset = 0.0102, .friction = 0.4}};
+  setup.grips = {{.particles = {0, 9, 18}, .active = {1, 1, 0, 1}, .displacement = {4, Vec3{0.001, 0, 0.0005}}}};
+  setup.has_blade = true;
+  setup.blade = {0.1, 0.1, 0.004, 0.2};
+  BladeMove move;
+  move.down = true;
+  move.from = {{0.051, 0.03, 0.041}, {0, 1, 0}, {0, 0, 1}};
+  move.to = move.from;
+  for (int k = 0; k < 4; ++k) {
+    move.to.edge.z -= 0.001;
+    setup.blade_moves.push_back(move);
+    move.from = move.to;
+  }
+  setup.stroke_end = {0};
+  scene.before = state_of(setup.body, box_clusters(9, 5, 4, 3));
+  for (std::size_t i = 0; i < scene.before.x.size(); ++i) {
+    Vec3& x = scene.before.x[i];
+    x.z += 3 * (x.x - 0.05) * (x.x - 0.05);
+    scene.before.v[i] = {0.3 - 4 * x.y, 4 * x.x, -0.5};
+  }
+  scene.take_step();
+  return scene;
+}
+
+// A particle in the middle of a block, away from blade, floor and grips.
+constexpr std::size_t kInside = 2 + 9 * (2 + 5 * 2);
+
+TEST(AdmissibleStep, IsTheReferencesWithEveryCauseAtWork) {
+  for (const Solver solver : {Solver::implicit, Solver::published}) {
+    for (const Acceleration acceleration : {Acceleration::none, Acceleration::chebyshev}) {
+      if (solver == Solver::published && acceleration != Acceleration::none) continue;
+      const StepScene scene = pressed_block(solver, acceleration);
+      const Verdict verdict = admissible_step(scene.setup, scene.before, scene.after);
+      expect_holds(verdict);
+      EXPECT_EQ(verdict.undecided, 0);
+      EXPECT_GT(verdict.measured, 0.01 * verdict.bound) << "the bound must be near to what it bounds";
+      EXPECT_LT(verdict.bound, 1e-11) << "[h]";
+    }
+  }
+}
+
+// The least that is rejected: in double precision some hundred roundings, 1e-12 h; in single precision 1e-5 h.
+TEST(AdmissibleStep, RejectsTheLeastDisturbances) {
+  const StepScene good = pressed_block();
+  StepScene single = good;
+  round_to_single(single.setup.body, single.before);
+  single.take_step();
+  round_to_single(single.setup.body, single.after);
+  expect_holds(admissible_step(single.setup, single.before, single.after));
+  const double dt = good.setup.substep_length[0];
+  struct Disturbance {
+    const char* name;
+    double in_double, in_single;  // [h], [h/dt], [rad], of the body's mass times [h/dt]
+    std::function<void(State&, double)> put;
+  };
+  const auto mass = 0.002 * static_cast<double>(good.before.x.size());
+  for (const Disturbance& disturbance : std::initializer_list<Disturbance>{
+           {"position", 1e-12, 2e-5, [](State&s, double by) { s.x[kInside].y += by * kSpacing; }},
+           {"velocity", 2e-12, 4e-5, [&](State&s, double by) { s.v[kInside].z += by * kSpacing / dt; }},
+           {"rotation", 1e-12, 2e-5,
+            [](State&s, double by) {
+              Mat3& r = s.clusters.rotation[1];
+              for (int row = 0; row < 3; ++row) r(row, 0) += by * r(row, 1);
+            }},
+           {"impulse", 1e-11, 2e-5, [&](State&s, double by) { s.impulse.x += by * mass * kSpacing / dt; }}}) {
+    for (const StepScene* scene : {&good, &std::as_const(single)}) {
+      State wrong = scene->after;
+      const double by = scene == &good ? disturbance.in_double : disturbance.in_single;
+      disturbance.put(wrong, by);
+      const Verdict verdict = admissible_step(scene->setup, scene->before, wrong);
+      EXPECT_FALSE(verdict.holds) << disturbance.name << " off by " << by << ", bound " << verdict.bound;
+      EXPECT_NE(verdict.witness.text.find(disturbance.name), std::string::npos) << verdict.witness.text;
+    }
+  }
+}
+
+// A simulator that has one of these a little wrong.
+TEST(AdmissibleStep, RejectsParametersThatAreOffByAThousandth) {
+  const StepScene good = pressed_block();
+  StepScene single = good;
+  round_to_single(single.setup.body, single.before);
+  using Edit = std::function<void(cutproof::Setup&)>;
+  for (const auto& [name, edit] : std::initializer_list<std::pair<const char*, Edit>>{
+           {"stiffness", [](cutproof::Setup& s) { s.step.stiffness *= 1.001; }},
+           {"gravity", [](cutproof::Setup& s) { s.step.gravity.z *= 1.001; }},
+           {"damping", [](cutproof::Setup& s) { s.step.damping *= 1.001; }},
+           {"friction of the floor", [](cutproof::Setup& s) { s.walls[0].friction *= 1.001; }},
+           {"friction of the blade", [](cutproof::Setup& s) { s.blade.friction *= 1.001; }},
+           {"place of the floor", [](cutproof::Setup& s) { s.walls[0].offset += 1e-3 * kSpacing; }},
+           {"thickness of the blade", [](cutproof::Setup& s) { s.detect.epsilon *= 1.001; }},
+           {"way of a grip", [](cutproof::Setup& s) { s.grips[0].displacement[2].x *= 1.001; }},
+           {"length of a substep", [](cutproof::Setup& s) { s.substep_length[0] *= 1.001; }},
+           {"iterations", [](cutproof::Setup& s) { --s.step.iterations; }},
+           {"no iterations", [](cutproof::Setup& s) { s.step.iterations = 0; }},
+           {"solver", [](cutproof::Setup& s) { s.step.solver = Solver::published; }},
+           {"acceleration", [](cutproof::Setup& s) { s.step.acceleration = Acceleration::chebyshev; }}}) {
+    for (const StepScene* scene : {&good, &std::as_const(single)}) {
+      StepScene wrong = *scene;
+      edit(wrong.setup);
+      wrong.take_step();
+      if (scene == &single) round_to_single(wrong.setup.body, wrong.after);
+      EXPECT_FALSE(admissible_step(scene->setup, scene->before, wrong.after).holds)
+          << name << (scene == &good ? "" : ", in single precision");
+    }
+  }
+}
+
+// Two particles that nothing joins but one cluster, both exactly in the plane of a blade: each may be on either side.
+struct PairInThePlane {
+  StepScene scene;
+  std::vector<State> outcomes;  // by the sides of both, positive and negative
+};
+PairInThePlane pair_in_the_plane(int32_t iterations) {
+  PairInThePlane pair{{setup_of(block_body(1, 1, 4, kSpacing, 0.002)), {}, {}}, {}};
+  cutproof::Setup& setup = pair.scene.setup;
+  setup.step.substeps = 1;
+  setup.step.iterations = iterations;
+  setup.has_blade = true;
+  setup.blade = {0.4, 0.4, 0, 0};
+  BladeMove move;
+  move.down = true;
+  const Vec3 middle = setup.body.rest_position(0);
+  move.from = {{middle.x, middle.y, middle.z - 0.1}, {0, 1, 0}, {0, 0, 1}};
+  move.to = move.from;
+  setup.blade_moves = {move};
+  setup.stroke_end = {0};
+  pair.scene.before = state_of(setup.body, {{0, 1}, {1, 2, 3}});
+  // Two away from the plane, so that only the others are open.
+  pair.scene.before.x[1].x += 2 * kSpacing;
+  pair.scene.before.x[3].x -= 2 * kSpacing;
+  round_to_single(setup.body, pair.scene.before);
+  for (const double first : {+1.0, -1.0}) {
+    for (const double second : {+1.0, -1.0}) {
+      StepScene led = pair.scene;
+      led.before.x[0].x += first * 1e-15;
+      led.before.x[2].x += second * 1e-15;
+      led.take_step();
+      round_to_single(setup.body, led.after);
+      pair.outcomes.push_back(led.after);
+    }
+  }
+  return pair;
+}
+
+TEST(AdmissibleStep, MayGoToEitherSideOfABladeFromItsPlane) {
+  const PairInThePlane pair = pair_in_the_plane(3);
+  for (const State& outcome : pair.outcomes) {
+    EXPECT_GT(norm(outcome.x[0] - pair.scene.before.x[0]), 0.1 * kSpacing);
+    expect_holds(admissible_step(pair.scene.setup, pair.scene.before, outcome));
+  }
+}
+
+TEST(AdmissibleStep, IsOneOutcomeForAllThatIsCoupled) {
+  const PairInThePlane pair = pair_in_the_plane(3);
+  // Every particle is where some outcome has it, but no outcome has them all.
+  State mixed = pair.outcomes[0];
+  mixed.x[3] = pair.outcomes[3].x[3];
+  mixed.v[3] = pair.outcomes[3].v[3];
+  ASSERT_GT(norm(mixed.x[3] - pair.outcomes[0].x[3]), 1e-3 * kSpacing);
+  const Verdict verdict = admissible_step(pair.scene.setup, pair.scene.before, mixed);
+  EXPECT_FALSE(verdict.holds);
+  EXPECT_EQ(verdict.undecided, 0);
+}
+
+TEST(AdmissibleStep, IsNotWhatOnlyATieCouldExcuse) {
+  const PairInThePlane pair = pair_in_the_plane(3);
+  for (const double off : {1e-4, 1e-2, 1.0, 50.0}) {
+    State wrong = pair.outcomes[1];
+    wrong.x[0].x += off * kSpacing;
+    EXPECT_FALSE(admissible_step(pair.scene.setup, pair.scene.before, wrong).holds) << off << " h";
+  }
+}
+
+// More ties than can be tried together: what several of them may have done is counted, what none does is rejected.
+TEST(AdmissibleStep, CountsWhatMoreTiesMayHaveDoneThanCanBeTried) {
+  StepScene scene{setup_of(block_body(5, 6, 6, kSpacing, 0.002)), {}, {}};
+  cutproof::Setup& setup = scene.setup;
+  setup.step.substeps = 1;
+  setup.has_blade = true;
+  setup.blade = {1, 1, 0, 0};
+  BladeMove move;
+  move.down = true;
+  const Vec3 middle = setup.body.rest_position(2);
+  move.from = {{middle.x, middle.y, middle.z - 0.5}, {0, 1, 0}, {0, 0, 1}};
+  move.to = move.from;
+  setup.blade_moves = {move};
+  setup.stroke_end = {0};
+  scene.before = state_of(setup.body, box_clusters(5, 6, 6, 3));
+  round_to_single(setup.body, scene.before);
+  // All 36 of the middle layer go their own ways.
+  StepScene led = scene;
+  for (std::size_t i = 0; i < led.before.x.size(); ++i) {
+    if (i % 5 == 2) led.before.x[i].x += (i * 7 % 3 == 0 ? 1 : -1) * 1e-15;
+  }
+  led.take_step();
+  round_to_single(setup.body, led.after);
+  const Verdict verdict = admissible_step(setup, scene.before, led.after);
+  EXPECT_TRUE(verdict.holds) << verdict.witness.text;
+  // The simulator that is too soft has the same ties.
+  led.setup.step.stiffness *= 0.1;
+  led.take_step();
+  round_to_single(setup.body, led.after);
+  EXPECT_FALSE(admissible_step(setup, scene.before, led.after).holds);
+}
+
+// Along a wire the best rotations are many: only the nearest to the previous one is right.
+TEST(AdmissibleStep, HasNoFreeAxis) {
+  StepScene scene{setup_of(block_body(5, 1, 1, kSpacing)), {}, {}};
+  scene.before = state_of(scene.setup.body, {{0, 1, 2, 3, 4}});
+  scene.take_step();
+  expect_holds(admissible_step(scene.setup, scene.before, scene.after));
+  const double angle = 1e-6;
+  scene.after.clusters.rotation[0] = {
+      {1, 0, 0, 0, std::cos(angle), -std::sin(angle), 0, std::sin(angle), std::cos(angle)}};
+  const Verdict verdict = admissible_step(scene.setup, scene.before, scene.after);
+  EXPECT_FALSE(verdict.holds);
+  EXPECT_EQ(verdict.witness.clusters, (Numbers{0}));
+}
+
+TEST(AdmissibleStep, KeepsTheRotationOfASingleParticle) {
+  StepScene scene{setup_of(block_body(1, 1, 1, kSpacing)), {}, {}};
+  scene.before = state_of(scene.setup.body, {{0}});
+  scene.before.clusters.rotation[0] = {{0, -1, 0, 1, 0, 0, 0, 0, 1}};
+  scene.before.v[0] = {0.1, 0.2, 0.3};
+  scene.take_step();
+  expect_holds(admissible_step(scene.setup, scene.before, scene.after));
+  scene.after.clusters.rotation[0] = Mat3{};
+  EXPECT_FALSE(admissible_step(scene.setup, scene.before, scene.after).holds);
+}
+
+TEST(AdmissibleStep, IsNotAskedOfNumbersThatAreNoneNorBeyondTheSchedule) {
+  StepScene scene = pressed_block();
+  State broken = scene.before;
+  broken.v[3].x = kNan;
+  const Verdict verdict = admissible_step(scene.setup, broken, scene.after);
+  EXPECT_TRUE(verdict.holds);
+  EXPECT_EQ(verdict.checked, 0);
+  State off = scene.after;
+  off.x[3].x = kNan;
+  EXPECT_FALSE(admissible_step(scene.setup, scene.before, off).holds);
+  State over = scene.before;
+  over.frame = 1;
+  EXPECT_EQ(admissible_step(scene.setup, over, over).checked, 0);
+}
+
+}  // namespace
+}  // namespace cutproof::oracles
