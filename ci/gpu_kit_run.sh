@@ -79,6 +79,7 @@ for part in $parts; do
       try clusters cutproof bench clusters --backend gpu --json "$results/clusters.json"
       try scale cutproof bench scale --backend gpu --split both --json "$results/scale.json"
       try solver cutproof bench solver --backend gpu --json "$results/solver.json"
+      try sensitivity cutproof bench sensitivity --backend gpu --json "$results/sensitivity.json"
       try baselines cutproof bench baselines --backend gpu --json "$results/baselines.json"
       # A body of ten million particles for 100 frames, a blade cutting.
       try ten_million cutproof bench stages --backend gpu --sizes 10000000 --frames 100 --json "$results/stages_10M.json" ;;

@@ -18,10 +18,12 @@ namespace {
 
 struct CheckOptions {
   std::string recording;
+  std::string depth{name_of(harness::Depth::motion)};
   std::string json;
 };
 
 int check(const CheckOptions& options) {
+  const harness::Depth depth = depth_asked(options.depth);
   const io::RecordingReader reader(options.recording);
   const io::Recording& recording = reader.header();
   Scene scene;
@@ -32,7 +34,7 @@ int check(const CheckOptions& options) {
   fmt::print("recording {}: scene {}, backend {}, {} snapshots of {} particles\n", options.recording,
              scene.name.empty() ? "(none)" : scene.name, recording.backend, recording.snapshot_count,
              recording.setup.body.particle_count());
-  harness::SceneJudge judge(recording.setup, scene.expect, recording.backend, initial);
+  harness::SceneJudge judge(recording.setup, scene.expect, recording.backend, initial, depth);
   RunResult result{"check", options.recording,    recording.backend,
                    scene,   recording.setup.body, initial->clusters.count()};
   {
@@ -44,6 +46,9 @@ int check(const CheckOptions& options) {
           progress.show(frame.frame + 1, "judging");
         });
     for (const Verdict& verdict : wrong) judge.add(verdict);
+  }
+  if (depth == harness::Depth::motion) {
+    judge.note("A recording cannot be run: relations between runs, such as 'no ghost force', were not asked of it.");
   }
   judge.finish();
   print_verdicts(judge);
@@ -60,6 +65,7 @@ void add_check(CLI::App& program, Work& work) {
   const auto options = std::make_shared<CheckOptions>();
   CLI::App* const command = program.add_subcommand("check", "judge a recording");
   command->add_option("recording", options->recording, "what --record was given")->required()->type_name("RECORDING");
+  add_check_depth(*command, options->depth, "how much is judged");
   add_json(*command, options->json, "write verdicts and counts");
   command->callback([options, &work] { work = [options] { return check(*options); }; });
 }

@@ -50,6 +50,21 @@ void add_seed(CLI::App& command, uint64_t& seed, const std::string& what, const 
   command.add_option(name, seed, what)->capture_default_str()->type_name("N")->check(CLI::NonNegativeNumber);
 }
 
+CLI::Option* add_check_depth(CLI::App& command, std::string& asked, const std::string& what) {
+  return command.add_option("--check", asked, fmt::format("{}: {}", what, fmt::join(harness::kDepthNames, " or ")))
+      ->default_str(std::string(name_of(harness::Depth::motion)))
+      ->type_name("D");
+}
+
+harness::Depth depth_asked(const std::string& asked) {
+  const std::optional<harness::Depth> depth = harness::depth_named(asked);
+  if (!depth) {
+    refuse("--check", fmt::format("'{}' is no depth of judging", asked),
+           fmt::format("use {}", fmt::join(harness::kDepthNames, " or ")));
+  }
+  return *depth;
+}
+
 void add_json(CLI::App& command, std::string& path, const std::string& what) {
   command.add_option("--json", path, what)->type_name("F");
 }

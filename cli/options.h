@@ -4,6 +4,7 @@
 #include <string>
 
 #include "harness/backends.h"
+#include "harness/depth.h"
 
 namespace cutproof::cli {
 
@@ -40,6 +41,11 @@ void add_list(CLI::App& command, const std::string& name, std::vector<Value>& li
   option->delimiter(',')->type_name(letter + "," + letter + "...");
   if (!list.empty()) option->capture_default_str();
 }
+
+// --check, which may be followed by a depth of judging. `asked` is empty unless it is given.
+CLI::Option* add_check_depth(CLI::App& command, std::string& asked, const std::string& what);
+// Throws InputError if there is no depth of this name.
+harness::Depth depth_asked(const std::string& asked);
 
 void add_json(CLI::App& command, std::string& path, const std::string& what);
 

@@ -1,6 +1,7 @@
 #include "cli/results.h"
 
 #include "cli/commands.h"
+#include "model/io/json_number.h"
 #include "model/io/verdict_json.h"
 #include "model/stage.h"
 
@@ -25,6 +26,17 @@ nlohmann::json to_json(const harness::FrameResult& frame, bool timed) {
     result["total_seconds"] = frame.total_seconds;
   }
   return result;
+}
+
+nlohmann::json to_json(const harness::PropertySummary& summary) {
+  return {{"property", summary.property},
+          {"stage", name_of(summary.stage)},
+          {"unit", summary.unit},
+          {"judged", summary.judged},
+          {"checked", summary.checked},
+          {"failed", summary.failed},
+          {"measured", json_number(summary.measured)},
+          {"of_bound", json_number(summary.of_bound)}};
 }
 
 }  // namespace
@@ -58,6 +70,10 @@ nlohmann::json to_json(const RunResult& result, const harness::SceneJudge* judge
                            {"verdicts", judge->verdicts().size()},
                            {"failed", failed},
                            {"failed_as_expected", expected}};
+    document["properties"] = nlohmann::json::array();
+    for (const harness::PropertySummary& summary : judge->summaries().all()) {
+      document["properties"].push_back(to_json(summary));
+    }
     document["notes"] = judge->notes();
   }
   return document;

@@ -18,6 +18,7 @@
 #include "harness/against.h"
 #include "harness/backends.h"
 #include "harness/frame_runner.h"
+#include "harness/relation_sample.h"
 #include "harness/scene_judge.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
@@ -35,10 +36,10 @@ struct RunOptions {
   fixtures::BuildOptions build;  // but for its mesh
   std::string mesh;              // takes the place of the scene's body
   std::string unit = "mm";       // of the mesh's numbers
-  bool check = false;
-  std::string against;        // "" or the reference
-  std::string mode = "both";  // of the comparison: lockstep, free-running, both
-  std::string errors;         // names of errors with commas between them, or "all"; empty: none
+  std::string check;             // a depth; empty: nothing is judged
+  std::string against;           // "" or the reference
+  std::string mode = "both";     // of the comparison: lockstep, free-running, both
+  std::string errors;            // names of errors with commas between them, or "all"; empty: none
   std::string record;
   std::string json;
 };
@@ -129,6 +130,8 @@ void compare(Against& against, const Setup& setup, const harness::Moment& moment
 }
 
 int run(const RunOptions& options) {
+  std::optional<harness::Depth> depth;
+  if (!options.check.empty()) depth = depth_asked(options.check);
   std::optional<AgainstMode> mode;
   if (!options.against.empty()) mode = against_mode(options);
   const harness::ErrorsWanted wanted = errors_wanted(options.errors);
@@ -145,6 +148,7 @@ int run(const RunOptions& options) {
   if (!options.record.empty())
     recorder.emplace(options.record, built.setup, io::write_scene(scene), options.backend.name);
   std::optional<harness::SceneJudge> judge;
+  std::optional<harness::RelationSample> relations;
   std::optional<Against> against;
   std::optional<harness::Errors> errors;
   print_header(scene, built, options);
@@ -152,7 +156,8 @@ int run(const RunOptions& options) {
   RunResult result{"run", options.scene, options.backend.name, scene, built.setup.body, built.state.clusters.count()};
   harness::FrameRunner runner(*backend, {built.setup}, {built.state});
   const auto state = [&]() -> const State& { return *runner.states().front(); };
-  if (options.check) judge.emplace(built.setup, scene.expect, options.backend.name, runner.states().front());
+  if (depth) judge.emplace(built.setup, scene.expect, options.backend.name, runner.states().front(), *depth);
+  if (depth == harness::Depth::motion) relations.emplace(built.setup, make_backend(options.backend));
   if (mode) against.emplace(built.setup, built.state, state(), options.backend.name, *mode);
   if (!options.errors.empty()) {
     errors.emplace(wanted, built.setup, state(), [&] { return make_backend(options.backend); });
@@ -160,6 +165,10 @@ int run(const RunOptions& options) {
   if (recorder) recorder->add(Stage::skin, state());
   const harness::Observer see = [&](const harness::Moment& moment) {
     if (judge) judge->see(moment);
+    if (relations) {
+      relations->see(moment);
+      for (Verdict& verdict : relations->take_verdicts()) judge->add(std::move(verdict));
+    }
     if (recorder) recorder->add(moment.span.last, *moment.after);
     if (against) compare(*against, built.setup, moment, runner.ran());
   };
@@ -179,6 +188,9 @@ int run(const RunOptions& options) {
   const std::vector<Verdict> broken = runner.take_broken_contracts();
   if (judge) {
     for (const Verdict& verdict : broken) judge->add(verdict);
+    if (relations) {
+      for (std::string& sentence : relations->notes()) judge->note(std::move(sentence));
+    }
     judge->finish();
     print_verdicts(*judge);
   }
@@ -232,7 +244,8 @@ void add_run(CLI::App& program, Work& work) {
             CLI::PositiveNumber);
   add_count(*command, "--frames", options->build.frames, "stop after this many frames of the scene",
             CLI::NonNegativeNumber);
-  command->add_flag("--check", options->check, "judge every frame with every oracle, and the scene's expectations");
+  add_check_depth(*command, options->check, "judge every frame by every property, and by what the scene expects")
+      ->expected(0, 1);
   command
       ->add_option("--against", options->against,
                    fmt::format("compare every stage with this backend: {}", harness::reference_backend().name))
@@ -251,6 +264,10 @@ void add_run(CLI::App& program, Work& work) {
       ->type_name("F");
   add_json(*command, options->json, "write verdicts, stage times and counts");
   command->callback([options, &work] {
+    // Whoever writes --check before the scene means no depth by it.
+    if (options->scene.empty() && !options->check.empty() && !harness::depth_named(options->check)) {
+      options->scene = std::exchange(options->check, std::string(name_of(harness::Depth::motion)));
+    }
     work = [options] {
       if (!options->scene.empty()) return run(*options);
       std::fputs(kNextSteps, stderr);

@@ -22,6 +22,12 @@ struct Row {
   int64_t frames = 0, failed = 0, expected = 0, checked = 0;
 };
 
+// The greatest of all frames: the worst figure need not be the one that came nearest to its own bound.
+std::string share_of_bound(const harness::SceneJudge& judge, const Verdict& verdict) {
+  const harness::PropertySummary* const summary = judge.summaries().find(verdict.property, verdict.stage);
+  return summary != nullptr && summary->of_bound ? fmt::format("{:.2g}", *summary->of_bound) : "-";
+}
+
 std::string figure(double value) { return fmt::format("{:.4g}", value); }
 
 }  // namespace
@@ -67,17 +73,17 @@ void print_verdicts(const harness::SceneJudge& judge) {
                        (row.worst->holds == verdict.holds && verdict.measured > row.worst->measured);
     if (worse) row.worst = &verdict;
   }
-  fmt::print("\n{:<40} {:<7} {:>7} {:>12} {:>7} {:>11} {:>11} {:<10} {}\n", "property", "after", "frames", "checked",
-             "failed", "worst", "bound", "unit", "");
+  fmt::print("\n{:<40} {:<7} {:>7} {:>12} {:>7} {:>11} {:>11} {:<7} {:>8}  {}\n", "property", "after", "frames",
+             "checked", "failed", "worst", "bound", "unit", "of bound", "");
   for (const auto& [key, row] : rows) {
     const Verdict& worst = *row.worst;
     const char* mark = row.failed > 0     ? "FAILS"
                        : row.expected > 0 ? "fails, as the scene expects"
                        : row.frames == 0  ? "vacuous"
                                           : "holds";
-    fmt::print("{:<40} {:<7} {:>7} {:>12} {:>7} {:>11} {:>11} {:<10} {}\n", worst.property, name_of(worst.stage),
+    fmt::print("{:<40} {:<7} {:>7} {:>12} {:>7} {:>11} {:>11} {:<7} {:>8}  {}\n", worst.property, name_of(worst.stage),
                row.frames, row.checked, row.failed + row.expected, figure(worst.measured), figure(worst.bound),
-               worst.unit, mark);
+               worst.unit, share_of_bound(judge, worst), mark);
   }
   std::size_t failures = 0;
   for (const Verdict& verdict : judge.verdicts()) {

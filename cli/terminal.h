@@ -27,7 +27,8 @@ class Progress {
 // Prints io::filled.
 void print_filled(const std::string& text, const nlohmann::json& values);
 
-// One row per property and stage: how often judged, how often it failed, the worst figure beside its bound; then the
+// One row per property and stage: how often judged, how often it failed, the worst figure beside its bound, and the
+// greatest share of a bound; then the
 // first failures with their witnesses, and one line that says whether everything holds.
 void print_verdicts(const harness::SceneJudge& judge);
 

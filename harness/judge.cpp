@@ -7,7 +7,6 @@
 #include "model/fields.h"
 #include "model/rules.h"
 #include "oracles/comparison/state_difference.h"
-#include "oracles/surface/surface.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::harness {
@@ -54,12 +53,12 @@ State after_step(const State& before, const State& end) {
   return state;
 }
 
-Judge::Judge(const Setup& setup, std::string backend, Promises promises, Thorough thorough)
+Judge::Judge(const Setup& setup, std::string backend, Promises promises, Thorough thorough, Depth depth)
     : setup_(setup),
       backend_(std::move(backend)),
       promises_(promises),
       thorough_(thorough),
-      judge_(setup, oracles::properties()) {}
+      judge_(setup, properties_of(depth)) {}
 Judge::~Judge() = default;
 
 void Judge::begin(const Snapshot& initial, bool has_expanded) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/depth.h"
 #include "harness/moments.h"
 #include "model/verdict.h"
 #include "oracles/oracles.h"
@@ -33,8 +34,9 @@ enum class Thorough {
 
 class Judge {
  public:
-  // `setup` must outlive this. `backend` is the name that verdicts carry.
-  Judge(const Setup& setup, std::string backend, Promises promises, Thorough thorough);
+  // `setup` must outlive this. `backend` is the name that verdicts carry. Who says nothing about the depth judges by
+  // everything.
+  Judge(const Setup& setup, std::string backend, Promises promises, Thorough thorough, Depth depth = Depth::motion);
   ~Judge();
 
   // The state as loaded. `has_expanded`: an expansion may have changed its clusters already.

@@ -8,9 +8,10 @@
 namespace cutproof::harness {
 
 SceneJudge::SceneJudge(const Setup& setup, const Expectations& expectations, std::string backend,
-                       const Snapshot& initial)
+                       const Snapshot& initial, Depth depth)
     : setup_(setup),
-      judge_(setup, std::move(backend), Promises{}, Thorough::when_cut),
+      depth_(depth),
+      judge_(setup, std::move(backend), Promises{}, Thorough::when_cut, depth),
       expectations_(setup, expectations, initial) {
   judge_.begin(initial);
 }
@@ -41,6 +42,7 @@ void SceneJudge::finish() {
   };
   std::map<std::string, Looked> properties;
   for (const Verdict& verdict : judge_.verdicts()) {
+    summaries_.add(verdict);
     Looked& looked = properties[verdict.property];
     looked.checked += verdict.checked;
     looked.excused = looked.excused || !verdict.vacuous.empty() || !verdict.holds;
@@ -68,6 +70,12 @@ bool SceneJudge::holds() const {
 std::vector<std::string> SceneJudge::notes() const {
   std::vector<std::string> notes;
   if (!expectations_.any()) notes.push_back("The scene expects nothing: no outcome was held against it.");
+  if (depth_ == Depth::topology) {
+    notes.push_back(
+        "Only the topology was judged: whether each step is one that could be made, and relations between runs, were "
+        "not asked.");
+  }
+  notes.insert(notes.end(), notes_.begin(), notes_.end());
   for (const Judge::Unpromised& u : judge_.unpromised()) {
     notes.push_back(fmt::format("'{}' is not promised here: of {} states it would not hold in {}.", u.property,
                                 u.states, u.failing));

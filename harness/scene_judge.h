@@ -6,31 +6,42 @@
 
 #include "harness/expectations.h"
 #include "harness/judge.h"
+#include "harness/property_summary.h"
 
 namespace cutproof::harness {
 
 class SceneJudge {
  public:
-  // `setup` must outlive this. `initial` is the state as loaded.
-  SceneJudge(const Setup& setup, const Expectations& expectations, std::string backend, const Snapshot& initial);
+  // `setup` must outlive this. `initial` is the state as loaded. Who says nothing about the depth judges by everything.
+  SceneJudge(const Setup& setup, const Expectations& expectations, std::string backend, const Snapshot& initial,
+             Depth depth = Depth::motion);
 
   void see(const Moment& moment);
-  void add(Verdict verdict) { judge_.add(std::move(verdict)); }  // such as a broken contract
+  // Of somebody else's: a broken contract, or a relation between runs.
+  void add(Verdict verdict) { judge_.add(std::move(verdict)); }
+  // A sentence that the reader of the verdicts has to know as well.
+  void note(std::string sentence) { notes_.push_back(std::move(sentence)); }
 
   // After the last moment: what the scene expects, whether the run came to the end of its schedule, and whether each
   // property that applied looked at anything at all. A run of which nothing was judged does not hold.
   void finish();
 
   const std::vector<Verdict>& verdicts() const { return judge_.verdicts(); }
+  // What the verdicts came to by property and stage, without those on the run as a whole and on what a scene expects.
+  // Complete after finish().
+  const PropertySummaries& summaries() const { return summaries_; }
   bool holds() const;
   bool is_expected_failure(const Verdict& verdict) const { return expectations_.is_expected_failure(verdict); }
-  // What a reader of the verdicts has to know, one sentence each: that the scene expects nothing, which properties were
-  // not promised.
+  // What a reader of the verdicts has to know, one sentence each: that the scene expects nothing, what was not judged,
+  // which properties were not promised.
   std::vector<std::string> notes() const;
 
  private:
   const Setup& setup_;
+  Depth depth_;
   Judge judge_;
+  PropertySummaries summaries_;
+  std::vector<std::string> notes_;
   ExpectationCheck expectations_;
 };
 

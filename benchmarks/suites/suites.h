@@ -87,4 +87,12 @@ struct FactorsOptions {
 };
 nlohmann::json run_factors(const FactorsOptions& options, const Progress& progress);
 
+// The least disturbance of a run that its judge rejects, by property and stage.
+struct SensitivityOptions {
+  std::string backend = harness::kReferenceName;
+  int64_t particles = 1000;
+  int64_t moments = 8;  // of each stage
+};
+nlohmann::json run_sensitivity(const SensitivityOptions& options, const Progress& progress);
+
 }  // namespace cutproof::benchmarks

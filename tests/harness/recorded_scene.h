@@ -24,6 +24,8 @@ struct RecordedScene {
   Scene scene;
   fixtures::Built built;
   std::vector<io::Snapshot> snapshots;  // the first as loaded, then one after each span that the backend ran
+  harness::Trace trace;                 // the same as it was seen live
+  std::vector<Verdict> broken_contracts;
 
   // `adapt` may change what is loaded.
   RecordedScene(
@@ -32,10 +34,15 @@ struct RecordedScene {
       : scene(io::parse_scene(json, "the test's scene")), built(fixtures::build(scene, "the test's scene")) {
     adapt(built.setup, built.state);
     harness::FrameRunner runner(backend, {built.setup}, {built.state});
-    snapshots.push_back({Stage::skin, *runner.states().front()});
+    trace.initial = runner.states().front();
+    snapshots.push_back({Stage::skin, *trace.initial});
     while (!runner.is_over()) {
-      runner.run_frame([&](const harness::Moment& moment) { snapshots.push_back({moment.span.last, *moment.after}); });
+      runner.run_frame([&](const harness::Moment& moment) {
+        trace.moments.push_back(moment);
+        snapshots.push_back({moment.span.last, *moment.after});
+      });
     }
+    broken_contracts = runner.take_broken_contracts();
   }
 
   // As somebody else may have recorded it: the ends of frames alone.

@@ -275,6 +275,86 @@ TEST_F(WrongRecording, WhosePositionsOrVelocitiesAreSoLargeThatNoBoundIsFinite) 
   }
 }
 
+// --- What verdicts came to -------------------------------------------------------------------------------------------
+
+TEST_F(WrongRecording, IsSummedUpByPropertyAndStage) {
+  RecordedScene recorded(kFallingScene, *reference_);
+  const auto judge = recorded.judged();
+  const harness::PropertySummary* const motion = judge->summaries().find("motion", Stage::step);
+  ASSERT_NE(motion, nullptr);
+  int64_t judged = 0, checked = 0;
+  double measured = 0, of_bound = 0;
+  for (const Verdict& verdict : judge->verdicts()) {
+    if (verdict.property != "motion") continue;
+    ++judged;
+    checked += verdict.checked;
+    measured = std::max(measured, verdict.measured);
+    of_bound = std::max(of_bound, verdict.measured / verdict.bound);
+  }
+  EXPECT_EQ(motion->judged, judged);
+  EXPECT_EQ(motion->checked, checked);
+  EXPECT_EQ(motion->failed, 0);
+  EXPECT_EQ(motion->measured, measured);
+  EXPECT_EQ(motion->of_bound, of_bound);
+  EXPECT_GT(of_bound, 0);
+  EXPECT_LT(of_bound, 1);
+  // What is counted has no bound but 0, and what is held against the run as a whole is no property.
+  ASSERT_NE(judge->summaries().find("coverage", Stage::skin), nullptr);
+  EXPECT_FALSE(judge->summaries().find("coverage", Stage::skin)->of_bound.has_value());
+  EXPECT_EQ(judge->summaries().find("the run is whole", Stage::skin), nullptr);
+
+  recorded.keep_ends_of_frames();
+  shift(recorded.snapshots.back().state, {1, 0, 0});
+  const auto wrong = recorded.judged();
+  EXPECT_EQ(wrong->summaries().find("motion", Stage::step)->failed, 1);
+  EXPECT_GT(wrong->summaries().find("motion", Stage::step)->of_bound, 1);
+}
+
+TEST(PropertySummaries, JoinAsIfAllHadBeenAddedToOne) {
+  const auto verdict = [](double measured, double bound, int64_t checked) {
+    Verdict one;
+    one.property = "a";
+    one.measured = measured;
+    one.bound = bound;
+    one.checked = checked;
+    return one;
+  };
+  const Verdict all[] = {verdict(1, 10, 3), verdict(4, 100, 1), verdict(7, 0, 2), verdict(9, 9, 0)};
+  harness::PropertySummaries one, first, second;
+  for (int k = 0; k < 4; ++k) {
+    one.add(all[k]);
+    (k < 1 ? first : second).add(all[k]);
+  }
+  second.join(first);
+  for (const harness::PropertySummaries* summaries : {&one, &second}) {
+    ASSERT_EQ(summaries->all().size(), 1u);
+    const harness::PropertySummary& a = summaries->all().front();
+    EXPECT_EQ(a.judged, 3);
+    EXPECT_EQ(a.checked, 6);
+    EXPECT_EQ(a.measured, 7) << "the one that looked at nothing does not count";
+    EXPECT_EQ(a.of_bound, 0.1) << "of the least bound, not of the greatest measure";
+  }
+}
+
+// --- Depth -----------------------------------------------------------------------------------------------------------
+
+TEST_F(WrongRecording, IsSaidToHaveOnlyItsTopologyJudged) {
+  const RecordedScene recorded(tests::kCutScene, *reference_);
+  for (const harness::Depth depth : {harness::Depth::topology, harness::Depth::motion}) {
+    harness::SceneJudge judge(recorded.built.setup, recorded.scene.expect, "a backend", recorded.trace.initial, depth);
+    for (const harness::Moment& moment : recorded.trace.moments) judge.see(moment);
+    judge.finish();
+    EXPECT_TRUE(judge.holds());
+    const auto notes = judge.notes();
+    const bool said = std::any_of(notes.begin(), notes.end(), [](const std::string& note) {
+      return note.find("Only the topology") != std::string::npos;
+    });
+    EXPECT_EQ(said, depth == harness::Depth::topology);
+    EXPECT_EQ(harness::depth_named(name_of(depth)), depth);
+  }
+  EXPECT_EQ(harness::depth_named("everything"), std::nullopt);
+}
+
 // --- Nothing to judge ------------------------------------------------------------------------------------------------
 
 TEST_F(WrongRecording, OfABodyWithoutParticlesOrOfNoFramesJudgesNothingAndFails) {

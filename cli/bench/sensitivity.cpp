@@ -1,0 +1,54 @@
+#include "cli/bench/suites.h"
+
+namespace cutproof::cli {
+
+namespace {
+
+void print_row(const nlohmann::json& document) {
+  const nlohmann::json& row = document.at("rows").back();
+  print_filled("{scene}, {disturbance} after {stage}: ", row);
+  print_filled(row.at("least").is_null() ? "nothing is rejected\n" : "{least:.2g} {unit}, {property}\n", row);
+}
+
+void print_sensitivity(const nlohmann::json& document) {
+  const auto within = [](const nlohmann::json& row) -> std::string {
+    const nlohmann::json& goal = row.at("within_goal");
+    return goal.is_null() ? "" : goal.get<bool>() ? "within" : "not yet";
+  };
+  fmt::print("\n{}", table_of(document.at("rows"), {{"disturbance", "{disturbance}"},
+                                                    {"after", "{stage}"},
+                                                    {"scene", "{scene}"},
+                                                    {"unit", "{unit}"},
+                                                    {"least rejected", "{least:.2g}"},
+                                                    {"by", "{property}"},
+                                                    {"its measured", "{measured:.2g} {measured_unit}"},
+                                                    {"of bound", "{of_bound:.2g}"},
+                                                    {"rounding", "{rounding:.2g}"},
+                                                    {"ratio", "{ratio:.2g}"},
+                                                    {"goal", "{goal:.2g}"},
+                                                    {"", within}}));
+  fmt::print(
+      "least rejected: of a bisection, in the best of the moments. its measured, of bound: the greatest of that\n"
+      "property over the run as it is. rounding: by how much the run as it is differs from the reference's stages.\n");
+  for (const nlohmann::json& scene : document.at("scenes")) {
+    for (const nlohmann::json& verdict : scene.at("failed")) {
+      print_filled("FAILS as it is: {property}: {witness/text}\n", verdict);
+    }
+  }
+}
+
+}  // namespace
+
+void add_sensitivity(CLI::App& bench, Work& work) {
+  const auto options = std::make_shared<benchmarks::SensitivityOptions>();
+  CLI::App* const command = bench.add_subcommand("sensitivity", "the least disturbance that the judge of runs rejects");
+  add_backend_name(*command, options->backend, "whose runs are disturbed");
+  add_count(*command, "--particles", options->particles, "of each scene", CLI::Range(100, 3000));
+  add_count(*command, "--moments", options->moments, "of each stage, evenly over the run", CLI::Range(1, 1000));
+  add_suite(*command, work, "write every row",
+            {.run = [options](const auto& progress) { return run_sensitivity(*options, progress); },
+             .row = print_row,
+             .end = print_sensitivity});
+}
+
+}  // namespace cutproof::cli

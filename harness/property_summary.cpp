@@ -1,0 +1,55 @@
+#include "harness/property_summary.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace cutproof::harness {
+
+namespace {
+
+void raise(std::optional<double>& greatest, std::optional<double> value) {
+  if (value && !(greatest && *greatest >= *value)) greatest = value;
+}
+
+}  // namespace
+
+const PropertySummary* PropertySummaries::find(const std::string& property, Stage stage) const {
+  const auto found = std::find_if(all_.begin(), all_.end(), [&](const PropertySummary& one) {
+    return one.property == property && one.stage == stage;
+  });
+  return found != all_.end() ? &*found : nullptr;
+}
+
+PropertySummary& PropertySummaries::entry(const std::string& property, Stage stage, const std::string& unit) {
+  const PropertySummary* const known = find(property, stage);
+  if (known != nullptr) return all_[static_cast<std::size_t>(known - all_.data())];
+  PropertySummary summary;
+  summary.property = property;
+  summary.stage = stage;
+  summary.unit = unit;
+  return all_.emplace_back(std::move(summary));
+}
+
+void PropertySummaries::add(const Verdict& verdict) {
+  PropertySummary& summary = entry(verdict.property, verdict.stage, verdict.unit);
+  summary.judged += verdict.checked > 0 || !verdict.holds;
+  summary.checked += verdict.checked;
+  summary.failed += !verdict.holds;
+  if (verdict.checked == 0) return;
+  // Comparisons with a NaN are false, so it must not be the first to stand here.
+  if (!(verdict.measured <= summary.measured)) summary.measured = verdict.measured;
+  if (verdict.bound > 0 && std::isfinite(verdict.bound)) raise(summary.of_bound, verdict.measured / verdict.bound);
+}
+
+void PropertySummaries::join(const PropertySummaries& other) {
+  for (const PropertySummary& theirs : other.all_) {
+    PropertySummary& ours = entry(theirs.property, theirs.stage, theirs.unit);
+    ours.judged += theirs.judged;
+    ours.checked += theirs.checked;
+    ours.failed += theirs.failed;
+    if (!(theirs.measured <= ours.measured)) ours.measured = theirs.measured;
+    raise(ours.of_bound, theirs.of_bound);
+  }
+}
+
+}  // namespace cutproof::harness

@@ -1,0 +1,41 @@
+// What the verdicts of a property came to over a run or a campaign.
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "model/verdict.h"
+
+namespace cutproof::harness {
+
+// Of one property after one stage.
+struct PropertySummary {
+  std::string property;
+  Stage stage = Stage::skin;
+  std::string unit;
+  int64_t judged = 0;   // verdicts that looked at something, or fail
+  int64_t checked = 0;  // things that they looked at
+  int64_t failed = 0;   // expected or not
+  double measured = 0;  // greatest
+  // Greatest measured / bound: how much room the bound leaves to what was found. Nothing where every bound is 0, as it
+  // is of what is counted.
+  std::optional<double> of_bound;
+};
+
+class PropertySummaries {
+ public:
+  void add(const Verdict& verdict);
+  void join(const PropertySummaries& other);
+
+  // In the order in which they were first added.
+  const std::vector<PropertySummary>& all() const { return all_; }
+  // Null if no verdict of this property after this stage was added.
+  const PropertySummary* find(const std::string& property, Stage stage) const;
+
+ private:
+  PropertySummary& entry(const std::string& property, Stage stage, const std::string& unit);
+  std::vector<PropertySummary> all_;
+};
+
+}  // namespace cutproof::harness

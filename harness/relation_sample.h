@@ -1,0 +1,49 @@
+// Relations between runs of one backend (oracles/relations/), asked in a sample of the frames of a run. A second
+// instance of the backend runs them, from the states in which those frames began.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "harness/moments.h"
+#include "model/backend.h"
+#include "model/verdict.h"
+
+namespace cutproof::harness {
+
+// Each relation costs runs of its own, so not every frame is asked; the rule is fixed, so that a run can be judged
+// again. Asked are
+// - frames 0, 8, 16, …;
+// - the first frame after a cut, that is one that removes nothing after one that did;
+// - a frame that begins with more components of tissue than the one before it: pieces that are new.
+inline constexpr int64_t kFramesBetweenSamples = 8;
+
+class RelationSample {
+ public:
+  // `second`: another instance of the backend that is judged. `setup` must outlive this.
+  RelationSample(const Setup& setup, std::unique_ptr<Backend> second);
+  ~RelationSample();
+
+  // Every moment of one body in order, whoever ran it. Runs the relations when a frame ends that is asked.
+  void see(const Moment& moment);
+  std::vector<Verdict> take_verdicts();
+
+  // How many frames were asked, and what could not be asked of this backend: one sentence each.
+  std::vector<std::string> notes() const;
+
+ private:
+  void ask(const State& begin);
+
+  const Setup& setup_;
+  const Setup frictionless_;  // friction has no energy, so it is left out where energy is asked about
+  std::unique_ptr<Backend> second_;
+  Snapshot begin_;               // of the frame in progress; null before its step has been seen
+  int32_t components_ = 0;       // as it began; 0: not counted
+  bool is_separated_ = false;    // it began with more of them than the frame before
+  bool removed_before_ = false;  // the frame before it removed something
+  int64_t frames_ = 0, asked_ = 0;
+  std::vector<Verdict> verdicts_;
+};
+
+}  // namespace cutproof::harness
