@@ -42,6 +42,7 @@ struct ClusterStretch {
 
 ClusterStretch stretch_of_cluster(const WeightedRest& rest, const State& state, int32_t cluster, double u) {
   const auto members = state.clusters.of(cluster);
+  if (members.size() == 1) return {};  // it has no extent, whatever rounding leaves of its center
   long double mass = 0;
   WideVector rest_center = WideVector::Zero(), center = WideVector::Zero();
   for (const int32_t i : members) {
@@ -66,8 +67,8 @@ ClusterStretch stretch_of_cluster(const WeightedRest& rest, const State& state, 
   const Eigen::SelfAdjointEigenSolver<Wide> extents(a0);
   const WideVector lambda = extents.eigenvalues();  // ascending
   ClusterStretch found;
-  if (!(lambda[2] > 0)) return found;  // a single particle
-  Wide along = Wide::Zero();           // F times the eigenvectors
+  if (!(lambda[2] > 0)) return found;
+  Wide along = Wide::Zero();  // F times the eigenvectors
   long double least = lambda[2];
   for (int k = 0; k < 3; ++k) {
     if (lambda[k] <= kFlat * lambda[2]) continue;

@@ -5,9 +5,11 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <random>
+#include <tuple>
 #include <vector>
 
 #include "fixtures/bodies.h"
@@ -15,13 +17,14 @@
 #include "gpu/backends.h"
 #include "model/at.h"
 #include "oracles/oracles.h"
+#include "property_tests/cases.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::property_tests {
 namespace {
 
 struct BentBlock {
-  Setup setup;
+  cutproof::Setup setup;
   State state;
 };
 
@@ -143,6 +146,84 @@ TEST(StrainOfBentBlocks, IsWeighedAlikeByOracleReferenceAndKernelsAndNotByWholeM
   EXPECT_GT(cut, kBlocks / 2);
   EXPECT_GT(whole_masses_differ, kBlocks / 20);
   EXPECT_EQ(rejected, whole_masses_differ);
+}
+
+// Bodies and clusters of every kind: sheets and wires, single particles, clusters that are flat or straight, where the
+// motion is bent, torn or turned inside out.
+TEST(StrainOfAnyClusters, IsJudgedAlikeByOracleReferenceAndKernels) {
+  constexpr uint64_t kSeed = 45;
+  std::mt19937_64 random(kSeed);
+  RecordProperty("seed", static_cast<int>(kSeed));
+  const auto uniform = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
+  int64_t removed = 0, kept = 0, flat = 0;
+  for (uint64_t round = 0; round < 300; ++round) {
+    SCOPED_TRACE(round);
+    Instance made = instance_of(draw_case(kSeed + round, 50));
+    made.setup.has_blade = false;
+    made.setup.blade_moves.clear();
+    made.setup.stroke_end.clear();
+    made.setup.step.substeps = 1;
+    made.setup.substep_length = {1e-3};  // one frame, however many strokes the case has
+    made.setup.detect = {Criterion::strain, 1.5, uniform(1.01, 1.4), true};
+    const double h = made.setup.body.grid.spacing;
+    for (double& m : made.setup.body.mass) m *= uniform(0.5, 2);
+    reference::update_rest_frames(made.setup.body, made.state.clusters);
+    const double bend = uniform(0, 0.05) / h, noise = round % 4 == 0 ? uniform(0, 0.3) * h : 0, turn = uniform(0, 3);
+    for (Vec3& x : made.state.x) {
+      x += Vec3{-bend * x.x * x.z, bend * x.x * x.y, bend * x.x * x.x / 2};
+      x += noise * Vec3{uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
+      x = {std::cos(turn) * x.x - std::sin(turn) * x.y, std::sin(turn) * x.x + std::cos(turn) * x.y, x.z};
+      if (round % 16 == 1) x.z = -x.z;
+    }
+    for (int32_t c = 0; c < made.state.clusters.count(); ++c) flat += made.state.clusters.size(c) < 4;
+    State by_reference = made.state;
+    reference::detect(made.setup, by_reference);
+    const Verdict verdict = oracles::detection(made.setup, made.state, by_reference);
+    EXPECT_TRUE(verdict.holds) << verdict.witness.text;
+    removed += static_cast<int64_t>(by_reference.removed.size());
+    kept += std::count(by_reference.alive.begin(), by_reference.alive.end(), 1);
+    const auto host = gpu::make_host_backend(1);
+    host->load({made.setup}, {made.state});
+    const State before = host->snapshot().front();
+    host->run({Stage::detect, Stage::detect});
+    const Verdict of_kernels = oracles::detection(made.setup, before, host->snapshot().front());
+    EXPECT_TRUE(of_kernels.holds) << of_kernels.witness.text;
+  }
+  EXPECT_GT(removed, 1000);
+  EXPECT_GT(kept, 1000);
+  EXPECT_GT(flat, 1000);
+}
+
+// A particle alone has no extent that could be stretched, whatever rounding makes of its own center.
+TEST(StrainOfSingleParticles, IsNone) {
+  std::mt19937_64 random(46);
+  const auto uniform = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
+  std::vector<std::array<int32_t, 3>> nodes;
+  std::vector<std::vector<int32_t>> clusters;
+  for (int32_t i = 0; i < 2000; ++i) {
+    nodes.push_back({2 * (i % 13), 2 * (i / 13 % 13), 2 * (i / 169)});
+    clusters.push_back({i});
+  }
+  std::sort(nodes.begin(), nodes.end(),
+            [](const auto& a, const auto& b) { return std::tuple(a[2], a[1], a[0]) < std::tuple(b[2], b[1], b[0]); });
+  cutproof::Setup setup;
+  setup.body = fixtures::body_from_nodes(nodes, 0.01);
+  for (double& m : setup.body.mass) m *= uniform(0.5, 2);
+  setup.step.substeps = 1;
+  setup.substep_length = {1e-3};
+  setup.detect = {Criterion::strain, 1.5, 1.01, true};
+  State state = fixtures::foreign_state(setup.body, clusters, 1, 1);
+  for (Vec3& x : state.x) x += {uniform(-0.1, 0.1), uniform(-0.1, 0.1), uniform(-0.1, 0.1)};
+  State by_reference = state;
+  reference::detect(setup, by_reference);
+  EXPECT_EQ(by_reference.removed.size(), 0u);
+  const auto host = gpu::make_host_backend(1);
+  host->load({setup}, {state});
+  const State before = host->snapshot().front();
+  host->run({Stage::detect, Stage::detect});
+  EXPECT_EQ(host->snapshot().front().removed.size(), 0u);
+  EXPECT_TRUE(oracles::detection(setup, state, state).holds);
+  EXPECT_TRUE(oracles::detection(setup, before, before).holds);
 }
 
 }  // namespace

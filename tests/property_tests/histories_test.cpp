@@ -144,14 +144,14 @@ TEST(Histories, RejectASnapshotThatChangesSomething) {
   EXPECT_EQ(failed_property(wears, {SaveAndLoad{}}), "a snapshot changes nothing");
 }
 
-// One bit of the first entry, or an entry where there is none.
+// One bit of the first entry, or of the last; or an entry where there is none.
 template <class T>
-void change_a_bit(T& value) {
+void change_a_bit(T& value, bool last = false) {
   if constexpr (requires { value.emplace_back(); }) {
     if (value.empty()) {
       value.emplace_back();
     } else {
-      change_a_bit(value.front());
+      change_a_bit(last ? value.back() : value.front());
     }
   } else if constexpr (std::is_same_v<T, bool>) {
     value = !value;
@@ -166,10 +166,10 @@ void for_each_field_by_index(Visit&& visit) {
   std::size_t index = 0;
   for_each_field([&](const Field& field, auto) { visit(field, index++); });
 }
-void change_field(State& state, std::size_t index) {
+void change_field(State& state, std::size_t index, bool last = false) {
   std::size_t k = 0;
   for_each_field([&](const Field&, auto get) {
-    if (k++ == index) change_a_bit(get(state));
+    if (k++ == index) change_a_bit(get(state), last);
   });
 }
 
@@ -199,16 +199,19 @@ TEST(Histories, SeeEachFieldOfEachSnapshotChangedAlone) {
   }
 }
 
-// The first frame cuts the wire in two, and what is kicked is the second part: the first entry of everything belongs to
-// the other one. The impulse is a sum over both.
+// The first frame cuts the wire in two. Where the second part is kicked, the first entry of everything belongs to the
+// other one; where the first is, the last one does. The impulse is a sum over both.
 TEST(Histories, SeeAGhostForceInEachField) {
   for_each_field_by_index([&](const Field& field, std::size_t index) {
-    const Faults ghost = {{}, {}, {}, [index](std::vector<State>& states) {
-                            if (states.size() == 2) change_field(states[1], index);
-                          }};
-    EXPECT_EQ(failed_property(ghost, {kFrame, Kick{1, {4, 0, 0}}}),
-              field.quantity == Quantity::momentum ? "" : "no ghost force")
-        << field.name;
+    for (const bool last : {false, true}) {
+      if (last && field.space == IndexSpace::state) continue;  // these have no entries that are of a part
+      const Faults ghost = {{}, {}, {}, [=](std::vector<State>& states) {
+                              if (states.size() == 2) change_field(states[1], index, last);
+                            }};
+      EXPECT_EQ(failed_property(ghost, {kFrame, Kick{last ? 0 : 1, {4, 0, 0}}}),
+                field.quantity == Quantity::momentum ? "" : "no ghost force")
+          << field.name << (last ? ", last entry" : "");
+    }
   });
 }
 
