@@ -8,6 +8,7 @@
 
 #include "oracles/blade_motion.h"
 #include "oracles/checks.h"
+#include "oracles/strain.h"
 
 namespace cutproof::oracles {
 namespace {
@@ -26,8 +27,6 @@ Stretch stretch_of(const TissueGraph& graph, const std::vector<Vec3>& x, int32_t
   }
   return stretch;
 }
-
-enum class Demand { keep, either, remove };
 
 // Rounding band of d_i > εh, with u the unit roundoff of what is judged. From the stored positions: each difference is
 // off by u relative to itself, its square by 3u, their sum by at most 5u, and the root by 2.5u + u. So every way to
@@ -191,6 +190,8 @@ void check_detection(const StageRun& run, Verdict& verdict) {
   const double limit = setup.detect.epsilon * h, u = unit_roundoff(before);
   const Criterion criterion = needs_detection(setup) ? setup.detect.criterion : Criterion::none;
   const Swept swept(setup, criterion == Criterion::geometric ? before.frame : setup.frame_count());
+  const std::vector<StrainDemand> strained =
+      criterion == Criterion::strain ? demands_of_strain(setup, before) : std::vector<StrainDemand>{};
   std::vector<int32_t> gone;
   for (int32_t i = 0; i < graph.particle_count(); ++i) {
     const bool was = before.alive[at(i)] != 0, is = after.alive[at(i)] != 0;
@@ -203,7 +204,7 @@ void check_detection(const StageRun& run, Verdict& verdict) {
     const Stretch stretch = stretch_of(graph, before.x, i);
     const Demand demand = criterion == Criterion::distance    ? demand_of_distance(stretch.distance, limit, u)
                           : criterion == Criterion::geometric ? swept.demand_of(stretch.distance, before.x[at(i)], u)
-                          : criterion == Criterion::strain    ? Demand::either
+                          : criterion == Criterion::strain    ? strained[at(i)].demand
                                                               : Demand::keep;
     if (demand == Demand::either || (demand == Demand::remove) == !is) continue;
     std::vector<int32_t> particles = {i};
@@ -212,7 +213,11 @@ void check_detection(const StageRun& run, Verdict& verdict) {
             "particle {} {} removed, but should {}have been: its greatest neighbour distance is "
             "{:.17g} h{}",
             i, is ? "was not" : "was", is ? "" : "not ", stretch.distance / h,
-            criterion == Criterion::distance ? fmt::format(", epsilon = {}", setup.detect.epsilon) : "");
+            criterion == Criterion::distance ? fmt::format(", epsilon = {}", setup.detect.epsilon)
+            : criterion == Criterion::strain
+                ? fmt::format(", the greatest stretch of its clusters {:.17g}, the limit {}", strained[at(i)].stretch,
+                              setup.detect.strain)
+                : "");
   }
   if (const auto wrong = first_in_one_only(gone, after.removed)) {
     violate(verdict, {{}, {wrong->element}}, "particle {} {}", wrong->element,

@@ -12,13 +12,18 @@
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <random>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "model/error.h"
+#include "model/io/container_types.h"
 #include "model/io/hdf5_file.h"
+#include "model/io/recording_format.h"
+#include "model/io/recording_setup.h"
 #include "tests/model/recording_bits.h"
 
 namespace cutproof::io {
@@ -321,6 +326,103 @@ TEST_F(RecordingTest, GivesBackTheSetupBitForBit) {
   }
 }
 
+// Changes a value by as little as its type can show.
+template <class T>
+void change_a_little(T& value) {
+  if constexpr (std::is_same_v<T, bool>) {
+    value = !value;
+  } else if constexpr (std::is_same_v<T, std::string>) {
+    value += '2';
+  } else if constexpr (NamedChoice<T>) {
+    value = static_cast<T>((static_cast<std::size_t>(value) + 1) % names_of(value).size());
+  } else if constexpr (std::is_integral_v<T>) {
+    value = static_cast<T>(value ^ 1);
+  } else {
+    static_assert(std::is_same_v<T, double>);
+    value = std::bit_cast<double>(std::bit_cast<uint64_t>(value) ^ 1);
+  }
+}
+
+// Calls check(changed) with each number of the value changed alone; of lists the first and the last entry, and the
+// length. `whole` is what the value is a part of.
+template <class Whole, class T, class Check>
+void change_each(const Whole& whole, T& value, const Check& check) {
+  const auto each_of = [&](auto& numbers) {
+    for (auto& number : numbers) change_each(whole, number, check);
+  };
+  if constexpr (is_list_of_entries<T>) {
+    for (std::size_t entry : {std::size_t{0}, value.size() - 1}) {
+      for_each_entry_field<typename T::value_type>(
+          [&](const SetupField&, auto get) { change_each(whole, get(value[entry]), check); });
+    }
+  } else if constexpr (is_vector<T>) {
+    for (auto* entry : {&value.front(), &value.back()}) change_each(whole, *entry, check);
+    const T before = value;
+    value.push_back(value.back());
+    check(whole);
+    value = before;
+  } else if constexpr (std::is_same_v<T, Vec3>) {
+    for (double* number : {&value.x, &value.y, &value.z}) change_each(whole, *number, check);
+  } else if constexpr (std::is_same_v<T, Mat3>) {
+    each_of(value.m);
+  } else if constexpr (std::is_class_v<T> && !std::is_same_v<T, std::string>) {  // std::array
+    each_of(value);
+  } else {
+    const T before = value;
+    change_a_little(value);
+    check(whole);
+    value = before;
+  }
+}
+
+// Not through a recorder, which refuses setups whose parts do not fit together.
+TEST_F(RecordingTest, GivesBackEachFieldOfASetupThatChangedAlone) {
+  Setup base = block_setup(2, 2, 2);
+  add_surroundings(base);
+  const auto recorded = [&](const Setup& setup) {
+    hdf5::File file = hdf5::File::create(path("setup.h5"));
+    write_setup(file.id(), setup);
+    file.close();
+    const hdf5::File opened = hdf5::File::open(path("setup.h5"));
+    return bits_of(read_setup(opened.id(), opened.bytes()));
+  };
+  const std::string before = bits_of(base);
+  ASSERT_TRUE(recorded(base) == before);
+  std::size_t fields = 0, changes = 0;
+  Setup setup = base;
+  for_each_setup_field([&](const SetupField& field, auto get) {
+    ++fields;
+    if constexpr (requires { get(setup).size(); }) {
+      ASSERT_FALSE(get(setup).empty()) << field.group << "/" << field.name << ": there is nothing to change";
+    }
+    change_each(setup, get(setup), [&](const Setup& changed) {
+      ++changes;
+      const std::string bits = bits_of(changed);
+      EXPECT_TRUE(bits != before) << field.group << "/" << field.name << ": change " << changes << " is none";
+      EXPECT_TRUE(recorded(changed) == bits) << field.group << "/" << field.name << ", change " << changes;
+    });
+  });
+  EXPECT_TRUE(bits_of(setup) == before);
+  EXPECT_GT(changes, 3 * fields);
+}
+
+// A recording says once in which precision all of its states were computed.
+TEST_F(RecordingTest, GivesBackThePrecisionOfItsStates) {
+  const Setup setup = block_setup(2, 1, 1);
+  State state = rest_state(setup);
+  for (const Precision precision : {Precision::binary32, Precision::binary64}) {
+    state.precision = precision;
+    write("run", setup, {{Stage::skin, state}, {Stage::step, state}});
+    const RecordingReader reader(path("run"));
+    EXPECT_EQ(reader.header().precision, precision);
+    for (const int64_t i : {0, 1}) EXPECT_EQ(reader.snapshot(i).state.precision, precision);
+  }
+  Recorder recorder(path("run"), setup, "{}", "reference");
+  recorder.add(Stage::skin, state);
+  state.precision = Precision::binary32;
+  EXPECT_THROW(recorder.add(Stage::step, state), std::invalid_argument);
+}
+
 TEST_F(RecordingTest, KeepsThePayloadOfNanAndTheSignOfZero) {
   const Setup setup = block_setup(2, 1, 1);
   State state = rest_state(setup);
@@ -419,6 +521,188 @@ TEST_F(RecordingTest, StoresOnceWhatDidNotChange) {
   EXPECT_EQ(stored_rows(script.particles, "/VTKHDF/PointData/velocity"), 2 * 8);
   EXPECT_EQ(stored_rows(script.particles, "/VTKHDF/PointData/alive"), 3 * 8);
   EXPECT_EQ(stored_rows(script.index, "/clusters/number"), 2 + 3);
+}
+
+// Where the rows of a field lie, as docs/reference/recording.md says; nothing for what stands in columns.
+std::optional<std::pair<std::string, std::string>> table_of(const RecordedField& recorded,
+                                                            const RecordingPaths& files) {
+  if (recorded.storage == Storage::cells) return {{files.skin, "/VTKHDF/Polygons/Connectivity"}};
+  if (recorded.storage != Storage::rows) return std::nullopt;
+  const IndexSpace space = recorded.field.space;
+  if (space != IndexSpace::particle && space != IndexSpace::vertex)
+    return {{files.index, "/clusters/" + recorded.name()}};
+  const std::string place = recorded.is_points() ? "/VTKHDF/Points" : "/VTKHDF/PointData/" + recorded.name();
+  return {{space == IndexSpace::particle ? files.particles : files.skin, place}};
+}
+
+// Each field in turn has one bit of one entry changed, and back again: the lowest and the highest bit of each number of
+// the first and of the last entry. Whatever is compared by size, by ==, in part, or under another field's name, shows.
+TEST_F(RecordingTest, GivesBackEachFieldThatChangedAloneAndStoresNoOtherAnew) {
+  const Setup setup = block_setup(3, 2, 2);
+  State base = rest_state(setup);
+  for (std::size_t i = 0; i < base.v.size(); ++i) base.v[i] = {0.1, -0.2, 0.3 * static_cast<double>(i)};
+  base.removed = {1, 4};
+  base.debris = {5, 7, 9};
+  base.skin = some_skin(base, 3);
+  base.impulse = {1, 2, 3};
+
+  std::vector<Snapshot> snapshots = {{Stage::skin, base}};
+  const auto add = [&](const State& changed) {
+    snapshots.push_back({Stage::skin, changed});
+    snapshots.push_back({Stage::skin, base});
+  };
+  std::vector<int64_t> changes;  // [fields]
+  for_each_field([&](const Field& field, auto get) {
+    const std::size_t before = snapshots.size();
+    const auto change_entry = [&](std::size_t entry) {
+      State changed = base;
+      auto* const bytes = [&] {
+        if constexpr (requires { get(changed).data(); }) {
+          return reinterpret_cast<unsigned char*>(&get(changed)[entry]);
+        } else {
+          return reinterpret_cast<unsigned char*>(&get(changed));
+        }
+      }();
+      using T = std::remove_cvref_t<decltype(get(changed))>;
+      using Entry = typename std::conditional_t<is_vector<T>, T, std::vector<T>>::value_type;
+      const std::size_t numbers = [] {
+        std::size_t count = 1;
+        for (const hsize_t extent : hdf5::layout_of<Entry>().shape) count *= extent;
+        return count;
+      }();
+      const std::size_t width = sizeof(Entry) / numbers;
+      for (std::size_t number = 0; number < numbers; ++number) {
+        for (const bool highest : {false, true}) {
+          if (highest && std::is_same_v<Entry, bool>) continue;
+          unsigned char& byte = bytes[number * width + (highest ? width - 1 : 0)];
+          const unsigned char bit = highest ? 0x80 : 0x01;
+          byte ^= bit;
+          add(changed);
+          byte ^= bit;
+        }
+      }
+    };
+    if constexpr (requires { get(base).size(); }) {
+      ASSERT_FALSE(get(base).empty()) << field.name << ": there is nothing to change";
+      change_entry(0);
+      change_entry(get(base).size() - 1);
+    } else {
+      change_entry(0);
+    }
+    changes.push_back(static_cast<int64_t>(snapshots.size() - before) / 2);
+  });
+  ASSERT_EQ(changes.size(), recorded_fields().size());
+
+  write("run", setup, snapshots);
+  const RecordingReader reader(path("run"));
+  ASSERT_EQ(reader.header().snapshot_count, static_cast<int64_t>(snapshots.size()));
+  for (std::size_t i = 0; i < snapshots.size(); ++i) {
+    const Snapshot read = reader.snapshot(static_cast<int64_t>(i));
+    for_each_field([&](const Field& field, auto get) {
+      EXPECT_TRUE(same_bits(get(read.state), get(snapshots[i].state))) << field.name << " of snapshot " << i;
+    });
+    ASSERT_FALSE(HasFailure());
+    if (i % 2 == 1) {
+      ASSERT_NE(parts_that_differ(base, read.state), 0u) << "snapshot " << i;
+    }
+  }
+
+  // A change and the way back are two blocks more, of this field alone; of vertices all that is not a position and the
+  // triangles belong to a mesh, which is written as a whole.
+  const auto of_mesh = [](const RecordedField& recorded) {
+    const IndexSpace space = recorded.field.space;
+    return space == IndexSpace::triangle || (space == IndexSpace::vertex && !recorded.is_points());
+  };
+  int64_t meshes = 1;
+  for (std::size_t k = 0; k < changes.size(); ++k) meshes += of_mesh(recorded_fields()[k]) ? 2 * changes[k] : 0;
+  std::size_t tables = 0;
+  for (std::size_t k = 0; k < changes.size(); ++k) {
+    const RecordedField& recorded = recorded_fields()[k];
+    const auto table = table_of(recorded, recording_paths(path("run")));
+    if (!table) continue;
+    ++tables;
+    const bool on_skin = of_mesh(recorded) || recorded.field.space == IndexSpace::vertex;
+    const int64_t blocks = (on_skin ? meshes : 1) + (of_mesh(recorded) ? 0 : 2 * changes[k]);
+    const int64_t rows = count_of(recorded.field.space, base) * (recorded.storage == Storage::cells ? 3 : 1);
+    EXPECT_EQ(stored_rows(table->first, table->second), blocks * rows) << recorded.name();
+  }
+  EXPECT_GE(tables, 14u);
+}
+
+// Lists of a length of their own: longer by one, and empty.
+TEST_F(RecordingTest, GivesBackListsThatChangeTheirLengthAlone) {
+  const Setup setup = block_setup(2, 2, 2);
+  State base = rest_state(setup);
+  base.removed = {1, 4};
+  base.debris = {5, 7};
+  std::vector<Snapshot> snapshots = {{Stage::split, base}};
+  for_each_field([&](const Field& field, auto get) {
+    if constexpr (requires { get(base).size(); }) {
+      if (field.space != IndexSpace::state) return;
+      for (const bool longer : {true, false}) {
+        State changed = base;
+        auto& list = get(changed);
+        longer ? list.push_back(list.back()) : list.clear();
+        snapshots.push_back({Stage::split, changed});
+        snapshots.push_back({Stage::split, base});
+      }
+    }
+  });
+  ASSERT_EQ(snapshots.size(), 9u);
+  write("run", setup, snapshots);
+  const RecordingReader reader(path("run"));
+  for (std::size_t i = 0; i < snapshots.size(); ++i) {
+    EXPECT_TRUE(bits_of(reader.snapshot(static_cast<int64_t>(i))) == bits_of(snapshots[i])) << "snapshot " << i;
+  }
+}
+
+// Particles, clusters, members, vertices and triangles beyond what 16 bits can number, each table in many chunks; and
+// what changes lies beyond them too.
+TEST_F(RecordingTest, HoldsMoreThan65536OfEverything) {
+  constexpr int64_t kMany = 65536;
+  const Setup setup = block_setup(41, 41, 40);
+  State state = rest_state(setup);
+  const int32_t n = setup.body.particle_count();
+  ASSERT_GT(n, kMany);
+  state.clusters = {};
+  Clusters& clusters = state.clusters;
+  for (int32_t i = 0; i < n; ++i) {
+    clusters.members.push_back(i);
+    clusters.number.push_back(i);
+    clusters.offsets.push_back(i + 1);
+    clusters.rest_center.push_back(setup.body.rest_position(i));
+    clusters.mass.push_back(1 + 1e-3 * i);
+    clusters.degenerate.push_back(static_cast<uint8_t>(i % 2));
+    clusters.rotation.push_back({});
+    clusters.rotation.back().m[5] = 1e-6 * i;
+  }
+  state.skin = some_skin(state, n);
+  for (const IndexSpace space : {IndexSpace::particle, IndexSpace::cluster, IndexSpace::cluster_end, IndexSpace::member,
+                                 IndexSpace::vertex, IndexSpace::triangle}) {
+    ASSERT_GT(count_of(space, state), kMany);
+  }
+  std::vector<Snapshot> snapshots = {{Stage::skin, state}};
+  state.removed = {1, 65535, 65536, n - 1};
+  for (const int32_t i : state.removed) state.alive[static_cast<std::size_t>(i)] = 0;
+  state.x[kMany].y += 1;
+  state.v.back().z = 1;
+  clusters.mass[kMany] = -0.0;
+  clusters.members.back() = 65536;
+  state.skin.triangles.back()[2] = 65537;
+  state.skin.owner[kMany + 1] = 65536;
+  snapshots.push_back({Stage::detect, state});
+  write("run", setup, snapshots);
+
+  const RecordingReader reader(path("run"));
+  EXPECT_TRUE(bits_of(reader.header().setup) == bits_of(setup));
+  for (std::size_t i = 0; i < snapshots.size(); ++i) {
+    const Snapshot read = reader.snapshot(static_cast<int64_t>(i));
+    for_each_field([&](const Field& field, auto get) {
+      EXPECT_TRUE(same_bits(get(read.state), get(snapshots[i].state))) << field.name << " of snapshot " << i;
+    });
+  }
+  // What stands in ParaView's file beside the fields: the number of the first cluster of each particle.
+  EXPECT_EQ(stored_rows(recording_paths(path("run")).particles, "/VTKHDF/PointData/cluster"), 2 * int64_t{n});
 }
 
 TEST_F(RecordingTest, OfTheSameRunHasTheSameBytes) {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -13,6 +15,7 @@
 #include "model/io/atomic_file.h"
 #include "model/io/scene_fields.h"
 #include "model/rules.h"
+#include "model/setup_fields.h"
 
 namespace cutproof::io {
 namespace {
@@ -176,6 +179,175 @@ TEST(SceneIo, EveryFieldThatIsWrittenIsReadAgainAlone) {
       less[group].erase(name);
       EXPECT_NE(write_scene(parse_scene(less.dump(), "scene.json")), whole) << group << "." << name;
     }
+  }
+}
+
+// The next greater value of its kind; of a choice the next one.
+template <class T>
+void change_slightly(T& value) {
+  if constexpr (std::is_same_v<T, bool>) {
+    value = !value;
+  } else if constexpr (std::is_enum_v<T>) {
+    value = static_cast<T>((static_cast<std::size_t>(value) + 1) % names_of(value).size());
+  } else if constexpr (std::is_integral_v<T>) {
+    value += 1;
+  } else {
+    value = std::nextafter(value, 1e300);
+  }
+}
+
+// What a scene says of each stage goes into the setup as it is, so each such field of a setup must come back.
+TEST(SceneIo, EachFieldOfASetupsStagesComesBackChangedAlone) {
+  const auto from_scene = [](const Scene& scene) {
+    cutproof::Setup setup;
+    setup.step = scene.step;
+    setup.detect = scene.detect;
+    setup.split = scene.split;
+    setup.merge = scene.merge;
+    setup.expand = scene.expand;
+    setup.skin = scene.skin;
+    return setup;
+  };
+  const auto round_trip = [&](const cutproof::Setup& setup) {
+    Scene scene = parse_scene(kSmallest, "scene.json");
+    scene.step = setup.step;
+    scene.detect = setup.detect;
+    scene.split = setup.split;
+    scene.merge = setup.merge;
+    scene.expand = setup.expand;
+    scene.skin = setup.skin;
+    return from_scene(parse_scene(write_scene(scene), "scene.json"));
+  };
+  const cutproof::Setup base = from_scene(parse_scene(kSmallest, "scene.json"));
+  int changes = 0;
+  for_each_setup_field([&](const SetupField& field, auto get) {
+    const auto groups = {"step", "detect", "split", "merge", "expand", "skin"};
+    if (std::find(groups.begin(), groups.end(), field.group) == groups.end()) return;
+    using T = std::remove_cvref_t<decltype(get(base))>;
+    const auto comes_back = [&](const auto& change) {
+      SCOPED_TRACE(std::string(field.group) + "." + std::string(field.name));
+      cutproof::Setup changed = base;
+      change(get(changed));
+      const cutproof::Setup found = round_trip(changed);
+      EXPECT_FALSE(get(found) == get(base));
+      for_each_setup_field([&](const SetupField& other, auto of) {
+        EXPECT_TRUE(of(found) == of(changed)) << other.group << "." << other.name;
+      });
+      ++changes;
+    };
+    if constexpr (std::is_same_v<T, Vec3>) {
+      for (int axis = 0; axis < 3; ++axis) comes_back([&](Vec3& value) { change_slightly(value[axis]); });
+    } else if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>) {
+      comes_back([](T& value) { change_slightly(value); });
+    } else {
+      ADD_FAILURE() << field.group << "." << field.name << " is of a kind that this test does not change";
+    }
+  });
+  EXPECT_GE(changes, 20);
+}
+
+// Changes the n-th value that a scene has, as little as its bounds allow, and none if there are fewer.
+class ChangeOne {
+ public:
+  explicit ChangeOne(int n) : left_(n) {}
+  std::string changed;  // the name of the field
+
+  template <class T>
+  void field(T& value, const SceneField& f) {
+    change(f, value);
+  }
+  bool applies(bool condition) const { return condition; }
+
+ private:
+  bool is_this_one(const SceneField& f) {
+    if (left_-- != 0) return false;
+    changed = f.name;
+    return true;
+  }
+  // What is written alone must be allowed alone.
+  static bool is_bound_to_others(const SceneField& f) { return f.name == "version" || f.name == "solver"; }
+
+  template <class T>
+  requires(std::is_arithmetic_v<T> && !std::is_same_v<T, bool>) void change(const SceneField& f, T& value) {
+    if (is_bound_to_others(f) || (f.presence == kZeroIsAbsent && value == 0) || !is_this_one(f)) return;
+    if (f.name == "side" && f.bounds.low == -1) {
+      value = -value;
+    } else if constexpr (std::is_floating_point_v<T>) {
+      const T up = std::nextafter(value, T(1e300));
+      value = f.bounds.contains(up) ? up : std::nextafter(value, T(-1e300));
+    } else {
+      value = f.bounds.contains(static_cast<double>(value) + 1) ? value + 1 : value - 1;
+    }
+  }
+  void change(const SceneField& f, bool& value) {
+    if (is_this_one(f)) value = !value;
+  }
+  void change(const SceneField& f, std::string& value) {
+    if (is_this_one(f)) value += "\t2";
+  }
+  void change(const SceneField& f, Vec3& value) {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (is_this_one(f)) value[axis] = std::nextafter(value[axis], -1e300);
+    }
+  }
+  void change(const SceneField& f, Range& value) {
+    if (is_this_one(f)) value.low = std::nextafter(value.low, -1e300);
+    if (is_this_one(f)) value.high = std::isinf(value.high) ? value.low + 1 : std::nextafter(value.high, 1e300);
+  }
+  template <class E>
+  requires(std::is_enum_v<E>) void change(const SceneField& f, E& value) {
+    if constexpr (std::is_same_v<E, Shape::Kind> || std::is_same_v<E, Curve>) return;  // they ask for other fields
+    if (is_bound_to_others(f) || !is_this_one(f)) return;
+    value = static_cast<E>((static_cast<std::size_t>(value) + 1) % names_of(value).size());
+  }
+  template <class T>
+  void change(const SceneField& f, std::optional<T>& value) {
+    if (value) change(f, *value);
+  }
+  template <class T>
+  void change(const SceneField& f, std::vector<T>& value) {
+    for (T& entry : value) change(f, entry);
+  }
+  template <class T>
+  requires(std::is_class_v<T>) void change(const SceneField&, T& value) { describe(*this, value); }
+
+  int left_;
+};
+
+TEST(SceneIo, EachValueComesBackChangedAlone) {
+  // With a mesh and without; with the path of a blade that is an arc; and with the solver that can be accelerated.
+  Scene shaped = scrambled(), meshed = scrambled();
+  shaped.step.solver = meshed.step.solver = Solver::implicit;
+  meshed.body.shape.reset();
+  meshed.body.mesh = {"organ.stl", 1e-3};
+  meshed.body.spacing = 0;
+  meshed.body.particles = 1000;
+  meshed.blade->strokes[0].curve = Curve::arc;
+  meshed.blade->strokes[0].points = {{0, 0, 0}, {0.5, 0.25, 0}, {1, 0, 0}};
+  for (const Scene& base : {shaped, meshed}) {
+    ASSERT_EQ(parse_scene(write_scene(base), "scene.json"), base);
+    int changes = 0;
+    for (;; ++changes) {
+      Scene changed = base;
+      ChangeOne one(changes);
+      describe(one, changed);
+      if (one.changed.empty()) break;
+      SCOPED_TRACE(one.changed + ", value " + std::to_string(changes));
+      ASSERT_FALSE(changed == base);
+      EXPECT_EQ(parse_scene(write_scene(changed), "scene.json"), changed);
+    }
+    EXPECT_GE(changes, 100);
+  }
+}
+
+// One number, from one number on, up to one, and between two: zero is a number as any other.
+TEST(SceneIo, RangesKeepBothTheirEnds) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Scene scene = parse_scene(kSmallest, "scene.json");
+  for (const Range range :
+       {Range{0, 0}, {0, 5}, {0, kInfinity}, {3, 3}, {3, kInfinity}, {-kInfinity, 5}, {-kInfinity, 0}}) {
+    scene.expect.removed = scene.expect.cluster_growth = range;
+    EXPECT_EQ(parse_scene(write_scene(scene), "scene.json"), scene) << range.low << " to " << range.high;
   }
 }
 

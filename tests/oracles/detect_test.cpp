@@ -100,13 +100,33 @@ TEST(Detection, RejectsRemovalWhereNothingIsEverRemoved) {
   }
 }
 
-TEST(Detection, OfStrainChecksTheListOnly) {
-  Pair pair = pulled(1);
+// The row is one cluster, whose stretch along x is known: Σ r x / Σ r² with r = -1.5, -0.5, 0.5, 1.5.
+TEST(Detection, ByStrainTakesWholeClustersThatAreStretchedTooMuch) {
+  Pair pair = pulled(1.5);  // the last particle by 0.5: 1 + 0.5 · 1.5 / 5 = 1.15
   pair.setup.detect.criterion = Criterion::strain;
-  remove_particles(pair.after, {0});
+  pair.setup.detect.strain = 1.15 * (1 + 1e-9);
   expect_holds(detection(pair.setup, pair.before, pair.after));
+  pair.after.removed = {0};
+  expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {0});  // nothing died
   pair.after.removed = {};
-  expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {0});
+  remove_particles(pair.after, {0, 1, 2, 3});
+  expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {0, 1});
+
+  pair.setup.detect.strain = 1.15 * (1 - 1e-9);
+  expect_holds(detection(pair.setup, pair.before, pair.after));
+  pair.after = pair.before;
+  remove_particles(pair.after, {0, 1, 2});
+  expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {3, 2});
+  pair.after = pair.before;
+  expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {0, 1});
+
+  // Within rounding both answers are right, in single precision within more of it.
+  pair.setup.detect.strain = 1.15;
+  expect_holds(detection(pair.setup, pair.before, pair.after));
+  pair.setup.detect.strain = 1.15 * (1 - 1e-6);
+  EXPECT_FALSE(detection(pair.setup, pair.before, pair.after).holds);
+  pair.before.precision = Precision::binary32;
+  expect_holds(detection(pair.setup, pair.before, pair.after));
 }
 
 // A 5 × 1 × 5 sheet in the plane y = 1, x and z from 1 to 5, and a blade that comes down at x = `place`, its edge

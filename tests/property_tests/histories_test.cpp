@@ -4,10 +4,20 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
+#include <memory>
 #include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
 
 #include "gpu/backends.h"
+#include "gpu/host/thread_schedule.h"
+#include "gpu/launch/load.h"
+#include "model/error.h"
+#include "model/fields.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::property_tests {
@@ -15,9 +25,10 @@ namespace {
 
 // The reference, and what goes wrong in it. Nothing of it is an error of a single stage.
 struct Faults {
-  std::function<void(State&)> on_load;                     // what a load makes of a state
-  std::function<void(State&)> on_snapshot;                 // what is shown of it
-  std::function<void(Span, int loads, State&)> after_run;  // loads: how often this backend has been loaded
+  std::function<void(State&)> on_load = {};                     // what a load makes of a state
+  std::function<void(State&)> on_snapshot = {};                 // what is shown of it
+  std::function<void(Span, int loads, State&)> after_run = {};  // loads: how often this backend has been loaded
+  std::function<void(std::vector<State>&)> on_snapshots = {};   // the same of all bodies of a load
 };
 
 class Faulty final : public Backend {
@@ -42,6 +53,7 @@ class Faulty final : public Backend {
   std::vector<State> snapshot() const override {
     std::vector<State> states = inner_->snapshot();
     for (std::size_t b = 0; b < states.size() && faults_.on_snapshot; ++b) faults_.on_snapshot(states[b]);
+    if (faults_.on_snapshots) faults_.on_snapshots(states);
     return states;
   }
   SpanReport report() const override { return report_; }
@@ -67,8 +79,12 @@ const Command kFrame = RunStages{6, false};
 const Command kToSplit = RunStages{2, false};  // step and detect
 
 std::string failed_property(const Faults& faults, const std::vector<Command>& commands) {
-  const History history = history_of([faults] { return std::make_unique<Faulty>(faults); }, wire(), commands);
-  return history.failure() ? history.failure()->property : "";
+  try {
+    const History history = history_of([faults] { return std::make_unique<Faulty>(faults); }, wire(), commands);
+    return history.failure() ? history.failure()->property : "";
+  } catch (const std::invalid_argument& error) {  // what it has come to cannot be loaded
+    return error.what();
+  }
 }
 
 TEST(Histories, HoldOnTheReferenceAndOnKernels) {
@@ -126,6 +142,143 @@ TEST(Histories, RejectASnapshotThatChangesSomething) {
   const auto calls = std::make_shared<int>(0);
   const Faults wears = {{}, [calls](State& state) { state.cap += ++*calls > 2; }, {}};
   EXPECT_EQ(failed_property(wears, {SaveAndLoad{}}), "a snapshot changes nothing");
+}
+
+// One bit of the first entry, or of the last; or an entry where there is none.
+template <class T>
+void change_a_bit(T& value, bool last = false) {
+  if constexpr (requires { value.emplace_back(); }) {
+    if (value.empty()) {
+      value.emplace_back();
+    } else {
+      change_a_bit(last ? value.back() : value.front());
+    }
+  } else if constexpr (std::is_same_v<T, bool>) {
+    value = !value;
+  } else {
+    static_assert(std::is_trivially_copyable_v<T>);
+    *reinterpret_cast<unsigned char*>(&value) ^= 1;
+  }
+}
+
+template <class Visit>
+void for_each_field_by_index(Visit&& visit) {
+  std::size_t index = 0;
+  for_each_field([&](const Field& field, auto) { visit(field, index++); });
+}
+void change_field(State& state, std::size_t index, bool last = false) {
+  std::size_t k = 0;
+  for_each_field([&](const Field&, auto get) {
+    if (k++ == index) change_a_bit(get(state), last);
+  });
+}
+
+// Whatever a backend shows, of whichever field, is compared with what it showed before, with what another one shows, or
+// with what was recorded. Stage by stage, or nobody looks at every snapshot.
+TEST(Histories, SeeEachFieldOfEachSnapshotChangedAlone) {
+  std::vector<Command> commands;
+  for (int stage = 0; stage < 9; ++stage) {
+    commands.push_back(RunStages{1, stage % 2 == 0});
+    if (stage == 1 || stage == 6) commands.push_back(SaveAndLoad{stage == 6});
+  }
+  const auto snapshots = std::make_shared<int>(0);
+  EXPECT_EQ(failed_property({{}, [snapshots](State&) { ++*snapshots; }, {}, {}}, commands), "");
+  const int count = std::exchange(*snapshots, 0);
+  ASSERT_GT(count, 20);
+  for (int changed = 1; changed <= count; ++changed) {
+    for_each_field_by_index([&](const Field& field, std::size_t index) {
+      *snapshots = 0;
+      const Faults fault = {{},
+                            [=](State& state) {
+                              if (++*snapshots == changed) change_field(state, index);
+                            },
+                            {},
+                            {}};
+      EXPECT_NE(failed_property(fault, commands), "") << field.name << ", snapshot " << changed << " of " << count;
+    });
+  }
+}
+
+// The first frame cuts the wire in two. Where the second part is kicked, the first entry of everything belongs to the
+// other one; where the first is, the last one does. The impulse is a sum over both.
+TEST(Histories, SeeAGhostForceInEachField) {
+  for_each_field_by_index([&](const Field& field, std::size_t index) {
+    for (const bool last : {false, true}) {
+      if (last && field.space == IndexSpace::state) continue;  // these have no entries that are of a part
+      const Faults ghost = {{}, {}, {}, [=](std::vector<State>& states) {
+                              if (states.size() == 2) change_field(states[1], index, last);
+                            }};
+      EXPECT_EQ(failed_property(ghost, {kFrame, Kick{last ? 0 : 1, {4, 0, 0}}}),
+                field.quantity == Quantity::momentum ? "" : "no ghost force")
+          << field.name << (last ? ", last entry" : "");
+    }
+  });
+}
+
+// What is kicked may be removed, turn and move: none of that is a ghost.
+TEST(Histories, LetAKickDoWhatItDoesToItsOwnComponent) {
+  const Faults own = {{}, {}, {}, [](std::vector<State>& states) {
+                        if (states.size() != 2) return;
+                        State& pushed = states[1];
+                        pushed.x.back().z += 1;
+                        pushed.v.back().z += 1;
+                        pushed.alive.back() = 0;
+                        pushed.removed.push_back(static_cast<int32_t>(pushed.x.size()) - 1);
+                        pushed.clusters.rotation.back() = {{0, -1, 0, 1, 0, 0, 0, 0, 1}};
+                        pushed.clusters.degenerate.back() = 1;
+                        pushed.impulse.x += 1;
+                      }};
+  EXPECT_EQ(failed_property(own, {kFrame, Kick{1, {4, 0, 0}}}), "");
+}
+
+// Kernels that begin with room for nothing but what was loaded, on a block in clusters of 27 particles that is cut in
+// two. Room doubles before a span: by stages six times a frame, by whole frames once; so the two backends of a history
+// grow apart, and what they make of the block must not.
+TEST(Histories, HoldInRoomsThatGrowAgainAndAgain) {
+  constexpr double kTiny = 1.0 / 1024;
+  Case block;
+  for (int32_t z = 0; z < 4; ++z) {
+    for (int32_t y = 0; y < 5; ++y) {
+      for (int32_t x = 0; x < 6; ++x) block.nodes.push_back({x, y, z});
+    }
+  }
+  std::sort(block.nodes.begin(), block.nodes.end());
+  block.side = 1;
+  constexpr int32_t kPauses = 12;
+  const Stroke pause{{0, 0, 0}, {0, 0, 0}, 4, false, Link::apart};
+  for (const int32_t x : {10, 4}) {
+    block.strokes.insert(block.strokes.end(), kPauses, pause);
+    block.strokes.push_back({{x, -20, -20}, {x, 20, -20}, 4, true, Link::apart});
+  }
+
+  gpu::KernelOptions tiny;
+  tiny.capacity.factor = kTiny;
+  // Each load begins in the tiny room again.
+  const int32_t to_the_cut = 6 * (kPauses + 1);
+  const std::vector<Command> commands = {RunStages{to_the_cut, true}, SaveAndLoad{false}, RunStages{to_the_cut, false}};
+  const auto holds = [&](const History::Source& make) {
+    const History history = history_of(make, block, commands);
+    EXPECT_FALSE(history.failure()) << describe(*history.failure());
+    HistoryCoverage seen = history.coverage();
+    EXPECT_GT(seen["cut in one span"], 0);
+  };
+  holds([&] { return gpu::make_host_backend(1, tiny); });
+  holds([&] { return gpu::make_simulated_backend({.schedule = gpu::random_walk(1)}, tiny); });
+  // As often as it takes, and what was loaded alone is not enough for the cut: so the room above did grow.
+  const Instance loaded = instance_of(block);
+  gpu::Load load({loaded.setup}, {loaded.state}, tiny, tiny.capacity);
+  for (double factor = 2 * kTiny; factor <= 1; factor *= 2) {
+    const gpu::Extents before = load.staging;
+    load = load.enlarged(load.states_of({true}), tiny);
+    EXPECT_EQ(load.capacity.factor, factor);
+    EXPECT_GE(load.staging.member_capacity, before.member_capacity);
+  }
+  EXPECT_EQ(load.staging.member_capacity, gpu::Load({loaded.setup}, {loaded.state}, {}, {}).staging.member_capacity);
+  const auto hasty = gpu::make_host_backend(1, tiny);
+  State at_the_cut = loaded.state;
+  at_the_cut.frame = kPauses;
+  hasty->load({loaded.setup}, {at_the_cut});
+  EXPECT_THROW(hasty->run({Stage::step, Stage::skin}), MachineError);
 }
 
 TEST(Histories, ComeBackFromJsonAsTheyWere) {

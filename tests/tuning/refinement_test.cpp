@@ -1,11 +1,15 @@
 // The reference solution against solutions that owe nothing to it: a parabola, and a sparse factorisation.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
+#include <vector>
 
 #include "model/io/scene_io.h"
 #include "oracles/comparison/reference_solution.h"
 #include "oracles/relations/relations.h"
+#include "reference_cpu/reference.h"
 #include "tuning/prepared_scene.h"
 #include "tuning/reference_solution.h"
 
@@ -47,6 +51,41 @@ TEST(ReferenceSolution, IsRefinedUntilItIsKnown) {
   EXPECT_TRUE(fine.nothing_removed());
 }
 
+// A block is pulled aside by its end and comes to rest again, where every solution is the same: in the end nothing is
+// seen any more of how far they were apart.
+TEST(ReferenceSolution, IsKnownToTheGreatestDistanceOfAnyFrame) {
+  Scene scene = scene_of(R"({"version": 1, "name": "pulled",
+    "body": {"shape": {"kind": "box", "size": [0.08, 0.03, 0.03]}, "spacing": 0.01}, "clusters": {"side": 2},
+    "frame": {"length": 0.016, "count": 40}, "step": {"substeps": 1, "stiffness": 3e5, "damping": 40},
+    "grips": [{"low": [0, 0, 0], "high": [0.2, 1, 1], "end": 0.064, "velocity": [0, 0, 0.3]},
+              {"low": [0, 0, 0], "high": [0.2, 1, 1], "start": 0.064}]})");
+  const ReferenceSolution solution(ReferenceKind::substeps, scene, "test", {}, 1);
+  ASSERT_EQ(solution.levels().size(), 2u);
+  std::vector<std::vector<std::vector<Vec3>>> runs;  // of each level, frame by frame
+  for (const RefinementLevel& level : solution.levels()) {
+    scene.step.iterations = level.iterations;
+    const PreparedScene prepared(scene, "test", {});
+    const std::unique_ptr<Backend> backend = reference::make_backend();
+    prepared.run(*backend, [&, frames = &runs.emplace_back()](double) {
+      frames->push_back(backend->snapshot().front().x);
+      return true;
+    });
+  }
+  std::vector<double> apart;
+  for (std::size_t f = 0; f < runs[0].size(); ++f) {
+    double squares = 0;
+    for (std::size_t i = 0; i < runs[0][f].size(); ++i) {
+      const Vec3 d = runs[0][f][i] - runs[1][f][i];
+      squares += dot(d, d);
+    }
+    apart.push_back(std::sqrt(squares / static_cast<double>(runs[0][f].size())) / 0.01);
+  }
+  const auto greatest = std::max_element(apart.begin(), apart.end());
+  ASSERT_GT(*greatest, 1e-3);
+  ASSERT_LT(apart.back(), *greatest / 10) << "the error does not peak in the middle, so this shows nothing";
+  EXPECT_NEAR(solution.known_to_h(), *greatest, 1e-9 * *greatest);
+}
+
 // Each substep solved exactly, one after the other, by Cholesky factorisation.
 TEST(ReferenceSolution, OfItsOwnSubstepsIsWhatASparseFactorisationFinds) {
   const Scene scene = scene_of(R"({"version": 1, "name": "hanging",
@@ -76,6 +115,52 @@ TEST(ReferenceSolution, OfItsOwnSubstepsIsWhatASparseFactorisationFinds) {
     moved = std::max(moved, oracles::poses_apart(prepared.setup(), pose, rest).position.max);
   }
   EXPECT_GT(moved, 0.05) << "it hangs from a grip: it has to move, else nothing is compared";
+}
+
+// A blade so fast that its frames are divided: those of the scene are counted all the same, and each part runs once.
+TEST(PreparedScene, CountsFramesOfTheSceneWhereTheyAreDivided) {
+  const Scene scene = scene_of(R"({"version": 1, "name": "cut",
+    "body": {"shape": {"kind": "box", "size": [0.05, 0.03, 0.03]}, "spacing": 0.01}, "clusters": {"side": 2},
+    "frame": {"length": 0.016, "settle": 0.04}, "step": {"substeps": 1}, "detect": {"criterion": "distance"},
+    "blade": {"speed": 2, "start": 0.03, "strokes": [
+      {"points": [[0.3, 0.5, 1.5], [0.3, 0.5, -0.5]], "along": [0, 1, 0], "pause": 0.02},
+      {"points": [[0.7, 0.5, 1.5], [0.7, 0.5, -0.5]], "along": [0, 1, 0]}]}})");
+  const PreparedScene prepared(scene, "test", {});
+  const cutproof::Setup& setup = prepared.setup();
+  int64_t parts = 0;
+  double time = 0;
+  std::vector<int64_t> expected(setup.stroke_end.size(), -1);
+  for (int64_t frame = 0; frame < prepared.frame_count(); ++frame) {
+    double length = 0;
+    prepared.for_parts_of(frame, [&] {
+      for (std::size_t s = 0; s < expected.size(); ++s) {
+        if (setup.stroke_end[s] == parts) expected[s] = frame;
+      }
+      length += setup.substep_length.at(static_cast<std::size_t>(parts++));
+    });
+    EXPECT_NEAR(length, 0.016, 1e-12) << frame;
+    time += length;
+  }
+  EXPECT_EQ(parts, setup.frame_count());
+  EXPECT_GT(parts, prepared.frame_count()) << "no frame is divided, so this shows nothing";
+  ASSERT_EQ(expected.size(), 2u);
+  EXPECT_GE(expected[0], 2);
+  EXPECT_GT(expected[1], expected[0]);
+  EXPECT_LT(expected[1], prepared.frame_count() - 1);
+  EXPECT_EQ(prepared.stroke_end(), expected);
+
+  // Seconds add up, each frame of the scene is seen once, and a run ends where nobody wants to see more.
+  const std::unique_ptr<Backend> backend = reference::make_backend();
+  int64_t seen = 0;
+  double before = 0;
+  prepared.run(*backend, [&](double seconds) {
+    EXPECT_GT(seconds, before);
+    before = seconds;
+    return ++seen < 3;
+  });
+  EXPECT_EQ(seen, 3);
+  const std::vector<int64_t> ends = PreparedScene(scene, "test", 3).stroke_end();
+  EXPECT_EQ(ends, (std::vector<int64_t>{expected[0] < 3 ? expected[0] : -1, -1}));
 }
 
 Trajectory trajectory(std::vector<int32_t> components, std::vector<int64_t> stroke_end) {
