@@ -11,9 +11,9 @@ std::optional<Depth> depth_named(std::string_view name) {
   return std::nullopt;
 }
 
-oracles::PropertyLists properties_of(Depth) {
-  // No list is of the motion alone yet: linear momentum, component momentum and motion cost as little as the rest.
-  return oracles::properties();
+oracles::PropertyLists properties_of(Depth depth) {
+  if (depth == Depth::motion) return oracles::properties();
+  return {&oracles::core_properties(), &oracles::surface_properties()};
 }
 
 }  // namespace cutproof::harness

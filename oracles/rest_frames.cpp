@@ -1,42 +1,40 @@
 // Rest centers and masses of clusters (method.md §5).
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <limits>
+#include <cmath>
 
 #include "oracles/checks.h"
+#include "oracles/rounding.h"
 #include "oracles/shape_sums.h"
 
 namespace cutproof::oracles {
 
-// Bound. A sum of k products of positive weights and coordinates, in any order, is off by at most (k + 2) u Σ w |X|
-// per axis to first order in u (Higham 2002, §3.1: k - 1 additions, one product, and one division for w = m / n);
-// Σ w by (k + 1) u Σ w; the quotient adds one u. With |X| <= L: (2k + 4) u L per axis, twice that because both sides
-// round, √3 for three axes; 8 (k + 2) u L covers it. The mass obeys the same bound relative to itself, because L >= h.
+// Bounds: tolerances.md, Detection and rest frames. The mean is taken relative to a member, as single precision has to
+// (a sum of coordinates would lose their digits), or in double.
 void check_rest_frames(Judged& judged, Verdict& verdict) {
-  const double h = judged.body.grid.spacing;
+  const double h = judged.body.grid.spacing, u = unit_roundoff(judged.state) + kUnitRoundoff;
   // Dead members count too: between detect and split the frames are those of before.
   const WeightedRest weighted = weighted_rest(judged.body, judged.clusters);
-  double reach = h;
-  for (const Vec3 position : weighted.position) reach = std::max(reach, norm(position));
-  int64_t largest = 0;
-  int32_t worst = -1;
+  Nearest nearest;
   for (int32_t c = 0; c < judged.clusters.count(); ++c) {
-    if (judged.clusters.size(c) == 0) continue;  // coverage rejects it
+    const auto members = judged.clusters.of(c);
+    if (members.empty()) continue;  // coverage rejects it
     ++verdict.checked;
-    largest = std::max(largest, judged.clusters.size(c));
     const ClusterMeans means = cluster_means(weighted, judged.clusters, judged.state.x, c);
-    const double center_error = norm(judged.clusters.rest_center[at(c)] - means.rest) / h;
-    const double mass_error = std::abs(judged.clusters.mass[at(c)] - means.mass) / means.mass;
-    const bool finite_error = std::isfinite(center_error) && std::isfinite(mass_error);
-    const double error = finite_error ? std::max(center_error, mass_error) : std::numeric_limits<double>::max();
-    if (error >= verdict.measured) {
-      verdict.measured = error;
-      worst = c;
+    double arms = 0;  // Σ w |X − X of the first member|
+    for (const int32_t i : members) {
+      arms += weighted.weight[at(i)] * norm(weighted.position[at(i)] - weighted.position[at(members.front())]);
     }
+    const double sums = kDeviations * sum_rounds(static_cast<double>(members.size()));
+    const double by_sums = sums * (u * arms / means.mass + kUnitRoundoff * norm(means.rest));
+    nearest.see(norm(judged.clusters.rest_center[at(c)] - means.rest) / h, by_sums / h, c);
+    nearest.see(std::abs(judged.clusters.mass[at(c)] - means.mass) / means.mass, sums * u, c);
   }
-  verdict.bound = 8.0 * static_cast<double>(largest + 2) * unit_roundoff(judged.state) * reach / h;
-  if (verdict.measured <= verdict.bound) return;
+  if (nearest.where < 0) return;
+  verdict.measured = nearest.measured;
+  verdict.bound = nearest.bound;
+  const int32_t worst = nearest.where;
+  if (nearest.holds()) return;
   const Vec3 t = judged.clusters.rest_center[at(worst)];
   fail(verdict, {{judged.number(worst)}},
        "rest center ({}, {}, {}) m or mass {} kg of cluster {} is not the weighted sum over its {} particles; off by "

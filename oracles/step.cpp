@@ -7,6 +7,7 @@
 
 #include "oracles/checks.h"
 #include "oracles/pushes.h"
+#include "oracles/rounding.h"
 #include "oracles/shape_sums.h"
 #include "oracles/totals.h"
 
@@ -58,6 +59,22 @@ std::vector<Balance> balances_of(const StageRun& run, const Partition& parts) {
   return balances;
 }
 
+// The greatest number that arithmetic works on for a goal: what is stored of a place, and an arm of a cluster [m].
+double stored_extent(const Setup& setup, const State& state) {
+  double farthest = 0, arm = 0;
+  for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
+    if (state.alive[at(i)] != 0) {
+      farthest = std::max(farthest, norm(stored_place(setup.body, state.precision, i, state.x[at(i)])));
+    }
+  }
+  for (int32_t c = 0; c < state.clusters.count(); ++c) {
+    for (const int32_t i : state.clusters.of(c)) {
+      arm = std::max(arm, norm(setup.body.rest_position(i) - state.clusters.rest_center[at(c)]));
+    }
+  }
+  return farthest + arm;
+}
+
 // How far rounding may put the momentum off (tolerances.md, Linear momentum). Rounding errors of one sum are taken as
 // independent (Higham and Mary 2019): λ √n instead of n, wrong with probability 2 exp(−λ² / 2) < 3e-14. Errors that
 // stay the same from one iteration to the next (of T_c and M_c) are not: they count linearly.
@@ -67,12 +84,12 @@ class MomentumRounding {
       : step_(run.setup.step),
         scale_(rounding_scale(run.setup, run.before)),
         u_(unit_roundoff(run.after)),
-        length_(u_ * std::max(scale_.extent, rounding_scale(run.setup, run.after).extent)),
+        length_(u_ * std::max(stored_extent(run.setup, run.before), stored_extent(run.setup, run.after)) +
+                kUnitRoundoff * std::max(scale_.extent, rounding_scale(run.setup, run.after).extent)),
         dt_(run.setup.substep_length[at(run.before.frame)]) {}
 
   // `impulse`: what contacts, pins and grips have given, in all.
   double bound(const Balance& balance, double impulse) const {
-    constexpr double kLambda = 8;
     const double magnitude =
         static_cast<double>(balance.before.speed) + static_cast<double>(balance.after.speed) + balance.gained + impulse;
     const double goal =
@@ -80,7 +97,7 @@ class MomentumRounding {
         std::sqrt(scale_.most_memberships + 16.0) * std::sqrt(balance.squared_particles);
     const double evaluations = step_.substeps * (step_.iterations + 1.0) * error_growth(step_);
     const double sums = std::sqrt(static_cast<double>(balance.particles) * evaluations) + 16 * step_.substeps;
-    return kLambda * (evaluations * goal * length_ / dt_ + sums * u_ * magnitude);
+    return kDeviations * (evaluations * goal * length_ / dt_ + sums * u_ * magnitude);
   }
 
  private:

@@ -10,6 +10,7 @@
 #include "oracles/best_rotation.h"
 #include "oracles/eigen.h"
 #include "oracles/memberships.h"
+#include "oracles/rounding.h"
 #include "oracles/shape_sums.h"
 #include "oracles/step_model/contact_model.h"
 #include "oracles/step_model/noise.h"
@@ -21,8 +22,6 @@ namespace {
 constexpr double kRotationRounds = 4;   // a rotation, about each axis, given its matrix
 constexpr double kParameterRounds = 4;  // what is made of parameters once: s, e^(-c dt), Chebyshev's weights
 constexpr double kContactRounds = 4;    // ways into the blade's frame and back
-// A sum of N terms: products and partial sums.
-double sum_rounds(double terms) { return 2 + std::sqrt(terms) / 2; }
 
 Vec3 turned_by(Vec3 rotation_vector, Vec3 v) { return v + cross(rotation_vector, v); }
 
@@ -153,7 +152,7 @@ class StepModel::Run {
  private:
   // The number that a backend stores of a place of particle i.
   Vec3 stored(std::size_t i, Vec3 x) const {
-    return stores_positions_ ? x : x - body_.rest_position(static_cast<int32_t>(i));
+    return stored_place(body_, before_.precision, static_cast<int32_t>(i), x);
   }
 
   std::vector<Wall> walls_now() {

@@ -1,0 +1,43 @@
+// What single operations of shape matching round, by the numbers that enter them (tolerances.md, The step again, What
+// rounds). Internal to oracles/.
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "model/body.h"
+#include "model/state.h"
+
+namespace cutproof::oracles {
+
+// A sum of N terms, one after the other, in units of u times the sum of their sizes.
+inline double sum_rounds(double terms) { return 2 + std::sqrt(terms) / 2; }
+
+// The number that arithmetic of this precision keeps of a place x of particle i [m]: in single precision its
+// displacement from rest.
+inline Vec3 stored_place(const Body& body, Precision precision, int32_t i, Vec3 x) {
+  return precision == Precision::binary32 ? x - body.rest_position(i) : x;
+}
+
+// What a rounding error of so many roundings of one size seldom exceeds, in standard deviations: 8, with probability
+// 3e-14 (Higham and Mary 2019; tolerances.md, Linear momentum).
+inline constexpr double kDeviations = 8;
+
+// Of many comparisons the one that comes nearest to its bound, or goes farthest beyond. What is not a number is beyond.
+struct Nearest {
+  double share = -1, measured = 0, bound = 0;
+  int32_t where = -1;
+
+  void see(double of, double within, int32_t index) {
+    if (std::isnan(of)) of = std::numeric_limits<double>::infinity();
+    const double ratio = of == 0 ? 0 : of / within;
+    if (!(ratio > share)) return;
+    share = ratio;
+    measured = of;
+    bound = within;
+    where = index;
+  }
+  bool holds() const { return share <= 1; }
+};
+
+}  // namespace cutproof::oracles
