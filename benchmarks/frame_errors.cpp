@@ -71,7 +71,8 @@ FrameErrors judge_frames(Backend& backend, const Setup& setup) {
     }
     ++errors.frames;
   }
-  std::vector<oracles::StateOracle> asked = {oracles::cluster_connectivity, oracles::coverage, oracles::edge_cover};
+  std::vector<oracles::StateOracle> asked = {oracles::cluster_connectivity, oracles::coverage, oracles::edge_cover,
+                                             oracles::skin_match};
   if (state.edge_covered) asked.push_back(oracles::component_match);
   for (const auto oracle : asked) {
     errors.topology.push_back(oracle(setup, state));

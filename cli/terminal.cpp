@@ -19,7 +19,7 @@ constexpr std::size_t kMostFailuresShown = 5;
 
 struct Row {
   const Verdict* worst = nullptr;  // the failing one with the greatest measure, or the greatest that holds
-  int64_t frames = 0, failed = 0, expected = 0, checked = 0;
+  int64_t frames = 0, failed = 0, expected = 0, checked = 0, undecided = 0;
 };
 
 // The greatest of all frames: the worst figure need not be the one that came nearest to its own bound.
@@ -68,6 +68,7 @@ void print_verdicts(const harness::SceneJudge& judge) {
     Row& row = found->second;
     row.frames += verdict.checked > 0 || !verdict.holds;
     row.checked += verdict.checked;
+    row.undecided += verdict.undecided;
     if (!verdict.holds) ++(judge.is_expected_failure(verdict) ? row.expected : row.failed);
     const bool worse = row.worst == nullptr || (row.worst->holds && !verdict.holds) ||
                        (row.worst->holds == verdict.holds && verdict.measured > row.worst->measured);
@@ -77,10 +78,11 @@ void print_verdicts(const harness::SceneJudge& judge) {
              "checked", "failed", "worst", "bound", "unit", "of bound", "");
   for (const auto& [key, row] : rows) {
     const Verdict& worst = *row.worst;
-    const char* mark = row.failed > 0     ? "FAILS"
+    std::string mark = row.failed > 0     ? "FAILS"
                        : row.expected > 0 ? "fails, as the scene expects"
                        : row.frames == 0  ? "vacuous"
                                           : "holds";
+    if (row.undecided > 0) mark += fmt::format(", {} undecided", row.undecided);
     fmt::print("{:<40} {:<7} {:>7} {:>12} {:>7} {:>11} {:>11} {:<7} {:>8}  {}\n", worst.property, name_of(worst.stage),
                row.frames, row.checked, row.failed + row.expected, figure(worst.measured), figure(worst.bound),
                worst.unit, share_of_bound(judge, worst), mark);

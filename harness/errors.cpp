@@ -17,7 +17,7 @@ TopologyFigures topology_of(const Setup& setup, const State& state) {
   const auto shells = oracles::skin_shells(state.skin);
   figures.shells = shells ? shells->outer : -1;
   figures.isolated = static_cast<int64_t>(oracles::isolation(setup, state).measured);
-  figures.equal = oracles::component_match(setup, state).holds;
+  figures.equal = oracles::component_match(setup, state).holds && oracles::skin_match(setup, state).holds;
   return figures;
 }
 

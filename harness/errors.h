@@ -32,7 +32,7 @@ struct TopologyFigures {
   int32_t couplings = 0;   // of "shares a cluster"
   int32_t shells = 0;      // outer ones of the skin
   int64_t isolated = 0;    // groups of clusters isolated inside connected tissue
-  bool equal = false;      // as partitions (oracle component_match)
+  bool equal = false;      // as partitions (oracles component_match, skin_match)
 };
 TopologyFigures topology_of(const Setup& setup, const State& state);
 

@@ -24,7 +24,8 @@ class ExpectationCheck {
 
   // Whether the scene expects anything at all.
   bool any() const;
-  // A failure that the scene expects: its `expect.isolated_clusters` asks for at least one.
+  // A failure that the scene expects: tissue that is connected and not coupled, where its `expect.isolated_clusters`
+  // asks for at least one group of it. Nothing else is excused.
   bool is_expected_failure(const Verdict& verdict) const;
 
  private:

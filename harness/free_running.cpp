@@ -84,7 +84,12 @@ void FreeRunning::see(Stage stage, const State& after) {
         first.explained = first.explained && std::isfinite(first.reach) && margin <= first.reach;
       }
     }
-    if (stage == Stage::merge && !promise_of(setup_.merge.rule).unique) first.explained = true;
+    // Where the rule leaves several right answers, this one may be another: all else is equal, and it is right.
+    if (stage == Stage::merge && !promise_of(setup_.merge.rule).unique) {
+      first.explained = !oracles::difference_of_decisions(expected, after, oracles::Sets::open) &&
+                        oracles::merge_legality(setup_, before_, after).holds &&
+                        oracles::merge_maximality(setup_, after).holds;
+    }
     return;
   }
   before_ = after;

@@ -35,6 +35,23 @@ State before_skin(const State& before, const State& end) {
   return state;
 }
 
+// What a split alone has left, where only a later end is known. The rotations are those of the end: that they are right
+// is nobody's to tell who does not know what the step made of them.
+State before_merge(const Setup& setup, const State& detected, const State& end, bool rotations_are_known) {
+  const std::unique_ptr<Backend> reference = reference::make_backend();
+  reference->load({setup}, {detected});
+  reference->run({Stage::split, Stage::split});
+  State state = reference->snapshot().front();
+  const std::vector<int32_t>& numbers = end.clusters.number;
+  for (int32_t c = 0; c < state.clusters.count() && !rotations_are_known; ++c) {
+    const auto place = std::lower_bound(numbers.begin(), numbers.end(), state.clusters.number[at(c)]);
+    if (place == numbers.end() || *place != state.clusters.number[at(c)]) continue;
+    state.clusters.rotation[at(c)] = end.clusters.rotation[at(place - numbers.begin())];
+    state.clusters.degenerate[at(c)] = end.clusters.degenerate[at(place - numbers.begin())];
+  }
+  return state;
+}
+
 }  // namespace
 
 // Nothing moves after step, and rotations stay with clusters that stay.
@@ -199,13 +216,23 @@ void Judge::see_several(const Moment& moment, const std::array<bool, 6>& seen) {
     verdict.property = "stages in one piece";
     verdict.bound_source = "method.md §5 to §8: the reference's answer to the same removal";
     verdict.unit = "1";
-    verdict.checked = unique ? end.clusters.count() : 0;
-    if (verdict.checked == 0) verdict.vacuous = unique ? "no cluster" : "the merge rule leaves several right answers";
+    verdict.checked = unique ? end.clusters.count() : 1;
+    if (verdict.checked == 0) verdict.vacuous = "no cluster";
     const auto sets = unique ? oracles::Sets::compared : oracles::Sets::open;
     if (const auto difference = oracles::difference_of_decisions(expected, end, sets)) {
       verdict.holds = false;
       verdict.measured = 1;
       verdict.witness = {difference->clusters, difference->particles, {}, difference->text};
+    }
+    if (!unique && sees(Stage::merge)) {
+      // Of the rule's answers the reference knows one. The split leaves one, and what was merged of it the oracle
+      // tells; where clusters have grown after that, or have lost their numbers at the frame's end, nobody does.
+      if (sees(Stage::expand) || sees(Stage::skin)) {
+        verdict.undecided = end.clusters.count();
+      } else {
+        const State split = before_merge(setup_, *before, end, !moment.span.contains(Stage::step));
+        take({oracles::merge_legality(setup_, split, end)}, Stage::merge, end);
+      }
     }
     if (before->clusters.members != end.clusters.members) has_expanded_ = has_expanded_ || sees(Stage::expand);
     take({verdict}, moment.span.last, end);

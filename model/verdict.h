@@ -31,9 +31,8 @@ struct Verdict {
   std::string unit;          // "1" for counts and ratios
   std::string bound_source;  // where the bound comes from, e.g. "method.md §2, I1"
   int64_t checked = 0;       // how many things were looked at; 0 means the property was vacuous here
-  // Of these: where rounding decides so much that no sharp answer could be asked for (tolerances.md, The step again).
-  int64_t undecided = 0;
   std::string vacuous = {};  // why there was nothing to look at, e.g. "no blade"; empty if there was
+  int64_t undecided = 0;     // how many things may be wrong and were not found to be: they count as right, and here
   Witness witness;           // empty if it holds
 
   friend bool operator==(const Verdict&, const Verdict&) = default;

@@ -22,6 +22,7 @@ void check_finite(Judged& judged, Verdict& verdict);
 void check_cluster_connectivity(Judged& judged, Verdict& verdict);
 void check_coverage(Judged& judged, Verdict& verdict);
 void check_component_match(Judged& judged, Verdict& verdict);
+void check_skin_match(Judged& judged, Verdict& verdict);
 void check_isolation(Judged& judged, Verdict& verdict);
 void check_edge_cover(Judged& judged, Verdict& verdict);
 void check_rest_frames(Judged& judged, Verdict& verdict);

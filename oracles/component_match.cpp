@@ -1,4 +1,4 @@
-// I3 (method.md §2) and the lemma of §8: tissue, coupling and skin fall into the same components.
+// I3 (method.md §2) and the lemma of §8: tissue and coupling fall into the same components, and so do tissue and skin.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -26,12 +26,35 @@ void tell_of_ghost_coupling(Judged& judged, Verdict& verdict) {
   }
 }
 
-void match_skin(Judged& judged, Verdict& verdict) {
+}  // namespace
+
+// Where both halves are violated the witness is that of a coupling too far: only then does it name a cluster, by which
+// those who expect isolated clusters tell that there is more (harness/expectations.cpp).
+void check_component_match(Judged& judged, Verdict& verdict) {
+  const Partition& components = judged.components();
+  const Partition& coupling = judged.coupling();
+  const int64_t pairs = judged.coupled_components();
+  const int64_t surplus = pairs - components.count, ghosts = pairs - coupling.count;
+  if (ghosts > 0) tell_of_ghost_coupling(judged, verdict);
+  if (surplus > 0) {
+    const Edge edge = judged.first_uncoupled_edge();
+    violate(verdict, {{}, {edge.a, edge.b}, {edge.a, edge.b}},
+            "particles {} and {} are neighbours in component {} of the tissue, but no chain of "
+            "clusters couples them",
+            edge.a, edge.b, components.label[at(edge.a)]);
+  }
+  verdict.measured = static_cast<double>(surplus + ghosts);
+  for (const int32_t label : components.label) verdict.checked += label >= 0 ? 1 : 0;
+}
+
+void check_skin_match(Judged& judged, Verdict& verdict) {
+  if (!skin_is_due(judged.setup, judged.state)) return;
   const Skin& skin = judged.state.skin;
   const Partition& components = judged.components();
   std::vector<Vec3> at_rest;
   for (std::size_t v = 0; v < skin.owner.size(); ++v) at_rest.push_back(vertex_at_rest(judged.setup, skin, v));
   const Shells shells = shells_of(skin, at_rest);
+  verdict.checked = components.count;
   const auto shell_count = static_cast<int32_t>(shells.volume.size());
 
   std::vector<int32_t> first_owner(at(shell_count), -1);
@@ -84,26 +107,6 @@ void match_skin(Judged& judged, Verdict& verdict) {
   if (inner != cavities) {
     violate(verdict, {}, "the skin has {} inner shells, but the tissue has {} cavities", inner, cavities);
   }
-}
-
-}  // namespace
-
-void check_component_match(Judged& judged, Verdict& verdict) {
-  const Partition& components = judged.components();
-  const Partition& coupling = judged.coupling();
-  const int64_t pairs = judged.coupled_components();
-  const int64_t surplus = pairs - components.count, ghosts = pairs - coupling.count;
-  if (surplus > 0) {
-    const Edge edge = judged.first_uncoupled_edge();
-    violate(verdict, {{}, {edge.a, edge.b}, {edge.a, edge.b}},
-            "particles {} and {} are neighbours in component {} of the tissue, but no chain of "
-            "clusters couples them",
-            edge.a, edge.b, components.label[at(edge.a)]);
-  }
-  if (ghosts > 0) tell_of_ghost_coupling(judged, verdict);
-  verdict.measured = static_cast<double>(surplus + ghosts);
-  if (judged.skin_is_current && skin_is_due(judged.setup, judged.state)) match_skin(judged, verdict);
-  for (const int32_t label : components.label) verdict.checked += label >= 0 ? 1 : 0;
 }
 
 }  // namespace cutproof::oracles

@@ -13,7 +13,6 @@ struct Judge::Memory {
   // A verdict that holds, of a state that had the same bits in all parts that it rests on.
   struct Held {
     const Property* property;
-    bool skin_is_current;
     Verdict verdict;
   };
 
@@ -45,20 +44,17 @@ struct Judge::Memory {
     last = &state;
   }
 
-  Verdict answer(const Property& property, Stage after) {
+  Verdict answer(const Property& property) {
     if (&property == &core_properties().front()) return form;
     if (!form.holds) return not_judged(property.name, form);
-    judged->skin_is_current = after == Stage::skin;
-    const auto known = std::find_if(held.begin(), held.end(), [&](const Held& h) {
-      return h.property == &property && h.skin_is_current == judged->skin_is_current;
-    });
+    const auto known = std::find_if(held.begin(), held.end(), [&](const Held& h) { return h.property == &property; });
     if (known != held.end()) {
       Verdict verdict = known->verdict;
       verdict.frame = last->frame;
       return verdict;
     }
     Verdict verdict = ask(property, *judged);
-    if (verdict.holds) held.push_back({&property, judged->skin_is_current, verdict});
+    if (verdict.holds) held.push_back({&property, verdict});
     return verdict;
   }
 
@@ -79,7 +75,7 @@ std::vector<Verdict> Judge::state(const State& state, Stage after, bool thorough
   std::vector<Verdict> verdicts;
   m.for_each_property([&](const Property& property) {
     if (property.check_state == nullptr || (property.cost == Cost::thorough && !thorough)) return;
-    if (property.due.holds(m.setup, state, after)) verdicts.push_back(m.answer(property, after));
+    if (property.due.holds(m.setup, state, after)) verdicts.push_back(m.answer(property));
   });
   for (Verdict& verdict : verdicts) verdict.stage = after;
   return verdicts;
@@ -96,7 +92,7 @@ std::vector<Verdict> Judge::stage(Stage stage, const State& before, const State&
     if (property.check_stage != nullptr) {
       verdicts.push_back(ask(property, {m.setup, stage, before, after}, form_before, m.form));
     } else if (property.due.holds(m.setup, after, stage)) {
-      verdicts.push_back(m.answer(property, stage));
+      verdicts.push_back(m.answer(property));
     }
   });
   for (Verdict& verdict : verdicts) verdict.stage = stage;

@@ -31,8 +31,6 @@ class Judged {
   const Body& body;
   const Clusters& clusters;
   const TissueGraph graph;
-  // Whether the skin, if there is one, is that of this tissue: not between detection and the skin stage.
-  bool skin_is_current = true;
   std::vector<uint8_t> connected;  // [m] 1: "cluster connectivity" has found the cluster to be; empty: it knows of none
 
  private:

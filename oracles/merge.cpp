@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 
 #include "model/rules.h"
 #include "oracles/checks.h"
@@ -168,14 +169,50 @@ class MergeDecomposition {
       if (!takers_[at(c)].empty()) open_.push_back(c);
     }
     if (give_from(0)) return;
-    if (budget_ < 0) {
+    if (budget_ < 0 && !is_refuted(needy)) {
       // Each result has an explanation of its own; that all have one at once was not refuted.
-      verdict.bound_source += "; simultaneous assignment not decided";
+      verdict.undecided = static_cast<int64_t>(needy.size());
       return;
     }
     std::vector<int32_t> numbers;
     for (const int32_t r : needy) numbers.push_back(after_.number[at(r)]);
     violate(verdict, {numbers}, "these clusters can be explained one by one, but only by using a cluster twice");
+  }
+
+  // Whether there is a particle of which not all needy results that lack it can be given an input of their own that
+  // holds it (a matching, found by augmenting paths). That there is none proves nothing.
+  bool is_refuted(const std::vector<int32_t>& needy) {
+    Lists inputs_of(at(graph_.particle_count()));  // of open_
+    for (const int32_t c : open_) {
+      for (const int32_t i : before_.of(c)) inputs_of[at(i)].push_back(c);
+    }
+    for (int32_t i = 0; i < graph_.particle_count(); ++i) {
+      if (inputs_of[at(i)].empty()) continue;  // then no needy result lacks it
+      std::vector<int32_t> user(inputs_, -1), tried(inputs_, -1);
+      const std::function<bool(int32_t)> finds_one = [&](int32_t r) {
+        for (const int32_t c : inputs_of[at(i)]) {
+          const auto& takers = takers_[at(c)];
+          if (tried[at(c)] >= 0 || std::find(takers.begin(), takers.end(), r) == takers.end()) continue;
+          tried[at(c)] = r;
+          if (user[at(c)] >= 0 && !finds_one(user[at(c)])) continue;
+          user[at(c)] = r;
+          return true;
+        }
+        return false;
+      };
+      for (const int32_t r : needy) {
+        const auto members = after_.of(r);
+        const auto holds = [&](int32_t c) {
+          const auto held = before_.of(c);
+          return std::find(held.begin(), held.end(), i) != held.end();
+        };
+        if (std::find(members.begin(), members.end(), i) == members.end()) continue;
+        if (std::any_of(given_[at(r)].begin(), given_[at(r)].end(), holds)) continue;
+        tried.assign(inputs_, -1);
+        if (!finds_one(r)) return true;
+      }
+    }
+    return false;
   }
 
   // Gives the inputs open_[k], open_[k + 1], … to needy results so that all are explained, if there is a way. Requires

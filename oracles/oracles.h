@@ -39,10 +39,11 @@ inline constexpr StateOracle well_formed{core_properties, "well formed"};
 inline constexpr StateOracle finite{core_properties, "finite"};                              // no NaN, no Inf anywhere
 inline constexpr StateOracle cluster_connectivity{core_properties, "cluster connectivity"};  // I1, by BFS
 inline constexpr StateOracle coverage{core_properties, "coverage"};  // I2; members sorted, unique, alive
-// I3 and the skin: components of G = of the coupling "shares a cluster" (both as partitions of the alive particles)
-// and, if the state has a skin, = outer shells of the skin (method.md §8). Witness of a failure: two particles and, if
-// they are connected, a path.
+// I3: components of G = of the coupling "shares a cluster", both as partitions of the alive particles. Witness of a
+// failure: two particles, and a path if they are connected and not coupled, else the cluster that couples them.
 inline constexpr StateOracle component_match{core_properties, "component match"};
+// If the state has a skin, components of G = its outer shells, and cavities = its inner ones (method.md §8).
+inline constexpr StateOracle skin_match{core_properties, "skin match"};
 // No cluster and no group of clusters isolated inside connected tissue; measured: number of surplus groups, that is
 // coupling components minus components of G (0 expected).
 inline constexpr StateOracle isolation{core_properties, "isolation"};

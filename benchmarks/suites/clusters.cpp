@@ -51,8 +51,8 @@ json run_cut(const Contender& contender, std::optional<double> tau, int64_t part
     scene_frame.push_back(built.schedule.scene_frame[static_cast<std::size_t>(frame)] + 1);
     clusters.push_back(state.clusters.count());
     removed += state.removed.size() + state.debris.size();
-    for (const auto oracle :
-         {oracles::cluster_connectivity, oracles::coverage, oracles::edge_cover, oracles::component_match}) {
+    for (const auto oracle : {oracles::cluster_connectivity, oracles::coverage, oracles::edge_cover,
+                              oracles::component_match, oracles::skin_match}) {
       Verdict verdict = oracle(setup, state);
       verdict.backend = backend.name();
       verdict.frame = frame;

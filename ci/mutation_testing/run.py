@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Mutation testing: applies one mutant at a time to a copy of the code and asks the gate to find it.
 
-Usage: run.py [--only NAME...] [--jobs N] [--json F] [--check]
+Usage: run.py [--only NAME...] [--shard I/N] [--jobs N] [--json F] [--check]
 
 A mutant is a patch, mutants/NN_name.patch, with a head of lines `Field: text` (a line that begins with a space goes on):
-  Stage     step detect split merge expand skin, or launch: what runs kernels and puts frames together
+  Stage     step detect split merge expand skin, or launch: what runs kernels and puts frames together; judge: what
+            judges, reads, draws, searches or prints, so that a wrong program may pass unseen
   Fault     what is wrong with the program, for a person
   Suspect   the gate's command that is expected to find it; may be given several times, tried in this order. A program
             is known by its name, which is that of its CMake target.
@@ -12,9 +13,11 @@ A mutant is a patch, mutants/NN_name.patch, with a head of lines `Field: text` (
 
 There is one copy (build/mutation_testing/tree) with one build folder, without CUDA. The unchanged code must pass every
 command that is used. Then for each mutant: patch, build what its suspects need, run them until one finds it; if none
-does, the tests of its stage, the properties, and five minutes of `cutproof fuzz`. A mutant that does not apply or does
-not compile is an error, not a find. Writes docs/results/mutation_testing.md unless --only is given. Exit status: 0
-every mutant was found, 1 one was not or the unchanged code fails, 2 bad usage or a bad patch.
+does, the tests of its stage, the properties, and five minutes of `cutproof fuzz`; for one of the judge the tests of the
+folders that it patches, because a campaign on right programs is silent about a judge that accepts too much. A mutant
+that does not apply or does not compile is an error, not a find. Writes docs/results/mutation_testing.md unless --only
+or --shard is given. Exit status: 0 every mutant was found, 1 one was not or the unchanged code fails, 2 bad usage or a
+bad patch.
 """
 import argparse
 import contextlib
@@ -36,7 +39,22 @@ ROOT = HERE.parent.parent
 WORK = ROOT / "build" / "mutation_testing"
 TREE, BUILD, RUN = WORK / "tree", WORK / "build", WORK / "run"
 TABLE = ROOT / "docs" / "results" / "mutation_testing.md"
-STAGES = ("step", "detect", "split", "merge", "expand", "skin", "launch")
+STAGES = ("step", "detect", "split", "merge", "expand", "skin", "launch", "judge")
+# What a mutant may patch: simulators, and with the stage `judge` all that says whether they are right. The tests of the
+# latter, for where suspects find nothing.
+SIMULATORS = ("gpu", "reference_cpu")
+TESTS_OF_JUDGES = {
+    "oracles": ("registry_test", "oracles_test", "remembering_test", "stage_comparison_test", "state_difference_test",
+                "relations_test", "judge_test"),
+    "harness": ("judge_test", "scene_judge_test", "every_field_test", "frame_runner_test", "lockstep_test",
+                "free_running_test", "against_test", "errors_test", "backends_test"),
+    "model": ("fields_test", "atomic_file_test", "scene_io_test", "recording_test", "judge_test"),
+    "fixtures": ("shapes_test", "bodies_test", "cook_test", "schedule_test", "build_test"),
+    "property_tests": ("campaign_test", "histories_test", "every_field_test"),
+    "tuning": ("search_test", "refinement_test", "tune_test"),
+    "benchmarks": ("clusters_test", "solver_test", "tune_test"),
+    "cli": ("table_test", "verbs_test", "program_test", "fuzz_test"),
+}
 FIELDS = ("Stage", "Fault", "Suspect", "Livelock")
 MOST_SECONDS = 420  # of one command
 FUZZ_SECONDS = 300  # of the last resort
@@ -86,8 +104,9 @@ def read_mutant(path):
     if stage not in STAGES:
         raise BadMutant(f"{path.name}: Stage: '{stage}' is none of {', '.join(STAGES)}")
     files = [line[6:].split("\t")[0] for line in lines if line.startswith("+++ b/")]
-    if not files or any(file.split("/")[0] not in ("gpu", "reference_cpu") for file in files):
-        raise BadMutant(f"{path.name}: a mutant patches files of gpu/ or reference_cpu/, and nothing else")
+    allowed = tuple(TESTS_OF_JUDGES) if stage == "judge" else SIMULATORS
+    if not files or any(file.split("/")[0] not in allowed for file in files):
+        raise BadMutant(f"{path.name}: a mutant of stage {stage} patches files of {', '.join(allowed)}, and nothing else")
     return Mutant(path.stem, path, stage, fields["Fault"][0], fields["Suspect"],
                  fields.get("Livelock") == ["yes"], files)
 
@@ -154,6 +173,9 @@ def target_of(command):
 
 
 def fallbacks(mutant):
+    if mutant.stage == "judge":
+        tests = [test for folder in TESTS_OF_JUDGES if folder in mutant.code for test in TESTS_OF_JUDGES[folder]]
+        return [test for test in dict.fromkeys(tests) if test not in mutant.suspects]
     if mutant.code == "reference_cpu":
         backend, kinds = "reference", "*/reference*"
         tests = ["backend_test"] if mutant.stage == "launch" else [f"{mutant.stage}_test"]
@@ -320,6 +342,7 @@ def write_table(rows):
 def main():
     parser = argparse.ArgumentParser(description="Applies mutants and asks the gate to find them.")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="mutants whose name begins with one of these")
+    parser.add_argument("--shard", metavar="I/N", help="every N-th of these mutants, beginning with the I-th")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="of the builds")
     parser.add_argument("--json", metavar="F", help="write the results there as well")
     parser.add_argument("--check", action="store_true", help="only whether every mutant applies to the code as it is")
@@ -331,6 +354,11 @@ def main():
             if not any(path.stem.startswith(name) for path in paths):
                 raise BadMutant(f"--only: there is no mutant '{name}' in {HERE / 'mutants'}")
         paths = [path for path in paths if any(path.stem.startswith(name) for name in options.only)]
+    if options.shard:
+        shard = re.fullmatch(r"(\d+)/(\d+)", options.shard)
+        if not shard or not 1 <= int(shard.group(1)) <= int(shard.group(2)):
+            raise BadMutant(f"--shard: '{options.shard}' is not I/N with 1 <= I <= N")
+        paths = paths[int(shard.group(1)) - 1::int(shard.group(2))]
     mutants = [read_mutant(path) for path in paths]
     if not mutants:
         raise BadMutant(f"there are no mutants in {HERE / 'mutants'}")
@@ -379,7 +407,7 @@ def main():
             pathlib.Path(options.json).write_text(json.dumps(
                 {"format": "cutproof.mutation_testing", "format_version": 1, "unchanged_passes": holds, "faults": rows},
                 indent=1) + "\n")
-    if not options.only:
+    if not options.only and not options.shard:
         write_table(rows)
     survivors = [row["name"] for row in rows if not row["found"]]
     print(simplicity(rows))

@@ -43,6 +43,19 @@ void note_if_any(MeasuredError& error, const ErrorNorm& norm) {
   if (norm.max > 0) error.norm = norm;
 }
 
+// What is computed and what the stage must leave as it is, to the bit. Positions and velocities are measured instead.
+std::optional<DecisionDifference> difference_of_kept(const StageDifference& stage, const State& before,
+                                                     const State& after) {
+  std::optional<DecisionDifference> found;
+  for_each_field([&](const Field& field, auto get) {
+    if (found || field.is_decision || field.space == IndexSpace::particle) return;
+    if ((stage.due && field.changed_by.contains(stage.stage)) || same_bits(get(before), get(after))) return;
+    found = DecisionDifference{
+        witness_of({}, "{} changed, which {} must leave as it is", field.text, name_of(stage.stage)), field.name};
+  });
+  return found;
+}
+
 }  // namespace
 
 std::vector<int32_t> in_one_only(const std::vector<int32_t>& a, const std::vector<int32_t>& b) {
@@ -120,6 +133,9 @@ StageDifference StageComparison::compare(Stage stage, const State& before, const
   } else {
     compare_later_stage(before, after, launched, found);
   }
+  if (auto kept = difference_of_kept(found, before, after); kept && found.decisions.empty()) {
+    found.decisions.push_back(std::move(*kept));
+  }
   return found;
 }
 
@@ -189,12 +205,19 @@ void StageComparison::compare_later_stage(const State& before, const State& afte
 
   found.sets_are_open = found.stage == Stage::merge && found.due && !promise_of(setup_.merge.rule).unique;
   auto difference = difference_of_decisions(expected, after, found.sets_are_open ? Sets::open : Sets::compared);
-  if (!difference && !found.sets_are_open && expected.clusters.rotation != after.clusters.rotation) {
-    const auto [mine, theirs] = std::mismatch(expected.clusters.rotation.begin(), expected.clusters.rotation.end(),
-                                              after.clusters.rotation.begin());
-    const int32_t cluster = after.clusters.number[at(theirs - after.clusters.rotation.begin())];
-    difference =
-        DecisionDifference{witness_of({{cluster}}, "cluster {} has not the rotation that it inherits", cluster)};
+  if (found.sets_are_open && !difference) {  // not compared, but they must be one of the rule's answers
+    for (const Verdict& answer : {merge_legality(setup_, before, after), merge_maximality(setup_, after)}) {
+      if (!answer.holds && !difference) difference = DecisionDifference{answer.witness};
+    }
+  }
+  for (int32_t c = 0; !difference && !found.sets_are_open && c < after.clusters.count(); ++c) {
+    const int32_t cluster = after.clusters.number[at(c)];
+    if (expected.clusters.rotation[at(c)] != after.clusters.rotation[at(c)]) {
+      difference =
+          DecisionDifference{witness_of({{cluster}}, "cluster {} has not the rotation that it inherits", cluster)};
+    } else if (expected.clusters.degenerate[at(c)] != after.clusters.degenerate[at(c)]) {
+      difference = DecisionDifference{witness_of({{cluster}}, "cluster {} has not the flag that it inherits", cluster)};
+    }
   }
 
   const double dt =

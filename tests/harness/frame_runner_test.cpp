@@ -188,5 +188,38 @@ TEST(PartialBackend, IsFoundWrongByFuzzWhateverItCanRun) {
   }
 }
 
+// Merges by another rule: every answer is legal and maximal, and so nothing that an oracle could reject, but it is not
+// the one that the rule of the scene leaves.
+class MergesByAnotherRule final : public Backend {
+ public:
+  std::string name() const override { return "another rule"; }
+  bool can_run(Span span) const override { return span.first == span.last; }
+  void load(std::vector<cutproof::Setup> setups, std::vector<State> states) override {
+    for (cutproof::Setup& setup : setups) {
+      if (setup.merge.rule == MergeRule::deterministic) setup.merge.rule = MergeRule::published;
+    }
+    inner_->load(std::move(setups), std::move(states));
+  }
+  void run(Span span) override { inner_->run(span); }
+  std::vector<State> snapshot() const override { return inner_->snapshot(); }
+  SpanReport report() const override { return inner_->report(); }
+
+ private:
+  std::unique_ptr<Backend> inner_ = reference::make_backend();
+};
+
+TEST(Dissection, ComparesMergesWithTheReference) {
+  property_tests::CampaignOptions options;
+  options.cases = 400;
+  options.keep_going = true;
+  const property_tests::Campaign campaign = property_tests::run_campaign(
+      options, {[](int64_t) { return std::make_unique<MergesByAnotherRule>(); }, false}, nullptr);
+  EXPECT_FALSE(campaign.violations.empty());
+  for (const auto& violation : campaign.violations) {
+    EXPECT_EQ(violation.verdict.property, "the reference's topology") << violation.verdict.witness.text;
+    EXPECT_EQ(violation.verdict.stage, Stage::merge);
+  }
+}
+
 }  // namespace
 }  // namespace cutproof

@@ -108,6 +108,20 @@ TEST(MergeLegality, RejectsAParticleThatNobodyHeld) {
   expect_rejected(merge.judge({{0, 1, 2, 3}, {2, 3, 4}, {4, 5}}, {0, 1, 2}), {0}, {3});
 }
 
+// Small is what has fewer than tau particles; a union may have cap.
+TEST(MergeLegality, HoldsExactlyUpToTauAndCap) {
+  for (const int32_t size : {1, 2, 3, 4}) {
+    Merge merge(8, {{0, 1, 2}, range(3, 3 + size)}, 3, 5);
+    const Verdict verdict = merge.judge({range(0, 3 + size)}, {0});
+    EXPECT_EQ(verdict.holds, size < 3) << size;
+  }
+  Merge merge(8, {{0, 1, 2}, {3, 4}}, 3, 5);
+  for (const int32_t cap : {4, 5, 6}) {
+    merge.pair.before.cap = cap;
+    EXPECT_EQ(merge.judge({range(0, 5)}, {0}).holds, cap >= 5) << cap;
+  }
+}
+
 TEST(MergeLegality, RejectsMergingAwayAClusterThatIsNotSmall) {
   Merge merge(7, {{0, 1, 2}, {3, 4, 5, 6}}, 3, 8);
   expect_rejected(merge.judge({range(0, 7)}, {0}), {1, 0}, {});
@@ -188,6 +202,39 @@ TEST(MergeLegality, ExplainsRandomLegalMergesAndNoticesAnExtraParticle) {
   }
   EXPECT_GT(merges, 1000);
   EXPECT_GT(noticed, 100);  // not all: the extra particle may make another legal merge
+}
+
+// --- Where who was merged into whom has to be searched ---------------------------------------------------------------
+
+// `results` clusters {0, 1} that each took in some of the vanished ones, whatever these are: they are all alike, so
+// that trying all ways to deal them out takes longer than anybody waits.
+Merge dealt_out(int32_t results, const Lists& vanished, const std::vector<int32_t>& result) {
+  Lists before(static_cast<std::size_t>(results), {0, 1}), after(static_cast<std::size_t>(results), result);
+  before.insert(before.end(), vanished.begin(), vanished.end());
+  Merge merge(6, before, 3, 8);
+  (void)merge.judge(after, range(0, results));
+  return merge;
+}
+
+TEST(MergeLegality, DecidesThatThereAreTooFewOfACluster) {
+  constexpr int32_t kResults = 9;
+  const Merge enough = dealt_out(kResults, Lists(kResults, {1, 2}), {0, 1, 2});
+  expect_holds(merge_legality(enough.pair.setup, enough.pair.before, enough.pair.after));
+  const Merge short_of_one = dealt_out(kResults, Lists(kResults - 1, {1, 2}), {0, 1, 2});
+  const Verdict verdict = merge_legality(short_of_one.pair.setup, short_of_one.pair.before, short_of_one.pair.after);
+  expect_rejected(verdict, range(0, kResults), {});
+  EXPECT_EQ(verdict.undecided, 0);
+}
+
+// Two of three kinds make a result. There are enough of each kind, and too few of all together.
+TEST(MergeLegality, CountsWhatItCouldNotDecide) {
+  constexpr int32_t kResults = 8;
+  Lists vanished;
+  for (int k = 0; k < 5; ++k) vanished.insert(vanished.end(), {{2, 3}, {3, 4}, {2, 4}});
+  const Merge merge = dealt_out(kResults, vanished, {0, 1, 2, 3, 4});
+  const Verdict verdict = merge_legality(merge.pair.setup, merge.pair.before, merge.pair.after);
+  EXPECT_TRUE(verdict.holds) << verdict.witness.text;
+  EXPECT_EQ(verdict.undecided, kResults);
 }
 
 TEST(MergeMaximality, RejectsASmallClusterThatSharesAParticleWithOneThatHasRoom) {

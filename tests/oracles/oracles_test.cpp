@@ -18,9 +18,9 @@ namespace {
 
 using namespace cutproof::testing;
 
-constexpr std::array<StateOracle, 9> kOracles = {well_formed,     cluster_connectivity, coverage,    component_match,
-                                                 isolation,       edge_cover,           rest_frames, finite,
-                                                 merge_maximality};
+constexpr std::array<StateOracle, 10> kOracles = {
+    well_formed, cluster_connectivity, coverage,    component_match, skin_match,
+    isolation,   edge_cover,           rest_frames, finite,          merge_maximality};
 
 TEST(OneStateOracles, AcceptASolidBlockWithItsSkin) {
   const Block block;

@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "model/at.h"
 #include "oracles/oracles.h"
 #include "reference_cpu/reference.h"
 #include "tests/oracles/expectations.h"

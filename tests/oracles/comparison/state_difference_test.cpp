@@ -117,6 +117,40 @@ TEST(StateDifference, IsADistanceExactlyInTheFieldsThatAreComputed) {
   });
 }
 
+// Whichever entry it is, and whichever of the two states has it.
+TEST(StateDifference, IsFoundInEveryEntryOfEveryField) {
+  Block block;
+  block.state.removed = block.state.debris = {1, 4, 6};
+  int64_t entries = 0;
+  for_each_field([&](const Field& field, auto get) {
+    if constexpr (requires { get(block.state).size(); }) {
+      const std::size_t ends = field.space == IndexSpace::cluster_end ? 1 : 0;  // they stay where they are
+      for (std::size_t k = ends; k + ends < get(block.state).size(); ++k) {
+        SCOPED_TRACE(std::string(field.name) + ", entry " + std::to_string(k));
+        ++entries;
+        State other = block.state;
+        if (field.space == IndexSpace::state) {  // a list of particles
+          get(other).erase(get(other).begin() + static_cast<std::ptrdiff_t>(k));
+        } else {
+          change(get(other)[k]);
+        }
+        for (const bool swapped : {false, true}) {
+          const State &expected = swapped ? other : block.state, &actual = swapped ? block.state : other;
+          const std::vector<FieldDifference> bits = differences_in_bits(expected, actual);
+          ASSERT_EQ(bits.size(), 1u);
+          EXPECT_EQ(bits.front().field, field.name);
+          EXPECT_EQ(bits.front().index, static_cast<int64_t>(k));
+          EXPECT_EQ(difference_of_decisions(expected, actual).has_value(), field.is_decision);
+          for (const FieldError& error : errors_of_fields(block.setup, expected, actual, 0.001, block.state.alive)) {
+            EXPECT_EQ(error.norm.max > 0, error.field == field.name) << error.field;
+          }
+        }
+      }
+    }
+  });
+  EXPECT_GT(entries, 600);
+}
+
 TEST(StateDifference, NamesTheEntry) {
   const Block block;
   State other = block.state;
