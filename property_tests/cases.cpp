@@ -209,6 +209,12 @@ Stroke draw_press(Random& random, const Case& c) {
   const int32_t towards_back = stroke.back % 2 == 0 ? +1 : -1;
   stroke.from[back_axis] -= towards_back * random.between(-1, c.blade_depth + 1);
   stroke.from[along_axis] += random.between(-c.blade_length / 2 - 1, c.blade_length / 2 + 1);
+  // With the particle exactly over a border in half of them: how far a blade reaches is a whole number of quarters.
+  const int32_t border = random.between(0, 7);
+  if (border == 0) stroke.from[back_axis] = 4 * target[back_axis];
+  if (border == 1) stroke.from[back_axis] = 4 * target[back_axis] - towards_back * c.blade_depth;
+  if (border == 2) stroke.from[along_axis] = 4 * target[along_axis] - c.blade_length / 2;
+  if (border == 3) stroke.from[along_axis] = 4 * target[along_axis] + c.blade_length / 2;
   stroke.to = stroke.from;
   const std::size_t ahead = random.pick({normal_axis, normal_axis, along_axis, back_axis});
   const int32_t sign = random.chance(0.5) ? +1 : -1;

@@ -70,6 +70,7 @@ void note_touches(const Touches& touches, CaseCoverage& seen) {
                                                 {"cutting edge", touches.cutting_edge},
                                                 {"blade back", touches.blade_back},
                                                 {"on a border", touches.on_a_border},
+                                                {"led round the blade", touches.led_round},
                                                 {"blade and wall at once", touches.blade_and_wall},
                                                 {"friction slides", touches.slides},
                                                 {"friction sticks", touches.sticks}};

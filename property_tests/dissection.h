@@ -76,6 +76,7 @@ inline constexpr std::array kCoverageClasses = {
     CoverageClass{"cutting edge", Occurs::often_where_bodies_move},
     CoverageClass{"blade back", Occurs::often_where_bodies_move},
     CoverageClass{"on a border", Occurs::often_where_bodies_move},
+    CoverageClass{"led round the blade", Occurs::where_bodies_move},
     CoverageClass{"blade and wall at once", Occurs::often_where_bodies_move},
     CoverageClass{"friction slides", Occurs::often_where_bodies_move},
     CoverageClass{"friction sticks", Occurs::often_where_bodies_move},

@@ -11,8 +11,10 @@ namespace {
 
 // [h] What is put at a distance is there up to rounding, also in single precision; to be so near by chance is rare.
 constexpr double kTouching = 1e-4, kExactly = 1e-5;
-// [h] of one substep, along a surface: it stuck, it slid, a neighbour would have taken it along.
-constexpr double kStuck = 1e-6, kSlid = 1e-4;
+// What was led round a side stands right over it, at most this far from the plane; beyond, it is there by chance [ρ].
+constexpr double kFarthestLed = 3;
+// [h] of one substep, along a surface: it stuck; it slid, and a neighbour would have taken others along.
+constexpr double kStuck = 1e-5, kSlid = 1e-4;
 
 // In the axes of the blade: u along the cutting edge, w from it to the back, n along the normal.
 struct BladeCoordinates {
@@ -95,10 +97,10 @@ class Looker {
     const double over_side = std::abs(c.u) - half, over_edge = -c.w, over_back = c.w - blade.depth;
     const double beyond = std::hypot(std::max(over_side, 0.0), std::max({over_edge, over_back, 0.0}));
     const double near = kTouching * h_;
-    // What was led round a side stands right over it and may be farther from the plane than ρ.
-    const bool over = std::max({over_side, over_edge, over_back}) <= near;
-    const bool led = over && std::max({over_side, over_edge, over_back}) >= -kExactly * h_ &&
-                     std::abs(c.n) <= 3 * clearance && std::abs(c.n) >= clearance - near;
+    const double border = std::max({over_side, over_edge, over_back});
+    const bool over = border <= near;
+    const bool led = over && border >= -kExactly * h_ && std::abs(c.n) >= clearance - near &&
+                     std::abs(c.n) <= kFarthestLed * clearance;
     const bool touches = std::abs(std::hypot(beyond, c.n) - clearance) <= near;
     if (!touches && !led) return false;
     seen_.blade_face |= over && touches;
@@ -106,7 +108,11 @@ class Looker {
     seen_.blade_side |= over_side >= -near;
     seen_.cutting_edge |= over_edge >= -near;
     seen_.blade_back |= over_back >= -near;
-    seen_.on_a_border |= std::max({over_side, over_edge, over_back}) >= -kExactly * h_ && beyond <= kExactly * h_;
+    if (border >= -kExactly * h_ && beyond <= kExactly * h_) {
+      seen_.on_a_border = true;
+      const int64_t first = before_.frame * setup_.step.substeps;
+      seen_.led_round |= c.n * in_blade(setup_.blade_moves[at(first)].from, before_.x[at(i)]).n < 0;
+    }
     if (blade.friction > 0 && beyond <= near) {
       look_at_friction(i, [&](int32_t k) { return slid_along(*move_, after_.x[at(k)], moved(k)); });
     }

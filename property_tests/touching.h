@@ -14,7 +14,8 @@ struct Touches {
   bool blade_side = false;    // beyond one of the two sides along the depth, or right over it
   bool cutting_edge = false;  // the same of the cutting edge
   bool blade_back = false;    // the same of the back
-  bool on_a_border = false;   // exactly over one of the four, up to rounding, as what is led round the blade
+  bool on_a_border = false;   // exactly over one of the four, up to rounding
+  bool led_round = false;     // there, and it began the frame on the other side of the blade
   bool wall = false;          // stands at a wall
   bool wall_that_is_no_floor = false;
   bool blade_and_wall = false;  // one particle touches both
