@@ -1,13 +1,17 @@
 // Detection (method.md §4): removed is what the criterion demands, up to rounding.
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "oracles/blade_motion.h"
 #include "oracles/checks.h"
+#include "oracles/eigen.h"
+#include "oracles/shape_sums.h"
 
 namespace cutproof::oracles {
 namespace {
@@ -40,6 +44,74 @@ Demand demand_of_distance(double distance, double limit, double u) {
   if (distance > limit * (1 + kStretchBand * u)) return Demand::remove;
   if (distance < limit * (1 - kStretchBand * u)) return Demand::keep;
   return Demand::either;
+}
+
+// The greatest stretch that the deformation gradient A A0⁺ of a cluster makes of any direction, A = Σ w (x − t)(X − T)ᵀ
+// and A0 = Σ w (X − T)(X − T)ᵀ, and how far off rounding may put it.
+struct PrincipalStretch {
+  double greatest = 0, rounding = 0;
+};
+
+// With displacements d = x − X, A = A0 + B, B = Σ w e rᵀ (e = d − its mean, r = X − T), so the gradient is 1 + B A0⁺ in
+// the directions in which the cluster has extent. Bounds, to first order, from what a backend may have rounded: a sum
+// over N members by γ = (N + 8) u of its magnitudes, places by u of their distance from the body's origin, and
+// eigenvectors by 32 u (tolerances.md, Detection and rest frames).
+PrincipalStretch principal_stretch(const WeightedRest& rest, const Clusters& clusters, const std::vector<Vec3>& x,
+                                   int32_t cluster, double u) {
+  using Eigen::Matrix3d, Eigen::Vector3d;
+  const ClusterMeans means = cluster_means(rest, clusters, x, cluster);
+  const auto members = clusters.of(cluster);
+  Matrix3d a0 = Matrix3d::Zero(), b = Matrix3d::Zero();
+  double arm = 0, reach = 0, place = 0;
+  for (const int32_t i : members) {
+    const Vec3 home = rest.position[at(i)];
+    const Vec3 r = home - means.rest, e = x[at(i)] - home - (means.current - means.rest);
+    a0 += rest.weight[at(i)] * as_eigen(r) * as_eigen(r).transpose();
+    b += rest.weight[at(i)] * as_eigen(e) * as_eigen(r).transpose();
+    arm = std::max(arm, norm(r));
+    reach = std::max(reach, norm(e));
+    place = std::max(place, norm(home));
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> extents(a0);
+  // Nodes of a flat cluster lie in one plane of the grid, so that what it lacks is zero up to rounding; the flattest of
+  // others is a long wire with a kink.
+  constexpr double kNoExtent = 1e-11;
+  Matrix3d gradient = Matrix3d::Zero();
+  double least = 0;
+  for (int k = 2; k >= 0; --k) {
+    const double extent = extents.eigenvalues()[k];
+    if (!(extent > kNoExtent * extents.eigenvalues()[2])) break;
+    const Vector3d axis = extents.eigenvectors().col(k);
+    gradient += (axis + b * axis / extent) * axis.transpose();
+    least = extent;
+  }
+  PrincipalStretch stretch;
+  if (!(least > 0)) return stretch;
+  if (!gradient.allFinite()) return {0, std::numeric_limits<double>::infinity()};
+  stretch.greatest = gradient.jacobiSvd().singularValues()[0];
+  const double gamma = (static_cast<double>(members.size()) + 8) * u, off_place = 4 * u * place;
+  const double size_b = means.mass * reach * arm, size_a0 = means.mass * arm * arm;
+  const double off_b = 4 * gamma * size_b + means.mass * reach * off_place;
+  const double off_a0 = (2 * gamma + 32 * u) * size_a0 + 2 * means.mass * arm * off_place;
+  stretch.rounding = off_b / least + size_b * off_a0 / (least * least) + 32 * u * (1 + size_b / least);
+  return stretch;
+}
+
+// Of each particle: a cluster that is stretched too much takes all its particles along.
+std::vector<Demand> demands_of_strain(const Setup& setup, const State& state, double u) {
+  std::vector<Demand> demands(state.alive.size(), Demand::keep);
+  const WeightedRest rest = weighted_rest(setup.body, state.clusters);
+  for (int32_t c = 0; c < state.clusters.count(); ++c) {
+    const PrincipalStretch stretch = principal_stretch(rest, state.clusters, state.x, c, u);
+    const double beyond = stretch.greatest - setup.detect.strain;
+    const double rounding = stretch.rounding + 2 * u * setup.detect.strain;
+    if (beyond < -rounding) continue;
+    for (const int32_t i : state.clusters.of(c)) {
+      if (beyond > rounding) demands[at(i)] = Demand::remove;
+      if (demands[at(i)] == Demand::keep) demands[at(i)] = Demand::either;
+    }
+  }
+  return demands;
 }
 
 // From the nearest point of the rectangle to p.
@@ -191,6 +263,8 @@ void check_detection(const StageRun& run, Verdict& verdict) {
   const double limit = setup.detect.epsilon * h, u = unit_roundoff(before);
   const Criterion criterion = needs_detection(setup) ? setup.detect.criterion : Criterion::none;
   const Swept swept(setup, criterion == Criterion::geometric ? before.frame : setup.frame_count());
+  const std::vector<Demand> by_strain =
+      criterion == Criterion::strain ? demands_of_strain(setup, before, u) : std::vector<Demand>();
   std::vector<int32_t> gone;
   for (int32_t i = 0; i < graph.particle_count(); ++i) {
     const bool was = before.alive[at(i)] != 0, is = after.alive[at(i)] != 0;
@@ -203,7 +277,7 @@ void check_detection(const StageRun& run, Verdict& verdict) {
     const Stretch stretch = stretch_of(graph, before.x, i);
     const Demand demand = criterion == Criterion::distance    ? demand_of_distance(stretch.distance, limit, u)
                           : criterion == Criterion::geometric ? swept.demand_of(stretch.distance, before.x[at(i)], u)
-                          : criterion == Criterion::strain    ? Demand::either
+                          : criterion == Criterion::strain    ? by_strain[at(i)]
                                                               : Demand::keep;
     if (demand == Demand::either || (demand == Demand::remove) == !is) continue;
     std::vector<int32_t> particles = {i};

@@ -209,8 +209,8 @@ Stroke draw_press(Random& random, const Case& c) {
   const int32_t towards_back = stroke.back % 2 == 0 ? +1 : -1;
   stroke.from[back_axis] -= towards_back * random.between(-1, c.blade_depth + 1);
   stroke.from[along_axis] += random.between(-c.blade_length / 2 - 1, c.blade_length / 2 + 1);
-  // With the particle exactly over a border in half of them: how far a blade reaches is a whole number of quarters.
-  const int32_t border = random.between(0, 7);
+  // With the particle exactly over a border in most of them: how far a blade reaches is a whole number of quarters.
+  const int32_t border = random.between(0, 5);
   if (border == 0) stroke.from[back_axis] = 4 * target[back_axis];
   if (border == 1) stroke.from[back_axis] = 4 * target[back_axis] - towards_back * c.blade_depth;
   if (border == 2) stroke.from[along_axis] = 4 * target[along_axis] - c.blade_length / 2;
@@ -220,7 +220,7 @@ Stroke draw_press(Random& random, const Case& c) {
   const int32_t sign = random.chance(0.5) ? +1 : -1;
   stroke.from[ahead] -= sign * random.between(0, 10);
   stroke.to[ahead] += sign * random.between(0, 8);
-  if (random.chance(0.4)) stroke.to[normal_axis] += random.between(-4, 4);
+  if (random.chance(0.3)) stroke.to[normal_axis] += random.between(-4, 4);
   return stroke;
 }
 
@@ -281,7 +281,7 @@ void draw_dynamics(Random& random, Case& c) {
     c.strain = random.pick({101, 105, 120, 150, 200});
   }
   if (c.nodes.empty()) return;
-  if (random.chance(0.5)) draw_presses(random, c);
+  if (random.chance(0.6)) draw_presses(random, c);
   c.pace = random.pick({1, 1, 1, 2, 4});
   if (random.chance(0.4)) c.blade_friction = random.pick({1, 3, 5, 10, 30});
   if (random.chance(0.4)) {

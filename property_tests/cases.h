@@ -104,8 +104,9 @@ struct Case {
 // same case for the same arguments on every platform.
 inline constexpr int kMostSize = 110;
 Case draw_case(uint64_t seed, int size);
-// The same body and clusters, and it moves. In half of these cases short blades press on the tissue with their faces,
-// sides, edges and backs instead of running through it: there contacts are that rounding or a wrong branch decides.
+// The same body and clusters, and it moves. In more than half of these cases short blades press on the tissue with
+// their faces, sides, edges and backs instead of running through it: there contacts are that rounding or a wrong branch
+// decides.
 Case draw_moving_case(uint64_t seed, int size);
 // A stroke of the kind that those cases have, for the body of `c`.
 Stroke draw_stroke(uint64_t seed, const Case& c);
