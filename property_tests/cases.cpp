@@ -235,6 +235,13 @@ void draw_presses(Random& random, Case& c) {
     if (s > 0) c.strokes.back().link = random.pick({Link::apart, Link::chained, Link::retraced});
   }
   incline(random, c);
+  if (random.chance(0.4)) {  // the tissue falls towards the blade that comes, and is led round it
+    const Stroke& first = c.strokes.front();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const int32_t way = first.to[axis] - first.from[axis];
+      if (way != 0) c.gravity[axis] = (way > 0 ? -1 : +1) * random.pick({30, 100, 300});
+    }
+  }
   if (random.chance(0.5)) {  // it stands where it has come to, and what it has pushed settles against it
     Stroke rest = c.strokes.back();
     rest.link = Link::chained;
@@ -287,7 +294,7 @@ void draw_dynamics(Random& random, Case& c) {
   if (random.chance(0.4)) {
     const int32_t walls = random.between(1, 2);
     for (int32_t w = 0; w < walls; ++w) c.walls.push_back(draw_wall(random, c));
-    for (int32_t& g : c.gravity) g = random.between(-3, 3);
+    for (int32_t& g : c.gravity) g += random.between(-3, 3);
     const CaseWall& wall = c.walls[random.index(c.walls.size())];
     c.gravity[at(wall.axis)] = -wall.side * random.pick({0, 10, 30, 100});
   }

@@ -83,7 +83,7 @@ class Looker {
   }
 
   bool look_at_wall(const Wall& wall, int32_t i) {
-    if (!(wall.side * (after_.x[at(i)][wall.axis] - wall.offset) <= kExactly * h_)) return false;
+    if (!(std::abs(after_.x[at(i)][wall.axis] - wall.offset) <= kExactly * h_)) return false;
     seen_.wall = true;
     seen_.wall_that_is_no_floor |= wall.axis != 2 || wall.side < 0;
     if (wall.friction > 0) look_at_friction(i, [&](int32_t k) { return slid_along(wall, moved(k)); });

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "property_tests/counterexample.h"
+#include "property_tests/dissection.h"
 #include "tests/cli/program.h"
 
 namespace {
@@ -36,7 +37,16 @@ TEST_F(Fuzz, HoldsOnEveryBackendOfEveryMachineAndMeetsEveryClass) {
     EXPECT_EQ(document["format"], "cutproof.fuzz");
     EXPECT_EQ(document["cases"], 1000);
     EXPECT_EQ(document["holds"], true);
-    for (const auto& [name, count] : document["coverage"].items()) EXPECT_GT(count, 0) << name;
+    for (const CoverageClass& each : kCoverageClasses) {
+      EXPECT_GE(document["coverage"][each.name], least_count(each, 1000, false)) << each.name;
+    }
+  }
+  // Bodies that move meet more classes, contacts in at least one of ten cases.
+  const Outcome moving = cutproof("fuzz --backend reference --dynamics --cases 1000 --seed 7 --json moving.json");
+  EXPECT_EQ(moving.status, 0) << moving.output;
+  const json document = result("moving.json");
+  for (const CoverageClass& each : kCoverageClasses) {
+    EXPECT_GE(document["coverage"][each.name], least_count(each, 1000, true)) << each.name;
   }
   const Outcome simulated = cutproof("fuzz --backend simulated --cases 260 --sizes 0-20 --seed 7");
   EXPECT_EQ(simulated.status, 0) << simulated.output;

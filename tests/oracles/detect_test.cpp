@@ -128,7 +128,7 @@ TEST(Detection, OfStrainDemandsAllOfAClusterThatIsStretchedTooMuchAndNothingElse
   turned.after.x = turned.before.x;
   expect_holds(detection(turned.setup, turned.before, turned.after));
   remove_particles(turned.after, {0});
-  expect_rejected(detection(turned.setup, turned.before, turned.after), {}, {0});
+  expect_rejected(detection(turned.setup, turned.before, turned.after), {}, {0, 1});
 }
 
 // Particle 2 lies in two clusters, so each counts half of its mass m. Of the second cluster, at 0, 1 and 2 from it with
