@@ -1,6 +1,7 @@
 // `cutproof fuzz` and `cutproof replay` as a user meets them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "property_tests/counterexample.h"
@@ -63,11 +64,21 @@ TEST_F(Fuzz, ComparesEveryStepOfAMovingBodyWithTheReferences) {
   EXPECT_LT(compared.at("undecidable").get<double>(), 0.05 * compared.at("particles").get<double>());
   EXPECT_GT(compared.at("greatest_h"), 0);
   EXPECT_LE(compared.at("greatest_h"), 1e-4);
+  // How claims of threads end may differ from one load to another, and with them clusters: only sums are compared.
+  json sum = {{"steps", 0}, {"particles", 0}, {"undecidable", 0}};
+  double greatest = 0;
   for (const std::string shard : {"1", "2"}) {
     ASSERT_EQ(cutproof(moving + shard + ".json --shard " + shard + "/2").status, 0);
+    const json part = result(shard + ".json").at("steps_compared");
+    for (auto& [field, value] : sum.items()) value = value.get<int64_t>() + part.at(field).get<int64_t>();
+    greatest = std::max(greatest, part.at("greatest_h").get<double>());
   }
   ASSERT_EQ(cutproof("fuzz --merge 1.json 2.json --json merged.json").status, 0);
-  EXPECT_EQ(result("merged.json").at("steps_compared"), compared);
+  json merged = result("merged.json").at("steps_compared");
+  EXPECT_EQ(merged.at("greatest_h"), greatest);
+  EXPECT_EQ(merged.at("steps"), compared.at("steps"));
+  merged.erase("greatest_h");
+  EXPECT_EQ(merged, sum);
 
   // Nothing is compared with itself, and what does not move has no step to speak of.
   ASSERT_EQ(cutproof("fuzz --backend reference --dynamics --cases 20 --json a.json").status, 0);
