@@ -210,7 +210,7 @@ Stroke draw_press(Random& random, const Case& c) {
   stroke.from[back_axis] -= towards_back * random.between(-1, c.blade_depth + 1);
   stroke.from[along_axis] += random.between(-c.blade_length / 2 - 1, c.blade_length / 2 + 1);
   // With the particle exactly over a border in most of them: how far a blade reaches is a whole number of quarters.
-  const int32_t border = random.between(0, 5);
+  const int32_t border = random.between(0, 4);
   if (border == 0) stroke.from[back_axis] = 4 * target[back_axis];
   if (border == 1) stroke.from[back_axis] = 4 * target[back_axis] - towards_back * c.blade_depth;
   if (border == 2) stroke.from[along_axis] = 4 * target[along_axis] - c.blade_length / 2;
@@ -288,10 +288,10 @@ void draw_dynamics(Random& random, Case& c) {
     c.strain = random.pick({101, 105, 120, 150, 200});
   }
   if (c.nodes.empty()) return;
-  if (random.chance(0.6)) draw_presses(random, c);
+  if (random.chance(0.65)) draw_presses(random, c);
   c.pace = random.pick({1, 1, 1, 2, 4});
   if (random.chance(0.4)) c.blade_friction = random.pick({1, 3, 5, 10, 30});
-  if (random.chance(0.4)) {
+  if (random.chance(0.45)) {
     const int32_t walls = random.between(1, 2);
     for (int32_t w = 0; w < walls; ++w) c.walls.push_back(draw_wall(random, c));
     for (int32_t& g : c.gravity) g += random.between(-3, 3);

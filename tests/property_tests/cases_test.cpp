@@ -275,7 +275,7 @@ TEST(DrawnCases, VaryEveryFieldAndArePlainInMost) {
            {"grips", [](const Case& c) { return !c.grips.empty(); }}}) {
     const double found = share(special, true);
     EXPECT_GT(found, 0.05) << what;
-    EXPECT_LT(found, 0.5) << what;
+    EXPECT_LT(found, what == "gravity" ? 0.6 : 0.5) << what;  // it presses on walls and blades
     EXPECT_EQ(share(special, false), 0) << what << ", where nothing moves";
   }
 }
