@@ -41,7 +41,7 @@ void note_blade(const Setup& setup, int64_t frame, CaseCoverage& seen) {
     const double greatest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
     return norm(v) - greatest < 1e-9;
   };
-  for (int64_t s = frame * setup.step.substeps; s < (frame + 1) * setup.step.substeps; ++s) {
+  for (int64_t s = frame * setup.step.substeps; setup.has_blade && s < (frame + 1) * setup.step.substeps; ++s) {
     const BladeMove& move = setup.blade_moves[at(s)];
     if (!move.down) continue;
     if (!is_along_an_axis(move.from.back)) seen["oblique blade"] = true;
