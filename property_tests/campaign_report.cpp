@@ -18,7 +18,7 @@ namespace {
 using nlohmann::json;
 
 constexpr const char* kResultFormat = "cutproof.fuzz";
-constexpr int kFormatVersion = 2;
+constexpr int kFormatVersion = 3;
 // Classes of cases are rare: below this many cases, or with small ones only, an empty class says nothing.
 constexpr int64_t kCasesThatMeetEveryClass = 1000;
 constexpr int kSizeThatMeetsEveryClass = 79;
@@ -171,12 +171,19 @@ CampaignConclusion conclude(const json& document, bool whole) {
   const std::size_t violations = document.at("violations").size();
   if (violations > 0) return {fmt::format("{} of {} cases", violations, cases)};
   if (!whole || cases < kCasesThatMeetEveryClass) return {};
-  std::vector<std::string> empty;
-  for (const char* name : kCoverageClassNames) {
-    if (document.at("coverage").at(name).get<int64_t>() == 0) empty.emplace_back(name);
+  std::vector<std::string> empty, rare;
+  for (const CoverageClass& wanted : kCoverageClasses) {
+    const auto count = document.at("coverage").at(wanted.name).get<int64_t>();
+    if (count >= least_count(wanted, cases, document.at("dynamics").get<bool>())) continue;
+    (count == 0 ? empty : rare).emplace_back(count == 0 ? wanted.name : fmt::format("{} ({})", wanted.name, count));
   }
-  if (document.at("sizes").at(1).get<int>() >= kSizeThatMeetsEveryClass && !empty.empty()) {
+  const bool meets_every_class = document.at("sizes").at(1).get<int>() >= kSizeThatMeetsEveryClass;
+  if (meets_every_class && !empty.empty()) {
     return {fmt::format("no case had: {}, so nothing was tested there", fmt::join(empty, ", "))};
+  }
+  if (meets_every_class && !rare.empty()) {
+    return {fmt::format("of {} cases fewer than one in ten had: {}, so too little was tested there", cases,
+                        fmt::join(rare, ", "))};
   }
   if (document.contains("steps_compared")) {
     const json& compared = document.at("steps_compared");

@@ -9,6 +9,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "fixtures/blade_path.h"
 #include "fixtures/bodies.h"
 #include "fixtures/cook.h"
 #include "model/rules.h"
@@ -16,6 +17,13 @@
 
 namespace cutproof::property_tests {
 namespace {
+
+// Of nodes along an axis; there is one.
+std::pair<int32_t, int32_t> extent(const std::vector<Node>& nodes, std::size_t axis) {
+  std::pair<int32_t, int32_t> range = {nodes.front()[axis], nodes.front()[axis]};
+  for (const Node& node : nodes) range = {std::min(range.first, node[axis]), std::max(range.second, node[axis])};
+  return range;
+}
 
 // --- Bodies -------------------------------------------------------------------------------------------------------
 
@@ -157,6 +165,145 @@ Stroke draw_stroke(Random& random, Node dims) {
   return stroke;
 }
 
+// A turn of so many spacings at the blade's farthest corner, at most: backends and oracles follow a turning blade in
+// pieces of a fixed length.
+Quarters draw_turn(Random& random, const Case& c) {
+  constexpr double kLongestArc = 4;  // [h]
+  const double radius = std::hypot(c.blade_length / 2.0, c.blade_depth) / 4;
+  const auto most = std::min(120, static_cast<int32_t>(100 * kLongestArc / std::sqrt(3.0) / radius));
+  Quarters turn = {random.between(-most, most), random.between(-most, most), random.between(-most, most)};
+  if (random.chance(0.3)) turn[random.index(3)] = turn[random.index(3)] = 0;  // about an axis, or in a plane of them
+  return turn;
+}
+
+// Blades that stand at an angle, or turn, in a share of all cases. `c` has its strokes.
+void incline(Random& random, Case& c) {
+  if (random.chance(0.25)) {
+    for (Stroke& stroke : c.strokes) {
+      for (int32_t& t : stroke.tilt) t = random.between(-3, 3);
+      if (random.chance(0.5)) continue;
+      for (int32_t& a : stroke.along) a = random.between(-4, 4);
+    }
+  }
+  if (random.chance(0.2)) {
+    for (Stroke& stroke : c.strokes) {
+      if (random.chance(0.7)) stroke.turn = draw_turn(random, c);
+    }
+  }
+}
+
+// --- What moves ---------------------------------------------------------------------------------------------------
+
+// A short blade that comes to a place in the tissue with its face, one of its sides, its edge or its back ahead, from a
+// few quarters away.
+Stroke draw_press(Random& random, const Case& c) {
+  Stroke stroke;
+  stroke.back = random.between(0, 5);
+  const std::size_t back_axis = at(stroke.back) / 2;
+  const std::size_t along_axis = (back_axis + static_cast<std::size_t>(random.between(1, 2))) % 3;
+  const std::size_t normal_axis = 3 - back_axis - along_axis;
+  stroke.along[along_axis] = 1;
+  const Node& target = c.nodes[random.index(c.nodes.size())];
+  for (std::size_t axis = 0; axis < 3; ++axis) stroke.from[axis] = 4 * target[axis];
+  // The place is somewhere under the blade, so often near a border of it: back from the middle of the edge.
+  const int32_t towards_back = stroke.back % 2 == 0 ? +1 : -1;
+  stroke.from[back_axis] -= towards_back * random.between(-1, c.blade_depth + 1);
+  stroke.from[along_axis] += random.between(-c.blade_length / 2 - 1, c.blade_length / 2 + 1);
+  // With the particle exactly over a border in most of them: how far a blade reaches is a whole number of quarters.
+  const int32_t border = random.between(0, 4);
+  if (border == 0) stroke.from[back_axis] = 4 * target[back_axis];
+  if (border == 1) stroke.from[back_axis] = 4 * target[back_axis] - towards_back * c.blade_depth;
+  if (border == 2) stroke.from[along_axis] = 4 * target[along_axis] - c.blade_length / 2;
+  if (border == 3) stroke.from[along_axis] = 4 * target[along_axis] + c.blade_length / 2;
+  stroke.to = stroke.from;
+  const std::size_t ahead = random.pick({normal_axis, normal_axis, along_axis, back_axis});
+  const int32_t sign = random.chance(0.5) ? +1 : -1;
+  stroke.from[ahead] -= sign * random.between(0, 10);
+  stroke.to[ahead] += sign * random.between(0, 8);
+  if (random.chance(0.3)) stroke.to[normal_axis] += random.between(-4, 4);
+  return stroke;
+}
+
+void draw_presses(Random& random, Case& c) {
+  c.blade_length = random.pick({2, 4, 6, 8, 12});
+  c.blade_depth = random.pick({2, 4, 6, 8, 12});
+  c.blade_thickness = random.pick({0, 4, 6, 8});
+  c.strokes.clear();
+  const int32_t strokes = random.between(1, 3);
+  for (int32_t s = 0; s < strokes; ++s) {
+    c.strokes.push_back(draw_press(random, c));
+    if (s > 0) c.strokes.back().link = random.pick({Link::apart, Link::chained, Link::retraced});
+  }
+  incline(random, c);
+  if (random.chance(0.4)) {  // the tissue falls towards the blade that comes, and is led round it
+    const Stroke& first = c.strokes.front();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const int32_t way = first.to[axis] - first.from[axis];
+      if (way != 0) c.gravity[axis] = (way > 0 ? -1 : +1) * random.pick({30, 100, 300});
+    }
+  }
+  if (random.chance(0.5)) {  // it stands where it has come to, and what it has pushed settles against it
+    Stroke rest = c.strokes.back();
+    rest.link = Link::chained;
+    rest.from = rest.to;
+    rest.turn = {0, 0, 0};
+    c.strokes.push_back(rest);
+  }
+}
+
+// At an outermost layer of nodes, often exactly, or a little beside it.
+CaseWall draw_wall(Random& random, const Case& c) {
+  CaseWall wall;
+  wall.axis = random.between(0, 2);
+  wall.side = random.chance(0.5) ? +1 : -1;
+  const auto [low, high] = extent(c.nodes, at(wall.axis));
+  wall.offset = 4 * (wall.side > 0 ? low : high) - wall.side * random.pick({0, 0, 1, 2, -1});
+  wall.friction = random.pick({0, 0, 3, 10});
+  return wall;
+}
+
+CaseGrip draw_grip(Random& random, const Case& c) {
+  CaseGrip grip;
+  grip.low = grip.high = c.nodes[random.index(c.nodes.size())];
+  for (int32_t& k : grip.high) k += random.between(0, 3);
+  if (random.chance(0.6)) {
+    for (int32_t& p : grip.pull) p = random.between(-5, 5);
+  }
+  grip.from = random.pick({0, 0, 0, 1, 3});
+  grip.until = random.chance(0.5) ? -1 : grip.from + random.between(1, 8);
+  return grip;
+}
+
+void draw_dynamics(Random& random, Case& c) {
+  if (random.chance(0.2)) {
+    c.solver = Solver::published;
+    c.acceleration = Acceleration::none;
+    c.relaxation = random.pick({1, 3, 5, 8, 10});
+  }
+  if (random.chance(0.25)) c.damping = random.pick({1, 10, 100, 1000});
+  if (random.chance(0.3)) c.time_step = random.pick({20, 100, 250, 4000, 16000});
+  if (random.chance(0.25)) c.epsilon = random.pick({11, 12, 13, 20, 30});
+  if (random.chance(0.24)) {
+    c.removal = random.pick({Removal::geometric, Removal::strain});
+    c.strain = random.pick({101, 105, 120, 150, 200});
+  }
+  if (c.nodes.empty()) return;
+  if (random.chance(0.65)) draw_presses(random, c);
+  c.pace = random.pick({1, 1, 1, 2, 4});
+  if (random.chance(0.4)) c.blade_friction = random.pick({1, 3, 5, 10, 30});
+  if (random.chance(0.45)) {
+    const int32_t walls = random.between(1, 2);
+    for (int32_t w = 0; w < walls; ++w) c.walls.push_back(draw_wall(random, c));
+    for (int32_t& g : c.gravity) g += random.between(-3, 3);
+    const CaseWall& wall = c.walls[random.index(c.walls.size())];
+    c.gravity[at(wall.axis)] = -wall.side * random.pick({0, 10, 30, 100});
+  }
+  if (random.chance(0.3)) {
+    const int32_t grips = random.between(1, 2);
+    for (int32_t g = 0; g < grips; ++g) c.grips.push_back(draw_grip(random, c));
+  }
+}
+
 // --- Foreign clusters ---------------------------------------------------------------------------------------------
 
 // Connected sets of at most `most` particles that cover the body: I1, I2 and nothing more.
@@ -194,33 +341,83 @@ Vec3 direction_vector(int32_t direction) {
   return {1.0 * d[0], 1.0 * d[1], 1.0 * d[2]};
 }
 
-// The cutting edge lies along the stroke, as far as that is orthogonal to the back; a stroke along the back, or of no
-// length, has its edge along another axis.
-Vec3 edge_direction(const Stroke& stroke) {
-  const Vec3 back = direction_vector(stroke.back);
-  const Vec3 way = metric(stroke.to, 4) - metric(stroke.from, 4);  // [quarters]
-  const Vec3 across = way - dot(way, back) * back;
-  return norm(across) > 0 ? normalized(across) : direction_vector((stroke.back + 2) % 6);
+Vec3 whole_vector(const std::array<int32_t, 3>& v) { return {1.0 * v[0], 1.0 * v[1], 1.0 * v[2]}; }
+
+// Halfway along the stroke. Directions that lie along an axis do so exactly.
+struct Orientation {
+  Vec3 along, back;
+};
+
+Orientation orientation_of(const Stroke& stroke) {
+  Orientation blade;
+  blade.back = direction_vector(stroke.back);
+  if (stroke.tilt != Quarters{}) blade.back = normalized(4 * blade.back + whole_vector(stroke.tilt));
+  const auto across = [&](Vec3 wish) { return wish - dot(wish, blade.back) * blade.back; };
+  // The edge lies along the stroke, as far as that is orthogonal to the back; if the stroke is along the back, or of no
+  // length, along another axis.
+  constexpr double kRounding = 1e-9;
+  Vec3 wish = stroke.along != Quarters{} ? whole_vector(stroke.along) : metric(stroke.to, 4) - metric(stroke.from, 4);
+  if (!(norm(across(wish)) > kRounding * norm(wish))) wish = direction_vector((stroke.back + 2) % 6);
+  // Of a direction that is nearly along the back the first difference is rounded too much to be orthogonal to it.
+  blade.along = normalized(across(wish));
+  if (stroke.tilt != Quarters{}) blade.along = normalized(across(blade.along));
+  return blade;
 }
+
+// By Rodrigues' formula.
+Vec3 turned(Vec3 v, Vec3 axis, double angle) {
+  return std::cos(angle) * v + std::sin(angle) * cross(axis, v) + (1 - std::cos(angle)) * dot(axis, v) * axis;
+}
+
+// Where the blade is along its stroke, from 0 to 1.
+class BladeWay {
+ public:
+  BladeWay(const Stroke& stroke, Vec3 first_node, double h)
+      : middle_(orientation_of(stroke)),
+        from_(first_node + metric(stroke.from, h)),
+        to_(first_node + metric(stroke.to, h)),
+        angle_(0.01 * norm(whole_vector(stroke.turn))),
+        axis_(angle_ > 0 ? normalized(whole_vector(stroke.turn)) : Vec3{}) {}
+
+  BladePose at(double fraction) const {
+    const Vec3 edge = from_ + fraction * (to_ - from_);
+    if (!(angle_ > 0)) return {edge, middle_.along, middle_.back};
+    const double angle = (fraction - 0.5) * angle_;
+    return {edge, turned(middle_.along, axis_, angle), turned(middle_.back, axis_, angle)};
+  }
+
+  // How many substeps it takes at least so that nothing tunnels (method.md §3, Blade).
+  double substeps_needed(const Setup& setup) const {
+    // A small part of the turn has an axis however far the whole one goes; each part is as long as any other.
+    constexpr int kParts = 64;
+    const double turning =
+        angle_ > 0 ? kParts * fixtures::motion_between(at(0), at(1.0 / kParts), setup.blade).turning : 0;
+    return std::max((norm(to_ - from_) + turning) / blade_clearance(setup),
+                    turning / (std::min(setup.blade.length, setup.blade.depth) / 2));
+  }
+
+ private:
+  Orientation middle_;
+  Vec3 from_, to_;
+  double angle_;
+  Vec3 axis_;
+};
 
 // One substep, or if the body moves as many frames as the blade needs so that it does not pass what it pushes.
 void add_moves(const Stroke& stroke, Vec3 first_node, const Case& c, Setup& setup) {
-  const double h = c.spacing;
-  const Vec3 from = first_node + metric(stroke.from, h), to = first_node + metric(stroke.to, h);
+  const BladeWay way(stroke, first_node, c.spacing);
   int64_t moves = 1;
   if (c.moves) {
-    const double most = blade_clearance(setup) * setup.step.substeps;
-    const auto frames = std::max<int64_t>(1, static_cast<int64_t>(std::ceil(norm(to - from) / most)));
-    moves = frames * setup.step.substeps;
+    const auto frames = static_cast<int64_t>(std::ceil(way.substeps_needed(setup) / setup.step.substeps));
+    moves = std::max<int64_t>(1, frames) * c.pace * setup.step.substeps;
   }
   const auto number = static_cast<int32_t>(setup.stroke_end.size());
   BladeMove move;
-  move.from = {from, edge_direction(stroke), direction_vector(stroke.back)};
+  move.from = way.at(0);
   move.down = stroke.down;
   move.stroke = stroke.down ? number : -1;
   for (int64_t k = 1; k <= moves; ++k) {
-    move.to = move.from;
-    move.to.edge = from + (static_cast<double>(k) / static_cast<double>(moves)) * (to - from);
+    move.to = way.at(static_cast<double>(k) / static_cast<double>(moves));
     setup.blade_moves.push_back(move);
     move.from = move.to;
   }
@@ -239,7 +436,54 @@ void add_schedule(const Case& c, Vec3 first_node, Setup& setup) {
     lifted.stroke = -1;
     setup.blade_moves.push_back(lifted);
   }
-  setup.substep_length.assign(setup.blade_moves.size() / substeps, 0.001);
+  setup.substep_length.assign(setup.blade_moves.size() / substeps, 1e-6 * c.time_step);
+}
+
+// A strip of substeps for each grip. What one grip holds no later one does, whenever it does.
+void add_grips(const Case& c, Setup& setup) {
+  std::vector<uint8_t> taken(c.nodes.size(), 0);
+  const auto substeps = static_cast<int64_t>(setup.blade_moves.size());
+  for (const CaseGrip& asked : c.grips) {
+    Grip grip;
+    for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
+      const auto node = setup.body.grid.coordinates(setup.body.node[at(i)]);
+      bool inside = taken[at(i)] == 0;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const int32_t k = node[axis] - 1;  // behind the ring of empty nodes
+        inside = inside && asked.low[axis] <= k && k <= asked.high[axis];
+      }
+      if (!inside) continue;
+      taken[at(i)] = 1;
+      grip.particles.push_back(i);
+    }
+    for (int64_t s = 0; s < substeps; ++s) {
+      const bool active = asked.from <= s && (asked.until < 0 || s < asked.until);
+      grip.active.push_back(active ? 1 : 0);
+      grip.displacement.push_back(active ? (c.spacing / 100) * whole_vector(asked.pull) : Vec3{});
+    }
+    setup.grips.push_back(std::move(grip));
+  }
+}
+
+void add_dynamics(const Case& c, Vec3 first_node, Setup& setup) {
+  const double h = c.spacing, dt = 1e-6 * c.time_step;
+  setup.step.solver = c.solver;
+  setup.step.relaxation = c.relaxation / 10.0;
+  if (c.solver == Solver::implicit) setup.step.acceleration = c.acceleration;
+  setup.step.damping = c.damping;
+  setup.step.gravity = (h / 1000 / (dt * dt)) * whole_vector(c.gravity);
+  setup.detect.epsilon = c.epsilon / 10.0;
+  setup.detect.strain = c.strain / 100.0;
+  if (c.removal == Removal::geometric) setup.detect.criterion = Criterion::geometric;
+  if (c.removal == Removal::strain) setup.detect.criterion = Criterion::strain;
+  setup.blade.friction = c.blade_friction / 10.0;
+  if (c.ground) {
+    setup.step.gravity += Vec3{0, 0, -9.81};
+    setup.walls.push_back({2, +1, first_node.z - 0.5 * h, 0.3});
+  }
+  for (const CaseWall& wall : c.walls) {
+    setup.walls.push_back({wall.axis, wall.side, first_node[wall.axis] + wall.offset * h / 4, wall.friction / 10.0});
+  }
 }
 
 // Without iterations rotations stay as they are loaded. Each cluster gets one of its own, so that a stage that gives a
@@ -314,6 +558,18 @@ Case draw_case(uint64_t seed, int size) {
   const int32_t strokes = random.between(0, 1 + size / 15);
   for (int32_t s = 0; s < strokes; ++s) c.strokes.push_back(draw_stroke(random, dims));
   c.together = random.pick({1, 2, 3, 8, 8});
+  if (c.merge == MergeRule::published && random.chance(0.4)) {
+    c.merge = MergeRule::single_pass;
+    // Where every cluster is small and two are too many for the cap, it goes beyond it.
+    if (random.chance(0.6)) {
+      c.clusters = ClusterKind::foreign;
+      c.most = random.between(2, 8);
+      c.tau = c.most;
+      c.cap = c.most + random.between(0, 3);
+    }
+  }
+  if (random.chance(0.3)) c.alpha = random.between(1, 9);
+  incline(random, c);
   return c;
 }
 
@@ -326,6 +582,7 @@ Case draw_moving_case(uint64_t seed, int size) {
   c.stiffness = random.between(3, 6);
   c.ground = random.chance(0.5);
   c.acceleration = random.chance(0.5) ? Acceleration::chebyshev : Acceleration::none;
+  draw_dynamics(random, c);
   return c;
 }
 
@@ -345,6 +602,9 @@ std::vector<Stroke> resolved_strokes(const Case& c) {
     if (strokes[s].link == Link::retraced) {
       strokes[s].to = strokes[s - 1].from;
       strokes[s].back = strokes[s - 1].back;
+      strokes[s].tilt = strokes[s - 1].tilt;
+      strokes[s].along = strokes[s - 1].along;
+      for (std::size_t axis = 0; axis < 3; ++axis) strokes[s].turn[axis] = -strokes[s - 1].turn[axis];
     }
   }
   return strokes;
@@ -357,8 +617,8 @@ Setup setup_of(const Case& c) {
   setup.step.substeps = c.moves ? c.substeps : c.together;
   setup.step.iterations = c.moves ? c.iterations : 0;
   setup.step.stiffness = std::pow(10.0, c.stiffness);
-  setup.step.acceleration = c.acceleration;
   setup.detect.criterion = c.moves ? Criterion::distance : Criterion::geometric;
+  setup.skin.alpha = c.alpha / 10.0;
   setup.split.debris = c.debris;
   setup.merge.rule = c.merge;
   setup.expand = {c.expand, c.expand_depth};
@@ -367,11 +627,9 @@ Setup setup_of(const Case& c) {
   setup.blade = {c.blade_length * h / 4, c.blade_depth * h / 4, c.blade_thickness * h / 4, 0};
   // Node (0, 0, 0) of the case rests one spacing from the grid's lowest node, behind the ring of empty ones.
   const Vec3 first_node = {h, h, h};
-  if (c.moves && c.ground) {
-    setup.step.gravity = {0, 0, -9.81};
-    setup.walls = {{2, +1, first_node.z - 0.5 * h, 0.3}};
-  }
+  if (c.moves) add_dynamics(c, first_node, setup);
   add_schedule(c, first_node, setup);
+  if (c.moves) add_grips(c, setup);
   return setup;
 }
 
@@ -412,12 +670,6 @@ void drop_chunks(std::size_t count, std::vector<T> Case::*list, Edits& edits) {
   }
 }
 
-std::pair<int32_t, int32_t> extent(const std::vector<Node>& nodes, std::size_t axis) {
-  std::pair<int32_t, int32_t> range = {nodes.front()[axis], nodes.front()[axis]};
-  for (const Node& node : nodes) range = {std::min(range.first, node[axis]), std::max(range.second, node[axis])};
-  return range;
-}
-
 // Without what lies on one side of a plane of the grid.
 void drop_slabs(const std::vector<Node>& nodes, Edits& edits) {
   for (std::size_t axis = 0; axis < 3 && !nodes.empty(); ++axis) {
@@ -432,11 +684,18 @@ void drop_slabs(const std::vector<Node>& nodes, Edits& edits) {
   }
 }
 
-// Body and strokes to the origin.
+// Body, strokes, walls and grips to the origin.
 void shift(const std::vector<Node>& nodes, Edits& edits) {
   for (std::size_t axis = 0; axis < 3 && !nodes.empty(); ++axis) {
     edits.push_back([axis, low = extent(nodes, axis).first](Case& c) {
       for (Node& node : c.nodes) node[axis] -= low;
+      for (CaseGrip& grip : c.grips) {
+        grip.low[axis] -= low;
+        grip.high[axis] -= low;
+      }
+      for (CaseWall& wall : c.walls) {
+        if (at(wall.axis) == axis) wall.offset -= 4 * low;
+      }
       for (Stroke& stroke : c.strokes) {
         stroke.from[axis] -= 4 * low;
         stroke.to[axis] -= 4 * low;
@@ -457,6 +716,13 @@ void towards(const Case& from, T Case::*field, T wanted, Edits& edits) {
 
 void simplify_stroke(const Case& from, std::size_t k, Edits& edits) {
   edits.push_back([k](Case& c) { c.strokes[k].down = true; });
+  for (Quarters Stroke::*vector : {&Stroke::turn, &Stroke::tilt, &Stroke::along}) {
+    edits.push_back([=](Case& c) { c.strokes[k].*vector = {0, 0, 0}; });
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      edits.push_back([=](Case& c) { (c.strokes[k].*vector)[axis] = 0; });
+      edits.push_back([=](Case& c) { (c.strokes[k].*vector)[axis] /= 2; });
+    }
+  }
   edits.push_back([k](Case& c) {
     c.strokes[k] = resolved_strokes(c)[k];
     c.strokes[k].link = Link::apart;
@@ -471,6 +737,13 @@ void simplify_stroke(const Case& from, std::size_t k, Edits& edits) {
   }
 }
 
+void simplify_grip(std::size_t k, Edits& edits) {
+  edits.push_back([k](Case& c) { c.grips[k].pull = {0, 0, 0}; });
+  edits.push_back([k](Case& c) { c.grips[k].from = 0; });
+  edits.push_back([k](Case& c) { c.grips[k].until = -1; });
+  edits.push_back([k](Case& c) { c.grips[k].high = c.grips[k].low; });
+}
+
 }  // namespace
 
 std::vector<std::function<void(Case&)>> simplifications(const Case& c) {
@@ -479,8 +752,22 @@ std::vector<std::function<void(Case&)>> simplifications(const Case& c) {
   drop_slabs(c.nodes, edits);
   drop_chunks(c.nodes.size(), &Case::nodes, edits);
 
+  drop_chunks(c.walls.size(), &Case::walls, edits);
+  drop_chunks(c.grips.size(), &Case::grips, edits);
+
   towards(c, &Case::moves, false, edits);
   towards(c, &Case::ground, false, edits);
+  towards(c, &Case::gravity, {0, 0, 0}, edits);
+  towards(c, &Case::removal, Removal::usual, edits);
+  towards(c, &Case::strain, 120, edits);
+  towards(c, &Case::epsilon, 15, edits);
+  towards(c, &Case::solver, Solver::implicit, edits);
+  towards(c, &Case::relaxation, 5, edits);
+  towards(c, &Case::damping, 0, edits);
+  towards(c, &Case::time_step, 1000, edits);
+  towards(c, &Case::pace, 1, edits);
+  towards(c, &Case::blade_friction, 0, edits);
+  towards(c, &Case::alpha, 5, edits);
   towards(c, &Case::acceleration, Acceleration::none, edits);
   towards(c, &Case::together, 1, edits);
   towards(c, &Case::substeps, 1, edits);
@@ -502,6 +789,14 @@ std::vector<std::function<void(Case&)>> simplifications(const Case& c) {
   towards(c, &Case::tau, 0, edits);
   towards(c, &Case::cap, 1, edits);
   for (std::size_t k = 0; k < c.strokes.size(); ++k) simplify_stroke(c, k, edits);
+  for (std::size_t k = 0; k < c.walls.size(); ++k) {
+    edits.push_back([k](Case& simpler) { simpler.walls[k].friction = 0; });
+  }
+  for (std::size_t k = 0; k < c.grips.size(); ++k) simplify_grip(k, edits);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    edits.push_back([axis](Case& simpler) { simpler.gravity[axis] = 0; });
+    edits.push_back([axis](Case& simpler) { simpler.gravity[axis] /= 2; });
+  }
   shift(c.nodes, edits);
   return edits;
 }
@@ -528,7 +823,30 @@ NLOHMANN_JSON_SERIALIZE_ENUM(ClusterKind, {{ClusterKind::boxes, "boxes"},
                                            {ClusterKind::sampled, "sampled"},
                                            {ClusterKind::foreign, "foreign"}})
 NLOHMANN_JSON_SERIALIZE_ENUM(Link, {{Link::apart, "apart"}, {Link::chained, "chained"}, {Link::retraced, "retraced"}})
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Stroke, from, to, back, down, link)
+NLOHMANN_JSON_SERIALIZE_ENUM(Removal, {{Removal::usual, "usual"},
+                                       {Removal::geometric, "geometric"},
+                                       {Removal::strain, "strain"}})
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CaseWall, axis, side, offset, friction)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CaseGrip, low, high, pull, from, until)
+
+// How the blade stands is written where it is not plain: strokes that were saved before read the same, wherever strokes
+// are kept (histories.h).
+void to_json(nlohmann::json& json, const Stroke& s) {
+  json = {{"from", s.from}, {"to", s.to}, {"back", s.back}, {"down", s.down}, {"link", s.link}};
+  if (s.tilt != Quarters{}) json["tilt"] = s.tilt;
+  if (s.along != Quarters{}) json["along"] = s.along;
+  if (s.turn != Quarters{}) json["turn"] = s.turn;
+}
+void from_json(const nlohmann::json& json, Stroke& s) {
+  json.at("from").get_to(s.from);
+  json.at("to").get_to(s.to);
+  json.at("back").get_to(s.back);
+  json.at("down").get_to(s.down);
+  json.at("link").get_to(s.link);
+  s.tilt = json.value("tilt", Quarters{});
+  s.along = json.value("along", Quarters{});
+  s.turn = json.value("turn", Quarters{});
+}
 
 }  // namespace cutproof::property_tests
 
@@ -551,7 +869,8 @@ namespace cutproof::property_tests {
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Case, nodes, spacing, clusters, side, seed_spacing, ball_radius, most, tau, cap,
                                    seed, merge, expand, expand_depth, debris, blade_length, blade_depth,
                                    blade_thickness, strokes, together, moves, substeps, iterations, stiffness,
-                                   acceleration, ground)
+                                   acceleration, ground, alpha, removal, epsilon, strain, solver, relaxation, damping,
+                                   time_step, pace, blade_friction, gravity, walls, grips)
 
 std::string to_json(const Case& c) { return nlohmann::json(c).dump(); }
 
@@ -583,9 +902,36 @@ void require_sane(const Case& c) {
   require(c.substeps >= 1 && c.substeps <= 1000, "substeps", "in [1, 1000]");
   require(c.iterations >= 0 && c.iterations <= 1000, "iterations", "in [0, 1000]");
   require(c.stiffness >= 0 && c.stiffness <= 12, "stiffness", "in [0, 12]");
+  const auto is_within = [](const std::array<int32_t, 3>& v, int32_t most) {
+    return std::all_of(v.begin(), v.end(), [&](int32_t q) { return -most <= q && q <= most; });
+  };
   for (const Stroke& stroke : c.strokes) {
     require(stroke.back >= 0 && stroke.back < 6, "strokes.back", "in [0, 5]");
     require(is_near(stroke.from, -kFarthest) && is_near(stroke.to, -kFarthest), "strokes", "within 2^20 of the origin");
+    require(is_within(stroke.tilt, 3), "strokes.tilt", "within -3 .. 3");
+    require(is_within(stroke.along, 1000), "strokes.along", "within -1000 .. 1000");
+    // Less than half a turn, so that a blade that takes one substep turns the way that was meant.
+    require(is_within(stroke.turn, 180), "strokes.turn", "within -180 .. 180");
+  }
+  require(c.alpha >= 1 && c.alpha <= 9, "alpha", "in [1, 9]");
+  require(c.epsilon >= 1 && c.epsilon <= 1000, "epsilon", "in [1, 1000]");
+  require(c.strain >= 1 && c.strain <= 100'000, "strain", "in [1, 100000]");
+  require(c.relaxation >= 1 && c.relaxation <= 10, "relaxation", "in [1, 10]");
+  require(c.damping >= 0 && c.damping <= 100'000, "damping", "in [0, 100000]");
+  require(c.time_step >= 1 && c.time_step <= 1'000'000, "time_step", "in [1, 1000000]");
+  require(c.pace >= 1 && c.pace <= 1000, "pace", "in [1, 1000]");
+  require(c.blade_friction >= 0 && c.blade_friction <= 10'000, "blade_friction", "in [0, 10000]");
+  require(is_within(c.gravity, 10'000), "gravity", "within -10000 .. 10000");
+  for (const CaseWall& wall : c.walls) {
+    require(wall.axis >= 0 && wall.axis < 3, "walls.axis", "0, 1 or 2");
+    require(wall.side == 1 || wall.side == -1, "walls.side", "1 or -1");
+    require(std::abs(int64_t{wall.offset}) <= 4 * int64_t{kFarthest}, "walls.offset", "within 2^22 of the origin");
+    require(wall.friction >= 0 && wall.friction <= 10'000, "walls.friction", "in [0, 10000]");
+  }
+  for (const CaseGrip& grip : c.grips) {
+    require(is_within(grip.low, kFarthest) && is_within(grip.high, kFarthest), "grips", "within 2^20 of the origin");
+    require(is_within(grip.pull, 1000), "grips.pull", "within -1000 .. 1000");
+    require(grip.from >= 0 && grip.until >= -1, "grips.from and until", ">= 0 (until: >= -1)");
   }
 }
 
@@ -596,8 +942,17 @@ Case from_json(const std::string& text) {
     auto document = nlohmann::json::parse(text);
     // Cases that were saved before there were these fields.
     if (document.is_object()) {
-      document.emplace("acceleration", Acceleration::none);
-      document.emplace("together", 1);
+      const nlohmann::json plain = Case{};
+      for (const char* field :
+           {"acceleration", "together", "alpha", "removal", "epsilon", "strain", "solver", "relaxation", "damping",
+            "time_step", "pace", "blade_friction", "gravity", "walls", "grips"}) {
+        document.emplace(field, plain.at(field));
+      }
+      for (auto& stroke : document.at("strokes")) {
+        for (const char* field : {"tilt", "along", "turn"}) {
+          if (stroke.value(field, nlohmann::json()) == nlohmann::json(Quarters{})) stroke.erase(field);
+        }
+      }
     }
     const Case c = document.get<Case>();
     // What nlohmann reads without a word, such as a rule that does not exist, does not come back as it was.

@@ -14,6 +14,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "model/backend.h"
@@ -51,11 +52,15 @@ class EveryBackend : public ::testing::TestWithParam<NamedBackend> {
   int64_t cases_of(int64_t fraction) const;
   // Whether all cases ran as planned and every class of cases must have occurred.
   bool ran_in_full() const;
-  // Prints how many `things` were in each class; if all ran in full each class must have occurred.
+  // Prints how many `things` were in each class; if all ran in full each class that is `wanted` must have occurred.
   template <const auto& names>
-  void report(const Coverage<names>& seen, const char* things) const {
+  void report(
+      const Coverage<names>& seen, const char* things,
+      const std::function<bool(std::size_t)>& wanted = [](std::size_t) { return true; }) const {
+    const char* separator = " ";
     for (std::size_t k = 0; k < names.size(); ++k) {
-      std::cout << (k == 0 ? " " : ", ") << names[k] << " " << seen.begin()[k];
+      if (!wanted(k)) continue;
+      std::cout << std::exchange(separator, ", ") << names[k] << " " << seen.begin()[k];
       if (ran_in_full()) {
         EXPECT_GT(seen.begin()[k], 0) << "no " << things << " with '" << names[k] << "': nothing was tested there";
       }

@@ -3,13 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "harness/backends.h"
 #include "harness/frame_runner.h"
 #include "harness/judge.h"
 #include "harness/reference_stages.h"
+#include "model/rules.h"
 #include "oracles/oracles.h"
+#include "property_tests/touching.h"
 
 namespace cutproof::property_tests {
 namespace {
@@ -31,6 +35,62 @@ void note_what_is_given(const Case& c, const Instance& loaded, CaseCoverage& see
   }
 }
 
+// Turns, and stands at an angle, in some substep of the frame in which it is down.
+void note_blade(const Setup& setup, int64_t frame, CaseCoverage& seen) {
+  const auto is_along_an_axis = [](Vec3 v) {
+    const double greatest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+    return norm(v) - greatest < 1e-9;
+  };
+  for (int64_t s = frame * setup.step.substeps; setup.has_blade && s < (frame + 1) * setup.step.substeps; ++s) {
+    const BladeMove& move = setup.blade_moves[at(s)];
+    if (!move.down) continue;
+    if (!is_along_an_axis(move.from.back)) seen["oblique blade"] = true;
+    if (!(move.from.along == move.to.along && move.from.back == move.to.back)) seen["turning blade"] = true;
+  }
+}
+
+// What of a setup has played a part in a step: something moved, and in more than free flight.
+void note_parameters(const Setup& setup, const State& before, const State& after, CaseCoverage& seen) {
+  const StepParameters& step = setup.step;
+  if (step.iterations == 0 || before.x == after.x) return;
+  const double dt = setup.substep_length[at(before.frame)];
+  if (step.solver == Solver::published) seen["published solver"] = true;
+  if (step.acceleration != Acceleration::none) seen["accelerated solver"] = true;
+  if (step.damping > 0) seen["damped"] = true;
+  if (dt < 0.001) seen["small dt"] = true;
+  if (dt > 0.001) seen["large dt"] = true;
+}
+
+void note_touches(const Touches& touches, CaseCoverage& seen) {
+  const std::pair<const char*, bool> noted[] = {{"grip", touches.held},
+                                                {"grip released", touches.released},
+                                                {"wall", touches.wall},
+                                                {"wall that is no floor", touches.wall_that_is_no_floor},
+                                                {"blade face", touches.blade_face},
+                                                {"blade rim", touches.blade_rim},
+                                                {"blade side", touches.blade_side},
+                                                {"cutting edge", touches.cutting_edge},
+                                                {"blade back", touches.blade_back},
+                                                {"on a border", touches.on_a_border},
+                                                {"led round the blade", touches.led_round},
+                                                {"blade and wall at once", touches.blade_and_wall},
+                                                {"friction slides", touches.slides},
+                                                {"friction sticks", touches.sticks}};
+  for (const auto& [name, is] : noted) {
+    if (is) seen[name] = true;
+  }
+}
+
+void note_what_was_removed(const Setup& setup, CaseCoverage& seen) {
+  seen["removal"] = true;
+  const DetectParameters& detect = setup.detect;
+  if (detect.criterion == Criterion::distance && detect.epsilon != DetectParameters{}.epsilon) {
+    seen["cut at another epsilon"] = true;
+  }
+  if (detect.criterion == Criterion::strain) seen["cut by strain"] = true;
+  if (detect.criterion == Criterion::geometric && setup.step.iterations > 0) seen["geometric cut of what moves"] = true;
+}
+
 void note_what_a_stage_did(const Setup& setup, Stage stage, const State& before, const State& after,
                            CaseCoverage& seen) {
   const auto clusters_before = before.clusters.count(), clusters_after = after.clusters.count();
@@ -40,7 +100,7 @@ void note_what_a_stage_did(const Setup& setup, Stage stage, const State& before,
       for (int32_t s = 0; setup.has_blade && s < setup.step.substeps; ++s) {
         down = down || setup.blade_moves[at(before.frame * setup.step.substeps + s)].down;
       }
-      if (!after.removed.empty()) seen["removal"] = true;
+      if (!after.removed.empty()) note_what_was_removed(setup, seen);
       if (after.removed.empty() && down && alive_count(before) > 0) seen["miss"] = true;
       break;
     }
@@ -57,6 +117,7 @@ void note_what_a_stage_did(const Setup& setup, Stage stage, const State& before,
       if (clusters_after < clusters_before) {
         seen["merge"] = true;
         if (setup.merge.rule == MergeRule::published) seen["published merge"] = true;
+        if (setup.merge.rule == MergeRule::single_pass) seen["single pass merge"] = true;
       }
       break;
     case Stage::expand:
@@ -66,12 +127,31 @@ void note_what_a_stage_did(const Setup& setup, Stage stage, const State& before,
       }
       break;
     case Stage::step:
+      note_blade(setup, before.frame, seen);
+      note_parameters(setup, before, after, seen);
+      note_touches(touches_of(setup, before, after), seen);
+      break;
     case Stage::skin:
+      if (setup.skin.alpha != SkinParameters{}.alpha && !after.skin.triangles.empty()) seen["alpha"] = true;
       break;
   }
 }
 
+// Of a merge that is legal but for clusters larger than cap, under a rule that does not promise to keep it. With a cap
+// that nothing exceeds the rest is judged alone.
+bool is_only_above_the_cap(const Setup& setup, const Verdict& verdict, State before, const State& after) {
+  if (verdict.holds || verdict.property != "merge legality" || promise_of(setup.merge.rule).keeps_cap) return false;
+  before.cap = std::numeric_limits<int32_t>::max();
+  return oracles::merge_legality(setup, before, after).holds;
+}
+
 }  // namespace
+
+int64_t least_count(const CoverageClass& wanted, int64_t cases, bool move) {
+  if (wanted.occurs == Occurs::always) return 1;
+  if (!move) return 0;
+  return wanted.occurs == Occurs::often_where_bodies_move ? std::max<int64_t>(1, cases / 10) : 1;
+}
 
 void StepsCompared::add(const oracles::StageDifference& step) {
   const oracles::ErrorNorm& position = step.error(oracles::Measure::position).norm;
@@ -147,7 +227,13 @@ Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, 
     if (judgement.failure) break;
     const State &before = *moment.before, &after = *moment.after;
     judge.see(moment);
-    take(judge.take_verdicts());
+    std::vector<Verdict> verdicts = judge.take_verdicts();
+    for (Verdict& verdict : verdicts) {
+      if (!is_only_above_the_cap(setup, verdict, before, after)) continue;
+      verdict.holds = true;
+      seen["above the cap without promise"] = true;
+    }
+    take(std::move(verdicts));
     for (const harness::Judge::Unpromised& u : judge.unpromised()) {
       if (u.property == "isolation" && u.failing > 0) seen["uncoupled without promise"] = true;
     }

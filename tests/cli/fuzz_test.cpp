@@ -1,9 +1,11 @@
 // `cutproof fuzz` and `cutproof replay` as a user meets them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "property_tests/counterexample.h"
+#include "property_tests/dissection.h"
 #include "tests/cli/program.h"
 
 namespace {
@@ -36,7 +38,16 @@ TEST_F(Fuzz, HoldsOnEveryBackendOfEveryMachineAndMeetsEveryClass) {
     EXPECT_EQ(document["format"], "cutproof.fuzz");
     EXPECT_EQ(document["cases"], 1000);
     EXPECT_EQ(document["holds"], true);
-    for (const auto& [name, count] : document["coverage"].items()) EXPECT_GT(count, 0) << name;
+    for (const CoverageClass& each : kCoverageClasses) {
+      EXPECT_GE(document["coverage"][each.name], least_count(each, 1000, false)) << each.name;
+    }
+  }
+  // Bodies that move meet more classes, contacts in at least one of ten cases.
+  const Outcome moving = cutproof("fuzz --backend reference --dynamics --cases 1000 --seed 7 --json moving.json");
+  EXPECT_EQ(moving.status, 0) << moving.output;
+  const json document = result("moving.json");
+  for (const CoverageClass& each : kCoverageClasses) {
+    EXPECT_GE(document["coverage"][each.name], least_count(each, 1000, true)) << each.name;
   }
   const Outcome simulated = cutproof("fuzz --backend simulated --cases 260 --sizes 0-20 --seed 7");
   EXPECT_EQ(simulated.status, 0) << simulated.output;
@@ -53,11 +64,21 @@ TEST_F(Fuzz, ComparesEveryStepOfAMovingBodyWithTheReferences) {
   EXPECT_LT(compared.at("undecidable").get<double>(), 0.05 * compared.at("particles").get<double>());
   EXPECT_GT(compared.at("greatest_h"), 0);
   EXPECT_LE(compared.at("greatest_h"), 1e-4);
+  // How claims of threads end may differ from one load to another, and with them clusters: only sums are compared.
+  json sum = {{"steps", 0}, {"particles", 0}, {"undecidable", 0}};
+  double greatest = 0;
   for (const std::string shard : {"1", "2"}) {
     ASSERT_EQ(cutproof(moving + shard + ".json --shard " + shard + "/2").status, 0);
+    const json part = result(shard + ".json").at("steps_compared");
+    for (auto& [field, value] : sum.items()) value = value.get<int64_t>() + part.at(field).get<int64_t>();
+    greatest = std::max(greatest, part.at("greatest_h").get<double>());
   }
   ASSERT_EQ(cutproof("fuzz --merge 1.json 2.json --json merged.json").status, 0);
-  EXPECT_EQ(result("merged.json").at("steps_compared"), compared);
+  json merged = result("merged.json").at("steps_compared");
+  EXPECT_EQ(merged.at("greatest_h"), greatest);
+  EXPECT_EQ(merged.at("steps"), compared.at("steps"));
+  merged.erase("greatest_h");
+  EXPECT_EQ(merged, sum);
 
   // Nothing is compared with itself, and what does not move has no step to speak of.
   ASSERT_EQ(cutproof("fuzz --backend reference --dynamics --cases 20 --json a.json").status, 0);

@@ -5,10 +5,13 @@
 
 #include <algorithm>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <utility>
 
 #include "gpu/backends.h"
 #include "model/error.h"
+#include "property_tests/campaign_report.h"
 #include "property_tests/counterexample.h"
 #include "reference_cpu/reference.h"
 
@@ -184,17 +187,66 @@ TEST(Simplest, KeepsOnlyWhatTheFaultNeeds) {
   EXPECT_EQ(found, 3);
 }
 
-TEST(AMovingCase, HasAsManyFramesAsTheBladeNeeds) {
-  int64_t divided = 0;
-  for (uint64_t seed = 0; seed < 40; ++seed) {
-    const Case c = draw_moving_case(seed, 50);
-    const cutproof::Setup setup = instance_of(c).setup;
-    const double most = blade_clearance(setup) * (1 + 1e-12);
-    for (const BladeMove& move : setup.blade_moves) EXPECT_LE(norm(move.to.edge - move.from.edge), most);
-    divided += setup.frame_count() > static_cast<int64_t>(c.strokes.size());
-    EXPECT_EQ(std::ssize(setup.blade_moves), setup.frame_count() * setup.step.substeps);
+// A document of a campaign in which each class occurred in `often` cases.
+nlohmann::json document_with(int64_t cases, bool dynamics, int64_t often) {
+  nlohmann::json coverage;
+  for (const char* name : kCoverageClassNames) coverage[name] = often;
+  return {{"cases", cases},       {"verdicts", 10 * cases}, {"violations", nlohmann::json::array()},
+          {"dynamics", dynamics}, {"coverage", coverage},   {"sizes", {0, 79}}};
+}
+
+TEST(ACampaign, FailsIfAClassThatItMustMeetIsEmptyOrRare) {
+  constexpr int64_t kCases = 1000;
+  EXPECT_TRUE(conclude(document_with(kCases, true, kCases / 10), true).holds());
+  EXPECT_TRUE(conclude(document_with(kCases, false, 1), true).holds());
+  int64_t of_moving = 0, often = 0;
+  for (const CoverageClass& each : kCoverageClasses) {
+    for (const bool dynamics : {false, true}) {
+      nlohmann::json document = document_with(kCases, dynamics, kCases / 10);
+      document["coverage"][each.name] = 0;
+      const CampaignConclusion conclusion = conclude(document, true);
+      EXPECT_EQ(conclusion.holds(), !dynamics && each.occurs != Occurs::always) << each.name;
+      EXPECT_EQ(conclusion.failure.find(each.name) == std::string::npos, conclusion.holds()) << conclusion.failure;
+      document["coverage"][each.name] = kCases / 10 - 1;
+      EXPECT_EQ(conclude(document, true).holds(), !dynamics || each.occurs != Occurs::often_where_bodies_move)
+          << each.name;
+    }
+    of_moving += each.occurs != Occurs::always;
+    often += each.occurs == Occurs::often_where_bodies_move;
   }
-  EXPECT_GT(divided, 10);
+  EXPECT_GE(of_moving, 15);
+  EXPECT_GE(often, 10);
+  // Of few cases, of small ones, or of one shard of several an empty class says nothing.
+  EXPECT_TRUE(conclude(document_with(kCases - 1, true, 0), true).holds());
+  EXPECT_TRUE(conclude(document_with(kCases, true, 0), false).holds());
+  nlohmann::json small = document_with(kCases, true, 0);
+  small["sizes"] = {0, 78};
+  EXPECT_TRUE(conclude(small, true).holds());
+}
+
+// A single pass may exceed its cap, which is counted; whatever else is wrong with such a merge is not excused.
+TEST(Campaign, ExcusesASinglePassAboveItsCapAndNothingElse) {
+  CampaignOptions options = small_campaign(3000);
+  options.keep_going = true;
+  const auto campaign_with = [&](Planted::Change change) {
+    return run_campaign(options, {[change](int64_t) { return std::make_unique<Planted>(change); }, false}, {});
+  };
+  const Campaign right = campaign_with({});
+  EXPECT_TRUE(right.violations.empty());
+  CaseCoverage coverage = right.coverage;
+  EXPECT_GT(coverage["above the cap without promise"], 0);
+  // The same, and what a merge leaves has a rotation that no input had.
+  options.batch = 1;
+  const auto clusters = std::make_shared<int32_t>(0);
+  const Campaign wrong = campaign_with([clusters](State& state) {
+    const int32_t count = state.clusters.count(), earlier = std::exchange(*clusters, count);
+    if (state.removed.empty() || count == 0 || count >= earlier) return;
+    state.clusters.rotation.back() = {{0, -1, 0, 1, 0, 0, 0, 0, 1}};
+  });
+  EXPECT_TRUE(std::any_of(wrong.violations.begin(), wrong.violations.end(),
+                          [](const Violation& v) { return v.verdict.property == "merge legality"; }));
+  coverage = wrong.coverage;
+  EXPECT_EQ(coverage["above the cap without promise"], 0);
 }
 
 TEST(ACounterexample, ComesBackFromItsFile) {
