@@ -30,7 +30,8 @@ struct Nearest {
 
   void see(double of, double within, int32_t index) {
     if (std::isnan(of)) of = std::numeric_limits<double>::infinity();
-    const double ratio = of == 0 ? 0 : of / within;
+    double ratio = of == 0 ? 0 : of / within;
+    if (std::isnan(ratio) || !std::isfinite(within)) ratio = std::numeric_limits<double>::infinity();
     if (!(ratio > share)) return;
     share = ratio;
     measured = of;

@@ -76,13 +76,16 @@ Vec3 Contacts::leave_by_a_side(Vec3 c, int side) const {
   return to_.global(best);
 }
 
-Vec3 Contacts::project(Vec3 x, int side) const {
+Vec3 Contacts::project(Vec3 x, int side, bool* in_turn) const {
   if (!has_blade_) return project_on_walls(x);
   Vec3 result = project_on_blade(x, side);
+  bool by_blade = !(result == x);
   for (int turn = 0; turn < kMostTurns; ++turn) {
     const Vec3 inside = project_on_walls(result);
     if (inside == result) return result;
     result = project_on_blade(inside, side);
+    by_blade = by_blade || !(result == inside);
+    if (in_turn != nullptr && by_blade) *in_turn = true;
     if (result == inside) return result;
   }
   return result;
@@ -90,9 +93,12 @@ Vec3 Contacts::project(Vec3 x, int side) const {
 
 // Coulomb friction in position form (Müller et al. 2007, Macklin et al. 2014 §6.1): a contact that moved the particle
 // by δ along its normal takes back at most μ δ of how far the particle has slid along the surface in this substep.
-Vec3 Contacts::project_with_friction(Vec3 x, int side, Vec3 start) const {
-  const Vec3 projected = project(x, side);
-  if (frictionless_ || projected == x) return projected;
+Vec3 Contacts::project_with_friction(Vec3 x, int side, Vec3 start, bool* in_turn) const {
+  bool turns = false;
+  const Vec3 projected = project(x, side, &turns);
+  if (in_turn != nullptr && turns) *in_turn = true;
+  // Blade and wall may both press on a point and leave it where it is: then it is rubbed all the same.
+  if (frictionless_ || (projected == x && !turns)) return projected;
   Vec3 result = projected;
   const auto rub = [&result](Vec3 slid, Vec3 normal, double reach) {
     const Vec3 along = slid - dot(slid, normal) * normal;
@@ -115,13 +121,14 @@ Vec3 Contacts::project_with_friction(Vec3 x, int side, Vec3 start) const {
       rub(result - start - carried, pushed / depth, setup_.blade.friction * depth);
     }
   }
-  return project(result, side);
+  return project(result, side, in_turn);
 }
 
 Vec3 Contacts::next_position(Vec3 free, int side, Vec3 start, Vec3 x) const {
-  const Vec3 next = project_with_friction(free, side, start);
+  bool in_turn = false;
+  const Vec3 next = project_with_friction(free, side, start, &in_turn);
   const bool worse = dot(next - free, next - free) > dot(x - free, x - free);
-  return takes_turns() && frictionless() && worse ? x : next;
+  return in_turn && frictionless() && worse ? x : next;
 }
 
 }  // namespace cutproof::reference

@@ -16,19 +16,18 @@ class Contacts {
 
   // The allowed point nearest to x, without friction, of a particle that began on side `side`. Exact for the walls
   // alone and for the blade alone; where both hold at once they are projected in turn, the blade last.
-  Vec3 project(Vec3 x, int side) const;
+  // `in_turn`, if wanted, is set where both have moved it.
+  Vec3 project(Vec3 x, int side, bool* in_turn = nullptr) const;
 
   // The same with friction: `start` is where the particle was when the substep began.
-  Vec3 project_with_friction(Vec3 x, int side, Vec3 start) const;
+  Vec3 project_with_friction(Vec3 x, int side, Vec3 start, bool* in_turn = nullptr) const;
 
-  // The same for a solver that comes from x and would go to `free`. Where blade and walls are projected in turn, that
+  // The same for a solver that comes from x and would go to `free`. Where blade and walls both move it, in turn, that
   // need not give the nearest point; one that is farther from `free` than x is not taken, so that the energy cannot
   // grow. Elsewhere the projection is exact, and asking would only let rounding decide.
   Vec3 next_position(Vec3 free, int side, Vec3 start, Vec3 x) const;
 
   bool any() const { return has_blade_ || !setup_.walls.empty(); }
-  // Blade and walls are projected in turn, which need not give the nearest point.
-  bool takes_turns() const { return has_blade_ && !setup_.walls.empty(); }
   bool frictionless() const { return frictionless_; }
   // Friction, or room that is not convex: an iteration can have several fixed points.
   bool path_matters() const { return has_blade_ || !frictionless_; }

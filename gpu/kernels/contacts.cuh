@@ -165,8 +165,11 @@ CUTPROOF_DEVICE inline float blade_side(const Contacts& contacts, const RestPoin
 CUTPROOF_DEVICE inline Float3 project(const Contacts& contacts, const RestPoint& rest, Float3 d, float side,
                                       Float3 start, bool& in_turn) {
   using namespace contacts_detail;
-  const Float3 projected = allowed(contacts, rest, d, side, in_turn);
-  if (contacts.frictionless || same(projected, d)) return projected;
+  bool turns = false;
+  const Float3 projected = allowed(contacts, rest, d, side, turns);
+  in_turn = in_turn || turns;
+  // Blade and wall may both press on a point and leave it where it is: then it is rubbed all the same.
+  if (contacts.frictionless || (same(projected, d) && !turns)) return projected;
   Float3 result = projected;
   for (int k = 0; k < contacts.wall_count; ++k) {
     const WallF wall = contacts.walls[k];

@@ -9,6 +9,7 @@
 
 #include "model/at.h"
 #include "oracles/best_rotation.h"
+#include "oracles/blade_motion.h"
 #include "oracles/partitions.h"
 #include "oracles/shape_sums.h"
 #include "oracles/support.h"
@@ -31,6 +32,9 @@ constexpr double kNear = 2e-3;
 // Outcomes that are tried for one coupled set, and what they may cost in all [evaluations].
 constexpr int kMostOutcomes = 1024;
 constexpr int64_t kMostEvaluations = 2'000'000'000;
+
+// Two rotations are not farther apart, but for the rounding of their entries (apart).
+constexpr double kAnyRotation = 2 + 1e-4;
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
@@ -69,6 +73,7 @@ class Search {
         reach_[at(c)] = std::max(reach_[at(c)], norm(rest.position[at(i)] - center));
       }
     }
+    coupled_ = components_of_coupling(TissueGraph(setup.body, before.alive), before.clusters);
     most_outcomes_ = static_cast<int>(
         std::clamp<int64_t>(kMostEvaluations / std::max<int64_t>(1, model_.evaluations()), 16, kMostOutcomes));
   }
@@ -88,8 +93,10 @@ class Search {
   // One outcome, with what was found out about it.
   struct Branch {
     Settled settled;
+    std::vector<const Mat3*> given;  // [m] rotations of the last iteration that the backend had to choose
     StepOutcome outcome;
     Bounds bounds;
+    std::vector<uint8_t> blunt;       // [n] 1: only asked bluntly
     bool close = false;               // bounds are those of disturbed runs
     std::vector<NearDecision> ties;   // that rounding may take the other way; known once looked at closely
     std::vector<int32_t> violations;  // particles beyond their bounds, or of clusters that are
@@ -104,6 +111,7 @@ class Search {
     Branch branch;
     branch.settled = std::move(settled);
     branch.outcome = model_.run({branch.settled, 0, kNear * h_, {}});
+    follow_rotations(branch);
     const StepOutcome& o = branch.outcome;
     Bounds& b = branch.bounds;
     for (const double square : o.rounding) {
@@ -120,6 +128,28 @@ class Search {
     return branch;
   }
 
+  // Where many rotations are the best in the last iteration, the one that the backend states is the right one, if it is
+  // among them: everything else has to follow from it. True if there are new ones.
+  bool follow_rotations(Branch& branch) {
+    const StepOutcome& o = branch.outcome;
+    branch.given.resize(reach_.size(), nullptr);
+    bool any = false;
+    for (std::size_t c = 0; c < reach_.size(); ++c) {
+      const bool is_free = o.free[c] == StepOutcome::Free::at_last || o.free[c] == StepOutcome::Free::about_line;
+      if (!is_free || branch.given[c] != nullptr) continue;
+      const Mat3& r = after_.clusters.rotation[c];
+      const BestRotation best = best_rotation(o.shape[c]);
+      const Vec3 u = {best.u[0], best.u[1], best.u[2]}, v = {best.v[0], best.v[1], best.v[2]};
+      const double known = branch.bounds.rotation.empty() ? 0 : branch.bounds.rotation[c];
+      const double rounding = kSigmas * (std::sqrt(o.turn_rounding[c]) + 4 * unit_roundoff(after_));
+      if (!(norm(r * v - u) <= std::max(rounding, known))) continue;
+      branch.given[c] = &r;
+      any = true;
+    }
+    if (any) branch.outcome = model_.run({branch.settled, 0, kNear * h_, branch.given});
+    return any;
+  }
+
   // What rounding does to this outcome, by disturbed runs that take the same decisions.
   void look_closer(Branch& branch) {
     const std::size_t n = before_.x.size(), m = reach_.size();
@@ -133,7 +163,7 @@ class Search {
       spread[key] = 0;
     }
     for (uint64_t run = 1; run <= kDisturbedRuns; ++run) {
-      const StepOutcome off = model_.run({as_taken, run, 2 * kNear * h_, {}});
+      const StepOutcome off = model_.run({as_taken, run, 2 * kNear * h_, branch.given});
       for (std::size_t i = 0; i < n; ++i) {
         grown.position[i] = std::max(grown.position[i], or_infinite(norm(off.x[i] - branch.outcome.x[i])));
         grown.velocity[i] = std::max(grown.velocity[i], or_infinite(norm(off.v[i] - branch.outcome.v[i])));
@@ -157,6 +187,8 @@ class Search {
     }
     for (std::size_t c = 0; c < m; ++c) b.rotation[c] = std::max(b.rotation[c], kBeyondRuns * grown.rotation[c]);
     b.impulse = std::max(b.impulse, kBeyondRuns * grown.impulse);
+    if (follow_rotations(branch)) return look_closer(branch);
+    ask_bluntly(branch);
     branch.close = true;
     branch.ties.clear();
     for (const NearDecision& d : branch.outcome.near) {
@@ -165,6 +197,52 @@ class Search {
     }
     std::sort(branch.ties.begin(), branch.ties.end(),
               [](const NearDecision& p, const NearDecision& q) { return p.key < q.key; });
+  }
+
+  // Where rounding is carried so far that small changes are no rule any more, or where many rotations fit a cluster
+  // before the last iteration, all that is coupled is asked one blunt question: no farther than the farthest of the
+  // runs brings any of it, and than such a cluster could have turned its members.
+  void ask_bluntly(Branch& branch) const {
+    Bounds& b = branch.bounds;
+    const std::size_t sets = at(coupled_.count) + 1;
+    std::vector<double> far(sets, 0), fast(sets, 0), turned(sets, 0);
+    std::vector<uint8_t> is_blunt(sets, 0);
+    for (std::size_t i = 0; i < before_.x.size(); ++i) {
+      if (before_.alive[i] == 0) continue;
+      const std::size_t set = at(coupled_.label[i]);
+      far[set] = std::max(far[set], b.position[i]);
+      fast[set] = std::max(fast[set], b.velocity[i]);
+      if (!(b.position[i] <= kSmall * h_)) is_blunt[set] = 1;
+    }
+    for (std::size_t c = 0; c < reach_.size(); ++c) {
+      if (branch.outcome.free[c] != StepOutcome::Free::before) continue;
+      const std::size_t set = set_of(c);
+      is_blunt[set] = 1;
+      turned[set] = std::max(turned[set], 2 * reach_[c]);
+    }
+    branch.blunt.assign(before_.x.size(), 0);
+    double pushed = 0;
+    const double substeps = setup_.step.substeps;
+    for (std::size_t i = 0; i < before_.x.size(); ++i) {
+      if (before_.alive[i] == 0) continue;
+      const std::size_t set = at(coupled_.label[i]);
+      if (is_blunt[set] == 0) continue;
+      branch.blunt[i] = 1;
+      b.position[i] = far[set] + substeps * turned[set];
+      b.velocity[i] = fast[set] + 2 * substeps * turned[set];
+      pushed += setup_.body.mass[i] * b.velocity[i];
+    }
+    for (std::size_t c = 0; c < reach_.size(); ++c) {
+      if (is_blunt[set_of(c)] != 0) b.rotation[c] = kAnyRotation;
+    }
+    b.impulse += pushed / dt_;
+  }
+  // A cluster of none that is alive belongs to a set of its own, of which nothing is known.
+  std::size_t set_of(std::size_t cluster) const {
+    for (const int32_t i : before_.clusters.of(static_cast<int32_t>(cluster))) {
+      if (coupled_.label[at(i)] >= 0) return at(coupled_.label[at(i)]);
+    }
+    return at(coupled_.count);
   }
 
   void see(Branch& branch, StepPart part, int32_t where, double measured, double bound) const {
@@ -215,31 +293,34 @@ class Search {
       if (a.violations.size() != b.violations.size()) return a.violations.size() > b.violations.size();
       return a.settled.size() > b.settled.size();
     };
+    Branch root = std::move(first);
+    if (Settled known = sides_of(root); !known.empty()) {
+      root = start(std::move(known));
+      look_closer(root);
+      compare(root);
+    }
     std::vector<Branch> open;
-    std::set<Settled> seen = {first.settled};
-    Branch best = first;
+    std::set<Settled> seen = {root.settled};
+    Branch best = root;
     int tried = 0;
     const auto try_out = [&](Settled settled) {
       if (tried >= most_outcomes_ || !seen.insert(settled).second) return;
       ++tried;
       Branch next = start(std::move(settled));
-      next.bounds = first.bounds;  // until it is worth a closer look
+      next.bounds = root.bounds;  // until it is worth a closer look
       next.close = false;
       compare(next);
-      if (next.holds() || next.violations.size() < best.violations.size()) {
+      if (next.violations.size() <= best.violations.size()) {
         look_closer(next);
         compare(next);
       } else {
-        next.ties = near_ties(next, first);
+        next.ties = near_ties(next, root);
       }
       if (better(best, next)) best = next;
       open.push_back(std::move(next));
       std::push_heap(open.begin(), open.end(), better);
     };
-    // Where particles ended tells on which side of the blade they were.
-    if (const Settled led = sides_of(first); !led.empty()) try_out(led);
-    open.push_back(first);
-    std::push_heap(open.begin(), open.end(), better);
+    open.push_back(root);
     while (!open.empty() && !best.holds() && tried < most_outcomes_) {
       std::pop_heap(open.begin(), open.end(), better);
       const Branch present = std::move(open.back());
@@ -275,16 +356,21 @@ class Search {
     return ties;
   }
 
+  // A particle that ends over the plate, clear of its rim, tells on which side of the blade it began the last substep:
+  // no such side is open. (One that was led round the plate ends over its border.)
   Settled sides_of(const Branch& branch) const {
-    Settled led = branch.settled;
-    const BladePose* pose = nullptr;
-    if (setup_.has_blade) pose = &setup_.blade_moves[at((before_.frame + 1) * setup_.step.substeps - 1)].to;
+    Settled known = branch.settled;
+    if (!setup_.has_blade) return known;
+    const BladePose& pose = setup_.blade_moves[at((before_.frame + 1) * setup_.step.substeps - 1)].to;
     for (const NearDecision& d : branch.ties) {
-      if (d.key.kind != DecisionKind::side || pose == nullptr) continue;
-      const double height = dot(after_.x[at(d.key.particle)] - pose->edge, cross(pose->along, pose->back));
-      led[d.key] = height < 0 ? 1 : 0;
+      if (d.key.kind != DecisionKind::side || d.key.substep + 1 < setup_.step.substeps) continue;
+      const Local place = to_local(pose, after_.x[at(d.key.particle)] - pose.edge);
+      const double rim = kSmall * h_;
+      const bool over =
+          std::abs(place.u) < setup_.blade.length / 2 - rim && place.w > rim && place.w < setup_.blade.depth - rim;
+      if (over && std::abs(place.n) >= blade_clearance(setup_) / 2) known[d.key] = place.n < 0 ? 1 : 0;
     }
-    return led;
+    return known;
   }
 
   // More ties than can be tried together: what violates must at least be within what they do one by one, added up.
@@ -310,14 +396,19 @@ class Search {
     found.measured = branch.measured;
     found.bound = branch.bound;
     found.holds = branch.holds() || undecided_ > 0;
-    found.otherwise = static_cast<int64_t>(branch.settled.size());
+    std::set<DecisionKey> against;
+    for (const NearDecision& d : branch.outcome.near) {
+      if (!d.is_natural) against.insert(d.key);
+    }
+    found.otherwise = static_cast<int64_t>(against.size()) + std::count_if(branch.given.begin(), branch.given.end(),
+                                                                           [](const Mat3* r) { return r != nullptr; });
     found.checked = std::count_if(before_.alive.begin(), before_.alive.end(), [](uint8_t a) { return a != 0; }) +
                     before_.clusters.count();
     found.undecided = undecided_;
     for (std::size_t i = 0; i < before_.alive.size(); ++i) {
       found.position_bound.push_back(branch.bounds.position[i] / h_);
-      if (before_.alive[i] != 0 && found.position_bound.back() > kSmall && undecided_ == 0) ++found.undecided;
     }
+    found.undecided += std::count(branch.blunt.begin(), branch.blunt.end(), 1);
     for (std::size_t c = 0; c < reach_.size(); ++c) {
       found.reach.push_back(std::max(reach_[c] / h_, 1.0));
       found.rotation_bound.push_back(branch.bounds.rotation[c] * found.reach.back());
@@ -332,6 +423,7 @@ class Search {
   double mass_ = 0;
   StepModel model_;
   std::vector<double> reach_;  // [m] greatest |X - T|
+  Partition coupled_;
   int most_outcomes_ = kMostOutcomes;
   int64_t undecided_ = 0;
 };

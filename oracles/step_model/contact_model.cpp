@@ -123,7 +123,7 @@ double ContactModel::depth(Vec3 free, const Began& began, Decisions& decisions) 
 Vec3 ContactModel::place(Vec3 free, const Began& began, const Vec3* x, Decisions& decisions) const {
   bool in_turn = false;
   Vec3 placed = nearest(free, began, decisions, &in_turn);
-  if (friction_ && !(placed == free)) {
+  if (friction_ && (in_turn || !(placed == free))) {
     for (const Wall& wall : walls_) {
       const double pressed = wall.side * (wall.offset - free[wall.axis]);
       if (!(pressed > 0) || wall.friction == 0) continue;

@@ -32,7 +32,8 @@ struct DecisionKey {
 struct NearDecision {
   DecisionKey key;
   int taken = 0, other = 0;
-  double lead = 0;  // of what was taken over the other [m]; below 0 where it was settled against the numbers
+  double lead = 0;         // of what was taken over the other [m]; not above 0 where it was settled against the numbers
+  bool is_natural = true;  // as the numbers say
 };
 
 // Decisions that are settled from outside: their outcomes by their keys.
@@ -69,9 +70,11 @@ class Decisions {
     bool any = false;
     for (std::size_t k = 0; k < N; ++k) any = any || is_near(k);
     if (!any) return static_cast<int>(taken);
+    const std::size_t natural = taken;
     if (const auto known = settled_.find(key); known != settled_.end()) taken = static_cast<std::size_t>(known->second);
     for (std::size_t k = 0; k < N; ++k) {
-      if (is_near(k)) noted_.push_back({key, static_cast<int>(taken), static_cast<int>(k), cost[k] - cost[taken]});
+      if (is_near(k))
+        noted_.push_back({key, static_cast<int>(taken), static_cast<int>(k), cost[k] - cost[taken], taken == natural});
     }
     return static_cast<int>(taken);
   }

@@ -23,6 +23,14 @@ constexpr double kRotationRounds = 4;   // a rotation, about each axis, given it
 constexpr double kParameterRounds = 4;  // what is made of parameters once: s, e^(-c dt), Chebyshev's weights
 constexpr double kContactRounds = 4;    // ways into the blade's frame and back
 
+// Below this, in units of u, (σ2 + σ3) / σ1 says nothing of how a cluster is turned: backends take 2^-53 · 9,000
+// (reference) and 2^-24 · 16 (kernels) for zero.
+constexpr double kDegenerate = 1e4;
+// The same of what the rounding of places makes of the matrix.
+constexpr double kInPlaces = 0.01;
+// Of NearestRotation::weight: below this, rounding decides which way round it goes.
+constexpr double kHalfTurn = 1e-3;
+
 Vec3 turned_by(Vec3 rotation_vector, Vec3 v) { return v + cross(rotation_vector, v); }
 
 // Weights of Chebyshev's iteration j -> j + 1 by the ratio of Chebyshev polynomials (method.md §11): ω_j+1 =
@@ -84,6 +92,8 @@ StepModel::StepModel(const Setup& setup, const State& before, double unit_roundo
     const auto members = clusters.of(c);
     cluster.begin = clusters.offsets[at(c)];
     cluster.end = clusters.offsets[at(c + 1)];
+    cluster.extent = Cluster::Extent::point;
+    if (members.empty()) continue;  // coverage rejects it
     const Vec3 base = body.rest_position(members.front());
     Vec3 moment;
     for (const int32_t i : members) {
@@ -131,6 +141,7 @@ class StepModel::Run {
     out_.rotation = before_.clusters.rotation;
     out_.rounding.resize(out_.x.size());
     out_.turn_rounding.resize(model.clusters_.size());
+    out_.free.assign(model.clusters_.size(), StepOutcome::Free::never);
     center_.resize(model.clusters_.size());
     sum_.resize(out_.x.size());
     goal_rounding_.resize(out_.x.size());
@@ -177,7 +188,12 @@ class StepModel::Run {
 
   void substep(int32_t s);
   void match_shapes(bool is_last);
-  Mat3 rotation_of(int32_t c, const Eigen::Matrix3d& a, double size, bool is_last);
+  // `size`: of all terms of A. `noise`: what the rounding of places makes of A.
+  Mat3 rotation_of(int32_t c, const Eigen::Matrix3d& a, double size, double noise, bool is_last);
+  void set_free(int32_t c, bool is_last) {
+    StepOutcome::Free& free = out_.free[at(c)];
+    if (free != StepOutcome::Free::before) free = is_last ? StepOutcome::Free::at_last : StepOutcome::Free::before;
+  }
   void note_rounding(std::size_t i, double amplitude) { rounding_now_[i] += amplitude * amplitude; }
 
   const StepModel& model_;
@@ -200,18 +216,25 @@ class StepModel::Run {
 };
 
 // The best rotation; the previous one where there is no extent, the nearest to it along a line.
-Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double size, bool is_last) {
+Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double size, double noise, bool is_last) {
   const Cluster& cluster = model_.clusters_[at(c)];
   const Mat3& previous = out_.rotation[at(c)];
   double& rounding = out_.turn_rounding[at(c)];
   rounding = 0;
   if (cluster.extent == Cluster::Extent::point || !a.allFinite() || a.cwiseAbs().maxCoeff() == 0) return previous;
   const double sum_amplitude = sum_rounds(static_cast<double>(cluster.end - cluster.begin)) * u_ * size;
+  const bool is_given = is_last && !wanted_.given.empty() && wanted_.given[at(c)] != nullptr;
   if (cluster.extent == Cluster::Extent::line) {
-    const BestRotation best = best_rotation(to_mat3(a));
+    const NearestRotation nearest = nearest_of_rank_one(best_rotation(to_mat3(a)), previous);
     rounding = u_ * kRotationRounds + sum_amplitude / a.norm();
+    if (!(a.norm() > kDegenerate * kInPlaces * noise)) {
+      set_free(c, is_last);
+      rounding = 1;
+    }
     rounding *= rounding;
-    return nearest_of_rank_one(best, previous).r;
+    // After half a turn every answer is as near as any other.
+    if (!(nearest.weight > kHalfTurn)) out_.free[at(c)] = StepOutcome::Free::about_line;
+    return is_given ? *wanted_.given[at(c)] : nearest.r;
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d u = svd.matrixU();
@@ -219,9 +242,15 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double siz
   if (u.determinant() * v.determinant() < 0) u.col(2) *= -1;
   const Eigen::Vector3d sigma = (u.transpose() * a * v).diagonal();
   const double sure = sigma[1] + sigma[2];
+  if (!(sure > kDegenerate * std::max(u_ * sigma[0], kInPlaces * noise))) {
+    set_free(c, is_last);
+    rounding = sigma[0] > kDegenerate * kInPlaces * noise ? u_ * kRotationRounds + sum_amplitude / sigma[0] : 1.0;
+    rounding *= rounding;
+    return is_given ? *wanted_.given[at(c)] : nearest_of_rank_one(best_rotation(to_mat3(a)), previous).r;
+  }
   rounding = u_ * kRotationRounds + (sure > 0 ? std::min(1.0, std::sqrt(2.0) * sum_amplitude / sure) : 1.0);
   rounding *= rounding;
-  if (is_last && !wanted_.given.empty() && wanted_.given[at(c)] != nullptr) return *wanted_.given[at(c)];
+  if (is_given) return *wanted_.given[at(c)];
   return to_mat3(u * v.transpose());
 }
 
@@ -236,10 +265,12 @@ void StepModel::Run::match_shapes(bool is_last) {
     const auto members = clusters.of(c);
     const Vec3* const arm = model_.arm_.data() + cluster.begin;
     const auto terms = static_cast<double>(members.size());
+    if (members.empty()) continue;
     const Vec3 base = x[at(members.front())];
     Vec3 moment;
-    double spread = 0;
+    double spread = 0, farthest = 0, arms = 0;
     for (const int32_t i : members) {
+      farthest = std::max(farthest, norm(stored(at(i), x[at(i)])));
       const Vec3 e = x[at(i)] - base;
       moment += model_.weight_[at(i)] * e;
       spread += model_.weight_[at(i)] * norm(stored(at(i), x[at(i)]) - stored(at(members.front()), base));
@@ -251,6 +282,7 @@ void StepModel::Run::match_shapes(bool is_last) {
       const double w = model_.weight_[at(members[k])];
       const Eigen::Vector3d now = as_eigen((x[at(members[k])] - base) - from_base), rest = as_eigen(arm[k]);
       a += w * now * rest.transpose();
+      arms += w * norm(arm[k]);
       size += w * now.cwiseAbs() * rest.cwiseAbs().transpose();
     }
     if (is_last) out_.shape[at(c)] = to_mat3(a);
@@ -260,13 +292,15 @@ void StepModel::Run::match_shapes(bool is_last) {
     const Vec3 center = stores_positions_ ? t : t - cluster.rest;
     Mat3 r;
     if (disturbed_) {
+      const double norm_of_a = a.norm();
       for (int row = 0; row < 3; ++row) {
         for (int column = 0; column < 3; ++column) {
-          a(row, column) += sum_rounds(terms) * u_ * size(row, column) * noise_();
+          // Methods for rotations are stable with respect to the norm of their matrix, not entry by entry.
+          a(row, column) += u_ * (sum_rounds(terms) * size(row, column) + kRotationRounds * norm_of_a) * noise_();
         }
       }
       t += noise_.off((2 * u_) * center, mean_amplitude);
-      r = rotation_of(c, a, size.sum(), is_last);
+      r = rotation_of(c, a, size.sum(), u_ * farthest * arms, is_last);
       const Vec3 turn = (kRotationRounds * u_) * noise_.vector();
       if (cluster.extent != Cluster::Extent::point) {
         for (int column = 0; column < 3; ++column) {
@@ -275,7 +309,7 @@ void StepModel::Run::match_shapes(bool is_last) {
         }
       }
     } else {
-      r = rotation_of(c, a, size.sum(), is_last);
+      r = rotation_of(c, a, size.sum(), u_ * farthest * arms, is_last);
     }
     out_.rotation[at(c)] = r;
     if (disturbed_) t -= r * rest_off_[at(c)];

@@ -129,6 +129,56 @@ TEST(Detection, ByStrainTakesWholeClustersThatAreStretchedTooMuch) {
   expect_holds(detection(pair.setup, pair.before, pair.after));
 }
 
+// A bar of two clusters that share a particle, the second stretched along the bar so that its last particle is
+// `farthest` beyond its place: the field is bent, so what a cluster's stretch is depends on the weights.
+Pair bent(double farthest) {
+  Pair pair = pair_of(block_body(5, 1, 1), {{0, 1, 2}, {2, 3, 4}}, {{0, 1, 2}, {2, 3, 4}});
+  pair.setup.detect.criterion = Criterion::strain;
+  pair.setup.detect.without_blade = true;
+  pair.setup.detect.strain = 1.2;
+  pair.before.x[4].x += farthest;
+  pair.after.x = pair.before.x;
+  return pair;
+}
+
+TEST(Detection, OfStrainDemandsAllOfAClusterThatIsStretchedTooMuchAndNothingElse) {
+  Pair pair = bent(1);
+  expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {2, 3});
+  remove_particles(pair.after, {2, 3, 4});
+  expect_holds(detection(pair.setup, pair.before, pair.after));
+  pair.after.removed = {};
+  expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {2});
+  Pair other = bent(1);
+  remove_particles(other.after, {1, 2, 3, 4});
+  expect_rejected(detection(other.setup, other.before, other.after), {}, {1, 2});
+  // What turns as a whole is not stretched.
+  Pair turned = bent(0);
+  for (Vec3& x : turned.before.x) x = {-x.y, x.x, x.z};
+  turned.after.x = turned.before.x;
+  expect_holds(detection(turned.setup, turned.before, turned.after));
+  remove_particles(turned.after, {0});
+  expect_rejected(detection(turned.setup, turned.before, turned.after), {}, {0, 1});
+}
+
+// Particle 2 lies in two clusters, so each counts half of its mass m. Of the second cluster, at 0, 1 and 2 from it with
+// weights 1/2, 1 and 1: the mean is 6/5, Σ w r² = 1/2 · 36/25 + 1/25 + 16/25 = 7/5, Σ w e r = 4/5 d, so the stretch is
+// 1 + 4/7 d. With whole masses it would be 1 + d/2.
+TEST(Detection, OfStrainCountsWhatClustersShareOnce) {
+  const double limit = 0.2 * 7 / 4;
+  Pair pair = bent(limit * (1 + 1e-12));
+  expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {2, 3});
+  pair = bent(limit * (1 - 1e-12));
+  expect_holds(detection(pair.setup, pair.before, pair.after));
+  pair = bent(limit);  // rounding decides
+  expect_holds(detection(pair.setup, pair.before, pair.after));
+  remove_particles(pair.after, {2, 3, 4});
+  expect_holds(detection(pair.setup, pair.before, pair.after));
+  // In single precision, rounding reaches farther, and what lies beyond it still counts.
+  pair = bent(limit * (1 + 1e-3));
+  pair.before.precision = Precision::binary32;
+  expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {2, 3});
+}
+
 // A 5 × 1 × 5 sheet in the plane y = 1, x and z from 1 to 5, and a blade that comes down at x = `place`, its edge
 // along y, from z = 10 to z = 3.
 Pair struck(double place, double thickness) {
