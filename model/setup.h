@@ -67,6 +67,11 @@ struct Wall {
   friend bool operator==(const Wall&, const Wall&) = default;
 };
 
+// Whether two walls face each other with no room between them: then nothing is allowed anywhere.
+inline bool leave_no_room(const Wall& a, const Wall& b) {
+  return a.axis == b.axis && a.side != b.side && a.side * (b.offset - a.offset) <= 0;
+}
+
 // Particles that follow a given path while active. Pinned particles are a grip that never moves.
 struct Grip {
   std::vector<int32_t> particles;  // ascending; no particle is held by two grips at once

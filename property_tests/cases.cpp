@@ -481,8 +481,11 @@ void add_dynamics(const Case& c, Vec3 first_node, Setup& setup) {
     setup.step.gravity += Vec3{0, 0, -9.81};
     setup.walls.push_back({2, +1, first_node.z - 0.5 * h, 0.3});
   }
-  for (const CaseWall& wall : c.walls) {
-    setup.walls.push_back({wall.axis, wall.side, first_node[wall.axis] + wall.offset * h / 4, wall.friction / 10.0});
+  for (const CaseWall& drawn : c.walls) {
+    const Wall wall = {drawn.axis, drawn.side, first_node[drawn.axis] + drawn.offset * h / 4, drawn.friction / 10.0};
+    const bool has_room = std::none_of(setup.walls.begin(), setup.walls.end(),
+                                       [&](const Wall& other) { return leave_no_room(wall, other); });
+    if (has_room) setup.walls.push_back(wall);
   }
 }
 

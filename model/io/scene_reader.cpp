@@ -351,6 +351,19 @@ void check(const WallSpec& s, const Place& at) {
   if (s.side == 0) at.inner("side").fail("The value 0 is out of bounds.", "Give 1 or -1.");
 }
 
+void check(const Scene& s, const Place& at) {
+  for (std::size_t a = 0; a < s.walls.size(); ++a) {
+    for (std::size_t b = 0; b < a; ++b) {
+      const WallSpec &one = s.walls[a], &other = s.walls[b];
+      if (one.axis != other.axis || one.side == other.side || one.side * (other.offset - one.offset) > 0) continue;
+      at.inner("walls").fail(
+          fmt::format("Two walls across {} leave no room: from {} upwards and from {} downwards.", "xyz"[one.axis],
+                      (one.side > 0 ? one : other).offset, (one.side > 0 ? other : one).offset),
+          "Move them apart (\"ground\" is a wall from its offset upwards along z).");
+    }
+  }
+}
+
 void check(const GripSpec& s, const Place& at) {
   for (int axis = 0; axis < 3; ++axis) {
     if (s.low[axis] > s.high[axis]) {

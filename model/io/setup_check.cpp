@@ -132,6 +132,10 @@ Defect parameter_defect(const Setup& setup) {
     if (wall.side != 1 && wall.side != -1) {
       return SetupDefect{"walls/side", fmt::format("A side is {}, and should be 1 or -1.", wall.side)};
     }
+    for (const Wall& other : setup.walls) {
+      if (!leave_no_room(wall, other)) continue;
+      return SetupDefect{"walls/offset", fmt::format("Two walls across axis {} leave no room.", wall.axis)};
+    }
   }
   return std::nullopt;
 }

@@ -157,8 +157,20 @@ void StageComparison::compare_step(const State& before, const State& after, Stag
     AdmissibleStep& step = *again.step;
     found.undecidable.otherwise = step.otherwise;
     found.undecidable.undecided = step.undecided;
-    if (step.otherwise > 0) {
+    const auto elsewhere = [&] {
+      for (std::size_t i = 0; i < expected.x.size(); ++i) {
+        const double off = norm(expected.x[i] - step.outcome.x[i]) / setup_.body.grid.spacing;
+        if (before.alive[i] != 0 && !(off <= step.position_bound[i])) return true;
+      }
+      for (int32_t c = 0; c < clusters.count(); ++c) {
+        const double turned = angle_between(expected.clusters.rotation[at(c)], step.outcome.rotation[at(c)]);
+        if (!(turned * step.reach[at(c)] <= 2 * step.rotation_bound[at(c)])) return true;
+      }
+      return false;
+    };
+    if (step.otherwise > 0 || elsewhere()) {
       // The reference has gone another way; from here on it goes the backend's.
+      if (step.otherwise == 0) ++found.undecidable.otherwise;
       expected.x = std::move(step.outcome.x);
       expected.v = std::move(step.outcome.v);
       expected.impulse = step.outcome.impulse;

@@ -193,7 +193,7 @@ class Search {
     branch.ties.clear();
     for (const NearDecision& d : branch.outcome.near) {
       if (branch.settled.contains(d.key)) continue;
-      if (d.lead <= kBeyondRuns * spread.at({d.key, d.other})) branch.ties.push_back(d);
+      if (d.lead <= kBeyondRuns * spread.at({d.key, d.other}) + d.rounding) branch.ties.push_back(d);
     }
     std::sort(branch.ties.begin(), branch.ties.end(),
               [](const NearDecision& p, const NearDecision& q) { return p.key < q.key; });
@@ -351,7 +351,7 @@ class Search {
     std::vector<NearDecision> ties;
     for (const NearDecision& d : branch.outcome.near) {
       if (branch.settled.contains(d.key)) continue;
-      if (d.lead <= 4 * measure.bounds.position[at(d.key.particle)]) ties.push_back(d);
+      if (d.lead <= kBeyondRuns * measure.bounds.position[at(d.key.particle)] + d.rounding) ties.push_back(d);
     }
     return ties;
   }

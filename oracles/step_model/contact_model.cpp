@@ -53,34 +53,32 @@ Vec3 ContactModel::off_walls(Vec3 x) const {
 Vec3 ContactModel::off_plate(Vec3 x, const Began& began, Decisions& decisions) const {
   const Local c = to_local(to_, x - to_.edge);
   const double before_edge = -c.w, behind_back = c.w - depth_, beyond_end = std::abs(c.u) - half_length_;
-  if (before_edge < 0 && behind_back < 0 && beyond_end < 0) {
+  const double outside = std::max({before_edge, behind_back, beyond_end});  // of the rectangle; below 0: over it
+  if (outside <= decisions.near()) {
     const int side = side_of(began, decisions);
     const double height = side * c.n;
-    if (height >= clearance_) return x;
+    if (outside < 0 && height >= clearance_) return x;
     const Local lifted = {c.u, side * clearance_, c.w};
-    if (height >= 0) return turned_back(lifted);
-    // It came through the plate: back, or round one of the four sides, where the rounded rim has to be cleared too.
-    const double far = std::max(-height, clearance_), climb = far + height;
-    const double end = half_length_ - std::abs(c.u), other_end = half_length_ + std::abs(c.u);
-    const std::array<double, 5> ways = {clearance_ - height, std::hypot(c.w, climb), std::hypot(depth_ - c.w, climb),
-                                        std::hypot(end, climb), std::hypot(other_end, climb)};
-    Local out = {c.u, -side * far, c.w};
-    switch (decisions.least(DecisionKind::way_out, ways)) {
-      case 0:
-        return turned_back(lifted);
-      case 1:
-        out.w = 0;
-        break;
-      case 2:
-        out.w = depth_;
-        break;
-      case 3:
-        out.u = std::copysign(half_length_, c.u);
-        break;
-      default:
-        out.u = -std::copysign(half_length_, c.u);
+    if (outside < 0 && height >= 0) return turned_back(lifted);
+    if (height < 0) {
+      // It came through the plate: back, or round one of the four sides, where the rounded rim has to be cleared too.
+      // Just beyond a side it is round that one already; near a corner, rounding may lead it round another.
+      const double far = std::max(-height, clearance_), climb = far + height;
+      const std::array<double, 5> ways = {clearance_ - height, std::hypot(std::max(-before_edge, 0.0), climb),
+                                          std::hypot(std::max(-behind_back, 0.0), climb),
+                                          std::hypot(std::max(-beyond_end, 0.0), climb),
+                                          std::hypot(half_length_ + std::abs(c.u), climb)};
+      const int way = decisions.least(DecisionKind::way_out, ways);
+      const bool is_round =
+          (way == 1 && before_edge >= 0) || (way == 2 && behind_back >= 0) || (way == 3 && beyond_end >= 0);
+      if (way == 0) return turned_back(lifted);
+      Local out = {c.u, -side * far, c.w};
+      if (way == 1) out.w = 0;
+      if (way == 2) out.w = depth_;
+      if (way == 3) out.u = std::copysign(half_length_, c.u);
+      if (way == 4) out.u = -std::copysign(half_length_, c.u);
+      if (!is_round) return turned_back(out);
     }
-    return turned_back(out);
   }
   const Local on_plate = {std::clamp(c.u, -half_length_, half_length_), 0, std::clamp(c.w, 0.0, depth_)};
   const Local away = {c.u - on_plate.u, c.n, c.w - on_plate.w};
@@ -143,10 +141,7 @@ Vec3 ContactModel::place(Vec3 free, const Began& began, const Vec3* x, Decisions
     placed = nearest(placed, began, decisions, &in_turn);
   }
   // Never what is worse than the present place, so that the energy cannot grow: only where turns were taken.
-  if (in_turn && !friction_ && x != nullptr &&
-      decisions.exceeds(DecisionKind::worse, norm(placed - free) - norm(*x - free))) {
-    return *x;
-  }
+  if (in_turn && !friction_ && x != nullptr && decisions.is_longer(norm(placed - free), norm(*x - free))) return *x;
   return placed;
 }
 

@@ -10,13 +10,14 @@
 #include <utility>
 #include <vector>
 
+#include "oracles/step_model/noise.h"
+
 namespace cutproof::oracles {
 
 enum class DecisionKind : uint8_t {
   side,     // of the blade, on which a particle begins a substep: 0 positive, 1 negative
   way_out,  // of one that came through the plate: 0 its own side, 1 the cutting edge, 2 the back, 3 and 4 the ends
-  touched,  // by a contact, in an accelerated iteration: 0 no, 1 yes
-  worse     // than where it was, where blade and walls are projected in turn: 0 no, 1 yes
+  touched   // by a contact, in an accelerated iteration: 0 no, 1 yes
 };
 
 // Names one decision of a step, the same in every run of it.
@@ -33,6 +34,7 @@ struct NearDecision {
   DecisionKey key;
   int taken = 0, other = 0;
   double lead = 0;         // of what was taken over the other [m]; not above 0 where it was settled against the numbers
+  double rounding = 0;     // what comparing the two rounds [m]
   bool is_natural = true;  // as the numbers say
 };
 
@@ -42,8 +44,10 @@ using Settled = std::map<DecisionKey, int>;
 // Takes decisions of one run: as the numbers say, unless they are near and settled from outside.
 class Decisions {
  public:
-  // `near`: what is decided by less is noted [m].
-  Decisions(const Settled& settled, double near) : settled_(settled), near_(near) {}
+  // `near`: what is decided by less is noted [m]. `unit_roundoff`: of the arithmetic that compares. `noise`: of a
+  // disturbed run.
+  Decisions(const Settled& settled, double near, double unit_roundoff, Noise* noise)
+      : settled_(settled), near_(near), unit_roundoff_(unit_roundoff), noise_(noise) {}
 
   void begin(int32_t substep, int32_t evaluation, int32_t particle) {
     key_ = {substep, evaluation, particle, 0, DecisionKind::side};
@@ -51,6 +55,14 @@ class Decisions {
 
   // Whether `lead`, of outcome 1 over outcome 0, is above 0 [m].
   bool exceeds(DecisionKind kind, double lead) { return least(kind, std::array<double, 2>{lead, 0}) == 1; }
+
+  // Whether one length is greater than another. Where they are nearly the same, the places that they lead to are
+  // near to each other too (to a root of the difference): so rounding decides it as it does other numbers, and it is
+  // not settled from outside.
+  bool is_longer(double one, double other) {
+    const double rounding = noise_ != nullptr ? 8 * unit_roundoff_ * (one + other) * (*noise_)() : 0;
+    return one - other + rounding > 0;
+  }
 
   // The outcome of least cost, the first of several [m].
   template <std::size_t N>
@@ -74,16 +86,19 @@ class Decisions {
     if (const auto known = settled_.find(key); known != settled_.end()) taken = static_cast<std::size_t>(known->second);
     for (std::size_t k = 0; k < N; ++k) {
       if (is_near(k))
-        noted_.push_back({key, static_cast<int>(taken), static_cast<int>(k), cost[k] - cost[taken], taken == natural});
+        noted_.push_back({key, static_cast<int>(taken), static_cast<int>(k), cost[k] - cost[taken],
+                          8 * unit_roundoff_ * (std::abs(cost[k]) + std::abs(cost[taken])), taken == natural});
     }
     return static_cast<int>(taken);
   }
 
+  double near() const { return near_; }
   std::vector<NearDecision> take_near() { return std::move(noted_); }
 
  private:
   const Settled& settled_;
-  double near_;
+  double near_, unit_roundoff_;
+  Noise* noise_;
   DecisionKey key_;
   std::vector<NearDecision> noted_;
 };

@@ -11,7 +11,8 @@ namespace cutproof::oracles {
 class Noise {
  public:
   explicit Noise(uint64_t seed) : state_(seed * 0x9e3779b97f4a7c15u) {}
-  double operator()() {
+  virtual ~Noise() = default;
+  virtual double operator()() {
     uint64_t z = (state_ += 0x9e3779b97f4a7c15u);
     z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
     z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
@@ -30,6 +31,17 @@ class Noise {
 
  private:
   uint64_t state_;
+};
+
+// The greatest there is, one way or the other, and with the opposite sign the other way: few numbers are drawn of it,
+// and each has to be tried both ways.
+class OppositeNoise : public Noise {
+ public:
+  OppositeNoise(uint64_t seed, int sign) : Noise(~seed), sign_(sign) {}
+  double operator()() override { return Noise::operator()() < 0 ? -sign_ : sign_; }
+
+ private:
+  int sign_;
 };
 
 }  // namespace cutproof::oracles

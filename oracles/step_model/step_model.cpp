@@ -29,7 +29,8 @@ constexpr double kDegenerate = 1e4;
 // The same of what the rounding of places makes of the matrix.
 constexpr double kInPlaces = 0.01;
 // Of NearestRotation::weight: below this, rounding decides which way round it goes.
-constexpr double kHalfTurn = 1e-3;
+constexpr double kHalfTurn = 0.03;
+constexpr double kShortest = 1e-12;
 
 Vec3 turned_by(Vec3 rotation_vector, Vec3 v) { return v + cross(rotation_vector, v); }
 
@@ -133,8 +134,9 @@ class StepModel::Run {
         wanted_(wanted),
         disturbed_(wanted.disturbance != 0),
         noise_(wanted.disturbance),
+        lasting_((wanted.disturbance + 1) / 2, wanted.disturbance % 2 == 0 ? -1 : +1),
         u_(model.u_),
-        decisions_(wanted.settled, wanted.near),
+        decisions_(wanted.settled, wanted.near, model.u_, disturbed_ ? &noise_ : nullptr),
         stores_positions_(before_.precision != Precision::binary32) {
     out_.x = before_.x;
     out_.v = before_.v;
@@ -147,10 +149,10 @@ class StepModel::Run {
     goal_rounding_.resize(out_.x.size());
     if (disturbed_) {
       for (const Cluster& cluster : model.clusters_) {
-        rest_off_.push_back(u_ * noise_.off(stores_positions_ ? cluster.rest : Vec3{}, cluster.radius));
+        rest_off_.push_back(u_ * lasting_.off(stores_positions_ ? cluster.rest : Vec3{}, cluster.radius));
       }
-      parameter_off_ = kParameterRounds * u_ * noise_();
-      step_off_ = u_ * noise_();
+      parameter_off_ = kParameterRounds * u_ * lasting_();
+      step_off_ = u_ * lasting_();
     }
   }
 
@@ -169,7 +171,7 @@ class StepModel::Run {
   std::vector<Wall> walls_now() {
     std::vector<Wall> walls = setup_.walls;
     if (disturbed_) {
-      for (Wall& wall : walls) wall.offset += u_ * wall.offset * noise_();
+      for (Wall& wall : walls) wall.offset += u_ * wall.offset * lasting_();
     }
     return walls;
   }
@@ -178,8 +180,8 @@ class StepModel::Run {
     if (!disturbed_) return move;
     BladeMove off = move;
     for (BladePose* pose : {&off.from, &off.to}) {
-      pose->edge += noise_.off(u_ * pose->edge, 0);
-      const Vec3 turn = (2 * u_) * noise_.vector();
+      pose->edge += lasting_.off(u_ * pose->edge, 0);
+      const Vec3 turn = (2 * u_) * lasting_.vector();
       pose->along = turned_by(turn, pose->along);
       pose->back = turned_by(turn, pose->back);
     }
@@ -202,7 +204,8 @@ class StepModel::Run {
   const State& before_;
   const Wanted& wanted_;
   const bool disturbed_;
-  Noise noise_;
+  Noise noise_;            // of single roundings
+  OppositeNoise lasting_;  // of what stays the same throughout a run
   const double u_;
   Decisions decisions_;
   const bool stores_positions_;
@@ -213,6 +216,7 @@ class StepModel::Run {
   std::vector<double> rounding_now_;   // [n] of this substep
   std::vector<Vec3> rest_off_;         // [m]
   double parameter_off_ = 0, step_off_ = 0;
+  double turn_amplitude_ = 0;  // of the last rotation [rad]
 };
 
 // The best rotation; the previous one where there is no extent, the nearest to it along a line.
@@ -220,13 +224,16 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double siz
   const Cluster& cluster = model_.clusters_[at(c)];
   const Mat3& previous = out_.rotation[at(c)];
   double& rounding = out_.turn_rounding[at(c)];
+  turn_amplitude_ = kRotationRounds * u_;
   rounding = 0;
   if (cluster.extent == Cluster::Extent::point || !a.allFinite() || a.cwiseAbs().maxCoeff() == 0) return previous;
   const double sum_amplitude = sum_rounds(static_cast<double>(cluster.end - cluster.begin)) * u_ * size;
   const bool is_given = is_last && !wanted_.given.empty() && wanted_.given[at(c)] != nullptr;
   if (cluster.extent == Cluster::Extent::line) {
     const NearestRotation nearest = nearest_of_rank_one(best_rotation(to_mat3(a)), previous);
-    rounding = u_ * kRotationRounds + sum_amplitude / a.norm();
+    // Near half a turn, what a quaternion has of the previous rotation is short, and its rounding turns it farther.
+    turn_amplitude_ = kRotationRounds * u_ / std::sqrt(std::max(nearest.weight, kShortest));
+    rounding = turn_amplitude_ + sum_amplitude / a.norm();
     if (!(a.norm() > kDegenerate * kInPlaces * noise)) {
       set_free(c, is_last);
       rounding = 1;
@@ -301,7 +308,7 @@ void StepModel::Run::match_shapes(bool is_last) {
       }
       t += noise_.off((2 * u_) * center, mean_amplitude);
       r = rotation_of(c, a, size.sum(), u_ * farthest * arms, is_last);
-      const Vec3 turn = (kRotationRounds * u_) * noise_.vector();
+      const Vec3 turn = turn_amplitude_ * noise_.vector();
       if (cluster.extent != Cluster::Extent::point) {
         for (int column = 0; column < 3; ++column) {
           const Vec3 now = turned_by(turn, {r(0, column), r(1, column), r(2, column)});

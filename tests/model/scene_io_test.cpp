@@ -480,6 +480,11 @@ TEST(SceneIoErrors, WrongTypesNameWhatIsThereAndWhatIsNeeded) {
   tree = smallest();
   tree["walls"] = json::object();
   expect_error(tree, "walls", {"list"});
+  tree["walls"] = json::parse(R"([{"axis": 2, "side": -1, "offset": 0.25}])");
+  tree["ground"] = {{"offset", 0.5}};
+  expect_error(tree, "walls", {"no room", "0.5 upwards", "0.25 downwards"});
+  tree["ground"] = {{"offset", 0.125}};
+  static_cast<void>(parse_scene(tree.dump(), "scene.json"));
   tree = smallest();
   tree["skin"] = true;
   expect_error(tree, "skin", {"object"});
