@@ -90,9 +90,18 @@ int print_conclusion(const json& document, bool whole) {
       document);
   if (document.contains("steps_compared")) {
     print_filled(
-        "{steps} steps beside the reference's: {particles} positions at most {greatest_h} h apart, {undecidable} "
-        "undecidable within rounding\n",
+        "{steps} steps beside the reference's: {particles} positions at most {greatest_h} h apart, {undecidable} that "
+        "rounding may carry farther\n",
         document.at("steps_compared"));
+  }
+  fmt::print("greatest measured / bound:\n");
+  for (const json& property : document.at("properties")) {
+    if (!property.at("of_bound").is_number()) continue;
+    const auto undecided = property.at("undecided").get<int64_t>();
+    fmt::print(
+        "  {:<32} {:<7} {:>8.2g}{}\n", property.at("property").get<std::string>(),
+        property.at("stage").get<std::string>(), property.at("of_bound").get<double>(),
+        undecided > 0 ? fmt::format("  {} of {} undecided", undecided, property.at("checked").get<int64_t>()) : "");
   }
   const CampaignConclusion conclusion = conclude(document, whole);
   if (conclusion.holds()) {

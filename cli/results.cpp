@@ -28,17 +28,6 @@ nlohmann::json to_json(const harness::FrameResult& frame, bool timed) {
   return result;
 }
 
-nlohmann::json to_json(const harness::PropertySummary& summary) {
-  return {{"property", summary.property},
-          {"stage", name_of(summary.stage)},
-          {"unit", summary.unit},
-          {"judged", summary.judged},
-          {"checked", summary.checked},
-          {"failed", summary.failed},
-          {"measured", json_number(summary.measured)},
-          {"of_bound", json_number(summary.of_bound)}};
-}
-
 }  // namespace
 
 nlohmann::json to_json(const RunResult& result, const harness::SceneJudge* judge) {
@@ -70,10 +59,7 @@ nlohmann::json to_json(const RunResult& result, const harness::SceneJudge* judge
                            {"verdicts", judge->verdicts().size()},
                            {"failed", failed},
                            {"failed_as_expected", expected}};
-    document["properties"] = nlohmann::json::array();
-    for (const harness::PropertySummary& summary : judge->summaries().all()) {
-      document["properties"].push_back(to_json(summary));
-    }
+    document["properties"] = judge->summaries().to_json();
     document["notes"] = judge->notes();
   }
   return document;

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "model/io/json_number.h"
 
 namespace cutproof::harness {
 
@@ -12,6 +15,37 @@ void raise(std::optional<double>& greatest, std::optional<double> value) {
 }
 
 }  // namespace
+
+nlohmann::json to_json(const PropertySummary& summary) {
+  return {{"property", summary.property},
+          {"stage", name_of(summary.stage)},
+          {"unit", summary.unit},
+          {"judged", summary.judged},
+          {"checked", summary.checked},
+          {"failed", summary.failed},
+          {"undecided", summary.undecided},
+          {"measured", json_number(summary.measured)},
+          {"of_bound", json_number(summary.of_bound)}};
+}
+
+void add_summary(nlohmann::json& sum, const nlohmann::json& more) {
+  for (const char* count : {"judged", "checked", "failed", "undecided"}) {
+    sum[count] = sum.at(count).get<int64_t>() + more.at(count).get<int64_t>();
+  }
+  for (const char* greatest : {"measured", "of_bound"}) {
+    // A number, nothing, or of what failed a word such as "inf".
+    const nlohmann::json &here = sum.at(greatest), &there = more.at(greatest);
+    const bool greater = there.is_string() || here.is_null() ||
+                         (here.is_number() && there.is_number() && there.get<double>() > here.get<double>());
+    if (greater && !here.is_string()) sum[greatest] = there;
+  }
+}
+
+nlohmann::json PropertySummaries::to_json() const {
+  nlohmann::json list = nlohmann::json::array();
+  for (const PropertySummary& summary : all_) list.push_back(harness::to_json(summary));
+  return list;
+}
 
 const PropertySummary* PropertySummaries::find(const std::string& property, Stage stage) const {
   const auto found = std::find_if(all_.begin(), all_.end(), [&](const PropertySummary& one) {
@@ -35,6 +69,7 @@ void PropertySummaries::add(const Verdict& verdict) {
   summary.judged += verdict.checked > 0 || !verdict.holds;
   summary.checked += verdict.checked;
   summary.failed += !verdict.holds;
+  summary.undecided += verdict.undecided;
   if (verdict.checked == 0) return;
   // Comparisons with a NaN are false, so it must not be the first to stand here.
   if (!(verdict.measured <= summary.measured)) summary.measured = verdict.measured;
@@ -47,6 +82,7 @@ void PropertySummaries::join(const PropertySummaries& other) {
     ours.judged += theirs.judged;
     ours.checked += theirs.checked;
     ours.failed += theirs.failed;
+    ours.undecided += theirs.undecided;
     if (!(theirs.measured <= ours.measured)) ours.measured = theirs.measured;
     raise(ours.of_bound, theirs.of_bound);
   }

@@ -1,6 +1,7 @@
 // What the verdicts of a property came to over a run or a campaign.
 #pragma once
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,14 +15,19 @@ struct PropertySummary {
   std::string property;
   Stage stage = Stage::skin;
   std::string unit;
-  int64_t judged = 0;   // verdicts that looked at something, or fail
-  int64_t checked = 0;  // things that they looked at
-  int64_t failed = 0;   // expected or not
-  double measured = 0;  // greatest
+  int64_t judged = 0;     // verdicts that looked at something, or fail
+  int64_t checked = 0;    // things that they looked at
+  int64_t failed = 0;     // expected or not
+  int64_t undecided = 0;  // of what was checked (Verdict::undecided)
+  double measured = 0;    // greatest
   // Greatest measured / bound: how much room the bound leaves to what was found. Nothing where every bound is 0, as it
   // is of what is counted.
   std::optional<double> of_bound;
 };
+
+// As it stands in result documents; an entry of another document is added to it.
+nlohmann::json to_json(const PropertySummary& summary);
+void add_summary(nlohmann::json& sum, const nlohmann::json& more);
 
 class PropertySummaries {
  public:
@@ -30,6 +36,8 @@ class PropertySummaries {
 
   // In the order in which they were first added.
   const std::vector<PropertySummary>& all() const { return all_; }
+  // A list of them.
+  nlohmann::json to_json() const;
   // Null if no verdict of this property after this stage was added.
   const PropertySummary* find(const std::string& property, Stage stage) const;
 

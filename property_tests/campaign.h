@@ -44,6 +44,7 @@ struct Campaign {
   int64_t cases = 0, verdicts = 0, particles = 0;
   CaseCoverage coverage;
   StepsCompared compared;
+  harness::PropertySummaries properties;
   std::vector<Violation> violations;  // by index; without keep_going the first alone
   double seconds = 0;                 // wall time
   // Of all threads together [s].

@@ -22,9 +22,9 @@ constexpr int kFormatVersion = 3;
 // Classes of cases are rare: below this many cases, or with small ones only, an empty class says nothing.
 constexpr int64_t kCasesThatMeetEveryClass = 1000;
 constexpr int kSizeThatMeetsEveryClass = 79;
-// Of positions after a step, as many as rounding may decide: 0.5 to 0.8 % in campaigns of thousands. A comparison that
-// grants everything compares nothing.
-constexpr double kMostUndecidable = 0.05;
+// Of what a property has looked at, as much as may stay undecided (tolerances.md, The step again). A judge that grants
+// everything judges nothing.
+constexpr double kMostUndecided = 0.01;
 
 constexpr const char* kRemedy = "give the results (--json) of all shards of one campaign, each once";
 
@@ -70,6 +70,17 @@ void add_shard(json& whole, const json& part, const std::string& file, const std
       compared["greatest_h"] = there;
     }
   }
+  for (const json& theirs : part.at("properties")) {
+    json& ours = whole.at("properties");
+    const auto known = std::find_if(ours.begin(), ours.end(), [&](const json& one) {
+      return one.at("property") == theirs.at("property") && one.at("stage") == theirs.at("stage");
+    });
+    if (known == ours.end()) {
+      ours.push_back(theirs);
+    } else {
+      harness::add_summary(*known, theirs);
+    }
+  }
   for (const json& violation : part.at("violations")) whole["violations"].push_back(violation);
 }
 
@@ -110,6 +121,7 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
       {"thread_seconds",
        {{"generating", campaign.generating}, {"running", campaign.running}, {"judging", campaign.judging}}},
       {"coverage", coverage},
+      {"properties", campaign.properties.to_json()},
       {"violations", violations},
       {"holds", violations.empty() && campaign.verdicts > 0}};
   if (options.dynamics && !described.is_the_reference) {
@@ -185,15 +197,15 @@ CampaignConclusion conclude(const json& document, bool whole) {
     return {fmt::format("of {} cases fewer than one in ten had: {}, so too little was tested there", cases,
                         fmt::join(rare, ", "))};
   }
-  if (document.contains("steps_compared")) {
-    const json& compared = document.at("steps_compared");
-    const double undecidable = compared.at("undecidable").get<double>(),
-                 measured = compared.at("particles").get<double>();
-    if (!(undecidable <= kMostUndecidable * (undecidable + measured)) || measured == 0) {
-      return {
-          fmt::format("{:.0f} positions after a step were undecidable and {:.0f} compared, so too little was tested",
-                      undecidable, measured)};
-    }
+  if (document.contains("steps_compared") && document.at("steps_compared").at("particles").get<int64_t>() == 0) {
+    return {"no position after a step was compared with the reference's"};
+  }
+  for (const json& property : document.at("properties")) {
+    const double undecided = property.at("undecided").get<double>(), checked = property.at("checked").get<double>();
+    if (undecided <= kMostUndecided * checked) continue;
+    return {fmt::format(
+        "of {:.0f} things that '{}' looked at after {} {:.0f} stayed undecided, so too little was tested", checked,
+        property.at("property").get<std::string>(), property.at("stage").get<std::string>(), undecided)};
   }
   return {};
 }

@@ -208,6 +208,7 @@ Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, 
   const auto take = [&](std::vector<Verdict> verdicts) {
     for (Verdict& verdict : verdicts) {
       ++judgement.verdicts;
+      judgement.properties.add(verdict);
       if (verdict.holds || judgement.failure) continue;
       verdict.backend = backend;
       judgement.failure = std::move(verdict);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "harness/moments.h"
+#include "harness/property_summary.h"
 #include "model/backend.h"
 #include "model/verdict.h"
 #include "oracles/comparison/stage_comparison.h"
@@ -95,7 +96,7 @@ int64_t least_count(const CoverageClass& wanted, int64_t cases, bool move);
 // Steps of moving bodies beside the reference's.
 struct StepsCompared {
   int64_t steps = 0;
-  int64_t particles = 0, undecidable = 0;  // of all steps; rounding decides where the latter go: they are not measured
+  int64_t particles = 0, undecidable = 0;  // of all steps; rounding carries the latter far: they are not measured
   double greatest = 0;                     // distance of positions [h]
   void add(const oracles::StageDifference& step);
   void join(const StepsCompared& other);
@@ -104,6 +105,7 @@ struct StepsCompared {
 struct Judgement {
   CaseCoverage coverage;  // 1 for what happened
   StepsCompared compared;
+  harness::PropertySummaries properties;
   int64_t verdicts = 0;            // how many were asked for
   std::optional<Verdict> failure;  // the first that does not hold
 };
