@@ -17,10 +17,8 @@
 namespace cutproof::oracles {
 namespace {
 
-// Without growth: so many times the quadratic sum of single roundings is beyond what chance does, and below what
-// disturbed runs would allow (tolerances.md, The step again).
-constexpr double kSigmas = 4;
-// Within so much of that nobody looks closer.
+// Without growth: within so much of the quadratic sum of single roundings nobody looks closer, because disturbed runs
+// would allow more (tolerances.md, The step again).
 constexpr double kSurely = 0.5;
 // Disturbed runs, from fixed seeds, and how much farther than the farthest of them a right answer may be.
 constexpr uint64_t kDisturbedRuns = 8;
@@ -115,16 +113,16 @@ class Search {
     const StepOutcome& o = branch.outcome;
     Bounds& b = branch.bounds;
     for (const double square : o.rounding) {
-      b.position.push_back(kSigmas * std::sqrt(square));
+      b.position.push_back(std::sqrt(square));
       b.velocity.push_back(2 * b.position.back());
     }
     for (int32_t c = 0; c < before_.clusters.count(); ++c) {
       double members = 0;
       for (const int32_t i : before_.clusters.of(c)) members = std::max(members, o.rounding[at(i)]);
       const double arm = std::max(reach_[at(c)], h_);
-      b.rotation.push_back(kSigmas * std::sqrt(o.turn_rounding[at(c)] + members / (arm * arm)));
+      b.rotation.push_back(std::sqrt(o.turn_rounding[at(c)] + members / (arm * arm)));
     }
-    b.impulse = kSigmas * std::sqrt(o.impulse_rounding);
+    b.impulse = std::sqrt(o.impulse_rounding);
     return branch;
   }
 
@@ -141,7 +139,7 @@ class Search {
       const BestRotation best = best_rotation(o.shape[c]);
       const Vec3 u = {best.u[0], best.u[1], best.u[2]}, v = {best.v[0], best.v[1], best.v[2]};
       const double known = branch.bounds.rotation.empty() ? 0 : branch.bounds.rotation[c];
-      const double rounding = kSigmas * (std::sqrt(o.turn_rounding[c]) + 4 * unit_roundoff(after_));
+      const double rounding = kBeyondRuns * (std::sqrt(o.turn_rounding[c]) + 4 * unit_roundoff(after_));
       if (!(norm(r * v - u) <= std::max(rounding, known))) continue;
       branch.given[c] = &r;
       any = true;
@@ -182,11 +180,11 @@ class Search {
     }
     Bounds& b = branch.bounds;
     for (std::size_t i = 0; i < n; ++i) {
-      b.position[i] = std::max(b.position[i], kBeyondRuns * grown.position[i]);
-      b.velocity[i] = std::max(b.velocity[i], kBeyondRuns * grown.velocity[i] * dt_);
+      b.position[i] = kBeyondRuns * grown.position[i];
+      b.velocity[i] = kBeyondRuns * grown.velocity[i] * dt_;
     }
-    for (std::size_t c = 0; c < m; ++c) b.rotation[c] = std::max(b.rotation[c], kBeyondRuns * grown.rotation[c]);
-    b.impulse = std::max(b.impulse, kBeyondRuns * grown.impulse);
+    for (std::size_t c = 0; c < m; ++c) b.rotation[c] = kBeyondRuns * grown.rotation[c];
+    b.impulse = kBeyondRuns * grown.impulse;
     if (follow_rotations(branch)) return look_closer(branch);
     ask_bluntly(branch);
     branch.close = true;

@@ -424,19 +424,24 @@ void StepModel::Run::substep(int32_t s) {
   const double decay = std::exp(-step.damping * dt);
   Vec3 pushed;
   double pushed_rounding = 0, summed = 0;
-  const double carried_on = step.substeps - s;
+  const double carried_on = step.substeps - s, carrying = kParameterRounds * std::sqrt(step.iterations + 1.0);
   for (std::size_t i = 0; i < start.size(); ++i) {
     if (before_.alive[i] == 0) continue;
-    pushed += body_.mass[i] * (out_.x[i] - predicted[i]);
+    const Vec3 push = out_.x[i] - predicted[i];
+    pushed += body_.mass[i] * push;
+    // A backend adds up what contacts do in each iteration.
+    if (disturbed_) pushed += body_.mass[i] * noise_.off((carrying * u_) * push, 0);
     out_.v[i] = (decay / dt) * (out_.x[i] - start[i]);
     if (disturbed_) out_.v[i] += noise_.off((kParameterRounds * u_) * out_.v[i], 0);
     out_.rounding[i] += carried_on * carried_on * rounding_now_[i];
-    pushed_rounding += body_.mass[i] * body_.mass[i] * rounding_now_[i];
-    summed += body_.mass[i] * norm(out_.x[i] - predicted[i]);
+    pushed_rounding +=
+        body_.mass[i] * body_.mass[i] * (rounding_now_[i] + carrying * carrying * u_ * u_ * dot(push, push));
+    summed += body_.mass[i] * norm(push);
   }
   // Partial sums, which are as large as the whole.
   summed *= u_ * std::sqrt(static_cast<double>(start.size()));
   pushed_rounding += 3 * summed * summed;
+  if (disturbed_) pushed += summed * noise_.vector();
   out_.impulse = decay * (out_.impulse + pushed / dt);
   out_.impulse_rounding += pushed_rounding / (dt * dt);
 }
