@@ -22,14 +22,14 @@ namespace {
 constexpr double kSurely = 0.5;
 // Disturbed runs, from fixed seeds, and how much farther than the farthest of them a right answer may be.
 constexpr uint64_t kDisturbedRuns = 8;
-constexpr double kBeyondRuns = 4;
+constexpr double kBeyondRuns = 8;
 // Beyond this the way from a rounding to what it does is no longer straight [h].
 constexpr double kSmall = 1e-3;
 // What is decided by more than this is decided whatever rounds [h].
 constexpr double kNear = 2e-3;
 // Outcomes that are tried for one coupled set, and what they may cost in all [evaluations].
 constexpr int kMostOutcomes = 1024;
-constexpr int64_t kMostEvaluations = 2'000'000'000;
+constexpr int64_t kMostEvaluations = 100'000'000;
 
 // Two rotations are not farther apart, but for the rounding of their entries (apart).
 constexpr double kAnyRotation = 2 + 1e-4;
@@ -72,8 +72,8 @@ class Search {
       }
     }
     coupled_ = components_of_coupling(TissueGraph(setup.body, before.alive), before.clusters);
-    most_outcomes_ = static_cast<int>(
-        std::clamp<int64_t>(kMostEvaluations / std::max<int64_t>(1, model_.evaluations()), 16, kMostOutcomes));
+    const int64_t of_an_outcome = (kDisturbedRuns + 1) * std::max<int64_t>(1, model_.evaluations());
+    most_outcomes_ = static_cast<int>(std::clamp<int64_t>(kMostEvaluations / of_an_outcome, 16, kMostOutcomes));
   }
 
   AdmissibleStep find() {
@@ -204,13 +204,13 @@ class Search {
     Bounds& b = branch.bounds;
     const std::size_t sets = at(coupled_.count) + 1;
     std::vector<double> far(sets, 0), fast(sets, 0), turned(sets, 0);
-    std::vector<uint8_t> is_blunt(sets, 0);
+    std::vector<uint8_t> is_blunt(sets, 0), wide(before_.x.size(), 0);
     for (std::size_t i = 0; i < before_.x.size(); ++i) {
       if (before_.alive[i] == 0) continue;
       const std::size_t set = at(coupled_.label[i]);
       far[set] = std::max(far[set], b.position[i]);
       fast[set] = std::max(fast[set], b.velocity[i]);
-      if (!(b.position[i] <= kSmall * h_)) is_blunt[set] = 1;
+      if (!(b.position[i] <= kSmall * h_)) wide[i] = 1;
     }
     for (std::size_t c = 0; c < reach_.size(); ++c) {
       if (branch.outcome.free[c] != StepOutcome::Free::before) continue;
@@ -224,14 +224,17 @@ class Search {
     for (std::size_t i = 0; i < before_.x.size(); ++i) {
       if (before_.alive[i] == 0) continue;
       const std::size_t set = at(coupled_.label[i]);
-      if (is_blunt[set] == 0) continue;
+      if (is_blunt[set] == 0 && wide[i] == 0) continue;
       branch.blunt[i] = 1;
       b.position[i] = far[set] + substeps * turned[set];
       b.velocity[i] = fast[set] + 2 * substeps * turned[set];
       pushed += setup_.body.mass[i] * b.velocity[i];
     }
     for (std::size_t c = 0; c < reach_.size(); ++c) {
-      if (is_blunt[set_of(c)] != 0) b.rotation[c] = kAnyRotation;
+      const auto members = before_.clusters.of(static_cast<int32_t>(c));
+      const bool any_wide =
+          std::any_of(members.begin(), members.end(), [&](int32_t i) { return branch.blunt[at(i)] != 0; });
+      if (any_wide) b.rotation[c] = kAnyRotation;
     }
     b.impulse += pushed / dt_;
   }

@@ -18,7 +18,7 @@
 namespace cutproof::oracles {
 namespace {
 
-// How much single operations round, in units of u times what they work on (tolerances.md, Rounding of a step).
+// How much single operations round, in units of u times what they work on (tolerances.md, The step again).
 constexpr double kRotationRounds = 4;   // a rotation, about each axis, given its matrix
 constexpr double kParameterRounds = 4;  // what is made of parameters once: s, e^(-c dt), Chebyshev's weights
 constexpr double kContactRounds = 4;    // ways into the blade's frame and back

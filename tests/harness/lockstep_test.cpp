@@ -78,11 +78,13 @@ TEST_P(AMovedParticle, IsFoundInItsStage) {
 INSTANTIATE_TEST_SUITE_P(After, AMovedParticle, testing::Values(Stage::step, Stage::split, Stage::merge, Stage::skin),
                          [](const auto& instance) { return std::string(name_of(instance.param)); });
 
-TEST(APlantedDeviation, OfAThousandthOfTheBoundIsNotAFailure) {
+// Nearer than the project asks, and farther than rounding goes.
+TEST(APlantedDeviation, OfAThousandthOfTheBoundIsNotAdmissible) {
   const Against against = plant(Stage::step, [](const cutproof::Setup& setup, State& state) {
     state.x[kParticle].y += 1e-7 * setup.body.grid.spacing;
   });
-  EXPECT_TRUE(against.holds()) << failures(against);
+  EXPECT_FALSE(verdict_named(against, "lockstep: admissible step").holds);
+  EXPECT_TRUE(verdict_named(against, "lockstep: positions").holds);
   EXPECT_NEAR(verdict_named(against, "lockstep: positions").measured, 1e-7, 1e-10);
 }
 
