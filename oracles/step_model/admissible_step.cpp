@@ -295,7 +295,7 @@ class Search {
       return a.settled.size() > b.settled.size();
     };
     Branch root = std::move(first);
-    if (Settled known = sides_of(root); !known.empty()) {
+    if (Settled known = sides_of(root, setup_.step.substeps - 1); !known.empty()) {
       root = start(std::move(known));
       look_closer(root);
       compare(root);
@@ -321,7 +321,10 @@ class Search {
       open.push_back(std::move(next));
       std::push_heap(open.begin(), open.end(), better);
     };
+    // Of earlier substeps it is likely, and no more.
+    if (!root.holds()) try_out(sides_of(root, 0));
     open.push_back(root);
+    std::push_heap(open.begin(), open.end(), better);
     while (!open.empty() && !best.holds() && tried < most_outcomes_) {
       std::pop_heap(open.begin(), open.end(), better);
       const Branch present = std::move(open.back());
@@ -359,12 +362,12 @@ class Search {
 
   // A particle that ends over the plate, clear of its rim, tells on which side of the blade it began the last substep:
   // no such side is open. (One that was led round the plate ends over its border.)
-  Settled sides_of(const Branch& branch) const {
+  Settled sides_of(const Branch& branch, int32_t from_substep) const {
     Settled known = branch.settled;
     if (!setup_.has_blade) return known;
     const BladePose& pose = setup_.blade_moves[at((before_.frame + 1) * setup_.step.substeps - 1)].to;
     for (const NearDecision& d : branch.ties) {
-      if (d.key.kind != DecisionKind::side || d.key.substep + 1 < setup_.step.substeps) continue;
+      if (d.key.kind != DecisionKind::side || d.key.substep < from_substep) continue;
       const Local place = to_local(pose, after_.x[at(d.key.particle)] - pose.edge);
       const double rim = kSmall * h_;
       const bool over =
