@@ -335,28 +335,24 @@ TEST(WithinItsRounding, TheSideOfTheBladeIsUndecidable) {
   Planted backend(reference::make_backend(), Stage::step, 0, {}, across);
   const Against against = compare(backend, built, 1, AgainstMode::lockstep, Precision::binary32);
   EXPECT_TRUE(against.holds()) << failures(against);
-  EXPECT_GT(against.lockstep->frames().front().undecidable.otherwise, 0);
-  EXPECT_EQ(against.lockstep->frames().front().undecidable.undecided, 0);
-  EXPECT_GT(against.lockstep->frames().front().error(Measure::position).count, 0);
+  // A whole layer of ties: more than are tried together, so it is counted as undecided.
+  const oracles::Undecidable& undecidable = against.lockstep->frames().front().undecidable;
+  EXPECT_GT(undecidable.otherwise + undecidable.undecided, 0);
   // In double precision there is no such excuse.
   EXPECT_FALSE(compare(backend, built, 1, AgainstMode::lockstep).holds());
 }
 
-TEST(WithinItsRounding, AParticleThatOneRoundingThrowsFarIsUndecidable) {
-  // Particles so near to the cutting edge that the direction in which it pushes them turns with the least change.
+TEST(WithinItsRounding, ANudgeThatNothingRoundsIsFoundWhereTheBladeThrowsFar) {
+  // Particles so near to the cutting edge that the direction in which it pushes them turns with the least change. What
+  // is kept of them is their displacement, which is 0 and not rounded.
   fixtures::Built built = block_with_blade(1e-3);
   built.setup.step.iterations = 0;
   built.setup.step.gravity = {};
   const Fault nudge = [](const cutproof::Setup& setup, State& state) {
-    for (std::size_t i = 0; i < state.x.size(); ++i) {
-      state.x[i].x += 1e-7 * (state.x[i].x - setup.body.rest_position(static_cast<int32_t>(i)).x);
-    }
+    for (Vec3& x : state.x) x.x += 2e-7 * setup.body.grid.spacing;
   };
   Planted backend(reference::make_backend(), Stage::step, 0, {}, nudge);
-  const Against against = compare(backend, built, 1, AgainstMode::lockstep, Precision::binary32);
-  EXPECT_TRUE(against.holds()) << failures(against);
-  EXPECT_GT(against.lockstep->frames().front().undecidable.positions, 0);
-  EXPECT_LT(against.lockstep->frames().front().undecidable.positions, built.setup.body.particle_count() / 4);
+  EXPECT_FALSE(compare(backend, built, 1, AgainstMode::lockstep, Precision::binary32).holds());
   EXPECT_FALSE(compare(backend, built, 1, AgainstMode::lockstep).holds());
 
   // What no rounding does is found among them all the same.
