@@ -51,11 +51,10 @@ int check(const CheckOptions& options) {
     judge.note("A recording cannot be run: relations between runs, such as 'no ghost force', were not asked of it.");
   }
   judge.finish();
+  // The file first: it is kept even if standard output cannot be written.
+  write_document(options.json, to_json(result, &judge));
   print_verdicts(judge);
-  if (!options.json.empty()) {
-    write_document(options.json, to_json(result, &judge));
-    fmt::print("wrote {}\n", options.json);
-  }
+  if (!options.json.empty()) fmt::print("wrote {}\n", options.json);
   return judge.holds() ? 0 : 1;
 }
 

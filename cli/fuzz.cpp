@@ -96,11 +96,12 @@ int print_conclusion(const json& document, bool whole) {
   }
   fmt::print("greatest measured / bound:\n");
   for (const json& property : document.at("properties")) {
-    if (!property.at("of_bound").is_number()) continue;
+    const json& of_bound = property.at("of_bound");
     const auto undecided = property.at("undecided").get<int64_t>();
+    if (!of_bound.is_number() && undecided == 0) continue;
     fmt::print(
-        "  {:<32} {:<7} {:>8.2g}{}\n", property.at("property").get<std::string>(),
-        property.at("stage").get<std::string>(), property.at("of_bound").get<double>(),
+        "  {:<32} {:<7} {:>8}{}\n", property.at("property").get<std::string>(), property.at("stage").get<std::string>(),
+        of_bound.is_number() ? fmt::format("{:.2g}", of_bound.get<double>()) : "-",
         undecided > 0 ? fmt::format("  {} of {} undecided", undecided, property.at("checked").get<int64_t>()) : "");
   }
   const CampaignConclusion conclusion = conclude(document, whole);

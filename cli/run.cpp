@@ -184,7 +184,6 @@ int run(const RunOptions& options) {
                                            result.frames.back().alive));
     }
   }
-  print_summary(result);
   const std::vector<Verdict> broken = runner.take_broken_contracts();
   if (judge) {
     for (const Verdict& verdict : broken) judge->add(verdict);
@@ -192,20 +191,14 @@ int run(const RunOptions& options) {
       for (std::string& sentence : relations->notes()) judge->note(std::move(sentence));
     }
     judge->finish();
-    print_verdicts(*judge);
   }
-  if (against) print_against(*against);
   nlohmann::json errors_document;
   if (errors) {
     errors->finish(state());
     errors_document = to_json(*errors, wanted.implementation && against ? &*against->lockstep : nullptr);
-    print_errors(*errors, errors_document);
   }
-  if (recorder) {
-    recorder->finish();
-    const io::RecordingPaths paths = io::recording_paths(options.record);
-    fmt::print("recorded {} (for ParaView: {}, {}, {})\n", paths.index, paths.particles, paths.skin, paths.blade);
-  }
+  if (recorder) recorder->finish();
+  // Files first: they are kept even if standard output cannot be written.
   if (!options.json.empty()) {
     nlohmann::json document = to_json(result, judge ? &*judge : nullptr);
     if (against) {
@@ -214,8 +207,17 @@ int run(const RunOptions& options) {
     }
     if (errors) document["errors"] = errors_document;
     write_document(options.json, document);
-    fmt::print("wrote {}\n", options.json);
   }
+
+  print_summary(result);
+  if (judge) print_verdicts(*judge);
+  if (against) print_against(*against);
+  if (errors) print_errors(*errors, errors_document);
+  if (recorder) {
+    const io::RecordingPaths paths = io::recording_paths(options.record);
+    fmt::print("recorded {} (for ParaView: {}, {}, {})\n", paths.index, paths.particles, paths.skin, paths.blade);
+  }
+  if (!options.json.empty()) fmt::print("wrote {}\n", options.json);
   if (!judge && !against) fmt::print("nothing was judged: add --check for that\n");
   if (!judge) {
     for (const Verdict& verdict : broken) {

@@ -57,10 +57,23 @@ double objective_gap(const BestRotation& best, const Mat3& r) {
 
 NearestRotation nearest_of_rank_one(const BestRotation& best, const Mat3& p) {
   const Matrix previous = as_eigen(p).cast<Real>();
-  const Vector u(best.u[0], best.u[1], best.u[2]), v(best.v[0], best.v[1], best.v[2]);
-  const Vector from = previous * v;
-  const Matrix nearest = Eigen::Quaternion<Real>::FromTwoVectors(from, u).toRotationMatrix() * previous;
-  return {to_mat3(nearest.cast<double>()), static_cast<double>((1 + from.normalized().dot(u)) / 2)};
+  const Vector u = Vector(best.u[0], best.u[1], best.u[2]).normalized();
+  const Vector from = (previous * Vector(best.v[0], best.v[1], best.v[2])).normalized();
+  Matrix shortest;
+  if (from.dot(u) > 0) {
+    shortest = Eigen::Quaternion<Real>::FromTwoVectors(from, u).toRotationMatrix();
+  } else {
+    // Where the turn is nearly half a one its axis is all that is left of the cross product. Two reflections keep the
+    // direction u however little that is: one takes `from` to u, the other is in the same plane and keeps u.
+    Vector beside = from - from.dot(u) * u;
+    if (!(beside.norm() > 0)) beside = u.unitOrthogonal();
+    beside.normalize();
+    beside = (beside - beside.dot(u) * u).normalized();
+    const Vector across = (from - u).normalized();
+    const Matrix one = Matrix::Identity();
+    shortest = (one - 2 * beside * beside.transpose()) * (one - 2 * across * across.transpose());
+  }
+  return {to_mat3((shortest * previous).cast<double>()), static_cast<double>((from + u).squaredNorm() / 4)};
 }
 
 }  // namespace cutproof::oracles

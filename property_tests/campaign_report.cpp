@@ -22,8 +22,8 @@ constexpr int kFormatVersion = 3;
 // Classes of cases are rare: below this many cases, or with small ones only, an empty class says nothing.
 constexpr int64_t kCasesThatMeetEveryClass = 1000;
 constexpr int kSizeThatMeetsEveryClass = 79;
-// Of what a property has looked at, as much as may stay undecided (tolerances.md, The step again). A judge that grants
-// everything judges nothing.
+// Of positions after a step, as many as may stay undecided (tolerances.md, The step again). A judge that grants
+// everything judges nothing. (Merges of whole frames cannot be decided at all; they are counted.)
 constexpr double kMostUndecided = 0.01;
 
 constexpr const char* kRemedy = "give the results (--json) of all shards of one campaign, each once";
@@ -201,6 +201,7 @@ CampaignConclusion conclude(const json& document, bool whole) {
     return {"no position after a step was compared with the reference's"};
   }
   for (const json& property : document.at("properties")) {
+    if (property.at("property") != "admissible step") continue;
     const double undecided = property.at("undecided").get<double>(), checked = property.at("checked").get<double>();
     if (undecided <= kMostUndecided * checked) continue;
     return {fmt::format(

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <queue>
+#include <map>
 #include <set>
 
 #include "model/at.h"
@@ -20,8 +20,9 @@ namespace {
 // Without growth: within so much of the quadratic sum of single roundings nobody looks closer, because disturbed runs
 // would allow more (tolerances.md, The step again).
 constexpr double kSurely = 0.5;
-// Disturbed runs, from fixed seeds, and how much farther than the farthest of them a right answer may be.
-constexpr uint64_t kDisturbedRuns = 8;
+// Disturbed runs, from fixed seeds; as many before anything is called wrong; and how much farther than the farthest of
+// them a right answer may be.
+constexpr uint64_t kDisturbedRuns = 8, kMostDisturbedRuns = 32;
 constexpr double kBeyondRuns = 8;
 // Beyond this the way from a rounding to what it does is no longer straight [h].
 constexpr double kSmall = 1e-3;
@@ -83,6 +84,10 @@ class Search {
       look_closer(branch);
       compare(branch);
     }
+    if (!branch.holds()) {
+      look_closer(branch, kMostDisturbedRuns);
+      compare(branch);
+    }
     if (!branch.holds() && !branch.ties.empty()) branch = explain(std::move(branch));
     return report(std::move(branch));
   }
@@ -92,10 +97,10 @@ class Search {
   struct Branch {
     Settled settled;
     std::vector<const Mat3*> given;  // [m] rotations of the last iteration that the backend had to choose
+    std::vector<double> direction;   // [m] how far rounding turns what all best rotations agree on; empty: not known
     StepOutcome outcome;
     Bounds bounds;
     std::vector<uint8_t> blunt;       // [n] 1: only asked bluntly
-    bool close = false;               // bounds are those of disturbed runs
     std::vector<NearDecision> ties;   // that rounding may take the other way; known once looked at closely
     std::vector<int32_t> violations;  // particles beyond their bounds, or of clusters that are
     double worst = -1;                // of measured / bound
@@ -133,40 +138,53 @@ class Search {
     branch.given.resize(reach_.size(), nullptr);
     bool any = false;
     for (std::size_t c = 0; c < reach_.size(); ++c) {
-      const bool is_free = o.free[c] == StepOutcome::Free::at_last || o.free[c] == StepOutcome::Free::about_line;
-      if (!is_free || branch.given[c] != nullptr) continue;
-      const Mat3& r = after_.clusters.rotation[c];
-      const BestRotation best = best_rotation(o.shape[c]);
-      const Vec3 u = {best.u[0], best.u[1], best.u[2]}, v = {best.v[0], best.v[1], best.v[2]};
-      const double known = branch.bounds.rotation.empty() ? 0 : branch.bounds.rotation[c];
-      const double rounding = kBeyondRuns * (std::sqrt(o.turn_rounding[c]) + 4 * unit_roundoff(after_));
-      if (!(norm(r * v - u) <= std::max(rounding, known))) continue;
-      branch.given[c] = &r;
+      if (!is_open(branch, c)) continue;
+      if (!(off_agreed(o.shape[c], after_.clusters.rotation[c]) <= agreed_bound(branch, c))) continue;
+      branch.given[c] = &after_.clusters.rotation[c];
       any = true;
     }
     if (any) branch.outcome = model_.run({branch.settled, 0, kNear * h_, branch.given});
     return any;
   }
+  // Whether many rotations are the best in the last iteration, and the one that the backend states is not followed.
+  static bool is_open(const Branch& branch, std::size_t c) {
+    const StepOutcome::Free free = branch.outcome.free[c];
+    return (free == StepOutcome::Free::at_last || free == StepOutcome::Free::about_line) && branch.given[c] == nullptr;
+  }
+  // How far a rotation is from what all best rotations of this shape agree on: they turn v to u.
+  static double off_agreed(const Mat3& shape, const Mat3& r) {
+    const BestRotation best = best_rotation(shape);
+    const Vec3 u = {best.u[0], best.u[1], best.u[2]}, v = {best.v[0], best.v[1], best.v[2]};
+    return or_infinite(norm(r * v - u));
+  }
+  double agreed_bound(const Branch& branch, std::size_t c) const {
+    const double rounding = std::sqrt(branch.outcome.turn_rounding[c]) + 4 * unit_roundoff(after_);
+    return kBeyondRuns * std::max(rounding, branch.direction.empty() ? 0 : branch.direction[c]);
+  }
 
   // What rounding does to this outcome, by disturbed runs that take the same decisions.
-  void look_closer(Branch& branch) {
+  void look_closer(Branch& branch, uint64_t runs = kDisturbedRuns) {
     const std::size_t n = before_.x.size(), m = reach_.size();
     Settled as_taken;
     for (const NearDecision& d : branch.outcome.near) as_taken[d.key] = d.taken;
     Bounds grown{std::vector<double>(n), std::vector<double>(n), std::vector<double>(m), 0};
+    std::vector<double> direction(m, 0);
     std::map<std::pair<DecisionKey, int>, double> leads, spread;
     for (const NearDecision& d : branch.outcome.near) {
       const auto key = std::pair(d.key, d.other);
       leads[key] = d.lead;
       spread[key] = 0;
     }
-    for (uint64_t run = 1; run <= kDisturbedRuns; ++run) {
+    for (uint64_t run = 1; run <= runs; ++run) {
       const StepOutcome off = model_.run({as_taken, run, 2 * kNear * h_, branch.given});
       for (std::size_t i = 0; i < n; ++i) {
         grown.position[i] = std::max(grown.position[i], or_infinite(norm(off.x[i] - branch.outcome.x[i])));
         grown.velocity[i] = std::max(grown.velocity[i], or_infinite(norm(off.v[i] - branch.outcome.v[i])));
       }
       for (std::size_t c = 0; c < m; ++c) {
+        if (branch.outcome.free[c] != StepOutcome::Free::never) {
+          direction[c] = std::max(direction[c], off_agreed(branch.outcome.shape[c], off.rotation[c]));
+        }
         grown.rotation[c] =
             std::max(grown.rotation[c], or_infinite(apart(off.rotation[c], branch.outcome.rotation[c])));
       }
@@ -183,11 +201,14 @@ class Search {
       b.position[i] = kBeyondRuns * grown.position[i];
       b.velocity[i] = kBeyondRuns * grown.velocity[i] * dt_;
     }
-    for (std::size_t c = 0; c < m; ++c) b.rotation[c] = kBeyondRuns * grown.rotation[c];
+    branch.direction = std::move(direction);
+    // Runs choose freely where the rotation is open: that bounds nothing.
+    for (std::size_t c = 0; c < m; ++c) {
+      b.rotation[c] = is_open(branch, c) ? agreed_bound(branch, c) : kBeyondRuns * grown.rotation[c];
+    }
     b.impulse = kBeyondRuns * grown.impulse;
-    if (follow_rotations(branch)) return look_closer(branch);
+    if (follow_rotations(branch)) return look_closer(branch, runs);
     ask_bluntly(branch);
-    branch.close = true;
     branch.ties.clear();
     for (const NearDecision& d : branch.outcome.near) {
       if (branch.settled.contains(d.key)) continue;
@@ -273,7 +294,9 @@ class Search {
       see(branch, StepPart::velocity, static_cast<int32_t>(i), fast / h_, b.velocity[i] / h_);
     }
     for (int32_t c = 0; c < before_.clusters.count(); ++c) {
-      const double turned = or_infinite(apart(after_.clusters.rotation[at(c)], o.rotation[at(c)]));
+      const Mat3& r = after_.clusters.rotation[at(c)];
+      const double turned =
+          is_open(branch, at(c)) ? off_agreed(o.shape[at(c)], r) : or_infinite(apart(r, o.rotation[at(c)]));
       const double arm = std::max(reach_[at(c)], h_) / h_;
       see(branch, StepPart::rotation, c, turned * arm, b.rotation[at(c)] * arm);
       if (turned <= b.rotation[at(c)]) continue;
@@ -294,22 +317,27 @@ class Search {
       if (a.violations.size() != b.violations.size()) return a.violations.size() > b.violations.size();
       return a.settled.size() > b.settled.size();
     };
-    Branch root = std::move(first);
-    if (Settled known = sides_of(root, setup_.step.substeps - 1); !known.empty()) {
-      root = start(std::move(known));
-      look_closer(root);
-      compare(root);
-    }
-    std::vector<Branch> open;
-    std::set<Settled> seen = {root.settled};
+    const auto branch_of = [&](Settled settled) {
+      Branch branch = start(std::move(settled));
+      look_closer(branch);
+      compare(branch);
+      return branch;
+    };
+    // The sides that particles tell of: of the last substep they are certain, of earlier ones only likely.
+    const Settled certain = sides_of(first, setup_.step.substeps - 1), likely = sides_of(first, 0);
+    const Branch root = likely.empty() ? std::move(first) : branch_of(likely);
+    std::vector<Branch> open = {root};
+    std::set<Settled> seen = {likely};
     Branch best = root;
+    if (!root.holds() && seen.insert(certain).second) open.push_back(branch_of(certain));
+    std::make_heap(open.begin(), open.end(), better);
+    if (open.front().holds() || open.front().violations.size() < best.violations.size()) best = open.front();
     int tried = 0;
     const auto try_out = [&](Settled settled) {
       if (tried >= most_outcomes_ || !seen.insert(settled).second) return;
       ++tried;
       Branch next = start(std::move(settled));
       next.bounds = root.bounds;  // until it is worth a closer look
-      next.close = false;
       compare(next);
       if (next.violations.size() <= best.violations.size()) {
         look_closer(next);
@@ -317,14 +345,10 @@ class Search {
       } else {
         next.ties = near_ties(next, root);
       }
-      if (better(best, next)) best = next;
+      if (next.holds() || next.violations.size() < best.violations.size()) best = next;
       open.push_back(std::move(next));
       std::push_heap(open.begin(), open.end(), better);
     };
-    // Of earlier substeps it is likely, and no more.
-    if (!root.holds()) try_out(sides_of(root, 0));
-    open.push_back(root);
-    std::push_heap(open.begin(), open.end(), better);
     while (!open.empty() && !best.holds() && tried < most_outcomes_) {
       std::pop_heap(open.begin(), open.end(), better);
       const Branch present = std::move(open.back());
@@ -342,8 +366,8 @@ class Search {
       }
     }
     const bool exhausted = best.holds() || open.empty();
-    if (!best.close) {
-      look_closer(best);
+    if (!best.holds()) {
+      look_closer(best, kMostDisturbedRuns);
       compare(best);
     }
     if (!best.holds() && !exhausted) count_undecided(best);
@@ -377,20 +401,28 @@ class Search {
     return known;
   }
 
-  // More ties than can be tried together: what violates must at least be within what they do one by one, added up.
+  // More ties than can be tried together: all that is compared must at least be within what they do one by one, added
+  // up. Then what violates is counted, beside these bounds.
   void count_undecided(Branch& branch) {
-    std::vector<double> explained = branch.bounds.position;
+    Branch explained = branch;
+    Bounds& b = explained.bounds;
     for (const NearDecision& tie : branch.ties) {
       Settled settled = branch.settled;
       settled[tie.key] = tie.other;
-      const StepOutcome other = model_.run({settled, 0, kNear * h_, {}});
-      for (std::size_t i = 0; i < explained.size(); ++i) explained[i] += norm(other.x[i] - branch.outcome.x[i]);
+      const StepOutcome other = model_.run({settled, 0, kNear * h_, branch.given});
+      for (std::size_t i = 0; i < b.position.size(); ++i) {
+        b.position[i] += norm(other.x[i] - branch.outcome.x[i]);
+        b.velocity[i] += norm(other.v[i] - branch.outcome.v[i]) * dt_;
+      }
+      for (std::size_t c = 0; c < reach_.size(); ++c) {
+        b.rotation[c] += apart(other.rotation[c], branch.outcome.rotation[c]);
+      }
+      b.impulse += norm(other.impulse - branch.outcome.impulse);
     }
-    const auto is_explained = [&](int32_t i) {
-      return or_infinite(norm(after_.x[at(i)] - branch.outcome.x[at(i)])) <= explained[at(i)];
-    };
-    if (!std::all_of(branch.violations.begin(), branch.violations.end(), is_explained)) return;
-    undecided_ = static_cast<int64_t>(branch.violations.size());
+    compare(explained);
+    if (!explained.holds()) return;
+    undecided_ = std::max<int64_t>(1, static_cast<int64_t>(branch.violations.size()));
+    branch = std::move(explained);
   }
 
   AdmissibleStep report(Branch branch) const {
@@ -399,7 +431,7 @@ class Search {
     found.where = branch.where;
     found.measured = branch.measured;
     found.bound = branch.bound;
-    found.holds = branch.holds() || undecided_ > 0;
+    found.holds = branch.holds();
     std::set<DecisionKey> against;
     for (const NearDecision& d : branch.outcome.near) {
       if (!d.is_natural) against.insert(d.key);

@@ -70,7 +70,9 @@ class Decisions {
     DecisionKey key = key_;
     key.kind = kind;
     if (kind == DecisionKind::side) {
-      key.evaluation = 0;  // taken once a substep, asked for in every evaluation
+      // Taken once a substep, asked for again and again.
+      key.evaluation = 0;
+      key.turn = 0;
     } else {
       key.turn = key_.turn++;
     }

@@ -10,7 +10,7 @@ namespace cutproof::oracles {
 // Uniform in [-1, 1] (Vigna's splitmix64).
 class Noise {
  public:
-  explicit Noise(uint64_t seed) : state_(seed * 0x9e3779b97f4a7c15u) {}
+  explicit Noise(uint64_t seed) : seed_(seed * 0x9e3779b97f4a7c15u), state_(seed_) {}
   virtual ~Noise() = default;
   virtual double operator()() {
     uint64_t z = (state_ += 0x9e3779b97f4a7c15u);
@@ -18,6 +18,10 @@ class Noise {
     z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
     z ^= z >> 31;
     return static_cast<double>(z >> 11) * 0x1p-52 - 1;
+  }
+  // Draws from here on are those of this name, whatever was drawn before.
+  void name(uint64_t what, uint64_t index, uint64_t time) {
+    state_ = seed_ ^ (what << 60 ^ time << 32 ^ index) * 0xd1342543de82ef95u;
   }
   Vec3 vector() {
     const double a = (*this)(), b = (*this)(), c = (*this)();
@@ -30,7 +34,7 @@ class Noise {
   }
 
  private:
-  uint64_t state_;
+  uint64_t seed_, state_;
 };
 
 // The greatest there is, one way or the other, and with the opposite sign the other way: few numbers are drawn of it,

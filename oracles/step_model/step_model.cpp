@@ -26,11 +26,10 @@ constexpr double kContactRounds = 4;    // ways into the blade's frame and back
 // Below this, in units of u, (σ2 + σ3) / σ1 says nothing of how a cluster is turned: backends take 2^-53 · 9,000
 // (reference) and 2^-24 · 16 (kernels) for zero.
 constexpr double kDegenerate = 1e4;
-// The same of what the rounding of places makes of the matrix.
+// Less than this of the previous rotation is nothing to go by, in whatever precision (the reference takes 1e-9).
+constexpr double kHalfTurn = 1e-8;
+// The same as kDegenerate, of what the rounding of places makes of the matrix.
 constexpr double kInPlaces = 0.01;
-// Of NearestRotation::weight: below this, rounding decides which way round it goes.
-constexpr double kHalfTurn = 0.03;
-constexpr double kShortest = 1e-12;
 
 Vec3 turned_by(Vec3 rotation_vector, Vec3 v) { return v + cross(rotation_vector, v); }
 
@@ -134,6 +133,7 @@ class StepModel::Run {
         wanted_(wanted),
         disturbed_(wanted.disturbance != 0),
         noise_(wanted.disturbance),
+        repeats_(wanted.disturbance > 0 && (wanted.disturbance - 1) / 2 % 2 == 1),
         lasting_((wanted.disturbance + 1) / 2, wanted.disturbance % 2 == 0 ? -1 : +1),
         u_(model.u_),
         decisions_(wanted.settled, wanted.near, model.u_, disturbed_ ? &noise_ : nullptr),
@@ -144,7 +144,6 @@ class StepModel::Run {
     out_.rounding.resize(out_.x.size());
     out_.turn_rounding.resize(model.clusters_.size());
     out_.free.assign(model.clusters_.size(), StepOutcome::Free::never);
-    center_.resize(model.clusters_.size());
     sum_.resize(out_.x.size());
     goal_rounding_.resize(out_.x.size());
     if (disturbed_) {
@@ -196,7 +195,10 @@ class StepModel::Run {
     StepOutcome::Free& free = out_.free[at(c)];
     if (free != StepOutcome::Free::before) free = is_last ? StepOutcome::Free::at_last : StepOutcome::Free::before;
   }
-  void note_rounding(std::size_t i, double amplitude) { rounding_now_[i] += amplitude * amplitude; }
+
+  // What is rounded: of clusters and of particles.
+  enum class Rounded : uint8_t { shape, prediction, place, end, impulse };
+  void round(Rounded what, std::size_t index) { noise_.name(static_cast<uint64_t>(what), index, repeats_ ? 0 : time_); }
 
   const StepModel& model_;
   const Setup& setup_;
@@ -205,18 +207,19 @@ class StepModel::Run {
   const Wanted& wanted_;
   const bool disturbed_;
   Noise noise_;            // of single roundings
+  const bool repeats_;     // each is the same in every iteration and substep
   OppositeNoise lasting_;  // of what stays the same throughout a run
   const double u_;
   Decisions decisions_;
   const bool stores_positions_;
   StepOutcome out_;
-  std::vector<Vec3> center_;           // [m] t
   std::vector<Vec3> sum_;              // [n] Σ_c t + R (X - T)
   std::vector<double> goal_rounding_;  // [n] Σ_c of squares
   std::vector<double> rounding_now_;   // [n] of this substep
   std::vector<Vec3> rest_off_;         // [m]
   double parameter_off_ = 0, step_off_ = 0;
   double turn_amplitude_ = 0;  // of the last rotation [rad]
+  uint64_t time_ = 0;          // evaluations so far
 };
 
 // The best rotation; the previous one where there is no extent, the nearest to it along a line.
@@ -231,16 +234,19 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double siz
   const bool is_given = is_last && !wanted_.given.empty() && wanted_.given[at(c)] != nullptr;
   if (cluster.extent == Cluster::Extent::line) {
     const NearestRotation nearest = nearest_of_rank_one(best_rotation(to_mat3(a)), previous);
-    // Near half a turn, what a quaternion has of the previous rotation is short, and its rounding turns it farther.
-    turn_amplitude_ = kRotationRounds * u_ / std::sqrt(std::max(nearest.weight, kShortest));
+    // Near half a turn, what a quaternion has of the previous rotation is short, and its rounding turns it farther;
+    // where it is no more than that, every answer is as near as any other.
+    const double kept = std::sqrt(nearest.weight);
+    const bool is_half_turn = !(kept > std::max(kDegenerate * u_, kHalfTurn));
+    if (!is_half_turn) turn_amplitude_ /= kept;
     rounding = turn_amplitude_ + sum_amplitude / a.norm();
     if (!(a.norm() > kDegenerate * kInPlaces * noise)) {
       set_free(c, is_last);
       rounding = 1;
     }
     rounding *= rounding;
-    // After half a turn every answer is as near as any other.
-    if (!(nearest.weight > kHalfTurn)) out_.free[at(c)] = StepOutcome::Free::about_line;
+    StepOutcome::Free& free = out_.free[at(c)];
+    if (is_half_turn && free != StepOutcome::Free::before) free = StepOutcome::Free::about_line;
     return is_given ? *wanted_.given[at(c)] : nearest.r;
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -255,7 +261,7 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double siz
     rounding *= rounding;
     return is_given ? *wanted_.given[at(c)] : nearest_of_rank_one(best_rotation(to_mat3(a)), previous).r;
   }
-  rounding = u_ * kRotationRounds + (sure > 0 ? std::min(1.0, std::sqrt(2.0) * sum_amplitude / sure) : 1.0);
+  rounding = u_ * kRotationRounds + std::min(1.0, std::sqrt(2.0) * sum_amplitude / sure);
   rounding *= rounding;
   if (is_given) return *wanted_.given[at(c)];
   return to_mat3(u * v.transpose());
@@ -300,6 +306,7 @@ void StepModel::Run::match_shapes(bool is_last) {
     Mat3 r;
     if (disturbed_) {
       const double norm_of_a = a.norm();
+      round(Rounded::shape, at(c));
       for (int row = 0; row < 3; ++row) {
         for (int column = 0; column < 3; ++column) {
           // Methods for rotations are stable with respect to the norm of their matrix, not entry by entry.
@@ -370,6 +377,7 @@ void StepModel::Run::substep(int32_t s) {
   for (std::size_t i = 0; i < start.size(); ++i) {
     if (before_.alive[i] == 0) continue;
     const Vec3 inertia = dt * out_.v[i] + (dt * dt) * step.gravity;
+    round(Rounded::prediction, i);
     predicted[i] = start[i] + inertia;
     if (disturbed_) predicted[i] += noise_.off(u_ * stored(i, predicted[i]), 2 * u_ * norm(inertia));
     began[i] = {start[i], contacts.height_at_start(start[i])};
@@ -385,6 +393,7 @@ void StepModel::Run::substep(int32_t s) {
 
   std::vector<Vec3> earlier = out_.x, now;
   for (int32_t j = 0; j < step.iterations; ++j) {
+    ++time_;
     match_shapes(s + 1 == step.substeps && j + 1 == step.iterations);
     now = out_.x;
     for (std::size_t i = 0; i < start.size(); ++i) {
@@ -402,6 +411,7 @@ void StepModel::Run::substep(int32_t s) {
       }
       Vec3& next = out_.x[i];
       next = free;
+      round(Rounded::place, i);
       Vec3 wanted = free;
       if (contacts.any()) {
         decisions_.begin(s, j + 1, static_cast<int32_t>(i));
@@ -428,6 +438,7 @@ void StepModel::Run::substep(int32_t s) {
   for (std::size_t i = 0; i < start.size(); ++i) {
     if (before_.alive[i] == 0) continue;
     const Vec3 push = out_.x[i] - predicted[i];
+    round(Rounded::end, i);
     pushed += body_.mass[i] * push;
     // A backend adds up what contacts do in each iteration.
     if (disturbed_) pushed += body_.mass[i] * noise_.off((carrying * u_) * push, 0);
@@ -441,7 +452,9 @@ void StepModel::Run::substep(int32_t s) {
   // Partial sums, which are as large as the whole.
   summed *= u_ * std::sqrt(static_cast<double>(start.size()));
   pushed_rounding += 3 * summed * summed;
+  round(Rounded::impulse, 0);
   if (disturbed_) pushed += summed * noise_.vector();
+  ++time_;
   out_.impulse = decay * (out_.impulse + pushed / dt);
   out_.impulse_rounding += pushed_rounding / (dt * dt);
 }

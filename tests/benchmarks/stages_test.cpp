@@ -70,7 +70,7 @@ void expect_rows(const json& document, const std::string& backend, const std::st
   EXPECT_EQ(document.at("rows").size(), expected.size());
   ASSERT_EQ(document.at("scenes").size(), scenes.size() * splits.size());
   for (const json& scene : document.at("scenes")) {
-    EXPECT_EQ(scene.at("topology").size(), 4U);
+    EXPECT_EQ(scene.at("topology").size(), 5U);
     for (const json& verdict : scene.at("topology")) EXPECT_TRUE(verdict.at("holds")) << verdict;
     EXPECT_GE(scene.at("judged_frames"), 1);
   }
@@ -121,7 +121,7 @@ TEST_F(Bench, ReproducesTable1WithBoxesAndSampledClusters) {
   for (const json& scene : document.at("scenes")) {
     seen.insert({scene.at("scene").get<std::string>(), scene.at("cooking").get<std::string>()});
     // Whether coupling matches is asked where clusters cover every edge.
-    EXPECT_EQ(scene.at("topology").size(), scene.at("cooking") == "boxes" ? 4U : 3U);
+    EXPECT_EQ(scene.at("topology").size(), scene.at("cooking") == "boxes" ? 5U : 4U);
     EXPECT_GE(scene.at("isolated_groups"), 0);
   }
   std::set<std::array<std::string, 2>> expected;

@@ -90,5 +90,22 @@ TEST(BestRotation, KnowsTheNearestAnswerToAWire) {
   }
 }
 
+// However near to half a turn: u is reached, the axis is right as far as it is known.
+TEST(BestRotation, KnowsTheNearestAnswerToAWireThatHasNearlyTurnedAbout) {
+  for (const double left : {1e-2, 1e-5, 1e-8, 1e-12, 0.0}) {
+    const Vector3d u = Vector3d::UnitX(), v(-std::cos(left), std::sin(left), 0);
+    const NearestRotation nearest =
+        nearest_of_rank_one(best_rotation(from(2 * u * v.transpose())), from(Matrix3d::Identity()));
+    const Matrix3d r = to(nearest.r);
+    EXPECT_LE((r * v - u).norm(), 5e-16) << left;
+    EXPECT_LE((r.transpose() * r - Matrix3d::Identity()).norm(), 2e-15) << left;
+    EXPECT_NEAR(r.determinant(), 1, 2e-15) << left;
+    EXPECT_NEAR(nearest.weight, left * left / 4, 1e-3 * left * left) << left;
+    if (left == 0) continue;
+    const Matrix3d turn = Eigen::AngleAxisd(left - M_PI, Vector3d::UnitZ()).toRotationMatrix();
+    EXPECT_LE((r - turn).norm(), 2e-15 / left) << left;
+  }
+}
+
 }  // namespace
 }  // namespace cutproof::oracles

@@ -157,6 +157,18 @@ TEST(AdmissibleStep, RejectsParametersThatAreOffByAThousandth) {
   }
 }
 
+// A thin blade that stands in the plane x = `plane.x`, over everything.
+void stand_in_plane(cutproof::Setup& setup, Vec3 plane) {
+  setup.has_blade = true;
+  setup.blade = {0.4, 0.4, 0, 0};
+  BladeMove move;
+  move.down = true;
+  move.from = {{plane.x, plane.y, plane.z - 0.1}, {0, 1, 0}, {0, 0, 1}};
+  move.to = move.from;
+  setup.blade_moves.assign(static_cast<std::size_t>(setup.step.substeps), move);
+  setup.stroke_end = {0};
+}
+
 // Two particles that nothing joins but one cluster, both exactly in the plane of a blade: each may be on either side.
 struct PairInThePlane {
   StepScene scene;
@@ -167,15 +179,7 @@ PairInThePlane pair_in_the_plane(int32_t iterations) {
   cutproof::Setup& setup = pair.scene.setup;
   setup.step.substeps = 1;
   setup.step.iterations = iterations;
-  setup.has_blade = true;
-  setup.blade = {0.4, 0.4, 0, 0};
-  BladeMove move;
-  move.down = true;
-  const Vec3 middle = setup.body.rest_position(0);
-  move.from = {{middle.x, middle.y, middle.z - 0.1}, {0, 1, 0}, {0, 0, 1}};
-  move.to = move.from;
-  setup.blade_moves = {move};
-  setup.stroke_end = {0};
+  stand_in_plane(setup, setup.body.rest_position(0));
   pair.scene.before = state_of(setup.body, {{0, 1}, {1, 2, 3}});
   // Two away from the plane, so that only the others are open.
   pair.scene.before.x[1].x += 2 * kSpacing;
@@ -223,36 +227,54 @@ TEST(AdmissibleStep, IsNotWhatOnlyATieCouldExcuse) {
   }
 }
 
-// More ties than can be tried together: what several of them may have done is counted, what none does is rejected.
-TEST(AdmissibleStep, CountsWhatMoreTiesMayHaveDoneThanCanBeTried) {
-  StepScene scene{setup_of(block_body(5, 6, 6, kSpacing, 0.002)), {}, {}};
-  cutproof::Setup& setup = scene.setup;
-  setup.step.substeps = 1;
-  setup.has_blade = true;
-  setup.blade = {1, 1, 0, 0};
-  BladeMove move;
-  move.down = true;
-  const Vec3 middle = setup.body.rest_position(2);
-  move.from = {{middle.x, middle.y, middle.z - 0.5}, {0, 1, 0}, {0, 0, 1}};
-  move.to = move.from;
-  setup.blade_moves = {move};
-  setup.stroke_end = {0};
-  scene.before = state_of(setup.body, box_clusters(5, 6, 6, 3));
-  round_to_single(setup.body, scene.before);
-  // All 36 of the middle layer go their own ways.
-  StepScene led = scene;
-  for (std::size_t i = 0; i < led.before.x.size(); ++i) {
-    if (i % 5 == 2) led.before.x[i].x += (i * 7 % 3 == 0 ? 1 : -1) * 1e-15;
+// More ties than can be tried together. Where particles end tells on which side they were; what is wrong besides is
+// rejected, whatever the ties.
+TEST(AdmissibleStep, TakesManyTiesAsTheyWereAndExcusesNothingElse) {
+  for (const int32_t substeps : {1, 2}) {
+    StepScene scene{setup_of(block_body(5, 6, 6, kSpacing, 0.002)), {}, {}};
+    cutproof::Setup& setup = scene.setup;
+    setup.step.substeps = substeps;
+    stand_in_plane(setup, setup.body.rest_position(2));
+    scene.before = state_of(setup.body, box_clusters(5, 6, 6, 3));
+    round_to_single(setup.body, scene.before);
+    // All 36 of the middle layer go their own ways.
+    StepScene led = scene;
+    for (std::size_t i = 0; i < led.before.x.size(); ++i) {
+      if (i % 5 == 2) led.before.x[i].x += (i * 7 % 3 == 0 ? 1 : -1) * 1e-15;
+    }
+    led.take_step();
+    round_to_single(setup.body, led.after);
+    const Verdict verdict = admissible_step(setup, scene.before, led.after);
+    expect_holds(verdict);
+    EXPECT_EQ(verdict.undecided, 0);
+    State wrong = led.after;
+    wrong.v[0].y += 0.1 * kSpacing / setup.substep_length[0];
+    EXPECT_FALSE(admissible_step(setup, scene.before, wrong).holds);
+    wrong = led.after;
+    wrong.impulse.x += 0.01;
+    EXPECT_FALSE(admissible_step(setup, scene.before, wrong).holds);
+    // The simulator that is too soft has the same ties.
+    led.setup.step.stiffness *= 0.1;
+    led.take_step();
+    round_to_single(setup.body, led.after);
+    EXPECT_FALSE(admissible_step(setup, scene.before, led.after).holds);
   }
-  led.take_step();
-  round_to_single(setup.body, led.after);
-  const Verdict verdict = admissible_step(setup, scene.before, led.after);
-  EXPECT_TRUE(verdict.holds) << verdict.witness.text;
-  // The simulator that is too soft has the same ties.
-  led.setup.step.stiffness *= 0.1;
-  led.take_step();
-  round_to_single(setup.body, led.after);
-  EXPECT_FALSE(admissible_step(setup, scene.before, led.after).holds);
+}
+
+// Half a turn from the previous rotation every one along the wire is as near as another, but none that is not along it.
+TEST(AdmissibleStep, FollowsTheRotationThatWasTakenAfterHalfATurn) {
+  StepScene scene{setup_of(block_body(5, 1, 1, kSpacing)), {}, {}};
+  scene.before = state_of(scene.setup.body, {{0, 1, 2, 3, 4}});
+  scene.before.clusters.rotation[0] = {{-1, 0, 0, 0, -1, 0, 0, 0, 1}};
+  scene.take_step();
+  expect_holds(admissible_step(scene.setup, scene.before, scene.after));
+  scene.after.clusters.rotation[0] = {{1, 0, 0, 0, 0, -1, 0, 1, 0}};
+  expect_holds(admissible_step(scene.setup, scene.before, scene.after));
+  for (const double angle : {1e-6, 1e-3, 1.0}) {
+    State wrong = scene.after;
+    wrong.clusters.rotation[0] = {{std::cos(angle), -std::sin(angle), 0, std::sin(angle), std::cos(angle), 0, 0, 0, 1}};
+    EXPECT_FALSE(admissible_step(scene.setup, scene.before, wrong).holds) << angle;
+  }
 }
 
 // Along a wire the best rotations are many: only the nearest to the previous one is right.
