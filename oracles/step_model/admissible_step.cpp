@@ -19,7 +19,7 @@ namespace {
 
 // Without growth: within so much of the quadratic sum of single roundings nobody looks closer, because disturbed runs
 // would allow more (tolerances.md, The step again).
-constexpr double kSurely = 0.5;
+constexpr double kSurely = 2;
 // Disturbed runs, from fixed seeds; as many before anything is called wrong; and how much farther than the farthest of
 // them a right answer may be.
 constexpr uint64_t kDisturbedRuns = 8, kMostDisturbedRuns = 32;
@@ -80,7 +80,7 @@ class Search {
   AdmissibleStep find() {
     Branch branch = start({});
     compare(branch);
-    if (!(branch.worst <= kSurely)) {
+    if (!branch.holds()) {
       look_closer(branch);
       compare(branch);
     }
@@ -118,16 +118,16 @@ class Search {
     const StepOutcome& o = branch.outcome;
     Bounds& b = branch.bounds;
     for (const double square : o.rounding) {
-      b.position.push_back(std::sqrt(square));
+      b.position.push_back(kSurely * std::sqrt(square));
       b.velocity.push_back(2 * b.position.back());
     }
     for (int32_t c = 0; c < before_.clusters.count(); ++c) {
       double members = 0;
       for (const int32_t i : before_.clusters.of(c)) members = std::max(members, o.rounding[at(i)]);
       const double arm = std::max(reach_[at(c)], h_);
-      b.rotation.push_back(std::sqrt(o.turn_rounding[at(c)] + members / (arm * arm)));
+      b.rotation.push_back(kSurely * std::sqrt(o.turn_rounding[at(c)] + members / (arm * arm)));
     }
-    b.impulse = std::sqrt(o.impulse_rounding);
+    b.impulse = kSurely * std::sqrt(o.impulse_rounding);
     return branch;
   }
 

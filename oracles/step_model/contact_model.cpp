@@ -54,6 +54,7 @@ Vec3 ContactModel::off_plate(Vec3 x, const Began& began, Decisions& decisions) c
   const Local c = to_local(to_, x - to_.edge);
   const double before_edge = -c.w, behind_back = c.w - depth_, beyond_end = std::abs(c.u) - half_length_;
   const double outside = std::max({before_edge, behind_back, beyond_end});  // of the rectangle; below 0: over it
+  if (outside > decisions.near() && std::max(outside, std::abs(c.n)) >= clearance_) return x;
   if (outside <= decisions.near()) {
     const int side = side_of(began, decisions);
     const double height = side * c.n;

@@ -31,6 +31,8 @@ constexpr double kHalfTurn = 1e-8;
 // The same as kDegenerate, of what the rounding of places makes of the matrix.
 constexpr double kInPlaces = 0.01;
 
+constexpr Mat3 kNoTerms = {{0, 0, 0, 0, 0, 0, 0, 0, 0}};
+
 Vec3 turned_by(Vec3 rotation_vector, Vec3 v) { return v + cross(rotation_vector, v); }
 
 // Weights of Chebyshev's iteration j -> j + 1 by the ratio of Chebyshev polynomials (method.md §11): ω_j+1 =
@@ -106,6 +108,7 @@ StepModel::StepModel(const Setup& setup, const State& before, double unit_roundo
       Vec3& arm = arm_[at(cluster.begin) + k];
       arm = (body.rest_position(members[k]) - base) - from_base;
       cluster.radius = std::max(cluster.radius, norm(arm));
+      cluster.arms += weight_[at(members[k])] * norm(arm);
       lever_[at(members[k])] += dot(arm, arm);
     }
     cluster.extent = members.size() == 1           ? Cluster::Extent::point
@@ -216,6 +219,7 @@ class StepModel::Run {
   std::vector<Vec3> sum_;              // [n] Σ_c t + R (X - T)
   std::vector<double> goal_rounding_;  // [n] Σ_c of squares
   std::vector<double> rounding_now_;   // [n] of this substep
+  double shared_rounding_ = 0;         // of this substep, of Σ m goal: of squares
   std::vector<Vec3> rest_off_;         // [m]
   double parameter_off_ = 0, step_off_ = 0;
   double turn_amplitude_ = 0;  // of the last rotation [rad]
@@ -279,26 +283,33 @@ void StepModel::Run::match_shapes(bool is_last) {
     const Vec3* const arm = model_.arm_.data() + cluster.begin;
     const auto terms = static_cast<double>(members.size());
     if (members.empty()) continue;
-    const Vec3 base = x[at(members.front())];
+    const Vec3 base = x[at(members.front())], base_stored = stored(at(members.front()), base);
     Vec3 moment;
-    double spread = 0, farthest = 0, arms = 0;
+    double spread = 0, farthest = 0;  // of what is stored: root mean square from the first member's; greatest
     for (const int32_t i : members) {
-      farthest = std::max(farthest, norm(stored(at(i), x[at(i)])));
-      const Vec3 e = x[at(i)] - base;
-      moment += model_.weight_[at(i)] * e;
-      spread += model_.weight_[at(i)] * norm(stored(at(i), x[at(i)]) - stored(at(members.front()), base));
+      const Vec3 place = stored(at(i), x[at(i)]), from_first = place - base_stored;
+      farthest = std::max(farthest, dot(place, place));
+      spread += model_.weight_[at(i)] * dot(from_first, from_first);
+      moment += model_.weight_[at(i)] * (x[at(i)] - base);
     }
     const Vec3 from_base = moment / cluster.mass;
-    spread /= cluster.mass;
-    Eigen::Matrix3d a = Eigen::Matrix3d::Zero(), size = Eigen::Matrix3d::Zero();
+    spread = std::sqrt(spread / cluster.mass);
+    farthest = std::sqrt(farthest);
+    Mat3 sum = kNoTerms, sizes = kNoTerms;  // Σ w (x - t) (X - T)ᵀ, and of its terms' sizes
     for (std::size_t k = 0; k < members.size(); ++k) {
       const double w = model_.weight_[at(members[k])];
-      const Eigen::Vector3d now = as_eigen((x[at(members[k])] - base) - from_base), rest = as_eigen(arm[k]);
-      a += w * now * rest.transpose();
-      arms += w * norm(arm[k]);
-      size += w * now.cwiseAbs() * rest.cwiseAbs().transpose();
+      const Vec3 now = w * ((x[at(members[k])] - base) - from_base), rest = arm[k];
+      for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column) {
+          const double term = now[row] * rest[column];
+          sum(row, column) += term;
+          sizes(row, column) += std::abs(term);
+        }
+      }
     }
-    if (is_last) out_.shape[at(c)] = to_mat3(a);
+    Eigen::Matrix3d a = as_eigen(sum);
+    const Eigen::Matrix3d size = as_eigen(sizes);
+    if (is_last) out_.shape[at(c)] = sum;
     Vec3 t = base + from_base;
     // The mean itself is stored, and its sum is taken relative to one member.
     const double mean_amplitude = sum_rounds(terms) * u_ * spread;
@@ -314,7 +325,7 @@ void StepModel::Run::match_shapes(bool is_last) {
         }
       }
       t += noise_.off((2 * u_) * center, mean_amplitude);
-      r = rotation_of(c, a, size.sum(), u_ * farthest * arms, is_last);
+      r = rotation_of(c, a, size.sum(), u_ * farthest * cluster.arms, is_last);
       const Vec3 turn = turn_amplitude_ * noise_.vector();
       if (cluster.extent != Cluster::Extent::point) {
         for (int column = 0; column < 3; ++column) {
@@ -323,11 +334,17 @@ void StepModel::Run::match_shapes(bool is_last) {
         }
       }
     } else {
-      r = rotation_of(c, a, size.sum(), u_ * farthest * arms, is_last);
+      r = rotation_of(c, a, size.sum(), u_ * farthest * cluster.arms, is_last);
     }
     out_.rotation[at(c)] = r;
     if (disturbed_) t -= r * rest_off_[at(c)];
     const double center_rounding = 4 * u_ * u_ * dot(center, center) + 3 * mean_amplitude * mean_amplitude;
+    if (!disturbed_) {
+      // What all members have in common moves their sum as a whole; a rest center is off in each iteration.
+      const double rest_amplitude = u_ * ((stores_positions_ ? norm(cluster.rest) : 0) + cluster.radius);
+      shared_rounding_ +=
+          cluster.mass * cluster.mass * (center_rounding + setup_.step.iterations * rest_amplitude * rest_amplitude);
+    }
     for (std::size_t k = 0; k < members.size(); ++k) {
       sum_[at(members[k])] += t + r * arm[k];
       if (!disturbed_) {
@@ -362,6 +379,7 @@ void StepModel::Run::substep(int32_t s) {
   std::vector<Vec3> predicted(start.size());
   std::vector<ContactModel::Began> began(start.size());
   rounding_now_.assign(start.size(), 0);
+  shared_rounding_ = 0;
   // Rounds a place that contacts have made of `free`.
   const auto settle = [&](std::size_t i, Vec3 free, Vec3& x, double more) {
     double amplitude = more;
@@ -394,6 +412,11 @@ void StepModel::Run::substep(int32_t s) {
   std::vector<Vec3> earlier = out_.x, now;
   for (int32_t j = 0; j < step.iterations; ++j) {
     ++time_;
+    // The implicit solver draws what earlier iterations have rounded to the prediction; others keep it.
+    if (implicit && !accelerated && !disturbed_) {
+      for (double& square : rounding_now_) square *= pull * pull;
+      shared_rounding_ *= pull * pull;
+    }
     match_shapes(s + 1 == step.substeps && j + 1 == step.iterations);
     now = out_.x;
     for (std::size_t i = 0; i < start.size(); ++i) {
@@ -433,7 +456,7 @@ void StepModel::Run::substep(int32_t s) {
 
   const double decay = std::exp(-step.damping * dt);
   Vec3 pushed;
-  double pushed_rounding = 0, summed = 0;
+  double pushed_rounding = pull * pull * shared_rounding_, summed = 0;
   const double carried_on = step.substeps - s, carrying = kParameterRounds * std::sqrt(step.iterations + 1.0);
   for (std::size_t i = 0; i < start.size(); ++i) {
     if (before_.alive[i] == 0) continue;

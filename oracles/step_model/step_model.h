@@ -55,6 +55,7 @@ class StepModel {
     double mass = 0;
     Vec3 rest;          // T
     double radius = 0;  // greatest |X - T|
+    double arms = 0;    // Σ w |X - T|
     enum class Extent { point, line, more } extent = Extent::more;
   };
 
