@@ -267,7 +267,9 @@ class Search {
     return at(coupled_.count);
   }
 
-  void see(Branch& branch, StepPart part, int32_t where, double measured, double bound) const {
+  // What was only asked bluntly is counted as undecided where it holds, and says nothing of how sharp the judge is.
+  void see(Branch& branch, StepPart part, int32_t where, double measured, double bound, bool blunt = false) const {
+    if (blunt && measured <= bound) return;
     const double ratio = measured <= bound ? (bound > 0 ? measured / bound : 0) : kInfinite;
     const bool farther =
         ratio == kInfinite && branch.worst == kInfinite && measured * branch.bound > branch.measured * bound;
@@ -282,6 +284,7 @@ class Search {
   void compare(Branch& branch) const {
     branch.violations.clear();
     branch.worst = -1;
+    branch.measured = branch.bound = 0;
     const StepOutcome& o = branch.outcome;
     const Bounds& b = branch.bounds;
     std::vector<uint8_t> violates(before_.x.size(), 0);
@@ -290,15 +293,16 @@ class Search {
       const double off = or_infinite(norm(after_.x[i] - o.x[i]));
       const double fast = or_infinite(norm(after_.v[i] - o.v[i]) * dt_);
       violates[i] = !(off <= b.position[i]) || !(fast <= b.velocity[i]);
-      see(branch, StepPart::position, static_cast<int32_t>(i), off / h_, b.position[i] / h_);
-      see(branch, StepPart::velocity, static_cast<int32_t>(i), fast / h_, b.velocity[i] / h_);
+      const bool blunt = !branch.blunt.empty() && branch.blunt[i] != 0;
+      see(branch, StepPart::position, static_cast<int32_t>(i), off / h_, b.position[i] / h_, blunt);
+      see(branch, StepPart::velocity, static_cast<int32_t>(i), fast / h_, b.velocity[i] / h_, blunt);
     }
     for (int32_t c = 0; c < before_.clusters.count(); ++c) {
       const Mat3& r = after_.clusters.rotation[at(c)];
       const double turned =
           is_open(branch, at(c)) ? off_agreed(o.shape[at(c)], r) : or_infinite(apart(r, o.rotation[at(c)]));
       const double arm = std::max(reach_[at(c)], h_) / h_;
-      see(branch, StepPart::rotation, c, turned * arm, b.rotation[at(c)] * arm);
+      see(branch, StepPart::rotation, c, turned * arm, b.rotation[at(c)] * arm, b.rotation[at(c)] == kAnyRotation);
       if (turned <= b.rotation[at(c)]) continue;
       for (const int32_t i : before_.clusters.of(c)) violates[at(i)] = 1;
     }
