@@ -1,7 +1,12 @@
 // Shells of the skin and cavities of the tissue, by joining what touches.
 #include "oracles/shells.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
+
+#include "oracles/rounding.h"
+#include "oracles/shape_sums.h"
 
 namespace cutproof::oracles {
 
@@ -66,6 +71,51 @@ ShellCount count_shells(const Skin& skin) {
   ShellCount count;
   for (const double volume : shells_of(skin, skin.position).volume) (volume > 0 ? count.outer : count.inner) += 1;
   return count;
+}
+
+std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, const Memberships& memberships) {
+  const Body& body = setup.body;
+  const Clusters& clusters = state.clusters;
+  const Skin& skin = state.skin;
+  const WeightedRest weighted = weighted_rest(body, clusters);
+  const double u = unit_roundoff(state) + kUnitRoundoff;
+  std::vector<ClusterMeans> means;
+  std::vector<double> center_rounding;  // what the sum of a cluster's center rounds: squares [m²]
+  for (int32_t c = 0; c < clusters.count(); ++c) {
+    means.push_back(cluster_means(weighted, clusters, state.x, c));
+    const auto members = clusters.of(c);
+    Vec3 mean;
+    double spread = 0, radius = 0;
+    for (const int32_t i : members) {
+      const double share = weighted.weight[at(i)] / means[at(c)].mass;
+      const Vec3 kept = stored_place(body, state.precision, i, state.x[at(i)]);
+      const int32_t first = members.front();
+      mean += share * kept;
+      spread += share * norm(kept - stored_place(body, state.precision, first, state.x[at(first)]));
+      radius = std::max(radius, norm(weighted.position[at(i)] - means[at(c)].rest));
+    }
+    const double sum = sum_rounds(static_cast<double>(members.size())) * u * spread;
+    center_rounding.push_back(4 * u * u * dot(mean, mean) + 3 * sum * sum + 3 * u * u * radius * radius);
+  }
+  std::vector<VertexPlace> places(skin.owner.size());
+  for (std::size_t v = 0; v < places.size(); ++v) {
+    const Vec3 rest = vertex_at_rest(setup, skin, v);
+    const auto holders = memberships.of(skin.owner[v]);
+    Vec3 sum;
+    double squares = 0;
+    for (const int32_t c : holders) {
+      const ClusterMeans& m = means[at(c)];
+      const Vec3 arm = rest - m.rest;
+      sum += m.current + clusters.rotation[at(c)] * arm;
+      squares += center_rounding[at(c)] + 4 * u * u * dot(arm, arm);
+    }
+    const auto count = static_cast<double>(holders.size());
+    const Vec3 place = sum / count, kept = state.precision == Precision::binary32 ? place - rest : place;
+    const double in_doubles = 4 * kUnitRoundoff * norm(place);
+    squares = squares / (count * count) + u * u * dot(kept, kept) + in_doubles * in_doubles;
+    places[v] = {place, kDeviations * std::sqrt(squares)};
+  }
+  return places;
 }
 
 }  // namespace cutproof::oracles

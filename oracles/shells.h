@@ -21,6 +21,14 @@ inline Vec3 vertex_at_rest(const Setup& setup, const Skin& skin, std::size_t v) 
   return setup.body.rest_position(skin.owner[v]) + reach * Vec3{1.0 * d[0], 1.0 * d[1], 1.0 * d[2]};
 }
 
+// Where the clusters of their owners put the vertices (method.md §8), and how far from there a right answer may be, by
+// rounding (tolerances.md, One skin vertex) [m]. Requires each owner to lie in a cluster.
+struct VertexPlace {
+  Vec3 place;
+  double bound = 0;
+};
+std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, const Memberships& memberships);
+
 struct ShellCount {
   int32_t outer = 0, inner = 0;
   friend bool operator==(const ShellCount&, const ShellCount&) = default;

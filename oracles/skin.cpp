@@ -7,7 +7,6 @@
 
 #include "oracles/checks.h"
 #include "oracles/rounding.h"
-#include "oracles/shape_sums.h"
 #include "oracles/shells.h"
 
 namespace cutproof::oracles {
@@ -164,49 +163,17 @@ void check_skin_vertices(Judged& judged, Verdict& verdict) {
   }
 
   // Their places.
-  const Clusters& clusters = state.clusters;
-  const WeightedRest weighted = weighted_rest(body, clusters);
-  const Memberships& memberships_of_all = judged.memberships();
-  std::vector<ClusterMeans> means;
-  for (int32_t c = 0; c < clusters.count(); ++c) means.push_back(cluster_means(weighted, clusters, state.x, c));
-  const double h = body.grid.spacing, u = unit_roundoff(state) + kUnitRoundoff;
-  // What the sum of a cluster's center rounds (tolerances.md, One skin vertex): squares [m²].
-  std::vector<double> center_rounding;
-  for (int32_t c = 0; c < clusters.count(); ++c) {
-    const auto members = clusters.of(c);
-    Vec3 mean;
-    double spread = 0, radius = 0;
-    for (const int32_t i : members) {
-      const double share = weighted.weight[at(i)] / means[at(c)].mass;
-      const Vec3 kept = stored_place(body, state.precision, i, state.x[at(i)]);
-      const int32_t first = members.front();
-      mean += share * kept;
-      spread += share * norm(kept - stored_place(body, state.precision, first, state.x[at(first)]));
-      radius = std::max(radius, norm(weighted.position[at(i)] - means[at(c)].rest));
-    }
-    const double sum = sum_rounds(static_cast<double>(members.size())) * u * spread;
-    center_rounding.push_back(4 * u * u * dot(mean, mean) + 3 * sum * sum + 3 * u * u * radius * radius);
-  }
-  Nearest nearest;
+  const Memberships& memberships = judged.memberships();
   for (std::size_t v = 0; v < skin.owner.size(); ++v) {
     const int32_t owner = skin.owner[v];
-    const auto memberships = memberships_of_all.of(owner);
-    if (memberships.empty())
+    if (memberships.of(owner).empty())
       return fail(verdict, {{}, {owner}}, "particle {} owns vertex {} and lies in no cluster", owner, v);
-    const Vec3 rest = vertex_at_rest(setup, skin, v);
-    Vec3 sum;
-    double squares = 0;
-    for (const int32_t c : memberships) {
-      const ClusterMeans& m = means[at(c)];
-      const Vec3 arm = rest - m.rest;
-      sum += m.current + clusters.rotation[at(c)] * arm;
-      squares += center_rounding[at(c)] + 4 * u * u * dot(arm, arm);
-    }
-    const auto count = static_cast<double>(memberships.size());
-    const Vec3 place = sum / count, kept = state.precision == Precision::binary32 ? place - rest : place;
-    const double in_doubles = 4 * kUnitRoundoff * norm(place);
-    squares = squares / (count * count) + u * u * dot(kept, kept) + in_doubles * in_doubles;
-    nearest.see(norm(skin.position[v] - place) / h, kDeviations * std::sqrt(squares) / h, static_cast<int32_t>(v));
+  }
+  const double h = body.grid.spacing;
+  Nearest nearest;
+  const std::vector<VertexPlace> places = vertex_places(setup, state, memberships);
+  for (std::size_t v = 0; v < places.size(); ++v) {
+    nearest.see(norm(skin.position[v] - places[v].place) / h, places[v].bound / h, static_cast<int32_t>(v));
   }
   if (nearest.where < 0) return;
   verdict.measured = nearest.measured;

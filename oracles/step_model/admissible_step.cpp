@@ -314,45 +314,63 @@ class Search {
     }
   }
 
-  // Looks for decisions that explain what no rounding of the first outcome does: fewest violations first.
+  Branch branch_of(Settled settled) {
+    Branch branch = start(std::move(settled));
+    look_closer(branch);
+    compare(branch);
+    return branch;
+  }
+
+  // Looks for decisions that explain what no rounding of the first outcome does.
   Branch explain(Branch first) {
+    // The sides that particles tell of: of the last substep they are certain, of earlier ones only likely.
+    const Settled certain = sides_of(first, setup_.step.substeps - 1), likely = sides_of(first, 0);
+    const Branch root = likely.empty() ? std::move(first) : branch_of(likely);
+    Branch best = root;
+    // What an outcome rounds is first taken for what the root does; that may be less.
+    bool all_tried = explore(root, likely == certain ? nullptr : &certain, false, best);
+    if (all_tried && !best.holds()) all_tried = explore(root, likely == certain ? nullptr : &certain, true, best);
+    if (!best.holds()) {
+      look_closer(best, kMostDisturbedRuns);
+      compare(best);
+    }
+    if (!best.holds() && !all_tried) count_undecided(best);
+    return best;
+  }
+
+  // Tries outcomes until one holds, fewest violations first; `closely`: looks closely at each, not only at those that
+  // seem to be as good as the best. False: there are more than are tried.
+  bool explore(const Branch& root, const Settled* other_root, bool closely, Branch& best) {
     const auto better = [](const Branch& a, const Branch& b) {
       if (a.holds() != b.holds()) return b.holds();
       if (a.violations.size() != b.violations.size()) return a.violations.size() > b.violations.size();
       return a.settled.size() > b.settled.size();
     };
-    const auto branch_of = [&](Settled settled) {
-      Branch branch = start(std::move(settled));
-      look_closer(branch);
-      compare(branch);
-      return branch;
-    };
-    // The sides that particles tell of: of the last substep they are certain, of earlier ones only likely.
-    const Settled certain = sides_of(first, setup_.step.substeps - 1), likely = sides_of(first, 0);
-    const Branch root = likely.empty() ? std::move(first) : branch_of(likely);
     std::vector<Branch> open = {root};
-    std::set<Settled> seen = {likely};
-    Branch best = root;
-    if (!root.holds() && seen.insert(certain).second) open.push_back(branch_of(certain));
-    std::make_heap(open.begin(), open.end(), better);
-    if (open.front().holds() || open.front().violations.size() < best.violations.size()) best = open.front();
+    std::set<Settled> seen = {root.settled};
     int tried = 0;
+    const auto keep = [&](Branch next) {
+      if (next.holds() || next.violations.size() < best.violations.size()) best = next;
+      open.push_back(std::move(next));
+      std::push_heap(open.begin(), open.end(), better);
+    };
     const auto try_out = [&](Settled settled) {
       if (tried >= most_outcomes_ || !seen.insert(settled).second) return;
       ++tried;
       Branch next = start(std::move(settled));
       next.bounds = root.bounds;  // until it is worth a closer look
       compare(next);
-      if (next.violations.size() <= best.violations.size()) {
+      if (closely || next.violations.size() <= best.violations.size()) {
         look_closer(next);
         compare(next);
       } else {
         next.ties = near_ties(next, root);
       }
-      if (next.holds() || next.violations.size() < best.violations.size()) best = next;
-      open.push_back(std::move(next));
-      std::push_heap(open.begin(), open.end(), better);
+      keep(std::move(next));
     };
+    if (other_root != nullptr && !best.holds() && seen.insert(*other_root).second) keep(branch_of(*other_root));
+    // Where one rounding tips many scales, as that of a wall does on which a whole layer rests.
+    for (uint64_t run = 1; run <= kMostDisturbedRuns && !best.holds(); ++run) try_out(decided_by(run, root));
     while (!open.empty() && !best.holds() && tried < most_outcomes_) {
       std::pop_heap(open.begin(), open.end(), better);
       const Branch present = std::move(open.back());
@@ -369,13 +387,20 @@ class Search {
         if (best.holds()) break;
       }
     }
-    const bool exhausted = best.holds() || open.empty();
-    if (!best.holds()) {
-      look_closer(best, kMostDisturbedRuns);
-      compare(best);
+    return best.holds() || open.empty();
+  }
+
+  // What a disturbed run decides that is left to itself, where the root has ties.
+  Settled decided_by(uint64_t run, const Branch& root) const {
+    Settled settled = root.settled;
+    const StepOutcome off = model_.run({settled, run, kNear * h_, root.given});
+    std::map<DecisionKey, int> taken;
+    for (const NearDecision& d : root.outcome.near) taken[d.key] = d.taken;
+    for (const NearDecision& d : off.near) {
+      const auto of_root = taken.find(d.key);
+      if (of_root == taken.end() || of_root->second != d.taken) settled[d.key] = d.taken;
     }
-    if (!best.holds() && !exhausted) count_undecided(best);
-    return best;
+    return settled;
   }
 
   // Ties of an outcome that was not looked at closely: by the measure of one that was.

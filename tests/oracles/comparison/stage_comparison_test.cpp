@@ -125,6 +125,23 @@ TEST(StageComparison, MeasuresWhatALaterStageMoves) {
   EXPECT_TRUE(found.decisions.empty());
 }
 
+// Where a body is 3,000 h from where it rests, a vertex of single precision is stored to 2e-4 h.
+TEST(StageComparison, AsksOfASkinFarAwayWhatSinglePrecisionCanHave) {
+  for (const double away : {0.0, 3000.0}) {
+    Block block;
+    block.before.precision = Precision::binary32;
+    for (Vec3& x : block.before.x) x += Vec3{away * block.setup.body.grid.spacing, 0, 0};
+    State after = block.after(reference::skin);
+    ++after.frame;
+    for (int32_t c = 0; c < after.clusters.count(); ++c) after.clusters.number[static_cast<std::size_t>(c)] = c;
+    after.skin.position[7].x += 2e-4 * block.setup.body.grid.spacing;
+    EXPECT_EQ(failures(block.comparison.compare(Stage::skin, block.before, after, true)),
+              away > 0 ? "" : "skin vertices");
+    after.skin.position[7].x += 0.01 * block.setup.body.grid.spacing;
+    EXPECT_EQ(failures(block.comparison.compare(Stage::skin, block.before, after, true)), "skin vertices");
+  }
+}
+
 // An edge as long as ε h up to a quarter of a rounding in single precision.
 TEST(StageComparison, CountsARemovalThatRoundingDecides) {
   cutproof::Setup setup = setup_of(block_body(2, 1, 1, 0.01));
