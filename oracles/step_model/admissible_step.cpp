@@ -125,7 +125,8 @@ class Search {
       double members = 0;
       for (const int32_t i : before_.clusters.of(c)) members = std::max(members, o.rounding[at(i)]);
       const double arm = std::max(reach_[at(c)], h_);
-      b.rotation.push_back(kSurely * std::sqrt(o.turn_rounding[at(c)] + members / (arm * arm)));
+      const double turned = kSurely * std::sqrt(o.turn_rounding[at(c)] + members / (arm * arm));
+      b.rotation.push_back(is_open(branch, at(c)) ? agreed_bound(branch, at(c)) : turned);
     }
     b.impulse = kSurely * std::sqrt(o.impulse_rounding);
     return branch;
@@ -148,8 +149,7 @@ class Search {
   }
   // Whether many rotations are the best in the last iteration, and the one that the backend states is not followed.
   static bool is_open(const Branch& branch, std::size_t c) {
-    const StepOutcome::Free free = branch.outcome.free[c];
-    return (free == StepOutcome::Free::at_last || free == StepOutcome::Free::about_line) && branch.given[c] == nullptr;
+    return branch.outcome.is_free[c] != 0 && branch.given[c] == nullptr;
   }
   // How far a rotation is from what all best rotations of this shape agree on: they turn v to u.
   static double off_agreed(const Mat3& shape, const Mat3& r) {
@@ -182,7 +182,7 @@ class Search {
         grown.velocity[i] = std::max(grown.velocity[i], or_infinite(norm(off.v[i] - branch.outcome.v[i])));
       }
       for (std::size_t c = 0; c < m; ++c) {
-        if (branch.outcome.free[c] != StepOutcome::Free::never) {
+        if (branch.outcome.is_free[c] != 0) {
           direction[c] = std::max(direction[c], off_agreed(branch.outcome.shape[c], off.rotation[c]));
         }
         grown.rotation[c] =
@@ -218,37 +218,26 @@ class Search {
               [](const NearDecision& p, const NearDecision& q) { return p.key < q.key; });
   }
 
-  // Where rounding is carried so far that small changes are no rule any more, or where many rotations fit a cluster
-  // before the last iteration, all that is coupled is asked one blunt question: no farther than the farthest of the
-  // runs brings any of it, and than such a cluster could have turned its members.
+  // Where rounding is carried so far that small changes are no rule any more, all that is coupled is asked one blunt
+  // question: no farther than the farthest of the runs brings any of it.
   void ask_bluntly(Branch& branch) const {
     Bounds& b = branch.bounds;
     const std::size_t sets = at(coupled_.count) + 1;
-    std::vector<double> far(sets, 0), fast(sets, 0), turned(sets, 0);
-    std::vector<uint8_t> is_blunt(sets, 0), wide(before_.x.size(), 0);
+    std::vector<double> far(sets, 0), fast(sets, 0);
+    branch.blunt.assign(before_.x.size(), 0);
     for (std::size_t i = 0; i < before_.x.size(); ++i) {
       if (before_.alive[i] == 0) continue;
       const std::size_t set = at(coupled_.label[i]);
       far[set] = std::max(far[set], b.position[i]);
       fast[set] = std::max(fast[set], b.velocity[i]);
-      if (!(b.position[i] <= kSmall * h_)) wide[i] = 1;
+      if (!(b.position[i] <= kSmall * h_)) branch.blunt[i] = 1;
     }
-    for (std::size_t c = 0; c < reach_.size(); ++c) {
-      if (branch.outcome.free[c] != StepOutcome::Free::before) continue;
-      const std::size_t set = set_of(c);
-      is_blunt[set] = 1;
-      turned[set] = std::max(turned[set], 2 * reach_[c]);
-    }
-    branch.blunt.assign(before_.x.size(), 0);
     double pushed = 0;
-    const double substeps = setup_.step.substeps;
     for (std::size_t i = 0; i < before_.x.size(); ++i) {
-      if (before_.alive[i] == 0) continue;
+      if (branch.blunt[i] == 0) continue;
       const std::size_t set = at(coupled_.label[i]);
-      if (is_blunt[set] == 0 && wide[i] == 0) continue;
-      branch.blunt[i] = 1;
-      b.position[i] = far[set] + substeps * turned[set];
-      b.velocity[i] = fast[set] + 2 * substeps * turned[set];
+      b.position[i] = far[set];
+      b.velocity[i] = fast[set];
       pushed += setup_.body.mass[i] * b.velocity[i];
     }
     for (std::size_t c = 0; c < reach_.size(); ++c) {
@@ -258,13 +247,6 @@ class Search {
       if (any_wide) b.rotation[c] = kAnyRotation;
     }
     b.impulse += pushed / dt_;
-  }
-  // A cluster of none that is alive belongs to a set of its own, of which nothing is known.
-  std::size_t set_of(std::size_t cluster) const {
-    for (const int32_t i : before_.clusters.of(static_cast<int32_t>(cluster))) {
-      if (coupled_.label[at(i)] >= 0) return at(coupled_.label[at(i)]);
-    }
-    return at(coupled_.count);
   }
 
   // What was only asked bluntly is counted as undecided where it holds, and says nothing of how sharp the judge is.

@@ -4,6 +4,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "model/at.h"
@@ -23,13 +24,14 @@ constexpr double kRotationRounds = 4;   // a rotation, about each axis, given it
 constexpr double kParameterRounds = 4;  // what is made of parameters once: s, e^(-c dt), Chebyshev's weights
 constexpr double kContactRounds = 4;    // ways into the blade's frame and back
 
-// Below this, in units of u, (σ2 + σ3) / σ1 says nothing of how a cluster is turned: backends take 2^-53 · 9,000
-// (reference) and 2^-24 · 16 (kernels) for zero.
-constexpr double kDegenerate = 1e4;
-// Less than this of the previous rotation is nothing to go by, in whatever precision (the reference takes 1e-9).
-constexpr double kHalfTurn = 1e-8;
-// The same as kDegenerate, of what the rounding of places makes of the matrix.
-constexpr double kInPlaces = 0.01;
+// Up to this, in units of u, (σ2 + σ3) / σ1 may be taken for zero: backends have thresholds, 9,000 in double precision
+// and 4 to 16 in single, and what rounds moves it.
+double degenerate_rounds(double u) { return u < 1e-10 ? 1e4 : 64; }
+// Up to so many times what the rounding of places makes of the matrix, it says nothing of how a cluster is turned.
+constexpr double kLost = 100;
+// Less than this of the previous rotation is nothing to go by, in whatever precision (the reference takes 1e-9), nor so
+// many roundings.
+constexpr double kHalfTurn = 1e-8, kHalfTurnRounds = 1e4;
 
 constexpr Mat3 kNoTerms = {{0, 0, 0, 0, 0, 0, 0, 0, 0}};
 
@@ -146,7 +148,7 @@ class StepModel::Run {
     out_.rotation = before_.clusters.rotation;
     out_.rounding.resize(out_.x.size());
     out_.turn_rounding.resize(model.clusters_.size());
-    out_.free.assign(model.clusters_.size(), StepOutcome::Free::never);
+    out_.is_free.assign(model.clusters_.size(), 0);
     sum_.resize(out_.x.size());
     goal_rounding_.resize(out_.x.size());
     if (disturbed_) {
@@ -194,10 +196,7 @@ class StepModel::Run {
   void match_shapes(bool is_last);
   // `size`: of all terms of A. `noise`: what the rounding of places makes of A.
   Mat3 rotation_of(int32_t c, const Eigen::Matrix3d& a, double size, double noise, bool is_last);
-  void set_free(int32_t c, bool is_last) {
-    StepOutcome::Free& free = out_.free[at(c)];
-    if (free != StepOutcome::Free::before) free = is_last ? StepOutcome::Free::at_last : StepOutcome::Free::before;
-  }
+  Mat3 one_of_many(const BestRotation& best, const Mat3& previous, bool all);
 
   // What is rounded: of clusters and of particles.
   enum class Rounded : uint8_t { shape, prediction, place, end, impulse };
@@ -226,6 +225,19 @@ class StepModel::Run {
   uint64_t time_ = 0;          // evaluations so far
 };
 
+// One of the rotations that take v to u, `all`: of all rotations. The nearest to the previous one, but any of them in a
+// disturbed run.
+Mat3 StepModel::Run::one_of_many(const BestRotation& best, const Mat3& previous, bool all) {
+  const Mat3 nearest = nearest_of_rank_one(best, previous).r;
+  if (!disturbed_) return nearest;
+  Vec3 axis = {best.u[0], best.u[1], best.u[2]};
+  if (all) axis = noise_.vector();
+  const double length = norm(axis);
+  if (!(length > 0)) return nearest;
+  const Eigen::AngleAxisd turn(std::numbers::pi * noise_(), as_eigen(axis) / length);
+  return to_mat3(turn.toRotationMatrix() * as_eigen(nearest));
+}
+
 // The best rotation; the previous one where there is no extent, the nearest to it along a line.
 Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double size, double noise, bool is_last) {
   const Cluster& cluster = model_.clusters_[at(c)];
@@ -237,21 +249,20 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double siz
   const double sum_amplitude = sum_rounds(static_cast<double>(cluster.end - cluster.begin)) * u_ * size;
   const bool is_given = is_last && !wanted_.given.empty() && wanted_.given[at(c)] != nullptr;
   if (cluster.extent == Cluster::Extent::line) {
-    const NearestRotation nearest = nearest_of_rank_one(best_rotation(to_mat3(a)), previous);
+    const BestRotation best = best_rotation(to_mat3(a));
+    const NearestRotation nearest = nearest_of_rank_one(best, previous);
     // Near half a turn, what a quaternion has of the previous rotation is short, and its rounding turns it farther;
     // where it is no more than that, every answer is as near as any other.
     const double kept = std::sqrt(nearest.weight);
-    const bool is_half_turn = !(kept > std::max(kDegenerate * u_, kHalfTurn));
+    const bool is_half_turn = !(kept > std::max(kHalfTurnRounds * u_, kHalfTurn));
+    const bool is_lost = !(a.norm() > kLost * noise);
     if (!is_half_turn) turn_amplitude_ /= kept;
-    rounding = turn_amplitude_ + sum_amplitude / a.norm();
-    if (!(a.norm() > kDegenerate * kInPlaces * noise)) {
-      set_free(c, is_last);
-      rounding = 1;
-    }
+    rounding = is_lost ? 1.0 : turn_amplitude_ + sum_amplitude / a.norm();
     rounding *= rounding;
-    StepOutcome::Free& free = out_.free[at(c)];
-    if (is_half_turn && free != StepOutcome::Free::before) free = StepOutcome::Free::about_line;
-    return is_given ? *wanted_.given[at(c)] : nearest.r;
+    // How it is turned about itself moves no member; but it stays.
+    if (is_half_turn || (is_lost && is_last)) out_.is_free[at(c)] = 1;
+    if (is_given) return *wanted_.given[at(c)];
+    return is_half_turn || is_lost ? one_of_many(best, previous, is_lost) : nearest.r;
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d u = svd.matrixU();
@@ -259,11 +270,12 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double siz
   if (u.determinant() * v.determinant() < 0) u.col(2) *= -1;
   const Eigen::Vector3d sigma = (u.transpose() * a * v).diagonal();
   const double sure = sigma[1] + sigma[2];
-  if (!(sure > kDegenerate * std::max(u_ * sigma[0], kInPlaces * noise))) {
-    set_free(c, is_last);
-    rounding = sigma[0] > kDegenerate * kInPlaces * noise ? u_ * kRotationRounds + sum_amplitude / sigma[0] : 1.0;
+  if (!(sure > std::max(degenerate_rounds(u_) * u_ * sigma[0], kLost * noise))) {
+    const bool is_lost = !(sigma[0] > kLost * noise);
+    if (is_last) out_.is_free[at(c)] = 1;
+    rounding = is_lost ? 1.0 : u_ * kRotationRounds + sum_amplitude / sigma[0];
     rounding *= rounding;
-    return is_given ? *wanted_.given[at(c)] : nearest_of_rank_one(best_rotation(to_mat3(a)), previous).r;
+    return is_given ? *wanted_.given[at(c)] : one_of_many(best_rotation(to_mat3(a)), previous, is_lost);
   }
   rounding = u_ * kRotationRounds + std::min(1.0, std::sqrt(2.0) * sum_amplitude / sure);
   rounding *= rounding;

@@ -19,11 +19,9 @@ struct StepOutcome {
   std::vector<NearDecision> near;
   // Of the last iteration: Σ w (x − t)(X − T)ᵀ of each cluster [m], empty without iterations.
   std::vector<Mat3> shape;
-  // [m] Whether rounding, or a backend's threshold, decides which of many best rotations a cluster has: never; in the
-  // last iteration alone; before that; or some time about the line in which its members rest, which moves none of them.
-  // It is the nearest to the previous one here, unless it was given.
-  enum class Free : uint8_t { never, at_last, before, about_line };
-  std::vector<Free> free;
+  // [m] 1: rounding, or a backend's threshold, decides which of many best rotations a cluster has in the end. It is the
+  // nearest to the previous one here, unless it was given; any of them in a disturbed run.
+  std::vector<uint8_t> is_free;
   // Of an undisturbed run: the quadratic sums of what single evaluations round, as if none of it grew.
   std::vector<double> rounding;       // [n] of positions [m²]
   std::vector<double> turn_rounding;  // [m] of rotations [rad²]
