@@ -107,7 +107,8 @@ class Search {
     StepPart part = StepPart::position;
     int32_t where = -1;
     double measured = 0, bound = 0;
-    bool holds() const { return worst <= 1; }
+    bool is_forced = false;  // settled otherwise than rounding may: no admissible outcome
+    bool holds() const { return worst <= 1 && !is_forced; }
   };
 
   Branch start(Settled settled) {
@@ -210,9 +211,11 @@ class Search {
     if (follow_rotations(branch)) return look_closer(branch, runs);
     ask_bluntly(branch);
     branch.ties.clear();
+    branch.is_forced = false;
     for (const NearDecision& d : branch.outcome.near) {
-      if (branch.settled.contains(d.key)) continue;
-      if (d.lead <= kBeyondRuns * spread.at({d.key, d.other}) + d.rounding) branch.ties.push_back(d);
+      const double rounding = kBeyondRuns * spread.at({d.key, d.other}) + d.rounding;
+      if (!d.is_natural && -d.lead > rounding) branch.is_forced = true;
+      if (!branch.settled.contains(d.key) && d.lead <= rounding) branch.ties.push_back(d);
     }
     std::sort(branch.ties.begin(), branch.ties.end(),
               [](const NearDecision& p, const NearDecision& q) { return p.key < q.key; });
@@ -413,23 +416,49 @@ class Search {
   }
 
   // More ties than can be tried together: all that is compared must at least be within what they do one by one, added
-  // up. Then what violates is counted, beside these bounds.
+  // up, and the farthest of disturbed runs that are left to themselves. Then what violates is counted, beside these
+  // bounds.
   void count_undecided(Branch& branch) {
+    const auto off_by = [&](const StepOutcome& other) {
+      Bounds off;
+      for (std::size_t i = 0; i < other.x.size(); ++i) {
+        off.position.push_back(norm(other.x[i] - branch.outcome.x[i]));
+        off.velocity.push_back(norm(other.v[i] - branch.outcome.v[i]) * dt_);
+      }
+      for (std::size_t c = 0; c < reach_.size(); ++c) {
+        off.rotation.push_back(apart(other.rotation[c], branch.outcome.rotation[c]));
+      }
+      off.impulse = norm(other.impulse - branch.outcome.impulse);
+      return off;
+    };
     Branch explained = branch;
     Bounds& b = explained.bounds;
+    const auto add = [&](const Bounds& off) {
+      for (std::size_t i = 0; i < b.position.size(); ++i) {
+        b.position[i] += off.position[i];
+        b.velocity[i] += off.velocity[i];
+      }
+      for (std::size_t c = 0; c < b.rotation.size(); ++c) b.rotation[c] += off.rotation[c];
+      b.impulse += off.impulse;
+    };
     for (const NearDecision& tie : branch.ties) {
       Settled settled = branch.settled;
       settled[tie.key] = tie.other;
-      const StepOutcome other = model_.run({settled, 0, kNear * h_, branch.given});
-      for (std::size_t i = 0; i < b.position.size(); ++i) {
-        b.position[i] += norm(other.x[i] - branch.outcome.x[i]);
-        b.velocity[i] += norm(other.v[i] - branch.outcome.v[i]) * dt_;
-      }
-      for (std::size_t c = 0; c < reach_.size(); ++c) {
-        b.rotation[c] += apart(other.rotation[c], branch.outcome.rotation[c]);
-      }
-      b.impulse += norm(other.impulse - branch.outcome.impulse);
+      add(off_by(model_.run({settled, 0, kNear * h_, branch.given})));
     }
+    Bounds farthest = off_by(branch.outcome);
+    for (uint64_t run = 1; run <= kMostDisturbedRuns; ++run) {
+      const Bounds off = off_by(model_.run({branch.settled, run, kNear * h_, branch.given}));
+      for (std::size_t i = 0; i < b.position.size(); ++i) {
+        farthest.position[i] = std::max(farthest.position[i], off.position[i]);
+        farthest.velocity[i] = std::max(farthest.velocity[i], off.velocity[i]);
+      }
+      for (std::size_t c = 0; c < b.rotation.size(); ++c) {
+        farthest.rotation[c] = std::max(farthest.rotation[c], off.rotation[c]);
+      }
+      farthest.impulse = std::max(farthest.impulse, off.impulse);
+    }
+    add(farthest);
     compare(explained);
     if (!explained.holds()) return;
     undecided_ = std::max<int64_t>(1, static_cast<int64_t>(branch.violations.size()));

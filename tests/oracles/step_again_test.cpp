@@ -277,6 +277,35 @@ TEST(AdmissibleStep, FollowsTheRotationThatWasTakenAfterHalfATurn) {
   }
 }
 
+// A layer that rests on a wall exactly, beside a blade: whether each of its particles touches the wall in an accelerated
+// iteration is decided by the rounding of the wall, for all of them at once.
+TEST(AdmissibleStep, TakesALayerOnAWallAsOneRoundingPutsIt) {
+  for (const double off : {-1e-9, +1e-9}) {
+    StepScene scene{setup_of(block_body(4, 4, 3, kSpacing, 0.002)), {}, {}};
+    cutproof::Setup& setup = scene.setup;
+    setup.step.acceleration = Acceleration::chebyshev;
+    setup.step.substeps = 1;
+    setup.step.iterations = 4;
+    setup.step.gravity = {};
+    stand_in_plane(setup, setup.body.rest_position(0) + Vec3{1.5 * kSpacing, 0, 0});
+    setup.walls = {{2, +1, setup.body.rest_position(0).z, 0.3}};
+    scene.before = state_of(setup.body, box_clusters(4, 4, 3, 2));
+    for (Vec3& v : scene.before.v) v = {0.2, 0.1, 0};
+    round_to_single(setup.body, scene.before);
+    StepScene taken = scene;
+    taken.setup.walls[0].offset += off * kSpacing;
+    taken.take_step();
+    round_to_single(setup.body, taken.after);
+    const Verdict verdict = admissible_step(setup, scene.before, taken.after);
+    expect_holds(verdict);
+    EXPECT_EQ(verdict.undecided, 0);
+    taken.setup.step.stiffness *= 0.1;
+    taken.take_step();
+    round_to_single(setup.body, taken.after);
+    EXPECT_FALSE(admissible_step(setup, scene.before, taken.after).holds);
+  }
+}
+
 // Along a wire the best rotations are many: only the nearest to the previous one is right.
 TEST(AdmissibleStep, HasNoFreeAxis) {
   StepScene scene{setup_of(block_body(5, 1, 1, kSpacing)), {}, {}};
