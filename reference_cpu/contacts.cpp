@@ -59,6 +59,18 @@ Vec3 Contacts::project_on_blade(Vec3 x, int side) const {
   return to_.global(nearest + (clearance_ / distance) * offset);
 }
 
+bool Contacts::touches(Vec3 x, int side) const {
+  const double margin = kTouchMargin * setup_.body.grid.spacing;
+  for (const Wall& wall : setup_.walls) {
+    if (wall.side * (x[wall.axis] - wall.offset) < margin) return true;
+  }
+  if (!has_blade_) return false;
+  const Vec3 c = to_.local(x);
+  if (std::abs(c.x) < half_length_ && c.y > 0 && c.y < depth_) return side * c.z < clearance_ + margin;
+  const Vec3 nearest = {std::clamp(c.x, -half_length_, half_length_), std::clamp(c.y, 0.0, depth_), 0};
+  return norm(c - nearest) < clearance_ + margin;
+}
+
 // The nearest allowed point of one that came through the blade: back to its own side, or round one of the four sides
 // of the rectangle, where it has to clear the rounded rim, so at least ρ from the plane.
 Vec3 Contacts::leave_by_a_side(Vec3 c, int side) const {

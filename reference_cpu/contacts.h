@@ -27,6 +27,9 @@ class Contacts {
   // grow. Elsewhere the projection is exact, and asking would only let rounding decide.
   Vec3 next_position(Vec3 free, int side, Vec3 start, Vec3 x) const;
 
+  // Whether a particle at x that began on side `side` touches a contact, or nearly so (kTouchMargin).
+  bool touches(Vec3 x, int side) const;
+
   bool any() const { return has_blade_ || !setup_.walls.empty(); }
   bool frictionless() const { return frictionless_; }
   // Friction, or room that is not convex: an iteration can have several fixed points.

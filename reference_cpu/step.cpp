@@ -156,8 +156,8 @@ void substep(const Setup& setup, const Memberships& memberships, int64_t index, 
         next = contacts.next_position(free, side[at(i)], start[at(i)], x);
         // Where several answers are right, the way there decides: touched particles go the plain way.
         if (accelerated && contacts.path_matters()) {
-          const Vec3 allowed = contacts.next_position(plain, side[at(i)], start[at(i)], x);
-          if (!(next == free && allowed == plain)) next = allowed;
+          const bool touched = contacts.touches(free, side[at(i)]) || contacts.touches(plain, side[at(i)]);
+          if (touched) next = contacts.next_position(plain, side[at(i)], start[at(i)], x);
         }
       }
       pushed_now += body.mass[at(i)] * (next - free);

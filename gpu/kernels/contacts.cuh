@@ -124,6 +124,23 @@ CUTPROOF_DEVICE inline Float3 off_blade(const Contacts& contacts, const RestPoin
   return d + out_of_frame(pose, way);
 }
 
+// Whether a particle touches a contact, or nearly so (kTouchMargin).
+CUTPROOF_DEVICE inline bool touches(const Contacts& contacts, const RestPoint& rest, Float3 d, float side) {
+  const float margin = static_cast<float>(kTouchMargin) * rest.h;
+  for (int k = 0; k < contacts.wall_count; ++k) {
+    if (depth_in(contacts.walls[k], rest, d) > -margin) return true;
+  }
+  if (contacts.move == nullptr) return false;
+  const PoseF& pose = contacts.move->to;
+  const Float3 c = into_frame(pose, rest.from(pose.edge) + d);
+  if (fabsf(c.x) < contacts.half_length && c.y > 0 && c.y < contacts.depth) {
+    return side * c.z < contacts.clearance + margin;
+  }
+  const Float3 offset = {c.x - fminf(fmaxf(c.x, -contacts.half_length), contacts.half_length),
+                         c.y - fminf(fmaxf(c.y, 0.0f), contacts.depth), c.z};
+  return norm(offset) < contacts.clearance + margin;
+}
+
 inline constexpr int kMostTurns = 16;  // of blade and walls, where both hold at once
 
 // The allowed point nearest to d: exactly, unless blade and walls both move it. Then they do in turn, the blade last,

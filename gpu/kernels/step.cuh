@@ -389,8 +389,9 @@ CUTPROOF_DEVICE void update_positions_kernel(Block& block, const DeviceView& w, 
           if constexpr (kAccelerated) {
             // Where several answers are right, the way there decides: touched particles go the plain way.
             if (combined && path_matters(contacts)) {
-              const Float3 allowed = next_position(contacts, rest, plain, predicted.w, start, x);
-              if (!contacts_detail::same(next, free) || !contacts_detail::same(allowed, plain)) next = allowed;
+              const bool touched = contacts_detail::touches(contacts, rest, free, predicted.w) ||
+                                   contacts_detail::touches(contacts, rest, plain, predicted.w);
+              if (touched) next = next_position(contacts, rest, plain, predicted.w, start, x);
             }
           }
         }

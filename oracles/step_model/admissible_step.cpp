@@ -30,7 +30,7 @@ constexpr double kSmall = 1e-3;
 constexpr double kNear = 2e-3;
 // Outcomes that are tried for one coupled set, and what they may cost in all [evaluations].
 constexpr int kMostOutcomes = 1024;
-constexpr int64_t kMostEvaluations = 100'000'000;
+constexpr int64_t kMostEvaluations = 20'000'000;
 
 // Two rotations are not farther apart, but for the rounding of their entries (apart).
 constexpr double kAnyRotation = 2 + 1e-4;

@@ -455,7 +455,7 @@ void StepModel::Run::substep(int32_t s) {
         if (accelerated && j > 0 && contacts.path_matters()) {
           const double deepest =
               std::max(contacts.depth(free, began[i], decisions_), contacts.depth(plain, began[i], decisions_));
-          touched = decisions_.exceeds(DecisionKind::touched, deepest);
+          touched = decisions_.exceeds(DecisionKind::touched, deepest + kTouchMargin * body_.grid.spacing);
           if (touched) wanted = plain;
         }
         if (touched) next = contacts.place(wanted, began[i], &now[i], decisions_);
