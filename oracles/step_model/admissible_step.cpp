@@ -287,7 +287,7 @@ class Search {
       const double turned =
           is_open(branch, at(c)) ? off_agreed(o.shape[at(c)], r) : or_infinite(apart(r, o.rotation[at(c)]));
       const double arm = std::max(reach_[at(c)], h_) / h_;
-      see(branch, StepPart::rotation, c, turned * arm, b.rotation[at(c)] * arm, b.rotation[at(c)] == kAnyRotation);
+      see(branch, StepPart::rotation, c, turned * arm, b.rotation[at(c)] * arm, !(b.rotation[at(c)] * arm <= kSmall));
       if (turned <= b.rotation[at(c)]) continue;
       for (const int32_t i : before_.clusters.of(c)) violates[at(i)] = 1;
     }
@@ -488,6 +488,8 @@ class Search {
     for (std::size_t c = 0; c < reach_.size(); ++c) {
       found.reach.push_back(std::max(reach_[c] / h_, 1.0));
       found.rotation_bound.push_back(branch.bounds.rotation[c] * found.reach.back());
+      // As of positions: beyond this, nothing sharp was asked.
+      if (!(found.rotation_bound.back() <= kSmall)) ++found.undecided;
     }
     found.outcome = std::move(branch.outcome);
     return found;
