@@ -156,12 +156,13 @@ std::vector<Disturbance> make_disturbances() {
     setup.step.stiffness *= 1 + size;
     return setup.step.solver == Solver::implicit && setup.step.iterations > 0;
   });
+  // Less of it: more holds what is held already.
   run("friction", "1", kParameters, [](Setup& setup, State&, double size) {
     bool any = setup.has_blade && setup.blade.friction > 0;
-    setup.blade.friction *= 1 + size;
+    setup.blade.friction /= 1 + size;
     for (Wall& wall : setup.walls) {
       any = any || wall.friction > 0;
-      wall.friction *= 1 + size;
+      wall.friction /= 1 + size;
     }
     return any;
   });

@@ -127,7 +127,7 @@ TEST_F(BenchSensitivity, HasARowForEachDisturbanceAndStage) {
     EXPECT_EQ(document.at("suite"), "sensitivity");
     EXPECT_TRUE(document.at("complete"));
     EXPECT_TRUE(document.at("holds"));
-    ASSERT_EQ(document.at("scenes").size(), 2u);
+    ASSERT_EQ(document.at("scenes").size(), 3u);
     std::set<std::string> seen;
     for (const json& row : document.at("rows")) {
       seen.insert(row.at("disturbance"));
@@ -136,6 +136,10 @@ TEST_F(BenchSensitivity, HasARowForEachDisturbanceAndStage) {
       EXPECT_GE(row.at("least"), document.at("least_tried"));
       EXPECT_LE(row.at("least"), row.at("greatest_tried"));
       EXPECT_FALSE(row.at("property").is_null());
+      // Where it slides, friction is no more than a bound in single precision away.
+      if (row.at("disturbance") == "friction" && row.at("scene") == "small_block, sliding") {
+        EXPECT_LT(row.at("least"), 0.01);
+      }
       if (!row.at("ratio").is_null()) {
         EXPECT_DOUBLE_EQ(row.at("ratio"), row.at("least").get<double>() / row.at("rounding").get<double>());
       }
