@@ -2,6 +2,7 @@
 """Mutation testing: applies one mutant at a time to a copy of the code and asks the gate to find it.
 
 Usage: run.py [--only NAME...] [--shard I/N] [--jobs N] [--json F] [--check]
+       run.py --merge JSON...     makes the table of runs of parts; runs nothing
 
 A mutant is a patch, mutants/NN_name.patch, with a head of lines `Field: text` (a line that begins with a space goes on):
   Stage     step detect split merge expand skin, or launch: what runs kernels and puts frames together; judge: what
@@ -339,6 +340,37 @@ def write_table(rows):
     TABLE.write_text("\n".join(lines) + "\n")
 
 
+def merge(files):
+    rows = {}
+    for file in files:
+        try:
+            document = json.loads(pathlib.Path(file).read_text())
+            if not document["unchanged_passes"]:
+                raise BadMutant(f"{file}: the unchanged code failed")
+            for row in document["faults"]:
+                if row["name"] in rows:
+                    raise BadMutant(f"{file}: {row['name']} is in another file too; give each part once")
+                rows[row["name"]] = row
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise BadMutant(f"{file} is no result of --json: {error!r}") from None
+    names = {path.stem for path in (HERE / "mutants").glob("*.patch")}
+    for what, wrong in (("missing", names - rows.keys()), ("no mutants any more", rows.keys() - names)):
+        if wrong:
+            named = ", ".join(sorted(wrong)[:5]) + (f" and {len(wrong) - 5} more" if len(wrong) > 5 else "")
+            raise BadMutant(f"--merge: {what}: {named}; run these parts again")
+    return conclude([rows[name] for name in sorted(rows)], True, True)
+
+
+def conclude(rows, holds, whole):
+    if whole:
+        write_table(rows)
+    survivors = [row["name"] for row in rows if not row["found"]]
+    print(simplicity(rows))
+    print(f"{len(rows) - len(survivors)} of {plural(len(rows), 'mutant')} found"
+          + (", not found: " + ", ".join(survivors) if survivors else ""))
+    return 0 if holds and not survivors else 1
+
+
 def main():
     parser = argparse.ArgumentParser(description="Applies mutants and asks the gate to find them.")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="mutants whose name begins with one of these")
@@ -346,8 +378,11 @@ def main():
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="of the builds")
     parser.add_argument("--json", metavar="F", help="write the results there as well")
     parser.add_argument("--check", action="store_true", help="only whether every mutant applies to the code as it is")
+    parser.add_argument("--merge", nargs="+", metavar="JSON", help="the table of runs of parts; runs nothing")
     options = parser.parse_args()
 
+    if options.merge:
+        return merge(options.merge)
     paths = sorted((HERE / "mutants").glob("*.patch"))
     if options.only:
         for name in options.only:
@@ -407,13 +442,7 @@ def main():
             pathlib.Path(options.json).write_text(json.dumps(
                 {"format": "cutproof.mutation_testing", "format_version": 1, "unchanged_passes": holds, "faults": rows},
                 indent=1) + "\n")
-    if not options.only and not options.shard:
-        write_table(rows)
-    survivors = [row["name"] for row in rows if not row["found"]]
-    print(simplicity(rows))
-    print(f"{len(rows) - len(survivors)} of {plural(len(rows), 'mutant')} found"
-          + (", not found: " + ", ".join(survivors) if survivors else ""))
-    return 0 if holds and not survivors else 1
+    return conclude(rows, holds, not options.only and not options.shard)
 
 
 if __name__ == "__main__":
