@@ -152,7 +152,7 @@ void StageComparison::compare_step(const State& before, const State& after, Stag
   }
   StepAgain again = step_again(setup_, before, after);
   found.step = std::move(again.verdict);
-  std::vector<uint8_t> measured = before.alive;
+  std::vector<uint8_t> measured = before.alive, measured_speed = before.alive;
   const Clusters& clusters = after.clusters;
   if (again.step) {
     AdmissibleStep& step = *again.step;
@@ -179,9 +179,10 @@ void StageComparison::compare_step(const State& before, const State& after, Stag
     }
     const double bound = found.error(Measure::position).bound;
     for (std::size_t i = 0; i < measured.size(); ++i) {
-      if (measured[i] == 0 || step.position_bound[i] <= bound) continue;
-      measured[i] = 0;
-      ++found.undecidable.positions;
+      if (before.alive[i] == 0) continue;
+      measured[i] = step.position_bound[i] <= bound;
+      measured_speed[i] = step.velocity_bound[i] <= 2 * bound;
+      if (measured[i] == 0 || measured_speed[i] == 0) ++found.undecidable.positions;
     }
     for (int32_t c = 0; c < clusters.count(); ++c) {
       const double angle = angle_between(expected.clusters.rotation[at(c)], clusters.rotation[at(c)]);
@@ -195,7 +196,7 @@ void StageComparison::compare_step(const State& before, const State& after, Stag
   }
   found.error(Measure::position).norm = position_error(setup_, expected.x, after.x, measured);
   found.error(Measure::velocity).norm =
-      velocity_error(setup_, expected.v, after.v, setup_.substep_length[at(before.frame)], measured);
+      velocity_error(setup_, expected.v, after.v, setup_.substep_length[at(before.frame)], measured_speed);
 }
 
 void StageComparison::compare_later_stage(const State& before, const State& after, bool launched,

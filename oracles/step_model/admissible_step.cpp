@@ -393,7 +393,7 @@ class Search {
     std::vector<NearDecision> ties;
     for (const NearDecision& d : branch.outcome.near) {
       if (branch.settled.contains(d.key)) continue;
-      if (d.lead <= kBeyondRuns * measure.bounds.position[at(d.key.particle)] + d.rounding) ties.push_back(d);
+      if (d.lead <= measure.bounds.position[at(d.key.particle)] + d.rounding) ties.push_back(d);
     }
     return ties;
   }
@@ -483,6 +483,7 @@ class Search {
     found.undecided = undecided_;
     for (std::size_t i = 0; i < before_.alive.size(); ++i) {
       found.position_bound.push_back(branch.bounds.position[i] / h_);
+      found.velocity_bound.push_back(branch.bounds.velocity[i] / h_);
     }
     found.undecided += std::count(branch.blunt.begin(), branch.blunt.end(), 1);
     for (std::size_t c = 0; c < reach_.size(); ++c) {

@@ -35,6 +35,7 @@ struct AdmissibleStep {
   // one by one, can do.
   int64_t undecided = 0;
   std::vector<double> position_bound;  // [n] what rounding does to the outcome [h]
+  std::vector<double> velocity_bound;  // [n] the same, times dt [h]
   std::vector<double> rotation_bound;  // [m] the same, where it puts the farthest member [h]
   std::vector<double> reach;           // [m] of the farthest member from the center at rest, or 1 if that is less [h]
 };
