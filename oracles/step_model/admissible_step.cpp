@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <set>
@@ -47,11 +48,23 @@ double apart(const Mat3& a, const Mat3& b) {
   return std::sqrt(square / 2);  // 2 sin(angle / 2)
 }
 
-// Bounds of one outcome.
+// Of one outcome: bounds, or how far another is from it.
 struct Bounds {
   std::vector<double> position, velocity;  // [n] [m], [m/s] times dt
   std::vector<double> rotation;            // [m] [rad]
   double impulse = 0;                      // [kg m/s]
+
+  // Entry by entry: this = f(this, other).
+  template <class F>
+  void combine(const Bounds& other, F f) {
+    const auto each = [&](std::vector<double>& mine, const std::vector<double>& theirs) {
+      for (std::size_t k = 0; k < mine.size(); ++k) mine[k] = f(mine[k], theirs[k]);
+    };
+    each(position, other.position);
+    each(velocity, other.velocity);
+    each(rotation, other.rotation);
+    impulse = f(impulse, other.impulse);
+  }
 };
 
 class Search {
@@ -163,12 +176,27 @@ class Search {
     return kBeyondRuns * std::max(rounding, branch.direction.empty() ? 0 : branch.direction[c]);
   }
 
+  static constexpr auto kGreater = [](double a, double b) { return std::max(a, b); };
+
+  Bounds off_by(const StepOutcome& one, const StepOutcome& other) const {
+    Bounds off;
+    for (std::size_t i = 0; i < one.x.size(); ++i) {
+      off.position.push_back(or_infinite(norm(one.x[i] - other.x[i])));
+      off.velocity.push_back(or_infinite(norm(one.v[i] - other.v[i]) * dt_));
+    }
+    for (std::size_t c = 0; c < reach_.size(); ++c) {
+      off.rotation.push_back(or_infinite(apart(one.rotation[c], other.rotation[c])));
+    }
+    off.impulse = or_infinite(norm(one.impulse - other.impulse));
+    return off;
+  }
+
   // What rounding does to this outcome, by disturbed runs that take the same decisions.
   void look_closer(Branch& branch, uint64_t runs = kDisturbedRuns) {
-    const std::size_t n = before_.x.size(), m = reach_.size();
+    const std::size_t m = reach_.size();
     Settled as_taken;
     for (const NearDecision& d : branch.outcome.near) as_taken[d.key] = d.taken;
-    Bounds grown{std::vector<double>(n), std::vector<double>(n), std::vector<double>(m), 0};
+    Bounds grown = off_by(branch.outcome, branch.outcome);
     std::vector<double> direction(m, 0);
     std::map<std::pair<DecisionKey, int>, double> leads, spread;
     for (const NearDecision& d : branch.outcome.near) {
@@ -178,18 +206,11 @@ class Search {
     }
     for (uint64_t run = 1; run <= runs; ++run) {
       const StepOutcome off = model_.run({as_taken, run, 2 * kNear * h_, branch.given});
-      for (std::size_t i = 0; i < n; ++i) {
-        grown.position[i] = std::max(grown.position[i], or_infinite(norm(off.x[i] - branch.outcome.x[i])));
-        grown.velocity[i] = std::max(grown.velocity[i], or_infinite(norm(off.v[i] - branch.outcome.v[i])));
-      }
+      grown.combine(off_by(off, branch.outcome), kGreater);
       for (std::size_t c = 0; c < m; ++c) {
-        if (branch.outcome.is_free[c] != 0) {
-          direction[c] = std::max(direction[c], off_agreed(branch.outcome.shape[c], off.rotation[c]));
-        }
-        grown.rotation[c] =
-            std::max(grown.rotation[c], or_infinite(apart(off.rotation[c], branch.outcome.rotation[c])));
+        if (branch.outcome.is_free[c] == 0) continue;
+        direction[c] = std::max(direction[c], off_agreed(branch.outcome.shape[c], off.rotation[c]));
       }
-      grown.impulse = std::max(grown.impulse, or_infinite(norm(off.impulse - branch.outcome.impulse)));
       for (const NearDecision& d : off.near) {
         const auto known = leads.find({d.key, d.other});
         if (known == leads.end()) continue;
@@ -198,16 +219,12 @@ class Search {
       }
     }
     Bounds& b = branch.bounds;
-    for (std::size_t i = 0; i < n; ++i) {
-      b.position[i] = kBeyondRuns * grown.position[i];
-      b.velocity[i] = kBeyondRuns * grown.velocity[i] * dt_;
-    }
+    b.combine(grown, [](double, double farthest) { return kBeyondRuns * farthest; });
     branch.direction = std::move(direction);
     // Runs choose freely where the rotation is open: that bounds nothing.
     for (std::size_t c = 0; c < m; ++c) {
-      b.rotation[c] = is_open(branch, c) ? agreed_bound(branch, c) : kBeyondRuns * grown.rotation[c];
+      if (is_open(branch, c)) b.rotation[c] = agreed_bound(branch, c);
     }
-    b.impulse = kBeyondRuns * grown.impulse;
     if (follow_rotations(branch)) return look_closer(branch, runs);
     ask_bluntly(branch);
     branch.ties.clear();
@@ -419,46 +436,19 @@ class Search {
   // up, and the farthest of disturbed runs that are left to themselves. Then what violates is counted, beside these
   // bounds.
   void count_undecided(Branch& branch) {
-    const auto off_by = [&](const StepOutcome& other) {
-      Bounds off;
-      for (std::size_t i = 0; i < other.x.size(); ++i) {
-        off.position.push_back(norm(other.x[i] - branch.outcome.x[i]));
-        off.velocity.push_back(norm(other.v[i] - branch.outcome.v[i]) * dt_);
-      }
-      for (std::size_t c = 0; c < reach_.size(); ++c) {
-        off.rotation.push_back(apart(other.rotation[c], branch.outcome.rotation[c]));
-      }
-      off.impulse = norm(other.impulse - branch.outcome.impulse);
-      return off;
-    };
     Branch explained = branch;
-    Bounds& b = explained.bounds;
-    const auto add = [&](const Bounds& off) {
-      for (std::size_t i = 0; i < b.position.size(); ++i) {
-        b.position[i] += off.position[i];
-        b.velocity[i] += off.velocity[i];
-      }
-      for (std::size_t c = 0; c < b.rotation.size(); ++c) b.rotation[c] += off.rotation[c];
-      b.impulse += off.impulse;
-    };
     for (const NearDecision& tie : branch.ties) {
       Settled settled = branch.settled;
       settled[tie.key] = tie.other;
-      add(off_by(model_.run({settled, 0, kNear * h_, branch.given})));
+      const StepOutcome other = model_.run({settled, 0, kNear * h_, branch.given});
+      explained.bounds.combine(off_by(other, branch.outcome), std::plus());
     }
-    Bounds farthest = off_by(branch.outcome);
+    Bounds farthest = off_by(branch.outcome, branch.outcome);
     for (uint64_t run = 1; run <= kMostDisturbedRuns; ++run) {
-      const Bounds off = off_by(model_.run({branch.settled, run, kNear * h_, branch.given}));
-      for (std::size_t i = 0; i < b.position.size(); ++i) {
-        farthest.position[i] = std::max(farthest.position[i], off.position[i]);
-        farthest.velocity[i] = std::max(farthest.velocity[i], off.velocity[i]);
-      }
-      for (std::size_t c = 0; c < b.rotation.size(); ++c) {
-        farthest.rotation[c] = std::max(farthest.rotation[c], off.rotation[c]);
-      }
-      farthest.impulse = std::max(farthest.impulse, off.impulse);
+      const StepOutcome off = model_.run({branch.settled, run, kNear * h_, branch.given});
+      farthest.combine(off_by(off, branch.outcome), kGreater);
     }
-    add(farthest);
+    explained.bounds.combine(farthest, std::plus());
     compare(explained);
     if (!explained.holds()) return;
     undecided_ = std::max<int64_t>(1, static_cast<int64_t>(branch.violations.size()));
