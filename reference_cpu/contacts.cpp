@@ -39,19 +39,24 @@ Vec3 Contacts::project_on_walls(Vec3 x) const {
   return x;
 }
 
+bool Contacts::is_over(Vec3 c) const { return std::abs(c.x) < half_length_ && c.y > 0 && c.y < depth_; }
+
+Vec3 Contacts::nearest_on_blade(Vec3 c) const {
+  return {std::clamp(c.x, -half_length_, half_length_), std::clamp(c.y, 0.0, depth_), 0};
+}
+
 // In the blade's frame a point is (u, w, n) with the mid-surface at n = 0, |u| <= L/2, 0 <= w <= D. Forbidden is
 // (a) what is nearer than the clearance ρ to the mid-surface, and (b) what lies over the mid-surface on the other side
 // than the one where the particle began: it could only have come there through the blade.
 Vec3 Contacts::project_on_blade(Vec3 x, int side) const {
   const Vec3 c = to_.local(x);
-  const bool over = std::abs(c.x) < half_length_ && c.y > 0 && c.y < depth_;
-  if (over) {
+  if (is_over(c)) {
     const double height = side * c.z;
     if (height >= clearance_) return x;
     if (height >= 0) return to_.global({c.x, c.y, side * clearance_});
     return leave_by_a_side(c, side);
   }
-  const Vec3 nearest = {std::clamp(c.x, -half_length_, half_length_), std::clamp(c.y, 0.0, depth_), 0};
+  const Vec3 nearest = nearest_on_blade(c);
   const Vec3 offset = c - nearest;
   const double distance = norm(offset);
   if (distance >= clearance_) return x;
@@ -66,9 +71,7 @@ bool Contacts::touches(Vec3 x, int side) const {
   }
   if (!has_blade_) return false;
   const Vec3 c = to_.local(x);
-  if (std::abs(c.x) < half_length_ && c.y > 0 && c.y < depth_) return side * c.z < clearance_ + margin;
-  const Vec3 nearest = {std::clamp(c.x, -half_length_, half_length_), std::clamp(c.y, 0.0, depth_), 0};
-  return norm(c - nearest) < clearance_ + margin;
+  return (is_over(c) ? side * c.z : norm(c - nearest_on_blade(c))) < clearance_ + margin;
 }
 
 // The nearest allowed point of one that came through the blade: back to its own side, or round one of the four sides

@@ -45,6 +45,9 @@ class Contacts {
   Vec3 project_on_walls(Vec3 x) const;
   Vec3 project_on_blade(Vec3 x, int side) const;
   Vec3 leave_by_a_side(Vec3 c, int side) const;
+  // In the blade's frame: whether a point is over the mid-surface, and the nearest point of that.
+  bool is_over(Vec3 c) const;
+  Vec3 nearest_on_blade(Vec3 c) const;
 
   const Setup& setup_;
   bool has_blade_ = false;

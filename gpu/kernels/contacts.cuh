@@ -82,6 +82,15 @@ CUTPROOF_DEVICE inline Float3 off_walls(const Contacts& contacts, const RestPoin
   return d;
 }
 
+// In the blade's frame: whether a point is over the mid-surface, and what leads to it from there.
+CUTPROOF_DEVICE inline bool is_over_blade(const Contacts& contacts, Float3 c) {
+  return fabsf(c.x) < contacts.half_length && c.y > 0 && c.y < contacts.depth;
+}
+CUTPROOF_DEVICE inline Float3 from_blade(const Contacts& contacts, Float3 c) {
+  return {c.x - fminf(fmaxf(c.x, -contacts.half_length), contacts.half_length),
+          c.y - fminf(fmaxf(c.y, 0.0f), contacts.depth), c.z};
+}
+
 // By how much, in the blade's frame, one has to move that came through the plate: back to its own side, or round one of
 // the four sides of the rectangle to where it clears the rounded rim. The shortest way, its own side first.
 CUTPROOF_DEVICE inline Float3 way_out(const Contacts& contacts, Float3 c, float side) {
@@ -109,13 +118,12 @@ CUTPROOF_DEVICE inline Float3 off_blade(const Contacts& contacts, const RestPoin
   const PoseF& pose = contacts.move->to;
   const Float3 c = into_frame(pose, rest.from(pose.edge) + d);
   Float3 way;
-  if (fabsf(c.x) < contacts.half_length && c.y > 0 && c.y < contacts.depth) {
+  if (is_over_blade(contacts, c)) {
     const float height = side * c.z;
     if (height >= contacts.clearance) return d;
     way = height >= 0 ? Float3{0, 0, side * contacts.clearance - c.z} : way_out(contacts, c, side);
   } else {
-    const Float3 offset = {c.x - fminf(fmaxf(c.x, -contacts.half_length), contacts.half_length),
-                           c.y - fminf(fmaxf(c.y, 0.0f), contacts.depth), c.z};
+    const Float3 offset = from_blade(contacts, c);
     const float distance = norm(offset);
     if (distance >= contacts.clearance) return d;
     way =
@@ -133,12 +141,10 @@ CUTPROOF_DEVICE inline bool touches(const Contacts& contacts, const RestPoint& r
   if (contacts.move == nullptr) return false;
   const PoseF& pose = contacts.move->to;
   const Float3 c = into_frame(pose, rest.from(pose.edge) + d);
-  if (fabsf(c.x) < contacts.half_length && c.y > 0 && c.y < contacts.depth) {
+  if (is_over_blade(contacts, c)) {
     return side * c.z < contacts.clearance + margin;
   }
-  const Float3 offset = {c.x - fminf(fmaxf(c.x, -contacts.half_length), contacts.half_length),
-                         c.y - fminf(fmaxf(c.y, 0.0f), contacts.depth), c.z};
-  return norm(offset) < contacts.clearance + margin;
+  return norm(from_blade(contacts, c)) < contacts.clearance + margin;
 }
 
 inline constexpr int kMostTurns = 16;  // of blade and walls, where both hold at once

@@ -277,8 +277,8 @@ TEST(AdmissibleStep, FollowsTheRotationThatWasTakenAfterHalfATurn) {
   }
 }
 
-// A layer that rests on a wall exactly, beside a blade: whether each of its particles touches the wall in an
-// accelerated iteration is decided by the rounding of the wall, for all of them at once.
+// A layer that rests on a wall exactly, beside a blade, in accelerated iterations: where rounding puts the wall decides
+// nothing, because what nearly touches counts as touching.
 TEST(AdmissibleStep, TakesALayerOnAWallAsOneRoundingPutsIt) {
   for (const double off : {-1e-9, +1e-9}) {
     StepScene scene{setup_of(block_body(4, 4, 3, kSpacing, 0.002)), {}, {}};
