@@ -48,21 +48,21 @@ Vec3 Contacts::nearest_on_blade(Vec3 c) const {
 // In the blade's frame a point is (u, w, n) with the mid-surface at n = 0, |u| <= L/2, 0 <= w <= D. Forbidden is
 // (a) what is nearer than the clearance ρ to the mid-surface, and (b) what lies over the mid-surface on the other side
 // than the one where the particle began: it could only have come there through the blade.
-Vec3 Contacts::project_on_blade(Vec3 x, int side) const {
+Vec3 Contacts::way_off_blade(Vec3 x, int side) const {
   const Vec3 c = to_.local(x);
   if (is_over(c)) {
     const double height = side * c.z;
-    if (height >= clearance_) return x;
-    if (height >= 0) return to_.global({c.x, c.y, side * clearance_});
-    return leave_by_a_side(c, side);
+    if (height >= clearance_) return {};
+    return to_.direction(height >= 0 ? Vec3{0, 0, side * clearance_ - c.z} : way_round_a_side(c, side));
   }
-  const Vec3 nearest = nearest_on_blade(c);
-  const Vec3 offset = c - nearest;
+  const Vec3 offset = c - nearest_on_blade(c);
   const double distance = norm(offset);
-  if (distance >= clearance_) return x;
-  if (distance == 0) return to_.global({c.x, c.y, side * clearance_});
-  return to_.global(nearest + (clearance_ / distance) * offset);
+  if (distance >= clearance_) return {};
+  if (distance == 0) return to_.direction({0, 0, side * clearance_});
+  return to_.direction(((clearance_ - distance) / distance) * offset);
 }
+
+Vec3 Contacts::project_on_blade(Vec3 x, int side) const { return x + way_off_blade(x, side); }
 
 bool Contacts::touches(Vec3 x, int side) const {
   const double margin = kTouchMargin * setup_.body.grid.spacing;
@@ -74,21 +74,16 @@ bool Contacts::touches(Vec3 x, int side) const {
   return (is_over(c) ? side * c.z : norm(c - nearest_on_blade(c))) < clearance_ + margin;
 }
 
-// The nearest allowed point of one that came through the blade: back to its own side, or round one of the four sides
-// of the rectangle, where it has to clear the rounded rim, so at least ρ from the plane.
-Vec3 Contacts::leave_by_a_side(Vec3 c, int side) const {
-  Vec3 best = {c.x, c.y, side * clearance_};
-  double best_distance = norm(best - c);
-  const double beyond = -side * std::max(std::abs(c.z), clearance_);
-  for (const Vec3 candidate : {Vec3{c.x, 0, beyond}, Vec3{c.x, depth_, beyond}, Vec3{-half_length_, c.y, beyond},
-                               Vec3{half_length_, c.y, beyond}}) {
-    const double distance = norm(candidate - c);
-    if (distance < best_distance) {
-      best = candidate;
-      best_distance = distance;
-    }
+// The shortest way for one that came through the blade: back to its own side, or round one of the four sides of the
+// rectangle, where it has to clear the rounded rim, so at least ρ from the plane.
+Vec3 Contacts::way_round_a_side(Vec3 c, int side) const {
+  Vec3 best = {0, 0, side * clearance_ - c.z};
+  const double beyond = -side * std::max(std::abs(c.z), clearance_) - c.z;
+  for (const Vec3 way : {Vec3{0, -c.y, beyond}, Vec3{0, depth_ - c.y, beyond}, Vec3{-half_length_ - c.x, 0, beyond},
+                         Vec3{half_length_ - c.x, 0, beyond}}) {
+    if (norm(way) < norm(best)) best = way;
   }
-  return to_.global(best);
+  return best;
 }
 
 Vec3 Contacts::project(Vec3 x, int side, bool* in_turn) const {
@@ -128,7 +123,7 @@ Vec3 Contacts::project_with_friction(Vec3 x, int side, Vec3 start, bool* in_turn
     rub(result - start, normal, wall.friction * depth);
   }
   if (has_blade_ && setup_.blade.friction > 0) {
-    const Vec3 pushed = project_on_blade(x, side) - x;
+    const Vec3 pushed = way_off_blade(x, side);
     const double depth = norm(pushed);
     if (depth > 0) {
       // The blade's own point under the particle has moved too; only sliding against it rubs.

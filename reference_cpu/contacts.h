@@ -39,12 +39,16 @@ class Contacts {
   struct Frame {
     Vec3 edge, along, back, normal;
     Vec3 local(Vec3 x) const { return {dot(x - edge, along), dot(x - edge, back), dot(x - edge, normal)}; }
-    Vec3 global(Vec3 c) const { return edge + c.x * along + c.y * back + c.z * normal; }
+    Vec3 direction(Vec3 c) const { return c.x * along + c.y * back + c.z * normal; }
+    Vec3 global(Vec3 c) const { return edge + direction(c); }
   };
   static Frame frame_of(const BladePose& pose);
   Vec3 project_on_walls(Vec3 x) const;
+  // What leads off the blade, zero where nothing has to. Not the difference of two positions, which would have no
+  // direction where it is short.
+  Vec3 way_off_blade(Vec3 x, int side) const;
   Vec3 project_on_blade(Vec3 x, int side) const;
-  Vec3 leave_by_a_side(Vec3 c, int side) const;
+  Vec3 way_round_a_side(Vec3 c, int side) const;  // in the blade's frame
   // In the blade's frame: whether a point is over the mid-surface, and the nearest point of that.
   bool is_over(Vec3 c) const;
   Vec3 nearest_on_blade(Vec3 c) const;

@@ -112,24 +112,28 @@ CUTPROOF_DEVICE inline Float3 way_out(const Contacts& contacts, Float3 c, float 
   return best;
 }
 
-// Forbidden is what is nearer than the clearance to the mid-surface, and what lies over it on the other side than where
-// the particle began. Requires contacts.move.
-CUTPROOF_DEVICE inline Float3 off_blade(const Contacts& contacts, const RestPoint& rest, Float3 d, float side) {
+// What leads a particle off the blade, zero where it is allowed to be: forbidden is what is nearer than the clearance
+// to the mid-surface, and what lies over it on the other side than where the particle began. Not the difference of two
+// positions, which would have no direction where it is short. Requires contacts.move.
+CUTPROOF_DEVICE inline Float3 way_off_blade(const Contacts& contacts, const RestPoint& rest, Float3 d, float side) {
   const PoseF& pose = contacts.move->to;
   const Float3 c = into_frame(pose, rest.from(pose.edge) + d);
   Float3 way;
   if (is_over_blade(contacts, c)) {
     const float height = side * c.z;
-    if (height >= contacts.clearance) return d;
+    if (height >= contacts.clearance) return {};
     way = height >= 0 ? Float3{0, 0, side * contacts.clearance - c.z} : way_out(contacts, c, side);
   } else {
     const Float3 offset = from_blade(contacts, c);
     const float distance = norm(offset);
-    if (distance >= contacts.clearance) return d;
+    if (distance >= contacts.clearance) return {};
     way =
         distance > 0 ? ((contacts.clearance - distance) / distance) * offset : Float3{0, 0, side * contacts.clearance};
   }
-  return d + out_of_frame(pose, way);
+  return out_of_frame(pose, way);
+}
+CUTPROOF_DEVICE inline Float3 off_blade(const Contacts& contacts, const RestPoint& rest, Float3 d, float side) {
+  return d + way_off_blade(contacts, rest, d, side);
 }
 
 // Whether a particle touches a contact, or nearly so (kTouchMargin).
@@ -203,7 +207,7 @@ CUTPROOF_DEVICE inline Float3 project(const Contacts& contacts, const RestPoint&
     result = rubbed(result, result - start, normal, wall.friction * depth);
   }
   if (contacts.blade_friction > 0) {
-    const Float3 pushed = off_blade(contacts, rest, d, side) - d;
+    const Float3 pushed = way_off_blade(contacts, rest, d, side);
     const float depth = norm(pushed);
     if (depth > 0) {
       // The blade's own point under the particle has moved too; only sliding against it rubs.

@@ -383,13 +383,24 @@ class Search {
         return violating.contains(a.key.particle) > violating.contains(b.key.particle);
       });
       for (const NearDecision& tie : ties) {
-        Settled settled = present.settled;
-        settled[tie.key] = tie.other;
-        try_out(std::move(settled));
+        // What tips one iteration's scale tips the next one's, and blade and walls ask the same again in turn.
+        Settled alike = present.settled, alone = present.settled;
+        for (const NearDecision& other : ties) {
+          if (is_alike(other, tie)) alike[other.key] = tie.other;
+        }
+        alone[tie.key] = tie.other;
+        try_out(std::move(alike));
+        if (!best.holds()) try_out(std::move(alone));
         if (best.holds()) break;
       }
     }
     return best.holds() || open.empty();
+  }
+
+  // Whether two ties put the same question in one substep.
+  static bool is_alike(const NearDecision& a, const NearDecision& b) {
+    return a.key.kind == b.key.kind && a.key.particle == b.key.particle && a.key.substep == b.key.substep &&
+           a.other == b.other;
   }
 
   // What a disturbed run decides that is left to itself, where the root has ties.

@@ -37,7 +37,7 @@ int ContactModel::side_of(const Began& began, Decisions& decisions) const {
 }
 
 Vec3 ContactModel::turned_back(Local c) const {
-  return to_.edge + c.u * to_.along + c.w * to_.back + c.n * cross(to_.along, to_.back);
+  return c.u * to_.along + c.w * to_.back + c.n * cross(to_.along, to_.back);
 }
 
 Vec3 ContactModel::off_walls(Vec3 x) const {
@@ -50,17 +50,17 @@ Vec3 ContactModel::off_walls(Vec3 x) const {
 
 // Forbidden is what is nearer than ρ to the rectangle, and what lies over it on the side where the particle did not
 // begin.
-Vec3 ContactModel::off_plate(Vec3 x, const Began& began, Decisions& decisions) const {
+Vec3 ContactModel::way_off_plate(Vec3 x, const Began& began, Decisions& decisions) const {
   const Local c = to_local(to_, x - to_.edge);
   const double before_edge = -c.w, behind_back = c.w - depth_, beyond_end = std::abs(c.u) - half_length_;
   const double outside = std::max({before_edge, behind_back, beyond_end});  // of the rectangle; below 0: over it
-  if (outside > decisions.near() && std::max(outside, std::abs(c.n)) >= clearance_) return x;
+  if (outside > decisions.near() && std::max(outside, std::abs(c.n)) >= clearance_) return {};
   if (outside <= decisions.near()) {
     const int side = side_of(began, decisions);
     const double height = side * c.n;
-    if (outside < 0 && height >= clearance_) return x;
-    const Local lifted = {c.u, side * clearance_, c.w};
-    if (outside < 0 && height >= 0) return turned_back(lifted);
+    if (outside < 0 && height >= clearance_) return {};
+    const Local lift = {0, side * clearance_ - c.n, 0};
+    if (outside < 0 && height >= 0) return turned_back(lift);
     if (height < 0) {
       // It came through the plate: back, or round one of the four sides, where the rounded rim has to be cleared too.
       // Just beyond a side it is round that one already; near a corner, rounding may lead it round another.
@@ -72,22 +72,26 @@ Vec3 ContactModel::off_plate(Vec3 x, const Began& began, Decisions& decisions) c
       const int way = decisions.least(DecisionKind::way_out, ways);
       const bool is_round =
           (way == 1 && before_edge >= 0) || (way == 2 && behind_back >= 0) || (way == 3 && beyond_end >= 0);
-      if (way == 0) return turned_back(lifted);
-      Local out = {c.u, -side * far, c.w};
-      if (way == 1) out.w = 0;
-      if (way == 2) out.w = depth_;
-      if (way == 3) out.u = std::copysign(half_length_, c.u);
-      if (way == 4) out.u = -std::copysign(half_length_, c.u);
+      if (way == 0) return turned_back(lift);
+      Local out = {0, -side * far - c.n, 0};
+      if (way == 1) out.w = -c.w;
+      if (way == 2) out.w = depth_ - c.w;
+      if (way == 3) out.u = std::copysign(half_length_, c.u) - c.u;
+      if (way == 4) out.u = -std::copysign(half_length_, c.u) - c.u;
       if (!is_round) return turned_back(out);
     }
   }
   const Local on_plate = {std::clamp(c.u, -half_length_, half_length_), 0, std::clamp(c.w, 0.0, depth_)};
   const Local away = {c.u - on_plate.u, c.n, c.w - on_plate.w};
   const double distance = std::hypot(away.u, away.n, away.w);
-  if (distance >= clearance_) return x;
-  if (distance == 0) return turned_back({c.u, side_of(began, decisions) * clearance_, c.w});
-  const double scale = clearance_ / distance;
-  return turned_back({on_plate.u + scale * away.u, scale * away.n, on_plate.w + scale * away.w});
+  if (distance >= clearance_) return {};
+  if (distance == 0) return turned_back({0, side_of(began, decisions) * clearance_, 0});
+  const double more = clearance_ / distance - 1;
+  return turned_back({more * away.u, more * away.n, more * away.w});
+}
+
+Vec3 ContactModel::off_plate(Vec3 x, const Began& began, Decisions& decisions) const {
+  return x + way_off_plate(x, began, decisions);
 }
 
 // `in_turn`: blade and walls have both moved it, so that this need not be the nearest point.
@@ -130,7 +134,7 @@ Vec3 ContactModel::place(Vec3 free, const Began& began, const Vec3* x, Decisions
       normal[wall.axis] = 1;
       placed = held_back(placed, placed - began.start, normal, wall.friction * pressed);
     }
-    const Vec3 pushed = blade_friction_ > 0 ? off_plate(free, began, decisions) - free : Vec3{};
+    const Vec3 pushed = blade_friction_ > 0 ? way_off_plate(free, began, decisions) : Vec3{};
     const double pressed = norm(pushed);
     if (pressed > 0) {
       // Against the point of the blade that is under the particle, which has moved too.

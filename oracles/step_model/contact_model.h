@@ -35,6 +35,7 @@ class ContactModel {
   double depth(Vec3 free, const Began& began, Decisions& decisions) const;
 
  private:
+  Vec3 way_off_plate(Vec3 x, const Began& began, Decisions& decisions) const;
   Vec3 off_plate(Vec3 x, const Began& began, Decisions& decisions) const;
   Vec3 off_walls(Vec3 x) const;
   Vec3 nearest(Vec3 x, const Began& began, Decisions& decisions, bool* in_turn = nullptr) const;

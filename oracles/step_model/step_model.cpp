@@ -199,7 +199,7 @@ class StepModel::Run {
   Mat3 one_of_many(const BestRotation& best, const Mat3& previous, bool all);
 
   // What is rounded: of clusters and of particles.
-  enum class Rounded : uint8_t { shape, prediction, place, end, impulse };
+  enum class Rounded : uint8_t { shape, prediction, place, push, end, impulse };
   void round(Rounded what, std::size_t index) { noise_.name(static_cast<uint64_t>(what), index, repeats_ ? 0 : time_); }
 
   const StepModel& model_;
@@ -422,6 +422,7 @@ void StepModel::Run::substep(int32_t s) {
   }
 
   std::vector<Vec3> earlier = out_.x, now;
+  Vec3 lost, lost_earlier;  // what the backend's sum of displacements misses, carried as it is
   for (int32_t j = 0; j < step.iterations; ++j) {
     ++time_;
     // The implicit solver draws what earlier iterations have rounded to the prediction; others keep it.
@@ -431,18 +432,30 @@ void StepModel::Run::substep(int32_t s) {
     }
     match_shapes(s + 1 == step.substeps && j + 1 == step.iterations);
     now = out_.x;
+    const bool combined = accelerated && j > 0;
+    Vec3 lost_now;
     for (std::size_t i = 0; i < start.size(); ++i) {
-      if (before_.alive[i] == 0 || held[i] != nullptr) continue;
+      if (before_.alive[i] == 0) continue;
       const double holders = model_.holders_[i];
       const Vec3 goal = holders > 0 ? sum_[i] / holders : now[i];
       const Vec3 from = implicit ? predicted[i] : now[i];
       const Vec3 plain = from + pull * (goal - from);
       Vec3 free = plain;
-      double carried = 0;
-      if (accelerated && j > 0) {
+      double amplitude = u_ * pull * (2 * norm(goal - from) + 2 * model_.lever_[i]);
+      if (combined) {
         const Vec3 drawn = weights[at(j)].pull * (plain - now[i]), swung = weights[at(j)].carry * (now[i] - earlier[i]);
         free = now[i] + drawn + swung;
-        carried = kParameterRounds * u_ * (norm(drawn) + norm(swung));
+        amplitude += kParameterRounds * u_ * (norm(drawn) + norm(swung));
+      }
+      // A backend knows how far a contact or a grip has displaced a particle from where it has rounded it to.
+      const auto note_lost = [&] {
+        if (!disturbed_ || out_.x[i] == free) return;
+        round(Rounded::push, i);
+        lost_now += body_.mass[i] * noise_.off(u_ * stored(i, free), amplitude);
+      };
+      if (held[i] != nullptr) {
+        note_lost();
+        continue;
       }
       Vec3& next = out_.x[i];
       next = free;
@@ -452,7 +465,7 @@ void StepModel::Run::substep(int32_t s) {
         decisions_.begin(s, j + 1, static_cast<int32_t>(i));
         // Where several answers are right, the way there decides: touched particles go the plain way.
         bool touched = true;
-        if (accelerated && j > 0 && contacts.path_matters()) {
+        if (combined && contacts.path_matters()) {
           const double deepest =
               std::max(contacts.depth(free, began[i], decisions_), contacts.depth(plain, began[i], decisions_));
           touched = decisions_.exceeds(DecisionKind::touched, deepest + kTouchMargin * body_.grid.spacing);
@@ -460,14 +473,20 @@ void StepModel::Run::substep(int32_t s) {
         }
         if (touched) next = contacts.place(wanted, began[i], &now[i], decisions_);
       }
-      settle(i, wanted, next, carried + u_ * pull * (2 * norm(goal - from) + 2 * model_.lever_[i]));
+      note_lost();
+      settle(i, wanted, next, amplitude);
       if (!disturbed_ && holders > 0) rounding_now_[i] += pull * pull * goal_rounding_[i] / (holders * holders);
     }
     earlier = now;
+    Vec3 carried = (implicit ? pull : 1.0) * lost;
+    if (combined)
+      carried = lost + weights[at(j)].pull * (carried - lost) + weights[at(j)].carry * (lost - lost_earlier);
+    lost_earlier = lost;
+    lost = carried + lost_now;
   }
 
   const double decay = std::exp(-step.damping * dt);
-  Vec3 pushed;
+  Vec3 pushed = lost;
   double pushed_rounding = pull * pull * shared_rounding_, summed = 0;
   const double carried_on = step.substeps - s, carrying = kParameterRounds * std::sqrt(step.iterations + 1.0);
   for (std::size_t i = 0; i < start.size(); ++i) {
