@@ -373,6 +373,25 @@ double substep_energy(const Setup& setup, const State& state, const std::vector<
   return energy_at(substep, x, poses_at(substep, x, state.clusters.rotation));
 }
 
+std::vector<Vec3> substep_gradient(const Setup& setup, const State& state, const std::vector<Vec3>& x) {
+  const Substep substep = substep_of(setup, state);
+  const Poses poses = poses_at(substep, x, state.clusters.rotation);
+  std::vector<Vec3> gradient(x.size());
+  for (int32_t c = 0; c < substep.clusters.count(); ++c) {
+    auto offset = substep.offset.begin() + substep.clusters.offsets[at(c)];
+    for (const int32_t i : substep.clusters.of(c)) {
+      const Vec3 d = x[at(i)] - poses.center[at(c)] - poses.rotation[at(c)] * *offset++;
+      gradient[at(i)] += substep.stiffness * substep.rest.weight[at(i)] * d;
+    }
+  }
+  for (int32_t i = 0; i < substep.body.particle_count(); ++i) {
+    if (!substep.is_free(i)) continue;
+    const Vec3 d = x[at(i)] - substep.predicted[at(i)];
+    gradient[at(i)] += substep.body.mass[at(i)] / (substep.dt * substep.dt) * d;
+  }
+  return gradient;
+}
+
 PlainLimit plain_limit(const Setup& setup, const State& state, double tolerance, int64_t most) {
   const Substep substep = substep_of(setup, state);
   require_solvable(setup, state, substep);

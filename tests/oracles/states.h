@@ -214,4 +214,20 @@ inline Skin convex_cell_skin(const Setup& setup, const State& state) {
   return skin;
 }
 
+// What single precision keeps of a state: displacements from rest, velocities and rotations.
+inline void round_to_single(const Body& body, State& state) {
+  const auto single = [](double value) { return static_cast<double>(static_cast<float>(value)); };
+  for (std::size_t i = 0; i < state.x.size(); ++i) {
+    const Vec3 rest = body.rest_position(static_cast<int32_t>(i));
+    for (int axis = 0; axis < 3; ++axis) {
+      state.x[i][axis] = rest[axis] + single(state.x[i][axis] - rest[axis]);
+      state.v[i][axis] = single(state.v[i][axis]);
+    }
+  }
+  for (Mat3& r : state.clusters.rotation) {
+    for (double& entry : r.m) entry = single(entry);
+  }
+  state.precision = Precision::binary32;
+}
+
 }  // namespace cutproof::testing

@@ -26,22 +26,6 @@ struct StepScene {
   }
 };
 
-// What single precision keeps of a state: displacements from rest, velocities and rotations.
-void round_to_single(const Body& body, State& state) {
-  const auto single = [](double value) { return static_cast<double>(static_cast<float>(value)); };
-  for (std::size_t i = 0; i < state.x.size(); ++i) {
-    const Vec3 rest = body.rest_position(static_cast<int32_t>(i));
-    for (int axis = 0; axis < 3; ++axis) {
-      state.x[i][axis] = rest[axis] + single(state.x[i][axis] - rest[axis]);
-      state.v[i][axis] = single(state.v[i][axis]);
-    }
-  }
-  for (Mat3& r : state.clusters.rotation) {
-    for (double& entry : r.m) entry = single(entry);
-  }
-  state.precision = Precision::binary32;
-}
-
 // A bent, spinning block on a floor with friction, held at one end, with a blade that presses its middle.
 StepScene pressed_block(Solver solver = Solver::implicit, Acceleration acceleration = Acceleration::none) {
   StepScene scene{setup_of(block_body(9, 5, 4, kSpacing, 0.002)), {}, {}};

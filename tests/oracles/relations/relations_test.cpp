@@ -25,6 +25,7 @@ using testing::body_of;
 using testing::box_clusters;
 using testing::Node;
 using testing::range;
+using testing::round_to_single;
 using testing::setup_of;
 using testing::state_of;
 
@@ -56,6 +57,9 @@ class FakeBackend final : public Backend {
   std::vector<State> snapshot() const override { return states_; }
   SpanReport report() const override { return {}; }
 
+  cutproof::Precision precision() const override { return arithmetic; }
+
+  cutproof::Precision arithmetic = cutproof::Precision::binary64;
   bool single_stages = true;
   std::optional<Stage> only;  // the one stage that it can run
   Span last_span;             // for faults that depend on how they are called
@@ -432,6 +436,41 @@ TEST(TranslationIsExact, RejectsABackendThatDampsInSecret) {
   const Verdict verdict = translation_is_exact(damped, scene.setup, scene.state, {1, 0, 0});
   EXPECT_FALSE(verdict.holds);
   EXPECT_FALSE(verdict.witness.particles.empty());
+}
+
+// In single precision as well, bounds are what rounding does there and not a multiple of h.
+TEST(RestIsFixed, SeesSmallFaultsOfSinglePrecision) {
+  const Scene scene = two_blocks();
+  const double h = scene.setup.body.grid.spacing;
+  for (const double size : {0.0, 3e-5}) {
+    FakeBackend thrown = fake_step([&](const cutproof::Setup& setup, State& state) {
+      reference::step(setup, state);
+      state.x[20].z += size * h;
+      round_to_single(setup.body, state);
+    });
+    thrown.arithmetic = cutproof::Precision::binary32;
+    EXPECT_EQ(rest_is_fixed(thrown, scene.setup, scene.state).holds, size == 0);
+    EXPECT_EQ(translation_is_exact(thrown, scene.setup, scene.state, {1, 0, 0}).holds, size == 0);
+  }
+}
+
+TEST(EnergyIsMonotone, SeesSmallGrowthInSinglePrecision) {
+  const Scene scene = spinning_block();
+  for (const double size : {0.0, 1e-4}) {
+    FakeBackend restless = fake_step([&](const cutproof::Setup& setup, State& state) {
+      const int32_t iterations = setup.step.iterations;
+      reference::step(setup, state);
+      if (iterations == 6) {
+        for (std::size_t i = 0; i < state.x.size(); ++i) {
+          state.x[i].z += (i % 2 == 0 ? size : -size) * setup.body.grid.spacing;
+        }
+      }
+      round_to_single(setup.body, state);
+    });
+    restless.arithmetic = cutproof::Precision::binary32;
+    const Verdict verdict = energy_is_monotone(restless, scene.setup, scene.state, 6);
+    EXPECT_EQ(verdict.holds, size == 0) << verdict.witness.text << ' ' << verdict.measured << ' ' << verdict.bound;
+  }
 }
 
 TEST(Refinement, RejectsABackendThatHealsWhatWasCut) {
