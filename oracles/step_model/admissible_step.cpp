@@ -11,6 +11,7 @@
 #include "model/at.h"
 #include "oracles/best_rotation.h"
 #include "oracles/blade_motion.h"
+#include "oracles/memberships.h"
 #include "oracles/partitions.h"
 #include "oracles/shape_sums.h"
 #include "oracles/support.h"
@@ -21,6 +22,8 @@ namespace {
 // Without growth: within so much of the quadratic sum of single roundings nobody looks closer, because disturbed runs
 // would allow more (tolerances.md, The step again).
 constexpr double kSurely = 2;
+// Of what clusters share, so much is left where they overlap when it is taken away once.
+constexpr double kNotShared = 0.125;
 // Disturbed runs, from fixed seeds; as many before anything is called wrong; and how much farther than the farthest of
 // them a right answer may be.
 constexpr uint64_t kDisturbedRuns = 8, kMostDisturbedRuns = 32;
@@ -50,9 +53,10 @@ double apart(const Mat3& a, const Mat3& b) {
 
 // Of one outcome: bounds, or how far another is from it.
 struct Bounds {
-  std::vector<double> position, velocity;  // [n] [m], [m/s] times dt
-  std::vector<double> rotation;            // [m] [rad]
-  double impulse = 0;                      // [kg m/s]
+  std::vector<double> position, velocity;          // [n] [m], [m/s] times dt
+  std::vector<double> own_position, own_velocity;  // the same, less what clusters share
+  std::vector<double> rotation;                    // [m] [rad]
+  double impulse = 0;                              // [kg m/s]
 
   // Entry by entry: this = f(this, other).
   template <class F>
@@ -62,6 +66,8 @@ struct Bounds {
     };
     each(position, other.position);
     each(velocity, other.velocity);
+    each(own_position, other.own_position);
+    each(own_velocity, other.own_velocity);
     each(rotation, other.rotation);
     impulse = f(impulse, other.impulse);
   }
@@ -135,6 +141,20 @@ class Search {
       b.position.push_back(kSurely * std::sqrt(square));
       b.velocity.push_back(2 * b.position.back());
     }
+    std::vector<double> own = o.own_rounding;
+    const std::vector<int32_t> holders = membership_counts(before_.clusters, setup_.body.particle_count());
+    for (int32_t c = 0; c < before_.clusters.count(); ++c) {
+      const auto members = before_.clusters.of(c);
+      double sum = 0;
+      for (const int32_t i : members) sum += o.rounding[at(i)];
+      for (const int32_t i : members) {
+        own[at(i)] += kNotShared * kNotShared * sum / static_cast<double>(members.size()) / holders[at(i)];
+      }
+    }
+    for (const double square : own) {
+      b.own_position.push_back(kSurely * std::sqrt(square));
+      b.own_velocity.push_back(2 * b.own_position.back());
+    }
     for (int32_t c = 0; c < before_.clusters.count(); ++c) {
       double members = 0;
       for (const int32_t i : before_.clusters.of(c)) members = std::max(members, o.rounding[at(i)]);
@@ -178,6 +198,22 @@ class Search {
 
   static constexpr auto kGreater = [](double a, double b) { return std::max(a, b); };
 
+  // [n] How far apart particles are, less what their clusters share of it, and less what taking that away rounds.
+  std::vector<double> own(const std::vector<Vec3>& one, const std::vector<Vec3>& other, double unit) const {
+    std::vector<Vec3> field(one.size());
+    double greatest = 0;
+    for (std::size_t i = 0; i < one.size(); ++i) {
+      if (before_.alive[i] != 0) field[i] = unit * (one[i] - other[i]);
+      greatest = std::max(greatest, or_infinite(norm(field[i])));
+    }
+    const double rounded = 64 * kUnitRoundoff * greatest;
+    std::vector<double> lengths;
+    for (const Vec3& own : model_.without_shared(field)) {
+      lengths.push_back(std::max(0.0, or_infinite(norm(own)) - rounded));
+    }
+    return lengths;
+  }
+
   Bounds off_by(const StepOutcome& one, const StepOutcome& other) const {
     Bounds off;
     for (std::size_t i = 0; i < one.x.size(); ++i) {
@@ -187,6 +223,8 @@ class Search {
     for (std::size_t c = 0; c < reach_.size(); ++c) {
       off.rotation.push_back(or_infinite(apart(one.rotation[c], other.rotation[c])));
     }
+    off.own_position = own(one.x, other.x, 1);
+    off.own_velocity = own(one.v, other.v, dt_);
     off.impulse = or_infinite(norm(one.impulse - other.impulse));
     return off;
   }
@@ -311,8 +349,23 @@ class Search {
     const double impulse = or_infinite(norm(after_.impulse - o.impulse));
     const double per_mass = mass_ > 0 ? dt_ / (mass_ * h_) : 0;
     see(branch, StepPart::impulse, -1, impulse * per_mass, b.impulse * per_mass);
+    if (branch.worst <= 1) compare_own(branch, violates);
     for (std::size_t i = 0; i < violates.size(); ++i) {
       if (violates[i] != 0) branch.violations.push_back(static_cast<int32_t>(i));
+    }
+  }
+
+  // Rounding that members of a cluster have in common, as of its rotation and its center, is much more than what each
+  // of them has alone. So what is wrong with one of them shows in what is left without it.
+  void compare_own(Branch& branch, std::vector<uint8_t>& violates) const {
+    const StepOutcome& o = branch.outcome;
+    const Bounds& b = branch.bounds;
+    const std::vector<double> off = own(after_.x, o.x, 1), fast = own(after_.v, o.v, dt_);
+    for (std::size_t i = 0; i < off.size(); ++i) {
+      if (before_.alive[i] == 0 || (!branch.blunt.empty() && branch.blunt[i] != 0)) continue;
+      if (!(off[i] <= b.own_position[i]) || !(fast[i] <= b.own_velocity[i])) violates[i] = 1;
+      see(branch, StepPart::own_position, static_cast<int32_t>(i), off[i] / h_, b.own_position[i] / h_);
+      see(branch, StepPart::own_velocity, static_cast<int32_t>(i), fast[i] / h_, b.own_velocity[i] / h_);
     }
   }
 

@@ -14,9 +14,10 @@
 namespace cutproof::oracles {
 
 // What of a step is compared, each with its own bounds.
-enum class StepPart { position, velocity, rotation, impulse };
+// `own`: less what its clusters share (StepModel::without_shared).
+enum class StepPart { position, velocity, rotation, impulse, own_position, own_velocity };
 constexpr const char* name_of(StepPart part) {
-  constexpr const char* kNames[] = {"position", "velocity", "rotation", "impulse"};
+  constexpr const char* kNames[] = {"position", "velocity", "rotation", "impulse", "own position", "own velocity"};
   return kNames[static_cast<int>(part)];
 }
 

@@ -1,5 +1,6 @@
 #include "oracles/step_model/step_model.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
 #include <algorithm>
@@ -63,6 +64,24 @@ std::vector<ChebyshevWeights> chebyshev_weights(double s, int32_t iterations) {
   return weights;
 }
 
+// a bᵀ
+void add_product(Mat3& sum, Vec3 a, Vec3 b) {
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) sum(row, column) += a[row] * b[column];
+  }
+}
+
+// Of a matrix of second moments; directions in which there is no extent stay without.
+Mat3 pseudoinverse(const Mat3& moments) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(as_eigen(moments));
+  const Eigen::Vector3d& values = solver.eigenvalues();
+  Eigen::Vector3d inverse = Eigen::Vector3d::Zero();
+  for (int k = 0; k < 3; ++k) {
+    if (values[k] > 1e-9 * values[2]) inverse[k] = 1 / values[k];
+  }
+  return to_mat3(solver.eigenvectors() * inverse.asDiagonal() * solver.eigenvectors().transpose());
+}
+
 bool is_on_a_line(const Body& body, std::span<const int32_t> members) {
   const auto first = body.grid.coordinates(body.node[at(members.front())]);
   std::array<int64_t, 3> way = {0, 0, 0};
@@ -106,13 +125,16 @@ StepModel::StepModel(const Setup& setup, const State& before, double unit_roundo
     }
     const Vec3 from_base = moment / cluster.mass;
     cluster.rest = base + from_base;
+    Mat3 moments = kNoTerms;
     for (std::size_t k = 0; k < members.size(); ++k) {
       Vec3& arm = arm_[at(cluster.begin) + k];
       arm = (body.rest_position(members[k]) - base) - from_base;
+      add_product(moments, weight_[at(members[k])] * arm, arm);
       cluster.radius = std::max(cluster.radius, norm(arm));
       cluster.arms += weight_[at(members[k])] * norm(arm);
       lever_[at(members[k])] += dot(arm, arm);
     }
+    cluster.inverse = pseudoinverse(moments);
     cluster.extent = members.size() == 1           ? Cluster::Extent::point
                      : is_on_a_line(body, members) ? Cluster::Extent::line
                                                    : Cluster::Extent::more;
@@ -120,6 +142,30 @@ StepModel::StepModel(const Setup& setup, const State& before, double unit_roundo
   for (int32_t i = 0; i < n; ++i) {
     if (holders_[at(i)] > 0) lever_[at(i)] = std::sqrt(lever_[at(i)]) / holders_[at(i)];
   }
+}
+
+std::vector<Vec3> StepModel::without_shared(const std::vector<Vec3>& field) const {
+  const Clusters& clusters = before_.clusters;
+  std::vector<Vec3> shared(field.size());
+  for (int32_t c = 0; c < clusters.count(); ++c) {
+    const Cluster& cluster = clusters_[at(c)];
+    const auto members = clusters.of(c);
+    if (members.empty()) continue;
+    Vec3 mean;
+    Mat3 slope = kNoTerms;
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      const Vec3 term = weight_[at(members[k])] * field[at(members[k])];
+      mean += term / cluster.mass;
+      add_product(slope, term, cluster.inverse * arm_[at(cluster.begin) + k]);
+    }
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      const int32_t i = members[k];
+      shared[at(i)] += (mean + slope * arm_[at(cluster.begin) + k]) / static_cast<double>(holders_[at(i)]);
+    }
+  }
+  std::vector<Vec3> own(field.size());
+  for (std::size_t i = 0; i < field.size(); ++i) own[i] = field[i] - shared[i];
+  return own;
 }
 
 int64_t StepModel::evaluations() const {
@@ -147,6 +193,7 @@ class StepModel::Run {
     out_.v = before_.v;
     out_.rotation = before_.clusters.rotation;
     out_.rounding.resize(out_.x.size());
+    out_.own_rounding.resize(out_.x.size());
     out_.turn_rounding.resize(model.clusters_.size());
     out_.is_free.assign(model.clusters_.size(), 0);
     sum_.resize(out_.x.size());
@@ -218,6 +265,7 @@ class StepModel::Run {
   std::vector<Vec3> sum_;              // [n] Σ_c t + R (X - T)
   std::vector<double> goal_rounding_;  // [n] Σ_c of squares
   std::vector<double> rounding_now_;   // [n] of this substep
+  std::vector<double> own_now_;        // [n] of it, the particle's own
   double shared_rounding_ = 0;         // of this substep, of Σ m goal: of squares
   std::vector<Vec3> rest_off_;         // [m]
   double parameter_off_ = 0, step_off_ = 0;
@@ -391,6 +439,7 @@ void StepModel::Run::substep(int32_t s) {
   std::vector<Vec3> predicted(start.size());
   std::vector<ContactModel::Began> began(start.size());
   rounding_now_.assign(start.size(), 0);
+  own_now_.assign(start.size(), 0);
   shared_rounding_ = 0;
   // Rounds a place that contacts have made of `free`.
   const auto settle = [&](std::size_t i, Vec3 free, Vec3& x, double more) {
@@ -401,7 +450,9 @@ void StepModel::Run::substep(int32_t s) {
     if (disturbed_) {
       x += noise_.off(u_ * place, amplitude);
     } else {
-      rounding_now_[i] += u_ * u_ * dot(place, place) + 3 * amplitude * amplitude;
+      const double square = u_ * u_ * dot(place, place) + 3 * amplitude * amplitude;
+      rounding_now_[i] += square;
+      own_now_[i] += square;
     }
   };
   for (std::size_t i = 0; i < start.size(); ++i) {
@@ -428,6 +479,7 @@ void StepModel::Run::substep(int32_t s) {
     // The implicit solver draws what earlier iterations have rounded to the prediction; others keep it.
     if (implicit && !accelerated && !disturbed_) {
       for (double& square : rounding_now_) square *= pull * pull;
+      for (double& square : own_now_) square *= pull * pull;
       shared_rounding_ *= pull * pull;
     }
     match_shapes(s + 1 == step.substeps && j + 1 == step.iterations);
@@ -441,7 +493,7 @@ void StepModel::Run::substep(int32_t s) {
       const Vec3 from = implicit ? predicted[i] : now[i];
       const Vec3 plain = from + pull * (goal - from);
       Vec3 free = plain;
-      double amplitude = u_ * pull * (2 * norm(goal - from) + 2 * model_.lever_[i]);
+      double amplitude = u_ * pull * (2 * norm(goal - from) + model_.lever_[i]);
       if (combined) {
         const Vec3 drawn = weights[at(j)].pull * (plain - now[i]), swung = weights[at(j)].carry * (now[i] - earlier[i]);
         free = now[i] + drawn + swung;
@@ -499,6 +551,7 @@ void StepModel::Run::substep(int32_t s) {
     out_.v[i] = (decay / dt) * (out_.x[i] - start[i]);
     if (disturbed_) out_.v[i] += noise_.off((kParameterRounds * u_) * out_.v[i], 0);
     out_.rounding[i] += carried_on * carried_on * rounding_now_[i];
+    out_.own_rounding[i] += carried_on * carried_on * own_now_[i];
     pushed_rounding +=
         body_.mass[i] * body_.mass[i] * (rounding_now_[i] + carrying * carrying * u_ * u_ * dot(push, push));
     summed += body_.mass[i] * norm(push);

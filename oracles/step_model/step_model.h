@@ -24,6 +24,7 @@ struct StepOutcome {
   std::vector<uint8_t> is_free;
   // Of an undisturbed run: the quadratic sums of what single evaluations round, as if none of it grew.
   std::vector<double> rounding;       // [n] of positions [m²]
+  std::vector<double> own_rounding;   // [n] of it, what is the particle's own: not of its clusters [m²]
   std::vector<double> turn_rounding;  // [m] of rotations [rad²]
   double impulse_rounding = 0;        // [(kg m/s)²]
 };
@@ -43,6 +44,10 @@ class StepModel {
   };
   StepOutcome run(const Wanted& wanted) const;
 
+  // [n] A field over the particles, less what their clusters share of it: in the mean over a particle's clusters, the
+  // affine motion that comes nearest to the cluster's members (by their shares of mass).
+  std::vector<Vec3> without_shared(const std::vector<Vec3>& field) const;
+
   // Σ over substeps of evaluations of positions and particles: what a run costs.
   int64_t evaluations() const;
 
@@ -54,6 +59,7 @@ class StepModel {
     Vec3 rest;          // T
     double radius = 0;  // greatest |X - T|
     double arms = 0;    // Σ w |X - T|
+    Mat3 inverse;       // pseudoinverse of Σ w (X - T)(X - T)ᵀ
     enum class Extent { point, line, more } extent = Extent::more;
   };
 

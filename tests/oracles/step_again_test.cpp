@@ -110,6 +110,35 @@ TEST(AdmissibleStep, RejectsTheLeastDisturbances) {
   }
 }
 
+// What rounds in a cluster as a whole is much more than what rounds in each of its members: one that is off alone shows
+// beside its neighbours, well within the bound of its position.
+TEST(AdmissibleStep, SeesOneParticleBesideItsNeighbours) {
+  StepScene scene{setup_of(block_body(9, 6, 6, kSpacing, 0.002)), {}, {}};
+  scene.setup.step.gravity = {0, 0, -9.81};
+  scene.before = state_of(scene.setup.body, box_clusters(9, 6, 6, 4));
+  for (std::size_t i = 0; i < scene.before.x.size(); ++i) {
+    const Vec3 x = scene.before.x[i];
+    scene.before.v[i] = {0.3 - 4 * x.y, 4 * x.x, -0.5};
+  }
+  round_to_single(scene.setup.body, scene.before);
+  scene.take_step();
+  round_to_single(scene.setup.body, scene.after);
+  expect_holds(admissible_step(scene.setup, scene.before, scene.after));
+  const std::size_t inside = 4 + 9 * (2 + 6 * 2);
+  const double dt = scene.setup.substep_length[0];
+  State wrong = scene.after;
+  wrong.x[inside].y += 1.5e-5 * kSpacing;
+  Verdict verdict = admissible_step(scene.setup, scene.before, wrong);
+  EXPECT_FALSE(verdict.holds) << verdict.bound;
+  EXPECT_NE(verdict.witness.text.find("own position of particle"), std::string::npos) << verdict.witness.text;
+  EXPECT_EQ(verdict.witness.particles, std::vector<int32_t>{static_cast<int32_t>(inside)});
+  wrong = scene.after;
+  wrong.v[inside].z += 1e-5 * kSpacing / dt;
+  verdict = admissible_step(scene.setup, scene.before, wrong);
+  EXPECT_FALSE(verdict.holds) << verdict.bound;
+  EXPECT_NE(verdict.witness.text.find("own velocity of particle"), std::string::npos) << verdict.witness.text;
+}
+
 // A simulator that has one of these a little wrong.
 TEST(AdmissibleStep, RejectsParametersThatAreOffByAThousandth) {
   const StepScene good = pressed_block();
