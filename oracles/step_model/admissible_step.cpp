@@ -232,7 +232,7 @@ class Search {
   // What rounding does to this outcome, by disturbed runs that take the same decisions.
   void look_closer(Branch& branch, uint64_t runs = kDisturbedRuns) {
     const std::size_t m = reach_.size();
-    Settled as_taken;
+    Settled as_taken = branch.settled;
     for (const NearDecision& d : branch.outcome.near) as_taken[d.key] = d.taken;
     Bounds grown = off_by(branch.outcome, branch.outcome);
     std::vector<double> direction(m, 0);
@@ -441,6 +441,7 @@ class Search {
         for (const NearDecision& other : ties) {
           if (is_alike(other, tie)) alike[other.key] = tie.other;
         }
+        alike[tie.key.all_alike()] = tie.other;
         alone[tie.key] = tie.other;
         try_out(std::move(alike));
         if (!best.holds()) try_out(std::move(alone));

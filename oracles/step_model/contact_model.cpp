@@ -146,7 +146,10 @@ Vec3 ContactModel::place(Vec3 free, const Began& began, const Vec3* x, Decisions
     placed = nearest(placed, began, decisions, &in_turn);
   }
   // Never what is worse than the present place, so that the energy cannot grow: only where turns were taken.
-  if (in_turn && !friction_ && x != nullptr && decisions.is_longer(norm(placed - free), norm(*x - free))) return *x;
+  if (in_turn && !friction_ && x != nullptr &&
+      decisions.is_longer(DecisionKind::refused, norm(placed - free), norm(*x - free), norm(placed - *x))) {
+    return *x;
+  }
   return placed;
 }
 

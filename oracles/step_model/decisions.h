@@ -17,16 +17,20 @@ namespace cutproof::oracles {
 enum class DecisionKind : uint8_t {
   side,     // of the blade, on which a particle begins a substep: 0 positive, 1 negative
   way_out,  // of one that came through the plate: 0 its own side, 1 the cutting edge, 2 the back, 3 and 4 the ends
-  touched   // by a contact, in an accelerated iteration: 0 no, 1 yes
+  touched,  // by a contact, in an accelerated iteration: 0 no, 1 yes
+  kept,     // the previous rotation, of a cluster whose matrix is no more than rounding: 0 no, 1 yes
+  refused   // a place that blade and walls have made in turn, because it is worse than the present one: 0 no, 1 yes
 };
 
 // Names one decision of a step, the same in every run of it.
 struct DecisionKey {
   int32_t substep = 0, evaluation = 0;  // evaluation 0: the predicted position; k: iteration k
-  int32_t particle = 0;
-  int32_t turn = 0;  // counts decisions of one kind within an evaluation of a particle
+  int32_t particle = 0;                 // of a cluster its first member
+  int32_t turn = 0;                     // counts decisions of one kind within an evaluation of a particle
   DecisionKind kind = DecisionKind::side;
   friend auto operator<=>(const DecisionKey&, const DecisionKey&) = default;
+  // All of one kind that a particle has to take in a substep.
+  DecisionKey all_alike() const { return {substep, -1, particle, -1, kind}; }
 };
 
 // One that was near.
@@ -38,7 +42,8 @@ struct NearDecision {
   bool is_natural = true;  // as the numbers say
 };
 
-// Decisions that are settled from outside: their outcomes by their keys.
+// Decisions that are settled from outside: their outcomes by their keys, and by those of all that are alike, which are
+// followed where nothing else is said and the scales are all but even.
 using Settled = std::map<DecisionKey, int>;
 
 // Takes decisions of one run: as the numbers say, unless they are near and settled from outside.
@@ -56,10 +61,10 @@ class Decisions {
   // Whether `lead`, of outcome 1 over outcome 0, is above 0 [m].
   bool exceeds(DecisionKind kind, double lead) { return least(kind, std::array<double, 2>{lead, 0}) == 1; }
 
-  // Whether one length is greater than another. Where they are nearly the same, the places that they lead to are
-  // near to each other too (to a root of the difference): so rounding decides it as it does other numbers, and it is
-  // not settled from outside.
-  bool is_longer(double one, double other) {
+  // Whether one length is greater than another, which lead to places so far `apart` from each other. If those are all
+  // but the same, rounding decides it as it does other numbers, and it is not settled from outside.
+  bool is_longer(DecisionKind kind, double one, double other, double apart) {
+    if (apart > kApart * near_) return least(kind, std::array<double, 2>{one, other}) == 1;
     const double rounding = noise_ != nullptr ? 8 * unit_roundoff_ * (one + other) * (*noise_)() : 0;
     return one - other + rounding > 0;
   }
@@ -85,7 +90,12 @@ class Decisions {
     for (std::size_t k = 0; k < N; ++k) any = any || is_near(k);
     if (!any) return static_cast<int>(taken);
     const std::size_t natural = taken;
-    if (const auto known = settled_.find(key); known != settled_.end()) taken = static_cast<std::size_t>(known->second);
+    if (const auto known = settled_.find(key); known != settled_.end()) {
+      taken = static_cast<std::size_t>(known->second);
+    } else if (const auto alike = settled_.find(key.all_alike()); alike != settled_.end()) {
+      const auto wanted = static_cast<std::size_t>(alike->second);
+      if (std::abs(cost[wanted] - cost[taken]) <= kEven * near_) taken = wanted;
+    }
     for (std::size_t k = 0; k < N; ++k) {
       if (is_near(k))
         noted_.push_back({key, static_cast<int>(taken), static_cast<int>(k), cost[k] - cost[taken],
@@ -98,6 +108,8 @@ class Decisions {
   std::vector<NearDecision> take_near() { return std::move(noted_); }
 
  private:
+  static constexpr double kEven = 0.005, kApart = 0.05;  // of what is near
+
   const Settled& settled_;
   double near_, unit_roundoff_;
   Noise* noise_;

@@ -240,10 +240,11 @@ class StepModel::Run {
   }
 
   void substep(int32_t s);
-  void match_shapes(bool is_last);
+  void match_shapes(int32_t s, int32_t j);
   // `size`: of all terms of A. `noise`: what the rounding of places makes of A.
   Mat3 rotation_of(int32_t c, const Eigen::Matrix3d& a, double size, double noise, bool is_last);
   Mat3 one_of_many(const BestRotation& best, const Mat3& previous, bool all);
+  bool keeps_rotation(int32_t c);
 
   // What is rounded: of clusters and of particles.
   enum class Rounded : uint8_t { shape, prediction, place, push, end, impulse };
@@ -271,13 +272,15 @@ class StepModel::Run {
   double parameter_off_ = 0, step_off_ = 0;
   double turn_amplitude_ = 0;  // of the last rotation [rad]
   uint64_t time_ = 0;          // evaluations so far
+  int32_t substep_ = 0, iteration_ = 0;
 };
 
 // One of the rotations that take v to u, `all`: of all rotations. The nearest to the previous one, but any of them in a
-// disturbed run.
+// disturbed run; of all, every second time what is the best of nothing but noise: contacts and flat clusters give that
+// a direction of its own.
 Mat3 StepModel::Run::one_of_many(const BestRotation& best, const Mat3& previous, bool all) {
   const Mat3 nearest = nearest_of_rank_one(best, previous).r;
-  if (!disturbed_) return nearest;
+  if (!disturbed_ || (all && noise_() < 0)) return nearest;
   Vec3 axis = {best.u[0], best.u[1], best.u[2]};
   if (all) axis = noise_.vector();
   const double length = norm(axis);
@@ -310,6 +313,7 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double siz
     // How it is turned about itself moves no member; but it stays.
     if (is_half_turn || (is_lost && is_last)) out_.is_free[at(c)] = 1;
     if (is_given) return *wanted_.given[at(c)];
+    if (is_lost && keeps_rotation(c)) return previous;
     return is_half_turn || is_lost ? one_of_many(best, previous, is_lost) : nearest.r;
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -323,7 +327,9 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double siz
     if (is_last) out_.is_free[at(c)] = 1;
     rounding = is_lost ? 1.0 : u_ * kRotationRounds + sum_amplitude / sigma[0];
     rounding *= rounding;
-    return is_given ? *wanted_.given[at(c)] : one_of_many(best_rotation(to_mat3(a)), previous, is_lost);
+    if (is_given) return *wanted_.given[at(c)];
+    if (is_lost && keeps_rotation(c)) return previous;
+    return one_of_many(best_rotation(to_mat3(a)), previous, is_lost);
   }
   rounding = u_ * kRotationRounds + std::min(1.0, std::sqrt(2.0) * sum_amplitude / sure);
   rounding *= rounding;
@@ -331,7 +337,17 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double siz
   return to_mat3(u * v.transpose());
 }
 
-void StepModel::Run::match_shapes(bool is_last) {
+// Whether a cluster whose matrix is no more than rounding keeps its rotation, as it does where a backend finds nothing
+// but zeros: among all rotations that is one which no draw at random finds.
+bool StepModel::Run::keeps_rotation(int32_t c) {
+  decisions_.begin(substep_, iteration_, before_.clusters.of(c).front());
+  return decisions_.exceeds(DecisionKind::kept, 0);
+}
+
+void StepModel::Run::match_shapes(int32_t s, int32_t j) {
+  const bool is_last = s + 1 == setup_.step.substeps && j + 1 == setup_.step.iterations;
+  substep_ = s;
+  iteration_ = j;
   const Clusters& clusters = before_.clusters;
   const std::vector<Vec3>& x = out_.x;
   std::fill(sum_.begin(), sum_.end(), Vec3{});
@@ -482,7 +498,7 @@ void StepModel::Run::substep(int32_t s) {
       for (double& square : own_now_) square *= pull * pull;
       shared_rounding_ *= pull * pull;
     }
-    match_shapes(s + 1 == step.substeps && j + 1 == step.iterations);
+    match_shapes(s, j);
     now = out_.x;
     const bool combined = accelerated && j > 0;
     Vec3 lost_now;
