@@ -35,6 +35,7 @@ struct FuzzOptions {
   int batch = 0;                 // bodies in one load; 0: by backend
   int threads = 0;               // 0: as many as the machine has
   std::string shard;             // "i/N"; empty: all
+  double simplify = 60;          // [s] for each violation
   std::string save = ".";        // the folder for counterexamples
   std::string json;
   std::vector<std::string> merge;  // results of shards, to be put together; nothing is run
@@ -125,7 +126,7 @@ int merge(const FuzzOptions& options) {
 std::string keep(const Violation& violation, const FuzzOptions& options, const BackendChoice& choice, int batch) {
   fmt::print("case {} FAILS: {}\n", violation.index, describe(violation.verdict));
   flush_output();
-  Simplified simplified = simplify(violation, choice);
+  Simplified simplified = simplify(violation, choice, options.simplify);
   simplified.counterexample.seed = options.campaign.seed;
   const Counterexample& found = simplified.counterexample;
   const std::string stem = (std::filesystem::path(options.save) /
@@ -218,6 +219,10 @@ void add_fuzz(CLI::App& program, Work& work) {
   add_count(*command, "--threads", options->threads, "that generate and judge (default: all)", CLI::Range(1, 4096));
   command->add_option("--shard", options->shard, "only part i of N of the cases")->type_name("i/N");
   command->add_flag("--keep-going", options->campaign.keep_going, "beyond the first violation");
+  command->add_option("--simplify", options->simplify, "how long a violation's case is simplified, 0: not at all")
+      ->capture_default_str()
+      ->type_name("S")
+      ->check(CLI::NonNegativeNumber);
   command->add_option("--save", options->save, "folder for counterexamples")->capture_default_str()->type_name("DIR");
   add_json(*command, options->json, "write counts, classes and violations");
   command->add_option("--merge", options->merge, "put the results of all shards together; runs nothing")

@@ -9,14 +9,13 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using harness::BackendChoice;
 
-constexpr std::chrono::seconds kSimplifyingTime{60};
 constexpr int kSchedulesTried = 50;
 
 bool takes_schedule(const BackendChoice& choice) { return harness::described_backend(choice.name).takes_schedule; }
 
 }  // namespace
 
-Simplified simplify(const Violation& violation, const BackendChoice& choice) {
+Simplified simplify(const Violation& violation, const BackendChoice& choice, double seconds) {
   Simplified result;
   Counterexample& found = result.counterexample;
   found.failing = violation.failing;
@@ -43,8 +42,8 @@ Simplified simplify(const Violation& violation, const BackendChoice& choice) {
   };
   if (!fails(violation.failing)) return result;
   result.alone = true;
-  const Clock::time_point until = Clock::now() + kSimplifyingTime;
-  const auto is_over = [&] { return Clock::now() > until; };
+  const Clock::time_point begin = Clock::now();
+  const auto is_over = [&] { return std::chrono::duration<double>(Clock::now() - begin).count() >= seconds; };
   found.failing = simplest(violation.failing, fails, is_over);
   if (scheduled) {
     const auto schedule = std::make_shared<gpu::ThreadSchedule>();

@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "model/at.h"
@@ -383,8 +384,9 @@ class Search {
     const Branch root = likely.empty() ? std::move(first) : branch_of(likely);
     Branch best = root;
     // What an outcome rounds is first taken for what the root does; that may be less.
-    bool all_tried = explore(root, likely == certain ? nullptr : &certain, false, best);
-    if (all_tried && !best.holds()) all_tried = explore(root, likely == certain ? nullptr : &certain, true, best);
+    const std::optional<Branch> open = likely == certain ? std::nullopt : std::optional(branch_of(certain));
+    bool all_tried = explore(root, open, false, best);
+    if (all_tried && !best.holds()) all_tried = explore(root, open, true, best);
     if (!best.holds()) {
       look_closer(best, kMostDisturbedRuns);
       compare(best);
@@ -395,7 +397,7 @@ class Search {
 
   // Tries outcomes until one holds, fewest violations first; `closely`: looks closely at each, not only at those that
   // seem to be as good as the best. False: there are more than are tried.
-  bool explore(const Branch& root, const Settled* other_root, bool closely, Branch& best) {
+  bool explore(const Branch& root, const std::optional<Branch>& other_root, bool closely, Branch& best) {
     const auto better = [](const Branch& a, const Branch& b) {
       if (a.holds() != b.holds()) return b.holds();
       if (a.violations.size() != b.violations.size()) return a.violations.size() > b.violations.size();
@@ -423,9 +425,12 @@ class Search {
       }
       keep(std::move(next));
     };
-    if (other_root != nullptr && !best.holds() && seen.insert(*other_root).second) keep(branch_of(*other_root));
+    if (other_root && !best.holds() && seen.insert(other_root->settled).second) keep(*other_root);
     // Where one rounding tips many scales, as that of a wall does on which a whole layer rests.
-    for (uint64_t run = 1; run <= kMostDisturbedRuns && !best.holds(); ++run) try_out(decided_by(run, root));
+    for (uint64_t run = 1; run <= kMostDisturbedRuns && !best.holds(); ++run) {
+      try_out(decided_by(run, root));
+      if (other_root && !best.holds()) try_out(decided_by(run, *other_root));
+    }
     while (!open.empty() && !best.holds() && tried < most_outcomes_) {
       std::pop_heap(open.begin(), open.end(), better);
       const Branch present = std::move(open.back());
@@ -436,12 +441,11 @@ class Search {
         return violating.contains(a.key.particle) > violating.contains(b.key.particle);
       });
       for (const NearDecision& tie : ties) {
-        // What tips one iteration's scale tips the next one's, and blade and walls ask the same again in turn.
         Settled alike = present.settled, alone = present.settled;
         for (const NearDecision& other : ties) {
           if (is_alike(other, tie)) alike[other.key] = tie.other;
         }
-        alike[tie.key.all_alike()] = tie.other;
+        if (tie.key.kind != DecisionKind::side) alike[tie.key.all_alike()] = tie.other;
         alone[tie.key] = tie.other;
         try_out(std::move(alike));
         if (!best.holds()) try_out(std::move(alone));
@@ -451,10 +455,12 @@ class Search {
     return best.holds() || open.empty();
   }
 
-  // Whether two ties put the same question in one substep.
+  // Whether two ties put the same question in one substep: what tips one iteration's scale tips the next one's, blade
+  // and walls ask the same again in turn, and where the blade's rounding puts a layer that lies in its plane, it puts
+  // all of it.
   static bool is_alike(const NearDecision& a, const NearDecision& b) {
-    return a.key.kind == b.key.kind && a.key.particle == b.key.particle && a.key.substep == b.key.substep &&
-           a.other == b.other;
+    return a.key.kind == b.key.kind && a.key.substep == b.key.substep && a.other == b.other &&
+           (a.key.particle == b.key.particle || a.key.kind == DecisionKind::side);
   }
 
   // What a disturbed run decides that is left to itself, where the root has ties.
