@@ -199,20 +199,22 @@ class Search {
 
   static constexpr auto kGreater = [](double a, double b) { return std::max(a, b); };
 
-  // [n] How far apart particles are, less what their clusters share of it, and less what taking that away rounds.
-  std::vector<double> own(const std::vector<Vec3>& one, const std::vector<Vec3>& other, double unit) const {
+  // [n] How far apart particles are, less what their clusters share of it; and what taking that away rounds.
+  struct Own {
+    std::vector<double> lengths;
+    double rounding = 0;
+  };
+  Own own(const std::vector<Vec3>& one, const std::vector<Vec3>& other, double unit) const {
     std::vector<Vec3> field(one.size());
     double greatest = 0;
     for (std::size_t i = 0; i < one.size(); ++i) {
       if (before_.alive[i] != 0) field[i] = unit * (one[i] - other[i]);
       greatest = std::max(greatest, or_infinite(norm(field[i])));
     }
-    const double rounded = 64 * kUnitRoundoff * greatest;
-    std::vector<double> lengths;
-    for (const Vec3& own : model_.without_shared(field)) {
-      lengths.push_back(std::max(0.0, or_infinite(norm(own)) - rounded));
-    }
-    return lengths;
+    Own own;
+    own.rounding = 64 * kUnitRoundoff * greatest;
+    for (const Vec3& rest : model_.without_shared(field)) own.lengths.push_back(or_infinite(norm(rest)));
+    return own;
   }
 
   Bounds off_by(const StepOutcome& one, const StepOutcome& other) const {
@@ -224,8 +226,8 @@ class Search {
     for (std::size_t c = 0; c < reach_.size(); ++c) {
       off.rotation.push_back(or_infinite(apart(one.rotation[c], other.rotation[c])));
     }
-    off.own_position = own(one.x, other.x, 1);
-    off.own_velocity = own(one.v, other.v, dt_);
+    off.own_position = own(one.x, other.x, 1).lengths;
+    off.own_velocity = own(one.v, other.v, dt_).lengths;
     off.impulse = or_infinite(norm(one.impulse - other.impulse));
     return off;
   }
@@ -361,12 +363,13 @@ class Search {
   void compare_own(Branch& branch, std::vector<uint8_t>& violates) const {
     const StepOutcome& o = branch.outcome;
     const Bounds& b = branch.bounds;
-    const std::vector<double> off = own(after_.x, o.x, 1), fast = own(after_.v, o.v, dt_);
-    for (std::size_t i = 0; i < off.size(); ++i) {
+    const Own off = own(after_.x, o.x, 1), fast = own(after_.v, o.v, dt_);
+    for (std::size_t i = 0; i < violates.size(); ++i) {
       if (before_.alive[i] == 0 || (!branch.blunt.empty() && branch.blunt[i] != 0)) continue;
-      if (!(off[i] <= b.own_position[i]) || !(fast[i] <= b.own_velocity[i])) violates[i] = 1;
-      see(branch, StepPart::own_position, static_cast<int32_t>(i), off[i] / h_, b.own_position[i] / h_);
-      see(branch, StepPart::own_velocity, static_cast<int32_t>(i), fast[i] / h_, b.own_velocity[i] / h_);
+      const double place = b.own_position[i] + off.rounding, speed = b.own_velocity[i] + fast.rounding;
+      if (!(off.lengths[i] <= place) || !(fast.lengths[i] <= speed)) violates[i] = 1;
+      see(branch, StepPart::own_position, static_cast<int32_t>(i), off.lengths[i] / h_, place / h_);
+      see(branch, StepPart::own_velocity, static_cast<int32_t>(i), fast.lengths[i] / h_, speed / h_);
     }
   }
 
@@ -443,9 +446,10 @@ class Search {
       for (const NearDecision& tie : ties) {
         Settled alike = present.settled, alone = present.settled;
         for (const NearDecision& other : ties) {
-          if (is_alike(other, tie)) alike[other.key] = tie.other;
+          if (!is_alike(other, tie)) continue;
+          alike[other.key] = tie.other;
+          if (tie.key.kind != DecisionKind::side) alike[other.key.all_alike()] = tie.other;
         }
-        if (tie.key.kind != DecisionKind::side) alike[tie.key.all_alike()] = tie.other;
         alone[tie.key] = tie.other;
         try_out(std::move(alike));
         if (!best.holds()) try_out(std::move(alone));
@@ -460,7 +464,7 @@ class Search {
   // all of it.
   static bool is_alike(const NearDecision& a, const NearDecision& b) {
     return a.key.kind == b.key.kind && a.key.substep == b.key.substep && a.other == b.other &&
-           (a.key.particle == b.key.particle || a.key.kind == DecisionKind::side);
+           (a.key.particle == b.key.particle || a.key.kind == DecisionKind::side || a.key.kind == DecisionKind::kept);
   }
 
   // What a disturbed run decides that is left to itself, where the root has ties.

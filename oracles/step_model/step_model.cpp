@@ -5,6 +5,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -329,6 +330,8 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double siz
     rounding *= rounding;
     if (is_given) return *wanted_.given[at(c)];
     if (is_lost && keeps_rotation(c)) return previous;
+    // What noise alone makes of it, every second time: contacts give that a direction of its own.
+    if (disturbed_ && noise_() < 0) return to_mat3(u * v.transpose());
     return one_of_many(best_rotation(to_mat3(a)), previous, is_lost);
   }
   rounding = u_ * kRotationRounds + std::min(1.0, std::sqrt(2.0) * sum_amplitude / sure);
@@ -338,10 +341,11 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double siz
 }
 
 // Whether a cluster whose matrix is no more than rounding keeps its rotation, as it does where a backend finds nothing
-// but zeros: among all rotations that is one which no draw at random finds.
+// but zeros: among all rotations that is one which no draw at random finds. A disturbed run that is left to itself
+// tosses a coin.
 bool StepModel::Run::keeps_rotation(int32_t c) {
   decisions_.begin(substep_, iteration_, before_.clusters.of(c).front());
-  return decisions_.exceeds(DecisionKind::kept, 0);
+  return decisions_.exceeds(DecisionKind::kept, disturbed_ ? std::numeric_limits<double>::min() * noise_() : 0);
 }
 
 void StepModel::Run::match_shapes(int32_t s, int32_t j) {
