@@ -460,8 +460,8 @@ class Search {
   }
 
   // Whether two ties put the same question in one substep: what tips one iteration's scale tips the next one's, blade
-  // and walls ask the same again in turn, and where the blade's rounding puts a layer that lies in its plane, it puts
-  // all of it.
+  // and walls ask the same again in turn, where the blade's rounding puts a layer that lies in its plane, it puts all
+  // of it, and a backend that takes one matrix for zero takes all of them.
   static bool is_alike(const NearDecision& a, const NearDecision& b) {
     return a.key.kind == b.key.kind && a.key.substep == b.key.substep && a.other == b.other &&
            (a.key.particle == b.key.particle || a.key.kind == DecisionKind::side || a.key.kind == DecisionKind::kept);

@@ -26,7 +26,7 @@ enum class DecisionKind : uint8_t {
 struct DecisionKey {
   int32_t substep = 0, evaluation = 0;  // evaluation 0: the predicted position; k: iteration k
   int32_t particle = 0;                 // of a cluster its first member
-  int32_t turn = 0;                     // counts decisions of one kind within an evaluation of a particle
+  int32_t turn = 0;  // counts decisions of one kind within an evaluation of a particle; of a cluster its index
   DecisionKind kind = DecisionKind::side;
   friend auto operator<=>(const DecisionKey&, const DecisionKey&) = default;
   // All of one kind that a particle has to take in a substep.
@@ -54,8 +54,9 @@ class Decisions {
   Decisions(const Settled& settled, double near, double unit_roundoff, Noise* noise)
       : settled_(settled), near_(near), unit_roundoff_(unit_roundoff), noise_(noise) {}
 
-  void begin(int32_t substep, int32_t evaluation, int32_t particle) {
-    key_ = {substep, evaluation, particle, 0, DecisionKind::side};
+  // `turn`: at which they begin to count.
+  void begin(int32_t substep, int32_t evaluation, int32_t particle, int32_t turn = 0) {
+    key_ = {substep, evaluation, particle, turn, DecisionKind::side};
   }
 
   // Whether `lead`, of outcome 1 over outcome 0, is above 0 [m].

@@ -277,8 +277,7 @@ class StepModel::Run {
 };
 
 // One of the rotations that take v to u, `all`: of all rotations. The nearest to the previous one, but any of them in a
-// disturbed run; of all, every second time what is the best of nothing but noise: contacts and flat clusters give that
-// a direction of its own.
+// disturbed run; of all, every second time what is the best of nothing but noise.
 Mat3 StepModel::Run::one_of_many(const BestRotation& best, const Mat3& previous, bool all) {
   const Mat3 nearest = nearest_of_rank_one(best, previous).r;
   if (!disturbed_ || (all && noise_() < 0)) return nearest;
@@ -344,7 +343,7 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double siz
 // but zeros: among all rotations that is one which no draw at random finds. A disturbed run that is left to itself
 // tosses a coin.
 bool StepModel::Run::keeps_rotation(int32_t c) {
-  decisions_.begin(substep_, iteration_, before_.clusters.of(c).front());
+  decisions_.begin(substep_, iteration_, before_.clusters.of(c).front(), c);
   return decisions_.exceeds(DecisionKind::kept, disturbed_ ? std::numeric_limits<double>::min() * noise_() : 0);
 }
 
