@@ -84,6 +84,7 @@ class Search {
         dt_(setup.substep_length[at(before.frame)]),
         model_(setup, before, std::max(unit_roundoff(before), unit_roundoff(after)) + kUnitRoundoff) {
     for (std::size_t i = 0; i < before.alive.size(); ++i) mass_ += before.alive[i] != 0 ? setup.body.mass[i] : 0;
+    holders_ = membership_counts(before.clusters, setup.body.particle_count());
     reach_.resize(at(before.clusters.count()));
     const WeightedRest rest = weighted_rest(setup.body, before.clusters);
     for (int32_t c = 0; c < before.clusters.count(); ++c) {
@@ -143,13 +144,12 @@ class Search {
       b.velocity.push_back(2 * b.position.back());
     }
     std::vector<double> own = o.own_rounding;
-    const std::vector<int32_t> holders = membership_counts(before_.clusters, setup_.body.particle_count());
     for (int32_t c = 0; c < before_.clusters.count(); ++c) {
       const auto members = before_.clusters.of(c);
       double sum = 0;
       for (const int32_t i : members) sum += o.rounding[at(i)];
       for (const int32_t i : members) {
-        own[at(i)] += kNotShared * kNotShared * sum / static_cast<double>(members.size()) / holders[at(i)];
+        own[at(i)] += kNotShared * kNotShared * sum / static_cast<double>(members.size()) / holders_[at(i)];
       }
     }
     for (const double square : own) {
@@ -566,7 +566,8 @@ class Search {
   const double h_, dt_;
   double mass_ = 0;
   StepModel model_;
-  std::vector<double> reach_;  // [m] greatest |X - T|
+  std::vector<int32_t> holders_;  // [n] clusters of a particle
+  std::vector<double> reach_;     // [m] greatest |X - T|
   Partition coupled_;
   int most_outcomes_ = kMostOutcomes;
   int64_t undecided_ = 0;
