@@ -36,6 +36,8 @@ constexpr double kNear = 2e-3;
 // Outcomes that are tried for one coupled set, and what they may cost in all [evaluations].
 constexpr int kMostOutcomes = 1024;
 constexpr int64_t kMostEvaluations = 20'000'000;
+// How often a fit goes through all ties; it ends when none brings it nearer.
+constexpr int kFitPasses = 32;
 
 // Two rotations are not farther apart, but for the rounding of their entries (apart).
 constexpr double kAnyRotation = 2 + 1e-4;
@@ -429,6 +431,11 @@ class Search {
       keep(std::move(next));
     };
     if (other_root && !best.holds() && seen.insert(other_root->settled).second) keep(*other_root);
+    // Many ties far from each other: which of them went the other way is found at once.
+    for (std::size_t before = best.violations.size() + 1; !best.holds() && best.violations.size() < before;) {
+      before = best.violations.size();
+      try_out(fitted(best));
+    }
     // Where one rounding tips many scales, as that of a wall does on which a whole layer rests.
     for (uint64_t run = 1; run <= kMostDisturbedRuns && !best.holds(); ++run) {
       try_out(decided_by(run, root));
@@ -438,11 +445,7 @@ class Search {
       std::pop_heap(open.begin(), open.end(), better);
       const Branch present = std::move(open.back());
       open.pop_back();
-      std::vector<NearDecision> ties = present.ties;
-      const std::set<int32_t> violating(present.violations.begin(), present.violations.end());
-      std::stable_sort(ties.begin(), ties.end(), [&](const NearDecision& a, const NearDecision& b) {
-        return violating.contains(a.key.particle) > violating.contains(b.key.particle);
-      });
+      const std::vector<NearDecision> ties = with_violating_first(present);
       for (const NearDecision& tie : ties) {
         Settled alike = present.settled, alone = present.settled;
         for (const NearDecision& other : ties) {
@@ -465,6 +468,75 @@ class Search {
   static bool is_alike(const NearDecision& a, const NearDecision& b) {
     return a.key.kind == b.key.kind && a.key.substep == b.key.substep && a.other == b.other &&
            (a.key.particle == b.key.particle || a.key.kind == DecisionKind::side || a.key.kind == DecisionKind::kept);
+  }
+
+  // How far particles are from an outcome, where they are; positions and velocities as one list.
+  std::vector<std::pair<std::size_t, Vec3>> off_outcome(const std::vector<Vec3>& x, const std::vector<Vec3>& v,
+                                                        const StepOutcome& o) const {
+    std::vector<std::pair<std::size_t, Vec3>> off;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      if (before_.alive[i] == 0) continue;
+      const Vec3 place = x[i] - o.x[i], way = dt_ * (v[i] - o.v[i]);
+      if (!(place == Vec3{})) off.emplace_back(2 * i, place);
+      if (!(way == Vec3{})) off.emplace_back(2 * i + 1, way);
+    }
+    return off;
+  }
+
+  // Taken the other way, which of an outcome's ties bring it nearest to what the backend states, in the sense of least
+  // squares, if what each of them does alone adds up.
+  Settled fitted(const Branch& branch) const {
+    struct Column {
+      Settled settled;
+      std::vector<std::pair<std::size_t, Vec3>> does;
+      double square = 0;
+      bool taken = false;
+    };
+    std::vector<Column> columns;
+    std::set<Settled> seen;
+    for (const NearDecision& tie : with_violating_first(branch)) {
+      if (columns.size() >= at(kDisturbedRuns + 1) * at(most_outcomes_)) break;
+      Column column;
+      for (const NearDecision& other : branch.ties) {
+        if (is_alike(other, tie)) column.settled[other.key] = tie.other;
+      }
+      if (!seen.insert(column.settled).second) continue;
+      Settled with = column.settled;
+      with.insert(branch.settled.begin(), branch.settled.end());
+      const StepOutcome o = model_.run({with, 0, kNear * h_, branch.given});
+      column.does = off_outcome(o.x, o.v, branch.outcome);
+      for (const auto& [k, way] : column.does) column.square += dot(way, way);
+      columns.push_back(std::move(column));
+    }
+    std::vector<Vec3> left(2 * before_.x.size());
+    for (const auto& [k, way] : off_outcome(after_.x, after_.v, branch.outcome)) left[k] = way;
+    bool any = true;
+    for (int pass = 0; any && pass < kFitPasses; ++pass) {
+      any = false;
+      for (Column& column : columns) {
+        const double sign = column.taken ? -1 : 1;
+        double gain = 0;
+        for (const auto& [k, way] : column.does) gain += sign * dot(left[k], way);
+        if (!(2 * gain > column.square)) continue;
+        for (const auto& [k, way] : column.does) left[k] -= sign * way;
+        column.taken = !column.taken;
+        any = true;
+      }
+    }
+    Settled best = branch.settled;
+    for (const Column& column : columns) {
+      if (column.taken) best.insert(column.settled.begin(), column.settled.end());
+    }
+    return best;
+  }
+
+  static std::vector<NearDecision> with_violating_first(const Branch& branch) {
+    std::vector<NearDecision> ties = branch.ties;
+    const std::set<int32_t> violating(branch.violations.begin(), branch.violations.end());
+    std::stable_sort(ties.begin(), ties.end(), [&](const NearDecision& a, const NearDecision& b) {
+      return violating.contains(a.key.particle) > violating.contains(b.key.particle);
+    });
+    return ties;
   }
 
   // What a disturbed run decides that is left to itself, where the root has ties.
