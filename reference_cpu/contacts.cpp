@@ -137,7 +137,8 @@ Vec3 Contacts::project_with_friction(Vec3 x, int side, Vec3 start, bool* in_turn
 Vec3 Contacts::next_position(Vec3 free, int side, Vec3 start, Vec3 x) const {
   bool in_turn = false;
   const Vec3 next = project_with_friction(free, side, start, &in_turn);
-  const bool worse = dot(next - free, next - free) > dot(x - free, x - free);
+  const double present = norm(x - free);
+  const bool worse = norm(next - free) > present + kRefusalRoundings * 0x1p-53 * (present + norm(x));
   return in_turn && frictionless() && worse ? x : next;
 }
 

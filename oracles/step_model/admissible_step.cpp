@@ -431,43 +431,30 @@ class Search {
       keep(std::move(next));
     };
     if (other_root && !best.holds() && seen.insert(other_root->settled).second) keep(*other_root);
-    // Many ties far from each other: which of them went the other way is found at once.
+    // Many ties at once: those of a layer that one rounding of its wall tips, or of particles far from each other.
     for (std::size_t before = best.violations.size() + 1; !best.holds() && best.violations.size() < before;) {
       before = best.violations.size();
       try_out(fitted(best));
-    }
-    // Where one rounding tips many scales, as that of a wall does on which a whole layer rests.
-    for (uint64_t run = 1; run <= kMostDisturbedRuns && !best.holds(); ++run) {
-      try_out(decided_by(run, root));
-      if (other_root && !best.holds()) try_out(decided_by(run, *other_root));
     }
     while (!open.empty() && !best.holds() && tried < most_outcomes_) {
       std::pop_heap(open.begin(), open.end(), better);
       const Branch present = std::move(open.back());
       open.pop_back();
-      const std::vector<NearDecision> ties = with_violating_first(present);
-      for (const NearDecision& tie : ties) {
-        Settled alike = present.settled, alone = present.settled;
-        for (const NearDecision& other : ties) {
-          if (!is_alike(other, tie)) continue;
-          alike[other.key] = tie.other;
-          if (tie.key.kind != DecisionKind::side) alike[other.key.all_alike()] = tie.other;
-        }
-        alone[tie.key] = tie.other;
-        try_out(std::move(alike));
-        if (!best.holds()) try_out(std::move(alone));
+      for (const NearDecision& tie : with_violating_first(present)) {
+        try_out(with_other(present.settled, tie, true));
+        if (!best.holds()) try_out(with_other(present.settled, tie, false));
         if (best.holds()) break;
       }
     }
     return best.holds() || open.empty();
   }
 
-  // Whether two ties put the same question in one substep: what tips one iteration's scale tips the next one's, blade
-  // and walls ask the same again in turn, where the blade's rounding puts a layer that lies in its plane, it puts all
-  // of it, and a backend that takes one matrix for zero takes all of them.
-  static bool is_alike(const NearDecision& a, const NearDecision& b) {
-    return a.key.kind == b.key.kind && a.key.substep == b.key.substep && a.other == b.other &&
-           (a.key.particle == b.key.particle || a.key.kind == DecisionKind::side || a.key.kind == DecisionKind::kept);
+  // A tie the other way. `again`: and the same question in the substep's other iterations (what tips one iteration's
+  // scale tips the next one's), and in turns of blade and walls.
+  static Settled with_other(Settled settled, const NearDecision& tie, bool again) {
+    settled[tie.key] = tie.other;
+    if (again && tie.key.kind != DecisionKind::side) settled[tie.key.all_alike()] = tie.other;
+    return settled;
   }
 
   // How far particles are from an outcome, where they are; positions and velocities as one list.
@@ -496,17 +483,16 @@ class Search {
     std::set<Settled> seen;
     for (const NearDecision& tie : with_violating_first(branch)) {
       if (columns.size() >= at(kDisturbedRuns + 1) * at(most_outcomes_)) break;
-      Column column;
-      for (const NearDecision& other : branch.ties) {
-        if (is_alike(other, tie)) column.settled[other.key] = tie.other;
+      for (const bool again : {true, false}) {
+        Column column = {with_other({}, tie, again), {}};
+        if (!seen.insert(column.settled).second) continue;
+        Settled settled = column.settled;
+        settled.insert(branch.settled.begin(), branch.settled.end());
+        const StepOutcome o = model_.run({settled, 0, kNear * h_, branch.given});
+        column.does = off_outcome(o.x, o.v, branch.outcome);
+        for (const auto& [k, way] : column.does) column.square += dot(way, way);
+        columns.push_back(std::move(column));
       }
-      if (!seen.insert(column.settled).second) continue;
-      Settled with = column.settled;
-      with.insert(branch.settled.begin(), branch.settled.end());
-      const StepOutcome o = model_.run({with, 0, kNear * h_, branch.given});
-      column.does = off_outcome(o.x, o.v, branch.outcome);
-      for (const auto& [k, way] : column.does) column.square += dot(way, way);
-      columns.push_back(std::move(column));
     }
     std::vector<Vec3> left(2 * before_.x.size());
     for (const auto& [k, way] : off_outcome(after_.x, after_.v, branch.outcome)) left[k] = way;
@@ -525,7 +511,8 @@ class Search {
     }
     Settled best = branch.settled;
     for (const Column& column : columns) {
-      if (column.taken) best.insert(column.settled.begin(), column.settled.end());
+      if (!column.taken) continue;
+      for (const auto& [key, outcome] : column.settled) best[key] = outcome;
     }
     return best;
   }
@@ -537,19 +524,6 @@ class Search {
       return violating.contains(a.key.particle) > violating.contains(b.key.particle);
     });
     return ties;
-  }
-
-  // What a disturbed run decides that is left to itself, where the root has ties.
-  Settled decided_by(uint64_t run, const Branch& root) const {
-    Settled settled = root.settled;
-    const StepOutcome off = model_.run({settled, run, kNear * h_, root.given});
-    std::map<DecisionKey, int> taken;
-    for (const NearDecision& d : root.outcome.near) taken[d.key] = d.taken;
-    for (const NearDecision& d : off.near) {
-      const auto of_root = taken.find(d.key);
-      if (of_root == taken.end() || of_root->second != d.taken) settled[d.key] = d.taken;
-    }
-    return settled;
   }
 
   // Ties of an outcome that was not looked at closely: by the measure of one that was.

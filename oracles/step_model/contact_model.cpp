@@ -123,7 +123,7 @@ double ContactModel::depth(Vec3 free, const Began& began, Decisions& decisions) 
   return std::max(deepest, clearance_ - away);
 }
 
-Vec3 ContactModel::place(Vec3 free, const Began& began, const Vec3* x, Decisions& decisions) const {
+Vec3 ContactModel::place(Vec3 free, const Began& began, Present* present, Decisions& decisions) const {
   bool in_turn = false;
   Vec3 placed = nearest(free, began, decisions, &in_turn);
   if (friction_ && (in_turn || !(placed == free))) {
@@ -145,10 +145,13 @@ Vec3 ContactModel::place(Vec3 free, const Began& began, const Vec3* x, Decisions
     }
     placed = nearest(placed, began, decisions, &in_turn);
   }
-  // Never what is worse than the present place, so that the energy cannot grow: only where turns were taken.
-  if (in_turn && !friction_ && x != nullptr &&
-      decisions.is_longer(DecisionKind::refused, norm(placed - free), norm(*x - free), norm(placed - *x))) {
-    return *x;
+  // Never what is worse than the present place, but for rounding, so that the energy cannot grow: only where turns were
+  // taken.
+  if (in_turn && !friction_ && present != nullptr) {
+    const double there = norm(placed - free), here = norm(present->x - free);
+    const double margin = present->roundings + kRefusalRoundings * present->unit_roundoff * here;
+    if (decisions.exceeds(DecisionKind::refused, there - (here + margin))) return present->x;
+    present->raised = std::max(0.0, there * there - here * here);
   }
   return placed;
 }

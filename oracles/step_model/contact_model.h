@@ -27,9 +27,17 @@ class ContactModel {
     double height = 0;
   };
 
-  // Where one may be that would go to `free`; coming from `x` it does not go where that is worse (nullptr: the
+  // Where a particle is.
+  struct Present {
+    Vec3 x;
+    double roundings = 0;  // kRefusalRoundings of what a backend stores of it [m]
+    double unit_roundoff = 0;
+    double raised = 0;  // set: by how much the square of its distance from where it would go has grown [m²]
+  };
+
+  // Where one may be that would go to `free`; it does not go where that is worse than where it is (nullptr: the
   // prediction, which comes from nowhere).
-  Vec3 place(Vec3 free, const Began& began, const Vec3* x, Decisions& decisions) const;
+  Vec3 place(Vec3 free, const Began& began, Present* present, Decisions& decisions) const;
 
   // By how much one that would go to `free` is inside of what it may not enter [m]; <= 0: it stays there.
   double depth(Vec3 free, const Began& began, Decisions& decisions) const;

@@ -10,8 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "oracles/step_model/noise.h"
-
 namespace cutproof::oracles {
 
 enum class DecisionKind : uint8_t {
@@ -49,10 +47,9 @@ using Settled = std::map<DecisionKey, int>;
 // Takes decisions of one run: as the numbers say, unless they are near and settled from outside.
 class Decisions {
  public:
-  // `near`: what is decided by less is noted [m]. `unit_roundoff`: of the arithmetic that compares. `noise`: of a
-  // disturbed run.
-  Decisions(const Settled& settled, double near, double unit_roundoff, Noise* noise)
-      : settled_(settled), near_(near), unit_roundoff_(unit_roundoff), noise_(noise) {}
+  // `near`: what is decided by less is noted [m]. `unit_roundoff`: of the arithmetic that compares.
+  Decisions(const Settled& settled, double near, double unit_roundoff)
+      : settled_(settled), near_(near), unit_roundoff_(unit_roundoff) {}
 
   // `turn`: at which they begin to count.
   void begin(int32_t substep, int32_t evaluation, int32_t particle, int32_t turn = 0) {
@@ -61,14 +58,6 @@ class Decisions {
 
   // Whether `lead`, of outcome 1 over outcome 0, is above 0 [m].
   bool exceeds(DecisionKind kind, double lead) { return least(kind, std::array<double, 2>{lead, 0}) == 1; }
-
-  // Whether one length is greater than another, which lead to places so far `apart` from each other. If those are all
-  // but the same, rounding decides it as it does other numbers, and it is not settled from outside.
-  bool is_longer(DecisionKind kind, double one, double other, double apart) {
-    if (apart > kApart * near_) return least(kind, std::array<double, 2>{one, other}) == 1;
-    const double rounding = noise_ != nullptr ? 8 * unit_roundoff_ * (one + other) * (*noise_)() : 0;
-    return one - other + rounding > 0;
-  }
 
   // The outcome of least cost, the first of several [m].
   template <std::size_t N>
@@ -109,11 +98,10 @@ class Decisions {
   std::vector<NearDecision> take_near() { return std::move(noted_); }
 
  private:
-  static constexpr double kEven = 0.005, kApart = 0.05;  // of what is near
+  static constexpr double kEven = 0.005;  // of what is near
 
   const Settled& settled_;
   double near_, unit_roundoff_;
-  Noise* noise_;
   DecisionKey key_;
   std::vector<NearDecision> noted_;
 };

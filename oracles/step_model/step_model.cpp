@@ -187,14 +187,18 @@ class StepModel::Run {
         noise_(wanted.disturbance),
         repeats_(wanted.disturbance > 0 && (wanted.disturbance - 1) / 2 % 2 == 1),
         lasting_((wanted.disturbance + 1) / 2, wanted.disturbance % 2 == 0 ? -1 : +1),
+        lost_(static_cast<Lost>(wanted.disturbance % 4)),
+        coordinate_(wanted.disturbance / 4 % 6),
+        threshold_(degenerate_rounds(model.u_) * model.u_ / static_cast<double>(2 << wanted.disturbance / 4 % 4)),
         u_(model.u_),
-        decisions_(wanted.settled, wanted.near, model.u_, disturbed_ ? &noise_ : nullptr),
+        decisions_(wanted.settled, wanted.near, model.u_),
         stores_positions_(before_.precision != Precision::binary32) {
     out_.x = before_.x;
     out_.v = before_.v;
     out_.rotation = before_.clusters.rotation;
     out_.rounding.resize(out_.x.size());
     out_.own_rounding.resize(out_.x.size());
+    out_.raised.resize(out_.x.size());
     out_.turn_rounding.resize(model.clusters_.size());
     out_.is_free.assign(model.clusters_.size(), 0);
     sum_.resize(out_.x.size());
@@ -242,14 +246,23 @@ class StepModel::Run {
 
   void substep(int32_t s);
   void match_shapes(int32_t s, int32_t j);
-  // `size`: of all terms of A. `noise`: what the rounding of places makes of A.
-  Mat3 rotation_of(int32_t c, const Eigen::Matrix3d& a, double size, double noise, bool is_last);
-  Mat3 one_of_many(const BestRotation& best, const Mat3& previous, bool all);
+  // `summed`: A before its sum is rounded. `size`: of all terms of A. `noise`: what the rounding of places makes of A.
+  Mat3 rotation_of(int32_t c, const Eigen::Matrix3d& a, const Eigen::Matrix3d& summed, double size, double noise,
+                   bool is_last);
+  Mat3 one_of_many(BestRotation best, const Mat3& previous, bool all);
   bool keeps_rotation(int32_t c);
 
   // What is rounded: of clusters and of particles.
   enum class Rounded : uint8_t { shape, prediction, place, push, end, impulse };
   void round(Rounded what, std::size_t index) { noise_.name(static_cast<uint64_t>(what), index, repeats_ ? 0 : time_); }
+
+  // How a disturbed run draws the rotation of a cluster whose matrix is no more than rounding, one run this way, the
+  // next that way: the best of that noise; any; the best where places differ in one coordinate alone, as they do on
+  // walls, each of six directions in turn; the previous one. Which way a pair falls apart may decide where it ends, and
+  // draws of one kind leave out one of the ways. On a line, every second run draws any turn about it, or what noise
+  // makes of it; the others have a threshold as backends do, each another one: layers that are flat to the bit keep
+  // their turn while one that has just become flat is turned by noise.
+  enum class Lost : uint8_t { noise, any, coordinate, kept };
 
   const StepModel& model_;
   const Setup& setup_;
@@ -260,6 +273,9 @@ class StepModel::Run {
   Noise noise_;            // of single roundings
   const bool repeats_;     // each is the same in every iteration and substep
   OppositeNoise lasting_;  // of what stays the same throughout a run
+  const Lost lost_;
+  const std::size_t coordinate_;  // of ±x, ±y, ±z
+  const double threshold_;        // of this run, for what is degenerate
   const double u_;
   Decisions decisions_;
   const bool stores_positions_;
@@ -276,13 +292,16 @@ class StepModel::Run {
   int32_t substep_ = 0, iteration_ = 0;
 };
 
-// One of the rotations that take v to u, `all`: of all rotations. The nearest to the previous one, but any of them in a
-// disturbed run; of all, every second time what is the best of nothing but noise.
-Mat3 StepModel::Run::one_of_many(const BestRotation& best, const Mat3& previous, bool all) {
+// One of the rotations that take v to u, the nearest to the previous one; any of them in a disturbed run. `all`: of all
+// rotations, as this run draws them.
+Mat3 StepModel::Run::one_of_many(BestRotation best, const Mat3& previous, bool all) {
+  if (all && lost_ == Lost::coordinate) {
+    best.u = {0, 0, 0};
+    best.u[coordinate_ / 2] = coordinate_ % 2 == 0 ? 1 : -1;
+  }
   const Mat3 nearest = nearest_of_rank_one(best, previous).r;
-  if (!disturbed_ || (all && noise_() < 0)) return nearest;
-  Vec3 axis = {best.u[0], best.u[1], best.u[2]};
-  if (all) axis = noise_.vector();
+  if (!disturbed_ || (all && (lost_ == Lost::coordinate || lost_ == Lost::noise))) return nearest;
+  const Vec3 axis = all ? noise_.vector() : Vec3{best.u[0], best.u[1], best.u[2]};
   const double length = norm(axis);
   if (!(length > 0)) return nearest;
   const Eigen::AngleAxisd turn(std::numbers::pi * noise_(), as_eigen(axis) / length);
@@ -290,7 +309,8 @@ Mat3 StepModel::Run::one_of_many(const BestRotation& best, const Mat3& previous,
 }
 
 // The best rotation; the previous one where there is no extent, the nearest to it along a line.
-Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double size, double noise, bool is_last) {
+Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, const Eigen::Matrix3d& summed, double size,
+                                 double noise, bool is_last) {
   const Cluster& cluster = model_.clusters_[at(c)];
   const Mat3& previous = out_.rotation[at(c)];
   double& rounding = out_.turn_rounding[at(c)];
@@ -329,9 +349,15 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double siz
     rounding *= rounding;
     if (is_given) return *wanted_.given[at(c)];
     if (is_lost && keeps_rotation(c)) return previous;
+    const BestRotation best = best_rotation(to_mat3(a));
+    if (!is_lost && (lost_ == Lost::coordinate || lost_ == Lost::kept)) {
+      const Eigen::Vector3d exact = Eigen::JacobiSVD<Eigen::Matrix3d>(summed).singularValues();
+      const bool is_below = exact[1] + exact[2] <= threshold_ * exact[0];
+      return is_below ? nearest_of_rank_one(best, previous).r : to_mat3(u * v.transpose());
+    }
     // What noise alone makes of it, every second time: contacts give that a direction of its own.
-    if (disturbed_ && noise_() < 0) return to_mat3(u * v.transpose());
-    return one_of_many(best_rotation(to_mat3(a)), previous, is_lost);
+    if (disturbed_ && (!is_lost || lost_ == Lost::noise) && noise_() < 0) return to_mat3(u * v.transpose());
+    return one_of_many(best, previous, is_lost);
   }
   rounding = u_ * kRotationRounds + std::min(1.0, std::sqrt(2.0) * sum_amplitude / sure);
   rounding *= rounding;
@@ -340,11 +366,15 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double siz
 }
 
 // Whether a cluster whose matrix is no more than rounding keeps its rotation, as it does where a backend finds nothing
-// but zeros: among all rotations that is one which no draw at random finds. A disturbed run that is left to itself
-// tosses a coin.
+// but zeros: among all rotations that is one which no draw at random finds.
 bool StepModel::Run::keeps_rotation(int32_t c) {
   decisions_.begin(substep_, iteration_, before_.clusters.of(c).front(), c);
-  return decisions_.exceeds(DecisionKind::kept, disturbed_ ? std::numeric_limits<double>::min() * noise_() : 0);
+  constexpr double kLeast = std::numeric_limits<double>::min();
+  const double lead = !disturbed_                 ? 0
+                      : lost_ == Lost::kept       ? kLeast
+                      : lost_ == Lost::coordinate ? -kLeast
+                                                  : kLeast * noise_();
+  return decisions_.exceeds(DecisionKind::kept, lead);
 }
 
 void StepModel::Run::match_shapes(int32_t s, int32_t j) {
@@ -404,7 +434,7 @@ void StepModel::Run::match_shapes(int32_t s, int32_t j) {
         }
       }
       t += noise_.off((2 * u_) * center, mean_amplitude);
-      r = rotation_of(c, a, size.sum(), u_ * farthest * cluster.arms, is_last);
+      r = rotation_of(c, a, as_eigen(sum), size.sum(), u_ * farthest * cluster.arms, is_last);
       const Vec3 turn = turn_amplitude_ * noise_.vector();
       if (cluster.extent != Cluster::Extent::point) {
         for (int column = 0; column < 3; ++column) {
@@ -413,7 +443,7 @@ void StepModel::Run::match_shapes(int32_t s, int32_t j) {
         }
       }
     } else {
-      r = rotation_of(c, a, size.sum(), u_ * farthest * cluster.arms, is_last);
+      r = rotation_of(c, a, a, size.sum(), u_ * farthest * cluster.arms, is_last);
     }
     out_.rotation[at(c)] = r;
     if (disturbed_) t -= r * rest_off_[at(c)];
@@ -542,7 +572,11 @@ void StepModel::Run::substep(int32_t s) {
           touched = decisions_.exceeds(DecisionKind::touched, deepest + kTouchMargin * body_.grid.spacing);
           if (touched) wanted = plain;
         }
-        if (touched) next = contacts.place(wanted, began[i], &now[i], decisions_);
+        if (touched) {
+          ContactModel::Present present = {now[i], kRefusalRoundings * u_ * norm(stored(i, now[i])), u_};
+          next = contacts.place(wanted, began[i], &present, decisions_);
+          if (s + 1 == step.substeps && j + 1 == step.iterations) out_.raised[i] = present.raised;
+        }
       }
       note_lost();
       settle(i, wanted, next, amplitude);
