@@ -432,6 +432,7 @@ class Search {
     };
     if (other_root && !best.holds() && seen.insert(other_root->settled).second) keep(*other_root);
     // Many ties at once: those of a layer that one rounding of its wall tips, or of particles far from each other.
+    if (other_root && !best.holds()) try_out(fitted(*other_root));
     for (std::size_t before = best.violations.size() + 1; !best.holds() && best.violations.size() < before;) {
       before = best.violations.size();
       try_out(fitted(best));
@@ -470,40 +471,56 @@ class Search {
     return off;
   }
 
-  // Taken the other way, which of an outcome's ties bring it nearest to what the backend states, in the sense of least
-  // squares, if what each of them does alone adds up.
-  Settled fitted(const Branch& branch) const {
-    struct Column {
-      Settled settled;
-      std::vector<std::pair<std::size_t, Vec3>> does;
-      double square = 0;
-      bool taken = false;
-    };
+  // What becomes of an outcome if a tie goes the other way.
+  struct Column {
+    Settled settled;
+    std::vector<std::pair<std::size_t, Vec3>> does;
+    double square = 0;
+    bool taken = false;
+  };
+  std::vector<Column> columns_of(const Branch& branch, std::size_t most) const {
     std::vector<Column> columns;
     std::set<Settled> seen;
     for (const NearDecision& tie : with_violating_first(branch)) {
-      if (columns.size() >= at(kDisturbedRuns + 1) * at(most_outcomes_)) break;
+      if (columns.size() >= most) break;
       for (const bool again : {true, false}) {
         Column column = {with_other({}, tie, again), {}};
         if (!seen.insert(column.settled).second) continue;
-        Settled settled = column.settled;
-        settled.insert(branch.settled.begin(), branch.settled.end());
-        const StepOutcome o = model_.run({settled, 0, kNear * h_, branch.given});
+        const StepOutcome o = model_.run({with(branch.settled, column.settled), 0, kNear * h_, branch.given});
         column.does = off_outcome(o.x, o.v, branch.outcome);
         for (const auto& [k, way] : column.does) column.square += dot(way, way);
         columns.push_back(std::move(column));
       }
     }
+    return columns;
+  }
+  static Settled with(Settled settled, const Settled& more) {
+    for (const auto& [key, outcome] : more) settled[key] = outcome;
+    return settled;
+  }
+  // How far the backend is from an outcome, as columns are.
+  std::vector<Vec3> left_by(const Branch& branch) const {
     std::vector<Vec3> left(2 * before_.x.size());
     for (const auto& [k, way] : off_outcome(after_.x, after_.v, branch.outcome)) left[k] = way;
+    return left;
+  }
+  static double gain_of(const Column& column, const std::vector<Vec3>& left) {
+    double gain = 0;
+    for (const auto& [k, way] : column.does) gain += dot(left[k], way);
+    return gain;
+  }
+
+  // Taken the other way, which of an outcome's ties bring it nearest to what the backend states, in the sense of least
+  // squares, if what each of them does alone adds up.
+  Settled fitted(const Branch& branch) const {
+    std::vector<Column> columns = columns_of(branch, at(kDisturbedRuns + 1) * at(most_outcomes_));
+    std::vector<Vec3> left = left_by(branch);
     bool any = true;
     for (int pass = 0; any && pass < kFitPasses; ++pass) {
       any = false;
       for (Column& column : columns) {
         const double sign = column.taken ? -1 : 1;
-        double gain = 0;
-        for (const auto& [k, way] : column.does) gain += sign * dot(left[k], way);
-        if (!(2 * gain > column.square)) continue;
+        if (!(2 * sign * gain_of(column, left) > column.square)) continue;
         for (const auto& [k, way] : column.does) left[k] -= sign * way;
         column.taken = !column.taken;
         any = true;
@@ -511,8 +528,7 @@ class Search {
     }
     Settled best = branch.settled;
     for (const Column& column : columns) {
-      if (!column.taken) continue;
-      for (const auto& [key, outcome] : column.settled) best[key] = outcome;
+      if (column.taken) best = with(std::move(best), column.settled);
     }
     return best;
   }
@@ -553,20 +569,24 @@ class Search {
     return known;
   }
 
-  // More ties than can be tried together: all that is compared must at least be within what they do one by one, added
-  // up, and the farthest of disturbed runs that are left to themselves. Then what violates is counted, beside these
-  // bounds.
+  // More ties than can be tried together: all that is compared must at least be within what those do one by one that
+  // are in doubt, added up, and the farthest of disturbed runs that leave just them to themselves. Then what violates
+  // is counted, beside these bounds. A tie is in doubt unless taking it the other way would bring the outcome farther
+  // from the backend by half of what that does.
   void count_undecided(Branch& branch) {
     Branch explained = branch;
-    for (const NearDecision& tie : branch.ties) {
-      Settled settled = branch.settled;
-      settled[tie.key] = tie.other;
-      const StepOutcome other = model_.run({settled, 0, kNear * h_, branch.given});
+    const std::vector<Vec3> left = left_by(branch);
+    Settled decided = branch.settled;
+    for (const NearDecision& d : branch.outcome.near) decided[d.key] = d.taken;
+    for (const Column& column : columns_of(branch, std::numeric_limits<std::size_t>::max())) {
+      if (!(4 * gain_of(column, left) > column.square)) continue;
+      for (const auto& [key, outcome] : column.settled) decided.erase(key);
+      const StepOutcome other = model_.run({with(branch.settled, column.settled), 0, kNear * h_, branch.given});
       explained.bounds.combine(off_by(other, branch.outcome), std::plus());
     }
     Bounds farthest = off_by(branch.outcome, branch.outcome);
     for (uint64_t run = 1; run <= kMostDisturbedRuns; ++run) {
-      const StepOutcome off = model_.run({branch.settled, run, kNear * h_, branch.given});
+      const StepOutcome off = model_.run({decided, run, kNear * h_, branch.given});
       farthest.combine(off_by(off, branch.outcome), kGreater);
     }
     explained.bounds.combine(farthest, std::plus());

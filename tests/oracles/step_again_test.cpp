@@ -274,6 +274,36 @@ TEST(AdmissibleStep, TakesManyTiesAsTheyWereAndExcusesNothingElse) {
   }
 }
 
+// The blade is gone before the step ends, so that no place tells on which side a particle was, and each of 49 ties
+// moves its neighbours too. One by one they are too many; together they are found, and what is a little more wrong than
+// they are is rejected.
+TEST(AdmissibleStep, FindsManyTiesAtOnceWhereNoPlaceTellsOfThem) {
+  StepScene scene{setup_of(block_body(5, 15, 15, kSpacing, 0.002)), {}, {}};
+  cutproof::Setup& setup = scene.setup;
+  setup.step.substeps = 2;
+  setup.detect.epsilon = 0.05;
+  stand_in_plane(setup, setup.body.rest_position(2));
+  setup.blade_moves[1].down = false;
+  for (BladePose* pose : {&setup.blade_moves[1].from, &setup.blade_moves[1].to}) pose->edge.y += 10;
+  scene.before = state_of(setup.body, box_clusters(5, 15, 15, 3));
+  round_to_single(setup.body, scene.before);
+  StepScene led = scene;
+  for (std::size_t i = 2; i < led.before.x.size(); i += 5) led.before.x[i].x += (i * 7 % 3 == 0 ? 1 : -1) * 1e-15;
+  led.take_step();
+  round_to_single(setup.body, led.after);
+  const Verdict verdict = admissible_step(setup, scene.before, led.after);
+  expect_holds(verdict);
+  EXPECT_EQ(verdict.undecided, 0);
+  // What is a little wrong besides puts no tie in doubt.
+  State wrong = led.after;
+  wrong.x[2].y += 1e-3 * kSpacing;
+  EXPECT_FALSE(admissible_step(setup, scene.before, wrong).holds);
+  led.setup.step.stiffness *= 0.99;
+  led.take_step();
+  round_to_single(setup.body, led.after);
+  EXPECT_FALSE(admissible_step(setup, scene.before, led.after).holds);
+}
+
 // Half a turn from the previous rotation every one along the wire is as near as another, but none that is not along it.
 TEST(AdmissibleStep, FollowsTheRotationThatWasTakenAfterHalfATurn) {
   StepScene scene{setup_of(block_body(5, 1, 1, kSpacing)), {}, {}};
