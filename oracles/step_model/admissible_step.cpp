@@ -130,7 +130,8 @@ class Search {
     StepPart part = StepPart::position;
     int32_t where = -1;
     double measured = 0, bound = 0;
-    bool is_forced = false;  // settled otherwise than rounding may: no admissible outcome
+    bool is_forced = false;     // settled otherwise than rounding may: no admissible outcome
+    bool is_undecided = false;  // holds by what ties do that are in doubt
     bool holds() const { return worst <= 1 && !is_forced; }
   };
 
@@ -353,7 +354,7 @@ class Search {
     }
     const double impulse = or_infinite(norm(after_.impulse - o.impulse));
     const double per_mass = mass_ > 0 ? dt_ / (mass_ * h_) : 0;
-    see(branch, StepPart::impulse, -1, impulse * per_mass, b.impulse * per_mass);
+    see(branch, StepPart::impulse, -1, impulse * per_mass, b.impulse * per_mass, branch.is_undecided);
     if (branch.worst <= 1) compare_own(branch, violates);
     for (std::size_t i = 0; i < violates.size(); ++i) {
       if (violates[i] != 0) branch.violations.push_back(static_cast<int32_t>(i));
@@ -592,7 +593,10 @@ class Search {
     explained.bounds.combine(farthest, std::plus());
     compare(explained);
     if (!explained.holds()) return;
-    undecided_ = std::max<int64_t>(1, static_cast<int64_t>(branch.violations.size()));
+    // What the ties explain says nothing of how sharp the judge is.
+    for (const int32_t i : branch.violations) explained.blunt[at(i)] = 1;
+    explained.is_undecided = true;
+    compare(explained);
     branch = std::move(explained);
   }
 
@@ -611,7 +615,7 @@ class Search {
                                                                            [](const Mat3* r) { return r != nullptr; });
     found.checked = std::count_if(before_.alive.begin(), before_.alive.end(), [](uint8_t a) { return a != 0; }) +
                     before_.clusters.count();
-    found.undecided = undecided_;
+    found.undecided = branch.is_undecided ? 1 : 0;
     for (std::size_t i = 0; i < before_.alive.size(); ++i) {
       found.position_bound.push_back(branch.bounds.position[i] / h_);
       found.velocity_bound.push_back(branch.bounds.velocity[i] / h_);
@@ -636,7 +640,6 @@ class Search {
   std::vector<double> reach_;     // [m] greatest |X - T|
   Partition coupled_;
   int most_outcomes_ = kMostOutcomes;
-  int64_t undecided_ = 0;
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "oracles/step_model/contact_model.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -150,7 +151,8 @@ Vec3 ContactModel::place(Vec3 free, const Began& began, Present* present, Decisi
   if (in_turn && !friction_ && present != nullptr) {
     const double there = norm(placed - free), here = norm(present->x - free);
     const double margin = present->roundings + kRefusalRoundings * present->unit_roundoff * here;
-    if (decisions.exceeds(DecisionKind::refused, there - (here + margin))) return present->x;
+    const std::array<double, 2> costs = {there, here + margin};
+    if (decisions.least(DecisionKind::refused, costs) == 1) return present->x;
     present->raised = std::max(0.0, there * there - here * here);
   }
   return placed;

@@ -27,7 +27,7 @@ class ContactModel {
     double height = 0;
   };
 
-  // Where a particle is.
+  // Where a particle is that has a place already.
   struct Present {
     Vec3 x;
     double roundings = 0;  // kRefusalRoundings of what a backend stores of it [m]
