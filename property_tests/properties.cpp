@@ -174,7 +174,7 @@ TEST_P(EveryBackend, StepsACutBodyWithoutGhostForcesAndWithoutEnergyFromNowhere)
 // projected in turn. Without friction that has an energy.
 TEST_P(EveryBackend, GainsNoEnergyBetweenBladeAndWalls) {
   int64_t iterations = 0;
-  check(id(), cases_of(10), GetParam().most_size, [&](const Case& c) {
+  const auto gained = [&](const Case& c) {
     Case moving = c;
     moving.moves = true;
     Instance loaded = load_for(*backend_, moving);
@@ -192,7 +192,18 @@ TEST_P(EveryBackend, GainsNoEnergyBetweenBladeAndWalls) {
       loaded.state = backend_->snapshot().front();
     }
     return std::string();
-  });
+  };
+  // A particle whose place becomes worse by less than what refuses it, and whose energy rounding alone would not raise
+  // so far (found by 4,000 cases).
+  EXPECT_EQ(
+      gained(from_json(R"({"alpha": 5, "ball_radius": 14, "blade_depth": 400, "blade_friction": 0, "blade_length": 4,
+      "blade_thickness": 16, "cap": 1, "clusters": "boxes", "debris": 0, "epsilon": 15, "expand": "none",
+      "expand_depth": 1, "ground": false, "iterations": 1, "merge": "none", "most": 1, "moves": true,
+      "nodes": [[0, 0, 0]], "pace": 1, "relaxation": 5, "removal": "usual", "seed": 1, "seed_spacing": 5, "side": 1,
+      "spacing": 1.0, "stiffness": 5, "strain": 120, "substeps": 1, "tau": 0, "strokes": [
+      {"back": 5, "down": true, "from": [2, 7, -5], "link": "apart", "to": [4, 1, 2]}]})")),
+      "");
+  check(id(), cases_of(10), GetParam().most_size, gained);
   if (ran_in_full()) {
     EXPECT_GT(iterations, 0);
   }
