@@ -94,6 +94,15 @@ TEST(AdmissibleStep, RejectsTheLeastDisturbances) {
   for (const Disturbance& disturbance : std::initializer_list<Disturbance>{
            {"position", 1e-12, 1e-4, [](State&s, double by) { s.x[kInside].y += by * kSpacing; }},
            {"velocity", 2e-12, 2e-4, [&](State&s, double by) { s.v[kInside].z += by * kSpacing / dt; }},
+           // All that is left of this without what neighbours share is nothing.
+           {"position", 1e-12, 1e-4,
+            [](State&s, double by) {
+              for (Vec3& x : s.x) x.y += by * kSpacing;
+            }},
+           {"velocity", 2e-12, 2e-4,
+            [&](State&s, double by) {
+              for (Vec3& v : s.v) v.z += by * kSpacing / dt;
+            }},
            {"rotation", 1e-12, 1e-4,
             [](State&s, double by) {
               Mat3& r = s.clusters.rotation[1];
@@ -300,7 +309,7 @@ TEST(AdmissibleStep, FindsManyTiesAtOnceWhereNoPlaceTellsOfThem) {
   wrong.x[2].y += 1e-3 * kSpacing;
   EXPECT_FALSE(admissible_step(setup, scene.before, wrong).holds);
   wrong = led.after;
-  wrong.v[2].y += 0.1 * kSpacing / setup.substep_length[0];
+  for (Vec3& v : wrong.v) v.y += 0.1 * kSpacing / setup.substep_length[0];
   EXPECT_FALSE(admissible_step(setup, scene.before, wrong).holds);
   led.setup.step.stiffness *= 0.99;
   led.take_step();
