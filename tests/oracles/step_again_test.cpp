@@ -284,9 +284,9 @@ TEST(AdmissibleStep, TakesManyTiesAsTheyWereAndExcusesNothingElse) {
   }
 }
 
-// The blade is gone before the step ends, so that no place tells on which side a particle was, and each of 49 ties
-// moves its neighbours too. One by one they are too many; together they are found, and what is a little more wrong than
-// they are is rejected.
+// The blade is gone before the step ends, so that no place tells on which side a particle was, and each of 225 ties
+// moves its neighbours too. One by one they are too many; together they are found, and what is a little wrong besides
+// is rejected.
 TEST(AdmissibleStep, FindsManyTiesAtOnceWhereNoPlaceTellsOfThem) {
   StepScene scene{setup_of(block_body(5, 15, 15, kSpacing, 0.002)), {}, {}};
   cutproof::Setup& setup = scene.setup;
