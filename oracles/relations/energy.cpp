@@ -62,8 +62,8 @@ Verdict energy_is_monotone(Backend& backend, const Setup& setup, const State& gi
       // E is isotropic in each particle: what a place was allowed to be worse.
       double raised = 0;
       for (std::size_t i = 0; i < end.x.size(); ++i) {
-        if (state.alive[i] != 0)
-          raised += (1 / (dt * dt) + k) / 2 * single.body.mass[i] * again.step->outcome.raised[i];
+        if (state.alive[i] == 0) continue;
+        raised += (1 / (dt * dt) + k) / 2 * single.body.mass[i] * again.step->outcome.raised[i];
       }
       const double bound = previous_rounding + rounding + evaluation + raised;
       const double growth = iteration == 0 ? 0 : energy - previous;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <initializer_list>
 #include <limits>
 #include <map>
 #include <optional>
@@ -472,19 +473,19 @@ class Search {
     return off;
   }
 
-  // What becomes of an outcome if a tie goes the other way.
+  // What becomes of an outcome if a tie goes the other way, alone or also together with the same question asked again.
   struct Column {
     Settled settled;
     std::vector<std::pair<std::size_t, Vec3>> does;
     double square = 0;
     bool taken = false;
   };
-  std::vector<Column> columns_of(const Branch& branch, std::size_t most) const {
+  std::vector<Column> columns_of(const Branch& branch, std::size_t most, std::initializer_list<bool> ways) const {
     std::vector<Column> columns;
     std::set<Settled> seen;
     for (const NearDecision& tie : with_violating_first(branch)) {
       if (columns.size() >= most) break;
-      for (const bool again : {true, false}) {
+      for (const bool again : ways) {
         Column column = {with_other({}, tie, again), {}};
         if (!seen.insert(column.settled).second) continue;
         const StepOutcome o = model_.run({with(branch.settled, column.settled), 0, kNear * h_, branch.given});
@@ -514,7 +515,7 @@ class Search {
   // Taken the other way, which of an outcome's ties bring it nearest to what the backend states, in the sense of least
   // squares, if what each of them does alone adds up.
   Settled fitted(const Branch& branch) const {
-    std::vector<Column> columns = columns_of(branch, at(kDisturbedRuns + 1) * at(most_outcomes_));
+    std::vector<Column> columns = columns_of(branch, at(kDisturbedRuns + 1) * at(most_outcomes_), {true, false});
     std::vector<Vec3> left = left_by(branch);
     bool any = true;
     for (int pass = 0; any && pass < kFitPasses; ++pass) {
@@ -579,7 +580,7 @@ class Search {
     const std::vector<Vec3> left = left_by(branch);
     Settled decided = branch.settled;
     for (const NearDecision& d : branch.outcome.near) decided[d.key] = d.taken;
-    for (const Column& column : columns_of(branch, std::numeric_limits<std::size_t>::max())) {
+    for (const Column& column : columns_of(branch, std::numeric_limits<std::size_t>::max(), {false})) {
       if (!(4 * gain_of(column, left) > column.square)) continue;
       for (const auto& [key, outcome] : column.settled) decided.erase(key);
       const StepOutcome other = model_.run({with(branch.settled, column.settled), 0, kNear * h_, branch.given});

@@ -150,7 +150,7 @@ Vec3 ContactModel::place(Vec3 free, const Began& began, Present* present, Decisi
   // taken.
   if (in_turn && !friction_ && present != nullptr) {
     const double there = norm(placed - free), here = norm(present->x - free);
-    const double margin = present->roundings + kRefusalRoundings * present->unit_roundoff * here;
+    const double margin = kRefusalRoundings * present->unit_roundoff * (here + present->stored);
     const std::array<double, 2> costs = {there, here + margin};
     if (decisions.least(DecisionKind::refused, costs) == 1) return present->x;
     present->raised = std::max(0.0, there * there - here * here);

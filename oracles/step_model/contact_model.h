@@ -30,9 +30,9 @@ class ContactModel {
   // Where a particle is that has a place already.
   struct Present {
     Vec3 x;
-    double roundings = 0;  // kRefusalRoundings of what a backend stores of it [m]
-    double unit_roundoff = 0;
-    double raised = 0;  // set: by how much the square of its distance from where it would go has grown [m²]
+    double stored = 0;         // the length of what a backend stores of it [m]
+    double unit_roundoff = 0;  // the backend's
+    double raised = 0;         // set: by how much the square of its distance from where it would go has grown [m²]
   };
 
   // Where one may be that would go to `free`; it does not go where that is worse than where it is (nullptr: the

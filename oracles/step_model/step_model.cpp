@@ -573,8 +573,7 @@ void StepModel::Run::substep(int32_t s) {
           if (touched) wanted = plain;
         }
         if (touched) {
-          const double unit = u_ - kUnitRoundoff;  // the backend's own
-          ContactModel::Present present = {now[i], kRefusalRoundings * unit * norm(stored(i, now[i])), unit};
+          ContactModel::Present present = {now[i], norm(stored(i, now[i])), u_ - kUnitRoundoff};
           next = contacts.place(wanted, began[i], &present, decisions_);
           if (s + 1 == step.substeps && j + 1 == step.iterations) out_.raised[i] = present.raised;
         }
