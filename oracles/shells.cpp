@@ -101,15 +101,19 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
   for (std::size_t v = 0; v < places.size(); ++v) {
     const Vec3 rest = vertex_at_rest(setup, skin, v);
     const auto holders = memberships.of(skin.owner[v]);
-    Vec3 sum;
-    double squares = 0;
+    Vec3 sum, first;
+    double squares = 0, terms = 0;  // of single clusters; how far they are from the first
     for (const int32_t c : holders) {
       const ClusterMeans& m = means[at(c)];
-      const Vec3 arm = rest - m.rest;
-      sum += m.current + clusters.rotation[at(c)] * arm;
+      const Vec3 arm = rest - m.rest, goal = m.current + clusters.rotation[at(c)] * arm;
+      if (c == holders.front()) first = goal;
+      sum += goal;
+      terms += norm(goal - first);
       squares += center_rounding[at(c)] + 4 * u * u * dot(arm, arm);
     }
     const auto count = static_cast<double>(holders.size());
+    // Partial sums of terms that are as large as their mean: u² q² (1² + … + n²) / 3n².
+    squares += count * u * u * terms * terms / 9;
     const Vec3 place = sum / count, kept = state.precision == Precision::binary32 ? place - rest : place;
     const double in_doubles = 4 * kUnitRoundoff * norm(place);
     squares = squares / (count * count) + u * u * dot(kept, kept) + in_doubles * in_doubles;
