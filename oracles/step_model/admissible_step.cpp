@@ -271,6 +271,7 @@ class Search {
       if (is_open(branch, c)) b.rotation[c] = agreed_bound(branch, c);
     }
     if (follow_rotations(branch)) return look_closer(branch, runs);
+    let_go(branch);
     ask_bluntly(branch);
     branch.ties.clear();
     branch.is_forced = false;
@@ -281,6 +282,27 @@ class Search {
     }
     std::sort(branch.ties.begin(), branch.ties.end(),
               [](const NearDecision& p, const NearDecision& q) { return p.key < q.key; });
+  }
+
+  // What a contact holds does not move at all until it slips or comes off, and the runs may just not have been that
+  // far: it is asked no more sharply than those beside it.
+  void let_go(Branch& branch) const {
+    Bounds& b = branch.bounds;
+    const Bounds known = b;
+    const auto at_least_as_beside = [&](std::vector<double>& mine, const std::vector<double>& of) {
+      for (int32_t c = 0; c < before_.clusters.count(); ++c) {
+        const auto members = before_.clusters.of(c);
+        double farthest = 0;
+        for (const int32_t i : members) farthest = std::max(farthest, of[at(i)]);
+        for (const int32_t i : members) {
+          if (branch.outcome.held[at(i)] != 0) mine[at(i)] = std::max(mine[at(i)], farthest);
+        }
+      }
+    };
+    at_least_as_beside(b.position, known.position);
+    at_least_as_beside(b.velocity, known.velocity);
+    at_least_as_beside(b.own_position, known.own_position);
+    at_least_as_beside(b.own_velocity, known.own_velocity);
   }
 
   // Where rounding is carried so far that small changes are no rule any more, all that is coupled is asked one blunt

@@ -20,7 +20,8 @@ Vec3 held_back(Vec3 x, Vec3 slid, Vec3 normal, double most) {
 
 }  // namespace
 
-ContactModel::ContactModel(const Setup& setup, const BladeMove* move, const std::vector<Wall>& walls) : walls_(walls) {
+ContactModel::ContactModel(const Setup& setup, const BladeMove* move, const std::vector<Wall>& walls, double border)
+    : walls_(walls), border_(border) {
   friction_ = std::any_of(walls.begin(), walls.end(), [](const Wall& wall) { return wall.friction > 0; });
   plate_ = move != nullptr && setup.detect.criterion != Criterion::geometric;
   if (!plate_) return;
@@ -35,6 +36,18 @@ ContactModel::ContactModel(const Setup& setup, const BladeMove* move, const std:
 
 int ContactModel::side_of(const Began& began, Decisions& decisions) const {
   return decisions.exceeds(DecisionKind::side, -began.height) ? -1 : +1;
+}
+
+// In the blade's frame. On a border a place is special: nothing leads off it sideways, while a rounding beside it is
+// led this way or that, and farther each time.
+Local ContactModel::seen_from_blade(Vec3 x) const {
+  Local c = to_local(to_, x - to_.edge);
+  const double near = border_ * std::hypot(c.u, c.n, c.w);
+  if (std::abs(c.n) <= near) c.n = 0;
+  if (std::abs(c.w) <= near) c.w = 0;
+  if (std::abs(c.w - depth_) <= near) c.w = depth_;
+  if (std::abs(std::abs(c.u) - half_length_) <= near) c.u = std::copysign(half_length_, c.u);
+  return c;
 }
 
 Vec3 ContactModel::turned_back(Local c) const {
@@ -52,7 +65,7 @@ Vec3 ContactModel::off_walls(Vec3 x) const {
 // Forbidden is what is nearer than ρ to the rectangle, and what lies over it on the side where the particle did not
 // begin.
 Vec3 ContactModel::way_off_plate(Vec3 x, const Began& began, Decisions& decisions) const {
-  const Local c = to_local(to_, x - to_.edge);
+  const Local c = seen_from_blade(x);
   const double before_edge = -c.w, behind_back = c.w - depth_, beyond_end = std::abs(c.u) - half_length_;
   const double outside = std::max({before_edge, behind_back, beyond_end});  // of the rectangle; below 0: over it
   if (outside > decisions.near() && std::max(outside, std::abs(c.n)) >= clearance_) return {};

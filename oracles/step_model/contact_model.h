@@ -10,8 +10,9 @@ namespace cutproof::oracles {
 class ContactModel {
  public:
   // `move`: what the blade does in this substep; nullptr: none, or it is up. `walls` may differ from the setup's by a
-  // rounding, as may the move.
-  ContactModel(const Setup& setup, const BladeMove* move, const std::vector<Wall>& walls);
+  // rounding, as may the move. `border`: what is as near to the blade's plane, or to where its rectangle ends, is taken
+  // to lie there [of its distance from the edge].
+  ContactModel(const Setup& setup, const BladeMove* move, const std::vector<Wall>& walls, double border = 0);
 
   bool any() const { return plate_ || !walls_.empty(); }
   bool has_plate() const { return plate_; }
@@ -48,12 +49,13 @@ class ContactModel {
   Vec3 off_walls(Vec3 x) const;
   Vec3 nearest(Vec3 x, const Began& began, Decisions& decisions, bool* in_turn = nullptr) const;
   int side_of(const Began& began, Decisions& decisions) const;
+  Local seen_from_blade(Vec3 x) const;
   Vec3 turned_back(Local c) const;
 
   const std::vector<Wall>& walls_;
   bool plate_ = false, friction_ = false;
   BladePose from_, to_;
-  double half_length_ = 0, depth_ = 0, clearance_ = 0, blade_friction_ = 0;
+  double half_length_ = 0, depth_ = 0, clearance_ = 0, blade_friction_ = 0, border_ = 0;
 };
 
 }  // namespace cutproof::oracles

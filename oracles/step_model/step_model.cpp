@@ -25,6 +25,8 @@ namespace {
 constexpr double kRotationRounds = 4;   // a rotation, about each axis, given its matrix
 constexpr double kParameterRounds = 4;  // what is made of parameters once: s, e^(-c dt), Chebyshev's weights
 constexpr double kContactRounds = 4;    // ways into the blade's frame and back
+// What is this near to a border of the blade, in roundings of the distance from its edge, may be on it to the bit.
+constexpr double kBorderRounds = 32;
 
 // Up to this, in units of u, (σ2 + σ3) / σ1 may be taken for zero: backends have thresholds, 9,000 in double precision
 // and 4 to 16 in single, and what rounds moves it.
@@ -190,6 +192,7 @@ class StepModel::Run {
         lost_(static_cast<Lost>(wanted.disturbance % 4)),
         coordinate_(wanted.disturbance / 4 % 6),
         threshold_(degenerate_rounds(model.u_) * model.u_ / static_cast<double>(2 << wanted.disturbance / 4 % 4)),
+        border_(wanted.disturbance / 4 % 5 == 2 || wanted.disturbance / 4 % 5 == 4 ? kBorderRounds * model.u_ : 0),
         u_(model.u_),
         decisions_(wanted.settled, wanted.near, model.u_),
         stores_positions_(before_.precision != Precision::binary32) {
@@ -199,6 +202,7 @@ class StepModel::Run {
     out_.rounding.resize(out_.x.size());
     out_.own_rounding.resize(out_.x.size());
     out_.raised.resize(out_.x.size());
+    out_.held.assign(out_.x.size(), 0);
     out_.turn_rounding.resize(model.clusters_.size());
     out_.is_free.assign(model.clusters_.size(), 0);
     sum_.resize(out_.x.size());
@@ -276,6 +280,7 @@ class StepModel::Run {
   const Lost lost_;
   const std::size_t coordinate_;  // of ±x, ±y, ±z
   const double threshold_;        // of this run, for what is degenerate
+  const double border_;           // of this run: what is as near to a border of the blade lies on it
   const double u_;
   Decisions decisions_;
   const bool stores_positions_;
@@ -477,7 +482,7 @@ void StepModel::Run::substep(int32_t s) {
   const std::vector<Wall> walls = walls_now();
   const bool down = setup_.has_blade && setup_.blade_moves[at(index)].down;
   const BladeMove move = down ? move_now(setup_.blade_moves[at(index)]) : BladeMove{};
-  const ContactModel contacts(setup_, down ? &move : nullptr, walls);
+  const ContactModel contacts(setup_, down ? &move : nullptr, walls, border_);
   std::vector<const Grip*> held(out_.x.size(), nullptr);
   for (const Grip& grip : setup_.grips) {
     if (grip.active[at(index)] == 0) continue;
@@ -487,12 +492,14 @@ void StepModel::Run::substep(int32_t s) {
   const std::vector<Vec3> start = out_.x;
   std::vector<Vec3> predicted(start.size());
   std::vector<ContactModel::Began> began(start.size());
+  Vec3 pushed, pushed_earlier;  // Σ m times displacements by contacts and grips, carried on as backends do
   rounding_now_.assign(start.size(), 0);
   own_now_.assign(start.size(), 0);
   shared_rounding_ = 0;
   // Rounds a place that contacts have made of `free`.
   const auto settle = [&](std::size_t i, Vec3 free, Vec3& x, double more) {
     double amplitude = more;
+    if (!(x == free)) out_.held[i] = 1;
     if (!(x == free) && contacts.has_plate()) amplitude += kContactRounds * u_ * norm(x - move.to.edge);
     const Vec3 place = stored(i, x);
     amplitude += kUnitRoundoff * norm(x);  // states hold places in double precision, whatever a backend stores
@@ -518,11 +525,12 @@ void StepModel::Run::substep(int32_t s) {
     out_.x[i] = held[i] != nullptr ? start[i] + held[i]->displacement[at(index)]
                 : contacts.any()   ? contacts.place(predicted[i], began[i], nullptr, decisions_)
                                    : predicted[i];
+    const bool is_pushed = !(out_.x[i] == predicted[i]);
     settle(i, predicted[i], out_.x[i], 2 * u_ * norm(inertia));
+    if (is_pushed) pushed += body_.mass[i] * (out_.x[i] - predicted[i]);
   }
 
   std::vector<Vec3> earlier = out_.x, now;
-  Vec3 lost, lost_earlier;  // what the backend's sum of displacements misses, carried as it is
   for (int32_t j = 0; j < step.iterations; ++j) {
     ++time_;
     // The implicit solver draws what earlier iterations have rounded to the prediction; others keep it.
@@ -534,7 +542,7 @@ void StepModel::Run::substep(int32_t s) {
     match_shapes(s, j);
     now = out_.x;
     const bool combined = accelerated && j > 0;
-    Vec3 lost_now;
+    Vec3 pushed_now;
     for (std::size_t i = 0; i < start.size(); ++i) {
       if (before_.alive[i] == 0) continue;
       const double holders = model_.holders_[i];
@@ -549,13 +557,13 @@ void StepModel::Run::substep(int32_t s) {
         amplitude += kParameterRounds * u_ * (norm(drawn) + norm(swung));
       }
       // A backend knows how far a contact or a grip has displaced a particle from where it has rounded it to.
-      const auto note_lost = [&] {
-        if (!disturbed_ || out_.x[i] == free) return;
+      const auto note_push = [&] {
+        if (!disturbed_) return;
         round(Rounded::push, i);
-        lost_now += body_.mass[i] * noise_.off(u_ * stored(i, free), amplitude);
+        pushed_now += body_.mass[i] * (out_.x[i] - free - noise_.off(u_ * stored(i, free), amplitude));
       };
       if (held[i] != nullptr) {
-        note_lost();
+        note_push();
         continue;
       }
       Vec3& next = out_.x[i];
@@ -578,27 +586,30 @@ void StepModel::Run::substep(int32_t s) {
           if (s + 1 == step.substeps && j + 1 == step.iterations) out_.raised[i] = present.raised;
         }
       }
-      note_lost();
+      const bool is_pushed = !(next == free);
       settle(i, wanted, next, amplitude);
+      if (is_pushed) note_push();
       if (!disturbed_ && holders > 0) rounding_now_[i] += pull * pull * goal_rounding_[i] / (holders * holders);
     }
     earlier = now;
-    Vec3 carried = (implicit ? pull : 1.0) * lost;
-    if (combined)
-      carried = lost + weights[at(j)].pull * (carried - lost) + weights[at(j)].carry * (lost - lost_earlier);
-    lost_earlier = lost;
-    lost = carried + lost_now;
+    Vec3 carried = (implicit ? pull : 1.0) * pushed;
+    if (combined) {
+      carried = pushed + weights[at(j)].pull * (carried - pushed) + weights[at(j)].carry * (pushed - pushed_earlier);
+    }
+    pushed_earlier = pushed;
+    pushed = carried + pushed_now;
   }
 
   const double decay = std::exp(-step.damping * dt);
-  Vec3 pushed = lost;
+  // Exactly, the balance of momentum says the same, with nothing carried on.
+  if (!disturbed_) pushed = {};
   double pushed_rounding = pull * pull * shared_rounding_, summed = 0;
   const double carried_on = step.substeps - s, carrying = kParameterRounds * std::sqrt(step.iterations + 1.0);
   for (std::size_t i = 0; i < start.size(); ++i) {
     if (before_.alive[i] == 0) continue;
     const Vec3 push = out_.x[i] - predicted[i];
     round(Rounded::end, i);
-    pushed += body_.mass[i] * push;
+    if (!disturbed_) pushed += body_.mass[i] * push;
     // A backend adds up what contacts do in each iteration.
     if (disturbed_) pushed += body_.mass[i] * noise_.off((carrying * u_) * push, 0);
     out_.v[i] = (decay / dt) * (out_.x[i] - start[i]);
