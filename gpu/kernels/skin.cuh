@@ -276,17 +276,17 @@ CUTPROOF_DEVICE void place_vertices_kernel(Block& block, const DeviceView& w) {
     const float reach = (direction % 2 == 0 ? body.alpha : -body.alpha) * body.h;
     const Float3 arm = {direction / 2 == 0 ? reach : 0.0f, direction / 2 == 1 ? reach : 0.0f,
                         direction / 2 == 2 ? reach : 0.0f};
-    // Relative to the first cluster, so that summing costs no digits of d. (Not to the owner: where a blade has pushed
-    // it away, that is far from all of them.)
+    // Relative to where the first cluster puts it, so that summing costs no digits of d. (Not to the owner: where a
+    // blade has pushed it away, that is far from what all of them say.)
     Float3 base = xyz(w.displacement[p]), sum;
     int clusters = 0;
     for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
       const int s = w.memberships[k];
       if (s < 0) continue;
       const Float3 r = from_rest_center(w, body, p, s) + arm;
-      const Float3 center = w.center[s];
-      if (clusters == 0) base = center;
-      sum = sum + ((center - base) + (w.rotation[s] * r - r));
+      const Float3 center = w.center[s], turned = w.rotation[s] * r - r;
+      if (clusters == 0) base = center + turned;
+      sum = sum + ((center - base) + turned);
       ++clusters;
     }
     w.vertex_position[v] = with_w(clusters > 0 ? base + (1.0f / static_cast<float>(clusters)) * sum : base, 0.0f);

@@ -199,6 +199,46 @@ TEST(SkinVertices, FollowTheClustersOfTheirOwners) {
   EXPECT_LT(verdict.bound, 1e-12);
 }
 
+// 400 clusters that agree in nothing but their center: single precision, one partial sum after another, is off by more
+// than single operations are.
+TEST(SkinVertices, AcceptsWhatTheSumOverManyClustersRounds) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  const auto rounded_rotation = [&] {
+    const double w = normal(random), x = normal(random), y = normal(random), z = normal(random);
+    const double s = 2 / (w * w + x * x + y * y + z * z);
+    const auto e = [](double entry) { return static_cast<double>(static_cast<float>(entry)); };
+    return Mat3{{e(1 - s * (y * y + z * z)), e(s * (x * y - w * z)), e(s * (x * z + w * y)),  //
+                 e(s * (x * y + w * z)), e(1 - s * (x * x + z * z)), e(s * (y * z - w * x)),  //
+                 e(s * (x * z - w * y)), e(s * (y * z + w * x)), e(1 - s * (x * x + y * y))}};
+  };
+  double greatest = 0;
+  for (int draw = 0; draw < 20; ++draw) {
+    Scene scene = scene_of(block_nodes({0, 0, 0}, {2, 2, 2}));
+    scene.state = state_of(scene.setup.body, Lists(400, range(0, 8)));
+    scene.state.skin = convex_cell_skin(scene.setup, scene.state);
+    scene.state.precision = Precision::binary32;
+    for (Mat3& r : scene.state.clusters.rotation) r = rounded_rotation();
+    for (Vec3& vertex : scene.state.skin.position) {
+      const Vec3 arm = vertex - scene.state.clusters.rest_center[0];
+      for (int row = 0; row < 3; ++row) {
+        float first = 0, sum = 0;
+        for (const Mat3& r : scene.state.clusters.rotation) {
+          float turned = -static_cast<float>(arm[row]);
+          for (int k = 0; k < 3; ++k) turned += static_cast<float>(r(row, k)) * static_cast<float>(arm[k]);
+          if (&r == scene.state.clusters.rotation.data()) first = turned;
+          sum += turned - first;
+        }
+        vertex[row] += first + sum / 400;
+      }
+    }
+    const Verdict verdict = skin_vertices(scene.setup, scene.state);
+    EXPECT_TRUE(verdict.holds) << verdict.witness.text;
+    greatest = std::max(greatest, verdict.measured / verdict.bound);
+  }
+  EXPECT_GT(greatest, 0.1);  // no more than rounding needs
+}
+
 TEST(SkinVertices, RejectsAVertexThatIsOffByABillionthOfTheSpacing) {
   Scene scene = scene_of(block_nodes({0, 0, 0}, {4, 4, 4}));
   scene.state.skin.position[17].y += 1e-9;
