@@ -131,9 +131,10 @@ class Search {
     StepPart part = StepPart::position;
     int32_t where = -1;
     double measured = 0, bound = 0;
-    bool is_forced = false;     // settled otherwise than rounding may: no admissible outcome
+    Settled forced;             // of what is settled, what goes against the numbers by more than rounding may
     bool is_undecided = false;  // holds by what ties do that are in doubt
-    bool holds() const { return worst <= 1 && !is_forced; }
+    // A forced outcome is not admissible.
+    bool holds() const { return worst <= 1 && forced.empty(); }
   };
 
   Branch start(Settled settled) {
@@ -274,10 +275,10 @@ class Search {
     let_go(branch);
     ask_bluntly(branch);
     branch.ties.clear();
-    branch.is_forced = false;
+    branch.forced.clear();
     for (const NearDecision& d : branch.outcome.near) {
       const double rounding = kBeyondRuns * spread.at({d.key, d.other}) + d.rounding;
-      if (!d.is_natural && -d.lead > rounding) branch.is_forced = true;
+      if (!d.is_natural && -d.lead > rounding) branch.forced[d.key] = d.taken;
       if (!branch.settled.contains(d.key) && d.lead <= rounding) branch.ties.push_back(d);
     }
     std::sort(branch.ties.begin(), branch.ties.end(),
@@ -285,24 +286,25 @@ class Search {
   }
 
   // What a contact holds does not move at all until it slips or comes off, and the runs may just not have been that
-  // far: it is asked no more sharply than those beside it.
+  // far: if those beside it may be off by more than it is held by, it is asked no more sharply than they are.
   void let_go(Branch& branch) const {
     Bounds& b = branch.bounds;
-    const Bounds known = b;
-    const auto at_least_as_beside = [&](std::vector<double>& mine, const std::vector<double>& of) {
-      for (int32_t c = 0; c < before_.clusters.count(); ++c) {
-        const auto members = before_.clusters.of(c);
-        double farthest = 0;
-        for (const int32_t i : members) farthest = std::max(farthest, of[at(i)]);
-        for (const int32_t i : members) {
-          if (branch.outcome.held[at(i)] != 0) mine[at(i)] = std::max(mine[at(i)], farthest);
-        }
-      }
+    const auto widest = [&](const std::vector<double>& bound, int32_t c) {
+      double most = 0;
+      for (const int32_t i : before_.clusters.of(c)) most = std::max(most, bound[at(i)]);
+      return most;
     };
-    at_least_as_beside(b.position, known.position);
-    at_least_as_beside(b.velocity, known.velocity);
-    at_least_as_beside(b.own_position, known.own_position);
-    at_least_as_beside(b.own_velocity, known.own_velocity);
+    const Bounds known = b;
+    for (int32_t c = 0; c < before_.clusters.count(); ++c) {
+      const double beside = widest(known.position, c);
+      for (const int32_t i : before_.clusters.of(c)) {
+        if (!(branch.outcome.hold[at(i)] < beside)) continue;
+        b.position[at(i)] = std::max(b.position[at(i)], beside);
+        b.velocity[at(i)] = std::max(b.velocity[at(i)], widest(known.velocity, c));
+        b.own_position[at(i)] = std::max(b.own_position[at(i)], widest(known.own_position, c));
+        b.own_velocity[at(i)] = std::max(b.own_velocity[at(i)], widest(known.own_velocity, c));
+      }
+    }
   }
 
   // Where rounding is carried so far that small changes are no rule any more, all that is coupled is asked one blunt
@@ -427,21 +429,25 @@ class Search {
   // Tries outcomes until one holds, fewest violations first; `closely`: looks closely at each, not only at those that
   // seem to be as good as the best. False: there are more than are tried.
   bool explore(const Branch& root, const std::optional<Branch>& other_root, bool closely, Branch& best) {
-    const auto better = [](const Branch& a, const Branch& b) {
-      if (a.holds() != b.holds()) return b.holds();
-      if (a.violations.size() != b.violations.size()) return a.violations.size() > b.violations.size();
-      return a.settled.size() > b.settled.size();
+    const auto is_nearer = [](const Branch& a, const Branch& b) {
+      if (a.holds() != b.holds()) return a.holds();
+      if (a.forced.empty() != b.forced.empty()) return a.forced.empty();
+      return a.violations.size() < b.violations.size();
+    };
+    const auto comes_later = [&](const Branch& a, const Branch& b) {
+      return is_nearer(b, a) || (!is_nearer(a, b) && a.settled.size() > b.settled.size());
     };
     std::vector<Branch> open = {root};
     std::set<Settled> seen = {root.settled};
     int tried = 0;
     const auto keep = [&](Branch next) {
-      if (next.holds() || next.violations.size() < best.violations.size()) best = next;
+      if (is_nearer(next, best)) best = next;
       open.push_back(std::move(next));
-      std::push_heap(open.begin(), open.end(), better);
+      std::push_heap(open.begin(), open.end(), comes_later);
     };
-    const auto try_out = [&](Settled settled) {
-      if (tried >= most_outcomes_ || !seen.insert(settled).second) return;
+    // What of it is forced.
+    const auto try_out = [&](Settled settled) -> Settled {
+      if (tried >= most_outcomes_ || !seen.insert(settled).second) return {};
       ++tried;
       Branch next = start(std::move(settled));
       next.bounds = root.bounds;  // until it is worth a closer look
@@ -452,17 +458,29 @@ class Search {
       } else {
         next.ties = near_ties(next, root);
       }
+      const Settled forced = next.forced;
       keep(std::move(next));
+      return forced;
+    };
+    // A fit adds up what ties do one by one. Where others go the other way they need not be open any more.
+    const auto try_fitted = [&](const Branch& branch) {
+      Settled settled = fitted(branch);
+      for (Settled forced = try_out(settled); !forced.empty() && !best.holds(); forced = try_out(settled)) {
+        for (const auto& [key, outcome] : forced) {
+          settled.erase(key);
+          settled.erase(key.all_alike());
+        }
+      }
     };
     if (other_root && !best.holds() && seen.insert(other_root->settled).second) keep(*other_root);
     // Many ties at once: those of a layer that one rounding of its wall tips, or of particles far from each other.
-    if (other_root && !best.holds()) try_out(fitted(*other_root));
+    if (other_root && !best.holds()) try_fitted(*other_root);
     for (std::size_t before = best.violations.size() + 1; !best.holds() && best.violations.size() < before;) {
       before = best.violations.size();
-      try_out(fitted(best));
+      try_fitted(Branch(best));
     }
     while (!open.empty() && !best.holds() && tried < most_outcomes_) {
-      std::pop_heap(open.begin(), open.end(), better);
+      std::pop_heap(open.begin(), open.end(), comes_later);
       const Branch present = std::move(open.back());
       open.pop_back();
       for (const NearDecision& tie : with_violating_first(present)) {

@@ -11,10 +11,11 @@ namespace {
 // How often blade and walls are projected in turn where both hold (decisions.md, Contacts with the blade).
 constexpr int kTurns = 16;
 
-// Takes back at most `most` of what `slid` has along a surface.
-Vec3 held_back(Vec3 x, Vec3 slid, Vec3 normal, double most) {
+// Takes back at most `most` of what `slid` has along a surface. `hold`: falls to what is left of that.
+Vec3 held_back(Vec3 x, Vec3 slid, Vec3 normal, double most, double& hold) {
   const Vec3 tangential = slid - dot(slid, normal) * normal;
   const double length = norm(tangential);
+  if (length <= most) hold = std::min(hold, most - length);
   return length > most ? x - (most / length) * tangential : x - tangential;
 }
 
@@ -137,16 +138,17 @@ double ContactModel::depth(Vec3 free, const Began& began, Decisions& decisions) 
   return std::max(deepest, clearance_ - away);
 }
 
-Vec3 ContactModel::place(Vec3 free, const Began& began, Present* present, Decisions& decisions) const {
+Vec3 ContactModel::place(Vec3 free, const Began& began, Present* present, Decisions& decisions, double* hold) const {
   bool in_turn = false;
   Vec3 placed = nearest(free, began, decisions, &in_turn);
+  double least = std::numeric_limits<double>::infinity();
   if (friction_ && (in_turn || !(placed == free))) {
     for (const Wall& wall : walls_) {
       const double pressed = wall.side * (wall.offset - free[wall.axis]);
       if (!(pressed > 0) || wall.friction == 0) continue;
       Vec3 normal;
       normal[wall.axis] = 1;
-      placed = held_back(placed, placed - began.start, normal, wall.friction * pressed);
+      placed = held_back(placed, placed - began.start, normal, wall.friction * pressed, least);
     }
     const Vec3 pushed = blade_friction_ > 0 ? way_off_plate(free, began, decisions) : Vec3{};
     const double pressed = norm(pushed);
@@ -155,10 +157,21 @@ Vec3 ContactModel::place(Vec3 free, const Began& began, Present* present, Decisi
       const Local c = to_local(to_, placed - to_.edge);
       const Vec3 was = from_.edge + c.u * from_.along + c.w * from_.back + c.n * cross(from_.along, from_.back);
       const Vec3 blade_moved = placed - was;
-      placed = held_back(placed, placed - began.start - blade_moved, pushed / pressed, blade_friction_ * pressed);
+      placed =
+          held_back(placed, placed - began.start - blade_moved, pushed / pressed, blade_friction_ * pressed, least);
     }
     placed = nearest(placed, began, decisions, &in_turn);
   }
+  if (hold != nullptr && in_turn) least = 0;
+  if (hold != nullptr && !(placed == free)) {
+    for (const Wall& wall : walls_) {
+      const double pressed = wall.side * (wall.offset - free[wall.axis]);
+      if (pressed > 0) least = std::min(least, pressed);
+    }
+    const double pushed = plate_ ? norm(way_off_plate(free, began, decisions)) : 0;
+    if (pushed > 0) least = std::min(least, pushed);
+  }
+  if (hold != nullptr) *hold = std::min(*hold, least);
   // Never what is worse than the present place, but for rounding, so that the energy cannot grow: only where turns were
   // taken.
   if (in_turn && !friction_ && present != nullptr) {

@@ -37,8 +37,9 @@ class ContactModel {
   };
 
   // Where one may be that would go to `free`; it does not go where that is worse than where it is (nullptr: the
-  // prediction, which comes from nowhere).
-  Vec3 place(Vec3 free, const Began& began, Present* present, Decisions& decisions) const;
+  // prediction, which comes from nowhere). `hold`: falls to how far, at least, `free` is from where a contact that
+  // holds would let go [m]; nullptr: nobody asks.
+  Vec3 place(Vec3 free, const Began& began, Present* present, Decisions& decisions, double* hold = nullptr) const;
 
   // By how much one that would go to `free` is inside of what it may not enter [m]; <= 0: it stays there.
   double depth(Vec3 free, const Began& began, Decisions& decisions) const;

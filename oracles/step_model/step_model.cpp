@@ -202,7 +202,7 @@ class StepModel::Run {
     out_.rounding.resize(out_.x.size());
     out_.own_rounding.resize(out_.x.size());
     out_.raised.resize(out_.x.size());
-    out_.held.assign(out_.x.size(), 0);
+    out_.hold.assign(out_.x.size(), std::numeric_limits<double>::infinity());
     out_.turn_rounding.resize(model.clusters_.size());
     out_.is_free.assign(model.clusters_.size(), 0);
     sum_.resize(out_.x.size());
@@ -496,10 +496,10 @@ void StepModel::Run::substep(int32_t s) {
   rounding_now_.assign(start.size(), 0);
   own_now_.assign(start.size(), 0);
   shared_rounding_ = 0;
+  const auto hold_of = [&](std::size_t i) { return disturbed_ ? nullptr : &out_.hold[i]; };
   // Rounds a place that contacts have made of `free`.
   const auto settle = [&](std::size_t i, Vec3 free, Vec3& x, double more) {
     double amplitude = more;
-    if (!(x == free)) out_.held[i] = 1;
     if (!(x == free) && contacts.has_plate()) amplitude += kContactRounds * u_ * norm(x - move.to.edge);
     const Vec3 place = stored(i, x);
     amplitude += kUnitRoundoff * norm(x);  // states hold places in double precision, whatever a backend stores
@@ -523,7 +523,7 @@ void StepModel::Run::substep(int32_t s) {
     }
     decisions_.begin(s, 0, static_cast<int32_t>(i));
     out_.x[i] = held[i] != nullptr ? start[i] + held[i]->displacement[at(index)]
-                : contacts.any()   ? contacts.place(predicted[i], began[i], nullptr, decisions_)
+                : contacts.any()   ? contacts.place(predicted[i], began[i], nullptr, decisions_, hold_of(i))
                                    : predicted[i];
     const bool is_pushed = !(out_.x[i] == predicted[i]);
     settle(i, predicted[i], out_.x[i], 2 * u_ * norm(inertia));
@@ -582,7 +582,7 @@ void StepModel::Run::substep(int32_t s) {
         }
         if (touched) {
           ContactModel::Present present = {now[i], norm(stored(i, now[i])), u_ - kUnitRoundoff};
-          next = contacts.place(wanted, began[i], &present, decisions_);
+          next = contacts.place(wanted, began[i], &present, decisions_, hold_of(i));
           if (s + 1 == step.substeps && j + 1 == step.iterations) out_.raised[i] = present.raised;
         }
       }

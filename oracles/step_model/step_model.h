@@ -25,7 +25,9 @@ struct StepOutcome {
   // [n] By how much the last iteration has raised the square of a particle's distance from where it would go, as it may
   // by rounding where blade and walls act in turn [m²].
   std::vector<double> raised;
-  std::vector<uint8_t> held;  // [n] 1: a contact has moved it, at some time
+  // Of an undisturbed run: [n] how far, at least, it was from where a contact that holds it would have let go [m];
+  // infinite without contacts.
+  std::vector<double> hold;
   // Of an undisturbed run: the quadratic sums of what single evaluations round, as if none of it grew.
   std::vector<double> rounding;       // [n] of positions [m²]
   std::vector<double> own_rounding;   // [n] of it, what is the particle's own: not of its clusters [m²]
