@@ -389,6 +389,30 @@ TEST(AdmissibleStep, TakesALayerOnAWallAsOneRoundingPutsIt) {
   }
 }
 
+// Two particles at one place: how they fall apart is open, and by how far as well. One of them is pressed on a wall with
+// friction: more firmly than the other can pull, so that it is asked as sharply as any, or so loosely that it may slip.
+TEST(AdmissibleStep, AsksSharplyWhatAContactHoldsFirmly) {
+  for (const bool firmly : {true, false}) {
+    StepScene scene{setup_of(block_body(2, 1, 1, kSpacing)), {}, {}};
+    cutproof::Setup& setup = scene.setup;
+    setup.step.substeps = 1;
+    setup.step.iterations = 2;
+    setup.step.stiffness = 1000;
+    setup.step.gravity = {};
+    scene.before = state_of(setup.body, {{0, 1}});
+    scene.before.x[1] = scene.before.x[0];
+    setup.walls = {{.axis = 2, .side = +1, .offset = scene.before.x[0].z, .friction = 0.5}};
+    scene.before.v[0].z = -(firmly ? 0.5 : 0.02) * kSpacing / setup.substep_length[0];
+    scene.take_step();
+    const Verdict verdict = admissible_step(setup, scene.before, scene.after);
+    expect_holds(verdict);
+    scene.after.x[0].x += 1e-9 * kSpacing;
+    EXPECT_EQ(admissible_step(setup, scene.before, scene.after).holds, !firmly);
+    scene.after.x[0].x += kSpacing;
+    EXPECT_FALSE(admissible_step(setup, scene.before, scene.after).holds);
+  }
+}
+
 // Along a wire the best rotations are many: only the nearest to the previous one is right.
 TEST(AdmissibleStep, HasNoFreeAxis) {
   StepScene scene{setup_of(block_body(5, 1, 1, kSpacing)), {}, {}};
