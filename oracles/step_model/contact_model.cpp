@@ -142,6 +142,12 @@ Vec3 ContactModel::place(Vec3 free, const Began& began, Present* present, Decisi
   bool in_turn = false;
   Vec3 placed = nearest(free, began, decisions, &in_turn);
   double least = std::numeric_limits<double>::infinity();
+  // Walls alone, each as deep as that; or the blade alone.
+  if (!(placed == free)) least = norm(placed - free);
+  for (const Wall& wall : walls_) {
+    const double pressed = wall.side * (wall.offset - free[wall.axis]);
+    if (pressed > 0) least = std::min(least, pressed);
+  }
   if (friction_ && (in_turn || !(placed == free))) {
     for (const Wall& wall : walls_) {
       const double pressed = wall.side * (wall.offset - free[wall.axis]);
@@ -162,16 +168,7 @@ Vec3 ContactModel::place(Vec3 free, const Began& began, Present* present, Decisi
     }
     placed = nearest(placed, began, decisions, &in_turn);
   }
-  if (hold != nullptr && in_turn) least = 0;
-  if (hold != nullptr && !(placed == free)) {
-    for (const Wall& wall : walls_) {
-      const double pressed = wall.side * (wall.offset - free[wall.axis]);
-      if (pressed > 0) least = std::min(least, pressed);
-    }
-    const double pushed = plate_ ? norm(way_off_plate(free, began, decisions)) : 0;
-    if (pushed > 0) least = std::min(least, pushed);
-  }
-  if (hold != nullptr) *hold = std::min(*hold, least);
+  if (hold != nullptr) *hold = in_turn ? 0 : std::min(*hold, least);
   // Never what is worse than the present place, but for rounding, so that the energy cannot grow: only where turns were
   // taken.
   if (in_turn && !friction_ && present != nullptr) {
