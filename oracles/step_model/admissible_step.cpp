@@ -28,7 +28,7 @@ constexpr double kSurely = 2;
 constexpr double kNotShared = 0.125;
 // Disturbed runs, from fixed seeds; as many before anything is called wrong; and how much farther than the farthest of
 // them a right answer may be.
-constexpr uint64_t kDisturbedRuns = 8, kMostDisturbedRuns = 32;
+constexpr uint64_t kDisturbedRuns = 8, kMostDisturbedRuns = 48;
 constexpr double kBeyondRuns = 8;
 // Beyond this the way from a rounding to what it does is no longer straight [h].
 constexpr double kSmall = 1e-3;
@@ -125,7 +125,7 @@ class Search {
     StepOutcome outcome;
     Bounds bounds;
     std::vector<uint8_t> blunt;       // [n] 1: only asked bluntly
-    std::vector<NearDecision> ties;   // that rounding may take the other way; known once looked at closely
+    std::vector<NearDecision> ties;   // that rounding may take the other way, known once looked at closely; settled too
     std::vector<int32_t> violations;  // particles beyond their bounds, or of clusters that are
     double worst = -1;                // of measured / bound
     StepPart part = StepPart::position;
@@ -279,7 +279,7 @@ class Search {
     for (const NearDecision& d : branch.outcome.near) {
       const double rounding = kBeyondRuns * spread.at({d.key, d.other}) + d.rounding;
       if (!d.is_natural && -d.lead > rounding) branch.forced[d.key] = d.taken;
-      if (!branch.settled.contains(d.key) && d.lead <= rounding) branch.ties.push_back(d);
+      if (d.lead <= rounding) branch.ties.push_back(d);
     }
     std::sort(branch.ties.begin(), branch.ties.end(),
               [](const NearDecision& p, const NearDecision& q) { return p.key < q.key; });
@@ -312,13 +312,12 @@ class Search {
   void ask_bluntly(Branch& branch) const {
     Bounds& b = branch.bounds;
     const std::size_t sets = at(coupled_.count) + 1;
-    std::vector<double> far(sets, 0), fast(sets, 0);
+    std::vector<double> far(sets, 0);
     branch.blunt.assign(before_.x.size(), 0);
     for (std::size_t i = 0; i < before_.x.size(); ++i) {
       if (before_.alive[i] == 0) continue;
       const std::size_t set = at(coupled_.label[i]);
-      far[set] = std::max(far[set], b.position[i]);
-      fast[set] = std::max(fast[set], b.velocity[i]);
+      far[set] = std::max({far[set], b.position[i], b.velocity[i]});
       if (!(b.position[i] <= kSmall * h_)) branch.blunt[i] = 1;
     }
     double pushed = 0;
@@ -326,7 +325,7 @@ class Search {
       if (branch.blunt[i] == 0) continue;
       const std::size_t set = at(coupled_.label[i]);
       b.position[i] = far[set];
-      b.velocity[i] = fast[set];
+      b.velocity[i] = far[set];
       pushed += setup_.body.mass[i] * b.velocity[i];
     }
     for (std::size_t c = 0; c < reach_.size(); ++c) {
@@ -387,13 +386,20 @@ class Search {
   }
 
   // Rounding that members of a cluster have in common, as of its rotation and its center, is much more than what each
-  // of them has alone. So what is wrong with one of them shows in what is left without it.
+  // of them has alone. So what is wrong with one of them shows in what is left without it; unless what they share is
+  // that of one that is only asked bluntly.
   void compare_own(Branch& branch, std::vector<uint8_t>& violates) const {
     const StepOutcome& o = branch.outcome;
     const Bounds& b = branch.bounds;
     const Own off = own(after_.x, o.x, 1), fast = own(after_.v, o.v, dt_);
+    std::vector<uint8_t> shares(violates.size(), 0);  // with one that is asked bluntly
+    for (int32_t c = 0; c < before_.clusters.count() && !branch.blunt.empty(); ++c) {
+      const auto members = before_.clusters.of(c);
+      if (std::none_of(members.begin(), members.end(), [&](int32_t i) { return branch.blunt[at(i)] != 0; })) continue;
+      for (const int32_t i : members) shares[at(i)] = 1;
+    }
     for (std::size_t i = 0; i < violates.size(); ++i) {
-      if (before_.alive[i] == 0 || (!branch.blunt.empty() && branch.blunt[i] != 0)) continue;
+      if (before_.alive[i] == 0 || shares[i] != 0) continue;
       const double place = b.own_position[i] + off.rounding, speed = b.own_velocity[i] + fast.rounding;
       if (!(off.lengths[i] <= place) || !(fast.lengths[i] <= speed)) violates[i] = 1;
       see(branch, StepPart::own_position, static_cast<int32_t>(i), off.lengths[i] / h_, place / h_);
@@ -580,9 +586,13 @@ class Search {
     return best;
   }
 
+  // Those that are open. What was settled is open again where that has not helped.
   static std::vector<NearDecision> with_violating_first(const Branch& branch) {
     std::vector<NearDecision> ties = branch.ties;
     const std::set<int32_t> violating(branch.violations.begin(), branch.violations.end());
+    std::erase_if(ties, [&](const NearDecision& d) {
+      return branch.settled.contains(d.key) && !violating.contains(d.key.particle);
+    });
     std::stable_sort(ties.begin(), ties.end(), [&](const NearDecision& a, const NearDecision& b) {
       return violating.contains(a.key.particle) > violating.contains(b.key.particle);
     });
@@ -593,7 +603,6 @@ class Search {
   std::vector<NearDecision> near_ties(const Branch& branch, const Branch& measure) const {
     std::vector<NearDecision> ties;
     for (const NearDecision& d : branch.outcome.near) {
-      if (branch.settled.contains(d.key)) continue;
       if (d.lead <= measure.bounds.position[at(d.key.particle)] + d.rounding) ties.push_back(d);
     }
     return ties;

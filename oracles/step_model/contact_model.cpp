@@ -21,8 +21,9 @@ Vec3 held_back(Vec3 x, Vec3 slid, Vec3 normal, double most, double& hold) {
 
 }  // namespace
 
-ContactModel::ContactModel(const Setup& setup, const BladeMove* move, const std::vector<Wall>& walls, double border)
-    : walls_(walls), border_(border) {
+ContactModel::ContactModel(const Setup& setup, const BladeMove* move, const std::vector<Wall>& walls, Border border,
+                           double near)
+    : walls_(walls), near_(near), border_(border) {
   friction_ = std::any_of(walls.begin(), walls.end(), [](const Wall& wall) { return wall.friction > 0; });
   plate_ = move != nullptr && setup.detect.criterion != Criterion::geometric;
   if (!plate_) return;
@@ -39,16 +40,29 @@ int ContactModel::side_of(const Began& began, Decisions& decisions) const {
   return decisions.exceeds(DecisionKind::side, -began.height) ? -1 : +1;
 }
 
-// In the blade's frame. On a border a place is special: nothing leads off it sideways, while a rounding beside it is
-// led this way or that, and farther each time.
-Local ContactModel::seen_from_blade(Vec3 x) const {
-  Local c = to_local(to_, x - to_.edge);
-  const double near = border_ * std::hypot(c.u, c.n, c.w);
-  if (std::abs(c.n) <= near) c.n = 0;
-  if (std::abs(c.w) <= near) c.w = 0;
-  if (std::abs(c.w - depth_) <= near) c.w = depth_;
-  if (std::abs(std::abs(c.u) - half_length_) <= near) c.u = std::copysign(half_length_, c.u);
-  return c;
+// On a border a place is special: nothing leads off it sideways, while a rounding beside it is led this way or that,
+// and farther each time; and beside the rim no more than rounding says where that leads.
+ContactModel::OnBorder ContactModel::seen_from_blade(Vec3 x) const {
+  OnBorder seen = {to_local(to_, x - to_.edge), {}};
+  if (border_ == Border::as_it_is) return seen;
+  Local& c = seen.place;
+  const double near = near_ * std::hypot(c.u, c.n, c.w);
+  const double beyond_end = std::abs(c.u) - half_length_;
+  const bool at_edge = std::abs(c.w) <= near, at_back = std::abs(c.w - depth_) <= near,
+             at_end = std::abs(beyond_end) <= near;
+  const bool within = beyond_end <= near && c.w >= -near && c.w <= depth_ + near;
+  if (border_ == Border::exact) {
+    if (std::abs(c.n) <= near) c.n = 0;
+    if (at_edge) c.w = 0;
+    if (at_back) c.w = depth_;
+    if (at_end) c.u = std::copysign(half_length_, c.u);
+  } else if (std::abs(c.n) <= near && within && (at_edge || at_back || at_end)) {
+    seen.out = {at_end ? std::copysign(1.0, c.u) : 0, 0, at_edge ? -1.0 : at_back ? 1.0 : 0};
+    const double length = std::hypot(seen.out.u, seen.out.w);
+    seen.out.u /= length;
+    seen.out.w /= length;
+  }
+  return seen;
 }
 
 Vec3 ContactModel::turned_back(Local c) const {
@@ -66,7 +80,12 @@ Vec3 ContactModel::off_walls(Vec3 x) const {
 // Forbidden is what is nearer than ρ to the rectangle, and what lies over it on the side where the particle did not
 // begin.
 Vec3 ContactModel::way_off_plate(Vec3 x, const Began& began, Decisions& decisions) const {
-  const Local c = seen_from_blade(x);
+  const OnBorder seen = seen_from_blade(x);
+  const Local& c = seen.place;
+  if (seen.out.u != 0 || seen.out.w != 0) {
+    const double outwards = clearance_ * std::abs(std::sin(began.angle));
+    return turned_back({outwards * seen.out.u, clearance_ * std::cos(began.angle), outwards * seen.out.w});
+  }
   const double before_edge = -c.w, behind_back = c.w - depth_, beyond_end = std::abs(c.u) - half_length_;
   const double outside = std::max({before_edge, behind_back, beyond_end});  // of the rectangle; below 0: over it
   if (outside > decisions.near() && std::max(outside, std::abs(c.n)) >= clearance_) return {};

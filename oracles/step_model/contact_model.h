@@ -10,9 +10,12 @@ namespace cutproof::oracles {
 class ContactModel {
  public:
   // `move`: what the blade does in this substep; nullptr: none, or it is up. `walls` may differ from the setup's by a
-  // rounding, as may the move. `border`: what is as near to the blade's plane, or to where its rectangle ends, is taken
-  // to lie there [of its distance from the edge].
-  ContactModel(const Setup& setup, const BladeMove* move, const std::vector<Wall>& walls, double border = 0);
+  // rounding, as may the move. What is as `near` to the blade's plane, or to where its rectangle ends [of its distance
+  // from the edge], is where the numbers say, or on it to the bit; or if it is near to both, it is led off the rim in
+  // any direction.
+  enum class Border : uint8_t { as_it_is, exact, any };
+  ContactModel(const Setup& setup, const BladeMove* move, const std::vector<Wall>& walls,
+               Border border = Border::as_it_is, double near = 0);
 
   bool any() const { return plate_ || !walls_.empty(); }
   bool has_plate() const { return plate_; }
@@ -26,6 +29,7 @@ class ContactModel {
   struct Began {
     Vec3 start;
     double height = 0;
+    double angle = 0;  // to the plane, under which it is led off the rim if that is open [rad]
   };
 
   // Where a particle is that has a place already.
@@ -50,13 +54,18 @@ class ContactModel {
   Vec3 off_walls(Vec3 x) const;
   Vec3 nearest(Vec3 x, const Began& began, Decisions& decisions, bool* in_turn = nullptr) const;
   int side_of(const Began& began, Decisions& decisions) const;
-  Local seen_from_blade(Vec3 x) const;
+  struct OnBorder {
+    Local place;
+    Local out;  // unit vector in the plane, away from the rectangle; 0: not on the rim
+  };
+  OnBorder seen_from_blade(Vec3 x) const;
   Vec3 turned_back(Local c) const;
 
   const std::vector<Wall>& walls_;
   bool plate_ = false, friction_ = false;
   BladePose from_, to_;
-  double half_length_ = 0, depth_ = 0, clearance_ = 0, blade_friction_ = 0, border_ = 0;
+  double half_length_ = 0, depth_ = 0, clearance_ = 0, blade_friction_ = 0, near_ = 0;
+  Border border_ = Border::as_it_is;
 };
 
 }  // namespace cutproof::oracles

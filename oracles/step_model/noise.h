@@ -1,5 +1,6 @@
 // Roundings at random, the same everywhere. Internal to oracles/.
 #pragma once
+#include <bit>
 #include <cmath>
 #include <cstdint>
 
@@ -10,7 +11,9 @@ namespace cutproof::oracles {
 // Uniform in [-1, 1] (Vigna's splitmix64).
 class Noise {
  public:
-  explicit Noise(uint64_t seed) : seed_(seed * 0x9e3779b97f4a7c15u), state_(seed_) {}
+  // `alike`: numbers that agree to that, relative to themselves, round alike; 0: each for itself.
+  explicit Noise(uint64_t seed, double alike = 0)
+      : alike_(alike), seed_(seed * 0x9e3779b97f4a7c15u), state_(seed_), of_equals_(seed_) {}
   virtual ~Noise() = default;
   virtual double operator()() {
     uint64_t z = (state_ += 0x9e3779b97f4a7c15u);
@@ -21,7 +24,16 @@ class Noise {
   }
   // Draws from here on are those of this name, whatever was drawn before.
   void name(uint64_t what, uint64_t index, uint64_t time) {
-    state_ = seed_ ^ (what << 60 ^ time << 32 ^ index) * 0xd1342543de82ef95u;
+    const auto of = [&](uint64_t k) { return seed_ ^ (what << 60 ^ time << 32 ^ k) * 0xd1342543de82ef95u; };
+    state_ = of(index);
+    of_equals_ = of(~uint64_t{0} >> 32);
+  }
+  // The same for numbers that round alike; `index` where each rounds for itself.
+  uint64_t key(double number, uint64_t index) const {
+    if (alike_ == 0 || number == 0) return index;
+    int exponent = 0;
+    const double digits = std::floor(std::frexp(number, &exponent) / alike_);
+    return (std::bit_cast<uint64_t>(digits) ^ static_cast<uint64_t>(exponent) << 1) * 0xff51afd7ed558ccdu >> 32;
   }
   Vec3 vector() {
     const double a = (*this)(), b = (*this)(), c = (*this)();
@@ -29,12 +41,20 @@ class Noise {
   }
   // Each component by at most so much of its own size, and by at most `more`.
   Vec3 off(Vec3 size, double more) {
-    const Vec3 r = vector();
+    Vec3 r = vector();
+    for (int k = 0; alike_ > 0 && k < 3; ++k) {
+      if (size[k] == 0) continue;
+      Noise equals(*this);
+      equals.state_ = of_equals_ ^ key(size[k], 0) << 2 ^ static_cast<uint64_t>(k);
+      r[k] = equals();
+    }
+    of_equals_ = of_equals_ * 0xd1342543de82ef95u + 1;  // what is drawn next is another rounding
     return {r.x * (std::abs(size.x) + more), r.y * (std::abs(size.y) + more), r.z * (std::abs(size.z) + more)};
   }
 
  private:
-  uint64_t seed_, state_;
+  double alike_;
+  uint64_t seed_, state_, of_equals_;
 };
 
 // The greatest there is, one way or the other, and with the opposite sign the other way: few numbers are drawn of it,

@@ -25,6 +25,8 @@ namespace {
 constexpr double kRotationRounds = 4;   // a rotation, about each axis, given its matrix
 constexpr double kParameterRounds = 4;  // what is made of parameters once: s, e^(-c dt), Chebyshev's weights
 constexpr double kContactRounds = 4;    // ways into the blade's frame and back
+// Where equal numbers round alike, they are equal to so many roundings: what has rounded before makes them differ.
+constexpr double kAlikeRounds = 256;
 // What is this near to a border of the blade, in roundings of the distance from its edge, may be on it to the bit.
 constexpr double kBorderRounds = 32;
 
@@ -186,13 +188,15 @@ class StepModel::Run {
         before_(model.before_),
         wanted_(wanted),
         disturbed_(wanted.disturbance != 0),
-        noise_(wanted.disturbance),
-        repeats_(wanted.disturbance > 0 && (wanted.disturbance - 1) / 2 % 2 == 1),
+        kind_(wanted.disturbance > 0
+                  ? static_cast<Kind>(((wanted.disturbance - 1) / 2 + (wanted.disturbance - 1) / 24) % 3)
+                  : Kind::independent),
+        noise_(wanted.disturbance, kind_ == Kind::alike ? kAlikeRounds * model.u_ : 0),
         lasting_((wanted.disturbance + 1) / 2, wanted.disturbance % 2 == 0 ? -1 : +1),
         lost_(static_cast<Lost>(wanted.disturbance % 4)),
         coordinate_(wanted.disturbance / 4 % 6),
         threshold_(degenerate_rounds(model.u_) * model.u_ / static_cast<double>(2 << wanted.disturbance / 4 % 4)),
-        border_(wanted.disturbance / 4 % 5 == 2 || wanted.disturbance / 4 % 5 == 4 ? kBorderRounds * model.u_ : 0),
+        border_(static_cast<ContactModel::Border>(wanted.disturbance / 4 % 5 % 3)),
         u_(model.u_),
         decisions_(wanted.settled, wanted.near, model.u_),
         stores_positions_(before_.precision != Precision::binary32) {
@@ -258,7 +262,15 @@ class StepModel::Run {
 
   // What is rounded: of clusters and of particles.
   enum class Rounded : uint8_t { shape, prediction, place, push, end, impulse };
-  void round(Rounded what, std::size_t index) { noise_.name(static_cast<uint64_t>(what), index, repeats_ ? 0 : time_); }
+  void round(Rounded what, std::size_t index) {
+    noise_.name(static_cast<uint64_t>(what), index, kind_ == Kind::independent ? time_ : 0);
+  }
+
+  // How the single roundings of a disturbed run go together, two runs this way, the next two that way: not at all; each
+  // is the same in every iteration and substep, as of iterates that hardly change; and equal numbers round alike too,
+  // as of a body that falls as a whole, or of the layers of a regular one: what is summed over them grows with their
+  // number.
+  enum class Kind : uint8_t { independent, repeated, alike };
 
   // How a disturbed run draws the rotation of a cluster whose matrix is no more than rounding, one run this way, the
   // next that way: the best of that noise; any; the best where places differ in one coordinate alone, as they do on
@@ -274,13 +286,13 @@ class StepModel::Run {
   const State& before_;
   const Wanted& wanted_;
   const bool disturbed_;
+  const Kind kind_;
   Noise noise_;            // of single roundings
-  const bool repeats_;     // each is the same in every iteration and substep
   OppositeNoise lasting_;  // of what stays the same throughout a run
   const Lost lost_;
   const std::size_t coordinate_;  // of ±x, ±y, ±z
   const double threshold_;        // of this run, for what is degenerate
-  const double border_;           // of this run: what is as near to a border of the blade lies on it
+  const ContactModel::Border border_;
   const double u_;
   Decisions decisions_;
   const bool stores_positions_;
@@ -431,7 +443,7 @@ void StepModel::Run::match_shapes(int32_t s, int32_t j) {
     Mat3 r;
     if (disturbed_) {
       const double norm_of_a = a.norm();
-      round(Rounded::shape, at(c));
+      round(Rounded::shape, noise_.key(norm_of_a, at(c)));
       for (int row = 0; row < 3; ++row) {
         for (int column = 0; column < 3; ++column) {
           // Methods for rotations are stable with respect to the norm of their matrix, not entry by entry.
@@ -482,7 +494,7 @@ void StepModel::Run::substep(int32_t s) {
   const std::vector<Wall> walls = walls_now();
   const bool down = setup_.has_blade && setup_.blade_moves[at(index)].down;
   const BladeMove move = down ? move_now(setup_.blade_moves[at(index)]) : BladeMove{};
-  const ContactModel contacts(setup_, down ? &move : nullptr, walls, border_);
+  const ContactModel contacts(setup_, down ? &move : nullptr, walls, border_, kBorderRounds * u_);
   std::vector<const Grip*> held(out_.x.size(), nullptr);
   for (const Grip& grip : setup_.grips) {
     if (grip.active[at(index)] == 0) continue;
@@ -518,6 +530,7 @@ void StepModel::Run::substep(int32_t s) {
     predicted[i] = start[i] + inertia;
     if (disturbed_) predicted[i] += noise_.off(u_ * stored(i, predicted[i]), 2 * u_ * norm(inertia));
     began[i] = {start[i], contacts.height_at_start(start[i])};
+    if (border_ == ContactModel::Border::any) began[i].angle = std::numbers::pi * noise_();
     if (disturbed_ && contacts.has_plate()) {
       began[i].height += kContactRounds * u_ * norm(start[i] - move.from.edge) * noise_();
     }

@@ -347,7 +347,7 @@ TEST(StepModel, DrawsEachCoordinateWhereAMatrixIsLostAndThePreviousRotation) {
   const StepModel model(setup, scene.before, 0x1p-24);
   const auto nearest_to = [&](Vec3 way) {
     double nearest = 2;
-    for (uint64_t run = 1; run <= 32; ++run) {
+    for (uint64_t run = 1; run <= 48; ++run) {
       const Mat3 r = model.run({{}, run, 2e-3 * kSpacing, {}}).rotation[0];
       nearest = std::min(nearest, norm(Vec3{r(0, 0), r(1, 0), r(2, 0)} - way));
     }
