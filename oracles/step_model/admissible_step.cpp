@@ -451,11 +451,10 @@ class Search {
       open.push_back(std::move(next));
       std::push_heap(open.begin(), open.end(), comes_later);
     };
-    // What of it is forced.
-    const auto try_out = [&](Settled settled) -> Settled {
-      if (tried >= most_outcomes_ || !seen.insert(settled).second) return {};
+    const auto try_out = [&](const Settled& settled) -> std::optional<Branch> {
+      if (tried >= most_outcomes_ || !seen.insert(settled).second) return std::nullopt;
       ++tried;
-      Branch next = start(std::move(settled));
+      Branch next = start(settled);
       next.bounds = root.bounds;  // until it is worth a closer look
       compare(next);
       if (closely || next.violations.size() <= best.violations.size()) {
@@ -464,27 +463,31 @@ class Search {
       } else {
         next.ties = near_ties(next, root);
       }
-      const Settled forced = next.forced;
-      keep(std::move(next));
-      return forced;
+      keep(next);
+      return next;
     };
-    // A fit adds up what ties do one by one. Where others go the other way they need not be open any more.
-    const auto try_fitted = [&](const Branch& branch) {
-      Settled settled = fitted(branch);
-      for (Settled forced = try_out(settled); !forced.empty() && !best.holds(); forced = try_out(settled)) {
-        for (const auto& [key, outcome] : forced) {
-          settled.erase(key);
-          settled.erase(key.all_alike());
+    // Many ties at once: those of a layer that one rounding of its wall tips, or of particles far from each other. From
+    // there again, as long as that brings it nearer.
+    const auto try_fitted = [&](Branch branch) {
+      for (double before = kInfinite; !best.holds() && square_left(branch) < before;) {
+        before = square_left(branch);
+        Settled settled = fitted(branch);
+        std::optional<Branch> next = try_out(settled);
+        // A fit adds up what ties do one by one. Where others go the other way they need not be open any more.
+        while (next && !next->forced.empty()) {
+          for (const auto& [key, outcome] : next->forced) {
+            settled.erase(key);
+            settled.erase(key.all_alike());
+          }
+          next = try_out(settled);
         }
+        if (!next) return;
+        branch = std::move(*next);
       }
     };
     if (other_root && !best.holds() && seen.insert(other_root->settled).second) keep(*other_root);
-    // Many ties at once: those of a layer that one rounding of its wall tips, or of particles far from each other.
     if (other_root && !best.holds()) try_fitted(*other_root);
-    for (std::size_t before = best.violations.size() + 1; !best.holds() && best.violations.size() < before;) {
-      before = best.violations.size();
-      try_fitted(Branch(best));
-    }
+    if (!best.holds()) try_fitted(Branch(best));
     while (!open.empty() && !best.holds() && tried < most_outcomes_) {
       std::pop_heap(open.begin(), open.end(), comes_later);
       const Branch present = std::move(open.back());
@@ -552,6 +555,11 @@ class Search {
     std::vector<Vec3> left(2 * before_.x.size());
     for (const auto& [k, way] : off_outcome(after_.x, after_.v, branch.outcome)) left[k] = way;
     return left;
+  }
+  double square_left(const Branch& branch) const {
+    double square = 0;
+    for (const Vec3& way : left_by(branch)) square += dot(way, way);
+    return square;
   }
   static double gain_of(const Column& column, const std::vector<Vec3>& left) {
     double gain = 0;

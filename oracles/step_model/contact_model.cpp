@@ -36,6 +36,12 @@ ContactModel::ContactModel(const Setup& setup, const BladeMove* move, const std:
   friction_ = friction_ || blade_friction_ > 0;
 }
 
+double ContactModel::height_at_start(Vec3 start) const {
+  if (!plate_) return 1;
+  const Local c = to_local(from_, start - from_.edge);
+  return border_ == Border::exact && std::abs(c.n) <= near_ * std::hypot(c.u, c.n, c.w) ? 0 : c.n;
+}
+
 int ContactModel::side_of(const Began& began, Decisions& decisions) const {
   return decisions.exceeds(DecisionKind::side, -began.height) ? -1 : +1;
 }

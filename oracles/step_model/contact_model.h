@@ -23,7 +23,7 @@ class ContactModel {
   bool path_matters() const { return plate_ || friction_; }
 
   // Over the plane of the blade at the start of the substep [m]; its sign is the particle's side.
-  double height_at_start(Vec3 start) const { return plate_ ? to_local(from_, start - from_.edge).n : 1; }
+  double height_at_start(Vec3 start) const;
 
   // One particle in one substep: where it began, and how high over the blade's plane.
   struct Began {

@@ -196,7 +196,9 @@ class StepModel::Run {
         lost_(static_cast<Lost>(wanted.disturbance % 4)),
         coordinate_(wanted.disturbance / 4 % 6),
         threshold_(degenerate_rounds(model.u_) * model.u_ / static_cast<double>(2 << wanted.disturbance / 4 % 4)),
-        border_(static_cast<ContactModel::Border>(wanted.disturbance / 4 % 5 % 3)),
+        border_(wanted.disturbance == 0 && model.before_.precision == Precision::binary32
+                    ? ContactModel::Border::exact
+                    : static_cast<ContactModel::Border>(wanted.disturbance / 4 % 5 % 3)),
         u_(model.u_),
         decisions_(wanted.settled, wanted.near, model.u_),
         stores_positions_(before_.precision != Precision::binary32) {
