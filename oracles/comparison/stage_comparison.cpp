@@ -160,8 +160,11 @@ void StageComparison::compare_step(const State& before, const State& after, Stag
     found.undecidable.undecided = step.undecided;
     const auto elsewhere = [&] {
       for (std::size_t i = 0; i < expected.x.size(); ++i) {
+        if (before.alive[i] == 0) continue;
         const double off = norm(expected.x[i] - step.outcome.x[i]) / setup_.body.grid.spacing;
-        if (before.alive[i] != 0 && !(off <= step.position_bound[i])) return true;
+        const double fast = norm(expected.v[i] - step.outcome.v[i]) * setup_.substep_length[at(before.frame)] /
+                            setup_.body.grid.spacing;
+        if (!(off <= step.position_bound[i]) || !(fast <= step.velocity_bound[i])) return true;
       }
       for (int32_t c = 0; c < clusters.count(); ++c) {
         const double turned = angle_between(expected.clusters.rotation[at(c)], step.outcome.rotation[at(c)]);

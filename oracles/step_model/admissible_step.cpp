@@ -504,6 +504,11 @@ class Search {
   // A tie the other way. `again`: and the same question in the substep's other iterations (what tips one iteration's
   // scale tips the next one's), and in turns of blade and walls.
   static Settled with_other(Settled settled, const NearDecision& tie, bool again) {
+    // Of two ways, back to what the numbers say is where it was before.
+    if (tie.key.kind != DecisionKind::way_out && settled.erase(tie.key) > 0) {
+      settled.erase(tie.key.all_alike());
+      return settled;
+    }
     settled[tie.key] = tie.other;
     if (again && tie.key.kind != DecisionKind::side) settled[tie.key.all_alike()] = tie.other;
     return settled;
