@@ -131,10 +131,9 @@ class Search {
     StepPart part = StepPart::position;
     int32_t where = -1;
     double measured = 0, bound = 0;
-    Settled forced;             // of what is settled, what goes against the numbers by more than rounding may
+    bool is_forced = false;     // settled otherwise than rounding may: no admissible outcome
     bool is_undecided = false;  // holds by what ties do that are in doubt
-    // A forced outcome is not admissible.
-    bool holds() const { return worst <= 1 && forced.empty(); }
+    bool holds() const { return worst <= 1 && !is_forced; }
   };
 
   Branch start(Settled settled) {
@@ -275,10 +274,10 @@ class Search {
     let_go(branch);
     ask_bluntly(branch);
     branch.ties.clear();
-    branch.forced.clear();
+    branch.is_forced = false;
     for (const NearDecision& d : branch.outcome.near) {
       const double rounding = kBeyondRuns * spread.at({d.key, d.other}) + d.rounding;
-      if (!d.is_natural && -d.lead > rounding) branch.forced[d.key] = d.taken;
+      if (!d.is_natural && -d.lead > rounding) branch.is_forced = true;
       if (d.lead <= rounding) branch.ties.push_back(d);
     }
     std::sort(branch.ties.begin(), branch.ties.end(),
@@ -437,7 +436,7 @@ class Search {
   bool explore(const Branch& root, const std::optional<Branch>& other_root, bool closely, Branch& best) {
     const auto is_nearer = [](const Branch& a, const Branch& b) {
       if (a.holds() != b.holds()) return a.holds();
-      if (a.forced.empty() != b.forced.empty()) return a.forced.empty();
+      if (a.is_forced != b.is_forced) return b.is_forced;
       return a.violations.size() < b.violations.size();
     };
     const auto comes_later = [&](const Branch& a, const Branch& b) {
@@ -471,16 +470,7 @@ class Search {
     const auto try_fitted = [&](Branch branch) {
       for (double before = kInfinite; !best.holds() && square_left(branch) < before;) {
         before = square_left(branch);
-        Settled settled = fitted(branch);
-        std::optional<Branch> next = try_out(settled);
-        // A fit adds up what ties do one by one. Where others go the other way they need not be open any more.
-        while (next && !next->forced.empty()) {
-          for (const auto& [key, outcome] : next->forced) {
-            settled.erase(key);
-            settled.erase(key.all_alike());
-          }
-          next = try_out(settled);
-        }
+        std::optional<Branch> next = try_out(fitted(branch));
         if (!next) return;
         branch = std::move(*next);
       }

@@ -389,8 +389,30 @@ TEST(AdmissibleStep, TakesALayerOnAWallAsOneRoundingPutsIt) {
   }
 }
 
-// Two particles at one place: how they fall apart is open, and by how far as well. One of them is pressed on a wall with
-// friction: more firmly than the other can pull, so that it is asked as sharply as any, or so loosely that it may slip.
+// A sheet that has slid 250 h, and that friction holds now: all numbers along that way are equal, and round alike.
+TEST(AdmissibleStep, KnowsThatEqualNumbersRoundAlike) {
+  StepScene scene{setup_of(block_body(40, 40, 1, kSpacing, 0.002)), {}, {}};
+  cutproof::Setup& setup = scene.setup;
+  setup.step.gravity = {0, 0, -9.81};
+  scene.before = state_of(setup.body, box_clusters(40, 40, 1, 4));
+  for (Vec3& x : scene.before.x) x.x += 250 * kSpacing;
+  round_to_single(setup.body, scene.before);
+  setup.walls = {{.axis = 2, .side = +1, .offset = scene.before.x[0].z, .friction = 1}};
+  scene.take_step();
+  round_to_single(setup.body, scene.after);
+  expect_holds(admissible_step(setup, scene.before, scene.after));
+  // What a contact gives back of what rounded away, of each particle the same.
+  const Vec3 one_rounding = {0x1p-24 * 250 * kSpacing * 0.002 * 1600 / setup.substep_length[0], 0, 0};
+  State off = scene.after;
+  off.impulse += one_rounding;
+  expect_holds(admissible_step(setup, scene.before, off));
+  off.impulse += 200 * one_rounding;
+  EXPECT_FALSE(admissible_step(setup, scene.before, off).holds);
+}
+
+// Two particles at one place: how they fall apart is open, and by how far as well. One of them is pressed on a wall
+// with friction: more firmly than the other can pull, so that it is asked as sharply as any, or so loosely that it may
+// slip.
 TEST(AdmissibleStep, AsksSharplyWhatAContactHoldsFirmly) {
   for (const bool firmly : {true, false}) {
     StepScene scene{setup_of(block_body(2, 1, 1, kSpacing)), {}, {}};
