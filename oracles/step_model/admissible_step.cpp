@@ -459,6 +459,10 @@ class Search {
       if (closely || next.violations.size() <= best.violations.size()) {
         look_closer(next);
         compare(next);
+        if (!next.holds() && next.measured <= kBeyondRuns * next.bound) {
+          look_closer(next, kMostDisturbedRuns);
+          compare(next);
+        }
       } else {
         next.ties = near_ties(next, root);
       }
@@ -475,6 +479,17 @@ class Search {
         branch = std::move(*next);
       }
     };
+    // One rounding of the blade's plane may put all that begin in it on one side.
+    const Branch& first = other_root ? *other_root : root;
+    for (const int side : {1, 0}) {
+      Settled settled = first.settled;
+      for (const NearDecision& tie : first.ties) {
+        if (tie.key.kind == DecisionKind::side) settled[tie.key] = side;
+      }
+      if (best.holds()) break;
+      const std::optional<Branch> next = try_out(settled);
+      if (next && !best.holds()) try_fitted(*next);
+    }
     if (other_root && !best.holds() && seen.insert(other_root->settled).second) keep(*other_root);
     if (other_root && !best.holds()) try_fitted(*other_root);
     if (!best.holds()) try_fitted(Branch(best));
