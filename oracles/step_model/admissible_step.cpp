@@ -391,7 +391,8 @@ class Search {
     const StepOutcome& o = branch.outcome;
     const Bounds& b = branch.bounds;
     const Own off = own(after_.x, o.x, 1), fast = own(after_.v, o.v, dt_);
-    std::vector<uint8_t> shares(violates.size(), 0);  // with one that is asked bluntly
+    std::vector<uint8_t> shares = branch.blunt;  // with one that is asked bluntly, or is one
+    shares.resize(violates.size(), 0);
     for (int32_t c = 0; c < before_.clusters.count() && !branch.blunt.empty(); ++c) {
       const auto members = before_.clusters.of(c);
       if (std::none_of(members.begin(), members.end(), [&](int32_t i) { return branch.blunt[at(i)] != 0; })) continue;
