@@ -295,13 +295,14 @@ class Search {
     };
     const Bounds known = b;
     for (int32_t c = 0; c < before_.clusters.count(); ++c) {
-      const double beside = widest(known.position, c);
+      const double beside = widest(known.position, c), fast = widest(known.velocity, c);
+      const double own_beside = widest(known.own_position, c), own_fast = widest(known.own_velocity, c);
       for (const int32_t i : before_.clusters.of(c)) {
         if (!(branch.outcome.hold[at(i)] < beside)) continue;
         b.position[at(i)] = std::max(b.position[at(i)], beside);
-        b.velocity[at(i)] = std::max(b.velocity[at(i)], widest(known.velocity, c));
-        b.own_position[at(i)] = std::max(b.own_position[at(i)], widest(known.own_position, c));
-        b.own_velocity[at(i)] = std::max(b.own_velocity[at(i)], widest(known.own_velocity, c));
+        b.velocity[at(i)] = std::max(b.velocity[at(i)], fast);
+        b.own_position[at(i)] = std::max(b.own_position[at(i)], own_beside);
+        b.own_velocity[at(i)] = std::max(b.own_velocity[at(i)], own_fast);
       }
     }
   }
@@ -654,7 +655,9 @@ class Search {
     Settled decided = branch.settled;
     for (const NearDecision& d : branch.outcome.near) decided[d.key] = d.taken;
     for (const Column& column : columns_of(branch, std::numeric_limits<std::size_t>::max(), {false})) {
-      if (!(4 * gain_of(column, left) > column.square)) continue;
+      // What the search has settled is not excused as well.
+      const bool is_settled = branch.settled.contains(column.settled.begin()->first);
+      if (is_settled || !(4 * gain_of(column, left) > column.square)) continue;
       for (const auto& [key, outcome] : column.settled) decided.erase(key);
       const StepOutcome other = model_.run({with(branch.settled, column.settled), 0, kNear * h_, branch.given});
       explained.bounds.combine(off_by(other, branch.outcome), std::plus());

@@ -167,11 +167,13 @@ Vec3 ContactModel::place(Vec3 free, const Began& began, Present* present, Decisi
   bool in_turn = false;
   Vec3 placed = nearest(free, began, decisions, &in_turn);
   double least = std::numeric_limits<double>::infinity();
-  // Walls alone, each as deep as that; or the blade alone.
-  if (!(placed == free)) least = norm(placed - free);
-  for (const Wall& wall : walls_) {
-    const double pressed = wall.side * (wall.offset - free[wall.axis]);
-    if (pressed > 0) least = std::min(least, pressed);
+  if (hold != nullptr && !(placed == free)) {
+    // Walls alone, each as deep as that; or the blade alone. (Both: in turn, which holds nothing firmly.)
+    least = norm(placed - free);
+    for (const Wall& wall : walls_) {
+      const double pressed = wall.side * (wall.offset - free[wall.axis]);
+      if (pressed > 0) least = std::min(least, pressed);
+    }
   }
   if (friction_ && (in_turn || !(placed == free))) {
     for (const Wall& wall : walls_) {

@@ -15,13 +15,7 @@ class Noise {
   explicit Noise(uint64_t seed, double alike = 0)
       : alike_(alike), seed_(seed * 0x9e3779b97f4a7c15u), state_(seed_), of_equals_(seed_) {}
   virtual ~Noise() = default;
-  virtual double operator()() {
-    uint64_t z = (state_ += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    z ^= z >> 31;
-    return static_cast<double>(z >> 11) * 0x1p-52 - 1;
-  }
+  virtual double operator()() { return drawn(state_); }
   // Draws from here on are those of this name, whatever was drawn before.
   void name(uint64_t what, uint64_t index, uint64_t time) {
     const auto of = [&](uint64_t k) { return seed_ ^ (what << 60 ^ time << 32 ^ k) * 0xd1342543de82ef95u; };
@@ -44,15 +38,22 @@ class Noise {
     Vec3 r = vector();
     for (int k = 0; alike_ > 0 && k < 3; ++k) {
       if (size[k] == 0) continue;
-      Noise equals(*this);
-      equals.state_ = of_equals_ ^ key(size[k], 0) << 2 ^ static_cast<uint64_t>(k);
-      r[k] = equals();
+      uint64_t state = of_equals_ ^ key(size[k], 0) << 2 ^ static_cast<uint64_t>(k);
+      r[k] = drawn(state);
     }
     of_equals_ = of_equals_ * 0xd1342543de82ef95u + 1;  // what is drawn next is another rounding
     return {r.x * (std::abs(size.x) + more), r.y * (std::abs(size.y) + more), r.z * (std::abs(size.z) + more)};
   }
 
  private:
+  static double drawn(uint64_t& state) {
+    uint64_t z = (state += 0x9e3779b97f4a7c15u);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    z ^= z >> 31;
+    return static_cast<double>(z >> 11) * 0x1p-52 - 1;
+  }
+
   double alike_;
   uint64_t seed_, state_, of_equals_;
 };

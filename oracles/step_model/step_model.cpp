@@ -292,9 +292,9 @@ class StepModel::Run {
   Noise noise_;            // of single roundings
   OppositeNoise lasting_;  // of what stays the same throughout a run
   const Lost lost_;
-  const std::size_t coordinate_;  // of ±x, ±y, ±z
-  const double threshold_;        // of this run, for what is degenerate
-  const ContactModel::Border border_;
+  const std::size_t coordinate_;       // of ±x, ±y, ±z
+  const double threshold_;             // of this run, for what is degenerate
+  const ContactModel::Border border_;  // dealt out among the runs (tolerances.md, Borders of the blade)
   const double u_;
   Decisions decisions_;
   const bool stores_positions_;
@@ -506,7 +506,8 @@ void StepModel::Run::substep(int32_t s) {
   const std::vector<Vec3> start = out_.x;
   std::vector<Vec3> predicted(start.size());
   std::vector<ContactModel::Began> began(start.size());
-  Vec3 pushed, pushed_earlier;  // Σ m times displacements by contacts and grips, carried on as backends do
+  // Of a disturbed run: Σ m times displacements by contacts and grips, carried on as backends do.
+  Vec3 pushed, pushed_earlier;
   rounding_now_.assign(start.size(), 0);
   own_now_.assign(start.size(), 0);
   shared_rounding_ = 0;
@@ -542,7 +543,7 @@ void StepModel::Run::substep(int32_t s) {
                                    : predicted[i];
     const bool is_pushed = !(out_.x[i] == predicted[i]);
     settle(i, predicted[i], out_.x[i], 2 * u_ * norm(inertia));
-    if (is_pushed) pushed += body_.mass[i] * (out_.x[i] - predicted[i]);
+    if (disturbed_ && is_pushed) pushed += body_.mass[i] * (out_.x[i] - predicted[i]);
   }
 
   std::vector<Vec3> earlier = out_.x, now;
@@ -616,14 +617,13 @@ void StepModel::Run::substep(int32_t s) {
   }
 
   const double decay = std::exp(-step.damping * dt);
-  // Exactly, the balance of momentum says the same, with nothing carried on.
-  if (!disturbed_) pushed = {};
   double pushed_rounding = pull * pull * shared_rounding_, summed = 0;
   const double carried_on = step.substeps - s, carrying = kParameterRounds * std::sqrt(step.iterations + 1.0);
   for (std::size_t i = 0; i < start.size(); ++i) {
     if (before_.alive[i] == 0) continue;
     const Vec3 push = out_.x[i] - predicted[i];
     round(Rounded::end, i);
+    // Exactly, the balance of momentum says the same, with nothing carried on.
     if (!disturbed_) pushed += body_.mass[i] * push;
     // A backend adds up what contacts do in each iteration.
     if (disturbed_) pushed += body_.mass[i] * noise_.off((carrying * u_) * push, 0);
