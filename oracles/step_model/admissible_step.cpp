@@ -655,9 +655,7 @@ class Search {
     Settled decided = branch.settled;
     for (const NearDecision& d : branch.outcome.near) decided[d.key] = d.taken;
     for (const Column& column : columns_of(branch, std::numeric_limits<std::size_t>::max(), {false})) {
-      // What the search has settled is not excused as well.
-      const bool is_settled = branch.settled.contains(column.settled.begin()->first);
-      if (is_settled || !(4 * gain_of(column, left) > column.square)) continue;
+      if (!(4 * gain_of(column, left) > column.square)) continue;
       for (const auto& [key, outcome] : column.settled) decided.erase(key);
       const StepOutcome other = model_.run({with(branch.settled, column.settled), 0, kNear * h_, branch.given});
       explained.bounds.combine(off_by(other, branch.outcome), std::plus());
