@@ -294,7 +294,7 @@ class StepModel::Run {
   const Lost lost_;
   const std::size_t coordinate_;       // of ±x, ±y, ±z
   const double threshold_;             // of this run, for what is degenerate
-  const ContactModel::Border border_;  // dealt out among the runs (tolerances.md, Borders of the blade)
+  const ContactModel::Border border_;  // dealt out among the runs (tolerances.md, The step again)
   const double u_;
   Decisions decisions_;
   const bool stores_positions_;
