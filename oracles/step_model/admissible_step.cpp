@@ -37,6 +37,8 @@ constexpr double kNear = 2e-3;
 // Outcomes that are tried for one coupled set, and what they may cost in all [evaluations].
 constexpr int kMostOutcomes = 1024;
 constexpr int64_t kMostEvaluations = 20'000'000;
+// Particles whose own ways are looked through, and how many ways of each.
+constexpr std::size_t kFollowed = 4, kMostWays = 128;
 // How often a fit goes through all ties; it ends when none brings it nearer.
 constexpr int kFitPasses = 32;
 
@@ -474,8 +476,8 @@ class Search {
     // Many ties at once: those of a layer that one rounding of its wall tips, or of particles far from each other. From
     // there again, as long as that brings it nearer.
     const auto try_fitted = [&](Branch branch) {
-      for (double before = kInfinite; !best.holds() && square_left(branch) < before;) {
-        before = square_left(branch);
+      for (double before = kInfinite; !best.holds() && square_left(branch.outcome) < before;) {
+        before = square_left(branch.outcome);
         std::optional<Branch> next = try_out(fitted(branch));
         if (!next) return;
         branch = std::move(*next);
@@ -495,6 +497,11 @@ class Search {
     if (other_root && !best.holds() && seen.insert(other_root->settled).second) keep(*other_root);
     if (other_root && !best.holds()) try_fitted(*other_root);
     if (!best.holds()) try_fitted(Branch(best));
+    for (bool any = true; any && !best.holds();) {
+      const std::optional<Settled> way = way_of_farthest(best);
+      any = way.has_value() && try_out(*way).has_value();
+      if (any && !best.holds()) try_fitted(Branch(best));
+    }
     while (!open.empty() && !best.holds() && tried < most_outcomes_) {
       std::pop_heap(open.begin(), open.end(), comes_later);
       const Branch present = std::move(open.back());
@@ -512,7 +519,7 @@ class Search {
   // scale tips the next one's), and in turns of blade and walls.
   static Settled with_other(Settled settled, const NearDecision& tie, bool again) {
     // Of two ways, back to what the numbers say is where it was before.
-    if (tie.key.kind != DecisionKind::way_out && settled.erase(tie.key) > 0) {
+    if (tie.key.kind != DecisionKind::way_out && !tie.is_natural && settled.erase(tie.key) > 0) {
       settled.erase(tie.key.all_alike());
       return settled;
     }
@@ -563,14 +570,14 @@ class Search {
     return settled;
   }
   // How far the backend is from an outcome, as columns are.
-  std::vector<Vec3> left_by(const Branch& branch) const {
+  std::vector<Vec3> left_by(const StepOutcome& outcome) const {
     std::vector<Vec3> left(2 * before_.x.size());
-    for (const auto& [k, way] : off_outcome(after_.x, after_.v, branch.outcome)) left[k] = way;
+    for (const auto& [k, way] : off_outcome(after_.x, after_.v, outcome)) left[k] = way;
     return left;
   }
-  double square_left(const Branch& branch) const {
+  double square_left(const StepOutcome& outcome) const {
     double square = 0;
-    for (const Vec3& way : left_by(branch)) square += dot(way, way);
+    for (const Vec3& way : left_by(outcome)) square += dot(way, way);
     return square;
   }
   static double gain_of(const Column& column, const std::vector<Vec3>& left) {
@@ -583,7 +590,7 @@ class Search {
   // squares, if what each of them does alone adds up.
   Settled fitted(const Branch& branch) const {
     std::vector<Column> columns = columns_of(branch, at(kDisturbedRuns + 1) * at(most_outcomes_), {true, false});
-    std::vector<Vec3> left = left_by(branch);
+    std::vector<Vec3> left = left_by(branch.outcome);
     // Of several ways of one decision, the one that brings it nearest comes first.
     for (Column& column : columns) column.nearer = 2 * gain_of(column, left) - column.square;
     std::stable_sort(columns.begin(), columns.end(),
@@ -602,6 +609,62 @@ class Search {
     Settled best = branch.settled;
     for (const Column& column : columns) {
       if (column.taken) best = with(std::move(best), column.settled);
+    }
+    return best;
+  }
+
+  // One particle alone may take several decisions on its way, each of which only comes up because of those before, and
+  // only all of them together lead where it is. So the ways of one are looked through, with few decisions taken
+  // otherwise first: of that which is farthest from where it should be, then of the next. What brings the whole
+  // nearest, if anything brings it nearer.
+  std::optional<Settled> way_of_farthest(const Branch& branch) const {
+    struct Way {
+      Settled settled;
+      std::vector<NearDecision> ties;  // that come after the last one taken otherwise
+    };
+    const auto ties_of = [&](int32_t i, const StepOutcome& outcome, const DecisionKey* last) {
+      std::map<std::pair<DecisionKey, int>, NearDecision> ties;
+      for (const NearDecision& d : outcome.near) {
+        if (d.key.particle != i || d.key.kind == DecisionKind::kept || (last != nullptr && d.key <= *last)) continue;
+        if (d.lead <= branch.bounds.position[at(i)] + d.rounding) ties.insert({{d.key, d.other}, d});
+      }
+      std::vector<NearDecision> listed;
+      for (const auto& [key, d] : ties) listed.push_back(d);
+      return listed;
+    };
+    std::map<int32_t, double> off;  // of those that have decisions to take
+    for (const NearDecision& d : branch.outcome.near) {
+      const std::size_t i = at(d.key.particle);
+      off[d.key.particle] =
+          std::max(norm(after_.x[i] - branch.outcome.x[i]), dt_ * norm(after_.v[i] - branch.outcome.v[i]));
+    }
+    std::vector<int32_t> farthest;
+    for (const auto& [i, distance] : off) farthest.push_back(i);
+    std::stable_sort(farthest.begin(), farthest.end(), [&](int32_t a, int32_t b) { return off[a] > off[b]; });
+    if (farthest.size() > kFollowed) farthest.resize(kFollowed);
+
+    double least = square_left(branch.outcome);
+    std::optional<Settled> best;
+    for (const int32_t i : farthest) {
+      std::set<Settled> seen = {branch.settled};
+      std::vector<Way> ways = {{branch.settled, ties_of(i, branch.outcome, nullptr)}};
+      // In order: all with one decision taken otherwise, all with two, ...
+      for (std::size_t k = 0; k < ways.size() && seen.size() < kMostWays; ++k) {
+        const Way way = ways[k];
+        for (const NearDecision& tie : way.ties) {
+          for (const bool again : {true, false}) {
+            const Settled settled = with_other(way.settled, tie, again);
+            if (seen.size() >= kMostWays || !seen.insert(settled).second) continue;
+            const StepOutcome o = model_.run({settled, 0, kNear * h_, branch.given});
+            if (const double square = square_left(o); square < least) {
+              least = square;
+              best = settled;
+            }
+            ways.push_back({settled, ties_of(i, o, &tie.key)});
+          }
+        }
+      }
+      if (best) return best;
     }
     return best;
   }
@@ -651,7 +714,7 @@ class Search {
   // from the backend by half of what that does.
   void count_undecided(Branch& branch) {
     Branch explained = branch;
-    const std::vector<Vec3> left = left_by(branch);
+    const std::vector<Vec3> left = left_by(branch.outcome);
     Settled decided = branch.settled;
     for (const NearDecision& d : branch.outcome.near) decided[d.key] = d.taken;
     for (const Column& column : columns_of(branch, std::numeric_limits<std::size_t>::max(), {false})) {

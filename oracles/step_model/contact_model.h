@@ -4,8 +4,12 @@
 #include "model/setup.h"
 #include "oracles/blade_motion.h"
 #include "oracles/step_model/decisions.h"
+#include "oracles/step_model/noise.h"
 
 namespace cutproof::oracles {
+
+// How much ways into the blade's frame and back round, in units of u times the distance from its edge.
+inline constexpr double kContactRounds = 4;
 
 class ContactModel {
  public:
@@ -14,8 +18,9 @@ class ContactModel {
   // from the edge], is where the numbers say, or on it to the bit; or if it is near to both, it is led off the rim in
   // any direction.
   enum class Border : uint8_t { as_it_is, exact, any };
+  // `turns`: rounds between turns of blade and walls, as the arithmetic of that unit roundoff does; nullptr: exact.
   ContactModel(const Setup& setup, const BladeMove* move, const std::vector<Wall>& walls,
-               Border border = Border::as_it_is, double near = 0);
+               Border border = Border::as_it_is, double near = 0, Noise* turns = nullptr, double unit_roundoff = 0);
 
   bool any() const { return plate_ || !walls_.empty(); }
   bool has_plate() const { return plate_; }
@@ -30,6 +35,7 @@ class ContactModel {
     Vec3 start;
     double height = 0;
     double angle = 0;  // to the plane, under which it is led off the rim if that is open [rad]
+    Vec3 origin;       // of what a backend stores of its places
   };
 
   // Where a particle is that has a place already.
@@ -53,6 +59,7 @@ class ContactModel {
   Vec3 off_plate(Vec3 x, const Began& began, Decisions& decisions) const;
   Vec3 off_walls(Vec3 x) const;
   Vec3 nearest(Vec3 x, const Began& began, Decisions& decisions, bool* in_turn = nullptr) const;
+  Vec3 rounded(Vec3 x, const Began& began) const;
   int side_of(const Began& began, Decisions& decisions) const;
   struct OnBorder {
     Local place;
@@ -66,6 +73,8 @@ class ContactModel {
   BladePose from_, to_;
   double half_length_ = 0, depth_ = 0, clearance_ = 0, blade_friction_ = 0, near_ = 0;
   Border border_ = Border::as_it_is;
+  Noise* turns_ = nullptr;
+  double unit_roundoff_ = 0;
 };
 
 }  // namespace cutproof::oracles

@@ -27,8 +27,8 @@ struct DecisionKey {
   int32_t turn = 0;  // counts decisions of one kind within an evaluation of a particle; of a cluster its index
   DecisionKind kind = DecisionKind::side;
   friend auto operator<=>(const DecisionKey&, const DecisionKey&) = default;
-  // All of one kind that a particle has to take in a substep.
-  DecisionKey all_alike() const { return {substep, -1, particle, -1, kind}; }
+  // All of one kind that a particle has to take in a substep; of ways out those from this turn on, in each evaluation.
+  DecisionKey all_alike() const { return {substep, -1, particle, kind == DecisionKind::way_out ? turn : -1, kind}; }
 };
 
 // One that was near.
@@ -41,7 +41,7 @@ struct NearDecision {
 };
 
 // Decisions that are settled from outside: their outcomes by their keys, and by those of all that are alike, which are
-// followed where nothing else is said and the scales are all but even.
+// followed where nothing else is said and the scales are all but even (the last that speaks of the turn).
 using Settled = std::map<DecisionKey, int>;
 
 // Takes decisions of one run: as the numbers say, unless they are near and settled from outside.
@@ -82,8 +82,8 @@ class Decisions {
     const std::size_t natural = taken;
     if (const auto known = settled_.find(key); known != settled_.end()) {
       taken = static_cast<std::size_t>(known->second);
-    } else if (const auto alike = settled_.find(key.all_alike()); alike != settled_.end()) {
-      const auto wanted = static_cast<std::size_t>(alike->second);
+    } else if (const int alike = settled_alike(key); alike >= 0) {
+      const auto wanted = static_cast<std::size_t>(alike);
       if (std::abs(cost[wanted] - cost[taken]) <= kEven * near_) taken = wanted;
     }
     for (std::size_t k = 0; k < N; ++k) {
@@ -99,6 +99,17 @@ class Decisions {
 
  private:
   static constexpr double kEven = 0.005;  // of what is near
+
+  // -1: nothing is said of decisions like this one.
+  int settled_alike(const DecisionKey& key) const {
+    const DecisionKey alike = key.all_alike();
+    for (auto k = settled_.upper_bound(alike); k != settled_.begin();) {
+      --k;
+      if (k->first.substep != alike.substep || k->first.evaluation != -1 || k->first.particle != alike.particle) break;
+      if (k->first.kind == alike.kind) return k->second;
+    }
+    return -1;
+  }
 
   const Settled& settled_;
   double near_, unit_roundoff_;

@@ -24,7 +24,6 @@ namespace {
 // How much single operations round, in units of u times what they work on (tolerances.md, The step again).
 constexpr double kRotationRounds = 4;   // a rotation, about each axis, given its matrix
 constexpr double kParameterRounds = 4;  // what is made of parameters once: s, e^(-c dt), Chebyshev's weights
-constexpr double kContactRounds = 4;    // ways into the blade's frame and back
 // Where equal numbers round alike, they are equal to so many roundings: what has rounded before makes them differ.
 constexpr double kAlikeRounds = 256;
 // What is this near to a border of the blade, in roundings of the distance from its edge, may be on it to the bit.
@@ -496,7 +495,8 @@ void StepModel::Run::substep(int32_t s) {
   const std::vector<Wall> walls = walls_now();
   const bool down = setup_.has_blade && setup_.blade_moves[at(index)].down;
   const BladeMove move = down ? move_now(setup_.blade_moves[at(index)]) : BladeMove{};
-  const ContactModel contacts(setup_, down ? &move : nullptr, walls, border_, kBorderRounds * u_);
+  const ContactModel contacts(setup_, down ? &move : nullptr, walls, border_, kBorderRounds * u_,
+                              disturbed_ ? &noise_ : nullptr, u_);
   std::vector<const Grip*> held(out_.x.size(), nullptr);
   for (const Grip& grip : setup_.grips) {
     if (grip.active[at(index)] == 0) continue;
@@ -532,7 +532,7 @@ void StepModel::Run::substep(int32_t s) {
     round(Rounded::prediction, i);
     predicted[i] = start[i] + inertia;
     if (disturbed_) predicted[i] += noise_.off(u_ * stored(i, predicted[i]), 2 * u_ * norm(inertia));
-    began[i] = {start[i], contacts.height_at_start(start[i])};
+    began[i] = {start[i], contacts.height_at_start(start[i]), 0, start[i] - stored(i, start[i])};
     if (border_ == ContactModel::Border::any) began[i].angle = std::numbers::pi * noise_();
     if (disturbed_ && contacts.has_plate()) {
       began[i].height += kContactRounds * u_ * norm(start[i] - move.from.edge) * noise_();
