@@ -79,12 +79,56 @@ struct Bounds {
   }
 };
 
+// What is coupled, alone: all else is dead, and has no clusters.
+struct CoupledSet {
+  State before, after;
+  std::vector<int32_t> clusters;  // which of all they are
+
+  CoupledSet(const State& before_all, const State& after_all, const Partition& coupled, int32_t set)
+      : before(kinematics_of(before_all)), after(kinematics_of(after_all)) {
+    for (std::size_t i = 0; i < before.alive.size(); ++i) {
+      before.alive[i] = after.alive[i] = coupled.label[i] == set ? 1 : 0;
+    }
+    for (int32_t c = 0; c < before_all.clusters.count(); ++c) {
+      const auto members = before_all.clusters.of(c);
+      if (members.empty() || coupled.label[at(members.front())] != set) continue;
+      clusters.push_back(c);
+      take(before_all.clusters, c, before.clusters);
+      take(after_all.clusters, c, after.clusters);
+    }
+  }
+
+ private:
+  static State kinematics_of(const State& state) {
+    State copy;
+    copy.frame = state.frame;
+    copy.x = state.x;
+    copy.v = state.v;
+    copy.alive = state.alive;
+    copy.impulse = state.impulse;
+    copy.precision = state.precision;
+    return copy;
+  }
+  static void take(const Clusters& from, int32_t c, Clusters& to) {
+    const auto members = from.of(c);
+    to.members.insert(to.members.end(), members.begin(), members.end());
+    to.offsets.push_back(static_cast<int64_t>(to.members.size()));
+    to.number.push_back(from.number[at(c)]);
+    to.rotation.push_back(from.rotation[at(c)]);
+    to.rest_center.push_back(from.rest_center[at(c)]);
+    to.mass.push_back(from.mass[at(c)]);
+    to.degenerate.push_back(from.degenerate[at(c)]);
+  }
+};
+
 class Search {
  public:
-  Search(const Setup& setup, const State& before, const State& after)
+  // `of_all`: of the whole body; else of one coupled set, of which nobody has stated the impulse.
+  Search(const Setup& setup, const State& before, const State& after, bool of_all = true)
       : setup_(setup),
         before_(before),
         after_(after),
+        of_all_(of_all),
         h_(setup.body.grid.spacing),
         dt_(setup.substep_length[at(before.frame)]),
         model_(setup, before, std::max(unit_roundoff(before), unit_roundoff(after)) + kUnitRoundoff) {
@@ -104,15 +148,12 @@ class Search {
   }
 
   AdmissibleStep find() {
-    Branch branch = start({});
-    compare(branch);
-    if (!branch.holds()) {
-      look_closer(branch);
-      compare(branch);
-    }
-    if (!branch.holds()) {
-      look_closer(branch, kMostDisturbedRuns);
-      compare(branch);
+    Branch branch = looked_at({});
+    if (!branch.holds() && !branch.ties.empty() && of_all_ && coupled_.count > 1) {
+      if (Settled settled = settled_apart(branch); !settled.empty()) {
+        branch = looked_at(std::move(settled));
+        if (!branch.holds()) count_undecided(branch);
+      }
     }
     if (!branch.holds() && !branch.ties.empty()) branch = explain(std::move(branch));
     return report(std::move(branch));
@@ -137,6 +178,39 @@ class Search {
     bool is_undecided = false;  // holds by what ties do that are in doubt
     bool holds() const { return worst <= 1 && !is_forced; }
   };
+
+  // As closely as it takes.
+  Branch looked_at(Settled settled) {
+    Branch branch = start(std::move(settled));
+    compare(branch);
+    for (const uint64_t runs : {kDisturbedRuns, kMostDisturbedRuns}) {
+      if (branch.holds()) break;
+      look_closer(branch, runs);
+      compare(branch);
+    }
+    return branch;
+  }
+
+  // What is not coupled goes its way whatever the rest does: what a set decides is looked for in it alone, as long as
+  // that explains it.
+  Settled settled_apart(const Branch& branch) const {
+    std::set<int32_t> sets;
+    for (const int32_t i : branch.violations) sets.insert(coupled_.label[at(i)]);
+    Settled settled;
+    for (const int32_t set : sets) {
+      const CoupledSet alone(before_, after_, coupled_, set);
+      Search search(setup_, alone.before, alone.after, false);
+      Branch found = search.looked_at({});
+      if (!found.holds() && !found.ties.empty()) found = search.explain(std::move(found));
+      for (const auto& [key_alone, outcome] : found.settled) {
+        DecisionKey key = key_alone;
+        if (key.kind == DecisionKind::kept && key.turn >= 0) key.turn = alone.clusters[at(key.turn)];
+        settled[key] = outcome;
+      }
+      if (!found.holds()) break;
+    }
+    return settled;
+  }
 
   Branch start(Settled settled) {
     Branch branch;
@@ -380,7 +454,7 @@ class Search {
     }
     const double impulse = or_infinite(norm(after_.impulse - o.impulse));
     const double per_mass = mass_ > 0 ? dt_ / (mass_ * h_) : 0;
-    see(branch, StepPart::impulse, -1, impulse * per_mass, b.impulse * per_mass, branch.is_undecided);
+    if (of_all_) see(branch, StepPart::impulse, -1, impulse * per_mass, b.impulse * per_mass, branch.is_undecided);
     if (branch.worst <= 1) compare_own(branch, violates);
     for (std::size_t i = 0; i < violates.size(); ++i) {
       if (violates[i] != 0) branch.violations.push_back(static_cast<int32_t>(i));
@@ -771,6 +845,7 @@ class Search {
 
   const Setup& setup_;
   const State &before_, &after_;
+  const bool of_all_;
   const double h_, dt_;
   double mass_ = 0;
   StepModel model_;
