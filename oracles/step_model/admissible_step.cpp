@@ -171,6 +171,7 @@ class Search {
     std::vector<NearDecision> ties;   // that rounding may take the other way, known once looked at closely; settled too
     std::vector<int32_t> violations;  // particles beyond their bounds, or of clusters that are
     double worst = -1;                // of measured / bound
+    double left = 0;                  // how far the backend is from it: of positions and velocities, squares [m²]
     StepPart part = StepPart::position;
     int32_t where = -1;
     double measured = 0, bound = 0;
@@ -434,6 +435,7 @@ class Search {
     const StepOutcome& o = branch.outcome;
     const Bounds& b = branch.bounds;
     std::vector<uint8_t> violates(before_.x.size(), 0);
+    branch.left = square_left(o);
     for (std::size_t i = 0; i < violates.size(); ++i) {
       if (before_.alive[i] == 0) continue;
       const double off = or_infinite(norm(after_.x[i] - o.x[i]));
@@ -509,13 +511,13 @@ class Search {
     return best;
   }
 
-  // Tries outcomes until one holds, fewest violations first; `closely`: looks closely at each, not only at those that
+  // Tries outcomes until one holds, the nearest first; `closely`: looks closely at each, not only at those that
   // seem to be as good as the best. False: there are more than are tried.
   bool explore(const Branch& root, const std::optional<Branch>& other_root, bool closely, Branch& best) {
     const auto is_nearer = [](const Branch& a, const Branch& b) {
       if (a.holds() != b.holds()) return a.holds();
       if (a.is_forced != b.is_forced) return b.is_forced;
-      return a.violations.size() < b.violations.size();
+      return a.left < b.left;
     };
     const auto comes_later = [&](const Branch& a, const Branch& b) {
       return is_nearer(b, a) || (!is_nearer(a, b) && a.settled.size() > b.settled.size());
@@ -534,7 +536,7 @@ class Search {
       Branch next = start(settled);
       next.bounds = root.bounds;  // until it is worth a closer look
       compare(next);
-      if (closely || next.violations.size() <= best.violations.size()) {
+      if (closely || next.left <= best.left || next.violations.size() <= best.violations.size()) {
         look_closer(next);
         compare(next);
         if (!next.holds() && next.measured <= kBeyondRuns * next.bound) {
@@ -550,8 +552,8 @@ class Search {
     // Many ties at once: those of a layer that one rounding of its wall tips, or of particles far from each other. From
     // there again, as long as that brings it nearer.
     const auto try_fitted = [&](Branch branch) {
-      for (double before = kInfinite; !best.holds() && square_left(branch.outcome) < before;) {
-        before = square_left(branch.outcome);
+      for (double before = kInfinite; !best.holds() && branch.left < before;) {
+        before = branch.left;
         std::optional<Branch> next = try_out(fitted(branch));
         if (!next) return;
         branch = std::move(*next);
@@ -717,7 +719,7 @@ class Search {
     std::stable_sort(farthest.begin(), farthest.end(), [&](int32_t a, int32_t b) { return off[a] > off[b]; });
     if (farthest.size() > kFollowed) farthest.resize(kFollowed);
 
-    double least = square_left(branch.outcome);
+    double least = branch.left;
     std::optional<Settled> best;
     for (const int32_t i : farthest) {
       std::set<Settled> seen = {branch.settled};
@@ -743,12 +745,13 @@ class Search {
     return best;
   }
 
-  // Those that are open. What was settled is open again where that has not helped.
+  // Those that are open. What was settled is open again where that has not helped, or nobody can tell.
   static std::vector<NearDecision> with_violating_first(const Branch& branch) {
     std::vector<NearDecision> ties = branch.ties;
     const std::set<int32_t> violating(branch.violations.begin(), branch.violations.end());
     std::erase_if(ties, [&](const NearDecision& d) {
-      return branch.settled.contains(d.key) && !violating.contains(d.key.particle);
+      const bool is_blunt = !branch.blunt.empty() && branch.blunt[at(d.key.particle)] != 0;
+      return branch.settled.contains(d.key) && !violating.contains(d.key.particle) && !is_blunt;
     });
     std::stable_sort(ties.begin(), ties.end(), [&](const NearDecision& a, const NearDecision& b) {
       return violating.contains(a.key.particle) > violating.contains(b.key.particle);
