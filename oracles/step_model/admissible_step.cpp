@@ -745,13 +745,12 @@ class Search {
     return best;
   }
 
-  // Those that are open. What was settled is open again where that has not helped, or nobody can tell.
+  // Those that are open. What was settled is open again where that has not helped.
   static std::vector<NearDecision> with_violating_first(const Branch& branch) {
     std::vector<NearDecision> ties = branch.ties;
     const std::set<int32_t> violating(branch.violations.begin(), branch.violations.end());
     std::erase_if(ties, [&](const NearDecision& d) {
-      const bool is_blunt = !branch.blunt.empty() && branch.blunt[at(d.key.particle)] != 0;
-      return branch.settled.contains(d.key) && !violating.contains(d.key.particle) && !is_blunt;
+      return branch.settled.contains(d.key) && !violating.contains(d.key.particle);
     });
     std::stable_sort(ties.begin(), ties.end(), [&](const NearDecision& a, const NearDecision& b) {
       return violating.contains(a.key.particle) > violating.contains(b.key.particle);
