@@ -622,7 +622,6 @@ class Search {
     Settled settled;
     std::vector<std::pair<std::size_t, Vec3>> does;
     double square = 0;
-    double nearer = 0;  // by how much it alone brings the sum of squares nearer
     bool taken = false;
   };
   std::vector<Column> columns_of(const Branch& branch, std::size_t most, std::initializer_list<bool> ways) const {
@@ -667,10 +666,6 @@ class Search {
   Settled fitted(const Branch& branch) const {
     std::vector<Column> columns = columns_of(branch, at(kDisturbedRuns + 1) * at(most_outcomes_), {true, false});
     std::vector<Vec3> left = left_by(branch.outcome);
-    // Of several ways of one decision, the one that brings it nearest comes first.
-    for (Column& column : columns) column.nearer = 2 * gain_of(column, left) - column.square;
-    std::stable_sort(columns.begin(), columns.end(),
-                     [](const Column& a, const Column& b) { return a.nearer > b.nearer; });
     bool any = true;
     for (int pass = 0; any && pass < kFitPasses; ++pass) {
       any = false;
