@@ -17,9 +17,8 @@ double greatest_stretch(const Setup& setup, const State& state) {
   double greatest = 0;
   for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
     if (!state.alive[at(i)]) continue;
-    for (const int direction : {0, 2, 4}) {
-      const int32_t j = setup.body.neighbour(i, direction);
-      if (j >= 0 && state.alive[at(j)]) greatest = std::max(greatest, norm(state.x[at(i)] - state.x[at(j)]));
+    for (const int32_t j : setup.body.neighbours(i)) {
+      if (state.alive[at(j)]) greatest = std::max(greatest, norm(state.x[at(i)] - state.x[at(j)]));
     }
   }
   return greatest / setup.body.grid.spacing;

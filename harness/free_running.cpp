@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "model/at.h"
@@ -17,15 +18,16 @@ namespace {
 // Rounding of a neighbour distance, in units of u h.
 constexpr double kDistanceBand = 64;
 
-// d_i of method.md §4, among neighbours alive in `state` [m].
-double greatest_neighbour_distance(const Setup& setup, const State& state, int32_t particle) {
-  double greatest = 0;
-  for (int direction = 0; direction < 6; ++direction) {
-    const int32_t other = setup.body.neighbour(particle, direction);
-    if (other < 0 || !state.alive[at(other)]) continue;
-    greatest = std::max(greatest, norm(state.x[at(particle)] - state.x[at(other)]));
+// By how much the longest edge of a particle, among neighbours alive in `state`, is longer than allowed (method.md §4)
+// [h].
+double excess_of(const Setup& setup, const State& state, int32_t particle) {
+  double greatest = -std::numeric_limits<double>::infinity();
+  for (const int32_t other : setup.body.neighbours(particle)) {
+    if (!state.alive[at(other)]) continue;
+    const double limit = setup.detect.epsilon * setup.body.rest_length(particle, other);
+    greatest = std::max(greatest, norm(state.x[at(particle)] - state.x[at(other)]) - limit);
   }
-  return greatest;
+  return greatest / setup.body.grid.spacing;
 }
 
 }  // namespace
@@ -72,12 +74,8 @@ void FreeRunning::see(Stage stage, const State& after) {
       if (setup_.detect.criterion == Criterion::distance) {
         State present = expected;
         for (const int32_t i : expected.removed) present.alive[at(i)] = 1;
-        const double h = setup_.body.grid.spacing;
         double margin = 0;
-        for (const int32_t i : undecided) {
-          margin =
-              std::max(margin, std::abs(greatest_neighbour_distance(setup_, present, i) / h - setup_.detect.epsilon));
-        }
+        for (const int32_t i : undecided) margin = std::max(margin, std::abs(excess_of(setup_, present, i)));
         first.margin = margin;
         // Each end of an edge is off by at most the greatest error, so the edge's length by at most twice that.
         first.reach = 2 * frames_.back().position.max + kDistanceBand * unit_roundoff(after);

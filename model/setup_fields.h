@@ -13,15 +13,17 @@ namespace cutproof {
 
 // What the entries of a field are counted by.
 enum class SetupSpace {
-  one,       // one value
-  node,      // [nodes of the grid]
-  particle,  // [n]
-  frame,     // [frames]
-  substep,   // [frames · S]
-  stroke,    // [strokes]
-  wall,      // [walls]
-  grip,      // [grips]
-  free       // [a length of its own]
+  one,            // one value
+  node,           // [nodes of the grid]
+  particle,       // [n]
+  grid_particle,  // [n] on a grid, else empty
+  bare_particle,  // [n] of a bare graph, else empty
+  frame,          // [frames]
+  substep,        // [frames · S]
+  stroke,         // [strokes]
+  wall,           // [walls]
+  grip,           // [grips]
+  free            // [a length of its own]
 };
 
 struct SetupField {
@@ -39,7 +41,8 @@ namespace fields_detail {
 inline void know_every_member(const Setup& setup) {
   [[maybe_unused]] const auto& [body, step, detect, split, merge, expand, skin, walls, grips, has_blade, blade,
                                 substep_length, blade_moves, stroke_end] = setup;
-  [[maybe_unused]] const auto& [name, grid, node, particle_at, mass, origin, orientation] = body;
+  [[maybe_unused]] const auto& [name, grid, node, particle_at, rest, edge_offsets, edge_ends, mass, origin,
+                                orientation] = body;
   [[maybe_unused]] const auto& [nodes, spacing] = grid;
   [[maybe_unused]] const auto& [solver, substeps, iterations, stiffness, relaxation, acceleration, damping, gravity] =
       step;
@@ -74,8 +77,11 @@ constexpr void for_each_setup_field(Visit&& visit) {
   CUTPROOF_FIELD(body.grid.spacing, "body", "spacing", one, "m", 0, true);
   CUTPROOF_FIELD(body.origin, "body", "origin", one, "m");
   CUTPROOF_FIELD(body.orientation, "body", "orientation", one);
-  CUTPROOF_FIELD(body.node, "body", "node", particle, "1", 0);
+  CUTPROOF_FIELD(body.node, "body", "node", grid_particle, "1", 0);
   CUTPROOF_FIELD(body.particle_at, "body", "particle_at", node, "1", -1);
+  CUTPROOF_FIELD(body.rest, "body", "rest", bare_particle, "m");
+  CUTPROOF_FIELD(body.edge_offsets, "body", "edge_offsets", free, "1", 0);
+  CUTPROOF_FIELD(body.edge_ends, "body", "edge_ends", free, "1", 0);
   CUTPROOF_FIELD(body.mass, "body", "mass", particle, "kg", 0, true);
   CUTPROOF_FIELD(step.solver, "step", "solver", one);
   CUTPROOF_FIELD(step.substeps, "step", "substeps", one, "1", 1);

@@ -35,10 +35,20 @@ Stretch stretch_of(const TissueGraph& graph, const std::vector<Vec3>& x, int32_t
 // terms of second order.
 constexpr double kStretchBand = 16;  // [u]
 
-Demand demand_of_distance(double distance, double limit, double u) {
-  if (distance > limit * (1 + kStretchBand * u)) return Demand::remove;
-  if (distance < limit * (1 - kStretchBand * u)) return Demand::keep;
-  return Demand::either;
+// Of a bare graph the rest length is a distance as well, computed in double precision on both sides: 2 · 4u more.
+constexpr double kRestBand = 8;  // [2⁻⁵³]
+
+// An edge is too long beyond ε times its own rest length.
+Demand demand_of_distance(const Body& body, const TissueGraph& graph, const std::vector<Vec3>& x, int32_t i,
+                          double epsilon, double u) {
+  const double band = kStretchBand * u + (body.on_grid() ? 0 : kRestBand * kUnitRoundoff);
+  Demand demand = Demand::keep;
+  for (const int32_t other : graph.neighbours(i)) {
+    const double distance = norm(x[at(i)] - x[at(other)]), limit = epsilon * body.rest_length(i, other);
+    if (distance > limit * (1 + band)) return Demand::remove;
+    if (!(distance < limit * (1 - band))) demand = Demand::either;
+  }
+  return demand;
 }
 
 // From the nearest point of the rectangle to p.
@@ -187,7 +197,7 @@ void check_detection(const StageRun& run, Verdict& verdict) {
   const State &before = run.before, &after = run.after;
   const TissueGraph graph(setup.body, before.alive);
   const double h = setup.body.grid.spacing;
-  const double limit = setup.detect.epsilon * h, u = unit_roundoff(before);
+  const double epsilon = setup.detect.epsilon, u = unit_roundoff(before);
   const Criterion criterion = needs_detection(setup) ? setup.detect.criterion : Criterion::none;
   const Swept swept(setup, criterion == Criterion::geometric ? before.frame : setup.frame_count());
   const std::vector<StrainDemand> strained =
@@ -202,7 +212,8 @@ void check_detection(const StageRun& run, Verdict& verdict) {
     ++verdict.checked;
     if (!is) gone.push_back(i);
     const Stretch stretch = stretch_of(graph, before.x, i);
-    const Demand demand = criterion == Criterion::distance    ? demand_of_distance(stretch.distance, limit, u)
+    const Demand demand = criterion == Criterion::distance
+                              ? demand_of_distance(setup.body, graph, before.x, i, epsilon, u)
                           : criterion == Criterion::geometric ? swept.demand_of(stretch.distance, before.x[at(i)], u)
                           : criterion == Criterion::strain    ? strained[at(i)].demand
                                                               : Demand::keep;

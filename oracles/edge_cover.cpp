@@ -12,10 +12,10 @@ void check_edge_cover(Judged& judged, Verdict& verdict) {
   }
   const UncoveredEdges edges = uncovered_edges(judged.graph, judged.clusters);
   verdict.checked = edges.edges;
-  verdict.measured = static_cast<double>(edges.uncovered);
-  if (edges.uncovered == 0) return;
-  fail(verdict, {{}, {edges.a, edges.b}, {edges.a, edges.b}},
-       "no cluster holds both ends of the edge from particle {} to {}", edges.a, edges.b);
+  verdict.measured = static_cast<double>(edges.uncovered.size());
+  if (edges.uncovered.empty()) return;
+  const auto [a, b] = edges.uncovered.front();
+  fail(verdict, {{}, {a, b}, {a, b}}, "no cluster holds both ends of the edge from particle {} to {}", a, b);
 }
 
 }  // namespace cutproof::oracles

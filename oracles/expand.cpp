@@ -31,8 +31,8 @@ std::vector<uint8_t> singly_isolated(const TissueGraph& graph, const Clusters& c
 // Whether cluster c, with these additions, was reached along edges of G within `depth` layers, and whether each
 // addition of the first layer was called for.
 void check_additions(const Setup& setup, const TissueGraph& graph, const Clusters& before, int32_t c,
-                     const std::vector<int32_t>& added, const std::vector<uint8_t>& covered,
-                     std::vector<int32_t>& layer, Verdict& verdict) {
+                     const std::vector<int32_t>& added, const std::vector<Edge>& uncovered, std::vector<int32_t>& layer,
+                     Verdict& verdict) {
   const int32_t number = before.number[at(c)];
   // layer: 0 for old members, k for the k-th layer, -2 for additions not reached yet, -1 for all others.
   for (const int32_t i : before.of(c)) layer[at(i)] = 0;
@@ -40,12 +40,11 @@ void check_additions(const Setup& setup, const TissueGraph& graph, const Cluster
   for (const int32_t i : added) {
     if (setup.expand.rule == ExpandRule::published || setup.expand.depth > 1) break;
     bool adjacent = false, called_for = false;
-    for (int direction = 0; direction < 6 && graph.alive(i); ++direction) {
-      const int32_t other = graph.neighbour(i, direction);
-      if (other < 0 || layer[at(other)] != 0) continue;
+    for (const int32_t other : graph.neighbours(i)) {
+      if (layer[at(other)] != 0) continue;
       adjacent = true;
-      const int32_t low = direction % 2 == 0 ? i : other;  // the end from which the edge leaves in + direction
-      if (covered[at(low) * 3 + at(direction / 2)] == 0) called_for = true;
+      const Edge edge = {std::min(i, other), std::max(i, other)};
+      if (std::binary_search(uncovered.begin(), uncovered.end(), edge)) called_for = true;
     }
     if (!adjacent || called_for) continue;
     violate(verdict, {{number}, {i}},
@@ -87,7 +86,7 @@ void check_expansion(const StageRun& run, Verdict& verdict) {
   const TissueGraph graph(setup.body, before.alive);
   const bool idle = setup.expand.rule == ExpandRule::none || before.edge_covered;
   const bool published = setup.expand.rule == ExpandRule::published;
-  std::optional<std::vector<uint8_t>> covered;  // once a cluster has grown
+  std::optional<UncoveredEdges> open;  // once a cluster has grown
   const std::vector<uint8_t> isolated_before = published ? singly_isolated(graph, a) : std::vector<uint8_t>{};
   std::vector<int32_t> layer(at(graph.particle_count()), -1);
 
@@ -111,15 +110,16 @@ void check_expansion(const StageRun& run, Verdict& verdict) {
               added.front());
       continue;
     }
-    if (!covered) covered = covered_edges(graph, a);
-    check_additions(setup, graph, a, c, added, *covered, layer, verdict);
+    if (!open) open = uncovered_edges(graph, a);
+    check_additions(setup, graph, a, c, added, open->uncovered, layer, verdict);
   }
 
   if (setup.expand.rule == ExpandRule::edge_cover) {
     const UncoveredEdges edges = uncovered_edges(graph, b);
-    if (edges.uncovered > 0) {
-      violate(verdict, {{}, {edges.a, edges.b}, {edges.a, edges.b}},
-              "no cluster holds both ends of the edge from particle {} to {}", edges.a, edges.b);
+    if (!edges.uncovered.empty()) {
+      const auto [a_end, b_end] = edges.uncovered.front();
+      violate(verdict, {{}, {a_end, b_end}, {a_end, b_end}},
+              "no cluster holds both ends of the edge from particle {} to {}", a_end, b_end);
     } else if (!after.edge_covered) {
       violate(verdict, {}, "every edge is covered, but edge_covered does not say so");
     }

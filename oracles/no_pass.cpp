@@ -56,9 +56,10 @@ void check_no_pass(Judged& judged, Verdict& verdict) {
   for (int32_t i = 0; i < n; ++i) local[at(i)] = to_local(pose, state.x[at(i)] - pose.edge);
   for (int32_t i = 0; i < n; ++i) {
     if (!judged.alive(i) || held[at(i)] != 0) continue;
-    for (int axis = 0; axis < 3; ++axis) {
-      const int32_t other = judged.graph.neighbour(i, 2 * axis);
-      if (other < 0 || held[at(other)] != 0) continue;
+    for (const int32_t other : judged.graph.upper_neighbours(i)) {
+      if (held[at(other)] != 0) continue;
+      // The blade keeps a distance that edges no longer than h cannot reach across; longer ones may.
+      if (judged.body.rest_length(i, other) > judged.body.grid.spacing * (1 + 1e-9)) continue;
       ++verdict.checked;
       if (!crosses(setup.blade, local[at(i)], local[at(other)])) continue;
       violate(verdict, {{}, {i, other}, {i, other}},

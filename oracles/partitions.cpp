@@ -4,6 +4,7 @@
 #include <set>
 
 #include "oracles/oracles.h"
+#include "oracles/rest_places.h"
 #include "oracles/support.h"
 
 namespace cutproof::oracles {
@@ -59,37 +60,31 @@ int64_t distinct_pairs(const Partition& a, const Partition& b) {
   return static_cast<int64_t>(pairs.size());
 }
 
-std::vector<uint8_t> covered_edges(const TissueGraph& graph, const Clusters& clusters) {
-  std::vector<uint8_t> covered(at(graph.particle_count()) * 3, 0);
-  std::vector<int32_t> held_by(at(graph.particle_count()), -1);
+UncoveredEdges uncovered_edges(const TissueGraph& graph, const Clusters& clusters) {
+  const int32_t n = graph.particle_count();
+  std::vector<int64_t> first = {0};  // [n + 1] the index of a particle's first edge to a greater one
+  for (int32_t i = 0; i < n; ++i) first.push_back(first.back() + graph.upper_neighbours(i).size());
+  std::vector<uint8_t> covered(at(first.back()), 0);
+  std::vector<int32_t> held_by(at(n), -1);
   for (int32_t c = 0; c < clusters.count(); ++c) {
     for (const int32_t i : clusters.of(c)) held_by[at(i)] = c;
     for (const int32_t i : clusters.of(c)) {
-      for (int axis = 0; axis < 3; ++axis) {
-        const int32_t other = graph.neighbour(i, 2 * axis);
-        if (other >= 0 && held_by[at(other)] == c) covered[at(i) * 3 + at(axis)] = 1;
+      int64_t edge = first[at(i)];
+      for (const int32_t other : graph.upper_neighbours(i)) {
+        if (held_by[at(other)] == c) covered[at(edge)] = 1;
+        ++edge;
       }
     }
   }
-  return covered;
-}
-
-UncoveredEdges uncovered_edges(const TissueGraph& graph, const Clusters& clusters) {
-  const std::vector<uint8_t> covered = covered_edges(graph, clusters);
   UncoveredEdges result;
-  for (int32_t i = 0; i < graph.particle_count(); ++i) {
-    if (!graph.alive(i)) continue;
-    for (int axis = 0; axis < 3; ++axis) {
-      const int32_t other = graph.neighbour(i, 2 * axis);
-      if (other < 0) continue;
-      ++result.edges;
-      if (covered[at(i) * 3 + at(axis)] != 0) continue;
-      if (result.uncovered++ == 0) {
-        result.a = i;
-        result.b = other;
-      }
+  result.edges = first.back();
+  for (int32_t i = 0; i < n; ++i) {
+    int64_t edge = first[at(i)];
+    for (const int32_t other : graph.upper_neighbours(i)) {
+      if (covered[at(edge++)] == 0) result.uncovered.push_back({i, other});
     }
   }
+  std::sort(result.uncovered.begin(), result.uncovered.end());
   return result;
 }
 
@@ -103,19 +98,6 @@ Partition coupling_components(const Setup& setup, const State& state) {
   return components_of_coupling(TissueGraph(setup.body, state.alive), state.clusters);
 }
 
-namespace {
-
-// Exact: nodes have integer coordinates.
-bool collinear(const Grid& grid, int64_t a, int64_t b, int64_t c) {
-  const auto from_a = [&, p = grid.coordinates(a)](int64_t node) {
-    const auto q = grid.coordinates(node);
-    return Vec3{1.0 * (q[0] - p[0]), 1.0 * (q[1] - p[1]), 1.0 * (q[2] - p[2])};
-  };
-  return cross(from_a(b), from_a(c)) == Vec3{};
-}
-
-}  // namespace
-
 WeakCouplings weak_couplings(const Setup& setup, const State& state) {
   WeakCouplings weak;
   if (!well_formed(setup, state).holds) return weak;
@@ -123,19 +105,16 @@ WeakCouplings weak_couplings(const Setup& setup, const State& state) {
   const Clusters& clusters = state.clusters;
   const Memberships memberships = memberships_of(clusters, body.particle_count());
   for (int32_t c = 0; c < clusters.count(); ++c) {
-    std::map<int32_t, std::vector<int64_t>> shared;  // with each later cluster: the nodes of living particles
+    std::map<int32_t, std::vector<int32_t>> shared;  // with each later cluster: living particles
     for (const int32_t i : clusters.of(c)) {
       for (const int32_t other : memberships.of(i)) {
-        if (other > c && state.alive[at(i)] != 0) shared[other].push_back(body.node[at(i)]);
+        if (other > c && state.alive[at(i)] != 0) shared[other].push_back(i);
       }
     }
-    for (const auto& [other, nodes] : shared) {
-      const auto on_a_line = [&grid = body.grid, a = nodes.front(), b = nodes.back()](int64_t node) {
-        return collinear(grid, a, b, node);
-      };
-      if (nodes.size() == 1) {
+    for (const auto& [other, particles] : shared) {
+      if (particles.size() == 1) {
         ++weak.ball_joints;
-      } else if (std::all_of(nodes.begin(), nodes.end(), on_a_line)) {
+      } else if (is_on_a_line(body, particles)) {
         ++weak.hinges;
       }
     }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <compare>
 #include <cstdint>
 #include <iterator>
 #include <optional>
@@ -27,45 +28,26 @@ namespace cutproof::oracles {
 // The graph G of a well-formed state (method.md §1). `alive` may be that of another moment.
 class TissueGraph {
  public:
-  TissueGraph(const Body& body, const std::vector<uint8_t>& alive) : body_(body), alive_(alive) {
-    for (int direction = 0; direction < 6; ++direction) steps_[at(direction)] = body.grid.step(direction);
-  }
+  TissueGraph(const Body& body, const std::vector<uint8_t>& alive) : body_(body), alive_(alive) {}
   int32_t particle_count() const { return body_.particle_count(); }
   bool alive(int32_t particle) const { return alive_[at(particle)] != 0; }
-  // The particle at the other end of the edge of G that leaves an alive particle along kDirections[direction], or -1.
-  int32_t neighbour(int32_t particle, int direction) const {
-    const int32_t other = body_.particle_at[at(body_.node[at(particle)] + steps_[at(direction)])];
-    return other >= 0 && alive_[at(other)] != 0 ? other : -1;
-  }
-
-  // The other ends of the edges of G at a particle, in the order of kDirections; a dead one has none.
-  class Ends {
-   public:
-    const int32_t* begin() const { return ends_.data(); }
-    const int32_t* end() const { return ends_.data() + count_; }
-
-   private:
-    friend class TissueGraph;
-    std::array<int32_t, 6> ends_;
-    int count_ = 0;
-  };
-  Ends neighbours(int32_t particle) const { return ends(particle, 1); }
-  // Only those along +x, +y and +z: over all particles each edge once.
-  Ends upper_neighbours(int32_t particle) const { return ends(particle, 2); }
+  // The other ends of the edges of G at a particle, in the order of Body::neighbours; a dead one has none.
+  Neighbours neighbours(int32_t particle) const { return ends(particle, -1); }
+  // Only those with a greater number: over all particles each edge once.
+  Neighbours upper_neighbours(int32_t particle) const { return ends(particle, particle); }
 
  private:
-  Ends ends(int32_t particle, int every) const {
-    Ends found;
-    for (int direction = 0; direction < 6 && alive(particle); direction += every) {
-      const int32_t other = neighbour(particle, direction);
-      if (other >= 0) found.ends_[at(found.count_++)] = other;
+  Neighbours ends(int32_t particle, int32_t above) const {
+    Neighbours found;
+    if (!alive(particle)) return found;
+    for (const int32_t other : body_.neighbours(particle)) {
+      if (other > above && alive(other)) found.add(other);
     }
     return found;
   }
 
   const Body& body_;
   const std::vector<uint8_t>& alive_;
-  std::array<int64_t, 6> steps_ = {};
 };
 
 // Disjoint sets of 0 .. n - 1; the root of a set is its smallest element.
@@ -190,17 +172,15 @@ Partition components_of_coupling(const TissueGraph& graph, const Clusters& clust
 int64_t distinct_pairs(const Partition& a, const Partition& b);
 
 struct Edge {
-  int32_t a = -1, b = -1;
+  int32_t a = -1, b = -1;  // a < b
+  friend auto operator<=>(const Edge&, const Edge&) = default;
 };
 
-// The first edge of G that no cluster contains, and how many there are, in a well-formed state (I4).
+// The edges of G that no cluster contains, ascending, and how many there are in all, in a well-formed state (I4).
 struct UncoveredEdges {
   int64_t edges = 0;  // of G
-  int64_t uncovered = 0;
-  int32_t a = -1, b = -1;  // ends of the first one
+  std::vector<Edge> uncovered;
 };
 UncoveredEdges uncovered_edges(const TissueGraph& graph, const Clusters& clusters);
-// [3 n] 1 where some cluster contains both ends of the grid edge from particle i along axis d: entry 3 i + d.
-std::vector<uint8_t> covered_edges(const TissueGraph& graph, const Clusters& clusters);
 
 }  // namespace cutproof::oracles

@@ -3,14 +3,24 @@
 
 #include <algorithm>
 
+#include "model/bare_graph.h"
 #include "oracles/checks.h"
 
 namespace cutproof::oracles {
 namespace {
 
-// Where the body itself cannot be read safely, the rest is not looked at.
-void check_body_form(const Setup& setup, Verdict& verdict) {
-  const Body& body = setup.body;
+void check_bare_graph_form(const Body& body, Verdict& verdict) {
+  if (!body.node.empty() || !body.particle_at.empty()) {
+    return violate(verdict, {}, "the body has both nodes of a grid and edges of its own");
+  }
+  if (body.mass.size() != body.rest.size()) {
+    return violate(verdict, {}, "the body has {} masses for {} particles", body.mass.size(), body.rest.size());
+  }
+  const std::string problem = problem_of_edges(body);
+  if (!problem.empty()) violate(verdict, {}, "{}", problem);
+}
+
+void check_grid_form(const Body& body, Verdict& verdict) {
   const Grid& grid = body.grid;
   if (grid.nodes[0] < 0 || grid.nodes[1] < 0 || grid.nodes[2] < 0)
     return violate(verdict, {}, "the grid has a negative side");
@@ -21,7 +31,6 @@ void check_body_form(const Setup& setup, Verdict& verdict) {
   if (body.mass.size() != body.node.size()) {
     return violate(verdict, {}, "the body has {} masses for {} particles", body.mass.size(), body.node.size());
   }
-  if (!(grid.spacing > 0)) return violate(verdict, {}, "the grid's spacing is {}", grid.spacing);
   const int32_t n = body.particle_count();
   for (int32_t i = 0; i < n; ++i) {
     const int64_t node = body.node[at(i)];
@@ -42,6 +51,16 @@ void check_body_form(const Setup& setup, Verdict& verdict) {
       }
     }
   }
+}
+
+// Where the body itself cannot be read safely, the rest is not looked at.
+void check_body_form(const Setup& setup, Verdict& verdict) {
+  const Body& body = setup.body;
+  body.on_grid() ? check_grid_form(body, verdict) : check_bare_graph_form(body, verdict);
+  if (!verdict.holds) return;
+  if (!(body.grid.spacing > 0)) return violate(verdict, {}, "the body's spacing is {}", body.grid.spacing);
+  if (!body.on_grid() && setup.skin.wanted) return violate(verdict, {}, "a body without a grid has no skin");
+  const int32_t n = body.particle_count();
   const auto substeps = static_cast<std::size_t>(setup.frame_count()) * at(std::max(setup.step.substeps, 0));
   if (setup.has_blade && setup.blade_moves.size() != substeps) {
     return violate(verdict, {}, "{} blade moves for {} substeps", setup.blade_moves.size(), substeps);

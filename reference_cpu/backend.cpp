@@ -1,6 +1,7 @@
 #include <chrono>
 #include <stdexcept>
 
+#include "model/bare_graph.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::reference {
@@ -12,11 +13,16 @@ void require(bool condition, const char* what) {
 }
 
 void require_fit(const Setup& setup, const State& state) {
-  const std::size_t n = setup.body.node.size();
+  const auto n = static_cast<std::size_t>(setup.body.particle_count());
   const auto substeps = static_cast<std::size_t>(setup.frame_count() * setup.step.substeps);
   require(setup.body.mass.size() == n, "one mass per particle is needed");
   require(state.x.size() == n && state.v.size() == n && state.alive.size() == n,
           "x, v and alive need one entry per particle");
+  if (!setup.body.on_grid()) {
+    const std::string problem = problem_of_edges(setup.body);
+    require(problem.empty(), problem.c_str());
+    require(!setup.skin.wanted, "a bare graph has no skin");
+  }
   require(!setup.has_blade || setup.blade_moves.size() == substeps, "one blade move per substep is needed");
   for (const Grip& grip : setup.grips) {
     require(grip.active.size() == substeps && grip.displacement.size() == substeps,

@@ -14,18 +14,20 @@ namespace {
 // d_i: greatest current distance from particle i to a neighbour in G; 0 without neighbours.
 double greatest_neighbour_distance(const Body& body, const State& state, int32_t i) {
   double greatest = 0;
-  for (int direction = 0; direction < 6; ++direction) {
-    const int32_t j = body.neighbour(i, direction);
-    if (j >= 0 && state.alive[at(j)]) greatest = std::max(greatest, norm(state.x[at(i)] - state.x[at(j)]));
+  for (const int32_t j : body.neighbours(i)) {
+    if (state.alive[at(j)]) greatest = std::max(greatest, norm(state.x[at(i)] - state.x[at(j)]));
   }
   return greatest;
 }
 
 std::vector<uint8_t> too_far_apart(const Setup& setup, const State& state) {
-  const double limit = setup.detect.epsilon * setup.body.grid.spacing;
   std::vector<uint8_t> found(state.alive.size(), 0);
   for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
-    if (state.alive[at(i)]) found[at(i)] = greatest_neighbour_distance(setup.body, state, i) > limit;
+    if (!state.alive[at(i)]) continue;
+    for (const int32_t j : setup.body.neighbours(i)) {
+      const double limit = setup.detect.epsilon * setup.body.rest_length(i, j);
+      if (state.alive[at(j)] && norm(state.x[at(i)] - state.x[at(j)]) > limit) found[at(i)] = 1;
+    }
   }
   return found;
 }

@@ -43,9 +43,9 @@ std::vector<Addition> cover_edges(const Body& body, const State& state, const Me
   std::vector<Addition> additions;
   for (int32_t a = 0; a < body.particle_count(); ++a) {
     if (!state.alive[static_cast<std::size_t>(a)]) continue;
-    for (const int direction : {0, 2, 4}) {  // each edge once: along +x, +y, +z
-      const int32_t b = body.neighbour(a, direction);
-      if (b < 0 || !state.alive[static_cast<std::size_t>(b)] || share_a_cluster(memberships, a, b)) continue;
+    for (const int32_t b : body.neighbours(a)) {
+      if (b < a) continue;  // each edge once
+      if (!state.alive[static_cast<std::size_t>(b)] || share_a_cluster(memberships, a, b)) continue;
       // (size, cluster, particle that it takes in); cluster indices are in the order of numbers.
       std::pair<int64_t, Addition> least = {-1, {}};
       const auto consider = [&](int32_t inside, int32_t outside) {
@@ -71,9 +71,9 @@ std::vector<Addition> free_lone_clusters(const Body& body, const State& state, c
     const auto is_shared = [&](int32_t p) { return memberships.count(p) > 1; };
     if (std::any_of(members.begin(), members.end(), is_shared)) continue;
     for (const int32_t p : members) {
-      for (int direction = 0; direction < 6 && state.alive[static_cast<std::size_t>(p)]; ++direction) {
-        const int32_t q = body.neighbour(p, direction);
-        if (q < 0 || !state.alive[static_cast<std::size_t>(q)] || holds(memberships, q, c)) continue;
+      if (!state.alive[static_cast<std::size_t>(p)]) continue;
+      for (const int32_t q : body.neighbours(p)) {
+        if (!state.alive[static_cast<std::size_t>(q)] || holds(memberships, q, c)) continue;
         additions.push_back({c, q});
       }
     }
@@ -87,9 +87,8 @@ std::vector<Addition> next_layer(const Body& body, const State& state, const Mem
                                  const std::vector<Addition>& last, const std::vector<Addition>& all) {
   std::vector<Addition> layer;
   for (const auto& [cluster, p] : last) {
-    for (int direction = 0; direction < 6; ++direction) {
-      const int32_t q = body.neighbour(p, direction);
-      if (q < 0 || !state.alive[static_cast<std::size_t>(q)] || !share_a_cluster(memberships, p, q)) continue;
+    for (const int32_t q : body.neighbours(p)) {
+      if (!state.alive[static_cast<std::size_t>(q)] || !share_a_cluster(memberships, p, q)) continue;
       const Addition addition = {cluster, q};
       if (holds(memberships, q, cluster) || std::binary_search(all.begin(), all.end(), addition)) continue;
       layer.push_back(addition);

@@ -21,8 +21,8 @@ Memberships memberships_of(const Clusters& clusters, int32_t particle_count) {
 void update_rest_frames(const Body& body, Clusters& clusters) {
   const Memberships memberships = memberships_of(clusters, body.particle_count());
   const auto count = static_cast<std::size_t>(clusters.count());
-  std::vector<double> weight(body.node.size());  // w_ic, the same for every cluster of i
-  std::vector<Vec3> rest(body.node.size());
+  std::vector<double> weight(static_cast<std::size_t>(body.particle_count()));  // w_ic, the same for every cluster of i
+  std::vector<Vec3> rest(weight.size());
   for (std::size_t i = 0; i < rest.size(); ++i) {
     const auto particle = static_cast<int32_t>(i);
     weight[i] = body.mass[i] / static_cast<double>(memberships.count(particle));

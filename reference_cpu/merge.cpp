@@ -68,9 +68,9 @@ class MergingSets {
       for (const int32_t slot : memberships_of(p)) touch(slot, 1);
     }
     for (const int32_t p : sets_[at(s)]) {
-      for (int direction = 0; direction < 6 && alive_[at(p)]; ++direction) {
-        const int32_t q = body_.neighbour(p, direction);
-        if (q < 0 || !alive_[at(q)] || std::exchange(visited_[at(q)], visit_) == visit_) continue;
+      if (!alive_[at(p)]) continue;
+      for (const int32_t q : body_.neighbours(p)) {
+        if (!alive_[at(q)] || std::exchange(visited_[at(q)], visit_) == visit_) continue;
         for (const int32_t slot : memberships_of(q)) touch(slot, 0);
       }
     }

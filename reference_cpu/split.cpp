@@ -31,9 +31,8 @@ class ComponentSearch {
   std::vector<int32_t> component_from(int32_t start) {
     std::vector<int32_t> reached = {start};
     for (std::size_t next = 0; next < reached.size(); ++next) {
-      for (int direction = 0; direction < 6; ++direction) {
-        const int32_t neighbour = body_.neighbour(reached[next], direction);
-        if (neighbour >= 0 && take(neighbour)) reached.push_back(neighbour);
+      for (const int32_t neighbour : body_.neighbours(reached[next])) {
+        if (take(neighbour)) reached.push_back(neighbour);
       }
     }
     std::sort(reached.begin(), reached.end());

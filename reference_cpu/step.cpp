@@ -23,7 +23,8 @@ struct Held {
 };
 
 Held held_particles(const Setup& setup, int64_t substep) {
-  Held held{std::vector<uint8_t>(setup.body.node.size(), 0), std::vector<Vec3>(setup.body.node.size())};
+  const auto n = static_cast<std::size_t>(setup.body.particle_count());
+  Held held{std::vector<uint8_t>(n, 0), std::vector<Vec3>(n)};
   for (const Grip& grip : setup.grips) {
     if (!grip.active[at(substep)]) continue;
     for (const int32_t i : grip.particles) {

@@ -21,6 +21,7 @@ void require(bool condition, const char* what) {
 }
 
 void require_fit(const Setup& setup, const State& state) {
+  require(setup.body.on_grid(), "a body without a grid; the backend reference can run it");
   const std::size_t n = setup.body.node.size();
   require(setup.body.mass.size() == n && state.x.size() == n && state.v.size() == n && state.alive.size() == n,
           "masses, positions, velocities and alive need one entry per particle");

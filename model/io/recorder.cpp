@@ -86,9 +86,9 @@ void require_precision(std::optional<Precision>& of_all, const State& state) {
 
 // Broken contents may be recorded, but each array must have the length by which a reader finds its entries.
 void require_lengths(const Setup& setup, const State& state) {
-  if (state.x.size() != setup.body.node.size()) {
+  if (static_cast<int64_t>(state.x.size()) != setup.body.particle_count()) {
     throw std::invalid_argument(fmt::format("A state to be recorded has {} positions for a body of {} particles.",
-                                            state.x.size(), setup.body.node.size()));
+                                            state.x.size(), setup.body.particle_count()));
   }
   for (const RecordedField& recorded : recorded_fields()) {
     const Field& field = recorded.field;
@@ -193,6 +193,7 @@ Recorder::File::File(const std::string& given_name, const Setup& given, const st
   for (const double dt : setup.substep_length) time.push_back(time.back() + dt * setup.step.substeps);
 
   digest.add(setup.body.node);
+  if (!setup.body.on_grid()) digest.add(setup.body.rest);
   digest.add(std::string_view(scene_json));
   digest.add(std::string_view(backend));
   hdf5::write_text_attribute(index.id(), "backend", backend);

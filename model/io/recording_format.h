@@ -14,7 +14,7 @@
 
 namespace cutproof::io {
 
-inline constexpr int32_t kFormatVersion = 2;
+inline constexpr int32_t kFormatVersion = 3;
 inline constexpr std::string_view kIndexSuffix = ".cutproof.h5";
 
 // What stands in the root attribute cutproof_file of each of the four files.

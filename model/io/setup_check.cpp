@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <string_view>
 
 #include "model/at.h"
+#include "model/bare_graph.h"
 #include "model/setup_fields.h"
 
 namespace cutproof::io {
@@ -77,7 +79,24 @@ Defect number_defect(const Setup& setup) {
 
 // --- How they belong together. Each number is already as it should be by itself. ---
 
-Defect body_defect(const Body& body) {
+Defect bare_graph_defect(const Setup& setup) {
+  const Body& body = setup.body;
+  if (!body.node.empty() || !body.particle_at.empty() || body.grid.nodes != std::array<int32_t, 3>{0, 0, 0}) {
+    return SetupDefect{"body/edge_offsets", "A body has a grid or edges of its own, not both."};
+  }
+  if (body.mass.size() != body.rest.size()) {
+    return SetupDefect{"body/mass",
+                       fmt::format("This has {} entries for {} particles.", body.mass.size(), body.rest.size())};
+  }
+  if (setup.skin.wanted) return SetupDefect{"skin/wanted", "A body without a grid has no skin."};
+  if (std::string problem = problem_of_edges(body); !problem.empty()) {
+    problem.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(problem.front())));
+    return SetupDefect{"body/edge_ends", problem + "."};
+  }
+  return std::nullopt;
+}
+
+Defect grid_defect(const Body& body) {
   const auto& nodes = body.grid.nodes;
   // Compared by division: the product of three corrupted counts need not fit.
   int64_t rest = static_cast<int64_t>(body.particle_at.size());
@@ -87,6 +106,9 @@ Defect body_defect(const Body& body) {
                                                        rest, nodes[0], nodes[1], nodes[2])};
   }
   const std::size_t n = body.node.size();
+  if (!body.rest.empty() || !body.edge_ends.empty()) {
+    return SetupDefect{"body/rest", "A body has a grid or edges of its own, not both."};
+  }
   if (n > static_cast<std::size_t>(std::numeric_limits<int32_t>::max())) {
     return SetupDefect{"body/node", "There are more particles than 32-bit numbers can name."};
   }
@@ -178,7 +200,7 @@ Defect schedule_defect(const Setup& setup) {
 
 std::optional<SetupDefect> defect_of(const Setup& setup) {
   if (Defect defect = number_defect(setup)) return defect;
-  if (Defect defect = body_defect(setup.body)) return defect;
+  if (Defect defect = setup.body.on_grid() ? grid_defect(setup.body) : bare_graph_defect(setup)) return defect;
   if (Defect defect = parameter_defect(setup)) return defect;
   return schedule_defect(setup);
 }

@@ -64,7 +64,7 @@ Substep substep_of(const Setup& setup, const State& state) {
                   .dt = setup.substep_length[at(state.frame)],
                   .stiffness = setup.step.stiffness,
                   .alive = state.alive,
-                  .held = std::vector<uint8_t>(body.node.size(), 0),
+                  .held = std::vector<uint8_t>(at(body.particle_count()), 0),
                   .start = state.x,
                   .predicted = state.x,
                   .rest = weighted_rest(body, state.clusters),
@@ -178,7 +178,7 @@ Poses poses_at(const Substep& substep, const std::vector<Vec3>& x, const std::ve
 
 // [n] the mean over a particle's clusters of R_c (X_i − T_c), to which the mean of t_c is added to give g_i.
 std::vector<Vec3> turned_offsets(const Substep& substep, const std::vector<Mat3>& rotation) {
-  std::vector<Vec3> mean(substep.body.node.size());
+  std::vector<Vec3> mean(at(substep.body.particle_count()));
   const Clusters& clusters = substep.clusters;
   for (int32_t c = 0; c < clusters.count(); ++c) {
     auto offset = substep.offset.begin() + clusters.offsets[at(c)];

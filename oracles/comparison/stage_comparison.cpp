@@ -9,6 +9,7 @@
 
 #include "model/rules.h"
 #include "oracles/oracles.h"
+#include "oracles/rest_places.h"
 #include "oracles/shape_sums.h"
 #include "oracles/shells.h"
 #include "oracles/step_model/admissible_step.h"
@@ -67,15 +68,15 @@ std::vector<int32_t> in_one_only(const std::vector<int32_t>& a, const std::vecto
 }
 
 double body_extent(const Body& body) {
-  std::array<int32_t, 3> low = {}, high = {};
-  for (std::size_t i = 0; i < body.node.size(); ++i) {
-    const auto c = body.grid.coordinates(body.node[i]);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      low[axis] = i == 0 ? c[axis] : std::min(low[axis], c[axis]);
-      high[axis] = i == 0 ? c[axis] : std::max(high[axis], c[axis]);
+  Vec3 low, high;
+  for (int32_t i = 0; i < body.particle_count(); ++i) {
+    const Vec3 place = rest_in_spacings(body, i);
+    for (int axis = 0; axis < 3; ++axis) {
+      low[axis] = i == 0 ? place[axis] : std::min(low[axis], place[axis]);
+      high[axis] = i == 0 ? place[axis] : std::max(high[axis], place[axis]);
     }
   }
-  return std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+  return std::max({high.x - low.x, high.y - low.y, high.z - low.z});
 }
 
 double position_bound(const Body& body) {

@@ -11,7 +11,8 @@ TransformedScene::TransformedScene(const Transform& transform, const Setup& setu
   const Grid& grid = setup.body.grid;
   for (std::size_t a = 0; a < 3; ++a) {
     const auto b = at(transform.target[a]);
-    const int32_t nodes = transform.padding[b] + (transform.sign[a] < 0 ? grid.nodes[a] - 1 : 0);
+    const bool mirrored = transform.sign[a] < 0 && setup.body.on_grid();
+    const int32_t nodes = transform.padding[b] + (mirrored ? grid.nodes[a] - 1 : 0);
     offset_[transform.target[a]] = grid.spacing * nodes;
   }
   transformed_ = setup;
@@ -46,6 +47,10 @@ Body TransformedScene::transform_body(const Body& body) {
     transformed.grid.nodes[b] = body.grid.nodes[a] + transform_.padding[b];
   }
   std::vector<int64_t> node(body.node.size());
+  if (!body.on_grid()) {
+    transformed.grid.nodes = body.grid.nodes;
+    for (Vec3& rest : transformed.rest) rest = point(rest);
+  }
   for (std::size_t i = 0; i < node.size(); ++i) {
     const auto old = body.grid.coordinates(body.node[i]);
     std::array<int32_t, 3> c{};
@@ -55,16 +60,20 @@ Body TransformedScene::transform_body(const Body& body) {
     }
     node[i] = transformed.grid.index(c[0], c[1], c[2]);
   }
-  std::vector<int32_t> order(node.size());
+  std::vector<int32_t> order(at(body.particle_count()));
   std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](int32_t i, int32_t j) { return node[at(i)] < node[at(j)]; });
-  particle_.resize(node.size());
+  // Edges of a bare graph have no order of their own: its particles keep their numbers.
+  if (body.on_grid()) {
+    std::sort(order.begin(), order.end(), [&](int32_t i, int32_t j) { return node[at(i)] < node[at(j)]; });
+  }
+  particle_.resize(order.size());
   transformed.particle_at.assign(at(transformed.grid.node_count()), -1);
   for (std::size_t j = 0; j < order.size(); ++j) {
     const auto i = at(order[j]);
     particle_[i] = static_cast<int32_t>(j);
-    transformed.node[j] = node[i];
     transformed.mass[j] = body.mass[i];
+    if (!body.on_grid()) continue;
+    transformed.node[j] = node[i];
     transformed.particle_at[at(node[i])] = static_cast<int32_t>(j);
   }
   // The body lies in the (scaled) world as it did: orientation' = orientation · Pᵀ.

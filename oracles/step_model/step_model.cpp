@@ -13,6 +13,7 @@
 #include "oracles/best_rotation.h"
 #include "oracles/eigen.h"
 #include "oracles/memberships.h"
+#include "oracles/rest_places.h"
 #include "oracles/rounding.h"
 #include "oracles/shape_sums.h"
 #include "oracles/step_model/contact_model.h"
@@ -84,21 +85,6 @@ Mat3 pseudoinverse(const Mat3& moments) {
     if (values[k] > 1e-9 * values[2]) inverse[k] = 1 / values[k];
   }
   return to_mat3(solver.eigenvectors() * inverse.asDiagonal() * solver.eigenvectors().transpose());
-}
-
-bool is_on_a_line(const Body& body, std::span<const int32_t> members) {
-  const auto first = body.grid.coordinates(body.node[at(members.front())]);
-  std::array<int64_t, 3> way = {0, 0, 0};
-  for (const int32_t i : members) {
-    const auto c = body.grid.coordinates(body.node[at(i)]);
-    const std::array<int64_t, 3> d = {c[0] - first[0], c[1] - first[1], c[2] - first[2]};
-    if (way == std::array<int64_t, 3>{0, 0, 0}) way = d;
-    for (std::size_t a = 0; a < 3; ++a) {
-      const std::size_t b = (a + 1) % 3;
-      if (way[a] * d[b] != way[b] * d[a]) return false;
-    }
-  }
-  return true;
 }
 
 }  // namespace

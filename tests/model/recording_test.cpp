@@ -874,7 +874,8 @@ TEST_F(RecordingTest, IsRefusedIfItIsNoneAtAll) {
 
 TEST_F(RecordingTest, IsRefusedIfItIsOfANewerVersion) {
   record("run");
-  tamper(path("run.cutproof.h5"), [](hid_t file) { set_attribute<int32_t>(file, "/", "cutproof_format", 3); });
+  tamper(path("run.cutproof.h5"),
+         [](hid_t file) { set_attribute<int32_t>(file, "/", "cutproof_format", kFormatVersion + 1); });
   expect_input_error([&] { RecordingReader reader(path("run")); }, path("run.cutproof.h5"), "newer cutproof");
   tamper(path("run.cutproof.h5"), [](hid_t file) { set_attribute<int32_t>(file, "/", "cutproof_format", 0); });
   expect_input_error([&] { RecordingReader reader(path("run")); }, path("run.cutproof.h5"), "format 0");
