@@ -8,6 +8,7 @@
 
 #include "oracles/blade_motion.h"
 #include "oracles/checks.h"
+#include "oracles/shape_sums.h"
 #include "oracles/strain.h"
 
 namespace cutproof::oracles {
