@@ -19,10 +19,10 @@
 #include <utility>
 #include <vector>
 
+#include "model/bare_graph.h"
 #include "model/error.h"
 #include "model/io/container_types.h"
 #include "model/io/hdf5_file.h"
-#include "model/bare_graph.h"
 #include "model/io/recording_format.h"
 #include "model/io/recording_setup.h"
 #include "tests/model/recording_bits.h"
