@@ -150,10 +150,9 @@ class Search {
   AdmissibleStep find() {
     Branch branch = looked_at({});
     if (!branch.holds() && !branch.ties.empty() && of_all_ && coupled_.count > 1) {
-      if (Settled settled = settled_apart(branch); !settled.empty()) {
-        branch = looked_at(std::move(settled));
-        if (!branch.holds()) count_undecided(branch);
-      }
+      Apart apart = settled_apart(branch);
+      if (!apart.settled.empty()) branch = looked_at(std::move(apart.settled));
+      if (!branch.holds() && apart.is_explained) count_undecided(branch);
     }
     if (!branch.holds() && !branch.ties.empty()) branch = explain(std::move(branch));
     return report(std::move(branch));
@@ -194,10 +193,14 @@ class Search {
 
   // What is not coupled goes its way whatever the rest does: what a set decides is looked for in it alone, as long as
   // that explains it.
-  Settled settled_apart(const Branch& branch) const {
+  struct Apart {
+    Settled settled;
+    bool is_explained = false;  // each set that violates, perhaps by what more decisions do than can be tried together
+  };
+  Apart settled_apart(const Branch& branch) const {
     std::set<int32_t> sets;
     for (const int32_t i : branch.violations) sets.insert(coupled_.label[at(i)]);
-    Settled settled;
+    Apart apart;
     for (const int32_t set : sets) {
       const CoupledSet alone(before_, after_, coupled_, set);
       Search search(setup_, alone.before, alone.after, false);
@@ -206,11 +209,12 @@ class Search {
       for (const auto& [key_alone, outcome] : found.settled) {
         DecisionKey key = key_alone;
         if (key.kind == DecisionKind::kept && key.turn >= 0) key.turn = alone.clusters[at(key.turn)];
-        settled[key] = outcome;
+        apart.settled[key] = outcome;
       }
-      if (!found.holds()) break;
+      apart.is_explained = found.holds();
+      if (!apart.is_explained) break;
     }
-    return settled;
+    return apart;
   }
 
   Branch start(Settled settled) {
@@ -653,7 +657,7 @@ class Search {
   double square_left(const StepOutcome& outcome) const {
     double square = 0;
     for (const Vec3& way : left_by(outcome)) square += dot(way, way);
-    return square;
+    return or_infinite(square);
   }
   static double gain_of(const Column& column, const std::vector<Vec3>& left) {
     double gain = 0;
@@ -706,8 +710,8 @@ class Search {
     std::map<int32_t, double> off;  // of those that have decisions to take
     for (const NearDecision& d : branch.outcome.near) {
       const std::size_t i = at(d.key.particle);
-      off[d.key.particle] =
-          std::max(norm(after_.x[i] - branch.outcome.x[i]), dt_ * norm(after_.v[i] - branch.outcome.v[i]));
+      off[d.key.particle] = std::max(or_infinite(norm(after_.x[i] - branch.outcome.x[i])),
+                                     or_infinite(dt_ * norm(after_.v[i] - branch.outcome.v[i])));
     }
     std::vector<int32_t> farthest;
     for (const auto& [i, distance] : off) farthest.push_back(i);
