@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "model/at.h"
@@ -21,7 +20,7 @@ constexpr double kDistanceBand = 64;
 // By how much the longest edge of a particle, among neighbours alive in `state`, is longer than allowed (method.md §4)
 // [h].
 double excess_of(const Setup& setup, const State& state, int32_t particle) {
-  double greatest = -std::numeric_limits<double>::infinity();
+  double greatest = -setup.detect.epsilon * setup.body.grid.spacing;  // without neighbours nothing is long
   for (const int32_t other : setup.body.neighbours(particle)) {
     if (!state.alive[at(other)]) continue;
     const double limit = setup.detect.epsilon * setup.body.rest_length(particle, other);

@@ -193,7 +193,10 @@ Recorder::File::File(const std::string& given_name, const Setup& given, const st
   for (const double dt : setup.substep_length) time.push_back(time.back() + dt * setup.step.substeps);
 
   digest.add(setup.body.node);
-  if (!setup.body.on_grid()) digest.add(setup.body.rest);
+  if (!setup.body.on_grid()) {
+    digest.add(setup.body.rest);
+    digest.add(setup.body.edge_ends);
+  }
   digest.add(std::string_view(scene_json));
   digest.add(std::string_view(backend));
   hdf5::write_text_attribute(index.id(), "backend", backend);

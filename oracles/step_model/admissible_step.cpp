@@ -79,7 +79,7 @@ struct Bounds {
   }
 };
 
-// What is coupled, alone: all else is dead, and has no clusters.
+// What is coupled, alone, as far as it moves: all else is dead, and has no clusters.
 struct CoupledSet {
   State before, after;
   std::vector<int32_t> clusters;  // which of all they are
@@ -105,7 +105,6 @@ struct CoupledSet {
     copy.x = state.x;
     copy.v = state.v;
     copy.alive = state.alive;
-    copy.impulse = state.impulse;
     copy.precision = state.precision;
     return copy;
   }
@@ -113,11 +112,7 @@ struct CoupledSet {
     const auto members = from.of(c);
     to.members.insert(to.members.end(), members.begin(), members.end());
     to.offsets.push_back(static_cast<int64_t>(to.members.size()));
-    to.number.push_back(from.number[at(c)]);
     to.rotation.push_back(from.rotation[at(c)]);
-    to.rest_center.push_back(from.rest_center[at(c)]);
-    to.mass.push_back(from.mass[at(c)]);
-    to.degenerate.push_back(from.degenerate[at(c)]);
   }
 };
 
@@ -152,7 +147,7 @@ class Search {
     if (!branch.holds() && !branch.ties.empty() && of_all_ && coupled_.count > 1) {
       Apart apart = settled_apart(branch);
       if (!apart.settled.empty()) branch = looked_at(std::move(apart.settled));
-      if (!branch.holds() && apart.is_explained) count_undecided(branch);
+      if (!branch.holds() && apart.is_explained && apart.is_undecided) count_undecided(branch);
     }
     if (!branch.holds() && !branch.ties.empty()) branch = explain(std::move(branch));
     return report(std::move(branch));
@@ -195,7 +190,8 @@ class Search {
   // that explains it.
   struct Apart {
     Settled settled;
-    bool is_explained = false;  // each set that violates, perhaps by what more decisions do than can be tried together
+    bool is_explained = false;  // each set that violates
+    bool is_undecided = false;  // one of them by what more decisions do than can be tried together
   };
   Apart settled_apart(const Branch& branch) const {
     std::set<int32_t> sets;
@@ -212,6 +208,7 @@ class Search {
         apart.settled[key] = outcome;
       }
       apart.is_explained = found.holds();
+      apart.is_undecided = apart.is_undecided || found.is_undecided;
       if (!apart.is_explained) break;
     }
     return apart;

@@ -11,8 +11,10 @@
 #include <vector>
 
 #include "model/backend.h"
+#include "model/io/setup_check.h"
 #include "oracles/judge.h"
 #include "oracles/oracles.h"
+#include "oracles/relations/relations.h"
 #include "property_tests/cases.h"
 #include "reference_cpu/reference.h"
 
@@ -245,6 +247,7 @@ TEST(BareGraph, IsRefusedWithEdgesThatAreNone) {
     change(wrong.setup.body);
     EXPECT_FALSE(oracles::well_formed(wrong.setup, wrong.state).holds) << what;
     EXPECT_THROW(reference::make_backend()->load({wrong.setup}, {wrong.state}), std::invalid_argument) << what;
+    EXPECT_TRUE(io::defect_of(wrong.setup)) << what;
   };
   EXPECT_TRUE(oracles::well_formed(right.setup, right.state).holds);
   refused("one way only", [](Body& b) { b.edge_ends.pop_back(), --b.edge_offsets.back(); });
@@ -255,9 +258,28 @@ TEST(BareGraph, IsRefusedWithEdgesThatAreNone) {
   refused("offsets that descend", [](Body& b) { b.edge_offsets[1] = b.edge_offsets[2] + 1; });
   refused("offsets that end early", [](Body& b) { --b.edge_offsets.back(); });
   refused("an offset too few", [](Body& b) { b.edge_offsets.pop_back(); });
+  EXPECT_FALSE(io::defect_of(right.setup));
   Cloud with_skin = right;
   with_skin.setup.skin.wanted = true;
   EXPECT_FALSE(oracles::well_formed(with_skin.setup, with_skin.state).holds);
+  EXPECT_TRUE(io::defect_of(with_skin.setup));
+  Cloud with_grid = right;
+  with_grid.setup.body.node = {0};
+  EXPECT_FALSE(oracles::well_formed(with_grid.setup, with_grid.state).holds);
+  EXPECT_TRUE(io::defect_of(with_grid.setup));
+}
+
+// Turned, mirrored and moved, it does the same.
+TEST(BareGraph, IsTheSameTurnedAndMirrored) {
+  std::mt19937_64 random(kSeed);
+  Cloud c = cloud(random);
+  for (Vec3& x : c.state.x) x = {1.1 * x.x, x.y, x.z};
+  const auto backend = reference::make_backend();
+  for (uint64_t seed = 0; seed < 2 * oracles::kEquivarianceKinds; ++seed) {
+    const Verdict verdict = oracles::equivariance(*backend, c.setup, c.state, {}, seed);
+    EXPECT_TRUE(verdict.holds) << "seed " << seed << ": " << verdict.witness.text;
+    EXPECT_GT(verdict.checked, 0) << "seed " << seed << ": " << verdict.vacuous;
+  }
 }
 
 }  // namespace
