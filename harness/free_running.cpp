@@ -85,6 +85,7 @@ void FreeRunning::see(Stage stage, const State& after) {
     if (stage == Stage::merge && !promise_of(setup_.merge.rule).unique) {
       first.explained = !oracles::difference_of_decisions(expected, after, oracles::Sets::open) &&
                         oracles::merge_legality(setup_, before_, after).holds &&
+                        oracles::cap_kept(setup_, before_, after).holds &&
                         oracles::merge_maximality(setup_, after).holds;
     }
     return;

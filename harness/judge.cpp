@@ -107,6 +107,7 @@ void Judge::add(Verdict verdict) {
 }
 
 bool Judge::is_promised(const Verdict& verdict, Stage stage, const State& state) const {
+  if (!promises_.cover(verdict.property)) return false;
   if (verdict.property == "component match" || verdict.property == "isolation") {
     return promises_.coupling_without_edge_cover || state.edge_covered;
   }
@@ -231,7 +232,7 @@ void Judge::see_several(const Moment& moment, const std::array<bool, 6>& seen) {
         verdict.undecided = end.clusters.count();
       } else {
         const State split = before_merge(setup_, *before, end, !moment.span.contains(Stage::step));
-        take({oracles::merge_legality(setup_, split, end)}, Stage::merge, end);
+        take({oracles::merge_legality(setup_, split, end), oracles::cap_kept(setup_, split, end)}, Stage::merge, end);
       }
     }
     if (before->clusters.members != end.clusters.members) has_expanded_ = has_expanded_ || sees(Stage::expand);

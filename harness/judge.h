@@ -9,22 +9,11 @@
 
 #include "harness/depth.h"
 #include "harness/moments.h"
+#include "harness/promises.h"
 #include "model/verdict.h"
 #include "oracles/oracles.h"
 
 namespace cutproof::harness {
-
-// For which properties somebody vouches. What nobody does is not judged, and said so (Judge::unpromised).
-struct Promises {
-  // Connected tissue is coupled. Only rules that keep I4 promise it (method.md §2); a scene that was written down
-  // promises it unless it expects otherwise.
-  bool coupling_without_edge_cover = true;
-  // No small cluster could still merge, also after an expansion: clusters that have grown may touch others that they
-  // did not touch, so this is the promise of the merge stage alone.
-  bool maximality_after_expansion = true;
-};
-// What the rules of a setup promise whatever clusters a body was given.
-inline constexpr Promises kPromisesOfRules = {false, false};
 
 enum class Thorough {
   never,

@@ -43,6 +43,7 @@ void check_admissible_step(const StageRun& run, Verdict& verdict);
 void check_detection(const StageRun& run, Verdict& verdict);
 void check_split_exactness(const StageRun& run, Verdict& verdict);
 void check_merge_legality(const StageRun& run, Verdict& verdict);
+void check_cap_kept(const StageRun& run, Verdict& verdict);
 void check_expansion(const StageRun& run, Verdict& verdict);
 void check_untouched(const StageRun& run, Verdict& verdict);
 

@@ -83,6 +83,8 @@ inline constexpr StageOracle admissible_step{"admissible step", Stage::step, mot
 inline constexpr StageOracle detection{"detection", Stage::detect};  // removed <=> d_i > εh outside the band
 inline constexpr StageOracle split_exactness{"split exactness", Stage::split};
 inline constexpr StageOracle merge_legality{"merge legality", Stage::merge};
+// No union has more than `cap` particles, where the rule promises that.
+inline constexpr StageOracle cap_kept{"cap kept", Stage::merge};
 inline constexpr StageOracle expansion{"expansion", Stage::expand};
 // Nothing but what a stage may change has changed (positions by split, clusters by step, …).
 inline Verdict untouched(const Setup& setup, Stage stage, const State& before, const State& after) {

@@ -62,6 +62,7 @@ PropertyList make_core_properties() {
                "nothing was alive", check_detection),
       of_stage("split exactness", "method.md §5", "1", stages(split), "no cluster", check_split_exactness),
       of_stage("merge legality", "method.md §6: legal", "1", stages(merge), "no cluster", check_merge_legality),
+      of_stage("cap kept", "method.md §6: at most cap particles", "1", stages(merge), "no cluster", check_cap_kept),
       of_stage("expansion", "method.md §7", "1", stages(expand), "no cluster", check_expansion),
       of_state("finite", "oracles.md, One state", "1", kMotion | kFrames | kRotations | kSkin, kAlways, "no numbers",
                check_finite, stages(step)),

@@ -91,6 +91,13 @@ void note_what_was_removed(const Setup& setup, CaseCoverage& seen) {
   if (detect.criterion == Criterion::geometric && setup.step.iterations > 0) seen["geometric cut of what moves"] = true;
 }
 
+// Some merged cluster, under a rule that does not promise it of none.
+bool is_above_its_cap(const Setup& setup, const State& before, const State& after) {
+  Setup promising = setup;
+  promising.merge.rule = MergeRule::published;
+  return !oracles::cap_kept(promising, before, after).holds;
+}
+
 void note_what_a_stage_did(const Setup& setup, Stage stage, const State& before, const State& after,
                            CaseCoverage& seen) {
   const auto clusters_before = before.clusters.count(), clusters_after = after.clusters.count();
@@ -119,6 +126,9 @@ void note_what_a_stage_did(const Setup& setup, Stage stage, const State& before,
         if (setup.merge.rule == MergeRule::published) seen["published merge"] = true;
         if (setup.merge.rule == MergeRule::single_pass) seen["single pass merge"] = true;
       }
+      if (!promise_of(setup.merge.rule).keeps_cap && is_above_its_cap(setup, before, after)) {
+        seen["above the cap without promise"] = true;
+      }
       break;
     case Stage::expand:
       if (after.clusters.members.size() > before.clusters.members.size()) {
@@ -135,14 +145,6 @@ void note_what_a_stage_did(const Setup& setup, Stage stage, const State& before,
       if (setup.skin.alpha != SkinParameters{}.alpha && !after.skin.triangles.empty()) seen["alpha"] = true;
       break;
   }
-}
-
-// Of a merge that is legal but for clusters larger than cap, under a rule that does not promise to keep it. With a cap
-// that nothing exceeds the rest is judged alone.
-bool is_only_above_the_cap(const Setup& setup, const Verdict& verdict, State before, const State& after) {
-  if (verdict.holds || verdict.property != "merge legality" || promise_of(setup.merge.rule).keeps_cap) return false;
-  before.cap = std::numeric_limits<int32_t>::max();
-  return oracles::merge_legality(setup, before, after).holds;
 }
 
 }  // namespace
@@ -228,13 +230,7 @@ Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, 
     if (judgement.failure) break;
     const State &before = *moment.before, &after = *moment.after;
     judge.see(moment);
-    std::vector<Verdict> verdicts = judge.take_verdicts();
-    for (Verdict& verdict : verdicts) {
-      if (!is_only_above_the_cap(setup, verdict, before, after)) continue;
-      verdict.holds = true;
-      seen["above the cap without promise"] = true;
-    }
-    take(std::move(verdicts));
+    take(judge.take_verdicts());
     for (const harness::Judge::Unpromised& u : judge.unpromised()) {
       if (u.property == "isolation" && u.failing > 0) seen["uncoupled without promise"] = true;
     }

@@ -225,13 +225,10 @@ void StageComparison::compare_later_stage(const State& before, const State& afte
   found.sets_are_open = found.stage == Stage::merge && found.due && !promise_of(setup_.merge.rule).unique;
   auto difference = difference_of_decisions(expected, after, found.sets_are_open ? Sets::open : Sets::compared);
   if (found.sets_are_open && !difference) {  // not compared, but they must be one of the rule's answers
-    const MergePromise promise = promise_of(setup_.merge.rule);
-    State given = before;
-    if (!promise.keeps_cap) given.cap = std::numeric_limits<int32_t>::max();
-    const Verdict legal = merge_legality(setup_, given, after);
-    if (!legal.holds) difference = DecisionDifference{legal.witness};
-    const Verdict maximal = promise.maximal ? merge_maximality(setup_, after) : Verdict{};
-    if (!difference && !maximal.holds) difference = DecisionDifference{maximal.witness};
+    for (const Verdict& promised :
+         {merge_legality(setup_, before, after), cap_kept(setup_, before, after), merge_maximality(setup_, after)}) {
+      if (!difference && !promised.holds) difference = DecisionDifference{promised.witness};
+    }
   }
   for (int32_t c = 0; !difference && !found.sets_are_open && c < after.clusters.count(); ++c) {
     const int32_t cluster = after.clusters.number[at(c)];

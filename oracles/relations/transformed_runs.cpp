@@ -332,7 +332,10 @@ std::optional<Witness> illegal_clusters(const TransformedRuns& runs, std::size_t
   }
   const Span span = runs.pieces[piece];
   std::optional<Verdict> legal;
-  if (span == Span{Stage::merge, Stage::merge}) legal = merge_legality(setup, input, actual);
+  if (span == Span{Stage::merge, Stage::merge}) {
+    legal = merge_legality(setup, input, actual);
+    if (legal->holds) legal = cap_kept(setup, input, actual);
+  }
   if (span == Span{Stage::expand, Stage::expand}) legal = expansion(setup, input, actual);
   return legal && !legal->holds ? std::optional(legal->witness) : std::nullopt;
 }

@@ -22,6 +22,7 @@
 #include "harness/reference_stages.h"
 #include "harness/scene_judge.h"
 #include "model/at.h"
+#include "model/error.h"
 #include "model/io/scene_io.h"
 #include "model/rules.h"
 #include "oracles/comparison/stage_comparison.h"
@@ -571,30 +572,25 @@ TEST(Judge, AcceptsEveryStageOfARightRunAndAsksAsOftenAsItMust) {
       // The first of two frames that cut covers every edge; what rests on that is asked from its expansion on.
       {kEveryStage,
        {{step, 4}, {detect, 4}, {split, 2}, {merge, 2}, {expand, 1}, {skin, 4}},
-       {{"admissible step", 4}, {"linear momentum", 4},  {"component momentum", 4},
-        {"motion", 4},          {"detection", 4},        {"no pass", 4},
-        {"split exactness", 2}, {"merge legality", 2},   {"expansion", 1},
-        {"untouched", 17},      {"finite", 17},          {"well formed", 13},
-        {"rest frames", 13},    {"rotation", 13},        {"cluster connectivity", 9},
-        {"coverage", 9},        {"edge cover", 7},       {"component match", 7},
-        {"isolation", 7},       {"merge maximality", 7}, {"skin match", 4},
-        {"skin surface", 4},    {"skin vertices", 4},    {"skin shells", 4},
-        {"skin geometry", 4}}},
+       {{"admissible step", 4},  {"linear momentum", 4}, {"component momentum", 4}, {"motion", 4},
+        {"detection", 4},        {"no pass", 4},         {"split exactness", 2},    {"merge legality", 2},
+        {"cap kept", 2},         {"expansion", 1},       {"untouched", 17},         {"finite", 17},
+        {"well formed", 13},     {"rest frames", 13},    {"rotation", 13},          {"cluster connectivity", 9},
+        {"coverage", 9},         {"edge cover", 7},      {"component match", 7},    {"isolation", 7},
+        {"merge maximality", 7}, {"skin match", 4},      {"skin surface", 4},       {"skin vertices", 4},
+        {"skin shells", 4},      {"skin geometry", 4}}},
       // Every edge is covered from the beginning.
       {kPressed,
        {{step, 3}, {detect, 3}, {split, 1}, {merge, 1}, {skin, 3}},
-       {{"admissible step", 3},    {"linear momentum", 3},
-        {"component momentum", 3}, {"motion", 3},
-        {"detection", 3},          {"no pass", 3},
-        {"split exactness", 1},    {"merge legality", 1},
-        {"untouched", 11},         {"finite", 11},
-        {"well formed", 8},        {"rest frames", 8},
-        {"rotation", 8},           {"cluster connectivity", 5},
-        {"coverage", 5},           {"edge cover", 5},
-        {"component match", 5},    {"isolation", 5},
-        {"merge maximality", 4},   {"skin match", 3},
-        {"skin surface", 3},       {"skin vertices", 3},
-        {"skin shells", 3},        {"skin geometry", 3}}}};
+       {{"admissible step", 3}, {"linear momentum", 3},  {"component momentum", 3},
+        {"motion", 3},          {"detection", 3},        {"no pass", 3},
+        {"split exactness", 1}, {"merge legality", 1},   {"cap kept", 1},
+        {"untouched", 11},      {"finite", 11},          {"well formed", 8},
+        {"rest frames", 8},     {"rotation", 8},         {"cluster connectivity", 5},
+        {"coverage", 5},        {"edge cover", 5},       {"component match", 5},
+        {"isolation", 5},       {"merge maximality", 4}, {"skin match", 3},
+        {"skin surface", 3},    {"skin vertices", 3},    {"skin shells", 3},
+        {"skin geometry", 3}}}};
   for (const auto& [scene, moments, counts] : expected) {
     const SceneRun& run = run_of(scene);
     std::map<Stage, int> seen;
@@ -625,7 +621,8 @@ TEST(Judge, RejectsOneWrongStateByExactlyWhatItViolates) {
   for (const oracles::PropertyList* list : oracles::properties()) {
     for (const oracles::Property& property : *list) {
       const std::string name(property.name);
-      EXPECT_TRUE(name == "well formed" || shown.contains(name)) << name;
+      // Those two have tests of their own.
+      EXPECT_TRUE(name == "well formed" || name == "cap kept" || shown.contains(name)) << name;
     }
   }
 }
@@ -644,6 +641,92 @@ TEST(Judge, RejectsAStateThatCannotBeReadAfterEachStageAndGoesOn) {
     const auto verdicts = changed(right, wrong).judged();
     EXPECT_EQ(failures(verdicts), (Counts{{"well formed", 1}})) << first_failure(verdicts);
     EXPECT_EQ(verdicts.back().frame, right.built.setup.frame_count() - 1);
+  }
+}
+
+// Every property is vouched for by one word, or asked of everybody; and every word names properties that there are, or
+// that only relations, or states of others, are asked for.
+TEST(Promises, NameEveryPropertyOnce) {
+  std::map<std::string_view, int> words;
+  for (const PromiseWord& word : promise_words()) {
+    for (const std::string_view property : word.properties) ++words[property];
+  }
+  for (const auto& [property, count] : words) EXPECT_EQ(count, 1) << property;
+  const std::set<std::string_view> of_everybody = {"well formed",     "finite",         "untouched", "detection",
+                                                   "split exactness", "merge legality", "expansion"};
+  for (const oracles::PropertyList* list : properties_of(Depth::motion)) {
+    for (const oracles::Property& property : *list) {
+      EXPECT_NE(words.contains(property.name), of_everybody.contains(property.name)) << property.name;
+      EXPECT_EQ(Promises{.words = 0}.cover(property.name), of_everybody.contains(property.name)) << property.name;
+      EXPECT_TRUE(Promises{}.cover(property.name)) << property.name;
+    }
+  }
+}
+
+TEST(Promises, AreReadAsWords) {
+  EXPECT_EQ(parse_promises("", "f", "promises"), 0u);
+  const uint32_t bits = parse_promises("  coupled connected ", "f", "promises");
+  EXPECT_TRUE(Promises{.words = bits}.cover("isolation"));
+  EXPECT_TRUE(Promises{.words = bits}.cover("cluster connectivity"));
+  EXPECT_FALSE(Promises{.words = bits}.cover("coverage"));
+  try {
+    parse_promises("connected perfect", "my.npz", "promises");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_EQ(std::string(error.what()).find("my.npz: promises: there is no promise 'perfect'"), 0u) << error.what();
+    EXPECT_NE(std::string(error.what()).find("edges_covered"), std::string::npos);
+  }
+}
+
+// A union that is legal but for a cap that was lower all along.
+TEST(Judge, RejectsAUnionAboveTheCap) {
+  const SceneRun run(kEveryStage);
+  int merged = 0;
+  for (const Moment& moment : run.moments) {
+    if (moment.span != Span{Stage::merge, Stage::merge}) continue;
+    int32_t largest = 0;
+    for (int32_t c = 0; c < moment.after->clusters.count(); ++c) {
+      largest = std::max(largest, static_cast<int32_t>(moment.after->clusters.size(c)));
+    }
+    const auto with_cap = [&](const Snapshot& state, int32_t cap) {
+      State changed = *state;
+      changed.cap = cap;
+      return std::make_shared<const State>(std::move(changed));
+    };
+    for (const int32_t cap : {largest, 1}) {
+      Judge judge(run.built.setup, "a backend", Promises{}, Thorough::never);
+      Moment lower = moment;
+      lower.before = with_cap(moment.before, cap);
+      lower.after = with_cap(moment.after, cap);
+      judge.begin(lower.before);
+      judge.see(lower);
+      const Counts failing = failures(judge.verdicts());
+      EXPECT_EQ(failing.contains("cap kept"),
+                cap == 1 && moment.before->clusters.count() > moment.after->clusters.count());
+      EXPECT_FALSE(failing.contains("merge legality"));
+    }
+    merged += moment.before->clusters.count() > moment.after->clusters.count();
+  }
+  EXPECT_GT(merged, 0);
+}
+
+// A word that nobody gives takes its properties out of the verdicts, wrong or right, and they are named.
+TEST(Judge, JudgesOnlyTheWordsThatAreGiven) {
+  const SceneRun run(kEveryStage);
+  Promises promises;
+  promises.words = parse_promises("connected rest_frames skin momentum", "", "");
+  Judge judge(run.built.setup, "a backend", promises, Thorough::never);
+  judge.begin(run.initial);
+  for (const Moment& moment : run.moments) judge.see(moment);
+  std::set<std::string> judged, left_out;
+  for (const Verdict& verdict : judge.verdicts()) judged.insert(verdict.property);
+  for (const Judge::Unpromised& unpromised : judge.unpromised()) left_out.insert(unpromised.property);
+  for (const char* property : {"cluster connectivity", "rest frames", "skin surface", "untouched"}) {
+    EXPECT_TRUE(judged.contains(property)) << property;
+  }
+  for (const char* property : {"coverage", "component match", "cap kept", "rotation", "admissible step"}) {
+    EXPECT_TRUE(left_out.contains(property)) << property;
+    EXPECT_FALSE(judged.contains(property)) << property;
   }
 }
 

@@ -28,6 +28,7 @@ struct Merge {
     for (std::size_t c = 0; c < numbers.size(); ++c) pair.after.clusters.rotation[c] = turn_about_z(numbers[c]);
     return merge_legality(pair.setup, pair.before, pair.after);
   }
+  Verdict cap() const { return cap_kept(pair.setup, pair.before, pair.after); }
   Pair pair;
 };
 
@@ -46,8 +47,17 @@ TEST(MergeLegality, HoldsOfEveryRuleAlike) {
     Merge merge(6, {{0, 1, 2, 3}, {4, 5}}, 3, 6);
     merge.pair.setup.merge.rule = rule;
     expect_holds(merge.judge({range(0, 6)}, {0}));
+    expect_holds(merge.cap());
     merge.pair.before.cap = 5;
-    expect_rejected(merge.judge({range(0, 6)}, {0}), {0, 1}, {});
+    expect_holds(merge.judge({range(0, 6)}, {0}));
+    if (rule == MergeRule::single_pass) {
+      const Verdict verdict = merge.cap();
+      EXPECT_TRUE(verdict.holds);
+      EXPECT_EQ(verdict.checked, 0);
+      EXPECT_EQ(verdict.vacuous, "the rule does not promise it");
+    } else {
+      expect_rejected(merge.cap(), {0}, {});
+    }
   }
 }
 
@@ -108,18 +118,34 @@ TEST(MergeLegality, RejectsAParticleThatNobodyHeld) {
   expect_rejected(merge.judge({{0, 1, 2, 3}, {2, 3, 4}, {4, 5}}, {0, 1, 2}), {0}, {3});
 }
 
-// Small is what has fewer than tau particles; a union may have cap.
-TEST(MergeLegality, HoldsExactlyUpToTauAndCap) {
+// Small is what has fewer than tau particles.
+TEST(MergeLegality, HoldsExactlyUpToTau) {
   for (const int32_t size : {1, 2, 3, 4}) {
     Merge merge(8, {{0, 1, 2}, range(3, 3 + size)}, 3, 5);
     const Verdict verdict = merge.judge({range(0, 3 + size)}, {0});
     EXPECT_EQ(verdict.holds, size < 3) << size;
   }
+}
+
+TEST(CapKept, HoldsExactlyUpToTheCap) {
   Merge merge(8, {{0, 1, 2}, {3, 4}}, 3, 5);
+  (void)merge.judge({range(0, 5)}, {0});
   for (const int32_t cap : {4, 5, 6}) {
     merge.pair.before.cap = cap;
-    EXPECT_EQ(merge.judge({range(0, 5)}, {0}).holds, cap >= 5) << cap;
+    EXPECT_EQ(merge.cap().holds, cap >= 5) << cap;
   }
+}
+
+// Clusters that were above the cap already may stay so, and take in what lies inside them.
+TEST(CapKept, HoldsOfWhatHasNotGrown) {
+  Merge merge(8, {range(0, 7), {3, 4}}, 3, 5);
+  (void)merge.judge({range(0, 7)}, {0});
+  expect_holds(merge.cap());
+  (void)merge.judge({range(0, 8)}, {0});
+  expect_rejected(merge.cap(), {0}, {});
+  // A cluster that nobody had before has grown from nothing.
+  (void)merge.judge({range(0, 7), range(0, 6)}, {0, 9});
+  expect_rejected(merge.cap(), {9}, {});
 }
 
 TEST(MergeLegality, RejectsMergingAwayAClusterThatIsNotSmall) {

@@ -274,8 +274,8 @@ TEST(GpuMerge, PublishedIsLegalAndMaximalInEverySchedule) {
     const State& before = bench.loaded.front();
     const State after = bench.states().front();
     fewer += after.clusters.count() < before.clusters.count();
-    for (const Verdict& verdict :
-         {oracles::merge_legality(setup, before, after), oracles::merge_maximality(setup, after)}) {
+    for (const Verdict& verdict : {oracles::merge_legality(setup, before, after),
+                                   oracles::cap_kept(setup, before, after), oracles::merge_maximality(setup, after)}) {
       ASSERT_TRUE(verdict.holds) << verdict.property << ": " << verdict.witness.text;
     }
     State expected = after;
@@ -294,7 +294,8 @@ TEST(GpuMerge, PublishedOnRandomDissectionsIsLegalAndMaximal) {
     merge_on(launcher, bench);
     const State after = bench.states().front();
     for (const Verdict& verdict :
-         {oracles::merge_legality(setup, bench.loaded.front(), after), oracles::merge_maximality(setup, after)}) {
+         {oracles::merge_legality(setup, bench.loaded.front(), after),
+          oracles::cap_kept(setup, bench.loaded.front(), after), oracles::merge_maximality(setup, after)}) {
       ASSERT_TRUE(verdict.holds) << verdict.property << ": " << verdict.witness.text;
     }
   });
@@ -307,11 +308,12 @@ TEST(GpuMerge, PublishedMergesAChainOfAThousandClusters) {
     const State after = bench.states().front();
     const cutproof::Setup& setup = bench.bodies.setups.front();
     EXPECT_TRUE(oracles::merge_legality(setup, bench.loaded.front(), after).holds);
+    EXPECT_TRUE(oracles::cap_kept(setup, bench.loaded.front(), after).holds);
     EXPECT_TRUE(oracles::merge_maximality(setup, after).holds);
   });
 }
 
-// The cap is what single_pass does not keep; everything else is judged with a cap that nothing exceeds.
+// The cap is what single_pass does not keep.
 TEST(GpuMerge, SinglePassIsLegalButForTheCapInEverySchedule) {
   std::uint32_t seed = 0;
   int beyond = 0, fewer = 0;
@@ -321,12 +323,14 @@ TEST(GpuMerge, SinglePassIsLegalButForTheCapInEverySchedule) {
     ASSERT_EQ(bench.fault(), 0);
     expect_memberships_agree(bench.staging);
     const cutproof::Setup& setup = bench.bodies.setups.front();
-    State before = bench.loaded.front(), after = bench.states().front();
+    const State before = bench.loaded.front(), after = bench.states().front();
     fewer += after.clusters.count() < before.clusters.count();
-    const Verdict capped = oracles::merge_legality(setup, before, after);
-    beyond += !capped.holds;
-    ASSERT_TRUE(capped.holds || capped.witness.text.find("does not promise to keep") != std::string::npos);
-    before.cap = after.cap = 1'000'000;
+    const Verdict unpromised = oracles::cap_kept(setup, before, after);
+    ASSERT_TRUE(unpromised.holds);
+    ASSERT_EQ(unpromised.checked, 0);
+    cutproof::Setup promising = setup;
+    promising.merge.rule = MergeRule::published;
+    beyond += !oracles::cap_kept(promising, before, after).holds;
     const Verdict verdict = oracles::merge_legality(setup, before, after);
     ASSERT_TRUE(verdict.holds) << verdict.witness.text;
     State expected = after;
@@ -388,6 +392,7 @@ TEST(GpuMerge, BodiesOfOneLoadKeepTheirOwnRules) {
       const cutproof::Setup& setup = bodies.setups[b];
       if (setup.merge.rule == MergeRule::published && !before.removed.empty()) {
         ASSERT_TRUE(oracles::merge_legality(setup, before, after[b]).holds);
+        ASSERT_TRUE(oracles::cap_kept(setup, before, after[b]).holds);
         ASSERT_TRUE(oracles::merge_maximality(setup, after[b]).holds);
       } else {
         const State expected = before.removed.empty() ? before : reference_merge(setup, before);
@@ -425,6 +430,7 @@ TEST(GpuMerge, WhenRoomIsUsedUpListsAreMovedTogetherAndNothingElseChanges) {
         expect_same_clusters(reference_merge(setup, bodies.states.front()), after, setup.body.grid.spacing);
       } else if (rule == MergeRule::published) {
         ASSERT_TRUE(oracles::merge_legality(setup, bench.loaded.front(), after).holds);
+        ASSERT_TRUE(oracles::cap_kept(setup, bench.loaded.front(), after).holds);
         ASSERT_TRUE(oracles::merge_maximality(setup, after).holds);
       }
       ASSERT_FALSE(::testing::Test::HasFatalFailure());

@@ -1,0 +1,85 @@
+#include "harness/promises.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "model/error.h"
+
+namespace cutproof::harness {
+
+namespace {
+
+constexpr std::array kConnected = {std::string_view("cluster connectivity")};
+constexpr std::array kCovered = {std::string_view("coverage")};
+constexpr std::array kCoupled = {std::string_view("component match"), std::string_view("isolation")};
+constexpr std::array kEdgesCovered = {std::string_view("edge cover")};
+constexpr std::array kCapKept = {std::string_view("cap kept")};
+constexpr std::array kMaximal = {std::string_view("merge maximality")};
+constexpr std::array kTissueKept = {std::string_view("tissue kept")};
+constexpr std::array kRestFrames = {std::string_view("rest frames")};
+constexpr std::array kRotations = {std::string_view("rotation")};
+constexpr std::array kMomentum = {std::string_view("linear momentum"), std::string_view("component momentum")};
+constexpr std::array kMotion = {std::string_view("motion"), std::string_view("admissible step")};
+constexpr std::array kBladeOut = {std::string_view("no pass")};
+constexpr std::array kSkin = {std::string_view("skin match"), std::string_view("skin surface"),
+                              std::string_view("skin vertices"), std::string_view("skin shells"),
+                              std::string_view("skin geometry")};
+constexpr std::array kSameBits = {std::string_view("determinism"), std::string_view("span composition")};
+constexpr std::array kNoGhostForce = {std::string_view("no ghost force")};
+
+constexpr std::array kWords = {
+    PromiseWord{"connected", "each cluster is connected tissue", kConnected},
+    PromiseWord{"covered", "each alive particle lies in a cluster, and no dead one does", kCovered},
+    PromiseWord{"coupled", "tissue is coupled through shared particles where it is connected, and nowhere else",
+                kCoupled},
+    PromiseWord{"edges_covered", "both ends of each edge of the tissue lie in one cluster", kEdgesCovered},
+    PromiseWord{"cap_kept", "no merged cluster has more particles than the cap", kCapKept},
+    PromiseWord{"maximal", "no small cluster is left that could still merge", kMaximal},
+    PromiseWord{"tissue_kept", "what is gone was cut: nothing else was deleted", kTissueKept},
+    PromiseWord{"rest_frames", "centers and masses of clusters at rest follow from their members", kRestFrames},
+    PromiseWord{"rotations", "the rotation of each cluster is one", kRotations},
+    PromiseWord{"momentum", "momentum changes by what acts from outside, also that of each piece", kMomentum},
+    PromiseWord{"motion", "a step ends where the equations of the method end, within rounding", kMotion},
+    PromiseWord{"blade_out", "no tissue stands across the blade", kBladeOut},
+    PromiseWord{"skin", "the skin is a closed surface around each piece, and where the tissue is", kSkin},
+    PromiseWord{"same_bits", "the same input gives the same bits", kSameBits},
+    PromiseWord{"no_ghost_force", "a piece that is kicked moves no other piece", kNoGhostForce},
+};
+
+}  // namespace
+
+std::span<const PromiseWord> promise_words() { return kWords; }
+
+bool Promises::cover(std::string_view property) const {
+  bool named = false;
+  for (std::size_t k = 0; k < kWords.size(); ++k) {
+    const auto& properties = kWords[k].properties;
+    if (std::find(properties.begin(), properties.end(), property) == properties.end()) continue;
+    if ((words >> k & 1u) != 0) return true;
+    named = true;
+  }
+  return !named;
+}
+
+uint32_t parse_promises(std::string_view text, const std::string& file, const std::string& field) {
+  uint32_t bits = 0;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find(' ', begin), text.size());
+    const std::string_view word = text.substr(begin, end - begin);
+    begin = end + 1;
+    if (word.empty()) continue;
+    const auto found = std::find_if(kWords.begin(), kWords.end(), [&](const PromiseWord& w) { return w.name == word; });
+    if (found == kWords.end()) {
+      std::string known;
+      for (const PromiseWord& each : kWords) known += (known.empty() ? "" : ", ") + std::string(each.name);
+      throw InputError(file, field, fmt::format("there is no promise '{}'", word),
+                       fmt::format("give words of these, separated by spaces: {}", known));
+    }
+    bits |= 1u << static_cast<unsigned>(found - kWords.begin());
+  }
+  return bits;
+}
+
+}  // namespace cutproof::harness
