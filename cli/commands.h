@@ -10,7 +10,8 @@ class App;
 namespace cutproof::cli {
 
 // What the command line asks for. Returns an exit status: 0 everything holds, 1 a verdict failed or nothing was judged.
-// Bad input is an InputError (status 2), a failing machine a MachineError (status 3); main() turns them into both.
+// Bad input is an InputError (status 2), a failing machine a MachineError (status 3), a plugin that cannot run here a
+// guests::CannotRunHere (status 77, which CTest and others take for skipped); main() turns them into these.
 using Work = std::function<int()>;
 
 // Each adds a verb to `program`, and sets `work` if the command line names it.
@@ -21,6 +22,7 @@ void add_replay(CLI::App& program, Work& work);
 void add_bench(CLI::App& program, Work& work);
 void add_tune(CLI::App& program, Work& work);
 void add_digest(CLI::App& program, Work& work);
+void add_judge(CLI::App& program, Work& work);
 void add_info(CLI::App& program, Work& work);
 
 inline constexpr const char* kVersion = CUTPROOF_VERSION;

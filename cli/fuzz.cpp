@@ -12,6 +12,7 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/terminal.h"
+#include "guests/plugin_backend.h"
 #include "model/io/atomic_file.h"
 #include "model/io/recording.h"
 #include "property_tests/campaign.h"
@@ -89,6 +90,7 @@ int print_conclusion(const json& document, bool whole) {
       "{cases} cases of {mean_particles:.0f} particles on average, {verdicts} verdicts, {seconds:.1f} s, "
       "{cases_per_second:.0f} cases/s\n",
       document);
+  if (document.at("refused") > 0) print_filled("{refused} cases were refused: nothing is known of them\n", document);
   if (document.contains("steps_compared")) {
     print_filled(
         "{steps} steps beside the reference's: {particles} positions at most {greatest_h} h apart, {undecidable} that "
@@ -122,6 +124,12 @@ int merge(const FuzzOptions& options) {
   return print_conclusion(whole, true);
 }
 
+// Of a plugin its file without folders.
+std::string name_in_files(const std::string& backend) {
+  if (!backend.starts_with(guests::kPluginPrefix)) return backend;
+  return std::filesystem::path(guests::options_of_name(backend).library).stem().string();
+}
+
 // Simplifies, saves, records; returns the file's name.
 std::string keep(const Violation& violation, const FuzzOptions& options, const BackendChoice& choice, int batch) {
   fmt::print("case {} FAILS: {}\n", violation.index, describe(violation.verdict));
@@ -130,7 +138,7 @@ std::string keep(const Violation& violation, const FuzzOptions& options, const B
   simplified.counterexample.seed = options.campaign.seed;
   const Counterexample& found = simplified.counterexample;
   const std::string stem = (std::filesystem::path(options.save) /
-                            fmt::format("{}_{}_{}", choice.name, options.campaign.seed, violation.index))
+                            fmt::format("{}_{}_{}", name_in_files(choice.name), options.campaign.seed, violation.index))
                                .string();
   const std::string file = stem + ".json";
   io::write_text(file, to_json(found) + "\n");

@@ -7,6 +7,8 @@
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "cli/output.h"
+#include "guests/guest.h"
+#include "model/backend.h"
 #include "model/error.h"
 #include "model/io/atomic_file.h"
 
@@ -27,6 +29,10 @@ int status_of_exception() noexcept {
     throw;
   } catch (const cutproof::InputError& error) {
     return say(error.what(), 2);
+  } catch (const cutproof::Refused& error) {
+    return say((std::string("nothing was judged: ") + error.what()).c_str(), 1);
+  } catch (const cutproof::guests::CannotRunHere& error) {
+    return say((std::string("skipped: ") + error.what()).c_str(), 77);
   } catch (const std::bad_alloc&) {
     return say("the machine has not enough memory for this", 3);
   } catch (const std::exception& error) {
@@ -50,11 +56,12 @@ int run_command_line(int argc, char** argv) {
   CLI::App app{
       "cutproof: judges soft-body dissection. Cuts a body made of shape matching clusters and certifies every frame.\n"
       "Exit status: 0 everything holds, 1 a verdict failed or nothing was judged, 2 bad input or usage, 3 the machine "
-      "failed."};
+      "failed, 77 a plugin cannot run here."};
   app.set_version_flag("--version", std::string("cutproof ") + kVersion);
   app.require_subcommand(1);
   Work work;
-  for (const auto add : {add_run, add_check, add_info, add_bench, add_tune, add_fuzz, add_replay, add_digest})
+  for (const auto add :
+       {add_run, add_judge, add_check, add_info, add_bench, add_tune, add_fuzz, add_replay, add_digest})
     add(app, work);
   try {
     app.parse(argc, argv);

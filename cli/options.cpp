@@ -22,7 +22,7 @@ void refuse_empty(const CLI::App& command) {
 
 void add_backend_name(CLI::App& command, std::string& name, const std::string& what,
                       const std::function<bool(const harness::BackendDescriptor&)>& offered) {
-  command.add_option("--backend", name, fmt::format("{}: {}", what, harness::backend_names(offered)))
+  command.add_option("--backend", name, fmt::format("{}: {}, plugin:FILE.so", what, harness::backend_names(offered)))
       ->capture_default_str()
       ->type_name("B");
 }

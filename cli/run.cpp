@@ -156,7 +156,11 @@ int run(const RunOptions& options) {
   RunResult result{"run", options.scene, options.backend.name, scene, built.setup.body, built.state.clusters.count()};
   harness::FrameRunner runner(*backend, {built.setup}, {built.state});
   const auto state = [&]() -> const State& { return *runner.states().front(); };
-  if (depth) judge.emplace(built.setup, scene.expect, options.backend.name, runner.states().front(), *depth);
+  if (depth) {
+    harness::Promises promises;
+    promises.words = harness::parse_promises(backend->promises(), options.backend.name, "promises");
+    judge.emplace(built.setup, scene.expect, options.backend.name, runner.states().front(), *depth, promises);
+  }
   if (depth == harness::Depth::motion) relations.emplace(built.setup, make_backend(options.backend));
   if (mode) against.emplace(built.setup, built.state, state(), options.backend.name, *mode);
   if (!options.errors.empty()) {

@@ -6,9 +6,13 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
+#include <functional>
+#include <map>
+#include <mutex>
 #include <thread>
 
 #include "gpu/backends.h"
+#include "guests/plugin_backend.h"
 #include "harness/partial_backend.h"
 #include "model/at.h"
 #include "model/error.h"
@@ -170,7 +174,29 @@ constexpr const char* kToolkitWanted = "no CUDA toolkit of version 12.4 or newer
 
 std::span<const BackendDescriptor> backends() { return kBackends; }
 
+namespace {
+
+// Of a plugin that is named on the command line; where there is none, making it says so.
+const BackendDescriptor* describe_plugin(std::string_view name) {
+  static std::mutex guard;
+  static std::map<std::string, BackendDescriptor, std::less<>> known;
+  const std::lock_guard lock(guard);
+  const auto [place, is_new] = known.try_emplace(std::string(name));
+  if (is_new) {
+    place->second.name = place->first;
+    place->second.summary = "a plugin";
+    place->second.takes_kernel_options = false;
+    place->second.only_split = place->second.only_rotation = "its own";
+    place->second.bodies_in_a_load = 16;
+    place->second.make = [](const BackendChoice& choice) { return guests::make_plugin_backend(choice.name); };
+  }
+  return &place->second;
+}
+
+}  // namespace
+
 const BackendDescriptor* find_backend(std::string_view name) {
+  if (name.starts_with(guests::kPluginPrefix)) return describe_plugin(name);
   const auto found = std::find_if(kBackends.begin(), kBackends.end(), [&](const auto& b) { return b.name == name; });
   return found == kBackends.end() ? nullptr : &*found;
 }
@@ -179,7 +205,7 @@ const BackendDescriptor& described_backend(std::string_view name) {
   const BackendDescriptor* const found = find_backend(name);
   if (found == nullptr) {
     refuse("--backend", fmt::format("there is no backend '{}'", name),
-           fmt::format("use one of those that `cutproof info` lists: {}", backend_names()));
+           fmt::format("use one of those that `cutproof info` lists: {}; or plugin:FILE.so", backend_names()));
   }
   return *found;
 }

@@ -61,7 +61,8 @@ struct BackendDescriptor {
 
 // In the order in which people read about them; also those that this build does not have.
 std::span<const BackendDescriptor> backends();
-// Null if there is none of that name.
+// Null if there is none of that name. A plugin's is "plugin:FILE.so" (guests/plugin_backend.h); whether there is such a
+// file shows when it is made.
 const BackendDescriptor* find_backend(std::string_view name);
 // Throws InputError, naming --backend, if there is none of that name.
 const BackendDescriptor& described_backend(std::string_view name);

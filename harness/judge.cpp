@@ -101,7 +101,17 @@ int32_t Judge::inner_shells() {
 
 std::vector<Verdict> Judge::take_verdicts() { return std::exchange(verdicts_, {}); }
 
+void Judge::leave_out(const Verdict& verdict) {
+  const auto known = std::find_if(unpromised_.begin(), unpromised_.end(),
+                                  [&](const Unpromised& u) { return u.property == verdict.property; });
+  Unpromised& entry =
+      known != unpromised_.end() ? *known : unpromised_.emplace_back(Unpromised{verdict.property, 0, 0});
+  ++entry.states;
+  entry.failing += verdict.holds ? 0 : 1;
+}
+
 void Judge::add(Verdict verdict) {
+  if (!promises_.cover(verdict.property)) return leave_out(verdict);
   verdict.backend = backend_;
   verdicts_.push_back(std::move(verdict));
 }
@@ -120,12 +130,7 @@ bool Judge::is_promised(const Verdict& verdict, Stage stage, const State& state)
 void Judge::take(std::vector<Verdict> found, Stage stage, const State& state) {
   for (Verdict& verdict : found) {
     if (!is_promised(verdict, stage, state)) {
-      const auto known = std::find_if(unpromised_.begin(), unpromised_.end(),
-                                      [&](const Unpromised& u) { return u.property == verdict.property; });
-      Unpromised& entry =
-          known != unpromised_.end() ? *known : unpromised_.emplace_back(Unpromised{verdict.property, 0, 0});
-      ++entry.states;
-      entry.failing += verdict.holds ? 0 : 1;
+      leave_out(verdict);
       continue;
     }
     verdict.stage = stage;

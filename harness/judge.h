@@ -32,7 +32,7 @@ class Judge {
   void begin(const Snapshot& initial, bool has_expanded = false);
   // Moments in order. What somebody else ran for the backend is not judged.
   void see(const Moment& moment);
-  // A verdict of somebody else's on this run, such as a broken contract.
+  // A verdict of somebody else's on this run, such as a broken contract. One that is not promised is left out.
   void add(Verdict verdict);
 
   const std::vector<Verdict>& verdicts() const { return verdicts_; }
@@ -55,6 +55,7 @@ class Judge {
   void see_stage(Stage stage, const State& before, const State& after);
   void see_several(const Moment& moment, const std::array<bool, 6>& due);
   void take(std::vector<Verdict> found, Stage stage, const State& state);
+  void leave_out(const Verdict& verdict);
   bool is_promised(const Verdict& verdict, Stage stage, const State& state) const;
 
   const Setup& setup_;

@@ -23,9 +23,13 @@ constexpr std::array kRotations = {std::string_view("rotation")};
 constexpr std::array kMomentum = {std::string_view("linear momentum"), std::string_view("component momentum")};
 constexpr std::array kMotion = {std::string_view("motion"), std::string_view("admissible step")};
 constexpr std::array kBladeOut = {std::string_view("no pass")};
-constexpr std::array kSkin = {std::string_view("skin match"), std::string_view("skin surface"),
-                              std::string_view("skin vertices"), std::string_view("skin shells"),
-                              std::string_view("skin geometry")};
+constexpr std::array kSkin = {std::string_view("skin match"),       std::string_view("skin surface"),
+                              std::string_view("skin vertices"),    std::string_view("skin shells"),
+                              std::string_view("skin geometry"),    std::string_view("surface"),
+                              std::string_view("surface vertices"), std::string_view("surface shells")};
+constexpr std::array kBest = {std::string_view("best rotation")};
+constexpr std::array kNearest = {std::string_view("nearest rotation")};
+constexpr std::array kKeepsPrevious = {std::string_view("previous rotation kept")};
 constexpr std::array kSameBits = {std::string_view("determinism"), std::string_view("span composition")};
 constexpr std::array kNoGhostForce = {std::string_view("no ghost force")};
 
@@ -40,6 +44,9 @@ constexpr std::array kWords = {
     PromiseWord{"tissue_kept", "what is gone was cut: nothing else was deleted", kTissueKept},
     PromiseWord{"rest_frames", "centers and masses of clusters at rest follow from their members", kRestFrames},
     PromiseWord{"rotations", "the rotation of each cluster is one", kRotations},
+    PromiseWord{"best", "no rotation is better", kBest},
+    PromiseWord{"nearest", "of several best rotations it is the nearest to the previous one", kNearest},
+    PromiseWord{"keeps_previous", "where nothing is known of a rotation the previous one stays", kKeepsPrevious},
     PromiseWord{"momentum", "momentum changes by what acts from outside, also that of each piece", kMomentum},
     PromiseWord{"motion", "a step ends where the equations of the method end, within rounding", kMotion},
     PromiseWord{"blade_out", "no tissue stands across the blade", kBladeOut},
@@ -64,6 +71,7 @@ bool Promises::cover(std::string_view property) const {
 }
 
 uint32_t parse_promises(std::string_view text, const std::string& file, const std::string& field) {
+  if (text == "*") return Promises{}.words;
   uint32_t bits = 0;
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find(' ', begin), text.size());

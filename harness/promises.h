@@ -35,8 +35,8 @@ struct Promises {
 inline constexpr Promises kPromisesOfRules = {.coupling_without_edge_cover = false,
                                               .maximality_after_expansion = false};
 
-// Words separated by spaces, as bits. Throws InputError, naming `file` and `field`, for a word that there is not, and
-// names those that there are.
+// Words separated by spaces, as bits; "*": all. Throws InputError, naming `file` and `field`, for a word that there is
+// not, and names those that there are.
 uint32_t parse_promises(std::string_view text, const std::string& file, const std::string& field);
 
 }  // namespace cutproof::harness

@@ -8,10 +8,10 @@
 namespace cutproof::harness {
 
 SceneJudge::SceneJudge(const Setup& setup, const Expectations& expectations, std::string backend,
-                       const Snapshot& initial, Depth depth)
+                       const Snapshot& initial, Depth depth, Promises promises)
     : setup_(setup),
       depth_(depth),
-      judge_(setup, std::move(backend), Promises{}, Thorough::when_cut, depth),
+      judge_(setup, std::move(backend), promises, Thorough::when_cut, depth),
       expectations_(setup, expectations, initial) {
   judge_.begin(initial);
 }

@@ -12,9 +12,10 @@ namespace cutproof::harness {
 
 class SceneJudge {
  public:
-  // `setup` must outlive this. `initial` is the state as loaded. Who says nothing about the depth judges by everything.
+  // `setup` must outlive this. `initial` is the state as loaded. Who says nothing about the depth judges by everything,
+  // and by all that a scene promises.
   SceneJudge(const Setup& setup, const Expectations& expectations, std::string backend, const Snapshot& initial,
-             Depth depth = Depth::motion);
+             Depth depth = Depth::motion, Promises promises = {});
 
   void see(const Moment& moment);
   // Of somebody else's: a broken contract, or a relation between runs.

@@ -40,6 +40,12 @@ struct Array {
   std::vector<std::byte> bytes;  // of as many elements as `shape` says
 
   int64_t rows() const { return shape.empty() ? 1 : shape[0]; }
+  // Elements of one row.
+  int64_t columns() const {
+    int64_t columns = 1;
+    for (std::size_t k = 1; k < shape.size(); ++k) columns *= shape[k];
+    return columns;
+  }
   int64_t count() const {
     int64_t count = 1;
     for (const int64_t extent : shape) count *= extent;

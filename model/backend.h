@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,13 @@ struct SpanReport {
   std::array<bool, 6> ran = {};        // by stage: did any body launch it?
   double total_seconds = 0;            // wall time of the whole span [s]
   std::array<double, 6> seconds = {};  // by stage: wall time [s]; 0 where the span ran as one piece
+};
+
+// A backend does not take what it was given, and says why: nothing is known of it, so nothing is judged and nothing
+// passed.
+class Refused : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
 };
 
 // A member may throw MachineError or std::bad_alloc when the machine fails; after an exception a backend can only be
@@ -36,9 +44,12 @@ class Backend {
   // cannot run, others run for it, and it is not judged on that (harness/frame_runner.h).
   virtual bool can_run(Span span) const = 0;
 
+  // What it vouches for, as words of harness/promises.h; "*": all that the rules of a setup promise.
+  virtual std::string promises() const { return "*"; }
+
   // Takes one or more bodies, each with its own parameters. Changes nothing in them: a state in the middle of a
   // frame may be loaded. Requires setups.size() == states.size(). Throws std::invalid_argument if a state does not
-  // fit its setup.
+  // fit its setup, and Refused for what the backend does not do, such as bodies without a grid.
   virtual void load(std::vector<Setup> setups, std::vector<State> states) = 0;
 
   // Executes the stages of `span` on every body whose schedule is not over. What a scene does not need is not

@@ -38,6 +38,8 @@ std::string problem_of(const std::function<void()>& run) {
     throw;
   } catch (const std::bad_alloc&) {
     throw;
+  } catch (const Refused&) {
+    throw;
   } catch (const std::exception& error) {
     return error.what();
   }
@@ -137,13 +139,19 @@ class Runner {
 
     std::vector<CaseRun> runs;
     std::string name, problem;
+    bool is_refused = false;
     double running = 0;
     {
       Loan loan(pool_);
       if (!loan.backend || source_.fresh) loan.backend = source_.make(number);
       name = loan.backend->name();
       const Clock::time_point running_since = Clock::now();
-      problem = problem_of([&] { runs = run_cases(*loan.backend, load.loaded); });
+      try {
+        problem = problem_of([&] { runs = run_cases(*loan.backend, load.loaded); });
+      } catch (const Refused& refused) {  // which of the bodies shows where each is alone
+        problem = refused.what();
+        is_refused = true;
+      }
       running = seconds_since(running_since);
       loan.works = problem.empty();
     }
@@ -154,7 +162,7 @@ class Runner {
                                                    load.indices[k] % options_.thorough == 0)
                                       : dissect_alone([&] { return source_.make(number); }, load.cases[k], true);
     }
-    if (!problem.empty() &&
+    if (!problem.empty() && !is_refused &&
         std::none_of(judgements.begin(), judgements.end(), [](const Judgement& j) { return j.failure.has_value(); })) {
       judgements.front() = thrown(name, "(with the other bodies of its load only) " + problem);
     }
@@ -171,6 +179,7 @@ class Runner {
       Judgement& judgement = judgements[k];
       ++campaign_.cases;
       campaign_.verdicts += judgement.verdicts;
+      campaign_.refused += judgement.refused ? 1 : 0;
       campaign_.particles += load.loaded[k].setup.body.particle_count();
       campaign_.coverage.add(judgement.coverage);
       campaign_.compared.join(judgement.compared);
@@ -213,8 +222,13 @@ namespace {
 
 Judgement alone(const std::string& backend, const std::function<Judgement()>& judged) {
   Judgement judgement;
-  const std::string problem = problem_of([&] { judgement = judged(); });
-  return problem.empty() ? judgement : thrown(backend, problem);
+  try {
+    const std::string problem = problem_of([&] { judgement = judged(); });
+    return problem.empty() ? judgement : thrown(backend, problem);
+  } catch (const Refused&) {
+    judgement.refused = true;
+    return judgement;
+  }
 }
 
 }  // namespace

@@ -42,6 +42,7 @@ struct Violation {
 
 struct Campaign {
   int64_t cases = 0, verdicts = 0, particles = 0;
+  int64_t refused = 0;  // cases that the backend refused: nothing is known of them
   CaseCoverage coverage;
   StepsCompared compared;
   harness::PropertySummaries properties;

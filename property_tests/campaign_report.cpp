@@ -113,6 +113,7 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
       {"shard", options.shard + 1},
       {"shards", options.shards},
       {"cases", campaign.cases},
+      {"refused", campaign.refused},
       {"verdicts", campaign.verdicts},
       {"mean_particles",
        campaign.cases == 0 ? 0.0 : static_cast<double>(campaign.particles) / static_cast<double>(campaign.cases)},

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "harness/moments.h"
+#include "harness/promises.h"
 #include "harness/property_summary.h"
 #include "model/backend.h"
 #include "model/verdict.h"
@@ -108,11 +109,13 @@ struct Judgement {
   harness::PropertySummaries properties;
   int64_t verdicts = 0;            // how many were asked for
   std::optional<Verdict> failure;  // the first that does not hold
+  bool refused = false;            // by the backend, so nothing was judged
 };
 
 // What a backend made of one case: the run, and what of the contract it broke on the way.
 struct CaseRun {
   harness::Trace trace;
+  harness::Promises promises = harness::kPromisesOfRules;
   bool has_expanded = false;       // before the first state: an expansion has changed clusters
   std::optional<Verdict> failure;  // of the contract
 };

@@ -5,6 +5,7 @@
 
 #include "gpu/state/indices.h"
 #include "gpu/state/staging.h"
+#include "model/backend.h"
 #include "model/body.h"
 
 namespace cutproof::gpu {
@@ -21,7 +22,7 @@ void require(bool condition, const char* what) {
 }
 
 void require_fit(const Setup& setup, const State& state) {
-  require(setup.body.on_grid(), "a body without a grid; the backend reference can run it");
+  if (!setup.body.on_grid()) throw Refused("the kernels run no body without a grid; the backend reference does");
   const std::size_t n = setup.body.node.size();
   require(setup.body.mass.size() == n && state.x.size() == n && state.v.size() == n && state.alive.size() == n,
           "masses, positions, velocities and alive need one entry per particle");

@@ -1,0 +1,225 @@
+// `cutproof judge`: somebody's own kernels, from a shared library.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "cli/options.h"
+#include "cli/output.h"
+#include "cli/terminal.h"
+#include "guests/campaign.h"
+#include "model/io/atomic_file.h"
+
+namespace cutproof::cli {
+
+namespace {
+
+using namespace guests;
+using nlohmann::json;
+
+struct JudgeOptions {
+  GuestOptions guest;
+  std::vector<std::string> operations;  // empty: all that the plugin has
+  KernelCampaignOptions campaign;
+  int64_t cases = 0;        // 0: of each operation what it takes a second or a few for
+  bool keep_going = false;  // beyond ten questions that were not answered
+  std::string save = ".";
+  std::string json, replay;
+};
+
+// Operations by what one case costs.
+int64_t usual_cases(const OperationDescription& operation) {
+  return operation.number == wire::rotations ? 100'000 : 2'000;
+}
+
+std::vector<const OperationDescription*> asked_operations(const JudgeOptions& options, const PluginInfo& plugin) {
+  std::string known, offered;
+  std::vector<const OperationDescription*> all;
+  for (const OperationDescription& each : operations()) {
+    known += (known.empty() ? "" : ", ") + std::string(each.name);
+    if (!plugin.offers(each.number)) continue;
+    offered += (offered.empty() ? "" : ", ") + std::string(each.name);
+    all.push_back(&each);
+  }
+  if (options.operations.empty()) {
+    if (all.empty()) {
+      throw InputError(options.guest.library, "", "it has no operation that can be judged by itself",
+                       "set one of its members: " + known);
+    }
+    return all;
+  }
+  std::vector<const OperationDescription*> asked;
+  for (const std::string& name : options.operations) {
+    const OperationDescription* const found = find_operation(name);
+    if (found == nullptr) refuse("OPS", fmt::format("there is no operation '{}'", name), "use some of " + known);
+    if (!plugin.offers(found->number)) {
+      throw InputError(options.guest.library, name, "the plugin does not have this operation",
+                       offered.empty() ? "it has none" : "it has " + offered);
+    }
+    asked.push_back(found);
+  }
+  return asked;
+}
+
+std::string title(const PluginInfo& plugin, const std::string& library) {
+  return fmt::format("{}{}{} ({}), {} precision, on the {}", plugin.name.empty() ? "a plugin" : plugin.name,
+                     plugin.version.empty() ? "" : " ", plugin.version, library,
+                     plugin.precision == Precision::binary32 ? "single" : "double",
+                     plugin.on_device ? "CUDA device" : "host");
+}
+
+std::string shortened(const std::string& text) { return text.size() > 2000 ? text.substr(0, 2000) + " …" : text; }
+
+void print(const KernelCampaign& campaign) {
+  fmt::print("{}: {} {} in {} questions, {:.1f} s\n", campaign.operation->name, campaign.cases,
+             campaign.operation->cases, campaign.questions, campaign.seconds);
+  fmt::print("  {:<24} {:>10} {:>10} {:>18}\n", "property", "judged", "failed", "greatest of bound");
+  for (const harness::PropertySummary& p : campaign.properties.all()) {
+    fmt::print("  {:<24} {:>10} {:>10} {:>18}\n", p.property, p.checked, p.failed,
+               p.of_bound ? fmt::format("{:.2g}", *p.of_bound) : "-");
+  }
+  for (const Unpromised& u : campaign.unpromised) {
+    fmt::print("  not promised, not judged: {}{}\n", u.property,
+               u.failing > 0 ? fmt::format(" (would fail in {} questions)", u.failing) : "");
+  }
+  if (campaign.refused > 0) fmt::print("  refused: {} questions, of which nothing is known\n", campaign.refused);
+  if (campaign.questions == campaign.refused) fmt::print("FAILS: nothing was judged\n");
+}
+
+// Saves what was found and says how to see it again.
+std::string keep(const JudgeOptions& options, const Guest& guest, const KernelCampaign& campaign,
+                 const KernelFailure& failure) {
+  const int64_t kinds = static_cast<int64_t>(campaign.operation->kinds().size());
+  SavedQuestion saved;
+  saved.operation = campaign.operation->name;
+  saved.question = failure.simplest;
+  saved.precision = guest.plugin().precision;
+  saved.at_end = (failure.index + failure.index / kinds) % 2 == 0;
+  saved.plugin = guest.plugin().name + " " + guest.plugin().version;
+  saved.found = failure.of_simplest.property + ": " + failure.of_simplest.witness.text;
+  saved.seed = options.campaign.seed;
+  saved.index = failure.index;
+  std::string property = failure.verdict.property;
+  std::replace(property.begin(), property.end(), ' ', '_');
+  const std::string file =
+      (std::filesystem::path(options.save) /
+       fmt::format("{}_{}_{}_{}.json", saved.operation, property, options.campaign.seed, failure.index))
+          .string();
+  io::write_text(file, guests::to_json(saved) + "\n");
+  fmt::print("FAILS: {}, '{}', question {} ({}):\n  {}\n", saved.operation, failure.verdict.property, failure.index,
+             failure.simplest.kind, shortened(failure.verdict.witness.text));
+  fmt::print("  simplified to {}: {}\n", campaign.operation->size_of(failure.simplest),
+             shortened(failure.of_simplest.witness.text));
+  fmt::print("  saved; to see it again: cutproof judge {} --case {}\n", options.guest.library, file);
+  return file;
+}
+
+int replay(const JudgeOptions& options, Guest& guest) {
+  const SavedQuestion saved = question_from_json(io::read_text(options.replay), options.replay);
+  const OperationDescription& operation = *find_operation(saved.operation);
+  if (!guest.plugin().offers(operation.number)) {
+    throw InputError(options.guest.library, saved.operation, "the plugin does not have this operation",
+                     "replay the case with a plugin that does");
+  }
+  const harness::Promises promises = promises_of(guest.plugin(), operation, options.guest.library);
+  fmt::print("{}: {}, {}\nfound as: {}\n", options.replay, saved.operation, saved.question.kind, saved.found);
+  const bool again = guest.plugin().promises && promises.cover("determinism");
+  const std::vector<Verdict> verdicts = judge_answer(guest, operation, saved.question, saved.at_end, again);
+  int64_t judged = 0, failed = 0;
+  for (const Verdict& verdict : verdicts) {
+    if (!promises.cover(verdict.property)) continue;
+    judged += verdict.checked > 0 ? 1 : 0;
+    if (verdict.holds) continue;
+    ++failed;
+    fmt::print("FAILS: '{}': {}\n", verdict.property, shortened(verdict.witness.text));
+  }
+  if (verdicts.empty()) fmt::print("it refuses this question: nothing was judged\n");
+  if (failed == 0 && judged > 0) fmt::print("holds: {} verdicts\n", judged);
+  return failed > 0 || judged == 0 ? 1 : 0;
+}
+
+int judge(const JudgeOptions& options) {
+  if (!std::filesystem::is_directory(options.save)) {
+    refuse("--save", fmt::format("'{}' is not a folder", options.save), "create it first");
+  }
+  require_writable(options.json);
+  Guest guest(options.guest);
+  const std::vector<const OperationDescription*> asked = asked_operations(options, guest.plugin());
+  if (!options.replay.empty()) return replay(options, guest);
+  fmt::print("{}, seed {}\n", title(guest.plugin(), options.guest.library), options.campaign.seed);
+  flush_output();
+  bool holds = true;
+  json document = {{"verb", "judge"},
+                   {"version", kVersion},
+                   {"plugin",
+                    {{"library", options.guest.library},
+                     {"name", guest.plugin().name},
+                     {"version", guest.plugin().version},
+                     {"precision", guest.plugin().precision == Precision::binary32 ? "single" : "double"},
+                     {"device", guest.plugin().on_device ? "cuda" : "host"}}},
+                   {"seed", options.campaign.seed},
+                   {"operations", json::array()}};
+  for (const OperationDescription* const operation : asked) {
+    const harness::Promises promises = promises_of(guest.plugin(), *operation, options.guest.library);
+    KernelCampaignOptions campaign_options = options.campaign;
+    campaign_options.cases = options.cases > 0 ? options.cases : usual_cases(*operation);
+    if (options.keep_going) campaign_options.most_lost = 0;
+    KernelCampaign campaign;
+    {
+      Progress progress(std::string(operation->name), campaign_options.cases);
+      campaign = judge_kernel(guest, *operation, promises, campaign_options, [&](const KernelCampaign& so_far) {
+        progress.show(so_far.cases, fmt::format("{} failed", so_far.failed));
+      });
+    }
+    print(campaign);
+    json result = guests::to_json(campaign);
+    for (std::size_t k = 0; k < campaign.failures.size(); ++k) {
+      result["failures"][k]["file"] = keep(options, guest, campaign, campaign.failures[k]);
+    }
+    if (campaign.gave_up) {
+      fmt::print("  given up after {} questions that were not answered; --keep-going goes on\n", campaign.lost);
+    }
+    document["operations"].push_back(std::move(result));
+    holds = holds && campaign.holds();
+    flush_output();
+  }
+  document["holds"] = holds;
+  write_document(options.json, document);
+  fmt::print("{}\n", holds ? "all hold" : "FAILS");
+  return holds ? 0 : 1;
+}
+
+}  // namespace
+
+void add_judge(CLI::App& program, Work& work) {
+  const auto options = std::make_shared<JudgeOptions>();
+  CLI::App* const command = program.add_subcommand("judge", "your own kernels, from a shared library");
+  command->add_option("plugin", options->guest.library, "a shared library that includes cutproof/plugin.h")
+      ->required()
+      ->type_name("FILE.so");
+  command->add_option("operations", options->operations, "which of its operations (default: all)")->type_name("OPS");
+  add_count(*command, "--cases", options->cases, "matrices or bodies for each operation (default: 100000 or 2000)",
+            CLI::PositiveNumber);
+  command->add_option("--seconds", options->campaign.seconds, "for how long, for each operation")
+      ->type_name("S")
+      ->check(CLI::NonNegativeNumber);
+  add_seed(*command, options->campaign.seed, "what cases are drawn from");
+  command->add_option("--parameters", options->guest.parameters, "a text for the plugin's create()")->type_name("TEXT");
+  command->add_option("--time-limit", options->guest.time_limit, "for each answer")
+      ->capture_default_str()
+      ->type_name("S")
+      ->check(CLI::Range(0.01, 1e6));
+  command->add_flag("--keep-going", options->keep_going, "beyond ten questions that were not answered");
+  command->add_option("--simplify", options->campaign.simplify, "how long each failure is simplified, 0: not at all")
+      ->capture_default_str()
+      ->type_name("S")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--save", options->save, "folder for counterexamples")->capture_default_str()->type_name("DIR");
+  add_json(*command, options->json, "write counts and failures");
+  command->add_option("--case", options->replay, "one saved question again, and nothing else")->type_name("CASE");
+  command->callback([options, &work] { work = [options] { return judge(*options); }; });
+}
+
+}  // namespace cutproof::cli

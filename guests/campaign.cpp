@@ -1,0 +1,332 @@
+#include "guests/campaign.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "model/at.h"
+#include "model/error.h"
+
+namespace cutproof::guests {
+
+namespace {
+
+using nlohmann::json;
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+const Verdict* first_failure(const std::vector<Verdict>& verdicts, const harness::Promises& promises,
+                             const std::string& property = {}) {
+  for (const Verdict& verdict : verdicts) {
+    if (verdict.holds || !promises.cover(verdict.property)) continue;
+    if (property.empty() || verdict.property == property) return &verdict;
+  }
+  return nullptr;
+}
+
+// By questions that are simpler and still fail in the same property.
+void simplify(Guest& guest, const OperationDescription& operation, const harness::Promises& promises, bool at_end,
+              bool again, double seconds, KernelFailure& failure) {
+  const Clock::time_point begin = Clock::now();
+  for (bool simpler = true; simpler && seconds_since(begin) < seconds;) {
+    simpler = false;
+    for (Question& next : operation.simpler(failure.simplest)) {
+      if (seconds_since(begin) >= seconds) break;
+      const std::vector<Verdict> verdicts = judge_answer(guest, operation, next, at_end, again);
+      const Verdict* const failing = first_failure(verdicts, promises, failure.verdict.property);
+      if (failing == nullptr) continue;
+      failure.of_simplest = *failing;
+      failure.simplest = std::move(next);
+      simpler = true;
+      break;
+    }
+  }
+}
+
+}  // namespace
+
+harness::Promises promises_of(const PluginInfo& plugin, const OperationDescription& operation,
+                              const std::string& library) {
+  harness::Promises promises;
+  const std::string words = plugin.promises.value_or(std::string(operation.by_itself));
+  promises.words = harness::parse_promises(words, library, "promises");
+  return promises;
+}
+
+Answer ask(Guest& guest, const OperationDescription& operation, const Question& question, bool at_end) {
+  const Precision precision = guest.plugin().precision;
+  Arrays rounded;
+  for (const Array& array : question.given) {
+    // The spacing is a member of the tissue, not an array.
+    rounded.push_back(array.name == "spacing" ? array : in_precision(array, precision));
+  }
+  std::vector<Argument> arguments;
+  for (const Array& array : rounded) {
+    arguments.push_back(given(array));
+    if (array.name == "spacing" || array.name == "nodes") arguments.back().role = Role::setup;
+  }
+  const ElementType real = precision == Precision::binary32 ? ElementType::f32 : ElementType::f64;
+  for (const AnswerArray& wanted : operation.answers) {
+    Argument& argument = arguments.emplace_back();
+    argument.name = wanted.name;
+    argument.type = wanted.real ? real : wanted.type;
+    argument.columns = wanted.columns;
+    argument.role = wanted.rows_of.empty() ? Role::grown : Role::answer;
+    if (!wanted.rows_of.empty()) argument.rows = find_array(question.given, wanted.rows_of)->rows();
+  }
+  return guest.call(operation.number, 0, {}, arguments, at_end);
+}
+
+std::vector<Verdict> judge_answer(Guest& guest, const OperationDescription& operation, const Question& question,
+                                  bool at_end, bool again) {
+  const Precision precision = guest.plugin().precision;
+  const Answer answer = ask(guest, operation, question, at_end);
+  if (answer.kind == Answer::Kind::refused) return {};
+  if (answer.kind == Answer::Kind::fault) return {unreadable(kAnswersProperty, answer.text)};
+  std::vector<Verdict> verdicts = operation.judge(question, answer.arrays, precision);
+  Verdict answers = unreadable(kAnswersProperty, "");
+  answers.holds = true;
+  answers.measured = 0;
+  verdicts.insert(verdicts.begin(), answers);
+  if (again) {
+    const Answer second = ask(guest, operation, question, !at_end);
+    Verdict same = unreadable("determinism", second.text.empty() ? "asked again it answers otherwise" : second.text);
+    same.holds = second.kind == Answer::Kind::answered && second.arrays == answer.arrays;
+    if (same.holds) {
+      same.measured = 0;
+      same.witness = {};
+    }
+    verdicts.push_back(same);
+  }
+  return verdicts;
+}
+
+KernelCampaign judge_kernel(Guest& guest, const OperationDescription& operation, const harness::Promises& promises,
+                            const KernelCampaignOptions& options,
+                            const std::function<void(const KernelCampaign&)>& progress) {
+  const Clock::time_point begin = Clock::now();
+  KernelCampaign campaign;
+  campaign.operation = &operation;
+  // What goes without saying says nothing of bits.
+  const bool again = guest.plugin().promises && promises.cover("determinism");
+  const auto kinds = static_cast<int64_t>(operation.kinds().size());
+  for (int64_t index = 0; campaign.cases < options.cases || index < kinds; ++index) {
+    if (options.seconds && seconds_since(begin) >= *options.seconds) break;
+    const Question question = operation.draw(options.seed, index, guest.plugin().precision);
+    // By turns both ends of every array are guarded, whatever the number of kinds.
+    const bool at_end = (index + index / kinds) % 2 == 0;
+    const std::vector<Verdict> verdicts = judge_answer(guest, operation, question, at_end, again);
+    ++campaign.questions;
+    campaign.cases += operation.cases_of(question);
+    if (verdicts.empty()) ++campaign.refused;
+    bool fails = false;
+    for (const Verdict& verdict : verdicts) {
+      if (!promises.cover(verdict.property)) {
+        const auto known = std::find_if(campaign.unpromised.begin(), campaign.unpromised.end(),
+                                        [&](const Unpromised& u) { return u.property == verdict.property; });
+        Unpromised& entry = known != campaign.unpromised.end()
+                                ? *known
+                                : campaign.unpromised.emplace_back(Unpromised{verdict.property, 0, 0});
+        entry.checked += verdict.checked > 0 ? 1 : 0;
+        entry.failing += verdict.holds ? 0 : 1;
+        continue;
+      }
+      campaign.properties.add(verdict);
+      if (verdict.holds) continue;
+      fails = true;
+      if (verdict.property == kAnswersProperty) ++campaign.lost;
+      const bool is_known = std::any_of(campaign.failures.begin(), campaign.failures.end(),
+                                        [&](const KernelFailure& f) { return f.verdict.property == verdict.property; });
+      if (!is_known) campaign.failures.push_back({index, verdict, question, verdict});
+    }
+    campaign.failed += fails ? 1 : 0;
+    campaign.seconds = seconds_since(begin);
+    if (progress) progress(campaign);
+    if (options.most_lost > 0 && campaign.lost >= options.most_lost) {
+      campaign.gave_up = true;
+      break;
+    }
+  }
+  for (KernelFailure& failure : campaign.failures) {
+    const bool at_end = (failure.index + failure.index / kinds) % 2 == 0;
+    simplify(guest, operation, promises, at_end, again, options.simplify, failure);
+  }
+  return campaign;
+}
+
+// --- Data ------------------------------------------------------------------------------------------------------------
+
+namespace {
+
+constexpr int kFormatVersion = 1;
+constexpr const char* kFormat = "cutproof.question";
+
+json to_json(const Array& array) {
+  json values = json::array();
+  const bool real = array.type == ElementType::f32 || array.type == ElementType::f64;
+  for (int64_t k = 0; k < array.count(); ++k) {
+    if (!real) {
+      values.push_back(array.integer(k));
+    } else if (const double value = array.number(k); std::isfinite(value)) {
+      values.push_back(value);
+    } else {
+      values.push_back(std::isnan(value) ? "nan" : value > 0 ? "inf" : "-inf");
+    }
+  }
+  return {{"type", name_of(array.type)}, {"shape", array.shape}, {"values", std::move(values)}};
+}
+
+Array array_from(const std::string& name, const json& j) {
+  ElementType type = {};
+  for (const ElementType each : {ElementType::i32, ElementType::i64, ElementType::u8, ElementType::f64}) {
+    if (j.at("type") == name_of(each)) type = each;
+  }
+  const auto shape = j.at("shape").get<std::vector<int64_t>>();
+  if (j.size() != 3 || type == ElementType{}) throw std::invalid_argument(name + " is no array");
+  const json& values = j.at("values");
+  const auto filled = [&]<class T>(T) {
+    std::vector<T> numbers;
+    for (const json& value : values) {
+      if (!value.is_string()) {
+        numbers.push_back(value.get<T>());
+      } else {
+        const std::string text = value;
+        const double number = text == "nan"   ? std::numeric_limits<double>::quiet_NaN()
+                              : text == "inf" ? std::numeric_limits<double>::infinity()
+                                              : -std::numeric_limits<double>::infinity();
+        numbers.push_back(static_cast<T>(number));
+      }
+    }
+    Array array = make_array(name, shape, numbers);
+    if (array.count() != static_cast<int64_t>(numbers.size())) throw std::invalid_argument(name + " has another shape");
+    return array;
+  };
+  switch (type) {
+    case ElementType::i32:
+      return filled(int32_t{});
+    case ElementType::i64:
+      return filled(int64_t{});
+    case ElementType::u8:
+      return filled(uint8_t{});
+    default:
+      return filled(double{});
+  }
+}
+
+json to_json(const Arrays& arrays) {
+  json object = json::object();
+  for (const Array& array : arrays) object[array.name] = to_json(array);
+  return object;
+}
+
+}  // namespace
+
+std::string to_json(const SavedQuestion& saved) {
+  return json{{"format", kFormat},
+              {"format_version", kFormatVersion},
+              {"operation", saved.operation},
+              {"kind", saved.question.kind},
+              {"precision", saved.precision == Precision::binary32 ? "single" : "double"},
+              {"at_end", saved.at_end},
+              {"plugin", saved.plugin},
+              {"found", saved.found},
+              {"seed", saved.seed},
+              {"index", saved.index},
+              {"given", to_json(saved.question.given)},
+              {"known", to_json(saved.question.known)}}
+      .dump();
+}
+
+SavedQuestion question_from_json(const std::string& text, const std::string& file) {
+  const auto refuse = [&](const std::string& problem) -> InputError {
+    return {file, "", problem, "give a question that `cutproof judge` has saved"};
+  };
+  SavedQuestion saved;
+  try {
+    const json j = json::parse(text);
+    if (!j.is_object() || j.value("format", "") != kFormat) throw refuse("it is no question to a kernel");
+    if (j.at("format_version") != kFormatVersion) {
+      throw refuse(
+          fmt::format("it has version {}, and this cutproof reads {}", j.at("format_version").dump(), kFormatVersion));
+    }
+    for (const auto& [key, value] : j.items()) {
+      constexpr std::string_view kKnown[] = {"format", "format_version", "operation", "kind",  "precision", "at_end",
+                                             "plugin", "found",          "seed",      "index", "given",     "known"};
+      if (std::find(std::begin(kKnown), std::end(kKnown), key) == std::end(kKnown)) {
+        throw refuse("it has a field '" + key + "', which is not known");
+      }
+    }
+    saved.operation = j.at("operation");
+    const OperationDescription* const operation = find_operation(saved.operation);
+    if (operation == nullptr) throw refuse("there is no operation '" + saved.operation + "'");
+    saved.question.kind = j.at("kind");
+    saved.precision = j.at("precision") == "double" ? Precision::binary64 : Precision::binary32;
+    saved.at_end = j.at("at_end");
+    saved.plugin = j.at("plugin");
+    saved.found = j.at("found");
+    saved.seed = j.at("seed");
+    saved.index = j.at("index");
+    // In the order in which the operation gives them, each of its type and as many columns.
+    const Question model = operation->draw(1, 0, saved.precision);
+    Question grid_model = model;
+    for (int64_t k = 0; k < static_cast<int64_t>(operation->kinds().size()); ++k) {
+      Question other = operation->draw(1, k, saved.precision);
+      if (other.given.size() > grid_model.given.size()) grid_model = std::move(other);
+    }
+    const auto take = [&](const char* member, const Arrays& wanted, Arrays& to) {
+      for (const Array& array : wanted) {
+        if (!j.at(member).contains(array.name)) continue;
+        Array read = array_from(array.name, j.at(member).at(array.name));
+        const bool fits = read.type == array.type && read.shape.size() == array.shape.size() &&
+                          std::equal(read.shape.begin() + 1, read.shape.end(), array.shape.begin() + 1);
+        if (!fits) throw refuse("'" + array.name + "' is of another type or shape");
+        to.push_back(std::move(read));
+      }
+      if (to.size() != j.at(member).size()) throw refuse(std::string(member) + " has an array that is not known");
+    };
+    take("given", grid_model.given, saved.question.given);
+    take("known", grid_model.known, saved.question.known);
+    if (saved.question.given.size() < model.given.size() - 2 ||
+        saved.question.known.size() != grid_model.known.size()) {
+      throw refuse("an array is missing");
+    }
+  } catch (const json::exception& error) {
+    throw refuse(error.what());
+  } catch (const std::invalid_argument& error) {
+    throw refuse(error.what());
+  }
+  return saved;
+}
+
+nlohmann::json to_json(const KernelCampaign& campaign) {
+  json unpromised = json::array(), failures = json::array();
+  for (const Unpromised& u : campaign.unpromised) {
+    unpromised.push_back({{"property", u.property}, {"judged", u.checked}, {"failing", u.failing}});
+  }
+  for (const KernelFailure& f : campaign.failures) {
+    failures.push_back({{"property", f.verdict.property},
+                        {"index", f.index},
+                        {"kind", f.simplest.kind},
+                        {"text", f.verdict.witness.text},
+                        {"simplified", f.of_simplest.witness.text}});
+  }
+  return {{"operation", campaign.operation->name},
+          {"cases", campaign.cases},
+          {"of", campaign.operation->cases},
+          {"questions", campaign.questions},
+          {"refused", campaign.refused},
+          {"not_answered", campaign.lost},
+          {"gave_up", campaign.gave_up},
+          {"failed", campaign.failed},
+          {"seconds", campaign.seconds},
+          {"properties", campaign.properties.to_json()},
+          {"unpromised", std::move(unpromised)},
+          {"failures", std::move(failures)},
+          {"holds", campaign.holds()}};
+}
+
+}  // namespace cutproof::guests

@@ -1,0 +1,369 @@
+#include "guests/guest.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <utility>
+
+#include "model/at.h"
+#include "model/error.h"
+
+extern char** environ;
+
+namespace cutproof::guests {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// Loading a library and a device's first context.
+constexpr double kTimeToStart = 60;
+
+[[noreturn]] void machine_failed(const std::string& what) { throw MachineError(what + ": " + std::strerror(errno)); }
+
+// Beside this program, where it is installed, or where the environment says.
+std::string guest_program() {
+  if (const char* const named = std::getenv("CUTPROOF_GUEST")) return named;
+  std::error_code failed;
+  const fs::path here = fs::read_symlink("/proc/self/exe", failed).parent_path();
+  for (const fs::path& place : {here / "cutproof-guest", here / "../libexec/cutproof/cutproof-guest"
+#ifdef CUTPROOF_GUEST_PROGRAM
+                                ,
+                                fs::path(CUTPROOF_GUEST_PROGRAM)
+#endif
+       }) {
+    if (fs::exists(place, failed)) return place.string();
+  }
+  throw MachineError(
+      "the program cutproof-guest, in which plugins run, is not beside cutproof; CUTPROOF_GUEST can name it");
+}
+
+// True: there is something to read, or the other end is gone.
+bool wait_for(int channel, double seconds) {
+  using Clock = std::chrono::steady_clock;
+  const auto end = Clock::now() + std::chrono::duration<double>(seconds);
+  for (;;) {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now()).count();
+    pollfd waiting = {channel, POLLIN, 0};
+    const int found = poll(&waiting, 1, static_cast<int>(std::clamp<int64_t>(left, 0, 1'000'000)));
+    if (found > 0) return true;
+    if (found < 0 && errno != EINTR) machine_failed("poll");
+    if (found == 0) return false;
+  }
+}
+
+int64_t up_to_page(int64_t bytes) { return (bytes + wire::kPage - 1) / wire::kPage * wire::kPage; }
+
+const char* name_of_signal(int signal) {
+  const char* const name = sigabbrev_np(signal);
+  return name != nullptr ? name : "?";
+}
+
+}  // namespace
+
+bool PluginInfo::can_run(Span span) const {
+  return offers(wire::run) &&
+         (spans >> wire::span_bit(static_cast<int>(span.first), static_cast<int>(span.last)) & 1u) != 0;
+}
+
+Argument given(const Array& array) {
+  return {array.name, Role::given, array.type, array.rows(), array.columns(), array.bytes.data()};
+}
+
+Array in_precision(const Array& array, Precision precision) {
+  if (array.type != ElementType::f64 || precision == Precision::binary64) return array;
+  const auto wide = array.of<double>();
+  return make_array(array.name, array.shape, std::vector<float>(wide.begin(), wide.end()));
+}
+
+Guest::Guest(GuestOptions options)
+    : options_(std::move(options)),
+      request_(std::make_unique<wire::Request>()),
+      reply_(std::make_unique<wire::Reply>()) {
+  std::error_code failed;
+  if (!fs::exists(options_.library, failed)) {
+    throw InputError(options_.library, "", "there is no such file", "name the shared library of a plugin");
+  }
+  options_.library = fs::absolute(options_.library).string();
+  file_ = static_cast<int>(memfd_create("cutproof arrays", MFD_CLOEXEC));
+  if (file_ < 0 || ftruncate(file_, wire::kMemoryBytes) != 0) machine_failed("memory to share with a plugin");
+  void* const mapped = mmap(nullptr, static_cast<std::size_t>(wire::kMemoryBytes), PROT_READ | PROT_WRITE,
+                            MAP_SHARED | MAP_NORESERVE, file_, 0);
+  if (mapped == MAP_FAILED) machine_failed("memory to share with a plugin");
+  memory_ = static_cast<unsigned char*>(mapped);
+  start();
+}
+
+Guest::Guest(int channel, int memory, double time_limit)
+    : request_(std::make_unique<wire::Request>()),
+      reply_(std::make_unique<wire::Reply>()),
+      attached_(true),
+      channel_(channel),
+      file_(memory) {
+  options_.time_limit = time_limit;
+  void* const mapped = mmap(nullptr, static_cast<std::size_t>(wire::kMemoryBytes), PROT_READ | PROT_WRITE,
+                            MAP_SHARED | MAP_NORESERVE, file_, 0);
+  if (mapped == MAP_FAILED) machine_failed("memory to share with a plugin");
+  memory_ = static_cast<unsigned char*>(mapped);
+  running_ = true;
+  restarts_ = 0;
+  greet(kTimeToStart);
+}
+
+Guest::~Guest() {
+  stop();
+  if (memory_ != nullptr) munmap(memory_, static_cast<std::size_t>(wire::kMemoryBytes));
+  if (file_ >= 0 && !attached_) close(file_);
+}
+
+void Guest::start() {
+  if (attached_) throw MachineError("the guest has ended");
+  stop();
+  int ends[2];
+  if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) machine_failed("a channel to a plugin");
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  // Copies are inherited, whatever their numbers; these are.
+  const int their_channel = fcntl(ends[1], F_DUPFD, 100), their_file = fcntl(file_, F_DUPFD, 100);
+  const std::string program = guest_program(), channel = std::to_string(their_channel),
+                    file = std::to_string(their_file);
+  const char* const arguments[] = {program.c_str(), options_.library.c_str(), channel.c_str(), file.c_str(), nullptr};
+  const std::string parameters = "CUTPROOF_PLUGIN_PARAMETERS=" + options_.parameters;
+  std::vector<const char*> environment;
+  for (char** each = environ; *each != nullptr; ++each) {
+    if (std::strncmp(*each, "CUTPROOF_PLUGIN_PARAMETERS=", 27) != 0) environment.push_back(*each);
+  }
+  environment.push_back(parameters.c_str());
+  environment.push_back(nullptr);
+  const int failed = posix_spawn(&process_, program.c_str(), &actions, nullptr, const_cast<char**>(arguments),
+                                 const_cast<char**>(environment.data()));
+  posix_spawn_file_actions_destroy(&actions);
+  close(ends[1]);
+  close(their_channel);
+  close(their_file);
+  channel_ = ends[0];
+  if (failed != 0) {
+    process_ = -1;
+    throw MachineError(program + ": " + std::strerror(failed));
+  }
+  running_ = true;
+  ++restarts_;
+  greet(std::max(kTimeToStart, options_.time_limit));
+}
+
+void Guest::greet(double time_limit) {
+  const auto hello = std::make_unique<wire::Hello>();
+  const std::string remedy = "a plugin is a shared library that includes cutproof/plugin.h (docs/reference/plugins.md)";
+  std::string problem;
+  if (!wait_for(channel_, time_limit)) {
+    problem = fmt::format("loading it does not end within {:g} s", time_limit);
+  } else if (recv(channel_, hello.get(), sizeof *hello, 0) != static_cast<ssize_t>(sizeof *hello)) {
+    problem = "loading it ends the process: " + why_it_ended();
+  }
+  if (!problem.empty()) {
+    stop();
+    throw InputError(options_.library, "", problem, remedy);
+  }
+  const auto text = [](const char* from) { return without_control_characters(from); };
+  if (hello->protocol != wire::kProtocol) {
+    throw InputError(options_.library, "", "cutproof-guest is of another version than cutproof", "install both anew");
+  }
+  if (hello->greeting == wire::Greeting::cannot_run_here) throw CannotRunHere(text(hello->text));
+  if (hello->greeting != wire::Greeting::ready) throw InputError(options_.library, "", text(hello->text), remedy);
+  plugin_.name = text(hello->name);
+  plugin_.version = text(hello->version);
+  plugin_.promises = hello->has_promises != 0 ? std::optional(text(hello->promises)) : std::nullopt;
+  plugin_.on_device = hello->device != 0;
+  plugin_.operations = hello->operations;
+  plugin_.spans = hello->spans;
+  if (hello->real != static_cast<int32_t>(ElementType::f32) && hello->real != static_cast<int32_t>(ElementType::f64)) {
+    throw InputError(options_.library, "real", fmt::format("{} is no type of real numbers", hello->real),
+                     "use CUTPROOF_F32 or CUTPROOF_F64");
+  }
+  plugin_.precision = hello->real == static_cast<int32_t>(ElementType::f64) ? Precision::binary64 : Precision::binary32;
+}
+
+void Guest::stop() {
+  if (channel_ >= 0 && (!attached_ || !running_)) {
+    close(channel_);
+    channel_ = -1;
+  }
+  if (process_ > 0) {
+    // One that waits ends by itself when its channel is closed, and takes its instances apart; not for long.
+    int status = 0;
+    pid_t ended = 0;
+    for (int k = 0; k < 200 && running_ && (ended = waitpid(process_, &status, WNOHANG)) == 0; ++k) usleep(1000);
+    if (ended == 0) {
+      kill(process_, SIGKILL);
+      waitpid(process_, &status, 0);
+    }
+    process_ = -1;
+  }
+  running_ = false;
+}
+
+std::string Guest::describe_fault(const wire::Fault& fault) const {
+  const std::string what = fault.access == 2 ? "writes to" : fault.access == 1 ? "reads" : "touches";
+  if (fault.array < 0 || at(fault.array) >= request_->array_count) return {};
+  const wire::Array& array = request_->arrays[fault.array];
+  if (fault.distance < 0) {
+    return fmt::format(": it {} byte {} before the beginning of '{}'", what, -fault.distance, array.name);
+  }
+  if (fault.distance >= fault.bytes) {
+    return fmt::format(": it {} byte {} behind the end of '{}', which has {} rows", what,
+                       fault.distance - fault.bytes + 1, array.name,
+                       fault.bytes / (array.columns * size_of(ElementType{array.type})));
+  }
+  return fmt::format(": it {} '{}', which is an input", what, array.name);
+}
+
+// Of a guest that is no longer there.
+std::string Guest::why_it_ended() {
+  if (attached_) return "the guest has closed its channel";
+  int status = 0;
+  pid_t ended = 0;
+  for (int k = 0; k < 2000 && (ended = waitpid(process_, &status, WNOHANG)) == 0; ++k) usleep(1000);
+  if (ended == 0) {
+    kill(process_, SIGKILL);
+    waitpid(process_, &status, 0);
+    process_ = -1;
+    return "it has closed the channel to its host";
+  }
+  process_ = -1;
+  if (WIFEXITED(status)) return fmt::format("it ended the process with exit status {}", WEXITSTATUS(status));
+  wire::Fault fault;
+  std::memcpy(&fault, memory_ + wire::kFaultOffset, sizeof fault);
+  const int signal = WTERMSIG(status);
+  std::string text = fmt::format("it was killed by signal {} (SIG{})", signal, name_of_signal(signal));
+  if (fault.signal == signal && (signal == SIGSEGV || signal == SIGBUS)) text += describe_fault(fault);
+  return text;
+}
+
+std::string Guest::problem_around(const wire::Array& array, int64_t offset, int64_t bytes, int64_t first,
+                                  int64_t end) const {
+  for (int64_t k = offset - 1; k >= first; --k) {
+    if (memory_[k] == wire::kCanary) continue;
+    return fmt::format("it wrote to byte {} before the beginning of '{}'", offset - k, array.name);
+  }
+  for (int64_t k = offset + bytes; k < end; ++k) {
+    if (memory_[k] == wire::kCanary) continue;
+    return fmt::format("it wrote to byte {} behind the end of '{}', which has {} rows", k - offset - bytes + 1,
+                       array.name, bytes / (array.columns * size_of(ElementType{array.type})));
+  }
+  return {};
+}
+
+Answer Guest::call(Operation operation, uint32_t instance, Span span, const std::vector<Argument>& arguments,
+                   bool at_end) {
+  if (!running_) start();
+  wire::Request& request = *request_;
+  request.operation = operation;
+  request.instance = instance;
+  request.first = static_cast<int32_t>(span.first);
+  request.last = static_cast<int32_t>(span.last);
+  request.at_end = at_end ? 1 : 0;
+  if (arguments.size() > std::size_t{wire::kMostArrays}) throw std::logic_error("too many arrays for a plugin");
+  request.array_count = static_cast<uint32_t>(arguments.size());
+  int64_t next = wire::kLeastGap, arena = 0;
+  for (std::size_t k = 0; k < arguments.size(); ++k) {
+    const Argument& argument = arguments[k];
+    wire::Array& array = request.arrays[k];
+    array = {};
+    std::snprintf(array.name, sizeof array.name, "%s", argument.name.c_str());
+    array.type = static_cast<int32_t>(argument.type);
+    array.role = argument.role;
+    array.rows = argument.rows;
+    array.columns = argument.columns;
+    array.arena = -1;
+    const int64_t bytes = argument.rows * argument.columns * size_of(argument.type);
+    if (argument.role == Role::grown) {
+      array.arena = arena++;
+      if (arena > wire::kArenaCount || bytes > wire::kMostGrown) throw MachineError("too much memory for a plugin");
+      const wire::Place place = wire::place_in_arena(array.arena, bytes, at_end);
+      array.offset = place.offset;
+      array.first_page = place.first_page;
+      array.end_page = place.end_page;
+    } else {
+      array.first_page = next;
+      array.end_page = next + up_to_page(bytes);
+      array.offset = at_end ? array.end_page - bytes : array.first_page;
+      next = array.end_page + up_to_page(std::max(bytes, wire::kLeastGap));
+      if (next > wire::kArrayBytes)
+        throw MachineError("the arrays of this case need more memory than plugins can share");
+    }
+    std::memset(memory_ + array.first_page, wire::kCanary, at(array.offset - array.first_page));
+    std::memset(memory_ + array.offset + bytes, wire::kCanary, at(array.end_page - array.offset - bytes));
+    if (argument.data != nullptr && bytes > 0) std::memcpy(memory_ + array.offset, argument.data, at(bytes));
+    // What is not written shows: NaN, -1, 255.
+    if (argument.data == nullptr) std::memset(memory_ + array.offset, 0xff, at(bytes));
+  }
+  std::memset(memory_ + wire::kFaultOffset, 0, sizeof(wire::Fault));
+
+  Answer answer;
+  const auto lost = [&](std::string text) {
+    running_ = false;
+    stop();
+    answer.kind = Answer::Kind::fault;
+    answer.text = std::move(text);
+    return answer;
+  };
+  if (send(channel_, &request, sizeof request, MSG_NOSIGNAL) != static_cast<ssize_t>(sizeof request)) {
+    return lost(why_it_ended());
+  }
+  if (!wait_for(channel_, options_.time_limit)) {
+    return lost(fmt::format("it did not answer within {:g} s", options_.time_limit));
+  }
+  wire::Reply& reply = *reply_;
+  if (recv(channel_, &reply, sizeof reply, 0) != static_cast<ssize_t>(sizeof reply)) return lost(why_it_ended());
+  if (reply.outcome == wire::Outcome::device_failed) return lost(without_control_characters(reply.text));
+  reply.text[sizeof reply.text - 1] = 0;
+  if (reply.outcome == wire::Outcome::refused) {
+    answer.kind = Answer::Kind::refused;
+    answer.text = fmt::format("it refused, with {}", reply.code);
+    return answer;
+  }
+  if (reply.outcome == wire::Outcome::broke_a_rule) {
+    answer.kind = Answer::Kind::fault;
+    answer.text = without_control_characters(reply.text);
+    return answer;
+  }
+  for (std::size_t k = 0; k < arguments.size(); ++k) {
+    const Argument& argument = arguments[k];
+    if (argument.role == Role::given || argument.role == Role::setup) continue;
+    const wire::Array& array = request.arrays[k];
+    const int64_t rows = reply.rows[k], offset = reply.offset[k];
+    const int64_t bytes = rows * argument.columns * size_of(argument.type);
+    wire::Place place = {array.offset, array.first_page, array.end_page};
+    if (argument.role == Role::grown && rows >= 0 && bytes <= wire::kMostGrown) {
+      place = wire::place_in_arena(array.arena, bytes, at_end);
+    }
+    if (rows < 0 || (argument.role == Role::answer && rows != argument.rows) || offset != place.offset) {
+      return lost("its process says something about '" + argument.name + "' that cannot be");
+    }
+    if (std::string problem = problem_around(array, offset, bytes, place.first_page, place.end_page);
+        !problem.empty()) {
+      answer.kind = Answer::Kind::fault;
+      answer.text = std::move(problem);
+      return answer;
+    }
+    Array got{argument.name, argument.type, {rows, argument.columns}, {}};
+    got.bytes.resize(at(bytes));
+    if (bytes > 0) std::memcpy(got.bytes.data(), memory_ + offset, at(bytes));
+    answer.arrays.push_back(std::move(got));
+  }
+  return answer;
+}
+
+}  // namespace cutproof::guests

@@ -1,0 +1,65 @@
+// What is asked of a single kernel, and when its answer is right. Plugins, Python functions and files of test vectors
+// are asked the same questions and judged alike.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "guests/wire.h"
+#include "model/arrays.h"
+#include "model/precision.h"
+#include "model/verdict.h"
+
+namespace cutproof::guests {
+
+// One call of a kernel. Real numbers are f64 here, whatever the kernel takes; in questions for single precision their
+// values have it.
+struct Question {
+  std::string kind;  // which of the operation's kinds of cases, in words
+  Arrays given;      // what the kernel gets, by the names of cutproof/plugin.h
+  Arrays known;      // what the judge alone needs
+
+  friend bool operator==(const Question&, const Question&) = default;
+};
+
+// What a kernel answers.
+struct AnswerArray {
+  std::string_view name;
+  bool real = false;  // of the kernel's precision; else of `type`
+  ElementType type = ElementType::i32;
+  int64_t columns = 1;
+  std::string_view rows_of = {};  // as many rows as this array that is given has; empty: the kernel says how many
+  std::string_view text;          // what it is, for a person
+};
+
+struct OperationDescription {
+  wire::Operation number;
+  std::string_view name;
+  std::string_view text;       // what it does, for a person
+  std::string_view by_itself;  // promises (harness/promises.h) that go without saying
+  std::span<const AnswerArray> answers;
+  // Cases are counted by what one question holds of them: matrices, or bodies.
+  std::string_view cases;
+  // Question `index` of a campaign: the same on every machine. The first ones are one of each kind.
+  Question (*draw)(uint64_t seed, int64_t index, Precision precision);
+  int64_t (*cases_of)(const Question& question);
+  std::string (*size_of)(const Question& question);  // "4 particles", for a person
+  // One verdict for each property that the operation has, whoever promised it; `answers` in the order above, in any
+  // precision.
+  std::vector<Verdict> (*judge)(const Question& question, const Arrays& answers, Precision precision);
+  // Questions that are each simpler, the most drastic first.
+  std::vector<Question> (*simpler)(const Question& question);
+  // Kinds of cases, in the order in which they are drawn.
+  std::vector<std::string> (*kinds)();
+};
+
+std::span<const OperationDescription> operations();
+// Null if there is none of that name.
+const OperationDescription* find_operation(std::string_view name);
+
+// A failing verdict where nothing can be judged: what the answer is not.
+Verdict unreadable(std::string_view property, const std::string& why);
+
+}  // namespace cutproof::guests

@@ -1,0 +1,351 @@
+// The reference as a plugin: all operations, right unless the parameters name a stage or an operation to spoil. It
+// knows its body, its setup and its state through cutproof/plugin.h alone.
+#include <cutproof/plugin.h>
+
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "model/at.h"
+#include "model/fields.h"
+#include "model/setup_fields.h"
+#include "reference_cpu/reference.h"
+
+namespace {
+
+using namespace cutproof;
+
+template <class T>
+inline constexpr bool is_vector = false;
+template <class T>
+inline constexpr bool is_vector<std::vector<T>> = true;
+
+double number(const cutproof_array* array, int64_t k) {
+  switch (array->type) {
+    case CUTPROOF_I32:
+      return static_cast<const int32_t*>(array->data)[k];
+    case CUTPROOF_I64:
+      return static_cast<double>(static_cast<const int64_t*>(array->data)[k]);
+    case CUTPROOF_U8:
+      return static_cast<const uint8_t*>(array->data)[k];
+    case CUTPROOF_F32:
+      return static_cast<double>(static_cast<const float*>(array->data)[k]);
+    default:
+      return static_cast<const double*>(array->data)[k];
+  }
+}
+void set(cutproof_array* array, int64_t k, double value) {
+  switch (array->type) {
+    case CUTPROOF_I32:
+      static_cast<int32_t*>(array->data)[k] = static_cast<int32_t>(value);
+      break;
+    case CUTPROOF_I64:
+      static_cast<int64_t*>(array->data)[k] = static_cast<int64_t>(value);
+      break;
+    case CUTPROOF_U8:
+      static_cast<uint8_t*>(array->data)[k] = static_cast<uint8_t>(value);
+      break;
+    case CUTPROOF_F32:
+      static_cast<float*>(array->data)[k] = static_cast<float>(value);
+      break;
+    default:
+      static_cast<double*>(array->data)[k] = value;
+  }
+}
+
+// One entry of a field, from row `row`, and back.
+template <class T>
+void get_row(const cutproof_array* array, int64_t row, T& value) {
+  if constexpr (std::is_same_v<T, Vec3>) {
+    value = {number(array, 3 * row), number(array, 3 * row + 1), number(array, 3 * row + 2)};
+  } else if constexpr (std::is_same_v<T, Mat3>) {
+    for (int64_t k = 0; k < 9; ++k) value.m[at(k)] = number(array, 9 * row + k);
+  } else if constexpr (std::is_same_v<T, std::array<int32_t, 3>>) {
+    for (int64_t k = 0; k < 3; ++k) value[at(k)] = static_cast<int32_t>(number(array, 3 * row + k));
+  } else if constexpr (std::is_same_v<T, bool>) {
+    value = number(array, row) != 0;
+  } else {
+    value = static_cast<T>(number(array, row));
+  }
+}
+template <class T>
+void set_row(cutproof_array* array, int64_t row, const T& value) {
+  if constexpr (std::is_same_v<T, Vec3>) {
+    for (int k = 0; k < 3; ++k) set(array, 3 * row + k, value[k]);
+  } else if constexpr (std::is_same_v<T, Mat3>) {
+    for (int64_t k = 0; k < 9; ++k) set(array, 9 * row + k, value.m[at(k)]);
+  } else if constexpr (std::is_same_v<T, std::array<int32_t, 3>>) {
+    for (int64_t k = 0; k < 3; ++k) set(array, 3 * row + k, value[at(k)]);
+  } else {
+    set(array, row, static_cast<double>(value));
+  }
+}
+
+cutproof_array* member(const cutproof_state* state, std::string_view name) {
+#define MEMBER(member) \
+  if (name == #member) return state->member
+  MEMBER(frame);
+  MEMBER(tau);
+  MEMBER(cap);
+  MEMBER(edge_covered);
+  MEMBER(impulse);
+  MEMBER(position);
+  MEMBER(velocity);
+  MEMBER(alive);
+  MEMBER(removed);
+  MEMBER(debris);
+  MEMBER(offsets);
+  MEMBER(members);
+  MEMBER(number);
+  MEMBER(rest_center);
+  MEMBER(mass);
+  MEMBER(rotation);
+  MEMBER(degenerate);
+  MEMBER(owner);
+  MEMBER(direction);
+  MEMBER(skin_position);
+  MEMBER(triangles);
+#undef MEMBER
+  return nullptr;
+}
+
+State state_of(const cutproof_state* from) {
+  State state;
+  for_each_field([&](const Field& field, auto get) {
+    auto& to = get(state);
+    using T = std::remove_cvref_t<decltype(to)>;
+    const cutproof_array* const array = member(from, field.name);
+    if constexpr (is_vector<T>) {
+      to.resize(at(array->rows));
+      for (int64_t row = 0; row < array->rows; ++row) get_row(array, row, to[at(row)]);
+    } else {
+      get_row(array, 0, to);
+    }
+  });
+  return state;
+}
+
+bool give(const cutproof_host* host, const State& state, cutproof_state* to) {
+  bool had = true;
+  for_each_field([&](const Field& field, auto get) {
+    const auto& from = get(state);
+    using T = std::remove_cvref_t<decltype(from)>;
+    cutproof_array* const array = member(to, field.name);
+    if constexpr (is_vector<T>) {
+      if (host->grow(host, array, static_cast<int64_t>(from.size())) != 0) had = false;
+      for (std::size_t row = 0; had && row < from.size(); ++row) set_row(array, static_cast<int64_t>(row), from[row]);
+    } else {
+      set_row(array, 0, from);
+    }
+  });
+  return had;
+}
+
+// One field of one entry, or of the setup.
+template <class T>
+void get_all(const cutproof_host* host, const std::string& name, T& to) {
+  const cutproof_array* const array = host->setup(host, name.c_str());
+  if (array == nullptr) return;
+  if constexpr (is_vector<T>) {
+    to.resize(at(array->rows));
+    for (int64_t row = 0; row < array->rows; ++row) get_row(array, row, to[at(row)]);
+  } else if constexpr (std::is_same_v<T, std::string>) {
+    to.clear();
+  } else if constexpr (!std::is_same_v<T, std::array<int32_t, 3>>) {
+    get_row(array, 0, to);
+  }
+}
+
+template <class Entry>
+void get_entries(const cutproof_host* host, std::vector<Entry>& entries) {
+  for_each_entry_field<Entry>([&](const SetupField& field, auto get) {
+    using T = std::remove_cvref_t<decltype(get(entries[0]))>;
+    const std::string name = std::string(field.group) + "/" + std::string(field.name);
+    const cutproof_array* const array = host->setup(host, name.c_str());
+    if constexpr (is_vector<T>) {
+      const cutproof_array* const offsets = host->setup(host, (name + "_offsets").c_str());
+      entries.resize(at(offsets->rows - 1));
+      for (std::size_t e = 0; e < entries.size(); ++e) {
+        T& list = get(entries[e]);
+        list.clear();
+        for (auto k = static_cast<int64_t>(number(offsets, static_cast<int64_t>(e)));
+             k < static_cast<int64_t>(number(offsets, static_cast<int64_t>(e) + 1)); ++k) {
+          get_row(array, k, list.emplace_back());
+        }
+      }
+    } else {
+      entries.resize(at(array->rows));
+      for (std::size_t e = 0; e < entries.size(); ++e) get_row(array, static_cast<int64_t>(e), get(entries[e]));
+    }
+  });
+}
+
+Body body_of(const cutproof_tissue* tissue) {
+  Body body;
+  const int64_t n = tissue->mass->rows;
+  body.grid.spacing = tissue->spacing;
+  for (int64_t i = 0; i < n; ++i) body.mass.push_back(number(tissue->mass, i));
+  if (tissue->node != nullptr) {
+    for (std::size_t axis = 0; axis < 3; ++axis) body.grid.nodes[axis] = tissue->nodes[axis];
+    body.particle_at.assign(at(body.grid.node_count()), -1);
+    for (int64_t i = 0; i < n; ++i) {
+      const auto of = [&](int64_t axis) { return static_cast<int32_t>(number(tissue->node, 3 * i + axis)); };
+      body.node.push_back(body.grid.index(of(0), of(1), of(2)));
+      body.particle_at[at(body.node.back())] = static_cast<int32_t>(i);
+    }
+    return body;
+  }
+  for (int64_t i = 0; i < n; ++i) get_row(tissue->rest, i, body.rest.emplace_back());
+  for (int64_t i = 0; i <= n; ++i) body.edge_offsets.push_back(static_cast<int64_t>(number(tissue->edge_offsets, i)));
+  for (int64_t k = 0; k < tissue->edge_ends->rows; ++k) {
+    body.edge_ends.push_back(static_cast<int32_t>(number(tissue->edge_ends, k)));
+  }
+  return body;
+}
+
+struct Instance {
+  std::string spoiled;
+  Setup setup;
+  std::unique_ptr<Backend> reference = reference::make_backend();
+};
+
+void* create(const cutproof_host*, const char* parameters) {
+  auto instance = std::make_unique<Instance>();
+  instance->spoiled = parameters != nullptr ? parameters : "";
+  return instance.release();
+}
+void destroy(void* self) { delete static_cast<Instance*>(self); }
+
+int load(const cutproof_host* host, void* self, const cutproof_tissue* tissue, const cutproof_state*) {
+  Setup& setup = static_cast<Instance*>(self)->setup;
+  setup = {};
+  setup.body = body_of(tissue);
+  if (static_cast<Instance*>(self)->spoiled == "refuse" && setup.body.mass.size() % 2 == 1) return 9;
+  for_each_setup_field([&](const SetupField& field, auto get) {
+    using T = std::remove_cvref_t<decltype(get(setup))>;
+    if (field.group == "body") return;
+    if constexpr (is_list_of_entries<T>) {
+      get_entries(host, get(setup));
+    } else {
+      const std::string name =
+          field.group.empty() ? std::string(field.name) : std::string(field.group) + "/" + std::string(field.name);
+      get_all(host, name, get(setup));
+    }
+  });
+  return 0;
+}
+
+// The least that is wrong with each stage.
+void spoil(const std::string& what, int last, const State& before, State& state) {
+  Clusters& clusters = state.clusters;
+  if (what == "step" && last == CUTPROOF_STEP) {
+    for (std::size_t i = 0; i < state.x.size(); ++i) {
+      if (state.alive[i] != 0 && !(state.x[i] == before.x[i])) {
+        state.x[i].y += 1e-3 * norm(state.x[i] - before.x[i]);
+        return;
+      }
+    }
+  }
+  // The last cluster that a split made is lost.
+  if (what == "split" && last == CUTPROOF_SPLIT && clusters.count() > before.clusters.count()) {
+    clusters.offsets.pop_back();
+    clusters.members.resize(at(clusters.offsets.back()));
+    clusters.number.pop_back();
+    clusters.rest_center.pop_back();
+    clusters.mass.pop_back();
+    clusters.rotation.pop_back();
+    clusters.degenerate.pop_back();
+  }
+  // What was merged keeps the rotation of the wrong one.
+  if (what == "merge" && last == CUTPROOF_MERGE && clusters.count() < before.clusters.count() && clusters.count() > 0) {
+    clusters.rotation.front() = {{0, -1, 0, 1, 0, 0, 0, 0, 1}};
+  }
+  if (what == "skin" && last == CUTPROOF_SKIN && !state.skin.triangles.empty()) {
+    std::swap(state.skin.triangles.back()[0], state.skin.triangles.back()[1]);
+  }
+}
+
+int run(const cutproof_host* host, void* self, int first, int last, cutproof_state* given) {
+  auto* const instance = static_cast<Instance*>(self);
+  const State before = state_of(given);
+  instance->reference->load({instance->setup}, {before});
+  instance->reference->run({static_cast<Stage>(first), static_cast<Stage>(last)});
+  State state = instance->reference->snapshot().front();
+  spoil(instance->spoiled, last, before, state);
+  return give(host, state, given) ? 0 : 1;
+}
+
+int rotations(const cutproof_host*, void* self, const cutproof_array* a, const cutproof_array* previous,
+              cutproof_array* r) {
+  for (int64_t i = 0; i < a->rows; ++i) {
+    Mat3 from, before;
+    get_row(a, i, from);
+    get_row(previous, i, before);
+    reference::Rotation best = reference::closest_rotation(from, before);
+    if (static_cast<Instance*>(self)->spoiled == "rotations" && !std::isfinite(from.m[0])) best.r = Mat3{};
+    set_row(r, i, best.r);
+  }
+  return 0;
+}
+
+int surface(const cutproof_host* host, void* self, const cutproof_tissue* tissue, const cutproof_array* alive,
+            cutproof_array* vertices, cutproof_array* triangles) {
+  Setup setup;
+  setup.body = body_of(tissue);
+  State state;
+  for (int64_t i = 0; i < alive->rows; ++i) {
+    state.x.push_back(setup.body.rest_position(static_cast<int32_t>(i)));
+    state.alive.push_back(static_cast<uint8_t>(number(alive, i)));
+  }
+  // A cluster for each living particle, which does not turn.
+  for (int64_t i = 0; i < alive->rows; ++i) {
+    if (state.alive[at(i)] == 0) continue;
+    state.clusters.members.push_back(static_cast<int32_t>(i));
+    state.clusters.offsets.push_back(static_cast<int64_t>(state.clusters.members.size()));
+    state.clusters.number.push_back(state.clusters.count() - 1);
+    state.clusters.rotation.emplace_back();
+    state.clusters.degenerate.push_back(0);
+  }
+  state.v.resize(state.x.size());
+  reference::update_rest_frames(setup.body, state.clusters);
+  reference::skin(setup, state);
+  spoil(static_cast<Instance*>(self)->spoiled == "surface" ? "skin" : "", CUTPROOF_SKIN, state, state);
+  if (host->grow(host, vertices, static_cast<int64_t>(state.skin.position.size())) != 0) return 1;
+  if (host->grow(host, triangles, static_cast<int64_t>(state.skin.triangles.size())) != 0) return 1;
+  for (int64_t v = 0; v < vertices->rows; ++v) set_row(vertices, v, state.skin.position[at(v)]);
+  for (int64_t t = 0; t < triangles->rows; ++t) set_row(triangles, t, state.skin.triangles[at(t)]);
+  return 0;
+}
+
+#ifdef PLUGIN_SPANS
+// Of so many stages alone.
+int can_run(int first, int last) { return last - first + 1 == PLUGIN_SPANS ? 1 : 0; }
+#endif
+
+const cutproof_plugin plugin = {
+    .size = sizeof(cutproof_plugin),
+    .abi = CUTPROOF_ABI,
+    .name = "the reference",
+    .version = "1",
+#ifdef PLUGIN_PROMISES
+    .promises = PLUGIN_PROMISES,
+#endif
+    .device = CUTPROOF_HOST,
+    .real = CUTPROOF_F64,
+    .create = create,
+    .destroy = destroy,
+    .rotations = rotations,
+    .surface = surface,
+#ifdef PLUGIN_SPANS
+    .can_run = can_run,
+#endif
+    .load = load,
+    .run = run,
+};
+
+}  // namespace
+
+CUTPROOF_PLUGIN(plugin)
