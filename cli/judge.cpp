@@ -27,6 +27,7 @@ struct JudgeOptions {
   bool keep_going = false;  // beyond ten questions that were not answered
   std::string save = ".";
   std::string json, replay;
+  std::vector<int> attached;  // open files of a guest that runs already: its channel, its memory
 };
 
 // Operations by what one case costs.
@@ -112,7 +113,11 @@ std::string keep(const JudgeOptions& options, const Guest& guest, const KernelCa
              failure.simplest.kind, shortened(failure.verdict.witness.text));
   fmt::print("  simplified to {}: {}\n", campaign.operation->size_of(failure.simplest),
              shortened(failure.of_simplest.witness.text));
-  fmt::print("  saved; to see it again: cutproof judge {} --case {}\n", options.guest.library, file);
+  if (options.attached.empty()) {
+    fmt::print("  saved; to see it again: cutproof judge {} --case {}\n", options.guest.library, file);
+  } else {
+    fmt::print("  saved; to see it again: cutproof.replay(\"{}\", {}=...)\n", file, saved.operation);
+  }
   return file;
 }
 
@@ -140,12 +145,25 @@ int replay(const JudgeOptions& options, Guest& guest) {
   return failed > 0 || judged == 0 ? 1 : 0;
 }
 
-int judge(const JudgeOptions& options) {
+int judge(JudgeOptions options) {
   if (!std::filesystem::is_directory(options.save)) {
     refuse("--save", fmt::format("'{}' is not a folder", options.save), "create it first");
   }
   require_writable(options.json);
-  Guest guest(options.guest);
+  if (!options.attached.empty()) {
+    if (options.attached.size() != 2) {
+      refuse("--attached", fmt::format("{} numbers", options.attached.size()), "give those of a socket and of memory");
+    }
+    // There is no library then: the first word is an operation too.
+    if (!options.guest.library.empty()) options.operations.insert(options.operations.begin(), options.guest.library);
+    options.guest.library = "the attached guest";
+  } else if (options.guest.library.empty()) {
+    refuse("FILE.so", "no plugin is given", "name the shared library of one");
+  }
+  const auto started = options.attached.empty() ? std::make_unique<Guest>(options.guest)
+                                                : std::make_unique<Guest>(options.attached[0], options.attached[1],
+                                                                          options.guest.time_limit);
+  Guest& guest = *started;
   const std::vector<const OperationDescription*> asked = asked_operations(options, guest.plugin());
   if (!options.replay.empty()) return replay(options, guest);
   fmt::print("{}, seed {}\n", title(guest.plugin(), options.guest.library), options.campaign.seed);
@@ -154,7 +172,7 @@ int judge(const JudgeOptions& options) {
   json document = {{"verb", "judge"},
                    {"version", kVersion},
                    {"plugin",
-                    {{"library", options.guest.library},
+                    {{"library", options.attached.empty() ? json(options.guest.library) : json()},
                      {"name", guest.plugin().name},
                      {"version", guest.plugin().version},
                      {"precision", guest.plugin().precision == Precision::binary32 ? "single" : "double"},
@@ -178,12 +196,15 @@ int judge(const JudgeOptions& options) {
     for (std::size_t k = 0; k < campaign.failures.size(); ++k) {
       result["failures"][k]["file"] = keep(options, guest, campaign, campaign.failures[k]);
     }
-    if (campaign.gave_up) {
+    if (campaign.ended) {
+      fmt::print("  nothing more was asked: the guest is gone\n");
+    } else if (campaign.gave_up) {
       fmt::print("  given up after {} questions that were not answered; --keep-going goes on\n", campaign.lost);
     }
     document["operations"].push_back(std::move(result));
     holds = holds && campaign.holds();
     flush_output();
+    if (campaign.ended) break;
   }
   document["holds"] = holds;
   write_document(options.json, document);
@@ -197,7 +218,6 @@ void add_judge(CLI::App& program, Work& work) {
   const auto options = std::make_shared<JudgeOptions>();
   CLI::App* const command = program.add_subcommand("judge", "your own kernels, from a shared library");
   command->add_option("plugin", options->guest.library, "a shared library that includes cutproof/plugin.h")
-      ->required()
       ->type_name("FILE.so");
   command->add_option("operations", options->operations, "which of its operations (default: all)")->type_name("OPS");
   add_count(*command, "--cases", options->cases, "matrices or bodies for each operation (default: 100000 or 2000)",
@@ -217,6 +237,13 @@ void add_judge(CLI::App& program, Work& work) {
       ->type_name("S")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--save", options->save, "folder for counterexamples")->capture_default_str()->type_name("DIR");
+  command
+      ->add_option(
+          "--attached", options->attached,
+          "instead of FILE.so: a guest that runs already, such as cutproof.py, by the numbers of two open files")
+      ->delimiter(',')
+      ->allow_extra_args(false)  // what follows are operations
+      ->type_name("SOCKET,MEMORY");
   add_json(*command, options->json, "write counts and failures");
   command->add_option("--case", options->replay, "one saved question again, and nothing else")->type_name("CASE");
   command->callback([options, &work] { work = [options] { return judge(*options); }; });

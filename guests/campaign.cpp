@@ -35,7 +35,7 @@ void simplify(Guest& guest, const OperationDescription& operation, const harness
   for (bool simpler = true; simpler && seconds_since(begin) < seconds;) {
     simpler = false;
     for (Question& next : operation.simpler(failure.simplest)) {
-      if (seconds_since(begin) >= seconds) break;
+      if (seconds_since(begin) >= seconds || guest.has_ended()) break;
       const std::vector<Verdict> verdicts = judge_answer(guest, operation, next, at_end, again);
       const Verdict* const failing = first_failure(verdicts, promises, failure.verdict.property);
       if (failing == nullptr) continue;
@@ -146,7 +146,8 @@ KernelCampaign judge_kernel(Guest& guest, const OperationDescription& operation,
     campaign.failed += fails ? 1 : 0;
     campaign.seconds = seconds_since(begin);
     if (progress) progress(campaign);
-    if (options.most_lost > 0 && campaign.lost >= options.most_lost) {
+    campaign.ended = guest.has_ended();
+    if (campaign.ended || (options.most_lost > 0 && campaign.lost >= options.most_lost)) {
       campaign.gave_up = true;
       break;
     }
@@ -312,7 +313,11 @@ nlohmann::json to_json(const KernelCampaign& campaign) {
                         {"index", f.index},
                         {"kind", f.simplest.kind},
                         {"text", f.verdict.witness.text},
-                        {"simplified", f.of_simplest.witness.text}});
+                        {"simplified", f.of_simplest.witness.text},
+                        {"measured", f.of_simplest.measured},
+                        {"bound", f.of_simplest.bound},
+                        {"unit", f.of_simplest.unit},
+                        {"size", campaign.operation->size_of(f.simplest)}});
   }
   return {{"operation", campaign.operation->name},
           {"cases", campaign.cases},

@@ -400,6 +400,8 @@ void greet(wire::Hello& hello, const char* library) {
   hello.protocol = wire::kProtocol;
   hello.memory = reinterpret_cast<uint64_t>(memory);
   hello.remembers_faults = 1;
+  hello.request_bytes = sizeof(wire::Request);
+  hello.reply_bytes = sizeof(wire::Reply);
   void* const loaded = dlopen(library, RTLD_NOW | RTLD_LOCAL);
   if (loaded == nullptr) {
     hello.greeting = wire::Greeting::cannot_load;
