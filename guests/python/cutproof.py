@@ -583,7 +583,7 @@ def judge(*, rotations=None, components=None, surface=None, clusters=None, cases
                 document = json.load(file)
     _raise_unless_judged(status, errors)
     if document is None:
-        raise Failed(errors or output)
+        raise Error(errors or "the program has judged nothing: is it cutproof?")
     if status != 0:
         raise Failed(_describe(guest, document, seed, precision), document)
     return Result(output, document)
