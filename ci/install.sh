@@ -9,6 +9,7 @@ packages=(
   nlohmann-json3-dev libfmt-dev libcli11-dev
   libgtest-dev librapidcheck-dev
   python3 python3-h5py python3-numpy
+  python3-scipy python3-skimage  # judged as examples: docs/results/libraries.md
 )
 # libFuzzer and the sanitizers of clang; llvm has the symbolizer that gives their reports file and line.
 fuzzing_packages=(clang libclang-rt-dev llvm)

@@ -326,6 +326,7 @@ nlohmann::json to_json(const KernelCampaign& campaign) {
           {"refused", campaign.refused},
           {"not_answered", campaign.lost},
           {"gave_up", campaign.gave_up},
+          {"ended", campaign.ended},
           {"failed", campaign.failed},
           {"seconds", campaign.seconds},
           {"properties", campaign.properties.to_json()},

@@ -1,4 +1,6 @@
-"""cutproof.py: have your own kernels judged, from Python. SPDX-License-Identifier: MIT. Copy this file into your project.
+"""cutproof.py: have your own kernels judged, from Python. Copy this file into your project.
+
+SPDX-License-Identifier: MIT
 
     import cutproof
 
@@ -274,8 +276,9 @@ class DeviceArray:
         if self._held:
             device.call("cuMemcpyHtoD_v2", self._memory + _DEVICE_CANARY, self._held, len(self._held))
         self.shape, self.dtype = array.shape, array.dtype
-        self.__cuda_array_interface__ = {"version": 3, "shape": array.shape, "typestr": array.dtype.str, "strides": None,
-                                         "data": (self._memory + _DEVICE_CANARY, False), "stream": None}
+        self.__cuda_array_interface__ = {"version": 3, "shape": array.shape, "typestr": array.dtype.str,
+                                         "strides": None, "data": (self._memory + _DEVICE_CANARY, False),
+                                         "stream": None}
 
     def __len__(self):
         return self.shape[0]
@@ -646,8 +649,10 @@ def _describe(guest, document, seed, precision):
             lines += ["  " + line for line in (trace or "").split("\n") if line]
         if operation["questions"] == operation["refused"]:
             lines.append(f"{name}: nothing was judged: it refused all of {operation['questions']} questions")
-        if operation["gave_up"] and guest.interrupted:
-            lines.append(f"{name}: nothing more was asked, because a function cannot be asked while it is at work")
+        if operation["ended"]:
+            why = "a function that has not ended cannot be asked again" if guest.interrupted else \
+                "after this nothing can be asked in this process"
+            lines.append(f"{name}: nothing more was asked: {why}")
         elif operation["gave_up"]:
             lines.append(f"{name}: given up after {operation['not_answered']} questions that were not answered; "
                          "keep_going=True goes on")

@@ -47,7 +47,7 @@ class Mine:
         driver.call("cuMemAlloc_v2", ctypes.byref(self.memory), max(whole.nbytes, 1))
         if whole.size:
             driver.call("cuMemcpyHtoD_v2", self.memory, whole.ctypes.data, whole.nbytes)
-        shift = array.__array_interface__["data"][0] - whole.__array_interface__["data"][0] if array.base is not None else 0
+        shift = array.ctypes.data - whole.ctypes.data if array.base is not None else 0
         self.__cuda_array_interface__ = {"version": 3, "shape": array.shape, "typestr": array.dtype.str,
                                          "strides": array.strides if array.base is not None else None,
                                          "data": (self.memory.value + shift, False)}
@@ -135,6 +135,25 @@ class OnTheDevice(unittest.TestCase):
     def test_on_the_host_nothing_is_taken_from_the_device(self):
         text = self.fault(rotations=lambda a, p: Mine(numpy.zeros(a.shape, "f4")), device="host")["answers"]
         self.assertEqual(text, 'r lies on a CUDA device; ask with device="cuda"')
+
+    def test_a_device_that_fails(self):
+        if "stand_in" not in os.environ.get("LD_LIBRARY_PATH", ""):
+            self.skipTest("it would be lost to the tests after this one; the stand-in can be repaired")
+        asked = []
+
+        def breaks(a, previous):
+            asked.append(len(a))
+            driver.driver.stand_in_break(1)
+            return previous
+
+        try:
+            with self.assertRaises(cutproof.Failed) as caught:
+                self.judge(rotations=breaks, components=lambda t, alive: asked.append(0))
+        finally:
+            driver.driver.stand_in_break(0)
+        self.assertEqual(len(asked), 1)
+        self.assertIn("the CUDA device failed: cuCtxSynchronize: CUDA_ERROR_ILLEGAL_ADDRESS", str(caught.exception))
+        self.assertIn("nothing can be asked in this process", str(caught.exception))
 
     def test_nothing_is_left_on_the_device(self):
         if "stand_in" not in os.environ.get("LD_LIBRARY_PATH", ""):

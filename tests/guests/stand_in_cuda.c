@@ -7,7 +7,7 @@
 
 typedef int Result;
 typedef unsigned long long Pointer;
-enum { kFine = 0, kInvalidValue = 1, kInvalidContext = 201, kMost = 4096 };
+enum { kFine = 0, kInvalidValue = 1, kInvalidContext = 201, kIllegalAddress = 700, kMost = 4096 };
 
 static struct {
   unsigned char* begin;
@@ -15,6 +15,7 @@ static struct {
 } blocks[kMost];
 static int count = 0;
 static void* current = NULL;
+static int broken = 0;
 static int context;
 
 static int lies_in_a_block(Pointer pointer, size_t size) {
@@ -25,6 +26,7 @@ static int lies_in_a_block(Pointer pointer, size_t size) {
   return 0;
 }
 static Result check(Pointer pointer, size_t size) {
+  if (broken) return kIllegalAddress;
   if (current == NULL) return kInvalidContext;
   return lies_in_a_block(pointer, size) ? kFine : kInvalidValue;
 }
@@ -34,7 +36,7 @@ Result cuInit(unsigned flags) { return flags == 0 ? kFine : kInvalidValue; }
 Result cuDeviceGet(int* device, int number) { return *device = 0, number == 0 ? kFine : kInvalidValue; }
 Result cuDevicePrimaryCtxRetain(void** to, int device) { return *to = &context, device == 0 ? kFine : kInvalidValue; }
 Result cuCtxSetCurrent(void* to) { return current = to, kFine; }
-Result cuCtxSynchronize(void) { return current != NULL ? kFine : kInvalidContext; }
+Result cuCtxSynchronize(void) { return broken ? kIllegalAddress : current != NULL ? kFine : kInvalidContext; }
 Result cuMemAlloc_v2(Pointer* to, size_t size) {
   if (current == NULL) return kInvalidContext;
   for (int k = 0; k < kMost && size > 0; ++k) {
@@ -78,8 +80,11 @@ Result cuMemsetD8_v2(Pointer to, unsigned char value, size_t size) {
   return result;
 }
 Result cuGetErrorName(Result result, const char** name) {
-  *name = result == kInvalidValue ? "CUDA_ERROR_INVALID_VALUE" : "CUDA_ERROR_INVALID_CONTEXT";
+  *name = result == kInvalidValue     ? "CUDA_ERROR_INVALID_VALUE"
+          : result == kIllegalAddress ? "CUDA_ERROR_ILLEGAL_ADDRESS"
+                                      : "CUDA_ERROR_INVALID_CONTEXT";
   return kFine;
 }
-/* Not of CUDA: for the test. */
+/* Not of CUDA: for the test. A kernel that went astray leaves a context in which everything fails. */
+void stand_in_break(int whether) { broken = whether; }
 int stand_in_count(void) { return count; }
