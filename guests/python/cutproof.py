@@ -634,8 +634,8 @@ def _describe(guest, document, seed, precision):
         more = ', device="cuda"' if guest.device is not None else ""
         more += f', promises="{guest.hello.promises.decode()}"' if guest.hello.has_promises else ""
         for failure in operation["failures"]:
-            measured, bound = (f"{failure[field]:.3g}" if failure[field] is not None else "no finite number"
-                               for field in ("measured", "bound"))
+            measured, bound = (f"{value:.3g}" if isinstance(value, (int, float)) else "no finite number"
+                               for value in (failure["measured"], failure["bound"]))
             unit = f" {failure['unit']}" if failure["unit"] != "1" else ""
             lines += [f"{name}: '{failure['property']}' fails in question {failure['index']} ({failure['kind']})",
                       f"  {failure['text']}"]

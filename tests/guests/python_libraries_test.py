@@ -76,7 +76,7 @@ class SciPy(Library):
         # The rotation R that takes the axes nearest to the columns of A has the greatest tr(R'A).
         align = each(lambda a: Rotation.align_vectors(a.T, numpy.eye(3))[0].as_matrix())
         for precision in ("single", "double"):
-            judge(rotations=align, cases=20000, precision=precision)
+            judge(rotations=align, cases=10000, precision=precision)
 
     def test_polar_gives_reflections(self):
         from scipy.linalg import polar
@@ -98,7 +98,7 @@ class SciPy(Library):
             return u
 
         for precision in ("single", "double"):
-            judge(rotations=each(rotation), cases=20000, precision=precision)
+            judge(rotations=each(rotation), cases=10000, precision=precision)
 
 
 def marching_cubes(method, direction, inside=1.0, value=None):

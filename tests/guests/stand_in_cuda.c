@@ -7,7 +7,7 @@
 
 typedef int Result;
 typedef unsigned long long Pointer;
-enum { kFine = 0, kInvalidValue = 1, kInvalidContext = 201, kIllegalAddress = 700, kMost = 4096 };
+enum { kFine = 0, kInvalidValue = 1, kNoDevice = 100, kInvalidContext = 201, kIllegalAddress = 700, kMost = 4096 };
 
 static struct {
   unsigned char* begin;
@@ -32,7 +32,7 @@ static Result check(Pointer pointer, size_t size) {
 }
 #define AT(pointer) ((unsigned char*)(size_t)(pointer))
 
-Result cuInit(unsigned flags) { return flags == 0 ? kFine : kInvalidValue; }
+Result cuInit(unsigned flags) { return broken ? kNoDevice : flags == 0 ? kFine : kInvalidValue; }
 Result cuDeviceGet(int* device, int number) { return *device = 0, number == 0 ? kFine : kInvalidValue; }
 Result cuDevicePrimaryCtxRetain(void** to, int device) { return *to = &context, device == 0 ? kFine : kInvalidValue; }
 Result cuCtxSetCurrent(void* to) { return current = to, kFine; }
@@ -81,6 +81,7 @@ Result cuMemsetD8_v2(Pointer to, unsigned char value, size_t size) {
 }
 Result cuGetErrorName(Result result, const char** name) {
   *name = result == kInvalidValue     ? "CUDA_ERROR_INVALID_VALUE"
+          : result == kNoDevice       ? "CUDA_ERROR_NO_DEVICE"
           : result == kIllegalAddress ? "CUDA_ERROR_ILLEGAL_ADDRESS"
                                       : "CUDA_ERROR_INVALID_CONTEXT";
   return kFine;
