@@ -21,6 +21,16 @@ std::string case_name(const std::string& property, std::string_view stage) {
   return fmt::format("{} after {}", property, stage);
 }
 
+// Its witness says what was found; a property of few words has none.
+std::string what_was_found(const Verdict& verdict) {
+  return verdict.witness.text.empty() ? io::verdict_text(verdict) : verdict.witness.text;
+}
+
+std::string what_was_found(const json& violation) {
+  const std::string witness = violation.value("witness", "");
+  return witness.empty() ? violation.at("text").get<std::string>() : witness;
+}
+
 // Of one property after one stage.
 struct CaseRow {
   std::string name;
@@ -68,7 +78,7 @@ std::vector<JunitCase> cases_of(const std::vector<Verdict>& verdicts, const Judg
     JunitCase& one = cases.emplace_back(JunitCase{row.name, judging.class_name});
     if (row.failing != nullptr) {
       one.outcome = JunitOutcome::failed;
-      one.message = row.failing->witness.text;
+      one.message = what_was_found(*row.failing);
       one.text = fmt::format("{}\n{} of {} verdicts fail.\nsee it again: {}\n", io::verdict_text(*row.failing),
                              row.failed, row.verdicts, judging.again);
     } else if (row.expected != nullptr) {
@@ -115,7 +125,7 @@ std::vector<JunitCase> cases_of_campaign(const json& document, const std::string
     JunitCase& one =
         case_named(case_name(violation.value("property", "violation"), violation.value("stage", "a case")));
     const auto text = violation.at("text").get<std::string>();
-    if (one.outcome != JunitOutcome::failed || one.text.empty()) one.message = violation.value("witness", text);
+    if (one.outcome != JunitOutcome::failed || one.text.empty()) one.message = what_was_found(violation);
     one.outcome = JunitOutcome::failed;
     one.text += fmt::format("case {}: {}\nsee it again: {}\n", violation.at("index").get<int64_t>(), text,
                             replay_command(violation, judging));
@@ -138,7 +148,7 @@ std::vector<Failure> failures_of(const std::vector<Verdict>& verdicts, const Jud
   std::vector<Failure> failures;
   for (const Verdict& verdict : verdicts) {
     if (verdict.holds || (is_expected && is_expected(verdict))) continue;
-    failures.push_back({verdict.property, verdict.witness.text, judging.again});
+    failures.push_back({verdict.property, what_was_found(verdict), judging.again});
   }
   return failures;
 }
@@ -147,9 +157,8 @@ std::vector<Failure> failures_of_campaign(const json& document, const std::strin
   std::vector<Failure> failures;
   if (is_about_the_whole(document, failure)) failures.push_back({kWholeCampaign, failure, judging.again});
   for (const json& violation : document.at("violations")) {
-    const auto text = violation.at("text").get<std::string>();
-    failures.push_back({violation.value("property", "violation"), violation.value("witness", text),
-                        replay_command(violation, judging)});
+    failures.push_back(
+        {violation.value("property", "violation"), what_was_found(violation), replay_command(violation, judging)});
   }
   return failures;
 }

@@ -3,8 +3,8 @@
 
 #include <memory>
 
-#include "cli/annotations.h"
 #include "cli/commands.h"
+#include "cli/findings.h"
 #include "cli/options.h"
 #include "model/io/atomic_file.h"
 #include "model/io/recording.h"
@@ -57,7 +57,7 @@ int replay(const ReplayOptions& options) {
   }
   if (judgement.failure) {
     fmt::print("FAILS: {}\n", describe(*judgement.failure));
-    print_annotations({{judgement.failure->property, judgement.failure->witness.text, options.again}});
+    print_annotations(failures_of({*judgement.failure}, {.suite = {}, .class_name = {}, .again = options.again}));
     return 1;
   }
   if (judgement.verdicts == 0) {

@@ -145,8 +145,9 @@ def slurm(ranks):
 
 
 def mpirun(ranks):
-    if shutil.which("mpirun") is None:
-        print("SKIPPED: there is no mpirun (Debian package openmpi-bin): campaigns under it were not tested")
+    version = subprocess.run(["mpirun", "--version"], capture_output=True, text=True).stdout if shutil.which("mpirun") else ""
+    if "Open MPI" not in version:
+        print("SKIPPED: there is no mpirun of Open MPI (Debian package openmpi-bin): campaigns under it were not tested")
         sys.exit(77)
     one = ranks.whole()
     script = ranks.scripts / "fuzz_mpi.sh"
