@@ -169,6 +169,36 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
 
 namespace {
 
+// Throws json::exception if something is missing, or of another kind, that merging or a conclusion reads.
+void require_fields(const json& part) {
+  for (const char* count : {"cases", "verdicts", "particles"}) static_cast<void>(part.at(count).get<int64_t>());
+  for (const char* figure : {"seconds", "cases_per_second"}) static_cast<void>(part.at(figure).get<double>());
+  for (const char* of_threads : {"generating", "running", "judging"}) {
+    static_cast<void>(part.at("thread_seconds").at(of_threads).get<double>());
+  }
+  static_cast<void>(part.at("dynamics").get<bool>());
+  static_cast<void>(part.at("backend").get<std::string>());
+  static_cast<void>(part.at("sizes").at(1).get<int>());
+  for (const CoverageClass& each : kCoverageClasses)
+    static_cast<void>(part.at("coverage").at(each.name).get<int64_t>());
+  for (const json& property : part.at("properties").get<std::vector<json>>()) {
+    for (const char* word : {"property", "stage"}) static_cast<void>(property.at(word).get<std::string>());
+    for (const char* count : {"judged", "checked", "failed", "undecided"}) {
+      static_cast<void>(property.at(count).get<int64_t>());
+    }
+    for (const char* figure : {"measured", "of_bound"}) static_cast<void>(property.at(figure));
+  }
+  for (const json& violation : part.at("violations").get<std::vector<json>>()) {
+    static_cast<void>(violation.at("index").get<int64_t>());
+    for (const char* word : {"text", "file"}) static_cast<void>(violation.at(word).get<std::string>());
+  }
+  if (!part.contains("steps_compared")) return;
+  for (const char* count : {"steps", "particles", "undecidable"}) {
+    static_cast<void>(part.at("steps_compared").at(count).get<int64_t>());
+  }
+  static_cast<void>(part.at("steps_compared").at("greatest_h"));
+}
+
 // One result as it stands in its file.
 json read_shard(const std::string& file) {
   json part;
@@ -191,6 +221,7 @@ json read_shard(const std::string& file) {
   if (shards < 1 || shards > kMostShards || shard < 1 || shard > shards) {
     throw InputError(file, "shard", fmt::format("there is no shard {} of {}", shard, shards), kRemedy);
   }
+  require_fields(part);
   return part;
 }
 

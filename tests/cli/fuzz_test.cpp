@@ -154,6 +154,21 @@ TEST_F(Fuzz, PutsShardsTogetherToTheWhole) {
     write("none_of_them.json", none.dump());
     expect_refused("fuzz --merge none_of_them.json", {"none_of_them.json", "there is no shard"});
   }
+  // Whatever is missing, or of another kind: a result that is refused, and no defect of the program.
+  const json third = result("3.json");
+  for (const auto& [field, value] : third.items()) {
+    for (const bool is_there : {false, true}) {
+      json broken = third;
+      broken.erase(field);
+      if (is_there) broken[field] = value.is_object() ? json{{"x", "y"}} : json{{"x"}};
+      write("broken.json", broken.dump());
+      const Outcome outcome = cutproof("fuzz --merge 1.json 2.json broken.json");
+      // The machine's threads, and a verdict that merging makes itself, are not read.
+      const bool is_read = field != "threads" && field != "mean_particles" && field != "holds";
+      EXPECT_EQ(outcome.status, is_read ? 2 : 0) << field << is_there << "\n" << outcome.output;
+      EXPECT_EQ(outcome.output.find("broken.json") != std::string::npos, is_read) << outcome.output;
+    }
+  }
   // What was merged is no shard: an incomplete result would become a complete one.
   expect_refused("fuzz --merge merged.json", {"merged.json", "put together already"});
   expect_refused("fuzz --merge 1.json 2.json 3.json --json nowhere/f.json", {"nowhere"});
