@@ -10,8 +10,8 @@
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 
-# As a rank: mpirun ends all the others once one of its processes ends with another status than 0, or is killed. So
-# each of them ends well, and its result, or that there is none, says how it was.
+# As a rank: mpirun ends all the others once one of its processes ends with another status than 0. So each of them ends
+# well, and its result, or that there is none, says how it was.
 if [ "${1:-}" = --rank ]; then
   shift
   "$here/fuzz_shard.sh" "$@" || true
@@ -39,8 +39,8 @@ mkdir -p "$results"
 CUTPROOF=$("$here/fuzz_shard.sh" --program)
 export CUTPROOF
 
-# Each rank takes its share of its machine by itself.
-mpirun --bind-to none "${of_mpirun[@]}" "${BASH_SOURCE[0]}" --rank "$results" "${options[@]}" ||
+# Each rank takes its share of its machine by itself. A rank that is killed must not take the others along (recovery).
+mpirun --bind-to none --enable-recovery "${of_mpirun[@]}" "${BASH_SOURCE[0]}" --rank "$results" "${options[@]}" ||
   echo "fuzz_mpi.sh: mpirun ended with status $?; what its ranks have finished is put together" >&2
 compgen -G "$results/shard_*.json" > /dev/null || { echo "fuzz_mpi.sh: no rank has left a result" >&2; exit 3; }
 exec "$CUTPROOF" fuzz --merge "$results"/shard_*.json --json "$results/whole.json"

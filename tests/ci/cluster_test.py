@@ -63,10 +63,16 @@ class Ranks:
         self.expect_status(0, [self.program, "fuzz", *CAMPAIGN, "--json", "one.json"])
         return self.read("one.json")
 
-    def write_losing(self, lost):
-        """A program that dies, as one does that a machine runs out of memory for, when it is to judge shard `lost`."""
+    def write_losing(self, lost, with_rank=False):
+        """A program that dies, as one does that a machine runs out of memory for, when it is to judge shard `lost`;
+        `with_rank`: and with it all of its rank, while the others are at work."""
         path = self.folder / f"losing_{lost}"
-        path.write_text(f'#!/bin/sh\ncase "$*" in *"--shard {lost}/"*) kill -9 $$ ;; esac\nexec "{self.program}" "$@"\n')
+        die, others = "kill -9 $$", ":"
+        if with_rank:
+            die = "kill -9 $(awk '/^PPid/ {print $2}' /proc/$PPID/status) $PPID $$"
+            others = "sleep 2"
+        path.write_text(f'#!/bin/sh\ncase "$*" in *"--shard {lost}/"*) {die} ;; *--shard*) {others} ;; esac\n'
+                        f'exec "{self.program}" "$@"\n')
         path.chmod(0o755)
         return path
 
@@ -161,6 +167,12 @@ def mpirun(ranks):
     expect("missing 2;" in text, f"the lost rank is not named:\n{text}")
     merged = ranks.read("lost/whole.json")
     expect(merged["complete"] is False and merged["missing_shards"] == [2], "a lost rank passes as complete")
+    # A rank that is killed, and not its program alone, does not take the others along.
+    text = ranks.expect_status(1, [script, "killed", *CAMPAIGN, *with_three], CUTPROOF=ranks.write_losing(3, True))
+    expect("shard 2 of 3: exit status 0" in text and "shard 3 of 3: exit status" not in text,
+           f"not all of a rank was killed, so this tests nothing:\n{text}")
+    merged = ranks.read("killed/whole.json")
+    expect(merged["missing_shards"] == [3], f"of 3 ranks the last was killed: {merged['missing_shards']} are missing")
     ranks.shard("lost", CUTPROOF_SHARD="2/3")
     expect_same(one, ranks.merge("lost", 0)[1], "the lost rank run again")
     text = ranks.expect_status(2, [script, "of_3", *CAMPAIGN, *with_three])
