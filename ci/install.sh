@@ -9,6 +9,8 @@ packages=(
   nlohmann-json3-dev libfmt-dev libcli11-dev
   libgtest-dev librapidcheck-dev
   python3 python3-h5py python3-numpy
+  dpkg-dev file  # packages: which libraries they depend on
+  openmpi-bin    # mpirun, for a test of ci/cluster/; no program is linked with it
 )
 # libFuzzer and the sanitizers of clang; llvm has the symbolizer that gives their reports file and line.
 fuzzing_packages=(clang libclang-rt-dev llvm)

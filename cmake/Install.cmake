@@ -92,5 +92,12 @@ if(CUTPROOF_INSTALL)
     DESTINATION ${package_folder})
   if(CUTPROOF_PROGRAM)
     install(TARGETS cutproof)
+    # The program reads no file by itself: scenes are for people to begin with.
+    install(DIRECTORY ${PROJECT_SOURCE_DIR}/fixtures/scenes DESTINATION ${CMAKE_INSTALL_DATADIR}/cutproof
+      FILES_MATCHING PATTERN "*.json")
+    install(DIRECTORY ${PROJECT_SOURCE_DIR}/ci/cluster DESTINATION ${CMAKE_INSTALL_DATADIR}/cutproof
+      USE_SOURCE_PERMISSIONS)
+    install(FILES ${CMAKE_CURRENT_LIST_DIR}/copyright ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md
+      ${PROJECT_SOURCE_DIR}/CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
   endif()
 endif()
