@@ -1,4 +1,6 @@
 // `cutproof fuzz`: random dissections until one is wrong, and that one simplified.
+#include "cli/fuzz.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -28,21 +30,6 @@ namespace {
 using namespace property_tests;
 using harness::BackendChoice;
 using nlohmann::json;
-
-struct FuzzOptions {
-  BackendChoice backend = {.name = harness::kHostName, .split = {}, .rotation = {}};
-  CampaignOptions campaign;
-  std::optional<int64_t> cases;  // default: 1000, or as many as its `seconds` allow
-  std::string sizes = "0-79";    // of cases, which take turns: 0 is nothing, 100 up to about 20,000 particles
-  int batch = 0;                 // bodies in one load; 0: by backend
-  int threads = 0;               // 0: as many as the machine has
-  std::string shard;             // "i/N"; empty: all
-  double simplify = 60;          // [s] for each violation
-  std::string save = ".";        // the folder for counterexamples
-  std::string json, junit;
-  std::string again;               // the command line
-  std::vector<std::string> merge;  // results of shards, to be put together; nothing is run
-};
 
 // "A-B" or "A/B" as numbers.
 std::pair<int64_t, int64_t> two_numbers(const std::string& text, char separator, const std::string& option,
@@ -86,7 +73,8 @@ CampaignOptions campaign_options(const FuzzOptions& options) {
   return campaign;
 }
 
-// Exit status of a campaign as it is written down; says why.
+}  // namespace
+
 int print_conclusion(const json& document, const CampaignConclusion& conclusion) {
   for (const CoverageClass& each : kCoverageClasses) {
     if (least_count(each, 1, document.at("dynamics").get<bool>()) == 0) continue;
@@ -120,6 +108,8 @@ int print_conclusion(const json& document, const CampaignConclusion& conclusion)
   }
   return conclusion.holds() ? 0 : 1;
 }
+
+namespace {
 
 // What a campaign came to goes into files first: these are kept even if standard output cannot be written.
 int conclude_campaign(const FuzzOptions& options, const json& document, bool whole) {
@@ -200,8 +190,9 @@ Campaign run(const FuzzOptions& options, const CampaignOptions& asked) {
   });
 }
 
-int fuzz(const FuzzOptions& options) {
-  if (!options.merge.empty()) return merge(options);
+}  // namespace
+
+nlohmann::json fuzz_campaign(const FuzzOptions& options) {
   const CampaignOptions asked = campaign_options(options);
   // What cannot be is said before anything is done.
   static_cast<void>(harness::make_backend(harness::choice_for_load(options.backend, 0)));
@@ -225,8 +216,15 @@ int fuzz(const FuzzOptions& options) {
     violations.push_back(violation_json(
         violation, keep(violation, options, harness::choice_for_load(options.backend, load), asked.batch)));
   }
-  const json document = campaign_document(options.backend, asked, campaign, violations);
-  return conclude_campaign(options, document, asked.shards == 1);
+  return campaign_document(options.backend, asked, campaign, violations);
+}
+
+namespace {
+
+int fuzz(const FuzzOptions& options) {
+  if (!options.merge.empty()) return merge(options);
+  const json document = fuzz_campaign(options);
+  return conclude_campaign(options, document, document.at("shards") == 1);
 }
 
 }  // namespace

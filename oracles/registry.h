@@ -19,6 +19,8 @@ struct StageRun {
   Stage stage;
   const State& before;
   const State& after;
+  // Of a step: false where `after` was made from a later state, in which clusters have changed.
+  bool rotations_are_known = true;
 };
 
 // What a check costs beside a frame of the reference: less, or more.

@@ -61,6 +61,12 @@ Shells shells_of(const Skin& skin, const std::vector<Vec3>& points) {
     shells.of_vertex[v] = root == v ? count++ : shells.of_vertex[root];
   }
   shells.volume.assign(at(count), 0.0);
+  shells.farthest.assign(at(count), -1);
+  for (std::size_t v = 0; v < used.size(); ++v) {
+    if (used[v] == 0) continue;
+    int32_t& farthest = shells.farthest[at(shells.of_vertex[v])];
+    if (farthest < 0 || points[v].x > points[at(farthest)].x) farthest = static_cast<int32_t>(v);
+  }
   for (const auto& t : skin.triangles) {
     shells.volume[at(shells.of_vertex[at(t[0])])] += dot(points[at(t[0])], cross(points[at(t[1])], points[at(t[2])]));
   }
