@@ -19,8 +19,7 @@ struct Needs {
 
 const std::vector<Needs>& all_needs() {
   static const std::vector<Needs> needs = {
-      // Masses do not depend on where things rest.
-      {"rest frames", {{"rest_centers", "cluster_masses"}, {"rest", "nodes", "cluster_masses"}}},
+      {"rest frames", {{"rest_centers", "cluster_masses"}}},
       {"rotation", {{"rotations"}}},
       {"merge maximality", {{"tau"}}},
       {"tissue kept", {{"removed"}}},

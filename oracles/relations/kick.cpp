@@ -136,7 +136,12 @@ Verdict the_kick_was_felt(const KickedRuns& runs, const KickReport& report) {
   const char* const what = runs.kicked_piece ? "did not move otherwise" : "moved otherwise";
   verdict.witness.text = fmt::format(
       "nothing was tested: {} {} when it was kicked{}", who, what,
-      report.repeats ? "" : ", by more than the simulator's own noise explains: kick harder, or make it repeat itself");
+      report.repeats
+          ? ""
+          : fmt::format(
+                ", by more than the simulator's own noise explains, in the {} of {} frames of which its noise is "
+                "known: kick harder, write longer runs, or make it repeat itself",
+                report.judged_frames, runs.frames));
   return verdict;
 }
 
@@ -152,6 +157,7 @@ Verdict others_feel_nothing(const Differences& differences, KickReport& report) 
     const Farthest farthest = differences.farthest(f, is_other);
     if (farthest.particle < 0) break;
     const double bound = differences.bounds[at(f)];
+    if (!std::isfinite(bound)) break;
     if (f >= report.kick_frame && (report.sharpest_frame < 0 || bound < report.least_bound)) {
       report.least_bound = bound;
       report.sharpest_frame = f;
@@ -180,6 +186,7 @@ Verdict others_feel_nothing(const Differences& differences, KickReport& report) 
   for (const KickedPiece& piece : report.pieces) {
     if (piece.piece == kicked) continue;
     verdict.checked += piece.particles * runs.frames;
+    verdict.undecided += piece.particles * (runs.frames - report.judged_frames);
     if (piece.felt == 0) continue;
     verdict.witness.text +=
         fmt::format("; {} of {} particles of piece {} did", piece.felt, piece.particles, piece.piece);
@@ -210,9 +217,8 @@ std::vector<double> noise_bounds(const KickedRuns& runs) {
   if (first < 0) return bounds;
   const double rounding = std::sqrt(3.0) * unit_roundoff(runs.precision) * extent;
   for (int64_t f = 0; f < runs.frames; ++f) {
-    // Chance may begin at once in one run and late in another.
-    const double grown = noise[at(std::min(first + f, runs.frames - 1))];
-    bounds[at(f)] = kNoiseFactor * std::max(grown, rounding);
+    // Chance may begin at once in one run and late in another. How far it would have grown by then nobody has seen.
+    bounds[at(f)] = first + f < runs.frames ? kNoiseFactor * std::max(noise[at(first + f)], rounding) : INFINITY;
   }
   return bounds;
 }
@@ -223,6 +229,7 @@ KickReport judge_kick(const KickedRuns& runs) {
   report.verdicts.push_back(check_numbers(runs));
   if (!report.verdicts.back().holds) return report;
   const std::vector<double> bounds = noise_bounds(runs);
+  report.judged_frames = std::count_if(bounds.begin(), bounds.end(), [](double bound) { return std::isfinite(bound); });
   report.repeats = std::all_of(bounds.begin(), bounds.end(), [](double bound) { return bound == 0; });
   const Differences differences{runs, bounds};
   look_at_pieces(differences, report);

@@ -45,12 +45,15 @@ struct KickReport {
   // [m].
   double least_bound = 0, kick_then = 0;
   int64_t sharpest_frame = -1;
+  int64_t judged_frames = 0;  // the first so many; of later ones nobody knows the noise
 
   bool holds() const;
 };
 
 // By how much positions of two runs of one start may differ that nothing but the simulator's own noise tells apart,
-// frame by frame [m] (tolerances.md, A kick in a noisy simulator). All 0 if it repeats itself.
+// frame
+// by frame [m] (tolerances.md, A kick in a noisy simulator). All 0 if it repeats itself; infinite where it is not
+// known.
 std::vector<double> noise_bounds(const KickedRuns& runs);
 
 // Requires arrays of the sizes that they are to have; kicked_piece, if given, is one of the pieces.
