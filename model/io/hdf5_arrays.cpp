@@ -24,8 +24,9 @@ void collect_text(const hdf5::Values& values, const std::string& name, ArrayColl
 }
 
 void collect(const hdf5::File& file, ArrayCollector& found) {
-  for (const std::string& name : hdf5::names_in(file.id(), kMostArrays)) {
-    const hdf5::Values values = hdf5::Values::of_dataset(file.id(), name, found.bytes_left());
+  const hdf5::Id root = hdf5::open_group(file.id(), "/");
+  for (const std::string& name : hdf5::names_in(root.get(), kMostArrays)) {
+    const hdf5::Values values = hdf5::Values::of_dataset(root.get(), name, found.bytes_left());
     if (values.kind() == hdf5::ValueKind::text) {
       collect_text(values, name, found);
       continue;
@@ -36,8 +37,8 @@ void collect(const hdf5::File& file, ArrayCollector& found) {
     values.read(raw.bytes.data());
     found.add(name, std::move(raw));
   }
-  for (const std::string& name : hdf5::attribute_names(file.id(), kMostArrays)) {
-    const hdf5::Values values = hdf5::Values::of_attribute(file.id(), name, kMostTextBytes);
+  for (const std::string& name : hdf5::attribute_names(root.get(), kMostArrays)) {
+    const hdf5::Values values = hdf5::Values::of_attribute(root.get(), name, kMostTextBytes);
     if (values.kind() != hdf5::ValueKind::text) {
       throw hdf5::Error(name, "This attribute is no text. Numbers are read from datasets.");
     }
