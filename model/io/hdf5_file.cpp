@@ -33,7 +33,7 @@ constexpr hsize_t kCopiesOfChunk = 4;
 // Deflate shrinks by at most 1032.
 constexpr uint64_t kMostCompression = 1100;
 
-constexpr std::size_t kMostNameBytes = 256, kMostAxes = 8;
+constexpr std::size_t kMostAxes = 8;
 
 // In the order of Scalar. HDF5's types exist only once the library runs.
 struct ScalarType {
@@ -377,43 +377,54 @@ void Table::read(int64_t first, int64_t count, void* values) const {
   transfer(first, count, [&](auto... arguments) { return H5Dread(arguments..., values); });
 }
 
+namespace {
+
+// Names as an iteration meets them. Exceptions must not cross HDF5, so what is wrong is kept.
+struct Met {
+  std::size_t most;
+  std::vector<std::string> names;
+  bool too_many = false, elsewhere = false;
+
+  herr_t see(const char* name) {
+    too_many = names.size() >= most;
+    if (too_many) return 1;
+    names.emplace_back(name);
+    return 0;
+  }
+};
+
+herr_t see_link(hid_t, const char* name, const H5L_info_t* link, void* met) {
+  Met& all = *static_cast<Met*>(met);
+  if (all.see(name) != 0) return 1;
+  all.elsewhere = link->type != H5L_TYPE_HARD;
+  return all.elsewhere ? 1 : 0;
+}
+herr_t see_attribute(hid_t, const char* name, const H5A_info_t*, void* met) {
+  return static_cast<Met*>(met)->see(name);
+}
+
+}  // namespace
+
+// In the order in which they lie in the file, and sorted here: HDF5 1.10 makes a table to sort them, and frees what it
+// has not yet filled in of that if the group is damaged.
 std::vector<std::string> names_in(hid_t group, std::size_t most) {
   require_memory();
-  H5G_info_t info;
-  check(H5Gget_info(group, &info), "/");
-  if (info.nlinks > most) throw Error("/", fmt::format("It holds {} things, more than {}.", info.nlinks, most));
-  std::vector<std::string> names;
-  for (hsize_t k = 0; k < info.nlinks; ++k) {
-    char name[kMostNameBytes] = {};
-    const ssize_t length =
-        H5Lget_name_by_idx(group, ".", H5_INDEX_NAME, H5_ITER_INC, k, name, sizeof name, H5P_DEFAULT);
-    check(static_cast<herr_t>(std::min<ssize_t>(length, 0)), "/");
-    if (static_cast<std::size_t>(length) >= sizeof name) throw Error("/", "A name has more than 255 bytes.");
-    H5L_info_t link;
-    check(H5Lget_info(group, name, &link, H5P_DEFAULT), name);
-    if (link.type != H5L_TYPE_HARD) throw Error(name, "This is a link to something elsewhere.");
-    names.emplace_back(name);
-  }
-  return names;
+  Met met{most, {}};
+  check(H5Literate(group, H5_INDEX_NAME, H5_ITER_NATIVE, nullptr, see_link, &met), "/");
+  if (met.too_many) throw Error("/", fmt::format("It holds more than {} things.", most));
+  if (met.elsewhere) throw Error(met.names.back(), "This is a link to something elsewhere.");
+  std::sort(met.names.begin(), met.names.end());
+  return met.names;
 }
 
 std::vector<std::string> attribute_names(hid_t object, std::size_t most) {
   require_memory();
-  const int count = H5Aget_num_attrs(object);
-  check(std::min(count, 0), "/");
-  if (static_cast<std::size_t>(count) > most) {
-    throw Error("/", fmt::format("It has {} attributes, more than {}.", count, most));
-  }
-  std::vector<std::string> names;
-  for (int k = 0; k < count; ++k) {
-    char name[kMostNameBytes] = {};
-    const ssize_t length = H5Aget_name_by_idx(object, ".", H5_INDEX_NAME, H5_ITER_INC, static_cast<hsize_t>(k), name,
-                                              sizeof name, H5P_DEFAULT);
-    check(static_cast<herr_t>(std::min<ssize_t>(length, 0)), "/");
-    if (static_cast<std::size_t>(length) >= sizeof name) throw Error("/", "A name has more than 255 bytes.");
-    names.emplace_back(name);
-  }
-  return names;
+  Met met{most, {}};
+  hsize_t from = 0;
+  check(H5Aiterate2(object, H5_INDEX_NAME, H5_ITER_NATIVE, &from, see_attribute, &met), "/");
+  if (met.too_many) throw Error("/", fmt::format("It has more than {} attributes.", most));
+  std::sort(met.names.begin(), met.names.end());
+  return met.names;
 }
 
 // What values are, from their type and extent.
