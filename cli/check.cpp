@@ -1,20 +1,18 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <memory>
 
+#include "cli/check_state.h"
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/results.h"
 #include "cli/terminal.h"
-#include "harness/foreign_judge.h"
 #include "harness/recorded_run.h"
 #include "harness/scene_judge.h"
 #include "model/io/array_file.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
-#include "model/io/verdict_json.h"
 
 namespace cutproof::cli {
 
@@ -25,57 +23,6 @@ struct CheckOptions {
   std::string depth{name_of(harness::Depth::motion)};
   std::string json;
 };
-
-nlohmann::json to_json(const CheckOptions& options, const harness::ForeignState& foreign,
-                       const harness::ForeignVerdicts& judged) {
-  nlohmann::json promises = nlohmann::json::array(), not_judged = nlohmann::json::array();
-  for (std::size_t k = 0; k < harness::promise_words().size(); ++k) {
-    if ((foreign.promises.words >> k & 1u) != 0) promises.push_back(harness::promise_words()[k].name);
-  }
-  for (const harness::NotJudged& each : judged.not_judged) {
-    not_judged.push_back({{"property", each.property}, {"why", each.why}});
-  }
-  const auto failed = std::count_if(judged.verdicts.begin(), judged.verdicts.end(),
-                                    [](const Verdict& verdict) { return !verdict.holds; });
-  return {{"format", "cutproof.check_state"},
-          {"format_version", 1},
-          {"cutproof", kVersion},
-          {"source", options.recording},
-          {"body",
-           {{"particles", foreign.state.x.size()},
-            {"clusters", foreign.state.clusters.count()},
-            {"spacing", foreign.setup.body.grid.spacing},
-            {"on_grid", foreign.setup.body.on_grid()}}},
-          {"arrays", foreign.given},
-          {"promises", promises},
-          {"promises_given", foreign.promises_given},
-          {"single_precision", foreign.state.precision == Precision::binary32},
-          {"verdicts", io::verdicts_json(judged.verdicts)},
-          {"not_judged", not_judged},
-          {"summary", {{"holds", judged.holds()}, {"verdicts", judged.verdicts.size()}, {"failed", failed}}},
-          {"notes", judged.notes}};
-}
-
-// A state that somebody else's simulator wrote.
-int check_state(const CheckOptions& options) {
-  depth_asked(options.depth);  // there is no motion to leave out, but a depth that is none is refused all the same
-  const harness::ForeignState foreign =
-      harness::foreign_state_of(io::read_array_file(options.recording), options.recording);
-  require_writable(options.json);
-  const harness::ForeignVerdicts judged = harness::judge_foreign_state(foreign);
-  write_document(options.json, to_json(options, foreign, judged));
-  fmt::print("state {}: {} particles in {} clusters, {}\n", options.recording, foreign.state.x.size(),
-             foreign.state.clusters.count(), foreign.given.contains("nodes") ? "on a grid" : "as a graph");
-  print_single_verdicts(judged.verdicts);
-  fmt::print("\n");
-  for (const harness::NotJudged& each : judged.not_judged) {
-    fmt::print("not judged: {}: {}\n", each.property, each.why);
-  }
-  for (const std::string& note : judged.notes) fmt::print("\nnote: {}\n", note);
-  print_whether_all_hold(judged.verdicts);
-  if (!options.json.empty()) fmt::print("wrote {}\n", options.json);
-  return judged.holds() ? 0 : 1;
-}
 
 int check_recording(const CheckOptions& options) {
   const harness::Depth depth = depth_asked(options.depth);
@@ -114,7 +61,9 @@ int check_recording(const CheckOptions& options) {
 }
 
 int check(const CheckOptions& options) {
-  return io::is_array_file(options.recording) ? check_state(options) : check_recording(options);
+  if (!io::is_array_file(options.recording)) return check_recording(options);
+  depth_asked(options.depth);  // there is no motion to leave out, but a depth that is none is refused all the same
+  return check_state(options.recording, options.json);
 }
 
 }  // namespace
