@@ -3,6 +3,7 @@
 #include <zip.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <memory>
@@ -21,6 +22,7 @@ constexpr const char* kNpzRemedy = "Write the file once more with numpy.savez or
 constexpr std::string_view kMagic = "\x93NUMPY";
 // Deflate shrinks by at most 1032.
 constexpr uint64_t kMostDeflation = 1100;
+constexpr std::size_t kZipNeeds = std::size_t{1} << 20;  // to open an archive of few files; more than it takes
 constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 16;
 
 struct Discard {
@@ -150,8 +152,15 @@ class NpzReader {
   explicit NpzReader(const std::string& path) : path_(path), found_(path) {}
 
   ArrayFile read() {
+    // libzip 1.7 says of some allocations that fail that this is no archive. So what it needs is asked for before, and
+    // what it says is believed when it says it twice.
     int code = 0;
-    archive_.reset(zip_open(path_.c_str(), ZIP_RDONLY | ZIP_CHECKCONS, &code));
+    for (int attempt = 0; attempt < 2 && archive_ == nullptr; ++attempt) {
+      void* volatile block = std::malloc(kZipNeeds);  // volatile: or the compiler would see that nobody uses it
+      if (block == nullptr) throw std::bad_alloc();
+      std::free(block);
+      archive_.reset(zip_open(path_.c_str(), ZIP_RDONLY | ZIP_CHECKCONS, &code));
+    }
     if (archive_ == nullptr) {
       zip_error_t error;
       zip_error_init_with_code(&error, code);
