@@ -3,6 +3,7 @@
 #include <chrono>
 #include <memory>
 
+#include "cli/check_state.h"
 #include "cli/commands.h"
 #include "cli/findings.h"
 #include "cli/options.h"
@@ -11,6 +12,7 @@
 #include "cli/terminal.h"
 #include "harness/recorded_run.h"
 #include "harness/scene_judge.h"
+#include "model/io/array_file.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
 
@@ -25,7 +27,7 @@ struct CheckOptions {
   std::string again;  // the command line
 };
 
-int check(const CheckOptions& options) {
+int check_recording(const CheckOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
   const harness::Depth depth = depth_asked(options.depth);
   const io::RecordingReader reader(options.recording);
@@ -69,12 +71,21 @@ int check(const CheckOptions& options) {
   return judge.holds() ? 0 : 1;
 }
 
+int check(const CheckOptions& options) {
+  if (!io::is_array_file(options.recording)) return check_recording(options);
+  depth_asked(options.depth);  // there is no motion to leave out, but a depth that is none is refused all the same
+  return check_state(options.recording, options.json);
+}
+
 }  // namespace
 
 void add_check(CLI::App& program, Work& work) {
   const auto options = std::make_shared<CheckOptions>();
-  CLI::App* const command = program.add_subcommand("check", "judge a recording");
-  command->add_option("recording", options->recording, "what --record was given")->required()->type_name("RECORDING");
+  CLI::App* const command =
+      program.add_subcommand("check", "judge a recording, or a state of somebody else's simulator");
+  command->add_option("recording", options->recording, "what --record was given, or an NPZ or HDF5 file of arrays")
+      ->required()
+      ->type_name("RECORDING");
   add_check_depth(*command, options->depth, "how much is judged");
   add_json(*command, options->json, "write verdicts and counts");
   add_junit(*command, options->junit);
