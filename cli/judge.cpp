@@ -281,7 +281,8 @@ int judge(const JudgeOptions& options) {
     flush_output();
   }
   const auto& names = options.operations;
-  if (has_stages(guest.plugin()) && (names.empty() || std::find(names.begin(), names.end(), kOnStages) != names.end())) {
+  if (has_stages(guest.plugin()) &&
+      (names.empty() || std::find(names.begin(), names.end(), kOnStages) != names.end())) {
     for (const bool dynamics : {false, true}) {
       if (dynamics && !steps(guest.plugin())) continue;
       holds = judge_stages(options, dynamics, document, junit, failures) && holds;
