@@ -21,8 +21,8 @@ import tempfile
 
 ROOMS = ("model", "fixtures", "reference_cpu", "gpu", "oracles", "harness", "property_tests", "tuning", "benchmarks",
          "cli", "tests", "ci", "docs", "cmake")
-CODE = (".h", ".cpp", ".cu", ".cuh", ".py", ".sh", ".cmake")
-FILES = r"(?:h|cuh|cpp|cu|py|sh|md|json|cmake|svg|png|patch)"
+CODE = (".h", ".cpp", ".cu", ".cuh", ".py", ".sh", ".cmake", ".slurm", ".yml")
+FILES = r"(?:h|cuh|cpp|cu|py|sh|md|json|cmake|svg|png|patch|slurm|yml)"
 # Counterexamples, inputs and results are records of what was said when they were made; the self-test below is full of
 # what must not be found.
 RECORDS = ("fixtures/regressions/*.json", "fixtures/regressions/inputs/*", "docs/results/*.json", "ci/check_docs.py")
@@ -249,7 +249,7 @@ class Check:
 
     def options_of_scripts(self):
         return {option for file in self.tree.files if file.startswith(("ci/", "docs/", "property_tests/"))
-                and file.endswith((".py", ".sh", ".cpp")) for option in re.findall(r"--[a-z][\w-]+", self.tree.text(file))}
+                and file.endswith((".py", ".sh", ".cpp", ".slurm")) for option in re.findall(r"--[a-z][\w-]+", self.tree.text(file))}
 
     def command(self, file, line, text):
         for problem in self.commands.problems(text):

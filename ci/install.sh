@@ -5,11 +5,13 @@ set -euo pipefail
 
 packages=(
   g++ cmake ninja-build ccache git ca-certificates
-  libeigen3-dev libsuitesparse-dev libcgal-dev libboost-dev libboost-context-dev libhdf5-dev
+  libeigen3-dev libsuitesparse-dev libcgal-dev libboost-dev libboost-context-dev libhdf5-dev libzip-dev
   nlohmann-json3-dev libfmt-dev libcli11-dev
   libgtest-dev librapidcheck-dev
   python3 python3-h5py python3-numpy
   python3-scipy python3-skimage  # judged as examples: docs/results/libraries.md
+  dpkg-dev file  # packages: which libraries they depend on
+  openmpi-bin    # mpirun, for a test of ci/cluster/; no program is linked with it
 )
 # libFuzzer and the sanitizers of clang; llvm has the symbolizer that gives their reports file and line.
 fuzzing_packages=(clang libclang-rt-dev llvm)

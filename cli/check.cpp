@@ -1,14 +1,18 @@
 #include <fmt/format.h>
 
+#include <chrono>
 #include <memory>
 
+#include "cli/check_state.h"
 #include "cli/commands.h"
+#include "cli/findings.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/results.h"
 #include "cli/terminal.h"
 #include "harness/recorded_run.h"
 #include "harness/scene_judge.h"
+#include "model/io/array_file.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
 
@@ -19,16 +23,19 @@ namespace {
 struct CheckOptions {
   std::string recording;
   std::string depth{name_of(harness::Depth::motion)};
-  std::string json;
+  std::string json, junit;
+  std::string again;  // the command line
 };
 
-int check(const CheckOptions& options) {
+int check_recording(const CheckOptions& options) {
+  const auto begin = std::chrono::steady_clock::now();
   const harness::Depth depth = depth_asked(options.depth);
   const io::RecordingReader reader(options.recording);
   const io::Recording& recording = reader.header();
   Scene scene;
   if (!recording.scene_json.empty()) scene = io::parse_scene(recording.scene_json, options.recording + " (its scene)");
   require_writable(options.json);
+  require_writable(options.junit);
 
   const auto initial = std::make_shared<const State>(reader.snapshot(0).state);
   fmt::print("recording {}: scene {}, backend {}, {} snapshots of {} particles\n", options.recording,
@@ -53,20 +60,39 @@ int check(const CheckOptions& options) {
   judge.finish();
   // The file first: it is kept even if standard output cannot be written.
   write_document(options.json, to_json(result, &judge));
+  const Judging judging{"cutproof check", "cutproof.check." + (scene.name.empty() ? "recording" : scene.name),
+                        options.again};
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+  write_junit(options.junit, judging, seconds.count(), cases_of(judge, judging));
   print_verdicts(judge);
   if (!options.json.empty()) fmt::print("wrote {}\n", options.json);
+  print_annotations(failures_of(judge.verdicts(), judging,
+                                [&](const Verdict& verdict) { return judge.is_expected_failure(verdict); }));
   return judge.holds() ? 0 : 1;
+}
+
+int check(const CheckOptions& options) {
+  if (!io::is_array_file(options.recording)) return check_recording(options);
+  depth_asked(options.depth);  // there is no motion to leave out, but a depth that is none is refused all the same
+  return check_state(options.recording, {options.json, options.junit, options.again});
 }
 
 }  // namespace
 
 void add_check(CLI::App& program, Work& work) {
   const auto options = std::make_shared<CheckOptions>();
-  CLI::App* const command = program.add_subcommand("check", "judge a recording");
-  command->add_option("recording", options->recording, "what --record was given")->required()->type_name("RECORDING");
+  CLI::App* const command =
+      program.add_subcommand("check", "judge a recording, or a state of somebody else's simulator");
+  command->add_option("recording", options->recording, "what --record was given, or an NPZ or HDF5 file of arrays")
+      ->required()
+      ->type_name("RECORDING");
   add_check_depth(*command, options->depth, "how much is judged");
   add_json(*command, options->json, "write verdicts and counts");
-  command->callback([options, &work] { work = [options] { return check(*options); }; });
+  add_junit(*command, options->junit);
+  command->callback([options, command, &work] {
+    options->again = as_given(*command);
+    work = [options] { return check(*options); };
+  });
 }
 
 }  // namespace cutproof::cli

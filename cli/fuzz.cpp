@@ -1,4 +1,6 @@
 // `cutproof fuzz`: random dissections until one is wrong, and that one simplified.
+#include "cli/fuzz.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,6 +11,7 @@
 #include <optional>
 
 #include "cli/commands.h"
+#include "cli/findings.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/terminal.h"
@@ -27,20 +30,6 @@ namespace {
 using namespace property_tests;
 using harness::BackendChoice;
 using nlohmann::json;
-
-struct FuzzOptions {
-  BackendChoice backend = {.name = harness::kHostName, .split = {}, .rotation = {}};
-  CampaignOptions campaign;
-  std::optional<int64_t> cases;  // default: 1000, or as many as its `seconds` allow
-  std::string sizes = "0-79";    // of cases, which take turns: 0 is nothing, 100 up to about 20,000 particles
-  int batch = 0;                 // bodies in one load; 0: by backend
-  int threads = 0;               // 0: as many as the machine has
-  std::string shard;             // "i/N"; empty: all
-  double simplify = 60;          // [s] for each violation
-  std::string save = ".";        // the folder for counterexamples
-  std::string json;
-  std::vector<std::string> merge;  // results of shards, to be put together; nothing is run
-};
 
 // "A-B" or "A/B" as numbers.
 std::pair<int64_t, int64_t> two_numbers(const std::string& text, char separator, const std::string& option,
@@ -73,6 +62,10 @@ CampaignOptions campaign_options(const FuzzOptions& options) {
   if (!options.shard.empty()) {
     const std::string remedy = "give i/N with i from 1 to N, such as 2/8";
     const auto [shard, shards] = two_numbers(options.shard, '/', "--shard", remedy);
+    if (shards > kMostShards) {
+      refuse("--shard", fmt::format("'{}' is of too many shards", options.shard),
+             fmt::format("use {} at most", kMostShards));
+    }
     if (shard < 1 || shard > shards) refuse("--shard", fmt::format("'{}' is no shard", options.shard), remedy);
     campaign.shard = shard - 1;
     campaign.shards = shards;
@@ -80,8 +73,9 @@ CampaignOptions campaign_options(const FuzzOptions& options) {
   return campaign;
 }
 
-// Exit status of a campaign as it is written down; says why.
-int print_conclusion(const json& document, bool whole) {
+}  // namespace
+
+int print_conclusion(const json& document, const CampaignConclusion& conclusion) {
   for (const CoverageClass& each : kCoverageClasses) {
     if (least_count(each, 1, document.at("dynamics").get<bool>()) == 0) continue;
     fmt::print("  {:<28} {:>9}\n", each.name, document.at("coverage").at(each.name).get<int64_t>());
@@ -107,7 +101,6 @@ int print_conclusion(const json& document, bool whole) {
         of_bound.is_number() ? fmt::format("{:.2g}", of_bound.get<double>()) : "-",
         undecided > 0 ? fmt::format("  {} of {} undecided", undecided, property.at("checked").get<int64_t>()) : "");
   }
-  const CampaignConclusion conclusion = conclude(document, whole);
   if (conclusion.holds()) {
     fmt::print("all hold\n");
   } else {
@@ -116,12 +109,31 @@ int print_conclusion(const json& document, bool whole) {
   return conclusion.holds() ? 0 : 1;
 }
 
+namespace {
+
+// What a campaign came to goes into files first: these are kept even if standard output cannot be written.
+int conclude_campaign(const FuzzOptions& options, const json& document, bool whole) {
+  const CampaignConclusion conclusion = conclude(document, whole);
+  const Judging judging{"cutproof fuzz", "cutproof.fuzz." + document.at("backend").get<std::string>(), options.again};
+  write_document(options.json, document);
+  write_junit(options.junit, judging, document.at("seconds").get<double>(),
+              cases_of_campaign(document, conclusion.failure, judging));
+  const int status = print_conclusion(document, conclusion);
+  print_annotations(failures_of_campaign(document, conclusion.failure, judging));
+  return status;
+}
+
 int merge(const FuzzOptions& options) {
+  require_writable(options.json);
+  require_writable(options.junit);
   const json whole = merge_shards(options.merge);
-  write_document(options.json, whole);
+  if (!whole.at("complete").get<bool>()) {
+    fmt::print("INCOMPLETE: missing {}; run each of these again with --shard i/{}\n", missing_shards(whole),
+               whole.at("merged_shards").get<int64_t>());
+  }
   print_filled("{merged_shards} shards, backend {backend}, seed {seed}\n", whole);
   for (const json& violation : whole.at("violations")) print_filled("case {index}: {text}\n", violation);
-  return print_conclusion(whole, true);
+  return conclude_campaign(options, whole, true);
 }
 
 // Of a plugin its file without folders.
@@ -178,8 +190,9 @@ Campaign run(const FuzzOptions& options, const CampaignOptions& asked) {
   });
 }
 
-int fuzz(const FuzzOptions& options) {
-  if (!options.merge.empty()) return merge(options);
+}  // namespace
+
+nlohmann::json fuzz_campaign(const FuzzOptions& options) {
   const CampaignOptions asked = campaign_options(options);
   // What cannot be is said before anything is done.
   static_cast<void>(harness::make_backend(harness::choice_for_load(options.backend, 0)));
@@ -187,6 +200,7 @@ int fuzz(const FuzzOptions& options) {
     refuse("--save", fmt::format("'{}' is not a folder", options.save), "create it first");
   }
   require_writable(options.json);
+  require_writable(options.junit);
 
   fmt::print("fuzzing backend {}: {}{} from seed {}{}, {} bodies a load, {} threads\n", options.backend.name,
              options.campaign.seconds ? fmt::format("{:g} s of cases", *options.campaign.seconds)
@@ -202,9 +216,15 @@ int fuzz(const FuzzOptions& options) {
     violations.push_back(violation_json(
         violation, keep(violation, options, harness::choice_for_load(options.backend, load), asked.batch)));
   }
-  const json document = campaign_document(options.backend, asked, campaign, violations);
-  write_document(options.json, document);
-  return print_conclusion(document, asked.shards == 1);
+  return campaign_document(options.backend, asked, campaign, violations);
+}
+
+namespace {
+
+int fuzz(const FuzzOptions& options) {
+  if (!options.merge.empty()) return merge(options);
+  const json document = fuzz_campaign(options);
+  return conclude_campaign(options, document, document.at("shards") == 1);
 }
 
 }  // namespace
@@ -233,9 +253,15 @@ void add_fuzz(CLI::App& program, Work& work) {
       ->check(CLI::NonNegativeNumber);
   command->add_option("--save", options->save, "folder for counterexamples")->capture_default_str()->type_name("DIR");
   add_json(*command, options->json, "write counts, classes and violations");
-  command->add_option("--merge", options->merge, "put the results of all shards together; runs nothing")
+  add_junit(*command, options->junit);
+  command
+      ->add_option("--merge", options->merge,
+                   "put the results of all shards together, and name those that are missing; runs nothing")
       ->type_name("JSON...");
-  command->callback([options, &work] { work = [options] { return fuzz(*options); }; });
+  command->callback([options, command, &work] {
+    options->again = as_given(*command);
+    work = [options] { return fuzz(*options); };
+  });
 }
 
 }  // namespace cutproof::cli

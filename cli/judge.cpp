@@ -1,15 +1,19 @@
 // `cutproof judge`: somebody's own kernels, from a shared library.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
+#include "cli/findings.h"
+#include "cli/fuzz.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/terminal.h"
 #include "guests/campaign.h"
+#include "guests/plugin_backend.h"
 #include "model/io/atomic_file.h"
 
 namespace cutproof::cli {
@@ -26,9 +30,17 @@ struct JudgeOptions {
   int64_t cases = 0;        // 0: of each operation what it takes a second or a few for
   bool keep_going = false;  // beyond ten questions that were not answered
   std::string save = ".";
-  std::string json, replay;
+  std::string json, junit, replay;
+  std::string again;          // the command line
   std::vector<int> attached;  // open files of a guest that runs already: its channel, its memory
 };
+
+// Not one of operations(): random dissections, of which the plugin runs what it can.
+constexpr const char* kOnStages = "stages";
+
+bool has_stages(const PluginInfo& plugin) { return plugin.offers(wire::load) && plugin.offers(wire::run); }
+
+constexpr int64_t kUsualDissections = 500;
 
 // Operations by what one case costs.
 int64_t usual_cases(const OperationDescription& operation) {
@@ -45,16 +57,18 @@ std::vector<const OperationDescription*> asked_operations(const JudgeOptions& op
     all.push_back(&each);
   }
   if (options.operations.empty()) {
-    if (all.empty()) {
+    if (all.empty() && !has_stages(plugin)) {
       throw InputError(options.guest.library, "", "it has no operation that can be judged by itself",
-                       "set one of its members: " + known);
+                       "set one of its members: " + known + ", or load and run");
     }
     return all;
   }
   std::vector<const OperationDescription*> asked;
   for (const std::string& name : options.operations) {
+    if (name == kOnStages && has_stages(plugin)) continue;
     const OperationDescription* const found = find_operation(name);
-    if (found == nullptr) refuse("OPS", fmt::format("there is no operation '{}'", name), "use some of " + known);
+    if (found == nullptr)
+      refuse("OPS", fmt::format("there is no operation '{}'", name), "use some of " + known + ", stages");
     if (!plugin.offers(found->number)) {
       throw InputError(options.guest.library, name, "the plugin does not have this operation",
                        offered.empty() ? "it has none" : "it has " + offered);
@@ -89,6 +103,15 @@ void print(const KernelCampaign& campaign) {
   if (campaign.questions == campaign.refused) fmt::print("FAILS: nothing was judged\n");
 }
 
+constexpr const char* kClass = "cutproof.judge";
+
+std::string replay_command(const JudgeOptions& options, const std::string& file, const std::string& operation) {
+  if (!options.attached.empty()) return fmt::format("cutproof.replay(\"{}\", {}=...)", file, operation);
+  return fmt::format("cutproof judge {}{} --case {}", quoted(options.guest.library),
+                     options.guest.parameters.empty() ? "" : " --parameters " + quoted(options.guest.parameters),
+                     quoted(file));
+}
+
 // Saves what was found and says how to see it again.
 std::string keep(const JudgeOptions& options, const Guest& guest, const KernelCampaign& campaign,
                  const KernelFailure& failure) {
@@ -113,12 +136,76 @@ std::string keep(const JudgeOptions& options, const Guest& guest, const KernelCa
              failure.simplest.kind, shortened(failure.verdict.witness.text));
   fmt::print("  simplified to {}: {}\n", campaign.operation->size_of(failure.simplest),
              shortened(failure.of_simplest.witness.text));
-  if (options.attached.empty()) {
-    fmt::print("  saved; to see it again: cutproof judge {} --case {}\n", options.guest.library, file);
-  } else {
-    fmt::print("  saved; to see it again: cutproof.replay(\"{}\", {}=...)\n", file, saved.operation);
-  }
+  fmt::print("  saved; to see it again: {}\n", replay_command(options, file, saved.operation));
   return file;
+}
+
+// A case for each property of an operation that was judged, and for each that was not promised.
+void add_cases(const json& result, const JudgeOptions& options, std::vector<io::JunitCase>& cases,
+               std::vector<Failure>& failures) {
+  const std::string operation = result.at("operation");
+  const auto add = [&](const std::string& property) -> io::JunitCase& {
+    return cases.emplace_back(io::JunitCase{property, std::string(kClass) + "." + operation});
+  };
+  for (const json& property : result.at("properties")) {
+    io::JunitCase& each = add(property.at("property"));
+    if (property.at("property") == kAnswersProperty) each.seconds = result.at("seconds");
+    if (property.at("judged") == 0) {
+      each.outcome = io::JunitOutcome::skipped;
+      each.message = "there was nothing to judge";
+    }
+    for (const json& failure : result.at("failures")) {
+      if (failure.at("property") != property.at("property")) continue;
+      const std::string again = failure.at("again");
+      each.outcome = io::JunitOutcome::failed;
+      each.message = failure.at("text");
+      each.text = fmt::format("question {} ({}): {}\nsimplified: {}\nto see it again: {}",
+                              failure.at("index").get<int64_t>(), failure.at("kind").get<std::string>(), each.message,
+                              failure.at("simplified").get<std::string>(), again);
+      failures.push_back({operation + ": " + each.name, each.message, again});
+    }
+  }
+  for (const json& property : result.at("unpromised")) {
+    io::JunitCase& each = add(property.at("property"));
+    each.outcome = io::JunitOutcome::skipped;
+    each.message = "not promised, not judged";
+  }
+  if (result.at("questions") == result.at("refused")) {
+    io::JunitCase& each = add("something was judged");
+    each.outcome = io::JunitOutcome::failed;
+    each.message = fmt::format("all {} questions were refused", result.at("refused").get<int64_t>());
+    failures.push_back({operation, each.message, options.again});
+  }
+}
+
+bool steps(const PluginInfo& plugin) {
+  for (const Stage last : kStages) {
+    if (plugin.can_run({Stage::step, last})) return true;
+  }
+  return false;
+}
+
+// Random dissections by the stages that the plugin has.
+bool judge_stages(const JudgeOptions& options, bool dynamics, json& document, std::vector<io::JunitCase>& cases,
+                  std::vector<Failure>& failures) {
+  FuzzOptions fuzz;
+  fuzz.backend.name = std::string(kPluginPrefix) + options.guest.library +
+                      (options.guest.parameters.empty() ? "" : "," + options.guest.parameters);
+  fuzz.campaign.seed = options.campaign.seed;
+  fuzz.campaign.seconds = options.campaign.seconds;
+  fuzz.campaign.dynamics = dynamics;
+  fuzz.campaign.keep_going = options.keep_going;
+  fuzz.cases = options.cases > 0 ? options.cases : kUsualDissections;
+  fuzz.simplify = options.campaign.simplify;
+  fuzz.save = options.save;
+  fuzz.again = options.again;
+  const json result = fuzz_campaign(fuzz);
+  const property_tests::CampaignConclusion conclusion = property_tests::conclude(result, true);
+  const Judging judging{"cutproof judge", std::string(kClass) + "." + kOnStages, options.again};
+  for (io::JunitCase& each : cases_of_campaign(result, conclusion.failure, judging)) cases.push_back(std::move(each));
+  for (Failure& each : failures_of_campaign(result, conclusion.failure, judging)) failures.push_back(std::move(each));
+  document[dynamics ? "moving_dissections" : "dissections"] = result;
+  return print_conclusion(result, conclusion) == 0;
 }
 
 int replay(const JudgeOptions& options, Guest& guest) {
@@ -150,6 +237,7 @@ int judge(JudgeOptions options) {
     refuse("--save", fmt::format("'{}' is not a folder", options.save), "create it first");
   }
   require_writable(options.json);
+  require_writable(options.junit);
   if (!options.attached.empty()) {
     if (options.attached.size() != 2) {
       refuse("--attached", fmt::format("{} numbers", options.attached.size()), "give those of a socket and of memory");
@@ -169,6 +257,8 @@ int judge(JudgeOptions options) {
   fmt::print("{}, seed {}\n", title(guest.plugin(), options.guest.library), options.campaign.seed);
   flush_output();
   bool holds = true;
+  std::vector<io::JunitCase> junit;
+  std::vector<Failure> failures;
   json document = {{"verb", "judge"},
                    {"version", kVersion},
                    {"plugin",
@@ -195,7 +285,9 @@ int judge(JudgeOptions options) {
     json result = guests::to_json(campaign);
     for (std::size_t k = 0; k < campaign.failures.size(); ++k) {
       result["failures"][k]["file"] = keep(options, guest, campaign, campaign.failures[k]);
+      result["failures"][k]["again"] = replay_command(options, result["failures"][k]["file"], result["operation"]);
     }
+    add_cases(result, options, junit, failures);
     if (campaign.ended) {
       fmt::print("  nothing more was asked: the guest is gone\n");
     } else if (campaign.gave_up) {
@@ -206,9 +298,21 @@ int judge(JudgeOptions options) {
     flush_output();
     if (campaign.ended) break;
   }
+  const auto& names = options.operations;
+  if (has_stages(guest.plugin()) &&
+      (names.empty() || std::find(names.begin(), names.end(), kOnStages) != names.end())) {
+    for (const bool dynamics : {false, true}) {
+      if (dynamics && !steps(guest.plugin())) continue;
+      holds = judge_stages(options, dynamics, document, junit, failures) && holds;
+    }
+  }
   document["holds"] = holds;
   write_document(options.json, document);
+  double seconds = 0;
+  for (const io::JunitCase& each : junit) seconds += each.seconds;
+  write_junit(options.junit, {"cutproof judge", kClass, options.again}, seconds, std::move(junit));
   fmt::print("{}\n", holds ? "all hold" : "FAILS");
+  print_annotations(failures);
   return holds ? 0 : 1;
 }
 
@@ -219,7 +323,10 @@ void add_judge(CLI::App& program, Work& work) {
   CLI::App* const command = program.add_subcommand("judge", "your own kernels, from a shared library");
   command->add_option("plugin", options->guest.library, "a shared library that includes cutproof/plugin.h")
       ->type_name("FILE.so");
-  command->add_option("operations", options->operations, "which of its operations (default: all)")->type_name("OPS");
+  command
+      ->add_option("operations", options->operations,
+                   "which of its operations: rotations, components, surface, clusters, stages (default: all)")
+      ->type_name("OPS");
   add_count(*command, "--cases", options->cases, "matrices or bodies for each operation (default: 100000 or 2000)",
             CLI::PositiveNumber);
   command->add_option("--seconds", options->campaign.seconds, "for how long, for each operation")
@@ -245,8 +352,12 @@ void add_judge(CLI::App& program, Work& work) {
       ->allow_extra_args(false)  // what follows are operations
       ->type_name("SOCKET,MEMORY");
   add_json(*command, options->json, "write counts and failures");
+  add_junit(*command, options->junit);
   command->add_option("--case", options->replay, "one saved question again, and nothing else")->type_name("CASE");
-  command->callback([options, &work] { work = [options] { return judge(*options); }; });
+  command->callback([options, command, &work] {
+    options->again = as_given(*command);
+    work = [options] { return judge(*options); };
+  });
 }
 
 }  // namespace cutproof::cli

@@ -65,6 +65,35 @@ harness::Depth depth_asked(const std::string& asked) {
   return *depth;
 }
 
+void add_junit(CLI::App& command, std::string& path) {
+  command.add_option("--junit", path, "write each property as a test case (JUnit XML)")->type_name("F");
+}
+
+std::string quoted(const std::string& word) {
+  constexpr const char* kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_./:=,+@%-";
+  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+  std::string result = "'";
+  for (const char c : word) result += c == '\'' ? "'\\''" : std::string(1, c);
+  return result + "'";
+}
+
+std::string as_given(const CLI::App& command) {
+  // Words without an option stand first: behind an option of as many values as one likes they would be its own.
+  std::string words, options;
+  for (const CLI::Option* const option : command.get_options()) {
+    const std::string name = option->get_name();
+    if (option->count() == 0 || name == "--json" || name == "--junit" || name == "--record") continue;
+    const bool is_word = option->get_lnames().empty() && option->get_snames().empty();
+    std::string& text = is_word ? words : options;
+    if (!is_word) text += " " + name;
+    if (option->get_expected_max() == 0) continue;  // a flag
+    for (const std::string& value : option->results()) {
+      if (!value.empty()) text += " " + quoted(value);
+    }
+  }
+  return "cutproof " + command.get_name() + words + options;
+}
+
 void add_json(CLI::App& command, std::string& path, const std::string& what) {
   command.add_option("--json", path, what)->type_name("F");
 }

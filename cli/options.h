@@ -47,6 +47,15 @@ CLI::Option* add_check_depth(CLI::App& command, std::string& asked, const std::s
 // Throws InputError if there is no depth of this name.
 harness::Depth depth_asked(const std::string& asked);
 
+// --junit F, for a verb that judges.
+void add_junit(CLI::App& command, std::string& path);
+
+// A word as a shell takes it.
+std::string quoted(const std::string& word);
+// The command line that names `command` as it was given, without what it writes (--json, --junit, --record): to be
+// given again. Requires that it has been parsed.
+std::string as_given(const CLI::App& command);
+
 void add_json(CLI::App& command, std::string& path, const std::string& what);
 
 }  // namespace cutproof::cli

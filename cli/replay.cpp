@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "cli/commands.h"
+#include "cli/findings.h"
 #include "cli/options.h"
 #include "model/io/atomic_file.h"
 #include "model/io/recording.h"
@@ -23,6 +24,7 @@ struct ReplayOptions {
   std::string counterexample;
   BackendChoice backend;  // without a name: the one on which it was found
   std::string record;
+  std::string again;  // the command line
 };
 
 BackendChoice choice_of(const ReplayOptions& options, const Counterexample& counterexample) {
@@ -55,10 +57,12 @@ int replay(const ReplayOptions& options) {
   }
   if (judgement.failure) {
     fmt::print("FAILS: {}\n", describe(*judgement.failure));
+    print_annotations(failures_of({*judgement.failure}, {.suite = {}, .class_name = {}, .again = options.again}));
     return 1;
   }
   if (judgement.verdicts == 0) {
     fmt::print("FAILS: nothing was judged\n");
+    print_annotations({{"enough was judged", "nothing was judged", options.again}});
     return 1;
   }
   fmt::print("holds: {} verdicts\n", judgement.verdicts);
@@ -77,7 +81,10 @@ void add_replay(CLI::App& program, Work& work) {
   add_backend(*command, options->backend, "backend under test (default: where it was found)");
   command->add_option("--record", options->record, "keep every frame, for `cutproof check` and ParaView")
       ->type_name("F");
-  command->callback([options, &work] { work = [options] { return replay(*options); }; });
+  command->callback([options, command, &work] {
+    options->again = as_given(*command);
+    work = [options] { return replay(*options); };
+  });
 }
 
 }  // namespace cutproof::cli

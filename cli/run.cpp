@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <map>
 #include <memory>
@@ -9,6 +10,7 @@
 #include "cli/against_report.h"
 #include "cli/commands.h"
 #include "cli/errors_report.h"
+#include "cli/findings.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/results.h"
@@ -41,7 +43,8 @@ struct RunOptions {
   std::string mode = "both";     // of the comparison: lockstep, free-running, both
   std::string errors;            // names of errors with commas between them, or "all"; empty: none
   std::string record;
-  std::string json;
+  std::string json, junit;
+  std::string again;  // the command line
 };
 
 constexpr const char* kNextSteps =
@@ -119,6 +122,19 @@ void print_summary(const RunResult& result) {
              result.clusters_at_start, clusters);
 }
 
+constexpr const char* kConservation = "conservation";
+constexpr const char* kNotConserved = "the body alone keeps its momentum or its energy less well than its bound says";
+
+io::JunitCase conservation_case(const harness::Errors& errors, const Judging& judging) {
+  io::JunitCase one{kConservation, judging.class_name};
+  if (!errors.holds()) {
+    one.outcome = io::JunitOutcome::failed;
+    one.message = kNotConserved;
+    one.text = fmt::format("{}\nsee it again: {}\n", kNotConserved, judging.again);
+  }
+  return one;
+}
+
 // The comparison goes stage by stage.
 void compare(Against& against, const Setup& setup, const harness::Moment& moment, const std::array<bool, 6>& ran) {
   const auto due = harness::due_stages(setup, *moment.before, moment.span, *moment.after);
@@ -130,6 +146,7 @@ void compare(Against& against, const Setup& setup, const harness::Moment& moment
 }
 
 int run(const RunOptions& options) {
+  const auto begin = std::chrono::steady_clock::now();
   std::optional<harness::Depth> depth;
   if (!options.check.empty()) depth = depth_asked(options.check);
   std::optional<AgainstMode> mode;
@@ -144,6 +161,10 @@ int run(const RunOptions& options) {
   const Scene scene = io::read_scene(options.scene);
   fixtures::Built built = fixtures::build(scene, options.scene, build_options);
   require_writable(options.json);
+  require_writable(options.junit);
+  if (!options.junit.empty() && !depth && !mode) {
+    refuse("--junit", "nothing is judged, so there are no test cases", "add --check or --against");
+  }
   std::optional<io::Recorder> recorder;
   if (!options.record.empty())
     recorder.emplace(options.record, built.setup, io::write_scene(scene), options.backend.name);
@@ -213,6 +234,16 @@ int run(const RunOptions& options) {
     write_document(options.json, document);
   }
 
+  const Judging judging{"cutproof run", "cutproof.run." + scene.name, options.again};
+  const std::vector<Verdict> beside = against ? against->verdicts() : std::vector<Verdict>();
+  if (!options.junit.empty()) {
+    std::vector<io::JunitCase> cases = judge ? cases_of(*judge, judging) : cases_of(broken, judging);
+    for (io::JunitCase& one : cases_of(beside, judging)) cases.push_back(std::move(one));
+    if (errors && errors->conservation()) cases.push_back(conservation_case(*errors, judging));
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+    write_junit(options.junit, judging, seconds.count(), std::move(cases));
+  }
+
   print_summary(result);
   if (judge) print_verdicts(*judge);
   if (against) print_against(*against);
@@ -228,6 +259,13 @@ int run(const RunOptions& options) {
       fmt::print("FAILS: {}: {} in frame {}\n", verdict.property, name_of(verdict.stage), verdict.frame);
     }
   }
+  std::vector<Failure> failures =
+      judge ? failures_of(judge->verdicts(), judging,
+                          [&](const Verdict& verdict) { return judge->is_expected_failure(verdict); })
+            : failures_of(broken, judging);
+  for (Failure& failure : failures_of(beside, judging)) failures.push_back(std::move(failure));
+  if (errors && !errors->holds()) failures.push_back({kConservation, kNotConserved, judging.again});
+  print_annotations(failures);
   return broken.empty() && (!judge || judge->holds()) && (!against || against->holds()) && (!errors || errors->holds())
              ? 0
              : 1;
@@ -269,7 +307,9 @@ void add_run(CLI::App& program, Work& work) {
   command->add_option("--record", options->record, "keep every frame, for `cutproof check` and ParaView")
       ->type_name("F");
   add_json(*command, options->json, "write verdicts, stage times and counts");
-  command->callback([options, &work] {
+  add_junit(*command, options->junit);
+  command->callback([options, command, &work] {
+    options->again = as_given(*command);
     // Whoever writes --check before the scene means no depth by it.
     if (options->scene.empty() && !options->check.empty() && !harness::depth_named(options->check)) {
       options->scene = std::exchange(options->check, std::string(name_of(harness::Depth::motion)));

@@ -6,6 +6,7 @@ include(CMakePackageConfigHelpers)
 # NAME TARGET [FOLDER]: a component, its library, and the folder whose headers are installed with it (once for each
 # folder). A component comes after those that it links.
 set(cutproof_components
+  "plugin cutproof_plugin"
   "model cutproof_model model"
   "io cutproof_io"
   "reference cutproof_reference reference_cpu"
@@ -23,6 +24,7 @@ set(needs_fmt::fmt "find_dependency(fmt)")
 set(needs_Threads::Threads "find_dependency(Threads)")
 set(needs_Boost::context "find_dependency(Boost 1.74 COMPONENTS context)")
 set(needs_hdf5::hdf5 "find_dependency(HDF5 COMPONENTS C)")
+set(needs_Libzip::zip "include(\${CMAKE_CURRENT_LIST_DIR}/Libzip.cmake)")
 set(needs_CGAL::CGAL "find_dependency(CGAL 5.5)")
 foreach(part cholmod spqr btf)
   set(needs_SuiteSparse::${part} "include(\${CMAKE_CURRENT_LIST_DIR}/SuiteSparse.cmake)")
@@ -89,8 +91,17 @@ if(CUTPROOF_INSTALL)
     ${CMAKE_CURRENT_BINARY_DIR}/package/cutproof-config.cmake
     ${CMAKE_CURRENT_BINARY_DIR}/package/cutproof-config-version.cmake
     ${CMAKE_CURRENT_LIST_DIR}/SuiteSparse.cmake
+    ${CMAKE_CURRENT_LIST_DIR}/Libzip.cmake
+    ${CMAKE_CURRENT_LIST_DIR}/CutproofTest.cmake
     DESTINATION ${package_folder})
   if(CUTPROOF_PROGRAM)
     install(TARGETS cutproof)
+    # The program reads no file by itself: scenes are for people to begin with.
+    install(DIRECTORY ${PROJECT_SOURCE_DIR}/fixtures/scenes DESTINATION ${CMAKE_INSTALL_DATADIR}/cutproof
+      FILES_MATCHING PATTERN "*.json")
+    install(DIRECTORY ${PROJECT_SOURCE_DIR}/ci/cluster DESTINATION ${CMAKE_INSTALL_DATADIR}/cutproof
+      USE_SOURCE_PERMISSIONS)
+    install(FILES ${CMAKE_CURRENT_LIST_DIR}/copyright ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md
+      ${PROJECT_SOURCE_DIR}/CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
   endif()
 endif()

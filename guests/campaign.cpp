@@ -272,8 +272,7 @@ SavedQuestion question_from_json(const std::string& text, const std::string& fil
     saved.seed = j.at("seed");
     saved.index = j.at("index");
     // In the order in which the operation gives them, each of its type and as many columns.
-    const Question model = operation->draw(1, 0, saved.precision);
-    Question grid_model = model;
+    Question grid_model = operation->draw(1, 0, saved.precision);
     for (int64_t k = 0; k < static_cast<int64_t>(operation->kinds().size()); ++k) {
       Question other = operation->draw(1, k, saved.precision);
       if (other.given.size() > grid_model.given.size()) grid_model = std::move(other);
@@ -291,10 +290,12 @@ SavedQuestion question_from_json(const std::string& text, const std::string& fil
     };
     take("given", grid_model.given, saved.question.given);
     take("known", grid_model.known, saved.question.known);
-    if (saved.question.given.size() < model.given.size() - 2 ||
-        saved.question.known.size() != grid_model.known.size()) {
-      throw refuse("an array is missing");
+    for (const Array& array : grid_model.given) {
+      if (array.name == "node" || array.name == "nodes" || find_array(saved.question.given, array.name)) continue;
+      throw refuse("'" + array.name + "' is missing");
     }
+    if (saved.question.known.size() != grid_model.known.size()) throw refuse("what the judge has to know is missing");
+    if (const std::string problem = operation->problem(saved.question); !problem.empty()) throw refuse(problem);
   } catch (const json::exception& error) {
     throw refuse(error.what());
   } catch (const std::invalid_argument& error) {

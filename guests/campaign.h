@@ -19,9 +19,9 @@ inline constexpr const char* kAnswersProperty = "answers";
 
 struct KernelCampaignOptions {
   uint64_t seed = 1;
-  int64_t cases = 1000;           // matrices, or bodies; at least one question of each kind
-  std::optional<double> seconds;  // begins no further question after so long
-  double simplify = 20;           // [s] for each failure that is kept
+  int64_t cases = 1000;                // matrices, or bodies; at least one question of each kind
+  std::optional<double> seconds = {};  // begins no further question after so long
+  double simplify = 20;                // [s] for each failure that is kept
   // After so many questions that were not answered at all the campaign ends; 0: never.
   int64_t most_lost = 10;
 };

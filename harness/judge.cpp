@@ -175,9 +175,9 @@ void Judge::see(const Moment& moment) {
   if (ends) ++frame_;
 }
 
-void Judge::see_stage(Stage stage, const State& before, const State& after) {
+void Judge::see_stage(Stage stage, const State& before, const State& after, bool rotations_are_known) {
   if (stage == Stage::expand && before.clusters.members != after.clusters.members) has_expanded_ = true;
-  std::vector<Verdict> found = judge_.stage(stage, before, after);
+  std::vector<Verdict> found = judge_.stage(stage, before, after, rotations_are_known);
   if (stage == Stage::step) return take(std::move(found), stage, after);
   const bool cut = !after.removed.empty() || !after.debris.empty();
   const bool thorough = thorough_ == Thorough::always ||
@@ -207,7 +207,11 @@ void Judge::see_several(const Moment& moment, const std::array<bool, 6>& seen) {
     see_stage(stage, *before, *between.back());
     before = between.back().get();
   };
-  if (sees(Stage::step)) follow(Stage::step, after_step(*before, end));
+  if (sees(Stage::step)) {
+    between.push_back(std::make_shared<State>(after_step(*before, end)));
+    see_stage(Stage::step, *before, *between.back(), same_sets(before->clusters, end.clusters));
+    before = between.back().get();
+  }
   if (sees(Stage::detect) && (cuts || sees(Stage::skin))) follow(Stage::detect, after_detection(*before, end));
   if (sees(Stage::detect) && !cuts && !sees(Stage::skin)) return see_stage(Stage::detect, *before, end);
   if (cuts) {

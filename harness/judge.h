@@ -52,7 +52,8 @@ class Judge {
   int32_t inner_shells();
 
  private:
-  void see_stage(Stage stage, const State& before, const State& after);
+  // `rotations_are_known`: as oracles::StageRun has it.
+  void see_stage(Stage stage, const State& before, const State& after, bool rotations_are_known = true);
   void see_several(const Moment& moment, const std::array<bool, 6>& due);
   void take(std::vector<Verdict> found, Stage stage, const State& state);
   void leave_out(const Verdict& verdict);

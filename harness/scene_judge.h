@@ -33,6 +33,7 @@ class SceneJudge {
   const PropertySummaries& summaries() const { return summaries_; }
   bool holds() const;
   bool is_expected_failure(const Verdict& verdict) const { return expectations_.is_expected_failure(verdict); }
+  const std::vector<Judge::Unpromised>& unpromised() const { return judge_.unpromised(); }
   // What a reader of the verdicts has to know, one sentence each: that the scene expects nothing, what was not judged,
   // which properties were not promised.
   std::vector<std::string> notes() const;

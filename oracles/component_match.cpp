@@ -74,6 +74,15 @@ void check_skin_match(Judged& judged, Verdict& verdict) {
               first, owner, components.label[at(first)], components.label[at(owner)]);
     }
   }
+  // A shell that is turned inside out would be taken for one around a cavity, and one around a cavity for an outer one.
+  for (int32_t shell = 0; shell < shell_count; ++shell) {
+    const int32_t v = shells.farthest[at(shell)];
+    const bool around_tissue = kDirections[skin.direction[at(v)]][0] > 0;
+    if (around_tissue == (shells.volume[at(shell)] > 0)) continue;
+    violate(verdict, {{}, {skin.owner[at(v)]}},
+            "the shell {} particle {} is inside out: its triangles turn clockwise, seen from outside the tissue",
+            around_tissue ? "around" : "of a cavity beside", skin.owner[at(v)]);
+  }
   // Exactly one outer shell for each component of the tissue.
   std::vector<int32_t> outer_of(at(components.count), -1);
   int32_t inner = 0;

@@ -27,8 +27,9 @@ struct Judge::Memory {
   // Makes `state` the last one, and forgets what rests on parts that have changed.
   void look_at(const State& state) {
     if (&state == last) return;
-    // Bounds follow from the precision, which is no part.
-    const bool comparable = last != nullptr && last->precision == state.precision;
+    // Bounds follow from the rounding, which is no part.
+    const bool comparable =
+        last != nullptr && last->precision == state.precision && last->place_rounding == state.place_rounding;
     const unsigned changed = comparable ? parts_that_differ(*last, state) : kAll;
     std::erase_if(held, [&](const Held& h) { return (h.property->rests_on & changed) != 0; });
     const bool last_is_good = last != nullptr && form.holds;
@@ -81,7 +82,7 @@ std::vector<Verdict> Judge::state(const State& state, Stage after, bool thorough
   return verdicts;
 }
 
-std::vector<Verdict> Judge::stage(Stage stage, const State& before, const State& after) {
+std::vector<Verdict> Judge::stage(Stage stage, const State& before, const State& after, bool rotations_are_known) {
   Memory& m = *memory_;
   m.look_at(before);
   const Verdict form_before = m.form;
@@ -90,7 +91,7 @@ std::vector<Verdict> Judge::stage(Stage stage, const State& before, const State&
   m.for_each_property([&](const Property& property) {
     if (!property.promised_by.contains(stage)) return;
     if (property.check_stage != nullptr) {
-      verdicts.push_back(ask(property, {m.setup, stage, before, after}, form_before, m.form));
+      verdicts.push_back(ask(property, {m.setup, stage, before, after, rotations_are_known}, form_before, m.form));
     } else if (property.due.holds(m.setup, after, stage)) {
       verdicts.push_back(m.answer(property));
     }

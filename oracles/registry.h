@@ -19,6 +19,8 @@ struct StageRun {
   Stage stage;
   const State& before;
   const State& after;
+  // Of a step: false where `after` was made from a later state, in which clusters have changed.
+  bool rotations_are_known = true;
 };
 
 // What a check costs beside a frame of the reference: less, or more.
@@ -56,6 +58,10 @@ const PropertyList& core_properties();
 
 // The motion, computed again: what a step of the reference costs, and a few times that where rounding decides much.
 const PropertyList& motion_properties();
+
+// Of a state that stands for all that came before it: its list of removed particles names every one that was ever taken
+// out, where a state of a run names those of its frame. Who judges such a state adds this list.
+const PropertyList& history_properties();
 
 // Throws std::out_of_range if the list has no property of this name.
 const Property& property_named(const PropertyList& list, std::string_view name);

@@ -61,6 +61,12 @@ Shells shells_of(const Skin& skin, const std::vector<Vec3>& points) {
     shells.of_vertex[v] = root == v ? count++ : shells.of_vertex[root];
   }
   shells.volume.assign(at(count), 0.0);
+  shells.farthest.assign(at(count), -1);
+  for (std::size_t v = 0; v < used.size(); ++v) {
+    if (used[v] == 0) continue;
+    int32_t& farthest = shells.farthest[at(shells.of_vertex[v])];
+    if (farthest < 0 || points[v].x > points[at(farthest)].x) farthest = static_cast<int32_t>(v);
+  }
   for (const auto& t : skin.triangles) {
     shells.volume[at(shells.of_vertex[at(t[0])])] += dot(points[at(t[0])], cross(points[at(t[1])], points[at(t[2])]));
   }
@@ -95,7 +101,9 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
       radius = std::max(radius, norm(weighted.position[at(i)] - means[at(c)].rest));
     }
     const double sum = sum_rounds(static_cast<double>(members.size())) * u * spread;
-    center_rounding.push_back(4 * u * u * dot(mean, mean) + 3 * sum * sum + 3 * u * u * radius * radius);
+    const double absolute = absolute_mean_rounding(state, static_cast<double>(members.size()));
+    center_rounding.push_back(4 * u * u * dot(mean, mean) + 3 * sum * sum + 3 * u * u * radius * radius +
+                              2 * absolute * absolute);  // now and at rest
   }
   std::vector<VertexPlace> places(skin.owner.size());
   for (std::size_t v = 0; v < places.size(); ++v) {
@@ -115,8 +123,8 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
     // Partial sums of terms that are as large as their mean: u² q² (1² + … + n²) / 3n².
     squares += count * u * u * terms * terms / 9;
     const Vec3 place = sum / count, kept = state.precision == Precision::binary32 ? place - rest : place;
-    const double in_doubles = 4 * kUnitRoundoff * norm(place);
-    squares = squares / (count * count) + u * u * dot(kept, kept) + in_doubles * in_doubles;
+    const double in_doubles = 4 * kUnitRoundoff * norm(place), absolute = absolute_mean_rounding(state, count);
+    squares = squares / (count * count) + u * u * dot(kept, kept) + in_doubles * in_doubles + absolute * absolute;
     places[v] = {place, kDeviations * std::sqrt(squares)};
   }
   return places;

@@ -10,6 +10,10 @@ namespace cutproof::oracles {
 struct Shells {
   std::vector<int32_t> of_vertex;  // [v] shell, -1 if no triangle uses the vertex
   std::vector<double> volume;      // [shells] six times [m³]
+  // [shells] its vertex that lies farthest along x, at rest: on an edge along x, because those on other edges lie in
+  // planes of nodes, of which the last one has tissue, or emptiness, half an edge beyond. Tissue lies before it where
+  // the shell goes around tissue, and behind it where it goes around a cavity, whatever way the triangles turn.
+  std::vector<int32_t> farthest;
 };
 // `points`: where the vertices are [v]. Requires triangles to name vertices that exist.
 Shells shells_of(const Skin& skin, const std::vector<Vec3>& points);

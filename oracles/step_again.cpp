@@ -8,7 +8,7 @@
 
 namespace cutproof::oracles {
 
-StepAgain step_again(const Setup& setup, const State& before, const State& after) {
+StepAgain step_again(const Setup& setup, const State& before, const State& after, Rotations rotations) {
   Verdict verdict = start_verdict(kAdmissibleStep, after, "h", kAdmissibleStepSource);
   const auto done = [&] { return StepAgain{conclude(std::move(verdict), kNoStep)}; };
   const Clusters &was = before.clusters, &is = after.clusters;
@@ -26,7 +26,7 @@ StepAgain step_again(const Setup& setup, const State& before, const State& after
     return done();
   }
   StepAgain again;
-  again.step = nearest_admissible_step(setup, before, after);
+  again.step = nearest_admissible_step(setup, before, after, rotations);
   const AdmissibleStep& step = *again.step;
   verdict.measured = step.measured;
   verdict.bound = step.bound;
@@ -50,7 +50,8 @@ StepAgain step_again(const Setup& setup, const State& before, const State& after
 }
 
 void check_admissible_step(const StageRun& run, Verdict& verdict) {
-  verdict = step_again(run.setup, run.before, run.after).verdict;
+  const Rotations rotations = run.rotations_are_known ? Rotations::stated : Rotations::unknown;
+  verdict = step_again(run.setup, run.before, run.after, rotations).verdict;
 }
 
 }  // namespace cutproof::oracles

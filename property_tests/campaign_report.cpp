@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <set>
+#include <iterator>
+#include <map>
+#include <utility>
 
 #include "model/error.h"
 #include "model/io/atomic_file.h"
@@ -28,6 +30,25 @@ constexpr double kMostUndecided = 0.01;
 
 constexpr const char* kRemedy = "give the results (--json) of all shards of one campaign, each once";
 
+// What makes two results shards of one campaign: what decides which cases there are, what runs them, and what judges.
+// Threads are the machine's business: no case depends on them.
+constexpr const char* kOfTheCampaign[] = {"version",  "commit",        "backend",     "split",         "rotation",
+                                          "schedule", "schedule_seed", "seed",        "sizes",         "dynamics",
+                                          "batch",    "keep_going",    "cases_asked", "seconds_asked", "shards"};
+
+// By stage and name: the order in which threads, or shards, come upon them says nothing.
+void sort_properties(json& properties) {
+  const auto key = [](const json& one) {
+    const auto stage = std::find(std::begin(kStageNames), std::end(kStageNames), one.at("stage").get<std::string>());
+    return std::pair(stage - std::begin(kStageNames), one.at("property").get<std::string>());
+  };
+  std::sort(properties.begin(), properties.end(), [&](const json& a, const json& b) { return key(a) < key(b); });
+}
+
+double mean(int64_t sum, int64_t count) {
+  return count > 0 ? static_cast<double>(sum) / static_cast<double>(count) : 0.0;
+}
+
 // `more` is added to `sum`: a number, or an object of numbers.
 void add(json& sum, const json& more) {
   if (sum.is_object()) {
@@ -39,25 +60,23 @@ void add(json& sum, const json& more) {
   }
 }
 
-// `part` is added to `whole`; `first`: the file that `whole` began with.
-void add_shard(json& whole, const json& part, const std::string& file, const std::string& first) {
-  for (const char* field : {"version", "backend", "split", "seed", "sizes", "dynamics", "shards", "cases_asked",
-                            "seconds_asked", "commit"}) {
+// `first`: the file that `whole` began with.
+void require_same_campaign(const json& whole, const json& part, const std::string& file, const std::string& first) {
+  for (const char* field : kOfTheCampaign) {
     if (part.value(field, json()) == whole.value(field, json())) continue;
     throw InputError(
         file, field,
         fmt::format("{} here, {} in {}", part.value(field, json()).dump(), whole.value(field, json()).dump(), first),
         kRemedy);
   }
-  const auto cases_of = [](const json& document) { return document.at("cases").get<double>(); };
-  const auto particles_of = [&](const json& document) {
-    return document.at("mean_particles").get<double>() * cases_of(document);
-  };
-  const double particles = particles_of(whole) + particles_of(part);
-  for (const char* field : {"cases", "verdicts", "cases_per_second", "thread_seconds", "coverage"}) {
+}
+
+// `part` is added to `whole`.
+void add_shard(json& whole, const json& part) {
+  for (const char* field : {"cases", "refused", "verdicts", "particles", "cases_per_second", "thread_seconds", "coverage"}) {
     add(whole.at(field), part.at(field));
   }
-  whole["mean_particles"] = cases_of(whole) > 0 ? particles / cases_of(whole) : 0.0;
+  whole["mean_particles"] = mean(whole.at("particles").get<int64_t>(), whole.at("cases").get<int64_t>());
   // Shards run beside each other: together they take as long as the slowest, and do what all of them do.
   whole["seconds"] = std::max(whole.at("seconds").get<double>(), part.at("seconds").get<double>());
   if (whole.contains("steps_compared")) {
@@ -91,6 +110,7 @@ json violation_json(const Violation& violation, const std::string& file) {
           {"property", violation.verdict.property},
           {"stage", name_of(violation.verdict.stage)},
           {"text", describe(violation.verdict)},
+          {"witness", violation.verdict.witness.text},
           {"file", file}};
 }
 
@@ -105,18 +125,20 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
       {"version", CUTPROOF_VERSION},
       {"backend", backend.name},
       {"split", backend.split.empty() ? "blocks" : backend.split},
+      {"rotation", harness::rotation_of(backend)},
       {"seed", options.seed},
       {"sizes", {options.least_size, options.most_size}},
       {"dynamics", options.dynamics},
       {"batch", options.batch},
       {"threads", options.threads},
+      {"keep_going", options.keep_going},
       {"shard", options.shard + 1},
       {"shards", options.shards},
       {"cases", campaign.cases},
       {"refused", campaign.refused},
       {"verdicts", campaign.verdicts},
-      {"mean_particles",
-       campaign.cases == 0 ? 0.0 : static_cast<double>(campaign.particles) / static_cast<double>(campaign.cases)},
+      {"particles", campaign.particles},
+      {"mean_particles", mean(campaign.particles, campaign.cases)},
       {"seconds", campaign.seconds},
       {"cases_per_second", campaign.seconds > 0 ? static_cast<double>(campaign.cases) / campaign.seconds : 0.0},
       {"thread_seconds",
@@ -125,6 +147,11 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
       {"properties", campaign.properties.to_json()},
       {"violations", violations},
       {"holds", violations.empty() && campaign.verdicts > 0}};
+  sort_properties(document["properties"]);
+  if (described.takes_schedule) {
+    document["schedule"] = backend.schedule;
+    document["schedule_seed"] = backend.seed;
+  }
   if (options.dynamics && !described.is_the_reference) {
     const StepsCompared& compared = campaign.compared;
     document["steps_compared"] = {{"steps", compared.steps},
@@ -141,48 +168,134 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
   return document;
 }
 
+namespace {
+
+// Throws json::exception if something is missing, or of another kind, that merging or a conclusion reads.
+void require_fields(const json& part) {
+  for (const char* count : {"cases", "refused", "verdicts", "particles"}) static_cast<void>(part.at(count).get<int64_t>());
+  for (const char* figure : {"seconds", "cases_per_second"}) static_cast<void>(part.at(figure).get<double>());
+  for (const char* of_threads : {"generating", "running", "judging"}) {
+    static_cast<void>(part.at("thread_seconds").at(of_threads).get<double>());
+  }
+  static_cast<void>(part.at("dynamics").get<bool>());
+  static_cast<void>(part.at("backend").get<std::string>());
+  static_cast<void>(part.at("sizes").at(1).get<int>());
+  for (const CoverageClass& each : kCoverageClasses)
+    static_cast<void>(part.at("coverage").at(each.name).get<int64_t>());
+  for (const json& property : part.at("properties").get<std::vector<json>>()) {
+    for (const char* word : {"property", "stage"}) static_cast<void>(property.at(word).get<std::string>());
+    for (const char* count : {"judged", "checked", "failed", "undecided"}) {
+      static_cast<void>(property.at(count).get<int64_t>());
+    }
+    for (const char* figure : {"measured", "of_bound"}) static_cast<void>(property.at(figure));
+  }
+  for (const json& violation : part.at("violations").get<std::vector<json>>()) {
+    static_cast<void>(violation.at("index").get<int64_t>());
+    for (const char* word : {"text", "file"}) static_cast<void>(violation.at(word).get<std::string>());
+  }
+  if (!part.contains("steps_compared")) return;
+  for (const char* count : {"steps", "particles", "undecidable"}) {
+    static_cast<void>(part.at("steps_compared").at(count).get<int64_t>());
+  }
+  static_cast<void>(part.at("steps_compared").at("greatest_h"));
+}
+
+// One result as it stands in its file.
+json read_shard(const std::string& file) {
+  json part;
+  try {
+    part = json::parse(io::read_text(file));
+  } catch (const json::parse_error& error) {
+    throw InputError(
+        file, "",
+        fmt::format("this is not JSON, or it is not whole: it breaks off, or goes wrong, at byte {}", error.byte),
+        "copy it again, or leave it out: --merge then names the shard as missing");
+  }
+  if (!part.is_object() || part.value("format", json()) != kResultFormat ||
+      part.value("format_version", json()) != kFormatVersion) {
+    throw InputError(file, "format", "this is not a result of `cutproof fuzz` of this version", kRemedy);
+  }
+  if (part.contains("merged_shards")) {
+    throw InputError(file, "merged_shards", "these are shards that were put together already", kRemedy);
+  }
+  const auto shard = part.at("shard").get<int64_t>(), shards = part.at("shards").get<int64_t>();
+  if (shards < 1 || shards > kMostShards || shard < 1 || shard > shards) {
+    throw InputError(file, "shard", fmt::format("there is no shard {} of {}", shard, shards), kRemedy);
+  }
+  require_fields(part);
+  return part;
+}
+
+}  // namespace
+
 json merge_shards(const std::vector<std::string>& files) {
   json whole;
-  std::set<int64_t> shards;
+  std::map<int64_t, std::string> file_of;  // shard -> its file
   for (const std::string& file : files) {
     try {
-      const json part = json::parse(io::read_text(file));
-      if (part.at("format") != kResultFormat || part.at("format_version") != kFormatVersion) {
-        throw InputError(file, "format", "this is not a result of `cutproof fuzz` of this version", kRemedy);
-      }
-      if (!shards.insert(part.at("shard").get<int64_t>()).second) {
-        throw InputError(file, "shard", fmt::format("shard {} was given already", part.at("shard").dump()), kRemedy);
-      }
+      const json part = read_shard(file);
+      // What belongs to another campaign is that, and not a shard given twice.
       if (whole.is_null()) {
         whole = part;
       } else {
-        add_shard(whole, part, file, files.front());
+        require_same_campaign(whole, part, file, files.front());
       }
+      const auto shard = part.at("shard").get<int64_t>();
+      const auto [known, is_new] = file_of.try_emplace(shard, file);
+      if (!is_new) {
+        throw InputError(file, "shard", fmt::format("shard {} was given already, by {}", shard, known->second),
+                         kRemedy);
+      }
+      if (file_of.size() > 1) add_shard(whole, part);
     } catch (const json::exception& error) {
       throw InputError(file, "", fmt::format("this is not a result of `cutproof fuzz` ({})", error.what()), kRemedy);
     }
   }
   const auto expected = whole.at("shards").get<int64_t>();
-  std::vector<int64_t> missing;
+  json missing = json::array();
   for (int64_t shard = 1; shard <= expected; ++shard) {
-    if (!shards.contains(shard)) missing.push_back(shard);
+    if (!file_of.contains(shard)) missing.push_back(shard);
   }
-  if (!missing.empty()) {
-    throw InputError("command line", "--merge",
-                     fmt::format("of {} shards these are missing: {}", expected, fmt::join(missing, ", ")), kRemedy);
-  }
-  whole["holds"] = whole.at("violations").empty() && whole.at("verdicts").get<int64_t>() > 0;
+  sort_properties(whole.at("properties"));
+  json& violations = whole.at("violations");
+  std::stable_sort(violations.begin(), violations.end(), [](const json& a, const json& b) {
+    return a.at("index").get<int64_t>() < b.at("index").get<int64_t>();
+  });
+  whole["complete"] = missing.empty();
+  whole["holds"] = violations.empty() && whole.at("verdicts").get<int64_t>() > 0 && missing.empty();
+  whole["missing_shards"] = std::move(missing);
   whole["shard"] = 1;
   whole["shards"] = 1;
   whole["merged_shards"] = expected;
   return whole;
 }
 
+std::string missing_shards(const json& document) {
+  std::vector<std::string> ranges;
+  const auto missing = document.value("missing_shards", std::vector<int64_t>());
+  for (std::size_t first = 0; first < missing.size();) {
+    std::size_t last = first;
+    while (last + 1 < missing.size() && missing[last + 1] == missing[last] + 1) ++last;
+    ranges.push_back(first == last ? fmt::format("{}", missing[first])
+                                   : fmt::format("{}-{}", missing[first], missing[last]));
+    first = last + 1;
+  }
+  return fmt::format("{}", fmt::join(ranges, ","));
+}
+
 CampaignConclusion conclude(const json& document, bool whole) {
   const auto cases = document.at("cases").get<int64_t>();
-  if (cases == 0 || document.at("verdicts").get<int64_t>() == 0) return {"nothing was judged"};
   const std::size_t violations = document.at("violations").size();
-  if (violations > 0) return {fmt::format("{} of {} cases", violations, cases)};
+  const std::string missing = missing_shards(document);
+  const std::string lost = missing.empty()
+                               ? ""
+                               : fmt::format("of {} shards these are missing, and their cases were not judged: {}",
+                                             document.at("merged_shards").get<int64_t>(), missing);
+  if (violations > 0) {
+    return {fmt::format("{} of {} cases{}", violations, cases, lost.empty() ? "" : "; " + lost)};
+  }
+  if (!lost.empty()) return {lost};
+  if (cases == 0 || document.at("verdicts").get<int64_t>() == 0) return {"nothing was judged"};
   if (!whole || cases < kCasesThatMeetEveryClass) return {};
   std::vector<std::string> empty, rare;
   for (const CoverageClass& wanted : kCoverageClasses) {

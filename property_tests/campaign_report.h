@@ -16,9 +16,14 @@ nlohmann::json violation_json(const Violation& violation, const std::string& fil
 nlohmann::json campaign_document(const harness::BackendChoice& backend, const CampaignOptions& options,
                                  const Campaign& campaign, const nlohmann::json& violations);
 
-// The document of the whole from the documents (files) of all its shards. Throws InputError, naming the file, for
-// anything that is not the result of a shard of one campaign, each once.
+inline constexpr int64_t kMostShards = 1'000'000;
+
+// The document of the whole from the documents (files) of its shards. A shard that is not there is listed in
+// `missing_shards`, and `complete` is false. Throws InputError, naming the file, for anything that is not the result of
+// a shard of one campaign, each once.
 nlohmann::json merge_shards(const std::vector<std::string>& files);
+// Of a merged document, as job arrays write it: "3,7-12"; empty: none is missing.
+std::string missing_shards(const nlohmann::json& document);
 
 // What follows from a document. `whole`: it is of all shards, so classes of cases that never occurred say something.
 struct CampaignConclusion {

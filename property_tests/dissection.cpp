@@ -11,6 +11,7 @@
 #include "harness/frame_runner.h"
 #include "harness/judge.h"
 #include "harness/reference_stages.h"
+#include "model/io/verdict_json.h"
 #include "model/rules.h"
 #include "oracles/oracles.h"
 #include "property_tests/touching.h"
@@ -278,10 +279,6 @@ Judgement dissect(Backend& backend, const Case& c, bool thorough) {
   return judge_case(c, loaded.front(), run, backend.name(), thorough);
 }
 
-std::string describe(const Verdict& verdict) {
-  return fmt::format("'{}' fails after {} in frame {} on backend '{}': measured {:g} {}, bound {:g} ({}). {}",
-                     verdict.property, name_of(verdict.stage), verdict.frame, verdict.backend, verdict.measured,
-                     verdict.unit, verdict.bound, verdict.bound_source, verdict.witness.text);
-}
+std::string describe(const Verdict& verdict) { return io::verdict_text(verdict); }
 
 }  // namespace cutproof::property_tests

@@ -68,6 +68,7 @@ const OperationDescription kClusters = {
     .cases_of = one_body,
     .size_of = size_of_body,
     .judge = judge_clusters,
+    .problem = problem_of_body,
     .simpler = fewer_particles,
     .kinds = graph_kinds,
 };

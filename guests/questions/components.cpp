@@ -97,6 +97,7 @@ const OperationDescription kComponents = {
     .cases_of = one_body,
     .size_of = size_of_body,
     .judge = judge_components,
+    .problem = problem_of_body,
     .simpler = fewer_particles,
     .kinds = graph_kinds,
 };

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "model/at.h"
+#include "model/bare_graph.h"
 
 namespace cutproof::guests {
 
@@ -213,6 +214,44 @@ Tissue tissue_of(const Arrays& arrays) {
   const auto rest = find_array(arrays, "rest")->of<double>();
   for (std::size_t k = 0; k + 2 < rest.size(); k += 3) body.rest.push_back({rest[k], rest[k + 1], rest[k + 2]});
   return tissue;
+}
+
+std::string problem_of_body(const Question& question) {
+  const Arrays& arrays = question.given;
+  const auto n = find_array(arrays, "alive")->rows();
+  for (const char* const name : {"rest", "mass", "alive", "node"}) {
+    const Array* const array = find_array(arrays, name);
+    if (array != nullptr && array->rows() != n) return std::string("'") + name + "' is not as long as 'alive'";
+  }
+  if (!(find_array(arrays, "spacing")->number(0) > 0)) return "'spacing' is not positive";
+  Body body;
+  body.rest.resize(at(n));
+  const auto offsets = find_array(arrays, "edge_offsets")->of<int64_t>();
+  body.edge_offsets.assign(offsets.begin(), offsets.end());
+  const auto ends = find_array(arrays, "edge_ends")->of<int32_t>();
+  body.edge_ends.assign(ends.begin(), ends.end());
+  if (std::string problem = problem_of_edges(body); !problem.empty()) return problem;
+  const Array* const node = find_array(arrays, "node");
+  if (node == nullptr) return "";
+  const Array* const nodes = find_array(arrays, "nodes");
+  if (nodes == nullptr || nodes->rows() != 3) return "'nodes' is missing, the extent of the grid";
+  int64_t count = 1;
+  for (int64_t axis = 0; axis < 3; ++axis) {
+    if (nodes->integer(axis) < 1 || nodes->integer(axis) > 1000) return "'nodes' is out of range";
+    count *= nodes->integer(axis);
+  }
+  std::set<std::array<int64_t, 3>> taken;
+  for (int64_t i = 0; i < n; ++i) {
+    std::array<int64_t, 3> place = {};
+    for (int64_t axis = 0; axis < 3; ++axis) {
+      place[at(axis)] = node->integer(3 * i + axis);
+      if (place[at(axis)] < 1 || place[at(axis)] > nodes->integer(axis) - 2) {
+        return "'node' of particle " + std::to_string(i) + " is not inside the grid";
+      }
+    }
+    if (!taken.insert(place).second) return "two particles have the node of particle " + std::to_string(i);
+  }
+  return "";
 }
 
 std::vector<Question> fewer_particles(const Question& question) {

@@ -51,6 +51,8 @@ Tissue part_of(const Tissue& tissue, const std::vector<uint8_t>& keep);
 // The arrays of cutproof_tissue, and `alive`.
 Arrays arrays_of(const Tissue& tissue);
 Tissue tissue_of(const Arrays& arrays);
+// What is wrong with them, or "".
+std::string problem_of_body(const Question& question);
 // The same question with fewer particles, the most drastic first; all of them living, too.
 std::vector<Question> fewer_particles(const Question& question);
 

@@ -49,6 +49,8 @@ struct OperationDescription {
   // One verdict for each property that the operation has, whoever promised it; `answers` in the order above, in any
   // precision.
   std::vector<Verdict> (*judge)(const Question& question, const Arrays& answers, Precision precision);
+  // What is wrong with a question that was read from a file, or "": sizes and indices. Types are right already.
+  std::string (*problem)(const Question& question);
   // Questions that are each simpler, the most drastic first.
   std::vector<Question> (*simpler)(const Question& question);
   // Kinds of cases, in the order in which they are drawn.

@@ -129,6 +129,21 @@ std::vector<Verdict> judge_rotations(const Question& question, const Arrays& ans
   return {rotation.take(), best.take(), nearest.take(), kept.take()};
 }
 
+std::string problem_of_rotations(const Question& question) {
+  const int64_t rows = count_matrices(question);
+  if (question.given[1].rows() != rows || question.known[0].rows() != rows) return "its arrays are not of equal length";
+  const auto expected = question.known[0].of<uint8_t>();
+  for (int64_t row = 0; row < rows; ++row) {
+    const Mat3 a = matrix(question.given[0], row);
+    const bool known = std::all_of(a.m.begin(), a.m.end(), [](double entry) { return std::isfinite(entry); }) &&
+                       std::any_of(a.m.begin(), a.m.end(), [](double entry) { return entry != 0; });
+    if (expected[at(row)] > 2 || (expected[at(row)] != 2 && !known)) {
+      return fmt::format("what is expected of matrix {} is not what can be", row);
+    }
+  }
+  return "";
+}
+
 std::vector<Question> simpler_rotations(const Question& question) {
   const int64_t rows = count_matrices(question);
   std::vector<Question> simpler;
@@ -164,6 +179,7 @@ const OperationDescription kRotations = {
     .cases_of = count_matrices,
     .size_of = size_of_rotations,
     .judge = judge_rotations,
+    .problem = problem_of_rotations,
     .simpler = simpler_rotations,
     .kinds = kinds_of_rotations,
 };

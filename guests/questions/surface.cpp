@@ -232,18 +232,19 @@ void check_surface(const Surface& surface, Verdict& verdict) {
 }
 
 struct Shells {
-  int64_t outer = 0, inner = 0, joining = 0;
+  int64_t outer = 0, inner = 0, joining = 0, inside_out = 0;
 };
 
-// By the sign of the volume; `joining`: shells on which components of this topology meet.
-Shells count_shells(const Surface& surface, Topology& topology) {
+// By the sign of the volume; `joining`: shells on which components of this topology meet; `inside_out`: those whose
+// triangles turn the wrong way. Which way is right shows at the vertex that lies farthest along x (oracles/shells.h).
+Shells count_shells(const Surface& surface, const Occupancy& nodes, Topology& topology) {
   Groups groups(surface.vertices.size());
   for (const auto& [a, b, c] : surface.triangles) {
     groups.join(at(a), at(b));
     groups.join(at(b), at(c));
   }
   std::map<std::size_t, double> volume;
-  std::map<std::size_t, std::size_t> component;
+  std::map<std::size_t, std::size_t> component, farthest;
   std::map<std::size_t, bool> joins;
   for (const auto& [a, b, c] : surface.triangles) {
     const std::size_t shell = groups.of(at(a));
@@ -251,35 +252,49 @@ Shells count_shells(const Surface& surface, Topology& topology) {
     for (const int32_t v : {a, b, c}) {
       const std::size_t of = topology.component.of(at(surface.placed[at(v)].node));
       if (component.try_emplace(shell, of).first->second != of) joins[shell] = true;
+      std::size_t& last = farthest.try_emplace(shell, at(v)).first->second;
+      if (surface.vertices[at(v)].x > surface.vertices[last].x) last = at(v);
     }
   }
   Shells shells;
-  for (const auto& [shell, six_volumes] : volume) ++(six_volumes > 0 ? shells.outer : shells.inner);
+  for (const auto& [shell, six_volumes] : volume) {
+    ++(six_volumes > 0 ? shells.outer : shells.inner);
+    const Vertex& last = surface.placed[farthest.at(shell)];
+    const bool around_tissue = nodes.living[at(last.edge / 3)] != 0;  // the lower end of its edge
+    if (around_tissue != (six_volumes > 0)) ++shells.inside_out;
+  }
   shells.joining = static_cast<int64_t>(joins.size());
   return shells;
 }
 
 void check_shells(const Surface& surface, const Occupancy& nodes, Verdict& verdict) {
   Topology own(nodes, false), other(nodes, true);
-  const Shells shells = count_shells(surface, own);
+  const Shells shells = count_shells(surface, nodes, own);
   verdict.checked = own.outer + own.inner;
-  verdict.measured =
-      static_cast<double>(std::abs(shells.outer - own.outer) + std::abs(shells.inner - own.inner) + shells.joining);
+  verdict.measured = static_cast<double>(std::abs(shells.outer - own.outer) + std::abs(shells.inner - own.inner) +
+                                         shells.joining + shells.inside_out);
   if (verdict.measured == 0) return;
   verdict.holds = false;
   std::string text = fmt::format("{} outer and {} inner shells around {} components with {} cavities", shells.outer,
                                  shells.inner, own.outer, own.inner);
   if (shells.joining > 0) text += fmt::format("; {} shells go around several components", shells.joining);
-  const Shells in_other = count_shells(surface, other);
-  if (in_other.outer == other.outer && in_other.inner == other.inner && in_other.joining == 0) {
+  const Shells in_other = count_shells(surface, nodes, other);
+  if (in_other.outer == other.outer && in_other.inner == other.inner && in_other.joining == 0 &&
+      in_other.inside_out == 0) {
     text += fmt::format(
         ". It is right in the other polarity ({} components, {} cavities): it joins living nodes that meet only across "
         "the diagonal of a face, where no edge joins the tissue; take the cases with inside and outside exchanged",
         other.outer, other.inner);
-  } else if (shells.outer == own.inner && shells.inner == own.outer) {
-    text += ". It is inside out: triangles are to be counter-clockwise seen from outside";
+  } else if (shells.inside_out > 0) {
+    text +=
+        fmt::format(". {} shells are inside out: triangles are to be counter-clockwise seen from outside the tissue",
+                    shells.inside_out);
   }
   verdict.witness.text = text;
+}
+
+std::string problem_on_grid(const Question& question) {
+  return find_array(question.given, "node") == nullptr ? "'node' is missing" : problem_of_body(question);
 }
 
 std::vector<Verdict> judge_surface(const Question& question, const Arrays& answers, Precision precision) {
@@ -333,6 +348,7 @@ const OperationDescription kSurface = {
     .cases_of = one_body,
     .size_of = size_of_body,
     .judge = judge_surface,
+    .problem = problem_on_grid,
     .simpler = fewer_particles,
     .kinds = grid_kinds,
 };

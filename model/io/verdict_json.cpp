@@ -1,5 +1,7 @@
 #include "model/io/verdict_json.h"
 
+#include <fmt/format.h>
+
 #include "model/io/json_number.h"
 #include "model/stage.h"
 
@@ -34,6 +36,12 @@ nlohmann::json verdicts_json(const std::vector<Verdict>& verdicts) {
   nlohmann::json list = nlohmann::json::array();
   for (const Verdict& verdict : verdicts) list.push_back(verdict_json(verdict, false));
   return list;
+}
+
+std::string verdict_text(const Verdict& verdict) {
+  return fmt::format("'{}' fails after {} in frame {} on backend '{}': measured {:g} {}, bound {:g} ({}). {}",
+                     verdict.property, name_of(verdict.stage), verdict.frame, verdict.backend, verdict.measured,
+                     verdict.unit, verdict.bound, verdict.bound_source, verdict.witness.text);
 }
 
 }  // namespace cutproof::io

@@ -1,6 +1,7 @@
-// A verdict in a result document (results_schema.md, Verdicts).
+// A verdict in a result document, and in words (results_schema.md, Verdicts).
 #pragma once
 #include <nlohmann/json.hpp>
+#include <string>
 #include <vector>
 
 #include "model/verdict.h"
@@ -11,5 +12,7 @@ namespace cutproof::io {
 nlohmann::json verdict_json(const Verdict& verdict, bool expected_failure);
 // A list of those of which none is expected to fail.
 nlohmann::json verdicts_json(const std::vector<Verdict>& verdicts);
+// One that fails, in one line for a person (guide.md, Reading a verdict).
+std::string verdict_text(const Verdict& verdict);
 
 }  // namespace cutproof::io

@@ -119,10 +119,11 @@ struct CoupledSet {
 class Search {
  public:
   // `of_all`: of the whole body; else of one coupled set, of which nobody has stated the impulse.
-  Search(const Setup& setup, const State& before, const State& after, bool of_all = true)
+  Search(const Setup& setup, const State& before, const State& after, Rotations rotations, bool of_all = true)
       : setup_(setup),
         before_(before),
         after_(after),
+        rotations_(rotations),
         of_all_(of_all),
         h_(setup.body.grid.spacing),
         dt_(setup.substep_length[at(before.frame)]),
@@ -144,6 +145,7 @@ class Search {
 
   AdmissibleStep find() {
     Branch branch = looked_at({});
+    if (rotations_ == Rotations::unknown && !branch.holds() && any_open(branch)) return nothing_known();
     if (!branch.holds() && !branch.ties.empty() && of_all_ && coupled_.count > 1) {
       Apart apart = settled_apart(branch);
       if (!apart.settled.empty()) branch = looked_at(std::move(apart.settled));
@@ -199,7 +201,7 @@ class Search {
     Apart apart;
     for (const int32_t set : sets) {
       const CoupledSet alone(before_, after_, coupled_, set);
-      Search search(setup_, alone.before, alone.after, false);
+      Search search(setup_, alone.before, alone.after, rotations_, false);
       Branch found = search.looked_at({});
       if (!found.holds() && !found.ties.empty()) found = search.explain(std::move(found));
       for (const auto& [key_alone, outcome] : found.settled) {
@@ -212,6 +214,19 @@ class Search {
       if (!apart.is_explained) break;
     }
     return apart;
+  }
+
+  // Whether where particles are hangs on a rotation that could be any of many.
+  bool any_open(const Branch& branch) const {
+    for (std::size_t c = 0; c < reach_.size(); ++c) {
+      if (is_open(branch, c) && reach_[c] > 0) return true;
+    }
+    return false;
+  }
+  AdmissibleStep nothing_known() const {
+    AdmissibleStep found;
+    found.checked = found.undecided = std::count(before_.alive.begin(), before_.alive.end(), 1);
+    return found;
   }
 
   Branch start(Settled settled) {
@@ -256,7 +271,7 @@ class Search {
     branch.given.resize(reach_.size(), nullptr);
     bool any = false;
     for (std::size_t c = 0; c < reach_.size(); ++c) {
-      if (!is_open(branch, c)) continue;
+      if (!is_open(branch, c) || rotations_ == Rotations::unknown) continue;
       if (!(off_agreed(o.shape[c], after_.clusters.rotation[c]) <= agreed_bound(branch, c))) continue;
       branch.given[c] = &after_.clusters.rotation[c];
       any = true;
@@ -446,7 +461,7 @@ class Search {
       see(branch, StepPart::position, static_cast<int32_t>(i), off / h_, b.position[i] / h_, blunt);
       see(branch, StepPart::velocity, static_cast<int32_t>(i), fast / h_, b.velocity[i] / h_, blunt);
     }
-    for (int32_t c = 0; c < before_.clusters.count(); ++c) {
+    for (int32_t c = 0; c < before_.clusters.count() && rotations_ == Rotations::stated; ++c) {
       const Mat3& r = after_.clusters.rotation[at(c)];
       const double turned =
           is_open(branch, at(c)) ? off_agreed(o.shape[at(c)], r) : or_infinite(apart(r, o.rotation[at(c)]));
@@ -835,7 +850,7 @@ class Search {
       found.reach.push_back(std::max(reach_[c] / h_, 1.0));
       found.rotation_bound.push_back(branch.bounds.rotation[c] * found.reach.back());
       // As of positions: beyond this, nothing sharp was asked.
-      if (!(found.rotation_bound.back() <= kSmall)) ++found.undecided;
+      if (!(found.rotation_bound.back() <= kSmall) || rotations_ == Rotations::unknown) ++found.undecided;
     }
     found.outcome = std::move(branch.outcome);
     return found;
@@ -843,6 +858,7 @@ class Search {
 
   const Setup& setup_;
   const State &before_, &after_;
+  const Rotations rotations_;
   const bool of_all_;
   const double h_, dt_;
   double mass_ = 0;
@@ -855,8 +871,9 @@ class Search {
 
 }  // namespace
 
-AdmissibleStep nearest_admissible_step(const Setup& setup, const State& before, const State& after) {
-  return Search(setup, before, after).find();
+AdmissibleStep nearest_admissible_step(const Setup& setup, const State& before, const State& after,
+                                       Rotations rotations) {
+  return Search(setup, before, after, rotations).find();
 }
 
 }  // namespace cutproof::oracles

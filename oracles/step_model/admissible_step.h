@@ -41,14 +41,20 @@ struct AdmissibleStep {
   std::vector<double> reach;           // [m] of the farthest member from the center at rest, or 1 if that is less [h]
 };
 
+// Whether `after` has the rotations that the step left. Where only a later state is known, in which clusters have
+// changed, nobody knows them: then none is judged, and each counts as undecided.
+enum class Rotations { stated, unknown };
+
 // `before` and `after`: well formed, of the same clusters; `before` finite, its schedule not over.
-AdmissibleStep nearest_admissible_step(const Setup& setup, const State& before, const State& after);
+AdmissibleStep nearest_admissible_step(const Setup& setup, const State& before, const State& after,
+                                       Rotations rotations = Rotations::stated);
 
 // The same with its verdict, of any two well-formed states; without the step where none can be computed.
 struct StepAgain {
   Verdict verdict;
   std::optional<AdmissibleStep> step = {};
 };
-StepAgain step_again(const Setup& setup, const State& before, const State& after);
+StepAgain step_again(const Setup& setup, const State& before, const State& after,
+                     Rotations rotations = Rotations::stated);
 
 }  // namespace cutproof::oracles

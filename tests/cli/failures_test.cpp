@@ -21,6 +21,7 @@
 #include <system_error>
 #include <vector>
 
+#include "model/io/array_file.h"
 #include "tests/cli/chosen_allocations.h"
 #include "tests/cli/cut_scene.h"
 #include "tests/cli/failing_allocations.h"
@@ -179,6 +180,21 @@ std::string defect_of(const Outcome& outcome, const Outcome& undisturbed) {
   return "";
 }
 
+// A file of arrays, as bytes: a row of four particles.
+std::string state_file(const std::string& suffix) {
+  io::ArrayFile state;
+  state.arrays = {make_array<double>("positions", {4, 3}, {0, 0, 0, 1, 0, 0, 2, 0, 0, 3, 0, 0}),
+                  make_array<int32_t>("edges", {3, 2}, {0, 1, 1, 2, 2, 3}),
+                  make_array<int32_t>("cluster_offsets", {4}, {0, 2, 4, 6}),
+                  make_array<int32_t>("cluster_members", {6}, {0, 1, 1, 2, 2, 3})};
+  state.texts = {{"promises", "connected covered coupled edges_covered"}};
+  const files::path path = files::temp_directory_path() / ("cutproof.state." + std::to_string(getpid()) + suffix);
+  io::write_array_file(path.string(), state);
+  std::string bytes = read(path);
+  files::remove(path);
+  return bytes;
+}
+
 struct Case {
   const char* name;
   std::vector<std::string> arguments;
@@ -197,7 +213,11 @@ class Allocations : public testing::TestWithParam<Case> {
     }
     std::string bad = kCutScene;
     bad.replace(bad.find("speed"), 5, "spede");
-    Files given = {{"cut.json", kCutScene}, {"bad.json", bad}, {"out.json", kOldJson}};
+    Files given = {{"cut.json", kCutScene},
+                   {"bad.json", bad},
+                   {"out.json", kOldJson},
+                   {"state.npz", state_file(".npz")},
+                   {"state.h5", state_file(".h5")}};
     const std::string name = GetParam().name;
     if (GetParam().reads_a_recording) {
       Program recording(name + "_recording", {"run", "cut.json", "--record", "seen"}, given);
@@ -296,6 +316,8 @@ INSTANTIATE_TEST_SUITE_P(
              1,
              false},
         Case{"CheckOfARecording", {"check", "seen", "--json", "out.json"}, 0, 1, true},
+        Case{"CheckOfAnNpzFile", {"check", "state.npz", "--json", "out.json"}, 0, 1, false},
+        Case{"CheckOfAnHdf5File", {"check", "state.h5", "--json", "out.json"}, 0, 1, false},
         Case{"RunOfABadScene", {"run", "bad.json", "--check", "--record", "r", "--json", "out.json"}, 2, 0, false}),
     [](const auto& instance) { return std::string(instance.param.name); });
 

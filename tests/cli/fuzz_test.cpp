@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
 
 #include "property_tests/counterexample.h"
 #include "property_tests/dissection.h"
@@ -97,18 +99,79 @@ TEST_F(Fuzz, PutsShardsTogetherToTheWhole) {
   const Outcome merged = cutproof("fuzz --merge 1.json 2.json 3.json --json merged.json");
   EXPECT_EQ(merged.status, 0) << merged.output;
   const json whole = result("whole.json"), together = result("merged.json");
-  for (const char* field : {"cases", "verdicts", "coverage", "holds"})
-    EXPECT_EQ(together[field], whole[field]) << field;
+  EXPECT_EQ(together["complete"], true);
+  EXPECT_EQ(together["missing_shards"], json::array());
+  // In everything that is no time and not how it was divided, whatever the order of the shards.
+  const auto without_times = [](json document) {
+    for (const char* field :
+         {"seconds", "cases_per_second", "thread_seconds", "complete", "missing_shards", "merged_shards"}) {
+      document.erase(field);
+    }
+    return document;
+  };
+  EXPECT_EQ(without_times(together), without_times(whole));
+  ASSERT_EQ(cutproof("fuzz --merge 3.json 1.json 2.json --json other_order.json").status, 0);
+  EXPECT_EQ(without_times(result("other_order.json")), without_times(whole));
 
-  expect_refused("fuzz --merge 1.json 2.json", {"--merge", "missing: 3"});
-  expect_refused("fuzz --merge 1.json 2.json 2.json", {"2.json", "given already"});
+  expect_refused("fuzz --merge 1.json 2.json 2.json", {"2.json", "shard 2 was given already"});
   expect_refused("fuzz --merge 1.json none.json", {"none.json"});
-  json other = result("3.json");
-  other["seed"] = 99;
-  write("other.json", other.dump());
-  expect_refused("fuzz --merge 1.json 2.json other.json", {"other.json", "seed", "99"});
-  write("bad.json", "{}");
-  expect_refused("fuzz --merge bad.json", {"bad.json"});
+  // One of another campaign is that, even if its shard was given already.
+  for (const auto& [field, value] : std::vector<std::pair<std::string, json>>{{"seed", 99},
+                                                                              {"version", "0.0.1"},
+                                                                              {"commit", "0123abcd"},
+                                                                              {"backend", "host"},
+                                                                              {"split", "global"},
+                                                                              {"rotation", "svd_of_another"},
+                                                                              {"schedule_seed", 4},
+                                                                              {"sizes", json{0, 41}},
+                                                                              {"dynamics", true},
+                                                                              {"batch", 17},
+                                                                              {"keep_going", true},
+                                                                              {"cases_asked", 301},
+                                                                              {"shards", 4}}) {
+    for (const char* shard : {"3.json", "1.json"}) {
+      json other = result(shard);
+      ASSERT_NE(other.value(field, json()), value) << field;
+      other[field] = value;
+      write("other.json", other.dump());
+      expect_refused("fuzz --merge 1.json 2.json other.json", {"other.json", field, value.dump()});
+    }
+  }
+  const std::string text = read("3.json");
+  for (const std::size_t bytes : {text.size() - 3, text.size() / 2, std::size_t{1}, std::size_t{0}}) {
+    write("cut_off.json", text.substr(0, bytes));
+    expect_refused("fuzz --merge 1.json 2.json cut_off.json", {"cut_off.json", "not whole"});
+  }
+  for (const char* bad : {"{}", "[]", "1", R"({"format": "cutproof.fuzz", "format_version": 3})"}) {
+    write("bad.json", bad);
+    expect_refused("fuzz --merge bad.json", {"bad.json"});
+  }
+  // What says that it is no shard: 4 of 3, 0 of 3, 1 of 0, or more than any machine has.
+  for (const auto& [shard, shards] : {std::pair{4, 3}, {0, 3}, {1, 0}, {1, 2'000'000'000}}) {
+    json none = result("3.json");
+    none["shard"] = shard;
+    none["shards"] = shards;
+    write("none_of_them.json", none.dump());
+    expect_refused("fuzz --merge none_of_them.json", {"none_of_them.json", "there is no shard"});
+  }
+  // Whatever is missing, or of another kind: a result that is refused, and no defect of the program.
+  const json third = result("3.json");
+  for (const auto& [field, value] : third.items()) {
+    for (const bool is_there : {false, true}) {
+      json broken = third;
+      broken.erase(field);
+      if (is_there) broken[field] = value.is_object() ? json{{"x", "y"}} : json{{"x"}};
+      write("broken.json", broken.dump());
+      const Outcome outcome = cutproof("fuzz --merge 1.json 2.json broken.json");
+      // The machine's threads, and a verdict that merging makes itself, are not read.
+      const bool is_read = field != "threads" && field != "mean_particles" && field != "holds";
+      EXPECT_EQ(outcome.status, is_read ? 2 : 0) << field << is_there << "\n" << outcome.output;
+      EXPECT_EQ(outcome.output.find("broken.json") != std::string::npos, is_read) << outcome.output;
+    }
+  }
+  // What was merged is no shard: an incomplete result would become a complete one.
+  expect_refused("fuzz --merge merged.json", {"merged.json", "put together already"});
+  expect_refused("fuzz --merge 1.json 2.json 3.json --json nowhere/f.json", {"nowhere"});
 
   // A shard that failed makes the whole fail.
   json failed = result("3.json");
@@ -119,6 +182,41 @@ TEST_F(Fuzz, PutsShardsTogetherToTheWhole) {
   EXPECT_NE(fails.output.find("'coverage' fails"), std::string::npos);
 }
 
+// A shard that is lost costs its cases and is named; what is left neither fails as bad input nor passes.
+TEST_F(Fuzz, NamesShardsThatAreMissing) {
+  for (const std::string shard : {"1", "3", "6"}) {
+    ASSERT_EQ(
+        cutproof("fuzz --backend reference --cases 100 --sizes 0-40 --shard " + shard + "/9 --json " + shard + ".json")
+            .status,
+        0);
+  }
+  const Outcome merged = cutproof("fuzz --merge 1.json 3.json 6.json --json merged.json");
+  EXPECT_EQ(merged.status, 1) << merged.output;
+  EXPECT_NE(merged.output.find("INCOMPLETE: missing 2,4-5,7-9;"), std::string::npos) << merged.output;
+  EXPECT_NE(merged.output.find("FAILS: of 9 shards"), std::string::npos) << merged.output;
+  EXPECT_EQ(merged.output.find("all hold"), std::string::npos) << merged.output;
+  json document = result("merged.json");
+  EXPECT_EQ(document["complete"], false);
+  EXPECT_EQ(document["missing_shards"], (json{2, 4, 5, 7, 8, 9}));
+  EXPECT_EQ(document["merged_shards"], 9);
+  EXPECT_EQ(document["holds"], false);
+  EXPECT_EQ(document["violations"], json::array());
+  EXPECT_EQ(document["cases"], 12 + 11 + 11);
+
+  // What fails is said as well, by index whatever the order of the files.
+  for (const auto& [shard, index] : {std::pair{"3", 11}, {"6", 5}}) {
+    document = result(std::string(shard) + ".json");
+    document["violations"] = {{{"index", index}, {"text", "'coverage' fails"}, {"file", "x.json"}}};
+    write(std::string(shard) + ".json", document.dump());
+  }
+  const Outcome failing = cutproof("fuzz --merge 3.json 6.json --json merged.json");
+  EXPECT_EQ(failing.status, 1) << failing.output;
+  EXPECT_NE(failing.output.find("FAILS: 2 of 22 cases; of 9 shards"), std::string::npos) << failing.output;
+  document = result("merged.json");
+  EXPECT_EQ(document["violations"][0]["index"], 5);
+  EXPECT_EQ(document["violations"][1]["index"], 11);
+}
+
 TEST_F(Fuzz, RefusesBadUsage) {
   expect_refused("fuzz --backend nobody", {"--backend", "nobody", "simulated"});
   expect_refused("fuzz --sizes 5", {"--sizes", "0-79"});
@@ -126,6 +224,7 @@ TEST_F(Fuzz, RefusesBadUsage) {
   expect_refused("fuzz --sizes 5-111", {"--sizes"});
   expect_refused("fuzz --shard 0/3", {"--shard", "2/8"});
   expect_refused("fuzz --shard 4/3", {"--shard"});
+  expect_refused("fuzz --shard 1/1000001", {"--shard", "1000000"});
   expect_refused("fuzz --cases -1", {"--cases"});
   expect_refused("fuzz --save nowhere", {"--save", "nowhere"});
   expect_refused("fuzz --json nowhere/f.json", {"nowhere"});

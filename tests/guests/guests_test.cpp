@@ -1,1 +1,801 @@
+// Plugins, by what becomes of them: right ones hold, and each way of being wrong is named for what it is.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "guests/campaign.h"
+#include "guests/guest.h"
+#include "guests/plugin_backend.h"
+#include "harness/backends.h"
+#include "model/at.h"
+#include "model/error.h"
+#include "model/fields.h"
+#include "property_tests/campaign.h"
+#include "property_tests/simplify.h"
+#include "reference_cpu/reference.h"
+
+namespace cutproof::guests {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+GuestOptions plugin(const std::string& library, const std::string& parameters = "", double time_limit = 20) {
+  return {library, parameters, time_limit};
+}
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+const OperationDescription& named(const char* name) { return *find_operation(name); }
+
+// --- What a guest does instead of answering --------------------------------------------------------------------------
+
+struct Misbehaviour {
+  const char* mode;
+  const char* operation;
+  const char* at_end;    // what is said where arrays end with their memory; "": it answers
+  const char* at_start;  // and where they begin with it
+};
+
+TEST(Guest, SaysWhatAPluginDidInsteadOfAnswering) {
+  const Misbehaviour ways[] = {
+      {"crash", "components", "it was killed by signal 11 (SIGSEGV)", "it was killed by signal 11 (SIGSEGV)"},
+      {"abort", "components", "it was killed by signal 6 (SIGABRT)", "it was killed by signal 6 (SIGABRT)"},
+      {"divide", "components", "it was killed by signal 8 (SIGFPE)", "it was killed by signal 8 (SIGFPE)"},
+      {"exit", "components", "it ended the process with exit status 0", "it ended the process with exit status 0"},
+      // One byte on either side: the page that is out of bounds, or the bytes that are looked at afterwards.
+      {"before", "components", "it wrote to byte 1 before the beginning of 'label'",
+       "it writes to byte 1 before the beginning of 'label'"},
+      {"behind", "components", "it writes to byte 1 behind the end of 'label', which has ",
+       "it wrote to byte 1 behind the end of 'label', which has "},
+      {"far_behind", "components", "it writes to byte 100001 behind the end of 'label'",
+       "it writes to byte 100001 behind the end of 'label'"},
+      {"behind", "clusters", "it writes to byte 1 behind the end of 'members'",
+       "it wrote to byte 1 behind the end of 'members'"},
+      {"before", "clusters", "it wrote to byte 1 before the beginning of 'members'",
+       "it writes to byte 1 before the beginning of 'members'"},
+      {"read_behind", "components", "it reads byte 1 behind the end of 'edge_offsets'", ""},
+      {"input", "components", "it writes to 'edge_offsets', which is an input",
+       "it writes to 'edge_offsets', which is an input"},
+      {"rows", "components", "it says that 'label' has ", "it says that 'label' has "},
+      {"rows", "clusters", " were given by grow()", " were given by grow()"},
+      {"data", "components", "it put memory of its own into 'label'", "it put memory of its own into 'label'"},
+      {"type", "components", "it changed what 'label' is", "it changed what 'label' is"},
+      {"grow", "components", "grow() was given 'label', whose length is fixed",
+       "grow() was given 'label', whose length is fixed"},
+      {"grow_huge", "clusters", "grow() was asked for 1000000000000 rows of 'members'",
+       "grow() was asked for 1000000000000 rows of 'members'"},
+      {"grow_negative", "clusters", "grow() was asked for -1 rows of 'members'",
+       "grow() was asked for -1 rows of 'members'"},
+      {"grow_another", "clusters", "grow() was given 'edge_ends', whose length is fixed",
+       "grow() was given 'edge_ends', whose length is fixed"},
+      {"right", "components", "", ""},
+      {"right", "clusters", "", ""},
+  };
+  for (const Misbehaviour& way : ways) {
+    SCOPED_TRACE(std::string(way.mode) + " in " + way.operation);
+    Guest guest(plugin(PLUGIN_in_c, way.mode));
+    const OperationDescription& operation = named(way.operation);
+    const Question question = operation.draw(1, 12, Precision::binary32);
+    // Twice: a process that was lost is started anew.
+    for (int again = 0; again < 2; ++again) {
+      for (const bool at_end : {true, false}) {
+        const std::string expected = at_end ? way.at_end : way.at_start;
+        const Answer answer = ask(guest, operation, question, at_end);
+        if (expected.empty()) {
+          EXPECT_EQ(answer.kind, Answer::Kind::answered) << answer.text;
+        } else {
+          EXPECT_EQ(answer.kind, Answer::Kind::fault);
+          EXPECT_TRUE(contains(answer.text, expected)) << answer.text;
+        }
+      }
+    }
+  }
+}
+
+TEST(Guest, DoesNotWaitForOneThatHangs) {
+  Guest guest(plugin(PLUGIN_in_c, "hang", 0.2));
+  const OperationDescription& operation = named("components");
+  for (int k = 0; k < 3; ++k) {
+    const Answer answer = ask(guest, operation, operation.draw(1, k, Precision::binary32), true);
+    EXPECT_EQ(answer.kind, Answer::Kind::fault);
+    EXPECT_EQ(answer.text, "it did not answer within 0.2 s");
+  }
+  EXPECT_EQ(guest.restarts(), 2);
+}
+
+TEST(Guest, CountsARefusalAsNothingElse) {
+  Guest guest(plugin(PLUGIN_in_c, "refuse"));
+  const OperationDescription& operation = named("components");
+  const Answer answer = ask(guest, operation, operation.draw(1, 12, Precision::binary32), true);
+  EXPECT_EQ(answer.kind, Answer::Kind::refused);
+  EXPECT_EQ(answer.text, "it refused, with 5");
+  EXPECT_EQ(guest.restarts(), 0);
+}
+
+std::string problem_of_loading(const GuestOptions& options) {
+  try {
+    Guest guest(options);
+    return "it loads";
+  } catch (const CannotRunHere& cannot) {
+    return std::string("skipped: ") + cannot.what();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+}
+
+TEST(Guest, RefusesWhatIsNoPluginForIt) {
+  const std::string text = ::testing::TempDir() + "text.so";
+  std::ofstream(text) << std::string(1000, 'x');
+  EXPECT_TRUE(contains(problem_of_loading(plugin("nowhere.so")), "nowhere.so: there is no such file"));
+  EXPECT_TRUE(contains(problem_of_loading(plugin(text)), "invalid ELF header"));
+  EXPECT_TRUE(contains(problem_of_loading(plugin(PLUGIN_no_plugin)), "it exports no function cutproof_plugin_entry"));
+  EXPECT_TRUE(contains(problem_of_loading(plugin(PLUGIN_of_another_version)),
+                       "it was made for version 99 of plugin.h, and this cutproof has 1"));
+  EXPECT_TRUE(contains(problem_of_loading(plugin(PLUGIN_without_a_size)), "size is to be sizeof(cutproof_plugin)"));
+  EXPECT_EQ(problem_of_loading(plugin(PLUGIN_in_c, "cannot")),
+            "skipped: its create() gave nothing: it cannot run here");
+  EXPECT_EQ(problem_of_loading(plugin(PLUGIN_in_c)), "it loads");
+}
+
+TEST(Guest, SkipsAPluginForADeviceThatIsNotThere) {
+  const std::string problem = problem_of_loading(plugin(PLUGIN_on_a_device));
+  if (problem == "it loads") GTEST_SKIP() << "there is a CUDA device here";
+  EXPECT_TRUE(problem.starts_with("skipped: it wants a CUDA device")) << problem;
+}
+
+// Made with a header that ended before `surface`: what lies beyond its size is not looked at, and what it has is
+// judged.
+TEST(Guest, TakesAPluginOfAnOlderHeader) {
+  Guest guest(plugin(PLUGIN_of_an_older_header));
+  EXPECT_TRUE(guest.plugin().offers(wire::components));
+  EXPECT_FALSE(guest.plugin().offers(wire::clusters)) << "beyond its size";
+  const KernelCampaign campaign =
+      judge_kernel(guest, named("components"), promises_of(guest.plugin(), named("components"), ""), {.cases = 50}, {});
+  EXPECT_TRUE(campaign.holds());
+}
+
+// --- The header ------------------------------------------------------------------------------------------------------
+
+std::string text_of(const std::string& file) {
+  std::ifstream in(file);
+  return (std::stringstream() << in.rdbuf()).str();
+}
+
+TEST(PluginHeader, IsShortAndNamesEveryFieldOfAState) {
+  const std::string header = text_of(CUTPROOF_SOURCE "/guests/include/cutproof/plugin.h");
+  EXPECT_LT(std::count(header.begin(), header.end(), '\n'), 120);
+  const std::size_t begin = header.find("typedef struct cutproof_state"), end = header.find("} cutproof_state;");
+  const std::string state = header.substr(begin, end - begin);
+  for_each_field([&](const Field& field, auto) {
+    const std::string name(field.name);
+    const bool is_there = contains(state, "*" + name + ",") || contains(state, "*" + name + ";") ||
+                          contains(state, "* " + name + ";") || contains(state, " *" + name);
+    EXPECT_TRUE(is_there) << name << " is not in cutproof_state";
+  });
+}
+
+// --- Questions -------------------------------------------------------------------------------------------------------
+
+TEST(Questions, AreTheSameForTheSameSeedAndOfEveryKind) {
+  for (const OperationDescription& operation : operations()) {
+    const std::vector<std::string> kinds = operation.kinds();
+    for (int64_t index = 0; index < static_cast<int64_t>(kinds.size()); ++index) {
+      const Question question = operation.draw(7, index, Precision::binary32);
+      EXPECT_EQ(question.kind, kinds[at(index)]) << operation.name;
+      const Question again = operation.draw(7, index, Precision::binary32);
+      ASSERT_EQ(again.given.size(), question.given.size());
+      for (std::size_t k = 0; k < again.given.size(); ++k) {
+        EXPECT_EQ(again.given[k], question.given[k]) << operation.name << ", " << question.kind;
+      }
+    }
+  }
+  const std::vector<std::string> graphs = named("components").kinds();
+  for (const char* wanted : {"an isolated vertex", "no edges", "fewer edges than vertices", "n = 512 k + 1"}) {
+    EXPECT_EQ(std::count(graphs.begin(), graphs.end(), wanted), 1) << wanted;
+  }
+}
+
+TEST(Questions, OfGraphsAreWhatTheirKindSays) {
+  const std::vector<std::string> kinds = named("components").kinds();
+  for (int64_t index = 0; index < 400; ++index) {
+    const Question question = named("components").draw(3, index, Precision::binary32);
+    const auto offsets = find_array(question.given, "edge_offsets")->of<int64_t>();
+    const int64_t n = static_cast<int64_t>(offsets.size()) - 1;
+    int64_t alone = 0;
+    for (int64_t i = 0; i < n; ++i) alone += offsets[at(i)] == offsets[at(i + 1)];
+    if (question.kind == "an isolated vertex") {
+      EXPECT_GE(alone, 1);
+    }
+    if (question.kind == "the last vertex is isolated") {
+      EXPECT_EQ(offsets[at(n - 1)], offsets[at(n)]);
+    }
+    if (question.kind == "no edges") {
+      EXPECT_EQ(offsets[at(n)], 0);
+    }
+    if (question.kind == "fewer edges than vertices") {
+      EXPECT_LT(offsets[at(n)] / 2, n);
+    }
+    if (question.kind == "n = 512 k + 1") {
+      EXPECT_EQ(n % 512, 1);
+    }
+  }
+}
+
+// A question as it was saved, with NaN and infinities, gives the same question.
+TEST(Questions, AreReadAsTheyWereSaved) {
+  for (const OperationDescription& operation : operations()) {
+    for (int64_t index = 0; index < static_cast<int64_t>(operation.kinds().size()); ++index) {
+      SavedQuestion saved;
+      saved.operation = operation.name;
+      saved.question = operation.draw(5, index, Precision::binary64);
+      saved.precision = Precision::binary64;
+      saved.at_end = false;
+      saved.found = "what \"was\" found";
+      saved.index = index;
+      const std::string text = to_json(saved);
+      const SavedQuestion read = question_from_json(text, "a file");
+      EXPECT_EQ(to_json(read), text) << operation.name << ", " << saved.question.kind;
+      ASSERT_EQ(read.question.given.size(), saved.question.given.size());
+    }
+  }
+}
+
+TEST(Questions, AreRefusedWithAnythingUnknown) {
+  SavedQuestion saved;
+  saved.operation = "components";
+  saved.question = named("components").draw(5, 20, Precision::binary32);
+  const json right = json::parse(to_json(saved));
+  const auto problem = [&](const std::function<void(json&)>& change) -> std::string {
+    json changed = right;
+    change(changed);
+    try {
+      question_from_json(changed.dump(), "q.json");
+      return "";
+    } catch (const InputError& error) {
+      return error.what();
+    }
+  };
+  EXPECT_EQ(problem([](json&) {}), "");
+  EXPECT_TRUE(contains(problem([](json& j) { j["more"] = 1; }), "q.json: it has a field 'more', which is not known"));
+  EXPECT_TRUE(contains(problem([](json& j) { j["format_version"] = 2; }), "it has version 2"));
+  EXPECT_TRUE(contains(problem([](json& j) { j["operation"] = "magic"; }), "there is no operation 'magic'"));
+  EXPECT_TRUE(contains(problem([](json& j) { j.erase("given"); }), "given"));
+  EXPECT_TRUE(contains(problem([](json& j) { j["given"].erase("alive"); }), "'alive' is missing"));
+  EXPECT_TRUE(contains(problem([](json& j) { j["given"]["alive"]["shape"] = {3, 3}; }), "alive"));
+  EXPECT_TRUE(contains(problem([](json& j) { j["given"]["alive"]["type"] = "float64"; }), "alive"));
+  EXPECT_TRUE(contains(problem([](json& j) { j["given"]["edge_ends"]["values"][0] = 1'000'000; }), "edge"));
+  EXPECT_TRUE(contains(problem([](json& j) { j["given"]["stranger"] = j["given"]["alive"]; }), "not known"));
+  EXPECT_TRUE(contains(problem([](json& j) { j = 5; }), "it is no question"));
+  EXPECT_THROW(question_from_json("{", "q.json"), InputError);
+}
+
+// --- Judges of single kernels ----------------------------------------------------------------------------------------
+
+std::map<std::string, std::string> failing(const std::vector<Verdict>& verdicts) {
+  std::map<std::string, std::string> failing;
+  for (const Verdict& verdict : verdicts) {
+    if (!verdict.holds) failing[verdict.property] = verdict.witness.text;
+  }
+  return failing;
+}
+
+// Of diag(a, b, c): the identity for positive entries.
+Question one_matrix(double a, double b, double c, uint8_t expected) {
+  return {"by hand",
+          {make_array("a", {1, 9}, std::vector<double>{a, 0, 0, 0, b, 0, 0, 0, c}),
+           make_array("previous", {1, 9}, std::vector<double>{0, -1, 0, 1, 0, 0, 0, 0, 1})},
+          {make_array("expected", {1}, std::vector<uint8_t>{expected})}};
+}
+Arrays rotation_about_z(double angle) {
+  const double c = std::cos(angle), s = std::sin(angle);
+  return {make_array("r", {1, 9}, std::vector<double>{c, -s, 0, s, c, 0, 0, 0, 1})};
+}
+
+TEST(JudgeOfRotations, RejectsTheLeastThatIsWrong) {
+  const auto judged = [](const Question& question, const Arrays& r) {
+    return failing(named("rotations").judge(question, r, Precision::binary32));
+  };
+  const Question plain = one_matrix(3, 2, 1, 0);
+  EXPECT_TRUE(judged(plain, rotation_about_z(0)).empty());
+  // The objective of diag(3, 2, 1) falls by (3 + 2) (1 - cos φ) of 6: at 1.55e-3 by 1.0e-6.
+  EXPECT_TRUE(judged(plain, rotation_about_z(1.5e-3)).empty());
+  EXPECT_TRUE(judged(plain, rotation_about_z(1.6e-3)).contains("best rotation"));
+  Arrays longer = rotation_about_z(0);
+  longer[0] = make_array("r", {1, 9}, std::vector<double>{1 + 2e-6, 0, 0, 0, 1, 0, 0, 0, 1});
+  EXPECT_TRUE(judged(plain, longer).empty());
+  longer[0] = make_array("r", {1, 9}, std::vector<double>{1 + 3e-6, 0, 0, 0, 1, 0, 0, 0, 1});
+  EXPECT_TRUE(judged(plain, longer).contains("rotation"));
+  const Arrays reflection = {make_array("r", {1, 9}, std::vector<double>{1, 0, 0, 0, 1, 0, 0, 0, -1})};
+  EXPECT_TRUE(contains(judged(plain, reflection)["rotation"], "a reflection"));
+  const Arrays unwritten = {make_array("r", {1, 9}, std::vector<double>(9, std::numeric_limits<double>::quiet_NaN()))};
+  EXPECT_TRUE(judged(plain, unwritten).contains("rotation"));
+  // Of rank one: every turn about x is best, the nearest to a quarter turn about z is none of these but that to x → x.
+  const Question wire = one_matrix(1, 0, 0, 1);
+  EXPECT_TRUE(judged(wire, {make_array("r", {1, 9}, std::vector<double>{1, 0, 0, 0, 0, -1, 0, 1, 0})})
+                  .contains("nearest rotation"));
+  // Nothing is known: the previous one, to the bit.
+  const Question nothing = one_matrix(0, 0, 0, 2);
+  EXPECT_TRUE(judged(nothing, {make_array("r", {1, 9}, std::vector<double>{0, -1, 0, 1, 0, 0, 0, 0, 1})}).empty());
+  EXPECT_EQ(judged(nothing, rotation_about_z(0)).size(), 1u);
+  EXPECT_TRUE(judged(nothing, rotation_about_z(0)).contains("previous rotation kept"));
+}
+
+// Of a question about one body: the surface that the reference makes, and what it was made of.
+struct Skinned {
+  explicit Skinned(int64_t kind, uint64_t seed = 1) : question(named("surface").draw(seed, kind, Precision::binary64)) {
+    Guest guest(plugin(PLUGIN_reference_plugin));
+    answer = ask(guest, named("surface"), question, true);
+  }
+  Question question;
+  Answer answer;
+  std::map<std::string, std::string> judged(const Arrays& arrays) const {
+    return failing(named("surface").judge(question, arrays, Precision::binary32));
+  }
+  std::vector<double> vertices() const {
+    const auto v = answer.arrays[0].of<double>();
+    return {v.begin(), v.end()};
+  }
+  std::vector<int32_t> triangles() const {
+    const auto t = answer.arrays[1].of<int32_t>();
+    return {t.begin(), t.end()};
+  }
+  static Arrays arrays(const std::vector<double>& v, const std::vector<int32_t>& t) {
+    return {make_array("vertices", {static_cast<int64_t>(v.size()) / 3, 3}, v),
+            make_array("triangles", {static_cast<int64_t>(t.size()) / 3, 3}, t)};
+  }
+};
+int64_t kind_of_surface(const std::string& name) {
+  const auto kinds = named("surface").kinds();
+  return std::find(kinds.begin(), kinds.end(), name) - kinds.begin();
+}
+
+TEST(JudgeOfSurfaces, RejectsTheLeastThatIsWrong) {
+  const Skinned cavity(kind_of_surface("a cavity"));
+  EXPECT_TRUE(cavity.judged(cavity.answer.arrays).empty());
+  std::vector<int32_t> t = cavity.triangles();
+  std::vector<double> v = cavity.vertices();
+  const double h = find_array(cavity.question.given, "spacing")->number(0);
+
+  std::vector<int32_t> open(t.begin(), t.end() - 3);
+  EXPECT_TRUE(contains(cavity.judged(Skinned::arrays(v, open))["surface"], "the surface is open"));
+  std::vector<int32_t> flipped = t;
+  std::swap(flipped[0], flipped[1]);
+  EXPECT_TRUE(contains(cavity.judged(Skinned::arrays(v, flipped))["surface"], "one is flipped or doubled"));
+  std::vector<int32_t> twice = t;
+  twice[0] = twice[1];
+  EXPECT_TRUE(contains(cavity.judged(Skinned::arrays(v, twice))["surface"], "names a vertex twice"));
+  std::vector<int32_t> beyond = t;
+  beyond[0] = static_cast<int32_t>(v.size() / 3);
+  EXPECT_TRUE(contains(cavity.judged(Skinned::arrays(v, beyond))["surface"], "names vertex"));
+  // All of it inside out: the shell around the cavity is an outer one then.
+  std::vector<int32_t> inside_out = t;
+  for (std::size_t k = 0; k < t.size(); k += 3) std::swap(inside_out[k], inside_out[k + 1]);
+  EXPECT_TRUE(cavity.judged(Skinned::arrays(v, inside_out)).contains("surface shells") || cavity.question.kind.empty());
+  // A vertex beside its edge, by a little more than rounding.
+  std::vector<double> beside = v;
+  std::size_t across = 0;  // a coordinate that is a whole number
+  while (std::abs(v[across] / h - std::round(v[across] / h)) > 1e-9) ++across;
+  beside[across] += 1e-7 * h;
+  EXPECT_TRUE(cavity.judged(Skinned::arrays(beside, t)).empty());
+  beside[across] += 1e-5 * h;
+  EXPECT_TRUE(cavity.judged(Skinned::arrays(beside, t)).contains("surface vertices"));
+  // Each triangle with vertices of its own.
+  std::vector<double> soup;
+  std::vector<int32_t> numbered;
+  for (const int32_t vertex : t) {
+    for (std::size_t k = 0; k < 3; ++k) soup.push_back(v[3 * at(vertex) + k]);
+    numbered.push_back(static_cast<int32_t>(numbered.size()));
+  }
+  EXPECT_TRUE(
+      contains(cavity.judged(Skinned::arrays(soup, numbered))["surface vertices"], "vertices are to be shared"));
+  // Without the cavity's shell.
+  EXPECT_FALSE(cavity.judged(Skinned::arrays({}, {})).empty());
+}
+
+// The surface with inside and outside exchanged: what meets across the diagonal of a face is joined. It is made of the
+// empty nodes, whose own surface keeps such apart.
+Arrays other_polarity(const Question& question) {
+  const auto nodes = find_array(question.given, "nodes")->of<int32_t>();
+  const auto node = find_array(question.given, "node")->of<int32_t>();
+  const auto alive = find_array(question.given, "alive")->of<uint8_t>();
+  const double h = find_array(question.given, "spacing")->number(0);
+  std::set<std::array<int32_t, 3>> tissue;
+  for (std::size_t i = 0; i < alive.size(); ++i) {
+    if (alive[i] != 0) tissue.insert({node[3 * i], node[3 * i + 1], node[3 * i + 2]});
+  }
+  cutproof::Setup setup;
+  Body& body = setup.body;
+  for (std::size_t axis = 0; axis < 3; ++axis) body.grid.nodes[axis] = nodes[axis] + 2;
+  body.grid.spacing = h;
+  body.particle_at.assign(at(body.grid.node_count()), -1);
+  State state;
+  for (int32_t z = 0; z < nodes[2]; ++z) {
+    for (int32_t y = 0; y < nodes[1]; ++y) {
+      for (int32_t x = 0; x < nodes[0]; ++x) {
+        if (tissue.contains({x, y, z})) continue;
+        body.particle_at[at(body.grid.index(x + 1, y + 1, z + 1))] = static_cast<int32_t>(body.node.size());
+        body.node.push_back(body.grid.index(x + 1, y + 1, z + 1));
+        body.mass.push_back(1);
+      }
+    }
+  }
+  for (int32_t i = 0; i < body.particle_count(); ++i) {
+    state.x.push_back(body.rest_position(i));
+    state.alive.push_back(1);
+    state.clusters.members.push_back(i);
+    state.clusters.offsets.push_back(i + 1);
+    state.clusters.number.push_back(i);
+    state.clusters.rotation.emplace_back();
+    state.clusters.degenerate.push_back(0);
+  }
+  state.v.resize(state.x.size());
+  reference::update_rest_frames(body, state.clusters);
+  reference::skin(setup, state);
+  // Those of its vertices that lie at tissue; the others are around all of it.
+  std::vector<int32_t> number(state.skin.owner.size(), -1), triangles;
+  std::vector<double> vertices;
+  for (std::size_t v = 0; v < number.size(); ++v) {
+    auto end = body.grid.coordinates(body.node[at(state.skin.owner[v])]);
+    for (std::size_t axis = 0; axis < 3; ++axis) end[axis] += kDirections[state.skin.direction[v]][axis] - 1;
+    if (!tissue.contains(end)) continue;
+    number[v] = static_cast<int32_t>(vertices.size() / 3);
+    for (int axis = 0; axis < 3; ++axis) vertices.push_back(state.skin.position[v][axis] - h);
+  }
+  for (const auto& [a, b, c] : state.skin.triangles) {
+    if (number[at(a)] < 0) continue;
+    for (const int32_t v : {b, a, c}) triangles.push_back(number[at(v)]);
+  }
+  return Skinned::arrays(vertices, triangles);
+}
+
+TEST(JudgeOfSurfaces, NamesTheOtherPolarity) {
+  int joined = 0, same = 0;
+  for (int64_t index = 0; index < 160; ++index) {
+    const Question question = named("surface").draw(2, index, Precision::binary64);
+    const auto found = failing(named("surface").judge(question, other_polarity(question), Precision::binary64));
+    if (found.empty()) {
+      ++same;
+      continue;
+    }
+    ++joined;
+    ASSERT_EQ(found.size(), 1u) << question.kind << ": " << found.begin()->second;
+    EXPECT_TRUE(contains(found.at("surface shells"), "It is right in the other polarity"))
+        << found.at("surface shells");
+  }
+  EXPECT_GT(joined, 30);
+  EXPECT_GT(same, 30);
+}
+
+TEST(JudgeOfComponents, RejectsOneLabelThatIsWrong) {
+  const OperationDescription& operation = named("components");
+  Guest guest(plugin(PLUGIN_in_c));
+  for (int64_t index = 0; index < 60; ++index) {
+    const Question question = operation.draw(11, index, Precision::binary32);
+    const Answer answer = ask(guest, operation, question, true);
+    ASSERT_TRUE(failing(operation.judge(question, answer.arrays, Precision::binary32)).empty()) << question.kind;
+    const auto alive = find_array(question.given, "alive")->of<uint8_t>();
+    if (std::count(alive.begin(), alive.end(), 1) < 2) continue;
+    const auto living = at(std::find(alive.begin(), alive.end(), 1) - alive.begin());
+    const auto labels = answer.arrays[0].of<int32_t>();
+    std::vector<int32_t> wrong(labels.begin(), labels.end());
+    // Another's label, or one that nobody has, where its own component is larger.
+    const auto others = std::count_if(labels.begin(), labels.end(), [&](int32_t l) { return l != labels[living]; });
+    const bool is_alone = std::count(labels.begin(), labels.end(), labels[living]) == 1;
+    if (is_alone && others == 0) continue;
+    for (std::size_t i = 0; is_alone && i < labels.size(); ++i) {
+      if (alive[i] != 0 && labels[i] != labels[living]) wrong[living] = labels[i];
+    }
+    if (!is_alone) wrong[living] = 1'000'000;
+    if (wrong == std::vector<int32_t>(labels.begin(), labels.end())) continue;
+    const auto found = failing(operation.judge(
+        question, {make_array("label", {static_cast<int64_t>(wrong.size())}, wrong)}, Precision::binary32));
+    EXPECT_TRUE(found.contains("components")) << question.kind;
+  }
+}
+
+// --- Campaigns -------------------------------------------------------------------------------------------------------
+
+KernelCampaign judged(const std::string& library, const char* operation, const std::string& mode,
+                      KernelCampaignOptions options = {.cases = 300}) {
+  Guest guest(plugin(library, mode));
+  const harness::Promises promises = promises_of(guest.plugin(), named(operation), library);
+  return judge_kernel(guest, named(operation), promises, options, {});
+}
+const harness::PropertySummary* summary(const KernelCampaign& campaign, const std::string& property) {
+  return campaign.properties.find(property, Stage::skin);
+}
+
+TEST(KernelCampaign, HoldsOfWhatIsRight) {
+  for (const auto& [library, operation] : {std::pair{PLUGIN_in_c, "components"},
+                                           {PLUGIN_in_c, "clusters"},
+                                           {PLUGIN_reference_plugin, "rotations"},
+                                           {PLUGIN_reference_plugin, "surface"}}) {
+    const KernelCampaign campaign = judged(library, operation, "right");
+    EXPECT_TRUE(campaign.holds()) << operation;
+    EXPECT_GE(campaign.cases, 300);
+    EXPECT_GE(campaign.questions, static_cast<int64_t>(named(operation).kinds().size()));
+    EXPECT_EQ(campaign.refused + campaign.lost + campaign.failed, 0);
+    for (const harness::PropertySummary& property : campaign.properties.all()) EXPECT_GT(property.checked, 0);
+  }
+}
+
+TEST(KernelCampaign, FindsAndSimplifiesWrongAnswers) {
+  struct Wrong {
+    const char* library;
+    const char* operation;
+    const char* mode;
+    const char* property;
+    int64_t most;  // particles, or matrices, that are left
+  };
+  for (const Wrong& wrong : {Wrong{PLUGIN_in_c, "components", "label", "components", 2},
+                             {PLUGIN_in_c, "components", "join", "components", 2},
+                             {PLUGIN_in_c, "components", "unwritten", "components", 4},
+                             {PLUGIN_in_c, "clusters", "last_member", "well formed", 1},
+                             {PLUGIN_reference_plugin, "surface", "surface", "surface", 1}}) {
+    SCOPED_TRACE(wrong.mode);
+    const KernelCampaign campaign = judged(wrong.library, wrong.operation, wrong.mode);
+    EXPECT_FALSE(campaign.holds());
+    ASSERT_FALSE(campaign.failures.empty());
+    const KernelFailure& failure = campaign.failures.front();
+    EXPECT_EQ(failure.verdict.property, wrong.property);
+    EXPECT_LE(find_array(failure.simplest.given, "alive")->rows(), wrong.most);
+    EXPECT_FALSE(failure.of_simplest.holds);
+    EXPECT_GT(summary(campaign, wrong.property)->failed, 10);
+  }
+}
+
+TEST(KernelCampaign, JudgesOnlyWhatIsPromised) {
+  const KernelCampaign right_and_silent = judged(PLUGIN_in_c, "clusters", "right");
+  ASSERT_EQ(right_and_silent.unpromised.size(), 1u);
+  EXPECT_EQ(right_and_silent.unpromised[0].failing, 0);
+  const KernelCampaign silent = judged(PLUGIN_in_c, "clusters", "uncovered");
+  ASSERT_EQ(silent.unpromised.size(), 1u);
+  EXPECT_EQ(silent.unpromised[0].property, "edge cover");
+  EXPECT_GT(silent.unpromised[0].failing, 0);
+  EXPECT_EQ(summary(silent, "edge cover"), nullptr);
+  EXPECT_EQ(summary(silent, "determinism"), nullptr);
+
+  const KernelCampaign promised = judged(PLUGIN_in_c_that_promises, "clusters", "uncovered");
+  EXPECT_FALSE(promised.holds());
+  EXPECT_GT(summary(promised, "edge cover")->failed, 10);
+  EXPECT_TRUE(promised.unpromised.empty());
+  const KernelCampaign right = judged(PLUGIN_in_c_that_promises, "clusters", "right");
+  EXPECT_TRUE(right.holds());
+  EXPECT_GT(summary(right, "determinism")->checked, 0);
+
+  try {
+    judged(PLUGIN_in_c_that_promises_nonsense, "clusters", "right");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_TRUE(contains(error.what(), "promises: there is no promise 'perfect'")) << error.what();
+  }
+}
+
+TEST(KernelCampaign, DoesNotHoldWhereEverythingIsRefused) {
+  const KernelCampaign campaign = judged(PLUGIN_in_c, "components", "refuse");
+  EXPECT_FALSE(campaign.holds());
+  EXPECT_EQ(campaign.refused, campaign.questions);
+  EXPECT_EQ(campaign.failed, 0);
+}
+
+TEST(KernelCampaign, GivesUpAfterTenQuestionsWithoutAnAnswerUnlessToldNotTo) {
+  const KernelCampaign campaign = judged(PLUGIN_in_c, "components", "crash");
+  EXPECT_TRUE(campaign.gave_up);
+  EXPECT_EQ(campaign.lost, 10);
+  EXPECT_EQ(campaign.questions, 10);
+  const KernelCampaign stubborn = judged(PLUGIN_in_c, "components", "crash", {.cases = 40, .most_lost = 0});
+  EXPECT_EQ(stubborn.questions, 40);
+  EXPECT_EQ(stubborn.lost, 40);
+}
+
+// Wrong in one call of seven, in seven ways: every case is judged, and every way is found.
+TEST(KernelCampaign, ComesToItsEndThroughTwentyThousandCasesOfAGuestThatCrashesHangsAndLies) {
+  KernelCampaignOptions options{.cases = 20'000, .simplify = 0, .most_lost = 0};
+  if (const char* const fewer = std::getenv("CUTPROOF_CASES")) options.cases = std::max(500, std::atoi(fewer));
+  const KernelCampaign campaign = judged(PLUGIN_in_c, "components", "turns", options);
+  EXPECT_EQ(campaign.cases, options.cases);
+  EXPECT_FALSE(campaign.gave_up);
+  EXPECT_GT(campaign.refused, 0);
+  EXPECT_GT(campaign.lost, options.cases / 60);
+  std::set<std::string> properties;
+  for (const KernelFailure& failure : campaign.failures) properties.insert(failure.verdict.property);
+  EXPECT_EQ(properties, (std::set<std::string>{kAnswersProperty, "components"}));
+
+  Guest hanging(plugin(PLUGIN_in_c, "hang", 0.02));
+  const KernelCampaign hung =
+      judge_kernel(hanging, named("components"), {}, {.cases = 60, .simplify = 0, .most_lost = 0}, {});
+  EXPECT_EQ(hung.lost, 60);
+}
+
+// --- Stages ----------------------------------------------------------------------------------------------------------
+
+using property_tests::Case;
+
+std::string backend_name(const std::string& library, const std::string& parameters = "") {
+  return kPluginPrefix + library + (parameters.empty() ? "" : "," + parameters);
+}
+
+// What a plugin sees of a body, its setup and its state is all of it: the reference behind it gives the same bits.
+TEST(PluginBackend, CarriesEverythingToTheBit) {
+  const std::unique_ptr<Backend> guest = make_plugin_backend(backend_name(PLUGIN_reference_plugin));
+  for (uint64_t seed = 1; seed <= 40; ++seed) {
+    std::vector<cutproof::Setup> setups;
+    std::vector<State> states;
+    for (const int size : {10, 30, 50}) {
+      const property_tests::Instance one = property_tests::instance_of(
+          seed % 2 == 0 ? property_tests::draw_moving_case(seed, size) : property_tests::draw_case(seed, size));
+      setups.push_back(one.setup);
+      states.push_back(one.state);
+    }
+    const std::unique_ptr<Backend> reference = reference::make_backend();
+    guest->load(setups, states);
+    reference->load(setups, states);
+    for (int frame = 0; frame < 4; ++frame) {
+      for (const Stage stage : kStages) {
+        guest->run({stage, stage});
+        reference->run({stage, stage});
+        const auto mine = guest->snapshot(), wanted = reference->snapshot();
+        for (std::size_t b = 0; b < mine.size(); ++b) {
+          ASSERT_EQ(parts_that_differ(mine[b], wanted[b]), 0u)
+              << "seed " << seed << ", body " << b << ", after " << name_of(stage);
+        }
+        for (const Stage each : kStages) {
+          EXPECT_EQ(guest->report().ran[at(each)], reference->report().ran[at(each)]) << name_of(each);
+        }
+      }
+    }
+  }
+}
+
+property_tests::Campaign dissected(const std::string& backend, int64_t cases, bool dynamics = false) {
+  property_tests::CampaignOptions options;
+  options.cases = cases;
+  options.batch = 16;
+  options.dynamics = dynamics;
+  const property_tests::BackendSource source{
+      [&](int64_t) { return harness::make_backend({.name = backend, .split = {}, .rotation = {}}); }, false};
+  return property_tests::run_campaign(options, source, {});
+}
+
+TEST(PluginBackend, HoldsStageByStageAndFrameByFrame) {
+  for (const char* library : {PLUGIN_one_stage_plugin, PLUGIN_whole_frames_plugin, PLUGIN_reference_plugin}) {
+    const property_tests::Campaign campaign = dissected(backend_name(library), 120);
+    EXPECT_TRUE(campaign.violations.empty()) << property_tests::describe(campaign.violations.front().verdict);
+    EXPECT_GT(campaign.verdicts, 1000);
+    const property_tests::Campaign moving = dissected(backend_name(library), 200, true);
+    EXPECT_TRUE(moving.violations.empty()) << property_tests::describe(moving.violations.front().verdict);
+  }
+}
+
+TEST(PluginBackend, IsFoundAndSimplifiedWhereOneStageIsWrong) {
+  for (const auto& [stage, dynamics] : {std::pair{"split", false}, {"merge", false}, {"skin", false}, {"step", true}}) {
+    SCOPED_TRACE(stage);
+    const std::string backend = backend_name(PLUGIN_one_stage_plugin, stage);
+    const property_tests::Campaign campaign = dissected(backend, 1000, dynamics);
+    ASSERT_EQ(campaign.violations.size(), 1u);
+    const property_tests::Simplified simplified =
+        property_tests::simplify(campaign.violations.front(), {.name = backend, .split = {}, .rotation = {}}, 30);
+    EXPECT_TRUE(simplified.alone);
+    EXPECT_LE(simplified.counterexample.failing.strokes.size(), 3u);
+    EXPECT_LE(simplified.counterexample.failing.nodes.size(), 30u);
+    EXPECT_EQ(name_of(campaign.violations.front().verdict.stage), stage);
+  }
+}
+
+// Bodies of an odd number of particles are refused: they count as that, and the others are judged.
+TEST(PluginBackend, CountsWhatIsRefused) {
+  const property_tests::Campaign campaign = dissected(backend_name(PLUGIN_one_stage_plugin, "refuse"), 120);
+  EXPECT_TRUE(campaign.violations.empty());
+  EXPECT_GT(campaign.refused, 20);
+  EXPECT_LT(campaign.refused, 100);
+  EXPECT_GT(campaign.verdicts, 500);
+}
+
+TEST(PluginBackend, NeedsStages) {
+  EXPECT_THROW(make_plugin_backend(backend_name(PLUGIN_in_c)), InputError);
+  EXPECT_THROW(make_plugin_backend(backend_name("nowhere.so")), InputError);
+}
+
+// --- The program -----------------------------------------------------------------------------------------------------
+
+struct Ran {
+  int status = -1;
+  std::string output;
+};
+Ran run(const std::string& arguments) {
+  const std::string command = std::string(CUTPROOF_PROGRAM) + " " + arguments + " 2>&1";
+  FILE* const pipe = popen(command.c_str(), "r");
+  Ran result;
+  char buffer[4096];
+  for (std::size_t n; (n = fread(buffer, 1, sizeof buffer, pipe)) > 0;) result.output.append(buffer, n);
+  result.status = WEXITSTATUS(pclose(pipe));
+  return result;
+}
+
+class JudgeVerb : public ::testing::Test {
+ protected:
+  JudgeVerb() { fs::create_directories(folder_); }
+  ~JudgeVerb() override { fs::remove_all(folder_); }
+  const std::string folder_ = ::testing::TempDir() + "judge_" + std::to_string(getpid());
+};
+
+TEST_F(JudgeVerb, EndsWithTheStatusThatSaysWhatHappened) {
+  EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " --cases 60").status, 0);
+  EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " components --cases 60").status, 0);
+  const Ran version = run(std::string("judge ") + PLUGIN_of_another_version);
+  EXPECT_EQ(version.status, 2);
+  EXPECT_EQ(std::count(version.output.begin(), version.output.end(), '\n'), 2) << version.output;
+  EXPECT_EQ(run("judge nowhere.so").status, 2);
+  EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " magic").status, 2);
+  EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " rotations").status, 2) << "it has none";
+  EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " --save /nowhere").status, 2);
+  const Ran skipped = run(std::string("judge ") + PLUGIN_in_c + " --parameters cannot");
+  EXPECT_EQ(skipped.status, 77);
+  EXPECT_EQ(skipped.output, "cutproof: skipped: its create() gave nothing: it cannot run here\n");
+  EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " components --parameters refuse --cases 60").status, 1);
+}
+
+TEST_F(JudgeVerb, SavesWhatFailsAndShowsItAgainWithoutThePluginsSource) {
+  const std::string document = folder_ + "/r.json", junit = folder_ + "/r.xml";
+  const Ran wrong = run(fmt::format("judge {} components --parameters label --cases 100 --save {} --json {} --junit {}",
+                                    PLUGIN_in_c, folder_, document, junit));
+  EXPECT_EQ(wrong.status, 1);
+  EXPECT_TRUE(contains(wrong.output, "simplified to 2 particles: an edge joins")) << wrong.output;
+  const json result = json::parse(text_of(document));
+  EXPECT_FALSE(result.at("holds").get<bool>());
+  const json& failure = result.at("operations").at(0).at("failures").at(0);
+  EXPECT_EQ(failure.at("property"), "components");
+  const std::string file = failure.at("file");
+  ASSERT_TRUE(fs::exists(file));
+  const Ran again = run(fmt::format("judge {} --case {} --parameters label", PLUGIN_in_c, file));
+  EXPECT_EQ(again.status, 1);
+  EXPECT_TRUE(contains(again.output, "FAILS: 'components': an edge joins")) << again.output;
+  const Ran right = run(fmt::format("judge {} --case {}", PLUGIN_in_c, file));
+  EXPECT_EQ(right.status, 0);
+  EXPECT_TRUE(contains(right.output, "holds: ")) << right.output;
+  const std::string report = text_of(junit);
+  EXPECT_TRUE(contains(report, "failures=\"1\"")) << report;
+  EXPECT_TRUE(contains(report, "an edge joins"));
+  EXPECT_TRUE(contains(report, "--case "));
+}
+
+TEST_F(JudgeVerb, ShowsACrashAsACaseOfItsReport) {
+  const std::string junit = folder_ + "/r.xml";
+  const Ran crashed =
+      run(fmt::format("judge {} components --parameters crash --save {} --junit {}", PLUGIN_in_c, folder_, junit));
+  EXPECT_EQ(crashed.status, 1);
+  EXPECT_TRUE(contains(crashed.output, "it was killed by signal 11 (SIGSEGV)"));
+  const std::string report = text_of(junit);
+  EXPECT_TRUE(contains(report, "name=\"answers\"")) << report;
+  EXPECT_TRUE(contains(report, "SIGSEGV"));
+}
+
+TEST_F(JudgeVerb, JudgesStagesToo) {
+  const Ran right = run(fmt::format("judge {} stages --cases 60 --save {}", PLUGIN_one_stage_plugin, folder_));
+  EXPECT_EQ(right.status, 0) << right.output;
+  const std::string document = folder_ + "/r.json";
+  const Ran wrong = run(fmt::format("judge {} stages --parameters split --cases 200 --save {} --json {}",
+                                    PLUGIN_one_stage_plugin, folder_, document));
+  EXPECT_EQ(wrong.status, 1);
+  EXPECT_TRUE(contains(wrong.output, "'split exactness' fails after split")) << wrong.output;
+  const json result = json::parse(text_of(document));
+  const std::string file = result.at("dissections").at("violations").at(0).at("file");
+  EXPECT_EQ(run("replay " + file).status, 1) << "on the plugin where it was found";
+  EXPECT_EQ(run("replay " + file + " --backend reference").status, 0);
+}
+
+}  // namespace
+}  // namespace cutproof::guests

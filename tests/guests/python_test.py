@@ -224,7 +224,7 @@ class Operations(Test):
             return vertices, [corners[::-1] for corners in triangles]
 
         text, _ = self.failure(surface=inside_out)
-        self.assertIn("It is inside out", text)
+        self.assertIn("are inside out", text)
 
     def test_right_clusters_as_lists_and_as_arrays(self):
         def as_arrays(tissue):

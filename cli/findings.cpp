@@ -1,0 +1,170 @@
+#include "cli/findings.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "cli/options.h"
+#include "model/io/atomic_file.h"
+#include "model/io/verdict_json.h"
+#include "model/stage.h"
+
+namespace cutproof::cli {
+
+namespace {
+
+using io::JunitCase;
+using io::JunitOutcome;
+using nlohmann::json;
+
+std::string case_name(const std::string& property, std::string_view stage) {
+  return fmt::format("{} after {}", property, stage);
+}
+
+// Its witness says what was found; a property of few words has none.
+std::string what_was_found(const Verdict& verdict) {
+  return verdict.witness.text.empty() ? io::verdict_text(verdict) : verdict.witness.text;
+}
+
+std::string what_was_found(const json& violation) {
+  const std::string witness = violation.value("witness", "");
+  return witness.empty() ? violation.at("text").get<std::string>() : witness;
+}
+
+// Of one property after one stage.
+struct CaseRow {
+  std::string name;
+  const Verdict* failing = nullptr;   // the first
+  const Verdict* expected = nullptr;  // the first that fails as the scene expects
+  int64_t verdicts = 0, failed = 0, looked = 0;
+  std::string vacuous = {};  // the first reason that was given
+};
+
+std::string replay_command(const json& violation, const Judging& judging) {
+  const std::string file = violation.value("file", "");
+  return file.empty() ? judging.again : "cutproof replay " + quoted(file);
+}
+
+// What a campaign that does not hold lacks beside properties that hold.
+bool is_about_the_whole(const json& document, const std::string& failure) {
+  return !failure.empty() && (document.at("violations").empty() || !document.value("complete", true));
+}
+
+constexpr const char* kWholeCampaign = "enough was judged";
+
+}  // namespace
+
+std::vector<JunitCase> cases_of(const std::vector<Verdict>& verdicts, const Judging& judging,
+                                const std::function<bool(const Verdict&)>& is_expected) {
+  std::vector<CaseRow> rows;
+  for (const Verdict& verdict : verdicts) {
+    const std::string name = case_name(verdict.property, name_of(verdict.stage));
+    auto row = rows.begin();
+    while (row != rows.end() && row->name != name) ++row;
+    if (row == rows.end()) row = rows.insert(rows.end(), {name});
+    ++row->verdicts;
+    row->looked += verdict.checked > 0 || !verdict.holds;
+    if (row->vacuous.empty()) row->vacuous = verdict.vacuous;
+    if (verdict.holds) continue;
+    if (is_expected && is_expected(verdict)) {
+      if (row->expected == nullptr) row->expected = &verdict;
+    } else {
+      ++row->failed;
+      if (row->failing == nullptr) row->failing = &verdict;
+    }
+  }
+  std::vector<JunitCase> cases;
+  for (const CaseRow& row : rows) {
+    JunitCase& one = cases.emplace_back(JunitCase{row.name, judging.class_name});
+    if (row.failing != nullptr) {
+      one.outcome = JunitOutcome::failed;
+      one.message = what_was_found(*row.failing);
+      one.text = fmt::format("{}\n{} of {} verdicts fail.\nsee it again: {}\n", io::verdict_text(*row.failing),
+                             row.failed, row.verdicts, judging.again);
+    } else if (row.expected != nullptr) {
+      one.text = fmt::format("It fails, as the scene expects: {}\n", io::verdict_text(*row.expected));
+    } else if (row.looked == 0) {
+      one.outcome = JunitOutcome::skipped;
+      one.message = "vacuous: " + (row.vacuous.empty() ? "there was nothing to look at" : row.vacuous);
+    }
+  }
+  return cases;
+}
+
+std::vector<JunitCase> cases_of(const harness::SceneJudge& judge, const Judging& judging) {
+  std::vector<JunitCase> cases =
+      cases_of(judge.verdicts(), judging, [&](const Verdict& verdict) { return judge.is_expected_failure(verdict); });
+  for (const harness::Judge::Unpromised& one : judge.unpromised()) {
+    cases.push_back({fmt::format("{}, where it is not promised", one.property), judging.class_name, 0,
+                     JunitOutcome::skipped,
+                     fmt::format("not promised: of {} states it would not hold in {}", one.states, one.failing)});
+  }
+  return cases;
+}
+
+std::vector<JunitCase> cases_of_campaign(const json& document, const std::string& failure, const Judging& judging) {
+  std::vector<JunitCase> cases;
+  const auto case_named = [&](const std::string& name) -> JunitCase& {
+    for (JunitCase& one : cases) {
+      if (one.name == name) return one;
+    }
+    return cases.emplace_back(JunitCase{name, judging.class_name});
+  };
+  for (const json& property : document.at("properties")) {
+    JunitCase& one =
+        case_named(case_name(property.at("property").get<std::string>(), property.at("stage").get<std::string>()));
+    if (property.at("failed").get<int64_t>() > 0) {
+      one.outcome = JunitOutcome::failed;
+      one.message = fmt::format("{} verdicts fail", property.at("failed").get<int64_t>());
+    } else if (property.at("judged").get<int64_t>() == 0) {
+      one.outcome = JunitOutcome::skipped;
+      one.message = "vacuous: there was nothing to look at in any case";
+    }
+  }
+  for (const json& violation : document.at("violations")) {
+    JunitCase& one =
+        case_named(case_name(violation.value("property", "violation"), violation.value("stage", "a case")));
+    const auto text = violation.at("text").get<std::string>();
+    if (one.outcome != JunitOutcome::failed || one.text.empty()) one.message = what_was_found(violation);
+    one.outcome = JunitOutcome::failed;
+    one.text += fmt::format("case {}: {}\nsee it again: {}\n", violation.at("index").get<int64_t>(), text,
+                            replay_command(violation, judging));
+  }
+  for (JunitCase& one : cases) {
+    if (one.outcome == JunitOutcome::failed && one.text.empty()) one.text = "see it again: " + judging.again + "\n";
+  }
+  JunitCase& whole = case_named(kWholeCampaign);
+  if (is_about_the_whole(document, failure)) {
+    // Cases that are missing could not be judged; what was judged too little was judged, and that is the failure.
+    whole.outcome = document.value("complete", true) ? JunitOutcome::failed : JunitOutcome::error;
+    whole.message = failure;
+    whole.text = fmt::format("{}\nsee it again: {}\n", failure, judging.again);
+  }
+  return cases;
+}
+
+std::vector<Failure> failures_of(const std::vector<Verdict>& verdicts, const Judging& judging,
+                                 const std::function<bool(const Verdict&)>& is_expected) {
+  std::vector<Failure> failures;
+  for (const Verdict& verdict : verdicts) {
+    if (verdict.holds || (is_expected && is_expected(verdict))) continue;
+    failures.push_back({verdict.property, what_was_found(verdict), judging.again});
+  }
+  return failures;
+}
+
+std::vector<Failure> failures_of_campaign(const json& document, const std::string& failure, const Judging& judging) {
+  std::vector<Failure> failures;
+  if (is_about_the_whole(document, failure)) failures.push_back({kWholeCampaign, failure, judging.again});
+  for (const json& violation : document.at("violations")) {
+    failures.push_back(
+        {violation.value("property", "violation"), what_was_found(violation), replay_command(violation, judging)});
+  }
+  return failures;
+}
+
+void write_junit(const std::string& path, const Judging& judging, double seconds, std::vector<JunitCase> cases) {
+  if (!path.empty()) io::write_text(path, io::junit_xml({{judging.suite, seconds, std::move(cases)}}));
+}
+
+}  // namespace cutproof::cli

@@ -1,0 +1,41 @@
+// What verdicts and campaigns came to, for continuous integration: as test cases (JUnit) and as annotations.
+#pragma once
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "cli/annotations.h"
+#include "harness/scene_judge.h"
+#include "model/io/junit.h"
+
+namespace cutproof::cli {
+
+// Who judged what, and how to see it again.
+struct Judging {
+  std::string suite;       // such as "cutproof run"
+  std::string class_name;  // of its cases: the suite, and what was judged
+  std::string again;       // a command line
+};
+
+// A case for each property and stage, in the order in which they first appear: failed with its first failing verdict,
+// skipped where no verdict of it looked at anything.
+// `is_expected`: a failure that the scene asks for, which passes.
+std::vector<io::JunitCase> cases_of(const std::vector<Verdict>& verdicts, const Judging& judging,
+                                    const std::function<bool(const Verdict&)>& is_expected = {});
+// The same of all that was judged of a run; what was not promised is skipped, with how often it would not hold.
+std::vector<io::JunitCase> cases_of(const harness::SceneJudge& judge, const Judging& judging);
+// Of a campaign's document. `failure`: of its conclusion, empty if it holds; it is a case by itself unless it is that
+// properties fail.
+std::vector<io::JunitCase> cases_of_campaign(const nlohmann::json& document, const std::string& failure,
+                                             const Judging& judging);
+
+std::vector<Failure> failures_of(const std::vector<Verdict>& verdicts, const Judging& judging,
+                                 const std::function<bool(const Verdict&)>& is_expected = {});
+std::vector<Failure> failures_of_campaign(const nlohmann::json& document, const std::string& failure,
+                                          const Judging& judging);
+
+// A file of one suite; nothing if `path` is empty.
+void write_junit(const std::string& path, const Judging& judging, double seconds, std::vector<io::JunitCase> cases);
+
+}  // namespace cutproof::cli

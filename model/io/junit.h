@@ -1,0 +1,35 @@
+// JUnit XML: the results of tests as continuous integration reads them. Plain data in, text out.
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace cutproof::io {
+
+enum class JunitOutcome {
+  passed,
+  failed,   // what was judged does not hold
+  skipped,  // there was nothing to judge, or nobody vouches for it
+  error     // it could not be judged
+};
+
+struct JunitCase {
+  std::string name, class_name;
+  double seconds = 0;
+  JunitOutcome outcome = JunitOutcome::passed;
+  std::string message = {};  // one line: why it did not pass; nothing of what passed
+  std::string text = {};     // the whole story, and how to see it again
+};
+
+struct JunitSuite {
+  std::string name;
+  double seconds = 0;  // wall time of all cases together
+  std::vector<JunitCase> cases = {};
+};
+
+// A document in UTF-8: <testsuites> of <testsuite> of <testcase>, with the attributes tests, failures, errors, skipped
+// and time of each suite and of all. What XML 1.0 cannot hold (control characters, bytes that are not UTF-8) is
+// replaced by U+FFFD.
+std::string junit_xml(const std::vector<JunitSuite>& suites);
+
+}  // namespace cutproof::io

@@ -1,0 +1,56 @@
+// Lines that GitHub takes for annotations: one line each, whatever stands in a witness.
+#include "cli/annotations.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+namespace cutproof::cli {
+namespace {
+
+std::string printed(const std::vector<Failure>& failures, const char* github_actions) {
+  if (github_actions != nullptr) {
+    setenv("GITHUB_ACTIONS", github_actions, 1);
+  } else {
+    unsetenv("GITHUB_ACTIONS");
+  }
+  testing::internal::CaptureStdout();
+  print_annotations(failures);
+  std::fflush(stdout);
+  unsetenv("GITHUB_ACTIONS");
+  return testing::internal::GetCapturedStdout();
+}
+
+TEST(AnAnnotation, SaysWhatFailsAndHowToSeeItAgain) {
+  EXPECT_EQ(annotation({"coverage", "particle 3 lies in no cluster", "cutproof replay x.json"}),
+            "::error title=cutproof: coverage::particle 3 lies in no cluster; see it again: cutproof replay x.json");
+}
+
+TEST(AnAnnotation, EscapesWhatALineCannotHold) {
+  EXPECT_EQ(annotation({"lockstep: 5 %, all", "100 %\r\nof: them, \x1B[31m", "cutproof run 'a\nb'"}),
+            "::error title=cutproof: lockstep%3A 5 %25%2C all::100 %25%0D%0Aof: them, ?[31m; see it again: "
+            "cutproof run 'a%0Ab'");
+}
+
+TEST(Annotations, AreForGitHubAlone) {
+  const std::vector<Failure> failures = {{"coverage", "a", "b"}, {"finite", "c", "d"}};
+  EXPECT_EQ(printed(failures, "true"), annotation(failures[0]) + "\n" + annotation(failures[1]) + "\n");
+  EXPECT_EQ(printed(failures, "false"), "");
+  EXPECT_EQ(printed(failures, ""), "");
+  EXPECT_EQ(printed(failures, nullptr), "");
+  EXPECT_EQ(printed({}, "true"), "");
+}
+
+TEST(Annotations, SayHowManyGitHubWouldNotShow) {
+  const auto lines = [](const std::string& text) { return std::count(text.begin(), text.end(), '\n'); };
+  const std::string ten = printed(std::vector<Failure>(10, {"coverage", "a", "b"}), "true");
+  EXPECT_EQ(lines(ten), 10);
+  EXPECT_EQ(ten.find("not shown"), std::string::npos);
+  const std::string more = printed(std::vector<Failure>(13, {"coverage", "a", "b"}), "true");
+  EXPECT_EQ(lines(more), 10);
+  EXPECT_NE(more.find("a (and 3 more that are not shown here); see"), std::string::npos) << more;
+}
+
+}  // namespace
+}  // namespace cutproof::cli
