@@ -5,7 +5,7 @@ set -euo pipefail
 
 packages=(
   g++ cmake ninja-build ccache git ca-certificates
-  libeigen3-dev libsuitesparse-dev libcgal-dev libboost-dev libboost-context-dev libhdf5-dev
+  libeigen3-dev libsuitesparse-dev libcgal-dev libboost-dev libboost-context-dev libhdf5-dev libzip-dev
   nlohmann-json3-dev libfmt-dev libcli11-dev
   libgtest-dev librapidcheck-dev
   python3 python3-h5py python3-numpy

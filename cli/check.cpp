@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "cli/check_state.h"
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "cli/output.h"
@@ -9,6 +10,7 @@
 #include "cli/terminal.h"
 #include "harness/recorded_run.h"
 #include "harness/scene_judge.h"
+#include "model/io/array_file.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
 
@@ -22,7 +24,7 @@ struct CheckOptions {
   std::string json;
 };
 
-int check(const CheckOptions& options) {
+int check_recording(const CheckOptions& options) {
   const harness::Depth depth = depth_asked(options.depth);
   const io::RecordingReader reader(options.recording);
   const io::Recording& recording = reader.header();
@@ -58,12 +60,21 @@ int check(const CheckOptions& options) {
   return judge.holds() ? 0 : 1;
 }
 
+int check(const CheckOptions& options) {
+  if (!io::is_array_file(options.recording)) return check_recording(options);
+  depth_asked(options.depth);  // there is no motion to leave out, but a depth that is none is refused all the same
+  return check_state(options.recording, options.json);
+}
+
 }  // namespace
 
 void add_check(CLI::App& program, Work& work) {
   const auto options = std::make_shared<CheckOptions>();
-  CLI::App* const command = program.add_subcommand("check", "judge a recording");
-  command->add_option("recording", options->recording, "what --record was given")->required()->type_name("RECORDING");
+  CLI::App* const command =
+      program.add_subcommand("check", "judge a recording, or a state of somebody else's simulator");
+  command->add_option("recording", options->recording, "what --record was given, or an NPZ or HDF5 file of arrays")
+      ->required()
+      ->type_name("RECORDING");
   add_check_depth(*command, options->depth, "how much is judged");
   add_json(*command, options->json, "write verdicts and counts");
   command->callback([options, &work] { work = [options] { return check(*options); }; });

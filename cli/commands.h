@@ -17,6 +17,7 @@ using Work = std::function<int()>;
 // Each adds a verb to `program`, and sets `work` if the command line names it.
 void add_run(CLI::App& program, Work& work);
 void add_check(CLI::App& program, Work& work);
+void add_kick(CLI::App& program, Work& work);
 void add_fuzz(CLI::App& program, Work& work);
 void add_replay(CLI::App& program, Work& work);
 void add_bench(CLI::App& program, Work& work);

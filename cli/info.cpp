@@ -41,7 +41,9 @@ std::string basis_of(const oracles::Property& property) {
 
 void print_properties() {
   fmt::print("properties: where each comes from, when it is judged, what it rests on\n");
-  for (const oracles::PropertyList* const list : oracles::properties()) {
+  oracles::PropertyLists lists = oracles::properties();
+  lists.push_back(&oracles::history_properties());
+  for (const oracles::PropertyList* const list : lists) {
     for (const oracles::Property& property : *list) {
       fmt::print("  {:<21} {}\n  {:<21} {}; rests on {}\n", property.name, property.source, "", due_of(property),
                  basis_of(property));

@@ -61,7 +61,7 @@ int run_command_line(int argc, char** argv) {
   app.require_subcommand(1);
   Work work;
   for (const auto add :
-       {add_run, add_judge, add_check, add_info, add_bench, add_tune, add_fuzz, add_replay, add_digest})
+       {add_run, add_judge, add_check, add_kick, add_info, add_bench, add_tune, add_fuzz, add_replay, add_digest})
     add(app, work);
   try {
     app.parse(argc, argv);

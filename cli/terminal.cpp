@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <vector>
@@ -101,6 +102,27 @@ void print_verdicts(const harness::SceneJudge& judge) {
   for (const std::string& note : judge.notes()) fmt::print("\nnote: {}\n", note);
   fmt::print("\n{} verdicts, {} failed: {}\n", judge.verdicts().size(), failures,
              judge.holds() ? "everything holds." : "NOT everything holds.");
+}
+
+void print_single_verdicts(const std::vector<Verdict>& verdicts) {
+  fmt::print("\n{:<24} {:>12} {:>11} {:>11} {:<7}  {}\n", "property", "checked", "measured", "bound", "unit", "");
+  for (const Verdict& verdict : verdicts) {
+    std::string mark = !verdict.holds ? "FAILS" : verdict.vacuous.empty() ? "holds" : "vacuous: " + verdict.vacuous;
+    if (verdict.undecided > 0) mark += fmt::format(", {} undecided", verdict.undecided);
+    fmt::print("{:<24} {:>12} {:>11} {:>11} {:<7}  {}\n", verdict.property, verdict.checked, figure(verdict.measured),
+               figure(verdict.bound), verdict.unit, mark);
+  }
+  for (const Verdict& verdict : verdicts) {
+    if (verdict.holds) continue;
+    fmt::print("\nFAILS: {}\n  measured {} {}, bound {} ({})\n  {}\n", verdict.property, figure(verdict.measured),
+               verdict.unit, figure(verdict.bound), verdict.bound_source, verdict.witness.text);
+  }
+}
+
+void print_whether_all_hold(const std::vector<Verdict>& verdicts) {
+  const auto failures = std::count_if(verdicts.begin(), verdicts.end(), [](const Verdict& v) { return !v.holds; });
+  fmt::print("\n{} verdicts, {} failed: {}\n", verdicts.size(), failures,
+             failures == 0 ? "what was judged holds." : "NOT everything holds.");
 }
 
 }  // namespace cutproof::cli

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "harness/scene_judge.h"
 
@@ -31,5 +32,10 @@ void print_filled(const std::string& text, const nlohmann::json& values);
 // greatest share of a bound; then the
 // first failures with their witnesses, and one line that says whether everything holds.
 void print_verdicts(const harness::SceneJudge& judge);
+
+// The same of single verdicts, of no run: one row each, then every failure with its witness.
+void print_single_verdicts(const std::vector<Verdict>& verdicts);
+// The last line of those, after all notes.
+void print_whether_all_hold(const std::vector<Verdict>& verdicts);
 
 }  // namespace cutproof::cli

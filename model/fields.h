@@ -116,7 +116,7 @@ namespace fields_detail {
 // Does not compile when a member is added or taken away: then the list above is to be changed as well.
 inline void know_every_member(const State& state) {
   [[maybe_unused]] const auto& [frame, x, v, alive, removed, debris, clusters, tau, cap, edge_covered, impulse, skin,
-                                precision] = state;
+                                precision, place_rounding] = state;
   [[maybe_unused]] const auto& [offsets, members, number, rotation, rest_center, mass, degenerate] = clusters;
   [[maybe_unused]] const auto& [owner, direction, position, triangles] = skin;
 }

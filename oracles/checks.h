@@ -28,6 +28,7 @@ void check_edge_cover(Judged& judged, Verdict& verdict);
 void check_rest_frames(Judged& judged, Verdict& verdict);
 void check_rotation_quality(Judged& judged, Verdict& verdict);
 void check_merge_maximality(Judged& judged, Verdict& verdict);
+void check_tissue_kept(Judged& judged, Verdict& verdict);
 void check_no_pass(Judged& judged, Verdict& verdict);
 void check_skin_surface(Judged& judged, Verdict& verdict);
 void check_skin_vertices(Judged& judged, Verdict& verdict);

@@ -27,8 +27,9 @@ struct Judge::Memory {
   // Makes `state` the last one, and forgets what rests on parts that have changed.
   void look_at(const State& state) {
     if (&state == last) return;
-    // Bounds follow from the precision, which is no part.
-    const bool comparable = last != nullptr && last->precision == state.precision;
+    // Bounds follow from the rounding, which is no part.
+    const bool comparable =
+        last != nullptr && last->precision == state.precision && last->place_rounding == state.place_rounding;
     const unsigned changed = comparable ? parts_that_differ(*last, state) : kAll;
     std::erase_if(held, [&](const Held& h) { return (h.property->rests_on & changed) != 0; });
     const bool last_is_good = last != nullptr && form.holds;

@@ -57,6 +57,9 @@ inline constexpr StateOracle merge_maximality{core_properties, "merge maximality
 inline constexpr StateOracle no_pass{core_properties, "no pass"};
 inline constexpr StateOracle skin_surface{core_properties,
                                           "skin surface"};  // closed, 2-manifold, oriented, by half-edges
+// The same of a surface whose vertices have no owners: `skin` has positions and triangles alone, and may be wrong in
+// any way.
+Verdict closed_surface(const Skin& skin);
 // Each vertex where its owner's clusters put it; owners alive, the other end of the edge empty.
 inline constexpr StateOracle skin_vertices{core_properties, "skin vertices"};
 

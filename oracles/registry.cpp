@@ -111,6 +111,12 @@ const PropertyList& motion_properties() {
   return list;
 }
 
+const PropertyList& history_properties() {
+  static const PropertyList list = {of_state("tissue kept", "oracles.md, Somebody else's state", "1", kAlive | kCut,
+                                             kAlways, "nothing is dead", check_tissue_kept)};
+  return list;
+}
+
 const Property& property_named(const PropertyList& list, std::string_view name) {
   for (const Property& property : list) {
     if (property.name == name) return property;

@@ -57,6 +57,10 @@ const PropertyList& core_properties();
 // The motion, computed again: what a step of the reference costs, and a few times that where rounding decides much.
 const PropertyList& motion_properties();
 
+// Of a state that stands for all that came before it: its list of removed particles names every one that was ever taken
+// out, where a state of a run names those of its frame. Who judges such a state adds this list.
+const PropertyList& history_properties();
+
 // Throws std::out_of_range if the list has no property of this name.
 const Property& property_named(const PropertyList& list, std::string_view name);
 

@@ -10,7 +10,7 @@
 namespace cutproof::oracles {
 
 // Bounds: tolerances.md, Detection and rest frames. The mean is taken relative to a member, as single precision has to
-// (a sum of coordinates would lose their digits), or in double.
+// (a sum of coordinates would lose their digits), or in double; or, in a state from a file, by absolute coordinates.
 void check_rest_frames(Judged& judged, Verdict& verdict) {
   const double h = judged.body.grid.spacing, u = unit_roundoff(judged.state) + kUnitRoundoff;
   // Dead members count too: between detect and split the frames are those of before.
@@ -26,7 +26,8 @@ void check_rest_frames(Judged& judged, Verdict& verdict) {
       arms += weighted.weight[at(i)] * norm(weighted.position[at(i)] - weighted.position[at(members.front())]);
     }
     const double sums = kDeviations * sum_rounds(static_cast<double>(members.size()));
-    const double by_sums = sums * (u * arms / means.mass + kUnitRoundoff * norm(means.rest));
+    const double by_sums = sums * (u * arms / means.mass + kUnitRoundoff * norm(means.rest)) +
+                           absolute_place_bound(judged.state, static_cast<double>(members.size()));
     nearest.see(norm(judged.clusters.rest_center[at(c)] - means.rest) / h, by_sums / h, c);
     nearest.see(std::abs(judged.clusters.mass[at(c)] - means.mass) / means.mass, sums * u, c);
   }

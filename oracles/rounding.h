@@ -13,6 +13,13 @@ namespace cutproof::oracles {
 // A sum of N terms, one after the other, in units of u times the sum of their sizes.
 inline double sum_rounds(double terms) { return 2 + std::sqrt(terms) / 2; }
 
+// A mean of `terms` places that were summed and stored as absolute coordinates, each rounded by at most
+// State::place_rounding [m]: as such a sum, and once more for each place and for the mean itself (tolerances.md,
+// Absolute coordinates). Squares of this are the share of a single mean.
+inline double absolute_mean_rounding(const State& state, double terms) {
+  return (2 + sum_rounds(terms)) * state.place_rounding;
+}
+
 // The number that arithmetic of this precision keeps of a place x of particle i [m]: in single precision its
 // displacement from rest.
 inline Vec3 stored_place(const Body& body, Precision precision, int32_t i, Vec3 x) {
@@ -22,6 +29,10 @@ inline Vec3 stored_place(const Body& body, Precision precision, int32_t i, Vec3 
 // What a rounding error of so many roundings of one size seldom exceeds, in standard deviations: 8, with probability
 // 3e-14 (Higham and Mary 2019; tolerances.md, Linear momentum).
 inline constexpr double kDeviations = 8;
+
+inline double absolute_place_bound(const State& state, double terms) {
+  return kDeviations * absolute_mean_rounding(state, terms);
+}
 
 // Of many comparisons the one that comes nearest to its bound, or goes farthest beyond. What is not a number is beyond.
 struct Nearest {

@@ -95,7 +95,9 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
       radius = std::max(radius, norm(weighted.position[at(i)] - means[at(c)].rest));
     }
     const double sum = sum_rounds(static_cast<double>(members.size())) * u * spread;
-    center_rounding.push_back(4 * u * u * dot(mean, mean) + 3 * sum * sum + 3 * u * u * radius * radius);
+    const double absolute = absolute_mean_rounding(state, static_cast<double>(members.size()));
+    center_rounding.push_back(4 * u * u * dot(mean, mean) + 3 * sum * sum + 3 * u * u * radius * radius +
+                              2 * absolute * absolute);  // now and at rest
   }
   std::vector<VertexPlace> places(skin.owner.size());
   for (std::size_t v = 0; v < places.size(); ++v) {
@@ -115,8 +117,8 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
     // Partial sums of terms that are as large as their mean: u² q² (1² + … + n²) / 3n².
     squares += count * u * u * terms * terms / 9;
     const Vec3 place = sum / count, kept = state.precision == Precision::binary32 ? place - rest : place;
-    const double in_doubles = 4 * kUnitRoundoff * norm(place);
-    squares = squares / (count * count) + u * u * dot(kept, kept) + in_doubles * in_doubles;
+    const double in_doubles = 4 * kUnitRoundoff * norm(place), absolute = absolute_mean_rounding(state, count);
+    squares = squares / (count * count) + u * u * dot(kept, kept) + in_doubles * in_doubles + absolute * absolute;
     places[v] = {place, kDeviations * std::sqrt(squares)};
   }
   return places;

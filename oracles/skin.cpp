@@ -25,7 +25,7 @@ HalfEdges half_edges_of(const Skin& skin) {
     const auto triangle = static_cast<int32_t>(t);
     edges.insert(edges.end(), {{a, {b, c, triangle}}, {b, {c, a, triangle}}, {c, {a, b, triangle}}});
   }
-  return {static_cast<int32_t>(skin.owner.size()), edges};
+  return {static_cast<int32_t>(skin.position.size()), edges};
 }
 
 // The first half-edge from a to b, and the next one if a surface has more than it may; null: there is none.
@@ -66,7 +66,7 @@ void check_duplicates(const Skin& skin, int32_t particle_count, Verdict& verdict
 
 // Closed and oriented: each half-edge is there once, and its opposite once.
 void check_edges(const Skin& skin, const HalfEdges& half_edges, Verdict& verdict) {
-  for (int32_t a = 0; a < static_cast<int32_t>(skin.owner.size()); ++a) {
+  for (int32_t a = 0; a < static_cast<int32_t>(skin.position.size()); ++a) {
     for (const HalfEdge& e : half_edges.of(a)) {
       const HalfEdge* const first = between(half_edges, a, e.to);
       if (const HalfEdge* const second = between(half_edges, a, e.to, first)) {
@@ -86,7 +86,7 @@ void check_edges(const Skin& skin, const HalfEdges& half_edges, Verdict& verdict
 
 // Manifold: the triangles around each vertex are one cycle. Requires the surface to be closed and oriented.
 void check_fans(const Skin& skin, const HalfEdges& half_edges, Verdict& verdict) {
-  for (int32_t v = 0; v < static_cast<int32_t>(skin.owner.size()); ++v) {
+  for (int32_t v = 0; v < static_cast<int32_t>(skin.position.size()); ++v) {
     const auto fan = half_edges.of(v);
     if (fan.empty()) return violate(verdict, owners_of(skin, {v}), "no triangle uses vertex {}", v);
     std::size_t length = 0;
@@ -102,10 +102,18 @@ void check_fans(const Skin& skin, const HalfEdges& half_edges, Verdict& verdict)
   }
 }
 
+// Both of the above, in the order in which they make sense.
+void check_closed(const Skin& skin, Verdict& verdict) {
+  const HalfEdges half_edges = half_edges_of(skin);
+  check_edges(skin, half_edges, verdict);
+  if (verdict.holds) check_fans(skin, half_edges, verdict);
+}
+
 }  // namespace
 
 Concerned owners_of(const Skin& skin, const std::vector<int32_t>& vertices) {
   std::set<int32_t> owners;
+  if (skin.owner.empty()) return {};
   for (const int32_t v : vertices) owners.insert(skin.owner[at(v)]);
   return {{}, {owners.begin(), owners.end()}};
 }
@@ -123,10 +131,25 @@ void check_skin_surface(Judged& judged, Verdict& verdict) {
   }
   check_triangles(skin, verdict);
   if (verdict.holds) check_duplicates(skin, judged.body.particle_count(), verdict);
-  if (!verdict.holds) return;
-  const HalfEdges half_edges = half_edges_of(skin);
-  check_edges(skin, half_edges, verdict);
-  if (verdict.holds) check_fans(skin, half_edges, verdict);
+  if (verdict.holds) check_closed(skin, verdict);
+}
+
+Verdict closed_surface(const Skin& skin) {
+  const Property& property = property_named(core_properties(), "skin surface");
+  Verdict verdict = start_verdict(property.name, {}, property.unit, property.source);
+  verdict.checked = static_cast<int64_t>(skin.triangles.size());
+  const auto vertices = static_cast<int32_t>(skin.position.size());
+  for (int32_t v = 0; v < vertices; ++v) {
+    if (!is_finite(skin.position[at(v)])) violate(verdict, {}, "the position of skin vertex {} is not finite", v);
+  }
+  for (std::size_t t = 0; t < skin.triangles.size(); ++t) {
+    for (const int32_t v : skin.triangles[t]) {
+      if (v < 0 || v >= vertices) violate(verdict, {}, "skin triangle {} names vertex {} of {}", t, v, vertices);
+    }
+  }
+  if (verdict.holds) check_triangles(skin, verdict);
+  if (verdict.holds) check_closed(skin, verdict);
+  return conclude(std::move(verdict), property.nothing);
 }
 
 void check_skin_vertices(Judged& judged, Verdict& verdict) {

@@ -4,7 +4,7 @@ namespace cutproof::cli {
 
 namespace {
 
-void print_row(const nlohmann::json& document) {
+void print_row_of_sensitivity(const nlohmann::json& document) {
   const nlohmann::json& row = document.at("rows").back();
   print_filled("{scene}, {disturbance} after {stage}: ", row);
   print_filled(row.at("least").is_null() ? "nothing is rejected\n" : "{least:.2g} {unit}, {property}\n", row);
@@ -47,7 +47,7 @@ void add_sensitivity(CLI::App& bench, Work& work) {
   add_count(*command, "--moments", options->moments, "of each stage, evenly over the run", CLI::Range(1, 1000));
   add_suite(*command, work, "write every row",
             {.run = [options](const auto& progress) { return run_sensitivity(*options, progress); },
-             .row = print_row,
+             .row = print_row_of_sensitivity,
              .end = print_sensitivity});
 }
 

@@ -33,6 +33,8 @@ constexpr hsize_t kCopiesOfChunk = 4;
 // Deflate shrinks by at most 1032.
 constexpr uint64_t kMostCompression = 1100;
 
+constexpr std::size_t kMostAxes = 8;
+
 // In the order of Scalar. HDF5's types exist only once the library runs.
 struct ScalarType {
   const char* name;
@@ -40,12 +42,13 @@ struct ScalarType {
   hid_t (*in_file)();  // little-endian on every machine
   hid_t (*in_memory)();
 };
-constexpr std::array<ScalarType, 5> kScalarTypes = {
+constexpr std::array<ScalarType, 6> kScalarTypes = {
     {{"float64", 8, [] { return H5T_IEEE_F64LE; }, [] { return H5T_NATIVE_DOUBLE; }},
      {"int32", 4, [] { return H5T_STD_I32LE; }, [] { return H5T_NATIVE_INT32; }},
      {"int64", 8, [] { return H5T_STD_I64LE; }, [] { return H5T_NATIVE_INT64; }},
      {"uint8", 1, [] { return H5T_STD_U8LE; }, [] { return H5T_NATIVE_UINT8; }},
-     {"uint64", 8, [] { return H5T_STD_U64LE; }, [] { return H5T_NATIVE_UINT64; }}}};
+     {"uint64", 8, [] { return H5T_STD_U64LE; }, [] { return H5T_NATIVE_UINT64; }},
+     {"float32", 4, [] { return H5T_IEEE_F32LE; }, [] { return H5T_NATIVE_FLOAT; }}}};
 
 const ScalarType& type_of(const Layout& layout) { return kScalarTypes[static_cast<std::size_t>(layout.scalar)]; }
 
@@ -372,6 +375,211 @@ void Table::read(int64_t first, int64_t count, void* values) const {
   if (count == 0) return;
   require_memory(kCopiesOfChunk * chunk_bytes_);
   transfer(first, count, [&](auto... arguments) { return H5Dread(arguments..., values); });
+}
+
+namespace {
+
+// Names as an iteration meets them. Exceptions must not cross HDF5, so what is wrong is kept.
+struct Met {
+  std::size_t most;
+  std::vector<std::string> names;
+  bool too_many = false, elsewhere = false;
+
+  herr_t see(const char* name) {
+    too_many = names.size() >= most;
+    if (too_many) return 1;
+    names.emplace_back(name);
+    return 0;
+  }
+};
+
+herr_t see_link(hid_t, const char* name, const H5L_info_t* link, void* met) {
+  Met& all = *static_cast<Met*>(met);
+  if (all.see(name) != 0) return 1;
+  all.elsewhere = link->type != H5L_TYPE_HARD;
+  return all.elsewhere ? 1 : 0;
+}
+herr_t see_attribute(hid_t, const char* name, const H5A_info_t*, void* met) {
+  return static_cast<Met*>(met)->see(name);
+}
+
+}  // namespace
+
+// In the order in which they lie in the file, and sorted here: HDF5 1.10 makes a table to sort them, and frees what it
+// has not yet filled in of that if the group is damaged.
+std::vector<std::string> names_in(hid_t group, std::size_t most) {
+  require_memory();
+  Met met{most, {}};
+  check(H5Literate(group, H5_INDEX_NAME, H5_ITER_NATIVE, nullptr, see_link, &met), "/");
+  if (met.too_many) throw Error("/", fmt::format("It holds more than {} things.", most));
+  if (met.elsewhere) throw Error(met.names.back(), "This is a link to something elsewhere.");
+  std::sort(met.names.begin(), met.names.end());
+  return met.names;
+}
+
+std::vector<std::string> attribute_names(hid_t object, std::size_t most) {
+  require_memory();
+  Met met{most, {}};
+  hsize_t from = 0;
+  check(H5Aiterate2(object, H5_INDEX_NAME, H5_ITER_NATIVE, &from, see_attribute, &met), "/");
+  if (met.too_many) throw Error("/", fmt::format("It has more than {} attributes.", most));
+  std::sort(met.names.begin(), met.names.end());
+  return met.names;
+}
+
+// What values are, from their type and extent.
+void Values::look(Id type, const Id& space, uint64_t most_bytes) {
+  const H5T_class_t kind = H5Tget_class(type.get());
+  std::size_t bytes = H5Tget_size(type.get());
+  if (kind == H5T_STRING) {
+    kind_ = ValueKind::text;
+    if (H5Tis_variable_str(type.get()) > 0) bytes = sizeof(char*);
+  } else if (kind == H5T_FLOAT && (bytes == 2 || bytes == 4 || bytes == 8)) {
+    kind_ = ValueKind::real;
+    bytes = std::max<std::size_t>(bytes, 4);             // half precision is widened
+  } else if (kind == H5T_INTEGER || kind == H5T_ENUM) {  // truth values are enumerations
+    const Id number = kind == H5T_ENUM ? Id(H5Tget_super(type.get()), H5Tclose, name_) : Id();
+    const hid_t integer = kind == H5T_ENUM ? number.get() : type.get();
+    kind_ = H5Tget_sign(integer) == H5T_SGN_NONE ? ValueKind::unsigned_integer : ValueKind::signed_integer;
+    bytes = H5Tget_size(integer);
+    if (bytes != 1 && bytes != 2 && bytes != 4 && bytes != 8) {
+      throw Error(name_, fmt::format("Its integers have {} bytes.", bytes));
+    }
+  } else {
+    throw Error(name_, "This is neither numbers nor text.");
+  }
+  bytes_each_ = static_cast<int64_t>(bytes);
+  const std::vector<hsize_t> dims = dimensions(space, name_);
+  if (dims.size() > kMostAxes) throw Error(name_, fmt::format("It has {} axes, more than {}.", dims.size(), kMostAxes));
+  uint64_t all = bytes;
+  for (const hsize_t extent : dims) {
+    if (extent != 0 && all > most_bytes / extent) {
+      throw Error(name_, fmt::format("It has more than {} bytes.", most_bytes));
+    }
+    all *= extent;
+    shape_.push_back(static_cast<int64_t>(extent));
+  }
+  type_ = std::move(type);
+}
+
+Values Values::of_attribute(hid_t object, const std::string& name, uint64_t most_bytes) {
+  require_memory();
+  Values values;
+  values.name_ = name;
+  values.id_ = Id(H5Aopen(object, name.c_str(), H5P_DEFAULT), H5Aclose, name);
+  values.look(Id(H5Aget_type(values.id_.get()), H5Tclose, name), Id(H5Aget_space(values.id_.get()), H5Sclose, name),
+              most_bytes);
+  return values;
+}
+
+Values Values::of_dataset(hid_t parent, const std::string& name, uint64_t most_bytes) {
+  require_memory();
+  Values values;
+  values.name_ = name;
+  values.is_dataset_ = true;
+  {
+    const Id object(H5Oopen(parent, name.c_str(), H5P_DEFAULT), H5Oclose, name);
+    if (H5Iget_type(object.get()) != H5I_DATASET) throw Error(name, "This is no dataset.");
+  }
+  values.id_ = Id(H5Dopen2(parent, name.c_str(), H5P_DEFAULT), H5Dclose, name);
+  const hid_t id = values.id_.get();
+  values.look(Id(H5Dget_type(id), H5Tclose, name), Id(H5Dget_space(id), H5Sclose, name), most_bytes);
+  const Id creation(H5Dget_create_plist(id), H5Pclose, name);
+  const H5D_layout_t layout = H5Pget_layout(creation.get());
+  if (layout == H5D_VIRTUAL) throw Error(name, "This is a virtual dataset: its numbers lie in other files.");
+  if (H5Pget_external_count(creation.get()) > 0) throw Error(name, "Its numbers lie in other files.");
+  const int filters = H5Pget_nfilters(creation.get());
+  check(std::min(filters, 0), name);
+  for (int k = 0; k < filters; ++k) {
+    unsigned flags = 0, config = 0;
+    std::size_t parameters = 0;
+    const H5Z_filter_t filter =
+        H5Pget_filter2(creation.get(), static_cast<unsigned>(k), &flags, &parameters, nullptr, 0, nullptr, &config);
+    if (filter < 0 || filter > H5Z_FILTER_SCALEOFFSET) {
+      throw Error(name, fmt::format("It has been through filter {}, which is not one of HDF5's own.", filter));
+    }
+  }
+  if (layout == H5D_CHUNKED) {
+    std::vector<hsize_t> chunk(values.shape_.size());
+    check(H5Pget_chunk(creation.get(), static_cast<int>(chunk.size()), chunk.data()), name);
+    uint64_t bytes = static_cast<uint64_t>(values.bytes_each_);
+    for (const hsize_t extent : chunk) {
+      if (extent != 0 && bytes > std::max<uint64_t>(kMostChunkBytes, values.bytes()) / extent) {
+        throw Error(name, "Its chunks are larger than it is.");
+      }
+      bytes *= extent;
+    }
+    values.chunk_bytes_ = bytes;
+  }
+  const uint64_t stored = H5Dget_storage_size(id);
+  if (values.bytes() / kMostCompression > stored || (values.bytes() > 0 && stored == 0)) {
+    throw Error(name, fmt::format("It claims {} bytes, and {} are stored for it.", values.bytes(), stored));
+  }
+  return values;
+}
+
+uint64_t Values::bytes() const {
+  auto bytes = static_cast<uint64_t>(bytes_each_);
+  for (const int64_t extent : shape_) bytes *= static_cast<uint64_t>(extent);
+  return bytes;
+}
+
+void Values::transfer(hid_t memory_type, void* values) const {
+  require_memory(kCopiesOfChunk * chunk_bytes_);
+  check(is_dataset_ ? H5Dread(id_.get(), memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values)
+                    : H5Aread(id_.get(), memory_type, values),
+        name_);
+}
+
+void Values::read(std::byte* values) const {
+  if (bytes() == 0) return;
+  const bool is_signed = kind_ == ValueKind::signed_integer;
+  hid_t type = bytes_each_ == 4 ? H5T_NATIVE_FLOAT : H5T_NATIVE_DOUBLE;
+  if (kind_ != ValueKind::real) {
+    type = bytes_each_ == 1   ? (is_signed ? H5T_NATIVE_INT8 : H5T_NATIVE_UINT8)
+           : bytes_each_ == 2 ? (is_signed ? H5T_NATIVE_INT16 : H5T_NATIVE_UINT16)
+           : bytes_each_ == 4 ? (is_signed ? H5T_NATIVE_INT32 : H5T_NATIVE_UINT32)
+                              : (is_signed ? H5T_NATIVE_INT64 : H5T_NATIVE_UINT64);
+  }
+  transfer(type, values);
+}
+
+std::vector<std::string> Values::texts() const {
+  std::size_t count = 1;
+  for (const int64_t extent : shape_) count *= static_cast<std::size_t>(extent);
+  std::vector<std::string> texts;
+  if (count == 0) return texts;
+  if (H5Tis_variable_str(type_.get()) > 0) {
+    std::vector<char*> pointers(count, nullptr);
+    transfer(type_.get(), pointers.data());
+    for (const char* const text : pointers) texts.emplace_back(text == nullptr ? "" : text);
+    const Id space = simple_space({count}, name_);
+    H5Dvlen_reclaim(type_.get(), space.get(), H5P_DEFAULT, pointers.data());
+    return texts;
+  }
+  const auto each = static_cast<std::size_t>(bytes_each_);
+  std::string all(count * each, '\0');
+  transfer(type_.get(), all.data());
+  for (std::size_t k = 0; k < count; ++k) {
+    std::string text = all.substr(k * each, each);
+    if (const std::size_t end = text.find('\0'); end != std::string::npos) text.resize(end);
+    texts.push_back(std::move(text));
+  }
+  return texts;
+}
+
+void write_dataset(hid_t parent, const std::string& name, const Layout& layout, const void* values) {
+  require_memory();
+  const Id creation = property_list(H5P_DATASET_CREATE);
+  forget_times(creation);
+  const Id space = simple_space(layout.shape, name);
+  Id dataset(H5Dcreate2(parent, name.c_str(), type_of(layout).in_file(), space.get(), H5P_DEFAULT, creation.get(),
+                        H5P_DEFAULT),
+             H5Dclose, name);
+  if (layout.bytes() > 0) {
+    check(H5Dwrite(dataset.get(), type_of(layout).in_memory(), H5S_ALL, H5S_ALL, H5P_DEFAULT, values), name);
+  }
+  dataset.close(name);
 }
 
 void write_table(hid_t parent, const std::string& name, const Layout& row, std::span<const std::byte> rows) {

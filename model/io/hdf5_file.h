@@ -64,7 +64,7 @@ class Id {
   Close close_ = nullptr;
 };
 
-enum class Scalar { f64, i32, i64, u8, u64 };
+enum class Scalar { f64, i32, i64, u8, u64, f32 };
 
 // How a C++ type lies in a file: scalars in an array of shape `shape` (none: one scalar).
 struct Layout {
@@ -156,6 +156,50 @@ class Table {
   hsize_t chunk_bytes_ = 0;  // if opened: of a chunk, in memory
   std::string name_;
 };
+
+// --- What others wrote: datasets and texts of any name, of any shape and of any type of number
+// ------------------------
+
+// Names of what lies in a group, ascending. Throws Error if there is more than `most`, or if a link leads elsewhere (a
+// soft or an external one).
+std::vector<std::string> names_in(hid_t group, std::size_t most);
+std::vector<std::string> attribute_names(hid_t object, std::size_t most);
+
+enum class ValueKind { signed_integer, unsigned_integer, real, text };
+
+// A dataset or an attribute, opened.
+class Values {
+ public:
+  // Throws Error if it is neither number nor text, has more than 8 axes, leads to other files (external storage,
+  // virtual datasets), has been through filters that are not HDF5's own, or claims more than `most_bytes`, or more than
+  // can be stored in what the file has of it.
+  static Values of_dataset(hid_t parent, const std::string& name, uint64_t most_bytes);
+  static Values of_attribute(hid_t object, const std::string& name, uint64_t most_bytes);
+  ValueKind kind() const { return kind_; }
+  int64_t bytes_each() const { return bytes_each_; }  // of a number: 1, 2, 4 or 8; a real: 4 or 8
+  const std::vector<int64_t>& shape() const { return shape_; }
+  uint64_t bytes() const;
+  // Requires numbers, and room for bytes(). In the machine's own order of bytes.
+  void read(std::byte* values) const;
+  // Requires text.
+  std::vector<std::string> texts() const;
+
+ private:
+  void look(Id type, const Id& space, uint64_t most_bytes);
+  void transfer(hid_t memory_type, void* values) const;
+
+  Id id_;
+  Id type_;
+  bool is_dataset_ = false;
+  ValueKind kind_ = ValueKind::real;
+  int64_t bytes_each_ = 0;
+  std::vector<int64_t> shape_;
+  uint64_t chunk_bytes_ = 0;
+  std::string name_;
+};
+
+// A dataset as others read it: plain, without compression.
+void write_dataset(hid_t parent, const std::string& name, const Layout& layout, const void* values);
 
 // A whole table at once.
 void write_table(hid_t parent, const std::string& name, const Layout& row, std::span<const std::byte> rows);

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "model/io/array_file.h"
 #include "tests/cli/program.h"
 
 namespace {
 
+using namespace cutproof;
 using nlohmann::json;
 
 constexpr const char* kScene = R"({"version": 1, "name": "small",
@@ -19,6 +21,15 @@ class Verbs : public Program {
   void SetUp() override {
     Program::SetUp();
     write("cut.json", kScene);
+    io::ArrayFile state, kick;
+    state.arrays = {make_array<double>("positions", {2, 3}, {0, 0, 0, 1, 0, 0}),
+                    make_array<int32_t>("edges", {1, 2}, {0, 1}), make_array<int32_t>("cluster_offsets", {2}, {0, 2}),
+                    make_array<int32_t>("cluster_members", {2}, {0, 1})};
+    io::write_array_file(path("state.npz"), state);
+    kick.arrays = {make_array<double>("positions", {1, 2, 3}, {0, 0, 0, 1, 0, 0}),
+                   make_array<double>("kicked", {1, 2, 3}, {0, 0, 0, 2, 0, 0}),
+                   make_array<int32_t>("piece", {2}, {0, 1})};
+    io::write_array_file(path("kick.npz"), kick);
   }
   std::string counterexample() const {
     return (files::path(CUTPROOF_SOURCE) / "fixtures/regressions/skin_cell_not_renewed.json").string();
@@ -31,6 +42,8 @@ class Verbs : public Program {
             "--version",
             "run cut.json --check",
             "check seen",
+            "check state.npz",
+            "kick kick.npz",
             "digest seen",
             "fuzz --cases 20 --sizes 0-20",
             "replay '" + counterexample() + "'",
@@ -107,6 +120,9 @@ TEST_F(Verbs, RefuseWhatIsGivenButEmpty) {
                                                         {"run ''", "scene"},
                                                         {"check seen --json ''", "--json"},
                                                         {"check ''", "recording"},
+                                                        {"check state.npz --json ''", "--json"},
+                                                        {"kick kick.npz --json ''", "--json"},
+                                                        {"kick ''", "file"},
                                                         {"digest ''", "recording"},
                                                         {"fuzz --cases 5 --json ''", "--json"},
                                                         {"fuzz --cases 5 --shard ''", "--shard"},
@@ -138,6 +154,11 @@ TEST_F(Verbs, RefuseUnknownOptionsMissingValuesAndNegativeCounts) {
                                                         {"run cut.json --frames -1", "--frames"},
                                                         {"run cut.json --particles -1", "--particles"},
                                                         {"check seen --frobnicate", "--frobnicate"},
+                                                        {"kick kick.npz --frobnicate", "--frobnicate"},
+                                                        {"kick", "file"},
+                                                        {"kick state.npz", "edges"},
+                                                        {"check kick.npz", "kicked"},
+                                                        {"check state.npz --check deep", "deep"},
                                                         {"digest seen --frobnicate", "--frobnicate"},
                                                         {"check seen --json", "--json"},
                                                         {"info --frobnicate", "--frobnicate"},

@@ -35,7 +35,8 @@ class ScratchFolder {
 }  // namespace
 
 std::span<const Target> all_targets() {
-  static const std::array<Target, 7> targets = {kScene, kStl, kObj, kPly, kOff, kRecording, kRecordingContents};
+  static const std::array<Target, 8> targets = {kScene, kStl, kObj, kPly, kOff, kRecording, kRecordingContents,
+                                                kArrays};
   return targets;
 }
 

@@ -43,7 +43,7 @@ template <class F>
 Outcome outcome_of(F&& action);
 
 // One for each reader, in files of their names.
-extern const Target kScene, kStl, kObj, kPly, kOff, kRecording, kRecordingContents;
+extern const Target kScene, kStl, kObj, kPly, kOff, kRecording, kRecordingContents, kArrays;
 
 }  // namespace cutproof::input_fuzzing
 

@@ -74,8 +74,9 @@ TEST(Fields, AreTheMembersOfAStateEachOnce) {
   const State state;
   Visited visited;
   for_each_field([&](const Field&, auto get) { visited.see(get(state)); });
-  // All but the precision, which is of the arithmetic and not of the body.
-  const auto& [frame, x, v, alive, removed, debris, clusters, tau, cap, edge_covered, impulse, skin, precision] = state;
+  // All but the precision and the rounding of places, which are of the arithmetic and not of the body.
+  const auto& [frame, x, v, alive, removed, debris, clusters, tau, cap, edge_covered, impulse, skin, precision,
+               place_rounding] = state;
   const auto& [offsets, members, number, rotation, rest_center, mass, degenerate] = clusters;
   const auto& [owner, direction, position, triangles] = skin;
   visited.expect_once(frame, x, v, alive, removed, debris, tau, cap, edge_covered, impulse, offsets, members, number,

@@ -271,23 +271,26 @@ TEST_F(Remembering, EachPropertyRestsOnExactlyThePartsThatItSays) {
   }
 }
 
-// Bounds follow from the precision, which is no part.
+// Bounds follow from the precision and from the rounding of places, which are no parts.
 TEST_F(Remembering, AsksAgainWhereOnlyThePrecisionChanged) {
-  State coarse = pool_of(setup_).front();
-  coarse.precision = Precision::binary32;
-  coarse.clusters.rest_center[0].x *= 1 + 0x1p-26;
-  State fine = coarse;
-  fine.precision = Precision::binary64;
-  Judge remembering(setup_, properties());
-  const auto rest_frames_hold = [&](const State& state) {
-    for (const Verdict& verdict : remembering.state(state, Stage::skin, false)) {
-      if (verdict.property == "rest frames") return verdict.holds;
-    }
-    ADD_FAILURE() << "not asked";
-    return false;
-  };
-  EXPECT_TRUE(rest_frames_hold(coarse));
-  EXPECT_FALSE(rest_frames_hold(fine));
+  State exact = pool_of(setup_).front();
+  exact.clusters.rest_center[0].x *= 1 + 0x1p-26;
+  State single = exact, absolute = exact;
+  single.precision = Precision::binary32;
+  absolute.place_rounding = 0x1p-24;
+  for (const State& coarse : {single, absolute}) {
+    const State fine = exact;
+    Judge remembering(setup_, properties());
+    const auto rest_frames_hold = [&](const State& state) {
+      for (const Verdict& verdict : remembering.state(state, Stage::skin, false)) {
+        if (verdict.property == "rest frames") return verdict.holds;
+      }
+      ADD_FAILURE() << "not asked";
+      return false;
+    };
+    EXPECT_TRUE(rest_frames_hold(coarse));
+    EXPECT_FALSE(rest_frames_hold(fine));
+  }
 }
 
 // The same of stages: both states are looked at anew, whichever part has changed since the last one.

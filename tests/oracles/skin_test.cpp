@@ -279,5 +279,64 @@ TEST(SkinVertices, RejectsACrossedEdgeWithoutVertex) {
   EXPECT_EQ(verdict.witness.particles, std::vector<int32_t>{1});
 }
 
+// --- A surface without owners ----------------------------------------------------------------------------------------
+
+class ClosedSurface : public ::testing::Test {
+ protected:
+  ClosedSurface() : skin(scene_of({{1, 1, 1}}).state.skin) {
+    skin.owner.clear();
+    skin.direction.clear();
+  }
+  void expect_rejected_for(const char* text) const {
+    const Verdict verdict = closed_surface(skin);
+    EXPECT_FALSE(verdict.holds);
+    EXPECT_NE(verdict.witness.text.find(text), std::string::npos) << verdict.witness.text;
+  }
+  Skin skin;  // an octahedron
+};
+
+TEST_F(ClosedSurface, HoldsOrIsVacuous) {
+  const Verdict verdict = closed_surface(skin);
+  EXPECT_TRUE(verdict.holds) << verdict.witness.text;
+  EXPECT_EQ(verdict.checked, 8);
+  EXPECT_EQ(closed_surface({}).vacuous, "no skin");
+}
+TEST_F(ClosedSurface, IsRejectedIfATriangleIsMissing) {
+  skin.triangles.pop_back();
+  expect_rejected_for("open");
+}
+TEST_F(ClosedSurface, IsRejectedIfATriangleIsFlipped) {
+  std::swap(skin.triangles[0][0], skin.triangles[0][1]);
+  expect_rejected_for("flipped");
+}
+TEST_F(ClosedSurface, IsRejectedIfTwoPartsMeetInAVertex) {
+  const auto n = static_cast<int32_t>(skin.position.size());
+  for (int32_t v = 1; v < n; ++v) skin.position.push_back(skin.position[static_cast<std::size_t>(v)]);
+  for (std::size_t k = 0; k < 8; ++k) {
+    auto other = skin.triangles[k];
+    for (int32_t& v : other) v = v == 0 ? 0 : v + n - 1;
+    skin.triangles.push_back(other);
+  }
+  expect_rejected_for("pinched");
+}
+TEST_F(ClosedSurface, IsRejectedIfItNamesWhatIsNotThere) {
+  for (const int32_t wrong : {-1, 6}) {
+    skin.triangles[2][1] = wrong;
+    expect_rejected_for("names vertex");
+  }
+}
+TEST_F(ClosedSurface, IsRejectedIfAVertexIsNowhere) {
+  skin.position[3].y = kNan;
+  expect_rejected_for("vertex 3 is not finite");
+}
+TEST_F(ClosedSurface, IsRejectedIfATriangleHasACornerTwiceOrAVertexNone) {
+  const Skin right = skin;
+  skin.triangles[0][0] = skin.triangles[0][1];
+  expect_rejected_for("twice");
+  skin = right;
+  skin.position.push_back({});
+  expect_rejected_for("no triangle uses vertex 6");
+}
+
 }  // namespace
 }  // namespace cutproof::oracles

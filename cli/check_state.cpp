@@ -1,0 +1,69 @@
+#include "cli/check_state.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "cli/output.h"
+#include "cli/terminal.h"
+#include "harness/foreign_judge.h"
+#include "model/io/array_file.h"
+#include "model/io/verdict_json.h"
+
+namespace cutproof::cli {
+
+namespace {
+
+nlohmann::json to_json(const std::string& file, const harness::ForeignState& foreign,
+                       const harness::ForeignVerdicts& judged) {
+  nlohmann::json promises = nlohmann::json::array(), not_judged = nlohmann::json::array();
+  for (std::size_t k = 0; k < harness::promise_words().size(); ++k) {
+    if ((foreign.promises.words >> k & 1u) != 0) promises.push_back(harness::promise_words()[k].name);
+  }
+  for (const harness::NotJudged& each : judged.not_judged) {
+    not_judged.push_back({{"property", each.property}, {"why", each.why}});
+  }
+  const auto failed = std::count_if(judged.verdicts.begin(), judged.verdicts.end(),
+                                    [](const Verdict& verdict) { return !verdict.holds; });
+  return {{"format", "cutproof.check_state"},
+          {"format_version", 1},
+          {"cutproof", kVersion},
+          {"source", file},
+          {"body",
+           {{"particles", foreign.state.x.size()},
+            {"clusters", foreign.state.clusters.count()},
+            {"spacing", foreign.setup.body.grid.spacing},
+            {"on_grid", foreign.setup.body.on_grid()}}},
+          {"arrays", foreign.given},
+          {"promises", promises},
+          {"promises_given", foreign.promises_given},
+          {"single_precision", foreign.state.precision == Precision::binary32},
+          {"verdicts", io::verdicts_json(judged.verdicts)},
+          {"not_judged", not_judged},
+          {"summary", {{"holds", judged.holds()}, {"verdicts", judged.verdicts.size()}, {"failed", failed}}},
+          {"notes", judged.notes}};
+}
+
+}  // namespace
+
+int check_state(const std::string& file, const std::string& json) {
+  const harness::ForeignState foreign = harness::foreign_state_of(io::read_array_file(file), file);
+  require_writable(json);
+  const harness::ForeignVerdicts judged = harness::judge_foreign_state(foreign);
+  write_document(json, to_json(file, foreign, judged));
+  fmt::print("state {}: {} particles in {} clusters, {}\n", file, foreign.state.x.size(),
+             foreign.state.clusters.count(), foreign.given.contains("nodes") ? "on a grid" : "as a graph");
+  print_single_verdicts(judged.verdicts);
+  fmt::print("\n");
+  for (const harness::NotJudged& each : judged.not_judged) {
+    fmt::print("not judged: {}: {}\n", each.property, each.why);
+  }
+  for (const std::string& note : judged.notes) fmt::print("\nnote: {}\n", note);
+  print_whether_all_hold(judged.verdicts);
+  if (!json.empty()) fmt::print("wrote {}\n", json);
+  return judged.holds() ? 0 : 1;
+}
+
+}  // namespace cutproof::cli

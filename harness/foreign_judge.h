@@ -1,0 +1,27 @@
+// Judges one state that somebody else's simulator wrote, by the registry of properties. What the file leaves out, what
+// its author does not promise and what a single state cannot show is not judged, and is named.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "harness/foreign_state.h"
+#include "model/verdict.h"
+
+namespace cutproof::harness {
+
+struct NotJudged {
+  std::string property, why;
+};
+
+struct ForeignVerdicts {
+  std::vector<Verdict> verdicts;
+  std::vector<NotJudged> not_judged;  // in the order of the registry
+  std::vector<std::string> notes;     // what a reader of the verdicts has to know, one sentence each
+
+  // Also false if nothing but the form of the state was judged.
+  bool holds() const;
+};
+
+ForeignVerdicts judge_foreign_state(const ForeignState& foreign);
+
+}  // namespace cutproof::harness

@@ -1,0 +1,55 @@
+// Named arrays of a file that somebody else wrote, taken out one by one: each is there or not, has the shape and the
+// kind of numbers that it should have, and no name is unknown. Whatever is not so is an InputError.
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "model/io/array_file.h"
+#include "model/vec.h"
+
+namespace cutproof::harness {
+
+struct KnownArray {
+  std::string_view name, text;  // what it holds, in a few words
+};
+
+class NamedArrays {
+ public:
+  // Keeps references. Throws InputError for an array or a text that is not among `known`, naming those that are.
+  NamedArrays(const io::ArrayFile& contents, const std::string& file, const std::vector<KnownArray>& known,
+              const std::vector<KnownArray>& known_texts);
+
+  [[noreturn]] void refuse(std::string_view name, const std::string& problem, const std::string& remedy) const;
+  bool has(std::string_view name) const { return find_array(contents_.arrays, name) != nullptr; }
+  // Null if it is not there. `shape`: extents, of which -1 may be any.
+  const Array* find(std::string_view name, const std::vector<int64_t>& shape) const;
+  const Array& require(std::string_view name, const std::vector<int64_t>& shape) const;
+  const Array& require_either(std::string_view name, const std::vector<int64_t>& shape,
+                              const std::vector<int64_t>& other) const;
+  // Throws InputError unless both are there or neither.
+  bool both(std::string_view a, std::string_view b) const;
+
+  // Whole numbers, each of 32 bits.
+  std::vector<int32_t> integers(const Array& array) const;
+  std::vector<int64_t> long_integers(const Array& array) const;
+  std::vector<double> numbers(const Array& array) const;
+  // Floating-point numbers, three to an entry.
+  std::vector<Vec3> vectors(const Array& array) const;
+  // One number: of shape () or (1).
+  std::optional<double> number(std::string_view name) const;
+  std::optional<int64_t> whole_number(std::string_view name) const;
+
+  const std::string& file() const { return file_; }
+
+ private:
+  void require_whole(const Array& array) const;
+  const io::ArrayFile& contents_;
+  const std::string& file_;
+};
+
+bool is_real(const Array& array);
+
+}  // namespace cutproof::harness

@@ -1,0 +1,47 @@
+// What reading NPZ and HDF5 shares. Internal to model/io/.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "model/error.h"
+#include "model/io/array_file.h"
+
+namespace cutproof::io {
+
+// Numbers as a file has them: in the machine's order of bytes, which is little endian.
+enum class RawKind { signed_integer, unsigned_integer, real };
+struct RawNumbers {
+  RawKind kind = RawKind::real;
+  int64_t bytes_each = 8;  // 1, 2, 4 or 8; a real: 2, 4 or 8
+  std::vector<int64_t> shape;
+  std::vector<std::byte> bytes;
+};
+
+// As one of the five types of model/arrays.h. Throws InputError if a value fits none.
+Array array_of(std::string name, RawNumbers raw, const std::string& file);
+
+// Adds to what was read. Throws InputError if the name is taken, if it is no plain name, or if the limits are exceeded.
+class ArrayCollector {
+ public:
+  explicit ArrayCollector(std::string file) : file_(std::move(file)) {}
+  // Before an array of that size is allocated.
+  void announce(const std::string& name, uint64_t bytes);
+  void add(const std::string& name, RawNumbers raw);
+  void add(const std::string& name, const std::vector<std::string>& texts);
+  uint64_t bytes_left() const { return kMostArrayBytes - bytes_; }
+  ArrayFile take() { return std::move(contents_); }
+
+ private:
+  void require_new(const std::string& name) const;
+  std::string file_;
+  ArrayFile contents_;
+  uint64_t bytes_ = 0;
+};
+
+// Of a file that is known to begin as such a file does.
+ArrayFile read_npz(const std::string& path);
+ArrayFile read_hdf5_arrays(const std::string& path);
+void write_npz(const std::string& path, const ArrayFile& contents);
+void write_hdf5_arrays(const std::string& path, const ArrayFile& contents);
+
+}  // namespace cutproof::io

@@ -1,0 +1,86 @@
+// Arrays in HDF5: a flat group of datasets.
+#include <fmt/format.h>
+
+#include "model/at.h"
+#include "model/io/array_parts.h"
+#include "model/io/atomic_file.h"
+#include "model/io/hdf5_file.h"
+
+namespace cutproof::io {
+namespace {
+
+constexpr const char* kArraysRemedy =
+    "Write plain datasets of numbers and texts into the root of the file, without links, in HDF5's own formats.";
+
+RawKind kind_of(hdf5::ValueKind kind) {
+  if (kind == hdf5::ValueKind::real) return RawKind::real;
+  return kind == hdf5::ValueKind::signed_integer ? RawKind::signed_integer : RawKind::unsigned_integer;
+}
+
+void collect_text(const hdf5::Values& values, const std::string& name, ArrayCollector& found) {
+  if (values.shape().size() > 1) throw hdf5::Error(name, "A text is one string, or a list of them.");
+  found.announce(name, values.bytes());
+  found.add(name, values.texts());
+}
+
+void collect(const hdf5::File& file, ArrayCollector& found) {
+  const hdf5::Id root = hdf5::open_group(file.id(), "/");
+  for (const std::string& name : hdf5::names_in(root.get(), kMostArrays)) {
+    const hdf5::Values values = hdf5::Values::of_dataset(root.get(), name, found.bytes_left());
+    if (values.kind() == hdf5::ValueKind::text) {
+      collect_text(values, name, found);
+      continue;
+    }
+    found.announce(name, values.bytes());
+    RawNumbers raw{kind_of(values.kind()), values.bytes_each(), values.shape(), {}};
+    raw.bytes.resize(values.bytes());
+    values.read(raw.bytes.data());
+    found.add(name, std::move(raw));
+  }
+  for (const std::string& name : hdf5::attribute_names(root.get(), kMostArrays)) {
+    const hdf5::Values values = hdf5::Values::of_attribute(root.get(), name, kMostTextBytes);
+    if (values.kind() != hdf5::ValueKind::text) {
+      throw hdf5::Error(name, "This attribute is no text. Numbers are read from datasets.");
+    }
+    collect_text(values, name, found);
+  }
+}
+
+hdf5::Layout layout_of(const Array& array) {
+  constexpr hdf5::Scalar kScalars[] = {hdf5::Scalar::i32, hdf5::Scalar::i64, hdf5::Scalar::u8, hdf5::Scalar::f32,
+                                       hdf5::Scalar::f64};  // in the order of ElementType, which begins with 1
+  hdf5::Layout layout{kScalars[static_cast<std::size_t>(array.type) - 1], {}};
+  for (const int64_t extent : array.shape) layout.shape.push_back(static_cast<hsize_t>(extent));
+  return layout;
+}
+
+}  // namespace
+
+ArrayFile read_hdf5_arrays(const std::string& path) {
+  const hdf5::Quiet quiet;
+  ArrayCollector found(path);
+  try {
+    collect(hdf5::File::open(path), found);
+  } catch (const hdf5::Error& error) {
+    throw InputError(path, error.where() == path ? "" : error.where(), error.what(), kArraysRemedy);
+  }
+  return found.take();
+}
+
+void write_hdf5_arrays(const std::string& path, const ArrayFile& contents) {
+  AtomicFile target(path);
+  const hdf5::Quiet quiet;
+  try {
+    hdf5::File file = hdf5::File::create(target.temporary());
+    for (const Array& array : contents.arrays) {
+      hdf5::write_dataset(file.id(), array.name, layout_of(array), array.bytes.data());
+    }
+    for (const NamedText& text : contents.texts) hdf5::write_text_attribute(file.id(), text.name, text.text);
+    file.close();
+  } catch (const hdf5::Error& error) {
+    throw MachineError(fmt::format("{}: The file could not be written. {}", path, error.what()));
+  }
+  target.commit();
+}
+
+}  // namespace cutproof::io

@@ -1,0 +1,159 @@
+// `cutproof check` of a state and `cutproof kick`, as the guide says that they are used, and what they print and write.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "model/io/array_file.h"
+#include "tests/cli/program.h"
+#include "tests/harness/foreign_files.h"
+
+namespace {
+
+using namespace cutproof;
+using nlohmann::json;
+using tests::As;
+
+class Foreign : public Program {
+ protected:
+  // What stands in the guide below "Somebody else's simulator" in Python, in order.
+  static std::vector<std::string> programs_of_the_guide() {
+    std::ifstream page(files::path(CUTPROOF_SOURCE) / "docs/guide.md");
+    std::vector<std::string> programs;
+    bool in_section = false, in_program = false;
+    for (std::string line; std::getline(page, line);) {
+      if (line.starts_with("## ")) in_section = line == "## Somebody else's simulator";
+      if (in_program && line == "```") {
+        in_program = false;
+      } else if (in_program) {
+        programs.back() += line + "\n";
+      } else if (in_section && line == "```python") {
+        in_program = true;
+        programs.emplace_back();
+      }
+    }
+    return programs;
+  }
+  void python(const std::string& program) const {
+    write("program.py", program);
+    const std::string line = "cd '" + folder_.string() + "' && /usr/bin/python3 program.py";
+    ASSERT_EQ(std::system(line.c_str()), 0) << program;
+  }
+  static std::string replaced(std::string text, const std::string& what, const std::string& by) {
+    const std::size_t at = text.find(what);
+    if (at == std::string::npos) throw std::logic_error("the guide does not say \"" + what + "\" any more");
+    return text.replace(at, what.size(), by);
+  }
+  static const json& entry(const json& list, const std::string& property) {
+    for (const json& each : list) {
+      if (each.at("property") == property) return each;
+    }
+    throw std::logic_error("there is nothing on " + property);
+  }
+};
+
+TEST_F(Foreign, StateOfTheGuideHolds) {
+  const auto programs = programs_of_the_guide();
+  ASSERT_EQ(programs.size(), 2u);
+  EXPECT_LE(std::count(programs[0].begin(), programs[0].end(), '\n'), 10);
+  python(programs[0]);
+  const Outcome outcome = cutproof("check state.npz --json verdicts.json");
+  EXPECT_EQ(outcome.status, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("36 particles in 3 clusters"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("not judged: rotation: not promised"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("what was judged holds."), std::string::npos) << outcome.output;
+  const json document = json::parse(read("verdicts.json"));
+  EXPECT_EQ(document.at("format"), "cutproof.check_state");
+  EXPECT_EQ(document.at("promises"), json({"connected", "covered", "coupled", "edges_covered"}));
+  EXPECT_TRUE(document.at("promises_given"));
+  EXPECT_FALSE(document.at("single_precision"));
+  EXPECT_TRUE(document.at("summary").at("holds"));
+  EXPECT_EQ(document.at("body").at("particles"), 36);
+  EXPECT_NEAR(document.at("body").at("spacing").get<double>(), 0.01, 1e-12);
+  EXPECT_EQ(entry(document.at("verdicts"), "edge cover").at("checked"), 75);
+  EXPECT_EQ(entry(document.at("not_judged"), "cap kept").at("why"), "one state does not show what a stage does");
+}
+
+TEST_F(Foreign, StateOfTheGuideIsRejectedOnceItIsWrong) {
+  const std::string right = programs_of_the_guide().at(0);
+  // The middle slab is missing; two slabs are torn apart; one has a particle that is not there.
+  for (const auto& [change, to, property] : std::vector<std::array<std::string, 3>>{
+           {"for k in range(3)]", "for k in (0, 2)]", "component match"},
+           {"(x == k + 1)", "(x == k + 3)", "cluster connectivity"},
+           {"(x == k + 1)", "False", "edge cover"},
+           {"np.concatenate(clusters)", "np.concatenate(clusters) + 1", "well formed"}}) {
+    python(replaced(right, change, to));
+    const Outcome outcome = cutproof("check state.npz --json verdicts.json");
+    EXPECT_EQ(outcome.status, 1) << change << "\n" << outcome.output;
+    EXPECT_NE(outcome.output.find("FAILS: " + property + "\n"), std::string::npos) << outcome.output;
+    const json document = json::parse(read("verdicts.json"));
+    EXPECT_FALSE(document.at("summary").at("holds"));
+    EXPECT_FALSE(entry(document.at("verdicts"), property).at("witness").at("text").get<std::string>().empty());
+  }
+  python(replaced(right, "promises=\"connected covered coupled edges_covered\"", "promises=\"\""));
+  EXPECT_EQ(cutproof("check state.npz").status, 1) << "nothing was judged";
+  python(replaced(right, "positions=rest", "places=rest"));
+  expect_refused("check state.npz", {"places", "positions", "remedy"});
+  python(replaced(right, "np.savez(\"state.npz\", positions=rest", "np.savez(\"state.npz\", positions=rest[1:]"));
+  expect_refused("check state.npz", {"rest", "(36, 3)", "(35, 3)"});
+}
+
+TEST_F(Foreign, KickOfTheGuideHoldsAndAGhostForceDoesNot) {
+  const std::string right = programs_of_the_guide().at(1);
+  python(right);
+  Outcome outcome = cutproof("kick kick.npz --json kick.json");
+  EXPECT_EQ(outcome.status, 0) << outcome.output;
+  json document = json::parse(read("kick.json"));
+  EXPECT_EQ(document.at("format"), "cutproof.kick");
+  EXPECT_EQ(document.at("kicked_piece"), 1);
+  EXPECT_EQ(document.at("kick_frame"), 10);
+  EXPECT_TRUE(document.at("repeats"));
+  EXPECT_EQ(document.at("pieces").at(1).at("felt"), 4);
+  EXPECT_TRUE(document.at("pieces").at(0).at("first_frame").is_null());
+  EXPECT_TRUE(document.at("summary").at("holds"));
+
+  python(replaced(right, "x[10:, 4:, 1] += kick", "x[10:, 4:, 1] += kick; x[12:, 3, 1] += 1e-6 * kick"));
+  outcome = cutproof("kick kick.npz --json kick.json");
+  EXPECT_EQ(outcome.status, 1) << outcome.output;
+  EXPECT_NE(outcome.output.find("particle 3 of piece 0 felt it first, from frame 12 on"), std::string::npos)
+      << outcome.output;
+  document = json::parse(read("kick.json"));
+  EXPECT_EQ(document.at("pieces").at(0).at("felt"), 1);
+  EXPECT_EQ(document.at("pieces").at(0).at("first_frame"), 12);
+  EXPECT_EQ(entry(document.at("verdicts"), "no ghost force").at("witness").at("particles"), json({3}));
+
+  python(replaced(right, "run(0.01)", "run(0)"));
+  outcome = cutproof("kick kick.npz");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_NE(outcome.output.find("nothing was tested"), std::string::npos) << outcome.output;
+
+  // A simulator with noise says how blunt the test is.
+  python(replaced(right, "    return x", "    return x + 1e-9 * np.random.default_rng().normal(size=x.shape)"));
+  outcome = cutproof("kick kick.npz --json kick.json");
+  EXPECT_EQ(outcome.status, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("the test is blunt"), std::string::npos) << outcome.output;
+  document = json::parse(read("kick.json"));
+  EXPECT_FALSE(document.at("repeats"));
+  EXPECT_GT(document.at("least_bound").get<double>(), 1e-8);
+}
+
+// A run of the reference, cut, as NPZ and as HDF5, as a graph and on a grid.
+TEST_F(Foreign, StateThatTheReferenceCutHolds) {
+  const tests::CutBody cut = tests::cut_body();
+  for (const As as : {As::grid, As::pairs, As::rows}) {
+    for (const std::string name : {"cut.npz", "cut.h5"}) {
+      io::write_array_file(path(name), tests::arrays_of(cut.setup, cut.state, as));
+      const Outcome outcome = cutproof("check " + name);
+      EXPECT_EQ(outcome.status, 0) << outcome.output;
+      EXPECT_EQ(outcome.output.find(as == As::grid ? "on a grid" : "as a graph") != std::string::npos, true);
+    }
+  }
+  State torn = cut.state;
+  torn.alive[0] = 0;
+  io::write_array_file(path("torn.h5"), tests::arrays_of(cut.setup, torn, As::pairs));
+  const Outcome outcome = cutproof("check torn.h5");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_NE(outcome.output.find("FAILS: tissue kept"), std::string::npos) << outcome.output;
+}
+
+}  // namespace
