@@ -1,5 +1,6 @@
 // A surface by VTK's contour filters, from an image that is 1 where a particle lives and 0 elsewhere. The filter is the
 // parameter: cutproof judge ./vtk_surface.so --parameters flying_edges
+// With "flying_edges_exchanged" the image is 0 where a particle lives and 1 elsewhere, and triangles are turned.
 #include <cutproof/plugin.h>
 #include <vtkCellArray.h>
 #include <vtkDiscreteFlyingEdges3D.h>
@@ -16,9 +17,14 @@
 #include <string>
 
 static std::string filter_wanted;
+static bool exchanged = false;
 
 static void* create(const cutproof_host*, const char* parameters) {
   filter_wanted = parameters;
+  if (const auto end = filter_wanted.find("_exchanged"); end != std::string::npos) {
+    filter_wanted.resize(end);
+    exchanged = true;
+  }
   return &filter_wanted;
 }
 
@@ -38,11 +44,12 @@ static int surface(const cutproof_host* host, void*, const cutproof_tissue* tiss
   image->SetSpacing(tissue->spacing, tissue->spacing, tissue->spacing);
   vtkNew<vtkFloatArray> inside;
   inside->SetNumberOfTuples(image->GetNumberOfPoints());
-  inside->FillValue(0);
+  inside->FillValue(exchanged ? 1 : 0);
   for (int64_t i = 0; i < alive->rows; ++i) {
     int node[3];
     for (int axis = 0; axis < 3; ++axis) node[axis] = static_cast<const int32_t*>(tissue->node->data)[3 * i + axis];
-    inside->SetValue(image->ComputePointId(node), static_cast<const uint8_t*>(alive->data)[i]);
+    inside->SetValue(image->ComputePointId(node),
+                     exchanged != (static_cast<const uint8_t*>(alive->data)[i] != 0) ? 1 : 0);
   }
   image->GetPointData()->SetScalars(inside);
 
@@ -64,7 +71,7 @@ static int surface(const cutproof_host* host, void*, const cutproof_tissue* tiss
   for (vtkIdType t = 0; t < found->GetNumberOfPolys(); ++t) {
     found->GetPolys()->GetCellAtId(t, corners);
     for (int k = 0; k < 3; ++k) {
-      static_cast<int32_t*>(triangles->data)[3 * t + k] = static_cast<int32_t>(corners->GetId(k));
+      static_cast<int32_t*>(triangles->data)[3 * t + k] = static_cast<int32_t>(corners->GetId(exchanged ? 2 - k : k));
     }
   }
   return 0;
