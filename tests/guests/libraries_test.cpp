@@ -2,7 +2,9 @@
 // guests/examples/. Where a library is not installed its tests are skipped, by name.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <limits>
+#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "fixtures/rotation_answers.h"
@@ -144,7 +146,6 @@ TEST_P(OfEigen, HoldsExceptOfDenormals) {
   EXPECT_EQ(again.status, 1) << again.output;
 
   Rotations rotations(GetParam());
-  EXPECT_EQ(rotations.failing_kinds("rotation", 12, false), std::vector<std::string>{});
   EXPECT_EQ(rotations.failing_kinds("best rotation", 12, false), std::vector<std::string>{"denormals"});
 }
 
@@ -177,6 +178,9 @@ TEST_F(Libraries, PolarDecompositionOfBulletMayReflect) {
   Rotations rotations(EXAMPLE_bullet_polar);
   const Verdict mirrored = rotations.verdict(about({{1, 0, 0, 0, 1, 0, 0, 0, -0.5}}), "rotation");
   EXPECT_EQ(mirrored.witness.text, "1 of 1 wrong; matrix 0: a reflection");
+  // What is not orthogonal at all is not called a reflection.
+  const Verdict tiny = rotations.verdict(about({{1e-9, 0, 0, 0, 1e-9, 0, 0, 0, -1e-9}}), "rotation");
+  EXPECT_TRUE(tiny.witness.text.starts_with("1 of 1 wrong; matrix 0: ‖RᵀR - I‖ = 1.7")) << tiny.witness.text;
 }
 
 // It gives up where ‖A‖₁ ‖A‖∞ < 2⁻²³, or that of the inverse is, and then returns A.
@@ -339,7 +343,8 @@ TEST_P(OfVtk, SurfacesHold) {
 // With tissue and what is around it exchanged they join what meets across the diagonal of a face, everywhere.
 TEST_P(OfVtk, ExchangedTheyHaveTheOtherPolarity) {
   NEEDS(EXAMPLE_vtk_surface, "VTK 9.1 (ci/install.sh libraries)")
-  const json found = judged(EXAMPLE_vtk_surface, std::string("--parameters ") + GetParam() + "_exchanged", 1);
+  const json found =
+      judged(EXAMPLE_vtk_surface, std::string("--parameters ") + GetParam() + "_exchanged --cases 200", 1);
   ASSERT_EQ(found.at("failures").size(), 1u) << found;
   EXPECT_EQ(found.at("failures")[0].at("property"), "surface shells");
   const std::string text = found.at("failures")[0].at("simplified");
