@@ -259,8 +259,9 @@ int judge(JudgeOptions options) {
   bool holds = true;
   std::vector<io::JunitCase> junit;
   std::vector<Failure> failures;
-  json document = {{"verb", "judge"},
-                   {"version", kVersion},
+  json document = {{"format", "cutproof.judge"},
+                   {"format_version", 1},
+                   {"cutproof", kVersion},
                    {"plugin",
                     {{"library", options.attached.empty() ? json(options.guest.library) : json()},
                      {"name", guest.plugin().name},

@@ -9,6 +9,7 @@
 
 #include "model/at.h"
 #include "model/error.h"
+#include "model/io/json_number.h"
 
 namespace cutproof::guests {
 
@@ -315,8 +316,8 @@ nlohmann::json to_json(const KernelCampaign& campaign) {
                         {"kind", f.simplest.kind},
                         {"text", f.verdict.witness.text},
                         {"simplified", f.of_simplest.witness.text},
-                        {"measured", f.of_simplest.measured},
-                        {"bound", f.of_simplest.bound},
+                        {"measured", json_number(f.of_simplest.measured)},
+                        {"bound", json_number(f.of_simplest.bound)},
                         {"unit", f.of_simplest.unit},
                         {"size", campaign.operation->size_of(f.simplest)}});
   }
