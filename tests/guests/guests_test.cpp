@@ -1,7 +1,9 @@
 // Plugins, by what becomes of them: right ones hold, and each way of being wrong is named for what it is.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <signal.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -14,6 +16,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
+#include <thread>
 
 #include "guests/campaign.h"
 #include "guests/guest.h"
@@ -114,6 +117,47 @@ TEST(Guest, DoesNotWaitForOneThatHangs) {
     EXPECT_EQ(answer.text, "it did not answer within 0.2 s");
   }
   EXPECT_EQ(guest.restarts(), 2);
+}
+
+// Campaigns hand guests from thread to thread: one that was started by a thread that has ended goes on.
+TEST(Guest, OutlivesTheThreadThatStartedIt) {
+  std::unique_ptr<Guest> guest;
+  std::thread([&] { guest = std::make_unique<Guest>(plugin(PLUGIN_in_c)); }).join();
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  const OperationDescription& operation = named("components");
+  const Answer answer = ask(*guest, operation, operation.draw(1, 12, Precision::binary32), true);
+  EXPECT_EQ(answer.kind, Answer::Kind::answered) << answer.text;
+  EXPECT_EQ(guest->restarts(), 0);
+}
+
+// But not its host, however busy it is.
+TEST(Guest, EndsWithItsHost) {
+  const std::string name = "hang,as_" + std::to_string(getpid());
+  const pid_t host = fork();
+  if (host == 0) {
+    // Nothing that may throw here: this process is a copy of the test.
+    const std::string command = std::string(CUTPROOF_PROGRAM) + " judge " + PLUGIN_in_c + " components --parameters " +
+                                name + " --time-limit 600";
+    execl("/bin/sh", "sh", "-c", ("exec " + command + " >/dev/null 2>&1").c_str(), nullptr);
+    _exit(1);
+  }
+  const auto guests = [&] {
+    int count = 0;
+    for (const auto& process : fs::directory_iterator("/proc")) {
+      std::ifstream file(process.path() / "environ");
+      const std::string text((std::istreambuf_iterator<char>(file)), {});
+      if (contains(text, "CUTPROOF_PLUGIN_PARAMETERS=" + name)) ++count;
+    }
+    return count;
+  };
+  const auto wait_for = [&](int count) {
+    for (int k = 0; k < 200 && guests() != count; ++k) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    return guests();
+  };
+  EXPECT_EQ(wait_for(1), 1);
+  kill(host, SIGKILL);
+  waitpid(host, nullptr, 0);
+  EXPECT_EQ(wait_for(0), 0);
 }
 
 TEST(Guest, CountsARefusalAsNothingElse) {

@@ -25,7 +25,12 @@ static int is(const char* what) { return strcmp(mode, what) == 0; }
 
 static void* create(const cutproof_host* host, const char* parameters) {
   if (parameters != NULL && parameters[0] != 0) {
-    strncpy(mode, parameters, sizeof mode - 1);
+    /* What stands behind a comma is for others. */
+    const size_t length = strcspn(parameters, ",");
+    if (length < sizeof mode) {
+      memcpy(mode, parameters, length);
+      mode[length] = 0;
+    }
   }
   if (is("cannot")) return NULL;
   if (is("log")) host->log(host, "created");
