@@ -475,6 +475,12 @@ class ClusterReader {
     offsets_ = arrays.long_integers(arrays.require("offsets", {-1}));
     members_ = arrays.integers(arrays.require("members", {-1}));
     if (offsets_.empty()) arrays.refuse("offsets", "It is empty.", "Begin with 0, also where there is no cluster.");
+    const auto last = static_cast<int64_t>(members_.size());
+    for (std::size_t k = 0; k < offsets_.size(); ++k) {
+      if (offsets_[k] >= 0 && offsets_[k] <= last) continue;
+      arrays.refuse("offsets", fmt::format("Entry {} is {}, and there are {} members.", k, offsets_[k], last),
+                    "Count members through all cases, from 0.");
+    }
     const auto count = static_cast<int64_t>(offsets_.size()) - 1;
     cluster_offsets_ = reader.offsets("cluster_offsets", cases, count, "clusters");
     for (const std::string& name : of_cluster) {
@@ -483,7 +489,6 @@ class ClusterReader {
     }
     // Where the members of each case begin.
     for (const int64_t first : cluster_offsets_) member_offsets_.push_back(offsets_[at(first)]);
-    const auto last = static_cast<int64_t>(members_.size());
     if (member_offsets_.front() != 0) {
       arrays.refuse("offsets", fmt::format("It begins with {}.", member_offsets_.front()), "Begin with 0.");
     }

@@ -102,7 +102,7 @@ constexpr MergeKind kMergeKinds[] = {
          d.clusters.push_back(piece(first, first + r.between(1, 3)));
        }
        d.tau = 4;
-       d.cap = 5;
+       d.cap = 3;  // so that unions stay small until they vanish in the first
        return d;
      }},
     {"equal clusters",

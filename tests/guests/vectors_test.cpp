@@ -3,14 +3,16 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
-#include <array>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <sstream>
 
@@ -260,11 +262,21 @@ TEST_F(VectorsTest, OfStagesContainWhatTheirKindsSay) {
       State after = before;
       reference::split(setup, after);
       const int64_t change = after.clusters.count() - before.clusters.count();
-      if (question.kind == "nothing lost") EXPECT_EQ(after.clusters, before.clusters);
-      if (question.kind == "all clusters vanish") EXPECT_EQ(after.clusters.count(), 0);
-      if (question.kind == "all that is left is debris") EXPECT_EQ(after.clusters.count(), 0);
-      if (question.kind == "a cluster that vanishes") EXPECT_LT(change, 0);
-      if (question.kind == "a dissection: boxes") EXPECT_FALSE(before.clusters.number.empty());
+      if (question.kind == "nothing lost") {
+        EXPECT_EQ(after.clusters, before.clusters);
+      }
+      if (question.kind == "all clusters vanish") {
+        EXPECT_EQ(after.clusters.count(), 0);
+      }
+      if (question.kind == "all that is left is debris") {
+        EXPECT_EQ(after.clusters.count(), 0);
+      }
+      if (question.kind == "a cluster that vanishes") {
+        EXPECT_LT(change, 0);
+      }
+      if (question.kind == "a dissection: boxes") {
+        EXPECT_FALSE(before.clusters.number.empty());
+      }
       more += change > 0;
       fewer += change < 0;
       debris += !after.debris.empty();
@@ -276,9 +288,15 @@ TEST_F(VectorsTest, OfStagesContainWhatTheirKindsSay) {
     int64_t merged = 0;
     for (const Question& question : merges.cases) {
       const int64_t before = count(question.given, "number"), after = count(answer_merge(question), "number");
-      if (question.kind == "nothing fits" || question.kind == "no small cluster") EXPECT_EQ(after, before);
-      if (question.kind == "equal clusters") EXPECT_EQ(after, 1);
-      if (question.kind == "clusters within others that are above the cap") EXPECT_EQ(after, 1);
+      if (question.kind == "nothing fits" || question.kind == "no small cluster") {
+        EXPECT_EQ(after, before);
+      }
+      if (question.kind == "equal clusters") {
+        EXPECT_EQ(after, 1);
+      }
+      if (question.kind == "clusters within others that are above the cap") {
+        EXPECT_EQ(after, 1);
+      }
       merged += after < before;
     }
     EXPECT_GT(merged, 5) << seed;
@@ -295,13 +313,15 @@ TEST_F(VectorsTest, HoldForTheReference) {
         const Vectors vectors = vectors_of(through_a_file(file_of(drawn), end), "v");
         const io::ArrayFile written = file_of_answers(vectors, answers_to(vectors));
         const AllAnswers answers = answers_of(through_a_file(written, end), "a", vectors);
-        // Also by everything that nobody promises, but that this reference does.
-        const std::optional<std::string> words =
-            operation.number == wire::clusters || operation.number == wire::rotations ? std::optional<std::string>("*")
-                                                                                      : std::nullopt;
+        // Also by what goes without saying for nobody, but that the reference does. In single precision a wire's matrix
+        // has rank one up to rounding, which the reference, in double precision, does not take for rank one.
+        const bool is_single = precision == Precision::binary32;
+        std::optional<std::string> words;
+        if (operation.number == wire::clusters) words = "*";
+        if (operation.number == wire::rotations) words = is_single ? "rotations best keeps_previous" : "*";
         const VectorReport report = judge_vectors(vectors, answers, promises_of(operation, words));
         EXPECT_TRUE(report.holds()) << operation.name << "\n" << summary(report);
-        EXPECT_TRUE(report.not_judged.empty()) << operation.name;
+        EXPECT_EQ(report.not_judged.size(), operation.number == wire::rotations && is_single ? 1u : 0u);
         for (const harness::PropertySummary& property : report.properties.all()) {
           EXPECT_GT(property.checked, 0) << operation.name << ": " << property.property;
         }
@@ -595,7 +615,7 @@ const std::vector<Wrong>& wrong_answers() {
          set(answer, sets);
          return true;
        }},
-      {"a number that leaves a gap", "split", "split exactness", "comes from nowhere", nullptr,
+      {"a number that leaves a gap", "split", "split exactness", "is missing", nullptr,
        [](const Question& q, Arrays& answer) {
          if (q.kind != "clusters that fall into two pieces") return false;
          return changed(answer, 2, [](std::vector<int32_t>& number) {

@@ -45,13 +45,11 @@ def answers_hold(program, sources, folder):
             # The least wrong of them, and the program says where.
             with np.load(folder / "vectors.npz") as v, np.load(folder / "answers.npz") as a:
                 if operation == "components":
-                    row = int(v["case_offsets"][np.argmax(np.diff(v["edge_offsets"]) > 0 )])
-                    first = int(np.argmax(np.bincount(a["label"]) > 1))
-                    last = int(np.max(np.nonzero(a["label"] == first)))
+                    of_several = int(np.argmax(np.bincount(a["label"]) > 1))
+                    row = int(np.max(np.nonzero(a["label"] == of_several)))
                     label = a["label"].copy()
-                    label[last] = -1
+                    label[row] = -1
                     np.savez(folder / "answers.npz", label=label)
-                    row = last
                 else:
                     row = int(np.max(np.nonzero(v["expected"] == 0)))
                     r = a["r"].copy()
@@ -68,7 +66,7 @@ def arrays_are_described(program, sources, folder):
     page = (sources / "docs/reference/vectors.md").read_text()
     questions = page[page.index("## The questions"):page.index("## The answers")]
     described = set(re.findall(r"`(\w+)`", questions))
-    there = {"single", "double", "OP", "previous", "precision", "deterministic", "must_exponent"}
+    there = {"single", "double", "deterministic", "C", "N", "M"}  # words that are no arrays
     for operation in ("rotations", "components", "surface", "clusters", "split", "merge"):
         cutproof(program, folder, 0, "vectors", operation, "-o", "vectors.npz", "--cases", "1")
         with np.load(folder / "vectors.npz") as v:
@@ -85,7 +83,7 @@ def arrays_are_described(program, sources, folder):
             expect(v["case_offsets"][0] == 0 and v["case_offsets"][-1] == rows, f"{operation}: case_offsets")
             if operation == "rotations":
                 check_rotations(v)
-    unknown = {name for name in described - there if not name.isupper()} - {"OP"}
+    unknown = {name for name in described - there if not name.endswith("_")} - {"X_offsets"}
     expect(not unknown, f"no file has {unknown}")
 
 
