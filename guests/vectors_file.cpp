@@ -469,8 +469,7 @@ std::vector<uint8_t> bytes_of(const NamedArrays& arrays, const Array& array) {
 // `offsets`, `members` and others of each case, as the judges take them. What lies within a case is theirs to judge.
 class ClusterReader {
  public:
-  ClusterReader(const Reader& reader, int64_t cases, const std::vector<std::string>& of_cluster)
-      : reader_(reader), cases_(cases) {
+  ClusterReader(const Reader& reader, int64_t cases, const std::vector<std::string>& of_cluster) {
     const NamedArrays& arrays = reader.arrays();
     offsets_ = arrays.long_integers(arrays.require("offsets", {-1}));
     members_ = arrays.integers(arrays.require("members", {-1}));
@@ -519,8 +518,6 @@ class ClusterReader {
   }
 
  private:
-  const Reader& reader_;
-  int64_t cases_;
   std::vector<int64_t> offsets_, cluster_offsets_, member_offsets_;
   std::vector<int32_t> members_;
   std::vector<std::pair<std::string, std::vector<int32_t>>> others_;

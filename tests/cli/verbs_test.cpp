@@ -30,6 +30,13 @@ class Verbs : public Program {
                    make_array<double>("kicked", {1, 2, 3}, {0, 0, 0, 2, 0, 0}),
                    make_array<int32_t>("piece", {2}, {0, 1})};
     io::write_array_file(path("kick.npz"), kick);
+    // Answers that stand in the questions themselves.
+    ASSERT_EQ(cutproof("vectors components -o vectors.npz --cases 1").status, 0);
+    const io::ArrayFile vectors = io::read_array_file(path("vectors.npz"));
+    io::ArrayFile answers;
+    answers.arrays = {*find_array(vectors.arrays, "answer_label")};
+    answers.arrays[0].name = "label";
+    io::write_array_file(path("answers.npz"), answers);
   }
   std::string counterexample() const {
     return (files::path(CUTPROOF_SOURCE) / "fixtures/regressions/skin_cell_not_renewed.json").string();
@@ -44,6 +51,8 @@ class Verbs : public Program {
             "check seen",
             "check state.npz",
             "kick kick.npz",
+            "vectors split -o split.h5 --cases 1",
+            "check-vectors vectors.npz answers.npz",
             "digest seen",
             "fuzz --cases 20 --sizes 0-20",
             "replay '" + counterexample() + "'",
@@ -123,6 +132,12 @@ TEST_F(Verbs, RefuseWhatIsGivenButEmpty) {
                                                         {"check state.npz --json ''", "--json"},
                                                         {"kick kick.npz --json ''", "--json"},
                                                         {"kick ''", "file"},
+                                                        {"vectors split -o ''", "--output"},
+                                                        {"vectors '' -o v.npz", "operation"},
+                                                        {"check-vectors '' answers.npz", "vectors"},
+                                                        {"check-vectors vectors.npz ''", "answers"},
+                                                        {"check-vectors vectors.npz answers.npz --json ''", "--json"},
+                                                        {"check-vectors vectors.npz answers.npz --junit ''", "--junit"},
                                                         {"digest ''", "recording"},
                                                         {"fuzz --cases 5 --json ''", "--json"},
                                                         {"fuzz --cases 5 --shard ''", "--shard"},
@@ -147,51 +162,60 @@ TEST_F(Verbs, RefuseWhatIsGivenButEmpty) {
 }
 
 TEST_F(Verbs, RefuseUnknownOptionsMissingValuesAndNegativeCounts) {
-  for (const auto& [command, word] :
-       std::vector<std::pair<std::string, std::string>>{{"run cut.json --frobnicate", "--frobnicate"},
-                                                        {"run cut.json more.json", "more.json"},
-                                                        {"run cut.json --json", "--json"},
-                                                        {"run cut.json --frames -1", "--frames"},
-                                                        {"run cut.json --particles -1", "--particles"},
-                                                        {"check seen --frobnicate", "--frobnicate"},
-                                                        {"kick kick.npz --frobnicate", "--frobnicate"},
-                                                        {"kick", "file"},
-                                                        {"kick state.npz", "edges"},
-                                                        {"check kick.npz", "kicked"},
-                                                        {"check state.npz --check deep", "deep"},
-                                                        {"digest seen --frobnicate", "--frobnicate"},
-                                                        {"check seen --json", "--json"},
-                                                        {"info --frobnicate", "--frobnicate"},
-                                                        {"fuzz --frobnicate", "--frobnicate"},
-                                                        {"fuzz --cases", "--cases"},
-                                                        {"fuzz --cases -1", "--cases"},
-                                                        {"fuzz --cases 1.5", "--cases"},
-                                                        {"fuzz --seconds -1", "--seconds"},
-                                                        {"fuzz --simplify -1", "--simplify"},
-                                                        {"fuzz --seed -1", "--seed"},
-                                                        {"fuzz --batch 0", "--batch"},
-                                                        {"fuzz --threads -1", "--threads"},
-                                                        {"replay case.json --frobnicate", "--frobnicate"},
-                                                        {"replay case.json --record", "--record"},
-                                                        {"tune cut.json --tolerance 1 --frobnicate", "--frobnicate"},
-                                                        {"tune cut.json --tolerance", "--tolerance"},
-                                                        {"tune cut.json --tolerance 1 --frames 0", "--frames"},
-                                                        {"tune cut.json --tolerance 1 --repeats -1", "--repeats"},
-                                                        {"tune cut.json --tolerance 1 --answer limit", "--answer"},
-                                                        {"bench stages --frobnicate", "--frobnicate"},
-                                                        {"bench stages --frames -1", "--frames"},
-                                                        {"bench stages --sizes -1000", "--sizes"},
-                                                        {"bench sampling --repeats -1", "--repeats"},
-                                                        {"bench clusters --particles -1", "--particles"},
-                                                        {"bench scale --sizes", "--sizes"},
-                                                        {"bench rotations --matrices -1", "--matrices"},
-                                                        {"bench machine_limits --repeats -1", "--repeats"},
-                                                        {"bench floors", "machine_limits"},
-                                                        {"bench solver --samples -1", "--samples"},
-                                                        {"bench solver --particles -1", "--particles"},
-                                                        {"bench baselines --particles -1", "--particles"},
-                                                        {"bench factors --repeats -1", "--repeats"},
-                                                        {"bench factors --seed -1", "--seed"}}) {
+  for (const auto& [command, word] : std::vector<std::pair<std::string, std::string>>{
+           {"run cut.json --frobnicate", "--frobnicate"},
+           {"run cut.json more.json", "more.json"},
+           {"run cut.json --json", "--json"},
+           {"run cut.json --frames -1", "--frames"},
+           {"run cut.json --particles -1", "--particles"},
+           {"check seen --frobnicate", "--frobnicate"},
+           {"kick kick.npz --frobnicate", "--frobnicate"},
+           {"kick", "file"},
+           {"kick state.npz", "edges"},
+           {"vectors split", "--output"},
+           {"vectors cut -o v.npz", "cut"},
+           {"vectors split -o v.npz --cases -1", "--cases"},
+           {"vectors split -o v.npz --seed -1", "--seed"},
+           {"vectors split -o v.npz --precision half", "--precision"},
+           {"check-vectors vectors.npz", "answers"},
+           {"check-vectors state.npz answers.npz", "schema"},
+           {"check-vectors vectors.npz kick.npz", "kicked"},
+           {"check-vectors vectors.npz answers.npz --promises some", "some"},
+           {"check kick.npz", "kicked"},
+           {"check state.npz --check deep", "deep"},
+           {"digest seen --frobnicate", "--frobnicate"},
+           {"check seen --json", "--json"},
+           {"info --frobnicate", "--frobnicate"},
+           {"fuzz --frobnicate", "--frobnicate"},
+           {"fuzz --cases", "--cases"},
+           {"fuzz --cases -1", "--cases"},
+           {"fuzz --cases 1.5", "--cases"},
+           {"fuzz --seconds -1", "--seconds"},
+           {"fuzz --simplify -1", "--simplify"},
+           {"fuzz --seed -1", "--seed"},
+           {"fuzz --batch 0", "--batch"},
+           {"fuzz --threads -1", "--threads"},
+           {"replay case.json --frobnicate", "--frobnicate"},
+           {"replay case.json --record", "--record"},
+           {"tune cut.json --tolerance 1 --frobnicate", "--frobnicate"},
+           {"tune cut.json --tolerance", "--tolerance"},
+           {"tune cut.json --tolerance 1 --frames 0", "--frames"},
+           {"tune cut.json --tolerance 1 --repeats -1", "--repeats"},
+           {"tune cut.json --tolerance 1 --answer limit", "--answer"},
+           {"bench stages --frobnicate", "--frobnicate"},
+           {"bench stages --frames -1", "--frames"},
+           {"bench stages --sizes -1000", "--sizes"},
+           {"bench sampling --repeats -1", "--repeats"},
+           {"bench clusters --particles -1", "--particles"},
+           {"bench scale --sizes", "--sizes"},
+           {"bench rotations --matrices -1", "--matrices"},
+           {"bench machine_limits --repeats -1", "--repeats"},
+           {"bench floors", "machine_limits"},
+           {"bench solver --samples -1", "--samples"},
+           {"bench solver --particles -1", "--particles"},
+           {"bench baselines --particles -1", "--particles"},
+           {"bench factors --repeats -1", "--repeats"},
+           {"bench factors --seed -1", "--seed"}}) {
     expect_refused(command, {word});
   }
 }
@@ -217,6 +241,20 @@ TEST_F(Verbs, FailACampaignThatJudgedNothing) {
   EXPECT_EQ(merged.status, 1) << merged.output;
   EXPECT_NE(merged.output.find("nothing was judged"), std::string::npos) << merged.output;
   EXPECT_FALSE(json::parse(read("merged.json")).at("holds"));
+}
+
+// Of dead particles alone there is nothing to say.
+TEST_F(Verbs, FailTestVectorsOfWhichNothingWasJudged) {
+  io::ArrayFile vectors = io::read_array_file(path("vectors.npz")), answers = io::read_array_file(path("answers.npz"));
+  for (Array& array : vectors.arrays) {
+    if (array.name == "alive") std::fill(array.bytes.begin(), array.bytes.end(), std::byte{0});
+    if (array.name == "answer_label") std::fill(array.bytes.begin(), array.bytes.end(), std::byte{0xff});  // -1
+  }
+  io::write_array_file(path("dead.npz"), vectors);
+  const Outcome outcome = cutproof("check-vectors dead.npz answers.npz --json out.json");
+  EXPECT_EQ(outcome.status, 1) << outcome.output;
+  EXPECT_NE(outcome.output.find("FAILS: nothing was judged"), std::string::npos) << outcome.output;
+  EXPECT_FALSE(json::parse(read("out.json")).at("summary").at("holds"));
 }
 
 // The irregular path has no body of boxes.

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -912,6 +913,48 @@ TEST_F(VectorsTest, RefuseOffsetsThatCannotBe) {
     edited([](auto& list) { std::fill(list.begin(), list.end(), int64_t{-1} << 40); });
     edited([](auto& list) { list[list.size() / 2] = std::numeric_limits<int64_t>::max(); });
     edited([](auto& list) { list.clear(); });
+  }
+}
+
+// Whatever stands in arrays of the right shape, the answer is a verdict or a refusal.
+TEST_F(VectorsTest, AreRefusedOrJudgedWhateverValuesTheyHave) {
+  const int64_t extremes[] = {
+      0, 1, -1, 2, 5, 255, 256, std::numeric_limits<int32_t>::max(), std::numeric_limits<int32_t>::min()};
+  for (const OperationDescription& operation : vector_operations()) {
+    Vectors vectors = draw_vectors(operation, 3, 1, Precision::binary32);
+    if (operation.number == wire::rotations) {  // of which all are alike
+      vectors.cases.resize(3);
+      vectors.kind.resize(3);
+    }
+    const io::ArrayFile questions = file_of(vectors), right = file_of_answers(vectors, answers_to(vectors));
+    Random random(5);
+    const auto spoil = [&](const io::ArrayFile& file) {
+      io::ArrayFile spoilt = file;
+      Array& array = spoilt.arrays[at(random.below(static_cast<int32_t>(file.arrays.size())))];
+      for (int32_t times = random.between(1, 3); times > 0 && array.count() > 0; --times) {
+        const auto place = at(random.below(static_cast<int32_t>(array.count()))) * at(size_of(array.type));
+        const int64_t value = extremes[random.below(static_cast<int32_t>(std::size(extremes)))];
+        std::memcpy(array.bytes.data() + place, &value, at(size_of(array.type)));
+      }
+      return spoilt;
+    };
+    int64_t judged = 0, refused = 0, questions_refused = 0;
+    for (int trial = 0; trial < 300; ++trial) {
+      const std::string said = refusal([&] {
+        const VectorReport report = judge_vectors(vectors, answers_of(spoil(right), "a", vectors), usual(vectors));
+        EXPECT_EQ(report.failures.empty(), report.holds());
+        ++judged;
+      });
+      refused += said.empty() ? 0 : 1;
+    }
+    for (int trial = 0; trial < 60; ++trial) {
+      questions_refused += refusal([&] { vectors_of(spoil(questions), "v"); }).empty() ? 0 : 1;
+    }
+    EXPECT_GT(judged, 20) << operation.name;
+    EXPECT_GT(questions_refused, 10) << operation.name;
+    // Where everything may be any number nothing is refused.
+    const bool any_will_do = operation.number == wire::rotations || operation.number == wire::components;
+    EXPECT_EQ(refused == 0, any_will_do) << operation.name << ": " << refused;
   }
 }
 
