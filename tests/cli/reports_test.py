@@ -190,7 +190,7 @@ def vectors(program):
     message, text = of(cases["merge maximality"], "failure")
     expect("could still merge" in message and again in text, f"no witness or no command: {message} {text}")
     found = program.annotations(1, "check-vectors", "vectors.npz", "unmerged.npz")
-    expect(len(found) == 1 and found[0].startswith("::error title=cutproof: merge: merge maximality::") and
+    expect(len(found) == 1 and found[0].startswith("::error title=cutproof: merge%3A merge maximality::") and
            found[0].endswith("; see it again: " + again), f"annotations: {found}")
     cases = program.junit(0, "check-vectors", "vectors.npz", "unmerged.npz", "--promises", "covered")
     expect(of(cases["merge maximality"], "skipped")[0] == "not promised", "what is not promised is not skipped")
