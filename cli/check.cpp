@@ -74,7 +74,7 @@ int check_recording(const CheckOptions& options) {
 int check(const CheckOptions& options) {
   if (!io::is_array_file(options.recording)) return check_recording(options);
   depth_asked(options.depth);  // there is no motion to leave out, but a depth that is none is refused all the same
-  return check_state(options.recording, options.json);
+  return check_state(options.recording, {options.json, options.junit, options.again});
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
+#include "cli/findings.h"
 #include "cli/output.h"
 #include "cli/terminal.h"
 #include "harness/foreign_judge.h"
@@ -48,11 +49,20 @@ nlohmann::json to_json(const std::string& file, const harness::ForeignState& for
 
 }  // namespace
 
-int check_state(const std::string& file, const std::string& json) {
+int check_state(const std::string& file, const StateReports& reports) {
   const harness::ForeignState foreign = harness::foreign_state_of(io::read_array_file(file), file);
-  require_writable(json);
+  require_writable(reports.json);
+  require_writable(reports.junit);
   const harness::ForeignVerdicts judged = harness::judge_foreign_state(foreign);
-  write_document(json, to_json(file, foreign, judged));
+  write_document(reports.json, to_json(file, foreign, judged));
+  const Judging judging{"cutproof check", "cutproof.check.state", reports.again};
+  std::vector<io::JunitCase> cases = cases_of(judged.verdicts, judging);
+  for (const harness::NotJudged& each : judged.not_judged) {
+    io::JunitCase& skipped = cases.emplace_back(io::JunitCase{each.property, judging.class_name});
+    skipped.outcome = io::JunitOutcome::skipped;
+    skipped.message = "not judged: " + each.why;
+  }
+  write_junit(reports.junit, judging, 0, std::move(cases));
   fmt::print("state {}: {} particles in {} clusters, {}\n", file, foreign.state.x.size(),
              foreign.state.clusters.count(), foreign.given.contains("nodes") ? "on a grid" : "as a graph");
   print_single_verdicts(judged.verdicts);
@@ -62,7 +72,8 @@ int check_state(const std::string& file, const std::string& json) {
   }
   for (const std::string& note : judged.notes) fmt::print("\nnote: {}\n", note);
   print_whether_all_hold(judged.verdicts);
-  if (!json.empty()) fmt::print("wrote {}\n", json);
+  if (!reports.json.empty()) fmt::print("wrote {}\n", reports.json);
+  print_annotations(failures_of(judged.verdicts, judging));
   return judged.holds() ? 0 : 1;
 }
 

@@ -4,7 +4,12 @@
 
 namespace cutproof::cli {
 
-// Judges, prints, and writes the document to `json` unless that is empty. Returns the exit status.
-int check_state(const std::string& file, const std::string& json);
+struct StateReports {
+  std::string json, junit;  // files; empty: none
+  std::string again;        // the command line
+};
+
+// Judges, prints, and writes what is asked for. Returns the exit status.
+int check_state(const std::string& file, const StateReports& reports);
 
 }  // namespace cutproof::cli

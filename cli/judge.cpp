@@ -31,7 +31,8 @@ struct JudgeOptions {
   bool keep_going = false;  // beyond ten questions that were not answered
   std::string save = ".";
   std::string json, junit, replay;
-  std::string again;  // the command line
+  std::string again;          // the command line
+  std::vector<int> attached;  // open files of a guest that runs already: its channel, its memory
 };
 
 // Not one of operations(): random dissections, of which the plugin runs what it can.
@@ -104,7 +105,8 @@ void print(const KernelCampaign& campaign) {
 
 constexpr const char* kClass = "cutproof.judge";
 
-std::string replay_command(const JudgeOptions& options, const std::string& file) {
+std::string replay_command(const JudgeOptions& options, const std::string& file, const std::string& operation) {
+  if (!options.attached.empty()) return fmt::format("cutproof.replay(\"{}\", {}=...)", file, operation);
   return fmt::format("cutproof judge {}{} --case {}", quoted(options.guest.library),
                      options.guest.parameters.empty() ? "" : " --parameters " + quoted(options.guest.parameters),
                      quoted(file));
@@ -134,7 +136,7 @@ std::string keep(const JudgeOptions& options, const Guest& guest, const KernelCa
              failure.simplest.kind, shortened(failure.verdict.witness.text));
   fmt::print("  simplified to {}: {}\n", campaign.operation->size_of(failure.simplest),
              shortened(failure.of_simplest.witness.text));
-  fmt::print("  saved; to see it again: {}\n", replay_command(options, file));
+  fmt::print("  saved; to see it again: {}\n", replay_command(options, file, saved.operation));
   return file;
 }
 
@@ -230,13 +232,26 @@ int replay(const JudgeOptions& options, Guest& guest) {
   return failed > 0 || judged == 0 ? 1 : 0;
 }
 
-int judge(const JudgeOptions& options) {
+int judge(JudgeOptions options) {
   if (!std::filesystem::is_directory(options.save)) {
     refuse("--save", fmt::format("'{}' is not a folder", options.save), "create it first");
   }
   require_writable(options.json);
   require_writable(options.junit);
-  Guest guest(options.guest);
+  if (!options.attached.empty()) {
+    if (options.attached.size() != 2) {
+      refuse("--attached", fmt::format("{} numbers", options.attached.size()), "give those of a socket and of memory");
+    }
+    // There is no library then: the first word is an operation too.
+    if (!options.guest.library.empty()) options.operations.insert(options.operations.begin(), options.guest.library);
+    options.guest.library = "the attached guest";
+  } else if (options.guest.library.empty()) {
+    refuse("FILE.so", "no plugin is given", "name the shared library of one");
+  }
+  const auto started = options.attached.empty() ? std::make_unique<Guest>(options.guest)
+                                                : std::make_unique<Guest>(options.attached[0], options.attached[1],
+                                                                          options.guest.time_limit);
+  Guest& guest = *started;
   const std::vector<const OperationDescription*> asked = asked_operations(options, guest.plugin());
   if (!options.replay.empty()) return replay(options, guest);
   fmt::print("{}, seed {}\n", title(guest.plugin(), options.guest.library), options.campaign.seed);
@@ -244,10 +259,11 @@ int judge(const JudgeOptions& options) {
   bool holds = true;
   std::vector<io::JunitCase> junit;
   std::vector<Failure> failures;
-  json document = {{"verb", "judge"},
-                   {"version", kVersion},
+  json document = {{"format", "cutproof.judge"},
+                   {"format_version", 1},
+                   {"cutproof", kVersion},
                    {"plugin",
-                    {{"library", options.guest.library},
+                    {{"library", options.attached.empty() ? json(options.guest.library) : json()},
                      {"name", guest.plugin().name},
                      {"version", guest.plugin().version},
                      {"precision", guest.plugin().precision == Precision::binary32 ? "single" : "double"},
@@ -270,18 +286,22 @@ int judge(const JudgeOptions& options) {
     json result = guests::to_json(campaign);
     for (std::size_t k = 0; k < campaign.failures.size(); ++k) {
       result["failures"][k]["file"] = keep(options, guest, campaign, campaign.failures[k]);
-      result["failures"][k]["again"] = replay_command(options, result["failures"][k]["file"]);
+      result["failures"][k]["again"] = replay_command(options, result["failures"][k]["file"], result["operation"]);
     }
     add_cases(result, options, junit, failures);
-    if (campaign.gave_up) {
+    if (campaign.ended) {
+      fmt::print("  nothing more was asked: the guest is gone\n");
+    } else if (campaign.gave_up) {
       fmt::print("  given up after {} questions that were not answered; --keep-going goes on\n", campaign.lost);
     }
     document["operations"].push_back(std::move(result));
     holds = holds && campaign.holds();
     flush_output();
+    if (campaign.ended) break;
   }
   const auto& names = options.operations;
-  if (has_stages(guest.plugin()) && (names.empty() || std::find(names.begin(), names.end(), kOnStages) != names.end())) {
+  if (has_stages(guest.plugin()) &&
+      (names.empty() || std::find(names.begin(), names.end(), kOnStages) != names.end())) {
     for (const bool dynamics : {false, true}) {
       if (dynamics && !steps(guest.plugin())) continue;
       holds = judge_stages(options, dynamics, document, junit, failures) && holds;
@@ -303,7 +323,6 @@ void add_judge(CLI::App& program, Work& work) {
   const auto options = std::make_shared<JudgeOptions>();
   CLI::App* const command = program.add_subcommand("judge", "your own kernels, from a shared library");
   command->add_option("plugin", options->guest.library, "a shared library that includes cutproof/plugin.h")
-      ->required()
       ->type_name("FILE.so");
   command
       ->add_option("operations", options->operations,
@@ -326,6 +345,13 @@ void add_judge(CLI::App& program, Work& work) {
       ->type_name("S")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--save", options->save, "folder for counterexamples")->capture_default_str()->type_name("DIR");
+  command
+      ->add_option(
+          "--attached", options->attached,
+          "instead of FILE.so: a guest that runs already, such as cutproof.py, by the numbers of two open files")
+      ->delimiter(',')
+      ->allow_extra_args(false)  // what follows are operations
+      ->type_name("SOCKET,MEMORY");
   add_json(*command, options->json, "write counts and failures");
   add_junit(*command, options->junit);
   command->add_option("--case", options->replay, "one saved question again, and nothing else")->type_name("CASE");

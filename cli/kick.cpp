@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "cli/commands.h"
+#include "cli/findings.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/terminal.h"
@@ -19,7 +20,8 @@ namespace {
 
 struct KickOptions {
   std::string file;
-  std::string json;
+  std::string json, junit;
+  std::string again;  // the command line
 };
 
 // What a reader of the verdicts has to know.
@@ -99,14 +101,18 @@ void print_pieces(const harness::RecordedKick& kick, const oracles::KickReport& 
 int kick(const KickOptions& options) {
   const harness::RecordedKick kick = harness::recorded_kick_of(io::read_array_file(options.file), options.file);
   require_writable(options.json);
+  require_writable(options.junit);
   const oracles::KickReport report = oracles::judge_kick(kick.runs);
   write_document(options.json, to_json(options, kick, report));
+  const Judging judging{"cutproof kick", "cutproof.kick", options.again};
+  write_junit(options.junit, judging, 0, cases_of(report.verdicts, judging));
   fmt::print("kick {}: {} frames of {} particles\n", options.file, kick.runs.frames, kick.runs.particles);
   print_pieces(kick, report);
   print_single_verdicts(report.verdicts);
   for (const std::string& note : notes_of(report, kick.runs)) fmt::print("\nnote: {}\n", note);
   print_whether_all_hold(report.verdicts);
   if (!options.json.empty()) fmt::print("wrote {}\n", options.json);
+  print_annotations(failures_of(report.verdicts, judging));
   return report.holds() ? 0 : 1;
 }
 
@@ -119,7 +125,11 @@ void add_kick(CLI::App& program, Work& work) {
       ->required()
       ->type_name("FILE");
   add_json(*command, options->json, "write verdicts and what became of each piece");
-  command->callback([options, &work] { work = [options] { return kick(*options); }; });
+  add_junit(*command, options->junit);
+  command->callback([options, command, &work] {
+    options->again = as_given(*command);
+    work = [options] { return kick(*options); };
+  });
 }
 
 }  // namespace cutproof::cli

@@ -6,6 +6,7 @@ include(CMakePackageConfigHelpers)
 # NAME TARGET [FOLDER]: a component, its library, and the folder whose headers are installed with it (once for each
 # folder). A component comes after those that it links.
 set(cutproof_components
+  "plugin cutproof_plugin"
   "model cutproof_model model"
   "io cutproof_io"
   "reference cutproof_reference reference_cpu"
@@ -91,6 +92,7 @@ if(CUTPROOF_INSTALL)
     ${CMAKE_CURRENT_BINARY_DIR}/package/cutproof-config-version.cmake
     ${CMAKE_CURRENT_LIST_DIR}/SuiteSparse.cmake
     ${CMAKE_CURRENT_LIST_DIR}/Libzip.cmake
+    ${CMAKE_CURRENT_LIST_DIR}/CutproofTest.cmake
     DESTINATION ${package_folder})
   if(CUTPROOF_PROGRAM)
     install(TARGETS cutproof)

@@ -9,6 +9,7 @@
 
 #include "model/at.h"
 #include "model/error.h"
+#include "model/io/json_number.h"
 
 namespace cutproof::guests {
 
@@ -35,7 +36,7 @@ void simplify(Guest& guest, const OperationDescription& operation, const harness
   for (bool simpler = true; simpler && seconds_since(begin) < seconds;) {
     simpler = false;
     for (Question& next : operation.simpler(failure.simplest)) {
-      if (seconds_since(begin) >= seconds) break;
+      if (seconds_since(begin) >= seconds || guest.has_ended()) break;
       const std::vector<Verdict> verdicts = judge_answer(guest, operation, next, at_end, again);
       const Verdict* const failing = first_failure(verdicts, promises, failure.verdict.property);
       if (failing == nullptr) continue;
@@ -146,7 +147,8 @@ KernelCampaign judge_kernel(Guest& guest, const OperationDescription& operation,
     campaign.failed += fails ? 1 : 0;
     campaign.seconds = seconds_since(begin);
     if (progress) progress(campaign);
-    if (options.most_lost > 0 && campaign.lost >= options.most_lost) {
+    campaign.ended = guest.has_ended();
+    if (campaign.ended || (options.most_lost > 0 && campaign.lost >= options.most_lost)) {
       campaign.gave_up = true;
       break;
     }
@@ -313,7 +315,11 @@ nlohmann::json to_json(const KernelCampaign& campaign) {
                         {"index", f.index},
                         {"kind", f.simplest.kind},
                         {"text", f.verdict.witness.text},
-                        {"simplified", f.of_simplest.witness.text}});
+                        {"simplified", f.of_simplest.witness.text},
+                        {"measured", json_number(f.of_simplest.measured)},
+                        {"bound", json_number(f.of_simplest.bound)},
+                        {"unit", f.of_simplest.unit},
+                        {"size", campaign.operation->size_of(f.simplest)}});
   }
   return {{"operation", campaign.operation->name},
           {"cases", campaign.cases},
@@ -322,6 +328,7 @@ nlohmann::json to_json(const KernelCampaign& campaign) {
           {"refused", campaign.refused},
           {"not_answered", campaign.lost},
           {"gave_up", campaign.gave_up},
+          {"ended", campaign.ended},
           {"failed", campaign.failed},
           {"seconds", campaign.seconds},
           {"properties", campaign.properties.to_json()},

@@ -42,6 +42,7 @@ struct KernelCampaign {
   const OperationDescription* operation = nullptr;
   int64_t questions = 0, cases = 0, refused = 0, lost = 0;
   bool gave_up = false;
+  bool ended = false;  // the guest has, and cannot be started anew
   double seconds = 0;
   harness::PropertySummaries properties;
   std::vector<Unpromised> unpromised;

@@ -6,6 +6,7 @@
 #include <spawn.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -112,7 +113,20 @@ Guest::Guest(int channel, int memory, double time_limit)
       attached_(true),
       channel_(channel),
       file_(memory) {
+  options_.library = "the attached guest";
   options_.time_limit = time_limit;
+  const auto refuse = [this](const std::string& problem) {
+    throw InputError(options_.library, "--attached", problem, "let cutproof.py start this program");
+  };
+  int type = 0;
+  socklen_t size = sizeof type;
+  if (getsockopt(channel, SOL_SOCKET, SO_TYPE, &type, &size) != 0 || type != SOCK_SEQPACKET) {
+    refuse(fmt::format("file {} is no socket that keeps messages apart", channel));
+  }
+  struct stat file = {};
+  if (fstat(memory, &file) != 0 || file.st_size != wire::kMemoryBytes) {
+    refuse(fmt::format("file {} is no memory of {} bytes", memory, wire::kMemoryBytes));
+  }
   void* const mapped = mmap(nullptr, static_cast<std::size_t>(wire::kMemoryBytes), PROT_READ | PROT_WRITE,
                             MAP_SHARED | MAP_NORESERVE, file_, 0);
   if (mapped == MAP_FAILED) machine_failed("memory to share with a plugin");
@@ -125,7 +139,7 @@ Guest::Guest(int channel, int memory, double time_limit)
 Guest::~Guest() {
   stop();
   if (memory_ != nullptr) munmap(memory_, static_cast<std::size_t>(wire::kMemoryBytes));
-  if (file_ >= 0 && !attached_) close(file_);
+  if (file_ >= 0) close(file_);
 }
 
 void Guest::start() {
@@ -165,20 +179,28 @@ void Guest::start() {
 
 void Guest::greet(double time_limit) {
   const auto hello = std::make_unique<wire::Hello>();
-  const std::string remedy = "a plugin is a shared library that includes cutproof/plugin.h (docs/reference/plugins.md)";
+  const std::string remedy =
+      attached_ ? "" : "a plugin is a shared library that includes cutproof/plugin.h (docs/reference/plugins.md)";
+  const std::string loading = attached_ ? "its greeting" : "loading it";
   std::string problem;
+  ssize_t received = 0;
   if (!wait_for(channel_, time_limit)) {
-    problem = fmt::format("loading it does not end within {:g} s", time_limit);
-  } else if (recv(channel_, hello.get(), sizeof *hello, 0) != static_cast<ssize_t>(sizeof *hello)) {
-    problem = "loading it ends the process: " + why_it_ended();
+    problem = fmt::format("{} does not end within {:g} s", loading, time_limit);
+  } else if (received = recv(channel_, hello.get(), sizeof *hello, MSG_TRUNC); received <= 0) {
+    problem = loading + " ends the process: " + why_it_ended();
   }
   if (!problem.empty()) {
     stop();
     throw InputError(options_.library, "", problem, remedy);
   }
   const auto text = [](const char* from) { return without_control_characters(from); };
-  if (hello->protocol != wire::kProtocol) {
-    throw InputError(options_.library, "", "cutproof-guest is of another version than cutproof", "install both anew");
+  if (received != static_cast<ssize_t>(sizeof *hello) || hello->protocol != wire::kProtocol ||
+      hello->request_bytes != sizeof(wire::Request) || hello->reply_bytes != sizeof(wire::Reply)) {
+    stop();
+    throw InputError(
+        options_.library, "",
+        fmt::format("{} is of another version than cutproof", attached_ ? "cutproof.py" : "cutproof-guest"),
+        "install both anew");
   }
   if (hello->greeting == wire::Greeting::cannot_run_here) throw CannotRunHere(text(hello->text));
   if (hello->greeting != wire::Greeting::ready) throw InputError(options_.library, "", text(hello->text), remedy);
@@ -196,7 +218,7 @@ void Guest::greet(double time_limit) {
 }
 
 void Guest::stop() {
-  if (channel_ >= 0 && (!attached_ || !running_)) {
+  if (channel_ >= 0) {
     close(channel_);
     channel_ = -1;
   }
@@ -341,8 +363,21 @@ Answer Guest::call(Operation operation, uint32_t instance, Span span, const std:
   }
   for (std::size_t k = 0; k < arguments.size(); ++k) {
     const Argument& argument = arguments[k];
-    if (argument.role == Role::given || argument.role == Role::setup) continue;
     const wire::Array& array = request.arrays[k];
+    if (argument.role == Role::given || argument.role == Role::setup) {
+      // Pages keep the program in process/ from writing to these; of other guests only the outcome is seen.
+      const int64_t bytes = argument.rows * argument.columns * size_of(argument.type);
+      if (!attached_) continue;
+      std::string problem = problem_around(array, array.offset, bytes, array.first_page, array.end_page);
+      if (bytes > 0 && std::memcmp(memory_ + array.offset, argument.data, at(bytes)) != 0) {
+        problem = fmt::format("it wrote to '{}', which is an input", argument.name);
+      }
+      if (problem.empty()) continue;
+      answer.kind = Answer::Kind::fault;
+      answer.text = std::move(problem);
+      answer.arrays.clear();
+      return answer;
+    }
     const int64_t rows = reply.rows[k], offset = reply.offset[k];
     const int64_t bytes = rows * argument.columns * size_of(argument.type);
     wire::Place place = {array.offset, array.first_page, array.end_page};

@@ -68,8 +68,9 @@ class Guest {
   // Starts the process and has it load the plugin. Throws InputError, naming the library, if that is none or is made
   // for another version; CannotRunHere; MachineError if no process can be started.
   explicit Guest(GuestOptions options);
-  // A guest that runs already and reads from the other end of `channel`; arrays lie in the file `memory` (wire.h). It
-  // cannot be started anew.
+  // A guest that runs already and reads from the other end of `channel`; arrays lie in the file `memory` (wire.h). Both
+  // numbers are of open files, which become the Guest's. It cannot be started anew (has_ended). Throws InputError if
+  // these are no such files, or the guest was made for another version.
   Guest(int channel, int memory, double time_limit);
   ~Guest();
   Guest(const Guest&) = delete;
@@ -80,6 +81,8 @@ class Guest {
   // `at_end`: arrays end where memory that may be touched ends; else they begin where it begins. Asked by turns, both
   // ends are guarded. A guest that was lost is started anew before the next call, with none of its instances.
   Answer call(Operation operation, uint32_t instance, Span span, const std::vector<Argument>& arguments, bool at_end);
+  // It is gone for good: nothing more can be asked.
+  bool has_ended() const { return attached_ && !running_; }
   // How often it had to be started anew.
   int64_t restarts() const { return restarts_; }
 

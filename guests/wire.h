@@ -88,7 +88,8 @@ struct Hello {
   uint32_t spans;        // which can be run, by span_bit
   int32_t device, real;  // as in cutproof_plugin
   int32_t has_promises;
-  int32_t remembers_faults;  // it writes a Fault before it dies
+  int32_t remembers_faults;             // it writes a Fault before it dies
+  uint32_t request_bytes, reply_bytes;  // sizeof, as the guest knows them
   char name[64], version[64];
   char promises[512];
   char text[512];

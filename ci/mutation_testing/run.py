@@ -56,6 +56,7 @@ TESTS_OF_JUDGES = {
     "tuning": ("search_test", "refinement_test", "tune_test"),
     "benchmarks": ("clusters_test", "solver_test", "tune_test"),
     "cli": ("table_test", "verbs_test", "program_test", "fuzz_test"),
+    "guests": ("guests_test",),
 }
 FIELDS = ("Stage", "Fault", "Suspect", "Livelock")
 MOST_SECONDS = 420  # of one command

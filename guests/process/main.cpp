@@ -348,6 +348,12 @@ void answer(wire::Reply& reply) {
     call.arrays[k].wire = call.request.arrays[k];
     take(call.arrays[k]);
   }
+  // The plugin's stream does not wait for what brought its arrays there.
+  std::string problem_before;
+  if (on_device && !call.device_failed && !wait_for_device(problem_before)) {
+    call.device_failed = true;
+    call.broken = problem_before;
+  }
   void* self = nullptr;
   if (!instance(call.request.instance, self)) {
     call.broken = "create() gave nothing, and had given something before";
@@ -400,6 +406,8 @@ void greet(wire::Hello& hello, const char* library) {
   hello.protocol = wire::kProtocol;
   hello.memory = reinterpret_cast<uint64_t>(memory);
   hello.remembers_faults = 1;
+  hello.request_bytes = sizeof(wire::Request);
+  hello.reply_bytes = sizeof(wire::Reply);
   void* const loaded = dlopen(library, RTLD_NOW | RTLD_LOCAL);
   if (loaded == nullptr) {
     hello.greeting = wire::Greeting::cannot_load;

@@ -112,7 +112,7 @@ std::vector<Verdict> judge_rotations(const Question& question, const Arrays& ans
       if (!all_zero) continue;  // NaN, or what is left of it
     }
     const double off = fixtures::orthogonality(answer);
-    const bool reflection = std::isfinite(off) && !(fixtures::determinant(answer) > 0);
+    const bool reflection = off <= bounds.orthogonality && !(fixtures::determinant(answer) > 0);
     rotation.see(
         row, reflection ? 2 : off,
         reflection ? "a reflection" : fmt::format("‖RᵀR - I‖ = {:.2g} (NaN: not finite, or not written)", off));

@@ -136,6 +136,18 @@ TEST(SkinMatch, CountsACavityAsAnInnerShell) {
   EXPECT_EQ(shells.inner, 1);
 }
 
+// With as many cavities as components the shells would only change their roles.
+TEST(SkinMatch, RejectsASkinThatIsInsideOut) {
+  Hollow hollow;
+  Block solid(5, 5, 5);
+  for (State* const state : {&hollow.state, &solid.state}) {
+    for (auto& triangle : state->skin.triangles) std::swap(triangle[0], triangle[1]);
+    const Verdict verdict = skin_match(state == &solid.state ? solid.setup : hollow.setup, *state);
+    EXPECT_FALSE(verdict.holds);
+    EXPECT_NE(verdict.witness.text.find("is inside out"), std::string::npos) << verdict.witness.text;
+  }
+}
+
 TEST(SkinMatch, RejectsACavityWithoutItsInnerShell) {
   Hollow hollow;
   Block solid(5, 5, 5);
