@@ -277,7 +277,7 @@ class Commands:
 
     @staticmethod
     def subcommands(text):
-        return re.findall(r"(?m)^  ([a-z_]+)  ", text.partition("Subcommands:")[2])
+        return re.findall(r"(?m)^  ([a-z_-]+)  ", text.partition("Subcommands:")[2])
 
     @staticmethod
     def options_in(text):

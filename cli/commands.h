@@ -24,6 +24,8 @@ void add_bench(CLI::App& program, Work& work);
 void add_tune(CLI::App& program, Work& work);
 void add_digest(CLI::App& program, Work& work);
 void add_judge(CLI::App& program, Work& work);
+void add_vectors(CLI::App& program, Work& work);
+void add_check_vectors(CLI::App& program, Work& work);
 void add_info(CLI::App& program, Work& work);
 
 inline constexpr const char* kVersion = CUTPROOF_VERSION;

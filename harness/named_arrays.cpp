@@ -20,9 +20,11 @@ std::string shape_text(const std::vector<int64_t>& shape) {
   return text + (shape.size() == 1 ? ",)" : ")");
 }
 
-std::string listed(const std::vector<KnownArray>& known) {
+std::string listed(const std::vector<KnownArray>& known, const std::vector<KnownArray>& more) {
   std::string names;
-  for (const KnownArray& each : known) names += (names.empty() ? "" : ", ") + std::string(each.name);
+  for (const auto* const list : {&known, &more}) {
+    for (const KnownArray& each : *list) names += (names.empty() ? "" : ", ") + std::string(each.name);
+  }
   return names;
 }
 
@@ -41,13 +43,13 @@ NamedArrays::NamedArrays(const io::ArrayFile& contents, const std::string& file,
     if (knows(known, array.name)) continue;
     if (knows(known_texts, array.name)) refuse(array.name, "This holds numbers.", "Write it as a text.");
     refuse(array.name, "There is no such array.",
-           fmt::format("Leave it out. These are known: {}, {}.", listed(known), listed(known_texts)));
+           fmt::format("Leave it out. These are known: {}.", listed(known, known_texts)));
   }
   for (const io::NamedText& text : contents.texts) {
     if (knows(known_texts, text.name)) continue;
     if (knows(known, text.name)) refuse(text.name, "This is a text.", "Write it as an array of numbers.");
     refuse(text.name, "There is no such text.",
-           fmt::format("Leave it out. These are known: {}, {}.", listed(known_texts), listed(known)));
+           fmt::format("Leave it out. These are known: {}.", listed(known_texts, known)));
   }
 }
 

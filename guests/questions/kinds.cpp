@@ -216,6 +216,9 @@ Tissue tissue_of(const Arrays& arrays) {
   return tissue;
 }
 
+// Of a grid that is read: each costs memory, whether or not a particle is on it.
+constexpr int64_t kMostNodes = 10'000'000;
+
 std::string problem_of_body(const Question& question) {
   const Arrays& arrays = question.given;
   const auto n = find_array(arrays, "alive")->rows();
@@ -240,6 +243,7 @@ std::string problem_of_body(const Question& question) {
     if (nodes->integer(axis) < 1 || nodes->integer(axis) > 1000) return "'nodes' is out of range";
     count *= nodes->integer(axis);
   }
+  if (count > kMostNodes) return "'nodes' is out of range";
   std::set<std::array<int64_t, 3>> taken;
   for (int64_t i = 0; i < n; ++i) {
     std::array<int64_t, 3> place = {};

@@ -1,5 +1,6 @@
 // What the operations share. Internal to guests/questions/.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <random>
 #include <string>
@@ -62,5 +63,8 @@ Tissue draw_on_grid(Random& random, int64_t kind);
 // Random graphs, likewise; the last kinds are those of grids.
 std::vector<std::string> graph_kinds();
 Tissue draw_graph(Random& random, int64_t kind);
+
+// What a surface around the living particles of a grid has: outer shells and inner ones.
+std::array<int64_t, 2> shells_around(const Tissue& tissue);
 
 }  // namespace cutproof::guests

@@ -32,10 +32,11 @@ struct AnswerArray {
   int64_t columns = 1;
   std::string_view rows_of = {};  // as many rows as this array that is given has; empty: the kernel says how many
   std::string_view text;          // what it is, for a person
+  bool optional = false;          // only in files: what it shows is not judged without it
 };
 
 struct OperationDescription {
-  wire::Operation number;
+  wire::Operation number;  // the plugin's member that answers it: of a stage `run`, by way of states
   std::string_view name;
   std::string_view text;       // what it does, for a person
   std::string_view by_itself;  // promises (harness/promises.h) that go without saying
@@ -51,12 +52,13 @@ struct OperationDescription {
   std::vector<Verdict> (*judge)(const Question& question, const Arrays& answers, Precision precision);
   // What is wrong with a question that was read from a file, or "": sizes and indices. Types are right already.
   std::string (*problem)(const Question& question);
-  // Questions that are each simpler, the most drastic first.
+  // Questions that are each simpler, the most drastic first. Null for those that are asked of files alone.
   std::vector<Question> (*simpler)(const Question& question);
   // Kinds of cases, in the order in which they are drawn.
   std::vector<std::string> (*kinds)();
 };
 
+// Those that plugins are asked. guests/vectors.h has more: the stages, which a plugin runs on whole states.
 std::span<const OperationDescription> operations();
 // Null if there is none of that name.
 const OperationDescription* find_operation(std::string_view name);

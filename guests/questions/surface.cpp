@@ -337,6 +337,11 @@ constexpr AnswerArray kSurfaceAnswers[] = {
 
 }  // namespace
 
+std::array<int64_t, 2> shells_around(const Tissue& tissue) {
+  const Topology topology(Occupancy(tissue), false);
+  return {topology.outer, topology.inner};
+}
+
 const OperationDescription kSurface = {
     .number = wire::surface,
     .name = "surface",

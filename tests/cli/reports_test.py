@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import xml.etree.ElementTree as tree
+import zipfile
 
 wrong = []
 SCENE = {"version": 1, "name": "small", "frame": {"count": 3}, "step": {"gravity": [0, 0, -9.81]},
@@ -169,6 +170,32 @@ def campaigns(program):
     expect(done.returncode == 2 and "nowhere" in done.stderr and "fuzzing" not in done.stdout, f"{done}")
 
 
+def vectors(program):
+    program.run("vectors", "merge", "-o", "vectors.npz", "--cases", "1")
+    # Answers that stand in the questions, as numpy would rename them: the names of entries of the archive.
+    names = ("cluster_offsets", "offsets", "members", "number")
+
+    def answers(name, prefix):
+        with zipfile.ZipFile(program.folder / "vectors.npz") as all_of, zipfile.ZipFile(program.folder / name, "w") as to:
+            for array in names:
+                to.writestr(f"{array}.npy", all_of.read(f"{prefix}{array}.npy"))
+
+    answers("right.npz", "example_")
+    answers("unmerged.npz", "")
+    cases = program.junit(0, "check-vectors", "vectors.npz", "right.npz")
+    expect(set(cases) >= {"merge legality", "cap kept", "merge maximality"}, f"cases of vectors: {list(cases)}")
+    expect(program.annotations(0, "check-vectors", "vectors.npz", "right.npz") == [], "annotations of what holds")
+    again = "cutproof check-vectors vectors.npz unmerged.npz"
+    cases = program.junit(1, "check-vectors", "vectors.npz", "unmerged.npz")
+    message, text = of(cases["merge maximality"], "failure")
+    expect("could still merge" in message and again in text, f"no witness or no command: {message} {text}")
+    found = program.annotations(1, "check-vectors", "vectors.npz", "unmerged.npz")
+    expect(len(found) == 1 and found[0].startswith("::error title=cutproof: merge%3A merge maximality::") and
+           found[0].endswith("; see it again: " + again), f"annotations: {found}")
+    cases = program.junit(0, "check-vectors", "vectors.npz", "unmerged.npz", "--promises", "covered")
+    expect(of(cases["merge maximality"], "skipped")[0] == "not promised", "what is not promised is not skipped")
+
+
 def replays(program, sources):
     case = sources / "fixtures/regressions/skin_cell_not_renewed.json"
     expect(program.annotations(0, "replay", str(case)) == [], "annotations of a case that holds")
@@ -186,6 +213,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         runs(Program(program, folder), sources)
         campaigns(Program(program, folder))
+        vectors(Program(program, folder))
         replays(Program(program, folder), sources)
     print("reports: " + ("all as they should be" if not wrong else f"{len(wrong)} things are wrong"))
     return 1 if wrong else 0

@@ -30,6 +30,13 @@ class Verbs : public Program {
                    make_array<double>("kicked", {1, 2, 3}, {0, 0, 0, 2, 0, 0}),
                    make_array<int32_t>("piece", {2}, {0, 1})};
     io::write_array_file(path("kick.npz"), kick);
+    // Answers that stand in the questions themselves.
+    ASSERT_EQ(cutproof("vectors components -o vectors.npz --cases 1").status, 0);
+    const io::ArrayFile vectors = io::read_array_file(path("vectors.npz"));
+    io::ArrayFile answers;
+    answers.arrays = {*find_array(vectors.arrays, "answer_label")};
+    answers.arrays[0].name = "label";
+    io::write_array_file(path("answers.npz"), answers);
   }
   std::string counterexample() const {
     return (files::path(CUTPROOF_SOURCE) / "fixtures/regressions/skin_cell_not_renewed.json").string();
@@ -44,6 +51,8 @@ class Verbs : public Program {
             "check seen",
             "check state.npz",
             "kick kick.npz",
+            "vectors split -o split.h5 --cases 1",
+            "check-vectors vectors.npz answers.npz",
             "digest seen",
             "fuzz --cases 20 --sizes 0-20",
             "replay '" + counterexample() + "'",
@@ -123,6 +132,12 @@ TEST_F(Verbs, RefuseWhatIsGivenButEmpty) {
                                                         {"check state.npz --json ''", "--json"},
                                                         {"kick kick.npz --json ''", "--json"},
                                                         {"kick ''", "file"},
+                                                        {"vectors split -o ''", "--output"},
+                                                        {"vectors '' -o v.npz", "operation"},
+                                                        {"check-vectors '' answers.npz", "vectors"},
+                                                        {"check-vectors vectors.npz ''", "answers"},
+                                                        {"check-vectors vectors.npz answers.npz --json ''", "--json"},
+                                                        {"check-vectors vectors.npz answers.npz --junit ''", "--junit"},
                                                         {"digest ''", "recording"},
                                                         {"fuzz --cases 5 --json ''", "--json"},
                                                         {"fuzz --cases 5 --shard ''", "--shard"},
@@ -157,6 +172,15 @@ TEST_F(Verbs, RefuseUnknownOptionsMissingValuesAndNegativeCounts) {
                                                         {"kick kick.npz --frobnicate", "--frobnicate"},
                                                         {"kick", "file"},
                                                         {"kick state.npz", "edges"},
+                                                        {"vectors split", "--output"},
+                                                        {"vectors cut -o v.npz", "cut"},
+                                                        {"vectors split -o v.npz --cases -1", "--cases"},
+                                                        {"vectors split -o v.npz --seed -1", "--seed"},
+                                                        {"vectors split -o v.npz --precision half", "--precision"},
+                                                        {"check-vectors vectors.npz", "answers"},
+                                                        {"check-vectors state.npz answers.npz", "schema"},
+                                                        {"check-vectors vectors.npz kick.npz", "label"},
+                                                        {"check-vectors vectors.npz answers.npz --promises no", "'no'"},
                                                         {"check kick.npz", "kicked"},
                                                         {"check state.npz --check deep", "deep"},
                                                         {"digest seen --frobnicate", "--frobnicate"},
@@ -217,6 +241,20 @@ TEST_F(Verbs, FailACampaignThatJudgedNothing) {
   EXPECT_EQ(merged.status, 1) << merged.output;
   EXPECT_NE(merged.output.find("nothing was judged"), std::string::npos) << merged.output;
   EXPECT_FALSE(json::parse(read("merged.json")).at("holds"));
+}
+
+// Of dead particles alone there is nothing to say.
+TEST_F(Verbs, FailTestVectorsOfWhichNothingWasJudged) {
+  io::ArrayFile vectors = io::read_array_file(path("vectors.npz")), answers = io::read_array_file(path("answers.npz"));
+  for (Array& array : vectors.arrays) {
+    if (array.name == "alive") std::fill(array.bytes.begin(), array.bytes.end(), std::byte{0});
+    if (array.name == "answer_label") std::fill(array.bytes.begin(), array.bytes.end(), std::byte{0xff});  // -1
+  }
+  io::write_array_file(path("dead.npz"), vectors);
+  const Outcome outcome = cutproof("check-vectors dead.npz answers.npz --json out.json");
+  EXPECT_EQ(outcome.status, 1) << outcome.output;
+  EXPECT_NE(outcome.output.find("FAILS: nothing was judged"), std::string::npos) << outcome.output;
+  EXPECT_FALSE(json::parse(read("out.json")).at("summary").at("holds"));
 }
 
 // The irregular path has no body of boxes.
