@@ -10,7 +10,7 @@ build=${1:-build/default}
 kit=${2:-gpu_kit}
 most_bytes=60000000  # as much as can be sent to such a machine beside the code
 
-programs=(cli/cutproof tests/gpu/launch_device_test tests/gpu/device_failures_test tests/gpu/acceleration_test
+programs=(cli/cutproof cli/cutproof-guest tests/gpu/launch_device_test tests/gpu/device_failures_test tests/gpu/acceleration_test
   property_tests/property_tests)
 [ -f "$build/CMakeCache.txt" ] || { echo "ci/gpu_kit.sh: $build is no build folder: cmake --preset default -B $build first" >&2; exit 2; }
 # The programs look for their libraries beside themselves, and for those that these need as well (a runpath, which is
@@ -18,10 +18,12 @@ programs=(cli/cutproof tests/gpu/launch_device_test tests/gpu/device_failures_te
 cmake -B "$build" -DCMAKE_BUILD_RPATH='$ORIGIN/../lib' -DCMAKE_EXE_LINKER_FLAGS=-Wl,--disable-new-dtags > /dev/null
 grep -q '^CMAKE_CUDA_COMPILER:.*nvcc' "$build/CMakeCache.txt" ||
   { echo "ci/gpu_kit.sh: $build has no gpu backend: it needs a CUDA toolkit" >&2; exit 2; }
-cmake --build "$build" --target "${programs[@]##*/}"
+guests=(cuda_components cuda_components_in_a_block cuda_components_without_barrier cuda_rotations)
+cmake --build "$build" --target "${programs[@]##*/}" "${guests[@]}"
 
 rm -rf "$kit.new"
-mkdir -p "$kit.new/bin" "$kit.new/lib" "$kit.new/fixtures"
+mkdir -p "$kit.new/bin" "$kit.new/lib" "$kit.new/fixtures" "$kit.new/guests"
+for guest in "${guests[@]}"; do install -s "$build/guests/examples/$guest.so" "$kit.new/guests/"; done
 for program in "${programs[@]}"; do
   install -s "$build/$program" "$kit.new/bin/"
   # The C library and the driver are the machine's own.
@@ -41,8 +43,8 @@ scene["frame"]["count"] = 1000
 scene["frame"].pop("settle", None)
 json.dump(scene, open(folder + "/kidney_1000_frames.json", "w"))
 PYTHON
-tar -C "$kit.new" -czf "$kit.new/contents.tar.gz" bin lib fixtures
-rm -r "$kit.new"/{bin,lib,fixtures}
+tar -C "$kit.new" -czf "$kit.new/contents.tar.gz" bin lib fixtures guests
+rm -r "$kit.new"/{bin,lib,fixtures,guests}
 cp ci/gpu_kit_run.sh "$kit.new/run.sh"
 git describe --always --dirty --abbrev=12 > "$kit.new/commit"
 bytes=$(du -sb "$kit.new" | cut -f1)

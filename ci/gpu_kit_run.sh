@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Runs all that needs a GPU: primitives, failing calls, scenes, properties, compute-sanitizer, timings. Part of the kit
 # that ci/gpu_kit.sh makes. Usage: run.sh RESULTS [PART...]
-# Parts: primitives failures scenes lockstep determinism properties sanitizer timings
+# Parts: primitives failures scenes lockstep determinism properties guests sanitizer timings
 set -uo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 results=$(mkdir -p "$1" && cd "$1" && pwd)
 shift
-parts=${*:-primitives failures scenes lockstep determinism properties sanitizer timings}
+parts=${*:-primitives failures scenes lockstep determinism properties guests sanitizer timings}
 export CUTPROOF_COMMIT=$(cat "$here/commit")
 export PATH="$here/bin:$PATH:/usr/local/cuda/bin"
 cases=${CUTPROOF_CASES:-100000}
@@ -29,6 +29,23 @@ try() {  # NAME COMMAND...
   "$@" > "$results/$name.log" 2>&1 || result=$?
   [ "$result" = 0 ] || tail -25 "$results/$name.log"
   note "$name" "$result" "$((SECONDS - begin))"
+}
+
+# Holds if the command says that something does not.
+finds() {
+  local result=0
+  "$@" || result=$?
+  [ "$result" = 1 ]
+}
+# A guest under compute-sanitizer: TOOL PLUGIN. The judge starts whatever CUTPROOF_GUEST names.
+judge_under() {
+  printf '#!/usr/bin/env bash\nexec compute-sanitizer --tool %s --error-exitcode 99 --log-file %s "%s/bin/cutproof-guest" "$@"\n' \
+    "$1" "$work/$1.log" "$here" > "$work/guest"
+  chmod +x "$work/guest"
+  rm -f "$work/$1.log"
+  CUTPROOF_GUEST="$work/guest" cutproof judge "guests/$2.so" --cases 60 --time-limit 120 --simplify 0 --save "$work" || true
+  cat "$work/$1.log"
+  grep -q 'ERROR SUMMARY: 0 errors\|RACECHECK SUMMARY: 0 hazards' "$work/$1.log"
 }
 
 for part in $parts; do
@@ -60,6 +77,20 @@ for part in $parts; do
         --save "$results" --json "$results/fuzz_dynamics.json"
       try acceleration acceleration_test --gtest_filter='*/gpu'
       try rapidcheck property_tests --gtest_filter='*/gpu*:Cases*' ;;
+    guests)
+      for plugin in cuda_components cuda_components_in_a_block; do
+        try "judge_$plugin" cutproof judge "guests/$plugin.so" --save "$results" --json "$results/judge_$plugin.json"
+      done
+      # Twenty turns of Müller's method are not always enough, and a barrier that is missing shows.
+      for plugin in cuda_rotations cuda_components_without_barrier; do
+        try "judge_$plugin" finds cutproof judge "guests/$plugin.so" --save "$results" --json "$results/judge_$plugin.json"
+      done
+      for plugin in cuda_components cuda_components_in_a_block cuda_rotations; do
+        for tool in memcheck racecheck synccheck initcheck; do
+          try "judge_${plugin}_$tool" judge_under "$tool" "$plugin"
+        done
+      done
+      try judge_cuda_components_without_barrier_racecheck finds judge_under racecheck cuda_components_without_barrier ;;
     sanitizer)
       for tool in memcheck racecheck initcheck synccheck; do
         # One by one and not as a graph: racecheck does not know conditional nodes. From one thread: it ends no kernel

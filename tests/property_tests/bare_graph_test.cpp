@@ -7,9 +7,11 @@
 #include <cmath>
 #include <memory>
 #include <random>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "harness/backends.h"
 #include "model/backend.h"
 #include "model/io/setup_check.h"
 #include "oracles/judge.h"
@@ -237,6 +239,22 @@ TEST(BareGraph, MeasuresEachEdgeByItsOwnRestLength) {
   all.alive = {0, 0, 0};
   all.removed = {0, 1, 2};
   EXPECT_FALSE(oracles::detection(c.setup, before, all).holds);
+}
+
+// Not as what a scene could not mean, nor as a failing machine: as something that they do not do.
+TEST(BareGraph, IsRefusedByKernels) {
+  std::mt19937_64 random(kSeed);
+  const Cloud right = cloud(random);
+  for (const harness::BackendDescriptor& described : harness::backends()) {
+    if (!described.is_built() || described.needs_device()) continue;
+    const std::unique_ptr<Backend> backend =
+        harness::make_backend({.name = std::string(described.name), .split = {}, .rotation = {}});
+    if (described.is_the_reference) {
+      EXPECT_NO_THROW(backend->load({right.setup}, {right.state}));
+    } else {
+      EXPECT_THROW(backend->load({right.setup}, {right.state}), Refused) << described.name;
+    }
+  }
 }
 
 TEST(BareGraph, IsRefusedWithEdgesThatAreNone) {
