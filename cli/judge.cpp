@@ -14,6 +14,7 @@
 #include "cli/terminal.h"
 #include "guests/campaign.h"
 #include "guests/plugin_backend.h"
+#include "model/error.h"
 #include "model/io/atomic_file.h"
 
 namespace cutproof::cli {
