@@ -8,6 +8,7 @@
 #include <string>
 
 #include "reference_cpu/reference.h"
+#include "tests/oracles/expectations.h"
 #include "tests/oracles/skins.h"
 
 namespace cutproof::oracles {
