@@ -73,7 +73,8 @@ void require_same_campaign(const json& whole, const json& part, const std::strin
 
 // `part` is added to `whole`.
 void add_shard(json& whole, const json& part) {
-  for (const char* field : {"cases", "refused", "verdicts", "particles", "cases_per_second", "thread_seconds", "coverage"}) {
+  for (const char* field :
+       {"cases", "refused", "verdicts", "particles", "cases_per_second", "thread_seconds", "coverage"}) {
     add(whole.at(field), part.at(field));
   }
   whole["mean_particles"] = mean(whole.at("particles").get<int64_t>(), whole.at("cases").get<int64_t>());
@@ -172,7 +173,8 @@ namespace {
 
 // Throws json::exception if something is missing, or of another kind, that merging or a conclusion reads.
 void require_fields(const json& part) {
-  for (const char* count : {"cases", "refused", "verdicts", "particles"}) static_cast<void>(part.at(count).get<int64_t>());
+  for (const char* count : {"cases", "refused", "verdicts", "particles"})
+    static_cast<void>(part.at(count).get<int64_t>());
   for (const char* figure : {"seconds", "cases_per_second"}) static_cast<void>(part.at(figure).get<double>());
   for (const char* of_threads : {"generating", "running", "judging"}) {
     static_cast<void>(part.at("thread_seconds").at(of_threads).get<double>());
