@@ -116,12 +116,11 @@ std::string replay_command(const JudgeOptions& options, const std::string& file,
 // Saves what was found and says how to see it again.
 std::string keep(const JudgeOptions& options, const Guest& guest, const KernelCampaign& campaign,
                  const KernelFailure& failure) {
-  const int64_t kinds = static_cast<int64_t>(campaign.operation->kinds().size());
   SavedQuestion saved;
   saved.operation = campaign.operation->name;
   saved.question = failure.simplest;
   saved.precision = guest.plugin().precision;
-  saved.at_end = (failure.index + failure.index / kinds) % 2 == 0;
+  saved.at_end = failure.at_end;
   saved.plugin = guest.plugin().name + " " + guest.plugin().version;
   saved.found = failure.of_simplest.property + ": " + failure.of_simplest.witness.text;
   saved.seed = options.campaign.seed;

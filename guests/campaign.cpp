@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "guests/tissue_arrays.h"
 #include "model/at.h"
 #include "model/error.h"
 #include "model/io/json_number.h"
@@ -30,14 +31,14 @@ const Verdict* first_failure(const std::vector<Verdict>& verdicts, const harness
 }
 
 // By questions that are simpler and still fail in the same property.
-void simplify(Guest& guest, const OperationDescription& operation, const harness::Promises& promises, bool at_end,
-              bool again, double seconds, KernelFailure& failure) {
+void simplify(Guest& guest, const OperationDescription& operation, const harness::Promises& promises, bool again,
+              double seconds, KernelFailure& failure) {
   const Clock::time_point begin = Clock::now();
   for (bool simpler = true; simpler && seconds_since(begin) < seconds;) {
     simpler = false;
     for (Question& next : operation.simpler(failure.simplest)) {
       if (seconds_since(begin) >= seconds || guest.has_ended()) break;
-      const std::vector<Verdict> verdicts = judge_answer(guest, operation, next, at_end, again);
+      const std::vector<Verdict> verdicts = judge_answer(guest, operation, next, failure.at_end, again);
       const Verdict* const failing = first_failure(verdicts, promises, failure.verdict.property);
       if (failing == nullptr) continue;
       failure.of_simplest = *failing;
@@ -61,15 +62,9 @@ harness::Promises promises_of(const PluginInfo& plugin, const OperationDescripti
 Answer ask(Guest& guest, const OperationDescription& operation, const Question& question, bool at_end) {
   const Precision precision = guest.plugin().precision;
   Arrays rounded;
-  for (const Array& array : question.given) {
-    // The spacing is a member of the tissue, not an array.
-    rounded.push_back(array.name == "spacing" ? array : in_precision(array, precision));
-  }
+  for (const Array& array : question.given) rounded.push_back(in_precision_of_tissue(array, precision));
   std::vector<Argument> arguments;
-  for (const Array& array : rounded) {
-    arguments.push_back(given(array));
-    if (array.name == "spacing" || array.name == "nodes") arguments.back().role = Role::setup;
-  }
+  for (const Array& array : rounded) arguments.push_back(given_of_tissue(array));
   const ElementType real = precision == Precision::binary32 ? ElementType::f32 : ElementType::f64;
   for (const AnswerArray& wanted : operation.answers) {
     Argument& argument = arguments.emplace_back();
@@ -142,7 +137,7 @@ KernelCampaign judge_kernel(Guest& guest, const OperationDescription& operation,
       if (verdict.property == kAnswersProperty) ++campaign.lost;
       const bool is_known = std::any_of(campaign.failures.begin(), campaign.failures.end(),
                                         [&](const KernelFailure& f) { return f.verdict.property == verdict.property; });
-      if (!is_known) campaign.failures.push_back({index, verdict, question, verdict});
+      if (!is_known) campaign.failures.push_back({index, at_end, verdict, question, verdict});
     }
     campaign.failed += fails ? 1 : 0;
     campaign.seconds = seconds_since(begin);
@@ -154,8 +149,7 @@ KernelCampaign judge_kernel(Guest& guest, const OperationDescription& operation,
     }
   }
   for (KernelFailure& failure : campaign.failures) {
-    const bool at_end = (failure.index + failure.index / kinds) % 2 == 0;
-    simplify(guest, operation, promises, at_end, again, options.simplify, failure);
+    simplify(guest, operation, promises, again, options.simplify, failure);
   }
   return campaign;
 }

@@ -27,8 +27,9 @@ struct KernelCampaignOptions {
 };
 
 struct KernelFailure {
-  int64_t index = 0;  // of the question
-  Verdict verdict;    // of the question as it was drawn
+  int64_t index = 0;   // of the question
+  bool at_end = true;  // where its arrays lay
+  Verdict verdict;     // of the question as it was drawn
   Question simplest;
   Verdict of_simplest;
 };

@@ -61,7 +61,7 @@ bool wait_for(int channel, double seconds) {
     const int found = poll(&waiting, 1, static_cast<int>(std::clamp<int64_t>(left, 0, 1'000'000)));
     if (found > 0) return true;
     if (found < 0 && errno != EINTR) machine_failed("poll");
-    if (found == 0) return false;
+    if (found == 0 && left <= 1'000'000) return false;
   }
 }
 
@@ -98,12 +98,10 @@ Guest::Guest(GuestOptions options)
     throw InputError(options_.library, "", "there is no such file", "name the shared library of a plugin");
   }
   options_.library = fs::absolute(options_.library).string();
-  file_ = static_cast<int>(memfd_create("cutproof arrays", MFD_CLOEXEC));
-  if (file_ < 0 || ftruncate(file_, wire::kMemoryBytes) != 0) machine_failed("memory to share with a plugin");
-  void* const mapped = mmap(nullptr, static_cast<std::size_t>(wire::kMemoryBytes), PROT_READ | PROT_WRITE,
-                            MAP_SHARED | MAP_NORESERVE, file_, 0);
-  if (mapped == MAP_FAILED) machine_failed("memory to share with a plugin");
-  memory_ = static_cast<unsigned char*>(mapped);
+  file_.number = memfd_create("cutproof arrays", MFD_CLOEXEC);
+  if (file_.number < 0 || ftruncate(file_.number, wire::kMemoryBytes) != 0)
+    machine_failed("memory to share with a plugin");
+  map();
   start();
 }
 
@@ -111,8 +109,8 @@ Guest::Guest(int channel, int memory, double time_limit)
     : request_(std::make_unique<wire::Request>()),
       reply_(std::make_unique<wire::Reply>()),
       attached_(true),
-      channel_(channel),
-      file_(memory) {
+      channel_(channel) {
+  file_.number = memory;
   options_.library = "the attached guest";
   options_.time_limit = time_limit;
   const auto refuse = [this](const std::string& problem) {
@@ -127,19 +125,27 @@ Guest::Guest(int channel, int memory, double time_limit)
   if (fstat(memory, &file) != 0 || file.st_size != wire::kMemoryBytes) {
     refuse(fmt::format("file {} is no memory of {} bytes", memory, wire::kMemoryBytes));
   }
-  void* const mapped = mmap(nullptr, static_cast<std::size_t>(wire::kMemoryBytes), PROT_READ | PROT_WRITE,
-                            MAP_SHARED | MAP_NORESERVE, file_, 0);
-  if (mapped == MAP_FAILED) machine_failed("memory to share with a plugin");
-  memory_ = static_cast<unsigned char*>(mapped);
+  map();
   running_ = true;
   restarts_ = 0;
   greet(kTimeToStart);
 }
 
-Guest::~Guest() {
-  stop();
-  if (memory_ != nullptr) munmap(memory_, static_cast<std::size_t>(wire::kMemoryBytes));
-  if (file_ >= 0) close(file_);
+Guest::~Guest() { stop(); }
+
+void Guest::map() {
+  void* const mapped = mmap(nullptr, static_cast<std::size_t>(wire::kMemoryBytes), PROT_READ | PROT_WRITE,
+                            MAP_SHARED | MAP_NORESERVE, file_.number, 0);
+  if (mapped == MAP_FAILED) machine_failed("memory to share with a plugin");
+  mapping_.at = mapped;
+  memory_ = static_cast<unsigned char*>(mapped);
+}
+
+Guest::File::~File() {
+  if (number >= 0) close(number);
+}
+Guest::Mapping::~Mapping() {
+  if (at != nullptr) munmap(at, static_cast<std::size_t>(wire::kMemoryBytes));
 }
 
 void Guest::start() {
@@ -149,8 +155,12 @@ void Guest::start() {
   if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) machine_failed("a channel to a plugin");
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  // Copies are inherited, whatever their numbers; these are.
-  const int their_channel = fcntl(ends[1], F_DUPFD, 100), their_file = fcntl(file_, F_DUPFD, 100);
+  // Only this process inherits these two: a file that is copied onto itself stays open in it. Were they open to others
+  // for a moment, a guest that another thread starts then would hold this one's end of the channel, and nobody would
+  // see that this one has ended.
+  const int their_channel = fcntl(ends[1], F_DUPFD_CLOEXEC, 100),
+            their_file = fcntl(file_.number, F_DUPFD_CLOEXEC, 100);
+  for (const int file : {their_channel, their_file}) posix_spawn_file_actions_adddup2(&actions, file, file);
   const std::string program = guest_program(), channel = std::to_string(their_channel),
                     file = std::to_string(their_file);
   const char* const arguments[] = {program.c_str(), options_.library.c_str(), channel.c_str(), file.c_str(), nullptr};
@@ -202,8 +212,11 @@ void Guest::greet(double time_limit) {
         fmt::format("{} is of another version than cutproof", attached_ ? "cutproof.py" : "cutproof-guest"),
         "install both anew");
   }
-  if (hello->greeting == wire::Greeting::cannot_run_here) throw CannotRunHere(text(hello->text));
-  if (hello->greeting != wire::Greeting::ready) throw InputError(options_.library, "", text(hello->text), remedy);
+  if (hello->greeting != wire::Greeting::ready) {
+    stop();
+    if (hello->greeting == wire::Greeting::cannot_run_here) throw CannotRunHere(text(hello->text));
+    throw InputError(options_.library, "", text(hello->text), remedy);
+  }
   plugin_.name = text(hello->name);
   plugin_.version = text(hello->version);
   plugin_.promises = hello->has_promises != 0 ? std::optional(text(hello->promises)) : std::nullopt;
@@ -349,13 +362,8 @@ Answer Guest::call(Operation operation, uint32_t instance, Span span, const std:
   }
   wire::Reply& reply = *reply_;
   if (recv(channel_, &reply, sizeof reply, 0) != static_cast<ssize_t>(sizeof reply)) return lost(why_it_ended());
-  if (reply.outcome == wire::Outcome::device_failed) return lost(without_control_characters(reply.text));
   reply.text[sizeof reply.text - 1] = 0;
-  if (reply.outcome == wire::Outcome::refused) {
-    answer.kind = Answer::Kind::refused;
-    answer.text = fmt::format("it refused, with {}", reply.code);
-    return answer;
-  }
+  if (reply.outcome == wire::Outcome::device_failed) return lost(without_control_characters(reply.text));
   if (reply.outcome == wire::Outcome::broke_a_rule) {
     answer.kind = Answer::Kind::fault;
     answer.text = without_control_characters(reply.text);
@@ -378,25 +386,32 @@ Answer Guest::call(Operation operation, uint32_t instance, Span span, const std:
       answer.arrays.clear();
       return answer;
     }
-    const int64_t rows = reply.rows[k], offset = reply.offset[k];
-    const int64_t bytes = rows * argument.columns * size_of(argument.type);
-    wire::Place place = {array.offset, array.first_page, array.end_page};
-    if (argument.role == Role::grown && rows >= 0 && bytes <= wire::kMostGrown) {
-      place = wire::place_in_arena(array.arena, bytes, at_end);
-    }
-    if (rows < 0 || (argument.role == Role::answer && rows != argument.rows) || offset != place.offset) {
+    const int64_t rows = reply.rows[k], offset = reply.offset[k], row = argument.columns * size_of(argument.type);
+    const bool grown = argument.role == Role::grown;
+    const bool possible = grown ? rows >= 0 && rows <= wire::kMostGrown / row : rows == argument.rows;
+    const int64_t bytes = possible ? rows * row : 0;
+    const wire::Place place = grown ? wire::place_in_arena(array.arena, bytes, at_end)
+                                    : wire::Place{array.offset, array.first_page, array.end_page};
+    if (!possible || offset != place.offset) {
       return lost("its process says something about '" + argument.name + "' that cannot be");
     }
     if (std::string problem = problem_around(array, offset, bytes, place.first_page, place.end_page);
         !problem.empty()) {
       answer.kind = Answer::Kind::fault;
       answer.text = std::move(problem);
+      answer.arrays.clear();
       return answer;
     }
     Array got{argument.name, argument.type, {rows, argument.columns}, {}};
     got.bytes.resize(at(bytes));
     if (bytes > 0) std::memcpy(got.bytes.data(), memory_ + offset, at(bytes));
     answer.arrays.push_back(std::move(got));
+  }
+  // Who refuses has not been anywhere else either.
+  if (reply.outcome == wire::Outcome::refused) {
+    answer.kind = Answer::Kind::refused;
+    answer.text = fmt::format("it refused, with {}", reply.code);
+    answer.arrays.clear();
   }
   return answer;
 }

@@ -92,14 +92,27 @@ class Guest {
   void stop();
   std::string why_it_ended();
   std::string describe_fault(const wire::Fault& fault) const;
+  void map();
   std::string problem_around(const wire::Array& array, int64_t offset, int64_t bytes, int64_t first, int64_t end) const;
+
+  // Given back also where a constructor throws.
+  struct File {
+    int number = -1;
+    ~File();
+  };
+  struct Mapping {
+    void* at = nullptr;
+    ~Mapping();
+  };
 
   GuestOptions options_;
   PluginInfo plugin_;
   std::unique_ptr<wire::Request> request_;
   std::unique_ptr<wire::Reply> reply_;
   bool attached_ = false, running_ = false;
-  int channel_ = -1, file_ = -1;
+  File file_;  // of arrays
+  Mapping mapping_;
+  int channel_ = -1;
   pid_t process_ = -1;
   unsigned char* memory_ = nullptr;
   int64_t restarts_ = -1;

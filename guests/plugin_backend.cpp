@@ -4,6 +4,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "guests/tissue_arrays.h"
 #include "model/at.h"
 #include "model/error.h"
 #include "model/fields.h"
@@ -101,7 +102,6 @@ Arrays arrays_of(const State& state, Precision precision) {
   return arrays;
 }
 
-// What the plugin may change keeps its length only where a state has one value.
 void take_state(const Arrays& arrays, State& state) {
   for_each_field([&](const Field& field, auto get) {
     if (const Array* const array = find_array(arrays, name_in_call(field))) take(*array, get(state));
@@ -153,31 +153,6 @@ Arrays arrays_of(const Setup& setup) {
   return arrays;
 }
 
-Arrays arrays_of(const Body& body, Precision precision) {
-  std::vector<int64_t> offsets = {0};
-  std::vector<int32_t> ends, nodes;
-  std::vector<Vec3> rest;
-  for (int32_t i = 0; i < body.particle_count(); ++i) {
-    for (const int32_t other : body.neighbours(i)) ends.push_back(other);
-    offsets.push_back(static_cast<int64_t>(ends.size()));
-    rest.push_back(body.rest_position(i));
-    if (!body.on_grid()) continue;
-    const auto node = body.grid.coordinates(body.node[at(i)]);
-    nodes.insert(nodes.end(), node.begin(), node.end());
-  }
-  Arrays arrays = {array_of("edge_offsets", offsets), array_of("edge_ends", ends),
-                   in_precision(array_of("rest", rest), precision),
-                   in_precision(array_of("mass", body.mass), precision)};
-  if (body.on_grid()) arrays.push_back(make_array("node", {body.particle_count(), 3}, nodes));
-  return arrays;
-}
-
-// Of which host->setup and the tissue's own members are read.
-Arrays constants_of(const Body& body) {
-  return {array_of_one("spacing", body.grid.spacing),
-          make_array("nodes", {3}, std::vector<int32_t>(body.grid.nodes.begin(), body.grid.nodes.end()))};
-}
-
 // --- The backend -----------------------------------------------------------------------------------------------------
 
 class PluginBackend final : public Backend {
@@ -203,8 +178,7 @@ class PluginBackend final : public Backend {
     report_ = {};
     for (std::size_t b = 0; b < setups_.size(); ++b) {
       states_[b].precision = std::max(states_[b].precision, precision());
-      Arrays& setup = setup_arrays_.emplace_back(arrays_of(setups_[b]));
-      for (Array& constant : constants_of(setups_[b].body)) setup.push_back(std::move(constant));
+      setup_arrays_.push_back(arrays_of(setups_[b]));
       load_body(b);
     }
     restarts_ = guest_.restarts();
@@ -220,13 +194,6 @@ class PluginBackend final : public Backend {
   }
 
   std::vector<State> snapshot() const override { return states_; }
-  std::vector<State> snapshot_of(const std::vector<bool>& wanted) const override {
-    std::vector<State> states(states_.size());
-    for (std::size_t b = 0; b < states.size(); ++b) {
-      if (wanted.at(b)) states[b] = states_[b];
-    }
-    return states;
-  }
   SpanReport report() const override { return report_; }
 
  private:
@@ -241,10 +208,13 @@ class PluginBackend final : public Backend {
 
   void load_body(std::size_t b) {
     std::vector<Argument> arguments = setup_arguments(b);
-    const Arrays tissue = arrays_of(setups_[b].body, precision()), state = arrays_of(states_[b], precision());
-    for (const Arrays* const arrays : {&tissue, &state}) {
-      for (const Array& array : *arrays) arguments.push_back(given(array));
+    Arrays tissue;
+    for (const Array& array : tissue_arrays(setups_[b].body)) {
+      tissue.push_back(in_precision_of_tissue(array, precision()));
     }
+    const Arrays state = arrays_of(states_[b], precision());
+    for (const Array& array : tissue) arguments.push_back(given_of_tissue(array));
+    for (const Array& array : state) arguments.push_back(given(array));
     const Answer answer = guest_.call(wire::load, static_cast<uint32_t>(b), {}, arguments, turn());
     if (answer.kind == Answer::Kind::refused) throw Refused("the plugin, load: " + answer.text);
     if (answer.kind == Answer::Kind::fault) throw std::runtime_error("load: " + answer.text);
@@ -260,7 +230,6 @@ class PluginBackend final : public Backend {
       next.impulse = {};
     }
     const int64_t frame = next.frame;
-    const std::vector<int32_t> numbers = next.clusters.number;
     // Of a single stage it is known beforehand whether it is due; in a longer span the plugin knows.
     const bool one = span.first == span.last;
     if (!one || is_due(setup, span.first, !next.removed.empty(), next.edge_covered)) {
@@ -293,7 +262,6 @@ class PluginBackend final : public Backend {
     const Arrays given_state = arrays_of(state, precision());
     for (const Array& array : given_state) {
       arguments.push_back(given(array));
-      // Those with one value keep their length.
       arguments.back().role = Role::grown;
     }
     const Answer answer = guest_.call(wire::run, static_cast<uint32_t>(b), span, arguments, turn());

@@ -57,7 +57,6 @@ struct Call {
   std::vector<Held> arrays;
   std::string broken;  // the first rule that was broken
   bool device_failed = false;
-  // Pages that may be touched, for the next call to close: [first, end) of the arrays, and of each arena.
   Held* find(const char* name, bool setup = false) {
     for (Held& held : arrays) {
       if ((held.wire.role == Role::setup) == setup && std::strcmp(held.wire.name, name) == 0) return &held;
@@ -74,7 +73,8 @@ Call call;
 const cutproof_plugin* plugin = nullptr;
 bool on_device = false;
 std::map<uint32_t, void*> instances;
-int64_t opened_arrays = 0;  // bytes from the beginning that may have been opened
+// Pages that may be touched, for the next call to close: of the arrays all before this, of each arena [first, end).
+int64_t opened_arrays = 0;
 int64_t opened_arenas[wire::kArenaCount][2] = {};
 
 // --- What kills the guest --------------------------------------------------------------------------------------------
@@ -442,7 +442,7 @@ void greet(wire::Hello& hello, const char* library) {
                                : "it was made for version " + std::to_string(plugin->abi) +
                                      " of plugin.h, and this cutproof has " + std::to_string(CUTPROOF_ABI));
   }
-  if (!CUTPROOF_HAS(plugin, rotations) && plugin->size < offsetof(cutproof_plugin, create)) {
+  if (plugin->size < offsetof(cutproof_plugin, create)) {
     hello.greeting = wire::Greeting::wrong_abi;
     return put(hello.text, "it says that its struct has " + std::to_string(plugin->size) +
                                " bytes: size is to be sizeof(cutproof_plugin)");

@@ -9,6 +9,7 @@
 #include <set>
 #include <utility>
 
+#include "guests/tissue_arrays.h"
 #include "model/at.h"
 #include "model/bare_graph.h"
 
@@ -161,29 +162,8 @@ Tissue part_of(const Tissue& tissue, const std::vector<uint8_t>& keep) {
 }
 
 Arrays arrays_of(const Tissue& tissue) {
-  const Body& body = tissue.body;
-  const int64_t n = body.particle_count();
-  std::vector<int64_t> offsets = {0};
-  std::vector<int32_t> ends, nodes;
-  std::vector<double> rest;
-  for (int32_t i = 0; i < n; ++i) {
-    for (const int32_t other : body.neighbours(i)) ends.push_back(other);
-    offsets.push_back(static_cast<int64_t>(ends.size()));
-    const Vec3 place = body.rest_position(i);
-    rest.insert(rest.end(), {place.x, place.y, place.z});
-    if (!body.on_grid()) continue;
-    const auto node = body.grid.coordinates(body.node[at(i)]);
-    nodes.insert(nodes.end(), node.begin(), node.end());
-  }
-  Arrays arrays = {make_array("edge_offsets", {n + 1}, offsets),
-                   make_array("edge_ends", {static_cast<int64_t>(ends.size())}, ends), make_array("rest", {n, 3}, rest),
-                   make_array("mass", {n}, body.mass)};
-  if (body.on_grid()) {
-    arrays.push_back(make_array("node", {n, 3}, nodes));
-    arrays.push_back(make_array("nodes", {3}, std::vector<int32_t>(body.grid.nodes.begin(), body.grid.nodes.end())));
-  }
-  arrays.push_back(make_array("spacing", {1}, std::vector<double>{body.grid.spacing}));
-  arrays.push_back(make_array("alive", {n}, tissue.alive));
+  Arrays arrays = tissue_arrays(tissue.body);
+  arrays.push_back(make_array("alive", {tissue.body.particle_count()}, tissue.alive));
   return arrays;
 }
 

@@ -69,6 +69,9 @@ TEST(Guest, SaysWhatAPluginDidInsteadOfAnswering) {
        "it wrote to byte 1 behind the end of 'members'"},
       {"before", "clusters", "it wrote to byte 1 before the beginning of 'members'",
        "it writes to byte 1 before the beginning of 'members'"},
+      // Refusing excuses nothing.
+      {"behind_and_refuse", "components", "it writes to byte 1 behind the end of 'label', which has ",
+       "it wrote to byte 1 behind the end of 'label', which has "},
       {"read_behind", "components", "it reads byte 1 behind the end of 'edge_offsets'", ""},
       {"input", "components", "it writes to 'edge_offsets', which is an input",
        "it writes to 'edge_offsets', which is an input"},

@@ -63,6 +63,8 @@ static int misbehave(cutproof_array* output, const cutproof_array* input) {
   if (is("input")) ((volatile char*)input->data)[0] = 77;
   if (is("rows")) output->rows += 3;
   if (is("data")) output->data = mode;
+  if (is("behind_and_refuse")) ((volatile char*)output->data)[bytes] = 1;
+  if (is("behind_and_refuse")) return 5;
   if (is("type")) output->type = CUTPROOF_F64;
   return is("refuse") ? 5 : 0;
 }
