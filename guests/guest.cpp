@@ -236,10 +236,14 @@ void Guest::stop() {
     channel_ = -1;
   }
   if (process_ > 0) {
-    // One that waits ends by itself when its channel is closed, and takes its instances apart; not for long.
+    // One that waits ends by itself when its channel is closed, and takes its instances apart; it may take as long as
+    // for an answer (a sanitizer that it runs under writes its report now).
     int status = 0;
     pid_t ended = 0;
-    for (int k = 0; k < 200 && running_ && (ended = waitpid(process_, &status, WNOHANG)) == 0; ++k) usleep(1000);
+    const auto last = std::chrono::steady_clock::now() + std::chrono::duration<double>(options_.time_limit);
+    while (running_ && (ended = waitpid(process_, &status, WNOHANG)) == 0 && std::chrono::steady_clock::now() < last) {
+      usleep(1000);
+    }
     if (ended == 0) {
       kill(process_, SIGKILL);
       waitpid(process_, &status, 0);
