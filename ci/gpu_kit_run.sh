@@ -86,13 +86,12 @@ for part in $parts; do
       for plugin in cuda_rotations cuda_components_without_barrier; do
         try "judge_$plugin" finds cutproof judge "guests/$plugin.so" --save "$results" --json "$results/judge_$plugin.json"
       done
+      # Not of the one without a barrier: all it shares it reads and writes atomically, which is no hazard to racecheck.
       for plugin in cuda_components cuda_components_in_a_block cuda_rotations; do
         for tool in memcheck racecheck synccheck initcheck; do
           try "judge_${plugin}_$tool" judge_under "$tool" "$plugin" 'ERROR SUMMARY: 0 errors\|RACECHECK SUMMARY: 0 hazards'
         done
-      done
-      try judge_cuda_components_without_barrier_racecheck judge_under racecheck cuda_components_without_barrier \
-        'RACECHECK SUMMARY: [1-9][0-9]* hazards' ;;
+      done ;;
     sanitizer)
       for tool in memcheck racecheck initcheck synccheck; do
         # One by one and not as a graph: racecheck does not know conditional nodes. From one thread: it ends no kernel
