@@ -228,13 +228,12 @@ class DeviceLauncher {
   template <class Kernel, class... Args>
   void items(Kernel, std::int64_t capacity, Args... args) {
     constexpr int kThreads = std::min(256, max_threads<Kernel>());
-    // A few waves of full blocks: enough to balance, few enough that empty ones cost little.
-    launch<Kernel>((capacity + kThreads - 1) / kThreads, 32 * 256 / kThreads, kThreads, 0, args...);
+    launch<Kernel>((capacity + kThreads - 1) / kThreads, kThreads, 0, args...);
   }
   template <class Kernel, class... Args>
   void blocks(Kernel, std::int64_t capacity, int threads, std::size_t shared_bytes, Args... args) {
     check_threads<Kernel>(threads);
-    launch<Kernel>(capacity, 4 * 2048 / threads, threads, shared_bytes, args...);
+    launch<Kernel>(capacity, threads, shared_bytes, args...);
   }
 
   template <class Body>
@@ -306,8 +305,7 @@ class DeviceLauncher {
       : mode_(mode), stream_(stream), resources_(std::move(resources)), depth_(depth) {}
 
   template <class Kernel, class... Args>
-  void launch(std::int64_t wanted, int most_per_multiprocessor, int threads, std::size_t shared_bytes,
-              const Args&... args) {
+  void launch(std::int64_t wanted, int threads, std::size_t shared_bytes, const Args&... args) {
     const auto arguments = detail::bundle(args...);
     const auto kernel = &run_kernel<Kernel, detail::Arguments<Args...>>;
     // Beyond this a kernel must ask; what collectives use (up to 6 KB) counts as well.
@@ -318,7 +316,13 @@ class DeviceLauncher {
           kernel_name<Kernel>(), __FILE__, __LINE__);
     }
     if (mode_ == Mode::measure) return;
-    const std::int64_t most = static_cast<std::int64_t>(most_per_multiprocessor) * resources_->multiprocessors;
+    // As many as run side by side. Capacities are far above what is there, and a block without work still has to come,
+    // read a counter and go: ten waves of them took as long as the work (advance_kernel of 100,000 particles).
+    int side_by_side = 0;
+    check_cuda(cudaOccupancyMaxActiveBlocksPerMultiprocessorWithFlags(&side_by_side, kernel, threads, shared_bytes,
+                                                                      cudaOccupancyDefault),
+               kernel_name<Kernel>(), __FILE__, __LINE__);
+    const std::int64_t most = std::int64_t{std::max(side_by_side, 1)} * resources_->multiprocessors;
     const auto grid = static_cast<unsigned>(std::clamp<std::int64_t>(wanted, 1, most));
     kernel<<<grid, static_cast<unsigned>(threads), shared_bytes, stream_>>>(arguments);
     check_cuda(cudaGetLastError(), kernel_name<Kernel>(), __FILE__, __LINE__);
