@@ -18,7 +18,7 @@ struct Span {
   Stage first = Stage::step;
   Stage last = Stage::skin;
 
-  bool contains(Stage stage) const { return first <= stage && stage <= last; }
+  constexpr bool contains(Stage stage) const { return first <= stage && stage <= last; }
   friend bool operator==(const Span&, const Span&) = default;
 };
 

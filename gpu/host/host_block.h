@@ -103,6 +103,7 @@ class HostBlock {
     meet(Operation::shuffle, mask, where, [&] { for_lanes(mask, [&](int i) { put(i, brought<T>(source_lane(i))); }); });
     return taken<T>();
   }
+  void sync_warp(unsigned mask, Where where = Where::here()) { ballot(mask, false, where); }
 
   // T: int, unsigned or unsigned long long.
   template <class T>

@@ -234,6 +234,40 @@ CUTPROOF_DEVICE inline Float3 next_position(const Contacts& contacts, const Rest
   return in_turn && contacts.frictionless && worse ? x : next;
 }
 
+// Points of the body within `radius` of one, all displaced alike.
+struct Ball {
+  RestPoint rest;
+  Float3 d;
+  float radius;
+};
+
+// Whether no point of a ball is projected, or touches (kTouchMargin), wherever in the ball it lies. `side`: of the
+// blade, that of all its points when the substep began, or 0 if they were on both. May say no where yes were right.
+//
+// A point over the plate is projected from any distance if it is on the other side than where it began, so keeping away
+// from the plate is not enough: either the whole ball stays on its side, or it keeps clear of all that lies over and
+// under the plate.
+CUTPROOF_DEVICE inline bool is_clear(const Contacts& contacts, const Ball& ball, int side) {
+  using namespace contacts_detail;
+  const RestPoint& rest = ball.rest;
+  // Coordinates are rounded a few times each, by units of the greatest number that is in them.
+  constexpr float kRounds = 32 * 0x1p-24f;
+  const auto extent = [](Float3 a) { return fabsf(a.x) + fabsf(a.y) + fabsf(a.z); };
+  const float size = rest.h * extent(rest.node) + extent(ball.d);
+  const float reach = ball.radius * (1.0f + kRounds) + static_cast<float>(kTouchMargin) * rest.h;
+  for (int k = 0; k < contacts.wall_count; ++k) {
+    const float slack = kRounds * (size + fabsf(contacts.walls[k].offset));
+    if (!(depth_in(contacts.walls[k], rest, ball.d) < -(reach + slack))) return false;
+  }
+  if (contacts.move == nullptr) return true;
+  const PoseF& pose = contacts.move->to;
+  const float clear = reach + kRounds * (size + extent(pose.edge));
+  const Float3 c = into_frame(pose, rest.from(pose.edge) + ball.d);
+  if (side != 0 && static_cast<float>(side) * c.z > contacts.clearance + clear) return true;
+  const Float3 away = from_blade(contacts, c);
+  return sqrtf(away.x * away.x + away.y * away.y) > clear && norm(away) > contacts.clearance + clear;
+}
+
 // Friction, or room that is not convex: an iteration can have several fixed points.
 CUTPROOF_DEVICE inline bool path_matters(const Contacts& contacts) {
   return contacts.move != nullptr || !contacts.frictionless;

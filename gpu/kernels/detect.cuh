@@ -428,7 +428,7 @@ CUTPROOF_DEVICE void remove_particles_kernel(Block& block, DeviceView w) {
 CUTPROOF_KERNEL(remove_particles_kernel);
 
 template <class Launcher>
-void enqueue_detect(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+CUTPROOF_ENQUEUE void enqueue_detect(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   using namespace detect_detail;
   if (plan.strain) launcher.blocks(flag_strained_clusters_kernel_object{}, w.slot_capacity, kStrainThreads, 0, w);
   launcher.items(flag_particles_kernel_object{}, w.particles, w);

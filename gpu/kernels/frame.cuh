@@ -42,7 +42,7 @@ CUTPROOF_DEVICE void note_cuts_kernel(Block& block, DeviceView w) {
   c.expanding = 0;
   c.extracting = 0;
   for (int b = 0; b < w.bodies; ++b) {
-    if (is_due(w, b, static_cast<int>(Stage::split))) c.cut = 1;
+    if (is_due(w, b, static_cast<int>(Stage::split))) c.cut = c.groups_stale = 1;
     if (is_due(w, b, static_cast<int>(Stage::expand))) c.expanding = 1;
     if (is_due(w, b, static_cast<int>(Stage::skin)) && (w.cut[b] >= 0 || w.skin_made[b] == 0)) c.extracting = 1;
   }

@@ -502,7 +502,7 @@ CUTPROOF_DEVICE void place_members_kernel(Block& block, DeviceView w) {
 CUTPROOF_KERNEL(place_members_kernel);
 
 template <class Launcher>
-void enqueue_move_together(Launcher& launcher, const DeviceView& w) {
+CUTPROOF_ENQUEUE void enqueue_move_together(Launcher& launcher, const DeviceView& w) {
   launcher.exclusive_scan(w.slot_size, moved_begin(w), w.slot_capacity, &w.counters->members_used);
   launcher.blocks(gather_members_kernel_object{}, w.slot_capacity, 128, 0, w);
   launcher.items(place_members_kernel_object{}, w.member_capacity, w);
@@ -512,7 +512,7 @@ void enqueue_move_together(Launcher& launcher, const DeviceView& w) {
 inline constexpr int kMergeBlocks = 2048, kMergeThreads = 128;
 
 template <class Launcher>
-void enqueue_merge(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   Counters* const c = w.counters;
   const int64_t most = w.slot_capacity < kMergeBlocks ? w.slot_capacity : kMergeBlocks;
   const auto propose = [&](Launcher& on, auto kernel) { on.blocks(kernel, most, kMergeThreads, kCandidateBytes, w); };

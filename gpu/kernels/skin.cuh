@@ -212,7 +212,7 @@ CUTPROOF_DEVICE void extract_cells_kernel(Block& block, const DeviceView& w) {
 CUTPROOF_KERNEL(extract_cells_kernel);
 
 template <class Launcher>
-void enqueue_skin_cells(Launcher& launcher, const DeviceView& w, const Plan&) {
+CUTPROOF_ENQUEUE void enqueue_skin_cells(Launcher& launcher, const DeviceView& w, const Plan&) {
   int* const scratch = w.counters->scratch;  // an address only: counters lie on the device
   launcher.items(mark_dirty_cells_kernel_object{}, w.particles, w);
   launcher.select(w.cell_dirty, w.nodes, w.dirty_cells, &w.counters->dirty_cells);
@@ -295,7 +295,7 @@ CUTPROOF_DEVICE void place_vertices_kernel(Block& block, const DeviceView& w) {
 CUTPROOF_KERNEL(place_vertices_kernel);
 
 template <class Launcher>
-void enqueue_skin_positions(Launcher& launcher, const DeviceView& w, const Plan&) {
+CUTPROOF_ENQUEUE void enqueue_skin_positions(Launcher& launcher, const DeviceView& w, const Plan&) {
   launcher.items(recenter_clusters_kernel_object{}, 32 * static_cast<int64_t>(w.slot_capacity), w);
   launcher.items(place_vertices_kernel_object{}, w.vertex_capacity, w);
 }

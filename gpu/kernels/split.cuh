@@ -468,7 +468,7 @@ CUTPROOF_DEVICE void rest_frames_of_components_kernel(Block& block, DeviceView w
 CUTPROOF_KERNEL(rest_frames_of_components_kernel);
 
 template <class Launcher>
-void enqueue_split(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+CUTPROOF_ENQUEUE void enqueue_split(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   using namespace split_detail;
   if (plan.debris) {
     launcher.items(link_tissue_kernel_object{}, w.particles, w);

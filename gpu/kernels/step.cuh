@@ -1,18 +1,23 @@
-// Stage step (method.md §3): position-based dynamics with shape matching, one DeviceView of bodies.
+// Stage step (docs/design/method.md §3, §13): position-based dynamics with shape matching, one DeviceView of bodies.
 //
-// A substep is K times two kernels: match_shapes (a few clusters per block: sums, rotations, centres) and
-// update_positions (a thread per particle: the mean over its clusters, contacts). The last update of a substep also
-// makes the velocity and begins the next substep, so nothing else is launched but the grips' kernel.
+// The particles of a group (groups.cuh) are carried: they are at d~ + M(r) - l e, with e = d~ - base from the
+// prediction, r = X - X_g, l a number of body and iteration, and M one affine map for all of them. So a substep touches
+// particles once (start_substep: puts the last map in, makes velocities, predicts, sums moments), and an iteration
+// touches clusters (match_shapes, from the moments of their groups) and groups (advance: the mean of their holders'
+// goals is the next map, and has the next moments). A group that may touch a contact is resolved: from there to the end
+// of the substep its particles have positions of their own, as those that are in no group always have.
 //
 // Everything is a displacement from rest: with d = x - X,  t_c - T_c = Σ w d / M,  and the goal of particle i in
 // cluster c lies at X_i + (t_c - T_c) + (R_c - I)(X_i - T_c). A body at rest or moved as a whole is then reproduced
-// exactly: d is the same everywhere, all sums of differences are zero, and R_c is I to the last bit.
+// exactly: d is the same everywhere, all moments about bases are zero, and R_c is I to the last bit.
 #pragma once
 #include "gpu/kernels/contacts.cuh"
 #include "gpu/kernels/float3.h"
+#include "gpu/kernels/groups.cuh"
 #include "gpu/kernels/rotation.cuh"
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/plan.h"
+#include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
 
 namespace cutproof::gpu {
@@ -24,7 +29,12 @@ CUTPROOF_DEVICE inline bool takes_part(const DeviceView& w, int b, int substep, 
   return running(w, b) && substep < w.body[b].substeps && iteration < w.body[b].iterations;
 }
 
+// The body of a particle, a cluster, a group. (Of a load of one body nothing has to be waited for.)
 CUTPROOF_DEVICE inline int body_index(const DeviceView& w, int p) { return w.bodies == 1 ? 0 : w.body_of[p]; }
+CUTPROOF_DEVICE inline int body_of_slot(const DeviceView& w, int s) { return w.bodies == 1 ? 0 : w.slot_body[s]; }
+CUTPROOF_DEVICE inline int body_of_group(const DeviceView& w, int g) {
+  return w.bodies == 1 ? 0 : w.group_head[g].body;
+}
 
 CUTPROOF_DEVICE inline Float3 grid_node(const BodyConstants& body, int node) {
   const Coordinates c = coordinates(body, node);
@@ -56,185 +66,13 @@ CUTPROOF_DEVICE inline float decay_by(float x) {
   return ldexpf(sum, static_cast<int>(n));
 }
 
-// ---- match shapes
-
-// Sums over the members of a cluster, with e = d - (d of the first member) and r = (X - T) / h:
-//   [0..2] Σ w e   [3..5] Σ w r   [6] Σ w   [7..15] Σ w (r + e / h) rᵀ
-// The products r_i r_j are formed first, so that at rest the last is symmetric to the bit and R is I.
-inline constexpr int kSums = 16;
-// Members are dealt out to kParts · 32 lanes, whatever the block looks like and however many clusters it has: the
-// order of a sum, and so its bits, depends on the cluster alone. Blocks have kParts warps on the device; with one
-// cluster for a block each warp takes a part, otherwise each warp takes all parts of its own clusters in turn.
-inline constexpr int kParts = 4;
-inline constexpr int kMatchThreads = 32 * kParts;
-// Clusters that a block holds at once; their rotations are computed side by side by the lanes of one warp.
-inline constexpr int kBatch = 32;
-// Blocks that are worth starting: enough to fill any device, few enough that large bodies have full batches.
-inline constexpr int kMatchBlocks = 2048;
-inline constexpr std::size_t kMatchShared = (kBatch * kSums + (kParts - 1) * 32 * kSums) * sizeof(float);
-
-template <int N>
-struct Floats {
-  float v[N];
-};
-
-CUTPROOF_DEVICE inline Floats<kSums> sum_part(const DeviceView& w, const BodyConstants& body, int s, int part,
-                                              int lane) {
-  Floats<kSums> sums = {};
-  const int begin = w.slot_begin[s], end = begin + w.slot_size[s];
-  const Float3 base = xyz(w.displacement[w.members[begin]]);
-  const float per_h = 1.0f / body.h;
-  const Float3 offset = w.rest_offset[s];
-  const int base_i = w.rest_base[3 * s], base_j = w.rest_base[3 * s + 1], base_k = w.rest_base[3 * s + 2];
-  for (int q = begin + 32 * part + lane; q < end; q += 32 * kParts) {
-    const int p = w.members[q];
-    const Float4 now = w.displacement[p];
-    const Coordinates c = coordinates(body, w.node[p]);
-    const float weight = now.w / static_cast<float>(w.membership_count[p]);
-    const Float3 e = xyz(now) - base;
-    const Float3 r = {static_cast<float>(c.i - base_i) - offset.x, static_cast<float>(c.j - base_j) - offset.y,
-                      static_cast<float>(c.k - base_k) - offset.z};
-    const Float3 y = r + per_h * e;
-    sums.v[0] += weight * e.x;
-    sums.v[1] += weight * e.y;
-    sums.v[2] += weight * e.z;
-    sums.v[3] += weight * r.x;
-    sums.v[4] += weight * r.y;
-    sums.v[5] += weight * r.z;
-    sums.v[6] += weight;
-    sums.v[7] += weight * (y.x * r.x);
-    sums.v[8] += weight * (y.x * r.y);
-    sums.v[9] += weight * (y.x * r.z);
-    sums.v[10] += weight * (y.y * r.x);
-    sums.v[11] += weight * (y.y * r.y);
-    sums.v[12] += weight * (y.y * r.z);
-    sums.v[13] += weight * (y.z * r.x);
-    sums.v[14] += weight * (y.z * r.y);
-    sums.v[15] += weight * (y.z * r.z);
-  }
-  return sums;
-}
-
-// Centre and rotation of a cluster from its sums.
-template <int Method>
-CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const float* sums) {
-  const BodyConstants& body = w.body[w.slot_body[s]];
-  const Float3 moved = {sums[0], sums[1], sums[2]}, rest = {sums[3], sums[4], sums[5]};
-  const float mass = sums[6];
-  // A = Σ w (x - t)(X - T)ᵀ / h². The rest moment is zero but for the rounding of T.
-  const Float3 shift = (1.0f / (mass * body.h)) * moved;
-  Matrix3 a;
-  for (int row = 0; row < 3; ++row) {
-    for (int k = 0; k < 3; ++k) a(row, k) = sums[7 + 3 * row + k] - shift[row] * rest[k];
-  }
-  // One particle has no extent: what is left of A is rounding, and rotate() would make a rotation of it.
-  Rotation best{w.rotation[s], true};
-  if (w.slot_size[s] > 1) best = rotate<Method>(a, w.rotation[s]);
-  w.rotation[s] = best.r;
-  w.degenerate[s] = best.degenerate;
-  // Such that Σ w (goal) = Σ w x to the rounding of these two sums (docs/design/decisions.md, Momentum and the rounding
-  // of sums): the rounded T must not push the cluster.
-  const Float3 turned = best.r * rest - rest;
-  const Float3 base = xyz(w.displacement[w.members[w.slot_begin[s]]]);
-  w.center[s] = base + (1.0f / mass) * (moved - body.h * turned);
-}
-
-}  // namespace step_detail
-
-template <int Method, class Block>
-CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int substep, int iteration) {
-  using namespace step_detail;
-  float* sums = block.template shared<float>(kBatch * kSums);
-  float* parts = block.template shared<float>((kParts - 1) * 32 * kSums);
-  const int warps = block.size() / 32, warp = block.thread() / 32, lane = block.lane();
-  const int slots = w.counters->slots_used;
-  int batch = (slots + block.count() - 1) / block.count();
-  batch = batch < 1 ? 1 : batch > kBatch ? kBatch : batch;
-  const bool together = batch == 1 && warps == kParts;
-  const auto wanted = [&](int s) { return w.slot_size[s] > 0 && takes_part(w, w.slot_body[s], substep, iteration); };
-
-  for (int64_t begin = static_cast<int64_t>(block.index()) * batch; begin < slots;
-       begin += static_cast<int64_t>(block.count()) * batch) {
-    const int first = static_cast<int>(begin);
-    const int count = slots - first < batch ? slots - first : batch;
-    if (together) {
-      const bool work = wanted(first);
-      Floats<kSums> mine;
-      if (work) mine = sum_part(w, w.body[w.slot_body[first]], first, warp, lane);
-      if (work && warp > 0) {
-        for (int k = 0; k < kSums; ++k) parts[((warp - 1) * kSums + k) * 32 + lane] = mine.v[k];
-      }
-      block.sync();
-      if (work && warp == 0) {
-        for (int part = 1; part < kParts; ++part) {
-          for (int k = 0; k < kSums; ++k) mine.v[k] += parts[((part - 1) * kSums + k) * 32 + lane];
-        }
-        const float total = block.warp_sums(mine.v);
-        if (lane % 2 == 0) sums[lane / 2] = total;
-      }
-    } else {
-      for (int k = warp; k < count; k += warps) {
-        const int s = first + k;
-        if (!wanted(s)) continue;
-        const BodyConstants& body = w.body[w.slot_body[s]];
-        Floats<kSums> mine = sum_part(w, body, s, 0, lane);
-        for (int part = 1; part < kParts && 32 * part < w.slot_size[s]; ++part) {
-          const Floats<kSums> more = sum_part(w, body, s, part, lane);
-          for (int j = 0; j < kSums; ++j) mine.v[j] += more.v[j];
-        }
-        const float total = block.warp_sums(mine.v);
-        if (lane % 2 == 0) sums[k * kSums + lane / 2] = total;
-      }
-    }
-    block.sync();
-    for (int k = block.thread(); k < count; k += block.size()) {
-      if (wanted(first + k)) place_cluster<Method>(w, first + k, sums + k * kSums);
-    }
-    block.sync();
-  }
-}
-
-template <int Method>
-struct match_shapes_kernel_object {
-  static constexpr const char* kName = "match_shapes_kernel";
-  static constexpr int kMaxThreads = step_detail::kMatchThreads;
-  template <class Block>
-  CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, int iteration) const {
-    match_shapes_kernel<Method>(block, w, substep, iteration);
-  }
-};
-
-// ---- particles
-
-namespace step_detail {
-
-// Predicts particle p, which is at d with velocity v, and puts it where contacts let it be. Grips come after this.
-template <bool kContacts>
-CUTPROOF_DEVICE inline void begin_substep(const DeviceView& w, const BodyConstants& body, int p, int frame, int substep,
-                                          float dt, Float3 d, Float3 v, float mass) {
-  const Float3 predicted = d + (dt * v + (dt * dt) * body.gravity);
-  w.start[p] = with_w(d, 0.0f);
-  if constexpr (kContacts) {
-    const Contacts contacts = contacts_of(w, body, frame, substep);
-    const RestPoint rest = {body.h, grid_node(body, w.node[p])};
-    const float side = blade_side(contacts, rest, d);
-    bool in_turn = false;  // of no interest: there is no earlier point to compare with
-    const Float3 x = project(contacts, rest, predicted, side, d, in_turn);
-    w.predicted[p] = with_w(predicted, side);
-    w.displacement[p] = with_w(x, mass);
-    w.pushed[p] = with_w(x - predicted, 0.0f);
-  } else {
-    w.predicted[p] = with_w(predicted, 1.0f);
-    w.displacement[p] = with_w(predicted, mass);
-  }
-}
-
 // Chebyshev semi-iteration (docs/design/method.md §11), order >= 1: x + pull (g - x) + carry (x - earlier), with g
 // where the plain iteration goes from x. The recurrence of the weights in closed form: omega_j = (1 + q) (1 + q^(j-1))
 // / (1 + q^j) for j >= 2, with q = ((1 - r) / (1 + r))², r² = 1 - b.
 struct Combination {
   float pull, carry;
-  CUTPROOF_DEVICE Float3 operator()(Float3 plain, Float3 now, Float3 earlier) const {
+  template <class Number>
+  CUTPROOF_DEVICE Number operator()(Number plain, Number now, Number earlier) const {
     return now + (pull * (plain - now) + carry * (now - earlier));
   }
 };
@@ -260,43 +98,407 @@ CUTPROOF_DEVICE inline Combination chebyshev(float kdt2, int order) {
   return {omega * (2.0f / (1.0f + r2)), omega - 1.0f};
 }
 
+// The M of a group: its rows of h L, and its a (arrays.inc).
+struct Map {
+  Float4 row[3];
+  // a + L (h r)
+  CUTPROOF_DEVICE Float3 operator()(Float3 r) const {
+    return {row[0].w + (row[0].x * r.x + row[0].y * r.y + row[0].z * r.z),
+            row[1].w + (row[1].x * r.x + row[1].y * r.y + row[1].z * r.z),
+            row[2].w + (row[2].x * r.x + row[2].y * r.y + row[2].z * r.z)};
+  }
+};
+CUTPROOF_DEVICE inline Map load_map(const Float4* rows, int g) {
+  return {{rows[3 * int64_t{g}], rows[3 * int64_t{g} + 1], rows[3 * int64_t{g} + 2]}};
+}
+CUTPROOF_DEVICE inline void store_map(Float4* rows, int g, const Map& map) {
+  for (int k = 0; k < 3; ++k) rows[3 * int64_t{g} + k] = map.row[k];
+}
+// Entry by entry.
+template <class Of>
+CUTPROOF_DEVICE inline Map map_of(Of of) {
+  Map map;
+  for (int k = 0; k < 3; ++k) map.row[k] = {of(k, 0), of(k, 1), of(k, 2), of(k, 3)};
+  return map;
+}
+CUTPROOF_DEVICE inline float entry(const Map& map, int row, int k) {
+  const Float4 r = map.row[row];
+  return k == 0 ? r.x : k == 1 ? r.y : k == 2 ? r.z : r.w;
+}
+
 CUTPROOF_DEVICE inline float substep_length(const DeviceView& w, const BodyConstants& body, int frame) {
   return w.substep_length[body.frame_begin + frame];
+}
+// s of method.md §3.
+CUTPROOF_DEVICE inline float pull_of(const BodyConstants& body, float kdt2) {
+  return body.solver == Solver::implicit ? kdt2 / (1.0f + kdt2) : body.relaxation;
+}
+// l: how much of a prediction's own shape is lost after so many iterations.
+CUTPROOF_DEVICE inline float lost_fraction(const BodyConstants& body, float s, int iterations) {
+  if (iterations == 0) return 0.0f;
+  if (body.solver == Solver::implicit) return s;
+  float kept = 1.0f, power = 1.0f - s;
+  for (int n = iterations; n > 0; n /= 2) {
+    if (n % 2 != 0) kept *= power;
+    power *= power;
+  }
+  return 1.0f - kept;
+}
+
+// A group and what its lanes need of it.
+struct Group {
+  int index;
+  GroupHead head;
+  RestCenter center;
+  // X - X_g [h] of its particle k.
+  CUTPROOF_DEVICE Float3 rest(const DeviceView& w, const BodyConstants& body, int k) const {
+    return groups_detail::nodes_between(center, coordinates(body, w.place_node[head.begin + k]));
+  }
+};
+CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) { return {g, w.group_head[g], w.group_center[g]}; }
+
+// Lanes that share a group: one for each row of its map; and where its particles are looked at one by one, in the pass
+// over all of them and while it is resolved.
+inline constexpr int kRowTeam = 4, kParticleTeam = 16, kResolvedTeam = 32;
+
+// Sums by axis of e (3) and of e rᵀ / h (9), weighted; in this order.
+template <class AnyTeam>
+using GroupSums = typename AnyTeam::template Sums<12>;
+
+// The rows of a map, each in the lane that has the item of its axis (Team::each).
+template <class Block>
+class Rows {
+ public:
+  CUTPROOF_DEVICE Float4& of(int axis) { return row_[Block::on_device ? 0 : axis]; }
+  template <class AnyTeam>
+  CUTPROOF_DEVICE Map all(const AnyTeam& team) {  // to every lane
+    return {{team.from(0, of(0)), team.from(1, of(1)), team.from(2, of(2))}};
+  }
+
+ private:
+  Float4 row_[Block::on_device ? 1 : 3];
+};
+
+CUTPROOF_DEVICE inline void add_moments(float* sums, float weight, Float3 e, Float3 e_per_h, Float3 r) {
+  for (int k = 0; k < 3; ++k) {
+    const float mass_e = weight * e[k], mass_e_per_h = weight * e_per_h[k];
+    sums[k] += mass_e;
+    sums[3 + 3 * k] += mass_e_per_h * r.x;
+    sums[4 + 3 * k] += mass_e_per_h * r.y;
+    sums[5 + 3 * k] += mass_e_per_h * r.z;
+  }
+}
+CUTPROOF_DEVICE inline void store_moments(Float4* rows, int g, const Floats<12>& sums) {
+  for (int k = 0; k < 3; ++k) {
+    rows[3 * int64_t{g} + k] = {sums.v[3 + 3 * k], sums.v[4 + 3 * k], sums.v[5 + 3 * k], sums.v[k]};
+  }
+}
+
+// All points of a group that are at d~ + M(r) - l e; kept: 1 - l.
+CUTPROOF_DEVICE inline Ball ball_around(const BodyConstants& body, const Group& group, Float4 base, float kept,
+                                        const Map& map) {
+  const RestCenter& center = group.center;
+  const RestPoint rest = {body.h,
+                          {static_cast<float>(center.i) + center.x, static_cast<float>(center.j) + center.y,
+                           static_cast<float>(center.k) + center.z}};
+  // |h (I + L)| <= the root of its greatest sum by rows times its greatest sum by columns.
+  float rows = 0, columns = 0;
+  for (int k = 0; k < 3; ++k) {
+    float row = 0, column = 0;
+    for (int j = 0; j < 3; ++j) {
+      row += fabsf(entry(map, k, j) + (j == k ? body.h : 0.0f));
+      column += fabsf(entry(map, j, k) + (j == k ? body.h : 0.0f));
+    }
+    rows = fmaxf(rows, row);
+    columns = fmaxf(columns, column);
+  }
+  const float radius = sqrtf(rows * columns) * group.head.radius + kept * base.w;
+  return {rest, xyz(base) + Float3{map.row[0].w, map.row[1].w, map.row[2].w}, radius};
+}
+
+// ---- substeps
+
+// [h] A base farther than this from the mean of its group is not used.
+inline constexpr float kFarBase = 1.0f / 16.0f;
+
+// Of one body, when substep `substep` begins and the one before it ends.
+struct Turnover {
+  int frame;
+  float dt, decay;
+  float lost;        // of the positions with which the last substep ends
+  bool first, last;  // nothing ends; nothing begins
+};
+CUTPROOF_DEVICE inline Turnover turnover(const DeviceView& w, int b, int substep) {
+  const BodyConstants& body = w.body[b];
+  const int frame = w.frame[b];
+  const float dt = substep_length(w, body, frame);
+  const float s = pull_of(body, body.stiffness * dt * dt);
+  return {frame,
+          dt,
+          decay_by(body.damping * dt),
+          lost_fraction(body, s, body.iterations),
+          substep == 0,
+          substep == body.substeps};
+}
+CUTPROOF_DEVICE inline bool turns_over(const DeviceView& w, int b, int substep) {
+  return running(w, b) && substep <= w.body[b].substeps;
+}
+
+// Predicts, from a particle's end of the last substep.
+CUTPROOF_DEVICE inline Float3 predict(const BodyConstants& body, float dt, Float3 d, Float3 v) {
+  return d + (dt * v + (dt * dt) * body.gravity);
+}
+
+// The displacement that contacts let a particle have that is predicted at `predicted`.
+CUTPROOF_DEVICE inline Float3 enter_substep(const DeviceView& w, const Contacts& contacts, const RestPoint& rest,
+                                            int64_t o, Float4 predicted, Float3 start, float share) {
+  bool in_turn = false;  // of no interest: there is no earlier point to compare with
+  const Float3 x = project(contacts, rest, xyz(predicted), predicted.w, start, in_turn);
+  w.position[o] = with_w(x, share);
+  w.pushed[o] = with_w(x - xyz(predicted), 0.0f);
+  return x;
+}
+
+CUTPROOF_DEVICE inline void end_impulse(const DeviceView& w, int p, const Turnover& now, Float3 pushed) {
+  w.impulse[p] = with_w(now.decay * (xyz(w.impulse[p]) + (1.0f / now.dt) * pushed), 0.0f);
+}
+
+// Where a carried particle with prediction `predicted` is. What is added is small where little has happened, however
+// far the particle is from the base.
+CUTPROOF_DEVICE inline Float3 carried_to(Float3 base, float lost, Float3 predicted, const Map& map, Float3 r) {
+  return predicted + (map(r) - lost * (predicted - base));
+}
+
+// Of groups that are resolved: where they are listed, and those of the next substep to be.
+CUTPROOF_DEVICE inline int* listed_in(const DeviceView& w, int substep) { return w.counters->listed + substep % 2; }
+
+template <class AnyTeam, class Block>
+CUTPROOF_DEVICE void list_resolved(Block& block, const AnyTeam& team, const DeviceView& w, int g, int substep) {
+  if (!team.leads()) return;
+  w.group_resolved[g] = 1;
+  w.group_touched[g] = 1;
+  if (w.body[w.group_head[g].body].iterations == 0) return;  // nobody asks for the list, or empties it
+  w.resolved_groups[block.atomic_add(listed_in(w, substep), 1)] = g;
+}
+
+template <bool kContacts, class Block>
+CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>& team, const DeviceView& w, int g,
+                                 int substep) {
+  const Group group = group_of(w, g);
+  const GroupHead& head = group.head;
+  const int b = body_of_group(w, g);
+  if (!turns_over(w, b, substep)) return;
+  const BodyConstants& body = w.body[b];
+  const Turnover now = turnover(w, b, substep);
+  Map map = {};
+  Float3 last_base;
+  [[maybe_unused]] bool resolved = false, touched = false;
+  if (!now.first) {
+    if (body.iterations > 0) map = load_map(w.group_map, g);
+    last_base = xyz(w.group_base[g]);
+    if constexpr (kContacts) resolved = w.group_resolved[g] != 0;
+  }
+  if constexpr (kContacts) touched = w.group_touched[g] != 0;
+  // Displacement and mass of particle k, and its velocity.
+  const auto where = [&](int k, Float3& v) {
+    const int o = head.begin + k;
+    if (now.first) {
+      const int p = w.place_particle[o];
+      v = xyz(w.velocity[p]);
+      return w.displacement[p];
+    }
+    const Float4 start = w.start[o];
+    Float3 d;
+    if (resolved) {
+      d = xyz(w.position[o]);
+    } else {
+      d = carried_to(last_base, now.lost, xyz(w.predicted[o]), map, group.rest(w, body, k));
+    }
+    v = (now.decay / now.dt) * (d - xyz(start));
+    return with_w(d, start.w);
+  };
+  const auto end = [&](int k) {
+    if constexpr (kContacts) {
+      if (now.first || !touched) return;
+      end_impulse(w, w.place_particle[head.begin + k], now, resolved ? xyz(w.pushed[head.begin + k]) : Float3{});
+    }
+  };
+  if (now.last) {
+    team.each(head.size, [&](int k) {
+      Float3 v;
+      const Float4 d = where(k, v);
+      const int p = w.place_particle[head.begin + k];
+      end(k);
+      w.displacement[p] = d;
+      w.velocity[p] = with_w(v, 0.0f);
+    });
+    return;
+  }
+
+  // Small numbers are summed: displacements less that of the particle in the middle. Only the lane that has it reads
+  // it, for it is that lane's to overwrite.
+  Float3 base;
+  if (team.has(head.middle)) {
+    Float3 v;
+    const Float4 d = where(head.middle, v);
+    base = predict(body, now.dt, xyz(d), v);
+  }
+  base = team.from(head.middle, base);
+  const float holders = static_cast<float>(head.holder_count), per_h = 1.0f / body.h;
+  const Contacts contacts = kContacts ? contacts_of(w, body, now.frame, substep) : Contacts{};
+  float reach = 0;
+  [[maybe_unused]] bool before = false, behind = false;  // the blade, when the substep begins
+  GroupSums<Team<Block, kParticleTeam>> sums;
+  team.each(head.size, [&](int k) {
+    Float3 v;
+    const Float4 d = where(k, v);
+    const Float3 predicted = predict(body, now.dt, xyz(d), v);
+    const int o = head.begin + k;
+    float side = 1.0f;
+    if constexpr (kContacts) {
+      end(k);
+      side = blade_side(contacts, {body.h, grid_node(body, w.place_node[o])}, xyz(d));
+      (side < 0 ? behind : before) = true;
+    }
+    w.start[o] = d;
+    w.predicted[o] = with_w(predicted, side);
+    const Float3 e = predicted - base;
+    reach = fmaxf(reach, dot(e, e));
+    add_moments(sums.of(k), d.w / holders, e, per_h * e, group.rest(w, body, k));
+  });
+  Floats<12> total = team.total(sums);
+  // Where that one is far off the others they are better measured from their mean. (Not always: what moves as a whole
+  // must have moments that vanish.)
+  const float shared = 1.0f / w.group_mass[g].w;
+  const Float3 off = {shared * total.v[0], shared * total.v[1], shared * total.v[2]};
+  if (dot(off, off) > kFarBase * kFarBase * body.h * body.h) {
+    base = base + off;
+    reach = 0;
+    sums = {};
+    team.each(head.size, [&](int k) {
+      const int o = head.begin + k;
+      const Float3 e = xyz(w.predicted[o]) - base;
+      reach = fmaxf(reach, dot(e, e));
+      add_moments(sums.of(k), w.start[o].w / holders, e, per_h * e, group.rest(w, body, k));
+    });
+    total = team.total(sums);
+  }
+  const Float4 base_and_reach = with_w(base, sqrtf(team.greatest(reach)) * (1.0f + 0x1p-20f));
+  if (team.leads()) {
+    w.group_base[g] = base_and_reach;
+    store_moments(w.group_predicted, g, total);
+  }
+  if constexpr (kContacts) {
+    before = team.any(before);
+    behind = team.any(behind);
+    const int side = before && behind ? 0 : behind ? -1 : 1;
+    const bool resolve = !is_clear(contacts, ball_around(body, group, base_and_reach, 1.0f, Map{}), side);
+    if (resolve) {
+      sums = {};
+      team.each(head.size, [&](int k) {
+        const int o = head.begin + k;
+        const RestPoint rest = {body.h, grid_node(body, w.place_node[o])};
+        const Float4 start = w.start[o];
+        const Float3 e = enter_substep(w, contacts, rest, o, w.predicted[o], xyz(start), 0.0f) - base;
+        add_moments(sums.of(k), start.w / holders, e, per_h * e, group.rest(w, body, k));
+      });
+      total = team.total(sums);
+    }
+    if (team.leads()) {
+      w.group_side[g] = side;
+      w.group_resolved[g] = 0;
+    }
+    if (resolve) list_resolved(block, team, w, g, substep);
+  }
+  if (team.leads()) store_moments(w.group_moments, g, total);
+}
+
+template <bool kContacts>
+CUTPROOF_DEVICE inline void start_loose(const DeviceView& w, int o, int substep) {
+  const int p = w.place_particle[o], b = body_index(w, p);
+  if (!turns_over(w, b, substep)) return;
+  const BodyConstants& body = w.body[b];
+  const Turnover now = turnover(w, b, substep);
+  Float4 d;
+  Float3 v;
+  if (now.first) {
+    d = w.displacement[p];
+    v = xyz(w.velocity[p]);
+  } else {
+    const Float4 start = w.start[o];
+    d = with_w(xyz(w.position[o]), start.w);
+    v = (now.decay / now.dt) * (xyz(d) - xyz(start));
+    if constexpr (kContacts) end_impulse(w, p, now, xyz(w.pushed[o]));
+  }
+  if (now.last) {
+    w.displacement[p] = d;
+    w.velocity[p] = with_w(v, 0.0f);
+    return;
+  }
+  const float share = d.w / static_cast<float>(w.membership_count[p]);
+  Float4 predicted = with_w(predict(body, now.dt, xyz(d), v), 1.0f);
+  w.start[o] = d;
+  if constexpr (kContacts) {
+    const Contacts contacts = contacts_of(w, body, now.frame, substep);
+    const RestPoint rest = {body.h, grid_node(body, w.place_node[o])};
+    predicted.w = blade_side(contacts, rest, xyz(d));
+    enter_substep(w, contacts, rest, o, predicted, xyz(d), share);
+  } else {
+    w.position[o] = with_w(xyz(predicted), share);
+  }
+  w.predicted[o] = predicted;
 }
 
 }  // namespace step_detail
 
-// Clears what a frame counts and begins the first substep.
-template <bool kContacts, class Block>
+// As block.first(), counted from the last thread: other work than that which the first threads have.
+template <class Block>
+CUTPROOF_DEVICE int64_t from_last(const Block& block) {
+  return block.stride() - 1 - block.first();
+}
+
+// Clears what a frame counts.
+template <class Block>
 CUTPROOF_DEVICE void begin_frame_kernel(Block& block, const DeviceView& w) {
   using namespace step_detail;
   if (block.first() == 0) {
     w.counters->removed = 0;
     w.counters->debris = 0;
     w.counters->affected = 0;
+    w.counters->listed[0] = 0;
   }
   for (int64_t b = block.first(); b < w.bodies; b += block.stride()) {
     if (running(w, static_cast<int>(b))) w.cut[b] = -1;
+  }
+  if (w.any_contact) {
+    for (int64_t g = block.first(); g < w.counters->groups; g += block.stride()) w.group_touched[g] = 0;
   }
   for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
     const int p = static_cast<int>(i);
     const int b = body_index(w, p);
     if (!running(w, b)) continue;
-    const BodyConstants& body = w.body[b];
-    const int frame = w.frame[b];
     // Every frame counts its own impulse and removals.
     w.impulse[p] = Float4{};
     const int death = w.death[p];
-    if (death >= 0) {
-      if (death >= 2 * frame && death != kDeadBefore) w.death[p] = kDeadBefore;
-      continue;
-    }
-    begin_substep<kContacts>(w, body, p, frame, 0, substep_length(w, body, frame), xyz(w.displacement[p]),
-                             xyz(w.velocity[p]), w.displacement[p].w);
+    if (death >= 2 * w.frame[b] && death != kDeadBefore) w.death[p] = kDeadBefore;
+  }
+}
+CUTPROOF_KERNEL(begin_frame_kernel);
+
+// Ends the substep before `substep`, if there is one, and begins that one, if the body has it.
+template <bool kContacts, class Block>
+CUTPROOF_DEVICE void start_substep_kernel(Block& block, const DeviceView& w, int substep) {
+  using namespace step_detail;
+  const Team<Block, kParticleTeam> team(block);
+  for (int64_t g = team.first(); g < w.counters->groups; g += team.stride()) {
+    start_group<kContacts>(block, team, w, static_cast<int>(g), substep);
+  }
+  for (int64_t k = from_last(block); k < w.counters->loose; k += block.stride()) {
+    start_loose<kContacts>(w, w.loose_places[k], substep);
   }
 }
 
-// Puts the particles that are held in this substep where their grip moves them.
+// Puts the particles that are held in this substep where their grip moves them. They are loose.
 template <class Block>
 CUTPROOF_DEVICE void hold_particles_kernel(Block& block, const DeviceView& w, int substep) {
   for (int b = 0; b < w.bodies; ++b) {
@@ -310,161 +512,474 @@ CUTPROOF_DEVICE void hold_particles_kernel(Block& block, const DeviceView& w, in
       for (int64_t k = grip.particle_begin + block.first(); k < grip.particle_end; k += block.stride()) {
         const int p = w.grip_particles[k];
         if (!alive(w, p)) continue;
-        const Float3 x = xyz(w.start[p]) + moved;
-        const Float3 predicted = xyz(w.predicted[p]);
-        w.predicted[p] = with_w(predicted, 0.0f);
-        w.displacement[p] = with_w(x, w.displacement[p].w);
-        w.pushed[p] = with_w(x - predicted, 0.0f);
+        const int o = w.place_of[p];
+        const Float3 x = xyz(w.start[o]) + moved;
+        const Float3 predicted = xyz(w.predicted[o]);
+        w.predicted[o] = with_w(predicted, 0.0f);
+        w.position[o] = with_w(x, w.position[o].w);
+        w.pushed[o] = with_w(x - predicted, 0.0f);
       }
     }
   }
 }
 CUTPROOF_KERNEL(hold_particles_kernel);
 
-template <bool kContacts, bool kAccelerated, class Block>
-CUTPROOF_DEVICE void update_positions_kernel(Block& block, const DeviceView& w, int substep, int iteration) {
+// ---- clusters
+
+namespace step_detail {
+
+inline constexpr int kClusterTeam = 32;  // lanes that share a cluster
+inline constexpr int kMatchThreads = 128;
+inline constexpr int kTeams = kMatchThreads / kClusterTeam;  // of a block on the device
+// What a cluster's place follows from: sums about `base`, as add_moments orders them.
+struct ClusterSums {
+  Floats<12> moments;
+  Float3 base;
+};
+inline constexpr std::size_t kMatchShared = kTeams * sizeof(ClusterSums);
+
+template <class Block>
+CUTPROOF_DEVICE ClusterSums sum_cluster(const Team<Block, kClusterTeam>& team, const DeviceView& w, int s) {
+  const BodyConstants& body = w.body[body_of_slot(w, s)];
+  const float h = body.h, per_h = 1.0f / h;
+  const ClusterHead head = w.cluster_head[s];
+  const int groups_begin = head.group_begin, groups = head.group_count;
+  const int* const loose = w.cluster_loose + head.loose_begin;
+  const int loose_count = head.loose_count;
+  ClusterSums found;
+  found.base = groups > 0 ? xyz(w.group_base[w.cluster_groups[groups_begin].index]) : xyz(w.position[loose[0]]);
+  typename Team<Block, kClusterTeam>::template Sums<12> sums;
+  team.each(groups, [&](int k) {
+    const Offset to = w.cluster_groups[groups_begin + k];
+    const Float4 mass = w.group_mass[to.index];
+    const Float3 apart = xyz(w.group_base[to.index]) - found.base;
+    float* const sum = sums.of(k);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Float4 own = w.group_moments[3 * int64_t{to.index} + axis];
+      const float moved = own.w + mass.w * apart[axis];
+      const float shift = per_h * apart[axis], lever = per_h * moved;
+      sum[axis] += moved;
+      sum[3 + 3 * axis] += own.x + (shift * mass.x + lever * to.x);
+      sum[4 + 3 * axis] += own.y + (shift * mass.y + lever * to.y);
+      sum[5 + 3 * axis] += own.z + (shift * mass.z + lever * to.z);
+    }
+  });
+  team.each(loose_count, [&](int k) {
+    const int o = loose[k];
+    const Float4 now = w.position[o];
+    const Float3 e = xyz(now) - found.base;
+    add_moments(sums.of(k), now.w, e, per_h * e, nodes_from_rest_center(w, coordinates(body, w.place_node[o]), s));
+  });
+  found.moments = team.total(sums);
+  return found;
+}
+
+// Centre and rotation of a cluster from its sums.
+template <int Method>
+CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const ClusterSums& sums) {
+  const float h = w.body[body_of_slot(w, s)].h;
+  const float* const moment = sums.moments.v;
+  const Float4 first = w.cluster_rest[3 * int64_t{s}], second = w.cluster_rest[3 * int64_t{s} + 1],
+               third = w.cluster_rest[3 * int64_t{s} + 2];
+  const Float3 rest = xyz(first), moved = {moment[0], moment[1], moment[2]};
+  const float mass = first.w;
+  const float spread[9] = {second.x, second.y, second.z, second.y, second.w, third.x, second.z, third.x, third.y};
+  // A = Σ w (x - t)(X - T)ᵀ / h². The rest moment is zero but for the rounding of T.
+  const Float3 shift = (1.0f / (mass * h)) * moved;
+  Matrix3 a;
+  for (int row = 0; row < 3; ++row) {
+    for (int k = 0; k < 3; ++k) {
+      a(row, k) = spread[3 * row + k] + (moment[3 + 3 * row + k] - shift[row] * rest[k]);
+    }
+  }
+  // One particle has no extent: what is left of A is rounding, and rotate() would make a rotation of it.
+  Rotation best{w.rotation[s], true};
+  if (w.slot_size[s] > 1) best = rotate<Method>(a, w.rotation[s]);
+  w.rotation[s] = best.r;
+  w.degenerate[s] = best.degenerate;
+  // Such that Σ w (goal) = Σ w x to the rounding of these two sums (docs/design/decisions.md, Momentum and the rounding
+  // of sums): the rounded T must not push the cluster.
+  const Float3 turned = best.r * rest - rest;
+  const Float3 center = sums.base + (1.0f / mass) * (moved - h * turned);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto entry = [&](int k) { return best.r(axis, k) - (k == axis ? 1.0f : 0.0f); };
+    w.placement[3 * int64_t{s} + axis] = {entry(0), entry(1), entry(2), center[axis]};
+  }
+}
+
+}  // namespace step_detail
+
+// On the device the teams of a block sum, and neighbouring threads compute the rotations of all of them side by side.
+template <int Method, class Block>
+CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int substep, int iteration) {
   using namespace step_detail;
-  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
-    const int p = static_cast<int>(i);
-    const int b = body_index(w, p);
-    const BodyConstants& body = w.body[b];
-    // A body without iterations still has one update, which moves nothing and ends the substep.
-    const int updates = body.iterations > 0 ? body.iterations : 1;
-    if (!running(w, b) || substep >= body.substeps || iteration >= updates || !alive(w, p)) continue;
-    const int frame = w.frame[b];
-    const float dt = substep_length(w, body, frame);
-    const Float4 now = w.displacement[p];
-    const Float3 x = xyz(now);
-    Float3 next = x;
-    Float4 pushed;
-
-    if (body.iterations > 0) {
-      const bool implicit = body.solver == Solver::implicit;
-      const float kdt2 = body.stiffness * dt * dt;
-      const float s = implicit ? kdt2 / (1.0f + kdt2) : body.relaxation;
-      const Float4 predicted = w.predicted[p];
-      const Float3 from = implicit ? xyz(predicted) : x;
-      // Mean of the goals, less `from`: small numbers, so that summing them costs no digits of d.
-      const int clusters = w.membership_count[p];
-      Float3 pull = x - from;  // a particle in no cluster stays where it is
-      if (clusters > 0) {
-        const Coordinates c = coordinates(body, w.node[p]);
-        Float3 sum;
-        const int end = w.membership_begin[p + 1];
-        for (int k = w.membership_begin[p]; k < end; ++k) {
-          const int slot = w.memberships[k];
-          if (slot < 0) continue;
-          const Float3 r = body.h * nodes_from_rest_center(w, c, slot);
-          Matrix3 turn = w.rotation[slot];
-          turn(0, 0) -= 1.0f;
-          turn(1, 1) -= 1.0f;
-          turn(2, 2) -= 1.0f;
-          sum = sum + ((w.center[slot] - from) + turn * r);
-        }
-        pull = (1.0f / static_cast<float>(clusters)) * sum;
+  const Team<Block, kClusterTeam> team(block);
+  const int slots = w.counters->slots_used;
+  if (block.first() == 0) {
+    w.counters->resolved = *listed_in(w, substep);
+    *listed_in(w, substep + 1) = 0;
+  }
+  const auto wanted = [&](int64_t s) {
+    if (s >= slots) return false;
+    const ClusterHead head = w.cluster_head[s];
+    return head.group_count + head.loose_count > 0 &&
+           takes_part(w, body_of_slot(w, static_cast<int>(s)), substep, iteration);
+  };
+  if constexpr (Block::on_device) {
+    ClusterSums* const all = block.template shared<ClusterSums>(kTeams);
+    const int mine = block.thread() / kClusterTeam;
+    for (int64_t begin = static_cast<int64_t>(block.index()) * kTeams; begin < slots;
+         begin += static_cast<int64_t>(block.count()) * kTeams) {
+      if (wanted(begin + mine)) {
+        const ClusterSums sums = sum_cluster(team, w, static_cast<int>(begin) + mine);
+        if (team.leads()) all[mine] = sums;
       }
-      const Float3 plain = from + s * pull;
-      Float3 free = plain;
-      // The first iteration is plain, and the last has no next one to keep anything for.
-      [[maybe_unused]] const bool combined = body.acceleration == Acceleration::chebyshev && iteration > 0;
-      [[maybe_unused]] const bool kept = body.acceleration == Acceleration::chebyshev && iteration + 1 < updates;
-      [[maybe_unused]] Combination combination;
-      if constexpr (kAccelerated) {
-        if (combined) {
-          combination = chebyshev(kdt2, iteration);
-          free = combination(plain, x, xyz(w.earlier[p]));
-        }
-        if (kept) w.earlier[p] = now;
+      block.sync();
+      if (block.thread() < kTeams && wanted(begin + block.thread())) {
+        place_cluster<Method>(w, static_cast<int>(begin) + block.thread(), all[block.thread()]);
       }
-      next = free;
-      if constexpr (kContacts) {
-        pushed = w.pushed[p];
-        if (predicted.w == 0) {
-          next = x;  // a held particle stays where its grip has put it
-        } else {
-          const Contacts contacts = contacts_of(w, body, frame, substep);
-          const RestPoint rest = {body.h, grid_node(body, w.node[p])};
-          const Float3 start = xyz(w.start[p]);
-          next = next_position(contacts, rest, free, predicted.w, start, x);
-          if constexpr (kAccelerated) {
-            // Where several answers are right, the way there decides: touched particles go the plain way.
-            if (combined && path_matters(contacts)) {
-              const bool touched = contacts_detail::touches(contacts, rest, free, predicted.w) ||
-                                   contacts_detail::touches(contacts, rest, plain, predicted.w);
-              if (touched) next = next_position(contacts, rest, plain, predicted.w, start, x);
-            }
-          }
-        }
-        const Float3 before = xyz(pushed);
-        Float3 carried = (implicit ? s : 1.0f) * before;
-        if constexpr (kAccelerated) {
-          if (combined) carried = combination(carried, before, xyz(w.pushed_earlier[p]));
-          if (kept) w.pushed_earlier[p] = pushed;
-        }
-        pushed = with_w(carried + (next - free), 0.0f);
-      }
-    } else if constexpr (kContacts) {
-      pushed = w.pushed[p];
+      block.sync();
     }
-
-    if (iteration + 1 < updates) {
-      w.displacement[p] = with_w(next, now.w);
-      if constexpr (kContacts) w.pushed[p] = pushed;
-      continue;
-    }
-    const float decay = decay_by(body.damping * dt);
-    const Float3 v = (decay / dt) * (next - xyz(w.start[p]));
-    if constexpr (kContacts) {
-      w.impulse[p] = with_w(decay * (xyz(w.impulse[p]) + (1.0f / dt) * xyz(pushed)), 0.0f);
-    }
-    if (substep + 1 < body.substeps) {
-      begin_substep<kContacts>(w, body, p, frame, substep + 1, dt, next, v, now.w);
-    } else {
-      w.displacement[p] = with_w(next, now.w);
-      w.velocity[p] = with_w(v, 0.0f);
+  } else {
+    for (int64_t i = team.first(); i < slots; i += team.stride()) {
+      if (!wanted(i)) continue;
+      const int s = static_cast<int>(i);
+      place_cluster<Method>(w, s, sum_cluster(team, w, s));
     }
   }
 }
 
+template <int Method>
+struct match_shapes_kernel_object {
+  static constexpr const char* kName = "match_shapes_kernel";
+  static constexpr int kMaxThreads = step_detail::kMatchThreads;
+  template <class Block>
+  CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, int iteration) const {
+    match_shapes_kernel<Method>(block, w, substep, iteration);
+  }
+};
+
+// ---- iterations
+
+namespace step_detail {
+
+// Of one body, in one iteration.
+struct Iteration {
+  float s;
+  bool implicit;
+  bool combined;  // the first iteration is plain
+  bool kept;      // the last has no next one to keep anything for
+  Combination combination;
+};
+CUTPROOF_DEVICE inline Iteration iteration_of(const DeviceView& w, int b, int iteration) {
+  const BodyConstants& body = w.body[b];
+  const float dt = substep_length(w, body, w.frame[b]);
+  const float kdt2 = body.stiffness * dt * dt;
+  Iteration now = {};
+  now.s = pull_of(body, kdt2);
+  now.implicit = body.solver == Solver::implicit;
+  const bool accelerated = body.acceleration == Acceleration::chebyshev;
+  now.combined = accelerated && iteration > 0;
+  now.kept = accelerated && iteration + 1 < body.iterations;
+  if (now.combined) now.combination = chebyshev(kdt2, iteration);
+  return now;
+}
+
+// Particle by particle: the one at place o goes from x towards `from` + pull, `from` being its prediction, or x itself
+// in the published way.
+template <bool kContacts, bool kAccelerated>
+CUTPROOF_DEVICE inline Float3 advance_particle(const DeviceView& w, const BodyConstants& body, const Contacts& contacts,
+                                               const Iteration& now, int64_t o, Float4 predicted, Float4 at,
+                                               Float3 from, Float3 pull) {
+  const Float3 x = xyz(at);
+  const Float3 plain = from + now.s * pull;
+  Float3 free = plain;
+  if constexpr (kAccelerated) {
+    if (now.combined) free = now.combination(plain, x, xyz(w.earlier[o]));
+    if (now.kept) w.earlier[o] = at;
+  }
+  Float3 next = free;
+  if constexpr (kContacts) {
+    const Float4 pushed = w.pushed[o];
+    if (predicted.w == 0) {
+      next = x;  // a held particle stays where its grip has put it
+    } else {
+      const RestPoint rest = {body.h, grid_node(body, w.place_node[o])};
+      const Float3 start = xyz(w.start[o]);
+      next = next_position(contacts, rest, free, predicted.w, start, x);
+      if constexpr (kAccelerated) {
+        // Where several answers are right, the way there decides: touched particles go the plain way.
+        if (now.combined && path_matters(contacts)) {
+          const bool touched = contacts_detail::touches(contacts, rest, free, predicted.w) ||
+                               contacts_detail::touches(contacts, rest, plain, predicted.w);
+          if (touched) next = next_position(contacts, rest, plain, predicted.w, start, x);
+        }
+      }
+    }
+    const Float3 before = xyz(pushed);
+    Float3 carried = (now.implicit ? now.s : 1.0f) * before;
+    if constexpr (kAccelerated) {
+      if (now.combined) carried = now.combination(carried, before, xyz(w.pushed_earlier[o]));
+      if (now.kept) w.pushed_earlier[o] = pushed;
+    }
+    w.pushed[o] = with_w(carried + (next - free), 0.0f);
+  }
+  w.position[o] = with_w(next, at.w);
+  return next;
+}
+
+// What the holders of a group want of it, their mean goal, along one axis: base + goal(r).
+CUTPROOF_DEVICE inline Float4 mean_goal(const DeviceView& w, const GroupHead& head, float h, Float4 base, int axis) {
+  const float from = xyz(base)[axis];
+  Float4 sum;
+  // Several at once: one by one, each would wait for the one before.
+  constexpr int kAtOnce = 4;
+  for (int begin = 0; begin < head.holder_count; begin += kAtOnce) {
+    const int count = head.holder_count - begin < kAtOnce ? head.holder_count - begin : kAtOnce;
+    Offset to[kAtOnce];
+    Float4 row[kAtOnce];
+    for (int k = 0; k < kAtOnce; ++k) to[k] = w.holders[head.holder_begin + begin + (k < count ? k : 0)];
+    for (int k = 0; k < kAtOnce; ++k) row[k] = w.placement[3 * int64_t{to[k].index} + axis];
+    for (int k = 0; k < kAtOnce; ++k) {
+      if (k >= count) break;
+      sum.x += row[k].x;
+      sum.y += row[k].y;
+      sum.z += row[k].z;
+      sum.w += (row[k].w - from) + h * (row[k].x * to[k].x + row[k].y * to[k].y + row[k].z * to[k].z);
+    }
+  }
+  const float mean = 1.0f / static_cast<float>(head.holder_count), turn = h * mean;
+  return {turn * sum.x, turn * sum.y, turn * sum.z, mean * sum.w};
+}
+
+// Entry by entry.
+template <class Of>
+CUTPROOF_DEVICE Float4 row_of(Of of, Float4 a, Float4 b) {
+  return {of(a.x, b.x), of(a.y, b.y), of(a.z, b.z), of(a.w, b.w)};
+}
+
+// One iteration of the particles of a resolved group.
+template <bool kContacts, bool kAccelerated, class AnyTeam>
+CUTPROOF_DEVICE void advance_particles(const AnyTeam& team, const DeviceView& w, const Group& group,
+                                       const BodyConstants& body, const Contacts& contacts, const Iteration& now,
+                                       Float3 base, const Map& goal) {
+  const GroupHead& head = group.head;
+  const float holders = static_cast<float>(head.holder_count), per_h = 1.0f / body.h;
+  GroupSums<AnyTeam> sums;
+  team.each(head.size, [&](int k) {
+    const int o = head.begin + k;
+    const Float4 predicted = w.predicted[o], at = w.position[o];
+    const Float3 from = now.implicit ? xyz(predicted) : xyz(at);
+    const Float3 r = group.rest(w, body, k);
+    const Float3 pull = (base - from) + goal(r);
+    const Float3 e =
+        advance_particle<kContacts, kAccelerated>(w, body, contacts, now, o, predicted, at, from, pull) - base;
+    add_moments(sums.of(k), w.start[o].w / holders, e, per_h * e, r);
+  });
+  const Floats<12> total = team.total(sums);
+  if (team.leads()) store_moments(w.group_moments, group.index, total);
+}
+
+// Of a group that was resolved before this launch began.
+template <bool kContacts, bool kAccelerated, class Block>
+CUTPROOF_DEVICE void advance_resolved(const Team<Block, kResolvedTeam>& team, const DeviceView& w, int g, int substep,
+                                      int iteration) {
+  const int b = body_of_group(w, g);
+  if (!takes_part(w, b, substep, iteration)) return;
+  const Group group = group_of(w, g);
+  const BodyConstants& body = w.body[b];
+  const Float4 base = w.group_base[g];
+  Rows<Block> goal;
+  team.each(3, [&](int axis) { goal.of(axis) = mean_goal(w, group.head, body.h, base, axis); });
+  advance_particles<kContacts, kAccelerated>(team, w, group, body, contacts_of(w, body, w.frame[b], substep),
+                                             iteration_of(w, b, iteration), xyz(base), goal.all(team));
+}
+
+// Of a group that was carried until now.
+template <bool kContacts, bool kAccelerated, class Block>
+CUTPROOF_DEVICE void advance_carried(Block& block, const Team<Block, kRowTeam>& team, const DeviceView& w, int g,
+                                     int substep, int iteration) {
+  const GroupHead head = w.group_head[g];
+  const int b = body_of_group(w, g);
+  if (!takes_part(w, b, substep, iteration)) return;
+  if constexpr (kContacts) {
+    if (w.group_resolved[g] != 0) return;
+  }
+  const BodyConstants& body = w.body[b];
+  const Iteration now = iteration_of(w, b, iteration);
+  const Float4 base = w.group_base[g];
+  const float lost_next = lost_fraction(body, now.s, iteration + 1);
+  Rows<Block> goal, present, earlier, plain, next;
+  team.each(3, [&](int axis) {
+    const int64_t at = 3 * int64_t{g} + axis;
+    if (iteration > 0) present.of(axis) = w.group_map[at];
+    earlier.of(axis) = present.of(axis);
+    goal.of(axis) = mean_goal(w, head, body.h, base, axis);
+    const auto relaxed = [&](float wanted, float is) {
+      const float toward = now.s * wanted;
+      return now.implicit ? toward : (1.0f - now.s) * is + toward;
+    };
+    plain.of(axis) = row_of(relaxed, goal.of(axis), present.of(axis));
+    next.of(axis) = plain.of(axis);
+    if constexpr (kAccelerated) {
+      if (!now.combined) return;
+      // The one before the first is no map of this kind, and of no weight.
+      if (iteration > 1) earlier.of(axis) = w.group_earlier_map[at];
+      const auto combined = [&](float x, float y, float z) { return now.combination(x, y, z); };
+      const Float4 x = plain.of(axis), y = present.of(axis), z = earlier.of(axis);
+      next.of(axis) = {combined(x.x, y.x, z.x), combined(x.y, y.y, z.y), combined(x.z, y.z, z.z),
+                       combined(x.w, y.w, z.w)};
+    }
+  });
+  if constexpr (kContacts) {
+    const Group group = {g, head, w.group_center[g]};
+    const Contacts contacts = contacts_of(w, body, w.frame[b], substep);
+    const int side = w.group_side[g];
+    const auto clear = [&](Rows<Block>& candidate) {
+      return is_clear(contacts, ball_around(body, group, base, 1.0f - lost_next, candidate.all(team)), side);
+    };
+    // A contact with either candidate of an accelerated iteration means the plain way.
+    if (!clear(plain) || (now.combined && !clear(next))) {
+      const float lost = lost_fraction(body, now.s, iteration);
+      const Map is = present.all(team);
+      [[maybe_unused]] const Map was = earlier.all(team);
+      // Nothing has touched it so far.
+      team.each(head.size, [&](int k) {
+        const int o = head.begin + k;
+        const Float3 predicted = xyz(w.predicted[o]), r = group.rest(w, body, k);
+        w.position[o] = with_w(carried_to(xyz(base), lost, predicted, is, r), 0.0f);
+        w.pushed[o] = Float4{};
+        if constexpr (kAccelerated) {
+          const float lost_earlier = lost_fraction(body, now.s, iteration > 0 ? iteration - 1 : 0);
+          w.earlier[o] = with_w(carried_to(xyz(base), lost_earlier, predicted, was, r), 0.0f);
+          w.pushed_earlier[o] = Float4{};
+        }
+      });
+      list_resolved(block, team, w, g, substep);
+      advance_particles<kContacts, kAccelerated>(team, w, group, body, contacts, now, xyz(base), goal.all(team));
+      return;
+    }
+  }
+  const bool more = iteration + 1 < body.iterations;
+  const float per_h = 1.0f / body.h;
+  const Float4 mass = w.group_mass[g], upper = w.group_spread[2 * int64_t{g}],
+               lower = w.group_spread[2 * int64_t{g} + 1];
+  team.each(3, [&](int axis) {
+    const int64_t at = 3 * int64_t{g} + axis;
+    const Float4 row = next.of(axis);
+    w.group_map[at] = row;
+    if constexpr (kAccelerated) {
+      if (now.kept) w.group_earlier_map[at] = present.of(axis);
+    }
+    if (!more) return;
+    const Float4 predicted = w.group_predicted[at];
+    const auto moved = [&](float at_first, float by_map) { return at_first + (by_map - lost_next * at_first); };
+    w.group_moments[at] = {
+        moved(predicted.x, per_h * (row.w * mass.x + (row.x * upper.x + row.y * upper.y + row.z * upper.z))),
+        moved(predicted.y, per_h * (row.w * mass.y + (row.x * upper.y + row.y * upper.w + row.z * lower.x))),
+        moved(predicted.z, per_h * (row.w * mass.z + (row.x * upper.z + row.y * lower.x + row.z * lower.y))),
+        moved(predicted.w, row.w * mass.w + (row.x * mass.x + row.y * mass.y + row.z * mass.z))};
+  });
+}
+
+template <bool kContacts, bool kAccelerated>
+CUTPROOF_DEVICE inline void advance_loose(const DeviceView& w, int o, int substep, int iteration) {
+  const int p = w.place_particle[o], b = body_index(w, p);
+  if (!takes_part(w, b, substep, iteration)) return;
+  const BodyConstants& body = w.body[b];
+  const Iteration now = iteration_of(w, b, iteration);
+  const Float4 predicted = w.predicted[o], at = w.position[o];
+  const Float3 from = now.implicit ? xyz(predicted) : xyz(at);
+  // Mean of the goals, less `from`: small numbers, so that summing them costs no digits of d.
+  const int clusters = w.membership_count[p];
+  Float3 pull = xyz(at) - from;  // a particle in no cluster stays where it is
+  if (clusters > 0) {
+    const Coordinates c = coordinates(body, w.place_node[o]);
+    Float3 sum;
+    const int end = w.membership_begin[p + 1];
+    for (int k = w.membership_begin[p]; k < end; ++k) {
+      const int slot = w.memberships[k];
+      if (slot < 0) continue;
+      const Float3 r = body.h * nodes_from_rest_center(w, c, slot);
+      const Map place = load_map(w.placement, slot);
+      const Float3 center = {place.row[0].w, place.row[1].w, place.row[2].w};
+      const Float3 turned = {place.row[0].x * r.x + place.row[0].y * r.y + place.row[0].z * r.z,
+                             place.row[1].x * r.x + place.row[1].y * r.y + place.row[1].z * r.z,
+                             place.row[2].x * r.x + place.row[2].y * r.y + place.row[2].z * r.z};
+      sum = sum + ((center - from) + turned);
+    }
+    pull = (1.0f / static_cast<float>(clusters)) * sum;
+  }
+  const Contacts contacts = kContacts ? contacts_of(w, body, w.frame[b], substep) : Contacts{};
+  advance_particle<kContacts, kAccelerated>(w, body, contacts, now, o, predicted, at, from, pull);
+}
+
+}  // namespace step_detail
+
+template <bool kContacts, bool kAccelerated, class Block>
+CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int substep, int iteration) {
+  using namespace step_detail;
+  const Team<Block, kRowTeam> rows(block);
+  for (int64_t g = rows.first(); g < w.counters->groups; g += rows.stride()) {
+    advance_carried<kContacts, kAccelerated>(block, rows, w, static_cast<int>(g), substep, iteration);
+  }
+  // The last threads begin with resolved groups, those before them with loose particles.
+  const Team<Block, kResolvedTeam> team(block);
+  const int64_t resolved = kContacts ? w.counters->resolved : 0;
+  if constexpr (kContacts) {
+    for (int64_t k = from_last(team); k < resolved; k += team.stride()) {
+      advance_resolved<kContacts, kAccelerated>(team, w, w.resolved_groups[k], substep, iteration);
+    }
+  }
+  int64_t k = from_last(block) - resolved * team.kLanes % block.stride();
+  if (k < 0) k += block.stride();
+  for (; k < w.counters->loose; k += block.stride()) {
+    advance_loose<kContacts, kAccelerated>(w, w.loose_places[k], substep, iteration);
+  }
+}
+
 template <bool kContacts>
-struct begin_frame_kernel_object {
-  static constexpr const char* kName = "begin_frame_kernel";
+struct start_substep_kernel_object {
+  static constexpr const char* kName = "start_substep_kernel";
   static constexpr int kMaxThreads = 256;
   template <class Block>
-  CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w) const {
-    begin_frame_kernel<kContacts>(block, w);
+  CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep) const {
+    start_substep_kernel<kContacts>(block, w, substep);
   }
 };
 template <bool kContacts, bool kAccelerated>
-struct update_positions_kernel_object {
-  static constexpr const char* kName = "update_positions_kernel";
+struct advance_kernel_object {
+  static constexpr const char* kName = "advance_kernel";
   static constexpr int kMaxThreads = 256;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, int iteration) const {
-    update_positions_kernel<kContacts, kAccelerated>(block, w, substep, iteration);
+    advance_kernel<kContacts, kAccelerated>(block, w, substep, iteration);
   }
 };
 
 namespace step_detail {
 
 template <int Method, bool kContacts, bool kAccelerated, class Launcher>
-void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   const int64_t particles = w.particles > w.bodies ? w.particles : w.bodies;
-  const int64_t jobs = w.slot_capacity < kMatchBlocks ? w.slot_capacity : kMatchBlocks;
-  launcher.items(begin_frame_kernel_object<kContacts>{}, particles, w);
+  const int64_t lanes = int64_t{kParticleTeam} * w.group_capacity;
+  const int64_t items = lanes > w.particles ? lanes : w.particles;
+  enqueue_groups(launcher, w);
+  launcher.items(begin_frame_kernel_object{}, particles, w);
   for (int substep = 0; substep < plan.substeps; ++substep) {
+    launcher.items(start_substep_kernel_object<kContacts>{}, items, w, substep);
     if (plan.grips) launcher.items(hold_particles_kernel_object{}, particles, w, substep);
-    for (int iteration = 0; iteration < plan.iterations || iteration == 0; ++iteration) {
-      if (iteration < plan.iterations) {
-        launcher.blocks(match_shapes_kernel_object<Method>{}, jobs, kMatchThreads, kMatchShared, w, substep, iteration);
-      }
-      launcher.items(update_positions_kernel_object<kContacts, kAccelerated>{}, particles, w, substep, iteration);
+    for (int iteration = 0; iteration < plan.iterations; ++iteration) {
+      launcher.blocks(match_shapes_kernel_object<Method>{}, (w.slot_capacity + kTeams - 1) / kTeams, kMatchThreads,
+                      kMatchShared, w, substep, iteration);
+      launcher.items(advance_kernel_object<kContacts, kAccelerated>{}, items, w, substep, iteration);
     }
   }
+  launcher.items(start_substep_kernel_object<kContacts>{}, items, w, plan.substeps);
 }
 
 template <int Method, class Launcher>
-void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   if (plan.contacts && plan.accelerated) {
     enqueue<Method, true, true>(launcher, w, plan);
   } else if (plan.contacts) {
@@ -480,20 +995,24 @@ void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan) {
 
 // All substeps of the frame of every running body.
 template <class Launcher>
-void enqueue_step(Launcher& launcher, const DeviceView& w, const Plan& plan) {
-  switch (w.rotation_method) {
-    case kMueller2016:
-      return step_detail::enqueue<kMueller2016>(launcher, w, plan);
-    case kApd:
-      return step_detail::enqueue<kApd>(launcher, w, plan);
-    case kSvd:
-      return step_detail::enqueue<kSvd>(launcher, w, plan);
-    case kQuest:
-      return step_detail::enqueue<kQuest>(launcher, w, plan);
-    case kNewton:
-      return step_detail::enqueue<kNewton>(launcher, w, plan);
-    default:
-      return step_detail::enqueue<kJacobi4>(launcher, w, plan);
+CUTPROOF_ENQUEUE void enqueue_step(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+  if constexpr (requires { typename Launcher::OnlyDefaultRotation; }) {
+    step_detail::enqueue<kNewton>(launcher, w, plan);
+  } else {
+    switch (w.rotation_method) {
+      case kMueller2016:
+        return step_detail::enqueue<kMueller2016>(launcher, w, plan);
+      case kApd:
+        return step_detail::enqueue<kApd>(launcher, w, plan);
+      case kSvd:
+        return step_detail::enqueue<kSvd>(launcher, w, plan);
+      case kQuest:
+        return step_detail::enqueue<kQuest>(launcher, w, plan);
+      case kNewton:
+        return step_detail::enqueue<kNewton>(launcher, w, plan);
+      default:
+        return step_detail::enqueue<kJacobi4>(launcher, w, plan);
+    }
   }
 }
 

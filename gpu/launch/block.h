@@ -31,6 +31,7 @@
 //   float warp_sums(const float (&)[16]);       as 16 times warp_sum, with the same bits, and a fifth of its exchanges:
 //                                               lanes 2 k and 2 k + 1 get the sum of value k
 //   unsigned ballot(unsigned mask, bool); T shuffle<T>(unsigned mask, T, int lane); int lane();
+//   void sync_warp(unsigned mask);              as sync(), for these lanes of the warp
 //   T atomic_add(T*, T), atomic_min(T*, T), atomic_max(T*, T), atomic_exchange(T*, T),
 //     atomic_cas(T*, T expected, T desired), atomic_or(T*, T);   all return the old value, relaxed; T: int, unsigned or
 //                                               unsigned long long
@@ -41,7 +42,11 @@
 #if defined(__CUDACC__)
 #define CUTPROOF_DEVICE __device__
 #define CUTPROOF_BOTH __host__ __device__
+// Of what writes work down (launcher.h): in one piece with the kernel that it becomes, where the view is known to be a
+// constant and its pointers to be global.
+#define CUTPROOF_ENQUEUE __host__ __device__ __forceinline__
 #else
 #define CUTPROOF_DEVICE
 #define CUTPROOF_BOTH
+#define CUTPROOF_ENQUEUE
 #endif

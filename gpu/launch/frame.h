@@ -20,7 +20,7 @@ namespace cutproof::gpu {
 
 // `mark` is called with each stage before its work is handed over (a launcher that works at once can take times).
 template <class Launcher, class Mark>
-void enqueue_span(Launcher& launcher, const DeviceView& w, const Plan& plan, Span span, Mark mark) {
+CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, const Plan& plan, Span span, Mark mark) {
   launcher.clear(w.counters->stage_ran, sizeof w.counters->stage_ran);
   const auto ran = [&](Stage stage) { launcher.items(note_stage_kernel_object{}, 1, w, static_cast<int>(stage)); };
   if (span.contains(Stage::step)) {

@@ -1,5 +1,6 @@
 // How kernels are started. A Launcher is used by frame.h to write down the work of a frame once; DeviceLauncher
-// (device_launcher.cuh) captures it into a CUDA graph, HostLauncher (host_launcher.h) carries it out on the spot.
+// (device_launcher.cuh) captures it into a CUDA graph, HostLauncher (host_launcher.h) carries it out on the spot, and
+// so does SpanLauncher (span_kernel.cuh), inside one kernel on the device.
 //
 // Members of a Launcher:
 //   template <class Kernel, class... Args>
@@ -20,7 +21,7 @@
 //   void sort_unique(unsigned long long* keys, int* count, int64_t capacity);  ascending, duplicates gone, in place;
 //                                                              *count <= capacity valid keys before and after; what
 //                                                              lies beyond them is overwritten; ~0 is not a key
-//   void clear(void* data, std::size_t bytes);                 zero bytes
+//   void clear(void* data, std::size_t bytes);                 zero bytes, of whole ints
 // `Body` takes the Launcher to use inside as its argument. Even with a capacity of 0 one block runs: a kernel may
 // have something to do once.
 //

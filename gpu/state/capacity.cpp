@@ -63,6 +63,9 @@ Extents extents_of(const StagingBuffers& loaded, Capacity capacity) {
   extents.vertex_capacity = narrow(std::min(6 * particles, scaled(4'000'000 + particles)) + 64, "skin vertices");
   extents.cell_capacity = narrow(cells, "skin cells");
   extents.addition_capacity = narrow(additions + 64, "expanded particles");
+  // A group has at least kLeastInGroup particles, and each of its holders that many members in it.
+  extents.pair_capacity = extents.member_capacity / kLeastInGroup;
+  extents.group_capacity = static_cast<int>(std::min(particles / kLeastInGroup, int64_t{extents.pair_capacity}));
   return extents;
 }
 

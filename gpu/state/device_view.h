@@ -86,6 +86,35 @@ struct GripF {
   int64_t table;                     // first entry in DeviceView::grip_active and DeviceView::grip_displacement
 };
 
+// A group: particles that the same clusters hold (docs/design/method.md §13, where groups are made). Its particles have
+// the places [begin, begin + size), ascending; its holders are DeviceView::holders[holder_begin .. holder_begin +
+// holder_count).
+struct alignas(16) GroupHead {
+  int begin, size, body;
+  int middle;  // which of its particles, from 0, is nearest to its rest centre
+  int holder_begin, holder_count;
+  float radius;  // [h], at least the distance of each particle from the rest centre, at rest
+};
+// A rest centre as kernels keep it: h · (base + offset), base being the grid coordinates of a particle.
+struct alignas(16) RestCenter {
+  int i, j, k;
+  float x, y, z;
+};
+// One end of a pair of group and cluster: the other's index, and X_g - T_c [h].
+struct alignas(16) Offset {
+  float x, y, z;
+  int index;
+};
+// What a cluster is made of: DeviceView::cluster_groups[group_begin .. group_begin + group_count), and
+// DeviceView::cluster_loose[loose_begin .. loose_begin + loose_count). One that is no more is made of nothing.
+struct alignas(16) ClusterHead {
+  int group_begin, group_count, loose_begin, loose_count;
+};
+// Groups are no larger: a team of lanes has the same work with each of them, and no body is one job.
+inline constexpr int kMostInGroup = 64;
+// Fewer particles with the same holders are not worth a map; they are loose.
+inline constexpr int kLeastInGroup = 4;
+
 // What changes in size or says what happened. One copy for all bodies.
 struct Counters {
   int fault;               // see above
@@ -113,6 +142,15 @@ struct Counters {
   int additions_before;    // expand: length of DeviceView::additions before the layer in progress
   int growth;              // expand: members that the enlarged clusters need
   int memberships_before;  // expand: length of DeviceView::memberships in use before it
+  int groups_stale;        // clusters have changed since groups were made, or none were made yet
+  int groups;              // how many there are
+  int placed;              // places given out from the first on, to classes…
+  int placed_last;         // … and from the last on, to particles that are in none
+  int loose;               // particles that are alive and in no group: length of DeviceView::loose_places
+  int pairs;               // of group and holder: length of DeviceView::holders
+  int cluster_pairs;       // the same, of DeviceView::cluster_groups
+  int listed[2];           // step, by turns of substeps: how many groups are listed in DeviceView::resolved_groups
+  int resolved;            // step: of these, how many were when the iteration began
   int scratch[8];
 };
 
@@ -126,6 +164,7 @@ struct Extents {
   int accelerated = 0;                                 // some body's iterations are
   int any_contact = 0;                                 // some body has a blade, a wall or a grip
   int slot_capacity = 0, member_capacity = 0, vertex_capacity = 0, cell_capacity = 0, addition_capacity = 0;
+  int group_capacity = 0, pair_capacity = 0;
 };
 
 struct DeviceView : Extents {

@@ -126,6 +126,7 @@ void add_particles(StagingBuffers& staging, const Setup& setup, const State& sta
     staging.death.push_back(state.alive[at(i)] ? -1 : kDeadBefore);
     staging.displacement.push_back(with_w(f(moved), f(setup.body.mass[at(i)])));
     staging.velocity.push_back(with_w(f(state.v[at(i)]), 0));
+    staging.may_be_held.push_back(0);
     // The state has one impulse for the body; spread by mass it adds up to the same.
     staging.impulse.push_back({});
   }
@@ -134,6 +135,9 @@ void add_particles(StagingBuffers& staging, const Setup& setup, const State& sta
   if (mass > 0 && !(state.impulse == Vec3{})) {
     for (int p = body.particle_begin; p < body.particle_end; ++p)
       staging.impulse[at(p)] = with_w(f(state.impulse / mass), 0);
+  }
+  for (const Grip& grip : setup.grips) {
+    for (const int32_t i : grip.particles) staging.may_be_held[at(body.particle_begin + i)] = 1;
   }
   const int code = narrow(2 * state.frame, "frames");
   const auto mark = [&](const std::vector<int32_t>& particles, int value) {
@@ -227,6 +231,7 @@ StagingBuffers make_staging_buffers(const std::vector<Setup>& setups, const std:
   Counters counters{};
   counters.slots_used = narrow(static_cast<int64_t>(staging.slot_size.size()), "clusters");
   counters.members_used = narrow(static_cast<int64_t>(staging.members.size()), "cluster members");
+  counters.groups_stale = 1;
   staging.counters = {counters};
   static_cast<Extents&>(staging) = extents_of(staging, capacity);
   staging.allocate();

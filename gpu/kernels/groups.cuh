@@ -1,0 +1,400 @@
+// Groups: particles that the same clusters hold, which the step carries together (docs/design/method.md §13). Here they
+// are made, from the clusters alone: which particles are in which group, and every constant that sums over groups need.
+//
+// A class belongs to the first of its holders. There equal lists of holders meet in a hash table as long as the
+// cluster, and one team counts them in ascending order. So a class has its particles, chunk by chunk of kMostInGroup,
+// wherever it is in memory. A particle is loose if its chunk has fewer than kLeastInGroup, if it has no holder, and if
+// any grip may ever hold it. All of that depends on the body's own clusters and particles only.
+#pragma once
+#include "gpu/kernels/float3.h"
+#include "gpu/launch/launcher.h"
+#include "gpu/launch/team.h"
+#include "gpu/state/device_view.h"
+
+namespace cutproof::gpu {
+
+// Lanes that measure a group, and that look through the members of a cluster.
+inline constexpr int kGroupTeam = 8;
+inline constexpr int kMemberTeam = 32;
+
+namespace groups_detail {
+
+// DeviceView::group_at of particles that are no group's first.
+enum : int { kInside = -1, kLoose = -2 };
+
+// By place in DeviceView::members, those of a cluster being its own table: a particle of the class (from 1; 0: none),
+// and how many of the class have been counted.
+CUTPROOF_BOTH inline int* table(const DeviceView& w) { return w.label; }
+CUTPROOF_BOTH inline int* class_size(const DeviceView& w) { return w.member_scratch; }
+// By particle: its class's place in that table, or -1; and how many of its class are smaller.
+CUTPROOF_BOTH inline int* entry_of(const DeviceView& w) { return w.particle_scratch; }
+CUTPROOF_BOTH inline int* rank_of(const DeviceView& w) { return w.particle_scratch + w.particles; }
+
+// A particle's holders: the gaps of its list (-1) are at its end.
+struct HolderList {
+  const int* begin;
+  int size;
+};
+CUTPROOF_DEVICE inline HolderList holders_of(const DeviceView& w, int p) {
+  return {w.memberships + w.membership_begin[p], w.membership_count[p]};
+}
+// Both take several entries at once: one by one, each would wait for the one before.
+inline constexpr int kAtOnce = 4;
+CUTPROOF_DEVICE inline bool same_holders(const DeviceView& w, int p, int q) {
+  const HolderList a = holders_of(w, p), b = holders_of(w, q);
+  if (a.size != b.size) return false;
+  for (int k = 0; k < a.size; k += kAtOnce) {
+    bool same = true;
+    for (int j = k; j < k + kAtOnce; ++j) same = same && (j >= a.size || a.begin[j] == b.begin[j]);
+    if (!same) return false;
+  }
+  return true;
+}
+CUTPROOF_DEVICE inline unsigned hash_of(HolderList list) {
+  unsigned hash = 2166136261u;
+  for (int k = 0; k < list.size; k += kAtOnce) {
+    int entry[kAtOnce];
+    for (int j = 0; j < kAtOnce; ++j) entry[j] = k + j < list.size ? list.begin[k + j] : 0;
+    for (int j = 0; j < kAtOnce; ++j) {
+      hash ^= static_cast<unsigned>(entry[j]);
+      hash ^= hash >> 16;
+      hash *= 0x7feb352du;
+      hash ^= hash >> 15;
+      hash *= 0x846ca68bu;
+    }
+  }
+  return hash ^ (hash >> 16);
+}
+
+// How many groups a class of so many particles has.
+CUTPROOF_DEVICE inline int groups_of(int particles) {
+  return particles / kMostInGroup + (particles % kMostInGroup >= kLeastInGroup ? 1 : 0);
+}
+// Particles of a class from this rank on are loose.
+CUTPROOF_DEVICE inline int grouped_of(int particles) {
+  const int left = particles % kMostInGroup;
+  return left >= kLeastInGroup ? particles : particles - left;
+}
+
+CUTPROOF_DEVICE inline void place(const DeviceView& w, int p, int o) {
+  w.place_particle[o] = p;
+  w.place_node[o] = w.node[p];
+  w.place_of[p] = o;
+}
+
+CUTPROOF_DEVICE inline Float3 nodes_between(RestCenter from, Coordinates to) {
+  return {static_cast<float>(to.i - from.i) - from.x, static_cast<float>(to.j - from.j) - from.y,
+          static_cast<float>(to.k - from.k) - from.z};
+}
+CUTPROOF_DEVICE inline RestCenter rest_center(const DeviceView& w, int s) {
+  const Float3 o = w.rest_offset[s];
+  return {w.rest_base[3 * s], w.rest_base[3 * s + 1], w.rest_base[3 * s + 2], o.x, o.y, o.z};
+}
+// X_g - T_s [h]: an exact difference of grid coordinates, and one of offsets.
+CUTPROOF_DEVICE inline Offset offset_between(RestCenter group, RestCenter cluster, int index) {
+  return {static_cast<float>(group.i - cluster.i) + (group.x - cluster.x),
+          static_cast<float>(group.j - cluster.j) + (group.y - cluster.y),
+          static_cast<float>(group.k - cluster.k) + (group.z - cluster.z), index};
+}
+
+// Sums of masses about a point, in nodes: first moments, mass, second moments (xx xy xz yy yz zz).
+CUTPROOF_DEVICE inline void add_masses(float* sum, float m, Float3 r) {
+  sum[0] += m * r.x;
+  sum[1] += m * r.y;
+  sum[2] += m * r.z;
+  sum[3] += m;
+  sum[4] += m * (r.x * r.x);
+  sum[5] += m * (r.x * r.y);
+  sum[6] += m * (r.x * r.z);
+  sum[7] += m * (r.y * r.y);
+  sum[8] += m * (r.y * r.z);
+  sum[9] += m * (r.z * r.z);
+}
+
+}  // namespace groups_detail
+
+// Each particle finds its class in its first holder's table. Those that are in no class get their places at once.
+template <class Block>
+CUTPROOF_DEVICE void find_classes_kernel(Block& block, const DeviceView& w) {
+  using namespace groups_detail;
+  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
+    const int p = static_cast<int>(i);
+    int at = -1;
+    if (alive(w, p)) {
+      const HolderList list = holders_of(w, p);
+      if (list.size > 0 && w.may_be_held[p] == 0) {
+        const int s = list.begin[0], begin = w.slot_begin[s], size = w.slot_size[s];
+        int* const classes = table(w) + begin;
+        int entry =
+            static_cast<int>(static_cast<unsigned long long>(hash_of(list)) * static_cast<unsigned>(size) >> 32);
+        while (true) {
+          int found = block.load(&classes[entry]);
+          if (found == 0) found = block.atomic_cas(&classes[entry], 0, p + 1);
+          if (found == 0 || same_holders(w, p, found - 1)) break;
+          entry = entry + 1 == size ? 0 : entry + 1;
+        }
+        at = begin + entry;
+      } else {
+        const int o = w.particles - 1 - block.atomic_add(&w.counters->placed_last, 1);
+        place(w, p, o);
+        w.group_at[p] = kLoose;
+        w.loose_places[block.atomic_add(&w.counters->loose, 1)] = o;
+      }
+    }
+    entry_of(w)[p] = at;
+  }
+}
+CUTPROOF_KERNEL(find_classes_kernel);
+
+// Deals the classes of each cluster out to groups, and gives places to their particles.
+template <class Block>
+CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
+  using namespace groups_detail;
+  const Team<Block, kMemberTeam> team(block);
+  Counters& counters = *w.counters;
+  for (int64_t i = team.first(); i < counters.slots_used; i += team.stride()) {
+    const int s = static_cast<int>(i), size = w.slot_size[s], begin = w.slot_begin[s];
+    if (size == 0) continue;
+    const int* const members = w.members + begin;
+    const int* const classes = table(w);
+    int* const sizes = class_size(w);
+    // The class of member k if it is this cluster's to deal out, else -1.
+    const auto entry_at = [&](int k, int& p) {
+      p = k < size ? members[k] : -1;
+      const int entry = p < 0 ? -1 : entry_of(w)[p];
+      return entry >= begin && entry < begin + size ? entry : -1;
+    };
+
+    // Ranks, tile by tile in ascending order; the next tile is on its way while one is counted.
+    int p = -1, entry = entry_at(team.lane(), p);
+    for (int tile = 0; tile < size; tile += team.kLanes) {
+      int next_p = -1;
+      const int next_entry = entry_at(tile + team.kLanes + team.lane(), next_p);
+      const auto equals = team.equals(entry);
+      int before = 0;
+      if (entry >= 0 && equals.before == 0) before = block.atomic_add(&sizes[entry], equals.count);
+      before = team.from(equals.first, before);
+      if (entry >= 0) rank_of(w)[p] = before + equals.before;
+      p = next_p;
+      entry = next_entry;
+    }
+    team.sync();
+
+    // Places and numbers for all classes of the cluster at once, then for each of them in turn.
+    const auto size_of_first = [&](int k, int& first) {
+      const int its = entry_at(k, first);
+      return its >= 0 && rank_of(w)[first] == 0 ? block.load(&sizes[its]) : 0;
+    };
+    int places = 0, groups = 0, pairs = 0;
+    team.each(size, [&](int k) {
+      int first = -1;
+      const int count = size_of_first(k, first);
+      if (count == 0) return;
+      places += count;
+      groups += groups_of(count);
+      pairs += groups_of(count) * holders_of(w, first).size;
+    });
+    places = team.total(places);
+    groups = team.total(groups);
+    pairs = team.total(pairs);
+    int next_place = 0, next_group = 0, next_pair = 0;
+    if (team.leads()) {
+      next_place = block.atomic_add(&counters.placed, places);
+      next_group = block.atomic_add(&counters.groups, groups);
+      next_pair = block.atomic_add(&counters.pairs, pairs);
+    }
+    next_place = team.from(0, next_place);
+    next_group = team.from(0, next_group);
+    next_pair = team.from(0, next_pair);
+    for (int tile = 0; tile < size; tile += team.kLanes) {
+      int first = -1;
+      const int count = size_of_first(tile + team.lane(), first);
+      if (!team.any(count > 0)) continue;
+      const int own = groups_of(count), holder_count = count > 0 ? holders_of(w, first).size : 0;
+      const int place_begin = next_place + team.total_before(count);
+      const int group_begin = next_group + team.total_before(own);
+      const int pair_begin = next_pair + team.total_before(own * holder_count);
+      next_place += team.total(count);
+      next_group += team.total(own);
+      next_pair += team.total(own * holder_count);
+      if (count == 0) continue;
+      w.class_data[block.load(&classes[entry_of(w)[first]]) - 1] =
+          static_cast<unsigned long long>(group_begin) << 32 | static_cast<unsigned>(place_begin);
+      for (int chunk = 0; chunk < own; ++chunk) {
+        const int left = count - chunk * kMostInGroup;
+        GroupHead head = {};
+        head.begin = place_begin + chunk * kMostInGroup;
+        head.size = left < kMostInGroup ? left : kMostInGroup;
+        head.body = w.slot_body[s];
+        head.holder_begin = pair_begin + chunk * holder_count;
+        head.holder_count = holder_count;
+        w.group_head[group_begin + chunk] = head;
+      }
+    }
+    team.sync();
+
+    for (int tile = 0; tile < size; tile += team.kLanes) {
+      int own = -1;
+      const int its = entry_at(tile + team.lane(), own);
+      int o = -1;
+      bool loose = false;
+      if (its >= 0) {
+        const int rank = rank_of(w)[own];
+        const unsigned long long data = w.class_data[block.load(&classes[its]) - 1];
+        o = static_cast<int>(data & 0xffffffffu) + rank;
+        loose = rank >= grouped_of(block.load(&sizes[its]));
+        w.group_at[own] = loose                      ? int{kLoose}
+                          : rank % kMostInGroup == 0 ? static_cast<int>(data >> 32) + rank / kMostInGroup
+                                                     : int{kInside};
+        place(w, own, o);
+      }
+      int found = 0;
+      const int before = team.rank(loose, found);
+      int next = 0;
+      if (found > 0 && team.leads()) next = block.atomic_add(&counters.loose, found);
+      next = team.from(0, next);
+      if (loose) w.loose_places[next + before] = o;
+    }
+  }
+}
+CUTPROOF_KERNEL(deal_out_groups_kernel);
+
+// X_g, the moments of the masses about it, and the offsets from the holders' rest centres.
+template <class Block>
+CUTPROOF_DEVICE void measure_groups_kernel(Block& block, const DeviceView& w) {
+  using namespace groups_detail;
+  const Team<Block, kGroupTeam> team(block);
+  for (int64_t i = team.first(); i < w.counters->groups; i += team.stride()) {
+    const int g = static_cast<int>(i);
+    GroupHead head = w.group_head[g];
+    const int first = w.place_particle[head.begin];
+    const BodyConstants& body = w.body[head.body];
+    const Coordinates base = coordinates(body, w.node[first]);
+    RestCenter center = {base.i, base.j, base.k, 0, 0, 0};
+    const auto rest = [&](int k) { return nodes_between(center, coordinates(body, w.place_node[head.begin + k])); };
+    const auto mass = [&](int k) {  // what each holder gets of it
+      return w.displacement[w.place_particle[head.begin + k]].w / static_cast<float>(head.holder_count);
+    };
+    // Twice: what the first centre is off by is taken out.
+    for (int round = 0; round < 2; ++round) {
+      typename Team<Block, kGroupTeam>::template Sums<4> sums;
+      team.each(head.size, [&](int k) {
+        const Float3 r = rest(k);
+        const float m = mass(k);
+        float* const sum = sums.of(k);
+        sum[0] += m * r.x;
+        sum[1] += m * r.y;
+        sum[2] += m * r.z;
+        sum[3] += m;
+      });
+      const auto total = team.total(sums);
+      center.x += total.v[0] / total.v[3];
+      center.y += total.v[1] / total.v[3];
+      center.z += total.v[2] / total.v[3];
+    }
+    typename Team<Block, kGroupTeam>::template Sums<10> sums;
+    float farthest = 0, nearest = -INFINITY;  // less the square of the least distance
+    team.each(head.size, [&](int k) {
+      const Float3 r = rest(k);
+      add_masses(sums.of(k), mass(k), r);
+      farthest = fmaxf(farthest, dot(r, r));
+      nearest = fmaxf(nearest, -dot(r, r));
+    });
+    const auto total = team.total(sums);
+    farthest = team.greatest(farthest);
+    nearest = team.greatest(nearest);
+    int middle = head.size;  // the first of the nearest
+    team.each(head.size, [&](int k) {
+      const Float3 r = rest(k);
+      if (-dot(r, r) == nearest && k < middle) middle = k;
+    });
+    head.middle = -static_cast<int>(team.greatest(-static_cast<float>(middle)));
+    head.radius = sqrtf(farthest) * (1.0f + 0x1p-20f);
+    if (team.leads()) {
+      w.group_head[g] = head;
+      w.group_center[g] = center;
+      w.group_mass[g] = {total.v[0], total.v[1], total.v[2], total.v[3]};
+      w.group_spread[2 * i] = {total.v[4], total.v[5], total.v[6], total.v[7]};
+      w.group_spread[2 * i + 1] = {total.v[8], total.v[9], 0, 0};
+    }
+    const HolderList list = holders_of(w, first);
+    team.each(list.size, [&](int k) {
+      w.holders[head.holder_begin + k] = offset_between(center, rest_center(w, list.begin[k]), list.begin[k]);
+    });
+  }
+}
+CUTPROOF_KERNEL(measure_groups_kernel);
+
+// What each cluster is made of, and the moments of its members about its rest centre.
+template <class Block>
+CUTPROOF_DEVICE void measure_clusters_kernel(Block& block, const DeviceView& w) {
+  using namespace groups_detail;
+  const Team<Block, kMemberTeam> team(block);
+  Counters& counters = *w.counters;
+  if (block.first() == 0) counters.groups_stale = 0;
+  for (int64_t i = team.first(); i < counters.slots_used; i += team.stride()) {
+    const int s = static_cast<int>(i), size = w.slot_size[s];
+    if (size == 0) {
+      if (team.leads()) w.cluster_head[s] = {};
+      continue;
+    }
+    const BodyConstants& body = w.body[w.slot_body[s]];
+    const RestCenter center = rest_center(w, s);
+    const int* const members = w.members + w.slot_begin[s];
+    int groups = 0, loose = 0;
+    typename Team<Block, kMemberTeam>::template Sums<10> sums;
+    for (int tile = 0; tile < size; tile += team.kLanes) {
+      const int k = tile + team.lane();
+      int at = kInside;
+      if (k < size) {
+        const int p = members[k];
+        at = w.group_at[p];
+        const Float3 r = nodes_between(center, coordinates(body, w.node[p]));
+        add_masses(sums.of(k), w.displacement[p].w / static_cast<float>(w.membership_count[p]), r);
+      }
+      int found = 0;
+      const int before = team.rank(at == kLoose, found);
+      if (at == kLoose) w.cluster_loose[w.slot_begin[s] + loose + before] = w.place_of[members[k]];
+      loose += found;
+      groups += at >= 0 ? 1 : 0;
+    }
+    groups = team.total(groups);
+    int next = 0;
+    if (team.leads()) next = block.atomic_add(&counters.cluster_pairs, groups);
+    next = team.from(0, next);
+    const auto total = team.total(sums);
+    if (team.leads()) {
+      w.cluster_head[s] = {next, groups, w.slot_begin[s], loose};
+      w.cluster_rest[3 * i] = {total.v[0], total.v[1], total.v[2], total.v[3]};
+      w.cluster_rest[3 * i + 1] = {total.v[4], total.v[5], total.v[6], total.v[7]};
+      w.cluster_rest[3 * i + 2] = {total.v[8], total.v[9], 0, 0};
+    }
+    for (int tile = 0; tile < size && groups > 0; tile += team.kLanes) {
+      const int k = tile + team.lane();
+      const int g = k < size ? w.group_at[members[k]] : int{kInside};
+      int found = 0;
+      const int before = team.rank(g >= 0, found);
+      if (g >= 0) w.cluster_groups[next + before] = offset_between(w.group_center[g], center, g);
+      next += found;
+      groups -= found;
+    }
+  }
+}
+CUTPROOF_KERNEL(measure_clusters_kernel);
+
+// Everything anew, if anything has changed since the last time.
+template <class Launcher>
+CUTPROOF_ENQUEUE void enqueue_groups(Launcher& launcher, const DeviceView& w) {
+  Counters* const c = w.counters;  // an address only: counters lie on the device
+  launcher.if_nonzero(&c->groups_stale, [&](Launcher& stale) {
+    stale.clear(&c->groups, 6 * sizeof(int));  // … and those that follow it
+    stale.clear(groups_detail::table(w), sizeof(int) * static_cast<std::size_t>(w.member_capacity));
+    stale.clear(groups_detail::class_size(w), sizeof(int) * static_cast<std::size_t>(w.member_capacity));
+    stale.items(find_classes_kernel_object{}, w.particles, w);
+    stale.items(deal_out_groups_kernel_object{}, int64_t{kMemberTeam} * w.slot_capacity, w);
+    stale.items(measure_groups_kernel_object{}, int64_t{kGroupTeam} * w.group_capacity, w);
+    stale.items(measure_clusters_kernel_object{}, int64_t{kMemberTeam} * w.slot_capacity, w);
+  });
+}
+
+}  // namespace cutproof::gpu

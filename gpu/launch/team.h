@@ -1,0 +1,152 @@
+// Several neighbouring lanes of a warp that do one small job together: a group of particles, a cluster of groups. A
+// warp holds several teams, which need not do the same at the same time.
+//
+// On the host a team is one thread, because meetings of fibres cost more than such a job has work; its sums keep one
+// bank for each lane of the device and combine them in the same order, so both give the same bits.
+#pragma once
+#include <cstdint>
+
+#include "gpu/launch/block.h"
+
+namespace cutproof::gpu {
+
+template <int N>
+struct Floats {
+  float v[N];
+};
+
+// kWidth: 2, 4, 8, 16 or 32 lanes.
+template <class Block, int kWidth>
+class Team {
+ public:
+  static constexpr int kLanes = Block::on_device ? kWidth : 1;  // threads of a team
+
+  CUTPROOF_DEVICE explicit Team(Block& block) : block_(block) {}
+
+  // For grid-stride loops over jobs of a team each.
+  CUTPROOF_DEVICE int64_t first() const { return block_.first() / kLanes; }
+  CUTPROOF_DEVICE int64_t stride() const { return block_.stride() / kLanes; }
+  CUTPROOF_DEVICE int lane() const { return block_.lane() % kLanes; }
+  CUTPROOF_DEVICE bool leads() const { return lane() == 0; }
+  // Whether this lane is the one that each() gives item k to.
+  CUTPROOF_DEVICE bool has(int k) const { return k % kLanes == lane(); }
+
+  // visit(k) for the items of [0, count) that are this lane's, ascending.
+  template <class Visit>
+  CUTPROOF_DEVICE void each(int count, Visit visit) const {
+    for (int k = lane(); k < count; k += kLanes) visit(k);
+  }
+
+  // N sums over items. Item k adds to of(k), in the order of each().
+  template <int N>
+  class Sums {
+   public:
+    CUTPROOF_DEVICE float* of(int k) { return bank_[k % kBanks].v; }
+
+   private:
+    friend class Team;
+    static constexpr int kBanks = Block::on_device ? 1 : kWidth;
+    Floats<N> bank_[kBanks] = {};
+  };
+  // To every lane.
+  template <int N>
+  CUTPROOF_DEVICE Floats<N> total(Sums<N>& sums) const {
+    for (int distance = kWidth / 2; distance > 0; distance /= 2) {
+      if constexpr (Block::on_device) {
+        for (int k = 0; k < N; ++k) sums.bank_[0].v[k] += other(sums.bank_[0].v[k], distance);
+      } else {
+        for (int bank = 0; bank < distance; ++bank) {
+          for (int k = 0; k < N; ++k) sums.bank_[bank].v[k] += sums.bank_[bank + distance].v[k];
+        }
+      }
+    }
+    return sums.bank_[0];
+  }
+
+  // Collectives, reached by all lanes of the team; the result goes to each of them.
+  CUTPROOF_DEVICE float greatest(float value) const {  // not of NaN
+    if constexpr (Block::on_device) {
+      for (int distance = kWidth / 2; distance > 0; distance /= 2) value = fmaxf(value, other(value, distance));
+    }
+    return value;
+  }
+  CUTPROOF_DEVICE bool any(bool value) const {
+    if constexpr (Block::on_device) return block_.ballot(mask(), value) != 0;
+    return value;
+  }
+  // What the lane that has item k says.
+  template <class T>
+  CUTPROOF_DEVICE T from(int k, T value) const {
+    if constexpr (Block::on_device) return block_.shuffle(mask(), value, (block_.lane() & ~(kWidth - 1)) + k % kWidth);
+    return value;
+  }
+  // Orders memory operations of the lanes.
+  CUTPROOF_DEVICE void sync() const {
+    if constexpr (Block::on_device) block_.sync_warp(mask());
+  }
+  // To every lane; exact for whole numbers only, because lanes of the device and the host's one have different terms.
+  CUTPROOF_DEVICE int total(int value) const {
+    if constexpr (Block::on_device) {
+      for (int distance = kWidth / 2; distance > 0; distance /= 2) value += other(value, distance);
+    }
+    return value;
+  }
+  // Of the lanes before this one.
+  CUTPROOF_DEVICE int total_before(int value) const {
+    if constexpr (Block::on_device) {
+      int through = value;
+      for (int distance = 1; distance < kWidth; distance *= 2) {
+        const int before =
+            block_.shuffle(mask(), through, lane() >= distance ? block_.lane() - distance : block_.lane());
+        if (lane() >= distance) through += before;
+      }
+      return through - value;
+    }
+    return 0;
+  }
+  // Of the lanes with the same value: the first (from 0), how many are before this one, and how many there are.
+  struct Equals {
+    int first, before, count;
+  };
+  CUTPROOF_DEVICE Equals equals(int value) const {
+    if constexpr (Block::on_device) {
+      Equals found = {-1, 0, 0};
+      for (int k = 0; k < kWidth; ++k) {
+        const bool same = from(k, value) == value;
+        if (same && found.first < 0) found.first = k;
+        found.before += same && k < lane() ? 1 : 0;
+        found.count += same ? 1 : 0;
+      }
+      return found;
+    }
+    return {0, 0, 1};
+  }
+  // How many lanes before this one say yes, and how many in all.
+  CUTPROOF_DEVICE int rank(bool value, int& total) const {
+    if constexpr (Block::on_device) {
+      const unsigned votes = block_.ballot(mask(), value) >> (block_.lane() & ~(kWidth - 1));
+      total = ones(votes);
+      return ones(votes & ((1u << lane()) - 1u));
+    }
+    total = value ? 1 : 0;
+    return 0;
+  }
+
+ private:
+  CUTPROOF_DEVICE unsigned mask() const {
+    return (kWidth == 32 ? 0xffffffffu : (1u << (kWidth % 32)) - 1u) << (block_.lane() & ~(kWidth - 1));
+  }
+  template <class T>
+  CUTPROOF_DEVICE T other(T value, int distance) const {
+    return block_.shuffle(mask(), value, block_.lane() ^ distance);
+  }
+  CUTPROOF_DEVICE static int ones(unsigned bits) {
+    int count = 0;
+    for (; bits != 0; bits &= bits - 1) ++count;
+    return count;
+  }
+
+  Block& block_;
+};
+
+}  // namespace cutproof::gpu

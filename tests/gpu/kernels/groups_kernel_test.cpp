@@ -1,0 +1,521 @@
+// Groups of the kernels: which particles are in which, the constants that sums over them need, when they are made
+// again, and that carrying particles in them gives what carrying each by itself gives.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <random>
+#include <set>
+
+#include "fixtures/bodies.h"
+#include "fixtures/cook.h"
+#include "gpu/host/host_launcher.h"
+#include "gpu/kernels/groups.cuh"
+#include "gpu/launch/frame.h"
+#include "gpu/state/staging.h"
+#include "model/at.h"
+#include "property_tests/cases.h"
+#include "property_tests/random.h"
+
+namespace cutproof::gpu {
+namespace {
+
+using Random = std::mt19937_64;
+double uniform(Random& random, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(random);
+}
+double normal(Random& random) { return std::normal_distribution<double>()(random); }
+
+struct Bodies {
+  std::vector<cutproof::Setup> setups;
+  std::vector<State> states;
+};
+
+Bodies random_bodies(std::uint64_t seed, int count, int size) {
+  property_tests::Random random(seed);
+  Bodies bodies;
+  for (int k = 0; k < count; ++k) {
+    auto [setup, state] = property_tests::instance_of(property_tests::draw_case(random.seed(), size));
+    bodies.setups.push_back(std::move(setup));
+    bodies.states.push_back(std::move(state));
+  }
+  return bodies;
+}
+
+// A load with its groups made.
+struct Grouped {
+  Bodies bodies;
+  StagingBuffers staging;
+  DeviceView view;
+  explicit Grouped(Bodies of) : Grouped(std::move(of), HostLauncher()) {}
+  // `like`: loaded before, with these states since; its rest frames are taken over, for a state gives them in double
+  // precision, rounded to the last bit but one.
+  Grouped(Bodies of, HostLauncher launcher, const StagingBuffers* like = nullptr)
+      : bodies(std::move(of)), staging(make_staging_buffers(bodies.setups, bodies.states, kNewton, Capacity{})) {
+    if (like != nullptr) take_over_rest_frames(*like);
+    view = staging.view();
+    enqueue_groups(launcher, view);
+  }
+  Grouped(const Grouped&) = delete;
+  const Counters& counters() const { return staging.counters.front(); }
+
+ private:
+  // The load has the clusters of each body in turn; those of `like` come in any order.
+  void take_over_rest_frames(const StagingBuffers& like) {
+    int to = 0;
+    for (int b = 0; b < staging.bodies; ++b) {
+      for (int slot = 0; slot < like.counters.front().slots_used; ++slot) {
+        if (like.slot_size[at(slot)] == 0 || like.slot_body[at(slot)] != b) continue;
+        ASSERT_EQ(staging.members[at(staging.slot_begin[at(to)])], like.members[at(like.slot_begin[at(slot)])]);
+        for (int axis = 0; axis < 3; ++axis) {
+          ASSERT_EQ(staging.rest_base[at(3 * to + axis)], like.rest_base[at(3 * slot + axis)]);
+        }
+        staging.rest_offset[at(to++)] = like.rest_offset[at(slot)];
+      }
+    }
+  }
+};
+
+std::vector<int> holders_of(const StagingBuffers& staging, int p) {
+  std::vector<int> found;
+  for (int k = staging.membership_begin[at(p)]; k < staging.membership_begin[at(p) + 1]; ++k) {
+    if (staging.memberships[at(k)] >= 0) found.push_back(staging.memberships[at(k)]);
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+// The chunks of each class of a plain map, and what is left over.
+struct Expected {
+  std::vector<std::vector<int>> groups;  // ascending by the class's first particle, then by their own
+  std::set<int> loose;
+};
+Expected expected_of(const StagingBuffers& staging) {
+  const std::set<int> held(staging.grip_particles.begin(), staging.grip_particles.end());
+  std::map<std::vector<int>, std::vector<int>> classes;
+  Expected expected;
+  for (int p = 0; p < static_cast<int>(staging.node.size()); ++p) {
+    if (staging.death[at(p)] >= 0) continue;
+    const std::vector<int> holders = holders_of(staging, p);
+    if (holders.empty() || held.count(p) != 0) {
+      expected.loose.insert(p);
+    } else {
+      classes[holders].push_back(p);
+    }
+  }
+  std::vector<std::vector<int>> ordered;
+  for (auto& [holders, members] : classes) ordered.push_back(std::move(members));
+  std::sort(ordered.begin(), ordered.end());
+  for (const std::vector<int>& members : ordered) {
+    for (std::size_t begin = 0; begin < members.size(); begin += kMostInGroup) {
+      const std::size_t end = std::min(members.size(), begin + kMostInGroup);
+      if (end - begin < at(kLeastInGroup)) {
+        expected.loose.insert(members.begin() + static_cast<std::ptrdiff_t>(begin), members.end());
+      } else {
+        expected.groups.emplace_back(members.begin() + static_cast<std::ptrdiff_t>(begin),
+                                     members.begin() + static_cast<std::ptrdiff_t>(end));
+      }
+    }
+  }
+  return expected;
+}
+
+std::vector<int> particles_of(const StagingBuffers& staging, const GroupHead& head) {
+  return {staging.place_particle.begin() + head.begin, staging.place_particle.begin() + head.begin + head.size};
+}
+
+TEST(Groups, AreTheClassesOfEqualHoldersInChunks) {
+  int groups = 0, loose = 0, chunked = 0;
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    SCOPED_TRACE(seed);
+    Grouped grouped(random_bodies(seed, 6, 120));
+    const StagingBuffers& staging = grouped.staging;
+    const Expected expected = expected_of(staging);
+    ASSERT_EQ(grouped.counters().groups, static_cast<int>(expected.groups.size()));
+    ASSERT_EQ(grouped.counters().loose, static_cast<int>(expected.loose.size()));
+    EXPECT_EQ(grouped.counters().groups_stale, 0);
+    std::set<std::vector<int>> made;
+    for (int g = 0; g < grouped.counters().groups; ++g) {
+      const GroupHead& head = staging.group_head[at(g)];
+      const std::vector<int> particles = particles_of(staging, head);
+      made.insert(particles);
+      ASSERT_EQ(head.body, staging.body_of[at(particles.front())]);
+      ASSERT_EQ(staging.group_at[at(particles.front())], g);
+      chunked += head.size == kMostInGroup;
+    }
+    ASSERT_EQ(made, std::set<std::vector<int>>(expected.groups.begin(), expected.groups.end()));
+    std::set<int> found;
+    for (int k = 0; k < grouped.counters().loose; ++k) {
+      found.insert(staging.place_particle[at(staging.loose_places[at(k)])]);
+    }
+    ASSERT_EQ(found, expected.loose);
+    for (int p = 0; p < static_cast<int>(staging.node.size()); ++p) {
+      if (staging.death[at(p)] >= 0) continue;
+      ASSERT_EQ(staging.place_particle[at(staging.place_of[at(p)])], p);
+      ASSERT_EQ(staging.place_node[at(staging.place_of[at(p)])], staging.node[at(p)]);
+    }
+    groups += grouped.counters().groups;
+    loose += grouped.counters().loose;
+  }
+  EXPECT_GT(groups, 1000);
+  EXPECT_GT(loose, 1000);
+  EXPECT_GT(chunked, 3);
+}
+
+// Against sums in double precision over the particles, with rest centers as they are stored.
+TEST(Groups, HaveTheMomentsOfTheirParticles) {
+  Grouped grouped(random_bodies(77, 40, 120));
+  const StagingBuffers& s = grouped.staging;
+  const auto node = [&](int p) {
+    const BodyConstants& body = s.body[at(s.body_of[at(p)])];
+    const Coordinates c = coordinates(body, s.node[at(p)]);
+    return Vec3{double(c.i), double(c.j), double(c.k)};
+  };
+  const auto share = [&](int p) { return double{s.displacement[at(p)].w} / s.membership_count[at(p)]; };
+  const auto rest_center = [&](int slot) {
+    const Float3 o = s.rest_offset[at(slot)];
+    return Vec3{s.rest_base[at(3 * slot)] + double{o.x}, s.rest_base[at(3 * slot + 1)] + double{o.y},
+                s.rest_base[at(3 * slot + 2)] + double{o.z}};
+  };
+  constexpr double kClose = 1e-5;  // 64 terms of two roundings each, and the rounding of arms of up to some 10 h
+  const auto expect_moments = [&](const std::vector<int>& particles, Vec3 center, Float4 mass, Float4 upper,
+                                  Float4 lower) {
+    double m = 0, size = 0;
+    Vec3 first;
+    double second[6] = {};
+    for (const int p : particles) {
+      const Vec3 r = node(p) - center;
+      m += share(p);
+      first += share(p) * r;
+      size += share(p) * (1 + dot(r, r));
+      const double product[6] = {r.x * r.x, r.x * r.y, r.x * r.z, r.y * r.y, r.y * r.z, r.z * r.z};
+      for (std::size_t k = 0; k < 6; ++k) second[k] += share(p) * product[k];
+    }
+    EXPECT_NEAR(mass.w, m, kClose * m);
+    EXPECT_NEAR(mass.x, first.x, kClose * size);
+    EXPECT_NEAR(mass.y, first.y, kClose * size);
+    EXPECT_NEAR(mass.z, first.z, kClose * size);
+    const float found[6] = {upper.x, upper.y, upper.z, upper.w, lower.x, lower.y};
+    for (std::size_t k = 0; k < 6; ++k) EXPECT_NEAR(found[k], second[k], kClose * size) << k;
+  };
+  std::map<int, std::vector<std::pair<int, Offset>>> of_cluster;  // by slot: group and what it says
+  for (int g = 0; g < grouped.counters().groups; ++g) {
+    SCOPED_TRACE("group " + std::to_string(g));
+    const GroupHead& head = s.group_head[at(g)];
+    const RestCenter& c = s.group_center[at(g)];
+    const Vec3 center = {c.i + double{c.x}, c.j + double{c.y}, c.k + double{c.z}};
+    const std::vector<int> particles = particles_of(s, head);
+    expect_moments(particles, center, s.group_mass[at(g)], s.group_spread[at(2 * g)], s.group_spread[at(2 * g + 1)]);
+    // The mean of all, to the rounding of one number.
+    const double scale = double{s.group_mass[at(g)].w} * head.radius;
+    EXPECT_LE(std::abs(s.group_mass[at(g)].x), 1e-6 * scale + 1e-12);
+    double farthest = 0, nearest = 1e9;
+    for (const int p : particles) {
+      farthest = std::max(farthest, norm(node(p) - center));
+      nearest = std::min(nearest, norm(node(p) - center));
+    }
+    EXPECT_GE(head.radius, farthest);
+    EXPECT_LE(head.radius, farthest * 1.0001);
+    EXPECT_NEAR(norm(node(particles[at(head.middle)]) - center), nearest, 1e-5);
+    const std::vector<int> holders = holders_of(s, particles.front());
+    ASSERT_EQ(head.holder_count, static_cast<int>(holders.size()));
+    for (int k = 0; k < head.holder_count; ++k) {
+      const Offset& to = s.holders[at(head.holder_begin + k)];
+      ASSERT_EQ(to.index, holders[at(k)]);
+      const Vec3 apart = center - rest_center(to.index);
+      EXPECT_LE(norm(Vec3{to.x, to.y, to.z} - apart), 1e-6 * (1 + norm(apart)));
+      of_cluster[to.index].emplace_back(g, to);
+    }
+  }
+  int with_loose = 0;
+  for (int slot = 0; slot < grouped.counters().slots_used; ++slot) {
+    SCOPED_TRACE("slot " + std::to_string(slot));
+    std::vector<int> members(s.members.begin() + s.slot_begin[at(slot)],
+                             s.members.begin() + s.slot_begin[at(slot)] + s.slot_size[at(slot)]);
+    expect_moments(members, rest_center(slot), s.cluster_rest[at(3 * slot)], s.cluster_rest[at(3 * slot + 1)],
+                   s.cluster_rest[at(3 * slot + 2)]);
+    // Both lists say the same, to the bit; the cluster's is ascending by first particle.
+    const int begin = s.cluster_head[at(slot)].group_begin, end = begin + s.cluster_head[at(slot)].group_count;
+    auto& listed = of_cluster[slot];
+    ASSERT_EQ(end - begin, static_cast<int>(listed.size()));
+    int last = -1;
+    for (int k = begin; k < end; ++k) {
+      const Offset& to = s.cluster_groups[at(k)];
+      const int first = s.place_particle[at(s.group_head[at(to.index)].begin)];
+      EXPECT_GT(first, last);
+      last = first;
+      const auto same = std::find_if(listed.begin(), listed.end(), [&](const auto& l) { return l.first == to.index; });
+      ASSERT_NE(same, listed.end());
+      EXPECT_EQ(std::memcmp(&same->second, &to, 3 * sizeof(float)), 0);
+    }
+    std::vector<int> loose, expected;
+    for (int k = 0; k < s.cluster_head[at(slot)].loose_count; ++k) {
+      loose.push_back(s.place_particle[at(s.cluster_loose[at(s.cluster_head[at(slot)].loose_begin + k)])]);
+    }
+    for (const int p : members) {
+      if (s.group_at[at(p)] == groups_detail::kLoose) expected.push_back(p);
+    }
+    EXPECT_EQ(loose, expected);
+    with_loose += !loose.empty();
+  }
+  EXPECT_GT(with_loose, 10);
+}
+
+// Everything that the tables say, but for the numbers of groups and the places of particles: clusters in the order in
+// which a load has them, groups as their clusters list them.
+std::string tables_of(const StagingBuffers& s) {
+  const Counters& c = s.counters.front();
+  std::vector<int> slots, rank(at(c.slots_used));
+  for (int b = 0; b < s.bodies; ++b) {
+    for (int slot = 0; slot < c.slots_used; ++slot) {
+      if (s.slot_size[at(slot)] == 0 || s.slot_body[at(slot)] != b) continue;
+      rank[at(slot)] = static_cast<int>(slots.size());
+      slots.push_back(slot);
+    }
+  }
+  std::string text;
+  const auto add = [&](const auto& value) { text.append(reinterpret_cast<const char*>(&value), sizeof value); };
+  const auto add_offset = [&](const Offset& o) { add(o.x), add(o.y), add(o.z); };
+  add(c.groups), add(c.loose), add(c.pairs), add(c.cluster_pairs);
+  std::set<int> loose;
+  for (int k = 0; k < c.loose; ++k) loose.insert(s.place_particle[at(s.loose_places[at(k)])]);
+  for (const int p : loose) add(p);
+  for (const int slot : slots) {
+    for (int k = 0; k < 3; ++k) add(s.cluster_rest[at(3 * slot + k)]);
+    for (int k = 0; k < s.cluster_head[at(slot)].loose_count; ++k) {
+      add(s.place_particle[at(s.cluster_loose[at(s.cluster_head[at(slot)].loose_begin + k)])]);
+    }
+    for (int k = 0; k < s.cluster_head[at(slot)].group_count; ++k) {
+      const Offset& to = s.cluster_groups[at(s.cluster_head[at(slot)].group_begin + k)];
+      add_offset(to);
+      const GroupHead& head = s.group_head[at(to.index)];
+      add(head.size), add(head.body), add(head.middle), add(head.radius);
+      for (const int p : particles_of(s, head)) add(p);
+      add(s.group_center[at(to.index)]), add(s.group_mass[at(to.index)]);
+      add(s.group_spread[at(2 * to.index)]), add(s.group_spread[at(2 * to.index + 1)]);
+      for (int h = 0; h < head.holder_count; ++h) {
+        const Offset& holder = s.holders[at(head.holder_begin + h)];
+        add_offset(holder);
+        add(rank[at(holder.index)]);
+      }
+    }
+  }
+  return text;
+}
+
+// After every frame of dissections that split, merge and expand: the step finds what a load of that state would make.
+TEST(Groups, FollowTheClusters) {
+  int made_again = 0;
+  for (std::uint64_t seed = 1; seed <= 25; ++seed) {
+    SCOPED_TRACE(seed);
+    const Bodies bodies = random_bodies(seed, 5, 60);
+    StagingBuffers staging = make_staging_buffers(bodies.setups, bodies.states, kNewton, Capacity{});
+    const DeviceView view = staging.view();
+    const Plan plan = make_plan(bodies.setups, bodies.states, kNewton, SplitMethod::blocks);
+    HostLauncher launcher;
+    std::int64_t frames = 0;
+    for (const cutproof::Setup& setup : bodies.setups) frames = std::max(frames, setup.frame_count());
+    for (std::int64_t f = 0; f < frames; ++f) {
+      made_again += f > 0 && staging.counters.front().groups_stale != 0;
+      const Grouped fresh(Bodies{bodies.setups, extract_states(staging, bodies.setups)}, HostLauncher(), &staging);
+      if (HasFatalFailure()) return;
+      enqueue_span(launcher, view, plan, Span{Stage::step, Stage::step}, [](Stage) {});
+      ASSERT_TRUE(tables_of(staging) == tables_of(fresh.staging)) << "frame " << f;
+      enqueue_span(launcher, view, plan, Span{Stage::detect, Stage::skin}, [](Stage) {});
+    }
+  }
+  EXPECT_GT(made_again, 25);
+}
+
+TEST(Groups, AreTheSameUnderEverySchedule) {
+  const Bodies bodies = random_bodies(5, 3, 80);
+  const std::string expected = tables_of(Grouped(bodies).staging);
+  const auto simulated = [&](Generator schedule) {
+    SimulationOptions options;
+    options.schedule = std::move(schedule);
+    return tables_of(Grouped(bodies, HostLauncher(options)).staging);
+  };
+  EXPECT_TRUE(simulated(forward()) == expected);
+  EXPECT_TRUE(simulated(reverse()) == expected);
+  EXPECT_TRUE(simulated(round_robin()) == expected);
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) EXPECT_TRUE(simulated(random_walk(seed)) == expected) << seed;
+  EXPECT_TRUE(tables_of(Grouped(bodies, HostLauncher(HostLauncher::Threads{4})).staging) == expected);
+}
+
+// No point of a clear ball is projected or touches, whatever its side; and balls are called clear often enough to be of
+// use.
+TEST(Groups, AreClearOnlyIfNoPointOfTheirBallTouches) {
+  Random random(91);
+  int clear = 0, near_blade = 0, over = 0;
+  for (int trial = 0; trial < 20000; ++trial) {
+    const float h = 0.01f;
+    WallF walls[2] = {{2, 1, static_cast<float>(uniform(random, -0.05, 0.02)), 0},
+                      {0, -1, static_cast<float>(uniform(random, 0.05, 0.2)), 0.3f}};
+    const auto pose = [&] {
+      const double a = uniform(random, 0, 6.28), b = uniform(random, -1.5, 1.5);
+      const Vec3 along = {std::cos(a), std::sin(a), 0};
+      const Vec3 back = {-std::sin(b) * std::sin(a), std::sin(b) * std::cos(a), std::cos(b)};
+      const auto single = [](Vec3 v) {
+        return Float3{static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+      };
+      return PoseF{single({uniform(random, 0, 0.1), uniform(random, 0, 0.1), uniform(random, 0, 0.1)}), single(along),
+                   single(back)};
+    };
+    const MoveF move = {pose(), pose(), 1};
+    Contacts contacts = {};
+    contacts.walls = walls;
+    contacts.wall_count = trial % 3 == 0 ? 0 : 2;
+    contacts.move = trial % 5 == 0 ? nullptr : &move;
+    contacts.half_length = 0.03f;
+    contacts.depth = 0.04f;
+    contacts.clearance = 0.0075f;
+    contacts.frictionless = contacts.wall_count == 0;
+    const Ball ball = {{h,
+                        {static_cast<float>(uniform(random, 0, 10)), static_cast<float>(uniform(random, 0, 10)),
+                         static_cast<float>(uniform(random, 0, 10))}},
+                       {static_cast<float>(0.02 * normal(random)), static_cast<float>(0.02 * normal(random)),
+                        static_cast<float>(0.02 * normal(random))},
+                       static_cast<float>(h * uniform(random, 0, 3))};
+    const int side = static_cast<int>(uniform(random, -1.99, 1.99));
+    if (!is_clear(contacts, ball, side)) continue;
+    ++clear;
+    if (contacts.move != nullptr) {
+      const Float3 c = contacts_detail::into_frame(move.to, ball.rest.from(move.to.edge) + ball.d);
+      near_blade += std::abs(c.z) < ball.radius + 2 * contacts.clearance;
+      over += contacts_detail::is_over_blade(contacts, c);
+    }
+    for (int k = 0; k < 40; ++k) {
+      // Half of them on its surface.
+      Vec3 way = {normal(random), normal(random), normal(random)};
+      way = ((k % 2 == 0 ? 1.0 : uniform(random, 0, 1)) * double{ball.radius} / norm(way)) * way;
+      const Float3 d = ball.d + Float3{static_cast<float>(way.x), static_cast<float>(way.y), static_cast<float>(way.z)};
+      for (const float own : {-1.0f, 1.0f}) {
+        if (side != 0 && own != static_cast<float>(side)) continue;
+        bool in_turn = false;
+        const Float3 reached = project(contacts, ball.rest, d, own, ball.d, in_turn);
+        ASSERT_TRUE(contacts_detail::same(reached, d)) << "trial " << trial;
+        ASSERT_FALSE(contacts_detail::touches(contacts, ball.rest, d, own)) << "trial " << trial;
+      }
+    }
+  }
+  EXPECT_GT(clear, 3000);
+  EXPECT_GT(near_blade, 100);
+  EXPECT_GT(over, 300);
+}
+
+// One frame of the kernels, and which groups were resolved in it.
+struct Stepped {
+  State state;
+  std::vector<int> touched;
+  StagingBuffers staging;
+};
+Stepped step(const cutproof::Setup& setup, const State& state) {
+  Stepped stepped;
+  const std::vector<cutproof::Setup> setups = {setup};
+  const std::vector<State> states = {state};
+  stepped.staging = make_staging_buffers(setups, states, kNewton, Capacity{});
+  HostLauncher launcher;
+  enqueue_step(launcher, stepped.staging.view(), make_plan(setups, states, kNewton, SplitMethod::blocks));
+  stepped.state = extract_states(stepped.staging, setups).front();
+  stepped.touched = stepped.staging.group_touched;
+  stepped.touched.resize(at(stepped.staging.counters.front().groups));
+  return stepped;
+}
+
+cutproof::Setup block_on_floor(double gap) {
+  cutproof::Setup setup;
+  setup.body = fixtures::block(15, 15, 15, 0.01);
+  setup.substep_length.assign(1, 0.002);
+  setup.step.gravity = {0, 0, -9.81};
+  // Nodes begin one spacing above the origin.
+  setup.walls = {{2, +1, 0.01 - gap, 0.3}};
+  return setup;
+}
+State cooked(const cutproof::Setup& setup) {
+  return fixtures::cook(setup.body, ClusterSpec{}, setup.expand, setup.merge, 1);
+}
+
+TEST(Groups, AreResolvedWhereTheyMayTouchAndNowhereElse) {
+  const cutproof::Setup setup = block_on_floor(0);
+  const Stepped found = step(setup, cooked(setup));
+  int resolved = 0;
+  double highest = 0, lowest_carried = 1;
+  for (std::size_t g = 0; g < found.touched.size(); ++g) {
+    double lowest = 1;
+    for (const int p : particles_of(found.staging, found.staging.group_head[g])) {
+      lowest = std::min(lowest, setup.body.rest_position(p).z);
+    }
+    if (found.touched[g] != 0) {
+      ++resolved;
+      highest = std::max(highest, lowest);
+    } else {
+      lowest_carried = std::min(lowest_carried, lowest);
+    }
+  }
+  EXPECT_GT(resolved, 5);
+  EXPECT_GT(lowest_carried, 0.0101) << "what lies on the floor is resolved";
+  EXPECT_LE(highest, 0.05) << "what is far above it is carried";
+  EXPECT_LT(resolved, static_cast<int>(found.touched.size()) / 2);
+  const cutproof::Setup above = block_on_floor(0.05);
+  for (const int touched : step(above, cooked(above)).touched) EXPECT_EQ(touched, 0);
+}
+
+// The same body once with groups and once without any, because a grip that never holds names all particles: what
+// carries particles together must give what carries each alone, within a few roundings, with blade, floor and friction,
+// for every way to iterate.
+TEST(Groups, GiveWhatTheirParticlesAloneGive) {
+  Random random(17);
+  int carried = 0, resolved = 0;
+  double worst = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    SCOPED_TRACE(trial);
+    cutproof::Setup setup = block_on_floor(trial % 3 == 0 ? 0.0 : uniform(random, 0, 0.03));
+    setup.body = fixtures::block(7 + trial % 5, 9, 8, 0.01);
+    setup.step.iterations = trial % 7;
+    setup.step.substeps = 1 + trial % 3;
+    setup.step.solver = trial % 4 == 3 ? Solver::published : Solver::implicit;
+    setup.step.acceleration = trial % 4 == 1 ? Acceleration::chebyshev : Acceleration::none;
+    setup.step.damping = trial % 2;
+    if (trial % 5 != 0) {
+      setup.has_blade = true;
+      setup.blade = {0.06, 0.05, 0.004, trial % 2 == 0 ? 0.2 : 0.0};
+      BladePose pose = {{0.04, 0.05, 0.06}, {1, 0, 0}, {0, 0, 1}};
+      for (int s = 0; s < setup.step.substeps; ++s) {
+        BladePose next = pose;
+        next.edge += Vec3{0, 0.0003, -0.002};
+        setup.blade_moves.push_back({pose, next, true, 0});
+        pose = next;
+      }
+    }
+    State state = cooked(setup);
+    for (std::size_t i = 0; i < state.x.size(); ++i) {
+      const Vec3 arm = state.x[i] - Vec3{0.05, 0.05, 0.05};
+      state.v[i] = Vec3{0.2, 0.1, -0.3} + cross(Vec3{2, 3, 1}, arm) + 0.05 * Vec3{normal(random), normal(random), 0};
+    }
+    const Stepped together = step(setup, state);
+    for (const int touched : together.touched) (touched != 0 ? resolved : carried)++;
+    cutproof::Setup alone = setup;
+    Grip grip;
+    for (int32_t i = 0; i < setup.body.particle_count(); ++i) grip.particles.push_back(i);
+    grip.active.assign(at(setup.step.substeps), false);
+    grip.displacement.assign(at(setup.step.substeps), Vec3{});
+    alone.grips = {grip};
+    const Stepped apart = step(alone, state);
+    ASSERT_EQ(apart.staging.counters.front().groups, 0);
+    ASSERT_GT(together.staging.counters.front().groups, 10);
+    for (std::size_t i = 0; i < state.x.size(); ++i) {
+      worst = std::max(worst, norm(together.state.x[i] - apart.state.x[i]) / 0.01);
+    }
+    // Roundings of displacements of some 0.2 h, a few for each iteration.
+    EXPECT_LE(worst, 2e-6);
+    EXPECT_LE(norm(together.state.impulse - apart.state.impulse), 1e-4 * (norm(apart.state.impulse) + 1e-6));
+  }
+  std::printf("greatest difference: %.1e h; %d groups carried, %d resolved\n", worst, carried, resolved);
+  EXPECT_GT(carried, 300);
+  EXPECT_GT(resolved, 500);
+}
+
+}  // namespace
+}  // namespace cutproof::gpu
