@@ -77,7 +77,7 @@ for part in $parts; do
       try fuzz_dynamics cutproof fuzz --backend gpu --dynamics --cases 10000 --seed 2000001 \
         --save "$results" --json "$results/fuzz_dynamics.json"
       try acceleration acceleration_test --gtest_filter='*/gpu'
-      try rapidcheck property_tests --gtest_filter='*/gpu*:Cases*' ;;
+      try rapidcheck property_tests --gtest_filter='*/gpu*:Cases*:Paths.OfTheDevice*' ;;
     guests)
       for plugin in cuda_components cuda_components_in_a_block; do
         try "judge_$plugin" cutproof judge "guests/$plugin.so" --save "$results" --json "$results/judge_$plugin.json"

@@ -68,16 +68,32 @@ std::unique_ptr<Backend> make_simulated(gpu::Generator schedule, const BackendCh
 }
 
 #if CUTPROOF_HAS_CUDA
-std::unique_ptr<Backend> make_gpu(const BackendChoice& choice) { return gpu::make_gpu_backend(kernel_options(choice)); }
-std::unique_ptr<Backend> make_eager_gpu(const BackendChoice& choice) {
+template <gpu::Path path>
+std::unique_ptr<Backend> make_gpu(const BackendChoice& choice) {
   gpu::KernelOptions options = kernel_options(choice);
-  options.eager = true;
+  options.path = path;
   return gpu::make_gpu_backend(options);
 }
 #else
+template <gpu::Path>
 constexpr std::unique_ptr<Backend> (*make_gpu)(const BackendChoice&) = nullptr;
-constexpr std::unique_ptr<Backend> (*make_eager_gpu)(const BackendChoice&) = nullptr;
 #endif
+
+// Of the same kernels, started in another way than loads of that size are.
+constexpr BackendDescriptor gpu_path(std::string_view name, std::string_view summary, bool is_timed,
+                                     std::unique_ptr<Backend> (*make)(const BackendChoice&)) {
+  return {
+      .name = name,
+      .summary = summary,
+      .processor = Processor::device,
+      .is_timed = is_timed,
+      .is_another_path = true,
+      .pipelines = is_timed,
+      .timed_frames = 20,
+      .most_parallel_loads = 6,
+      .make = make,
+  };
+}
 
 constexpr bool whole_frames(Span span) { return span.first == Stage::step && span.last == Stage::skin; }
 constexpr bool split_alone(Span span) { return span.first == Stage::split && span.last == Stage::split; }
@@ -138,16 +154,12 @@ constexpr std::array kBackends = {
         .timed_frames = 20,
         // It is busy with so many loads at once; more only take memory.
         .most_parallel_loads = 6,
-        .make = make_gpu,
+        .make = make_gpu<gpu::Path::automatic>,
     },
-    BackendDescriptor{
-        .name = "gpu-eager",
-        .summary = "the same, launch by launch instead of as a graph",
-        .processor = Processor::device,
-        .is_timed = false,
-        .most_parallel_loads = 6,
-        .make = make_eager_gpu,
-    },
+    gpu_path("gpu-eager", "the same, kernel by kernel", false, make_gpu<gpu::Path::eager>),
+    gpu_path("gpu-graph", "the same, a graph of kernels whatever the size", true, make_gpu<gpu::Path::graph>),
+    gpu_path("gpu-block", "the same, one kernel of one block", true, make_gpu<gpu::Path::one_block>),
+    gpu_path("gpu-grid", "the same, one kernel that fills the device", true, make_gpu<gpu::Path::one_grid>),
 };
 
 std::string cpu_name() {

@@ -37,6 +37,7 @@ struct BackendDescriptor {
   bool is_the_reference = false;
   Processor processor = Processor::one_thread;
   bool is_timed = true;              // else it only finds faults: what it takes says nothing
+  bool is_another_path = false;      // another backend, whose kernels are started in another way, with the same bits
   bool pipelines = false;            // run() does not wait: frames can be handed over back to back
   bool takes_kernel_options = true;  // it runs the kernels: --split, --rotation
   bool takes_schedule = false;       // --schedule, --schedule-seed: its interleaving is chosen and can be replayed

@@ -54,6 +54,8 @@ std::vector<NamedBackend> all_backends() {
       add(backend, "_random", "", "random", 2, 35);
       add(backend, "_pct", "", "pct", 2, 35);
       add(backend, "_reverse", "global", "reverse", 2, 35);
+    } else if (backend.is_timed && backend.is_another_path) {
+      add(backend, "", "", "", 10, 100);
     } else if (backend.is_timed) {
       add(backend, "", "", "", 1, 100);
       if (backend.takes_kernel_options) add(backend, "_global_labels", "global", "", 4, 100);

@@ -296,6 +296,80 @@ std::vector<NamedBackend> backends_for_large_bodies() {
 INSTANTIATE_TEST_SUITE_P(Over, LargeBodies, ::testing::ValuesIn(backends_for_large_bodies()),
                          [](const auto& tested) { return tested.param.name; });
 
+// --- Paths --------------------------------------------------------------------------------------------------------
+
+using Paths = std::vector<std::pair<std::string, std::unique_ptr<Backend>>>;
+
+// The same work, started in other ways. Eight bodies a load: what one needs is not what all need, and a small load is
+// not one small body. Each of two of them alone, too.
+void expect_same_bits(const std::string& id, int64_t cases, Paths& paths) {
+  constexpr int kBodies = 8;
+  constexpr int64_t kFrames = 4;
+  const auto run = [](Backend& backend, const std::vector<Setup>& setups, const std::vector<State>& states) {
+    backend.load(setups, states);
+    std::vector<std::vector<State>> all;
+    for (int64_t frame = 0; frame < kFrames; ++frame) {
+      backend.run({});
+      all.push_back(backend.snapshot());
+    }
+    return all;
+  };
+  int64_t frames = 0, cut = 0;
+  check(id, cases, 100, [&](const Case& drawn) -> std::string {
+    std::vector<Setup> setups;
+    std::vector<State> states;
+    for (int k = 0; k < kBodies; ++k) {
+      const uint64_t seed = drawn.seed + static_cast<uint64_t>(k);
+      const Case c = k == 0 ? drawn : k % 2 == 0 ? draw_case(seed, 60) : draw_moving_case(seed, 60);
+      Instance body = load_for(*paths.front().second, without_claims(c));
+      setups.push_back(std::move(body.setup));
+      states.push_back(std::move(body.state));
+    }
+    const auto expected = run(*paths.front().second, setups, states);
+    for (const auto& together : expected) {
+      ++frames;
+      cut += std::any_of(together.begin(), together.end(), [](const State& s) { return !s.removed.empty(); });
+    }
+    for (auto& [name, backend] : paths) {
+      if (run(*backend, setups, states) != expected) return name + " gives other bits in a load";
+      for (const std::size_t k : {std::size_t{0}, std::size_t{1}}) {
+        const auto alone = run(*backend, {setups[k]}, {states[k]});
+        for (std::size_t frame = 0; frame < alone.size(); ++frame) {
+          if (alone[frame].front() != expected[frame][k]) return name + " gives other bits alone";
+        }
+      }
+    }
+    return "";
+  });
+  std::cout << frames << " frames of " << kBodies << " bodies over " << paths.size() << " paths; something was cut in "
+            << cut << std::endl;
+  EXPECT_GT(cut, 0);
+}
+
+TEST(Paths, OfTheHostGiveTheSameBitsAloneAndInALoad) {
+  Paths paths;
+  for (const int threads : {1, 2, 32}) {
+    harness::BackendChoice choice;
+    choice.name = harness::kHostName;
+    choice.threads = threads;
+    paths.emplace_back(choice.name + " with " + std::to_string(threads) + " threads", harness::make_backend(choice));
+  }
+  expect_same_bits("Paths.OfTheHostGiveTheSameBitsAloneAndInALoad", std::max<int64_t>(wanted_cases() / 100, 5), paths);
+}
+
+TEST(Paths, OfTheDeviceGiveTheSameBitsAloneAndInALoad) {
+  Paths paths;
+  for (const harness::BackendDescriptor& backend : harness::backends()) {
+    if (!backend.is_built() || !backend.needs_device() || harness::processor_of(backend).empty()) continue;
+    harness::BackendChoice choice;
+    choice.name = backend.name;
+    paths.emplace_back(choice.name, harness::make_backend(choice));
+  }
+  if (paths.empty()) GTEST_SKIP() << "there is no device";
+  ASSERT_GE(paths.size(), 5u);
+  expect_same_bits("Paths.OfTheDeviceGiveTheSameBitsAloneAndInALoad", std::max<int64_t>(wanted_cases() / 20, 5), paths);
+}
+
 // --- The generators themselves ------------------------------------------------------------------------------------
 
 TEST(Cases, ShrinkToTheFewestParticlesAndStrokesThatAPlantedFaultNeeds) {

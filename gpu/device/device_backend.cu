@@ -1,3 +1,6 @@
+// The launchers of this file are the host's, though what writes work down is also the device's.
+#pragma nv_diag_suppress 20011
+#pragma nv_diag_suppress 20014
 #include <cuda_runtime.h>
 
 #include <array>
@@ -12,6 +15,7 @@
 #include "gpu/device/cuda_check.h"
 #include "gpu/device/cuda_handles.h"
 #include "gpu/device/device_launcher.cuh"
+#include "gpu/device/span_kernel.h"
 #include "gpu/launch/frame.h"
 
 namespace cutproof::gpu {
@@ -80,7 +84,14 @@ class GpuBackend final : public Backend {
       require_no_fault(then);
       if (wants_capacity(device_.view(), then)) take(load_.enlarged(snapshot(), options_));
     }
-    if (options_.eager) {
+    const Path path = path_of_load();
+    if (path == Path::one_block || path == Path::one_grid) {
+      CUTPROOF_CUDA(cudaEventRecord(begin_.get(), stream_.get()));
+      launch_span(device_.view(), load_.plan, span, static_cast<int*>(partials_.get()),
+                  path == Path::one_block ? 1 : most_span_blocks_, stream_.get());
+      return finish(span);
+    }
+    if (path == Path::eager) {
       DeviceLauncher launcher(stream_.get());
       CUTPROOF_CUDA(cudaEventRecord(begin_.get(), stream_.get()));
       enqueue_span(launcher, device_.view(), load_.plan, span, [](Stage) {});
@@ -120,6 +131,13 @@ class GpuBackend final : public Backend {
   }
 
  private:
+  Path path_of_load() const {
+    const bool in_one = options_.path == Path::one_block || options_.path == Path::one_grid;
+    if (options_.path != Path::automatic && !in_one) return options_.path;
+    if (!fits_span_kernel(device_.view(), load_.plan)) return Path::graph;
+    if (in_one) return options_.path;
+    return device_.view().particles <= kMostInOneBlock ? Path::one_block : Path::graph;
+  }
   void take(Load load) {
     CUTPROOF_CUDA(cudaStreamSynchronize(stream_.get()));
     graphs_.clear();
@@ -128,6 +146,7 @@ class GpuBackend final : public Backend {
     load_ = std::move(load);
     runs_ = 0;
   }
+  static constexpr int kMostInOneBlock = 1200;  // particles; with more the graph is faster (docs/results/README.md, Sizes)
   static constexpr std::size_t kInFlight = 4;
   std::size_t slot() const { return static_cast<std::size_t>(runs_ % kInFlight); }
   std::size_t last() const { return static_cast<std::size_t>((runs_ - 1) % kInFlight); }
@@ -152,6 +171,8 @@ class GpuBackend final : public Backend {
   Stream stream_ = make_stream();
   Event begin_ = make_event();
   std::array<Event, kInFlight> end_;
+  int most_span_blocks_ = prepare_span_kernel();
+  DeviceMemory partials_ = make_device_memory(kMostSpanBlocks * sizeof(int));
   PinnedMemory counters_ = make_pinned_memory(kInFlight * sizeof(Counters));
   uint64_t runs_ = 0;  // since the load
   Span span_;

@@ -1,6 +1,9 @@
-// The Block of kernels on the device (block.h): everything is inlined to what a plain CUDA kernel would say, and what
+// The Blocks of kernels on the device (block.h): everything is inlined to what a plain CUDA kernel would say, and what
 // a kernel does not use costs nothing. Block sizes are multiples of 32 (launcher.h checks). Collectives take a number
 // of threads known at run time and combine in a fixed order, so equal block sizes give equal bits.
+//
+// DeviceBlock is a block of the launch. PartOfBlock is one of several parts of it, of neighbouring warps, each of which
+// works like a block: with equal threads it gives the same bits as a DeviceBlock.
 #pragma once
 #include <cstdint>
 #include <cstring>
@@ -10,25 +13,79 @@
 
 namespace cutproof::gpu {
 
-class DeviceBlock {
- public:
-  static constexpr bool on_device = true;
+namespace detail {
 
+struct WholeBlock {
   __device__ int thread() const { return static_cast<int>(threadIdx.x); }
   __device__ int size() const { return static_cast<int>(blockDim.x); }
   __device__ int index() const { return static_cast<int>(blockIdx.x); }
   __device__ int count() const { return static_cast<int>(gridDim.x); }
-  __device__ std::int64_t first() const { return static_cast<std::int64_t>(blockIdx.x) * blockDim.x + threadIdx.x; }
-  __device__ std::int64_t stride() const { return static_cast<std::int64_t>(gridDim.x) * blockDim.x; }
-  __device__ int lane() const { return static_cast<int>(threadIdx.x & 31u); }
+  __device__ int first_warp() const { return 0; }
+  __device__ unsigned first_shared() const { return 0; }
+  __device__ void sync() const { __syncthreads(); }
+  __device__ bool any(bool value) const { return __syncthreads_or(value) != 0; }
+};
 
-  __device__ void sync() { __syncthreads(); }
+class PartShape {
+ public:
+  // Parts of so many threads, and so many bytes of shared memory for each (a multiple of 16). At most 15 parts of more
+  // than a warp: a block has 16 barriers, and the first is everybody's.
+  __device__ PartShape(int threads, unsigned shared_bytes)
+      : threads_(threads), part_(static_cast<int>(threadIdx.x) / threads), shared_bytes_(shared_bytes) {}
+
+  __device__ int thread() const { return static_cast<int>(threadIdx.x) - part_ * threads_; }
+  __device__ int size() const { return threads_; }
+  __device__ int index() const { return static_cast<int>(blockIdx.x) * parts() + part_; }
+  __device__ int count() const { return static_cast<int>(gridDim.x) * parts(); }
+  __device__ int first_warp() const { return part_ * threads_ / 32; }
+  __device__ unsigned first_shared() const { return static_cast<unsigned>(part_) * shared_bytes_; }
+  __device__ void sync() const {
+    if (threads_ == 32) return __syncwarp();
+    asm volatile("barrier.sync.aligned %0, %1;" ::"r"(part_ + 1), "r"(threads_) : "memory");
+  }
+  __device__ bool any(bool value) const {
+    if (threads_ == 32) return __any_sync(0xffffffffu, value) != 0;
+    int found = 0;
+    asm volatile(
+        "{\n .reg .pred one, all;\n setp.ne.s32 one, %1, 0;\n barrier.red.or.pred.aligned all, %2, %3, one;\n"
+        " selp.s32 %0, 1, 0, all;\n}"
+        : "=r"(found)
+        : "r"(value ? 1 : 0), "r"(part_ + 1), "r"(threads_)
+        : "memory");
+    return found != 0;
+  }
+
+ private:
+  __device__ int parts() const { return static_cast<int>(blockDim.x) / threads_; }
+
+  int threads_, part_;
+  unsigned shared_bytes_;
+};
+
+}  // namespace detail
+
+template <class Shape>
+class BlockOnDevice : private Shape {
+ public:
+  static constexpr bool on_device = true;
+
+  using Shape::any;
+  using Shape::count;
+  using Shape::index;
+  using Shape::Shape;
+  using Shape::size;
+  using Shape::sync;
+  using Shape::thread;
+  __device__ std::int64_t first() const { return static_cast<std::int64_t>(index()) * size() + thread(); }
+  __device__ std::int64_t stride() const { return static_cast<std::int64_t>(count()) * size(); }
+  __device__ int lane() const { return static_cast<int>(threadIdx.x & 31u); }
 
   template <class T>
   __device__ T* shared(int count) {
     static_assert(alignof(T) <= 16);
     extern __shared__ uint4 cutproof_dynamic_shared[];
-    T* const taken = reinterpret_cast<T*>(reinterpret_cast<unsigned char*>(cutproof_dynamic_shared) + shared_used_);
+    T* const taken = reinterpret_cast<T*>(reinterpret_cast<unsigned char*>(cutproof_dynamic_shared) +
+                                          Shape::first_shared() + shared_used_);
     shared_used_ += (static_cast<unsigned>(count) * static_cast<unsigned>(sizeof(T)) + 15u) & ~15u;
     return taken;
   }
@@ -63,18 +120,18 @@ class DeviceBlock {
   __device__ T smallest(T value) {
     return reduce<std::is_integral_v<T>>(value, [](T a, T b) { return b < a ? b : a; });
   }
-  __device__ bool any(bool value) { return __syncthreads_or(value) != 0; }
   __device__ int exclusive_scan(int value, int& total) {
     int through = inclusive_scan_in_warp(value);
-    if (blockDim.x == 32) {
+    if (size() == 32) {
       total = __shfl_sync(kWarp, through, 31);
       return through - value;
     }
-    __shared__ int partial[32];
+    __shared__ int partials[32];
+    int* const partial = partials + Shape::first_warp();
     const int warp = thread() / 32;
-    __syncthreads();  // everyone is done with the last use of `partial`
+    sync();  // everyone is done with the last use of `partial`
     if (lane() == 31) partial[warp] = through;
-    __syncthreads();
+    sync();
     const int warps = size() / 32;
     const int through_warps = inclusive_scan_in_warp(lane() < warps ? partial[lane()] : 0);
     total = __shfl_sync(kWarp, through_warps, 31);
@@ -87,6 +144,7 @@ class DeviceBlock {
   __device__ T shuffle(unsigned mask, T value, int lane) {
     return by_words(value, [=](unsigned word) { return __shfl_sync(mask, word, lane); });
   }
+  __device__ void sync_warp(unsigned mask) { __syncwarp(mask); }
 
   // T: int, unsigned or unsigned long long.
   template <class T>
@@ -186,19 +244,19 @@ class DeviceBlock {
   // `symmetric`: combine(a, b) and combine(b, a) have the same bits, so every lane has the result already. (Minima of
   // floats are not: the sign of a zero, NaN.)
   template <bool symmetric, class T, class Combine>
-  __device__ static T reduce(T value, Combine combine) {
+  __device__ T reduce(T value, Combine combine) const {
     const auto from_first = [](T own) {
       return by_words(own, [](unsigned word) { return __shfl_sync(kWarp, word, 0); });
     };
     value = reduce_warp(value, combine);
-    const int warps = static_cast<int>(blockDim.x / 32u);
+    const int warps = size() / 32;
     if (warps == 1) return symmetric ? value : from_first(value);
     alignas(16) __shared__ unsigned char storage[32 * sizeof(T)];
-    T* const partial = reinterpret_cast<T*>(storage);
+    T* const partial = reinterpret_cast<T*>(storage) + Shape::first_warp();
     const int lane = static_cast<int>(threadIdx.x & 31u);
-    __syncthreads();  // everyone is done with the last use of `partial`
-    if (lane == 0) partial[threadIdx.x / 32] = value;
-    __syncthreads();
+    sync();  // everyone is done with the last use of `partial`
+    if (lane == 0) partial[thread() / 32] = value;
+    sync();
     // Every warp adds up the partial results of all; the tree leaves out what is beyond the last warp.
     value = partial[lane < warps ? lane : 0];
 #pragma unroll
@@ -220,5 +278,8 @@ class DeviceBlock {
 
   unsigned shared_used_ = 0;
 };
+
+using DeviceBlock = BlockOnDevice<detail::WholeBlock>;
+using PartOfBlock = BlockOnDevice<detail::PartShape>;
 
 }  // namespace cutproof::gpu

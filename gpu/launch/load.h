@@ -9,11 +9,20 @@
 
 namespace cutproof::gpu {
 
+// gpu: how the work of a span is started. All give the same bits.
+enum class Path {
+  automatic,  // one_block for small loads, graph for others
+  graph,      // kernels and conditions as one CUDA graph
+  eager,      // kernels one by one, waiting for each condition
+  one_block,  // one kernel of one block; a load that does not fit takes the graph
+  one_grid,   // one kernel of as many blocks as run side by side; likewise
+};
+
 struct KernelOptions {
   int rotation_method = kNewton;  // the fastest of those that fail on no hard case (accuracy.md, Rotations)
   SplitMethod split = SplitMethod::blocks;
-  bool eager = false;  // gpu: kernels one by one, waiting for each condition, instead of one graph per span
-  Capacity capacity;   // at load; a backend doubles it when it must (for tests)
+  Path path = Path::automatic;
+  Capacity capacity;  // at load; a backend doubles it when it must (for tests)
 };
 
 struct Load {

@@ -61,7 +61,7 @@ cudaError_t error_of(const std::string& call) {
   if (call == "cudaMalloc" || call == "cudaMallocHost" || call == "cudaGraphInstantiate") {
     return cudaErrorMemoryAllocation;
   }
-  if (call == "__cudaLaunchKernel") return cudaErrorLaunchOutOfResources;
+  if (call == "__cudaLaunchKernel" || call == "cudaLaunchCooperativeKernel") return cudaErrorLaunchOutOfResources;
   return cudaErrorLaunchFailure;
 }
 
@@ -182,6 +182,9 @@ INTERCEPT(cudaStreamBeginCaptureToGraph,
           (cudaStream_t stream, cudaGraph_t graph, const cudaGraphNode_t* dependencies, const cudaGraphEdgeData* edges,
            size_t count, cudaStreamCaptureMode mode),
           (stream, graph, dependencies, edges, count, mode))
+INTERCEPT(cudaLaunchCooperativeKernel,
+          (const void* kernel, dim3 grid, dim3 block, void** arguments, size_t shared_bytes, cudaStream_t stream),
+          (kernel, grid, block, arguments, shared_bytes, stream))
 // What <<< >>> becomes. It reports nothing itself: the error is for cudaGetLastError.
 INTERCEPT(__cudaLaunchKernel,
           (cudaKernel_t kernel, dim3 grid, dim3 block, void** arguments, size_t shared_bytes, cudaStream_t stream),
@@ -241,22 +244,20 @@ const fixtures::Built& small_body() {
   return built;
 }
 
-KernelOptions options(bool eager) {
+KernelOptions options(Path path) {
   KernelOptions options;
-  options.eager = eager;
+  options.path = path;
   options.capacity = kLittle;
   return options;
 }
 
 // Call names that do not stand in a message where CUB made the call or <<< >>> did: the kernel's or CUB's does.
 const std::set<std::string>& called_within() {
-  static const std::set<std::string> names = {"__cudaLaunchKernel",
-                                              "cudaGetDevice",
-                                              "cudaSetDevice",
-                                              "cudaDeviceGetAttribute",
-                                              "cudaFuncGetAttributes",
-                                              "cudaFuncSetAttribute",
-                                              "cudaOccupancyMaxActiveBlocksPerMultiprocessorWithFlags"};
+  static const std::set<std::string> names = {
+      "__cudaLaunchKernel",     "cudaLaunchCooperativeKernel",
+      "cudaGetDevice",          "cudaSetDevice",
+      "cudaDeviceGetAttribute", "cudaFuncGetAttributes",
+      "cudaFuncSetAttribute",   "cudaOccupancyMaxActiveBlocksPerMultiprocessorWithFlags"};
   return names;
 }
 
@@ -351,9 +352,9 @@ class DeviceFailures : public testing::Test {
   }
 
   // Each of the chosen calls fails; afterwards nothing is left, and now and then a fresh backend is tried.
-  void fail_each(bool eager, Failing failing, uint64_t parts) {
+  void fail_each(Path path, Failing failing, uint64_t parts) {
     const auto work = [&] {
-      const std::unique_ptr<Backend> backend = make_gpu_backend(options(eager));
+      const std::unique_ptr<Backend> backend = make_gpu_backend(options(path));
       State state = load_and_run(*backend);
       calls.stop();
       return state;
@@ -392,6 +393,7 @@ TEST_F(DeviceFailures, TheSceneMakesTheBackendEnlarge) {
   EXPECT_FALSE(wants(2 * kLittle.factor));
   const auto memories = [](Capacity capacity) {
     KernelOptions with;
+    with.path = Path::graph;
     with.capacity = capacity;
     calls.start(0, Failing::once);
     static_cast<void>(load_and_run(*make_gpu_backend(with)));
@@ -401,24 +403,32 @@ TEST_F(DeviceFailures, TheSceneMakesTheBackendEnlarge) {
   expect_nothing_outstanding();
 }
 
-TEST_F(DeviceFailures, ACallThatFailsInTheGraphModeLeavesNothing) { fail_each(false, Failing::once, 300); }
+TEST_F(DeviceFailures, ACallThatFailsInTheGraphModeLeavesNothing) { fail_each(Path::graph, Failing::once, 300); }
 
-TEST_F(DeviceFailures, ADeviceThatIsLostInTheGraphModeLeavesNothing) { fail_each(false, Failing::for_good, 100); }
+TEST_F(DeviceFailures, ADeviceThatIsLostInTheGraphModeLeavesNothing) { fail_each(Path::graph, Failing::for_good, 100); }
 
-TEST_F(DeviceFailures, ACallThatFailsInTheEagerModeLeavesNothing) { fail_each(true, Failing::once, 60); }
+TEST_F(DeviceFailures, ACallThatFailsInTheEagerModeLeavesNothing) { fail_each(Path::eager, Failing::once, 60); }
 
-TEST_F(DeviceFailures, ADeviceThatIsLostInTheEagerModeLeavesNothing) { fail_each(true, Failing::for_good, 20); }
+TEST_F(DeviceFailures, ADeviceThatIsLostInTheEagerModeLeavesNothing) { fail_each(Path::eager, Failing::for_good, 20); }
+
+TEST_F(DeviceFailures, ACallThatFailsInOneKernelLeavesNothing) {
+  for (const Path path : {Path::one_block, Path::one_grid}) {
+    fail_each(path, Failing::once, 60);
+    fail_each(path, Failing::for_good, 20);
+  }
+}
 
 TEST_F(DeviceFailures, ABackendWhoseCallFailedCanBeLoadedAnew) {
-  for (const bool eager : {false, true}) {
-    const State right = load_and_run(*make_gpu_backend(options(eager)));
-    std::unique_ptr<Backend> backend = make_gpu_backend(options(eager));
+  for (const Path path : {Path::graph, Path::eager, Path::one_block, Path::one_grid}) {
+    const State right = load_and_run(*make_gpu_backend(options(path)));
+    std::unique_ptr<Backend> backend = make_gpu_backend(options(path));
     calls.start(0, Failing::once);
     static_cast<void>(load_and_run(*backend));
     calls.stop();
     const std::vector<const char*> trace = calls.trace;
     for (const uint64_t number : chosen(trace, 0)) {
-      SCOPED_TRACE("call " + std::to_string(number) + ", " + trace[number - 1] + (eager ? ", eager" : ", graph"));
+      SCOPED_TRACE("call " + std::to_string(number) + ", " + trace[number - 1] + ", path " +
+                   std::to_string(static_cast<int>(path)));
       // Graphs are captured only once a load, so a backend that has run makes the same calls as the first time.
       fail(number, Failing::once, [&] { return load_and_run(*backend) == right; });
       ASSERT_TRUE(load_and_run(*backend) == right);
