@@ -46,7 +46,9 @@ std::vector<NamedBackend> all_backends() {
     choice.schedule = schedule;
     choice.seed = wanted_seed();
     choice.threads = 2;
-    tested.push_back({choice.name + variant, [choice] { return harness::make_backend(choice); }, fraction, most_size});
+    std::string name = choice.name + variant;
+    std::replace(name.begin(), name.end(), '-', '_');  // GoogleTest takes no others
+    tested.push_back({std::move(name), [choice] { return harness::make_backend(choice); }, fraction, most_size});
   };
   for (const harness::BackendDescriptor& backend : harness::backends()) {
     if (!backend.is_built() || (backend.needs_device() && harness::processor_of(backend).empty())) continue;
