@@ -79,7 +79,7 @@ template <gpu::Path>
 constexpr std::unique_ptr<Backend> (*make_gpu)(const BackendChoice&) = nullptr;
 #endif
 
-// Of the same kernels, started in another way than loads of that size are.
+// Of the same kernels, started in another way.
 constexpr BackendDescriptor gpu_path(std::string_view name, std::string_view summary, bool is_timed,
                                      std::unique_ptr<Backend> (*make)(const BackendChoice&)) {
   return {
@@ -154,10 +154,9 @@ constexpr std::array kBackends = {
         .timed_frames = 20,
         // It is busy with so many loads at once; more only take memory.
         .most_parallel_loads = 6,
-        .make = make_gpu<gpu::Path::automatic>,
+        .make = make_gpu<gpu::Path::graph>,
     },
     gpu_path("gpu-eager", "the same, kernel by kernel", false, make_gpu<gpu::Path::eager>),
-    gpu_path("gpu-graph", "the same, a graph of kernels whatever the size", true, make_gpu<gpu::Path::graph>),
     gpu_path("gpu-block", "the same, one kernel of one block", true, make_gpu<gpu::Path::one_block>),
     gpu_path("gpu-grid", "the same, one kernel that fills the device", true, make_gpu<gpu::Path::one_grid>),
 };

@@ -133,10 +133,7 @@ class GpuBackend final : public Backend {
  private:
   Path path_of_load() const {
     const bool in_one = options_.path == Path::one_block || options_.path == Path::one_grid;
-    if (options_.path != Path::automatic && !in_one) return options_.path;
-    if (!fits_span_kernel(device_.view(), load_.plan)) return Path::graph;
-    if (in_one) return options_.path;
-    return device_.view().particles <= kMostInOneBlock ? Path::one_block : Path::graph;
+    return in_one && !fits_span_kernel(device_.view(), load_.plan) ? Path::graph : options_.path;
   }
   void take(Load load) {
     CUTPROOF_CUDA(cudaStreamSynchronize(stream_.get()));
@@ -146,7 +143,6 @@ class GpuBackend final : public Backend {
     load_ = std::move(load);
     runs_ = 0;
   }
-  static constexpr int kMostInOneBlock = 1200;  // particles; with more the graph is faster (docs/results/README.md, Sizes)
   static constexpr std::size_t kInFlight = 4;
   std::size_t slot() const { return static_cast<std::size_t>(runs_ % kInFlight); }
   std::size_t last() const { return static_cast<std::size_t>((runs_ - 1) % kInFlight); }

@@ -1,7 +1,7 @@
 // A whole span as one kernel: the Launcher of launcher.h inside the device, on which frame.h writes down the same work
 // as on the others. A launch becomes a call, what separates launches a barrier of the grid, and a condition a branch.
-// A grid of one block needs no more than __syncthreads(), so small loads, whose launches take longer than their work,
-// run in a block.
+// A grid of one block needs no more than __syncthreads(), which is the fastest for small loads, whose launches take
+// longer than their work.
 //
 // Kernels see the blocks that they ask for: of blocks(), whose sums depend on their sizes, as parts of the real ones.
 // So every path gives the same bits.

@@ -11,7 +11,6 @@ namespace cutproof::gpu {
 
 // gpu: how the work of a span is started. All give the same bits.
 enum class Path {
-  automatic,  // one_block for small loads, graph for others
   graph,      // kernels and conditions as one CUDA graph
   eager,      // kernels one by one, waiting for each condition
   one_block,  // one kernel of one block; a load that does not fit takes the graph
@@ -21,7 +20,7 @@ enum class Path {
 struct KernelOptions {
   int rotation_method = kNewton;  // the fastest of those that fail on no hard case (accuracy.md, Rotations)
   SplitMethod split = SplitMethod::blocks;
-  Path path = Path::automatic;
+  Path path = Path::graph;
   Capacity capacity;  // at load; a backend doubles it when it must (for tests)
 };
 

@@ -393,7 +393,6 @@ TEST_F(DeviceFailures, TheSceneMakesTheBackendEnlarge) {
   EXPECT_FALSE(wants(2 * kLittle.factor));
   const auto memories = [](Capacity capacity) {
     KernelOptions with;
-    with.path = Path::graph;
     with.capacity = capacity;
     calls.start(0, Failing::once);
     static_cast<void>(load_and_run(*make_gpu_backend(with)));
