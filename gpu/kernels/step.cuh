@@ -111,16 +111,6 @@ struct Map {
 CUTPROOF_DEVICE inline Map load_map(const Float4* rows, int g) {
   return {{rows[3 * int64_t{g}], rows[3 * int64_t{g} + 1], rows[3 * int64_t{g} + 2]}};
 }
-CUTPROOF_DEVICE inline void store_map(Float4* rows, int g, const Map& map) {
-  for (int k = 0; k < 3; ++k) rows[3 * int64_t{g} + k] = map.row[k];
-}
-// Entry by entry.
-template <class Of>
-CUTPROOF_DEVICE inline Map map_of(Of of) {
-  Map map;
-  for (int k = 0; k < 3; ++k) map.row[k] = {of(k, 0), of(k, 1), of(k, 2), of(k, 3)};
-  return map;
-}
 CUTPROOF_DEVICE inline float entry(const Map& map, int row, int k) {
   const Float4 r = map.row[row];
   return k == 0 ? r.x : k == 1 ? r.y : k == 2 ? r.z : r.w;
