@@ -140,6 +140,7 @@ class BlockOnDevice : private Shape {
   }
 
   __device__ unsigned ballot(unsigned mask, bool value) { return __ballot_sync(mask, value); }
+  __device__ unsigned match(unsigned mask, int value) { return __match_any_sync(mask, value); }
   template <class T>
   __device__ T shuffle(unsigned mask, T value, int lane) {
     return by_words(value, [=](unsigned word) { return __shfl_sync(mask, word, lane); });
@@ -200,6 +201,13 @@ class BlockOnDevice : private Shape {
     }
   }
   __device__ void fence() { __threadfence(); }
+  __device__ void wait_for_earlier() {
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
+    // In this order: whoever begins then finds the work of all launches before this one done.
+    asm volatile("griddepcontrol.wait;" ::: "memory");
+    asm volatile("griddepcontrol.launch_dependents;" ::: "memory");
+#endif
+  }
 
  private:
   static constexpr unsigned kWarp = 0xffffffffu;

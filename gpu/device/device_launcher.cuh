@@ -60,10 +60,13 @@ Arguments<First, Rest...> bundle(const First& first, const Rest&... rest) {
 
 // Arguments stay in constant memory: nothing is copied to the stack for kernels that take addresses of them.
 template <class Kernel, class Arguments>
-__global__ void __launch_bounds__(max_threads<Kernel>()) run_kernel(const __grid_constant__ Arguments arguments) {
+__global__ void __launch_bounds__(max_threads<Kernel>(), min_blocks<Kernel>())
+    run_kernel(const __grid_constant__ Arguments arguments) {
   arguments.apply([](const auto&... args) {
     DeviceBlock block;
+    if constexpr (!reads_ahead<Kernel>()) block.wait_for_earlier();
     Kernel{}(block, args...);
+    if constexpr (reads_ahead<Kernel>()) block.wait_for_earlier();  // on every way through it
   });
 }
 
@@ -272,6 +275,7 @@ class DeviceLauncher {
   void sort_unique(unsigned long long* keys, int* count, std::int64_t capacity) {
     const int n = narrow(capacity, "sort_unique");
     if (n == 0) return;
+    after_launch_ = false;
     const std::size_t sorted_bytes = (static_cast<std::size_t>(n) * sizeof(unsigned long long) + 255) / 256 * 256;
     if (mode_ != Mode::measure) {
       const int grid = static_cast<int>(std::min<std::int64_t>((n + 255) / 256, 8 * resources_->multiprocessors));
@@ -295,6 +299,7 @@ class DeviceLauncher {
     }
   }
   void clear(void* data, std::size_t bytes) {
+    after_launch_ = false;
     if (bytes > 0 && mode_ != Mode::measure) CUTPROOF_CUDA(cudaMemsetAsync(data, 0, bytes, stream_));
   }
 
@@ -323,9 +328,31 @@ class DeviceLauncher {
                                                                       cudaOccupancyDefault),
                kernel_name<Kernel>(), __FILE__, __LINE__);
     const std::int64_t most = std::int64_t{std::max(side_by_side, 1)} * resources_->multiprocessors;
-    const auto grid = static_cast<unsigned>(std::clamp<std::int64_t>(wanted, 1, most));
-    kernel<<<grid, static_cast<unsigned>(threads), shared_bytes, stream_>>>(arguments);
-    check_cuda(cudaGetLastError(), kernel_name<Kernel>(), __FILE__, __LINE__);
+    cudaLaunchConfig_t config = {};
+    config.gridDim = static_cast<unsigned>(std::clamp<std::int64_t>(wanted, 1, most));
+    config.blockDim = static_cast<unsigned>(threads);
+    config.dynamicSmemBytes = shared_bytes;
+    config.stream = stream_;
+    // Begins while the last blocks of the launch before it work, where both know to wait (launcher.h).
+    cudaLaunchAttribute overlap = {};
+    overlap.id = cudaLaunchAttributeProgrammaticStreamSerialization;
+    overlap.val.programmaticStreamSerializationAllowed = 1;
+    config.attrs = &overlap;
+    const bool waits = waits_for_earlier<Kernel>(kernel);
+    config.numAttrs = mode_ == Mode::capture && waits && after_launch_ ? 1 : 0;
+    check_cuda(cudaLaunchKernelEx(&config, kernel, arguments), kernel_name<Kernel>(), __FILE__, __LINE__);
+    after_launch_ = waits;
+  }
+
+  // Code for devices before 9.0 knows no such waiting, wherever it runs.
+  template <class Kernel, class Function>
+  static bool waits_for_earlier(Function kernel) {
+    static const bool waits = [&] {
+      cudaFuncAttributes attributes = {};
+      check_cuda(cudaFuncGetAttributes(&attributes, kernel), kernel_name<Kernel>(), __FILE__, __LINE__);
+      return attributes.ptxVersion >= 90;
+    }();
+    return waits;
   }
 
   int read(const int* flag) {
@@ -339,6 +366,7 @@ class DeviceLauncher {
   // end.
   template <class Body>
   void conditional(const int* flag, cudaGraphConditionalNodeType type, Body& body) {
+    after_launch_ = false;
     if (mode_ == Mode::measure) {
       DeviceLauncher inside(mode_, nullptr, resources_, depth_ + 1);
       body(inside);
@@ -399,6 +427,7 @@ class DeviceLauncher {
   // Calls one of CUB's functions with the memory it asks for, behind `reserved` bytes that are the caller's.
   template <class Call>
   void with_temporary(const char* name, Call call, std::size_t reserved = 0) {
+    after_launch_ = false;
     std::size_t bytes = bytes_of(name, call);
     require(reserved + bytes);
     if (mode_ == Mode::measure) return;
@@ -419,6 +448,7 @@ class DeviceLauncher {
   cudaStream_t stream_;
   std::shared_ptr<detail::DeviceResources> resources_;
   std::size_t depth_ = 0;
+  bool after_launch_ = false;  // what was handed over last is a kernel that lets the next one begin
 };
 
 }  // namespace cutproof::gpu

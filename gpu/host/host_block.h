@@ -157,6 +157,7 @@ class HostBlock {
     std::atomic_thread_fence(std::memory_order_seq_cst);
 #endif
   }
+  void wait_for_earlier() {}  // launches follow one another
 
  private:
   static constexpr unsigned kEveryone = LiveBlock::kAll;

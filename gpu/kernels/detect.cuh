@@ -416,6 +416,7 @@ CUTPROOF_DEVICE void remove_particles_kernel(Block& block, DeviceView w) {
     if (flag == kStays) continue;
     if (flag == kWentBefore) {
       w.death[p] = kDeadBefore;
+      block.store(&w.debris_anywhere[body_index(w, p)], 1);  // beside it too
       continue;
     }
     const int b = body_index(w, p), code = removal_code(w, b);

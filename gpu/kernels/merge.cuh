@@ -22,6 +22,9 @@
 
 namespace cutproof::gpu {
 
+// Threads of a block that looks round a pair of clusters: a thousand particles, seven places each.
+inline constexpr int kMergeThreads = 512;
+
 // Scratch of merge in DeviceView::slot_scratch, by slot: where lists go when they are moved together.
 CUTPROOF_BOTH inline int* moved_begin(const DeviceView& w) { return w.slot_scratch; }
 // r + 1: in round r the cluster itself, or one that it touches, has changed. What it proposes stands until then.
@@ -256,7 +259,7 @@ CUTPROOF_DEVICE void propose_merges_kernel(Block& block, DeviceView w) {
     }
   }
 }
-CUTPROOF_KERNEL(propose_merges_kernel);
+CUTPROOF_KERNEL_THREADS(propose_merges_kernel, kMergeThreads);
 
 // --- Merging ---------------------------------------------------------------------------------------------------------
 
@@ -341,7 +344,7 @@ CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, DeviceView w) {
   c.round = c.merging_round + 1;
   c.changed = 0;
 }
-CUTPROOF_KERNEL(merge_pairs_kernel);
+CUTPROOF_KERNEL_THREADS(merge_pairs_kernel, kMergeThreads);
 
 // --- single_pass: the paper's strategy as printed, a baseline --------------------------------------------------------
 
@@ -358,7 +361,7 @@ CUTPROOF_DEVICE void propose_once_kernel(Block& block, DeviceView w) {
     block.atomic_cas(&w.best[t], -1, s);
   }
 }
-CUTPROOF_KERNEL(propose_once_kernel);
+CUTPROOF_KERNEL_THREADS(propose_once_kernel, kMergeThreads);
 
 CUTPROOF_DEVICE inline bool owns_target(const DeviceView& w, int s) {
   return w.proposal[s] >= 0 && w.best[w.proposal[s]] == s;
@@ -418,7 +421,7 @@ CUTPROOF_DEVICE void merge_chains_kernel(Block& block, DeviceView w) {
     block.store(&rest_marks(w)[end], 1);
   }
 }
-CUTPROOF_KERNEL(merge_chains_kernel);
+CUTPROOF_KERNEL_THREADS(merge_chains_kernel, kMergeThreads);
 
 // --- Beginning and end -----------------------------------------------------------------------------------------------
 
@@ -509,7 +512,7 @@ CUTPROOF_ENQUEUE void enqueue_move_together(Launcher& launcher, const DeviceView
 }
 
 // The work that follows a cut is small, so grids are kept small too: blocks take several clusters if there are many.
-inline constexpr int kMergeBlocks = 2048, kMergeThreads = 128;
+inline constexpr int kMergeBlocks = 2048;
 
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, const Plan& plan) {

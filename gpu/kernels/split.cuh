@@ -26,7 +26,8 @@ inline constexpr int kMostInBlock = 4096;
 
 namespace split_detail {
 
-inline constexpr int kRegroupThreads = 128;
+// Blocks as large as most clusters: one waits for memory as long for all of its particles as for one.
+inline constexpr int kLabelThreads = 512, kRegroupThreads = 512;
 // How many blocks share the pairs of one cluster in global_labels.
 inline constexpr int kPairsPerBlock = 1024;
 inline constexpr int kMostShares = 64;
@@ -60,21 +61,63 @@ CUTPROOF_DEVICE int place_of_lower(const Members& members, int k, int neighbour,
 
 // ---- debris
 
-// Bodies whose small components are to be taken out now.
+// Bodies whose small components are to be taken out now. Once that has been done, a component can only become too small
+// where particles die: then it is looked for from there, unless it may have too many particles for that.
+inline constexpr int kMostSearched = 32;
 CUTPROOF_DEVICE inline bool drops_debris(const DeviceView& w, int b) { return w.body[b].debris > 0 && cut_now(w, b); }
+CUTPROOF_DEVICE inline bool labels_tissue(const DeviceView& w, int b) {
+  return drops_debris(w, b) && (w.debris_anywhere[b] != 0 || w.body[b].debris > kMostSearched);
+}
 
 // DeviceView::particle_scratch: the parents of the particles, then the sizes of their components.
 CUTPROOF_BOTH inline int* component_size(const DeviceView& w) { return w.particle_scratch + w.particles; }
 
+// Lists p, which is debris.
+template <class Block>
+CUTPROOF_DEVICE void add_debris(Block& block, const DeviceView& w, int p) {
+  w.fallen[w.counters->fallen + block.atomic_add(&w.counters->debris, 1)] = p;
+}
+
 }  // namespace split_detail
+
+// Clears what list_fallen counts. One thread.
+template <class Block>
+CUTPROOF_DEVICE void begin_split_kernel(Block& block, DeviceView w) {
+  if (block.first() != 0) return;
+  Counters& c = *w.counters;
+  c.debris = 0;
+  c.fallen = 0;
+  c.failed = 0;
+  c.scratch[split_detail::kTooLarge] = 0;
+  c.whole_tissue = 0;
+  for (int b = 0; b < w.bodies; ++b) {
+    if (split_detail::labels_tissue(w, b)) c.whole_tissue = 1;
+  }
+}
+CUTPROOF_KERNEL(begin_split_kernel);
+
+// The dead of this frame, and all others that clusters still hold. What a split earlier in this frame has taken out
+// leaves the list of debris, which this one replaces.
+template <class Block>
+CUTPROOF_DEVICE void list_fallen_kernel(Block& block, DeviceView w) {
+  using namespace split_detail;
+  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
+    const int p = static_cast<int>(i);
+    if (alive(w, p)) continue;
+    const int b = body_index(w, p);
+    if (!cut_now(w, b)) continue;
+    if (drops_debris(w, b) && w.death[p] == w.cut[b] + 1) w.death[p] = kDeadBefore;
+    if (w.death[p] == w.cut[b] || w.membership_count[p] > 0) w.fallen[block.atomic_add(&w.counters->fallen, 1)] = p;
+  }
+}
+CUTPROOF_KERNEL(list_fallen_kernel);
 
 template <class Block>
 CUTPROOF_DEVICE void link_tissue_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
-  if (block.first() == 0) w.counters->debris = 0;
   for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
     const int p = static_cast<int>(i), b = body_index(w, p);
-    if (!drops_debris(w, b)) continue;
+    if (!labels_tissue(w, b)) continue;
     int parent = p;
     for (int d = 0; d < 3 && parent == p && alive(w, p); ++d) {
       const int q = neighbour(w, w.body[b], p, lower_direction(d));
@@ -92,7 +135,7 @@ CUTPROOF_DEVICE void hook_tissue_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
   for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
     const int p = static_cast<int>(i), b = body_index(w, p);
-    if (!drops_debris(w, b) || !alive(w, p)) continue;
+    if (!labels_tissue(w, b) || !alive(w, p)) continue;
     for (int d = 1; d < 3; ++d) {
       const int q = neighbour(w, w.body[b], p, lower_direction(d));
       if (q >= 0 && alive(w, q)) unite(block, w.particle_scratch, p, q);
@@ -101,18 +144,13 @@ CUTPROOF_DEVICE void hook_tissue_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(hook_tissue_kernel);
 
-// Sizes are counted up to where they no longer matter. What a split earlier in this frame has taken out leaves the list
-// of debris, which this one replaces.
+// Sizes are counted up to where they no longer matter.
 template <class Block>
 CUTPROOF_DEVICE void measure_tissue_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
   for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
     const int p = static_cast<int>(i), b = body_index(w, p);
-    if (!drops_debris(w, b)) continue;
-    if (!alive(w, p)) {
-      if (w.death[p] == w.cut[b] + 1) w.death[p] = kDeadBefore;
-      continue;
-    }
+    if (!labels_tissue(w, b) || !alive(w, p)) continue;
     const int root = final_root(block, w.particle_scratch, p);
     block.store(&w.particle_scratch[p], root);
     int* const size = &component_size(w)[root];
@@ -124,26 +162,60 @@ CUTPROOF_KERNEL(measure_tissue_kernel);
 template <class Block>
 CUTPROOF_DEVICE void remove_debris_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
-  int removed = 0;
   for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
     const int p = static_cast<int>(i), b = body_index(w, p);
-    if (!drops_debris(w, b) || !alive(w, p)) continue;
+    if (!labels_tissue(w, b) || !alive(w, p)) continue;
     if (component_size(w)[w.particle_scratch[p]] >= w.body[b].debris) continue;
     w.death[p] = w.cut[b] + 1;
-    ++removed;
+    add_debris(block, w, p);
   }
-  if (removed > 0) block.atomic_add(&w.counters->debris, removed);
 }
 CUTPROOF_KERNEL(remove_debris_kernel);
+
+// The component of each living neighbour of a fallen particle, as far as it matters. Several threads may come upon the
+// same: what another one takes out meanwhile still counts as tissue.
+template <class Block>
+CUTPROOF_DEVICE void search_debris_kernel(Block& block, DeviceView w) {
+  using namespace split_detail;
+  for (int64_t i = block.first(); i < int64_t{6} * w.counters->fallen; i += block.stride()) {
+    const int p = w.fallen[i / 6], b = body_index(w, p);
+    if (!drops_debris(w, b) || labels_tissue(w, b)) continue;
+    const BodyConstants& body = w.body[b];
+    const int debris = w.cut[b] + 1;
+    const auto is_tissue = [&](int q) {
+      if (q < 0) return false;
+      const int death = block.load(&w.death[q]);
+      return death < 0 || death == debris;
+    };
+    const int start = neighbour(w, body, p, static_cast<int>(i % 6));
+    if (!is_tissue(start)) continue;
+    int found[kMostSearched], count = 1;
+    found[0] = start;
+    for (int k = 0; k < count && count < body.debris; ++k) {
+      for (int d = 0; d < 6 && count < body.debris; ++d) {
+        const int q = neighbour(w, body, found[k], d);
+        bool known = !is_tissue(q);
+        for (int j = 0; j < count && !known; ++j) known = found[j] == q;
+        if (!known) found[count++] = q;
+      }
+    }
+    if (count >= body.debris) continue;
+    for (int k = 0; k < count; ++k) {
+      if (block.atomic_cas(&w.death[found[k]], -1, debris) == -1) add_debris(block, w, found[k]);
+    }
+  }
+}
+CUTPROOF_KERNEL(search_debris_kernel);
 
 // The slots that are left are too few for the stage.
 template <class Block>
 CUTPROOF_DEVICE void put_debris_back_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
-  if (block.first() == 0) w.counters->debris = 0;
-  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
-    const int p = static_cast<int>(i), b = body_index(w, p);
-    if (drops_debris(w, b) && w.death[p] == w.cut[b] + 1) w.death[p] = -1;
+  const Counters& c = *w.counters;
+  for (int64_t k = block.first(); k < c.debris; k += block.stride()) {
+    const int p = w.fallen[c.fallen + k];
+    w.death[p] = -1;
+    block.store(&w.debris_anywhere[body_index(w, p)], 1);
   }
 }
 CUTPROOF_KERNEL(put_debris_back_kernel);
@@ -154,9 +226,8 @@ CUTPROOF_KERNEL(put_debris_back_kernel);
 template <class Block>
 CUTPROOF_DEVICE void mark_affected_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
-  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
-    const int p = static_cast<int>(i);
-    if (alive(w, p) || w.membership_count[p] == 0 || !cut_now(w, body_index(w, p))) continue;
+  for (int64_t i = block.first(); i < w.counters->fallen + w.counters->debris; i += block.stride()) {
+    const int p = w.fallen[i];
     for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
       if (w.memberships[k] >= 0) block.store(&by_slot(w)[w.memberships[k]], 1);
     }
@@ -167,9 +238,8 @@ CUTPROOF_KERNEL(mark_affected_kernel);
 template <class Block>
 CUTPROOF_DEVICE void flag_affected_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
-  if (block.first() == 0) {
-    w.counters->failed = 0;
-    w.counters->scratch[kTooLarge] = 0;
+  for (int64_t b = block.first(); b < w.bodies; b += block.stride()) {
+    if (drops_debris(w, static_cast<int>(b))) w.debris_anywhere[b] = 0;
   }
   for (int64_t s = block.first(); s < w.slot_capacity; s += block.stride()) {
     w.slot_flag[s] = by_slot(w)[s] != 0;
@@ -201,13 +271,16 @@ CUTPROOF_DEVICE void label_in_blocks_kernel(Block& block, DeviceView w, int most
     block.sync();
     for (int k = block.thread(); k < size; k += block.size()) {
       if (peek<Memory::shared>(block, &parent[k]) < 0) continue;
+      bool first = true;
       for (int d = 0; d < 3; ++d) {
         const int q = neighbour(w, body, members[k], lower_direction(d));
         if (q < 0) continue;
         const int place = place_of_lower(members, k, q, lower_direction(d));
-        if (place >= 0 && peek<Memory::shared>(block, &parent[place]) >= 0) {
-          unite<Memory::shared>(block, parent, k, place);
-        }
+        if (place < 0 || peek<Memory::shared>(block, &parent[place]) < 0) continue;
+        // The first needs no search for roots, unless somebody has hooked k before.
+        const bool hooked = first && block.atomic_cas(&parent[k], k, place) == k;
+        if (!hooked) unite<Memory::shared>(block, parent, k, place);
+        first = false;
       }
     }
     block.sync();
@@ -223,7 +296,7 @@ CUTPROOF_DEVICE void label_in_blocks_kernel(Block& block, DeviceView w, int most
     block.sync();
   }
 }
-CUTPROOF_KERNEL(label_in_blocks_kernel);
+CUTPROOF_KERNEL_THREADS(label_in_blocks_kernel, split_detail::kLabelThreads);
 
 // The pairs of each affected cluster with more than `most` members, shared out among `shares` blocks: calls
 // visit(slot, members, k) for k in [0, slot_size).
@@ -450,7 +523,7 @@ CUTPROOF_DEVICE void regroup_members_kernel(Block& block, DeviceView w) {
     block.sync();
   }
 }
-CUTPROOF_KERNEL(regroup_members_kernel);
+CUTPROOF_KERNEL_THREADS(regroup_members_kernel, split_detail::kRegroupThreads);
 
 // Of what is left of affected clusters, and of the new ones; their slots count as given out from now on.
 template <class Block>
@@ -470,13 +543,18 @@ CUTPROOF_KERNEL(rest_frames_of_components_kernel);
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_split(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   using namespace split_detail;
-  if (plan.debris) {
-    launcher.items(link_tissue_kernel_object{}, w.particles, w);
-    launcher.items(hook_tissue_kernel_object{}, w.particles, w);
-    launcher.items(measure_tissue_kernel_object{}, w.particles, w);
-    launcher.items(remove_debris_kernel_object{}, w.particles, w);
-  }
   Counters* const counters = w.counters;
+  launcher.items(begin_split_kernel_object{}, 1, w);
+  launcher.items(list_fallen_kernel_object{}, w.particles, w);
+  if (plan.debris) {
+    launcher.if_nonzero(&counters->whole_tissue, [&](Launcher& whole) {
+      whole.items(link_tissue_kernel_object{}, w.particles, w);
+      whole.items(hook_tissue_kernel_object{}, w.particles, w);
+      whole.items(measure_tissue_kernel_object{}, w.particles, w);
+      whole.items(remove_debris_kernel_object{}, w.particles, w);
+    });
+    launcher.items(search_debris_kernel_object{}, w.particles, w);
+  }
   launcher.clear(by_slot(w), sizeof(int) * static_cast<std::size_t>(w.slot_capacity));
   launcher.items(mark_affected_kernel_object{}, w.particles, w);
   launcher.items(flag_affected_kernel_object{}, w.slot_capacity, w);
@@ -494,8 +572,7 @@ CUTPROOF_ENQUEUE void enqueue_split(Launcher& launcher, const DeviceView& w, con
     inner.blocks(flatten_pairs_kernel_object{}, w.slot_capacity, 128, 0, w, most);
   };
   if (in_blocks) {
-    const int threads = most <= 1024 ? 128 : 256;
-    launcher.blocks(label_in_blocks_kernel_object{}, w.slot_capacity, threads,
+    launcher.blocks(label_in_blocks_kernel_object{}, w.slot_capacity, kLabelThreads,
                     2 * sizeof(int) * static_cast<std::size_t>(most), w, most);
     if (plan.expand || largest > most) launcher.if_nonzero(&counters->scratch[kTooLarge], label_large);
   } else {
@@ -507,8 +584,10 @@ CUTPROOF_ENQUEUE void enqueue_split(Launcher& launcher, const DeviceView& w, con
   launcher.blocks(regroup_members_kernel_object{}, w.slot_capacity, kRegroupThreads, sizeof(int) * kRegroupThreads, w);
   launcher.blocks(rest_frames_of_components_kernel_object{}, 2 * int64_t{w.slot_capacity}, kRestThreads, 0, w);
   if (plan.debris) {
-    launcher.if_nonzero(&counters->failed,
-                        [&](Launcher& inner) { inner.items(put_debris_back_kernel_object{}, w.particles, w); });
+    launcher.if_nonzero(&counters->failed, [&](Launcher& inner) {
+      inner.items(put_debris_back_kernel_object{}, w.particles, w);
+      inner.clear(&counters->debris, sizeof(int));
+    });
   }
 }
 

@@ -151,7 +151,7 @@ CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) { return {g, w
 // over all of them and while it is resolved.
 inline constexpr int kRowTeam = 4, kParticleTeam = 16, kResolvedTeam = 32;
 
-// Sums by axis of e (3) and of e rᵀ / h (9), weighted; in this order.
+// Weighted sums in the order of arrays.inc: 4 axis + k: of e rᵀ / h; 4 axis + 3: of e.
 template <class AnyTeam>
 using GroupSums = typename AnyTeam::template Sums<12>;
 
@@ -170,18 +170,18 @@ class Rows {
 };
 
 CUTPROOF_DEVICE inline void add_moments(float* sums, float weight, Float3 e, Float3 e_per_h, Float3 r) {
-  for (int k = 0; k < 3; ++k) {
-    const float mass_e = weight * e[k], mass_e_per_h = weight * e_per_h[k];
-    sums[k] += mass_e;
-    sums[3 + 3 * k] += mass_e_per_h * r.x;
-    sums[4 + 3 * k] += mass_e_per_h * r.y;
-    sums[5 + 3 * k] += mass_e_per_h * r.z;
+  for (int axis = 0; axis < 3; ++axis) {
+    const float mass_e_per_h = weight * e_per_h[axis];
+    sums[4 * axis] += mass_e_per_h * r.x;
+    sums[4 * axis + 1] += mass_e_per_h * r.y;
+    sums[4 * axis + 2] += mass_e_per_h * r.z;
+    sums[4 * axis + 3] += weight * e[axis];
   }
 }
-CUTPROOF_DEVICE inline void store_moments(Float4* rows, int g, const Floats<12>& sums) {
-  for (int k = 0; k < 3; ++k) {
-    rows[3 * int64_t{g} + k] = {sums.v[3 + 3 * k], sums.v[4 + 3 * k], sums.v[5 + 3 * k], sums.v[k]};
-  }
+// Sum n of group g.
+CUTPROOF_DEVICE inline void store_moment(Float4* rows, int g, int n, float sum) {
+  Float4& row = rows[3 * int64_t{g} + n / 4];
+  (n % 4 == 0 ? row.x : n % 4 == 1 ? row.y : n % 4 == 2 ? row.z : row.w) = sum;
 }
 
 // All points of a group that are at d~ + M(r) - l e; kept: 1 - l.
@@ -327,12 +327,22 @@ CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>&
 
   // Small numbers are summed: displacements less that of the particle in the middle. Only the lane that has it reads
   // it, for it is that lane's to overwrite.
-  Float3 base;
-  if (team.has(head.middle)) {
+  struct Begun {
+    Float4 d;
+    Float3 predicted;
+  };
+  const auto begin = [&](int k) {
+    Begun begun;
     Float3 v;
-    const Float4 d = where(head.middle, v);
-    base = predict(body, now.dt, xyz(d), v);
-  }
+    begun.d = where(k, v);
+    begun.predicted = predict(body, now.dt, xyz(begun.d), v);
+    return begun;
+  };
+  const int first = team.lane();
+  Begun of_first = {};  // the first of this lane's particles: nearly always the only one
+  if (first < head.size) of_first = begin(first);
+  Float3 base = of_first.predicted;
+  if (head.middle >= team.kLanes && team.has(head.middle)) base = begin(head.middle).predicted;
   base = team.from(head.middle, base);
   const float holders = static_cast<float>(head.holder_count), per_h = 1.0f / body.h;
   const Contacts contacts = kContacts ? contacts_of(w, body, now.frame, substep) : Contacts{};
@@ -340,9 +350,9 @@ CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>&
   [[maybe_unused]] bool before = false, behind = false;  // the blade, when the substep begins
   GroupSums<Team<Block, kParticleTeam>> sums;
   team.each(head.size, [&](int k) {
-    Float3 v;
-    const Float4 d = where(k, v);
-    const Float3 predicted = predict(body, now.dt, xyz(d), v);
+    const Begun begun = k == first ? of_first : begin(k);
+    const Float4 d = begun.d;
+    const Float3 predicted = begun.predicted;
     const int o = head.begin + k;
     float side = 1.0f;
     if constexpr (kContacts) {
@@ -356,11 +366,11 @@ CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>&
     reach = fmaxf(reach, dot(e, e));
     add_moments(sums.of(k), d.w / holders, e, per_h * e, group.rest(w, body, k));
   });
-  Floats<12> total = team.total(sums);
+  auto total = team.parted(sums);
   // Where that one is far off the others they are better measured from their mean. (Not always: what moves as a whole
   // must have moments that vanish.)
   const float shared = 1.0f / w.group_mass[g].w;
-  const Float3 off = {shared * total.v[0], shared * total.v[1], shared * total.v[2]};
+  const Float3 off = {shared * total.get(team, 3), shared * total.get(team, 7), shared * total.get(team, 11)};
   if (dot(off, off) > kFarBase * kFarBase * body.h * body.h) {
     base = base + off;
     reach = 0;
@@ -371,13 +381,11 @@ CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>&
       reach = fmaxf(reach, dot(e, e));
       add_moments(sums.of(k), w.start[o].w / holders, e, per_h * e, group.rest(w, body, k));
     });
-    total = team.total(sums);
+    total = team.parted(sums);
   }
   const Float4 base_and_reach = with_w(base, sqrtf(team.greatest(reach)) * (1.0f + 0x1p-20f));
-  if (team.leads()) {
-    w.group_base[g] = base_and_reach;
-    store_moments(w.group_predicted, g, total);
-  }
+  if (team.leads()) w.group_base[g] = base_and_reach;
+  total.each(team, [&](int n, float sum) { store_moment(w.group_predicted, g, n, sum); });
   if constexpr (kContacts) {
     before = team.any(before);
     behind = team.any(behind);
@@ -392,7 +400,7 @@ CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>&
         const Float3 e = enter_substep(w, contacts, rest, o, w.predicted[o], xyz(start), 0.0f) - base;
         add_moments(sums.of(k), start.w / holders, e, per_h * e, group.rest(w, body, k));
       });
-      total = team.total(sums);
+      total = team.parted(sums);
     }
     if (team.leads()) {
       w.group_side[g] = side;
@@ -400,7 +408,7 @@ CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>&
     }
     if (resolve) list_resolved(block, team, w, g, substep);
   }
-  if (team.leads()) store_moments(w.group_moments, g, total);
+  total.each(team, [&](int n, float sum) { store_moment(w.group_moments, g, n, sum); });
 }
 
 template <bool kContacts>
@@ -518,10 +526,10 @@ CUTPROOF_KERNEL(hold_particles_kernel);
 
 namespace step_detail {
 
-inline constexpr int kClusterTeam = 32;  // lanes that share a cluster
+inline constexpr int kClusterTeam = 16;  // lanes that share a cluster
 inline constexpr int kMatchThreads = 128;
 inline constexpr int kTeams = kMatchThreads / kClusterTeam;  // of a block on the device
-// What a cluster's place follows from: sums about `base`, as add_moments orders them.
+// What a cluster's place follows from: sums about `base`, in the order of GroupSums.
 struct ClusterSums {
   Floats<12> moments;
   Float3 base;
@@ -529,49 +537,58 @@ struct ClusterSums {
 inline constexpr std::size_t kMatchShared = kTeams * sizeof(ClusterSums);
 
 template <class Block>
-CUTPROOF_DEVICE ClusterSums sum_cluster(const Team<Block, kClusterTeam>& team, const DeviceView& w, int s) {
+CUTPROOF_DEVICE void sum_cluster(const Team<Block, kClusterTeam>& team, const DeviceView& w, int s,
+                                 const ClusterHead& head, Offset first, ClusterSums& found) {
   const BodyConstants& body = w.body[body_of_slot(w, s)];
   const float h = body.h, per_h = 1.0f / h;
-  const ClusterHead head = w.cluster_head[s];
-  const int groups_begin = head.group_begin, groups = head.group_count;
+  const Offset* const groups = w.cluster_groups + head.group_begin;
   const int* const loose = w.cluster_loose + head.loose_begin;
-  const int loose_count = head.loose_count;
-  ClusterSums found;
-  found.base = groups > 0 ? xyz(w.group_base[w.cluster_groups[groups_begin].index]) : xyz(w.position[loose[0]]);
+  const Float3 base = head.group_count > 0 ? xyz(w.group_base[team.from(0, first.index)]) : xyz(w.position[loose[0]]);
   typename Team<Block, kClusterTeam>::template Sums<12> sums;
-  team.each(groups, [&](int k) {
-    const Offset to = w.cluster_groups[groups_begin + k];
+  team.each(head.group_count, [&](int k) {
+    const Offset to = k == team.lane() ? first : groups[k];
     const Float4 mass = w.group_mass[to.index];
-    const Float3 apart = xyz(w.group_base[to.index]) - found.base;
+    const Float3 apart = xyz(w.group_base[to.index]) - base;
     float* const sum = sums.of(k);
     for (int axis = 0; axis < 3; ++axis) {
       const Float4 own = w.group_moments[3 * int64_t{to.index} + axis];
       const float moved = own.w + mass.w * apart[axis];
       const float shift = per_h * apart[axis], lever = per_h * moved;
-      sum[axis] += moved;
-      sum[3 + 3 * axis] += own.x + (shift * mass.x + lever * to.x);
-      sum[4 + 3 * axis] += own.y + (shift * mass.y + lever * to.y);
-      sum[5 + 3 * axis] += own.z + (shift * mass.z + lever * to.z);
+      sum[4 * axis] += own.x + (shift * mass.x + lever * to.x);
+      sum[4 * axis + 1] += own.y + (shift * mass.y + lever * to.y);
+      sum[4 * axis + 2] += own.z + (shift * mass.z + lever * to.z);
+      sum[4 * axis + 3] += moved;
     }
   });
-  team.each(loose_count, [&](int k) {
+  team.each(head.loose_count, [&](int k) {
     const int o = loose[k];
     const Float4 now = w.position[o];
-    const Float3 e = xyz(now) - found.base;
+    const Float3 e = xyz(now) - base;
     add_moments(sums.of(k), now.w, e, per_h * e, nodes_from_rest_center(w, coordinates(body, w.place_node[o]), s));
   });
-  found.moments = team.total(sums);
-  return found;
+  team.parted(sums).each(team, [&](int n, float sum) { found.moments.v[n] = sum; });
+  if (team.leads()) found.base = base;
+}
+
+// What else it follows from.
+struct ClusterRest {
+  Float4 row[3];  // DeviceView::cluster_rest
+  Matrix3 rotation;
+  int size;
+};
+CUTPROOF_DEVICE inline ClusterRest rest_of_cluster(const DeviceView& w, int s) {
+  const Float4* const row = w.cluster_rest + 3 * int64_t{s};
+  return {{row[0], row[1], row[2]}, w.rotation[s], w.slot_size[s]};
 }
 
 // Centre and rotation of a cluster from its sums.
 template <int Method>
-CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const ClusterSums& sums) {
+CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const ClusterRest& rest,
+                                          const ClusterSums& sums) {
   const float h = w.body[body_of_slot(w, s)].h;
   const float* const moment = sums.moments.v;
-  const Float4 first = w.cluster_rest[3 * int64_t{s}], second = w.cluster_rest[3 * int64_t{s} + 1],
-               third = w.cluster_rest[3 * int64_t{s} + 2];
-  const Float3 rest = xyz(first), moved = {moment[0], moment[1], moment[2]};
+  const Float4 first = rest.row[0], second = rest.row[1], third = rest.row[2];
+  const Float3 rest_moment = xyz(first), moved = {moment[3], moment[7], moment[11]};
   const float mass = first.w;
   const float spread[9] = {second.x, second.y, second.z, second.y, second.w, third.x, second.z, third.x, third.y};
   // A = Σ w (x - t)(X - T)ᵀ / h². The rest moment is zero but for the rounding of T.
@@ -579,17 +596,17 @@ CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const Clus
   Matrix3 a;
   for (int row = 0; row < 3; ++row) {
     for (int k = 0; k < 3; ++k) {
-      a(row, k) = spread[3 * row + k] + (moment[3 + 3 * row + k] - shift[row] * rest[k]);
+      a(row, k) = spread[3 * row + k] + (moment[4 * row + k] - shift[row] * rest_moment[k]);
     }
   }
   // One particle has no extent: what is left of A is rounding, and rotate() would make a rotation of it.
-  Rotation best{w.rotation[s], true};
-  if (w.slot_size[s] > 1) best = rotate<Method>(a, w.rotation[s]);
+  Rotation best{rest.rotation, true};
+  if (rest.size > 1) best = rotate<Method>(a, rest.rotation);
   w.rotation[s] = best.r;
   w.degenerate[s] = best.degenerate;
   // Such that Σ w (goal) = Σ w x to the rounding of these two sums (docs/design/decisions.md, Momentum and the rounding
   // of sums): the rounded T must not push the cluster.
-  const Float3 turned = best.r * rest - rest;
+  const Float3 turned = best.r * rest_moment - rest_moment;
   const Float3 center = sums.base + (1.0f / mass) * (moved - h * turned);
   for (int axis = 0; axis < 3; ++axis) {
     const auto entry = [&](int k) { return best.r(axis, k) - (k == axis ? 1.0f : 0.0f); };
@@ -605,28 +622,35 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
   using namespace step_detail;
   const Team<Block, kClusterTeam> team(block);
   const int slots = w.counters->slots_used;
-  if (block.first() == 0) {
-    w.counters->resolved = *listed_in(w, substep);
-    *listed_in(w, substep + 1) = 0;
-  }
   const auto wanted = [&](int64_t s) {
     if (s >= slots) return false;
     const ClusterHead head = w.cluster_head[s];
     return head.group_count + head.loose_count > 0 &&
            takes_part(w, body_of_slot(w, static_cast<int>(s)), substep, iteration);
   };
+  const auto first_of = [&](const ClusterHead& head) {
+    return team.lane() < head.group_count ? w.cluster_groups[head.group_begin + team.lane()] : Offset{};
+  };
+  // What does not change in a substep is read ahead.
   if constexpr (Block::on_device) {
     ClusterSums* const all = block.template shared<ClusterSums>(kTeams);
     const int mine = block.thread() / kClusterTeam;
     for (int64_t begin = static_cast<int64_t>(block.index()) * kTeams; begin < slots;
          begin += static_cast<int64_t>(block.count()) * kTeams) {
-      if (wanted(begin + mine)) {
-        const ClusterSums sums = sum_cluster(team, w, static_cast<int>(begin) + mine);
-        if (team.leads()) all[mine] = sums;
+      const bool sums = wanted(begin + mine), places = block.thread() < kTeams && wanted(begin + block.thread());
+      ClusterHead head = {};
+      Offset first = {};
+      if (sums) {
+        head = w.cluster_head[begin + mine];
+        first = first_of(head);
       }
+      ClusterRest rest;
+      if (places) rest = rest_of_cluster(w, static_cast<int>(begin) + block.thread());
+      block.wait_for_earlier();
+      if (sums) sum_cluster(team, w, static_cast<int>(begin) + mine, head, first, all[mine]);
       block.sync();
-      if (block.thread() < kTeams && wanted(begin + block.thread())) {
-        place_cluster<Method>(w, static_cast<int>(begin) + block.thread(), all[block.thread()]);
+      if (places) {
+        place_cluster<Method>(w, static_cast<int>(begin) + block.thread(), rest, all[block.thread()]);
       }
       block.sync();
     }
@@ -634,14 +658,22 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
     for (int64_t i = team.first(); i < slots; i += team.stride()) {
       if (!wanted(i)) continue;
       const int s = static_cast<int>(i);
-      place_cluster<Method>(w, s, sum_cluster(team, w, s));
+      ClusterSums sums;
+      sum_cluster(team, w, s, w.cluster_head[s], first_of(w.cluster_head[s]), sums);
+      place_cluster<Method>(w, s, rest_of_cluster(w, s), sums);
     }
+  }
+  block.wait_for_earlier();
+  if (block.first() == 0) {
+    w.counters->resolved = *listed_in(w, substep);
+    *listed_in(w, substep + 1) = 0;
   }
 }
 
 template <int Method>
 struct match_shapes_kernel_object {
   static constexpr const char* kName = "match_shapes_kernel";
+  static constexpr bool kReadsAhead = true;
   static constexpr int kMaxThreads = step_detail::kMatchThreads;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, int iteration) const {
@@ -718,24 +750,36 @@ CUTPROOF_DEVICE inline Float3 advance_particle(const DeviceView& w, const BodyCo
   return next;
 }
 
+// The first of a group's holders, which do not change in a substep.
+inline constexpr int kAtOnce = 4;
+struct FirstHolders {
+  Offset to[kAtOnce];
+};
+CUTPROOF_DEVICE inline FirstHolders holders_from(const DeviceView& w, const GroupHead& head, int begin) {
+  FirstHolders holders;
+  for (int k = 0; k < kAtOnce; ++k) {
+    holders.to[k] = w.holders[head.holder_begin + begin + (begin + k < head.holder_count ? k : 0)];
+  }
+  return holders;
+}
+
 // What the holders of a group want of it, their mean goal, along one axis: base + goal(r).
-CUTPROOF_DEVICE inline Float4 mean_goal(const DeviceView& w, const GroupHead& head, float h, Float4 base, int axis) {
+CUTPROOF_DEVICE inline Float4 mean_goal(const DeviceView& w, const GroupHead& head, const FirstHolders& first, float h,
+                                        Float4 base, int axis) {
   const float from = xyz(base)[axis];
   Float4 sum;
   // Several at once: one by one, each would wait for the one before.
-  constexpr int kAtOnce = 4;
   for (int begin = 0; begin < head.holder_count; begin += kAtOnce) {
-    const int count = head.holder_count - begin < kAtOnce ? head.holder_count - begin : kAtOnce;
-    Offset to[kAtOnce];
+    const FirstHolders some = begin == 0 ? first : holders_from(w, head, begin);
     Float4 row[kAtOnce];
-    for (int k = 0; k < kAtOnce; ++k) to[k] = w.holders[head.holder_begin + begin + (k < count ? k : 0)];
-    for (int k = 0; k < kAtOnce; ++k) row[k] = w.placement[3 * int64_t{to[k].index} + axis];
+    for (int k = 0; k < kAtOnce; ++k) row[k] = w.placement[3 * int64_t{some.to[k].index} + axis];
     for (int k = 0; k < kAtOnce; ++k) {
-      if (k >= count) break;
+      if (begin + k >= head.holder_count) break;
+      const Offset to = some.to[k];
       sum.x += row[k].x;
       sum.y += row[k].y;
       sum.z += row[k].z;
-      sum.w += (row[k].w - from) + h * (row[k].x * to[k].x + row[k].y * to[k].y + row[k].z * to[k].z);
+      sum.w += (row[k].w - from) + h * (row[k].x * to.x + row[k].y * to.y + row[k].z * to.z);
     }
   }
   const float mean = 1.0f / static_cast<float>(head.holder_count), turn = h * mean;
@@ -748,14 +792,51 @@ CUTPROOF_DEVICE Float4 row_of(Of of, Float4 a, Float4 b) {
   return {of(a.x, b.x), of(a.y, b.y), of(a.z, b.z), of(a.w, b.w)};
 }
 
-// One iteration of the particles of a resolved group.
-template <bool kContacts, bool kAccelerated, class AnyTeam>
-CUTPROOF_DEVICE void advance_particles(const AnyTeam& team, const DeviceView& w, const Group& group,
-                                       const BodyConstants& body, const Contacts& contacts, const Iteration& now,
-                                       Float3 base, const Map& goal) {
+// A group that has been carried so far is resolved from here on: where its particles are, and, accelerated, were one
+// iteration ago. Nothing has touched them.
+template <bool kAccelerated, class Block>
+CUTPROOF_DEVICE void resolve(Block& block, const Team<Block, kResolvedTeam>& team, const DeviceView& w,
+                             const Group& group, const BodyConstants& body, const Iteration& now, Float3 base,
+                             int substep, int iteration) {
+  const int g = group.index;
+  Map is = {}, was = {};
+  if (iteration > 0) is = load_map(w.group_map, g);
+  if constexpr (kAccelerated) was = iteration > 1 && now.combined ? load_map(w.group_earlier_map, g) : is;
+  const float lost = lost_fraction(body, now.s, iteration);
+  [[maybe_unused]] const float lost_earlier = lost_fraction(body, now.s, iteration > 0 ? iteration - 1 : 0);
+  team.each(group.head.size, [&](int k) {
+    const int o = group.head.begin + k;
+    const Float3 predicted = xyz(w.predicted[o]), r = group.rest(w, body, k);
+    w.position[o] = with_w(carried_to(base, lost, predicted, is, r), 0.0f);
+    w.pushed[o] = Float4{};
+    if constexpr (kAccelerated) {
+      w.earlier[o] = with_w(carried_to(base, lost_earlier, predicted, was, r), 0.0f);
+      w.pushed_earlier[o] = Float4{};
+    }
+  });
+  list_resolved(block, team, w, g, substep);
+}
+
+// One iteration of the particles of a resolved group. begins: it has been carried so far.
+template <bool kContacts, bool kAccelerated, class Block>
+CUTPROOF_DEVICE void advance_resolved(Block& block, const Team<Block, kResolvedTeam>& team, const DeviceView& w, int g,
+                                      int substep, int iteration, bool begins) {
+  const int b = body_of_group(w, g);
+  if (!takes_part(w, b, substep, iteration)) return;
+  const Group group = group_of(w, g);
   const GroupHead& head = group.head;
+  const BodyConstants& body = w.body[b];
+  const Contacts contacts = contacts_of(w, body, w.frame[b], substep);
+  const Iteration now = iteration_of(w, b, iteration);
+  const Float4 base_and_reach = w.group_base[g];
+  const Float3 base = xyz(base_and_reach);
+  if (begins) resolve<kAccelerated>(block, team, w, group, body, now, base, substep, iteration);
+  Rows<Block> rows;
+  const FirstHolders first = holders_from(w, head, 0);
+  team.each(3, [&](int axis) { rows.of(axis) = mean_goal(w, head, first, body.h, base_and_reach, axis); });
+  const Map goal = rows.all(team);
   const float holders = static_cast<float>(head.holder_count), per_h = 1.0f / body.h;
-  GroupSums<AnyTeam> sums;
+  GroupSums<Team<Block, kResolvedTeam>> sums;
   team.each(head.size, [&](int k) {
     const int o = head.begin + k;
     const Float4 predicted = w.predicted[o], at = w.position[o];
@@ -766,59 +847,43 @@ CUTPROOF_DEVICE void advance_particles(const AnyTeam& team, const DeviceView& w,
         advance_particle<kContacts, kAccelerated>(w, body, contacts, now, o, predicted, at, from, pull) - base;
     add_moments(sums.of(k), w.start[o].w / holders, e, per_h * e, r);
   });
-  const Floats<12> total = team.total(sums);
-  if (team.leads()) store_moments(w.group_moments, group.index, total);
+  team.parted(sums).each(team, [&](int n, float sum) { store_moment(w.group_moments, g, n, sum); });
 }
 
-// Of a group that was resolved before this launch began.
+// Of a group that was carried until now. Says whether it may touch a contact in this iteration: then nothing has been
+// done.
 template <bool kContacts, bool kAccelerated, class Block>
-CUTPROOF_DEVICE void advance_resolved(const Team<Block, kResolvedTeam>& team, const DeviceView& w, int g, int substep,
-                                      int iteration) {
-  const int b = body_of_group(w, g);
-  if (!takes_part(w, b, substep, iteration)) return;
-  const Group group = group_of(w, g);
-  const BodyConstants& body = w.body[b];
-  const Float4 base = w.group_base[g];
-  Rows<Block> goal;
-  team.each(3, [&](int axis) { goal.of(axis) = mean_goal(w, group.head, body.h, base, axis); });
-  advance_particles<kContacts, kAccelerated>(team, w, group, body, contacts_of(w, body, w.frame[b], substep),
-                                             iteration_of(w, b, iteration), xyz(base), goal.all(team));
-}
-
-// Of a group that was carried until now.
-template <bool kContacts, bool kAccelerated, class Block>
-CUTPROOF_DEVICE void advance_carried(Block& block, const Team<Block, kRowTeam>& team, const DeviceView& w, int g,
+CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRowTeam>& team, const DeviceView& w, int g,
                                      int substep, int iteration) {
   const GroupHead head = w.group_head[g];
   const int b = body_of_group(w, g);
-  if (!takes_part(w, b, substep, iteration)) return;
+  if (!takes_part(w, b, substep, iteration)) return false;
   if constexpr (kContacts) {
-    if (w.group_resolved[g] != 0) return;
+    if (w.group_resolved[g] != 0) return false;
   }
   const BodyConstants& body = w.body[b];
   const Iteration now = iteration_of(w, b, iteration);
   const Float4 base = w.group_base[g];
+  const FirstHolders first = holders_from(w, head, 0);
   const float lost_next = lost_fraction(body, now.s, iteration + 1);
-  Rows<Block> goal, present, earlier, plain, next;
+  block.wait_for_earlier();  // for the clusters: all else is older
+  Rows<Block> present, plain, next;
   team.each(3, [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
     if (iteration > 0) present.of(axis) = w.group_map[at];
-    earlier.of(axis) = present.of(axis);
-    goal.of(axis) = mean_goal(w, head, body.h, base, axis);
+    const Float4 goal = mean_goal(w, head, first, body.h, base, axis);
     const auto relaxed = [&](float wanted, float is) {
       const float toward = now.s * wanted;
       return now.implicit ? toward : (1.0f - now.s) * is + toward;
     };
-    plain.of(axis) = row_of(relaxed, goal.of(axis), present.of(axis));
+    plain.of(axis) = row_of(relaxed, goal, present.of(axis));
     next.of(axis) = plain.of(axis);
     if constexpr (kAccelerated) {
       if (!now.combined) return;
       // The one before the first is no map of this kind, and of no weight.
-      if (iteration > 1) earlier.of(axis) = w.group_earlier_map[at];
-      const auto combined = [&](float x, float y, float z) { return now.combination(x, y, z); };
-      const Float4 x = plain.of(axis), y = present.of(axis), z = earlier.of(axis);
-      next.of(axis) = {combined(x.x, y.x, z.x), combined(x.y, y.y, z.y), combined(x.z, y.z, z.z),
-                       combined(x.w, y.w, z.w)};
+      const Float4 x = plain.of(axis), y = present.of(axis), z = iteration > 1 ? w.group_earlier_map[at] : y;
+      next.of(axis) = {now.combination(x.x, y.x, z.x), now.combination(x.y, y.y, z.y), now.combination(x.z, y.z, z.z),
+                       now.combination(x.w, y.w, z.w)};
     }
   });
   if constexpr (kContacts) {
@@ -829,26 +894,7 @@ CUTPROOF_DEVICE void advance_carried(Block& block, const Team<Block, kRowTeam>& 
       return is_clear(contacts, ball_around(body, group, base, 1.0f - lost_next, candidate.all(team)), side);
     };
     // A contact with either candidate of an accelerated iteration means the plain way.
-    if (!clear(plain) || (now.combined && !clear(next))) {
-      const float lost = lost_fraction(body, now.s, iteration);
-      const Map is = present.all(team);
-      [[maybe_unused]] const Map was = earlier.all(team);
-      // Nothing has touched it so far.
-      team.each(head.size, [&](int k) {
-        const int o = head.begin + k;
-        const Float3 predicted = xyz(w.predicted[o]), r = group.rest(w, body, k);
-        w.position[o] = with_w(carried_to(xyz(base), lost, predicted, is, r), 0.0f);
-        w.pushed[o] = Float4{};
-        if constexpr (kAccelerated) {
-          const float lost_earlier = lost_fraction(body, now.s, iteration > 0 ? iteration - 1 : 0);
-          w.earlier[o] = with_w(carried_to(xyz(base), lost_earlier, predicted, was, r), 0.0f);
-          w.pushed_earlier[o] = Float4{};
-        }
-      });
-      list_resolved(block, team, w, g, substep);
-      advance_particles<kContacts, kAccelerated>(team, w, group, body, contacts, now, xyz(base), goal.all(team));
-      return;
-    }
+    if (!clear(plain) || (now.combined && !clear(next))) return true;
   }
   const bool more = iteration + 1 < body.iterations;
   const float per_h = 1.0f / body.h;
@@ -870,6 +916,7 @@ CUTPROOF_DEVICE void advance_carried(Block& block, const Team<Block, kRowTeam>& 
         moved(predicted.z, per_h * (row.w * mass.z + (row.x * upper.z + row.y * lower.x + row.z * lower.y))),
         moved(predicted.w, row.w * mass.w + (row.x * mass.x + row.y * mass.y + row.z * mass.z))};
   });
+  return false;
 }
 
 template <bool kContacts, bool kAccelerated>
@@ -910,15 +957,25 @@ template <bool kContacts, bool kAccelerated, class Block>
 CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int substep, int iteration) {
   using namespace step_detail;
   const Team<Block, kRowTeam> rows(block);
-  for (int64_t g = rows.first(); g < w.counters->groups; g += rows.stride()) {
-    advance_carried<kContacts, kAccelerated>(block, rows, w, static_cast<int>(g), substep, iteration);
-  }
-  // The last threads begin with resolved groups, those before them with loose particles.
   const Team<Block, kResolvedTeam> team(block);
+  const int groups = w.counters->groups;
+  // Whole warps at a time: those groups that turn out to be no longer clear are everybody's.
+  const int64_t ahead = rows.first() % (team.kLanes / rows.kLanes);
+  for (int64_t k = rows.first(); k - ahead < groups; k += rows.stride()) {
+    const int g = static_cast<int>(k);
+    const bool begins = k < groups && advance_carried<kContacts, kAccelerated>(block, rows, w, g, substep, iteration);
+    if constexpr (kContacts) {
+      team.for_found(begins && rows.leads(), g, [&](int found) {
+        advance_resolved<kContacts, kAccelerated>(block, team, w, found, substep, iteration, true);
+      });
+    }
+  }
+  block.wait_for_earlier();
+  // The last threads begin with groups that were resolved before, those before them with loose particles.
   const int64_t resolved = kContacts ? w.counters->resolved : 0;
   if constexpr (kContacts) {
     for (int64_t k = from_last(team); k < resolved; k += team.stride()) {
-      advance_resolved<kContacts, kAccelerated>(team, w, w.resolved_groups[k], substep, iteration);
+      advance_resolved<kContacts, kAccelerated>(block, team, w, w.resolved_groups[k], substep, iteration, false);
     }
   }
   int64_t k = from_last(block) - resolved * team.kLanes % block.stride();
@@ -931,7 +988,7 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
 template <bool kContacts>
 struct start_substep_kernel_object {
   static constexpr const char* kName = "start_substep_kernel";
-  static constexpr int kMaxThreads = 256;
+  static constexpr int kMaxThreads = 256, kMinBlocks = 3;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep) const {
     start_substep_kernel<kContacts>(block, w, substep);
@@ -940,7 +997,8 @@ struct start_substep_kernel_object {
 template <bool kContacts, bool kAccelerated>
 struct advance_kernel_object {
   static constexpr const char* kName = "advance_kernel";
-  static constexpr int kMaxThreads = 256;
+  static constexpr int kMaxThreads = 256, kMinBlocks = 3;
+  static constexpr bool kReadsAhead = true;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, int iteration) const {
     advance_kernel<kContacts, kAccelerated>(block, w, substep, iteration);

@@ -30,6 +30,7 @@
 //   T warp_sum<T>(T);                           as sum, over the lanes of this warp; reached by all of them
 //   float warp_sums(const float (&)[16]);       as 16 times warp_sum, with the same bits, and a fifth of its exchanges:
 //                                               lanes 2 k and 2 k + 1 get the sum of value k
+//   unsigned match(unsigned mask, int);         (DeviceBlock) the lanes of `mask` with the same value, as a mask
 //   unsigned ballot(unsigned mask, bool); T shuffle<T>(unsigned mask, T, int lane); int lane();
 //   void sync_warp(unsigned mask);              as sync(), for these lanes of the warp
 //   T atomic_add(T*, T), atomic_min(T*, T), atomic_max(T*, T), atomic_exchange(T*, T),
@@ -37,6 +38,8 @@
 //                                               unsigned long long
 //   T load(const T*); void store(T*, T);        relaxed; T of 4 or 8 bytes
 //   void fence();                               orders this thread's memory operations for the whole grid
+//   void wait_for_earlier();                    returns when all work before this launch is done. Every kernel begins
+//                                               so, but for those that read ahead (launcher.h); any number of times
 #pragma once
 
 #if defined(__CUDACC__)

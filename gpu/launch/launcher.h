@@ -28,6 +28,11 @@
 // A kernel is handed over as an object, because a function template cannot be: CUTPROOF_KERNEL(verb_noun_kernel)
 // defines the type verb_noun_kernel_object, whose operator() calls it. CUTPROOF_KERNEL_THREADS(verb_noun_kernel, n)
 // allows blocks of up to n threads on the device instead of 256 (the compiler then has 65536 / n registers a thread).
+//
+// A launch may begin while the last blocks of the one before it work, and then waits for them: what it takes to start
+// is hidden. A kernel whose object has kReadsAhead = true is not made to wait. It calls wait_for_earlier() itself, and
+// may read before that what the launch before it does not write. (What is older is there: a launch begins only when
+// the one before it no longer waits for others.)
 #pragma once
 #include <stdexcept>
 #include <string>
@@ -62,6 +67,26 @@ constexpr int max_threads() {
     return Kernel::kMaxThreads;
   } else {
     return 256;
+  }
+}
+
+// How many of its largest blocks a multiprocessor is to hold: the compiler keeps the registers of a thread below what
+// that leaves. 0: as many as come.
+template <class Kernel>
+constexpr int min_blocks() {
+  if constexpr (requires { Kernel::kMinBlocks; }) {
+    return Kernel::kMinBlocks;
+  } else {
+    return 0;
+  }
+}
+
+template <class Kernel>
+constexpr bool reads_ahead() {
+  if constexpr (requires { Kernel::kReadsAhead; }) {
+    return Kernel::kReadsAhead;
+  } else {
+    return false;
   }
 }
 

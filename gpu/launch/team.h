@@ -63,6 +63,61 @@ class Team {
     return sums.bank_[0];
   }
 
+  // The same sums, by a third of the exchanges, but each of them in one lane only.
+  template <int N>
+  class Parted {
+   public:
+    // give(n, sum) for the sums that this lane has.
+    template <class Give>
+    CUTPROOF_DEVICE void each(const Team& team, Give give) const {
+      if constexpr (Block::on_device) {
+        const int which = team.lane() / kShare;
+        if (team.lane() % kShare == 0 && which < N) give(which, value_[0]);
+      } else {
+        for (int k = 0; k < N; ++k) give(k, value_[k]);
+      }
+    }
+    // Sum n, to every lane.
+    CUTPROOF_DEVICE float get(const Team& team, int n) const {
+      return team.from(n * kShare, value_[Block::on_device ? 0 : n]);
+    }
+
+   private:
+    friend class Team;
+    static constexpr int kMost = 16, kShare = kWidth / kMost;  // lanes that end up with the same sum
+    static_assert(N <= kMost && kWidth >= kMost);
+    float value_[Block::on_device ? 1 : N] = {};
+  };
+  template <int N>
+  CUTPROOF_DEVICE Parted<N> parted(Sums<N>& sums) const {
+    Parted<N> found;
+    if constexpr (Block::on_device) {
+      // Each lane keeps half of its sums, those of the upper half if `distance` is in its number, and gets what the
+      // lane at that distance has of them.
+      constexpr int kMost = Parted<N>::kMost;
+      float kept[kMost];
+      for (int k = 0; k < kMost; ++k) kept[k] = k < N ? sums.bank_[0].v[k < N ? k : 0] : 0.0f;
+      int half = kMost / 2;
+      for (int distance = kWidth / 2; distance > 0; distance /= 2, half /= 2) {
+        if (half == 0) {
+          kept[0] += other(kept[0], distance);
+          continue;
+        }
+        const bool upper = (lane() & distance) != 0;
+        for (int k = 0; k < kMost / 2; ++k) {
+          if (k >= half) break;
+          const float sent = upper ? kept[k] : kept[k + half], mine = upper ? kept[k + half] : kept[k];
+          kept[k] = mine + other(sent, distance);
+        }
+      }
+      found.value_[0] = kept[0];
+    } else {
+      const Floats<N> all = total(sums);
+      for (int k = 0; k < N; ++k) found.value_[k] = all.v[k];
+    }
+    return found;
+  }
+
   // Collectives, reached by all lanes of the team; the result goes to each of them.
   CUTPROOF_DEVICE float greatest(float value) const {  // not of NaN
     if constexpr (Block::on_device) {
@@ -79,6 +134,17 @@ class Team {
   CUTPROOF_DEVICE T from(int k, T value) const {
     if constexpr (Block::on_device) return block_.shuffle(mask(), value, (block_.lane() & ~(kWidth - 1)) + k % kWidth);
     return value;
+  }
+  // Jobs that lanes come upon, at most one each: visit(job) for one after the other, by the whole team.
+  template <class Visit>
+  CUTPROOF_DEVICE void for_found(bool found, int job, Visit visit) const {
+    if constexpr (Block::on_device) {
+      for (unsigned votes = block_.ballot(mask(), found); votes != 0; votes &= votes - 1) {
+        visit(block_.shuffle(mask(), job, ones((votes & (~votes + 1)) - 1)));
+      }
+    } else if (found) {
+      visit(job);
+    }
   }
   // Orders memory operations of the lanes.
   CUTPROOF_DEVICE void sync() const {
@@ -110,14 +176,8 @@ class Team {
   };
   CUTPROOF_DEVICE Equals equals(int value) const {
     if constexpr (Block::on_device) {
-      Equals found = {-1, 0, 0};
-      for (int k = 0; k < kWidth; ++k) {
-        const bool same = from(k, value) == value;
-        if (same && found.first < 0) found.first = k;
-        found.before += same && k < lane() ? 1 : 0;
-        found.count += same ? 1 : 0;
-      }
-      return found;
+      const unsigned same = block_.match(mask(), value) >> (block_.lane() & ~(kWidth - 1));
+      return {ones((same & (~same + 1)) - 1), ones(same & ((1u << lane()) - 1)), ones(same)};
     }
     return {0, 0, 1};
   }
@@ -141,9 +201,13 @@ class Team {
     return block_.shuffle(mask(), value, block_.lane() ^ distance);
   }
   CUTPROOF_DEVICE static int ones(unsigned bits) {
+#if defined(__CUDA_ARCH__)
+    return __popc(bits);
+#else
     int count = 0;
     for (; bits != 0; bits &= bits - 1) ++count;
     return count;
+#endif
   }
 
   Block& block_;
