@@ -5,6 +5,7 @@
 //
 // Kernels see the blocks that they ask for: of blocks(), whose sums depend on their sizes, as parts of the real ones.
 // So every path gives the same bits.
+#define CUTPROOF_ONE_LAUNCH
 #include <cooperative_groups.h>
 
 #include <cstddef>
@@ -28,7 +29,7 @@ constexpr unsigned kSpanShared = 64 * 1024;  // bytes of dynamic shared memory t
 
 class SpanLauncher {
  public:
-  using OnlyDefaultRotation = void;  // step.cuh: the others would only make the kernel larger
+  using OneLaunch = void;  // step.cuh: what it never needs would only make the kernel larger
 
   // partials: kMostSpanBlocks ints.
   __device__ explicit SpanLauncher(int* partials) : partials_(partials) {}

@@ -27,24 +27,20 @@ struct Contacts {
   bool frictionless;
 };
 
-CUTPROOF_DEVICE inline Contacts contacts_of(const DeviceView& w, const BodyConstants& body, int frame, int substep) {
+CUTPROOF_DEVICE inline Contacts contacts_of(const DeviceView& w, const Pace& pace, int substep) {
   Contacts contacts;
-  contacts.walls = w.walls + body.wall_begin;
-  contacts.wall_count = body.wall_end - body.wall_begin;
+  contacts.walls = w.walls + pace.wall_begin;
+  contacts.wall_count = pace.wall_count;
   contacts.move = nullptr;
-  // A geometric blade removes what it sweeps and touches nothing.
-  if (body.has_blade && body.criterion != Criterion::geometric) {
-    const MoveF* move = w.moves + (body.schedule + static_cast<int64_t>(frame) * body.substeps + substep);
-    if (move->down) contacts.move = move;
+  if (pace.first_move >= 0) {
+    const MoveF* const move = w.moves + (pace.first_move + substep);
+    if (constant(&move->down) != 0) contacts.move = move;
   }
-  contacts.half_length = 0.5f * body.blade_length;
-  contacts.depth = body.blade_depth;
-  contacts.clearance = body.clearance;
-  contacts.blade_friction = contacts.move != nullptr ? body.blade_friction : 0.0f;
-  contacts.frictionless = contacts.blade_friction == 0;
-  for (int k = 0; k < contacts.wall_count; ++k) {
-    if (contacts.walls[k].friction != 0) contacts.frictionless = false;
-  }
+  contacts.half_length = pace.half_length;
+  contacts.depth = pace.depth;
+  contacts.clearance = pace.clearance;
+  contacts.blade_friction = contacts.move != nullptr ? pace.blade_friction : 0.0f;
+  contacts.frictionless = contacts.blade_friction == 0 && pace.frictionless_walls != 0;
   return contacts;
 }
 
@@ -74,7 +70,7 @@ CUTPROOF_DEVICE inline float depth_in(const WallF& wall, const RestPoint& rest, 
 
 CUTPROOF_DEVICE inline Float3 off_walls(const Contacts& contacts, const RestPoint& rest, Float3 d) {
   for (int k = 0; k < contacts.wall_count; ++k) {
-    const WallF wall = contacts.walls[k];
+    const WallF wall = constant(&contacts.walls[k]);
     if (depth_in(wall, rest, d) > 0) {
       set_axis(d, wall.axis, fmaf(-rest.h, along_axis(rest.node, wall.axis), wall.offset));
     }
@@ -116,7 +112,7 @@ CUTPROOF_DEVICE inline Float3 way_out(const Contacts& contacts, Float3 c, float 
 // to the mid-surface, and what lies over it on the other side than where the particle began. Not the difference of two
 // positions, which would have no direction where it is short. Requires contacts.move.
 CUTPROOF_DEVICE inline Float3 way_off_blade(const Contacts& contacts, const RestPoint& rest, Float3 d, float side) {
-  const PoseF& pose = contacts.move->to;
+  const PoseF pose = constant(&contacts.move->to);
   const Float3 c = into_frame(pose, rest.from(pose.edge) + d);
   Float3 way;
   if (is_over_blade(contacts, c)) {
@@ -140,10 +136,10 @@ CUTPROOF_DEVICE inline Float3 off_blade(const Contacts& contacts, const RestPoin
 CUTPROOF_DEVICE inline bool touches(const Contacts& contacts, const RestPoint& rest, Float3 d, float side) {
   const float margin = static_cast<float>(kTouchMargin) * rest.h;
   for (int k = 0; k < contacts.wall_count; ++k) {
-    if (depth_in(contacts.walls[k], rest, d) > -margin) return true;
+    if (depth_in(constant(&contacts.walls[k]), rest, d) > -margin) return true;
   }
   if (contacts.move == nullptr) return false;
-  const PoseF& pose = contacts.move->to;
+  const PoseF pose = constant(&contacts.move->to);
   const Float3 c = into_frame(pose, rest.from(pose.edge) + d);
   if (is_over_blade(contacts, c)) {
     return side * c.z < contacts.clearance + margin;
@@ -183,7 +179,7 @@ CUTPROOF_DEVICE inline Float3 rubbed(Float3 d, Float3 slid, Float3 normal, float
 // The side of the blade, +1 or -1, on which a particle stands when the substep begins.
 CUTPROOF_DEVICE inline float blade_side(const Contacts& contacts, const RestPoint& rest, Float3 d) {
   if (contacts.move == nullptr) return 1.0f;
-  const PoseF& pose = contacts.move->from;
+  const PoseF pose = constant(&contacts.move->from);
   return contacts_detail::into_frame(pose, rest.from(pose.edge) + d).z < 0 ? -1.0f : 1.0f;
 }
 
@@ -199,7 +195,7 @@ CUTPROOF_DEVICE inline Float3 project(const Contacts& contacts, const RestPoint&
   if (contacts.frictionless || (same(projected, d) && !turns)) return projected;
   Float3 result = projected;
   for (int k = 0; k < contacts.wall_count; ++k) {
-    const WallF wall = contacts.walls[k];
+    const WallF wall = constant(&contacts.walls[k]);
     const float depth = depth_in(wall, rest, d);
     if (depth <= 0 || wall.friction == 0) continue;
     Float3 normal;
@@ -211,7 +207,7 @@ CUTPROOF_DEVICE inline Float3 project(const Contacts& contacts, const RestPoint&
     const float depth = norm(pushed);
     if (depth > 0) {
       // The blade's own point under the particle has moved too; only sliding against it rubs.
-      const PoseF &from = contacts.move->from, &to = contacts.move->to;
+      const PoseF from = constant(&contacts.move->from), to = constant(&contacts.move->to);
       const Float3 c = into_frame(to, rest.from(to.edge) + result);
       const Float3 carried = (to.edge - from.edge) + c.x * (to.along - from.along) + c.y * (to.back - from.back) +
                              c.z * (cross(to.along, to.back) - cross(from.along, from.back));
@@ -256,11 +252,12 @@ CUTPROOF_DEVICE inline bool is_clear(const Contacts& contacts, const Ball& ball,
   const float size = rest.h * extent(rest.node) + extent(ball.d);
   const float reach = ball.radius * (1.0f + kRounds) + static_cast<float>(kTouchMargin) * rest.h;
   for (int k = 0; k < contacts.wall_count; ++k) {
-    const float slack = kRounds * (size + fabsf(contacts.walls[k].offset));
-    if (!(depth_in(contacts.walls[k], rest, ball.d) < -(reach + slack))) return false;
+    const WallF wall = constant(&contacts.walls[k]);
+    const float slack = kRounds * (size + fabsf(wall.offset));
+    if (!(depth_in(wall, rest, ball.d) < -(reach + slack))) return false;
   }
   if (contacts.move == nullptr) return true;
-  const PoseF& pose = contacts.move->to;
+  const PoseF pose = constant(&contacts.move->to);
   const float clear = reach + kRounds * (size + extent(pose.edge));
   const Float3 c = into_frame(pose, rest.from(pose.edge) + ball.d);
   if (side != 0 && static_cast<float>(side) * c.z > contacts.clearance + clear) return true;

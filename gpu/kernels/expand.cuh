@@ -242,7 +242,9 @@ CUTPROOF_DEVICE void finish_rows_kernel(Block& block, DeviceView w) {
     if (end - begin == old_count(w, p)) continue;
     sort_memberships(w, p);
     for (int h = begin; h < end; ++h) {
-      if (w.memberships[h] >= 0) block.store(&rest_marks(w)[w.memberships[h]], 1);
+      if (w.memberships[h] < 0) continue;
+      block.store(&rest_marks(w)[w.memberships[h]], 1);
+      block.store(&w.regroup[w.memberships[h]], 1);
     }
   }
 }

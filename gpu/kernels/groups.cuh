@@ -3,8 +3,9 @@
 //
 // A class belongs to the first of its holders. There equal lists of holders meet in a hash table as long as the
 // cluster, and one team counts them in ascending order. So a class has its particles, chunk by chunk of kMostInGroup,
-// wherever it is in memory. A particle is loose if its chunk has fewer than kLeastInGroup, if it has no holder, and if
-// any grip may ever hold it. All of that depends on the body's own clusters and particles only.
+// wherever it is in memory. A particle is loose if its chunk has fewer than kLeastInGroup, and if it has no holder.
+// Particles that different grips hold are in different classes. All of that depends on the body's own clusters and
+// particles only.
 #pragma once
 #include "gpu/kernels/float3.h"
 #include "gpu/launch/launcher.h"
@@ -16,6 +17,8 @@ namespace cutproof::gpu {
 // Lanes that measure a group, and that look through the members of a cluster.
 inline constexpr int kGroupTeam = 8;
 inline constexpr int kMemberTeam = 32;
+// Teams that share a cluster where each of its members is looked at alone.
+inline constexpr int kShares = 8;
 
 namespace groups_detail {
 
@@ -26,6 +29,10 @@ enum : int { kInside = -1, kLoose = -2 };
 // and how many of the class have been counted.
 CUTPROOF_BOTH inline int* table(const DeviceView& w) { return w.label; }
 CUTPROOF_BOTH inline int* class_size(const DeviceView& w) { return w.member_scratch; }
+// Of DeviceView::slot_scratch: clusters whose groups are made anew, and those whose lists of groups are.
+CUTPROOF_BOTH inline int* changed(const DeviceView& w) { return w.slot_scratch; }
+CUTPROOF_BOTH inline int* remeasured(const DeviceView& w) { return w.slot_scratch + w.slot_capacity; }
+inline constexpr int kRemeasured = 2;  // in DeviceView::regroup: it is listed among the latter
 // By particle: its class's place in that table, or -1; and how many of its class are smaller.
 CUTPROOF_BOTH inline int* entry_of(const DeviceView& w) { return w.particle_scratch; }
 CUTPROOF_BOTH inline int* rank_of(const DeviceView& w) { return w.particle_scratch + w.particles; }
@@ -40,9 +47,10 @@ CUTPROOF_DEVICE inline HolderList holders_of(const DeviceView& w, int p) {
 }
 // Both take several entries at once: one by one, each would wait for the one before.
 inline constexpr int kAtOnce = 4;
-CUTPROOF_DEVICE inline bool same_holders(const DeviceView& w, int p, int q) {
+CUTPROOF_DEVICE inline int hold_set(const DeviceView& w, int p) { return w.grip_count > 0 ? w.hold_set[p] : 0; }
+CUTPROOF_DEVICE inline bool same_class(const DeviceView& w, int p, int q) {
   const HolderList a = holders_of(w, p), b = holders_of(w, q);
-  if (a.size != b.size) return false;
+  if (a.size != b.size || hold_set(w, p) != hold_set(w, q)) return false;
   for (int k = 0; k < a.size; k += kAtOnce) {
     bool same = true;
     for (int j = k; j < k + kAtOnce; ++j) same = same && (j >= a.size || a.begin[j] == b.begin[j]);
@@ -50,8 +58,8 @@ CUTPROOF_DEVICE inline bool same_holders(const DeviceView& w, int p, int q) {
   }
   return true;
 }
-CUTPROOF_DEVICE inline unsigned hash_of(HolderList list) {
-  unsigned hash = 2166136261u;
+CUTPROOF_DEVICE inline unsigned hash_of(HolderList list, int set) {
+  unsigned hash = 2166136261u ^ static_cast<unsigned>(set);
   for (int k = 0; k < list.size; k += kAtOnce) {
     int entry[kAtOnce];
     for (int j = 0; j < kAtOnce; ++j) entry[j] = k + j < list.size ? list.begin[k + j] : 0;
@@ -113,35 +121,114 @@ CUTPROOF_DEVICE inline void add_masses(float* sum, float m, Float3 r) {
 
 }  // namespace groups_detail
 
-// Each particle finds its class in its first holder's table. Those that are in no class get their places at once.
+// Clusters that have changed: how many particles and pairs of theirs may need places.
+template <class Block>
+CUTPROOF_DEVICE void find_changed_clusters_kernel(Block& block, const DeviceView& w) {
+  using namespace groups_detail;
+  const Team<Block, kMemberTeam> team(block);
+  Counters& c = *w.counters;
+  if (c.groups_whole) return;
+  for (int64_t i = team.first(); i < c.slots_used; i += team.stride()) {
+    const int s = static_cast<int>(i);
+    if (w.regroup[s] == 0) continue;
+    int particles = 0, pairs = 0;
+    team.each(w.slot_size[s], [&](int k) {
+      const HolderList list = holders_of(w, w.members[w.slot_begin[s] + k]);
+      if (list.begin[0] != s) return;
+      ++particles;
+      pairs += list.size;
+    });
+    particles = team.total(particles);
+    pairs = team.total(pairs);
+    if (!team.leads()) continue;
+    changed(w)[block.atomic_add(&c.regrouped, 1)] = s;
+    block.atomic_add(&c.due_particles, particles);
+    block.atomic_add(&c.due_pairs, pairs);
+  }
+}
+CUTPROOF_KERNEL(find_changed_clusters_kernel);
+
+// Groups and loose particles of changed clusters are no more. By its first holder: whoever's clusters have changed had,
+// as all of its group, a first one that has.
+template <class Block>
+CUTPROOF_DEVICE void dissolve_groups_kernel(Block& block, const DeviceView& w) {
+  using namespace groups_detail;
+  Counters& c = *w.counters;
+  // Where there is no room behind the groups that stay, none does.
+  const bool whole = block.load(&c.groups_whole) != 0 ||
+                     c.placed + c.placed_last + c.due_particles > w.place_capacity ||
+                     c.groups + c.due_particles / kLeastInGroup > w.group_capacity ||
+                     c.pairs + c.due_pairs / kLeastInGroup > w.pair_capacity;
+  if (block.first() == 0) {
+    c.groups_before = whole ? 0 : c.groups;
+    block.store(&c.groups_whole, whole ? 1 : 0);
+  }
+  // Their tables.
+  const Team<Block, kMemberTeam> team(block);
+  const int clusters = whole ? c.slots_used : c.regrouped;
+  for (int64_t i = team.first(); i < clusters; i += team.stride()) {
+    const int s = whole ? static_cast<int>(i) : changed(w)[i], begin = w.slot_begin[s];
+    team.each(w.slot_size[s], [&](int k) {
+      table(w)[begin + k] = 0;
+      class_size(w)[begin + k] = 0;
+      block.store(&entry_of(w)[w.members[begin + k]], -1);
+    });
+  }
+  if (whole) return;
+  for (int64_t g = block.first(); g < c.groups; g += block.stride()) {
+    const GroupHead head = w.group_head[g];
+    if (head.size > 0 && w.regroup[w.holders[head.holder_begin].index] != 0) w.group_head[g].size = 0;
+  }
+  for (int64_t k = block.first(); k < c.loose; k += block.stride()) {
+    const int o = w.loose_places[k];
+    if (o < 0) continue;
+    const int p = w.place_particle[o];
+    if (!alive(w, p) || (w.membership_count[p] > 0 && w.regroup[holders_of(w, p).begin[0]] != 0))
+      w.loose_places[k] = -1;
+  }
+}
+CUTPROOF_KERNEL(dissolve_groups_kernel);
+
+// Each particle of a changed cluster finds its class in its first holder's table.
 template <class Block>
 CUTPROOF_DEVICE void find_classes_kernel(Block& block, const DeviceView& w) {
   using namespace groups_detail;
-  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
-    const int p = static_cast<int>(i);
-    int at = -1;
-    if (alive(w, p)) {
+  const Team<Block, kMemberTeam> team(block);
+  Counters& c = *w.counters;
+  const bool whole = c.groups_whole != 0;
+  if (whole && block.first() == 0) c.groups = c.placed = c.placed_last = c.loose = c.pairs = 0;
+  const auto remeasure = [&](int s) {
+    if (whole || block.load(&w.regroup[s]) >= kRemeasured) return;
+    if ((block.atomic_or(&w.regroup[s], kRemeasured) & kRemeasured) != 0) return;
+    remeasured(w)[block.atomic_add(&c.remeasured, 1)] = s;
+  };
+  // Several teams for each cluster: there may be few.
+  const int64_t jobs = int64_t{kShares} * (whole ? c.slots_used : c.regrouped);
+  for (int64_t i = team.first(); i < jobs; i += team.stride()) {
+    const int share = static_cast<int>(i % kShares),
+              s = whole ? static_cast<int>(i / kShares) : changed(w)[i / kShares];
+    const int begin = w.slot_begin[s], size = w.slot_size[s];
+    if (team.leads() && share == 0) remeasure(s);
+    int* const classes = table(w) + begin;
+    for (int k = share * team.kLanes + team.lane(); k < size; k += kShares * team.kLanes) {
+      const int p = w.members[begin + k];
       const HolderList list = holders_of(w, p);
-      if (list.size > 0 && w.may_be_held[p] == 0) {
-        const int s = list.begin[0], begin = w.slot_begin[s], size = w.slot_size[s];
-        int* const classes = table(w) + begin;
-        int entry =
-            static_cast<int>(static_cast<unsigned long long>(hash_of(list)) * static_cast<unsigned>(size) >> 32);
-        while (true) {
-          int found = block.load(&classes[entry]);
-          if (found == 0) found = block.atomic_cas(&classes[entry], 0, p + 1);
-          if (found == 0 || same_holders(w, p, found - 1)) break;
-          entry = entry + 1 == size ? 0 : entry + 1;
+      if (list.begin[0] != s) continue;
+      int entry = static_cast<int>(
+          static_cast<unsigned long long>(hash_of(list, hold_set(w, p))) * static_cast<unsigned>(size) >> 32);
+      bool first = false;
+      while (true) {
+        int found = block.load(&classes[entry]);
+        if (found == 0) {
+          found = block.atomic_cas(&classes[entry], 0, p + 1);
+          first = found == 0;
         }
-        at = begin + entry;
-      } else {
-        const int o = w.particles - 1 - block.atomic_add(&w.counters->placed_last, 1);
-        place(w, p, o);
-        w.group_at[p] = kLoose;
-        w.loose_places[block.atomic_add(&w.counters->loose, 1)] = o;
+        if (first || same_class(w, p, found - 1)) break;
+        entry = entry + 1 == size ? 0 : entry + 1;
       }
+      entry_of(w)[p] = begin + entry;
+      for (int h = 0; h < list.size && first; ++h) remeasure(list.begin[h]);
     }
-    entry_of(w)[p] = at;
   }
 }
 CUTPROOF_KERNEL(find_classes_kernel);
@@ -152,8 +239,20 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
   using namespace groups_detail;
   const Team<Block, kMemberTeam> team(block);
   Counters& counters = *w.counters;
-  for (int64_t i = team.first(); i < counters.slots_used; i += team.stride()) {
-    const int s = static_cast<int>(i), size = w.slot_size[s], begin = w.slot_begin[s];
+  const bool whole = counters.groups_whole != 0;
+  if (whole) {
+    for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
+      const int p = static_cast<int>(i);
+      if (!alive(w, p) || w.membership_count[p] > 0) continue;
+      const int o = w.place_capacity - 1 - block.atomic_add(&counters.placed_last, 1);
+      place(w, p, o);
+      w.group_at[p] = kLoose;
+      w.loose_places[block.atomic_add(&counters.loose, 1)] = o;
+    }
+  }
+  const int clusters = whole ? counters.slots_used : counters.regrouped;
+  for (int64_t i = team.first(); i < clusters; i += team.stride()) {
+    const int s = whole ? static_cast<int>(i) : changed(w)[i], size = w.slot_size[s], begin = w.slot_begin[s];
     if (size == 0) continue;
     const int* const members = w.members + begin;
     const int* const classes = table(w);
@@ -181,14 +280,14 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
     team.sync();
 
     // Places and numbers for all classes of the cluster at once, then for each of them in turn.
-    const auto size_of_first = [&](int k, int& first) {
-      const int its = entry_at(k, first);
-      return its >= 0 && rank_of(w)[first] == 0 ? block.load(&sizes[its]) : 0;
+    const auto class_at = [&](int k, int& first) {  // how many particles it has
+      first = k < size ? block.load(&classes[begin + k]) - 1 : -1;
+      return first >= 0 ? block.load(&sizes[begin + k]) : 0;
     };
     int places = 0, groups = 0, pairs = 0;
     team.each(size, [&](int k) {
       int first = -1;
-      const int count = size_of_first(k, first);
+      const int count = class_at(k, first);
       if (count == 0) return;
       places += count;
       groups += groups_of(count);
@@ -208,7 +307,7 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
     next_pair = team.from(0, next_pair);
     for (int tile = 0; tile < size; tile += team.kLanes) {
       int first = -1;
-      const int count = size_of_first(tile + team.lane(), first);
+      const int count = class_at(tile + team.lane(), first);
       if (!team.any(count > 0)) continue;
       const int own = groups_of(count), holder_count = count > 0 ? holders_of(w, first).size : 0;
       const int place_begin = next_place + team.total_before(count);
@@ -218,8 +317,7 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
       next_group += team.total(own);
       next_pair += team.total(own * holder_count);
       if (count == 0) continue;
-      w.class_data[block.load(&classes[entry_of(w)[first]]) - 1] =
-          static_cast<unsigned long long>(group_begin) << 32 | static_cast<unsigned>(place_begin);
+      w.class_data[first] = static_cast<unsigned long long>(group_begin) << 32 | static_cast<unsigned>(place_begin);
       for (int chunk = 0; chunk < own; ++chunk) {
         const int left = count - chunk * kMostInGroup;
         GroupHead head = {};
@@ -228,6 +326,7 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
         head.body = w.slot_body[s];
         head.holder_begin = pair_begin + chunk * holder_count;
         head.holder_count = holder_count;
+        head.hold_set = hold_set(w, first);
         w.group_head[group_begin + chunk] = head;
       }
     }
@@ -264,7 +363,7 @@ template <class Block>
 CUTPROOF_DEVICE void measure_groups_kernel(Block& block, const DeviceView& w) {
   using namespace groups_detail;
   const Team<Block, kGroupTeam> team(block);
-  for (int64_t i = team.first(); i < w.counters->groups; i += team.stride()) {
+  for (int64_t i = w.counters->groups_before + team.first(); i < w.counters->groups; i += team.stride()) {
     const int g = static_cast<int>(i);
     GroupHead head = w.group_head[g];
     const int first = w.place_particle[head.begin];
@@ -272,8 +371,9 @@ CUTPROOF_DEVICE void measure_groups_kernel(Block& block, const DeviceView& w) {
     const Coordinates base = coordinates(body, w.node[first]);
     RestCenter center = {base.i, base.j, base.k, 0, 0, 0};
     const auto rest = [&](int k) { return nodes_between(center, coordinates(body, w.place_node[head.begin + k])); };
+    const float of_each = 1.0f / static_cast<float>(head.holder_count);
     const auto mass = [&](int k) {  // what each holder gets of it
-      return w.displacement[w.place_particle[head.begin + k]].w / static_cast<float>(head.holder_count);
+      return of_each * w.displacement[w.place_particle[head.begin + k]].w;
     };
     // Twice: what the first centre is off by is taken out.
     for (int round = 0; round < 2; ++round) {
@@ -325,15 +425,19 @@ CUTPROOF_DEVICE void measure_groups_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL(measure_groups_kernel);
 
-// What each cluster is made of, and the moments of its members about its rest centre.
+// What each cluster is made of, and the moments of its members about its rest centre, which may have moved: so groups
+// that stay hear of it too.
 template <class Block>
 CUTPROOF_DEVICE void measure_clusters_kernel(Block& block, const DeviceView& w) {
   using namespace groups_detail;
   const Team<Block, kMemberTeam> team(block);
   Counters& counters = *w.counters;
+  const bool whole = block.load(&counters.groups_whole) != 0;
   if (block.first() == 0) counters.groups_stale = 0;
-  for (int64_t i = team.first(); i < counters.slots_used; i += team.stride()) {
-    const int s = static_cast<int>(i), size = w.slot_size[s];
+  const int clusters = whole ? counters.slots_used : counters.remeasured;
+  for (int64_t i = team.first(); i < clusters; i += team.stride()) {
+    const int s = whole ? static_cast<int>(i) : remeasured(w)[i], size = w.slot_size[s];
+    if (team.leads()) w.regroup[s] = 0;
     if (size == 0) {
       if (team.leads()) w.cluster_head[s] = {};
       continue;
@@ -341,6 +445,8 @@ CUTPROOF_DEVICE void measure_clusters_kernel(Block& block, const DeviceView& w) 
     const BodyConstants& body = w.body[w.slot_body[s]];
     const RestCenter center = rest_center(w, s);
     const int* const members = w.members + w.slot_begin[s];
+    // A list of groups has a quarter of the room that the members have, for each group has kLeastInGroup of them.
+    const int list_begin = (w.slot_begin[s] + kLeastInGroup - 1) / kLeastInGroup;
     int groups = 0, loose = 0;
     typename Team<Block, kMemberTeam>::template Sums<10> sums;
     for (int tile = 0; tile < size; tile += team.kLanes) {
@@ -356,44 +462,40 @@ CUTPROOF_DEVICE void measure_clusters_kernel(Block& block, const DeviceView& w) 
       const int before = team.rank(at == kLoose, found);
       if (at == kLoose) w.cluster_loose[w.slot_begin[s] + loose + before] = w.place_of[members[k]];
       loose += found;
-      groups += at >= 0 ? 1 : 0;
+      const int group = groups + team.rank(at >= 0, found);
+      groups += found;
+      if (at < 0) continue;
+      const Offset to = offset_between(w.group_center[at], center, at);
+      w.cluster_groups[list_begin + group] = to;
+      if (whole) continue;
+      const GroupHead head = w.group_head[at];
+      for (int h = head.holder_begin; h < head.holder_begin + head.holder_count; ++h) {
+        if (w.holders[h].index == s) w.holders[h] = {to.x, to.y, to.z, s};
+      }
     }
-    groups = team.total(groups);
-    int next = 0;
-    if (team.leads()) next = block.atomic_add(&counters.cluster_pairs, groups);
-    next = team.from(0, next);
     const auto total = team.total(sums);
-    if (team.leads()) {
-      w.cluster_head[s] = {next, groups, w.slot_begin[s], loose};
-      w.cluster_rest[3 * i] = {total.v[0], total.v[1], total.v[2], total.v[3]};
-      w.cluster_rest[3 * i + 1] = {total.v[4], total.v[5], total.v[6], total.v[7]};
-      w.cluster_rest[3 * i + 2] = {total.v[8], total.v[9], 0, 0};
-    }
-    for (int tile = 0; tile < size && groups > 0; tile += team.kLanes) {
-      const int k = tile + team.lane();
-      const int g = k < size ? w.group_at[members[k]] : int{kInside};
-      int found = 0;
-      const int before = team.rank(g >= 0, found);
-      if (g >= 0) w.cluster_groups[next + before] = offset_between(w.group_center[g], center, g);
-      next += found;
-      groups -= found;
-    }
+    if (!team.leads()) continue;
+    w.cluster_head[s] = {list_begin, groups, w.slot_begin[s], loose};
+    w.cluster_rest[3 * int64_t{s}] = {total.v[0], total.v[1], total.v[2], total.v[3]};
+    w.cluster_rest[3 * int64_t{s} + 1] = {total.v[4], total.v[5], total.v[6], total.v[7]};
+    w.cluster_rest[3 * int64_t{s} + 2] = {total.v[8], total.v[9], 0, 0};
   }
 }
 CUTPROOF_KERNEL(measure_clusters_kernel);
 
-// Everything anew, if anything has changed since the last time.
+// Groups of the clusters that have changed since the last time.
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_groups(Launcher& launcher, const DeviceView& w) {
   Counters* const c = w.counters;  // an address only: counters lie on the device
+  const int64_t by_cluster = int64_t{kMemberTeam} * w.slot_capacity;
   launcher.if_nonzero(&c->groups_stale, [&](Launcher& stale) {
-    stale.clear(&c->groups, 6 * sizeof(int));  // … and those that follow it
-    stale.clear(groups_detail::table(w), sizeof(int) * static_cast<std::size_t>(w.member_capacity));
-    stale.clear(groups_detail::class_size(w), sizeof(int) * static_cast<std::size_t>(w.member_capacity));
-    stale.items(find_classes_kernel_object{}, w.particles, w);
-    stale.items(deal_out_groups_kernel_object{}, int64_t{kMemberTeam} * w.slot_capacity, w);
+    stale.items(find_changed_clusters_kernel_object{}, by_cluster, w);
+    stale.items(dissolve_groups_kernel_object{}, by_cluster, w);
+    stale.items(find_classes_kernel_object{}, by_cluster, w);
+    stale.items(deal_out_groups_kernel_object{}, by_cluster, w);
     stale.items(measure_groups_kernel_object{}, int64_t{kGroupTeam} * w.group_capacity, w);
-    stale.items(measure_clusters_kernel_object{}, int64_t{kMemberTeam} * w.slot_capacity, w);
+    stale.items(measure_clusters_kernel_object{}, by_cluster, w);
+    stale.clear(&c->groups_whole, sizeof(int));
   });
 }
 

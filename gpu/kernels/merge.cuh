@@ -281,6 +281,10 @@ template <class Block>
 CUTPROOF_DEVICE void hand_over(Block& block, const DeviceView& w, int s, int t, const int* list, int size) {
   int* marks = rest_marks(w);
   const int* members = w.members + w.slot_begin[s];
+  if (block.thread() == 0) {
+    block.store(&w.regroup[s], 1);
+    block.store(&w.regroup[t], 1);
+  }
   for (int k = block.thread(); k < w.slot_size[s]; k += block.size()) {
     const int p = members[k];
     const bool twice = contains(list, size, p);
@@ -288,11 +292,12 @@ CUTPROOF_DEVICE void hand_over(Block& block, const DeviceView& w, int s, int t, 
     for (int h = begin; h < end; ++h) {
       if (block.load(&w.memberships[h]) == s) block.store(&w.memberships[h], twice ? -1 : t);
     }
-    if (!twice) continue;
-    block.atomic_add(&w.membership_count[p], -1);
+    if (twice) block.atomic_add(&w.membership_count[p], -1);
     for (int h = begin; h < end; ++h) {
       const int slot = block.load(&w.memberships[h]);
-      if (slot >= 0) block.store(&marks[slot], 1);
+      if (slot < 0) continue;
+      block.store(&w.regroup[slot], 1);
+      if (twice) block.store(&marks[slot], 1);
     }
   }
 }
@@ -501,6 +506,7 @@ CUTPROOF_DEVICE void place_members_kernel(Block& block, DeviceView w) {
   if (block.first() != 0) return;
   w.counters->failed = 0;
   w.counters->changed = 1;
+  w.counters->groups_whole = 1;  // what groups say of clusters lies where their members lay
 }
 CUTPROOF_KERNEL(place_members_kernel);
 

@@ -28,6 +28,8 @@ namespace split_detail {
 
 // Blocks as large as most clusters: one waits for memory as long for all of its particles as for one.
 inline constexpr int kLabelThreads = 512, kRegroupThreads = 512;
+// Components that are gone through one by one when a cluster's members are regrouped.
+inline constexpr int kMostScanned = 4;
 // How many blocks share the pairs of one cluster in global_labels.
 inline constexpr int kPairsPerBlock = 1024;
 inline constexpr int kMostShares = 64;
@@ -421,10 +423,9 @@ namespace split_detail {
 template <class Block>
 CUTPROOF_DEVICE void rename_holder(Block& block, const DeviceView& w, int p, int from, int to) {
   for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
-    if (block.load(&w.memberships[k]) == from) {
-      block.store(&w.memberships[k], to);
-      return;
-    }
+    const int slot = block.load(&w.memberships[k]);
+    if (slot == from) block.store(&w.memberships[k], to);
+    if (slot >= 0 && to >= 0) block.store(&w.regroup[slot], 1);
   }
 }
 
@@ -447,6 +448,7 @@ CUTPROOF_DEVICE void regroup_members_kernel(Block& block, DeviceView w) {
     int* const slot_of_root = w.member_scratch + begin;
     int* const regrouped = w.member_scratch;
 
+    if (block.thread() == 0) block.store(&w.regroup[s], 1);
     int components = 0;
     for (int from = 0; from < size; from += block.size()) {
       const int k = from + block.thread();
@@ -458,6 +460,7 @@ CUTPROOF_DEVICE void regroup_members_kernel(Block& block, DeviceView w) {
       const int t = c == 0 ? s : first_new + c - 1;
       slot_of_root[k] = t;
       fill[t] = 0;
+      block.store(&w.regroup[t], 1);
       if (c == 0) continue;
       w.slot_number[t] = number + c - 1;
       w.slot_body[t] = w.slot_body[s];
@@ -493,27 +496,35 @@ CUTPROOF_DEVICE void regroup_members_kernel(Block& block, DeviceView w) {
     if (components == 0 && block.thread() == 0) w.slot_size[s] = 0;
     block.sync();
 
-    // Members in ascending order, a chunk at a time: each goes behind those of its component in this chunk.
+    // Members in ascending order, a chunk at a time: each goes behind those of its component that are before it.
+    int done[kMostScanned] = {};  // how many of a component are in chunks before, if there are few components
     for (int from = 0; from < size; from += block.size()) {
       const int k = from + block.thread();
       const int t = k < size ? w.label[begin + k] : -1;
+      const int p = k < size ? w.members[begin + k] : -1;
+      if (p >= 0 && t != s) rename_holder(block, w, p, s, t);
+      if (p >= 0 && t < 0) block.store(&w.membership_count[p], 0);
+      if (components <= kMostScanned) {
+        for (int c = 0; c < components; ++c) {
+          const int target = c == 0 ? s : first_new + c - 1;
+          int total = 0;
+          const int before = done[c] + block.exclusive_scan(t == target ? 1 : 0, total);
+          if (t == target) regrouped[w.slot_begin[t] + before] = p;
+          done[c] += total;
+        }
+        continue;
+      }
       chunk[block.thread()] = t;
       block.sync();
       int before = 0;
       bool last = true;
-      if (k < size) {
-        const int p = w.members[begin + k];
-        if (t != s) rename_holder(block, w, p, s, t);
-        if (t >= 0) {
-          for (int j = 0; j < block.size(); ++j) {
-            before += j < block.thread() && chunk[j] == t;
-            last = last && (j <= block.thread() || chunk[j] != t);
-          }
-          before += fill[t];
-          regrouped[before] = p;
-        } else {
-          block.store(&w.membership_count[p], 0);
+      if (t >= 0) {
+        for (int j = 0; j < block.size(); ++j) {
+          before += j < block.thread() && chunk[j] == t;
+          last = last && (j <= block.thread() || chunk[j] != t);
         }
+        before += fill[t];
+        regrouped[before] = p;
       }
       block.sync();
       if (t >= 0 && last) fill[t] = before + 1;

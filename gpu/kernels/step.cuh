@@ -24,20 +24,20 @@ namespace cutproof::gpu {
 
 namespace step_detail {
 
-// Whether body b takes part in this iteration. A body with fewer substeps or iterations than others waits.
-CUTPROOF_DEVICE inline bool takes_part(const DeviceView& w, int b, int substep, int iteration) {
-  return running(w, b) && substep < w.body[b].substeps && iteration < w.body[b].iterations;
+// Whether a body takes part in this iteration. One with fewer substeps or iterations than others waits.
+CUTPROOF_DEVICE inline bool takes_part(const Pace& pace, int substep, int iteration) {
+  return substep < pace.substeps && iteration < pace.iterations;
 }
 
 // The body of a particle, a cluster, a group. (Of a load of one body nothing has to be waited for.)
 CUTPROOF_DEVICE inline int body_index(const DeviceView& w, int p) { return w.bodies == 1 ? 0 : w.body_of[p]; }
 CUTPROOF_DEVICE inline int body_of_slot(const DeviceView& w, int s) { return w.bodies == 1 ? 0 : w.slot_body[s]; }
-CUTPROOF_DEVICE inline int body_of_group(const DeviceView& w, int g) {
-  return w.bodies == 1 ? 0 : w.group_head[g].body;
+CUTPROOF_DEVICE inline int body_of_group(const DeviceView& w, const GroupHead& head) {
+  return w.bodies == 1 ? 0 : head.body;
 }
 
-CUTPROOF_DEVICE inline Float3 grid_node(const BodyConstants& body, int node) {
-  const Coordinates c = coordinates(body, node);
+CUTPROOF_DEVICE inline Float3 grid_node(const Pace& pace, int node) {
+  const Coordinates c = coordinates(pace, node);
   return {static_cast<float>(c.i), static_cast<float>(c.j), static_cast<float>(c.k)};
 }
 
@@ -116,23 +116,50 @@ CUTPROOF_DEVICE inline float entry(const Map& map, int row, int k) {
   return k == 0 ? r.x : k == 1 ? r.y : k == 2 ? r.z : r.w;
 }
 
-CUTPROOF_DEVICE inline float substep_length(const DeviceView& w, const BodyConstants& body, int frame) {
-  return w.substep_length[body.frame_begin + frame];
-}
-// s of method.md §3.
-CUTPROOF_DEVICE inline float pull_of(const BodyConstants& body, float kdt2) {
-  return body.solver == Solver::implicit ? kdt2 / (1.0f + kdt2) : body.relaxation;
-}
 // l: how much of a prediction's own shape is lost after so many iterations.
-CUTPROOF_DEVICE inline float lost_fraction(const BodyConstants& body, float s, int iterations) {
+CUTPROOF_DEVICE inline float lost_fraction(const Pace& pace, int iterations) {
   if (iterations == 0) return 0.0f;
-  if (body.solver == Solver::implicit) return s;
-  float kept = 1.0f, power = 1.0f - s;
+  if (pace.solver == Solver::implicit) return pace.s;
+  float kept = 1.0f, power = 1.0f - pace.s;
   for (int n = iterations; n > 0; n /= 2) {
     if (n % 2 != 0) kept *= power;
     power *= power;
   }
   return 1.0f - kept;
+}
+
+// Of one body, in one iteration.
+struct Iteration {
+  float s;
+  bool implicit;
+  bool combined;  // the first iteration is plain
+  bool kept;      // the last has no next one to keep anything for
+  Combination combination;
+};
+CUTPROOF_DEVICE inline Iteration iteration_of(const Pace& pace, int iteration) {
+  Iteration now = {};
+  now.s = pace.s;
+  now.implicit = pace.solver == Solver::implicit;
+  const bool accelerated = pace.acceleration == Acceleration::chebyshev;
+  now.combined = accelerated && iteration > 0;
+  now.kept = accelerated && iteration + 1 < pace.iterations;
+  if (now.combined) now.combination = chebyshev(pace.kdt2, iteration);
+  return now;
+}
+
+// The displacement [m] that the last active grip of a set gives to its particles in a substep, from where they began.
+struct Held {
+  bool active = false;
+  Float3 moved;
+};
+CUTPROOF_DEVICE inline Held held_by(const DeviceView& w, const Pace& pace, int set, int substep) {
+  Held held;
+  if (set == 0) return held;
+  for (int k = w.hold_begin[set]; k < w.hold_begin[set + 1]; ++k) {
+    const int64_t entry = w.grips[w.hold_grips[k]].table + int64_t{pace.frame} * pace.substeps + substep;
+    if (w.grip_active[entry]) held = {true, w.grip_displacement[entry]};
+  }
+  return held;
 }
 
 // A group and what its lanes need of it.
@@ -141,32 +168,35 @@ struct Group {
   GroupHead head;
   RestCenter center;
   // X - X_g [h] of its particle k.
-  CUTPROOF_DEVICE Float3 rest(const DeviceView& w, const BodyConstants& body, int k) const {
-    return groups_detail::nodes_between(center, coordinates(body, w.place_node[head.begin + k]));
+  CUTPROOF_DEVICE Float3 rest(const DeviceView& w, const Pace& pace, int k) const {
+    return groups_detail::nodes_between(center, coordinates(pace, constant(&w.place_node[head.begin + k])));
   }
 };
-CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) { return {g, w.group_head[g], w.group_center[g]}; }
+CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) {
+  return {g, constant(&w.group_head[g]), constant(&w.group_center[g])};
+}
 
 // Lanes that share a group: one for each row of its map; and where its particles are looked at one by one, in the pass
 // over all of them and while it is resolved.
 inline constexpr int kRowTeam = 4, kParticleTeam = 16, kResolvedTeam = 32;
+inline constexpr int kMostByRows = 300'000;  // particles of a load
 
 // Weighted sums in the order of arrays.inc: 4 axis + k: of e rᵀ / h; 4 axis + 3: of e.
 template <class AnyTeam>
 using GroupSums = typename AnyTeam::template Sums<12>;
 
 // The rows of a map, each in the lane that has the item of its axis (Team::each).
-template <class Block>
+template <class AnyTeam>
 class Rows {
  public:
-  CUTPROOF_DEVICE Float4& of(int axis) { return row_[Block::on_device ? 0 : axis]; }
-  template <class AnyTeam>
+  CUTPROOF_DEVICE Float4& of(int axis) { return row_[AnyTeam::kLanes >= 3 ? 0 : axis]; }
   CUTPROOF_DEVICE Map all(const AnyTeam& team) {  // to every lane
+    static_assert(AnyTeam::kLanes == 1 || AnyTeam::kLanes >= 3);
     return {{team.from(0, of(0)), team.from(1, of(1)), team.from(2, of(2))}};
   }
 
  private:
-  Float4 row_[Block::on_device ? 1 : 3];
+  Float4 row_[AnyTeam::kLanes >= 3 ? 1 : 3];
 };
 
 CUTPROOF_DEVICE inline void add_moments(float* sums, float weight, Float3 e, Float3 e_per_h, Float3 r) {
@@ -185,10 +215,9 @@ CUTPROOF_DEVICE inline void store_moment(Float4* rows, int g, int n, float sum) 
 }
 
 // All points of a group that are at d~ + M(r) - l e; kept: 1 - l.
-CUTPROOF_DEVICE inline Ball ball_around(const BodyConstants& body, const Group& group, Float4 base, float kept,
-                                        const Map& map) {
+CUTPROOF_DEVICE inline Ball ball_around(const Pace& pace, const Group& group, Float4 base, float kept, const Map& map) {
   const RestCenter& center = group.center;
-  const RestPoint rest = {body.h,
+  const RestPoint rest = {pace.h,
                           {static_cast<float>(center.i) + center.x, static_cast<float>(center.j) + center.y,
                            static_cast<float>(center.k) + center.z}};
   // |h (I + L)| <= the root of its greatest sum by rows times its greatest sum by columns.
@@ -196,8 +225,8 @@ CUTPROOF_DEVICE inline Ball ball_around(const BodyConstants& body, const Group& 
   for (int k = 0; k < 3; ++k) {
     float row = 0, column = 0;
     for (int j = 0; j < 3; ++j) {
-      row += fabsf(entry(map, k, j) + (j == k ? body.h : 0.0f));
-      column += fabsf(entry(map, j, k) + (j == k ? body.h : 0.0f));
+      row += fabsf(entry(map, k, j) + (j == k ? pace.h : 0.0f));
+      column += fabsf(entry(map, j, k) + (j == k ? pace.h : 0.0f));
     }
     rows = fmaxf(rows, row);
     columns = fmaxf(columns, column);
@@ -211,46 +240,53 @@ CUTPROOF_DEVICE inline Ball ball_around(const BodyConstants& body, const Group& 
 // [h] A base farther than this from the mean of its group is not used.
 inline constexpr float kFarBase = 1.0f / 16.0f;
 
-// Of one body, when substep `substep` begins and the one before it ends.
-struct Turnover {
-  int frame;
-  float dt, decay;
-  float lost;        // of the positions with which the last substep ends
-  bool first, last;  // nothing ends; nothing begins
-};
-CUTPROOF_DEVICE inline Turnover turnover(const DeviceView& w, int b, int substep) {
-  const BodyConstants& body = w.body[b];
-  const int frame = w.frame[b];
-  const float dt = substep_length(w, body, frame);
-  const float s = pull_of(body, body.stiffness * dt * dt);
-  return {frame,
-          dt,
-          decay_by(body.damping * dt),
-          lost_fraction(body, s, body.iterations),
-          substep == 0,
-          substep == body.substeps};
-}
-CUTPROOF_DEVICE inline bool turns_over(const DeviceView& w, int b, int substep) {
-  return running(w, b) && substep <= w.body[b].substeps;
+// Whether a substep of a body ends, or begins, when substep `substep` begins.
+CUTPROOF_DEVICE inline bool turns_over(const Pace& pace, int substep) {
+  return pace.substeps > 0 && substep <= pace.substeps;
 }
 
 // Predicts, from a particle's end of the last substep.
-CUTPROOF_DEVICE inline Float3 predict(const BodyConstants& body, float dt, Float3 d, Float3 v) {
-  return d + (dt * v + (dt * dt) * body.gravity);
+CUTPROOF_DEVICE inline Float3 predict(const Pace& pace, Float3 d, Float3 v) { return d + (pace.dt * v + pace.fall); }
+
+// While a grip holds a group, its particles stay where it has put them, and what changes in an iteration is how much
+// they are pushed: by alpha (x - d~) + beta e - M(r), M being a map as those of carried groups are.
+enum : int { kCarried = 0, kResolved = 1, kHeld = 2 };  // DeviceView::group_resolved
+// Sets alpha and beta of the end of a substep. They follow from what an iteration does with one particle
+// (advance_particle), whose pull is G(r) - e, or, from where it is, G(r) - e - (x - d~).
+CUTPROOF_DEVICE inline void set_held_push(Pace& pace) {
+  float alpha = 1.0f, beta = 0.0f, earlier_alpha = 1.0f, earlier_beta = 0.0f;
+  for (int j = 0; j < pace.iterations; ++j) {
+    const Iteration now = iteration_of(pace, j);
+    const float kept = now.implicit ? now.s : 1.0f, part = now.combined ? now.combination.pull : 1.0f;
+    const auto next = [&](float is, float was, float added) {
+      const float carried = now.combined ? now.combination(kept * is, is, was) : kept * is;
+      return carried + part * added;
+    };
+    const float next_alpha = next(alpha, earlier_alpha, now.implicit ? 1.0f : now.s);
+    const float next_beta = next(beta, earlier_beta, now.s);
+    earlier_alpha = alpha;
+    earlier_beta = beta;
+    alpha = next_alpha;
+    beta = next_beta;
+  }
+  pace.held_alpha = alpha;
+  pace.held_beta = beta;
 }
 
-// The displacement that contacts let a particle have that is predicted at `predicted`.
-CUTPROOF_DEVICE inline Float3 enter_substep(const DeviceView& w, const Contacts& contacts, const RestPoint& rest,
-                                            int64_t o, Float4 predicted, Float3 start, float share) {
+// The displacement that contacts, or its grip, let a particle have that is predicted at `predicted`.
+CUTPROOF_DEVICE inline Float3 enter_substep(const DeviceView& w, const Contacts& contacts, const Held& held,
+                                            const RestPoint& rest, int64_t o, Float4 predicted, Float3 start,
+                                            float share) {
   bool in_turn = false;  // of no interest: there is no earlier point to compare with
-  const Float3 x = project(contacts, rest, xyz(predicted), predicted.w, start, in_turn);
+  const Float3 x =
+      held.active ? start + held.moved : project(contacts, rest, xyz(predicted), predicted.w, start, in_turn);
   w.position[o] = with_w(x, share);
   w.pushed[o] = with_w(x - xyz(predicted), 0.0f);
   return x;
 }
 
-CUTPROOF_DEVICE inline void end_impulse(const DeviceView& w, int p, const Turnover& now, Float3 pushed) {
-  w.impulse[p] = with_w(now.decay * (xyz(w.impulse[p]) + (1.0f / now.dt) * pushed), 0.0f);
+CUTPROOF_DEVICE inline void end_impulse(const DeviceView& w, int p, const Pace& pace, Float3 pushed) {
+  w.impulse[p] = with_w(pace.decay * xyz(w.impulse[p]) + pace.decay_per_dt * pushed, 0.0f);
 }
 
 // Where a carried particle with prediction `predicted` is. What is added is small where little has happened, however
@@ -262,126 +298,137 @@ CUTPROOF_DEVICE inline Float3 carried_to(Float3 base, float lost, Float3 predict
 // Of groups that are resolved: where they are listed, and those of the next substep to be.
 CUTPROOF_DEVICE inline int* listed_in(const DeviceView& w, int substep) { return w.counters->listed + substep % 2; }
 
+// The moments of a resolved group. (After its particles have moved, not while they do: sums and projections together
+// would need more registers than there are.)
+template <class AnyTeam>
+CUTPROOF_DEVICE void sum_resolved(const AnyTeam& team, const DeviceView& w, const Group& group, const Pace& pace,
+                                  Float3 base) {
+  const float of_each = 1.0f / static_cast<float>(group.head.holder_count), per_h = pace.per_h;
+  GroupSums<AnyTeam> sums;
+  team.each(group.head.size, [&](int k) {
+    const int o = group.head.begin + k;
+    const Float3 e = xyz(w.position[o]) - base;
+    add_moments(sums.of(k), of_each * w.start[o].w, e, per_h * e, group.rest(w, pace, k));
+  });
+  team.parted(sums).each(team, [&](int n, float sum) { store_moment(w.group_moments, group.index, n, sum); });
+}
+
 template <class AnyTeam, class Block>
-CUTPROOF_DEVICE void list_resolved(Block& block, const AnyTeam& team, const DeviceView& w, int g, int substep) {
+CUTPROOF_DEVICE void list_resolved(Block& block, const AnyTeam& team, const DeviceView& w, const Pace& pace, int g,
+                                   int substep) {
   if (!team.leads()) return;
-  w.group_resolved[g] = 1;
+  w.group_resolved[g] = kResolved;
   w.group_touched[g] = 1;
-  if (w.body[w.group_head[g].body].iterations == 0) return;  // nobody asks for the list, or empties it
-  w.resolved_groups[block.atomic_add(listed_in(w, substep), 1)] = g;
+  if (pace.iterations == 0) return;  // nobody asks for the list, or empties it
+  block.store(&w.resolved_groups[block.atomic_add(listed_in(w, substep), 1)], g);
 }
 
 template <bool kContacts, class Block>
 CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>& team, const DeviceView& w, int g,
                                  int substep) {
+  // What is needed is asked for first, and not when it is needed: each answer takes as long as the work.
   const Group group = group_of(w, g);
   const GroupHead& head = group.head;
-  const int b = body_of_group(w, g);
-  if (!turns_over(w, b, substep)) return;
-  const BodyConstants& body = w.body[b];
-  const Turnover now = turnover(w, b, substep);
+  if (head.size == 0) return;
+  const Pace pace = constant(&w.pace[body_of_group(w, head)]);
+  const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
+  const float shared = 1.0f / constant(&w.group_mass[g]).w;
+  block.wait_for_earlier();
+  const bool begins = substep == 0, ends = substep == pace.substeps;
   Map map = {};
   Float3 last_base;
-  [[maybe_unused]] bool resolved = false, touched = false;
-  if (!now.first) {
-    if (body.iterations > 0) map = load_map(w.group_map, g);
+  [[maybe_unused]] int state = kCarried;
+  [[maybe_unused]] bool touched = false;
+  if (!begins) {
+    map = load_map(w.group_map, g);
     last_base = xyz(w.group_base[g]);
-    if constexpr (kContacts) resolved = w.group_resolved[g] != 0;
+    if constexpr (kContacts) state = w.group_resolved[g];
   }
   if constexpr (kContacts) touched = w.group_touched[g] != 0;
+  if (!turns_over(pace, substep)) return;
+  if (pace.iterations == 0) map = {};
+  const float lost = lost_fraction(pace, pace.iterations);
+  const Held held = kContacts && !ends ? held_by(w, pace, head.hold_set, substep) : Held{};
+
   // Displacement and mass of particle k, and its velocity.
   const auto where = [&](int k, Float3& v) {
     const int o = head.begin + k;
-    if (now.first) {
+    if (begins) {
       const int p = w.place_particle[o];
       v = xyz(w.velocity[p]);
       return w.displacement[p];
     }
-    const Float4 start = w.start[o];
-    Float3 d;
-    if (resolved) {
-      d = xyz(w.position[o]);
-    } else {
-      d = carried_to(last_base, now.lost, xyz(w.predicted[o]), map, group.rest(w, body, k));
-    }
-    v = (now.decay / now.dt) * (d - xyz(start));
+    const Float4 start = w.start[o], predicted = w.predicted[o];
+    Float3 d = carried_to(last_base, lost, xyz(predicted), map, group.rest(w, pace, k));
+    if (state != kCarried) d = xyz(w.position[o]);
+    v = pace.decay_per_dt * (d - xyz(start));
     return with_w(d, start.w);
   };
   const auto end = [&](int k) {
     if constexpr (kContacts) {
-      if (now.first || !touched) return;
-      end_impulse(w, w.place_particle[head.begin + k], now, resolved ? xyz(w.pushed[head.begin + k]) : Float3{});
+      if (begins || !touched) return;
+      const int o = head.begin + k;
+      Float3 pushed;
+      if (state == kResolved) pushed = xyz(w.pushed[o]);
+      if (state == kHeld) {
+        const Float3 predicted = xyz(w.predicted[o]);
+        pushed = pace.held_alpha * (xyz(w.position[o]) - predicted) +
+                 (pace.held_beta * (predicted - last_base) - map(group.rest(w, pace, k)));
+      }
+      end_impulse(w, w.place_particle[o], pace, pushed);
     }
   };
-  if (now.last) {
-    team.each(head.size, [&](int k) {
-      Float3 v;
-      const Float4 d = where(k, v);
-      const int p = w.place_particle[head.begin + k];
-      end(k);
+  const int first = team.lane();  // the first of this lane's particles: nearly always the only one
+  Float4 of_first;                // its prediction, and what a holder gets of its mass
+  const float of_each = 1.0f / static_cast<float>(head.holder_count);
+  [[maybe_unused]] bool before = false, behind = false;  // the blade, when the substep begins
+  team.each(head.size, [&](int k) {
+    const int o = head.begin + k;
+    Float3 v;
+    const Float4 d = where(k, v);
+    end(k);
+    if (ends) {
+      const int p = w.place_particle[o];
       w.displacement[p] = d;
       w.velocity[p] = with_w(v, 0.0f);
-    });
-    return;
-  }
-
-  // Small numbers are summed: displacements less that of the particle in the middle. Only the lane that has it reads
-  // it, for it is that lane's to overwrite.
-  struct Begun {
-    Float4 d;
-    Float3 predicted;
-  };
-  const auto begin = [&](int k) {
-    Begun begun;
-    Float3 v;
-    begun.d = where(k, v);
-    begun.predicted = predict(body, now.dt, xyz(begun.d), v);
-    return begun;
-  };
-  const int first = team.lane();
-  Begun of_first = {};  // the first of this lane's particles: nearly always the only one
-  if (first < head.size) of_first = begin(first);
-  Float3 base = of_first.predicted;
-  if (head.middle >= team.kLanes && team.has(head.middle)) base = begin(head.middle).predicted;
-  base = team.from(head.middle, base);
-  const float holders = static_cast<float>(head.holder_count), per_h = 1.0f / body.h;
-  const Contacts contacts = kContacts ? contacts_of(w, body, now.frame, substep) : Contacts{};
-  float reach = 0;
-  [[maybe_unused]] bool before = false, behind = false;  // the blade, when the substep begins
-  GroupSums<Team<Block, kParticleTeam>> sums;
-  team.each(head.size, [&](int k) {
-    const Begun begun = k == first ? of_first : begin(k);
-    const Float4 d = begun.d;
-    const Float3 predicted = begun.predicted;
-    const int o = head.begin + k;
+      return;
+    }
+    const Float3 predicted = predict(pace, xyz(d), v);
     float side = 1.0f;
     if constexpr (kContacts) {
-      end(k);
-      side = blade_side(contacts, {body.h, grid_node(body, w.place_node[o])}, xyz(d));
+      side = blade_side(contacts, {pace.h, grid_node(pace, constant(&w.place_node[o]))}, xyz(d));
       (side < 0 ? behind : before) = true;
+      if (held.active) side = 0.0f;
     }
     w.start[o] = d;
     w.predicted[o] = with_w(predicted, side);
-    const Float3 e = predicted - base;
-    reach = fmaxf(reach, dot(e, e));
-    add_moments(sums.of(k), d.w / holders, e, per_h * e, group.rest(w, body, k));
+    if (k == first) of_first = with_w(predicted, of_each * d.w);
   });
-  auto total = team.parted(sums);
-  // Where that one is far off the others they are better measured from their mean. (Not always: what moves as a whole
-  // must have moments that vanish.)
-  const float shared = 1.0f / w.group_mass[g].w;
-  const Float3 off = {shared * total.get(team, 3), shared * total.get(team, 7), shared * total.get(team, 11)};
-  if (dot(off, off) > kFarBase * kFarBase * body.h * body.h) {
-    base = base + off;
+  if (ends) return;
+  // Small numbers are summed: displacements less that of the particle in the middle, or, where that one is far off the
+  // others, less their mean. (Not always: what moves as a whole must have moments that vanish.)
+  Float3 base = xyz(of_first);
+  if (head.middle >= team.kLanes && team.has(head.middle)) base = xyz(w.predicted[head.begin + head.middle]);
+  base = team.from(head.middle, base);
+  float reach = 0;
+  typename Team<Block, kParticleTeam>::template Parted<12> total;
+  for (int round = 0;; ++round) {
+    GroupSums<Team<Block, kParticleTeam>> sums;
     reach = 0;
-    sums = {};
     team.each(head.size, [&](int k) {
-      const int o = head.begin + k;
-      const Float3 e = xyz(w.predicted[o]) - base;
+      Float4 particle = of_first;
+      if (k != first) {
+        const int o = head.begin + k;
+        particle = with_w(xyz(w.predicted[o]), of_each * w.start[o].w);
+      }
+      const Float3 e = xyz(particle) - base;
       reach = fmaxf(reach, dot(e, e));
-      add_moments(sums.of(k), w.start[o].w / holders, e, per_h * e, group.rest(w, body, k));
+      add_moments(sums.of(k), particle.w, e, pace.per_h * e, group.rest(w, pace, k));
     });
     total = team.parted(sums);
+    const Float3 off = {shared * total.get(team, 3), shared * total.get(team, 7), shared * total.get(team, 11)};
+    if (round > 0 || !(dot(off, off) > kFarBase * kFarBase * pace.h * pace.h)) break;
+    base = base + off;
   }
   const Float4 base_and_reach = with_w(base, sqrtf(team.greatest(reach)) * (1.0f + 0x1p-20f));
   if (team.leads()) w.group_base[g] = base_and_reach;
@@ -390,57 +437,57 @@ CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>&
     before = team.any(before);
     behind = team.any(behind);
     const int side = before && behind ? 0 : behind ? -1 : 1;
-    const bool resolve = !is_clear(contacts, ball_around(body, group, base_and_reach, 1.0f, Map{}), side);
-    if (resolve) {
-      sums = {};
-      team.each(head.size, [&](int k) {
-        const int o = head.begin + k;
-        const RestPoint rest = {body.h, grid_node(body, w.place_node[o])};
-        const Float4 start = w.start[o];
-        const Float3 e = enter_substep(w, contacts, rest, o, w.predicted[o], xyz(start), 0.0f) - base;
-        add_moments(sums.of(k), start.w / holders, e, per_h * e, group.rest(w, body, k));
-      });
-      total = team.parted(sums);
-    }
+    const bool resolve =
+        held.active || !is_clear(contacts, ball_around(pace, group, base_and_reach, 1.0f, Map{}), side);
     if (team.leads()) {
       w.group_side[g] = side;
-      w.group_resolved[g] = 0;
+      w.group_resolved[g] = held.active ? kHeld : kCarried;
+      if (held.active) w.group_touched[g] = 1;
     }
-    if (resolve) list_resolved(block, team, w, g, substep);
+    if (resolve) {
+      if (!held.active) list_resolved(block, team, w, pace, g, substep);
+      team.each(head.size, [&](int k) {
+        const int o = head.begin + k;
+        const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
+        enter_substep(w, contacts, held, rest, o, w.predicted[o], xyz(w.start[o]), 0.0f);
+      });
+      return sum_resolved(team, w, group, pace, base);
+    }
   }
   total.each(team, [&](int n, float sum) { store_moment(w.group_moments, g, n, sum); });
 }
 
 template <bool kContacts>
 CUTPROOF_DEVICE inline void start_loose(const DeviceView& w, int o, int substep) {
-  const int p = w.place_particle[o], b = body_index(w, p);
-  if (!turns_over(w, b, substep)) return;
-  const BodyConstants& body = w.body[b];
-  const Turnover now = turnover(w, b, substep);
+  if (o < 0) return;
+  const int p = w.place_particle[o];
+  const Pace pace = constant(&w.pace[body_index(w, p)]);
+  if (!turns_over(pace, substep)) return;
   Float4 d;
   Float3 v;
-  if (now.first) {
+  if (substep == 0) {
     d = w.displacement[p];
     v = xyz(w.velocity[p]);
   } else {
     const Float4 start = w.start[o];
     d = with_w(xyz(w.position[o]), start.w);
-    v = (now.decay / now.dt) * (xyz(d) - xyz(start));
-    if constexpr (kContacts) end_impulse(w, p, now, xyz(w.pushed[o]));
+    v = pace.decay_per_dt * (xyz(d) - xyz(start));
+    if constexpr (kContacts) end_impulse(w, p, pace, xyz(w.pushed[o]));
   }
-  if (now.last) {
+  if (substep == pace.substeps) {
     w.displacement[p] = d;
     w.velocity[p] = with_w(v, 0.0f);
     return;
   }
   const float share = d.w / static_cast<float>(w.membership_count[p]);
-  Float4 predicted = with_w(predict(body, now.dt, xyz(d), v), 1.0f);
+  Float4 predicted = with_w(predict(pace, xyz(d), v), 1.0f);
   w.start[o] = d;
   if constexpr (kContacts) {
-    const Contacts contacts = contacts_of(w, body, now.frame, substep);
-    const RestPoint rest = {body.h, grid_node(body, w.place_node[o])};
-    predicted.w = blade_side(contacts, rest, xyz(d));
-    enter_substep(w, contacts, rest, o, predicted, xyz(d), share);
+    const Contacts contacts = contacts_of(w, pace, substep);
+    const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
+    const Held held = held_by(w, pace, groups_detail::hold_set(w, p), substep);
+    predicted.w = held.active ? 0.0f : blade_side(contacts, rest, xyz(d));
+    enter_substep(w, contacts, held, rest, o, predicted, xyz(d), share);
   } else {
     w.position[o] = with_w(xyz(predicted), share);
   }
@@ -455,7 +502,50 @@ CUTPROOF_DEVICE int64_t from_last(const Block& block) {
   return block.stride() - 1 - block.first();
 }
 
-// Clears what a frame counts.
+namespace step_detail {
+
+CUTPROOF_DEVICE inline Pace pace_of(const DeviceView& w, int b) {
+  const BodyConstants& body = w.body[b];
+  Pace pace = {};
+  pace.first_move = -1;
+  if (!running(w, b)) return pace;
+  pace.substeps = body.substeps;
+  pace.iterations = body.iterations;
+  pace.frame = w.frame[b];
+  pace.h = body.h;
+  pace.per_h = 1.0f / body.h;
+  pace.dt = w.substep_length[body.frame_begin + pace.frame];
+  pace.kdt2 = body.stiffness * pace.dt * pace.dt;
+  pace.decay = decay_by(body.damping * pace.dt);
+  pace.decay_per_dt = pace.decay / pace.dt;
+  pace.s = body.solver == Solver::implicit ? pace.kdt2 / (1.0f + pace.kdt2) : body.relaxation;
+  pace.fall = (pace.dt * pace.dt) * body.gravity;
+  pace.solver = body.solver;
+  pace.acceleration = body.acceleration;
+  for (int axis = 0; axis < 2; ++axis) pace.nodes[axis] = body.nodes[axis];
+  pace.by_row = body.by_row;
+  pace.by_layer = body.by_layer;
+  // A geometric blade removes what it sweeps and touches nothing.
+  if (body.has_blade && body.criterion != Criterion::geometric) {
+    pace.first_move = body.schedule + int64_t{pace.frame} * body.substeps;
+  }
+  pace.wall_begin = body.wall_begin;
+  pace.wall_count = body.wall_end - body.wall_begin;
+  pace.frictionless_walls = 1;
+  for (int k = body.wall_begin; k < body.wall_end; ++k) {
+    if (w.walls[k].friction != 0) pace.frictionless_walls = 0;
+  }
+  pace.half_length = 0.5f * body.blade_length;
+  pace.depth = body.blade_depth;
+  pace.clearance = body.clearance;
+  pace.blade_friction = body.blade_friction;
+  set_held_push(pace);
+  return pace;
+}
+
+}  // namespace step_detail
+
+// Clears what a frame counts, and says what its bodies need.
 template <class Block>
 CUTPROOF_DEVICE void begin_frame_kernel(Block& block, const DeviceView& w) {
   using namespace step_detail;
@@ -464,12 +554,14 @@ CUTPROOF_DEVICE void begin_frame_kernel(Block& block, const DeviceView& w) {
     w.counters->debris = 0;
     w.counters->affected = 0;
     w.counters->listed[0] = 0;
+    w.counters->regrouped = w.counters->remeasured = w.counters->due_particles = w.counters->due_pairs = 0;
   }
   for (int64_t b = block.first(); b < w.bodies; b += block.stride()) {
     if (running(w, static_cast<int>(b))) w.cut[b] = -1;
+    w.pace[b] = pace_of(w, static_cast<int>(b));
   }
   if (w.any_contact) {
-    for (int64_t g = block.first(); g < w.counters->groups; g += block.stride()) w.group_touched[g] = 0;
+    for (int64_t g = block.first(); g < w.group_capacity; g += block.stride()) w.group_touched[g] = 0;
   }
   for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
     const int p = static_cast<int>(i);
@@ -488,39 +580,15 @@ template <bool kContacts, class Block>
 CUTPROOF_DEVICE void start_substep_kernel(Block& block, const DeviceView& w, int substep) {
   using namespace step_detail;
   const Team<Block, kParticleTeam> team(block);
-  for (int64_t g = team.first(); g < w.counters->groups; g += team.stride()) {
+  const int groups = w.counters->groups;
+  for (int64_t g = team.first(); g < groups; g += team.stride()) {
     start_group<kContacts>(block, team, w, static_cast<int>(g), substep);
   }
+  block.wait_for_earlier();
   for (int64_t k = from_last(block); k < w.counters->loose; k += block.stride()) {
     start_loose<kContacts>(w, w.loose_places[k], substep);
   }
 }
-
-// Puts the particles that are held in this substep where their grip moves them. They are loose.
-template <class Block>
-CUTPROOF_DEVICE void hold_particles_kernel(Block& block, const DeviceView& w, int substep) {
-  for (int b = 0; b < w.bodies; ++b) {
-    const BodyConstants& body = w.body[b];
-    if (!running(w, b) || substep >= body.substeps) continue;
-    for (int g = body.grip_begin; g < body.grip_end; ++g) {
-      const GripF grip = w.grips[g];
-      const int64_t entry = grip.table + static_cast<int64_t>(w.frame[b]) * body.substeps + substep;
-      if (!w.grip_active[entry]) continue;
-      const Float3 moved = w.grip_displacement[entry];
-      for (int64_t k = grip.particle_begin + block.first(); k < grip.particle_end; k += block.stride()) {
-        const int p = w.grip_particles[k];
-        if (!alive(w, p)) continue;
-        const int o = w.place_of[p];
-        const Float3 x = xyz(w.start[o]) + moved;
-        const Float3 predicted = xyz(w.predicted[o]);
-        w.predicted[o] = with_w(predicted, 0.0f);
-        w.position[o] = with_w(x, w.position[o].w);
-        w.pushed[o] = with_w(x - predicted, 0.0f);
-      }
-    }
-  }
-}
-CUTPROOF_KERNEL(hold_particles_kernel);
 
 // ---- clusters
 
@@ -539,15 +607,15 @@ inline constexpr std::size_t kMatchShared = kTeams * sizeof(ClusterSums);
 template <class Block>
 CUTPROOF_DEVICE void sum_cluster(const Team<Block, kClusterTeam>& team, const DeviceView& w, int s,
                                  const ClusterHead& head, Offset first, ClusterSums& found) {
-  const BodyConstants& body = w.body[body_of_slot(w, s)];
-  const float h = body.h, per_h = 1.0f / h;
+  const Pace pace = constant(&w.pace[body_of_slot(w, s)]);
+  const float per_h = pace.per_h;
   const Offset* const groups = w.cluster_groups + head.group_begin;
   const int* const loose = w.cluster_loose + head.loose_begin;
   const Float3 base = head.group_count > 0 ? xyz(w.group_base[team.from(0, first.index)]) : xyz(w.position[loose[0]]);
   typename Team<Block, kClusterTeam>::template Sums<12> sums;
   team.each(head.group_count, [&](int k) {
-    const Offset to = k == team.lane() ? first : groups[k];
-    const Float4 mass = w.group_mass[to.index];
+    const Offset to = k == team.lane() ? first : constant(&groups[k]);
+    const Float4 mass = constant(&w.group_mass[to.index]);
     const Float3 apart = xyz(w.group_base[to.index]) - base;
     float* const sum = sums.of(k);
     for (int axis = 0; axis < 3; ++axis) {
@@ -564,7 +632,8 @@ CUTPROOF_DEVICE void sum_cluster(const Team<Block, kClusterTeam>& team, const De
     const int o = loose[k];
     const Float4 now = w.position[o];
     const Float3 e = xyz(now) - base;
-    add_moments(sums.of(k), now.w, e, per_h * e, nodes_from_rest_center(w, coordinates(body, w.place_node[o]), s));
+    add_moments(sums.of(k), now.w, e, per_h * e,
+                nodes_from_rest_center(w, coordinates(pace, constant(&w.place_node[o])), s));
   });
   team.parted(sums).each(team, [&](int n, float sum) { found.moments.v[n] = sum; });
   if (team.leads()) found.base = base;
@@ -578,14 +647,14 @@ struct ClusterRest {
 };
 CUTPROOF_DEVICE inline ClusterRest rest_of_cluster(const DeviceView& w, int s) {
   const Float4* const row = w.cluster_rest + 3 * int64_t{s};
-  return {{row[0], row[1], row[2]}, w.rotation[s], w.slot_size[s]};
+  return {{constant(&row[0]), constant(&row[1]), constant(&row[2])}, w.rotation[s], w.slot_size[s]};
 }
 
 // Centre and rotation of a cluster from its sums.
 template <int Method>
 CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const ClusterRest& rest,
                                           const ClusterSums& sums) {
-  const float h = w.body[body_of_slot(w, s)].h;
+  const float h = constant(&w.pace[body_of_slot(w, s)]).h;
   const float* const moment = sums.moments.v;
   const Float4 first = rest.row[0], second = rest.row[1], third = rest.row[2];
   const Float3 rest_moment = xyz(first), moved = {moment[3], moment[7], moment[11]};
@@ -624,12 +693,12 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
   const int slots = w.counters->slots_used;
   const auto wanted = [&](int64_t s) {
     if (s >= slots) return false;
-    const ClusterHead head = w.cluster_head[s];
+    const ClusterHead head = constant(&w.cluster_head[s]);
     return head.group_count + head.loose_count > 0 &&
-           takes_part(w, body_of_slot(w, static_cast<int>(s)), substep, iteration);
+           takes_part(constant(&w.pace[body_of_slot(w, static_cast<int>(s))]), substep, iteration);
   };
   const auto first_of = [&](const ClusterHead& head) {
-    return team.lane() < head.group_count ? w.cluster_groups[head.group_begin + team.lane()] : Offset{};
+    return team.lane() < head.group_count ? constant(&w.cluster_groups[head.group_begin + team.lane()]) : Offset{};
   };
   // What does not change in a substep is read ahead.
   if constexpr (Block::on_device) {
@@ -641,7 +710,7 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
       ClusterHead head = {};
       Offset first = {};
       if (sums) {
-        head = w.cluster_head[begin + mine];
+        head = constant(&w.cluster_head[begin + mine]);
         first = first_of(head);
       }
       ClusterRest rest;
@@ -674,7 +743,7 @@ template <int Method>
 struct match_shapes_kernel_object {
   static constexpr const char* kName = "match_shapes_kernel";
   static constexpr bool kReadsAhead = true;
-  static constexpr int kMaxThreads = step_detail::kMatchThreads;
+  static constexpr int kMaxThreads = step_detail::kMatchThreads, kMinBlocks = 5;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, int iteration) const {
     match_shapes_kernel<Method>(block, w, substep, iteration);
@@ -685,32 +754,10 @@ struct match_shapes_kernel_object {
 
 namespace step_detail {
 
-// Of one body, in one iteration.
-struct Iteration {
-  float s;
-  bool implicit;
-  bool combined;  // the first iteration is plain
-  bool kept;      // the last has no next one to keep anything for
-  Combination combination;
-};
-CUTPROOF_DEVICE inline Iteration iteration_of(const DeviceView& w, int b, int iteration) {
-  const BodyConstants& body = w.body[b];
-  const float dt = substep_length(w, body, w.frame[b]);
-  const float kdt2 = body.stiffness * dt * dt;
-  Iteration now = {};
-  now.s = pull_of(body, kdt2);
-  now.implicit = body.solver == Solver::implicit;
-  const bool accelerated = body.acceleration == Acceleration::chebyshev;
-  now.combined = accelerated && iteration > 0;
-  now.kept = accelerated && iteration + 1 < body.iterations;
-  if (now.combined) now.combination = chebyshev(kdt2, iteration);
-  return now;
-}
-
 // Particle by particle: the one at place o goes from x towards `from` + pull, `from` being its prediction, or x itself
 // in the published way.
 template <bool kContacts, bool kAccelerated>
-CUTPROOF_DEVICE inline Float3 advance_particle(const DeviceView& w, const BodyConstants& body, const Contacts& contacts,
+CUTPROOF_DEVICE inline Float3 advance_particle(const DeviceView& w, const Pace& pace, const Contacts& contacts,
                                                const Iteration& now, int64_t o, Float4 predicted, Float4 at,
                                                Float3 from, Float3 pull) {
   const Float3 x = xyz(at);
@@ -726,7 +773,7 @@ CUTPROOF_DEVICE inline Float3 advance_particle(const DeviceView& w, const BodyCo
     if (predicted.w == 0) {
       next = x;  // a held particle stays where its grip has put it
     } else {
-      const RestPoint rest = {body.h, grid_node(body, w.place_node[o])};
+      const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
       const Float3 start = xyz(w.start[o]);
       next = next_position(contacts, rest, free, predicted.w, start, x);
       if constexpr (kAccelerated) {
@@ -758,7 +805,7 @@ struct FirstHolders {
 CUTPROOF_DEVICE inline FirstHolders holders_from(const DeviceView& w, const GroupHead& head, int begin) {
   FirstHolders holders;
   for (int k = 0; k < kAtOnce; ++k) {
-    holders.to[k] = w.holders[head.holder_begin + begin + (begin + k < head.holder_count ? k : 0)];
+    holders.to[k] = constant(&w.holders[head.holder_begin + begin + (begin + k < head.holder_count ? k : 0)]);
   }
   return holders;
 }
@@ -796,17 +843,17 @@ CUTPROOF_DEVICE Float4 row_of(Of of, Float4 a, Float4 b) {
 // iteration ago. Nothing has touched them.
 template <bool kAccelerated, class Block>
 CUTPROOF_DEVICE void resolve(Block& block, const Team<Block, kResolvedTeam>& team, const DeviceView& w,
-                             const Group& group, const BodyConstants& body, const Iteration& now, Float3 base,
-                             int substep, int iteration) {
+                             const Group& group, const Pace& pace, const Iteration& now, Float3 base, int substep,
+                             int iteration) {
   const int g = group.index;
   Map is = {}, was = {};
   if (iteration > 0) is = load_map(w.group_map, g);
   if constexpr (kAccelerated) was = iteration > 1 && now.combined ? load_map(w.group_earlier_map, g) : is;
-  const float lost = lost_fraction(body, now.s, iteration);
-  [[maybe_unused]] const float lost_earlier = lost_fraction(body, now.s, iteration > 0 ? iteration - 1 : 0);
+  const float lost = lost_fraction(pace, iteration);
+  [[maybe_unused]] const float lost_earlier = lost_fraction(pace, iteration > 0 ? iteration - 1 : 0);
   team.each(group.head.size, [&](int k) {
     const int o = group.head.begin + k;
-    const Float3 predicted = xyz(w.predicted[o]), r = group.rest(w, body, k);
+    const Float3 predicted = xyz(w.predicted[o]), r = group.rest(w, pace, k);
     w.position[o] = with_w(carried_to(base, lost, predicted, is, r), 0.0f);
     w.pushed[o] = Float4{};
     if constexpr (kAccelerated) {
@@ -814,64 +861,90 @@ CUTPROOF_DEVICE void resolve(Block& block, const Team<Block, kResolvedTeam>& tea
       w.pushed_earlier[o] = Float4{};
     }
   });
-  list_resolved(block, team, w, g, substep);
+  list_resolved(block, team, w, pace, g, substep);
+}
+
+// A group, and what of it does not change in a substep.
+struct GroupAhead {
+  Group group;
+  FirstHolders holders;
+  Float4 base;
+};
+CUTPROOF_DEVICE inline GroupAhead group_ahead(const DeviceView& w, int g) {
+  const Group group = group_of(w, g);
+  return {group, holders_from(w, group.head, 0), w.group_base[g]};
 }
 
 // One iteration of the particles of a resolved group. begins: it has been carried so far.
 template <bool kContacts, bool kAccelerated, class Block>
-CUTPROOF_DEVICE void advance_resolved(Block& block, const Team<Block, kResolvedTeam>& team, const DeviceView& w, int g,
-                                      int substep, int iteration, bool begins) {
-  const int b = body_of_group(w, g);
-  if (!takes_part(w, b, substep, iteration)) return;
-  const Group group = group_of(w, g);
+CUTPROOF_DEVICE void advance_resolved(Block& block, const Team<Block, kResolvedTeam>& team, const DeviceView& w,
+                                      const GroupAhead& ahead, int substep, int iteration, bool begins) {
+  const Group& group = ahead.group;
   const GroupHead& head = group.head;
-  const BodyConstants& body = w.body[b];
-  const Contacts contacts = contacts_of(w, body, w.frame[b], substep);
-  const Iteration now = iteration_of(w, b, iteration);
-  const Float4 base_and_reach = w.group_base[g];
-  const Float3 base = xyz(base_and_reach);
-  if (begins) resolve<kAccelerated>(block, team, w, group, body, now, base, substep, iteration);
-  Rows<Block> rows;
-  const FirstHolders first = holders_from(w, head, 0);
-  team.each(3, [&](int axis) { rows.of(axis) = mean_goal(w, head, first, body.h, base_and_reach, axis); });
+  const Pace pace = constant(&w.pace[body_of_group(w, head)]);
+  if (!takes_part(pace, substep, iteration)) return;
+  const Contacts contacts = contacts_of(w, pace, substep);
+  const Iteration now = iteration_of(pace, iteration);
+  const Float3 base = xyz(ahead.base);
+  if (begins) resolve<kAccelerated>(block, team, w, group, pace, now, base, substep, iteration);
+  Rows<Team<Block, kResolvedTeam>> rows;
+  team.each(3, [&](int axis) { rows.of(axis) = mean_goal(w, head, ahead.holders, pace.h, ahead.base, axis); });
   const Map goal = rows.all(team);
-  const float holders = static_cast<float>(head.holder_count), per_h = 1.0f / body.h;
-  GroupSums<Team<Block, kResolvedTeam>> sums;
   team.each(head.size, [&](int k) {
     const int o = head.begin + k;
     const Float4 predicted = w.predicted[o], at = w.position[o];
     const Float3 from = now.implicit ? xyz(predicted) : xyz(at);
-    const Float3 r = group.rest(w, body, k);
-    const Float3 pull = (base - from) + goal(r);
-    const Float3 e =
-        advance_particle<kContacts, kAccelerated>(w, body, contacts, now, o, predicted, at, from, pull) - base;
-    add_moments(sums.of(k), w.start[o].w / holders, e, per_h * e, r);
+    const Float3 pull = (base - from) + goal(group.rest(w, pace, k));
+    advance_particle<kContacts, kAccelerated>(w, pace, contacts, now, o, predicted, at, from, pull);
   });
-  team.parted(sums).each(team, [&](int n, float sum) { store_moment(w.group_moments, g, n, sum); });
+  sum_resolved(team, w, group, pace, base);
 }
 
 // Of a group that was carried until now. Says whether it may touch a contact in this iteration: then nothing has been
 // done.
-template <bool kContacts, bool kAccelerated, class Block>
-CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRowTeam>& team, const DeviceView& w, int g,
+template <bool kContacts, bool kAccelerated, class Block, int kRows>
+CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& team, const DeviceView& w, int g,
                                      int substep, int iteration) {
-  const GroupHead head = w.group_head[g];
-  const int b = body_of_group(w, g);
-  if (!takes_part(w, b, substep, iteration)) return false;
+  const GroupAhead ahead = group_ahead(w, g);
+  const GroupHead& head = ahead.group.head;
+  const Float4 base = ahead.base;
+  const Pace pace = constant(&w.pace[body_of_group(w, head)]);
+  const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
+  [[maybe_unused]] int side = 0, state = kCarried;
   if constexpr (kContacts) {
-    if (w.group_resolved[g] != 0) return false;
+    side = w.group_side[g];
+    state = w.group_resolved[g];
   }
-  const BodyConstants& body = w.body[b];
-  const Iteration now = iteration_of(w, b, iteration);
-  const Float4 base = w.group_base[g];
-  const FirstHolders first = holders_from(w, head, 0);
-  const float lost_next = lost_fraction(body, now.s, iteration + 1);
   block.wait_for_earlier();  // for the clusters: all else is older
-  Rows<Block> present, plain, next;
+  if (head.size == 0 || state == kResolved || !takes_part(pace, substep, iteration)) return false;
+  const Iteration now = iteration_of(pace, iteration);
+  const float lost_next = lost_fraction(pace, iteration + 1);
+  Rows<Team<Block, kRows>> present, plain, next;
   team.each(3, [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
     if (iteration > 0) present.of(axis) = w.group_map[at];
-    const Float4 goal = mean_goal(w, head, first, body.h, base, axis);
+    const Float4 goal = mean_goal(w, head, ahead.holders, pace.h, base, axis);
+    if constexpr (kContacts) {
+      if (state == kHeld) {
+        // As set_held_push().
+        const float kept = now.implicit ? now.s : 1.0f, added = now.combined ? now.combination.pull * now.s : now.s;
+        const auto pushed = [&](float of_goal, float is) { return kept * is + added * of_goal; };
+        Float4 row = row_of(pushed, goal, present.of(axis));
+        if constexpr (kAccelerated) {
+          if (now.combined) {
+            const Float4 y = present.of(axis), z = iteration > 1 ? w.group_earlier_map[at] : y;
+            const auto combined = [&](float is, float was, float of_goal) {
+              return now.combination(kept * is, is, was) + added * of_goal;
+            };
+            row = {combined(y.x, z.x, goal.x), combined(y.y, z.y, goal.y), combined(y.z, z.z, goal.z),
+                   combined(y.w, z.w, goal.w)};
+          }
+          if (now.kept) w.group_earlier_map[at] = present.of(axis);
+        }
+        w.group_map[at] = row;
+        return;
+      }
+    }
     const auto relaxed = [&](float wanted, float is) {
       const float toward = now.s * wanted;
       return now.implicit ? toward : (1.0f - now.s) * is + toward;
@@ -887,19 +960,17 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRowTeam>& 
     }
   });
   if constexpr (kContacts) {
-    const Group group = {g, head, w.group_center[g]};
-    const Contacts contacts = contacts_of(w, body, w.frame[b], substep);
-    const int side = w.group_side[g];
-    const auto clear = [&](Rows<Block>& candidate) {
-      return is_clear(contacts, ball_around(body, group, base, 1.0f - lost_next, candidate.all(team)), side);
+    if (state == kHeld) return false;
+    const auto clear = [&](Rows<Team<Block, kRows>>& candidate) {
+      return is_clear(contacts, ball_around(pace, ahead.group, base, 1.0f - lost_next, candidate.all(team)), side);
     };
     // A contact with either candidate of an accelerated iteration means the plain way.
     if (!clear(plain) || (now.combined && !clear(next))) return true;
   }
-  const bool more = iteration + 1 < body.iterations;
-  const float per_h = 1.0f / body.h;
-  const Float4 mass = w.group_mass[g], upper = w.group_spread[2 * int64_t{g}],
-               lower = w.group_spread[2 * int64_t{g} + 1];
+  const bool more = iteration + 1 < pace.iterations;
+  const float per_h = pace.per_h;
+  const Float4 mass = constant(&w.group_mass[g]), upper = constant(&w.group_spread[2 * int64_t{g}]),
+               lower = constant(&w.group_spread[2 * int64_t{g} + 1]);
   team.each(3, [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
     const Float4 row = next.of(axis);
@@ -921,23 +992,24 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRowTeam>& 
 
 template <bool kContacts, bool kAccelerated>
 CUTPROOF_DEVICE inline void advance_loose(const DeviceView& w, int o, int substep, int iteration) {
-  const int p = w.place_particle[o], b = body_index(w, p);
-  if (!takes_part(w, b, substep, iteration)) return;
-  const BodyConstants& body = w.body[b];
-  const Iteration now = iteration_of(w, b, iteration);
+  if (o < 0) return;
+  const int p = w.place_particle[o];
+  const Pace pace = constant(&w.pace[body_index(w, p)]);
+  if (!takes_part(pace, substep, iteration)) return;
+  const Iteration now = iteration_of(pace, iteration);
   const Float4 predicted = w.predicted[o], at = w.position[o];
   const Float3 from = now.implicit ? xyz(predicted) : xyz(at);
   // Mean of the goals, less `from`: small numbers, so that summing them costs no digits of d.
   const int clusters = w.membership_count[p];
   Float3 pull = xyz(at) - from;  // a particle in no cluster stays where it is
   if (clusters > 0) {
-    const Coordinates c = coordinates(body, w.place_node[o]);
+    const Coordinates c = coordinates(pace, constant(&w.place_node[o]));
     Float3 sum;
     const int end = w.membership_begin[p + 1];
     for (int k = w.membership_begin[p]; k < end; ++k) {
       const int slot = w.memberships[k];
       if (slot < 0) continue;
-      const Float3 r = body.h * nodes_from_rest_center(w, c, slot);
+      const Float3 r = pace.h * nodes_from_rest_center(w, c, slot);
       const Map place = load_map(w.placement, slot);
       const Float3 center = {place.row[0].w, place.row[1].w, place.row[2].w};
       const Float3 turned = {place.row[0].x * r.x + place.row[0].y * r.y + place.row[0].z * r.z,
@@ -947,38 +1019,55 @@ CUTPROOF_DEVICE inline void advance_loose(const DeviceView& w, int o, int subste
     }
     pull = (1.0f / static_cast<float>(clusters)) * sum;
   }
-  const Contacts contacts = kContacts ? contacts_of(w, body, w.frame[b], substep) : Contacts{};
-  advance_particle<kContacts, kAccelerated>(w, body, contacts, now, o, predicted, at, from, pull);
+  const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
+  advance_particle<kContacts, kAccelerated>(w, pace, contacts, now, o, predicted, at, from, pull);
 }
 
 }  // namespace step_detail
 
-template <bool kContacts, bool kAccelerated, class Block>
+// kRows: lanes that share a carried group.
+template <bool kContacts, bool kAccelerated, int kRows, class Block>
 CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int substep, int iteration) {
   using namespace step_detail;
-  const Team<Block, kRowTeam> rows(block);
+  const Team<Block, kRows> rows(block);
   const Team<Block, kResolvedTeam> team(block);
   const int groups = w.counters->groups;
-  // Whole warps at a time: those groups that turn out to be no longer clear are everybody's.
-  const int64_t ahead = rows.first() % (team.kLanes / rows.kLanes);
-  for (int64_t k = rows.first(); k - ahead < groups; k += rows.stride()) {
-    const int g = static_cast<int>(k);
-    const bool begins = k < groups && advance_carried<kContacts, kAccelerated>(block, rows, w, g, substep, iteration);
+  // Whole warps at a time: groups that turn out to be no longer clear are everybody's, as are those that were resolved
+  // before, with which the last warps begin. All of them in one place, because there is much to it.
+  const int64_t in_warp = rows.first() % (team.kLanes / rows.kLanes);
+  int64_t row = rows.first(), listed = from_last(team);
+  [[maybe_unused]] unsigned found = 0;
+  [[maybe_unused]] int resolved = -1;
+  while (true) {
+    [[maybe_unused]] bool begins = false;
+    [[maybe_unused]] int g = -1;
+    if (found != 0) {
+      begins = true;
+      g = team.take(found, static_cast<int>(row - rows.stride()));
+    } else if (row - in_warp < groups) {
+      const bool touches = row < groups && advance_carried<kContacts, kAccelerated>(
+                                               block, rows, w, static_cast<int>(row), substep, iteration);
+      if constexpr (kContacts) found = team.found(touches && rows.leads());
+      row += rows.stride();
+      continue;
+    } else if constexpr (kContacts) {
+      if (resolved < 0) {
+        block.wait_for_earlier();
+        resolved = w.counters->resolved;
+      }
+      if (listed >= resolved) break;
+      g = block.load(&w.resolved_groups[listed]);
+      listed += team.stride();
+    } else {
+      break;
+    }
     if constexpr (kContacts) {
-      team.for_found(begins && rows.leads(), g, [&](int found) {
-        advance_resolved<kContacts, kAccelerated>(block, team, w, found, substep, iteration, true);
-      });
+      advance_resolved<kContacts, kAccelerated>(block, team, w, group_ahead(w, g), substep, iteration, begins);
     }
   }
   block.wait_for_earlier();
-  // The last threads begin with groups that were resolved before, those before them with loose particles.
-  const int64_t resolved = kContacts ? w.counters->resolved : 0;
-  if constexpr (kContacts) {
-    for (int64_t k = from_last(team); k < resolved; k += team.stride()) {
-      advance_resolved<kContacts, kAccelerated>(block, team, w, w.resolved_groups[k], substep, iteration, false);
-    }
-  }
-  int64_t k = from_last(block) - resolved * team.kLanes % block.stride();
+  // Before those, the threads with loose particles.
+  int64_t k = from_last(block) - (kContacts ? int64_t{w.counters->resolved} : 0) * team.kLanes % block.stride();
   if (k < 0) k += block.stride();
   for (; k < w.counters->loose; k += block.stride()) {
     advance_loose<kContacts, kAccelerated>(w, w.loose_places[k], substep, iteration);
@@ -988,20 +1077,21 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
 template <bool kContacts>
 struct start_substep_kernel_object {
   static constexpr const char* kName = "start_substep_kernel";
-  static constexpr int kMaxThreads = 256, kMinBlocks = 3;
+  static constexpr int kMaxThreads = 128, kMinBlocks = 5;
+  static constexpr bool kReadsAhead = true;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep) const {
     start_substep_kernel<kContacts>(block, w, substep);
   }
 };
-template <bool kContacts, bool kAccelerated>
+template <bool kContacts, bool kAccelerated, int kRows>
 struct advance_kernel_object {
   static constexpr const char* kName = "advance_kernel";
-  static constexpr int kMaxThreads = 256, kMinBlocks = 3;
+  static constexpr int kMaxThreads = 128, kMinBlocks = 5;
   static constexpr bool kReadsAhead = true;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, int iteration) const {
-    advance_kernel<kContacts, kAccelerated>(block, w, substep, iteration);
+    advance_kernel<kContacts, kAccelerated, kRows>(block, w, substep, iteration);
   }
 };
 
@@ -1011,16 +1101,25 @@ template <int Method, bool kContacts, bool kAccelerated, class Launcher>
 CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   const int64_t particles = w.particles > w.bodies ? w.particles : w.bodies;
   const int64_t lanes = int64_t{kParticleTeam} * w.group_capacity;
-  const int64_t items = lanes > w.particles ? lanes : w.particles;
-  enqueue_groups(launcher, w);
+  const int64_t items = lanes > w.place_capacity ? lanes : w.place_capacity;
   launcher.items(begin_frame_kernel_object{}, particles, w);
+  enqueue_groups(launcher, w);
+  // Of a small load each group has lanes enough for its rows; of a large one they would all do what one can do for
+  // three.
+  const auto advance = [&](Launcher& on, int substep, int iteration) {
+    if constexpr (!requires { typename Launcher::OneLaunch; }) {
+      if (w.particles > kMostByRows) {
+        return on.items(advance_kernel_object<kContacts, kAccelerated, 1>{}, items, w, substep, iteration);
+      }
+    }
+    on.items(advance_kernel_object<kContacts, kAccelerated, kRowTeam>{}, items, w, substep, iteration);
+  };
   for (int substep = 0; substep < plan.substeps; ++substep) {
     launcher.items(start_substep_kernel_object<kContacts>{}, items, w, substep);
-    if (plan.grips) launcher.items(hold_particles_kernel_object{}, particles, w, substep);
     for (int iteration = 0; iteration < plan.iterations; ++iteration) {
       launcher.blocks(match_shapes_kernel_object<Method>{}, (w.slot_capacity + kTeams - 1) / kTeams, kMatchThreads,
                       kMatchShared, w, substep, iteration);
-      launcher.items(advance_kernel_object<kContacts, kAccelerated>{}, items, w, substep, iteration);
+      advance(launcher, substep, iteration);
     }
   }
   launcher.items(start_substep_kernel_object<kContacts>{}, items, w, plan.substeps);
@@ -1044,7 +1143,7 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
 // All substeps of the frame of every running body.
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_step(Launcher& launcher, const DeviceView& w, const Plan& plan) {
-  if constexpr (requires { typename Launcher::OnlyDefaultRotation; }) {
+  if constexpr (requires { typename Launcher::OneLaunch; }) {
     step_detail::enqueue<kNewton>(launcher, w, plan);
   } else {
     switch (w.rotation_method) {

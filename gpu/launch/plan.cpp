@@ -18,7 +18,6 @@ Plan make_plan(const std::vector<Setup>& setups, const std::vector<State>& state
     plan.iterations = std::max(plan.iterations, setup.step.iterations);
     plan.accelerated = plan.accelerated || setup.step.acceleration != Acceleration::none;
     plan.contacts = plan.contacts || setup.has_blade || !setup.walls.empty() || !setup.grips.empty();
-    plan.grips = plan.grips || !setup.grips.empty();
     const bool detection = needs_detection(setup);
     plan.detection = plan.detection || detection;
     plan.distance = plan.distance || (detection && setup.detect.criterion == Criterion::distance);

@@ -15,7 +15,6 @@ struct Plan {
   int iterations = 0;                                        // most of any body
   bool contacts = false;                                     // some body has a blade, a wall or a grip
   bool accelerated = false;                                  // some body's iterations are
-  bool grips = false;                                        // some body has a grip
   bool detection = false;                                    // some body launches detect
   bool distance = false, geometric = false, strain = false;  // criteria in use
   bool debris = false;

@@ -15,7 +15,7 @@ struct Floats {
   float v[N];
 };
 
-// kWidth: 2, 4, 8, 16 or 32 lanes.
+// kWidth: 1, 2, 4, 8, 16 or 32 lanes.
 template <class Block, int kWidth>
 class Team {
  public:
@@ -132,19 +132,19 @@ class Team {
   // What the lane that has item k says.
   template <class T>
   CUTPROOF_DEVICE T from(int k, T value) const {
-    if constexpr (Block::on_device) return block_.shuffle(mask(), value, (block_.lane() & ~(kWidth - 1)) + k % kWidth);
-    return value;
+    if constexpr (kLanes == 1) return value;
+    return block_.shuffle(mask(), value, (block_.lane() & ~(kWidth - 1)) + k % kWidth);
   }
-  // Jobs that lanes come upon, at most one each: visit(job) for one after the other, by the whole team.
-  template <class Visit>
-  CUTPROOF_DEVICE void for_found(bool found, int job, Visit visit) const {
-    if constexpr (Block::on_device) {
-      for (unsigned votes = block_.ballot(mask(), found); votes != 0; votes &= votes - 1) {
-        visit(block_.shuffle(mask(), job, ones((votes & (~votes + 1)) - 1)));
-      }
-    } else if (found) {
-      visit(job);
-    }
+  // Which lanes have found a job for the whole team, as bits; and the job of the first of them, which is crossed out.
+  CUTPROOF_DEVICE unsigned found(bool mine) const {
+    if constexpr (Block::on_device) return block_.ballot(mask(), mine);
+    return mine ? 1u : 0u;
+  }
+  CUTPROOF_DEVICE int take(unsigned& lanes, int job) const {
+    const unsigned first = lanes & (~lanes + 1);
+    lanes &= lanes - 1;
+    if constexpr (Block::on_device) return block_.shuffle(mask(), job, ones(first - 1));
+    return job;
   }
   // Orders memory operations of the lanes.
   CUTPROOF_DEVICE void sync() const {

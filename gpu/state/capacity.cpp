@@ -44,7 +44,8 @@ Extents extents_of(const StagingBuffers& loaded, Capacity capacity) {
   extents.schedule_substeps = size(loaded.moves);
   extents.wall_count = narrow(size(loaded.walls), "walls");
   extents.grip_count = narrow(size(loaded.grips), "grips");
-  extents.held_count = narrow(size(loaded.grip_particles), "held particles");
+  extents.hold_set_count = narrow(size(loaded.hold_begin), "sets of grips") - 1;
+  extents.hold_entry_count = narrow(size(loaded.hold_grips), "sets of grips");
   extents.grip_substeps = size(loaded.grip_active);
   extents.accelerated = some_body(loaded, [](const BodyConstants& b) { return b.acceleration != Acceleration::none; });
   extents.any_contact = some_body(loaded, [](const BodyConstants& b) {
@@ -63,6 +64,8 @@ Extents extents_of(const StagingBuffers& loaded, Capacity capacity) {
   extents.vertex_capacity = narrow(std::min(6 * particles, scaled(4'000'000 + particles)) + 64, "skin vertices");
   extents.cell_capacity = narrow(cells, "skin cells");
   extents.addition_capacity = narrow(additions + 64, "expanded particles");
+  // Particles that change groups get new places, until none are left and all get theirs anew.
+  extents.place_capacity = narrow(particles + particles / 8 + 64, "particles");
   // A group has at least kLeastInGroup particles, and each of its holders that many members in it.
   extents.pair_capacity = extents.member_capacity / kLeastInGroup;
   extents.group_capacity = static_cast<int>(std::min(particles / kLeastInGroup, int64_t{extents.pair_capacity}));

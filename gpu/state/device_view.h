@@ -82,9 +82,29 @@ struct MoveF {
 };
 
 struct GripF {
-  int particle_begin, particle_end;  // in DeviceView::grip_particles
-  int64_t table;                     // first entry in DeviceView::grip_active and DeviceView::grip_displacement
+  int64_t table;  // first entry in DeviceView::grip_active and DeviceView::grip_displacement
 };
+
+// What the step of a body needs in the frame in progress, in one line of the cache: most of its threads have nothing
+// else to wait for before their own work.
+struct alignas(128) Pace {
+  int64_t first_move;  // of the blade in this frame, in DeviceView::moves; -1: none, or one that touches nothing
+  int substeps, iterations;  // 0: its schedule is over
+  int frame;
+  float h, per_h;
+  float dt, kdt2;
+  float decay, decay_per_dt;    // decay: e^(-c dt)
+  float held_alpha, held_beta;  // step.cuh, how much held particles are pushed
+  float s;                      // pull towards the goal (docs/design/method.md §3)
+  Float3 fall;                  // dt² · gravity
+  Solver solver;
+  Acceleration acceleration;
+  int nodes[2];
+  Divider by_row, by_layer;
+  int wall_begin, wall_count, frictionless_walls;
+  float half_length, depth, clearance, blade_friction;
+};
+static_assert(sizeof(Pace) == 128);
 
 // A group: particles that the same clusters hold (docs/design/method.md §13, where groups are made). Its particles have
 // the places [begin, begin + size), ascending; its holders are DeviceView::holders[holder_begin .. holder_begin +
@@ -94,6 +114,7 @@ struct alignas(16) GroupHead {
   int middle;  // which of its particles, from 0, is nearest to its rest centre
   int holder_begin, holder_count;
   float radius;  // [h], at least the distance of each particle from the rest centre, at rest
+  int hold_set;  // of its particles
 };
 // A rest centre as kernels keep it: h · (base + offset), base being the grid coordinates of a particle.
 struct alignas(16) RestCenter {
@@ -145,12 +166,17 @@ struct Counters {
   int growth;              // expand: members that the enlarged clusters need
   int memberships_before;  // expand: length of DeviceView::memberships in use before it
   int groups_stale;        // clusters have changed since groups were made, or none were made yet
-  int groups;              // how many there are
+  int groups_whole;        // none of them is to stay
+  int groups;              // how many there are; those of size 0 are no more
   int placed;              // places given out from the first on, to classes…
   int placed_last;         // … and from the last on, to particles that are in none
-  int loose;               // particles that are alive and in no group: length of DeviceView::loose_places
+  int loose;               // length of DeviceView::loose_places: particles that are alive and in no group, and gaps
   int pairs;               // of group and holder: length of DeviceView::holders
-  int cluster_pairs;       // the same, of DeviceView::cluster_groups
+  int groups_before;       // groups: those from here on are new
+  int regrouped;           // groups: clusters whose groups are made anew
+  int remeasured;          // groups: clusters whose lists of groups are made anew
+  int due_particles;       // groups: particles that get a new place…
+  int due_pairs;           // … and in how many clusters they are
   int listed[2];           // step, by turns of substeps: how many groups are listed in DeviceView::resolved_groups
   int resolved;            // step: of these, how many were when the iteration began
   int scratch[8];
@@ -161,12 +187,12 @@ struct Extents {
   int bodies = 0, particles = 0;
   int64_t nodes = 0;                                   // over all bodies
   int64_t schedule_frames = 0, schedule_substeps = 0;  // of the schedules of all bodies, one after the other
-  int wall_count = 0, grip_count = 0, held_count = 0;  // held: particles that grips hold
-  int64_t grip_substeps = 0;                           // substeps of each grip's schedule, over all grips
-  int accelerated = 0;                                 // some body's iterations are
-  int any_contact = 0;                                 // some body has a blade, a wall or a grip
+  int wall_count = 0, grip_count = 0, hold_set_count = 0, hold_entry_count = 0;
+  int64_t grip_substeps = 0;  // substeps of each grip's schedule, over all grips
+  int accelerated = 0;        // some body's iterations are
+  int any_contact = 0;        // some body has a blade, a wall or a grip
   int slot_capacity = 0, member_capacity = 0, vertex_capacity = 0, cell_capacity = 0, addition_capacity = 0;
-  int group_capacity = 0, pair_capacity = 0;
+  int group_capacity = 0, pair_capacity = 0, place_capacity = 0;
 };
 
 struct DeviceView : Extents {
@@ -191,7 +217,9 @@ CUTPROOF_BOTH inline int neighbour(const DeviceView& w, const BodyConstants& bod
 struct Coordinates {
   int i, j, k;
 };
-CUTPROOF_BOTH inline Coordinates coordinates(const BodyConstants& body, int node) {
+// body: BodyConstants or Pace.
+template <class Body>
+CUTPROOF_BOTH inline Coordinates coordinates(const Body& body, int node) {
   const int k = node / body.by_layer;
   const int in_layer = node - k * (body.nodes[0] * body.nodes[1]);
   const int j = in_layer / body.by_row;

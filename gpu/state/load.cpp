@@ -1,7 +1,9 @@
 // From setups and states to staging buffers.
 #include <algorithm>
+#include <map>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "gpu/state/indices.h"
 #include "gpu/state/staging.h"
@@ -102,9 +104,6 @@ void add_constants(StagingBuffers& staging, const Setup& setup, const State& sta
   body.grip_begin = narrow(static_cast<int64_t>(staging.grips.size()), "grips");
   for (const Grip& grip : setup.grips) {
     GripF entry{};
-    entry.particle_begin = narrow(static_cast<int64_t>(staging.grip_particles.size()), "held particles");
-    for (const int32_t i : grip.particles) staging.grip_particles.push_back(body.particle_begin + i);
-    entry.particle_end = narrow(static_cast<int64_t>(staging.grip_particles.size()), "held particles");
     entry.table = static_cast<int64_t>(staging.grip_active.size());
     staging.grip_active.insert(staging.grip_active.end(), grip.active.begin(), grip.active.end());
     for (const Vec3 moved : grip.displacement) staging.grip_displacement.push_back(f(moved));
@@ -112,6 +111,27 @@ void add_constants(StagingBuffers& staging, const Setup& setup, const State& sta
   }
   body.grip_end = narrow(static_cast<int64_t>(staging.grips.size()), "grips");
   staging.body.push_back(body);
+}
+
+// Particles that the same grips name share a set of them.
+void add_hold_sets(StagingBuffers& staging, const Setup& setup) {
+  const BodyConstants& body = staging.body.back();
+  std::map<int32_t, std::vector<int>> grips_of;
+  for (std::size_t g = 0; g < setup.grips.size(); ++g) {
+    for (const int32_t i : setup.grips[g].particles) grips_of[i].push_back(body.grip_begin + static_cast<int>(g));
+  }
+  std::map<std::vector<int>, int> sets;
+  staging.hold_set.resize(staging.node.size(), 0);
+  for (auto& [i, grips] : grips_of) {
+    grips.erase(std::unique(grips.begin(), grips.end()), grips.end());
+    const auto [found, added] =
+        sets.emplace(grips, narrow(static_cast<int64_t>(staging.hold_begin.size()) - 1, "sets of grips"));
+    if (added) {
+      staging.hold_grips.insert(staging.hold_grips.end(), grips.begin(), grips.end());
+      staging.hold_begin.push_back(narrow(static_cast<int64_t>(staging.hold_grips.size()), "sets of grips"));
+    }
+    staging.hold_set[at(body.particle_begin + i)] = found->second;
+  }
 }
 
 void add_particles(StagingBuffers& staging, const Setup& setup, const State& state, int body_index) {
@@ -126,7 +146,6 @@ void add_particles(StagingBuffers& staging, const Setup& setup, const State& sta
     staging.death.push_back(state.alive[at(i)] ? -1 : kDeadBefore);
     staging.displacement.push_back(with_w(f(moved), f(setup.body.mass[at(i)])));
     staging.velocity.push_back(with_w(f(state.v[at(i)]), 0));
-    staging.may_be_held.push_back(0);
     // The state has one impulse for the body; spread by mass it adds up to the same.
     staging.impulse.push_back({});
   }
@@ -136,9 +155,7 @@ void add_particles(StagingBuffers& staging, const Setup& setup, const State& sta
     for (int p = body.particle_begin; p < body.particle_end; ++p)
       staging.impulse[at(p)] = with_w(f(state.impulse / mass), 0);
   }
-  for (const Grip& grip : setup.grips) {
-    for (const int32_t i : grip.particles) staging.may_be_held[at(body.particle_begin + i)] = 1;
-  }
+  add_hold_sets(staging, setup);
   const int code = narrow(2 * state.frame, "frames");
   const auto mark = [&](const std::vector<int32_t>& particles, int value) {
     for (const int32_t i : particles) {
@@ -218,6 +235,7 @@ StagingBuffers make_staging_buffers(const std::vector<Setup>& setups, const std:
   require(setups.size() == states.size(), "as many states as setups are needed");
   StagingBuffers staging;
   staging.rotation_method = rotation_method;
+  staging.hold_begin = {0, 0};
   int64_t particles = 0, nodes = 0;
   for (std::size_t b = 0; b < setups.size(); ++b) {
     require_fit(setups[b], states[b]);
@@ -231,7 +249,7 @@ StagingBuffers make_staging_buffers(const std::vector<Setup>& setups, const std:
   Counters counters{};
   counters.slots_used = narrow(static_cast<int64_t>(staging.slot_size.size()), "clusters");
   counters.members_used = narrow(static_cast<int64_t>(staging.members.size()), "cluster members");
-  counters.groups_stale = 1;
+  counters.groups_stale = counters.groups_whole = 1;
   staging.counters = {counters};
   static_cast<Extents&>(staging) = extents_of(staging, capacity);
   staging.allocate();

@@ -547,9 +547,10 @@ TEST(GpuContacts, ProjectWhereTheReferenceDoes) {
     const auto place = [&](Float3 d) { return rest + Vec3{d.x, d.y, d.z}; };
 
     const reference::Contacts expected(setup, move.down ? &move : nullptr);
-    const Contacts contacts = contacts_of(view, view.body[0], 0, 0);
+    const Pace pace = step_detail::pace_of(view, 0);
+    const Contacts contacts = contacts_of(view, pace, 0);
     EXPECT_EQ(contacts.frictionless, expected.frictionless());
-    const RestPoint at = {view.body[0].h, step_detail::grid_node(view.body[0], view.node[p])};
+    const RestPoint at = {pace.h, step_detail::grid_node(pace, view.node[p])};
     const float side = blade_side(contacts, at, start);
     EXPECT_EQ(side, expected.side(place(start)));
     bool in_turn = false;
