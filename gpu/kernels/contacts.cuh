@@ -32,7 +32,7 @@ CUTPROOF_DEVICE inline Contacts contacts_of(const DeviceView& w, const Pace& pac
   contacts.walls = w.walls + pace.wall_begin;
   contacts.wall_count = pace.wall_count;
   contacts.move = nullptr;
-  if (pace.first_move >= 0) {
+  if (pace.first_move >= 0 && substep < pace.substeps) {  // asked for before it is known whether there is that substep
     const MoveF* const move = w.moves + (pace.first_move + substep);
     if (constant(&move->down) != 0) contacts.move = move;
   }
