@@ -57,11 +57,18 @@ struct Interceptor {
 };
 Interceptor calls;
 
+// `<<< >>>`, a launch with attributes, and one whose blocks meet.
+const std::set<std::string>& launches() {
+  static const std::set<std::string> names = {"__cudaLaunchKernel", "cudaLaunchKernelExC",
+                                              "cudaLaunchCooperativeKernel"};
+  return names;
+}
+
 cudaError_t error_of(const std::string& call) {
   if (call == "cudaMalloc" || call == "cudaMallocHost" || call == "cudaGraphInstantiate") {
     return cudaErrorMemoryAllocation;
   }
-  if (call == "__cudaLaunchKernel" || call == "cudaLaunchCooperativeKernel") return cudaErrorLaunchOutOfResources;
+  if (launches().count(call) != 0) return cudaErrorLaunchOutOfResources;
   return cudaErrorLaunchFailure;
 }
 
@@ -182,6 +189,8 @@ INTERCEPT(cudaStreamBeginCaptureToGraph,
           (cudaStream_t stream, cudaGraph_t graph, const cudaGraphNode_t* dependencies, const cudaGraphEdgeData* edges,
            size_t count, cudaStreamCaptureMode mode),
           (stream, graph, dependencies, edges, count, mode))
+INTERCEPT(cudaLaunchKernelExC, (const cudaLaunchConfig_t* config, const void* kernel, void** arguments),
+          (config, kernel, arguments))
 INTERCEPT(cudaLaunchCooperativeKernel,
           (const void* kernel, dim3 grid, dim3 block, void** arguments, size_t shared_bytes, cudaStream_t stream),
           (kernel, grid, block, arguments, shared_bytes, stream))
@@ -251,14 +260,15 @@ KernelOptions options(Path path) {
   return options;
 }
 
-// Call names that do not stand in a message where CUB made the call or <<< >>> did: the kernel's or CUB's does.
-const std::set<std::string>& called_within() {
+// What a launcher or CUB asks around a launch. As with the launches, a message names the kernel or CUB's function.
+const std::set<std::string>& asked_around_a_launch() {
   static const std::set<std::string> names = {
-      "__cudaLaunchKernel",     "cudaLaunchCooperativeKernel",
-      "cudaGetDevice",          "cudaSetDevice",
-      "cudaDeviceGetAttribute", "cudaFuncGetAttributes",
-      "cudaFuncSetAttribute",   "cudaOccupancyMaxActiveBlocksPerMultiprocessorWithFlags"};
+      "cudaGetDevice",         "cudaSetDevice",        "cudaDeviceGetAttribute",
+      "cudaFuncGetAttributes", "cudaFuncSetAttribute", "cudaOccupancyMaxActiveBlocksPerMultiprocessorWithFlags"};
   return names;
+}
+bool named_by_kernel(const std::string& call) {
+  return launches().count(call) != 0 || asked_around_a_launch().count(call) != 0;
 }
 
 // All that a backend does: enlarges its arrays by the way, and runs whole frames and stages one by one.
@@ -327,7 +337,7 @@ class DeviceFailures : public testing::Test {
     if (!message.starts_with("CUDA failed: ") || in == std::string::npos) return false;
     const std::string where = message.substr(in);
     if (where.find(call + "(") != std::string::npos) return true;
-    return called_within().count(call) != 0 &&
+    return named_by_kernel(call) &&
            (where.find("kernel") != std::string::npos || where.find("cub::") != std::string::npos);
   }
 
@@ -339,7 +349,7 @@ class DeviceFailures : public testing::Test {
     try {
       const bool right = work_is_right();
       const std::string call = calls.failed == nullptr ? "" : calls.failed;
-      const bool may_do_without = called_within().count(call) != 0 && call != "__cudaLaunchKernel";
+      const bool may_do_without = asked_around_a_launch().count(call) != 0;
       if (!right || !may_do_without) defect = "its failure was not noticed";
     } catch (const MachineError& error) {
       if (calls.failed == nullptr || !names(error.what(), calls.failed)) defect = error.what();
