@@ -147,7 +147,8 @@ CUTPROOF_DEVICE inline Iteration iteration_of(const Pace& pace, int iteration) {
   return now;
 }
 
-// The displacement [m] that the last active grip of a set gives to its particles in a substep, from where they began.
+// The displacement [m] that the active grip of a set gives to its particles in a substep, from where they began. At most
+// one is active at a time (model/setup.h).
 struct Held {
   bool active = false;
   Float3 moved;
