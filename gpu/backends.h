@@ -11,8 +11,9 @@
 
 namespace cutproof::gpu {
 
-// Kernels on `threads` threads of the CPU.
-std::unique_ptr<Backend> make_host_backend(int threads = 1, KernelOptions options = {});
+// Kernels on `threads` threads of the CPU. `of_block`: threads of a block (HostLauncher::Threads), which give the same
+// bits: 1 is quick, kHostThreads tells whether kernels keep the rules of block.h.
+std::unique_ptr<Backend> make_host_backend(int threads = 1, KernelOptions options = {}, int of_block = 1);
 // Kernels under a simulated schedule (thread_schedule.h).
 std::unique_ptr<Backend> make_simulated_backend(HostLauncher::Simulated simulation, KernelOptions options = {});
 

@@ -98,8 +98,9 @@ constexpr BackendDescriptor gpu_path(std::string_view name, std::string_view sum
 constexpr bool whole_frames(Span span) { return span.first == Stage::step && span.last == Stage::skin; }
 constexpr bool split_alone(Span span) { return span.first == Stage::split && span.last == Stage::split; }
 
+template <int of_block = 1>
 std::unique_ptr<Backend> make_host(const BackendChoice& choice) {
-  return gpu::make_host_backend(choice.threads > 0 ? choice.threads : cpu_threads(), kernel_options(choice));
+  return gpu::make_host_backend(choice.threads > 0 ? choice.threads : cpu_threads(), kernel_options(choice), of_block);
 }
 
 // No strings that allocate: this table is there before main() and where there is no memory.
@@ -120,7 +121,15 @@ constexpr std::array kBackends = {
         .name = kHostName,
         .summary = "the CUDA kernels' source, single precision, on the threads of this CPU",
         .processor = Processor::all_threads,
-        .make = make_host,
+        .make = make_host<>,
+    },
+    BackendDescriptor{
+        .name = "host-blocks",
+        .summary = "the same in blocks of 32 threads: slower, and it tells where kernels break the rules of a block",
+        .processor = Processor::all_threads,
+        .is_timed = false,
+        .is_another_path = true,
+        .make = make_host<gpu::kHostThreads>,
     },
     BackendDescriptor{
         .name = "host-frames",
@@ -128,7 +137,8 @@ constexpr std::array kBackends = {
         .processor = Processor::all_threads,
         .is_timed = false,
         .can_run = whole_frames,
-        .make = [](const BackendChoice& choice) { return offer_only(make_host(choice), "host-frames", whole_frames); },
+        .make =
+            [](const BackendChoice& choice) { return offer_only(make_host<>(choice), "host-frames", whole_frames); },
     },
     BackendDescriptor{
         .name = "host-split",
@@ -136,7 +146,7 @@ constexpr std::array kBackends = {
         .processor = Processor::all_threads,
         .is_timed = false,
         .can_run = split_alone,
-        .make = [](const BackendChoice& choice) { return offer_only(make_host(choice), "host-split", split_alone); },
+        .make = [](const BackendChoice& choice) { return offer_only(make_host<>(choice), "host-split", split_alone); },
     },
     BackendDescriptor{
         .name = "simulated",

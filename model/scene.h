@@ -112,8 +112,11 @@ struct Expectations {
   friend bool operator==(const Expectations&, const Expectations&) = default;
 };
 
+// Of the format. What a scene leaves out is as it was when its version was new: in version 1 the plain iteration.
+inline constexpr int32_t kSceneVersion = 2;
+
 struct Scene {
-  int32_t version = 1;
+  int32_t version = kSceneVersion;
   std::string name;
   std::string description;
   uint64_t seed = 1;
@@ -122,7 +125,7 @@ struct Scene {
   double frame_length = 0.016;  // [s]
   int64_t frames = 0;           // 0: until the last stroke ends and `settle` is over
   double settle = 0;            // [s] after the last stroke
-  StepParameters step;
+  StepParameters step = {.acceleration = Acceleration::chebyshev};
   DetectParameters detect;
   SplitParameters split;
   MergeParameters merge;

@@ -348,11 +348,13 @@ void expect_same_bits(const std::string& id, int64_t cases, Paths& paths) {
 
 TEST(Paths, OfTheHostGiveTheSameBitsAloneAndInALoad) {
   Paths paths;
-  for (const int threads : {1, 2, 32}) {
-    harness::BackendChoice choice;
-    choice.name = harness::kHostName;
-    choice.threads = threads;
-    paths.emplace_back(choice.name + " with " + std::to_string(threads) + " threads", harness::make_backend(choice));
+  for (const std::string name : {harness::kHostName, "host-blocks"}) {
+    for (const int threads : {1, 2, 32}) {
+      harness::BackendChoice choice;
+      choice.name = name;
+      choice.threads = threads;
+      paths.emplace_back(choice.name + " with " + std::to_string(threads) + " threads", harness::make_backend(choice));
+    }
   }
   expect_same_bits("Paths.OfTheHostGiveTheSameBitsAloneAndInALoad", std::max<int64_t>(wanted_cases() / 100, 5), paths);
 }

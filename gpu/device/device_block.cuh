@@ -92,33 +92,11 @@ class BlockOnDevice : private Shape {
 
   template <class T>
   __device__ T sum(T value) {
-    return reduce<true>(value, [](T a, T b) { return a + b; });
-  }
-  template <class T>
-  __device__ T warp_sum(T value) {
-    return reduce_warp(value, [](T a, T b) { return a + b; });
-  }
-  // Each lane keeps half of its values, those of the upper half if `distance` is in its number, and gets what the lane
-  // at that distance has of them: 16 words exchanged instead of 80.
-  __device__ float warp_sums(const float (&values)[16]) {
-    float kept[16];
-#pragma unroll
-    for (int k = 0; k < 16; ++k) kept[k] = values[k];
-#pragma unroll
-    for (int distance = 16; distance > 1; distance /= 2) {
-      const bool upper = (lane() & distance) != 0;
-#pragma unroll
-      for (int k = 0; k < distance / 2; ++k) {
-        const float lower_value = kept[k], upper_value = kept[k + distance / 2];
-        const float received = __shfl_xor_sync(kWarp, upper ? lower_value : upper_value, distance);
-        kept[k] = (upper ? upper_value : lower_value) + received;
-      }
-    }
-    return kept[0] + __shfl_xor_sync(kWarp, kept[0], 1);
+    return reduce(value, [](T a, T b) { return a + b; });
   }
   template <class T>
   __device__ T smallest(T value) {
-    return reduce<std::is_integral_v<T>>(value, [](T a, T b) { return b < a ? b : a; });
+    return reduce(value, [](T a, T b) { return b < a ? b : a; });
   }
   __device__ int exclusive_scan(int value, int& total) {
     int through = inclusive_scan_in_warp(value);
@@ -225,42 +203,17 @@ class BlockOnDevice : private Shape {
     return value;
   }
 
-  // Word by word: for a whole struct the compiler branches, which made block sums 5 % slower than plain CUDA.
-  template <class T>
-  __device__ static T select(bool first, T a, const T& b) {
-    static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % 4 == 0);
-    constexpr int kWords = static_cast<int>(sizeof(T) / 4);
-    unsigned from_a[kWords], from_b[kWords];
-    memcpy(from_a, &a, sizeof(T));
-    memcpy(from_b, &b, sizeof(T));
-#pragma unroll
-    for (int i = 0; i < kWords; ++i) from_a[i] = first ? from_a[i] : from_b[i];
-    memcpy(&a, from_a, sizeof(T));
-    return a;
-  }
-
-  // A butterfly, as HostBlock does it. Every lane combines the same terms, in one order or the other.
   template <class T, class Combine>
-  __device__ static T reduce_warp(T value, Combine combine) {
+  __device__ T reduce(T value, Combine combine) const {
+    static_assert(std::is_integral_v<T>);  // so every lane finds the same, in whatever order it combines
 #pragma unroll
     for (int distance = 16; distance > 0; distance /= 2) {
       value = combine(value, by_words(value, [=](unsigned word) { return __shfl_xor_sync(kWarp, word, distance); }));
     }
-    return value;
-  }
-
-  // `symmetric`: combine(a, b) and combine(b, a) have the same bits, so every lane has the result already. (Minima of
-  // floats are not: the sign of a zero, NaN.)
-  template <bool symmetric, class T, class Combine>
-  __device__ T reduce(T value, Combine combine) const {
-    const auto from_first = [](T own) {
-      return by_words(own, [](unsigned word) { return __shfl_sync(kWarp, word, 0); });
-    };
-    value = reduce_warp(value, combine);
     const int warps = size() / 32;
-    if (warps == 1) return symmetric ? value : from_first(value);
-    alignas(16) __shared__ unsigned char storage[32 * sizeof(T)];
-    T* const partial = reinterpret_cast<T*>(storage) + Shape::first_warp();
+    if (warps == 1) return value;
+    __shared__ T partials[32];
+    T* const partial = partials + Shape::first_warp();
     const int lane = static_cast<int>(threadIdx.x & 31u);
     sync();  // everyone is done with the last use of `partial`
     if (lane == 0) partial[thread() / 32] = value;
@@ -270,9 +223,9 @@ class BlockOnDevice : private Shape {
 #pragma unroll
     for (int distance = 16; distance > 0; distance /= 2) {
       const T other = by_words(value, [=](unsigned word) { return __shfl_down_sync(kWarp, word, distance); });
-      value = select(lane + distance < warps, combine(value, other), value);
+      if (lane + distance < warps) value = combine(value, other);
     }
-    return from_first(value);
+    return by_words(value, [](unsigned word) { return __shfl_sync(kWarp, word, 0); });
   }
 
   __device__ int inclusive_scan_in_warp(int value) const {

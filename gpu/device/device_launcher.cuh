@@ -234,6 +234,10 @@ class DeviceLauncher {
     launch<Kernel>((capacity + kThreads - 1) / kThreads, kThreads, 0, args...);
   }
   template <class Kernel, class... Args>
+  void teams(Kernel kernel, int lanes, std::int64_t capacity, Args... args) {
+    items(kernel, lanes * capacity, args...);
+  }
+  template <class Kernel, class... Args>
   void blocks(Kernel, std::int64_t capacity, int threads, std::size_t shared_bytes, Args... args) {
     check_threads<Kernel>(threads);
     launch<Kernel>(capacity, threads, shared_bytes, args...);

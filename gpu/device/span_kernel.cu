@@ -41,6 +41,10 @@ class SpanLauncher {
     wait();
   }
   template <class Kernel, class... Args>
+  __device__ __forceinline__ void teams(Kernel kernel, int, std::int64_t capacity, const Args&... args) {
+    items(kernel, capacity, args...);
+  }
+  template <class Kernel, class... Args>
   __device__ __forceinline__ void blocks(Kernel kernel, std::int64_t, int threads, std::size_t shared_bytes,
                                          const Args&... args) {
     const unsigned shared = (static_cast<unsigned>(shared_bytes) + 15u) & ~15u;

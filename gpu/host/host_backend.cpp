@@ -69,8 +69,9 @@ class HostBackend final : public Backend {
 
 }  // namespace
 
-std::unique_ptr<Backend> make_host_backend(int threads, KernelOptions options) {
-  return std::make_unique<HostBackend>("host", HostLauncher(HostLauncher::Threads{threads}), options);
+std::unique_ptr<Backend> make_host_backend(int threads, KernelOptions options, int of_block) {
+  const HostLauncher::Threads mode = {.count = threads, .of_block = of_block};
+  return std::make_unique<HostBackend>(of_block == 1 ? "host" : "host-blocks", HostLauncher(mode), options);
 }
 
 std::unique_ptr<Backend> make_simulated_backend(HostLauncher::Simulated simulation, KernelOptions options) {

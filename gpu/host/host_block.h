@@ -1,6 +1,9 @@
 // The Block of kernels on the host (block.h): 32 threads, each a fibre. Every rule of block.h that a kernel breaks is a
 // KernelFault: a barrier or collective that not all threads reach, a warp operation whose mask names a lane that does
 // not come, shared memory beyond what the launch granted or taken in different order.
+//
+// Or one thread alone, for speed: then nobody is to be met, so none of these rules can be broken, and a collective
+// gives the thread what it brings. Warp operations are of 32 threads: one thread that asks for them is a KernelFault.
 #pragma once
 #include <algorithm>
 #include <atomic>
@@ -19,17 +22,18 @@ class HostBlock {
   static constexpr bool on_device = false;
 
   HostBlock(Worker& worker, LiveBlock& state, int thread)
-      : worker_(worker), state_(state), thread_(thread), count_(worker.job().blocks) {}
+      : worker_(worker), state_(state), thread_(thread), size_(worker.job().threads), count_(worker.job().blocks) {}
 
   int thread() const { return thread_; }
-  static constexpr int size() { return kHostThreads; }
+  int size() const { return size_; }
   int index() const { return state_.index; }
   int count() const { return count_; }
-  std::int64_t first() const { return static_cast<std::int64_t>(state_.index) * kHostThreads + thread_; }
-  std::int64_t stride() const { return static_cast<std::int64_t>(count_) * kHostThreads; }
+  std::int64_t first() const { return static_cast<std::int64_t>(state_.index) * size_ + thread_; }
+  std::int64_t stride() const { return static_cast<std::int64_t>(count_) * size_; }
   int lane() const { return thread_; }
 
   void sync(Where where = Where::here()) {
+    if (alone()) return;
     meet(Operation::sync, kEveryone, where, [] {});
   }
 
@@ -39,38 +43,25 @@ class HostBlock {
     return static_cast<T*>(worker_.shared(state_, thread_, static_cast<std::size_t>(count) * sizeof(T)));
   }
 
-  // Sums and minima in the order of a butterfly, as a warp on the device does, so that equal block sizes give equal
-  // bits.
   template <class T>
   T sum(T value, Where where = Where::here()) {
+    if (alone()) return value;
     return reduce(Operation::sum, value, where, [](T a, T b) { return a + b; });
   }
   template <class T>
-  T warp_sum(T value, Where where = Where::here()) {
-    return reduce(Operation::warp_sum, value, where, [](T a, T b) { return a + b; });
-  }
-  float warp_sums(const float (&values)[16], Where where = Where::here()) {
-    bring(values);
-    meet(Operation::warp_sums, kEveryone, where, [&] {
-      float level[kHostThreads][16];
-      std::memcpy(level, state_.value, sizeof level);
-      for (int half = kHostThreads / 2; half > 0; half /= 2) {
-        for (int i = 0; i < half; ++i) {
-          for (int k = 0; k < 16; ++k) level[i][k] += level[i + half][k];
-        }
-      }
-      for (int i = 0; i < kHostThreads; ++i) put(i, level[0][i / 2]);
-    });
-    return taken<float>();
-  }
-  template <class T>
   T smallest(T value, Where where = Where::here()) {
+    if (alone()) return value;
     return reduce(Operation::smallest, value, where, [](T a, T b) { return b < a ? b : a; });
   }
   bool any(bool value, Where where = Where::here()) {
+    if (alone()) return value;
     return reduce(Operation::any, static_cast<int>(value), where, [](int a, int b) { return a | b; }) != 0;
   }
   int exclusive_scan(int value, int& total, Where where = Where::here()) {
+    if (alone()) {
+      total = value;
+      return 0;
+    }
     bring(value);
     meet(Operation::exclusive_scan, kEveryone, where, [&] {
       int before = 0;
@@ -85,6 +76,7 @@ class HostBlock {
   }
 
   unsigned ballot(unsigned mask, bool value, Where where = Where::here()) {
+    if (alone()) refuse_alone("a ballot");
     bring(static_cast<unsigned>(value));
     meet(Operation::ballot, mask, where, [&] {
       unsigned votes = 0;
@@ -95,6 +87,7 @@ class HostBlock {
   }
   template <class T>
   T shuffle(unsigned mask, T value, int lane, Where where = Where::here()) {
+    if (alone()) refuse_alone("a shuffle");
     if (lane < 0 || lane >= kHostThreads || (mask >> lane & 1u) == 0) {
       worker_.fault(state_, thread_, "shuffles from lane " + std::to_string(lane) + ", which is not in its mask");
     }
@@ -162,6 +155,11 @@ class HostBlock {
  private:
   static constexpr unsigned kEveryone = LiveBlock::kAll;
 
+  bool alone() const { return size_ == 1; }
+  [[noreturn]] void refuse_alone(const char* what) {
+    worker_.fault(state_, thread_, std::string("runs alone and asks for ") + what + ", which is of 32 threads");
+  }
+
   // The last to arrive does `complete` for everyone.
   template <class Complete>
   void meet(Operation operation, unsigned mask, const Where& where, Complete complete) {
@@ -175,14 +173,12 @@ class HostBlock {
 
   template <class T, class Combine>
   T reduce(Operation operation, T value, const Where& where, Combine combine) {
+    static_assert(std::is_integral_v<T>);
     bring(value);
     meet(operation, kEveryone, where, [&] {
-      T level[kHostThreads];
-      for (int i = 0; i < kHostThreads; ++i) level[i] = brought<T>(i);
-      for (int half = kHostThreads / 2; half > 0; half /= 2) {
-        for (int i = 0; i < half; ++i) level[i] = combine(level[i], level[i + half]);
-      }
-      for (int i = 0; i < kHostThreads; ++i) put(i, level[0]);
+      T all = brought<T>(0);
+      for (int i = 1; i < kHostThreads; ++i) all = combine(all, brought<T>(i));
+      for (int i = 0; i < kHostThreads; ++i) put(i, all);
     });
     return taken<T>();
   }
@@ -235,7 +231,7 @@ class HostBlock {
 
   Worker& worker_;
   LiveBlock& state_;
-  int thread_;
+  int thread_, size_;
   int count_;
 };
 

@@ -1,6 +1,6 @@
 // The Launcher of launcher.h that carries out work on the host, at once: when a member returns, its work is done.
-// Kernels are executed by operating-system threads, or simulated under a schedule (thread_schedule.h). Results do not
-// depend on the number of threads if the kernels keep the rules of block.h.
+// Kernels are executed by operating-system threads, or simulated under a schedule (thread_schedule.h). Results depend
+// neither on how many those are nor on the threads of a block if the kernels keep the rules of block.h.
 #pragma once
 #include <algorithm>
 #include <cstddef>
@@ -22,14 +22,23 @@ namespace cutproof::gpu {
 class HostLauncher {
  public:
   struct Threads {
-    int count = 1;  // operating-system threads, the caller's included
+    int count = 1;                // operating-system threads, the caller's included
+    int of_block = kHostThreads;  // 1: quick, but then the rules of block.h cannot be broken, so nothing tells whether
+                                  // they are kept
   };
   using Simulated = SimulationOptions;
 
   static constexpr int kMostBlocks = 64;                  // of a launch; simulated: SimulationOptions::live_blocks
   static constexpr std::int64_t kMostRounds = 1'000'000;  // of a while_nonzero, beyond which it counts as a livelock
 
-  explicit HostLauncher(Threads mode) : runtime_(std::make_unique<HostRuntime>(mode.count)), blocks_(kMostBlocks) {}
+  explicit HostLauncher(Threads mode)
+      : runtime_(std::make_unique<HostRuntime>(mode.count)), blocks_(kMostBlocks), threads_(mode.of_block) {
+    if (threads_ != 1 && threads_ != kHostThreads) {
+      throw std::invalid_argument("HostLauncher: a block has 1 or " + std::to_string(kHostThreads) + " threads, not " +
+                                  std::to_string(threads_));
+    }
+    unshared_ = threads_ == 1 && mode.count == 1;
+  }
   explicit HostLauncher(Simulated mode) {
     blocks_ = mode.live_blocks;
     runtime_ = std::make_unique<HostRuntime>(std::move(mode));
@@ -40,14 +49,21 @@ class HostLauncher {
   void items(Kernel kernel, std::int64_t capacity, Args... args) {
     // Every thread has at most about 8 items, so that what its neighbours read next is still in the cache; an odd
     // number of blocks, so that its items do not all fall into the same lines of it.
+    // Who is all alone takes them one after the other.
+    if (unshared_) return launch(kernel, 1, 1, 0, args...);
     const std::int64_t all = (capacity + kHostThreads - 1) / kHostThreads;
     const std::int64_t most = runtime_->simulated() ? blocks_ : std::max<std::int64_t>(kMostBlocks, all / 8 | 1);
-    launch(kernel, std::min(all, most), 0, args...);
+    launch(kernel, std::min(all, most), kHostThreads, 0, args...);
+  }
+  // A team on the host is one thread.
+  template <class Kernel, class... Args>
+  void teams(Kernel kernel, int, std::int64_t capacity, Args... args) {
+    items(kernel, capacity, args...);
   }
   template <class Kernel, class... Args>
   void blocks(Kernel kernel, std::int64_t capacity, int threads, std::size_t shared_bytes, Args... args) {
     check_threads<Kernel>(threads);
-    launch(kernel, std::min<std::int64_t>(capacity, blocks_), shared_bytes, args...);
+    launch(kernel, std::min<std::int64_t>(capacity, unshared_ ? 1 : blocks_), threads_, shared_bytes, args...);
   }
 
   template <class Body>
@@ -100,19 +116,22 @@ class HostLauncher {
 
  private:
   template <class Kernel, class... Args>
-  void launch(const Kernel& kernel, std::int64_t blocks, std::size_t shared_bytes, const Args&... args) {
+  void launch(const Kernel& kernel, std::int64_t blocks, int threads, std::size_t shared_bytes, const Args&... args) {
     const auto call = [&](HostBlock& block) { kernel(block, args...); };
     Job job;
     job.kernel = kernel_name<Kernel>();
     job.run = [](const void* closure, HostBlock& block) { (*static_cast<decltype(&call)>(closure))(block); };
     job.call = &call;
     job.blocks = static_cast<int>(std::max<std::int64_t>(blocks, 1));
+    job.threads = threads;
     job.shared_bytes = shared_bytes;
     runtime_->run(job);
   }
 
   std::unique_ptr<HostRuntime> runtime_;
   int blocks_ = kMostBlocks;
+  int threads_ = kHostThreads;  // of a block
+  bool unshared_ = false;       // one thread does everything
 };
 
 }  // namespace cutproof::gpu

@@ -9,8 +9,7 @@ namespace cutproof::gpu {
 namespace {
 
 // In the order of the enumerators.
-constexpr const char* kOperationNames[] = {"sync",           "sum",    "warp_sum", "warp_sums", "smallest", "any",
-                                           "exclusive_scan", "ballot", "shuffle"};
+constexpr const char* kOperationNames[] = {"sync", "sum", "smallest", "any", "exclusive_scan", "ballot", "shuffle"};
 
 bool of_warp(Operation operation) { return operation == Operation::ballot || operation == Operation::shuffle; }
 

@@ -8,13 +8,13 @@
 
 namespace cutproof::gpu {
 
-inline constexpr int kHostThreads = 32;             // threads of a host block: one warp
-inline constexpr std::size_t kMostValueBytes = 64;  // of a value that collectives and shuffles carry
+inline constexpr int kHostThreads = 32;             // threads of a host block: one warp, or one alone (Job::threads)
+inline constexpr std::size_t kMostValueBytes = 16;  // of a value that collectives and shuffles carry
 
 class HostBlock;
 struct Runner;
 
-enum class Operation : unsigned char { sync, sum, warp_sum, warp_sums, smallest, any, exclusive_scan, ballot, shuffle };
+enum class Operation : unsigned char { sync, sum, smallest, any, exclusive_scan, ballot, shuffle };
 
 // A place in a kernel. (std::source_location is not known to the Clang of Debian 12.)
 struct Where {
@@ -36,6 +36,7 @@ struct Job {
   void (*run)(const void* call, HostBlock& block) = nullptr;
   const void* call = nullptr;  // the kernel and its arguments
   int blocks = 0;
+  int threads = kHostThreads;    // of a block: kHostThreads, or 1, which needs no fibres
   std::size_t shared_bytes = 0;  // what a block may take
 };
 

@@ -94,6 +94,24 @@ void Worker::go(int live_blocks) {
   }
 }
 
+// As go, for blocks of one thread: they run one after the other on the caller's stack.
+void Worker::go_alone() {
+  error = nullptr;
+  error_block = -1;
+  try {
+    prepare(1);
+    LiveBlock& block = *blocks_.front();
+    while (start_block(block)) {
+      HostBlock seen(*this, block, 0);
+      job_->run(job_->call, seen);
+    }
+  } catch (...) {
+    error = std::current_exception();
+    error_block = blocks_.empty() ? -1 : blocks_.front()->index;
+    failed_->store(true, std::memory_order_relaxed);
+  }
+}
+
 void Worker::prepare(int live_blocks) {
   if (runnable_.size() < static_cast<std::size_t>(live_blocks)) runnable_.resize(live_blocks);
   while (static_cast<int>(blocks_.size()) < live_blocks) {
@@ -122,7 +140,11 @@ void Worker::run(const Job& job, std::atomic<int>& next, std::atomic<bool>& fail
   failed_ = &failed;
   alone_ = alone;
   simulation_ = nullptr;
-  go(1);
+  if (job.threads == 1) {
+    go_alone();
+  } else {
+    go(1);
+  }
 }
 
 void Worker::simulate(const Job& job, SimulationOptions& options, ThreadSchedule& recorded) {

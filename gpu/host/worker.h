@@ -62,6 +62,7 @@ class Worker {
   };
   void yield(LiveBlock& block, int thread);
   void go(int live_blocks);
+  void go_alone();
   void prepare(int live_blocks);
   bool start_block(LiveBlock& block);
   Next pick();

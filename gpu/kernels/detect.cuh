@@ -14,6 +14,7 @@
 #pragma once
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/plan.h"
+#include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
 
 namespace cutproof::gpu {
@@ -306,7 +307,7 @@ CUTPROOF_DEVICE inline float greatest_stretch(const float (&a0)[3][3], const flo
   return sqrtf(fmaxf(c[0][0], fmaxf(c[1][1], c[2][2])));
 }
 
-inline constexpr int kStrainThreads = 32;  // as many as a host block has: host and device add in the same order
+inline constexpr int kStrainTeam = 32;  // lanes that look at a cluster
 
 }  // namespace detect_detail
 
@@ -315,41 +316,54 @@ inline constexpr int kStrainThreads = 32;  // as many as a host block has: host 
 template <class Block>
 CUTPROOF_DEVICE void flag_strained_clusters_kernel(Block& block, DeviceView w) {
   using namespace detect_detail;
-  for (int s = block.index(); s < w.counters->slots_used; s += block.count()) {
-    const int b = w.slot_body[s], begin = w.slot_begin[s], size = w.slot_size[s];
+  const Team<Block, kStrainTeam> team(block);
+  for (int64_t i = team.first(); i < w.counters->slots_used; i += team.stride()) {
+    const int s = static_cast<int>(i);
+    const int b = w.slot_body[s], size = w.slot_size[s];
     const BodyConstants& body = w.body[b];
     if (size == 0 || body.criterion != Criterion::strain || !detects(w, b)) continue;
-    const Float3 base = xyz(w.displacement[w.members[begin]]);
+    const int* const members = w.members + w.slot_begin[s];
+    const Float3 base = xyz(w.displacement[members[0]]);
+    // add(k, p, w, d - base) for the members of this lane.
     const auto weighted = [&](auto add) {
-      for (int k = block.thread(); k < size; k += block.size()) {
-        const int p = w.members[begin + k];
+      team.each(size, [&](int k) {
+        const int p = members[k];
         const Float4 now = w.displacement[p];
-        add(p, now.w / static_cast<float>(w.membership_count[p]), xyz(now) - base);
-      }
+        add(k, p, now.w / static_cast<float>(w.membership_count[p]), xyz(now) - base);
+      });
     };
-    Float3 mean;
-    weighted([&](int, float weight, Float3 e) { mean = mean + weight * e; });
-    mean = (1.0f / w.mass[s]) * Float3{block.sum(mean.x), block.sum(mean.y), block.sum(mean.z)};
-    float a0[3][3] = {}, moved[3][3] = {};
-    weighted([&](int p, float weight, Float3 e) {
+    typename Team<Block, kStrainTeam>::template Sums<3> means;
+    weighted([&](int k, int, float weight, Float3 e) {
+      float* const sum = means.of(k);
+      sum[0] += weight * e.x;
+      sum[1] += weight * e.y;
+      sum[2] += weight * e.z;
+    });
+    const auto moment = team.total(means);
+    const Float3 mean = (1.0f / w.mass[s]) * Float3{moment.v[0], moment.v[1], moment.v[2]};
+    // Σ w r rᵀ, then Σ w (e - mean) rᵀ, by rows.
+    typename Team<Block, kStrainTeam>::template Sums<18> products;
+    weighted([&](int k, int p, float weight, Float3 e) {
       const Float3 r = from_rest_center(w, body, p, s), d = e - mean;
+      float* const sum = products.of(k);
       for (int row = 0; row < 3; ++row) {
         for (int column = 0; column < 3; ++column) {
-          a0[row][column] += weight * (r[row] * r[column]);
-          moved[row][column] += weight * (d[row] * r[column]);
+          sum[3 * row + column] += weight * (r[row] * r[column]);
+          sum[9 + 3 * row + column] += weight * (d[row] * r[column]);
         }
       }
     });
+    const auto total = team.total(products);
+    if (!team.leads()) continue;
+    float a0[3][3], moved[3][3];
     for (int row = 0; row < 3; ++row) {
       for (int column = 0; column < 3; ++column) {
-        a0[row][column] = block.sum(a0[row][column]);
-        moved[row][column] = block.sum(moved[row][column]);
+        a0[row][column] = total.v[3 * row + column];
+        moved[row][column] = total.v[9 + 3 * row + column];
       }
     }
-    if (block.thread() == 0) {
-      const float stretch = greatest_stretch(a0, moved);
-      w.slot_flag[s] = stretch > body.strain && stretch <= 3.0e38f;
-    }
+    const float stretch = greatest_stretch(a0, moved);
+    w.slot_flag[s] = stretch > body.strain && stretch <= 3.0e38f;
   }
 }
 CUTPROOF_KERNEL(flag_strained_clusters_kernel);
@@ -431,7 +445,7 @@ CUTPROOF_KERNEL(remove_particles_kernel);
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_detect(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   using namespace detect_detail;
-  if (plan.strain) launcher.blocks(flag_strained_clusters_kernel_object{}, w.slot_capacity, kStrainThreads, 0, w);
+  if (plan.strain) launcher.teams(flag_strained_clusters_kernel_object{}, kStrainTeam, w.slot_capacity, w);
   launcher.items(flag_particles_kernel_object{}, w.particles, w);
   if (plan.geometric) launcher.items(flag_swept_particles_kernel_object{}, w.particles, w);
   launcher.items(remove_particles_kernel_object{}, w.particles, w);

@@ -487,14 +487,13 @@ CUTPROOF_KERNEL(measure_clusters_kernel);
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_groups(Launcher& launcher, const DeviceView& w) {
   Counters* const c = w.counters;  // an address only: counters lie on the device
-  const int64_t by_cluster = int64_t{kMemberTeam} * w.slot_capacity;
   launcher.if_nonzero(&c->groups_stale, [&](Launcher& stale) {
-    stale.items(find_changed_clusters_kernel_object{}, by_cluster, w);
-    stale.items(dissolve_groups_kernel_object{}, by_cluster, w);
-    stale.items(find_classes_kernel_object{}, by_cluster, w);
-    stale.items(deal_out_groups_kernel_object{}, by_cluster, w);
-    stale.items(measure_groups_kernel_object{}, int64_t{kGroupTeam} * w.group_capacity, w);
-    stale.items(measure_clusters_kernel_object{}, by_cluster, w);
+    stale.teams(find_changed_clusters_kernel_object{}, kMemberTeam, w.slot_capacity, w);
+    stale.teams(dissolve_groups_kernel_object{}, kMemberTeam, w.slot_capacity, w);
+    stale.teams(find_classes_kernel_object{}, kMemberTeam, w.slot_capacity, w);
+    stale.teams(deal_out_groups_kernel_object{}, kMemberTeam, w.slot_capacity, w);
+    stale.teams(measure_groups_kernel_object{}, kGroupTeam, w.group_capacity, w);
+    stale.teams(measure_clusters_kernel_object{}, kMemberTeam, w.slot_capacity, w);
     stale.clear(&c->groups_whole, sizeof(int));
   });
 }

@@ -10,6 +10,7 @@
 #include "gpu/kernels/skin_table.h"
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/plan.h"
+#include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
 
 namespace cutproof::gpu {
@@ -18,6 +19,8 @@ namespace skin_detail {
 
 // Use of Counters::scratch.
 enum : int { kNewVertices = 0, kNewCells = 1, kVertexBase = 2, kCellBase = 3, kSound = 4 };
+
+inline constexpr int kClusterTeam = 32;  // lanes that find where a cluster is
 
 CUTPROOF_DEVICE inline bool skinned(const DeviceView& w, int b) { return running(w, b) && w.body[b].skin_wanted; }
 CUTPROOF_DEVICE inline bool extracts(const DeviceView& w, int b) {
@@ -226,38 +229,39 @@ CUTPROOF_ENQUEUE void enqueue_skin_cells(Launcher& launcher, const DeviceView& w
 
 // ---- Positions
 
-// DeviceView::center from the final displacements; what step leaves there belongs to its last iteration's. A warp for
-// each cluster, so that the order of its sums depends on nothing else.
+// DeviceView::center from the final displacements; what step leaves there belongs to its last iteration's.
 template <class Block>
 CUTPROOF_DEVICE void recenter_clusters_kernel(Block& block, const DeviceView& w) {
-  struct Sums {
-    Float3 moved;    // Σ w (d - d of the first member)
-    Float3 rest;     // Σ w (X - T): zero but for the rounding of T
-    float mass = 0;  // Σ w
-    CUTPROOF_DEVICE Sums operator+(const Sums& other) const {
-      return {moved + other.moved, rest + other.rest, mass + other.mass};
-    }
-  };
-  for (int64_t i = block.first() / 32; i < w.counters->slots_used; i += block.stride() / 32) {
+  using namespace skin_detail;
+  const Team<Block, kClusterTeam> team(block);
+  for (int64_t i = team.first(); i < w.counters->slots_used; i += team.stride()) {
     const int s = static_cast<int>(i);
     const int size = w.slot_size[s], b = w.slot_body[s];
-    if (size == 0 || !skin_detail::skinned(w, b)) continue;
-    const int* members = w.members + w.slot_begin[s];
+    if (size == 0 || !skinned(w, b)) continue;
+    const int* const members = w.members + w.slot_begin[s];
     const Float3 base = xyz(w.displacement[members[0]]);
-    Sums sums;
-    for (int k = block.lane(); k < size; k += 32) {
+    // Σ w (d - base), Σ w (X - T), which is zero but for the rounding of T, and Σ w.
+    typename Team<Block, kClusterTeam>::template Sums<7> sums;
+    team.each(size, [&](int k) {
       const int p = members[k];
       const Float4 now = w.displacement[p];
       const float weight = now.w / static_cast<float>(w.membership_count[p]);
-      sums.moved = sums.moved + weight * (xyz(now) - base);
-      sums.rest = sums.rest + weight * from_rest_center(w, w.body[b], p, s);
-      sums.mass += weight;
-    }
-    sums = block.warp_sum(sums);
-    if (block.lane() != 0) continue;
+      const Float3 moved = weight * (xyz(now) - base), rest = weight * from_rest_center(w, w.body[b], p, s);
+      float* const sum = sums.of(k);
+      sum[0] += moved.x;
+      sum[1] += moved.y;
+      sum[2] += moved.z;
+      sum[3] += rest.x;
+      sum[4] += rest.y;
+      sum[5] += rest.z;
+      sum[6] += weight;
+    });
+    const auto total = team.total(sums);
+    if (!team.leads()) continue;
+    const Float3 moved = {total.v[0], total.v[1], total.v[2]}, rest = {total.v[3], total.v[4], total.v[5]};
     // The rounded T must not move the cluster (docs/design/decisions.md, Momentum and the rounding of sums).
-    const Float3 turned = w.rotation[s] * sums.rest - sums.rest;
-    w.center[s] = base + (1.0f / sums.mass) * (sums.moved - turned);
+    const Float3 turned = w.rotation[s] * rest - rest;
+    w.center[s] = base + (1.0f / total.v[6]) * (moved - turned);
   }
 }
 CUTPROOF_KERNEL(recenter_clusters_kernel);
@@ -296,7 +300,7 @@ CUTPROOF_KERNEL(place_vertices_kernel);
 
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_skin_positions(Launcher& launcher, const DeviceView& w, const Plan&) {
-  launcher.items(recenter_clusters_kernel_object{}, 32 * static_cast<int64_t>(w.slot_capacity), w);
+  launcher.teams(recenter_clusters_kernel_object{}, skin_detail::kClusterTeam, w.slot_capacity, w);
   launcher.items(place_vertices_kernel_object{}, w.vertex_capacity, w);
 }
 

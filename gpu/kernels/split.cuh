@@ -544,9 +544,11 @@ CUTPROOF_DEVICE void rest_frames_of_components_kernel(Block& block, DeviceView w
   if (counters.failed) return;
   const int first_new = counters.scratch[kFirstNewSlot], added = counters.scratch[kNewClusters];
   if (block.first() == 0) counters.slots_used = first_new + added;
-  for (int job = block.index(); job < counters.affected + added; job += block.count()) {
+  const Team<Block, kRestTeam> team(block);
+  for (int64_t i = team.first(); i < counters.affected + added; i += team.stride()) {
+    const int job = static_cast<int>(i);
     const int s = job < counters.affected ? w.affected[job] : first_new + job - counters.affected;
-    if (w.slot_size[s] > 0) recompute_rest_frame(block, w, s);
+    if (w.slot_size[s] > 0) recompute_rest_frame(team, w, s);
   }
 }
 CUTPROOF_KERNEL(rest_frames_of_components_kernel);
@@ -593,7 +595,7 @@ CUTPROOF_ENQUEUE void enqueue_split(Launcher& launcher, const DeviceView& w, con
   launcher.exclusive_scan(extra_components(w), extra_before(w), w.slot_capacity, &counters->scratch[kNewClusters]);
   launcher.blocks(number_components_kernel_object{}, w.bodies, 256, 0, w);
   launcher.blocks(regroup_members_kernel_object{}, w.slot_capacity, kRegroupThreads, sizeof(int) * kRegroupThreads, w);
-  launcher.blocks(rest_frames_of_components_kernel_object{}, 2 * int64_t{w.slot_capacity}, kRestThreads, 0, w);
+  launcher.teams(rest_frames_of_components_kernel_object{}, kRestTeam, 2 * int64_t{w.slot_capacity}, w);
   if (plan.debris) {
     launcher.if_nonzero(&counters->failed, [&](Launcher& inner) {
       inner.items(put_debris_back_kernel_object{}, w.particles, w);

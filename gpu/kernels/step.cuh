@@ -147,8 +147,8 @@ CUTPROOF_DEVICE inline Iteration iteration_of(const Pace& pace, int iteration) {
   return now;
 }
 
-// The displacement [m] that the active grip of a set gives to its particles in a substep, from where they began. At most
-// one is active at a time (model/setup.h).
+// The displacement [m] that the active grip of a set gives to its particles in a substep, from where they began. At
+// most one is active at a time (model/setup.h).
 struct Held {
   bool active = false;
   Float3 moved;
@@ -1101,8 +1101,8 @@ namespace step_detail {
 template <int Method, bool kContacts, bool kAccelerated, class Launcher>
 CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   const int64_t particles = w.particles > w.bodies ? w.particles : w.bodies;
-  const int64_t lanes = int64_t{kParticleTeam} * w.group_capacity;
-  const int64_t items = lanes > w.place_capacity ? lanes : w.place_capacity;
+  const int64_t of_places = (w.place_capacity + kParticleTeam - 1) / kParticleTeam;
+  const int64_t teams = w.group_capacity > of_places ? w.group_capacity : of_places;
   launcher.items(begin_frame_kernel_object{}, particles, w);
   enqueue_groups(launcher, w);
   // Of a small load each group has lanes enough for its rows; of a large one they would all do what one can do for
@@ -1110,20 +1110,21 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
   const auto advance = [&](Launcher& on, int substep, int iteration) {
     if constexpr (!requires { typename Launcher::OneLaunch; }) {
       if (w.particles > kMostByRows) {
-        return on.items(advance_kernel_object<kContacts, kAccelerated, 1>{}, items, w, substep, iteration);
+        return on.teams(advance_kernel_object<kContacts, kAccelerated, 1>{}, kParticleTeam, teams, w, substep,
+                        iteration);
       }
     }
-    on.items(advance_kernel_object<kContacts, kAccelerated, kRowTeam>{}, items, w, substep, iteration);
+    on.teams(advance_kernel_object<kContacts, kAccelerated, kRowTeam>{}, kParticleTeam, teams, w, substep, iteration);
   };
   for (int substep = 0; substep < plan.substeps; ++substep) {
-    launcher.items(start_substep_kernel_object<kContacts>{}, items, w, substep);
+    launcher.teams(start_substep_kernel_object<kContacts>{}, kParticleTeam, teams, w, substep);
     for (int iteration = 0; iteration < plan.iterations; ++iteration) {
       launcher.blocks(match_shapes_kernel_object<Method>{}, (w.slot_capacity + kTeams - 1) / kTeams, kMatchThreads,
                       kMatchShared, w, substep, iteration);
       advance(launcher, substep, iteration);
     }
   }
-  launcher.items(start_substep_kernel_object<kContacts>{}, items, w, plan.substeps);
+  launcher.teams(start_substep_kernel_object<kContacts>{}, kParticleTeam, teams, w, plan.substeps);
 }
 
 template <int Method, class Launcher>

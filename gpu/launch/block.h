@@ -5,7 +5,7 @@
 // that is instantiated with DeviceBlock (device_block.cuh: inlined intrinsics and CUB) by nvcc and with HostBlock
 // (host_block.h: each thread a stackful fibre) by any C++20 compiler. Rules that make both the same program:
 //
-// - Loops are block-stride (or grid-stride) and assume no block size. Host blocks have 32 threads.
+// - Loops are block-stride (or grid-stride) and assume no block size. Host blocks have 32 threads, or 1.
 // - sync() and the collectives sum, smallest, any and exclusive_scan are reached by all threads of the block.
 // - Warp operations name their participants in `mask`; each of those reaches the same operation with the same mask.
 // - Shared memory is taken with shared<T>(count), in the same order by all threads, and holds garbage at first.
@@ -24,12 +24,9 @@
 //   void sync();
 //   T* shared<T>(int count);                    aligned to 16 bytes; counts against the launch's shared_bytes,
 //                                               rounded up to a multiple of 16
-//   T sum<T>(T), T smallest<T>(T), bool any(bool);   to all threads; in a fixed order, so floats are reproducible for
-//                                               equal block sizes. T: trivially copyable, at most 64 bytes, with + or <
+//   T sum<T>(T), T smallest<T>(T), bool any(bool);   to all threads. T: an integer, for sums of floats would depend on
+//                                               the block size; those are of teams (team.h)
 //   int exclusive_scan(int value, int& total);  in thread order
-//   T warp_sum<T>(T);                           as sum, over the lanes of this warp; reached by all of them
-//   float warp_sums(const float (&)[16]);       as 16 times warp_sum, with the same bits, and a fifth of its exchanges:
-//                                               lanes 2 k and 2 k + 1 get the sum of value k
 //   unsigned match(unsigned mask, int);         (DeviceBlock) the lanes of `mask` with the same value, as a mask
 //   unsigned ballot(unsigned mask, bool); T shuffle<T>(unsigned mask, T, int lane); int lane();
 //   void sync_warp(unsigned mask);              as sync(), for these lanes of the warp

@@ -7,10 +7,12 @@
 //   void items(Kernel, int64_t capacity, Args...);             grid-stride kernels: as many threads as is sensible for
 //                                                              up to `capacity` items; no shared memory
 //   template <class Kernel, class... Args>
+//   void teams(Kernel, int lanes, int64_t capacity, Args...);  items, for up to `capacity` jobs of a Team each (team.h)
+//   template <class Kernel, class... Args>
 //   void blocks(Kernel, int64_t capacity, int threads, std::size_t shared_bytes, Args...);
 //                                                              block-stride over up to `capacity` jobs, one block each;
-//                                                              `threads` is for the device (host: 32), a multiple of
-//                                                              32, at most kMaxThreads of the kernel
+//                                                              `threads` is for the device (host: 32 or 1), a multiple
+//                                                              of 32, at most kMaxThreads of the kernel
 //   void if_nonzero(const int* flag, Body);                    what `Body` (a callable that launches) does happens only
 //                                                              if *flag is not 0 when the work before it is done
 //   void while_nonzero(int* flag, Body);                       again and again while *flag is not 0

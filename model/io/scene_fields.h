@@ -136,8 +136,9 @@ void describe(auto& v, StepParameters& s) {
           {"stiffness", "k, stiffness per mass. `implicit` only: s = k dt² / (1 + k dt²).", between(0, 1e15, "1/s²")});
   v.field(s.relaxation, {"relaxation", "s, `published` only.", above(0, 1)});
   v.field(s.acceleration, {"acceleration",
-                           "`implicit` only. `chebyshev`: the same answer in fewer iterations, each of which costs a "
-                           "little more; the energy need not fall in every one (method.md §11)."});
+                           "`chebyshev`: the same answer in fewer iterations, each of which costs a little more; the "
+                           "energy need not fall in every one (method.md §11). `implicit` only: left out, it is `none` "
+                           "with `published`, and in a scene of version 1."});
   v.field(s.damping, {"damping", "c: velocities decay as exp(−c t).", between(0, 1e9, "1/s")});
   v.field(s.gravity, {"gravity", "In the body's frame.", between(-1e6, 1e6, "m/s²")});
 }
@@ -268,7 +269,7 @@ void describe(auto& v, FrameFields& s) {
 }
 
 void describe(auto& v, Scene& s) {
-  v.field(s.version, {"version", "Of this format: 1.", between(1, 1), kRequired});
+  v.field(s.version, {"version", "Of this format: 2; 1 is read as ever.", between(1, kSceneVersion), kRequired});
   v.field(s.name, {"name", "A short name, for reports."});
   v.field(s.description, {"description", "What the scene shows, for people."});
   v.field(s.seed, {"seed", "Of everything random.", between(0, 18446744073709551615.0)});

@@ -431,27 +431,40 @@ void read(const json& value, const Place& at, const SceneField&, T& out) {
 }
 
 // A scene of another version has other fields, so this comes before anything else.
-void require_version(const json& tree, const std::string& name) {
+int32_t require_version(const json& tree, const std::string& name) {
   if (!tree.is_object()) {
     throw InputError(name, "", fmt::format("A scene is an object, and this is {}.", type_text(tree)),
-                     "Put its fields in braces: {\"version\": 1, \"body\": ...}.");
+                     fmt::format("Put its fields in braces: {{\"version\": {}, \"body\": ...}}.", kSceneVersion));
   }
   const auto version = tree.find("version");
   if (version == tree.end()) {
-    throw InputError(name, "version", "This field is missing.", "Add \"version\": 1 if this is a cutproof scene.");
+    throw InputError(name, "version", "This field is missing.",
+                     fmt::format("Add \"version\": {} if this is a cutproof scene.", kSceneVersion));
   }
-  if (!version->is_number() || version->get<double>() != 1) {
-    throw InputError(name, "version", fmt::format("This is {}, and only version 1 is known.", type_text(*version)),
-                     "Use a newer cutproof for a scene of a newer version.");
+  for (int32_t known = 1; known <= kSceneVersion; ++known) {
+    if (version->is_number() && version->get<double>() == known) return known;
   }
+  throw InputError(name, "version",
+                   fmt::format("This is {}, and only versions 1 to {} are known.", type_text(*version), kSceneVersion),
+                   "Use a newer cutproof for a scene of a newer version.");
+}
+
+// Of a scene that does not say.
+Acceleration default_acceleration(const json& tree, int32_t version) {
+  if (version < 2) return Acceleration::none;
+  const auto step = tree.find("step");
+  const bool published = step != tree.end() && step->is_object() && step->contains("solver") &&
+                         step->at("solver") == name_of(Solver::published);
+  return published ? Acceleration::none : Acceleration::chebyshev;
 }
 
 }  // namespace
 
 Scene parse_scene(const std::string& text, const std::string& name) {
   const json tree = parse_tree(text, name);
-  require_version(tree, name);
+  const int32_t version = require_version(tree, name);
   Scene scene;
+  scene.step.acceleration = default_acceleration(tree, version);
   read(tree, Place{name, "", 0}, SceneField{}, scene);
   return scene;
 }

@@ -22,7 +22,7 @@ namespace {
 
 using nlohmann::json;
 
-const char* const kSmallest = R"({"version": 1, "body": {"shape": {"kind": "box"}, "spacing": 0.01}})";
+const char* const kSmallest = R"({"version": 2, "body": {"shape": {"kind": "box"}, "spacing": 0.01}})";
 
 json smallest() { return json::parse(kSmallest); }
 json with_blade() {
@@ -595,8 +595,36 @@ TEST(SceneIoErrors, MissingRequiredFieldsAreNamed) {
   expect_error(tree, "grips[0].high", {"missing"});
 }
 
+TEST(SceneIo, AScenesVersionSaysHowItIteratesIfNothingElseDoes) {
+  const auto acceleration = [](const std::string& version, const std::string& step) {
+    return parse_scene(R"({"version": )" + version +
+                           R"(, "body": {"shape": {"kind": "box"}, "spacing": 0.01}, "step": )" + step + "}",
+                       "scene.json")
+        .step.acceleration;
+  };
+  EXPECT_EQ(acceleration("1", "{}"), Acceleration::none);
+  EXPECT_EQ(acceleration("2", "{}"), Acceleration::chebyshev);
+  EXPECT_EQ(acceleration("2", R"({"solver": "implicit", "iterations": 2})"), Acceleration::chebyshev);
+  EXPECT_EQ(acceleration("2", R"({"solver": "published"})"), Acceleration::none);
+  EXPECT_EQ(acceleration("2", R"({"acceleration": "none"})"), Acceleration::none);
+  EXPECT_EQ(acceleration("1", R"({"acceleration": "chebyshev"})"), Acceleration::chebyshev);
+  expect_error(std::string(R"({"version": 2, "body": {"shape": {"kind": "box"}, "spacing": 0.01},
+                               "step": {"solver": "published", "acceleration": "chebyshev"}})"),
+               "step.acceleration", {"published"});
+  expect_error(
+      std::string(R"({"version": 2, "body": {"shape": {"kind": "box"}, "spacing": 0.01}, "step": {"solver": 7}})"),
+      "step.solver", {"7"});
+  EXPECT_EQ(Scene{}.step,
+            parse_scene(R"({"version": 2, "body": {"shape": {"kind": "box"}, "spacing": 0.01}})", "").step);
+  // A scene of version 1 stays what it is when it is written and read again.
+  const Scene old = parse_scene(R"({"version": 1, "body": {"shape": {"kind": "box"}, "spacing": 0.01}})", "scene.json");
+  EXPECT_EQ(old.version, 1);
+  EXPECT_EQ(parse_scene(write_scene(old), "again"), old);
+}
+
 TEST(SceneIoErrors, AnotherVersionIsRefusedBeforeAnythingElse) {
-  expect_error(std::string(R"({"version": 2, "new_field": true})"), "version", {"2", "version 1"});
+  expect_error(std::string(R"({"version": 3, "new_field": true})"), "version", {"3", "versions 1 to 2"});
+  expect_error(std::string(R"({"version": 1.5})"), "version", {"1.5"});
   expect_error(std::string(R"({"version": "1"})"), "version", {"\"1\""});
   expect_error(std::string(R"([1])"), "", {"object", "list"});
 }

@@ -438,6 +438,98 @@ TEST(Groups, AreClearOnlyIfNoPointOfTheirBallTouches) {
   EXPECT_GT(over, 300);
 }
 
+// Touching begins a margin before what is projected, and the nearest point of a ball may be there: over a floor, beside
+// a plate, before its edge and beyond its end.
+TEST(Groups, AreNotClearWhereTheirNearestPointTouches) {
+  Random random(93);
+  int clear = 0, touching = 0;
+  for (int trial = 0; trial < 20000; ++trial) {
+    const float h = 0.01f;
+    const double margin = kTouchMargin * double{h};
+    const double gap = margin * uniform(random, -0.5, 2);
+    const float radius = static_cast<float>(h * uniform(random, 0, 3));
+    const int which = trial % 4;
+    const PoseF pose = {{0.05f, 0.05f, 0.05f}, {1, 0, 0}, {0, 0, 1}};
+    const MoveF move = {pose, pose, 1};
+    Contacts contacts = {};
+    contacts.half_length = 0.03f;
+    contacts.depth = 0.04f;
+    contacts.clearance = 0.0075f;
+    contacts.frictionless = true;
+    // Coordinates of the frame of the blade: along, back, across, from the middle of its edge.
+    Vec3 center = {uniform(random, -0.02, 0.02), uniform(random, 0.01, 0.03), 0}, way;
+    const double away = double{radius} + gap;
+    if (which == 1) center.z = contacts.clearance + away, way = {0, 0, -1};
+    if (which == 2) center.y = -(contacts.clearance + away), way = {0, 1, 0};
+    if (which == 3) center.x = contacts.half_length + contacts.clearance + away, way = {-1, 0, 0};
+    const Vec3 along = {1, 0, 0}, back = {0, 0, 1}, across = cross(along, back);
+    const auto in_world = [&](Vec3 c) { return c.x * along + c.y * back + c.z * across; };
+    Vec3 place = Vec3{0.05, 0.05, 0.05} + in_world(center);
+    way = in_world(way);
+    WallF floor = {2, 1, 0.02f, 0};
+    if (which == 0) {
+      contacts.walls = &floor;
+      contacts.wall_count = 1;
+      place.z = double{floor.offset} + away;
+      way = {0, 0, -1};
+    } else {
+      contacts.move = &move;
+    }
+    const Vec3 d = place - double{h} * Vec3{4, 5, 6};
+    const Ball ball = {
+        {h, {4, 5, 6}}, {static_cast<float>(d.x), static_cast<float>(d.y), static_cast<float>(d.z)}, radius};
+    const Float3 nearest = ball.d + Float3{static_cast<float>(radius * way.x), static_cast<float>(radius * way.y),
+                                           static_cast<float>(radius * way.z)};
+    const bool touches = contacts_detail::touches(contacts, ball.rest, nearest, 1);
+    EXPECT_EQ(touches, gap < margin) << "case " << which << ", gap of " << gap / margin << " margins";
+    touching += touches;
+    if (!is_clear(contacts, ball, 0)) continue;
+    ++clear;
+    ASSERT_FALSE(touches) << "case " << which << ", gap of " << gap / margin << " margins";
+  }
+  EXPECT_GT(touching, 10000);
+  EXPECT_GT(clear, 5000);
+}
+
+// Points at d~ + M(r) - l e, each e and r at random, on the edge of what is allowed too; maps of up to twice the size.
+TEST(Groups, AllPointsAreInTheirBall) {
+  Random random(92);
+  double fullest = 0;
+  for (int trial = 0; trial < 20000; ++trial) {
+    const auto single = [&](double scale) { return static_cast<float>(scale * uniform(random, -1, 1)); };
+    Pace pace = {};
+    pace.h = 0.01f;
+    step_detail::Group group = {};
+    group.head.radius = static_cast<float>(uniform(random, 0.5, 6));
+    group.center.i = 3, group.center.j = 4, group.center.k = 5;
+    group.center.x = single(0.5), group.center.y = single(0.5), group.center.z = single(0.5);
+    const Float4 base = {single(0.05), single(0.05), single(0.05), static_cast<float>(uniform(random, 0, 0.03))};
+    const float kept = static_cast<float>(uniform(random, 0, 1));
+    step_detail::Map map = {};
+    for (Float4& row : map.row) row = {single(0.02), single(0.02), single(0.02), single(0.02)};
+    const Ball ball = step_detail::ball_around(pace, group, base, kept, map);
+    const Vec3 center = Vec3{3.0 + group.center.x, 4.0 + group.center.y, 5.0 + group.center.z};
+    for (int k = 0; k < 20; ++k) {
+      const auto within = [&](double reach) {
+        const Vec3 way = {normal(random), normal(random), normal(random)};
+        return (reach * (k % 2 == 0 ? 1.0 : uniform(random, 0, 1)) / norm(way)) * way;
+      };
+      const Vec3 r = within(double{group.head.radius}), e = within(double{base.w});
+      Vec3 x = double{pace.h} * (center + r) + Vec3{base.x, base.y, base.z} + double{kept} * e;
+      for (int axis = 0; axis < 3; ++axis) {
+        const Float4& row = map.row[axis];
+        x[axis] += row.x * r.x + row.y * r.y + row.z * r.z + row.w;
+      }
+      Vec3 from_ball = x - Vec3{ball.d.x, ball.d.y, ball.d.z};
+      from_ball -= double{pace.h} * center;
+      const double part = norm(from_ball) / double{ball.radius};
+      ASSERT_LE(part, 1 + 1e-5) << "trial " << trial;
+      fullest = std::max(fullest, part);
+    }
+  }
+  EXPECT_GT(fullest, 0.9) << "and balls are no larger than they have to be";
+}
+
 // One frame of the kernels, and which groups were resolved in it.
 struct Stepped {
   State state;
@@ -495,9 +587,95 @@ TEST(Groups, AreResolvedWhereTheyMayTouchAndNowhereElse) {
   for (const int touched : step(above, cooked(above)).touched) EXPECT_EQ(touched, 0);
 }
 
-// The same body once with groups and once without any, because no two particles are named by the same grips: what
-// carries particles together must give what carries each alone, within a few roundings, with blade, floor, friction and
-// a grip that holds, for every way to iterate.
+// Moments are about a number near all of their group, though its middle particle, which gives that number else, may
+// have been led far away.
+TEST(Groups, HaveTheirBaseNearTheirMean) {
+  cutproof::Setup setup = block_on_floor(0.05);
+  setup.step.substeps = 1;
+  State state = cooked(setup);
+  Random random(5);
+  for (std::size_t i = 0; i < state.x.size(); i += 7) {
+    state.x[i] += Vec3{normal(random), normal(random), 1 + std::abs(normal(random))} * 0.1;
+  }
+  const Stepped found = step(setup, state);
+  const StagingBuffers& staging = found.staging;
+  int moved = 0;
+  for (std::size_t g = 0; g < found.touched.size(); ++g) {
+    const GroupHead& head = staging.group_head[g];
+    const double mass = staging.group_mass[g].w;
+    ASSERT_GT(mass, 0);
+    const auto off = [&](std::size_t axis) { return staging.group_predicted[3 * g + axis].w / mass; };
+    EXPECT_LE(norm(Vec3{off(0), off(1), off(2)}), (1.0 / 16 + 1e-3) * setup.body.grid.spacing) << "group " << g;
+    const Float4 middle = staging.predicted[at(head.begin + head.middle)], base = staging.group_base[g];
+    moved += middle.x != base.x || middle.y != base.y || middle.z != base.z;
+  }
+  EXPECT_GT(moved, 20);
+  EXPECT_LT(moved, static_cast<int>(found.touched.size())) << "where it is near, it is the base";
+}
+
+// The same body, in which no two particles are named by the same grips: none of them is in a group.
+cutproof::Setup without_groups(cutproof::Setup setup) {
+  for (int32_t bit = 1; bit < setup.body.particle_count(); bit *= 2) {
+    setup.grips.push_back(idle_grip(setup, [&](int32_t i) { return (i & bit) != 0; }));
+  }
+  return setup;
+}
+
+// Both candidates of an accelerated iteration are asked whether they touch. Seldom does only one of them, so the state
+// in which one does is made by hand: all of a body is led to a floor, or comes back from below it.
+TEST(Groups, AreResolvedIfEitherCandidateTouches) {
+  constexpr int kIteration = 2;
+  cutproof::Setup setup = block_on_floor(0.2);
+  setup.step.substeps = 1;
+  setup.step.iterations = 4;
+  setup.step.gravity = {};
+  setup.step.acceleration = Acceleration::chebyshev;
+  const std::vector<cutproof::Setup> setups = {setup};
+  const std::vector<State> states = {cooked(setup)};
+  struct Candidates {
+    float plain, accelerated;  // by how much all is moved [m]
+    bool touches;
+  };
+  for (const Candidates& wanted : {Candidates{-0.01f, -0.02f, false}, Candidates{-0.01f, -0.4f, true},
+                                   Candidates{-0.4f, -0.01f, true}, Candidates{-0.4f, -0.5f, true}}) {
+    StagingBuffers staging = make_staging_buffers(setups, states, kNewton, Capacity{});
+    const DeviceView w = staging.view();
+    HostLauncher launcher;
+    const int teams = w.group_capacity;
+    launcher.items(begin_frame_kernel_object{}, w.particles, w);
+    enqueue_groups(launcher, w);
+    launcher.teams(start_substep_kernel_object<true>{}, step_detail::kParticleTeam, teams, w, 0);
+    const Pace& pace = staging.pace.front();
+    const step_detail::Combination combination = step_detail::chebyshev(pace.kdt2, kIteration);
+    // Where all is now, and where it was that the two lead to the candidate that is wanted.
+    const float now = -0.005f;
+    const float earlier =
+        now - (wanted.accelerated - now - combination.pull * (wanted.plain - now)) / combination.carry;
+    ASSERT_NEAR(combination(wanted.plain, now, earlier), wanted.accelerated, 1e-6);
+    for (int slot = 0; slot < w.slot_capacity; ++slot) {
+      w.placement[3 * slot] = w.placement[3 * slot + 1] = {};
+      w.placement[3 * slot + 2] = {0, 0, 0, wanted.plain / pace.s};
+    }
+    const int groups = staging.counters.front().groups;
+    ASSERT_GT(groups, 20);
+    for (int g = 0; g < groups; ++g) {
+      ASSERT_EQ(w.group_resolved[g], step_detail::kCarried);
+      for (int axis = 0; axis < 3; ++axis) {
+        w.group_map[3 * g + axis] = {0, 0, 0, axis == 2 ? now : 0};
+        w.group_earlier_map[3 * g + axis] = {0, 0, 0, axis == 2 ? earlier : 0};
+      }
+    }
+    launcher.teams(advance_kernel_object<true, true, step_detail::kRowTeam>{}, step_detail::kParticleTeam, teams, w, 0,
+                   kIteration);
+    for (int g = 0; g < groups; ++g) {
+      ASSERT_EQ(w.group_resolved[g], wanted.touches ? step_detail::kResolved : step_detail::kCarried)
+          << "plain " << wanted.plain << ", accelerated " << wanted.accelerated << ", group " << g;
+    }
+  }
+}
+
+// The same body once with groups and once without any: what carries particles together must give what carries each
+// alone, within a few roundings, with blade, floor, friction and a grip that holds, for every way to iterate.
 TEST(Groups, GiveWhatTheirParticlesAloneGive) {
   Random random(17);
   int carried = 0, resolved = 0, held = 0;
@@ -538,11 +716,7 @@ TEST(Groups, GiveWhatTheirParticlesAloneGive) {
     }
     const Stepped together = step(setup, state);
     for (const int touched : together.touched) (touched != 0 ? resolved : carried)++;
-    cutproof::Setup alone = setup;
-    for (int32_t bit = 1; bit < setup.body.particle_count(); bit *= 2) {
-      alone.grips.push_back(idle_grip(setup, [&](int32_t i) { return (i & bit) != 0; }));
-    }
-    const Stepped apart = step(alone, state);
+    const Stepped apart = step(without_groups(setup), state);
     ASSERT_EQ(apart.staging.counters.front().groups, 0);
     ASSERT_GT(together.staging.counters.front().groups, 10);
     for (std::size_t i = 0; i < state.x.size(); ++i) {

@@ -16,6 +16,7 @@
 
 #include "gpu/kernels/float3.h"
 #include "gpu/launch/launcher.h"
+#include "gpu/launch/team.h"
 
 namespace cutproof::gpu {
 
@@ -30,6 +31,10 @@ CUTPROOF_BOTH inline unsigned scramble(unsigned a, unsigned b) {
 }
 CUTPROOF_BOTH inline int small_value(int job, int thread) {
   return static_cast<int>(scramble(static_cast<unsigned>(job), static_cast<unsigned>(thread)) % 2001u) - 1000;
+}
+CUTPROOF_BOTH inline unsigned long long wide_value(int job, int thread) {
+  const unsigned upper = scramble(static_cast<unsigned>(job), static_cast<unsigned>(thread));
+  return static_cast<unsigned long long>(upper) << 32 | scramble(upper, static_cast<unsigned>(thread));
 }
 CUTPROOF_BOTH inline float any_float(int job, int thread) {
   return static_cast<float>(small_value(job, thread)) * 0.001f + 1e-4f * static_cast<float>(thread);
@@ -47,7 +52,7 @@ CUTPROOF_DEVICE void visit_jobs_kernel(Block& block, int* visits, int* wrong, in
     if (block.thread() == 0) visits[job] += 1;
   }
   const bool right = block.thread() >= 0 && block.thread() < block.size() && block.index() < block.count() &&
-                     block.lane() == block.thread() % 32 && block.size() % 32 == 0 &&
+                     block.lane() == block.thread() % 32 && (block.size() % 32 == 0 || block.size() == 1) &&
                      block.first() == static_cast<std::int64_t>(block.index()) * block.size() + block.thread() &&
                      block.stride() == static_cast<std::int64_t>(block.count()) * block.size();
   if (!right) block.atomic_add(wrong, 1);
@@ -58,10 +63,8 @@ CUTPROOF_KERNEL(visit_jobs_kernel);
 struct Collected {
   int* size;
   int* sum;
-  float* float_sum;
-  Float3* vector_sum;
   int* smallest;
-  float* smallest_float;
+  unsigned long long* smallest_wide;
   int* any;
   int* none;
   int* scan;
@@ -76,10 +79,8 @@ CUTPROOF_DEVICE void collect_kernel(Block& block, Collected out, int jobs) {
     const int value = small_value(job, t);
     out.size[at] = block.size();
     out.sum[at] = block.sum(value);
-    out.float_sum[at] = block.sum(any_float(job, t));
-    out.vector_sum[at] = block.sum(Float3{any_float(job, t), 1.0f, static_cast<float>(t)});
     out.smallest[at] = block.smallest(value);
-    out.smallest_float[at] = block.smallest(any_float(job, t));
+    out.smallest_wide[at] = block.smallest(wide_value(job, t));
     out.any[at] = block.any(t == job % block.size());
     out.none[at] = block.any(false);
     int total = -1;
@@ -100,9 +101,6 @@ struct Warped {
   int* from_leader;  // within the parity
   unsigned long long* wide;
   Float3* vector;
-  Float3* vector_sum;
-  float* sums;      // sixteen at once
-  float* own_sums;  // each by itself
 };
 
 template <class Block>
@@ -114,14 +112,6 @@ CUTPROOF_DEVICE void warp_kernel(Block& block, Warped out) {
   out.rotated[at] = block.shuffle(everyone, static_cast<int>(at), (lane + 1) % 32);
   out.wide[at] = block.shuffle(everyone, (1ull << 40) + static_cast<unsigned long long>(at), 31 - lane);
   out.vector[at] = block.shuffle(everyone, Float3{static_cast<float>(lane), 2.0f, -static_cast<float>(lane)}, lane ^ 5);
-  out.vector_sum[at] = block.warp_sum(Float3{static_cast<float>(at), 1.0f, -static_cast<float>(lane)});
-  float values[16];
-  for (int k = 0; k < 16; ++k) values[k] = any_float(k, static_cast<int>(at));
-  out.sums[at] = block.warp_sums(values);
-  for (int k = 0; k < 16; ++k) {
-    const float sum = block.warp_sum(values[k]);
-    if (k == lane / 2) out.own_sums[at] = sum;
-  }
   if (lane % 2 == 0) {
     out.half[at] = block.ballot(0x55555555u, lane < 16);
     out.from_leader[at] = block.shuffle(0x55555555u, static_cast<int>(at), 0);
@@ -131,6 +121,98 @@ CUTPROOF_DEVICE void warp_kernel(Block& block, Warped out) {
   }
 }
 CUTPROOF_KERNEL(warp_kernel);
+
+inline constexpr int kTeamSums = 10, kTeamClasses = 8;
+
+// What teams make of jobs; job j has the items from begin[j] to begin[j + 1], with the values small_value(j, k).
+struct Teamed {
+  enum : int { kOdd, kTotal, kAny, kWrong, kCounts };
+  const int* begin;
+  float* sums;      // of any_float(j + n, k) over k [j · kTeamSums + n]
+  float* parts;     // the same, by parted(), where teams are wide enough
+  int* counts;      // [j · kCounts + which]
+  float* greatest;  // of any_float(j, k)
+  int* kept;        // from begin[j] on: the items with odd values, in order
+  int* place;       // of each item: the sum of the values before it
+  int* taken;       // 1: the team was given this item as a job of its own; of values that 3 divides
+  int* classes;     // items by the lowest bits of their values [j · kTeamClasses + class]
+};
+
+template <class Block, int kWidth>
+CUTPROOF_DEVICE void team_kernel(Block& block, const Teamed& out, int jobs) {
+  const Team<Block, kWidth> team(block);
+  for (std::int64_t i = team.first(); i < jobs; i += team.stride()) {
+    const int job = static_cast<int>(i);
+    const int first = out.begin[job], size = out.begin[job + 1] - first;
+    typename Team<Block, kWidth>::template Sums<kTeamSums> sums, again;
+    team.each(size, [&](int k) {
+      for (int n = 0; n < kTeamSums; ++n) {
+        sums.of(k)[n] += any_float(job + n, k);
+        again.of(k)[n] += any_float(job + n, k);
+      }
+    });
+    const auto total = team.total(sums);
+    if (team.leads()) {
+      for (int n = 0; n < kTeamSums; ++n) out.sums[job * kTeamSums + n] = total.v[n];
+    }
+    int wrong = 0;
+    if constexpr (kWidth >= 16) {
+      const auto parts = team.parted(again);
+      for (int n = 0; n < kTeamSums; ++n) {
+        if (parts.get(team, n) != total.v[n]) ++wrong;
+      }
+      parts.each(team, [&](int n, float sum) { out.parts[job * kTeamSums + n] = sum; });
+    } else if (team.leads()) {
+      for (int n = 0; n < kTeamSums; ++n) out.parts[job * kTeamSums + n] = total.v[n];
+    }
+    float most = -1e9f;
+    int values = 0, odd = 0, before = 0;
+    bool any_odd = false;
+    for (int tile = 0; tile < size; tile += team.kLanes) {
+      const int k = tile + team.lane();
+      const bool inside = k < size;
+      const int value = inside ? small_value(job, k) : 0;
+      if (inside) most = most > any_float(job, k) ? most : any_float(job, k);
+      values += value;
+      any_odd = any_odd || value % 2 != 0;
+      int found = 0;
+      const int rank = team.rank(value % 2 != 0, found);
+      if (value % 2 != 0) out.kept[first + odd + rank] = k;
+      odd += found;
+      const int lower = team.total_before(value);
+      if (inside) out.place[first + k] = before + lower;
+      before += team.total(value);
+      const auto equals = team.equals(inside ? value & (kTeamClasses - 1) : -1);
+      if (equals.before == 0 && equals.first != team.lane()) ++wrong;
+      if (inside && equals.before == 0)
+        block.atomic_add(&out.classes[job * kTeamClasses + (value & (kTeamClasses - 1))], equals.count);
+      unsigned lanes = team.found(inside && value % 3 == 0);
+      while (lanes != 0) {
+        const int mine = team.take(lanes, k);  // to all of them
+        if (team.has(mine - tile)) out.taken[first + mine] += 1;
+      }
+      const int last = size - 1 < tile + team.kLanes - 1 ? size - 1 : tile + team.kLanes - 1;
+      if (team.from(last - tile, value) != small_value(job, last)) ++wrong;
+    }
+    const float of_all = team.greatest(most);
+    const int all = team.total(values), all_wrong = team.total(wrong);
+    const bool any = team.any(any_odd);
+    if (!team.leads()) continue;
+    out.greatest[job] = of_all;
+    out.counts[job * Teamed::kCounts + Teamed::kOdd] = odd;
+    out.counts[job * Teamed::kCounts + Teamed::kTotal] = all;
+    out.counts[job * Teamed::kCounts + Teamed::kAny] = any ? 1 : 0;
+    out.counts[job * Teamed::kCounts + Teamed::kWrong] = all_wrong;
+  }
+}
+template <int kWidth>
+struct team_kernel_object {
+  static constexpr const char* kName = "team_kernel";
+  template <class Block>
+  CUTPROOF_DEVICE void operator()(Block& block, const Teamed& out, int jobs) const {
+    team_kernel<Block, kWidth>(block, out, jobs);
+  }
+};
 
 struct Tallies {
   int add, least, greatest, bits, cas, last;
@@ -238,16 +320,12 @@ void check_collectives(Machine& machine) {
   const std::size_t places = kJobs * 1024;
   for (const int wanted : machine.block_sizes()) {
     auto ints = machine.array(std::vector<int>(8 * places));
-    auto floats = machine.array(std::vector<float>(2 * places));
-    auto vectors = machine.array(std::vector<Float3>(places));
+    auto wides = machine.array(std::vector<unsigned long long>(places));
     int* const i = ints.at();
-    float* const f = floats.at();
     const Collected out{i,
                         i + places,
-                        f,
-                        vectors.at(),
                         i + 2 * places,
-                        f + places,
+                        wides.at(),
                         i + 3 * places,
                         i + 4 * places,
                         i + 5 * places,
@@ -256,20 +334,16 @@ void check_collectives(Machine& machine) {
     const auto work = [&](auto& launcher) { launcher.blocks(collect_kernel_object{}, kJobs, wanted, 0, out, kJobs); };
     machine.run(work);
     const std::vector<int> got = ints.get();
-    const std::vector<float> got_floats = floats.get();
-    const std::vector<Float3> got_vectors = vectors.get();
+    const std::vector<unsigned long long> got_wides = wides.get();
     const auto entry = [&](int row, int at) { return got[static_cast<std::size_t>(row) * places + at]; };
     for (int job = 0; job < kJobs; ++job) {
       const int size = entry(0, job * 1024);
       int sum = 0, smallest = 1 << 20;
-      double float_sum = 0, magnitude = 0;
-      float smallest_float = 1e9f;
+      unsigned long long smallest_wide = ~0ull;
       for (int t = 0; t < size; ++t) {
         sum += small_value(job, t);
         smallest = std::min(smallest, small_value(job, t));
-        float_sum += any_float(job, t);
-        magnitude += std::abs(any_float(job, t));
-        smallest_float = std::min(smallest_float, any_float(job, t));
+        smallest_wide = std::min(smallest_wide, wide_value(job, t));
       }
       int before = 0;
       for (int t = 0; t < size; ++t) {
@@ -282,19 +356,84 @@ void check_collectives(Machine& machine) {
         ASSERT_EQ(entry(5, at), before) << "scan, thread " << t << " of " << size;
         ASSERT_EQ(entry(6, at), sum);
         ASSERT_EQ(entry(7, at), 5 * sum + 10 * size);
-        // A tree of additions: at most ten roundings on the way of any term.
-        ASSERT_NEAR(got_floats[at], float_sum, 10 * std::ldexp(1.0, -24) * magnitude);
-        ASSERT_EQ(got_floats[at], got_floats[job * 1024]) << "threads got different sums";
-        ASSERT_EQ(got_floats[places + at], smallest_float);
-        ASSERT_EQ(got_vectors[at].x, got_floats[at]);
-        ASSERT_EQ(got_vectors[at].y, static_cast<float>(size));
-        ASSERT_EQ(got_vectors[at].z, static_cast<float>(size * (size - 1) / 2));
+        ASSERT_EQ(got_wides[static_cast<std::size_t>(at)], smallest_wide);
         before += small_value(job, t);
       }
     }
-    machine.run(work);
-    EXPECT_EQ(floats.get(), got_floats) << "sums of two runs differ";
   }
+}
+
+template <int kWidth, class Machine>
+void check_teams_of(Machine& machine) {
+  const std::vector<int> sizes = {0, 1, 2, 7, 8, 9, 31, 32, 33, 63, 64, 65, 150};
+  const int jobs = 400;
+  std::vector<int> begin = {0};
+  for (int job = 0; job < jobs; ++job) {
+    begin.push_back(begin.back() + sizes[static_cast<std::size_t>(job) % sizes.size()]);
+  }
+  const std::size_t items = static_cast<std::size_t>(begin.back());
+  auto begins = machine.array(begin);
+  auto sums = machine.array(std::vector<float>(static_cast<std::size_t>(jobs) * kTeamSums, -1.0f));
+  auto parts = machine.array(std::vector<float>(static_cast<std::size_t>(jobs) * kTeamSums, -1.0f));
+  auto counts = machine.array(std::vector<int>(static_cast<std::size_t>(jobs) * Teamed::kCounts));
+  auto greatest = machine.array(std::vector<float>(static_cast<std::size_t>(jobs)));
+  auto kept = machine.array(std::vector<int>(items, -1));
+  auto place = machine.array(std::vector<int>(items, -1));
+  auto taken = machine.array(std::vector<int>(items));
+  auto classes = machine.array(std::vector<int>(static_cast<std::size_t>(jobs) * kTeamClasses));
+  const Teamed out{begins.at(), sums.at(),  parts.at(), counts.at(), greatest.at(),
+                   kept.at(),   place.at(), taken.at(), classes.at()};
+  machine.run([&](auto& launcher) { launcher.teams(team_kernel_object<kWidth>{}, kWidth, jobs, out, jobs); });
+
+  const auto got_sums = sums.get(), got_parts = parts.get(), got_greatest = greatest.get();
+  const auto got_counts = counts.get(), got_kept = kept.get(), got_place = place.get(), got_taken = taken.get(),
+             got_classes = classes.get();
+  for (int job = 0; job < jobs; ++job) {
+    SCOPED_TRACE("teams of " + std::to_string(kWidth) + ", job " + std::to_string(job));
+    const int first = begin[static_cast<std::size_t>(job)], size = begin[static_cast<std::size_t>(job) + 1] - first;
+    // Sums: one bank for each lane of the device, combined as a butterfly does.
+    for (int n = 0; n < kTeamSums; ++n) {
+      float bank[kWidth] = {};
+      for (int k = 0; k < size; ++k) bank[k % kWidth] += any_float(job + n, k);
+      for (int half = kWidth / 2; half > 0; half /= 2) {
+        for (int lane = 0; lane < half; ++lane) bank[lane] += bank[lane + half];
+      }
+      const auto at = static_cast<std::size_t>(job * kTeamSums + n);
+      ASSERT_EQ(got_sums[at], bank[0]) << "sum " << n;
+      ASSERT_EQ(got_parts[at], bank[0]) << "sum " << n << ", parted";
+    }
+    int odd = 0, total = 0, before = 0;
+    float most = -1e9f;
+    std::vector<int> of_class(kTeamClasses);
+    for (int k = 0; k < size; ++k) {
+      const int value = small_value(job, k);
+      ASSERT_EQ(got_place[static_cast<std::size_t>(first + k)], before) << "item " << k;
+      ASSERT_EQ(got_taken[static_cast<std::size_t>(first + k)], value % 3 == 0 ? 1 : 0) << "item " << k;
+      if (value % 2 != 0) {
+        ASSERT_EQ(got_kept[static_cast<std::size_t>(first + odd)], k);
+        ++odd;
+      }
+      most = std::max(most, any_float(job, k));
+      total += value;
+      before += value;
+      ++of_class[static_cast<std::size_t>(value & (kTeamClasses - 1))];
+    }
+    const int* const count = got_counts.data() + static_cast<std::size_t>(job) * Teamed::kCounts;
+    EXPECT_EQ(count[Teamed::kOdd], odd);
+    EXPECT_EQ(count[Teamed::kTotal], total);
+    EXPECT_EQ(count[Teamed::kAny], odd > 0 ? 1 : 0);
+    EXPECT_EQ(count[Teamed::kWrong], 0) << "lanes with equal values were numbered wrongly, or from() gave another's";
+    EXPECT_EQ(got_greatest[static_cast<std::size_t>(job)], most);
+    const int* const found = got_classes.data() + static_cast<std::size_t>(job) * kTeamClasses;
+    EXPECT_EQ(std::vector<int>(found, found + kTeamClasses), of_class);
+  }
+}
+
+template <class Machine>
+void check_teams(Machine& machine) {
+  check_teams_of<8>(machine);
+  check_teams_of<16>(machine);
+  check_teams_of<32>(machine);
 }
 
 template <class Machine>
@@ -303,10 +442,9 @@ void check_warp_operations(Machine& machine) {
   auto unsigneds = machine.array(std::vector<unsigned>(2 * kThreads));
   auto ints = machine.array(std::vector<int>(2 * kThreads));
   auto wides = machine.array(std::vector<unsigned long long>(kThreads));
-  auto vectors = machine.array(std::vector<Float3>(2 * kThreads));
-  auto floats = machine.array(std::vector<float>(2 * kThreads));
-  const Warped out{unsigneds.at(), unsigneds.at() + kThreads, ints.at(),   ints.at() + kThreads,  wides.at(),
-                   vectors.at(),   vectors.at() + kThreads,   floats.at(), floats.at() + kThreads};
+  auto vectors = machine.array(std::vector<Float3>(kThreads));
+  const Warped out{unsigneds.at(), unsigneds.at() + kThreads, ints.at(), ints.at() + kThreads, wides.at(),
+                   vectors.at()};
   machine.run([&](auto& launcher) { launcher.items(warp_kernel_object{}, kThreads, out); });
   for (int at = 0; at < kThreads; ++at) {
     const int lane = at % 32, warp = at - lane;
@@ -318,10 +456,6 @@ void check_warp_operations(Machine& machine) {
     EXPECT_EQ(vectors.get()[at].x, static_cast<float>(lane ^ 5));
     EXPECT_EQ(vectors.get()[at].y, 2.0f);
     EXPECT_EQ(vectors.get()[at].z, -static_cast<float>(lane ^ 5));
-    EXPECT_EQ(vectors.get()[kThreads + at].x, static_cast<float>(32 * warp + 496));
-    EXPECT_EQ(vectors.get()[kThreads + at].y, 32.0f);
-    EXPECT_EQ(vectors.get()[kThreads + at].z, -496.0f);
-    EXPECT_EQ(floats.get()[at], floats.get()[kThreads + at]);  // bit by bit: terms cancel, so any other order shows
   }
 }
 

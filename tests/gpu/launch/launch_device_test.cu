@@ -72,6 +72,7 @@ TEST_P(LaunchOnDevice, VisitsEveryItemOnce) { check_every_item_is_visited_once(m
 TEST_P(LaunchOnDevice, GivesEveryJobOneBlock) { check_every_job_gets_one_block(machine); }
 TEST_P(LaunchOnDevice, CollectivesAreWhatTheySay) { check_collectives(machine); }
 TEST_P(LaunchOnDevice, WarpOperationsAreWhatTheySay) { check_warp_operations(machine); }
+TEST_P(LaunchOnDevice, TeamsAreWhatTheySay) { check_teams(machine); }
 TEST_P(LaunchOnDevice, AtomicsLoseNothing) { check_atomics(machine); }
 TEST_P(LaunchOnDevice, SharedMemoryIsAlignedAndDisjoint) { check_shared_memory(machine); }
 TEST_P(LaunchOnDevice, ConditionsAreReadWhenTheWorkBeforeIsDone) { check_conditions(machine); }

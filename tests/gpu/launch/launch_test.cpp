@@ -58,6 +58,7 @@ TEST_P(LaunchOnHost, VisitsEveryItemOnce) { check_every_item_is_visited_once(mac
 TEST_P(LaunchOnHost, GivesEveryJobOneBlock) { check_every_job_gets_one_block(machine); }
 TEST_P(LaunchOnHost, CollectivesAreWhatTheySay) { check_collectives(machine); }
 TEST_P(LaunchOnHost, WarpOperationsAreWhatTheySay) { check_warp_operations(machine); }
+TEST_P(LaunchOnHost, TeamsAreWhatTheySay) { check_teams(machine); }
 TEST_P(LaunchOnHost, AtomicsLoseNothing) { check_atomics(machine); }
 TEST_P(LaunchOnHost, SharedMemoryIsAlignedAndDisjoint) { check_shared_memory(machine); }
 TEST_P(LaunchOnHost, ConditionsAreReadWhenTheWorkBeforeIsDone) { check_conditions(machine); }
@@ -241,6 +242,71 @@ INSTANTIATE_TEST_SUITE_P(Modes, LaunchOnHost,
                                          ModeCase{"RandomWalk", [] { return simulated(random_walk(1)); }},
                                          ModeCase{"Pct", [] { return simulated(pct(1, 3, 1000)); }}),
                          [](const auto& mode) { return mode.param.name; });
+
+// Blocks of one thread.
+
+class LoneThreads : public testing::TestWithParam<int> {
+ protected:
+  HostMachine machine{HostLauncher(HostLauncher::Threads{.count = GetParam(), .of_block = 1})};
+};
+
+TEST_P(LoneThreads, DoWhatBlocksDo) {
+  check_every_item_is_visited_once(machine);
+  check_every_job_gets_one_block(machine);
+  check_collectives(machine);
+  check_teams(machine);
+  check_atomics(machine);
+  check_shared_memory(machine);
+  check_conditions(machine);
+}
+
+TEST_P(LoneThreads, KeepTheRulesOfSharedMemory) {
+  HostLauncher& launcher = machine.launcher;
+  const take_shared_kernel_object take;
+  EXPECT_NO_THROW(launcher.blocks(take, 1, 32, 400, 100, false));
+  expect_mentions(fault_of([&] { launcher.blocks(take, 1, 32, 399, 100, false); }),
+                  {"take_shared_kernel, block 0", "byte 400 of the 399"});
+  std::vector<int> ints(100, 1);
+  std::vector<float> floats(100, 1);
+  for (const bool dirty : {true, false}) {
+    launcher.blocks(read_unwritten_kernel_object{}, 100, 32, 32, ints.data(), floats.data(), dirty);
+    EXPECT_EQ(ints[0], -1);
+    EXPECT_TRUE(std::isnan(floats[0]));
+  }
+}
+
+template <class Block>
+CUTPROOF_DEVICE void ask_a_warp_kernel(Block& block, int which) {
+  if (which == 0) block.ballot(1u, true);
+  if (which == 1) block.shuffle(1u, 1, 0);
+  if (which == 2) block.sync_warp(1u);
+  if (block.index() == 3) throw std::runtime_error("block 3");
+}
+CUTPROOF_KERNEL(ask_a_warp_kernel);
+
+TEST_P(LoneThreads, AreNoWarps) {
+  HostLauncher& launcher = machine.launcher;
+  for (int which = 0; which < 3; ++which) {
+    expect_mentions(fault_of([&] { launcher.blocks(ask_a_warp_kernel_object{}, 1, 32, 0, which); }),
+                    {"ask_a_warp_kernel, block 0", "runs alone", "32 threads"});
+  }
+}
+
+TEST_P(LoneThreads, AnExceptionReachesTheCaller) {
+  if (GetParam() == 1) {
+    EXPECT_NO_THROW(machine.launcher.blocks(ask_a_warp_kernel_object{}, 64, 32, 0, 3)) << "one block does all";
+  } else {
+    EXPECT_THROW(machine.launcher.blocks(ask_a_warp_kernel_object{}, 64, 32, 0, 3), std::runtime_error);
+  }
+  check_collectives(machine);
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, LoneThreads, testing::Values(1, 3), testing::PrintToStringParamName());
+
+TEST(LoneThreads, AreOneOrAsManyAsAWarpHas) {
+  EXPECT_THROW(HostLauncher(HostLauncher::Threads{.of_block = 0}), std::invalid_argument);
+  EXPECT_THROW(HostLauncher(HostLauncher::Threads{.of_block = 16}), std::invalid_argument);
+}
 
 // Schedules.
 
