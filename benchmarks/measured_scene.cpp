@@ -1,12 +1,15 @@
 #include "benchmarks/measured_scene.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include "benchmarks/report.h"
 #include "benchmarks/times.h"
 #include "model/at.h"
 #include "model/io/filled.h"
 #include "model/io/json_number.h"
 #include "model/io/verdict_json.h"
+#include "model/rules.h"
 
 namespace cutproof::benchmarks {
 
@@ -99,6 +102,7 @@ json run_fields(const BenchScene& scene, const Contender& contender) {
           {"precision", name_of(contender.described->precision)},
           {"substeps", setup.step.substeps},
           {"iterations", setup.step.iterations},
+          {"acceleration", name_of(setup.step.acceleration)},
           {"rotation", contender.rotation},
           {"split", contender.split}};
 }
@@ -115,6 +119,21 @@ json scene_row(const BenchScene& scene, const Contender& contender, const Measur
   row["seconds"] = std::move(seconds);
   row["error"] = std::move(errors);
   return row;
+}
+
+std::vector<StepParameters> steps_of(const TimingOptions& options, const StepParameters& own) {
+  StepParameters step = own;
+  step.iterations = options.iterations.value_or(own.iterations);
+  if (options.acceleration.empty()) return {step};
+  std::vector<StepParameters> steps;
+  for (const std::string& word : options.acceleration) {
+    const auto known = choice_named<Acceleration>(word);
+    require_option(known.has_value(), "--acceleration", fmt::format("there is no acceleration '{}'", word),
+                   fmt::format("use {}", fmt::join(names_of(Acceleration{}), " and ")));
+    step.acceleration = *known;
+    steps.push_back(step);
+  }
+  return steps;
 }
 
 }  // namespace cutproof::benchmarks

@@ -40,8 +40,14 @@ struct TimingOptions {
   std::optional<int64_t> frames;  // timed; absent: by backend
   int64_t repeats = 3;
   std::string split, rotation;  // empty: the kernels' default
+  // How the step iterates: each of these in turn. Empty, absent: as the scene says.
+  std::vector<std::string> acceleration;
+  std::optional<int32_t> iterations;
   const harness::BackendDescriptor& described() const { return harness::described_backend(backend); }
   int64_t frames_or_default() const { return frames.value_or(described().timed_frames); }
 };
+
+// The steps that are to be timed of a scene whose own is this. Throws InputError, naming the option.
+std::vector<StepParameters> steps_of(const TimingOptions& options, const StepParameters& own);
 
 }  // namespace cutproof::benchmarks

@@ -27,9 +27,9 @@ struct BenchScene : ReadyScene {
 // The most frames that are judged after the timed ones: until one of them has removed something.
 inline constexpr int64_t kJudgedFrames = 4;
 
-// A box up to kLargestBox particles, a kidney beyond; `boxes` clusters; 4 substeps × 4 iterations; k = 1e5; the blade
-// enters at the upper end of the longest axis and follows it, halfway between two layers of nodes. The other end is
-// held. Throws InputError if no body has so many particles, within 2 %.
+// A box up to kLargestBox particles, a kidney beyond; `boxes` clusters; 4 substeps × 4 plain iterations; k = 1e5; the
+// blade enters at the upper end of the longest axis and follows it, halfway between two layers of nodes. The other end
+// is held. Throws InputError if no body has so many particles, within 2 %.
 inline constexpr int64_t kLargestBox = 2000;
 BenchScene make_bench_scene(int64_t particles, int64_t frames);
 

@@ -73,17 +73,29 @@ void add_timing(CLI::App& command, benchmarks::TimingOptions& options) {
   command.add_option("--split", options.split, "kernels: how clusters are split, blocks, global or both")
       ->type_name("M");
   command.add_option("--rotation", options.rotation, "kernels: how rotations are found")->type_name("M");
+  add_list(command, "--acceleration", options.acceleration,
+           options.acceleration.empty() ? "none, chebyshev or both, instead of the scene's" : "none, chebyshev or both",
+           "A");
+  add_count(command, "--iterations", options.iterations, "of a substep, instead of the scene's",
+            CLI::Range(1, 1'000'000));
 }
 
 void print_scene(const nlohmann::json& document) {
   const nlohmann::json& row = document.at("rows").back();
-  print_filled("{scene}, split {split}: {particles} particles, frame {1e3*seconds/frame/median:.4g} ms\n", row);
+  print_filled(
+      "{scene}, acceleration {acceleration}, split {split}: {particles} particles, frame "
+      "{1e3*seconds/frame/median:.4g} ms\n",
+      row);
   print_failures(row.at("error").at("frame"));
 }
 
 void print_scenes(const nlohmann::json& document, const std::vector<Column>& beside_clusters,
                   const std::vector<Column>& beside_times) {
-  std::vector<Column> columns = {{"median ms", "{scene}"}, {"particles", "{particles}"}, {"clusters", "{clusters}"}};
+  std::vector<Column> columns = {{"median ms", "{scene}"},
+                                 {"iterations", "{substeps} × {iterations}"},
+                                 {"acceleration", "{acceleration}"},
+                                 {"particles", "{particles}"},
+                                 {"clusters", "{clusters}"}};
   columns.insert(columns.end(), beside_clusters.begin(), beside_clusters.end());
   for (const std::string_view stage : kStageNames) {
     columns.emplace_back(std::string(stage), fmt::format("{{1e3*seconds/{}/median:.4g}}", stage));

@@ -1,6 +1,8 @@
 // Every choice that a scene makes by name, described once: its name in files, and what its answer promises.
 #pragma once
+#include <algorithm>
 #include <array>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <type_traits>
@@ -33,6 +35,14 @@ concept NamedChoice = std::is_enum_v<E> && requires(E choice) {
 template <NamedChoice E>
 constexpr std::string_view name_of(E choice) {
   return names_of(choice)[static_cast<std::size_t>(choice)];
+}
+// The choice of this name, if there is one.
+template <NamedChoice E>
+constexpr std::optional<E> choice_named(std::string_view name) {
+  const auto names = names_of(E{});
+  const auto found = std::ranges::find(names, name);
+  if (found == names.end()) return std::nullopt;
+  return static_cast<E>(found - names.begin());
 }
 
 // What a rule of merging promises (method.md §6).

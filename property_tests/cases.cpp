@@ -861,9 +861,7 @@ void to_json(nlohmann::json& json, E choice) {
 }
 template <NamedChoice E>
 void from_json(const nlohmann::json& json, E& choice) {
-  const auto names = names_of(choice);
-  const auto found = std::find(names.begin(), names.end(), json.get<std::string>());
-  choice = static_cast<E>(found == names.end() ? 0 : found - names.begin());
+  choice = choice_named<E>(json.get<std::string>()).value_or(E{});
 }
 }  // namespace cutproof
 

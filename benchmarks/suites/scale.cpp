@@ -21,21 +21,25 @@ nlohmann::json run_scale(const ScaleOptions& options, const Progress& progress) 
   const int64_t frames = options.frames_or_default();
   const auto contenders = [&] { return make_contenders(options.backend, options.split, options.rotation); };
   static_cast<void>(contenders());  // what cannot be made is refused before anything is shown
+  static_cast<void>(steps_of(options, {}));
   Report report("scale", options.backend, {{"frames", frames}, {"repeats", options.repeats}, {"holds", true}},
                 progress);
   for (const int64_t size : sizes) {
-    const BenchScene scene = make_bench_scene(size, frames);
-    // New ones for each size, so that what one keeps is what this size needs.
-    for (const Contender& contender : contenders()) {
-      const std::optional<int64_t> before = bytes_in_use(options.described());
-      const Measured measured = measure(contender, scene, frames, options.repeats);
-      const std::optional<int64_t> after = bytes_in_use(options.described());
-      nlohmann::json row = scene_row(scene, contender, measured);
-      row["particles_per_second"] =
-          static_cast<double>(scene.setup.body.particle_count()) / measured.timings.frame.median;
-      row["bytes"] = nullptr;
-      if (before && after && *after > *before) row["bytes"] = *after - *before;
-      report.add(std::move(row), measured.holds());
+    BenchScene scene = make_bench_scene(size, frames);
+    for (const StepParameters& step : steps_of(options, scene.setup.step)) {
+      scene.setup.step = step;
+      // New ones for each row, so that what one keeps is what this size needs.
+      for (const Contender& contender : contenders()) {
+        const std::optional<int64_t> before = bytes_in_use(options.described());
+        const Measured measured = measure(contender, scene, frames, options.repeats);
+        const std::optional<int64_t> after = bytes_in_use(options.described());
+        nlohmann::json row = scene_row(scene, contender, measured);
+        row["particles_per_second"] =
+            static_cast<double>(scene.setup.body.particle_count()) / measured.timings.frame.median;
+        row["bytes"] = nullptr;
+        if (before && after && *after > *before) row["bytes"] = *after - *before;
+        report.add(std::move(row), measured.holds());
+      }
     }
   }
   return report.complete();

@@ -106,6 +106,7 @@ json run_stages(const StagesOptions& options, const Progress& progress) {
   const int64_t frames = options.frames_or_default();
   const auto scenes = scenes_of(options, frames);
   const std::vector<Contender> contenders = make_contenders(options.backend, options.split, options.rotation);
+  static_cast<void>(steps_of(options, {}));  // refused before anything is measured
   const MachineLimits machine = measure_machine(options.described());
   json fields = {{"frames", frames},
                  {"repeats", options.repeats},
@@ -119,18 +120,21 @@ json run_stages(const StagesOptions& options, const Progress& progress) {
 #endif
   Report report("stages", options.backend, fields, progress, "scenes");
   for (const auto& make_scene : scenes) {
-    const BenchScene scene = make_scene();
-    for (const Contender& contender : contenders) {
-      const Measured measured = measure(contender, scene, frames, options.repeats);
-      add_rows(scene, contender, measured, report.document);
-      json entry = scene_json(scene, contender, measured);
-      entry["frames"] = frames;
-      entry["repeats"] = options.repeats;
-      if (contender.described->takes_kernel_options) {  // what its step moves is counted
-        const Times& step = measured.timings.stage[static_cast<std::size_t>(Stage::step)];
-        entry["step_limit"] = step_limit(scene, step.median, machine);
+    BenchScene scene = make_scene();
+    for (const StepParameters& asked : steps_of(options, scene.setup.step)) {
+      scene.setup.step = asked;
+      for (const Contender& contender : contenders) {
+        const Measured measured = measure(contender, scene, frames, options.repeats);
+        add_rows(scene, contender, measured, report.document);
+        json entry = scene_json(scene, contender, measured);
+        entry["frames"] = frames;
+        entry["repeats"] = options.repeats;
+        if (contender.described->takes_kernel_options) {  // what its step moves is counted
+          const Times& step = measured.timings.stage[static_cast<std::size_t>(Stage::step)];
+          entry["step_limit"] = step_limit(scene, step.median, machine);
+        }
+        report.add(std::move(entry), measured.holds());
       }
-      report.add(std::move(entry), measured.holds());
     }
   }
   return report.complete();

@@ -40,6 +40,7 @@ nlohmann::json run_clusters(const ClustersOptions& options, const Progress& prog
 
 // What a frame takes from a thousand particles to ten million.
 struct ScaleOptions : TimingOptions {
+  ScaleOptions() { acceleration = {"none", "chebyshev"}; }
   std::vector<int64_t> sizes;  // particles; empty: by backend
 };
 nlohmann::json run_scale(const ScaleOptions& options, const Progress& progress);

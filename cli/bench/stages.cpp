@@ -44,7 +44,7 @@ void print_last_scene(const json& document) {
   print_filled("{body/memberships} memberships, h = {1e3*body/spacing:.4g} mm; ", scene);
   print_filled("the blade goes on by {blade_advance_h:.2g} h a frame\n", scene);
   print_filled("{backend}, {precision} precision, {substeps} substeps × {iterations} iterations, ", rows.front());
-  print_filled("rotation {rotation}, split {split}\n", rows.front());
+  print_filled("acceleration {acceleration}, rotation {rotation}, split {split}\n", rows.front());
   const auto line = [](auto what, auto median, auto least, auto most, auto frames, auto paper, auto error) {
     fmt::print("  {:<14} {:>11} {:>11} {:>11} {:>9} {:>9}  {}\n", what, median, least, most, frames, paper, error);
   };

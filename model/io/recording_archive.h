@@ -61,12 +61,9 @@ class ReadingArchive {
     located(name, [&] {
       if constexpr (NamedChoice<T>) {
         const std::string found = hdf5::read_text_attribute(group_, name);
-        const auto names = names_of(T{});
-        const auto at = std::find(names.begin(), names.end(), found);
-        if (at == names.end()) {
-          throw hdf5::Error(name, fmt::format("This is \"{}\", which is none of its names.", found));
-        }
-        value = static_cast<T>(at - names.begin());
+        const auto choice = choice_named<T>(found);
+        if (!choice) throw hdf5::Error(name, fmt::format("This is \"{}\", which is none of its names.", found));
+        value = *choice;
       } else if constexpr (std::is_same_v<T, std::string>) {
         value = hdf5::read_text_attribute(group_, name);
       } else if constexpr (std::is_same_v<T, bool>) {

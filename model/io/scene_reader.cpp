@@ -262,13 +262,12 @@ void read(const json& value, const Place& at, const SceneField& field, Range& ou
 
 template <NamedChoice E>
 void read(const json& value, const Place& at, const SceneField&, E& out) {
-  const auto names = names_of(E{});
-  const auto found = value.is_string() ? std::ranges::find(names, value.get<std::string>()) : names.end();
-  if (found == names.end()) {
+  const auto choice = value.is_string() ? choice_named<E>(value.get<std::string>()) : std::nullopt;
+  if (!choice) {
     at.fail(fmt::format("{} is none of the known words.", type_text(value)),
             fmt::format("Give one of {}.", all_names<E>("\"")));
   }
-  out = static_cast<E>(found - names.begin());
+  out = *choice;
 }
 
 // Structs with fields, lists and optional values refer to each other.

@@ -21,9 +21,12 @@ TEST_F(BenchScale, TellsTimeMemoryAndErrorOfEachSize) {
     const json document = json::parse(read("out.json"));
     EXPECT_EQ(document.at("complete"), true);
     EXPECT_EQ(document.at("holds"), true);
-    ASSERT_EQ(document.at("rows").size(), 2U);
+    ASSERT_EQ(document.at("rows").size(), 4U);
     int64_t before = 0;
-    for (const json& row : document.at("rows")) {
+    for (std::size_t k = 0; k < 4; ++k) {
+      const json& row = document.at("rows")[k];
+      EXPECT_EQ(row.at("acceleration"), k % 2 == 0 ? "none" : "chebyshev");
+      EXPECT_EQ(row.at("iterations"), 4);
       EXPECT_EQ(row.at("backend"), backend);
       EXPECT_GT(row.at("particles_per_second"), 0);
       EXPECT_EQ(row.at("error").at("frame").at("topology_holds"), true);
@@ -32,10 +35,22 @@ TEST_F(BenchScale, TellsTimeMemoryAndErrorOfEachSize) {
         continue;  // a sanitizer's allocator does not count
       // At the very least position and velocity of each particle in single precision.
       EXPECT_GT(row.at("bytes"), 24 * row.at("particles").get<int64_t>());
+      if (k % 2 != 0) continue;  // of the same size as the row before
       EXPECT_GT(row.at("bytes"), before);
       before = row.at("bytes");
     }
   }
+}
+
+TEST_F(BenchScale, IteratesAsAskedFor) {
+  const Outcome outcome = cutproof(
+      "bench scale --sizes 1000 --frames 1 --repeats 1 --acceleration chebyshev --iterations 16 --json out.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  const json rows = json::parse(read("out.json")).at("rows");
+  ASSERT_EQ(rows.size(), 1U);
+  EXPECT_EQ(rows[0].at("acceleration"), "chebyshev");
+  EXPECT_EQ(rows[0].at("iterations"), 16);
+  EXPECT_NE(outcome.output.find("4 × 16"), std::string::npos) << outcome.output;
 }
 
 TEST(BytesInUse, CountWhatIsAllocated) {
@@ -51,6 +66,8 @@ TEST(BytesInUse, CountWhatIsAllocated) {
 TEST_F(BenchScale, RefusesBadUsage) {
   expect_refused("bench scale --sizes 5", {"--sizes"});
   expect_refused("bench scale --split blocks", {"--split"});
+  expect_refused("bench scale --acceleration swift", {"--acceleration", "swift", "none and chebyshev"});
+  expect_refused("bench scale --iterations 0", {"--iterations"});
   expect_refused("bench scale --json nowhere/out.json", {"nowhere"});
 }
 

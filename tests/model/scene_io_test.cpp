@@ -218,7 +218,8 @@ TEST(SceneIo, EachFieldOfASetupsStagesComesBackChangedAlone) {
     scene.skin = setup.skin;
     return from_scene(parse_scene(write_scene(scene), "scene.json"));
   };
-  const cutproof::Setup base = from_scene(parse_scene(kSmallest, "scene.json"));
+  cutproof::Setup base = from_scene(parse_scene(kSmallest, "scene.json"));
+  base.step.acceleration = Acceleration::none;  // so that the solver may change alone
   int changes = 0;
   for_each_setup_field([&](const SetupField& field, auto get) {
     const auto groups = {"step", "detect", "split", "merge", "expand", "skin"};
