@@ -7,7 +7,7 @@ namespace cutproof::benchmarks {
 
 namespace {
 
-constexpr const char* kScene = "kidney_101096";
+constexpr const char* kKidney = "kidney_101096";
 // What the paper's counts of particles are divided by where nobody wants to wait.
 constexpr int64_t kScaledDown = 16;
 
@@ -16,7 +16,7 @@ constexpr int64_t kScaledDown = 16;
 nlohmann::json run_sampling(const SamplingOptions& options, const Progress& progress) {
   const Cooking cooking = cooking_of(options.cooking);
   const std::vector<Contender> contenders = make_contenders(options.backend, options.split, options.rotation);
-  const std::vector<StepParameters> steps = steps_of(options, embedded_scene(kScene).step);
+  const std::vector<StepParameters> steps = steps_of(options, embedded_scene(kKidney).step);
   const int64_t frames = options.frames_or_default();
   const int64_t scaled_down = options.full || options.described().takes_full_size ? 1 : kScaledDown;
   Report report("sampling", options.backend,
@@ -31,7 +31,7 @@ nlohmann::json run_sampling(const SamplingOptions& options, const Progress& prog
       double first_frame = 0;
       for (const PaperSampling& paper : paper_samplings()) {
         const int64_t wanted = paper.particles / scaled_down;
-        BenchScene scene = make_paper_scene(kScene, fmt::format("kidney_{}", wanted), wanted, cooking, frames);
+        BenchScene scene = make_paper_scene(kKidney, fmt::format("kidney_{}", wanted), wanted, cooking, frames);
         scene.setup.step = step;
         const Measured measured = measure(contender, scene, frames, options.repeats);
         const double frame = measured.timings.frame.median;
