@@ -10,6 +10,7 @@
 #include "gpu/device/cuda_handles.h"
 #include "gpu/device/device_launcher.cuh"
 #include "gpu/kernels/float3.h"
+#include "gpu/launch/team.h"
 
 namespace cutproof::gpu {
 namespace {
@@ -45,8 +46,8 @@ __global__ void __launch_bounds__(256) raw_update_particles_kernel(const __grid_
   }
 }
 
-// One block per cluster of kClusterSize particles, as the sums of step.cuh: members in shared memory, t = Σ w x / n by
-// a block sum that every thread needs, and each member's w (x - t).
+// A warp for each cluster of kClusterSize particles, as the sums over members in the kernels: t = Σ w x / n, which every
+// lane needs, and each member's w (x - t).
 constexpr int kClusterSize = 125;
 struct Clusters {
   const Float4* position;
@@ -56,23 +57,25 @@ struct Clusters {
 };
 
 template <class Block>
-CUTPROOF_DEVICE void sum_clusters_kernel(Block& block, Clusters c) {
-  int* members = block.template shared<int>(kClusterSize);
-  for (int s = block.index(); s < c.count; s += block.count()) {
-    for (int i = block.thread(); i < kClusterSize; i += block.size()) members[i] = c.members[s * kClusterSize + i];
-    block.sync();
-    Float3 own;
-    for (int i = block.thread(); i < kClusterSize; i += block.size()) {
-      // From the other end, so that it is another thread's member.
-      const Float4 x = c.position[members[kClusterSize - 1 - i]];
-      own = own + x.w * xyz(x);
-    }
-    const Float3 center = (1.0f / kClusterSize) * block.sum(own);
-    for (int i = block.thread(); i < kClusterSize; i += block.size()) {
-      const Float4 x = c.position[members[i]];
-      c.offset[s * kClusterSize + i] = with_w(x.w * (xyz(x) - center), x.w);
-    }
-    block.sync();
+CUTPROOF_DEVICE void sum_clusters_kernel(Block& block, const Clusters& c) {
+  using WholeWarp = Team<Block, 32>;
+  const WholeWarp team(block);
+  for (std::int64_t s = team.first(); s < c.count; s += team.stride()) {
+    const int* const members = c.members + s * kClusterSize;
+    typename WholeWarp::template Sums<3> sums;
+    team.each(kClusterSize, [&](int k) {
+      const Float4 x = c.position[members[k]];
+      float* const sum = sums.of(k);
+      sum[0] += x.w * x.x;
+      sum[1] += x.w * x.y;
+      sum[2] += x.w * x.z;
+    });
+    const auto total = team.total(sums);
+    const Float3 center = (1.0f / kClusterSize) * Float3{total.v[0], total.v[1], total.v[2]};
+    team.each(kClusterSize, [&](int k) {
+      const Float4 x = c.position[members[k]];
+      c.offset[s * kClusterSize + k] = with_w(x.w * (xyz(x) - center), x.w);
+    });
   }
 }
 CUTPROOF_KERNEL(sum_clusters_kernel);
@@ -84,43 +87,24 @@ __device__ inline float raw_warp_sum(float value) {
 }
 
 __global__ void __launch_bounds__(256) raw_sum_clusters_kernel(const __grid_constant__ Clusters c) {
-  extern __shared__ int members[];
-  __shared__ float partial[32][3];
-  const int lane = static_cast<int>(threadIdx.x % 32), warp = static_cast<int>(threadIdx.x / 32);
-  const int warps = static_cast<int>(blockDim.x / 32);
-  for (int s = static_cast<int>(blockIdx.x); s < c.count; s += static_cast<int>(gridDim.x)) {
-    for (int i = static_cast<int>(threadIdx.x); i < kClusterSize; i += static_cast<int>(blockDim.x))
-      members[i] = c.members[s * kClusterSize + i];
-    __syncthreads();
+  const int lane = static_cast<int>(threadIdx.x % 32), warps = static_cast<int>(gridDim.x * blockDim.x / 32);
+  for (int s = static_cast<int>((blockIdx.x * blockDim.x + threadIdx.x) / 32); s < c.count; s += warps) {
+    const int* const members = c.members + static_cast<std::int64_t>(s) * kClusterSize;
+    float4* const offset = reinterpret_cast<float4*>(c.offset) + static_cast<std::int64_t>(s) * kClusterSize;
     float x = 0, y = 0, z = 0;
-    for (int i = static_cast<int>(threadIdx.x); i < kClusterSize; i += static_cast<int>(blockDim.x)) {
-      const float4 at = reinterpret_cast<const float4*>(c.position)[members[kClusterSize - 1 - i]];
+    for (int i = lane; i < kClusterSize; i += 32) {
+      const float4 at = reinterpret_cast<const float4*>(c.position)[members[i]];
       x += at.w * at.x;
       y += at.w * at.y;
       z += at.w * at.z;
     }
-    x = raw_warp_sum(x), y = raw_warp_sum(y), z = raw_warp_sum(z);
-    __syncthreads();
-    if (lane == 0) partial[warp][0] = x, partial[warp][1] = y, partial[warp][2] = z;
-    __syncthreads();
-    const int from = lane < warps ? lane : 0;
-    x = partial[from][0], y = partial[from][1], z = partial[from][2];
-#pragma unroll
-    for (int distance = 16; distance > 0; distance /= 2) {
-      const float ox = __shfl_down_sync(0xffffffffu, x, distance);
-      const float oy = __shfl_down_sync(0xffffffffu, y, distance);
-      const float oz = __shfl_down_sync(0xffffffffu, z, distance);
-      if (lane + distance < warps) x += ox, y += oy, z += oz;
-    }
-    x = __shfl_sync(0xffffffffu, x, 0) * (1.0f / kClusterSize);
-    y = __shfl_sync(0xffffffffu, y, 0) * (1.0f / kClusterSize);
-    z = __shfl_sync(0xffffffffu, z, 0) * (1.0f / kClusterSize);
-    for (int i = static_cast<int>(threadIdx.x); i < kClusterSize; i += static_cast<int>(blockDim.x)) {
+    x = raw_warp_sum(x) * (1.0f / kClusterSize);
+    y = raw_warp_sum(y) * (1.0f / kClusterSize);
+    z = raw_warp_sum(z) * (1.0f / kClusterSize);
+    for (int i = lane; i < kClusterSize; i += 32) {
       const float4 at = reinterpret_cast<const float4*>(c.position)[members[i]];
-      reinterpret_cast<float4*>(c.offset)[s * kClusterSize + static_cast<int>(i)] =
-          make_float4(at.w * (at.x - x), at.w * (at.y - y), at.w * (at.z - z), at.w);
+      offset[i] = make_float4(at.w * (at.x - x), at.w * (at.y - y), at.w * (at.z - z), at.w);
     }
-    __syncthreads();
   }
 }
 
@@ -251,7 +235,7 @@ std::vector<KernelComparison> compare_with_raw(long long particles, int launches
     result.raw = resources_of(&raw_update_particles_kernel);
     DeviceLauncher launcher(nullptr);
     const auto grid = static_cast<unsigned>(
-        std::min<std::int64_t>((particles + 255) / 256, static_cast<std::int64_t>(32) * multiprocessors));
+        std::min<std::int64_t>((particles + 255) / 256, static_cast<std::int64_t>(8) * multiprocessors));
     time_both([&] { launcher.items(update_particles_kernel_object{}, particles, layer); },
               [&] {
                 raw_update_particles_kernel<<<grid, 256>>>(raw);
@@ -280,12 +264,10 @@ std::vector<KernelComparison> compare_with_raw(long long particles, int launches
     result.layer = resources_of(&run_kernel<sum_clusters_kernel_object, detail::Arguments<Clusters>>);
     result.raw = resources_of(&raw_sum_clusters_kernel);
     DeviceLauncher launcher(nullptr);
-    constexpr int kThreads = 128;
-    constexpr std::size_t kShared = kClusterSize * sizeof(int);
-    const auto grid = static_cast<unsigned>(std::min(clusters, 4 * 2048 / kThreads * multiprocessors));
-    time_both([&] { launcher.blocks(sum_clusters_kernel_object{}, clusters, kThreads, kShared, layer); },
+    const auto grid = static_cast<unsigned>(std::min((clusters + 7) / 8, 8 * multiprocessors));
+    time_both([&] { launcher.teams(sum_clusters_kernel_object{}, 32, clusters, layer); },
               [&] {
-                raw_sum_clusters_kernel<<<grid, kThreads, kShared>>>(raw);
+                raw_sum_clusters_kernel<<<grid, 256>>>(raw);
                 CUTPROOF_CUDA(cudaGetLastError());
               },
               launches, result);
