@@ -77,6 +77,85 @@ __global__ void set_condition_kernel(cudaGraphConditionalHandle handle, const in
   cudaGraphSetConditional(handle, *flag != 0 ? 1u : 0u);
 }
 
+// What is small enough is scanned and selected by one block, tile by tile: CUB takes two launches for either, neither of
+// which may overlap with what is before it.
+inline constexpr int kScanThreads = 1024, kEach = 16;  // items of a thread in a tile
+inline constexpr std::int64_t kMostScannedInBlock = 8 * kEach * kScanThreads;
+inline constexpr std::int64_t kMostSelectedInBlock = 16 * kEach * kScanThreads;
+
+// The items of a thread as one piece of memory; those from `count` on are 0.
+template <class T>
+struct alignas(16) TileItems {
+  T item[kEach];
+};
+template <class T>
+__device__ TileItems<T> load_items(const T* in, int begin, int count) {
+  TileItems<T> items;
+  if (begin + kEach <= count) return *reinterpret_cast<const TileItems<T>*>(in + begin);
+#pragma unroll
+  for (int k = 0; k < kEach; ++k) items.item[k] = begin + k < count ? in[begin + k] : T{};
+  return items;
+}
+
+struct scan_in_block_kernel_object {
+  static constexpr const char* kName = "scan_in_block_kernel";
+  static constexpr int kMaxThreads = kScanThreads;
+  template <class Block>
+  __device__ void operator()(Block& block, const int* in, int* out, int count, int* total) const {
+    int running = 0;
+    TileItems<int> next = load_items(in, block.thread() * kEach, count);
+    for (int tile = 0; tile < count; tile += kScanThreads * kEach) {
+      const TileItems<int> own = next;
+      const int begin = tile + block.thread() * kEach;
+      next = load_items(in, begin + kScanThreads * kEach, count);  // on its way while this one is scanned
+      int sum = 0, found = 0;
+#pragma unroll
+      for (int k = 0; k < kEach; ++k) sum += own.item[k];
+      int before = running + block.exclusive_scan(sum, found);
+      running += found;
+#pragma unroll
+      for (int k = 0; k < kEach; ++k) {
+        if (begin + k < count) out[begin + k] = before;
+        before += own.item[k];
+      }
+    }
+    if (block.thread() == 0) *total = running;
+  }
+};
+struct select_in_block_kernel_object {
+  static constexpr const char* kName = "select_in_block_kernel";
+  static constexpr int kMaxThreads = kScanThreads;
+  template <class Block>
+  __device__ void operator()(Block& block, const unsigned char* flags, int count, int* selected, int* total) const {
+    int running = 0;
+    TileItems<unsigned char> next = load_items(flags, block.thread() * kEach, count);
+    for (int tile = 0; tile < count; tile += kScanThreads * kEach) {
+      const TileItems<unsigned char> own = next;
+      const int begin = tile + block.thread() * kEach;
+      next = load_items(flags, begin + kScanThreads * kEach, count);
+      int sum = 0, found = 0;
+#pragma unroll
+      for (int k = 0; k < kEach; ++k) sum += own.item[k] != 0;
+      int before = running + block.exclusive_scan(sum, found);
+      running += found;
+      if (sum == 0) continue;
+#pragma unroll
+      for (int k = 0; k < kEach; ++k) {
+        if (own.item[k] != 0) selected[before++] = begin + k;
+      }
+    }
+    if (block.thread() == 0) *total = running;
+  }
+};
+
+struct clear_kernel_object {
+  static constexpr const char* kName = "clear_kernel";
+  template <class Block>
+  __device__ void operator()(Block& block, int* data, std::int64_t count) const {
+    for (std::int64_t i = block.first(); i < count; i += block.stride()) data[i] = 0;
+  }
+};
+
 // Keys beyond *count become the greatest number, which sorting puts last.
 template <class = void>
 __global__ void pad_keys_kernel(unsigned long long* keys, const int* count, int capacity) {
@@ -262,6 +341,9 @@ class DeviceLauncher {
 
   void exclusive_scan(const int* in, int* out, std::int64_t count, int* total) {
     const int n = narrow(count, "exclusive_scan");
+    if (n <= detail::kMostScannedInBlock && is_aligned(in)) {
+      return launch<detail::scan_in_block_kernel_object>(1, detail::kScanThreads, 0, in, out, n, total);
+    }
     const auto input = thrust::make_transform_iterator(thrust::counting_iterator<int>(0), detail::ScanInput{in, n});
     const detail::ScanOutput output(out, n, total);
     with_temporary("cub::DeviceScan::ExclusiveSum", [&](void* temporary, std::size_t& bytes) {
@@ -270,7 +352,10 @@ class DeviceLauncher {
   }
   void select(const unsigned char* flags, std::int64_t count, int* selected, int* selected_count) {
     const int n = narrow(count, "select");
-    if (n == 0) return clear(selected_count, sizeof(int));
+    if (n <= detail::kMostSelectedInBlock && is_aligned(flags)) {
+      return launch<detail::select_in_block_kernel_object>(1, detail::kScanThreads, 0, flags, n, selected,
+                                                           selected_count);
+    }
     with_temporary("cub::DeviceSelect::Flagged", [&](void* temporary, std::size_t& bytes) {
       return cub::DeviceSelect::Flagged(temporary, bytes, thrust::counting_iterator<int>(0), flags, selected,
                                         selected_count, n, stream_);
@@ -303,12 +388,14 @@ class DeviceLauncher {
     }
   }
   void clear(void* data, std::size_t bytes) {
-    after_launch_ = false;
-    if (bytes > 0 && mode_ != Mode::measure) CUTPROOF_CUDA(cudaMemsetAsync(data, 0, bytes, stream_));
+    const auto ints = static_cast<std::int64_t>(bytes / sizeof(int));
+    if (ints > 0) items(detail::clear_kernel_object{}, ints, static_cast<int*>(data), ints);
   }
 
  private:
   enum class Mode { at_once, measure, capture };
+
+  static bool is_aligned(const void* at) { return reinterpret_cast<std::uintptr_t>(at) % 16 == 0; }
 
   DeviceLauncher(Mode mode, cudaStream_t stream, std::shared_ptr<detail::DeviceResources> resources, std::size_t depth)
       : mode_(mode), stream_(stream), resources_(std::move(resources)), depth_(depth) {}

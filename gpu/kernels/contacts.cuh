@@ -48,10 +48,10 @@ namespace contacts_detail {
 
 // In the blade's frame: along the cutting edge, towards the back, along the positive normal.
 CUTPROOF_DEVICE inline Float3 into_frame(const PoseF& pose, Float3 from_edge) {
-  return {dot(from_edge, pose.along), dot(from_edge, pose.back), dot(from_edge, cross(pose.along, pose.back))};
+  return {dot(from_edge, pose.along), dot(from_edge, pose.back), dot(from_edge, pose.normal)};
 }
 CUTPROOF_DEVICE inline Float3 out_of_frame(const PoseF& pose, Float3 local) {
-  return local.x * pose.along + local.y * pose.back + local.z * cross(pose.along, pose.back);
+  return local.x * pose.along + local.y * pose.back + local.z * pose.normal;
 }
 CUTPROOF_DEVICE inline bool same(Float3 a, Float3 b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
@@ -210,7 +210,7 @@ CUTPROOF_DEVICE inline Float3 project(const Contacts& contacts, const RestPoint&
       const PoseF from = constant(&contacts.move->from), to = constant(&contacts.move->to);
       const Float3 c = into_frame(to, rest.from(to.edge) + result);
       const Float3 carried = (to.edge - from.edge) + c.x * (to.along - from.along) + c.y * (to.back - from.back) +
-                             c.z * (cross(to.along, to.back) - cross(from.along, from.back));
+                             c.z * (to.normal - from.normal);
       result = rubbed(result, result - start - carried, (1.0f / depth) * pushed, contacts.blade_friction * depth);
     }
   }

@@ -33,31 +33,50 @@ CUTPROOF_DEVICE inline bool is_due(const DeviceView& w, int b, int stage) {
   }
 }
 
-// What the conditions of a span ask for. One thread.
+// What a span reports of step and detect: which of them some body has due. One block.
 template <class Block>
-CUTPROOF_DEVICE void note_cuts_kernel(Block& block, DeviceView w) {
-  if (block.first() != 0) return;
+CUTPROOF_DEVICE void begin_span_kernel(Block& block, const DeviceView& w, Span span) {
+  if (block.index() != 0) return;
   Counters& c = *w.counters;
-  c.cut = 0;
-  c.expanding = 0;
-  c.extracting = 0;
-  for (int b = 0; b < w.bodies; ++b) {
-    if (is_due(w, b, static_cast<int>(Stage::split))) c.cut = c.groups_stale = 1;
-    if (is_due(w, b, static_cast<int>(Stage::expand))) c.expanding = 1;
-    if (is_due(w, b, static_cast<int>(Stage::skin)) && (w.cut[b] >= 0 || w.skin_made[b] == 0)) c.extracting = 1;
+  for (int k = block.thread(); k < static_cast<int>(kStages.size()); k += block.size()) block.store(&c.stage_ran[k], 0);
+  block.sync();
+  for (int b = block.thread(); b < w.bodies; b += block.size()) {
+    for (int k = 0; k < 2; ++k) {
+      if (span.contains(static_cast<Stage>(k)) && is_due(w, b, k)) block.store(&c.stage_ran[k], 1);
+    }
+  }
+}
+CUTPROOF_KERNEL(begin_span_kernel);
+
+// The same of all later stages, once it is known what detect has removed, and what the conditions of a span ask for.
+// One block.
+template <class Block>
+CUTPROOF_DEVICE void note_cuts_kernel(Block& block, const DeviceView& w, Span span) {
+  if (block.index() != 0) return;
+  Counters& c = *w.counters;
+  if (block.thread() == 0) {
+    block.store(&c.cut, 0);
+    block.store(&c.expanding, 0);
+    block.store(&c.extracting, 0);
+  }
+  block.sync();
+  for (int b = block.thread(); b < w.bodies; b += block.size()) {
+    const auto due = [&](Stage stage) {
+      const int k = static_cast<int>(stage);
+      const bool is = is_due(w, b, k);
+      if (is && span.contains(stage)) block.store(&c.stage_ran[k], 1);
+      return is;
+    };
+    if (due(Stage::split)) {
+      block.store(&c.cut, 1);
+      block.store(&c.groups_stale, 1);
+    }
+    static_cast<void>(due(Stage::merge));
+    if (due(Stage::expand)) block.store(&c.expanding, 1);
+    if (due(Stage::skin) && (w.cut[b] >= 0 || w.skin_made[b] == 0)) block.store(&c.extracting, 1);
   }
 }
 CUTPROOF_KERNEL(note_cuts_kernel);
-
-// One thread: reports a stage as run if some body had it due.
-template <class Block>
-CUTPROOF_DEVICE void note_stage_kernel(Block& block, DeviceView w, int stage) {
-  if (block.first() != 0) return;
-  for (int b = 0; b < w.bodies; ++b) {
-    if (is_due(w, b, stage)) w.counters->stage_ran[stage] = 1;
-  }
-}
-CUTPROOF_KERNEL(note_stage_kernel);
 
 // Split and merge rename memberships in place. Before anything is summed over them again they are brought into the
 // order that a load gives them, so that sums have the same bits however often a state was loaded on the way.

@@ -526,34 +526,34 @@ CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, con
   const int64_t most = w.slot_capacity < kMergeBlocks ? w.slot_capacity : kMergeBlocks;
   const auto propose = [&](Launcher& on, auto kernel) { on.blocks(kernel, most, kMergeThreads, kCandidateBytes, w); };
   const auto carry_out = [&](Launcher& on, auto kernel) { on.blocks(kernel, most, kMergeThreads, 16, w); };
-  const auto rounds = [&](Launcher& on) {
-    on.while_nonzero(&c->merging, [&](Launcher& round) {
-      propose(round, propose_merges_kernel_object{});
-      carry_out(round, merge_pairs_kernel_object{});
-    });
+  const auto round = [&](Launcher& on) {
+    propose(on, propose_merges_kernel_object{});
+    carry_out(on, merge_pairs_kernel_object{});
   };
+  const auto rounds = [&](Launcher& on) { on.while_nonzero(&c->merging, round); };
 
   launcher.clear(&c->live_members, sizeof(int));
   launcher.items(begin_merge_kernel_object{}, w.slot_capacity, w);
   launcher.select(w.slot_flag, w.slot_capacity, w.small_clusters, &c->small);
   launcher.items(begin_rounds_kernel_object{}, 1, w);
-  if (plan.single_pass_merge) {
-    propose(launcher, propose_once_kernel_object{});
-    carry_out(launcher, merge_chains_kernel_object{});
-    launcher.if_nonzero(&c->failed, [&](Launcher& again) {
-      enqueue_move_together(again, w);
-      carry_out(again, merge_chains_kernel_object{});
-    });
-  }
-  if (plan.deterministic_merge || plan.published_merge) {
-    rounds(launcher);
-    launcher.while_nonzero(&c->failed, [&](Launcher& again) {
-      enqueue_move_together(again, w);
-      carry_out(again, merge_pairs_kernel_object{});
-      rounds(again);
-    });
-  }
   launcher.if_nonzero(&c->small, [&](Launcher& inner) {
+    if (plan.single_pass_merge) {
+      propose(inner, propose_once_kernel_object{});
+      carry_out(inner, merge_chains_kernel_object{});
+      inner.if_nonzero(&c->failed, [&](Launcher& again) {
+        enqueue_move_together(again, w);
+        carry_out(again, merge_chains_kernel_object{});
+      });
+    }
+    if (plan.deterministic_merge || plan.published_merge) {
+      round(inner);  // the first: a loop would ask whether there is one
+      rounds(inner);
+      inner.while_nonzero(&c->failed, [&](Launcher& again) {
+        enqueue_move_together(again, w);
+        carry_out(again, merge_pairs_kernel_object{});
+        rounds(again);
+      });
+    }
     inner.items(note_rest_dirty_kernel_object{}, w.slot_capacity, w);
     enqueue_rest_frames(inner, w);
   });

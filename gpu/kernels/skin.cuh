@@ -89,6 +89,9 @@ CUTPROOF_DEVICE inline void visit_new_vertices(const DeviceView& w, int b, int p
 template <class Block>
 CUTPROOF_DEVICE void mark_dirty_cells_kernel(Block& block, const DeviceView& w) {
   using namespace skin_detail;
+  for (int64_t s = block.first(); s < w.counters->slots_used; s += block.stride()) {
+    if (extracts(w, w.slot_body[s])) w.under_skin[s] = 0;
+  }
   for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
     const int p = static_cast<int>(i);
     const int b = w.body_of[p];
@@ -177,7 +180,7 @@ CUTPROOF_DEVICE void renew_vertices_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL(renew_vertices_kernel);
 
-// Writes the triangles of dirty cells and takes the flags down again.
+// Writes the triangles of dirty cells and takes the flags down again. Says which clusters vertices hang on.
 template <class Block>
 CUTPROOF_DEVICE void extract_cells_kernel(Block& block, const DeviceView& w) {
   using namespace skin_detail;
@@ -208,6 +211,13 @@ CUTPROOF_DEVICE void extract_cells_kernel(Block& block, const DeviceView& w) {
       w.cell_triangles[15 * static_cast<int64_t>(place) + c] = vertex;
     }
   }
+  for (int64_t v = block.first(); v < w.counters->vertices_used; v += block.stride()) {
+    const int p = w.vertex_owner[v];
+    if (p < 0 || !skinned(w, w.body_of[p])) continue;
+    for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
+      if (w.memberships[k] >= 0) block.store(&w.under_skin[w.memberships[k]], 1);
+    }
+  }
   for (int64_t b = block.first(); b < w.bodies; b += block.stride()) {
     if (sound && skinned(w, static_cast<int>(b))) w.skin_made[b] = 1;
   }
@@ -229,7 +239,8 @@ CUTPROOF_ENQUEUE void enqueue_skin_cells(Launcher& launcher, const DeviceView& w
 
 // ---- Positions
 
-// DeviceView::center from the final displacements; what step leaves there belongs to its last iteration's.
+// DeviceView::center from the final displacements, of the clusters that a vertex hangs on: deep in the tissue nobody
+// asks.
 template <class Block>
 CUTPROOF_DEVICE void recenter_clusters_kernel(Block& block, const DeviceView& w) {
   using namespace skin_detail;
@@ -237,7 +248,7 @@ CUTPROOF_DEVICE void recenter_clusters_kernel(Block& block, const DeviceView& w)
   for (int64_t i = team.first(); i < w.counters->slots_used; i += team.stride()) {
     const int s = static_cast<int>(i);
     const int size = w.slot_size[s], b = w.slot_body[s];
-    if (size == 0 || !skinned(w, b)) continue;
+    if (size == 0 || !skinned(w, b) || w.under_skin[s] == 0) continue;
     const int* const members = w.members + w.slot_begin[s];
     const Float3 base = xyz(w.displacement[members[0]]);
     // Σ w (d - base), Σ w (X - T), which is zero but for the rounding of T, and Σ w.

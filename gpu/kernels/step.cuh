@@ -179,7 +179,7 @@ CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) {
 
 // Lanes that share a group: one for each row of its map; and where its particles are looked at one by one, in the pass
 // over all of them and while it is resolved.
-inline constexpr int kRowTeam = 4, kParticleTeam = 16, kResolvedTeam = 32;
+inline constexpr int kRowTeam = 4, kParticleTeam = 8, kResolvedTeam = 32;
 inline constexpr int kMostByRows = 300'000;  // particles of a load
 
 // Weighted sums in the order of arrays.inc: 4 axis + k: of e rᵀ / h; 4 axis + 3: of e.
@@ -351,85 +351,101 @@ CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>&
   const float lost = lost_fraction(pace, pace.iterations);
   const Held held = kContacts && !ends ? held_by(w, pace, head.hold_set, substep) : Held{};
 
-  // Displacement and mass of particle k, and its velocity.
-  const auto where = [&](int k, Float3& v) {
-    const int o = head.begin + k;
-    if (begins) {
-      const int p = w.place_particle[o];
-      v = xyz(w.velocity[p]);
-      return w.displacement[p];
-    }
-    const Float4 start = w.start[o], predicted = w.predicted[o];
-    Float3 d = carried_to(last_base, lost, xyz(predicted), map, group.rest(w, pace, k));
-    if (state != kCarried) d = xyz(w.position[o]);
-    v = pace.decay_per_dt * (d - xyz(start));
-    return with_w(d, start.w);
+  // Of particle k: its place, X - X_g [h], displacement and mass, and velocity.
+  struct Moved {
+    int o;
+    Float3 r;
+    Float4 d;
+    Float3 v;
   };
-  const auto end = [&](int k) {
+  const auto moved = [&](int k) {
+    Moved now;
+    now.o = head.begin + k;
+    now.r = group.rest(w, pace, k);
+    if (begins) {
+      const int p = w.place_particle[now.o];
+      now.v = xyz(w.velocity[p]);
+      now.d = w.displacement[p];
+      return now;
+    }
+    const Float4 start = w.start[now.o];
+    Float3 d;
+    if (state == kCarried) {
+      d = carried_to(last_base, lost, xyz(w.predicted[now.o]), map, now.r);
+    } else {
+      d = xyz(w.position[now.o]);
+    }
+    now.v = pace.decay_per_dt * (d - xyz(start));
+    now.d = with_w(d, start.w);
+    return now;
+  };
+  const auto end = [&](const Moved& now) {
     if constexpr (kContacts) {
       if (begins || !touched) return;
-      const int o = head.begin + k;
       Float3 pushed;
-      if (state == kResolved) pushed = xyz(w.pushed[o]);
+      if (state == kResolved) pushed = xyz(w.pushed[now.o]);
       if (state == kHeld) {
-        const Float3 predicted = xyz(w.predicted[o]);
-        pushed = pace.held_alpha * (xyz(w.position[o]) - predicted) +
-                 (pace.held_beta * (predicted - last_base) - map(group.rest(w, pace, k)));
+        const Float3 predicted = xyz(w.predicted[now.o]);
+        pushed = pace.held_alpha * (xyz(w.position[now.o]) - predicted) +
+                 (pace.held_beta * (predicted - last_base) - map(now.r));
       }
-      end_impulse(w, w.place_particle[o], pace, pushed);
+      end_impulse(w, w.place_particle[now.o], pace, pushed);
     }
   };
-  const int first = team.lane();  // the first of this lane's particles: nearly always the only one
-  Float4 of_first;                // its prediction, and what a holder gets of its mass
+  if (ends) {
+    team.each(head.size, [&](int k) {
+      const Moved now = moved(k);
+      end(now);
+      const int p = w.place_particle[now.o];
+      w.displacement[p] = now.d;
+      w.velocity[p] = with_w(now.v, 0.0f);
+    });
+    return;
+  }
+  // Small numbers are summed: displacements less that of the particle in the middle, or, where that one is far off the
+  // others, less their mean. (Not always: what moves as a whole must have moments that vanish.) Every lane works out
+  // where the middle one goes, so that nobody waits for it.
+  Float3 base;
+  {
+    const Moved middle = moved(head.middle);
+    base = predict(pace, xyz(middle.d), middle.v);
+  }
+  // Nobody writes over what others read of the one in the middle.
+  team.sync();
   const float of_each = 1.0f / static_cast<float>(head.holder_count);
   [[maybe_unused]] bool before = false, behind = false;  // the blade, when the substep begins
+  GroupSums<Team<Block, kParticleTeam>> sums;
+  float reach = 0;
+  const auto add = [&](int k, Float3 predicted, float mass, Float3 r) {
+    const Float3 e = predicted - base;
+    reach = fmaxf(reach, dot(e, e));
+    add_moments(sums.of(k), of_each * mass, e, pace.per_h * e, r);
+  };
   team.each(head.size, [&](int k) {
-    const int o = head.begin + k;
-    Float3 v;
-    const Float4 d = where(k, v);
-    end(k);
-    if (ends) {
-      const int p = w.place_particle[o];
-      w.displacement[p] = d;
-      w.velocity[p] = with_w(v, 0.0f);
-      return;
-    }
-    const Float3 predicted = predict(pace, xyz(d), v);
+    const Moved now = moved(k);
+    end(now);
+    const Float3 predicted = predict(pace, xyz(now.d), now.v);
     float side = 1.0f;
     if constexpr (kContacts) {
-      side = blade_side(contacts, {pace.h, grid_node(pace, constant(&w.place_node[o]))}, xyz(d));
+      side = blade_side(contacts, {pace.h, grid_node(pace, constant(&w.place_node[now.o]))}, xyz(now.d));
       (side < 0 ? behind : before) = true;
       if (held.active) side = 0.0f;
     }
-    w.start[o] = d;
-    w.predicted[o] = with_w(predicted, side);
-    if (k == first) of_first = with_w(predicted, of_each * d.w);
+    w.start[now.o] = now.d;
+    w.predicted[now.o] = with_w(predicted, side);
+    add(k, predicted, now.d.w, now.r);
   });
-  if (ends) return;
-  // Small numbers are summed: displacements less that of the particle in the middle, or, where that one is far off the
-  // others, less their mean. (Not always: what moves as a whole must have moments that vanish.)
-  Float3 base = xyz(of_first);
-  if (head.middle >= team.kLanes && team.has(head.middle)) base = xyz(w.predicted[head.begin + head.middle]);
-  base = team.from(head.middle, base);
-  float reach = 0;
-  typename Team<Block, kParticleTeam>::template Parted<12> total;
-  for (int round = 0;; ++round) {
-    GroupSums<Team<Block, kParticleTeam>> sums;
+  auto total = team.parted(sums);
+  const Float3 off = {shared * total.get(team, 3), shared * total.get(team, 7), shared * total.get(team, 11)};
+  if (dot(off, off) > kFarBase * kFarBase * pace.h * pace.h) {
+    base = base + off;
+    sums = {};
     reach = 0;
     team.each(head.size, [&](int k) {
-      Float4 particle = of_first;
-      if (k != first) {
-        const int o = head.begin + k;
-        particle = with_w(xyz(w.predicted[o]), of_each * w.start[o].w);
-      }
-      const Float3 e = xyz(particle) - base;
-      reach = fmaxf(reach, dot(e, e));
-      add_moments(sums.of(k), particle.w, e, pace.per_h * e, group.rest(w, pace, k));
+      const int o = head.begin + k;
+      add(k, xyz(w.predicted[o]), w.start[o].w, group.rest(w, pace, k));
     });
     total = team.parted(sums);
-    const Float3 off = {shared * total.get(team, 3), shared * total.get(team, 7), shared * total.get(team, 11)};
-    if (round > 0 || !(dot(off, off) > kFarBase * kFarBase * pace.h * pace.h)) break;
-    base = base + off;
   }
   const Float4 base_and_reach = with_w(base, sqrtf(team.greatest(reach)) * (1.0f + 0x1p-20f));
   if (team.leads()) w.group_base[g] = base_and_reach;

@@ -21,39 +21,30 @@ namespace cutproof::gpu {
 // `mark` is called with each stage before its work is handed over (a launcher that works at once can take times).
 template <class Launcher, class Mark>
 CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, const Plan& plan, Span span, Mark mark) {
-  launcher.clear(w.counters->stage_ran, sizeof w.counters->stage_ran);
-  const auto ran = [&](Stage stage) { launcher.items(note_stage_kernel_object{}, 1, w, static_cast<int>(stage)); };
+  launcher.blocks(begin_span_kernel_object{}, 1, 128, 0, w, span);
   if (span.contains(Stage::step)) {
     mark(Stage::step);
-    ran(Stage::step);
     enqueue_step(launcher, w, plan);
   }
   if (span.contains(Stage::detect) && plan.detection) {
     mark(Stage::detect);
-    ran(Stage::detect);
     enqueue_detect(launcher, w, plan);
   }
   const bool clusters = span.contains(Stage::split) || span.contains(Stage::merge) || span.contains(Stage::expand);
-  if (clusters || span.contains(Stage::skin)) launcher.items(note_cuts_kernel_object{}, 1, w);
+  if (clusters || span.contains(Stage::skin)) launcher.blocks(note_cuts_kernel_object{}, 1, 128, 0, w, span);
   if (clusters) {
     launcher.if_nonzero(&w.counters->cut, [&](Launcher& inner) {
-      const auto ran_inside = [&](Stage stage) {
-        inner.items(note_stage_kernel_object{}, 1, w, static_cast<int>(stage));
-      };
       if (span.contains(Stage::split)) {
         mark(Stage::split);
-        ran_inside(Stage::split);
         enqueue_split(inner, w, plan);
       }
       if (span.contains(Stage::merge) && plan.merge) {
         mark(Stage::merge);
-        ran_inside(Stage::merge);
         enqueue_merge(inner, w, plan);
       }
       if (span.contains(Stage::expand) && plan.expand) {
         inner.if_nonzero(&w.counters->expanding, [&](Launcher& innermost) {
           mark(Stage::expand);
-          innermost.items(note_stage_kernel_object{}, 1, w, static_cast<int>(Stage::expand));
           enqueue_expand(innermost, w, plan);
         });
       }
@@ -72,7 +63,6 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
       inner.items(number_slots_kernel_object{}, w.slot_capacity, w);
     });
     if (plan.skin) {
-      ran(Stage::skin);
       launcher.if_nonzero(&w.counters->extracting, [&](Launcher& inner) { enqueue_skin_cells(inner, w, plan); });
       enqueue_skin_positions(launcher, w, plan);
     }

@@ -73,10 +73,14 @@ struct WallF {
   float offset, friction;
 };
 
-struct PoseF {
-  Float3 edge, along, back;  // model/blade.h BladePose
+// model/blade.h BladePose; normal: along × back. Read as whole lines of 16 bytes, once for each particle near a blade.
+struct alignas(16) PoseF {
+  Float3 edge, along, back, normal;
 };
-struct MoveF {
+CUTPROOF_BOTH inline PoseF make_pose(Float3 edge, Float3 along, Float3 back) {
+  return {edge, along, back, cross(along, back)};
+}
+struct alignas(16) MoveF {
   PoseF from, to;
   int down;
 };

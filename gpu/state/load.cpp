@@ -17,7 +17,7 @@ namespace {
 float f(double value) { return static_cast<float>(value); }
 Float3 f(Vec3 v) { return {f(v.x), f(v.y), f(v.z)}; }
 
-PoseF pose_of(const BladePose& pose) { return {f(pose.edge), f(pose.along), f(pose.back)}; }
+PoseF pose_of(const BladePose& pose) { return make_pose(f(pose.edge), f(pose.along), f(pose.back)); }
 
 void require(bool condition, const char* what) {
   if (!condition) throw std::invalid_argument(std::string("kernels, load: ") + what);

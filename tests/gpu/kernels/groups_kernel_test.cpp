@@ -393,8 +393,8 @@ TEST(Groups, AreClearOnlyIfNoPointOfTheirBallTouches) {
       const auto single = [](Vec3 v) {
         return Float3{static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
       };
-      return PoseF{single({uniform(random, 0, 0.1), uniform(random, 0, 0.1), uniform(random, 0, 0.1)}), single(along),
-                   single(back)};
+      return make_pose(single({uniform(random, 0, 0.1), uniform(random, 0, 0.1), uniform(random, 0, 0.1)}),
+                       single(along), single(back));
     };
     const MoveF move = {pose(), pose(), 1};
     Contacts contacts = {};
@@ -449,7 +449,7 @@ TEST(Groups, AreNotClearWhereTheirNearestPointTouches) {
     const double gap = margin * uniform(random, -0.5, 2);
     const float radius = static_cast<float>(h * uniform(random, 0, 3));
     const int which = trial % 4;
-    const PoseF pose = {{0.05f, 0.05f, 0.05f}, {1, 0, 0}, {0, 0, 1}};
+    const PoseF pose = make_pose({0.05f, 0.05f, 0.05f}, {1, 0, 0}, {0, 0, 1});
     const MoveF move = {pose, pose, 1};
     Contacts contacts = {};
     contacts.half_length = 0.03f;
