@@ -77,74 +77,75 @@ __global__ void set_condition_kernel(cudaGraphConditionalHandle handle, const in
   cudaGraphSetConditional(handle, *flag != 0 ? 1u : 0u);
 }
 
-// What is small enough is scanned and selected by one block, tile by tile: CUB takes two launches for either, neither of
-// which may overlap with what is before it.
-inline constexpr int kScanThreads = 1024, kEach = 16;  // items of a thread in a tile
-inline constexpr std::int64_t kMostScannedInBlock = 8 * kEach * kScanThreads;
-inline constexpr std::int64_t kMostSelectedInBlock = 16 * kEach * kScanThreads;
+// What is few is scanned and selected by one block, tile by tile, because CUB takes two launches for either, neither of
+// which may overlap with what is before it. (Beyond some ten thousand CUB is faster.)
+inline constexpr int kScanThreads = 1024;
+inline constexpr std::int64_t kMostScannedInBlock = 4 * 4 * kScanThreads, kMostSelectedInBlock = 2 * 16 * kScanThreads;
 
-// The items of a thread as one piece of memory; those from `count` on are 0.
+// Neighbouring items of a thread, read as one; those from `count` on are 0.
 template <class T>
 struct alignas(16) TileItems {
+  static constexpr int kEach = 16 / sizeof(T);
   T item[kEach];
 };
 template <class T>
 __device__ TileItems<T> load_items(const T* in, int begin, int count) {
+  constexpr int kEach = TileItems<T>::kEach;
   TileItems<T> items;
   if (begin + kEach <= count) return *reinterpret_cast<const TileItems<T>*>(in + begin);
 #pragma unroll
   for (int k = 0; k < kEach; ++k) items.item[k] = begin + k < count ? in[begin + k] : T{};
   return items;
 }
+// Calls place(i, value, before) for each item: what measure(value) adds up to over those before it. Gives the total.
+template <class T, class Block, class Measure, class Place>
+__device__ int scan_tiles(Block& block, const T* in, int count, Measure measure, Place place) {
+  constexpr int kEach = TileItems<T>::kEach;
+  int running = 0;
+  TileItems<T> next = load_items(in, block.thread() * kEach, count);
+  for (int tile = 0; tile < count; tile += kScanThreads * kEach) {
+    const TileItems<T> own = next;
+    const int begin = tile + block.thread() * kEach;
+    next = load_items(in, begin + kScanThreads * kEach, count);  // on its way while this one is scanned
+    int sum = 0, found = 0;
+#pragma unroll
+    for (int k = 0; k < kEach; ++k) sum += measure(own.item[k]);
+    int before = running + block.exclusive_scan(sum, found);
+    running += found;
+#pragma unroll
+    for (int k = 0; k < kEach; ++k) {
+      if (begin + k < count) place(begin + k, own.item[k], before);
+      before += measure(own.item[k]);
+    }
+  }
+  return running;
+}
 
+// used: null, or how many of the items are there.
 struct scan_in_block_kernel_object {
   static constexpr const char* kName = "scan_in_block_kernel";
   static constexpr int kMaxThreads = kScanThreads;
   template <class Block>
-  __device__ void operator()(Block& block, const int* in, int* out, int count, int* total) const {
-    int running = 0;
-    TileItems<int> next = load_items(in, block.thread() * kEach, count);
-    for (int tile = 0; tile < count; tile += kScanThreads * kEach) {
-      const TileItems<int> own = next;
-      const int begin = tile + block.thread() * kEach;
-      next = load_items(in, begin + kScanThreads * kEach, count);  // on its way while this one is scanned
-      int sum = 0, found = 0;
-#pragma unroll
-      for (int k = 0; k < kEach; ++k) sum += own.item[k];
-      int before = running + block.exclusive_scan(sum, found);
-      running += found;
-#pragma unroll
-      for (int k = 0; k < kEach; ++k) {
-        if (begin + k < count) out[begin + k] = before;
-        before += own.item[k];
-      }
-    }
-    if (block.thread() == 0) *total = running;
+  __device__ void operator()(Block& block, const int* in, int* out, int count, const int* used, int* total) const {
+    const int there = used == nullptr ? count : *used;
+    const int found = scan_tiles(
+        block, in, there, [](int value) { return value; }, [&](int i, int, int before) { out[i] = before; });
+    if (block.thread() == 0) *total = found;
   }
 };
 struct select_in_block_kernel_object {
   static constexpr const char* kName = "select_in_block_kernel";
   static constexpr int kMaxThreads = kScanThreads;
   template <class Block>
-  __device__ void operator()(Block& block, const unsigned char* flags, int count, int* selected, int* total) const {
-    int running = 0;
-    TileItems<unsigned char> next = load_items(flags, block.thread() * kEach, count);
-    for (int tile = 0; tile < count; tile += kScanThreads * kEach) {
-      const TileItems<unsigned char> own = next;
-      const int begin = tile + block.thread() * kEach;
-      next = load_items(flags, begin + kScanThreads * kEach, count);
-      int sum = 0, found = 0;
-#pragma unroll
-      for (int k = 0; k < kEach; ++k) sum += own.item[k] != 0;
-      int before = running + block.exclusive_scan(sum, found);
-      running += found;
-      if (sum == 0) continue;
-#pragma unroll
-      for (int k = 0; k < kEach; ++k) {
-        if (own.item[k] != 0) selected[before++] = begin + k;
-      }
-    }
-    if (block.thread() == 0) *total = running;
+  __device__ void operator()(Block& block, const unsigned char* flags, int count, const int* used, int* selected,
+                             int* total) const {
+    const int there = used == nullptr ? count : *used;
+    const int found = scan_tiles(
+        block, flags, there, [](unsigned char flag) { return flag != 0 ? 1 : 0; },
+        [&](int i, unsigned char flag, int before) {
+          if (flag != 0) selected[before] = i;
+        });
+    if (block.thread() == 0) *total = found;
   }
 };
 
@@ -339,10 +340,10 @@ class DeviceLauncher {
     }
   }
 
-  void exclusive_scan(const int* in, int* out, std::int64_t count, int* total) {
+  void exclusive_scan(const int* in, int* out, std::int64_t count, int* total, const int* used = nullptr) {
     const int n = narrow(count, "exclusive_scan");
-    if (n <= detail::kMostScannedInBlock && is_aligned(in)) {
-      return launch<detail::scan_in_block_kernel_object>(1, detail::kScanThreads, 0, in, out, n, total);
+    if ((used != nullptr || n <= detail::kMostScannedInBlock) && is_aligned(in)) {
+      return launch<detail::scan_in_block_kernel_object>(1, detail::kScanThreads, 0, in, out, n, used, total);
     }
     const auto input = thrust::make_transform_iterator(thrust::counting_iterator<int>(0), detail::ScanInput{in, n});
     const detail::ScanOutput output(out, n, total);
@@ -350,10 +351,11 @@ class DeviceLauncher {
       return cub::DeviceScan::ExclusiveSum(temporary, bytes, input, output, n + 1, stream_);
     });
   }
-  void select(const unsigned char* flags, std::int64_t count, int* selected, int* selected_count) {
+  void select(const unsigned char* flags, std::int64_t count, int* selected, int* selected_count,
+              const int* used = nullptr) {
     const int n = narrow(count, "select");
-    if (n <= detail::kMostSelectedInBlock && is_aligned(flags)) {
-      return launch<detail::select_in_block_kernel_object>(1, detail::kScanThreads, 0, flags, n, selected,
+    if ((used != nullptr || n <= detail::kMostSelectedInBlock) && is_aligned(flags)) {
+      return launch<detail::select_in_block_kernel_object>(1, detail::kScanThreads, 0, flags, n, used, selected,
                                                            selected_count);
     }
     with_temporary("cub::DeviceSelect::Flagged", [&](void* temporary, std::size_t& bytes) {
@@ -395,6 +397,7 @@ class DeviceLauncher {
  private:
   enum class Mode { at_once, measure, capture };
 
+  // For reading 16 bytes at a time.
   static bool is_aligned(const void* at) { return reinterpret_cast<std::uintptr_t>(at) % 16 == 0; }
 
   DeviceLauncher(Mode mode, cudaStream_t stream, std::shared_ptr<detail::DeviceResources> resources, std::size_t depth)

@@ -62,8 +62,9 @@ class SpanLauncher {
     while (agreed(flag)) body(*this);
   }
 
-  __device__ void exclusive_scan(const int* in, int* out, std::int64_t count, int* total) {
+  __device__ void exclusive_scan(const int* in, int* out, std::int64_t count, int* total, const int* used = nullptr) {
     DeviceBlock block;
+    if (used != nullptr) count = *used;
     const Share share = share_of(block, count);
     int running = before(block, share, [&](std::int64_t i) { return in[i]; });
     for (std::int64_t tile = share.begin; tile < share.end; tile += block.size()) {
@@ -76,8 +77,10 @@ class SpanLauncher {
     if (share.last && block.thread() == 0) *total = running;
     wait();
   }
-  __device__ void select(const unsigned char* flags, std::int64_t count, int* selected, int* selected_count) {
+  __device__ void select(const unsigned char* flags, std::int64_t count, int* selected, int* selected_count,
+                         const int* used = nullptr) {
     DeviceBlock block;
+    if (used != nullptr) count = *used;
     const Share share = share_of(block, count);
     int running = before(block, share, [&](std::int64_t i) { return flags[i] != 0 ? 1 : 0; });
     for (std::int64_t tile = share.begin; tile < share.end; tile += block.size()) {

@@ -80,12 +80,15 @@ class HostLauncher {
     }
   }
 
-  void exclusive_scan(const int* in, int* out, std::int64_t count, int* total) {
+  void exclusive_scan(const int* in, int* out, std::int64_t count, int* total, const int* used = nullptr) {
+    count = used_of(count, used, "exclusive_scan");
     const int sum = std::accumulate(in, in + count, 0);
     std::exclusive_scan(in, in + count, out, 0);
     *total = sum;
   }
-  void select(const unsigned char* flags, std::int64_t count, int* selected, int* selected_count) {
+  void select(const unsigned char* flags, std::int64_t count, int* selected, int* selected_count,
+              const int* used = nullptr) {
+    count = used_of(count, used, "select");
     int* end = selected;
     for (std::int64_t i = 0; i < count; ++i) {
       if (flags[i] != 0) *end++ = static_cast<int>(i);
@@ -115,6 +118,14 @@ class HostLauncher {
   bool simulated() const { return runtime_->simulated(); }
 
  private:
+  static std::int64_t used_of(std::int64_t count, const int* used, const char* what) {
+    if (used == nullptr) return count;
+    if (*used < 0 || *used > count) {
+      throw KernelFault(std::string(what) + ": " + std::to_string(*used) + " items of " + std::to_string(count) +
+                        " are to be used.");
+    }
+    return *used;
+  }
   template <class Kernel, class... Args>
   void launch(const Kernel& kernel, std::int64_t blocks, int threads, std::size_t shared_bytes, const Args&... args) {
     const auto call = [&](HostBlock& block) { kernel(block, args...); };

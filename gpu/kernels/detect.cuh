@@ -445,7 +445,7 @@ CUTPROOF_KERNEL(remove_particles_kernel);
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_detect(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   using namespace detect_detail;
-  if (plan.strain) launcher.teams(flag_strained_clusters_kernel_object{}, kStrainTeam, w.slot_capacity, w);
+  if (plan.strain) launcher.teams(flag_strained_clusters_kernel_object{}, kStrainTeam, w.slots_expected, w);
   launcher.items(flag_particles_kernel_object{}, w.particles, w);
   if (plan.geometric) launcher.items(flag_swept_particles_kernel_object{}, w.particles, w);
   launcher.items(remove_particles_kernel_object{}, w.particles, w);

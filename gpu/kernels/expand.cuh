@@ -303,7 +303,7 @@ CUTPROOF_ENQUEUE void enqueue_expand(Launcher& launcher, const DeviceView& w, co
   };
   launcher.items(begin_expand_kernel_object{}, 1, w);
   if (plan.edge_cover) launcher.items(cover_edges_kernel_object{}, w.particles, w);
-  if (plan.published_expand) launcher.blocks(free_lone_clusters_kernel_object{}, w.slot_capacity, kThreads, 0, w);
+  if (plan.published_expand) launcher.blocks(free_lone_clusters_kernel_object{}, w.slots_expected, kThreads, 0, w);
   collect(launcher);
   launcher.while_nonzero(&c->changed, [&](Launcher& layer) {
     layer.items(add_layer_kernel_object{}, w.addition_capacity, w);
@@ -322,7 +322,7 @@ CUTPROOF_ENQUEUE void enqueue_expand(Launcher& launcher, const DeviceView& w, co
     fits.items(add_memberships_kernel_object{}, w.addition_capacity, w);
     fits.items(finish_rows_kernel_object{}, w.particles, w);
     fits.blocks(grow_clusters_kernel_object{}, w.addition_capacity, kThreads, 16, w);
-    fits.items(note_grown_dirty_kernel_object{}, w.slot_capacity, w);
+    fits.items(note_grown_dirty_kernel_object{}, w.slots_expected, w);
     enqueue_rest_frames(fits, w);
   });
   launcher.items(note_edge_covered_kernel_object{}, w.bodies, w);

@@ -89,8 +89,8 @@ CUTPROOF_KERNEL(sort_memberships_kernel);
 // Numbers in the order of slots, and the frame counts up.
 template <class Block>
 CUTPROOF_DEVICE void flag_live_slots_kernel(Block& block, DeviceView w) {
-  for (int64_t s = block.first(); s < w.slot_capacity; s += block.stride()) {
-    w.slot_scratch[s] = s < w.counters->slots_used && w.slot_size[s] > 0;
+  for (int64_t s = block.first(); s < w.counters->slots_used; s += block.stride()) {
+    w.slot_scratch[s] = w.slot_size[s] > 0;
   }
 }
 CUTPROOF_KERNEL(flag_live_slots_kernel);

@@ -488,12 +488,12 @@ template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_groups(Launcher& launcher, const DeviceView& w) {
   Counters* const c = w.counters;  // an address only: counters lie on the device
   launcher.if_nonzero(&c->groups_stale, [&](Launcher& stale) {
-    stale.teams(find_changed_clusters_kernel_object{}, kMemberTeam, w.slot_capacity, w);
-    stale.teams(dissolve_groups_kernel_object{}, kMemberTeam, w.slot_capacity, w);
-    stale.teams(find_classes_kernel_object{}, kMemberTeam, w.slot_capacity, w);
-    stale.teams(deal_out_groups_kernel_object{}, kMemberTeam, w.slot_capacity, w);
+    stale.teams(find_changed_clusters_kernel_object{}, kMemberTeam, w.slots_expected, w);
+    stale.teams(dissolve_groups_kernel_object{}, kMemberTeam, w.slots_expected, w);
+    stale.teams(find_classes_kernel_object{}, kMemberTeam, w.slots_expected, w);
+    stale.teams(deal_out_groups_kernel_object{}, kMemberTeam, w.slots_expected, w);
     stale.teams(measure_groups_kernel_object{}, kGroupTeam, w.group_capacity, w);
-    stale.teams(measure_clusters_kernel_object{}, kMemberTeam, w.slot_capacity, w);
+    stale.teams(measure_clusters_kernel_object{}, kMemberTeam, w.slots_expected, w);
     stale.clear(&c->groups_whole, sizeof(int));
   });
 }

@@ -435,9 +435,8 @@ template <class Block>
 CUTPROOF_DEVICE void begin_merge_kernel(Block& block, DeviceView w) {
   Counters& c = *w.counters;
   int live = 0;
-  for (int64_t s = block.first(); s < w.slot_capacity; s += block.stride()) {
+  for (int64_t s = block.first(); s < c.slots_used; s += block.stride()) {
     w.slot_flag[s] = 0;
-    if (s >= c.slots_used) continue;
     live += w.slot_size[s];
     if (c.fault != 0 || !merges_now(w, w.slot_body[s])) continue;
     w.proposal[s] = -1;
@@ -513,7 +512,7 @@ CUTPROOF_KERNEL(place_members_kernel);
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_move_together(Launcher& launcher, const DeviceView& w) {
   launcher.exclusive_scan(w.slot_size, moved_begin(w), w.slot_capacity, &w.counters->members_used);
-  launcher.blocks(gather_members_kernel_object{}, w.slot_capacity, 128, 0, w);
+  launcher.blocks(gather_members_kernel_object{}, w.slots_expected, 128, 0, w);
   launcher.items(place_members_kernel_object{}, w.member_capacity, w);
 }
 
@@ -523,7 +522,7 @@ inline constexpr int kMergeBlocks = 2048;
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   Counters* const c = w.counters;
-  const int64_t most = w.slot_capacity < kMergeBlocks ? w.slot_capacity : kMergeBlocks;
+  const int64_t most = w.slots_expected < kMergeBlocks ? w.slots_expected : kMergeBlocks;
   const auto propose = [&](Launcher& on, auto kernel) { on.blocks(kernel, most, kMergeThreads, kCandidateBytes, w); };
   const auto carry_out = [&](Launcher& on, auto kernel) { on.blocks(kernel, most, kMergeThreads, 16, w); };
   const auto round = [&](Launcher& on) {
@@ -533,8 +532,8 @@ CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, con
   const auto rounds = [&](Launcher& on) { on.while_nonzero(&c->merging, round); };
 
   launcher.clear(&c->live_members, sizeof(int));
-  launcher.items(begin_merge_kernel_object{}, w.slot_capacity, w);
-  launcher.select(w.slot_flag, w.slot_capacity, w.small_clusters, &c->small);
+  launcher.items(begin_merge_kernel_object{}, w.slots_expected, w);
+  launcher.select(w.slot_flag, w.slot_capacity, w.small_clusters, &c->small, &c->slots_used);
   launcher.items(begin_rounds_kernel_object{}, 1, w);
   launcher.if_nonzero(&c->small, [&](Launcher& inner) {
     if (plan.single_pass_merge) {
@@ -554,7 +553,7 @@ CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, con
         rounds(again);
       });
     }
-    inner.items(note_rest_dirty_kernel_object{}, w.slot_capacity, w);
+    inner.items(note_rest_dirty_kernel_object{}, w.slots_expected, w);
     enqueue_rest_frames(inner, w);
   });
 }

@@ -70,14 +70,13 @@ CUTPROOF_DEVICE void recompute_rest_frames_kernel(Block& block, DeviceView w, co
 }
 CUTPROOF_KERNEL(recompute_rest_frames_kernel);
 
-// Every slot whose rest_dirty is set; clears the flags. Flags of slots that are not given out must be 0. Uses
-// slot_scratch from 3 · slot_capacity on and Counters::scratch[7].
+// Every slot whose rest_dirty is set; clears the flags. Uses slot_scratch from 3 · slot_capacity on and Counters::scratch[7].
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_rest_frames(Launcher& launcher, const DeviceView& w) {
   int* const slots = w.slot_scratch + int64_t{3} * w.slot_capacity;
   int* const count = &w.counters->scratch[7];
-  launcher.select(w.rest_dirty, w.slot_capacity, slots, count);
-  launcher.teams(recompute_rest_frames_kernel_object{}, kRestTeam, w.slot_capacity, w, static_cast<const int*>(slots),
+  launcher.select(w.rest_dirty, w.slot_capacity, slots, count, &w.counters->slots_used);
+  launcher.teams(recompute_rest_frames_kernel_object{}, kRestTeam, w.slots_expected, w, static_cast<const int*>(slots),
                  static_cast<const int*>(count));
 }
 

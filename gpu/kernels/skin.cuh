@@ -311,7 +311,7 @@ CUTPROOF_KERNEL(place_vertices_kernel);
 
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_skin_positions(Launcher& launcher, const DeviceView& w, const Plan&) {
-  launcher.teams(recenter_clusters_kernel_object{}, skin_detail::kClusterTeam, w.slot_capacity, w);
+  launcher.teams(recenter_clusters_kernel_object{}, skin_detail::kClusterTeam, w.slots_expected, w);
   launcher.items(place_vertices_kernel_object{}, w.vertex_capacity, w);
 }
 

@@ -243,7 +243,7 @@ CUTPROOF_DEVICE void flag_affected_kernel(Block& block, DeviceView w) {
   for (int64_t b = block.first(); b < w.bodies; b += block.stride()) {
     if (drops_debris(w, static_cast<int>(b))) w.debris_anywhere[b] = 0;
   }
-  for (int64_t s = block.first(); s < w.slot_capacity; s += block.stride()) {
+  for (int64_t s = block.first(); s < w.counters->slots_used; s += block.stride()) {
     w.slot_flag[s] = by_slot(w)[s] != 0;
     extra_components(w)[s] = 0;
   }
@@ -570,8 +570,8 @@ CUTPROOF_ENQUEUE void enqueue_split(Launcher& launcher, const DeviceView& w, con
   }
   launcher.clear(by_slot(w), sizeof(int) * static_cast<std::size_t>(w.slot_capacity));
   launcher.items(mark_affected_kernel_object{}, w.particles, w);
-  launcher.items(flag_affected_kernel_object{}, w.slot_capacity, w);
-  launcher.select(w.slot_flag, w.slot_capacity, w.affected, &counters->affected);
+  launcher.items(flag_affected_kernel_object{}, w.slots_expected, w);
+  launcher.select(w.slot_flag, w.slot_capacity, w.affected, &counters->affected, &counters->slots_used);
 
   // Merging keeps to the cap, which plan.largest_cluster includes; expansion may pass any size.
   const int largest = plan.largest_cluster < 1 ? 1 : plan.largest_cluster;
@@ -580,22 +580,23 @@ CUTPROOF_ENQUEUE void enqueue_split(Launcher& launcher, const DeviceView& w, con
   const auto label_large = [&](Launcher& inner) {
     const int wanted = (largest + kPairsPerBlock - 1) / kPairsPerBlock;
     const int shares = wanted < kMostShares ? wanted : kMostShares;
-    inner.blocks(link_pairs_kernel_object{}, int64_t{shares} * w.slot_capacity, 128, 0, w, most, shares);
-    inner.blocks(hook_pairs_kernel_object{}, int64_t{shares} * w.slot_capacity, 128, 0, w, most, shares);
-    inner.blocks(flatten_pairs_kernel_object{}, w.slot_capacity, 128, 0, w, most);
+    inner.blocks(link_pairs_kernel_object{}, int64_t{shares} * w.slots_expected, 128, 0, w, most, shares);
+    inner.blocks(hook_pairs_kernel_object{}, int64_t{shares} * w.slots_expected, 128, 0, w, most, shares);
+    inner.blocks(flatten_pairs_kernel_object{}, w.slots_expected, 128, 0, w, most);
   };
   if (in_blocks) {
-    launcher.blocks(label_in_blocks_kernel_object{}, w.slot_capacity, kLabelThreads,
+    launcher.blocks(label_in_blocks_kernel_object{}, w.slots_expected, kLabelThreads,
                     2 * sizeof(int) * static_cast<std::size_t>(most), w, most);
     if (plan.expand || largest > most) launcher.if_nonzero(&counters->scratch[kTooLarge], label_large);
   } else {
     label_large(launcher);
   }
 
-  launcher.exclusive_scan(extra_components(w), extra_before(w), w.slot_capacity, &counters->scratch[kNewClusters]);
+  launcher.exclusive_scan(extra_components(w), extra_before(w), w.slot_capacity, &counters->scratch[kNewClusters],
+                          &counters->affected);
   launcher.blocks(number_components_kernel_object{}, w.bodies, 256, 0, w);
-  launcher.blocks(regroup_members_kernel_object{}, w.slot_capacity, kRegroupThreads, sizeof(int) * kRegroupThreads, w);
-  launcher.teams(rest_frames_of_components_kernel_object{}, kRestTeam, 2 * int64_t{w.slot_capacity}, w);
+  launcher.blocks(regroup_members_kernel_object{}, w.slots_expected, kRegroupThreads, sizeof(int) * kRegroupThreads, w);
+  launcher.teams(rest_frames_of_components_kernel_object{}, kRestTeam, 2 * int64_t{w.slots_expected}, w);
   if (plan.debris) {
     launcher.if_nonzero(&counters->failed, [&](Launcher& inner) {
       inner.items(put_debris_back_kernel_object{}, w.particles, w);

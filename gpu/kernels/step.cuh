@@ -324,13 +324,14 @@ CUTPROOF_DEVICE void list_resolved(Block& block, const AnyTeam& team, const Devi
   block.store(&w.resolved_groups[block.atomic_add(listed_in(w, substep), 1)], g);
 }
 
+// Says whether contacts or a grip hold some of the group from the beginning on (enter_group).
 template <bool kContacts, class Block>
-CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>& team, const DeviceView& w, int g,
+CUTPROOF_DEVICE bool start_group(Block& block, const Team<Block, kParticleTeam>& team, const DeviceView& w, int g,
                                  int substep) {
   // What is needed is asked for first, and not when it is needed: each answer takes as long as the work.
   const Group group = group_of(w, g);
   const GroupHead& head = group.head;
-  if (head.size == 0) return;
+  if (head.size == 0) return false;
   const Pace pace = constant(&w.pace[body_of_group(w, head)]);
   const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
   const float shared = 1.0f / constant(&w.group_mass[g]).w;
@@ -346,7 +347,7 @@ CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>&
     if constexpr (kContacts) state = w.group_resolved[g];
   }
   if constexpr (kContacts) touched = w.group_touched[g] != 0;
-  if (!turns_over(pace, substep)) return;
+  if (!turns_over(pace, substep)) return false;
   if (pace.iterations == 0) map = {};
   const float lost = lost_fraction(pace, pace.iterations);
   const Held held = kContacts && !ends ? held_by(w, pace, head.hold_set, substep) : Held{};
@@ -400,7 +401,7 @@ CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>&
       w.displacement[p] = now.d;
       w.velocity[p] = with_w(now.v, 0.0f);
     });
-    return;
+    return false;
   }
   // Small numbers are summed: displacements less that of the particle in the middle, or, where that one is far off the
   // others, less their mean. (Not always: what moves as a whole must have moments that vanish.) Every lane works out
@@ -461,17 +462,29 @@ CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>&
       w.group_resolved[g] = held.active ? kHeld : kCarried;
       if (held.active) w.group_touched[g] = 1;
     }
-    if (resolve) {
-      if (!held.active) list_resolved(block, team, w, pace, g, substep);
-      team.each(head.size, [&](int k) {
-        const int o = head.begin + k;
-        const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
-        enter_substep(w, contacts, held, rest, o, w.predicted[o], xyz(w.start[o]), 0.0f);
-      });
-      return sum_resolved(team, w, group, pace, base);
-    }
+    if (resolve) return true;
   }
   total.each(team, [&](int n, float sum) { store_moment(w.group_moments, g, n, sum); });
+  return false;
+}
+
+// A group that start_group has started, and that is resolved or held from the beginning on.
+template <class Block>
+CUTPROOF_DEVICE void enter_group(Block& block, const Team<Block, kParticleTeam>& team, const DeviceView& w, int g,
+                                 int substep) {
+  const Group group = group_of(w, g);
+  const GroupHead& head = group.head;
+  const Pace pace = constant(&w.pace[body_of_group(w, head)]);
+  const Contacts contacts = contacts_of(w, pace, substep);
+  const Held held = held_by(w, pace, head.hold_set, substep);
+  if (!held.active) list_resolved(block, team, w, pace, g, substep);
+  team.each(head.size, [&](int k) {
+    const int o = head.begin + k;
+    const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
+    enter_substep(w, contacts, held, rest, o, w.predicted[o], xyz(w.start[o]), 0.0f);
+  });
+  team.sync();
+  sum_resolved(team, w, group, pace, xyz(w.group_base[g]));
 }
 
 template <bool kContacts>
@@ -599,7 +612,12 @@ CUTPROOF_DEVICE void start_substep_kernel(Block& block, const DeviceView& w, int
   const Team<Block, kParticleTeam> team(block);
   const int groups = w.counters->groups;
   for (int64_t g = team.first(); g < groups; g += team.stride()) {
-    start_group<kContacts>(block, team, w, static_cast<int>(g), substep);
+    [[maybe_unused]] const bool enters = start_group<kContacts>(block, team, w, static_cast<int>(g), substep);
+    // In a place of its own, where nothing of the above takes registers any more.
+    if constexpr (kContacts) {
+      team.sync();  // the base
+      if (enters) enter_group(block, team, w, static_cast<int>(g), substep);
+    }
   }
   block.wait_for_earlier();
   for (int64_t k = from_last(block); k < w.counters->loose; k += block.stride()) {
@@ -1084,9 +1102,15 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
   }
   block.wait_for_earlier();
   // Before those, the threads with loose particles.
-  int64_t k = from_last(block) - (kContacts ? int64_t{w.counters->resolved} : 0) * team.kLanes % block.stride();
-  if (k < 0) k += block.stride();
-  for (; k < w.counters->loose; k += block.stride()) {
+  const int loose = w.counters->loose;
+  if (loose == 0) return;
+  int64_t k = from_last(block);
+  if constexpr (kContacts) {
+    const auto teams = static_cast<unsigned>(team.stride());
+    k -= static_cast<int64_t>(static_cast<unsigned>(w.counters->resolved) % teams) * team.kLanes;
+    if (k < 0) k += block.stride();
+  }
+  for (; k < loose; k += block.stride()) {
     advance_loose<kContacts, kAccelerated>(w, w.loose_places[k], substep, iteration);
   }
 }
@@ -1094,7 +1118,7 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
 template <bool kContacts>
 struct start_substep_kernel_object {
   static constexpr const char* kName = "start_substep_kernel";
-  static constexpr int kMaxThreads = 128, kMinBlocks = 5;
+  static constexpr int kMaxThreads = 128, kMinBlocks = 4;
   static constexpr bool kReadsAhead = true;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep) const {
@@ -1135,7 +1159,7 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
   for (int substep = 0; substep < plan.substeps; ++substep) {
     launcher.teams(start_substep_kernel_object<kContacts>{}, kParticleTeam, teams, w, substep);
     for (int iteration = 0; iteration < plan.iterations; ++iteration) {
-      launcher.blocks(match_shapes_kernel_object<Method>{}, (w.slot_capacity + kTeams - 1) / kTeams, kMatchThreads,
+      launcher.blocks(match_shapes_kernel_object<Method>{}, (w.slots_expected + kTeams - 1) / kTeams, kMatchThreads,
                       kMatchShared, w, substep, iteration);
       advance(launcher, substep, iteration);
     }

@@ -58,9 +58,10 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
         inner.blocks(number_slots_by_body_kernel_object{}, w.bodies, 256, 0, w);
         return;
       }
-      inner.items(flag_live_slots_kernel_object{}, w.slot_capacity, w);
-      inner.exclusive_scan(w.slot_scratch, w.slot_scratch + w.slot_capacity, w.slot_capacity, &w.counters->scratch[0]);
-      inner.items(number_slots_kernel_object{}, w.slot_capacity, w);
+      inner.items(flag_live_slots_kernel_object{}, w.slots_expected, w);
+      inner.exclusive_scan(w.slot_scratch, w.slot_scratch + w.slot_capacity, w.slot_capacity, &w.counters->scratch[0],
+                           &w.counters->slots_used);
+      inner.items(number_slots_kernel_object{}, w.slots_expected, w);
     });
     if (plan.skin) {
       launcher.if_nonzero(&w.counters->extracting, [&](Launcher& inner) { enqueue_skin_cells(inner, w, plan); });

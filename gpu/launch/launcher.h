@@ -16,10 +16,12 @@
 //   void if_nonzero(const int* flag, Body);                    what `Body` (a callable that launches) does happens only
 //                                                              if *flag is not 0 when the work before it is done
 //   void while_nonzero(int* flag, Body);                       again and again while *flag is not 0
-//   void exclusive_scan(const int* in, int* out, int64_t count, int* total);   out[i] = Σ in[0..i), *total = Σ all;
-//                                                              in == out is allowed
-//   void select(const unsigned char* flags, int64_t count, int* selected, int* selected_count);
-//                                                              indices with a flag, ascending
+//   void exclusive_scan(const int* in, int* out, int64_t count, int* total, const int* used = nullptr);
+//                                                              out[i] = Σ in[0..i), *total = Σ all; in == out is allowed
+//   void select(const unsigned char* flags, int64_t count, int* selected, int* selected_count,
+//               const int* used = nullptr);                    indices with a flag, ascending
+//                                                              `used`: that only the first *used <= count items are
+//                                                              there is known when the work before it is done
 //   void sort_unique(unsigned long long* keys, int* count, int64_t capacity);  ascending, duplicates gone, in place;
 //                                                              *count <= capacity valid keys before and after; what
 //                                                              lies beyond them is overwritten; ~0 is not a key

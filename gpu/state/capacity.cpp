@@ -60,6 +60,7 @@ Extents extents_of(const StagingBuffers& loaded, Capacity capacity) {
   narrow(6 * particles, "particles");
   extents.slot_capacity =
       narrow(slots + scaled(std::min(members, std::max<int64_t>(65536, 2 * slots))) + 64, "clusters");
+  extents.slots_expected = std::min(extents.slot_capacity, narrow(slots + slots / 4 + 64, "clusters"));
   extents.member_capacity = narrow(members + scaled(2 * members + 4096) + additions, "cluster members");
   extents.vertex_capacity = narrow(std::min(6 * particles, scaled(4'000'000 + particles)) + 64, "skin vertices");
   extents.cell_capacity = narrow(cells, "skin cells");
