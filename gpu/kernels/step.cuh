@@ -179,7 +179,7 @@ CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) {
 
 // Lanes that share a group: one for each row of its map; and where its particles are looked at one by one, in the pass
 // over all of them and while it is resolved.
-inline constexpr int kRowTeam = 4, kParticleTeam = 8, kResolvedTeam = 32;
+inline constexpr int kRowTeam = 4, kParticleTeam = 16, kResolvedTeam = 32;
 inline constexpr int kMostByRows = 300'000;  // particles of a load
 
 // Weighted sums in the order of arrays.inc: 4 axis + k: of e rᵀ / h; 4 axis + 3: of e.
@@ -324,14 +324,13 @@ CUTPROOF_DEVICE void list_resolved(Block& block, const AnyTeam& team, const Devi
   block.store(&w.resolved_groups[block.atomic_add(listed_in(w, substep), 1)], g);
 }
 
-// Says whether contacts or a grip hold some of the group from the beginning on (enter_group).
 template <bool kContacts, class Block>
-CUTPROOF_DEVICE bool start_group(Block& block, const Team<Block, kParticleTeam>& team, const DeviceView& w, int g,
+CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>& team, const DeviceView& w, int g,
                                  int substep) {
   // What is needed is asked for first, and not when it is needed: each answer takes as long as the work.
   const Group group = group_of(w, g);
   const GroupHead& head = group.head;
-  if (head.size == 0) return false;
+  if (head.size == 0) return;
   const Pace pace = constant(&w.pace[body_of_group(w, head)]);
   const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
   const float shared = 1.0f / constant(&w.group_mass[g]).w;
@@ -347,106 +346,90 @@ CUTPROOF_DEVICE bool start_group(Block& block, const Team<Block, kParticleTeam>&
     if constexpr (kContacts) state = w.group_resolved[g];
   }
   if constexpr (kContacts) touched = w.group_touched[g] != 0;
-  if (!turns_over(pace, substep)) return false;
+  if (!turns_over(pace, substep)) return;
   if (pace.iterations == 0) map = {};
   const float lost = lost_fraction(pace, pace.iterations);
   const Held held = kContacts && !ends ? held_by(w, pace, head.hold_set, substep) : Held{};
 
-  // Of particle k: its place, X - X_g [h], displacement and mass, and velocity.
-  struct Moved {
-    int o;
-    Float3 r;
-    Float4 d;
-    Float3 v;
-  };
-  const auto moved = [&](int k) {
-    Moved now;
-    now.o = head.begin + k;
-    now.r = group.rest(w, pace, k);
+  // Displacement and mass of particle k, and its velocity.
+  const auto where = [&](int k, Float3& v) {
+    const int o = head.begin + k;
     if (begins) {
-      const int p = w.place_particle[now.o];
-      now.v = xyz(w.velocity[p]);
-      now.d = w.displacement[p];
-      return now;
+      const int p = w.place_particle[o];
+      v = xyz(w.velocity[p]);
+      return w.displacement[p];
     }
-    const Float4 start = w.start[now.o];
-    Float3 d;
-    if (state == kCarried) {
-      d = carried_to(last_base, lost, xyz(w.predicted[now.o]), map, now.r);
-    } else {
-      d = xyz(w.position[now.o]);
-    }
-    now.v = pace.decay_per_dt * (d - xyz(start));
-    now.d = with_w(d, start.w);
-    return now;
+    const Float4 start = w.start[o], predicted = w.predicted[o];
+    Float3 d = carried_to(last_base, lost, xyz(predicted), map, group.rest(w, pace, k));
+    if (state != kCarried) d = xyz(w.position[o]);
+    v = pace.decay_per_dt * (d - xyz(start));
+    return with_w(d, start.w);
   };
-  const auto end = [&](const Moved& now) {
+  const auto end = [&](int k) {
     if constexpr (kContacts) {
       if (begins || !touched) return;
+      const int o = head.begin + k;
       Float3 pushed;
-      if (state == kResolved) pushed = xyz(w.pushed[now.o]);
+      if (state == kResolved) pushed = xyz(w.pushed[o]);
       if (state == kHeld) {
-        const Float3 predicted = xyz(w.predicted[now.o]);
-        pushed = pace.held_alpha * (xyz(w.position[now.o]) - predicted) +
-                 (pace.held_beta * (predicted - last_base) - map(now.r));
+        const Float3 predicted = xyz(w.predicted[o]);
+        pushed = pace.held_alpha * (xyz(w.position[o]) - predicted) +
+                 (pace.held_beta * (predicted - last_base) - map(group.rest(w, pace, k)));
       }
-      end_impulse(w, w.place_particle[now.o], pace, pushed);
+      end_impulse(w, w.place_particle[o], pace, pushed);
     }
   };
-  if (ends) {
-    team.each(head.size, [&](int k) {
-      const Moved now = moved(k);
-      end(now);
-      const int p = w.place_particle[now.o];
-      w.displacement[p] = now.d;
-      w.velocity[p] = with_w(now.v, 0.0f);
-    });
-    return false;
-  }
-  // Small numbers are summed: displacements less that of the particle in the middle, or, where that one is far off the
-  // others, less their mean. (Not always: what moves as a whole must have moments that vanish.) Every lane works out
-  // where the middle one goes, so that nobody waits for it.
-  Float3 base;
-  {
-    const Moved middle = moved(head.middle);
-    base = predict(pace, xyz(middle.d), middle.v);
-  }
-  // Nobody writes over what others read of the one in the middle.
-  team.sync();
+  const int first = team.lane();  // the first of this lane's particles: nearly always the only one
+  Float4 of_first;                // its prediction, and what a holder gets of its mass
   const float of_each = 1.0f / static_cast<float>(head.holder_count);
   [[maybe_unused]] bool before = false, behind = false;  // the blade, when the substep begins
-  GroupSums<Team<Block, kParticleTeam>> sums;
-  float reach = 0;
-  const auto add = [&](int k, Float3 predicted, float mass, Float3 r) {
-    const Float3 e = predicted - base;
-    reach = fmaxf(reach, dot(e, e));
-    add_moments(sums.of(k), of_each * mass, e, pace.per_h * e, r);
-  };
   team.each(head.size, [&](int k) {
-    const Moved now = moved(k);
-    end(now);
-    const Float3 predicted = predict(pace, xyz(now.d), now.v);
+    const int o = head.begin + k;
+    Float3 v;
+    const Float4 d = where(k, v);
+    end(k);
+    if (ends) {
+      const int p = w.place_particle[o];
+      w.displacement[p] = d;
+      w.velocity[p] = with_w(v, 0.0f);
+      return;
+    }
+    const Float3 predicted = predict(pace, xyz(d), v);
     float side = 1.0f;
     if constexpr (kContacts) {
-      side = blade_side(contacts, {pace.h, grid_node(pace, constant(&w.place_node[now.o]))}, xyz(now.d));
+      side = blade_side(contacts, {pace.h, grid_node(pace, constant(&w.place_node[o]))}, xyz(d));
       (side < 0 ? behind : before) = true;
       if (held.active) side = 0.0f;
     }
-    w.start[now.o] = now.d;
-    w.predicted[now.o] = with_w(predicted, side);
-    add(k, predicted, now.d.w, now.r);
+    w.start[o] = d;
+    w.predicted[o] = with_w(predicted, side);
+    if (k == first) of_first = with_w(predicted, of_each * d.w);
   });
-  auto total = team.parted(sums);
-  const Float3 off = {shared * total.get(team, 3), shared * total.get(team, 7), shared * total.get(team, 11)};
-  if (dot(off, off) > kFarBase * kFarBase * pace.h * pace.h) {
-    base = base + off;
-    sums = {};
+  if (ends) return;
+  // Small numbers are summed: displacements less that of the particle in the middle, or, where that one is far off the
+  // others, less their mean. (Not always: what moves as a whole must have moments that vanish.)
+  Float3 base = xyz(of_first);
+  if (head.middle >= team.kLanes && team.has(head.middle)) base = xyz(w.predicted[head.begin + head.middle]);
+  base = team.from(head.middle, base);
+  float reach = 0;
+  typename Team<Block, kParticleTeam>::template Parted<12> total;
+  for (int round = 0;; ++round) {
+    GroupSums<Team<Block, kParticleTeam>> sums;
     reach = 0;
     team.each(head.size, [&](int k) {
-      const int o = head.begin + k;
-      add(k, xyz(w.predicted[o]), w.start[o].w, group.rest(w, pace, k));
+      Float4 particle = of_first;
+      if (k != first) {
+        const int o = head.begin + k;
+        particle = with_w(xyz(w.predicted[o]), of_each * w.start[o].w);
+      }
+      const Float3 e = xyz(particle) - base;
+      reach = fmaxf(reach, dot(e, e));
+      add_moments(sums.of(k), particle.w, e, pace.per_h * e, group.rest(w, pace, k));
     });
     total = team.parted(sums);
+    const Float3 off = {shared * total.get(team, 3), shared * total.get(team, 7), shared * total.get(team, 11)};
+    if (round > 0 || !(dot(off, off) > kFarBase * kFarBase * pace.h * pace.h)) break;
+    base = base + off;
   }
   const Float4 base_and_reach = with_w(base, sqrtf(team.greatest(reach)) * (1.0f + 0x1p-20f));
   if (team.leads()) w.group_base[g] = base_and_reach;
@@ -462,29 +445,17 @@ CUTPROOF_DEVICE bool start_group(Block& block, const Team<Block, kParticleTeam>&
       w.group_resolved[g] = held.active ? kHeld : kCarried;
       if (held.active) w.group_touched[g] = 1;
     }
-    if (resolve) return true;
+    if (resolve) {
+      if (!held.active) list_resolved(block, team, w, pace, g, substep);
+      team.each(head.size, [&](int k) {
+        const int o = head.begin + k;
+        const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
+        enter_substep(w, contacts, held, rest, o, w.predicted[o], xyz(w.start[o]), 0.0f);
+      });
+      return sum_resolved(team, w, group, pace, base);
+    }
   }
   total.each(team, [&](int n, float sum) { store_moment(w.group_moments, g, n, sum); });
-  return false;
-}
-
-// A group that start_group has started, and that is resolved or held from the beginning on.
-template <class Block>
-CUTPROOF_DEVICE void enter_group(Block& block, const Team<Block, kParticleTeam>& team, const DeviceView& w, int g,
-                                 int substep) {
-  const Group group = group_of(w, g);
-  const GroupHead& head = group.head;
-  const Pace pace = constant(&w.pace[body_of_group(w, head)]);
-  const Contacts contacts = contacts_of(w, pace, substep);
-  const Held held = held_by(w, pace, head.hold_set, substep);
-  if (!held.active) list_resolved(block, team, w, pace, g, substep);
-  team.each(head.size, [&](int k) {
-    const int o = head.begin + k;
-    const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
-    enter_substep(w, contacts, held, rest, o, w.predicted[o], xyz(w.start[o]), 0.0f);
-  });
-  team.sync();
-  sum_resolved(team, w, group, pace, xyz(w.group_base[g]));
 }
 
 template <bool kContacts>
@@ -612,12 +583,7 @@ CUTPROOF_DEVICE void start_substep_kernel(Block& block, const DeviceView& w, int
   const Team<Block, kParticleTeam> team(block);
   const int groups = w.counters->groups;
   for (int64_t g = team.first(); g < groups; g += team.stride()) {
-    [[maybe_unused]] const bool enters = start_group<kContacts>(block, team, w, static_cast<int>(g), substep);
-    // In a place of its own, where nothing of the above takes registers any more.
-    if constexpr (kContacts) {
-      team.sync();  // the base
-      if (enters) enter_group(block, team, w, static_cast<int>(g), substep);
-    }
+    start_group<kContacts>(block, team, w, static_cast<int>(g), substep);
   }
   block.wait_for_earlier();
   for (int64_t k = from_last(block); k < w.counters->loose; k += block.stride()) {
@@ -1106,7 +1072,7 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
   if (loose == 0) return;
   int64_t k = from_last(block);
   if constexpr (kContacts) {
-    const auto teams = static_cast<unsigned>(team.stride());
+    const auto teams = static_cast<unsigned>(team.stride());  // a remainder of 64 bits takes a hundred instructions
     k -= static_cast<int64_t>(static_cast<unsigned>(w.counters->resolved) % teams) * team.kLanes;
     if (k < 0) k += block.stride();
   }
@@ -1128,7 +1094,7 @@ struct start_substep_kernel_object {
 template <bool kContacts, bool kAccelerated, int kRows>
 struct advance_kernel_object {
   static constexpr const char* kName = "advance_kernel";
-  static constexpr int kMaxThreads = 128, kMinBlocks = 5;
+  static constexpr int kMaxThreads = 128, kMinBlocks = 4;
   static constexpr bool kReadsAhead = true;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, int iteration) const {

@@ -71,27 +71,22 @@ class Team {
     template <class Give>
     CUTPROOF_DEVICE void each(const Team& team, Give give) const {
       if constexpr (Block::on_device) {
-        if (team.lane() % kShare != 0) return;
-        const int begin = team.lane() / kShare * kOwn;
-        for (int k = 0; k < kOwn; ++k) {
-          if (begin + k < N) give(begin + k, value_[k]);
-        }
+        const int which = team.lane() / kShare;
+        if (team.lane() % kShare == 0 && which < N) give(which, value_[0]);
       } else {
         for (int k = 0; k < N; ++k) give(k, value_[k]);
       }
     }
     // Sum n, to every lane.
     CUTPROOF_DEVICE float get(const Team& team, int n) const {
-      return team.from(n / kOwn * kShare, value_[Block::on_device ? n % kOwn : n]);
+      return team.from(n * kShare, value_[Block::on_device ? 0 : n]);
     }
 
    private:
     friend class Team;
-    static constexpr int kMost = 16;
-    static constexpr int kOwn = kMost / kWidth > 1 ? kMost / kWidth : 1;    // sums that a lane ends up with
-    static constexpr int kShare = kWidth / kMost > 1 ? kWidth / kMost : 1;  // lanes that end up with the same
-    static_assert(N <= kMost);
-    float value_[Block::on_device ? kOwn : N] = {};
+    static constexpr int kMost = 16, kShare = kWidth / kMost;  // lanes that end up with the same sum
+    static_assert(N <= kMost && kWidth >= kMost);
+    float value_[Block::on_device ? 1 : N] = {};
   };
   template <int N>
   CUTPROOF_DEVICE Parted<N> parted(Sums<N>& sums) const {
@@ -115,7 +110,7 @@ class Team {
           kept[k] = mine + other(sent, distance);
         }
       }
-      for (int k = 0; k < Parted<N>::kOwn; ++k) found.value_[k] = kept[k];
+      found.value_[0] = kept[0];
     } else {
       const Floats<N> all = total(sums);
       for (int k = 0; k < N; ++k) found.value_[k] = all.v[k];
