@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <set>
 #include <vector>
 
@@ -281,7 +282,7 @@ CUTPROOF_DEVICE void make_keys_kernel(Block& block, unsigned long long* keys, in
 CUTPROOF_KERNEL(make_keys_kernel);
 
 inline const std::vector<int>& hard_counts() {
-  static const std::vector<int> counts = {0, 1, 31, 32, 33, 255, 256, 257, 1023, 1024, 1025, 70001};
+  static const std::vector<int> counts = {0, 1, 31, 32, 33, 255, 256, 257, 1023, 1024, 1025, 16385, 32769, 70001};
   return counts;
 }
 
@@ -568,6 +569,26 @@ void check_scan(Machine& machine) {
     expected.push_back(77);  // nothing is written beyond the end
     EXPECT_EQ(out.get(), expected) << count;
     EXPECT_EQ(totals.get(), (std::vector<int>{sum, sum}));
+    // Only the first of them, how many only the device knows; and from a place that no four items begin at.
+    for (const int used : {0, 1, count / 2, count}) {
+      if (used > count) continue;
+      auto there = machine.array(std::vector<int>(1, used));
+      auto values_again = machine.array(values), some = machine.array(std::vector<int>(values.size(), 77));
+      machine.run([&](auto& launcher) {
+        launcher.exclusive_scan(values_again.at(), some.at(), count, totals.at(), there.at());
+        if (count > 0) {
+          launcher.exclusive_scan(values_again.at() + 1, values_again.at() + 1, count - 1, totals.at() + 1);
+        }
+      });
+      std::vector<int> wanted(values.size(), 77);
+      std::copy_n(expected.begin(), used, wanted.begin());
+      EXPECT_EQ(some.get(), wanted) << used << " of " << count;
+      const auto first = static_cast<std::ptrdiff_t>(used);
+      EXPECT_EQ(totals.get()[0], std::accumulate(values.begin(), values.begin() + first, 0)) << used << " of " << count;
+      if (count > 0) {
+        EXPECT_EQ(totals.get()[1], sum - values[0]) << count;
+      }
+    }
   }
 }
 
@@ -590,6 +611,16 @@ void check_select(Machine& machine) {
       std::vector<int> got = selected.get();
       got.resize(expected.size());
       EXPECT_EQ(got, expected);
+      for (const int used : {0, 1, count / 2, count}) {
+        if (used > count) continue;
+        auto there = machine.array(std::vector<int>(1, used));
+        machine.run([&](auto& launcher) { launcher.select(flags.at(), count, selected.at(), number.at(), there.at()); });
+        const auto below = std::lower_bound(expected.begin(), expected.end(), used);
+        ASSERT_EQ(number.get()[0], static_cast<int>(below - expected.begin())) << used << " of " << count;
+        got = selected.get();
+        got.resize(static_cast<std::size_t>(below - expected.begin()));
+        EXPECT_EQ(got, std::vector<int>(expected.begin(), below)) << used << " of " << count;
+      }
     }
   }
 }
