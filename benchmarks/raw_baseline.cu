@@ -46,8 +46,8 @@ __global__ void __launch_bounds__(256) raw_update_particles_kernel(const __grid_
   }
 }
 
-// A warp for each cluster of kClusterSize particles, as the sums over members in the kernels: t = Σ w x / n, which every
-// lane needs, and each member's w (x - t).
+// A warp for each cluster of kClusterSize particles, as the sums over members in the kernels: t = Σ w x / n, which
+// every lane needs, and each member's w (x - t).
 constexpr int kClusterSize = 125;
 struct Clusters {
   const Float4* position;

@@ -17,7 +17,8 @@
 //                                                              if *flag is not 0 when the work before it is done
 //   void while_nonzero(int* flag, Body);                       again and again while *flag is not 0
 //   void exclusive_scan(const int* in, int* out, int64_t count, int* total, const int* used = nullptr);
-//                                                              out[i] = Σ in[0..i), *total = Σ all; in == out is allowed
+//                                                              out[i] = Σ in[0..i), *total = Σ all; in == out is
+//                                                              allowed
 //   void select(const unsigned char* flags, int64_t count, int* selected, int* selected_count,
 //               const int* used = nullptr);                    indices with a flag, ascending
 //                                                              `used`: that only the first *used <= count items are

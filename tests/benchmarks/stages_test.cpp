@@ -114,7 +114,9 @@ TEST_F(Bench, TellsBothWaysOfSplittingOnTheHost) {
 
 // The scenes of Table 1 with both ways of cooking: what the paper timed has its time, and an expansion that really ran.
 TEST_F(Bench, ReproducesTable1WithBoxesAndSampledClusters) {
-  const Outcome outcome = bench("stages --frames 8 --repeats 2 --json out.json");
+  // Plain iterations, as the paper's: accelerated ones cut the irregular path so that the first eight frames that cut
+  // leave nothing to expand.
+  const Outcome outcome = bench("stages --frames 8 --repeats 2 --acceleration none --json out.json");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
   const json document = result("out.json");
   std::set<std::array<std::string, 2>> seen;

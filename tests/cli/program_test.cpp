@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -49,22 +50,30 @@ INSTANTIATE_TEST_SUITE_P(OfThePaper, Scene, testing::ValuesIn(scenes_and_backend
 
 struct OnMesh {
   std::string scene, mesh;
+  int parts = 2;
 };
 class SceneOnMesh : public Program, public testing::WithParamInterface<OnMesh> {};
 
 TEST_P(SceneOnMesh, HoldsWithEveryCheckOn) {
   const char* meshes = std::getenv("CUTPROOF_MESHES");
   if (meshes == nullptr) GTEST_SKIP() << "CUTPROOF_MESHES is not set";
-  const Outcome outcome =
-      cutproof("run " + scene(GetParam().scene) + " --check --mesh " + meshes + "/" + GetParam().mesh);
+  json expecting = json::parse(std::ifstream(scene(GetParam().scene)));
+  json& expect = expecting.at("expect");
+  expect.at("components_after_stroke").back() = GetParam().parts;
+  expect.at("components_at_end") = GetParam().parts;
+  expect.at("shells_at_end") = GetParam().parts;
+  write("scene.json", expecting.dump());
+  const Outcome outcome = cutproof("run scene.json --check --mesh " + std::string(meshes) + "/" + GetParam().mesh);
   EXPECT_EQ(outcome.status, 0) << outcome.output;
 }
 
+// The liver of sksurgery falls into three: so it does with 32 accelerated and with 128 plain iterations. (With 8 plain
+// ones, far from the solution of their substeps, it fell into two.)
 INSTANTIATE_TEST_SUITE_P(Organs, SceneOnMesh,
                          testing::Values(OnMesh{"kidney_discontinuous", "openhelp_Kidney_left.stl"},
                                          OnMesh{"kidney_discontinuous", "bp3d_FMA7205_Left_Kidney.obj"},
                                          OnMesh{"liver_cut", "openhelp_Liver.stl"},
-                                         OnMesh{"liver_cut", "sksurgery_liver.ply"},
+                                         OnMesh{"liver_cut", "sksurgery_liver.ply", 3},
                                          OnMesh{"liver_cut", "bp3d_FMA7197_Liver.obj"}),
                          [](const auto& instance) {
                            std::string name = instance.param.scene + "_on_" + instance.param.mesh;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "model/io/scene_io.h"
 #include "reference_cpu/reference.h"
@@ -35,10 +36,11 @@ class Tune : public Program {
 
 // RMS distance of a scene's run from that of the same scene with other substeps and iterations: without the library's
 // notion of a reference solution.
-double greatest_rms_h(const Scene& tuned, Scene scene, int substeps, int iterations) {
+double greatest_rms_h(const Scene& tuned, Scene scene, int substeps, int iterations,
+                      std::optional<int64_t> frames = {}) {
   scene.step.substeps = substeps;
   scene.step.iterations = iterations;
-  const cutproof::tuning::PreparedScene a(scene, "test", {}), b(tuned, "test", {});
+  const cutproof::tuning::PreparedScene a(scene, "test", frames), b(tuned, "test", frames);
   const auto first = cutproof::reference::make_backend(), second = cutproof::reference::make_backend();
   first->load({a.setup()}, {a.start()});
   second->load({b.setup()}, {b.start()});
@@ -96,6 +98,17 @@ TEST_F(Tune, WritesACheaperSceneWithinTheTolerance) {
     }
     EXPECT_EQ(cutproof("run scene_tuned.json --check --backend " + backend).status, 0);
   }
+}
+
+// The first frames of three_cuts, in which the block meets the ground, beside 256 plain iterations of each substep: as
+// the scene is given, and as it would be without the default of its version.
+TEST(ScenesOfTheProject, AreWithinATwentiethOfASpacingOfTheirOwnSubstepsSolved) {
+  const Scene given = cutproof::io::read_scene(CUTPROOF_SOURCE "/fixtures/scenes/three_cuts.json");
+  Scene plain = given;
+  plain.step.acceleration = cutproof::Acceleration::none;
+  constexpr int64_t kFrames = 6;
+  EXPECT_LE(greatest_rms_h(given, plain, given.step.substeps, 256, kFrames), 0.05);
+  EXPECT_GT(greatest_rms_h(plain, plain, given.step.substeps, 256, kFrames), 0.05);
 }
 
 TEST_F(Tune, AgainstTheLimitOfShortTimeSteps) {

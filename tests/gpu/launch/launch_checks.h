@@ -614,7 +614,8 @@ void check_select(Machine& machine) {
       for (const int used : {0, 1, count / 2, count}) {
         if (used > count) continue;
         auto there = machine.array(std::vector<int>(1, used));
-        machine.run([&](auto& launcher) { launcher.select(flags.at(), count, selected.at(), number.at(), there.at()); });
+        machine.run(
+            [&](auto& launcher) { launcher.select(flags.at(), count, selected.at(), number.at(), there.at()); });
         const auto below = std::lower_bound(expected.begin(), expected.end(), used);
         ASSERT_EQ(number.get()[0], static_cast<int>(below - expected.begin())) << used << " of " << count;
         got = selected.get();
