@@ -342,6 +342,7 @@ class DeviceLauncher {
 
   void exclusive_scan(const int* in, int* out, std::int64_t count, int* total, const int* used = nullptr) {
     const int n = narrow(count, "exclusive_scan");
+    if (used != nullptr && !is_aligned(in)) throw std::logic_error("exclusive_scan: items that begin at no 16 bytes.");
     if ((used != nullptr || n <= detail::kMostScannedInBlock) && is_aligned(in)) {
       return launch<detail::scan_in_block_kernel_object>(1, detail::kScanThreads, 0, in, out, n, used, total);
     }
@@ -354,6 +355,7 @@ class DeviceLauncher {
   void select(const unsigned char* flags, std::int64_t count, int* selected, int* selected_count,
               const int* used = nullptr) {
     const int n = narrow(count, "select");
+    if (used != nullptr && !is_aligned(flags)) throw std::logic_error("select: items that begin at no 16 bytes.");
     if ((used != nullptr || n <= detail::kMostSelectedInBlock) && is_aligned(flags)) {
       return launch<detail::select_in_block_kernel_object>(1, detail::kScanThreads, 0, flags, n, used, selected,
                                                            selected_count);
