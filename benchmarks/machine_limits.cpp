@@ -67,12 +67,15 @@ MachineLimits measure_machine(const harness::BackendDescriptor& backend) {
 #if CUTPROOF_HAS_CUDA
   if (backend.processor == Processor::device) {
     const gpu::DeviceLimits measured = gpu::measure_device_limits();
-    return {measured.copy_bytes_per_second, measured.graph_node_seconds, measured.chain_seconds};
+    return {measured.copy_bytes_per_second, measured.graph_node_seconds, measured.chain_seconds,
+            measured.l2_round_trip_seconds, measured.grid_sync_seconds};
   }
 #endif
   const int threads = backend.processor == Processor::one_thread ? 1 : harness::cpu_threads();
   const MachineLimit copy = copy_on_cpu(threads, kRepeats);
-  return {copy.bytes / copy.seconds.median, {}, {}};
+  MachineLimits limits;
+  limits.copy_bytes_per_second = copy.bytes / copy.seconds.median;
+  return limits;
 }
 
 nlohmann::json to_json(const MachineLimits& machine) {
@@ -80,6 +83,8 @@ nlohmann::json to_json(const MachineLimits& machine) {
   if (machine.graph_node_seconds) {
     result["graph_node_seconds"] = *machine.graph_node_seconds;
     result["chain_of_40_seconds"] = *machine.chain_seconds;
+    result["l2_round_trip_seconds"] = *machine.l2_round_trip_seconds;
+    result["grid_sync_seconds"] = *machine.grid_sync_seconds;
   }
   return result;
 }
@@ -91,7 +96,10 @@ std::vector<MachineLimit> measure_machine_limits(const harness::BackendDescripto
     const gpu::DeviceLimits measured = gpu::measure_device_limits(repeats);
     return {{"copy, device to device", times_of(measured.copy), measured.copy_bytes, measured.bytes_lost},
             {"graph of 40 empty kernels", times_of(measured.short_chain), 0, {}},
-            {"graph of 400 empty kernels", times_of(measured.long_chain), 0, {}}};
+            {"graph of 400 empty kernels", times_of(measured.long_chain), 0, {}},
+            {"32768 dependent reads", times_of(measured.walk), 0, measured.walks_lost},
+            {"100 meetings of the grid", times_of(measured.few_meetings), 0, measured.meetings_missed},
+            {"1100 meetings of the grid", times_of(measured.many_meetings), 0, measured.meetings_missed}};
   }
 #endif
   std::vector<MachineLimit> limits = {copy_on_cpu(1, repeats)};

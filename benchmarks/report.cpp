@@ -12,7 +12,7 @@ namespace cutproof::benchmarks {
 
 namespace {
 
-constexpr int kFormatVersion = 2;
+constexpr int kFormatVersion = 3;
 
 }  // namespace
 

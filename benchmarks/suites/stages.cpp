@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <functional>
+#include <map>
+#include <string>
 
 #include "benchmarks/machine_limits.h"
 #include "benchmarks/paper.h"
-#include "benchmarks/step_traffic.h"
+#include "benchmarks/stage_limits.h"
 #include "benchmarks/suites/suites.h"
 #include "model/io/verdict_json.h"
 #if CUTPROOF_HAS_CUDA
@@ -39,19 +41,6 @@ std::vector<std::function<BenchScene()>> scenes_of(const StagesOptions& options,
   return makers;
 }
 
-// The step, of which one takes `median` [s], beside what the machine can do at best.
-json step_limit(const BenchScene& scene, double median, const MachineLimits& machine) {
-  const StepTraffic traffic = step_traffic(scene.setup, scene.state);
-  const double bytes_seconds = traffic.bytes / machine.copy_bytes_per_second;
-  const double launch_seconds = static_cast<double>(traffic.launches) * machine.graph_node_seconds.value_or(0);
-  const double seconds = std::max(bytes_seconds, launch_seconds);
-  json limit = {{"bytes", traffic.bytes},         {"launches", traffic.launches},
-                {"bytes_seconds", bytes_seconds}, {"seconds", seconds},
-                {"multiple", median / seconds},   {"multiple_of_bytes", median / bytes_seconds}};
-  if (machine.graph_node_seconds) limit["launch_seconds"] = launch_seconds;
-  return limit;
-}
-
 json scene_json(const BenchScene& scene, const Contender& contender, const Measured& measured) {
   const Setup& setup = scene.setup;
   json entry = {{"scene", scene.name},
@@ -81,8 +70,21 @@ json scene_json(const BenchScene& scene, const Contender& contender, const Measu
   return entry;
 }
 
-// A row for whole frames and for each stage: its time and its error.
-void add_rows(const BenchScene& scene, const Contender& contender, const Measured& measured, json& document) {
+// What the stages of a backend that runs the kernels take at best, under the name of each.
+std::map<std::string, StageLimit> limits_of(const BenchScene& scene, const Contender& contender) {
+  std::map<std::string, StageLimit> limits;
+  if (!contender.described->takes_kernel_options) return limits;
+  const StageLimits found = stage_limits(
+      scene.setup, scene.state,
+      contender.split == "global" ? gpu::SplitMethod::global_labels : gpu::SplitMethod::blocks);
+  for (const Stage stage : kStages) limits.emplace(name_of(stage), found[static_cast<std::size_t>(stage)]);
+  return limits;
+}
+
+// A row for whole frames and for each stage: its time, its error, and its limit.
+void add_rows(const BenchScene& scene, const Contender& contender, const Measured& measured,
+              const MachineLimits& machine, json& document) {
+  const std::map<std::string, StageLimit> limits = limits_of(scene, contender);
   const PaperScene* const known = find_paper_scene(scene.name);
   for (const auto& [what, times] : measured.timings.named()) {
     json row = run_fields(scene, contender);
@@ -96,6 +98,10 @@ void add_rows(const BenchScene& scene, const Contender& contender, const Measure
     if (const auto ms = known == nullptr ? std::nullopt : known->paper_ms(what)) row["paper_seconds"] = 1e-3 * *ms;
     row["error"] = error;
     row["error_text"] = in_words(error, measured.judged ? "did not run" : "not measured");
+    row["limit"] = nullptr;
+    if (const auto found = limits.find(what); found != limits.end() && times.count > 0) {
+      row["limit"] = limit_json(found->second, machine, times.median);
+    }
     document["rows"].push_back(std::move(row));
   }
 }
@@ -125,14 +131,10 @@ json run_stages(const StagesOptions& options, const Progress& progress) {
       scene.setup.step = asked;
       for (const Contender& contender : contenders) {
         const Measured measured = measure(contender, scene, frames, options.repeats);
-        add_rows(scene, contender, measured, report.document);
+        add_rows(scene, contender, measured, machine, report.document);
         json entry = scene_json(scene, contender, measured);
         entry["frames"] = frames;
         entry["repeats"] = options.repeats;
-        if (contender.described->takes_kernel_options) {  // what its step moves is counted
-          const Times& step = measured.timings.stage[static_cast<std::size_t>(Stage::step)];
-          entry["step_limit"] = step_limit(scene, step.median, machine);
-        }
         report.add(std::move(entry), measured.holds());
       }
     }

@@ -1,4 +1,7 @@
+#include <algorithm>
+#include <array>
 #include <map>
+#include <string>
 
 #include "benchmarks/paper.h"
 #include "cli/bench/suites.h"
@@ -15,16 +18,12 @@ void print_machine(const json& document) {
   print_filled("copy, read + written: {1e-9*copy_bytes_per_second:.4g} GB/s", machine);
   if (machine.contains("graph_node_seconds")) {
     print_filled(
-        "; one node of a graph {1e6*graph_node_seconds:.2f} µs (40 empty kernels {1e6*chain_of_40_seconds:.1f} µs)",
+        "; one node of a graph {1e6*graph_node_seconds:.2f} µs (40 empty kernels {1e6*chain_of_40_seconds:.1f} µs), a "
+        "read that waits for another {1e6*l2_round_trip_seconds:.2f} µs, a barrier of the grid "
+        "{1e6*grid_sync_seconds:.2f} µs",
         machine);
   }
   fmt::print("\n");
-}
-
-void print_limit(const json& limit) {
-  print_filled("  limit of step: {1e-6*bytes:.4g} MB at the copy's bandwidth {1e3*bytes_seconds:.4f} ms", limit);
-  if (limit.contains("launch_seconds")) print_filled(", {launches} launches {1e3*launch_seconds:.4f} ms", limit);
-  print_filled("; step takes {multiple:.2f} × its limit ({multiple_of_bytes:.2f} × bytes / bandwidth)\n", limit);
 }
 
 // [scenes] the rows of each, which stand one after the other and begin with whole frames.
@@ -45,14 +44,23 @@ void print_last_scene(const json& document) {
   print_filled("the blade goes on by {blade_advance_h:.2g} h a frame\n", scene);
   print_filled("{backend}, {precision} precision, {substeps} substeps × {iterations} iterations, ", rows.front());
   print_filled("acceleration {acceleration}, rotation {rotation}, split {split}\n", rows.front());
-  const auto line = [](auto what, auto median, auto least, auto most, auto frames, auto paper, auto error) {
-    fmt::print("  {:<14} {:>11} {:>11} {:>11} {:>9} {:>9}  {}\n", what, median, least, most, frames, paper, error);
+  const bool limits = std::any_of(rows.begin(), rows.end(), [](const json& row) { return !row.at("limit").is_null(); });
+  const auto line = [&](auto what, auto median, auto least, auto most, const std::array<std::string, 4>& limit,
+                        auto frames, auto paper, auto error) {
+    fmt::print("  {:<14} {:>11} {:>11} {:>11} ", what, median, least, most);
+    if (limits) fmt::print("{:>9} {:>7} {:>10} {:>7} ", limit[0], limit[1], limit[2], limit[3]);
+    fmt::print("{:>9} {:>9}  {}\n", frames, paper, error);
   };
-  line("", "median ms", "least ms", "most ms", "frames", "paper ms", "error");
+  line("", "median ms", "least ms", "most ms", {"MB", "phases", "limit ms", "×"}, "frames", "paper ms", "error");
   for (const json& row : rows) {
     const auto text = [&](const char* cell) { return io::filled(cell, row); };
+    std::array<std::string, 4> limit;
+    if (!row.at("limit").is_null()) {
+      limit = {text("{1e-6*limit/bytes:.4g}"), text("{limit/phases}"), text("{1e3*limit/seconds:.4f}"),
+               row.at("limit").at("multiple").is_null() ? "" : text("{limit/multiple:.2f}")};
+    }
     line(text("{what}"), text("{1e3*seconds/median:.4f}"), text("{1e3*seconds/min:.4f}"), text("{1e3*seconds/max:.4f}"),
-         text("{frames}/{of}"), row.at("paper_seconds").is_null() ? "" : text("{1e3*paper_seconds:.2f}"),
+         limit, text("{frames}/{of}"), row.at("paper_seconds").is_null() ? "" : text("{1e3*paper_seconds:.2f}"),
          text("{error_text}"));
   }
   if (scene.contains("topology")) {
@@ -61,7 +69,6 @@ void print_last_scene(const json& document) {
     fmt::print("  errors not measured: beyond {} particles the reference takes minutes\n",
                benchmarks::kMostJudgedParticles);
   }
-  if (scene.contains("step_limit")) print_limit(scene.at("step_limit"));
 }
 
 // As the paper has it: a row for each stage, a column for each scene, here for each way of cooking, and the paper's

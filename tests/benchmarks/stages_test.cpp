@@ -1,6 +1,7 @@
 // `cutproof bench stages`: no time without its error, no error that goes unseen. What the times are is not tested.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
@@ -10,7 +11,9 @@
 #include <utility>
 
 #include "benchmarks/frame_errors.h"
+#include "benchmarks/phase_counter.h"
 #include "benchmarks/scene.h"
+#include "benchmarks/stage_limits.h"
 #include "benchmarks/times.h"
 #include "reference_cpu/reference.h"
 #include "tests/cli/program.h"
@@ -25,6 +28,62 @@ using cutproof::Stage;
 using cutproof::State;
 using cutproof::benchmarks::FrameErrors;
 using nlohmann::json;
+
+// --- Limits ----------------------------------------------------------------------------------------------------------
+
+int64_t phases_of(const cutproof::gpu::Plan& plan, Stage stage) {
+  return cutproof::benchmarks::phases_of_stages(plan)[static_cast<std::size_t>(stage)];
+}
+
+TEST(Limits, AnIterationIsTwoPhasesAndASubstepOneMore) {
+  cutproof::gpu::Plan plan;
+  plan.substeps = 3;
+  plan.iterations = 5;
+  const int64_t before = phases_of(plan, Stage::step);
+  plan.iterations = 6;
+  EXPECT_EQ(phases_of(plan, Stage::step), before + 3 * 2);
+  plan.iterations = 5;
+  plan.substeps = 4;
+  EXPECT_EQ(phases_of(plan, Stage::step), before + 1 + 5 * 2);
+}
+
+TEST(Limits, AStageThatIsNotPlannedHasOnlyTheBeginningOfItsSpan) {
+  const cutproof::gpu::Plan none;
+  EXPECT_EQ(phases_of(none, Stage::detect), 1);
+  cutproof::gpu::Plan plan;
+  plan.detection = plan.distance = true;
+  EXPECT_EQ(phases_of(plan, Stage::detect), 3);  // flag, remove
+  plan.merge = plan.deterministic_merge = true;
+  EXPECT_GT(phases_of(plan, Stage::merge), phases_of(none, Stage::merge));
+}
+
+// A block of 20 x 10 x 5 particles, counted by hand.
+TEST(Limits, CountTheBytesOfABlock) {
+  const auto scene = cutproof::benchmarks::make_bench_scene(1000, 1);
+  ASSERT_EQ(scene.setup.body.particle_count(), 20 * 10 * 5);
+  ASSERT_EQ(scene.setup.body.particle_at.size(), 22U * 12 * 7);
+  const auto limits =
+      cutproof::benchmarks::stage_limits(scene.setup, scene.state, cutproof::gpu::SplitMethod::blocks);
+  const auto bytes = [&](Stage stage) { return limits[static_cast<std::size_t>(stage)].bytes; };
+  EXPECT_EQ(bytes(Stage::detect), 26 * 1000 + 4 * 1848);
+  const double vertices = 2 * (20 * 10 + 10 * 5 + 5 * 20), owners = 20 * 10 * 5 - 18 * 8 * 3;
+  const auto members = static_cast<double>(scene.state.clusters.members.size());  // no cluster lies inside
+  EXPECT_EQ(bytes(Stage::skin), 21 * vertices + 32 * owners + 84 * scene.state.clusters.count() + 28 * members);
+  EXPECT_EQ(bytes(Stage::split), 0);
+}
+
+TEST(Limits, ASlowerMachineRaisesThem) {
+  cutproof::benchmarks::MachineLimits machine;
+  machine.copy_bytes_per_second = 1e12;
+  machine.graph_node_seconds = 1e-6;
+  machine.l2_round_trip_seconds = 0.5e-6;
+  const json by_phases = cutproof::benchmarks::limit_json({1e6, 10}, machine, 30e-6);
+  EXPECT_DOUBLE_EQ(by_phases.at("seconds").get<double>(), 15e-6);
+  EXPECT_DOUBLE_EQ(by_phases.at("multiple").get<double>(), 2.0);
+  const json by_bytes = cutproof::benchmarks::limit_json({1e8, 10}, machine, 3e-4);
+  EXPECT_DOUBLE_EQ(by_bytes.at("seconds").get<double>(), 1e-4);
+  EXPECT_DOUBLE_EQ(by_bytes.at("multiple").get<double>(), 3.0);
+}
 
 // --- The program -----------------------------------------------------------------------------------------------------
 
@@ -109,7 +168,16 @@ TEST_F(Bench, TellsBothWaysOfSplittingOnTheHost) {
     if (row.at("what") != "step") continue;
     EXPECT_GT(row.at("error").at("max_h"), 0) << "single precision has its rounding";
   }
-  for (const json& scene : document.at("scenes")) EXPECT_GT(scene.at("step_limit").at("bytes"), 0);
+  for (const json& row : document.at("rows")) {
+    const json& limit = row.at("limit");
+    const bool stage = row.at("what").get<std::string>().rfind("frame", 0) != 0;
+    ASSERT_EQ(limit.is_null(), !stage || row.at("seconds").is_null()) << row;
+    if (limit.is_null()) continue;
+    EXPECT_GT(limit.at("phases"), 0) << row;
+    const double at_best = std::max(limit.at("bytes_seconds").get<double>(), limit.at("phases_seconds").get<double>());
+    EXPECT_EQ(limit.at("seconds"), at_best);
+    EXPECT_EQ(limit.at("multiple").is_null(), at_best == 0) << row;
+  }
 }
 
 // The scenes of Table 1 with both ways of cooking: what the paper timed has its time, and an expansion that really ran.

@@ -1,0 +1,66 @@
+#include "benchmarks/phase_counter.h"
+
+#include <cstddef>
+
+#include "gpu/launch/frame.h"
+
+namespace cutproof::benchmarks {
+
+namespace {
+
+// A Launcher (gpu/launch/launcher.h) that launches nothing.
+class PhaseCounter {
+ public:
+  int64_t phases() const { return phases_; }
+
+  template <class Kernel, class... Args>
+  void items(Kernel, int64_t, const Args&...) {
+    ++phases_;
+  }
+  template <class Kernel, class... Args>
+  void teams(Kernel, int, int64_t, const Args&...) {
+    ++phases_;
+  }
+  template <class Kernel, class... Args>
+  void blocks(Kernel, int64_t, int, std::size_t, const Args&...) {
+    ++phases_;
+  }
+  // What is inside waits for a node that reads the flag.
+  template <class Body>
+  void if_nonzero(const int* flag, Body body) {
+    ++phases_;
+    if (*flag != 0) body(*this);
+  }
+  template <class Body>
+  void while_nonzero(int*, Body body) {
+    ++phases_;
+    body(*this);
+  }
+  void exclusive_scan(const int*, int*, int64_t, int*, const int* = nullptr) { ++phases_; }
+  void select(const unsigned char*, int64_t, int*, int*, const int* = nullptr) { ++phases_; }
+  void sort_unique(unsigned long long*, int*, int64_t) { ++phases_; }
+  void clear(void*, std::size_t) { ++phases_; }
+
+ private:
+  int64_t phases_ = 0;
+};
+
+}  // namespace
+
+std::array<int64_t, kStages.size()> phases_of_stages(const gpu::Plan& plan) {
+  gpu::Counters counters = {};
+  counters.cut = counters.extracting = counters.expanding = counters.additions = counters.small = counters.groups_stale = 1;
+  gpu::DeviceView view;
+  view.bodies = 1;
+  view.rotation_method = plan.rotation_method;
+  view.counters = &counters;
+  std::array<int64_t, kStages.size()> phases = {};
+  for (const Stage stage : kStages) {
+    PhaseCounter counter;
+    gpu::enqueue_span(counter, view, plan, Span{stage, stage}, [](Stage) {});
+    phases[static_cast<std::size_t>(stage)] = counter.phases();
+  }
+  return phases;
+}
+
+}  // namespace cutproof::benchmarks
