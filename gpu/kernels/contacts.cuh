@@ -237,13 +237,14 @@ struct Ball {
   float radius;
 };
 
-// Whether no point of a ball is projected, or touches (kTouchMargin), wherever in the ball it lies. `side`: of the
-// blade, that of all its points when the substep began, or 0 if they were on both. May say no where yes were right.
+// By how much at least the radius of a ball may grow before some point in it is projected, or touches (kTouchMargin),
+// wherever in the ball it lies; not positive: it is not clear. (May be less than there is.) `side`: of the blade, that
+// of all its points when the substep began, or 0 if they were on both.
 //
 // A point over the plate is projected from any distance if it is on the other side than where it began, so keeping away
 // from the plate is not enough: either the whole ball stays on its side, or it keeps clear of all that lies over and
 // under the plate.
-CUTPROOF_DEVICE inline bool is_clear(const Contacts& contacts, const Ball& ball, int side) {
+CUTPROOF_DEVICE inline float room_around(const Contacts& contacts, const Ball& ball, int side) {
   using namespace contacts_detail;
   const RestPoint& rest = ball.rest;
   // Coordinates are rounded a few times each, by units of the greatest number that is in them.
@@ -251,18 +252,24 @@ CUTPROOF_DEVICE inline bool is_clear(const Contacts& contacts, const Ball& ball,
   const auto extent = [](Float3 a) { return fabsf(a.x) + fabsf(a.y) + fabsf(a.z); };
   const float size = rest.h * extent(rest.node) + extent(ball.d);
   const float reach = ball.radius * (1.0f + kRounds) + static_cast<float>(kTouchMargin) * rest.h;
+  const auto least = [](float a, float b) { return a < b || a != a ? a : b; };  // no number, if one of them is none
+  float room = 3.0e38f;
   for (int k = 0; k < contacts.wall_count; ++k) {
     const WallF wall = constant(&contacts.walls[k]);
     const float slack = kRounds * (size + fabsf(wall.offset));
-    if (!(depth_in(wall, rest, ball.d) < -(reach + slack))) return false;
+    room = least(room, -depth_in(wall, rest, ball.d) - (reach + slack));
   }
-  if (contacts.move == nullptr) return true;
+  if (contacts.move == nullptr) return room;
   const PoseF pose = constant(&contacts.move->to);
   const float clear = reach + kRounds * (size + extent(pose.edge));
   const Float3 c = into_frame(pose, rest.from(pose.edge) + ball.d);
-  if (side != 0 && static_cast<float>(side) * c.z > contacts.clearance + clear) return true;
   const Float3 away = from_blade(contacts, c);
-  return sqrtf(away.x * away.x + away.y * away.y) > clear && norm(away) > contacts.clearance + clear;
+  float of_blade = least(sqrtf(away.x * away.x + away.y * away.y) - clear, norm(away) - (contacts.clearance + clear));
+  if (side != 0) of_blade = fmaxf(of_blade, static_cast<float>(side) * c.z - (contacts.clearance + clear));
+  return least(room, of_blade);
+}
+CUTPROOF_DEVICE inline bool is_clear(const Contacts& contacts, const Ball& ball, int side) {
+  return room_around(contacts, ball, side) > 0;
 }
 
 // Friction, or room that is not convex: an iteration can have several fixed points.

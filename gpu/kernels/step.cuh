@@ -170,7 +170,11 @@ struct Group {
   RestCenter center;
   // X - X_g [h] of its particle k.
   CUTPROOF_DEVICE Float3 rest(const DeviceView& w, const Pace& pace, int k) const {
-    return groups_detail::nodes_between(center, coordinates(pace, constant(&w.place_node[head.begin + k])));
+    return rest_of(pace, constant(&w.place_node[head.begin + k]));
+  }
+  // The same of the particle that is at this node.
+  CUTPROOF_DEVICE Float3 rest_of(const Pace& pace, int node) const {
+    return groups_detail::nodes_between(center, coordinates(pace, node));
   }
 };
 CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) {
@@ -236,6 +240,13 @@ CUTPROOF_DEVICE inline Ball ball_around(const Pace& pace, const Group& group, Fl
   return {rest, xyz(base) + Float3{map.row[0].w, map.row[1].w, map.row[2].w}, radius};
 }
 
+// How far at most a map leads a point that is `radius` [h] from the rest centre, along the axis of this row.
+CUTPROOF_DEVICE inline float way_along(Float4 row, float radius) {
+  return fabsf(row.w) + (fabsf(row.x) + fabsf(row.y) + fabsf(row.z)) * radius;
+}
+// No longer a way along any axis than this part of the room leaves it: 1 / √3, less what is rounded.
+inline constexpr float kOfRoom = 0.577f;
+
 // ---- substeps
 
 // [h] A base farther than this from the mean of its group is not used.
@@ -296,8 +307,11 @@ CUTPROOF_DEVICE inline Float3 carried_to(Float3 base, float lost, Float3 predict
   return predicted + (map(r) - lost * (predicted - base));
 }
 
-// Of groups that are resolved: where they are listed, and those of the next substep to be.
-CUTPROOF_DEVICE inline int* listed_in(const DeviceView& w, int substep) { return w.counters->listed + substep % 2; }
+// How many groups of a substep were resolved when an iteration began. Those that are resolved in it are counted with the
+// next one, so that this number stands from one iteration to the next, and may be read ahead.
+CUTPROOF_DEVICE inline int* listed_before(const DeviceView& w, int substep, int iteration) {
+  return &w.counters->listed[substep % 2][iteration % 2];
+}
 
 // The moments of a resolved group. (After its particles have moved, not while they do: sums and projections together
 // would need more registers than there are.)
@@ -314,19 +328,21 @@ CUTPROOF_DEVICE void sum_resolved(const AnyTeam& team, const DeviceView& w, cons
   team.parted(sums).each(team, [&](int n, float sum) { store_moment(w.group_moments, group.index, n, sum); });
 }
 
+// before: the iteration that it is to be resolved in from the first.
 template <class AnyTeam, class Block>
 CUTPROOF_DEVICE void list_resolved(Block& block, const AnyTeam& team, const DeviceView& w, const Pace& pace, int g,
-                                   int substep) {
+                                   int substep, int before) {
   if (!team.leads()) return;
   w.group_resolved[g] = kResolved;
   w.group_touched[g] = 1;
   if (pace.iterations == 0) return;  // nobody asks for the list, or empties it
-  block.store(&w.resolved_groups[block.atomic_add(listed_in(w, substep), 1)], g);
+  block.store(&w.resolved_groups[block.atomic_add(listed_before(w, substep, before), 1)], g);
 }
 
+// iterated: iterations lie between this launch and that which began the substep that ends.
 template <bool kContacts, class Block>
 CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>& team, const DeviceView& w, int g,
-                                 int substep) {
+                                 int substep, bool iterated) {
   // What is needed is asked for first, and not when it is needed: each answer takes as long as the work.
   const Group group = group_of(w, g);
   const GroupHead& head = group.head;
@@ -334,15 +350,25 @@ CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>&
   const Pace pace = constant(&w.pace[body_of_group(w, head)]);
   const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
   const float shared = 1.0f / constant(&w.group_mass[g]).w;
-  block.wait_for_earlier();
   const bool begins = substep == 0, ends = substep == pace.substeps;
-  Map map = {};
+  const int first = team.lane();  // the first of this lane's particles: nearly always the only one
+  Float4 first_start, first_predicted;  // its in the substep that ends
   Float3 last_base;
+  const bool is_older = iterated && !begins;
+  if (is_older) {
+    last_base = xyz(w.group_base[g]);
+    if (first < head.size) {
+      first_start = w.start[head.begin + first];
+      first_predicted = w.predicted[head.begin + first];
+    }
+  }
+  block.wait_for_earlier();
+  Map map = {};
   [[maybe_unused]] int state = kCarried;
   [[maybe_unused]] bool touched = false;
   if (!begins) {
     map = load_map(w.group_map, g);
-    last_base = xyz(w.group_base[g]);
+    if (!is_older) last_base = xyz(w.group_base[g]);
     if constexpr (kContacts) state = w.group_resolved[g];
   }
   if constexpr (kContacts) touched = w.group_touched[g] != 0;
@@ -359,7 +385,8 @@ CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>&
       v = xyz(w.velocity[p]);
       return w.displacement[p];
     }
-    const Float4 start = w.start[o], predicted = w.predicted[o];
+    const bool known = is_older && k == first;
+    const Float4 start = known ? first_start : w.start[o], predicted = known ? first_predicted : w.predicted[o];
     Float3 d = carried_to(last_base, lost, xyz(predicted), map, group.rest(w, pace, k));
     if (state != kCarried) d = xyz(w.position[o]);
     v = pace.decay_per_dt * (d - xyz(start));
@@ -379,8 +406,7 @@ CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>&
       end_impulse(w, w.place_particle[o], pace, pushed);
     }
   };
-  const int first = team.lane();  // the first of this lane's particles: nearly always the only one
-  Float4 of_first;                // its prediction, and what a holder gets of its mass
+  Float4 of_first;  // its prediction, and what a holder gets of its mass
   const float of_each = 1.0f / static_cast<float>(head.holder_count);
   [[maybe_unused]] bool before = false, behind = false;  // the blade, when the substep begins
   team.each(head.size, [&](int k) {
@@ -438,15 +464,16 @@ CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>&
     before = team.any(before);
     behind = team.any(behind);
     const int side = before && behind ? 0 : behind ? -1 : 1;
-    const bool resolve =
-        held.active || !is_clear(contacts, ball_around(pace, group, base_and_reach, 1.0f, Map{}), side);
+    const float room = room_around(contacts, ball_around(pace, group, base_and_reach, 1.0f, Map{}), side);
+    const bool resolve = held.active || !(room > 0);
     if (team.leads()) {
+      w.group_room[g] = room;
       w.group_side[g] = side;
       w.group_resolved[g] = held.active ? kHeld : kCarried;
       if (held.active) w.group_touched[g] = 1;
     }
     if (resolve) {
-      if (!held.active) list_resolved(block, team, w, pace, g, substep);
+      if (!held.active) list_resolved(block, team, w, pace, g, substep, 0);
       team.each(head.size, [&](int k) {
         const int o = head.begin + k;
         const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
@@ -554,7 +581,7 @@ CUTPROOF_DEVICE void begin_frame_kernel(Block& block, const DeviceView& w) {
     w.counters->removed = 0;
     w.counters->debris = 0;
     w.counters->affected = 0;
-    w.counters->listed[0] = 0;
+    *step_detail::listed_before(w, 0, 0) = 0;
     w.counters->regrouped = w.counters->remeasured = w.counters->due_particles = w.counters->due_pairs = 0;
   }
   for (int64_t b = block.first(); b < w.bodies; b += block.stride()) {
@@ -578,12 +605,12 @@ CUTPROOF_KERNEL(begin_frame_kernel);
 
 // Ends the substep before `substep`, if there is one, and begins that one, if the body has it.
 template <bool kContacts, class Block>
-CUTPROOF_DEVICE void start_substep_kernel(Block& block, const DeviceView& w, int substep) {
+CUTPROOF_DEVICE void start_substep_kernel(Block& block, const DeviceView& w, int substep, bool iterated) {
   using namespace step_detail;
   const Team<Block, kParticleTeam> team(block);
   const int groups = w.counters->groups;
   for (int64_t g = team.first(); g < groups; g += team.stride()) {
-    start_group<kContacts>(block, team, w, static_cast<int>(g), substep);
+    start_group<kContacts>(block, team, w, static_cast<int>(g), substep, iterated);
   }
   block.wait_for_earlier();
   for (int64_t k = from_last(block); k < w.counters->loose; k += block.stride()) {
@@ -735,8 +762,8 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
   }
   block.wait_for_earlier();
   if (block.first() == 0) {
-    w.counters->resolved = *listed_in(w, substep);
-    *listed_in(w, substep + 1) = 0;
+    *listed_before(w, substep, iteration + 1) = *listed_before(w, substep, iteration);
+    *listed_before(w, substep + 1, 0) = 0;
   }
 }
 
@@ -755,47 +782,71 @@ struct match_shapes_kernel_object {
 
 namespace step_detail {
 
-// Particle by particle: the one at place o goes from x towards `from` + pull, `from` being its prediction, or x itself
-// in the published way.
+// A particle on its own, before an iteration.
+struct Particle {
+  Float4 predicted, at;
+  Float3 start;                            // with contacts…
+  Float4 pushed, earlier, pushed_earlier;  // … and accelerated
+  int node;
+};
 template <bool kContacts, bool kAccelerated>
-CUTPROOF_DEVICE inline Float3 advance_particle(const DeviceView& w, const Pace& pace, const Contacts& contacts,
-                                               const Iteration& now, int64_t o, Float4 predicted, Float4 at,
-                                               Float3 from, Float3 pull) {
-  const Float3 x = xyz(at);
+CUTPROOF_DEVICE inline Particle particle_at(const DeviceView& w, const Iteration& now, int64_t o) {
+  Particle found;
+  found.predicted = w.predicted[o];
+  found.at = w.position[o];
+  found.node = constant(&w.place_node[o]);
+  if constexpr (kContacts) {
+    found.start = xyz(w.start[o]);
+    found.pushed = w.pushed[o];
+  }
+  if constexpr (kAccelerated) {
+    if (now.combined) found.earlier = w.earlier[o];
+    if constexpr (kContacts) {
+      if (now.combined) found.pushed_earlier = w.pushed_earlier[o];
+    }
+  }
+  return found;
+}
+
+// Particle by particle: the one at place o goes from where it is towards `from` + pull, `from` being its prediction, or
+// where it is in the published way.
+template <bool kContacts, bool kAccelerated>
+CUTPROOF_DEVICE inline void advance_particle(const DeviceView& w, const Pace& pace, const Contacts& contacts,
+                                             const Iteration& now, int64_t o, const Particle& particle, Float3 from,
+                                             Float3 pull) {
+  const Float3 x = xyz(particle.at);
   const Float3 plain = from + now.s * pull;
   Float3 free = plain;
   if constexpr (kAccelerated) {
-    if (now.combined) free = now.combination(plain, x, xyz(w.earlier[o]));
-    if (now.kept) w.earlier[o] = at;
+    if (now.combined) free = now.combination(plain, x, xyz(particle.earlier));
+    if (now.kept) w.earlier[o] = particle.at;
   }
   Float3 next = free;
   if constexpr (kContacts) {
-    const Float4 pushed = w.pushed[o];
-    if (predicted.w == 0) {
+    const float side = particle.predicted.w;
+    if (side == 0) {
       next = x;  // a held particle stays where its grip has put it
     } else {
-      const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
-      const Float3 start = xyz(w.start[o]);
-      next = next_position(contacts, rest, free, predicted.w, start, x);
+      const RestPoint rest = {pace.h, grid_node(pace, particle.node)};
+      next = next_position(contacts, rest, free, side, particle.start, x);
       if constexpr (kAccelerated) {
         // Where several answers are right, the way there decides: touched particles go the plain way.
         if (now.combined && path_matters(contacts)) {
-          const bool touched = contacts_detail::touches(contacts, rest, free, predicted.w) ||
-                               contacts_detail::touches(contacts, rest, plain, predicted.w);
-          if (touched) next = next_position(contacts, rest, plain, predicted.w, start, x);
+          const bool touched = contacts_detail::touches(contacts, rest, free, side) ||
+                               contacts_detail::touches(contacts, rest, plain, side);
+          if (touched) next = next_position(contacts, rest, plain, side, particle.start, x);
         }
       }
     }
-    const Float3 before = xyz(pushed);
+    const Float3 before = xyz(particle.pushed);
     Float3 carried = (now.implicit ? now.s : 1.0f) * before;
     if constexpr (kAccelerated) {
-      if (now.combined) carried = now.combination(carried, before, xyz(w.pushed_earlier[o]));
-      if (now.kept) w.pushed_earlier[o] = pushed;
+      if (now.combined) carried = now.combination(carried, before, xyz(particle.pushed_earlier));
+      if (now.kept) w.pushed_earlier[o] = particle.pushed;
     }
     w.pushed[o] = with_w(carried + (next - free), 0.0f);
   }
-  w.position[o] = with_w(next, at.w);
-  return next;
+  w.position[o] = with_w(next, particle.at.w);
 }
 
 // The first of a group's holders, which do not change in a substep.
@@ -862,7 +913,7 @@ CUTPROOF_DEVICE void resolve(Block& block, const Team<Block, kResolvedTeam>& tea
       w.pushed_earlier[o] = Float4{};
     }
   });
-  list_resolved(block, team, w, pace, g, substep);
+  list_resolved(block, team, w, pace, g, substep, iteration + 1);
 }
 
 // A group, and what of it does not change in a substep.
@@ -888,15 +939,19 @@ CUTPROOF_DEVICE void advance_resolved(Block& block, const Team<Block, kResolvedT
   const Iteration now = iteration_of(pace, iteration);
   const Float3 base = xyz(ahead.base);
   if (begins) resolve<kAccelerated>(block, team, w, group, pace, now, base, substep, iteration);
+  const int first = team.lane();  // of this lane's particles
+  Particle of_first;
+  if (first < head.size) of_first = particle_at<kContacts, kAccelerated>(w, now, head.begin + first);
+  block.wait_for_earlier();  // for the clusters: all else is older
   Rows<Team<Block, kResolvedTeam>> rows;
   team.each(3, [&](int axis) { rows.of(axis) = mean_goal(w, head, ahead.holders, pace.h, ahead.base, axis); });
   const Map goal = rows.all(team);
   team.each(head.size, [&](int k) {
     const int o = head.begin + k;
-    const Float4 predicted = w.predicted[o], at = w.position[o];
-    const Float3 from = now.implicit ? xyz(predicted) : xyz(at);
-    const Float3 pull = (base - from) + goal(group.rest(w, pace, k));
-    advance_particle<kContacts, kAccelerated>(w, pace, contacts, now, o, predicted, at, from, pull);
+    const Particle particle = k == first ? of_first : particle_at<kContacts, kAccelerated>(w, now, o);
+    const Float3 from = now.implicit ? xyz(particle.predicted) : xyz(particle.at);
+    const Float3 pull = (base - from) + goal(group.rest_of(pace, particle.node));
+    advance_particle<kContacts, kAccelerated>(w, pace, contacts, now, o, particle, from, pull);
   });
   sum_resolved(team, w, group, pace, base);
 }
@@ -910,10 +965,10 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
   const GroupHead& head = ahead.group.head;
   const Float4 base = ahead.base;
   const Pace pace = constant(&w.pace[body_of_group(w, head)]);
-  const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
-  [[maybe_unused]] int side = 0, state = kCarried;
+  [[maybe_unused]] float room = 0;
+  [[maybe_unused]] int state = kCarried;
   if constexpr (kContacts) {
-    side = w.group_side[g];
+    room = w.group_room[g];
     state = w.group_resolved[g];
   }
   block.wait_for_earlier();  // for the clusters: all else is older
@@ -962,11 +1017,21 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
   });
   if constexpr (kContacts) {
     if (state == kHeld) return false;
-    const auto clear = [&](Rows<Team<Block, kRows>>& candidate) {
-      return is_clear(contacts, ball_around(pace, ahead.group, base, 1.0f - lost_next, candidate.all(team)), side);
-    };
-    // A contact with either candidate of an accelerated iteration means the plain way.
-    if (!clear(plain) || (now.combined && !clear(next))) return true;
+    // A contact with either candidate of an accelerated iteration means the plain way. Most groups are so far from any
+    // that how far each axis leads them says enough.
+    bool near = false;
+    team.each(3, [&](int axis) {
+      near = near || !(way_along(plain.of(axis), head.radius) <= kOfRoom * room) ||
+             (now.combined && !(way_along(next.of(axis), head.radius) <= kOfRoom * room));
+    });
+    if (team.any(near)) {
+      const Contacts contacts = contacts_of(w, pace, substep);
+      const int side = w.group_side[g];
+      const auto clear = [&](Rows<Team<Block, kRows>>& candidate) {
+        return is_clear(contacts, ball_around(pace, ahead.group, base, 1.0f - lost_next, candidate.all(team)), side);
+      };
+      if (!clear(plain) || (now.combined && !clear(next))) return true;
+    }
   }
   const bool more = iteration + 1 < pace.iterations;
   const float per_h = pace.per_h;
@@ -991,23 +1056,24 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
   return false;
 }
 
-template <bool kContacts, bool kAccelerated>
-CUTPROOF_DEVICE inline void advance_loose(const DeviceView& w, int o, int substep, int iteration) {
+template <bool kContacts, bool kAccelerated, class Block>
+CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int substep, int iteration) {
   if (o < 0) return;
   const int p = w.place_particle[o];
   const Pace pace = constant(&w.pace[body_index(w, p)]);
   if (!takes_part(pace, substep, iteration)) return;
   const Iteration now = iteration_of(pace, iteration);
-  const Float4 predicted = w.predicted[o], at = w.position[o];
-  const Float3 from = now.implicit ? xyz(predicted) : xyz(at);
+  const Particle particle = particle_at<kContacts, kAccelerated>(w, now, o);
+  const Float3 at = xyz(particle.at), from = now.implicit ? xyz(particle.predicted) : at;
   // Mean of the goals, less `from`: small numbers, so that summing them costs no digits of d.
-  const int clusters = w.membership_count[p];
-  Float3 pull = xyz(at) - from;  // a particle in no cluster stays where it is
+  const int clusters = w.membership_count[p], begin = w.membership_begin[p], end = w.membership_begin[p + 1];
+  const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
+  block.wait_for_earlier();   // for the clusters: all else is older
+  Float3 pull = at - from;  // a particle in no cluster stays where it is
   if (clusters > 0) {
-    const Coordinates c = coordinates(pace, constant(&w.place_node[o]));
+    const Coordinates c = coordinates(pace, particle.node);
     Float3 sum;
-    const int end = w.membership_begin[p + 1];
-    for (int k = w.membership_begin[p]; k < end; ++k) {
+    for (int k = begin; k < end; ++k) {
       const int slot = w.memberships[k];
       if (slot < 0) continue;
       const Float3 r = pace.h * nodes_from_rest_center(w, c, slot);
@@ -1020,8 +1086,7 @@ CUTPROOF_DEVICE inline void advance_loose(const DeviceView& w, int o, int subste
     }
     pull = (1.0f / static_cast<float>(clusters)) * sum;
   }
-  const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
-  advance_particle<kContacts, kAccelerated>(w, pace, contacts, now, o, predicted, at, from, pull);
+  advance_particle<kContacts, kAccelerated>(w, pace, contacts, now, o, particle, from, pull);
 }
 
 }  // namespace step_detail
@@ -1032,13 +1097,13 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
   using namespace step_detail;
   const Team<Block, kRows> rows(block);
   const Team<Block, kResolvedTeam> team(block);
-  const int groups = w.counters->groups;
+  const int groups = w.counters->groups, loose = w.counters->loose;
+  const int resolved = kContacts ? *listed_before(w, substep, iteration) : 0;
   // Whole warps at a time: groups that turn out to be no longer clear are everybody's, as are those that were resolved
   // before, with which the last warps begin. All of them in one place, because there is much to it.
   const int64_t in_warp = rows.first() % (team.kLanes / rows.kLanes);
   int64_t row = rows.first(), listed = from_last(team);
   [[maybe_unused]] unsigned found = 0;
-  [[maybe_unused]] int resolved = -1;
   while (true) {
     [[maybe_unused]] bool begins = false;
     [[maybe_unused]] int g = -1;
@@ -1051,12 +1116,7 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
       if constexpr (kContacts) found = team.found(touches && rows.leads());
       row += rows.stride();
       continue;
-    } else if constexpr (kContacts) {
-      if (resolved < 0) {
-        block.wait_for_earlier();
-        resolved = w.counters->resolved;
-      }
-      if (listed >= resolved) break;
+    } else if (listed < resolved) {
       g = block.load(&w.resolved_groups[listed]);
       listed += team.stride();
     } else {
@@ -1066,18 +1126,16 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
       advance_resolved<kContacts, kAccelerated>(block, team, w, group_ahead(w, g), substep, iteration, begins);
     }
   }
-  block.wait_for_earlier();
-  // Before those, the threads with loose particles.
-  const int loose = w.counters->loose;
   if (loose == 0) return;
+  // Before those, the threads with loose particles.
   int64_t k = from_last(block);
   if constexpr (kContacts) {
     const auto teams = static_cast<unsigned>(team.stride());  // a remainder of 64 bits takes a hundred instructions
-    k -= static_cast<int64_t>(static_cast<unsigned>(w.counters->resolved) % teams) * team.kLanes;
+    k -= static_cast<int64_t>(static_cast<unsigned>(resolved) % teams) * team.kLanes;
     if (k < 0) k += block.stride();
   }
   for (; k < loose; k += block.stride()) {
-    advance_loose<kContacts, kAccelerated>(w, w.loose_places[k], substep, iteration);
+    advance_loose<kContacts, kAccelerated>(block, w, w.loose_places[k], substep, iteration);
   }
 }
 
@@ -1087,8 +1145,8 @@ struct start_substep_kernel_object {
   static constexpr int kMaxThreads = 128, kMinBlocks = 4;
   static constexpr bool kReadsAhead = true;
   template <class Block>
-  CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep) const {
-    start_substep_kernel<kContacts>(block, w, substep);
+  CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, bool iterated) const {
+    start_substep_kernel<kContacts>(block, w, substep, iterated);
   }
 };
 template <bool kContacts, bool kAccelerated, int kRows>
@@ -1122,15 +1180,16 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
     }
     on.teams(advance_kernel_object<kContacts, kAccelerated, kRowTeam>{}, kParticleTeam, teams, w, substep, iteration);
   };
+  const bool iterated = plan.iterations > 0;
   for (int substep = 0; substep < plan.substeps; ++substep) {
-    launcher.teams(start_substep_kernel_object<kContacts>{}, kParticleTeam, teams, w, substep);
+    launcher.teams(start_substep_kernel_object<kContacts>{}, kParticleTeam, teams, w, substep, iterated);
     for (int iteration = 0; iteration < plan.iterations; ++iteration) {
       launcher.blocks(match_shapes_kernel_object<Method>{}, (w.slots_expected + kTeams - 1) / kTeams, kMatchThreads,
                       kMatchShared, w, substep, iteration);
       advance(launcher, substep, iteration);
     }
   }
-  launcher.teams(start_substep_kernel_object<kContacts>{}, kParticleTeam, teams, w, plan.substeps);
+  launcher.teams(start_substep_kernel_object<kContacts>{}, kParticleTeam, teams, w, plan.substeps, iterated);
 }
 
 template <int Method, class Launcher>

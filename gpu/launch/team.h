@@ -126,7 +126,7 @@ class Team {
     return value;
   }
   CUTPROOF_DEVICE bool any(bool value) const {
-    if constexpr (Block::on_device) return block_.ballot(mask(), value) != 0;
+    if constexpr (kLanes > 1) return block_.ballot(mask(), value) != 0;
     return value;
   }
   // What the lane that has item k says.

@@ -181,8 +181,8 @@ struct Counters {
   int remeasured;          // groups: clusters whose lists of groups are made anew
   int due_particles;       // groups: particles that get a new place…
   int due_pairs;           // … and in how many clusters they are
-  int listed[2];           // step, by turns of substeps: how many groups are listed in DeviceView::resolved_groups
-  int resolved;            // step: of these, how many were when the iteration began
+  int listed[2][2];        // step, by turns of substeps: how many groups are listed in DeviceView::resolved_groups; by
+                           // turns of iterations: when this one began, and by now
   int scratch[8];
 };
 
