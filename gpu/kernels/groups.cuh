@@ -19,6 +19,9 @@ inline constexpr int kGroupTeam = 8;
 inline constexpr int kMemberTeam = 32;
 // Teams that share a cluster where each of its members is looked at alone.
 inline constexpr int kShares = 8;
+// Where a cluster is dealt out: threads, and how many members have room in their shared memory.
+inline constexpr int kDealThreads = 256;
+inline constexpr int kMostDealt = 2048;
 
 namespace groups_detail {
 
@@ -131,13 +134,26 @@ CUTPROOF_DEVICE void find_changed_clusters_kernel(Block& block, const DeviceView
   for (int64_t i = team.first(); i < c.slots_used; i += team.stride()) {
     const int s = static_cast<int>(i);
     if (w.regroup[s] == 0) continue;
+    const int begin = w.slot_begin[s], size = w.slot_size[s];
     int particles = 0, pairs = 0;
-    team.each(w.slot_size[s], [&](int k) {
-      const HolderList list = holders_of(w, w.members[w.slot_begin[s] + k]);
-      if (list.begin[0] != s) return;
-      ++particles;
-      pairs += list.size;
-    });
+    for (int tile = 0; tile < size; tile += kAtOnce * team.kLanes) {
+      int member[kAtOnce], count[kAtOnce], first[kAtOnce];
+      for (int t = 0; t < kAtOnce; ++t) {
+        const int k = tile + t * team.kLanes + team.lane();
+        member[t] = w.members[begin + (k < size ? k : 0)];
+        if (k >= size) member[t] = -1;
+      }
+      for (int t = 0; t < kAtOnce; ++t) {
+        const HolderList list = holders_of(w, member[t] < 0 ? 0 : member[t]);
+        count[t] = list.size;
+        first[t] = member[t] < 0 ? -1 : list.begin[0];
+      }
+      for (int t = 0; t < kAtOnce; ++t) {
+        if (first[t] != s) continue;
+        ++particles;
+        pairs += count[t];
+      }
+    }
     particles = team.total(particles);
     pairs = team.total(pairs);
     if (!team.leads()) continue;
@@ -148,8 +164,8 @@ CUTPROOF_DEVICE void find_changed_clusters_kernel(Block& block, const DeviceView
 }
 CUTPROOF_KERNEL(find_changed_clusters_kernel);
 
-// Groups and loose particles of changed clusters are no more. By its first holder: whoever's clusters have changed had,
-// as all of its group, a first one that has.
+// Groups and loose particles of changed clusters are no more. By its first holder, in whose list it is: whoever's clusters
+// have changed had, as all of its group, a first one that has.
 template <class Block>
 CUTPROOF_DEVICE void dissolve_groups_kernel(Block& block, const DeviceView& w) {
   using namespace groups_detail;
@@ -173,12 +189,14 @@ CUTPROOF_DEVICE void dissolve_groups_kernel(Block& block, const DeviceView& w) {
       class_size(w)[begin + k] = 0;
       block.store(&entry_of(w)[w.members[begin + k]], -1);
     });
+    if (whole) continue;
+    const ClusterHead head = w.cluster_head[s];  // as it was when groups were made
+    team.each(head.group_count, [&](int k) {
+      const int g = w.cluster_groups[head.group_begin + k].index;
+      if (w.holders[w.group_head[g].holder_begin].index == s) w.group_head[g].size = 0;
+    });
   }
   if (whole) return;
-  for (int64_t g = block.first(); g < c.groups; g += block.stride()) {
-    const GroupHead head = w.group_head[g];
-    if (head.size > 0 && w.regroup[w.holders[head.holder_begin].index] != 0) w.group_head[g].size = 0;
-  }
   for (int64_t k = block.first(); k < c.loose; k += block.stride()) {
     const int o = w.loose_places[k];
     if (o < 0) continue;
@@ -233,12 +251,14 @@ CUTPROOF_DEVICE void find_classes_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL(find_classes_kernel);
 
-// Deals the classes of each cluster out to groups, and gives places to their particles.
+// Deals the classes of each cluster out to groups, and gives places to their particles. A block for each cluster, whose
+// lists are in shared memory, unless there are more than kMostDealt members.
 template <class Block>
 CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
   using namespace groups_detail;
-  const Team<Block, kMemberTeam> team(block);
   Counters& counters = *w.counters;
+  int* const next = block.template shared<int>(3);          // place, group and pair of a tile's first class
+  int* const shared = block.template shared<int>(3 * kMostDealt);
   const bool whole = counters.groups_whole != 0;
   if (whole) {
     for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
@@ -251,71 +271,65 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
     }
   }
   const int clusters = whole ? counters.slots_used : counters.regrouped;
-  for (int64_t i = team.first(); i < clusters; i += team.stride()) {
-    const int s = whole ? static_cast<int>(i) : changed(w)[i], size = w.slot_size[s], begin = w.slot_begin[s];
+  for (int i = block.index(); i < clusters; i += block.count()) {
+    const int s = whole ? i : changed(w)[i], size = w.slot_size[s], begin = w.slot_begin[s];
     if (size == 0) continue;
     const int* const members = w.members + begin;
-    const int* const classes = table(w);
-    int* const sizes = class_size(w);
-    // The class of member k if it is this cluster's to deal out, else -1.
-    const auto entry_at = [&](int k, int& p) {
-      p = k < size ? members[k] : -1;
-      const int entry = p < 0 ? -1 : entry_of(w)[p];
-      return entry >= begin && entry < begin + size ? entry : -1;
+    const int* const classes = table(w) + begin;
+    const bool fits = size <= kMostDealt;
+    // By member: the entry of its class in `classes`, -1 if that is not this cluster's to deal out, and how many of its
+    // class come before it. By entry: how many the class has.
+    const auto looked_up = [&](int p) {
+      const int entry = entry_of(w)[p] - begin;
+      return entry >= 0 && entry < size ? entry : -1;
     };
-
-    // Ranks, tile by tile in ascending order; the next tile is on its way while one is counted.
-    int p = -1, entry = entry_at(team.lane(), p);
-    for (int tile = 0; tile < size; tile += team.kLanes) {
-      int next_p = -1;
-      const int next_entry = entry_at(tile + team.kLanes + team.lane(), next_p);
-      const auto equals = team.equals(entry);
-      int before = 0;
-      if (entry >= 0 && equals.before == 0) before = block.atomic_add(&sizes[entry], equals.count);
-      before = team.from(equals.first, before);
-      if (entry >= 0) rank_of(w)[p] = before + equals.before;
-      p = next_p;
-      entry = next_entry;
-    }
-    team.sync();
-
-    // Places and numbers for all classes of the cluster at once, then for each of them in turn.
-    const auto class_at = [&](int k, int& first) {  // how many particles it has
-      first = k < size ? block.load(&classes[begin + k]) - 1 : -1;
-      return first >= 0 ? block.load(&sizes[begin + k]) : 0;
+    const auto entry_at = [&](int k) { return fits ? shared[k] : looked_up(members[k]); };
+    const auto rank_at = [&](int k) -> int& {
+      return fits ? shared[kMostDealt + k] : rank_of(w)[members[k]];
     };
-    int places = 0, groups = 0, pairs = 0;
-    team.each(size, [&](int k) {
-      int first = -1;
-      const int count = class_at(k, first);
-      if (count == 0) return;
-      places += count;
-      groups += groups_of(count);
-      pairs += groups_of(count) * holders_of(w, first).size;
-    });
-    places = team.total(places);
-    groups = team.total(groups);
-    pairs = team.total(pairs);
-    int next_place = 0, next_group = 0, next_pair = 0;
-    if (team.leads()) {
-      next_place = block.atomic_add(&counters.placed, places);
-      next_group = block.atomic_add(&counters.groups, groups);
-      next_pair = block.atomic_add(&counters.pairs, pairs);
+    int* const sizes = fits ? shared + 2 * kMostDealt : class_size(w) + begin;
+    if (fits) {
+      for (int k = block.thread(); k < size; k += block.size()) {
+        shared[k] = looked_up(members[k]);
+        sizes[k] = 0;
+      }
+      block.sync();
     }
-    next_place = team.from(0, next_place);
-    next_group = team.from(0, next_group);
-    next_pair = team.from(0, next_pair);
-    for (int tile = 0; tile < size; tile += team.kLanes) {
-      int first = -1;
-      const int count = class_at(tile + team.lane(), first);
-      if (!team.any(count > 0)) continue;
+
+    // Ranks, tile by tile in ascending order.
+    const Team<Block, kMemberTeam> team(block);
+    if (block.thread() < team.kLanes) {
+      for (int tile = 0; tile < size; tile += team.kLanes) {
+        const int k = tile + team.lane(), entry = k < size ? entry_at(k) : -1;
+        const auto equals = team.equals(entry);
+        int before = 0;
+        if (entry >= 0 && equals.before == 0) before = block.atomic_add(&sizes[entry], equals.count);
+        before = team.from(equals.first, before);
+        if (entry >= 0) rank_at(k) = before + equals.before;
+      }
+    }
+    block.sync();
+
+    // Places and numbers, for as many classes at once as there are threads.
+    for (int tile = 0; tile < size; tile += block.size()) {
+      const int entry = tile + block.thread();
+      const int first = entry < size ? block.load(&classes[entry]) - 1 : -1;  // a particle of the class
+      const int count = first >= 0 ? block.load(&sizes[entry]) : 0;
       const int own = groups_of(count), holder_count = count > 0 ? holders_of(w, first).size : 0;
-      const int place_begin = next_place + team.total_before(count);
-      const int group_begin = next_group + team.total_before(own);
-      const int pair_begin = next_pair + team.total_before(own * holder_count);
-      next_place += team.total(count);
-      next_group += team.total(own);
-      next_pair += team.total(own * holder_count);
+      int places = 0, groups = 0, pairs = 0;
+      int place_begin = block.exclusive_scan(count, places);
+      int group_begin = block.exclusive_scan(own, groups);
+      int pair_begin = block.exclusive_scan(own * holder_count, pairs);
+      if (block.thread() == 0) {
+        next[0] = block.atomic_add(&counters.placed, places);
+        next[1] = block.atomic_add(&counters.groups, groups);
+        next[2] = block.atomic_add(&counters.pairs, pairs);
+      }
+      block.sync();
+      place_begin += next[0];
+      group_begin += next[1];
+      pair_begin += next[2];
+      block.sync();  // before the next tile has others
       if (count == 0) continue;
       w.class_data[first] = static_cast<unsigned long long>(group_begin) << 32 | static_cast<unsigned>(place_begin);
       for (int chunk = 0; chunk < own; ++chunk) {
@@ -330,30 +344,22 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
         w.group_head[group_begin + chunk] = head;
       }
     }
-    team.sync();
+    block.sync();
 
-    for (int tile = 0; tile < size; tile += team.kLanes) {
-      int own = -1;
-      const int its = entry_at(tile + team.lane(), own);
-      int o = -1;
-      bool loose = false;
-      if (its >= 0) {
-        const int rank = rank_of(w)[own];
-        const unsigned long long data = w.class_data[block.load(&classes[its]) - 1];
-        o = static_cast<int>(data & 0xffffffffu) + rank;
-        loose = rank >= grouped_of(block.load(&sizes[its]));
-        w.group_at[own] = loose                      ? int{kLoose}
-                          : rank % kMostInGroup == 0 ? static_cast<int>(data >> 32) + rank / kMostInGroup
-                                                     : int{kInside};
-        place(w, own, o);
-      }
-      int found = 0;
-      const int before = team.rank(loose, found);
-      int next = 0;
-      if (found > 0 && team.leads()) next = block.atomic_add(&counters.loose, found);
-      next = team.from(0, next);
-      if (loose) w.loose_places[next + before] = o;
+    for (int k = block.thread(); k < size; k += block.size()) {
+      const int entry = entry_at(k);
+      if (entry < 0) continue;
+      const int p = members[k], rank = rank_at(k);
+      const unsigned long long data = w.class_data[block.load(&classes[entry]) - 1];
+      const int o = static_cast<int>(data & 0xffffffffu) + rank;
+      const bool loose = rank >= grouped_of(block.load(&sizes[entry]));
+      w.group_at[p] = loose                      ? int{kLoose}
+                      : rank % kMostInGroup == 0 ? static_cast<int>(data >> 32) + rank / kMostInGroup
+                                                 : int{kInside};
+      place(w, p, o);
+      if (loose) w.loose_places[block.atomic_add(&counters.loose, 1)] = o;
     }
+    block.sync();  // before the next cluster's lists
   }
 }
 CUTPROOF_KERNEL(deal_out_groups_kernel);
@@ -362,41 +368,54 @@ CUTPROOF_KERNEL(deal_out_groups_kernel);
 template <class Block>
 CUTPROOF_DEVICE void measure_groups_kernel(Block& block, const DeviceView& w) {
   using namespace groups_detail;
-  const Team<Block, kGroupTeam> team(block);
+  using Lanes = Team<Block, kGroupTeam>;
+  const Lanes team(block);
+  // Of a lane's own particles, which are asked for once.
+  constexpr int kEach = kMostInGroup / Lanes::kLanes;
+  struct Own {
+    Coordinates node;
+    float mass;  // what each holder gets of it
+  };
   for (int64_t i = w.counters->groups_before + team.first(); i < w.counters->groups; i += team.stride()) {
     const int g = static_cast<int>(i);
     GroupHead head = w.group_head[g];
     const int first = w.place_particle[head.begin];
     const BodyConstants& body = w.body[head.body];
-    const Coordinates base = coordinates(body, w.node[first]);
-    RestCenter center = {base.i, base.j, base.k, 0, 0, 0};
-    const auto rest = [&](int k) { return nodes_between(center, coordinates(body, w.place_node[head.begin + k])); };
     const float of_each = 1.0f / static_cast<float>(head.holder_count);
-    const auto mass = [&](int k) {  // what each holder gets of it
-      return of_each * w.displacement[w.place_particle[head.begin + k]].w;
+    Own own[kEach];
+    const auto each = [&](auto visit) {  // visit(k, own)
+      for (int n = 0; n < kEach; ++n) {
+        const int k = n * team.kLanes + team.lane();
+        if (k < head.size) visit(k, own[n]);
+      }
     };
+    each([&](int k, Own& of) {
+      of.node = coordinates(body, w.place_node[head.begin + k]);
+      of.mass = of_each * w.displacement[w.place_particle[head.begin + k]].w;
+    });
+    const Coordinates base = coordinates(body, w.place_node[head.begin]);
+    RestCenter center = {base.i, base.j, base.k, 0, 0, 0};
     // Twice: what the first centre is off by is taken out.
     for (int round = 0; round < 2; ++round) {
-      typename Team<Block, kGroupTeam>::template Sums<4> sums;
-      team.each(head.size, [&](int k) {
-        const Float3 r = rest(k);
-        const float m = mass(k);
+      typename Lanes::template Sums<4> sums;
+      each([&](int k, const Own& of) {
+        const Float3 r = nodes_between(center, of.node);
         float* const sum = sums.of(k);
-        sum[0] += m * r.x;
-        sum[1] += m * r.y;
-        sum[2] += m * r.z;
-        sum[3] += m;
+        sum[0] += of.mass * r.x;
+        sum[1] += of.mass * r.y;
+        sum[2] += of.mass * r.z;
+        sum[3] += of.mass;
       });
       const auto total = team.total(sums);
       center.x += total.v[0] / total.v[3];
       center.y += total.v[1] / total.v[3];
       center.z += total.v[2] / total.v[3];
     }
-    typename Team<Block, kGroupTeam>::template Sums<10> sums;
+    typename Lanes::template Sums<10> sums;
     float farthest = 0, nearest = -INFINITY;  // less the square of the least distance
-    team.each(head.size, [&](int k) {
-      const Float3 r = rest(k);
-      add_masses(sums.of(k), mass(k), r);
+    each([&](int k, const Own& of) {
+      const Float3 r = nodes_between(center, of.node);
+      add_masses(sums.of(k), of.mass, r);
       farthest = fmaxf(farthest, dot(r, r));
       nearest = fmaxf(nearest, -dot(r, r));
     });
@@ -404,8 +423,8 @@ CUTPROOF_DEVICE void measure_groups_kernel(Block& block, const DeviceView& w) {
     farthest = team.greatest(farthest);
     nearest = team.greatest(nearest);
     int middle = head.size;  // the first of the nearest
-    team.each(head.size, [&](int k) {
-      const Float3 r = rest(k);
+    each([&](int k, const Own& of) {
+      const Float3 r = nodes_between(center, of.node);
       if (-dot(r, r) == nearest && k < middle) middle = k;
     });
     head.middle = -static_cast<int>(team.greatest(-static_cast<float>(middle)));
@@ -449,28 +468,49 @@ CUTPROOF_DEVICE void measure_clusters_kernel(Block& block, const DeviceView& w) 
     const int list_begin = (w.slot_begin[s] + kLeastInGroup - 1) / kLeastInGroup;
     int groups = 0, loose = 0;
     typename Team<Block, kMemberTeam>::template Sums<10> sums;
-    for (int tile = 0; tile < size; tile += team.kLanes) {
-      const int k = tile + team.lane();
-      int at = kInside;
-      if (k < size) {
-        const int p = members[k];
-        at = w.group_at[p];
-        const Float3 r = nodes_between(center, coordinates(body, w.node[p]));
-        add_masses(sums.of(k), w.displacement[p].w / static_cast<float>(w.membership_count[p]), r);
+    // Several tiles at once: each of these steps waits for what the one before has asked for.
+    for (int tile = 0; tile < size; tile += kAtOnce * team.kLanes) {
+      int member[kAtOnce], at[kAtOnce], node[kAtOnce], share[kAtOnce], place[kAtOnce];
+      float mass[kAtOnce];
+      for (int t = 0; t < kAtOnce; ++t) {
+        const int k = tile + t * team.kLanes + team.lane();
+        member[t] = members[k < size ? k : 0];
       }
-      int found = 0;
-      const int before = team.rank(at == kLoose, found);
-      if (at == kLoose) w.cluster_loose[w.slot_begin[s] + loose + before] = w.place_of[members[k]];
-      loose += found;
-      const int group = groups + team.rank(at >= 0, found);
-      groups += found;
-      if (at < 0) continue;
-      const Offset to = offset_between(w.group_center[at], center, at);
-      w.cluster_groups[list_begin + group] = to;
+      for (int t = 0; t < kAtOnce; ++t) {
+        const int p = member[t];
+        at[t] = tile + t * team.kLanes + team.lane() < size ? w.group_at[p] : int{kInside};
+        node[t] = w.node[p];
+        mass[t] = w.displacement[p].w;
+        share[t] = w.membership_count[p];
+        place[t] = w.place_of[p];
+      }
+      Offset to[kAtOnce];
+      GroupHead head[kAtOnce];
+      for (int t = 0; t < kAtOnce; ++t) {
+        if (at[t] < 0) continue;
+        to[t] = offset_between(w.group_center[at[t]], center, at[t]);
+        if (!whole) head[t] = w.group_head[at[t]];
+      }
+      for (int t = 0; t < kAtOnce; ++t) {
+        const int k = tile + t * team.kLanes + team.lane();
+        if (k < size) {
+          const Float3 r = nodes_between(center, coordinates(body, node[t]));
+          add_masses(sums.of(k), mass[t] / static_cast<float>(share[t]), r);
+        }
+        int found = 0;
+        const int before = team.rank(at[t] == kLoose, found);
+        if (at[t] == kLoose) w.cluster_loose[w.slot_begin[s] + loose + before] = place[t];
+        loose += found;
+        const int group = groups + team.rank(at[t] >= 0, found);
+        groups += found;
+        if (at[t] >= 0) w.cluster_groups[list_begin + group] = to[t];
+      }
       if (whole) continue;
-      const GroupHead head = w.group_head[at];
-      for (int h = head.holder_begin; h < head.holder_begin + head.holder_count; ++h) {
-        if (w.holders[h].index == s) w.holders[h] = {to.x, to.y, to.z, s};
+      for (int t = 0; t < kAtOnce; ++t) {
+        if (at[t] < 0) continue;
+        for (int h = head[t].holder_begin; h < head[t].holder_begin + head[t].holder_count; ++h) {
+          if (w.holders[h].index == s) w.holders[h] = {to[t].x, to[t].y, to[t].z, s};
+        }
       }
     }
     const auto total = team.total(sums);
@@ -491,7 +531,8 @@ CUTPROOF_ENQUEUE void enqueue_groups(Launcher& launcher, const DeviceView& w) {
     stale.teams(find_changed_clusters_kernel_object{}, kMemberTeam, w.slots_expected, w);
     stale.teams(dissolve_groups_kernel_object{}, kMemberTeam, w.slots_expected, w);
     stale.teams(find_classes_kernel_object{}, kMemberTeam, w.slots_expected, w);
-    stale.teams(deal_out_groups_kernel_object{}, kMemberTeam, w.slots_expected, w);
+    stale.blocks(deal_out_groups_kernel_object{}, w.slots_expected, kDealThreads,
+                 (3 * kMostDealt + 4) * sizeof(int), w);
     stale.teams(measure_groups_kernel_object{}, kGroupTeam, w.group_capacity, w);
     stale.teams(measure_clusters_kernel_object{}, kMemberTeam, w.slots_expected, w);
     stale.clear(&c->groups_whole, sizeof(int));
