@@ -11,8 +11,6 @@
 // cluster c lies at X_i + (t_c - T_c) + (R_c - I)(X_i - T_c). A body at rest or moved as a whole is then reproduced
 // exactly: d is the same everywhere, all moments about bases are zero, and R_c is I to the last bit.
 #pragma once
-#include <bit>
-
 #include "gpu/kernels/contacts.cuh"
 #include "gpu/kernels/float3.h"
 #include "gpu/kernels/groups.cuh"
@@ -331,257 +329,149 @@ CUTPROOF_DEVICE void sum_resolved(const AnyTeam& team, const DeviceView& w, cons
 }
 
 // before: the iteration that it is to be resolved in from the first.
-template <class Block>
-CUTPROOF_DEVICE void list_resolved(Block& block, const DeviceView& w, const Pace& pace, int g, int substep,
-                                   int before) {
+template <class AnyTeam, class Block>
+CUTPROOF_DEVICE void list_resolved(Block& block, const AnyTeam& team, const DeviceView& w, const Pace& pace, int g,
+                                   int substep, int before) {
+  if (!team.leads()) return;
   w.group_resolved[g] = kResolved;
   w.group_touched[g] = 1;
   if (pace.iterations == 0) return;  // nobody asks for the list, or empties it
   block.store(&w.resolved_groups[block.atomic_add(listed_before(w, substep, before), 1)], g);
 }
 
-// Groups that a block starts together: particle by particle, each thread one of them, whosever it is; then sum by sum;
-// then group by group.
-inline constexpr int kTogether = 8, kStartThreads = 128, kMostTogether = kTogether * kMostInGroup;
-struct Together {
-  // By group, from the block's first.
-  int from[kTogether + 1];                // whose the block's particles are: from[n] up to from[n + 1] are of group n
-  int active[kTogether];                  // whether its body has this substep
-  int sides[kTogether];                   // of the blade, on which its particles stand: kBefore, kBehind
-  int reach[kTogether];                   // the greatest |e|² [m²], as the bits of a float that is not negative
-  int resolve[kTogether];
-  float sum[kTogether][12];               // of e, in the order of GroupSums
-  Float3 base[kTogether];
-  // By particle, axis by axis.
-  float at[3][kMostTogether];             // where it is predicted
-  float rest[3][kMostTogether];           // r
-  float weight[kMostTogether];            // what a holder gets of its mass
-  float mass_e[3][kMostTogether];         // that times e…
-  float mass_e_per_h[3][kMostTogether];   // … and over h
-
-  CUTPROOF_DEVICE int group_of(int j) const {
-    int n = 0;
-    while (j >= from[n + 1]) ++n;
-    return n;
-  }
-  CUTPROOF_DEVICE Float3 predicted(int j) const { return {at[0][j], at[1][j], at[2][j]}; }
-};
-enum : int { kBefore = 1, kBehind = 2 };  // Together::sides
-enum : int { kBegins = 1, kEnds = 2 };    // Together::active
-inline constexpr std::size_t kTogetherShared = (sizeof(Together) + 15) / 16 * 16;
-
-CUTPROOF_DEVICE inline int bits_of(float value) {
-#if defined(__CUDA_ARCH__)
-  return __float_as_int(value);
-#else
-  return std::bit_cast<int>(value);
-#endif
-}
-CUTPROOF_DEVICE inline float float_of(int bits) {
-#if defined(__CUDA_ARCH__)
-  return __int_as_float(bits);
-#else
-  return std::bit_cast<float>(bits);
-#endif
-}
-
-// e of the block's particle j of group n, for the sums.
-CUTPROOF_DEVICE inline void put_moved(Together& all, int j, Float3 e, float per_h) {
-  const Float3 e_per_h = per_h * e;
-  for (int axis = 0; axis < 3; ++axis) {
-    all.mass_e[axis][j] = all.weight[j] * e[axis];
-    all.mass_e_per_h[axis][j] = all.weight[j] * e_per_h[axis];
-  }
-}
-// store(n, m, sum m of group n) for groups that `wanted` names; each a thread's, particle after particle.
-template <class Block, class Wanted, class Store>
-CUTPROOF_DEVICE void sum_together(const Block& block, const Together& all, int count, Wanted wanted, Store store) {
-  for (int t = block.thread(); t < 12 * count; t += block.size()) {
-    const int n = t / 12, m = t % 12, axis = m / 4, k = m % 4;
-    if (!wanted(n)) continue;
-    const float* const of = k < 3 ? all.mass_e_per_h[axis] : all.mass_e[axis];
-    float sum = 0;
-    for (int j = all.from[n]; j < all.from[n + 1]; ++j) sum += k < 3 ? of[j] * all.rest[k][j] : of[j];
-    store(n, m, sum);
-  }
-}
-
-// Ends the substep before for particle k of a group, and predicts. It is the block's particle j; `sides`: where it stands.
-template <bool kContacts>
-CUTPROOF_DEVICE void start_particle(const DeviceView& w, int g, int k, int substep, Together& all, int j, int& sides) {
+template <bool kContacts, class Block>
+CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>& team, const DeviceView& w, int g,
+                                 int substep) {
+  // What is needed is asked for first, and not when it is needed: each answer takes as long as the work.
   const Group group = group_of(w, g);
   const GroupHead& head = group.head;
+  if (head.size == 0) return;
   const Pace pace = constant(&w.pace[body_of_group(w, head)]);
-  const int o = head.begin + k;
-  const int node = constant(&w.place_node[o]);
-  const Float3 r = group.rest_of(pace, node);
-  Float4 d;  // displacement and mass
-  Float3 v;
-  [[maybe_unused]] const bool touched = kContacts && w.group_touched[g] != 0;
-  if (substep == 0) {
-    const int p = w.place_particle[o];
-    d = w.displacement[p];
-    v = xyz(w.velocity[p]);
-  } else {
-    const Float4 start = w.start[o];
-    const Float3 predicted = xyz(w.predicted[o]), base = xyz(w.group_base[g]);
-    const Map map = pace.iterations > 0 ? load_map(w.group_map, g) : Map{};
-    const int state = kContacts ? w.group_resolved[g] : int{kCarried};
-    Float3 x = carried_to(base, lost_fraction(pace, pace.iterations), predicted, map, r);
-    if (state != kCarried) x = xyz(w.position[o]);
-    d = with_w(x, start.w);
-    v = pace.decay_per_dt * (x - xyz(start));
-    if constexpr (kContacts) {
-      if (touched) {
-        Float3 pushed;
-        if (state == kResolved) pushed = xyz(w.pushed[o]);
-        if (state == kHeld) {
-          pushed = pace.held_alpha * (x - predicted) + (pace.held_beta * (predicted - base) - map(r));
-        }
-        end_impulse(w, w.place_particle[o], pace, pushed);
-      }
-    }
-  }
-  if (substep == pace.substeps) {
-    const int p = w.place_particle[o];
-    w.displacement[p] = d;
-    w.velocity[p] = with_w(v, 0.0f);
-    return;
-  }
-  const Float3 predicted = predict(pace, xyz(d), v);
-  float side = 1.0f;
-  if constexpr (kContacts) {
-    side = blade_side(contacts_of(w, pace, substep), {pace.h, grid_node(pace, node)}, xyz(d));
-    sides = side < 0 ? kBehind : kBefore;
-    if (held_by(w, pace, head.hold_set, substep).active) side = 0.0f;
-  }
-  w.start[o] = d;
-  w.predicted[o] = with_w(predicted, side);
-  for (int axis = 0; axis < 3; ++axis) {
-    all.at[axis][j] = predicted[axis];
-    all.rest[axis][j] = r[axis];
-  }
-  all.weight[j] = (1.0f / static_cast<float>(head.holder_count)) * d.w;
-}
-
-// Of the groups that begin the substep with a contact, or held: their particles are where these let them be.
-template <class Block>
-CUTPROOF_DEVICE void resolve_together(Block& block, Together& all, const DeviceView& w, int first, int count,
-                                      int substep) {
-  for (int j = block.thread(); j < all.from[count]; j += block.size()) {
-    const int n = all.group_of(j);
-    if (all.resolve[n] == 0) continue;
-    const Group group = group_of(w, first + n);
-    const Pace pace = constant(&w.pace[body_of_group(w, group.head)]);
-    const int o = group.head.begin + j - all.from[n];
-    const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
-    const Held held = held_by(w, pace, group.head.hold_set, substep);
-    const Float3 x = enter_substep(w, contacts_of(w, pace, substep), held, rest, o, w.predicted[o], xyz(w.start[o]), 0.0f);
-    put_moved(all, j, x - all.base[n], pace.per_h);
-  }
-  block.sync();
-  sum_together(
-      block, all, count, [&](int n) { return all.resolve[n] != 0; },
-      [&](int n, int m, float sum) { store_moment(w.group_moments, first + n, m, sum); });
-  for (int n = block.thread(); n < count; n += block.size()) {
-    if (all.resolve[n] != kResolved) continue;
-    list_resolved(block, w, constant(&w.pace[body_of_group(w, constant(&w.group_head[first + n]))]), first + n, substep, 0);
-  }
-}
-
-template <bool kContacts, class Block>
-CUTPROOF_DEVICE void start_together(Block& block, Together& all, const DeviceView& w, int first, int count,
-                                    int substep) {
-  // Whose particles they are.
-  for (int n = block.thread(); n <= count; n += block.size()) {
-    int before = 0;
-    for (int m = 0; m < n; ++m) before += constant(&w.group_head[first + m]).size;
-    all.from[n] = before;
-    if (n == count) continue;
-    const GroupHead head = constant(&w.group_head[first + n]);
-    all.active[n] = 0;
-    if (head.size > 0) {
-      const Pace pace = constant(&w.pace[body_of_group(w, head)]);
-      all.active[n] = turns_over(pace, substep) ? substep == pace.substeps ? kEnds : kBegins : 0;
-    }
-    all.sides[n] = all.reach[n] = all.resolve[n] = 0;
-  }
-  block.sync();
+  const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
+  const float shared = 1.0f / constant(&w.group_mass[g]).w;
+  const bool begins = substep == 0, ends = substep == pace.substeps;
   block.wait_for_earlier();
-  const int particles = all.from[count];
-  for (int j = block.thread(); j < particles; j += block.size()) {
-    const int n = all.group_of(j);
-    if (all.active[n] == 0) continue;
-    int sides = 0;
-    start_particle<kContacts>(w, first + n, j - all.from[n], substep, all, j, sides);
-    if (kContacts && sides != 0) block.atomic_or(&all.sides[n], sides);
+  Map map = {};
+  Float3 last_base;
+  [[maybe_unused]] int state = kCarried;
+  [[maybe_unused]] bool touched = false;
+  if (!begins) {
+    map = load_map(w.group_map, g);
+    last_base = xyz(w.group_base[g]);
+    if constexpr (kContacts) state = w.group_resolved[g];
   }
-  const auto begins = [&](int n) { return all.active[n] == kBegins; };
-  bool any = false;
-  for (int n = block.thread(); n < count; n += block.size()) any = any || begins(n);
-  if (!block.any(any)) return;
+  if constexpr (kContacts) touched = w.group_touched[g] != 0;
+  if (!turns_over(pace, substep)) return;
+  if (pace.iterations == 0) map = {};
+  const float lost = lost_fraction(pace, pace.iterations);
+  const Held held = kContacts && !ends ? held_by(w, pace, head.hold_set, substep) : Held{};
 
+  // Displacement and mass of particle k, and its velocity.
+  const auto where = [&](int k, Float3& v) {
+    const int o = head.begin + k;
+    if (begins) {
+      const int p = w.place_particle[o];
+      v = xyz(w.velocity[p]);
+      return w.displacement[p];
+    }
+    const Float4 start = w.start[o], predicted = w.predicted[o];
+    Float3 d = carried_to(last_base, lost, xyz(predicted), map, group.rest(w, pace, k));
+    if (state != kCarried) d = xyz(w.position[o]);
+    v = pace.decay_per_dt * (d - xyz(start));
+    return with_w(d, start.w);
+  };
+  const auto end = [&](int k) {
+    if constexpr (kContacts) {
+      if (begins || !touched) return;
+      const int o = head.begin + k;
+      Float3 pushed;
+      if (state == kResolved) pushed = xyz(w.pushed[o]);
+      if (state == kHeld) {
+        const Float3 predicted = xyz(w.predicted[o]);
+        pushed = pace.held_alpha * (xyz(w.position[o]) - predicted) +
+                 (pace.held_beta * (predicted - last_base) - map(group.rest(w, pace, k)));
+      }
+      end_impulse(w, w.place_particle[o], pace, pushed);
+    }
+  };
+  const int first = team.lane();  // the first of this lane's particles: nearly always the only one
+  Float4 of_first;                // its prediction, and what a holder gets of its mass
+  const float of_each = 1.0f / static_cast<float>(head.holder_count);
+  [[maybe_unused]] bool before = false, behind = false;  // the blade, when the substep begins
+  team.each(head.size, [&](int k) {
+    const int o = head.begin + k;
+    Float3 v;
+    const Float4 d = where(k, v);
+    end(k);
+    if (ends) {
+      const int p = w.place_particle[o];
+      w.displacement[p] = d;
+      w.velocity[p] = with_w(v, 0.0f);
+      return;
+    }
+    const Float3 predicted = predict(pace, xyz(d), v);
+    float side = 1.0f;
+    if constexpr (kContacts) {
+      side = blade_side(contacts, {pace.h, grid_node(pace, constant(&w.place_node[o]))}, xyz(d));
+      (side < 0 ? behind : before) = true;
+      if (held.active) side = 0.0f;
+    }
+    w.start[o] = d;
+    w.predicted[o] = with_w(predicted, side);
+    if (k == first) of_first = with_w(predicted, of_each * d.w);
+  });
+  if (ends) return;
   // Small numbers are summed: displacements less that of the particle in the middle, or, where that one is far off the
   // others, less their mean. (Not always: what moves as a whole must have moments that vanish.)
+  Float3 base = xyz(of_first);
+  if (head.middle >= team.kLanes && team.has(head.middle)) base = xyz(w.predicted[head.begin + head.middle]);
+  base = team.from(head.middle, base);
+  float reach = 0;
+  typename Team<Block, kParticleTeam>::template Parted<12> total;
   for (int round = 0;; ++round) {
-    for (int j = block.thread(); j < particles; j += block.size()) {
-      const int n = all.group_of(j);
-      if (!begins(n)) continue;
-      const GroupHead head = constant(&w.group_head[first + n]);
-      const Float3 base = round == 0 ? all.predicted(all.from[n] + head.middle) : all.base[n];
-      const Float3 e = all.predicted(j) - base;
-      block.atomic_max(&all.reach[n], bits_of(dot(e, e)));
-      put_moved(all, j, e, constant(&w.pace[body_of_group(w, head)]).per_h);
-    }
-    block.sync();
-    sum_together(block, all, count, begins, [&](int n, int m, float sum) {
-      all.sum[n][m] = sum;
-      store_moment(w.group_predicted, first + n, m, sum);
-      store_moment(w.group_moments, first + n, m, sum);
+    GroupSums<Team<Block, kParticleTeam>> sums;
+    reach = 0;
+    team.each(head.size, [&](int k) {
+      Float4 particle = of_first;
+      if (k != first) {
+        const int o = head.begin + k;
+        particle = with_w(xyz(w.predicted[o]), of_each * w.start[o].w);
+      }
+      const Float3 e = xyz(particle) - base;
+      reach = fmaxf(reach, dot(e, e));
+      add_moments(sums.of(k), particle.w, e, pace.per_h * e, group.rest(w, pace, k));
     });
-    block.sync();
-    bool far = false, resolve = false;
-    for (int n = block.thread(); n < count; n += block.size()) {
-      if (!begins(n)) continue;
-      const int g = first + n;
-      const Group group = group_of(w, g);
-      const Pace pace = constant(&w.pace[body_of_group(w, group.head)]);
-      Float3 base = round == 0 ? all.predicted(all.from[n] + group.head.middle) : all.base[n];
-      if (round == 0) {
-        const float shared = 1.0f / constant(&w.group_mass[g]).w;
-        const Float3 off = {shared * all.sum[n][3], shared * all.sum[n][7], shared * all.sum[n][11]};
-        if (dot(off, off) > kFarBase * kFarBase * pace.h * pace.h) {
-          base = base + off;
-          far = true;
-        }
-        all.base[n] = base;
-      }
-      const Float4 base_and_reach = with_w(base, sqrtf(float_of(all.reach[n])) * (1.0f + 0x1p-20f));
-      w.group_base[g] = base_and_reach;
-      if constexpr (kContacts) {
-        const Contacts contacts = contacts_of(w, pace, substep);
-        const int sides = all.sides[n], side = sides == (kBefore | kBehind) ? 0 : sides == kBehind ? -1 : 1;
-        const float room = room_around(contacts, ball_around(pace, group, base_and_reach, 1.0f, Map{}), side);
-        const bool held = held_by(w, pace, group.head.hold_set, substep).active;
-        w.group_room[g] = room;
-        w.group_side[g] = side;
-        w.group_resolved[g] = held ? kHeld : kCarried;
-        if (held) w.group_touched[g] = 1;
-        all.resolve[n] = held ? kHeld : room > 0 ? 0 : kResolved;
-        resolve = resolve || all.resolve[n] != 0;
-      }
-    }
-    if (block.any(far)) {
-      // What has changed is found again with all else, which stays as it is.
-      for (int n = block.thread(); n < count; n += block.size()) all.reach[n] = 0;
-      block.sync();
-      continue;
-    }
-    if constexpr (kContacts) {
-      if (block.any(resolve)) resolve_together(block, all, w, first, count, substep);
-    }
-    return;
+    total = team.parted(sums);
+    const Float3 off = {shared * total.get(team, 3), shared * total.get(team, 7), shared * total.get(team, 11)};
+    if (round > 0 || !(dot(off, off) > kFarBase * kFarBase * pace.h * pace.h)) break;
+    base = base + off;
   }
+  const Float4 base_and_reach = with_w(base, sqrtf(team.greatest(reach)) * (1.0f + 0x1p-20f));
+  if (team.leads()) w.group_base[g] = base_and_reach;
+  total.each(team, [&](int n, float sum) { store_moment(w.group_predicted, g, n, sum); });
+  if constexpr (kContacts) {
+    before = team.any(before);
+    behind = team.any(behind);
+    const int side = before && behind ? 0 : behind ? -1 : 1;
+    const float room = room_around(contacts, ball_around(pace, group, base_and_reach, 1.0f, Map{}), side);
+    const bool resolve = held.active || !(room > 0);
+    if (team.leads()) {
+      w.group_room[g] = room;
+      w.group_side[g] = side;
+      w.group_resolved[g] = held.active ? kHeld : kCarried;
+      if (held.active) w.group_touched[g] = 1;
+    }
+    if (resolve) {
+      if (!held.active) list_resolved(block, team, w, pace, g, substep, 0);
+      team.each(head.size, [&](int k) {
+        const int o = head.begin + k;
+        const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
+        enter_substep(w, contacts, held, rest, o, w.predicted[o], xyz(w.start[o]), 0.0f);
+      });
+      return sum_resolved(team, w, group, pace, base);
+    }
+  }
+  total.each(team, [&](int n, float sum) { store_moment(w.group_moments, g, n, sum); });
 }
 
 template <bool kContacts>
@@ -706,12 +596,10 @@ CUTPROOF_KERNEL(begin_frame_kernel);
 template <bool kContacts, class Block>
 CUTPROOF_DEVICE void start_substep_kernel(Block& block, const DeviceView& w, int substep) {
   using namespace step_detail;
-  Together& all = *block.template shared<Together>(1);
+  const Team<Block, kParticleTeam> team(block);
   const int groups = w.counters->groups;
-  for (int64_t i = block.index(); i * kTogether < groups; i += block.count()) {
-    const int first = static_cast<int>(i) * kTogether;
-    start_together<kContacts>(block, all, w, first, groups - first < kTogether ? groups - first : kTogether, substep);
-    block.sync();  // before the next ones
+  for (int64_t g = team.first(); g < groups; g += team.stride()) {
+    start_group<kContacts>(block, team, w, static_cast<int>(g), substep);
   }
   block.wait_for_earlier();
   for (int64_t k = from_last(block); k < w.counters->loose; k += block.stride()) {
@@ -1014,7 +902,7 @@ CUTPROOF_DEVICE void resolve(Block& block, const Team<Block, kResolvedTeam>& tea
       w.pushed_earlier[o] = Float4{};
     }
   });
-  if (team.leads()) list_resolved(block, w, pace, g, substep, iteration + 1);
+  list_resolved(block, team, w, pace, g, substep, iteration + 1);
 }
 
 // A group, and what of it does not change in a substep.
@@ -1246,7 +1134,7 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
 template <bool kContacts>
 struct start_substep_kernel_object {
   static constexpr const char* kName = "start_substep_kernel";
-  static constexpr int kMaxThreads = step_detail::kStartThreads, kMinBlocks = 7;
+  static constexpr int kMaxThreads = 128, kMinBlocks = 4;
   static constexpr bool kReadsAhead = true;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep) const {
@@ -1284,21 +1172,15 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
     }
     on.teams(advance_kernel_object<kContacts, kAccelerated, kRowTeam>{}, kParticleTeam, teams, w, substep, iteration);
   };
-  const int64_t of_groups = (int64_t{w.group_capacity} + kTogether - 1) / kTogether,
-                of_loose = (int64_t{w.place_capacity} + 8 * kStartThreads - 1) / (8 * kStartThreads);
-  const auto start = [&](int substep) {
-    launcher.blocks(start_substep_kernel_object<kContacts>{}, of_groups > of_loose ? of_groups : of_loose,
-                    kStartThreads, kTogetherShared, w, substep);
-  };
   for (int substep = 0; substep < plan.substeps; ++substep) {
-    start(substep);
+    launcher.teams(start_substep_kernel_object<kContacts>{}, kParticleTeam, teams, w, substep);
     for (int iteration = 0; iteration < plan.iterations; ++iteration) {
       launcher.blocks(match_shapes_kernel_object<Method>{}, (w.slots_expected + kTeams - 1) / kTeams, kMatchThreads,
                       kMatchShared, w, substep, iteration);
       advance(launcher, substep, iteration);
     }
   }
-  start(plan.substeps);
+  launcher.teams(start_substep_kernel_object<kContacts>{}, kParticleTeam, teams, w, plan.substeps);
 }
 
 template <int Method, class Launcher>

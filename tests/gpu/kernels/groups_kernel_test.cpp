@@ -644,8 +644,7 @@ TEST(Groups, AreResolvedIfEitherCandidateTouches) {
     const int teams = w.group_capacity;
     launcher.items(begin_frame_kernel_object{}, w.particles, w);
     enqueue_groups(launcher, w);
-    launcher.blocks(start_substep_kernel_object<true>{}, teams, step_detail::kStartThreads, step_detail::kTogetherShared, w,
-                    0);
+    launcher.teams(start_substep_kernel_object<true>{}, step_detail::kParticleTeam, teams, w, 0);
     const Pace& pace = staging.pace.front();
     const step_detail::Combination combination = step_detail::chebyshev(pace.kdt2, kIteration);
     // Where all is now, and where it was that the two lead to the candidate that is wanted.
