@@ -3,8 +3,8 @@
 //
 // A vertex is known by its owner and direction. It is made when the particle beyond its grid edge dies (or with the
 // body's first skin) and lasts as long as its owner, because the dead do not come back; so cells that kept all
-// corners keep their triangles as they are. Places of vertices and cells are given out by scans over particles and
-// nodes, in ascending order.
+// corners keep their triangles as they are. What there is to do hangs on the particles that have changed, so they are
+// listed first, ascending; places of vertices and cells are given out in their order.
 #pragma once
 #include "gpu/kernels/float3.h"
 #include "gpu/kernels/skin_table.h"
@@ -18,7 +18,7 @@ namespace cutproof::gpu {
 namespace skin_detail {
 
 // Use of Counters::scratch.
-enum : int { kNewVertices = 0, kNewCells = 1, kVertexBase = 2, kCellBase = 3, kSound = 4 };
+enum : int { kVertexBase = 0, kCellBase = 1, kSound = 2 };
 
 inline constexpr int kClusterTeam = 32;  // lanes that find where a cluster is
 
@@ -38,16 +38,6 @@ CUTPROOF_DEVICE inline int corner_step(const BodyConstants& body, int corner) {
   return (corner & 1) + body.nodes[0] * ((corner >> 1 & 1) + body.nodes[1] * (corner >> 2));
 }
 
-// The body whose grid holds a node; node counts over all bodies.
-CUTPROOF_DEVICE inline int body_of_node(const DeviceView& w, int64_t node) {
-  int low = 0, high = w.bodies;  // body[low].node_begin <= node < body[high].node_begin
-  while (high - low > 1) {
-    const int middle = low + (high - low) / 2;
-    (w.body[middle].node_begin <= node ? low : high) = middle;
-  }
-  return low;
-}
-
 // The particles at a cell's corners, -1 where there is none, and which of them are tissue, as bits.
 struct Cell {
   int corner[8];
@@ -64,151 +54,198 @@ CUTPROOF_DEVICE inline Cell cell_at(const DeviceView& w, const BodyConstants& bo
   return cell;
 }
 
-// Calls visit(owner, direction) for each vertex that p's death, or p in a first skin, brings about. No two particles
-// bring about the same one.
-template <class Visit>
-CUTPROOF_DEVICE inline void visit_new_vertices(const DeviceView& w, int b, int p, const Visit& visit) {
-  if (!changes_cells(w, b, p)) return;
-  const BodyConstants& body = w.body[b];
-  for (int d = 0; d < 6; ++d) {
-    const int q = neighbour(w, body, p, d);
-    const bool q_alive = q >= 0 && alive(w, q);
-    if (w.skin_made[b]) {
-      if (q_alive && w.vertex_of[6 * q + (d ^ 1)] < 0) visit(q, d ^ 1);
-    } else {
-      if (!q_alive && w.vertex_of[6 * p + d] < 0) visit(p, d);
-    }
-  }
+// The vertex that p's death, or p in a first skin, brings about along d; no owner: none. No two particles bring about the
+// same one.
+struct NewVertex {
+  int owner, direction;
+};
+CUTPROOF_DEVICE inline NewVertex new_vertex(const DeviceView& w, int b, int p, int d) {
+  const int q = neighbour(w, w.body[b], p, d);
+  const bool q_alive = q >= 0 && alive(w, q);
+  if (w.skin_made[b]) return {q_alive && w.vertex_of[6 * q + (d ^ 1)] < 0 ? q : -1, d ^ 1};
+  return {!q_alive && w.vertex_of[6 * p + d] < 0 ? p : -1, d};
 }
+
+// Lanes that share a particle's cells: one for each corner that it is.
+inline constexpr int kCornerTeam = 8;
+inline constexpr int kReserveThreads = 1024;
+
+// Particles that change the cells around them, ascending: as many as Counters::skin_changes. And for each of them, first
+// how many vertices and cells it needs, then how many those before it do.
+CUTPROOF_BOTH inline int* changed(const DeviceView& w) { return w.fallen; }
+CUTPROOF_BOTH inline int* new_vertices(const DeviceView& w) { return w.particle_scratch; }
+CUTPROOF_BOTH inline int* new_cells(const DeviceView& w) { return w.particle_scratch + w.particles; }
+// By particle: the corners at which it is the lowest of its cell's that change, as bits: those cells are its own.
+CUTPROOF_BOTH inline unsigned char* own_corners(const DeviceView& w) { return w.particle_flag; }
 
 }  // namespace skin_detail
 
 // ---- Extraction
 
-// Flags the cells to be extracted and counts the vertices that each particle brings about.
 template <class Block>
-CUTPROOF_DEVICE void mark_dirty_cells_kernel(Block& block, const DeviceView& w) {
+CUTPROOF_DEVICE void flag_changed_particles_kernel(Block& block, const DeviceView& w) {
   using namespace skin_detail;
   for (int64_t s = block.first(); s < w.counters->slots_used; s += block.stride()) {
     if (extracts(w, w.slot_body[s])) w.under_skin[s] = 0;
   }
   for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
-    const int p = static_cast<int>(i);
-    const int b = w.body_of[p];
-    int vertices = 0;
-    if (extracts(w, b) && changes_cells(w, b, p)) {
-      const BodyConstants& body = w.body[b];
-      for (int corner = 0; corner < 8; ++corner) {
-        const int64_t node = body.node_begin + w.node[p] - corner_step(body, corner);
-        // The flag is written by the lowest of the corners that change, so by one thread alone.
-        bool first = true;
-        for (int lower = 0; lower < corner && first; ++lower) {
-          const int q = w.particle_at[node + corner_step(body, lower)];
-          first = q < 0 || !changes_cells(w, b, q);
-        }
-        if (first) w.cell_dirty[node] = 1;
-      }
-      visit_new_vertices(w, b, p, [&](int, int) { ++vertices; });
-    }
-    w.particle_scratch[p] = vertices;
+    const int p = static_cast<int>(i), b = w.body_of[p];
+    w.particle_flag[p] = extracts(w, b) && changes_cells(w, b, p);
   }
 }
-CUTPROOF_KERNEL(mark_dirty_cells_kernel);
+CUTPROOF_KERNEL(flag_changed_particles_kernel);
 
-// cell_scratch[k]: dirty cell k needs a place. 0 beyond the last one, for the scan.
+// What each of them needs.
 template <class Block>
-CUTPROOF_DEVICE void count_new_cells_kernel(Block& block, const DeviceView& w) {
+CUTPROOF_DEVICE void count_skin_changes_kernel(Block& block, const DeviceView& w) {
   using namespace skin_detail;
-  const int dirty = w.counters->dirty_cells;
-  for (int64_t k = block.first(); k < w.nodes; k += block.stride()) {
-    int needed = 0;
-    if (k < dirty) {
-      const int node = w.dirty_cells[k];
-      if (w.cell_of[node] < 0) {
-        const Cell cell = cell_at(w, w.body[body_of_node(w, node)], node);
-        needed = skin_table().corners[cell.inside][0] >= 0;
+  const Team<Block, kCornerTeam> team(block);
+  for (int64_t j = team.first(); j < w.counters->skin_changes; j += team.stride()) {
+    const int p = changed(w)[j], b = w.body_of[p];
+    const BodyConstants& body = w.body[b];
+    int own_bits = 0, cells = 0, vertices = 0;
+    team.each(8, [&](int corner) {
+      const int64_t node = body.node_begin + w.node[p] - corner_step(body, corner);
+      const Cell cell = cell_at(w, body, node);
+      bool own = true;
+      for (int lower = 0; lower < corner && own; ++lower) {
+        own = cell.corner[lower] < 0 || !changes_cells(w, b, cell.corner[lower]);
       }
-    }
-    w.cell_scratch[k] = needed;
+      if (!own) return;
+      own_bits += 1 << corner;
+      if (w.cell_of[node] < 0 && skin_table().corners[cell.inside][0] >= 0) ++cells;
+    });
+    team.each(6, [&](int d) { vertices += new_vertex(w, b, p, d).owner >= 0 ? 1 : 0; });
+    own_bits = team.total(own_bits);
+    cells = team.total(cells);
+    vertices = team.total(vertices);
+    if (!team.leads()) continue;
+    own_corners(w)[p] = static_cast<unsigned char>(own_bits);
+    new_cells(w)[j] = cells;
+    new_vertices(w)[j] = vertices;
   }
 }
-CUTPROOF_KERNEL(count_new_cells_kernel);
+CUTPROOF_KERNEL(count_skin_changes_kernel);
+
+namespace skin_detail {
+// counts[k] becomes the sum of those before it; returns the sum of all. Reached by all threads of the one block.
+template <class Block>
+CUTPROOF_DEVICE int sum_before(Block& block, int* counts, int count) {
+  constexpr int kEach = 4;
+  int before = 0;
+  for (int tile = 0; tile < count; tile += kEach * block.size()) {
+    const int first = tile + kEach * block.thread();
+    int own[kEach], sum = 0, total = 0;
+    for (int k = 0; k < kEach; ++k) own[k] = first + k < count ? counts[first + k] : 0;
+    for (int k = 0; k < kEach; ++k) sum += own[k];
+    int next = before + block.exclusive_scan(sum, total);
+    for (int k = 0; k < kEach; ++k) {
+      if (first + k < count) counts[first + k] = next;
+      next += own[k];
+    }
+    before += total;
+  }
+  return before;
+}
+}  // namespace skin_detail
 
 // Gives out places for new vertices and cells, or says that there are too few. After a fault the skin stays as it is.
-// One thread.
+// One block.
 template <class Block>
 CUTPROOF_DEVICE void reserve_skin_kernel(Block& block, const DeviceView& w) {
   using namespace skin_detail;
-  if (block.first() != 0) return;
+  if (block.index() != 0) return;
   Counters& c = *w.counters;
+  const int changes = c.skin_changes;
+  const int vertices = sum_before(block, new_vertices(w), changes), cells = sum_before(block, new_cells(w), changes);
+  if (block.thread() != 0) return;
   c.scratch[kVertexBase] = c.vertices_used;
   c.scratch[kCellBase] = c.cells_used;
-  if (c.scratch[kNewVertices] > w.vertex_capacity - c.vertices_used) block.atomic_or(&c.fault, kVerticesFull);
-  if (c.scratch[kNewCells] > w.cell_capacity - c.cells_used) block.atomic_or(&c.fault, kCellsFull);
+  if (vertices > w.vertex_capacity - c.vertices_used) block.atomic_or(&c.fault, kVerticesFull);
+  if (cells > w.cell_capacity - c.cells_used) block.atomic_or(&c.fault, kCellsFull);
   c.scratch[kSound] = (block.load(&c.fault) & (kVerticesFull | kCellsFull)) == 0;
   if (!c.scratch[kSound]) return;
-  c.vertices_used += c.scratch[kNewVertices];
-  c.cells_used += c.scratch[kNewCells];
+  c.vertices_used += vertices;
+  c.cells_used += cells;
 }
-CUTPROOF_KERNEL(reserve_skin_kernel);
+CUTPROOF_KERNEL_THREADS(reserve_skin_kernel, skin_detail::kReserveThreads);
 
 // Vertices of the dead go, those that deaths or a first skin bring about come.
 template <class Block>
 CUTPROOF_DEVICE void renew_vertices_kernel(Block& block, const DeviceView& w) {
   using namespace skin_detail;
   if (!w.counters->scratch[kSound]) return;
-  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
-    const int p = static_cast<int>(i);
-    const int b = w.body_of[p];
-    if (!extracts(w, b)) continue;
-    if (w.skin_made[b] && died_now(w, b, p)) {
-      for (int d = 0; d < 6; ++d) {
-        const int v = w.vertex_of[6 * p + d];
-        if (v < 0) continue;
-        w.vertex_owner[v] = -1;
-        w.vertex_of[6 * p + d] = -1;
+  const Team<Block, kCornerTeam> team(block);
+  for (int64_t j = team.first(); j < w.counters->skin_changes; j += team.stride()) {
+    const int p = changed(w)[j], b = w.body_of[p];
+    const bool dies = w.skin_made[b] != 0;
+    int next = w.counters->scratch[kVertexBase] + new_vertices(w)[j];
+    for (int tile = 0; tile < 6; tile += team.kLanes) {
+      const int d = tile + team.lane();
+      const NewVertex made = d < 6 ? new_vertex(w, b, p, d) : NewVertex{-1, 0};
+      int found = 0;
+      const int v = next + team.rank(made.owner >= 0, found);
+      next += found;
+      if (made.owner >= 0) {
+        w.vertex_of[6 * made.owner + made.direction] = v;
+        w.vertex_owner[v] = made.owner;
+        w.vertex_direction[v] = static_cast<unsigned char>(made.direction);
       }
+      if (!dies || d >= 6) continue;
+      const int gone = w.vertex_of[6 * p + d];
+      if (gone < 0) continue;
+      w.vertex_owner[gone] = -1;
+      w.vertex_of[6 * p + d] = -1;
     }
-    int v = w.counters->scratch[kVertexBase] + w.particle_scratch[p];
-    visit_new_vertices(w, b, p, [&](int owner, int direction) {
-      w.vertex_of[6 * owner + direction] = v;
-      w.vertex_owner[v] = owner;
-      w.vertex_direction[v] = static_cast<unsigned char>(direction);
-      ++v;
-    });
   }
 }
 CUTPROOF_KERNEL(renew_vertices_kernel);
 
-// Writes the triangles of dirty cells and takes the flags down again. Says which clusters vertices hang on.
+// Writes the triangles of the cells around what has changed. Says which clusters vertices hang on.
 template <class Block>
 CUTPROOF_DEVICE void extract_cells_kernel(Block& block, const DeviceView& w) {
   using namespace skin_detail;
   const SkinTable& table = skin_table();
   const bool sound = w.counters->scratch[kSound];
-  for (int64_t k = block.first(); k < w.counters->dirty_cells; k += block.stride()) {
-    const int node = w.dirty_cells[k];
-    w.cell_dirty[node] = 0;
-    if (!sound) continue;
-    const Cell cell = cell_at(w, w.body[body_of_node(w, node)], node);
-    const signed char* corners = table.corners[cell.inside];
-    int place = w.cell_of[node];
-    if (place < 0) {
-      if (corners[0] < 0) continue;  // all tissue or all empty, and it never had a triangle
-      place = w.counters->scratch[kCellBase] + w.cell_scratch[k];
-      w.cell_of[node] = place;
-      w.cell_node[place] = node;
-    }
-    for (int c = 0; c < 3 * kMostSkinTriangles; ++c) {
-      int vertex = -1;
-      const int edge = corners[c];
-      if (edge >= 0) {
-        const int low = table.low[edge], axis = table.axis[edge];
-        const bool low_owns = cell.inside >> low & 1;
-        const int owner = cell.corner[low_owns ? low : low + (1 << axis)];
-        vertex = w.vertex_of[6 * owner + 2 * axis + (low_owns ? 0 : 1)];
+  const Team<Block, kCornerTeam> team(block);
+  for (int64_t j = team.first(); j < w.counters->skin_changes && sound; j += team.stride()) {
+    const int p = changed(w)[j];
+    const BodyConstants& body = w.body[w.body_of[p]];
+    const int own = own_corners(w)[p];
+    int next = w.counters->scratch[kCellBase] + new_cells(w)[j];
+    for (int tile = 0; tile < 8; tile += team.kLanes) {
+      const int at = tile + team.lane();
+      const int64_t node = body.node_begin + w.node[p] - corner_step(body, at);
+      int place = -1;
+      const signed char* corners = table.corners[0];
+      Cell cell = {};
+      if (own >> at & 1) {
+        cell = cell_at(w, body, node);
+        corners = table.corners[cell.inside];
+        place = w.cell_of[node];
       }
-      w.cell_triangles[15 * static_cast<int64_t>(place) + c] = vertex;
+      // All tissue or all empty, and it never had a triangle: it stays without a place.
+      const bool fresh = place < 0 && corners[0] >= 0;
+      int found = 0;
+      const int given = next + team.rank(fresh, found);
+      next += found;
+      if (fresh) {
+        place = given;
+        w.cell_of[node] = place;
+        w.cell_node[place] = static_cast<int>(node);
+      }
+      if (place < 0) continue;
+      for (int c = 0; c < 3 * kMostSkinTriangles; ++c) {
+        int vertex = -1;
+        const int edge = corners[c];
+        if (edge >= 0) {
+          const int low = table.low[edge], axis = table.axis[edge];
+          const bool low_owns = cell.inside >> low & 1;
+          const int owner = cell.corner[low_owns ? low : low + (1 << axis)];
+          vertex = w.vertex_of[6 * owner + 2 * axis + (low_owns ? 0 : 1)];
+        }
+        w.cell_triangles[15 * static_cast<int64_t>(place) + c] = vertex;
+      }
     }
   }
   for (int64_t v = block.first(); v < w.counters->vertices_used; v += block.stride()) {
@@ -226,15 +263,13 @@ CUTPROOF_KERNEL(extract_cells_kernel);
 
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_skin_cells(Launcher& launcher, const DeviceView& w, const Plan&) {
-  int* const scratch = w.counters->scratch;  // an address only: counters lie on the device
-  launcher.items(mark_dirty_cells_kernel_object{}, w.particles, w);
-  launcher.select(w.cell_dirty, w.nodes, w.dirty_cells, &w.counters->dirty_cells);
-  launcher.items(count_new_cells_kernel_object{}, w.nodes, w);
-  launcher.exclusive_scan(w.particle_scratch, w.particle_scratch, w.particles, scratch + skin_detail::kNewVertices);
-  launcher.exclusive_scan(w.cell_scratch, w.cell_scratch, w.nodes, scratch + skin_detail::kNewCells);
-  launcher.items(reserve_skin_kernel_object{}, 1, w);
-  launcher.items(renew_vertices_kernel_object{}, w.particles, w);
-  launcher.items(extract_cells_kernel_object{}, w.nodes, w);
+  using namespace skin_detail;
+  launcher.items(flag_changed_particles_kernel_object{}, w.particles, w);
+  launcher.select(w.particle_flag, w.particles, changed(w), &w.counters->skin_changes);
+  launcher.teams(count_skin_changes_kernel_object{}, kCornerTeam, w.particles, w);
+  launcher.blocks(reserve_skin_kernel_object{}, 1, kReserveThreads, 0, w);
+  launcher.teams(renew_vertices_kernel_object{}, kCornerTeam, w.particles, w);
+  launcher.teams(extract_cells_kernel_object{}, kCornerTeam, w.particles, w);
 }
 
 // ---- Positions

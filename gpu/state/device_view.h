@@ -162,7 +162,7 @@ struct Counters {
   int expanding;           // some body of this span needs the expand stage
   int additions;           // length of DeviceView::additions
   int layer;               // expand: layers done
-  int dirty_cells;         // skin cells to be extracted again
+  int skin_changes;        // skin: particles that change the cells around them: length of DeviceView::fallen
   int stage_ran[6];        // by stage: launched in this span
   int changed;             // scratch of a stage's loop
   int failed;              // a capacity was too small for the stage in progress

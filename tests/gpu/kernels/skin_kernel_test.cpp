@@ -286,7 +286,6 @@ void expect_reference_skins(const Bodies& bodies, const std::string& where) {
     }
     ASSERT_LE(worst, 1e-5) << where << ", body " << b;
   }
-  for (const unsigned char flag : bodies.staging.cell_dirty) ASSERT_EQ(flag, 0) << where;
 }
 
 std::vector<int32_t> draw_alive(std::mt19937& random, const Bodies& bodies, int b, double chance) {
@@ -372,14 +371,14 @@ TEST(GpuSkin, ExtractsOnlyTheCellsAroundADeadParticleAndNothingWithoutACut) {
   EXPECT_EQ(counters.vertices_used, 6 * 36);
   EXPECT_EQ(counters.cells_used, 7 * 7 * 7 - 5 * 5 * 5);
   next_frame(bodies);
-  counters.dirty_cells = -7;
+  counters.skin_changes = -7;
   run_skin(launcher, bodies);
-  EXPECT_EQ(counters.dirty_cells, -7) << "cells were looked for in a frame without a cut";
+  EXPECT_EQ(counters.skin_changes, -7) << "cells were looked for in a frame without a cut";
   next_frame(bodies);
   // A cavity of one node in the middle: its eight cells, and a vertex on each of its six edges.
   remove_now(bodies, 0, {2 + 6 * (2 + 6 * 2)}, {});
   run_skin(launcher, bodies);
-  EXPECT_EQ(counters.dirty_cells, 8);
+  EXPECT_EQ(counters.skin_changes, 1);
   EXPECT_EQ(counters.vertices_used, 6 * 36 + 6);
   EXPECT_EQ(counters.cells_used, 7 * 7 * 7 - 5 * 5 * 5 + 8);
   expect_reference_skins(bodies, "cavity");
@@ -515,7 +514,6 @@ TEST(GpuSkin, WritesNothingWhereRoomIsShort) {
       expect_same_bytes(after.cell_of, before.cell_of, where);
       expect_same_bytes(after.cell_node, before.cell_node, where);
       expect_same_bytes(after.cell_triangles, before.cell_triangles, where);
-      expect_same_bytes(after.cell_dirty, before.cell_dirty, where);
       EXPECT_EQ(after.skin_made, before.skin_made);
       EXPECT_EQ(after.counters[0].vertices_used, before.counters[0].vertices_used);
       EXPECT_EQ(after.counters[0].cells_used, before.counters[0].cells_used);
