@@ -106,14 +106,12 @@ CUTPROOF_DEVICE void count_skin_changes_kernel(Block& block, const DeviceView& w
     int own_bits = 0, cells = 0, vertices = 0;
     team.each(8, [&](int corner) {
       const int64_t node = body.node_begin + w.node[p] - corner_step(body, corner);
-      const Cell cell = cell_at(w, body, node);
-      bool own = true;
-      for (int lower = 0; lower < corner && own; ++lower) {
-        own = cell.corner[lower] < 0 || !changes_cells(w, b, cell.corner[lower]);
+      for (int lower = 0; lower < corner; ++lower) {
+        const int q = w.particle_at[node + corner_step(body, lower)];
+        if (q >= 0 && changes_cells(w, b, q)) return;
       }
-      if (!own) return;
       own_bits += 1 << corner;
-      if (w.cell_of[node] < 0 && skin_table().corners[cell.inside][0] >= 0) ++cells;
+      if (w.cell_of[node] < 0 && skin_table().corners[cell_at(w, body, node).inside][0] >= 0) ++cells;
     });
     team.each(6, [&](int d) { vertices += new_vertex(w, b, p, d).owner >= 0 ? 1 : 0; });
     own_bits = team.total(own_bits);
