@@ -674,6 +674,87 @@ TEST(Groups, AreResolvedIfEitherCandidateTouches) {
   }
 }
 
+// No way within the room around a ball leads to a contact: most groups of a body are asked nothing else. In the worst
+// directions, of equal parts along all axes, among them.
+TEST(Groups, TouchNothingWithinTheirRoom) {
+  Random random(23);
+  const auto direction = [&] {
+    const Vec3 v = {normal(random), normal(random), normal(random)};
+    return (1 / norm(v)) * v;
+  };
+  const auto single = [](const Vec3& v) {
+    return Float3{static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+  };
+  const float h = 0.01f;
+  int roomy = 0, tight = 0;
+  for (int turn = 0; turn < 20'000; ++turn) {
+    // A blade with its normal along a diagonal every other time, and a floor.
+    const double third = 1 / std::sqrt(3.0);
+    const auto sign = [&] { return uniform(random, -1, 1) < 0 ? -third : third; };
+    const Vec3 towards = turn % 2 == 0 ? Vec3{sign(), sign(), sign()} : direction();
+    Vec3 along = cross(towards, direction());
+    along = (1 / norm(along)) * along;
+    MoveF move = {};
+    move.down = 1;
+    move.to.edge = single(Vec3{0.03, 0.03, 0.03});
+    move.to.along = single(along);
+    move.to.normal = single(towards);
+    move.to.back = single(cross(towards, along));
+    const WallF floor = {2, 1, -0.02f, 0.0f};
+    Contacts contacts = {};
+    contacts.walls = &floor;
+    contacts.wall_count = turn % 3 == 0 ? 1 : 0;
+    contacts.move = &move;
+    contacts.half_length = 0.05f;
+    contacts.depth = 0.05f;
+    contacts.clearance = 0.3f * h;
+    contacts.frictionless = true;
+    const Float3 node = {std::floor(static_cast<float>(uniform(random, 0, 8))),
+                         std::floor(static_cast<float>(uniform(random, 0, 8))),
+                         std::floor(static_cast<float>(uniform(random, 0, 8)))};
+    Ball ball = {
+        {h, node}, single(uniform(random, 0, 0.3) * h * direction()), static_cast<float>(uniform(random, 0, 2) * h)};
+    const int side = turn % 5 == 0 ? 0 : uniform(random, -1, 1) < 0 ? -1 : 1;
+    const float room = room_around(contacts, ball, side);
+    EXPECT_EQ(room > 0, is_clear(contacts, ball, side));
+    if (!(room > 0)) continue;
+    ++roomy;
+    for (const Vec3& way : {towards, -1.0 * towards, direction(), Vec3{0, 0, -1}}) {
+      // As long as it may be along its longest axis, and a little less than that for what is rounded here.
+      const double longest = std::max({std::abs(way[0]), std::abs(way[1]), std::abs(way[2])});
+      const double length = step_detail::kOfRoom * double{room} / longest;
+      Ball moved = ball;
+      moved.d = ball.d + single((1 - 1e-5) * length * way);
+      EXPECT_TRUE(is_clear(contacts, moved, side)) << "turn " << turn << ", room " << room;
+      moved.d = ball.d + single(1.05 * std::sqrt(3.0) * length * way);
+      tight += !is_clear(contacts, moved, side);
+    }
+  }
+  EXPECT_GT(roomy, 5'000);
+  EXPECT_GT(tight, 500) << "the room is much larger than what is said of it";
+}
+
+// No particle of a group goes farther along an axis than its map's way along it.
+TEST(Groups, GoNoFartherThanTheirWay) {
+  Random random(29);
+  const auto number = [&] { return static_cast<float>(normal(random)); };
+  for (int turn = 0; turn < 2'000; ++turn) {
+    const step_detail::Map map = {{{number(), number(), number(), number()},
+                                   {number(), number(), number(), number()},
+                                   {number(), number(), number(), number()}}};
+    const float radius = static_cast<float>(uniform(random, 0.5, 4));
+    for (int axis = 0; axis < 3; ++axis) {
+      Float3 r;
+      const double sign = uniform(random, -1, 1) < 0 ? -1 : 1;
+      (axis == 0 ? r.x : axis == 1 ? r.y : r.z) = static_cast<float>(sign * radius);
+      const Float3 moved = map(r);
+      for (int k = 0; k < 3; ++k) {
+        EXPECT_LE(std::abs(moved[k]), (1 + 1e-5f) * step_detail::way_along(map.row[k], radius)) << "axis " << k;
+      }
+    }
+  }
+}
+
 // The same body once with groups and once without any: what carries particles together must give what carries each
 // alone, within a few roundings, with blade, floor, friction and a grip that holds, for every way to iterate.
 TEST(Groups, GiveWhatTheirParticlesAloneGive) {
