@@ -75,19 +75,19 @@ double step_bytes(const Setup& setup, const State& state) {
   // placement 48, flag 4.
   const double match = 16 * of.pairs + 80 * of.groups + 20 * of.loose + 4 * of.loose_memberships + 192 * clusters;
   // advance. Pair: offset 16. Group: head 32, base 16, map in and out 96, moments of the prediction in and of the
-  // position out 96, masses 48; with contacts rest centre, side and resolved 24. Loose particle: places 8, position in
+  // position out 96, masses 48; with contacts room and resolved 8. Loose particle: places 8, position in
   // and out 32, predicted 16, node, share and first holder 12, a slot for each holder 4; with contacts start 16, pushed
   // in and out 32. Cluster: placement 48; of loose particles rest frame 24. Accelerated, the same of one iteration ago:
   // maps in and out 96, positions 32, with contacts pushed 32.
-  const double advance = 16 * of.pairs + (288 + (contacts ? 24 : 0) + (accelerated ? 96 : 0)) * of.groups +
+  const double advance = 16 * of.pairs + (288 + (contacts ? 8 : 0) + (accelerated ? 96 : 0)) * of.groups +
                          (68 + (contacts ? 48 : 0) + (accelerated ? (contacts ? 64 : 32) : 0)) * of.loose +
                          4 * of.loose_memberships + (of.loose > 0 ? 72 : 48) * clusters;
   // start_substep, once more than there are substeps; what it does first and last alone comes below. Particle: start in
   // and out 32, predicted in and out 32, node 4. Group: head 32, rest centre 16, map 48, base in and out 32, moments
-  // out 96, mass 16; with contacts side, resolved and touched 12. Loose particle besides: its place 4, position in and
-  // out 32; with contacts pushed and impulse, in and out 64.
+  // out 96, mass 16; with contacts room, side, resolved and touched 16. Loose particle besides: its place 4, position
+  // in and out 32; with contacts pushed and impulse, in and out 64.
   const double substep =
-      68 * particles + (240 + (contacts ? 12 : 0)) * of.groups + (36 + (contacts ? 64 : 0)) * of.loose;
+      68 * particles + (240 + (contacts ? 16 : 0)) * of.groups + (36 + (contacts ? 64 : 0)) * of.loose;
   // Once a frame: displacement and velocity in and out 64, whose they are 8; begin_frame's impulse and death 20.
   const double frame = 92 * particles;
   return frame + setup.step.substeps * (substep + setup.step.iterations * (match + advance));
@@ -109,9 +109,9 @@ double detect_bytes(const Setup& setup, const State& state) {
   }
 }
 
-// Skin positions. A vertex is where a particle has no neighbour in a direction: its owner, direction 5, position out 16;
-// owner: displacement 16, node, body, memberships and where they are 16. Cluster that a vertex hangs on: rotation, rest
-// centre and base, centre out and in 84; its members as detection by strain, once.
+// Skin positions. A vertex is where a particle has no neighbour in a direction: its owner, direction 5, position out
+// 16; owner: displacement 16, node, body, memberships and where they are 16. Cluster that a vertex hangs on: rotation,
+// rest centre and base, centre out and in 84; its members as detection by strain, once.
 double skin_bytes(const Setup& setup, const State& state) {
   if (!setup.skin.wanted) return 0;
   double bytes = 0;
