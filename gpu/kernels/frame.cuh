@@ -86,45 +86,37 @@ CUTPROOF_DEVICE void sort_memberships_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(sort_memberships_kernel);
 
-// Numbers in the order of slots, and the frame counts up.
-template <class Block>
-CUTPROOF_DEVICE void flag_live_slots_kernel(Block& block, DeviceView w) {
-  for (int64_t s = block.first(); s < w.counters->slots_used; s += block.stride()) {
-    w.slot_scratch[s] = w.slot_size[s] > 0;
-  }
-}
-CUTPROOF_KERNEL(flag_live_slots_kernel);
+inline constexpr int kNumberThreads = 512;
 
-// slot_scratch[slot_capacity + s]: live slots before s. Requires a DeviceView of one body.
+// Numbers in the order of slots: of each body from 0, whose slots interleave once clusters have split. A block for each
+// body.
 template <class Block>
-CUTPROOF_DEVICE void number_slots_kernel(Block& block, DeviceView w) {
-  for (int64_t s = block.first(); s < w.counters->slots_used; s += block.stride()) {
-    if (w.slot_size[s] > 0 && running(w, w.slot_body[s])) w.slot_number[s] = w.slot_scratch[w.slot_capacity + s];
-  }
-}
-CUTPROOF_KERNEL(number_slots_kernel);
-
-// The same for several bodies, each of which counts from 0; their slots interleave once clusters have split. A block
-// for each body, whose threads take consecutive parts of the slots: count, add up, count again.
-template <class Block>
-CUTPROOF_DEVICE void number_slots_by_body_kernel(Block& block, DeviceView w) {
+CUTPROOF_DEVICE void number_slots_kernel(Block& block, const DeviceView& w) {
+  constexpr int kEach = 4;  // neighbouring slots of a thread
   const int used = w.counters->slots_used;
-  const int part = (used + block.size() - 1) / block.size();
   for (int b = block.index(); b < w.bodies; b += block.count()) {
     if (!running(w, b)) continue;
-    const int begin = part * block.thread() < used ? part * block.thread() : used;
-    const int end = begin + part < used ? begin + part : used;
-    const auto mine = [&](int s) { return w.slot_body[s] == b && w.slot_size[s] > 0; };
-    int count = 0, total = 0;
-    for (int s = begin; s < end; ++s) count += mine(s) ? 1 : 0;
-    int number = block.exclusive_scan(count, total);
-    for (int s = begin; s < end; ++s) {
-      if (mine(s)) w.slot_number[s] = number++;
+    int before = 0;
+    for (int tile = 0; tile < used; tile += kEach * block.size()) {
+      const int first = tile + kEach * block.thread();
+      bool mine[kEach];
+      int count = 0, total = 0;
+      for (int k = 0; k < kEach; ++k) {
+        const int s = first + k;
+        mine[k] = s < used && w.slot_size[s] > 0 && w.slot_body[s] == b;
+        count += mine[k] ? 1 : 0;
+      }
+      int number = before + block.exclusive_scan(count, total);
+      for (int k = 0; k < kEach; ++k) {
+        if (mine[k]) w.slot_number[first + k] = number++;
+      }
+      before += total;
     }
   }
 }
-CUTPROOF_KERNEL(number_slots_by_body_kernel);
+CUTPROOF_KERNEL_THREADS(number_slots_kernel, kNumberThreads);
 
+// The frame counts up.
 template <class Block>
 CUTPROOF_DEVICE void end_frame_kernel(Block& block, DeviceView w) {
   for (int64_t b = block.first(); b < w.bodies; b += block.stride()) {

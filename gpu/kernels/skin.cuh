@@ -68,7 +68,7 @@ CUTPROOF_DEVICE inline NewVertex new_vertex(const DeviceView& w, int b, int p, i
 
 // Lanes that share a particle's cells: one for each corner that it is.
 inline constexpr int kCornerTeam = 8;
-inline constexpr int kReserveThreads = 1024;
+inline constexpr int kReserveThreads = 512;
 
 // Particles that change the cells around them, ascending: as many as Counters::skin_changes. And for each of them, first
 // how many vertices and cells it needs, then how many those before it do.

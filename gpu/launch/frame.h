@@ -54,14 +54,7 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
     mark(Stage::skin);
     launcher.if_nonzero(&w.counters->cut, [&](Launcher& inner) {
       inner.items(sort_memberships_kernel_object{}, w.particles, w);
-      if (w.bodies > 1) {
-        inner.blocks(number_slots_by_body_kernel_object{}, w.bodies, 256, 0, w);
-        return;
-      }
-      inner.items(flag_live_slots_kernel_object{}, w.slots_expected, w);
-      inner.exclusive_scan(w.slot_scratch, w.slot_scratch + w.slot_capacity, w.slot_capacity, &w.counters->scratch[0],
-                           &w.counters->slots_used);
-      inner.items(number_slots_kernel_object{}, w.slots_expected, w);
+      inner.blocks(number_slots_kernel_object{}, w.bodies, kNumberThreads, 0, w);
     });
     if (plan.skin) {
       launcher.if_nonzero(&w.counters->extracting, [&](Launcher& inner) { enqueue_skin_cells(inner, w, plan); });
