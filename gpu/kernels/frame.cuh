@@ -86,35 +86,18 @@ CUTPROOF_DEVICE void sort_memberships_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(sort_memberships_kernel);
 
-inline constexpr int kNumberThreads = 512;
-
 // Numbers in the order of slots: of each body from 0, whose slots interleave once clusters have split. A block for each
 // body.
 template <class Block>
 CUTPROOF_DEVICE void number_slots_kernel(Block& block, const DeviceView& w) {
-  constexpr int kEach = 4;  // neighbouring slots of a thread
-  const int used = w.counters->slots_used;
   for (int b = block.index(); b < w.bodies; b += block.count()) {
     if (!running(w, b)) continue;
-    int before = 0;
-    for (int tile = 0; tile < used; tile += kEach * block.size()) {
-      const int first = tile + kEach * block.thread();
-      bool mine[kEach];
-      int count = 0, total = 0;
-      for (int k = 0; k < kEach; ++k) {
-        const int s = first + k;
-        mine[k] = s < used && w.slot_size[s] > 0 && w.slot_body[s] == b;
-        count += mine[k] ? 1 : 0;
-      }
-      int number = before + block.exclusive_scan(count, total);
-      for (int k = 0; k < kEach; ++k) {
-        if (mine[k]) w.slot_number[first + k] = number++;
-      }
-      before += total;
-    }
+    count_off(
+        block, w.counters->slots_used, [&](int s) { return w.slot_size[s] > 0 && w.slot_body[s] == b; },
+        [&](int number, int s) { w.slot_number[s] = number; });
   }
 }
-CUTPROOF_KERNEL_THREADS(number_slots_kernel, kNumberThreads);
+CUTPROOF_KERNEL_THREADS(number_slots_kernel, kListThreads);
 
 // The frame counts up.
 template <class Block>

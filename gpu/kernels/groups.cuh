@@ -164,8 +164,8 @@ CUTPROOF_DEVICE void find_changed_clusters_kernel(Block& block, const DeviceView
 }
 CUTPROOF_KERNEL(find_changed_clusters_kernel);
 
-// Groups and loose particles of changed clusters are no more. By its first holder, in whose list it is: whoever's clusters
-// have changed had, as all of its group, a first one that has.
+// Groups and loose particles of changed clusters are no more. By its first holder, in whose list it is: whoever's
+// clusters have changed had, as all of its group, a first one that has.
 template <class Block>
 CUTPROOF_DEVICE void dissolve_groups_kernel(Block& block, const DeviceView& w) {
   using namespace groups_detail;
@@ -257,7 +257,7 @@ template <class Block>
 CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
   using namespace groups_detail;
   Counters& counters = *w.counters;
-  int* const next = block.template shared<int>(3);          // place, group and pair of a tile's first class
+  int* const next = block.template shared<int>(3);  // place, group and pair of a tile's first class
   int* const shared = block.template shared<int>(3 * kMostDealt);
   const bool whole = counters.groups_whole != 0;
   if (whole) {
@@ -284,9 +284,7 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
       return entry >= 0 && entry < size ? entry : -1;
     };
     const auto entry_at = [&](int k) { return fits ? shared[k] : looked_up(members[k]); };
-    const auto rank_at = [&](int k) -> int& {
-      return fits ? shared[kMostDealt + k] : rank_of(w)[members[k]];
-    };
+    const auto rank_at = [&](int k) -> int& { return fits ? shared[kMostDealt + k] : rank_of(w)[members[k]]; };
     int* const sizes = fits ? shared + 2 * kMostDealt : class_size(w) + begin;
     if (fits) {
       for (int k = block.thread(); k < size; k += block.size()) {
@@ -531,8 +529,8 @@ CUTPROOF_ENQUEUE void enqueue_groups(Launcher& launcher, const DeviceView& w) {
     stale.teams(find_changed_clusters_kernel_object{}, kMemberTeam, w.slots_expected, w);
     stale.teams(dissolve_groups_kernel_object{}, kMemberTeam, w.slots_expected, w);
     stale.teams(find_classes_kernel_object{}, kMemberTeam, w.slots_expected, w);
-    stale.blocks(deal_out_groups_kernel_object{}, w.slots_expected, kDealThreads,
-                 (3 * kMostDealt + 4) * sizeof(int), w);
+    stale.blocks(deal_out_groups_kernel_object{}, w.slots_expected, kDealThreads, (3 * kMostDealt + 4) * sizeof(int),
+                 w);
     stale.teams(measure_groups_kernel_object{}, kGroupTeam, w.group_capacity, w);
     stale.teams(measure_clusters_kernel_object{}, kMemberTeam, w.slots_expected, w);
     stale.clear(&c->groups_whole, sizeof(int));

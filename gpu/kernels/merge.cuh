@@ -433,11 +433,9 @@ CUTPROOF_KERNEL_THREADS(merge_chains_kernel, kMergeThreads);
 // A merge does not begin after a fault: what the faulty stage left may still hold dead particles.
 template <class Block>
 CUTPROOF_DEVICE void begin_merge_kernel(Block& block, DeviceView w) {
-  Counters& c = *w.counters;
-  int live = 0;
+  const Counters& c = *w.counters;
   for (int64_t s = block.first(); s < c.slots_used; s += block.stride()) {
     w.slot_flag[s] = 0;
-    live += w.slot_size[s];
     if (c.fault != 0 || !merges_now(w, w.slot_body[s])) continue;
     w.proposal[s] = -1;
     best_of_round(w, 0)[s] = -1;
@@ -446,17 +444,23 @@ CUTPROOF_DEVICE void begin_merge_kernel(Block& block, DeviceView w) {
     changed_after(w)[s] = 0;
     w.slot_flag[s] = w.slot_size[s] > 0 && w.slot_size[s] < w.body[w.slot_body[s]].tau;
   }
-  live = block.sum(live);
-  if (block.thread() == 0 && live > 0) block.atomic_add(&c.live_members, live);
 }
 CUTPROOF_KERNEL(begin_merge_kernel);
 
-// Whether the capacity surely suffices for a round: it unites each list at most once, and each small cluster with one
-// other to at most cap members.
+// Lists the small clusters, and asks whether the capacity surely suffices for a round: it unites each list at most
+// once, and each small cluster with one other to at most cap members. One block.
 template <class Block>
-CUTPROOF_DEVICE void begin_rounds_kernel(Block& block, DeviceView w) {
-  if (block.first() != 0) return;
+CUTPROOF_DEVICE void begin_rounds_kernel(Block& block, const DeviceView& w) {
+  if (block.index() != 0) return;
   Counters& c = *w.counters;
+  const int small = count_off(
+      block, c.slots_used, [&](int s) { return w.slot_flag[s] != 0; }, [&](int n, int s) { w.small_clusters[n] = s; });
+  int live = 0;
+  for (int s = block.thread(); s < c.slots_used; s += block.size()) live += w.slot_size[s];
+  live = block.sum(live);
+  if (block.thread() != 0) return;
+  c.small = small;
+  c.live_members = live;
   int cap = 0;
   for (int b = 0; b < w.bodies; ++b) {
     const BodyConstants& body = w.body[b];
@@ -475,7 +479,7 @@ CUTPROOF_DEVICE void begin_rounds_kernel(Block& block, DeviceView w) {
   c.changed = 0;
   c.failed = 0;
 }
-CUTPROOF_KERNEL(begin_rounds_kernel);
+CUTPROOF_KERNEL_THREADS(begin_rounds_kernel, kListThreads);
 
 template <class Block>
 CUTPROOF_DEVICE void note_rest_dirty_kernel(Block& block, DeviceView w) {
@@ -531,10 +535,8 @@ CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, con
   };
   const auto rounds = [&](Launcher& on) { on.while_nonzero(&c->merging, round); };
 
-  launcher.clear(&c->live_members, sizeof(int));
   launcher.items(begin_merge_kernel_object{}, w.slots_expected, w);
-  launcher.select(w.slot_flag, w.slot_capacity, w.small_clusters, &c->small, &c->slots_used);
-  launcher.items(begin_rounds_kernel_object{}, 1, w);
+  launcher.blocks(begin_rounds_kernel_object{}, 1, kListThreads, 0, w);
   launcher.if_nonzero(&c->small, [&](Launcher& inner) {
     if (plan.single_pass_merge) {
       propose(inner, propose_once_kernel_object{});

@@ -54,8 +54,8 @@ CUTPROOF_DEVICE inline Cell cell_at(const DeviceView& w, const BodyConstants& bo
   return cell;
 }
 
-// The vertex that p's death, or p in a first skin, brings about along d; no owner: none. No two particles bring about the
-// same one.
+// The vertex that p's death, or p in a first skin, brings about along d; no owner: none. No two particles bring about
+// the same one.
 struct NewVertex {
   int owner, direction;
 };
@@ -70,8 +70,8 @@ CUTPROOF_DEVICE inline NewVertex new_vertex(const DeviceView& w, int b, int p, i
 inline constexpr int kCornerTeam = 8;
 inline constexpr int kReserveThreads = 512;
 
-// Particles that change the cells around them, ascending: as many as Counters::skin_changes. And for each of them, first
-// how many vertices and cells it needs, then how many those before it do.
+// Particles that change the cells around them, ascending: as many as Counters::skin_changes. And for each of them,
+// first how many vertices and cells it needs, then how many those before it do.
 CUTPROOF_BOTH inline int* changed(const DeviceView& w) { return w.fallen; }
 CUTPROOF_BOTH inline int* new_vertices(const DeviceView& w) { return w.particle_scratch; }
 CUTPROOF_BOTH inline int* new_cells(const DeviceView& w) { return w.particle_scratch + w.particles; }

@@ -1,10 +1,35 @@
-// Ascending lists of different numbers: searching in one, uniting two. Merge and expand use them on the members of
-// clusters. A list is anything that operator[] gives numbers of.
+// Ascending lists of different numbers: making one, searching in one, uniting two. Merge and expand use them on the
+// members of clusters. A list is anything that operator[] gives numbers of.
 #pragma once
 #include "gpu/launch/block.h"
 #include "gpu/state/device_view.h"
 
 namespace cutproof::gpu {
+
+inline constexpr int kListThreads = 512;
+
+// give(n, k) for the k in [0, count) that are wanted, n being how many before it are. Reached by all threads of one
+// block; returns how many there are.
+template <class Block, class Wanted, class Give>
+CUTPROOF_DEVICE int count_off(Block& block, int count, Wanted wanted, Give give) {
+  constexpr int kEach = 4;  // neighbours of a thread
+  int before = 0;
+  for (int tile = 0; tile < count; tile += kEach * block.size()) {
+    const int first = tile + kEach * block.thread();
+    bool is[kEach];
+    int own = 0, total = 0;
+    for (int k = 0; k < kEach; ++k) {
+      is[k] = first + k < count && wanted(first + k);
+      own += is[k] ? 1 : 0;
+    }
+    int n = before + block.exclusive_scan(own, total);
+    for (int k = 0; k < kEach; ++k) {
+      if (is[k]) give(n++, first + k);
+    }
+    before += total;
+  }
+  return before;
+}
 
 // How many numbers of the list are less than `value`.
 template <class List, class Value>

@@ -103,6 +103,10 @@ CUTPROOF_KERNEL(begin_split_kernel);
 template <class Block>
 CUTPROOF_DEVICE void list_fallen_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
+  for (int64_t s = block.first(); s < w.counters->slots_used; s += block.stride()) {
+    by_slot(w)[s] = 0;
+    extra_components(w)[s] = 0;
+  }
   for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
     const int p = static_cast<int>(i);
     if (alive(w, p)) continue;
@@ -237,18 +241,20 @@ CUTPROOF_DEVICE void mark_affected_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(mark_affected_kernel);
 
+// One block.
 template <class Block>
-CUTPROOF_DEVICE void flag_affected_kernel(Block& block, DeviceView w) {
+CUTPROOF_DEVICE void list_affected_kernel(Block& block, const DeviceView& w) {
   using namespace split_detail;
-  for (int64_t b = block.first(); b < w.bodies; b += block.stride()) {
-    if (drops_debris(w, static_cast<int>(b))) w.debris_anywhere[b] = 0;
+  if (block.index() != 0) return;
+  for (int b = block.thread(); b < w.bodies; b += block.size()) {
+    if (drops_debris(w, b)) w.debris_anywhere[b] = 0;
   }
-  for (int64_t s = block.first(); s < w.counters->slots_used; s += block.stride()) {
-    w.slot_flag[s] = by_slot(w)[s] != 0;
-    extra_components(w)[s] = 0;
-  }
+  const int affected = count_off(
+      block, w.counters->slots_used, [&](int s) { return by_slot(w)[s] != 0; },
+      [&](int n, int s) { w.affected[n] = s; });
+  if (block.thread() == 0) w.counters->affected = affected;
 }
-CUTPROOF_KERNEL(flag_affected_kernel);
+CUTPROOF_KERNEL_THREADS(list_affected_kernel, kListThreads);
 
 // ---- labels
 
@@ -568,10 +574,8 @@ CUTPROOF_ENQUEUE void enqueue_split(Launcher& launcher, const DeviceView& w, con
     });
     launcher.items(search_debris_kernel_object{}, w.particles, w);
   }
-  launcher.clear(by_slot(w), sizeof(int) * static_cast<std::size_t>(w.slot_capacity));
   launcher.items(mark_affected_kernel_object{}, w.particles, w);
-  launcher.items(flag_affected_kernel_object{}, w.slots_expected, w);
-  launcher.select(w.slot_flag, w.slot_capacity, w.affected, &counters->affected, &counters->slots_used);
+  launcher.blocks(list_affected_kernel_object{}, 1, kListThreads, 0, w);
 
   // Merging keeps to the cap, which plan.largest_cluster includes; expansion may pass any size.
   const int largest = plan.largest_cluster < 1 ? 1 : plan.largest_cluster;

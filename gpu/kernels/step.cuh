@@ -307,8 +307,8 @@ CUTPROOF_DEVICE inline Float3 carried_to(Float3 base, float lost, Float3 predict
   return predicted + (map(r) - lost * (predicted - base));
 }
 
-// How many groups of a substep were resolved when an iteration began. Those that are resolved in it are counted with the
-// next one, so that this number stands from one iteration to the next, and may be read ahead.
+// How many groups of a substep were resolved when an iteration began. Those that are resolved in it are counted with
+// the next one, so that this number stands from one iteration to the next, and may be read ahead.
 CUTPROOF_DEVICE inline int* listed_before(const DeviceView& w, int substep, int iteration) {
   return &w.counters->listed[substep % 2][iteration % 2];
 }
@@ -1060,8 +1060,8 @@ CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int
   // Mean of the goals, less `from`: small numbers, so that summing them costs no digits of d.
   const int clusters = w.membership_count[p], begin = w.membership_begin[p], end = w.membership_begin[p + 1];
   const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
-  block.wait_for_earlier();   // for the clusters: all else is older
-  Float3 pull = at - from;  // a particle in no cluster stays where it is
+  block.wait_for_earlier();  // for the clusters: all else is older
+  Float3 pull = at - from;   // a particle in no cluster stays where it is
   if (clusters > 0) {
     const Coordinates c = coordinates(pace, particle.node);
     Float3 sum;

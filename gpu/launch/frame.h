@@ -54,7 +54,7 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
     mark(Stage::skin);
     launcher.if_nonzero(&w.counters->cut, [&](Launcher& inner) {
       inner.items(sort_memberships_kernel_object{}, w.particles, w);
-      inner.blocks(number_slots_kernel_object{}, w.bodies, kNumberThreads, 0, w);
+      inner.blocks(number_slots_kernel_object{}, w.bodies, kListThreads, 0, w);
     });
     if (plan.skin) {
       launcher.if_nonzero(&w.counters->extracting, [&](Launcher& inner) { enqueue_skin_cells(inner, w, plan); });
