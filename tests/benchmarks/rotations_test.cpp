@@ -44,7 +44,7 @@ void expect_times(const json& seconds) {
 // What results_schema.md promises, for these methods in these precisions and every case.
 void expect_complete(const json& document, const std::set<std::pair<std::string, std::string>>& methods) {
   EXPECT_EQ(document.at("format"), "cutproof.bench");
-  EXPECT_EQ(document.at("format_version"), 2);
+  EXPECT_EQ(document.at("format_version"), 3);
   EXPECT_EQ(document.at("suite"), "rotations");
   EXPECT_EQ(document.at("commit"), "0123456789ab");
   for (const char* text : {"cutproof", "date", "device"}) EXPECT_TRUE(document.at(text).is_string()) << text;
