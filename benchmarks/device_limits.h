@@ -17,8 +17,8 @@ struct DeviceLimits {
   // every walk of kWalk dependent reads, every kernel that meets kFewMeetings or kManyMeetings times.
   std::vector<double> copy, short_chain, long_chain, walk, few_meetings, many_meetings;
   double copy_bytes = 0;
-  int64_t bytes_lost = 0;   // of the last 16 MiB: those that are not what was copied
-  int64_t walks_lost = 0;   // that did not end where the walk ends
+  int64_t bytes_lost = 0;       // of the last 16 MiB: those that are not what was copied
+  int64_t walks_lost = 0;       // that did not end where the walk ends
   int64_t meetings_missed = 0;  // threads that went on from a meeting before another had come, at the last of a kernel
 
   static constexpr int kWalk = 1 << 15, kFewMeetings = 100, kManyMeetings = 1100;

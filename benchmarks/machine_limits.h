@@ -12,9 +12,9 @@
 namespace cutproof::benchmarks {
 
 struct MachineLimits {
-  double copy_bytes_per_second = 0;          // read + written
-  std::optional<double> graph_node_seconds;  // device only
-  std::optional<double> chain_seconds;       // of a graph of 40 empty kernels; device only
+  double copy_bytes_per_second = 0;                                // read + written
+  std::optional<double> graph_node_seconds;                        // device only
+  std::optional<double> chain_seconds;                             // of a graph of 40 empty kernels; device only
   std::optional<double> l2_round_trip_seconds, grid_sync_seconds;  // device only (device_limits.h)
 
   // What a kernel takes at least that waits for the one before it and reads what that has written; 0 without a device.

@@ -14,9 +14,9 @@
 namespace cutproof::benchmarks {
 
 struct StageLimit {
-  // That the stage reads and writes, each array counted once for each kernel that uses it, and what the caches keep of a
-  // gathered array counted as if it were all of it. What only cut tissue costs is left out: it has no share that a body
-  // has before it is cut.
+  // That the stage reads and writes, each array counted once for each kernel that uses it, and what the caches keep of
+  // a gathered array counted as if it were all of it. What only cut tissue costs is left out: it has no share that a
+  // body has before it is cut.
   double bytes = 0;
   int64_t phases = 0;  // kernels one after the other
 };

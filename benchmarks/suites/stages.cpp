@@ -74,9 +74,9 @@ json scene_json(const BenchScene& scene, const Contender& contender, const Measu
 std::map<std::string, StageLimit> limits_of(const BenchScene& scene, const Contender& contender) {
   std::map<std::string, StageLimit> limits;
   if (!contender.described->takes_kernel_options) return limits;
-  const StageLimits found = stage_limits(
-      scene.setup, scene.state,
-      contender.split == "global" ? gpu::SplitMethod::global_labels : gpu::SplitMethod::blocks);
+  const StageLimits found =
+      stage_limits(scene.setup, scene.state,
+                   contender.split == "global" ? gpu::SplitMethod::global_labels : gpu::SplitMethod::blocks);
   for (const Stage stage : kStages) limits.emplace(name_of(stage), found[static_cast<std::size_t>(stage)]);
   return limits;
 }

@@ -62,8 +62,7 @@ TEST(Limits, CountTheBytesOfABlock) {
   const auto scene = cutproof::benchmarks::make_bench_scene(1000, 1);
   ASSERT_EQ(scene.setup.body.particle_count(), 20 * 10 * 5);
   ASSERT_EQ(scene.setup.body.particle_at.size(), 22U * 12 * 7);
-  const auto limits =
-      cutproof::benchmarks::stage_limits(scene.setup, scene.state, cutproof::gpu::SplitMethod::blocks);
+  const auto limits = cutproof::benchmarks::stage_limits(scene.setup, scene.state, cutproof::gpu::SplitMethod::blocks);
   const auto bytes = [&](Stage stage) { return limits[static_cast<std::size_t>(stage)].bytes; };
   EXPECT_EQ(bytes(Stage::detect), 26 * 1000 + 4 * 1848);
   const double vertices = 2 * (20 * 10 + 10 * 5 + 5 * 20), owners = 20 * 10 * 5 - 18 * 8 * 3;
