@@ -244,7 +244,8 @@ CUTPROOF_DEVICE inline Ball ball_around(const Pace& pace, const Group& group, Fl
 CUTPROOF_DEVICE inline float way_along(Float4 row, float radius) {
   return fabsf(row.w) + (fabsf(row.x) + fabsf(row.y) + fabsf(row.z)) * radius;
 }
-// No longer a way along any axis than this part of the room leaves it: 1 / √3, less what is rounded.
+// No longer a way along any axis than this part of the room leaves it: 1 / √3 = 0.57735, less what is rounded, the way
+// itself (8 roundings) and what room_around() leaves for farther coordinates (32 √3): some 4e-6 of it, of 6e-4.
 inline constexpr float kOfRoom = 0.577f;
 
 // ---- substeps

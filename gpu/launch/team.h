@@ -146,10 +146,6 @@ class Team {
     if constexpr (Block::on_device) return block_.shuffle(mask(), job, ones(first - 1));
     return job;
   }
-  // Orders memory operations of the lanes.
-  CUTPROOF_DEVICE void sync() const {
-    if constexpr (Block::on_device) block_.sync_warp(mask());
-  }
   // To every lane; exact for whole numbers only, because lanes of the device and the host's one have different terms.
   CUTPROOF_DEVICE int total(int value) const {
     if constexpr (Block::on_device) {

@@ -69,6 +69,18 @@ TEST(Limits, CountTheBytesOfABlock) {
   const auto members = static_cast<double>(scene.state.clusters.members.size());  // no cluster lies inside
   EXPECT_EQ(bytes(Stage::skin), 21 * vertices + 32 * owners + 84 * scene.state.clusters.count() + 28 * members);
   EXPECT_EQ(bytes(Stage::split), 0);
+  // Boxes of 5 grown by 1: along x four of them share 2 layers each with the next, along y two, along z one. Classes of
+  // 4 2 3 2 3 2 4 by 4 2 4 by 5 particles; the four of 80 make two groups each. A grip names the first two layers along
+  // x: of the two classes of 80 there it takes the one group or the other, and of the 40 between them a group of its
+  // own.
+  ASSERT_EQ(scene.setup.grips.size(), 1U);
+  ASSERT_EQ(scene.setup.grips[0].particles.size(), 2U * 10 * 5);
+  const double groups = 7 * 3 + 4 + 1, pairs = 12 * 1 + (6 + 4 + 1) * 2 + 3 * 4;
+  ASSERT_TRUE(scene.setup.has_blade);
+  ASSERT_EQ(scene.setup.step.acceleration, cutproof::Acceleration::none);
+  ASSERT_EQ(scene.setup.step.substeps * 100 + scene.setup.step.iterations, 404);
+  const double match = 16 * pairs + 80 * groups + 192 * 8, advance = 16 * pairs + 296 * groups + 48 * 8;
+  EXPECT_EQ(bytes(Stage::step), 92 * 1000 + 4 * (68 * 1000 + 256 * groups + 4 * (match + advance)));
 }
 
 TEST(Limits, ASlowerMachineRaisesThem) {
