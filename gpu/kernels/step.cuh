@@ -433,17 +433,22 @@ CUTPROOF_DEVICE inline Float4 predicted_row(const Pace& pace, int axis, const Ax
           now.place.z + pace.dt * now.velocity.z, now.place.w + (pace.dt * now.velocity.w + pace.fall[axis])};
 }
 
-// What a particle began the frame with, less what its group did.
+// What a particle began the frame with, and that less what its group did.
 struct Own {
+  Float4 began;  // displacement; w: mass
   Float3 shape, motion;
-  float mass;
 };
 CUTPROOF_DEVICE inline Own own_of(const DeviceView& w, int p, Float3 place, Float3 velocity) {
   const Float4 d = w.displacement[p];
-  return {xyz(d) - place, xyz(w.velocity[p]) - velocity, d.w};
+  return {d, xyz(d) - place, xyz(w.velocity[p]) - velocity};
 }
-CUTPROOF_DEVICE inline Float3 led_to(const Map& map, const Parts& parts, const Own& own, Float3 r) {
-  return map.moved() + ((parts.shape * own.shape + parts.motion * own.motion) + map.linear(r));
+// Where it is now. What is added to where it was is small where little has happened; but where its group moves as a
+// whole, it does just what that does. place: D.
+CUTPROOF_DEVICE inline Float3 led_to(const Map& map, const Parts& parts, Float3 place, const Own& own, Float3 r) {
+  const Float3 apart = ((parts.shape - 1.0f) * own.shape + parts.motion * own.motion) + map.linear(r);
+  const auto none = [](Float3 a) { return a.x == 0 && a.y == 0 && a.z == 0; };
+  if (none(own.shape) && none(apart)) return map.moved();
+  return xyz(own.began) + ((map.moved() - place) + apart);
 }
 
 // Gives the particles of such a group positions of their own: where the substep began, and its prediction.
@@ -463,10 +468,10 @@ CUTPROOF_DEVICE void track_particles(const AnyTeam& team, const DeviceView& w, c
   team.each(group.head.size, [&](int k) {
     const int o = group.head.begin + k, node = constant(&w.place_node[o]);
     const Own own = own_of(w, w.place_particle[o], place, velocity);
-    const Float3 r = group.rest_of(pace, node), start = led_to(now, parts.place, own, r);
+    const Float3 r = group.rest_of(pace, node), start = led_to(now, parts.place, place, own, r);
     const float side = held ? 0.0f : blade_side(contacts, {pace.h, grid_node(pace, node)}, start);
-    w.start[o] = with_w(start, own.mass);
-    w.predicted[o] = with_w(led_to(next, of_prediction, own, r), side);
+    w.start[o] = with_w(start, own.began.w);
+    w.predicted[o] = with_w(led_to(next, of_prediction, place, own, r), side);
   });
 }
 
@@ -805,22 +810,24 @@ CUTPROOF_DEVICE void end_group(const Team<Block, kParticleTeam>& team, const Dev
   }
   const Float3 first_place = xyz(w.group_origin[2 * int64_t{g}]),
                first_velocity = xyz(w.group_origin[2 * int64_t{g} + 1]), base = xyz(w.group_base[g]);
-  const FrameParts parts = load_parts(w, body, pace.substeps);
+  const FrameParts before = load_parts(w, body, pace.substeps - 1), after = load_parts(w, body, pace.substeps);
   const float kept = 1.0f - lost_fraction(pace, pace.iterations);
-  Map place, velocity;
+  Map start, end;
   for (int axis = 0; axis < 3; ++axis) {
     const int64_t at = 3 * int64_t{g} + axis;
     const Float4 map = pace.iterations > 0 ? w.group_map[at] : Float4{};
-    const Axis end = axis_after(pace, kept, base[axis], map, load_axis(w, at));
-    place.row[axis] = end.place;
-    velocity.row[axis] = end.velocity;
+    const Axis now = load_axis(w, at);
+    start.row[axis] = now.place;
+    end.row[axis] = axis_after(pace, kept, base[axis], map, now).place;
   }
   team.each(head.size, [&](int k) {
     const int p = w.place_particle[head.begin + k];
     const Own own = own_of(w, p, first_place, first_velocity);
-    const Float3 r = group.rest(w, pace, k);
-    w.displacement[p] = with_w(led_to(place, parts.place, own, r), own.mass);
-    w.velocity[p] = with_w(led_to(velocity, parts.velocity, own, r), 0.0f);
+    const Float3 r = group.rest(w, pace, k), d = led_to(end, after.place, first_place, own, r);
+    // Not from velocities of the same form: what a position rounds to is how far its particle has moved.
+    const Float3 v = pace.decay_per_dt * (d - led_to(start, before.place, first_place, own, r));
+    w.displacement[p] = with_w(d, own.began.w);
+    w.velocity[p] = with_w(v, 0.0f);
   });
 }
 
