@@ -374,22 +374,23 @@ CUTPROOF_DEVICE void list_tracked(Block& block, const AnyTeam& team, const Devic
 // ---- groups that nothing has touched in this frame
 //
 // Their particles began it with d = D + u and v = V + m, D and V being the group's and u and m the particle's own, and
-// are now at d = S + a u + b m + A(r), with velocities of the same form. a and b are numbers of body and substep.
+// have moved since by T + (a - 1) u + b m + A(r). a and b are numbers of body and substep. Where u and m are zero for
+// all of them, D + T is kept instead of T, and nothing is added to where a particle was: then they do to the bit what
+// single particles do that move alike.
 
 struct Parts {
-  float shape, motion;  // a, b
+  float shape, motion;  // a - 1, which may be small; b
 };
 struct FrameParts {
   Parts place, velocity;
 };
-static_assert(sizeof(FrameParts) == sizeof(Float4));
 CUTPROOF_DEVICE inline Parts predicted_parts(const Pace& pace, const FrameParts& now) {
   return {now.place.shape + pace.dt * now.velocity.shape, now.place.motion + pace.dt * now.velocity.motion};
 }
-CUTPROOF_DEVICE inline FrameParts parts_after(const Pace& pace, float kept, const FrameParts& now) {
+CUTPROOF_DEVICE inline FrameParts parts_after(const Pace& pace, float lost, const FrameParts& now) {
   const Parts predicted = predicted_parts(pace, now);
   FrameParts next;
-  next.place = {kept * predicted.shape, kept * predicted.motion};
+  next.place = {predicted.shape - lost * (1.0f + predicted.shape), predicted.motion - lost * predicted.motion};
   next.velocity = {pace.decay_per_dt * (next.place.shape - now.place.shape),
                    pace.decay_per_dt * (next.place.motion - now.place.motion)};
   return next;
@@ -402,35 +403,46 @@ CUTPROOF_DEVICE inline FrameParts load_parts(const DeviceView& w, int body, int 
   return {{parts.x, parts.y}, {parts.z, parts.w}};
 }
 CUTPROOF_DEVICE inline void store_parts(const DeviceView& w, int body, const Pace& pace) {
-  const float kept = 1.0f - lost_fraction(pace, pace.iterations);
-  FrameParts now = {{1, 0}, {0, 1}};
+  const float lost = lost_fraction(pace, pace.iterations);
+  FrameParts now = {{0, 0}, {0, 1}};
   for (int substep = 0; substep <= pace.substeps; ++substep) {
     *parts_of(w, body, substep) = {now.place.shape, now.place.motion, now.velocity.shape, now.velocity.motion};
-    now = parts_after(pace, kept, now);
+    now = parts_after(pace, lost, now);
   }
 }
 
-// Along one axis: its row of A, with S in w, and the same of velocities.
+// Along one axis: its row of A, with T in w; and the same of velocities.
 struct Axis {
   Float4 place, velocity;
 };
 CUTPROOF_DEVICE inline Axis load_axis(const DeviceView& w, int64_t at) {
   return {w.group_place[at], w.group_velocity[at]};
 }
-// After a substep with this map; base: of its prediction.
-CUTPROOF_DEVICE inline Axis axis_after(const Pace& pace, float kept, float base, Float4 map, const Axis& now) {
-  const auto led = [&](float by_map, float is, float rate) { return by_map + kept * (is + pace.dt * rate); };
-  const auto rate = [&](float is, float was) { return pace.decay_per_dt * (is - was); };
-  Axis next;
-  next.place = {led(map.x, now.place.x, now.velocity.x), led(map.y, now.place.y, now.velocity.y),
-                led(map.z, now.place.z, now.velocity.z), base + map.w};
-  next.velocity = row_of(rate, next.place, now.place);
-  return next;
-}
-// Its prediction, in which S is the base. As predict().
+// Its prediction, as predict().
 CUTPROOF_DEVICE inline Float4 predicted_row(const Pace& pace, int axis, const Axis& now) {
   return {now.place.x + pace.dt * now.velocity.x, now.place.y + pace.dt * now.velocity.y,
           now.place.z + pace.dt * now.velocity.z, now.place.w + (pace.dt * now.velocity.w + pace.fall[axis])};
+}
+// After a substep with this map.
+CUTPROOF_DEVICE inline Axis axis_after(const Pace& pace, int axis, float lost, Float4 map, const Axis& now) {
+  const Float4 predicted = predicted_row(pace, axis, now);
+  const auto rate = [&](float is, float was) { return pace.decay_per_dt * (is - was); };
+  Axis next;
+  const auto led = [&](float is, float by_map) { return is + (by_map - lost * is); };
+  next.place = {led(predicted.x, map.x), led(predicted.y, map.y), led(predicted.z, map.z), predicted.w + map.w};
+  next.velocity = row_of(rate, next.place, now.place);
+  return next;
+}
+
+// What its particles have in common when the frame begins.
+struct Origin {
+  Float4 place, velocity;  // D, V; w: at least every |u|, |m|
+  CUTPROOF_DEVICE bool uniform() const { return place.w == 0 && velocity.w == 0; }
+  // What T counts from.
+  CUTPROOF_DEVICE Float3 from() const { return uniform() ? Float3{} : xyz(place); }
+};
+CUTPROOF_DEVICE inline Origin origin_of(const DeviceView& w, int g) {
+  return {w.group_origin[2 * int64_t{g}], w.group_origin[2 * int64_t{g} + 1]};
 }
 
 // What a particle began the frame with, and that less what its group did.
@@ -438,17 +450,16 @@ struct Own {
   Float4 began;  // displacement; w: mass
   Float3 shape, motion;
 };
-CUTPROOF_DEVICE inline Own own_of(const DeviceView& w, int p, Float3 place, Float3 velocity) {
+CUTPROOF_DEVICE inline Own own_of(const DeviceView& w, int p, const Origin& origin) {
   const Float4 d = w.displacement[p];
-  return {d, xyz(d) - place, xyz(w.velocity[p]) - velocity};
+  return {d, xyz(d) - xyz(origin.place), xyz(w.velocity[p]) - xyz(origin.velocity)};
 }
-// Where it is now. What is added to where it was is small where little has happened; but where its group moves as a
-// whole, it does just what that does. place: D.
-CUTPROOF_DEVICE inline Float3 led_to(const Map& map, const Parts& parts, Float3 place, const Own& own, Float3 r) {
-  const Float3 apart = ((parts.shape - 1.0f) * own.shape + parts.motion * own.motion) + map.linear(r);
-  const auto none = [](Float3 a) { return a.x == 0 && a.y == 0 && a.z == 0; };
-  if (none(own.shape) && none(apart)) return map.moved();
-  return xyz(own.began) + ((map.moved() - place) + apart);
+// Where it is now. Its group's part is small where little has happened, wherever the others are.
+CUTPROOF_DEVICE inline Float3 led_to(const Map& map, const Parts& parts, const Origin& origin, const Own& own,
+                                     Float3 r) {
+  const Float3 apart = (parts.shape * own.shape + parts.motion * own.motion) + map.linear(r);
+  const Float3 from = origin.uniform() ? Float3{} : xyz(own.began);
+  return from + (map.moved() + apart);
 }
 
 // Gives the particles of such a group positions of their own: where the substep began, and its prediction.
@@ -458,7 +469,7 @@ CUTPROOF_DEVICE void track_particles(const AnyTeam& team, const DeviceView& w, c
   const int64_t g = group.index;
   const FrameParts parts = load_parts(w, body_of_group(w, group.head), substep);
   const Parts of_prediction = predicted_parts(pace, parts);
-  const Float3 place = xyz(w.group_origin[2 * g]), velocity = xyz(w.group_origin[2 * g + 1]);
+  const Origin origin = origin_of(w, group.index);
   Map now, next;
   for (int axis = 0; axis < 3; ++axis) {
     const Axis is = load_axis(w, 3 * g + axis);
@@ -467,11 +478,11 @@ CUTPROOF_DEVICE void track_particles(const AnyTeam& team, const DeviceView& w, c
   }
   team.each(group.head.size, [&](int k) {
     const int o = group.head.begin + k, node = constant(&w.place_node[o]);
-    const Own own = own_of(w, w.place_particle[o], place, velocity);
-    const Float3 r = group.rest_of(pace, node), start = led_to(now, parts.place, place, own, r);
+    const Own own = own_of(w, w.place_particle[o], origin);
+    const Float3 r = group.rest_of(pace, node), start = led_to(now, parts.place, origin, own, r);
     const float side = held ? 0.0f : blade_side(contacts, {pace.h, grid_node(pace, node)}, start);
     w.start[o] = with_w(start, own.began.w);
-    w.predicted[o] = with_w(led_to(next, of_prediction, place, own, r), side);
+    w.predicted[o] = with_w(led_to(next, of_prediction, origin, own, r), side);
   });
 }
 
@@ -527,28 +538,35 @@ CUTPROOF_DEVICE void sum_group(const Team<Block, kParticleTeam>& team, const Dev
     first_velocity = w.velocity[p];
     first_velocity.w = first_place.w = mass_share(first_place.w);
   }
-  const auto sum = [&](auto value, float far, int which, Float4* rows, Float4* state) {
+  const auto sum = [&](auto value, float far, Float4* rows) {
     typename Team<Block, kParticleTeam>::template Parted<12> total;
     const Float4 base = sum_about(team, w, group, pace, per_mass, far, value, total);
     total.each(team, [&](int n, float of) { store_moment(rows, g, n, of); });
-    if (!team.leads()) return;
-    w.group_origin[2 * int64_t{g} + which] = base;
-    for (int axis = 0; axis < 3; ++axis) state[3 * int64_t{g} + axis] = {0, 0, 0, xyz(base)[axis]};
+    return base;
   };
-  sum(
+  Origin origin;
+  origin.place = sum(
       [&](int k) {
         if (k == first) return first_place;
         const Float4 d = w.displacement[particle(k)];
         return with_w(xyz(d), mass_share(d.w));
       },
-      kFarBase * pace.h, 0, w.frame_shape, w.group_place);
-  sum(
+      kFarBase * pace.h, w.frame_shape);
+  origin.velocity = sum(
       [&](int k) {
         if (k == first) return first_velocity;
         const int p = particle(k);
         return with_w(xyz(w.velocity[p]), mass_share(w.displacement[p].w));
       },
-      kFarBase * pace.h / pace.dt, 1, w.frame_motion, w.group_velocity);
+      kFarBase * pace.h / pace.dt, w.frame_motion);
+  if (!team.leads()) return;
+  w.group_origin[2 * int64_t{g}] = origin.place;
+  w.group_origin[2 * int64_t{g} + 1] = origin.velocity;
+  const Float3 since = origin.uniform() ? xyz(origin.place) : Float3{};
+  for (int axis = 0; axis < 3; ++axis) {
+    w.group_place[3 * int64_t{g} + axis] = {0, 0, 0, since[axis]};
+    w.group_velocity[3 * int64_t{g} + axis] = {0, 0, 0, xyz(origin.velocity)[axis]};
+  }
 }
 
 // Begins a substep of a group that nothing has touched so far. Says whether something may in its prediction, or a grip
@@ -570,15 +588,10 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
   }
   const FrameParts parts = load_parts(w, body, substep);
   const Parts of_prediction = predicted_parts(pace, parts);
-  const float kept = 1.0f - lost_fraction(pace, pace.iterations), per_h = pace.per_h;
+  const float lost = lost_fraction(pace, pace.iterations), per_h = pace.per_h;
   // All that is read before anything is written: behind a store, each would be waited for by itself.
   Rows<Team<Block, kRows>> place, velocity, map, shape, motion;
-  Float4 last_base, origin, first_velocity;
-  if (substep > 0) last_base = w.group_base[g];
-  if constexpr (kContacts) {
-    origin = w.group_origin[2 * int64_t{g}];
-    first_velocity = w.group_origin[2 * int64_t{g} + 1];
-  }
+  const Origin origin = origin_of(w, g);
   team.each(3, [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
     place.of(axis) = w.group_place[at];
@@ -592,31 +605,31 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
     const int64_t at = 3 * int64_t{g} + axis;
     Axis now = {place.of(axis), velocity.of(axis)};
     if (substep > 0) {
-      now = axis_after(pace, kept, xyz(last_base)[axis], map.of(axis), now);
+      now = axis_after(pace, axis, lost, map.of(axis), now);
       place.of(axis) = w.group_place[at] = now.place;
       w.group_velocity[at] = now.velocity;
     }
     predicted.of(axis) = predicted_row(pace, axis, now);
   });
-  Float4 base = {};
+  Map to = predicted.all(team);
+  Float4 base = with_w(origin.from() + to.moved(), 0.0f);
+  for (Float4& row : to.row) row.w = 0;
   if constexpr (kContacts) {
     // Every particle's own part of where it is, and of its prediction.
     const auto reach_of = [&](const Parts& part) {
-      return (fabsf(part.shape) * origin.w + fabsf(part.motion) * first_velocity.w) * (1.0f + kOfRoundings);
+      return (fabsf(1.0f + part.shape) * origin.place.w + fabsf(part.motion) * origin.velocity.w) *
+             (1.0f + kOfRoundings);
     };
-    const Map to = predicted.all(team);
     const float own = reach_of(of_prediction);
-    base = with_w(to.moved(), (greatest_stretch(to, 0.0f) * head.radius + own) * (1.0f + kOfRoundings));
+    base.w = (greatest_stretch(to, 0.0f) * head.radius + own) * (1.0f + kOfRoundings);
     int side = 1;
     if (contacts.move != nullptr) {
-      Map from = place.all(team);
-      const Float3 moved = from.moved();
-      for (Float4& row : from.row) row.w = 0;
-      side = side_of_all(contacts, ball_around(pace, group, with_w(moved, reach_of(parts.place)), 1.0f, from));
+      const Map from = place.all(team);
+      side = side_of_all(contacts, ball_around(pace, group, with_w(origin.from(), reach_of(parts.place)), 1.0f, from));
     }
     // What an iteration adds is M(r), and takes is a part of e: a ball that contains the rest shape too contains every
     // such d~ - l e.
-    Ball ball = ball_around(pace, group, with_w({}, own), 1.0f, to);
+    Ball ball = ball_around(pace, group, with_w(xyz(base), own), 1.0f, to);
     ball.radius = fmaxf(ball.radius, pace.h * head.radius);
     const float room = room_around(contacts, ball, side);
     const bool held = held_by(w, pace, head.hold_set, substep).active;
@@ -627,15 +640,14 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
       w.group_resolved[g] = kCarried;
     }
     if (held || !(room > 0)) return true;
-  } else {
-    base = with_w(predicted.all(team).moved(), 0.0f);
-    if (team.leads()) w.group_base[g] = base;
+  } else if (team.leads()) {
+    w.group_base[g] = base;
   }
   team.each(3, [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
     const Float4 row = predicted.of(axis), u = shape.of(axis), m = motion.of(axis);
     const auto own = [&](float of_shape, float of_motion) {
-      return of_prediction.shape * of_shape + of_prediction.motion * of_motion;
+      return (1.0f + of_prediction.shape) * of_shape + of_prediction.motion * of_motion;
     };
     const Float4 moment = {own(u.x, m.x) + per_h * (row.x * upper.x + row.y * upper.y + row.z * upper.z),
                            own(u.y, m.y) + per_h * (row.x * upper.y + row.y * upper.w + row.z * lower.x),
@@ -808,24 +820,23 @@ CUTPROOF_DEVICE void end_group(const Team<Block, kParticleTeam>& team, const Dev
       return;
     }
   }
-  const Float3 first_place = xyz(w.group_origin[2 * int64_t{g}]),
-               first_velocity = xyz(w.group_origin[2 * int64_t{g} + 1]), base = xyz(w.group_base[g]);
+  const Origin origin = origin_of(w, g);
   const FrameParts before = load_parts(w, body, pace.substeps - 1), after = load_parts(w, body, pace.substeps);
-  const float kept = 1.0f - lost_fraction(pace, pace.iterations);
+  const float lost = lost_fraction(pace, pace.iterations);
   Map start, end;
   for (int axis = 0; axis < 3; ++axis) {
     const int64_t at = 3 * int64_t{g} + axis;
     const Float4 map = pace.iterations > 0 ? w.group_map[at] : Float4{};
     const Axis now = load_axis(w, at);
     start.row[axis] = now.place;
-    end.row[axis] = axis_after(pace, kept, base[axis], map, now).place;
+    end.row[axis] = axis_after(pace, axis, lost, map, now).place;
   }
   team.each(head.size, [&](int k) {
     const int p = w.place_particle[head.begin + k];
-    const Own own = own_of(w, p, first_place, first_velocity);
-    const Float3 r = group.rest(w, pace, k), d = led_to(end, after.place, first_place, own, r);
+    const Own own = own_of(w, p, origin);
+    const Float3 r = group.rest(w, pace, k), d = led_to(end, after.place, origin, own, r);
     // Not from velocities of the same form: what a position rounds to is how far its particle has moved.
-    const Float3 v = pace.decay_per_dt * (d - led_to(start, before.place, first_place, own, r));
+    const Float3 v = pace.decay_per_dt * (d - led_to(start, before.place, origin, own, r));
     w.displacement[p] = with_w(d, own.began.w);
     w.velocity[p] = with_w(v, 0.0f);
   });
