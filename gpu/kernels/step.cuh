@@ -374,9 +374,9 @@ CUTPROOF_DEVICE void list_tracked(Block& block, const AnyTeam& team, const Devic
 // ---- groups that nothing has touched in this frame
 //
 // Their particles began it with d = D + u and v = V + m, D and V being the group's and u and m the particle's own, and
-// have moved since by T + (a - 1) u + b m + A(r). a and b are numbers of body and substep. Where u and m are zero for
-// all of them, D + T is kept instead of T, and nothing is added to where a particle was: then they do to the bit what
-// single particles do that move alike.
+// have moved since by b v + T + (a - 1) u + A(r): by what they do of themselves, most of all. a and b are numbers of
+// body and substep. Where u and m are zero for all of them, D + b V + T is kept instead of T, and nothing is added to
+// where a particle was: then they do to the bit what single particles do that move alike.
 
 struct Parts {
   float shape, motion;  // a - 1, which may be small; b
@@ -423,43 +423,46 @@ CUTPROOF_DEVICE inline Float4 predicted_row(const Pace& pace, int axis, const Ax
   return {now.place.x + pace.dt * now.velocity.x, now.place.y + pace.dt * now.velocity.y,
           now.place.z + pace.dt * now.velocity.z, now.place.w + (pace.dt * now.velocity.w + pace.fall[axis])};
 }
-// After a substep with this map.
-CUTPROOF_DEVICE inline Axis axis_after(const Pace& pace, int axis, float lost, Float4 map, const Axis& now) {
-  const Float4 predicted = predicted_row(pace, axis, now);
-  const auto rate = [&](float is, float was) { return pace.decay_per_dt * (is - was); };
-  Axis next;
-  const auto led = [&](float is, float by_map) { return is + (by_map - lost * is); };
-  next.place = {led(predicted.x, map.x), led(predicted.y, map.y), led(predicted.z, map.z), predicted.w + map.w};
-  next.velocity = row_of(rate, next.place, now.place);
-  return next;
-}
-
 // What its particles have in common when the frame begins.
 struct Origin {
   Float4 place, velocity;  // D, V; w: at least every |u|, |m|
   CUTPROOF_DEVICE bool uniform() const { return place.w == 0 && velocity.w == 0; }
-  // What T counts from.
-  CUTPROOF_DEVICE Float3 from() const { return uniform() ? Float3{} : xyz(place); }
+  // The base where T is zero, and velocities have that part in places.
+  CUTPROOF_DEVICE Float3 from(float motion) const { return uniform() ? Float3{} : xyz(place) + motion * xyz(velocity); }
 };
 CUTPROOF_DEVICE inline Origin origin_of(const DeviceView& w, int g) {
   return {w.group_origin[2 * int64_t{g}], w.group_origin[2 * int64_t{g} + 1]};
 }
 
-// What a particle began the frame with, and that less what its group did.
+// After a substep with this map, whose shift is that of the base. predicted: parts of the prediction.
+CUTPROOF_DEVICE inline Axis axis_after(const Pace& pace, int axis, float lost, const Origin& origin,
+                                       const Parts& predicted_part, Float4 map, const Axis& now) {
+  const Float4 predicted = predicted_row(pace, axis, now);
+  const auto led = [&](float is, float by_map) { return is + (by_map - lost * is); };
+  const auto rate = [&](float is, float was) { return pace.decay_per_dt * (is - was); };
+  const float lost_motion = origin.uniform() ? 0.0f : lost * (predicted_part.motion * xyz(origin.velocity)[axis]);
+  Axis next;
+  next.place = {led(predicted.x, map.x), led(predicted.y, map.y), led(predicted.z, map.z),
+                predicted.w + (map.w + lost_motion)};
+  next.velocity = row_of(rate, next.place, now.place);
+  return next;
+}
+
+// What a particle began the frame with.
 struct Own {
-  Float4 began;  // displacement; w: mass
-  Float3 shape, motion;
+  Float4 began;          // displacement; w: mass
+  Float3 shape, motion;  // displacement less its group's; velocity
 };
 CUTPROOF_DEVICE inline Own own_of(const DeviceView& w, int p, const Origin& origin) {
   const Float4 d = w.displacement[p];
-  return {d, xyz(d) - xyz(origin.place), xyz(w.velocity[p]) - xyz(origin.velocity)};
+  return {d, xyz(d) - xyz(origin.place), xyz(w.velocity[p])};
 }
 // Where it is now. Its group's part is small where little has happened, wherever the others are.
 CUTPROOF_DEVICE inline Float3 led_to(const Map& map, const Parts& parts, const Origin& origin, const Own& own,
                                      Float3 r) {
-  const Float3 apart = (parts.shape * own.shape + parts.motion * own.motion) + map.linear(r);
-  const Float3 from = origin.uniform() ? Float3{} : xyz(own.began);
-  return from + (map.moved() + apart);
+  const Float3 turned = map.linear(r);
+  if (origin.uniform()) return map.moved() + turned;
+  return xyz(own.began) + (parts.motion * own.motion + (map.moved() + (parts.shape * own.shape + turned)));
 }
 
 // Gives the particles of such a group positions of their own: where the substep began, and its prediction.
@@ -563,9 +566,10 @@ CUTPROOF_DEVICE void sum_group(const Team<Block, kParticleTeam>& team, const Dev
   w.group_origin[2 * int64_t{g}] = origin.place;
   w.group_origin[2 * int64_t{g} + 1] = origin.velocity;
   const Float3 since = origin.uniform() ? xyz(origin.place) : Float3{};
+  const Float3 began = origin.uniform() ? xyz(origin.velocity) : Float3{};
   for (int axis = 0; axis < 3; ++axis) {
     w.group_place[3 * int64_t{g} + axis] = {0, 0, 0, since[axis]};
-    w.group_velocity[3 * int64_t{g} + axis] = {0, 0, 0, xyz(origin.velocity)[axis]};
+    w.group_velocity[3 * int64_t{g} + axis] = {0, 0, 0, began[axis]};
   }
 }
 
@@ -588,6 +592,8 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
   }
   const FrameParts parts = load_parts(w, body, substep);
   const Parts of_prediction = predicted_parts(pace, parts);
+  Parts of_last_prediction = {};
+  if (substep > 0) of_last_prediction = predicted_parts(pace, load_parts(w, body, substep - 1));
   const float lost = lost_fraction(pace, pace.iterations), per_h = pace.per_h;
   // All that is read before anything is written: behind a store, each would be waited for by itself.
   Rows<Team<Block, kRows>> place, velocity, map, shape, motion;
@@ -605,14 +611,14 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
     const int64_t at = 3 * int64_t{g} + axis;
     Axis now = {place.of(axis), velocity.of(axis)};
     if (substep > 0) {
-      now = axis_after(pace, axis, lost, map.of(axis), now);
+      now = axis_after(pace, axis, lost, origin, of_last_prediction, map.of(axis), now);
       place.of(axis) = w.group_place[at] = now.place;
       w.group_velocity[at] = now.velocity;
     }
     predicted.of(axis) = predicted_row(pace, axis, now);
   });
   Map to = predicted.all(team);
-  Float4 base = with_w(origin.from() + to.moved(), 0.0f);
+  Float4 base = with_w(origin.from(of_prediction.motion) + to.moved(), 0.0f);
   for (Float4& row : to.row) row.w = 0;
   if constexpr (kContacts) {
     // Every particle's own part of where it is, and of its prediction.
@@ -625,7 +631,9 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
     int side = 1;
     if (contacts.move != nullptr) {
       const Map from = place.all(team);
-      side = side_of_all(contacts, ball_around(pace, group, with_w(origin.from(), reach_of(parts.place)), 1.0f, from));
+      side = side_of_all(
+          contacts,
+          ball_around(pace, group, with_w(origin.from(parts.place.motion), reach_of(parts.place)), 1.0f, from));
     }
     // What an iteration adds is M(r), and takes is a part of e: a ball that contains the rest shape too contains every
     // such d~ - l e.
@@ -829,7 +837,7 @@ CUTPROOF_DEVICE void end_group(const Team<Block, kParticleTeam>& team, const Dev
     const Float4 map = pace.iterations > 0 ? w.group_map[at] : Float4{};
     const Axis now = load_axis(w, at);
     start.row[axis] = now.place;
-    end.row[axis] = axis_after(pace, axis, lost, map, now).place;
+    end.row[axis] = axis_after(pace, axis, lost, origin, predicted_parts(pace, before), map, now).place;
   }
   team.each(head.size, [&](int k) {
     const int p = w.place_particle[head.begin + k];
