@@ -237,17 +237,6 @@ struct Ball {
   float radius;
 };
 
-namespace contacts_detail {
-
-// Coordinates are rounded a few times each, by units of the greatest number that is in them.
-inline constexpr float kRounds = 32 * 0x1p-24f;
-CUTPROOF_DEVICE inline float extent(Float3 a) { return fabsf(a.x) + fabsf(a.y) + fabsf(a.z); }
-CUTPROOF_DEVICE inline float ball_extent(const Ball& ball) {
-  return ball.rest.h * extent(ball.rest.node) + extent(ball.d);
-}
-
-}  // namespace contacts_detail
-
 // By how much at least the radius of a ball may grow before some point in it is projected, or touches (kTouchMargin),
 // wherever in the ball it lies; not positive: it is not clear. (May be less than there is.) `side`: of the blade, that
 // of all its points when the substep began, or 0 if they were on both.
@@ -258,7 +247,10 @@ CUTPROOF_DEVICE inline float ball_extent(const Ball& ball) {
 CUTPROOF_DEVICE inline float room_around(const Contacts& contacts, const Ball& ball, int side) {
   using namespace contacts_detail;
   const RestPoint& rest = ball.rest;
-  const float size = ball_extent(ball);
+  // Coordinates are rounded a few times each, by units of the greatest number that is in them.
+  constexpr float kRounds = 32 * 0x1p-24f;
+  const auto extent = [](Float3 a) { return fabsf(a.x) + fabsf(a.y) + fabsf(a.z); };
+  const float size = rest.h * extent(rest.node) + extent(ball.d);
   const float reach = ball.radius * (1.0f + kRounds) + static_cast<float>(kTouchMargin) * rest.h;
   const auto least = [](float a, float b) { return a < b || a != a ? a : b; };  // no number, if one of them is none
   float room = 3.0e38f;
@@ -275,16 +267,6 @@ CUTPROOF_DEVICE inline float room_around(const Contacts& contacts, const Ball& b
   float of_blade = least(sqrtf(away.x * away.x + away.y * away.y) - clear, norm(away) - (contacts.clearance + clear));
   if (side != 0) of_blade = fmaxf(of_blade, static_cast<float>(side) * c.z - (contacts.clearance + clear));
   return least(room, of_blade);
-}
-// The side of the blade, +1 or -1, on which all points of a ball stand when the substep begins, as blade_side says of
-// each; 0: not certainly all on one.
-CUTPROOF_DEVICE inline int side_of_all(const Contacts& contacts, const Ball& ball) {
-  using namespace contacts_detail;
-  if (contacts.move == nullptr) return 1;
-  const PoseF pose = constant(&contacts.move->from);
-  const float reach = ball.radius * (1.0f + kRounds) + kRounds * (ball_extent(ball) + extent(pose.edge));
-  const float height = into_frame(pose, ball.rest.from(pose.edge) + ball.d).z;
-  return height > reach ? 1 : height < -reach ? -1 : 0;
 }
 CUTPROOF_DEVICE inline bool is_clear(const Contacts& contacts, const Ball& ball, int side) {
   return room_around(contacts, ball, side) > 0;

@@ -1,20 +1,16 @@
 // Stage step (docs/design/method.md §3, §13): position-based dynamics with shape matching, one DeviceView of bodies.
 //
 // The particles of a group (groups.cuh) are carried: they are at d~ + M(r) - l e, with e = d~ - base from the
-// prediction, r = X - X_g, l a number of body and iteration, and M one affine map for all of them. A prediction follows
-// from the map of the substep before in the same way, so a frame touches particles twice: it sums what they begin with
-// (sum_groups), and puts them where they have come to (end_step). Between these a substep touches groups
-// (begin_substep) and an iteration touches clusters (match_shapes, from the moments of their groups) and groups
-// (advance: the mean of their holders' goals is the next map, and has the next moments). A group that may touch a
-// contact is resolved: from there to the end of the substep its particles have positions of their own, and to the end
-// of the frame it is tracked: each substep begins with its particles, as it does with those that are in no group.
+// prediction, r = X - X_g, l a number of body and iteration, and M one affine map for all of them. So a substep touches
+// particles once (start_substep: puts the last map in, makes velocities, predicts, sums moments), and an iteration
+// touches clusters (match_shapes, from the moments of their groups) and groups (advance: the mean of their holders'
+// goals is the next map, and has the next moments). A group that may touch a contact is resolved: from there to the end
+// of the substep its particles have positions of their own, as those that are in no group always have.
 //
 // Everything is a displacement from rest: with d = x - X,  t_c - T_c = Σ w d / M,  and the goal of particle i in
 // cluster c lies at X_i + (t_c - T_c) + (R_c - I)(X_i - T_c). A body at rest or moved as a whole is then reproduced
 // exactly: d is the same everywhere, all moments about bases are zero, and R_c is I to the last bit.
 #pragma once
-#include <type_traits>
-
 #include "gpu/kernels/contacts.cuh"
 #include "gpu/kernels/float3.h"
 #include "gpu/kernels/groups.cuh"
@@ -25,12 +21,6 @@
 #include "gpu/state/device_view.h"
 
 namespace cutproof::gpu {
-
-// As block.first(), counted from the last thread: other work than that which the first threads have.
-template <class Block>
-CUTPROOF_DEVICE int64_t from_last(const Block& block) {
-  return block.stride() - 1 - block.first();
-}
 
 namespace step_detail {
 
@@ -111,22 +101,15 @@ CUTPROOF_DEVICE inline Combination chebyshev(float kdt2, int order) {
 // The M of a group: its rows of h L, and its a (arrays.inc).
 struct Map {
   Float4 row[3];
-  // L (h r)
-  CUTPROOF_DEVICE Float3 linear(Float3 r) const {
-    return {row[0].x * r.x + row[0].y * r.y + row[0].z * r.z, row[1].x * r.x + row[1].y * r.y + row[1].z * r.z,
-            row[2].x * r.x + row[2].y * r.y + row[2].z * r.z};
-  }
-  CUTPROOF_DEVICE Float3 moved() const { return {row[0].w, row[1].w, row[2].w}; }
   // a + L (h r)
-  CUTPROOF_DEVICE Float3 operator()(Float3 r) const { return moved() + linear(r); }
+  CUTPROOF_DEVICE Float3 operator()(Float3 r) const {
+    return {row[0].w + (row[0].x * r.x + row[0].y * r.y + row[0].z * r.z),
+            row[1].w + (row[1].x * r.x + row[1].y * r.y + row[1].z * r.z),
+            row[2].w + (row[2].x * r.x + row[2].y * r.y + row[2].z * r.z)};
+  }
 };
 CUTPROOF_DEVICE inline Map load_map(const Float4* rows, int g) {
   return {{rows[3 * int64_t{g}], rows[3 * int64_t{g} + 1], rows[3 * int64_t{g} + 2]}};
-}
-// Entry by entry.
-template <class Of>
-CUTPROOF_DEVICE Float4 row_of(Of of, Float4 a, Float4 b) {
-  return {of(a.x, b.x), of(a.y, b.y), of(a.z, b.z), of(a.w, b.w)};
 }
 CUTPROOF_DEVICE inline float entry(const Map& map, int row, int k) {
   const Float4 r = map.row[row];
@@ -236,29 +219,25 @@ CUTPROOF_DEVICE inline void store_moment(Float4* rows, int g, int n, float sum) 
   (n % 4 == 0 ? row.x : n % 4 == 1 ? row.y : n % 4 == 2 ? row.z : row.w) = sum;
 }
 
-// At least |(h diagonal + L) r| for every |r| <= 1 [h]: the root of the greatest sum by rows times the greatest sum by
-// columns.
-CUTPROOF_DEVICE inline float greatest_stretch(const Map& map, float diagonal) {
-  float rows = 0, columns = 0;
-  for (int k = 0; k < 3; ++k) {
-    float row = 0, column = 0;
-    for (int j = 0; j < 3; ++j) {
-      row += fabsf(entry(map, k, j) + (j == k ? diagonal : 0.0f));
-      column += fabsf(entry(map, j, k) + (j == k ? diagonal : 0.0f));
-    }
-    rows = fmaxf(rows, row);
-    columns = fmaxf(columns, column);
-  }
-  return sqrtf(rows * columns);
-}
 // All points of a group that are at d~ + M(r) - l e; kept: 1 - l.
 CUTPROOF_DEVICE inline Ball ball_around(const Pace& pace, const Group& group, Float4 base, float kept, const Map& map) {
   const RestCenter& center = group.center;
   const RestPoint rest = {pace.h,
                           {static_cast<float>(center.i) + center.x, static_cast<float>(center.j) + center.y,
                            static_cast<float>(center.k) + center.z}};
-  const float radius = greatest_stretch(map, pace.h) * group.head.radius + kept * base.w;
-  return {rest, xyz(base) + map.moved(), radius};
+  // |h (I + L)| <= the root of its greatest sum by rows times its greatest sum by columns.
+  float rows = 0, columns = 0;
+  for (int k = 0; k < 3; ++k) {
+    float row = 0, column = 0;
+    for (int j = 0; j < 3; ++j) {
+      row += fabsf(entry(map, k, j) + (j == k ? pace.h : 0.0f));
+      column += fabsf(entry(map, j, k) + (j == k ? pace.h : 0.0f));
+    }
+    rows = fmaxf(rows, row);
+    columns = fmaxf(columns, column);
+  }
+  const float radius = sqrtf(rows * columns) * group.head.radius + kept * base.w;
+  return {rest, xyz(base) + Float3{map.row[0].w, map.row[1].w, map.row[2].w}, radius};
 }
 
 // How far at most a map leads a point that is `radius` [h] from the rest centre, along the axis of this row.
@@ -273,8 +252,11 @@ inline constexpr float kOfRoom = 0.577f;
 
 // [h] A base farther than this from the mean of its group is not used.
 inline constexpr float kFarBase = 1.0f / 16.0f;
-// Bounds of lengths are made greater by this part: more than the roundings of their own sums and of what they bound.
-inline constexpr float kOfRoundings = 0x1p-20f;
+
+// Whether a substep of a body ends, or begins, when substep `substep` begins.
+CUTPROOF_DEVICE inline bool turns_over(const Pace& pace, int substep) {
+  return pace.substeps > 0 && substep <= pace.substeps;
+}
 
 // Predicts, from a particle's end of the last substep.
 CUTPROOF_DEVICE inline Float3 predict(const Pace& pace, Float3 d, Float3 v) { return d + (pace.dt * v + pace.fall); }
@@ -347,443 +329,174 @@ CUTPROOF_DEVICE void sum_resolved(const AnyTeam& team, const DeviceView& w, cons
   team.parted(sums).each(team, [&](int n, float sum) { store_moment(w.group_moments, group.index, n, sum); });
 }
 
-// How many groups were tracked when a substep began, for begin_substep_kernel, which then has it in `tracked`; those of
-// the substep itself are counted by themselves. (Three such counts: one is read, one counts, and one is cleared.)
-CUTPROOF_DEVICE inline int tracked_before(const DeviceView& w, int substep) {
-  return w.counters->tracked[(substep + 1) % 2] + w.counters->newly_tracked[(substep + 2) % 3];
-}
-
-// A group is resolved, and tracked from now on. before: the iteration that it is to be resolved in from the first.
+// before: the iteration that it is to be resolved in from the first.
 template <class AnyTeam, class Block>
 CUTPROOF_DEVICE void list_resolved(Block& block, const AnyTeam& team, const DeviceView& w, const Pace& pace, int g,
                                    int substep, int before) {
   if (!team.leads()) return;
   w.group_resolved[g] = kResolved;
+  w.group_touched[g] = 1;
   if (pace.iterations == 0) return;  // nobody asks for the list, or empties it
   block.store(&w.resolved_groups[block.atomic_add(listed_before(w, substep, before), 1)], g);
 }
-// tracked: how many were before this substep.
-template <class AnyTeam, class Block>
-CUTPROOF_DEVICE void list_tracked(Block& block, const AnyTeam& team, const DeviceView& w, int g, int substep,
-                                  int tracked) {
-  if (!team.leads()) return;
-  w.group_tracked[g] = 1;
-  block.store(&w.tracked_groups[tracked + block.atomic_add(&w.counters->newly_tracked[substep % 3], 1)], g);
-}
 
-// ---- groups that nothing has touched in this frame
-//
-// Their particles began it with d = D + u and v = V + m, D and V being the group's and u and m the particle's own, and
-// have moved since by T + (a - 1) u + b m + A(r). a and b are numbers of body and substep. Where u and m are zero for
-// all of them, D + T is kept instead of T, and nothing is added to where a particle was: then they do to the bit what
-// single particles do that move alike.
-
-struct Parts {
-  float shape, motion;  // a - 1, which may be small; b
-};
-struct FrameParts {
-  Parts place, velocity;
-};
-CUTPROOF_DEVICE inline Parts predicted_parts(const Pace& pace, const FrameParts& now) {
-  return {now.place.shape + pace.dt * now.velocity.shape, now.place.motion + pace.dt * now.velocity.motion};
-}
-CUTPROOF_DEVICE inline FrameParts parts_after(const Pace& pace, float lost, const FrameParts& now) {
-  const Parts predicted = predicted_parts(pace, now);
-  FrameParts next;
-  next.place = {predicted.shape - lost * (1.0f + predicted.shape), predicted.motion - lost * predicted.motion};
-  next.velocity = {pace.decay_per_dt * (next.place.shape - now.place.shape),
-                   pace.decay_per_dt * (next.place.motion - now.place.motion)};
-  return next;
-}
-CUTPROOF_DEVICE inline Float4* parts_of(const DeviceView& w, int body, int substep) {
-  return &w.parts[int64_t{body} * (w.most_substeps + 1) + substep];
-}
-CUTPROOF_DEVICE inline FrameParts load_parts(const DeviceView& w, int body, int substep) {
-  const Float4 parts = constant(parts_of(w, body, substep));
-  return {{parts.x, parts.y}, {parts.z, parts.w}};
-}
-CUTPROOF_DEVICE inline void store_parts(const DeviceView& w, int body, const Pace& pace) {
-  const float lost = lost_fraction(pace, pace.iterations);
-  FrameParts now = {{0, 0}, {0, 1}};
-  for (int substep = 0; substep <= pace.substeps; ++substep) {
-    *parts_of(w, body, substep) = {now.place.shape, now.place.motion, now.velocity.shape, now.velocity.motion};
-    now = parts_after(pace, lost, now);
-  }
-}
-
-// Along one axis: its row of A, with T in w; and the same of velocities.
-struct Axis {
-  Float4 place, velocity;
-};
-CUTPROOF_DEVICE inline Axis load_axis(const DeviceView& w, int64_t at) {
-  return {w.group_place[at], w.group_velocity[at]};
-}
-// Its prediction, as predict().
-CUTPROOF_DEVICE inline Float4 predicted_row(const Pace& pace, int axis, const Axis& now) {
-  return {now.place.x + pace.dt * now.velocity.x, now.place.y + pace.dt * now.velocity.y,
-          now.place.z + pace.dt * now.velocity.z, now.place.w + (pace.dt * now.velocity.w + pace.fall[axis])};
-}
-// After a substep with this map.
-CUTPROOF_DEVICE inline Axis axis_after(const Pace& pace, int axis, float lost, Float4 map, const Axis& now) {
-  const Float4 predicted = predicted_row(pace, axis, now);
-  const auto rate = [&](float is, float was) { return pace.decay_per_dt * (is - was); };
-  Axis next;
-  const auto led = [&](float is, float by_map) { return is + (by_map - lost * is); };
-  next.place = {led(predicted.x, map.x), led(predicted.y, map.y), led(predicted.z, map.z), predicted.w + map.w};
-  next.velocity = row_of(rate, next.place, now.place);
-  return next;
-}
-
-// What its particles have in common when the frame begins.
-struct Origin {
-  Float4 place, velocity;  // D, V; w: at least every |u|, |m|
-  CUTPROOF_DEVICE bool uniform() const { return place.w == 0 && velocity.w == 0; }
-  // What T counts from.
-  CUTPROOF_DEVICE Float3 from() const { return uniform() ? Float3{} : xyz(place); }
-};
-CUTPROOF_DEVICE inline Origin origin_of(const DeviceView& w, int g) {
-  return {w.group_origin[2 * int64_t{g}], w.group_origin[2 * int64_t{g} + 1]};
-}
-
-// What a particle began the frame with, and that less what its group did.
-struct Own {
-  Float4 began;  // displacement; w: mass
-  Float3 shape, motion;
-};
-CUTPROOF_DEVICE inline Own own_of(const DeviceView& w, int p, const Origin& origin) {
-  const Float4 d = w.displacement[p];
-  return {d, xyz(d) - xyz(origin.place), xyz(w.velocity[p]) - xyz(origin.velocity)};
-}
-// Where it is now. Its group's part is small where little has happened, wherever the others are.
-CUTPROOF_DEVICE inline Float3 led_to(const Map& map, const Parts& parts, const Origin& origin, const Own& own,
-                                     Float3 r) {
-  const Float3 apart = (parts.shape * own.shape + parts.motion * own.motion) + map.linear(r);
-  const Float3 from = origin.uniform() ? Float3{} : xyz(own.began);
-  return from + (map.moved() + apart);
-}
-
-// Gives the particles of such a group positions of their own: where the substep began, and its prediction.
-template <class AnyTeam>
-CUTPROOF_DEVICE void track_particles(const AnyTeam& team, const DeviceView& w, const Group& group, const Pace& pace,
-                                     const Contacts& contacts, bool held, int substep) {
-  const int64_t g = group.index;
-  const FrameParts parts = load_parts(w, body_of_group(w, group.head), substep);
-  const Parts of_prediction = predicted_parts(pace, parts);
-  const Origin origin = origin_of(w, group.index);
-  Map now, next;
-  for (int axis = 0; axis < 3; ++axis) {
-    const Axis is = load_axis(w, 3 * g + axis);
-    now.row[axis] = is.place;
-    next.row[axis] = predicted_row(pace, axis, is);
-  }
-  team.each(group.head.size, [&](int k) {
-    const int o = group.head.begin + k, node = constant(&w.place_node[o]);
-    const Own own = own_of(w, w.place_particle[o], origin);
-    const Float3 r = group.rest_of(pace, node), start = led_to(now, parts.place, origin, own, r);
-    const float side = held ? 0.0f : blade_side(contacts, {pace.h, grid_node(pace, node)}, start);
-    w.start[o] = with_w(start, own.began.w);
-    w.predicted[o] = with_w(led_to(next, of_prediction, origin, own, r), side);
-  });
-}
-
-// Moments of what a group's particles have, value(k) with a weight in w, about `base`: that of the particle in the
-// middle, or, where that one is farther off the others than `far`, their mean. (Not always: what moves as a whole must
-// have moments that vanish.) Small numbers are summed. Gives the base, with at least every distance from it in w.
-template <class AnyTeam, class Value>
-CUTPROOF_DEVICE Float4 sum_about(const AnyTeam& team, const DeviceView& w, const Group& group, const Pace& pace,
-                                 float per_mass, float far, Value value, typename AnyTeam::template Parted<12>& total) {
+template <bool kContacts, class Block>
+CUTPROOF_DEVICE void start_group(Block& block, const Team<Block, kParticleTeam>& team, const DeviceView& w, int g,
+                                 int substep) {
+  // What is needed is asked for first, and not when it is needed: each answer takes as long as the work.
+  const Group group = group_of(w, g);
   const GroupHead& head = group.head;
-  Float3 base;
-  if (team.has(head.middle)) base = xyz(value(head.middle));
+  if (head.size == 0) return;
+  const Pace pace = constant(&w.pace[body_of_group(w, head)]);
+  const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
+  const float shared = 1.0f / constant(&w.group_mass[g]).w;
+  const bool begins = substep == 0, ends = substep == pace.substeps;
+  block.wait_for_earlier();
+  Map map = {};
+  Float3 last_base;
+  [[maybe_unused]] int state = kCarried;
+  [[maybe_unused]] bool touched = false;
+  if (!begins) {
+    map = load_map(w.group_map, g);
+    last_base = xyz(w.group_base[g]);
+    if constexpr (kContacts) state = w.group_resolved[g];
+  }
+  if constexpr (kContacts) touched = w.group_touched[g] != 0;
+  if (!turns_over(pace, substep)) return;
+  if (pace.iterations == 0) map = {};
+  const float lost = lost_fraction(pace, pace.iterations);
+  const Held held = kContacts && !ends ? held_by(w, pace, head.hold_set, substep) : Held{};
+
+  // Displacement and mass of particle k, and its velocity.
+  const auto where = [&](int k, Float3& v) {
+    const int o = head.begin + k;
+    if (begins) {
+      const int p = w.place_particle[o];
+      v = xyz(w.velocity[p]);
+      return w.displacement[p];
+    }
+    const Float4 start = w.start[o], predicted = w.predicted[o];
+    Float3 d = carried_to(last_base, lost, xyz(predicted), map, group.rest(w, pace, k));
+    if (state != kCarried) d = xyz(w.position[o]);
+    v = pace.decay_per_dt * (d - xyz(start));
+    return with_w(d, start.w);
+  };
+  const auto end = [&](int k) {
+    if constexpr (kContacts) {
+      if (begins || !touched) return;
+      const int o = head.begin + k;
+      Float3 pushed;
+      if (state == kResolved) pushed = xyz(w.pushed[o]);
+      if (state == kHeld) {
+        const Float3 predicted = xyz(w.predicted[o]);
+        pushed = pace.held_alpha * (xyz(w.position[o]) - predicted) +
+                 (pace.held_beta * (predicted - last_base) - map(group.rest(w, pace, k)));
+      }
+      end_impulse(w, w.place_particle[o], pace, pushed);
+    }
+  };
+  const int first = team.lane();  // the first of this lane's particles: nearly always the only one
+  Float4 of_first;                // its prediction, and what a holder gets of its mass
+  const float of_each = 1.0f / static_cast<float>(head.holder_count);
+  [[maybe_unused]] bool before = false, behind = false;  // the blade, when the substep begins
+  team.each(head.size, [&](int k) {
+    const int o = head.begin + k;
+    Float3 v;
+    const Float4 d = where(k, v);
+    end(k);
+    if (ends) {
+      const int p = w.place_particle[o];
+      w.displacement[p] = d;
+      w.velocity[p] = with_w(v, 0.0f);
+      return;
+    }
+    const Float3 predicted = predict(pace, xyz(d), v);
+    float side = 1.0f;
+    if constexpr (kContacts) {
+      side = blade_side(contacts, {pace.h, grid_node(pace, constant(&w.place_node[o]))}, xyz(d));
+      (side < 0 ? behind : before) = true;
+      if (held.active) side = 0.0f;
+    }
+    w.start[o] = d;
+    w.predicted[o] = with_w(predicted, side);
+    if (k == first) of_first = with_w(predicted, of_each * d.w);
+  });
+  if (ends) return;
+  // Small numbers are summed: displacements less that of the particle in the middle, or, where that one is far off the
+  // others, less their mean. (Not always: what moves as a whole must have moments that vanish.)
+  Float3 base = xyz(of_first);
+  if (head.middle >= team.kLanes && team.has(head.middle)) base = xyz(w.predicted[head.begin + head.middle]);
   base = team.from(head.middle, base);
   float reach = 0;
+  typename Team<Block, kParticleTeam>::template Parted<12> total;
   for (int round = 0;; ++round) {
-    GroupSums<AnyTeam> sums;
+    GroupSums<Team<Block, kParticleTeam>> sums;
     reach = 0;
     team.each(head.size, [&](int k) {
-      const Float4 particle = value(k);
+      Float4 particle = of_first;
+      if (k != first) {
+        const int o = head.begin + k;
+        particle = with_w(xyz(w.predicted[o]), of_each * w.start[o].w);
+      }
       const Float3 e = xyz(particle) - base;
       reach = fmaxf(reach, dot(e, e));
       add_moments(sums.of(k), particle.w, e, pace.per_h * e, group.rest(w, pace, k));
     });
     total = team.parted(sums);
-    const Float3 off = {per_mass * total.get(team, 3), per_mass * total.get(team, 7), per_mass * total.get(team, 11)};
-    if (round > 0 || !(dot(off, off) > far * far)) break;
+    const Float3 off = {shared * total.get(team, 3), shared * total.get(team, 7), shared * total.get(team, 11)};
+    if (round > 0 || !(dot(off, off) > kFarBase * kFarBase * pace.h * pace.h)) break;
     base = base + off;
   }
-  return with_w(base, sqrtf(team.greatest(reach)) * (1.0f + kOfRoundings));
-}
-
-// What a group begins the frame with.
-template <bool kContacts, class Block>
-CUTPROOF_DEVICE void sum_group(const Team<Block, kParticleTeam>& team, const DeviceView& w, int g) {
+  const Float4 base_and_reach = with_w(base, sqrtf(team.greatest(reach)) * (1.0f + 0x1p-20f));
+  if (team.leads()) w.group_base[g] = base_and_reach;
+  total.each(team, [&](int n, float sum) { store_moment(w.group_predicted, g, n, sum); });
   if constexpr (kContacts) {
-    if (team.leads()) w.group_tracked[g] = 0;
-  }
-  const Group group = group_of(w, g);
-  const GroupHead& head = group.head;
-  if (head.size == 0) return;
-  const Pace pace = constant(&w.pace[body_of_group(w, head)]);
-  if (pace.substeps == 0) return;
-  const float per_mass = 1.0f / constant(&w.group_mass[g]).w;
-  const float of_each = 1.0f / static_cast<float>(head.holder_count);
-  const auto particle = [&](int k) { return w.place_particle[head.begin + k]; };
-  const auto mass_share = [&](float mass) { return of_each * mass; };
-  // The first of this lane's particles: nearly always the only one.
-  const int first = team.lane();
-  Float4 first_place, first_velocity;
-  if (first < head.size) {
-    const int p = particle(first);
-    first_place = w.displacement[p];
-    first_velocity = w.velocity[p];
-    first_velocity.w = first_place.w = mass_share(first_place.w);
-  }
-  const auto sum = [&](auto value, float far, Float4* rows) {
-    typename Team<Block, kParticleTeam>::template Parted<12> total;
-    const Float4 base = sum_about(team, w, group, pace, per_mass, far, value, total);
-    total.each(team, [&](int n, float of) { store_moment(rows, g, n, of); });
-    return base;
-  };
-  Origin origin;
-  origin.place = sum(
-      [&](int k) {
-        if (k == first) return first_place;
-        const Float4 d = w.displacement[particle(k)];
-        return with_w(xyz(d), mass_share(d.w));
-      },
-      kFarBase * pace.h, w.frame_shape);
-  origin.velocity = sum(
-      [&](int k) {
-        if (k == first) return first_velocity;
-        const int p = particle(k);
-        return with_w(xyz(w.velocity[p]), mass_share(w.displacement[p].w));
-      },
-      kFarBase * pace.h / pace.dt, w.frame_motion);
-  if (!team.leads()) return;
-  w.group_origin[2 * int64_t{g}] = origin.place;
-  w.group_origin[2 * int64_t{g} + 1] = origin.velocity;
-  const Float3 since = origin.uniform() ? xyz(origin.place) : Float3{};
-  for (int axis = 0; axis < 3; ++axis) {
-    w.group_place[3 * int64_t{g} + axis] = {0, 0, 0, since[axis]};
-    w.group_velocity[3 * int64_t{g} + axis] = {0, 0, 0, xyz(origin.velocity)[axis]};
-  }
-}
-
-// Begins a substep of a group that nothing has touched so far. Says whether something may in its prediction, or a grip
-// holds it: then its particles are to be tracked.
-template <bool kContacts, class Block, int kRows>
-CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& team, const DeviceView& w, int g,
-                                     int substep) {
-  const Group group = group_of(w, g);
-  const GroupHead& head = group.head;
-  const int body = body_of_group(w, head);
-  const Pace pace = constant(&w.pace[body]);
-  const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
-  const Float4 mass = constant(&w.group_mass[g]), upper = constant(&w.group_spread[2 * int64_t{g}]),
-               lower = constant(&w.group_spread[2 * int64_t{g} + 1]);
-  block.wait_for_earlier();
-  if (head.size == 0 || substep >= pace.substeps) return false;
-  if constexpr (kContacts) {
-    if (w.group_tracked[g] != 0) return false;
-  }
-  const FrameParts parts = load_parts(w, body, substep);
-  const Parts of_prediction = predicted_parts(pace, parts);
-  const float lost = lost_fraction(pace, pace.iterations), per_h = pace.per_h;
-  // All that is read before anything is written: behind a store, each would be waited for by itself.
-  Rows<Team<Block, kRows>> place, velocity, map, shape, motion;
-  const Origin origin = origin_of(w, g);
-  team.each(3, [&](int axis) {
-    const int64_t at = 3 * int64_t{g} + axis;
-    place.of(axis) = w.group_place[at];
-    velocity.of(axis) = w.group_velocity[at];
-    if (substep > 0 && pace.iterations > 0) map.of(axis) = w.group_map[at];
-    shape.of(axis) = w.frame_shape[at];
-    motion.of(axis) = w.frame_motion[at];
-  });
-  Rows<Team<Block, kRows>>& predicted = map;
-  team.each(3, [&](int axis) {
-    const int64_t at = 3 * int64_t{g} + axis;
-    Axis now = {place.of(axis), velocity.of(axis)};
-    if (substep > 0) {
-      now = axis_after(pace, axis, lost, map.of(axis), now);
-      place.of(axis) = w.group_place[at] = now.place;
-      w.group_velocity[at] = now.velocity;
-    }
-    predicted.of(axis) = predicted_row(pace, axis, now);
-  });
-  Map to = predicted.all(team);
-  Float4 base = with_w(origin.from() + to.moved(), 0.0f);
-  for (Float4& row : to.row) row.w = 0;
-  if constexpr (kContacts) {
-    // Every particle's own part of where it is, and of its prediction.
-    const auto reach_of = [&](const Parts& part) {
-      return (fabsf(1.0f + part.shape) * origin.place.w + fabsf(part.motion) * origin.velocity.w) *
-             (1.0f + kOfRoundings);
-    };
-    const float own = reach_of(of_prediction);
-    base.w = (greatest_stretch(to, 0.0f) * head.radius + own) * (1.0f + kOfRoundings);
-    int side = 1;
-    if (contacts.move != nullptr) {
-      const Map from = place.all(team);
-      side = side_of_all(contacts, ball_around(pace, group, with_w(origin.from(), reach_of(parts.place)), 1.0f, from));
-    }
-    // What an iteration adds is M(r), and takes is a part of e: a ball that contains the rest shape too contains every
-    // such d~ - l e.
-    Ball ball = ball_around(pace, group, with_w(xyz(base), own), 1.0f, to);
-    ball.radius = fmaxf(ball.radius, pace.h * head.radius);
-    const float room = room_around(contacts, ball, side);
-    const bool held = held_by(w, pace, head.hold_set, substep).active;
-    if (team.leads()) {
-      w.group_base[g] = base;
-      w.group_room[g] = room;
-      w.group_side[g] = side;
-      w.group_resolved[g] = kCarried;
-    }
-    if (held || !(room > 0)) return true;
-  } else if (team.leads()) {
-    w.group_base[g] = base;
-  }
-  team.each(3, [&](int axis) {
-    const int64_t at = 3 * int64_t{g} + axis;
-    const Float4 row = predicted.of(axis), u = shape.of(axis), m = motion.of(axis);
-    const auto own = [&](float of_shape, float of_motion) {
-      return (1.0f + of_prediction.shape) * of_shape + of_prediction.motion * of_motion;
-    };
-    const Float4 moment = {own(u.x, m.x) + per_h * (row.x * upper.x + row.y * upper.y + row.z * upper.z),
-                           own(u.y, m.y) + per_h * (row.x * upper.y + row.y * upper.w + row.z * lower.x),
-                           own(u.z, m.z) + per_h * (row.x * upper.z + row.y * lower.x + row.z * lower.y),
-                           own(u.w, m.w) + (row.x * mass.x + row.y * mass.y + row.z * mass.z)};
-    w.group_predicted[at] = moment;
-    w.group_moments[at] = moment;
-  });
-  return false;
-}
-
-// ---- groups that are tracked
-
-// How the substep before has left the particles of one.
-struct Ending {
-  Map map;
-  Float3 base;
-  float lost;
-  int state;
-};
-CUTPROOF_DEVICE inline Ending ending_of(const DeviceView& w, const Pace& pace, int g) {
-  Ending ending = {{}, xyz(w.group_base[g]), lost_fraction(pace, pace.iterations), w.group_resolved[g]};
-  if (pace.iterations > 0) ending.map = load_map(w.group_map, g);
-  return ending;
-}
-// Displacement and mass of its particle k; sets its velocity, and ends its impulse.
-CUTPROOF_DEVICE inline Float4 end_tracked(const DeviceView& w, const Pace& pace, const Group& group,
-                                          const Ending& ending, int k, Float3& v) {
-  const int o = group.head.begin + k;
-  const Float4 start = w.start[o];
-  const Float3 predicted = xyz(w.predicted[o]), r = group.rest(w, pace, k);
-  Float3 d = carried_to(ending.base, ending.lost, predicted, ending.map, r);
-  Float3 pushed;
-  if (ending.state != kCarried) d = xyz(w.position[o]);
-  if (ending.state == kResolved) pushed = xyz(w.pushed[o]);
-  if (ending.state == kHeld) {
-    pushed = pace.held_alpha * (d - predicted) + (pace.held_beta * (predicted - ending.base) - ending.map(r));
-  }
-  end_impulse(w, w.place_particle[o], pace, pushed);
-  v = pace.decay_per_dt * (d - xyz(start));
-  return with_w(d, start.w);
-}
-
-// Begins a substep of a group whose particles are to be tracked from here on (`begins`), or have been.
-template <class Block>
-CUTPROOF_DEVICE void begin_tracked(Block& block, const Team<Block, kResolvedTeam>& team, const DeviceView& w, int g,
-                                   int substep, int tracked, bool begins) {
-  const Group group = group_of(w, g);
-  const GroupHead& head = group.head;
-  const Pace pace = constant(&w.pace[body_of_group(w, head)]);
-  if (substep >= pace.substeps) return;
-  const Contacts contacts = contacts_of(w, pace, substep);
-  const Held held = held_by(w, pace, head.hold_set, substep);
-  Float3 base;
-  bool resolve = true;
-  if (begins) {
-    base = xyz(w.group_base[g]);
-    track_particles(team, w, group, pace, contacts, held.active, substep);
-    list_tracked(block, team, w, g, substep, tracked);
-  } else {
-    const Ending ending = ending_of(w, pace, g);
-    const float of_each = 1.0f / static_cast<float>(head.holder_count);
-    bool before = false, behind = false;  // the blade, when the substep begins
-    team.each(head.size, [&](int k) {
-      const int o = head.begin + k;
-      Float3 v;
-      const Float4 d = end_tracked(w, pace, group, ending, k, v);
-      float side = blade_side(contacts, {pace.h, grid_node(pace, constant(&w.place_node[o]))}, xyz(d));
-      (side < 0 ? behind : before) = true;
-      if (held.active) side = 0.0f;
-      w.start[o] = d;
-      w.predicted[o] = with_w(predict(pace, xyz(d), v), side);
-    });
-    typename Team<Block, kResolvedTeam>::template Parted<12> total;
-    const Float4 base_and_reach = sum_about(
-        team, w, group, pace, 1.0f / constant(&w.group_mass[g]).w, kFarBase * pace.h,
-        [&](int k) {
-          const int o = head.begin + k;
-          return with_w(xyz(w.predicted[o]), of_each * w.start[o].w);
-        },
-        total);
     before = team.any(before);
     behind = team.any(behind);
     const int side = before && behind ? 0 : behind ? -1 : 1;
     const float room = room_around(contacts, ball_around(pace, group, base_and_reach, 1.0f, Map{}), side);
-    resolve = held.active || !(room > 0);
-    base = xyz(base_and_reach);
+    const bool resolve = held.active || !(room > 0);
     if (team.leads()) {
-      w.group_base[g] = base_and_reach;
       w.group_room[g] = room;
       w.group_side[g] = side;
-      w.group_resolved[g] = kCarried;
+      w.group_resolved[g] = held.active ? kHeld : kCarried;
+      if (held.active) w.group_touched[g] = 1;
     }
-    total.each(team, [&](int n, float sum) {
-      store_moment(w.group_predicted, g, n, sum);
-      if (!resolve) store_moment(w.group_moments, g, n, sum);
-    });
+    if (resolve) {
+      if (!held.active) list_resolved(block, team, w, pace, g, substep, 0);
+      team.each(head.size, [&](int k) {
+        const int o = head.begin + k;
+        const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
+        enter_substep(w, contacts, held, rest, o, w.predicted[o], xyz(w.start[o]), 0.0f);
+      });
+      return sum_resolved(team, w, group, pace, base);
+    }
   }
-  if (!resolve) return;
-  if (held.active) {
-    if (team.leads()) w.group_resolved[g] = kHeld;
-  } else {
-    list_resolved(block, team, w, pace, g, substep, 0);
-  }
-  team.each(head.size, [&](int k) {
-    const int o = head.begin + k;
-    const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
-    enter_substep(w, contacts, held, rest, o, w.predicted[o], xyz(w.start[o]), 0.0f);
-  });
-  sum_resolved(team, w, group, pace, base);
-}
-
-// ---- particles that are in no group
-
-// Where the substep before, if there was one, has left the particle at place o.
-template <bool kContacts>
-CUTPROOF_DEVICE inline Float4 end_loose(const DeviceView& w, const Pace& pace, int o, int p, int substep, Float3& v) {
-  if (substep == 0) {
-    v = xyz(w.velocity[p]);
-    return w.displacement[p];
-  }
-  const Float4 start = w.start[o];
-  const Float3 d = xyz(w.position[o]);
-  if constexpr (kContacts) end_impulse(w, p, pace, xyz(w.pushed[o]));
-  v = pace.decay_per_dt * (d - xyz(start));
-  return with_w(d, start.w);
+  total.each(team, [&](int n, float sum) { store_moment(w.group_moments, g, n, sum); });
 }
 
 template <bool kContacts>
-CUTPROOF_DEVICE inline void begin_loose(const DeviceView& w, int o, int substep) {
+CUTPROOF_DEVICE inline void start_loose(const DeviceView& w, int o, int substep) {
   if (o < 0) return;
   const int p = w.place_particle[o];
   const Pace pace = constant(&w.pace[body_index(w, p)]);
-  if (substep >= pace.substeps) return;
+  if (!turns_over(pace, substep)) return;
+  Float4 d;
   Float3 v;
-  const Float4 d = end_loose<kContacts>(w, pace, o, p, substep, v);
+  if (substep == 0) {
+    d = w.displacement[p];
+    v = xyz(w.velocity[p]);
+  } else {
+    const Float4 start = w.start[o];
+    d = with_w(xyz(w.position[o]), start.w);
+    v = pace.decay_per_dt * (xyz(d) - xyz(start));
+    if constexpr (kContacts) end_impulse(w, p, pace, xyz(w.pushed[o]));
+  }
+  if (substep == pace.substeps) {
+    w.displacement[p] = d;
+    w.velocity[p] = with_w(v, 0.0f);
+    return;
+  }
   const float share = d.w / static_cast<float>(w.membership_count[p]);
   Float4 predicted = with_w(predict(pace, xyz(d), v), 1.0f);
   w.start[o] = d;
@@ -799,59 +512,15 @@ CUTPROOF_DEVICE inline void begin_loose(const DeviceView& w, int o, int substep)
   w.predicted[o] = predicted;
 }
 
-// ---- the end of the last substep
+}  // namespace step_detail
 
-template <bool kContacts, class Block>
-CUTPROOF_DEVICE void end_group(const Team<Block, kParticleTeam>& team, const DeviceView& w, int g) {
-  const Group group = group_of(w, g);
-  const GroupHead& head = group.head;
-  const int body = body_of_group(w, head);
-  const Pace pace = constant(&w.pace[body]);
-  if (head.size == 0 || pace.substeps == 0) return;
-  if constexpr (kContacts) {
-    if (w.group_tracked[g] != 0) {
-      const Ending ending = ending_of(w, pace, g);
-      team.each(head.size, [&](int k) {
-        const int p = w.place_particle[head.begin + k];
-        Float3 v;
-        w.displacement[p] = end_tracked(w, pace, group, ending, k, v);
-        w.velocity[p] = with_w(v, 0.0f);
-      });
-      return;
-    }
-  }
-  const Origin origin = origin_of(w, g);
-  const FrameParts before = load_parts(w, body, pace.substeps - 1), after = load_parts(w, body, pace.substeps);
-  const float lost = lost_fraction(pace, pace.iterations);
-  Map start, end;
-  for (int axis = 0; axis < 3; ++axis) {
-    const int64_t at = 3 * int64_t{g} + axis;
-    const Float4 map = pace.iterations > 0 ? w.group_map[at] : Float4{};
-    const Axis now = load_axis(w, at);
-    start.row[axis] = now.place;
-    end.row[axis] = axis_after(pace, axis, lost, map, now).place;
-  }
-  team.each(head.size, [&](int k) {
-    const int p = w.place_particle[head.begin + k];
-    const Own own = own_of(w, p, origin);
-    const Float3 r = group.rest(w, pace, k), d = led_to(end, after.place, origin, own, r);
-    // Not from velocities of the same form: what a position rounds to is how far its particle has moved.
-    const Float3 v = pace.decay_per_dt * (d - led_to(start, before.place, origin, own, r));
-    w.displacement[p] = with_w(d, own.began.w);
-    w.velocity[p] = with_w(v, 0.0f);
-  });
+// As block.first(), counted from the last thread: other work than that which the first threads have.
+template <class Block>
+CUTPROOF_DEVICE int64_t from_last(const Block& block) {
+  return block.stride() - 1 - block.first();
 }
 
-template <bool kContacts>
-CUTPROOF_DEVICE inline void finish_loose(const DeviceView& w, int o) {
-  if (o < 0) return;
-  const int p = w.place_particle[o];
-  const Pace pace = constant(&w.pace[body_index(w, p)]);
-  if (pace.substeps == 0) return;
-  Float3 v;
-  w.displacement[p] = end_loose<kContacts>(w, pace, o, p, pace.substeps, v);
-  w.velocity[p] = with_w(v, 0.0f);
-}
+namespace step_detail {
 
 CUTPROOF_DEVICE inline Pace pace_of(const DeviceView& w, int b) {
   const BodyConstants& body = w.body[b];
@@ -903,14 +572,14 @@ CUTPROOF_DEVICE void begin_frame_kernel(Block& block, const DeviceView& w) {
     w.counters->debris = 0;
     w.counters->affected = 0;
     *step_detail::listed_before(w, 0, 0) = 0;
-    w.counters->tracked[1] = w.counters->newly_tracked[0] = w.counters->newly_tracked[2] = 0;
     w.counters->regrouped = w.counters->remeasured = w.counters->due_particles = w.counters->due_pairs = 0;
   }
   for (int64_t b = block.first(); b < w.bodies; b += block.stride()) {
     if (running(w, static_cast<int>(b))) w.cut[b] = -1;
-    const Pace pace = pace_of(w, static_cast<int>(b));
-    w.pace[b] = pace;
-    store_parts(w, static_cast<int>(b), pace);
+    w.pace[b] = pace_of(w, static_cast<int>(b));
+  }
+  if (w.any_contact) {
+    for (int64_t g = block.first(); g < w.group_capacity; g += block.stride()) w.group_touched[g] = 0;
   }
   for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
     const int p = static_cast<int>(i);
@@ -924,82 +593,18 @@ CUTPROOF_DEVICE void begin_frame_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL(begin_frame_kernel);
 
-// Once a frame: what each group begins it with.
+// Ends the substep before `substep`, if there is one, and begins that one, if the body has it.
 template <bool kContacts, class Block>
-CUTPROOF_DEVICE void sum_groups_kernel(Block& block, const DeviceView& w) {
+CUTPROOF_DEVICE void start_substep_kernel(Block& block, const DeviceView& w, int substep) {
   using namespace step_detail;
   const Team<Block, kParticleTeam> team(block);
   const int groups = w.counters->groups;
   for (int64_t g = team.first(); g < groups; g += team.stride()) {
-    sum_group<kContacts>(team, w, static_cast<int>(g));
-  }
-}
-
-// Ends the substep before `substep`, if there is one, and begins that one, of the bodies that have it. kRows: lanes
-// that share a group that is not tracked.
-template <bool kContacts, int kRows, class Block>
-CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int substep) {
-  using namespace step_detail;
-  const Team<Block, kRows> rows(block);
-  const Team<Block, kResolvedTeam> team(block);
-  const int groups = w.counters->groups, loose = w.counters->loose;
-  // Whole warps at a time, as in advance_kernel.
-  const int64_t in_warp = rows.first() % (team.kLanes / rows.kLanes);
-  int64_t row = rows.first();
-  [[maybe_unused]] int64_t listed = from_last(team);
-  [[maybe_unused]] unsigned found = 0;
-  [[maybe_unused]] int tracked = -1;
-  while (true) {
-    [[maybe_unused]] bool begins = false;
-    [[maybe_unused]] int g = -1;
-    if (found != 0) {
-      begins = true;
-      g = team.take(found, static_cast<int>(row - rows.stride()));
-    } else if (row - in_warp < groups) {
-      const bool touches = row < groups && begin_untouched<kContacts>(block, rows, w, static_cast<int>(row), substep);
-      if constexpr (kContacts) {
-        found = team.found(touches && rows.leads());
-        team.sync();  // its base is the whole team's to read
-      }
-      row += rows.stride();
-      continue;
-    }
-    if constexpr (kContacts) {
-      if (tracked < 0) {
-        block.wait_for_earlier();
-        tracked = tracked_before(w, substep);
-      }
-      if (!begins) {
-        if (listed >= tracked) break;
-        g = block.load(&w.tracked_groups[listed]);
-        listed += team.stride();
-      }
-      begin_tracked(block, team, w, g, substep, tracked, begins);
-    } else {
-      break;
-    }
+    start_group<kContacts>(block, team, w, static_cast<int>(g), substep);
   }
   block.wait_for_earlier();
-  if (kContacts && block.first() == 0) {
-    w.counters->tracked[substep % 2] = tracked;
-    block.store(&w.counters->newly_tracked[(substep + 1) % 3], 0);
-  }
-  for (int64_t k = from_last(block); k < loose; k += block.stride()) {
-    begin_loose<kContacts>(w, w.loose_places[k], substep);
-  }
-}
-
-// Once a frame: where all particles have come to.
-template <bool kContacts, class Block>
-CUTPROOF_DEVICE void end_step_kernel(Block& block, const DeviceView& w) {
-  using namespace step_detail;
-  const Team<Block, kParticleTeam> team(block);
-  const int groups = w.counters->groups;
-  for (int64_t g = team.first(); g < groups; g += team.stride()) {
-    end_group<kContacts>(team, w, static_cast<int>(g));
-  }
   for (int64_t k = from_last(block); k < w.counters->loose; k += block.stride()) {
-    finish_loose<kContacts>(w, w.loose_places[k]);
+    start_loose<kContacts>(w, w.loose_places[k], substep);
   }
 }
 
@@ -1270,17 +875,19 @@ CUTPROOF_DEVICE inline Float4 mean_goal(const DeviceView& w, const GroupHead& he
   return {turn * sum.x, turn * sum.y, turn * sum.z, mean * sum.w};
 }
 
+// Entry by entry.
+template <class Of>
+CUTPROOF_DEVICE Float4 row_of(Of of, Float4 a, Float4 b) {
+  return {of(a.x, b.x), of(a.y, b.y), of(a.z, b.z), of(a.w, b.w)};
+}
+
 // A group that has been carried so far is resolved from here on: where its particles are, and, accelerated, were one
 // iteration ago. Nothing has touched them.
 template <bool kAccelerated, class Block>
 CUTPROOF_DEVICE void resolve(Block& block, const Team<Block, kResolvedTeam>& team, const DeviceView& w,
-                             const Group& group, const Pace& pace, const Contacts& contacts, const Iteration& now,
-                             Float3 base, int substep, int iteration) {
+                             const Group& group, const Pace& pace, const Iteration& now, Float3 base, int substep,
+                             int iteration) {
   const int g = group.index;
-  if (!team.any(w.group_tracked[g] != 0)) {
-    track_particles(team, w, group, pace, contacts, false, substep);
-    list_tracked(block, team, w, g, substep, w.counters->tracked[substep % 2]);
-  }
   Map is = {}, was = {};
   if (iteration > 0) is = load_map(w.group_map, g);
   if constexpr (kAccelerated) was = iteration > 1 && now.combined ? load_map(w.group_earlier_map, g) : is;
@@ -1321,7 +928,7 @@ CUTPROOF_DEVICE void advance_resolved(Block& block, const Team<Block, kResolvedT
   const Contacts contacts = contacts_of(w, pace, substep);
   const Iteration now = iteration_of(pace, iteration);
   const Float3 base = xyz(ahead.base);
-  if (begins) resolve<kAccelerated>(block, team, w, group, pace, contacts, now, base, substep, iteration);
+  if (begins) resolve<kAccelerated>(block, team, w, group, pace, now, base, substep, iteration);
   const int first = team.lane();  // of this lane's particles
   Particle of_first;
   if (first < head.size) of_first = particle_at<kContacts, kAccelerated>(w, now, head.begin + first);
@@ -1526,31 +1133,13 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
 }
 
 template <bool kContacts>
-struct sum_groups_kernel_object {
-  static constexpr const char* kName = "sum_groups_kernel";
-  static constexpr int kMaxThreads = 128, kMinBlocks = 6;
-  template <class Block>
-  CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w) const {
-    sum_groups_kernel<kContacts>(block, w);
-  }
-};
-template <bool kContacts, int kRows>
-struct begin_substep_kernel_object {
-  static constexpr const char* kName = "begin_substep_kernel";
+struct start_substep_kernel_object {
+  static constexpr const char* kName = "start_substep_kernel";
   static constexpr int kMaxThreads = 128, kMinBlocks = 4;
   static constexpr bool kReadsAhead = true;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep) const {
-    begin_substep_kernel<kContacts, kRows>(block, w, substep);
-  }
-};
-template <bool kContacts>
-struct end_step_kernel_object {
-  static constexpr const char* kName = "end_step_kernel";
-  static constexpr int kMaxThreads = 128, kMinBlocks = 6;
-  template <class Block>
-  CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w) const {
-    end_step_kernel<kContacts>(block, w);
+    start_substep_kernel<kContacts>(block, w, substep);
   }
 };
 template <bool kContacts, bool kAccelerated, int kRows>
@@ -1575,27 +1164,24 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
   enqueue_groups(launcher, w);
   // Of a small load each group has lanes enough for its rows; of a large one they would all do what one can do for
   // three.
-  const auto by_rows = [&](auto start) {
+  const auto advance = [&](Launcher& on, int substep, int iteration) {
     if constexpr (!requires { typename Launcher::OneLaunch; }) {
-      if (w.particles > kMostByRows) return start(std::integral_constant<int, 1>{});
+      if (w.particles > kMostByRows) {
+        return on.teams(advance_kernel_object<kContacts, kAccelerated, 1>{}, kParticleTeam, teams, w, substep,
+                        iteration);
+      }
     }
-    start(std::integral_constant<int, kRowTeam>{});
+    on.teams(advance_kernel_object<kContacts, kAccelerated, kRowTeam>{}, kParticleTeam, teams, w, substep, iteration);
   };
-  launcher.teams(sum_groups_kernel_object<kContacts>{}, kParticleTeam, teams, w);
   for (int substep = 0; substep < plan.substeps; ++substep) {
-    by_rows([&](auto rows) {
-      launcher.teams(begin_substep_kernel_object<kContacts, rows.value>{}, kParticleTeam, teams, w, substep);
-    });
+    launcher.teams(start_substep_kernel_object<kContacts>{}, kParticleTeam, teams, w, substep);
     for (int iteration = 0; iteration < plan.iterations; ++iteration) {
       launcher.blocks(match_shapes_kernel_object<Method>{}, (w.slots_expected + kTeams - 1) / kTeams, kMatchThreads,
                       kMatchShared, w, substep, iteration);
-      by_rows([&](auto rows) {
-        launcher.teams(advance_kernel_object<kContacts, kAccelerated, rows.value>{}, kParticleTeam, teams, w, substep,
-                       iteration);
-      });
+      advance(launcher, substep, iteration);
     }
   }
-  launcher.teams(end_step_kernel_object<kContacts>{}, kParticleTeam, teams, w);
+  launcher.teams(start_substep_kernel_object<kContacts>{}, kParticleTeam, teams, w, plan.substeps);
 }
 
 template <int Method, class Launcher>

@@ -129,10 +129,6 @@ class Team {
     if constexpr (kLanes > 1) return block_.ballot(mask(), value) != 0;
     return value;
   }
-  // What its lanes have written so far is seen by all of them.
-  CUTPROOF_DEVICE void sync() const {
-    if constexpr (kLanes > 1) block_.sync_warp(mask());
-  }
   // What the lane that has item k says.
   template <class T>
   CUTPROOF_DEVICE T from(int k, T value) const {

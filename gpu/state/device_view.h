@@ -183,8 +183,6 @@ struct Counters {
   int due_pairs;           // … and in how many clusters they are
   int listed[2][2];        // step, by turns of substeps: how many groups are listed in DeviceView::resolved_groups; by
                            // turns of iterations: when this one began, and by now
-  int tracked[2];          // step, by turns of substeps: how many groups are listed in DeviceView::tracked_groups…
-  int newly_tracked[3];    // … and how many came to it in that one
   int scratch[8];
 };
 
@@ -195,7 +193,6 @@ struct Extents {
   int64_t schedule_frames = 0, schedule_substeps = 0;  // of the schedules of all bodies, one after the other
   int wall_count = 0, grip_count = 0, hold_set_count = 0, hold_entry_count = 0;
   int64_t grip_substeps = 0;  // substeps of each grip's schedule, over all grips
-  int most_substeps = 0;      // of any body
   int accelerated = 0;        // some body's iterations are
   int any_contact = 0;        // some body has a blade, a wall or a grip
   int slot_capacity = 0, member_capacity = 0, vertex_capacity = 0, cell_capacity = 0, addition_capacity = 0;
