@@ -353,6 +353,9 @@ CUTPROOF_DEVICE inline int tracked_before(const DeviceView& w, int substep) {
   return w.counters->tracked[(substep + 1) % 2] + w.counters->newly_tracked[(substep + 2) % 3];
 }
 
+// DeviceView::group_tracked. Groups that a grip holds when the frame begins are listed before, to be tracked when the
+// first substep begins: they are many, and lie side by side, so that few warps would find all of them.
+enum : int { kUntouched = 0, kTracked = 1, kDue = 2 };
 // A group is resolved, and tracked from now on. before: the iteration that it is to be resolved in from the first.
 template <class AnyTeam, class Block>
 CUTPROOF_DEVICE void list_resolved(Block& block, const AnyTeam& team, const DeviceView& w, const Pace& pace, int g,
@@ -365,10 +368,10 @@ CUTPROOF_DEVICE void list_resolved(Block& block, const AnyTeam& team, const Devi
 // tracked: how many were before this substep.
 template <class AnyTeam, class Block>
 CUTPROOF_DEVICE void list_tracked(Block& block, const AnyTeam& team, const DeviceView& w, int g, int substep,
-                                  int tracked) {
+                                  int tracked, int state = kTracked) {
   if (!team.leads()) return;
-  w.group_tracked[g] = 1;
-  block.store(&w.tracked_groups[tracked + block.atomic_add(&w.counters->newly_tracked[substep % 3], 1)], g);
+  w.group_tracked[g] = state;
+  block.store(&w.tracked_groups[tracked + block.atomic_add(&w.counters->newly_tracked[(substep + 3) % 3], 1)], g);
 }
 
 // ---- groups that nothing has touched in this frame
@@ -465,10 +468,11 @@ CUTPROOF_DEVICE inline Float3 led_to(const Map& map, const Parts& parts, const O
   return xyz(own.began) + (parts.motion * own.motion + (map.moved() + (parts.shape * own.shape + turned)));
 }
 
-// Gives the particles of such a group positions of their own: where the substep began, and its prediction.
+// Gives the particles of such a group positions of their own: where the substep began, and its prediction. Gives the
+// base of that.
 template <class AnyTeam>
-CUTPROOF_DEVICE void track_particles(const AnyTeam& team, const DeviceView& w, const Group& group, const Pace& pace,
-                                     const Contacts& contacts, bool held, int substep) {
+CUTPROOF_DEVICE Float3 track_particles(const AnyTeam& team, const DeviceView& w, const Group& group, const Pace& pace,
+                                       const Contacts& contacts, bool held, int substep) {
   const int64_t g = group.index;
   const FrameParts parts = load_parts(w, body_of_group(w, group.head), substep);
   const Parts of_prediction = predicted_parts(pace, parts);
@@ -487,6 +491,7 @@ CUTPROOF_DEVICE void track_particles(const AnyTeam& team, const DeviceView& w, c
     w.start[o] = with_w(start, own.began.w);
     w.predicted[o] = with_w(led_to(next, of_prediction, origin, own, r), side);
   });
+  return origin.from(of_prediction.motion) + next.moved();
 }
 
 // Moments of what a group's particles have, value(k) with a weight in w, about `base`: that of the particle in the
@@ -519,15 +524,18 @@ CUTPROOF_DEVICE Float4 sum_about(const AnyTeam& team, const DeviceView& w, const
 
 // What a group begins the frame with.
 template <bool kContacts, class Block>
-CUTPROOF_DEVICE void sum_group(const Team<Block, kParticleTeam>& team, const DeviceView& w, int g) {
+CUTPROOF_DEVICE void sum_group(Block& block, const Team<Block, kParticleTeam>& team, const DeviceView& w, int g) {
   if constexpr (kContacts) {
-    if (team.leads()) w.group_tracked[g] = 0;
+    if (team.leads()) w.group_tracked[g] = kUntouched;
   }
   const Group group = group_of(w, g);
   const GroupHead& head = group.head;
   if (head.size == 0) return;
   const Pace pace = constant(&w.pace[body_of_group(w, head)]);
   if (pace.substeps == 0) return;
+  if constexpr (kContacts) {
+    if (held_by(w, pace, head.hold_set, 0).active) list_tracked(block, team, w, g, -1, 0, kDue);
+  }
   const float per_mass = 1.0f / constant(&w.group_mass[g]).w;
   const float of_each = 1.0f / static_cast<float>(head.holder_count);
   const auto particle = [&](int k) { return w.place_particle[head.begin + k]; };
@@ -588,7 +596,7 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
   block.wait_for_earlier();
   if (head.size == 0 || substep >= pace.substeps) return false;
   if constexpr (kContacts) {
-    if (w.group_tracked[g] != 0) return false;
+    if (w.group_tracked[g] != kUntouched) return false;
   }
   const FrameParts parts = load_parts(w, body, substep);
   const Parts of_prediction = predicted_parts(pace, parts);
@@ -711,10 +719,14 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const Team<Block, kResolvedTeam
   const Held held = held_by(w, pace, head.hold_set, substep);
   Float3 base;
   bool resolve = true;
-  if (begins) {
-    base = xyz(w.group_base[g]);
-    track_particles(team, w, group, pace, contacts, held.active, substep);
-    list_tracked(block, team, w, g, substep, tracked);
+  const bool due = team.any(w.group_tracked[g] == kDue);
+  if (begins || due) {
+    base = track_particles(team, w, group, pace, contacts, held.active, substep);
+    if (begins) list_tracked(block, team, w, g, substep, tracked);
+    if (due && team.leads()) {
+      w.group_tracked[g] = kTracked;
+      w.group_base[g] = with_w(base, 0.0f);  // how far from it particles are is asked of carried groups only
+    }
   } else {
     const Ending ending = ending_of(w, pace, g);
     const float of_each = 1.0f / static_cast<float>(head.holder_count);
@@ -817,7 +829,7 @@ CUTPROOF_DEVICE void end_group(const Team<Block, kParticleTeam>& team, const Dev
   const Pace pace = constant(&w.pace[body]);
   if (head.size == 0 || pace.substeps == 0) return;
   if constexpr (kContacts) {
-    if (w.group_tracked[g] != 0) {
+    if (w.group_tracked[g] != kUntouched) {
       const Ending ending = ending_of(w, pace, g);
       team.each(head.size, [&](int k) {
         const int p = w.place_particle[head.begin + k];
@@ -939,7 +951,7 @@ CUTPROOF_DEVICE void sum_groups_kernel(Block& block, const DeviceView& w) {
   const Team<Block, kParticleTeam> team(block);
   const int groups = w.counters->groups;
   for (int64_t g = team.first(); g < groups; g += team.stride()) {
-    sum_group<kContacts>(team, w, static_cast<int>(g));
+    sum_group<kContacts>(block, team, w, static_cast<int>(g));
   }
 }
 
@@ -1285,7 +1297,7 @@ CUTPROOF_DEVICE void resolve(Block& block, const Team<Block, kResolvedTeam>& tea
                              const Group& group, const Pace& pace, const Contacts& contacts, const Iteration& now,
                              Float3 base, int substep, int iteration) {
   const int g = group.index;
-  if (!team.any(w.group_tracked[g] != 0)) {
+  if (!team.any(w.group_tracked[g] != kUntouched)) {
     track_particles(team, w, group, pace, contacts, false, substep);
     list_tracked(block, team, w, g, substep, w.counters->tracked[substep % 2]);
   }
