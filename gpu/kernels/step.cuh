@@ -365,7 +365,7 @@ CUTPROOF_DEVICE void list_resolved(Block& block, const AnyTeam& team, const Devi
   if (pace.iterations == 0) return;  // nobody asks for the list, or empties it
   block.store(&w.resolved_groups[block.atomic_add(listed_before(w, substep, before), 1)], g);
 }
-// tracked: how many were before this substep.
+// tracked: how many were before this substep (-1: before the first).
 template <class AnyTeam, class Block>
 CUTPROOF_DEVICE void list_tracked(Block& block, const AnyTeam& team, const DeviceView& w, int g, int substep,
                                   int tracked, int state = kTracked) {

@@ -653,6 +653,39 @@ TEST(Groups, HaveTheirBasesNearTheirMeans) {
   }
 }
 
+// An iteration adds a map and takes part of what a prediction has beyond its base, so particles may come to where they
+// are at rest about the base: whatever an earlier substep has made of their group, no room is more than that leaves.
+TEST(Groups, LeaveRoomForTheirRestShape) {
+  cutproof::Setup setup = block_on_floor(0.05);
+  setup.step.substeps = 1;
+  const std::vector<cutproof::Setup> setups = {setup};
+  StagingBuffers staging = make_staging_buffers(setups, {cooked(setup)}, kNewton, Capacity{});
+  const DeviceView w = staging.view();
+  HostLauncher launcher;
+  launcher.items(begin_frame_kernel_object{}, w.particles, w);
+  enqueue_groups(launcher, w);
+  launcher.teams(sum_groups_kernel_object<true>{}, step_detail::kParticleTeam, w.group_capacity, w);
+  const int groups = staging.counters.front().groups;
+  ASSERT_GT(groups, 20);
+  const auto h = static_cast<float>(setup.body.grid.spacing);
+  const float smaller = -0.9f * h;  // all are pressed together to a tenth
+  for (int g = 0; g < groups; ++g) {
+    Float4* const rows = w.group_place + 3 * g;
+    rows[0].x = rows[1].y = rows[2].z = smaller;
+  }
+  launcher.teams(begin_substep_kernel_object<true, step_detail::kRowTeam>{}, step_detail::kParticleTeam,
+                 w.group_capacity, w, 0);
+  for (int g = 0; g < groups; ++g) {
+    ASSERT_EQ(w.group_tracked[g], step_detail::kUntouched);
+    double lowest = 1;
+    for (const int p : particles_of(staging, staging.group_head[at(g)])) {
+      lowest = std::min(lowest, setup.body.rest_position(p).z);
+    }
+    EXPECT_LE(w.group_room[g], lowest + double{w.group_base[g].z} - setup.walls.front().offset) << "group " << g;
+    EXPECT_GT(w.group_room[g], 0);
+  }
+}
+
 // The same body, in which no two particles are named by the same grips: none of them is in a group.
 cutproof::Setup without_groups(cutproof::Setup setup) {
   for (int32_t bit = 1; bit < setup.body.particle_count(); bit *= 2) {
