@@ -69,6 +69,7 @@ CUTPROOF_DEVICE inline float depth_in(const WallF& wall, const RestPoint& rest, 
 }
 
 CUTPROOF_DEVICE inline Float3 off_walls(const Contacts& contacts, const RestPoint& rest, Float3 d) {
+  CUTPROOF_ROLLED
   for (int k = 0; k < contacts.wall_count; ++k) {
     const WallF wall = constant(&contacts.walls[k]);
     if (depth_in(wall, rest, d) > 0) {
@@ -135,6 +136,7 @@ CUTPROOF_DEVICE inline Float3 off_blade(const Contacts& contacts, const RestPoin
 // Whether a particle touches a contact, or nearly so (kTouchMargin).
 CUTPROOF_DEVICE inline bool touches(const Contacts& contacts, const RestPoint& rest, Float3 d, float side) {
   const float margin = static_cast<float>(kTouchMargin) * rest.h;
+  CUTPROOF_ROLLED
   for (int k = 0; k < contacts.wall_count; ++k) {
     if (depth_in(constant(&contacts.walls[k]), rest, d) > -margin) return true;
   }
@@ -154,17 +156,18 @@ inline constexpr int kMostTurns = 16;  // of blade and walls, where both hold at
 CUTPROOF_DEVICE inline Float3 allowed(const Contacts& contacts, const RestPoint& rest, Float3 d, float side,
                                       bool& in_turn) {
   if (contacts.move == nullptr) return off_walls(contacts, rest, d);
-  Float3 result = off_blade(contacts, rest, d, side);
-  bool by_blade = !same(result, d);
-  for (int turn = 0; turn < kMostTurns; ++turn) {
-    const Float3 inside = off_walls(contacts, rest, result);
-    if (same(inside, result)) return result;
-    result = off_blade(contacts, rest, inside, side);
-    by_blade = by_blade || !same(result, inside);
-    in_turn = by_blade;
-    if (same(result, inside)) return result;
+  bool by_blade = false;
+  CUTPROOF_ROLLED
+  for (int turn = 0;; ++turn) {
+    const Float3 result = off_blade(contacts, rest, d, side);
+    by_blade = by_blade || !same(result, d);
+    if (turn > 0) {
+      in_turn = by_blade;
+      if (turn == kMostTurns || same(result, d)) return result;
+    }
+    d = off_walls(contacts, rest, result);
+    if (same(d, result)) return result;
   }
-  return result;
 }
 
 // Takes back at most `reach` of the sliding `slid` along the surface with the given normal.
@@ -188,33 +191,37 @@ CUTPROOF_DEVICE inline float blade_side(const Contacts& contacts, const RestPoin
 CUTPROOF_DEVICE inline Float3 project(const Contacts& contacts, const RestPoint& rest, Float3 d, float side,
                                       Float3 start, bool& in_turn) {
   using namespace contacts_detail;
-  bool turns = false;
-  const Float3 projected = allowed(contacts, rest, d, side, turns);
-  in_turn = in_turn || turns;
-  // Blade and wall may both press on a point and leave it where it is: then it is rubbed all the same.
-  if (contacts.frictionless || (same(projected, d) && !turns)) return projected;
-  Float3 result = projected;
-  for (int k = 0; k < contacts.wall_count; ++k) {
-    const WallF wall = constant(&contacts.walls[k]);
-    const float depth = depth_in(wall, rest, d);
-    if (depth <= 0 || wall.friction == 0) continue;
-    Float3 normal;
-    set_axis(normal, wall.axis, static_cast<float>(wall.side));
-    result = rubbed(result, result - start, normal, wall.friction * depth);
-  }
-  if (contacts.blade_friction > 0) {
-    const Float3 pushed = way_off_blade(contacts, rest, d, side);
-    const float depth = norm(pushed);
-    if (depth > 0) {
-      // The blade's own point under the particle has moved too; only sliding against it rubs.
-      const PoseF from = constant(&contacts.move->from), to = constant(&contacts.move->to);
-      const Float3 c = into_frame(to, rest.from(to.edge) + result);
-      const Float3 carried = (to.edge - from.edge) + c.x * (to.along - from.along) + c.y * (to.back - from.back) +
-                             c.z * (to.normal - from.normal);
-      result = rubbed(result, result - start - carried, (1.0f / depth) * pushed, contacts.blade_friction * depth);
+  Float3 result = d;
+  CUTPROOF_ROLLED
+  for (bool rubs = false;; rubs = true) {
+    bool turns = false;
+    const Float3 projected = allowed(contacts, rest, result, side, turns);
+    in_turn = in_turn || turns;
+    // Blade and wall may both press on a point and leave it where it is: then it is rubbed all the same.
+    if (rubs || contacts.frictionless || (same(projected, d) && !turns)) return projected;
+    result = projected;
+    CUTPROOF_ROLLED
+    for (int k = 0; k < contacts.wall_count; ++k) {
+      const WallF wall = constant(&contacts.walls[k]);
+      const float depth = depth_in(wall, rest, d);
+      if (depth <= 0 || wall.friction == 0) continue;
+      Float3 normal;
+      set_axis(normal, wall.axis, static_cast<float>(wall.side));
+      result = rubbed(result, result - start, normal, wall.friction * depth);
+    }
+    if (contacts.blade_friction > 0) {
+      const Float3 pushed = way_off_blade(contacts, rest, d, side);
+      const float depth = norm(pushed);
+      if (depth > 0) {
+        // The blade's own point under the particle has moved too; only sliding against it rubs.
+        const PoseF from = constant(&contacts.move->from), to = constant(&contacts.move->to);
+        const Float3 c = into_frame(to, rest.from(to.edge) + result);
+        const Float3 carried = (to.edge - from.edge) + c.x * (to.along - from.along) + c.y * (to.back - from.back) +
+                               c.z * (to.normal - from.normal);
+        result = rubbed(result, result - start - carried, (1.0f / depth) * pushed, contacts.blade_friction * depth);
+      }
     }
   }
-  return allowed(contacts, rest, result, side, in_turn);
 }
 
 // The same for a solver that comes from x and would go to `free`. Where blade and walls hold at once, projecting in
@@ -262,6 +269,7 @@ CUTPROOF_DEVICE inline float room_around(const Contacts& contacts, const Ball& b
   const float reach = ball.radius * (1.0f + kRounds) + static_cast<float>(kTouchMargin) * rest.h;
   const auto least = [](float a, float b) { return a < b || a != a ? a : b; };  // no number, if one of them is none
   float room = 3.0e38f;
+  CUTPROOF_ROLLED
   for (int k = 0; k < contacts.wall_count; ++k) {
     const WallF wall = constant(&contacts.walls[k]);
     const float slack = kRounds * (size + fabsf(wall.offset));

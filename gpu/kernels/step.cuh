@@ -1233,15 +1233,19 @@ CUTPROOF_DEVICE inline void advance_particle(const DeviceView& w, const Pace& pa
       next = x;  // a held particle stays where its grip has put it
     } else {
       const RestPoint rest = {pace.h, grid_node(pace, particle.node)};
-      next = next_position(contacts, rest, free, side, particle.start, x);
+      Float3 wanted = free;
       if constexpr (kAccelerated) {
         // Where several answers are right, the way there decides: touched particles go the plain way.
         if (now.combined && path_matters(contacts)) {
-          const bool touched = contacts_detail::touches(contacts, rest, free, side) ||
-                               contacts_detail::touches(contacts, rest, plain, side);
-          if (touched) next = next_position(contacts, rest, plain, side, particle.start, x);
+          bool touched = false;
+          CUTPROOF_ROLLED
+          for (int k = 0; k < 2; ++k) {
+            touched = touched || contacts_detail::touches(contacts, rest, k == 0 ? free : plain, side);
+          }
+          if (touched) wanted = plain;
         }
       }
+      next = next_position(contacts, rest, wanted, side, particle.start, x);
     }
     const Float3 before = xyz(particle.pushed);
     Float3 carried = (now.implicit ? now.s : 1.0f) * before;
@@ -1430,10 +1434,12 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
     if (team.any(near)) {
       const Contacts contacts = contacts_of(w, pace, substep);
       const int side = w.group_side[g];
-      const auto clear = [&](Rows<Team<Block, kRows>>& candidate) {
-        return is_clear(contacts, ball_around(pace, ahead.group, base, 1.0f - lost_next, candidate.all(team)), side);
-      };
-      if (!clear(plain) || (now.combined && !clear(next))) return true;
+      CUTPROOF_ROLLED
+      for (int k = 0; k < (now.combined ? 2 : 1); ++k) {
+        Rows<Team<Block, kRows>> candidate = k == 0 ? plain : next;
+        const Ball ball = ball_around(pace, ahead.group, base, 1.0f - lost_next, candidate.all(team));
+        if (!is_clear(contacts, ball, side)) return true;
+      }
     }
   }
   const bool more = iteration + 1 < pace.iterations;
