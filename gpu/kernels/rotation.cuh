@@ -20,6 +20,13 @@ struct Quaternion {
   Real w, x, y, z;
 };
 
+// Where kNewton begins: a rotation both ways.
+template <class Real>
+struct Start {
+  Quaternion<Real> q;
+  Matrix3x3<Real> r;
+};
+
 namespace rotation_detail {
 
 CUTPROOF_BOTH inline float absolute(float a) { return fabsf(a); }
@@ -44,6 +51,17 @@ CUTPROOF_BOTH inline int exponent_of(double a) {
   int exponent = 0;
   static_cast<void>(frexp(a, &exponent));
   return exponent;
+}
+
+CUTPROOF_BOTH inline unsigned bits_of(float a) {
+  unsigned bits;
+  memcpy(&bits, &a, sizeof bits);
+  return bits;
+}
+CUTPROOF_BOTH inline float float_of(unsigned bits) {
+  float a;
+  memcpy(&a, &bits, sizeof a);
+  return a;
 }
 
 template <class Real>
@@ -121,6 +139,22 @@ CUTPROOF_BOTH inline Vector3<Real> column(const Matrix3x3<Real>& a, int k) {
 // underflow nor overflow. False if there is nothing to scale: A is zero or not finite.
 template <class Real>
 CUTPROOF_BOTH inline bool scale_to_one(Matrix3x3<Real>& a) {
+  if constexpr (kSingle<Real>) {
+    // Bits of sizes are in the order of the sizes, with what is not finite above all. The greatest of them by pairs:
+    // one after the other, each would wait for the one before.
+    unsigned size[9];
+    for (int k = 0; k < 9; ++k) size[k] = bits_of(a.m[k]) & 0x7fffffffu;
+    const auto greater = [](unsigned x, unsigned y) { return x > y ? x : y; };
+    const unsigned greatest = greater(greater(greater(size[0], size[1]), greater(size[2], size[3])),
+                                      greater(greater(greater(size[4], size[5]), greater(size[6], size[7])), size[8]));
+    const unsigned exponent = greatest >> 23;
+    // Where both the number and its reciprocal are normal, and nothing that matters underflows.
+    if (exponent >= 64 && exponent <= 190) {
+      const float factor = float_of((253u - exponent) << 23);
+      for (int k = 0; k < 9; ++k) a.m[k] = a.m[k] * factor;
+      return true;
+    }
+  }
   Real greatest = 0;
   bool finite = true;
   for (int k = 0; k < 9; ++k) {
@@ -252,7 +286,7 @@ CUTPROOF_BOTH inline Rotation<Real> by_mueller2016(const Matrix3x3<Real>& a, con
   return {matrix_of(q), false};
 }
 
-// The objective at the rotation q, turned on by a small ω in the rotated frame: with B = Rᵀ A it is
+// The objective at the rotation R, turned on by a small ω in the rotated frame: with B = Rᵀ A it is
 // tr B + g·ω - ½ ωᵀ H ω + …, g the axial vector of B and H = tr(B) I - sym(B).
 template <class Real>
 struct Expansion {
@@ -267,8 +301,7 @@ struct Expansion {
 };
 
 template <class Real>
-CUTPROOF_BOTH inline Expansion<Real> expand(const Matrix3x3<Real>& a, Quaternion<Real> q) {
-  const Matrix3x3<Real> r = matrix_of(q);
+CUTPROOF_BOTH inline Expansion<Real> expand(const Matrix3x3<Real>& a, const Matrix3x3<Real>& r) {
   Matrix3x3<Real> b;
   for (int row = 0; row < 3; ++row) {
     for (int k = 0; k < 3; ++k) b(row, k) = gpu::dot(column(r, row), column(a, k));
@@ -291,10 +324,10 @@ CUTPROOF_BOTH inline Expansion<Real> expand(const Matrix3x3<Real>& a, Quaternion
   return e;
 }
 
-// q turned on by ω in its own frame, through Cayley's map.
+// q turned on by ω in its own frame, through Cayley's map; not of unit length.
 template <class Real>
 CUTPROOF_BOTH inline Quaternion<Real> turned(Quaternion<Real> q, Vector3<Real> omega) {
-  return normalized(q * Quaternion<Real>{1, Real(0.5) * omega.x, Real(0.5) * omega.y, Real(0.5) * omega.z});
+  return q * Quaternion<Real>{1, Real(0.5) * omega.x, Real(0.5) * omega.y, Real(0.5) * omega.z};
 }
 
 // Kugelstadt, Koschier, Bender 2018, "Fast corotated FEM using operator splitting", §4: Newton's method from the
@@ -303,12 +336,12 @@ template <class Real>
 CUTPROOF_BOTH inline Rotation<Real> by_apd(const Matrix3x3<Real>& a, const Matrix3x3<Real>& previous) {
   Quaternion<Real> q = quaternion_of(previous);
   for (int iteration = 0; iteration < 20; ++iteration) {
-    const Expansion<Real> e = expand(a, q);
+    const Expansion<Real> e = expand(a, matrix_of(q));
     Vector3<Real> omega = e.scaled_step();
     // Entries of A are below 1, so that 0.25 of the gradient is a short step.
     const bool newton = absolute(e.determinant) > rounding<Real>(1e-9) && gpu::dot(omega, e.g) * e.determinant > 0;
     omega = (newton ? 1 / e.determinant : 0) * omega + (newton ? 0 : Real(0.25)) * e.g;
-    q = turned(q, omega);
+    q = normalized(turned(q, omega));
     if (gpu::dot(omega, omega) < (newton ? rounding<Real>(1e-7) : rounding<Real>(1e-14, 2)))
       break;  // Newton's next step would be below rounding
   }
@@ -324,16 +357,22 @@ CUTPROOF_BOTH inline Rotation<Real> by_apd(const Matrix3x3<Real>& a, const Matri
 template <class Real>
 inline constexpr Real kLastSquare = static_cast<Real>(kSingle<Real> ? 1e-6 : 3e-11);
 template <class Real>
-CUTPROOF_BOTH inline Rotation<Real> by_newton(const Matrix3x3<Real>& a, const Matrix3x3<Real>& previous) {
-  Quaternion<Real> q = quaternion_of(previous);
+CUTPROOF_BOTH inline Rotation<Real> by_newton(const Matrix3x3<Real>& a, const Matrix3x3<Real>& previous,
+                                              const Start<Real>& start) {
+  Quaternion<Real> q = start.q;
+  Matrix3x3<Real> r = start.r;
   for (int iteration = 0; iteration < 5; ++iteration) {
-    const Expansion<Real> e = expand(a, q);
+    const Expansion<Real> e = expand(a, r);
     const Real trace = e.h00 + e.h11 + e.h22;
     const bool positive = e.h00 > 0 && e.c22 > 0 && e.determinant > Real(1e-5) * trace * trace * trace;
     if (!positive) break;
     const Vector3<Real> omega = (1 / e.determinant) * e.scaled_step();
+    const Real square = gpu::dot(omega, omega);
     q = turned(q, omega);
-    if (gpu::dot(omega, omega) < kLastSquare<Real>) return {matrix_of(q), false};
+    // A matrix is made of q of any length; five long steps might leave none that is a number.
+    if (square > 1) q = normalized(q);
+    r = matrix_of(q);
+    if (square < kLastSquare<Real>) return {r, false};
   }
   return by_jacobi4(a, previous);
 }
@@ -466,19 +505,35 @@ CUTPROOF_BOTH inline Rotation<Real> by_quest(const Matrix3x3<Real>& a, const Mat
 
 }  // namespace rotation_detail
 
+// What follows from the previous rotation alone, so that it may be computed before A is known.
+template <int Method, class Real>
+CUTPROOF_BOTH inline Start<Real> start_from(const Matrix3x3<Real>& previous) {
+  Start<Real> start = {};
+  if constexpr (Method == kNewton) {
+    start.q = rotation_detail::quaternion_of(previous);
+    start.r = rotation_detail::matrix_of(start.q);
+  }
+  return start;
+}
+
 // One rotation problem. Where the answer is not unique, the one nearest to `previous` (kJacobi4, kNewton; kSvd for rank
 // one); where A is zero or not finite, `previous`. Never NaN if `previous` is a rotation. kMueller2016, kApd and
 // kNewton start from `previous`, the others do not need it; kMueller2016, kApd and kQuest do not know when an answer is
-// not unique.
+// not unique. start: start_from<Method>(previous).
 template <int Method, class Real>
-CUTPROOF_BOTH inline Rotation<Real> rotate(Matrix3x3<Real> a, const Matrix3x3<Real>& previous) {
+CUTPROOF_BOTH inline Rotation<Real> rotate(Matrix3x3<Real> a, const Matrix3x3<Real>& previous,
+                                           const Start<Real>& start) {
   if (!rotation_detail::scale_to_one(a)) return {previous, true};
   if constexpr (Method == kJacobi4) return rotation_detail::by_jacobi4(a, previous);
   if constexpr (Method == kMueller2016) return rotation_detail::by_mueller2016<20>(a, previous);
   if constexpr (Method == kApd) return rotation_detail::by_apd(a, previous);
   if constexpr (Method == kSvd) return rotation_detail::by_svd(a, previous);
   if constexpr (Method == kQuest) return rotation_detail::by_quest(a, previous);
-  if constexpr (Method == kNewton) return rotation_detail::by_newton(a, previous);
+  if constexpr (Method == kNewton) return rotation_detail::by_newton(a, previous, start);
+}
+template <int Method, class Real>
+CUTPROOF_BOTH inline Rotation<Real> rotate(const Matrix3x3<Real>& a, const Matrix3x3<Real>& previous) {
+  return rotate<Method>(a, previous, start_from<Method>(previous));
 }
 
 }  // namespace cutproof::gpu

@@ -152,16 +152,35 @@ struct Iteration {
   bool combined;  // the first iteration is plain
   bool kept;      // the last has no next one to keep anything for
   Combination combination;
+  float lost_before, lost_after;
 };
-CUTPROOF_DEVICE inline Iteration iteration_of(const Pace& pace, int iteration) {
+CUTPROOF_DEVICE inline Iteration iteration_of(const Pace& pace, int iteration, const IterationNumbers& numbers) {
   Iteration now = {};
   now.s = pace.s;
   now.implicit = pace.solver == Solver::implicit;
   const bool accelerated = pace.acceleration == Acceleration::chebyshev;
   now.combined = accelerated && iteration > 0;
   now.kept = accelerated && iteration + 1 < pace.iterations;
-  if (now.combined) now.combination = chebyshev(pace.kdt2, iteration);
+  now.combination = {numbers.pull, numbers.carry};
+  now.lost_before = numbers.lost_before;
+  now.lost_after = numbers.lost_after;
   return now;
+}
+// Computed once a frame, because a root and powers take long.
+CUTPROOF_DEVICE inline IterationNumbers iteration_numbers(const Pace& pace, int iteration) {
+  Combination combination = {};
+  if (pace.acceleration == Acceleration::chebyshev && iteration > 0) combination = chebyshev(pace.kdt2, iteration);
+  return {combination.pull, combination.carry, lost_fraction(pace, iteration), lost_fraction(pace, iteration + 1)};
+}
+CUTPROOF_DEVICE inline IterationNumbers* numbers_of(const DeviceView& w, int body, int iteration) {
+  return &w.iterations[int64_t{body} * (w.most_iterations + 1) + iteration];
+}
+CUTPROOF_DEVICE inline Iteration iteration_of(const DeviceView& w, int body, const Pace& pace, int iteration) {
+  return iteration_of(pace, iteration, constant(numbers_of(w, body, iteration)));
+}
+// l at the end of a substep.
+CUTPROOF_DEVICE inline float lost_in_all(const DeviceView& w, int body, const Pace& pace) {
+  return constant(numbers_of(w, body, pace.iterations)).lost_before;
 }
 
 // The displacement [m] that the active grip of a set gives to its particles in a substep, from where they began. At
@@ -287,7 +306,7 @@ enum : int { kCarried = 0, kResolved = 1, kHeld = 2 };  // DeviceView::group_res
 CUTPROOF_DEVICE inline void set_held_push(Pace& pace) {
   float alpha = 1.0f, beta = 0.0f, earlier_alpha = 1.0f, earlier_beta = 0.0f;
   for (int j = 0; j < pace.iterations; ++j) {
-    const Iteration now = iteration_of(pace, j);
+    const Iteration now = iteration_of(pace, j, iteration_numbers(pace, j));
     const float kept = now.implicit ? now.s : 1.0f, part = now.combined ? now.combination.pull : 1.0f;
     const auto next = [&](float is, float was, float added) {
       const float carried = now.combined ? now.combination(kept * is, is, was) : kept * is;
@@ -405,12 +424,16 @@ CUTPROOF_DEVICE inline FrameParts load_parts(const DeviceView& w, int body, int 
   const Float4 parts = constant(parts_of(w, body, substep));
   return {{parts.x, parts.y}, {parts.z, parts.w}};
 }
-CUTPROOF_DEVICE inline void store_parts(const DeviceView& w, int body, const Pace& pace) {
+// What the substeps and iterations of a body's frame have in common.
+CUTPROOF_DEVICE inline void store_numbers(const DeviceView& w, int body, const Pace& pace) {
   const float lost = lost_fraction(pace, pace.iterations);
   FrameParts now = {{0, 0}, {0, 1}};
   for (int substep = 0; substep <= pace.substeps; ++substep) {
     *parts_of(w, body, substep) = {now.place.shape, now.place.motion, now.velocity.shape, now.velocity.motion};
     now = parts_after(pace, lost, now);
+  }
+  for (int iteration = 0; iteration <= pace.iterations; ++iteration) {
+    *numbers_of(w, body, iteration) = iteration_numbers(pace, iteration);
   }
 }
 
@@ -602,7 +625,7 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
   const Parts of_prediction = predicted_parts(pace, parts);
   Parts of_last_prediction = {};
   if (substep > 0) of_last_prediction = predicted_parts(pace, load_parts(w, body, substep - 1));
-  const float lost = lost_fraction(pace, pace.iterations), per_h = pace.per_h;
+  const float lost = lost_in_all(w, body, pace), per_h = pace.per_h;
   // All that is read before anything is written: behind a store, each would be waited for by itself.
   Rows<Team<Block, kRows>> place, velocity, map, shape, motion;
   const Origin origin = origin_of(w, g);
@@ -684,8 +707,8 @@ struct Ending {
   float lost;
   int state;
 };
-CUTPROOF_DEVICE inline Ending ending_of(const DeviceView& w, const Pace& pace, int g) {
-  Ending ending = {{}, xyz(w.group_base[g]), lost_fraction(pace, pace.iterations), w.group_resolved[g]};
+CUTPROOF_DEVICE inline Ending ending_of(const DeviceView& w, int body, const Pace& pace, int g) {
+  Ending ending = {{}, xyz(w.group_base[g]), lost_in_all(w, body, pace), w.group_resolved[g]};
   if (pace.iterations > 0) ending.map = load_map(w.group_map, g);
   return ending;
 }
@@ -713,7 +736,8 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const Team<Block, kResolvedTeam
                                    int substep, int tracked, bool begins) {
   const Group group = group_of(w, g);
   const GroupHead& head = group.head;
-  const Pace pace = constant(&w.pace[body_of_group(w, head)]);
+  const int body = body_of_group(w, head);
+  const Pace pace = constant(&w.pace[body]);
   if (substep >= pace.substeps) return;
   const Contacts contacts = contacts_of(w, pace, substep);
   const Held held = held_by(w, pace, head.hold_set, substep);
@@ -728,7 +752,7 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const Team<Block, kResolvedTeam
       w.group_base[g] = with_w(base, 0.0f);  // how far from it particles are is asked of carried groups only
     }
   } else {
-    const Ending ending = ending_of(w, pace, g);
+    const Ending ending = ending_of(w, body, pace, g);
     const float of_each = 1.0f / static_cast<float>(head.holder_count);
     bool before = false, behind = false;  // the blade, when the substep begins
     team.each(head.size, [&](int k) {
@@ -830,7 +854,7 @@ CUTPROOF_DEVICE void end_group(const Team<Block, kParticleTeam>& team, const Dev
   if (head.size == 0 || pace.substeps == 0) return;
   if constexpr (kContacts) {
     if (w.group_tracked[g] != kUntouched) {
-      const Ending ending = ending_of(w, pace, g);
+      const Ending ending = ending_of(w, body, pace, g);
       team.each(head.size, [&](int k) {
         const int p = w.place_particle[head.begin + k];
         Float3 v;
@@ -842,7 +866,7 @@ CUTPROOF_DEVICE void end_group(const Team<Block, kParticleTeam>& team, const Dev
   }
   const Origin origin = origin_of(w, g);
   const FrameParts before = load_parts(w, body, pace.substeps - 1), after = load_parts(w, body, pace.substeps);
-  const float lost = lost_fraction(pace, pace.iterations);
+  const float lost = lost_in_all(w, body, pace);
   Map start, end;
   for (int axis = 0; axis < 3; ++axis) {
     const int64_t at = 3 * int64_t{g} + axis;
@@ -930,7 +954,7 @@ CUTPROOF_DEVICE void begin_frame_kernel(Block& block, const DeviceView& w) {
     if (running(w, static_cast<int>(b))) w.cut[b] = -1;
     const Pace pace = pace_of(w, static_cast<int>(b));
     w.pace[b] = pace;
-    store_parts(w, static_cast<int>(b), pace);
+    store_numbers(w, static_cast<int>(b), pace);
   }
   for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
     const int p = static_cast<int>(i);
@@ -1027,9 +1051,10 @@ CUTPROOF_DEVICE void end_step_kernel(Block& block, const DeviceView& w) {
 
 namespace step_detail {
 
-inline constexpr int kClusterTeam = 16;  // lanes that share a cluster
+inline constexpr int kClusterTeam = 32;  // lanes that share a cluster: few have more groups
 inline constexpr int kMatchThreads = 128;
 inline constexpr int kTeams = kMatchThreads / kClusterTeam;  // of a block on the device
+inline constexpr int kMostApart = 4096;                      // clusters of a load
 // What a cluster's place follows from: sums about `base`, in the order of GroupSums.
 struct ClusterSums {
   Floats<12> moments;
@@ -1037,19 +1062,46 @@ struct ClusterSums {
 };
 inline constexpr std::size_t kMatchShared = kTeams * sizeof(ClusterSums);
 
+// A cluster, and what its lanes need of it that no iteration changes: of their first group each, and the first particle
+// that is in none.
+struct ClusterAhead {
+  ClusterHead head;
+  Offset first;
+  Float4 mass;
+  int loose;
+  Pace pace;
+};
+template <class Block>
+CUTPROOF_DEVICE ClusterAhead cluster_ahead(const Team<Block, kClusterTeam>& team, const DeviceView& w, int s,
+                                           const ClusterHead& head) {
+  ClusterAhead ahead = {head, {}, {}, 0, constant(&w.pace[body_of_slot(w, s)])};
+  if (team.lane() < head.group_count) {
+    ahead.first = constant(&w.cluster_groups[head.group_begin + team.lane()]);
+    ahead.mass = constant(&w.group_mass[ahead.first.index]);
+  }
+  if (team.lane() < head.loose_count) ahead.loose = w.cluster_loose[head.loose_begin + team.lane()];
+  return ahead;
+}
+
+// base: of this lane's first group.
 template <class Block>
 CUTPROOF_DEVICE void sum_cluster(const Team<Block, kClusterTeam>& team, const DeviceView& w, int s,
-                                 const ClusterHead& head, Offset first, ClusterSums& found) {
-  const Pace pace = constant(&w.pace[body_of_slot(w, s)]);
-  const float per_h = pace.per_h;
-  const Offset* const groups = w.cluster_groups + head.group_begin;
-  const int* const loose = w.cluster_loose + head.loose_begin;
-  const Float3 base = head.group_count > 0 ? xyz(w.group_base[team.from(0, first.index)]) : xyz(w.position[loose[0]]);
+                                 const ClusterAhead& ahead, Float3 first_base, ClusterSums& found) {
+  const ClusterHead& head = ahead.head;
+  const float per_h = ahead.pace.per_h;
   typename Team<Block, kClusterTeam>::template Sums<12> sums;
+  const Float3 base =
+      head.group_count > 0 ? team.from(0, first_base) : xyz(w.position[w.cluster_loose[head.loose_begin]]);
   team.each(head.group_count, [&](int k) {
-    const Offset to = k == team.lane() ? first : constant(&groups[k]);
-    const Float4 mass = constant(&w.group_mass[to.index]);
-    const Float3 apart = xyz(w.group_base[to.index]) - base;
+    Offset to = ahead.first;
+    Float4 mass = ahead.mass;
+    Float3 from = first_base;
+    if (k != team.lane()) {
+      to = constant(&w.cluster_groups[head.group_begin + k]);
+      mass = constant(&w.group_mass[to.index]);
+      from = xyz(w.group_base[to.index]);
+    }
+    const Float3 apart = from - base;
     float* const sum = sums.of(k);
     for (int axis = 0; axis < 3; ++axis) {
       const Float4 own = w.group_moments[3 * int64_t{to.index} + axis];
@@ -1062,11 +1114,11 @@ CUTPROOF_DEVICE void sum_cluster(const Team<Block, kClusterTeam>& team, const De
     }
   });
   team.each(head.loose_count, [&](int k) {
-    const int o = loose[k];
+    const int o = k == team.lane() ? ahead.loose : w.cluster_loose[head.loose_begin + k];
     const Float4 now = w.position[o];
     const Float3 e = xyz(now) - base;
     add_moments(sums.of(k), now.w, e, per_h * e,
-                nodes_from_rest_center(w, coordinates(pace, constant(&w.place_node[o])), s));
+                nodes_from_rest_center(w, coordinates(ahead.pace, constant(&w.place_node[o])), s));
   });
   team.parted(sums).each(team, [&](int n, float sum) { found.moments.v[n] = sum; });
   if (team.leads()) found.base = base;
@@ -1075,26 +1127,33 @@ CUTPROOF_DEVICE void sum_cluster(const Team<Block, kClusterTeam>& team, const De
 // What else it follows from.
 struct ClusterRest {
   Float4 row[3];  // DeviceView::cluster_rest
-  Matrix3 rotation;
+  Start<float> start;
+  float h, per_mass, per_mass_and_h;
   int size;
 };
+template <int Method>
 CUTPROOF_DEVICE inline ClusterRest rest_of_cluster(const DeviceView& w, int s) {
   const Float4* const row = w.cluster_rest + 3 * int64_t{s};
-  return {{constant(&row[0]), constant(&row[1]), constant(&row[2])}, w.rotation[s], w.slot_size[s]};
+  ClusterRest rest = {};
+  for (int k = 0; k < 3; ++k) rest.row[k] = constant(&row[k]);
+  rest.start = start_from<Method>(w.rotation[s]);
+  rest.h = constant(&w.pace[body_of_slot(w, s)]).h;
+  rest.per_mass = 1.0f / rest.row[0].w;
+  rest.per_mass_and_h = 1.0f / (rest.row[0].w * rest.h);
+  rest.size = w.slot_size[s];
+  return rest;
 }
 
 // Centre and rotation of a cluster from its sums.
 template <int Method>
 CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const ClusterRest& rest,
                                           const ClusterSums& sums) {
-  const float h = constant(&w.pace[body_of_slot(w, s)]).h;
   const float* const moment = sums.moments.v;
   const Float4 first = rest.row[0], second = rest.row[1], third = rest.row[2];
   const Float3 rest_moment = xyz(first), moved = {moment[3], moment[7], moment[11]};
-  const float mass = first.w;
   const float spread[9] = {second.x, second.y, second.z, second.y, second.w, third.x, second.z, third.x, third.y};
   // A = Σ w (x - t)(X - T)ᵀ / h². The rest moment is zero but for the rounding of T.
-  const Float3 shift = (1.0f / (mass * h)) * moved;
+  const Float3 shift = rest.per_mass_and_h * moved;
   Matrix3 a;
   for (int row = 0; row < 3; ++row) {
     for (int k = 0; k < 3; ++k) {
@@ -1102,67 +1161,75 @@ CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const Clus
     }
   }
   // One particle has no extent: what is left of A is rounding, and rotate() would make a rotation of it.
-  Rotation best{rest.rotation, true};
-  if (rest.size > 1) best = rotate<Method>(a, rest.rotation);
-  w.rotation[s] = best.r;
-  w.degenerate[s] = best.degenerate;
+  const Matrix3& previous = w.rotation[s];
+  const Rotation<float> best =
+      rest.size > 1 ? rotate<Method>(a, previous, rest.start) : Rotation<float>{previous, true};
   // Such that Σ w (goal) = Σ w x to the rounding of these two sums (docs/design/decisions.md, Momentum and the rounding
   // of sums): the rounded T must not push the cluster.
   const Float3 turned = best.r * rest_moment - rest_moment;
-  const Float3 center = sums.base + (1.0f / mass) * (moved - h * turned);
+  const Float3 center = sums.base + rest.per_mass * (moved - rest.h * turned);
   for (int axis = 0; axis < 3; ++axis) {
     const auto entry = [&](int k) { return best.r(axis, k) - (k == axis ? 1.0f : 0.0f); };
     w.placement[3 * int64_t{s} + axis] = {entry(0), entry(1), entry(2), center[axis]};
   }
+  w.rotation[s] = best.r;
+  w.degenerate[s] = best.degenerate;
 }
 
 }  // namespace step_detail
 
-// On the device the teams of a block sum, and neighbouring threads compute the rotations of all of them side by side.
+// On the device the teams of a block sum. Of a large load neighbouring threads then compute the rotations of all of
+// them side by side; of a small one each team's own first thread does, and nobody waits for others.
 template <int Method, class Block>
 CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int substep, int iteration) {
   using namespace step_detail;
   const Team<Block, kClusterTeam> team(block);
   const int slots = w.counters->slots_used;
-  const auto wanted = [&](int64_t s) {
+  const auto wanted = [&](int64_t s, ClusterHead& head) {
     if (s >= slots) return false;
-    const ClusterHead head = constant(&w.cluster_head[s]);
+    head = constant(&w.cluster_head[s]);
     return head.group_count + head.loose_count > 0 &&
            takes_part(constant(&w.pace[body_of_slot(w, static_cast<int>(s))]), substep, iteration);
   };
-  const auto first_of = [&](const ClusterHead& head) {
-    return team.lane() < head.group_count ? constant(&w.cluster_groups[head.group_begin + team.lane()]) : Offset{};
+  // What begins with a substep is read ahead in all its iterations but the first.
+  const auto first_base = [&](const ClusterAhead& ahead) {
+    return team.lane() < ahead.head.group_count ? xyz(w.group_base[ahead.first.index]) : Float3{};
   };
-  // What does not change in a substep is read ahead.
   if constexpr (Block::on_device) {
     ClusterSums* const all = block.template shared<ClusterSums>(kTeams);
+    const bool apart = w.slots_expected <= kMostApart;
     const int mine = block.thread() / kClusterTeam;
+    const int which = apart ? mine : block.thread();  // of the block's clusters this thread places, if any
     for (int64_t begin = static_cast<int64_t>(block.index()) * kTeams; begin < slots;
          begin += static_cast<int64_t>(block.count()) * kTeams) {
-      const bool sums = wanted(begin + mine), places = block.thread() < kTeams && wanted(begin + block.thread());
-      ClusterHead head = {};
-      Offset first = {};
-      if (sums) {
-        head = constant(&w.cluster_head[begin + mine]);
-        first = first_of(head);
-      }
-      ClusterRest rest;
-      if (places) rest = rest_of_cluster(w, static_cast<int>(begin) + block.thread());
+      const int own = static_cast<int>(begin) + mine, placed = static_cast<int>(begin) + which;
+      ClusterHead head = {}, ignored;
+      const bool sums = wanted(own, head);
+      const bool places = apart ? sums && team.leads() : which < kTeams && wanted(placed, ignored);
+      ClusterAhead ahead = {};
+      Float3 base;
+      if (sums) ahead = cluster_ahead(team, w, own, head);
+      if (sums && iteration > 0) base = first_base(ahead);
+      ClusterRest rest = {};
+      if (places) rest = rest_of_cluster<Method>(w, placed);
       block.wait_for_earlier();
-      if (sums) sum_cluster(team, w, static_cast<int>(begin) + mine, head, first, all[mine]);
-      block.sync();
-      if (places) {
-        place_cluster<Method>(w, static_cast<int>(begin) + block.thread(), rest, all[block.thread()]);
+      if (sums) {
+        if (iteration == 0) base = first_base(ahead);
+        sum_cluster(team, w, own, ahead, base, all[mine]);
       }
-      block.sync();
+      apart ? team.sync() : block.sync();
+      if (places) place_cluster<Method>(w, placed, rest, all[which]);
+      apart ? team.sync() : block.sync();
     }
   } else {
     for (int64_t i = team.first(); i < slots; i += team.stride()) {
-      if (!wanted(i)) continue;
       const int s = static_cast<int>(i);
+      ClusterHead head = {};
+      if (!wanted(s, head)) continue;
+      const ClusterAhead ahead = cluster_ahead(team, w, s, head);
       ClusterSums sums;
-      sum_cluster(team, w, s, w.cluster_head[s], first_of(w.cluster_head[s]), sums);
-      place_cluster<Method>(w, s, rest_of_cluster(w, s), sums);
+      sum_cluster(team, w, s, ahead, first_base(ahead), sums);
+      place_cluster<Method>(w, s, rest_of_cluster<Method>(w, s), sums);
     }
   }
   block.wait_for_earlier();
@@ -1176,7 +1243,7 @@ template <int Method>
 struct match_shapes_kernel_object {
   static constexpr const char* kName = "match_shapes_kernel";
   static constexpr bool kReadsAhead = true;
-  static constexpr int kMaxThreads = step_detail::kMatchThreads, kMinBlocks = 5;
+  static constexpr int kMaxThreads = step_detail::kMatchThreads, kMinBlocks = 4;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, int iteration) const {
     match_shapes_kernel<Method>(block, w, substep, iteration);
@@ -1258,13 +1325,14 @@ CUTPROOF_DEVICE inline void advance_particle(const DeviceView& w, const Pace& pa
   w.position[o] = with_w(next, particle.at.w);
 }
 
-// The first of a group's holders, which do not change in a substep.
-inline constexpr int kAtOnce = 4;
-struct FirstHolders {
+// Several of a group's holders, which do not change in a substep.
+template <int kAtOnce>
+struct SomeHolders {
   Offset to[kAtOnce];
 };
-CUTPROOF_DEVICE inline FirstHolders holders_from(const DeviceView& w, const GroupHead& head, int begin) {
-  FirstHolders holders;
+template <int kAtOnce>
+CUTPROOF_DEVICE inline SomeHolders<kAtOnce> holders_from(const DeviceView& w, const GroupHead& head, int begin) {
+  SomeHolders<kAtOnce> holders;
   for (int k = 0; k < kAtOnce; ++k) {
     holders.to[k] = constant(&w.holders[head.holder_begin + begin + (begin + k < head.holder_count ? k : 0)]);
   }
@@ -1272,13 +1340,12 @@ CUTPROOF_DEVICE inline FirstHolders holders_from(const DeviceView& w, const Grou
 }
 
 // What the holders of a group want of it, their mean goal, along one axis: base + goal(r).
-CUTPROOF_DEVICE inline Float4 mean_goal(const DeviceView& w, const GroupHead& head, const FirstHolders& first, float h,
-                                        Float4 base, int axis) {
+template <int kAtOnce>
+CUTPROOF_DEVICE inline Float4 mean_goal(const DeviceView& w, const GroupHead& head, const SomeHolders<kAtOnce>& first,
+                                        float h, Float4 base, int axis) {
   const float from = xyz(base)[axis];
   Float4 sum;
-  // Several at once: one by one, each would wait for the one before.
-  for (int begin = 0; begin < head.holder_count; begin += kAtOnce) {
-    const FirstHolders some = begin == 0 ? first : holders_from(w, head, begin);
+  const auto add = [&](const SomeHolders<kAtOnce>& some, int begin) {
     Float4 row[kAtOnce];
     for (int k = 0; k < kAtOnce; ++k) row[k] = w.placement[3 * int64_t{some.to[k].index} + axis];
     for (int k = 0; k < kAtOnce; ++k) {
@@ -1289,6 +1356,12 @@ CUTPROOF_DEVICE inline Float4 mean_goal(const DeviceView& w, const GroupHead& he
       sum.z += row[k].z;
       sum.w += (row[k].w - from) + h * (row[k].x * to.x + row[k].y * to.y + row[k].z * to.z);
     }
+  };
+  // Several at once: one by one, each would wait for the one before.
+  add(first, 0);
+  CUTPROOF_ROLLED
+  for (int begin = kAtOnce; begin < head.holder_count; begin += kAtOnce) {
+    add(holders_from<kAtOnce>(w, head, begin), begin);
   }
   const float mean = 1.0f / static_cast<float>(head.holder_count), turn = h * mean;
   return {turn * sum.x, turn * sum.y, turn * sum.z, mean * sum.w};
@@ -1308,8 +1381,13 @@ CUTPROOF_DEVICE void resolve(Block& block, const Team<Block, kResolvedTeam>& tea
   Map is = {}, was = {};
   if (iteration > 0) is = load_map(w.group_map, g);
   if constexpr (kAccelerated) was = iteration > 1 && now.combined ? load_map(w.group_earlier_map, g) : is;
-  const float lost = lost_fraction(pace, iteration);
-  [[maybe_unused]] const float lost_earlier = lost_fraction(pace, iteration > 0 ? iteration - 1 : 0);
+  const float lost = now.lost_before;
+  [[maybe_unused]] float lost_earlier = 0;
+  if constexpr (kAccelerated) {
+    if (iteration > 0) {
+      lost_earlier = constant(numbers_of(w, body_of_group(w, group.head), iteration - 1)).lost_before;
+    }
+  }
   team.each(group.head.size, [&](int k) {
     const int o = group.head.begin + k;
     const Float3 predicted = xyz(w.predicted[o]), r = group.rest(w, pace, k);
@@ -1324,26 +1402,32 @@ CUTPROOF_DEVICE void resolve(Block& block, const Team<Block, kResolvedTeam>& tea
 }
 
 // A group, and what of it does not change in a substep.
+template <int kAtOnce>
 struct GroupAhead {
   Group group;
-  FirstHolders holders;
+  SomeHolders<kAtOnce> holders;
   Float4 base;
 };
-CUTPROOF_DEVICE inline GroupAhead group_ahead(const DeviceView& w, int g) {
+template <int kAtOnce>
+CUTPROOF_DEVICE inline GroupAhead<kAtOnce> group_ahead(const DeviceView& w, int g) {
   const Group group = group_of(w, g);
-  return {group, holders_from(w, group.head, 0), w.group_base[g]};
+  return {group, holders_from<kAtOnce>(w, group.head, 0), w.group_base[g]};
 }
+// Where lanes share a group there is room for all of most groups' holders, and for all else that is read ahead.
+template <int kRows>
+inline constexpr int kHoldersAtOnce = kRows > 1 ? 8 : 4;
 
 // One iteration of the particles of a resolved group. begins: it has been carried so far.
-template <bool kContacts, bool kAccelerated, class Block>
+template <bool kContacts, bool kAccelerated, class Block, int kAtOnce>
 CUTPROOF_DEVICE void advance_resolved(Block& block, const Team<Block, kResolvedTeam>& team, const DeviceView& w,
-                                      const GroupAhead& ahead, int substep, int iteration, bool begins) {
+                                      const GroupAhead<kAtOnce>& ahead, int substep, int iteration, bool begins) {
   const Group& group = ahead.group;
   const GroupHead& head = group.head;
-  const Pace pace = constant(&w.pace[body_of_group(w, head)]);
+  const int body = body_of_group(w, head);
+  const Pace pace = constant(&w.pace[body]);
   if (!takes_part(pace, substep, iteration)) return;
   const Contacts contacts = contacts_of(w, pace, substep);
-  const Iteration now = iteration_of(pace, iteration);
+  const Iteration now = iteration_of(w, body, pace, iteration);
   const Float3 base = xyz(ahead.base);
   if (begins) resolve<kAccelerated>(block, team, w, group, pace, contacts, now, base, substep, iteration);
   const int first = team.lane();  // of this lane's particles
@@ -1368,24 +1452,51 @@ CUTPROOF_DEVICE void advance_resolved(Block& block, const Team<Block, kResolvedT
 template <bool kContacts, bool kAccelerated, class Block, int kRows>
 CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& team, const DeviceView& w, int g,
                                      int substep, int iteration) {
-  const GroupAhead ahead = group_ahead(w, g);
+  const GroupAhead<kHoldersAtOnce<kRows>> ahead = group_ahead<kHoldersAtOnce<kRows>>(w, g);
   const GroupHead& head = ahead.group.head;
   const Float4 base = ahead.base;
-  const Pace pace = constant(&w.pace[body_of_group(w, head)]);
+  const int body = body_of_group(w, head);
+  const Pace pace = constant(&w.pace[body]);
   [[maybe_unused]] float room = 0;
   [[maybe_unused]] int state = kCarried;
   if constexpr (kContacts) {
     room = w.group_room[g];
     state = w.group_resolved[g];
   }
+  const bool active = head.size > 0 && state != kResolved && takes_part(pace, substep, iteration);
+  const bool more = iteration + 1 < pace.iterations;
+  Iteration now = {};
+  if (active) now = iteration_of(w, body, pace, iteration);
+  Rows<Team<Block, kRows>> present, earlier, of_prediction;
+  Float4 mass, upper, lower;
+  const auto read_maps = [&](int axis) {
+    const int64_t at = 3 * int64_t{g} + axis;
+    if (iteration > 0) earlier.of(axis) = present.of(axis) = w.group_map[at];
+    // The one before the first is no map of this kind, and of no weight.
+    if constexpr (kAccelerated) {
+      if (iteration > 1 && now.combined) earlier.of(axis) = w.group_earlier_map[at];
+    }
+  };
+  const auto read_moments = [&] {
+    mass = constant(&w.group_mass[g]);
+    upper = constant(&w.group_spread[2 * int64_t{g}]);
+    lower = constant(&w.group_spread[2 * int64_t{g} + 1]);
+    if (more) team.each(3, [&](int axis) { of_prediction.of(axis) = w.group_predicted[3 * int64_t{g} + axis]; });
+  };
+  constexpr bool kAllAhead = kRows > 1;  // one thread has no registers for so much
+  if constexpr (kAllAhead) {
+    if (active) {
+      team.each(3, read_maps);
+      read_moments();
+    }
+  }
   block.wait_for_earlier();  // for the clusters: all else is older
-  if (head.size == 0 || state == kResolved || !takes_part(pace, substep, iteration)) return false;
-  const Iteration now = iteration_of(pace, iteration);
-  const float lost_next = lost_fraction(pace, iteration + 1);
-  Rows<Team<Block, kRows>> present, plain, next;
+  if (!active) return false;
+  const float lost_next = now.lost_after;
+  Rows<Team<Block, kRows>> plain, next;
   team.each(3, [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
-    if (iteration > 0) present.of(axis) = w.group_map[at];
+    if constexpr (!kAllAhead) read_maps(axis);
     const Float4 goal = mean_goal(w, head, ahead.holders, pace.h, base, axis);
     if constexpr (kContacts) {
       if (state == kHeld) {
@@ -1395,7 +1506,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
         Float4 row = row_of(pushed, goal, present.of(axis));
         if constexpr (kAccelerated) {
           if (now.combined) {
-            const Float4 y = present.of(axis), z = iteration > 1 ? w.group_earlier_map[at] : y;
+            const Float4 y = present.of(axis), z = earlier.of(axis);
             const auto combined = [&](float is, float was, float of_goal) {
               return now.combination(kept * is, is, was) + added * of_goal;
             };
@@ -1416,8 +1527,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
     next.of(axis) = plain.of(axis);
     if constexpr (kAccelerated) {
       if (!now.combined) return;
-      // The one before the first is no map of this kind, and of no weight.
-      const Float4 x = plain.of(axis), y = present.of(axis), z = iteration > 1 ? w.group_earlier_map[at] : y;
+      const Float4 x = plain.of(axis), y = present.of(axis), z = earlier.of(axis);
       next.of(axis) = {now.combination(x.x, y.x, z.x), now.combination(x.y, y.y, z.y), now.combination(x.z, y.z, z.z),
                        now.combination(x.w, y.w, z.w)};
     }
@@ -1442,13 +1552,9 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
       }
     }
   }
-  const bool more = iteration + 1 < pace.iterations;
   const float per_h = pace.per_h;
-  const Float4 mass = constant(&w.group_mass[g]), upper = constant(&w.group_spread[2 * int64_t{g}]),
-               lower = constant(&w.group_spread[2 * int64_t{g} + 1]);
   // All that is read before anything is written: behind a store, each would be waited for by itself.
-  Rows<Team<Block, kRows>>& of_prediction = plain;
-  if (more) team.each(3, [&](int axis) { of_prediction.of(axis) = w.group_predicted[3 * int64_t{g} + axis]; });
+  if constexpr (!kAllAhead) read_moments();
   team.each(3, [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
     const Float4 row = next.of(axis);
@@ -1471,10 +1577,10 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
 template <bool kContacts, bool kAccelerated, class Block>
 CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int substep, int iteration) {
   if (o < 0) return;
-  const int p = w.place_particle[o];
-  const Pace pace = constant(&w.pace[body_index(w, p)]);
+  const int p = w.place_particle[o], body = body_index(w, p);
+  const Pace pace = constant(&w.pace[body]);
   if (!takes_part(pace, substep, iteration)) return;
-  const Iteration now = iteration_of(pace, iteration);
+  const Iteration now = iteration_of(w, body, pace, iteration);
   const Particle particle = particle_at<kContacts, kAccelerated>(w, now, o);
   const Float3 at = xyz(particle.at), from = now.implicit ? xyz(particle.predicted) : at;
   // Mean of the goals, less `from`: small numbers, so that summing them costs no digits of d.
@@ -1535,7 +1641,8 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
       break;
     }
     if constexpr (kContacts) {
-      advance_resolved<kContacts, kAccelerated>(block, team, w, group_ahead(w, g), substep, iteration, begins);
+      advance_resolved<kContacts, kAccelerated>(block, team, w, group_ahead<kHoldersAtOnce<kRows>>(w, g), substep,
+                                                iteration, begins);
     }
   }
   if (loose == 0) return;
@@ -1582,7 +1689,7 @@ struct end_step_kernel_object {
 template <bool kContacts, bool kAccelerated, int kRows>
 struct advance_kernel_object {
   static constexpr const char* kName = "advance_kernel";
-  static constexpr int kMaxThreads = 128, kMinBlocks = 4;
+  static constexpr int kMaxThreads = 128, kMinBlocks = kRows > 1 ? 3 : 4;
   static constexpr bool kReadsAhead = true;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, int iteration) const {

@@ -47,7 +47,10 @@ Extents extents_of(const StagingBuffers& loaded, Capacity capacity) {
   extents.hold_set_count = narrow(size(loaded.hold_begin), "sets of grips") - 1;
   extents.hold_entry_count = narrow(size(loaded.hold_grips), "sets of grips");
   extents.grip_substeps = size(loaded.grip_active);
-  for (const BodyConstants& body : loaded.body) extents.most_substeps = std::max(extents.most_substeps, body.substeps);
+  for (const BodyConstants& body : loaded.body) {
+    extents.most_substeps = std::max(extents.most_substeps, body.substeps);
+    extents.most_iterations = std::max(extents.most_iterations, body.iterations);
+  }
   extents.accelerated = some_body(loaded, [](const BodyConstants& b) { return b.acceleration != Acceleration::none; });
   extents.any_contact = some_body(loaded, [](const BodyConstants& b) {
     return b.has_blade || b.wall_end > b.wall_begin || b.grip_end > b.grip_begin;

@@ -110,6 +110,12 @@ struct alignas(128) Pace {
 };
 static_assert(sizeof(Pace) == 128);
 
+// What is the same in an iteration of all substeps (kernels/step.cuh).
+struct alignas(16) IterationNumbers {
+  float pull, carry;              // of the Chebyshev semi-iteration
+  float lost_before, lost_after;  // how much of a prediction's own shape
+};
+
 // A group: particles that the same clusters hold (docs/design/method.md §13, where groups are made). Its particles have
 // the places [begin, begin + size), ascending; its holders are DeviceView::holders[holder_begin .. holder_begin +
 // holder_count).
@@ -196,6 +202,7 @@ struct Extents {
   int wall_count = 0, grip_count = 0, hold_set_count = 0, hold_entry_count = 0;
   int64_t grip_substeps = 0;  // substeps of each grip's schedule, over all grips
   int most_substeps = 0;      // of any body
+  int most_iterations = 0;    // of any body, in a substep
   int accelerated = 0;        // some body's iterations are
   int any_contact = 0;        // some body has a blade, a wall or a grip
   int slot_capacity = 0, member_capacity = 0, vertex_capacity = 0, cell_capacity = 0, addition_capacity = 0;
