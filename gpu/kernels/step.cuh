@@ -220,7 +220,7 @@ CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) {
 // Lanes that share a group: one for each row of its map; and where its particles are looked at one by one, in the pass
 // over all of them and while it is resolved.
 inline constexpr int kRowTeam = 4, kParticleTeam = 16, kResolvedTeam = 32;
-inline constexpr int kMostByRows = 300'000;  // particles of a load
+inline constexpr int kMostByRows = 150'000;  // particles of a load
 
 // Weighted sums in the order of arrays.inc: 4 axis + k: of e rᵀ / h; 4 axis + 3: of e.
 template <class AnyTeam>
@@ -616,16 +616,15 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
   const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
   const Float4 mass = constant(&w.group_mass[g]), upper = constant(&w.group_spread[2 * int64_t{g}]),
                lower = constant(&w.group_spread[2 * int64_t{g} + 1]);
-  block.wait_for_earlier();
-  if (head.size == 0 || substep >= pace.substeps) return false;
-  if constexpr (kContacts) {
-    if (w.group_tracked[g] != kUntouched) return false;
-  }
   const FrameParts parts = load_parts(w, body, substep);
   const Parts of_prediction = predicted_parts(pace, parts);
   Parts of_last_prediction = {};
   if (substep > 0) of_last_prediction = predicted_parts(pace, load_parts(w, body, substep - 1));
   const float lost = lost_in_all(w, body, pace), per_h = pace.per_h;
+  block.wait_for_earlier();
+  if (head.size == 0 || substep >= pace.substeps) return false;
+  [[maybe_unused]] int state = kUntouched;
+  if constexpr (kContacts) state = w.group_tracked[g];
   // All that is read before anything is written: behind a store, each would be waited for by itself.
   Rows<Team<Block, kRows>> place, velocity, map, shape, motion;
   const Origin origin = origin_of(w, g);
@@ -637,6 +636,7 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
     shape.of(axis) = w.frame_shape[at];
     motion.of(axis) = w.frame_motion[at];
   });
+  if (state != kUntouched) return false;
   Rows<Team<Block, kRows>>& predicted = map;
   team.each(3, [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
@@ -991,6 +991,12 @@ CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int
   const int64_t in_warp = rows.first() % (team.kLanes / rows.kLanes);
   int64_t row = rows.first();
   [[maybe_unused]] int64_t listed = from_last(team);
+  if constexpr (kContacts && Block::on_device) {
+    if (row - in_warp >= groups && listed < groups) {
+      const int guess = block.load(&w.tracked_groups[listed]);
+      if (guess >= 0 && guess < groups) block.keep_near(group_of(w, guess));
+    }
+  }
   [[maybe_unused]] unsigned found = 0;
   [[maybe_unused]] int tracked = -1;
   while (true) {
@@ -1051,16 +1057,17 @@ CUTPROOF_DEVICE void end_step_kernel(Block& block, const DeviceView& w) {
 
 namespace step_detail {
 
-inline constexpr int kClusterTeam = 32;  // lanes that share a cluster: few have more groups
+// Lanes that share a cluster. Few clusters have more than 32 groups; where there are clusters enough, half of the lanes
+// do the work of all, and sum in the same order.
+inline constexpr int kClusterTeam = 32, kHalfTeam = 16;
 inline constexpr int kMatchThreads = 128;
-inline constexpr int kTeams = kMatchThreads / kClusterTeam;  // of a block on the device
-inline constexpr int kMostApart = 4096;                      // clusters of a load
+inline constexpr int kFewClusters = 4096;  // of a load
 // What a cluster's place follows from: sums about `base`, in the order of GroupSums.
 struct ClusterSums {
   Floats<12> moments;
   Float3 base;
 };
-inline constexpr std::size_t kMatchShared = kTeams * sizeof(ClusterSums);
+constexpr std::size_t match_shared(int lanes) { return kMatchThreads / lanes * sizeof(ClusterSums); }
 
 // A cluster, and what its lanes need of it that no iteration changes: of their first group each, and the first particle
 // that is in none.
@@ -1071,9 +1078,8 @@ struct ClusterAhead {
   int loose;
   Pace pace;
 };
-template <class Block>
-CUTPROOF_DEVICE ClusterAhead cluster_ahead(const Team<Block, kClusterTeam>& team, const DeviceView& w, int s,
-                                           const ClusterHead& head) {
+template <class AnyTeam>
+CUTPROOF_DEVICE ClusterAhead cluster_ahead(const AnyTeam& team, const DeviceView& w, int s, const ClusterHead& head) {
   ClusterAhead ahead = {head, {}, {}, 0, constant(&w.pace[body_of_slot(w, s)])};
   if (team.lane() < head.group_count) {
     ahead.first = constant(&w.cluster_groups[head.group_begin + team.lane()]);
@@ -1084,15 +1090,15 @@ CUTPROOF_DEVICE ClusterAhead cluster_ahead(const Team<Block, kClusterTeam>& team
 }
 
 // base: of this lane's first group.
-template <class Block>
-CUTPROOF_DEVICE void sum_cluster(const Team<Block, kClusterTeam>& team, const DeviceView& w, int s,
-                                 const ClusterAhead& ahead, Float3 first_base, ClusterSums& found) {
+template <class AnyTeam>
+CUTPROOF_DEVICE void sum_cluster(const AnyTeam& team, const DeviceView& w, int s, const ClusterAhead& ahead,
+                                 Float3 first_base, ClusterSums& found) {
   const ClusterHead& head = ahead.head;
   const float per_h = ahead.pace.per_h;
-  typename Team<Block, kClusterTeam>::template Sums<12> sums;
+  typename AnyTeam::template Sums<12, kClusterTeam> sums;
   const Float3 base =
       head.group_count > 0 ? team.from(0, first_base) : xyz(w.position[w.cluster_loose[head.loose_begin]]);
-  team.each(head.group_count, [&](int k) {
+  team.each(sums, head.group_count, [&](int k, float* sum) {
     Offset to = ahead.first;
     Float4 mass = ahead.mass;
     Float3 from = first_base;
@@ -1102,7 +1108,6 @@ CUTPROOF_DEVICE void sum_cluster(const Team<Block, kClusterTeam>& team, const De
       from = xyz(w.group_base[to.index]);
     }
     const Float3 apart = from - base;
-    float* const sum = sums.of(k);
     for (int axis = 0; axis < 3; ++axis) {
       const Float4 own = w.group_moments[3 * int64_t{to.index} + axis];
       const float moved = own.w + mass.w * apart[axis];
@@ -1113,11 +1118,11 @@ CUTPROOF_DEVICE void sum_cluster(const Team<Block, kClusterTeam>& team, const De
       sum[4 * axis + 3] += moved;
     }
   });
-  team.each(head.loose_count, [&](int k) {
+  team.each(sums, head.loose_count, [&](int k, float* sum) {
     const int o = k == team.lane() ? ahead.loose : w.cluster_loose[head.loose_begin + k];
     const Float4 now = w.position[o];
     const Float3 e = xyz(now) - base;
-    add_moments(sums.of(k), now.w, e, per_h * e,
+    add_moments(sum, now.w, e, per_h * e,
                 nodes_from_rest_center(w, coordinates(ahead.pace, constant(&w.place_node[o])), s));
   });
   team.parted(sums).each(team, [&](int n, float sum) { found.moments.v[n] = sum; });
@@ -1178,12 +1183,12 @@ CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const Clus
 
 }  // namespace step_detail
 
-// On the device the teams of a block sum. Of a large load neighbouring threads then compute the rotations of all of
-// them side by side; of a small one each team's own first thread does, and nobody waits for others.
-template <int Method, class Block>
+// On the device the teams of a block sum. Where clusters are many, neighbouring threads then compute the rotations of
+// all of them side by side; where they are few, each team's own first thread does, and nobody waits for others.
+template <int Method, int kLanes, class Block>
 CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int substep, int iteration) {
   using namespace step_detail;
-  const Team<Block, kClusterTeam> team(block);
+  const Team<Block, kLanes> team(block);
   const int slots = w.counters->slots_used;
   const auto wanted = [&](int64_t s, ClusterHead& head) {
     if (s >= slots) return false;
@@ -1196,9 +1201,10 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
     return team.lane() < ahead.head.group_count ? xyz(w.group_base[ahead.first.index]) : Float3{};
   };
   if constexpr (Block::on_device) {
+    constexpr int kTeams = kMatchThreads / kLanes;
+    constexpr bool apart = kLanes == kClusterTeam;
     ClusterSums* const all = block.template shared<ClusterSums>(kTeams);
-    const bool apart = w.slots_expected <= kMostApart;
-    const int mine = block.thread() / kClusterTeam;
+    const int mine = block.thread() / kLanes;
     const int which = apart ? mine : block.thread();  // of the block's clusters this thread places, if any
     for (int64_t begin = static_cast<int64_t>(block.index()) * kTeams; begin < slots;
          begin += static_cast<int64_t>(block.count()) * kTeams) {
@@ -1239,14 +1245,14 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
   }
 }
 
-template <int Method>
+template <int Method, int kLanes>
 struct match_shapes_kernel_object {
   static constexpr const char* kName = "match_shapes_kernel";
-  static constexpr bool kReadsAhead = true;
+  static constexpr bool kReadsAhead = true, kLetsNextBegin = true;
   static constexpr int kMaxThreads = step_detail::kMatchThreads, kMinBlocks = 4;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, int iteration) const {
-    match_shapes_kernel<Method>(block, w, substep, iteration);
+    match_shapes_kernel<Method, kLanes>(block, w, substep, iteration);
   }
 };
 
@@ -1325,7 +1331,7 @@ CUTPROOF_DEVICE inline void advance_particle(const DeviceView& w, const Pace& pa
   w.position[o] = with_w(next, particle.at.w);
 }
 
-// Several of a group's holders, which do not change in a substep.
+// Several of a group's holders, which do not change in a frame.
 template <int kAtOnce>
 struct SomeHolders {
   Offset to[kAtOnce];
@@ -1401,17 +1407,16 @@ CUTPROOF_DEVICE void resolve(Block& block, const Team<Block, kResolvedTeam>& tea
   list_resolved(block, team, w, pace, g, substep, iteration + 1);
 }
 
-// A group, and what of it does not change in a substep.
+// A group, and what of it does not change in a frame.
 template <int kAtOnce>
 struct GroupAhead {
   Group group;
   SomeHolders<kAtOnce> holders;
-  Float4 base;
 };
 template <int kAtOnce>
 CUTPROOF_DEVICE inline GroupAhead<kAtOnce> group_ahead(const DeviceView& w, int g) {
   const Group group = group_of(w, g);
-  return {group, holders_from<kAtOnce>(w, group.head, 0), w.group_base[g]};
+  return {group, holders_from<kAtOnce>(w, group.head, 0)};
 }
 // Where lanes share a group there is room for all of most groups' holders, and for all else that is read ahead.
 template <int kRows>
@@ -1428,14 +1433,14 @@ CUTPROOF_DEVICE void advance_resolved(Block& block, const Team<Block, kResolvedT
   if (!takes_part(pace, substep, iteration)) return;
   const Contacts contacts = contacts_of(w, pace, substep);
   const Iteration now = iteration_of(w, body, pace, iteration);
-  const Float3 base = xyz(ahead.base);
+  const Float4 base_and_reach = w.group_base[group.index];
+  const Float3 base = xyz(base_and_reach);
   if (begins) resolve<kAccelerated>(block, team, w, group, pace, contacts, now, base, substep, iteration);
   const int first = team.lane();  // of this lane's particles
   Particle of_first;
   if (first < head.size) of_first = particle_at<kContacts, kAccelerated>(w, now, head.begin + first);
-  block.wait_for_earlier();  // for the clusters: all else is older
   Rows<Team<Block, kResolvedTeam>> rows;
-  team.each(3, [&](int axis) { rows.of(axis) = mean_goal(w, head, ahead.holders, pace.h, ahead.base, axis); });
+  team.each(3, [&](int axis) { rows.of(axis) = mean_goal(w, head, ahead.holders, pace.h, base_and_reach, axis); });
   const Map goal = rows.all(team);
   team.each(head.size, [&](int k) {
     const int o = head.begin + k;
@@ -1454,64 +1459,65 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
                                      int substep, int iteration) {
   const GroupAhead<kHoldersAtOnce<kRows>> ahead = group_ahead<kHoldersAtOnce<kRows>>(w, g);
   const GroupHead& head = ahead.group.head;
-  const Float4 base = ahead.base;
   const int body = body_of_group(w, head);
   const Pace pace = constant(&w.pace[body]);
+  const Iteration now = iteration_of(w, body, pace, iteration);
+  Float4 mass, upper, lower;
+  const auto read_spread = [&] {
+    mass = constant(&w.group_mass[g]);
+    upper = constant(&w.group_spread[2 * int64_t{g}]);
+    lower = constant(&w.group_spread[2 * int64_t{g} + 1]);
+  };
+  constexpr bool kAllAtOnce = kRows > 1;  // one thread has no registers for so much
+  if constexpr (kAllAtOnce) read_spread();
+  block.wait_for_earlier();
+  if (head.size == 0 || !takes_part(pace, substep, iteration)) return false;
+  const Float4 base = w.group_base[g];
   [[maybe_unused]] float room = 0;
   [[maybe_unused]] int state = kCarried;
   if constexpr (kContacts) {
     room = w.group_room[g];
     state = w.group_resolved[g];
   }
-  const bool active = head.size > 0 && state != kResolved && takes_part(pace, substep, iteration);
   const bool more = iteration + 1 < pace.iterations;
-  Iteration now = {};
-  if (active) now = iteration_of(w, body, pace, iteration);
-  Rows<Team<Block, kRows>> present, earlier, of_prediction;
-  Float4 mass, upper, lower;
-  const auto read_maps = [&](int axis) {
+  const float lost_next = now.lost_after;
+  Rows<Team<Block, kRows>> present, earlier, of_prediction, goal;
+  const auto read_prediction = [&] {
+    if (more) team.each(3, [&](int axis) { of_prediction.of(axis) = w.group_predicted[3 * int64_t{g} + axis]; });
+  };
+  team.each(3, [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
     if (iteration > 0) earlier.of(axis) = present.of(axis) = w.group_map[at];
     // The one before the first is no map of this kind, and of no weight.
     if constexpr (kAccelerated) {
       if (iteration > 1 && now.combined) earlier.of(axis) = w.group_earlier_map[at];
     }
-  };
-  const auto read_moments = [&] {
-    mass = constant(&w.group_mass[g]);
-    upper = constant(&w.group_spread[2 * int64_t{g}]);
-    lower = constant(&w.group_spread[2 * int64_t{g} + 1]);
-    if (more) team.each(3, [&](int axis) { of_prediction.of(axis) = w.group_predicted[3 * int64_t{g} + axis]; });
-  };
-  constexpr bool kAllAhead = kRows > 1;  // one thread has no registers for so much
-  if constexpr (kAllAhead) {
-    if (active) {
-      team.each(3, read_maps);
-      read_moments();
-    }
+  });
+  const auto find_goal = [&](int axis) { goal.of(axis) = mean_goal(w, head, ahead.holders, pace.h, base, axis); };
+  if constexpr (kAllAtOnce) {
+    read_prediction();
+    team.each(3, find_goal);
   }
-  block.wait_for_earlier();  // for the clusters: all else is older
-  if (!active) return false;
-  const float lost_next = now.lost_after;
+  if (state == kResolved) return false;
   Rows<Team<Block, kRows>> plain, next;
   team.each(3, [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
-    if constexpr (!kAllAhead) read_maps(axis);
-    const Float4 goal = mean_goal(w, head, ahead.holders, pace.h, base, axis);
+    if constexpr (!kAllAtOnce) find_goal(axis);
     if constexpr (kContacts) {
       if (state == kHeld) {
         // As set_held_push().
         const float kept = now.implicit ? now.s : 1.0f, added = now.combined ? now.combination.pull * now.s : now.s;
         const auto pushed = [&](float of_goal, float is) { return kept * is + added * of_goal; };
-        Float4 row = row_of(pushed, goal, present.of(axis));
+        Float4 row = row_of(pushed, goal.of(axis), present.of(axis));
         if constexpr (kAccelerated) {
           if (now.combined) {
             const Float4 y = present.of(axis), z = earlier.of(axis);
             const auto combined = [&](float is, float was, float of_goal) {
               return now.combination(kept * is, is, was) + added * of_goal;
             };
-            row = {combined(y.x, z.x, goal.x), combined(y.y, z.y, goal.y), combined(y.z, z.z, goal.z),
-                   combined(y.w, z.w, goal.w)};
+            const Float4 to = goal.of(axis);
+            row = {combined(y.x, z.x, to.x), combined(y.y, z.y, to.y), combined(y.z, z.z, to.z),
+                   combined(y.w, z.w, to.w)};
           }
           if (now.kept) w.group_earlier_map[at] = present.of(axis);
         }
@@ -1523,7 +1529,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
       const float toward = now.s * wanted;
       return now.implicit ? toward : (1.0f - now.s) * is + toward;
     };
-    plain.of(axis) = row_of(relaxed, goal, present.of(axis));
+    plain.of(axis) = row_of(relaxed, goal.of(axis), present.of(axis));
     next.of(axis) = plain.of(axis);
     if constexpr (kAccelerated) {
       if (!now.combined) return;
@@ -1554,7 +1560,10 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
   }
   const float per_h = pace.per_h;
   // All that is read before anything is written: behind a store, each would be waited for by itself.
-  if constexpr (!kAllAhead) read_moments();
+  if constexpr (!kAllAtOnce) {
+    read_spread();
+    read_prediction();
+  }
   team.each(3, [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
     const Float4 row = next.of(axis);
@@ -1581,13 +1590,13 @@ CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int
   const Pace pace = constant(&w.pace[body]);
   if (!takes_part(pace, substep, iteration)) return;
   const Iteration now = iteration_of(w, body, pace, iteration);
-  const Particle particle = particle_at<kContacts, kAccelerated>(w, now, o);
-  const Float3 at = xyz(particle.at), from = now.implicit ? xyz(particle.predicted) : at;
-  // Mean of the goals, less `from`: small numbers, so that summing them costs no digits of d.
   const int clusters = w.membership_count[p], begin = w.membership_begin[p], end = w.membership_begin[p + 1];
   const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
-  block.wait_for_earlier();  // for the clusters: all else is older
-  Float3 pull = at - from;   // a particle in no cluster stays where it is
+  block.wait_for_earlier();
+  const Particle particle = particle_at<kContacts, kAccelerated>(w, now, o);
+  // Mean of the goals, less `from`: small numbers, so that summing them costs no digits of d.
+  const Float3 at = xyz(particle.at), from = now.implicit ? xyz(particle.predicted) : at;
+  Float3 pull = at - from;  // a particle in no cluster stays where it is
   if (clusters > 0) {
     const Coordinates c = coordinates(pace, particle.node);
     Float3 sum;
@@ -1616,12 +1625,20 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
   const Team<Block, kRows> rows(block);
   const Team<Block, kResolvedTeam> team(block);
   const int groups = w.counters->groups, loose = w.counters->loose;
-  const int resolved = kContacts ? *listed_before(w, substep, iteration) : 0;
   // Whole warps at a time: groups that turn out to be no longer clear are everybody's, as are those that were resolved
   // before, with which the last warps begin. All of them in one place, because there is much to it.
   const int64_t in_warp = rows.first() % (team.kLanes / rows.kLanes);
   int64_t row = rows.first(), listed = from_last(team);
   [[maybe_unused]] unsigned found = 0;
+  [[maybe_unused]] int resolved = -1;
+  constexpr int kHolders = kHoldersAtOnce<kRows>;
+  if constexpr (kContacts && Block::on_device) {
+    // A warp without other work reads ahead the group that is listed at its place so far, if any is.
+    if (row - in_warp >= groups && listed < groups) {
+      const int guess = block.load(&w.resolved_groups[listed]);
+      if (guess >= 0 && guess < groups) block.keep_near(group_ahead<kHolders>(w, guess));
+    }
+  }
   while (true) {
     [[maybe_unused]] bool begins = false;
     [[maybe_unused]] int g = -1;
@@ -1634,15 +1651,21 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
       if constexpr (kContacts) found = team.found(touches && rows.leads());
       row += rows.stride();
       continue;
-    } else if (listed < resolved) {
-      g = block.load(&w.resolved_groups[listed]);
-      listed += team.stride();
-    } else {
-      break;
     }
     if constexpr (kContacts) {
-      advance_resolved<kContacts, kAccelerated>(block, team, w, group_ahead<kHoldersAtOnce<kRows>>(w, g), substep,
-                                                iteration, begins);
+      if (!begins) {
+        if (resolved < 0) {
+          block.wait_for_earlier();
+          resolved = *listed_before(w, substep, iteration);
+        }
+        if (listed >= resolved) break;
+        g = block.load(&w.resolved_groups[listed]);
+        listed += team.stride();
+      }
+      advance_resolved<kContacts, kAccelerated>(block, team, w, group_ahead<kHolders>(w, g), substep, iteration,
+                                                begins);
+    } else {
+      break;
     }
   }
   if (loose == 0) return;
@@ -1670,7 +1693,7 @@ struct sum_groups_kernel_object {
 template <bool kContacts, int kRows>
 struct begin_substep_kernel_object {
   static constexpr const char* kName = "begin_substep_kernel";
-  static constexpr int kMaxThreads = 128, kMinBlocks = 4;
+  static constexpr int kMaxThreads = 128, kMinBlocks = 4, kMostBlocks = kRows > 1 ? 2 : 4;
   static constexpr bool kReadsAhead = true;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep) const {
@@ -1689,7 +1712,7 @@ struct end_step_kernel_object {
 template <bool kContacts, bool kAccelerated, int kRows>
 struct advance_kernel_object {
   static constexpr const char* kName = "advance_kernel";
-  static constexpr int kMaxThreads = 128, kMinBlocks = kRows > 1 ? 3 : 4;
+  static constexpr int kMaxThreads = 128, kMinBlocks = kRows > 1 ? 3 : 4, kMostBlocks = kRows > 1 ? 2 : 4;
   static constexpr bool kReadsAhead = true;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, int iteration) const {
@@ -1714,14 +1737,24 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
     }
     start(std::integral_constant<int, kRowTeam>{});
   };
+  // (Other methods than the default one are for comparison.)
+  const auto by_clusters = [&](auto start) {
+    if constexpr (!requires { typename Launcher::OneLaunch; } && Method == kNewton) {
+      if (w.slots_expected > kFewClusters) return start(std::integral_constant<int, kHalfTeam>{});
+    }
+    start(std::integral_constant<int, kClusterTeam>{});
+  };
   launcher.teams(sum_groups_kernel_object<kContacts>{}, kParticleTeam, teams, w);
   for (int substep = 0; substep < plan.substeps; ++substep) {
     by_rows([&](auto rows) {
       launcher.teams(begin_substep_kernel_object<kContacts, rows.value>{}, kParticleTeam, teams, w, substep);
     });
     for (int iteration = 0; iteration < plan.iterations; ++iteration) {
-      launcher.blocks(match_shapes_kernel_object<Method>{}, (w.slots_expected + kTeams - 1) / kTeams, kMatchThreads,
-                      kMatchShared, w, substep, iteration);
+      by_clusters([&](auto lanes) {
+        constexpr int kTeams = kMatchThreads / lanes.value;
+        launcher.blocks(match_shapes_kernel_object<Method, lanes.value>{}, (w.slots_expected + kTeams - 1) / kTeams,
+                        kMatchThreads, match_shared(lanes.value), w, substep, iteration);
+      });
       by_rows([&](auto rows) {
         launcher.teams(advance_kernel_object<kContacts, kAccelerated, rows.value>{}, kParticleTeam, teams, w, substep,
                        iteration);

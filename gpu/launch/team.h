@@ -37,27 +37,43 @@ class Team {
     for (int k = lane(); k < count; k += kLanes) visit(k);
   }
 
-  // N sums over items. Item k adds to of(k), in the order of each().
-  template <int N>
+  // N sums over items. Item k adds to of(k), in the order of each(). The order of adding is that of kOrder lanes, of
+  // which each lane here does the work of several if it is not the team's width: so teams of several widths give the
+  // same bits.
+  template <int N, int kOrder = kWidth>
   class Sums {
    public:
-    CUTPROOF_DEVICE float* of(int k) { return bank_[k % kBanks].v; }
+    CUTPROOF_DEVICE float* of(int k) {
+      static_assert(kOrder == kWidth);
+      return bank_[k % kBanks].v;
+    }
 
    private:
     friend class Team;
-    static constexpr int kBanks = Block::on_device ? 1 : kWidth;
+    static_assert(kOrder % kWidth == 0);
+    static constexpr int kBanks = kOrder / kLanes;
     Floats<N> bank_[kBanks] = {};
   };
+  // visit(k, sums) for this lane's items, with the sums that item k adds to.
+  template <int N, int kOrder, class Visit>
+  CUTPROOF_DEVICE void each(Sums<N, kOrder>& sums, int count, Visit visit) const {
+    for (int begin = lane(); begin < count; begin += kOrder) {
+      for (int bank = 0; bank < kOrder / kLanes; ++bank) {
+        const int k = begin + bank * kLanes;
+        if (k < count) visit(k, sums.bank_[bank].v);
+      }
+    }
+  }
   // To every lane.
-  template <int N>
-  CUTPROOF_DEVICE Floats<N> total(Sums<N>& sums) const {
-    for (int distance = kWidth / 2; distance > 0; distance /= 2) {
-      if constexpr (Block::on_device) {
-        for (int k = 0; k < N; ++k) sums.bank_[0].v[k] += other(sums.bank_[0].v[k], distance);
-      } else {
-        for (int bank = 0; bank < distance; ++bank) {
-          for (int k = 0; k < N; ++k) sums.bank_[bank].v[k] += sums.bank_[bank + distance].v[k];
+  template <int N, int kOrder>
+  CUTPROOF_DEVICE Floats<N> total(Sums<N, kOrder>& sums) const {
+    for (int distance = kOrder / 2; distance > 0; distance /= 2) {
+      if (distance >= kLanes) {
+        for (int bank = 0; bank < distance / kLanes; ++bank) {
+          for (int k = 0; k < N; ++k) sums.bank_[bank].v[k] += sums.bank_[bank + distance / kLanes].v[k];
         }
+      } else {
+        for (int k = 0; k < N; ++k) sums.bank_[0].v[k] += other(sums.bank_[0].v[k], distance);
       }
     }
     return sums.bank_[0];
@@ -88,10 +104,15 @@ class Team {
     static_assert(N <= kMost && kWidth >= kMost);
     float value_[Block::on_device ? 1 : N] = {};
   };
-  template <int N>
-  CUTPROOF_DEVICE Parted<N> parted(Sums<N>& sums) const {
+  template <int N, int kOrder>
+  CUTPROOF_DEVICE Parted<N> parted(Sums<N, kOrder>& sums) const {
     Parted<N> found;
     if constexpr (Block::on_device) {
+      for (int distance = kOrder / 2; distance >= kWidth; distance /= 2) {
+        for (int bank = 0; bank < distance / kLanes; ++bank) {
+          for (int k = 0; k < N; ++k) sums.bank_[bank].v[k] += sums.bank_[bank + distance / kLanes].v[k];
+        }
+      }
       // Each lane keeps half of its sums, those of the upper half if `distance` is in its number, and gets what the
       // lane at that distance has of them.
       constexpr int kMost = Parted<N>::kMost;
