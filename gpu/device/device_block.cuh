@@ -179,27 +179,12 @@ class BlockOnDevice : private Shape {
     }
   }
   __device__ void fence() { __threadfence(); }
-  // For values that have been read only to have them in the cache.
-  template <class T>
-  __device__ void keep_near(const T& value) {
-    static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % 4 == 0);
-    unsigned words[sizeof(T) / 4];
-    memcpy(words, &value, sizeof(T));
-#pragma unroll
-    for (unsigned word : words) asm volatile("" ::"r"(word));
-  }
-  // What is launched next may begin, and wait for this launch, when all blocks have said so.
-  __device__ void let_next_begin() {
-#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
-    asm volatile("griddepcontrol.launch_dependents;" ::: "memory");
-#endif
-  }
   __device__ void wait_for_earlier() {
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
     // In this order: whoever begins then finds the work of all launches before this one done.
     asm volatile("griddepcontrol.wait;" ::: "memory");
+    asm volatile("griddepcontrol.launch_dependents;" ::: "memory");
 #endif
-    let_next_begin();
   }
 
  private:

@@ -64,7 +64,6 @@ __global__ void __launch_bounds__(max_threads<Kernel>(), min_blocks<Kernel>())
     run_kernel(const __grid_constant__ Arguments arguments) {
   arguments.apply([](const auto&... args) {
     DeviceBlock block;
-    if constexpr (lets_next_begin<Kernel>()) block.let_next_begin();
     if constexpr (!reads_ahead<Kernel>()) block.wait_for_earlier();
     Kernel{}(block, args...);
     if constexpr (reads_ahead<Kernel>()) block.wait_for_earlier();  // on every way through it
@@ -424,8 +423,7 @@ class DeviceLauncher {
     check_cuda(cudaOccupancyMaxActiveBlocksPerMultiprocessorWithFlags(&side_by_side, kernel, threads, shared_bytes,
                                                                       cudaOccupancyDefault),
                kernel_name<Kernel>(), __FILE__, __LINE__);
-    const std::int64_t most =
-        std::int64_t{std::clamp(side_by_side, 1, most_blocks<Kernel>())} * resources_->multiprocessors;
+    const std::int64_t most = std::int64_t{std::max(side_by_side, 1)} * resources_->multiprocessors;
     cudaLaunchConfig_t config = {};
     config.gridDim = static_cast<unsigned>(std::clamp<std::int64_t>(wanted, 1, most));
     config.blockDim = static_cast<unsigned>(threads);

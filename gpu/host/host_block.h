@@ -150,8 +150,6 @@ class HostBlock {
     std::atomic_thread_fence(std::memory_order_seq_cst);
 #endif
   }
-  template <class T>
-  void keep_near(const T&) {}
   void wait_for_earlier() {}  // launches follow one another
 
  private:

@@ -32,6 +32,17 @@ CUTPROOF_DEVICE int64_t from_last(const Block& block) {
   return block.stride() - 1 - block.first();
 }
 
+// What other work a team begins with where `jobs` of smaller teams are everybody's first: those behind them begin with
+// the first. (Not the last teams of all, which are the last to come.)
+template <class Small, class Large>
+CUTPROOF_DEVICE int64_t behind(const Small&, const Large& large, int jobs) {
+  const auto teams = static_cast<unsigned>(large.stride());  // a remainder of 64 bits takes a hundred instructions
+  unsigned busy = (static_cast<unsigned>(jobs) * Small::kLanes + Large::kLanes - 1) / Large::kLanes;
+  if (busy >= teams) busy %= teams;
+  const int64_t first = large.first() - busy;
+  return first < 0 ? first + teams : first;
+}
+
 namespace step_detail {
 
 // Whether a body takes part in this iteration. One with fewer substeps or iterations than others waits.
@@ -990,13 +1001,7 @@ CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int
   // Whole warps at a time, as in advance_kernel.
   const int64_t in_warp = rows.first() % (team.kLanes / rows.kLanes);
   int64_t row = rows.first();
-  [[maybe_unused]] int64_t listed = from_last(team);
-  if constexpr (kContacts && Block::on_device) {
-    if (row - in_warp >= groups && listed < groups) {
-      const int guess = block.load(&w.tracked_groups[listed]);
-      if (guess >= 0 && guess < groups) block.keep_near(group_of(w, guess));
-    }
-  }
+  [[maybe_unused]] int64_t listed = behind(rows, team, groups);
   [[maybe_unused]] unsigned found = 0;
   [[maybe_unused]] int tracked = -1;
   while (true) {
@@ -1248,7 +1253,7 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
 template <int Method, int kLanes>
 struct match_shapes_kernel_object {
   static constexpr const char* kName = "match_shapes_kernel";
-  static constexpr bool kReadsAhead = true, kLetsNextBegin = true;
+  static constexpr bool kReadsAhead = true;
   static constexpr int kMaxThreads = step_detail::kMatchThreads, kMinBlocks = 4;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, int iteration) const {
@@ -1331,7 +1336,7 @@ CUTPROOF_DEVICE inline void advance_particle(const DeviceView& w, const Pace& pa
   w.position[o] = with_w(next, particle.at.w);
 }
 
-// Several of a group's holders, which do not change in a frame.
+// Several of a group's holders, which do not change in a substep.
 template <int kAtOnce>
 struct SomeHolders {
   Offset to[kAtOnce];
@@ -1407,16 +1412,17 @@ CUTPROOF_DEVICE void resolve(Block& block, const Team<Block, kResolvedTeam>& tea
   list_resolved(block, team, w, pace, g, substep, iteration + 1);
 }
 
-// A group, and what of it does not change in a frame.
+// A group, and what of it does not change in a substep.
 template <int kAtOnce>
 struct GroupAhead {
   Group group;
   SomeHolders<kAtOnce> holders;
+  Float4 base;
 };
 template <int kAtOnce>
 CUTPROOF_DEVICE inline GroupAhead<kAtOnce> group_ahead(const DeviceView& w, int g) {
   const Group group = group_of(w, g);
-  return {group, holders_from<kAtOnce>(w, group.head, 0)};
+  return {group, holders_from<kAtOnce>(w, group.head, 0), w.group_base[g]};
 }
 // Where lanes share a group there is room for all of most groups' holders, and for all else that is read ahead.
 template <int kRows>
@@ -1433,14 +1439,14 @@ CUTPROOF_DEVICE void advance_resolved(Block& block, const Team<Block, kResolvedT
   if (!takes_part(pace, substep, iteration)) return;
   const Contacts contacts = contacts_of(w, pace, substep);
   const Iteration now = iteration_of(w, body, pace, iteration);
-  const Float4 base_and_reach = w.group_base[group.index];
-  const Float3 base = xyz(base_and_reach);
+  const Float3 base = xyz(ahead.base);
   if (begins) resolve<kAccelerated>(block, team, w, group, pace, contacts, now, base, substep, iteration);
   const int first = team.lane();  // of this lane's particles
   Particle of_first;
   if (first < head.size) of_first = particle_at<kContacts, kAccelerated>(w, now, head.begin + first);
+  block.wait_for_earlier();  // for the clusters: all else is older
   Rows<Team<Block, kResolvedTeam>> rows;
-  team.each(3, [&](int axis) { rows.of(axis) = mean_goal(w, head, ahead.holders, pace.h, base_and_reach, axis); });
+  team.each(3, [&](int axis) { rows.of(axis) = mean_goal(w, head, ahead.holders, pace.h, ahead.base, axis); });
   const Map goal = rows.all(team);
   team.each(head.size, [&](int k) {
     const int o = head.begin + k;
@@ -1459,65 +1465,64 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
                                      int substep, int iteration) {
   const GroupAhead<kHoldersAtOnce<kRows>> ahead = group_ahead<kHoldersAtOnce<kRows>>(w, g);
   const GroupHead& head = ahead.group.head;
+  const Float4 base = ahead.base;
   const int body = body_of_group(w, head);
   const Pace pace = constant(&w.pace[body]);
-  const Iteration now = iteration_of(w, body, pace, iteration);
-  Float4 mass, upper, lower;
-  const auto read_spread = [&] {
-    mass = constant(&w.group_mass[g]);
-    upper = constant(&w.group_spread[2 * int64_t{g}]);
-    lower = constant(&w.group_spread[2 * int64_t{g} + 1]);
-  };
-  constexpr bool kAllAtOnce = kRows > 1;  // one thread has no registers for so much
-  if constexpr (kAllAtOnce) read_spread();
-  block.wait_for_earlier();
-  if (head.size == 0 || !takes_part(pace, substep, iteration)) return false;
-  const Float4 base = w.group_base[g];
   [[maybe_unused]] float room = 0;
   [[maybe_unused]] int state = kCarried;
   if constexpr (kContacts) {
     room = w.group_room[g];
     state = w.group_resolved[g];
   }
+  const bool active = head.size > 0 && state != kResolved && takes_part(pace, substep, iteration);
   const bool more = iteration + 1 < pace.iterations;
-  const float lost_next = now.lost_after;
-  Rows<Team<Block, kRows>> present, earlier, of_prediction, goal;
-  const auto read_prediction = [&] {
-    if (more) team.each(3, [&](int axis) { of_prediction.of(axis) = w.group_predicted[3 * int64_t{g} + axis]; });
-  };
-  team.each(3, [&](int axis) {
+  Iteration now = {};
+  if (active) now = iteration_of(w, body, pace, iteration);
+  Rows<Team<Block, kRows>> present, earlier, of_prediction;
+  Float4 mass, upper, lower;
+  const auto read_maps = [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
     if (iteration > 0) earlier.of(axis) = present.of(axis) = w.group_map[at];
     // The one before the first is no map of this kind, and of no weight.
     if constexpr (kAccelerated) {
       if (iteration > 1 && now.combined) earlier.of(axis) = w.group_earlier_map[at];
     }
-  });
-  const auto find_goal = [&](int axis) { goal.of(axis) = mean_goal(w, head, ahead.holders, pace.h, base, axis); };
-  if constexpr (kAllAtOnce) {
-    read_prediction();
-    team.each(3, find_goal);
+  };
+  const auto read_moments = [&] {
+    mass = constant(&w.group_mass[g]);
+    upper = constant(&w.group_spread[2 * int64_t{g}]);
+    lower = constant(&w.group_spread[2 * int64_t{g} + 1]);
+    if (more) team.each(3, [&](int axis) { of_prediction.of(axis) = w.group_predicted[3 * int64_t{g} + axis]; });
+  };
+  constexpr bool kAllAhead = kRows > 1;  // one thread has no registers for so much
+  if constexpr (kAllAhead) {
+    if (active) {
+      team.each(3, read_maps);
+      read_moments();
+    }
   }
-  if (state == kResolved) return false;
+  block.wait_for_earlier();  // for the clusters: all else is older
+  if (!active) return false;
+  const float lost_next = now.lost_after;
   Rows<Team<Block, kRows>> plain, next;
   team.each(3, [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
-    if constexpr (!kAllAtOnce) find_goal(axis);
+    if constexpr (!kAllAhead) read_maps(axis);
+    const Float4 goal = mean_goal(w, head, ahead.holders, pace.h, base, axis);
     if constexpr (kContacts) {
       if (state == kHeld) {
         // As set_held_push().
         const float kept = now.implicit ? now.s : 1.0f, added = now.combined ? now.combination.pull * now.s : now.s;
         const auto pushed = [&](float of_goal, float is) { return kept * is + added * of_goal; };
-        Float4 row = row_of(pushed, goal.of(axis), present.of(axis));
+        Float4 row = row_of(pushed, goal, present.of(axis));
         if constexpr (kAccelerated) {
           if (now.combined) {
             const Float4 y = present.of(axis), z = earlier.of(axis);
             const auto combined = [&](float is, float was, float of_goal) {
               return now.combination(kept * is, is, was) + added * of_goal;
             };
-            const Float4 to = goal.of(axis);
-            row = {combined(y.x, z.x, to.x), combined(y.y, z.y, to.y), combined(y.z, z.z, to.z),
-                   combined(y.w, z.w, to.w)};
+            row = {combined(y.x, z.x, goal.x), combined(y.y, z.y, goal.y), combined(y.z, z.z, goal.z),
+                   combined(y.w, z.w, goal.w)};
           }
           if (now.kept) w.group_earlier_map[at] = present.of(axis);
         }
@@ -1529,7 +1534,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
       const float toward = now.s * wanted;
       return now.implicit ? toward : (1.0f - now.s) * is + toward;
     };
-    plain.of(axis) = row_of(relaxed, goal.of(axis), present.of(axis));
+    plain.of(axis) = row_of(relaxed, goal, present.of(axis));
     next.of(axis) = plain.of(axis);
     if constexpr (kAccelerated) {
       if (!now.combined) return;
@@ -1560,10 +1565,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
   }
   const float per_h = pace.per_h;
   // All that is read before anything is written: behind a store, each would be waited for by itself.
-  if constexpr (!kAllAtOnce) {
-    read_spread();
-    read_prediction();
-  }
+  if constexpr (!kAllAhead) read_moments();
   team.each(3, [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
     const Float4 row = next.of(axis);
@@ -1590,13 +1592,13 @@ CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int
   const Pace pace = constant(&w.pace[body]);
   if (!takes_part(pace, substep, iteration)) return;
   const Iteration now = iteration_of(w, body, pace, iteration);
+  const Particle particle = particle_at<kContacts, kAccelerated>(w, now, o);
+  const Float3 at = xyz(particle.at), from = now.implicit ? xyz(particle.predicted) : at;
+  // Mean of the goals, less `from`: small numbers, so that summing them costs no digits of d.
   const int clusters = w.membership_count[p], begin = w.membership_begin[p], end = w.membership_begin[p + 1];
   const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
-  block.wait_for_earlier();
-  const Particle particle = particle_at<kContacts, kAccelerated>(w, now, o);
-  // Mean of the goals, less `from`: small numbers, so that summing them costs no digits of d.
-  const Float3 at = xyz(particle.at), from = now.implicit ? xyz(particle.predicted) : at;
-  Float3 pull = at - from;  // a particle in no cluster stays where it is
+  block.wait_for_earlier();  // for the clusters: all else is older
+  Float3 pull = at - from;   // a particle in no cluster stays where it is
   if (clusters > 0) {
     const Coordinates c = coordinates(pace, particle.node);
     Float3 sum;
@@ -1625,20 +1627,12 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
   const Team<Block, kRows> rows(block);
   const Team<Block, kResolvedTeam> team(block);
   const int groups = w.counters->groups, loose = w.counters->loose;
+  const int resolved = kContacts ? *listed_before(w, substep, iteration) : 0;
   // Whole warps at a time: groups that turn out to be no longer clear are everybody's, as are those that were resolved
-  // before, with which the last warps begin. All of them in one place, because there is much to it.
+  // before, with which the warps behind begin. All of them in one place, because there is much to it.
   const int64_t in_warp = rows.first() % (team.kLanes / rows.kLanes);
-  int64_t row = rows.first(), listed = from_last(team);
+  int64_t row = rows.first(), listed = behind(rows, team, groups);
   [[maybe_unused]] unsigned found = 0;
-  [[maybe_unused]] int resolved = -1;
-  constexpr int kHolders = kHoldersAtOnce<kRows>;
-  if constexpr (kContacts && Block::on_device) {
-    // A warp without other work reads ahead the group that is listed at its place so far, if any is.
-    if (row - in_warp >= groups && listed < groups) {
-      const int guess = block.load(&w.resolved_groups[listed]);
-      if (guess >= 0 && guess < groups) block.keep_near(group_ahead<kHolders>(w, guess));
-    }
-  }
   while (true) {
     [[maybe_unused]] bool begins = false;
     [[maybe_unused]] int g = -1;
@@ -1651,32 +1645,19 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
       if constexpr (kContacts) found = team.found(touches && rows.leads());
       row += rows.stride();
       continue;
-    }
-    if constexpr (kContacts) {
-      if (!begins) {
-        if (resolved < 0) {
-          block.wait_for_earlier();
-          resolved = *listed_before(w, substep, iteration);
-        }
-        if (listed >= resolved) break;
-        g = block.load(&w.resolved_groups[listed]);
-        listed += team.stride();
-      }
-      advance_resolved<kContacts, kAccelerated>(block, team, w, group_ahead<kHolders>(w, g), substep, iteration,
-                                                begins);
+    } else if (listed < resolved) {
+      g = block.load(&w.resolved_groups[listed]);
+      listed += team.stride();
     } else {
       break;
     }
+    if constexpr (kContacts) {
+      advance_resolved<kContacts, kAccelerated>(block, team, w, group_ahead<kHoldersAtOnce<kRows>>(w, g), substep,
+                                                iteration, begins);
+    }
   }
   if (loose == 0) return;
-  // Before those, the threads with loose particles.
-  int64_t k = from_last(block);
-  if constexpr (kContacts) {
-    const auto teams = static_cast<unsigned>(team.stride());  // a remainder of 64 bits takes a hundred instructions
-    k -= static_cast<int64_t>(static_cast<unsigned>(resolved) % teams) * team.kLanes;
-    if (k < 0) k += block.stride();
-  }
-  for (; k < loose; k += block.stride()) {
+  for (int64_t k = from_last(block); k < loose; k += block.stride()) {
     advance_loose<kContacts, kAccelerated>(block, w, w.loose_places[k], substep, iteration);
   }
 }
@@ -1693,7 +1674,7 @@ struct sum_groups_kernel_object {
 template <bool kContacts, int kRows>
 struct begin_substep_kernel_object {
   static constexpr const char* kName = "begin_substep_kernel";
-  static constexpr int kMaxThreads = 128, kMinBlocks = 4, kMostBlocks = kRows > 1 ? 2 : 4;
+  static constexpr int kMaxThreads = 128, kMinBlocks = 4;
   static constexpr bool kReadsAhead = true;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep) const {

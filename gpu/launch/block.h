@@ -35,7 +35,6 @@
 //                                               unsigned long long
 //   T load(const T*); void store(T*, T);        relaxed; T of 4 or 8 bytes
 //   void fence();                               orders this thread's memory operations for the whole grid
-//   void keep_near<T>(const T&);                what has been read is wanted soon, but not kept until then
 //   void wait_for_earlier();                    returns when all work before this launch is done. Every kernel begins
 //                                               so, but for those that read ahead (launcher.h); any number of times
 #pragma once

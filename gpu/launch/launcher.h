@@ -37,10 +37,8 @@
 // A launch may begin while the last blocks of the one before it work, and then waits for them: what it takes to start
 // is hidden. A kernel whose object has kReadsAhead = true is not made to wait. It calls wait_for_earlier() itself, and
 // may read before that what the launch before it does not write. (What is older is there: a launch begins only when
-// the one before it no longer waits for others.) After a launch with kLetsNextBegin = true, which does not make the
-// next one wait for that, it may neither read what the launch before that one writes.
+// the one before it no longer waits for others.)
 #pragma once
-#include <climits>
 #include <stdexcept>
 #include <string>
 
@@ -85,26 +83,6 @@ constexpr int min_blocks() {
     return Kernel::kMinBlocks;
   } else {
     return 0;
-  }
-}
-
-// Of how many blocks a multiprocessor a grid has at most, even where more would fit: what it leaves is for the next
-// launch to begin in.
-template <class Kernel>
-constexpr int most_blocks() {
-  if constexpr (requires { Kernel::kMostBlocks; }) {
-    return Kernel::kMostBlocks;
-  } else {
-    return INT_MAX;
-  }
-}
-
-template <class Kernel>
-constexpr bool lets_next_begin() {
-  if constexpr (requires { Kernel::kLetsNextBegin; }) {
-    return Kernel::kLetsNextBegin;
-  } else {
-    return false;
   }
 }
 
