@@ -49,8 +49,7 @@ class PhaseCounter {
 
 std::array<int64_t, kStages.size()> phases_of_stages(const gpu::Plan& plan) {
   gpu::Counters counters = {};
-  counters.cut = counters.extracting = counters.expanding = counters.additions = counters.small =
-      counters.groups_stale = 1;
+  counters.changing = counters.expanding = counters.additions = counters.small = counters.groups_stale = 1;
   gpu::DeviceView view;
   view.bodies = 1;
   view.rotation_method = plan.rotation_method;

@@ -55,9 +55,8 @@ CUTPROOF_DEVICE void note_cuts_kernel(Block& block, const DeviceView& w, Span sp
   if (block.index() != 0) return;
   Counters& c = *w.counters;
   if (block.thread() == 0) {
-    block.store(&c.cut, 0);
     block.store(&c.expanding, 0);
-    block.store(&c.extracting, 0);
+    block.store(&c.changing, 0);
   }
   block.sync();
   for (int b = block.thread(); b < w.bodies; b += block.size()) {
@@ -68,12 +67,12 @@ CUTPROOF_DEVICE void note_cuts_kernel(Block& block, const DeviceView& w, Span sp
       return is;
     };
     if (due(Stage::split)) {
-      block.store(&c.cut, 1);
+      block.store(&c.changing, 1);
       block.store(&c.groups_stale, 1);
     }
     static_cast<void>(due(Stage::merge));
     if (due(Stage::expand)) block.store(&c.expanding, 1);
-    if (due(Stage::skin) && (w.cut[b] >= 0 || w.skin_made[b] == 0)) block.store(&c.extracting, 1);
+    if (due(Stage::skin) && w.skin_made[b] == 0 && span.contains(Stage::skin)) block.store(&c.changing, 1);
   }
 }
 CUTPROOF_KERNEL(note_cuts_kernel);

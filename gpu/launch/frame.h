@@ -31,9 +31,12 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
     enqueue_detect(launcher, w, plan);
   }
   const bool clusters = span.contains(Stage::split) || span.contains(Stage::merge) || span.contains(Stage::expand);
-  if (clusters || span.contains(Stage::skin)) launcher.blocks(note_cuts_kernel_object{}, 1, 128, 0, w, span);
-  if (clusters) {
-    launcher.if_nonzero(&w.counters->cut, [&](Launcher& inner) {
+  const bool skin = span.contains(Stage::skin);
+  if (clusters || skin) {
+    launcher.blocks(note_cuts_kernel_object{}, 1, 128, 0, w, span);
+    // One condition for all that a frame without a cut does not need: each costs as much as ten launches. (A first skin
+    // needs only the cells; the rest finds no body that was cut.)
+    launcher.if_nonzero(&w.counters->changing, [&](Launcher& inner) {
       if (span.contains(Stage::split)) {
         mark(Stage::split);
         enqueue_split(inner, w, plan);
@@ -48,18 +51,17 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
           enqueue_expand(innermost, w, plan);
         });
       }
+      if (skin) {
+        mark(Stage::skin);
+        inner.items(sort_memberships_kernel_object{}, w.particles, w);
+        inner.blocks(number_slots_kernel_object{}, w.bodies, kListThreads, 0, w);
+        if (plan.skin) enqueue_skin_cells(inner, w, plan);
+      }
     });
   }
-  if (span.contains(Stage::skin)) {
+  if (skin) {
     mark(Stage::skin);
-    launcher.if_nonzero(&w.counters->cut, [&](Launcher& inner) {
-      inner.items(sort_memberships_kernel_object{}, w.particles, w);
-      inner.blocks(number_slots_kernel_object{}, w.bodies, kListThreads, 0, w);
-    });
-    if (plan.skin) {
-      launcher.if_nonzero(&w.counters->extracting, [&](Launcher& inner) { enqueue_skin_cells(inner, w, plan); });
-      enqueue_skin_positions(launcher, w, plan);
-    }
+    if (plan.skin) enqueue_skin_positions(launcher, w, plan);
     launcher.items(end_frame_kernel_object{}, w.bodies, w);
   }
 }

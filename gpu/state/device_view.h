@@ -153,8 +153,7 @@ struct Counters {
   int members_used;        // members [0, members_used) have been given out
   int vertices_used;       // skin vertices given out
   int cells_used;          // skin cells given out
-  int cut;                 // some running body lost a particle in this frame
-  int extracting;          // some running body has skin cells to extract: cut, or no skin yet
+  int changing;            // some running body lost a particle in this frame, or gets its first skin in this span
   int removed;             // particles removed by this frame's detection, over all bodies
   int debris;              // …, by this frame's split
   int fallen;              // split: length of DeviceView::fallen, without debris, which follows

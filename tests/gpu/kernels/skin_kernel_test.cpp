@@ -184,11 +184,11 @@ Bodies make_bodies(std::vector<Setup> setups, const std::vector<State>& states) 
 }
 
 void run_skin(HostLauncher& launcher, Bodies& bodies, const DeviceView& w) {
-  w.counters->extracting = 0;
+  w.counters->changing = 0;
   for (int b = 0; b < w.bodies; ++b) {
-    if (running(w, b) && w.body[b].skin_wanted && (w.cut[b] >= 0 || !w.skin_made[b])) w.counters->extracting = 1;
+    if (running(w, b) && w.body[b].skin_wanted && (w.cut[b] >= 0 || !w.skin_made[b])) w.counters->changing = 1;
   }
-  launcher.if_nonzero(&w.counters->extracting, [&](HostLauncher& inner) { enqueue_skin_cells(inner, w, bodies.plan); });
+  launcher.if_nonzero(&w.counters->changing, [&](HostLauncher& inner) { enqueue_skin_cells(inner, w, bodies.plan); });
   enqueue_skin_positions(launcher, w, bodies.plan);
 }
 void run_skin(HostLauncher& launcher, Bodies& bodies) { run_skin(launcher, bodies, bodies.staging.view()); }
