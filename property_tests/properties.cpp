@@ -9,6 +9,7 @@
 #include <iostream>
 #include <sstream>
 
+#include "fixtures/build.h"
 #include "fixtures/cook.h"
 #include "harness/backends.h"
 #include "oracles/relations/relations.h"
@@ -370,6 +371,43 @@ TEST(Paths, OfTheDeviceGiveTheSameBitsAloneAndInALoad) {
   if (paths.empty()) GTEST_SKIP() << "there is no device";
   ASSERT_GE(paths.size(), 4u);
   expect_same_bits("Paths.OfTheDeviceGiveTheSameBitsAloneAndInALoad", std::max<int64_t>(wanted_cases() / 20, 5), paths);
+}
+
+// A large load runs other kernels, with fewer lanes for each group and each cluster: so large that all of them do.
+TEST(Paths, OfTheDeviceGiveTheSameBitsInALargeLoad) {
+  constexpr std::size_t kCopies = 72;
+  harness::BackendChoice choice;
+  choice.name = "gpu";
+  const harness::BackendDescriptor* const gpu = harness::find_backend(choice.name);
+  if (gpu == nullptr || !gpu->is_built() || harness::processor_of(*gpu).empty()) GTEST_SKIP() << "there is no device";
+  Scene scene;
+  scene.name = "block";
+  scene.body.shape = Shape{};
+  scene.body.particles = 8000;
+  scene.frames = 30;
+  scene.grips = {{.low = {0, 0, 0}, .high = {1, 1, 0.1}, .velocity = {}}};
+  StrokeSpec stroke;
+  stroke.points = {{1.2, 0.5, 0.5}, {0.2, 0.5, 0.5}};
+  stroke.back = {1, 0, 0};
+  scene.blade = BladeSpec{};
+  scene.blade->speed = 0.4;
+  scene.blade->strokes = {stroke};
+  for (const Acceleration acceleration : {Acceleration::none, Acceleration::chebyshev}) {
+    scene.step.acceleration = acceleration;
+    const fixtures::Built built = fixtures::build(scene, "block");
+    const auto particles = static_cast<std::size_t>(built.setup.body.particle_count());
+    ASSERT_GT(kCopies * static_cast<std::size_t>(built.state.clusters.count()), 4096u);  // gpu/kernels/step.cuh
+    ASSERT_GT(kCopies * particles, 130'000u);
+    const auto run = [&](std::size_t copies) {
+      const auto backend = harness::make_backend(choice);
+      backend->load(std::vector<cutproof::Setup>(copies, built.setup), std::vector<State>(copies, built.state));
+      for (int64_t frame = 0; frame < scene.frames; ++frame) backend->run({});
+      return backend->snapshot();
+    };
+    const State alone = run(1).front();
+    EXPECT_GT(std::count(alone.alive.begin(), alone.alive.end(), 0), 0) << "nothing was cut";
+    for (const State& together : run(kCopies)) ASSERT_TRUE(together == alone);
+  }
 }
 
 // --- The generators themselves ------------------------------------------------------------------------------------

@@ -131,6 +131,7 @@ struct Teamed {
   const int* begin;
   float* sums;      // of any_float(j + n, k) over k [j · kTeamSums + n]
   float* parts;     // the same, by parted(), where teams are wide enough
+  float* half;      // the same, by half of the lanes that the order of adding is of
   int* counts;      // [j · kCounts + which]
   float* greatest;  // of any_float(j, k)
   int* kept;        // from begin[j] on: the items with odd values, in order
@@ -146,6 +147,11 @@ CUTPROOF_DEVICE void team_kernel(Block& block, const Teamed& out, int jobs) {
     const int job = static_cast<int>(i);
     const int first = out.begin[job], size = out.begin[job + 1] - first;
     typename Team<Block, kWidth>::template Sums<kTeamSums> sums, again;
+    typename Team<Block, kWidth>::template Sums<kTeamSums, 2 * kWidth> of_twice, of_twice_again;
+    team.each(of_twice, size, [&](int k, float* sum) {
+      for (int n = 0; n < kTeamSums; ++n) sum[n] += any_float(job + n, k);
+    });
+    of_twice_again = of_twice;
     team.each(size, [&](int k) {
       for (int n = 0; n < kTeamSums; ++n) {
         sums.of(k)[n] += any_float(job + n, k);
@@ -157,7 +163,15 @@ CUTPROOF_DEVICE void team_kernel(Block& block, const Teamed& out, int jobs) {
       for (int n = 0; n < kTeamSums; ++n) out.sums[job * kTeamSums + n] = total.v[n];
     }
     int wrong = 0;
+    const auto half = team.total(of_twice);
+    if (team.leads()) {
+      for (int n = 0; n < kTeamSums; ++n) out.half[job * kTeamSums + n] = half.v[n];
+    }
     if constexpr (kWidth >= 16) {
+      const auto half_parts = team.parted(of_twice_again);
+      for (int n = 0; n < kTeamSums; ++n) {
+        if (half_parts.get(team, n) != half.v[n]) ++wrong;
+      }
       const auto parts = team.parted(again);
       for (int n = 0; n < kTeamSums; ++n) {
         if (parts.get(team, n) != total.v[n]) ++wrong;
@@ -382,11 +396,12 @@ void check_teams_of(Machine& machine) {
   auto place = machine.array(std::vector<int>(items, -1));
   auto taken = machine.array(std::vector<int>(items));
   auto classes = machine.array(std::vector<int>(static_cast<std::size_t>(jobs) * kTeamClasses));
-  const Teamed out{begins.at(), sums.at(),  parts.at(), counts.at(), greatest.at(),
-                   kept.at(),   place.at(), taken.at(), classes.at()};
+  auto half = machine.array(std::vector<float>(static_cast<std::size_t>(jobs) * kTeamSums, -1.0f));
+  const Teamed out{begins.at(),   sums.at(), parts.at(), half.at(),  counts.at(),
+                   greatest.at(), kept.at(), place.at(), taken.at(), classes.at()};
   machine.run([&](auto& launcher) { launcher.teams(team_kernel_object<kWidth>{}, kWidth, jobs, out, jobs); });
 
-  const auto got_sums = sums.get(), got_parts = parts.get(), got_greatest = greatest.get();
+  const auto got_sums = sums.get(), got_parts = parts.get(), got_half = half.get(), got_greatest = greatest.get();
   const auto got_counts = counts.get(), got_kept = kept.get(), got_place = place.get(), got_taken = taken.get(),
              got_classes = classes.get();
   for (int job = 0; job < jobs; ++job) {
@@ -394,14 +409,18 @@ void check_teams_of(Machine& machine) {
     const int first = begin[static_cast<std::size_t>(job)], size = begin[static_cast<std::size_t>(job) + 1] - first;
     // Sums: one bank for each lane of the device, combined as a butterfly does.
     for (int n = 0; n < kTeamSums; ++n) {
-      float bank[kWidth] = {};
-      for (int k = 0; k < size; ++k) bank[k % kWidth] += any_float(job + n, k);
-      for (int half = kWidth / 2; half > 0; half /= 2) {
-        for (int lane = 0; lane < half; ++lane) bank[lane] += bank[lane + half];
-      }
+      const auto by_lanes = [&](int lanes) {
+        std::vector<float> bank(static_cast<std::size_t>(lanes));
+        for (int k = 0; k < size; ++k) bank[static_cast<std::size_t>(k % lanes)] += any_float(job + n, k);
+        for (std::size_t distance = bank.size() / 2; distance > 0; distance /= 2) {
+          for (std::size_t lane = 0; lane < distance; ++lane) bank[lane] += bank[lane + distance];
+        }
+        return bank[0];
+      };
       const auto at = static_cast<std::size_t>(job * kTeamSums + n);
-      ASSERT_EQ(got_sums[at], bank[0]) << "sum " << n;
-      ASSERT_EQ(got_parts[at], bank[0]) << "sum " << n << ", parted";
+      ASSERT_EQ(got_sums[at], by_lanes(kWidth)) << "sum " << n;
+      ASSERT_EQ(got_parts[at], by_lanes(kWidth)) << "sum " << n << ", parted";
+      ASSERT_EQ(got_half[at], by_lanes(2 * kWidth)) << "sum " << n << ", by half of the lanes";
     }
     int odd = 0, total = 0, before = 0;
     float most = -1e9f;
