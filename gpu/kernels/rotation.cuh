@@ -367,12 +367,9 @@ CUTPROOF_BOTH inline Rotation<Real> by_newton(const Matrix3x3<Real>& a, const Ma
     const bool positive = e.h00 > 0 && e.c22 > 0 && e.determinant > Real(1e-5) * trace * trace * trace;
     if (!positive) break;
     const Vector3<Real> omega = (1 / e.determinant) * e.scaled_step();
-    const Real square = gpu::dot(omega, omega);
     q = turned(q, omega);
-    // A matrix is made of q of any length; five long steps might leave none that is a number.
-    if (square > 1) q = normalized(q);
-    r = matrix_of(q);
-    if (square < kLastSquare<Real>) return {r, false};
+    r = matrix_of(q);  // of q of any length; should long steps leave none that is a number, nothing below is true
+    if (gpu::dot(omega, omega) < kLastSquare<Real>) return {r, false};
   }
   return by_jacobi4(a, previous);
 }
