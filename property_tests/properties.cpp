@@ -389,6 +389,7 @@ TEST(Paths, OfTheDeviceGiveTheSameBitsInALargeLoad) {
   StrokeSpec stroke;
   stroke.points = {{1.2, 0.5, 0.5}, {0.2, 0.5, 0.5}};
   stroke.back = {1, 0, 0};
+  stroke.along = Vec3{0, 1, 0};
   scene.blade = BladeSpec{};
   scene.blade->speed = 0.4;
   scene.blade->strokes = {stroke};
