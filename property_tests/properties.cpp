@@ -398,7 +398,7 @@ TEST(Paths, OfTheDeviceGiveTheSameBitsInALargeLoad) {
     const fixtures::Built built = fixtures::build(scene, "block");
     const auto particles = static_cast<std::size_t>(built.setup.body.particle_count());
     ASSERT_GT(kCopies * static_cast<std::size_t>(built.state.clusters.count()), 4096u);  // gpu/kernels/step.cuh
-    ASSERT_GT(kCopies * particles, 130'000u);
+    ASSERT_GT(kCopies * particles, 150'000u);
     const auto run = [&](std::size_t copies) {
       const auto backend = harness::make_backend(choice);
       backend->load(std::vector<cutproof::Setup>(copies, built.setup), std::vector<State>(copies, built.state));

@@ -423,8 +423,7 @@ class DeviceLauncher {
     check_cuda(cudaOccupancyMaxActiveBlocksPerMultiprocessorWithFlags(&side_by_side, kernel, threads, shared_bytes,
                                                                       cudaOccupancyDefault),
                kernel_name<Kernel>(), __FILE__, __LINE__);
-    const std::int64_t most =
-        std::int64_t{std::clamp(side_by_side, 1, most_blocks<Kernel>())} * resources_->multiprocessors;
+    const std::int64_t most = std::int64_t{std::max(side_by_side, 1)} * resources_->multiprocessors;
     cudaLaunchConfig_t config = {};
     config.gridDim = static_cast<unsigned>(std::clamp<std::int64_t>(wanted, 1, most));
     config.blockDim = static_cast<unsigned>(threads);

@@ -231,7 +231,7 @@ CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) {
 // Lanes that share a group: one for each row of its map; and where its particles are looked at one by one, in the pass
 // over all of them and while it is resolved.
 inline constexpr int kRowTeam = 4, kParticleTeam = 16, kResolvedTeam = 32;
-inline constexpr int kMostByRows = 130'000;  // particles of a load
+inline constexpr int kMostByRows = 150'000;  // particles of a load
 
 // Weighted sums in the order of arrays.inc: 4 axis + k: of e rᵀ / h; 4 axis + 3: of e.
 template <class AnyTeam>
@@ -1693,7 +1693,7 @@ struct end_step_kernel_object {
 template <bool kContacts, bool kAccelerated, int kRows>
 struct advance_kernel_object {
   static constexpr const char* kName = "advance_kernel";
-  static constexpr int kMaxThreads = 128, kMinBlocks = kRows > 1 ? 3 : 4, kMostBlocks = kRows > 1 ? 2 : 4;
+  static constexpr int kMaxThreads = 128, kMinBlocks = kRows > 1 ? 3 : 4;
   static constexpr bool kReadsAhead = true;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, int iteration) const {

@@ -39,7 +39,6 @@
 // may read before that what the launch before it does not write. (What is older is there: a launch begins only when
 // the one before it no longer waits for others.)
 #pragma once
-#include <climits>
 #include <stdexcept>
 #include <string>
 
@@ -84,17 +83,6 @@ constexpr int min_blocks() {
     return Kernel::kMinBlocks;
   } else {
     return 0;
-  }
-}
-
-// Of how many blocks a multiprocessor a grid has at most, even where more would fit. (One that comes late, for want of
-// room beside the launch before, and finds nothing to do still makes the next one wait.)
-template <class Kernel>
-constexpr int most_blocks() {
-  if constexpr (requires { Kernel::kMostBlocks; }) {
-    return Kernel::kMostBlocks;
-  } else {
-    return INT_MAX;
   }
 }
 
