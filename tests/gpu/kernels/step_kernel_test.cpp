@@ -432,6 +432,40 @@ TEST(GpuStep, SumsClustersOfSizesAroundTheWidthOfAWarpAndABlock) {
   }
 }
 
+// Groups are cells of eight particles, each a cluster too. One cluster has the first so many of them, around the number
+// of lanes that share a cluster; ten have the first few, which so have more holders than are read at once.
+TEST(GpuStep, SumsClustersOfManyGroupsAndGroupsOfManyHolders) {
+  Random random(30);
+  for (const std::size_t groups : {15u, 16u, 17u, 31u, 32u, 33u, 47u, 64u, 65u, 80u}) {
+    cutproof::Setup setup = setup_of(fixtures::block(10, 8, 8, 0.01));
+    std::vector<std::vector<int32_t>> clusters(80);
+    for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
+      const Vec3 node = (1 / 0.02) * (setup.body.rest_position(i) - setup.body.rest_position(0));
+      const auto at = [](double coordinate) { return static_cast<std::size_t>(coordinate + 0.25); };
+      clusters[at(node.x) + 5 * (at(node.y) + 4 * at(node.z))].push_back(i);
+    }
+    const auto first = [&](std::size_t count) {
+      std::vector<int32_t> members;
+      for (std::size_t k = 0; k < count; ++k) members.insert(members.end(), clusters[k].begin(), clusters[k].end());
+      std::sort(members.begin(), members.end());
+      return members;
+    };
+    std::vector<std::vector<int32_t>> more = {first(groups)};
+    for (std::size_t k = 0; k < 10; ++k) more.push_back(first(2 + k));
+    clusters.insert(clusters.end(), more.begin(), more.end());
+    for (const Acceleration acceleration : {Acceleration::none, Acceleration::chebyshev}) {
+      setup.step.acceleration = acceleration;
+      State state = fixtures::foreign_state(setup.body, clusters, 1, 2000);
+      perturb(setup, state, random);
+      state = seeded(setup, state);
+      State expected = state;
+      reference::step(setup, expected);
+      const double error = greatest_distance(kernel_step(setup, state).x, expected.x);
+      EXPECT_LE(error, frame_bound(setup, state, expected)) << groups << " groups";
+    }
+  }
+}
+
 TEST(GpuStep, LeavesDeadParticlesAndFinishedBodiesAlone) {
   cutproof::Setup setup = setup_of(fixtures::block(4, 4, 4, 0.01));
   setup.step.gravity = {0, 0, -9.81};
