@@ -11,6 +11,7 @@
 
 #include "fixtures/build.h"
 #include "fixtures/cook.h"
+#include "gpu/kernels/step.cuh"
 #include "harness/backends.h"
 #include "oracles/relations/relations.h"
 #include "property_tests/checking.h"
@@ -375,11 +376,12 @@ TEST(Paths, OfTheDeviceGiveTheSameBitsAloneAndInALoad) {
 
 // A large load runs other kernels, with fewer lanes for each group and each cluster: so large that all of them do.
 TEST(Paths, OfTheDeviceGiveTheSameBitsInALargeLoad) {
-  constexpr std::size_t kCopies = 72;
+  constexpr int32_t kCopies = 72;
   harness::BackendChoice choice;
   choice.name = "gpu";
-  const harness::BackendDescriptor* const gpu = harness::find_backend(choice.name);
-  if (gpu == nullptr || !gpu->is_built() || harness::processor_of(*gpu).empty()) GTEST_SKIP() << "there is no device";
+  const harness::BackendDescriptor* const backend = harness::find_backend(choice.name);
+  if (backend == nullptr || !backend->is_built() || harness::processor_of(*backend).empty())
+    GTEST_SKIP() << "there is no device";
   Scene scene;
   scene.name = "block";
   scene.body.shape = Shape{};
@@ -396,14 +398,14 @@ TEST(Paths, OfTheDeviceGiveTheSameBitsInALargeLoad) {
   for (const Acceleration acceleration : {Acceleration::none, Acceleration::chebyshev}) {
     scene.step.acceleration = acceleration;
     const fixtures::Built built = fixtures::build(scene, "block");
-    const auto particles = static_cast<std::size_t>(built.setup.body.particle_count());
-    ASSERT_GT(kCopies * static_cast<std::size_t>(built.state.clusters.count()), 4096u);  // gpu/kernels/step.cuh
-    ASSERT_GT(kCopies * particles, 150'000u);
+    const int32_t particles = built.setup.body.particle_count();
+    ASSERT_GT(kCopies * built.state.clusters.count(), gpu::step_detail::kFewClusters);
+    ASSERT_GT(kCopies * particles, gpu::step_detail::kMostByRows);
     const auto run = [&](std::size_t copies) {
-      const auto backend = harness::make_backend(choice);
-      backend->load(std::vector<cutproof::Setup>(copies, built.setup), std::vector<State>(copies, built.state));
-      for (int64_t frame = 0; frame < scene.frames; ++frame) backend->run({});
-      return backend->snapshot();
+      const auto gpu = harness::make_backend(choice);
+      gpu->load(std::vector<cutproof::Setup>(copies, built.setup), std::vector<State>(copies, built.state));
+      for (int64_t frame = 0; frame < scene.frames; ++frame) gpu->run({});
+      return gpu->snapshot();
     };
     const State alone = run(1).front();
     EXPECT_GT(std::count(alone.alive.begin(), alone.alive.end(), 0), 0) << "nothing was cut";

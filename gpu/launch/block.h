@@ -45,16 +45,15 @@
 // Of what writes work down (launcher.h): in one piece with the kernel that it becomes, where the view is known to be a
 // constant and its pointers to be global.
 #define CUTPROOF_ENQUEUE __host__ __device__ __forceinline__
+#else
+#define CUTPROOF_DEVICE
+#define CUTPROOF_BOTH
+#define CUTPROOF_ENQUEUE
+#endif
 // Before a loop that stays one: what few threads do, and rarely, has to be fetched anew each time, and code that is
 // fetched takes longer than what it does.
 #if defined(__CUDA_ARCH__)
 #define CUTPROOF_ROLLED _Pragma("unroll 1")
 #else
 #define CUTPROOF_ROLLED
-#endif
-#else
-#define CUTPROOF_ROLLED
-#define CUTPROOF_DEVICE
-#define CUTPROOF_BOTH
-#define CUTPROOF_ENQUEUE
 #endif

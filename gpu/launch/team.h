@@ -67,14 +67,9 @@ class Team {
   // To every lane.
   template <int N, int kOrder>
   CUTPROOF_DEVICE Floats<N> total(Sums<N, kOrder>& sums) const {
-    for (int distance = kOrder / 2; distance > 0; distance /= 2) {
-      if (distance >= kLanes) {
-        for (int bank = 0; bank < distance / kLanes; ++bank) {
-          for (int k = 0; k < N; ++k) sums.bank_[bank].v[k] += sums.bank_[bank + distance / kLanes].v[k];
-        }
-      } else {
-        for (int k = 0; k < N; ++k) sums.bank_[0].v[k] += other(sums.bank_[0].v[k], distance);
-      }
+    add_banks(sums);
+    for (int distance = kLanes / 2; distance > 0; distance /= 2) {
+      for (int k = 0; k < N; ++k) sums.bank_[0].v[k] += other(sums.bank_[0].v[k], distance);
     }
     return sums.bank_[0];
   }
@@ -108,11 +103,7 @@ class Team {
   CUTPROOF_DEVICE Parted<N> parted(Sums<N, kOrder>& sums) const {
     Parted<N> found;
     if constexpr (Block::on_device) {
-      for (int distance = kOrder / 2; distance >= kWidth; distance /= 2) {
-        for (int bank = 0; bank < distance / kLanes; ++bank) {
-          for (int k = 0; k < N; ++k) sums.bank_[bank].v[k] += sums.bank_[bank + distance / kLanes].v[k];
-        }
-      }
+      add_banks(sums);
       // Each lane keeps half of its sums, those of the upper half if `distance` is in its number, and gets what the
       // lane at that distance has of them.
       constexpr int kMost = Parted<N>::kMost;
@@ -216,6 +207,15 @@ class Team {
  private:
   CUTPROOF_DEVICE unsigned mask() const {
     return (kWidth == 32 ? 0xffffffffu : (1u << (kWidth % 32)) - 1u) << (block_.lane() & ~(kWidth - 1));
+  }
+  // All of a lane's banks into its first, as the lanes would that they stand for.
+  template <int N, int kOrder>
+  CUTPROOF_DEVICE static void add_banks(Sums<N, kOrder>& sums) {
+    for (int half = kOrder / kLanes / 2; half > 0; half /= 2) {
+      for (int bank = 0; bank < half; ++bank) {
+        for (int k = 0; k < N; ++k) sums.bank_[bank].v[k] += sums.bank_[bank + half].v[k];
+      }
+    }
   }
   template <class T>
   CUTPROOF_DEVICE T other(T value, int distance) const {
