@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "benchmarks/memory.h"
 #include "benchmarks/report.h"
 #include "benchmarks/times.h"
 #include "model/at.h"
@@ -45,7 +46,10 @@ json error_of_stage(Stage stage, const Measured& measured) {
 Measured measure(const Contender& contender, const BenchScene& scene, int64_t frames, int64_t repeats) {
   Backend& backend = *contender.instance;
   Measured measured;
+  const std::optional<int64_t> before = bytes_in_use(*contender.described);
   measured.timings = time_stages(backend, scene, frames, contender.described->pipelines, repeats);
+  const std::optional<int64_t> after = bytes_in_use(*contender.described);
+  if (before && after && *after > *before) measured.bytes = *after - *before;
   const auto begin = Clock::now();
   if (scene.setup.body.particle_count() <= kMostJudgedParticles) {
     const bool expands = measured.timings.stage[at(Stage::expand)].count > 0;

@@ -19,6 +19,7 @@ struct Measured {
   Timings timings;
   std::optional<FrameErrors> judged;  // absent beyond kMostJudgedParticles
   int64_t added = 0;                  // memberships, by expansion in the timed frames
+  std::optional<int64_t> bytes;       // that a new backend keeps after these; absent where nobody can tell
   double judge_seconds = 0;
   bool holds() const { return !judged || judged->topology_holds(); }
 };

@@ -44,13 +44,6 @@ const std::vector<PaperSampling>& paper_samplings() {
   return rows;
 }
 
-Cooking cooking_of(const std::string& name) {
-  if (name == "boxes") return Cooking::boxes;
-  require_option(name == "sampled", "--clusters", fmt::format("clusters cannot be cooked by '{}'", name),
-                 "use boxes or sampled");
-  return Cooking::sampled;
-}
-
 Scene embedded_scene(const std::string& file) {
   static const std::map<std::string, std::string> texts = {
 #define SCENE(name, text) {name, text},
@@ -82,11 +75,10 @@ BenchScene make_paper_scene(const std::string& file, const std::string& name, in
   Scene spec = embedded_scene(file);
   const bool as_it_is = spec.clusters.method == Cooking::sampled;
   spec.clusters.method = cooking;
-  if (cooking == Cooking::sampled) spec.expand.rule = ExpandRule::published;
-  if (cooking == Cooking::sampled && !as_it_is) {
-    // Balls that overlap to as many clusters as the paper has: 789 of 101,056 particles, the paper 795 of 101,096. A
-    // ball's seed may lie next to another ball, so there are edges with ends in two of them.
-    spec.clusters.spacing = spec.clusters.radius = 4.5;
+  if (cooking == Cooking::sampled) {
+    const ClusterSpec own = spec.clusters;
+    sample_as_paper(spec);
+    if (as_it_is) spec.clusters = own;
   }
   fixtures::BuildOptions options;
   options.particles = particles;
@@ -94,7 +86,7 @@ BenchScene make_paper_scene(const std::string& file, const std::string& name, in
 
   BenchScene scene;
   scene.name = name;
-  scene.cooking = cooking == Cooking::boxes ? "boxes" : "sampled";
+  scene.cooking = cooking;
   const auto [first, last] = last_stroke(built.setup);
   const int64_t available = last + 1 - first - kJudgedFrames;
   require_option(frames <= available, "--frames",

@@ -47,9 +47,6 @@ const std::vector<PaperSampling>& paper_samplings();
 // Fig. 10: how many more clusters there are at the end of a cut than at its start.
 inline constexpr double kPaperGrowth = 0.01;
 
-// `boxes` or `sampled`; throws InputError, naming --clusters, for anything else.
-Cooking cooking_of(const std::string& name);
-
 // A scene that is part of the program, which so needs no file, by the name of its file without the ending
 // (benchmarks/CMakeLists.txt). Throws std::out_of_range for a scene that is none of those.
 Scene embedded_scene(const std::string& file);

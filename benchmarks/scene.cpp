@@ -1,6 +1,7 @@
 #include "benchmarks/scene.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,10 +11,24 @@
 #include "fixtures/bodies.h"
 #include "fixtures/build.h"
 #include "fixtures/cook.h"
+#include "model/rules.h"
 
 namespace cutproof::benchmarks {
 
-BenchScene make_bench_scene(int64_t particles, int64_t frames) {
+Cooking cooking_of(const std::string& name) {
+  const auto known = choice_named<Cooking>(name);
+  require_option(known.has_value(), "--clusters", fmt::format("clusters cannot be cooked by '{}'", name),
+                 fmt::format("use {}", fmt::join(names_of(Cooking{}), " or ")));
+  return *known;
+}
+
+void sample_as_paper(Scene& spec) {
+  spec.clusters.method = Cooking::sampled;
+  spec.clusters.spacing = spec.clusters.radius = 4.5;
+  spec.expand.rule = ExpandRule::published;
+}
+
+BenchScene make_bench_scene(int64_t particles, int64_t frames, Cooking cooking) {
   const bool box = particles <= kLargestBox;
   const std::string kind = box ? "box" : "kidney";
   const auto begin = Clock::now();
@@ -30,9 +45,11 @@ BenchScene make_bench_scene(int64_t particles, int64_t frames) {
   spec.step.acceleration = Acceleration::none;  // the same work as since figures are kept
   spec.step.stiffness = 1e5;
   spec.step.damping = 5;
+  if (cooking == Cooking::sampled) sample_as_paper(spec);
 
   BenchScene scene;
   scene.name = spec.name;
+  scene.cooking = cooking;
   Setup& setup = scene.setup;
   setup.body = fixtures::sample(fixtures::solid_from_shape(shape, kind), spec.body, "command line");
   fixtures::take_stage_parameters(spec, setup);

@@ -12,15 +12,12 @@ namespace cutproof::benchmarks {
 
 namespace {
 
-// What kernels make of the clusters (gpu/kernels/groups.cuh).
-struct Groups {
-  double groups = 0, pairs = 0, loose = 0, loose_memberships = 0;
-};
-
 uint64_t mixed(uint64_t mix, uint64_t with) {
   mix = (mix ^ (with + 1)) * 0x9e3779b97f4a7c15u;
   return mix ^ mix >> 29;
 }
+
+}  // namespace
 
 Groups groups_of(const Setup& setup, const State& state) {
   // Lists of holders by what two mixes of them come to: 64 bits tell them apart.
@@ -63,6 +60,8 @@ Groups groups_of(const Setup& setup, const State& state) {
   }
   return found;
 }
+
+namespace {
 
 double step_bytes(const Setup& setup, const State& state) {
   const auto particles = static_cast<double>(setup.body.particle_count());

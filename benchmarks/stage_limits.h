@@ -22,6 +22,13 @@ struct StageLimit {
 };
 using StageLimits = std::array<StageLimit, kStages.size()>;
 
+// What kernels make of the clusters (gpu/kernels/groups.cuh): groups, pairs of a group and a holder, particles that are
+// in no group, and how many clusters have these, counted for each.
+struct Groups {
+  double groups = 0, pairs = 0, loose = 0, loose_memberships = 0;
+};
+Groups groups_of(const Setup& setup, const State& state);
+
 // Of one frame that cuts, on a backend that runs the kernels. Requires a body on a grid.
 StageLimits stage_limits(const Setup& setup, const State& state, gpu::SplitMethod split);
 

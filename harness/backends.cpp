@@ -103,6 +103,9 @@ std::unique_ptr<Backend> make_host(const BackendChoice& choice) {
   return gpu::make_host_backend(choice.threads > 0 ? choice.threads : cpu_threads(), kernel_options(choice), of_block);
 }
 
+// Several, so that kernels see more than one body; no more, so that what they work on stays in the caches.
+constexpr int kBodiesOnTheHost = 4;
+
 // No strings that allocate: this table is there before main() and where there is no memory.
 constexpr std::array kBackends = {
     BackendDescriptor{
@@ -121,6 +124,7 @@ constexpr std::array kBackends = {
         .name = kHostName,
         .summary = "the CUDA kernels' source, single precision, on the threads of this CPU",
         .processor = Processor::all_threads,
+        .bodies_in_a_load = kBodiesOnTheHost,
         .make = make_host<>,
     },
     BackendDescriptor{
@@ -129,6 +133,7 @@ constexpr std::array kBackends = {
         .processor = Processor::all_threads,
         .is_timed = false,
         .is_another_path = true,
+        .bodies_in_a_load = kBodiesOnTheHost,
         .make = make_host<gpu::kHostThreads>,
     },
     BackendDescriptor{
@@ -137,6 +142,7 @@ constexpr std::array kBackends = {
         .processor = Processor::all_threads,
         .is_timed = false,
         .can_run = whole_frames,
+        .bodies_in_a_load = kBodiesOnTheHost,
         .make =
             [](const BackendChoice& choice) { return offer_only(make_host<>(choice), "host-frames", whole_frames); },
     },
@@ -146,6 +152,7 @@ constexpr std::array kBackends = {
         .processor = Processor::all_threads,
         .is_timed = false,
         .can_run = split_alone,
+        .bodies_in_a_load = kBodiesOnTheHost,
         .make = [](const BackendChoice& choice) { return offer_only(make_host<>(choice), "host-split", split_alone); },
     },
     BackendDescriptor{

@@ -1,4 +1,3 @@
-#include "benchmarks/memory.h"
 #include "benchmarks/suites/suites.h"
 
 namespace cutproof::benchmarks {
@@ -28,16 +27,12 @@ nlohmann::json run_scale(const ScaleOptions& options, const Progress& progress) 
     BenchScene scene = make_bench_scene(size, frames);
     for (const StepParameters& step : steps_of(options, scene.setup.step)) {
       scene.setup.step = step;
-      // New ones for each row, so that what one keeps is what this size needs.
       for (const Contender& contender : contenders()) {
-        const std::optional<int64_t> before = bytes_in_use(options.described());
         const Measured measured = measure(contender, scene, frames, options.repeats);
-        const std::optional<int64_t> after = bytes_in_use(options.described());
         nlohmann::json row = scene_row(scene, contender, measured);
         row["particles_per_second"] =
             static_cast<double>(scene.setup.body.particle_count()) / measured.timings.frame.median;
-        row["bytes"] = nullptr;
-        if (before && after && *after > *before) row["bytes"] = *after - *before;
+        row["bytes"] = measured.bytes ? nlohmann::json(*measured.bytes) : nlohmann::json(nullptr);
         report.add(std::move(row), measured.holds());
       }
     }

@@ -23,15 +23,22 @@ using nlohmann::json;
 // The scenes that are asked for, made one after the other.
 std::vector<std::function<BenchScene()>> scenes_of(const StagesOptions& options, int64_t frames) {
   std::vector<std::function<BenchScene()>> makers;
+  std::vector<Cooking> cookings;
+  for (const std::string& name : options.cooking) cookings.push_back(cooking_of(name));
   require_timed_sizes(options.sizes);
-  for (const int64_t size : options.sizes) makers.push_back([=] { return make_bench_scene(size, frames); });
+  if (cookings.empty()) cookings.push_back(Cooking::boxes);
+  for (const int64_t size : options.sizes) {
+    for (const Cooking cooking : cookings) {
+      makers.push_back([=] { return make_bench_scene(size, frames, cooking); });
+    }
+  }
   if (!makers.empty()) return makers;
+  if (options.cooking.empty()) cookings.push_back(Cooking::sampled);
   for (const std::string& name : options.scenes) {
     const PaperScene* const scene = find_paper_scene(name);
     require_option(scene != nullptr, "--scenes", fmt::format("there is no scene '{}'", name),
                    "use cuboid, liver, kidney and irregular");
-    for (const std::string& cooking : options.cooking) {
-      const Cooking method = cooking_of(cooking);
+    for (const Cooking method : cookings) {
       if (scene->sampled_only && method != Cooking::sampled) continue;
       const int64_t particles =
           options.full || options.described().takes_full_size ? scene->full_particles : scene->small_particles;
@@ -43,8 +50,9 @@ std::vector<std::function<BenchScene()>> scenes_of(const StagesOptions& options,
 
 json scene_json(const BenchScene& scene, const Contender& contender, const Measured& measured) {
   const Setup& setup = scene.setup;
+  const Groups groups = groups_of(setup, scene.state);
   json entry = {{"scene", scene.name},
-                {"cooking", scene.cooking},
+                {"cooking", name_of(scene.cooking)},
                 {"backend", contender.described->name},
                 {"rotation", contender.rotation},
                 {"split", contender.split},
@@ -53,12 +61,15 @@ json scene_json(const BenchScene& scene, const Contender& contender, const Measu
                   {"particles", setup.body.particle_count()},
                   {"clusters", scene.state.clusters.count()},
                   {"memberships", scene.state.clusters.members.size()},
+                  {"groups", groups.groups},
+                  {"loose", groups.loose},
                   {"spacing", setup.body.grid.spacing},
                   {"nodes", setup.body.grid.nodes}}},
                 {"stiffness", setup.step.stiffness},
                 {"damping", setup.step.damping},
                 {"blade_advance_h", scene.advance},
                 {"warm_up", scene.warm_up},
+                {"bytes", measured.bytes ? json(*measured.bytes) : json(nullptr)},
                 {"build_seconds", scene.build_seconds},
                 {"judged_frames", 0},
                 {"judge_seconds", measured.judge_seconds}};
@@ -89,7 +100,7 @@ void add_rows(const BenchScene& scene, const Contender& contender, const Measure
   for (const auto& [what, times] : measured.timings.named()) {
     json row = run_fields(scene, contender);
     const json error = error_of(what, measured);
-    row["cooking"] = scene.cooking;
+    row["cooking"] = name_of(scene.cooking);
     row["what"] = what;
     row["seconds"] = to_json(times);
     row["frames"] = times.count;
@@ -111,8 +122,9 @@ void add_rows(const BenchScene& scene, const Contender& contender, const Measure
 json run_stages(const StagesOptions& options, const Progress& progress) {
   const int64_t frames = options.frames_or_default();
   const auto scenes = scenes_of(options, frames);
-  const std::vector<Contender> contenders = make_contenders(options.backend, options.split, options.rotation);
-  static_cast<void>(steps_of(options, {}));  // refused before anything is measured
+  const auto contenders = [&] { return make_contenders(options.backend, options.split, options.rotation); };
+  static_cast<void>(contenders());  // what cannot be made or asked for is refused before anything is measured
+  static_cast<void>(steps_of(options, {}));
   const MachineLimits machine = measure_machine(options.described());
   json fields = {{"frames", frames},
                  {"repeats", options.repeats},
@@ -129,7 +141,7 @@ json run_stages(const StagesOptions& options, const Progress& progress) {
     BenchScene scene = make_scene();
     for (const StepParameters& asked : steps_of(options, scene.setup.step)) {
       scene.setup.step = asked;
-      for (const Contender& contender : contenders) {
+      for (const Contender& contender : contenders()) {
         const Measured measured = measure(contender, scene, frames, options.repeats);
         add_rows(scene, contender, measured, machine, report.document);
         json entry = scene_json(scene, contender, measured);

@@ -16,8 +16,8 @@ namespace cutproof::benchmarks {
 struct StagesOptions : TimingOptions {
   std::vector<int64_t> sizes;  // particles; if given, not the scenes
   std::vector<std::string> scenes = {"cuboid", "liver", "kidney", "irregular"};
-  std::vector<std::string> cooking = {"boxes", "sampled"};
-  bool full = false;  // the scenes at the paper's size
+  std::vector<std::string> cooking;  // empty: both of the scenes, boxes of given sizes
+  bool full = false;                 // the scenes at the paper's size
 };
 nlohmann::json run_stages(const StagesOptions& options, const Progress& progress);
 

@@ -42,6 +42,14 @@ void print_last_scene(const json& document) {
   print_filled("\n{scene}: {body/particles} particles, {body/clusters} clusters ({cooking}), ", scene);
   print_filled("{body/memberships} memberships, h = {1e3*body/spacing:.4g} mm; ", scene);
   print_filled("the blade goes on by {blade_advance_h:.2g} h a frame\n", scene);
+  const json& body = scene.at("body");
+  const auto particles = body.at("particles").get<double>(), groups = body.at("groups").get<double>();
+  const auto loose = body.at("loose").get<double>();
+  fmt::print("{:.0f} groups of {:.3g} particles, {:.0f} particles in none", groups,
+             groups > 0 ? (particles - loose) / groups : 0, loose);
+  if (!scene.at("bytes").is_null())
+    fmt::print("; {:.0f} bytes a particle", scene.at("bytes").get<double>() / particles);
+  fmt::print("\n");
   print_filled("{backend}, {precision} precision, {substeps} substeps × {iterations} iterations, ", rows.front());
   print_filled("acceleration {acceleration}, rotation {rotation}, split {split}\n", rows.front());
   const bool limits = std::any_of(rows.begin(), rows.end(), [](const json& row) { return !row.at("limit").is_null(); });
@@ -115,7 +123,8 @@ void add_stages(CLI::App& bench, Work& work) {
       "stages", "whole frames and each stage, a blade cutting: Table 1, or boxes and kidneys of given sizes");
   add_timing(*command, *options);
   add_list(*command, "--scenes", options->scenes, "of Table 1, and the irregular path of Fig. 13", "S");
-  add_list(*command, "--clusters", options->cooking, "how they are cooked", "C");
+  add_list(*command, "--clusters", options->cooking, "how they are cooked, instead of both; with --sizes, of boxes",
+           "C");
   command->add_flag("--full", options->full, "the scenes at the paper's size, as always on a device");
   add_list(*command, "--sizes", options->sizes, "instead of the scenes: bodies with so many particles");
   const auto print_all = [options](const json& document) {

@@ -44,6 +44,30 @@ inline DeviceMemory make_device_memory(std::size_t bytes) {
   CUTPROOF_CUDA(cudaMalloc(&memory, bytes));
   return DeviceMemory(memory);
 }
+// Of which pages are made where the device touches them first, and those of the first `at_once` bytes now. The device
+// must be able to (has_memory_on_demand).
+inline bool has_memory_on_demand() {
+  int device = 0, can = 0;
+  CUTPROOF_CUDA(cudaGetDevice(&device));
+  CUTPROOF_CUDA(cudaDeviceGetAttribute(&can, cudaDevAttrConcurrentManagedAccess, device));
+  return can != 0;
+}
+inline DeviceMemory make_device_memory_on_demand(std::size_t bytes, std::size_t at_once) {
+  void* memory = nullptr;
+  CUTPROOF_CUDA(cudaMallocManaged(&memory, bytes));
+  DeviceMemory held(memory);
+  int device = 0;
+  CUTPROOF_CUDA(cudaGetDevice(&device));
+#if CUDART_VERSION >= 13000
+  const cudaMemLocation place = {cudaMemLocationTypeDevice, device};
+  CUTPROOF_CUDA(cudaMemAdvise(memory, bytes, cudaMemAdviseSetPreferredLocation, place));
+  if (at_once > 0) CUTPROOF_CUDA(cudaMemPrefetchAsync(memory, at_once, place, 0, nullptr));
+#else
+  CUTPROOF_CUDA(cudaMemAdvise(memory, bytes, cudaMemAdviseSetPreferredLocation, device));
+  if (at_once > 0) CUTPROOF_CUDA(cudaMemPrefetchAsync(memory, at_once, device, nullptr));
+#endif
+  return held;
+}
 inline PinnedMemory make_pinned_memory(std::size_t bytes) {
   void* memory = nullptr;
   CUTPROOF_CUDA(cudaMallocHost(&memory, bytes));

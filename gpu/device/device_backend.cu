@@ -3,7 +3,9 @@
 #pragma nv_diag_suppress 20014
 #include <cuda_runtime.h>
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <map>
@@ -26,25 +28,40 @@ namespace {
 class DeviceArrays {
  public:
   DeviceArrays() = default;
-  explicit DeviceArrays(StagingBuffers& staging) {
-    view_ = staging.view();
-    staging.each(view_, [this](const auto&, const auto& vector, auto& pointer) {
-      using Pointer = std::remove_reference_t<decltype(pointer)>;
-      const std::size_t bytes = vector.size() * sizeof(*pointer);
-      // Never empty: a null pointer would be taken for an array that is not there.
-      memory_.push_back(make_device_memory(bytes == 0 ? sizeof(*pointer) : bytes));
-      pointer = static_cast<Pointer>(memory_.back().get());
-      CUTPROOF_CUDA(cudaMemcpy(pointer, vector.data(), bytes, cudaMemcpyHostToDevice));
+  // contents: arrays as long as what a load puts into them. on_demand: from so many bytes on an array has memory only
+  // where something is put into it, then or later.
+  DeviceArrays(StagingBuffers& contents, std::size_t on_demand) {
+    const bool can = has_memory_on_demand();
+    static_cast<Extents&>(view_) = contents;
+    view_.rotation_method = contents.rotation_method;
+    contents.each(view_, [&](const auto& array, auto& vector, auto& pointer) {
+      using Element = std::remove_reference_t<decltype(*pointer)>;
+      const auto extent = static_cast<std::size_t>(array.extent);
+      if (array.unset) vector.resize(extent, *array.unset);
+      const std::size_t bytes = extent * sizeof(Element);
+      const std::size_t loaded = std::min(extent, vector.size()) * sizeof(Element);
+      if (can && bytes >= on_demand && loaded < bytes) {
+        memory_.push_back(make_device_memory_on_demand(bytes, loaded));
+      } else {
+        // Never empty: a null pointer would be taken for an array that is not there.
+        memory_.push_back(make_device_memory(std::max(bytes, sizeof(Element))));
+      }
+      pointer = static_cast<Element*>(memory_.back().get());
+      CUTPROOF_CUDA(cudaMemcpy(pointer, vector.data(), loaded, cudaMemcpyHostToDevice));
     });
   }
 
   const DeviceView& view() const { return view_; }
 
-  // Copies what belongs to the state into the staging's vectors.
+  // Copies what belongs to the state, as far as it is in use, into the staging's vectors.
   void download(StagingBuffers& staging) const {
+    Counters& counters = staging.counters.front();
+    CUTPROOF_CUDA(cudaMemcpy(&counters, view_.counters, sizeof(Counters), cudaMemcpyDeviceToHost));
+    static_cast<Extents&>(staging) = in_use(view_, counters);
     DeviceView pointers = view_;
     staging.each(pointers, [](const auto& array, auto& vector, auto& pointer) {
       if (array.lifetime != Lifetime::state) return;
+      vector.resize(static_cast<std::size_t>(array.extent));
       CUTPROOF_CUDA(cudaMemcpy(vector.data(), pointer, vector.size() * sizeof(*pointer), cudaMemcpyDeviceToHost));
     });
   }
@@ -139,7 +156,7 @@ class GpuBackend final : public Backend {
     CUTPROOF_CUDA(cudaStreamSynchronize(stream_.get()));
     graphs_.clear();
     device_ = DeviceArrays();  // gives the old memory back before the new is asked for
-    device_ = DeviceArrays(load.staging);
+    device_ = DeviceArrays(load.staging, options_.on_demand);
     load_ = std::move(load);
     runs_ = 0;
   }

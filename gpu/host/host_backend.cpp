@@ -54,6 +54,7 @@ class HostBackend final : public Backend {
  private:
   void take(Load load) {
     load_ = std::move(load);
+    load_.staging.allocate(true);
     view_ = load_.staging.view();
     report_ = {};
   }

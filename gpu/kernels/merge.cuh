@@ -515,7 +515,8 @@ CUTPROOF_KERNEL(place_members_kernel);
 
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_move_together(Launcher& launcher, const DeviceView& w) {
-  launcher.exclusive_scan(w.slot_size, moved_begin(w), w.slot_capacity, &w.counters->members_used);
+  launcher.exclusive_scan(w.slot_size, moved_begin(w), w.slot_capacity, &w.counters->members_used,
+                          &w.counters->slots_used);
   launcher.blocks(gather_members_kernel_object{}, w.slots_expected, 128, 0, w);
   launcher.items(place_members_kernel_object{}, w.member_capacity, w);
 }

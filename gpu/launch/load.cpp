@@ -7,7 +7,7 @@ namespace cutproof::gpu {
 Load::Load(std::vector<Setup> bodies, const std::vector<State>& states, const KernelOptions& options, Capacity with)
     : setups(std::move(bodies)),
       capacity(with),
-      staging(make_staging_buffers(setups, states, options.rotation_method, with)),
+      staging(make_contents(setups, states, options.rotation_method, with)),
       plan(make_plan(setups, states, options.rotation_method, options.split)) {
   forget_skins();
 }

@@ -1,5 +1,6 @@
 // What a backend keeps of the bodies that it has loaded, wherever its kernels run.
 #pragma once
+#include <cstddef>
 #include <vector>
 
 #include "gpu/launch/plan.h"
@@ -22,17 +23,19 @@ struct KernelOptions {
   SplitMethod split = SplitMethod::blocks;
   Path path = Path::graph;
   Capacity capacity;  // at load; a backend doubles it when it must (for tests)
+  // gpu: from so many bytes on an array has memory only where it is touched, by pages of 2 MiB (small for tests).
+  std::size_t on_demand = std::size_t{16} << 20;
 };
 
 struct Load {
   std::vector<Setup> setups;
   Capacity capacity;
-  StagingBuffers staging;
+  StagingBuffers staging;  // contents only; where kernels work on them, the backend allocates the rest
   Plan plan;
   KnownSkins skins;  // of the last skin stage, as far as snapshots have asked for them
 
   Load() = default;
-  // Throws what make_staging_buffers throws.
+  // Throws what make_contents throws.
   Load(std::vector<Setup> bodies, const std::vector<State>& states, const KernelOptions& options, Capacity with);
 
   // The same bodies, now in these states, with twice the capacity. Leaves this load without its setups.

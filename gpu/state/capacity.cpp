@@ -77,6 +77,15 @@ Extents extents_of(const StagingBuffers& loaded, Capacity capacity) {
   return extents;
 }
 
+Extents in_use(const Extents& extents, const Counters& counters) {
+  Extents used = extents;
+  used.slot_capacity = counters.slots_used;
+  used.member_capacity = counters.members_used;
+  used.vertex_capacity = counters.vertices_used;
+  used.cell_capacity = counters.cells_used;
+  return used;
+}
+
 bool wants_capacity(const Extents& of, const Counters& c) {
   const auto full = [](int used, int capacity) { return int64_t{4} * used > int64_t{3} * capacity; };
   // A particle has at most six vertices and a node one cell: a capacity for all of them is enough.

@@ -3,6 +3,7 @@
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "gpu/state/indices.h"
@@ -217,9 +218,16 @@ void find_memberships(StagingBuffers& staging) {
 
 }  // namespace
 
-void StagingBuffers::allocate() {
+void StagingBuffers::allocate(bool bare) {
   DeviceView unused;
-  each(unused, [](const auto& array, auto& vector, auto&) { vector.resize(at(array.extent), array.unset); });
+  each(unused, [&](const auto& array, auto& vector, auto&) {
+    using Element = std::remove_reference_t<decltype(vector.front())>;
+    if (array.unset || !bare) {
+      vector.resize(at(array.extent), array.unset.value_or(Element{}));
+    } else {
+      vector.resize(at(array.extent));
+    }
+  });
 }
 
 DeviceView StagingBuffers::view() {
@@ -230,8 +238,8 @@ DeviceView StagingBuffers::view() {
   return view;
 }
 
-StagingBuffers make_staging_buffers(const std::vector<Setup>& setups, const std::vector<State>& states,
-                                    int rotation_method, Capacity capacity) {
+StagingBuffers make_contents(const std::vector<Setup>& setups, const std::vector<State>& states, int rotation_method,
+                             Capacity capacity) {
   require(setups.size() == states.size(), "as many states as setups are needed");
   StagingBuffers staging;
   staging.rotation_method = rotation_method;
@@ -252,6 +260,12 @@ StagingBuffers make_staging_buffers(const std::vector<Setup>& setups, const std:
   counters.groups_stale = counters.groups_whole = 1;
   staging.counters = {counters};
   static_cast<Extents&>(staging) = extents_of(staging, capacity);
+  return staging;
+}
+
+StagingBuffers make_staging_buffers(const std::vector<Setup>& setups, const std::vector<State>& states,
+                                    int rotation_method, Capacity capacity) {
+  StagingBuffers staging = make_contents(setups, states, rotation_method, capacity);
   staging.allocate();
   return staging;
 }

@@ -2,7 +2,10 @@
 // download is turned into states from. The host backend works on them directly.
 #pragma once
 #include <cstdint>
+#include <memory>
+#include <new>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "gpu/state/device_view.h"
@@ -24,11 +27,28 @@ struct Array {
   const char* name;
   int64_t extent;
   Lifetime lifetime;
-  Element unset;
+  std::optional<Element> unset;
 };
+inline constexpr std::nullopt_t none = std::nullopt;
+
+// Elements that nobody has given a value are what the memory holds: making room costs no time, and no memory either
+// where there is much.
+template <class Element>
+struct BareAllocator : std::allocator<Element> {
+  template <class Other>
+  struct rebind {
+    using other = BareAllocator<Other>;
+  };
+  template <class Made, class... Args>
+  void construct(Made* at, Args&&... args) {
+    if constexpr (sizeof...(Args) > 0) ::new (static_cast<void*>(at)) Made(std::forward<Args>(args)...);
+  }
+};
+template <class Element>
+using Elements = std::vector<Element, BareAllocator<Element>>;
 
 struct StagingBuffers : Extents {
-#define ARRAY(name, Element, extent, lifetime, unset) std::vector<Element> name;
+#define ARRAY(name, Element, extent, lifetime, unset) Elements<Element> name;
 #include "gpu/state/arrays.inc"
 
   int rotation_method = kJacobi4;
@@ -44,14 +64,18 @@ struct StagingBuffers : Extents {
   }
 
   // Gives every array its extent. What is there stays, and new elements are unset; those beyond an extent are lost.
-  void allocate();
+  // bare: elements of arrays whose unset is `none` are left as memory comes; else they are zero.
+  void allocate(bool bare = false);
 
   // A DeviceView over these vectors.
   DeviceView view();
 };
 
-// load.cpp. Requires setups.size() == states.size(); throws std::invalid_argument if a state does not fit its setup,
-// and MachineError if an index would not fit into 32 bits.
+// load.cpp. Arrays as long as what the load puts into them. Requires setups.size() == states.size(); throws
+// std::invalid_argument if a state does not fit its setup, and MachineError if an index would not fit into 32 bits.
+StagingBuffers make_contents(const std::vector<Setup>& setups, const std::vector<State>& states, int rotation_method,
+                             Capacity capacity);
+// The same with all arrays allocated.
 StagingBuffers make_staging_buffers(const std::vector<Setup>& setups, const std::vector<State>& states,
                                     int rotation_method, Capacity capacity);
 
@@ -67,6 +91,8 @@ std::vector<State> extract_states(const StagingBuffers& staging, const std::vect
 // capacity.cpp. The extents of what has been loaded, whose arrays are as long as their contents. Throws MachineError if
 // one is beyond 32 bits.
 Extents extents_of(const StagingBuffers& loaded, Capacity capacity);
+// What of these has been given out: as long is what a state is made from.
+Extents in_use(const Extents& extents, const Counters& counters);
 // Something is at least three quarters full, so the next load should have more capacity.
 bool wants_capacity(const Extents& extents, const Counters& counters);
 // Throws MachineError if a capacity was too small for a stage.

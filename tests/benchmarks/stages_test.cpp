@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "benchmarks/frame_errors.h"
+#include "benchmarks/memory.h"
 #include "benchmarks/phase_counter.h"
 #include "benchmarks/scene.h"
 #include "benchmarks/stage_limits.h"
@@ -230,6 +231,34 @@ TEST_F(Bench, ReproducesTable1WithBoxesAndSampledClusters) {
   }
 }
 
+// A body of a given size has the clusters that are asked for, and tells what kernels make of them and what they keep.
+TEST_F(Bench, CooksBodiesOfGivenSizesAsAsked) {
+  const Outcome outcome =
+      bench("stages --backend host --sizes 3000 --clusters boxes,sampled --frames 2 --repeats 1 --json out.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  const json document = result("out.json");
+  ASSERT_EQ(document.at("scenes").size(), 2U);
+  const json &boxes = document.at("scenes")[0], &sampled = document.at("scenes")[1];
+  EXPECT_EQ(boxes.at("cooking"), "boxes");
+  EXPECT_EQ(sampled.at("cooking"), "sampled");
+  EXPECT_NE(boxes.at("body").at("clusters"), sampled.at("body").at("clusters"));
+  for (const json* scene : {&boxes, &sampled}) {
+    const auto particles = scene->at("body").at("particles").get<double>();
+    const auto groups = scene->at("body").at("groups").get<double>();
+    const auto loose = scene->at("body").at("loose").get<double>();
+    EXPECT_GT(groups, 0);
+    EXPECT_GE(particles - loose, 4 * groups) << "a group has four particles and more";
+    // A sanitizer's allocator does not count.
+    if (!cutproof::benchmarks::bytes_in_use(cutproof::harness::described_backend("host"))) continue;
+    EXPECT_GT(scene->at("bytes"), 24 * particles);
+  }
+  EXPECT_GT(sampled.at("body").at("loose"), 3 * boxes.at("body").at("loose").get<double>());
+  EXPECT_EQ(document.at("rows").back().at("cooking"), "sampled");
+  for (const char* words : {"(boxes)", "(sampled)", "particles in none"}) {
+    EXPECT_NE(outcome.output.find(words), std::string::npos) << "no '" << words << "' in:\n" << outcome.output;
+  }
+}
+
 TEST_F(Bench, RefusesBadUsage) {
   const std::pair<const char*, const char*> cases[] = {
       {"", "use one of stages"},
@@ -243,6 +272,7 @@ TEST_F(Bench, RefusesBadUsage) {
       {"stages --repeats 0", "repeats"},
       {"stages --scenes cuboid,heart", "heart"},
       {"stages --clusters spheres", "spheres"},
+      {"stages --sizes 1000 --clusters boxes,spheres", "spheres"},
       {"stages --scenes cuboid --frames 1000", "--frames"},
       {"stages --backend host --split halves", "halves"},
       {"stages --backend host --rotation guess", "guess"},

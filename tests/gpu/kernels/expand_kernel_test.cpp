@@ -171,7 +171,7 @@ TEST(GpuExpand, WhatIsCoveredOrWasNotCutIsLeftAsItIs) {
     Bodies bodies = random_foreign(7, kCover);
     bodies.states.front().edge_covered = cut;
     Bench bench(bodies, cut);
-    const std::vector<int> memberships = bench.staging.memberships;
+    const auto memberships = bench.staging.memberships;
     expand_on(launcher, bench);
     EXPECT_EQ(bench.states(), bench.loaded);
     EXPECT_EQ(bench.staging.memberships, memberships);

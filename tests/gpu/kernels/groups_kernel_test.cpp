@@ -553,7 +553,7 @@ TEST(Groups, AllPointsAreInTheirBall) {
 // One frame of the kernels, and which groups were resolved in it.
 struct Stepped {
   State state;
-  std::vector<int> touched;
+  Elements<int> touched;
   StagingBuffers staging;
 };
 Stepped step(const cutproof::Setup& setup, const State& state) {
@@ -629,7 +629,7 @@ TEST(Groups, HaveTheirBasesNearTheirMeans) {
     const GroupHead& head = staging.group_head[g];
     const double mass = staging.group_mass[g].w;
     ASSERT_GT(mass, 0);
-    const auto off = [&](const std::vector<Float4>& moments) {
+    const auto off = [&](const Elements<Float4>& moments) {
       const auto along = [&](std::size_t axis) { return moments[3 * g + axis].w / mass; };
       return norm(Vec3{along(0), along(1), along(2)});
     };

@@ -318,7 +318,7 @@ Bodies random_bodies(std::mt19937& random, int count, int64_t frames) {
 }
 
 template <class T>
-void expect_same_bytes(const std::vector<T>& a, const std::vector<T>& b, const std::string& where) {
+void expect_same_bytes(const Elements<T>& a, const Elements<T>& b, const std::string& where) {
   ASSERT_EQ(a.size(), b.size());
   EXPECT_TRUE(a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0) << where;
 }
