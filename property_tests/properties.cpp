@@ -11,6 +11,7 @@
 
 #include "fixtures/build.h"
 #include "fixtures/cook.h"
+#include "gpu/backends.h"
 #include "gpu/kernels/step.cuh"
 #include "harness/backends.h"
 #include "oracles/relations/relations.h"
@@ -371,6 +372,11 @@ TEST(Paths, OfTheDeviceGiveTheSameBitsAloneAndInALoad) {
   }
   if (paths.empty()) GTEST_SKIP() << "there is no device";
   ASSERT_GE(paths.size(), 4u);
+#if CUTPROOF_HAS_CUDA
+  gpu::KernelOptions options;
+  options.on_demand = 1;
+  paths.emplace_back("gpu, with memory on demand", gpu::make_gpu_backend(options));
+#endif
   expect_same_bits("Paths.OfTheDeviceGiveTheSameBitsAloneAndInALoad", std::max<int64_t>(wanted_cases() / 20, 5), paths);
 }
 

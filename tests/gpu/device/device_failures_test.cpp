@@ -10,6 +10,7 @@
 #include <iostream>
 #include <map>
 #include <memory>
+#include <optional>
 #include <random>
 #include <set>
 #include <string>
@@ -65,9 +66,7 @@ const std::set<std::string>& launches() {
 }
 
 cudaError_t error_of(const std::string& call) {
-  if (call == "cudaMalloc" || call == "cudaMallocHost" || call == "cudaGraphInstantiate") {
-    return cudaErrorMemoryAllocation;
-  }
+  if (call.starts_with("cudaMalloc") || call == "cudaGraphInstantiate") return cudaErrorMemoryAllocation;
   if (launches().count(call) != 0) return cudaErrorLaunchOutOfResources;
   return cudaErrorLaunchFailure;
 }
@@ -135,6 +134,7 @@ cudaError_t give_back(const void* handle, Call call) {
   }
 
 INTERCEPT_HAND_OUT(cudaMalloc, (void** memory, size_t bytes), (memory, bytes), memory)
+INTERCEPT_HAND_OUT(cudaMallocManaged, (void** memory, size_t bytes, unsigned flags), (memory, bytes, flags), memory)
 INTERCEPT_HAND_OUT(cudaMallocHost, (void** memory, size_t bytes), (memory, bytes), memory)
 INTERCEPT_HAND_OUT(cudaStreamCreateWithFlags, (cudaStream_t * stream, unsigned flags), (stream, flags), stream)
 INTERCEPT_HAND_OUT(cudaEventCreate, (cudaEvent_t * event), (event), event)
@@ -164,6 +164,11 @@ INTERCEPT(cudaEventRecord, (cudaEvent_t event, cudaStream_t stream), (event, str
 INTERCEPT_WAIT(cudaEventSynchronize, (cudaEvent_t event), (event))
 INTERCEPT_WAIT(cudaStreamSynchronize, (cudaStream_t stream), (stream))
 INTERCEPT(cudaMemGetInfo, (size_t * free, size_t* all), (free, all))
+INTERCEPT(cudaMemAdvise, (const void* memory, size_t bytes, cudaMemoryAdvise advice, cudaMemLocation place),
+          (memory, bytes, advice, place))
+INTERCEPT(cudaMemPrefetchAsync,
+          (const void* memory, size_t bytes, cudaMemLocation place, unsigned flags, cudaStream_t stream),
+          (memory, bytes, place, flags, stream))
 INTERCEPT(cudaMemcpy, (void* to, const void* from, size_t bytes, cudaMemcpyKind kind), (to, from, bytes, kind))
 INTERCEPT(cudaMemcpyAsync, (void* to, const void* from, size_t bytes, cudaMemcpyKind kind, cudaStream_t stream),
           (to, from, bytes, kind, stream))
@@ -364,7 +369,9 @@ class DeviceFailures : public testing::Test {
   // Each of the chosen calls fails; afterwards nothing is left, and now and then a fresh backend is tried.
   void fail_each(Path path, Failing failing, uint64_t parts) {
     const auto work = [&] {
-      const std::unique_ptr<Backend> backend = make_gpu_backend(options(path));
+      KernelOptions with = options(path);
+      if (on_demand_) with.on_demand = *on_demand_;
+      const std::unique_ptr<Backend> backend = make_gpu_backend(with);
       State state = load_and_run(*backend);
       calls.stop();
       return state;
@@ -390,6 +397,7 @@ class DeviceFailures : public testing::Test {
   }
 
   uint64_t seed_ = 0;
+  std::optional<std::size_t> on_demand_;  // as KernelOptions has it
 };
 
 TEST_F(DeviceFailures, TheSceneMakesTheBackendEnlarge) {
@@ -427,6 +435,13 @@ TEST_F(DeviceFailures, ACallThatFailsInOneKernelLeavesNothing) {
   }
 }
 
+TEST_F(DeviceFailures, ACallThatFailsWithMemoryOnDemandLeavesNothing) {
+  on_demand_ = 1;
+  fail_each(Path::graph, Failing::once, 60);
+  EXPECT_GT(std::count(calls.trace.begin(), calls.trace.end(), std::string("cudaMallocManaged")), 0);
+  fail_each(Path::graph, Failing::for_good, 20);
+}
+
 TEST_F(DeviceFailures, ABackendWhoseCallFailedCanBeLoadedAnew) {
   for (const Path path : {Path::graph, Path::eager, Path::one_block, Path::one_grid}) {
     const State right = load_and_run(*make_gpu_backend(options(path)));
@@ -445,6 +460,33 @@ TEST_F(DeviceFailures, ABackendWhoseCallFailedCanBeLoadedAnew) {
     backend.reset();
     expect_nothing_outstanding();
   }
+}
+
+// Not a failure, but here is what counts: arrays that have room for a cut through everything take memory for what is in
+// use, and more where a frame needs more.
+TEST_F(DeviceFailures, ALargeBodyTakesMemoryWhereItIsNeeded) {
+  Scene scene = io::parse_scene(kScene, "the test's scene");
+  scene.body.spacing = 0;
+  scene.body.particles = 1'000'000;
+  scene.clusters.side = 5;
+  const fixtures::Built built = fixtures::build(scene, "the test's scene");
+  const auto bytes = [&](std::size_t on_demand) {
+    KernelOptions with;
+    with.on_demand = on_demand;
+    const std::unique_ptr<Backend> backend = make_gpu_backend(with);
+    const int64_t before = device_bytes_in_use();
+    backend->load({built.setup}, {built.state});
+    for (int64_t frame = 0; frame < built.setup.frame_count(); ++frame) backend->run(kFrame);
+    static_cast<void>(backend->report());
+    const int64_t taken = device_bytes_in_use() - before;
+    return std::pair(taken, backend->snapshot().front());
+  };
+  const auto [lean, state] = bytes(KernelOptions{}.on_demand);
+  const auto [full, same] = bytes(std::size_t{1} << 60);
+  EXPECT_TRUE(state == same);
+  EXPECT_LT(2 * lean, full) << lean / built.setup.body.particle_count() << " bytes a particle";
+  std::cout << lean / built.setup.body.particle_count() << " bytes a particle, "
+            << full / built.setup.body.particle_count() << " with all memory at once" << std::endl;
 }
 
 TEST_F(DeviceFailures, LimitsThatCannotBeMeasuredLeaveNothing) {

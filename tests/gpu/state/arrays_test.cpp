@@ -61,10 +61,9 @@ struct Trace {
   std::array<int, 6> ran{};                // how many times, by stage
 };
 
-// Runs all frames, stage by stage; calls before(staging) before each of them.
+// Runs all frames of these arrays, stage by stage; calls before(staging) before each of them.
 template <class Before>
-Trace run_all(const Bodies& bodies, Before before) {
-  StagingBuffers staging = make_staging_buffers(bodies.setups, bodies.states, kNewton, Capacity{});
+Trace run_all(const Bodies& bodies, StagingBuffers staging, Before before) {
   const Plan plan = make_plan(bodies.setups, bodies.states, kNewton, SplitMethod::blocks);
   const DeviceView view = staging.view();
   HostLauncher launcher;
@@ -82,6 +81,11 @@ Trace run_all(const Bodies& bodies, Before before) {
     }
   }
   return run;
+}
+
+template <class Before>
+Trace run_all(const Bodies& bodies, Before before) {
+  return run_all(bodies, make_staging_buffers(bodies.setups, bodies.states, kNewton, Capacity{}), before);
 }
 
 TEST(Arrays, AreAsLongAsTheirExtentsSay) {
@@ -118,6 +122,34 @@ TEST(Arrays, OfScratchMemoryAreNothingThatAStageReliesOn) {
   for (const Stage stage : kStages) EXPECT_GT(ran[static_cast<std::size_t>(stage)], 10) << name_of(stage);
 }
 
+// What a load puts nothing into is left as memory comes, but where arrays.inc gives it a value.
+TEST(Arrays, HoldNothingToRelyOnBeyondWhatHasBeenPutIntoThem) {
+  int64_t spoiled = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(seed);
+    const Bodies bodies = some_bodies(seed, 8);
+    const Trace expected = run_all(bodies, [](StagingBuffers&) {});
+    StagingBuffers staging = make_contents(bodies.setups, bodies.states, kNewton, Capacity{});
+    DeviceView unused;
+    std::map<std::string, std::size_t> loaded;
+    staging.each(unused, [&](const auto& array, const auto& vector, auto&) { loaded[array.name] = vector.size(); });
+    staging.allocate(true);
+    staging.each(unused, [&](const auto& array, auto& vector, auto&) {
+      const std::size_t begin = loaded[array.name];
+      if (array.unset || begin >= vector.size()) return;
+      std::memset(static_cast<void*>(vector.data() + begin), 0x5a, (vector.size() - begin) * sizeof vector.front());
+      ++spoiled;
+    });
+    const Trace found = run_all(bodies, std::move(staging), [](StagingBuffers&) {});
+    ASSERT_EQ(found.states.size(), expected.states.size());
+    for (std::size_t k = 0; k < found.states.size(); ++k) {
+      ASSERT_TRUE(found.states[k] == expected.states[k])
+          << "after stage " << name_of(kStages[k % 6]) << " of frame " << k / 6;
+    }
+  }
+  EXPECT_GT(spoiled, 20 * 40);
+}
+
 TEST(Arrays, OfTheStateAreAllThatASnapshotNeedsBesideTheConstantOnes) {
   int skins = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
@@ -128,6 +160,15 @@ TEST(Arrays, OfTheStateAreAllThatASnapshotNeedsBesideTheConstantOnes) {
       for (const State& state : expected) skins += !state.skin.triangles.empty();
       StagingBuffers spoiled = staging;
       spoil(spoiled, [](Lifetime lifetime) { return lifetime == Lifetime::scratch || lifetime == Lifetime::derived; });
+      ASSERT_TRUE(extract_states(spoiled, bodies.setups) == expected);
+      // And of these no more than what has been given out.
+      static_cast<Extents&>(spoiled) = in_use(spoiled, spoiled.counters.front());
+      DeviceView unused;
+      spoiled.each(unused, [](const auto& array, auto& vector, auto&) {
+        if (array.lifetime != Lifetime::state) return;
+        vector.resize(static_cast<std::size_t>(array.extent));
+        vector.shrink_to_fit();
+      });
       ASSERT_TRUE(extract_states(spoiled, bodies.setups) == expected);
     });
   }
