@@ -94,10 +94,13 @@ CUTPROOF_DEVICE void free_lone_clusters_kernel(Block& block, DeviceView w) {
     const int b = w.slot_body[s];
     if (w.slot_size[s] == 0 || w.body[b].expand_rule != ExpandRule::published || !expands_now(w, b)) continue;
     const int* members = w.members + w.slot_begin[s];
+    // Nearly every cluster shares one of the first particles that are looked at.
     bool shared = false;
-    for (int k = block.thread(); k < w.slot_size[s]; k += block.size())
-      shared = shared || w.membership_count[members[k]] > 1;
-    if (block.any(shared)) continue;
+    for (int tile = 0; tile < w.slot_size[s] && !shared; tile += block.size()) {
+      const int k = tile + block.thread();
+      shared = block.any(k < w.slot_size[s] && w.membership_count[members[k]] > 1);
+    }
+    if (shared) continue;
     for (int k = block.thread(); k < w.slot_size[s]; k += block.size()) {
       for (int direction = 0; direction < 6 && alive(w, members[k]); ++direction) {
         const int q = neighbour(w, w.body[b], members[k], direction);
@@ -304,26 +307,29 @@ CUTPROOF_ENQUEUE void enqueue_expand(Launcher& launcher, const DeviceView& w, co
   launcher.items(begin_expand_kernel_object{}, 1, w);
   if (plan.edge_cover) launcher.items(cover_edges_kernel_object{}, w.particles, w);
   if (plan.published_expand) launcher.blocks(free_lone_clusters_kernel_object{}, w.slots_expected, kThreads, 0, w);
-  collect(launcher);
-  launcher.while_nonzero(&c->changed, [&](Launcher& layer) {
-    layer.items(add_layer_kernel_object{}, w.addition_capacity, w);
-    collect(layer);
-  });
-  launcher.if_nonzero(&c->additions, [&](Launcher& found) {
-    found.items(note_rows_kernel_object{}, w.particles, w);
-    found.items(measure_growth_kernel_object{}, w.addition_capacity, w);
-    found.items(check_growth_kernel_object{}, 1, w);
-  });
-  launcher.if_nonzero(&c->additions, [&](Launcher& fits) {
-    fits.clear(rest_marks(w), sizeof(int) * static_cast<std::size_t>(w.slot_capacity));
-    fits.items(copy_memberships_kernel_object{}, w.member_capacity, w);
-    fits.exclusive_scan(new_count(w), w.membership_begin, w.particles, w.membership_begin + w.particles);
-    fits.items(move_rows_kernel_object{}, w.particles, w);
-    fits.items(add_memberships_kernel_object{}, w.addition_capacity, w);
-    fits.items(finish_rows_kernel_object{}, w.particles, w);
-    fits.blocks(grow_clusters_kernel_object{}, w.addition_capacity, kThreads, 16, w);
-    fits.items(note_grown_dirty_kernel_object{}, w.slots_expected, w);
-    enqueue_rest_frames(fits, w);
+  // Most frames that look for additions find none: sorting as many as there is room for would take longest of all.
+  launcher.if_nonzero(&c->additions, [&](Launcher& some) {
+    collect(some);
+    some.while_nonzero(&c->changed, [&](Launcher& layer) {
+      layer.items(add_layer_kernel_object{}, w.addition_capacity, w);
+      collect(layer);
+    });
+    some.if_nonzero(&c->additions, [&](Launcher& found) {
+      found.items(note_rows_kernel_object{}, w.particles, w);
+      found.items(measure_growth_kernel_object{}, w.addition_capacity, w);
+      found.items(check_growth_kernel_object{}, 1, w);
+    });
+    some.if_nonzero(&c->additions, [&](Launcher& fits) {
+      fits.clear(rest_marks(w), sizeof(int) * static_cast<std::size_t>(w.slot_capacity));
+      fits.items(copy_memberships_kernel_object{}, w.member_capacity, w);
+      fits.exclusive_scan(new_count(w), w.membership_begin, w.particles, w.membership_begin + w.particles);
+      fits.items(move_rows_kernel_object{}, w.particles, w);
+      fits.items(add_memberships_kernel_object{}, w.addition_capacity, w);
+      fits.items(finish_rows_kernel_object{}, w.particles, w);
+      fits.blocks(grow_clusters_kernel_object{}, w.addition_capacity, kThreads, 16, w);
+      fits.items(note_grown_dirty_kernel_object{}, w.slots_expected, w);
+      enqueue_rest_frames(fits, w);
+    });
   });
   launcher.items(note_edge_covered_kernel_object{}, w.bodies, w);
 }
