@@ -112,6 +112,7 @@ class Buffer {
  public:
   explicit Buffer(std::size_t bytes) : data_(make_device_memory(bytes)), bytes_(bytes) {
     CUTPROOF_CUDA(cudaMemset(data_.get(), 0, bytes));
+    wait_for_copies();
   }
   template <class T>
   T* as() const {
@@ -120,6 +121,7 @@ class Buffer {
   template <class T>
   void fill(const std::vector<T>& values) {
     CUTPROOF_CUDA(cudaMemcpy(data_.get(), values.data(), values.size() * sizeof(T), cudaMemcpyHostToDevice));
+    wait_for_copies();
   }
   std::vector<unsigned char> read() const {
     std::vector<unsigned char> bytes(bytes_);

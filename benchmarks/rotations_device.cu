@@ -15,6 +15,7 @@ template <class T>
 gpu::DeviceMemory uploaded(const std::vector<T>& values) {
   gpu::DeviceMemory memory = gpu::make_device_memory(std::max<std::size_t>(values.size(), 1) * sizeof(T));
   CUTPROOF_CUDA(cudaMemcpy(memory.get(), values.data(), values.size() * sizeof(T), cudaMemcpyHostToDevice));
+  gpu::wait_for_copies();
   return memory;
 }
 template <class T>

@@ -1,4 +1,5 @@
 // Properties of every backend over random dissections (architecture.md, Properties).
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -373,9 +374,17 @@ TEST(Paths, OfTheDeviceGiveTheSameBitsAloneAndInALoad) {
   if (paths.empty()) GTEST_SKIP() << "there is no device";
   ASSERT_GE(paths.size(), 4u);
 #if CUTPROOF_HAS_CUDA
-  gpu::KernelOptions options;
-  options.on_demand = 1;
-  paths.emplace_back("gpu, with memory on demand", gpu::make_gpu_backend(options));
+  // Whatever memory holds before anything is put into it, and where it has to be made first.
+  for (const gpu::Path path : {gpu::Path::graph, gpu::Path::eager, gpu::Path::one_block, gpu::Path::one_grid}) {
+    for (const int fill : {0x5a, 0xff, 0x00}) {
+      gpu::KernelOptions options;
+      options.path = path;
+      options.fill = fill;
+      if (fill == 0xff) options.on_demand = 1;
+      paths.emplace_back(fmt::format("path {} in memory of bytes {}", static_cast<int>(path), fill),
+                         gpu::make_gpu_backend(options));
+    }
+  }
 #endif
   expect_same_bits("Paths.OfTheDeviceGiveTheSameBitsAloneAndInALoad", std::max<int64_t>(wanted_cases() / 20, 5), paths);
 }

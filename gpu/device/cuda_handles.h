@@ -68,6 +68,9 @@ inline DeviceMemory make_device_memory_on_demand(std::size_t bytes, std::size_t 
 #endif
   return held;
 }
+// What cudaMemcpy and cudaMemset have begun is done. A copy from memory that is not pinned may return while the last of
+// it is under way, and our streams do not wait for the default one: a kernel would read what was there before.
+inline void wait_for_copies() { CUTPROOF_CUDA(cudaStreamSynchronize(nullptr)); }
 inline PinnedMemory make_pinned_memory(std::size_t bytes) {
   void* memory = nullptr;
   CUTPROOF_CUDA(cudaMallocHost(&memory, bytes));

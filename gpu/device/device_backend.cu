@@ -28,9 +28,8 @@ namespace {
 class DeviceArrays {
  public:
   DeviceArrays() = default;
-  // contents: arrays as long as what a load puts into them. on_demand: from so many bytes on an array has memory only
-  // where something is put into it, then or later.
-  DeviceArrays(StagingBuffers& contents, std::size_t on_demand) {
+  // contents: arrays as long as what a load puts into them.
+  DeviceArrays(StagingBuffers& contents, const KernelOptions& options) {
     const bool can = has_memory_on_demand();
     static_cast<Extents&>(view_) = contents;
     view_.rotation_method = contents.rotation_method;
@@ -40,15 +39,17 @@ class DeviceArrays {
       if (array.unset) vector.resize(extent, *array.unset);
       const std::size_t bytes = extent * sizeof(Element);
       const std::size_t loaded = std::min(extent, vector.size()) * sizeof(Element);
-      if (can && bytes >= on_demand && loaded < bytes) {
+      if (can && bytes >= options.on_demand && loaded < bytes) {
         memory_.push_back(make_device_memory_on_demand(bytes, loaded));
       } else {
         // Never empty: a null pointer would be taken for an array that is not there.
         memory_.push_back(make_device_memory(std::max(bytes, sizeof(Element))));
       }
       pointer = static_cast<Element*>(memory_.back().get());
+      if (options.fill) CUTPROOF_CUDA(cudaMemset(pointer, *options.fill, bytes));
       CUTPROOF_CUDA(cudaMemcpy(pointer, vector.data(), loaded, cudaMemcpyHostToDevice));
     });
+    wait_for_copies();
   }
 
   const DeviceView& view() const { return view_; }
@@ -156,7 +157,7 @@ class GpuBackend final : public Backend {
     CUTPROOF_CUDA(cudaStreamSynchronize(stream_.get()));
     graphs_.clear();
     device_ = DeviceArrays();  // gives the old memory back before the new is asked for
-    device_ = DeviceArrays(load.staging, options_.on_demand);
+    device_ = DeviceArrays(load.staging, options_);
     load_ = std::move(load);
     runs_ = 0;
   }

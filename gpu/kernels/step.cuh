@@ -390,6 +390,9 @@ enum : int { kUntouched = 0, kTracked = 1, kDue = 2 };
 template <class AnyTeam, class Block>
 CUTPROOF_DEVICE void list_resolved(Block& block, const AnyTeam& team, const DeviceView& w, const Pace& pace, int g,
                                    int substep, int before) {
+  // It has no map any more, and may never have had one; who reads ahead reads it all the same.
+  team.sync();  // all have read the last one
+  team.each(3, [&](int axis) { w.group_map[3 * int64_t{g} + axis] = Float4{}; });
   if (!team.leads()) return;
   w.group_resolved[g] = kResolved;
   if (pace.iterations == 0) return;  // nobody asks for the list, or empties it

@@ -1,6 +1,7 @@
 // What a backend keeps of the bodies that it has loaded, wherever its kernels run.
 #pragma once
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "gpu/launch/plan.h"
@@ -25,6 +26,8 @@ struct KernelOptions {
   Capacity capacity;  // at load; a backend doubles it when it must (for tests)
   // gpu: from so many bytes on an array has memory only where it is touched, by pages of 2 MiB (small for tests).
   std::size_t on_demand = std::size_t{16} << 20;
+  // gpu, for tests: a byte that fills all memory before anything is put into it.
+  std::optional<int> fill;
 };
 
 struct Load {

@@ -262,6 +262,7 @@ KernelOptions options(Path path) {
   KernelOptions options;
   options.path = path;
   options.capacity = kLittle;
+  options.fill = 0x5a;  // nothing may hang on what memory held before
   return options;
 }
 
