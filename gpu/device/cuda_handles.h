@@ -44,14 +44,14 @@ inline DeviceMemory make_device_memory(std::size_t bytes) {
   CUTPROOF_CUDA(cudaMalloc(&memory, bytes));
   return DeviceMemory(memory);
 }
-// Of which pages are made where the device touches them first, and those of the first `at_once` bytes now. The device
-// must be able to (has_memory_on_demand).
 inline bool has_memory_on_demand() {
   int device = 0, can = 0;
   CUTPROOF_CUDA(cudaGetDevice(&device));
   CUTPROOF_CUDA(cudaDeviceGetAttribute(&can, cudaDevAttrConcurrentManagedAccess, device));
   return can != 0;
 }
+// Pages are made where the device touches them first, and those of the first `at_once` bytes now. Requires
+// has_memory_on_demand().
 inline DeviceMemory make_device_memory_on_demand(std::size_t bytes, std::size_t at_once) {
   void* memory = nullptr;
   CUTPROOF_CUDA(cudaMallocManaged(&memory, bytes));

@@ -64,14 +64,20 @@ double greatest_rms_h(const Scene& tuned, Scene scene, int substeps, int iterati
 }
 
 TEST_F(Tune, WritesACheaperSceneWithinTheTolerance) {
+  // So many iterations that a frame costs ten times what it has to, however busy the machine is.
+  constexpr int kIterations = 256;
+  std::string text = kScene;
+  const std::string given_iterations = "\"iterations\": 16";
+  text.replace(text.find(given_iterations), given_iterations.size(), "\"iterations\": " + std::to_string(kIterations));
+  write("scene.json", text);
   for (const std::string backend : {"reference", "host"}) {
     const Outcome outcome = tune("--tolerance 0.05 --reference substeps --json out.json --backend " + backend);
     ASSERT_EQ(outcome.status, 0) << outcome.output;
     EXPECT_NE(outcome.output.find("\nfound: "), std::string::npos) << outcome.output;
     const Scene tuned = cutproof::io::read_scene(path("scene_tuned.json"));
     const Scene given = cutproof::io::read_scene(path("scene.json"));
-    EXPECT_LT(tuned.step.substeps * tuned.step.iterations, 4 * 16);
-    const double error = greatest_rms_h(tuned, given, 4, 200);
+    EXPECT_LT(tuned.step.substeps * tuned.step.iterations, 4 * kIterations);
+    const double error = greatest_rms_h(tuned, given, 4, kIterations);
     EXPECT_LE(error, 0.05);
 
     const json document = json::parse(read("out.json"));
@@ -83,7 +89,7 @@ TEST_F(Tune, WritesACheaperSceneWithinTheTolerance) {
     EXPECT_GT(found.at("verdicts"), 10);
     const json& trials = document.at("trials");
     EXPECT_EQ(trials.at(0).at("substeps"), 4);
-    EXPECT_EQ(trials.at(0).at("iterations"), 16);
+    EXPECT_EQ(trials.at(0).at("iterations"), kIterations);
     EXPECT_EQ(trials.at(0).at("outcome"), "within");
     EXPECT_EQ(trials.at(0).at("rotation").is_null(), backend == "reference");
     // What it has tried and found wanting is written too.
