@@ -10,6 +10,7 @@
 #include "benchmarks/stage_limits.h"
 #include "benchmarks/suites/suites.h"
 #include "model/io/verdict_json.h"
+#include "model/rules.h"
 #if CUTPROOF_HAS_CUDA
 #include "benchmarks/raw_baseline.h"
 #endif
