@@ -1477,7 +1477,8 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
     room = w.group_room[g];
     state = w.group_resolved[g];
   }
-  const bool active = head.size > 0 && state != kResolved && takes_part(pace, substep, iteration);
+  // In this order: who takes no part may have no state.
+  const bool active = head.size > 0 && takes_part(pace, substep, iteration) && state != kResolved;
   const bool more = iteration + 1 < pace.iterations;
   Iteration now = {};
   if (active) now = iteration_of(w, body, pace, iteration);
