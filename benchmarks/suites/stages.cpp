@@ -24,22 +24,21 @@ using nlohmann::json;
 // The scenes that are asked for, made one after the other.
 std::vector<std::function<BenchScene()>> scenes_of(const StagesOptions& options, int64_t frames) {
   std::vector<std::function<BenchScene()>> makers;
-  std::vector<Cooking> cookings;
-  for (const std::string& name : options.cooking) cookings.push_back(cooking_of(name));
+  std::vector<Cooking> asked;
+  for (const std::string& name : options.cooking) asked.push_back(cooking_of(name));
+  const auto asked_or = [&](std::vector<Cooking> otherwise) { return asked.empty() ? otherwise : asked; };
   require_timed_sizes(options.sizes);
-  if (cookings.empty()) cookings.push_back(Cooking::boxes);
   for (const int64_t size : options.sizes) {
-    for (const Cooking cooking : cookings) {
+    for (const Cooking cooking : asked_or({Cooking::boxes})) {
       makers.push_back([=] { return make_bench_scene(size, frames, cooking); });
     }
   }
   if (!makers.empty()) return makers;
-  if (options.cooking.empty()) cookings.push_back(Cooking::sampled);
   for (const std::string& name : options.scenes) {
     const PaperScene* const scene = find_paper_scene(name);
     require_option(scene != nullptr, "--scenes", fmt::format("there is no scene '{}'", name),
                    "use cuboid, liver, kidney and irregular");
-    for (const Cooking method : cookings) {
+    for (const Cooking method : asked_or({Cooking::boxes, Cooking::sampled})) {
       if (scene->sampled_only && method != Cooking::sampled) continue;
       const int64_t particles =
           options.full || options.described().takes_full_size ? scene->full_particles : scene->small_particles;

@@ -31,8 +31,7 @@ class DeviceArrays {
   // contents: arrays as long as what a load puts into them.
   DeviceArrays(StagingBuffers& contents, const KernelOptions& options) {
     const bool can = has_memory_on_demand();
-    static_cast<Extents&>(view_) = contents;
-    view_.rotation_method = contents.rotation_method;
+    view_ = contents.view();
     contents.each(view_, [&](const auto& array, auto& vector, auto& pointer) {
       using Element = std::remove_reference_t<decltype(*pointer)>;
       const auto extent = static_cast<std::size_t>(array.extent);
