@@ -630,13 +630,15 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
   const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
   const Float4 mass = constant(&w.group_mass[g]), upper = constant(&w.group_spread[2 * int64_t{g}]),
                lower = constant(&w.group_spread[2 * int64_t{g} + 1]);
-  const FrameParts parts = load_parts(w, body, substep);
+  const bool active = head.size > 0 && substep < pace.substeps;
+  FrameParts parts = {};  // of no more substeps than its body has
+  if (active) parts = load_parts(w, body, substep);
   const Parts of_prediction = predicted_parts(pace, parts);
   Parts of_last_prediction = {};
-  if (substep > 0) of_last_prediction = predicted_parts(pace, load_parts(w, body, substep - 1));
+  if (active && substep > 0) of_last_prediction = predicted_parts(pace, load_parts(w, body, substep - 1));
   const float lost = lost_in_all(w, body, pace), per_h = pace.per_h;
   block.wait_for_earlier();
-  if (head.size == 0 || substep >= pace.substeps) return false;
+  if (!active) return false;
   [[maybe_unused]] int state = kUntouched;
   if constexpr (kContacts) state = w.group_tracked[g];
   // All that is read before anything is written: behind a store, each would be waited for by itself.
@@ -1473,13 +1475,13 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
   const Pace pace = constant(&w.pace[body]);
   [[maybe_unused]] float room = 0;
   [[maybe_unused]] int state = kCarried;
-  if constexpr (kContacts) {
-    room = w.group_room[g];
-    state = w.group_resolved[g];
-  }
+  if constexpr (kContacts) state = w.group_resolved[g];
   // In this order: who takes no part may have no state.
   const bool active = head.size > 0 && takes_part(pace, substep, iteration) && state != kResolved;
   const bool more = iteration + 1 < pace.iterations;
+  if constexpr (kContacts) {
+    if (active && state == kCarried) room = w.group_room[g];
+  }
   Iteration now = {};
   if (active) now = iteration_of(w, body, pace, iteration);
   Rows<Team<Block, kRows>> present, earlier, of_prediction;
@@ -1502,7 +1504,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
   if constexpr (kAllAhead) {
     if (active) {
       team.each(3, read_maps);
-      read_moments();
+      if (state == kCarried) read_moments();  // one that is held has none
     }
   }
   block.wait_for_earlier();  // for the clusters: all else is older
