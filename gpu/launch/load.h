@@ -25,7 +25,7 @@ struct KernelOptions {
   Path path = Path::graph;
   Capacity capacity;  // at load; a backend doubles it when it must (for tests)
   // gpu: from so many bytes on an array has memory only where it is touched, by pages of 2 MiB (small for tests).
-  std::size_t on_demand = std::size_t{16} << 20;
+  std::size_t on_demand = std::size_t{4} << 20;
   // gpu, for tests: a byte that fills all memory before anything is put into it.
   std::optional<int> fill;
 };
