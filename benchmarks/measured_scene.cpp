@@ -43,7 +43,8 @@ json error_of_stage(Stage stage, const Measured& measured) {
 
 }  // namespace
 
-Measured measure(const Contender& contender, const BenchScene& scene, int64_t frames, int64_t repeats) {
+Measured measure(const Contender& contender, const BenchScene& scene, int64_t frames, int64_t repeats,
+                 const WhenTimed& timed) {
   Backend& backend = *contender.instance;
   Measured measured;
   const std::optional<int64_t> before = bytes_in_use(*contender.described);
@@ -51,7 +52,10 @@ Measured measure(const Contender& contender, const BenchScene& scene, int64_t fr
   const std::optional<int64_t> after = bytes_in_use(*contender.described);
   if (before && after && *after > *before) measured.bytes = *after - *before;
   const auto begin = Clock::now();
-  if (scene.setup.body.particle_count() <= kMostJudgedParticles) {
+  measured.to_be_judged = scene.setup.body.particle_count() <= kMostJudgedParticles;
+  if (measured.to_be_judged) {
+    if (timed) timed(measured);
+    measured.to_be_judged = false;
     const bool expands = measured.timings.stage[at(Stage::expand)].count > 0;
     measured.added = expands ? count_added_memberships(backend, scene, frames) : 0;
     measured.judged = judge_frames(backend, scene.setup);

@@ -1,6 +1,7 @@
 // What one backend makes of one scene: times, then errors; and how both stand in documents.
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -21,9 +22,13 @@ struct Measured {
   int64_t added = 0;                  // memberships, by expansion in the timed frames
   std::optional<int64_t> bytes;       // that a new backend keeps after these; absent where nobody can tell
   double judge_seconds = 0;
+  bool to_be_judged = false;  // what was timed is judged next
   bool holds() const { return !judged || judged->topology_holds(); }
 };
-Measured measure(const Contender& contender, const BenchScene& scene, int64_t frames, int64_t repeats);
+// timed: called between timing and judging, which takes minutes for a large body.
+using WhenTimed = std::function<void(const Measured& times)>;
+Measured measure(const Contender& contender, const BenchScene& scene, int64_t frames, int64_t repeats,
+                 const WhenTimed& timed = {});
 
 // The error of what was timed under this name (Timings::named); null if it was not measured, or did not run.
 nlohmann::json error_of(const std::string& what, const Measured& measured);

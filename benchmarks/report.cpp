@@ -45,6 +45,11 @@ void Report::add(nlohmann::json row, bool holds) {
   progress_(document);
 }
 
+void Report::show_timed(nlohmann::json so_far) const {
+  so_far["judging"] = true;
+  progress_(so_far);
+}
+
 nlohmann::json Report::complete() {
   document["complete"] = true;
   return std::move(document);

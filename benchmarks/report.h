@@ -25,6 +25,8 @@ class Report {
          const std::string& list = "rows");
   // `holds`: what the suite judges of it.
   void add(nlohmann::json row, bool holds = true);
+  // Shows a copy that has what was timed, while it is being judged: whoever keeps it has the times if that is cut off.
+  void show_timed(nlohmann::json so_far) const;
   // With the last row in it.
   nlohmann::json complete();
 

@@ -380,7 +380,7 @@ TEST(Paths, OfTheDeviceGiveTheSameBitsAloneAndInALoad) {
       gpu::KernelOptions options;
       options.path = path;
       options.fill = fill;
-      if (fill == 0xff) options.on_demand = 1;
+      if (fill == 0xff) options.on_demand = {1, 0};
       paths.emplace_back(fmt::format("path {} in memory of bytes {}", static_cast<int>(path), fill),
                          gpu::make_gpu_backend(options));
     }

@@ -28,12 +28,19 @@ nlohmann::json run_scale(const ScaleOptions& options, const Progress& progress) 
     for (const StepParameters& step : steps_of(options, scene.setup.step)) {
       scene.setup.step = step;
       for (const Contender& contender : contenders()) {
-        const Measured measured = measure(contender, scene, frames, options.repeats);
-        nlohmann::json row = scene_row(scene, contender, measured);
-        row["particles_per_second"] =
-            static_cast<double>(scene.setup.body.particle_count()) / measured.timings.frame.median;
-        row["bytes"] = measured.bytes ? nlohmann::json(*measured.bytes) : nlohmann::json(nullptr);
-        report.add(std::move(row), measured.holds());
+        const auto row_of = [&](const Measured& measured) {
+          nlohmann::json row = scene_row(scene, contender, measured);
+          row["particles_per_second"] =
+              static_cast<double>(scene.setup.body.particle_count()) / measured.timings.frame.median;
+          row["bytes"] = measured.bytes ? nlohmann::json(*measured.bytes) : nlohmann::json(nullptr);
+          return row;
+        };
+        const Measured measured = measure(contender, scene, frames, options.repeats, [&](const Measured& times) {
+          nlohmann::json so_far = report.document;
+          so_far["rows"].push_back(row_of(times));
+          report.show_timed(std::move(so_far));
+        });
+        report.add(row_of(measured), measured.holds());
       }
     }
   }

@@ -108,7 +108,9 @@ void add_rows(const BenchScene& scene, const Contender& contender, const Measure
     row["paper_seconds"] = nullptr;
     if (const auto ms = known == nullptr ? std::nullopt : known->paper_ms(what)) row["paper_seconds"] = 1e-3 * *ms;
     row["error"] = error;
-    row["error_text"] = in_words(error, measured.judged ? "did not run" : "not measured");
+    row["error_text"] = in_words(error, measured.judged         ? "did not run"
+                                        : measured.to_be_judged ? "not judged yet"
+                                                                : "not measured");
     row["limit"] = nullptr;
     if (const auto found = limits.find(what); found != limits.end() && times.count > 0) {
       row["limit"] = limit_json(found->second, machine, times.median);
@@ -142,12 +144,20 @@ json run_stages(const StagesOptions& options, const Progress& progress) {
     for (const StepParameters& asked : steps_of(options, scene.setup.step)) {
       scene.setup.step = asked;
       for (const Contender& contender : contenders()) {
-        const Measured measured = measure(contender, scene, frames, options.repeats);
+        const auto entry_of = [&](const Measured& measured) {
+          json entry = scene_json(scene, contender, measured);
+          entry["frames"] = frames;
+          entry["repeats"] = options.repeats;
+          return entry;
+        };
+        const Measured measured = measure(contender, scene, frames, options.repeats, [&](const Measured& times) {
+          json so_far = report.document;
+          add_rows(scene, contender, times, machine, so_far);
+          so_far["scenes"].push_back(entry_of(times));
+          report.show_timed(std::move(so_far));
+        });
         add_rows(scene, contender, measured, machine, report.document);
-        json entry = scene_json(scene, contender, measured);
-        entry["frames"] = frames;
-        entry["repeats"] = options.repeats;
-        report.add(std::move(entry), measured.holds());
+        report.add(entry_of(measured), measured.holds());
       }
     }
   }

@@ -30,7 +30,8 @@ class DeviceArrays {
   DeviceArrays() = default;
   // contents: arrays as long as what a load puts into them.
   DeviceArrays(StagingBuffers& contents, const KernelOptions& options) {
-    const bool can = has_memory_on_demand();
+    const OnDemand& where = options.on_demand;
+    const bool on_demand = has_memory_on_demand() && empty_bytes(contents, where.array) >= where.room;
     view_ = contents.view();
     contents.each(view_, [&](const auto& array, auto& vector, auto& pointer) {
       using Element = std::remove_reference_t<decltype(*pointer)>;
@@ -38,7 +39,7 @@ class DeviceArrays {
       if (array.unset) vector.resize(extent, *array.unset);
       const std::size_t bytes = extent * sizeof(Element);
       const std::size_t loaded = std::min(extent, vector.size()) * sizeof(Element);
-      if (can && bytes >= options.on_demand && loaded < bytes) {
+      if (on_demand && bytes >= where.array && loaded < bytes) {
         memory_.push_back(make_device_memory_on_demand(bytes, loaded));
       } else {
         // Never empty: a null pointer would be taken for an array that is not there.

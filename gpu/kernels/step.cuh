@@ -567,9 +567,14 @@ CUTPROOF_DEVICE void sum_group(Block& block, const Team<Block, kParticleTeam>& t
   }
   const Group group = group_of(w, g);
   const GroupHead& head = group.head;
-  if (head.size == 0) return;
   const Pace pace = constant(&w.pace[body_of_group(w, head)]);
-  if (pace.substeps == 0) return;
+  if (head.size == 0 || pace.substeps == 0) {
+    // Who reads ahead reads these before it knows that nothing is to be done.
+    if (!team.leads()) return;
+    w.group_base[g] = Float4{};
+    if constexpr (kContacts) w.group_resolved[g] = kCarried;
+    return;
+  }
   if constexpr (kContacts) {
     if (held_by(w, pace, head.hold_set, 0).active) list_tracked(block, team, w, g, -1, 0, kDue);
   }

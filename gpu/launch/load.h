@@ -19,13 +19,20 @@ enum class Path {
   one_grid,   // one kernel of as many blocks as run side by side; likewise
 };
 
+// gpu: arrays of at least `array` bytes have memory only where they are touched, by pages of 2 MiB, if a load leaves at
+// least `room` bytes of them empty (both small for tests). CUDA takes memory for pages by pieces of 128 MiB, so that a
+// load that leaves less would take more than all of its arrays.
+struct OnDemand {
+  std::size_t array = std::size_t{4} << 20;
+  std::size_t room = std::size_t{256} << 20;
+};
+
 struct KernelOptions {
   int rotation_method = kNewton;  // the fastest of those that fail on no hard case (accuracy.md, Rotations)
   SplitMethod split = SplitMethod::blocks;
   Path path = Path::graph;
   Capacity capacity;  // at load; a backend doubles it when it must (for tests)
-  // gpu: from so many bytes on an array has memory only where it is touched, by pages of 2 MiB (small for tests).
-  std::size_t on_demand = std::size_t{4} << 20;
+  OnDemand on_demand;
   // gpu, for tests: a byte that fills all memory before anything is put into it.
   std::optional<int> fill;
 };

@@ -77,6 +77,17 @@ Extents extents_of(const StagingBuffers& loaded, Capacity capacity) {
   return extents;
 }
 
+std::size_t empty_bytes(StagingBuffers& contents, std::size_t of_arrays) {
+  std::size_t sum = 0;
+  DeviceView view = contents.view();
+  contents.each(view, [&](const auto& array, const auto& vector, const auto& pointer) {
+    const auto extent = static_cast<std::size_t>(array.extent);
+    if (array.unset || vector.size() >= extent || extent * sizeof(*pointer) < of_arrays) return;
+    sum += (extent - vector.size()) * sizeof(*pointer);
+  });
+  return sum;
+}
+
 Extents in_use(const Extents& extents, const Counters& counters) {
   Extents used = extents;
   used.slot_capacity = counters.slots_used;

@@ -93,6 +93,8 @@ std::vector<State> extract_states(const StagingBuffers& staging, const std::vect
 Extents extents_of(const StagingBuffers& loaded, Capacity capacity);
 // What of these has been given out: as long is what a state is made from.
 Extents in_use(const Extents& extents, const Counters& counters);
+// How many bytes of arrays that are at least so long [bytes] a load puts nothing into.
+std::size_t empty_bytes(StagingBuffers& contents, std::size_t of_arrays);
 // Something is at least three quarters full, so the next load should have more capacity.
 bool wants_capacity(const Extents& extents, const Counters& counters);
 // Throws MachineError if a capacity was too small for a stage.

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "benchmarks/memory.h"
+#include "benchmarks/suites/suites.h"
 #include "tests/cli/program.h"
 
 namespace {
@@ -51,6 +52,23 @@ TEST_F(BenchScale, IteratesAsAskedFor) {
   EXPECT_EQ(rows[0].at("acceleration"), "chebyshev");
   EXPECT_EQ(rows[0].at("iterations"), 16);
   EXPECT_NE(outcome.output.find("4 × 16"), std::string::npos) << outcome.output;
+}
+
+TEST(Scale, ShowsTimesBeforeTheyAreJudged) {
+  cutproof::benchmarks::ScaleOptions options;
+  options.sizes = {1000};
+  options.acceleration = {"none"};
+  options.frames = 2;
+  options.repeats = 1;
+  std::vector<json> shown;
+  static_cast<void>(cutproof::benchmarks::run_scale(options, [&](const json& so_far) { shown.push_back(so_far); }));
+  ASSERT_EQ(shown.size(), 3U);
+  EXPECT_EQ(shown[1].at("judging"), true);
+  EXPECT_FALSE(shown[2].contains("judging"));
+  const json &timed = shown[1].at("rows").at(0), &judged = shown[2].at("rows").at(0);
+  EXPECT_EQ(timed.at("seconds"), judged.at("seconds"));
+  EXPECT_TRUE(timed.at("error").at("frame").is_null());
+  EXPECT_EQ(judged.at("error").at("frame").at("topology_holds"), true);
 }
 
 TEST(BytesInUse, CountWhatIsAllocated) {

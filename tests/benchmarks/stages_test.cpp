@@ -15,6 +15,7 @@
 #include "benchmarks/phase_counter.h"
 #include "benchmarks/scene.h"
 #include "benchmarks/stage_limits.h"
+#include "benchmarks/suites/suites.h"
 #include "benchmarks/times.h"
 #include "reference_cpu/reference.h"
 #include "tests/cli/program.h"
@@ -257,6 +258,41 @@ TEST_F(Bench, CooksBodiesOfGivenSizesAsAsked) {
   for (const char* words : {"(boxes)", "(sampled)", "particles in none"}) {
     EXPECT_NE(outcome.output.find(words), std::string::npos) << "no '" << words << "' in:\n" << outcome.output;
   }
+}
+
+// Judging a large body takes minutes: whoever stops it then has its times.
+TEST(Stages, ShowTheirTimesBeforeTheyAreJudged) {
+  cutproof::benchmarks::StagesOptions options;
+  options.sizes = {1000, 1155};
+  options.frames = 2;
+  options.repeats = 1;
+  std::vector<json> shown;
+  const json document = cutproof::benchmarks::run_stages(options, [&](const json& so_far) { shown.push_back(so_far); });
+  ASSERT_EQ(shown.size(), 5U);  // nothing yet; of each scene its times, and these with their errors
+  std::size_t rows_before = 0;
+  for (std::size_t scene = 0; scene < 2; ++scene) {
+    const json &timed = shown[1 + 2 * scene], &judged = shown[2 + 2 * scene];
+    EXPECT_EQ(timed.at("judging"), true);
+    EXPECT_FALSE(judged.contains("judging"));
+    EXPECT_EQ(timed.at("complete"), false);
+    EXPECT_EQ(timed.at("scenes").size(), scene + 1);
+    ASSERT_EQ(timed.at("rows").size(), judged.at("rows").size());
+    ASSERT_GT(timed.at("rows").size(), rows_before);
+    for (std::size_t k = 0; k < timed.at("rows").size(); ++k) {
+      const json &row = timed.at("rows")[k], &later = judged.at("rows")[k];
+      EXPECT_EQ(row.at("seconds"), later.at("seconds"));
+      if (k < rows_before) {
+        EXPECT_EQ(row, later);
+        continue;
+      }
+      EXPECT_TRUE(row.at("error").is_null());
+      EXPECT_EQ(row.at("error_text"), "not judged yet");
+      EXPECT_NE(later.at("error_text"), "not judged yet");
+    }
+    rows_before = timed.at("rows").size();
+  }
+  EXPECT_EQ(document.at("rows"), shown.back().at("rows"));
+  EXPECT_FALSE(document.contains("judging"));
 }
 
 TEST_F(Bench, RefusesBadUsage) {

@@ -399,8 +399,8 @@ class DeviceFailures : public testing::Test {
   }
 
   uint64_t seed_ = 0;
-  std::optional<std::size_t> on_demand_;  // as KernelOptions has it
-  std::vector<const char*> made_;         // all calls of what fail_each() lets fail
+  std::optional<OnDemand> on_demand_;  // as KernelOptions has it
+  std::vector<const char*> made_;      // all calls of what fail_each() lets fail
 };
 
 TEST_F(DeviceFailures, TheSceneMakesTheBackendEnlarge) {
@@ -439,7 +439,7 @@ TEST_F(DeviceFailures, ACallThatFailsInOneKernelLeavesNothing) {
 }
 
 TEST_F(DeviceFailures, ACallThatFailsWithMemoryOnDemandLeavesNothing) {
-  on_demand_ = 1;
+  on_demand_ = {1, 0};
   fail_each(Path::graph, Failing::once, 60);
   EXPECT_GT(std::count(made_.begin(), made_.end(), std::string("cudaMallocManaged")), 20);
   fail_each(Path::graph, Failing::for_good, 20);
@@ -473,7 +473,7 @@ TEST_F(DeviceFailures, ALargeBodyTakesMemoryWhereItIsNeeded) {
   scene.body.particles = 1'000'000;
   scene.clusters.side = 5;
   const fixtures::Built built = fixtures::build(scene, "the test's scene");
-  const auto bytes = [&](std::size_t on_demand) {
+  const auto bytes = [&](OnDemand on_demand) {
     KernelOptions with;
     with.on_demand = on_demand;
     const std::unique_ptr<Backend> backend = make_gpu_backend(with);
@@ -484,17 +484,12 @@ TEST_F(DeviceFailures, ALargeBodyTakesMemoryWhereItIsNeeded) {
     const int64_t taken = device_bytes_in_use() - before;
     return std::pair(taken, backend->snapshot().front());
   };
-  int64_t room = 0;  // of the large arrays beyond what a load puts into them
+  const OnDemand as_ever = KernelOptions{}.on_demand;
   StagingBuffers contents = make_contents({built.setup}, {built.state}, KernelOptions{}.rotation_method, {});
-  DeviceView view = contents.view();
-  contents.each(view, [&](const auto& array, const auto& vector, const auto& pointer) {
-    const auto extent = static_cast<std::size_t>(array.extent);
-    const bool large = extent * sizeof(*pointer) >= KernelOptions{}.on_demand;
-    if (large && !array.unset && vector.size() < extent) room += int64_t((extent - vector.size()) * sizeof(*pointer));
-  });
-  static_cast<void>(bytes(KernelOptions{}.on_demand));  // what CUDA takes once for all, with the first of a kind
-  const auto [lean, state] = bytes(KernelOptions{}.on_demand);
-  const auto [full, same] = bytes(std::size_t{1} << 60);
+  const auto room = static_cast<int64_t>(empty_bytes(contents, as_ever.array));
+  static_cast<void>(bytes(as_ever));  // what CUDA takes once for all, with the first of a kind
+  const auto [lean, state] = bytes(as_ever);
+  const auto [full, same] = bytes({as_ever.array, std::size_t{1} << 60});
   EXPECT_TRUE(state == same);
   const int64_t particles = built.setup.body.particle_count();
   const std::string found = fmt::format("{} bytes a particle, {} with all memory at once, of which {} are room",

@@ -68,7 +68,7 @@ Trace run_all(const Bodies& bodies, StagingBuffers staging, Before before) {
   const DeviceView view = staging.view();
   HostLauncher launcher;
   std::int64_t frames = 0;
-  for (const Setup& setup : bodies.setups) frames = std::max(frames, setup.frame_count());
+  for (const cutproof::Setup& setup : bodies.setups) frames = std::max(frames, setup.frame_count());
   Trace run;
   for (std::int64_t frame = 0; frame < frames; ++frame) {
     for (const Stage stage : kStages) {
@@ -101,6 +101,19 @@ TEST(Arrays, AreAsLongAsTheirExtentsSay) {
   EXPECT_GT(arrays, 50);
   EXPECT_EQ(view.bodies, 5);
   EXPECT_EQ(view.slot_capacity, staging.slot_capacity);
+}
+
+// Room for six vertices for each particle, and 64, of 16 bytes. A load makes none.
+TEST(Arrays, TellHowMuchOfThemALoadLeavesEmpty) {
+  const Bodies bodies = some_bodies(1, 5);
+  StagingBuffers contents = make_contents(bodies.setups, bodies.states, kNewton, Capacity{});
+  std::size_t particles = 0;
+  for (const cutproof::Setup& setup : bodies.setups) particles += static_cast<std::size_t>(setup.body.particle_count());
+  const std::size_t vertices = 16 * (6 * particles + 64);
+  EXPECT_EQ(empty_bytes(contents, vertices) - empty_bytes(contents, vertices + 1), vertices);
+  EXPECT_GT(empty_bytes(contents, 0), empty_bytes(contents, vertices));
+  contents.allocate();
+  EXPECT_EQ(empty_bytes(contents, 0), 0U);
 }
 
 TEST(Arrays, OfScratchMemoryAreNothingThatAStageReliesOn) {
