@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Draws what configurations cost against their error, from the JSON of `cutproof tune --full`.
 
-Usage: docs/images/tune_curve.py TUNE.json -o F.svg
+Usage: docs/images/tune_curve.py TUNE.json [--before OLDER.json] -o F.svg
 """
 import argparse
 import json
@@ -31,9 +31,11 @@ def front_of(points):
     return front
 
 
-def picture(document):
+def picture(document, before=None):
     points = points_of(document)
-    xs, ys = [p[0] for p in points], [p[1] for p in points] + [document["tolerance_h"]]
+    front_before = front_of(points_of(before)) if before else []
+    xs = [p[0] for p in points + front_before]
+    ys = [p[1] for p in points + front_before] + [document["tolerance_h"]]
     # Half decades: a whole one leaves the picture empty.
     x0, x1 = math.floor(2 * math.log10(min(xs))) / 2, math.ceil(2 * math.log10(max(xs))) / 2
     y0, y1 = math.floor(2 * math.log10(min(ys))) / 2, math.ceil(2 * math.log10(max(ys))) / 2
@@ -49,8 +51,9 @@ def picture(document):
     axes.tolerance(document["tolerance_h"])
     axes.text(right + 6, py(document["tolerance_h"]) + 4, f"tolerance {document['tolerance_h']:g} h")
 
-    corners = " ".join(f"{px(x):.1f},{py(y):.1f}" for x, y, _ in front_of(points))
-    parts.append(f'<polyline points="{corners}" fill="none" stroke="#999" stroke-width="1.5"/>')
+    for front, dashes in [(front_before, 'stroke-dasharray="5 3"'), (front_of(points), "")]:
+        corners = " ".join(f"{px(x):.1f},{py(y):.1f}" for x, y, _ in front)
+        parts.append(f'<polyline points="{corners}" fill="none" stroke="#999" stroke-width="1.5" {dashes}/>')
     for x, y, trial in points:
         colour = PLAIN if trial["acceleration"] == "none" else ACCELERATED
         fill = "white" if trial["outcome"] == "topology" else colour
@@ -70,6 +73,9 @@ def picture(document):
         axes.text(right + 24, y + 4, what)
     axes.text(right + 8, TOP + 14 + 60, "grey: none is both")
     axes.text(right + 8, TOP + 14 + 76, "cheaper and nearer")
+    if before:
+        axes.text(right + 8, axes.bottom - 20, "dashed: the grey line")
+        axes.text(right + 8, axes.bottom - 4, f"at {before['commit']}")
     return axes.svg()
 
 
@@ -82,14 +88,17 @@ def title_of(document):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("json")
+    parser.add_argument("--before", help="of an older state, of which the front is drawn too")
     parser.add_argument("-o", "--output", required=True)
     arguments = parser.parse_args()
-    with open(arguments.json, encoding="utf-8") as file:
-        document = json.load(file)
-    if not points_of(document):
-        parser.error(f"{arguments.json}: nothing in it was carried through")
+    documents = []
+    for path in filter(None, [arguments.json, arguments.before]):
+        with open(path, encoding="utf-8") as file:
+            documents.append(json.load(file))
+        if not points_of(documents[-1]):
+            parser.error(f"{path}: nothing in it was carried through")
     with open(arguments.output, "w", encoding="utf-8") as file:
-        file.write(picture(document))
+        file.write(picture(*documents))
 
 
 if __name__ == "__main__":
