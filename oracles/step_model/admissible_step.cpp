@@ -4,11 +4,14 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <future>
 #include <initializer_list>
 #include <limits>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <set>
+#include <thread>
 
 #include "model/at.h"
 #include "oracles/best_rotation.h"
@@ -30,6 +33,9 @@ constexpr double kNotShared = 0.125;
 // them a right answer may be.
 constexpr uint64_t kDisturbedRuns = 8, kMostDisturbedRuns = 48;
 constexpr double kBeyondRuns = 8;
+// Of bodies whose runs cost more than this [evaluations] several go at the same time, where there are processors for
+// them: at most as many as are always made, each of which has some 300 bytes for each particle.
+constexpr int64_t kLongRun = 2'000'000;
 // Beyond this the way from a rounding to what it does is no longer straight [h].
 constexpr double kSmall = 1e-3;
 // What is decided by more than this is decided whatever rounds [h].
@@ -342,9 +348,13 @@ class Search {
       leads[key] = d.lead;
       spread[key] = 0;
     }
-    for (uint64_t run = 1; run <= runs; ++run) {
+    std::mutex of_all_runs;
+    const auto look_at = [&](uint64_t run) {
       const StepOutcome off = model_.run({as_taken, run, 2 * kNear * h_, branch.given});
-      grown.combine(off_by(off, branch.outcome), kGreater);
+      const Bounds apart_now = off_by(off, branch.outcome);
+      // The greatest of all is the same whichever comes first.
+      const std::lock_guard<std::mutex> lock(of_all_runs);
+      grown.combine(apart_now, kGreater);
       for (std::size_t c = 0; c < m; ++c) {
         if (branch.outcome.is_free[c] == 0) continue;
         direction[c] = std::max(direction[c], off_agreed(branch.outcome.shape[c], off.rotation[c]));
@@ -355,7 +365,16 @@ class Search {
         double& s = spread[known->first];
         s = std::max(s, std::abs(d.lead - known->second));
       }
-    }
+    };
+    const bool is_long = model_.evaluations() > kLongRun;
+    const uint64_t at_once = is_long ? std::clamp<uint64_t>(std::thread::hardware_concurrency(), 1, kDisturbedRuns) : 1;
+    const auto every = [&](uint64_t first) {
+      for (uint64_t run = first; run <= runs; run += at_once) look_at(run);
+    };
+    std::vector<std::future<void>> others;
+    for (uint64_t first = 2; first <= at_once; ++first) others.push_back(std::async(every, first));
+    every(1);
+    for (std::future<void>& other : others) other.get();
     Bounds& b = branch.bounds;
     b.combine(grown, [](double, double farthest) { return kBeyondRuns * farthest; });
     branch.direction = std::move(direction);

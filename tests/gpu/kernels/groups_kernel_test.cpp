@@ -18,6 +18,7 @@
 #include "model/at.h"
 #include "property_tests/cases.h"
 #include "property_tests/random.h"
+#include "reference_cpu/reference.h"
 
 namespace cutproof::gpu {
 namespace {
@@ -898,4 +899,27 @@ TEST(Groups, GiveWhatTheirParticlesAloneGive) {
 }
 
 }  // namespace
+// Two layers between a floor and a ceiling that are nearer than they are: nothing is carried, everything is pushed.
+TEST(Groups, AreAllResolvedWhereEverythingTouches) {
+  for (const Acceleration acceleration : {Acceleration::none, Acceleration::chebyshev}) {
+    cutproof::Setup setup = block_on_floor(0);
+    setup.body = fixtures::block(31, 31, 2, 0.01);
+    setup.walls = {{2, +1, 0.0101, 0.3}, {2, -1, 0.0199, 0.3}};
+    setup.step.acceleration = acceleration;
+    State state = cooked(setup);
+    for (Vec3& v : state.v) v = {0.1, -0.05, 0};
+    const Stepped found = step(setup, state);
+    ASSERT_GT(found.touched.size(), 20U);
+    for (const int touched : found.touched) EXPECT_EQ(touched, 1);
+    const Stepped apart = step(without_groups(setup), state);
+    State reference = state;
+    cutproof::reference::step(setup, reference);
+    for (std::size_t i = 0; i < state.x.size(); ++i) {
+      EXPECT_LE(norm(found.state.x[i] - apart.state.x[i]), 2e-6 * 0.01);
+      EXPECT_LE(norm(found.state.x[i] - reference.x[i]), 1e-4 * 0.01);
+    }
+    EXPECT_GT(norm(reference.impulse), 0);
+  }
+}
+
 }  // namespace cutproof::gpu
