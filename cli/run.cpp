@@ -87,8 +87,9 @@ void print_header(const Scene& scene, const fixtures::Built& built, const RunOpt
   fmt::print("body {}, {:.4g} × {:.4g} × {:.4g} mm, {} particles at h = {:.4g} mm, {} clusters\n", body.name, size.x,
              size.y, size.z, body.particle_count(), body.grid.spacing * 1e3, built.state.clusters.count());
   if (!options.mesh.empty()) fmt::print("one unit of the mesh is 1 {} (--unit changes that)\n", options.unit);
-  fmt::print("{} frames of {} substeps × {} iterations, backend {}, seed {}\n", built.setup.frame_count(),
-             built.setup.step.substeps, built.setup.step.iterations, options.backend.name, scene.seed);
+  const int32_t substeps = built.setup.step.substeps;
+  fmt::print("{} frames of {} substep{} × {} iterations, backend {}, seed {}\n", built.setup.frame_count(), substeps,
+             substeps == 1 ? "" : "s", built.setup.step.iterations, options.backend.name, scene.seed);
 }
 
 void print_summary(const RunResult& result) {

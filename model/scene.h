@@ -115,6 +115,10 @@ struct Expectations {
 // Of the format. What a scene leaves out is as it was when its version was new: in version 1 the plain iteration.
 inline constexpr int32_t kSceneVersion = 2;
 
+// How often the scene's frames detect. substep: each frame is laid out as as many frames of one substep, in all of
+// which every stage runs: what a blade has parted goes at the end of that substep, and not of up to S of them.
+enum class DetectEvery { frame, substep };
+
 struct Scene {
   int32_t version = kSceneVersion;
   std::string name;
@@ -127,6 +131,7 @@ struct Scene {
   double settle = 0;            // [s] after the last stroke
   StepParameters step = {.acceleration = Acceleration::chebyshev};
   DetectParameters detect;
+  DetectEvery detect_every = DetectEvery::frame;
   SplitParameters split;
   MergeParameters merge;
   ExpandParameters expand;
@@ -143,9 +148,11 @@ inline constexpr std::array<std::string_view, 6> kShapeNames = {"box",   "ball",
                                                                 "liver", "union", "difference"};
 inline constexpr std::array<std::string_view, 2> kCookingNames = {"boxes", "sampled"};
 inline constexpr std::array<std::string_view, 2> kCurveNames = {"line", "arc"};
+inline constexpr std::array<std::string_view, 2> kDetectEveryNames = {"frame", "substep"};
 
 constexpr std::span<const std::string_view> names_of(Shape::Kind) { return kShapeNames; }
 constexpr std::span<const std::string_view> names_of(Cooking) { return kCookingNames; }
 constexpr std::span<const std::string_view> names_of(Curve) { return kCurveNames; }
+constexpr std::span<const std::string_view> names_of(DetectEvery) { return kDetectEveryNames; }
 
 }  // namespace cutproof

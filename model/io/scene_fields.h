@@ -55,11 +55,15 @@ struct Ground {
   double friction = 0;
 };
 
-// An object of its own in the file.
+// Objects of their own in the file.
 struct FrameFields {
   double& length;
   int64_t& count;
   double& settle;
+};
+struct DetectFields {
+  DetectParameters& parameters;
+  DetectEvery& every;
 };
 
 void describe(auto& v, Shape& s) {
@@ -153,6 +157,14 @@ void describe(auto& v, DetectParameters& s) {
            above(0, 1e6, "h")});
   v.field(s.strain, {"strain", "`strain` only: greatest principal stretch that is not yet a cut.", above(0, 1e6)});
   v.field(s.without_blade, {"without_blade", "Whether a scene without a blade launches detection too."});
+}
+
+void describe(auto& v, DetectFields& s) {
+  describe(v, s.parameters);
+  v.field(s.every, {"every",
+                    "`frame`: detection, and all stages behind it, run once a frame, as in the paper; `substep`: after "
+                    "each substep. A frame is then laid out as `step.substeps` frames of one substep, and counts as so "
+                    "many."});
 }
 
 void describe(auto& v, SplitParameters& s) {
@@ -278,7 +290,8 @@ void describe(auto& v, Scene& s) {
   FrameFields frame{s.frame_length, s.frames, s.settle};
   v.field(frame, {"frame", "How time is divided."});
   v.field(s.step, {"step", "The stage that moves particles."});
-  v.field(s.detect, {"detect", "The stage that decides which particles are removed."});
+  DetectFields detect{s.detect, s.detect_every};
+  v.field(detect, {"detect", "The stage that decides which particles are removed."});
   v.field(s.split, {"split", "The stage that takes clusters apart."});
   v.field(s.merge, {"merge", "The stage that joins small clusters."});
   v.field(s.expand, {"expand", "The stage that keeps connected tissue coupled."});

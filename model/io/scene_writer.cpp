@@ -208,7 +208,8 @@ Time is divided into frames of `frame.length`, and these into `step.substeps`. W
 `geometric`), a frame in which the blade would be too fast for its own thickness is divided into the least number of
 equal shorter frames in which, per substep, no corner of the blade moves by more than
 1.001 · max(thickness, epsilon · h) / 2, and none moves, by turning, by more than half of the shorter of length and
-depth (method.md §3, Blade).
+depth (method.md §3, Blade). With `detect.every` = `substep` each of these frames is laid out as as many frames of one
+substep.
 )";
 
 }  // namespace

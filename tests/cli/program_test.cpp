@@ -201,6 +201,42 @@ bool has_note(const json& document, const std::string& words) {
   return false;
 }
 
+// A block that is pulled apart by its ends: what goes too far apart goes in the substep in which it does.
+TEST_F(Program, DetectsInEverySubstepIfTheSceneSaysSo) {
+  json scene = json::parse(R"({"version": 2, "name": "torn",
+    "body": {"shape": {"kind": "box", "size": [0.12, 0.04, 0.04]}, "spacing": 0.01},
+    "frame": {"count": 12}, "step": {"substeps": 4}, "detect": {"without_blade": true},
+    "grips": [{"low": [0, 0, 0], "high": [0.2, 1, 1], "velocity": [-0.15, 0, 0]},
+              {"low": [0.8, 0, 0], "high": [1, 1, 1], "velocity": [0.15, 0, 0]}]})");
+  std::map<std::string, int> first;  // the end of the frame in which tissue first goes, by how often [substeps]
+  for (const std::string every : {"frame", "substep"}) {
+    scene["detect"]["every"] = every;
+    write("torn.json", scene.dump());
+    for (const std::string backend : {"reference", "host"}) {
+      SCOPED_TRACE(every + " on " + backend);
+      const Outcome outcome = cutproof("run torn.json --check --json out.json --backend " + backend);
+      EXPECT_EQ(outcome.status, 0) << outcome.output;
+      const bool each = every == "substep";
+      EXPECT_NE(outcome.output.find(each ? "48 frames of 1 substep ×" : "12 frames of 4 substeps ×"), std::string::npos)
+          << outcome.output;
+      const json frames = json::parse(read("out.json")).at("frames");
+      ASSERT_EQ(frames.size(), each ? 48U : 12U);
+      int substeps = 0, found = 0;
+      for (const json& frame : frames) {
+        substeps += each ? 1 : 4;
+        if (found == 0 && frame.at("removed") > 0) found = substeps;
+      }
+      ASSERT_GT(found, 0) << "nothing was torn";
+      if (backend == "host") {
+        EXPECT_EQ(first.at(every), found);
+      }
+      first[every] = found;
+    }
+  }
+  EXPECT_LT(first["substep"], first["frame"]);
+  EXPECT_GT(first["substep"], first["frame"] - 4);
+}
+
 TEST_F(Program, CheckGivesTheVerdictsThatTheRunGave) {
   for (const std::string name : {"three_cuts", "uniform_stretch_strain"}) {
     const Outcome run = cutproof("run " + scene(name) + " --check --json run.json --record recording");
