@@ -35,7 +35,7 @@ constexpr uint64_t kDisturbedRuns = 8, kMostDisturbedRuns = 48;
 constexpr double kBeyondRuns = 8;
 // Of bodies whose runs cost more than this [evaluations] several go at the same time, where there are processors for
 // them: at most as many as are always made, each of which has some 300 bytes for each particle.
-constexpr int64_t kLongRun = 2'000'000;
+constexpr int64_t kLongRun = 500'000;
 // Beyond this the way from a rounding to what it does is no longer straight [h].
 constexpr double kSmall = 1e-3;
 // What is decided by more than this is decided whatever rounds [h].
@@ -125,7 +125,9 @@ struct CoupledSet {
 class Search {
  public:
   // `of_all`: of the whole body; else of one coupled set, of which nobody has stated the impulse.
-  Search(const Setup& setup, const State& before, const State& after, Rotations rotations, bool of_all = true)
+  // `at_once`: as nearest_admissible_step() has it.
+  Search(const Setup& setup, const State& before, const State& after, Rotations rotations, int at_once,
+         bool of_all = true)
       : setup_(setup),
         before_(before),
         after_(after),
@@ -147,6 +149,10 @@ class Search {
     coupled_ = components_of_coupling(TissueGraph(setup.body, before.alive), before.clusters);
     const int64_t of_an_outcome = (kDisturbedRuns + 1) * std::max<int64_t>(1, model_.evaluations());
     most_outcomes_ = static_cast<int>(std::clamp<int64_t>(kMostEvaluations / of_an_outcome, 16, kMostOutcomes));
+    at_once_ = at_once > 0 ? static_cast<uint64_t>(at_once)
+               : model_.evaluations() <= kLongRun
+                   ? 1
+                   : std::clamp<uint64_t>(std::thread::hardware_concurrency(), 1, kDisturbedRuns);
   }
 
   AdmissibleStep find() {
@@ -207,7 +213,7 @@ class Search {
     Apart apart;
     for (const int32_t set : sets) {
       const CoupledSet alone(before_, after_, coupled_, set);
-      Search search(setup_, alone.before, alone.after, rotations_, false);
+      Search search(setup_, alone.before, alone.after, rotations_, static_cast<int>(at_once_), false);
       Branch found = search.looked_at({});
       if (!found.holds() && !found.ties.empty()) found = search.explain(std::move(found));
       for (const auto& [key_alone, outcome] : found.settled) {
@@ -366,13 +372,11 @@ class Search {
         s = std::max(s, std::abs(d.lead - known->second));
       }
     };
-    const bool is_long = model_.evaluations() > kLongRun;
-    const uint64_t at_once = is_long ? std::clamp<uint64_t>(std::thread::hardware_concurrency(), 1, kDisturbedRuns) : 1;
     const auto every = [&](uint64_t first) {
-      for (uint64_t run = first; run <= runs; run += at_once) look_at(run);
+      for (uint64_t run = first; run <= runs; run += at_once_) look_at(run);
     };
     std::vector<std::future<void>> others;
-    for (uint64_t first = 2; first <= at_once; ++first) others.push_back(std::async(every, first));
+    for (uint64_t first = 2; first <= at_once_; ++first) others.push_back(std::async(every, first));
     every(1);
     for (std::future<void>& other : others) other.get();
     Bounds& b = branch.bounds;
@@ -886,13 +890,14 @@ class Search {
   std::vector<double> reach_;     // [m] greatest |X - T|
   Partition coupled_;
   int most_outcomes_ = kMostOutcomes;
+  uint64_t at_once_ = 1;  // disturbed runs
 };
 
 }  // namespace
 
-AdmissibleStep nearest_admissible_step(const Setup& setup, const State& before, const State& after,
-                                       Rotations rotations) {
-  return Search(setup, before, after, rotations).find();
+AdmissibleStep nearest_admissible_step(const Setup& setup, const State& before, const State& after, Rotations rotations,
+                                       int at_once) {
+  return Search(setup, before, after, rotations, at_once).find();
 }
 
 }  // namespace cutproof::oracles

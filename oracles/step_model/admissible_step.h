@@ -45,9 +45,10 @@ struct AdmissibleStep {
 // changed, nobody knows them: then none is judged, and each counts as undecided.
 enum class Rotations { stated, unknown };
 
-// `before` and `after`: well formed, of the same clusters; `before` finite, its schedule not over.
+// `before` and `after`: well formed, of the same clusters; `before` finite, its schedule not over. `at_once`: threads
+// for disturbed runs; 0: one, or where runs are long one for each processor. The answer is the same with any number.
 AdmissibleStep nearest_admissible_step(const Setup& setup, const State& before, const State& after,
-                                       Rotations rotations = Rotations::stated);
+                                       Rotations rotations = Rotations::stated, int at_once = 0);
 
 // The same with its verdict, of any two well-formed states; without the step where none can be computed.
 struct StepAgain {
