@@ -52,10 +52,8 @@ Measured measure(const Contender& contender, const BenchScene& scene, int64_t fr
   const std::optional<int64_t> after = bytes_in_use(*contender.described);
   if (before && after && *after > *before) measured.bytes = *after - *before;
   const auto begin = Clock::now();
-  measured.to_be_judged = scene.setup.body.particle_count() <= kMostJudgedParticles;
-  if (measured.to_be_judged) {
+  if (scene.setup.body.particle_count() <= kMostJudgedParticles) {
     if (timed) timed(measured);
-    measured.to_be_judged = false;
     const bool expands = measured.timings.stage[at(Stage::expand)].count > 0;
     measured.added = expands ? count_added_memberships(backend, scene, frames) : 0;
     measured.judged = judge_frames(backend, scene.setup);

@@ -22,10 +22,9 @@ struct Measured {
   int64_t added = 0;                  // memberships, by expansion in the timed frames
   std::optional<int64_t> bytes;       // that a new backend keeps after these; absent where nobody can tell
   double judge_seconds = 0;
-  bool to_be_judged = false;  // what was timed is judged next
   bool holds() const { return !judged || judged->topology_holds(); }
 };
-// timed: called between timing and judging, which takes minutes for a large body.
+// timed: called between timing and judging, which takes minutes for a large body; not if nothing is judged.
 using WhenTimed = std::function<void(const Measured& times)>;
 Measured measure(const Contender& contender, const BenchScene& scene, int64_t frames, int64_t repeats,
                  const WhenTimed& timed = {});

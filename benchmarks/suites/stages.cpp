@@ -92,9 +92,10 @@ std::map<std::string, StageLimit> limits_of(const BenchScene& scene, const Conte
   return limits;
 }
 
-// A row for whole frames and for each stage: its time, its error, and its limit.
+// A row for whole frames and for each stage: its time, its error, and its limit. unjudged: what stands for the error of
+// what has not been judged.
 void add_rows(const BenchScene& scene, const Contender& contender, const Measured& measured,
-              const MachineLimits& machine, json& document) {
+              const MachineLimits& machine, json& document, const char* unjudged = "not measured") {
   const std::map<std::string, StageLimit> limits = limits_of(scene, contender);
   const PaperScene* const known = find_paper_scene(scene.name);
   for (const auto& [what, times] : measured.timings.named()) {
@@ -108,9 +109,7 @@ void add_rows(const BenchScene& scene, const Contender& contender, const Measure
     row["paper_seconds"] = nullptr;
     if (const auto ms = known == nullptr ? std::nullopt : known->paper_ms(what)) row["paper_seconds"] = 1e-3 * *ms;
     row["error"] = error;
-    row["error_text"] = in_words(error, measured.judged         ? "did not run"
-                                        : measured.to_be_judged ? "not judged yet"
-                                                                : "not measured");
+    row["error_text"] = in_words(error, measured.judged ? "did not run" : unjudged);
     row["limit"] = nullptr;
     if (const auto found = limits.find(what); found != limits.end() && times.count > 0) {
       row["limit"] = limit_json(found->second, machine, times.median);
@@ -152,7 +151,7 @@ json run_stages(const StagesOptions& options, const Progress& progress) {
         };
         const Measured measured = measure(contender, scene, frames, options.repeats, [&](const Measured& times) {
           json so_far = report.document;
-          add_rows(scene, contender, times, machine, so_far);
+          add_rows(scene, contender, times, machine, so_far, "not judged yet");
           so_far["scenes"].push_back(entry_of(times));
           report.show_timed(std::move(so_far));
         });

@@ -34,8 +34,8 @@ constexpr double kNotShared = 0.125;
 constexpr uint64_t kDisturbedRuns = 8, kMostDisturbedRuns = 48;
 constexpr double kBeyondRuns = 8;
 // Of bodies whose runs cost more than this [evaluations] several go at the same time, where there are processors for
-// them: at most as many as are always made, each of which has some 300 bytes for each particle.
-constexpr int64_t kLongRun = 500'000;
+// them: at most as many as are always made, since each takes some hundred bytes for each particle.
+constexpr int64_t kLongRun = 2'000'000;
 // Beyond this the way from a rounding to what it does is no longer straight [h].
 constexpr double kSmall = 1e-3;
 // What is decided by more than this is decided whatever rounds [h].

@@ -898,7 +898,6 @@ TEST(Groups, GiveWhatTheirParticlesAloneGive) {
   EXPECT_GT(held, 20);
 }
 
-}  // namespace
 // Two layers between a floor and a ceiling that are nearer than they are: nothing is carried, everything is pushed.
 TEST(Groups, AreAllResolvedWhereEverythingTouches) {
   for (const Acceleration acceleration : {Acceleration::none, Acceleration::chebyshev}) {
@@ -922,4 +921,5 @@ TEST(Groups, AreAllResolvedWhereEverythingTouches) {
   }
 }
 
+}  // namespace
 }  // namespace cutproof::gpu

@@ -68,7 +68,7 @@ Trace run_all(const Bodies& bodies, StagingBuffers staging, Before before) {
   const DeviceView view = staging.view();
   HostLauncher launcher;
   std::int64_t frames = 0;
-  for (const cutproof::Setup& setup : bodies.setups) frames = std::max(frames, setup.frame_count());
+  for (const Setup& setup : bodies.setups) frames = std::max(frames, setup.frame_count());
   Trace run;
   for (std::int64_t frame = 0; frame < frames; ++frame) {
     for (const Stage stage : kStages) {
