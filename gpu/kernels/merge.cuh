@@ -388,7 +388,7 @@ CUTPROOF_DEVICE inline OwnerChain chain_of(const DeviceView& w, int s) {
 // Owners and owned form chains and cycles, each of which becomes one cluster, above the cap or not.
 template <class Block>
 CUTPROOF_DEVICE void merge_chains_kernel(Block& block, DeviceView w) {
-  int* place = block.template shared<int>(1);
+  int* place = block.template shared<int>(2);  // and how many of them
   for (int job = block.index(); job < w.counters->small; job += block.count()) {
     if (w.body[w.slot_body[w.small_clusters[job]]].merge_rule != MergeRule::single_pass) continue;
     const auto [end, first] = chain_of(w, w.small_clusters[job]);
@@ -397,10 +397,11 @@ CUTPROOF_DEVICE void merge_chains_kernel(Block& block, DeviceView w) {
     if (block.thread() == 0) {
       int needed = w.slot_size[end];
       for (int s = first; is_source(s); s = w.best[s]) needed += w.slot_size[s];
-      *place = reserve_members(block, w, needed);
+      place[0] = reserve_members(block, w, needed);
+      place[1] = needed;
     }
     block.sync();
-    const int begin = *place;
+    const int begin = place[0], places = place[1];
     block.sync();  // everyone has read it
     if (begin < 0) continue;
 
@@ -418,6 +419,8 @@ CUTPROOF_DEVICE void merge_chains_kernel(Block& block, DeviceView w) {
     if (united == w.label + begin) {
       for (int k = block.thread(); k < size; k += block.size()) w.members[begin + k] = w.label[begin + k];
     }
+    // Who was in several of them has one place: the others are read by nobody but a snapshot, which copies all.
+    for (int k = size + block.thread(); k < places; k += block.size()) w.members[begin + k] = -1;
     block.sync();
     if (block.thread() != 0) continue;
     for (int s = first; is_source(s); s = w.best[s]) w.slot_size[s] = 0;
