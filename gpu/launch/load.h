@@ -48,7 +48,8 @@ struct Load {
   // Throws what make_contents throws.
   Load(std::vector<Setup> bodies, const std::vector<State>& states, const KernelOptions& options, Capacity with);
 
-  // The same bodies, now in these states, with twice the capacity. Leaves this load without its setups.
+  // The same bodies, now in these states, which are what `staging` holds, with twice the capacity. Leaves this load
+  // without its setups.
   Load enlarged(const std::vector<State>& states, const KernelOptions& options);
   // To be called before a skin stage.
   void forget_skins() { skins.assign(setups.size(), std::nullopt); }

@@ -13,6 +13,7 @@
 
 #include "gpu/host/host_launcher.h"
 #include "gpu/launch/frame.h"
+#include "gpu/launch/load.h"
 #include "gpu/state/staging.h"
 #include "model/stage.h"
 #include "property_tests/cases.h"
@@ -114,6 +115,32 @@ TEST(Arrays, TellHowMuchOfThemALoadLeavesEmpty) {
   EXPECT_GT(empty_bytes(contents, 0), empty_bytes(contents, vertices));
   contents.allocate();
   EXPECT_EQ(empty_bytes(contents, 0), 0U);
+}
+
+// A backend that enlarges its arrays between two stages changes nothing: not even the last bit of an impulse, of which
+// a state has the sum alone.
+TEST(Arrays, ThatAreEnlargedHoldWhatTheyHeld) {
+  property_tests::Random random(3);
+  int pushed = 0;
+  for (int k = 0; k < 40; ++k) {
+    auto [setup, state] = property_tests::instance_of(property_tests::draw_moving_case(random.seed(), 40));
+    Load load({setup}, {state}, KernelOptions{}, Capacity{});
+    load.staging.allocate();
+    HostLauncher launcher;
+    for (int64_t frame = 0; frame < std::min<int64_t>(setup.frame_count(), 6); ++frame) {
+      enqueue_span(launcher, load.staging.view(), load.plan, Span{Stage::step, Stage::split}, [](Stage) {});
+      const std::vector<State> before = load.states_of({true});
+      Load larger = load.enlarged(before, KernelOptions{});
+      const std::vector<State> after = larger.states_of({true});
+      ASSERT_EQ(after.front().impulse, before.front().impulse);
+      ASSERT_TRUE(after == before);
+      pushed += !(before.front().impulse == Vec3{});
+      load = std::move(larger);
+      load.staging.allocate();
+      enqueue_span(launcher, load.staging.view(), load.plan, Span{Stage::merge, Stage::skin}, [](Stage) {});
+    }
+  }
+  EXPECT_GT(pushed, 20);
 }
 
 TEST(Arrays, OfScratchMemoryAreNothingThatAStageReliesOn) {
