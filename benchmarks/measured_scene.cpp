@@ -109,6 +109,7 @@ json run_fields(const BenchScene& scene, const Contender& contender) {
           {"substeps", setup.step.substeps},
           {"iterations", setup.step.iterations},
           {"acceleration", name_of(setup.step.acceleration)},
+          {"remove", name_of(setup.detect.remove)},
           {"rotation", contender.rotation},
           {"split", contender.split}};
 }
@@ -140,6 +141,20 @@ std::vector<StepParameters> steps_of(const TimingOptions& options, const StepPar
     steps.push_back(step);
   }
   return steps;
+}
+
+DetectParameters detection_of(const TimingOptions& options, const DetectParameters& own) {
+  DetectParameters detect = own;
+  if (options.remove.empty()) return detect;
+  const auto known = choice_named<RemovedEnds>(options.remove);
+  require_option(known.has_value(), "--remove", fmt::format("there is no '{}' of the ends of an edge", options.remove),
+                 fmt::format("use {}", fmt::join(names_of(RemovedEnds{}), " or ")));
+  require_option(
+      *known == RemovedEnds::both || own.criterion == Criterion::distance, "--remove",
+      fmt::format("the criterion of a scene is {}, which asks particles, and not edges", name_of(own.criterion)),
+      "leave it out, or leave that scene out with --scenes");
+  detect.remove = *known;
+  return detect;
 }
 
 }  // namespace cutproof::benchmarks

@@ -48,11 +48,15 @@ struct TimingOptions {
   // How the step iterates: each of these in turn. Empty, absent: as the scene says.
   std::vector<std::string> acceleration;
   std::optional<int32_t> iterations;
+  std::string remove;  // which ends of an edge that is too long go; empty: as the scene says
   const harness::BackendDescriptor& described() const { return harness::described_backend(backend); }
   int64_t frames_or_default() const { return frames.value_or(described().timed_frames); }
 };
 
 // The steps that are to be timed of a scene whose own is this. Throws InputError, naming the option.
 std::vector<StepParameters> steps_of(const TimingOptions& options, const StepParameters& own);
+
+// How detection is to be timed, likewise.
+DetectParameters detection_of(const TimingOptions& options, const DetectParameters& own);
 
 }  // namespace cutproof::benchmarks

@@ -78,6 +78,9 @@ void add_timing(CLI::App& command, benchmarks::TimingOptions& options) {
            "A");
   add_count(command, "--iterations", options.iterations, "of a substep, instead of the scene's",
             CLI::Range(1, 1'000'000));
+  command
+      .add_option("--remove", options.remove, "ends of an edge that is too long: both or one, instead of the scene's")
+      ->type_name("E");
 }
 
 void print_scene(const nlohmann::json& document) {

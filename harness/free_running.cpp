@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "model/at.h"
@@ -17,16 +18,44 @@ namespace {
 // Rounding of a neighbour distance, in units of u h.
 constexpr double kDistanceBand = 64;
 
-// By how much the longest edge of a particle, among neighbours alive in `state`, is longer than allowed (method.md §4)
-// [h].
-double excess_of(const Setup& setup, const State& state, int32_t particle) {
-  double greatest = -setup.detect.epsilon * setup.body.grid.spacing;  // without neighbours nothing is long
+// By how much an edge is longer than allowed (method.md §4) [h].
+double excess_of(const Setup& setup, const State& state, int32_t a, int32_t b) {
+  const double limit = setup.detect.epsilon * setup.body.rest_length(a, b);
+  return (norm(state.x[at(a)] - state.x[at(b)]) - limit) / setup.body.grid.spacing;
+}
+
+// visit(end) for the edges of a particle to what is alive.
+template <class Visit>
+void for_edges(const Setup& setup, const State& state, int32_t particle, const Visit& visit) {
   for (const int32_t other : setup.body.neighbours(particle)) {
-    if (!state.alive[at(other)]) continue;
-    const double limit = setup.detect.epsilon * setup.body.rest_length(particle, other);
-    greatest = std::max(greatest, norm(state.x[at(particle)] - state.x[at(other)]) - limit);
+    if (state.alive[at(other)]) visit(other);
   }
-  return greatest / setup.body.grid.spacing;
+}
+
+// How far the particle's removal is from being another one [h]: if both ends go, by how much its longest edge is longer
+// than allowed. If one does, whether any of its edges or of those of its neighbours is open counts, and on which side
+// of a lowered blade's plane they are: the least of these distances.
+double margin_of(const Setup& setup, const State& state, int32_t particle) {
+  if (setup.detect.remove == RemovedEnds::both) {
+    double greatest = -setup.detect.epsilon;  // without neighbours nothing is long
+    for_edges(setup, state, particle,
+              [&](int32_t other) { greatest = std::max(greatest, excess_of(setup, state, particle, other)); });
+    return std::abs(greatest);
+  }
+  double least = std::numeric_limits<double>::infinity();
+  const auto note = [&](double distance) { least = std::min(least, std::abs(distance)); };
+  std::vector<int32_t> near = {particle};
+  for_edges(setup, state, particle, [&](int32_t other) { near.push_back(other); });
+  for (const int32_t i : near) {
+    for_edges(setup, state, i, [&](int32_t other) { note(excess_of(setup, state, i, other)); });
+  }
+  for (int64_t s = 0; setup.has_blade && s < setup.step.substeps; ++s) {
+    const BladeMove& move = setup.blade_moves[at(state.frame * setup.step.substeps + s)];
+    if (!move.down) continue;
+    const Vec3 normal = cross(move.to.along, move.to.back);
+    for (const int32_t i : near) note(dot(state.x[at(i)] - move.to.edge, normal) / setup.body.grid.spacing);
+  }
+  return least;
 }
 
 }  // namespace
@@ -74,7 +103,7 @@ void FreeRunning::see(Stage stage, const State& after) {
         State present = expected;
         for (const int32_t i : expected.removed) present.alive[at(i)] = 1;
         double margin = 0;
-        for (const int32_t i : undecided) margin = std::max(margin, std::abs(excess_of(setup_, present, i)));
+        for (const int32_t i : undecided) margin = std::max(margin, margin_of(setup_, present, i));
         first.margin = margin;
         // Each end of an edge is off by at most the greatest error, so the edge's length by at most twice that.
         first.reach = 2 * frames_.back().position.max + kDistanceBand * unit_roundoff(after);

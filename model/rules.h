@@ -16,6 +16,7 @@ namespace cutproof {
 inline constexpr std::array<std::string_view, 2> kSolverNames = {"implicit", "published"};
 inline constexpr std::array<std::string_view, 2> kAccelerationNames = {"none", "chebyshev"};
 inline constexpr std::array<std::string_view, 4> kCriterionNames = {"none", "distance", "geometric", "strain"};
+inline constexpr std::array<std::string_view, 2> kRemovedEndsNames = {"both", "one"};
 inline constexpr std::array<std::string_view, 4> kMergeRuleNames = {"none", "deterministic", "published",
                                                                     "single_pass"};
 inline constexpr std::array<std::string_view, 3> kExpandRuleNames = {"none", "edge_cover", "published"};
@@ -23,6 +24,7 @@ inline constexpr std::array<std::string_view, 3> kExpandRuleNames = {"none", "ed
 constexpr std::span<const std::string_view> names_of(Solver) { return kSolverNames; }
 constexpr std::span<const std::string_view> names_of(Acceleration) { return kAccelerationNames; }
 constexpr std::span<const std::string_view> names_of(Criterion) { return kCriterionNames; }
+constexpr std::span<const std::string_view> names_of(RemovedEnds) { return kRemovedEndsNames; }
 constexpr std::span<const std::string_view> names_of(MergeRule) { return kMergeRuleNames; }
 constexpr std::span<const std::string_view> names_of(ExpandRule) { return kExpandRuleNames; }
 
@@ -74,6 +76,12 @@ struct CriterionPromise {
 constexpr CriterionPromise promise_of(Criterion criterion) {
   return {.keeps_blade_out = criterion == Criterion::distance};
 }
+
+// What a rule of which ends go promises (method.md §4).
+struct RemovePromise {
+  bool minds_no_order;  // particles in another order are the same answer
+};
+constexpr RemovePromise promise_of(RemovedEnds remove) { return {.minds_no_order = remove == RemovedEnds::both}; }
 
 // Whether a body in this state is due a stage (model/backend.h, run), given the state before the stage.
 // A backend writes its own rule of this: it is tested against this one.

@@ -13,6 +13,7 @@ namespace cutproof {
 enum class Solver { implicit, published };                             // method.md §3
 enum class Acceleration { none, chebyshev };                           // of the implicit solver, method.md §11
 enum class Criterion { none, distance, geometric, strain };            // method.md §4; none: nothing is ever removed
+enum class RemovedEnds { both, one };                                  // of an edge that is too long, method.md §4
 enum class MergeRule { none, deterministic, published, single_pass };  // method.md §6
 enum class ExpandRule { none, edge_cover, published };                 // method.md §7
 
@@ -30,9 +31,10 @@ struct StepParameters {
 
 struct DetectParameters {
   Criterion criterion = Criterion::distance;
-  double epsilon = 1.5;        // removed if the greatest neighbour distance exceeds epsilon · h
-  double strain = 1.2;         // strain baseline: removed if a principal stretch of a cluster exceeds this
-  bool without_blade = false;  // false: a scene without a blade launches no detection
+  RemovedEnds remove = RemovedEnds::both;  // distance only
+  double epsilon = 1.5;                    // an edge of G longer than epsilon · h (its rest length) is open
+  double strain = 1.2;                     // strain baseline: removed if a principal stretch of a cluster exceeds this
+  bool without_blade = false;              // false: a scene without a blade launches no detection
   friend bool operator==(const DetectParameters&, const DetectParameters&) = default;
 };
 

@@ -26,14 +26,17 @@ enum class SetupSpace {
   free            // [a length of its own]
 };
 
+inline constexpr double kAnyNumber = -std::numeric_limits<double>::infinity();
+
 struct SetupField {
   std::string_view group;  // "step"; of an entry of a list: that of the list
   std::string_view name;   // within the group: "solver"
   SetupSpace space;
   std::string_view unit = "1";  // "1" for counts, flags, names and ratios
   // Of a number, of each component of a vector, of each entry of a list. All of them are finite.
-  double least = -std::numeric_limits<double>::infinity();
+  double least = kAnyNumber;
   bool above = false;  // `least` itself is not allowed
+  int32_t since = 0;   // recordings of earlier formats do not have it: there it is as it is by default
 };
 
 namespace fields_detail {
@@ -46,7 +49,7 @@ inline void know_every_member(const Setup& setup) {
   [[maybe_unused]] const auto& [nodes, spacing] = grid;
   [[maybe_unused]] const auto& [solver, substeps, iterations, stiffness, relaxation, acceleration, damping, gravity] =
       step;
-  [[maybe_unused]] const auto& [criterion, epsilon, strain, without_blade] = detect;
+  [[maybe_unused]] const auto& [criterion, remove, epsilon, strain, without_blade] = detect;
   [[maybe_unused]] const auto& [debris] = split;
   [[maybe_unused]] const auto& [merge_rule] = merge;
   [[maybe_unused]] const auto& [expand_rule, expand_depth] = expand;
@@ -92,6 +95,7 @@ constexpr void for_each_setup_field(Visit&& visit) {
   CUTPROOF_FIELD(step.damping, "step", "damping", one, "1/s");
   CUTPROOF_FIELD(step.gravity, "step", "gravity", one, "m/s²");
   CUTPROOF_FIELD(detect.criterion, "detect", "criterion", one);
+  CUTPROOF_FIELD(detect.remove, "detect", "remove", one, "1", kAnyNumber, false, 4);
   CUTPROOF_FIELD(detect.epsilon, "detect", "epsilon", one, "h");
   CUTPROOF_FIELD(detect.strain, "detect", "strain", one);
   CUTPROOF_FIELD(detect.without_blade, "detect", "without_blade", one);

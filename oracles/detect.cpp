@@ -8,6 +8,7 @@
 
 #include "oracles/blade_motion.h"
 #include "oracles/checks.h"
+#include "oracles/open_edges.h"
 #include "oracles/shape_sums.h"
 #include "oracles/strain.h"
 
@@ -29,26 +30,11 @@ Stretch stretch_of(const TissueGraph& graph, const std::vector<Vec3>& x, int32_t
   return stretch;
 }
 
-// Rounding band of d_i > εh, with u the unit roundoff of what is judged. From the stored positions: each difference is
-// off by u relative to itself, its square by 3u, their sum by at most 5u, and the root by 2.5u + u. So every way to
-// compute d_i in double is off by at most 4u d_i, every way to compute εh by u (squared and compared: 3u on
-// squares, 1.5u here). What is compared here has the same errors once more: 2 (4u + 2u) = 12u; 16u leaves room for the
-// terms of second order.
-constexpr double kStretchBand = 16;  // [u]
-
-// Of a bare graph the rest length is a distance as well, computed in double precision on both sides: 2 · 4u more.
-constexpr double kRestBand = 8;  // [2⁻⁵³]
-
-// An edge is too long beyond ε times its own rest length.
+// An edge is too long beyond ε times its own rest length: then both of its ends go.
 Demand demand_of_distance(const Body& body, const TissueGraph& graph, const std::vector<Vec3>& x, int32_t i,
                           double epsilon, double u) {
-  const double band = kStretchBand * u + (body.on_grid() ? 0 : kRestBand * kUnitRoundoff);
   Demand demand = Demand::keep;
-  for (const int32_t other : graph.neighbours(i)) {
-    const double distance = norm(x[at(i)] - x[at(other)]), limit = epsilon * body.rest_length(i, other);
-    if (distance > limit * (1 + band)) return Demand::remove;
-    if (!(distance < limit * (1 - band))) demand = Demand::either;
-  }
+  for (const int32_t other : graph.neighbours(i)) demand = std::max(demand, openness(body, x, i, other, epsilon, u));
   return demand;
 }
 
@@ -94,7 +80,7 @@ double distance_to_translated(const Blade& blade, Local p, Local d) {
 // body of a thousand spacings, is far inside the band around that.
 constexpr double kTie = 1e-9;
 constexpr double kSweepBand = 5e-10;
-constexpr double kPlacesBand = 32;  // [u]: twice the lengthening of 16 u reach + 12 u (|x| + |edge|), and rounding
+// Of places (open_edges.h): twice the lengthening of 16 u reach + 12 u (|x| + |edge|), and rounding.
 
 // A turning sweep has no closed form, and a backend may replace it by translations that are off by a little: between
 // `reach` and `reach` + kTurningSlack · h either answer is right. The distance to the pose at t changes by at most
@@ -203,7 +189,9 @@ void check_detection(const StageRun& run, Verdict& verdict) {
   const Swept swept(setup, criterion == Criterion::geometric ? before.frame : setup.frame_count());
   const std::vector<StrainDemand> strained =
       criterion == Criterion::strain ? demands_of_strain(setup, before) : std::vector<StrainDemand>{};
+  const bool one_end = criterion == Criterion::distance && setup.detect.remove == RemovedEnds::one;
   std::vector<int32_t> gone;
+  std::vector<uint8_t> is_gone(before.alive.size(), 0);
   for (int32_t i = 0; i < graph.particle_count(); ++i) {
     const bool was = before.alive[at(i)] != 0, is = after.alive[at(i)] != 0;
     if (!was) {
@@ -211,7 +199,11 @@ void check_detection(const StageRun& run, Verdict& verdict) {
       continue;
     }
     ++verdict.checked;
-    if (!is) gone.push_back(i);
+    if (!is) {
+      gone.push_back(i);
+      is_gone[at(i)] = 1;
+    }
+    if (one_end) continue;
     const Stretch stretch = stretch_of(graph, before.x, i);
     const Demand demand = criterion == Criterion::distance
                               ? demand_of_distance(setup.body, graph, before.x, i, epsilon, u)
@@ -231,6 +223,7 @@ void check_detection(const StageRun& run, Verdict& verdict) {
                               setup.detect.strain)
                 : "");
   }
+  if (one_end) OneEndOfEach(setup, graph, before).judge(is_gone, verdict);
   if (const auto wrong = first_in_one_only(gone, after.removed)) {
     violate(verdict, {{}, {wrong->element}}, "particle {} {}", wrong->element,
             wrong->in_second ? "is listed as removed, but did not die in this stage"

@@ -4,11 +4,9 @@
 
 #include "model/setup.h"
 #include "model/state.h"
+#include "oracles/demand.h"
 
 namespace cutproof::oracles {
-
-// Of a particle in a detection; `either`: rounding decides.
-enum class Demand { keep, either, remove };
 
 struct StrainDemand {
   Demand demand = Demand::keep;

@@ -474,6 +474,7 @@ void add_dynamics(const Case& c, Vec3 first_node, Setup& setup) {
   setup.step.gravity = (h / 1000 / (dt * dt)) * whole_vector(c.gravity);
   setup.detect.epsilon = c.epsilon / 10.0;
   setup.detect.strain = c.strain / 100.0;
+  if (c.removal == Removal::usual) setup.detect.remove = c.remove;
   if (c.removal == Removal::geometric) setup.detect.criterion = Criterion::geometric;
   if (c.removal == Removal::strain) setup.detect.criterion = Criterion::strain;
   setup.blade.friction = c.blade_friction / 10.0;
@@ -586,6 +587,7 @@ Case draw_moving_case(uint64_t seed, int size) {
   c.ground = random.chance(0.5);
   c.acceleration = random.chance(0.5) ? Acceleration::chebyshev : Acceleration::none;
   draw_dynamics(random, c);
+  c.remove = random.chance(0.4) ? RemovedEnds::one : RemovedEnds::both;
   return c;
 }
 
@@ -762,6 +764,7 @@ std::vector<std::function<void(Case&)>> simplifications(const Case& c) {
   towards(c, &Case::ground, false, edits);
   towards(c, &Case::gravity, {0, 0, 0}, edits);
   towards(c, &Case::removal, Removal::usual, edits);
+  towards(c, &Case::remove, RemovedEnds::both, edits);
   towards(c, &Case::strain, 120, edits);
   towards(c, &Case::epsilon, 15, edits);
   towards(c, &Case::solver, Solver::implicit, edits);
@@ -870,8 +873,8 @@ namespace cutproof::property_tests {
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Case, nodes, spacing, clusters, side, seed_spacing, ball_radius, most, tau, cap,
                                    seed, merge, expand, expand_depth, debris, blade_length, blade_depth,
                                    blade_thickness, strokes, together, moves, substeps, iterations, stiffness,
-                                   acceleration, ground, alpha, removal, epsilon, strain, solver, relaxation, damping,
-                                   time_step, pace, blade_friction, gravity, walls, grips)
+                                   acceleration, ground, alpha, removal, remove, epsilon, strain, solver, relaxation,
+                                   damping, time_step, pace, blade_friction, gravity, walls, grips)
 
 std::string to_json(const Case& c) { return nlohmann::json(c).dump(); }
 
@@ -945,8 +948,8 @@ Case from_json(const std::string& text) {
     if (document.is_object()) {
       const nlohmann::json plain = Case{};
       for (const char* field :
-           {"acceleration", "together", "alpha", "removal", "epsilon", "strain", "solver", "relaxation", "damping",
-            "time_step", "pace", "blade_friction", "gravity", "walls", "grips"}) {
+           {"acceleration", "together", "alpha", "removal", "remove", "epsilon", "strain", "solver", "relaxation",
+            "damping", "time_step", "pace", "blade_friction", "gravity", "walls", "grips"}) {
         document.emplace(field, plain.at(field));
       }
       for (auto& stroke : document.at("strokes")) {

@@ -84,6 +84,7 @@ struct Case {
 
   // All of these only where the body moves.
   Removal removal = Removal::usual;
+  RemovedEnds remove = RemovedEnds::both;      // usual removal
   int32_t epsilon = 15;                        // [tenths]
   int32_t strain = 120;                        // removal by strain: the greatest stretch that is no cut [hundredths]
   Solver solver = Solver::implicit;            // published: without acceleration

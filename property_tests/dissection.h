@@ -66,6 +66,7 @@ inline constexpr std::array kCoverageClasses = {
     CoverageClass{"large dt", Occurs::where_bodies_move},
     // Something was removed.
     CoverageClass{"cut at another epsilon", Occurs::where_bodies_move},
+    CoverageClass{"one end of each edge", Occurs::where_bodies_move},
     CoverageClass{"cut by strain", Occurs::where_bodies_move},
     CoverageClass{"geometric cut of what moves", Occurs::where_bodies_move},
     // Touches (touching.h).

@@ -20,16 +20,69 @@ double greatest_neighbour_distance(const Body& body, const State& state, int32_t
   return greatest;
 }
 
-std::vector<uint8_t> too_far_apart(const Setup& setup, const State& state) {
-  std::vector<uint8_t> found(state.alive.size(), 0);
+// An edge of G beyond ε times its rest length.
+struct OpenEdge {
+  int32_t low, high;
+};
+
+std::vector<OpenEdge> open_edges(const Setup& setup, const State& state) {
+  std::vector<OpenEdge> open;
   for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
     if (!state.alive[at(i)]) continue;
     for (const int32_t j : setup.body.neighbours(i)) {
       const double limit = setup.detect.epsilon * setup.body.rest_length(i, j);
-      if (state.alive[at(j)] && norm(state.x[at(i)] - state.x[at(j)]) > limit) found[at(i)] = 1;
+      if (i < j && state.alive[at(j)] && norm(state.x[at(i)] - state.x[at(j)]) > limit) open.push_back({i, j});
     }
   }
+  return open;
+}
+
+std::vector<uint8_t> both_ends(const std::vector<OpenEdge>& open, std::size_t particles) {
+  std::vector<uint8_t> found(particles, 0);
+  for (const OpenEdge edge : open) found[at(edge.low)] = found[at(edge.high)] = 1;
   return found;
+}
+
+// Where the blade stood last in this frame while it was lowered.
+const BladePose* lowered_blade(const Setup& setup, int64_t frame) {
+  const BladePose* pose = nullptr;
+  for (int32_t s = 0; setup.has_blade && s < setup.step.substeps; ++s) {
+    const BladeMove& move = setup.blade_moves[at(frame * setup.step.substeps + s)];
+    if (move.down) pose = &move.to;
+  }
+  return pose;
+}
+
+// The end on the blade's negative side, if its plane lies between them; otherwise the one with more open edges; of
+// equals the one with the lower number.
+std::vector<uint8_t> one_end_of_each(const Setup& setup, const State& state, const std::vector<OpenEdge>& open) {
+  const BladePose* blade = lowered_blade(setup, state.frame);
+  const auto is_negative = [&](int32_t i) {
+    return dot(state.x[at(i)] - blade->edge, cross(blade->along, blade->back)) < 0;
+  };
+  std::vector<int> open_at(state.alive.size(), 0);
+  for (const OpenEdge edge : open) {
+    ++open_at[at(edge.low)];
+    ++open_at[at(edge.high)];
+  }
+  std::vector<uint8_t> found(state.alive.size(), 0);
+  for (const auto [low, high] : open) {
+    bool low_goes = open_at[at(low)] >= open_at[at(high)];
+    if (blade != nullptr && is_negative(low) != is_negative(high)) low_goes = is_negative(low);
+    found[at(low_goes ? low : high)] = 1;
+  }
+  return found;
+}
+
+std::vector<uint8_t> too_far_apart(const Setup& setup, const State& state) {
+  const std::vector<OpenEdge> open = open_edges(setup, state);
+  switch (setup.detect.remove) {
+    case RemovedEnds::both:
+      return both_ends(open, state.alive.size());
+    case RemovedEnds::one:
+      return one_end_of_each(setup, state, open);
+  }
+  return {};
 }
 
 // The part of the blade's sweep in which its orientation stays the same: the Minkowski sum of the mid-surface and the

@@ -17,6 +17,7 @@ nlohmann::json run_sampling(const SamplingOptions& options, const Progress& prog
   const Cooking cooking = cooking_of(options.cooking);
   const std::vector<Contender> contenders = make_contenders(options.backend, options.split, options.rotation);
   const std::vector<StepParameters> steps = steps_of(options, embedded_scene(kKidney).step);
+  static_cast<void>(detection_of(options, {}));
   const int64_t frames = options.frames_or_default();
   const int64_t scaled_down = options.full || options.described().takes_full_size ? 1 : kScaledDown;
   Report report("sampling", options.backend,
@@ -33,6 +34,7 @@ nlohmann::json run_sampling(const SamplingOptions& options, const Progress& prog
         const int64_t wanted = paper.particles / scaled_down;
         BenchScene scene = make_paper_scene(kKidney, fmt::format("kidney_{}", wanted), wanted, cooking, frames);
         scene.setup.step = step;
+        scene.setup.detect = detection_of(options, scene.setup.detect);
         const Measured measured = measure(contender, scene, frames, options.repeats);
         const double frame = measured.timings.frame.median;
         if (first_frame == 0) first_frame = frame;

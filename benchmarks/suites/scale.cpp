@@ -21,10 +21,12 @@ nlohmann::json run_scale(const ScaleOptions& options, const Progress& progress) 
   const auto contenders = [&] { return make_contenders(options.backend, options.split, options.rotation); };
   static_cast<void>(contenders());  // what cannot be made is refused before anything is shown
   static_cast<void>(steps_of(options, {}));
+  static_cast<void>(detection_of(options, {}));
   Report report("scale", options.backend, {{"frames", frames}, {"repeats", options.repeats}, {"holds", true}},
                 progress);
   for (const int64_t size : sizes) {
     BenchScene scene = make_bench_scene(size, frames);
+    scene.setup.detect = detection_of(options, scene.setup.detect);
     for (const StepParameters& step : steps_of(options, scene.setup.step)) {
       scene.setup.step = step;
       for (const Contender& contender : contenders()) {

@@ -126,6 +126,7 @@ json run_stages(const StagesOptions& options, const Progress& progress) {
   const auto contenders = [&] { return make_contenders(options.backend, options.split, options.rotation); };
   static_cast<void>(contenders());  // what cannot be made or asked for is refused before anything is measured
   static_cast<void>(steps_of(options, {}));
+  static_cast<void>(detection_of(options, {}));
   const MachineLimits machine = measure_machine(options.described());
   json fields = {{"frames", frames},
                  {"repeats", options.repeats},
@@ -140,6 +141,7 @@ json run_stages(const StagesOptions& options, const Progress& progress) {
   Report report("stages", options.backend, fields, progress, "scenes");
   for (const auto& make_scene : scenes) {
     BenchScene scene = make_scene();
+    scene.setup.detect = detection_of(options, scene.setup.detect);
     for (const StepParameters& asked : steps_of(options, scene.setup.step)) {
       scene.setup.step = asked;
       for (const Contender& contender : contenders()) {

@@ -51,7 +51,7 @@ void print_last_scene(const json& document) {
     fmt::print("; {:.0f} bytes a particle", scene.at("bytes").get<double>() / particles);
   fmt::print("\n");
   print_filled("{backend}, {precision} precision, {substeps} substeps × {iterations} iterations, ", rows.front());
-  print_filled("acceleration {acceleration}, rotation {rotation}, split {split}\n", rows.front());
+  print_filled("acceleration {acceleration}, rotation {rotation}, split {split}, remove {remove}\n", rows.front());
   const bool limits = std::any_of(rows.begin(), rows.end(), [](const json& row) { return !row.at("limit").is_null(); });
   const auto line = [&](auto what, auto median, auto least, auto most, const std::array<std::string, 4>& limit,
                         auto frames, auto paper, auto error) {

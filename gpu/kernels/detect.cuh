@@ -3,14 +3,13 @@
 //
 // Rounding, with u = 2^-24, of the decisions compared with exact arithmetic on the same stored numbers:
 // - distance: d_i > epsilon h may come out either way where |d_i - epsilon h| <= 8 u (1 + epsilon) h. An edge is h e
-// plus
-//   a difference of displacements, so where the body is does not matter: u for the difference, u for the sum, 1.5 u for
-//   the squares and their sum, and u each for h, epsilon, their product and its square.
+//   plus a difference of displacements, so where the body is does not matter: u for the difference, u for the sum, 1.5
+//   u for the squares and their sum, and u each for h, epsilon, their product and its square. Where one end of each
+//   edge goes, also where an end is as near to the plane of the blade as places are rounded (as for geometric).
 // - geometric: distances to the blade are between places in the body, so they carry 10 u |x| + 8 u |edge|: u each for
-// h,
-//   X, X + d and the stored edge, and for x - edge the difference, the stored axes and the products with them. Ties go
-//   to removal, so the reach is longer by swept_slack(), which is more than that: what is within the reach always goes,
-//   and what is farther by up to twice the slack may go.
+//   h, X, X + d and the stored edge, and for x - edge the difference, the stored axes and the products with them. Ties
+//   go to removal, so the reach is longer by swept_slack(), which is more than that: what is within the reach always
+//   goes, and what is farther by up to twice the slack may go.
 #pragma once
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/plan.h"
@@ -21,7 +20,9 @@ namespace cutproof::gpu {
 
 namespace detect_detail {
 
-enum : unsigned char { kStays = 0, kGoes = 1, kWentBefore = 2 };  // DeviceView::particle_flag
+// DeviceView::particle_flag. kAsks: the particle has open edges of which neither end is the blade's; it goes if it has
+// more open edges than the other end of one of them.
+enum : unsigned char { kStays = 0, kGoes = 1, kWentBefore = 2, kAsks = 3 };
 
 inline constexpr float kRounding = 0x1p-24f;
 
@@ -32,11 +33,11 @@ CUTPROOF_DEVICE inline bool detects(const DeviceView& w, int b) { return w.body[
 // The code of particles that detection removes in the frame in progress.
 CUTPROOF_DEVICE inline int removal_code(const DeviceView& w, int b) { return 2 * w.frame[b] + 2; }
 
-// d_i²: the greatest squared distance to a neighbour in G; 0 without neighbours. Each edge is evaluated from its lower
-// to its upper end, so both ends get the same bits.
-CUTPROOF_DEVICE inline float greatest_squared_edge(const DeviceView& w, const BodyConstants& body, int p) {
+// visit(direction, squared length, other end) for the edges of G at p. Each is evaluated from its lower to its upper
+// end, so both ends get the same bits.
+template <class Visit>
+CUTPROOF_DEVICE inline void for_edges(const DeviceView& w, const BodyConstants& body, int p, Visit visit) {
   const Float3 here = xyz(w.displacement[p]);
-  float greatest = 0;
   for (int direction = 0; direction < 6; ++direction) {
     const int q = neighbour(w, body, p, direction);
     if (q < 0 || !alive(w, q)) continue;
@@ -46,10 +47,79 @@ CUTPROOF_DEVICE inline float greatest_squared_edge(const DeviceView& w, const Bo
     const Float3 edge = {axis == 0 ? body.h + difference.x : difference.x,
                          axis == 1 ? body.h + difference.y : difference.y,
                          axis == 2 ? body.h + difference.z : difference.z};
-    const float squared = dot(edge, edge);
-    greatest = squared > greatest ? squared : greatest;
+    visit(direction, dot(edge, edge), q);
   }
+}
+
+// d_i²: the greatest squared distance to a neighbour in G; 0 without neighbours.
+CUTPROOF_DEVICE inline float greatest_squared_edge(const DeviceView& w, const BodyConstants& body, int p) {
+  float greatest = 0;
+  for_edges(w, body, p, [&](int, float squared, int) { greatest = squared > greatest ? squared : greatest; });
   return greatest;
+}
+
+// ---- one end of each edge that is too long
+
+// The open edges of a particle, as they stand in DeviceView::particle_scratch for its neighbours: how many, and the
+// directions of those of which the blade has not chosen an end.
+struct OpenEdges {
+  int count = 0;
+  unsigned contested = 0;
+};
+CUTPROOF_DEVICE inline int packed(OpenEdges edges) { return edges.count << 6 | static_cast<int>(edges.contested); }
+CUTPROOF_DEVICE inline OpenEdges unpacked(int word) { return {word >> 6, static_cast<unsigned>(word) & 63u}; }
+
+// The plane of the blade where it stood last in this frame while it was lowered.
+struct Plane {
+  bool exists = false;
+  Float3 edge, normal;
+};
+CUTPROOF_DEVICE inline Plane lowered_plane(const DeviceView& w, const BodyConstants& body, int b) {
+  Plane plane;
+  if (!body.has_blade) return plane;
+  const MoveF* const moves = w.moves + body.schedule + int64_t{w.frame[b]} * body.substeps;
+  for (int s = body.substeps - 1; s >= 0 && !plane.exists; --s) {
+    if (moves[s].down) plane = {true, moves[s].to.edge, cross(moves[s].to.along, moves[s].to.back)};
+  }
+  return plane;
+}
+CUTPROOF_DEVICE inline bool is_negative(const DeviceView& w, const BodyConstants& body, const Plane& plane, int p) {
+  return dot(rest_position(body, w.node[p]) + xyz(w.displacement[p]) - plane.edge, plane.normal) < 0;
+}
+
+// What becomes of a particle that has an edge longer than the root of `limit`.
+CUTPROOF_DEVICE inline unsigned char flag_of_open(const DeviceView& w, const BodyConstants& body, int b, int p,
+                                                  float limit) {
+  if (body.remove == RemovedEnds::both) return kGoes;
+  const Plane plane = lowered_plane(w, body, b);
+  const bool negative = plane.exists && is_negative(w, body, plane, p);
+  OpenEdges open;
+  bool goes = false;
+  for_edges(w, body, p, [&](int direction, float squared, int q) {
+    if (!(squared > limit)) return;
+    ++open.count;
+    if (plane.exists && is_negative(w, body, plane, q) != negative) {
+      goes = goes || negative;
+    } else {
+      open.contested |= 1u << direction;
+    }
+  });
+  w.particle_scratch[p] = packed(open);
+  return goes ? kGoes : open.contested != 0 ? kAsks : kStays;
+}
+
+// Whether a particle has at least as many open edges as the other end of one of which the blade has not chosen: of
+// equals the lower particle goes.
+CUTPROOF_DEVICE inline bool loses(const DeviceView& w, const BodyConstants& body, int p) {
+  const OpenEdges open = unpacked(w.particle_scratch[p]);
+  bool goes = false;
+  for (int direction = 0; direction < 6; ++direction) {
+    if (!(open.contested >> direction & 1u)) continue;
+    const int q = neighbour(w, body, p, direction);
+    const int others = unpacked(w.particle_scratch[q]).count;
+    goes = goes || open.count > others || (open.count == others && p < q);
+  }
+  return goes;
 }
 
 // ---- the swept mid-surface
@@ -385,7 +455,7 @@ CUTPROOF_DEVICE void flag_particles_kernel(Block& block, DeviceView w) {
         if (w.death[p] == removal_code(w, b)) flag = kWentBefore;
       } else if (body.criterion == Criterion::distance) {
         const float limit = body.epsilon * body.h;
-        if (greatest_squared_edge(w, body, p) > limit * limit) flag = kGoes;
+        if (greatest_squared_edge(w, body, p) > limit * limit) flag = flag_of_open(w, body, b, p, limit * limit);
       } else if (body.criterion == Criterion::strain) {
         for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
           const int s = w.memberships[k];
@@ -434,6 +504,7 @@ CUTPROOF_DEVICE void remove_particles_kernel(Block& block, DeviceView w) {
       continue;
     }
     const int b = body_index(w, p), code = removal_code(w, b);
+    if (flag == kAsks && !loses(w, w.body[b], p)) continue;
     w.death[p] = code;
     block.store(&w.cut[b], code);
     ++removed;

@@ -50,6 +50,7 @@ struct BodyConstants {
   float stiffness, relaxation, damping;
   Float3 gravity;
   Criterion criterion;
+  RemovedEnds remove;
   int needs_detection;
   float epsilon, strain;
   int debris;

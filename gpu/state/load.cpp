@@ -67,6 +67,7 @@ void add_constants(StagingBuffers& staging, const Setup& setup, const State& sta
   body.damping = f(setup.step.damping);
   body.gravity = f(setup.step.gravity);
   body.criterion = setup.detect.criterion;
+  body.remove = setup.detect.remove;
   body.needs_detection = needs_detection(setup);
   body.epsilon = f(setup.detect.epsilon);
   body.strain = f(setup.detect.strain);

@@ -14,7 +14,8 @@
 
 namespace cutproof::io {
 
-inline constexpr int32_t kFormatVersion = 3;
+inline constexpr int32_t kFormatVersion = 4;
+inline constexpr int32_t kOldestFormatVersion = 3;  // that is read too: without what SetupField::since says
 inline constexpr std::string_view kIndexSuffix = ".cutproof.h5";
 
 // What stands in the root attribute cutproof_file of each of the four files.

@@ -66,12 +66,11 @@ hdf5::File open_part(const std::string& path, const char* kind) {
                        "Give the name of the index, which ends in \".cutproof.h5\".");
     }
     const auto version = hdf5::read_attribute<int32_t>(file.id(), "cutproof_format");
-    if (version != kFormatVersion) {
-      const bool newer = version > kFormatVersion;
+    if (version < kOldestFormatVersion || version > kFormatVersion) {
       throw InputError(path, "cutproof_format",
-                       fmt::format("The recording has format {}, and this program reads {}{}.", version,
-                                   newer ? "up to " : "", kFormatVersion),
-                       newer ? "Use a newer cutproof." : "Record the scene again.");
+                       fmt::format("The recording has format {}, and this program reads {} to {}.", version,
+                                   kOldestFormatVersion, kFormatVersion),
+                       version > kFormatVersion ? "Use a newer cutproof." : "Record the scene again.");
     }
     return file;
   } catch (const hdf5::Error& error) {
@@ -181,7 +180,9 @@ void RecordingReader::File::read_index(const ReadingArchive& root) {
   std::vector<uint8_t> scene;
   root("scene", scene);
   header.scene_json.assign(scene.begin(), scene.end());
-  header.setup = read_setup(index.file.id(), index.file.bytes());
+  int32_t format = 0;
+  root("cutproof_format", format);
+  header.setup = read_setup(index.file.id(), index.file.bytes(), format);
   double u = 0;
   root("unit_roundoff", u);
   header.precision = u == unit_roundoff(Precision::binary64) ? Precision::binary64 : Precision::binary32;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "model/io/recording_archive.h"
+#include "model/io/recording_format.h"
 #include "model/setup_fields.h"
 
 namespace cutproof::io {
@@ -73,10 +74,11 @@ void read_entries(const ReadingArchive& archive, std::vector<Entry>& entries) {
   });
 }
 
-// The whole of /setup. S is Setup or const Setup.
+// The whole of /setup as recordings of a format have it. S is Setup or const Setup.
 template <class Archive, class S>
-void walk_setup(Archive& archive, S& setup) {
+void walk_setup(Archive& archive, S& setup, int32_t format) {
   for_each_setup_field([&](const SetupField& field, auto get) {
+    if (field.since > format) return;
     const auto add = [&](auto& group) {
       if constexpr (!is_list_of_entries<std::remove_cvref_t<decltype(get(setup))>>) {
         group(std::string(field.name), get(setup));
@@ -98,13 +100,13 @@ void walk_setup(Archive& archive, S& setup) {
 
 void write_setup(hid_t file, const Setup& setup) {
   WritingArchive root(file);
-  root.group("setup", [&](auto& archive) { walk_setup(archive, setup); });
+  root.group("setup", [&](auto& archive) { walk_setup(archive, setup, kFormatVersion); });
 }
 
-Setup read_setup(hid_t file, uint64_t file_bytes) {
+Setup read_setup(hid_t file, uint64_t file_bytes, int32_t format) {
   Setup setup;
   const ReadingArchive root(file, "", file_bytes);
-  root.group("setup", [&](auto& archive) { walk_setup(archive, setup); });
+  root.group("setup", [&](auto& archive) { walk_setup(archive, setup, format); });
   return setup;
 }
 

@@ -152,6 +152,10 @@ void describe(auto& v, DetectParameters& s) {
                         "What removes a particle. `distance`: a neighbour farther than epsilon · h; `geometric`: the "
                         "swept blade comes within max(thickness, h)/2 of its node; `strain`: a cluster's principal "
                         "stretch; `none`: nothing is ever removed (method.md §4)."});
+  v.field(s.remove, {"remove",
+                     "`distance` only: of an edge that is longer than epsilon · h `both` ends go, as in the paper, or "
+                     "`one`: half the loss. With a lowered blade between them it is the end on its negative side, "
+                     "along × back being positive (method.md §4)."});
   v.field(s.epsilon,
           {"epsilon", "Distance from a neighbour beyond which a particle is removed. At 1 or less, tissue at rest is.",
            above(0, 1e6, "h")});

@@ -320,6 +320,15 @@ void check(const StepParameters& s, const Place& at) {
   }
 }
 
+void check(const DetectFields& s, const Place& at) {
+  if (s.parameters.criterion != Criterion::distance && s.parameters.remove != RemovedEnds::both) {
+    at.inner("remove").fail(
+        fmt::format("The criterion \"{}\" asks particles, and not edges, of which one end might go.",
+                    name_of(s.parameters.criterion)),
+        "Choose \"criterion\": \"distance\", or \"remove\": \"both\".");
+  }
+}
+
 void check(const StrokeSpec& s, const Place& at) {
   const Place points = at.inner("points");
   if (s.points.size() < 2) {

@@ -147,6 +147,10 @@ Defect parameter_defect(const Setup& setup) {
   if (setup.step.solver == Solver::published && setup.step.acceleration != Acceleration::none) {
     return SetupDefect{"step/acceleration", "The solver \"published\" has no acceleration."};
   }
+  if (setup.detect.criterion != Criterion::distance && setup.detect.remove != RemovedEnds::both) {
+    return SetupDefect{"detect/remove", fmt::format("The criterion \"{}\" asks particles, and not edges.",
+                                                    name_of(setup.detect.criterion))};
+  }
   for (const Wall& wall : setup.walls) {
     if (wall.axis > 2) {
       return SetupDefect{"walls/axis", fmt::format("An axis is {}, and should be 0, 1 or 2.", wall.axis)};

@@ -6,6 +6,7 @@
 
 #include "benchmarks/memory.h"
 #include "benchmarks/suites/suites.h"
+#include "model/error.h"
 #include "tests/cli/program.h"
 
 namespace {
@@ -54,6 +55,30 @@ TEST_F(BenchScale, IteratesAsAskedFor) {
   EXPECT_NE(outcome.output.find("4 × 16"), std::string::npos) << outcome.output;
 }
 
+TEST_F(BenchScale, RemovesTheEndsThatAreAskedFor) {
+  std::vector<std::string> ends;
+  for (const char* remove : {"", " --remove both", " --remove one"}) {
+    const Outcome outcome = cutproof(
+        std::string("bench scale --sizes 1000 --frames 12 --repeats 1 --acceleration none --json out.json") + remove);
+    ASSERT_EQ(outcome.status, 0) << outcome.output;
+    const json row = json::parse(read("out.json")).at("rows").at(0);
+    EXPECT_EQ(row.at("error").at("frame").at("topology_holds"), true);
+    ends.push_back(row.at("remove"));
+  }
+  EXPECT_EQ(ends, (std::vector<std::string>{"both", "both", "one"}));
+}
+
+TEST(Scale, RemovesOneEndByTheCriterionOfEdgesOnly) {
+  cutproof::benchmarks::ScaleOptions options;
+  cutproof::DetectParameters detect;
+  options.remove = "one";
+  EXPECT_EQ(cutproof::benchmarks::detection_of(options, detect).remove, cutproof::RemovedEnds::one);
+  detect.criterion = cutproof::Criterion::geometric;
+  EXPECT_THROW(static_cast<void>(cutproof::benchmarks::detection_of(options, detect)), cutproof::InputError);
+  options.remove = "both";
+  EXPECT_EQ(cutproof::benchmarks::detection_of(options, detect), detect);
+}
+
 TEST(Scale, ShowsTimesBeforeTheyAreJudged) {
   cutproof::benchmarks::ScaleOptions options;
   options.sizes = {1000};
@@ -86,6 +111,7 @@ TEST_F(BenchScale, RefusesBadUsage) {
   expect_refused("bench scale --split blocks", {"--split"});
   expect_refused("bench scale --acceleration swift", {"--acceleration", "swift", "none and chebyshev"});
   expect_refused("bench scale --iterations 0", {"--iterations"});
+  expect_refused("bench scale --remove none", {"--remove", "none", "both or one"});
   expect_refused("bench scale --json nowhere/out.json", {"nowhere"});
 }
 

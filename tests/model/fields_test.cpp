@@ -92,7 +92,7 @@ TEST(Fields, AreTheMembersOfASetupEachOnce) {
   const auto& [name, grid, node, particle_at, rest, edge_offsets, edge_ends, mass, origin, orientation] = body;
   const auto& [nodes, spacing] = grid;
   const auto& [solver, substeps, iterations, stiffness, relaxation, acceleration, damping, gravity] = step;
-  const auto& [criterion, epsilon, strain, without_blade] = detect;
+  const auto& [criterion, remove, epsilon, strain, without_blade] = detect;
   const auto& [debris] = split;
   const auto& [merge_rule] = merge;
   const auto& [expand_rule, depth] = expand;
@@ -100,8 +100,8 @@ TEST(Fields, AreTheMembersOfASetupEachOnce) {
   const auto& [length, blade_depth, thickness, friction] = blade;
   visited.expect_once(name, nodes, spacing, node, particle_at, rest, edge_offsets, edge_ends, mass, origin, orientation,
                       solver, substeps, iterations, stiffness, relaxation, acceleration, damping, gravity, criterion,
-                      epsilon, strain, without_blade, debris, merge_rule, expand_rule, depth, wanted, alpha, walls,
-                      grips, has_blade, length, blade_depth, thickness, friction, substep_length, blade_moves,
+                      remove, epsilon, strain, without_blade, debris, merge_rule, expand_rule, depth, wanted, alpha,
+                      walls, grips, has_blade, length, blade_depth, thickness, friction, substep_length, blade_moves,
                       stroke_end);
 }
 

@@ -63,7 +63,7 @@ Setup block_setup(int32_t nx, int32_t ny, int32_t nz) {
 // A blade that is up in frame 0, comes down in frame 1 and is up again in frame 2; walls; a pinned and a moving grip.
 void add_surroundings(Setup& setup) {
   setup.step = {Solver::published, 2, 7, 1e-310, 0.3, Acceleration::none, -0.0, {0, 0, -9.81}};
-  setup.detect = {Criterion::strain, 1.5000000000000002, 1.2, true};
+  setup.detect = {Criterion::strain, RemovedEnds::both, 1.5000000000000002, 1.2, true};
   setup.split.debris = 3;
   setup.merge.rule = MergeRule::single_pass;
   setup.expand = {ExpandRule::published, 2};
@@ -385,7 +385,7 @@ TEST_F(RecordingTest, GivesBackEachFieldOfASetupThatChangedAlone) {
     write_setup(file.id(), setup);
     file.close();
     const hdf5::File opened = hdf5::File::open(path("setup.h5"));
-    return bits_of(read_setup(opened.id(), opened.bytes()));
+    return bits_of(read_setup(opened.id(), opened.bytes(), kFormatVersion));
   };
   // No body has both a grid and edges of its own, but each field is kept for itself.
   const Body bare = as_bare_graph(base.body);
@@ -885,6 +885,30 @@ TEST_F(RecordingTest, IsRefusedIfItIsOfANewerVersion) {
   expect_input_error([&] { RecordingReader reader(path("run")); }, path("run.cutproof.h5"), "newer cutproof");
   tamper(path("run.cutproof.h5"), [](hid_t file) { set_attribute<int32_t>(file, "/", "cutproof_format", 0); });
   expect_input_error([&] { RecordingReader reader(path("run")); }, path("run.cutproof.h5"), "format 0");
+}
+
+// Format 3 had no detect/remove: both ends of an edge went.
+TEST_F(RecordingTest, IsReadIfItIsOfTheFormatBefore) {
+  Setup setup = block_setup(2, 1, 1);
+  setup.detect.remove = RemovedEnds::one;
+  {
+    Recorder recorder(path("run"), setup, "{}", "reference");
+    recorder.finish();
+  }
+  const RecordingPaths files = recording_paths(path("run"));
+  const auto call_it = [&](int32_t format) {
+    for (const std::string& file : {files.index, files.particles, files.skin}) {
+      tamper(file, [&](hid_t id) { set_attribute<int32_t>(id, "/", "cutproof_format", format); });
+    }
+  };
+  const auto removed = [&] { return RecordingReader(path("run")).header().setup.detect.remove; };
+  EXPECT_EQ(removed(), RemovedEnds::one);
+  call_it(kFormatVersion - 1);
+  EXPECT_EQ(removed(), RemovedEnds::both);
+  tamper(files.index, [](hid_t file) { H5Adelete_by_name(file, "/setup/detect", "remove", H5P_DEFAULT); });
+  EXPECT_EQ(removed(), RemovedEnds::both);
+  call_it(kFormatVersion);
+  expect_input_error([&] { RecordingReader reader(path("run")); }, files.index, "remove");
 }
 
 TEST_F(RecordingTest, IsRefusedIfAFileOfItIsMissingOrOfAnother) {

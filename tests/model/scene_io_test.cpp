@@ -106,6 +106,8 @@ class Scrambler {
     describe(*this, value);
     if constexpr (std::is_same_v<T, BodySpec>) value.particles = 0;
     if constexpr (std::is_same_v<T, StepParameters>) value.acceleration = Acceleration::none;  // excludes `published`
+    if constexpr (std::is_same_v<T, DetectFields>)
+      value.parameters.remove = RemovedEnds::both;  // excludes most criteria
     if constexpr (std::is_same_v<T, WallSpec>) value.side = -1;
     if constexpr (std::is_same_v<T, GripSpec>) value.end = value.start + 0.25;
     (void)f;
@@ -158,7 +160,7 @@ TEST(SceneIo, EveryFieldSurvivesWritingAndReading) {
   const json defaults = json::parse(write_scene(plain));
   for (const char* group : {"clusters", "frame", "step", "detect", "split", "merge", "expand", "skin", "blade"}) {
     for (const auto& [name, value] : tree[group].items()) {
-      if (name == "acceleration") continue;  // AccelerationIsForTheImplicitSolver
+      if (name == "acceleration" || name == "remove") continue;  // AccelerationIsFor…, OneEndIsFor…
       EXPECT_NE(value, defaults[group].value(name, json())) << group << "." << name << " kept its default";
     }
   }
@@ -174,7 +176,7 @@ TEST(SceneIo, EveryFieldThatIsWrittenIsReadAgainAlone) {
   const json tree = json::parse(whole);
   for (const char* group : {"clusters", "frame", "step", "detect", "split", "merge", "expand", "skin", "expect"}) {
     for (const auto& [name, value] : tree[group].items()) {
-      if (name == "acceleration") continue;
+      if (name == "acceleration" || name == "remove") continue;
       json less = tree;
       less[group].erase(name);
       EXPECT_NE(write_scene(parse_scene(less.dump(), "scene.json")), whole) << group << "." << name;
@@ -316,9 +318,11 @@ class ChangeOne {
 };
 
 TEST(SceneIo, EachValueComesBackChangedAlone) {
-  // With a mesh and without; with the path of a blade that is an arc; and with the solver that can be accelerated.
+  // With a mesh and without; with the path of a blade that is an arc; with the solver that can be accelerated, and the
+  // criterion that may take one end.
   Scene shaped = scrambled(), meshed = scrambled();
   shaped.step.solver = meshed.step.solver = Solver::implicit;
+  shaped.detect.criterion = meshed.detect.criterion = Criterion::distance;
   meshed.body.shape.reset();
   meshed.body.mesh = {"organ.stl", 1e-3};
   meshed.body.spacing = 0;
@@ -368,6 +372,20 @@ TEST(SceneIo, AccelerationIsForTheImplicitSolver) {
   expect_error(tree, "step.acceleration", {"published", "implicit", "none"});
   tree["step"]["acceleration"] = "none";
   EXPECT_EQ(parse_scene(tree.dump(), "scene.json").step.solver, Solver::published);
+}
+
+TEST(SceneIo, OneEndIsForTheCriterionOfEdges) {
+  Scene scene = parse_scene(kSmallest, "scene.json");
+  EXPECT_EQ(scene.detect.remove, RemovedEnds::both);
+  scene.detect.remove = RemovedEnds::one;
+  EXPECT_EQ(parse_scene(write_scene(scene), "scene.json").detect, scene.detect);
+  json tree = json::parse(write_scene(scene));
+  for (const char* criterion : {"none", "geometric", "strain"}) {
+    tree["detect"]["criterion"] = criterion;
+    expect_error(tree, "detect.remove", {criterion, "distance", "both"});
+  }
+  tree["detect"]["remove"] = "both";
+  EXPECT_EQ(parse_scene(tree.dump(), "scene.json").detect.criterion, Criterion::strain);
 }
 
 TEST(SceneIo, NumbersKeepAllTheirBits) {

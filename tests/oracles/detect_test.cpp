@@ -6,6 +6,7 @@
 #include <functional>
 #include <random>
 
+#include "model/at.h"
 #include "oracles/oracles.h"
 #include "tests/oracles/expectations.h"
 
@@ -98,6 +99,160 @@ TEST(Detection, RejectsRemovalWhereNothingIsEverRemoved) {
     remove_particles(pair.after, {2, 3});
     expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {2, 3});
   }
+}
+
+// --- One end of each edge ---
+
+Pair one_end(Pair pair) {
+  pair.setup.detect.remove = RemovedEnds::one;
+  return pair;
+}
+bool accepts(Pair pair, std::vector<int32_t> gone) {
+  remove_particles(pair.after, gone);
+  return detection(pair.setup, pair.before, pair.after).holds;
+}
+
+TEST(DetectionOfOneEnd, AcceptsOnlyTheLowerOfTwoThatAreAlike) {
+  const Pair pair = one_end(pulled(1.6));
+  EXPECT_TRUE(accepts(pair, {2}));
+  for (const std::vector<int32_t>& gone : {std::vector<int32_t>{}, {3}, {2, 3}, {0, 2}}) {
+    EXPECT_FALSE(accepts(pair, gone));
+  }
+  Pair none = pair;
+  expect_rejected(detection(none.setup, none.before, none.after), {}, {2, 3});
+  Pair wrong = pair;
+  remove_particles(wrong.after, {1, 2});
+  expect_rejected(detection(wrong.setup, wrong.before, wrong.after), {}, {1});
+}
+
+TEST(DetectionOfOneEnd, AcceptsOnlyTheOneWithMoreOpenEdges) {
+  Pair pair = one_end(pulled(1.6));  // 2 → 3, and 1 → 2 now too
+  pair.before.x[0].x -= 0.6;
+  pair.before.x[1].x -= 0.6;
+  pair.after.x = pair.before.x;
+  EXPECT_TRUE(accepts(pair, {2}));
+  for (const std::vector<int32_t>& gone : {std::vector<int32_t>{1}, {3}, {1, 3}, {1, 2}})
+    EXPECT_FALSE(accepts(pair, gone));
+}
+
+TEST(DetectionOfOneEnd, AcceptsOnlyTheEndOnTheBladesNegativeSide) {
+  Pair pair = one_end(pulled(1.6));
+  pair.setup.has_blade = true;
+  pair.setup.blade = {1, 1, 0, 0};
+  const auto stand = [&](double x, double along) {
+    const BladePose pose = {{x, 1, 1}, {0, along, 0}, {0, 0, 1}};  // its normal is along x
+    pair.setup.blade_moves.assign(static_cast<std::size_t>(pair.setup.step.substeps), BladeMove{pose, pose, true, 0});
+  };
+  const double between = pair.before.x[2].x + 0.8;
+  stand(between, -1);
+  EXPECT_TRUE(accepts(pair, {3}));
+  EXPECT_FALSE(accepts(pair, {2}));
+  EXPECT_FALSE(accepts(pair, {2, 3}));
+  stand(between, 1);
+  EXPECT_TRUE(accepts(pair, {2}));
+  EXPECT_FALSE(accepts(pair, {3}));
+  // Beside both ends, and up: as without one.
+  stand(between + 5, -1);
+  EXPECT_TRUE(accepts(pair, {2}));
+  EXPECT_FALSE(accepts(pair, {3}));
+  stand(between, -1);
+  for (BladeMove& move : pair.setup.blade_moves) move.down = false;
+  EXPECT_TRUE(accepts(pair, {2}));
+  EXPECT_FALSE(accepts(pair, {3}));
+  // In the plane of an end rounding decides on which side it is, and 1e-13 away not any more.
+  for (const double off : {0.0, 1e-13, -1e-13}) {
+    stand(pair.before.x[3].x + off, -1);
+    EXPECT_EQ(accepts(pair, {2}), off >= 0) << off;  // 3 is on the positive side, that of 2: as without a blade
+    EXPECT_EQ(accepts(pair, {3}), off <= 0) << off;
+    EXPECT_FALSE(accepts(pair, {2, 3})) << "one of the two is right, and never both";
+  }
+}
+
+// Two edges at particle 2, both at the limit to rounding: their four choices give {}, {1}, {2}; no one gives {1, 2} or
+// {3}.
+TEST(DetectionOfOneEnd, AcceptsWhatOneChoiceOfRoundingGivesAndNothingElse) {
+  Pair pair = one_end(pulled(1.5));
+  pair.before.x[0].x -= 0.5;
+  pair.before.x[1].x -= 0.5;
+  pair.after.x = pair.before.x;
+  for (const std::vector<int32_t>& gone : {std::vector<int32_t>{}, {1}, {2}}) EXPECT_TRUE(accepts(pair, gone));
+  for (const std::vector<int32_t>& gone : {std::vector<int32_t>{3}, {1, 2}, {2, 3}, {1, 3}, {0}}) {
+    EXPECT_FALSE(accepts(pair, gone));
+  }
+  // With the second one beyond doubt: 2, whatever the first is.
+  pair.before.x[3].x += 1e-13;
+  EXPECT_TRUE(accepts(pair, {2}));
+  EXPECT_FALSE(accepts(pair, {}));
+  EXPECT_FALSE(accepts(pair, {1}));
+}
+
+// A long row with every edge at the limit: too much to try, so every particle must have an explanation of its own, and
+// counts as undecided. What no choice gives is rejected still.
+TEST(DetectionOfOneEnd, CountsWhatItCannotTryAsUndecided) {
+  constexpr int32_t kLong = 40;
+  Pair pair = one_end(pair_of(block_body(kLong, 1, 1), {range(0, kLong)}, {range(0, kLong)}));
+  pair.setup.detect.without_blade = true;
+  for (int32_t i = 0; i < kLong; ++i) pair.before.x[static_cast<std::size_t>(i)].x = 1.5 * i;
+  pair.after.x = pair.before.x;
+  Pair all = pair;
+  remove_particles(all.after, range(0, kLong - 1));  // all edges are open
+  const Verdict verdict = detection(all.setup, all.before, all.after);
+  expect_holds(verdict);
+  EXPECT_EQ(verdict.undecided, kLong);
+  EXPECT_TRUE(accepts(pair, {}));
+  EXPECT_FALSE(accepts(pair, {kLong - 1})) << "it is never the lower end";
+  // One edge of them is open beyond doubt, so it must lose an end.
+  for (std::size_t i = 20; i < kLong; ++i) pair.before.x[i].x += 0x1p-40;
+  pair.after.x = pair.before.x;
+  EXPECT_FALSE(accepts(pair, {}));
+  EXPECT_TRUE(accepts(pair, {19}));
+}
+
+// Against the rule written once more, on random bodies: what it says is accepted, and with any one particle turned
+// around it is not.
+TEST(DetectionOfOneEnd, RejectsEverySingleParticleThatIsOtherwise) {
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> normal;
+  int64_t removed = 0;
+  for (int round = 0; round < 6; ++round) {
+    Pair pair = one_end(pair_of(block_body(5, 4, 3), {range(0, 60)}, {range(0, 60)}));
+    const Body& body = pair.setup.body;
+    for (Vec3& x : pair.before.x) x += 0.25 * Vec3{normal(random), normal(random), normal(random)};
+    pair.after.x = pair.before.x;
+    pair.setup.has_blade = true;
+    pair.setup.blade = {1, 1, 0, 0};
+    const BladePose pose = {{3.1, 2.2, 2.3}, {0, 0.6, 0.8}, {0, -0.8, 0.6}};
+    pair.setup.blade_moves.assign(static_cast<std::size_t>(pair.setup.step.substeps),
+                                  BladeMove{pose, pose, round % 2 == 0, 0});
+    const auto is_open = [&](int32_t i, int32_t j) { return norm(pair.before.x[at(i)] - pair.before.x[at(j)]) > 1.5; };
+    const auto count = [&](int32_t i) {
+      int open = 0;
+      for (const int32_t j : body.neighbours(i)) open += is_open(i, j);
+      return open;
+    };
+    const auto goes = [&](int32_t i) {
+      const bool negative = round % 2 == 0 && pair.before.x[at(i)].x < 3.1;
+      for (const int32_t j : body.neighbours(i)) {
+        if (!is_open(i, j)) continue;
+        const bool other = round % 2 == 0 && pair.before.x[at(j)].x < 3.1;
+        if (negative != other ? negative : std::pair(count(i), -i) > std::pair(count(j), -j)) return true;
+      }
+      return false;
+    };
+    std::vector<int32_t> right;
+    for (int32_t i = 0; i < 60; ++i) {
+      if (goes(i)) right.push_back(i);
+    }
+    removed += static_cast<int64_t>(right.size());
+    EXPECT_TRUE(accepts(pair, right)) << "round " << round;
+    for (int32_t i = 0; i < 60; ++i) {
+      std::vector<int32_t> wrong = right;
+      const auto place = std::lower_bound(wrong.begin(), wrong.end(), i);
+      place != wrong.end() && *place == i ? wrong.erase(place) : wrong.insert(place, i);
+      EXPECT_FALSE(accepts(pair, wrong)) << "round " << round << ", particle " << i;
+    }
+  }
+  EXPECT_GT(removed, 60);
 }
 
 // The row is one cluster, whose stretch along x is known: Σ r x / Σ r² with r = -1.5, -0.5, 0.5, 1.5.

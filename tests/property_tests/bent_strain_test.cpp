@@ -164,7 +164,7 @@ TEST(StrainOfAnyClusters, IsJudgedAlikeByOracleReferenceAndKernels) {
     made.setup.stroke_end.clear();
     made.setup.step.substeps = 1;
     made.setup.substep_length = {1e-3};  // one frame, however many strokes the case has
-    made.setup.detect = {Criterion::strain, 1.5, uniform(1.01, 1.4), true};
+    made.setup.detect = {Criterion::strain, RemovedEnds::both, 1.5, uniform(1.01, 1.4), true};
     const double h = made.setup.body.grid.spacing;
     for (double& m : made.setup.body.mass) m *= uniform(0.5, 2);
     reference::update_rest_frames(made.setup.body, made.state.clusters);
@@ -211,7 +211,7 @@ TEST(StrainOfSingleParticles, IsNone) {
   for (double& m : setup.body.mass) m *= uniform(0.5, 2);
   setup.step.substeps = 1;
   setup.substep_length = {1e-3};
-  setup.detect = {Criterion::strain, 1.5, 1.01, true};
+  setup.detect = {Criterion::strain, RemovedEnds::both, 1.5, 1.01, true};
   State state = fixtures::foreign_state(setup.body, clusters, 1, 1);
   for (Vec3& x : state.x) x += {uniform(-0.1, 0.1), uniform(-0.1, 0.1), uniform(-0.1, 0.1)};
   State by_reference = state;

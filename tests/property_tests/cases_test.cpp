@@ -28,9 +28,9 @@ TEST(Cases, ThatWereSavedBeforeThereWereMoreFieldsHaveThePlainOnes) {
   plain.moves = true;
   plain.strokes = {{{0, 0, 0}, {4, 0, 0}, 4, true, Link::apart}};
   json old = json::parse(to_json(plain));
-  const std::vector<std::string> later = {"acceleration", "together", "alpha",      "removal", "epsilon",
-                                          "strain",       "solver",   "relaxation", "damping", "time_step",
-                                          "pace",         "gravity",  "walls",      "grips",   "blade_friction"};
+  const std::vector<std::string> later = {
+      "acceleration", "together",  "alpha", "removal", "epsilon", "strain", "solver",         "relaxation",
+      "damping",      "time_step", "pace",  "gravity", "walls",   "grips",  "blade_friction", "remove"};
   for (const std::string& field : later) {
     ASSERT_EQ(old.erase(field), 1u) << field;
     EXPECT_EQ(from_json(old.dump()), plain) << "without " << field;
@@ -75,6 +75,7 @@ TEST(Cases, WithNumbersThatNoCaseHasAreRefusedByField) {
                                                               {"gravity", {{10'001, 0, 0}, {0, 0, -10'001}}},
                                                               {"solver", {"explicit"}},
                                                               {"removal", {"none"}},
+                                                              {"remove", {"none", "two"}},
                                                               {"acceleration", {"anderson"}},
                                                               {"merge", {"both"}},
                                                               {"alpha", {1e30, 5.5, "5"}}}) {
@@ -263,6 +264,7 @@ TEST(DrawnCases, VaryEveryFieldAndArePlainInMost) {
   for (const auto& [what, special] : std::vector<std::pair<std::string, std::function<bool(const Case&)>>>{
            {"removal by strain", [](const Case& c) { return c.removal == Removal::strain; }},
            {"geometric removal", [](const Case& c) { return c.removal == Removal::geometric; }},
+           {"one end", [](const Case& c) { return c.remove == RemovedEnds::one; }},
            {"epsilon", [&](const Case& c) { return c.epsilon != plain.epsilon; }},
            {"solver", [](const Case& c) { return c.solver == Solver::published; }},
            {"relaxation", [&](const Case& c) { return c.relaxation != plain.relaxation; }},

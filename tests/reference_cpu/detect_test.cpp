@@ -6,6 +6,7 @@
 
 #include "fixtures/bodies.h"
 #include "fixtures/cook.h"
+#include "model/at.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::reference {
@@ -52,6 +53,121 @@ TEST(DetectByDistance, IgnoresDeadNeighbours) {
   state.x[1].y += 10;
   detect(setup, state);
   EXPECT_TRUE(state.removed.empty());
+}
+
+// --- One end of each edge ---
+
+cutproof::Setup one_end(Body body) {
+  cutproof::Setup setup = setup_of(std::move(body));
+  setup.detect.remove = RemovedEnds::one;
+  return setup;
+}
+
+TEST(DetectOneEnd, TakesTheLowerOfTwoThatAreAlike) {
+  const cutproof::Setup setup = one_end(fixtures::block(6, 1, 1, 1.0));
+  State state = cooked(setup);
+  for (std::size_t i = 3; i < 6; ++i) state.x[i].x += 0.500001;
+  detect(setup, state);
+  EXPECT_EQ(state.removed, (std::vector<int32_t>{2}));
+}
+
+TEST(DetectOneEnd, TakesTheOneWithMoreOpenEdges) {
+  // 3 × 3: the middle, 4, is pulled out, so it has four edges that are too long and each neighbour one.
+  const cutproof::Setup setup = one_end(fixtures::block(3, 3, 1, 1.0));
+  State state = cooked(setup);
+  state.x[4].z += 5;
+  detect(setup, state);
+  EXPECT_EQ(state.removed, (std::vector<int32_t>{4}));
+  // With only one of them alive both have one, and the lower goes.
+  state = cooked(setup);
+  state.x[4].z += 5;
+  for (const std::size_t i : {1u, 5u, 7u}) state.alive[i] = 0;
+  detect(setup, state);
+  EXPECT_EQ(state.removed, (std::vector<int32_t>{3}));
+}
+
+// The blade's plane is x = 3.5 (its edge along y, its back along z, so its normal along x), between the second and the
+// third column; on either side of it one end of each edge is too far from the other.
+TEST(DetectOneEnd, TakesTheEndOnTheNegativeSideOfABladeThatIsLowered) {
+  cutproof::Setup setup = one_end(fixtures::block(5, 3, 3, 1.0));  // columns at x = 1 … 5
+  const auto at_blade = [&](bool turned) {
+    const BladePose pose = {{2.5, 2, 2}, {0, turned ? -1.0 : 1.0, 0}, {0, 0, 1}};
+    setup.has_blade = true;
+    setup.blade = {0.1, 0.1, 0, 0};  // the plane counts, however small the plate
+    setup.blade_moves = {{pose, pose, true, 0}};
+  };
+  const auto columns_of = [&](const State& state) {
+    std::vector<double> columns;
+    for (const int32_t i : state.removed) columns.push_back(setup.body.rest_position(i).x);
+    return columns;
+  };
+  State pulled = cooked(setup);
+  for (Vec3& x : pulled.x) x.x += x.x > 2.5 ? 0.4 : -0.4;
+  at_blade(false);
+  State state = pulled;
+  detect(setup, state);
+  EXPECT_EQ(columns_of(state), std::vector<double>(9, 2.0));
+  at_blade(true);
+  state = pulled;
+  detect(setup, state);
+  EXPECT_EQ(columns_of(state), std::vector<double>(9, 3.0));
+  // While it is up it takes no side: the lower of two that are alike.
+  setup.blade_moves[0].down = false;
+  state = pulled;
+  detect(setup, state);
+  EXPECT_EQ(columns_of(state), std::vector<double>(9, 2.0));
+}
+
+TEST(DetectOneEnd, AsksTheBladeWhereItStoodLastWhileItWasLowered) {
+  cutproof::Setup setup = one_end(fixtures::block(2, 1, 1, 1.0));
+  setup.step.substeps = 3;
+  setup.has_blade = true;
+  setup.blade = {1, 1, 0, 0};
+  const BladePose here = {{1.5, 1, 1}, {0, -1, 0}, {0, 0, 1}};  // its negative side is that of particle 1
+  BladePose away = here;
+  away.edge.x = -10;
+  setup.blade_moves = {{away, here, true, 0}, {here, here, false, 0}, {away, away, false, 0}};
+  State state = cooked(setup);
+  state.x[1].x += 1;
+  detect(setup, state);
+  EXPECT_EQ(state.removed, (std::vector<int32_t>{1}));
+  // Lowered once more elsewhere, it is not between them any more.
+  setup.blade_moves[2].down = true;
+  state = cooked(setup);
+  state.x[1].x += 1;
+  detect(setup, state);
+  EXPECT_EQ(state.removed, (std::vector<int32_t>{0}));
+}
+
+// On random bodies: no edge that is too long keeps both ends, who goes had such an edge, and no more go than with both.
+TEST(DetectOneEnd, LeavesNoOpenEdgeAndTakesNobodyWithoutOne) {
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  std::size_t one = 0, both = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    cutproof::Setup setup = one_end(fixtures::block(6, 5, 4, 1.0));
+    const BladePose pose = {{3.5, 2, 2}, {0, 1, 0}, {0, 0, 1}};
+    setup.has_blade = true;
+    setup.blade = {1, 1, 0, 0};
+    setup.blade_moves = {{pose, pose, trial % 2 == 0, 0}};
+    State before = cooked(setup);
+    for (Vec3& x : before.x) x += 0.2 * Vec3{normal(random), normal(random), normal(random)};
+    State after = before;
+    detect(setup, after);
+    setup.detect.remove = RemovedEnds::both;
+    State all = before;
+    detect(setup, all);
+    for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
+      EXPECT_LE(all.alive[at(i)], after.alive[at(i)]) << "who goes has an edge that is too long";
+      for (const int32_t j : setup.body.neighbours(i)) {
+        EXPECT_FALSE(after.alive[at(i)] && after.alive[at(j)] && norm(before.x[at(i)] - before.x[at(j)]) > 1.5);
+      }
+    }
+    one += after.removed.size();
+    both += all.removed.size();
+  }
+  EXPECT_GT(one, 100u);
+  EXPECT_LT(one, 0.7 * static_cast<double>(both));
 }
 
 TEST(DetectByDistance, NeverCutsUniformStretchBelowTheLimit) {

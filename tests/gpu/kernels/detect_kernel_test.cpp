@@ -188,6 +188,111 @@ TEST(GpuDetectByDistance, HandlesParticleCountsAroundWarpsAndBlocks) {
   }
 }
 
+// ---- One end of each edge
+
+// Within the bands of detect.cuh: whether an edge at the particle or at a neighbour is open, and on which side of the
+// blade's plane the ends of its own are.
+bool is_undecidable_of_one(const Setup& setup, const State& state, int32_t i) {
+  const double h = setup.body.grid.spacing, epsilon = setup.detect.epsilon;
+  const BladePose& pose = setup.blade_moves[0].to;
+  std::vector<int32_t> near = {i};
+  for (const int32_t j : setup.body.neighbours(i)) {
+    if (state.alive[at(j)]) near.push_back(j);
+  }
+  for (const int32_t j : near) {
+    const double n = dot(state.x[at(j)] - pose.edge, cross(pose.along, pose.back));
+    if (std::abs(n) <= kUnit * (10 * norm(state.x[at(j)]) + 8 * norm(pose.edge))) return true;
+    for (const int32_t k : setup.body.neighbours(j)) {
+      const double distance = norm(state.x[at(j)] - state.x[at(k)]);
+      if (state.alive[at(k)] && std::abs(distance - epsilon * h) <= 8 * kUnit * (1 + epsilon) * h) return true;
+    }
+  }
+  return false;
+}
+
+TEST(GpuDetectOneEnd, EqualsTheReferenceOutsideItsBandForManyBodiesInOneLoad) {
+  Random random(7);
+  int64_t removed = 0, stayed = 0, undecidable = 0, by_blade = 0;
+  for (int round = 0; round < 30; ++round) {
+    std::vector<cutproof::Setup> setups;
+    std::vector<State> states;
+    for (int b = 0; b < 5; ++b) {
+      const double h = std::vector<double>{1.0, 0.1, 0.0037, 1.0 / 3, 17.0}[at(b)];
+      Body body = fixtures::block(2 + static_cast<int32_t>(random() % 6), 1 + static_cast<int32_t>(random() % 5), 4, h);
+      cutproof::Setup setup = setup_of(std::move(body), Criterion::distance, 3);
+      setup.detect.remove = b == 2 ? RemovedEnds::both : RemovedEnds::one;
+      setup.detect.epsilon = uniform(random, 1.1, 1.8);
+      setup.step.substeps = 2;
+      setup.has_blade = random() % 4 != 0;
+      setup.blade = {h, h, 0, 0};
+      for (int s = 0; s < 6; ++s) {
+        BladePose pose = {h * Vec3{uniform(random, 1, 6), uniform(random, 1, 4), uniform(random, 1, 4)}, {}, {}};
+        pose.along = normalized(vector(random));
+        pose.back = normalized(cross(pose.along, vector(random)));
+        // The last of a frame that is down counts, here the first of its two.
+        setup.blade_moves.push_back({pose, pose, s % 2 == 0 && random() % 3 != 0, 0});
+      }
+      State state = cooked(setup);
+      for (Vec3& x : state.x) x += 0.25 * h * vector(random);
+      for (uint8_t& alive : state.alive) alive = random() % 10 != 0;
+      state.frame = random() % 5 == 0 ? 3 : 0;  // 3: its schedule is over
+      setups.push_back(setup);
+      states.push_back(kept(setup, state));
+    }
+    HostLauncher launcher(HostLauncher::Threads{round % 3 + 1});
+    const std::vector<State> actual = detected(setups, states, launcher);
+    for (std::size_t b = 0; b < setups.size(); ++b) {
+      const State exact = expected(setups[b], states[b]);
+      cutproof::Setup without = setups[b];
+      for (BladeMove& move : without.blade_moves) move.down = false;
+      const State as_if_up = expected(without, states[b]);
+      for (int32_t i = 0; i < setups[b].body.particle_count(); ++i) {
+        if (is_undecidable_of_one(setups[b], states[b], i)) {
+          ++undecidable;
+          continue;
+        }
+        ASSERT_EQ(actual[b].alive[at(i)], exact.alive[at(i)]) << "round " << round << ", body " << b << ", " << i;
+        ++(exact.alive[at(i)] ? stayed : removed);
+        by_blade += exact.alive[at(i)] != as_if_up.alive[at(i)];
+      }
+    }
+  }
+  EXPECT_GT(removed, 500);
+  EXPECT_GT(stayed, 500);
+  EXPECT_GT(by_blade, 50);
+  EXPECT_LT(undecidable, 20);
+}
+
+// Both ends judge an edge at the limit, and the side of an end in the plane, alike: one of them goes, or none.
+TEST(GpuDetectOneEnd, TakesExactlyOneEndHoweverNearTheLimitOrThePlaneItIs) {
+  Random random(8);
+  int one = 0, none = 0, higher = 0;
+  for (int trial = 0; trial < 4000; ++trial) {
+    const double h = uniform(random, 0.001, 2);
+    cutproof::Setup setup = setup_of(fixtures::block(2, 1, 1, h), Criterion::distance);
+    setup.detect.remove = RemovedEnds::one;
+    State state = cooked(setup);
+    const double length = (trial % 2 ? 1.5 * (1 + uniform(random, -2, 2) * kUnit) : 2) * h;
+    state.x[0] += 10 * h * vector(random);
+    state.x[1] = state.x[0] + length * normalized(vector(random));
+    BladePose pose = {state.x[1], normalized(vector(random)), {}};
+    pose.back = normalized(cross(pose.along, vector(random)));
+    pose.edge += (uniform(random, -2, 2) * kUnit * h) * vector(random);
+    setup.has_blade = true;
+    setup.blade = {h, h, 0, 0};
+    setup.blade_moves = {{pose, pose, true, 0}};
+    const State after = detected(setup, state);
+    ASSERT_TRUE(after.alive[0] || after.alive[1]) << "trial " << trial;
+    const bool went = !after.alive[0] || !after.alive[1];
+    ASSERT_TRUE(went || trial % 2 == 1) << "trial " << trial;
+    ++(went ? one : none);
+    higher += !after.alive[1];
+  }
+  EXPECT_GT(one, 2500);
+  EXPECT_GT(none, 500);
+  EXPECT_GT(higher, 500);
+}
+
 TEST(GpuDetect, ReplacesTheListWhenItRunsTwiceInAFrame) {
   const cutproof::Setup setup = setup_of(fixtures::block(8, 1, 1, 1.0), Criterion::distance);
   State state = cooked(setup);
@@ -466,12 +571,13 @@ TEST(GpuDetect, JudgesEachBodyOfALoadByItsOwnCriterionUnderAnySchedule) {
   std::vector<cutproof::Setup> setups;
   std::vector<State> states;
   for (const Criterion criterion : {Criterion::geometric, Criterion::distance, Criterion::none, Criterion::strain,
-                                    Criterion::geometric, Criterion::distance}) {
+                                    Criterion::geometric, Criterion::distance, Criterion::distance}) {
     cutproof::Setup setup = setup_of(fixtures::block(5, 4, 3, 1.0), criterion);
+    if (setups.size() == 6) setup.detect.remove = RemovedEnds::one;
     const BladePose pose = {{3, 2, 0}, {0, 1, 0}, {0, 0, 1}};
     sweep(setup, pose, pose, 10, 10, setups.empty() ? 0 : 2.5);
     State state = cooked(setup);
-    for (Vec3& x : state.x) x.x *= setups.size() == 3 ? 1.3 : setups.size() == 5 ? 1.6 : 1.0;
+    for (Vec3& x : state.x) x.x *= setups.size() == 3 ? 1.3 : setups.size() >= 5 ? 1.6 : 1.0;
     setups.push_back(setup);
     states.push_back(state);
   }

@@ -227,7 +227,10 @@ TEST(Relations, TheReferenceIsEquivariant) {
   const auto backend = reference::make_backend();
   const std::array<Span, 3> spans = {Span{}, Span{Stage::step, Stage::step}, Span{Stage::detect, Stage::skin}};
   std::array<int, kEquivarianceKinds> judged{};
-  for (const Scene& scene : {spinning_block(), cut_block(Criterion::geometric), cut_block(Criterion::distance)}) {
+  Scene one_end = cut_block(Criterion::distance);
+  one_end.setup.detect.remove = RemovedEnds::one;
+  for (const Scene& scene :
+       {spinning_block(), cut_block(Criterion::geometric), cut_block(Criterion::distance), one_end}) {
     // From the beginning, and from the middle of the run with a skin, dead particles and split clusters.
     backend->load({scene.setup}, {scene.state});
     backend->run(Span{});

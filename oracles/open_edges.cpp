@@ -1,0 +1,199 @@
+#include "oracles/open_edges.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "oracles/shape_sums.h"
+
+namespace cutproof::oracles {
+namespace {
+
+// Rounding band of d > εh, with u the unit roundoff of what is judged. From the stored positions: each difference is
+// off by u relative to itself, its square by 3u, their sum by at most 5u, and the root by 2.5u + u. So every way to
+// compute d in double is off by at most 4u d, every way to compute εh by u (squared and compared: 3u on squares, 1.5u
+// here). What is compared here has the same errors once more: 2 (4u + 2u) = 12u; 16u leaves room for the terms of
+// second order.
+constexpr double kStretchBand = 16;  // [u]
+
+// Of a bare graph the rest length is a distance as well, computed in double precision on both sides: 2 · 4u more.
+constexpr double kRestBand = 8;  // [2⁻⁵³]
+
+// So many things that rounding decides are tried in all combinations.
+constexpr std::size_t kMostTried = 12;
+
+// Where the blade stood last in a frame while it was lowered.
+std::optional<BladePose> last_lowered(const Setup& setup, int64_t frame) {
+  const int64_t substeps = setup.step.substeps;
+  if (!setup.has_blade || frame >= setup.frame_count()) return std::nullopt;
+  for (int64_t s = (frame + 1) * substeps - 1; s >= frame * substeps; --s) {
+    if (setup.blade_moves[at(s)].down) return setup.blade_moves[at(s)].to;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+Demand openness(const Body& body, const std::vector<Vec3>& x, int32_t i, int32_t j, double epsilon, double u) {
+  const double band = kStretchBand * u + (body.on_grid() ? 0 : kRestBand * kUnitRoundoff);
+  const double distance = norm(x[at(i)] - x[at(j)]), limit = epsilon * body.rest_length(i, j);
+  if (distance > limit * (1 + band)) return Demand::remove;
+  return distance < limit * (1 - band) ? Demand::keep : Demand::either;
+}
+
+OneEndOfEach::OneEndOfEach(const Setup& setup, const TissueGraph& graph, const State& before)
+    : setup_(setup),
+      before_(before),
+      at_(before.alive.size()),
+      negative_(before.alive.size(), 0),
+      side_bit_(before.alive.size(), -1) {
+  const double u = unit_roundoff(before);
+  for (int32_t i = 0; i < graph.particle_count(); ++i) {
+    for (const int32_t j : graph.upper_neighbours(i)) {
+      const Demand open = openness(setup.body, before.x, i, j, setup.detect.epsilon, u);
+      if (open == Demand::keep) continue;
+      for (const int32_t end : {i, j}) at_[at(end)].push_back(static_cast<int32_t>(edges_.size()));
+      edges_.push_back({i, j, open == Demand::either ? bits_++ : -1});
+    }
+  }
+  const std::optional<BladePose> pose = last_lowered(setup, before.frame);
+  blade_ = pose.has_value();
+  for (int32_t i = 0; blade_ && i < graph.particle_count(); ++i) {
+    if (at_[at(i)].empty()) continue;
+    const double n = to_local(*pose, before.x[at(i)] - pose->edge).n;
+    // Not below 0 counts as the positive side; places are rounded as those of geometric cuts are.
+    const double band = kPlacesBand * u * (norm(before.x[at(i)]) + norm(pose->edge));
+    if (std::abs(n) <= band) side_bit_[at(i)] = bits_++;
+    negative_[at(i)] = n < 0;
+  }
+}
+
+template <class Value>
+int OneEndOfEach::open_at(int32_t i, const Value& value) const {
+  return static_cast<int>(
+      std::count_if(at_[at(i)].begin(), at_[at(i)].end(), [&](int32_t e) { return is_open(edges_[at(e)], value); }));
+}
+
+template <class Value>
+const OneEndOfEach::Edge* OneEndOfEach::takes(int32_t i, const Value& value) const {
+  for (const int32_t e : at_[at(i)]) {
+    const Edge& edge = edges_[at(e)];
+    if (!is_open(edge, value)) continue;
+    const int32_t j = edge.low == i ? edge.high : edge.low;
+    const bool negative = is_negative(i, value);
+    if (blade_ && negative != is_negative(j, value)) {
+      if (negative) return &edge;
+      continue;
+    }
+    const int here = open_at(i, value), there = open_at(j, value);
+    if (here > there || (here == there && i < j)) return &edge;
+  }
+  return nullptr;
+}
+
+// All that rounding decides and the particle's fate depends on: which of its edges are open, on which side their ends
+// are, and how many open edges the other ends have.
+std::vector<int32_t> OneEndOfEach::bits_of(int32_t i) const {
+  std::vector<int32_t> bits = {side_bit_[at(i)]};
+  for (const int32_t e : at_[at(i)]) {
+    const int32_t j = edges_[at(e)].low == i ? edges_[at(e)].high : edges_[at(e)].low;
+    bits.push_back(side_bit_[at(j)]);
+    for (const int32_t beyond : at_[at(j)]) bits.push_back(edges_[at(beyond)].bit);
+  }
+  std::sort(bits.begin(), bits.end());
+  bits.erase(std::unique(bits.begin(), bits.end()), bits.end());
+  std::erase(bits, -1);
+  return bits;
+}
+
+bool OneEndOfEach::is_explained(const std::vector<int32_t>& particles, const std::vector<int32_t>& bits,
+                                const std::vector<uint8_t>& gone) const {
+  for (uint32_t choice = 0; choice < uint32_t{1} << bits.size(); ++choice) {
+    const auto value = [&](int32_t bit) {
+      return (choice >> (std::lower_bound(bits.begin(), bits.end(), bit) - bits.begin()) & 1u) != 0;
+    };
+    const auto fits = [&](int32_t i) { return (takes(i, value) != nullptr) == (gone[at(i)] != 0); };
+    if (std::all_of(particles.begin(), particles.end(), fits)) return true;
+  }
+  return false;
+}
+
+void OneEndOfEach::reject(int32_t i, bool gone, Verdict& verdict) const {
+  const auto never = [](int32_t) { return false; };
+  const Edge* const edge = takes(i, never);
+  std::vector<int32_t> particles = {i};
+  std::string why;
+  if (gone) {
+    why = at_[at(i)].empty() ? fmt::format("no edge of its is longer than epsilon = {} allows", setup_.detect.epsilon)
+                             : "of each of its edges that are too long the other end goes";
+  } else if (edge == nullptr) {  // something that rounding decides was held against it
+    why = "no choice of what rounding decides lets it stay";
+  } else {
+    const int32_t other = edge->low == i ? edge->high : edge->low;
+    particles.push_back(other);
+    why = blade_ && is_negative(i, never) != is_negative(other, never)
+              ? fmt::format("of its edge to particle {}, {:.17g} h long, it is the end on the blade's negative side",
+                            other, norm(before_.x[at(i)] - before_.x[at(other)]) / setup_.body.grid.spacing)
+              : fmt::format(
+                    "its edge to particle {} is {:.17g} h long, and as many or more of its edges are too long ({}, "
+                    "and {} there)",
+                    other, norm(before_.x[at(i)] - before_.x[at(other)]) / setup_.body.grid.spacing, open_at(i, never),
+                    open_at(other, never));
+  }
+  violate(verdict, {{}, particles}, "particle {} {} removed, but should {}have been: {}", i, gone ? "was" : "was not",
+          gone ? "not " : "", why);
+}
+
+void OneEndOfEach::judge(const std::vector<uint8_t>& gone, Verdict& verdict) const {
+  const auto none = [](int32_t) { return false; };
+  DisjointSets together(bits_);
+  std::vector<std::vector<int32_t>> bits(gone.size());
+  for (std::size_t i = 0; i < gone.size(); ++i) {
+    const auto particle = static_cast<int32_t>(i);
+    if (at_[i].empty()) {
+      if (gone[i] != 0) reject(particle, true, verdict);
+      continue;
+    }
+    bits[i] = bits_of(particle);
+    for (const int32_t bit : bits[i]) together.unite(bits[i].front(), bit);
+    if (bits[i].empty() && (takes(particle, none) != nullptr) != (gone[i] != 0))
+      reject(particle, gone[i] != 0, verdict);
+  }
+  struct Group {
+    std::vector<int32_t> particles, bits;
+  };
+  std::map<int32_t, Group> groups;
+  for (int32_t bit = 0; bit < bits_; ++bit) groups[together.find(bit)].bits.push_back(bit);
+  for (std::size_t i = 0; i < gone.size(); ++i) {
+    if (!bits[i].empty()) groups[together.find(bits[i].front())].particles.push_back(static_cast<int32_t>(i));
+  }
+  for (const auto& [root, group] : groups) {
+    if (group.bits.size() <= kMostTried) {
+      if (is_explained(group.particles, group.bits, gone)) continue;
+      violate(
+          verdict, {{}, group.particles},
+          "no choice of the {} things that rounding decides near particle {} removes these {} particles as they were",
+          group.bits.size(), group.particles.front(), group.particles.size());
+      continue;
+    }
+    for (const int32_t i : group.particles) {
+      const std::vector<int32_t>& own = bits[at(i)];
+      if (own.size() <= kMostTried && !is_explained({i}, own, gone)) reject(i, gone[at(i)] != 0, verdict);
+      ++verdict.undecided;
+    }
+    // Whatever rounding decides, an edge that is too long beyond doubt loses an end.
+    for (const int32_t i : group.particles) {
+      for (const int32_t e : at_[at(i)]) {
+        const Edge& edge = edges_[at(e)];
+        if (edge.bit >= 0 || gone[at(edge.low)] != 0 || gone[at(edge.high)] != 0) continue;
+        violate(verdict, {{}, {edge.low, edge.high}},
+                "the edge from particle {} to {} is too long, and neither end went", edge.low, edge.high);
+      }
+    }
+  }
+}
+
+}  // namespace cutproof::oracles

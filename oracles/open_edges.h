@@ -1,0 +1,63 @@
+// Edges that the criterion `distance` finds too long, and which of their ends go where one is enough (method.md §4).
+// Internal to oracles/.
+#pragma once
+#include <vector>
+
+#include "oracles/blade_motion.h"
+#include "oracles/demand.h"
+#include "oracles/judged.h"
+
+namespace cutproof::oracles {
+
+// Rounding of places in the body, in units of u · (their size), where a backend may use it up: distances to the blade.
+constexpr double kPlacesBand = 32;
+
+// Whether the edge between two neighbours is open, longer than epsilon times its rest length: `remove`: it is, `keep`:
+// it is not, however a backend of unit roundoff u computes it.
+Demand openness(const Body& body, const std::vector<Vec3>& x, int32_t i, int32_t j, double epsilon, double u);
+
+// Detection with `detect.remove` = `one`. Each particle's fate follows from whether edges near it are open, and from
+// which side of the blade's plane their ends are on. Where rounding leaves some of that open, one choice of all of it
+// must explain all particles that hang on it; where that is too much to try, each particle must be explained by some
+// choice of its own, and counts as undecided.
+class OneEndOfEach {
+ public:
+  OneEndOfEach(const Setup& setup, const TissueGraph& graph, const State& before);
+  // `gone`: [n] particles that were alive and are not any more.
+  void judge(const std::vector<uint8_t>& gone, Verdict& verdict) const;
+
+ private:
+  struct Edge {
+    int32_t low, high;
+    int32_t bit;  // whether it is open, if rounding decides; -1: it is
+  };
+  template <class Value>
+  bool is_open(const Edge& edge, const Value& value) const {
+    return edge.bit < 0 || value(edge.bit);
+  }
+  template <class Value>
+  bool is_negative(int32_t i, const Value& value) const {
+    return side_bit_[at(i)] < 0 ? negative_[at(i)] != 0 : value(side_bit_[at(i)]);
+  }
+  template <class Value>
+  int open_at(int32_t i, const Value& value) const;
+  // The edge that takes the particle away, in these values of the bits; null: it stays.
+  template <class Value>
+  const Edge* takes(int32_t i, const Value& value) const;
+  // Whether some values of these bits explain the fates of all these particles.
+  bool is_explained(const std::vector<int32_t>& particles, const std::vector<int32_t>& bits,
+                    const std::vector<uint8_t>& gone) const;
+  std::vector<int32_t> bits_of(int32_t i) const;
+  void reject(int32_t i, bool gone, Verdict& verdict) const;
+
+  const Setup& setup_;
+  const State& before_;
+  bool blade_ = false;                    // it was lowered in this frame
+  std::vector<Edge> edges_;               // those that may be open
+  std::vector<std::vector<int32_t>> at_;  // [n] of them, those at a particle
+  std::vector<uint8_t> negative_;         // [n] whether it is on the blade's negative side, if that is decided
+  std::vector<int32_t> side_bit_;         // [n] whether it is, if rounding decides; -1: that is decided
+  int32_t bits_ = 0;                      // what rounding decides
+};
+
+}  // namespace cutproof::oracles
