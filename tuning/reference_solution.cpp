@@ -28,6 +28,18 @@ int32_t enough_iterations(const Scene& scene, int32_t substeps) {
 
 }  // namespace
 
+double left_to_go(std::span<const RefinementLevel> levels) {
+  constexpr double kSeen = 1e-9;  // [h]
+  constexpr double kNotKnown = std::numeric_limits<double>::infinity();
+  if (levels.empty() || !levels.back().apart_h) return kNotKnown;
+  const double last = *levels.back().apart_h;
+  if (last <= kSeen) return last;
+  const std::optional<double> before = levels.size() < 3 ? std::nullopt : levels[levels.size() - 2].apart_h;
+  if (!before || !std::isfinite(*before) || !(*before > last)) return kNotKnown;
+  const double falls_by = *before / last;
+  return std::max(last, last / (falls_by - 1));
+}
+
 ReferenceSolution::ReferenceSolution(ReferenceKind kind, const Scene& scene, std::string source,
                                      std::optional<int64_t> frames, double known)
     : kind_(kind), scene_(scene), source_(std::move(source)), frames_(frames) {
@@ -40,11 +52,11 @@ ReferenceSolution::ReferenceSolution(ReferenceKind kind, const Scene& scene, std
   std::future<Trajectory> finer = std::async(std::launch::async, [&] { return run(second); });
   trajectory_ = run(first);
   take(second, finer.get());
-  while (known_to_h() > known) {
-    const RefinementLevel next = next_level();
-    if (next.substeps > kMostSubsteps || next.iterations > kMostIterations) break;
-    refine();
-  }
+  const auto is_allowed = [](const RefinementLevel& next) {
+    return next.substeps <= kMostSubsteps && next.iterations <= kMostIterations;
+  };
+  // The third, which tells how fast they come nearer, is run in any case.
+  while (levels_.size() < 3 || (known_to_h() > known && is_allowed(next_level()))) refine();
 }
 
 RefinementLevel ReferenceSolution::next_level() const {

@@ -3,6 +3,7 @@
 #pragma once
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,18 +24,23 @@ struct RefinementLevel {
   std::optional<double> apart_h;  // from the level before: greatest RMS distance in any frame [h]
 };
 
+// By how much the last of these levels may be off [h]. If distances fall by a factor r from level to level, all that
+// are still to come add up to the last one over r - 1 (a geometric series; first order: r = 2, and as much as the last
+// one). One that falls more slowly knows less, and one that does not fall knows nothing: infinity, as with less than
+// two finite distances. Never less than the last distance; below 1e-9 h that, because there rounding is seen.
+double left_to_go(std::span<const RefinementLevel> levels);
+
 class ReferenceSolution {
  public:
-  // Refines, a factor of 2 at a time, until two levels are apart by at most `known` [h], or no further level is allowed
-  // (kMostSubsteps, kMostIterations). The scene must have the implicit solver.
+  // Refines, a factor of 2 at a time, until the solution is known to `known` [h], by three levels at least, or no
+  // further level is allowed (kMostSubsteps, kMostIterations). The scene must have the implicit solver.
   ReferenceSolution(ReferenceKind kind, const Scene& scene, std::string source, std::optional<int64_t> frames,
                     double known);
 
   const Trajectory& trajectory() const { return trajectory_; }
   const std::vector<RefinementLevel>& levels() const { return levels_; }
-  // By how much the solution may be off [h]: how far its last two levels are apart. What converges at first order or
-  // faster is as far from its limit at most.
-  double known_to_h() const { return levels_.back().apart_h.value_or(0); }
+  // By how much the solution may be off [h]; infinity: it is not known.
+  double known_to_h() const { return left_to_go(levels_); }
   bool nothing_removed() const;
 
   // One more level, whatever it costs: what the search has not seen.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <utility>
 
 #include "harness/frame_runner.h"
@@ -44,8 +45,11 @@ Verified verify(const Measuring& measuring, const ReferenceSolution& reference, 
   } else if (verified.failure = difference_in_parts(wanted, comparison.trajectory()); !verified.failure.empty()) {
     verified.trial.outcome = Outcome::topology;
   } else if (comparison.beyond()) {
-    verified.failure = fmt::format("it is {:.2g} h from a finer reference solution, known to {:.2g} h",
-                                   verified.trial.greatest_rms_h, reference.known_to_h());
+    const double known = reference.known_to_h();
+    verified.failure = fmt::format(
+        "it is {:.2g} h from a finer reference solution, {}", verified.trial.greatest_rms_h,
+        std::isfinite(known) ? fmt::format("known to {:.2g} h", known)
+                             : std::string("which is not known: it is as far from the one before as that was"));
     verified.trial.outcome = Outcome::over;
   } else {
     verified.trial.outcome = Outcome::within;

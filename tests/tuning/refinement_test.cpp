@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -40,15 +41,40 @@ TEST(ReferenceSolution, OfShortTimeStepsIsTheParabola) {
 
 TEST(ReferenceSolution, IsRefinedUntilItIsKnown) {
   const ReferenceSolution rough(ReferenceKind::limit, scene_of(kFalling), "test", {}, 1);
-  EXPECT_EQ(rough.levels().size(), 2u);
+  EXPECT_EQ(rough.levels().size(), 3u) << "two distances tell how fast it comes nearer";
   EXPECT_FALSE(rough.levels().front().apart_h);
+  EXPECT_NEAR(rough.known_to_h(), *rough.levels().back().apart_h, 1e-9) << "first order";
   ReferenceSolution fine(ReferenceKind::limit, scene_of(kFalling), "test", {}, 0.005);
-  EXPECT_GT(fine.levels().size(), 2u);
+  EXPECT_GT(fine.levels().size(), 3u);
   EXPECT_LE(fine.known_to_h(), 0.005);
   const std::size_t levels = fine.levels().size();
   fine.refine();
   EXPECT_EQ(fine.levels().size(), levels + 1);
   EXPECT_TRUE(fine.nothing_removed());
+}
+
+// Distances that fall by r from level to level are followed by 1 / r, 1 / r², … of the last one.
+TEST(ReferenceSolution, IsKnownAsItsLevelsComeNearer) {
+  const auto known = [](std::vector<double> apart) {
+    std::vector<RefinementLevel> levels(1);
+    for (const double distance : apart) levels.push_back({1, 1, distance});
+    return left_to_go(levels);
+  };
+  EXPECT_DOUBLE_EQ(known({1, 0.5, 0.25}), 0.25);                         // first order
+  EXPECT_DOUBLE_EQ(known({1, 0.1, 0.01}), 0.01);                         // faster: not less than the last
+  EXPECT_DOUBLE_EQ(known({0.068, 0.042}), 0.042 / (0.068 / 0.042 - 1));  // slower: more
+  double series = 0;
+  for (double term = 0.8 * 0.5; term > 1e-16; term *= 0.8) series += term;
+  EXPECT_NEAR(known({0.5 / 0.8, 0.5}), series, 1e-12);
+  constexpr double kNothing = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(known({0.043, 0.048}), kNothing);  // no nearer
+  EXPECT_EQ(known({0.05, 0.05}), kNothing);
+  EXPECT_EQ(known({kNothing, 0.05}), kNothing) << "the level before had other parts";
+  EXPECT_EQ(known({kNothing, 0.1, 0.05}), 0.05);
+  EXPECT_EQ(known({0.05, kNothing}), kNothing);
+  EXPECT_EQ(known({0.05}), kNothing) << "one distance tells nothing of the next";
+  EXPECT_EQ(known({}), kNothing);
+  EXPECT_EQ(known({1e-15, 2e-15}), 2e-15) << "what rounding leaves does not fall";
 }
 
 // A block is pulled aside by its end and comes to rest again, where every solution is the same: in the end nothing is
@@ -60,7 +86,7 @@ TEST(ReferenceSolution, IsKnownToTheGreatestDistanceOfAnyFrame) {
     "grips": [{"low": [0, 0, 0], "high": [0.2, 1, 1], "end": 0.064, "velocity": [0, 0, 0.3]},
               {"low": [0, 0, 0], "high": [0.2, 1, 1], "start": 0.064}]})");
   const ReferenceSolution solution(ReferenceKind::substeps, scene, "test", {}, 1);
-  ASSERT_EQ(solution.levels().size(), 2u);
+  ASSERT_EQ(solution.levels().size(), 3u);
   std::vector<std::vector<std::vector<Vec3>>> runs;  // of each level, frame by frame
   for (const RefinementLevel& level : solution.levels()) {
     scene.step.iterations = level.iterations;
@@ -71,19 +97,26 @@ TEST(ReferenceSolution, IsKnownToTheGreatestDistanceOfAnyFrame) {
       return true;
     });
   }
-  std::vector<double> apart;
-  for (std::size_t f = 0; f < runs[0].size(); ++f) {
-    double squares = 0;
-    for (std::size_t i = 0; i < runs[0][f].size(); ++i) {
-      const Vec3 d = runs[0][f][i] - runs[1][f][i];
-      squares += dot(d, d);
+  const auto apart = [&](std::size_t level) {
+    std::vector<double> distances;
+    for (std::size_t f = 0; f < runs[level].size(); ++f) {
+      double squares = 0;
+      for (std::size_t i = 0; i < runs[level][f].size(); ++i) {
+        const Vec3 d = runs[level][f][i] - runs[level - 1][f][i];
+        squares += dot(d, d);
+      }
+      distances.push_back(std::sqrt(squares / static_cast<double>(runs[level][f].size())) / 0.01);
     }
-    apart.push_back(std::sqrt(squares / static_cast<double>(runs[0][f].size())) / 0.01);
-  }
-  const auto greatest = std::max_element(apart.begin(), apart.end());
-  ASSERT_GT(*greatest, 1e-3);
-  ASSERT_LT(apart.back(), *greatest / 10) << "the error does not peak in the middle, so this shows nothing";
-  EXPECT_NEAR(solution.known_to_h(), *greatest, 1e-9 * *greatest);
+    return distances;
+  };
+  const std::vector<double> first = apart(1), last = apart(2);
+  const double before = *std::max_element(first.begin(), first.end());
+  const double greatest = *std::max_element(last.begin(), last.end());
+  ASSERT_GT(greatest, 1e-3);
+  ASSERT_LT(last.back(), greatest / 10) << "the error does not peak in the middle, so this shows nothing";
+  ASSERT_GT(before, greatest);
+  const double known = std::max(greatest, greatest / (before / greatest - 1));
+  EXPECT_NEAR(solution.known_to_h(), known, 1e-9 * known);
 }
 
 // Each substep solved exactly, one after the other, by Cholesky factorisation.
