@@ -13,6 +13,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "model/at.h"
 #include "oracles/oracles.h"
 #include "reference_cpu/reference.h"
 #include "tests/oracles/states.h"
@@ -247,6 +248,38 @@ TEST(Relations, TheReferenceIsEquivariant) {
     }
   }
   for (const int count : judged) EXPECT_GT(count, 12) << "of 24 runs of each kind most must be decided";
+}
+
+// A block that is pulled apart in the middle, with no blade to choose: of each edge the lower end goes, and which one
+// that is hangs on the order of particles, which a turned scene has another of.
+TEST(Relations, EquivarianceLeavesOutTurnsWhereTheOrderOfParticlesDecides) {
+  const auto backend = reference::make_backend();
+  Scene torn = cut_block(Criterion::distance);
+  torn.setup.detect.remove = RemovedEnds::one;
+  torn.setup.detect.without_blade = true;
+  torn.setup.has_blade = false;
+  torn.setup.blade_moves.clear();
+  torn.setup.stroke_end.clear();
+  const Body& body = torn.setup.body;
+  double low = 1e300, high = -1e300;
+  for (int32_t i = 0; i < body.particle_count(); ++i) {
+    low = std::min(low, body.rest_position(i).x);
+    high = std::max(high, body.rest_position(i).x);
+  }
+  for (int32_t i = 0; i < body.particle_count(); ++i) {
+    if (body.rest_position(i).x > (low + high) / 2) torn.state.x[at(i)].x += body.grid.spacing;
+  }
+  const Span span{Stage::detect, Stage::skin};
+  backend->load({torn.setup}, {torn.state});
+  backend->run(span);
+  EXPECT_FALSE(backend->snapshot()[0].removed.empty());
+  int checked = 0;
+  for (uint64_t seed = 0; seed < 10 * kEquivarianceKinds; ++seed) {
+    const Verdict verdict = equivariance(*backend, torn.setup, torn.state, span, seed);
+    EXPECT_TRUE(verdict.holds) << "seed " << seed << ": " << verdict.witness.text;
+    checked += verdict.checked > 0;
+  }
+  EXPECT_GT(checked, 40);
 }
 
 TEST(Relations, MoreStrokesOnlyRefineTheReferencesComponents) {
