@@ -24,7 +24,7 @@ constexpr int64_t kOverlapEvery = 8;
 
 const std::vector<Baseline>& baselines() {
   static const std::vector<Baseline> kAll = [] {
-    std::vector<Baseline> all(7);
+    std::vector<Baseline> all(8);
     all[0] = {.name = "this method", .source = "method.md"};
     all[1] = {.name = "particles deleted, no split", .source = "Berndt 2017", .deletion = Deletion::particles};
     all[2] = {.name = "clusters deleted, no split",
@@ -34,6 +34,7 @@ const std::vector<Baseline>& baselines() {
     all[4] = {.name = "no expansion", .source = "Yu 2024, Fig. 13a", .expand = ExpandRule::none};
     all[5] = {.name = "strain detection", .source = "Yu 2024, Fig. 7", .criterion = Criterion::strain};
     all[6] = {.name = "single_pass merging", .source = "Yu 2024", .merge = MergeRule::single_pass};
+    all[7] = {.name = "one end of each edge", .source = "method.md §4", .remove = RemovedEnds::one};
     return all;
   }();
   return kAll;
@@ -44,6 +45,7 @@ ReadyScene make_baseline_scene(const Baseline& baseline, int64_t particles, uint
   scene.seed = seed;
   scene.body.particles = particles;
   scene.detect.criterion = baseline.criterion;
+  scene.detect.remove = baseline.remove;
   scene.merge.rule = baseline.merge;
   scene.expand.rule = baseline.expand;
   // The right grip lets go where the push begins, and only the schedule knows when that is.
@@ -141,6 +143,7 @@ nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const Re
            {{"expand", name_of(baseline.expand)},
             {"merge", name_of(baseline.merge)},
             {"detect", name_of(baseline.criterion)},
+            {"remove", name_of(baseline.remove)},
             {"deletion", kDeletionNames[static_cast<std::size_t>(baseline.deletion)]}}},
           {"frames", frames},
           {"seconds", to_json(times_of(std::move(seconds)))},

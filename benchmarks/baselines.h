@@ -24,6 +24,7 @@ struct Baseline {
   ExpandRule expand = ExpandRule::edge_cover;
   MergeRule merge = MergeRule::deterministic;
   Criterion criterion = Criterion::distance;
+  RemovedEnds remove = RemovedEnds::both;
   Deletion deletion = Deletion::none;
 };
 // This method first.

@@ -69,7 +69,7 @@ TEST(Baselines, DifferInOneSettingFromThisMethod) {
   for (std::size_t b = 1; b < baselines().size(); ++b) {
     const Baseline& other = baselines()[b];
     EXPECT_EQ((other.expand != ours.expand) + (other.merge != ours.merge) + (other.criterion != ours.criterion) +
-                  (other.deletion != ours.deletion),
+                  (other.remove != ours.remove) + (other.deletion != ours.deletion),
               1)
         << other.name;
   }
@@ -113,6 +113,10 @@ TEST_F(BenchBaselines, TellsOfEveryMethodWhatItCosts) {
     EXPECT_GT(ours.at("interpenetration").at("volume"), 0) << "the pieces are pushed into each other";
     EXPECT_GT(unsplit.at("unequal_frames"), 0) << "pieces stay coupled";
     EXPECT_LT(unsplit.at("couplings"), unsplit.at("components"));
+    const json& one_end = rows.at("one end of each edge");
+    EXPECT_EQ(one_end.at("settings").at("remove"), "one");
+    EXPECT_EQ(one_end.at("unequal_frames"), 0);
+    EXPECT_LT(one_end.at("geometry").at("lost_per_area"), ours.at("geometry").at("lost_per_area"));
     EXPECT_GT(deleted.at("geometry").at("lost_per_area"), ours.at("geometry").at("lost_per_area"))
         << "what the paper calls burning";
     EXPECT_GT(deleted.at("geometry").at("hausdorff"), ours.at("geometry").at("hausdorff"));
