@@ -54,7 +54,7 @@ void divide_frame(Setup& setup, int32_t substeps) {
 // Nothing but the step, in one frame of one substep.
 void keep_the_step(Setup& setup) {
   setup.step.damping = 0;
-  setup.detect.criterion = Criterion::none;
+  remove_nothing(setup.detect);
   setup.skin.wanted = false;
   setup.has_blade = false;
   setup.blade_moves.clear();

@@ -54,13 +54,6 @@ void print_beginning(const TuneOptions& options, const json& document, const Sce
   }
 }
 
-// How well the reference solution is known.
-std::string known_to(const json& reference) {
-  if (reference.at("known_h").is_number()) return io::filled("known to {known_h:.2g} h", reference);
-  return io::filled("not known: its last two levels are {apart_h:.2g} h apart, no less than those before",
-                    reference.at("levels").back());
-}
-
 void print_reference(const TuneOptions& options, const json& reference) {
   fmt::print("the reference solution: {}\n", options.reference == ReferenceKind::limit
                                                  ? "the limit of short time steps"
@@ -70,7 +63,7 @@ void print_reference(const TuneOptions& options, const json& reference) {
     if (!level.at("apart_h").is_null()) print_filled(": {apart_h:.2g} h from the one before", level);
     fmt::print("\n");
   }
-  fmt::print("  {}\n", known_to(reference));
+  print_filled("  {known_text}\n", reference);
 }
 
 void print_trials(const json& trials) {
@@ -149,14 +142,15 @@ void print(const TuneOptions& options, TuneStep step, const json& document, cons
       fmt::print(
           "the reference solution is {}, so nothing can be said to be within {:g} h of it.\n"
           "  Give a greater tolerance{}.\n",
-          known_to(document.at("reference")), options.tolerance,
+          document.at("reference").at("known_text").get<std::string>(), options.tolerance,
           options.reference == ReferenceKind::limit
               ? ", fewer --frames, or --reference substeps, which takes the scene's time step as given"
               : " or fewer --frames");
       return;
     case TuneStep::none_within:
       fmt::print("none of {} configurations is within {:g} h of the reference solution, itself {}\n",
-                 document.at("trials").size(), options.tolerance, known_to(document.at("reference")));
+                 document.at("trials").size(), options.tolerance,
+                 document.at("reference").at("known_text").get<std::string>());
       return;
     case TuneStep::none_verified:
       fmt::print("none of the configurations that seemed to be within {:g} h holds when it is verified\n",

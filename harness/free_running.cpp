@@ -17,6 +17,8 @@ namespace {
 
 // Rounding of a neighbour distance, in units of u h.
 constexpr double kDistanceBand = 64;
+// Rounding of places in the body, in units of u (|x| + |edge of the blade|): on which side of its plane they are.
+constexpr double kPlacesBand = 32;
 
 // By how much an edge is longer than allowed (method.md §4) [h].
 double excess_of(const Setup& setup, const State& state, int32_t a, int32_t b) {
@@ -32,30 +34,46 @@ void for_edges(const Setup& setup, const State& state, int32_t particle, const V
   }
 }
 
-// How far the particle's removal is from being another one [h]: if both ends go, by how much its longest edge is longer
-// than allowed. If one does, whether any of its edges or of those of its neighbours is open counts, and on which side
-// of a lowered blade's plane they are: the least of these distances.
-double margin_of(const Setup& setup, const State& state, int32_t particle) {
+// How far something that decides a removal is from being decided otherwise, and how far it may be by what the runs are
+// apart [h].
+struct Closeness {
+  double margin = std::numeric_limits<double>::infinity(), reach = 0;
+  double beyond() const { return margin - reach; }
+};
+
+// Of a particle's removal, with positions at most `apart` from each other in the two runs [h]. If both ends of an edge
+// go: by how much its longest edge is longer than allowed. If one does: of the edges at it and at its neighbours, and
+// of the sides of these of the plane of the blade where it was lowered last, whatever is nearest to being otherwise.
+Closeness closeness_of(const Setup& setup, const State& state, int32_t particle, double apart, double u) {
+  // Each end of an edge is off by at most `apart`, so the edge's length by at most twice that.
+  const double of_edges = 2 * apart + kDistanceBand * u;
   if (setup.detect.remove == RemovedEnds::both) {
     double greatest = -setup.detect.epsilon;  // without neighbours nothing is long
     for_edges(setup, state, particle,
               [&](int32_t other) { greatest = std::max(greatest, excess_of(setup, state, particle, other)); });
-    return std::abs(greatest);
+    return {std::abs(greatest), of_edges};
   }
-  double least = std::numeric_limits<double>::infinity();
-  const auto note = [&](double distance) { least = std::min(least, std::abs(distance)); };
+  Closeness nearest;
+  const auto note = [&](double distance, double reach) {
+    const Closeness found{std::abs(distance), reach};
+    if (found.beyond() < nearest.beyond()) nearest = found;
+  };
   std::vector<int32_t> near = {particle};
   for_edges(setup, state, particle, [&](int32_t other) { near.push_back(other); });
   for (const int32_t i : near) {
-    for_edges(setup, state, i, [&](int32_t other) { note(excess_of(setup, state, i, other)); });
+    for_edges(setup, state, i, [&](int32_t other) { note(excess_of(setup, state, i, other), of_edges); });
   }
-  for (int64_t s = 0; setup.has_blade && s < setup.step.substeps; ++s) {
+  for (int64_t s = setup.step.substeps - 1; setup.has_blade && s >= 0; --s) {
     const BladeMove& move = setup.blade_moves[at(state.frame * setup.step.substeps + s)];
     if (!move.down) continue;
     const Vec3 normal = cross(move.to.along, move.to.back);
-    for (const int32_t i : near) note(dot(state.x[at(i)] - move.to.edge, normal) / setup.body.grid.spacing);
+    for (const int32_t i : near) {
+      const double places = (norm(state.x[at(i)]) + norm(move.to.edge)) / setup.body.grid.spacing;
+      note(dot(state.x[at(i)] - move.to.edge, normal) / setup.body.grid.spacing, apart + kPlacesBand * u * places);
+    }
+    break;
   }
-  return least;
+  return nearest;
 }
 
 }  // namespace
@@ -102,12 +120,14 @@ void FreeRunning::see(Stage stage, const State& after) {
       if (setup_.detect.criterion == Criterion::distance) {
         State present = expected;
         for (const int32_t i : expected.removed) present.alive[at(i)] = 1;
-        double margin = 0;
-        for (const int32_t i : undecided) margin = std::max(margin, margin_of(setup_, present, i));
-        first.margin = margin;
-        // Each end of an edge is off by at most the greatest error, so the edge's length by at most twice that.
-        first.reach = 2 * frames_.back().position.max + kDistanceBand * unit_roundoff(after);
-        first.explained = first.explained && std::isfinite(first.reach) && margin <= first.reach;
+        Closeness farthest{0, 0};
+        for (const int32_t i : undecided) {
+          const Closeness of = closeness_of(setup_, present, i, frames_.back().position.max, unit_roundoff(after));
+          if (i == undecided.front() || !(of.beyond() <= farthest.beyond())) farthest = of;
+        }
+        first.margin = farthest.margin;
+        first.reach = farthest.reach;
+        first.explained = first.explained && std::isfinite(first.reach) && farthest.margin <= first.reach;
       }
     }
     // Where the rule leaves several right answers, this one may be another: all else is equal, and it is right.

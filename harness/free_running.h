@@ -25,8 +25,9 @@ struct FirstDifference {
   int64_t frame = 0;
   Stage stage = Stage::step;
   oracles::DecisionDifference what;
-  // Distance criterion, removals: greatest |d_i - εh| / h of the particles that only one of them removed, in the
-  // reference's positions, and by how much their d_i may differ, given how far the positions are apart.
+  // Distance criterion, removals: of the particles that only one of them removed the one whose removal is farthest from
+  // being another, in the reference's positions: |d_i - εh| / h, or of one end of each edge the least such distance of
+  // an edge or of a side of the blade's plane; and by how much that may differ, given how far the positions are apart.
   std::optional<double> margin;
   double reach = 0;  // [h]
   // Both may be right: the backend's removals are those that its own positions ask for and the margin is within reach,

@@ -79,9 +79,9 @@ constexpr CriterionPromise promise_of(Criterion criterion) {
 
 // What a rule of which ends go promises (method.md §4).
 struct RemovePromise {
-  bool minds_no_order;  // particles in another order are the same answer
+  bool order_independent;  // with particles in another order the answer is the same
 };
-constexpr RemovePromise promise_of(RemovedEnds remove) { return {.minds_no_order = remove == RemovedEnds::both}; }
+constexpr RemovePromise promise_of(RemovedEnds remove) { return {.order_independent = remove == RemovedEnds::both}; }
 
 // Whether a body in this state is due a stage (model/backend.h, run), given the state before the stage.
 // A backend writes its own rule of this: it is tested against this one.

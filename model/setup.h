@@ -38,6 +38,12 @@ struct DetectParameters {
   friend bool operator==(const DetectParameters&, const DetectParameters&) = default;
 };
 
+// Nothing is ever removed: with what that leaves without a meaning as it is by default.
+inline void remove_nothing(DetectParameters& detect) {
+  detect.criterion = Criterion::none;
+  detect.remove = RemovedEnds::both;
+}
+
 struct SplitParameters {
   int32_t debris = 0;  // components of G with fewer particles are removed; 0 keeps all
   friend bool operator==(const SplitParameters&, const SplitParameters&) = default;

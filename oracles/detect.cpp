@@ -80,7 +80,6 @@ double distance_to_translated(const Blade& blade, Local p, Local d) {
 // body of a thousand spacings, is far inside the band around that.
 constexpr double kTie = 1e-9;
 constexpr double kSweepBand = 5e-10;
-// Of places (open_edges.h): twice the lengthening of 16 u reach + 12 u (|x| + |edge|), and rounding.
 
 // A turning sweep has no closed form, and a backend may replace it by translations that are off by a little: between
 // `reach` and `reach` + kTurningSlack · h either answer is right. The distance to the pose at t changes by at most

@@ -47,7 +47,7 @@ Demand openness(const Body& body, const std::vector<Vec3>& x, int32_t i, int32_t
 OneEndOfEach::OneEndOfEach(const Setup& setup, const TissueGraph& graph, const State& before)
     : setup_(setup),
       before_(before),
-      at_(before.alive.size()),
+      edges_at_(before.alive.size()),
       negative_(before.alive.size(), 0),
       side_bit_(before.alive.size(), -1) {
   const double u = unit_roundoff(before);
@@ -55,14 +55,14 @@ OneEndOfEach::OneEndOfEach(const Setup& setup, const TissueGraph& graph, const S
     for (const int32_t j : graph.upper_neighbours(i)) {
       const Demand open = openness(setup.body, before.x, i, j, setup.detect.epsilon, u);
       if (open == Demand::keep) continue;
-      for (const int32_t end : {i, j}) at_[at(end)].push_back(static_cast<int32_t>(edges_.size()));
+      for (const int32_t end : {i, j}) edges_at_[at(end)].push_back(static_cast<int32_t>(edges_.size()));
       edges_.push_back({i, j, open == Demand::either ? bits_++ : -1});
     }
   }
   const std::optional<BladePose> pose = last_lowered(setup, before.frame);
-  blade_ = pose.has_value();
-  for (int32_t i = 0; blade_ && i < graph.particle_count(); ++i) {
-    if (at_[at(i)].empty()) continue;
+  has_lowered_blade_ = pose.has_value();
+  for (int32_t i = 0; has_lowered_blade_ && i < graph.particle_count(); ++i) {
+    if (edges_at_[at(i)].empty()) continue;
     const double n = to_local(*pose, before.x[at(i)] - pose->edge).n;
     // Not below 0 counts as the positive side; places are rounded as those of geometric cuts are.
     const double band = kPlacesBand * u * (norm(before.x[at(i)]) + norm(pose->edge));
@@ -73,18 +73,18 @@ OneEndOfEach::OneEndOfEach(const Setup& setup, const TissueGraph& graph, const S
 
 template <class Value>
 int OneEndOfEach::open_at(int32_t i, const Value& value) const {
-  return static_cast<int>(
-      std::count_if(at_[at(i)].begin(), at_[at(i)].end(), [&](int32_t e) { return is_open(edges_[at(e)], value); }));
+  return static_cast<int>(std::count_if(edges_at_[at(i)].begin(), edges_at_[at(i)].end(),
+                                        [&](int32_t e) { return is_open(edges_[at(e)], value); }));
 }
 
 template <class Value>
-const OneEndOfEach::Edge* OneEndOfEach::takes(int32_t i, const Value& value) const {
-  for (const int32_t e : at_[at(i)]) {
+const OneEndOfEach::Edge* OneEndOfEach::edge_that_removes(int32_t i, const Value& value) const {
+  for (const int32_t e : edges_at_[at(i)]) {
     const Edge& edge = edges_[at(e)];
     if (!is_open(edge, value)) continue;
-    const int32_t j = edge.low == i ? edge.high : edge.low;
+    const int32_t j = other_end(edge, i);
     const bool negative = is_negative(i, value);
-    if (blade_ && negative != is_negative(j, value)) {
+    if (has_lowered_blade_ && negative != is_negative(j, value)) {
       if (negative) return &edge;
       continue;
     }
@@ -98,15 +98,38 @@ const OneEndOfEach::Edge* OneEndOfEach::takes(int32_t i, const Value& value) con
 // are, and how many open edges the other ends have.
 std::vector<int32_t> OneEndOfEach::bits_of(int32_t i) const {
   std::vector<int32_t> bits = {side_bit_[at(i)]};
-  for (const int32_t e : at_[at(i)]) {
-    const int32_t j = edges_[at(e)].low == i ? edges_[at(e)].high : edges_[at(e)].low;
+  for (const int32_t e : edges_at_[at(i)]) {
+    const int32_t j = other_end(edges_[at(e)], i);
     bits.push_back(side_bit_[at(j)]);
-    for (const int32_t beyond : at_[at(j)]) bits.push_back(edges_[at(beyond)].bit);
+    for (const int32_t beyond : edges_at_[at(j)]) bits.push_back(edges_[at(beyond)].bit);
   }
   std::sort(bits.begin(), bits.end());
   bits.erase(std::unique(bits.begin(), bits.end()), bits.end());
   std::erase(bits, -1);
   return bits;
+}
+
+Demand OneEndOfEach::bluntly(int32_t i) const {
+  const auto surely = [](int32_t) { return false; };
+  const auto perhaps = [](int32_t) { return true; };
+  const auto undecided_side = [&](int32_t p) { return side_bit_[at(p)] >= 0; };
+  Demand demand = Demand::keep;
+  for (const int32_t e : edges_at_[at(i)]) {
+    const Edge& edge = edges_[at(e)];
+    const int32_t j = other_end(edge, i);
+    const bool sides_known = !has_lowered_blade_ || (!undecided_side(i) && !undecided_side(j));
+    const bool between = has_lowered_blade_ && is_negative(i, surely) != is_negative(j, surely);
+    // How many open edges they have at least and at most; the edge itself counts at both ends.
+    const int least_here = open_at(i, surely), most_here = open_at(i, perhaps);
+    const int least_there = open_at(j, surely), most_there = open_at(j, perhaps);
+    const bool must_by_count = least_here > most_there || (least_here >= most_there && i < j);
+    const bool may_by_count = most_here > least_there || (most_here >= least_there && i < j);
+    const bool must = sides_known && (between ? is_negative(i, surely) : must_by_count);
+    const bool may = !sides_known || (between ? is_negative(i, surely) : may_by_count);
+    if (must && edge.bit < 0) return Demand::remove;
+    if (may) demand = Demand::either;
+  }
+  return demand;
 }
 
 bool OneEndOfEach::is_explained(const std::vector<int32_t>& particles, const std::vector<int32_t>& bits,
@@ -115,7 +138,7 @@ bool OneEndOfEach::is_explained(const std::vector<int32_t>& particles, const std
     const auto value = [&](int32_t bit) {
       return (choice >> (std::lower_bound(bits.begin(), bits.end(), bit) - bits.begin()) & 1u) != 0;
     };
-    const auto fits = [&](int32_t i) { return (takes(i, value) != nullptr) == (gone[at(i)] != 0); };
+    const auto fits = [&](int32_t i) { return (edge_that_removes(i, value) != nullptr) == (gone[at(i)] != 0); };
     if (std::all_of(particles.begin(), particles.end(), fits)) return true;
   }
   return false;
@@ -123,25 +146,25 @@ bool OneEndOfEach::is_explained(const std::vector<int32_t>& particles, const std
 
 void OneEndOfEach::reject(int32_t i, bool gone, Verdict& verdict) const {
   const auto never = [](int32_t) { return false; };
-  const Edge* const edge = takes(i, never);
+  const Edge* const edge = edge_that_removes(i, never);
   std::vector<int32_t> particles = {i};
   std::string why;
   if (gone) {
-    why = at_[at(i)].empty() ? fmt::format("no edge of its is longer than epsilon = {} allows", setup_.detect.epsilon)
-                             : "of each of its edges that are too long the other end goes";
+    why = edges_at_[at(i)].empty()
+              ? fmt::format("no edge of its is longer than epsilon = {} allows", setup_.detect.epsilon)
+              : "of each of its edges that are too long the other end goes";
   } else if (edge == nullptr) {  // something that rounding decides was held against it
     why = "no choice of what rounding decides lets it stay";
   } else {
-    const int32_t other = edge->low == i ? edge->high : edge->low;
+    const int32_t other = other_end(*edge, i);
+    const double length = norm(before_.x[at(i)] - before_.x[at(other)]) / setup_.body.grid.spacing;
     particles.push_back(other);
-    why = blade_ && is_negative(i, never) != is_negative(other, never)
+    why = has_lowered_blade_ && is_negative(i, never) != is_negative(other, never)
               ? fmt::format("of its edge to particle {}, {:.17g} h long, it is the end on the blade's negative side",
-                            other, norm(before_.x[at(i)] - before_.x[at(other)]) / setup_.body.grid.spacing)
+                            other, length)
               : fmt::format(
-                    "its edge to particle {} is {:.17g} h long, and as many or more of its edges are too long ({}, "
-                    "and {} there)",
-                    other, norm(before_.x[at(i)] - before_.x[at(other)]) / setup_.body.grid.spacing, open_at(i, never),
-                    open_at(other, never));
+                    "its edge to particle {} is {:.17g} h long, and of its edges {} are too long, of the other's {}",
+                    other, length, open_at(i, never), open_at(other, never));
   }
   violate(verdict, {{}, particles}, "particle {} {} removed, but should {}have been: {}", i, gone ? "was" : "was not",
           gone ? "not " : "", why);
@@ -153,13 +176,13 @@ void OneEndOfEach::judge(const std::vector<uint8_t>& gone, Verdict& verdict) con
   std::vector<std::vector<int32_t>> bits(gone.size());
   for (std::size_t i = 0; i < gone.size(); ++i) {
     const auto particle = static_cast<int32_t>(i);
-    if (at_[i].empty()) {
+    if (edges_at_[i].empty()) {
       if (gone[i] != 0) reject(particle, true, verdict);
       continue;
     }
     bits[i] = bits_of(particle);
     for (const int32_t bit : bits[i]) together.unite(bits[i].front(), bit);
-    if (bits[i].empty() && (takes(particle, none) != nullptr) != (gone[i] != 0))
+    if (bits[i].empty() && (edge_that_removes(particle, none) != nullptr) != (gone[i] != 0))
       reject(particle, gone[i] != 0, verdict);
   }
   struct Group {
@@ -181,12 +204,15 @@ void OneEndOfEach::judge(const std::vector<uint8_t>& gone, Verdict& verdict) con
     }
     for (const int32_t i : group.particles) {
       const std::vector<int32_t>& own = bits[at(i)];
-      if (own.size() <= kMostTried && !is_explained({i}, own, gone)) reject(i, gone[at(i)] != 0, verdict);
-      ++verdict.undecided;
+      const Demand demand = bluntly(i);
+      const bool is_wrong = demand != Demand::either ? (demand == Demand::remove) != (gone[at(i)] != 0)
+                                                     : own.size() <= kMostTried && !is_explained({i}, own, gone);
+      if (is_wrong) reject(i, gone[at(i)] != 0, verdict);
+      verdict.undecided += demand == Demand::either;
     }
     // Whatever rounding decides, an edge that is too long beyond doubt loses an end.
     for (const int32_t i : group.particles) {
-      for (const int32_t e : at_[at(i)]) {
+      for (const int32_t e : edges_at_[at(i)]) {
         const Edge& edge = edges_[at(e)];
         if (edge.bit >= 0 || gone[at(edge.low)] != 0 || gone[at(edge.high)] != 0) continue;
         violate(verdict, {{}, {edge.low, edge.high}},

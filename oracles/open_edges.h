@@ -9,7 +9,9 @@
 
 namespace cutproof::oracles {
 
-// Rounding of places in the body, in units of u · (their size), where a backend may use it up: distances to the blade.
+// Of distances between places in the body and the blade, in units of u (|x| + |edge|): such a place carries 10 u |x| +
+// 8 u |edge| (gpu/kernels/detect.cuh), by which a backend may lengthen its reach, 16 u reach + 12 u (|x| + |edge|)
+// there; twice that, and rounding. Here for both the reach of geometric cuts and the sides of the blade's plane.
 constexpr double kPlacesBand = 32;
 
 // Whether the edge between two neighbours is open, longer than epsilon times its rest length: `remove`: it is, `keep`:
@@ -18,8 +20,9 @@ Demand openness(const Body& body, const std::vector<Vec3>& x, int32_t i, int32_t
 
 // Detection with `detect.remove` = `one`. Each particle's fate follows from whether edges near it are open, and from
 // which side of the blade's plane their ends are on. Where rounding leaves some of that open, one choice of all of it
-// must explain all particles that hang on it; where that is too much to try, each particle must be explained by some
-// choice of its own, and counts as undecided.
+// must explain all particles that hang on it. Where that is too much to try, each particle must be explained by some
+// choice of its own; and where even that is, it must stay if no choice takes it, and go if every one does, as far as
+// bounds of its count of open edges tell. Whoever may do both then counts as undecided.
 class OneEndOfEach {
  public:
   OneEndOfEach(const Setup& setup, const TissueGraph& graph, const State& before);
@@ -31,6 +34,7 @@ class OneEndOfEach {
     int32_t low, high;
     int32_t bit;  // whether it is open, if rounding decides; -1: it is
   };
+  int32_t other_end(const Edge& edge, int32_t i) const { return edge.low == i ? edge.high : edge.low; }
   template <class Value>
   bool is_open(const Edge& edge, const Value& value) const {
     return edge.bit < 0 || value(edge.bit);
@@ -41,23 +45,25 @@ class OneEndOfEach {
   }
   template <class Value>
   int open_at(int32_t i, const Value& value) const;
-  // The edge that takes the particle away, in these values of the bits; null: it stays.
+  // The edge that removes the particle, in these values of the bits; null: it stays.
   template <class Value>
-  const Edge* takes(int32_t i, const Value& value) const;
+  const Edge* edge_that_removes(int32_t i, const Value& value) const;
   // Whether some values of these bits explain the fates of all these particles.
   bool is_explained(const std::vector<int32_t>& particles, const std::vector<int32_t>& bits,
                     const std::vector<uint8_t>& gone) const;
   std::vector<int32_t> bits_of(int32_t i) const;
+  // `keep` or `remove` only if that is so in all values of the bits.
+  Demand bluntly(int32_t i) const;
   void reject(int32_t i, bool gone, Verdict& verdict) const;
 
   const Setup& setup_;
   const State& before_;
-  bool blade_ = false;                    // it was lowered in this frame
-  std::vector<Edge> edges_;               // those that may be open
-  std::vector<std::vector<int32_t>> at_;  // [n] of them, those at a particle
-  std::vector<uint8_t> negative_;         // [n] whether it is on the blade's negative side, if that is decided
-  std::vector<int32_t> side_bit_;         // [n] whether it is, if rounding decides; -1: that is decided
-  int32_t bits_ = 0;                      // what rounding decides
+  bool has_lowered_blade_ = false;              // it was lowered in this frame
+  std::vector<Edge> edges_;                     // those that may be open
+  std::vector<std::vector<int32_t>> edges_at_;  // [n] of them, those at a particle
+  std::vector<uint8_t> negative_;               // [n] whether it is on the blade's negative side, if that is decided
+  std::vector<int32_t> side_bit_;               // [n] whether it is, if rounding decides; -1: that is decided
+  int32_t bits_ = 0;                            // what rounding decides
 };
 
 }  // namespace cutproof::oracles

@@ -83,7 +83,8 @@ inline constexpr StageOracle motion{"motion", Stage::step};
 // rounding decides must explain all coupled particles. `measured` and `bound` as above; `undecided` counts particles of
 // which only a blunt question can be asked.
 inline constexpr StageOracle admissible_step{"admissible step", Stage::step, motion_properties};
-inline constexpr StageOracle detection{"detection", Stage::detect};  // removed <=> d_i > εh outside the band
+inline constexpr StageOracle detection{"detection",
+                                       Stage::detect};  // removed <=> as the criterion says, outside the band
 inline constexpr StageOracle split_exactness{"split exactness", Stage::split};
 inline constexpr StageOracle merge_legality{"merge legality", Stage::merge};
 // No union has more than `cap` particles, where the rule promises that.

@@ -39,7 +39,7 @@ Setup undisturbed(Setup setup) {
   setup.stroke_end.clear();
   setup.walls.clear();
   setup.grips.clear();
-  setup.detect.criterion = Criterion::none;
+  remove_nothing(setup.detect);
   setup.skin.wanted = false;
   return setup;
 }

@@ -1,5 +1,7 @@
 #include "tuning/reference_solution.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <future>
@@ -28,16 +30,30 @@ int32_t enough_iterations(const Scene& scene, int32_t substeps) {
 
 }  // namespace
 
-double left_to_go(std::span<const RefinementLevel> levels) {
+double remaining_error(std::span<const RefinementLevel> levels) {
   constexpr double kSeen = 1e-9;  // [h]
   constexpr double kNotKnown = std::numeric_limits<double>::infinity();
-  if (levels.empty() || !levels.back().apart_h) return kNotKnown;
+  if (levels.empty() || !levels.back().apart_h || !std::isfinite(*levels.back().apart_h)) return kNotKnown;
   const double last = *levels.back().apart_h;
   if (last <= kSeen) return last;
-  const std::optional<double> before = levels.size() < 3 ? std::nullopt : levels[levels.size() - 2].apart_h;
-  if (!before || !std::isfinite(*before) || !(*before > last)) return kNotKnown;
-  const double falls_by = *before / last;
+  double falls_by = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 1; k + 1 < levels.size(); ++k) {
+    const std::optional<double> before = levels[k].apart_h, after = levels[k + 1].apart_h;
+    if (before && after && std::isfinite(*before)) falls_by = std::min(falls_by, *before / *after);
+  }
+  if (!std::isfinite(falls_by) || !(falls_by > 1)) return kNotKnown;
   return std::max(last, last / (falls_by - 1));
+}
+
+std::string known_to(std::span<const RefinementLevel> levels) {
+  const double known = remaining_error(levels);
+  if (std::isfinite(known)) return fmt::format("known to {:.2g} h", known);
+  const bool has_parts =
+      std::all_of(levels.begin() + (levels.empty() ? 0 : 1), levels.end(),
+                  [](const RefinementLevel& level) { return level.apart_h && std::isfinite(*level.apart_h); });
+  return has_parts
+             ? "not known: its levels do not come nearer to each other each time"
+             : "not known: between its levels tissue falls into other parts, or the blade arrives in another frame";
 }
 
 ReferenceSolution::ReferenceSolution(ReferenceKind kind, const Scene& scene, std::string source,

@@ -24,23 +24,27 @@ struct RefinementLevel {
   std::optional<double> apart_h;  // from the level before: greatest RMS distance in any frame [h]
 };
 
-// By how much the last of these levels may be off [h]. If distances fall by a factor r from level to level, all that
-// are still to come add up to the last one over r - 1 (a geometric series; first order: r = 2, and as much as the last
-// one). One that falls more slowly knows less, and one that does not fall knows nothing: infinity, as with less than
-// two finite distances. Never less than the last distance; below 1e-9 h that, because there rounding is seen.
-double left_to_go(std::span<const RefinementLevel> levels);
+// By how much the last of these levels may be off [h], as its distances tell. If they fall by a factor r from level to
+// level, all that are still to come add up to the last one over r - 1 (a geometric series; of first order r is 2, and
+// the sum as much as the last one). r is the least that was seen, because one that is greater may be luck; at least the
+// last distance itself counts. Infinity: not known, because some distance did not fall, or because there are not two
+// finite ones side by side. Distances up to 1e-9 h are rounding, which does not fall: they count as they are.
+double remaining_error(std::span<const RefinementLevel> levels);
+// The same for people: "known to 0.04 h", or "not known", and why.
+std::string known_to(std::span<const RefinementLevel> levels);
 
 class ReferenceSolution {
  public:
-  // Refines, a factor of 2 at a time, until the solution is known to `known` [h], by three levels at least, or no
-  // further level is allowed (kMostSubsteps, kMostIterations). The scene must have the implicit solver.
+  // Refines, a factor of 2 at a time, until the solution is known to `known` [h] or no further level is allowed
+  // (kMostSubsteps, kMostIterations); but the first three are run in any case, because fewer tell nothing. The scene
+  // must have the implicit solver.
   ReferenceSolution(ReferenceKind kind, const Scene& scene, std::string source, std::optional<int64_t> frames,
                     double known);
 
   const Trajectory& trajectory() const { return trajectory_; }
   const std::vector<RefinementLevel>& levels() const { return levels_; }
   // By how much the solution may be off [h]; infinity: it is not known.
-  double known_to_h() const { return left_to_go(levels_); }
+  double known_to_h() const { return remaining_error(levels_); }
   bool nothing_removed() const;
 
   // One more level, whatever it costs: what the search has not seen.

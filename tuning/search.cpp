@@ -100,7 +100,9 @@ class Searcher {
     if (space_.may_drop_skin) attempt_with([&](Configuration& c) { return set(c.scene.skin.wanted, false); });
     if (space_.nothing_removed) {
       attempt_with([&](Configuration& c) {
-        return !c.scene.blade && c.scene.detect.without_blade && set(c.scene.detect.criterion, Criterion::none);
+        if (c.scene.blade || !c.scene.detect.without_blade || c.scene.detect.criterion == Criterion::none) return false;
+        remove_nothing(c.scene.detect);
+        return true;
       });
     }
     // Larger clusters as long as they pay, else smaller ones.

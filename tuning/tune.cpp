@@ -151,6 +151,7 @@ bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
   document["reference"] = {{"kind", options.reference == ReferenceKind::limit ? "limit" : "substeps"},
                            {"levels", levels_json(reference)},
                            {"known_h", json_number(reference.known_to_h())},
+                           {"known_text", known_to(reference.levels())},
                            {"searched_level", reference.levels().size() - 1}};
   show(TuneStep::reference_known);
   if (!(measuring.allowed(reference) > 0)) return conclude(TuneStep::reference_unknown);
@@ -168,6 +169,7 @@ bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
   reference.refine();
   document["reference"]["levels"] = levels_json(reference);
   document["reference"]["known_h"] = json_number(reference.known_to_h());
+  document["reference"]["known_text"] = known_to(reference.levels());
   const std::optional<Found> found =
       take_cheapest(measuring, reference, trials, options.write, [&](std::size_t trial, const std::string& why) {
         document["left"].push_back({{"trial", trial}, {"why", why}});

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <utility>
 
 #include "harness/frame_runner.h"
@@ -45,11 +44,8 @@ Verified verify(const Measuring& measuring, const ReferenceSolution& reference, 
   } else if (verified.failure = difference_in_parts(wanted, comparison.trajectory()); !verified.failure.empty()) {
     verified.trial.outcome = Outcome::topology;
   } else if (comparison.beyond()) {
-    const double known = reference.known_to_h();
-    verified.failure = fmt::format(
-        "it is {:.2g} h from a finer reference solution, {}", verified.trial.greatest_rms_h,
-        std::isfinite(known) ? fmt::format("known to {:.2g} h", known)
-                             : std::string("which is not known: it is as far from the one before as that was"));
+    verified.failure = fmt::format("it is {:.2g} h from a finer reference solution, itself {}",
+                                   verified.trial.greatest_rms_h, known_to(reference.levels()));
     verified.trial.outcome = Outcome::over;
   } else {
     verified.trial.outcome = Outcome::within;

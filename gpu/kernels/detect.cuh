@@ -4,8 +4,9 @@
 // Rounding, with u = 2^-24, of the decisions compared with exact arithmetic on the same stored numbers:
 // - distance: d_i > epsilon h may come out either way where |d_i - epsilon h| <= 8 u (1 + epsilon) h. An edge is h e
 //   plus a difference of displacements, so where the body is does not matter: u for the difference, u for the sum, 1.5
-//   u for the squares and their sum, and u each for h, epsilon, their product and its square. Where one end of each
-//   edge goes, also where an end is as near to the plane of the blade as places are rounded (as for geometric).
+//   u for the squares and their sum, and u each for h, epsilon, their product and its square. Where one end of
+//   each edge goes, a fate may also come out either way where that holds of an edge of a neighbour, or where an end is
+//   as near to the plane of the blade as places are rounded (as for geometric).
 // - geometric: distances to the blade are between places in the body, so they carry 10 u |x| + 8 u |edge|: u each for
 //   h, X, X + d and the stored edge, and for x - edge the difference, the stored axes and the products with them. Ties
 //   go to removal, so the reach is longer by swept_slack(), which is more than that: what is within the reach always
@@ -20,9 +21,9 @@ namespace cutproof::gpu {
 
 namespace detect_detail {
 
-// DeviceView::particle_flag. kAsks: the particle has open edges of which neither end is the blade's; it goes if it has
-// more open edges than the other end of one of them.
-enum : unsigned char { kStays = 0, kGoes = 1, kWentBefore = 2, kAsks = 3 };
+// DeviceView::particle_flag. kContested: the particle has open edges of which the blade has not chosen an end; whether
+// it loses one of them is asked when all have been counted.
+enum : unsigned char { kStays = 0, kGoes = 1, kWentBefore = 2, kContested = 3 };
 
 inline constexpr float kRounding = 0x1p-24f;
 
@@ -105,11 +106,11 @@ CUTPROOF_DEVICE inline unsigned char flag_of_open(const DeviceView& w, const Bod
     }
   });
   w.particle_scratch[p] = packed(open);
-  return goes ? kGoes : open.contested != 0 ? kAsks : kStays;
+  return goes ? kGoes : open.contested != 0 ? kContested : kStays;
 }
 
-// Whether a particle has at least as many open edges as the other end of one of which the blade has not chosen: of
-// equals the lower particle goes.
+// Whether the particle loses one of its contested edges: it has more open edges than the other end, or as many and is
+// the lower.
 CUTPROOF_DEVICE inline bool loses(const DeviceView& w, const BodyConstants& body, int p) {
   const OpenEdges open = unpacked(w.particle_scratch[p]);
   bool goes = false;
@@ -504,7 +505,7 @@ CUTPROOF_DEVICE void remove_particles_kernel(Block& block, DeviceView w) {
       continue;
     }
     const int b = body_index(w, p), code = removal_code(w, b);
-    if (flag == kAsks && !loses(w, w.body[b], p)) continue;
+    if (flag == kContested && !loses(w, w.body[b], p)) continue;
     w.death[p] = code;
     block.store(&w.cut[b], code);
     ++removed;

@@ -15,7 +15,7 @@
 namespace cutproof::io {
 
 inline constexpr int32_t kFormatVersion = 4;
-inline constexpr int32_t kOldestFormatVersion = 3;  // that is read too: without what SetupField::since says
+inline constexpr int32_t kOldestFormatVersion = 3;  // that is read; a field with a later `since` keeps its default
 inline constexpr std::string_view kIndexSuffix = ".cutproof.h5";
 
 // What stands in the root attribute cutproof_file of each of the four files.

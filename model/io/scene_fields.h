@@ -154,8 +154,9 @@ void describe(auto& v, DetectParameters& s) {
                         "stretch; `none`: nothing is ever removed (method.md §4)."});
   v.field(s.remove, {"remove",
                      "`distance` only: of an edge that is longer than epsilon · h `both` ends go, as in the paper, or "
-                     "`one`: half the loss. With a lowered blade between them it is the end on its negative side, "
-                     "along × back being positive (method.md §4)."});
+                     "`one`, which halves the loss: the end on the negative side of the plane of a lowered blade "
+                     "between them (along × back is positive), else the one with more such edges, of equals the lower "
+                     "particle (method.md §4)."});
   v.field(s.epsilon,
           {"epsilon", "Distance from a neighbour beyond which a particle is removed. At 1 or less, tissue at rest is.",
            above(0, 1e6, "h")});

@@ -53,7 +53,7 @@ Verdict equivariance(Backend& backend, const Setup& setup, const State& state, S
   return judge_relation(relation, backend, span, setup, state, [&](Verdict& verdict) {
     uint64_t kind = seed % kEquivarianceKinds;
     // A turned body has its particles in another order, and so another end goes of two that are alike.
-    if (kind == 0 && !promise_of(setup.detect.remove).minds_no_order) kind = 1;
+    if (kind == 0 && !promise_of(setup.detect.remove).order_independent) kind = 1;
     uint64_t random = seed;
     Transform transform;
     const auto pad = [&](uint64_t layers) {

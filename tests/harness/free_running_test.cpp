@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "fixtures/bodies.h"
+#include "fixtures/cook.h"
 #include "gpu/backends.h"
 #include "tests/harness/planted.h"
 
@@ -48,6 +50,43 @@ TEST(FreeRunning, DoesNotExplainAMergeThatIsNoAnswerOfItsRule) {
     EXPECT_FALSE(first.explained) << "a number that no union keeps is no answer of any rule";
     EXPECT_EQ(against.free_running->verdict().holds, first.explained);
     EXPECT_EQ(against.lockstep->frames()[kFrame].topology_differences, 1);
+  }
+}
+
+// One end of each edge: two particles too far apart, and the plane of the blade just beside the second. (The plate
+// itself is far away, and touches nobody.) The first goes instead of the second: right for a run in which the second is
+// on the other side of the plane, and explained by how far the runs are apart; wrong for one in which it is not.
+TEST(FreeRunning, ExplainsAnotherEndOfAnEdgeByTheSideOfTheBladeThatItIsOn) {
+  constexpr double off = 1e-6;
+  for (const bool on_the_other_side : {true, false}) {
+    cutproof::Setup setup;
+    setup.body = fixtures::block(2, 1, 1, 1.0);
+    setup.step.substeps = 1;
+    setup.step.iterations = 0;
+    setup.substep_length = {0.01};
+    setup.detect.remove = RemovedEnds::one;
+    State start = fixtures::cook(setup.body, {}, setup.expand, setup.merge, 1);
+    start.x[1].x += 1;
+    const BladePose pose = {{start.x[1].x - off, 100, 100}, {0, -1, 0}, {0, 0, 1}};  // its negative side is that of 1
+    setup.has_blade = true;
+    setup.blade = {0.001, 0.001, 0, 0};
+    setup.blade_moves = {{pose, pose, true, 0}};
+    setup.stroke_end = {0};
+    FreeRunning running(setup, start, start, "a backend");
+    State other = start;
+    if (on_the_other_side) other.x[1].x -= off + 1e-9;
+    running.see(Stage::step, other);
+    ASSERT_FALSE(running.first_difference());
+    other.alive[0] = 0;
+    other.removed = {0};
+    running.see(Stage::detect, other);
+    ASSERT_TRUE(running.first_difference());
+    const FirstDifference& first = *running.first_difference();
+    EXPECT_EQ(first.what.particles, (std::vector<int32_t>{0, 1}));
+    ASSERT_TRUE(first.margin);
+    EXPECT_NEAR(*first.margin, off, 1e-12);
+    EXPECT_EQ(first.reach > off, on_the_other_side);
+    EXPECT_EQ(first.explained, on_the_other_side);
   }
 }
 

@@ -208,6 +208,27 @@ TEST(DetectionOfOneEnd, CountsWhatItCannotTryAsUndecided) {
   EXPECT_TRUE(accepts(pair, {19}));
 }
 
+// In a block of which every edge is at the limit a particle inside hangs on more than can be tried. It is asked all the
+// same what no choice can change.
+TEST(DetectionOfOneEnd, AsksBluntlyWhereAParticleAloneHangsOnTooMuch) {
+  Pair pair = one_end(pair_of(block_body(5, 5, 5), {range(0, 125)}, {range(0, 125)}));
+  pair.setup.detect.without_blade = true;
+  for (Vec3& x : pair.before.x) x = 1.5 * x;
+  pair.after.x = pair.before.x;
+  const Verdict none = detection(pair.setup, pair.before, pair.after);
+  expect_holds(none);
+  EXPECT_EQ(none.undecided, 125);
+  EXPECT_TRUE(accepts(pair, range(0, 124)));
+  // The middle is pulled out of its place: all its edges are too long, nobody has more, and it is lower than some.
+  pair.before.x[62] += Vec3{0, 0, 9};
+  pair.after.x = pair.before.x;
+  EXPECT_TRUE(accepts(pair, {62}));
+  expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {62, 37});
+  std::vector<int32_t> others = range(0, 125);
+  others.erase(others.begin() + 62);
+  EXPECT_FALSE(accepts(pair, others)) << "no edge of it keeps both ends, and it should have gone all the same";
+}
+
 // Against the rule written once more, on random bodies: what it says is accepted, and with any one particle turned
 // around it is not.
 TEST(DetectionOfOneEnd, RejectsEverySingleParticleThatIsOtherwise) {

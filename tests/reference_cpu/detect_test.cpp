@@ -86,8 +86,8 @@ TEST(DetectOneEnd, TakesTheOneWithMoreOpenEdges) {
   EXPECT_EQ(state.removed, (std::vector<int32_t>{3}));
 }
 
-// The blade's plane is x = 3.5 (its edge along y, its back along z, so its normal along x), between the second and the
-// third column; on either side of it one end of each edge is too far from the other.
+// The blade's plane is x = 2.5 (its edge along y, its back along z, so its normal along x), between the second and the
+// third column, which are too far from each other.
 TEST(DetectOneEnd, TakesTheEndOnTheNegativeSideOfABladeThatIsLowered) {
   cutproof::Setup setup = one_end(fixtures::block(5, 3, 3, 1.0));  // columns at x = 1 … 5
   const auto at_blade = [&](bool turned) {

@@ -58,7 +58,7 @@ TEST(ReferenceSolution, IsKnownAsItsLevelsComeNearer) {
   const auto known = [](std::vector<double> apart) {
     std::vector<RefinementLevel> levels(1);
     for (const double distance : apart) levels.push_back({1, 1, distance});
-    return left_to_go(levels);
+    return remaining_error(levels);
   };
   EXPECT_DOUBLE_EQ(known({1, 0.5, 0.25}), 0.25);                         // first order
   EXPECT_DOUBLE_EQ(known({1, 0.1, 0.01}), 0.01);                         // faster: not less than the last
@@ -69,12 +69,22 @@ TEST(ReferenceSolution, IsKnownAsItsLevelsComeNearer) {
   constexpr double kNothing = std::numeric_limits<double>::infinity();
   EXPECT_EQ(known({0.043, 0.048}), kNothing);  // no nearer
   EXPECT_EQ(known({0.05, 0.05}), kNothing);
+  EXPECT_DOUBLE_EQ(known({0.6, 0.5, 0.01}), 0.05) << "a lucky last one: by the least factor, 1.2";
+  EXPECT_EQ(known({0.052, 0.15, 0.010}), kNothing) << "a lucky last one after one that was no nearer";
   EXPECT_EQ(known({kNothing, 0.05}), kNothing) << "the level before had other parts";
   EXPECT_EQ(known({kNothing, 0.1, 0.05}), 0.05);
   EXPECT_EQ(known({0.05, kNothing}), kNothing);
   EXPECT_EQ(known({0.05}), kNothing) << "one distance tells nothing of the next";
   EXPECT_EQ(known({}), kNothing);
   EXPECT_EQ(known({1e-15, 2e-15}), 2e-15) << "what rounding leaves does not fall";
+  const auto text = [](std::vector<double> apart) {
+    std::vector<RefinementLevel> levels(1);
+    for (const double distance : apart) levels.push_back({1, 1, distance});
+    return known_to(levels);
+  };
+  EXPECT_EQ(text({1, 0.5, 0.25}), "known to 0.25 h");
+  EXPECT_NE(text({0.043, 0.048}).find("nearer"), std::string::npos);
+  EXPECT_NE(text({kNothing, 0.05}).find("other parts"), std::string::npos);
 }
 
 // A block is pulled aside by its end and comes to rest again, where every solution is the same: in the end nothing is

@@ -203,6 +203,7 @@ TEST(Search, DropsStagesThatNobodyNeeds) {
   };
   Configuration start = given();
   start.scene.detect.without_blade = true;
+  start.scene.detect.remove = RemovedEnds::one;
   SearchSpace space = space_of_steps();
   const auto cheapest = [&] {
     const std::vector<Trial> trials = search(start, space, measure);
@@ -218,6 +219,8 @@ TEST(Search, DropsStagesThatNobodyNeeds) {
   space.rotations = {"slow", "quick"};
   found = cheapest();
   EXPECT_EQ(differences(found, start), "clusters.side 6, no detection, debris 8, no skin, rotation quick");
+
+  EXPECT_EQ(found.scene.detect.remove, RemovedEnds::both) << "of no criterion, or the scene could not be read";
 
   // With a blade there is something to detect, whatever this run removed.
   start.scene.blade.emplace();
