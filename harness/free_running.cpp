@@ -63,15 +63,13 @@ Closeness closeness_of(const Setup& setup, const State& state, int32_t particle,
   for (const int32_t i : near) {
     for_edges(setup, state, i, [&](int32_t other) { note(excess_of(setup, state, i, other), of_edges); });
   }
-  for (int64_t s = setup.step.substeps - 1; setup.has_blade && s >= 0; --s) {
-    const BladeMove& move = setup.blade_moves[at(state.frame * setup.step.substeps + s)];
-    if (!move.down) continue;
-    const Vec3 normal = cross(move.to.along, move.to.back);
+  if (const BladePose* const pose = last_lowered(setup, state.frame)) {
+    const Vec3 normal = cross(pose->along, pose->back);
+    const double h = setup.body.grid.spacing;
     for (const int32_t i : near) {
-      const double places = (norm(state.x[at(i)]) + norm(move.to.edge)) / setup.body.grid.spacing;
-      note(dot(state.x[at(i)] - move.to.edge, normal) / setup.body.grid.spacing, apart + kPlacesBand * u * places);
+      const double places = (norm(state.x[at(i)]) + norm(pose->edge)) / h;
+      note(dot(state.x[at(i)] - pose->edge, normal) / h, apart + kPlacesBand * u * places);
     }
-    break;
   }
   return nearest;
 }

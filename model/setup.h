@@ -128,4 +128,16 @@ inline double blade_clearance(const Setup& setup) {
   return 1.001 * (setup.blade.thickness > reach ? setup.blade.thickness : reach) / 2;
 }
 
+// The blade where it stands last in a frame while it is lowered; null if it never is, or if the schedule is over. For
+// those who judge: a backend has its own.
+inline const BladePose* last_lowered(const Setup& setup, int64_t frame) {
+  const int64_t substeps = setup.step.substeps;
+  if (!setup.has_blade || frame >= setup.frame_count()) return nullptr;
+  for (int64_t s = (frame + 1) * substeps - 1; s >= frame * substeps; --s) {
+    const BladeMove& move = setup.blade_moves[static_cast<std::size_t>(s)];
+    if (move.down) return &move.to;
+  }
+  return nullptr;
+}
+
 }  // namespace cutproof

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
 
 #include "oracles/shape_sums.h"
 
@@ -24,16 +23,6 @@ constexpr double kRestBand = 8;  // [2⁻⁵³]
 
 // So many things that rounding decides are tried in all combinations.
 constexpr std::size_t kMostTried = 12;
-
-// Where the blade stood last in a frame while it was lowered.
-std::optional<BladePose> last_lowered(const Setup& setup, int64_t frame) {
-  const int64_t substeps = setup.step.substeps;
-  if (!setup.has_blade || frame >= setup.frame_count()) return std::nullopt;
-  for (int64_t s = (frame + 1) * substeps - 1; s >= frame * substeps; --s) {
-    if (setup.blade_moves[at(s)].down) return setup.blade_moves[at(s)].to;
-  }
-  return std::nullopt;
-}
 
 }  // namespace
 
@@ -59,8 +48,8 @@ OneEndOfEach::OneEndOfEach(const Setup& setup, const TissueGraph& graph, const S
       edges_.push_back({i, j, open == Demand::either ? bits_++ : -1});
     }
   }
-  const std::optional<BladePose> pose = last_lowered(setup, before.frame);
-  has_lowered_blade_ = pose.has_value();
+  const BladePose* const pose = last_lowered(setup, before.frame);
+  has_lowered_blade_ = pose != nullptr;
   for (int32_t i = 0; has_lowered_blade_ && i < graph.particle_count(); ++i) {
     if (edges_at_[at(i)].empty()) continue;
     const double n = to_local(*pose, before.x[at(i)] - pose->edge).n;
@@ -113,14 +102,14 @@ Demand OneEndOfEach::bluntly(int32_t i) const {
   const auto surely = [](int32_t) { return false; };
   const auto perhaps = [](int32_t) { return true; };
   const auto undecided_side = [&](int32_t p) { return side_bit_[at(p)] >= 0; };
+  // How many open edges a particle has at least and at most; an edge counts at both of its ends.
+  const int least_here = open_at(i, surely), most_here = open_at(i, perhaps);
   Demand demand = Demand::keep;
   for (const int32_t e : edges_at_[at(i)]) {
     const Edge& edge = edges_[at(e)];
     const int32_t j = other_end(edge, i);
     const bool sides_known = !has_lowered_blade_ || (!undecided_side(i) && !undecided_side(j));
     const bool between = has_lowered_blade_ && is_negative(i, surely) != is_negative(j, surely);
-    // How many open edges they have at least and at most; the edge itself counts at both ends.
-    const int least_here = open_at(i, surely), most_here = open_at(i, perhaps);
     const int least_there = open_at(j, surely), most_there = open_at(j, perhaps);
     const bool must_by_count = least_here > most_there || (least_here >= most_there && i < j);
     const bool may_by_count = most_here > least_there || (most_here >= least_there && i < j);
@@ -210,15 +199,12 @@ void OneEndOfEach::judge(const std::vector<uint8_t>& gone, Verdict& verdict) con
       if (is_wrong) reject(i, gone[at(i)] != 0, verdict);
       verdict.undecided += demand == Demand::either;
     }
-    // Whatever rounding decides, an edge that is too long beyond doubt loses an end.
-    for (const int32_t i : group.particles) {
-      for (const int32_t e : edges_at_[at(i)]) {
-        const Edge& edge = edges_[at(e)];
-        if (edge.bit >= 0 || gone[at(edge.low)] != 0 || gone[at(edge.high)] != 0) continue;
-        violate(verdict, {{}, {edge.low, edge.high}},
-                "the edge from particle {} to {} is too long, and neither end went", edge.low, edge.high);
-      }
-    }
+  }
+  // Whatever rounding decides, an edge that is too long beyond doubt loses an end.
+  for (const Edge& edge : edges_) {
+    if (edge.bit >= 0 || gone[at(edge.low)] != 0 || gone[at(edge.high)] != 0) continue;
+    violate(verdict, {{}, {edge.low, edge.high}}, "the edge from particle {} to {} is too long, and neither end went",
+            edge.low, edge.high);
   }
 }
 

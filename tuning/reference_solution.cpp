@@ -48,10 +48,10 @@ double remaining_error(std::span<const RefinementLevel> levels) {
 std::string known_to(std::span<const RefinementLevel> levels) {
   const double known = remaining_error(levels);
   if (std::isfinite(known)) return fmt::format("known to {:.2g} h", known);
-  const bool has_parts =
+  const bool all_compare =
       std::all_of(levels.begin() + (levels.empty() ? 0 : 1), levels.end(),
                   [](const RefinementLevel& level) { return level.apart_h && std::isfinite(*level.apart_h); });
-  return has_parts
+  return all_compare
              ? "not known: its levels do not come nearer to each other each time"
              : "not known: between its levels tissue falls into other parts, or the blade arrives in another frame";
 }

@@ -20,8 +20,8 @@ enum class Path {
 };
 
 // gpu: arrays of at least `array` bytes have memory only where they are touched, by pages of 2 MiB, if a load leaves at
-// least `room` bytes of them empty (both small for tests). CUDA takes memory for pages by pieces of 128 MiB: the last of
-// a load, and one that a frame begins, may be taken for next to nothing.
+// least `room` bytes of them empty (both small for tests). CUDA takes memory for pages by pieces of 128 MiB: the last
+// of a load, and one that a frame begins, may be taken for next to nothing.
 struct OnDemand {
   std::size_t array = std::size_t{4} << 20;
   std::size_t room = std::size_t{256} << 20;

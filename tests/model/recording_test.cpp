@@ -887,6 +887,13 @@ TEST_F(RecordingTest, IsRefusedIfItIsOfANewerVersion) {
   expect_input_error([&] { RecordingReader reader(path("run")); }, path("run.cutproof.h5"), "format 0");
 }
 
+TEST_F(RecordingTest, IsNotMadeOfASetupWhoseCriterionHasNoEndsToTake) {
+  Setup setup = block_setup(2, 1, 1);
+  setup.detect.remove = RemovedEnds::one;
+  setup.detect.criterion = Criterion::geometric;
+  EXPECT_THROW(Recorder(path("run"), setup, "{}", "reference"), std::invalid_argument);
+}
+
 // Format 3 had no detect/remove: both ends of an edge went.
 TEST_F(RecordingTest, IsReadIfItIsOfTheFormatBefore) {
   Setup setup = block_setup(2, 1, 1);

@@ -75,6 +75,12 @@ double greatest_neighbour_distance(const Body& body, const State& state, int32_t
   return greatest;
 }
 
+// Of a spacing of its own for each b in 0 .. 4.
+Body some_block(Random& random, int b) {
+  const double h = std::vector<double>{1.0, 0.1, 0.0037, 1.0 / 3, 17.0}[at(b)];
+  return fixtures::block(2 + static_cast<int32_t>(random() % 6), 1 + static_cast<int32_t>(random() % 5), 4, h);
+}
+
 // ---- Distance
 
 // The band of detect.cuh.
@@ -91,8 +97,8 @@ TEST(GpuDetectByDistance, EqualsTheReferenceOutsideItsBandForManyBodiesInOneLoad
     std::vector<cutproof::Setup> setups;
     std::vector<State> states;
     for (int b = 0; b < 5; ++b) {
-      const double h = std::vector<double>{1.0, 0.1, 0.0037, 1.0 / 3, 17.0}[at(b)];
-      Body body = fixtures::block(2 + static_cast<int32_t>(random() % 6), 1 + static_cast<int32_t>(random() % 5), 4, h);
+      Body body = some_block(random, b);
+      const double h = body.grid.spacing;
       cutproof::Setup setup = setup_of(std::move(body), Criterion::distance, 3);
       setup.detect.epsilon = uniform(random, 1.1, 2.5);
       setup.detect.without_blade = random() % 6 != 0;  // without: no detection
@@ -217,8 +223,8 @@ TEST(GpuDetectOneEnd, EqualsTheReferenceOutsideItsBandForManyBodiesInOneLoad) {
     std::vector<cutproof::Setup> setups;
     std::vector<State> states;
     for (int b = 0; b < 5; ++b) {
-      const double h = std::vector<double>{1.0, 0.1, 0.0037, 1.0 / 3, 17.0}[at(b)];
-      Body body = fixtures::block(2 + static_cast<int32_t>(random() % 6), 1 + static_cast<int32_t>(random() % 5), 4, h);
+      Body body = some_block(random, b);
+      const double h = body.grid.spacing;
       cutproof::Setup setup = setup_of(std::move(body), Criterion::distance, 3);
       setup.detect.remove = b == 2 ? RemovedEnds::both : RemovedEnds::one;
       setup.detect.epsilon = uniform(random, 1.1, 1.8);
