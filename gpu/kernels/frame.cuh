@@ -8,6 +8,7 @@
 #pragma once
 #include "gpu/kernels/sorted_lists.cuh"
 #include "gpu/launch/launcher.h"
+#include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
 #include "model/stage.h"
 
@@ -78,22 +79,39 @@ CUTPROOF_DEVICE void note_cuts_kernel(Block& block, const DeviceView& w, Span sp
 CUTPROOF_KERNEL(note_cuts_kernel);
 
 // Split and merge rename memberships in place. Before anything is summed over them again they are brought into the
-// order that a load gives them, so that sums have the same bits however often a state was loaded on the way.
+// order that a load gives them, so that sums have the same bits however often a state was loaded on the way. A warp for
+// each row of particles.
 template <class Block>
-CUTPROOF_DEVICE void sort_memberships_kernel(Block& block, DeviceView w) {
-  for (int64_t p = block.first(); p < w.particles; p += block.stride()) sort_memberships(w, p);
+CUTPROOF_DEVICE void sort_memberships_kernel(Block& block, const DeviceView& w) {
+  const Team<Block, kParticleRow> team(block);
+  const int64_t rows = particle_rows(w.particles);
+  for (int64_t row = team.first(); row < rows; row += team.stride()) {
+    if (w.unsorted[row] == 0) continue;
+    const int64_t begin = row * kParticleRow, left = w.particles - begin;
+    team.each(left < kParticleRow ? static_cast<int>(left) : kParticleRow,
+              [&](int k) { sort_memberships(w, begin + k); });
+    team.sync();  // all have read it
+    if (team.leads()) w.unsorted[row] = 0;
+  }
 }
 CUTPROOF_KERNEL(sort_memberships_kernel);
 
-// Numbers in the order of slots: of each body from 0, whose slots interleave once clusters have split. A block for each
-// body.
+// Slots that a block numbers; it counts those before them by itself.
+inline constexpr int kSlotRun = 8192;
+CUTPROOF_BOTH inline int64_t slot_runs(int64_t slots) { return (slots + kSlotRun - 1) / kSlotRun; }
+// Numbers in the order of slots: of each body from 0, whose slots interleave once clusters have split.
 template <class Block>
 CUTPROOF_DEVICE void number_slots_kernel(Block& block, const DeviceView& w) {
-  for (int b = block.index(); b < w.bodies; b += block.count()) {
+  const int slots = w.counters->slots_used, runs = static_cast<int>(slot_runs(slots));
+  for (int64_t job = block.index(); job < int64_t{w.bodies} * runs; job += block.count()) {
+    const int b = static_cast<int>(job / runs), begin = static_cast<int>(job % runs) * kSlotRun;
     if (!running(w, b)) continue;
-    count_off(
-        block, w.counters->slots_used, [&](int s) { return w.slot_size[s] > 0 && w.slot_body[s] == b; },
-        [&](int number, int s) { w.slot_number[s] = number; });
+    const auto wanted = [&](int s) { return w.slot_size[s] > 0 && (w.bodies == 1 || w.slot_body[s] == b); };
+    int before = 0;
+    for (int s = block.thread(); s < begin; s += block.size()) before += wanted(s) ? 1 : 0;
+    before = block.sum(before);
+    count_off(block, begin, begin + kSlotRun < slots ? begin + kSlotRun : slots, before, wanted,
+              [&](int number, int s) { w.slot_number[s] = number; });
   }
 }
 CUTPROOF_KERNEL_THREADS(number_slots_kernel, kListThreads);

@@ -288,6 +288,7 @@ CUTPROOF_DEVICE void hand_over(Block& block, const DeviceView& w, int s, int t, 
   for (int k = block.thread(); k < w.slot_size[s]; k += block.size()) {
     const int p = members[k];
     const bool twice = contains(list, size, p);
+    mark_unsorted(block, w, p);
     const int begin = w.membership_begin[p], end = w.membership_begin[p + 1];
     for (int h = begin; h < end; ++h) {
       if (block.load(&w.memberships[h]) == s) block.store(&w.memberships[h], twice ? -1 : t);
@@ -456,10 +457,14 @@ template <class Block>
 CUTPROOF_DEVICE void begin_rounds_kernel(Block& block, const DeviceView& w) {
   if (block.index() != 0) return;
   Counters& c = *w.counters;
-  const int small = count_off(
-      block, c.slots_used, [&](int s) { return w.slot_flag[s] != 0; }, [&](int n, int s) { w.small_clusters[n] = s; });
   int live = 0;
-  for (int s = block.thread(); s < c.slots_used; s += block.size()) live += w.slot_size[s];
+  const int small = count_off(
+      block, 0, c.slots_used, 0,
+      [&](int s) {
+        live += w.slot_size[s];
+        return w.slot_flag[s] != 0;
+      },
+      [&](int n, int s) { w.small_clusters[n] = s; });
   live = block.sum(live);
   if (block.thread() != 0) return;
   c.small = small;

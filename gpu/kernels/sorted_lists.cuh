@@ -8,23 +8,27 @@ namespace cutproof::gpu {
 
 inline constexpr int kListThreads = 512;
 
-// give(n, k) for the k in [0, count) that are wanted, n being how many before it are. Reached by all threads of one
-// block; returns how many there are.
+// give(n, k) for the k in [begin, end) that are wanted, n being `before` and how many before it are. Reached by all
+// threads of one block; returns the n behind the last. wanted() is asked once for each k, and for some before give()
+// has told of others.
 template <class Block, class Wanted, class Give>
-CUTPROOF_DEVICE int count_off(Block& block, int count, Wanted wanted, Give give) {
-  constexpr int kEach = 4;  // neighbours of a thread
-  int before = 0;
-  for (int tile = 0; tile < count; tile += kEach * block.size()) {
+CUTPROOF_DEVICE int count_off(Block& block, int begin, int end, int before, Wanted wanted, Give give) {
+  constexpr int kEach = 8;  // neighbours of a thread
+  const auto wanted_from = [&](int first) {
+    unsigned bits = 0;
+    for (int k = 0; k < kEach; ++k) bits |= first + k < end && wanted(first + k) ? 1u << k : 0u;
+    return bits;
+  };
+  unsigned next = wanted_from(begin + kEach * block.thread());
+  for (int tile = begin; tile < end; tile += kEach * block.size()) {
     const int first = tile + kEach * block.thread();
-    bool is[kEach];
+    const unsigned is = next;
+    next = wanted_from(first + kEach * block.size());  // on its way while this tile is counted
     int own = 0, total = 0;
-    for (int k = 0; k < kEach; ++k) {
-      is[k] = first + k < count && wanted(first + k);
-      own += is[k] ? 1 : 0;
-    }
+    for (int k = 0; k < kEach; ++k) own += is >> k & 1u;
     int n = before + block.exclusive_scan(own, total);
     for (int k = 0; k < kEach; ++k) {
-      if (is[k]) give(n++, first + k);
+      if (is >> k & 1u) give(n++, first + k);
     }
     before += total;
   }
@@ -87,6 +91,11 @@ CUTPROOF_DEVICE int write_union(Block& block, const A& a, int a_size, const B& b
   write_part_of_union(block, a, a_size, b, b_size, true, out);
   const int common = write_part_of_union(block, b, b_size, a, a_size, false, out);
   return a_size + b_size - common;
+}
+
+template <class Block>
+CUTPROOF_DEVICE void mark_unsorted(Block& block, const DeviceView& w, int p) {
+  block.store(&w.unsorted[p / kParticleRow], 1);
 }
 
 // Memberships of a particle in ascending order, -1 last.

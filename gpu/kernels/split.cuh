@@ -250,7 +250,7 @@ CUTPROOF_DEVICE void list_affected_kernel(Block& block, const DeviceView& w) {
     if (drops_debris(w, b)) w.debris_anywhere[b] = 0;
   }
   const int affected = count_off(
-      block, w.counters->slots_used, [&](int s) { return by_slot(w)[s] != 0; },
+      block, 0, w.counters->slots_used, 0, [&](int s) { return by_slot(w)[s] != 0; },
       [&](int n, int s) { w.affected[n] = s; });
   if (block.thread() == 0) w.counters->affected = affected;
 }
@@ -428,6 +428,7 @@ namespace split_detail {
 // In the list of p's clusters `to` takes the place of `from`. Each block renames a slot of its own.
 template <class Block>
 CUTPROOF_DEVICE void rename_holder(Block& block, const DeviceView& w, int p, int from, int to) {
+  mark_unsorted(block, w, p);
   for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
     const int slot = block.load(&w.memberships[k]);
     if (slot == from) block.store(&w.memberships[k], to);

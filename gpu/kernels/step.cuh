@@ -229,13 +229,15 @@ CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) {
 }
 
 // Lanes that share a group: one for each row of its map; and where its particles are looked at one by one, in the pass
-// over all of them and while it is resolved.
+// over all of them and while it is resolved. Of a large load one thread has all rows, and half as many lanes do the
+// work of all, but in an iteration, whose resolved groups are few.
 inline constexpr int kRowTeam = 4, kParticleTeam = 16, kResolvedTeam = 32;
 inline constexpr int kMostByRows = 150'000;  // particles of a load
 
-// Weighted sums in the order of arrays.inc: 4 axis + k: of e rᵀ / h; 4 axis + 3: of e.
-template <class AnyTeam>
-using GroupSums = typename AnyTeam::template Sums<12>;
+// Weighted sums in the order of arrays.inc: 4 axis + k: of e rᵀ / h; 4 axis + 3: of e. kOrder: lanes whose work the
+// team does.
+template <class AnyTeam, int kOrder>
+using GroupSums = typename AnyTeam::template Sums<12, kOrder>;
 
 // The rows of a map, each in the lane that has the item of its axis (Team::each).
 template <class AnyTeam>
@@ -363,16 +365,18 @@ CUTPROOF_DEVICE inline int* listed_before(const DeviceView& w, int substep, int 
 }
 
 // The moments of a resolved group. (After its particles have moved, not while they do: sums and projections together
-// would need more registers than there are.)
+// would need more registers than there are.) own: where the first particle of this lane, nearly always the only one,
+// has come to, and its mass: what was just written would have to be waited for.
 template <class AnyTeam>
 CUTPROOF_DEVICE void sum_resolved(const AnyTeam& team, const DeviceView& w, const Group& group, const Pace& pace,
-                                  Float3 base) {
+                                  Float3 base, Float4 own) {
   const float of_each = 1.0f / static_cast<float>(group.head.holder_count), per_h = pace.per_h;
-  GroupSums<AnyTeam> sums;
-  team.each(group.head.size, [&](int k) {
+  GroupSums<AnyTeam, kResolvedTeam> sums;
+  team.each(sums, group.head.size, [&](int k, int, float* sum) {
     const int o = group.head.begin + k;
-    const Float3 e = xyz(w.position[o]) - base;
-    add_moments(sums.of(k), of_each * w.start[o].w, e, per_h * e, group.rest(w, pace, k));
+    const Float4 at = k == team.lane() ? own : with_w(xyz(w.position[o]), w.start[o].w);
+    const Float3 e = xyz(at) - base;
+    add_moments(sum, of_each * at.w, e, per_h * e, group.rest(w, pace, k));
   });
   team.parted(sums).each(team, [&](int n, float sum) { store_moment(w.group_moments, group.index, n, sum); });
 }
@@ -534,7 +538,7 @@ CUTPROOF_DEVICE Float3 track_particles(const AnyTeam& team, const DeviceView& w,
 // Moments of what a group's particles have, value(k) with a weight in w, about `base`: that of the particle in the
 // middle, or, where that one is farther off the others than `far`, their mean. (Not always: what moves as a whole must
 // have moments that vanish.) Small numbers are summed. Gives the base, with at least every distance from it in w.
-template <class AnyTeam, class Value>
+template <int kOrder, class AnyTeam, class Value>
 CUTPROOF_DEVICE Float4 sum_about(const AnyTeam& team, const DeviceView& w, const Group& group, const Pace& pace,
                                  float per_mass, float far, Value value, typename AnyTeam::template Parted<12>& total) {
   const GroupHead& head = group.head;
@@ -543,13 +547,13 @@ CUTPROOF_DEVICE Float4 sum_about(const AnyTeam& team, const DeviceView& w, const
   base = team.from(head.middle, base);
   float reach = 0;
   for (int round = 0;; ++round) {
-    GroupSums<AnyTeam> sums;
+    GroupSums<AnyTeam, kOrder> sums;
     reach = 0;
-    team.each(head.size, [&](int k) {
+    team.each(sums, head.size, [&](int k, int, float* sum) {
       const Float4 particle = value(k);
       const Float3 e = xyz(particle) - base;
       reach = fmaxf(reach, dot(e, e));
-      add_moments(sums.of(k), particle.w, e, pace.per_h * e, group.rest(w, pace, k));
+      add_moments(sum, particle.w, e, pace.per_h * e, group.rest(w, pace, k));
     });
     total = team.parted(sums);
     const Float3 off = {per_mass * total.get(team, 3), per_mass * total.get(team, 7), per_mass * total.get(team, 11)};
@@ -560,8 +564,8 @@ CUTPROOF_DEVICE Float4 sum_about(const AnyTeam& team, const DeviceView& w, const
 }
 
 // What a group begins the frame with.
-template <bool kContacts, class Block>
-CUTPROOF_DEVICE void sum_group(Block& block, const Team<Block, kParticleTeam>& team, const DeviceView& w, int g) {
+template <bool kContacts, class Block, class AnyTeam>
+CUTPROOF_DEVICE void sum_group(Block& block, const AnyTeam& team, const DeviceView& w, int g) {
   if constexpr (kContacts) {
     if (team.leads()) w.group_tracked[g] = kUntouched;
   }
@@ -582,32 +586,40 @@ CUTPROOF_DEVICE void sum_group(Block& block, const Team<Block, kParticleTeam>& t
   const float of_each = 1.0f / static_cast<float>(head.holder_count);
   const auto particle = [&](int k) { return w.place_particle[head.begin + k]; };
   const auto mass_share = [&](float mass) { return of_each * mass; };
-  // The first of this lane's particles: nearly always the only one.
-  const int first = team.lane();
-  Float4 first_place, first_velocity;
-  if (first < head.size) {
-    const int p = particle(first);
-    first_place = w.displacement[p];
-    first_velocity = w.velocity[p];
-    first_velocity.w = first_place.w = mass_share(first_place.w);
+  // The first of this lane's particles, one for each lane that it stands for: nearly always all that it has.
+  constexpr int kFirst = AnyTeam::kLanes > 1 ? kParticleTeam / AnyTeam::kLanes : 1;
+  static_assert(kFirst <= 2);
+  Float4 first_place[kFirst], first_velocity[kFirst];
+  int index[kFirst];
+  for (int t = 0; t < kFirst; ++t) {
+    const int k = team.lane() + t * team.kLanes;
+    index[t] = k < head.size ? particle(k) : -1;
   }
+  for (int t = 0; t < kFirst; ++t) {
+    if (index[t] < 0) continue;
+    first_place[t] = w.displacement[index[t]];
+    first_velocity[t] = w.velocity[index[t]];
+  }
+  for (int t = 0; t < kFirst; ++t) first_velocity[t].w = first_place[t].w = mass_share(first_place[t].w);
   const auto sum = [&](auto value, float far, Float4* rows) {
-    typename Team<Block, kParticleTeam>::template Parted<12> total;
-    const Float4 base = sum_about(team, w, group, pace, per_mass, far, value, total);
+    typename AnyTeam::template Parted<12> total;
+    const Float4 base = sum_about<kParticleTeam>(team, w, group, pace, per_mass, far, value, total);
     total.each(team, [&](int n, float of) { store_moment(rows, g, n, of); });
     return base;
   };
   Origin origin;
   origin.place = sum(
       [&](int k) {
-        if (k == first) return first_place;
+        if (k == team.lane()) return first_place[0];
+        if (kFirst > 1 && k == team.lane() + team.kLanes) return first_place[kFirst - 1];
         const Float4 d = w.displacement[particle(k)];
         return with_w(xyz(d), mass_share(d.w));
       },
       kFarBase * pace.h, w.frame_shape);
   origin.velocity = sum(
       [&](int k) {
-        if (k == first) return first_velocity;
+        if (k == team.lane()) return first_velocity[0];
+        if (kFirst > 1 && k == team.lane() + team.kLanes) return first_velocity[kFirst - 1];
         const int p = particle(k);
         return with_w(xyz(w.velocity[p]), mass_share(w.displacement[p].w));
       },
@@ -752,9 +764,9 @@ CUTPROOF_DEVICE inline Float4 end_tracked(const DeviceView& w, const Pace& pace,
 }
 
 // Begins a substep of a group whose particles are to be tracked from here on (`begins`), or have been.
-template <class Block>
-CUTPROOF_DEVICE void begin_tracked(Block& block, const Team<Block, kResolvedTeam>& team, const DeviceView& w, int g,
-                                   int substep, int tracked, bool begins) {
+template <class Block, class AnyTeam>
+CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const DeviceView& w, int g, int substep,
+                                   int tracked, bool begins) {
   const Group group = group_of(w, g);
   const GroupHead& head = group.head;
   const int body = body_of_group(w, head);
@@ -764,9 +776,18 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const Team<Block, kResolvedTeam
   const Held held = held_by(w, pace, head.hold_set, substep);
   Float3 base;
   bool resolve = true;
+  // Of the first particle of this lane, nearly always the only one: what was just written would have to be waited for.
+  const int first = team.lane();
+  Float4 first_start, first_predicted;
+  const auto start_of = [&](int k) { return k == first ? first_start : w.start[head.begin + k]; };
+  const auto predicted_of = [&](int k) { return k == first ? first_predicted : w.predicted[head.begin + k]; };
   const bool due = team.any(w.group_tracked[g] == kDue);
   if (begins || due) {
     base = track_particles(team, w, group, pace, contacts, held.active, substep);
+    if (first < head.size) {
+      first_start = w.start[head.begin + first];
+      first_predicted = w.predicted[head.begin + first];
+    }
     if (begins) list_tracked(block, team, w, g, substep, tracked);
     if (due && team.leads()) {
       w.group_tracked[g] = kTracked;
@@ -780,25 +801,30 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const Team<Block, kResolvedTeam
       const int o = head.begin + k;
       Float3 v;
       const Float4 d = end_tracked(w, pace, group, ending, k, v);
-      float side = blade_side(contacts, {pace.h, grid_node(pace, constant(&w.place_node[o]))}, xyz(d));
-      (side < 0 ? behind : before) = true;
-      if (held.active) side = 0.0f;
+      float side = 0.0f;
+      if (!held.active) {
+        side = blade_side(contacts, {pace.h, grid_node(pace, constant(&w.place_node[o]))}, xyz(d));
+        (side < 0 ? behind : before) = true;
+      }
+      const Float4 predicted = with_w(predict(pace, xyz(d), v), side);
       w.start[o] = d;
-      w.predicted[o] = with_w(predict(pace, xyz(d), v), side);
+      w.predicted[o] = predicted;
+      if (k == first) {
+        first_start = d;
+        first_predicted = predicted;
+      }
     });
-    typename Team<Block, kResolvedTeam>::template Parted<12> total;
-    const Float4 base_and_reach = sum_about(
+    typename AnyTeam::template Parted<12> total;
+    const Float4 base_and_reach = sum_about<kResolvedTeam>(
         team, w, group, pace, 1.0f / constant(&w.group_mass[g]).w, kFarBase * pace.h,
-        [&](int k) {
-          const int o = head.begin + k;
-          return with_w(xyz(w.predicted[o]), of_each * w.start[o].w);
-        },
-        total);
+        [&](int k) { return with_w(xyz(predicted_of(k)), of_each * start_of(k).w); }, total);
     before = team.any(before);
     behind = team.any(behind);
     const int side = before && behind ? 0 : behind ? -1 : 1;
-    const float room = room_around(contacts, ball_around(pace, group, base_and_reach, 1.0f, Map{}), side);
-    resolve = held.active || !(room > 0);
+    // (Of a group that a grip holds nobody asks.)
+    const float room =
+        held.active ? 0.0f : room_around(contacts, ball_around(pace, group, base_and_reach, 1.0f, Map{}), side);
+    resolve = !(room > 0);
     base = xyz(base_and_reach);
     if (team.leads()) {
       w.group_base[g] = base_and_reach;
@@ -817,12 +843,15 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const Team<Block, kResolvedTeam
   } else {
     list_resolved(block, team, w, pace, g, substep, 0);
   }
+  Float4 first_at;
   team.each(head.size, [&](int k) {
     const int o = head.begin + k;
     const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
-    enter_substep(w, contacts, held, rest, o, w.predicted[o], xyz(w.start[o]), 0.0f);
+    const Float4 start = start_of(k);
+    const Float3 x = enter_substep(w, contacts, held, rest, o, predicted_of(k), xyz(start), 0.0f);
+    if (k == first) first_at = with_w(x, start.w);
   });
-  sum_resolved(team, w, group, pace, base);
+  sum_resolved(team, w, group, pace, base, first_at);
 }
 
 // ---- particles that are in no group
@@ -866,8 +895,8 @@ CUTPROOF_DEVICE inline void begin_loose(const DeviceView& w, int o, int substep)
 
 // ---- the end of the last substep
 
-template <bool kContacts, class Block>
-CUTPROOF_DEVICE void end_group(const Team<Block, kParticleTeam>& team, const DeviceView& w, int g) {
+template <bool kContacts, class AnyTeam>
+CUTPROOF_DEVICE void end_group(const AnyTeam& team, const DeviceView& w, int g) {
   const Group group = group_of(w, g);
   const GroupHead& head = group.head;
   const int body = body_of_group(w, head);
@@ -896,15 +925,27 @@ CUTPROOF_DEVICE void end_group(const Team<Block, kParticleTeam>& team, const Dev
     start.row[axis] = now.place;
     end.row[axis] = axis_after(pace, axis, lost, origin, predicted_parts(pace, before), map, now).place;
   }
-  team.each(head.size, [&](int k) {
-    const int p = w.place_particle[head.begin + k];
-    const Own own = own_of(w, p, origin);
-    const Float3 r = group.rest(w, pace, k), d = led_to(end, after.place, origin, own, r);
-    // Not from velocities of the same form: what a position rounds to is how far its particle has moved.
-    const Float3 v = pace.decay_per_dt * (d - led_to(start, before.place, origin, own, r));
-    w.displacement[p] = with_w(d, own.began.w);
-    w.velocity[p] = with_w(v, 0.0f);
-  });
+  // Several particles at once: behind a store, each would be waited for by itself.
+  constexpr int kAtOnce = 2;
+  CUTPROOF_ROLLED
+  for (int begin = team.lane(); begin < head.size; begin += kAtOnce * team.kLanes) {
+    int p[kAtOnce], node[kAtOnce];
+    Own own[kAtOnce];
+    for (int t = 0; t < kAtOnce; ++t) {
+      const int k = begin + t * team.kLanes, o = head.begin + (k < head.size ? k : begin);
+      p[t] = w.place_particle[o];
+      node[t] = constant(&w.place_node[o]);
+    }
+    for (int t = 0; t < kAtOnce; ++t) own[t] = own_of(w, p[t], origin);
+    for (int t = 0; t < kAtOnce; ++t) {
+      if (begin + t * team.kLanes >= head.size) break;
+      const Float3 r = group.rest_of(pace, node[t]), d = led_to(end, after.place, origin, own[t], r);
+      // Not from velocities of the same form: what a position rounds to is how far its particle has moved.
+      const Float3 v = pace.decay_per_dt * (d - led_to(start, before.place, origin, own[t], r));
+      w.displacement[p[t]] = with_w(d, own[t].began.w);
+      w.velocity[p[t]] = with_w(v, 0.0f);
+    }
+  }
 }
 
 template <bool kContacts>
@@ -989,11 +1030,11 @@ CUTPROOF_DEVICE void begin_frame_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL(begin_frame_kernel);
 
-// Once a frame: what each group begins it with.
-template <bool kContacts, class Block>
+// Once a frame: what each group begins it with. kLanes: that share a group.
+template <bool kContacts, int kLanes, class Block>
 CUTPROOF_DEVICE void sum_groups_kernel(Block& block, const DeviceView& w) {
   using namespace step_detail;
-  const Team<Block, kParticleTeam> team(block);
+  const Team<Block, kLanes> team(block);
   const int groups = w.counters->groups;
   for (int64_t g = team.first(); g < groups; g += team.stride()) {
     sum_group<kContacts>(block, team, w, static_cast<int>(g));
@@ -1006,10 +1047,14 @@ template <bool kContacts, int kRows, class Block>
 CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int substep) {
   using namespace step_detail;
   const Team<Block, kRows> rows(block);
-  const Team<Block, kResolvedTeam> team(block);
+  // A warp, and what it has of teams for the groups that are tracked: where a grip holds a part of a large body these
+  // are many, and two of them side by side.
+  const Team<Block, kResolvedTeam> warp(block);
+  const Team<Block, kRows == 1 ? kResolvedTeam / 2 : kResolvedTeam> team(block);
+  constexpr int kTeams = warp.kLanes / team.kLanes;
   const int groups = w.counters->groups, loose = w.counters->loose;
   // Whole warps at a time, as in advance_kernel.
-  const int64_t in_warp = rows.first() % (team.kLanes / rows.kLanes);
+  const int64_t in_warp = rows.first() % (warp.kLanes / rows.kLanes);
   int64_t row = rows.first();
   [[maybe_unused]] int64_t listed = behind(rows, team, groups);
   [[maybe_unused]] unsigned found = 0;
@@ -1019,12 +1064,15 @@ CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int
     [[maybe_unused]] int g = -1;
     if (found != 0) {
       begins = true;
-      g = team.take(found, static_cast<int>(row - rows.stride()));
+      for (int k = 0; k < kTeams && found != 0; ++k) {
+        const int next = warp.take(found, static_cast<int>(row - rows.stride()));
+        if (k == team.first() % kTeams) g = next;
+      }
     } else if (row - in_warp < groups) {
       const bool touches = row < groups && begin_untouched<kContacts>(block, rows, w, static_cast<int>(row), substep);
       if constexpr (kContacts) {
-        found = team.found(touches && rows.leads());
-        team.sync();  // its base is the whole team's to read
+        found = warp.found(touches && rows.leads());
+        warp.sync();  // its base is all lanes' to read
       }
       row += rows.stride();
       continue;
@@ -1039,7 +1087,7 @@ CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int
         g = block.load(&w.tracked_groups[listed]);
         listed += team.stride();
       }
-      begin_tracked(block, team, w, g, substep, tracked, begins);
+      if (g >= 0) begin_tracked(block, team, w, g, substep, tracked, begins);
     } else {
       break;
     }
@@ -1054,11 +1102,11 @@ CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int
   }
 }
 
-// Once a frame: where all particles have come to.
-template <bool kContacts, class Block>
+// Once a frame: where all particles have come to. kLanes: that share a group; no sum goes by them.
+template <bool kContacts, int kLanes, class Block>
 CUTPROOF_DEVICE void end_step_kernel(Block& block, const DeviceView& w) {
   using namespace step_detail;
-  const Team<Block, kParticleTeam> team(block);
+  const Team<Block, kLanes> team(block);
   const int groups = w.counters->groups;
   for (int64_t g = team.first(); g < groups; g += team.stride()) {
     end_group<kContacts>(team, w, static_cast<int>(g));
@@ -1082,49 +1130,82 @@ struct ClusterSums {
   Floats<12> moments;
   Float3 base;
 };
-constexpr std::size_t match_shared(int lanes) { return kMatchThreads / lanes * sizeof(ClusterSums); }
+// How many clusters at most a team sums before their rotations are computed, which take so long that few threads of a
+// block should not do so while others wait.
+template <int kLanes>
+inline constexpr int kMostTurns = kLanes == kClusterTeam ? 1 : kMatchThreads / kLanes / 2;
+template <int kLanes>
+inline constexpr std::size_t kMatchShared = kMostTurns<kLanes>*(kMatchThreads / kLanes) * sizeof(ClusterSums);
 
-// A cluster, and what its lanes need of it that no iteration changes: of their first group each, and the first particle
-// that is in none.
+// A cluster, and what its lanes need of it that no iteration changes: of the first group of each lane that they stand
+// for, and the first particle that is in none.
+template <class AnyTeam>
+inline constexpr int kGroupsAhead = AnyTeam::kLanes > 1 ? kClusterTeam / AnyTeam::kLanes : 1;
+template <class AnyTeam>
 struct ClusterAhead {
   ClusterHead head;
-  Offset first;
-  Float4 mass;
+  Offset to[kGroupsAhead<AnyTeam>];
+  Float4 mass[kGroupsAhead<AnyTeam>];
+  Float3 base[kGroupsAhead<AnyTeam>];
   int loose;
   Pace pace;
+  // visit(bank, k) for these groups.
+  template <class Visit>
+  CUTPROOF_DEVICE void each(const AnyTeam& team, Visit visit) const {
+    for (int bank = 0; bank < kGroupsAhead<AnyTeam>; ++bank) {
+      const int k = team.lane() + bank * AnyTeam::kLanes;
+      if (k < head.group_count) visit(bank, k);
+    }
+  }
+  CUTPROOF_DEVICE void read_bases(const AnyTeam& team, const DeviceView& w) {
+    each(team, [&](int bank, int) { base[bank] = xyz(w.group_base[to[bank].index]); });
+  }
 };
 template <class AnyTeam>
-CUTPROOF_DEVICE ClusterAhead cluster_ahead(const AnyTeam& team, const DeviceView& w, int s, const ClusterHead& head) {
-  ClusterAhead ahead = {head, {}, {}, 0, constant(&w.pace[body_of_slot(w, s)])};
-  if (team.lane() < head.group_count) {
-    ahead.first = constant(&w.cluster_groups[head.group_begin + team.lane()]);
-    ahead.mass = constant(&w.group_mass[ahead.first.index]);
-  }
+CUTPROOF_DEVICE ClusterAhead<AnyTeam> cluster_ahead(const AnyTeam& team, const DeviceView& w, int s,
+                                                    const ClusterHead& head) {
+  ClusterAhead<AnyTeam> ahead = {};
+  ahead.head = head;
+  ahead.pace = constant(&w.pace[body_of_slot(w, s)]);
+  ahead.each(team, [&](int bank, int k) { ahead.to[bank] = constant(&w.cluster_groups[head.group_begin + k]); });
+  ahead.each(team, [&](int bank, int) { ahead.mass[bank] = constant(&w.group_mass[ahead.to[bank].index]); });
   if (team.lane() < head.loose_count) ahead.loose = w.cluster_loose[head.loose_begin + team.lane()];
   return ahead;
 }
 
-// base: of this lane's first group.
+struct Moments {
+  Float4 row[3];
+};
+CUTPROOF_DEVICE inline Moments load_moments(const DeviceView& w, int g) {
+  const Float4* const row = w.group_moments + 3 * int64_t{g};
+  return {{row[0], row[1], row[2]}};
+}
+
 template <class AnyTeam>
-CUTPROOF_DEVICE void sum_cluster(const AnyTeam& team, const DeviceView& w, int s, const ClusterAhead& ahead,
-                                 Float3 first_base, ClusterSums& found) {
+CUTPROOF_DEVICE void sum_cluster(const AnyTeam& team, const DeviceView& w, int s, const ClusterAhead<AnyTeam>& ahead,
+                                 ClusterSums& found) {
   const ClusterHead& head = ahead.head;
   const float per_h = ahead.pace.per_h;
   typename AnyTeam::template Sums<12, kClusterTeam> sums;
   const Float3 base =
-      head.group_count > 0 ? team.from(0, first_base) : xyz(w.position[w.cluster_loose[head.loose_begin]]);
-  team.each(sums, head.group_count, [&](int k, float* sum) {
-    Offset to = ahead.first;
-    Float4 mass = ahead.mass;
-    Float3 from = first_base;
-    if (k != team.lane()) {
+      head.group_count > 0 ? team.from(0, ahead.base[0]) : xyz(w.position[w.cluster_loose[head.loose_begin]]);
+  Moments moments[kGroupsAhead<AnyTeam>];
+  ahead.each(team, [&](int bank, int) { moments[bank] = load_moments(w, ahead.to[bank].index); });
+  team.each(sums, head.group_count, [&](int k, int bank, float* sum) {
+    const int read = bank < kGroupsAhead<AnyTeam> ? bank : 0;
+    Offset to = ahead.to[read];
+    Float4 mass = ahead.mass[read];
+    Float3 from = ahead.base[read];
+    Moments of_group = moments[read];
+    if (k != team.lane() + read * team.kLanes) {
       to = constant(&w.cluster_groups[head.group_begin + k]);
       mass = constant(&w.group_mass[to.index]);
       from = xyz(w.group_base[to.index]);
+      of_group = load_moments(w, to.index);
     }
     const Float3 apart = from - base;
     for (int axis = 0; axis < 3; ++axis) {
-      const Float4 own = w.group_moments[3 * int64_t{to.index} + axis];
+      const Float4 own = of_group.row[axis];
       const float moved = own.w + mass.w * apart[axis];
       const float shift = per_h * apart[axis], lever = per_h * moved;
       sum[4 * axis] += own.x + (shift * mass.x + lever * to.x);
@@ -1133,7 +1214,7 @@ CUTPROOF_DEVICE void sum_cluster(const AnyTeam& team, const DeviceView& w, int s
       sum[4 * axis + 3] += moved;
     }
   });
-  team.each(sums, head.loose_count, [&](int k, float* sum) {
+  team.each(sums, head.loose_count, [&](int k, int, float* sum) {
     const int o = k == team.lane() ? ahead.loose : w.cluster_loose[head.loose_begin + k];
     const Float4 now = w.position[o];
     const Float3 e = xyz(now) - base;
@@ -1198,8 +1279,9 @@ CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const Clus
 
 }  // namespace step_detail
 
-// On the device the teams of a block sum. Where clusters are many, neighbouring threads then compute the rotations of
-// all of them side by side; where they are few, each team's own first thread does, and nobody waits for others.
+// On the device the teams of a block sum. Where clusters are many, each team sums several, and neighbouring threads
+// then compute the rotations of all of them side by side; where they are few, each team's own first thread does, and
+// nobody waits for others.
 template <int Method, int kLanes, class Block>
 CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int substep, int iteration) {
   using namespace step_detail;
@@ -1211,34 +1293,41 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
     return head.group_count + head.loose_count > 0 &&
            takes_part(constant(&w.pace[body_of_slot(w, static_cast<int>(s))]), substep, iteration);
   };
-  // What begins with a substep is read ahead in all its iterations but the first.
-  const auto first_base = [&](const ClusterAhead& ahead) {
-    return team.lane() < ahead.head.group_count ? xyz(w.group_base[ahead.first.index]) : Float3{};
-  };
   if constexpr (Block::on_device) {
     constexpr int kTeams = kMatchThreads / kLanes;
+    constexpr int kMost = kMostTurns<kLanes>;
     constexpr bool apart = kLanes == kClusterTeam;
-    ClusterSums* const all = block.template shared<ClusterSums>(kTeams);
+    ClusterSums* const all = block.template shared<ClusterSums>(kMost * kTeams);
     const int mine = block.thread() / kLanes;
     const int which = apart ? mine : block.thread();  // of the block's clusters this thread places, if any
-    for (int64_t begin = static_cast<int64_t>(block.index()) * kTeams; begin < slots;
-         begin += static_cast<int64_t>(block.count()) * kTeams) {
-      const int own = static_cast<int>(begin) + mine, placed = static_cast<int>(begin) + which;
-      ClusterHead head = {}, ignored;
-      const bool sums = wanted(own, head);
-      const bool places = apart ? sums && team.leads() : which < kTeams && wanted(placed, ignored);
-      ClusterAhead ahead = {};
-      Float3 base;
-      if (sums) ahead = cluster_ahead(team, w, own, head);
-      if (sums && iteration > 0) base = first_base(ahead);
+    int turns = 1;
+    while (turns < kMost && turns * kTeams * block.count() < slots) ++turns;
+    for (int64_t begin = static_cast<int64_t>(block.index()) * turns * kTeams; begin < slots;
+         begin += static_cast<int64_t>(block.count()) * turns * kTeams) {
+      const int placed = static_cast<int>(begin) + which;
+      ClusterHead ignored;
+      bool places = false;
       ClusterRest rest = {};
-      if (places) rest = rest_of_cluster<Method>(w, placed);
-      block.wait_for_earlier();
-      if (sums) {
-        if (iteration == 0) base = first_base(ahead);
-        sum_cluster(team, w, own, ahead, base, all[mine]);
+      for (int turn = 0; turn < turns; ++turn) {
+        const int own = static_cast<int>(begin) + turn * kTeams + mine;
+        ClusterHead head = {};
+        const bool sums = wanted(own, head);
+        ClusterAhead<Team<Block, kLanes>> ahead = {};
+        if (sums) ahead = cluster_ahead(team, w, own, head);
+        // What begins with a substep is read ahead in all its iterations but the first.
+        if (sums && iteration > 0) ahead.read_bases(team, w);
+        if (turn == 0) {
+          places = apart ? sums && team.leads() : which < turns * kTeams && wanted(placed, ignored);
+          // (Where few threads place many clusters, registers for it would be missing in all that sum.)
+          if (apart && places) rest = rest_of_cluster<Method>(w, placed);
+        }
+        block.wait_for_earlier();
+        if (!sums) continue;
+        if (iteration == 0) ahead.read_bases(team, w);
+        sum_cluster(team, w, own, ahead, all[turn * kTeams + mine]);
       }
       apart ? team.sync() : block.sync();
+      if (!apart && places) rest = rest_of_cluster<Method>(w, placed);
       if (places) place_cluster<Method>(w, placed, rest, all[which]);
       apart ? team.sync() : block.sync();
     }
@@ -1247,9 +1336,10 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
       const int s = static_cast<int>(i);
       ClusterHead head = {};
       if (!wanted(s, head)) continue;
-      const ClusterAhead ahead = cluster_ahead(team, w, s, head);
+      ClusterAhead<Team<Block, kLanes>> ahead = cluster_ahead(team, w, s, head);
+      ahead.read_bases(team, w);
       ClusterSums sums;
-      sum_cluster(team, w, s, ahead, first_base(ahead), sums);
+      sum_cluster(team, w, s, ahead, sums);
       place_cluster<Method>(w, s, rest_of_cluster<Method>(w, s), sums);
     }
   }
@@ -1278,7 +1368,7 @@ namespace step_detail {
 // A particle on its own, before an iteration.
 struct Particle {
   Float4 predicted, at;
-  Float3 start;                            // with contacts…
+  Float4 start;                            // with contacts…
   Float4 pushed, earlier, pushed_earlier;  // … and accelerated
   int node;
 };
@@ -1289,7 +1379,7 @@ CUTPROOF_DEVICE inline Particle particle_at(const DeviceView& w, const Iteration
   found.at = w.position[o];
   found.node = constant(&w.place_node[o]);
   if constexpr (kContacts) {
-    found.start = xyz(w.start[o]);
+    found.start = w.start[o];
     found.pushed = w.pushed[o];
   }
   if constexpr (kAccelerated) {
@@ -1302,11 +1392,11 @@ CUTPROOF_DEVICE inline Particle particle_at(const DeviceView& w, const Iteration
 }
 
 // Particle by particle: the one at place o goes from where it is towards `from` + pull, `from` being its prediction, or
-// where it is in the published way.
+// where it is in the published way. Gives where it has come to.
 template <bool kContacts, bool kAccelerated>
-CUTPROOF_DEVICE inline void advance_particle(const DeviceView& w, const Pace& pace, const Contacts& contacts,
-                                             const Iteration& now, int64_t o, const Particle& particle, Float3 from,
-                                             Float3 pull) {
+CUTPROOF_DEVICE inline Float3 advance_particle(const DeviceView& w, const Pace& pace, const Contacts& contacts,
+                                               const Iteration& now, int64_t o, const Particle& particle, Float3 from,
+                                               Float3 pull) {
   const Float3 x = xyz(particle.at);
   const Float3 plain = from + now.s * pull;
   Float3 free = plain;
@@ -1333,7 +1423,7 @@ CUTPROOF_DEVICE inline void advance_particle(const DeviceView& w, const Pace& pa
           if (touched) wanted = plain;
         }
       }
-      next = next_position(contacts, rest, wanted, side, particle.start, x);
+      next = next_position(contacts, rest, wanted, side, xyz(particle.start), x);
     }
     const Float3 before = xyz(particle.pushed);
     Float3 carried = (now.implicit ? now.s : 1.0f) * before;
@@ -1344,6 +1434,7 @@ CUTPROOF_DEVICE inline void advance_particle(const DeviceView& w, const Pace& pa
     w.pushed[o] = with_w(carried + (next - free), 0.0f);
   }
   w.position[o] = with_w(next, particle.at.w);
+  return next;
 }
 
 // Several of a group's holders, which do not change in a substep.
@@ -1360,32 +1451,43 @@ CUTPROOF_DEVICE inline SomeHolders<kAtOnce> holders_from(const DeviceView& w, co
   return holders;
 }
 
-// What the holders of a group want of it, their mean goal, along one axis: base + goal(r).
-template <int kAtOnce>
-CUTPROOF_DEVICE inline Float4 mean_goal(const DeviceView& w, const GroupHead& head, const SomeHolders<kAtOnce>& first,
-                                        float h, Float4 base, int axis) {
-  const float from = xyz(base)[axis];
-  Float4 sum;
-  const auto add = [&](const SomeHolders<kAtOnce>& some, int begin) {
-    Float4 row[kAtOnce];
-    for (int k = 0; k < kAtOnce; ++k) row[k] = w.placement[3 * int64_t{some.to[k].index} + axis];
+// What the holders of a group want of it, their mean goal: base + goal(r), each axis in the lane that has it.
+template <int kAtOnce, class AnyTeam>
+CUTPROOF_DEVICE inline Rows<AnyTeam> mean_goal(const AnyTeam& team, const DeviceView& w, const GroupHead& head,
+                                               SomeHolders<kAtOnce> some, float h, Float4 base) {
+  Rows<AnyTeam> goal;
+  const auto add = [&](int begin) {
+    // Several at once, along all axes: one by one, each would wait for the one before.
+    Rows<AnyTeam> row[kAtOnce];
     for (int k = 0; k < kAtOnce; ++k) {
-      if (begin + k >= head.holder_count) break;
-      const Offset to = some.to[k];
-      sum.x += row[k].x;
-      sum.y += row[k].y;
-      sum.z += row[k].z;
-      sum.w += (row[k].w - from) + h * (row[k].x * to.x + row[k].y * to.y + row[k].z * to.z);
+      team.each(3, [&](int axis) { row[k].of(axis) = w.placement[3 * int64_t{some.to[k].index} + axis]; });
     }
+    team.each(3, [&](int axis) {
+      const float from = xyz(base)[axis];
+      Float4& sum = goal.of(axis);
+      for (int k = 0; k < kAtOnce; ++k) {
+        if (begin + k >= head.holder_count) break;
+        const Offset to = some.to[k];
+        const Float4 of = row[k].of(axis);
+        sum.x += of.x;
+        sum.y += of.y;
+        sum.z += of.z;
+        sum.w += (of.w - from) + h * (of.x * to.x + of.y * to.y + of.z * to.z);
+      }
+    });
   };
-  // Several at once: one by one, each would wait for the one before.
-  add(first, 0);
+  add(0);
   CUTPROOF_ROLLED
   for (int begin = kAtOnce; begin < head.holder_count; begin += kAtOnce) {
-    add(holders_from<kAtOnce>(w, head, begin), begin);
+    some = holders_from<kAtOnce>(w, head, begin);
+    add(begin);
   }
   const float mean = 1.0f / static_cast<float>(head.holder_count), turn = h * mean;
-  return {turn * sum.x, turn * sum.y, turn * sum.z, mean * sum.w};
+  team.each(3, [&](int axis) {
+    Float4& sum = goal.of(axis);
+    sum = {turn * sum.x, turn * sum.y, turn * sum.z, mean * sum.w};
+  });
+  return goal;
 }
 
 // A group that has been carried so far is resolved from here on: where its particles are, and, accelerated, were one
@@ -1455,17 +1557,17 @@ CUTPROOF_DEVICE void advance_resolved(Block& block, const Team<Block, kResolvedT
   Particle of_first;
   if (first < head.size) of_first = particle_at<kContacts, kAccelerated>(w, now, head.begin + first);
   block.wait_for_earlier();  // for the clusters: all else is older
-  Rows<Team<Block, kResolvedTeam>> rows;
-  team.each(3, [&](int axis) { rows.of(axis) = mean_goal(w, head, ahead.holders, pace.h, ahead.base, axis); });
-  const Map goal = rows.all(team);
+  const Map goal = mean_goal(team, w, head, ahead.holders, pace.h, ahead.base).all(team);
+  Float4 first_at;
   team.each(head.size, [&](int k) {
     const int o = head.begin + k;
     const Particle particle = k == first ? of_first : particle_at<kContacts, kAccelerated>(w, now, o);
     const Float3 from = now.implicit ? xyz(particle.predicted) : xyz(particle.at);
     const Float3 pull = (base - from) + goal(group.rest_of(pace, particle.node));
-    advance_particle<kContacts, kAccelerated>(w, pace, contacts, now, o, particle, from, pull);
+    const Float3 x = advance_particle<kContacts, kAccelerated>(w, pace, contacts, now, o, particle, from, pull);
+    if (k == first) first_at = with_w(x, particle.start.w);
   });
-  sum_resolved(team, w, group, pace, base);
+  sum_resolved(team, w, group, pace, base, first_at);
 }
 
 // Of a group that was carried until now. Says whether it may touch a contact in this iteration: then nothing has been
@@ -1515,11 +1617,11 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
   block.wait_for_earlier();  // for the clusters: all else is older
   if (!active) return false;
   const float lost_next = now.lost_after;
-  Rows<Team<Block, kRows>> plain, next;
+  Rows<Team<Block, kRows>> goals = mean_goal(team, w, head, ahead.holders, pace.h, base), plain, next;
+  if constexpr (!kAllAhead) team.each(3, read_maps);
   team.each(3, [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
-    if constexpr (!kAllAhead) read_maps(axis);
-    const Float4 goal = mean_goal(w, head, ahead.holders, pace.h, base, axis);
+    const Float4 goal = goals.of(axis);
     if constexpr (kContacts) {
       if (state == kHeld) {
         // As set_held_push().
@@ -1673,13 +1775,13 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
   }
 }
 
-template <bool kContacts>
+template <bool kContacts, int kLanes>
 struct sum_groups_kernel_object {
   static constexpr const char* kName = "sum_groups_kernel";
-  static constexpr int kMaxThreads = 128, kMinBlocks = 6;
+  static constexpr int kMaxThreads = 128, kMinBlocks = kLanes == step_detail::kParticleTeam ? 6 : 5;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w) const {
-    sum_groups_kernel<kContacts>(block, w);
+    sum_groups_kernel<kContacts, kLanes>(block, w);
   }
 };
 template <bool kContacts, int kRows>
@@ -1692,13 +1794,13 @@ struct begin_substep_kernel_object {
     begin_substep_kernel<kContacts, kRows>(block, w, substep);
   }
 };
-template <bool kContacts>
+template <bool kContacts, int kLanes>
 struct end_step_kernel_object {
   static constexpr const char* kName = "end_step_kernel";
-  static constexpr int kMaxThreads = 128, kMinBlocks = 6;
+  static constexpr int kMaxThreads = 128, kMinBlocks = 5;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w) const {
-    end_step_kernel<kContacts>(block, w);
+    end_step_kernel<kContacts, kLanes>(block, w);
   }
 };
 template <bool kContacts, bool kAccelerated, int kRows>
@@ -1736,7 +1838,15 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
     }
     start(std::integral_constant<int, kClusterTeam>{});
   };
-  launcher.teams(sum_groups_kernel_object<kContacts>{}, kParticleTeam, teams, w);
+  // The same for the lanes that share a group's particles.
+  const auto by_particles = [&](auto start) {
+    by_rows([&](auto rows) {
+      constexpr int kLanes = rows.value == 1 ? kParticleTeam / 2 : kParticleTeam;
+      start(std::integral_constant<int, kLanes>{});
+    });
+  };
+  by_particles(
+      [&](auto lanes) { launcher.teams(sum_groups_kernel_object<kContacts, lanes.value>{}, kParticleTeam, teams, w); });
   for (int substep = 0; substep < plan.substeps; ++substep) {
     by_rows([&](auto rows) {
       launcher.teams(begin_substep_kernel_object<kContacts, rows.value>{}, kParticleTeam, teams, w, substep);
@@ -1745,7 +1855,7 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
       by_clusters([&](auto lanes) {
         constexpr int kTeams = kMatchThreads / lanes.value;
         launcher.blocks(match_shapes_kernel_object<Method, lanes.value>{}, (w.slots_expected + kTeams - 1) / kTeams,
-                        kMatchThreads, match_shared(lanes.value), w, substep, iteration);
+                        kMatchThreads, kMatchShared<lanes.value>, w, substep, iteration);
       });
       by_rows([&](auto rows) {
         launcher.teams(advance_kernel_object<kContacts, kAccelerated, rows.value>{}, kParticleTeam, teams, w, substep,
@@ -1753,7 +1863,8 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
       });
     }
   }
-  launcher.teams(end_step_kernel_object<kContacts>{}, kParticleTeam, teams, w);
+  by_particles(
+      [&](auto lanes) { launcher.teams(end_step_kernel_object<kContacts, lanes.value>{}, kParticleTeam, teams, w); });
 }
 
 template <int Method, class Launcher>

@@ -54,13 +54,14 @@ class Team {
     static constexpr int kBanks = kOrder / kLanes;
     Floats<N> bank_[kBanks] = {};
   };
-  // visit(k, sums) for this lane's items, with the sums that item k adds to.
+  // visit(k, bank, sums) for this lane's items: those of the bank-th lane that it stands for, and the sums that these
+  // add to.
   template <int N, int kOrder, class Visit>
   CUTPROOF_DEVICE void each(Sums<N, kOrder>& sums, int count, Visit visit) const {
     for (int begin = lane(); begin < count; begin += kOrder) {
       for (int bank = 0; bank < kOrder / kLanes; ++bank) {
         const int k = begin + bank * kLanes;
-        if (k < count) visit(k, sums.bank_[bank].v);
+        if (k < count) visit(k, bank, sums.bank_[bank].v);
       }
     }
   }
@@ -82,22 +83,26 @@ class Team {
     template <class Give>
     CUTPROOF_DEVICE void each(const Team& team, Give give) const {
       if constexpr (Block::on_device) {
-        const int which = team.lane() / kShare;
-        if (team.lane() % kShare == 0 && which < N) give(which, value_[0]);
+        for (int k = 0; k < kOwn; ++k) {
+          const int which = team.lane() / kShare * kOwn + k;
+          if (team.lane() % kShare == 0 && which < N) give(which, value_[k]);
+        }
       } else {
         for (int k = 0; k < N; ++k) give(k, value_[k]);
       }
     }
     // Sum n, to every lane.
     CUTPROOF_DEVICE float get(const Team& team, int n) const {
-      return team.from(n * kShare, value_[Block::on_device ? 0 : n]);
+      return team.from(n / kOwn * kShare, value_[Block::on_device ? n % kOwn : n]);
     }
 
    private:
     friend class Team;
-    static constexpr int kMost = 16, kShare = kWidth / kMost;  // lanes that end up with the same sum
-    static_assert(N <= kMost && kWidth >= kMost);
-    float value_[Block::on_device ? 1 : N] = {};
+    static constexpr int kMost = 16;
+    static constexpr int kShare = kWidth > kMost ? kWidth / kMost : 1;  // lanes that end up with the same sums…
+    static constexpr int kOwn = kWidth < kMost ? kMost / kWidth : 1;    // … and how many these are
+    static_assert(N <= kMost);
+    float value_[Block::on_device ? kOwn : N] = {};
   };
   template <int N, int kOrder>
   CUTPROOF_DEVICE Parted<N> parted(Sums<N, kOrder>& sums) const {
@@ -122,7 +127,7 @@ class Team {
           kept[k] = mine + other(sent, distance);
         }
       }
-      found.value_[0] = kept[0];
+      for (int k = 0; k < Parted<N>::kOwn; ++k) found.value_[k] = kept[k];
     } else {
       const Floats<N> all = total(sums);
       for (int k = 0; k < N; ++k) found.value_[k] = all.v[k];

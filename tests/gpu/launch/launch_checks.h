@@ -130,7 +130,7 @@ struct Teamed {
   enum : int { kOdd, kTotal, kAny, kWrong, kCounts };
   const int* begin;
   float* sums;      // of any_float(j + n, k) over k [j · kTeamSums + n]
-  float* parts;     // the same, by parted(), where teams are wide enough
+  float* parts;     // the same, by parted()
   float* half;      // the same, by half of the lanes that the order of adding is of
   int* counts;      // [j · kCounts + which]
   float* greatest;  // of any_float(j, k)
@@ -148,7 +148,9 @@ CUTPROOF_DEVICE void team_kernel(Block& block, const Teamed& out, int jobs) {
     const int first = out.begin[job], size = out.begin[job + 1] - first;
     typename Team<Block, kWidth>::template Sums<kTeamSums> sums, again;
     typename Team<Block, kWidth>::template Sums<kTeamSums, 2 * kWidth> of_twice, of_twice_again;
-    team.each(of_twice, size, [&](int k, float* sum) {
+    int wrong = 0;
+    team.each(of_twice, size, [&](int k, int bank, float* sum) {
+      if (bank != k % (2 * kWidth) / team.kLanes) ++wrong;
       for (int n = 0; n < kTeamSums; ++n) sum[n] += any_float(job + n, k);
     });
     of_twice_again = of_twice;
@@ -162,24 +164,19 @@ CUTPROOF_DEVICE void team_kernel(Block& block, const Teamed& out, int jobs) {
     if (team.leads()) {
       for (int n = 0; n < kTeamSums; ++n) out.sums[job * kTeamSums + n] = total.v[n];
     }
-    int wrong = 0;
     const auto half = team.total(of_twice);
     if (team.leads()) {
       for (int n = 0; n < kTeamSums; ++n) out.half[job * kTeamSums + n] = half.v[n];
     }
-    if constexpr (kWidth >= 16) {
-      const auto half_parts = team.parted(of_twice_again);
-      for (int n = 0; n < kTeamSums; ++n) {
-        if (half_parts.get(team, n) != half.v[n]) ++wrong;
-      }
-      const auto parts = team.parted(again);
-      for (int n = 0; n < kTeamSums; ++n) {
-        if (parts.get(team, n) != total.v[n]) ++wrong;
-      }
-      parts.each(team, [&](int n, float sum) { out.parts[job * kTeamSums + n] = sum; });
-    } else if (team.leads()) {
-      for (int n = 0; n < kTeamSums; ++n) out.parts[job * kTeamSums + n] = total.v[n];
+    const auto half_parts = team.parted(of_twice_again);
+    for (int n = 0; n < kTeamSums; ++n) {
+      if (half_parts.get(team, n) != half.v[n]) ++wrong;
     }
+    const auto parts = team.parted(again);
+    for (int n = 0; n < kTeamSums; ++n) {
+      if (parts.get(team, n) != total.v[n]) ++wrong;
+    }
+    parts.each(team, [&](int n, float sum) { out.parts[job * kTeamSums + n] = sum; });
     float most = -1e9f;
     int values = 0, odd = 0, before = 0;
     bool any_odd = false;

@@ -1,0 +1,100 @@
+// What a frame does around its stages: memberships come back into their order where they may have left it, and clusters
+// are numbered as their slots come.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "fixtures/bodies.h"
+#include "fixtures/cook.h"
+#include "gpu/host/host_launcher.h"
+#include "gpu/launch/frame.h"
+#include "model/at.h"
+#include "tests/gpu/kernels/cluster_stages.h"
+
+namespace cutproof::gpu {
+namespace {
+
+using testing::Bench;
+using testing::Bodies;
+
+bool is_in_order(const StagingBuffers& staging, std::size_t p) {
+  const auto list = staging.memberships.begin();
+  return std::is_sorted(list + staging.membership_begin[p], list + staging.membership_begin[p + 1],
+                        [](int a, int b) { return static_cast<unsigned>(a) < static_cast<unsigned>(b); });
+}
+
+TEST(Frame, BringsMembershipsIntoTheirOrderAndLooksAtNoOthers) {
+  int out_of_order = 0, left_alone = 0;
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    SCOPED_TRACE(seed);
+    property_tests::Random random(seed);
+    Bodies bodies;
+    std::int64_t frames = 0;
+    for (int k = 0; k < 3; ++k) {
+      auto [setup, state] = property_tests::instance_of(property_tests::draw_case(random.seed(), 60));
+      frames = std::max(frames, setup.frame_count());
+      bodies.add(std::move(setup), std::move(state));
+    }
+    Bench bench(std::move(bodies));
+    HostLauncher launcher;
+    for (std::int64_t f = 0; f < frames; ++f) {
+      enqueue_span(launcher, bench.view, bench.plan, Span{Stage::step, Stage::expand}, [](Stage) {});
+      for (std::size_t p = 0; p < bench.staging.node.size(); ++p) {
+        const bool marked = bench.staging.unsorted[p / kParticleRow] != 0;
+        if (!is_in_order(bench.staging, p)) {
+          ++out_of_order;
+          ASSERT_TRUE(marked) << "particle " << p << " in frame " << f;
+        }
+        left_alone += !marked;
+      }
+      enqueue_span(launcher, bench.view, bench.plan, Span{Stage::skin, Stage::skin}, [](Stage) {});
+      for (std::size_t p = 0; p < bench.staging.node.size(); ++p) ASSERT_TRUE(is_in_order(bench.staging, p)) << p;
+      for (const int marked : bench.staging.unsorted) ASSERT_EQ(marked, 0);
+    }
+  }
+  EXPECT_GT(out_of_order, 100);
+  EXPECT_GT(left_alone, 1000);
+}
+
+// More slots than one block numbers, of which some are empty.
+TEST(Frame, NumbersClustersInTheOrderOfTheirSlots) {
+  Bodies bodies;
+  for (const int side : {24, 6}) {
+    cutproof::Setup setup;
+    setup.body = fixtures::block(side, side, side, 0.01);
+    setup.substep_length = {1e-3};
+    setup.step.substeps = 1;
+    ClusterSpec spec;
+    spec.side = 1;
+    State state = fixtures::cook(setup.body, spec, setup.expand, setup.merge, 1);
+    bodies.add(std::move(setup), std::move(state));
+  }
+  for (const bool together : {false, true}) {
+    Bodies some;
+    for (std::size_t b = 0; b < (together ? 2u : 1u); ++b) some.add(bodies.setups[b], bodies.states[b]);
+    Bench bench(std::move(some));
+    const int slots = bench.staging.counters.front().slots_used;
+    ASSERT_GT(slots, kSlotRun);
+    std::mt19937_64 random(5);
+    for (int s = 0; s < slots; ++s) {
+      if (random() % 3 == 0) bench.staging.slot_size[at(s)] = 0;
+      if (together) bench.staging.slot_body[at(s)] = static_cast<int>(random() % 2);  // as after splits of both
+      bench.staging.slot_number[at(s)] = -7;
+    }
+    for (const int threads : {1, 4}) {
+      HostLauncher launcher{HostLauncher::Threads{threads}};
+      launcher.blocks(number_slots_kernel_object{}, bench.view.bodies * slot_runs(slots), kListThreads, 0, bench.view);
+      std::vector<int> next(2, 0);
+      for (int s = 0; s < slots; ++s) {
+        if (bench.staging.slot_size[at(s)] == 0) continue;
+        ASSERT_EQ(bench.staging.slot_number[at(s)], next[at(bench.staging.slot_body[at(s)])]++) << "slot " << s;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace cutproof::gpu
