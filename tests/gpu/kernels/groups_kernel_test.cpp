@@ -665,7 +665,8 @@ TEST(Groups, LeaveRoomForTheirRestShape) {
   HostLauncher launcher;
   launcher.items(begin_frame_kernel_object{}, w.particles, w);
   enqueue_groups(launcher, w);
-  launcher.teams(sum_groups_kernel_object<true>{}, step_detail::kParticleTeam, w.group_capacity, w);
+  launcher.teams(sum_groups_kernel_object<true, step_detail::kParticleTeam>{}, step_detail::kParticleTeam,
+                 w.group_capacity, w);
   const int groups = staging.counters.front().groups;
   ASSERT_GT(groups, 20);
   const auto h = static_cast<float>(setup.body.grid.spacing);
@@ -718,7 +719,7 @@ TEST(Groups, AreResolvedIfEitherCandidateTouches) {
     const int teams = w.group_capacity;
     launcher.items(begin_frame_kernel_object{}, w.particles, w);
     enqueue_groups(launcher, w);
-    launcher.teams(sum_groups_kernel_object<true>{}, step_detail::kParticleTeam, teams, w);
+    launcher.teams(sum_groups_kernel_object<true, step_detail::kParticleTeam>{}, step_detail::kParticleTeam, teams, w);
     launcher.teams(begin_substep_kernel_object<true, step_detail::kRowTeam>{}, step_detail::kParticleTeam, teams, w, 0);
     const Pace& pace = staging.pace.front();
     const step_detail::Combination combination = step_detail::chebyshev(pace.kdt2, kIteration);
