@@ -608,6 +608,48 @@ TEST(Groups, AreResolvedWhereTheyMayTouchAndNowhereElse) {
   for (const int touched : step(above, cooked(above)).touched) EXPECT_EQ(touched, 0);
 }
 
+// A plate stands in the middle of the body: groups with particles before and behind it are on neither side, whatever
+// the one in their middle says, or one that comes through the plate might be taken for clear of it.
+TEST(Groups, AreOnBothSidesOfTheBladeIfTheirParticlesAre) {
+  cutproof::Setup setup = block_on_floor(0.05);
+  setup.step.substeps = 2;
+  const double h = setup.body.grid.spacing;
+  setup.has_blade = true;
+  setup.blade = {1, 1, 0.5 * h, 0};
+  BladePose pose;
+  pose.edge = {8.4 * h, 8 * h, -0.5};
+  pose.along = {0, 1, 0};
+  pose.back = {0, 0, 1};
+  const double normal_x = cross(pose.along, pose.back).x;
+  setup.blade_moves.assign(2, BladeMove{pose, pose, true, 0});
+  const std::vector<cutproof::Setup> setups = {setup};
+  StagingBuffers staging = make_staging_buffers(setups, {cooked(setup)}, kNewton, Capacity{});
+  const DeviceView w = staging.view();
+  HostLauncher launcher;
+  launcher.items(begin_frame_kernel_object{}, w.particles, w);
+  enqueue_groups(launcher, w);
+  launcher.teams(sum_groups_kernel_object<true, step_detail::kParticleTeam>{}, step_detail::kParticleTeam,
+                 w.group_capacity, w);
+  for (int substep = 0; substep < 2; ++substep) {
+    launcher.teams(begin_substep_kernel_object<true, step_detail::kRowTeam>{}, step_detail::kParticleTeam,
+                   w.group_capacity, w, substep);
+  }
+  int both = 0, one = 0;
+  for (int g = 0; g < staging.counters.front().groups; ++g) {
+    if (w.group_tracked[g] == step_detail::kUntouched) continue;
+    const GroupHead& head = staging.group_head[at(g)];
+    bool before = false, behind = false;
+    for (int o = head.begin; o < head.begin + head.size; ++o) {
+      const double x = setup.body.rest_position(staging.place_particle[at(o)]).x + w.start[o].x;
+      (normal_x * (x - pose.edge.x) < 0 ? behind : before) = true;
+    }
+    ASSERT_EQ(w.group_side[g], before && behind ? 0 : behind ? -1 : 1) << "group " << g;
+    ++(before && behind ? both : one);
+  }
+  EXPECT_GT(both, 5);
+  EXPECT_GT(one, 5);
+}
+
 // Moments are about numbers near all of their group, though its middle particle, which gives those numbers else, may
 // have been led, or be flying, far away.
 TEST(Groups, HaveTheirBasesNearTheirMeans) {
