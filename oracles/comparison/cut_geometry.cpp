@@ -1,6 +1,8 @@
 #include "oracles/comparison/cut_geometry.h"
 
 #include <algorithm>
+#include <boost/graph/adjacency_list.hpp>
+#include <boost/graph/max_cardinality_matching.hpp>
 #include <cmath>
 #include <limits>
 
@@ -89,15 +91,20 @@ IdealCut ideal_cut(const Body& body, const State& before, const std::vector<Tria
   return cut;
 }
 
-// The fewest particles on any one direction of grid lines without which no edge along it crosses the surface. Edges of
-// one line form paths; going up a path, the upper end of an edge serves the next one too.
+// The fewest particles without which no edge of the grid is left that crosses the surface. Neighbours on a grid differ
+// in whether the sum of their coordinates is even, so the graph of these edges is bipartite: the fewest that touch all
+// of its edges are as many as the most edges of which no two share an end (D. König, Gráfok és mátrixok, 1931).
 int64_t least_removed(const Body& body, const State& before, const std::vector<Triangle>& surface) {
   const double h = body.grid.spacing;
-  int64_t least = 0;
+  using Ends = std::pair<int64_t, int64_t>;  // grid nodes, the lower first
+  std::vector<Ends> edges;
+  const auto index_of = [&](const std::array<int64_t, 3>& node) {
+    return int64_t{
+        body.grid.index(static_cast<int32_t>(node[0]), static_cast<int32_t>(node[1]), static_cast<int32_t>(node[2]))};
+  };
   for (int axis = 0; axis < 3; ++axis) {
     Lattice lattice{axes_of(axis), {-h / 2, -h / 2}, {}, {h, h}};
     lattice.count = {body.grid.nodes[at(lattice.axes.u)], body.grid.nodes[at(lattice.axes.v)]};
-    std::vector<std::pair<int64_t, int64_t>> edges;  // line, lower node
     for (const Triangle& triangle : surface) {
       cross_lines(lattice, triangle, [&](const Crossing& c) {
         std::array<int64_t, 3> node;
@@ -107,22 +114,29 @@ int64_t least_removed(const Body& body, const State& before, const std::vector<T
         std::array<int64_t, 3> upper = node;
         ++upper[at(axis)];
         if (is_tissue(body, before, node) && is_tissue(body, before, upper)) {
-          edges.emplace_back(c.line, node[at(axis)]);
+          edges.emplace_back(index_of(node), index_of(upper));
         }
       });
     }
-    std::sort(edges.begin(), edges.end());
-    edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-    int64_t needed = 0;
-    std::pair<int64_t, int64_t> taken = {-1, -1};
-    for (const auto& edge : edges) {
-      if (edge == taken) continue;  // its lower node is gone
-      ++needed;
-      taken = {edge.first, edge.second + 1};
-    }
-    least = std::max(least, needed);
   }
-  return least;
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+
+  std::vector<int64_t> ends;
+  for (const auto& [low, high] : edges) {
+    ends.push_back(low);
+    ends.push_back(high);
+  }
+  std::sort(ends.begin(), ends.end());
+  ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
+  const auto vertex = [&](int64_t node) {
+    return static_cast<std::size_t>(std::lower_bound(ends.begin(), ends.end(), node) - ends.begin());
+  };
+  boost::adjacency_list<boost::vecS, boost::vecS, boost::undirectedS> graph(ends.size());
+  for (const auto& [low, high] : edges) boost::add_edge(vertex(low), vertex(high), graph);
+  std::vector<std::size_t> mate(ends.size());
+  boost::edmonds_maximum_cardinality_matching(graph, mate.data());
+  return static_cast<int64_t>(boost::matching_size(graph, mate.data()));
 }
 
 // --- The new skin ----------------------------------------------------------------------------------------------------

@@ -4,7 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <random>
+#include <set>
+#include <utility>
+#include <vector>
 
 #include "oracles/surface/surface_distance.h"
 #include "tests/oracles/states.h"
@@ -180,6 +185,83 @@ TEST(CutGeometry, AnObliquePlaneHasItsArea) {
   EXPECT_NEAR(geometry.cut_area, area, 2 * 4 * std::sqrt(2.0) / kLinesPerSpacing);
   // Along x every one of the 20 × 4 lines is cut once, and so are those along z.
   EXPECT_NEAR(geometry.least_per_area.value(), 80 / geometry.cut_area, 1e-12);
+}
+
+// Planes through a block, one after the other, each by a plate larger than it that goes along itself.
+struct Planes {
+  cutproof::Setup setup;
+  State before, after;
+
+  Planes(Body body, const std::vector<std::pair<Vec3, Vec3>>& points_and_normals) {
+    setup = setup_of(std::move(body), static_cast<int64_t>(points_and_normals.size()));
+    setup.step.substeps = 1;
+    setup.has_blade = true;
+    setup.blade = {100 * kH, 100 * kH, 0, 0};
+    for (const auto& [point, normal] : points_and_normals) {
+      const Vec3 aside = std::abs(normal.x) < 0.7 * norm(normal) ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
+      Vec3 along = cross(normal, aside);
+      along = (1 / norm(along)) * along;
+      Vec3 back = cross(along, normal);
+      back = (1 / norm(back)) * back;
+      const BladePose from = {point + 40 * kH * back, along, back}, to = {point - 40 * kH * back, along, back};
+      setup.blade_moves.push_back({from, to, true, static_cast<int32_t>(setup.blade_moves.size())});
+    }
+    before = state_of(setup.body, {range(0, setup.body.particle_count())});
+    after = before;
+    after.frame = setup.frame_count();
+  }
+  double least() const {
+    const CutGeometry geometry = cut_geometry(setup, before, after);
+    return geometry.least_per_area.value() * geometry.cut_area;
+  }
+};
+
+// Each crosses 9 × 4 edges. Of the four particles around where they meet, two that lie across from each other serve two
+// edges each, in each of 4 layers.
+TEST(CutGeometry, TheLeastOfTwoCutsAcrossEachOtherIsNotThatOfOne) {
+  const Planes planes(block_body(9, 9, 4, kH), {{{5.5 * kH, 5 * kH, 2 * kH}, {1, 0, 0}},  //
+                                                {{5 * kH, 5.5 * kH, 2 * kH}, {0, 1, 0}}});
+  EXPECT_NEAR(planes.least(), 36 + 36 - 4 * 2, 1e-9);
+}
+
+// Of three planes in any direction through 18 particles: of all 2^18 choices the smallest that touches every edge whose
+// ends lie on two sides of one of them.
+TEST(CutGeometry, TheLeastIsThatOfAllChoices) {
+  std::mt19937_64 random(7);
+  const auto number = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  std::set<int> found;
+  for (int trial = 0; trial < 12; ++trial) {
+    SCOPED_TRACE(trial);
+    std::vector<std::pair<Vec3, Vec3>> planes;
+    for (int k = 0; k < 3; ++k) {
+      planes.emplace_back(Vec3{number(1, 3) * kH, number(1, 3) * kH, number(1, 2) * kH},
+                          Vec3{number(-1, 1), number(-1, 1), number(-1, 1)});
+    }
+    const Planes cuts(block_body(3, 3, 2, kH), planes);
+    std::vector<uint32_t> edges;  // both ends, as bits
+    const Body& body = cuts.setup.body;
+    const auto side = [&](const std::pair<Vec3, Vec3>& plane, int32_t i) {
+      return dot(body.rest_position(i) - plane.first, plane.second) > 0;
+    };
+    for (int32_t i = 0; i < body.particle_count(); ++i) {
+      for (int32_t j = i + 1; j < body.particle_count(); ++j) {
+        if (norm(body.rest_position(i) - body.rest_position(j)) > 1.01 * kH) continue;
+        const auto between = [&](const auto& plane) { return side(plane, i) != side(plane, j); };
+        if (std::any_of(planes.begin(), planes.end(), between)) edges.push_back((1u << i) | (1u << j));
+      }
+    }
+    int least = 18;
+    for (uint32_t gone = 0; gone < (1u << 18); ++gone) {
+      if (std::popcount(gone) >= least) continue;
+      const auto touched = [&](uint32_t edge) { return (edge & gone) != 0; };
+      if (std::all_of(edges.begin(), edges.end(), touched)) least = std::popcount(gone);
+    }
+    EXPECT_NEAR(cuts.least(), least, 1e-9);
+    found.insert(least);
+  }
+  EXPECT_GE(found.size(), 3u) << "the trials are too much alike";
 }
 
 // A plate whose edge goes along itself on a circle, upright: it cuts a part of a cylinder.
