@@ -80,18 +80,18 @@ CUTPROOF_KERNEL(note_cuts_kernel);
 
 // Split and merge rename memberships in place. Before anything is summed over them again they are brought into the
 // order that a load gives them, so that sums have the same bits however often a state was loaded on the way. A warp for
-// each row of particles.
+// each tile of particles.
 template <class Block>
 CUTPROOF_DEVICE void sort_memberships_kernel(Block& block, const DeviceView& w) {
-  const Team<Block, kParticleRow> team(block);
-  const int64_t rows = particle_rows(w.particles);
-  for (int64_t row = team.first(); row < rows; row += team.stride()) {
-    if (w.unsorted[row] == 0) continue;
-    const int64_t begin = row * kParticleRow, left = w.particles - begin;
-    team.each(left < kParticleRow ? static_cast<int>(left) : kParticleRow,
+  const Team<Block, kParticleTile> team(block);
+  const int64_t tiles = particle_tiles(w.particles);
+  for (int64_t tile = team.first(); tile < tiles; tile += team.stride()) {
+    if (w.unsorted[tile] == 0) continue;
+    const int64_t begin = tile * kParticleTile, left = w.particles - begin;
+    team.each(left < kParticleTile ? static_cast<int>(left) : kParticleTile,
               [&](int k) { sort_memberships(w, begin + k); });
-    team.sync();  // all have read it
-    if (team.leads()) w.unsorted[row] = 0;
+    team.sync();  // all lanes have read the mark
+    if (team.leads()) w.unsorted[tile] = 0;
   }
 }
 CUTPROOF_KERNEL(sort_memberships_kernel);

@@ -9,8 +9,8 @@ namespace cutproof::gpu {
 inline constexpr int kListThreads = 512;
 
 // give(n, k) for the k in [begin, end) that are wanted, n being `before` and how many before it are. Reached by all
-// threads of one block; returns the n behind the last. wanted() is asked once for each k, and for some before give()
-// has told of others.
+// threads of one block; returns the n behind the last. wanted() is asked once for each k, a tile ahead of give(): it
+// must not depend on what give() writes.
 template <class Block, class Wanted, class Give>
 CUTPROOF_DEVICE int count_off(Block& block, int begin, int end, int before, Wanted wanted, Give give) {
   constexpr int kEach = 8;  // neighbours of a thread
@@ -95,7 +95,7 @@ CUTPROOF_DEVICE int write_union(Block& block, const A& a, int a_size, const B& b
 
 template <class Block>
 CUTPROOF_DEVICE void mark_unsorted(Block& block, const DeviceView& w, int p) {
-  block.store(&w.unsorted[p / kParticleRow], 1);
+  block.store(&w.unsorted[p / kParticleTile], 1);
 }
 
 // Memberships of a particle in ascending order, -1 last.

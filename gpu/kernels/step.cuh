@@ -1846,7 +1846,7 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
     });
   };
   by_particles(
-      [&](auto lanes) { launcher.teams(sum_groups_kernel_object<kContacts, lanes.value>{}, kParticleTeam, teams, w); });
+      [&](auto lanes) { launcher.teams(sum_groups_kernel_object<kContacts, lanes.value>{}, lanes.value, teams, w); });
   for (int substep = 0; substep < plan.substeps; ++substep) {
     by_rows([&](auto rows) {
       launcher.teams(begin_substep_kernel_object<kContacts, rows.value>{}, kParticleTeam, teams, w, substep);
@@ -1864,7 +1864,7 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
     }
   }
   by_particles(
-      [&](auto lanes) { launcher.teams(end_step_kernel_object<kContacts, lanes.value>{}, kParticleTeam, teams, w); });
+      [&](auto lanes) { launcher.teams(end_step_kernel_object<kContacts, lanes.value>{}, lanes.value, teams, w); });
 }
 
 template <int Method, class Launcher>

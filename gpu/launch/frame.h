@@ -53,7 +53,7 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
       }
       if (skin) {
         mark(Stage::skin);
-        inner.teams(sort_memberships_kernel_object{}, kParticleRow, particle_rows(w.particles), w);
+        inner.teams(sort_memberships_kernel_object{}, kParticleTile, particle_tiles(w.particles), w);
         inner.blocks(number_slots_kernel_object{}, w.bodies * slot_runs(w.slots_expected), kListThreads, 0, w);
         if (plan.skin) enqueue_skin_cells(inner, w, plan);
       }

@@ -22,9 +22,9 @@ enum : int { kSlotsFull = 1, kMembersFull = 2, kVerticesFull = 4, kCellsFull = 8
 // Which rotation method match_shapes uses (rotation.cuh); chosen by measurement, docs/results/accuracy.md, Rotations.
 enum : int { kJacobi4 = 0, kMueller2016 = 1, kApd = 2, kSvd = 3, kQuest = 4, kNewton = 5 };
 
-// Whose memberships may be out of order is known by rows of so many particles.
-inline constexpr int kParticleRow = 32;
-CUTPROOF_BOTH inline int64_t particle_rows(int64_t particles) { return (particles + kParticleRow - 1) / kParticleRow; }
+// Whose memberships may be out of order is known by tiles of so many particles.
+inline constexpr int kParticleTile = 32;
+CUTPROOF_BOTH inline int64_t particle_tiles(int64_t particles) { return (particles + kParticleTile - 1) / kParticleTile; }
 
 // Division by a number that is known before: n / d = n · multiplier >> shift for every 0 <= n < 2^31 (Granlund and
 // Montgomery 1994). A division proper takes some 20 instructions, and kernels need two for each particle they look at.
