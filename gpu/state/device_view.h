@@ -24,7 +24,9 @@ enum : int { kJacobi4 = 0, kMueller2016 = 1, kApd = 2, kSvd = 3, kQuest = 4, kNe
 
 // Whose memberships may be out of order is known by tiles of so many particles.
 inline constexpr int kParticleTile = 32;
-CUTPROOF_BOTH inline int64_t particle_tiles(int64_t particles) { return (particles + kParticleTile - 1) / kParticleTile; }
+CUTPROOF_BOTH inline int64_t particle_tiles(int64_t particles) {
+  return (particles + kParticleTile - 1) / kParticleTile;
+}
 
 // Division by a number that is known before: n / d = n · multiplier >> shift for every 0 <= n < 2^31 (Granlund and
 // Montgomery 1994). A division proper takes some 20 instructions, and kernels need two for each particle they look at.

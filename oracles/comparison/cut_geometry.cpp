@@ -122,6 +122,7 @@ int64_t least_removed(const Body& body, const State& before, const std::vector<T
   std::sort(edges.begin(), edges.end());
   edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
 
+  // Vertices are the ends of these edges and no others: each search for a greater matching looks at all of them.
   std::vector<int64_t> ends;
   for (const auto& [low, high] : edges) {
     ends.push_back(low);

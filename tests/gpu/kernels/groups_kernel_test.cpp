@@ -570,6 +570,18 @@ Stepped step(const cutproof::Setup& setup, const State& state) {
   return stepped;
 }
 
+// The step's kernels up to where a frame's first substep begins, and what begins one.
+void begin_frame(HostLauncher& launcher, const DeviceView& w) {
+  launcher.items(begin_frame_kernel_object{}, w.particles, w);
+  enqueue_groups(launcher, w);
+  launcher.teams(sum_groups_kernel_object<true, step_detail::kParticleTeam>{}, step_detail::kParticleTeam,
+                 w.group_capacity, w);
+}
+void begin_substep(HostLauncher& launcher, const DeviceView& w, int substep) {
+  launcher.teams(begin_substep_kernel_object<true, step_detail::kRowTeam>{}, step_detail::kParticleTeam,
+                 w.group_capacity, w, substep);
+}
+
 cutproof::Setup block_on_floor(double gap) {
   cutproof::Setup setup;
   setup.body = fixtures::block(15, 15, 15, 0.01);
@@ -626,14 +638,8 @@ TEST(Groups, AreOnBothSidesOfTheBladeIfTheirParticlesAre) {
   StagingBuffers staging = make_staging_buffers(setups, {cooked(setup)}, kNewton, Capacity{});
   const DeviceView w = staging.view();
   HostLauncher launcher;
-  launcher.items(begin_frame_kernel_object{}, w.particles, w);
-  enqueue_groups(launcher, w);
-  launcher.teams(sum_groups_kernel_object<true, step_detail::kParticleTeam>{}, step_detail::kParticleTeam,
-                 w.group_capacity, w);
-  for (int substep = 0; substep < 2; ++substep) {
-    launcher.teams(begin_substep_kernel_object<true, step_detail::kRowTeam>{}, step_detail::kParticleTeam,
-                   w.group_capacity, w, substep);
-  }
+  begin_frame(launcher, w);
+  for (int substep = 0; substep < 2; ++substep) begin_substep(launcher, w, substep);
   int both = 0, one = 0;
   for (int g = 0; g < staging.counters.front().groups; ++g) {
     if (w.group_tracked[g] == step_detail::kUntouched) continue;
@@ -705,10 +711,7 @@ TEST(Groups, LeaveRoomForTheirRestShape) {
   StagingBuffers staging = make_staging_buffers(setups, {cooked(setup)}, kNewton, Capacity{});
   const DeviceView w = staging.view();
   HostLauncher launcher;
-  launcher.items(begin_frame_kernel_object{}, w.particles, w);
-  enqueue_groups(launcher, w);
-  launcher.teams(sum_groups_kernel_object<true, step_detail::kParticleTeam>{}, step_detail::kParticleTeam,
-                 w.group_capacity, w);
+  begin_frame(launcher, w);
   const int groups = staging.counters.front().groups;
   ASSERT_GT(groups, 20);
   const auto h = static_cast<float>(setup.body.grid.spacing);
@@ -717,8 +720,7 @@ TEST(Groups, LeaveRoomForTheirRestShape) {
     Float4* const rows = w.group_place + 3 * g;
     rows[0].x = rows[1].y = rows[2].z = smaller;
   }
-  launcher.teams(begin_substep_kernel_object<true, step_detail::kRowTeam>{}, step_detail::kParticleTeam,
-                 w.group_capacity, w, 0);
+  begin_substep(launcher, w, 0);
   for (int g = 0; g < groups; ++g) {
     ASSERT_EQ(w.group_tracked[g], step_detail::kUntouched);
     double lowest = 1;
@@ -758,11 +760,8 @@ TEST(Groups, AreResolvedIfEitherCandidateTouches) {
     StagingBuffers staging = make_staging_buffers(setups, states, kNewton, Capacity{});
     const DeviceView w = staging.view();
     HostLauncher launcher;
-    const int teams = w.group_capacity;
-    launcher.items(begin_frame_kernel_object{}, w.particles, w);
-    enqueue_groups(launcher, w);
-    launcher.teams(sum_groups_kernel_object<true, step_detail::kParticleTeam>{}, step_detail::kParticleTeam, teams, w);
-    launcher.teams(begin_substep_kernel_object<true, step_detail::kRowTeam>{}, step_detail::kParticleTeam, teams, w, 0);
+    begin_frame(launcher, w);
+    begin_substep(launcher, w, 0);
     const Pace& pace = staging.pace.front();
     const step_detail::Combination combination = step_detail::chebyshev(pace.kdt2, kIteration);
     // Where all is now, and where it was that the two lead to the candidate that is wanted.
@@ -783,8 +782,8 @@ TEST(Groups, AreResolvedIfEitherCandidateTouches) {
         w.group_earlier_map[3 * g + axis] = {0, 0, 0, axis == 2 ? earlier : 0};
       }
     }
-    launcher.teams(advance_kernel_object<true, true, step_detail::kRowTeam>{}, step_detail::kParticleTeam, teams, w, 0,
-                   kIteration);
+    launcher.teams(advance_kernel_object<true, true, step_detail::kRowTeam>{}, step_detail::kParticleTeam,
+                   w.group_capacity, w, 0, kIteration);
     for (int g = 0; g < groups; ++g) {
       ASSERT_EQ(w.group_resolved[g], wanted.touches ? step_detail::kResolved : step_detail::kCarried)
           << "plain " << wanted.plain << ", accelerated " << wanted.accelerated << ", group " << g;
