@@ -7,6 +7,8 @@
 
 #include "cli/commands.h"
 #include "cli/options.h"
+#include "cli/scene_files.h"
+#include "model/error.h"
 #include "model/fields.h"
 #include "model/io/scene_io.h"
 #include "oracles/surface/surface.h"
@@ -16,7 +18,8 @@ namespace cutproof::cli {
 namespace {
 
 struct InfoOptions {
-  bool scene = false;  // print the reference of scene files
+  bool scene = false;   // print the reference of scene files
+  bool scenes = false;  // print the scenes that come with the program
 };
 
 // When it is judged: a property of a state says so itself, one of a stage after the stages that promise it.
@@ -51,7 +54,18 @@ void print_properties() {
   }
 }
 
+int print_scenes() {
+  const std::vector<std::string> names = scene_names();
+  if (names.empty()) {
+    throw InputError("cutproof info", "--scenes", "The scenes that come with the program are not beside it.",
+                     "Run the program from its build or its package, or give a scene file.");
+  }
+  for (const std::string& name : names) fmt::print("{}\n  {}\n", name, io::read_scene(scene_file(name)).description);
+  return 0;
+}
+
 int info(const InfoOptions& options) {
+  if (options.scenes) return print_scenes();
   if (options.scene) {
     fmt::print("{}", io::scene_reference());
     return 0;
@@ -74,6 +88,7 @@ void add_info(CLI::App& program, Work& work) {
   const auto options = std::make_shared<InfoOptions>();
   CLI::App* const command = program.add_subcommand("info", "version, backends, devices, properties");
   command->add_flag("--scene", options->scene, "list every field of a scene file");
+  command->add_flag("--scenes", options->scenes, "list the scenes that come with the program");
   command->callback([options, &work] { work = [options] { return info(*options); }; });
 }
 

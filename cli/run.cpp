@@ -14,6 +14,7 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/results.h"
+#include "cli/scene_files.h"
 #include "cli/terminal.h"
 #include "fixtures/bodies.h"
 #include "fixtures/build.h"
@@ -49,12 +50,14 @@ struct RunOptions {
 
 constexpr const char* kNextSteps =
     "cutproof run needs a scene. Try\n"
-    "  cutproof run fixtures/scenes/kidney_discontinuous.json --check\n"
+    "  cutproof run kidney_discontinuous --check\n"
     "      cuts a kidney in two steps and certifies every frame\n"
-    "  cutproof run fixtures/scenes/kidney_discontinuous.json --check --mesh KIDNEY.stl --unit mm\n"
+    "  cutproof run kidney_discontinuous --check --mesh KIDNEY.stl --unit mm\n"
     "      does the same on your own closed surface mesh (STL, OBJ, PLY, OFF)\n"
-    "  cutproof run fixtures/scenes/three_cuts.json --check --record cuts --json cuts.json\n"
+    "  cutproof run three_cuts --check --record cuts --json cuts.json\n"
     "      keeps a recording for ParaView and `cutproof check`, and the verdicts for a machine\n"
+    "  cutproof info --scenes\n"
+    "      lists the scenes that come with the program\n"
     "  cutproof info --scene\n"
     "      lists every field of a scene file\n";
 
@@ -277,7 +280,10 @@ int run(const RunOptions& options) {
 void add_run(CLI::App& program, Work& work) {
   const auto options = std::make_shared<RunOptions>();
   CLI::App* const command = program.add_subcommand("run", "simulate a scene, and judge it with --check");
-  command->add_option("scene", options->scene, "scene file (JSON); see `cutproof info --scene`")->type_name("SCENE");
+  command
+      ->add_option("scene", options->scene,
+                   "scene file (JSON, see `cutproof info --scene`), or a name (`cutproof info --scenes`)")
+      ->type_name("SCENE");
   add_backend(*command, options->backend, "backend under test");
   command->add_option("--mesh", options->mesh, "closed surface mesh that takes the place of the scene's body")
       ->type_name("FILE");
@@ -316,7 +322,10 @@ void add_run(CLI::App& program, Work& work) {
       options->scene = std::exchange(options->check, std::string(name_of(harness::Depth::motion)));
     }
     work = [options] {
-      if (!options->scene.empty()) return run(*options);
+      if (!options->scene.empty()) {
+        options->scene = scene_file(options->scene);
+        return run(*options);
+      }
       std::fputs(kNextSteps, stderr);
       return 2;
     };

@@ -9,6 +9,7 @@
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "cli/output.h"
+#include "cli/scene_files.h"
 #include "cli/table.h"
 #include "cli/terminal.h"
 #include "model/io/filled.h"
@@ -178,7 +179,9 @@ void add_tune(CLI::App& program, Work& work) {
   TuneOptions& options = asked->tune;
   CLI::App* const command =
       program.add_subcommand("tune", "find the cheapest configuration of a scene within a tolerance");
-  command->add_option("scene", options.scene, "scene file (JSON); see `cutproof info --scene`")
+  command
+      ->add_option("scene", options.scene,
+                   "scene file (JSON, see `cutproof info --scene`), or a name (`cutproof info --scenes`)")
       ->required()
       ->type_name("SCENE");
   command
@@ -204,7 +207,12 @@ void add_tune(CLI::App& program, Work& work) {
   command->add_option("--write", options.write, "the scene that was found (default: NAME_tuned.json here)")
       ->type_name("F");
   add_json(*command, asked->json, "write everything that was tried");
-  command->callback([asked, &work] { work = [asked] { return tune(*asked); }; });
+  command->callback([asked, &work] {
+    work = [asked] {
+      asked->tune.scene = scene_file(asked->tune.scene);
+      return tune(*asked);
+    };
+  });
 }
 
 }  // namespace cutproof::cli

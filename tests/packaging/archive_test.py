@@ -58,9 +58,17 @@ def judge(options, root, name):
     ours = {path.name for path in (options.source / "fixtures/scenes").glob("*.json")}
     theirs = {path.name for path in scenes.glob("*")}
     expect(ours == theirs, f"{name}: scenes that only one side has: {ours ^ theirs}")
-    done = run([program, "run", scenes / "small_block.json", "--check", "topology"], **surroundings)
+    # As the README says it: the scene by its name, from any folder.
+    done = run([program, "run", "small_block", "--check", "topology"], **surroundings)
     expect(done.returncode == 0 and "everything holds." in done.stdout, f"{name}: cutproof run: {done.stdout}")
     expect(not list(empty.iterdir()), f"{name}: the program has written {list(empty.iterdir())}")
+    # The tutorial's first steps: its simulator is there, builds against the header that is there, and fails.
+    shutil.copy(root / "share/cutproof/examples/splitter.cpp", empty)
+    built = run([options.cxx, "-std=c++20", "-shared", "-fPIC", "splitter.cpp", "-o", "libsplitter.so",
+                 "-I", root / "include"], **surroundings)
+    expect(built.returncode == 0, f"{name}: the tutorial's simulator does not build: {built.stdout}")
+    done = run([program, "run", "three_cuts", "--backend", "plugin:./libsplitter.so", "--check"], **surroundings)
+    expect(done.returncode == 1 and "cluster connectivity" in done.stdout, f"{name}: the tutorial: {done.stdout}")
     # Scripts for clusters find the program that they were installed with.
     found = run([root / "share/cutproof/cluster/fuzz_shard.sh", "--program"], **surroundings)
     expect(found.returncode == 0 and os.path.realpath(found.stdout.strip()) == os.path.realpath(program),

@@ -1,0 +1,57 @@
+#include "cli/scene_files.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <system_error>
+
+#include "model/error.h"
+
+namespace cutproof::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// Beside the program that runs: what an installation has, else what the source tree has in which it was built. Not
+// compiled in, because packages are unpacked anywhere. Empty if neither is there.
+fs::path scene_folder() {
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  if (error) return {};
+  if (const fs::path installed = program.parent_path().parent_path() / "share/cutproof/scenes";
+      fs::is_directory(installed, error)) {
+    return installed;
+  }
+  for (fs::path folder = program.parent_path(); folder != folder.parent_path(); folder = folder.parent_path()) {
+    if (fs::is_directory(folder / "fixtures/scenes", error)) return folder / "fixtures/scenes";
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<std::string> scene_names() {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(scene_folder(), error)) {
+    if (entry.path().extension() == ".json") names.push_back(entry.path().stem().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+std::string scene_file(const std::string& given) {
+  std::error_code error;
+  const bool is_path = given.find('/') != std::string::npos || given.find('.') != std::string::npos;
+  if (is_path || fs::exists(given, error)) return given;
+  const std::vector<std::string> names = scene_names();
+  if (std::binary_search(names.begin(), names.end(), given)) return (scene_folder() / (given + ".json")).string();
+  if (names.empty()) return given;
+  throw InputError(given, "", "There is no file of this name, and no scene that comes with the program is called so.",
+                   fmt::format("Give a scene file, or one of: {}.", fmt::join(names, ", ")));
+}
+
+}  // namespace cutproof::cli
