@@ -43,4 +43,27 @@ TEST_F(SceneNames, ThatThereAreNotAreRefusedWithThoseThatThereAre) {
   expect_refused("tune kidny --tolerance 1", {"kidny", "no scene that comes with the program"});
 }
 
+// What the guide says of scenes: a body that nothing holds is pushed away, one that is held is cut, and a geometric cut
+// does not ask.
+TEST_F(SceneNames, OfYourOwnNeedABodyThatIsHeldOrAGeometricCut) {
+  const std::string held =
+      R"("grips": [{"low": [0, 0, 0], "high": [0.15, 1, 1]}, {"low": [0.85, 0, 0], "high": [1, 1, 1]}],)";
+  const std::string geometric = R"("detect": {"criterion": "geometric"},)";
+  for (const auto& [speed, removed_from_free] : {std::pair("0.05", 16), std::pair("0.15", 112), std::pair("1", 128)}) {
+    for (const std::string& more : {std::string(), held, geometric}) {
+      write("block.json", R"({"version": 2, "name": "block", )" + more + R"(
+        "body": {"shape": {"kind": "box", "size": [0.1, 0.04, 0.04]}, "spacing": 0.005},
+        "frame": {"length": 0.016, "settle": 0.1}, "step": {"stiffness": 100000, "damping": 2},
+        "blade": {"thickness": 0.5, "speed": )" +
+                              speed + R"(, "strokes": [
+          {"points": [[0.5, 0.5, 1.1], [0.5, 0.5, -0.15]], "back": [0, 0, 1], "along": [0, 1, 0]}]}})");
+      const Outcome outcome = cutproof("run block.json");
+      const int removed = more.empty() ? removed_from_free : 128;
+      EXPECT_NE(outcome.output.find("removed " + std::to_string(removed) + " particles"), std::string::npos)
+          << speed << " m/s, " << more << "\n"
+          << outcome.output;
+    }
+  }
+}
+
 }  // namespace

@@ -62,8 +62,8 @@ typedef struct cutproof_host {
   /* Gives an output so many rows and keeps those that it has: rows and data change. Not 0: it cannot be had. */
   int (*grow)(const struct cutproof_host* host, cutproof_array* output, int64_t rows);
   void (*log)(const struct cutproof_host* host, const char* text);
-  /* In load and run: a field of the setup by its name in docs/reference/recording.md, such as "step/iterations" (f64)
-   * or "blade_moves/down"; in host memory. Null: there is none. */
+  /* In load and run: a field of the setup by its name in docs/reference/recording.md, such as "step/iterations" or
+   * "blade_moves/down", with the type it has there; in host memory. Null: there is none. */
   const cutproof_array* (*setup)(const struct cutproof_host* host, const char* name);
 } cutproof_host;
 
