@@ -107,7 +107,9 @@ nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const Re
   harness::TopologyFigures end;
   oracles::Interpenetration overlap;  // the greatest of those looked at
   State state = start;
+  oracles::CarriedSweep sweep(scene.setup);
   for (int64_t frame = 0; frame < frames; ++frame) {
+    const State before = state;
     double spent = 0;
     const auto run = [&](Span span) {
       backend.run(span);
@@ -126,6 +128,7 @@ nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const Re
     }
     seconds.push_back(spent);
     state = std::move(backend.snapshot().front());
+    sweep.add(before, state);
     removed += state.removed.size() + state.debris.size();
     const bool last = frame + 1 == frames;
     // Where nothing was removed, all is connected and coupled as before.
@@ -156,7 +159,7 @@ nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const Re
           {"equal", end.equal},
           {"unequal_frames", unequal_frames},
           {"isolated", isolated},
-          {"geometry", harness::to_json(oracles::cut_geometry(scene.setup, start, state))},
+          {"geometry", harness::to_json(oracles::cut_geometry(scene.setup, start, state, sweep.surface()))},
           {"interpenetration", harness::to_json(overlap)}};
 }
 

@@ -22,7 +22,7 @@ TopologyFigures topology_of(const Setup& setup, const State& state) {
 }
 
 Errors::Errors(const ErrorsWanted& wanted, const Setup& setup, const State& start, oracles::MakeBackend make)
-    : wanted_(wanted), setup_(setup), precision_(start.precision), start_(start), make_(std::move(make)) {
+    : wanted_(wanted), setup_(setup), precision_(start.precision), start_(start), make_(std::move(make)), sweep_(setup) {
   if (wanted_.solver) {
     judged_ = make_();
     exact_ = reference::make_backend();
@@ -36,10 +36,12 @@ bool Errors::looked_at(int64_t frame) const {
 }
 
 bool Errors::wants(int64_t frame) const {
-  return wanted_.topology || ((wanted_.solver || wanted_.geometry) && looked_at(frame));
+  return wanted_.topology || ((wanted_.solver || wanted_.geometry) && looked_at(frame)) ||
+         (wanted_.geometry && sweep_.wants(frame));
 }
 
 void Errors::frame_begins(const State& state) {
+  if (wanted_.geometry && sweep_.wants(state.frame)) frame_start_ = state;
   if (!wanted_.solver || !looked_at(state.frame)) return;
   if (auto error = oracles::solver_error(*judged_, *exact_, setup_, state)) solver_.push_back({state.frame, *error});
 }
@@ -57,6 +59,7 @@ void Errors::frame_ends(const State& state) {
     }
     topology_.end = figures;
   }
+  if (wanted_.geometry && sweep_.wants(frame)) sweep_.add(frame_start_, state);
   if (wanted_.geometry && looked_at(frame)) {
     const oracles::Interpenetration found = oracles::interpenetration(setup_, state);
     // What is not a number stays.
@@ -67,7 +70,7 @@ void Errors::frame_ends(const State& state) {
 }
 
 void Errors::finish(const State& end) {
-  if (wanted_.geometry) geometry_ = oracles::cut_geometry(setup_, start_, end);
+  if (wanted_.geometry) geometry_ = oracles::cut_geometry(setup_, start_, end, sweep_.surface());
   if (wanted_.time_step) time_step_ = oracles::time_step_error(make_, setup_, start_, setup_.frame_count());
   const bool any_alive = std::find(start_.alive.begin(), start_.alive.end(), 1) != start_.alive.end();
   if (wanted_.conservation && any_alive && setup_.frame_count() > 0) {

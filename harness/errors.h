@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "oracles/comparison/conservation.h"
+#include "oracles/comparison/carried_sweep.h"
 #include "oracles/comparison/cut_geometry.h"
 #include "oracles/comparison/interpenetration.h"
 #include "oracles/comparison/solver_error.h"
@@ -91,6 +92,8 @@ class Errors {
   Topology topology_;
   std::optional<Overlap> overlap_;  // the greatest
   std::optional<oracles::TimeStepError> time_step_;
+  oracles::CarriedSweep sweep_;
+  State frame_start_;  // of a frame that it wants
   std::optional<oracles::CutGeometry> geometry_;
   std::optional<oracles::Conservation> conservation_;
 };

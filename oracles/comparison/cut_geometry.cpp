@@ -8,6 +8,7 @@
 
 #include "oracles/blade_motion.h"
 #include "oracles/comparison/lattice_lines.h"
+#include "oracles/comparison/plate_sweep.h"
 #include "oracles/oracles.h"
 #include "oracles/shells.h"
 #include "oracles/support.h"
@@ -19,16 +20,10 @@ namespace {
 
 // --- The ideal cut ---------------------------------------------------------------------------------------------------
 
-// Turning is followed in pieces in which no point of the plate is off its way by more than this [h].
-constexpr double kTurningSlack = 0.01;
 // Crossings of one line that are nearer to each other than this, at right angles to the cut, are one [h]: what the
-// blade passes twice, up to how finely its turning is followed.
-constexpr double kSameCut = 0.05;
-
-std::array<Vec3, 4> plate_of(const Blade& blade, const BladePose& pose) {
-  const Vec3 half = (blade.length / 2) * pose.along, deep = blade.depth * pose.back;
-  return {pose.edge - half, pose.edge + half, pose.edge + half + deep, pose.edge - half + deep};
-}
+// blade passes twice, because it goes back or because tissue that it has pushed springs back to it. Particles cannot
+// tell cuts apart that lie nearer.
+constexpr double kSameCut = 0.5;
 
 void add_quad(std::vector<Triangle>& surface, Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
   for (const Triangle& t : {Triangle{a, b, c}, Triangle{a, c, d}}) {
@@ -189,7 +184,6 @@ double greatest_of(const std::vector<double>& values) { return *std::max_element
 std::vector<Triangle> swept_surface(const Setup& setup, int64_t first_frame, int64_t end_frame) {
   std::vector<Triangle> surface;
   if (!setup.has_blade) return surface;
-  const double slack = kTurningSlack * setup.body.grid.spacing;
   const auto add_plate = [&](const BladePose& pose) {
     const auto [a, b, c, d] = plate_of(setup.blade, pose);
     add_quad(surface, a, b, c, d);
@@ -202,10 +196,7 @@ std::vector<Triangle> swept_surface(const Setup& setup, int64_t first_frame, int
     if (move.down && !goes_on) add_plate(move.from);
     before = move.down ? &move : nullptr;
     if (!move.down) continue;
-    // An arc of angle φ and radius r is off its chord by r φ² / 8.
-    const double angle = turn_between(move.from, move.to).angle;
-    const double radius = std::hypot(setup.blade.length / 2, setup.blade.depth);
-    const int pieces = std::max(1, static_cast<int>(std::ceil(angle * std::sqrt(radius / (8 * slack)))));
+    const int pieces = turning_pieces(setup, move);
     for (int piece = 0; piece < pieces; ++piece) {
       const auto corners = [&](int p) {
         return plate_of(setup.blade, pose_between(move.from, move.to, static_cast<double>(p) / pieces));
@@ -227,6 +218,11 @@ std::optional<double> CutGeometry::hausdorff() const {
 }
 
 CutGeometry cut_geometry(const Setup& setup, const State& before, const State& after) {
+  return cut_geometry(setup, before, after, swept_surface(setup, before.frame, after.frame));
+}
+
+CutGeometry cut_geometry(const Setup& setup, const State& before, const State& after,
+                         const std::vector<Triangle>& surface) {
   const Body& body = setup.body;
   const double h = body.grid.spacing;
   CutGeometry geometry;
@@ -235,7 +231,6 @@ CutGeometry cut_geometry(const Setup& setup, const State& before, const State& a
     return geometry;
   }
   for (std::size_t i = 0; i < before.alive.size(); ++i) geometry.lost_volume += before.alive[i] && !after.alive[i];
-  const std::vector<Triangle> surface = swept_surface(setup, before.frame, after.frame);
   const IdealCut ideal = ideal_cut(body, before, surface);
   geometry.cut_area = ideal.area;
   if (ideal.area > 0) {

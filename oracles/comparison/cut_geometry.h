@@ -17,8 +17,7 @@ namespace cutproof::oracles {
 // moves in its own plane sweeps a surface; of one that turns on the spot this is the hull of what it passes through.
 std::vector<std::array<Vec3, 3>> swept_surface(const Setup& setup, int64_t first_frame, int64_t end_frame);
 
-// The cut at rest: before it is what was alive in `before`. Tissue that has moved by the time the blade comes by is cut
-// elsewhere, and that counts as an error.
+// The cut at rest: before it is what was alive in `before`.
 struct CutGeometry {
   // Area of the ideal cut inside the tissue, which is the union of the cubes of side h around the particles [h²].
   // Counted along lines parallel to the axes, h / kLinesPerSpacing apart, that cross it: dA = Σ_a |n_a| · |n_a| dA, and
@@ -37,6 +36,11 @@ inline constexpr int kLinesPerSpacing = 4;
 // New skin: triangles all of whose vertices lie on grid edges whose other end died, and such vertices by themselves.
 // Absent distances: no new skin, or no cut inside the tissue. Requires before.frame <= after.frame, and `after` with
 // the skin of its alive particles; without one there are no distances.
+// `ideal`: the ideal cut, body frame at rest [m]: of tissue that moves what CarriedSweep (carried_sweep.h) has made of
+// these frames.
+CutGeometry cut_geometry(const Setup& setup, const State& before, const State& after,
+                         const std::vector<std::array<Vec3, 3>>& ideal);
+// The same for tissue that lies still until it is cut: with swept_surface of these frames.
 CutGeometry cut_geometry(const Setup& setup, const State& before, const State& after);
 
 }  // namespace cutproof::oracles

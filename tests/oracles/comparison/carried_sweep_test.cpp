@@ -1,0 +1,165 @@
+// The ideal cut of tissue that moves: known where the tissue moves as a whole, and where it is shifted during the cut.
+#include "oracles/comparison/carried_sweep.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <vector>
+
+#include "oracles/comparison/cut_geometry.h"
+#include "tests/oracles/states.h"
+
+namespace cutproof::oracles {
+namespace {
+
+using testing::block_body;
+using testing::convex_cell_skin;
+using testing::range;
+using testing::setup_of;
+using testing::state_of;
+
+constexpr double kH = 0.01;
+constexpr int kFrames = 6;
+
+// A block of 9 × 6 × 6 particles, which rest at x = 1 … 9 h, y, z = 1 … 6 h, and a plate at right angles to x that goes
+// down through where it rests at x = 5 h in six frames, from z = 9 h to z = -1 h; both as `moved` at that time (of 0 to
+// 6 frames) puts the tissue, and `blade_moved` the blade.
+struct MovingCut {
+  cutproof::Setup setup;
+  std::vector<State> states;  // as each frame begins, and the last one's end
+  CarriedSweep sweep;
+
+  using Motion = std::function<Vec3(Vec3, double)>;
+  MovingCut(const Motion& moved, const Motion& blade_moved)
+      : setup(setup_of(block_body(9, 6, 6, kH), kFrames)), sweep(setup) {
+    setup.has_blade = true;
+    setup.blade = {20 * kH, 20 * kH, 0, 0};
+    const int substeps = setup.step.substeps;
+    setup.blade_moves.clear();
+    const auto pose = [&](int k) {
+      const double time = static_cast<double>(k) / substeps;
+      const Vec3 edge = {5 * kH, 3.5 * kH, (9 - 10 * time / kFrames) * kH};
+      const auto direction = [&](Vec3 d) { return blade_moved(edge + d, time) - blade_moved(edge, time); };
+      return BladePose{blade_moved(edge, time), direction({0, 1, 0}), direction({0, 0, 1})};
+    };
+    for (int k = 0; k < kFrames * substeps; ++k) setup.blade_moves.push_back({pose(k), pose(k + 1), true, 0});
+    const State rest = state_of(setup.body, {range(0, setup.body.particle_count())});
+    for (int frame = 0; frame <= kFrames; ++frame) {
+      State& state = states.emplace_back(rest);
+      state.frame = frame;
+      for (std::size_t i = 0; i < state.x.size(); ++i) state.x[i] = moved(rest.x[i], frame);
+      if (frame > 0) sweep.add(states[static_cast<std::size_t>(frame) - 1], state);
+    }
+  }
+  // With the particles gone that rest in layers x = `layer` h where z is above and below 3.5 h.
+  CutGeometry without(int above, int below) const {
+    State after = states.back();
+    std::vector<int32_t> gone;
+    for (int32_t k = 0; k < 6; ++k) {
+      for (int32_t j = 0; j < 6; ++j) gone.push_back((k >= 3 ? above : below) - 1 + 9 * (j + 6 * k));
+    }
+    testing::remove_particles(after, gone);
+    after.skin = convex_cell_skin(setup, after);
+    return cut_geometry(setup, states.front(), after, sweep.surface());
+  }
+};
+
+Vec3 still(Vec3 p, double) { return p; }
+// Turns about the block's middle and drifts, all in all by 1.2 radians and 30 h.
+Vec3 rigidly(Vec3 p, double time) {
+  const Vec3 middle = {5 * kH, 3.5 * kH, 3.5 * kH};
+  const double angle = 0.2 * time, c = std::cos(angle), s = std::sin(angle);
+  const Vec3 d = p - middle;
+  return middle + Vec3{c * d.x - s * d.y, s * d.x + c * d.y, d.z} + Vec3{5 * kH * time, 0, 0};
+}
+
+TEST(CarriedSweep, OfTissueThatLiesStillIsTheSweep) {
+  const MovingCut cut(still, still);
+  const CutGeometry carried = cut.without(5, 5);
+  State after = cut.states.back();
+  const CutGeometry swept = cut_geometry(cut.setup, cut.states.front(), after);
+  EXPECT_NEAR(carried.cut_area, 6 * 6, 1e-9);
+  EXPECT_NEAR(carried.cut_area, swept.cut_area, 1e-9);
+  EXPECT_EQ(carried.least_per_area.value(), 1);
+  EXPECT_NEAR(carried.skin_to_ideal.value(), 0.5, 1e-9);
+  // Where it is within reach of the tissue, and nowhere else.
+  for (const auto& triangle : cut.sweep.surface()) {
+    for (const Vec3 p : triangle) {
+      EXPECT_NEAR(p.x, 5 * kH, 1e-9 * kH);
+      EXPECT_LT(p.z, (6 + CarriedSweep::kReach) * kH);
+    }
+  }
+}
+
+// Straight ways between the states of two frames are chords of the turn: off by r φ² / 8 = 0.03 h at most.
+TEST(CarriedSweep, TurnsAndDriftsWithTheTissue) {
+  const MovingCut cut(rigidly, rigidly);
+  const CutGeometry carried = cut.without(5, 5);
+  EXPECT_NEAR(carried.cut_area, 6 * 6, 0.01 * 36);
+  EXPECT_NEAR(carried.least_per_area.value() * carried.cut_area, 36, 1e-9);
+  EXPECT_NEAR(carried.skin_to_ideal.value(), 0.5, 0.04);
+  EXPECT_LT(carried.ideal_to_skin.value(), 0.9);
+  // Where the blade went in the world it met no tissue at rest at all after the first frames.
+  State after = cut.states.back();
+  EXPECT_LT(cut_geometry(cut.setup, cut.states.front(), after).cut_area, 18);
+}
+
+// Tissue that is shifted to the side by 2 h while the blade is half way through: the cut lies in x = 5 h above, and in
+// x = 3 h below, and that is where particles have to be gone.
+TEST(CarriedSweep, LiesWhereTheTissueWasWhenTheBladePassed) {
+  const auto shifted = [](Vec3 p, double time) { return p + Vec3{(time > 3.2 ? 2 : 0) * kH, 0, 0}; };
+  // Of frame 3, in which it is shifted, the blade passes z = 4 h to 2.33 h.
+  const MovingCut cut(shifted, still);
+  const CutGeometry right = cut.without(5, 3);
+  EXPECT_LT(right.hausdorff().value(), 1.6);
+  EXPECT_GT(cut.without(5, 5).hausdorff().value(), 2.4) << "a cut where the blade was in the world is off";
+  EXPECT_GT(cut.without(3, 3).hausdorff().value(), 2.4);
+}
+
+TEST(CarriedSweep, StretchedTissueIsCutAsFarAsItRests) {
+  // Twice as long along z, about z = 3.5 h: the blade passes from z = 9 h, which rests at 6.25 h, to -1 h: 1.25 h.
+  const auto stretched = [](Vec3 p, double) { return Vec3{p.x, p.y, 3.5 * kH + 2 * (p.z - 3.5 * kH)}; };
+  const MovingCut cut(stretched, still);
+  // From the top, 6.5 h: in which the plate stands to begin with, down to 1.25 h; the least distance of lines is a
+  // quarter.
+  EXPECT_NEAR(cut.without(5, 5).cut_area, 6 * (6.5 - 1.25), 6 * 0.3);
+}
+
+TEST(CarriedSweep, IsNothingWithoutABladeThatIsDown) {
+  MovingCut cut(still, still);
+  for (BladeMove& move : cut.setup.blade_moves) move.down = false;
+  CarriedSweep sweep(cut.setup);
+  EXPECT_FALSE(sweep.wants(0));
+  sweep.add(cut.states[0], cut.states[1]);
+  EXPECT_TRUE(sweep.surface().empty());
+  cut.setup.has_blade = false;
+  EXPECT_FALSE(sweep.wants(0));
+}
+
+// Nobody says how a single particle is turned: then it is not.
+TEST(CarriedSweep, FewParticlesAreCarriedAsFarAsTheySay) {
+  cutproof::Setup setup = setup_of(block_body(1, 1, 1, kH), 1);
+  setup.has_blade = true;
+  setup.blade = {20 * kH, 20 * kH, 0, 0};
+  setup.blade_moves.clear();
+  const int substeps = setup.step.substeps;
+  for (int k = 0; k < substeps; ++k) {
+    const auto pose = [&](int at) {
+      return BladePose{{8 * kH, kH, (3 - 4.0 * at / substeps) * kH}, {0, 1, 0}, {0, 0, 1}};
+    };
+    setup.blade_moves.push_back({pose(k), pose(k + 1), true, 0});
+  }
+  State before = state_of(setup.body, {{0}});
+  before.x[0] = before.x[0] + Vec3{7 * kH, 0, 0};
+  State after = before;
+  after.frame = 1;
+  CarriedSweep sweep(setup);
+  sweep.add(before, after);
+  const CutGeometry geometry = cut_geometry(setup, before, after, sweep.surface());
+  EXPECT_NEAR(geometry.cut_area, 1, 0.01);
+}
+
+}  // namespace
+}  // namespace cutproof::oracles
