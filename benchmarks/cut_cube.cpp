@@ -20,7 +20,7 @@ ReadyScene make_cut_cube(int32_t side, int32_t core) {
   spec.step.substeps = 1;
   spec.step.iterations = 0;  // nothing moves: a geometric cut does not ask where the tissue is now
   spec.step.stiffness = kCutCubeStiffness;
-  spec.detect.criterion = Criterion::geometric;
+  spec.detect = {.criterion = Criterion::geometric};
   spec.skin.wanted = false;
 
   ReadyScene cube;

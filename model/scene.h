@@ -112,8 +112,9 @@ struct Expectations {
   friend bool operator==(const Expectations&, const Expectations&) = default;
 };
 
-// Of the format. What a scene leaves out is as it was when its version was new: in version 1 the plain iteration.
-inline constexpr int32_t kSceneVersion = 2;
+// Of the format. What a scene leaves out is as it was when its version was new: in version 1 the plain iteration, in 1
+// and 2 both ends of an open edge.
+inline constexpr int32_t kSceneVersion = 3;
 
 // How often the scene's frames detect. substep: each frame is laid out as as many frames of one substep, in all of
 // which every stage runs: what a blade has parted goes at the end of that substep, and not of up to S of them.
@@ -130,7 +131,7 @@ struct Scene {
   int64_t frames = 0;           // 0: until the last stroke ends and `settle` is over
   double settle = 0;            // [s] after the last stroke
   StepParameters step = {.acceleration = Acceleration::chebyshev};
-  DetectParameters detect;
+  DetectParameters detect = {.remove = RemovedEnds::one};
   DetectEvery detect_every = DetectEvery::frame;
   SplitParameters split;
   MergeParameters merge;

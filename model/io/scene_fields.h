@@ -156,7 +156,8 @@ void describe(auto& v, DetectParameters& s) {
                      "`distance` only: of an edge that is longer than epsilon · h `both` ends go, as in the paper, or "
                      "`one`, which halves the loss: the end on the negative side of the plane of a lowered blade "
                      "between them (along × back is positive), else the one with more such edges, of equals the lower "
-                     "particle (method.md §4)."});
+                     "particle (method.md §4). Left out, it is `both` with other criteria, and in a scene of version 1 "
+                     "or 2."});
   v.field(s.epsilon,
           {"epsilon", "Distance from a neighbour beyond which a particle is removed. At 1 or less, tissue at rest is.",
            above(0, 1e6, "h")});
@@ -286,7 +287,7 @@ void describe(auto& v, FrameFields& s) {
 }
 
 void describe(auto& v, Scene& s) {
-  v.field(s.version, {"version", "Of this format: 2; 1 is read as ever.", between(1, kSceneVersion), kRequired});
+  v.field(s.version, {"version", "Of this format: 3; 1 and 2 are read as ever.", between(1, kSceneVersion), kRequired});
   v.field(s.name, {"name", "A short name, for reports."});
   v.field(s.description, {"description", "What the scene shows, for people."});
   v.field(s.seed, {"seed", "Of everything random.", between(0, 18446744073709551615.0)});

@@ -466,6 +466,14 @@ Acceleration default_acceleration(const json& tree, int32_t version) {
   return published ? Acceleration::none : Acceleration::chebyshev;
 }
 
+RemovedEnds default_remove(const json& tree, int32_t version) {
+  if (version < 3) return RemovedEnds::both;
+  const auto detect = tree.find("detect");
+  const bool by_distance = detect == tree.end() || !detect->is_object() || !detect->contains("criterion") ||
+                           detect->at("criterion") == name_of(Criterion::distance);
+  return by_distance ? RemovedEnds::one : RemovedEnds::both;
+}
+
 }  // namespace
 
 Scene parse_scene(const std::string& text, const std::string& name) {
@@ -473,6 +481,7 @@ Scene parse_scene(const std::string& text, const std::string& name) {
   const int32_t version = require_version(tree, name);
   Scene scene;
   scene.step.acceleration = default_acceleration(tree, version);
+  scene.detect.remove = default_remove(tree, version);
   read(tree, Place{name, "", 0}, SceneField{}, scene);
   return scene;
 }

@@ -22,7 +22,7 @@ namespace {
 
 using nlohmann::json;
 
-const char* const kSmallest = R"({"version": 2, "body": {"shape": {"kind": "box"}, "spacing": 0.01}})";
+const char* const kSmallest = R"({"version": 3, "body": {"shape": {"kind": "box"}, "spacing": 0.01}})";
 
 json smallest() { return json::parse(kSmallest); }
 json with_blade() {
@@ -222,6 +222,7 @@ TEST(SceneIo, EachFieldOfASetupsStagesComesBackChangedAlone) {
   };
   cutproof::Setup base = from_scene(parse_scene(kSmallest, "scene.json"));
   base.step.acceleration = Acceleration::none;  // so that the solver may change alone
+  base.detect.remove = RemovedEnds::both;       // and the criterion
   int changes = 0;
   for_each_setup_field([&](const SetupField& field, auto get) {
     const auto groups = {"step", "detect", "split", "merge", "expand", "skin"};
@@ -376,8 +377,7 @@ TEST(SceneIo, AccelerationIsForTheImplicitSolver) {
 
 TEST(SceneIo, OneEndIsForTheCriterionOfEdges) {
   Scene scene = parse_scene(kSmallest, "scene.json");
-  EXPECT_EQ(scene.detect.remove, RemovedEnds::both);
-  scene.detect.remove = RemovedEnds::one;
+  EXPECT_EQ(scene.detect.remove, RemovedEnds::one);
   EXPECT_EQ(parse_scene(write_scene(scene), "scene.json").detect, scene.detect);
   json tree = json::parse(write_scene(scene));
   for (const char* criterion : {"none", "geometric", "strain"}) {
@@ -401,6 +401,7 @@ TEST(SceneIo, NumbersKeepAllTheirBits) {
 
 TEST(SceneIo, EveryWordOfEveryEnumerationIsReadBack) {
   Scene scene = parse_scene(kSmallest, "scene.json");
+  scene.detect.remove = RemovedEnds::both;  // so that the criterion may change alone
   const auto each = []<class E>(E, auto&& visit) {
     for (std::size_t i = 0; i < names_of(E{}).size(); ++i) visit(static_cast<E>(i));
   };
@@ -641,8 +642,32 @@ TEST(SceneIo, AScenesVersionSaysHowItIteratesIfNothingElseDoes) {
   EXPECT_EQ(parse_scene(write_scene(old), "again"), old);
 }
 
+TEST(SceneIo, AScenesVersionSaysWhichEndsGoIfNothingElseDoes) {
+  const auto removed = [](const std::string& version, const std::string& detect) {
+    return parse_scene(R"({"version": )" + version +
+                           R"(, "body": {"shape": {"kind": "box"}, "spacing": 0.01}, "detect": )" + detect + "}",
+                       "scene.json")
+        .detect.remove;
+  };
+  EXPECT_EQ(removed("1", "{}"), RemovedEnds::both);
+  EXPECT_EQ(removed("2", "{}"), RemovedEnds::both);
+  EXPECT_EQ(removed("3", "{}"), RemovedEnds::one);
+  EXPECT_EQ(removed("3", R"({"criterion": "distance", "epsilon": 2})"), RemovedEnds::one);
+  for (const char* criterion : {"none", "geometric", "strain"}) {
+    EXPECT_EQ(removed("3", R"({"criterion": ")" + std::string(criterion) + R"("})"), RemovedEnds::both) << criterion;
+  }
+  EXPECT_EQ(removed("3", R"({"remove": "both"})"), RemovedEnds::both);
+  EXPECT_EQ(removed("2", R"({"remove": "one"})"), RemovedEnds::one);
+  const std::string plain = R"(, "body": {"shape": {"kind": "box"}, "spacing": 0.01}})";
+  EXPECT_EQ(parse_scene(R"({"version": 3)" + plain, "").detect, Scene{}.detect);
+  // A scene of version 2 stays what it is when it is written and read again.
+  const Scene old = parse_scene(R"({"version": 2)" + plain, "scene.json");
+  EXPECT_EQ(old.version, 2);
+  EXPECT_EQ(parse_scene(write_scene(old), "again"), old);
+}
+
 TEST(SceneIoErrors, AnotherVersionIsRefusedBeforeAnythingElse) {
-  expect_error(std::string(R"({"version": 3, "new_field": true})"), "version", {"3", "versions 1 to 2"});
+  expect_error(std::string(R"({"version": 4, "new_field": true})"), "version", {"4", "versions 1 to 3"});
   expect_error(std::string(R"({"version": 1.5})"), "version", {"1.5"});
   expect_error(std::string(R"({"version": "1"})"), "version", {"\"1\""});
   expect_error(std::string(R"([1])"), "", {"object", "list"});
