@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
-#include <numbers>
+#include <map>
 #include <vector>
 
 #include "oracles/comparison/cut_geometry.h"
@@ -32,10 +34,13 @@ struct MovingCut {
   CarriedSweep sweep;
 
   using Motion = std::function<Vec3(Vec3, double)>;
-  MovingCut(const Motion& moved, const Motion& blade_moved)
+  // `gone`: whether a particle that rests there is gone when a frame begins.
+  MovingCut(
+      const Motion& moved, const Motion& blade_moved, double depth = 20,
+      const std::function<bool(Vec3, int)>& gone = [](Vec3, int) { return false; })
       : setup(setup_of(block_body(9, 6, 6, kH), kFrames)), sweep(setup) {
     setup.has_blade = true;
-    setup.blade = {20 * kH, 20 * kH, 0, 0};
+    setup.blade = {20 * kH, depth * kH, 0, 0};
     const int substeps = setup.step.substeps;
     setup.blade_moves.clear();
     const auto pose = [&](int k) {
@@ -49,7 +54,10 @@ struct MovingCut {
     for (int frame = 0; frame <= kFrames; ++frame) {
       State& state = states.emplace_back(rest);
       state.frame = frame;
-      for (std::size_t i = 0; i < state.x.size(); ++i) state.x[i] = moved(rest.x[i], frame);
+      for (std::size_t i = 0; i < state.x.size(); ++i) {
+        state.x[i] = moved(rest.x[i], frame);
+        state.alive[i] = gone(rest.x[i], frame) ? 0 : 1;
+      }
       if (frame > 0) sweep.add(states[static_cast<std::size_t>(frame) - 1], state);
     }
   }
@@ -116,15 +124,79 @@ TEST(CarriedSweep, LiesWhereTheTissueWasWhenTheBladePassed) {
   EXPECT_LT(right.hausdorff().value(), 1.6);
   EXPECT_GT(cut.without(5, 5).hausdorff().value(), 2.4) << "a cut where the blade was in the world is off";
   EXPECT_GT(cut.without(3, 3).hausdorff().value(), 2.4);
+  // In the frame in which the tissue is shifted the blade passes 1.67 h of it, and comes 2 h to the side.
+  const double area = 6 * (6 - 5.0 / 3 + std::hypot(5.0 / 3, 2));
+  EXPECT_NEAR(right.cut_area, area, 0.05 * area);
+  // What comes behind the cutting edge cuts nothing: the back of a blade of 2 h passes where the tissue is open.
+  EXPECT_NEAR(MovingCut(shifted, still, 2).without(5, 3).cut_area, area, 0.05 * area);
+}
+
+// Of bent tissue, of which the blade takes particles away, each frame's particles say something else of where a point
+// rests. The surface goes on from frame to frame all the same: none of its edges inside the tissue has one triangle.
+TEST(CarriedSweep, HasNoGapsBetweenFrames) {
+  const auto bent = [](Vec3 p, double) { return p + Vec3{4 * p.z * p.z, 0, 0}; };  // by 1.44 h at the top
+  const auto passed = [](Vec3 p, int frame) {
+    return std::abs(p.x - 5 * kH) < 0.1 * kH && p.z > (9 - 10.0 * frame / kFrames) * kH;
+  };
+  const MovingCut cut(bent, still, 20, passed);
+  using Edge = std::array<std::array<double, 3>, 2>;
+  std::map<Edge, int> triangles;
+  for (const auto& triangle : cut.sweep.surface()) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3 p = triangle[k], q = triangle[(k + 1) % 3];
+      Edge edge = {{{p.x, p.y, p.z}, {q.x, q.y, q.z}}};
+      if (edge[1] < edge[0]) std::swap(edge[0], edge[1]);
+      ++triangles[edge];
+    }
+  }
+  int inside = 0;
+  for (const auto& [edge, count] : triangles) {
+    const auto within = [&ends = edge](std::size_t axis) {
+      return std::min(ends[0][axis], ends[1][axis]) > 0.5 * kH && std::max(ends[0][axis], ends[1][axis]) < 6.5 * kH;
+    };
+    if (!within(1) || !within(2)) continue;
+    ++inside;
+    EXPECT_EQ(count, 2) << "at y = " << edge[0][1] / kH << " h, z = " << edge[0][2] / kH << " h";
+  }
+  EXPECT_GT(inside, 1000);
 }
 
 TEST(CarriedSweep, StretchedTissueIsCutAsFarAsItRests) {
   // Twice as long along z, about z = 3.5 h: the blade passes from z = 9 h, which rests at 6.25 h, to -1 h: 1.25 h.
   const auto stretched = [](Vec3 p, double) { return Vec3{p.x, p.y, 3.5 * kH + 2 * (p.z - 3.5 * kH)}; };
   const MovingCut cut(stretched, still);
-  // From the top, 6.5 h: in which the plate stands to begin with, down to 1.25 h; the least distance of lines is a
-  // quarter.
+  // From the top, 6.5 h, down to 1.25 h; lines are a quarter of a spacing apart.
   EXPECT_NEAR(cut.without(5, 5).cut_area, 6 * (6.5 - 1.25), 6 * 0.3);
+}
+
+// At its edge tissue is on one side alone, and only its stretch tells where a point rests: a blade that goes flat
+// through the uppermost particles, of tissue that is half as high again.
+TEST(CarriedSweep, KnowsByTheStretchWhereTheEdgeRests) {
+  cutproof::Setup setup = setup_of(block_body(9, 6, 6, kH), 1);
+  setup.has_blade = true;
+  setup.blade = {20 * kH, 20 * kH, 0, 0};
+  setup.blade_moves.clear();
+  const int substeps = setup.step.substeps;
+  const auto height = [](double rest) { return 3.5 * kH + 1.5 * (rest - 3.5 * kH); };
+  const auto pose = [&](int k) {
+    return BladePose{{(12 - 14.0 * k / substeps) * kH, 3.5 * kH, height(6 * kH)}, {0, 1, 0}, {1, 0, 0}};
+  };
+  for (int k = 0; k < substeps; ++k) setup.blade_moves.push_back({pose(k), pose(k + 1), true, 0});
+  State before = state_of(setup.body, {range(0, setup.body.particle_count())});
+  for (Vec3& x : before.x) x.z = height(x.z);
+  State after = before;
+  after.frame = 1;
+  CarriedSweep sweep(setup);
+  sweep.add(before, after);
+  int points = 0;
+  for (const auto& triangle : sweep.surface()) {
+    for (const Vec3 p : triangle) {
+      if (p.x < 1 * kH || p.x > 9 * kH || p.y < 1 * kH || p.y > 6 * kH) continue;
+      ++points;
+      EXPECT_NEAR(p.z, 6 * kH, 0.03 * kH);
+    }
+  }
+  EXPECT_GT(points, 1000);
 }
 
 TEST(CarriedSweep, IsNothingWithoutABladeThatIsDown) {
