@@ -345,7 +345,7 @@ TEST_F(Program, JudgesBackendsOfWholeFramesAndOfOneStageOnWhatTheyRun) {
 // --- Bad input ------------------------------------------------------------------------------------------------------
 
 TEST_F(Program, SaysWhatToDoNextWhenRunHasNoScene) {
-  expect_refused("run", {"cutproof run fixtures/scenes/", "--check", "--mesh"});
+  expect_refused("run", {"cutproof run kidney_discontinuous", "--check", "--mesh", "info --scenes"});
   expect_refused("", {"run", "check", "info"});
 }
 
