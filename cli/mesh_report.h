@@ -14,7 +14,7 @@ double metres_per(const std::string& unit);
 
 // Nothing if nothing was repaired and there is nothing to note.
 void print_build(const fixtures::Built& built);
-// Results_schema.md, "build".
+// docs/reference/results_schema.md, The build.
 nlohmann::json build_json(const fixtures::Built& built);
 
 void print_examination(const fixtures::MeshExamination& mesh, const std::string& unit);
