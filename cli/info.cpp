@@ -1,4 +1,4 @@
-// `cutproof info`: version, backends, devices, properties.
+// `cutproof info`: version, backends, devices, properties; a mesh, examined.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -6,8 +6,11 @@
 #include <vector>
 
 #include "cli/commands.h"
+#include "cli/mesh_report.h"
 #include "cli/options.h"
+#include "cli/output.h"
 #include "cli/scene_files.h"
+#include "fixtures/import/mesh.h"
 #include "model/error.h"
 #include "model/fields.h"
 #include "model/io/scene_io.h"
@@ -18,8 +21,10 @@ namespace cutproof::cli {
 namespace {
 
 struct InfoOptions {
-  bool scene = false;   // print the reference of scene files
-  bool scenes = false;  // print the scenes that come with the program
+  bool scene = false;      // print the reference of scene files
+  bool scenes = false;     // print the scenes that come with the program
+  std::string mesh, unit;  // examine a mesh
+  std::string json;
 };
 
 // When it is judged: a property of a state says so itself, one of a stage after the stages that promise it.
@@ -64,8 +69,19 @@ int print_scenes() {
   return 0;
 }
 
+int examine(const InfoOptions& options) {
+  const double unit = metres_per(options.unit);
+  require_writable(options.json);
+  const fixtures::MeshExamination mesh = fixtures::examine_mesh(options.mesh, unit);
+  write_document(options.json, examination_json(mesh, options.mesh, unit));
+  print_examination(mesh, options.unit);
+  if (!options.json.empty()) fmt::print("wrote {}\n", options.json);
+  return mesh.defects.empty() ? 0 : 1;
+}
+
 int info(const InfoOptions& options) {
   if (options.scenes) return print_scenes();
+  if (!options.mesh.empty()) return examine(options);
   if (options.scene) {
     fmt::print("{}", io::scene_reference());
     return 0;
@@ -86,9 +102,21 @@ int info(const InfoOptions& options) {
 
 void add_info(CLI::App& program, Work& work) {
   const auto options = std::make_shared<InfoOptions>();
-  CLI::App* const command = program.add_subcommand("info", "version, backends, devices, properties");
+  CLI::App* const command = program.add_subcommand("info", "version, backends, devices, properties; or a mesh");
   command->add_flag("--scene", options->scene, "list every field of a scene file");
   command->add_flag("--scenes", options->scenes, "list the scenes that come with the program");
+  CLI::Option* const mesh =
+      command
+          ->add_option("--mesh", options->mesh,
+                       "examine a surface mesh: its defects, size and volume, and what --repair would do; exit status "
+                       "1 if it does not bound a solid")
+          ->type_name("FILE");
+  options->unit = "mm";
+  command->add_option("--unit", options->unit, "what one unit of the mesh is: mm, cm or m")
+      ->capture_default_str()
+      ->type_name("U")
+      ->needs(mesh);
+  command->add_option("--json", options->json, "write what was found of the mesh")->type_name("F")->needs(mesh);
   command->callback([options, &work] { work = [options] { return info(*options); }; });
 }
 

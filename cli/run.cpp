@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <map>
 #include <memory>
 #include <optional>
 
@@ -11,6 +10,7 @@
 #include "cli/commands.h"
 #include "cli/errors_report.h"
 #include "cli/findings.h"
+#include "cli/mesh_report.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/results.h"
@@ -39,6 +39,7 @@ struct RunOptions {
   fixtures::BuildOptions build;  // but for its mesh
   std::string mesh;              // takes the place of the scene's body
   std::string unit = "mm";       // of the mesh's numbers
+  bool repair = false;           // the mesh
   std::string check;             // a depth; empty: nothing is judged
   std::string against;           // "" or the reference
   std::string mode = "both";     // of the comparison: lockstep, free-running, both
@@ -60,13 +61,6 @@ constexpr const char* kNextSteps =
     "      lists the scenes that come with the program\n"
     "  cutproof info --scene\n"
     "      lists every field of a scene file\n";
-
-double metres_per(const std::string& unit) {
-  static const std::map<std::string, double> kUnits = {{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}};
-  const auto found = kUnits.find(unit);
-  if (found == kUnits.end()) refuse("--unit", fmt::format("'{}' is not a unit", unit), "use mm, cm or m");
-  return found->second;
-}
 
 using harness::Against;
 using harness::AgainstMode;
@@ -90,6 +84,7 @@ void print_header(const Scene& scene, const fixtures::Built& built, const RunOpt
   fmt::print("body {}, {:.4g} × {:.4g} × {:.4g} mm, {} particles at h = {:.4g} mm, {} clusters\n", body.name, size.x,
              size.y, size.z, body.particle_count(), body.grid.spacing * 1e3, built.state.clusters.count());
   if (!options.mesh.empty()) fmt::print("one unit of the mesh is 1 {} (--unit changes that)\n", options.unit);
+  print_build(built);
   const int32_t substeps = built.setup.step.substeps;
   fmt::print("{} frames of {} substep{} × {} iterations, backend {}, seed {}\n", built.setup.frame_count(), substeps,
              substeps == 1 ? "" : "s", built.setup.step.iterations, options.backend.name, scene.seed);
@@ -159,7 +154,9 @@ int run(const RunOptions& options) {
   if (wanted.implementation)
     mode = mode.value_or(AgainstMode::lockstep) == AgainstMode::lockstep ? AgainstMode::lockstep : AgainstMode::both;
   fixtures::BuildOptions build_options = options.build;
-  if (!options.mesh.empty()) build_options.mesh = MeshSpec{options.mesh, metres_per(options.unit)};
+  if (!options.mesh.empty()) {
+    build_options.mesh = MeshSpec{options.mesh, metres_per(options.unit), options.repair};
+  }
   const std::unique_ptr<Backend> backend = make_backend(options.backend);
 
   const Scene scene = io::read_scene(options.scene);
@@ -230,6 +227,7 @@ int run(const RunOptions& options) {
   // Files first: they are kept even if standard output cannot be written.
   if (!options.json.empty()) {
     nlohmann::json document = to_json(result, judge ? &*judge : nullptr);
+    document["build"] = build_json(built);
     if (against) {
       document["against"] = to_json(*against, built.setup);
       document["against"]["verdicts"] = io::verdicts_json(against->verdicts());
@@ -290,6 +288,8 @@ void add_run(CLI::App& program, Work& work) {
   command->add_option("--unit", options->unit, "what one unit of the mesh is: mm, cm or m")
       ->capture_default_str()
       ->type_name("U")
+      ->needs("--mesh");
+  command->add_flag("--repair", options->repair, "repair the mesh if it does not bound a solid, and say what was done")
       ->needs("--mesh");
   add_count(*command, "--particles", options->build.particles, "how many particles the body is to have",
             CLI::PositiveNumber);

@@ -97,6 +97,9 @@ void describe(auto& v, MeshSpec& s) {
                    kRequired});
   v.field(s.unit, {"unit", "Metres per unit of the numbers in the mesh's file: 0.001 if they are millimetres.",
                    above(0, kLongest, "m"), kRequired});
+  v.field(s.repair, {"repair",
+                     "Repair a surface that does not bound a solid, and say what was done (method.md §1). Otherwise "
+                     "such a mesh is refused."});
 }
 
 void describe(auto& v, BodySpec& s) {

@@ -107,6 +107,96 @@ INSTANTIATE_TEST_SUITE_P(Meshes, BadOutsideMesh,
                            return name;
                          });
 
+class OutsideMesh : public Program, public testing::WithParamInterface<std::string> {};
+
+TEST_P(OutsideMesh, RunsInEverySceneOfKidneysAndLiversWithRepair) {
+  const char* meshes = std::getenv("CUTPROOF_MESHES");
+  if (meshes == nullptr) GTEST_SKIP() << "CUTPROOF_MESHES is not set";
+  for (const auto& entry : files::directory_iterator(files::path(CUTPROOF_SOURCE) / "fixtures/scenes")) {
+    const std::string name = entry.path().filename();
+    if (name.find("kidney") == std::string::npos && name.find("liver") == std::string::npos) continue;
+    const Outcome outcome =
+        cutproof("run '" + entry.path().string() + "' --backend host --particles 1500 --frames 2 " +
+                 "--repair --mesh '" + std::string(meshes) + "/" + GetParam() + "' --json out.json");
+    EXPECT_EQ(outcome.status, 0) << name << "\n" << outcome.output;
+    EXPECT_NE(outcome.output.find("repair"), std::string::npos) << outcome.output;
+    EXPECT_TRUE(json::parse(read("out.json")).at("build").contains("repair"));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Organs, OutsideMesh,
+                         testing::Values("openhelp_Heart.stl", "openhelp_Kidney_left.stl", "beamadapter_carotids.stl",
+                                         "sksurgery_Tumor.ply", "sofa_liver-smooth.obj", "bp3d_FMA7197_Liver.obj"),
+                         [](const auto& instance) {
+                           std::string name = instance.param;
+                           for (char& c : name) c = std::isalnum(static_cast<unsigned char>(c)) ? c : '_';
+                           return name;
+                         });
+
+// --- Meshes -------------------------------------------------------------------------------------------------------
+
+// A cuboid of 60 × 50 × 50 mm; open: without the last triangle.
+std::string cuboid(bool is_open) {
+  return std::string("OFF\n8 ") + (is_open ? "11" : "12") +
+         " 0\n0 0 0\n60 0 0\n60 50 0\n0 50 0\n0 0 50\n60 0 50\n60 50 50\n0 50 50\n"
+         "3 0 2 1\n3 0 3 2\n3 4 5 6\n3 4 6 7\n3 0 1 5\n3 0 5 4\n3 1 2 6\n3 1 6 5\n3 2 3 7\n3 2 7 6\n3 3 0 4\n" +
+         (is_open ? "" : "3 3 4 7\n");
+}
+
+TEST_F(Program, ExaminesAMeshWithoutAScene) {
+  write("sound.off", cuboid(false));
+  write("open.off", cuboid(true));
+  const Outcome sound = cutproof("info --mesh sound.off --json sound.json");
+  EXPECT_EQ(sound.status, 0) << sound.output;
+  for (const char* word : {"8 vertices, 12 triangles, 1 component", "60 × 50 × 50 mm", "volume 150 cm³", "a solid"}) {
+    EXPECT_NE(sound.output.find(word), std::string::npos) << word << " in " << sound.output;
+  }
+  EXPECT_TRUE(json::parse(read("sound.json")).at("solid"));
+  const Outcome open = cutproof("info --mesh open.off --unit cm --json open.json");
+  EXPECT_EQ(open.status, 1) << open.output;
+  for (const char* word : {"600 × 500 × 500 mm", "the surface is open: 3 edges", "--repair would make it one",
+                           "1 hole filled with 1 triangle", "volume 1.5e+05 cm³"}) {
+    EXPECT_NE(open.output.find(word), std::string::npos) << word << " in " << open.output;
+  }
+  const json found = json::parse(read("open.json"));
+  EXPECT_FALSE(found.at("solid"));
+  EXPECT_EQ(found.at("defects").size(), 1U);
+  EXPECT_TRUE(found.at("repair").at("solid"));
+  EXPECT_EQ(found.at("repair").at("steps").at(0).at("name"), "holes_filled");
+  EXPECT_NEAR(found.at("repair").at("volume").get<double>(), 0.15, 1e-12);
+  expect_refused("info --mesh missing.off", {"missing.off"});
+  expect_refused("info --mesh sound.off --unit inch", {"--unit", "mm, cm or m"});
+}
+
+TEST_F(Program, RepairsAMeshOnlyIfAskedAndSaysWhatItDid) {
+  write("open.off", cuboid(true));
+  write("cut.json", small_block().dump());
+  expect_refused("run cut.json --mesh open.off", {"the surface is open", "--repair", "\"repair\": true"});
+  expect_refused("run cut.json --repair", {"--repair", "--mesh"});
+  const Outcome outcome = cutproof("run cut.json --check --mesh open.off --repair --json out.json");
+  EXPECT_EQ(outcome.status, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("repaired: 1 hole filled with 1 triangle"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("the volume changed by"), std::string::npos) << outcome.output;
+  const json build = json::parse(read("out.json")).at("build");
+  EXPECT_EQ(build.at("repair").at("steps").at(0).at("count"), 1);
+  EXPECT_FALSE(build.at("repair").at("made_up"));
+}
+
+TEST_F(Program, NotesWhatAnOrganThatTheSceneWasNotMadeForChanges) {
+  json pulled = small_block();
+  pulled["grips"] = json::parse(R"([{"low": [1.2, 0, 0], "high": [1.4, 1, 1]}])");
+  write("pulled.json", pulled.dump());
+  const Outcome grip = cutproof("run pulled.json --json out.json");
+  EXPECT_EQ(grip.status, 0) << grip.output;
+  EXPECT_NE(grip.output.find("note: grips[0]: no particle rests in its region"), std::string::npos) << grip.output;
+  EXPECT_EQ(json::parse(read("out.json")).at("build").at("notes").size(), 1U);
+  write("sound.off", cuboid(false));
+  write("cut.json", small_block().dump());
+  const Outcome unit = cutproof("run cut.json --mesh sound.off --unit m");
+  EXPECT_EQ(unit.status, 2) << unit.output;
+  EXPECT_NE(unit.output.find("if its numbers are mm, use --unit mm"), std::string::npos) << unit.output;
+}
+
 // --- What a scene expects -------------------------------------------------------------------------------------------
 
 TEST_F(Program, FailsWithStatusOneWhenAnExpectationDoesNotHold) {

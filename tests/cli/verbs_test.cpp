@@ -30,6 +30,7 @@ class Verbs : public Program {
                    make_array<double>("kicked", {1, 2, 3}, {0, 0, 0, 2, 0, 0}),
                    make_array<int32_t>("piece", {2}, {0, 1})};
     io::write_array_file(path("kick.npz"), kick);
+    write("organ.off", "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n");
     // Answers that stand in the questions themselves.
     ASSERT_EQ(cutproof("vectors components -o vectors.npz --cases 1").status, 0);
     const io::ArrayFile vectors = io::read_array_file(path("vectors.npz"));
@@ -45,6 +46,7 @@ class Verbs : public Program {
   std::vector<std::string> commands() const {
     return {"info",
             "info --scene",
+            "info --mesh organ.off",
             "--help",
             "--version",
             "run cut.json --check",

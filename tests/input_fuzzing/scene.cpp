@@ -51,7 +51,7 @@ std::vector<std::string> seeds() {
   scene.expect.dent = Range{0.5, 0.5};
   seeds.push_back(io::write_scene(scene));
   scene.body.shape.reset();
-  scene.body.mesh = MeshSpec{"kidney.stl", 0.001};
+  scene.body.mesh = MeshSpec{"kidney.stl", 0.001, true};
   seeds.push_back(io::write_scene(scene));
   return seeds;
 }

@@ -1,0 +1,130 @@
+#include "cli/mesh_report.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <map>
+
+#include "cli/commands.h"
+#include "cli/options.h"
+
+namespace cutproof::cli {
+
+namespace {
+
+using fixtures::Defect;
+using fixtures::MeshExamination;
+using fixtures::RepairReport;
+
+nlohmann::json repair_json(const RepairReport& report) {
+  nlohmann::json steps = nlohmann::json::array();
+  for (const fixtures::RepairStep& step : report.steps) {
+    steps.push_back({{"name", step.name}, {"count", step.count}, {"text", step.text}});
+  }
+  return {{"steps", steps},
+          {"warnings", report.warnings},
+          {"triangles_before", report.triangles_before},
+          {"triangles_after", report.triangles_after},
+          {"volume_change", fixtures::volume_change(report)},
+          {"cap_share", report.cap_share},
+          {"made_up", report.is_made_up}};
+}
+
+nlohmann::json defects_json(const std::vector<Defect>& defects) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const Defect& defect : defects) {
+    list.push_back({{"where", defect.where}, {"problem", defect.problem}, {"remedy", defect.remedy}});
+  }
+  return list;
+}
+
+void print_defects(const std::vector<Defect>& defects) {
+  for (const Defect& defect : defects) {
+    fmt::print("  {}\n", defect.problem);
+    if (!defect.where.empty()) fmt::print("    first: {}\n", defect.where);
+  }
+}
+
+void print_volume(double volume) { fmt::print("volume {:.5g} cm³\n", 1e6 * volume); }
+
+// Spacings that give bodies from a quick look to a large run.
+constexpr std::array<int, 3> kUsualCounts = {2000, 8000, 100'000};
+
+void print_usual_counts(double volume) {
+  fmt::print("as a body:");
+  for (const int count : kUsualCounts) {
+    fmt::print("{} {} particles at h = {:.3g} mm", count == kUsualCounts.front() ? "" : ",", count,
+               1e3 * std::cbrt(volume / count));
+  }
+  fmt::print("\n");
+}
+
+}  // namespace
+
+double metres_per(const std::string& unit) {
+  static const std::map<std::string, double> kUnits = {{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}};
+  const auto found = kUnits.find(unit);
+  if (found == kUnits.end()) refuse("--unit", fmt::format("'{}' is not a unit", unit), "use mm, cm or m");
+  return found->second;
+}
+
+void print_build(const fixtures::Built& built) {
+  if (built.repair) {
+    for (const std::string& line : fixtures::report_lines(*built.repair)) fmt::print("{}\n", line);
+  }
+  for (const std::string& note : built.notes) fmt::print("note: {}\n", note);
+}
+
+nlohmann::json build_json(const fixtures::Built& built) {
+  nlohmann::json build = {{"notes", built.notes}};
+  if (built.repair) build["repair"] = repair_json(*built.repair);
+  return build;
+}
+
+void print_examination(const MeshExamination& mesh, const std::string& unit) {
+  const Vec3 size = 1e3 * (mesh.bounds.high - mesh.bounds.low);
+  fmt::print("mesh {}: {} vertices, {} triangles, {} component{}\n", mesh.name, mesh.points, mesh.triangles,
+             mesh.components, mesh.components == 1 ? "" : "s");
+  fmt::print("size {:.4g} × {:.4g} × {:.4g} mm, one unit being 1 {} (--unit changes that)\n", size.x, size.y, size.z,
+             unit);
+  if (mesh.defects.empty()) {
+    print_volume(mesh.volume);
+    print_usual_counts(mesh.volume);
+    fmt::print("it bounds a solid\n");
+    return;
+  }
+  fmt::print("it does not bound a solid:\n");
+  print_defects(mesh.defects);
+  if (!mesh.repaired_defects.empty()) {
+    fmt::print("--repair would not help; what it leaves:\n");
+    print_defects(mesh.repaired_defects);
+  } else {
+    fmt::print("--repair would make it one:\n");
+  }
+  for (const std::string& line : fixtures::report_lines(*mesh.repair)) fmt::print("  {}\n", line);
+  if (mesh.repaired_defects.empty()) {
+    print_volume(mesh.repaired_volume);
+    print_usual_counts(mesh.repaired_volume);
+  }
+}
+
+nlohmann::json examination_json(const MeshExamination& mesh, const std::string& file, double unit) {
+  const auto vector = [](Vec3 v) { return nlohmann::json::array({v.x, v.y, v.z}); };
+  nlohmann::json document = {{"format", "cutproof.mesh"},      {"format_version", 1},
+                             {"cutproof", kVersion},           {"source", file},
+                             {"metres_per_unit", unit},        {"vertices", mesh.points},
+                             {"triangles", mesh.triangles},    {"components", mesh.components},
+                             {"low", vector(mesh.bounds.low)}, {"high", vector(mesh.bounds.high)},
+                             {"solid", mesh.defects.empty()},  {"defects", defects_json(mesh.defects)}};
+  if (mesh.defects.empty()) document["volume"] = mesh.volume;
+  if (mesh.repair) {
+    document["repair"] = repair_json(*mesh.repair);
+    document["repair"]["solid"] = mesh.repaired_defects.empty();
+    document["repair"]["defects"] = defects_json(mesh.repaired_defects);
+    if (mesh.repaired_defects.empty()) document["repair"]["volume"] = mesh.repaired_volume;
+  }
+  return document;
+}
+
+}  // namespace cutproof::cli

@@ -1,0 +1,23 @@
+// What was done to a mesh, and what a body was built with otherwise than the scene says: printed, and for --json.
+#pragma once
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+
+#include "fixtures/build.h"
+#include "fixtures/import/mesh.h"
+
+namespace cutproof::cli {
+
+// Metres per unit of a mesh's numbers: mm, cm or m. Throws InputError for another name.
+double metres_per(const std::string& unit);
+
+// Nothing if nothing was repaired and there is nothing to note.
+void print_build(const fixtures::Built& built);
+// docs/reference/results_schema.md, The build.
+nlohmann::json build_json(const fixtures::Built& built);
+
+void print_examination(const fixtures::MeshExamination& mesh, const std::string& unit);
+nlohmann::json examination_json(const fixtures::MeshExamination& mesh, const std::string& file, double unit);
+
+}  // namespace cutproof::cli
