@@ -8,6 +8,7 @@
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "model/fields.h"
+#include "model/io/limits.h"
 #include "model/io/scene_io.h"
 #include "oracles/surface/surface.h"
 
@@ -16,7 +17,8 @@ namespace cutproof::cli {
 namespace {
 
 struct InfoOptions {
-  bool scene = false;  // print the reference of scene files
+  bool scene = false;   // print the reference of scene files
+  bool limits = false;  // print how much is read
 };
 
 // When it is judged: a property of a state says so itself, one of a stage after the stages that promise it.
@@ -56,6 +58,10 @@ int info(const InfoOptions& options) {
     fmt::print("{}", io::scene_reference());
     return 0;
   }
+  if (options.limits) {
+    fmt::print("{}", io::limits_reference());
+    return 0;
+  }
   fmt::print("cutproof {}\nbackends:\n", kVersion);
   for (const harness::BackendDescriptor& backend : harness::backends()) {
     fmt::print("  {:<11} {}\n", backend.name, harness::description_of(backend));
@@ -74,6 +80,7 @@ void add_info(CLI::App& program, Work& work) {
   const auto options = std::make_shared<InfoOptions>();
   CLI::App* const command = program.add_subcommand("info", "version, backends, devices, properties");
   command->add_flag("--scene", options->scene, "list every field of a scene file");
+  command->add_flag("--limits", options->limits, "list how much is read of each kind of file");
   command->callback([options, &work] { work = [options] { return info(*options); }; });
 }
 

@@ -209,7 +209,7 @@ bool judge_stages(const JudgeOptions& options, bool dynamics, json& document, st
 }
 
 int replay(const JudgeOptions& options, Guest& guest) {
-  const SavedQuestion saved = question_from_json(io::read_text(options.replay), options.replay);
+  const SavedQuestion saved = read_question(options.replay);
   const OperationDescription& operation = *find_operation(saved.operation);
   if (!guest.plugin().offers(operation.number)) {
     throw InputError(options.guest.library, saved.operation, "the plugin does not have this operation",

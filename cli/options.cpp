@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include "model/error.h"
+#include "model/printable.h"
 
 namespace cutproof::cli {
 
@@ -72,6 +73,16 @@ void add_junit(CLI::App& command, std::string& path) {
 std::string quoted(const std::string& word) {
   constexpr const char* kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_./:=,+@%-";
   if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+  if (printable(word) != word) {  // as bash and zsh take it, and a terminal bears it
+    std::string result = "$'";
+    for_each_printable(word, false, [&](std::string_view piece, bool is_escape) {
+      for (const char c : piece) {
+        if (!is_escape && (c == '\'' || c == '\\')) result += '\\';
+        result += c;
+      }
+    });
+    return result + "'";
+  }
   std::string result = "'";
   for (const char c : word) result += c == '\'' ? "'\\''" : std::string(1, c);
   return result + "'";

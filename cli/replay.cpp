@@ -37,7 +37,7 @@ BackendChoice choice_of(const ReplayOptions& options, const Counterexample& coun
 
 int replay(const ReplayOptions& options) {
   const std::string& file = options.counterexample;
-  const Counterexample counterexample = counterexample_from_json(io::read_text(file), file);
+  const Counterexample counterexample = read_counterexample(file);
   const BackendChoice choice = choice_of(options, counterexample);
   const Case& c = counterexample.failing;
   const bool is_history = !counterexample.commands.empty();

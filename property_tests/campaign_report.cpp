@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "model/error.h"
-#include "model/io/atomic_file.h"
 #include "model/io/json_number.h"
+#include "model/io/json_reader.h"
 
 namespace cutproof::property_tests {
 
@@ -171,8 +171,9 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
 
 namespace {
 
-// Throws json::exception if something is missing, or of another kind, that merging or a conclusion reads.
-void require_fields(const json& part) {
+// Throws json::exception if something is missing, or of another kind, that merging or a conclusion reads; InputError if
+// there is too much.
+void require_fields(const json& part, const std::string& file) {
   for (const char* count : {"cases", "refused", "verdicts", "particles"})
     static_cast<void>(part.at(count).get<int64_t>());
   for (const char* figure : {"seconds", "cases_per_second"}) static_cast<void>(part.at(figure).get<double>());
@@ -184,6 +185,12 @@ void require_fields(const json& part) {
   static_cast<void>(part.at("sizes").at(1).get<int>());
   for (const CoverageClass& each : kCoverageClasses)
     static_cast<void>(part.at("coverage").at(each.name).get<int64_t>());
+  if (part.at("properties").size() > io::kMostProperties) {
+    throw InputError(
+        file, "properties",
+        fmt::format("there are {} properties, more than {}", part.at("properties").size(), io::kMostProperties),
+        kRemedy);
+  }
   for (const json& property : part.at("properties").get<std::vector<json>>()) {
     for (const char* word : {"property", "stage"}) static_cast<void>(property.at(word).get<std::string>());
     for (const char* count : {"judged", "checked", "failed", "undecided"}) {
@@ -204,15 +211,8 @@ void require_fields(const json& part) {
 
 // One result as it stands in its file.
 json read_shard(const std::string& file) {
-  json part;
-  try {
-    part = json::parse(io::read_text(file));
-  } catch (const json::parse_error& error) {
-    throw InputError(
-        file, "",
-        fmt::format("this is not JSON, or it is not whole: it breaks off, or goes wrong, at byte {}", error.byte),
-        "copy it again, or leave it out: --merge then names the shard as missing");
-  }
+  const json part = io::read_json(file, io::kCampaignLimits,
+                                  "Copy it again, or leave it out: --merge then names the shard as missing.");
   if (!part.is_object() || part.value("format", json()) != kResultFormat ||
       part.value("format_version", json()) != kFormatVersion) {
     throw InputError(file, "format", "this is not a result of `cutproof fuzz` of this version", kRemedy);
@@ -224,7 +224,7 @@ json read_shard(const std::string& file) {
   if (shards < 1 || shards > kMostShards || shard < 1 || shard > shards) {
     throw InputError(file, "shard", fmt::format("there is no shard {} of {}", shard, shards), kRemedy);
   }
-  require_fields(part);
+  require_fields(part, file);
   return part;
 }
 
