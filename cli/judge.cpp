@@ -16,6 +16,7 @@
 #include "guests/plugin_backend.h"
 #include "model/error.h"
 #include "model/io/atomic_file.h"
+#include "model/printable.h"
 
 namespace cutproof::cli {
 
@@ -216,7 +217,8 @@ int replay(const JudgeOptions& options, Guest& guest) {
                      "replay the case with a plugin that does");
   }
   const harness::Promises promises = promises_of(guest.plugin(), operation, options.guest.library);
-  fmt::print("{}: {}, {}\nfound as: {}\n", options.replay, saved.operation, saved.question.kind, saved.found);
+  fmt::print("{}: {}, {}\nfound as: {}\n", options.replay, saved.operation, printable(saved.question.kind),
+             printable(saved.found));
   const bool again = guest.plugin().promises && promises.cover("determinism");
   const std::vector<Verdict> verdicts = judge_answer(guest, operation, saved.question, saved.at_end, again);
   int64_t judged = 0, failed = 0;

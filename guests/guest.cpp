@@ -98,7 +98,15 @@ Guest::Guest(GuestOptions options)
   if (!fs::exists(options_.library, failed)) {
     throw InputError(options_.library, "", "there is no such file", "name the shared library of a plugin");
   }
+  if (!fs::is_regular_file(options_.library, failed)) {
+    throw InputError(options_.library, "", "this is no file", "name the shared library of a plugin");
+  }
   options_.library = fs::absolute(options_.library).string();
+  // Counterexamples and documents name it, and these are UTF-8.
+  if (!is_utf8(options_.library)) {
+    throw InputError(options_.library, "", "the name of the plugin, or of a folder it lies in, is not UTF-8",
+                     "rename it");
+  }
   file_.number = memfd_create("cutproof arrays", MFD_CLOEXEC);
   if (file_.number < 0 || ftruncate(file_.number, wire::kMemoryBytes) != 0)
     machine_failed("memory to share with a plugin");

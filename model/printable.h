@@ -31,6 +31,15 @@ inline Character first_character(std::string_view text) {
   return {code, count};
 }
 
+inline bool is_utf8(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t bytes = first_character(text).bytes;
+    if (bytes == 0) return false;
+    text.remove_prefix(bytes);
+  }
+  return true;
+}
+
 // Control characters (C0, DEL, C1), marks and overrides of the direction of reading, separators of lines, and signs
 // that nobody sees.
 constexpr bool is_printable(uint32_t code) {

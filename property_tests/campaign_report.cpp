@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <iterator>
 #include <map>
@@ -27,6 +28,8 @@ constexpr int kSizeThatMeetsEveryClass = 79;
 // Of positions after a step, as many as may stay undecided (tolerances.md, The step again). A judge that grants
 // everything judges nothing. (Merges of whole frames cannot be decided at all; they are counted.)
 constexpr double kMostUndecided = 0.01;
+
+constexpr double kMostCounted = 1e12;  // by one shard, of anything
 
 constexpr const char* kRemedy = "give the results (--json) of all shards of one campaign, each once";
 
@@ -53,10 +56,13 @@ double mean(int64_t sum, int64_t count) {
 void add(json& sum, const json& more) {
   if (sum.is_object()) {
     for (auto& [name, value] : sum.items()) add(value, more.at(name));
-  } else if (sum.is_number_integer()) {
+    return;
+  }
+  const double both = sum.get<double>() + more.get<double>();
+  if (sum.is_number_integer() && more.is_number_integer() && std::abs(both) < 9e18) {
     sum = sum.get<int64_t>() + more.get<int64_t>();
   } else {
-    sum = sum.get<double>() + more.get<double>();
+    sum = both;
   }
 }
 
@@ -174,8 +180,13 @@ namespace {
 // Throws json::exception if something is missing, or of another kind, that merging or a conclusion reads; InputError if
 // there is too much.
 void require_fields(const json& part, const std::string& file) {
-  for (const char* count : {"cases", "refused", "verdicts", "particles"})
-    static_cast<void>(part.at(count).get<int64_t>());
+  // Counts are added up: those of a million shards must fit.
+  const auto require_count = [&](const json& within, const char* name) {
+    const double count = within.at(name).get<double>();
+    if (count >= 0 && count <= kMostCounted) return;
+    throw InputError(file, name, fmt::format("{} is no number of things that a campaign has seen", count), kRemedy);
+  };
+  for (const char* count : {"cases", "refused", "verdicts", "particles"}) require_count(part, count);
   for (const char* figure : {"seconds", "cases_per_second"}) static_cast<void>(part.at(figure).get<double>());
   for (const char* of_threads : {"generating", "running", "judging"}) {
     static_cast<void>(part.at("thread_seconds").at(of_threads).get<double>());
@@ -183,8 +194,7 @@ void require_fields(const json& part, const std::string& file) {
   static_cast<void>(part.at("dynamics").get<bool>());
   static_cast<void>(part.at("backend").get<std::string>());
   static_cast<void>(part.at("sizes").at(1).get<int>());
-  for (const CoverageClass& each : kCoverageClasses)
-    static_cast<void>(part.at("coverage").at(each.name).get<int64_t>());
+  for (const CoverageClass& each : kCoverageClasses) require_count(part.at("coverage"), each.name);
   if (part.at("properties").size() > io::kMostProperties) {
     throw InputError(
         file, "properties",
@@ -193,9 +203,7 @@ void require_fields(const json& part, const std::string& file) {
   }
   for (const json& property : part.at("properties").get<std::vector<json>>()) {
     for (const char* word : {"property", "stage"}) static_cast<void>(property.at(word).get<std::string>());
-    for (const char* count : {"judged", "checked", "failed", "undecided"}) {
-      static_cast<void>(property.at(count).get<int64_t>());
-    }
+    for (const char* count : {"judged", "checked", "failed", "undecided"}) require_count(property, count);
     for (const char* figure : {"measured", "of_bound"}) static_cast<void>(property.at(figure));
   }
   for (const json& violation : part.at("violations").get<std::vector<json>>()) {
@@ -203,9 +211,7 @@ void require_fields(const json& part, const std::string& file) {
     for (const char* word : {"text", "file"}) static_cast<void>(violation.at(word).get<std::string>());
   }
   if (!part.contains("steps_compared")) return;
-  for (const char* count : {"steps", "particles", "undecidable"}) {
-    static_cast<void>(part.at("steps_compared").at(count).get<int64_t>());
-  }
+  for (const char* count : {"steps", "particles", "undecidable"}) require_count(part.at("steps_compared"), count);
   static_cast<void>(part.at("steps_compared").at("greatest_h"));
 }
 

@@ -9,15 +9,6 @@ namespace {
 
 using nlohmann::json;
 
-bool is_utf8(std::string_view text) {
-  while (!text.empty()) {
-    const std::size_t bytes = first_character(text).bytes;
-    if (bytes == 0) return false;
-    text.remove_prefix(bytes);
-  }
-  return true;
-}
-
 bool holds_utf8(const json& value) {
   if (value.is_string()) return is_utf8(value.get_ref<const std::string&>());
   if (!value.is_structured()) return true;

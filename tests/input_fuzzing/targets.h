@@ -43,7 +43,8 @@ template <class F>
 Outcome outcome_of(F&& action);
 
 // One for each reader, in files of their names.
-extern const Target kScene, kStl, kObj, kPly, kOff, kRecording, kRecordingContents, kArrays;
+extern const Target kScene, kStl, kObj, kPly, kOff, kRecording, kRecordingContents, kArrays, kCounterexample, kCampaign,
+    kQuestion;
 
 }  // namespace cutproof::input_fuzzing
 
