@@ -83,7 +83,7 @@ int run_command_line(int argc, char** argv) {
     }
     return 2;
   }
-  refuse_empty(app);
+  refuse_odd_words(app);
   return work();
 }
 

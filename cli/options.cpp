@@ -12,13 +12,16 @@ void refuse(const std::string& option, const std::string& problem, const std::st
   throw InputError("command line", option, problem, remedy);
 }
 
-void refuse_empty(const CLI::App& command) {
+void refuse_odd_words(const CLI::App& command) {
   for (const CLI::Option* const option : command.get_options()) {
     for (const std::string& given : option->results()) {
       if (given.empty()) refuse(option->get_name(), "it is given but empty", "give a value, or leave the option out");
+      if (given.find_first_of("\n\r") != std::string::npos) {
+        refuse(option->get_name(), fmt::format("'{}' holds a line end", given), "rename the file");
+      }
     }
   }
-  for (const CLI::App* const named : command.get_subcommands()) refuse_empty(*named);
+  for (const CLI::App* const named : command.get_subcommands()) refuse_odd_words(*named);
 }
 
 void add_backend_name(CLI::App& command, std::string& name, const std::string& what,

@@ -59,17 +59,30 @@ class Writer {
   bool good_ = true;
 };
 
+// Nothing that hides text: as usual, bold, faint, the one or the other off, and colours of what is written.
+bool is_harmless(int style) {
+  return style == 0 || style == 1 || style == 2 || style == 22 || (style >= 30 && style <= 39) ||
+         (style >= 90 && style <= 97);
+}
+
 // Bytes of the colour that `text`, which begins with ESC, begins with: "ESC [ 1 ; 31 m"; 0 if it is none. `open`:
 // whether it may become one.
 std::size_t colour_at(std::string_view text, bool& open) {
-  std::size_t at = 1;
-  if (at < text.size() && text[at] != '[') return 0;
-  for (++at; at < text.size(); ++at) {
-    if (text[at] == 'm') return at + 1;
-    if ((text[at] < '0' || text[at] > '9') && text[at] != ';') return 0;
-    if (at + 1 >= kMostPending) return 0;
+  if (text.size() > 1 && text[1] != '[') return 0;
+  int style = 0;
+  for (std::size_t at = 2; at < text.size(); ++at) {
+    const char c = text[at];
+    if (c == 'm' || c == ';') {
+      if (!is_harmless(style)) return 0;
+      if (c == 'm') return at + 1;
+      style = 0;
+    } else if (c < '0' || c > '9' || at + 1 >= kMostPending) {
+      return 0;
+    } else {
+      style = 10 * style + (c - '0') > 999 ? 999 : 10 * style + (c - '0');
+    }
   }
-  open = true;
+  open = text.size() < kMostPending;
   return 0;
 }
 

@@ -10,8 +10,8 @@ namespace cutproof::cli {
 // writing show as ever, by fflush and ferror. To be called once, before anything is printed. Throws std::bad_alloc.
 void make_output_printable();
 
-// Lets colours and their like (escape sequences "ESC [ numbers m") through, for a program that colours its output. Of
-// what a name from outside can do, colours are all that gets through then.
+// Lets colours, bold and faint through ("ESC [ numbers m"), for a program that colours its output. Of what a name from
+// outside can do, these are all that gets through then: nothing hides.
 void let_colours_through();
 
 // The same at once, for standard error; allocates nothing.

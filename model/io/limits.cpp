@@ -14,7 +14,7 @@ std::string count_text(uint64_t count) {
 
 std::string json_rows(const JsonLimits& limits, std::string_view read_by) {
   return fmt::format(
-      "| {} ({}) | bytes | {} |\n| | brackets within brackets | {} |\n| | values, names of fields included | {} |\n",
+      "| {} ({}) | bytes | {} |\n|  | brackets within brackets | {} |\n|  | values, names of fields included | {} |\n",
       limits.what, read_by, bytes_text(limits.bytes), limits.depth, count_text(static_cast<uint64_t>(limits.values)));
 }
 
@@ -43,8 +43,8 @@ pipe.
 two rows say. HDF5 files hold everything themselves: links to other files, soft links, data in other files (external
 storage, virtual datasets) and filters that are not HDF5's own are refused, and no filter is loaded.
 
-**Names.** A file may have any name that the system allows, UTF-8 or not, but for plugins (`judge FILE.so`,
-`--backend plugin:FILE.so`): their names are kept in counterexamples, so they must be UTF-8. What is printed of names and
+**Names.** A file may have any name, UTF-8 or not, without line ends, which are refused on the command line. Names of
+plugins (`judge FILE.so`, `--backend plugin:FILE.so`) are kept in counterexamples, so they must be UTF-8. What is printed of names and
 of texts from files has `\x1b`, `\u202e` and the like in place of what would act on a terminal or change the direction
 of reading, and `\xe9` for a byte that is no UTF-8; commands to be given again quote such names as `$'caf\xe9.json'`.
 JSON, JUnit and annotations have the same, and stay valid UTF-8.

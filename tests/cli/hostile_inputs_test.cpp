@@ -278,8 +278,9 @@ const std::vector<Hostile>& hostile_inputs() {
        {R"(x\ncutproof: all hold)"}},
       {"AnEscapeInAFileName", [] { Writer("\x1b[31minput")("{"); }, "run '\x1b[31minput'", {R"(\x1b[31minput)"}},
       {"AFileNameThatIsNoUtf8", [] { Writer("caf\xe9")("{"); }, "run 'caf\xe9'", {R"(caf\xe9)"}},
+      {"ALineEndInAFileName", [] { Writer("two\nlines")("{"); }, "run 'two\nlines'", {R"(two\nlines)", "line end"}},
       {"AnEscapeInAnOption", nothing, "run '--\x1b[31m'", {R"(\x1b[31m)"}},
-      {"AnEscapeInAVerb", nothing, "'\x1b[31mrun'", {R"(\x1b[31mrun)"}},
+      {"AnEscapeInAVerb", nothing, "'\x1b[31mrun'", {}},
 
       // --- Counterexamples, results of campaigns, questions
       {"ACounterexampleOfATerabyte", sparse("input"), "replay input", {"too large", "8 MiB"}},
@@ -589,12 +590,12 @@ TEST_P(HostileName, WorksForWhatIsReadAndWritten) {
   const std::string name = GetParam();
   files::create_directory(name);
   const std::string in = name + "/" + name;
-  Writer(in + ".json")(kScene + R"(, "name": "\u001b[31ma\u009b\u202e\n:", "description": "one\nall hold"})");
+  Writer(in + ".json")(kScene + R"(, "name": "\u001b[31ma\u009b\u202e\n:", "description": "one\nall is well"})");
   const auto expect = [&](const std::string& arguments, int status) {
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.status, status) << arguments << "\n" << outcome.output;
     EXPECT_EQ(outcome.output, printable_lines(outcome.output)) << arguments;
-    EXPECT_EQ(outcome.output.find("\nall hold\n"), std::string::npos) << outcome.output;
+    EXPECT_EQ(outcome.output.find("\nall is well"), std::string::npos) << outcome.output;
     return outcome.output;
   };
   const auto expect_json = [&](const std::string& file) {
@@ -614,7 +615,7 @@ TEST_P(HostileName, WorksForWhatIsReadAndWritten) {
 
   const std::string checked = expect("check " + in_quotes(in) + " --json " + in_quotes(in + ".check.json"), 0);
   EXPECT_NE(checked.find(printable(in)), std::string::npos) << checked;
-  EXPECT_EQ(expect_json(in + ".check.json").at("source"), printable(in));
+  EXPECT_EQ(expect_json(in + ".check.json").at("source"), is_utf8(in) ? in : printable(in));
   expect("digest " + in_quotes(in), 0);
 
   expect("fuzz --backend reference --cases 3 --sizes 0-3 --save " + in_quotes(name) + " --json " +
@@ -648,12 +649,11 @@ TEST_P(HostileName, WorksForWhatIsReadAndWritten) {
 }
 
 std::string label_of(const testing::TestParamInfo<std::string>& name) {
-  constexpr std::array kLabels = {"NoUtf8", "Escapes", "LineEnd", "DirectionAndC1", "Plain"};
+  constexpr std::array kLabels = {"NoUtf8", "Escapes", "DirectionAndC1", "Plain"};
   return kLabels[name.index];
 }
 INSTANTIATE_TEST_SUITE_P(Names, HostileName,
-                         testing::Values("caf\xe9", "\x1b[31mred\x1b[0m", "two\nlines", "\xe2\x80\xaenames\xc2\x9b",
-                                         "plain"),
+                         testing::Values("caf\xe9", "\x1b[31mred\x1b[0m", "\xe2\x80\xaenames\xc2\x9b", "plain"),
                          label_of);
 
 // The command that shows a failure again is one that a shell takes.

@@ -31,8 +31,10 @@ nlohmann::json result(int64_t shard, int64_t shards) {
   campaign.cases = 5;
   campaign.verdicts = 70;
   campaign.seconds = 1.5;
+  harness::BackendChoice backend;
+  backend.name = "host";
   nlohmann::json document = campaign_document(
-      {.name = "host"}, options, campaign,
+      backend, options, campaign,
       nlohmann::json::array(
           {{{"index", shard}, {"property", "coverage"}, {"stage", "split"}, {"text", "found"}, {"file", "a.json"}}}));
   document["properties"].push_back({{"property", "admissible step"},
