@@ -30,7 +30,6 @@ class ArrayCollector {
   void announce(const std::string& name, uint64_t bytes);
   void add(const std::string& name, RawNumbers raw);
   void add(const std::string& name, const std::vector<std::string>& texts);
-  uint64_t bytes_left() const { return most_bytes() - bytes_; }
   // Throws InputError if a file of this size may not hold arrays of so many bytes in all.
   void require_sum(const std::string& name, uint64_t bytes) const;
   ArrayFile take() { return std::move(contents_); }

@@ -27,7 +27,7 @@ void collect_text(const hdf5::Values& values, const std::string& name, ArrayColl
 void collect(const hdf5::File& file, ArrayCollector& found) {
   const hdf5::Id root = hdf5::open_group(file.id(), "/");
   for (const std::string& name : hdf5::names_in(root.get(), kMostArrays)) {
-    const hdf5::Values values = hdf5::Values::of_dataset(root.get(), name, found.bytes_left(), file.bytes());
+    const hdf5::Values values = hdf5::Values::of_dataset(root.get(), name, kMostArrayBytes, file.bytes());
     if (values.kind() == hdf5::ValueKind::text) {
       collect_text(values, name, found);
       continue;

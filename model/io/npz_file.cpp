@@ -204,12 +204,12 @@ class NpzReader {
     if ((entry.valid & ZIP_STAT_ENCRYPTION_METHOD) != 0 && entry.encryption_method != ZIP_EM_NONE) {
       refuse(name, "It is encrypted.", kNpzRemedy);
     }
-    // Headers are small, so that these may be counted as arrays.
-    found_.require_sum(name, entry.size > kMostArrayBytes ? entry.size : bytes_ += entry.size);
     if (entry.size / kMostDeflation > entry.comp_size + 1) {
       refuse(name, fmt::format("It claims {} bytes, and {} are stored for it.", entry.size, entry.comp_size),
              kNpzRemedy);
     }
+    // Headers are small, so that these may be counted as arrays.
+    found_.require_sum(name, entry.size > kMostArrayBytes ? entry.size : bytes_ += entry.size);
   }
 
   void read_entry(zip_uint64_t index) {

@@ -275,7 +275,9 @@ Snapshot RecordingReader::File::snapshot(std::size_t i) const {
   state.precision = header.precision;
   for (std::size_t k = 0; k < tables.size(); ++k) {
     const RecordedField& recorded = recorded_fields()[k];
-    const auto& [values, index_column] = columns.fields[k];
+    // No structured binding: clang 14 does not capture these.
+    const std::vector<std::byte>& values = columns.fields[k].values;
+    const std::vector<int64_t>& index_column = columns.fields[k].index;
     if (recorded.storage == Storage::value || recorded.storage == Storage::list) {
       const bool is_list = recorded.storage == Storage::list;
       const int64_t first = is_list ? index_column[i] : static_cast<int64_t>(i);

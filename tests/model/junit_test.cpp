@@ -70,7 +70,7 @@ TEST(Junit, ReplacesWhatXmlCannotHold) {
   using namespace std::string_literals;
   const struct {
     std::string text, read;
-  } all[] = {{"a\0b"s, R"(a\ufffdb)"},
+  } all[] = {{"a\0b"s, R"(a\\x00b)"},
              {"\x01\x1B[31m\x1F", R"(\\x01\\x1b[31m\\x1f)"},
              {"\xEF\xBF\xBE\xEF\xBF\xBF\xEF\xBF\xBD", R"(\\ufffe\\uffff\ufffd)"},  // U+FFFD stays as it is
              {"\x80x", R"(\\x80x)"},                                               // a byte that goes on

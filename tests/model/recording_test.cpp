@@ -864,7 +864,7 @@ TEST_F(RecordingTest, IsRefusedIfItIsNoneAtAll) {
   };
   refused("missing", "no such file");
   fs::create_directory(path("folder.cutproof.h5"));
-  refused("folder", "not a file");
+  refused("folder", "a folder");
   write_bytes(path("empty.cutproof.h5"), "");
   refused("empty", "empty");
   write_bytes(path("text.cutproof.h5"), "This is a text, and a rather long one.\n");
