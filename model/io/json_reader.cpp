@@ -133,7 +133,8 @@ std::string join(const std::string& path, std::string_view name) {
 }
 
 json parse_json(const std::string& text, const std::string& file, const JsonLimits& limits, const std::string& remedy) {
-  if (text.find_first_not_of(" \t\r\n") == std::string::npos) throw InputError(file, "", "The file is empty.", remedy);
+  if (text.find_first_not_of(" \t\r\n") == std::string::npos)
+    throw InputError(file, "", "The file is empty, or not whole.", remedy);
   require_within(text, file, limits);
   PathTracker tracker(file);
   try {
@@ -144,6 +145,11 @@ json parse_json(const std::string& text, const std::string& file, const JsonLimi
     const std::string last = quoted == std::string::npos ? "" : message.substr(quoted);
     const bool is_no_number = last.find_first_of("NI") != std::string::npos || last.find("na'") != std::string::npos ||
                               last.find("inf") != std::string::npos;
+    if (error.byte > text.size()) {
+      throw InputError(file, position_text(text, error.byte),
+                       fmt::format("This is not valid JSON, or not whole: {}.", message),
+                       "Look for what is open at the end, or copy the file again. " + remedy);
+    }
     throw InputError(
         file, position_text(text, error.byte), fmt::format("This is not valid JSON: {}.", message),
         is_no_number
