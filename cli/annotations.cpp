@@ -6,6 +6,8 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "model/printable.h"
+
 namespace cutproof::cli {
 
 namespace {
@@ -16,23 +18,24 @@ constexpr std::size_t kMostShown = 10;
 // separate properties from each other and from the text.
 std::string escaped(std::string_view text, bool in_property) {
   std::string result;
-  for (const char c : text) {
-    if (c == '%') {
-      result += "%25";
-    } else if (c == '\r') {
-      result += "%0D";
-    } else if (c == '\n') {
-      result += "%0A";
-    } else if (in_property && c == ':') {
-      result += "%3A";
-    } else if (in_property && c == ',') {
-      result += "%2C";
-    } else if (static_cast<unsigned char>(c) < 32 || c == 127) {  // would act on a terminal
-      result += '?';
-    } else {
-      result += c;
+  for_each_printable(text, true, [&](std::string_view piece, bool is_escape) {
+    if (piece == "\\r" && is_escape) piece = "\r";
+    for (const char c : piece) {
+      if (c == '%') {
+        result += "%25";
+      } else if (c == '\r') {
+        result += "%0D";
+      } else if (c == '\n') {
+        result += "%0A";
+      } else if (in_property && c == ':') {
+        result += "%3A";
+      } else if (in_property && c == ',') {
+        result += "%2C";
+      } else {
+        result += c;
+      }
     }
-  }
+  });
   return result;
 }
 

@@ -15,6 +15,7 @@
 #include "model/io/array_file.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
+#include "model/printable.h"
 
 namespace cutproof::cli {
 
@@ -39,8 +40,8 @@ int check_recording(const CheckOptions& options) {
 
   const auto initial = std::make_shared<const State>(reader.snapshot(0).state);
   fmt::print("recording {}: scene {}, backend {}, {} snapshots of {} particles\n", options.recording,
-             scene.name.empty() ? "(none)" : scene.name, recording.backend, recording.snapshot_count,
-             recording.setup.body.particle_count());
+             scene.name.empty() ? "(none)" : printable(scene.name), printable(recording.backend),
+             recording.snapshot_count, recording.setup.body.particle_count());
   harness::SceneJudge judge(recording.setup, scene.expect, recording.backend, initial, depth);
   RunResult result{"check", options.recording,    recording.backend,
                    scene,   recording.setup.body, initial->clusters.count()};

@@ -18,6 +18,7 @@
 #include "guests/plugin_backend.h"
 #include "model/io/atomic_file.h"
 #include "model/io/recording.h"
+#include "model/printable.h"
 #include "property_tests/campaign.h"
 #include "property_tests/campaign_report.h"
 #include "property_tests/recorded_case.h"
@@ -97,7 +98,8 @@ int print_conclusion(const json& document, const CampaignConclusion& conclusion)
     const auto undecided = property.at("undecided").get<int64_t>();
     if (!of_bound.is_number() && undecided == 0) continue;
     fmt::print(
-        "  {:<32} {:<7} {:>8}{}\n", property.at("property").get<std::string>(), property.at("stage").get<std::string>(),
+        "  {:<32} {:<7} {:>8}{}\n", printable(property.at("property").get_ref<const std::string&>()),
+        printable(property.at("stage").get_ref<const std::string&>()),
         of_bound.is_number() ? fmt::format("{:.2g}", of_bound.get<double>()) : "-",
         undecided > 0 ? fmt::format("  {} of {} undecided", undecided, property.at("checked").get<int64_t>()) : "");
   }

@@ -13,6 +13,7 @@
 #include "fixtures/import/mesh.h"
 #include "model/error.h"
 #include "model/fields.h"
+#include "model/io/limits.h"
 #include "model/io/scene_io.h"
 #include "oracles/surface/surface.h"
 
@@ -23,6 +24,7 @@ namespace {
 struct InfoOptions {
   bool scene = false;      // print the reference of scene files
   bool scenes = false;     // print the scenes that come with the program
+  bool limits = false;     // print how much is read
   std::string mesh, unit;  // examine a mesh
   std::string json;
 };
@@ -86,6 +88,10 @@ int info(const InfoOptions& options) {
     fmt::print("{}", io::scene_reference());
     return 0;
   }
+  if (options.limits) {
+    fmt::print("{}", io::limits_reference());
+    return 0;
+  }
   fmt::print("cutproof {}\nbackends:\n", kVersion);
   for (const harness::BackendDescriptor& backend : harness::backends()) {
     fmt::print("  {:<11} {}\n", backend.name, harness::description_of(backend));
@@ -117,6 +123,7 @@ void add_info(CLI::App& program, Work& work) {
       ->type_name("U")
       ->needs(mesh);
   command->add_option("--json", options->json, "write what was found of the mesh")->type_name("F")->needs(mesh);
+  command->add_flag("--limits", options->limits, "list how much is read of each kind of file");
   command->callback([options, &work] { work = [options] { return info(*options); }; });
 }
 

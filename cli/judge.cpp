@@ -16,6 +16,7 @@
 #include "guests/plugin_backend.h"
 #include "model/error.h"
 #include "model/io/atomic_file.h"
+#include "model/printable.h"
 
 namespace cutproof::cli {
 
@@ -209,14 +210,15 @@ bool judge_stages(const JudgeOptions& options, bool dynamics, json& document, st
 }
 
 int replay(const JudgeOptions& options, Guest& guest) {
-  const SavedQuestion saved = question_from_json(io::read_text(options.replay), options.replay);
+  const SavedQuestion saved = read_question(options.replay);
   const OperationDescription& operation = *find_operation(saved.operation);
   if (!guest.plugin().offers(operation.number)) {
     throw InputError(options.guest.library, saved.operation, "the plugin does not have this operation",
                      "replay the case with a plugin that does");
   }
   const harness::Promises promises = promises_of(guest.plugin(), operation, options.guest.library);
-  fmt::print("{}: {}, {}\nfound as: {}\n", options.replay, saved.operation, saved.question.kind, saved.found);
+  fmt::print("{}: {}, {}\nfound as: {}\n", options.replay, saved.operation, printable(saved.question.kind),
+             printable(saved.found));
   const bool again = guest.plugin().promises && promises.cover("determinism");
   const std::vector<Verdict> verdicts = judge_answer(guest, operation, saved.question, saved.at_end, again);
   int64_t judged = 0, failed = 0;

@@ -3,10 +3,13 @@
 #include <cstdlib>
 #include <exception>
 #include <new>
+#include <sstream>
+#include <string>
 
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "cli/output.h"
+#include "cli/printable_output.h"
 #include "guests/guest.h"
 #include "model/backend.h"
 #include "model/error.h"
@@ -18,7 +21,7 @@ namespace {
 int say(const char* what, int status) {
   std::fflush(stdout);
   std::fputs("cutproof: ", stderr);
-  std::fputs(what, stderr);
+  cutproof::cli::print_printable(stderr, what);
   std::fputs("\n", stderr);
   return status;
 }
@@ -66,16 +69,21 @@ int run_command_line(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& asked) {  // --help, --version
-    return app.exit(asked);
+    std::ostringstream text;
+    const int status = app.exit(asked, text, text);
+    std::fputs(text.str().c_str(), stdout);
+    return status;
   } catch (const CLI::ParseError& error) {
     if (argc <= 1) {
       std::fputs(app.help().c_str(), stderr);
     } else {
-      app.exit(error);
+      std::ostringstream text;
+      app.exit(error, text, text);
+      print_printable(stderr, text.str());
     }
     return 2;
   }
-  refuse_empty(app);
+  refuse_odd_words(app);
   return work();
 }
 
@@ -84,6 +92,7 @@ int run_command_line(int argc, char** argv) {
 int main(int argc, char** argv) {
   std::set_terminate(end_with_status);
   try {
+    cutproof::cli::make_output_printable();
     const int status = run_command_line(argc, argv);
     cutproof::cli::flush_output();
     return status;

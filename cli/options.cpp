@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include "model/error.h"
+#include "model/printable.h"
 
 namespace cutproof::cli {
 
@@ -11,13 +12,16 @@ void refuse(const std::string& option, const std::string& problem, const std::st
   throw InputError("command line", option, problem, remedy);
 }
 
-void refuse_empty(const CLI::App& command) {
+void refuse_odd_words(const CLI::App& command) {
   for (const CLI::Option* const option : command.get_options()) {
     for (const std::string& given : option->results()) {
       if (given.empty()) refuse(option->get_name(), "it is given but empty", "give a value, or leave the option out");
+      if (given.find_first_of("\n\r") != std::string::npos) {
+        refuse(option->get_name(), fmt::format("'{}' holds a line end", given), "rename the file");
+      }
     }
   }
-  for (const CLI::App* const named : command.get_subcommands()) refuse_empty(*named);
+  for (const CLI::App* const named : command.get_subcommands()) refuse_odd_words(*named);
 }
 
 void add_backend_name(CLI::App& command, std::string& name, const std::string& what,
@@ -72,6 +76,16 @@ void add_junit(CLI::App& command, std::string& path) {
 std::string quoted(const std::string& word) {
   constexpr const char* kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_./:=,+@%-";
   if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+  if (printable(word) != word) {  // as bash and zsh take it, and a terminal bears it
+    std::string result = "$'";
+    for_each_printable(word, false, [&](std::string_view piece, bool is_escape) {
+      for (const char c : piece) {
+        if (!is_escape && (c == '\'' || c == '\\')) result += '\\';
+        result += c;
+      }
+    });
+    return result + "'";
+  }
   std::string result = "'";
   for (const char c : word) result += c == '\'' ? "'\\''" : std::string(1, c);
   return result + "'";

@@ -10,8 +10,9 @@ namespace cutproof::cli {
 
 // Throws InputError for an option of the command line.
 [[noreturn]] void refuse(const std::string& option, const std::string& problem, const std::string& remedy);
-// Refuses what was given but is empty, such as --json "": nobody means that.
-void refuse_empty(const CLI::App& command);
+// Refuses what was given but is empty, such as --json "": nobody means that. So it is with line ends: a file whose name
+// has one would print lines that look like ours.
+void refuse_odd_words(const CLI::App& command);
 
 // --backend alone. `what`: what it does, for the help, which lists those of which `offered` holds.
 void add_backend_name(CLI::App& command, std::string& name, const std::string& what,

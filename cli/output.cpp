@@ -6,6 +6,7 @@
 
 #include "model/error.h"
 #include "model/io/atomic_file.h"
+#include "model/io/json_text.h"
 
 namespace cutproof::cli {
 
@@ -23,7 +24,7 @@ void require_writable(const std::string& path) {
 }
 
 void write_document(const std::string& path, const nlohmann::json& document) {
-  if (!path.empty()) io::write_text(path, document.dump(1) + "\n");
+  if (!path.empty()) io::write_text(path, io::json_text(document, 1) + "\n");
 }
 
 }  // namespace cutproof::cli

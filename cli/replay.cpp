@@ -6,8 +6,8 @@
 #include "cli/commands.h"
 #include "cli/findings.h"
 #include "cli/options.h"
-#include "model/io/atomic_file.h"
 #include "model/io/recording.h"
+#include "model/printable.h"
 #include "property_tests/campaign.h"
 #include "property_tests/counterexample.h"
 #include "property_tests/recorded_case.h"
@@ -37,7 +37,7 @@ BackendChoice choice_of(const ReplayOptions& options, const Counterexample& coun
 
 int replay(const ReplayOptions& options) {
   const std::string& file = options.counterexample;
-  const Counterexample counterexample = counterexample_from_json(io::read_text(file), file);
+  const Counterexample counterexample = read_counterexample(file);
   const BackendChoice choice = choice_of(options, counterexample);
   const Case& c = counterexample.failing;
   const bool is_history = !counterexample.commands.empty();
@@ -45,8 +45,8 @@ int replay(const ReplayOptions& options) {
     refuse("--record", file + " is a history of commands, which no recording holds", "leave it out");
   }
   fmt::print("{}: {} particles, {} strokes, {}backend {}\n", file, c.nodes.size(), c.strokes.size(),
-             is_history ? fmt::format("{} commands, ", counterexample.commands.size()) : "", choice.name);
-  if (!counterexample.found.empty()) fmt::print("found as: {}\n", counterexample.found);
+             is_history ? fmt::format("{} commands, ", counterexample.commands.size()) : "", printable(choice.name));
+  if (!counterexample.found.empty()) fmt::print("found as: {}\n", printable(counterexample.found));
   const auto make = [&] { return backend_of(counterexample, choice); };
   const Judgement judgement =
       is_history ? history_alone(make, c, counterexample.commands) : dissect_alone(make, c, true);

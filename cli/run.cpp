@@ -26,6 +26,7 @@
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
 #include "model/io/verdict_json.h"
+#include "model/printable.h"
 
 namespace cutproof::cli {
 
@@ -80,7 +81,7 @@ void print_header(const Scene& scene, const fixtures::Built& built, const RunOpt
   const Body& body = built.setup.body;
   const fixtures::Bounds box = fixtures::path_box(body);
   const Vec3 size = 1e3 * (box.high - box.low);
-  fmt::print("scene {}: {}\n", scene.name, scene.description);
+  fmt::print("scene {}: {}\n", printable(scene.name), printable(scene.description));
   fmt::print("body {}, {:.4g} × {:.4g} × {:.4g} mm, {} particles at h = {:.4g} mm, {} clusters\n", body.name, size.x,
              size.y, size.z, body.particle_count(), body.grid.spacing * 1e3, built.state.clusters.count());
   if (!options.mesh.empty()) fmt::print("one unit of the mesh is 1 {} (--unit changes that)\n", options.unit);

@@ -13,6 +13,7 @@
 #include "cli/table.h"
 #include "cli/terminal.h"
 #include "model/io/filled.h"
+#include "model/printable.h"
 
 namespace cutproof::cli {
 
@@ -49,7 +50,7 @@ void settle_files(Asked& asked) {
 
 void print_beginning(const TuneOptions& options, const json& document, const Scene& given) {
   print_filled(kHead, document);
-  fmt::print("scene {}: {}\n", given.name, given.description);
+  fmt::print("scene {}: {}\n", printable(given.name), printable(given.description));
   if (options.without_skin && given.expect.shells_at_end) {
     fmt::print("--without-skin does nothing: the scene expects shells of its skin\n");
   }

@@ -10,7 +10,10 @@
 #include "guests/tissue_arrays.h"
 #include "model/at.h"
 #include "model/error.h"
+#include "model/io/input_file.h"
 #include "model/io/json_number.h"
+#include "model/io/json_reader.h"
+#include "model/io/json_text.h"
 
 namespace cutproof::guests {
 
@@ -160,6 +163,7 @@ namespace {
 
 constexpr int kFormatVersion = 1;
 constexpr const char* kFormat = "cutproof.question";
+constexpr const char* kWhatToGive = "give a question that `cutproof judge` has saved";
 
 json to_json(const Array& array) {
   json values = json::array();
@@ -222,28 +226,25 @@ json to_json(const Arrays& arrays) {
 }  // namespace
 
 std::string to_json(const SavedQuestion& saved) {
-  return json{{"format", kFormat},
-              {"format_version", kFormatVersion},
-              {"operation", saved.operation},
-              {"kind", saved.question.kind},
-              {"precision", saved.precision == Precision::binary32 ? "single" : "double"},
-              {"at_end", saved.at_end},
-              {"plugin", saved.plugin},
-              {"found", saved.found},
-              {"seed", saved.seed},
-              {"index", saved.index},
-              {"given", to_json(saved.question.given)},
-              {"known", to_json(saved.question.known)}}
-      .dump();
+  return io::json_text({{"format", kFormat},
+                        {"format_version", kFormatVersion},
+                        {"operation", saved.operation},
+                        {"kind", saved.question.kind},
+                        {"precision", saved.precision == Precision::binary32 ? "single" : "double"},
+                        {"at_end", saved.at_end},
+                        {"plugin", saved.plugin},
+                        {"found", saved.found},
+                        {"seed", saved.seed},
+                        {"index", saved.index},
+                        {"given", to_json(saved.question.given)},
+                        {"known", to_json(saved.question.known)}});
 }
 
 SavedQuestion question_from_json(const std::string& text, const std::string& file) {
-  const auto refuse = [&](const std::string& problem) -> InputError {
-    return {file, "", problem, "give a question that `cutproof judge` has saved"};
-  };
+  const auto refuse = [&](const std::string& problem) -> InputError { return {file, "", problem, kWhatToGive}; };
   SavedQuestion saved;
   try {
-    const json j = json::parse(text);
+    const json j = io::parse_json(text, file, io::kQuestionLimits, std::string(kWhatToGive) + ".");
     if (!j.is_object() || j.value("format", "") != kFormat) throw refuse("it is no question to a kernel");
     if (j.at("format_version") != kFormatVersion) {
       throw refuse(
@@ -297,6 +298,10 @@ SavedQuestion question_from_json(const std::string& text, const std::string& fil
     throw refuse(error.what());
   }
   return saved;
+}
+
+SavedQuestion read_question(const std::string& file) {
+  return question_from_json(io::read_file(file, io::kQuestionLimits.what, io::kQuestionLimits.bytes), file);
 }
 
 nlohmann::json to_json(const KernelCampaign& campaign) {

@@ -84,6 +84,7 @@ struct SavedQuestion {
 std::string to_json(const SavedQuestion& saved);
 // Throws InputError, naming `file`, for anything else, and for fields that are not known.
 SavedQuestion question_from_json(const std::string& text, const std::string& file);
+SavedQuestion read_question(const std::string& file);
 
 nlohmann::json to_json(const KernelCampaign& campaign);
 

@@ -20,6 +20,7 @@
 
 #include "model/at.h"
 #include "model/error.h"
+#include "model/printable.h"
 
 extern char** environ;
 
@@ -97,7 +98,15 @@ Guest::Guest(GuestOptions options)
   if (!fs::exists(options_.library, failed)) {
     throw InputError(options_.library, "", "there is no such file", "name the shared library of a plugin");
   }
+  if (!fs::is_regular_file(options_.library, failed)) {
+    throw InputError(options_.library, "", "this is no file", "name the shared library of a plugin");
+  }
   options_.library = fs::absolute(options_.library).string();
+  // Counterexamples and documents name it, and these are UTF-8.
+  if (!is_utf8(options_.library)) {
+    throw InputError(options_.library, "", "the name of the plugin, or of a folder it lies in, is not UTF-8",
+                     "rename it");
+  }
   file_.number = memfd_create("cutproof arrays", MFD_CLOEXEC);
   if (file_.number < 0 || ftruncate(file_.number, wire::kMemoryBytes) != 0)
     machine_failed("memory to share with a plugin");
@@ -203,7 +212,7 @@ void Guest::greet(double time_limit) {
     stop();
     throw InputError(options_.library, "", problem, remedy);
   }
-  const auto text = [](const char* from) { return without_control_characters(from); };
+  const auto text = [](const char* from) { return printable(from); };
   if (received != static_cast<ssize_t>(sizeof *hello) || hello->protocol != wire::kProtocol ||
       hello->request_bytes != sizeof(wire::Request) || hello->reply_bytes != sizeof(wire::Reply)) {
     stop();
@@ -367,10 +376,10 @@ Answer Guest::call(Operation operation, uint32_t instance, Span span, const std:
   wire::Reply& reply = *reply_;
   if (recv(channel_, &reply, sizeof reply, 0) != static_cast<ssize_t>(sizeof reply)) return lost(why_it_ended());
   reply.text[sizeof reply.text - 1] = 0;
-  if (reply.outcome == wire::Outcome::device_failed) return lost(without_control_characters(reply.text));
+  if (reply.outcome == wire::Outcome::device_failed) return lost(printable(reply.text));
   if (reply.outcome == wire::Outcome::broke_a_rule) {
     answer.kind = Answer::Kind::fault;
-    answer.text = without_control_characters(reply.text);
+    answer.text = printable(reply.text);
     return answer;
   }
   for (std::size_t k = 0; k < arguments.size(); ++k) {

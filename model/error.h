@@ -4,29 +4,27 @@
 #include <string>
 #include <utility>
 
+#include "model/printable.h"
+
 namespace cutproof {
 
-// What errors quote from files may hold anything: a NUL would cut the message off, an escape would act on the terminal.
-inline std::string without_control_characters(std::string text) {
-  for (char& c : text) {
-    if ((static_cast<unsigned char>(c) < 32 && c != '\n') || c == 127) c = '?';
-  }
-  return text;
-}
-
 // Bad input or usage; the program ends with exit status 2. Names the file, the field in it, what is wrong
-// (with the value), and what would be right.
+// (with the value), and what would be right. All of these may quote what stands in files: what() is printable, of two
+// lines, and not as long as a file.
 class InputError : public std::runtime_error {
  public:
   InputError(std::string file, std::string field, const std::string& problem, const std::string& remedy)
-      : std::runtime_error(without_control_characters(file + (field.empty() ? "" : ": " + field) + ": " + problem +
-                                                      (remedy.empty() ? "" : "\n  remedy: " + remedy))),
+      : std::runtime_error(shown(file, kMostNameBytes) + (field.empty() ? "" : ": " + shown(field, kMostFieldBytes)) +
+                           ": " + shown(problem, kMostTextBytes) +
+                           (remedy.empty() ? "" : "\n  remedy: " + shown(remedy, kMostTextBytes))),
         file_(std::move(file)),
         field_(std::move(field)) {}
   const std::string& file() const { return file_; }
   const std::string& field() const { return field_; }
 
  private:
+  static constexpr std::size_t kMostNameBytes = 4096, kMostFieldBytes = 300, kMostTextBytes = 4000;
+  static std::string shown(std::string_view text, std::size_t most) { return printable(shortened(text, most)); }
   std::string file_, field_;
 };
 

@@ -4,14 +4,15 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <iterator>
 #include <map>
 #include <utility>
 
 #include "model/error.h"
-#include "model/io/atomic_file.h"
 #include "model/io/json_number.h"
+#include "model/io/json_reader.h"
 
 namespace cutproof::property_tests {
 
@@ -27,6 +28,8 @@ constexpr int kSizeThatMeetsEveryClass = 79;
 // Of positions after a step, as many as may stay undecided (tolerances.md, The step again). A judge that grants
 // everything judges nothing. (Merges of whole frames cannot be decided at all; they are counted.)
 constexpr double kMostUndecided = 0.01;
+
+constexpr double kMostCounted = 1e12;  // by one shard, of anything
 
 constexpr const char* kRemedy = "give the results (--json) of all shards of one campaign, each once";
 
@@ -53,10 +56,13 @@ double mean(int64_t sum, int64_t count) {
 void add(json& sum, const json& more) {
   if (sum.is_object()) {
     for (auto& [name, value] : sum.items()) add(value, more.at(name));
-  } else if (sum.is_number_integer()) {
+    return;
+  }
+  const double both = sum.get<double>() + more.get<double>();
+  if (sum.is_number_integer() && more.is_number_integer() && std::abs(both) < 9e18) {
     sum = sum.get<int64_t>() + more.get<int64_t>();
   } else {
-    sum = sum.get<double>() + more.get<double>();
+    sum = both;
   }
 }
 
@@ -171,10 +177,16 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
 
 namespace {
 
-// Throws json::exception if something is missing, or of another kind, that merging or a conclusion reads.
-void require_fields(const json& part) {
-  for (const char* count : {"cases", "refused", "verdicts", "particles"})
-    static_cast<void>(part.at(count).get<int64_t>());
+// Throws json::exception if something is missing, or of another kind, that merging or a conclusion reads; InputError if
+// there is too much.
+void require_fields(const json& part, const std::string& file) {
+  // Counts are added up: those of a million shards must fit.
+  const auto require_count = [&](const json& within, const char* name) {
+    const double count = within.at(name).get<double>();
+    if (count >= 0 && count <= kMostCounted) return;
+    throw InputError(file, name, fmt::format("{} is no number of things that a campaign has seen", count), kRemedy);
+  };
+  for (const char* count : {"cases", "refused", "verdicts", "particles"}) require_count(part, count);
   for (const char* figure : {"seconds", "cases_per_second"}) static_cast<void>(part.at(figure).get<double>());
   for (const char* of_threads : {"generating", "running", "judging"}) {
     static_cast<void>(part.at("thread_seconds").at(of_threads).get<double>());
@@ -182,13 +194,16 @@ void require_fields(const json& part) {
   static_cast<void>(part.at("dynamics").get<bool>());
   static_cast<void>(part.at("backend").get<std::string>());
   static_cast<void>(part.at("sizes").at(1).get<int>());
-  for (const CoverageClass& each : kCoverageClasses)
-    static_cast<void>(part.at("coverage").at(each.name).get<int64_t>());
+  for (const CoverageClass& each : kCoverageClasses) require_count(part.at("coverage"), each.name);
+  if (part.at("properties").size() > io::kMostProperties) {
+    throw InputError(
+        file, "properties",
+        fmt::format("there are {} properties, more than {}", part.at("properties").size(), io::kMostProperties),
+        kRemedy);
+  }
   for (const json& property : part.at("properties").get<std::vector<json>>()) {
     for (const char* word : {"property", "stage"}) static_cast<void>(property.at(word).get<std::string>());
-    for (const char* count : {"judged", "checked", "failed", "undecided"}) {
-      static_cast<void>(property.at(count).get<int64_t>());
-    }
+    for (const char* count : {"judged", "checked", "failed", "undecided"}) require_count(property, count);
     for (const char* figure : {"measured", "of_bound"}) static_cast<void>(property.at(figure));
   }
   for (const json& violation : part.at("violations").get<std::vector<json>>()) {
@@ -196,23 +211,14 @@ void require_fields(const json& part) {
     for (const char* word : {"text", "file"}) static_cast<void>(violation.at(word).get<std::string>());
   }
   if (!part.contains("steps_compared")) return;
-  for (const char* count : {"steps", "particles", "undecidable"}) {
-    static_cast<void>(part.at("steps_compared").at(count).get<int64_t>());
-  }
+  for (const char* count : {"steps", "particles", "undecidable"}) require_count(part.at("steps_compared"), count);
   static_cast<void>(part.at("steps_compared").at("greatest_h"));
 }
 
 // One result as it stands in its file.
 json read_shard(const std::string& file) {
-  json part;
-  try {
-    part = json::parse(io::read_text(file));
-  } catch (const json::parse_error& error) {
-    throw InputError(
-        file, "",
-        fmt::format("this is not JSON, or it is not whole: it breaks off, or goes wrong, at byte {}", error.byte),
-        "copy it again, or leave it out: --merge then names the shard as missing");
-  }
+  const json part = io::read_json(file, io::kCampaignLimits,
+                                  "Copy it again, or leave it out: --merge then names the shard as missing.");
   if (!part.is_object() || part.value("format", json()) != kResultFormat ||
       part.value("format_version", json()) != kFormatVersion) {
     throw InputError(file, "format", "this is not a result of `cutproof fuzz` of this version", kRemedy);
@@ -224,7 +230,7 @@ json read_shard(const std::string& file) {
   if (shards < 1 || shards > kMostShards || shard < 1 || shard > shards) {
     throw InputError(file, "shard", fmt::format("there is no shard {} of {}", shard, shards), kRemedy);
   }
-  require_fields(part);
+  require_fields(part, file);
   return part;
 }
 

@@ -6,12 +6,14 @@
 #include <numeric>
 #include <set>
 #include <stdexcept>
+#include <string>
 #include <type_traits>
 #include <utility>
 
 #include "fixtures/blade_path.h"
 #include "fixtures/bodies.h"
 #include "fixtures/cook.h"
+#include "model/io/limits.h"
 #include "model/rules.h"
 #include "property_tests/random.h"
 
@@ -893,6 +895,13 @@ void require_sane(const Case& c) {
               std::adjacent_find(c.nodes.begin(), c.nodes.end()) == c.nodes.end() &&
               std::all_of(c.nodes.begin(), c.nodes.end(), [&](const Node& n) { return is_near(n, 0); }),
           "nodes", "ascending, without duplicates, between 0 and 2^20");
+  const auto require_few = [&](const auto& list, std::size_t most, const char* field) {
+    require(list.size() <= most, field, (std::to_string(most) + " at most").c_str());
+  };
+  require_few(c.nodes, io::kMostCaseNodes, "nodes");
+  require_few(c.strokes, io::kMostStrokes, "strokes");
+  require_few(c.walls, io::kMostWalls, "walls");
+  require_few(c.grips, io::kMostGrips, "grips");
   require(c.spacing > 0 && c.spacing <= 1e6, "spacing", "in (0, 1e6]");
   require(c.side >= 1, "side", ">= 1");
   require(c.seed_spacing >= 1, "seed_spacing", ">= 1");

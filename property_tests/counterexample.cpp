@@ -5,14 +5,16 @@
 #include <stdexcept>
 
 #include "model/error.h"
+#include "model/io/input_file.h"
+#include "model/io/json_reader.h"
+#include "model/io/json_text.h"
 
 namespace cutproof::property_tests {
 namespace {
 
 constexpr const char* kFormat = "cutproof.counterexample";
 constexpr int kVersion = 1;
-// Beyond what any run decides; a number larger than this is a mistake, and would ask for that much memory.
-constexpr std::size_t kMostDecisions = 100'000'000;
+constexpr const char* kWhatToGive = "give a file that `cutproof fuzz` has saved";
 
 }  // namespace
 
@@ -33,17 +35,17 @@ std::string to_json(const Counterexample& counterexample) {
   for (const Command& command : counterexample.commands) {
     document["commands"].push_back(nlohmann::json::parse(to_json(command)));
   }
-  return document.dump();
+  return io::json_text(document);
 }
 
 Counterexample counterexample_from_json(const std::string& text, const std::string& file) {
   const auto refuse = [&](const std::string& field, const std::string& problem) -> InputError {
-    return {file, field, problem, "give a file that `cutproof fuzz` has saved"};
+    return {file, field, problem, kWhatToGive};
   };
   Counterexample result;
   std::string field;
   try {
-    const auto document = nlohmann::json::parse(text);
+    const auto document = io::parse_json(text, file, io::kCounterexampleLimits, std::string(kWhatToGive) + ".");
     if (!document.is_object()) throw refuse("", "this is not a counterexample");
     if (!document.contains("format")) {
       result.failing = from_json(text);
@@ -70,7 +72,8 @@ Counterexample counterexample_from_json(const std::string& text, const std::stri
     std::vector<std::pair<std::size_t, std::uint16_t>> choices;
     get("schedule", choices);
     for (const auto& [decision, choice] : choices) {
-      if (decision >= kMostDecisions) throw refuse("schedule", "a decision with number " + std::to_string(decision));
+      if (decision >= io::kMostDecisions)
+        throw refuse("schedule", "a decision with number " + std::to_string(decision));
       if (decision >= result.schedule.size()) result.schedule.resize(decision + 1, 0);
       result.schedule[decision] = choice;
     }
@@ -88,6 +91,11 @@ Counterexample counterexample_from_json(const std::string& text, const std::stri
   } catch (const std::invalid_argument& error) {
     throw refuse(field, error.what());
   }
+}
+
+Counterexample read_counterexample(const std::string& file) {
+  return counterexample_from_json(io::read_file(file, io::kCounterexampleLimits.what, io::kCounterexampleLimits.bytes),
+                                  file);
 }
 
 }  // namespace cutproof::property_tests

@@ -26,5 +26,6 @@ struct Counterexample {
 std::string to_json(const Counterexample& counterexample);
 // Throws InputError, naming `file`, for anything else. A line that to_json(Case) wrote is a counterexample, too.
 Counterexample counterexample_from_json(const std::string& text, const std::string& file);
+Counterexample read_counterexample(const std::string& file);
 
 }  // namespace cutproof::property_tests

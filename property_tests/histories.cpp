@@ -5,11 +5,13 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <string>
 #include <type_traits>
 #include <utility>
 
 #include "model/error.h"
 #include "model/fields.h"
+#include "model/io/limits.h"
 #include "model/io/recording.h"
 #include "model/rules.h"
 #include "oracles/comparison/state_difference.h"
@@ -130,7 +132,11 @@ std::vector<Command> commands_from_json(const std::string& list) {
   constexpr int32_t kMost = 1000;  // stages of a run, quarters of a velocity; no generator asks for more
   std::vector<Command> commands;
   try {
-    for (const auto& given : nlohmann::json::parse(list)) commands.push_back(command_of(given));
+    const auto document = nlohmann::json::parse(list);
+    if (document.size() > io::kMostCommands) {
+      throw std::invalid_argument("commands must be " + std::to_string(io::kMostCommands) + " at most");
+    }
+    for (const auto& given : document) commands.push_back(command_of(given));
   } catch (const nlohmann::json::exception& error) {
     throw std::invalid_argument(std::string("commands: ") + error.what());
   }

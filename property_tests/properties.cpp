@@ -6,9 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
-#include <sstream>
 
 #include "fixtures/build.h"
 #include "fixtures/cook.h"
@@ -50,9 +48,7 @@ std::vector<std::pair<std::string, Counterexample>> saved_counterexamples() {
   std::vector<std::pair<std::string, Counterexample>> saved;
   for (const auto& entry : std::filesystem::directory_iterator(path)) {
     if (entry.path().extension() != ".json") continue;
-    std::ostringstream text;
-    text << std::ifstream(entry.path()).rdbuf();
-    saved.emplace_back(entry.path().string(), counterexample_from_json(text.str(), entry.path().string()));
+    saved.emplace_back(entry.path().string(), read_counterexample(entry.path().string()));
   }
   std::sort(saved.begin(), saved.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   return saved;

@@ -16,6 +16,7 @@
 #include "model/at.h"
 #include "model/io/array_parts.h"
 #include "model/io/hdf5_file.h"
+#include "model/io/input_file.h"
 #include "model/io/recording.h"
 
 namespace cutproof::io {
@@ -27,14 +28,7 @@ enum class Format { npz, hdf5, other, empty };
 
 // Throws InputError if there is no regular file, or if it cannot be opened.
 Format format_of(const std::string& path) {
-  std::error_code no_status;
-  const auto status = std::filesystem::status(path, no_status);
-  if (!std::filesystem::exists(status)) {
-    throw InputError(path, "", "There is no such file.", "Give the name of an NPZ or HDF5 file.");
-  }
-  if (!std::filesystem::is_regular_file(status)) {
-    throw InputError(path, "", "This is not a file.", "Give the name of an NPZ or HDF5 file.");
-  }
+  require_regular_file(path);
   constexpr std::array<char, 8> kHdf5 = {'\x89', 'H', 'D', 'F', '\r', '\n', '\x1a', '\n'};
   std::array<char, 8> begin = {};
   std::ifstream stream;
@@ -178,12 +172,21 @@ void ArrayCollector::require_new(const std::string& name) const {
   }
 }
 
-void ArrayCollector::announce(const std::string& name, uint64_t bytes) {
-  require_new(name);
-  if (bytes > bytes_left()) {
+void ArrayCollector::require_sum(const std::string& name, uint64_t bytes) const {
+  if (bytes <= most_bytes()) return;
+  if (bytes > kMostArrayBytes) {
     throw InputError(file_, name, fmt::format("With this array there are more than {} bytes.", kMostArrayBytes),
                      "Write fewer frames or a smaller body.");
   }
+  throw InputError(file_, name,
+                   fmt::format("With this array a file of {} bytes becomes more than {}.", file_bytes_,
+                               bytes_text(most_inflated(file_bytes_))),
+                   "Write it without compression.");
+}
+
+void ArrayCollector::announce(const std::string& name, uint64_t bytes) {
+  require_new(name);
+  require_sum(name, bytes > kMostArrayBytes ? bytes : bytes_ + bytes);
   bytes_ += bytes;
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "model/arrays.h"
+#include "model/io/limits.h"
 
 namespace cutproof::io {
 
@@ -24,20 +25,14 @@ struct ArrayFile {
 // Null if there is none of that name.
 const std::string* find_text(const ArrayFile& contents, std::string_view name);
 
-// Limits of what is read: a damaged or a hostile file must not take the machine's memory.
-inline constexpr uint64_t kMostArrayBytes = uint64_t{4} << 30;  // of all arrays together, as they lie in memory
-inline constexpr std::size_t kMostArrays = 64;
-inline constexpr std::size_t kMostArrayAxes = 8;
-inline constexpr std::size_t kMostTextBytes = std::size_t{1} << 15;
-
 // Whether this path is to be read as a file of arrays, not as a recording: its name ends in ".npz", or there is a file
 // of exactly this name that is no part of a recording, while a recording of that name is not there.
 bool is_array_file(const std::string& path);
 
 // NPZ or HDF5, told apart by how the file begins. Truth values, int8 and uint8 become u8; other integers i32 where
 // every value fits, int64 i64 always; half precision becomes f32. Throws InputError, naming file, array, problem and
-// remedy, for anything that is not a file of arrays within the limits, before anything large is allocated. Texts of
-// HDF5 are string datasets or attributes of the root group.
+// remedy, for anything that is not a file of arrays within the limits (model/io/limits.h), before anything large is
+// allocated. Texts of HDF5 are string datasets or attributes of the root group.
 ArrayFile read_array_file(const std::string& path);
 
 // NPZ if the name ends in ".npz", else HDF5. The file is whole or not there, and the same for the same contents. Throws

@@ -1,10 +1,12 @@
 // What reading NPZ and HDF5 shares. Internal to model/io/.
 #pragma once
+#include <algorithm>
 #include <string>
 #include <vector>
 
 #include "model/error.h"
 #include "model/io/array_file.h"
+#include "model/io/limits.h"
 
 namespace cutproof::io {
 
@@ -23,17 +25,20 @@ Array array_of(std::string name, RawNumbers raw, const std::string& file);
 // Adds to what was read. Throws InputError if the name is taken, if it is no plain name, or if the limits are exceeded.
 class ArrayCollector {
  public:
-  explicit ArrayCollector(std::string file) : file_(std::move(file)) {}
+  ArrayCollector(std::string file, uint64_t file_bytes) : file_(std::move(file)), file_bytes_(file_bytes) {}
   // Before an array of that size is allocated.
   void announce(const std::string& name, uint64_t bytes);
   void add(const std::string& name, RawNumbers raw);
   void add(const std::string& name, const std::vector<std::string>& texts);
-  uint64_t bytes_left() const { return kMostArrayBytes - bytes_; }
+  // Throws InputError if a file of this size may not hold arrays of so many bytes in all.
+  void require_sum(const std::string& name, uint64_t bytes) const;
   ArrayFile take() { return std::move(contents_); }
 
  private:
   void require_new(const std::string& name) const;
+  uint64_t most_bytes() const { return std::min(kMostArrayBytes, most_inflated(file_bytes_)); }
   std::string file_;
+  uint64_t file_bytes_;
   ArrayFile contents_;
   uint64_t bytes_ = 0;
 };

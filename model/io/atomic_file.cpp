@@ -126,31 +126,4 @@ void write_text(const std::string& path, const std::string& text) {
   target.commit();
 }
 
-std::string read_text(const std::string& path) {
-  std::error_code ignored;
-  if (fs::is_directory(path, ignored)) {
-    throw InputError(path, "", "This is a folder, and a file is to be read.", "Give a file inside it.");
-  }
-  File file(std::fopen(path.c_str(), "rb"));
-  if (!file) {
-    const int error = errno;
-    if (error == ENOMEM) throw std::bad_alloc();
-    if (error == EMFILE || error == ENFILE) {
-      throw MachineError(fmt::format("{}: The file cannot be opened: {}.", path, reason(error)));
-    }
-    throw InputError(path, "", fmt::format("The file cannot be opened: {}.", reason(error)),
-                     "Check its name and its permissions.");
-  }
-  std::string text;
-  char block[1 << 16];
-  while (const std::size_t count = std::fread(block, 1, sizeof block, file.get())) text.append(block, count);
-  if (std::ferror(file.get()) != 0) {
-    const int error = errno;
-    if (error == ENOMEM) throw std::bad_alloc();
-    throw InputError(path, "", fmt::format("The file cannot be read to the end: {}.", reason(error)),
-                     "Check that the file is whole and its disk in order.");
-  }
-  return text;
-}
-
 }  // namespace cutproof::io

@@ -29,7 +29,5 @@ class AtomicFile {
 
 // Throws InputError if the folder is not there or not writable, MachineError if the disk fails.
 void write_text(const std::string& path, const std::string& text);
-// Throws InputError if it cannot be read, MachineError if the system has no file descriptor left.
-std::string read_text(const std::string& path);
 
 }  // namespace cutproof::io

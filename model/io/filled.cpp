@@ -5,6 +5,8 @@
 #include <regex>
 #include <sstream>
 
+#include "model/printable.h"
+
 namespace cutproof::io {
 
 namespace {
@@ -18,7 +20,7 @@ const nlohmann::json& value_at(const std::string& path, const nlohmann::json& va
 
 std::string figure(const nlohmann::json& value, double factor, const std::string& format) {
   if (value.is_null()) return "-";
-  if (value.is_string()) return value.get<std::string>();
+  if (value.is_string()) return printable(value.get_ref<const std::string&>());  // begins no line of its own
   if (format.empty()) return value.dump();
   return fmt::format(fmt::runtime("{" + format + "}"), factor * value.get<double>());
 }

@@ -5,6 +5,7 @@
 #include "model/io/array_parts.h"
 #include "model/io/atomic_file.h"
 #include "model/io/hdf5_file.h"
+#include "model/io/input_file.h"
 
 namespace cutproof::io {
 namespace {
@@ -20,13 +21,13 @@ RawKind kind_of(hdf5::ValueKind kind) {
 void collect_text(const hdf5::Values& values, const std::string& name, ArrayCollector& found) {
   if (values.shape().size() > 1) throw hdf5::Error(name, "A text is one string, or a list of them.");
   found.announce(name, values.bytes());
-  found.add(name, values.texts());
+  found.add(name, values.texts(kMostTextBytes));
 }
 
 void collect(const hdf5::File& file, ArrayCollector& found) {
   const hdf5::Id root = hdf5::open_group(file.id(), "/");
   for (const std::string& name : hdf5::names_in(root.get(), kMostArrays)) {
-    const hdf5::Values values = hdf5::Values::of_dataset(root.get(), name, found.bytes_left());
+    const hdf5::Values values = hdf5::Values::of_dataset(root.get(), name, kMostArrayBytes, file.bytes());
     if (values.kind() == hdf5::ValueKind::text) {
       collect_text(values, name, found);
       continue;
@@ -38,7 +39,7 @@ void collect(const hdf5::File& file, ArrayCollector& found) {
     found.add(name, std::move(raw));
   }
   for (const std::string& name : hdf5::attribute_names(root.get(), kMostArrays)) {
-    const hdf5::Values values = hdf5::Values::of_attribute(root.get(), name, kMostTextBytes);
+    const hdf5::Values values = hdf5::Values::of_attribute(root.get(), name, kMostTextBytes, file.bytes());
     if (values.kind() != hdf5::ValueKind::text) {
       throw hdf5::Error(name, "This attribute is no text. Numbers are read from datasets.");
     }
@@ -58,7 +59,7 @@ hdf5::Layout layout_of(const Array& array) {
 
 ArrayFile read_hdf5_arrays(const std::string& path) {
   const hdf5::Quiet quiet;
-  ArrayCollector found(path);
+  ArrayCollector found(path, require_regular_file(path));
   try {
     collect(hdf5::File::open(path), found);
   } catch (const hdf5::Error& error) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <cstring>
 #include <exception>
 #include <filesystem>
 #include <limits>
@@ -11,6 +12,8 @@
 #include <new>
 #include <string_view>
 #include <utility>
+
+#include "model/io/limits.h"
 
 #if defined(__has_feature)  // clang
 #if __has_feature(address_sanitizer)
@@ -141,6 +144,36 @@ std::vector<hsize_t> dimensions(const Id& space, const std::string& where) {
   return dims;
 }
 
+// Links may lead to other files, and round in circles. `name` may have several parts.
+void require_hard_links(hid_t parent, const std::string& name) {
+  for (std::size_t end = name.find('/', 1);; end = name.find('/', end + 1)) {
+    const std::string part = name.substr(0, end);
+    H5L_info_t link;
+    if (part == "/" || H5Lget_info(parent, part.c_str(), &link, H5P_DEFAULT) < 0) return;  // opening says what is wrong
+    if (link.type != H5L_TYPE_HARD) throw Error(name, "This is a link to something elsewhere.");
+    if (end == std::string::npos) return;
+  }
+}
+
+// That what a dataset holds lies in its file, and becomes what it is by HDF5 alone.
+void require_own_storage(const Id& creation, const std::string& name) {
+  if (H5Pget_layout(creation.get()) == H5D_VIRTUAL) {
+    throw Error(name, "This is a virtual dataset: its numbers lie in other files.");
+  }
+  if (H5Pget_external_count(creation.get()) > 0) throw Error(name, "Its numbers lie in other files.");
+  const int filters = H5Pget_nfilters(creation.get());
+  check(std::min(filters, 0), name);
+  for (int k = 0; k < filters; ++k) {
+    unsigned flags = 0, config = 0;
+    std::size_t parameters = 0;
+    const H5Z_filter_t filter =
+        H5Pget_filter2(creation.get(), static_cast<unsigned>(k), &flags, &parameters, nullptr, 0, nullptr, &config);
+    if (filter < 0 || filter > H5Z_FILTER_SCALEOFFSET) {
+      throw Error(name, fmt::format("It has been through filter {}, which is not one of HDF5's own.", filter));
+    }
+  }
+}
+
 bool is_type(const Id& type, const Layout& layout) { return H5Tequal(type.get(), type_of(layout).in_file()) > 0; }
 
 }  // namespace
@@ -157,6 +190,8 @@ Quiet::Quiet() {
   // Objects that could not be written stay open inside HDF5, and its clean-up at exit then crashes. We close what we
   // open, so there is nothing left for it to do. Counts only before the first call to the library.
   [[maybe_unused]] static const herr_t no_cleanup = H5dont_atexit();
+  // A file must not make us load code that knows its filters.
+  [[maybe_unused]] static const herr_t no_plugins = H5PLset_loading_state(0);
   H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }
@@ -164,6 +199,16 @@ Quiet::Quiet() {
 Quiet::~Quiet() { H5Eset_auto2(H5E_DEFAULT, function_, data_); }
 
 void release_memory() { reserve.reset(); }
+
+InflationBudget::InflationBudget(uint64_t file_bytes) : file_bytes_(file_bytes), left_(most_inflated(file_bytes)) {}
+
+void InflationBudget::take(const std::string& where, uint64_t bytes) {
+  if (bytes > left_) {
+    throw Error(where, fmt::format("With this, files of {} become more than {}.", bytes_text(file_bytes_),
+                                   bytes_text(most_inflated(file_bytes_))));
+  }
+  left_ -= bytes;
+}
 
 Id::Id(hid_t id, Close closer, const std::string& where) : id_(id), close_(closer) {
   if (id < 0) throw Error(where, fmt::format("HDF5 says: {}.", last_message()));
@@ -225,6 +270,7 @@ Id create_group(hid_t parent, const std::string& name) {
 
 Id open_group(hid_t parent, const std::string& name) {
   require_memory();
+  require_hard_links(parent, name);
   return Id(H5Gopen2(parent, name.c_str(), H5P_DEFAULT), H5Gclose, name);
 }
 
@@ -316,6 +362,7 @@ Table Table::create(hid_t parent, const std::string& name, const Layout& row, in
 
 Table Table::open(hid_t parent, const std::string& name, const Layout& row, uint64_t file_bytes) {
   require_memory();
+  require_hard_links(parent, name);
   Table table;
   table.id_ = Id(H5Dopen2(parent, name.c_str(), H5P_DEFAULT), H5Dclose, name);
   table.row_ = row;
@@ -327,6 +374,7 @@ Table Table::open(hid_t parent, const std::string& name, const Layout& row, uint
     throw Error(name, fmt::format("This dataset should hold rows of {}.", describe(row)));
   }
   const Id creation(H5Dget_create_plist(table.id_.get()), H5Pclose, name);
+  require_own_storage(creation, name);
   if (H5Pget_layout(creation.get()) == H5D_CHUNKED) {
     std::vector<hsize_t> chunk(dims.size());
     check(H5Pget_chunk(creation.get(), static_cast<int>(chunk.size()), chunk.data()), name);
@@ -462,21 +510,24 @@ void Values::look(Id type, const Id& space, uint64_t most_bytes) {
   type_ = std::move(type);
 }
 
-Values Values::of_attribute(hid_t object, const std::string& name, uint64_t most_bytes) {
+Values Values::of_attribute(hid_t object, const std::string& name, uint64_t most_bytes, uint64_t file_bytes) {
   require_memory();
   Values values;
   values.name_ = name;
+  values.file_bytes_ = file_bytes;
   values.id_ = Id(H5Aopen(object, name.c_str(), H5P_DEFAULT), H5Aclose, name);
   values.look(Id(H5Aget_type(values.id_.get()), H5Tclose, name), Id(H5Aget_space(values.id_.get()), H5Sclose, name),
               most_bytes);
   return values;
 }
 
-Values Values::of_dataset(hid_t parent, const std::string& name, uint64_t most_bytes) {
+Values Values::of_dataset(hid_t parent, const std::string& name, uint64_t most_bytes, uint64_t file_bytes) {
   require_memory();
   Values values;
   values.name_ = name;
+  values.file_bytes_ = file_bytes;
   values.is_dataset_ = true;
+  require_hard_links(parent, name);
   {
     const Id object(H5Oopen(parent, name.c_str(), H5P_DEFAULT), H5Oclose, name);
     if (H5Iget_type(object.get()) != H5I_DATASET) throw Error(name, "This is no dataset.");
@@ -486,19 +537,7 @@ Values Values::of_dataset(hid_t parent, const std::string& name, uint64_t most_b
   values.look(Id(H5Dget_type(id), H5Tclose, name), Id(H5Dget_space(id), H5Sclose, name), most_bytes);
   const Id creation(H5Dget_create_plist(id), H5Pclose, name);
   const H5D_layout_t layout = H5Pget_layout(creation.get());
-  if (layout == H5D_VIRTUAL) throw Error(name, "This is a virtual dataset: its numbers lie in other files.");
-  if (H5Pget_external_count(creation.get()) > 0) throw Error(name, "Its numbers lie in other files.");
-  const int filters = H5Pget_nfilters(creation.get());
-  check(std::min(filters, 0), name);
-  for (int k = 0; k < filters; ++k) {
-    unsigned flags = 0, config = 0;
-    std::size_t parameters = 0;
-    const H5Z_filter_t filter =
-        H5Pget_filter2(creation.get(), static_cast<unsigned>(k), &flags, &parameters, nullptr, 0, nullptr, &config);
-    if (filter < 0 || filter > H5Z_FILTER_SCALEOFFSET) {
-      throw Error(name, fmt::format("It has been through filter {}, which is not one of HDF5's own.", filter));
-    }
-  }
+  require_own_storage(creation, name);
   if (layout == H5D_CHUNKED) {
     std::vector<hsize_t> chunk(values.shape_.size());
     check(H5Pget_chunk(creation.get(), static_cast<int>(chunk.size()), chunk.data()), name);
@@ -511,7 +550,7 @@ Values Values::of_dataset(hid_t parent, const std::string& name, uint64_t most_b
     }
     values.chunk_bytes_ = bytes;
   }
-  const uint64_t stored = H5Dget_storage_size(id);
+  const uint64_t stored = std::min<uint64_t>(H5Dget_storage_size(id), file_bytes);
   if (values.bytes() / kMostCompression > stored || (values.bytes() > 0 && stored == 0)) {
     throw Error(name, fmt::format("It claims {} bytes, and {} are stored for it.", values.bytes(), stored));
   }
@@ -544,19 +583,33 @@ void Values::read(std::byte* values) const {
   transfer(type, values);
 }
 
-std::vector<std::string> Values::texts() const {
+std::vector<std::string> Values::texts(uint64_t most) const {
   std::size_t count = 1;
   for (const int64_t extent : shape_) count *= static_cast<std::size_t>(extent);
   std::vector<std::string> texts;
   if (count == 0) return texts;
+  const auto require_few = [&](uint64_t bytes) {
+    if (bytes > most) throw Error(name_, fmt::format("This text has {} bytes, more than {}.", bytes, most));
+  };
   if (H5Tis_variable_str(type_.get()) > 0) {
+    // Each may be as long as the file, and all of them the same bytes of it.
+    if (count > most_inflated(file_bytes_) / std::max<uint64_t>(file_bytes_, 1)) {
+      throw Error(name_, fmt::format("There are {} texts of variable length.", count));
+    }
+    require_memory(file_bytes_ * count);
     std::vector<char*> pointers(count, nullptr);
     transfer(type_.get(), pointers.data());
-    for (const char* const text : pointers) texts.emplace_back(text == nullptr ? "" : text);
+    uint64_t bytes = 0;
+    for (const char* const text : pointers) bytes += text == nullptr ? 0 : std::strlen(text);
+    if (bytes <= most) {
+      for (const char* const text : pointers) texts.emplace_back(text == nullptr ? "" : text);
+    }
     const Id space = simple_space({count}, name_);
     H5Dvlen_reclaim(type_.get(), space.get(), H5P_DEFAULT, pointers.data());
+    require_few(bytes);
     return texts;
   }
+  require_few(bytes());
   const auto each = static_cast<std::size_t>(bytes_each_);
   std::string all(count * each, '\0');
   transfer(type_.get(), all.data());

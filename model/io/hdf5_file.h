@@ -41,6 +41,19 @@ class Quiet {
   void* data_ = nullptr;
 };
 
+// What may still be read whole out of files of so many bytes: most_inflated() of them.
+class InflationBudget {
+ public:
+  InflationBudget() = default;
+  explicit InflationBudget(uint64_t file_bytes);
+  uint64_t file_bytes() const { return file_bytes_; }
+  // Throws Error, naming `where`, if no `bytes` are left.
+  void take(const std::string& where, uint64_t bytes);
+
+ private:
+  uint64_t file_bytes_ = 0, left_ = 0;
+};
+
 // Gives back the memory that is held for closing what is open. To be called before that is done, once nothing else will
 // be.
 void release_memory();
@@ -110,8 +123,8 @@ class File {
 };
 
 Id create_group(hid_t parent, const std::string& name);
-Id open_group(hid_t parent, const std::string& name);
-Id group_in(hid_t parent, const std::string& name);  // which is made if it is not there
+Id open_group(hid_t parent, const std::string& name);  // throws Error if a link on the way leads elsewhere
+Id group_in(hid_t parent, const std::string& name);    // which is made if it is not there
 bool has_attribute(hid_t object, const std::string& name);
 
 void write_attribute(hid_t object, const std::string& name, const Layout& layout, const void* value);
@@ -136,7 +149,8 @@ class Table {
   Table() = default;
   // `expected_rows`: how many will be written, or 0 for a table that grows.
   static Table create(hid_t parent, const std::string& name, const Layout& row, int64_t expected_rows = 0);
-  // Throws Error if it is missing, or of another type or shape, or claims more rows than `file_bytes` can hold.
+  // Throws Error if it is missing, or of another type or shape, or claims more rows than `file_bytes` can hold, or if
+  // its rows lie elsewhere: behind soft and external links, in other files, behind filters that are not HDF5's own.
   static Table open(hid_t parent, const std::string& name, const Layout& row, uint64_t file_bytes);
   int64_t rows() const { return rows_; }
   int64_t append(std::span<const std::byte> rows);  // whole ones; returns the index of the first new row
@@ -161,7 +175,7 @@ class Table {
 // ------------------------
 
 // Names of what lies in a group, ascending. Throws Error if there is more than `most`, or if a link leads elsewhere (a
-// soft or an external one).
+// soft or an external one, or one of a kind that somebody made up).
 std::vector<std::string> names_in(hid_t group, std::size_t most);
 std::vector<std::string> attribute_names(hid_t object, std::size_t most);
 
@@ -173,16 +187,16 @@ class Values {
   // Throws Error if it is neither number nor text, has more than 8 axes, leads to other files (external storage,
   // virtual datasets), has been through filters that are not HDF5's own, or claims more than `most_bytes`, or more than
   // can be stored in what the file has of it.
-  static Values of_dataset(hid_t parent, const std::string& name, uint64_t most_bytes);
-  static Values of_attribute(hid_t object, const std::string& name, uint64_t most_bytes);
+  static Values of_dataset(hid_t parent, const std::string& name, uint64_t most_bytes, uint64_t file_bytes);
+  static Values of_attribute(hid_t object, const std::string& name, uint64_t most_bytes, uint64_t file_bytes);
   ValueKind kind() const { return kind_; }
   int64_t bytes_each() const { return bytes_each_; }  // of a number: 1, 2, 4 or 8; a real: 4 or 8
   const std::vector<int64_t>& shape() const { return shape_; }
   uint64_t bytes() const;
   // Requires numbers, and room for bytes(). In the machine's own order of bytes.
   void read(std::byte* values) const;
-  // Requires text.
-  std::vector<std::string> texts() const;
+  // Requires text. Throws Error if there is more than `most` bytes of it.
+  std::vector<std::string> texts(uint64_t most) const;
 
  private:
   void look(Id type, const Id& space, uint64_t most_bytes);
@@ -195,6 +209,7 @@ class Values {
   int64_t bytes_each_ = 0;
   std::vector<int64_t> shape_;
   uint64_t chunk_bytes_ = 0;
+  uint64_t file_bytes_ = 0;
   std::string name_;
 };
 

@@ -2,53 +2,27 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <string_view>
 
+#include "model/printable.h"
+
 namespace cutproof::io {
 namespace {
-
-constexpr std::string_view kReplacement = "\xEF\xBF\xBD";  // U+FFFD
-
-struct Decoded {
-  uint32_t code = 0;
-  std::size_t bytes = 0;  // 0: no character of UTF-8 begins here
-};
-
-// The first character of `text`, which is not empty. Overlong forms and halves of surrogate pairs are none.
-Decoded first_character(std::string_view text) {
-  const auto byte = [&](std::size_t k) { return static_cast<uint32_t>(static_cast<unsigned char>(text[k])); };
-  const uint32_t lead = byte(0);
-  if (lead < 0x80) return {lead, 1};
-  const std::size_t count = lead >> 5 == 0x6 ? 2 : lead >> 4 == 0xE ? 3 : lead >> 3 == 0x1E ? 4 : 0;
-  if (count == 0 || count > text.size()) return {};
-  uint32_t code = lead & (0x7Fu >> count);
-  for (std::size_t k = 1; k < count; ++k) {
-    if (byte(k) >> 6 != 0x2) return {};
-    code = code << 6 | (byte(k) & 0x3F);
-  }
-  constexpr std::array<uint32_t, 5> kLeast = {0, 0, 0x80, 0x800, 0x10000};
-  if (code < kLeast[count] || code > 0x10FFFF || (code >= 0xD800 && code <= 0xDFFF)) return {};
-  return {code, count};
-}
-
-// XML 1.0, Char.
-bool is_allowed(uint32_t code) {
-  return code >= 0x20 ? code != 0xFFFE && code != 0xFFFF : code == '\t' || code == '\n' || code == '\r';
-}
 
 // For contents and for attributes: a reader of these turns tabs and line breaks into blanks unless they are written as
 // numbers, and everywhere "\r" into "\n".
 std::string escaped(std::string_view text, bool in_attribute) {
   std::string result;
   while (!text.empty()) {
-    const Decoded next = first_character(text);
+    const Character next = first_character(text);
     const std::string_view character = text.substr(0, next.bytes);
+    const char first = text[0];
     text.remove_prefix(next.bytes > 0 ? next.bytes : 1);
-    if (next.bytes == 0 || !is_allowed(next.code)) {
-      result += kReplacement;
+    const bool is_blank = first == '\t' || first == '\n' || first == '\r';
+    if (next.bytes == 0 || !(is_printable(next.code) || is_blank)) {  // much of which XML does not allow at all
+      escape_character(next, static_cast<unsigned char>(first), [&](std::string_view escape) { result += escape; });
     } else if (next.code == '&') {
       result += "&amp;";
     } else if (next.code == '<') {

@@ -14,6 +14,7 @@
 #include "model/at.h"
 #include "model/io/array_parts.h"
 #include "model/io/atomic_file.h"
+#include "model/io/input_file.h"
 
 namespace cutproof::io {
 namespace {
@@ -149,7 +150,7 @@ std::optional<NpyHeader> read_header(std::string_view text) {
 
 class NpzReader {
  public:
-  explicit NpzReader(const std::string& path) : path_(path), found_(path) {}
+  explicit NpzReader(const std::string& path) : path_(path), found_(path, require_regular_file(path)) {}
 
   ArrayFile read() {
     // libzip 1.7 says of some allocations that fail that this is no archive. So what it needs is asked for before, and
@@ -174,8 +175,7 @@ class NpzReader {
              "Write only those that are to be read.");
     }
     // The directory says how large everything is: what is too large is refused before any of it is inflated.
-    uint64_t bytes = 0;
-    for (zip_int64_t k = 0; k < count; ++k) bytes += size_of_entry(static_cast<zip_uint64_t>(k));
+    for (zip_int64_t k = 0; k < count; ++k) require_size_of_entry(static_cast<zip_uint64_t>(k));
     for (zip_int64_t k = 0; k < count; ++k) read_entry(static_cast<zip_uint64_t>(k));
     return found_.take();
   }
@@ -195,7 +195,7 @@ class NpzReader {
     return stat;
   }
 
-  uint64_t size_of_entry(zip_uint64_t index) {
+  void require_size_of_entry(zip_uint64_t index) {
     const zip_stat_t entry = stat(index);
     const std::string name = entry.name;
     if (entry.comp_method != ZIP_CM_STORE && entry.comp_method != ZIP_CM_DEFLATE) {
@@ -204,16 +204,12 @@ class NpzReader {
     if ((entry.valid & ZIP_STAT_ENCRYPTION_METHOD) != 0 && entry.encryption_method != ZIP_EM_NONE) {
       refuse(name, "It is encrypted.", kNpzRemedy);
     }
-    bytes_ += entry.size;
-    if (entry.size > kMostArrayBytes + kMostHeaderBytes || bytes_ > kMostArrayBytes + kMostArrays * kMostHeaderBytes) {
-      refuse(name, fmt::format("With this array there are more than {} bytes.", kMostArrayBytes),
-             "Write fewer frames or a smaller body.");
-    }
     if (entry.size / kMostDeflation > entry.comp_size + 1) {
       refuse(name, fmt::format("It claims {} bytes, and {} are stored for it.", entry.size, entry.comp_size),
              kNpzRemedy);
     }
-    return entry.size;
+    // Headers are small, so that these may be counted as arrays.
+    found_.require_sum(name, entry.size > kMostArrayBytes ? entry.size : bytes_ += entry.size);
   }
 
   void read_entry(zip_uint64_t index) {

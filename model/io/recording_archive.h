@@ -53,8 +53,9 @@ class WritingArchive {
 class ReadingArchive {
  public:
   static constexpr bool kReading = true;
-  ReadingArchive(hid_t group, std::string path, uint64_t file_bytes)
-      : group_(group), path_(std::move(path)), file_bytes_(file_bytes) {}
+  // `budget`: of all that is read whole.
+  ReadingArchive(hid_t group, std::string path, hdf5::InflationBudget& budget)
+      : group_(group), path_(std::move(path)), budget_(budget) {}
 
   template <class T>
   void operator()(const std::string& name, T& value) const {
@@ -72,7 +73,8 @@ class ReadingArchive {
         value = bit == 1;
       } else if constexpr (is_vector<T>) {
         const hdf5::Table table =
-            hdf5::Table::open(group_, name, hdf5::layout_of<typename T::value_type>(), file_bytes_);
+            hdf5::Table::open(group_, name, hdf5::layout_of<typename T::value_type>(), budget_.file_bytes());
+        budget_.take(name, static_cast<uint64_t>(table.rows()) * sizeof(typename T::value_type));
         value.resize(static_cast<std::size_t>(table.rows()));
         table.read(0, table.rows(), value.data());
       } else {
@@ -83,17 +85,18 @@ class ReadingArchive {
   void rows(const std::string& name, const hdf5::Layout& row, std::vector<std::byte>& bytes) const {
     const hdf5::Table stored = table(name, row);
     located(name, [&] {
+      budget_.take(name, static_cast<uint64_t>(stored.rows()) * row.bytes());
       bytes.resize(static_cast<std::size_t>(stored.rows()) * row.bytes());
       stored.read(0, stored.rows(), bytes.data());
     });
   }
   hdf5::Table table(const std::string& name, const hdf5::Layout& row) const {
-    return located(name, [&] { return hdf5::Table::open(group_, name, row, file_bytes_); });
+    return located(name, [&] { return hdf5::Table::open(group_, name, row, budget_.file_bytes()); });
   }
   template <class F>
   void group(const std::string& name, F&& fields) const {
     const hdf5::Id id = located(name, [&] { return hdf5::open_group(group_, name); });
-    ReadingArchive inner(id.get(), path_ + "/" + name, file_bytes_);
+    ReadingArchive inner(id.get(), path_ + "/" + name, budget_);
     fields(inner);
   }
 
@@ -109,7 +112,7 @@ class ReadingArchive {
 
   hid_t group_;
   std::string path_;
-  uint64_t file_bytes_;
+  hdf5::InflationBudget& budget_;
 };
 
 // What is read has to fit together; `field` is its full path. These throw hdf5::Error.

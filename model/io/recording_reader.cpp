@@ -15,6 +15,8 @@
 #include "model/at.h"
 #include "model/error.h"
 #include "model/io/hdf5_file.h"
+#include "model/io/input_file.h"
+#include "model/io/limits.h"
 #include "model/io/recording.h"
 #include "model/io/recording_archive.h"
 #include "model/io/recording_format.h"
@@ -30,16 +32,13 @@ constexpr const char* kRemedy =
 // A file of a recording, opened and recognised.
 hdf5::File open_part(const std::string& path, const char* kind) {
   std::error_code no_status;
-  const auto status = std::filesystem::status(path, no_status);
-  if (!std::filesystem::exists(status)) {
+  if (!std::filesystem::exists(path, no_status)) {
     const bool companion = std::string_view(kind) != kIndexKind;
     throw InputError(path, "", "There is no such file.",
                      companion ? "Keep the files of a recording (index, particles, skin) in one folder."
                                : "Give the name of a recording, with or without \".cutproof.h5\".");
   }
-  if (!std::filesystem::is_regular_file(status)) {
-    throw InputError(path, "", "This is not a file.", "Give the name of a recording.");
-  }
+  require_regular_file(path);
   constexpr std::array<char, 8> kSignature = {'\x89', 'H', 'D', 'F', '\r', '\n', '\x1a', '\n'};
   std::array<char, 8> begin = {};
   std::ifstream stream;
@@ -120,12 +119,13 @@ struct RecordingReader::File {
   struct Part {
     std::string path;
     hdf5::File file;
+    hdf5::InflationBudget* budget = nullptr;
 
     // Runs an action on what it holds.
     template <class F>
     void reading(F&& action) const {
       try {
-        action(ReadingArchive(file.id(), "", file.bytes()));
+        action(ReadingArchive(file.id(), "", *budget));
       } catch (const hdf5::Error& error) {
         throw InputError(path, error.where(), error.what(), kRemedy);
       }
@@ -133,10 +133,12 @@ struct RecordingReader::File {
   };
   void read_index(const ReadingArchive& root);
   void check_ranges() const;
+  void check_sizes() const;
   const Part& part_of(const RecordedField& recorded) const;
   int64_t count_in(IndexSpace space, std::size_t i) const;
 
   Part index, particles, skin;
+  hdf5::InflationBudget budget;
   uint64_t recording = 0;
   SnapshotColumns columns;
   std::vector<hdf5::Table> tables = std::vector<hdf5::Table>(recorded_fields().size());  // of rows and cells
@@ -145,9 +147,10 @@ struct RecordingReader::File {
 RecordingReader::File::File(const std::string& name) {
   const RecordingPaths paths = recording_paths(name);
   index_path = paths.index;
-  index = {paths.index, open_part(paths.index, kIndexKind)};
-  particles = {paths.particles, open_part(paths.particles, kParticlesKind)};
-  skin = {paths.skin, open_part(paths.skin, kSkinKind)};
+  index = {paths.index, open_part(paths.index, kIndexKind), &budget};
+  particles = {paths.particles, open_part(paths.particles, kParticlesKind), &budget};
+  skin = {paths.skin, open_part(paths.skin, kSkinKind), &budget};
+  budget = hdf5::InflationBudget(index.file.bytes() + particles.file.bytes() + skin.file.bytes());
   index.reading([&](const ReadingArchive& root) { read_index(root); });
   for (const Part* part : {&index, &particles, &skin}) {
     part->reading([&](const ReadingArchive& archive) {
@@ -170,7 +173,10 @@ RecordingReader::File::File(const std::string& name) {
       }
     });
   }
-  index.reading([&](const ReadingArchive&) { check_ranges(); });
+  index.reading([&](const ReadingArchive&) {
+    check_ranges();
+    check_sizes();
+  });
   header.snapshot_count = static_cast<int64_t>(columns.stage.size());
 }
 
@@ -182,7 +188,7 @@ void RecordingReader::File::read_index(const ReadingArchive& root) {
   header.scene_json.assign(scene.begin(), scene.end());
   int32_t format = 0;
   root("cutproof_format", format);
-  header.setup = read_setup(index.file.id(), index.file.bytes(), format);
+  header.setup = read_setup(index.file.id(), budget, format);
   double u = 0;
   root("unit_roundoff", u);
   header.precision = u == unit_roundoff(Precision::binary64) ? Precision::binary64 : Precision::binary32;
@@ -212,6 +218,9 @@ int64_t RecordingReader::File::count_in(IndexSpace space, std::size_t i) const {
 void RecordingReader::File::check_ranges() const {
   const std::size_t count = columns.stage.size();
   const std::string at = "/snapshots/";
+  if (count > static_cast<std::size_t>(kMostSnapshots)) {
+    throw hdf5::Error(at + "stage", fmt::format("There are {} snapshots, more than {}.", count, kMostSnapshots));
+  }
   if (!std::ranges::all_of(columns.stage, [](uint8_t s) { return s < kStages.size(); })) {
     throw hdf5::Error(at + "stage", "A stage is not one of 0 (step) to 5 (skin).");
   }
@@ -247,6 +256,18 @@ void RecordingReader::File::check_ranges() const {
   }
 }
 
+// A snapshot is read whole, too: each may be what the files may become.
+void RecordingReader::File::check_sizes() const {
+  for (std::size_t i = 0; i < columns.stage.size(); ++i) {
+    hdf5::InflationBudget of_snapshot(budget.file_bytes());
+    for (const RecordedField& recorded : recorded_fields()) {
+      if (recorded.storage != Storage::rows && recorded.storage != Storage::cells) continue;
+      of_snapshot.take("/snapshots/" + recorded.name() + "_row",
+                       static_cast<uint64_t>(count_in(recorded.field.space, i)) * recorded.entry.bytes());
+    }
+  }
+}
+
 Snapshot RecordingReader::File::snapshot(std::size_t i) const {
   Snapshot snapshot;
   snapshot.stage = static_cast<Stage>(columns.stage[i]);
@@ -254,7 +275,9 @@ Snapshot RecordingReader::File::snapshot(std::size_t i) const {
   state.precision = header.precision;
   for (std::size_t k = 0; k < tables.size(); ++k) {
     const RecordedField& recorded = recorded_fields()[k];
-    const auto& [values, index_column] = columns.fields[k];
+    // No structured binding: clang 14 does not capture these.
+    const std::vector<std::byte>& values = columns.fields[k].values;
+    const std::vector<int64_t>& index_column = columns.fields[k].index;
     if (recorded.storage == Storage::value || recorded.storage == Storage::list) {
       const bool is_list = recorded.storage == Storage::list;
       const int64_t first = is_list ? index_column[i] : static_cast<int64_t>(i);

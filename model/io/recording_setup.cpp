@@ -103,9 +103,9 @@ void write_setup(hid_t file, const Setup& setup) {
   root.group("setup", [&](auto& archive) { walk_setup(archive, setup, kFormatVersion); });
 }
 
-Setup read_setup(hid_t file, uint64_t file_bytes, int32_t format) {
+Setup read_setup(hid_t file, hdf5::InflationBudget& budget, int32_t format) {
   Setup setup;
-  const ReadingArchive root(file, "", file_bytes);
+  const ReadingArchive root(file, "", budget);
   root.group("setup", [&](auto& archive) { walk_setup(archive, setup, format); });
   return setup;
 }

@@ -11,6 +11,6 @@ namespace cutproof::io {
 // Both throw hdf5::Error; what is read is not yet checked by defect_of.
 void write_setup(hid_t file, const Setup& setup);
 // `format`: of the recording, which lacks what is newer (SetupField::since).
-Setup read_setup(hid_t file, uint64_t file_bytes, int32_t format);
+Setup read_setup(hid_t file, hdf5::InflationBudget& budget, int32_t format);
 
 }  // namespace cutproof::io

@@ -12,6 +12,7 @@
 #include <optional>
 #include <string_view>
 
+#include "model/io/limits.h"
 #include "model/scene.h"
 
 namespace cutproof::io {
@@ -42,6 +43,7 @@ struct SceneField {
   std::string_view doc;
   Bounds bounds = {};
   Presence presence = kOptional;
+  std::size_t most = 0;  // entries of a list, bytes of a text; of these all have a limit
 };
 
 // --- The fields ----------------------------------------------------------------------------------------------------
@@ -86,7 +88,8 @@ void describe(auto& v, Shape& s) {
     v.field(s.radius, {"radius", "Only for `ball`.", above(0, kLongest, "m")});
   }
   if (v.applies(made_of_parts)) {
-    v.field(s.parts, {"parts", "Further shapes. Only for `union` and `difference`; at least one."});
+    v.field(s.parts,
+            {"parts", "Further shapes. Only for `union` and `difference`; at least one.", {}, kOptional, kMostShapes});
   }
 }
 
@@ -94,7 +97,8 @@ void describe(auto& v, MeshSpec& s) {
   v.field(s.file, {"file",
                    "STL, OBJ, PLY or OFF file of a closed surface, relative to the folder of the scene's file.",
                    {},
-                   kRequired});
+                   kRequired,
+                   kMostPathBytes});
   v.field(s.unit, {"unit", "Metres per unit of the numbers in the mesh's file: 0.001 if they are millimetres.",
                    above(0, kLongest, "m"), kRequired});
   v.field(s.repair, {"repair",
@@ -201,7 +205,7 @@ void describe(auto& v, StrokeSpec& s) {
                     "the spot; `arc`: the circle through three points, from the first over the second to the third."});
   v.field(s.points,
           {"points", "Where the middle of the cutting edge goes; at least two points, for an arc exactly three.",
-           between(-1000, 1000, "box"), kRequired});
+           between(-1000, 1000, "box"), kRequired, kMostPoints});
   v.field(s.back,
           {"back", "Direction from the cutting edge to the back of the blade, in the body's frame (metric, not box).",
            between(-1e6, 1e6)});
@@ -232,7 +236,7 @@ void describe(auto& v, BladeSpec& s) {
            "substeps and every stroke whole frames; turning on the spot, the ends of the edge move this fast.",
            above(0, 1e9, "m/s")});
   v.field(s.start, {"start", "When the first stroke begins, rounded up to whole frames.", between(0, 1e6, "s")});
-  v.field(s.strokes, {"strokes", "The path, stroke by stroke; at least one.", {}, kRequired});
+  v.field(s.strokes, {"strokes", "The path, stroke by stroke; at least one.", {}, kRequired, kMostStrokes});
 }
 
 void describe(auto& v, Ground& s) {
@@ -262,7 +266,8 @@ void describe(auto& v, Expectations& s) {
   constexpr Bounds kCount = between(0, 1e15);
   v.field(s.components_after_stroke,
           {"components_after_stroke",
-           "Connected components of the tissue graph at the end of each stroke, one entry per stroke.", kCount});
+           "Connected components of the tissue graph at the end of each stroke, one entry per stroke.", kCount,
+           kOptional, kMostStrokes});
   v.field(s.components_at_end, {"components_at_end", "Connected components when the scene ends.", kCount});
   v.field(s.shells_at_end, {"shells_at_end", "Outer shells of the skin when the scene ends.", kCount});
   v.field(s.removed, {"removed", "Particles removed over the whole run.", kCount});
@@ -291,8 +296,8 @@ void describe(auto& v, FrameFields& s) {
 
 void describe(auto& v, Scene& s) {
   v.field(s.version, {"version", "Of this format: 3; 1 and 2 are read as ever.", between(1, kSceneVersion), kRequired});
-  v.field(s.name, {"name", "A short name, for reports."});
-  v.field(s.description, {"description", "What the scene shows, for people."});
+  v.field(s.name, {"name", "A short name, for reports.", {}, kOptional, kMostNameBytes});
+  v.field(s.description, {"description", "What the scene shows, for people.", {}, kOptional, kMostDescriptionBytes});
   v.field(s.seed, {"seed", "Of everything random.", between(0, 18446744073709551615.0)});
   v.field(s.body, {"body", "What is cut.", {}, kRequired});
   v.field(s.clusters, {"clusters", "How the body is covered with clusters."});
@@ -308,9 +313,9 @@ void describe(auto& v, Scene& s) {
   v.field(s.blade, {"blade", "The blade and its path. Absent: nothing is cut by a blade."});
   std::optional<Ground> ground;
   v.field(ground, {"ground", "The wall on which tissue lies: short for a wall with axis 2 and side +1."});
-  v.field(s.walls, {"walls", "Half-spaces that tissue cannot enter."});
+  v.field(s.walls, {"walls", "Half-spaces that tissue cannot enter.", {}, kOptional, kMostWalls});
   if (ground) s.walls.insert(s.walls.begin(), {2, +1, ground->offset, ground->friction});
-  v.field(s.grips, {"grips", "Regions that are held, and moved."});
+  v.field(s.grips, {"grips", "Regions that are held, and moved.", {}, kOptional, kMostGrips});
   v.field(s.expect, {"expect", "What `cutproof run --check` enforces; what is absent is not enforced."});
 }
 

@@ -5,13 +5,13 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
-#include <set>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "model/error.h"
-#include "model/io/atomic_file.h"
+#include "model/io/input_file.h"
+#include "model/io/json_reader.h"
 #include "model/io/scene_fields.h"
 #include "model/io/scene_io.h"
 #include "model/io/scene_text.h"
@@ -21,8 +21,7 @@ namespace {
 
 using nlohmann::json;
 
-// Shapes inside shapes: deeper than any person writes, shallower than what recursion could not bear.
-constexpr int kDeepest = 64;
+constexpr const char* kWhatASceneIs = "A scene is a JSON object; docs/reference/scene.md lists its fields.";
 
 std::string bounds_text(const Bounds& b) {
   const bool low = std::isfinite(b.low), high = std::isfinite(b.high);
@@ -34,111 +33,6 @@ std::string bounds_text(const Bounds& b) {
   }
   if (!b.unit.empty() && !text.empty()) text += fmt::format(" [{}]", b.unit);
   return text;
-}
-
-// --- From text to a JSON tree ----------------------------------------------------------------------------------------
-
-// Follows the parser, so that errors can say in which field they are, and refuses a field that is given twice (which
-// JSON libraries let pass, and then one of the two is lost).
-class PathTracker {
- public:
-  explicit PathTracker(std::string file) : file_(std::move(file)) {}
-
-  bool operator()(int, json::parse_event_t event, json& parsed) {
-    using Event = json::parse_event_t;
-    switch (event) {
-      case Event::object_start:
-      case Event::array_start:
-        next_entry();
-        levels_.push_back({event == Event::array_start, -1, "", {}});
-        break;
-      case Event::object_end:
-      case Event::array_end:
-        levels_.pop_back();
-        break;
-      case Event::key: {
-        Level& level = levels_.back();
-        level.key = parsed.get<std::string>();
-        if (!level.keys.insert(level.key).second) {
-          throw InputError(file_, path(), "This field is given twice.", "Keep one of the two.");
-        }
-        break;
-      }
-      case Event::value:
-        next_entry();
-        break;
-    }
-    return true;
-  }
-
-  std::string path() const {
-    std::string text;
-    for (const Level& level : levels_) {
-      if (level.list) {
-        if (level.index >= 0) text += fmt::format("[{}]", level.index);
-      } else if (!level.key.empty()) {
-        text = join(text, level.key);
-      }
-    }
-    return text;
-  }
-
- private:
-  struct Level {
-    bool list;
-    int64_t index;
-    std::string key;
-    std::set<std::string> keys;
-  };
-  void next_entry() {
-    if (!levels_.empty() && levels_.back().list) ++levels_.back().index;
-  }
-  std::string file_;
-  std::vector<Level> levels_;
-};
-
-std::string position_text(const std::string& text, std::size_t byte) {
-  const std::size_t end = std::min(byte == 0 ? 0 : byte - 1, text.size());
-  const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(end), '\n');
-  const std::size_t newline = end == 0 ? std::string::npos : text.rfind('\n', end - 1);
-  const std::size_t column = newline == std::string::npos ? end + 1 : end - newline;
-  return fmt::format("line {}, column {}", line, column);
-}
-
-// The sentence in a message of the library, without its number and position.
-std::string parser_message(const std::string& what) {
-  const std::size_t column = what.find("column ");
-  const std::size_t start = what.find(": ", column == std::string::npos ? 0 : column);
-  return start == std::string::npos ? what : what.substr(start + 2);
-}
-
-json parse_tree(const std::string& text, const std::string& name) {
-  if (text.find_first_not_of(" \t\r\n") == std::string::npos) {
-    throw InputError(name, "", "The file is empty.",
-                     "A scene is a JSON object; docs/reference/scene.md lists its fields.");
-  }
-  PathTracker tracker(name);
-  try {
-    return json::parse(text, std::ref(tracker));
-  } catch (const json::parse_error& error) {
-    const std::string message = parser_message(error.what());
-    std::string remedy = "Correct the JSON there: fields are \"name\": value, separated by commas, without comments.";
-    const std::size_t quoted = message.find("last read: ");
-    const std::string last = quoted == std::string::npos ? "" : message.substr(quoted);
-    if (last.find_first_of("NI") != std::string::npos || last.find("na'") != std::string::npos ||
-        last.find("inf") != std::string::npos) {
-      remedy = "If this is NaN or Infinity: neither is a value in JSON or in a scene. Give a finite number.";
-    }
-    throw InputError(name, position_text(text, error.byte), fmt::format("This is not valid JSON: {}.", message),
-                     remedy);
-  } catch (const json::out_of_range& error) {
-    const std::string what = error.what();
-    const std::size_t quote = what.find('\'');
-    throw InputError(name, tracker.path(),
-                     fmt::format("The number{} is out of range: no finite number is that large.",
-                                 quote == std::string::npos ? "" : " " + what.substr(quote)),
-                     "Give a finite number below 1e308.");
-  }
 }
 
 // --- Reading ---------------------------------------------------------------------------------------------------------
@@ -172,10 +66,9 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 struct Place {
   std::string file;
   std::string path;
-  int depth = 0;
 
-  Place inner(std::string_view name) const { return {file, join(path, name), depth + 1}; }
-  Place entry(std::size_t index) const { return {file, fmt::format("{}[{}]", path, index), depth + 1}; }
+  Place inner(std::string_view name) const { return {file, join(path, name)}; }
+  Place entry(std::size_t index) const { return {file, fmt::format("{}[{}]", path, index)}; }
   [[noreturn]] void fail(const std::string& problem, const std::string& remedy) const {
     throw InputError(file, path, problem, remedy);
   }
@@ -223,9 +116,14 @@ void read(const json& value, const Place& at, const SceneField&, bool& out) {
   out = value.get<bool>();
 }
 
-void read(const json& value, const Place& at, const SceneField&, std::string& out) {
+void read(const json& value, const Place& at, const SceneField& field, std::string& out) {
   require(value.is_string(), "A text", value, at, "Put it in quotation marks.");
-  out = value.get<std::string>();
+  const auto& text = value.get_ref<const std::string&>();
+  if (text.size() > field.most) {
+    at.fail(fmt::format("The text has {} bytes, more than {}.", text.size(), field.most), "Write a shorter one.");
+  }
+  if (text.find('\0') != std::string::npos) at.fail("The text holds a NUL.", "Write it without.");
+  out = text;
 }
 
 void read(const json& value, const Place& at, const SceneField& field, Vec3& out) {
@@ -283,6 +181,10 @@ void read(const json& value, const Place& at, const SceneField& field, std::opti
 template <class T>
 void read(const json& value, const Place& at, const SceneField& field, std::vector<T>& out) {
   require(value.is_array(), "A list", value, at, "Put the entries in square brackets.");
+  if (value.size() > field.most) {
+    at.fail(fmt::format("The list has {} entries, more than {}.", value.size(), field.most),
+            "Leave some out, or make several scenes of them.");
+  }
   out.clear();
   for (std::size_t i = 0; i < value.size(); ++i) read(value[i], at.entry(i), field, out.emplace_back());
 }
@@ -297,7 +199,17 @@ void check(const Shape& s, const Place& at) {
   }
 }
 
+std::size_t shapes_in(const Shape& shape) {
+  std::size_t count = 1;
+  for (const Shape& part : shape.parts) count += shapes_in(part);
+  return count;
+}
+
 void check(const BodySpec& s, const Place& at) {
+  if (s.shape && shapes_in(*s.shape) > kMostShapes) {
+    at.inner("shape").fail(fmt::format("There are {} shapes in it, more than {}.", shapes_in(*s.shape), kMostShapes),
+                           "Use fewer shapes, or give the body as a mesh.");
+  }
   if (s.shape.has_value() == s.mesh.has_value()) {
     at.fail(s.shape ? "Both shape and mesh are given." : "Neither shape nor mesh is given.",
             "Give exactly one of \"shape\" and \"mesh\".");
@@ -391,7 +303,6 @@ class Reader {
  public:
   Reader(const json& object, Place at) : object_(object), at_(std::move(at)) {
     require(object.is_object(), "An object", object, at_, "Put its fields in braces: {\"name\": value, ...}.");
-    if (at_.depth > kDeepest) at_.fail("Objects are nested too deeply.", "Nest at most 30 shapes.");
   }
 
   template <class T>
@@ -411,10 +322,12 @@ class Reader {
   void finish() const {
     for (const auto& [key, value] : object_.items()) {
       if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
-      const auto nearest = std::min_element(known_.begin(), known_.end(), [&given = key](auto a, auto b) {
+      // What is longer is no misspelt name, and would take long to compare.
+      const std::string given = key.substr(0, 64);
+      const auto nearest = std::min_element(known_.begin(), known_.end(), [&](auto a, auto b) {
         return edit_distance(given, a) < edit_distance(given, b);
       });
-      const bool near = edit_distance(key, *nearest) <= std::max<std::size_t>(2, nearest->size() / 2);
+      const bool near = edit_distance(given, *nearest) <= std::max<std::size_t>(2, nearest->size() / 2);
       at_.inner(key).fail(
           "This field is not known here.",
           fmt::format("{}Known here are: {}.", near ? fmt::format("Did you mean \"{}\"? ", *nearest) : "",
@@ -477,15 +390,17 @@ RemovedEnds default_remove(const json& tree, int32_t version) {
 }  // namespace
 
 Scene parse_scene(const std::string& text, const std::string& name) {
-  const json tree = parse_tree(text, name);
+  const json tree = parse_json(text, name, kSceneLimits, kWhatASceneIs);
   const int32_t version = require_version(tree, name);
   Scene scene;
   scene.step.acceleration = default_acceleration(tree, version);
   scene.detect.remove = default_remove(tree, version);
-  read(tree, Place{name, "", 0}, SceneField{}, scene);
+  read(tree, Place{name, ""}, SceneField{}, scene);
   return scene;
 }
 
-Scene read_scene(const std::string& path) { return parse_scene(read_text(path), path); }
+Scene read_scene(const std::string& path) {
+  return parse_scene(read_file(path, kSceneLimits.what, kSceneLimits.bytes), path);
+}
 
 }  // namespace cutproof::io

@@ -21,10 +21,6 @@ inline constexpr bool has_fields = requires(int& visitor, T& value) {
   describe(visitor, value);
 };
 
-inline std::string join(const std::string& path, std::string_view name) {
-  return path.empty() ? std::string(name) : fmt::format("{}.{}", path, name);
-}
-
 inline std::string number_text(double x) { return fmt::format("{}", x); }
 
 // The names of a choice, each in quotes.

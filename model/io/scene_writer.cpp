@@ -131,6 +131,14 @@ std::string interval_text(const Bounds& b) {
                      b.open_high ? ")" : "]");
 }
 
+// Of numbers an interval, of lists and texts how many entries or bytes.
+std::string limits_text(const SceneField& f, bool is_list) {
+  const std::string interval = interval_text(f.bounds);
+  if (f.most == 0) return interval;
+  return fmt::format("{}{}at most {} {}", interval, interval.empty() ? "" : "; ", f.most,
+                     is_list ? "entries" : "bytes");
+}
+
 // The table of one object, and below it those of the objects in it.
 template <class T>
 std::string section(const std::string& path, T& value);
@@ -142,7 +150,7 @@ class Documenter {
   template <class T>
   void field(T& value, const SceneField& f) {
     rows_ += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", f.name, type_name<T>(), f.bounds.unit,
-                         default_text(value, f), interval_text(f.bounds), f.doc);
+                         default_text(value, f), limits_text(f, is_vector<T>), f.doc);
     const std::string path = join(path_, f.name);
     if constexpr (has_fields<T>) {
       inner_ += "\n" + section(path, value);

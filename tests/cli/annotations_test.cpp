@@ -29,7 +29,7 @@ TEST(AnAnnotation, SaysWhatFailsAndHowToSeeItAgain) {
 
 TEST(AnAnnotation, EscapesWhatALineCannotHold) {
   EXPECT_EQ(annotation({"lockstep: 5 %, all", "100 %\r\nof: them, \x1B[31m", "cutproof run 'a\nb'"}),
-            "::error title=cutproof: lockstep%3A 5 %25%2C all::100 %25%0D%0Aof: them, ?[31m; see it again: "
+            "::error title=cutproof: lockstep%3A 5 %25%2C all::100 %25%0D%0Aof: them, \\x1b[31m; see it again: "
             "cutproof run 'a%0Ab'");
 }
 

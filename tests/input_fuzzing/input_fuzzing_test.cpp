@@ -108,7 +108,7 @@ TEST(InputFuzzingChecks, ARefusalWithoutARemedyBreaksTheContract) {
 TEST(InputFuzzingChecks, ARefusalShowsWhatItQuotesWithoutControlCharacters) {
   using namespace std::string_literals;
   const InputError error("a.json", "name", "is \"\0\x1b[2J\x7f é\""s, "Mend it.");
-  EXPECT_STREQ(error.what(), "a.json: name: is \"??[2J? é\"\n  remedy: Mend it.");
+  EXPECT_STREQ(error.what(), "a.json: name: is \"\\x00\\x1b[2J\\x7f é\"\n  remedy: Mend it.");
   EXPECT_EQ(outcome_of([&] { throw error; }), Outcome::refused);
 }
 

@@ -35,8 +35,8 @@ class ScratchFolder {
 }  // namespace
 
 std::span<const Target> all_targets() {
-  static const std::array<Target, 8> targets = {kScene, kStl, kObj, kPly, kOff, kRecording, kRecordingContents,
-                                                kArrays};
+  static const std::array<Target, 11> targets = {
+      kScene, kStl, kObj, kPly, kOff, kRecording, kRecordingContents, kArrays, kCounterexample, kCampaign, kQuestion};
   return targets;
 }
 

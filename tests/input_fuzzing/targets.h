@@ -43,7 +43,8 @@ template <class F>
 Outcome outcome_of(F&& action);
 
 // One for each reader, in files of their names.
-extern const Target kScene, kStl, kObj, kPly, kOff, kRecording, kRecordingContents, kArrays;
+extern const Target kScene, kStl, kObj, kPly, kOff, kRecording, kRecordingContents, kArrays, kCounterexample, kCampaign,
+    kQuestion;
 
 }  // namespace cutproof::input_fuzzing
 
@@ -61,8 +62,7 @@ Outcome outcome_of(F&& action) {
     if (error.file().empty() || message.find("\n  remedy: ") == std::string_view::npos) {
       broken_contract("a refusal names no file or no remedy: " + std::string(message));
     }
-    if (message != without_control_characters(std::string(message)))
-      broken_contract("a refusal has control characters");
+    if (message != printable_lines(message)) broken_contract("a refusal is not printable");
     return Outcome::refused;
   }
 }

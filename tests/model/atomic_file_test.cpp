@@ -19,6 +19,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+std::string read(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
 // A folder of its own for each test, removed afterwards.
 class AtomicFileTest : public ::testing::Test {
  protected:
@@ -38,7 +43,7 @@ class AtomicFileTest : public ::testing::Test {
 TEST_F(AtomicFileTest, WhatIsWrittenIsReadBackByteForByte) {
   const std::string text("line\r\n\0 zero, \xc3\xa9\n", 18);
   write_text(in_folder("a"), text);
-  EXPECT_EQ(read_text(in_folder("a")), text);
+  EXPECT_EQ(read(in_folder("a")), text);
   EXPECT_EQ(entries(), 1u) << "a temporary file was left behind";
 }
 
@@ -50,7 +55,7 @@ TEST_F(AtomicFileTest, NothingIsLeftWithoutACommit) {
     EXPECT_EQ(entries(), 2u);
   }
   EXPECT_EQ(entries(), 1u);
-  EXPECT_EQ(read_text(in_folder("a")), "old");
+  EXPECT_EQ(read(in_folder("a")), "old");
 }
 
 TEST_F(AtomicFileTest, NothingIsLeftWhereAProgramEndsWithoutUnwinding) {
@@ -61,7 +66,7 @@ TEST_F(AtomicFileTest, NothingIsLeftWhereAProgramEndsWithoutUnwinding) {
   finished.commit();
   AtomicFile::remove_unfinished();
   EXPECT_EQ(entries(), 1u);
-  EXPECT_EQ(read_text(in_folder("a")), "new");
+  EXPECT_EQ(read(in_folder("a")), "new");
 }
 
 TEST_F(AtomicFileTest, TheTemporaryNameLiesInTheSameFolderAndIsNeverUsedTwice) {
@@ -76,7 +81,7 @@ TEST_F(AtomicFileTest, ASymbolicLinkKeepsPointingAtTheFileThatIsReplaced) {
   fs::create_symlink("target", folder_ / "link");
   write_text(in_folder("link"), "new");
   EXPECT_TRUE(fs::is_symlink(fs::symlink_status(folder_ / "link")));
-  EXPECT_EQ(read_text(in_folder("target")), "new");
+  EXPECT_EQ(read(in_folder("target")), "new");
 }
 
 TEST_F(AtomicFileTest, AMissingFolderIsAnInputErrorThatNamesIt) {
@@ -96,22 +101,11 @@ TEST_F(AtomicFileTest, AFolderInPlaceOfAFileIsAnInputError) {
   EXPECT_THROW(write_text(folder_.string(), "text"), InputError);
   EXPECT_THROW(write_text(folder_.string() + "/", "text"), InputError);
   EXPECT_THROW(write_text("", "text"), InputError);
-  EXPECT_THROW(read_text(folder_.string()), InputError);
 }
 
 TEST_F(AtomicFileTest, AFileInPlaceOfTheFolderIsAnInputError) {
   write_text(in_folder("a"), "text");
   EXPECT_THROW(write_text(in_folder("a/b"), "text"), InputError);
-}
-
-TEST_F(AtomicFileTest, AMissingFileIsAnInputError) {
-  try {
-    read_text(in_folder("missing"));
-    FAIL() << "a file that is not there was read";
-  } catch (const InputError& error) {
-    EXPECT_EQ(error.file(), in_folder("missing"));
-    EXPECT_NE(std::string(error.what()).find("No such file"), std::string::npos) << error.what();
-  }
 }
 
 // These tests may run as root, for whom a file that is replaced by mistake is gone, devices included: so what cannot be
@@ -128,7 +122,7 @@ TEST_F(AtomicFileTest, AFullDiskIsAMachineErrorAndLeavesWhatWasThere) {
       write_text(in_folder("a"), std::string(bytes, 'x'));
     } catch (const MachineError& error) {
       const bool is_named = std::string(error.what()).find(in_folder("a")) != std::string::npos;
-      std::exit(is_named && entries() == 1 && read_text(in_folder("a")) == "old" ? 7 : 2);
+      std::exit(is_named && entries() == 1 && read(in_folder("a")) == "old" ? 7 : 2);
     }
     std::exit(1);
   };

@@ -70,16 +70,19 @@ TEST(Junit, ReplacesWhatXmlCannotHold) {
   using namespace std::string_literals;
   const struct {
     std::string text, read;
-  } all[] = {{"a\0b"s, R"(a\ufffdb)"},
-             {"\x01\x1B[31m\x1F", R"(\ufffd\ufffd[31m\ufffd)"},
-             {"\xEF\xBF\xBE\xEF\xBF\xBF\xEF\xBF\xBD", R"(\ufffd\ufffd\ufffd)"},  // U+FFFE, U+FFFF; U+FFFD as it is
-             {"\x80x", R"(\ufffdx)"},                                            // a byte that goes on
-             {"\xC3", R"(\ufffd)"},                                              // broken off
-             {"\xE2\x82<", R"(\ufffd\ufffd<)"},
-             {"\xC0\xAF", R"(\ufffd\ufffd)"},                      // "/" in two bytes
-             {"\xED\xA0\x80", R"(\ufffd\ufffd\ufffd)"},            // half of a pair
-             {"\xF4\x90\x80\x80", R"(\ufffd\ufffd\ufffd\ufffd)"},  // beyond U+10FFFF
-             {"\xFF", R"(\ufffd)"}};
+  } all[] = {{"a\0b"s, R"(a\\x00b)"},
+             {"\x01\x1B[31m\x1F", R"(\\x01\\x1b[31m\\x1f)"},
+             {"\xEF\xBF\xBE\xEF\xBF\xBF\xEF\xBF\xBD", R"(\\ufffe\\uffff\ufffd)"},  // U+FFFD stays as it is
+             {"\x80x", R"(\\x80x)"},                                               // a byte that goes on
+             {"\xC3", R"(\\xc3)"},                                                 // broken off
+             {"\xE2\x82<", R"(\\xe2\\x82<)"},
+             {"\xC0\xAF", R"(\\xc0\\xaf)"},                    // "/" in two bytes
+             {"\xED\xA0\x80", R"(\\xed\\xa0\\x80)"},           // half of a pair
+             {"\xF4\x90\x80\x80", R"(\\xf4\\x90\\x80\\x80)"},  // beyond U+10FFFF
+             {"\xC2\x9B"
+              "31m \xE2\x80\xAE",
+              R"(\\u009b31m \\u202e)"},  // C1, and a direction of reading
+             {"\xFF", R"(\\xff)"}};
   for (const auto& [text, expected] : all) {
     const std::string read = as_python_reads(junit_xml({{"s", 1, {{"n", "c", 0, JunitOutcome::failed, text, text}}}}));
     EXPECT_TRUE(has(read, "message='" + expected + "' '" + expected + "'")) << expected << " in " << read;

@@ -385,7 +385,8 @@ TEST_F(RecordingTest, GivesBackEachFieldOfASetupThatChangedAlone) {
     write_setup(file.id(), setup);
     file.close();
     const hdf5::File opened = hdf5::File::open(path("setup.h5"));
-    return bits_of(read_setup(opened.id(), opened.bytes(), kFormatVersion));
+    hdf5::InflationBudget budget(opened.bytes());
+    return bits_of(read_setup(opened.id(), budget, kFormatVersion));
   };
   // No body has both a grid and edges of its own, but each field is kept for itself.
   const Body bare = as_bare_graph(base.body);
@@ -863,7 +864,7 @@ TEST_F(RecordingTest, IsRefusedIfItIsNoneAtAll) {
   };
   refused("missing", "no such file");
   fs::create_directory(path("folder.cutproof.h5"));
-  refused("folder", "not a file");
+  refused("folder", "a folder");
   write_bytes(path("empty.cutproof.h5"), "");
   refused("empty", "empty");
   write_bytes(path("text.cutproof.h5"), "This is a text, and a rather long one.\n");

@@ -12,7 +12,8 @@
 #include <vector>
 
 #include "model/error.h"
-#include "model/io/atomic_file.h"
+#include "model/io/input_file.h"
+#include "model/io/limits.h"
 #include "model/io/scene_fields.h"
 #include "model/rules.h"
 #include "model/setup_fields.h"
@@ -755,8 +756,13 @@ TEST(SceneReference, NamesEveryFieldThatIsWritten) {
   visit(tree);
 }
 
+TEST(LimitsReference, IsThePageOfTheDocumentation) {
+  const std::string page = read_file(std::string(CUTPROOF_SOURCE_DIR) + "/docs/reference/limits.md", "A page", kMiB);
+  EXPECT_EQ(page, limits_reference()) << "Regenerate it: cutproof info --limits > docs/reference/limits.md";
+}
+
 TEST(SceneReference, IsThePageOfTheDocumentation) {
-  const std::string page = read_text(std::string(CUTPROOF_SOURCE_DIR) + "/docs/reference/scene.md");
+  const std::string page = read_file(std::string(CUTPROOF_SOURCE_DIR) + "/docs/reference/scene.md", "A page", kMiB);
   EXPECT_EQ(page, scene_reference()) << "Regenerate it: cutproof info --scene > docs/reference/scene.md";
 }
 

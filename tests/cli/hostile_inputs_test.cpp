@@ -1,0 +1,676 @@
+// What a hostile file, or an unlucky one, can do to the program: nothing. A table that anyone can extend: a row says
+// how to make the file "input" (or another that the arguments name), what is run, and what the error must say. Each run
+// must end by itself with exit status 2 and a remedy, must print nothing that acts on a terminal, write nothing, and
+// stay within kMostMemory. Time is measured by nobody; who takes kMostSeconds hangs.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "model/printable.h"
+
+namespace cutproof::tests {
+namespace {
+
+namespace files = std::filesystem;
+
+constexpr unsigned kMostSeconds = 60;
+constexpr long kMostMemory = 500 << 10;  // [KiB] resident, the program itself included
+
+// Every path here is in the folder of the test, which the run has as its own.
+struct Hostile {
+  const char* name;
+  std::function<void()> make;
+  const char* arguments;
+  std::vector<std::string> words;  // of the error
+};
+
+// Piece by piece, so that this process stays small: a child's memory is counted from that of its parent.
+class Writer {
+ public:
+  explicit Writer(const std::string& name = "input") : file_(name, std::ios::binary) {}
+  Writer& operator()(std::string_view text, std::size_t times = 1) {
+    for (; times > 0; --times) file_.write(text.data(), static_cast<std::streamsize>(text.size()));
+    return *this;
+  }
+
+ private:
+  std::ofstream file_;
+};
+
+std::function<void()> text(const std::string& content) {
+  return [content] { Writer()(content); };
+}
+// `before`, a piece many times, `after`.
+std::function<void()> repeated(const std::string& before, const std::string& piece, std::size_t times,
+                               const std::string& after) {
+  return [=] { Writer()(before)(piece, times)(after); };
+}
+// A scene whose body is a small box, but for what follows.
+const std::string kScene =
+    R"({"version": 2, "frame": {"count": 1}, "body": {"spacing": 0.02, "shape": {"kind": "box"}})";
+
+void run_shell(const std::string& command) {
+  if (std::system(command.c_str()) != 0) throw std::runtime_error(command);
+}
+// By Python, with numpy and h5py: the input is to be written as "input.npz" or "input.h5".
+std::function<void()> python(const std::string& program) {
+  return [program] {
+    Writer("make.py")("import numpy as np, h5py, zipfile, struct\n" + program);
+    run_shell("/usr/bin/python3 make.py");
+    files::remove("make.py");
+  };
+}
+// A recording, "input.cutproof.h5", whose index is then changed.
+std::function<void()> changed_recording(const std::string& program) {
+  return [program] {
+    Writer("scene.json")(kScene + "}");
+    run_shell("'" CUTPROOF_PROGRAM "' run scene.json --record input > /dev/null");
+    python("f = h5py.File('input.cutproof.h5', 'r+')\n" + program)();
+  };
+}
+void make_socket() {
+  const int made = socket(AF_UNIX, SOCK_STREAM, 0);
+  sockaddr_un address = {};
+  address.sun_family = AF_UNIX;
+  std::string("input").copy(address.sun_path, sizeof address.sun_path - 1);
+  if (bind(made, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) throw std::runtime_error("bind");
+  close(made);
+}
+void make_pipe() {
+  if (mkfifo("input", 0600) != 0) throw std::runtime_error("mkfifo");
+}
+std::function<void()> sparse(const std::string& name) {
+  return [name] {
+    Writer{name};
+    files::resize_file(name, uintmax_t{1} << 40);
+  };
+}
+void nothing() {}
+
+const std::vector<Hostile>& hostile_inputs() {
+  static const std::vector<Hostile> all = {
+      // --- What is no file
+      {"APipeForAScene", make_pipe, "run input", {"input", "a pipe"}},
+      {"ASocketForAScene", make_socket, "run input", {"a socket"}},
+      {"AFolderForAScene", [] { files::create_directory("input"); }, "run input", {"a folder"}},
+      {"ADeviceForAScene", nothing, "run /dev/zero", {"/dev/zero", "a device"}},
+      {"ATerminalForAScene", nothing, "run /dev/tty", {"/dev/tty"}},
+      {"NothingForAScene", nothing, "run input", {"no such file"}},
+      {"ALinkToNothing", [] { files::create_symlink("away", "input"); }, "run input", {"no such file"}},
+      {"ALinkToItself", [] { files::create_symlink("input", "input"); }, "run input", {"cannot be opened"}},
+      {"APipeForStandardInput", nothing, "run /dev/stdin", {"/dev/stdin", "a pipe"}},
+      {"AFileOfTheKernelWithoutASize", nothing, "run /proc/kallsyms", {"/proc/kallsyms"}},
+      {"APipeForACounterexample", make_pipe, "replay input", {"a pipe"}},
+      {"APipeForAResult", make_pipe, "fuzz --merge input", {"a pipe"}},
+      {"APipeForARecording",
+       [] {
+         make_pipe();
+         files::rename("input", "input.cutproof.h5");
+       },
+       "check input.cutproof.h5",
+       {"a pipe"}},
+      {"APipeForArrays",
+       [] {
+         make_pipe();
+         files::rename("input", "input.npz");
+       },
+       "check input.npz",
+       {"a pipe"}},
+      {"APipeForAKick",
+       [] {
+         make_pipe();
+         files::rename("input", "input.npz");
+       },
+       "kick input.npz",
+       {"a pipe"}},
+      {"APipeForVectors",
+       [] {
+         make_pipe();
+         files::rename("input", "input.npz");
+       },
+       "check-vectors input.npz input.npz",
+       {"a pipe"}},
+      {"APipeForAMesh",
+       [] {
+         make_pipe();
+         Writer("scene.json")(kScene + "}");
+       },
+       "run scene.json --mesh input",
+       {"a pipe"}},
+      {"APipeForAPlugin", make_pipe, "judge ./input", {"no file"}},
+      {"APipeToTune", make_pipe, "tune input --tolerance 1", {"a pipe"}},
+
+      // --- Scenes
+      {"ASceneOfATerabyte", sparse("input"), "run input", {"too large", "4 MiB"}},
+      {"AHundredMegabytesOfBrackets",
+       repeated("", std::string(1000, '['), 100'000, ""),
+       "run input",
+       {"too large", "4 MiB"}},
+      {"AMillionBrackets", repeated("", "[", 1'000'000, ""), "run input", {"nested too deeply", "64", "column 65"}},
+      {"AMillionBracketsInTune", repeated("", "[", 1'000'000, ""), "tune input --tolerance 1", {"nested too deeply"}},
+      {"AMillionObjects", repeated("", "{\"a\":", 500'000, ""), "run input", {"nested too deeply"}},
+      {"AMillionEmptyLists", repeated("[", "[],", 1'000'000, "[]]"), "run input", {"too many values", "200000"}},
+      {"AMillionFields",
+       [] {
+         Writer out;
+         out("{");
+         for (int k = 0; k < 400'000; ++k) out("\"" + std::to_string(k) + "\":0,");
+         out("\"a\":0}");
+       },
+       "run input",
+       {"too large"}},
+      {"SixMillionPointsOfAPath",
+       repeated(kScene + R"(,"blade":{"strokes":[{"points":[)", "[0,0,0],", 6'000'000, "[1,0,0]]}]}}"),
+       "run input",
+       {"too large"}},
+      {"FortyThousandPointsOfAPath",
+       repeated(kScene + R"(,"blade":{"strokes":[{"points":[)", "[0,0,0],", 40'000, "[1,0,0]]}]}}"),
+       "run input",
+       {"blade.strokes[0].points", "40001 entries", "10000"}},
+      {"TwoThousandStrokes",
+       repeated(kScene + R"(,"blade":{"strokes":[)", R"({"points":[[0,0,0],[1,0,0]]},)", 2000,
+                R"({"points":[[0,0,0],[1,0,0]]}]}})"),
+       "run input",
+       {"blade.strokes", "2001 entries"}},
+      {"AHundredThousandGrips",
+       repeated(kScene + R"(,"grips":[)", R"({"low":[0,0,0],"high":[1,1,1]},)", 100'000,
+                R"({"low":[0,0,0],"high":[1,1,1]}]})"),
+       "run input",
+       {"too many values"}},
+      {"AThousandGrips",
+       repeated(kScene + R"(,"grips":[)", R"({"low":[0,0,0],"high":[1,1,1]},)", 1000,
+                R"({"low":[0,0,0],"high":[1,1,1]}]})"),
+       "run input",
+       {"grips", "1001 entries", "100"}},
+      {"GripsOfTooManySubsteps",
+       [] {
+         Writer()(R"({"version": 2, "frame": {"count": 50000}, "step": {"substeps": 100},)")(
+             R"("body": {"spacing": 0.02, "shape": {"kind": "box"}}, "grips": [)")(
+             R"({"low":[0,0,0],"high":[1,1,1]},)", 9)(R"({"low":[0,0,0],"high":[1,1,1]}]})");
+       },
+       "run input",
+       {"grips", "10 grips", "Use at most 4 grips"}},
+      {"AThousandWalls",
+       repeated(kScene + R"(,"walls":[)", R"({"axis":0},)", 1000, R"({"axis":0}]})"),
+       "run input",
+       {"walls", "1001 entries"}},
+      {"AHundredThousandPartsOfAUnion",
+       repeated(R"({"version":2,"body":{"spacing":1,"shape":{"kind":"union","parts":[)", R"({"kind":"ball"},)", 100'000,
+                R"({"kind":"ball"}]}}})"),
+       "run input",
+       {"too many values"}},
+      {"AThousandPartsOfAUnion",
+       repeated(R"({"version":2,"body":{"spacing":1,"shape":{"kind":"union","parts":[)", R"({"kind":"ball"},)", 1000,
+                R"({"kind":"ball"}]}}})"),
+       "run input",
+       {"body.shape.parts", "1001 entries", "100"}},
+      {"ManyPartsOfManyUnions",
+       repeated(R"({"version":2,"body":{"spacing":1,"shape":{"kind":"union","parts":[)",
+                R"({"kind":"union","parts":[{"kind":"ball"},{"kind":"ball"},{"kind":"ball"}]},)", 50,
+                R"({"kind":"ball"}]}}})"),
+       "run input",
+       {"body.shape", "202 shapes", "100"}},
+      {"ATextOfFiftyMegabytes",
+       repeated(R"({"version":2,"description":")", std::string(1000, 'a'), 50'000, "\"}"),
+       "run input",
+       {"too large"}},
+      {"ATextOfThreeMegabytes",
+       repeated(R"({"version":2,"description":")", "abc", 1'000'000, "\"}"),
+       "run input",
+       {"description", "3000000 bytes", "10000"}},
+      {"AnUnknownFieldOfThreeMegabytes",
+       repeated(R"({"version":2,")", "abc", 1'000'000, "\":0}"),
+       "run input",
+       {"not known here", "more bytes"}},
+      {"AWordOfThreeMegabytes",
+       repeated(R"({"version":2,"body":)", "abc", 1'000'000, "}"),
+       "run input",
+       {"not valid JSON"}},
+      {"ANumberOfAMillionDigits",
+       repeated(R"({"version":2,"seed":)", "9", 1'000'000, "}"),
+       "run input",
+       {"out of range", "more bytes"}},
+      {"AFractionOfAMillionDigits",
+       repeated(R"({"version":2,"frame":{"length":0.)", "0", 1'000'000, "1}}"),
+       "run input",
+       {"frame.length", "out of bounds"}},
+      {"AnExponentOfAMillionDigits",
+       repeated(R"({"version":2,"frame":{"length":1e)", "9", 1'000'000, "}}"),
+       "run input",
+       {"out of range"}},
+      {"AFieldGivenTwice",
+       text(R"({"version":2,"body":{"spacing":1,"spacing":2}})"),
+       "run input",
+       {"body.spacing", "given twice"}},
+      {"BytesThatAreNoUtf8", text("{\"version\":2,\"name\":\"\xff\xfe\"}"), "run input", {"not valid JSON", "UTF-8"}},
+      {"HalfOfASurrogatePair", text(R"({"version":2,"name":"\ud800"})"), "run input", {"not valid JSON"}},
+      {"ANulInAName", text(kScene + R"(,"name":"a\u0000b"})"), "run input", {"name", "NUL"}},
+      {"AnEscapeInAField", text(R"({"version":2,"\u001b]0;owned\u0007":1})"), "run input", {R"(\x1b]0;owned\x07)"}},
+      {"AC1ControlInAField",
+       text("{\"version\":2,\"\xc2\x9b"
+            "31m\":1}"),
+       "run input",
+       {R"(\u009b31m)"}},
+      {"ADirectionOfReadingInAField",
+       text("{\"version\":2,\"\xe2\x80\xae"
+            "abc\":1}"),
+       "run input",
+       {R"(\u202eabc)"}},
+      {"ALineThatLooksLikeOurs",
+       text(R"({"version":2,"x\ncutproof: all hold":1})"),
+       "run input",
+       {R"(x\ncutproof: all hold)"}},
+      {"AnEscapeInAFileName", [] { Writer("\x1b[31minput")("{"); }, "run '\x1b[31minput'", {R"(\x1b[31minput)"}},
+      {"AFileNameThatIsNoUtf8", [] { Writer("caf\xe9")("{"); }, "run 'caf\xe9'", {R"(caf\xe9)"}},
+      {"ALineEndInAFileName", [] { Writer("two\nlines")("{"); }, "run 'two\nlines'", {R"(two\nlines)", "line end"}},
+      {"AnEscapeInAnOption", nothing, "run '--\x1b[31m'", {R"(\x1b[31m)"}},
+      {"AnEscapeInAVerb", nothing, "'\x1b[31mrun'", {}},
+
+      // --- Counterexamples, results of campaigns, questions
+      {"ACounterexampleOfATerabyte", sparse("input"), "replay input", {"too large", "8 MiB"}},
+      {"ACounterexampleOfBrackets", repeated("", "[", 1'000'000, ""), "replay input", {"nested too deeply"}},
+      {"ACounterexampleOfManyValues", repeated("[", "{},", 1'000'000, "0]"), "replay input", {"too many values"}},
+      {"ACounterexampleWithAFieldTwice", text(R"({"format":1,"format":2})"), "replay input", {"format", "given twice"}},
+      {"ACounterexampleThatIsNoJson", text("\x1b[2J"), "replay input", {"not valid JSON"}},
+      {"ADecisionFarAway",
+       text(R"({"format":"cutproof.counterexample","format_version":1,"backend":"","split":"","found":"","seed":1,)"
+            R"("index":0,"schedule":[[99999999,1]]})"),
+       "replay input",
+       {"schedule", "99999999"}},
+      {"AResultOfATerabyte", sparse("input"), "fuzz --merge input", {"too large", "64 MiB"}},
+      {"AResultOfBrackets", repeated("", "[", 1'000'000, ""), "fuzz --merge input", {"nested too deeply"}},
+      {"AResultOfManyValues", repeated("[", "{},", 3'000'000, "0]"), "fuzz --merge input", {"too many values"}},
+      {"AQuestionOfATerabyte", sparse("input"), "judge '" CUTPROOF_PLUGIN "' --case input", {"too large", "32 MiB"}},
+      {"AQuestionOfBrackets",
+       repeated("", "[", 1'000'000, ""),
+       "judge '" CUTPROOF_PLUGIN "' --case input",
+       {"nested too deeply"}},
+      {"AQuestionOfManyValues",
+       repeated("[", "{},", 3'000'000, "0]"),
+       "judge '" CUTPROOF_PLUGIN "' --case input",
+       {"too many values"}},
+      {"APluginThatIsNoUtf8",
+       [] { Writer("caf\xe9.so")("x"); },
+       "judge './caf\xe9.so'",
+       {R"(caf\xe9.so)", "not UTF-8"}},
+
+      // --- Meshes
+      {"AMeshOfATerabyte",
+       [] {
+         sparse("input.stl")();
+         Writer("scene.json")(kScene + "}");
+       },
+       "run scene.json --mesh input.stl",
+       {"too large", "256 MiB"}},
+      {"AnObjOfTwoMillionFacesAndMore",
+       [] {
+         Writer("input.obj")("v 0 0 0\nv 1 0 0\nv 0 1 0\n")("f 1 2 3\n", 2'000'002);
+         Writer("scene.json")(kScene + "}");
+       },
+       "run scene.json --mesh input.obj",
+       {"more than 2000000 faces"}},
+      {"AnObjOfTwoMillionVerticesAndMore",
+       [] {
+         Writer("input.obj")("v 0 0 0\n", 2'000'002);
+         Writer("scene.json")(kScene + "}");
+       },
+       "run scene.json --mesh input.obj",
+       {"more than 2000000 vertices"}},
+      {"AnOffThatPromisesMuch",
+       [] {
+         Writer("input.off")("OFF\n99999999999 99999999999 0\n");
+         Writer("scene.json")(kScene + "}");
+       },
+       "run scene.json --mesh input.off",
+       {"promises 99999999999 vertices"}},
+      {"APlyThatPromisesMuch",
+       [] {
+         Writer("input.ply")("ply\nformat ascii 1.0\nelement vertex 99999999999\nproperty float x\nproperty float y\n")(
+             "property float z\nelement face 9\nproperty list uchar int vertex_indices\nend_header\n");
+         Writer("scene.json")(kScene + "}");
+       },
+       "run scene.json --mesh input.ply",
+       {"cut off"}},
+      {"AFaceOfAMillionCorners",
+       [] {
+         Writer("input.obj")("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf")(" 1 2 3 4", 250'000)("\n");
+         Writer("scene.json")(kScene + "}");
+       },
+       "run scene.json --mesh input.obj",
+       {"corners"}},
+      {"AnEscapeInAMesh",
+       [] {
+         Writer("input.obj")("\x1b[31mv 0 0 0\n");
+         Writer("scene.json")(kScene + "}");
+       },
+       "run scene.json --mesh input.obj",
+       {"input.obj"}},
+
+      // --- Files of arrays
+      {"ANpzThatInflates",
+       python("with zipfile.ZipFile('input.npz', 'w', zipfile.ZIP_DEFLATED) as z, z.open('x.npy', 'w') as f:\n"
+              "  f.write(np.lib.format.magic(1, 0) + struct.pack('<H', 118) + "
+              "b\"{'descr': '<f8', 'fortran_order': False, 'shape': (39321600,), }\".ljust(118))\n"
+              "  for k in range(300): f.write(bytes(1 << 20))\n"),
+       "check input.npz",
+       {"x.npy", "becomes more than"}},
+      {"ManyArraysThatInflate",
+       python("with zipfile.ZipFile('input.npz', 'w', zipfile.ZIP_DEFLATED) as z:\n"
+              "  for n in range(30):\n"
+              "    with z.open(f'x{n}.npy', 'w') as f:\n"
+              "      for k in range(10): f.write(bytes(1 << 20))\n"),
+       "check input.npz",
+       {"becomes more than"}},
+      {"AnNpzOfManyFiles",
+       python("with zipfile.ZipFile('input.npz', 'w') as z:\n"
+              "  for n in range(60000): z.writestr(f'{n}.npy', b'')\n"),
+       "check input.npz",
+       {"60000 arrays"}},
+      {"AnHdf5FileThatInflates",
+       python("with h5py.File('input.h5', 'w') as f:\n"
+              "  x = f.create_dataset('x', (39321600,), 'f8', chunks=(131072,), compression='gzip')\n"
+              "  for k in range(300): x[k * 131072:(k + 1) * 131072] = 0\n"),
+       "check input.h5",
+       {"x", "more than"}},
+      {"AnHdf5FileOfNothing",
+       python("with h5py.File('input.h5', 'w') as f: f.create_dataset('x', (1 << 28,), 'f8', chunks=(1 << 16,))\n"),
+       "check input.h5",
+       {"x"}},
+      {"AnHdf5LinkToAnotherFile",
+       python("with h5py.File('input.h5', 'w') as f: f['x'] = h5py.ExternalLink('/etc/passwd', '/x')\n"),
+       "check input.h5",
+       {"x", "link"}},
+      {"AnHdf5LinkToItself",
+       python("with h5py.File('input.h5', 'w') as f: f['x'] = h5py.SoftLink('/x')\n"),
+       "check input.h5",
+       {"x", "link"}},
+      {"AnHdf5FileWhoseNumbersLieElsewhere",
+       python("with h5py.File('input.h5', 'w') as f:\n"
+              "  f.create_dataset('x', (6,), 'f8', external=[('/etc/passwd', 0, 48)])\n"),
+       "check input.h5",
+       {"x", "other files"}},
+      {"AVirtualDataset",
+       python("with h5py.File('input.h5', 'w') as f:\n"
+              "  v = h5py.VirtualLayout((6,), 'f8')\n  v[:] = h5py.VirtualSource('/etc/passwd', 'x', (6,))\n"
+              "  f.create_virtual_dataset('x', v)\n"),
+       "check input.h5",
+       {"x", "virtual"}},
+      {"AFilterOfSomebody",
+       python("with h5py.File('input.h5', 'w') as f:\n"
+              "  p = h5py.h5p.create(h5py.h5p.DATASET_CREATE)\n  p.set_chunk((6,))\n"
+              "  p.set_filter(32015, h5py.h5z.FLAG_OPTIONAL)\n"
+              "  d = h5py.h5d.create(f.id, b'x', h5py.h5t.IEEE_F64LE, h5py.h5s.create_simple((6,)), p)\n"
+              "  d.write(h5py.h5s.ALL, h5py.h5s.ALL, np.zeros(6))\n"),
+       "check input.h5",
+       {"filter 32015"}},
+      {"AnEscapeInTheNameOfAnArray",
+       python("with h5py.File('input.h5', 'w') as f: f['\\x1b[31m/a'] = np.zeros(3)\n"),
+       "check input.h5",
+       {R"(\x1b[31m)"}},
+      {"AnArrayWhoseNameIsNoUtf8",
+       python("with h5py.File('input.h5', 'w') as f: f.create_group(b'caf\\xe9')\n"),
+       "check input.h5",
+       {R"(caf\xe9)"}},
+
+      // --- Recordings
+      {"ARecordingThatInflates",
+       changed_recording("del f['setup/body/mass']\n"
+                         "x = f.create_dataset('setup/body/mass', (39321600,), 'f8', chunks=(131072,), "
+                         "maxshape=(None,), compression='gzip')\n"
+                         "for k in range(300): x[k * 131072:(k + 1) * 131072] = 1\n"),
+       "check input",
+       {"setup/body/mass", "become more than"}},
+      {"ARecordingThatClaimsMuch",
+       changed_recording("f['setup/body/mass'].resize((1 << 40,))\n"),
+       "check input",
+       {"setup/body/mass", "claims"}},
+      {"ARecordingWithALinkToAnotherFile",
+       changed_recording("del f['setup/body/mass']\nf['setup/body/mass'] = h5py.ExternalLink('/etc/passwd', '/x')\n"),
+       "check input",
+       {"setup/body/mass", "link"}},
+      {"ARecordingWithALinkToItself",
+       changed_recording("del f['setup']\nf['setup'] = h5py.SoftLink('/setup')\n"),
+       "check input",
+       {"setup", "link"}},
+      {"ARecordingWithAGroupElsewhere",
+       changed_recording("del f['snapshots']\nf['snapshots'] = h5py.ExternalLink('/etc/passwd', '/')\n"),
+       "digest input",
+       {"snapshots", "link"}},
+      {"ARecordingWhoseNumbersLieElsewhere",
+       changed_recording("n = f['setup/body/mass'].shape\ndel f['setup/body/mass']\n"
+                         "f.create_dataset('setup/body/mass', n, 'f8', external=[('/dev/zero', 0, 8 * n[0])])\n"),
+       "check input",
+       {"setup/body/mass", "other files"}},
+      {"ARecordingOfVirtualDatasets",
+       changed_recording("n = f['setup/body/mass'].shape\ndel f['setup/body/mass']\n"
+                         "v = h5py.VirtualLayout(n, 'f8')\nv[:] = h5py.VirtualSource('/etc/passwd', 'x', n)\n"
+                         "f.create_virtual_dataset('setup/body/mass', v)\n"),
+       "check input",
+       {"setup/body/mass", "virtual"}},
+      {"ARecordingThroughAFilterOfSomebody",
+       changed_recording("n = f['setup/body/mass'].shape\ndel f['setup/body/mass']\n"
+                         "p = h5py.h5p.create(h5py.h5p.DATASET_CREATE)\np.set_chunk((6,))\n"
+                         "p.set_filter(32015, h5py.h5z.FLAG_OPTIONAL)\n"
+                         "h5py.h5d.create(f['setup/body'].id, b'mass', h5py.h5t.IEEE_F64LE, "
+                         "h5py.h5s.create_simple(n), p)\n"),
+       "check input",
+       {"setup/body/mass", "filter 32015"}},
+      {"ARecordingWhoseSceneIsNested",
+       changed_recording("del f['scene']\nf.create_dataset('scene', data=np.full(300000, ord('['), 'u1'))\n"),
+       "check input",
+       {"its scene", "nested too deeply"}},
+  };
+  return all;
+}
+
+struct Outcome {
+  int status = -1;  // 128 + signal if it was killed
+  long memory = 0;  // [KiB]
+  std::string output;
+};
+
+Outcome run(const std::string& arguments) {
+  int ends[2];
+  if (pipe(ends) != 0) throw std::runtime_error("pipe");
+  const std::string command = "exec '" CUTPROOF_PROGRAM "' " + arguments;
+  const pid_t child = fork();
+  if (child == 0) {
+    // Standard input is a pipe that nobody writes to: who reads it, hangs.
+    int unwritten[2];
+    if (pipe(unwritten) != 0 || dup2(unwritten[0], 0) < 0 || dup2(ends[1], 1) < 0 || dup2(ends[1], 2) < 0) _exit(126);
+    close(ends[0]);
+    alarm(kMostSeconds);
+    execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
+    _exit(127);
+  }
+  close(ends[1]);
+  Outcome outcome;
+  std::array<char, 4096> block;
+  for (ssize_t n; (n = read(ends[0], block.data(), block.size())) > 0;) {
+    outcome.output.append(block.data(), static_cast<std::size_t>(n));
+  }
+  close(ends[0]);
+  int status = 0;
+  rusage usage = {};
+  if (child < 0 || wait4(child, &status, 0, &usage) != child) throw std::runtime_error("wait4");
+  outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  outcome.memory = usage.ru_maxrss;
+  return outcome;
+}
+
+bool with_sanitizers() { return std::string_view(CUTPROOF_SANITIZERS) != ""; }
+
+// The folder of a test, in which it runs.
+class Folder {
+ public:
+  Folder() : before_(files::current_path()) {
+    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+    std::string name = std::string(test->name()) + "." + std::to_string(getpid());
+    for (char& c : name) c = c == '/' ? '_' : c;
+    path_ = files::temp_directory_path() / ("cutproof." + name);
+    files::create_directories(path_);
+    files::current_path(path_);
+  }
+  ~Folder() {
+    files::current_path(before_);
+    files::remove_all(path_);
+  }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  static std::set<std::string> listing() {
+    std::set<std::string> names;
+    for (const auto& entry : files::directory_iterator(".")) names.insert(entry.path().filename().string());
+    return names;
+  }
+
+ private:
+  files::path before_, path_;
+};
+
+std::string contents(const std::string& name) {
+  std::ifstream file(name, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+class HostileInput : public testing::TestWithParam<Hostile> {
+ protected:
+  Folder folder_;
+};
+
+TEST_P(HostileInput, IsRefusedWithARemedy) {
+  GetParam().make();
+  const std::set<std::string> before = Folder::listing();
+  const Outcome outcome = run(GetParam().arguments);
+  const std::string shown = shortened(outcome.output, 2000);
+  EXPECT_EQ(outcome.status, 2) << shown;
+  for (const std::string& word : GetParam().words) {
+    EXPECT_NE(outcome.output.find(word), std::string::npos) << "no '" << word << "' in:\n" << shown;
+  }
+  EXPECT_EQ(outcome.output, printable_lines(outcome.output));
+  EXPECT_LT(outcome.output.size(), 10'000u);
+  // Usage is explained by CLI11, in its own words.
+  if (outcome.output.find("cutproof: ") == 0) {
+    EXPECT_NE(outcome.output.find("\n  remedy: "), std::string::npos) << shown;
+  }
+  if (!with_sanitizers()) {
+    EXPECT_LT(outcome.memory, kMostMemory) << shown;
+  }
+  EXPECT_EQ(Folder::listing(), before) << "something was written";
+}
+
+INSTANTIATE_TEST_SUITE_P(Table, HostileInput, testing::ValuesIn(hostile_inputs()),
+                         [](const auto& row) { return std::string(row.param.name); });
+
+// --- Names that are no UTF-8, or would act on a terminal, where everything else is as it should be
+
+class HostileName : public testing::TestWithParam<std::string> {
+ protected:
+  Folder folder_;
+};
+
+std::string in_quotes(const std::string& name) { return "'" + name + "'"; }
+
+TEST_P(HostileName, WorksForWhatIsReadAndWritten) {
+  const std::string name = GetParam();
+  files::create_directory(name);
+  const std::string in = name + "/" + name;
+  Writer(in + ".json")(kScene + R"(, "name": "\u001b[31ma\u009b\u202e\n:", "description": "one\nall is well"})");
+  const auto expect = [&](const std::string& arguments, int status) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.status, status) << arguments << "\n" << outcome.output;
+    EXPECT_EQ(outcome.output, printable_lines(outcome.output)) << arguments;
+    EXPECT_EQ(outcome.output.find("\nall is well"), std::string::npos) << outcome.output;
+    return outcome.output;
+  };
+  const auto expect_json = [&](const std::string& file) {
+    const std::string written = contents(file);
+    EXPECT_TRUE(nlohmann::json::accept(written)) << file << ": " << shortened(written, 1000);
+    EXPECT_EQ(written, printable_lines(written)) << file;
+    return nlohmann::json::parse(written, nullptr, false);
+  };
+  const std::string ran = expect("run " + in_quotes(in + ".json") + " --check --json " + in_quotes(in + ".run.json") +
+                                     " --junit " + in_quotes(in + ".xml") + " --record " + in_quotes(in),
+                                 0);
+  EXPECT_NE(ran.find(printable(in)), std::string::npos) << ran;
+  expect_json(in + ".run.json");
+  const std::string junit = contents(in + ".xml");
+  EXPECT_EQ(junit, printable_lines(junit));
+  EXPECT_NE(junit.find("testcase"), std::string::npos);
+
+  const std::string checked = expect("check " + in_quotes(in) + " --json " + in_quotes(in + ".check.json"), 0);
+  EXPECT_NE(checked.find(printable(in)), std::string::npos) << checked;
+  EXPECT_EQ(expect_json(in + ".check.json").at("source"), is_utf8(in) ? in : printable(in));
+  expect("digest " + in_quotes(in), 0);
+
+  expect("fuzz --backend reference --cases 3 --sizes 0-3 --save " + in_quotes(name) + " --json " +
+             in_quotes(in + ".fuzz.json"),
+         0);
+  expect_json(in + ".fuzz.json");
+  expect("fuzz --merge " + in_quotes(in + ".fuzz.json") + " --json " + in_quotes(in + ".merged.json"), 0);
+  expect_json(in + ".merged.json");
+
+  files::copy_file(CUTPROOF_SOURCE "/fixtures/regressions/pair_on_a_wall.json", in + ".case.json");
+  expect("replay --backend reference " + in_quotes(in + ".case.json") + " --record " + in_quotes(in + ".replayed"), 0);
+  expect("digest " + in_quotes(in + ".replayed"), 0);
+
+  // A cube as a mesh; the body takes the file's name.
+  Writer(in + ".off")("OFF 8 6 12\n0 0 0\n9 0 0\n9 9 0\n0 9 0\n0 0 9\n9 0 9\n9 9 9\n0 9 9\n")(
+      "4 3 2 1 0\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n");
+  Writer("scene.json")(R"({"version": 2, "frame": {"count": 1}, "body": {"particles": 64, "shape": {"kind": "box"}}})");
+  expect("run scene.json --mesh " + in_quotes(in + ".off") + " --record " + in_quotes(in + ".meshed") + " --json " +
+             in_quotes(in + ".mesh.json"),
+         0);
+  EXPECT_EQ(expect_json(in + ".mesh.json").at("body").at("name"), printable(name + ".off"));
+  expect("check " + in_quotes(in + ".meshed"), 0);
+
+  expect("vectors split -o " + in_quotes(in + ".npz"), 0);
+  expect("check " + in_quotes(in + ".npz"), 2);  // no state
+  expect("tune " + in_quotes(in + ".json") +
+             " --tolerance 100 --frames 1 --backend host --reference substeps --write " +
+             in_quotes(in + ".tuned.json") + " --json " + in_quotes(in + ".tune.json"),
+         0);
+  expect_json(in + ".tune.json");
+}
+
+std::string label_of(const testing::TestParamInfo<std::string>& name) {
+  constexpr std::array kLabels = {"NoUtf8", "Escapes", "DirectionAndC1", "Plain"};
+  return kLabels[name.index];
+}
+INSTANTIATE_TEST_SUITE_P(Names, HostileName,
+                         testing::Values("caf\xe9", "\x1b[31mred\x1b[0m", "\xe2\x80\xaenames\xc2\x9b", "plain"),
+                         label_of);
+
+// The command that shows a failure again is one that a shell takes.
+TEST(ACommandToBeGivenAgain, IsOneForSuchNamesToo) {
+  const Folder folder;
+  const std::string name = "caf\xe9 it's \x1b[1m";
+  Writer{name}(kScene + R"(, "expect": {"particles": 1}})");
+  setenv("GITHUB_ACTIONS", "true", 1);
+  const Outcome outcome = run("run \"" + name + "\" --check");
+  unsetenv("GITHUB_ACTIONS");
+  EXPECT_EQ(outcome.status, 1) << outcome.output;
+  EXPECT_EQ(outcome.output, printable_lines(outcome.output));
+  EXPECT_NE(outcome.output.find(R"($'caf\xe9 it\'s \x1b[1m')"), std::string::npos) << outcome.output;
+  Writer("again.sh")(R"(exec ')" CUTPROOF_PROGRAM R"(' run $'caf\xe9 it\'s \x1b[1m' --check > again.txt)");
+  EXPECT_EQ(WEXITSTATUS(std::system("bash again.sh")), 1);
+  EXPECT_NE(contents("again.txt").find("particles"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace cutproof::tests
