@@ -882,6 +882,17 @@ std::string to_json(const Case& c) { return nlohmann::json(c).dump(); }
 
 namespace {
 
+// Nodes of the grid in the box around them, each axis of which is within 2^20: the product fits.
+int64_t cells_around(const std::vector<Node>& nodes) {
+  int64_t cells = 1;
+  for (std::size_t axis = 0; axis < 3 && !nodes.empty(); ++axis) {
+    const auto [low, high] = std::minmax_element(nodes.begin(), nodes.end(),
+                                                 [&](const Node& a, const Node& b) { return a[axis] < b[axis]; });
+    cells *= int64_t{(*high)[axis]} - (*low)[axis] + 1;
+  }
+  return cells;
+}
+
 // Throws std::invalid_argument for numbers that no case can have.
 void require_sane(const Case& c) {
   const auto require = [](bool holds, const char* field, const char* what) {
@@ -902,6 +913,7 @@ void require_sane(const Case& c) {
   require_few(c.strokes, io::kMostStrokes, "strokes");
   require_few(c.walls, io::kMostWalls, "walls");
   require_few(c.grips, io::kMostGrips, "grips");
+  require(cells_around(c.nodes) <= io::kMostCaseCells, "nodes", "nearer to each other");
   require(c.spacing > 0 && c.spacing <= 1e6, "spacing", "in (0, 1e6]");
   require(c.side >= 1, "side", ">= 1");
   require(c.seed_spacing >= 1, "seed_spacing", ">= 1");

@@ -51,7 +51,7 @@ void require_regular(const std::string& path, const struct stat& status) {
   if (S_ISDIR(status.st_mode)) refuse("This is a folder, and a file is to be read.", "Give a file inside it.");
   if (S_ISFIFO(status.st_mode)) {
     refuse("This is a pipe, and a file is to be read.",
-           "Write what comes through it into a file first; of a shell, not <(...) and not | but > FILE.");
+           "Write what comes through it into a file first: COMMAND > FILE, not <(COMMAND) and not COMMAND |.");
   }
   if (S_ISSOCK(status.st_mode)) refuse("This is a socket, and a file is to be read.", "Give the name of a file.");
   refuse("This is a device, and a file is to be read.", "Give the name of a file.");

@@ -74,6 +74,7 @@ std::string limits_reference() {
   text +=
       row("", "particles, commands, decisions of a schedule",
           fmt::format("{}, {}, {}", count_text(kMostCaseNodes), count_text(kMostCommands), count_text(kMostDecisions)));
+  text += row("", "grid nodes of the box around the particles", count_text(kMostCaseCells));
   text += json_rows(kCampaignLimits, "`fuzz --merge`");
   text += row("", "properties", count_text(kMostProperties));
   text += json_rows(kQuestionLimits, "`judge --case`");

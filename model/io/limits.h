@@ -37,6 +37,7 @@ inline constexpr uint64_t kMostGripSubsteps = 20'000'000;  // a grip has 25 byte
 
 // Of a counterexample.
 inline constexpr std::size_t kMostCaseNodes = 100'000;
+inline constexpr int64_t kMostCaseCells = 10'000'000;  // of the box around them
 inline constexpr std::size_t kMostCommands = 10'000;
 inline constexpr std::size_t kMostDecisions = 10'000'000;  // of a schedule
 

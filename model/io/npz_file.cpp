@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <limits>
 #include <memory>
 #include <new>
@@ -145,6 +146,32 @@ std::optional<NpyHeader> read_header(std::string_view text) {
   return header;
 }
 
+// How many files an archive says at its end that it has; nothing if it has no such end, of which libzip says more.
+// libzip takes seconds for a directory of hundreds of thousands before it says how many they are.
+std::optional<uint64_t> count_of_archive(const std::string& path, uint64_t file_bytes) {
+  constexpr uint64_t kEnd = 22, kLongestComment = 65535, kLocator = 20;
+  const uint64_t bytes = std::min(file_bytes, kEnd + kLongestComment + kLocator);
+  std::string tail(bytes, '\0');
+  std::ifstream file(path, std::ios::binary);
+  const auto read_at = [&](uint64_t at, char* to, uint64_t size) {
+    file.seekg(static_cast<std::streamoff>(at));
+    file.read(to, static_cast<std::streamsize>(size));
+    return file.good();
+  };
+  if (bytes < kEnd || !read_at(file_bytes - bytes, tail.data(), bytes)) return std::nullopt;
+  const std::size_t end = tail.rfind("PK\x05\x06", bytes - kEnd);
+  if (end == std::string::npos) return std::nullopt;
+  uint16_t count = 0;
+  std::memcpy(&count, tail.data() + end + 10, sizeof count);
+  if (count != 0xFFFF) return count;
+  // More than that, or a large archive: a further end says it, and a locator before this end where that lies.
+  if (end < kLocator || tail.compare(end - kLocator, 4, "PK\x06\x07") != 0) return count;
+  uint64_t at = 0, large_count = 0;
+  std::memcpy(&at, tail.data() + end - kLocator + 8, sizeof at);
+  if (at > file_bytes || !read_at(at + 32, reinterpret_cast<char*>(&large_count), sizeof large_count)) return count;
+  return large_count;
+}
+
 // --- Reading
 // -------------------------------------------------------------------------------------------------------------
 
@@ -153,6 +180,7 @@ class NpzReader {
   explicit NpzReader(const std::string& path) : path_(path), found_(path, require_regular_file(path)) {}
 
   ArrayFile read() {
+    require_few(count_of_archive(path_, require_regular_file(path_)).value_or(0));
     // libzip 1.7 says of some allocations that fail that this is no archive. So what it needs is asked for before, and
     // what it says is believed when it says it twice.
     int code = 0;
@@ -170,10 +198,7 @@ class NpzReader {
       refuse("", fmt::format("The archive cannot be read: {}.", why), kNpzRemedy);
     }
     const zip_int64_t count = zip_get_num_entries(archive_.get(), 0);
-    if (count > static_cast<zip_int64_t>(kMostArrays)) {
-      refuse("", fmt::format("There are {} arrays, more than {}.", count, kMostArrays),
-             "Write only those that are to be read.");
-    }
+    require_few(static_cast<uint64_t>(count));
     // The directory says how large everything is: what is too large is refused before any of it is inflated.
     for (zip_int64_t k = 0; k < count; ++k) require_size_of_entry(static_cast<zip_uint64_t>(k));
     for (zip_int64_t k = 0; k < count; ++k) read_entry(static_cast<zip_uint64_t>(k));
@@ -183,6 +208,12 @@ class NpzReader {
  private:
   [[noreturn]] void refuse(const std::string& name, const std::string& problem, const std::string& remedy) const {
     throw InputError(path_, name, problem, remedy);
+  }
+
+  void require_few(uint64_t count) const {
+    if (count <= kMostArrays) return;
+    refuse("", fmt::format("There are {} arrays, more than {}.", count, kMostArrays),
+           "Write only those that are to be read.");
   }
 
   zip_stat_t stat(zip_uint64_t index) {

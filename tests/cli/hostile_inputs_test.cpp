@@ -111,9 +111,9 @@ const std::vector<Hostile>& hostile_inputs() {
       {"AFolderForAScene", [] { files::create_directory("input"); }, "run input", {"a folder"}},
       {"ADeviceForAScene", nothing, "run /dev/zero", {"/dev/zero", "a device"}},
       {"ATerminalForAScene", nothing, "run /dev/tty", {"/dev/tty"}},
-      {"NothingForAScene", nothing, "run input", {"no such file"}},
-      {"ALinkToNothing", [] { files::create_symlink("away", "input"); }, "run input", {"no such file"}},
-      {"ALinkToItself", [] { files::create_symlink("input", "input"); }, "run input", {"cannot be opened"}},
+      {"NothingForAScene", nothing, "run ./input", {"no such file"}},
+      {"ALinkToNothing", [] { files::create_symlink("away", "input"); }, "run ./input", {"no such file"}},
+      {"ALinkToItself", [] { files::create_symlink("input", "input"); }, "run ./input", {"cannot be opened"}},
       {"APipeForStandardInput", nothing, "run /dev/stdin", {"/dev/stdin", "a pipe"}},
       {"AFileOfTheKernelWithoutASize", nothing, "run /proc/kallsyms", {"/proc/kallsyms"}},
       {"APipeForACounterexample", make_pipe, "replay input", {"a pipe"}},
@@ -293,6 +293,15 @@ const std::vector<Hostile>& hostile_inputs() {
             R"("index":0,"schedule":[[99999999,1]]})"),
        "replay input",
        {"schedule", "99999999"}},
+      {"ParticlesFarFromEachOther",
+       [] {
+         std::ifstream file(CUTPROOF_SOURCE "/fixtures/regressions/pair_on_a_wall.json");
+         nlohmann::json document = nlohmann::json::parse(file);
+         document["case"]["nodes"] = {{0, 0, 0}, {1 << 20, 1 << 20, 1 << 20}};
+         Writer()(document.dump());
+       },
+       "replay input",
+       {"case", "nodes"}},
       {"AResultOfATerabyte", sparse("input"), "fuzz --merge input", {"too large", "64 MiB"}},
       {"AResultOfBrackets", repeated("", "[", 1'000'000, ""), "fuzz --merge input", {"nested too deeply"}},
       {"AResultOfManyValues", repeated("[", "{},", 3'000'000, "0]"), "fuzz --merge input", {"too many values"}},
@@ -382,6 +391,18 @@ const std::vector<Hostile>& hostile_inputs() {
               "  for n in range(60000): z.writestr(f'{n}.npy', b'')\n"),
        "check input.npz",
        {"60000 arrays"}},
+      {"AnNpzOfVeryManyFiles",  // 46 bytes of directory each, after the same file
+       python("n = 500000\n"
+              "entry = b'PK\\1\\2' + bytes(24) + struct.pack('<H', 5) + bytes(16)\n"
+              "with open('input.npz', 'wb') as f:\n"
+              "  f.write(b'PK\\3\\4' + bytes(26) + entry[:0])\n"
+              "  for k in range(n): f.write(entry[:46] + b'a.npy')\n"
+              "  end = f.tell()\n"
+              "  f.write(b'PK\\6\\6' + struct.pack('<QHHIIQQQQ', 44, 45, 45, 0, 0, n, n, end - 30, 30))\n"
+              "  f.write(b'PK\\6\\7' + struct.pack('<IQI', 0, end, 1))\n"
+              "  f.write(b'PK\\5\\6' + struct.pack('<HHHHIIH', 0, 0, 65535, 65535, 2**32 - 1, 2**32 - 1, 0))\n"),
+       "check input.npz",
+       {"500000 arrays"}},
       {"AnHdf5FileThatInflates",
        python("with h5py.File('input.h5', 'w') as f:\n"
               "  x = f.create_dataset('x', (39321600,), 'f8', chunks=(131072,), compression='gzip')\n"
