@@ -42,10 +42,10 @@ too, and for `/dev/stdin` unless it is a file (`< scene.json`): write into a
 file first what comes through a pipe.
 
 **What is compressed** (recordings, NPZ, HDF5) is refused before it is inflated
-if it would become larger than the last two limits say. HDF5 files hold everything
-themselves: links to other files, soft links, data in other files (external
-storage, virtual datasets) and filters that are not HDF5's own are refused, and
-no filter is loaded.
+if it would become larger than the last two limits say. HDF5 files hold
+everything themselves: links to other files, soft links, data in other files
+(external storage, virtual datasets) and filters that are not HDF5's own are
+refused, and no filter is loaded.
 
 **Names.** A file may have any name, UTF-8 or not, without line ends, which are
 refused on the command line. Names of plugins (`judge FILE.so`, `--backend
