@@ -6,6 +6,8 @@
 #include <string_view>
 #include <utility>
 
+#include "cli/screen.h"
+#include "cli/terminal.h"
 #include "model/io/json_number.h"
 
 namespace cutproof::cli {
@@ -88,10 +90,11 @@ void print_lockstep(const harness::Lockstep& lockstep) {
     angle.join(frame.angle);
     undecidable.join(frame.undecidable);
   }
-  fmt::print("\nagainst the reference, lockstep, {} frames: errors of one frame\n", lockstep.frames().size());
-  fmt::print("{:<14} {:>11} {:>11} {:<5}\n", "", "greatest", "RMS", "unit");
+  say("\nagainst the reference, lockstep, {} frames: errors of one frame\n", lockstep.frames().size());
+  say("{:<14} {:>11} {:>11} {}\n", "", "greatest", "RMS", "unit");
   const auto row = [](std::string_view name, const ErrorNorm& norm, std::string_view unit) {
-    if (norm.count > 0) fmt::print("{:<14} {:>11.3g} {:>11.3g} {:<5}\n", name, norm.max, norm.rms(), unit);
+    if (norm.count > 0)
+      say("{:<14} {:>11.3g} {:>11.3g} {}\n", name, norm.max, norm.rms(), unit == "1" ? "relative" : unit);
   };
   for (std::size_t m = 0; m < oracles::kMeasures.size(); ++m) {
     const auto measure = static_cast<Measure>(m);
@@ -99,31 +102,29 @@ void print_lockstep(const harness::Lockstep& lockstep) {
     if (rotations) row(oracles::kMeasures[m].name, angle, "rad");
     row(rotations ? "" : oracles::kMeasures[m].name, lockstep.worst(measure).norm, oracles::kMeasures[m].unit);
   }
-  fmt::print("undecidable within rounding:\n");
-  fmt::print("{:>8} removals within the rounding band\n", undecidable.removals);
-  fmt::print("{:>8} decisions of steps that the reference takes otherwise\n", undecidable.otherwise);
-  fmt::print("{:>8} positions that rounding carries beyond the bound: not measured, but judged\n",
-             undecidable.positions);
-  fmt::print("{:>8} rotations, the same\n", undecidable.rotations);
-  fmt::print("{:>8} positions that rounding carries so far that they are not judged sharply\n", undecidable.undecided);
+  say("undecidable within rounding:\n");
+  say("{:>8} removals within the rounding band\n", undecidable.removals);
+  say("{:>8} decisions of steps that the reference takes otherwise\n", undecidable.otherwise);
+  say("{:>8} positions that rounding carries beyond the bound: not measured, but judged\n", undecidable.positions);
+  say("{:>8} rotations, the same\n", undecidable.rotations);
+  say("{:>8} positions that rounding carries so far that they are not judged sharply\n", undecidable.undecided);
 }
 
 void print_free_running(const harness::FreeRunning& run) {
-  fmt::print("\nagainst the reference, free-running: both run freely\n");
+  say("\nagainst the reference, free-running: both run freely\n");
   if (!run.frames().empty()) {
     const FreeFrame& last = run.frames().back();
-    fmt::print("positions in frame {}: greatest {:.3g} h, RMS {:.3g} h\n", last.frame, last.position.max,
-               last.position.rms());
+    say("positions in frame {}: greatest {:.3g} h, RMS {:.3g} h\n", last.frame, last.position.max, last.position.rms());
   }
   if (!run.first_difference()) {
-    fmt::print("no decision differs in {} frames\n", run.frames().size());
+    say("no decision differs in {} frames\n", run.frames().size());
     return;
   }
   const FirstDifference& first = *run.first_difference();
-  fmt::print("first difference: frame {}, {}: {}\n", first.frame, name_of(first.stage), first.what.text);
+  say("first difference: frame {}, {}: {}\n", first.frame, name_of(first.stage), first.what.text);
   if (first.margin) {
-    fmt::print("  margin {:.3g} h; positions are so far apart that up to {:.3g} h is {}\n", *first.margin, first.reach,
-               first.explained ? "explained" : "explained, and this is not");
+    say("  margin {:.3g} h; positions are so far apart that up to {:.3g} h is {}\n", *first.margin, first.reach,
+        first.explained ? "explained" : "explained, and this is not");
   }
 }
 
@@ -140,18 +141,10 @@ json to_json(const Against& against, const Setup& setup) {
   return result;
 }
 
-void print_against(const Against& against) {
+void print_against(const Against& against, const std::string& again) {
   if (against.lockstep) print_lockstep(*against.lockstep);
   if (against.free_running) print_free_running(*against.free_running);
-  fmt::print("\n");
-  for (const Verdict& verdict : against.verdicts()) {
-    fmt::print("{:<28} {:<8} {:.4g} {}, bound {:.4g} (frame {}, {})\n", verdict.property,
-               !verdict.holds         ? "FAILS"
-               : verdict.checked == 0 ? "vacuous"
-                                      : "holds",
-               verdict.measured, verdict.unit, verdict.bound, verdict.frame, name_of(verdict.stage));
-    if (!verdict.holds) fmt::print("  {}\n", verdict.witness.text);
-  }
+  print_verdicts(against.verdicts(), Shown{again});
 }
 
 }  // namespace cutproof::cli

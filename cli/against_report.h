@@ -1,6 +1,7 @@
 // `cutproof run --against reference`: how a comparison is printed and written (docs/reference/results_schema.md).
 #pragma once
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "harness/against.h"
 
@@ -12,6 +13,7 @@ nlohmann::json to_json(const harness::Against& against, const Setup& setup);
 nlohmann::json worst_json(const harness::Lockstep& lockstep);
 
 // The table, the verdicts and the first difference, for a person.
-void print_against(const harness::Against& against);
+// `again`: the command that shows it again.
+void print_against(const harness::Against& against, const std::string& again);
 
 }  // namespace cutproof::cli

@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -42,24 +43,35 @@ void add_suite(CLI::App& command, Work& work, const std::string& what, Suite sui
     work = [path, suite] {
       require_writable(*path);
       bool begun = false;
+      std::optional<Progress> progress;
       const nlohmann::json document = suite.run([&](const nlohmann::json& so_far) {
         if (std::exchange(begun, true)) {
           if (!so_far.contains("judging")) suite.row(so_far);
           write_document(*path, so_far);
         } else {
-          print_filled(kHead, so_far);
+          say_filled(kHead, so_far);
           suite.begin(so_far);
         }
         flush_output();
+        const auto rows_at_most = so_far.value("rows_at_most", int64_t{0});
+        if (rows_at_most == 0) return;
+        if (!progress) progress.emplace("row", rows_at_most);
+        const std::size_t measured = so_far.at(suite.rows).size() - (so_far.contains("judging") ? 1 : 0);
+        progress->show(static_cast<int64_t>(measured), "measuring");
       });
       if (document.at(suite.rows).empty()) {
-        fmt::print("FAILS: nothing was measured\n");
+        insist("{}: nothing was measured\n", failing("FAILS"));
         return 1;
       }
+      progress.reset();
       write_document(*path, document);
       suite.end(document);
-      if (!path->empty()) fmt::print("\nwrote {}\n", *path);
-      return document.value("holds", true) ? 0 : 1;
+      if (!path->empty()) say_copy("wrote", *path);
+      const bool holds = document.value("holds", true);
+      const std::size_t rows = document.at(suite.rows).size();
+      insist("measured: {} {}{}\n", rows, rows == 1 ? "row" : "rows",
+             holds ? "" : "; " + failing("NOT everything holds."));
+      return holds ? 0 : 1;
     };
   });
 }
@@ -85,7 +97,7 @@ void add_timing(CLI::App& command, benchmarks::TimingOptions& options) {
 
 void print_scene(const nlohmann::json& document) {
   const nlohmann::json& row = document.at("rows").back();
-  print_filled(
+  say_filled(
       "{scene}, acceleration {acceleration}, split {split}: {particles} particles, frame "
       "{1e3*seconds/frame/median:.4g} ms\n",
       row);
@@ -112,13 +124,13 @@ void print_scenes(const nlohmann::json& document, const std::vector<Column>& bes
       return benchmarks::in_words(row.at("error").at(what), "not measured");
     });
   }
-  fmt::print("\n{}", table_of(document.at("rows"), columns));
+  say_as_it_is("\n" + table_of(document.at("rows"), columns, 3));
 }
 
 void print_failures(const nlohmann::json& frame_error) {
   if (!frame_error.contains("failed")) return;
   for (const nlohmann::json& verdict : frame_error.at("failed")) {
-    print_filled("  FAILS: {property}: {witness/text}\n", verdict);
+    insist("  {}: {}\n", failing("FAILS"), io::filled("{property}: {witness/text}", verdict));
   }
 }
 

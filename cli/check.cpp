@@ -8,8 +8,11 @@
 #include "cli/findings.h"
 #include "cli/options.h"
 #include "cli/output.h"
+#include "cli/progress.h"
 #include "cli/results.h"
+#include "cli/screen.h"
 #include "cli/terminal.h"
+#include "fixtures/reach.h"
 #include "harness/recorded_run.h"
 #include "harness/scene_judge.h"
 #include "model/io/array_file.h"
@@ -39,10 +42,13 @@ int check_recording(const CheckOptions& options) {
   require_writable(options.junit);
 
   const auto initial = std::make_shared<const State>(reader.snapshot(0).state);
-  fmt::print("recording {}: scene {}, backend {}, {} snapshots of {} particles\n", options.recording,
-             scene.name.empty() ? "(none)" : printable(scene.name), printable(recording.backend),
-             recording.snapshot_count, recording.setup.body.particle_count());
-  harness::SceneJudge judge(recording.setup, scene.expect, recording.backend, initial, depth);
+  say("recording {}: scene {}, backend {}, {} snapshots of {} particles\n", options.recording,
+      scene.name.empty() ? "(none)" : printable(scene.name), printable(recording.backend), recording.snapshot_count,
+      recording.setup.body.particle_count());
+  const bool is_cut_short =
+      !recording.scene_json.empty() && fixtures::stops_early(scene, options.recording, recording.setup);
+  harness::SceneJudge judge(recording.setup, scene.expect, recording.backend, initial, depth, {},
+                            is_cut_short ? harness::Extent::cut_short : harness::Extent::whole);
   RunResult result{"check", options.recording,    recording.backend,
                    scene,   recording.setup.body, initial->clusters.count()};
   {
@@ -65,8 +71,9 @@ int check_recording(const CheckOptions& options) {
                         options.again};
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
   write_junit(options.junit, judging, seconds.count(), cases_of(judge, judging));
-  print_verdicts(judge);
-  if (!options.json.empty()) fmt::print("wrote {}\n", options.json);
+  print_verdicts(judge, options.again);
+  if (!options.json.empty()) say_copy("wrote", options.json);
+  print_conclusion(judge);
   print_annotations(failures_of(judge.verdicts(), judging,
                                 [&](const Verdict& verdict) { return judge.is_expected_failure(verdict); }));
   return judge.holds() ? 0 : 1;

@@ -8,6 +8,7 @@
 #include "cli/commands.h"
 #include "cli/findings.h"
 #include "cli/output.h"
+#include "cli/screen.h"
 #include "cli/terminal.h"
 #include "harness/foreign_judge.h"
 #include "model/io/array_file.h"
@@ -63,16 +64,17 @@ int check_state(const std::string& file, const StateReports& reports) {
     skipped.message = "not judged: " + each.why;
   }
   write_junit(reports.junit, judging, 0, std::move(cases));
-  fmt::print("state {}: {} particles in {} clusters, {}\n", file, foreign.state.x.size(),
-             foreign.state.clusters.count(), foreign.given.contains("nodes") ? "on a grid" : "as a graph");
-  print_single_verdicts(judged.verdicts);
-  fmt::print("\n");
-  for (const harness::NotJudged& each : judged.not_judged) {
-    fmt::print("not judged: {}: {}\n", each.property, each.why);
-  }
-  for (const std::string& note : judged.notes) fmt::print("\nnote: {}\n", note);
-  print_whether_all_hold(judged.verdicts);
-  if (!reports.json.empty()) fmt::print("wrote {}\n", reports.json);
+  say("state {}: {} particles in {} clusters, {}\n", file, foreign.state.x.size(), foreign.state.clusters.count(),
+      foreign.given.contains("nodes") ? "on a grid" : "as a graph");
+  Shown shown{reports.again};
+  shown.in_frames = false;
+  print_verdicts(judged.verdicts, shown);
+  std::vector<std::pair<std::string, std::string>> not_judged;
+  for (const harness::NotJudged& each : judged.not_judged) not_judged.emplace_back(each.property, each.why);
+  print_grouped(undecided("Not judged"), not_judged);
+  print_notes(judged.notes);
+  if (!reports.json.empty()) say_copy("wrote", reports.json);
+  print_conclusion(judged.verdicts, shown, "what was judged holds.");
   print_annotations(failures_of(judged.verdicts, judging));
   return judged.holds() ? 0 : 1;
 }

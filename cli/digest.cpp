@@ -8,6 +8,7 @@
 
 #include "cli/commands.h"
 #include "cli/options.h"
+#include "cli/screen.h"
 #include "model/io/recording.h"
 
 namespace cutproof::cli {
@@ -20,11 +21,11 @@ int print_digests(const std::string& recording) {
   for (int64_t i = 0; i < reader.header().snapshot_count; ++i) {
     const io::Snapshot snapshot = reader.snapshot(i);
     const uint64_t value = digest(snapshot.state);
-    fmt::print("{:016x}  snapshot {}, {}, frame {}\n", value, i, i == 0 ? "start" : name_of(snapshot.stage),
-               snapshot.state.frame - (i > 0 && snapshot.stage == Stage::skin ? 1 : 0));
+    say("{:016x}  snapshot {}, {}, frame {}\n", value, i, i == 0 ? "start" : name_of(snapshot.stage),
+        snapshot.state.frame - (i > 0 && snapshot.stage == Stage::skin ? 1 : 0));
     all.add(value);
   }
-  fmt::print("{:016x}  all {} snapshots\n", all.value(), reader.header().snapshot_count);
+  insist("{:016x}  all {} snapshots\n", all.value(), reader.header().snapshot_count);
   return 0;
 }
 

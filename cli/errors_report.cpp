@@ -7,9 +7,11 @@
 #include <sstream>
 
 #include "cli/against_report.h"
-#include "cli/terminal.h"
+#include "cli/screen.h"
 #include "harness/geometry_json.h"
 #include "model/error.h"
+#include "model/io/columns.h"
+#include "model/io/filled.h"
 #include "model/io/json_number.h"
 
 namespace cutproof::cli {
@@ -134,48 +136,51 @@ json to_json(const Errors& errors, const harness::Lockstep* lockstep) {
 }
 
 void print_errors(const Errors& errors, const json& document) {
-  fmt::print("\nerrors\n");
+  constexpr std::size_t kName = 16;
+  say("\nerrors\n");
   // What was not measured is not there, or null.
-  const auto print = [&](const char* kind, const std::string& text) {
-    if (document.contains(kind) && !document.at(kind).is_null()) print_filled(text, document.at(kind));
+  const auto row = [&](const char* kind, const char* name, const std::string& text) {
+    if (!document.contains(kind) || document.at(kind).is_null()) return std::string();
+    return io::hanging(fmt::format("{:<{}}{}", name, kName, io::filled(text, document.at(kind))), kName) + "\n";
   };
-  print("implementation", "implementation  the table above\n");
+  say_text(row("implementation", "implementation", "the table above"));
   std::optional<double> energy;
   int64_t unconverged = 0;
   for (const auto& [frame, error] : errors.solver()) {
     if (error.energy) energy = std::max(energy.value_or(0), *error.energy);
     unconverged += !error.converged;
   }
-  print("solver", fmt::format("solver          max {{max:.3g}} h, RMS {{rms:.3g}} h, energy {} above the least; {} "
-                              "substeps{}\n",
-                              energy ? fmt::format("{:.3g}", *energy) : "-", errors.solver().size(),
-                              unconverged > 0 ? fmt::format(", {} without a reference solution", unconverged) : ""));
-  print("time_step",
-        "time step       RMS up to {greatest_rms:.3g} h against {factor} × the substeps, over {frames} frames");
-  if (const auto& found = errors.time_step()) {
-    fmt::print("{}\n", found->first_difference
-                           ? fmt::format(", until particle {} is removed by one only", *found->removed_otherwise)
-                           : "");
-  }
-  print("geometry",
-        "geometry        Hausdorff {hausdorff:.3g} h (skin to ideal {skin_to_ideal:.3g}, ideal to skin "
-        "{ideal_to_skin:.3g}), {lost_per_area:.3g} h lost per cut area of {cut_area:.4g} h², at least "
-        "{least_per_area:.3g}\n");
+  say_text(row("solver", "solver",
+               fmt::format("max {{max:.3g}} h, RMS {{rms:.3g}} h, energy {} above the least; {} substeps{}",
+                           energy ? fmt::format("{:.3g}", *energy) : "-", errors.solver().size(),
+                           unconverged > 0 ? fmt::format(", {} without a reference solution", unconverged) : "")));
+  const auto& steps = errors.time_step();
+  say_text(
+      row("time_step", "time step",
+          fmt::format("RMS up to {{greatest_rms:.3g}} h against {{factor}} × the substeps, over {{frames}} frames{}",
+                      steps && steps->first_difference
+                          ? fmt::format(", until particle {} is removed by one only", *steps->removed_otherwise)
+                          : "")));
+  say_text(row("geometry", "geometry",
+               "Hausdorff {hausdorff:.3g} h (skin to ideal {skin_to_ideal:.3g}, ideal to skin {ideal_to_skin:.3g}), "
+               "{lost_per_area:.3g} h lost per cut area of {cut_area:.4g} h², at least {least_per_area:.3g}"));
   if (errors.overlap()) {
-    print("geometry",
-          "                pieces share up to {interpenetration/volume:.3g} h³ (± {interpenetration/bound:.2g}), in "
-          "frame {interpenetration/frame}\n");
+    say_text(row("geometry", "",
+                 "pieces share up to {interpenetration/volume:.3g} h³ (± {interpenetration/bound:.2g}), in frame "
+                 "{interpenetration/frame}"));
   }
-  print("topology",
-        "topology        {components} components, {couplings} couplings, {shells} shells; unequal in {unequal} of "
-        "{frames} frames; {isolated} isolated groups\n");
+  say_text(row("topology", "topology",
+               "{components} components, {couplings} couplings, {shells} shells; unequal in {unequal} of {frames} "
+               "frames; {isolated} isolated groups"));
   const bool is_double = errors.precision() == Precision::binary64;
-  print("conservation",
-        fmt::format("conservation    {}: momentum {{momentum:.3g}} m/s per mass ({{momentum_relative:.3g}} relative), "
-                    "bound {}; energy {{energy:.3g}}, bound {{energy_bound:.2g}}; angular momentum "
-                    "{{angular_momentum:.3g}}; over {{substeps}} substeps\n",
-                    errors.holds() ? "holds" : "FAILS",
-                    is_double ? fmt::format("{:.2g} relative", harness::kDoubleDrift) : "{momentum_bound:.2g} m/s"));
+  const std::string conservation = row(
+      "conservation", "conservation",
+      fmt::format("{}: momentum {{momentum:.3g}} m/s per mass ({{momentum_relative:.3g}} relative), bound {}; energy "
+                  "{{energy:.3g}}, bound {{energy_bound:.2g}}; angular momentum {{angular_momentum:.3g}}; over "
+                  "{{substeps}} substeps",
+                  errors.holds() ? holding("holds") : failing("FAILS"),
+                  is_double ? fmt::format("{:.2g} relative", harness::kDoubleDrift) : "{momentum_bound:.2g} m/s"));
+  errors.holds() ? say_text(conservation) : insist_text(conservation);
 }
 
 }  // namespace cutproof::cli

@@ -99,6 +99,10 @@ std::vector<JunitCase> cases_of(const harness::SceneJudge& judge, const Judging&
                      JunitOutcome::skipped,
                      fmt::format("not promised: of {} states it would not hold in {}", one.states, one.failing)});
   }
+  for (const std::string& one : judge.not_reached()) {
+    cases.push_back({case_name("expected " + one, name_of(Stage::skin)), judging.class_name, 0, JunitOutcome::skipped,
+                     "not reached: the run stops before"});
+  }
   return cases;
 }
 

@@ -2,6 +2,7 @@
 #include "cli/fuzz.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -14,9 +15,14 @@
 #include "cli/findings.h"
 #include "cli/options.h"
 #include "cli/output.h"
+#include "cli/progress.h"
+#include "cli/screen.h"
+#include "cli/table.h"
 #include "cli/terminal.h"
 #include "guests/plugin_backend.h"
 #include "model/io/atomic_file.h"
+#include "model/io/columns.h"
+#include "model/io/filled.h"
 #include "model/io/recording.h"
 #include "model/printable.h"
 #include "property_tests/campaign.h"
@@ -74,39 +80,87 @@ CampaignOptions campaign_options(const FuzzOptions& options) {
   return campaign;
 }
 
+// How often what is to occur did.
+void print_coverage(const json& document) {
+  Table table({"class", "cases"});
+  std::vector<std::string> empty;
+  std::string rarest;
+  int64_t classes = 0, least = std::numeric_limits<int64_t>::max();
+  for (const CoverageClass& each : kCoverageClasses) {
+    if (least_count(each, 1, document.at("dynamics").get<bool>()) == 0) continue;
+    const auto count = document.at("coverage").at(each.name).get<int64_t>();
+    ++classes;
+    table.add({each.name, fmt::format("{}", count)});
+    if (count == 0) empty.emplace_back(each.name);
+    if (count > 0 && count < least) {
+      least = count;
+      rarest = each.name;
+    }
+  }
+  if (style().verbose) say_as_it_is(table.text());
+  if (empty.empty()) {
+    say("all {} coverage classes were met, the rarest in {} cases: {}\n", classes, least, rarest);
+  } else {
+    say("{} of {} coverage classes were met; {}: {}\n", classes - static_cast<int64_t>(empty.size()), classes,
+        undecided("not met"), fmt::join(empty, ", "));
+  }
+}
+
+// As of a run (terminal.h): what fails first, what holds summed up.
+void print_properties(const json& properties) {
+  Table table({"property", "after", "judged", "failed", "of bound", "undecided"});
+  const json* nearest = nullptr;
+  int64_t holds = 0, judged = 0, doubtful = 0;
+  for (const json& each : properties) {
+    const bool has_share = each.at("of_bound").is_number();
+    table.add({printable(io::filled("{property}", each)), printable(io::filled("{stage}", each)),
+               io::filled("{judged}", each), io::filled("{failed}", each),
+               has_share ? io::filled("{of_bound:.2g}", each) : "-",
+               each.at("undecided") > 0 ? io::filled("{undecided} of {checked}", each) : "-"});
+    if (each.at("failed") > 0) {
+      insist("{}: {}\n", failing("FAILS"),
+             io::filled("{property} after {stage}, in {failed} of {judged} verdicts", each));
+    } else if (each.at("judged") > 0) {
+      ++holds;
+      judged += each.at("judged").get<int64_t>();
+      if (has_share && (nearest == nullptr || each.at("of_bound") > nearest->at("of_bound"))) nearest = &each;
+    }
+    doubtful += each.at("undecided").get<int64_t>();
+  }
+  if (style().verbose) say_as_it_is(table.text());
+  if (holds > 0) {
+    say("{} pairs of a property and a stage {}, in {} verdicts", holds, holding(holds == 1 ? "holds" : "hold"),
+        io::grouped(judged));
+    if (nearest != nullptr) {
+      say_filled("; the nearest to its bound: {property} after {stage}, at {of_bound:.2g} of it", *nearest);
+    }
+    say("\n");
+  }
+  if (doubtful > 0) say("{}: {} things\n", undecided("undecidable within rounding"), io::grouped(doubtful));
+}
+
 }  // namespace
 
 int print_conclusion(const json& document, const CampaignConclusion& conclusion) {
-  for (const CoverageClass& each : kCoverageClasses) {
-    if (least_count(each, 1, document.at("dynamics").get<bool>()) == 0) continue;
-    fmt::print("  {:<28} {:>9}\n", each.name, document.at("coverage").at(each.name).get<int64_t>());
-  }
-  print_filled(
-      "{cases} cases of {mean_particles:.0f} particles on average, {verdicts} verdicts, {seconds:.1f} s, "
-      "{cases_per_second:.0f} cases/s\n",
-      document);
-  if (document.at("refused") > 0) print_filled("{refused} cases were refused: nothing is known of them\n", document);
+  print_coverage(document);
+  print_properties(document.at("properties"));
   if (document.contains("steps_compared")) {
-    print_filled(
+    say_filled(
         "{steps} steps beside the reference's: {particles} positions at most {greatest_h} h apart, {undecidable} that "
         "rounding may carry farther\n",
         document.at("steps_compared"));
   }
-  fmt::print("greatest measured / bound:\n");
-  for (const json& property : document.at("properties")) {
-    const json& of_bound = property.at("of_bound");
-    const auto undecided = property.at("undecided").get<int64_t>();
-    if (!of_bound.is_number() && undecided == 0) continue;
-    fmt::print(
-        "  {:<32} {:<7} {:>8}{}\n", printable(property.at("property").get_ref<const std::string&>()),
-        printable(property.at("stage").get_ref<const std::string&>()),
-        of_bound.is_number() ? fmt::format("{:.2g}", of_bound.get<double>()) : "-",
-        undecided > 0 ? fmt::format("  {} of {} undecided", undecided, property.at("checked").get<int64_t>()) : "");
+  if (document.at("refused") > 0) {
+    say("{}\n", undecided(io::filled("{refused} cases were refused: nothing is known of them", document)));
   }
+  say_filled(
+      "{cases} cases of {mean_particles:.0f} particles on average, {verdicts} verdicts, {seconds:.1f} s, "
+      "{cases_per_second:.0f} cases/s\n",
+      document);
   if (conclusion.holds()) {
-    fmt::print("all hold\n");
+    insist("{}\n", holding("all hold"));
   } else {
-    fmt::print("FAILS: {}\n", conclusion.failure);
+    insist("{}: {}\n", failing("FAILS"), conclusion.failure);
   }
   return conclusion.holds() ? 0 : 1;
 }
@@ -130,11 +184,11 @@ int merge(const FuzzOptions& options) {
   require_writable(options.junit);
   const json whole = merge_shards(options.merge);
   if (!whole.at("complete").get<bool>()) {
-    fmt::print("INCOMPLETE: missing {}; run each of these again with --shard i/{}\n", missing_shards(whole),
-               whole.at("merged_shards").get<int64_t>());
+    insist("INCOMPLETE: missing {}; run each of these again with --shard i/{}\n", missing_shards(whole),
+           whole.at("merged_shards").get<int64_t>());
   }
-  print_filled("{merged_shards} shards, backend {backend}, seed {seed}\n", whole);
-  for (const json& violation : whole.at("violations")) print_filled("case {index}: {text}\n", violation);
+  say_filled("{merged_shards} shards, backend {backend}, seed {seed}\n", whole);
+  for (const json& violation : whole.at("violations")) insist_text(io::filled("case {index}: {text}\n", violation));
   return conclude_campaign(options, whole, true);
 }
 
@@ -146,7 +200,7 @@ std::string name_in_files(const std::string& backend) {
 
 // Simplifies, saves, records; returns the file's name.
 std::string keep(const Violation& violation, const FuzzOptions& options, const BackendChoice& choice, int batch) {
-  fmt::print("case {} FAILS: {}\n", violation.index, describe(violation.verdict));
+  insist("case {} {}: {}\n", violation.index, failing("FAILS"), describe(violation.verdict));
   flush_output();
   Simplified simplified = simplify(violation, choice, options.simplify);
   simplified.counterexample.seed = options.campaign.seed;
@@ -157,19 +211,23 @@ std::string keep(const Violation& violation, const FuzzOptions& options, const B
   const std::string file = stem + ".json";
   io::write_text(file, to_json(found) + "\n");
   if (simplified.alone) {
-    fmt::print("simplified to {} strokes and {} particles{}: {}\n", found.failing.strokes.size(),
-               found.failing.nodes.size(),
-               harness::described_backend(choice.name).takes_schedule
-                   ? fmt::format(", {} preemptions", gpu::preemptions(found.schedule))
-                   : "",
-               simplified.text);
+    insist("simplified to {} strokes and {} particles{}: {}\n", found.failing.strokes.size(),
+           found.failing.nodes.size(),
+           harness::described_backend(choice.name).takes_schedule
+               ? fmt::format(", {} preemptions", gpu::preemptions(found.schedule))
+               : "",
+           simplified.text);
     const std::string problem = record_case(stem, backend_of(found, choice), found.failing);
-    fmt::print("{}\n", problem.empty() ? "recorded " + io::recording_paths(stem).index : "not recorded: " + problem);
+    if (problem.empty()) {
+      say_copy("recorded", io::recording_paths(stem).index);
+    } else {
+      insist("not recorded: {}\n", problem);
+    }
   } else {
-    fmt::print("alone it does not fail, only with the other bodies of its load: fuzz again with --seed {} --batch {}\n",
-               options.campaign.seed, batch);
+    insist("alone it does not fail, only with the other bodies of its load: fuzz again with --seed {} --batch {}\n",
+           options.campaign.seed, batch);
   }
-  fmt::print("saved; to see it again: cutproof replay {}\n", file);
+  insist_copy("saved; to see it again:", "cutproof replay " + quoted(file));
   return file;
 }
 
@@ -178,7 +236,7 @@ Campaign run(const FuzzOptions& options, const CampaignOptions& asked) {
       [&](int64_t load) { return harness::make_backend(harness::choice_for_load(options.backend, load)); },
       harness::described_backend(options.backend.name).takes_schedule};
   const int64_t of_this_shard = (asked.cases - asked.shard + asked.shards - 1) / asked.shards;
-  Progress progress("case", options.campaign.seconds ? 0 : of_this_shard);
+  Progress progress("case", options.cases || !asked.seconds ? of_this_shard : 0);
   return run_campaign(asked, source, [&](const Campaign& so_far) {
     std::size_t classes = 0, wanted = 0;
     for (std::size_t k = 0; k < kCoverageClassCount; ++k) {
@@ -186,9 +244,13 @@ Campaign run(const FuzzOptions& options, const CampaignOptions& asked) {
       ++wanted;
       classes += so_far.coverage.begin()[k] > 0;
     }
-    progress.show(so_far.cases, fmt::format("{:.0f} cases/s, {} of {} classes met, {} violations",
-                                            static_cast<double>(so_far.cases) / so_far.seconds, classes, wanted,
-                                            so_far.violations.size()));
+    const std::string rate =
+        fmt::format("{} violations, {:.0f} cases/s, {} of {} classes met", so_far.violations.size(),
+                    static_cast<double>(so_far.cases) / so_far.seconds, classes, wanted);
+    // It ends with whichever is over first.
+    double part = static_cast<double>(so_far.cases) / static_cast<double>(std::max<int64_t>(of_this_shard, 1));
+    if (asked.seconds) part = std::max(part, *asked.seconds > 0 ? so_far.seconds / *asked.seconds : 1);
+    progress.show(so_far.cases, rate, part);
   });
 }
 
@@ -204,12 +266,12 @@ nlohmann::json fuzz_campaign(const FuzzOptions& options) {
   require_writable(options.json);
   require_writable(options.junit);
 
-  fmt::print("fuzzing backend {}: {}{} from seed {}{}, {} bodies a load, {} threads\n", options.backend.name,
-             options.campaign.seconds ? fmt::format("{:g} s of cases", *options.campaign.seconds)
-                                      : fmt::format("{} cases", asked.cases),
-             asked.dynamics ? " with dynamics" : "", asked.seed,
-             asked.shards > 1 ? fmt::format(", shard {} of {}", asked.shard + 1, asked.shards) : "", asked.batch,
-             asked.threads);
+  say("fuzzing backend {}: {}{} from seed {}{}, {} bodies a load, {} threads\n", options.backend.name,
+      options.campaign.seconds ? fmt::format("{:g} s of cases", *options.campaign.seconds)
+                               : fmt::format("{} cases", asked.cases),
+      asked.dynamics ? " with dynamics" : "", asked.seed,
+      asked.shards > 1 ? fmt::format(", shard {} of {}", asked.shard + 1, asked.shards) : "", asked.batch,
+      asked.threads);
   flush_output();
   const Campaign campaign = run(options, asked);
   json violations = json::array();

@@ -10,9 +10,11 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/scene_files.h"
+#include "cli/screen.h"
 #include "fixtures/import/mesh.h"
 #include "model/error.h"
 #include "model/fields.h"
+#include "model/io/columns.h"
 #include "model/io/limits.h"
 #include "model/io/scene_io.h"
 #include "oracles/surface/surface.h"
@@ -50,13 +52,14 @@ std::string basis_of(const oracles::Property& property) {
 }
 
 void print_properties() {
-  fmt::print("properties: where each comes from, when it is judged, what it rests on\n");
+  insist("properties: where each comes from, when it is judged, what it rests on\n");
   oracles::PropertyLists lists = oracles::properties();
   lists.push_back(&oracles::history_properties());
   for (const oracles::PropertyList* const list : lists) {
     for (const oracles::Property& property : *list) {
-      fmt::print("  {:<21} {}\n  {:<21} {}; rests on {}\n", property.name, property.source, "", due_of(property),
-                 basis_of(property));
+      insist("{}\n", io::hanging(fmt::format("  {:<21} {}", property.name, property.source), 24));
+      insist("{}\n",
+             io::hanging(fmt::format("  {:<21} {}; rests on {}", "", due_of(property), basis_of(property)), 24));
     }
   }
 }
@@ -67,7 +70,7 @@ int print_scenes() {
     throw InputError("cutproof info", "--scenes", "The scenes that come with the program are not beside it.",
                      "Run the program from its build or its package, or give a scene file.");
   }
-  for (const std::string& name : names) fmt::print("{}\n  {}\n", name, io::read_scene(scene_file(name)).description);
+  for (const std::string& name : names) insist("{}\n  {}\n", name, io::read_scene(scene_file(name)).description);
   return 0;
 }
 
@@ -77,7 +80,7 @@ int examine(const InfoOptions& options) {
   const fixtures::MeshExamination mesh = fixtures::examine_mesh(options.mesh, unit);
   write_document(options.json, examination_json(mesh, options.mesh, unit));
   print_examination(mesh, options.unit);
-  if (!options.json.empty()) fmt::print("wrote {}\n", options.json);
+  if (!options.json.empty()) say_copy("wrote", options.json);
   return mesh.defects.empty() ? 0 : 1;
 }
 
@@ -85,19 +88,19 @@ int info(const InfoOptions& options) {
   if (options.scenes) return print_scenes();
   if (!options.mesh.empty()) return examine(options);
   if (options.scene) {
-    fmt::print("{}", io::scene_reference());
+    insist_text(io::scene_reference());
     return 0;
   }
   if (options.limits) {
-    fmt::print("{}", io::limits_reference());
+    insist_text(io::limits_reference());
     return 0;
   }
-  fmt::print("cutproof {}\nbackends:\n", kVersion);
+  insist("cutproof {}\nbackends:\n", kVersion);
   for (const harness::BackendDescriptor& backend : harness::backends()) {
-    fmt::print("  {:<11} {}\n", backend.name, harness::description_of(backend));
+    insist("{}\n", io::hanging(fmt::format("  {:<11} {}", backend.name, harness::description_of(backend)), 14));
   }
   print_properties();
-  fmt::print(
+  insist(
       "scene files: version 1 (`cutproof info --scene` lists every field)\n"
       "recordings: temporal VTKHDF 2.0, index version 2\n"
       "licence: sources MIT; this program links CGAL and SuiteSparse, which makes it GPL\n");

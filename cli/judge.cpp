@@ -11,7 +11,9 @@
 #include "cli/fuzz.h"
 #include "cli/options.h"
 #include "cli/output.h"
-#include "cli/terminal.h"
+#include "cli/progress.h"
+#include "cli/screen.h"
+#include "cli/table.h"
 #include "guests/campaign.h"
 #include "guests/plugin_backend.h"
 #include "model/error.h"
@@ -89,20 +91,27 @@ std::string title(const PluginInfo& plugin, const std::string& library) {
 
 std::string shortened(const std::string& text) { return text.size() > 2000 ? text.substr(0, 2000) + " …" : text; }
 
-void print(const KernelCampaign& campaign) {
-  fmt::print("{}: {} {} in {} questions, {:.1f} s\n", campaign.operation->name, campaign.cases,
-             campaign.operation->cases, campaign.questions, campaign.seconds);
-  fmt::print("  {:<24} {:>10} {:>10} {:>18}\n", "property", "judged", "failed", "greatest of bound");
+void print_head(const KernelCampaign& campaign) {
+  say("{}: {} {} in {} questions, {:.1f} s\n", campaign.operation->name, campaign.cases, campaign.operation->cases,
+      campaign.questions, campaign.seconds);
+}
+
+void print_properties(const KernelCampaign& campaign) {
+  Table table({"property", "judged", "failed", "greatest of bound"});
   for (const harness::PropertySummary& p : campaign.properties.all()) {
-    fmt::print("  {:<24} {:>10} {:>10} {:>18}\n", p.property, p.checked, p.failed,
-               p.of_bound ? fmt::format("{:.2g}", *p.of_bound) : "-");
+    const std::string failed = fmt::format("{}", p.failed);
+    table.add({p.property, fmt::format("{}", p.checked), p.failed > 0 ? failing(failed) : failed,
+               p.of_bound ? fmt::format("{:.2g}", *p.of_bound) : "-"});
   }
+  say_as_it_is(table.text());
   for (const Unpromised& u : campaign.unpromised) {
-    fmt::print("  not promised, not judged: {}{}\n", u.property,
-               u.failing > 0 ? fmt::format(" (would fail in {} questions)", u.failing) : "");
+    say("  {}: {}{}\n", undecided("not promised, not judged"), u.property,
+        u.failing > 0 ? fmt::format(" (would fail in {} questions)", u.failing) : "");
   }
-  if (campaign.refused > 0) fmt::print("  refused: {} questions, of which nothing is known\n", campaign.refused);
-  if (campaign.questions == campaign.refused) fmt::print("FAILS: nothing was judged\n");
+  if (campaign.refused > 0) {
+    say("  {}: {} questions, of which nothing is known\n", undecided("refused"), campaign.refused);
+  }
+  if (campaign.questions == campaign.refused) insist("{}: nothing was judged\n", failing("FAILS"));
 }
 
 constexpr const char* kClass = "cutproof.judge";
@@ -133,11 +142,11 @@ std::string keep(const JudgeOptions& options, const Guest& guest, const KernelCa
        fmt::format("{}_{}_{}_{}.json", saved.operation, property, options.campaign.seed, failure.index))
           .string();
   io::write_text(file, guests::to_json(saved) + "\n");
-  fmt::print("FAILS: {}, '{}', question {} ({}):\n  {}\n", saved.operation, failure.verdict.property, failure.index,
-             failure.simplest.kind, shortened(failure.verdict.witness.text));
-  fmt::print("  simplified to {}: {}\n", campaign.operation->size_of(failure.simplest),
-             shortened(failure.of_simplest.witness.text));
-  fmt::print("  saved; to see it again: {}\n", replay_command(options, file, saved.operation));
+  insist("{}: {}, '{}', question {} ({}):\n  {}\n", failing("FAILS"), saved.operation, failure.verdict.property,
+         failure.index, failure.simplest.kind, shortened(failure.verdict.witness.text));
+  insist("  simplified to {}: {}\n", campaign.operation->size_of(failure.simplest),
+         shortened(failure.of_simplest.witness.text));
+  insist_copy("  saved; to see it again:", replay_command(options, file, saved.operation));
   return file;
 }
 
@@ -217,8 +226,8 @@ int replay(const JudgeOptions& options, Guest& guest) {
                      "replay the case with a plugin that does");
   }
   const harness::Promises promises = promises_of(guest.plugin(), operation, options.guest.library);
-  fmt::print("{}: {}, {}\nfound as: {}\n", options.replay, saved.operation, printable(saved.question.kind),
-             printable(saved.found));
+  say("{}: {}, {}\nfound as: {}\n", options.replay, saved.operation, printable(saved.question.kind),
+      printable(saved.found));
   const bool again = guest.plugin().promises && promises.cover("determinism");
   const std::vector<Verdict> verdicts = judge_answer(guest, operation, saved.question, saved.at_end, again);
   int64_t judged = 0, failed = 0;
@@ -227,10 +236,10 @@ int replay(const JudgeOptions& options, Guest& guest) {
     judged += verdict.checked > 0 ? 1 : 0;
     if (verdict.holds) continue;
     ++failed;
-    fmt::print("FAILS: '{}': {}\n", verdict.property, shortened(verdict.witness.text));
+    insist("{}: '{}': {}\n", failing("FAILS"), verdict.property, shortened(verdict.witness.text));
   }
-  if (verdicts.empty()) fmt::print("it refuses this question: nothing was judged\n");
-  if (failed == 0 && judged > 0) fmt::print("holds: {} verdicts\n", judged);
+  if (verdicts.empty()) insist("it refuses this question: nothing was judged\n");
+  if (failed == 0 && judged > 0) insist("{}: {} verdicts\n", holding("holds"), judged);
   return failed > 0 || judged == 0 ? 1 : 0;
 }
 
@@ -256,7 +265,7 @@ int judge(JudgeOptions options) {
   Guest& guest = *started;
   const std::vector<const OperationDescription*> asked = asked_operations(options, guest.plugin());
   if (!options.replay.empty()) return replay(options, guest);
-  fmt::print("{}, seed {}\n", title(guest.plugin(), options.guest.library), options.campaign.seed);
+  say("{}, seed {}\n", title(guest.plugin(), options.guest.library), options.campaign.seed);
   flush_output();
   bool holds = true;
   std::vector<io::JunitCase> junit;
@@ -281,20 +290,24 @@ int judge(JudgeOptions options) {
     {
       Progress progress(std::string(operation->name), campaign_options.cases);
       campaign = judge_kernel(guest, *operation, promises, campaign_options, [&](const KernelCampaign& so_far) {
-        progress.show(so_far.cases, fmt::format("{} failed", so_far.failed));
+        const double cases = static_cast<double>(so_far.cases) / static_cast<double>(campaign_options.cases);
+        const std::optional<double>& most = campaign_options.seconds;
+        progress.show(so_far.cases, fmt::format("{} failed", so_far.failed),
+                      most && *most > 0 ? std::max(cases, so_far.seconds / *most) : cases);
       });
     }
-    print(campaign);
+    print_head(campaign);
     json result = guests::to_json(campaign);
     for (std::size_t k = 0; k < campaign.failures.size(); ++k) {
       result["failures"][k]["file"] = keep(options, guest, campaign, campaign.failures[k]);
       result["failures"][k]["again"] = replay_command(options, result["failures"][k]["file"], result["operation"]);
     }
+    print_properties(campaign);
     add_cases(result, options, junit, failures);
     if (campaign.ended) {
-      fmt::print("  nothing more was asked: the guest is gone\n");
+      insist("  nothing more was asked: the guest is gone\n");
     } else if (campaign.gave_up) {
-      fmt::print("  given up after {} questions that were not answered; --keep-going goes on\n", campaign.lost);
+      insist("  given up after {} questions that were not answered; --keep-going goes on\n", campaign.lost);
     }
     document["operations"].push_back(std::move(result));
     holds = holds && campaign.holds();
@@ -314,7 +327,7 @@ int judge(JudgeOptions options) {
   double seconds = 0;
   for (const io::JunitCase& each : junit) seconds += each.seconds;
   write_junit(options.junit, {"cutproof judge", kClass, options.again}, seconds, std::move(junit));
-  fmt::print("{}\n", holds ? "all hold" : "FAILS");
+  insist("{}\n", holds ? holding("all hold") : failing("FAILS"));
   print_annotations(failures);
   return holds ? 0 : 1;
 }

@@ -8,6 +8,8 @@
 #include "cli/findings.h"
 #include "cli/options.h"
 #include "cli/output.h"
+#include "cli/screen.h"
+#include "cli/table.h"
 #include "cli/terminal.h"
 #include "harness/recorded_kick.h"
 #include "model/io/array_file.h"
@@ -87,15 +89,17 @@ nlohmann::json to_json(const KickOptions& options, const harness::RecordedKick& 
 
 void print_pieces(const harness::RecordedKick& kick, const oracles::KickReport& report) {
   if (report.pieces.empty()) return;
-  fmt::print("\n{:<12} {:>10} {:>10} {:>14}  {}\n", "piece", "particles", "felt it", "greatest [m]", "from frame");
+  Table table({"piece", "particles", "felt it", "greatest [m]", "from frame"});
   for (const oracles::KickedPiece& piece : report.pieces) {
     std::string from = piece.first_frame < 0 ? "-" : fmt::format("{}", piece.first_frame);
     if (piece.first_frame >= 0 && !kick.time.empty()) {
       from += fmt::format(" ({:.4g} s)", kick.time[static_cast<std::size_t>(piece.first_frame)]);
     }
     if (report.kicked_piece && piece.piece == *report.kicked_piece) from += ", kicked";
-    fmt::print("{:<12} {:>10} {:>10} {:>14.4g}  {}\n", piece.piece, piece.particles, piece.felt, piece.greatest, from);
+    table.add({fmt::format("{}", piece.piece), fmt::format("{}", piece.particles), fmt::format("{}", piece.felt),
+               fmt::format("{:.4g}", piece.greatest), from});
   }
+  say_as_it_is("\n" + table.text());
 }
 
 int kick(const KickOptions& options) {
@@ -106,12 +110,14 @@ int kick(const KickOptions& options) {
   write_document(options.json, to_json(options, kick, report));
   const Judging judging{"cutproof kick", "cutproof.kick", options.again};
   write_junit(options.junit, judging, 0, cases_of(report.verdicts, judging));
-  fmt::print("kick {}: {} frames of {} particles\n", options.file, kick.runs.frames, kick.runs.particles);
+  say("kick {}: {} frames of {} particles\n", options.file, kick.runs.frames, kick.runs.particles);
   print_pieces(kick, report);
-  print_single_verdicts(report.verdicts);
-  for (const std::string& note : notes_of(report, kick.runs)) fmt::print("\nnote: {}\n", note);
-  print_whether_all_hold(report.verdicts);
-  if (!options.json.empty()) fmt::print("wrote {}\n", options.json);
+  Shown shown{options.again};
+  shown.in_frames = false;
+  print_verdicts(report.verdicts, shown);
+  print_notes(notes_of(report, kick.runs));
+  if (!options.json.empty()) say_copy("wrote", options.json);
+  print_conclusion(report.verdicts, shown, "what was judged holds.");
   print_annotations(failures_of(report.verdicts, judging));
   return report.holds() ? 0 : 1;
 }

@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
@@ -7,9 +9,11 @@
 #include <string>
 
 #include "cli/commands.h"
+#include "cli/help.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/printable_output.h"
+#include "cli/screen.h"
 #include "guests/guest.h"
 #include "model/backend.h"
 #include "model/error.h"
@@ -66,16 +70,21 @@ int run_command_line(int argc, char** argv) {
   for (const auto add : {add_run, add_judge, add_check, add_kick, add_vectors, add_check_vectors, add_info, add_bench,
                          add_tune, add_fuzz, add_replay, add_digest})
     add(app, work);
+  AskedStyle asked_style;
+  add_style(app, asked_style);
   try {
     app.parse(argc, argv);
-  } catch (const CLI::Success& asked) {  // --help, --version
+  } catch (const CLI::CallForHelp&) {
+    std::fputs(help_page(app).c_str(), stdout);
+    return 0;
+  } catch (const CLI::Success& asked) {  // --version
     std::ostringstream text;
     const int status = app.exit(asked, text, text);
     std::fputs(text.str().c_str(), stdout);
     return status;
   } catch (const CLI::ParseError& error) {
     if (argc <= 1) {
-      std::fputs(app.help().c_str(), stderr);
+      std::fputs(help_page(app).c_str(), stderr);
     } else {
       std::ostringstream text;
       app.exit(error, text, text);
@@ -84,6 +93,8 @@ int run_command_line(int argc, char** argv) {
     return 2;
   }
   refuse_odd_words(app);
+  set_style(settled(asked_style, isatty(STDOUT_FILENO) != 0));
+  if (style().colour) let_colours_through();
   return work();
 }
 

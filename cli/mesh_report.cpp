@@ -8,6 +8,7 @@
 
 #include "cli/commands.h"
 #include "cli/options.h"
+#include "cli/screen.h"
 
 namespace cutproof::cli {
 
@@ -41,23 +42,23 @@ nlohmann::json defects_json(const std::vector<Defect>& defects) {
 
 void print_defects(const std::vector<Defect>& defects) {
   for (const Defect& defect : defects) {
-    fmt::print("  {}\n", defect.problem);
-    if (!defect.where.empty()) fmt::print("    first: {}\n", defect.where);
+    insist("  {}\n", defect.problem);
+    if (!defect.where.empty()) insist("    first: {}\n", defect.where);
   }
 }
 
-void print_volume(double volume) { fmt::print("volume {:.5g} cm³\n", 1e6 * volume); }
+void print_volume(double volume) { say("volume {:.5g} cm³\n", 1e6 * volume); }
 
 // Spacings that give bodies from a quick look to a large run.
 constexpr std::array<int, 3> kUsualCounts = {2000, 8000, 100'000};
 
 void print_usual_counts(double volume) {
-  fmt::print("as a body:");
+  say("as a body:");
   for (const int count : kUsualCounts) {
-    fmt::print("{} {} particles at h = {:.3g} mm", count == kUsualCounts.front() ? "" : ",", count,
-               1e3 * std::cbrt(volume / count));
+    say("{} {} particles at h = {:.3g} mm", count == kUsualCounts.front() ? "" : ",", count,
+        1e3 * std::cbrt(volume / count));
   }
-  fmt::print("\n");
+  say("\n");
 }
 
 }  // namespace
@@ -71,9 +72,9 @@ double metres_per(const std::string& unit) {
 
 void print_build(const fixtures::Built& built) {
   if (built.repair) {
-    for (const std::string& line : fixtures::report_lines(*built.repair)) fmt::print("{}\n", line);
+    for (const std::string& line : fixtures::report_lines(*built.repair)) say("{}\n", line);
   }
-  for (const std::string& note : built.notes) fmt::print("note: {}\n", note);
+  for (const std::string& note : built.notes) say("{} {}\n", lesser("note:"), note);
 }
 
 nlohmann::json build_json(const fixtures::Built& built) {
@@ -84,25 +85,24 @@ nlohmann::json build_json(const fixtures::Built& built) {
 
 void print_examination(const MeshExamination& mesh, const std::string& unit) {
   const Vec3 size = 1e3 * (mesh.bounds.high - mesh.bounds.low);
-  fmt::print("mesh {}: {} vertices, {} triangles, {} component{}\n", mesh.name, mesh.points, mesh.triangles,
-             mesh.components, mesh.components == 1 ? "" : "s");
-  fmt::print("size {:.4g} × {:.4g} × {:.4g} mm, one unit being 1 {} (--unit changes that)\n", size.x, size.y, size.z,
-             unit);
+  say("mesh {}: {} vertices, {} triangles, {} component{}\n", mesh.name, mesh.points, mesh.triangles, mesh.components,
+      mesh.components == 1 ? "" : "s");
+  say("size {:.4g} × {:.4g} × {:.4g} mm, one unit being 1 {} (--unit changes that)\n", size.x, size.y, size.z, unit);
   if (mesh.defects.empty()) {
     print_volume(mesh.volume);
     print_usual_counts(mesh.volume);
-    fmt::print("it bounds a solid\n");
+    insist("{}\n", holding("it bounds a solid"));
     return;
   }
-  fmt::print("it does not bound a solid:\n");
+  insist("it does {} bound a solid:\n", failing("not"));
   print_defects(mesh.defects);
   if (!mesh.repaired_defects.empty()) {
-    fmt::print("--repair would not help; what it leaves:\n");
+    insist("--repair would not help; what it leaves:\n");
     print_defects(mesh.repaired_defects);
   } else {
-    fmt::print("--repair would make it one:\n");
+    insist("--repair would make it one:\n");
   }
-  for (const std::string& line : fixtures::report_lines(*mesh.repair)) fmt::print("  {}\n", line);
+  for (const std::string& line : fixtures::report_lines(*mesh.repair)) say("  {}\n", line);
   if (mesh.repaired_defects.empty()) {
     print_volume(mesh.repaired_volume);
     print_usual_counts(mesh.repaired_volume);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "cli/screen.h"
 #include "model/error.h"
 #include "model/printable.h"
 
@@ -97,6 +98,7 @@ std::string as_given(const CLI::App& command) {
   for (const CLI::Option* const option : command.get_options()) {
     const std::string name = option->get_name();
     if (option->count() == 0 || name == "--json" || name == "--junit" || name == "--record") continue;
+    if (option->get_group() == kStyleGroup) continue;  // how it is printed changes nothing
     const bool is_word = option->get_lnames().empty() && option->get_snames().empty();
     std::string& text = is_word ? words : options;
     if (!is_word) text += " " + name;

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstring>
 
+#include "cli/screen.h"
 #include "model/error.h"
 #include "model/io/atomic_file.h"
 #include "model/io/json_text.h"
@@ -11,6 +12,7 @@
 namespace cutproof::cli {
 
 void flush_output() {
+  end_line();
   errno = 0;
   const bool failed = std::fflush(stdout) != 0;
   const int why = errno;

@@ -6,6 +6,7 @@
 #include "cli/commands.h"
 #include "cli/findings.h"
 #include "cli/options.h"
+#include "cli/screen.h"
 #include "model/io/recording.h"
 #include "model/printable.h"
 #include "property_tests/campaign.h"
@@ -44,28 +45,31 @@ int replay(const ReplayOptions& options) {
   if (is_history && !options.record.empty()) {
     refuse("--record", file + " is a history of commands, which no recording holds", "leave it out");
   }
-  fmt::print("{}: {} particles, {} strokes, {}backend {}\n", file, c.nodes.size(), c.strokes.size(),
-             is_history ? fmt::format("{} commands, ", counterexample.commands.size()) : "", printable(choice.name));
-  if (!counterexample.found.empty()) fmt::print("found as: {}\n", printable(counterexample.found));
+  say("{}: {} particles, {} strokes, {}backend {}\n", file, c.nodes.size(), c.strokes.size(),
+      is_history ? fmt::format("{} commands, ", counterexample.commands.size()) : "", printable(choice.name));
+  if (!counterexample.found.empty()) say("found as: {}\n", printable(counterexample.found));
   const auto make = [&] { return backend_of(counterexample, choice); };
   const Judgement judgement =
       is_history ? history_alone(make, c, counterexample.commands) : dissect_alone(make, c, true);
   if (!options.record.empty()) {
     const std::string problem = record_case(options.record, make(), c);
-    fmt::print("{}\n",
-               problem.empty() ? "recorded " + io::recording_paths(options.record).index : "not recorded: " + problem);
+    if (problem.empty()) {
+      say_copy("recorded", io::recording_paths(options.record).index);
+    } else {
+      insist("not recorded: {}\n", problem);
+    }
   }
   if (judgement.failure) {
-    fmt::print("FAILS: {}\n", describe(*judgement.failure));
+    insist("{}: {}\n", failing("FAILS"), describe(*judgement.failure));
     print_annotations(failures_of({*judgement.failure}, {.suite = {}, .class_name = {}, .again = options.again}));
     return 1;
   }
   if (judgement.verdicts == 0) {
-    fmt::print("FAILS: nothing was judged\n");
+    insist("{}: nothing was judged\n", failing("FAILS"));
     print_annotations({{"enough was judged", "nothing was judged", options.again}});
     return 1;
   }
-  fmt::print("holds: {} verdicts\n", judgement.verdicts);
+  insist("{}: {} verdicts\n", holding("holds"), judgement.verdicts);
   return 0;
 }
 

@@ -61,6 +61,7 @@ nlohmann::json to_json(const RunResult& result, const harness::SceneJudge* judge
                            {"failed_as_expected", expected}};
     document["properties"] = judge->summaries().to_json();
     document["notes"] = judge->notes();
+    document["not_reached"] = judge->not_reached();
   }
   return document;
 }

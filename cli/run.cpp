@@ -13,11 +13,14 @@
 #include "cli/mesh_report.h"
 #include "cli/options.h"
 #include "cli/output.h"
+#include "cli/progress.h"
 #include "cli/results.h"
 #include "cli/scene_files.h"
+#include "cli/screen.h"
 #include "cli/terminal.h"
 #include "fixtures/bodies.h"
 #include "fixtures/build.h"
+#include "fixtures/reach.h"
 #include "harness/against.h"
 #include "harness/backends.h"
 #include "harness/frame_runner.h"
@@ -81,14 +84,14 @@ void print_header(const Scene& scene, const fixtures::Built& built, const RunOpt
   const Body& body = built.setup.body;
   const fixtures::Bounds box = fixtures::path_box(body);
   const Vec3 size = 1e3 * (box.high - box.low);
-  fmt::print("scene {}: {}\n", printable(scene.name), printable(scene.description));
-  fmt::print("body {}, {:.4g} × {:.4g} × {:.4g} mm, {} particles at h = {:.4g} mm, {} clusters\n", body.name, size.x,
-             size.y, size.z, body.particle_count(), body.grid.spacing * 1e3, built.state.clusters.count());
-  if (!options.mesh.empty()) fmt::print("one unit of the mesh is 1 {} (--unit changes that)\n", options.unit);
+  say("scene {}: {}\n", printable(scene.name), printable(scene.description));
+  say("body {}, {:.4g} × {:.4g} × {:.4g} mm, {} particles at h = {:.4g} mm, {} clusters\n", body.name, size.x, size.y,
+      size.z, body.particle_count(), body.grid.spacing * 1e3, built.state.clusters.count());
+  if (!options.mesh.empty()) say("one unit of the mesh is 1 {} (--unit changes that)\n", options.unit);
   print_build(built);
   const int32_t substeps = built.setup.step.substeps;
-  fmt::print("{} frames of {} substep{} × {} iterations, backend {}, seed {}\n", built.setup.frame_count(), substeps,
-             substeps == 1 ? "" : "s", built.setup.step.iterations, options.backend.name, scene.seed);
+  say("{} frames of {} substep{} × {} iterations, backend {}, seed {}\n", built.setup.frame_count(), substeps,
+      substeps == 1 ? "" : "s", built.setup.step.iterations, options.backend.name, scene.seed);
 }
 
 void print_summary(const RunResult& result) {
@@ -105,21 +108,21 @@ void print_summary(const RunResult& result) {
     removed += frame.removed;
     debris += frame.debris;
   }
-  fmt::print("\n{:<8} {:>7} {:>14}\n", "stage", "frames", "ms per frame");
+  say("\n{:<8} {:>7} {:>14}\n", "stage", "frames", "ms per frame");
   for (const Stage stage : kStages) {
     const auto s = static_cast<std::size_t>(stage);
-    fmt::print("{:<8} {:>7} {:>14}\n", name_of(stage), launched[s],
-               launched[s] == 0 || seconds[s] == 0
-                   ? "-"
-                   : fmt::format("{:.3f}", 1e3 * seconds[s] / static_cast<double>(launched[s])));
+    say("{:<8} {:>7} {:>14}\n", name_of(stage), launched[s],
+        launched[s] == 0 || seconds[s] == 0
+            ? "-"
+            : fmt::format("{:.3f}", 1e3 * seconds[s] / static_cast<double>(launched[s])));
   }
   if (!result.frames.empty()) {
-    fmt::print("{:<8} {:>7} {:>14.3f}\n", "all", result.frames.size(),
-               1e3 * total / static_cast<double>(result.frames.size()));
+    say("{:<8} {:>7} {:>14.3f}\n", "all", result.frames.size(),
+        1e3 * total / static_cast<double>(result.frames.size()));
   }
   const int64_t clusters = result.frames.empty() ? result.clusters_at_start : result.frames.back().clusters;
-  fmt::print("removed {} particles ({} as debris); clusters {} -> {}\n", removed + debris, debris,
-             result.clusters_at_start, clusters);
+  say("removed {} particles ({} as debris); clusters {} -> {}\n", removed + debris, debris, result.clusters_at_start,
+      clusters);
 }
 
 constexpr const char* kConservation = "conservation";
@@ -182,7 +185,9 @@ int run(const RunOptions& options) {
   if (depth) {
     harness::Promises promises;
     promises.words = harness::parse_promises(backend->promises(), options.backend.name, "promises");
-    judge.emplace(built.setup, scene.expect, options.backend.name, runner.states().front(), *depth, promises);
+    const bool is_cut_short = options.build.frames && fixtures::stops_early(scene, options.scene, built.setup);
+    judge.emplace(built.setup, scene.expect, options.backend.name, runner.states().front(), *depth, promises,
+                  is_cut_short ? harness::Extent::cut_short : harness::Extent::whole);
   }
   if (depth == harness::Depth::motion) relations.emplace(built.setup, make_backend(options.backend));
   if (mode) against.emplace(built.setup, built.state, state(), options.backend.name, *mode);
@@ -248,18 +253,28 @@ int run(const RunOptions& options) {
   }
 
   print_summary(result);
-  if (judge) print_verdicts(*judge);
-  if (against) print_against(*against);
+  if (judge) print_verdicts(*judge, options.again);
+  if (against) print_against(*against, options.again);
   if (errors) print_errors(*errors, errors_document);
   if (recorder) {
     const io::RecordingPaths paths = io::recording_paths(options.record);
-    fmt::print("recorded {} (for ParaView: {}, {}, {})\n", paths.index, paths.particles, paths.skin, paths.blade);
+    say_copy("recorded", paths.index);
+    say("for ParaView:\n");
+    for (const std::string& file : {paths.particles, paths.skin, paths.blade}) say_copy(" ", file);
   }
-  if (!options.json.empty()) fmt::print("wrote {}\n", options.json);
-  if (!judge && !against) fmt::print("nothing was judged: add --check for that\n");
-  if (!judge) {
-    for (const Verdict& verdict : broken) {
-      fmt::print("FAILS: {}: {} in frame {}\n", verdict.property, name_of(verdict.stage), verdict.frame);
+  if (!options.json.empty()) say_copy("wrote", options.json);
+  if (!options.junit.empty()) say_copy("wrote", options.junit);
+  if (judge) {
+    print_conclusion(*judge);
+  } else {
+    const Shown of_the_run{options.again};
+    print_verdicts(broken, of_the_run);
+    if (against) {
+      std::vector<Verdict> all = beside;
+      all.insert(all.end(), broken.begin(), broken.end());
+      print_conclusion(all, of_the_run, "what was compared holds.");
+    } else {
+      insist("nothing was judged: add --check for that\n");
     }
   }
   std::vector<Failure> failures =
@@ -294,8 +309,8 @@ void add_run(CLI::App& program, Work& work) {
       ->needs("--mesh");
   add_count(*command, "--particles", options->build.particles, "how many particles the body is to have",
             CLI::PositiveNumber);
-  add_count(*command, "--frames", options->build.frames, "stop after this many frames of the scene",
-            CLI::NonNegativeNumber);
+  add_count(*command, "--frames", options->build.frames,
+            "stop after this many frames of the scene, and judge what is in reach", CLI::NonNegativeNumber);
   add_check_depth(*command, options->check, "judge every frame by every property, and by what the scene expects")
       ->expected(0, 1);
   command
@@ -311,7 +326,7 @@ void add_run(CLI::App& program, Work& work) {
       ->add_option("--errors", options->errors,
                    "measure errors: all, or some of implementation (as --against reference), solver, time_step, "
                    "geometry, topology, conservation")
-      ->type_name("E,…");
+      ->type_name("E,E...");
   command->add_option("--record", options->record, "keep every frame, for `cutproof check` and ParaView")
       ->type_name("F");
   add_json(*command, options->json, "write verdicts, stage times and counts");

@@ -1,128 +1,278 @@
 #include "cli/terminal.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <chrono>
-#include <cstdio>
-#include <vector>
+#include <cmath>
+#include <set>
+#include <string_view>
+#include <utility>
 
+#include "cli/screen.h"
+#include "cli/table.h"
+#include "model/io/columns.h"
 #include "model/io/filled.h"
+#include "model/io/verdict_json.h"
 
 namespace cutproof::cli {
 
 namespace {
 
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
-
 constexpr std::size_t kMostFailuresShown = 5;
 
+// All verdicts of one property after one stage.
 struct Row {
+  const Verdict* any = nullptr;
+  const Verdict *first_failing = nullptr, *worst_failing = nullptr, *first_expected = nullptr;
   const Verdict* worst = nullptr;  // the failing one with the greatest measure, or the greatest that holds
-  int64_t frames = 0, failed = 0, expected = 0, checked = 0, undecided = 0;
+  int64_t verdicts = 0, looked = 0, failed = 0, expected = 0, checked = 0, undecided = 0;
+  // The greatest of all frames: the worst figure need not be the one that came nearest to its own bound.
+  double of_bound = -1;  // -1: every bound is 0, as it is of what is counted
+  std::string vacuous = {};
 };
 
-// The greatest of all frames: the worst figure need not be the one that came nearest to its own bound.
-std::string share_of_bound(const harness::SceneJudge& judge, const Verdict& verdict) {
-  const harness::PropertySummary* const summary = judge.summaries().find(verdict.property, verdict.stage);
-  return summary != nullptr && summary->of_bound ? fmt::format("{:.2g}", *summary->of_bound) : "-";
+bool is_greater(const Verdict& verdict, const Verdict* other) {
+  return other == nullptr || !(verdict.measured <= other->measured);  // what is no number is the worst
+}
+
+// In order of first appearance, which is that of time within each.
+std::vector<Row> rows_of(const std::vector<Verdict>& verdicts, const Shown& shown) {
+  std::vector<Row> rows;
+  for (const Verdict& verdict : verdicts) {
+    auto row = std::find_if(rows.begin(), rows.end(), [&](const Row& known) {
+      return known.any->property == verdict.property && known.any->stage == verdict.stage;
+    });
+    if (row == rows.end()) row = rows.insert(rows.end(), Row{&verdict});
+    ++row->verdicts;
+    row->looked += verdict.checked > 0 || !verdict.holds;
+    row->checked += verdict.checked;
+    row->undecided += verdict.undecided;
+    if (row->vacuous.empty()) row->vacuous = verdict.vacuous;
+    if (verdict.checked > 0 && verdict.bound > 0 && std::isfinite(verdict.bound)) {
+      row->of_bound = std::max(row->of_bound, verdict.measured / verdict.bound);
+    }
+    const bool worse = row->worst == nullptr || (row->worst->holds && !verdict.holds) ||
+                       (row->worst->holds == verdict.holds && is_greater(verdict, row->worst));
+    if (worse) row->worst = &verdict;
+    if (verdict.holds) continue;
+    if (shown.is_expected(verdict)) {
+      ++row->expected;
+      if (row->first_expected == nullptr) row->first_expected = &verdict;
+    } else {
+      ++row->failed;
+      if (row->first_failing == nullptr || verdict.frame < row->first_failing->frame) row->first_failing = &verdict;
+      if (is_greater(verdict, row->worst_failing)) row->worst_failing = &verdict;
+    }
+  }
+  if (shown.summaries == nullptr) return rows;
+  for (Row& row : rows) {
+    const harness::PropertySummary* const summary = shown.summaries->find(row.any->property, row.any->stage);
+    row.of_bound = summary != nullptr ? summary->of_bound.value_or(-1) : -1;
+  }
+  return rows;
 }
 
 std::string figure(double value) { return fmt::format("{:.4g}", value); }
 
-}  // namespace
-
-Progress::Progress(std::string thing, int64_t total)
-    : thing_(std::move(thing)), total_(total), terminal_(isatty(STDERR_FILENO) != 0) {}
-
-Progress::~Progress() { clear(); }
-
-void Progress::clear() {
-  if (!terminal_ || width_ == 0) return;
-  fmt::print(stderr, "\r{:{}}\r", "", width_);
-  std::fflush(stderr);
-  width_ = 0;
+// Of a bound, in as many columns as its head has.
+std::string share(double of_bound) {
+  return of_bound > 0 && of_bound < 0.001 ? "<0.001" : fmt::format("{:.2g}", of_bound);
 }
 
-void Progress::show(int64_t done, const std::string& what) {
-  if (!terminal_ || (now() - last_ < 0.1 && done != total_)) return;
-  last_ = now();
-  const std::string line = total_ > 0 ? fmt::format("{} {} of {}: {}", thing_, done, total_, what)
-                                      : fmt::format("{} {}: {}", thing_, done, what);
-  clear();
-  fmt::print(stderr, "\r{}", line);
-  std::fflush(stderr);
-  width_ = line.size();
+std::string plural(int64_t count, const char* one, const char* several) {
+  return fmt::format("{} {}", io::grouped(count), count == 1 ? one : several);
 }
 
-void print_filled(const std::string& text, const nlohmann::json& values) { fmt::print("{}", io::filled(text, values)); }
+// What a scene expects is not of a stage.
+constexpr std::string_view kExpected = "expected ";
+bool is_expectation(const Row& row) { return row.any->property.starts_with(kExpected); }
 
-void print_verdicts(const harness::SceneJudge& judge) {
-  std::vector<std::pair<std::string, Row>> rows;  // in order of first appearance
-  for (const Verdict& verdict : judge.verdicts()) {
-    // Expectations are read one by one; properties are gathered over frames.
-    const std::string key = fmt::format("{}\t{}", verdict.property, name_of(verdict.stage));
-    auto found = rows.begin();
-    while (found != rows.end() && found->first != key) ++found;
-    if (found == rows.end()) found = rows.insert(rows.end(), {key, {}});
-    Row& row = found->second;
-    row.frames += verdict.checked > 0 || !verdict.holds;
-    row.checked += verdict.checked;
-    row.undecided += verdict.undecided;
-    if (!verdict.holds) ++(judge.is_expected_failure(verdict) ? row.expected : row.failed);
-    const bool worse = row.worst == nullptr || (row.worst->holds && !verdict.holds) ||
-                       (row.worst->holds == verdict.holds && verdict.measured > row.worst->measured);
-    if (worse) row.worst = &verdict;
-  }
-  fmt::print("\n{:<40} {:<7} {:>7} {:>12} {:>7} {:>11} {:>11} {:<7} {:>8}  {}\n", "property", "after", "frames",
-             "checked", "failed", "worst", "bound", "unit", "of bound", "");
-  for (const auto& [key, row] : rows) {
-    const Verdict& worst = *row.worst;
-    std::string mark = row.failed > 0     ? "FAILS"
-                       : row.expected > 0 ? "fails, as the scene expects"
-                       : row.frames == 0  ? "vacuous"
-                                          : "holds";
-    if (row.undecided > 0) mark += fmt::format(", {} undecided", row.undecided);
-    fmt::print("{:<40} {:<7} {:>7} {:>12} {:>7} {:>11} {:>11} {:<7} {:>8}  {}\n", worst.property, name_of(worst.stage),
-               row.frames, row.checked, row.failed + row.expected, figure(worst.measured), figure(worst.bound),
-               worst.unit, share_of_bound(judge, worst), mark);
-  }
+std::string name_of_row(const Row& row, const Shown& shown) {
+  const bool has_stage = shown.in_frames && !is_expectation(row);
+  return has_stage ? fmt::format("{} after {}", row.any->property, name_of(row.any->stage)) : row.any->property;
+}
+
+std::string measured_and_bound(const Verdict& verdict) {
+  return fmt::format("measured {}, bound {}", io::in_unit(figure(verdict.measured), verdict.unit),
+                     io::in_unit(figure(verdict.bound), verdict.unit));
+}
+
+std::string listed(const std::vector<std::string>& names) { return fmt::format("{}", fmt::join(names, ", ")); }
+
+void print_failing(const std::vector<Row>& rows, const Shown& shown) {
   std::size_t failures = 0;
-  for (const Verdict& verdict : judge.verdicts()) {
-    if (verdict.holds || judge.is_expected_failure(verdict)) continue;
-    if (++failures > kMostFailuresShown) continue;
-    fmt::print("\nFAILS: {} after {}, frame {}, backend {}\n  measured {} {}, bound {} ({})\n  {}\n", verdict.property,
-               name_of(verdict.stage), verdict.frame, verdict.backend, figure(verdict.measured), verdict.unit,
-               figure(verdict.bound), verdict.bound_source, verdict.witness.text);
+  for (const Row& row : rows) {
+    if (row.failed == 0 || ++failures > kMostFailuresShown) continue;
+    const Verdict &first = *row.first_failing, &worst = *row.worst_failing;
+    say("\n");
+    insist("{}: {}", failing("FAILS"), name_of_row(row, shown));
+    if (shown.in_frames) insist(", {}in frame {}", row.failed > 1 ? "first " : "", first.frame);
+    if (row.failed > 1) insist(" ({} of {} verdicts)", io::grouped(row.failed), io::grouped(row.verdicts));
+    insist("\n  {} ({})\n", measured_and_bound(first), first.bound_source);
+    if (!first.witness.text.empty()) insist("  {}\n", first.witness.text);
+    if (&worst != &first && worst.measured > first.measured) {
+      insist("  worst in frame {}: {}\n", worst.frame, measured_and_bound(worst));
+    }
   }
   if (failures > kMostFailuresShown) {
-    fmt::print("\n… and {} more failing verdicts; --json holds all of them.\n", failures - kMostFailuresShown);
+    insist("\n… and {} more properties fail; --json holds all verdicts.\n", failures - kMostFailuresShown);
   }
-  for (const std::string& note : judge.notes()) fmt::print("\nnote: {}\n", note);
-  fmt::print("\n{} verdicts, {} failed: {}\n", judge.verdicts().size(), failures,
-             judge.holds() ? "everything holds." : "NOT everything holds.");
-}
-
-void print_single_verdicts(const std::vector<Verdict>& verdicts) {
-  fmt::print("\n{:<24} {:>12} {:>11} {:>11} {:<7}  {}\n", "property", "checked", "measured", "bound", "unit", "");
-  for (const Verdict& verdict : verdicts) {
-    std::string mark = !verdict.holds ? "FAILS" : verdict.vacuous.empty() ? "holds" : "vacuous: " + verdict.vacuous;
-    if (verdict.undecided > 0) mark += fmt::format(", {} undecided", verdict.undecided);
-    fmt::print("{:<24} {:>12} {:>11} {:>11} {:<7}  {}\n", verdict.property, verdict.checked, figure(verdict.measured),
-               figure(verdict.bound), verdict.unit, mark);
-  }
-  for (const Verdict& verdict : verdicts) {
-    if (verdict.holds) continue;
-    fmt::print("\nFAILS: {}\n  measured {} {}, bound {} ({})\n  {}\n", verdict.property, figure(verdict.measured),
-               verdict.unit, figure(verdict.bound), verdict.bound_source, verdict.witness.text);
+  if (failures > 0 && !shown.again.empty()) {
+    say("\n");
+    insist_copy("see it again:", shown.again);
   }
 }
 
-void print_whether_all_hold(const std::vector<Verdict>& verdicts) {
-  const auto failures = std::count_if(verdicts.begin(), verdicts.end(), [](const Verdict& v) { return !v.holds; });
-  fmt::print("\n{} verdicts, {} failed: {}\n", verdicts.size(), failures,
-             failures == 0 ? "what was judged holds." : "NOT everything holds.");
+// A row for each property and stage.
+void print_table(const std::vector<Row>& rows, const Shown& shown) {
+  std::vector<std::string> head = {"property"};
+  if (shown.in_frames) head.insert(head.end(), {"after", "frames"});
+  head.insert(head.end(), {"checked", "failed", "worst", "bound", "unit", "of bound"});
+  Table table(head);
+  for (const Row& row : rows) {
+    const Verdict& worst = *row.worst;
+    const std::string failed = row.failed + row.expected == 0 ? "-" : fmt::format("{}", row.failed + row.expected);
+    std::vector<std::string> cells = {worst.property};
+    if (shown.in_frames) cells.insert(cells.end(), {std::string(name_of(worst.stage)), fmt::format("{}", row.looked)});
+    cells.insert(cells.end(), {row.checked < 100'000 ? fmt::format("{}", row.checked)
+                                                     : fmt::format("{:.3g}", static_cast<double>(row.checked)),
+                               row.failed > 0 ? failing(failed) : failed, fmt::format("{:.3g}", worst.measured),
+                               fmt::format("{:.3g}", worst.bound), worst.unit == "1" ? "" : worst.unit,
+                               row.of_bound < 0 ? "-" : share(row.of_bound)});
+    table.add(cells);
+  }
+  say_as_it_is("\n" + table.text());
+}
+
+// What holds, and how near it came.
+void print_holding(const std::vector<Row>& rows, const Shown& shown) {
+  std::set<std::string> wrong, right;
+  int64_t verdicts = 0;
+  const Row* nearest = nullptr;
+  for (const Row& row : rows) {
+    if (row.failed + row.expected > 0) wrong.insert(row.any->property);
+  }
+  std::vector<std::string> expected;
+  for (const Row& row : rows) {
+    if (row.looked == 0 || wrong.contains(row.any->property)) continue;
+    if (is_expectation(row)) {
+      expected.push_back(fmt::format("{}: {}", row.any->property.substr(kExpected.size()),
+                                     io::in_unit(figure(row.any->measured), row.any->unit)));
+      continue;
+    }
+    right.insert(row.any->property);
+    verdicts += row.looked;
+    if (row.of_bound > 0 && (nearest == nullptr || row.of_bound > nearest->of_bound)) nearest = &row;
+  }
+  if (!expected.empty()) say("\n{}: {}.\n", holding("As the scene expects"), listed(expected));
+  if (right.empty()) return;
+  say("{}{} {}, in {}", expected.empty() ? "\n" : "",
+      plural(static_cast<int64_t>(right.size()), "property", "properties"),
+      right.size() == 1 ? holding("holds") : holding("hold"), plural(verdicts, "verdict", "verdicts"));
+  if (nearest != nullptr) {
+    say("; the nearest to its bound: {}, at {:.2g} of it", name_of_row(*nearest, shown), nearest->of_bound);
+  }
+  say(".\n");
+}
+
+void print_the_rest(const std::vector<Row>& rows, const Shown& shown) {
+  std::vector<std::string> expected, unsure;
+  std::vector<std::pair<std::string, std::string>> vacuous;
+  std::set<std::string> looked;
+  for (const Row& row : rows) {
+    if (row.looked > 0) looked.insert(row.any->property);
+    if (row.expected > 0) {
+      expected.push_back(fmt::format("{} ({} of {} verdicts, first in frame {})", name_of_row(row, shown),
+                                     io::grouped(row.expected), io::grouped(row.verdicts), row.first_expected->frame));
+    }
+    if (row.undecided > 0) {
+      unsure.push_back(
+          fmt::format("{} of {} in {}", io::grouped(row.undecided), io::grouped(row.checked), name_of_row(row, shown)));
+    }
+  }
+  for (const Row& row : rows) {
+    if (row.looked == 0 && looked.insert(row.any->property).second) {
+      vacuous.emplace_back(row.any->property, row.vacuous.empty() ? "no reason given" : row.vacuous);
+    }
+  }
+  if (!expected.empty()) say("{}: {}.\n", undecided("Fails, as the scene expects"), listed(expected));
+  print_grouped(lesser("Nothing to look at"), vacuous);
+  if (!unsure.empty()) say("{}: {}.\n", undecided("Undecidable within rounding"), listed(unsure));
+}
+
+void print_conclusion(std::size_t verdicts, int64_t failed, bool all, const char* holds) {
+  say("\n");
+  insist("{} {}, {} failed: {}\n", io::grouped(static_cast<long long>(verdicts)),
+         verdicts == 1 ? "verdict" : "verdicts", io::grouped(failed),
+         all ? holding(holds) : failing("NOT everything holds."));
+}
+
+int64_t failures_in(const std::vector<Verdict>& verdicts, const Shown& shown) {
+  return std::count_if(verdicts.begin(), verdicts.end(),
+                       [&](const Verdict& verdict) { return !verdict.holds && !shown.is_expected(verdict); });
+}
+
+Shown shown_of(const harness::SceneJudge& judge, const std::string& again) {
+  return {again, [&judge](const Verdict& verdict) { return judge.is_expected_failure(verdict); }, true,
+          &judge.summaries()};
+}
+
+}  // namespace
+
+void say_filled(const std::string& text, const nlohmann::json& values) { say_text(io::filled(text, values)); }
+
+void print_verdicts(const std::vector<Verdict>& verdicts, const Shown& shown) {
+  const std::vector<Row> rows = rows_of(verdicts, shown);
+  print_failing(rows, shown);
+  if (style().verbose) print_table(rows, shown);
+  print_holding(rows, shown);
+  print_the_rest(rows, shown);
+}
+
+void print_verdicts(const harness::SceneJudge& judge, const std::string& again) {
+  print_verdicts(judge.verdicts(), shown_of(judge, again));
+  if (!judge.not_reached().empty()) {
+    say("{}: {}.\n", undecided("Not reached, because the run stops before"), listed(judge.not_reached()));
+  }
+  std::vector<std::string> unpromised;
+  for (const harness::Judge::Unpromised& u : judge.unpromised()) {
+    unpromised.push_back(u.failing > 0 ? fmt::format("{} (would not hold in {} of {} states)", u.property,
+                                                     io::grouped(u.failing), io::grouped(u.states))
+                                       : u.property);
+  }
+  if (!unpromised.empty()) say("{}: {}.\n", undecided("Not promised here, so not judged"), listed(unpromised));
+  print_notes(judge.notes_beside_promises());
+}
+
+void print_grouped(const std::string& what, const std::vector<std::pair<std::string, std::string>>& names_and_reasons) {
+  std::vector<std::pair<std::string, std::vector<std::string>>> groups;  // by reason
+  for (const auto& [name, reason] : names_and_reasons) {
+    auto group = std::find_if(groups.begin(), groups.end(), [&r = reason](const auto& g) { return g.first == r; });
+    if (group == groups.end()) group = groups.insert(groups.end(), {reason, {}});
+    group->second.push_back(name);
+  }
+  if (groups.empty()) return;
+  if (groups.size() == 1) {
+    say("{} ({}): {}.\n", what, groups[0].first, listed(groups[0].second));
+    return;
+  }
+  say("{}:\n", what);
+  for (const auto& [reason, names] : groups) say("  {}: {}\n", reason, listed(names));
+}
+
+void print_notes(const std::vector<std::string>& notes) {
+  for (const std::string& note : notes) say("{} {}\n", lesser("note:"), note);
+}
+
+void print_conclusion(const std::vector<Verdict>& verdicts, const Shown& shown, const char* holds) {
+  const int64_t failed = failures_in(verdicts, shown);
+  print_conclusion(verdicts.size(), failed, failed == 0, holds);
+}
+
+void print_conclusion(const harness::SceneJudge& judge) {
+  print_conclusion(judge.verdicts().size(), failures_in(judge.verdicts(), shown_of(judge, "")), judge.holds(),
+                   judge.not_reached().empty() ? "everything holds." : "what was reached holds.");
 }
 
 }  // namespace cutproof::cli

@@ -1,6 +1,6 @@
-// What a person sees: progress on a terminal (silent when piped) and the table of verdicts.
+// What a person sees of verdicts: what fails first, then what holds, summed up.
 #pragma once
-#include <cstdint>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -9,33 +9,32 @@
 
 namespace cutproof::cli {
 
-class Progress {
- public:
-  // Of `total` things of this name; 0: nobody knows how many there will be.
-  Progress(std::string thing, int64_t total);
-  ~Progress();
-  void show(int64_t done, const std::string& what);
+// Says io::filled.
+void say_filled(const std::string& text, const nlohmann::json& values);
 
- private:
-  void clear();
-  std::string thing_;
-  int64_t total_;
-  bool terminal_;
-  std::size_t width_ = 0;
-  double last_ = -1;
+// How verdicts are shown.
+struct Shown {
+  std::string again;  // the command that shows them again
+  // A failure that the scene asks for, which counts as right.
+  std::function<bool(const Verdict&)> is_expected = [](const Verdict&) { return false; };
+  bool in_frames = true;  // of a run; else of no run, without stages and frames
+  // Where given, which properties have a share of their bound, and how much: a verdict on a run as a whole has none.
+  const harness::PropertySummaries* summaries = nullptr;
 };
 
-// Prints io::filled.
-void print_filled(const std::string& text, const nlohmann::json& values);
+// What fails, by property and stage: how often, and the first of them with its frame, its figures and its witness. Then
+// in words what holds, and how near to its bound the nearest came, what fails as it is expected to, what had nothing to
+// look at, what is undecided. With --verbose a table of all rows as well: how often judged, how often it failed, the
+// worst figure beside its bound, and the greatest share of a bound.
+void print_verdicts(const std::vector<Verdict>& verdicts, const Shown& shown);
+// The same of a run, with what was not reached, what was not promised, and the notes.
+void print_verdicts(const harness::SceneJudge& judge, const std::string& again);
+// "what": of what each is told, because of one reason: "Not judged (REASON): A, B".
+void print_grouped(const std::string& what, const std::vector<std::pair<std::string, std::string>>& names_and_reasons);
+void print_notes(const std::vector<std::string>& notes);
 
-// One row per property and stage: how often judged, how often it failed, the worst figure beside its bound, and the
-// greatest share of a bound; then the
-// first failures with their witnesses, and one line that says whether everything holds.
-void print_verdicts(const harness::SceneJudge& judge);
-
-// The same of single verdicts, of no run: one row each, then every failure with its witness.
-void print_single_verdicts(const std::vector<Verdict>& verdicts);
-// The last line of those, after all notes.
-void print_whether_all_hold(const std::vector<Verdict>& verdicts);
+// The last line. `holds`: what is said if all do.
+void print_conclusion(const std::vector<Verdict>& verdicts, const Shown& shown, const char* holds);
+void print_conclusion(const harness::SceneJudge& judge);
 
 }  // namespace cutproof::cli

@@ -3,13 +3,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "cli/output.h"
+#include "cli/progress.h"
 #include "cli/scene_files.h"
+#include "cli/screen.h"
 #include "cli/table.h"
 #include "cli/terminal.h"
 #include "model/io/filled.h"
@@ -49,23 +52,23 @@ void settle_files(Asked& asked) {
 }
 
 void print_beginning(const TuneOptions& options, const json& document, const Scene& given) {
-  print_filled(kHead, document);
-  fmt::print("scene {}: {}\n", printable(given.name), printable(given.description));
+  say_filled(kHead, document);
+  say("scene {}: {}\n", printable(given.name), printable(given.description));
   if (options.without_skin && given.expect.shells_at_end) {
-    fmt::print("--without-skin does nothing: the scene expects shells of its skin\n");
+    say("--without-skin does nothing: the scene expects shells of its skin\n");
   }
 }
 
 void print_reference(const TuneOptions& options, const json& reference) {
-  fmt::print("the reference solution: {}\n", options.reference == ReferenceKind::limit
-                                                 ? "the limit of short time steps"
-                                                 : "the scene's own substeps, each solved until converged");
+  say("the reference solution: {}\n", options.reference == ReferenceKind::limit
+                                          ? "the limit of short time steps"
+                                          : "the scene's own substeps, each solved until converged");
   for (const json& level : reference.at("levels")) {
-    print_filled("  reference, {substeps} × {iterations}", level);
-    if (!level.at("apart_h").is_null()) print_filled(": {apart_h:.2g} h from the one before", level);
-    fmt::print("\n");
+    say_filled("  reference, {substeps} × {iterations}", level);
+    if (!level.at("apart_h").is_null()) say_filled(": {apart_h:.2g} h from the one before", level);
+    say("\n");
   }
-  print_filled("  {known_text}\n", reference);
+  say_filled("  {known_text}\n", reference);
 }
 
 void print_trials(const json& trials) {
@@ -78,22 +81,24 @@ void print_trials(const json& trials) {
     const bool both = trial.at("differences") != "" && trial.at("why") != "";
     return io::filled(both ? "{differences}; {why}" : "{differences}{why}", trial);
   };
-  fmt::print("\n{}", table_of(trials, {{"substeps × iterations", "{substeps} × {iterations}"},
-                                       {"acceleration", "{acceleration}"},
-                                       {"RMS h", "{rms_h:.2g}"},
-                                       {"max h", "{max_h:.2g}"},
-                                       {"removed otherwise", "{removed_otherwise}"},
-                                       {"ms a frame", "{1e3*seconds_per_frame/median:.3f}"},
-                                       {"of given", of_given},
-                                       {"outcome", "{outcome}"},
-                                       {"else", more}}));
+  say_as_it_is("\n" + table_of(trials,
+                               {{"substeps × iterations", "{substeps} × {iterations}"},
+                                {"acceleration", "{acceleration}"},
+                                {"RMS h", "{rms_h:.2g}"},
+                                {"max h", "{max_h:.2g}"},
+                                {"removed otherwise", "{removed_otherwise}"},
+                                {"ms a frame", "{1e3*seconds_per_frame/median:.3f}"},
+                                {"of given", of_given},
+                                {"outcome", "{outcome}"},
+                                {"else", more}},
+                               2));
 }
 
 void print_not_taken(const json& document) {
   const json& left = document.at("left").back();
-  print_filled("{substeps} × {iterations}, acceleration {acceleration}, is not taken",
-               document.at("trials").at(left.at("trial").get<std::size_t>()));
-  print_filled(": {why}\n", left);
+  say_filled("{substeps} × {iterations}, acceleration {acceleration}, is not taken",
+             document.at("trials").at(left.at("trial").get<std::size_t>()));
+  say_filled(": {why}\n", left);
 }
 
 void print_found(const TuneOptions& options, const json& document) {
@@ -106,24 +111,23 @@ void print_found(const TuneOptions& options, const json& document) {
   const std::string tuned =
       io::filled("{1e3*median:.3f} ms a frame ({1e3*min:.3f} to {1e3*max:.3f})", found.at("seconds_per_frame"));
   if (index == 0) {
-    fmt::print("\nfound: nothing that is cheaper; the scene as it was given is within the tolerance\n  {}\n", tuned);
+    say("\nfound: nothing that is cheaper; the scene as it was given is within the tolerance\n  {}\n", tuned);
   } else {
     const auto ratio = found.at("times_cheaper").get<double>();
-    print_filled("\nfound: {substeps} × {iterations}, acceleration {acceleration}", trial);
-    if (trial.at("differences") != "") print_filled(", {differences}", trial);
-    fmt::print("\n  {}, as given {}: {}\n", tuned, ms_and_range(found.at("seconds_per_frame_as_given")),
-               ratio >= 1 ? fmt::format("{:.2f} times cheaper", ratio)
-                          : fmt::format("{:.2f} times as expensive, and what was given is not within", 1 / ratio));
+    say_filled("\nfound: {substeps} × {iterations}, acceleration {acceleration}", trial);
+    if (trial.at("differences") != "") say_filled(", {differences}", trial);
+    say("\n  {}, as given {}: {}\n", tuned, ms_and_range(found.at("seconds_per_frame_as_given")),
+        ratio >= 1 ? fmt::format("{:.2f} times cheaper", ratio)
+                   : fmt::format("{:.2f} times as expensive, and what was given is not within", 1 / ratio));
   }
-  print_filled("  verified: RMS {rms_h:.2g} h, max {max_h:.2g} h ", found.at("verified"));
-  print_filled("from the reference's {substeps} × {iterations}, {apart_h:.2g} h from the one before; ",
-               document.at("reference").at("levels").back());
-  print_filled("{verdicts} verdicts hold\n", found);
-  fmt::print("wrote {}\n", options.write);
+  say_filled("  verified: RMS {rms_h:.2g} h, max {max_h:.2g} h ", found.at("verified"));
+  say_filled("from the reference's {substeps} × {iterations}, {apart_h:.2g} h from the one before; ",
+             document.at("reference").at("levels").back());
+  say_filled("{verdicts} verdicts hold\n", found);
   if (trial.at("rotation") != given.at("rotation")) {
-    print_filled("  rotations are no part of a scene: run it with --rotation {rotation}\n", trial);
+    say_filled("  rotations are no part of a scene: run it with --rotation {rotation}\n", trial);
   }
-  if (options.frames) print_filled("  the scene was written whole, and looked at for {frames} frames only\n", document);
+  if (options.frames) say_filled("  the scene was written whole, and looked at for {frames} frames only\n", document);
 }
 
 void print(const TuneOptions& options, TuneStep step, const json& document, const Scene& given) {
@@ -141,7 +145,7 @@ void print(const TuneOptions& options, TuneStep step, const json& document, cons
     case TuneStep::found:
       return print_found(options, document);
     case TuneStep::reference_unknown:
-      fmt::print(
+      insist(
           "the reference solution is {}, so nothing can be said to be within {:g} h of it.\n"
           "  Give a greater tolerance{}.\n",
           document.at("reference").at("known_text").get<std::string>(), options.tolerance,
@@ -150,26 +154,37 @@ void print(const TuneOptions& options, TuneStep step, const json& document, cons
               : " or fewer --frames");
       return;
     case TuneStep::none_within:
-      fmt::print("none of {} configurations is within {:g} h of the reference solution, itself {}\n",
-                 document.at("trials").size(), options.tolerance,
-                 document.at("reference").at("known_text").get<std::string>());
+      insist("none of {} configurations is within {:g} h of the reference solution, itself {}\n",
+             document.at("trials").size(), options.tolerance,
+             document.at("reference").at("known_text").get<std::string>());
       return;
     case TuneStep::none_verified:
-      fmt::print("none of the configurations that seemed to be within {:g} h holds when it is verified\n",
-                 options.tolerance);
+      insist("none of the configurations that seemed to be within {:g} h holds when it is verified\n",
+             options.tolerance);
   }
 }
 
 int tune(Asked asked) {
   asked.tune.reference = asked.reference == "limit" ? ReferenceKind::limit : ReferenceKind::substeps;
   settle_files(asked);
+  Progress progress("trial", 0);
+  double part = 0;
   const bool found = run_tune(asked.tune, [&](TuneStep step, const json& document, const Scene& given) {
     print(asked.tune, step, document, given);
+    if (step == TuneStep::trial) part = std::max(part, part_searched(document, given));  // what is varied begins anew
+    if (!document.at("complete")) {
+      const char* const what = step == TuneStep::begun      ? "computing the reference solution"
+                               : step == TuneStep::searched ? "verifying"
+                                                            : "searching";
+      flush_output();
+      progress.show(static_cast<int64_t>(document.at("trials").size()), what, part);
+    }
     flush_output();
     // After each trial, so that what has been measured is kept if a later one fails; and in the end.
     if (step == TuneStep::trial || document.at("complete")) write_document(asked.json, document);
   });
-  if (!asked.json.empty()) fmt::print("wrote {}\n", asked.json);
+  if (!asked.json.empty()) say_copy("wrote", asked.json);
+  if (found) insist_copy("wrote", asked.tune.write);
   return found ? 0 : 1;
 }
 

@@ -12,6 +12,8 @@
 #include "cli/findings.h"
 #include "cli/options.h"
 #include "cli/output.h"
+#include "cli/screen.h"
+#include "cli/table.h"
 #include "model/io/array_file.h"
 
 namespace cutproof::cli {
@@ -51,8 +53,8 @@ int make_vectors(const VectorsOptions& options) {
       draw_vectors(*operation, options.seed, options.cases > 0 ? options.cases : usual_vector_cases(*operation),
                    options.precision == "double" ? Precision::binary64 : Precision::binary32);
   io::write_array_file(options.file, file_of(vectors));
-  fmt::print("wrote {}: {} cases of {}, of {} kinds, seed {}, {} precision\n", options.file, vectors.cases.size(),
-             operation->name, vectors.kinds.size(), options.seed, options.precision);
+  insist("wrote {}: {} cases of {}, of {} kinds, seed {}, {} precision\n", options.file, vectors.cases.size(),
+         operation->name, vectors.kinds.size(), options.seed, options.precision);
   return 0;
 }
 
@@ -67,29 +69,32 @@ struct CheckVectorsOptions {
 
 constexpr int kMostPrinted = 3;  // failures of one property
 
-void print(const Vectors& vectors, const VectorReport& report) {
-  fmt::print("{}: {} cases, {} precision\n", report.operation->name, report.cases,
-             vectors.precision == Precision::binary32 ? "single" : "double");
-  fmt::print("  {:<24} {:>10} {:>10} {:>18}\n", "property", "judged", "failed", "greatest of bound");
-  for (const harness::PropertySummary& p : report.properties.all()) {
-    fmt::print("  {:<24} {:>10} {:>10} {:>18}\n", p.property, p.judged, p.failed,
-               p.of_bound ? fmt::format("{:.2g}", *p.of_bound) : "-");
-  }
-  for (const NotJudged& each : report.not_judged) {
-    fmt::print("  not judged: {}: {}{}\n", each.property, each.why,
-               each.failing > 0 ? fmt::format(" (would fail in {} cases)", each.failing) : "");
-  }
+void print(const Vectors& vectors, const VectorReport& report, const std::string& again) {
+  say("{}: {} cases, {} precision\n", report.operation->name, report.cases,
+      vectors.precision == Precision::binary32 ? "single" : "double");
   std::map<std::string, int> printed;
   for (const VectorFailure& failure : report.failures) {
     if (++printed[failure.verdict.property] > kMostPrinted) continue;
-    fmt::print("FAILS: '{}', case {} ({}), which begins at row {}:\n  {}\n", failure.verdict.property, failure.index,
-               vectors.cases[static_cast<std::size_t>(failure.index)].kind, first_row(vectors, failure.index),
-               failure.verdict.witness.text);
+    insist("{}: '{}', case {} ({}), which begins at row {}:\n  {}\n", failing("FAILS"), failure.verdict.property,
+           failure.index, vectors.cases[static_cast<std::size_t>(failure.index)].kind,
+           first_row(vectors, failure.index), failure.verdict.witness.text);
   }
   for (const auto& [property, count] : printed) {
-    if (count > kMostPrinted) fmt::print("  and {} more cases fail in '{}'\n", count - kMostPrinted, property);
+    if (count > kMostPrinted) insist("  and {} more cases fail in '{}'\n", count - kMostPrinted, property);
   }
-  if (report.verdicts == 0) fmt::print("FAILS: nothing was judged\n");
+  if (!printed.empty()) insist_copy("see it again:", again);
+  Table table({"property", "judged", "failed", "greatest of bound"});
+  for (const harness::PropertySummary& p : report.properties.all()) {
+    const std::string failed = fmt::format("{}", p.failed);
+    table.add({p.property, fmt::format("{}", p.judged), p.failed > 0 ? failing(failed) : failed,
+               p.of_bound ? fmt::format("{:.2g}", *p.of_bound) : "-"});
+  }
+  say_as_it_is(table.text());
+  for (const NotJudged& each : report.not_judged) {
+    say("  {}: {}: {}{}\n", undecided("not judged"), each.property, each.why,
+        each.failing > 0 ? fmt::format(" (would fail in {} cases)", each.failing) : "");
+  }
+  if (report.verdicts == 0) insist("{}: nothing was judged\n", failing("FAILS"));
 }
 
 constexpr const char* kVectorsClass = "cutproof.check-vectors";
@@ -142,8 +147,8 @@ int check_vectors(const CheckVectorsOptions& options) {
   const AllAnswers answers = answers_of(io::read_array_file(options.answers), options.answers, vectors);
   const VectorReport report = judge_vectors(vectors, answers, promises);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  fmt::print("{}, answers to {}\n", options.answers, options.vectors);
-  print(vectors, report);
+  say("{}, answers to {}\n", options.answers, options.vectors);
+  print(vectors, report, options.again);
   json document = guests::to_json(vectors, report);
   document["format"] = "cutproof.check_vectors";
   document["format_version"] = 1;
@@ -159,7 +164,7 @@ int check_vectors(const CheckVectorsOptions& options) {
   std::vector<Failure> failures;
   std::vector<io::JunitCase> cases = junit_cases(vectors, report, seconds, options.again, failures);
   write_junit(options.junit, {"cutproof check-vectors", kVectorsClass, options.again}, seconds, std::move(cases));
-  fmt::print("{}\n", report.holds() ? "all hold" : "FAILS");
+  insist("{}\n", report.holds() ? holding("all hold") : failing("FAILS"));
   print_annotations(failures);
   return report.holds() ? 0 : 1;
 }

@@ -7,6 +7,7 @@
 
 #include "model/at.h"
 #include "oracles/oracles.h"
+#include "oracles/piece_sizes.h"
 #include "oracles/surface/surface.h"
 
 namespace cutproof::harness {
@@ -43,12 +44,19 @@ double dent_depth(const Setup& setup, const State& state, Vec3 back) {
 
 }  // namespace
 
-ExpectationCheck::ExpectationCheck(const Setup& setup, const Expectations& expectations, const Snapshot& initial)
+ExpectationCheck::ExpectationCheck(const Setup& setup, const Expectations& expectations, const Snapshot& initial,
+                                   Extent extent)
     : setup_(setup),
       expectations_(expectations),
+      extent_(extent),
       last_(initial),
       initial_clusters_(initial->clusters.count()),
-      components_after_stroke_(setup.stroke_end.size()) {}
+      after_stroke_(setup.stroke_end.size()) {}
+
+void ExpectationCheck::Greatest::see(double now, int64_t frame, const std::optional<Range>& expected) {
+  value = std::max(value, now);
+  if (!beyond && expected && value > expected->high) beyond = frame;
+}
 
 void ExpectationCheck::see(const Moment& moment) {
   if (!moment.span.contains(Stage::skin)) return;
@@ -56,84 +64,119 @@ void ExpectationCheck::see(const Moment& moment) {
   const State& state = *moment.after;
   if (!oracles::well_formed(setup_, state).holds) return;
   last_ = moment.after;
-  removed_ += static_cast<int64_t>(state.removed.size() + state.debris.size());
-  greatest_stretch_ = std::max(greatest_stretch_, greatest_stretch(setup_, state));
-  if (removed_ == 0 && setup_.has_blade && frame < setup_.frame_count()) {
+  const auto removed = static_cast<double>(state.removed.size() + state.debris.size());
+  removed_.see(removed_.value + removed, frame, expectations_.removed);
+  greatest_stretch_.see(greatest_stretch(setup_, state), frame, expectations_.greatest_stretch);
+  if (removed_.value == 0 && setup_.has_blade && frame < setup_.frame_count()) {
     const BladeMove& move = setup_.blade_moves[at((frame + 1) * setup_.step.substeps - 1)];
-    if (move.down) dent_ = std::max(dent_, dent_depth(setup_, state, move.to.back));
+    if (move.down) dent_.see(dent_depth(setup_, state, move.to.back), frame, expectations_.dent);
   }
   if (expectations_.isolated_clusters) {
-    isolated_ = std::max(isolated_, oracles::isolation(setup_, state).measured);
+    isolated_.see(oracles::isolation(setup_, state).measured, frame, expectations_.isolated_clusters);
   }
+  const bool ends_a_stroke =
+      std::find(setup_.stroke_end.begin(), setup_.stroke_end.end(), frame) != setup_.stroke_end.end();
+  const bool may_differ = frame == 0 || removed > 0;
+  if (!ends_a_stroke && !(may_differ && expectations_.components_at_end)) return;
+  const oracles::Partition pieces = oracles::graph_components(setup_, state);
+  if (pieces.count != components_) components_since_ = frame;
+  components_ = pieces.count;
   for (std::size_t s = 0; s < setup_.stroke_end.size(); ++s) {
-    if (setup_.stroke_end[s] == frame) components_after_stroke_[s] = oracles::graph_components(setup_, state).count;
+    if (setup_.stroke_end[s] == frame) after_stroke_[s] = {pieces.count, oracles::pieces_in_words(pieces)};
   }
 }
 
-Verdict ExpectationCheck::verdict(const std::string& what, double measured, double low, double high,
-                                  const std::string& unit, const std::string& text) const {
-  Verdict verdict;
-  verdict.property = "expected " + what;
-  verdict.stage = Stage::skin;
-  verdict.frame = std::max<int64_t>(frames_seen_ - 1, 0);
-  verdict.holds = low <= measured && measured <= high;
-  verdict.measured = measured;
-  verdict.bound = measured < low ? low : high;
-  verdict.unit = unit;
-  verdict.bound_source = "the scene's expect block";
-  verdict.checked = 1;
-  if (!verdict.holds) verdict.witness.text = text;
-  return verdict;
-}
-
-std::vector<Verdict> ExpectationCheck::verdicts() const {
-  std::vector<Verdict> found;
-  // `measured`: absent if it could not be counted, and then `why` says why.
-  const auto equal = [&](const std::string& what, std::optional<int64_t> measured, int64_t wanted,
-                         const std::string& when, const std::string& why) {
-    const double value = static_cast<double>(measured.value_or(-1));
-    found.push_back(verdict(what, value, static_cast<double>(wanted), static_cast<double>(wanted), "1",
-                            measured ? fmt::format("{} there are {}, expected {}", when, *measured, wanted) : why));
-    if (!measured) found.back().holds = false;
+ExpectationCheck::Judged ExpectationCheck::judged() const {
+  Judged found;
+  const auto add = [&](const std::string& what, double measured, double low, double high, const std::string& unit,
+                       int64_t frame, const std::string& text) {
+    Verdict& verdict = found.verdicts.emplace_back();
+    verdict.property = "expected " + what;
+    verdict.stage = Stage::skin;
+    verdict.frame = frame;
+    verdict.holds = low <= measured && measured <= high;
+    verdict.measured = measured;
+    verdict.bound = measured < low ? low : high;
+    verdict.unit = unit;
+    verdict.bound_source = "the scene's expect block";
+    verdict.checked = 1;
+    if (!verdict.holds) verdict.witness.text = text;
   };
+  const bool is_whole = extent_ == Extent::whole;
+  // `measured`: absent if it could not be counted, and then `why` says why.
+  const auto equal = [&](const std::string& what, std::optional<int64_t> measured, int64_t wanted, int64_t frame,
+                         const std::string& when, const std::string& pieces, const std::string& why) {
+    const auto value = static_cast<double>(measured.value_or(-1)), target = static_cast<double>(wanted);
+    add(what, value, target, target, "1", frame,
+        measured ? fmt::format("{} there are {}, expected {}; the tissue is {}", when, *measured, wanted, pieces)
+                 : why);
+    if (!measured) found.verdicts.back().holds = false;
+  };
+  // What may change until the run ends, unless it `is_final`, and what is too much and will not become less.
   const auto within = [&](const std::string& what, double measured, const std::optional<Range>& range,
-                          const std::string& unit) {
+                          const std::string& unit, int64_t frame, bool is_final, bool grows_only) {
     if (!range) return;
-    found.push_back(
-        verdict(what, measured, range->low, range->high, unit,
-                fmt::format("{} is {:.6g}, expected {:.6g} to {:.6g}", what, measured, range->low, range->high)));
+    if (!is_whole && !is_final && !(grows_only && measured > range->high)) {
+      found.not_reached.push_back(what);
+      return;
+    }
+    add(what, measured, range->low, range->high, unit, frame,
+        fmt::format("{} is {:.6g}, expected {:.6g} to {:.6g}", what, measured, range->low, range->high));
+  };
+  const auto greatest = [&](const std::string& what, const Greatest& of, const std::optional<Range>& range,
+                            const std::string& unit, bool is_final = false) {
+    within(what, of.value, range, unit, of.beyond.value_or(last_frame()), is_final, true);
   };
   const auto& after_stroke = expectations_.components_after_stroke;
   for (std::size_t s = 0; s < after_stroke.size(); ++s) {
-    const std::string stroke = std::to_string(s + 1);
-    const bool exists = s < components_after_stroke_.size();
-    equal("components after stroke " + stroke, exists ? components_after_stroke_[s] : std::nullopt, after_stroke[s],
-          "at the end of stroke " + stroke,
+    const std::string stroke = std::to_string(s + 1), what = "components after stroke " + stroke;
+    const bool exists = s < after_stroke_.size();
+    if (exists && !is_whole && setup_.stroke_end[s] < 0) {
+      found.not_reached.push_back(what);
+      continue;
+    }
+    const std::optional<AfterStroke> seen = exists ? after_stroke_[s] : std::nullopt;
+    equal(what, seen ? std::optional<int64_t>(seen->count) : std::nullopt, after_stroke[s],
+          seen ? setup_.stroke_end[s] : last_frame(), "at the end of stroke " + stroke, seen ? seen->pieces : "",
           exists ? "the end of stroke " + stroke + " was never reached, or its state could not be read"
                  : "the scene has no stroke " + stroke);
   }
   const State& last = *last_;
-  if (expectations_.components_at_end) {
-    equal("components at the end", oracles::graph_components(setup_, last).count, *expectations_.components_at_end,
-          "at the end", "");
-  }
-  if (expectations_.shells_at_end) {
+  const auto at_end = [&](const std::string& what, const std::optional<int64_t>& wanted, const auto& judge) {
+    if (!wanted) return;
+    if (is_whole) {
+      judge(what, *wanted);
+    } else {
+      found.not_reached.push_back(what);
+    }
+  };
+  at_end("components at the end", expectations_.components_at_end, [&](const std::string& what, int64_t wanted) {
+    const oracles::Partition pieces = oracles::graph_components(setup_, last);
+    const bool known_since = pieces.count == components_ && pieces.count > wanted;
+    equal(what, pieces.count, wanted, known_since ? components_since_ : last_frame(), "at the end",
+          oracles::pieces_in_words(pieces), "");
+  });
+  at_end("shells at the end", expectations_.shells_at_end, [&](const std::string& what, int64_t wanted) {
     const std::optional<oracles::ShellCount> shells = oracles::skin_shells(last.skin);
-    equal("shells at the end", shells ? std::optional<int64_t>(shells->outer) : std::nullopt,
-          *expectations_.shells_at_end, "at the end",
+    equal(what, shells ? std::optional<int64_t>(shells->outer) : std::nullopt, wanted, last_frame(), "at the end",
+          oracles::pieces_in_words(oracles::graph_components(setup_, last)),
           "the shells of the skin at the end cannot be counted: its triangles are no closed surface");
-  }
+  });
   const double clusters = static_cast<double>(initial_clusters_);
-  within("removed particles", static_cast<double>(removed_), expectations_.removed, "1");
-  within("isolated groups of clusters", isolated_, expectations_.isolated_clusters, "1");
+  greatest("removed particles", removed_, expectations_.removed, "1");
+  greatest("isolated groups of clusters", isolated_, expectations_.isolated_clusters, "1");
   within("cluster growth", clusters > 0 ? (last.clusters.count() - clusters) / clusters : 0,
-         expectations_.cluster_growth, "1");
-  within("clusters", clusters, expectations_.clusters, "1");
-  within("particles", setup_.body.particle_count(), expectations_.particles, "1");
-  within("dent before the first removal", dent_, expectations_.dent, "h");
-  within("greatest stretch", greatest_stretch_, expectations_.greatest_stretch, "h");
+         expectations_.cluster_growth, "1", last_frame(), false, false);
+  within("clusters", clusters, expectations_.clusters, "1", 0, true, false);
+  within("particles", setup_.body.particle_count(), expectations_.particles, "1", 0, true, false);
+  greatest("dent before the first removal", dent_, expectations_.dent, "h", removed_.value > 0);
+  greatest("greatest stretch", greatest_stretch_, expectations_.greatest_stretch, "h");
   return found;
 }
+
+std::vector<Verdict> ExpectationCheck::verdicts() const { return judged().verdicts; }
+
+std::vector<std::string> ExpectationCheck::not_reached() const { return judged().not_reached; }
 
 bool ExpectationCheck::any() const { return !(expectations_ == Expectations{}); }
 

@@ -11,16 +11,27 @@
 
 namespace cutproof::harness {
 
+// How much of its scene a run is.
+enum class Extent {
+  whole,
+  cut_short  // it was asked to stop before the scene's end (fixtures/reach.h)
+};
+
 class ExpectationCheck {
  public:
   // `setup` must outlive this. `initial` is the state as loaded.
-  ExpectationCheck(const Setup& setup, const Expectations& expectations, const Snapshot& initial);
+  ExpectationCheck(const Setup& setup, const Expectations& expectations, const Snapshot& initial,
+                   Extent extent = Extent::whole);
 
   // Every moment; only the ends of frames are looked at, and of them only those that are well formed.
   void see(const Moment& moment);
 
-  // After the last moment: one verdict for each thing that is expected, stage and frame filled in.
+  // After the last moment: one verdict for each thing that is expected, with the stage and the frame in which it went
+  // wrong: the first in which too much was seen, the last if there was too little. Of a run that is cut short only for
+  // what can be told: strokes that are complete, what cannot change any more, and what is too much already.
   std::vector<Verdict> verdicts() const;
+  // The rest of what is expected, which such a run has not reached.
+  std::vector<std::string> not_reached() const;
 
   // Whether the scene expects anything at all.
   bool any() const;
@@ -29,19 +40,34 @@ class ExpectationCheck {
   bool is_expected_failure(const Verdict& verdict) const;
 
  private:
-  Verdict verdict(const std::string& what, double measured, double low, double high, const std::string& unit,
-                  const std::string& text) const;
+  // Something that is counted in every frame, and never falls.
+  struct Greatest {
+    double value = 0;
+    std::optional<int64_t> beyond;  // the first frame in which it was more than is expected
+    void see(double now, int64_t frame, const std::optional<Range>& expected);
+  };
+  struct Judged {
+    std::vector<Verdict> verdicts;
+    std::vector<std::string> not_reached;
+  };
+  Judged judged() const;
+  int64_t last_frame() const { return frames_seen_ > 0 ? frames_seen_ - 1 : 0; }
 
   const Setup& setup_;
   Expectations expectations_;
+  Extent extent_;
   Snapshot last_;  // end of the last frame that is well formed
   int64_t initial_clusters_ = 0;
   int64_t frames_seen_ = 0;
-  int64_t removed_ = 0;
-  double dent_ = 0;              // [h]
-  double greatest_stretch_ = 0;  // [h]
-  double isolated_ = 0;
-  std::vector<std::optional<int64_t>> components_after_stroke_;
+  Greatest removed_, isolated_;
+  Greatest dent_, greatest_stretch_;  // [h]
+  int32_t components_ = 0;            // in the last frame in which they were counted
+  int64_t components_since_ = 0;      // the first frame from which on there are so many
+  struct AfterStroke {
+    int64_t count = 0;
+    std::string pieces;  // in words
+  };
+  std::vector<std::optional<AfterStroke>> after_stroke_;
 };
 
 }  // namespace cutproof::harness

@@ -8,11 +8,11 @@
 namespace cutproof::harness {
 
 SceneJudge::SceneJudge(const Setup& setup, const Expectations& expectations, std::string backend,
-                       const Snapshot& initial, Depth depth, Promises promises)
+                       const Snapshot& initial, Depth depth, Promises promises, Extent extent)
     : setup_(setup),
       depth_(depth),
       judge_(setup, std::move(backend), promises, Thorough::when_cut, depth),
-      expectations_(setup, expectations, initial) {
+      expectations_(setup, expectations, initial, extent) {
   judge_.begin(initial);
 }
 
@@ -47,7 +47,13 @@ void SceneJudge::finish() {
     looked.checked += verdict.checked;
     looked.excused = looked.excused || !verdict.vacuous.empty() || !verdict.holds;
   }
-  for (Verdict& verdict : expectations_.verdicts()) judge_.add(std::move(verdict));
+  std::vector<Verdict> expected = expectations_.verdicts();
+  const bool none_reached = expected.empty();
+  for (Verdict& verdict : expected) judge_.add(std::move(verdict));
+  not_reached_ = expectations_.not_reached();
+  if (none_reached && !not_reached_.empty()) {
+    note("The run stops before anything that the scene expects could be told: no outcome was held against it.");
+  }
   const auto frames = static_cast<double>(setup_.frame_count()), seen = static_cast<double>(judge_.frame());
   whole("the run is whole", seen == frames, seen, frames,
         fmt::format("it ends after frame {} of {}", judge_.frame(), setup_.frame_count()));
@@ -67,7 +73,7 @@ bool SceneJudge::holds() const {
                      [this](const Verdict& verdict) { return verdict.holds || is_expected_failure(verdict); });
 }
 
-std::vector<std::string> SceneJudge::notes() const {
+std::vector<std::string> SceneJudge::notes_beside_promises() const {
   std::vector<std::string> notes;
   if (!expectations_.any()) notes.push_back("The scene expects nothing: no outcome was held against it.");
   if (depth_ == Depth::topology) {
@@ -76,6 +82,11 @@ std::vector<std::string> SceneJudge::notes() const {
         "not asked.");
   }
   notes.insert(notes.end(), notes_.begin(), notes_.end());
+  return notes;
+}
+
+std::vector<std::string> SceneJudge::notes() const {
+  std::vector<std::string> notes = notes_beside_promises();
   for (const Judge::Unpromised& u : judge_.unpromised()) {
     notes.push_back(fmt::format("'{}' is not promised here: of {} states it would not hold in {}.", u.property,
                                 u.states, u.failing));

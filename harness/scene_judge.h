@@ -15,7 +15,7 @@ class SceneJudge {
   // `setup` must outlive this. `initial` is the state as loaded. Who says nothing about the depth judges by everything,
   // and by all that a scene promises.
   SceneJudge(const Setup& setup, const Expectations& expectations, std::string backend, const Snapshot& initial,
-             Depth depth = Depth::motion, Promises promises = {});
+             Depth depth = Depth::motion, Promises promises = {}, Extent extent = Extent::whole);
 
   void see(const Moment& moment);
   // Of somebody else's: a broken contract, or a relation between runs.
@@ -34,16 +34,21 @@ class SceneJudge {
   bool holds() const;
   bool is_expected_failure(const Verdict& verdict) const { return expectations_.is_expected_failure(verdict); }
   const std::vector<Judge::Unpromised>& unpromised() const { return judge_.unpromised(); }
+  // What the scene expects of frames and strokes that a run that is cut short has not reached: neither failures nor
+  // passes. Complete after finish().
+  const std::vector<std::string>& not_reached() const { return not_reached_; }
   // What a reader of the verdicts has to know, one sentence each: that the scene expects nothing, what was not judged,
   // which properties were not promised.
   std::vector<std::string> notes() const;
+  // The same but for those on promises, of which unpromised() says more.
+  std::vector<std::string> notes_beside_promises() const;
 
  private:
   const Setup& setup_;
   Depth depth_;
   Judge judge_;
   PropertySummaries summaries_;
-  std::vector<std::string> notes_;
+  std::vector<std::string> notes_, not_reached_;
   ExpectationCheck expectations_;
 };
 

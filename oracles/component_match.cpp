@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "oracles/checks.h"
+#include "oracles/piece_sizes.h"
 #include "oracles/shells.h"
 
 namespace cutproof::oracles {
@@ -42,6 +43,10 @@ void check_component_match(Judged& judged, Verdict& verdict) {
             "particles {} and {} are neighbours in component {} of the tissue, but no chain of "
             "clusters couples them",
             edge.a, edge.b, components.label[at(edge.a)]);
+  }
+  if (!verdict.holds) {
+    verdict.witness.text += fmt::format("; the tissue is {}, and what clusters couple is {}",
+                                        pieces_in_words(components), pieces_in_words(coupling));
   }
   verdict.measured = static_cast<double>(surplus + ghosts);
   for (const int32_t label : components.label) verdict.checked += label >= 0 ? 1 : 0;
@@ -115,6 +120,10 @@ void check_skin_match(Judged& judged, Verdict& verdict) {
   const int32_t cavities = count_cavities(judged);
   if (inner != cavities) {
     violate(verdict, {}, "the skin has {} inner shells, but the tissue has {} cavities", inner, cavities);
+  }
+  if (!verdict.holds) {
+    verdict.witness.text +=
+        fmt::format("; the tissue is {}, and the skin has {} shells", pieces_in_words(components), shell_count);
   }
 }
 

@@ -52,11 +52,15 @@ Measuring prepare(const TuneOptions& options) {
   return measuring;
 }
 
+std::vector<int32_t> searched_substeps(int32_t given) {
+  return substeps_to_try(given, std::max(ReferenceSolution::kMostSubsteps / 4, given));
+}
+
 SearchSpace space_of(const Measuring& measuring, const TuneOptions& options, const ReferenceSolution& reference) {
   SearchSpace space;
   const Scene& scene = measuring.given.scene;
   const int32_t given = scene.step.substeps;
-  space.substeps = substeps_to_try(given, std::max(ReferenceSolution::kMostSubsteps / 4, given));
+  space.substeps = searched_substeps(given);
   space.most_iterations = std::max(64, scene.step.iterations);
   if (harness::described_backend(options.backend.name).takes_kernel_options) {
     for (const std::string& rotation : sound_rotations()) {
@@ -125,6 +129,19 @@ json levels_json(const ReferenceSolution& reference) {
 }
 
 }  // namespace
+
+double part_searched(const json& so_far, const Scene& given) {
+  // Substeps rise, with and without acceleration; then what is cheapest is varied, which takes about as long as a fifth
+  // of that.
+  constexpr double kOfSteps = 0.85;
+  const std::vector<int32_t> substeps = searched_substeps(given.step.substeps);
+  const json& trials = so_far.at("trials");
+  if (trials.size() < 2) return 0;  // the scene as it is given
+  const json& last = trials.back();
+  const auto at = std::lower_bound(substeps.begin(), substeps.end(), last.at("substeps").get<int32_t>());
+  const double half = last.at("acceleration") == "none" ? 0.25 : 0.75;
+  return kOfSteps * (static_cast<double>(at - substeps.begin()) + half) / static_cast<double>(substeps.size());
+}
 
 bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
   const Measuring measuring = prepare(options);

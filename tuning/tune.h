@@ -22,6 +22,9 @@ enum class TuneStep {
 // `so_far`: the fields of results_schema.md. `given`: the scene that is tuned.
 using TuneProgress = std::function<void(TuneStep step, const nlohmann::json& so_far, const Scene& given)>;
 
+// After a trial: about how much of the search is done, in [0, 1].
+double part_searched(const nlohmann::json& so_far, const Scene& given);
+
 // Writes the scene that is found, and returns whether one is. Throws InputError for a scene, a backend or an option
 // that cannot be tuned, MachineError if the machine fails.
 bool run_tune(const TuneOptions& options, const TuneProgress& progress);

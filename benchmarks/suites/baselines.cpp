@@ -9,7 +9,11 @@ namespace cutproof::benchmarks {
 nlohmann::json run_baselines(const BaselinesOptions& options, const Progress& progress) {
   require_timed_backend(options.backend);
   Report report("baselines", options.backend,
-                {{"particles_asked", options.particles}, {"seed", options.seed}, {"holds", true}}, progress);
+                {{"particles_asked", options.particles},
+                 {"seed", options.seed},
+                 {"rows_at_most", baselines().size()},
+                 {"holds", true}},
+                progress);
   for (const Baseline& baseline : baselines()) {
     const std::unique_ptr<Backend> backend = make_timed_backend(options.backend);
     const ReadyScene scene = make_baseline_scene(baseline, options.particles, options.seed);

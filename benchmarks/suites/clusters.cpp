@@ -88,10 +88,13 @@ json run_clusters(const ClustersOptions& options, const Progress& progress) {
   const bool full = options.full || harness::described_backend(options.backend).takes_full_size;
   const int64_t particles = options.particles.value_or(full ? kPaperParticles : kFewParticles);
   const std::vector<Contender> contenders = make_contenders(options.backend, options.split, "");
-  Report report(
-      "clusters", options.backend,
-      {{"scene", kScene}, {"paper", {{"growth", kPaperGrowth}}}, {"wanted_growth", kWantedGrowth}, {"holds", true}},
-      progress);
+  Report report("clusters", options.backend,
+                {{"scene", kScene},
+                 {"paper", {{"growth", kPaperGrowth}}},
+                 {"wanted_growth", kWantedGrowth},
+                 {"rows_at_most", contenders.size() * taus.size()},
+                 {"holds", true}},
+                progress);
   for (const Contender& contender : contenders) {
     for (const std::optional<double>& tau : taus) {
       json row = run_cut(contender, tau, particles);

@@ -80,6 +80,7 @@ json run_factors(const FactorsOptions& options, const Progress& progress) {
                  {"seed", options.seed},
                  {"stiffness", kCutCubeStiffness},
                  {"substep_seconds", kCutCubeSubstepLength},
+                 {"rows_at_most", scenes.size()},
                  {"holds", true}},
                 progress, "scenes");
   for (const auto& [side, core] : scenes) {

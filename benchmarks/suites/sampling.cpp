@@ -25,6 +25,7 @@ nlohmann::json run_sampling(const SamplingOptions& options, const Progress& prog
                  {"repeats", options.repeats},
                  {"cooking", options.cooking},
                  {"scaled_down", scaled_down},
+                 {"rows_at_most", contenders.size() * steps.size() * paper_samplings().size()},
                  {"holds", true}},
                 progress);
   for (const Contender& contender : contenders) {

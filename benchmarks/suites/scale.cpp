@@ -19,11 +19,11 @@ nlohmann::json run_scale(const ScaleOptions& options, const Progress& progress) 
   const std::vector<int64_t> sizes = sizes_of(options);
   const int64_t frames = options.frames_or_default();
   const auto contenders = [&] { return make_contenders(options.backend, options.split, options.rotation); };
-  static_cast<void>(contenders());  // what cannot be made is refused before anything is shown
-  static_cast<void>(steps_of(options, {}));
+  // What cannot be made is refused before anything is shown.
+  const std::size_t rows = sizes.size() * contenders().size() * steps_of(options, {}).size();
   static_cast<void>(detection_of(options, {}));
-  Report report("scale", options.backend, {{"frames", frames}, {"repeats", options.repeats}, {"holds", true}},
-                progress);
+  Report report("scale", options.backend,
+                {{"frames", frames}, {"repeats", options.repeats}, {"rows_at_most", rows}, {"holds", true}}, progress);
   for (const int64_t size : sizes) {
     BenchScene scene = make_bench_scene(size, frames);
     scene.setup.detect = detection_of(options, scene.setup.detect);

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+
 #include "benchmarks/paper.h"
 #include "benchmarks/suites/suites.h"
 #include "fixtures/build.h"
@@ -99,14 +101,18 @@ json run_sensitivity(const SensitivityOptions& options, const Progress& progress
   harness::BackendChoice choice;
   choice.name = options.backend;
   const std::unique_ptr<Backend> backend = harness::make_backend(choice);
+  constexpr std::array<const char*, 3> kScenes = {"small_block", "kidney_discontinuous", kSliding};
+  std::size_t rows_of_a_scene = 0;
+  for (const Disturbance& disturbance : disturbances()) rows_of_a_scene += disturbance.of_run ? 1 : kStages.size();
   Report report("sensitivity", options.backend,
                 {{"particles_asked", options.particles},
                  {"moments", options.moments},
                  {"least_tried", kLeastSize},
                  {"scenes", json::array()},
+                 {"rows_at_most", kScenes.size() * rows_of_a_scene},
                  {"holds", true}},
                 progress);
-  for (const std::string name : {"small_block", "kidney_discontinuous", kSliding}) {
+  for (const std::string name : kScenes) {
     ReadyScene scene = make_scene(name == kSliding ? "small_block" : name, options.particles);
     if (name == kSliding) {
       scene.name = name;

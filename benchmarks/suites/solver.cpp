@@ -89,10 +89,12 @@ json run_solver(const SolverOptions& options, const Progress& progress) {
   std::vector<ReadyScene> scenes = {make_block_scene()};
   if (particles > 0) scenes.push_back(make_body_scene(particles));
 
-  Report report(
-      "solver", options.backend,
-      {{"precision", name_of(backend->precision())}, {"tolerance_h", options.tolerance}, {"samples", options.samples}},
-      progress, "scenes");
+  Report report("solver", options.backend,
+                {{"precision", name_of(backend->precision())},
+                 {"tolerance_h", options.tolerance},
+                 {"samples", options.samples},
+                 {"rows_at_most", scenes.size() * options.stiffness.size() * options.substeps.size()}},
+                progress, "scenes");
   for (const ReadyScene& scene : scenes) {
     for (const double stiffness : options.stiffness) {
       for (const int32_t substeps : options.substeps) {

@@ -124,15 +124,13 @@ json run_stages(const StagesOptions& options, const Progress& progress) {
   const int64_t frames = options.frames_or_default();
   const auto scenes = scenes_of(options, frames);
   const auto contenders = [&] { return make_contenders(options.backend, options.split, options.rotation); };
-  static_cast<void>(contenders());  // what cannot be made or asked for is refused before anything is measured
-  static_cast<void>(steps_of(options, {}));
+  // What cannot be made or asked for is refused before anything is measured.
+  const std::size_t rows = scenes.size() * contenders().size() * steps_of(options, {}).size();
   static_cast<void>(detection_of(options, {}));
   const MachineLimits machine = measure_machine(options.described());
-  json fields = {{"frames", frames},
-                 {"repeats", options.repeats},
-                 {"machine_limits", to_json(machine)},
-                 {"holds", true},
-                 {"rows", json::array()}};
+  json fields = {
+      {"frames", frames}, {"repeats", options.repeats}, {"machine_limits", to_json(machine)}, {"rows_at_most", rows},
+      {"holds", true},    {"rows", json::array()}};
 #if CUTPROOF_HAS_CUDA
   if (options.described().needs_device()) {
     fields["launch_layer"] = json::parse(gpu::raw_baseline_json(gpu::compare_with_raw(1'000'000, 200)));

@@ -4,7 +4,7 @@ namespace cutproof::cli {
 
 namespace {
 
-void print_seed(const nlohmann::json& document) { print_filled("seed {seed}\n", document); }
+void print_seed(const nlohmann::json& document) { say_filled("seed {seed}\n", document); }
 
 void print_baselines(const nlohmann::json& document) {
   const std::vector<Column> columns = {
@@ -18,12 +18,11 @@ void print_baselines(const nlohmann::json& document) {
       {"Hausdorff [h]", "{geometry/hausdorff:.3g}"},
       {"interpenetration [h³]", "{interpenetration/volume:.3g} ± {interpenetration/bound:.2g}"},
       {"clusters", "{clusters_before} -> {clusters}"}};
-  fmt::print("\n{}\n", table_of(document.at("rows"), columns));
-  fmt::print(
-      "ideal: the least that removing particles can lose; a blade without thickness would lose nothing.\n"
+  say_as_it_is(fmt::format("\n{}\n", table_of(document.at("rows"), columns)));
+  say("ideal: the least that removing particles can lose; a blade without thickness would lose nothing.\n"
       "The two that delete are emulated beside the backend: their time is that of step, detect and skin.\n");
   if (!document.at("holds")) {
-    fmt::print("FAILS: this method left clusters isolated, or components that are not the same\n");
+    insist("FAILS: this method left clusters isolated, or components that are not the same\n");
   }
 }
 

@@ -44,16 +44,16 @@ void print_curves(const std::vector<json>& curves) {
   add("error: verdicts that fail", [](const json& curve) {
     return fmt::format("{} of {}", curve.at("error").at("failed").size(), curve.at("error").at("verdicts").dump());
   });
-  fmt::print("\n{}", table.text());
+  say_as_it_is("\n" + table.text());
 }
 
 void print_row(const json& document) {
   const json& curve = document.at("rows").back();
-  fmt::print("{}, ", name_of(curve));
-  print_filled("split {split}: {particles} particles, ", curve);
-  fmt::print("{} to {} clusters\n", curve.at("clusters").front().dump(), curve.at("clusters").back().dump());
+  say("{}, ", name_of(curve));
+  say_filled("split {split}: {particles} particles, ", curve);
+  say("{} to {} clusters\n", curve.at("clusters").front().dump(), curve.at("clusters").back().dump());
   for (const json& verdict : curve.at("error").at("failed")) {
-    print_filled("  FAILS in frame {frame}: {property}: {witness/text}\n", verdict);
+    insist_text(io::filled("  FAILS in frame {frame}: {property}: {witness/text}\n", verdict));
   }
 }
 
@@ -68,8 +68,7 @@ void print_tables(const json& document) {
   }
   const auto particles = document.at("rows").front().at("particles").get<int64_t>();
   if (particles < benchmarks::kPaperParticles * 98 / 100) {
-    fmt::print("at {} particles a cluster more or less is much; --full takes {}\n", particles,
-               benchmarks::kPaperParticles);
+    say("at {} particles a cluster more or less is much; --full takes {}\n", particles, benchmarks::kPaperParticles);
   }
 }
 

@@ -10,21 +10,24 @@ void print_factors(const nlohmann::json& document) {
     const bool within = row.at("residual") <= row.at("residual_bound");
     return io::filled(within ? "{residual_bound:.1e}" : "{residual_bound:.1e} EXCEEDED", row);
   };
-  print_filled("\n{scene}: {particles} particles, {clusters} clusters\n", scene);
-  fmt::print("{}", table_of(scene.at("rows"), {{"cut", "{cut}"},
-                                               {"removed", "{removed}"},
-                                               {"rows changed", "{changed_rows}"},
-                                               {"new", "{new_rows}"},
-                                               {"way", "{way}"},
-                                               {"median ms", "{1e3*seconds/median:.4g}"},
-                                               {"least", "{1e3*seconds/min:.4g}"},
-                                               {"solve ms", "{1e3*solve_seconds/median:.4g}"},
-                                               {"entries", "{entries}"},
-                                               {"residual", "{residual:.1e}"},
-                                               {"bound", bound}}));
+  say_filled("\n{scene}: {particles} particles, {clusters} clusters\n", scene);
+  say_as_it_is(table_of(scene.at("rows"),
+                        {{"cut", "{cut}"},
+                         {"way", "{way}"},
+                         {"removed", "{removed}"},
+                         {"rows changed", "{changed_rows}"},
+                         {"new", "{new_rows}"},
+
+                         {"median ms", "{1e3*seconds/median:.4g}"},
+                         {"least", "{1e3*seconds/min:.4g}"},
+                         {"solve ms", "{1e3*solve_seconds/median:.4g}"},
+                         {"entries", "{entries}"},
+                         {"residual", "{residual:.1e}"},
+                         {"bound", bound}},
+                        2));
   const nlohmann::json& substep = scene.at("converged_substep");
-  print_filled("  a converged substep: {seconds:.4g} s, {alternations} alternations", substep);
-  fmt::print("{}\n", substep.at("converged") ? "" : ", NOT converged");
+  say_filled("  a converged substep: {seconds:.4g} s, {alternations} alternations", substep);
+  say("{}\n", substep.at("converged") ? "" : ", NOT converged");
 }
 
 }  // namespace

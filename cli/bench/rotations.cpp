@@ -28,7 +28,7 @@ void print_cases(const json& document, const std::string& precision) {
       return std::string();
     });
   }
-  fmt::print("\n{}", table_of(document.at("cases"), columns));
+  say_as_it_is("\n" + table_of(document.at("cases"), columns));
 }
 
 // One line for each method.
@@ -37,43 +37,44 @@ void print_methods(const json& document) {
     const bool front = row.at("on_front"), is_default = row.at("default");
     return front && is_default ? "front, default" : front ? "front" : is_default ? "default" : "";
   };
-  fmt::print("\n{}", table_of(document.at("methods"), {{"method", "{method}"},
-                                                       {"precision", "{precision}"},
-                                                       {"worst gap", "{worst_gap:.1e}"},
-                                                       {"in case", "{worst_case}"},
-                                                       {"‖RᵀR - I‖", "{worst_orthogonality:.1e}"},
-                                                       {"wrong", "{wrong}"},
-                                                       {"NaN", "{not_finite}"},
-                                                       {"near ms", "{1e3*near_seconds_per_million/median:.4g}"},
-                                                       {"least", "{1e3*near_seconds_per_million/min:.4g}"},
-                                                       {"most", "{1e3*near_seconds_per_million/max:.4g}"},
-                                                       {"cold ms", "{1e3*cold_seconds_per_million/median:.4g}"},
-                                                       {"× limit", "{multiple_of_limit:.1f}"},
-                                                       {"", marks}}));
+  say_as_it_is("\n" + table_of(document.at("methods"),
+                               {{"method", "{method}"},
+                                {"precision", "{precision}"},
+                                {"worst gap", "{worst_gap:.1e}"},
+                                {"in case", "{worst_case}"},
+                                {"‖RᵀR - I‖", "{worst_orthogonality:.1e}"},
+                                {"wrong", "{wrong}"},
+                                {"NaN", "{not_finite}"},
+                                {"near ms", "{1e3*near_seconds_per_million/median:.4g}"},
+                                {"least", "{1e3*near_seconds_per_million/min:.4g}"},
+                                {"most", "{1e3*near_seconds_per_million/max:.4g}"},
+                                {"cold ms", "{1e3*cold_seconds_per_million/median:.4g}"},
+                                {"× limit", "{multiple_of_limit:.1f}"},
+                                {"", marks}},
+                               2));
 }
 
 void print_what_is_wrong(const json& document) {
-  fmt::print("\nTimes are of a million matrices, near the answer ({} rad) and from the identity.",
-             benchmarks::kNearTurn);
-  print_filled(
-      " An answer is wrong beyond a\n"
+  say("\nTimes are of a million matrices, near the answer ({} rad) and from the identity.", benchmarks::kNearTurn);
+  say_filled(
+      " An answer is wrong beyond a "
       "gap of {single/gap:.1e} or ‖RᵀR - I‖ = {single/orthogonality:.1e} (double: {double/gap:.1e}, "
-      "{double/orthogonality:.1e}), or where the case expects another. The best values\n"
+      "{double/orthogonality:.1e}), or where the case expects another. The best values "
       "that answers are compared with are certain to {single/reference_error:.1e} (double: "
       "{double/reference_error:.1e}).\n",
       document.at("bounds"));
   for (const json& method : document.at("methods")) {
     if (!method.at("default")) continue;
-    print_filled("The default, {method} in {precision} precision, is wrong in {wrong} of {answers} answers.\n", method);
+    say_filled("The default, {method} in {precision} precision, is wrong in {wrong} of {answers} answers.\n", method);
     for (const json& row : document.at("rows")) {
       if (row.at("method") != method.at("method") || row.at("precision") != method.at("precision")) continue;
-      if (row.at("wrong") > 0) print_filled("  FAILS: {case}: {first_wrong}\n", row);
+      if (row.at("wrong") > 0) insist_text(io::filled("  FAILS: {case}: {first_wrong}\n", row));
     }
   }
 }
 
 void print_begin(const json& document) {
-  print_filled(
+  say_filled(
       "{matrices} matrices of each case, {timed} timed {repeats} times, seed {seed}; copy, read + written: "
       "{1e-9*machine_limits/copy_bytes_per_second:.4g} GB/s\n",
       document);

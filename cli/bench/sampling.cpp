@@ -11,7 +11,7 @@ void print_sampling(const nlohmann::json& document) {
                {{"to first", to_first},
                 {"paper ms", "{1e3*paper/frame_seconds:.2f}"},
                 {"to first", [&](const nlohmann::json& row) { return to_first(row.at("paper")); }}});
-  if (!whole) print_filled("at 1/{scaled_down} of the paper's particles; --full takes them all\n", document);
+  if (!whole) say_filled("at 1/{scaled_down} of the paper's particles; --full takes them all\n", document);
 }
 
 }  // namespace

@@ -1,13 +1,21 @@
 #include "cli/bench/suites.h"
+#include "model/io/verdict_json.h"
 
 namespace cutproof::cli {
 
 namespace {
 
+// Of a size: relative to what is there is what has no unit.
+std::string words_of(const nlohmann::json& unit) { return unit == "1" ? "relative" : unit.get<std::string>(); }
+
 void print_row_of_sensitivity(const nlohmann::json& document) {
   const nlohmann::json& row = document.at("rows").back();
-  print_filled("{scene}, {disturbance} after {stage}: ", row);
-  print_filled(row.at("least").is_null() ? "nothing is rejected\n" : "{least:.2g} {unit}, {property}\n", row);
+  say_filled("{scene}, {disturbance} after {stage}: ", row);
+  if (row.at("least").is_null()) {
+    say("nothing is rejected\n");
+  } else {
+    say("{} {}, {}\n", io::filled("{least:.2g}", row), words_of(row.at("unit")), io::filled("{property}", row));
+  }
 }
 
 void print_sensitivity(const nlohmann::json& document) {
@@ -15,24 +23,30 @@ void print_sensitivity(const nlohmann::json& document) {
     const nlohmann::json& goal = row.at("within_goal");
     return goal.is_null() ? "" : goal.get<bool>() ? "within" : "not yet";
   };
-  fmt::print("\n{}", table_of(document.at("rows"), {{"disturbance", "{disturbance}"},
-                                                    {"after", "{stage}"},
-                                                    {"scene", "{scene}"},
-                                                    {"unit", "{unit}"},
-                                                    {"least rejected", "{least:.2g}"},
-                                                    {"by", "{property}"},
-                                                    {"its measured", "{measured:.2g} {measured_unit}"},
-                                                    {"of bound", "{of_bound:.2g}"},
-                                                    {"rounding", "{rounding:.2g}"},
-                                                    {"ratio", "{ratio:.2g}"},
-                                                    {"goal", "{goal:.2g}"},
-                                                    {"", within}}));
-  fmt::print(
-      "least rejected: of a bisection, in the best of the moments. its measured, of bound: the greatest of that\n"
+  say_as_it_is("\n" + table_of(document.at("rows"),
+                               {{"disturbance", "{disturbance}"},
+                                {"after", "{stage}"},
+                                {"scene", "{scene}"},
+                                {"unit", [](const nlohmann::json& row) { return words_of(row.at("unit")); }},
+                                {"least rejected", "{least:.2g}"},
+                                {"by", "{property}"},
+                                {"its measured",
+                                 [](const nlohmann::json& row) {
+                                   const std::string measured = io::filled("{measured:.2g}", row);
+                                   const nlohmann::json& unit = row.at("measured_unit");
+                                   return unit.is_null() ? measured : io::in_unit(measured, unit);
+                                 }},
+                                {"of bound", "{of_bound:.2g}"},
+                                {"rounding", "{rounding:.2g}"},
+                                {"ratio", "{ratio:.2g}"},
+                                {"goal", "{goal:.2g}"},
+                                {"", within}},
+                               3));
+  say("least rejected: of a bisection, in the best of the moments. its measured, of bound: the greatest of that "
       "property over the run as it is. rounding: by how much the run as it is differs from the reference's stages.\n");
   for (const nlohmann::json& scene : document.at("scenes")) {
     for (const nlohmann::json& verdict : scene.at("failed")) {
-      print_filled("FAILS as it is: {property}: {witness/text}\n", verdict);
+      insist_text(io::filled("FAILS as it is: {property}: {witness/text}\n", verdict));
     }
   }
 }

@@ -6,21 +6,20 @@ namespace {
 
 void print_entry(const nlohmann::json& document) {
   const nlohmann::json& entry = document.at("scenes").back();
-  print_filled("\n{scene}: {particles} particles, {clusters} clusters; k = {stiffness:g}, {substeps} substep", entry);
-  fmt::print("{}", entry.at("substeps") == 1 ? "" : "s");
-  print_filled(" of {1e3*substep_seconds:g} ms", entry);
-  print_filled("; {precision} precision", document);
-  fmt::print("{}\n",
-             entry.at("converged") ? "" : "; NO converged solution was found, errors are from the last alternation");
-  fmt::print("{}", table_of(entry.at("rows"), {{"acceleration", "{acceleration}"},
-                                               {"iterations", "{iterations}"},
-                                               {"max h", "{max_h:.2g}"},
-                                               {"RMS h", "{rms_h:.2g}"},
-                                               {"energy gap", "{energy_gap:.1e}"},
-                                               {"median ms", "{1e3*seconds/median:.4f}"}}));
+  say_filled("\n{scene}: {particles} particles, {clusters} clusters; k = {stiffness:g}, {substeps} substep", entry);
+  say("{}", entry.at("substeps") == 1 ? "" : "s");
+  say_filled(" of {1e3*substep_seconds:g} ms", entry);
+  say_filled("; {precision} precision", document);
+  say("{}\n", entry.at("converged") ? "" : "; NO converged solution was found, errors are from the last alternation");
+  say_as_it_is(table_of(entry.at("rows"), {{"acceleration", "{acceleration}"},
+                                           {"iterations", "{iterations}"},
+                                           {"max h", "{max_h:.2g}"},
+                                           {"RMS h", "{rms_h:.2g}"},
+                                           {"energy gap", "{energy_gap:.1e}"},
+                                           {"median ms", "{1e3*seconds/median:.4f}"}}));
   for (const nlohmann::json& least : entry.at("to_tolerance")) {
-    print_filled("  {tolerance_h:g} h: ", document);
-    print_filled("{acceleration} after {iterations} iterations, {1e3*seconds:.4f} ms\n", least);
+    say_filled("  {tolerance_h:g} h: ", document);
+    say_filled("{acceleration} after {iterations} iterations, {1e3*seconds:.4f} ms\n", least);
   }
 }
 

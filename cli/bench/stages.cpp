@@ -15,15 +15,15 @@ using nlohmann::json;
 
 void print_machine(const json& document) {
   const json& machine = document.at("machine_limits");
-  print_filled("copy, read + written: {1e-9*copy_bytes_per_second:.4g} GB/s", machine);
+  say_filled("copy, read + written: {1e-9*copy_bytes_per_second:.4g} GB/s", machine);
   if (machine.contains("graph_node_seconds")) {
-    print_filled(
+    say_filled(
         "; one node of a graph {1e6*graph_node_seconds:.2f} µs (40 empty kernels {1e6*chain_of_40_seconds:.1f} µs), a "
         "read that waits for another {1e6*l2_round_trip_seconds:.2f} µs, a barrier of the grid "
         "{1e6*grid_sync_seconds:.2f} µs",
         machine);
   }
-  fmt::print("\n");
+  say("\n");
 }
 
 // [scenes] the rows of each, which stand one after the other and begin with whole frames.
@@ -39,43 +39,43 @@ std::vector<std::vector<json>> rows_by_scene(const json& document) {
 void print_last_scene(const json& document) {
   const json& scene = document.at("scenes").back();
   const std::vector<json> rows = rows_by_scene(document).back();
-  print_filled("\n{scene}: {body/particles} particles, {body/clusters} clusters ({cooking}), ", scene);
-  print_filled("{body/memberships} memberships, h = {1e3*body/spacing:.4g} mm; ", scene);
-  print_filled("the blade goes on by {blade_advance_h:.2g} h a frame\n", scene);
+  say_filled("\n{scene}: {body/particles} particles, {body/clusters} clusters ({cooking}), ", scene);
+  say_filled("{body/memberships} memberships, h = {1e3*body/spacing:.4g} mm; ", scene);
+  say_filled("the blade goes on by {blade_advance_h:.2g} h a frame\n", scene);
   const json& body = scene.at("body");
   const auto particles = body.at("particles").get<double>(), groups = body.at("groups").get<double>();
   const auto loose = body.at("loose").get<double>();
-  fmt::print("{:.0f} groups of {:.3g} particles, {:.0f} particles in none", groups,
-             groups > 0 ? (particles - loose) / groups : 0, loose);
-  if (!scene.at("bytes").is_null())
-    fmt::print("; {:.0f} bytes a particle", scene.at("bytes").get<double>() / particles);
-  fmt::print("\n");
-  print_filled("{backend}, {precision} precision, {substeps} substeps × {iterations} iterations, ", rows.front());
-  print_filled("acceleration {acceleration}, rotation {rotation}, split {split}, remove {remove}\n", rows.front());
+  say("{:.0f} groups of {:.3g} particles, {:.0f} particles in none", groups,
+      groups > 0 ? (particles - loose) / groups : 0, loose);
+  if (!scene.at("bytes").is_null()) say("; {:.0f} bytes a particle", scene.at("bytes").get<double>() / particles);
+  say("\n");
+  say_filled("{backend}, {precision} precision, {substeps} substeps × {iterations} iterations, ", rows.front());
+  say_filled("acceleration {acceleration}, rotation {rotation}, split {split}, remove {remove}\n", rows.front());
   const bool limits = std::any_of(rows.begin(), rows.end(), [](const json& row) { return !row.at("limit").is_null(); });
-  const auto line = [&](auto what, auto median, auto least, auto most, const std::array<std::string, 4>& limit,
-                        auto frames, auto paper, auto error) {
-    fmt::print("  {:<14} {:>11} {:>11} {:>11} ", what, median, least, most);
-    if (limits) fmt::print("{:>9} {:>7} {:>10} {:>7} ", limit[0], limit[1], limit[2], limit[3]);
-    fmt::print("{:>9} {:>9}  {}\n", frames, paper, error);
-  };
-  line("", "median ms", "least ms", "most ms", {"MB", "phases", "limit ms", "×"}, "frames", "paper ms", "error");
+  std::vector<std::string> head = {"", "median ms", "least ms", "most ms"};
+  if (limits) head.insert(head.end(), {"MB", "phases", "limit ms", "×"});
+  head.insert(head.end(), {"frames", "paper ms", "error"});
+  Table table(head);
   for (const json& row : rows) {
     const auto text = [&](const char* cell) { return io::filled(cell, row); };
-    std::array<std::string, 4> limit;
-    if (!row.at("limit").is_null()) {
-      limit = {text("{1e-6*limit/bytes:.4g}"), text("{limit/phases}"), text("{1e3*limit/seconds:.4f}"),
-               row.at("limit").at("multiple").is_null() ? "" : text("{limit/multiple:.2f}")};
+    std::vector<std::string> cells = {text("{what}"), text("{1e3*seconds/median:.4f}"), text("{1e3*seconds/min:.4f}"),
+                                      text("{1e3*seconds/max:.4f}")};
+    if (limits && row.at("limit").is_null()) cells.insert(cells.end(), 4, "");
+    if (limits && !row.at("limit").is_null()) {
+      const bool has_multiple = !row.at("limit").at("multiple").is_null();
+      cells.insert(cells.end(), {text("{1e-6*limit/bytes:.4g}"), text("{limit/phases}"),
+                                 text("{1e3*limit/seconds:.4f}"), has_multiple ? text("{limit/multiple:.2f}") : ""});
     }
-    line(text("{what}"), text("{1e3*seconds/median:.4f}"), text("{1e3*seconds/min:.4f}"), text("{1e3*seconds/max:.4f}"),
-         limit, text("{frames}/{of}"), row.at("paper_seconds").is_null() ? "" : text("{1e3*paper_seconds:.2f}"),
-         text("{error_text}"));
+    cells.insert(cells.end(),
+                 {text("{frames}/{of}"), row.at("paper_seconds").is_null() ? "" : text("{1e3*paper_seconds:.2f}"),
+                  text("{error_text}")});
+    table.add(cells);
   }
+  say_as_it_is(table.text());
   if (scene.contains("topology")) {
     print_failures(rows.front().at("error"));
   } else {
-    fmt::print("  errors not measured: beyond {} particles the reference takes minutes\n",
-               benchmarks::kMostJudgedParticles);
+    say("  errors not measured: beyond {} particles the reference takes minutes\n", benchmarks::kMostJudgedParticles);
   }
 }
 
@@ -112,7 +112,7 @@ void print_table_1(const json& document) {
   }
   Table table;
   for (const std::vector<std::string>& line : lines) table.add(line);
-  fmt::print("\n{}", table.text());
+  say_as_it_is("\n" + table.text());
 }
 
 }  // namespace

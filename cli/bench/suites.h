@@ -11,6 +11,8 @@
 #include "benchmarks/suites/suites.h"
 #include "cli/commands.h"
 #include "cli/options.h"
+#include "cli/progress.h"
+#include "cli/screen.h"
 #include "cli/table.h"
 #include "cli/terminal.h"
 #include "model/io/filled.h"

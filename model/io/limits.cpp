@@ -2,52 +2,59 @@
 
 #include <fmt/format.h>
 
+#include "model/io/columns.h"
+
 namespace cutproof::io {
 namespace {
 
-// 1234567 as "1,234,567".
-std::string count_text(uint64_t count) {
-  std::string text = fmt::format("{}", count);
-  for (std::size_t at = text.size(); at > 3;) text.insert(at -= 3, ",");
-  return text;
+std::string count_text(uint64_t count) { return grouped(static_cast<long long>(count)); }
+
+// What is read, where that is another thing than in the row before, and below it one limit.
+std::string row(std::string_view file, std::string_view what, const std::string& most) {
+  const std::string head = file.empty() ? "" : fmt::format("- {}\n", file);
+  return wrapped_text(fmt::format("{}  - {}: {}\n", head, what, most));
 }
 
 std::string json_rows(const JsonLimits& limits, std::string_view read_by) {
-  return fmt::format(
-      "| {} ({}) | bytes | {} |\n|  | brackets within brackets | {} |\n|  | values, names of fields included | {} |\n",
-      limits.what, read_by, bytes_text(limits.bytes), limits.depth, count_text(static_cast<uint64_t>(limits.values)));
-}
-
-std::string row(std::string_view file, std::string_view what, const std::string& most) {
-  return fmt::format("| {} | {} | {} |\n", file, what, most);
+  return row(fmt::format("{} ({})", limits.what, read_by), "bytes", bytes_text(limits.bytes)) +
+         row("", "brackets within brackets", count_text(static_cast<uint64_t>(limits.depth))) +
+         row("", "values, names of fields included", count_text(static_cast<uint64_t>(limits.values)));
 }
 
 constexpr std::string_view kHead = R"(# Limits of what is read
 
-This page is what `cutproof info --limits` prints; a test sees to it that the two are equal.
+This page is what `cutproof info --limits` prints; a test sees to it that the
+two are equal.
 
-What goes beyond a limit is refused with exit status 2, before memory is taken for it; the error names the limit. A
-scene, counterexample, result or question within the limits is read in seconds and some hundred megabytes.
+What goes beyond a limit is refused with exit status 2, before memory is taken
+for it; the error names the limit. A scene, counterexample, result or question
+within the limits is read in seconds and some hundred megabytes.
 
-| file | what | at most |
-|---|---|---|
+What is read of each at most:
+
 )";
 
 constexpr std::string_view kRest = R"(
-**Regular files only.** Files to read may be links, but what these lead to must be a regular file. Pipes, sockets,
-devices and folders are refused before they are opened, so nothing waits. That holds for process substitution,
-`<(...)`, too, and for `/dev/stdin` unless it is a file (`< scene.json`): write into a file first what comes through a
-pipe.
+**Regular files only.** Files to read may be links, but what these lead to must
+be a regular file. Pipes, sockets, devices and folders are refused before they
+are opened, so nothing waits. That holds for process substitution, `<(...)`,
+too, and for `/dev/stdin` unless it is a file (`< scene.json`): write into a
+file first what comes through a pipe.
 
-**What is compressed** (recordings, NPZ, HDF5) is refused before it is inflated if it would become larger than the last
-two rows say. HDF5 files hold everything themselves: links to other files, soft links, data in other files (external
-storage, virtual datasets) and filters that are not HDF5's own are refused, and no filter is loaded.
+**What is compressed** (recordings, NPZ, HDF5) is refused before it is inflated
+if it would become larger than the last two limits say. HDF5 files hold
+everything themselves: links to other files, soft links, data in other files
+(external storage, virtual datasets) and filters that are not HDF5's own are
+refused, and no filter is loaded.
 
-**Names.** A file may have any name, UTF-8 or not, without line ends, which are refused on the command line. Names of
-plugins (`judge FILE.so`, `--backend plugin:FILE.so`) are kept in counterexamples, so they must be UTF-8. What is printed of names and
-of texts from files has `\x1b`, `\u202e` and the like in place of what would act on a terminal or change the direction
-of reading, and `\xe9` for a byte that is no UTF-8; commands to be given again quote such names as `$'caf\xe9.json'`.
-JSON, JUnit and annotations have the same, and stay valid UTF-8.
+**Names.** A file may have any name, UTF-8 or not, without line ends, which are
+refused on the command line. Names of plugins (`judge FILE.so`, `--backend
+plugin:FILE.so`) are kept in counterexamples, so they must be UTF-8. What is
+printed of names and of texts from files has `\x1b`, `\u202e` and the like in
+place of what would act on a terminal or change the direction of reading, and
+`\xe9` for a byte that is no UTF-8; commands to be given again quote such names
+as `$'caf\xe9.json'`. JSON, JUnit and annotations have the same, and stay valid
+UTF-8.
 )";
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "model/io/columns.h"
 #include "model/io/scene_fields.h"
 #include "model/io/scene_io.h"
 #include "model/io/scene_text.h"
@@ -133,13 +134,12 @@ std::string interval_text(const Bounds& b) {
 
 // Of numbers an interval, of lists and texts how many entries or bytes.
 std::string limits_text(const SceneField& f, bool is_list) {
-  const std::string interval = interval_text(f.bounds);
-  if (f.most == 0) return interval;
-  return fmt::format("{}{}at most {} {}", interval, interval.empty() ? "" : "; ", f.most,
-                     is_list ? "entries" : "bytes");
+  const std::string interval = interval_text(f.bounds), in = interval.empty() ? "" : ", in " + interval;
+  if (f.most == 0) return in;
+  return fmt::format("{}, at most {} {}", in, f.most, is_list ? "entries" : "bytes");
 }
 
-// The table of one object, and below it those of the objects in it.
+// The list of one object, and below it those of the objects in it.
 template <class T>
 std::string section(const std::string& path, T& value);
 
@@ -149,8 +149,9 @@ class Documenter {
 
   template <class T>
   void field(T& value, const SceneField& f) {
-    rows_ += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", f.name, type_name<T>(), f.bounds.unit,
-                         default_text(value, f), limits_text(f, is_vector<T>), f.doc);
+    const std::string unit = f.bounds.unit.empty() ? "" : fmt::format(" [{}]", f.bounds.unit);
+    rows_ += wrapped_text(fmt::format("- `{}`: {}{}; {}{}. {}\n", f.name, type_name<T>(), unit, default_text(value, f),
+                                      limits_text(f, is_vector<T>), f.doc));
     const std::string path = join(path_, f.name);
     if constexpr (has_fields<T>) {
       inner_ += "\n" + section(path, value);
@@ -164,8 +165,7 @@ class Documenter {
   bool applies(bool) const { return true; }
 
   std::string text() const {
-    return fmt::format("## {}\n\n| field | type | unit | default | bounds | meaning |\n|---|---|---|---|---|---|\n{}{}",
-                       path_.empty() ? "The scene" : "`" + path_ + "`", rows_, inner_);
+    return fmt::format("## {}\n\n{}{}", path_.empty() ? "The scene" : "`" + path_ + "`", rows_, inner_);
   }
 
  private:
@@ -175,11 +175,11 @@ class Documenter {
     if constexpr (is_optional<T>) {
       return "absent";
     } else if constexpr (is_vector<T>) {
-      return "[]";
+      return "default []";
     } else if constexpr (has_fields<T>) {
       return "see below";
     } else {
-      return f.presence == kZeroIsAbsent ? "absent" : fmt::format("`{}`", on_one_line(written(value)));
+      return f.presence == kZeroIsAbsent ? "absent" : fmt::format("default `{}`", on_one_line(written(value)));
     }
   }
 
@@ -196,28 +196,38 @@ std::string section(const std::string& path, T& value) {
 constexpr std::string_view kReferenceHead =
     R"(# Scenes
 
-This page is what `cutproof info --scene` prints: it is generated from the table of fields that also reads and checks
-scenes, and a test sees to it that the two are equal.
+This page is what `cutproof info --scene` prints: it is generated from the table
+of fields that also reads and checks scenes, and a test sees to it that the two
+are equal. Of each field: its type with its unit, what stands for it where it is
+absent, and its bounds.
 
-A scene is a JSON file (UTF-8, no comments). It says what is cut, how it is simulated, what the blade does, and what
-must come out. Fields that are absent have their default; a field that is not listed here, or that is given twice, is
+A scene is a JSON file (UTF-8, no comments). It says what is cut, how it is
+simulated, what the blade does, and what must come out. Fields that are absent
+have their default; a field that is not listed here, or that is given twice, is
 an error, and so is a value out of bounds. Units are SI unless stated:
 
-- **box**: coordinates in the bounding box of the body's particles at rest, after alignment: (0, 0, 0) is its lower
-  corner and (1, 1, 1) its upper one, half a spacing beyond the outermost particles. Points may lie outside. A path in
-  these coordinates runs on any organ.
-- **h**: the spacing of the background grid. **extents**: multiples of the bounding box's width along a direction.
-- Directions (`back`, `along`, `velocity`, `gravity`) are metric and in the body's frame.
-- A **range** is a number (exactly that), or `{"at_least": a}`, `{"at_most": b}`, or both.
-- In bounds, a square bracket includes the number and a round one does not. They hold for each component of a vector,
-  each entry of a list and both ends of a range.
+- **box**: coordinates in the bounding box of the body's particles at rest,
+  after alignment: (0, 0, 0) is its lower corner and (1, 1, 1) its upper one,
+  half a spacing beyond the outermost particles. Points may lie outside. A path
+  in these coordinates runs on any organ.
+- **h**: the spacing of the background grid. **extents**: multiples of the
+  bounding box's width along a direction.
+- Directions (`back`, `along`, `velocity`, `gravity`) are metric and in the
+  body's frame.
+- A **range** is a number (exactly that), or `{"at_least": a}`, `{"at_most":
+  b}`, or both.
+- In bounds, a square bracket includes the number and a round one does not. They
+  hold for each component of a vector, each entry of a list and both ends of a
+  range.
 
-Time is divided into frames of `frame.length`, and these into `step.substeps`. With a dynamic criterion (anything but
-`geometric`), a frame in which the blade would be too fast for its own thickness is divided into the least number of
-equal shorter frames in which, per substep, no corner of the blade moves by more than
-1.001 · max(thickness, epsilon · h) / 2, and none moves, by turning, by more than half of the shorter of length and
-depth (method.md §3, Blade). With `detect.every` = `substep` each of these frames is laid out as as many frames of one
-substep.
+Time is divided into frames of `frame.length`, and these into `step.substeps`.
+With a dynamic criterion (anything but `geometric`), a frame in which the blade
+would be too fast for its own thickness is divided into the least number of
+equal shorter frames in which, per substep, no corner of the blade moves by more
+than 1.001 · max(thickness, epsilon · h) / 2, and none moves, by turning, by
+more than half of the shorter of length and depth (method.md §3, Blade). With
+`detect.every` = `substep` each of these frames is laid out as as many frames of
+one substep.
 )";
 
 }  // namespace

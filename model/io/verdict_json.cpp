@@ -38,10 +38,16 @@ nlohmann::json verdicts_json(const std::vector<Verdict>& verdicts) {
   return list;
 }
 
+std::string in_unit(const std::string& figure, const std::string& unit) {
+  return unit == "1" || unit.empty() ? figure : figure + " " + unit;
+}
+
 std::string verdict_text(const Verdict& verdict) {
-  return fmt::format("'{}' fails after {} in frame {} on backend '{}': measured {:g} {}, bound {:g} ({}). {}",
-                     verdict.property, name_of(verdict.stage), verdict.frame, verdict.backend, verdict.measured,
-                     verdict.unit, verdict.bound, verdict.bound_source, verdict.witness.text);
+  return fmt::format("'{}' fails after {} in frame {} on backend '{}': measured {}, bound {} ({}). {}",
+                     verdict.property, name_of(verdict.stage), verdict.frame, verdict.backend,
+                     in_unit(fmt::format("{:g}", verdict.measured), verdict.unit),
+                     in_unit(fmt::format("{:g}", verdict.bound), verdict.unit), verdict.bound_source,
+                     verdict.witness.text);
 }
 
 }  // namespace cutproof::io

@@ -12,6 +12,8 @@ namespace cutproof::io {
 nlohmann::json verdict_json(const Verdict& verdict, bool expected_failure);
 // A list of those of which none is expected to fail.
 nlohmann::json verdicts_json(const std::vector<Verdict>& verdicts);
+// A figure with its unit, for a person: counts and ratios, whose unit is "1", have none.
+std::string in_unit(const std::string& figure, const std::string& unit);
 // One that fails, in one line for a person (guide.md, Reading a verdict).
 std::string verdict_text(const Verdict& verdict);
 

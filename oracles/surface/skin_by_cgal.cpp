@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "oracles/checks.h"
+#include "oracles/piece_sizes.h"
 #include "oracles/shape_sums.h"
 #include "oracles/surface/surface.h"
 #include "oracles/surface/tissue_volume.h"
@@ -165,8 +166,8 @@ void check_skin_geometry(Judged& judged, Verdict& verdict) {
     verdict.measured = std::abs(outer - components) + std::abs(inner - cavities);
     return fail(verdict, {},
                 "the skin has {} outward and {} inward shells, and the tissue has {} components and {} "
-                "cavities",
-                outer, inner, components, cavities);
+                "cavities; the tissue is {}",
+                outer, inner, components, cavities, pieces_in_words(judged.components()));
   }
 
   const VolumeRange range = tissue_volume(setup.body.grid, tissue, setup.skin.alpha);

@@ -19,6 +19,16 @@ struct Outcome {
   std::string output;  // standard output and standard error
 };
 
+// Of what was printed, whose lines are broken to fit a screen: every run of white space as one space.
+inline std::string on_one_line(const std::string& text) {
+  std::string line;
+  for (const char c : text) {
+    const bool is_space = c == ' ' || c == '\n';
+    if (!is_space || (!line.empty() && line.back() != ' ')) line += is_space ? ' ' : c;
+  }
+  return line;
+}
+
 // A folder of its own for each test, removed at the end.
 class Program : public testing::Test {
  protected:

@@ -27,4 +27,29 @@ TEST(Table, IsMadeOfTheFieldsOfADocument) {
       "  b     -  inf of 12     24\n");
 }
 
+TEST(Table, BreaksHeadsAndThenSentencesThatAreTooWide) {
+  cutproof::cli::Table table({"", "median ms", "error"});
+  table.add({"step", "1.5", "3 of 20 removals differ, and one more"});
+  EXPECT_EQ(table.text(1, 42),
+            "        median\n"
+            "            ms  error\n"
+            "  step     1.5  3 of 20 removals differ,\n"
+            "                and one more\n");
+}
+
+// Each part has the columns that name a row, and is no wider than it may be.
+TEST(Table, FallsIntoPartsIfNothingElseHelps) {
+  cutproof::cli::Table table({"name", "kind", "aaaaaaaa", "bbbbbbbb", "cccccccc"});
+  table.add({"x", "y", "1", "2", "3"});
+  EXPECT_EQ(table.text(2, 30),
+            "  name  kind  aaaaaaaa\n"
+            "  x        y         1\n"
+            "\n"
+            "  name  kind  bbbbbbbb\n"
+            "  x        y         2\n"
+            "\n"
+            "  name  kind  cccccccc\n"
+            "  x        y         3\n");
+}
+
 }  // namespace

@@ -32,6 +32,8 @@ for command in commands[0]:
     output = done.stdout + done.stderr
     assert done.returncode == (1 if command.startswith("cutproof") else 0), f"{command}: {done.returncode}\n{output}"
 print(f"first verdict after {time.monotonic() - begin:.1f} s")
+for line in output.splitlines():
+    assert len(line) <= 80 or line.strip().startswith("cutproof judge "), f"wider than 80 columns: {line}"
 for line in expected[0]:
     assert any(printed.startswith(line) for printed in output.splitlines()), f"'{line}' is not printed:\n{output}"
 again = subprocess.run(commands[1][0], shell=True, cwd=work, env=environment, capture_output=True, text=True, timeout=300)

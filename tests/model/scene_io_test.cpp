@@ -746,7 +746,7 @@ TEST(SceneReference, NamesEveryFieldThatIsWritten) {
   const std::function<void(const json&)> visit = [&](const json& tree) {
     for (const auto& [name, value] : tree.items()) {
       if (tree.is_object()) {
-        EXPECT_NE(reference.find("| `" + name + "` |"), std::string::npos) << name << " is not documented";
+        EXPECT_NE(reference.find("- `" + name + "`:"), std::string::npos) << name << " is not documented";
       }
       if (value.is_structured() && name != "removed") visit(value);
     }

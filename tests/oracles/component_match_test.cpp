@@ -63,12 +63,28 @@ TEST(SkinMatch, AcceptsTwoPiecesWithTwoShells) {
   expect_holds(skin_match(two.setup, two.state));
 }
 
+TEST(ComponentMatch, TellsTheSizesOfThePieces) {
+  TwoBlocks two;
+  two.state.clusters = clusters_of(two.setup.body, {{0, 1, 4, 5, 8, 9, 12, 13}, {2, 3, 6, 7, 10, 11}, {14}, {15}});
+  const Verdict uncoupled = component_match(two.setup, two.state);
+  EXPECT_FALSE(uncoupled.holds);
+  EXPECT_NE(uncoupled.witness.text.find(
+                "the tissue is 2 pieces (of 8 and 8 particles), and what clusters couple is 4 pieces (of 8, 6, "
+                "1 and 1 particles)"),
+            std::string::npos)
+      << uncoupled.witness.text;
+}
+
 TEST(SkinMatch, RejectsAPieceWithoutAShell) {
   TwoBlocks two;
   auto& triangles = two.state.skin.triangles;
   std::erase_if(triangles,
                 [&](const auto& t) { return two.state.skin.owner[static_cast<std::size_t>(t[0])] % 4 >= 2; });
-  expect_rejected(skin_match(two.setup, two.state), {}, {2});
+  const Verdict verdict = skin_match(two.setup, two.state);
+  expect_rejected(verdict, {}, {2});
+  EXPECT_NE(verdict.witness.text.find("; the tissue is 2 pieces (of 8 and 8 particles), and the skin has 1 shells"),
+            std::string::npos)
+      << verdict.witness.text;
 }
 
 TEST(SkinMatch, RejectsAShellThatJoinsTwoPieces) {

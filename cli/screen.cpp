@@ -1,0 +1,113 @@
+#include "cli/screen.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+#include "cli/progress.h"
+#include "model/io/columns.h"
+
+namespace cutproof::cli {
+
+namespace {
+
+Style& present_style() {
+  static Style present;
+  return present;
+}
+
+// What was said of a line that has not ended.
+std::string& open_line() {
+  static std::string open;
+  return open;
+}
+
+void print(const std::string& text) {
+  std::string& open = open_line();
+  open += text;
+  const std::size_t end = open.rfind('\n');
+  if (end == std::string::npos) return;
+  Progress::clear_all();
+  const std::string whole = io::wrapped_text(open.substr(0, end + 1));
+  std::fwrite(whole.data(), 1, whole.size(), stdout);
+  open.erase(0, end + 1);
+}
+
+std::string in_colour(const char* code, const std::string& text) {
+  return style().colour ? fmt::format("\x1b[{}m{}\x1b[0m", code, text) : text;
+}
+
+std::string to_be_copied(const std::string& words, const std::string& copied) {
+  const std::string line = words + " " + copied;
+  if (io::width_of(line) <= io::kColumns) return line + "\n";
+  const std::size_t indentation = std::min(words.find_first_not_of(' '), words.size());
+  return fmt::format("{}\n{:{}}{}\n", words, "", indentation + 2, copied);
+}
+
+}  // namespace
+
+void set_style(const Style& style) { present_style() = style; }
+const Style& style() { return present_style(); }
+
+void add_style(CLI::App& program, AskedStyle& asked) {
+  program.add_option("--color", asked.color, "auto (on a terminal), always or never")
+      ->capture_default_str()
+      ->type_name("C")
+      ->check(CLI::IsMember({"auto", "always", "never"}))
+      ->group(kStyleGroup);
+  program.add_flag("--quiet", asked.quiet, "print only what fails, and the last line")->group(kStyleGroup);
+  program.add_flag("--verbose", asked.verbose, "print a row for every property")->group(kStyleGroup);
+  for (CLI::App* const command : program.get_subcommands([](const CLI::App*) { return true; })) {
+    add_style(*command, asked);
+  }
+}
+
+Style settled(const AskedStyle& asked, bool is_terminal) {
+  const auto holds = [](const char* name) {
+    const char* const value = std::getenv(name);
+    return value != nullptr && *value != '\0';
+  };
+  const char* const kind = std::getenv("TERM");
+  const bool knows_colour = is_terminal && kind != nullptr && *kind != '\0' && std::strcmp(kind, "dumb") != 0;
+  Style style;
+  style.colour = asked.color == "always" || (asked.color == "auto" && knows_colour && !holds("NO_COLOR"));
+  style.quiet = asked.quiet;
+  style.verbose = asked.verbose;
+  return style;
+}
+
+void say_text(const std::string& text) {
+  if (!style().quiet) print(text);
+}
+
+void insist_text(const std::string& text) { print(text); }
+
+void say_as_it_is(const std::string& text) {
+  if (style().quiet) return;
+  end_line();
+  Progress::clear_all();
+  std::fwrite(text.data(), 1, text.size(), stdout);
+}
+
+void insist_copy(const std::string& words, const std::string& copied) {
+  end_line();
+  Progress::clear_all();
+  const std::string text = to_be_copied(words, copied);
+  std::fwrite(text.data(), 1, text.size(), stdout);
+}
+
+void say_copy(const std::string& words, const std::string& copied) {
+  if (!style().quiet) insist_copy(words, copied);
+}
+
+void end_line() {
+  if (!open_line().empty()) print("\n");
+}
+
+std::string failing(const std::string& text) { return in_colour("31", text); }
+std::string holding(const std::string& text) { return in_colour("32", text); }
+std::string undecided(const std::string& text) { return in_colour("33", text); }
+std::string lesser(const std::string& text) { return in_colour("2", text); }
+
+}  // namespace cutproof::cli

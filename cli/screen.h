@@ -1,0 +1,63 @@
+// What this program prints on standard output, in lines of at most 80 columns, and how: in colour, and how much of it.
+// There is one standard output in a process, so there is one style, which main() sets before a verb begins.
+#pragma once
+#include <fmt/format.h>
+
+#include <string>
+#include <utility>
+
+namespace CLI {
+class App;
+}
+
+namespace cutproof::cli {
+
+enum class ColourChoice { automatic, always, never };
+
+struct Style {
+  bool colour = false;
+  bool quiet = false;    // only what fails, and the last line
+  bool verbose = false;  // every row of the verdicts
+};
+void set_style(const Style& style);
+const Style& style();
+
+// What is asked for on the command line.
+struct AskedStyle {
+  std::string color = "auto";
+  bool quiet = false, verbose = false;
+};
+inline constexpr const char* kStyleGroup = "Output";  // in which their help lists them
+// --color, --quiet and --verbose of the program and of each of its verbs and suites.
+void add_style(CLI::App& program, AskedStyle& asked);
+// Colour on a terminal that knows it (TERM), unless NO_COLOR holds anything (https://no-color.org); --color decides
+// before both.
+Style settled(const AskedStyle& asked, bool is_terminal);
+
+// Lines that begin and end anywhere: a line is printed once its end is there, broken at words (columns.h).
+// say: not under --quiet. insist: what fails, and the last line, always.
+void say_text(const std::string& text);
+void insist_text(const std::string& text);
+// What is set out in columns already, or longer than them because it is data, as it is.
+void say_as_it_is(const std::string& text);
+template <class... T>
+void say(fmt::format_string<T...> format, T&&... values) {
+  say_text(fmt::format(format, std::forward<T>(values)...));
+}
+template <class... T>
+void insist(fmt::format_string<T...> format, T&&... values) {
+  insist_text(fmt::format(format, std::forward<T>(values)...));
+}
+// A command or a path to be copied, after these words if there is room, else on a line of its own.
+void insist_copy(const std::string& words, const std::string& copied);
+void say_copy(const std::string& words, const std::string& copied);
+// What waits for the end of its line.
+void end_line();
+
+// Colours, never the only carrier of a meaning.
+std::string failing(const std::string& text);    // red
+std::string holding(const std::string& text);    // green
+std::string undecided(const std::string& text);  // yellow: what is not promised, or not decided
+std::string lesser(const std::string& text);     // dim: what matters less
+
+}  // namespace cutproof::cli
