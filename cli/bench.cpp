@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "cli/bench/suites.h"
+#include "cli/interruption.h"
 #include "cli/output.h"
+#include "model/stop.h"
 
 namespace cutproof::cli {
 
@@ -35,14 +37,32 @@ void add_bench(CLI::App& program, Work& work) {
   });
 }
 
+namespace {
+
+// Of a suite that was stopped. What it has measured has been written after each row.
+int print_how_far(const std::string& path, const nlohmann::json& document, const Suite& suite) {
+  const std::size_t rows = document.at(suite.rows).size();
+  if (rows > 0) suite.end(document);
+  fmt::print("\nINCOMPLETE: it was stopped after {} row{}\n", rows, rows == 1 ? "" : "s");
+  if (!path.empty()) {
+    write_document(path, document);
+    fmt::print("wrote {}\n", path);
+  }
+  return 1;
+}
+
+}  // namespace
+
 void add_suite(CLI::App& command, Work& work, const std::string& what, Suite suite) {
   const auto path = std::make_shared<std::string>();
   add_json(command, *path, what);
   command.callback([path, suite, &work] {
     work = [path, suite] {
       require_writable(*path);
+      const EndsInOrder in_order;
+      nlohmann::json document;  // so far
       bool begun = false;
-      const nlohmann::json document = suite.run([&](const nlohmann::json& so_far) {
+      const auto show = [&](const nlohmann::json& so_far) {
         if (std::exchange(begun, true)) {
           if (!so_far.contains("judging")) suite.row(so_far);
           write_document(*path, so_far);
@@ -51,7 +71,14 @@ void add_suite(CLI::App& command, Work& work, const std::string& what, Suite sui
           suite.begin(so_far);
         }
         flush_output();
-      });
+        document = so_far;
+        throw_if_asked(stop_asked);
+      };
+      try {
+        document = suite.run(show);
+      } catch (const Stopped&) {
+        return print_how_far(*path, document, suite);
+      }
       if (document.at(suite.rows).empty()) {
         fmt::print("FAILS: nothing was measured\n");
         return 1;

@@ -12,6 +12,7 @@
 
 #include "cli/commands.h"
 #include "cli/findings.h"
+#include "cli/interruption.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/terminal.h"
@@ -54,6 +55,7 @@ CampaignOptions campaign_options(const FuzzOptions& options) {
       fmt::format("give the least and the greatest size, such as 0-79; sizes go from 0 to {}", kMostSize);
   const auto [least, most] = two_numbers(options.sizes, '-', "--sizes", sizes_remedy);
   if (least > most || most > kMostSize) refuse("--sizes", fmt::format("'{}' is no range", options.sizes), sizes_remedy);
+  campaign.stop_asked = stop_asked;
   campaign.least_size = static_cast<int>(least);
   campaign.most_size = static_cast<int>(most);
   campaign.batch = options.batch > 0 ? options.batch : backend.bodies_in_a_load;
@@ -106,7 +108,8 @@ int print_conclusion(const json& document, const CampaignConclusion& conclusion)
   if (conclusion.holds()) {
     fmt::print("all hold\n");
   } else {
-    fmt::print("FAILS: {}\n", conclusion.failure);
+    const bool only_stopped = !document.at("complete") && document.at("violations").empty();
+    fmt::print("{}: {}\n", only_stopped ? "INCOMPLETE" : "FAILS", conclusion.failure);
   }
   return conclusion.holds() ? 0 : 1;
 }
@@ -148,7 +151,7 @@ std::string name_in_files(const std::string& backend) {
 std::string keep(const Violation& violation, const FuzzOptions& options, const BackendChoice& choice, int batch) {
   fmt::print("case {} FAILS: {}\n", violation.index, describe(violation.verdict));
   flush_output();
-  Simplified simplified = simplify(violation, choice, options.simplify);
+  Simplified simplified = simplify(violation, choice, options.simplify, stop_asked);
   simplified.counterexample.seed = options.campaign.seed;
   const Counterexample& found = simplified.counterexample;
   const std::string stem = (std::filesystem::path(options.save) /
@@ -198,11 +201,9 @@ nlohmann::json fuzz_campaign(const FuzzOptions& options) {
   const CampaignOptions asked = campaign_options(options);
   // What cannot be is said before anything is done.
   static_cast<void>(harness::make_backend(harness::choice_for_load(options.backend, 0)));
-  if (!std::filesystem::is_directory(options.save)) {
-    refuse("--save", fmt::format("'{}' is not a folder", options.save), "create it first");
-  }
   require_writable(options.json);
   require_writable(options.junit);
+  make_folder("--save", options.save);
 
   fmt::print("fuzzing backend {}: {}{} from seed {}{}, {} bodies a load, {} threads\n", options.backend.name,
              options.campaign.seconds ? fmt::format("{:g} s of cases", *options.campaign.seconds)
@@ -225,6 +226,7 @@ namespace {
 
 int fuzz(const FuzzOptions& options) {
   if (!options.merge.empty()) return merge(options);
+  const EndsInOrder in_order;
   const json document = fuzz_campaign(options);
   return conclude_campaign(options, document, document.at("shards") == 1);
 }

@@ -9,6 +9,7 @@
 #include "cli/commands.h"
 #include "cli/findings.h"
 #include "cli/fuzz.h"
+#include "cli/interruption.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/terminal.h"
@@ -235,9 +236,7 @@ int replay(const JudgeOptions& options, Guest& guest) {
 }
 
 int judge(JudgeOptions options) {
-  if (!std::filesystem::is_directory(options.save)) {
-    refuse("--save", fmt::format("'{}' is not a folder", options.save), "create it first");
-  }
+  const EndsInOrder in_order;
   require_writable(options.json);
   require_writable(options.junit);
   if (!options.attached.empty()) {
@@ -256,6 +255,7 @@ int judge(JudgeOptions options) {
   Guest& guest = *started;
   const std::vector<const OperationDescription*> asked = asked_operations(options, guest.plugin());
   if (!options.replay.empty()) return replay(options, guest);
+  make_folder("--save", options.save);
   fmt::print("{}, seed {}\n", title(guest.plugin(), options.guest.library), options.campaign.seed);
   flush_output();
   bool holds = true;
@@ -275,6 +275,7 @@ int judge(JudgeOptions options) {
   for (const OperationDescription* const operation : asked) {
     const harness::Promises promises = promises_of(guest.plugin(), *operation, options.guest.library);
     KernelCampaignOptions campaign_options = options.campaign;
+    campaign_options.stop_asked = stop_asked;
     campaign_options.cases = options.cases > 0 ? options.cases : usual_cases(*operation);
     if (options.keep_going) campaign_options.most_lost = 0;
     KernelCampaign campaign;
@@ -299,22 +300,34 @@ int judge(JudgeOptions options) {
     document["operations"].push_back(std::move(result));
     holds = holds && campaign.holds();
     flush_output();
-    if (campaign.ended) break;
+    if (campaign.ended || stop_asked()) break;
   }
   const auto& names = options.operations;
   if (has_stages(guest.plugin()) &&
       (names.empty() || std::find(names.begin(), names.end(), kOnStages) != names.end())) {
     for (const bool dynamics : {false, true}) {
-      if (dynamics && !steps(guest.plugin())) continue;
+      if (stop_asked() || (dynamics && !steps(guest.plugin()))) continue;
       holds = judge_stages(options, dynamics, document, junit, failures) && holds;
     }
   }
+  const bool complete = !stop_asked();
+  if (!complete) {
+    const std::string how_far =
+        fmt::format("it was stopped after {} of {} operations were begun", document["operations"].size(), asked.size());
+    fmt::print("INCOMPLETE: {}\n", how_far);
+    io::JunitCase& stopped = junit.emplace_back(io::JunitCase{"enough was judged", kClass});
+    stopped.outcome = io::JunitOutcome::error;
+    stopped.message = how_far;
+    failures.push_back({stopped.name, how_far, options.again});
+  }
+  holds = holds && complete;
+  document["complete"] = complete;
   document["holds"] = holds;
   write_document(options.json, document);
   double seconds = 0;
   for (const io::JunitCase& each : junit) seconds += each.seconds;
   write_junit(options.junit, {"cutproof judge", kClass, options.again}, seconds, std::move(junit));
-  fmt::print("{}\n", holds ? "all hold" : "FAILS");
+  if (complete) fmt::print("{}\n", holds ? "all hold" : "FAILS");
   print_annotations(failures);
   return holds ? 0 : 1;
 }

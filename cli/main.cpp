@@ -7,13 +7,14 @@
 #include <string>
 
 #include "cli/commands.h"
+#include "cli/interruption.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/printable_output.h"
 #include "guests/guest.h"
 #include "model/backend.h"
 #include "model/error.h"
-#include "model/io/atomic_file.h"
+#include "model/io/unfinished.h"
 
 namespace {
 
@@ -50,7 +51,7 @@ int status_of_exception() noexcept {
 [[noreturn]] void end_with_status() {
   const int status = std::current_exception() != nullptr ? status_of_exception() : say("a defect of this program", 3);
   std::fflush(stdout);
-  cutproof::io::AtomicFile::remove_unfinished();
+  cutproof::io::Unfinished::remove_all();
   std::_Exit(status);
 }
 
@@ -91,12 +92,19 @@ int run_command_line(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   std::set_terminate(end_with_status);
+  cutproof::cli::handle_signals();
   try {
     cutproof::cli::make_output_printable();
     const int status = run_command_line(argc, argv);
+    if (cutproof::cli::stop_asked()) {
+      std::fflush(stdout);
+      cutproof::cli::end_by_signal();
+    }
     cutproof::cli::flush_output();
     return status;
   } catch (...) {
-    return status_of_exception();
+    const int status = status_of_exception();
+    if (cutproof::cli::stop_asked()) cutproof::cli::end_by_signal();
+    return status;
   }
 }

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "cli/commands.h"
+#include "cli/interruption.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/scene_files.h"
@@ -157,17 +158,29 @@ void print(const TuneOptions& options, TuneStep step, const json& document, cons
     case TuneStep::none_verified:
       fmt::print("none of the configurations that seemed to be within {:g} h holds when it is verified\n",
                  options.tolerance);
+      return;
+    case TuneStep::stopped: {
+      const json& trials = document.at("trials");
+      if (!trials.empty()) print_trials(trials);
+      fmt::print("\nINCOMPLETE: it was stopped {}; nothing is found yet\n",
+                 trials.empty() ? std::string("before the first configuration was tried")
+                                : fmt::format("after {} configurations", trials.size()));
+    }
   }
 }
 
 int tune(Asked asked) {
+  const EndsInOrder in_order;
+  asked.tune.stop_asked = stop_asked;
   asked.tune.reference = asked.reference == "limit" ? ReferenceKind::limit : ReferenceKind::substeps;
   settle_files(asked);
   const bool found = run_tune(asked.tune, [&](TuneStep step, const json& document, const Scene& given) {
+    // After each trial, so that what has been measured is kept if a later one fails; and in the end.
+    if (step == TuneStep::trial || step == TuneStep::stopped || document.at("complete")) {
+      write_document(asked.json, document);
+    }
     print(asked.tune, step, document, given);
     flush_output();
-    // After each trial, so that what has been measured is kept if a later one fails; and in the end.
-    if (step == TuneStep::trial || document.at("complete")) write_document(asked.json, document);
   });
   if (!asked.json.empty()) fmt::print("wrote {}\n", asked.json);
   return found ? 0 : 1;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "harness/backends.h"
+#include "model/stop.h"
 #include "tuning/prepared_scene.h"
 #include "tuning/reference_solution.h"
 #include "tuning/trial.h"
@@ -22,6 +23,7 @@ struct TuneOptions {
   bool without_skin = false;                       // nobody looks at it
   bool full = false;                               // nothing is given up: errors and times of all that is tried
   int repeats = 3;                                 // timed runs of a configuration
+  StopAsked stop_asked;                            // ends it between two frames
 };
 
 // What is measured, and how. `asked` must outlive it.
