@@ -163,8 +163,9 @@ void print(const TuneOptions& options, TuneStep step, const json& document, cons
       const json& trials = document.at("trials");
       if (!trials.empty()) print_trials(trials);
       fmt::print("\nINCOMPLETE: it was stopped {}; nothing is found yet\n",
-                 trials.empty() ? std::string("before the first configuration was tried")
-                                : fmt::format("after {} configurations", trials.size()));
+                 trials.empty()
+                     ? std::string("before the first configuration was tried")
+                     : fmt::format("after {} configuration{}", trials.size(), trials.size() == 1 ? "" : "s"));
     }
   }
 }
