@@ -9,6 +9,7 @@
 #include "cli/bench/suites.h"
 #include "cli/interruption.h"
 #include "cli/output.h"
+#include "model/nearest_word.h"
 #include "model/stop.h"
 
 namespace cutproof::cli {
@@ -30,7 +31,10 @@ void add_bench(CLI::App& program, Work& work) {
   bench->callback([suite, unknown, names, &work] {
     work = [suite, unknown, names] {
       const std::string remedy = fmt::format("use one of {}", fmt::join(names, ", "));
-      if (!unknown->empty()) refuse("bench", fmt::format("there is no suite '{}'", unknown->front()), remedy);
+      if (!unknown->empty()) {
+        refuse("bench", fmt::format("there is no suite '{}'", unknown->front()),
+               did_you_mean(unknown->front(), names) + remedy);
+      }
       if (!*suite) refuse("bench", "no suite is named", remedy);
       return (*suite)();
     };
@@ -44,10 +48,8 @@ int print_how_far(const std::string& path, const nlohmann::json& document, const
   const std::size_t rows = document.at(suite.rows).size();
   if (rows > 0) suite.end(document);
   fmt::print("\nINCOMPLETE: it was stopped after {} row{}\n", rows, rows == 1 ? "" : "s");
-  if (!path.empty()) {
-    write_document(path, document);
-    fmt::print("wrote {}\n", path);
-  }
+  write_document(path, document);
+  print_written(path);
   return 1;
 }
 
@@ -65,7 +67,7 @@ void add_suite(CLI::App& command, Work& work, const std::string& what, Suite sui
       const auto show = [&](const nlohmann::json& so_far) {
         if (std::exchange(begun, true)) {
           if (!so_far.contains("judging")) suite.row(so_far);
-          write_document(*path, so_far);
+          keep_document(*path, so_far);
         } else {
           print_filled(kHead, so_far);
           suite.begin(so_far);
@@ -85,7 +87,7 @@ void add_suite(CLI::App& command, Work& work, const std::string& what, Suite sui
       }
       write_document(*path, document);
       suite.end(document);
-      if (!path->empty()) fmt::print("\nwrote {}\n", *path);
+      print_written(*path);
       return document.value("holds", true) ? 0 : 1;
     };
   });
@@ -94,20 +96,24 @@ void add_suite(CLI::App& command, Work& work, const std::string& what, Suite sui
 void add_timing(CLI::App& command, benchmarks::TimingOptions& options) {
   add_backend_name(command, options.backend, "backend under test", is_timed);
   add_count(command, "--frames", options.frames, "timed frames of each repeat (default: by backend)",
-            CLI::Range(1, 10'000));
+            whole_number(1, 10'000));
   add_count(command, "--repeats", options.repeats, "how often they are timed, each time after a warm-up",
-            CLI::Range(1, 1'000));
+            whole_number(1, 1'000));
   command.add_option("--split", options.split, "kernels: how clusters are split, blocks, global or both")
-      ->type_name("M");
-  command.add_option("--rotation", options.rotation, "kernels: how rotations are found")->type_name("M");
+      ->type_name("M")
+      ->check(one_of({"blocks", "global", "both"}));
+  command.add_option("--rotation", options.rotation, "kernels: how rotations are found")
+      ->type_name("M")
+      ->check(one_of(harness::rotation_names()));
   add_list(command, "--acceleration", options.acceleration,
            options.acceleration.empty() ? "none, chebyshev or both, instead of the scene's" : "none, chebyshev or both",
            "A");
   add_count(command, "--iterations", options.iterations, "of a substep, instead of the scene's",
-            CLI::Range(1, 1'000'000));
+            whole_number(1, 1'000'000));
   command
       .add_option("--remove", options.remove, "ends of an edge that is too long: both or one, instead of the scene's")
-      ->type_name("E");
+      ->type_name("E")
+      ->check(one_of({"both", "one"}));
 }
 
 void print_scene(const nlohmann::json& document) {

@@ -66,7 +66,7 @@ int check_recording(const CheckOptions& options) {
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
   write_junit(options.junit, judging, seconds.count(), cases_of(judge, judging));
   print_verdicts(judge);
-  if (!options.json.empty()) fmt::print("wrote {}\n", options.json);
+  print_written(options.json);
   print_annotations(failures_of(judge.verdicts(), judging,
                                 [&](const Verdict& verdict) { return judge.is_expected_failure(verdict); }));
   return judge.holds() ? 0 : 1;

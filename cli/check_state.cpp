@@ -72,7 +72,7 @@ int check_state(const std::string& file, const StateReports& reports) {
   }
   for (const std::string& note : judged.notes) fmt::print("\nnote: {}\n", note);
   print_whether_all_hold(judged.verdicts);
-  if (!reports.json.empty()) fmt::print("wrote {}\n", reports.json);
+  print_written(reports.json);
   print_annotations(failures_of(judged.verdicts, judging));
   return judged.holds() ? 0 : 1;
 }

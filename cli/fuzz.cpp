@@ -33,6 +33,8 @@ using namespace property_tests;
 using harness::BackendChoice;
 using nlohmann::json;
 
+constexpr int64_t kMostCases = 1'000'000'000'000'000;
+
 // "A-B" or "A/B" as numbers.
 std::pair<int64_t, int64_t> two_numbers(const std::string& text, char separator, const std::string& option,
                                         const std::string& remedy) {
@@ -238,23 +240,21 @@ void add_fuzz(CLI::App& program, Work& work) {
   CLI::App* const command =
       program.add_subcommand("fuzz", "random dissections until one is wrong, and that one simplified");
   add_backend(*command, options->backend, "backend under test");
-  add_count(*command, "--cases", options->cases, "how many (default: 1000)", CLI::NonNegativeNumber);
-  command->add_option("--seconds", options->campaign.seconds, "for how long")
-      ->type_name("S")
-      ->check(CLI::NonNegativeNumber);
+  add_count(*command, "--cases", options->cases, "how many (default: 1000)", whole_number(0, kMostCases));
+  command->add_option("--seconds", options->campaign.seconds, "for how long")->type_name("S")->check(number_from(0));
   add_seed(*command, options->campaign.seed, "what cases are drawn from");
   command->add_option("--sizes", options->sizes, "least and greatest size of a case, within 0-110")
       ->capture_default_str()
       ->type_name("A-B");
   command->add_flag("--dynamics", options->campaign.dynamics, "bodies move and blades push what they cut");
-  add_count(*command, "--batch", options->batch, "bodies in one load (default: by backend)", CLI::Range(1, 100'000));
-  add_count(*command, "--threads", options->threads, "that generate and judge (default: all)", CLI::Range(1, 4096));
+  add_count(*command, "--batch", options->batch, "bodies in one load (default: by backend)", whole_number(1, 100'000));
+  add_count(*command, "--threads", options->threads, "that generate and judge (default: all)", whole_number(1, 4096));
   command->add_option("--shard", options->shard, "only part i of N of the cases")->type_name("i/N");
   command->add_flag("--keep-going", options->campaign.keep_going, "beyond the first violation");
   command->add_option("--simplify", options->simplify, "how long a violation's case is simplified, 0: not at all")
       ->capture_default_str()
       ->type_name("S")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_from(0));
   command->add_option("--save", options->save, "folder for counterexamples")->capture_default_str()->type_name("DIR");
   add_json(*command, options->json, "write counts, classes and violations");
   add_junit(*command, options->junit);

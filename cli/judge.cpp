@@ -17,6 +17,7 @@
 #include "guests/plugin_backend.h"
 #include "model/error.h"
 #include "model/io/atomic_file.h"
+#include "model/nearest_word.h"
 #include "model/printable.h"
 
 namespace cutproof::cli {
@@ -71,7 +72,8 @@ std::vector<const OperationDescription*> asked_operations(const JudgeOptions& op
     if (name == kOnStages && has_stages(plugin)) continue;
     const OperationDescription* const found = find_operation(name);
     if (found == nullptr)
-      refuse("OPS", fmt::format("there is no operation '{}'", name), "use some of " + known + ", stages");
+      refuse("OPS", fmt::format("there is no operation '{}'", name),
+             did_you_mean(name, listed(known + ", stages")) + "use some of " + known + ", stages");
     if (!plugin.offers(found->number)) {
       throw InputError(options.guest.library, name, "the plugin does not have this operation",
                        offered.empty() ? "it has none" : "it has " + offered);
@@ -344,21 +346,21 @@ void add_judge(CLI::App& program, Work& work) {
                    "which of its operations: rotations, components, surface, clusters, stages (default: all)")
       ->type_name("OPS");
   add_count(*command, "--cases", options->cases, "matrices or bodies for each operation (default: 100000 or 2000)",
-            CLI::PositiveNumber);
+            whole_number(1));
   command->add_option("--seconds", options->campaign.seconds, "for how long, for each operation")
       ->type_name("S")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_from(0));
   add_seed(*command, options->campaign.seed, "what cases are drawn from");
   command->add_option("--parameters", options->guest.parameters, "a text for the plugin's create()")->type_name("TEXT");
   command->add_option("--time-limit", options->guest.time_limit, "for each answer")
       ->capture_default_str()
       ->type_name("S")
-      ->check(CLI::Range(0.01, 1e6));
+      ->check(number_between(0.01, 1e6));
   command->add_flag("--keep-going", options->keep_going, "beyond ten questions that were not answered");
   command->add_option("--simplify", options->campaign.simplify, "how long each failure is simplified, 0: not at all")
       ->capture_default_str()
       ->type_name("S")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_from(0));
   command->add_option("--save", options->save, "folder for counterexamples")->capture_default_str()->type_name("DIR");
   command
       ->add_option(
@@ -366,7 +368,8 @@ void add_judge(CLI::App& program, Work& work) {
           "instead of FILE.so: a guest that runs already, such as cutproof.py, by the numbers of two open files")
       ->delimiter(',')
       ->allow_extra_args(false)  // what follows are operations
-      ->type_name("SOCKET,MEMORY");
+      ->type_name("SOCKET,MEMORY")
+      ->check(whole_number(0, std::numeric_limits<int>::max()));
   add_json(*command, options->json, "write counts and failures");
   add_junit(*command, options->junit);
   command->add_option("--case", options->replay, "one saved question again, and nothing else")->type_name("CASE");

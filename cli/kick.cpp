@@ -111,7 +111,7 @@ int kick(const KickOptions& options) {
   print_single_verdicts(report.verdicts);
   for (const std::string& note : notes_of(report, kick.runs)) fmt::print("\nnote: {}\n", note);
   print_whether_all_hold(report.verdicts);
-  if (!options.json.empty()) fmt::print("wrote {}\n", options.json);
+  print_written(options.json);
   print_annotations(failures_of(report.verdicts, judging));
   return report.holds() ? 0 : 1;
 }

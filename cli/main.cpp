@@ -11,6 +11,7 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/printable_output.h"
+#include "cli/usage.h"
 #include "guests/guest.h"
 #include "model/backend.h"
 #include "model/error.h"
@@ -78,13 +79,12 @@ int run_command_line(int argc, char** argv) {
     if (argc <= 1) {
       std::fputs(app.help().c_str(), stderr);
     } else {
-      std::ostringstream text;
-      app.exit(error, text, text);
-      print_printable(stderr, text.str());
+      say(usage_error(app, error, {argv + 1, argv + argc}).c_str(), 2);
     }
     return 2;
   }
   refuse_odd_words(app);
+  divert_standard_output(app);
   return work();
 }
 

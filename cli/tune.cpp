@@ -11,6 +11,7 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/scene_files.h"
+#include "cli/scene_options.h"
 #include "cli/table.h"
 #include "cli/terminal.h"
 #include "model/io/filled.h"
@@ -25,6 +26,7 @@ using namespace tuning;
 
 struct Asked {
   TuneOptions tune;
+  SceneOptions scene;
   std::string reference = "limit";
   std::string json;
 };
@@ -174,16 +176,21 @@ int tune(Asked asked) {
   const EndsInOrder in_order;
   asked.tune.stop_asked = stop_asked;
   asked.tune.reference = asked.reference == "limit" ? ReferenceKind::limit : ReferenceKind::substeps;
+  asked.tune.scene = asked.scene.file;
+  asked.tune.changes = changes_of(asked.scene);
   settle_files(asked);
-  const bool found = run_tune(asked.tune, [&](TuneStep step, const json& document, const Scene& given) {
-    // After each trial, so that what has been measured is kept if a later one fails; and in the end.
-    if (step == TuneStep::trial || step == TuneStep::stopped || document.at("complete")) {
-      write_document(asked.json, document);
-    }
-    print(asked.tune, step, document, given);
-    flush_output();
+  const bool found = with_sources(asked.tune.scene, asked.tune.changes, [&] {
+    return run_tune(asked.tune, [&](TuneStep step, const json& so_far, const Scene& given) {
+      json document = so_far;
+      document["changes"] = given_changes(asked.tune.changes);
+      // After each trial, so that what has been measured is kept if a later one fails; and in the end.
+      if (step == TuneStep::trial) keep_document(asked.json, document);
+      if (step == TuneStep::stopped || document.at("complete")) write_document(asked.json, document);
+      print(asked.tune, step, document, given);
+      flush_output();
+    });
   });
-  if (!asked.json.empty()) fmt::print("wrote {}\n", asked.json);
+  print_written(asked.json);
   return found ? 0 : 1;
 }
 
@@ -194,37 +201,33 @@ void add_tune(CLI::App& program, Work& work) {
   TuneOptions& options = asked->tune;
   CLI::App* const command =
       program.add_subcommand("tune", "find the cheapest configuration of a scene within a tolerance");
-  command
-      ->add_option("scene", options.scene,
-                   "scene file (JSON, see `cutproof info --scene`), or a name (`cutproof info --scenes`)")
-      ->required()
-      ->type_name("SCENE");
+  add_scene(*command, asked->scene)->required();
   command
       ->add_option("--tolerance", options.tolerance,
                    "greatest RMS distance from the reference solution in any frame [h]")
       ->required()
       ->type_name("T")
-      ->check(CLI::PositiveNumber);
+      ->check(number_above(0));
   command
       ->add_option("--reference", asked->reference,
                    "the reference solution. limit: of ever shorter time steps; substeps: the scene's own, each solved "
                    "until it is converged")
       ->capture_default_str()
       ->type_name("R")
-      ->check(CLI::IsMember({"limit", "substeps"}));
+      ->check(one_of({"limit", "substeps"}));
   add_backend(*command, options.backend, "backend under test", is_timed);
-  add_count(*command, "--frames", options.frames, "look at this many frames of the scene only", CLI::PositiveNumber);
+  add_count(*command, "--frames", options.frames, "look at this many frames of the scene only", whole_number(1));
   command->add_flag("--without-skin", options.without_skin, "nobody looks at the skin: it need not be made");
   command->add_flag("--full", options.full,
                     "run and time everything to its end, for a curve; else what is beyond the tolerance, or more "
                     "expensive than what was found, is given up");
-  add_count(*command, "--repeats", options.repeats, "timed runs of each configuration", CLI::Range(1, 1000));
+  add_count(*command, "--repeats", options.repeats, "timed runs of each configuration", whole_number(1, 1000));
   command->add_option("--write", options.write, "the scene that was found (default: NAME_tuned.json here)")
       ->type_name("F");
   add_json(*command, asked->json, "write everything that was tried");
   command->callback([asked, &work] {
     work = [asked] {
-      asked->tune.scene = scene_file(asked->tune.scene);
+      asked->scene.file = scene_file(asked->scene.file);
       return tune(*asked);
     };
   });

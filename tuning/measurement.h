@@ -4,8 +4,10 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "harness/backends.h"
+#include "model/io/scene_io.h"
 #include "model/stop.h"
 #include "tuning/prepared_scene.h"
 #include "tuning/reference_solution.h"
@@ -14,8 +16,9 @@
 namespace cutproof::tuning {
 
 struct TuneOptions {
-  std::string scene;  // its file
-  std::string write;  // where the scene that is found is written
+  std::string scene;                     // its file
+  std::vector<io::SceneChange> changes;  // of it: what is tuned is the scene with these
+  std::string write;                     // where the scene that is found is written
   harness::BackendChoice backend;
   double tolerance = 0;                            // [h]
   ReferenceKind reference = ReferenceKind::limit;  // what errors are distances from

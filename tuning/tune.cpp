@@ -31,7 +31,7 @@ const std::vector<std::string>& sound_rotations() {
 
 // Whatever is wrong with the choice of a backend, or with the scene, is found out here.
 Measuring prepare(const TuneOptions& options) {
-  Measuring measuring{options, {io::read_scene(options.scene), ""}};
+  Measuring measuring{options, {io::read_scene(options.scene, options.changes), ""}};
   const Scene& scene = measuring.given.scene;
   if (scene.step.solver != Solver::implicit) {
     throw InputError(options.scene, "step.solver",
