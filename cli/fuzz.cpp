@@ -110,7 +110,8 @@ int print_conclusion(const json& document, const CampaignConclusion& conclusion)
   if (conclusion.holds()) {
     fmt::print("all hold\n");
   } else {
-    const bool only_stopped = !document.at("complete") && document.at("violations").empty();
+    const bool only_stopped =
+        !document.at("complete") && !document.contains("missing_shards") && document.at("violations").empty();
     fmt::print("{}: {}\n", only_stopped ? "INCOMPLETE" : "FAILS", conclusion.failure);
   }
   return conclusion.holds() ? 0 : 1;

@@ -35,21 +35,25 @@ std::optional<Number> number_of(std::string_view text, bool& is_out_of_range) {
   return number;
 }
 
-// `wanted`: such as "a whole number from 0 up". What is fine is written as CLI11 takes it for the same number.
+// CLI11 would read 010 as 8.
+bool is_octal(std::string_view given) {
+  if (given.starts_with('-') || given.starts_with('+')) given.remove_prefix(1);
+  return given.size() > 1 && given[0] == '0';
+}
+
+// `wanted`: such as "a whole number from 0 up".
 template <class Number, class IsFine>
 CLI::Validator validator_of(std::string wanted, IsFine is_fine) {
-  return {[wanted = std::move(wanted), is_fine](std::string& given) -> std::string {
+  return {[wanted = std::move(wanted), is_fine](const std::string& given) -> std::string {
             bool is_out_of_range = false;
             const std::optional<Number> number = number_of<Number>(given, is_out_of_range);
-            if (number && is_fine(*number)) {
-              if (std::is_integral_v<Number>) given = fmt::format("{}", *number);
-              if (given.starts_with('+')) given.erase(0, 1);
-              return {};
-            }
-            return fmt::format("must be {}, and {} is {}", wanted, quoted_short(given),
-                               number            ? "not"
-                               : is_out_of_range ? "too large"
-                                                 : "none");
+            const bool begins_with_0 = std::is_integral_v<Number> && number && is_octal(given);
+            if (number && !begins_with_0 && is_fine(*number)) return {};
+            return fmt::format("must be {}, and {} {}", wanted, quoted_short(given),
+                               begins_with_0     ? "begins with 0"
+                               : number          ? "is not"
+                               : is_out_of_range ? "is too large"
+                                                 : "is none");
           },
           ""};
 }
