@@ -46,8 +46,11 @@ void for_each_command(const CLI::App& command, const std::string& name,
 
 std::string offer_of(const CLI::Option& option) {
   const std::vector<std::string> words = words_of(option);
-  if (!words.empty()) return fmt::format("words='{}'", fmt::join(words, " "));
-  switch (kind_of(option.get_type_name())) {
+  const Value kind = kind_of(option.get_type_name());
+  if (!words.empty()) {
+    return fmt::format("words='{}'{}", fmt::join(words, " "), kind == Value::file ? " kind=file" : "");
+  }
+  switch (kind) {
     case Value::folder:
       return "kind=folder";
     case Value::file:
@@ -190,7 +193,7 @@ _cutproof() {{
   COMPREPLY=()
   case "$kind" in
     none) ;;
-    file) compopt -o filenames 2> /dev/null; mapfile -t COMPREPLY < <(compgen -f -- "$current") ;;
+    file) compopt -o filenames 2> /dev/null; mapfile -t COMPREPLY < <(compgen -W "$words" -- "$current"; compgen -f -- "$current") ;;
     folder) compopt -o filenames 2> /dev/null; mapfile -t COMPREPLY < <(compgen -d -- "$current") ;;
     *) mapfile -t COMPREPLY < <(compgen -W "$words" -- "$current") ;;
   esac

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "cli/options.h"
+#include "cli/scene_files.h"
 
 namespace cutproof::cli {
 
@@ -11,7 +12,8 @@ CLI::Option* add_scene(CLI::App& command, SceneOptions& options) {
       command
           .add_option("scene", options.file,
                       "scene file (JSON, see `cutproof info --scene`), or a name (`cutproof info --scenes`)")
-          ->type_name("SCENE");
+          ->type_name("SCENE")
+          ->check(usually_one_of(scene_names()));
   command.add_option("--set", options.set, "another value of a field, such as step.iterations=8; repeatable")
       ->allow_extra_args(false)
       ->type_name("FIELD=V");

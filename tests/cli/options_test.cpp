@@ -36,6 +36,7 @@ class Options : public Program {
 TEST_F(Options, SayWhatWasMeant) {
   for (const auto& [command, words] : std::vector<std::pair<std::string, std::vector<std::string>>>{
            {"rnu s.json", {"rnu", "did you mean 'run'?"}},
+           {"run kidny_arc", {"did you mean 'kidney_arc'?"}},
            {"fuz", {"did you mean 'fuzz'?"}},
            {"run --frams 3 s.json", {"--frams", "did you mean '--frames'?", "cutproof run --help"}},
            {"run s.json --recrod=x", {"--recrod:", "did you mean '--record'?"}},
@@ -116,125 +117,127 @@ TEST_F(Options, WriteADocumentToStandardOutputAloneAndTheRestToStandardError) {
   if (files::exists("/dev/full")) {
     EXPECT_EQ(cutproof("fuzz --cases 5 --json - 2> error > /dev/full; exit $? #").status, 3);
   }
+}
 
-  TEST_F(Options, ChangeAnyFieldOfAScene) {
-    ASSERT_EQ(cutproof("run s.json --record seen --set step.iterations=3 --set step.acceleration=none "
-                       "--set 'step.gravity=[0,0,-1]' --set walls[0].friction=0.25 --set 'name=\"other\"'")
-                  .status,
-              0);
-    const json document = standard_output_of(
-        "run s.json --set name=one --set name=two --set body.spacing=0.005 --particles 27 --seed 7 --json -");
-    EXPECT_EQ(document.at("scene"), "two") << "the last counts";
-    EXPECT_EQ(document.at("seed"), 7);
-    EXPECT_EQ(document.at("changes"),
-              json({"--set name=one", "--set name=two", "--set body.spacing=0.005", "--particles 27", "--seed 7"}));
-    EXPECT_EQ(document.at("body").at("particles"), 27) << "--particles comes after --set";
-    // The scene that a recording keeps is the one that was run.
-    EXPECT_EQ(standard_output_of("check seen --json -").at("scene"), "other");
-    EXPECT_DOUBLE_EQ(standard_output_of("run s.json --spacing 0.005 --json -").at("body").at("spacing"), 0.005);
-    const json tuned = standard_output_of(
-        "tune s.json --set step.iterations=3 --spacing 0.01 --seed 2 --tolerance 0.5 --repeats 1 --json -");
-    EXPECT_EQ(tuned.at("changes"), json({"--set step.iterations=3", "--spacing 0.01", "--seed 2"}));
-    EXPECT_EQ(tuned.at("trials").at(0).at("iterations"), 3);
+TEST_F(Options, ChangeAnyFieldOfAScene) {
+  ASSERT_EQ(cutproof("run s.json --record seen --set step.iterations=3 --set step.acceleration=none "
+                     "--set 'step.gravity=[0,0,-1]' --set walls[0].friction=0.25 --set 'name=\"other\"'")
+                .status,
+            0);
+  const json document = standard_output_of(
+      "run s.json --set name=one --set name=two --set body.spacing=0.005 --particles 27 --seed 7 --json -");
+  EXPECT_EQ(document.at("scene"), "two") << "the last counts";
+  EXPECT_EQ(document.at("seed"), 7);
+  EXPECT_EQ(document.at("changes"),
+            json({"--set name=one", "--set name=two", "--set body.spacing=0.005", "--particles 27", "--seed 7"}));
+  EXPECT_EQ(document.at("body").at("particles"), 27) << "--particles comes after --set";
+  // The scene that a recording keeps is the one that was run.
+  EXPECT_EQ(standard_output_of("check seen --json -").at("scene"), "other");
+  EXPECT_DOUBLE_EQ(standard_output_of("run s.json --spacing 0.005 --json -").at("body").at("spacing"), 0.005);
+  const json tuned = standard_output_of(
+      "tune s.json --set step.iterations=3 --spacing 0.01 --seed 2 --tolerance 0.5 --repeats 1 --json -");
+  EXPECT_EQ(tuned.at("changes"), json({"--set step.iterations=3", "--spacing 0.01", "--seed 2"}));
+  EXPECT_EQ(tuned.at("trials").at(0).at("iterations"), 3);
+}
+
+TEST_F(Options, SayWhichChangeOfASceneIsWrong) {
+  for (const auto& [change, words] : std::vector<std::pair<std::string, std::vector<std::string>>>{
+           {"--set step.iterations=-1", {"cutproof: --set step.iterations=-1: step.iterations: ", "out of bounds"}},
+           {"--set step.iteration=8", {"--set step.iteration=8: ", "Did you mean \"iterations\"?"}},
+           {"--set step.iterations=many", {"--set step.iterations=many", "the text \"many\""}},
+           {"--set step.iterations=nan", {"--set step.iterations=nan", "the text \"nan\""}},
+           {"--set step.stiffness=1e999", {"--set step.stiffness=1e999", "finite"}},
+           {"--set 'step.gravity=[0,0'", {"--set step.gravity=[0,0", "no value"}},
+           {"--set step.gravity=[0,0]", {"--set step.gravity=[0,0]", "three numbers"}},
+           {"--set walls[1].offset=0", {"--set walls[1].offset=0", "the list has 1"}},
+           {"--set name.first=x", {"--set name.first=x", "string"}},
+           {"--set name[0]=x", {"--set name[0]=x", "no list"}},
+           {"--set step..iterations=8", {"--set step..iterations=8", "no path"}},
+           {"--set step.=8", {"no path"}},
+           {"--set step[x]=8", {"no path"}},
+           {"--set version=9", {"--set version=9", "versions 1 to"}},
+           {"--set step.iterations", {"--set", "step.iterations", "value"}},
+           {"--set =8", {"--set", "value"}},
+           {"--set body.particles=10", {"s.json with --set body.particles=10", "Both spacing and particles"}},
+           {"--particles 10 --spacing 0.01", {"--spacing", "--particles"}},
+           {"--spacing 1e-9", {"cutproof: --spacing 1e-09: body.spacing", "memory"}}}) {
+    expect_refused("run s.json " + change, words);
+    expect_refused("tune s.json --tolerance 0.5 " + change, words);
   }
+}
 
-  TEST_F(Options, SayWhichChangeOfASceneIsWrong) {
-    for (const auto& [change, words] : std::vector<std::pair<std::string, std::vector<std::string>>>{
-             {"--set step.iterations=-1", {"cutproof: --set step.iterations=-1: step.iterations: ", "out of bounds"}},
-             {"--set step.iteration=8", {"--set step.iteration=8: ", "Did you mean \"iterations\"?"}},
-             {"--set step.iterations=many", {"--set step.iterations=many", "the text \"many\""}},
-             {"--set step.iterations=nan", {"--set step.iterations=nan", "the text \"nan\""}},
-             {"--set step.stiffness=1e999", {"--set step.stiffness=1e999", "finite"}},
-             {"--set 'step.gravity=[0,0'", {"--set step.gravity=[0,0", "no value"}},
-             {"--set step.gravity=[0,0]", {"--set step.gravity=[0,0]", "three numbers"}},
-             {"--set walls[1].offset=0", {"--set walls[1].offset=0", "the list has 1"}},
-             {"--set name.first=x", {"--set name.first=x", "string"}},
-             {"--set name[0]=x", {"--set name[0]=x", "no list"}},
-             {"--set step..iterations=8", {"--set step..iterations=8", "no path"}},
-             {"--set step.=8", {"no path"}},
-             {"--set step[x]=8", {"no path"}},
-             {"--set version=9", {"--set version=9", "versions 1 to"}},
-             {"--set step.iterations", {"--set", "step.iterations", "value"}},
-             {"--set =8", {"--set", "value"}},
-             {"--set body.particles=10", {"s.json with --set body.particles=10", "Both spacing and particles"}},
-             {"--particles 10 --spacing 0.01", {"--spacing", "--particles"}},
-             {"--spacing 1e-9", {"cutproof: --spacing 1e-09: body.spacing", "memory"}}}) {
-      expect_refused("run s.json " + change, words);
-      expect_refused("tune s.json --tolerance 0.5 " + change, words);
+// A scene that was made for its own body does not fit every other.
+TEST_F(Options, DoNotBlameASceneForAMesh) {
+  write("cube.off",
+        "OFF\n8 12 0\n0 0 0\n40 0 0\n40 40 0\n0 40 0\n0 0 40\n40 0 40\n40 40 40\n0 40 40\n3 0 2 1\n3 0 3 2\n"
+        "3 4 5 6\n3 4 6 7\n3 0 1 5\n3 0 5 4\n3 1 2 6\n3 1 6 5\n3 2 3 7\n3 2 7 6\n3 3 0 4\n3 3 4 7\n");
+  expect_refused("run s.json --mesh cube.off --particles 5", {"cutproof: cube.off in place of the body of s.json: "});
+}
+
+// What a remedy says that `cutproof info` lists.
+TEST_F(Options, AreListedByInfo) {
+  const std::string info = cutproof("info").output;
+  for (const char* word : {"reference", "host-split", "plugin:FILE.so", "newton", "round_robin", "topology", "motion",
+                           "conservation", "rotations, components", "connected", "versions 1 to 3"}) {
+    EXPECT_NE(info.find(word), std::string::npos) << "no '" << word << "' in:\n" << info;
+  }
+  EXPECT_NE(cutproof("info --scene").output.find("iterations"), std::string::npos);
+}
+
+TEST_F(Options, NameTheVersionAlikeInEveryDocument) {
+  ASSERT_EQ(cutproof("run s.json --record seen").status, 0);
+  for (const char* command : {"run s.json", "check seen", "fuzz --cases 5", "bench machine_limits --repeats 1",
+                              "tune s.json --tolerance 0.5 --repeats 1"}) {
+    const json document = standard_output_of(std::string(command) + " --json -");
+    EXPECT_TRUE(document.at("cutproof").is_string()) << command;
+    EXPECT_FALSE(document.contains("version")) << command;
+  }
+}
+
+// --- What shells and man show
+// ----------------------------------------------------------------------------------------------------
+
+TEST_F(Options, AreOfferedByBash) {
+  write("a scene.json", kScene);
+  files::create_directory(folder_ / "afolder");
+  for (const auto& [words, offered] : std::vector<std::pair<std::string, std::string>>{
+           {"cutproof r", "run replay"},
+           {"cutproof run --fr", "--frames"},
+           {"cutproof run --backend host-", "host-blocks host-frames host-split"},
+           {"cutproof run --backend = sim", "simulated"},
+           {"cutproof fuzz --rotation n", "newton"},
+           {"cutproof bench so", "solver"},
+           {"cutproof bench solver --st", "--stiffness"},
+           {"cutproof tune x.json --reference ''", "limit substeps"},
+           {"cutproof vectors s", "surface split"},
+           {"cutproof run --unit ''", "mm cm m"},
+           {"cutproof run kidney_a", "kidney_arc"},
+           {"cutproof run a", "a scene.json afolder"},
+           {"cutproof fuzz --save a", "afolder"},
+           {"cutproof fuzz --cases ''", ""},
+           {"cutproof info --c", "--completion"},
+           {"cutproof fuzz --dynamics --se", "--seconds --seed"}}) {
+    const std::string said = words_offered(words);
+    if (words == "cutproof run a") {
+      EXPECT_NE(said.find("a scene.json"), std::string::npos) << said;
+      EXPECT_NE(said.find("afolder"), std::string::npos) << said;
+    } else {
+      EXPECT_EQ(said, offered + "\n") << words;
     }
   }
+  expect_refused("info --completion csh", {"csh", "bash"});
+}
 
-  // A scene that was made for its own body does not fit every other.
-  TEST_F(Options, DoNotBlameASceneForAMesh) {
-    write("cube.off",
-          "OFF\n8 12 0\n0 0 0\n40 0 0\n40 40 0\n0 40 0\n0 0 40\n40 0 40\n40 40 40\n0 40 40\n3 0 2 1\n3 0 3 2\n"
-          "3 4 5 6\n3 4 6 7\n3 0 1 5\n3 0 5 4\n3 1 2 6\n3 1 6 5\n3 2 3 7\n3 2 7 6\n3 3 0 4\n3 3 4 7\n");
-    expect_refused("run s.json --mesh cube.off --particles 5", {"cutproof: cube.off in place of the body of s.json: "});
+TEST_F(Options, StandOnAManualPageWithoutWarnings) {
+  ASSERT_EQ(cutproof("info --man > cutproof.1").status, 0);
+  const Outcome warnings = cutproof("--version > version; groff -man -Tutf8 -ww -z cutproof.1 #");
+  EXPECT_EQ(warnings.output, "");
+  const std::string page = cutproof("--version > version; groff -man -Tutf8 -P-bcou -rLL=80n cutproof.1 #").output;
+  for (const char* word :
+       {"cutproof tune SCENE", "--set FIELD=V", "cutproof bench solver", "--stiffness", "EXIT STATUS"}) {
+    EXPECT_NE(page.find(word), std::string::npos) << word << "\n" << page.substr(0, 2000);
   }
-
-  // What a remedy says that `cutproof info` lists.
-  TEST_F(Options, AreListedByInfo) {
-    const std::string info = cutproof("info").output;
-    for (const char* word : {"reference", "host-split", "plugin:FILE.so", "newton", "round_robin", "topology", "motion",
-                             "conservation", "rotations, components", "connected", "versions 1 to 3"}) {
-      EXPECT_NE(info.find(word), std::string::npos) << "no '" << word << "' in:\n" << info;
-    }
-    EXPECT_NE(cutproof("info --scene").output.find("iterations"), std::string::npos);
-  }
-
-  TEST_F(Options, NameTheVersionAlikeInEveryDocument) {
-    ASSERT_EQ(cutproof("run s.json --record seen").status, 0);
-    for (const char* command : {"run s.json", "check seen", "fuzz --cases 5", "bench machine_limits --repeats 1",
-                                "tune s.json --tolerance 0.5 --repeats 1"}) {
-      const json document = standard_output_of(std::string(command) + " --json -");
-      EXPECT_TRUE(document.at("cutproof").is_string()) << command;
-      EXPECT_FALSE(document.contains("version")) << command;
-    }
-  }
-
-  // --- What shells and man show
-  // ----------------------------------------------------------------------------------------------------
-
-  TEST_F(Options, AreOfferedByBash) {
-    write("a scene.json", kScene);
-    files::create_directory(folder_ / "afolder");
-    for (const auto& [words, offered] : std::vector<std::pair<std::string, std::string>>{
-             {"cutproof r", "run replay"},
-             {"cutproof run --fr", "--frames"},
-             {"cutproof run --backend host-", "host-blocks host-frames host-split"},
-             {"cutproof run --backend = sim", "simulated"},
-             {"cutproof fuzz --rotation n", "newton"},
-             {"cutproof bench so", "solver"},
-             {"cutproof bench solver --st", "--stiffness"},
-             {"cutproof tune x.json --reference ''", "limit substeps"},
-             {"cutproof vectors s", "surface split"},
-             {"cutproof run --unit ''", "mm cm m"},
-             {"cutproof run a", "a scene.json afolder"},
-             {"cutproof fuzz --save a", "afolder"},
-             {"cutproof fuzz --cases ''", ""},
-             {"cutproof info --c", "--completion"},
-             {"cutproof fuzz --dynamics --se", "--seconds --seed"}}) {
-      const std::string said = words_offered(words);
-      if (words == "cutproof run a") {
-        EXPECT_NE(said.find("a scene.json"), std::string::npos) << said;
-        EXPECT_NE(said.find("afolder"), std::string::npos) << said;
-      } else {
-        EXPECT_EQ(said, offered + "\n") << words;
-      }
-    }
-    expect_refused("info --completion csh", {"csh", "bash"});
-  }
-
-  TEST_F(Options, StandOnAManualPageWithoutWarnings) {
-    ASSERT_EQ(cutproof("info --man > cutproof.1").status, 0);
-    const Outcome warnings = cutproof("--version > version; groff -man -Tutf8 -ww -z cutproof.1 #");
-    EXPECT_EQ(warnings.output, "");
-    const std::string page = cutproof("--version > version; groff -man -Tutf8 -P-bcou -rLL=80n cutproof.1 #").output;
-    for (const char* word :
-         {"cutproof tune SCENE", "--set FIELD=V", "cutproof bench solver", "--stiffness", "EXIT STATUS"}) {
-      EXPECT_NE(page.find(word), std::string::npos) << word << "\n" << page.substr(0, 2000);
-    }
-    EXPECT_EQ(page.find("\\["), std::string::npos);
-  }
+  EXPECT_EQ(page.find("\\["), std::string::npos);
+}
 
 }  // namespace
