@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "model/io/json_reader.h"
 #include "model/io/scene_fields.h"
 #include "model/io/scene_io.h"
 #include "model/io/scene_text.h"
