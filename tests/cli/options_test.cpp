@@ -147,7 +147,7 @@ TEST_F(Options, SayWhichChangeOfASceneIsWrong) {
            {"--set step.iterations=many", {"--set step.iterations=many", "the text \"many\""}},
            {"--set step.iterations=nan", {"--set step.iterations=nan", "the text \"nan\""}},
            {"--set step.stiffness=1e999", {"--set step.stiffness=1e999", "finite"}},
-           {"--set 'step.gravity=[0,0'", {"--set step.gravity=[0,0", "no value"}},
+           {"--set 'step.gravity=[0,0'", {"--set step.gravity=[0,0", "not valid JSON"}},
            {"--set step.gravity=[0,0]", {"--set step.gravity=[0,0]", "three numbers"}},
            {"--set walls[1].offset=0", {"--set walls[1].offset=0", "the list has 1"}},
            {"--set name.first=x", {"--set name.first=x", "string"}},
