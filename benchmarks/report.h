@@ -14,7 +14,7 @@ namespace cutproof::benchmarks {
 nlohmann::json begin_document(const std::string& suite, const std::string& backend);
 
 // Called before anything is measured, when there is only the head, and again after each row: so what has been measured
-// can be shown, and is kept if a later measurement fails.
+// can be shown, and is kept if a later measurement fails. What it throws ends the suite (model/stop.h).
 using Progress = std::function<void(const nlohmann::json& so_far)>;
 
 // A suite's document while it grows.

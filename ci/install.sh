@@ -13,6 +13,7 @@ packages=(
   libgtest-dev librapidcheck-dev libbullet-dev
   python3 python3-h5py python3-numpy
   python3-scipy python3-skimage  # judged as examples: docs/results/libraries.md
+  groff-base     # the manual page, rendered by a test
   dpkg-dev file  # packages: which libraries they depend on
   openmpi-bin    # mpirun, for a test of ci/cluster/; no program is linked with it
 )

@@ -8,7 +8,10 @@
 #include <vector>
 
 #include "cli/bench/suites.h"
+#include "cli/interruption.h"
 #include "cli/output.h"
+#include "model/nearest_word.h"
+#include "model/stop.h"
 
 namespace cutproof::cli {
 
@@ -29,12 +32,29 @@ void add_bench(CLI::App& program, Work& work) {
   bench->callback([suite, unknown, names, &work] {
     work = [suite, unknown, names] {
       const std::string remedy = fmt::format("use one of {}", fmt::join(names, ", "));
-      if (!unknown->empty()) refuse("bench", fmt::format("there is no suite '{}'", unknown->front()), remedy);
+      if (!unknown->empty()) {
+        refuse("bench", fmt::format("there is no suite '{}'", unknown->front()),
+               did_you_mean(unknown->front(), names) + remedy);
+      }
       if (!*suite) refuse("bench", "no suite is named", remedy);
       return (*suite)();
     };
   });
 }
+
+namespace {
+
+// Of a suite that was stopped. What it has measured has been written after each row.
+int print_how_far(const std::string& path, const nlohmann::json& document, const Suite& suite) {
+  const std::size_t rows = document.at(suite.rows).size();
+  if (rows > 0) suite.end(document);
+  insist("\n{}: it was stopped after {} row{}\n", undecided("INCOMPLETE"), rows, rows == 1 ? "" : "s");
+  write_document(path, document);
+  print_written(path);
+  return 1;
+}
+
+}  // namespace
 
 void add_suite(CLI::App& command, Work& work, const std::string& what, Suite suite) {
   const auto path = std::make_shared<std::string>();
@@ -42,23 +62,33 @@ void add_suite(CLI::App& command, Work& work, const std::string& what, Suite sui
   command.callback([path, suite, &work] {
     work = [path, suite] {
       require_writable(*path);
+      const EndsInOrder in_order;
+      nlohmann::json document;  // so far
       bool begun = false;
       std::optional<Progress> progress;
-      const nlohmann::json document = suite.run([&](const nlohmann::json& so_far) {
+      const auto show = [&](const nlohmann::json& so_far) {
         if (std::exchange(begun, true)) {
           if (!so_far.contains("judging")) suite.row(so_far);
-          write_document(*path, so_far);
+          keep_document(*path, so_far);
         } else {
           say_filled(kHead, so_far);
           suite.begin(so_far);
         }
         flush_output();
+        document = so_far;
+        throw_if_asked(stop_asked);
         const auto rows_at_most = so_far.value("rows_at_most", int64_t{0});
         if (rows_at_most == 0) return;
         if (!progress) progress.emplace("row", rows_at_most);
         const std::size_t measured = so_far.at(suite.rows).size() - (so_far.contains("judging") ? 1 : 0);
         progress->show(static_cast<int64_t>(measured), "measuring");
-      });
+      };
+      try {
+        document = suite.run(show);
+      } catch (const Stopped&) {
+        progress.reset();
+        return print_how_far(*path, document, suite);
+      }
       if (document.at(suite.rows).empty()) {
         insist("{}: nothing was measured\n", failing("FAILS"));
         return 1;
@@ -66,7 +96,7 @@ void add_suite(CLI::App& command, Work& work, const std::string& what, Suite sui
       progress.reset();
       write_document(*path, document);
       suite.end(document);
-      if (!path->empty()) say_copy("wrote", *path);
+      print_written(*path);
       const bool holds = document.value("holds", true);
       const std::size_t rows = document.at(suite.rows).size();
       insist("measured: {} {}{}\n", rows, rows == 1 ? "row" : "rows",
@@ -79,20 +109,24 @@ void add_suite(CLI::App& command, Work& work, const std::string& what, Suite sui
 void add_timing(CLI::App& command, benchmarks::TimingOptions& options) {
   add_backend_name(command, options.backend, "backend under test", is_timed);
   add_count(command, "--frames", options.frames, "timed frames of each repeat (default: by backend)",
-            CLI::Range(1, 10'000));
+            whole_number(1, 10'000));
   add_count(command, "--repeats", options.repeats, "how often they are timed, each time after a warm-up",
-            CLI::Range(1, 1'000));
+            whole_number(1, 1'000));
   command.add_option("--split", options.split, "kernels: how clusters are split, blocks, global or both")
-      ->type_name("M");
-  command.add_option("--rotation", options.rotation, "kernels: how rotations are found")->type_name("M");
+      ->type_name("M")
+      ->check(one_of({"blocks", "global", "both"}));
+  command.add_option("--rotation", options.rotation, "kernels: how rotations are found")
+      ->type_name("M")
+      ->check(one_of(harness::rotation_names()));
   add_list(command, "--acceleration", options.acceleration,
            options.acceleration.empty() ? "none, chebyshev or both, instead of the scene's" : "none, chebyshev or both",
            "A");
   add_count(command, "--iterations", options.iterations, "of a substep, instead of the scene's",
-            CLI::Range(1, 1'000'000));
+            whole_number(1, 1'000'000));
   command
       .add_option("--remove", options.remove, "ends of an edge that is too long: both or one, instead of the scene's")
-      ->type_name("E");
+      ->type_name("E")
+      ->check(one_of({"both", "one"}));
 }
 
 void print_scene(const nlohmann::json& document) {

@@ -72,7 +72,7 @@ int check_recording(const CheckOptions& options) {
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
   write_junit(options.junit, judging, seconds.count(), cases_of(judge, judging));
   print_verdicts(judge, options.again);
-  if (!options.json.empty()) say_copy("wrote", options.json);
+  print_written(options.json);
   print_conclusion(judge);
   print_annotations(failures_of(judge.verdicts(), judging,
                                 [&](const Verdict& verdict) { return judge.is_expected_failure(verdict); }));

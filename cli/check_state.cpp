@@ -73,7 +73,7 @@ int check_state(const std::string& file, const StateReports& reports) {
   for (const harness::NotJudged& each : judged.not_judged) not_judged.emplace_back(each.property, each.why);
   print_grouped(undecided("Not judged"), not_judged);
   print_notes(judged.notes);
-  if (!reports.json.empty()) say_copy("wrote", reports.json);
+  print_written(reports.json);
   print_conclusion(judged.verdicts, shown, "what was judged holds.");
   print_annotations(failures_of(judged.verdicts, judging));
   return judged.holds() ? 0 : 1;

@@ -13,6 +13,7 @@
 #include "model/io/columns.h"
 #include "model/io/filled.h"
 #include "model/io/json_number.h"
+#include "model/nearest_word.h"
 
 namespace cutproof::cli {
 
@@ -49,6 +50,12 @@ json implementation_json(const harness::Lockstep* lockstep) {
 
 }  // namespace
 
+std::vector<std::string> error_names() {
+  std::vector<std::string> names = {"all"};
+  for (const Kind& kind : kKinds) names.emplace_back(kind.name);
+  return names;
+}
+
 ErrorsWanted errors_wanted(const std::string& list) {
   ErrorsWanted wanted;
   std::istringstream names(list);
@@ -60,9 +67,11 @@ ErrorsWanted errors_wanted(const std::string& list) {
       known = true;
     }
     if (!known) {
-      throw InputError("command line", "--errors", fmt::format("there is no error '{}'", name),
-                       "use all, or some of implementation, solver, time_step, geometry, topology, conservation with "
-                       "commas between them");
+      throw InputError(
+          "command line", "--errors", fmt::format("there is no error '{}'", name),
+          did_you_mean(name, error_names()) +
+              "use all, or some of implementation, solver, time_step, geometry, topology, conservation with "
+              "commas between them");
     }
   }
   return wanted;

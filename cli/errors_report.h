@@ -3,12 +3,15 @@
 #pragma once
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "harness/errors.h"
 #include "harness/lockstep.h"
 
 namespace cutproof::cli {
 
+// What errors_wanted() understands.
+std::vector<std::string> error_names();
 // Names with commas between them, or `all`. Throws InputError.
 harness::ErrorsWanted errors_wanted(const std::string& list);
 

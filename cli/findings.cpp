@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "cli/options.h"
-#include "model/io/atomic_file.h"
+#include "cli/output.h"
 #include "model/io/verdict_json.h"
 #include "model/stage.h"
 
@@ -168,7 +168,7 @@ std::vector<Failure> failures_of_campaign(const json& document, const std::strin
 }
 
 void write_junit(const std::string& path, const Judging& judging, double seconds, std::vector<JunitCase> cases) {
-  if (!path.empty()) io::write_text(path, io::junit_xml({{judging.suite, seconds, std::move(cases)}}));
+  write_output(path, io::junit_xml({{judging.suite, seconds, std::move(cases)}}));
 }
 
 }  // namespace cutproof::cli

@@ -13,6 +13,7 @@
 
 #include "cli/commands.h"
 #include "cli/findings.h"
+#include "cli/interruption.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/progress.h"
@@ -38,6 +39,8 @@ using namespace property_tests;
 using harness::BackendChoice;
 using nlohmann::json;
 
+constexpr int64_t kMostCases = 1'000'000'000'000'000;
+
 // "A-B" or "A/B" as numbers.
 std::pair<int64_t, int64_t> two_numbers(const std::string& text, char separator, const std::string& option,
                                         const std::string& remedy) {
@@ -60,6 +63,7 @@ CampaignOptions campaign_options(const FuzzOptions& options) {
       fmt::format("give the least and the greatest size, such as 0-79; sizes go from 0 to {}", kMostSize);
   const auto [least, most] = two_numbers(options.sizes, '-', "--sizes", sizes_remedy);
   if (least > most || most > kMostSize) refuse("--sizes", fmt::format("'{}' is no range", options.sizes), sizes_remedy);
+  campaign.stop_asked = stop_asked;
   campaign.least_size = static_cast<int>(least);
   campaign.most_size = static_cast<int>(most);
   campaign.batch = options.batch > 0 ? options.batch : backend.bodies_in_a_load;
@@ -160,7 +164,9 @@ int print_conclusion(const json& document, const CampaignConclusion& conclusion)
   if (conclusion.holds()) {
     insist("{}\n", holding("all hold"));
   } else {
-    insist("{}: {}\n", failing("FAILS"), conclusion.failure);
+    const bool only_stopped =
+        !document.at("complete") && !document.contains("missing_shards") && document.at("violations").empty();
+    insist("{}: {}\n", only_stopped ? undecided("INCOMPLETE") : failing("FAILS"), conclusion.failure);
   }
   return conclusion.holds() ? 0 : 1;
 }
@@ -202,7 +208,7 @@ std::string name_in_files(const std::string& backend) {
 std::string keep(const Violation& violation, const FuzzOptions& options, const BackendChoice& choice, int batch) {
   insist("case {} {}: {}\n", violation.index, failing("FAILS"), describe(violation.verdict));
   flush_output();
-  Simplified simplified = simplify(violation, choice, options.simplify);
+  Simplified simplified = simplify(violation, choice, options.simplify, stop_asked);
   simplified.counterexample.seed = options.campaign.seed;
   const Counterexample& found = simplified.counterexample;
   const std::string stem = (std::filesystem::path(options.save) /
@@ -260,11 +266,9 @@ nlohmann::json fuzz_campaign(const FuzzOptions& options) {
   const CampaignOptions asked = campaign_options(options);
   // What cannot be is said before anything is done.
   static_cast<void>(harness::make_backend(harness::choice_for_load(options.backend, 0)));
-  if (!std::filesystem::is_directory(options.save)) {
-    refuse("--save", fmt::format("'{}' is not a folder", options.save), "create it first");
-  }
   require_writable(options.json);
   require_writable(options.junit);
+  make_folder("--save", options.save);
 
   say("fuzzing backend {}: {}{} from seed {}{}, {} bodies a load, {} threads\n", options.backend.name,
       options.campaign.seconds ? fmt::format("{:g} s of cases", *options.campaign.seconds)
@@ -287,6 +291,7 @@ namespace {
 
 int fuzz(const FuzzOptions& options) {
   if (!options.merge.empty()) return merge(options);
+  const EndsInOrder in_order;
   const json document = fuzz_campaign(options);
   return conclude_campaign(options, document, document.at("shards") == 1);
 }
@@ -298,23 +303,21 @@ void add_fuzz(CLI::App& program, Work& work) {
   CLI::App* const command =
       program.add_subcommand("fuzz", "random dissections until one is wrong, and that one simplified");
   add_backend(*command, options->backend, "backend under test");
-  add_count(*command, "--cases", options->cases, "how many (default: 1000)", CLI::NonNegativeNumber);
-  command->add_option("--seconds", options->campaign.seconds, "for how long")
-      ->type_name("S")
-      ->check(CLI::NonNegativeNumber);
+  add_count(*command, "--cases", options->cases, "how many (default: 1000)", whole_number(0, kMostCases));
+  command->add_option("--seconds", options->campaign.seconds, "for how long")->type_name("S")->check(number_from(0));
   add_seed(*command, options->campaign.seed, "what cases are drawn from");
   command->add_option("--sizes", options->sizes, "least and greatest size of a case, within 0-110")
       ->capture_default_str()
       ->type_name("A-B");
   command->add_flag("--dynamics", options->campaign.dynamics, "bodies move and blades push what they cut");
-  add_count(*command, "--batch", options->batch, "bodies in one load (default: by backend)", CLI::Range(1, 100'000));
-  add_count(*command, "--threads", options->threads, "that generate and judge (default: all)", CLI::Range(1, 4096));
+  add_count(*command, "--batch", options->batch, "bodies in one load (default: by backend)", whole_number(1, 100'000));
+  add_count(*command, "--threads", options->threads, "that generate and judge (default: all)", whole_number(1, 4096));
   command->add_option("--shard", options->shard, "only part i of N of the cases")->type_name("i/N");
   command->add_flag("--keep-going", options->campaign.keep_going, "beyond the first violation");
   command->add_option("--simplify", options->simplify, "how long a violation's case is simplified, 0: not at all")
       ->capture_default_str()
       ->type_name("S")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_from(0));
   command->add_option("--save", options->save, "folder for counterexamples")->capture_default_str()->type_name("DIR");
   add_json(*command, options->json, "write counts, classes and violations");
   add_junit(*command, options->junit);

@@ -1,17 +1,24 @@
 // `cutproof info`: version, backends, devices, properties; a mesh, examined.
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <cstdlib>
+#include <ctime>
 #include <memory>
 #include <vector>
 
 #include "cli/commands.h"
+#include "cli/errors_report.h"
 #include "cli/mesh_report.h"
 #include "cli/options.h"
 #include "cli/output.h"
+#include "cli/reference_pages.h"
 #include "cli/scene_files.h"
 #include "cli/screen.h"
 #include "fixtures/import/mesh.h"
+#include "guests/vectors.h"
+#include "harness/promises.h"
 #include "model/error.h"
 #include "model/fields.h"
 #include "model/io/columns.h"
@@ -29,6 +36,8 @@ struct InfoOptions {
   bool limits = false;     // print how much is read
   std::string mesh, unit;  // examine a mesh
   std::string json;
+  bool man = false;        // print the manual page
+  std::string completion;  // print what this shell offers
 };
 
 // When it is judged: a property of a state says so itself, one of a stage after the stages that promise it.
@@ -80,11 +89,36 @@ int examine(const InfoOptions& options) {
   const fixtures::MeshExamination mesh = fixtures::examine_mesh(options.mesh, unit);
   write_document(options.json, examination_json(mesh, options.mesh, unit));
   print_examination(mesh, options.unit);
-  if (!options.json.empty()) say_copy("wrote", options.json);
+  print_written(options.json);
   return mesh.defects.empty() ? 0 : 1;
 }
 
-int info(const InfoOptions& options) {
+// Every list of words that options know and remedies tell.
+void print_words() {
+  insist("  plugin:FILE.so  a plugin (cutproof/plugin.h)\n");
+  const auto line = [](const char* what, const auto& words) {
+    insist("{}\n", io::hanging(fmt::format("{}: {}", what, fmt::join(words, ", ")), 2));
+  };
+  line("rotations (--rotation)", harness::rotation_names());
+  line("schedules (--schedule)", harness::schedule_names());
+  line("depths of judging (--check)", harness::kDepthNames);
+  line("errors (--errors)", error_names());
+  std::vector<std::string_view> promises, operations;
+  for (const harness::PromiseWord& each : harness::promise_words()) promises.push_back(each.name);
+  for (const guests::OperationDescription& each : guests::vector_operations()) operations.push_back(each.name);
+  line("promises (--promises, and of plugins)", promises);
+  line("operations (vectors)", operations);
+}
+
+// Of the page: today, or what whoever builds it again wants (reproducible-builds.org).
+std::string date_of_build() {
+  const char* const given = std::getenv("SOURCE_DATE_EPOCH");
+  const std::time_t time =
+      given != nullptr ? static_cast<std::time_t>(std::strtoll(given, nullptr, 10)) : std::time(nullptr);
+  return fmt::format("{:%Y-%m-%d}", fmt::gmtime(time));
+}
+
+int info(const InfoOptions& options, const CLI::App& program) {
   if (options.scenes) return print_scenes();
   if (!options.mesh.empty()) return examine(options);
   if (options.scene) {
@@ -95,13 +129,22 @@ int info(const InfoOptions& options) {
     insist_text(io::limits_reference());
     return 0;
   }
+  if (!options.completion.empty()) {
+    say_as_it_is(bash_completion(program));
+    return 0;
+  }
+  if (options.man) {
+    say_as_it_is(manual_page(program, date_of_build()));
+    return 0;
+  }
   insist("cutproof {}\nbackends:\n", kVersion);
   for (const harness::BackendDescriptor& backend : harness::backends()) {
     insist("{}\n", io::hanging(fmt::format("  {:<11} {}", backend.name, harness::description_of(backend)), 14));
   }
+  print_words();
   print_properties();
   insist(
-      "scene files: version 1 (`cutproof info --scene` lists every field)\n"
+      "scene files: versions 1 to 3 (`cutproof info --scene` lists every field)\n"
       "recordings: temporal VTKHDF 2.0, index version 2\n"
       "licence: sources MIT; this program links CGAL and SuiteSparse, which makes it GPL\n");
   return 0;
@@ -124,10 +167,15 @@ void add_info(CLI::App& program, Work& work) {
   command->add_option("--unit", options->unit, "what one unit of the mesh is: mm, cm or m")
       ->capture_default_str()
       ->type_name("U")
+      ->check(one_of({"mm", "cm", "m"}))
       ->needs(mesh);
   command->add_option("--json", options->json, "write what was found of the mesh")->type_name("F")->needs(mesh);
   command->add_flag("--limits", options->limits, "list how much is read of each kind of file");
-  command->callback([options, &work] { work = [options] { return info(*options); }; });
+  command->add_flag("--man", options->man, "print the manual page, cutproof(1)");
+  command->add_option("--completion", options->completion, "print a script that makes a shell offer words: bash")
+      ->type_name("SHELL")
+      ->check(one_of({"bash"}));
+  command->callback([options, &program, &work] { work = [options, &program] { return info(*options, program); }; });
 }
 
 }  // namespace cutproof::cli

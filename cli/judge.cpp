@@ -9,6 +9,7 @@
 #include "cli/commands.h"
 #include "cli/findings.h"
 #include "cli/fuzz.h"
+#include "cli/interruption.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/progress.h"
@@ -18,6 +19,7 @@
 #include "guests/plugin_backend.h"
 #include "model/error.h"
 #include "model/io/atomic_file.h"
+#include "model/nearest_word.h"
 #include "model/printable.h"
 
 namespace cutproof::cli {
@@ -72,7 +74,8 @@ std::vector<const OperationDescription*> asked_operations(const JudgeOptions& op
     if (name == kOnStages && has_stages(plugin)) continue;
     const OperationDescription* const found = find_operation(name);
     if (found == nullptr)
-      refuse("OPS", fmt::format("there is no operation '{}'", name), "use some of " + known + ", stages");
+      refuse("OPS", fmt::format("there is no operation '{}'", name),
+             did_you_mean(name, listed(known + ", stages")) + "use some of " + known + ", stages");
     if (!plugin.offers(found->number)) {
       throw InputError(options.guest.library, name, "the plugin does not have this operation",
                        offered.empty() ? "it has none" : "it has " + offered);
@@ -244,9 +247,7 @@ int replay(const JudgeOptions& options, Guest& guest) {
 }
 
 int judge(JudgeOptions options) {
-  if (!std::filesystem::is_directory(options.save)) {
-    refuse("--save", fmt::format("'{}' is not a folder", options.save), "create it first");
-  }
+  const EndsInOrder in_order;
   require_writable(options.json);
   require_writable(options.junit);
   if (!options.attached.empty()) {
@@ -265,6 +266,7 @@ int judge(JudgeOptions options) {
   Guest& guest = *started;
   const std::vector<const OperationDescription*> asked = asked_operations(options, guest.plugin());
   if (!options.replay.empty()) return replay(options, guest);
+  make_folder("--save", options.save);
   say("{}, seed {}\n", title(guest.plugin(), options.guest.library), options.campaign.seed);
   flush_output();
   bool holds = true;
@@ -284,6 +286,7 @@ int judge(JudgeOptions options) {
   for (const OperationDescription* const operation : asked) {
     const harness::Promises promises = promises_of(guest.plugin(), *operation, options.guest.library);
     KernelCampaignOptions campaign_options = options.campaign;
+    campaign_options.stop_asked = stop_asked;
     campaign_options.cases = options.cases > 0 ? options.cases : usual_cases(*operation);
     if (options.keep_going) campaign_options.most_lost = 0;
     KernelCampaign campaign;
@@ -312,22 +315,34 @@ int judge(JudgeOptions options) {
     document["operations"].push_back(std::move(result));
     holds = holds && campaign.holds();
     flush_output();
-    if (campaign.ended) break;
+    if (campaign.ended || stop_asked()) break;
   }
   const auto& names = options.operations;
   if (has_stages(guest.plugin()) &&
       (names.empty() || std::find(names.begin(), names.end(), kOnStages) != names.end())) {
     for (const bool dynamics : {false, true}) {
-      if (dynamics && !steps(guest.plugin())) continue;
+      if (stop_asked() || (dynamics && !steps(guest.plugin()))) continue;
       holds = judge_stages(options, dynamics, document, junit, failures) && holds;
     }
   }
+  const bool complete = !stop_asked();
+  if (!complete) {
+    const std::string how_far =
+        fmt::format("it was stopped after {} of {} operations were begun", document["operations"].size(), asked.size());
+    insist("{}: {}\n", undecided("INCOMPLETE"), how_far);
+    io::JunitCase& stopped = junit.emplace_back(io::JunitCase{"enough was judged", kClass});
+    stopped.outcome = io::JunitOutcome::error;
+    stopped.message = how_far;
+    failures.push_back({stopped.name, how_far, options.again});
+  }
+  holds = holds && complete;
+  document["complete"] = complete;
   document["holds"] = holds;
   write_document(options.json, document);
   double seconds = 0;
   for (const io::JunitCase& each : junit) seconds += each.seconds;
   write_junit(options.junit, {"cutproof judge", kClass, options.again}, seconds, std::move(junit));
-  insist("{}\n", holds ? holding("all hold") : failing("FAILS"));
+  if (complete) insist("{}\n", holds ? holding("all hold") : failing("FAILS"));
   print_annotations(failures);
   return holds ? 0 : 1;
 }
@@ -344,21 +359,21 @@ void add_judge(CLI::App& program, Work& work) {
                    "which of its operations: rotations, components, surface, clusters, stages (default: all)")
       ->type_name("OPS");
   add_count(*command, "--cases", options->cases, "matrices or bodies for each operation (default: 100000 or 2000)",
-            CLI::PositiveNumber);
+            whole_number(1));
   command->add_option("--seconds", options->campaign.seconds, "for how long, for each operation")
       ->type_name("S")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_from(0));
   add_seed(*command, options->campaign.seed, "what cases are drawn from");
   command->add_option("--parameters", options->guest.parameters, "a text for the plugin's create()")->type_name("TEXT");
   command->add_option("--time-limit", options->guest.time_limit, "for each answer")
       ->capture_default_str()
       ->type_name("S")
-      ->check(CLI::Range(0.01, 1e6));
+      ->check(number_between(0.01, 1e6));
   command->add_flag("--keep-going", options->keep_going, "beyond ten questions that were not answered");
   command->add_option("--simplify", options->campaign.simplify, "how long each failure is simplified, 0: not at all")
       ->capture_default_str()
       ->type_name("S")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_from(0));
   command->add_option("--save", options->save, "folder for counterexamples")->capture_default_str()->type_name("DIR");
   command
       ->add_option(
@@ -366,7 +381,8 @@ void add_judge(CLI::App& program, Work& work) {
           "instead of FILE.so: a guest that runs already, such as cutproof.py, by the numbers of two open files")
       ->delimiter(',')
       ->allow_extra_args(false)  // what follows are operations
-      ->type_name("SOCKET,MEMORY");
+      ->type_name("SOCKET,MEMORY")
+      ->check(whole_number(0, std::numeric_limits<int>::max()));
   add_json(*command, options->json, "write counts and failures");
   add_junit(*command, options->junit);
   command->add_option("--case", options->replay, "one saved question again, and nothing else")->type_name("CASE");

@@ -116,7 +116,7 @@ int kick(const KickOptions& options) {
   shown.in_frames = false;
   print_verdicts(report.verdicts, shown);
   print_notes(notes_of(report, kick.runs));
-  if (!options.json.empty()) say_copy("wrote", options.json);
+  print_written(options.json);
   print_conclusion(report.verdicts, shown, "what was judged holds.");
   print_annotations(failures_of(report.verdicts, judging));
   return report.holds() ? 0 : 1;

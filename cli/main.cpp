@@ -10,14 +10,16 @@
 
 #include "cli/commands.h"
 #include "cli/help.h"
+#include "cli/interruption.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/printable_output.h"
 #include "cli/screen.h"
+#include "cli/usage.h"
 #include "guests/guest.h"
 #include "model/backend.h"
 #include "model/error.h"
-#include "model/io/atomic_file.h"
+#include "model/io/unfinished.h"
 
 namespace {
 
@@ -54,7 +56,7 @@ int status_of_exception() noexcept {
 [[noreturn]] void end_with_status() {
   const int status = std::current_exception() != nullptr ? status_of_exception() : say("a defect of this program", 3);
   std::fflush(stdout);
-  cutproof::io::AtomicFile::remove_unfinished();
+  cutproof::io::Unfinished::remove_all();
   std::_Exit(status);
 }
 
@@ -86,13 +88,12 @@ int run_command_line(int argc, char** argv) {
     if (argc <= 1) {
       std::fputs(help_page(app).c_str(), stderr);
     } else {
-      std::ostringstream text;
-      app.exit(error, text, text);
-      print_printable(stderr, text.str());
+      say(usage_error(app, error, {argv + 1, argv + argc}).c_str(), 2);
     }
     return 2;
   }
   refuse_odd_words(app);
+  divert_standard_output(app);
   set_style(settled(asked_style, isatty(STDOUT_FILENO) != 0));
   if (style().colour) let_colours_through();
   return work();
@@ -102,12 +103,19 @@ int run_command_line(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   std::set_terminate(end_with_status);
+  cutproof::cli::handle_signals();
   try {
     cutproof::cli::make_output_printable();
     const int status = run_command_line(argc, argv);
+    if (cutproof::cli::stop_asked()) {
+      std::fflush(stdout);
+      cutproof::cli::end_by_signal();
+    }
     cutproof::cli::flush_output();
     return status;
   } catch (...) {
-    return status_of_exception();
+    const int status = status_of_exception();
+    if (cutproof::cli::stop_asked()) cutproof::cli::end_by_signal();
+    return status;
   }
 }

@@ -5,6 +5,7 @@
 
 #include "cli/screen.h"
 #include "model/error.h"
+#include "model/nearest_word.h"
 #include "model/printable.h"
 
 namespace cutproof::cli {
@@ -29,43 +30,49 @@ void add_backend_name(CLI::App& command, std::string& name, const std::string& w
                       const std::function<bool(const harness::BackendDescriptor&)>& offered) {
   command.add_option("--backend", name, fmt::format("{}: {}, plugin:FILE.so", what, harness::backend_names(offered)))
       ->capture_default_str()
-      ->type_name("B");
+      ->type_name("B")
+      ->check(usually_one_of(listed(harness::backend_names(offered))));
 }
 
 void add_backend(CLI::App& command, harness::BackendChoice& choice, const std::string& what,
                  const std::function<bool(const harness::BackendDescriptor&)>& offered) {
   add_backend_name(command, choice.name, what, offered);
-  command.add_option("--split", choice.split, "kernels: how clusters are split, blocks or global")->type_name("M");
+  command.add_option("--split", choice.split, "kernels: how clusters are split, blocks or global")
+      ->type_name("M")
+      ->check(one_of({"blocks", "global"}));
   command
       .add_option("--rotation", choice.rotation,
                   fmt::format("kernels: how rotations are found, {}", fmt::join(harness::rotation_names(), ", ")))
-      ->type_name("M");
+      ->type_name("M")
+      ->check(one_of(harness::rotation_names()));
   const std::string scheduled = harness::backend_names([](const auto& backend) { return backend.takes_schedule; });
   command
       .add_option("--schedule", choice.schedule,
                   fmt::format("{}: {}", scheduled, fmt::join(harness::schedule_names(), ", ")))
       ->capture_default_str()
-      ->type_name("S");
+      ->type_name("S")
+      ->check(one_of(harness::schedule_names()));
   add_seed(command, choice.seed, scheduled + ": what random and pct are drawn from", "--schedule-seed");
 }
 
 bool is_timed(const harness::BackendDescriptor& backend) { return backend.is_timed; }
 
 void add_seed(CLI::App& command, uint64_t& seed, const std::string& what, const std::string& name) {
-  command.add_option(name, seed, what)->capture_default_str()->type_name("N")->check(CLI::NonNegativeNumber);
+  command.add_option(name, seed, what)->capture_default_str()->type_name("N")->check(seed_number());
 }
 
 CLI::Option* add_check_depth(CLI::App& command, std::string& asked, const std::string& what) {
   return command.add_option("--check", asked, fmt::format("{}: {}", what, fmt::join(harness::kDepthNames, " or ")))
       ->default_str(std::string(name_of(harness::Depth::motion)))
-      ->type_name("D");
+      ->type_name("D")
+      ->check(usually_one_of({harness::kDepthNames.begin(), harness::kDepthNames.end()}));
 }
 
 harness::Depth depth_asked(const std::string& asked) {
   const std::optional<harness::Depth> depth = harness::depth_named(asked);
   if (!depth) {
     refuse("--check", fmt::format("'{}' is no depth of judging", asked),
-           fmt::format("use {}", fmt::join(harness::kDepthNames, " or ")));
+           did_you_mean(asked, harness::kDepthNames) + fmt::format("use {}", fmt::join(harness::kDepthNames, " or ")));
   }
   return *depth;
 }

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
+#include "cli/validators.h"
 #include "harness/backends.h"
 #include "harness/depth.h"
 
@@ -39,6 +40,8 @@ template <class Value>
 void add_list(CLI::App& command, const std::string& name, std::vector<Value>& list, const std::string& what,
               const std::string& letter = "N") {
   CLI::Option* const option = command.add_option(name, list, what + ", separated by commas");
+  if constexpr (std::is_integral_v<Value>) option->check(whole_number(0, std::numeric_limits<Value>::max()));
+  if constexpr (std::is_floating_point_v<Value>) option->check(number());
   option->delimiter(',')->type_name(letter + "," + letter + "...");
   if (!list.empty()) option->capture_default_str();
 }

@@ -16,6 +16,7 @@
 #include "cli/progress.h"
 #include "cli/results.h"
 #include "cli/scene_files.h"
+#include "cli/scene_options.h"
 #include "cli/screen.h"
 #include "cli/terminal.h"
 #include "fixtures/bodies.h"
@@ -38,16 +39,16 @@ using harness::make_backend;
 namespace {
 
 struct RunOptions {
-  std::string scene;
+  SceneOptions scene;
   harness::BackendChoice backend;
-  fixtures::BuildOptions build;  // but for its mesh
-  std::string mesh;              // takes the place of the scene's body
-  std::string unit = "mm";       // of the mesh's numbers
-  bool repair = false;           // the mesh
-  std::string check;             // a depth; empty: nothing is judged
-  std::string against;           // "" or the reference
-  std::string mode = "both";     // of the comparison: lockstep, free-running, both
-  std::string errors;            // names of errors with commas between them, or "all"; empty: none
+  std::optional<int64_t> frames;
+  std::string mesh;           // takes the place of the scene's body
+  std::string unit = "mm";    // of the mesh's numbers
+  bool repair = false;        // the mesh
+  std::string check;          // a depth; empty: nothing is judged
+  std::string against;        // "" or the reference
+  std::string mode = "both";  // of the comparison: lockstep, free-running, both
+  std::string errors;         // names of errors with commas between them, or "all"; empty: none
   std::string record;
   std::string json, junit;
   std::string again;  // the command line
@@ -157,14 +158,17 @@ int run(const RunOptions& options) {
   const harness::ErrorsWanted wanted = errors_wanted(options.errors);
   if (wanted.implementation)
     mode = mode.value_or(AgainstMode::lockstep) == AgainstMode::lockstep ? AgainstMode::lockstep : AgainstMode::both;
-  fixtures::BuildOptions build_options = options.build;
+  fixtures::BuildOptions build_options;
+  build_options.frames = options.frames;
   if (!options.mesh.empty()) {
     build_options.mesh = MeshSpec{options.mesh, metres_per(options.unit), options.repair};
   }
   const std::unique_ptr<Backend> backend = make_backend(options.backend);
 
-  const Scene scene = io::read_scene(options.scene);
-  fixtures::Built built = fixtures::build(scene, options.scene, build_options);
+  const std::vector<io::SceneChange> changes = changes_of(options.scene);
+  const Scene scene = io::read_scene(options.scene.file, changes);
+  fixtures::Built built = with_sources(options.scene.file, changes,
+                                       [&] { return fixtures::build(scene, options.scene.file, build_options); });
   require_writable(options.json);
   require_writable(options.junit);
   if (!options.junit.empty() && !depth && !mode) {
@@ -179,13 +183,14 @@ int run(const RunOptions& options) {
   std::optional<harness::Errors> errors;
   print_header(scene, built, options);
 
-  RunResult result{"run", options.scene, options.backend.name, scene, built.setup.body, built.state.clusters.count()};
+  RunResult result{"run", options.scene.file, options.backend.name,
+                   scene, built.setup.body,   built.state.clusters.count()};
   harness::FrameRunner runner(*backend, {built.setup}, {built.state});
   const auto state = [&]() -> const State& { return *runner.states().front(); };
   if (depth) {
     harness::Promises promises;
     promises.words = harness::parse_promises(backend->promises(), options.backend.name, "promises");
-    const bool is_cut_short = options.build.frames && fixtures::stops_early(scene, options.scene, built.setup);
+    const bool is_cut_short = options.frames && fixtures::stops_early(scene, options.scene.file, built.setup);
     judge.emplace(built.setup, scene.expect, options.backend.name, runner.states().front(), *depth, promises,
                   is_cut_short ? harness::Extent::cut_short : harness::Extent::whole);
   }
@@ -234,6 +239,7 @@ int run(const RunOptions& options) {
   if (!options.json.empty()) {
     nlohmann::json document = to_json(result, judge ? &*judge : nullptr);
     document["build"] = build_json(built);
+    document["changes"] = given_changes(changes);
     if (against) {
       document["against"] = to_json(*against, built.setup);
       document["against"]["verdicts"] = io::verdicts_json(against->verdicts());
@@ -262,8 +268,8 @@ int run(const RunOptions& options) {
     say("for ParaView:\n");
     for (const std::string& file : {paths.particles, paths.skin, paths.blade}) say_copy(" ", file);
   }
-  if (!options.json.empty()) say_copy("wrote", options.json);
-  if (!options.junit.empty()) say_copy("wrote", options.junit);
+  print_written(options.json);
+  print_written(options.junit);
   if (judge) {
     print_conclusion(*judge);
   } else {
@@ -294,39 +300,37 @@ int run(const RunOptions& options) {
 void add_run(CLI::App& program, Work& work) {
   const auto options = std::make_shared<RunOptions>();
   CLI::App* const command = program.add_subcommand("run", "simulate a scene, and judge it with --check");
-  command
-      ->add_option("scene", options->scene,
-                   "scene file (JSON, see `cutproof info --scene`), or a name (`cutproof info --scenes`)")
-      ->type_name("SCENE");
+  add_scene(*command, options->scene);
   add_backend(*command, options->backend, "backend under test");
   command->add_option("--mesh", options->mesh, "closed surface mesh that takes the place of the scene's body")
       ->type_name("FILE");
   command->add_option("--unit", options->unit, "what one unit of the mesh is: mm, cm or m")
       ->capture_default_str()
       ->type_name("U")
+      ->check(one_of({"mm", "cm", "m"}))
       ->needs("--mesh");
   command->add_flag("--repair", options->repair, "repair the mesh if it does not bound a solid, and say what was done")
       ->needs("--mesh");
-  add_count(*command, "--particles", options->build.particles, "how many particles the body is to have",
-            CLI::PositiveNumber);
-  add_count(*command, "--frames", options->build.frames,
-            "stop after this many frames of the scene, and judge what is in reach", CLI::NonNegativeNumber);
+  add_count(*command, "--frames", options->frames,
+            "stop after this many frames of the scene, and judge what is in reach", whole_number(0));
   add_check_depth(*command, options->check, "judge every frame by every property, and by what the scene expects")
       ->expected(0, 1);
   command
       ->add_option("--against", options->against,
                    fmt::format("compare every stage with this backend: {}", harness::reference_backend().name))
-      ->type_name("B");
+      ->type_name("B")
+      ->check(usually_one_of({std::string(harness::reference_backend().name)}));
   command->add_option("--mode", options->mode, "of the comparison: lockstep, free-running or both")
       ->capture_default_str()
       ->type_name("M")
-      ->check(CLI::IsMember({"lockstep", "free-running", "both"}))
+      ->check(one_of({"lockstep", "free-running", "both"}))
       ->needs("--against");
   command
       ->add_option("--errors", options->errors,
                    "measure errors: all, or some of implementation (as --against reference), solver, time_step, "
                    "geometry, topology, conservation")
-      ->type_name("E,E...");
+      ->type_name("E,E...")
+      ->check(usually_one_of(error_names()));
   command->add_option("--record", options->record, "keep every frame, for `cutproof check` and ParaView")
       ->type_name("F");
   add_json(*command, options->json, "write verdicts, stage times and counts");
@@ -334,12 +338,12 @@ void add_run(CLI::App& program, Work& work) {
   command->callback([options, command, &work] {
     options->again = as_given(*command);
     // Whoever writes --check before the scene means no depth by it.
-    if (options->scene.empty() && !options->check.empty() && !harness::depth_named(options->check)) {
-      options->scene = std::exchange(options->check, std::string(name_of(harness::Depth::motion)));
+    if (options->scene.file.empty() && !options->check.empty() && !harness::depth_named(options->check)) {
+      options->scene.file = std::exchange(options->check, std::string(name_of(harness::Depth::motion)));
     }
     work = [options] {
-      if (!options->scene.empty()) {
-        options->scene = scene_file(options->scene);
+      if (!options->scene.file.empty()) {
+        options->scene.file = scene_file(options->scene.file);
         return run(*options);
       }
       std::fputs(kNextSteps, stderr);

@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "model/error.h"
+#include "model/nearest_word.h"
 
 namespace cutproof::cli {
 
@@ -50,8 +51,9 @@ std::string scene_file(const std::string& given) {
   const std::vector<std::string> names = scene_names();
   if (std::binary_search(names.begin(), names.end(), given)) return (scene_folder() / (given + ".json")).string();
   if (names.empty()) return given;
-  throw InputError(given, "", "There is no file of this name, and no scene that comes with the program is called so.",
-                   fmt::format("Give a scene file, or one of: {}.", fmt::join(names, ", ")));
+  throw InputError(
+      given, "", "There is no file of this name, and no scene that comes with the program is called so.",
+      did_you_mean(given, names) + fmt::format("Give a scene file, or one of: {}.", fmt::join(names, ", ")));
 }
 
 }  // namespace cutproof::cli

@@ -8,10 +8,12 @@
 #include <memory>
 
 #include "cli/commands.h"
+#include "cli/interruption.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/progress.h"
 #include "cli/scene_files.h"
+#include "cli/scene_options.h"
 #include "cli/screen.h"
 #include "cli/table.h"
 #include "cli/terminal.h"
@@ -27,6 +29,7 @@ using namespace tuning;
 
 struct Asked {
   TuneOptions tune;
+  SceneOptions scene;
   std::string reference = "limit";
   std::string json;
 };
@@ -161,29 +164,44 @@ void print(const TuneOptions& options, TuneStep step, const json& document, cons
     case TuneStep::none_verified:
       insist("none of the configurations that seemed to be within {:g} h holds when it is verified\n",
              options.tolerance);
+      return;
+    case TuneStep::stopped: {
+      const json& trials = document.at("trials");
+      if (!trials.empty()) print_trials(trials);
+      insist("\n{}: it was stopped {}; nothing is found yet\n", undecided("INCOMPLETE"),
+             trials.empty() ? std::string("before the first configuration was tried")
+                            : fmt::format("after {} configuration{}", trials.size(), trials.size() == 1 ? "" : "s"));
+    }
   }
 }
 
 int tune(Asked asked) {
+  const EndsInOrder in_order;
+  asked.tune.stop_asked = stop_asked;
   asked.tune.reference = asked.reference == "limit" ? ReferenceKind::limit : ReferenceKind::substeps;
+  asked.tune.scene = asked.scene.file;
+  asked.tune.changes = changes_of(asked.scene);
   settle_files(asked);
   Progress progress("trial", 0);
   double part = 0;
-  const bool found = run_tune(asked.tune, [&](TuneStep step, const json& document, const Scene& given) {
-    print(asked.tune, step, document, given);
-    if (step == TuneStep::trial) part = std::max(part, part_searched(document, given));  // what is varied begins anew
-    if (!document.at("complete")) {
+  const bool found = with_sources(asked.tune.scene, asked.tune.changes, [&] {
+    return run_tune(asked.tune, [&](TuneStep step, const json& so_far, const Scene& given) {
+      json document = so_far;
+      document["changes"] = given_changes(asked.tune.changes);
+      // After each trial, so that what has been measured is kept if a later one fails; and in the end.
+      if (step == TuneStep::trial) keep_document(asked.json, document);
+      if (step == TuneStep::stopped || document.at("complete")) write_document(asked.json, document);
+      print(asked.tune, step, document, given);
+      if (step == TuneStep::trial) part = std::max(part, part_searched(document, given));  // what is varied begins anew
+      flush_output();
+      if (step == TuneStep::stopped || document.at("complete")) return;
       const char* const what = step == TuneStep::begun      ? "computing the reference solution"
                                : step == TuneStep::searched ? "verifying"
                                                             : "searching";
-      flush_output();
       progress.show(static_cast<int64_t>(document.at("trials").size()), what, part);
-    }
-    flush_output();
-    // After each trial, so that what has been measured is kept if a later one fails; and in the end.
-    if (step == TuneStep::trial || document.at("complete")) write_document(asked.json, document);
+    });
   });
-  if (!asked.json.empty()) say_copy("wrote", asked.json);
+  print_written(asked.json);
   if (found) insist_copy("wrote", asked.tune.write);
   return found ? 0 : 1;
 }
@@ -195,37 +213,33 @@ void add_tune(CLI::App& program, Work& work) {
   TuneOptions& options = asked->tune;
   CLI::App* const command =
       program.add_subcommand("tune", "find the cheapest configuration of a scene within a tolerance");
-  command
-      ->add_option("scene", options.scene,
-                   "scene file (JSON, see `cutproof info --scene`), or a name (`cutproof info --scenes`)")
-      ->required()
-      ->type_name("SCENE");
+  add_scene(*command, asked->scene)->required();
   command
       ->add_option("--tolerance", options.tolerance,
                    "greatest RMS distance from the reference solution in any frame [h]")
       ->required()
       ->type_name("T")
-      ->check(CLI::PositiveNumber);
+      ->check(number_above(0));
   command
       ->add_option("--reference", asked->reference,
                    "the reference solution. limit: of ever shorter time steps; substeps: the scene's own, each solved "
                    "until it is converged")
       ->capture_default_str()
       ->type_name("R")
-      ->check(CLI::IsMember({"limit", "substeps"}));
+      ->check(one_of({"limit", "substeps"}));
   add_backend(*command, options.backend, "backend under test", is_timed);
-  add_count(*command, "--frames", options.frames, "look at this many frames of the scene only", CLI::PositiveNumber);
+  add_count(*command, "--frames", options.frames, "look at this many frames of the scene only", whole_number(1));
   command->add_flag("--without-skin", options.without_skin, "nobody looks at the skin: it need not be made");
   command->add_flag("--full", options.full,
                     "run and time everything to its end, for a curve; else what is beyond the tolerance, or more "
                     "expensive than what was found, is given up");
-  add_count(*command, "--repeats", options.repeats, "timed runs of each configuration", CLI::Range(1, 1000));
+  add_count(*command, "--repeats", options.repeats, "timed runs of each configuration", whole_number(1, 1000));
   command->add_option("--write", options.write, "the scene that was found (default: NAME_tuned.json here)")
       ->type_name("F");
   add_json(*command, asked->json, "write everything that was tried");
   command->callback([asked, &work] {
     work = [asked] {
-      asked->tune.scene = scene_file(asked->tune.scene);
+      asked->scene.file = scene_file(asked->scene.file);
       return tune(*asked);
     };
   });

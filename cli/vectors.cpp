@@ -15,6 +15,7 @@
 #include "cli/screen.h"
 #include "cli/table.h"
 #include "model/io/array_file.h"
+#include "model/nearest_word.h"
 
 namespace cutproof::cli {
 
@@ -43,7 +44,8 @@ struct VectorsOptions {
 int make_vectors(const VectorsOptions& options) {
   const OperationDescription* const operation = find_vector_operation(options.operation);
   if (operation == nullptr) {
-    refuse("OP", fmt::format("there is no operation '{}'", options.operation), "use one of " + operation_names());
+    refuse("OP", fmt::format("there is no operation '{}'", options.operation),
+           did_you_mean(options.operation, listed(operation_names())) + "use one of " + operation_names());
   }
   if (options.cases > kMostCases) {
     refuse("--cases", fmt::format("a file has at most {} cases", kMostCases), "make several, of different seeds");
@@ -175,16 +177,19 @@ void add_vectors(CLI::App& program, Work& work) {
   const auto options = std::make_shared<VectorsOptions>();
   CLI::App* const command =
       program.add_subcommand("vectors", "test vectors for single kernels, as a file that any program reads");
-  command->add_option("operation", options->operation, operation_names())->required()->type_name("OP");
+  command->add_option("operation", options->operation, operation_names())
+      ->required()
+      ->type_name("OP")
+      ->check(usually_one_of(listed(operation_names())));
   command->add_option("-o,--output", options->file, "NPZ if its name ends in .npz, else HDF5")
       ->required()
       ->type_name("FILE");
   add_count(*command, "--cases", options->cases,
-            "at least one of each kind (default: 200; of rotations, one of each kind)", CLI::PositiveNumber);
+            "at least one of each kind (default: 200; of rotations, one of each kind)", whole_number(1));
   add_seed(*command, options->seed, "what cases are drawn from");
   command->add_option("--precision", options->precision, "of the numbers, and of the bounds")
       ->capture_default_str()
-      ->check(CLI::IsMember({"single", "double"}));
+      ->check(one_of({"single", "double"}));
   command->callback([options, &work] { work = [options] { return make_vectors(*options); }; });
 }
 

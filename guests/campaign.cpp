@@ -35,12 +35,15 @@ const Verdict* first_failure(const std::vector<Verdict>& verdicts, const harness
 
 // By questions that are simpler and still fail in the same property.
 void simplify(Guest& guest, const OperationDescription& operation, const harness::Promises& promises, bool again,
-              double seconds, KernelFailure& failure) {
+              const KernelCampaignOptions& options, KernelFailure& failure) {
   const Clock::time_point begin = Clock::now();
-  for (bool simpler = true; simpler && seconds_since(begin) < seconds;) {
+  const auto is_over = [&] {
+    return seconds_since(begin) >= options.simplify || guest.has_ended() || is_asked(options.stop_asked);
+  };
+  for (bool simpler = true; simpler && !is_over();) {
     simpler = false;
     for (Question& next : operation.simpler(failure.simplest)) {
-      if (seconds_since(begin) >= seconds || guest.has_ended()) break;
+      if (is_over()) break;
       const std::vector<Verdict> verdicts = judge_answer(guest, operation, next, failure.at_end, again);
       const Verdict* const failing = first_failure(verdicts, promises, failure.verdict.property);
       if (failing == nullptr) continue;
@@ -115,6 +118,8 @@ KernelCampaign judge_kernel(Guest& guest, const OperationDescription& operation,
   const auto kinds = static_cast<int64_t>(operation.kinds().size());
   for (int64_t index = 0; campaign.cases < options.cases || index < kinds; ++index) {
     if (options.seconds && seconds_since(begin) >= *options.seconds) break;
+    campaign.stopped = is_asked(options.stop_asked);
+    if (campaign.stopped) break;
     const Question question = operation.draw(options.seed, index, guest.plugin().precision);
     // By turns both ends of every array are guarded, whatever the number of kinds.
     const bool at_end = (index + index / kinds) % 2 == 0;
@@ -152,7 +157,7 @@ KernelCampaign judge_kernel(Guest& guest, const OperationDescription& operation,
     }
   }
   for (KernelFailure& failure : campaign.failures) {
-    simplify(guest, operation, promises, again, options.simplify, failure);
+    simplify(guest, operation, promises, again, options, failure);
   }
   return campaign;
 }
@@ -326,6 +331,7 @@ nlohmann::json to_json(const KernelCampaign& campaign) {
           {"questions", campaign.questions},
           {"refused", campaign.refused},
           {"not_answered", campaign.lost},
+          {"complete", !campaign.stopped},
           {"gave_up", campaign.gave_up},
           {"ended", campaign.ended},
           {"failed", campaign.failed},

@@ -11,6 +11,7 @@
 #include "guests/questions/question.h"
 #include "harness/promises.h"
 #include "harness/property_summary.h"
+#include "model/stop.h"
 
 namespace cutproof::guests {
 
@@ -24,6 +25,7 @@ struct KernelCampaignOptions {
   double simplify = 20;                // [s] for each failure that is kept
   // After so many questions that were not answered at all the campaign ends; 0: never.
   int64_t most_lost = 10;
+  StopAsked stop_asked = {};  // asks no further question, and simplifies no further
 };
 
 struct KernelFailure {
@@ -43,7 +45,8 @@ struct KernelCampaign {
   const OperationDescription* operation = nullptr;
   int64_t questions = 0, cases = 0, refused = 0, lost = 0;
   bool gave_up = false;
-  bool ended = false;  // the guest has, and cannot be started anew
+  bool ended = false;    // the guest has, and cannot be started anew
+  bool stopped = false;  // it was asked to stop, and did before its end
   double seconds = 0;
   harness::PropertySummaries properties;
   std::vector<Unpromised> unpromised;

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
+#include <signal.h>
 #include <spawn.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
@@ -180,8 +181,19 @@ void Guest::start() {
   }
   environment.push_back(parameters.c_str());
   environment.push_back(nullptr);
-  const int failed = posix_spawn(&process_, program.c_str(), &actions, nullptr, const_cast<char**>(arguments),
+  // In a group of its own: a terminal's ^C is for the host, which ends in order; a guest that it killed would seem to
+  // have crashed. It ends with its host. What the host ignores is not the plugin's choice.
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setpgroup(&attributes, 0);
+  sigset_t ignored;
+  sigemptyset(&ignored);
+  sigaddset(&ignored, SIGXFSZ);
+  posix_spawnattr_setsigdefault(&attributes, &ignored);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGDEF);
+  const int failed = posix_spawn(&process_, program.c_str(), &actions, &attributes, const_cast<char**>(arguments),
                                  const_cast<char**>(environment.data()));
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   close(ends[1]);
   close(their_channel);

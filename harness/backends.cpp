@@ -9,6 +9,7 @@
 #include <functional>
 #include <map>
 #include <mutex>
+#include <ranges>
 #include <thread>
 
 #include "gpu/backends.h"
@@ -16,6 +17,7 @@
 #include "harness/partial_backend.h"
 #include "model/at.h"
 #include "model/error.h"
+#include "model/nearest_word.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::harness {
@@ -233,7 +235,8 @@ const BackendDescriptor& described_backend(std::string_view name) {
   const BackendDescriptor* const found = find_backend(name);
   if (found == nullptr) {
     refuse("--backend", fmt::format("there is no backend '{}'", name),
-           fmt::format("use one of those that `cutproof info` lists: {}; or plugin:FILE.so", backend_names()));
+           did_you_mean(name, kBackends | std::views::transform([](const auto& backend) { return backend.name; })) +
+               fmt::format("use one of those that `cutproof info` lists: {}; or plugin:FILE.so", backend_names()));
   }
   return *found;
 }

@@ -105,6 +105,7 @@ class Runner {
               [](const Violation& a, const Violation& b) { return a.index < b.index; });
     if (!options_.keep_going && violations.size() > 1) violations.erase(violations.begin() + 1, violations.end());
     campaign_.seconds = seconds_since(begin_);
+    campaign_.stopped = stopped_;
     return std::move(campaign_);
   }
 
@@ -126,6 +127,7 @@ class Runner {
   bool run_load(int64_t number) {
     const Clock::time_point begin = Clock::now();
     if (options_.seconds && seconds_since(begin_) >= *options_.seconds) return false;
+    if (options_.shard + number * options_.batch * options_.shards >= options_.cases || is_stopped()) return false;
     Load load;
     for (int64_t k = number * options_.batch; k < (number + 1) * options_.batch; ++k) {
       const int64_t index = options_.shard + k * options_.shards;
@@ -156,13 +158,13 @@ class Runner {
       loan.works = problem.empty();
     }
     const Clock::time_point judging_since = Clock::now();
-    std::vector<Judgement> judgements(load.cases.size());
-    for (std::size_t k = 0; k < load.cases.size(); ++k) {
-      judgements[k] = problem.empty() ? judge_case(load.cases[k], load.loaded[k], runs[k], name,
-                                                   load.indices[k] % options_.thorough == 0)
-                                      : dissect_alone([&] { return source_.make(number); }, load.cases[k], true);
+    std::vector<Judgement> judgements;
+    for (std::size_t k = 0; k < load.cases.size() && !is_stopped(); ++k) {
+      judgements.push_back(problem.empty() ? judge_case(load.cases[k], load.loaded[k], runs[k], name,
+                                                        load.indices[k] % options_.thorough == 0)
+                                           : dissect_alone([&] { return source_.make(number); }, load.cases[k], true));
     }
-    if (!problem.empty() && !is_refused &&
+    if (!problem.empty() && !is_refused && judgements.size() == load.cases.size() &&
         std::none_of(judgements.begin(), judgements.end(), [](const Judgement& j) { return j.failure.has_value(); })) {
       judgements.front() = thrown(name, "(with the other bodies of its load only) " + problem);
     }
@@ -170,6 +172,13 @@ class Runner {
     return true;
   }
 
+  // Once it is asked to stop, what is begun counts as far as it was judged.
+  bool is_stopped() {
+    if (is_asked(options_.stop_asked)) stopped_ = true;
+    return stopped_;
+  }
+
+  // `judgements`: of the first cases of the load, or of all.
   void note(const Load& load, std::vector<Judgement>& judgements, double generating, double running, double judging) {
     const std::lock_guard lock(guard_);
     campaign_.generating += generating;
@@ -198,7 +207,7 @@ class Runner {
   Pool pool_;
   Clock::time_point begin_ = Clock::now();
   std::atomic<int64_t> next_{0};  // loads are begun in order, so the first violation is found whatever comes after it
-  std::atomic<bool> stop_{false};
+  std::atomic<bool> stop_{false}, stopped_{false};
   std::mutex guard_;
   Campaign campaign_;
   std::exception_ptr error_;

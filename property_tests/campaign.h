@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "model/stop.h"
 #include "property_tests/dissection.h"
 #include "property_tests/histories.h"
 
@@ -26,6 +27,7 @@ struct CampaignOptions {
   int thorough = 50;                   // every n-th case with CGAL's geometric check
   int64_t shard = 0, shards = 1;       // of cases 0, 1, 2, …: those that are `shard` modulo `shards`
   bool keep_going = false;             // beyond the first violation
+  StopAsked stop_asked;                // begins no further case; those that were judged count
 };
 
 // Makes the backend for a load; called once for each of `backends` and never for others if `fresh` is false.
@@ -42,7 +44,8 @@ struct Violation {
 
 struct Campaign {
   int64_t cases = 0, verdicts = 0, particles = 0;
-  int64_t refused = 0;  // cases that the backend refused: nothing is known of them
+  int64_t refused = 0;   // cases that the backend refused: nothing is known of them
+  bool stopped = false;  // it was asked to stop, and did before its end
   CaseCoverage coverage;
   StepsCompared compared;
   harness::PropertySummaries properties;

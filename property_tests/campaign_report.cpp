@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <iterator>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "model/error.h"
@@ -21,7 +22,7 @@ namespace {
 using nlohmann::json;
 
 constexpr const char* kResultFormat = "cutproof.fuzz";
-constexpr int kFormatVersion = 3;
+constexpr int kFormatVersion = 4;
 // Classes of cases are rare: below this many cases, or with small ones only, an empty class says nothing.
 constexpr int64_t kCasesThatMeetEveryClass = 1000;
 constexpr int kSizeThatMeetsEveryClass = 79;
@@ -35,7 +36,7 @@ constexpr const char* kRemedy = "give the results (--json) of all shards of one 
 
 // What makes two results shards of one campaign: what decides which cases there are, what runs them, and what judges.
 // Threads are the machine's business: no case depends on them.
-constexpr const char* kOfTheCampaign[] = {"version",  "commit",        "backend",     "split",         "rotation",
+constexpr const char* kOfTheCampaign[] = {"cutproof", "commit",        "backend",     "split",         "rotation",
                                           "schedule", "schedule_seed", "seed",        "sizes",         "dynamics",
                                           "batch",    "keep_going",    "cases_asked", "seconds_asked", "shards"};
 
@@ -129,7 +130,8 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
   json document = {
       {"format", kResultFormat},
       {"format_version", kFormatVersion},
-      {"version", CUTPROOF_VERSION},
+      {"cutproof", CUTPROOF_VERSION},
+      {"complete", !campaign.stopped},
       {"backend", backend.name},
       {"split", backend.split.empty() ? "blocks" : backend.split},
       {"rotation", harness::rotation_of(backend)},
@@ -153,7 +155,7 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
       {"coverage", coverage},
       {"properties", campaign.properties.to_json()},
       {"violations", violations},
-      {"holds", violations.empty() && campaign.verdicts > 0}};
+      {"holds", violations.empty() && campaign.verdicts > 0 && !campaign.stopped}};
   sort_properties(document["properties"]);
   if (described.takes_schedule) {
     document["schedule"] = backend.schedule;
@@ -191,7 +193,7 @@ void require_fields(const json& part, const std::string& file) {
   for (const char* of_threads : {"generating", "running", "judging"}) {
     static_cast<void>(part.at("thread_seconds").at(of_threads).get<double>());
   }
-  static_cast<void>(part.at("dynamics").get<bool>());
+  for (const char* flag : {"dynamics", "complete"}) static_cast<void>(part.at(flag).get<bool>());
   static_cast<void>(part.at("backend").get<std::string>());
   static_cast<void>(part.at("sizes").at(1).get<int>());
   for (const CoverageClass& each : kCoverageClasses) require_count(part.at("coverage"), each.name);
@@ -239,6 +241,7 @@ json read_shard(const std::string& file) {
 json merge_shards(const std::vector<std::string>& files) {
   json whole;
   std::map<int64_t, std::string> file_of;  // shard -> its file
+  std::set<int64_t> stopped;               // shards that have not judged all of their cases
   for (const std::string& file : files) {
     try {
       const json part = read_shard(file);
@@ -255,6 +258,7 @@ json merge_shards(const std::vector<std::string>& files) {
                          kRemedy);
       }
       if (file_of.size() > 1) add_shard(whole, part);
+      if (!part.at("complete").get<bool>()) stopped.insert(shard);
     } catch (const json::exception& error) {
       throw InputError(file, "", fmt::format("this is not a result of `cutproof fuzz` ({})", error.what()), kRemedy);
     }
@@ -262,7 +266,7 @@ json merge_shards(const std::vector<std::string>& files) {
   const auto expected = whole.at("shards").get<int64_t>();
   json missing = json::array();
   for (int64_t shard = 1; shard <= expected; ++shard) {
-    if (!file_of.contains(shard)) missing.push_back(shard);
+    if (!file_of.contains(shard) || stopped.contains(shard)) missing.push_back(shard);
   }
   sort_properties(whole.at("properties"));
   json& violations = whole.at("violations");
@@ -291,14 +295,32 @@ std::string missing_shards(const json& document) {
   return fmt::format("{}", fmt::join(ranges, ","));
 }
 
+namespace {
+
+// How far a campaign came that was stopped.
+std::string how_far(const json& document) {
+  if (document.contains("seconds_asked")) {
+    return fmt::format("it was stopped after {:.1f} of {:g} s", document.at("seconds").get<double>(),
+                       document.at("seconds_asked").get<double>());
+  }
+  const auto shard = document.at("shard").get<int64_t>(), shards = document.at("shards").get<int64_t>();
+  return fmt::format("it was stopped after {} of {} cases", document.at("cases").get<int64_t>(),
+                     (document.at("cases_asked").get<int64_t>() - shard + shards) / shards);
+}
+
+}  // namespace
+
 CampaignConclusion conclude(const json& document, bool whole) {
   const auto cases = document.at("cases").get<int64_t>();
   const std::size_t violations = document.at("violations").size();
   const std::string missing = missing_shards(document);
-  const std::string lost = missing.empty()
-                               ? ""
-                               : fmt::format("of {} shards these are missing, and their cases were not judged: {}",
-                                             document.at("merged_shards").get<int64_t>(), missing);
+  std::string lost;
+  if (!missing.empty()) {
+    lost = fmt::format("of {} shards these are missing or were stopped, and not all of their cases were judged: {}",
+                       document.at("merged_shards").get<int64_t>(), missing);
+  } else if (!document.value("complete", true)) {
+    lost = how_far(document);
+  }
   if (violations > 0) {
     return {fmt::format("{} of {} cases{}", violations, cases, lost.empty() ? "" : "; " + lost)};
   }

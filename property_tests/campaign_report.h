@@ -18,9 +18,9 @@ nlohmann::json campaign_document(const harness::BackendChoice& backend, const Ca
 
 inline constexpr int64_t kMostShards = 1'000'000;
 
-// The document of the whole from the documents (files) of its shards. A shard that is not there is listed in
-// `missing_shards`, and `complete` is false. Throws InputError, naming the file, for anything that is not the result of
-// a shard of one campaign, each once.
+// The document of the whole from the documents (files) of its shards. A shard that is not there, or was stopped before
+// its end, is listed in `missing_shards`, and `complete` is false. Throws InputError, naming the file, for anything
+// that is not the result of a shard of one campaign, each once.
 nlohmann::json merge_shards(const std::vector<std::string>& files);
 // Of a merged document, as job arrays write it: "3,7-12"; empty: none is missing.
 std::string missing_shards(const nlohmann::json& document);

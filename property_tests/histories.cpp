@@ -13,6 +13,7 @@
 #include "model/fields.h"
 #include "model/io/limits.h"
 #include "model/io/recording.h"
+#include "model/io/unfinished.h"
 #include "model/rules.h"
 #include "oracles/comparison/state_difference.h"
 #include "oracles/oracles.h"
@@ -59,25 +60,11 @@ int64_t first_ghost(const Field& field, const T& still, const T& pushed, const C
   }
 }
 
-// A folder that goes with everything in it.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "cutproof_history_XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) throw MachineError(pattern + ": The folder cannot be made.");
-    path_ = pattern;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  std::string file(const char* name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
-};
+std::string new_folder() {
+  std::string pattern = (std::filesystem::temp_directory_path() / "cutproof_history_XXXXXX").string();
+  if (mkdtemp(pattern.data()) == nullptr) throw MachineError(pattern + ": The folder cannot be made.");
+  return pattern;
+}
 
 }  // namespace
 
@@ -294,8 +281,10 @@ void History::carry_out(const SaveAndLoad& command) {
   require_same("a snapshot changes nothing", state_, saved);
   Setup setup = loaded_.setup;
   if (command.through_files) {
-    const TemporaryFolder folder;
-    const std::string name = folder.file("history");
+    const io::Unfinished folder(new_folder());
+    const std::string name = folder.path() + "/history";
+    const io::RecordingPaths paths = io::recording_paths(name);
+    const io::Unfinished index(paths.index), particles(paths.particles), skin(paths.skin), blade(paths.blade);
     io::Recorder recorder(name, setup, "{}", staged_->name());
     recorder.add(before(next_), saved);
     recorder.finish();

@@ -15,7 +15,8 @@ bool takes_schedule(const BackendChoice& choice) { return harness::described_bac
 
 }  // namespace
 
-Simplified simplify(const Violation& violation, const BackendChoice& choice, double seconds) {
+Simplified simplify(const Violation& violation, const BackendChoice& choice, double seconds,
+                    const StopAsked& stop_asked) {
   Simplified result;
   Counterexample& found = result.counterexample;
   found.failing = violation.failing;
@@ -43,7 +44,9 @@ Simplified simplify(const Violation& violation, const BackendChoice& choice, dou
   if (!fails(violation.failing)) return result;
   result.alone = true;
   const Clock::time_point begin = Clock::now();
-  const auto is_over = [&] { return std::chrono::duration<double>(Clock::now() - begin).count() >= seconds; };
+  const auto is_over = [&] {
+    return std::chrono::duration<double>(Clock::now() - begin).count() >= seconds || is_asked(stop_asked);
+  };
   found.failing = simplest(violation.failing, fails, is_over);
   if (scheduled) {
     const auto schedule = std::make_shared<gpu::ThreadSchedule>();

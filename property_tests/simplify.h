@@ -15,8 +15,9 @@ struct Simplified {
   bool alone = false;  // fails without the other bodies of its load
 };
 // The simplest case, and under a chosen schedule the fewest preemptions, that still fail; as far as this time reaches
-// [s]. What is tried last is tried to its end. 0: the case as it was drawn.
-Simplified simplify(const Violation& violation, const harness::BackendChoice& choice, double seconds);
+// [s], or until it is asked to stop. What is tried last is tried to its end. 0: the case as it was drawn.
+Simplified simplify(const Violation& violation, const harness::BackendChoice& choice, double seconds,
+                    const StopAsked& stop_asked = {});
 
 // The backend with which a counterexample is run again: under its schedule, if it has one and the backend takes one.
 std::unique_ptr<Backend> backend_of(const Counterexample& counterexample, const harness::BackendChoice& choice);

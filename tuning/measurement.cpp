@@ -11,8 +11,12 @@ namespace cutproof::tuning {
 
 namespace {
 
-double seconds_per_frame(Backend& backend, const PreparedScene& scene) {
-  return scene.run(backend, {}) / static_cast<double>(scene.frame_count());
+double seconds_per_frame(Backend& backend, const PreparedScene& scene, const StopAsked& stop_asked) {
+  const auto look_up = [&](double) {
+    throw_if_asked(stop_asked);
+    return true;
+  };
+  return scene.run(backend, look_up) / static_cast<double>(scene.frame_count());
 }
 
 }  // namespace
@@ -48,6 +52,7 @@ Trial measure(const Measuring& measuring, const ReferenceSolution& reference, co
   Comparison comparison(scene->setup(), reference.trajectory(), measuring.allowed(reference), trial);
   bool given_up = false;
   scene->run(*backend, [&](double seconds) {
+    throw_if_asked(measuring.asked.stop_asked);
     comparison.add(backend->snapshot().front());
     if (to_the_end) return true;
     // What is more expensive by its first run may be a little less so by its median.
@@ -68,7 +73,7 @@ Trial measure(const Measuring& measuring, const ReferenceSolution& reference, co
   if (trial.outcome == Outcome::within || to_the_end) {
     std::vector<double> samples;
     for (int repeat = 0; repeat < measuring.asked.repeats; ++repeat)
-      samples.push_back(seconds_per_frame(*backend, *scene));
+      samples.push_back(seconds_per_frame(*backend, *scene, measuring.asked.stop_asked));
     trial.frame = benchmarks::times_of(samples);
   }
   return trial;
@@ -81,7 +86,7 @@ TimedInTurns time_in_turns(const Measuring& measuring, const Configuration& foun
       const Configuration& timed = given ? measuring.given : found;
       const std::unique_ptr<Backend> backend = measuring.backend_for(timed);
       const PreparedScene scene(timed.scene, measuring.asked.scene, measuring.asked.frames);
-      (given ? before : after).push_back(seconds_per_frame(*backend, scene));
+      (given ? before : after).push_back(seconds_per_frame(*backend, scene, measuring.asked.stop_asked));
     }
   }
   return {benchmarks::times_of(before), benchmarks::times_of(after)};

@@ -4,8 +4,11 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "harness/backends.h"
+#include "model/io/scene_io.h"
+#include "model/stop.h"
 #include "tuning/prepared_scene.h"
 #include "tuning/reference_solution.h"
 #include "tuning/trial.h"
@@ -13,8 +16,9 @@
 namespace cutproof::tuning {
 
 struct TuneOptions {
-  std::string scene;  // its file
-  std::string write;  // where the scene that is found is written
+  std::string scene;                     // its file
+  std::vector<io::SceneChange> changes;  // of it: what is tuned is the scene with these
+  std::string write;                     // where the scene that is found is written
   harness::BackendChoice backend;
   double tolerance = 0;                            // [h]
   ReferenceKind reference = ReferenceKind::limit;  // what errors are distances from
@@ -22,6 +26,7 @@ struct TuneOptions {
   bool without_skin = false;                       // nobody looks at it
   bool full = false;                               // nothing is given up: errors and times of all that is tried
   int repeats = 3;                                 // timed runs of a configuration
+  StopAsked stop_asked;                            // ends it between two frames
 };
 
 // What is measured, and how. `asked` must outlive it.

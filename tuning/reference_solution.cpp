@@ -57,8 +57,8 @@ std::string known_to(std::span<const RefinementLevel> levels) {
 }
 
 ReferenceSolution::ReferenceSolution(ReferenceKind kind, const Scene& scene, std::string source,
-                                     std::optional<int64_t> frames, double known)
-    : kind_(kind), scene_(scene), source_(std::move(source)), frames_(frames) {
+                                     std::optional<int64_t> frames, double known, StopAsked stop_asked)
+    : kind_(kind), scene_(scene), source_(std::move(source)), frames_(frames), stop_asked_(std::move(stop_asked)) {
   scene_.skin.wanted = false;  // nothing moves with it
   scene_.step.acceleration = Acceleration::none;
   setup_ = PreparedScene(scene_, source_, frames_).setup();
@@ -97,6 +97,7 @@ Trajectory ReferenceSolution::run(const RefinementLevel& level) const {
   Trajectory trajectory;
   trajectory.stroke_end = prepared.stroke_end();
   prepared.run(*reference, [&](double) {
+    throw_if_asked(stop_asked_);
     trajectory.frames.push_back(oracles::pose_of(prepared.setup(), reference->snapshot().front(),
                                                  trajectory.frames.empty() ? nullptr : &trajectory.frames.back()));
     return true;

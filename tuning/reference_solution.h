@@ -9,6 +9,7 @@
 
 #include "model/scene.h"
 #include "model/setup.h"
+#include "model/stop.h"
 #include "tuning/trajectory.h"
 
 namespace cutproof::tuning {
@@ -37,9 +38,9 @@ class ReferenceSolution {
  public:
   // Refines, a factor of 2 at a time, until the solution is known to `known` [h] or no further level is allowed
   // (kMostSubsteps, kMostIterations); but the first three are run in any case, because fewer tell nothing. The scene
-  // must have the implicit solver.
+  // must have the implicit solver. Here and in refine(): throws Stopped between two frames once it is asked to stop.
   ReferenceSolution(ReferenceKind kind, const Scene& scene, std::string source, std::optional<int64_t> frames,
-                    double known);
+                    double known, StopAsked stop_asked = {});
 
   const Trajectory& trajectory() const { return trajectory_; }
   const std::vector<RefinementLevel>& levels() const { return levels_; }
@@ -62,6 +63,7 @@ class ReferenceSolution {
   Scene scene_;
   std::string source_;
   std::optional<int64_t> frames_;
+  StopAsked stop_asked_;
   Setup setup_;
   std::vector<RefinementLevel> levels_;
   Trajectory trajectory_;

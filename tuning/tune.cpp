@@ -31,7 +31,7 @@ const std::vector<std::string>& sound_rotations() {
 
 // Whatever is wrong with the choice of a backend, or with the scene, is found out here.
 Measuring prepare(const TuneOptions& options) {
-  Measuring measuring{options, {io::read_scene(options.scene), ""}};
+  Measuring measuring{options, {io::read_scene(options.scene, options.changes), ""}};
   const Scene& scene = measuring.given.scene;
   if (scene.step.solver != Solver::implicit) {
     throw InputError(options.scene, "step.solver",
@@ -162,45 +162,49 @@ bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
     return conclusion == TuneStep::found;
   };
   show(TuneStep::begun);
+  try {
+    ReferenceSolution reference(options.reference, measuring.given.scene, options.scene, options.frames,
+                                kUnknownShare * options.tolerance, options.stop_asked);
+    document["reference"] = {{"kind", options.reference == ReferenceKind::limit ? "limit" : "substeps"},
+                             {"levels", levels_json(reference)},
+                             {"known_h", json_number(reference.known_to_h())},
+                             {"known_text", known_to(reference.levels())},
+                             {"searched_level", reference.levels().size() - 1}};
+    show(TuneStep::reference_known);
+    if (!(measuring.allowed(reference) > 0)) return conclude(TuneStep::reference_unknown);
 
-  ReferenceSolution reference(options.reference, measuring.given.scene, options.scene, options.frames,
-                              kUnknownShare * options.tolerance);
-  document["reference"] = {{"kind", options.reference == ReferenceKind::limit ? "limit" : "substeps"},
-                           {"levels", levels_json(reference)},
-                           {"known_h", json_number(reference.known_to_h())},
-                           {"known_text", known_to(reference.levels())},
-                           {"searched_level", reference.levels().size() - 1}};
-  show(TuneStep::reference_known);
-  if (!(measuring.allowed(reference) > 0)) return conclude(TuneStep::reference_unknown);
+    const std::vector<Trial> trials = search(measuring.given, space_of(measuring, options, reference),
+                                             [&](const Configuration& configuration, std::optional<double> limit) {
+                                               Trial trial = measure(measuring, reference, configuration, limit);
+                                               document["trials"].push_back(to_json(trial, measuring.given));
+                                               show(TuneStep::trial);
+                                               return trial;
+                                             });
+    show(TuneStep::searched);
+    if (by_cost(trials).empty()) return conclude(TuneStep::none_within);
 
-  const std::vector<Trial> trials = search(measuring.given, space_of(measuring, options, reference),
-                                           [&](const Configuration& configuration, std::optional<double> limit) {
-                                             Trial trial = measure(measuring, reference, configuration, limit);
-                                             document["trials"].push_back(to_json(trial, measuring.given));
-                                             show(TuneStep::trial);
-                                             return trial;
-                                           });
-  show(TuneStep::searched);
-  if (by_cost(trials).empty()) return conclude(TuneStep::none_within);
-
-  reference.refine();
-  document["reference"]["levels"] = levels_json(reference);
-  document["reference"]["known_h"] = json_number(reference.known_to_h());
-  document["reference"]["known_text"] = known_to(reference.levels());
-  const std::optional<Found> found =
-      take_cheapest(measuring, reference, trials, options.write, [&](std::size_t trial, const std::string& why) {
-        document["left"].push_back({{"trial", trial}, {"why", why}});
-        show(TuneStep::not_taken);
-      });
-  if (!found) return conclude(TuneStep::none_verified);
-  io::write_text(options.write, found->text);
-  document["found"] = {{"trial", found->trial},
-                       {"verified", to_json(found->verified.trial, measuring.given)},
-                       {"verdicts", found->verified.verdicts},
-                       {"seconds_per_frame", benchmarks::to_json(found->times.found)},
-                       {"seconds_per_frame_as_given", benchmarks::to_json(found->times.given)},
-                       {"times_cheaper", found->times.given.median / found->times.found.median}};
-  return conclude(TuneStep::found);
+    reference.refine();
+    document["reference"]["levels"] = levels_json(reference);
+    document["reference"]["known_h"] = json_number(reference.known_to_h());
+    document["reference"]["known_text"] = known_to(reference.levels());
+    const std::optional<Found> found =
+        take_cheapest(measuring, reference, trials, options.write, [&](std::size_t trial, const std::string& why) {
+          document["left"].push_back({{"trial", trial}, {"why", why}});
+          show(TuneStep::not_taken);
+        });
+    if (!found) return conclude(TuneStep::none_verified);
+    io::write_text(options.write, found->text);
+    document["found"] = {{"trial", found->trial},
+                         {"verified", to_json(found->verified.trial, measuring.given)},
+                         {"verdicts", found->verified.verdicts},
+                         {"seconds_per_frame", benchmarks::to_json(found->times.found)},
+                         {"seconds_per_frame_as_given", benchmarks::to_json(found->times.given)},
+                         {"times_cheaper", found->times.given.median / found->times.found.median}};
+    return conclude(TuneStep::found);
+  } catch (const Stopped&) {
+    show(TuneStep::stopped);
+    return false;
+  }
 }
 
 }  // namespace cutproof::tuning

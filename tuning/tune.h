@@ -7,7 +7,7 @@
 
 namespace cutproof::tuning {
 
-// What has just been added to the document; the last four conclude.
+// What has just been added to the document; the last five conclude.
 enum class TuneStep {
   begun,
   reference_known,
@@ -17,7 +17,8 @@ enum class TuneStep {
   found,
   reference_unknown,  // the reference solution is not known well enough to say
   none_within,
-  none_verified  // of those that seemed to be within
+  none_verified,  // of those that seemed to be within
+  stopped         // before its end, as it was asked to: the document stays incomplete
 };
 // `so_far`: the fields of results_schema.md. `given`: the scene that is tuned.
 using TuneProgress = std::function<void(TuneStep step, const nlohmann::json& so_far, const Scene& given)>;

@@ -30,6 +30,7 @@ Verified verify(const Measuring& measuring, const ReferenceSolution& reference, 
   harness::SceneJudge judge(prepared.setup(), expected, measuring.asked.backend.name, runner.states().front());
   Comparison comparison(prepared.setup(), reference.trajectory(), measuring.allowed(reference), verified.trial);
   for (int64_t frame = 0; frame < prepared.frame_count(); ++frame) {
+    throw_if_asked(measuring.asked.stop_asked);
     prepared.for_parts_of(frame, [&] { runner.run_frame([&](const harness::Moment& moment) { judge.see(moment); }); });
     comparison.add(*runner.states().front());
   }

@@ -33,7 +33,7 @@ void add_baselines(CLI::App& bench, Work& work) {
   CLI::App* const command =
       bench.add_subcommand("baselines", "this method beside deletion, other expansion, detection and merging");
   add_backend_name(*command, options->backend, "backend under test", is_timed);
-  add_count(*command, "--particles", options->particles, "of the kidney", CLI::Range(100, 2'000'000));
+  add_count(*command, "--particles", options->particles, "of the kidney", whole_number(100, 2'000'000));
   add_seed(*command, options->seed, "of the clusters");
   add_suite(*command, work, "write times and errors",
             {.run = [options](const auto& progress) { return run_baselines(*options, progress); },

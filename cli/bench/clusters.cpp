@@ -80,10 +80,11 @@ void add_clusters(CLI::App& bench, Work& work) {
       bench.add_subcommand("clusters", "how the number of clusters changes during a cut: Fig. 10");
   add_backend_name(*command, options->backend, "backend under test", is_timed);
   add_list(*command, "--tau", options->taus, "below which multiple of the median size a cluster is small", "T");
-  add_count(*command, "--particles", options->particles, "of the kidney", CLI::Range(500, 100'000'000));
+  add_count(*command, "--particles", options->particles, "of the kidney", whole_number(500, 100'000'000));
   command->add_flag("--full", options->full, "37,704 particles, as always on a device");
   command->add_option("--split", options->split, "kernels: how clusters are split, blocks, global or both")
-      ->type_name("M");
+      ->type_name("M")
+      ->check(one_of({"blocks", "global", "both"}));
   add_suite(*command, work, "write curves, times and errors",
             {.run = [options](const auto& progress) { return run_clusters(*options, progress); },
              .row = print_row,

@@ -38,7 +38,7 @@ void add_factors(CLI::App& bench, Work& work) {
       bench.add_subcommand("factors", "a cut body's linear system: its factor updated, or made anew");
   add_list(*command, "--sides", options->sides, "particles along a cube, clusters of cores of 5³");
   add_list(*command, "--fine-sides", options->fine_sides, "the same with many clusters, of cores of 2³");
-  add_count(*command, "--repeats", options->repeats, "of each measurement", CLI::Range(1, 1000));
+  add_count(*command, "--repeats", options->repeats, "of each measurement", whole_number(1, 1000));
   add_seed(*command, options->seed, "of right-hand sides and velocities");
   add_suite(*command, work, "write every row",
             {.run = [options](const auto& progress) { return run_factors(*options, progress); },

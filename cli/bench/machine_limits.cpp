@@ -23,7 +23,7 @@ void add_machine_limits(CLI::App& bench, Work& work) {
   const auto options = std::make_shared<benchmarks::MachineLimitsOptions>();
   CLI::App* const command = bench.add_subcommand("machine_limits", "what the machine can do at best: copies, launches");
   add_backend_name(*command, options->backend, "whose machine", is_timed);
-  add_count(*command, "--repeats", options->repeats, "of each timing", CLI::Range(1, 10'000));
+  add_count(*command, "--repeats", options->repeats, "of each timing", whole_number(1, 10'000));
   add_suite(*command, work, "write times",
             {.run = [options](const auto& progress) { return run_machine_limits(*options, progress); },
              .end = print_machine_limits});

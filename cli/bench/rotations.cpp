@@ -87,11 +87,11 @@ void add_rotations(CLI::App& bench, Work& work) {
   CLI::App* const command =
       bench.add_subcommand("rotations", "methods for the rotation of a cluster, on every hard case");
   add_backend_name(*command, asked->backend, "where", is_timed);
-  add_count(*command, "--matrices", asked->counts.matrices, "of each case", CLI::Range(1, 10'000'000));
+  add_count(*command, "--matrices", asked->counts.matrices, "of each case", whole_number(1, 10'000'000));
   add_count(*command, "--timed", asked->timed, "matrices that are timed together (default: 20000; on a device 1000000)",
-            CLI::Range(1, 100'000'000));
+            whole_number(1, 100'000'000));
   add_count(*command, "--repeats", asked->counts.repeats, "of each timing, after one that does not count",
-            CLI::Range(1, 10'000));
+            whole_number(1, 10'000));
   add_seed(*command, asked->counts.seed, "added to the seeds of the cases");
   command->add_flag("--cases", asked->cases, "print the worst gap in every case as well");
   const auto run = [asked](const benchmarks::Progress& found) {

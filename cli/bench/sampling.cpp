@@ -22,7 +22,8 @@ void add_sampling(CLI::App& bench, Work& work) {
   add_timing(*command, *options);
   command->add_option("--clusters", options->cooking, "how they are cooked: boxes or sampled")
       ->capture_default_str()
-      ->type_name("C");
+      ->type_name("C")
+      ->check(one_of({"boxes", "sampled"}));
   command->add_flag("--full", options->full, "the paper's counts of particles, as always on a device");
   add_suite(*command, work, "write times and errors",
             {.run = [options](const auto& progress) { return run_sampling(*options, progress); },

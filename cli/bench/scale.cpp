@@ -26,7 +26,8 @@ void add_scale(CLI::App& bench, Work& work) {
       ->add_option("--sizes", options->sizes,
                    "particles, separated by commas (default: 1000 to 10000; on a device to 10000000)")
       ->delimiter(',')
-      ->type_name("N,N...");
+      ->type_name("N,N...")
+      ->check(whole_number(1));
   add_suite(*command, work, "write times and errors",
             {.run = [options](const auto& progress) { return run_scale(*options, progress); },
              .row = print_scene,

@@ -57,8 +57,8 @@ void add_sensitivity(CLI::App& bench, Work& work) {
   const auto options = std::make_shared<benchmarks::SensitivityOptions>();
   CLI::App* const command = bench.add_subcommand("sensitivity", "the least disturbance that the judge of runs rejects");
   add_backend_name(*command, options->backend, "whose runs are disturbed");
-  add_count(*command, "--particles", options->particles, "of each scene", CLI::Range(100, 3000));
-  add_count(*command, "--moments", options->moments, "of each stage, evenly over the run", CLI::Range(1, 1000));
+  add_count(*command, "--particles", options->particles, "of each scene", whole_number(100, 3000));
+  add_count(*command, "--moments", options->moments, "of each stage, evenly over the run", whole_number(1, 1000));
   add_suite(*command, work, "write every row",
             {.run = [options](const auto& progress) { return run_sensitivity(*options, progress); },
              .row = print_row_of_sensitivity,

@@ -36,12 +36,13 @@ void add_solver(CLI::App& bench, Work& work) {
   command
       ->add_option("--particles", options->particles,
                    "of a second body; 0: the block alone (default: 2000; on a device 101096)")
-      ->type_name("N");
+      ->type_name("N")
+      ->check(whole_number(0));
   command->add_option("--tolerance", options->tolerance, "greatest error that is asked for [h]")
       ->capture_default_str()
       ->type_name("H")
-      ->check(CLI::PositiveNumber);
-  add_count(*command, "--samples", options->samples, "timed steps of each row", CLI::Range(1, 10'000));
+      ->check(number_above(0));
+  add_count(*command, "--samples", options->samples, "timed steps of each row", whole_number(1, 10'000));
   add_suite(*command, work, "write every row",
             {.run = [options](const auto& progress) { return run_solver(*options, progress); },
              .row = print_entry,

@@ -3,13 +3,11 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <memory>
-#include <mutex>
 #include <new>
 #include <system_error>
 
@@ -36,13 +34,6 @@ std::string resolved(const std::string& path) {
   return error ? path : target.string();
 }
 
-// Two processes, and two writers in one process, never share a temporary name.
-std::string temporary_name(const fs::path& path) {
-  static std::atomic<unsigned> count{0};
-  const std::string name = fmt::format(".{}.{}-{}.tmp", path.filename().string(), ::getpid(), count++);
-  return (path.parent_path() / name).string();
-}
-
 void require_writable_folder(const std::string& path) {
   if (path.empty()) throw InputError("output", "", "The name of the file to write is empty.", "Give a file name.");
   std::error_code error;
@@ -63,44 +54,26 @@ void require_writable_folder(const std::string& path) {
   }
 }
 
-// A list without allocations, because it is gone through when there is no memory.
-std::mutex living_guard;
-AtomicFile* living = nullptr;
+// Where the file is written that replaces `path`; empty: it is written as it stands.
+std::string temporary_of(const std::string& path) {
+  require_writable_folder(path);
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (fs::exists(status) && !fs::is_regular_file(status)) return {};
+  const fs::path folder = fs::path(path).parent_path();
+  remove_left_behind(folder.empty() ? "." : folder);
+  return unfinished_name(path);
+}
 
 }  // namespace
 
-AtomicFile::AtomicFile(std::string path) : path_(resolved(path)) {
-  require_writable_folder(path_);
-  std::error_code error;
-  const fs::file_status status = fs::status(path_, error);
-  const bool replaceable = !fs::exists(status) || fs::is_regular_file(status);
-  temporary_ = replaceable ? temporary_name(path_) : path_;
-  const std::lock_guard lock(living_guard);
-  next_ = living;
-  if (next_ != nullptr) next_->previous_ = this;
-  living = this;
-}
-
-AtomicFile::~AtomicFile() {
-  remove_temporary();
-  const std::lock_guard lock(living_guard);
-  (previous_ != nullptr ? previous_->next_ : living) = next_;
-  if (next_ != nullptr) next_->previous_ = previous_;
-}
-
-void AtomicFile::remove_temporary() noexcept {
-  if (!committed_ && temporary_ != path_) std::remove(temporary_.c_str());
-}
-
-void AtomicFile::remove_unfinished() noexcept {
-  for (AtomicFile* file = living; file != nullptr; file = file->next_) file->remove_temporary();
-}
+AtomicFile::AtomicFile(std::string path) : path_(resolved(path)), unfinished_(temporary_of(path_)) {}
 
 void AtomicFile::commit() {
-  if (temporary_ != path_ && std::rename(temporary_.c_str(), path_.c_str()) != 0) {
+  if (!unfinished_.path().empty() && std::rename(unfinished_.path().c_str(), path_.c_str()) != 0) {
     throw MachineError(fmt::format("{}: The finished file could not be given its name: {}.", path_, reason(errno)));
   }
-  committed_ = true;
+  unfinished_.keep();
 }
 
 void write_text(const std::string& path, const std::string& text) {

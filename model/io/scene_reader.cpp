@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <optional>
 #include <type_traits>
 #include <utility>
@@ -12,9 +11,11 @@
 #include "model/error.h"
 #include "model/io/input_file.h"
 #include "model/io/json_reader.h"
+#include "model/io/scene_changes.h"
 #include "model/io/scene_fields.h"
 #include "model/io/scene_io.h"
 #include "model/io/scene_text.h"
+#include "model/nearest_word.h"
 
 namespace cutproof::io {
 namespace {
@@ -48,29 +49,16 @@ std::string type_text(const json& value) {
   return value.is_array() ? "a list" : "an object";
 }
 
-// Levenshtein's distance: insertions, deletions and substitutions from one word to the other.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i);
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = std::exchange(row[j], std::min({row[j] + 1, row[j - 1] + 1, substituted}));
-    }
-  }
-  return row[b.size()];
-}
-
 // Where a value stands: in which file, under which path.
 struct Place {
   std::string file;
   std::string path;
+  const std::vector<SceneChange>& changes;
 
-  Place inner(std::string_view name) const { return {file, join(path, name)}; }
-  Place entry(std::size_t index) const { return {file, fmt::format("{}[{}]", path, index)}; }
+  Place inner(std::string_view name) const { return {file, join(path, name), changes}; }
+  Place entry(std::size_t index) const { return {file, fmt::format("{}[{}]", path, index), changes}; }
   [[noreturn]] void fail(const std::string& problem, const std::string& remedy) const {
-    throw InputError(file, path, problem, remedy);
+    throw InputError(source_of_field(path, file, changes), path, problem, remedy);
   }
 };
 
@@ -322,15 +310,10 @@ class Reader {
   void finish() const {
     for (const auto& [key, value] : object_.items()) {
       if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
-      // What is longer is no misspelt name, and would take long to compare.
-      const std::string given = key.substr(0, 64);
-      const auto nearest = std::min_element(known_.begin(), known_.end(), [&](auto a, auto b) {
-        return edit_distance(given, a) < edit_distance(given, b);
-      });
-      const bool near = edit_distance(given, *nearest) <= std::max<std::size_t>(2, nearest->size() / 2);
+      const std::string nearest = nearest_word(key, known_);
       at_.inner(key).fail(
           "This field is not known here.",
-          fmt::format("{}Known here are: {}.", near ? fmt::format("Did you mean \"{}\"? ", *nearest) : "",
+          fmt::format("{}Known here are: {}.", nearest.empty() ? "" : fmt::format("Did you mean \"{}\"? ", nearest),
                       fmt::join(known_, ", ")));
     }
     if (!missing_.empty()) at_.inner(missing_.front()).fail("This field is missing.", "It must be given.");
@@ -389,18 +372,21 @@ RemovedEnds default_remove(const json& tree, int32_t version) {
 
 }  // namespace
 
-Scene parse_scene(const std::string& text, const std::string& name) {
-  const json tree = parse_json(text, name, kSceneLimits, kWhatASceneIs);
-  const int32_t version = require_version(tree, name);
+Scene parse_scene(const std::string& text, const std::string& name, const std::vector<SceneChange>& changes) {
+  json tree = parse_json(text, name, kSceneLimits, kWhatASceneIs);
+  for (const SceneChange& change : changes) {
+    if (tree.is_object()) make_change(change, tree);
+  }
+  const int32_t version = require_version(tree, source_of_field("version", name, changes));
   Scene scene;
   scene.step.acceleration = default_acceleration(tree, version);
   scene.detect.remove = default_remove(tree, version);
-  read(tree, Place{name, ""}, SceneField{}, scene);
+  read(tree, Place{name, "", changes}, SceneField{}, scene);
   return scene;
 }
 
-Scene read_scene(const std::string& path) {
-  return parse_scene(read_file(path, kSceneLimits.what, kSceneLimits.bytes), path);
+Scene read_scene(const std::string& path, const std::vector<SceneChange>& changes) {
+  return parse_scene(read_file(path, kSceneLimits.what, kSceneLimits.bytes), path, changes);
 }
 
 }  // namespace cutproof::io

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "model/io/columns.h"
+#include "model/io/json_reader.h"
 #include "model/io/scene_fields.h"
 #include "model/io/scene_io.h"
 #include "model/io/scene_text.h"

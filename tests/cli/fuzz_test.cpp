@@ -117,7 +117,7 @@ TEST_F(Fuzz, PutsShardsTogetherToTheWhole) {
   expect_refused("fuzz --merge 1.json none.json", {"none.json"});
   // One of another campaign is that, even if its shard was given already.
   for (const auto& [field, value] : std::vector<std::pair<std::string, json>>{{"seed", 99},
-                                                                              {"version", "0.0.1"},
+                                                                              {"cutproof", "0.0.1"},
                                                                               {"commit", "0123abcd"},
                                                                               {"backend", "host"},
                                                                               {"split", "global"},
@@ -226,7 +226,8 @@ TEST_F(Fuzz, RefusesBadUsage) {
   expect_refused("fuzz --shard 4/3", {"--shard"});
   expect_refused("fuzz --shard 1/1000001", {"--shard", "1000000"});
   expect_refused("fuzz --cases -1", {"--cases"});
-  expect_refused("fuzz --save nowhere", {"--save", "nowhere"});
+  write("file", "");
+  expect_refused("fuzz --save file/nowhere", {"--save", "file/nowhere"});
   expect_refused("fuzz --json nowhere/f.json", {"nowhere"});
   expect_refused("fuzz --backend reference --split global", {"--split"});
   expect_refused("fuzz --backend simulated --schedule-seed x", {"--schedule-seed"});

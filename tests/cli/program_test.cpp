@@ -460,7 +460,7 @@ TEST_F(Program, SaysWhatToDoNextWhenRunHasNoScene) {
 TEST_F(Program, RefusesWrongUsageWithStatusTwo) {
   write("cut.json", small_block().dump());
   expect_refused("run cut.json --frobnicate", {"--frobnicate"});
-  expect_refused("dissect cut.json", {"subcommand", "--help"});
+  expect_refused("dissect cut.json", {"dissect", "did you mean 'digest'?", "fuzz"});
   expect_refused("run cut.json --backend abacus", {"abacus", "cutproof info"});
   expect_refused("run cut.json --mesh x.stl --unit furlong", {"furlong", "mm"});
   expect_refused("run cut.json --particles 0", {"--particles"});

@@ -38,8 +38,8 @@ TEST_F(SceneNames, GiveWayToFiles) {
 
 TEST_F(SceneNames, ThatThereAreNotAreRefusedWithThoseThatThereAre) {
   expect_refused("run kidny", {"kidny", "no scene that comes with the program", "kidney_arc", "three_cuts"});
-  expect_refused("run kidny.json", {"kidny.json", "cannot be opened"});
-  expect_refused("run ./small_block", {"./small_block", "cannot be opened"});
+  expect_refused("run kidny.json", {"kidny.json", "no such file"});
+  expect_refused("run ./small_block", {"./small_block", "no such file"});
   expect_refused("tune kidny --tolerance 1", {"kidny", "no scene that comes with the program"});
 }
 

@@ -788,7 +788,7 @@ TEST_F(JudgeVerb, EndsWithTheStatusThatSaysWhatHappened) {
   EXPECT_EQ(run("judge nowhere.so").status, 2);
   EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " magic").status, 2);
   EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " rotations").status, 2) << "it has none";
-  EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " --save /nowhere").status, 2);
+  EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " --save /dev/null/nowhere").status, 2);
   const Ran skipped = run(std::string("judge ") + PLUGIN_in_c + " --parameters cannot");
   EXPECT_EQ(skipped.status, 77);
   EXPECT_EQ(skipped.output, "cutproof: skipped: its create() gave nothing: it cannot run here\n");

@@ -10,7 +10,9 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <set>
 #include <string>
+#include <thread>
 
 #include "model/error.h"
 
@@ -58,15 +60,81 @@ TEST_F(AtomicFileTest, NothingIsLeftWithoutACommit) {
   EXPECT_EQ(read(in_folder("a")), "old");
 }
 
+// In a process of its own: the one that removes them is to end.
 TEST_F(AtomicFileTest, NothingIsLeftWhereAProgramEndsWithoutUnwinding) {
-  AtomicFile finished(in_folder("a")), unfinished(in_folder("b"));
-  { const AtomicFile gone(in_folder("c")); }
-  std::ofstream(finished.temporary()) << "new";
-  std::ofstream(unfinished.temporary()) << "half";
-  finished.commit();
-  AtomicFile::remove_unfinished();
+  const auto end = [&] {
+    AtomicFile finished(in_folder("a")), unfinished(in_folder("b"));
+    { const AtomicFile gone(in_folder("c")); }
+    std::ofstream(finished.temporary()) << "new";
+    std::ofstream(unfinished.temporary()) << "half";
+    finished.commit();
+    fs::create_directory(folder_ / "d");
+    const Unfinished folder(in_folder("d")), inside(in_folder("d/e"));
+    std::ofstream(inside.path()) << "inside";
+    Unfinished::remove_all();
+    std::_Exit(7);
+  };
+  EXPECT_EXIT(end(), testing::ExitedWithCode(7), "");
   EXPECT_EQ(entries(), 1u);
   EXPECT_EQ(read(in_folder("a")), "new");
+}
+
+// Handlers run in the middle of anything, on any thread: also where the list is being changed.
+TEST_F(AtomicFileTest, NothingIsLeftBySignalsWhileManyFilesAreWritten) {
+  const auto write_until_signal = [&](int turn) {
+    std::signal(SIGALRM, [](int) {
+      Unfinished::remove_all();
+      std::_Exit(7);
+    });
+    const auto write_for_ever = [&](int thread) {
+      for (int k = 0;; ++k) write_text(in_folder(std::to_string(thread)), std::to_string(k));
+    };
+    std::thread(write_for_ever, 1).detach();
+    std::thread(write_for_ever, 2).detach();
+    ualarm(static_cast<useconds_t>(2000 + 500 * turn), 0);
+    write_for_ever(0);
+  };
+  for (int turn = 0; turn < 20; ++turn) EXPECT_EXIT(write_until_signal(turn), testing::ExitedWithCode(7), "");
+  // What another thread had named and not yet made may be left: by a process that is dead, for the next one.
+  write_text(in_folder("0"), "after");
+  for (const auto& entry : fs::directory_iterator(folder_)) {
+    EXPECT_EQ(entry.path().filename().string().size(), 1u) << entry.path();
+  }
+}
+
+TEST_F(AtomicFileTest, WhatAKilledProgramLeftIsRemovedByTheNextOneThatWritesThere) {
+  // Killed in the middle.
+  const auto be_killed = [&] {
+    const AtomicFile half(in_folder("a.json"));
+    std::ofstream(half.temporary()) << "half";
+    std::raise(SIGKILL);
+  };
+  EXPECT_EXIT(be_killed(), testing::KilledBySignal(SIGKILL), "");
+  ASSERT_EQ(entries(), 1u);
+  const std::string left = fs::directory_iterator(folder_)->path().filename().string();
+  const std::string machine = left.substr(left.size() - 13);  // "-MACHINE.tmp", with the hyphen
+  ASSERT_TRUE(left.starts_with(".a.json.") && machine.starts_with('-') && machine.ends_with(".tmp")) << left;
+  // Not ours, or of somebody who lives: these stay.
+  const std::string dead = left.substr(8, left.find('-') - 8);  // its process
+  const std::set<std::string> others = {"a.json." + dead + "-0" + machine,
+                                        ".a.json." + dead + "-0.tmp",
+                                        ".a.json." + dead + "-0-00000000.tmp",
+                                        ".a.json." + dead + "-x" + machine,
+                                        ".a.json." + dead + machine,
+                                        ".a.json.-" + dead + "-0" + machine,
+                                        ".a.json.0-0" + machine,
+                                        ".a.json.99999999999-0" + machine,
+                                        ".a.json.1-0" + machine,
+                                        ".a.json." + std::to_string(::getpid()) + "-7" + machine,
+                                        "." + dead + "-0" + machine,
+                                        left + ".gz"};
+  for (const std::string& name : others) std::ofstream(in_folder(name)) << "somebody's";
+  fs::create_directory(folder_ / (".folder." + dead + "-0" + machine));
+  write_text(in_folder("b"), "new");
+  EXPECT_FALSE(fs::exists(folder_ / left));
+  for (const std::string& name : others) EXPECT_TRUE(fs::exists(folder_ / name)) << name;
+  EXPECT_TRUE(fs::exists(folder_ / (".folder." + dead + "-0" + machine)));
+  EXPECT_EQ(entries(), others.size() + 2);
 }
 
 TEST_F(AtomicFileTest, TheTemporaryNameLiesInTheSameFolderAndIsNeverUsedTwice) {

@@ -5,6 +5,7 @@ Exit status: 0 all is as it should be, 1 something is not, 77 the Debian package
 tested all the same).
 """
 import argparse
+import gzip
 import os
 import pathlib
 import shutil
@@ -73,6 +74,10 @@ def judge(options, root, name):
     found = run([root / "share/cutproof/cluster/fuzz_shard.sh", "--program"], **surroundings)
     expect(found.returncode == 0 and os.path.realpath(found.stdout.strip()) == os.path.realpath(program),
            f"{name}: the scripts for clusters run {found.stdout}")
+    page = gzip.decompress((root / "share/man/man1/cutproof.1.gz").read_bytes()).decode()
+    expect(page.startswith(".TH CUTPROOF 1") and "cutproof fuzz" in page, f"{name}: the manual page is {page[:200]}")
+    offers = (root / "share/bash-completion/completions/cutproof").read_text()
+    expect("complete -F _cutproof cutproof" in offers, f"{name}: completion is {offers[:200]}")
     licence = (root / "share/doc/cutproof/copyright").read_text()
     expect("MIT" in licence and "GPL" in licence, f"{name}: the licence of the sources or of the program is missing")
     # Where it was built is nowhere written down for those who look for files.

@@ -1,0 +1,13 @@
+// What a shell offers and what `man` shows, from the options as the program declares them.
+#pragma once
+#include <CLI/CLI.hpp>
+#include <string>
+
+namespace cutproof::cli {
+
+// A script for bash: verbs, suites, options, words that an option knows, files and folders.
+std::string bash_completion(const CLI::App& program);
+// cutproof(1), in man's macros. `date`: of the page.
+std::string manual_page(const CLI::App& program, const std::string& date);
+
+}  // namespace cutproof::cli

@@ -1,0 +1,45 @@
+// A scene on the command line, and what of it is to be otherwise: of every verb that takes one.
+#pragma once
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "model/error.h"
+#include "model/io/scene_io.h"
+
+namespace cutproof::cli {
+
+struct SceneOptions {
+  std::string file;
+  std::vector<std::string> set;  // "step.iterations=8"
+  std::optional<int64_t> particles;
+  std::optional<double> spacing;
+  std::optional<uint64_t> seed;
+};
+
+// SCENE, --set, --particles, --spacing and --seed.
+CLI::Option* add_scene(CLI::App& command, SceneOptions& options);
+
+// In the order in which they are made: every --set as given, then --particles, --spacing and --seed, which are short
+// for fields. Throws InputError for what is none, or for two of them that contradict each other.
+std::vector<io::SceneChange> changes_of(const SceneOptions& options);
+
+// As documents have them.
+std::vector<std::string> given_changes(const std::vector<io::SceneChange>& changes);
+
+// What `build` makes of a scene that was read with these changes. An error about a field that a change has made names
+// the change in place of `file`.
+template <class Build>
+auto with_sources(const std::string& file, const std::vector<io::SceneChange>& changes, const Build& build) {
+  try {
+    return build();
+  } catch (const InputError& error) {
+    const std::string source = error.field().empty() ? file : io::source_of_field(error.field(), file, changes);
+    if (error.file() != file || source == file) throw;
+    throw InputError(source, "", std::string(error.what()).substr(file.size() + 2), "");
+  }
+}
+
+}  // namespace cutproof::cli

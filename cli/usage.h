@@ -1,0 +1,19 @@
+// What is wrong with a command line that cannot be understood.
+#pragma once
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+namespace cutproof::cli {
+
+// In words, with a remedy: for a verb or an option that does not exist the nearest one that does. `words`: of the
+// command line, without the program.
+std::string usage_error(const CLI::App& program, const CLI::ParseError& error, const std::vector<std::string>& words);
+
+// Verbs and options that help tells of.
+std::vector<const CLI::App*> shown_commands(const CLI::App& command);
+std::vector<const CLI::Option*> shown_options(const CLI::App& command);
+// Arguments without a name, in order.
+std::vector<const CLI::Option*> shown_arguments(const CLI::App& command);
+
+}  // namespace cutproof::cli

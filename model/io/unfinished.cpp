@@ -1,0 +1,136 @@
+#include "model/io/unfinished.h"
+
+#include <fmt/format.h>
+#include <sched.h>
+#include <signal.h>
+#include <sys/utsname.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <charconv>
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+namespace cutproof::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A list without allocations, because it is gone through when there is no memory, and by signal handlers. While a
+// thread holds it, no handler interrupts that thread: one that waited for it would wait for ever.
+std::atomic_flag held = ATOMIC_FLAG_INIT;
+Unfinished* living = nullptr;
+
+class Held {
+ public:
+  Held() {
+    sigset_t all;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before_);
+    while (held.test_and_set(std::memory_order_acquire)) sched_yield();
+  }
+  ~Held() {
+    held.clear(std::memory_order_release);
+    pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+  }
+  Held(const Held&) = delete;
+  Held& operator=(const Held&) = delete;
+
+ private:
+  sigset_t before_ = {};
+};
+
+// FNV-1a.
+uint32_t mixed(uint32_t hash, std::string_view text) {
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619u;
+  return hash;
+}
+
+// Says which processes a number stands for: those of this installation, under this name, in this namespace. Folders are
+// shared between machines, and between containers.
+std::string machine_tag() {
+  uint32_t hash = 2166136261u;
+  std::string id;
+  std::getline(std::ifstream("/etc/machine-id"), id);
+  utsname name = {};
+  uname(&name);
+  std::error_code error;
+  for (const std::string& part :
+       {id, std::string(name.nodename), fs::read_symlink("/proc/self/ns/pid", error).string()})
+    hash = mixed(hash, part + '\n');
+  return fmt::format("{:08x}", hash);
+}
+
+// The number that `text` is, or begins with before `end`; takes it off. Negative: none.
+int64_t take_number(std::string_view& text, char end) {
+  int64_t number = -1;
+  const auto [after, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const auto length = static_cast<std::size_t>(after - text.data());
+  if (error != std::errc() || length >= text.size() || text[length] != end) return -1;
+  text.remove_prefix(length + 1);
+  return number;
+}
+
+// The process that has left a file of this name, as unfinished_name() makes them on this machine; 0: it is another.
+int64_t process_of(std::string_view name, std::string_view machine) {
+  const std::string tail = fmt::format("-{}.tmp", machine);
+  if (!name.starts_with('.') || !name.ends_with(tail)) return 0;
+  name.remove_suffix(tail.size() - 1);  // ends with '-'
+  const std::size_t dot = name.rfind('.');
+  if (dot < 2) return 0;  // nothing before it but the first one
+  std::string_view numbers = name.substr(dot + 1);
+  const int64_t process = take_number(numbers, '-'), count = take_number(numbers, '-');
+  return process > 0 && process <= INT32_MAX && count >= 0 && numbers.empty() ? process : 0;
+}
+
+}  // namespace
+
+Unfinished::Unfinished(std::string path) : path_(std::move(path)) {
+  const Held now;
+  next_ = living;
+  if (next_ != nullptr) next_->previous_ = this;
+  living = this;
+}
+
+Unfinished::~Unfinished() {
+  remove();
+  const Held now;
+  (previous_ != nullptr ? previous_->next_ : living) = next_;
+  if (next_ != nullptr) next_->previous_ = previous_;
+}
+
+void Unfinished::remove() noexcept {
+  if (kept_ || path_.empty()) return;
+  if (::unlink(path_.c_str()) != 0 && errno == EISDIR) ::rmdir(path_.c_str());
+}
+
+void Unfinished::remove_all() noexcept {
+  sigset_t all;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, nullptr);
+  while (held.test_and_set(std::memory_order_acquire)) sched_yield();
+  for (Unfinished* file = living; file != nullptr; file = file->next_) file->remove();
+}
+
+std::string unfinished_name(const fs::path& path) {
+  static std::atomic<unsigned> count{0};
+  const std::string name =
+      fmt::format(".{}.{}-{}-{}.tmp", path.filename().string(), ::getpid(), count++, machine_tag());
+  return (path.parent_path() / name).string();
+}
+
+void remove_left_behind(const fs::path& folder) {
+  const std::string machine = machine_tag();
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    const auto process = static_cast<pid_t>(process_of(entry->path().filename().string(), machine));
+    if (process == 0 || ::kill(process, 0) == 0 || errno != ESRCH) continue;
+    ::unlink(entry->path().c_str());
+  }
+}
+
+}  // namespace cutproof::io

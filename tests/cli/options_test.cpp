@@ -1,0 +1,243 @@
+// What every verb does alike with what it is given.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/cli/program.h"
+
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kScene = R"({"version": 2, "name": "falling",
+  "body": {"shape": {"kind": "box", "size": [0.04, 0.03, 0.03]}, "spacing": 0.01}, "frame": {"count": 2},
+  "walls": [{"axis": 2, "offset": -0.5}], "step": {"gravity": [0, 0, -9.81]}})";
+
+class Options : public Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    write("s.json", kScene);
+  }
+  json standard_output_of(const std::string& arguments) const {
+    const Outcome outcome = cutproof(arguments + " 2> error #");
+    EXPECT_EQ(outcome.status, 0) << arguments << "\n" << read("error");
+    return json::parse(outcome.output, nullptr, false);
+  }
+  std::string words_offered(const std::string& words) const {
+    write("complete.sh", "source <('" CUTPROOF_PROGRAM "' info --completion bash)\nCOMP_WORDS=(" + words +
+                             ")\nCOMP_CWORD=$(( ${#COMP_WORDS[@]} - 1 ))\n_cutproof\necho \"${COMPREPLY[*]}\"\n");
+    // The program's own status and output do not matter here.
+    return cutproof("--version > version; bash complete.sh #").output;
+  }
+};
+
+// Anybody can add a line: what is given, and what the error has to say.
+TEST_F(Options, SayWhatWasMeant) {
+  for (const auto& [command, words] : std::vector<std::pair<std::string, std::vector<std::string>>>{
+           {"rnu s.json", {"rnu", "did you mean 'run'?"}},
+           {"run kidny_arc", {"did you mean 'kidney_arc'?"}},
+           {"fuz", {"did you mean 'fuzz'?"}},
+           {"run --frams 3 s.json", {"--frams", "did you mean '--frames'?", "cutproof run --help"}},
+           {"run s.json --recrod=x", {"--recrod:", "did you mean '--record'?"}},
+           {"tune s.json --tolerence 1", {"--tolerence", "did you mean '--tolerance'?"}},
+           {"bench solver --sampels 3", {"did you mean '--samples'?", "cutproof bench solver --help"}},
+           {"bench solvr", {"solvr", "did you mean 'solver'?"}},
+           {"fuzz --backend hots", {"hots", "did you mean 'host'?", "cutproof info"}},
+           {"fuzz --rotation newtn", {"newtn", "did you mean 'newton'?", "jacobi4"}},
+           {"fuzz --split block", {"did you mean 'blocks'?"}},
+           {"fuzz --backend simulated --schedule randm", {"did you mean 'random'?"}},
+           {"run s.json --check moton", {"did you mean 'motion'?"}},
+           {"run s.json --mesh m.stl --unit inch", {"inch", "mm, cm, m"}},
+           {"run s.json --errors topologi", {"did you mean 'topology'?"}},
+           {"run s.json --against reference --mode lockstp", {"did you mean 'lockstep'?"}},
+           {"tune s.json --tolerance 1 --reference limt", {"did you mean 'limit'?"}},
+           {"vectors splt -o v.npz", {"did you mean 'split'?"}},
+           {"vectors split -o v.npz --precision doubel", {"did you mean 'double'?"}},
+           {"bench sampling --clusters box", {"did you mean 'boxes'?"}}}) {
+    expect_refused(command, words);
+  }
+  // Nothing is near to this.
+  EXPECT_EQ(cutproof("run s.json --zzzzzzzzzz").output.find("did you mean"), std::string::npos);
+}
+
+TEST_F(Options, SayRangesInWordsAndTakeNoNumberForAnother) {
+  for (const auto& [command, words] : std::vector<std::pair<std::string, std::vector<std::string>>>{
+           {"fuzz --cases -1", {"--cases: must be a whole number from 0", "'-1'"}},
+           {"fuzz --cases 1.5", {"--cases: must be a whole number"}},
+           {"fuzz --cases 0x10", {"--cases: must be a whole number"}},
+           {"fuzz --cases 010", {"--cases: must be a whole number", "begins with 0"}},
+           {"fuzz --cases 1e3", {"--cases: must be a whole number"}},
+           {"fuzz --cases 99999999999999999999", {"too large"}},
+           {"fuzz --seed -1", {"--seed: must be a whole number from 0 to 18446744073709551615"}},
+           {"fuzz --seed 18446744073709551616", {"--seed", "too large"}},
+           {"fuzz --schedule-seed 18446744073709551616", {"--schedule-seed", "too large"}},
+           {"run s.json --seed -1", {"--seed"}},
+           {"run s.json --seed 18446744073709551616", {"--seed"}},
+           {"fuzz --batch 0", {"--batch: must be a whole number from 1 to 100000"}},
+           {"fuzz --seconds nan", {"--seconds: must be a finite number from 0 up"}},
+           {"fuzz --seconds inf", {"--seconds: must be a finite number from 0 up"}},
+           {"fuzz --seconds 0x1p3", {"--seconds: must be a finite number"}},
+           {"fuzz --simplify nan", {"--simplify"}},
+           {"judge x.so --time-limit nan", {"--time-limit: must be a number from 0.01 to 1e+06"}},
+           {"judge x.so --seconds inf", {"--seconds"}},
+           {"tune s.json --tolerance nan", {"--tolerance: must be a finite number above 0"}},
+           {"tune s.json --tolerance inf", {"--tolerance"}},
+           {"run s.json --spacing nan", {"--spacing: must be a finite number above 0"}},
+           {"run s.json --frames 99999999999999999999", {"--frames: must be a whole number from 0 up"}},
+           {"bench stages --sizes 0x400", {"--sizes"}},
+           {"bench solver --stiffness nan", {"--stiffness"}},
+           {"bench solver --particles 1e3", {"--particles"}},
+           {"bench rotations --seed 18446744073709551616", {"--seed"}}}) {
+    expect_refused(command, words);
+    const std::string said = cutproof(command).output;
+    EXPECT_EQ(said.find("000000000000000000000"), std::string::npos) << said;
+  }
+  EXPECT_EQ(standard_output_of("run s.json --seed 18446744073709551615 --json -").at("seed"), UINT64_MAX);
+}
+
+TEST_F(Options, WriteADocumentToStandardOutputAloneAndTheRestToStandardError) {
+  EXPECT_EQ(standard_output_of("run s.json --check --json -").at("format"), "cutproof.run");
+  EXPECT_NE(read("error").find("everything holds"), std::string::npos) << read("error");
+  EXPECT_EQ(read("error").find("wrote -"), std::string::npos);
+  ASSERT_EQ(cutproof("run s.json --record seen").status, 0);
+  EXPECT_EQ(standard_output_of("check seen --json -").at("format"), "cutproof.check");
+  EXPECT_EQ(standard_output_of("fuzz --cases 20 --json -").at("format"), "cutproof.fuzz");
+  EXPECT_EQ(standard_output_of("bench machine_limits --repeats 1 --json -").at("complete"), true);
+  EXPECT_EQ(standard_output_of("tune s.json --tolerance 0.5 --repeats 1 --json -").at("complete"), true);
+  EXPECT_TRUE(cutproof("run s.json --check --junit - 2> error #").output.starts_with("<?xml"));
+  EXPECT_FALSE(files::exists(path("-")));
+  expect_refused("run s.json --check --json - --junit -", {"--junit", "--json"});
+  for (const char* output : {"run s.json --record -", "vectors split --cases 1 -o -", "fuzz --cases 5 --save -",
+                             "tune s.json --tolerance 0.5 --write -"}) {
+    expect_refused(output, {"standard output", "./-"});
+  }
+  EXPECT_EQ(cutproof("run s.json --json ./-").status, 0);
+  EXPECT_TRUE(files::exists(path("-")));
+  if (files::exists("/dev/full")) {
+    EXPECT_EQ(cutproof("fuzz --cases 5 --json - 2> error > /dev/full; exit $? #").status, 3);
+  }
+}
+
+TEST_F(Options, ChangeAnyFieldOfAScene) {
+  ASSERT_EQ(cutproof("run s.json --record seen --set step.iterations=3 --set step.acceleration=none "
+                     "--set 'step.gravity=[0,0,-1]' --set walls[0].friction=0.25 --set 'name=\"other\"'")
+                .status,
+            0);
+  const json document = standard_output_of(
+      "run s.json --set name=one --set name=two --set body.spacing=0.005 --particles 27 --seed 7 --json -");
+  EXPECT_EQ(document.at("scene"), "two") << "the last counts";
+  EXPECT_EQ(document.at("seed"), 7);
+  EXPECT_EQ(document.at("changes"),
+            json({"--set name=one", "--set name=two", "--set body.spacing=0.005", "--particles 27", "--seed 7"}));
+  EXPECT_EQ(document.at("body").at("particles"), 27) << "--particles comes after --set";
+  // The scene that a recording keeps is the one that was run.
+  EXPECT_EQ(standard_output_of("check seen --json -").at("scene"), "other");
+  EXPECT_DOUBLE_EQ(standard_output_of("run s.json --spacing 0.005 --json -").at("body").at("spacing"), 0.005);
+  const json tuned = standard_output_of(
+      "tune s.json --set step.iterations=3 --spacing 0.01 --seed 2 --tolerance 0.5 --repeats 1 --json -");
+  EXPECT_EQ(tuned.at("changes"), json({"--set step.iterations=3", "--spacing 0.01", "--seed 2"}));
+  EXPECT_EQ(tuned.at("trials").at(0).at("iterations"), 3);
+}
+
+TEST_F(Options, SayWhichChangeOfASceneIsWrong) {
+  for (const auto& [change, words] : std::vector<std::pair<std::string, std::vector<std::string>>>{
+           {"--set step.iterations=-1", {"cutproof: --set step.iterations=-1: step.iterations: ", "out of bounds"}},
+           {"--set step.iteration=8", {"--set step.iteration=8: ", "Did you mean \"iterations\"?"}},
+           {"--set step.iterations=many", {"--set step.iterations=many", "the text \"many\""}},
+           {"--set step.iterations=nan", {"--set step.iterations=nan", "the text \"nan\""}},
+           {"--set step.stiffness=1e999", {"--set step.stiffness=1e999", "finite"}},
+           {"--set 'step.gravity=[0,0'", {"--set step.gravity=[0,0", "not valid JSON"}},
+           {"--set step.gravity=[0,0]", {"--set step.gravity=[0,0]", "three numbers"}},
+           {"--set walls[1].offset=0", {"--set walls[1].offset=0", "the list has 1"}},
+           {"--set name.first=x", {"--set name.first=x", "string"}},
+           {"--set name[0]=x", {"--set name[0]=x", "no list"}},
+           {"--set step..iterations=8", {"--set step..iterations=8", "no path"}},
+           {"--set step.=8", {"no path"}},
+           {"--set step[x]=8", {"no path"}},
+           {"--set version=9", {"--set version=9", "versions 1 to"}},
+           {"--set step.iterations", {"--set", "step.iterations", "value"}},
+           {"--set =8", {"--set", "value"}},
+           {"--set body.particles=10", {"s.json with --set body.particles=10", "Both spacing and particles"}},
+           {"--particles 10 --spacing 0.01", {"--spacing", "--particles"}},
+           {"--spacing 1e-9", {"cutproof: --spacing 1e-09: body.spacing", "memory"}}}) {
+    expect_refused("run s.json " + change, words);
+    expect_refused("tune s.json --tolerance 0.5 " + change, words);
+  }
+}
+
+// A scene that was made for its own body does not fit every other.
+TEST_F(Options, DoNotBlameASceneForAMesh) {
+  write("cube.off",
+        "OFF\n8 12 0\n0 0 0\n40 0 0\n40 40 0\n0 40 0\n0 0 40\n40 0 40\n40 40 40\n0 40 40\n3 0 2 1\n3 0 3 2\n"
+        "3 4 5 6\n3 4 6 7\n3 0 1 5\n3 0 5 4\n3 1 2 6\n3 1 6 5\n3 2 3 7\n3 2 7 6\n3 3 0 4\n3 3 4 7\n");
+  expect_refused("run s.json --mesh cube.off --particles 5", {"cutproof: cube.off in place of the body of s.json: "});
+}
+
+// What a remedy says that `cutproof info` lists.
+TEST_F(Options, AreListedByInfo) {
+  const std::string info = cutproof("info").output;
+  for (const char* word : {"reference", "host-split", "plugin:FILE.so", "newton", "round_robin", "topology", "motion",
+                           "conservation", "rotations, components", "connected", "versions 1 to 3"}) {
+    EXPECT_NE(info.find(word), std::string::npos) << "no '" << word << "' in:\n" << info;
+  }
+  EXPECT_NE(cutproof("info --scene").output.find("iterations"), std::string::npos);
+}
+
+TEST_F(Options, NameTheVersionAlikeInEveryDocument) {
+  ASSERT_EQ(cutproof("run s.json --record seen").status, 0);
+  for (const char* command : {"run s.json", "check seen", "fuzz --cases 5", "bench machine_limits --repeats 1",
+                              "tune s.json --tolerance 0.5 --repeats 1"}) {
+    const json document = standard_output_of(std::string(command) + " --json -");
+    EXPECT_TRUE(document.at("cutproof").is_string()) << command;
+    EXPECT_FALSE(document.contains("version")) << command;
+  }
+}
+
+// --- What shells and man show
+// ----------------------------------------------------------------------------------------------------
+
+TEST_F(Options, AreOfferedByBash) {
+  write("a scene.json", kScene);
+  files::create_directory(folder_ / "afolder");
+  for (const auto& [words, offered] : std::vector<std::pair<std::string, std::string>>{
+           {"cutproof r", "run replay"},
+           {"cutproof run --fr", "--frames"},
+           {"cutproof run --backend host-", "host-blocks host-frames host-split"},
+           {"cutproof run --backend = sim", "simulated"},
+           {"cutproof fuzz --rotation n", "newton"},
+           {"cutproof bench so", "solver"},
+           {"cutproof bench solver --st", "--stiffness"},
+           {"cutproof tune x.json --reference ''", "limit substeps"},
+           {"cutproof vectors s", "surface split"},
+           {"cutproof run --unit ''", "mm cm m"},
+           {"cutproof run kidney_a", "kidney_arc"},
+           {"cutproof run a", "a scene.json afolder"},
+           {"cutproof fuzz --save a", "afolder"},
+           {"cutproof fuzz --cases ''", ""},
+           {"cutproof info --c", "--completion"},
+           {"cutproof fuzz --dynamics --se", "--seconds --seed"}}) {
+    const std::string said = words_offered(words);
+    if (words == "cutproof run a") {
+      EXPECT_NE(said.find("a scene.json"), std::string::npos) << said;
+      EXPECT_NE(said.find("afolder"), std::string::npos) << said;
+    } else {
+      EXPECT_EQ(said, offered + "\n") << words;
+    }
+  }
+  expect_refused("info --completion csh", {"csh", "bash"});
+}
+
+TEST_F(Options, StandOnAManualPageWithoutWarnings) {
+  ASSERT_EQ(cutproof("info --man > cutproof.1").status, 0);
+  const Outcome warnings = cutproof("--version > version; groff -man -Tutf8 -ww -z cutproof.1 #");
+  EXPECT_EQ(warnings.output, "");
+  const std::string page = cutproof("--version > version; groff -man -Tutf8 -P-bcou -rLL=80n cutproof.1 #").output;
+  for (const char* word :
+       {"cutproof tune SCENE", "--set FIELD=V", "cutproof bench solver", "--stiffness", "EXIT STATUS"}) {
+    EXPECT_NE(page.find(word), std::string::npos) << word << "\n" << page.substr(0, 2000);
+  }
+  EXPECT_EQ(page.find("\\["), std::string::npos);
+}
+
+}  // namespace
