@@ -1,5 +1,7 @@
 #include "model/io/unfinished.h"
 
+#include <dirent.h>
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sched.h>
 #include <signal.h>
@@ -11,6 +13,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <fstream>
+#include <memory>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -125,11 +128,16 @@ std::string unfinished_name(const fs::path& path) {
 
 void remove_left_behind(const fs::path& folder) {
   const std::string machine = machine_tag();
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    const auto process = static_cast<pid_t>(process_of(entry->path().filename().string(), machine));
+  // Not directory_iterator: where there is no memory for a name, libstdc++ ends the program instead of throwing.
+  struct Close {
+    void operator()(DIR* open) const { ::closedir(open); }
+  };
+  const std::unique_ptr<DIR, Close> entries(::opendir(folder.empty() ? "." : folder.c_str()));
+  if (entries == nullptr) return;
+  while (const dirent* const entry = ::readdir(entries.get())) {
+    const auto process = static_cast<pid_t>(process_of(entry->d_name, machine));
     if (process == 0 || ::kill(process, 0) == 0 || errno != ESRCH) continue;
-    ::unlink(entry->path().c_str());
+    ::unlinkat(::dirfd(entries.get()), entry->d_name, 0);
   }
 }
 
