@@ -167,7 +167,7 @@ TEST_F(Program, ExaminesAMeshWithoutAScene) {
   EXPECT_EQ(found.at("repair").at("steps").at(0).at("name"), "holes_filled");
   EXPECT_NEAR(found.at("repair").at("volume").get<double>(), 0.15, 1e-12);
   expect_refused("info --mesh missing.off", {"missing.off"});
-  expect_refused("info --mesh sound.off --unit inch", {"--unit", "mm, cm or m"});
+  expect_refused("info --mesh sound.off --unit inch", {"--unit", "mm, cm, m"});
 }
 
 TEST_F(Program, RepairsAMeshOnlyIfAskedAndSaysWhatItDid) {

@@ -477,7 +477,7 @@ class Program(Test):
                                ({"rotations": rotations_by_svd, "precision": "half"}, ValueError),
                                ({"rotations": rotations_by_svd, "device": "tpu"}, ValueError),
                                ({"rotations": rotations_by_svd, "cases": 0}, cutproof.Error),
-                               ({"rotations": rotations_by_svd, "save": "/nonexistent"}, cutproof.Error)):
+                               ({"rotations": rotations_by_svd, "save": "/dev/null/nonexistent"}, cutproof.Error)):
             with self.assertRaises(error):
                 self.judge(**options)
         with self.assertRaisesRegex(cutproof.Error, "no question"):
