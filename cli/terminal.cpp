@@ -74,6 +74,11 @@ std::vector<Row> rows_of(const std::vector<Verdict>& verdicts, const Shown& show
 }
 
 std::string figure(double value) { return fmt::format("{:.4g}", value); }
+// In a column of the table: counts up to five digits as they are, so that 1,010 is not 1.01e+03.
+std::string short_figure(double value) {
+  const bool is_count = std::abs(value) < 100'000 && value == std::floor(value);
+  return fmt::format(is_count ? "{:.0f}" : "{:.3g}", value);
+}
 
 // Of a bound, in as many columns as its head has.
 std::string share(double of_bound) {
@@ -135,11 +140,10 @@ void print_table(const std::vector<Row>& rows, const Shown& shown) {
     const std::string failed = row.failed + row.expected == 0 ? "-" : fmt::format("{}", row.failed + row.expected);
     std::vector<std::string> cells = {worst.property};
     if (shown.in_frames) cells.insert(cells.end(), {std::string(name_of(worst.stage)), fmt::format("{}", row.looked)});
-    cells.insert(cells.end(), {row.checked < 100'000 ? fmt::format("{}", row.checked)
-                                                     : fmt::format("{:.3g}", static_cast<double>(row.checked)),
-                               row.failed > 0 ? failing(failed) : failed, fmt::format("{:.3g}", worst.measured),
-                               fmt::format("{:.3g}", worst.bound), worst.unit == "1" ? "" : worst.unit,
-                               row.of_bound < 0 ? "-" : share(row.of_bound)});
+    cells.insert(cells.end(),
+                 {short_figure(static_cast<double>(row.checked)), row.failed > 0 ? failing(failed) : failed,
+                  short_figure(worst.measured), short_figure(worst.bound), worst.unit == "1" ? "" : worst.unit,
+                  row.of_bound < 0 ? "-" : share(row.of_bound)});
     table.add(cells);
   }
   say_as_it_is("\n" + table.text());

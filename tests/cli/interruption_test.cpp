@@ -80,7 +80,13 @@ class Interrupted : public Program {
     }
     return found;
   }
-  bool has_printed(const std::string& text) const { return read("out").find(text) != std::string::npos; }
+  // However its lines are broken.
+  bool has_printed(const std::string& text) const {
+    std::istringstream words(read("out"));
+    std::string printed;
+    for (std::string word; words >> word;) printed += (printed.empty() ? "" : " ") + word;
+    return printed.find(text) != std::string::npos;
+  }
   // A number of trials or rows, of a document that is replaced as it grows.
   std::size_t count(const char* list) const {
     return files::exists(path("out.json")) ? json::parse(read("out.json")).at(list).size() : 0;

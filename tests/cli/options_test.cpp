@@ -215,7 +215,7 @@ TEST_F(Options, AreOfferedByBash) {
            {"cutproof run a", "a scene.json afolder"},
            {"cutproof fuzz --save a", "afolder"},
            {"cutproof fuzz --cases ''", ""},
-           {"cutproof info --c", "--completion"},
+           {"cutproof info --c", "--completion --color"},
            {"cutproof fuzz --dynamics --se", "--seconds --seed"}}) {
     const std::string said = words_offered(words);
     if (words == "cutproof run a") {
