@@ -77,7 +77,7 @@ std::string figure(double value) { return fmt::format("{:.4g}", value); }
 // In a column of the table: counts up to five digits as they are, so that 1,010 is not 1.01e+03.
 std::string short_figure(double value) {
   const bool is_count = std::abs(value) < 100'000 && value == std::floor(value);
-  return fmt::format(is_count ? "{:.0f}" : "{:.3g}", value);
+  return is_count ? fmt::format("{:.0f}", value) : fmt::format("{:.3g}", value);
 }
 
 // Of a bound, in as many columns as its head has.

@@ -39,7 +39,7 @@ TEST_F(BenchSampling, HasARowForEachOfTable2WithThePapersFigures) {
 }
 
 TEST_F(BenchSampling, RefusesBadUsage) {
-  expect_refused("bench sampling --clusters spheres", {"spheres", "boxes or sampled"});
+  expect_refused("bench sampling --clusters spheres", {"spheres", "boxes, sampled"});
   expect_refused("bench sampling --backend simulated", {"simulated"});
   expect_refused("bench sampling --frames 5000", {"--frames", "at most"});
   expect_refused("bench sampling --json nowhere/out.json", {"nowhere"});

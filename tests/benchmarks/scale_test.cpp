@@ -111,7 +111,7 @@ TEST_F(BenchScale, RefusesBadUsage) {
   expect_refused("bench scale --split blocks", {"--split"});
   expect_refused("bench scale --acceleration swift", {"--acceleration", "swift", "none and chebyshev"});
   expect_refused("bench scale --iterations 0", {"--iterations"});
-  expect_refused("bench scale --remove none", {"--remove", "none", "both or one"});
+  expect_refused("bench scale --remove none", {"--remove", "none", "both, one"});
   expect_refused("bench scale --json nowhere/out.json", {"nowhere"});
 }
 
