@@ -1,6 +1,7 @@
 #include "cli/errors_report.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -67,11 +68,9 @@ ErrorsWanted errors_wanted(const std::string& list) {
       known = true;
     }
     if (!known) {
-      throw InputError(
-          "command line", "--errors", fmt::format("there is no error '{}'", name),
-          did_you_mean(name, error_names()) +
-              "use all, or some of implementation, solver, time_step, geometry, topology, conservation with "
-              "commas between them");
+      throw InputError("command line", "--errors", fmt::format("there is no error '{}'", name),
+                       did_you_mean(name, error_names()) +
+                           fmt::format("use some of {} with commas between them", fmt::join(error_names(), ", ")));
     }
   }
   return wanted;

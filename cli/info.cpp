@@ -23,6 +23,7 @@
 #include "model/fields.h"
 #include "model/io/columns.h"
 #include "model/io/limits.h"
+#include "model/io/recording.h"
 #include "model/io/scene_io.h"
 #include "oracles/surface/surface.h"
 
@@ -31,10 +32,11 @@ namespace cutproof::cli {
 namespace {
 
 struct InfoOptions {
-  bool scene = false;      // print the reference of scene files
-  bool scenes = false;     // print the scenes that come with the program
-  bool limits = false;     // print how much is read
-  std::string mesh, unit;  // examine a mesh
+  bool scene = false;   // print the reference of scene files
+  bool scenes = false;  // print the scenes that come with the program
+  bool limits = false;  // print how much is read
+  std::string mesh;     // examine it
+  std::string unit = "mm";
   std::string json;
   bool man = false;        // print the manual page
   std::string completion;  // print what this shell offers
@@ -130,11 +132,11 @@ int info(const InfoOptions& options, const CLI::App& program) {
     return 0;
   }
   if (!options.completion.empty()) {
-    say_as_it_is(bash_completion(program));
+    insist_as_it_is(bash_completion(program));
     return 0;
   }
   if (options.man) {
-    say_as_it_is(manual_page(program, date_of_build()));
+    insist_as_it_is(manual_page(program, date_of_build()));
     return 0;
   }
   insist("cutproof {}\nbackends:\n", kVersion);
@@ -144,9 +146,10 @@ int info(const InfoOptions& options, const CLI::App& program) {
   print_words();
   print_properties();
   insist(
-      "scene files: versions 1 to 3 (`cutproof info --scene` lists every field)\n"
-      "recordings: temporal VTKHDF 2.0, index version 2\n"
-      "licence: sources MIT; this program links CGAL and SuiteSparse, which makes it GPL\n");
+      "scene files: versions 1 to {} (`cutproof info --scene` lists every field)\n"
+      "recordings: temporal VTKHDF 2.0, format {} (format {} is read too)\n"
+      "licence: sources MIT; this program links CGAL and SuiteSparse, which makes it GPL\n",
+      kSceneVersion, io::kFormatVersion, io::kOldestFormatVersion);
   return 0;
 }
 
@@ -163,12 +166,7 @@ void add_info(CLI::App& program, Work& work) {
                        "examine a surface mesh: its defects, size and volume, and what --repair would do; exit status "
                        "1 if it does not bound a solid")
           ->type_name("FILE");
-  options->unit = "mm";
-  command->add_option("--unit", options->unit, "what one unit of the mesh is: mm, cm or m")
-      ->capture_default_str()
-      ->type_name("U")
-      ->check(one_of({"mm", "cm", "m"}))
-      ->needs(mesh);
+  add_unit(*command, options->unit)->needs(mesh);
   command->add_option("--json", options->json, "write what was found of the mesh")->type_name("F")->needs(mesh);
   command->add_flag("--limits", options->limits, "list how much is read of each kind of file");
   command->add_flag("--man", options->man, "print the manual page, cutproof(1)");

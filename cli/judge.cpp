@@ -14,7 +14,7 @@
 #include "cli/output.h"
 #include "cli/progress.h"
 #include "cli/screen.h"
-#include "cli/table.h"
+#include "cli/terminal.h"
 #include "guests/campaign.h"
 #include "guests/plugin_backend.h"
 #include "model/error.h"
@@ -92,7 +92,7 @@ std::string title(const PluginInfo& plugin, const std::string& library) {
                      plugin.on_device ? "CUDA device" : "host");
 }
 
-std::string shortened(const std::string& text) { return text.size() > 2000 ? text.substr(0, 2000) + " …" : text; }
+constexpr std::size_t kMostWitnessBytes = 2000;
 
 void print_head(const KernelCampaign& campaign) {
   say("{}: {} {} in {} questions, {:.1f} s\n", campaign.operation->name, campaign.cases, campaign.operation->cases,
@@ -100,13 +100,7 @@ void print_head(const KernelCampaign& campaign) {
 }
 
 void print_properties(const KernelCampaign& campaign) {
-  Table table({"property", "judged", "failed", "greatest of bound"});
-  for (const harness::PropertySummary& p : campaign.properties.all()) {
-    const std::string failed = fmt::format("{}", p.failed);
-    table.add({p.property, fmt::format("{}", p.checked), p.failed > 0 ? failing(failed) : failed,
-               p.of_bound ? fmt::format("{:.2g}", *p.of_bound) : "-"});
-  }
-  say_as_it_is(table.text());
+  print_judged(campaign.properties, &harness::PropertySummary::checked);
   for (const Unpromised& u : campaign.unpromised) {
     say("  {}: {}{}\n", undecided("not promised, not judged"), u.property,
         u.failing > 0 ? fmt::format(" (would fail in {} questions)", u.failing) : "");
@@ -146,9 +140,9 @@ std::string keep(const JudgeOptions& options, const Guest& guest, const KernelCa
           .string();
   io::write_text(file, guests::to_json(saved) + "\n");
   insist("{}: {}, '{}', question {} ({}):\n  {}\n", failing("FAILS"), saved.operation, failure.verdict.property,
-         failure.index, failure.simplest.kind, shortened(failure.verdict.witness.text));
+         failure.index, failure.simplest.kind, shortened(failure.verdict.witness.text, kMostWitnessBytes));
   insist("  simplified to {}: {}\n", campaign.operation->size_of(failure.simplest),
-         shortened(failure.of_simplest.witness.text));
+         shortened(failure.of_simplest.witness.text, kMostWitnessBytes));
   insist_copy("  saved; to see it again:", replay_command(options, file, saved.operation));
   return file;
 }
@@ -239,7 +233,7 @@ int replay(const JudgeOptions& options, Guest& guest) {
     judged += verdict.checked > 0 ? 1 : 0;
     if (verdict.holds) continue;
     ++failed;
-    insist("{}: '{}': {}\n", failing("FAILS"), verdict.property, shortened(verdict.witness.text));
+    insist("{}: '{}': {}\n", failing("FAILS"), verdict.property, shortened(verdict.witness.text, kMostWitnessBytes));
   }
   if (verdicts.empty()) insist("it refuses this question: nothing was judged\n");
   if (failed == 0 && judged > 0) insist("{}: {} verdicts\n", holding("holds"), judged);

@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "cli/commands.h"
 #include "cli/options.h"
@@ -49,6 +52,8 @@ void print_defects(const std::vector<Defect>& defects) {
 
 void print_volume(double volume) { say("volume {:.5g} cm³\n", 1e6 * volume); }
 
+constexpr std::array<std::pair<const char*, double>, 3> kUnits = {{{"mm", 1e-3}, {"cm", 1e-2}, {"m", 1.0}}};  // [m]
+
 // Spacings that give bodies from a quick look to a large run.
 constexpr std::array<int, 3> kUsualCounts = {2000, 8000, 100'000};
 
@@ -63,11 +68,17 @@ void print_usual_counts(double volume) {
 
 }  // namespace
 
+CLI::Option* add_unit(CLI::App& command, std::string& unit) {
+  std::vector<std::string> names;
+  for (const auto& [name, metres] : kUnits) names.emplace_back(name);
+  return command.add_option("--unit", unit, "what one unit of the mesh is: mm, cm or m")
+      ->capture_default_str()
+      ->type_name("U")
+      ->check(one_of(names));
+}
+
 double metres_per(const std::string& unit) {
-  static const std::map<std::string, double> kUnits = {{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}};
-  const auto found = kUnits.find(unit);
-  if (found == kUnits.end()) refuse("--unit", fmt::format("'{}' is not a unit", unit), "use mm, cm or m");
-  return found->second;
+  return std::find_if(kUnits.begin(), kUnits.end(), [&](const auto& each) { return unit == each.first; })->second;
 }
 
 void print_build(const fixtures::Built& built) {

@@ -1,5 +1,6 @@
 // What was done to a mesh, and what a body was built with otherwise than the scene says: printed, and for --json.
 #pragma once
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
@@ -9,7 +10,9 @@
 
 namespace cutproof::cli {
 
-// Metres per unit of a mesh's numbers: mm, cm or m. Throws InputError for another name.
+// --unit of a mesh's numbers: mm, cm or m, and no other word.
+CLI::Option* add_unit(CLI::App& command, std::string& unit);
+// Metres per such a unit.
 double metres_per(const std::string& unit);
 
 // Nothing if nothing was repaired and there is nothing to note.

@@ -9,6 +9,7 @@
 #include "cli/commands.h"
 #include "cli/usage.h"
 #include "cli/validators.h"
+#include "model/printable.h"
 
 namespace cutproof::cli {
 
@@ -84,10 +85,9 @@ std::string for_man(std::string_view text) {
     } else if (c < 0x80) {
       result += static_cast<char>(c);
     } else {
-      const int more = c >= 0xf0 ? 3 : c >= 0xe0 ? 2 : 1;
-      uint32_t letter = c & (0x3fu >> more);
-      for (int n = 0; n < more && k + 1 < text.size(); ++n) letter = letter << 6 | (text[++k] & 0x3f);
-      result += fmt::format("\\[u{:04X}]", letter);
+      const Character letter = first_character(text.substr(k));
+      result += fmt::format("\\[u{:04X}]", letter.code);
+      k += letter.bytes - 1;
     }
   }
   return result;
@@ -117,7 +117,7 @@ std::string option_entry(const CLI::Option& option) {
 }
 
 std::string synopsis(const CLI::App& command, const std::string& name) {
-  std::string line = bold(name.empty() ? "cutproof" : "cutproof " + name);
+  std::string line = bold("cutproof " + name);
   for (const CLI::Option* const argument : shown_arguments(command)) {
     const std::string type = italic(argument->get_type_name());
     line += argument->get_required() ? " " + type : " [" + type + "]";
@@ -139,7 +139,7 @@ constexpr const char* kEnvironment[][2] = {
     {"CUTPROOF_COMMIT", "What documents of fuzz and bench tell as the commit that was run."}};
 
 constexpr const char* kExamples[][2] = {
-    {"cutproof run kidney_discontinuous.json --check", "Cuts a kidney in two steps and certifies every frame."},
+    {"cutproof run kidney_discontinuous --check", "Cuts a kidney in two steps and certifies every frame."},
     {"cutproof fuzz --backend host --cases 1000", "A thousand random dissections by the kernels on this processor."},
     {"cutproof judge ./libmine.so", "Kernels of your own."},
     {"cutproof info --scene", "Every field of a scene file."}};
@@ -162,7 +162,7 @@ std::string bash_completion(const CLI::App& program) {
         fmt::format("    '{}') options='{}' below='{}' ;;\n", name, fmt::join(options, " "), fmt::join(below, " "));
     for (const std::string& each : below)
       inner += fmt::format("      '{}/{}') path='{}{}{}' ;;\n", name, each, name, name.empty() ? "" : " ", each);
-    // Of several arguments the last stands for all: they are of one kind.
+    // Of several arguments the first stands for all: they are of one kind.
     if (const auto shown = shown_arguments(command); !shown.empty()) {
       arguments += fmt::format("    '{}') {} ;;\n", name, offer_of(*shown.front()));
     }

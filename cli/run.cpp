@@ -304,11 +304,7 @@ void add_run(CLI::App& program, Work& work) {
   add_backend(*command, options->backend, "backend under test");
   command->add_option("--mesh", options->mesh, "closed surface mesh that takes the place of the scene's body")
       ->type_name("FILE");
-  command->add_option("--unit", options->unit, "what one unit of the mesh is: mm, cm or m")
-      ->capture_default_str()
-      ->type_name("U")
-      ->check(one_of({"mm", "cm", "m"}))
-      ->needs("--mesh");
+  add_unit(*command, options->unit)->needs("--mesh");
   command->add_flag("--repair", options->repair, "repair the mesh if it does not bound a solid, and say what was done")
       ->needs("--mesh");
   add_count(*command, "--frames", options->frames,

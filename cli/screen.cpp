@@ -84,18 +84,16 @@ void say_text(const std::string& text) {
 void insist_text(const std::string& text) { print(text); }
 
 void say_as_it_is(const std::string& text) {
-  if (style().quiet) return;
+  if (!style().quiet) insist_as_it_is(text);
+}
+
+void insist_as_it_is(const std::string& text) {
   end_line();
   Progress::clear_all();
   std::fwrite(text.data(), 1, text.size(), stdout);
 }
 
-void insist_copy(const std::string& words, const std::string& copied) {
-  end_line();
-  Progress::clear_all();
-  const std::string text = to_be_copied(words, copied);
-  std::fwrite(text.data(), 1, text.size(), stdout);
-}
+void insist_copy(const std::string& words, const std::string& copied) { insist_as_it_is(to_be_copied(words, copied)); }
 
 void say_copy(const std::string& words, const std::string& copied) {
   if (!style().quiet) insist_copy(words, copied);

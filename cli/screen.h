@@ -40,6 +40,7 @@ void say_text(const std::string& text);
 void insist_text(const std::string& text);
 // What is set out in columns already, or longer than them because it is data, as it is.
 void say_as_it_is(const std::string& text);
+void insist_as_it_is(const std::string& text);
 template <class... T>
 void say(fmt::format_string<T...> format, T&&... values) {
   say_text(fmt::format(format, std::forward<T>(values)...));

@@ -269,6 +269,16 @@ void print_notes(const std::vector<std::string>& notes) {
   for (const std::string& note : notes) say("{} {}\n", lesser("note:"), note);
 }
 
+void print_judged(const harness::PropertySummaries& properties, int64_t harness::PropertySummary::*judged) {
+  Table table({"property", "judged", "failed", "greatest of bound"});
+  for (const harness::PropertySummary& p : properties.all()) {
+    const std::string failed = fmt::format("{}", p.failed);
+    table.add({p.property, fmt::format("{}", p.*judged), p.failed > 0 ? failing(failed) : failed,
+               p.of_bound ? fmt::format("{:.2g}", *p.of_bound) : "-"});
+  }
+  say_as_it_is(table.text());
+}
+
 void print_conclusion(const std::vector<Verdict>& verdicts, const Shown& shown, const char* holds) {
   const int64_t failed = failures_in(verdicts, shown);
   print_conclusion(verdicts.size(), failed, failed == 0, holds);

@@ -33,6 +33,10 @@ void print_verdicts(const harness::SceneJudge& judge, const std::string& again);
 void print_grouped(const std::string& what, const std::vector<std::pair<std::string, std::string>>& names_and_reasons);
 void print_notes(const std::vector<std::string>& notes);
 
+// Of a kernel's campaign: a row for each property, with how many of its verdicts or of the things it looked at (a
+// member of PropertySummary) were judged.
+void print_judged(const harness::PropertySummaries& properties, int64_t harness::PropertySummary::*judged);
+
 // The last line. `holds`: what is said if all do.
 void print_conclusion(const std::vector<Verdict>& verdicts, const Shown& shown, const char* holds);
 void print_conclusion(const harness::SceneJudge& judge);

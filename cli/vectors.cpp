@@ -13,7 +13,7 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/screen.h"
-#include "cli/table.h"
+#include "cli/terminal.h"
 #include "model/io/array_file.h"
 #include "model/nearest_word.h"
 
@@ -85,13 +85,7 @@ void print(const Vectors& vectors, const VectorReport& report, const std::string
     if (count > kMostPrinted) insist("  and {} more cases fail in '{}'\n", count - kMostPrinted, property);
   }
   if (!printed.empty()) insist_copy("see it again:", again);
-  Table table({"property", "judged", "failed", "greatest of bound"});
-  for (const harness::PropertySummary& p : report.properties.all()) {
-    const std::string failed = fmt::format("{}", p.failed);
-    table.add({p.property, fmt::format("{}", p.judged), p.failed > 0 ? failing(failed) : failed,
-               p.of_bound ? fmt::format("{:.2g}", *p.of_bound) : "-"});
-  }
-  say_as_it_is(table.text());
+  print_judged(report.properties, &harness::PropertySummary::judged);
   for (const NotJudged& each : report.not_judged) {
     say("  {}: {}: {}{}\n", undecided("not judged"), each.property, each.why,
         each.failing > 0 ? fmt::format(" (would fail in {} cases)", each.failing) : "");

@@ -22,7 +22,12 @@ TopologyFigures topology_of(const Setup& setup, const State& state) {
 }
 
 Errors::Errors(const ErrorsWanted& wanted, const Setup& setup, const State& start, oracles::MakeBackend make)
-    : wanted_(wanted), setup_(setup), precision_(start.precision), start_(start), make_(std::move(make)), sweep_(setup) {
+    : wanted_(wanted),
+      setup_(setup),
+      precision_(start.precision),
+      start_(start),
+      make_(std::move(make)),
+      sweep_(setup) {
   if (wanted_.solver) {
     judged_ = make_();
     exact_ = reference::make_backend();

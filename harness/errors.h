@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "oracles/comparison/conservation.h"
 #include "oracles/comparison/carried_sweep.h"
+#include "oracles/comparison/conservation.h"
 #include "oracles/comparison/cut_geometry.h"
 #include "oracles/comparison/interpenetration.h"
 #include "oracles/comparison/solver_error.h"

@@ -26,8 +26,8 @@ struct Shape {
 };
 
 struct MeshSpec {
-  std::string file;  // as written in the scene; relative to the scene's file
-  double unit = 0;   // metres per unit of the file's numbers: 1e-3 for mm. Must be given.
+  std::string file;     // as written in the scene; relative to the scene's file
+  double unit = 0;      // metres per unit of the file's numbers: 1e-3 for mm. Must be given.
   bool repair = false;  // what keeps it from bounding a solid
   friend bool operator==(const MeshSpec&, const MeshSpec&) = default;
 };

@@ -12,6 +12,10 @@
 
 namespace cutproof::io {
 
+// What is written, and the oldest that is read; a field with a later `since` keeps its default.
+inline constexpr int32_t kFormatVersion = 4;
+inline constexpr int32_t kOldestFormatVersion = 3;
+
 // One moment of one body: the state after a span of stages. Who records a run keeps one after each stage that was due
 // and at the end of each frame; who looks on from farther off may keep the ends of frames alone. Snapshot 0 is the
 // state as loaded (stage: skin).

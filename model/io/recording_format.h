@@ -11,11 +11,10 @@
 
 #include "model/fields.h"
 #include "model/io/hdf5_file.h"
+#include "model/io/recording.h"
 
 namespace cutproof::io {
 
-inline constexpr int32_t kFormatVersion = 4;
-inline constexpr int32_t kOldestFormatVersion = 3;  // that is read; a field with a later `since` keeps its default
 inline constexpr std::string_view kIndexSuffix = ".cutproof.h5";
 
 // What stands in the root attribute cutproof_file of each of the four files.

@@ -18,6 +18,8 @@
 #include <system_error>
 #include <utility>
 
+#include "model/digest.h"
+
 namespace cutproof::io {
 namespace {
 
@@ -47,25 +49,19 @@ class Held {
   sigset_t before_ = {};
 };
 
-// FNV-1a.
-uint32_t mixed(uint32_t hash, std::string_view text) {
-  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619u;
-  return hash;
-}
-
 // Says which processes a number stands for: those of this installation, under this name, in this namespace. Folders are
 // shared between machines, and between containers.
 std::string machine_tag() {
-  uint32_t hash = 2166136261u;
   std::string id;
   std::getline(std::ifstream("/etc/machine-id"), id);
   utsname name = {};
   uname(&name);
   std::error_code error;
-  for (const std::string& part :
-       {id, std::string(name.nodename), fs::read_symlink("/proc/self/ns/pid", error).string()})
-    hash = mixed(hash, part + '\n');
-  return fmt::format("{:08x}", hash);
+  Digest digest;
+  digest.add(std::string_view(id));
+  digest.add(std::string_view(name.nodename));
+  digest.add(std::string_view(fs::read_symlink("/proc/self/ns/pid", error).native()));
+  return fmt::format("{:08x}", digest.value() >> 32);
 }
 
 // The number that `text` is, or begins with before `end`; takes it off. Negative: none.
@@ -78,9 +74,11 @@ int64_t take_number(std::string_view& text, char end) {
   return number;
 }
 
+// What names of this machine end with.
+std::string name_tail() { return fmt::format("-{}.tmp", machine_tag()); }
+
 // The process that has left a file of this name, as unfinished_name() makes them on this machine; 0: it is another.
-int64_t process_of(std::string_view name, std::string_view machine) {
-  const std::string tail = fmt::format("-{}.tmp", machine);
+int64_t process_of(std::string_view name, std::string_view tail) {
   if (!name.starts_with('.') || !name.ends_with(tail)) return 0;
   name.remove_suffix(tail.size() - 1);  // ends with '-'
   const std::size_t dot = name.rfind('.');
@@ -121,21 +119,20 @@ void Unfinished::remove_all() noexcept {
 
 std::string unfinished_name(const fs::path& path) {
   static std::atomic<unsigned> count{0};
-  const std::string name =
-      fmt::format(".{}.{}-{}-{}.tmp", path.filename().string(), ::getpid(), count++, machine_tag());
+  const std::string name = fmt::format(".{}.{}-{}{}", path.filename().string(), ::getpid(), count++, name_tail());
   return (path.parent_path() / name).string();
 }
 
 void remove_left_behind(const fs::path& folder) {
-  const std::string machine = machine_tag();
+  const std::string tail = name_tail();
   // Not directory_iterator: where there is no memory for a name, libstdc++ ends the program instead of throwing.
   struct Close {
     void operator()(DIR* open) const { ::closedir(open); }
   };
-  const std::unique_ptr<DIR, Close> entries(::opendir(folder.empty() ? "." : folder.c_str()));
+  const std::unique_ptr<DIR, Close> entries(::opendir(folder.c_str()));
   if (entries == nullptr) return;
   while (const dirent* const entry = ::readdir(entries.get())) {
-    const auto process = static_cast<pid_t>(process_of(entry->d_name, machine));
+    const auto process = static_cast<pid_t>(process_of(entry->d_name, tail));
     if (process == 0 || ::kill(process, 0) == 0 || errno != ESRCH) continue;
     ::unlinkat(::dirfd(entries.get()), entry->d_name, 0);
   }

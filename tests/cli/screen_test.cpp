@@ -51,7 +51,7 @@ class Screen : public Verbs {
 TEST_F(Screen, IsNotLeftByAnyVerb) {
   record();
   std::vector<std::string> all = commands();
-  for (const std::string& command :
+  for (const char* const command :
        {"run cut.json --check --verbose --against reference --errors all --backend host --record again --json run.json",
         "fuzz --cases 20 --sizes 0-30 --dynamics --verbose", "bench sampling --repeats 1 --frames 1",
         "bench clusters --particles 500 --tau 0.5", "bench scale --sizes 1000 --repeats 1 --frames 1",
