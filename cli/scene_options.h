@@ -38,7 +38,7 @@ auto with_sources(const std::string& file, const std::vector<io::SceneChange>& c
   } catch (const InputError& error) {
     const std::string source = error.field().empty() ? file : io::source_of_field(error.field(), file, changes);
     if (error.file() != file || source == file) throw;
-    throw InputError(source, "", std::string(error.what()).substr(file.size() + 2), "");
+    throw InputError(source, error.field(), error.problem(), error.remedy());
   }
 }
 

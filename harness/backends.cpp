@@ -9,8 +9,9 @@
 #include <functional>
 #include <map>
 #include <mutex>
-#include <ranges>
+#include <string_view>
 #include <thread>
+#include <vector>
 
 #include "gpu/backends.h"
 #include "guests/plugin_backend.h"
@@ -234,8 +235,10 @@ const BackendDescriptor* find_backend(std::string_view name) {
 const BackendDescriptor& described_backend(std::string_view name) {
   const BackendDescriptor* const found = find_backend(name);
   if (found == nullptr) {
+    std::vector<std::string_view> names;
+    for (const BackendDescriptor& backend : kBackends) names.push_back(backend.name);
     refuse("--backend", fmt::format("there is no backend '{}'", name),
-           did_you_mean(name, kBackends | std::views::transform([](const auto& backend) { return backend.name; })) +
+           did_you_mean(name, names) +
                fmt::format("use one of those that `cutproof info` lists: {}; or plugin:FILE.so", backend_names()));
   }
   return *found;

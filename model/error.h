@@ -18,14 +18,19 @@ class InputError : public std::runtime_error {
                            ": " + shown(problem, kMostTextBytes) +
                            (remedy.empty() ? "" : "\n  remedy: " + shown(remedy, kMostTextBytes))),
         file_(std::move(file)),
-        field_(std::move(field)) {}
+        field_(std::move(field)),
+        problem_(problem),
+        remedy_(remedy) {}
   const std::string& file() const { return file_; }
   const std::string& field() const { return field_; }
+  // As they were given: for an error that says the same of another source.
+  const std::string& problem() const { return problem_; }
+  const std::string& remedy() const { return remedy_; }
 
  private:
   static constexpr std::size_t kMostNameBytes = 4096, kMostFieldBytes = 300, kMostTextBytes = 4000;
   static std::string shown(std::string_view text, std::size_t most) { return printable(shortened(text, most)); }
-  std::string file_, field_;
+  std::string file_, field_, problem_, remedy_;
 };
 
 // The device or the machine failed (memory, disk, GPU); exit status 3.

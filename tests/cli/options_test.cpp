@@ -160,6 +160,7 @@ TEST_F(Options, SayWhichChangeOfASceneIsWrong) {
            {"--set =8", {"--set", "value"}},
            {"--set body.particles=10", {"s.json with --set body.particles=10", "Both spacing and particles"}},
            {"--particles 10 --spacing 0.01", {"--spacing", "--particles"}},
+           {"--particles 10", {"cutproof: --particles 10: body.particles: ", "the nearest counts are"}},
            {"--spacing 1e-9", {"cutproof: --spacing 1e-09: body.spacing", "memory"}}}) {
     expect_refused("run s.json " + change, words);
     expect_refused("tune s.json --tolerance 0.5 " + change, words);

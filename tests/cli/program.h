@@ -70,6 +70,11 @@ class Program : public testing::Test {
     for (const auto& entry : files::directory_iterator(folder_)) names.insert(entry.path().filename());
     return names;
   }
+  // An error ends with its remedy, on a line of its own.
+  static void expect_remedy(const std::string& output) {
+    EXPECT_NE(output.find("\n  remedy: "), std::string::npos) << output;
+    EXPECT_EQ(output.find("\\n"), std::string::npos) << "an error within an error:\n" << output;
+  }
   void expect_refused(const std::string& arguments, const std::vector<std::string>& words) const {
     const std::set<std::string> before = listing();
     const Outcome outcome = cutproof(arguments);
@@ -77,6 +82,7 @@ class Program : public testing::Test {
     for (const std::string& word : words) {
       EXPECT_NE(outcome.output.find(word), std::string::npos) << "no '" << word << "' in:\n" << outcome.output;
     }
+    expect_remedy(outcome.output);
     EXPECT_EQ(listing(), before) << "something was written";
   }
 

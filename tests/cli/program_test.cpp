@@ -197,6 +197,7 @@ TEST_F(Program, NotesWhatAnOrganThatTheSceneWasNotMadeForChanges) {
   const Outcome unit = cutproof("run cut.json --mesh sound.off --unit m");
   EXPECT_EQ(unit.status, 2) << unit.output;
   EXPECT_NE(unit.output.find("if its numbers are mm, use --unit mm"), std::string::npos) << unit.output;
+  expect_remedy(unit.output);
 }
 
 // --- What a scene expects -------------------------------------------------------------------------------------------
