@@ -194,8 +194,7 @@ TEST_F(Options, NameTheVersionAlikeInEveryDocument) {
   }
 }
 
-// --- What shells and man show
-// ----------------------------------------------------------------------------------------------------
+// --- What shells and man show ----------------------------------------------------------------------------------------
 
 TEST_F(Options, AreOfferedByBash) {
   write("a scene.json", kScene);
@@ -230,8 +229,15 @@ TEST_F(Options, AreOfferedByBash) {
 
 TEST_F(Options, StandOnAManualPageWithoutWarnings) {
   ASSERT_EQ(cutproof("info --man > cutproof.1").status, 0);
-  const Outcome warnings = cutproof("--version > version; groff -man -Tutf8 -ww -z cutproof.1 #");
-  EXPECT_EQ(warnings.output, "");
+  // The redirection stands before the #, or warnings would go elsewhere and none be seen.
+  const auto warnings = [&](const std::string& page) {
+    const Outcome outcome = cutproof("--version > version; groff -man -Tutf8 -ww -z " + page + " 2>&1 #");
+    EXPECT_EQ(outcome.status, 0) << outcome.output;
+    return outcome.output;
+  };
+  EXPECT_EQ(warnings("cutproof.1"), "");
+  write("broken.1", read("cutproof.1") + "\\*[no_such_string]\n");
+  EXPECT_NE(warnings("broken.1").find("no_such_string"), std::string::npos) << "groff tells what is wrong here";
   const std::string page = cutproof("--version > version; groff -man -Tutf8 -P-bcou -rLL=80n cutproof.1 #").output;
   for (const char* word :
        {"cutproof tune SCENE", "--set FIELD=V", "cutproof bench solver", "--stiffness", "EXIT STATUS"}) {
