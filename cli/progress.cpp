@@ -16,7 +16,6 @@ namespace cutproof::cli {
 namespace {
 
 constexpr double kLeastSeconds = 1;  // before that nothing is foretold
-constexpr std::size_t kMostMarks = 512;
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 

@@ -17,6 +17,10 @@ class Remaining {
   // is often another kind of work: tissue that is not cut yet, or cases that are smaller.
   std::optional<double> seconds() const;
 
+  // How many notes are kept, however many there were.
+  static constexpr std::size_t kMostMarks = 512;
+  std::size_t marks() const { return marks_.size(); }
+
  private:
   struct Mark {
     double seconds, part;

@@ -70,10 +70,11 @@ def colours(program, folder):
 
 
 def progress(program, folder):
-    fuzz = [program, "fuzz", "--seconds", "4", "--cases", "100000000", "--backend", "reference"]
+    fuzz = [program, "fuzz", "--seconds", "4", "--cases", "100000000", "--sizes", "0-30", "--backend", "reference"]
     for columns in (80, 40, 12):
         status, seen = in_terminal(fuzz, folder, columns)
-        expect(status in (0, 1), f"fuzz: status {status}")
+        # Bodies of these sizes need not meet every class of cases, which 4 s may or may not.
+        expect(status == 0, f"fuzz: status {status}")
         drawn = [line for line in lines_drawn(seen) if line.startswith("case ")]
         expect(len(drawn) > 5, f"{columns} columns: {len(drawn)} lines of progress: {seen!r}")
         widest = max(map(len, drawn), default=0)
