@@ -8,6 +8,9 @@
 
 namespace cutproof::cli {
 
+// Of the terminal at standard error at this moment: it may be resized. kColumns where it does not say.
+std::size_t terminal_columns();
+
 // When something will be done, from how much of it was done when.
 class Remaining {
  public:
