@@ -132,7 +132,9 @@ int info(const InfoOptions& options, const CLI::App& program) {
     return 0;
   }
   if (!options.completion.empty()) {
-    insist_as_it_is(bash_completion(program));
+    insist_as_it_is(options.completion == "zsh"    ? zsh_completion(program)
+                    : options.completion == "fish" ? fish_completion(program)
+                                                   : bash_completion(program));
     return 0;
   }
   if (options.man) {
@@ -170,9 +172,11 @@ void add_info(CLI::App& program, Work& work) {
   command->add_option("--json", options->json, "write what was found of the mesh")->type_name("F")->needs(mesh);
   command->add_flag("--limits", options->limits, "list how much is read of each kind of file");
   command->add_flag("--man", options->man, "print the manual page, cutproof(1)");
-  command->add_option("--completion", options->completion, "print a script that makes a shell offer words: bash")
+  command
+      ->add_option("--completion", options->completion,
+                   "print a script that makes a shell offer words: bash, zsh or fish")
       ->type_name("SHELL")
-      ->check(one_of({"bash"}));
+      ->check(one_of({"bash", "zsh", "fish"}));
   command->callback([options, &program, &work] { work = [options, &program] { return info(*options, program); }; });
 }
 

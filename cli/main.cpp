@@ -26,9 +26,7 @@ namespace {
 // Not fmt::print, which may need memory that is not there.
 int say(const char* what, int status) {
   std::fflush(stdout);
-  std::fputs("cutproof: ", stderr);
-  cutproof::cli::print_printable(stderr, what);
-  std::fputs("\n", stderr);
+  cutproof::cli::print_error({"cutproof: ", what, "\n"});
   return status;
 }
 

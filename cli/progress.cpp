@@ -16,7 +16,6 @@ namespace cutproof::cli {
 namespace {
 
 constexpr double kLeastSeconds = 1;  // before that nothing is foretold
-constexpr std::size_t kMostMarks = 512;
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -26,13 +25,12 @@ bool& stands() {
   return line;
 }
 
-// Of the terminal at standard error at this moment: it may be resized.
+}  // namespace
+
 std::size_t terminal_columns() {
   winsize size{};
   return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : io::kColumns;
 }
-
-}  // namespace
 
 void Remaining::note(double seconds, double part) {
   if (marks_.size() >= kMostMarks) {  // every other one tells as much

@@ -8,6 +8,9 @@
 
 namespace cutproof::cli {
 
+// Of the terminal at standard error at this moment: it may be resized. kColumns where it does not say.
+std::size_t terminal_columns();
+
 // When something will be done, from how much of it was done when.
 class Remaining {
  public:
@@ -16,6 +19,10 @@ class Remaining {
   // [s]; nothing as long as too little is known. By the pace of the latter half of the time, because what comes first
   // is often another kind of work: tissue that is not cut yet, or cases that are smaller.
   std::optional<double> seconds() const;
+
+  // How many notes are kept, however many there were.
+  static constexpr std::size_t kMostMarks = 512;
+  std::size_t marks() const { return marks_.size(); }
 
  private:
   struct Mark {

@@ -43,13 +43,14 @@ void for_each_command(const CLI::App& command, const std::string& name,
   }
 }
 
-// --- bash ------------------------------------------------------------------------------------------------------------
+// --- Shells ----------------------------------------------------------------------------------------------------------
 
+// What bash and zsh take alike: assignments to `offered` and `kind`.
 std::string offer_of(const CLI::Option& option) {
   const std::vector<std::string> words = words_of(option);
   const Value kind = kind_of(option.get_type_name());
   if (!words.empty()) {
-    return fmt::format("words='{}'{}", fmt::join(words, " "), kind == Value::file ? " kind=file" : "");
+    return fmt::format("offered='{}'{}", fmt::join(words, " "), kind == Value::file ? " kind=file" : "");
   }
   switch (kind) {
     case Value::folder:
@@ -60,6 +61,78 @@ std::string offer_of(const CLI::Option& option) {
       return "kind=none";
   }
   return {};
+}
+
+// Alternatives of `case`, as bash and zsh have it.
+struct Alternatives {
+  std::string commands;   // "run/…": what a word makes of the command
+  std::string flags;      // of each command its options, and what is below it
+  std::string values;     // of each option that takes one
+  std::string arguments;  // of each command that takes some
+};
+
+Alternatives alternatives_of(const CLI::App& program) {
+  Alternatives all;
+  for_each_command(program, "", [&](const CLI::App& command, const std::string& name) {
+    std::vector<std::string> options, below;
+    for (const CLI::Option* const option : shown_options(command)) {
+      const std::vector<std::string> names = names_of(*option);
+      options.insert(options.end(), names.begin(), names.end());
+      if (!takes_value(*option)) continue;
+      for (const std::string& each : names)
+        all.values += fmt::format("    '{} {}') {} ;;\n", name, each, offer_of(*option));
+    }
+    for (const CLI::App* const each : shown_commands(command)) below.push_back(each->get_name());
+    all.flags +=
+        fmt::format("    '{}') flags='{}' below='{}' ;;\n", name, fmt::join(options, " "), fmt::join(below, " "));
+    for (const std::string& each : below)
+      all.commands += fmt::format("      '{}/{}') at='{}{}{}' ;;\n", name, each, name, name.empty() ? "" : " ", each);
+    // Of several arguments the first stands for all: they are of one kind.
+    if (const auto shown = shown_arguments(command); !shown.empty()) {
+      all.arguments += fmt::format("      '{}') {} ;;\n", name, offer_of(*shown.front()));
+    }
+  });
+  return all;
+}
+
+// What is offered, once it is known where the word stands.
+std::string choice_among(const Alternatives& all) {
+  return fmt::format(R"(  case "$at" in
+{}  esac
+  if [[ $current == -* ]]; then
+    offered=$flags
+  else
+    case "$at $before" in
+{}    esac
+    if [[ -z $offered$kind && -n $below ]]; then offered=$below; fi
+    if [[ -z $offered$kind ]]; then
+      case "$at" in
+{}      esac
+    fi
+  fi
+)",
+                     all.flags, all.values, all.arguments);
+}
+
+// In single quotes, as fish reads them.
+std::string in_quotes_of_fish(std::string_view text) {
+  std::string quoted = "'";
+  for (const char c : text) {
+    if (c == '\\' || c == '\'') quoted += '\\';
+    quoted += c;
+  }
+  return quoted + "'";
+}
+
+// The value of an option, or an argument, as `complete` of fish is told.
+std::string offer_to_fish(const CLI::Option& option, bool is_value) {
+  const std::vector<std::string> words = words_of(option);
+  const Value kind = kind_of(option.get_type_name());
+  const char* const required = is_value ? " -r" : "";
+  std::string told = kind == Value::file ? fmt::format("{} -F", required) : fmt::format("{} -f", required);
+  if (kind == Value::folder) told += " -a '(__fish_complete_directories)'";
+  if (!words.empty()) told += fmt::format(" -a '{}'", fmt::join(words, " "));
+  return told;
 }
 
 // --- man -------------------------------------------------------------------------------------------------------------
@@ -136,6 +209,8 @@ constexpr const char* kExitStatus[][2] = {{"0", "Everything holds."},
 
 constexpr const char* kEnvironment[][2] = {
     {"CUTPROOF_GUEST", "The program cutproof-guest, in which plugins run, where it is not beside cutproof."},
+    {"COLUMNS",
+     "How wide errors are on a terminal, if this is a number; otherwise as wide as it is, 80 columns at most."},
     {"CUTPROOF_COMMIT", "What documents of fuzz and bench tell as the commit that was run."}};
 
 constexpr const char* kExamples[][2] = {
@@ -147,60 +222,94 @@ constexpr const char* kExamples[][2] = {
 }  // namespace
 
 std::string bash_completion(const CLI::App& program) {
-  std::string commands, values, arguments, inner;
-  for_each_command(program, "", [&](const CLI::App& command, const std::string& name) {
-    std::vector<std::string> options, below;
-    for (const CLI::Option* const option : shown_options(command)) {
-      const std::vector<std::string> names = names_of(*option);
-      options.insert(options.end(), names.begin(), names.end());
-      if (!takes_value(*option)) continue;
-      for (const std::string& each : names)
-        values += fmt::format("    '{} {}') {} ;;\n", name, each, offer_of(*option));
-    }
-    for (const CLI::App* const each : shown_commands(command)) below.push_back(each->get_name());
-    commands +=
-        fmt::format("    '{}') options='{}' below='{}' ;;\n", name, fmt::join(options, " "), fmt::join(below, " "));
-    for (const std::string& each : below)
-      inner += fmt::format("      '{}/{}') path='{}{}{}' ;;\n", name, each, name, name.empty() ? "" : " ", each);
-    // Of several arguments the first stands for all: they are of one kind.
-    if (const auto shown = shown_arguments(command); !shown.empty()) {
-      arguments += fmt::format("    '{}') {} ;;\n", name, offer_of(*shown.front()));
-    }
-  });
+  const Alternatives all = alternatives_of(program);
   return fmt::format(R"(# bash completion for cutproof: made by `cutproof info --completion bash`.
 _cutproof() {{
-  local current=${{COMP_WORDS[COMP_CWORD]}} before=${{COMP_WORDS[COMP_CWORD-1]}} path='' options='' below='' words='' kind='' k
+  local current=${{COMP_WORDS[COMP_CWORD]}} before=${{COMP_WORDS[COMP_CWORD-1]}} at='' flags='' below='' offered='' kind='' k
   # --option=value comes as three words.
   [[ $current == '=' ]] && current=''
   [[ $before == '=' ]] && before=${{COMP_WORDS[COMP_CWORD-2]}}
   for ((k = 1; k < COMP_CWORD; ++k)); do
-    case "$path/${{COMP_WORDS[k]}}" in
+    case "$at/${{COMP_WORDS[k]}}" in
 {}    esac
   done
-  case "$path" in
-{}  esac
-  if [[ $current == -* ]]; then
-    words=$options
-  else
-    case "$path $before" in
-{}    esac
-    if [[ -z $words$kind && -n $below ]]; then words=$below; fi
-    if [[ -z $words$kind ]]; then
-      case "$path" in
-{}      esac
-    fi
-  fi
-  COMPREPLY=()
+{}  COMPREPLY=()
   case "$kind" in
     none) ;;
-    file) compopt -o filenames 2> /dev/null; mapfile -t COMPREPLY < <(compgen -W "$words" -- "$current"; compgen -f -- "$current") ;;
+    file) compopt -o filenames 2> /dev/null; mapfile -t COMPREPLY < <(compgen -W "$offered" -- "$current"; compgen -f -- "$current") ;;
     folder) compopt -o filenames 2> /dev/null; mapfile -t COMPREPLY < <(compgen -d -- "$current") ;;
-    *) mapfile -t COMPREPLY < <(compgen -W "$words" -- "$current") ;;
+    *) mapfile -t COMPREPLY < <(compgen -W "$offered" -- "$current") ;;
   esac
 }}
 complete -F _cutproof cutproof
 )",
-                     inner, commands, values, arguments);
+                     all.commands, choice_among(all));
+}
+
+std::string zsh_completion(const CLI::App& program) {
+  const Alternatives all = alternatives_of(program);
+  return fmt::format(R"(#compdef cutproof
+# zsh completion for cutproof: made by `cutproof info --completion zsh`.
+_cutproof() {{
+  local current=$words[CURRENT] before=$words[CURRENT-1] at='' flags='' below='' offered='' kind='' k
+  # --option=value is one word.
+  if [[ $current == --*=* ]]; then
+    before=${{current%%=*}}
+    current=${{current#*=}}
+    compset -P 1 '*='
+  fi
+  for ((k = 2; k < CURRENT; ++k)); do
+    case "$at/$words[k]" in
+{}    esac
+  done
+{}  case "$kind" in
+    none) ;;
+    file) compadd -- ${{=offered}}; _files ;;
+    folder) _files -/ ;;
+    *) compadd -- ${{=offered}} ;;
+  esac
+}}
+# Found in a folder of completions this file is itself the function; otherwise it has been sourced.
+if [[ $funcstack[1] == _cutproof ]]; then _cutproof "$@"; else compdef _cutproof cutproof; fi
+)",
+                     all.commands, choice_among(all));
+}
+
+std::string fish_completion(const CLI::App& program) {
+  std::string commands, offers;
+  for_each_command(program, "", [&](const CLI::App& command, const std::string& name) {
+    const std::string here = fmt::format("complete -c cutproof -n \"__cutproof_at '{}'\"", name);
+    for (const CLI::App* const each : shown_commands(command)) {
+      commands += fmt::format("      case '{}/{}'\n        set at '{}{}{}'\n", name, each->get_name(), name,
+                              name.empty() ? "" : " ", each->get_name());
+      offers += fmt::format("{} -f -a {} -d {}\n", here, each->get_name(), in_quotes_of_fish(each->get_description()));
+    }
+    for (const CLI::Option* const option : shown_options(command)) {
+      std::string names;
+      for (const std::string& each : option->get_snames()) names += " -s " + each;
+      for (const std::string& each : option->get_lnames()) names += " -l " + each;
+      offers += fmt::format("{}{}{} -d {}\n", here, names, takes_value(*option) ? offer_to_fish(*option, true) : "",
+                            in_quotes_of_fish(option->get_description()));
+    }
+    if (const auto shown = shown_arguments(command); !shown.empty()) {
+      offers += fmt::format("{}{}\n", here, offer_to_fish(*shown.front(), false));
+    }
+  });
+  return fmt::format(R"(# fish completion for cutproof: made by `cutproof info --completion fish`.
+# Whether the words before name this verb, and this suite of it.
+function __cutproof_at
+  set -l at ''
+  set -l given (commandline -opc)
+  set -e given[1]
+  for word in $given
+    switch "$at/$word"
+{}    end
+  end
+  test "$at" = "$argv[1]"
+end
+complete -c cutproof -f
+{})",
+                     commands, offers);
 }
 
 std::string manual_page(const CLI::App& program, const std::string& date) {

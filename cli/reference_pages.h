@@ -5,8 +5,10 @@
 
 namespace cutproof::cli {
 
-// A script for bash: verbs, suites, options, words that an option knows, files and folders.
+// A script for a shell: verbs, suites, options, words that an option knows, files and folders.
 std::string bash_completion(const CLI::App& program);
+std::string zsh_completion(const CLI::App& program);
+std::string fish_completion(const CLI::App& program);
 // cutproof(1), in man's macros. `date`: of the page.
 std::string manual_page(const CLI::App& program, const std::string& date);
 

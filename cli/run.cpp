@@ -342,7 +342,7 @@ void add_run(CLI::App& program, Work& work) {
         options->scene.file = scene_file(options->scene.file);
         return run(*options);
       }
-      std::fputs(kNextSteps, stderr);
+      print_error({kNextSteps});
       return 2;
     };
   });

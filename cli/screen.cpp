@@ -1,12 +1,20 @@
 #include "cli/screen.h"
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <new>
+#include <system_error>
 
+#include "cli/printable_output.h"
 #include "cli/progress.h"
 #include "model/io/columns.h"
+#include "model/printable.h"
 
 namespace cutproof::cli {
 
@@ -32,6 +40,18 @@ void print(const std::string& text) {
   const std::string whole = io::wrapped_text(open.substr(0, end + 1));
   std::fwrite(whole.data(), 1, whole.size(), stdout);
   open.erase(0, end + 1);
+}
+
+std::size_t columns_of_errors() {
+  constexpr std::size_t kLeast = 20;  // with less nothing can be read
+  const char* const asked = std::getenv("COLUMNS");
+  const std::string_view digits = asked != nullptr ? asked : "";
+  std::size_t columns = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), columns);
+  if (error != std::errc() || end != digits.data() + digits.size() || columns == 0) {
+    columns = std::min(terminal_columns(), io::kColumns);
+  }
+  return std::max(columns, kLeast);
 }
 
 std::string in_colour(const char* code, const std::string& text) {
@@ -101,6 +121,19 @@ void say_copy(const std::string& words, const std::string& copied) {
 
 void end_line() {
   if (!open_line().empty()) print("\n");
+}
+
+void print_error(std::initializer_list<std::string_view> pieces) noexcept {
+  Progress::clear_all();
+  try {
+    if (isatty(STDERR_FILENO) != 0) {
+      std::string text;
+      for (const std::string_view piece : pieces) text += printable_lines(piece);
+      return print_printable(stderr, io::wrapped_text(text, columns_of_errors()));
+    }
+  } catch (const std::bad_alloc&) {  // as they are, then
+  }
+  for (const std::string_view piece : pieces) print_printable(stderr, piece);
 }
 
 std::string failing(const std::string& text) { return in_colour("31", text); }

@@ -1,9 +1,11 @@
-// What this program prints on standard output, in lines of at most 80 columns, and how: in colour, and how much of it.
+// What this program prints, in lines of at most 80 columns, and how: in colour, and how much of it.
 // There is one standard output in a process, so there is one style, which main() sets before a verb begins.
 #pragma once
 #include <fmt/format.h>
 
+#include <initializer_list>
 #include <string>
+#include <string_view>
 #include <utility>
 
 namespace CLI {
@@ -54,6 +56,10 @@ void insist_copy(const std::string& words, const std::string& copied);
 void say_copy(const std::string& words, const std::string& copied);
 // What waits for the end of its line.
 void end_line();
+// Whole lines on standard error. On a terminal they are broken as those of standard output are, to its columns,
+// kColumns at most, or to as many as COLUMNS says; elsewhere, where a tool reads them, an error keeps its line. Pieces,
+// because they are printed even where there is no memory to put them together.
+void print_error(std::initializer_list<std::string_view> pieces) noexcept;
 
 // Colours, never the only carrier of a meaning.
 std::string failing(const std::string& text);    // red

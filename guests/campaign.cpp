@@ -306,7 +306,7 @@ SavedQuestion question_from_json(const std::string& text, const std::string& fil
 }
 
 SavedQuestion read_question(const std::string& file) {
-  return question_from_json(io::read_file(file, io::kQuestionLimits.what, io::kQuestionLimits.bytes), file);
+  return question_from_json(io::read_file(file, io::kQuestionLimits), file);
 }
 
 nlohmann::json to_json(const KernelCampaign& campaign) {

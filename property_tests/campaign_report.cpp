@@ -32,6 +32,11 @@ constexpr double kMostUndecided = 0.01;
 
 constexpr double kMostCounted = 1e12;  // by one shard, of anything
 
+// What a result counts and measures, and what is added up of shards.
+constexpr const char* kCounts[] = {"cases", "refused", "verdicts", "particles"};
+constexpr const char* kCountsOfSteps[] = {"steps", "particles", "undecidable"};  // within steps_compared
+constexpr const char* kOfThreads[] = {"generating", "running", "judging"};       // within thread_seconds
+
 constexpr const char* kRemedy = "give the results (--json) of all shards of one campaign, each once";
 
 // What makes two results shards of one campaign: what decides which cases there are, what runs them, and what judges.
@@ -53,19 +58,10 @@ double mean(int64_t sum, int64_t count) {
   return count > 0 ? static_cast<double>(sum) / static_cast<double>(count) : 0.0;
 }
 
-// `more` is added to `sum`: a number, or an object of numbers.
-void add(json& sum, const json& more) {
-  if (sum.is_object()) {
-    for (auto& [name, value] : sum.items()) add(value, more.at(name));
-    return;
-  }
-  const double both = sum.get<double>() + more.get<double>();
-  if (sum.is_number_integer() && more.is_number_integer() && std::abs(both) < 9e18) {
-    sum = sum.get<int64_t>() + more.get<int64_t>();
-  } else {
-    sum = both;
-  }
-}
+// Counts are whole, and so few (kMostCounted) that those of all shards fit.
+static_assert(kMostCounted * kMostShards < 9e18);
+void add_count(json& sum, const json& more) { sum = sum.get<int64_t>() + more.get<int64_t>(); }
+void add_figure(json& sum, const json& more) { sum = sum.get<double>() + more.get<double>(); }
 
 // `first`: the file that `whole` began with.
 void require_same_campaign(const json& whole, const json& part, const std::string& file, const std::string& first) {
@@ -80,17 +76,20 @@ void require_same_campaign(const json& whole, const json& part, const std::strin
 
 // `part` is added to `whole`.
 void add_shard(json& whole, const json& part) {
-  for (const char* field :
-       {"cases", "refused", "verdicts", "particles", "cases_per_second", "thread_seconds", "coverage"}) {
-    add(whole.at(field), part.at(field));
+  for (const char* count : kCounts) add_count(whole.at(count), part.at(count));
+  for (const CoverageClass& each : kCoverageClasses) {
+    add_count(whole.at("coverage").at(each.name), part.at("coverage").at(each.name));
   }
+  add_figure(whole.at("cases_per_second"), part.at("cases_per_second"));
+  for (const char* each : kOfThreads)
+    add_figure(whole.at("thread_seconds").at(each), part.at("thread_seconds").at(each));
   whole["mean_particles"] = mean(whole.at("particles").get<int64_t>(), whole.at("cases").get<int64_t>());
   // Shards run beside each other: together they take as long as the slowest, and do what all of them do.
   whole["seconds"] = std::max(whole.at("seconds").get<double>(), part.at("seconds").get<double>());
   if (whole.contains("steps_compared")) {
     json& compared = whole.at("steps_compared");
     const json& more = part.at("steps_compared");
-    for (const char* field : {"steps", "particles", "undecidable"}) add(compared.at(field), more.at(field));
+    for (const char* count : kCountsOfSteps) add_count(compared.at(count), more.at(count));
     // A number, or of what failed the string "inf".
     const json &here = compared.at("greatest_h"), &there = more.at("greatest_h");
     if (there.is_string() || (here.is_number() && there.get<double>() > here.get<double>())) {
@@ -188,9 +187,9 @@ void require_fields(const json& part, const std::string& file) {
     if (count >= 0 && count <= kMostCounted) return;
     throw InputError(file, name, fmt::format("{} is no number of things that a campaign has seen", count), kRemedy);
   };
-  for (const char* count : {"cases", "refused", "verdicts", "particles"}) require_count(part, count);
+  for (const char* count : kCounts) require_count(part, count);
   for (const char* figure : {"seconds", "cases_per_second"}) static_cast<void>(part.at(figure).get<double>());
-  for (const char* of_threads : {"generating", "running", "judging"}) {
+  for (const char* of_threads : kOfThreads) {
     static_cast<void>(part.at("thread_seconds").at(of_threads).get<double>());
   }
   for (const char* flag : {"dynamics", "complete"}) static_cast<void>(part.at(flag).get<bool>());
@@ -213,7 +212,7 @@ void require_fields(const json& part, const std::string& file) {
     for (const char* word : {"text", "file"}) static_cast<void>(violation.at(word).get<std::string>());
   }
   if (!part.contains("steps_compared")) return;
-  for (const char* count : {"steps", "particles", "undecidable"}) require_count(part.at("steps_compared"), count);
+  for (const char* count : kCountsOfSteps) require_count(part.at("steps_compared"), count);
   static_cast<void>(part.at("steps_compared").at("greatest_h"));
 }
 
@@ -318,7 +317,7 @@ CampaignConclusion conclude(const json& document, bool whole) {
   if (!missing.empty()) {
     lost = fmt::format("of {} shards these are missing or were stopped, and not all of their cases were judged: {}",
                        document.at("merged_shards").get<int64_t>(), missing);
-  } else if (!document.value("complete", true)) {
+  } else if (!document.at("complete").get<bool>()) {
     lost = how_far(document);
   }
   if (violations > 0) {

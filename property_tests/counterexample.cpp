@@ -94,8 +94,7 @@ Counterexample counterexample_from_json(const std::string& text, const std::stri
 }
 
 Counterexample read_counterexample(const std::string& file) {
-  return counterexample_from_json(io::read_file(file, io::kCounterexampleLimits.what, io::kCounterexampleLimits.bytes),
-                                  file);
+  return counterexample_from_json(io::read_file(file, io::kCounterexampleLimits), file);
 }
 
 }  // namespace cutproof::property_tests

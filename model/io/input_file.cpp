@@ -97,4 +97,8 @@ std::string read_file(const std::string& path, std::string_view what, uint64_t m
   }
 }
 
+std::string read_file(const std::string& path, const JsonLimits& limits) {
+  return read_file(path, limits.what, limits.bytes);
+}
+
 }  // namespace cutproof::io

@@ -166,7 +166,7 @@ json parse_json(const std::string& text, const std::string& file, const JsonLimi
 }
 
 json read_json(const std::string& file, const JsonLimits& limits, const std::string& remedy) {
-  return parse_json(read_file(file, limits.what, limits.bytes), file, limits, remedy);
+  return parse_json(read_file(file, limits), file, limits, remedy);
 }
 
 }  // namespace cutproof::io

@@ -386,7 +386,7 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::v
 }
 
 Scene read_scene(const std::string& path, const std::vector<SceneChange>& changes) {
-  return parse_scene(read_file(path, kSceneLimits.what, kSceneLimits.bytes), path, changes);
+  return parse_scene(read_file(path, kSceneLimits), path, changes);
 }
 
 }  // namespace cutproof::io

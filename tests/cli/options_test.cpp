@@ -1,7 +1,9 @@
 // What every verb does alike with what it is given.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "tests/cli/program.h"
 
@@ -20,9 +22,25 @@ class Options : public Program {
     write("s.json", kScene);
   }
   json standard_output_of(const std::string& arguments) const {
+    return json::parse(standard_output(arguments), nullptr, false);
+  }
+  std::string standard_output(const std::string& arguments) const {
     const Outcome outcome = cutproof(arguments + " 2> error #");
     EXPECT_EQ(outcome.status, 0) << arguments << "\n" << read("error");
-    return json::parse(outcome.output, nullptr, false);
+    return outcome.output;
+  }
+  // What the first group of this expression matches.
+  static std::set<std::string> matches(const std::string& text, const std::string& expression) {
+    const std::regex regex(expression);
+    std::set<std::string> found;
+    for (std::sregex_iterator each(text.begin(), text.end(), regex), end; each != end; ++each)
+      found.insert(each->str(1));
+    return found;
+  }
+  // The line that begins so; empty if there is none.
+  static std::string line_of(const std::string& text, const std::string& beginning) {
+    const std::size_t at = text.find("\n" + beginning);
+    return at == std::string::npos ? "" : text.substr(at + 1, text.find('\n', at + 1) - at - 1);
   }
   std::string words_offered(const std::string& words) const {
     write("complete.sh", "source <('" CUTPROOF_PROGRAM "' info --completion bash)\nCOMP_WORDS=(" + words +
@@ -195,8 +213,7 @@ TEST_F(Options, NameTheVersionAlikeInEveryDocument) {
   }
 }
 
-// --- What shells and man show
-// ----------------------------------------------------------------------------------------------------
+// --- What shells and man show ----------------------------------------------------------------------------------------
 
 TEST_F(Options, AreOfferedByBash) {
   write("a scene.json", kScene);
@@ -226,13 +243,78 @@ TEST_F(Options, AreOfferedByBash) {
       EXPECT_EQ(said, offered + "\n") << words;
     }
   }
-  expect_refused("info --completion csh", {"csh", "bash"});
+  expect_refused("info --completion csh", {"csh", "bash, zsh, fish"});
 }
+
+// Held against the help of each verb and suite, which is not made from the same tables: whatever it lists is offered
+// there, and nothing else.
+TEST_F(Options, AreOfferedByZshAndFish) {
+  const std::string zsh = standard_output("info --completion zsh"), fish = standard_output("info --completion fish");
+  EXPECT_TRUE(zsh.starts_with("#compdef cutproof\n"));
+  int suites = 0, options = 0;
+  std::vector<std::string> commands = {""};
+  for (std::size_t k = 0; k < commands.size(); ++k) {
+    const std::string command = commands[k];
+    const std::string help = standard_output(command + " --help");
+    const std::set<std::string> below =
+        matches(help.substr(std::min(help.find("\nSubcommands:"), help.size())), "\n  ([a-z][a-z_-]*)");
+    const std::set<std::string> listed = matches(help, "\n  (?:-[a-zA-Z],)?--([a-z-]+)");
+    EXPECT_TRUE(listed.contains("quiet")) << command << "\n" << help;
+    for (const std::string& each : below) commands.push_back(command.empty() ? each : command + " " + each);
+    suites += command == "bench" ? static_cast<int>(below.size()) : 0;
+    options += static_cast<int>(listed.size());
+
+    const std::string line = line_of(zsh, "    '" + command + "') flags='");
+    EXPECT_EQ(matches(line.substr(0, line.find(" below=")), "--([a-z-]+)"), listed) << command << ": " << line;
+    EXPECT_EQ(matches(line.substr(std::min(line.find(" below="), line.size())), "[' ]([a-z][a-z_-]*)(?=[' ])"), below)
+        << command << ": " << line;
+
+    const std::string here = "complete -c cutproof -n \"__cutproof_at '" + command + "'\"";
+    EXPECT_EQ(matches(fish, "\n" + here + "(?: -s [a-zA-Z])? -l ([a-z-]+)"), listed) << command;
+    EXPECT_EQ(matches(fish, "\n" + here + " -f -a ([a-z][a-z_-]*) "), below) << command;
+  }
+  EXPECT_GE(commands.size(), 12u) << "verbs";
+  EXPECT_GE(suites, 5);
+  EXPECT_GE(options, 100);
+  // What comes after: words that an option knows, files, folders, a number of which nobody knows anything.
+  for (const char* words :
+       {"    'fuzz --backend') offered='reference host ", "    'fuzz --save') kind=folder ;;\n",
+        "    'fuzz --cases') kind=none ;;\n", "    'info --completion') offered='bash zsh fish' ;;\n"}) {
+    EXPECT_NE(zsh.find(words), std::string::npos) << words;
+  }
+  for (const char* words :
+       {" -l backend -r -f -a 'reference host ", " -l save -r -f -a '(__fish_complete_directories)'",
+        " -l cases -r -f -d ", " -l completion -r -f -a 'bash zsh fish'", " -l json -r -F"}) {
+    EXPECT_NE(fish.find(words), std::string::npos) << words;
+  }
+}
+
+// By the shells themselves, where there are any.
+class OptionsInShell : public Options, public testing::WithParamInterface<const char*> {};
+TEST_P(OptionsInShell, AreWrittenAsItReads) {
+  const std::string shell = GetParam();
+  if (cutproof("--version > version; command -v " + shell + " #").status != 0) GTEST_SKIP() << "there is no " << shell;
+  ASSERT_EQ(cutproof("info --completion " + shell + " > script").status, 0);
+  const Outcome parsed = cutproof("--version > version; " + shell + " -n script 2>&1 #");
+  EXPECT_EQ(parsed.status, 0) << parsed.output;
+  EXPECT_EQ(parsed.output, "");
+  write("script", read("script") + "\nif case (\n");
+  EXPECT_NE(cutproof("--version > version; " + shell + " -n script 2>&1 #").status, 0) << "it reads this, too";
+}
+INSTANTIATE_TEST_SUITE_P(Each, OptionsInShell, testing::Values("bash", "zsh", "fish"),
+                         [](const auto& shell) { return std::string(shell.param); });
 
 TEST_F(Options, StandOnAManualPageWithoutWarnings) {
   ASSERT_EQ(cutproof("info --man > cutproof.1").status, 0);
-  const Outcome warnings = cutproof("--version > version; groff -man -Tutf8 -ww -z cutproof.1 #");
-  EXPECT_EQ(warnings.output, "");
+  // The redirection stands before the #, or warnings would go elsewhere and none be seen.
+  const auto warnings = [&](const std::string& page) {
+    const Outcome outcome = cutproof("--version > version; groff -man -Tutf8 -ww -z " + page + " 2>&1 #");
+    EXPECT_EQ(outcome.status, 0) << outcome.output;
+    return outcome.output;
+  };
+  EXPECT_EQ(warnings("cutproof.1"), "");
+  write("broken.1", read("cutproof.1") + "\\*[no_such_string]\n");
+  EXPECT_NE(warnings("broken.1").find("no_such_string"), std::string::npos) << "groff tells what is wrong here";
   const std::string page = cutproof("--version > version; groff -man -Tutf8 -P-bcou -rLL=80n cutproof.1 #").output;
   for (const char* word :
        {"cutproof tune SCENE", "--set FIELD=V", "cutproof bench solver", "--stiffness", "EXIT STATUS"}) {

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -37,7 +38,10 @@ class Program : public testing::Test {
     std::string name = std::string(info->test_suite_name()) + "." + info->name() + "." + std::to_string(getpid());
     for (char& c : name) c = c == '/' ? '_' : c;
     folder_ = files::temp_directory_path() / ("cutproof." + name);
+    files::remove_all(folder_);  // of a process of the same number that was killed
     files::create_directories(folder_);
+    // Where tests run there, the program would add annotations to what it prints.
+    unsetenv("GITHUB_ACTIONS");
   }
   void TearDown() override { files::remove_all(folder_); }
 

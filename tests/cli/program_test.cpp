@@ -10,6 +10,7 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <set>
 
 namespace {
@@ -409,10 +410,18 @@ TEST_F(Program, SaysHowNearToItsBoundEachPropertyCame) {
   const std::string words = "the nearest to its bound: " + which + ", at " + share.data() + " of it.";
   EXPECT_NE(on_one_line(outcome.output).find(words), std::string::npos) << words << "\n" << outcome.output;
   const std::string table = cutproof("run cut.json --check --verbose").output;
+  // Of each row the first word, which no column is too narrow for, and the stage, which stands before a number.
+  std::multiset<std::pair<std::string, std::string>> wanted, rows;
   for (const json& property : document["properties"]) {
-    EXPECT_NE(on_one_line(table).find(property["property"].get<std::string>().substr(0, 5)), std::string::npos)
-        << table;
+    const std::string name = property["property"];
+    wanted.emplace(name.substr(0, name.find(' ')), property["stage"]);
   }
+  const std::regex row("\n  (\\S+)[^\n]* (step|detect|split|merge|expand|skin) +[0-9,]+ ");
+  for (std::sregex_iterator each(table.begin(), table.end(), row), end; each != end; ++each) {
+    rows.emplace(each->str(1), each->str(2));
+  }
+  // Expectations and what is said of the whole run have rows too.
+  EXPECT_TRUE(std::includes(rows.begin(), rows.end(), wanted.begin(), wanted.end())) << table;
   EXPECT_NE(table.find("worst"), std::string::npos) << table;
   EXPECT_EQ(outcome.output.find("worst"), std::string::npos) << "only with --verbose: " << outcome.output;
 }

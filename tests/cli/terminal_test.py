@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What is seen in a terminal: colours, and a line of progress that never wraps. Usage: terminal_test.py CUTPROOF SOURCES"""
+"""What is seen in a terminal: colours, errors, and a line of progress that never wraps. Usage: terminal_test.py CUTPROOF SOURCES"""
 import fcntl
 import json
 import os
@@ -25,7 +25,7 @@ def in_terminal(command, folder, columns, environment=None, pipe_output=False):
     """Status, and the bytes that a terminal of 24 lines gets."""
     master, slave = pty.openpty()
     fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
-    plain = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "TERM")}
+    plain = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "TERM", "COLUMNS")}
     process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stderr=slave,
                                stdout=subprocess.DEVNULL if pipe_output else slave,
                                env=plain | {"TERM": "xterm"} | (environment or {}))
@@ -70,10 +70,11 @@ def colours(program, folder):
 
 
 def progress(program, folder):
-    fuzz = [program, "fuzz", "--seconds", "4", "--cases", "100000000", "--backend", "reference"]
+    fuzz = [program, "fuzz", "--seconds", "4", "--cases", "100000000", "--sizes", "0-30", "--backend", "reference"]
     for columns in (80, 40, 12):
         status, seen = in_terminal(fuzz, folder, columns)
-        expect(status in (0, 1), f"fuzz: status {status}")
+        # Bodies of these sizes need not meet every class of cases, which 4 s may or may not.
+        expect(status == 0, f"fuzz: status {status}")
         drawn = [line for line in lines_drawn(seen) if line.startswith("case ")]
         expect(len(drawn) > 5, f"{columns} columns: {len(drawn)} lines of progress: {seen!r}")
         widest = max(map(len, drawn), default=0)
@@ -97,6 +98,39 @@ def progress(program, folder):
         expect(max(map(len, lines_drawn(seen))) <= 80, f"{arguments}: a line is wider than the terminal")
 
 
+def errors(program, folder):
+    """Broken on a terminal, at words, as standard output is; one line each where a tool reads them."""
+    wrong_field = [program, "run", "scene.json", "--set", "step.iteration=8"]
+    done = subprocess.run(wrong_field, cwd=folder, capture_output=True, text=True, env=os.environ | {"COLUMNS": "40"})
+    piped = done.stderr
+    expect(done.returncode == 2 and done.stdout == "", f"in a pipe: {done}")
+    error, remedy = (piped.splitlines() + ["", ""])[:2]
+    expect(piped == f"{error}\n{remedy}\n" and error.startswith("cutproof: ") and remedy.startswith("  remedy: "),
+           f"in a pipe there is one line each: {piped!r}")
+    # To be broken in the middle of any of these terminals.
+    expect(max(map(len, (error, remedy))) > 80, f"nothing to be broken: {piped!r}")
+    for columns, environment, most in ((80, {}, 80), (200, {}, 80), (40, {}, 40), (80, {"COLUMNS": "60"}, 60),
+                                       (80, {"COLUMNS": "200"}, 200), (80, {"COLUMNS": "many"}, 80),
+                                       (80, {"COLUMNS": "0"}, 80), (80, {"COLUMNS": "-1"}, 80)):
+        where = f"{columns} columns, {environment}"
+        status, seen = in_terminal(wrong_field, folder, columns, environment)
+        lines = seen.replace("\r\n", "\n").split("\n")
+        expect(status == 2, f"{where}: status {status}")
+        expect(" ".join(seen.split()) == " ".join(piped.split()), f"{where}: other words: {seen!r}")
+        expect(max(map(len, lines)) <= most, f"{where}: wider than {most}: {seen!r}")
+        # No narrower than need be: a line takes the first word of the next if there is room.
+        for line, following in zip(lines, lines[1:]):
+            if not following or following.startswith("  remedy: "):
+                continue
+            expect(following.startswith("  "), f"{where}: a line stands as if it were an error: {seen!r}")
+            expect(len(line) + 1 + len(following.split()[0]) > most, f"{where}: broken too early: {seen!r}")
+    path = "./" + "/".join(["a_folder_that_is_not_there"] * 4)
+    _, seen = in_terminal([program, "run", path], folder, 40)
+    expect(path in seen, f"a path to be copied is in pieces: {seen!r}")
+    _, seen = in_terminal([program, "run"], folder, 80)
+    expect("cutproof info --scenes" in seen and max(map(len, lines_drawn(seen))) <= 80, f"usage: {seen!r}")
+
+
 def main():
     program = sys.argv[1]
     with tempfile.TemporaryDirectory() as folder:
@@ -107,6 +141,7 @@ def main():
         subprocess.run([program, "run", "scene.json", "--record", "seen"], cwd=folder, capture_output=True, check=True)
         colours(program, folder)
         progress(program, folder)
+        errors(program, folder)
     print("terminal: " + ("all as it should be" if not wrong else f"{len(wrong)} things are wrong"))
     return 1 if wrong else 0
 

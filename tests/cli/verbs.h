@@ -1,4 +1,4 @@
-// A folder with a file for each verb, and a command line of each that succeeds.
+// A folder with a file for each verb but judge, whose plugins are tested elsewhere, and command lines that succeed.
 #pragma once
 #include <string>
 #include <vector>
@@ -37,7 +37,8 @@ class Verbs : public Program {
   std::string counterexample() const {
     return (files::path(CUTPROOF_SOURCE) / "fixtures/regressions/skin_cell_not_renewed.json").string();
   }
-  // One command line of each verb and suite that would succeed.
+  // One command line of each verb but judge, of each list of info, and of two suites of bench. Those that name `seen`
+  // need record() first.
   std::vector<std::string> commands() const {
     return {"info",
             "info --scene",

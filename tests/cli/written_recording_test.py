@@ -37,13 +37,13 @@ def run(name, spoil):
 
 status, output = run("as_written", (None, None))
 assert status == 0 and "everything holds" in output and "backend mine" in output, f"{status}\n{output}"
-for name, spoil, word in (
-        ("heavier", ('dt * step["gravity"]', '1.01 * dt * step["gravity"]'), "momentum"),
-        ("not_a_number", ("v = v * np.exp", "v = np.nan * v * np.exp"), "finite"),
+for name, spoil, verdict in (
+        ("heavier", ('dt * step["gravity"]', '1.01 * dt * step["gravity"]'), "linear momentum after step"),
+        ("not_a_number", ("v = v * np.exp", "v = np.nan * v * np.exp"), "finite after step"),
         ("a_frame_short", ('enumerate(index["setup/substep_length"][:])', 'enumerate(index["setup/substep_length"][:-1])'),
-         "the run is whole")):
+         "the run is whole after skin")):
     status, output = run(name, spoil)
-    assert status == 1 and word in output, f"{name}: status {status}, no '{word}':\n{output}"
+    assert status == 1 and f"FAILS: {verdict}, " in output, f"{name}: status {status}, not '{verdict}':\n{output}"
 # Rows that are not there are a damaged file, not a verdict.
 status, output = run("beyond_the_rows", ("= append(points, x)", "= append(points, x) + 1"))
 assert status == 2 and "position_row" in output, f"{status}\n{output}"

@@ -10,17 +10,7 @@ namespace cutproof::input_fuzzing {
 namespace {
 
 Outcome feed(std::string_view bytes) {
-  return outcome_of([&] {
-    const auto read = property_tests::counterexample_from_json(std::string(bytes), "fed.json");
-    const std::string written = to_json(read);
-    std::string again;
-    try {
-      again = to_json(property_tests::counterexample_from_json(written, "written.json"));
-    } catch (const InputError& error) {
-      broken_contract("a counterexample that was read is refused when it is written out: " + std::string(error.what()));
-    }
-    if (again != written) broken_contract("a counterexample changes when it is written out and read again");
-  });
+  return feed_document(bytes, "a counterexample", property_tests::counterexample_from_json);
 }
 
 // The regressions, the smallest first; among them are histories and schedules.

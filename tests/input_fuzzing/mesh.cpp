@@ -47,8 +47,7 @@ void require_solid(const SurfaceMesh& mesh) {
   }
 }
 
-// Read as it is, then repaired: what is sound stays as it is, and of the others what is accepted is sound. The time of
-// both is that of one input of the fuzzer.
+// Read as it is, then with repair: what is accepted is sound, and repair accepts what is sound as it is.
 Outcome feed(const std::string& file, std::string_view bytes) {
   write_scratch(file, bytes);
   const auto read = [&](bool is_repaired) {

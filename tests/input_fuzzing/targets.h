@@ -42,6 +42,11 @@ std::string bytes_of_file(const std::string& path);
 template <class F>
 Outcome outcome_of(F&& action);
 
+// What is read can be written, and reads back as what gives the same text. `read(text, file)` is the reader, to_json()
+// of its namespace the writer, `thing` what they are of: "a question".
+template <class Read>
+Outcome feed_document(std::string_view bytes, const std::string& thing, Read&& read);
+
 // One for each reader, in files of their names.
 extern const Target kScene, kStl, kObj, kPly, kOff, kRecording, kRecordingContents, kArrays, kCounterexample, kCampaign,
     kQuestion;
@@ -65,6 +70,20 @@ Outcome outcome_of(F&& action) {
     if (message != printable_lines(message)) broken_contract("a refusal is not printable");
     return Outcome::refused;
   }
+}
+
+template <class Read>
+Outcome feed_document(std::string_view bytes, const std::string& thing, Read&& read) {
+  return outcome_of([&] {
+    const std::string written = to_json(read(std::string(bytes), "fed.json"));
+    std::string again;
+    try {
+      again = to_json(read(written, "written.json"));
+    } catch (const InputError& error) {
+      broken_contract(thing + " that was read is refused when it is written out: " + std::string(error.what()));
+    }
+    if (again != written) broken_contract(thing + " changes when it is written out and read again");
+  });
 }
 
 }  // namespace cutproof::input_fuzzing

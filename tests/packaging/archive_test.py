@@ -76,8 +76,12 @@ def judge(options, root, name):
            f"{name}: the scripts for clusters run {found.stdout}")
     page = gzip.decompress((root / "share/man/man1/cutproof.1.gz").read_bytes()).decode()
     expect(page.startswith(".TH CUTPROOF 1") and "cutproof fuzz" in page, f"{name}: the manual page is {page[:200]}")
-    offers = (root / "share/bash-completion/completions/cutproof").read_text()
-    expect("complete -F _cutproof cutproof" in offers, f"{name}: completion is {offers[:200]}")
+    for place, words in (("bash-completion/completions/cutproof", "complete -F _cutproof cutproof"),
+                         ("zsh/site-functions/_cutproof", "#compdef cutproof\n"),
+                         ("zsh/vendor-completions/_cutproof", "#compdef cutproof\n"),
+                         ("fish/vendor_completions.d/cutproof.fish", "complete -c cutproof ")):
+        offers = (root / "share" / place).read_text()
+        expect(words in offers, f"{name}: completion in {place} is {offers[:200]}")
     licence = (root / "share/doc/cutproof/copyright").read_text()
     expect("MIT" in licence and "GPL" in licence, f"{name}: the licence of the sources or of the program is missing")
     # Where it was built is nowhere written down for those who look for files.
