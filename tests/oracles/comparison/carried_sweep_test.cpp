@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <map>
 #include <vector>
 
@@ -208,6 +209,81 @@ TEST(CarriedSweep, IsNothingWithoutABladeThatIsDown) {
   EXPECT_TRUE(sweep.surface().empty());
   cut.setup.has_blade = false;
   EXPECT_FALSE(sweep.wants(0));
+}
+
+TEST(CarriedSweep, KnowsNoFrameThatTheSetupHasNot) {
+  MovingCut cut(still, still);
+  const CarriedSweep sweep(cut.setup);
+  EXPECT_TRUE(sweep.wants(0) && sweep.wants(kFrames - 1));
+  using Limits = std::numeric_limits<int64_t>;
+  for (const int64_t frame : {int64_t{-1}, int64_t{kFrames}, Limits::min(), Limits::max()}) {
+    EXPECT_FALSE(sweep.wants(frame)) << frame;
+    CarriedSweep added(cut.setup);
+    State before = cut.states[2];
+    before.frame = frame;
+    added.add(before, cut.states[3]);
+    EXPECT_TRUE(added.surface().empty()) << frame;
+  }
+}
+
+// The surface of a cut in which `harm` is done to the states before.
+template <class Harm>
+std::vector<std::array<Vec3, 3>> surface_of_harmed(const MovingCut& cut, const Harm& harm) {
+  std::vector<State> states = cut.states;
+  for (State& state : states) harm(state);
+  CarriedSweep sweep(cut.setup);
+  for (std::size_t frame = 0; frame < kFrames; ++frame) sweep.add(states[frame], states[frame + 1]);
+  return sweep.surface();
+}
+
+// A particle beside the cut that is nowhere, or beyond all numbers of cells, counts as one that is gone.
+TEST(CarriedSweep, PassesOverParticlesThatAreNowhere) {
+  const MovingCut cut(rigidly, rigidly);
+  constexpr std::size_t kBeside = 4 + 9 * (2 + 6 * 2);  // x = 5 h, y = z = 3 h
+  const auto gone = surface_of_harmed(cut, [&](State& state) { state.alive[kBeside] = 0; });
+  EXPECT_NE(gone, cut.sweep.surface());
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(), kInfinity = std::numeric_limits<double>::infinity();
+  for (const double wrong : {kNaN, kInfinity, -kInfinity, 1e300, -1e300, 1e30, -1e30}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto place = [&](State& state) { state.x[kBeside][axis] = wrong; };
+      EXPECT_EQ(surface_of_harmed(cut, place), gone) << wrong;
+    }
+  }
+  // In one of the states only: gone in the two frames that it bounds.
+  CarriedSweep once(cut.setup), without(cut.setup);
+  for (std::size_t frame = 0; frame < kFrames; ++frame) {
+    State before = cut.states[frame], after = cut.states[frame + 1];
+    (frame == 3 ? before : after).x[kBeside].z = frame == 3 || frame == 2 ? kNaN : after.x[kBeside].z;
+    once.add(before, after);
+    before = cut.states[frame];
+    if (frame == 3 || frame == 2) before.alive[kBeside] = 0;
+    without.add(before, cut.states[frame + 1]);
+  }
+  EXPECT_EQ(once.surface(), without.surface());
+}
+
+TEST(CarriedSweep, HasNoSurfaceInAFrameWhoseStatesAreNotWellFormed) {
+  const MovingCut cut(still, still);
+  // Short in the state between the third frame and the fourth: neither has a surface, and none leads across.
+  std::vector<State> states = cut.states;
+  states[3].x.resize(100);
+  CarriedSweep sweep(cut.setup);
+  std::size_t before = 0;
+  for (std::size_t frame = 0; frame < kFrames; ++frame) {
+    sweep.add(states[frame], states[frame + 1]);
+    if (frame == 1) before = sweep.surface().size();
+    if (frame == 2 || frame == 3) {
+      EXPECT_EQ(sweep.surface().size(), before);
+    }
+  }
+  ASSERT_GT(before, 0);
+  ASSERT_GT(sweep.surface().size(), before);
+  // The edge is at z = 9 - 10/6 k h after k frames.
+  for (std::size_t t = before; t < sweep.surface().size(); ++t) {
+    for (const Vec3 p : sweep.surface()[t]) EXPECT_LT(p.z, (9 - 40.0 / 6 + 1e-9) * kH);
+  }
+  const auto all_short = [](State& state) { state.x.resize(1); };
+  EXPECT_TRUE(surface_of_harmed(cut, all_short).empty());
 }
 
 // Nobody says how a single particle is turned: then it is not.
