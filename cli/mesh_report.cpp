@@ -80,14 +80,14 @@ double metres_per(const std::string& unit) {
   return std::find_if(units.begin(), units.end(), [&](const auto& each) { return unit == each.name; })->metres;
 }
 
-void print_build(const fixtures::Built& built) {
+void print_build(const fixtures::BuildReport& built) {
   if (built.repair) {
     for (const std::string& line : fixtures::report_lines(*built.repair)) say("{}\n", line);
   }
   for (const std::string& note : built.notes) say("{} {}\n", lesser("note:"), note);
 }
 
-nlohmann::json build_json(const fixtures::Built& built) {
+nlohmann::json build_json(const fixtures::BuildReport& built) {
   nlohmann::json build = {{"notes", built.notes}};
   if (built.repair) build["repair"] = repair_json(*built.repair);
   return build;
