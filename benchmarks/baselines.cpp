@@ -109,7 +109,8 @@ nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const Re
   State state = start;
   oracles::CarriedSweep sweep(scene.setup);
   for (int64_t frame = 0; frame < frames; ++frame) {
-    const State before = state;
+    const bool is_swept = sweep.wants(state.frame);
+    const State before = is_swept ? state : State{};
     double spent = 0;
     const auto run = [&](Span span) {
       backend.run(span);
@@ -128,7 +129,7 @@ nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const Re
     }
     seconds.push_back(spent);
     state = std::move(backend.snapshot().front());
-    sweep.add(before, state);
+    if (is_swept) sweep.add(before, state);
     removed += state.removed.size() + state.debris.size();
     const bool last = frame + 1 == frames;
     // Where nothing was removed, all is connected and coupled as before.

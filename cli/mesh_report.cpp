@@ -6,12 +6,12 @@
 #include <array>
 #include <cmath>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "cli/screen.h"
+#include "fixtures/units.h"
 
 namespace cutproof::cli {
 
@@ -52,8 +52,6 @@ void print_defects(const std::vector<Defect>& defects) {
 
 void print_volume(double volume) { say("volume {:.5g} cm³\n", 1e6 * volume); }
 
-constexpr std::array<std::pair<const char*, double>, 3> kUnits = {{{"mm", 1e-3}, {"cm", 1e-2}, {"m", 1.0}}};  // [m]
-
 // Spacings that give bodies from a quick look to a large run.
 constexpr std::array<int, 3> kUsualCounts = {2000, 8000, 100'000};
 
@@ -70,7 +68,7 @@ void print_usual_counts(double volume) {
 
 CLI::Option* add_unit(CLI::App& command, std::string& unit) {
   std::vector<std::string> names;
-  for (const auto& [name, metres] : kUnits) names.emplace_back(name);
+  for (const fixtures::MeshUnit& each : fixtures::kMeshUnits) names.emplace_back(each.name);
   return command.add_option("--unit", unit, "what one unit of the mesh is: mm, cm or m")
       ->capture_default_str()
       ->type_name("U")
@@ -78,17 +76,18 @@ CLI::Option* add_unit(CLI::App& command, std::string& unit) {
 }
 
 double metres_per(const std::string& unit) {
-  return std::find_if(kUnits.begin(), kUnits.end(), [&](const auto& each) { return unit == each.first; })->second;
+  const auto& units = fixtures::kMeshUnits;
+  return std::find_if(units.begin(), units.end(), [&](const auto& each) { return unit == each.name; })->metres;
 }
 
-void print_build(const fixtures::Built& built) {
+void print_build(const fixtures::BuildReport& built) {
   if (built.repair) {
     for (const std::string& line : fixtures::report_lines(*built.repair)) say("{}\n", line);
   }
   for (const std::string& note : built.notes) say("{} {}\n", lesser("note:"), note);
 }
 
-nlohmann::json build_json(const fixtures::Built& built) {
+nlohmann::json build_json(const fixtures::BuildReport& built) {
   nlohmann::json build = {{"notes", built.notes}};
   if (built.repair) build["repair"] = repair_json(*built.repair);
   return build;

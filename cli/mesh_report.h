@@ -16,9 +16,9 @@ CLI::Option* add_unit(CLI::App& command, std::string& unit);
 double metres_per(const std::string& unit);
 
 // Nothing if nothing was repaired and there is nothing to note.
-void print_build(const fixtures::Built& built);
+void print_build(const fixtures::BuildReport& built);
 // docs/reference/results_schema.md, The build.
-nlohmann::json build_json(const fixtures::Built& built);
+nlohmann::json build_json(const fixtures::BuildReport& built);
 
 void print_examination(const fixtures::MeshExamination& mesh, const std::string& unit);
 nlohmann::json examination_json(const fixtures::MeshExamination& mesh, const std::string& file, double unit);

@@ -21,7 +21,6 @@
 #include "cli/terminal.h"
 #include "fixtures/bodies.h"
 #include "fixtures/build.h"
-#include "fixtures/reach.h"
 #include "harness/against.h"
 #include "harness/backends.h"
 #include "harness/frame_runner.h"
@@ -190,9 +189,8 @@ int run(const RunOptions& options) {
   if (depth) {
     harness::Promises promises;
     promises.words = harness::parse_promises(backend->promises(), options.backend.name, "promises");
-    const bool is_cut_short = options.frames && fixtures::stops_early(scene, options.scene.file, built.setup);
     judge.emplace(built.setup, scene.expect, options.backend.name, runner.states().front(), *depth, promises,
-                  is_cut_short ? harness::Extent::cut_short : harness::Extent::whole);
+                  built.schedule.is_cut_short ? harness::Extent::cut_short : harness::Extent::whole);
   }
   if (depth == harness::Depth::motion) relations.emplace(built.setup, make_backend(options.backend));
   if (mode) against.emplace(built.setup, built.state, state(), options.backend.name, *mode);

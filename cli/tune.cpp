@@ -9,6 +9,7 @@
 
 #include "cli/commands.h"
 #include "cli/interruption.h"
+#include "cli/mesh_report.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/progress.h"
@@ -54,9 +55,11 @@ void settle_files(Asked& asked) {
   require_writable(options.write);
 }
 
-void print_beginning(const TuneOptions& options, const json& document, const Scene& given) {
+void print_beginning(const TuneOptions& options, const json& document, const Scene& given,
+                     const fixtures::BuildReport& built) {
   say_filled(kHead, document);
   say("scene {}: {}\n", printable(given.name), printable(given.description));
+  print_build(built);
   if (options.without_skin && given.expect.shells_at_end) {
     say("--without-skin does nothing: the scene expects shells of its skin\n");
   }
@@ -133,10 +136,11 @@ void print_found(const TuneOptions& options, const json& document) {
   if (options.frames) say_filled("  the scene was written whole, and looked at for {frames} frames only\n", document);
 }
 
-void print(const TuneOptions& options, TuneStep step, const json& document, const Scene& given) {
+void print(const TuneOptions& options, TuneStep step, const json& document, const Scene& given,
+           const fixtures::BuildReport& built) {
   switch (step) {
     case TuneStep::begun:
-      return print_beginning(options, document, given);
+      return print_beginning(options, document, given, built);
     case TuneStep::reference_known:
       return print_reference(options, document.at("reference"));
     case TuneStep::trial:
@@ -184,23 +188,24 @@ int tune(Asked asked) {
   settle_files(asked);
   Progress progress("trial", 0);
   double part = 0;
-  const bool found = with_sources(asked.tune.scene, asked.tune.changes, [&] {
-    return run_tune(asked.tune, [&](TuneStep step, const json& so_far, const Scene& given) {
-      json document = so_far;
-      document["changes"] = given_changes(asked.tune.changes);
-      // After each trial, so that what has been measured is kept if a later one fails; and in the end.
-      if (step == TuneStep::trial) keep_document(asked.json, document);
-      if (step == TuneStep::stopped || document.at("complete")) write_document(asked.json, document);
-      print(asked.tune, step, document, given);
-      if (step == TuneStep::trial) part = std::max(part, part_searched(document, given));  // what is varied begins anew
-      flush_output();
-      if (step == TuneStep::stopped || document.at("complete")) return;
-      const char* const what = step == TuneStep::begun      ? "computing the reference solution"
-                               : step == TuneStep::searched ? "verifying"
-                                                            : "searching";
-      progress.show(static_cast<int64_t>(document.at("trials").size()), what, part);
-    });
-  });
+  const TuneProgress tell = [&](TuneStep step, const json& so_far, const Scene& given,
+                                const fixtures::BuildReport& built) {
+    json document = so_far;
+    document["build"] = build_json(built);
+    document["changes"] = given_changes(asked.tune.changes);
+    // After each trial, so that what has been measured is kept if a later one fails; and in the end.
+    if (step == TuneStep::trial) keep_document(asked.json, document);
+    if (step == TuneStep::stopped || document.at("complete")) write_document(asked.json, document);
+    print(asked.tune, step, document, given, built);
+    if (step == TuneStep::trial) part = std::max(part, part_searched(document, given));  // what is varied begins anew
+    flush_output();
+    if (step == TuneStep::stopped || document.at("complete")) return;
+    const char* const what = step == TuneStep::begun      ? "computing the reference solution"
+                             : step == TuneStep::searched ? "verifying"
+                                                          : "searching";
+    progress.show(static_cast<int64_t>(document.at("trials").size()), what, part);
+  };
+  const bool found = with_sources(asked.tune.scene, asked.tune.changes, [&] { return run_tune(asked.tune, tell); });
   print_written(asked.json);
   if (found) insist_copy("wrote", asked.tune.write);
   return found ? 0 : 1;

@@ -174,10 +174,6 @@ ExpectationCheck::Judged ExpectationCheck::judged() const {
   return found;
 }
 
-std::vector<Verdict> ExpectationCheck::verdicts() const { return judged().verdicts; }
-
-std::vector<std::string> ExpectationCheck::not_reached() const { return judged().not_reached; }
-
 bool ExpectationCheck::any() const { return !(expectations_ == Expectations{}); }
 
 bool ExpectationCheck::is_expected_failure(const Verdict& verdict) const {

@@ -26,12 +26,16 @@ class ExpectationCheck {
   // Every moment; only the ends of frames are looked at, and of them only those that are well formed.
   void see(const Moment& moment);
 
-  // After the last moment: one verdict for each thing that is expected, with the stage and the frame in which it went
-  // wrong: the first in which too much was seen, the last if there was too little. Of a run that is cut short only for
-  // what can be told: strokes that are complete, what cannot change any more, and what is too much already.
-  std::vector<Verdict> verdicts() const;
-  // The rest of what is expected, which such a run has not reached.
-  std::vector<std::string> not_reached() const;
+  struct Judged {
+    // One for each thing that is expected, with the stage and the frame in which it went wrong: the first in which too
+    // much was seen, the last if there was too little. Of a run that is cut short only for what can be told: strokes
+    // that are complete, what cannot change any more, and what is too much already.
+    std::vector<Verdict> verdicts;
+    // The rest of what is expected, which such a run has not reached.
+    std::vector<std::string> not_reached;
+  };
+  // After the last moment.
+  Judged judged() const;
 
   // Whether the scene expects anything at all.
   bool any() const;
@@ -46,11 +50,6 @@ class ExpectationCheck {
     std::optional<int64_t> beyond;  // the first frame in which it was more than is expected
     void see(double now, int64_t frame, const std::optional<Range>& expected);
   };
-  struct Judged {
-    std::vector<Verdict> verdicts;
-    std::vector<std::string> not_reached;
-  };
-  Judged judged() const;
   int64_t last_frame() const { return frames_seen_ > 0 ? frames_seen_ - 1 : 0; }
 
   const Setup& setup_;

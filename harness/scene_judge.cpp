@@ -47,10 +47,10 @@ void SceneJudge::finish() {
     looked.checked += verdict.checked;
     looked.excused = looked.excused || !verdict.vacuous.empty() || !verdict.holds;
   }
-  std::vector<Verdict> expected = expectations_.verdicts();
-  const bool none_reached = expected.empty();
-  for (Verdict& verdict : expected) judge_.add(std::move(verdict));
-  not_reached_ = expectations_.not_reached();
+  ExpectationCheck::Judged expected = expectations_.judged();
+  const bool none_reached = expected.verdicts.empty();
+  for (Verdict& verdict : expected.verdicts) judge_.add(std::move(verdict));
+  not_reached_ = std::move(expected.not_reached);
   if (none_reached && !not_reached_.empty()) {
     note("The run stops before anything that the scene expects could be told: no outcome was held against it.");
   }

@@ -33,6 +33,7 @@ struct TuneOptions {
 struct Measuring {
   const TuneOptions& asked;
   Configuration given;
+  fixtures::BuildReport built = {};  // of what was given
 
   // What is left of the tolerance where the reference solution is not known better.
   double allowed(const ReferenceSolution& reference) const { return asked.tolerance - reference.known_to_h(); }

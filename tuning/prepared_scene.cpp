@@ -1,8 +1,7 @@
 #include "tuning/prepared_scene.h"
 
 #include <algorithm>
-
-#include "fixtures/build.h"
+#include <utility>
 
 namespace cutproof::tuning {
 
@@ -12,6 +11,7 @@ PreparedScene::PreparedScene(const Scene& scene, const std::string& source, std:
   fixtures::Built built = fixtures::build(scene, source, options);
   setup_ = std::move(built.setup);
   start_ = std::move(built.state);
+  report_ = {std::move(built.repair), std::move(built.notes)};
   const std::vector<int32_t>& scene_frame = built.schedule.scene_frame;
   for (std::size_t f = 0; f < scene_frame.size(); ++f) {
     if (f + 1 == scene_frame.size() || scene_frame[f + 1] != scene_frame[f])

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "fixtures/build.h"
 #include "model/backend.h"
 #include "model/scene.h"
 
@@ -19,6 +20,7 @@ class PreparedScene {
   PreparedScene(const Scene& scene, const std::string& source, std::optional<int64_t> frames);
   const Setup& setup() const { return setup_; }
   const State& start() const { return start_; }
+  const fixtures::BuildReport& report() const { return report_; }
   int64_t frame_count() const { return static_cast<int64_t>(last_of_.size()); }
 
   // Calls `run` for each part into which a frame of the scene is divided.
@@ -36,6 +38,7 @@ class PreparedScene {
  private:
   Setup setup_;
   State start_;
+  fixtures::BuildReport report_;
   std::vector<int64_t> last_of_;  // [scene frames] the last frame of the schedule that belongs to it
 };
 

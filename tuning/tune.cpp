@@ -44,10 +44,12 @@ Measuring prepare(const TuneOptions& options) {
   }
   const harness::BackendDescriptor& backend = benchmarks::require_timed_backend(options.backend.name);
   static_cast<void>(harness::make_backend(options.backend));
-  if (PreparedScene(scene, options.scene, options.frames).frame_count() == 0) {
+  const PreparedScene prepared(scene, options.scene, options.frames);
+  if (prepared.frame_count() == 0) {
     throw InputError(options.scene, "frame.count", "the scene has no frame, so nothing happens that could be compared",
                      "give a number of frames, a blade, or a grip that ends");
   }
+  measuring.built = prepared.report();
   if (backend.takes_kernel_options) measuring.given.rotation = harness::rotation_of(options.backend);
   return measuring;
 }
@@ -155,7 +157,7 @@ bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
                    {"trials", json::array()},
                    {"left", json::array()},
                    {"found", nullptr}});
-  const auto show = [&](TuneStep step) { progress(step, document, measuring.given.scene); };
+  const auto show = [&](TuneStep step) { progress(step, document, measuring.given.scene, measuring.built); };
   const auto conclude = [&](TuneStep conclusion) {
     document["complete"] = true;
     show(conclusion);

@@ -9,6 +9,7 @@
 #include "model/at.h"
 #include "oracles/comparison/plate_sweep.h"
 #include "oracles/eigen.h"
+#include "oracles/oracles.h"
 
 namespace cutproof::oracles {
 
@@ -17,24 +18,33 @@ namespace {
 // As far as nearby particles do not say how the tissue is stretched, it is not: in units of their weight and h².
 constexpr double kTowardsRotation = 0.01;
 
+// Coordinates beyond have no digits left that tell one piece of the surface (kPiece h) from the next: 2⁵⁰ h × 2⁻⁵² is
+// that piece. Within, the number of a cell, which is no smaller than kReach h, fits a whole number of 64 bits.
+constexpr double kFarthest = 0x1p50;  // [h]
+
 // The tissue of one frame, deformed beside at rest.
 class Tissue {
  public:
   Tissue(const Body& body, const State& before, const State& after)
       : body_(body), before_(before), after_(after), reach_(CarriedSweep::kReach * body.grid.spacing) {
+    // Particles that are nowhere, or farther away than numbers tell, are near nothing.
+    const auto counts = [&](std::size_t i) {
+      return before.alive[i] != 0 && is_placed(before.x[i]) && is_placed(after.x[i]);
+    };
     double farthest = 0;
     for (std::size_t i = 0; i < before.alive.size(); ++i) {
-      if (before.alive[i] != 0) farthest = std::max(farthest, norm(after.x[i] - before.x[i]));
+      if (counts(i)) farthest = std::max(farthest, norm(after.x[i] - before.x[i]));
     }
     // By where particles began: one that is near at any time of the frame began in the same cell or beside it.
     cell_size_ = reach_ + farthest;
     for (std::size_t i = 0; i < before.alive.size(); ++i) {
-      if (before.alive[i] != 0) cells_[cell_of(before.x[i], {})].push_back(static_cast<int32_t>(i));
+      if (counts(i)) cells_[cell_of(before.x[i], {})].push_back(static_cast<int32_t>(i));
     }
   }
 
   // Where the tissue at `p`, `fraction` of the frame being over, rests.
   std::optional<Vec3> at_rest(Vec3 p, double fraction) const {
+    if (!is_placed(p)) return std::nullopt;
     struct Near {
       Vec3 now, rest;
       double weight;
@@ -79,11 +89,18 @@ class Tissue {
   }
 
  private:
+  // Not of NaN either.
+  bool is_placed(Vec3 p) const {
+    const double most = kFarthest * body_.grid.spacing;
+    return std::abs(p.x) <= most && std::abs(p.y) <= most && std::abs(p.z) <= most;
+  }
+
   // The cell with a point, or one beside it. Cells whose numbers are equal by chance cost time and change nothing.
-  int64_t cell_of(Vec3 p, std::array<int, 3> beside) const {
-    int64_t number = 0;
+  uint64_t cell_of(Vec3 p, std::array<int, 3> beside) const {
+    uint64_t number = 0;  // without sign: it may wrap round
     for (int axis = 0; axis < 3; ++axis) {
-      number = number * 1'000'003 + static_cast<int64_t>(std::floor(p[axis] / cell_size_)) + beside[at(axis)];
+      const int64_t cell = static_cast<int64_t>(std::floor(p[axis] / cell_size_)) + beside[at(axis)];
+      number = number * 1'000'003 + static_cast<uint64_t>(cell);
     }
     return number;
   }
@@ -91,7 +108,7 @@ class Tissue {
   const Body& body_;
   const State &before_, &after_;
   double reach_, cell_size_ = 0;
-  std::unordered_map<int64_t, std::vector<int32_t>> cells_;
+  std::unordered_map<uint64_t, std::vector<int32_t>> cells_;
 };
 
 // Points along a side of the plate, in the deformed tissue at a time, carried to rest.
@@ -109,7 +126,7 @@ int pieces_of(double length, double piece) { return std::max(1, static_cast<int>
 }  // namespace
 
 bool CarriedSweep::wants(int64_t frame) const {
-  if (!setup_.has_blade) return false;
+  if (!setup_.has_blade || frame < 0 || frame >= setup_.frame_count()) return false;
   const int64_t substeps = setup_.step.substeps;
   for (int64_t k = frame * substeps; k < (frame + 1) * substeps; ++k) {
     if (setup_.blade_moves[at(k)].down) return true;
@@ -129,6 +146,10 @@ void CarriedSweep::add_strip(const Row& from, const Row& to) {
 
 void CarriedSweep::add(const State& before, const State& after) {
   if (!wants(before.frame)) return;
+  if (!well_formed(setup_, before).holds || !well_formed(setup_, after).holds) {
+    reached_ = {};  // what comes after must not go on across the gap
+    return;
+  }
   const Tissue tissue(setup_.body, before, after);
   const Blade& blade = setup_.blade;
   const double piece = kPiece * setup_.body.grid.spacing;

@@ -15,7 +15,8 @@ namespace cutproof::oracles {
 // was in the deformed tissue at that time to where that tissue rests, by the affine map that fits the particles within
 // kReach best, near ones more (moving least squares, P. Lancaster and K. Salkauskas, Math. Comp. 37(155), 1981);
 // towards the rotation that fits best, as far as these particles do not determine it. Positions within a frame are
-// taken to go straight from its first state to its last. Where no living particle is near there is no surface.
+// taken to go straight from its first state to its last. Where no living particle is near there is no surface; a
+// particle that is at no finite place, or beyond 2⁵⁰ h, is near nothing.
 class CarriedSweep {
  public:
   static constexpr double kReach = 2.5;   // [h]
@@ -24,9 +25,10 @@ class CarriedSweep {
   // `setup` must outlive this.
   explicit CarriedSweep(const Setup& setup) : setup_(setup) {}
 
-  // Whether the blade is down at any time in a frame; others need not be added.
+  // Whether the blade is down at any time in a frame; others need not be added. Not in frames that the setup has not.
   bool wants(int64_t frame) const;
-  // The frame `before`.frame, of which these are the first and the last state. Requires that both are well formed.
+  // The frame `before`.frame, of which these are the first and the last state. If either is not well formed, the frame
+  // has no surface: what is wrong then is for well_formed to say.
   void add(const State& before, const State& after);
 
   // Of the frames that were added; body frame at rest [m].

@@ -96,10 +96,14 @@ TEST_F(BenchBaselines, TellsOfEveryMethodWhatItCosts) {
       const json& geometry = row.at("geometry");
       EXPECT_NEAR(geometry.at("lost_per_area").get<double>(),
                   geometry.at("lost_volume").get<double>() / geometry.at("cut_area").get<double>(), 1e-12);
-      // The ideal cut is that of the tissue that the blade passed, and tissue that is cut otherwise moves otherwise.
+      // The ideal cut is that of the tissue that the blade passed, and tissue that is cut otherwise moves otherwise. A
+      // plane of normal n is crossed by max |n_a| edges of that axis to an area of h², no two of which share an end,
+      // and the ends on one side, of which there are as many, touch all others: 1/√3 to 1. Within h/2 of the outline
+      // there is tissue, but no edge whose ends are both particles; so of a cut D h across (1 - 1/D)² is left, half of
+      // it at D = 3.4: 0.5/√3 = 0.289 at least. The kidney is seven particles thick.
       const double least = geometry.at("least_per_area").get<double>();
       EXPECT_GT(least, 0.3) << name;
-      EXPECT_LT(least, 1.05) << name;
+      EXPECT_LE(least, 1) << name;
       EXPECT_EQ(row.at("equal"),
                 row.at("components") == row.at("couplings") && row.at("components") == row.at("shells"))
           << row;

@@ -132,14 +132,18 @@ TEST_F(Tune, SaysThatThereIsNone) {
   EXPECT_EQ(listing(), std::set<std::string>{"scene.json"}) << "nothing was found, so nothing is written";
 }
 
-TEST_F(Tune, KeepsAMeshWithinReach) {
+TEST_F(Tune, KeepsAMeshWithinReachAndSaysWhatItsRepairDid) {
   files::create_directories(path("meshes"));
   files::create_directories(path("found"));
-  write("meshes/tetrahedron.off", "OFF\n4 4 0\n0 0 0\n60 0 0\n0 60 0\n0 0 60\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n");
-  write("scene.json", R"({"version": 1, "body": {"mesh": {"file": "meshes/tetrahedron.off", "unit": 0.001},
+  write("meshes/tetrahedron.off", "OFF\n4 3 0\n0 0 0\n60 0 0\n0 60 0\n0 0 60\n3 0 2 1\n3 0 1 3\n3 0 3 2\n");
+  write("scene.json",
+        R"({"version": 1, "body": {"mesh": {"file": "meshes/tetrahedron.off", "unit": 0.001, "repair": true},
     "spacing": 0.008}, "frame": {"count": 2}, "step": {"gravity": [0, 0, -9.81]}})");
-  const Outcome outcome = tune("--tolerance 0.2 --reference substeps --write found/tuned.json");
+  const Outcome outcome = tune("--tolerance 0.2 --reference substeps --write found/tuned.json --json out.json");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("repaired: 1 hole filled"), std::string::npos) << outcome.output;
+  const json build = json::parse(read("out.json")).at("build");
+  EXPECT_EQ(build.at("repair").at("steps").at(0).at("name"), "holes_filled") << build;
   EXPECT_EQ(cutproof::io::read_scene(path("found/tuned.json")).body.mesh->file, "../meshes/tetrahedron.off");
   EXPECT_EQ(cutproof("run found/tuned.json --check").status, 0);
 }
