@@ -21,6 +21,7 @@
 #include "cli/table.h"
 #include "cli/terminal.h"
 #include "guests/plugin_backend.h"
+#include "model/counted.h"
 #include "model/io/atomic_file.h"
 #include "model/io/columns.h"
 #include "model/io/filled.h"
@@ -217,10 +218,10 @@ std::string keep(const Violation& violation, const FuzzOptions& options, const B
   const std::string file = stem + ".json";
   io::write_text(file, to_json(found) + "\n");
   if (simplified.alone) {
-    insist("simplified to {} strokes and {} particles{}: {}\n", found.failing.strokes.size(),
-           found.failing.nodes.size(),
+    insist("simplified to {} and {}{}: {}\n", counted(found.failing.strokes.size(), "stroke", "strokes"),
+           counted(found.failing.nodes.size(), "particle", "particles"),
            harness::described_backend(choice.name).takes_schedule
-               ? fmt::format(", {} preemptions", gpu::preemptions(found.schedule))
+               ? ", " + counted(gpu::preemptions(found.schedule), "preemption", "preemptions")
                : "",
            simplified.text);
     const std::string problem = record_case(stem, backend_of(found, choice), found.failing);

@@ -7,6 +7,7 @@
 #include "cli/findings.h"
 #include "cli/options.h"
 #include "cli/screen.h"
+#include "model/counted.h"
 #include "model/io/recording.h"
 #include "model/printable.h"
 #include "property_tests/campaign.h"
@@ -45,8 +46,9 @@ int replay(const ReplayOptions& options) {
   if (is_history && !options.record.empty()) {
     refuse("--record", file + " is a history of commands, which no recording holds", "leave it out");
   }
-  say("{}: {} particles, {} strokes, {}backend {}\n", file, c.nodes.size(), c.strokes.size(),
-      is_history ? fmt::format("{} commands, ", counterexample.commands.size()) : "", printable(choice.name));
+  say("{}: {}, {}, {}backend {}\n", file, counted(c.nodes.size(), "particle", "particles"),
+      counted(c.strokes.size(), "stroke", "strokes"),
+      is_history ? counted(counterexample.commands.size(), "command", "commands") + ", " : "", printable(choice.name));
   if (!counterexample.found.empty()) say("found as: {}\n", printable(counterexample.found));
   const auto make = [&] { return backend_of(counterexample, choice); };
   const Judgement judgement =

@@ -26,6 +26,7 @@
 #include "harness/frame_runner.h"
 #include "harness/relation_sample.h"
 #include "harness/scene_judge.h"
+#include "model/counted.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
 #include "model/io/verdict_json.h"
@@ -85,13 +86,15 @@ void print_header(const Scene& scene, const fixtures::Built& built, const RunOpt
   const fixtures::Bounds box = fixtures::path_box(body);
   const Vec3 size = 1e3 * (box.high - box.low);
   say("scene {}: {}\n", printable(scene.name), printable(scene.description));
-  say("body {}, {:.4g} × {:.4g} × {:.4g} mm, {} particles at h = {:.4g} mm, {} clusters\n", body.name, size.x, size.y,
-      size.z, body.particle_count(), body.grid.spacing * 1e3, built.state.clusters.count());
+  say("body {}, {:.4g} × {:.4g} × {:.4g} mm, {} at h = {:.4g} mm, {}\n", body.name, size.x, size.y, size.z,
+      counted(body.particle_count(), "particle", "particles"), body.grid.spacing * 1e3,
+      counted(built.state.clusters.count(), "cluster", "clusters"));
   if (!options.mesh.empty()) say("one unit of the mesh is 1 {} (--unit changes that)\n", options.unit);
   print_build(built);
-  const int32_t substeps = built.setup.step.substeps;
-  say("{} frames of {} substep{} × {} iterations, backend {}, seed {}\n", built.setup.frame_count(), substeps,
-      substeps == 1 ? "" : "s", built.setup.step.iterations, options.backend.name, scene.seed);
+  const StepParameters& step = built.setup.step;
+  say("{} of {} × {}, backend {}, seed {}\n", counted(built.setup.frame_count(), "frame", "frames"),
+      counted(step.substeps, "substep", "substeps"), counted(step.iterations, "iteration", "iterations"),
+      options.backend.name, scene.seed);
 }
 
 void print_summary(const RunResult& result) {
@@ -121,7 +124,7 @@ void print_summary(const RunResult& result) {
         1e3 * total / static_cast<double>(result.frames.size()));
   }
   const int64_t clusters = result.frames.empty() ? result.clusters_at_start : result.frames.back().clusters;
-  say("removed {} particles ({} as debris); clusters {} -> {}\n", removed + debris, debris, result.clusters_at_start,
+  say("removed {} ({} as debris); clusters {} -> {}\n", counted(removed + debris, "particle", "particles"), debris, result.clusters_at_start,
       clusters);
 }
 
