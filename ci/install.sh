@@ -12,6 +12,8 @@ packages=(
   nlohmann-json3-dev libfmt-dev libcli11-dev
   libgtest-dev librapidcheck-dev libbullet-dev
   python3 python3-h5py python3-numpy
+  zlib1g-dev esbuild libjs-three             # report pages
+  chromium chromium-driver python3-selenium  # report pages in a browser, looked at by a test
   python3-scipy python3-skimage  # judged as examples: docs/results/libraries.md
   groff-base     # the manual page, rendered by a test
   dpkg-dev file  # packages: which libraries they depend on
