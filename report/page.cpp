@@ -27,12 +27,11 @@ json finding_json(const Finding& finding, const Marks& marks) {
           {"ofBound", json_number(finding.of_bound)},
           {"source", finding.bound_source},
           {"text", finding.text},
-          {"clusters", finding.clusters},
-          {"particles", finding.particles},
           {"expected", finding.is_expected},
           {"marks",
            {{"moment", marks.moment},
             {"exact", marks.is_exact},
+            {"partly", marks.is_partly},
             {"particles", marks.particles},
             {"path", marks.path},
             {"members", marks.clusters}}}};

@@ -254,10 +254,18 @@ Survey survey_of(const Source& source) {
   return survey;
 }
 
-std::vector<int32_t> within(const std::vector<int32_t>& particles, int32_t n) {
+// How many particles are marked: of a finding in each of its lists, and of all findings together before each has few.
+constexpr std::size_t kMostMarks = 2000, kFewMarks = 60, kManyMarks = 80'000;
+
+std::vector<int32_t> within(const std::vector<int32_t>& particles, int32_t n, std::size_t most, Marks& marks) {
   std::vector<int32_t> found;
   for (const int32_t particle : particles) {
-    if (particle >= 0 && particle < n) found.push_back(particle);
+    if (particle < 0 || particle >= n) continue;
+    if (found.size() == most) {
+      marks.is_partly = true;
+      break;
+    }
+    found.push_back(particle);
   }
   return found;
 }
@@ -269,11 +277,13 @@ std::vector<Marks> marks_of(const Source& source, const std::vector<Moment>& mom
   std::vector<Marks> all;
   int64_t read = -1;
   io::Snapshot snapshot;
+  std::size_t marked = 0;
   for (const Finding& finding : findings) {
     Marks marks;
+    const std::size_t most = marked < kManyMarks ? kMostMarks : kFewMarks;
     std::tie(marks.moment, marks.is_exact) = moment_of(moments, finding);
-    marks.particles = within(finding.particles, n);
-    marks.path = within(finding.path, n);
+    marks.particles = within(finding.particles, n, most, marks);
+    marks.path = within(finding.path, n, most, marks);
     if (marks.moment >= 0 && !finding.clusters.empty()) {
       if (const int64_t index = moments[static_cast<std::size_t>(marks.moment)].snapshot; index != read) {
         snapshot = source.snapshot(index);
@@ -282,10 +292,11 @@ std::vector<Marks> marks_of(const Source& source, const std::vector<Moment>& mom
       std::set<int32_t> members;
       for (const int32_t cluster : finding.clusters) {
         for (const int32_t member : members_of(snapshot.state.clusters, cluster, n)) members.insert(member);
-        if (members.size() >= kMostWitnesses) break;
+        if (members.size() > most) break;
       }
-      marks.clusters.assign(members.begin(), members.end());
+      marks.clusters = within({members.begin(), members.end()}, n, most, marks);
     }
+    marked += marks.particles.size() + marks.path.size() + marks.clusters.size();
     all.push_back(std::move(marks));
   }
   return all;

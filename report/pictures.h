@@ -43,8 +43,9 @@ struct FrameEnd {
 
 // The particles that show a finding, by their place among those kept.
 struct Marks {
-  int64_t moment = -1;                   // -1: the recording has no such frame
+  int64_t moment = -1;                   // -1: the recording has no moment
   bool is_exact = false;                 // the moment is the one after the finding's stage
+  bool is_partly = false;                // there are more than are marked
   std::vector<int32_t> particles, path;  // of the witness
   std::vector<int32_t> clusters;         // members of its clusters
 };

@@ -20,7 +20,7 @@ Pieces pieces_of(const Body& body, const std::vector<uint8_t>& alive);
 struct Holders {
   std::vector<int32_t> lowest;  // [n] lowest member of the first cluster that holds a particle, -1 without one: it
                                 // stays the same where clusters are numbered anew
-  std::vector<uint8_t> count;  // [n] how many clusters hold it, at most 255
+  std::vector<uint8_t> count;   // [n] how many clusters hold it, at most 255
 };
 Holders holders_of(const Clusters& clusters, int32_t particles);
 // Particles of the cluster of this number, none twice; empty if there is no such cluster.

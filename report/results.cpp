@@ -6,10 +6,12 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <tuple>
 #include <utility>
 
 #include "model/error.h"
+#include "model/io/columns.h"
 #include "model/io/json_reader.h"
 #include "model/io/limits.h"
 
@@ -105,13 +107,24 @@ struct Field {
 
 std::string figure(double value) { return fmt::format("{:.4g}", value); }
 
+// Properties of which measured / bound says how much room there is: those of the summary. What a scene expects and
+// what is held against the run as a whole has a bound that is to be met, or exceeded.
+using Measured = std::set<std::pair<std::string, Stage>>;
+Measured measured_properties(const Field& document) {
+  Measured found;
+  const Field properties = document["properties"];
+  for (std::size_t k = 0; properties.value != nullptr && k < properties.length(); ++k)
+    found.emplace(properties.at(k)["property"].text(), properties.at(k)["stage"].stage());
+  return found;
+}
+
 struct Row {
   PropertyRow shown;
   double worst = -1;  // measured / bound of the verdict shown
 };
 
-void add_verdict(const Field& verdict, std::vector<Row>& rows, std::map<std::pair<std::string, Stage>, std::size_t>& at,
-                 Results& results) {
+void add_verdict(const Field& verdict, const Measured* known, std::vector<Row>& rows,
+                 std::map<std::pair<std::string, Stage>, std::size_t>& at, Results& results) {
   const std::string property = verdict["property"].text();
   const Stage stage = verdict["stage"].stage();
   const auto [place, is_new] = at.try_emplace({property, stage}, rows.size());
@@ -127,7 +140,8 @@ void add_verdict(const Field& verdict, std::vector<Row>& rows, std::map<std::pai
   const double measured = verdict["measured"].number(), bound = verdict["bound"].number();
   const std::string given_unit = verdict["unit"].text();
   const std::string unit = given_unit == "1" ? "" : given_unit, source = verdict["bound_source"].text();
-  const bool has_ratio = std::isfinite(measured) && std::isfinite(bound) && bound > 0;
+  const bool has_ratio = (known == nullptr || known->count({property, stage}) != 0) && std::isfinite(measured) &&
+                         std::isfinite(bound) && bound > 0;
   const std::optional<double> of_bound = has_ratio ? std::optional(measured / bound) : std::nullopt;
   ++results.verdicts;
   shown.unit = unit;
@@ -163,14 +177,15 @@ void add_verdict(const Field& verdict, std::vector<Row>& rows, std::map<std::pai
 void add_verdicts(const Field& document, Results& results) {
   std::vector<Row> rows;
   std::map<std::pair<std::string, Stage>, std::size_t> at;
-  const auto add_list = [&](const Field& list) {
+  const Measured known = measured_properties(document);
+  const auto add_list = [&](const Field& list, const Measured* measured) {
     const std::size_t count = list.length();
-    for (std::size_t k = 0; k < count; ++k) add_verdict(list.at(k), rows, at, results);
+    for (std::size_t k = 0; k < count; ++k) add_verdict(list.at(k), measured, rows, at, results);
   };
-  if (results.checked) add_list(document["verdicts"]);
+  if (results.checked) add_list(document["verdicts"], &known);
   if (const Field against = document["against"]; against.value != nullptr) {
     results.checked = true;
-    add_list(against["verdicts"]);
+    add_list(against["verdicts"], nullptr);
   }
   for (Row& row : rows) {
     if (row.shown.judged > 0) row.shown.vacuous.clear();
@@ -180,7 +195,9 @@ void add_verdicts(const Field& document, Results& results) {
     const auto rank = [](const PropertyRow& row) {
       return row.failed > 0 ? 0 : row.expected > 0 ? 1 : row.judged > 0 ? 2 : 3;
     };
-    return rank(a) < rank(b);
+    // Of those that hold, the nearest to its bound first.
+    const int of_a = rank(a), of_b = rank(b);
+    return of_a != of_b ? of_a < of_b : of_a == 2 && a.of_bound.value_or(-1) > b.of_bound.value_or(-1);
   });
   std::stable_sort(results.findings.begin(), results.findings.end(), [](const Finding& a, const Finding& b) {
     return std::tuple(a.is_expected, a.frame, a.stage) < std::tuple(b.is_expected, b.frame, b.stage);
@@ -307,7 +324,7 @@ std::string summary_sentence(const Results& results) {
   if (failing == 0) {
     const std::string what = looked == 1 ? "the one property that was judged holds"
                                          : fmt::format("all {} properties that were judged hold", looked);
-    return subject + fmt::format(": {}, in {} verdicts.", what, results.verdicts);
+    return subject + fmt::format(": {}, in {} verdicts.", what, io::grouped(results.verdicts));
   }
   std::string sentence = subject + fmt::format(": {} of {} properties {}", looked - failing, looked,
                                                looked - failing == 1 ? "holds" : "hold");

@@ -51,7 +51,8 @@ struct Results {
   bool checked = false;  // whether anything was judged
   bool holds = false;
   int64_t verdicts = 0;
-  std::vector<PropertyRow> rows;  // those that fail first, then those that fail as expected, then as they were judged
+  std::vector<PropertyRow> rows;  // those that fail first, then those that fail as expected, then by how near to the
+                                  // bound, then those that had nothing to look at
   std::vector<Finding> findings;  // by frame and stage, those that were expected at the end; at most kMostFindings
   int64_t findings_left_out = 0;
   std::vector<std::string> notes, not_reached;

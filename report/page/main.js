@@ -4,7 +4,7 @@ import { colourings, rampStops } from './colours.js';
 import { byId, count, drawing, element, figure, plural } from './dom.js';
 import { plotsOf } from './plots.js';
 import { cards, command, table } from './verdicts.js';
-import { View } from './view.js';
+import { View, contextOf } from './view.js';
 
 const data = JSON.parse(byId('data').textContent);
 const moments = new Moments(data.firstMoment);
@@ -69,7 +69,7 @@ function controls() {
   const [marks, keys] = timeline();
   return element('div', { class: 'player' },
     element('div', { class: 'track' }, marks, range),
-    element('div', { class: 'row' }, play, button('⏮', 'Previous frame', frame(-1)), button('‹', 'Previous stage', step(-1)), button('›', 'Next stage', step(1)), button('⏭', 'Next frame', frame(1)), keys));
+    element('div', { class: 'row' }, play, button('« Frame', 'Previous frame', frame(-1)), button('‹ Stage', 'Previous stage', step(-1)), button('Stage ›', 'Next stage', step(1)), button('Frame »', 'Next frame', frame(1)), keys));
 }
 
 function lookControls(hasSkin) {
@@ -136,7 +136,7 @@ async function update() {
     const ramp = drawing('svg', { class: 'ramp', viewBox: '0 0 70 10', 'aria-hidden': 'true' }, ...rampStops.map((fill, k) => drawing('rect', { x: 10 * k, y: 0, width: 10.5, height: 10, fill })));
     legend.append(element('span', { text: ` ${said.scale[0]} ` }), ramp, element('span', { text: ` ${said.scale[1]}` }));
   }
-  if (found) legend.append(element('span', { class: 'marked-key', text: ' Marked orange: what the verdict names.' }), found.marks.members.length > 0 && element('span', { text: ' Yellow: the members of its clusters.' }) || '');
+  if (found) legend.append(element('span', { class: 'marked-key', text: ' Marked orange: what the verdict names.' }), found.marks.members.length > 0 && element('span', { text: ' Yellow: the members of its clusters.' }) || '', found.marks.partly && element('span', { text: ' There are more than are marked.' }) || '', !found.marks.exact && element('span', { text: ' The recording has no moment after this stage; this is the next one.' }) || '');
   document.documentElement.dataset.shown = `${state.at}/${state.finding === null ? '' : state.finding}`;
 }
 
@@ -204,16 +204,17 @@ async function main() {
   const section = byId('view');
   section.append(place);
   if (last < 0) return place.replaceChildren(element('p', { class: 'card', text: 'This recording holds no moment to show.' }));
-  try {
-    view = new View(canvas, data);
-  } catch {
+  const context = contextOf(canvas);
+  if (context) {
+    view = new View(canvas, context, data);
+  } else {
     place.replaceChildren(element('p', { class: 'nothing', id: 'no-webgl', text: 'This browser shows no 3D view (WebGL is not there). Everything else on this page works.' }));
   }
   if (view) {
     const first = await moments.chunk(0);
     edges = first.edges || null;
     view.begin(first.moments[0]);
-    section.append(controls(), status, witness, lookControls(first.moments[0].triangles.length > 0), legend);
+    section.append(controls(), status, witness, lookControls(data.frames.triangles.some((triangles) => triangles > 0)), legend);
   } else {
     section.append(controls(), status, witness);
   }

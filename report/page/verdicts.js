@@ -50,7 +50,7 @@ export function table(data, jump) {
     if (row.undecided > 0) details.push(`${plural(row.undecided, 'thing')} undecidable within rounding, counted as right`);
     body.append(element('tr', { class: fails ? kind : null },
       element('th', { scope: 'row' }, element('span', { text: row.property }), element('span', { class: 'muted small', text: ` after ${row.stage}` })),
-      element('td', {}, element('span', { class: `status ${kind}`, text: words }), element('span', { class: 'muted small block', text: details.join('; ') })),
+      element('td', {}, element('span', { class: `status ${kind}`, text: words }), element("span", { class: "muted small block", text: details.join('; ') })),
       element('td', {}, row.judged > 0 && bar(row, fails)),
       element('td', { class: 'figures' }, row.judged > 0 && element('span', { text: withUnit(row.measured, row.unit) }), row.judged > 0 && element('span', { class: 'muted small block', text: `bound ${withUnit(row.bound, row.unit)}` })),
       element('td', {}, row.judged > 0 && element('button', { type: 'button', class: 'quiet', text: `frame ${row.frame}`, 'aria-label': `Show frame ${row.frame}, after ${row.stage}: ${fails ? 'where' : 'the nearest to the bound of'} ${row.property}${fails ? ' fails first' : ''}`, onclick: () => jump(row.frame, row.stage) })),

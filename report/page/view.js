@@ -1,6 +1,6 @@
 // The 3D view: particles, skin, blade, and what a verdict names. Lengths are in h, the middle of the body is 0.
 import {
-  BoxGeometry, BufferAttribute, BufferGeometry, Color, DoubleSide, EdgesGeometry, Group, Line, LineBasicMaterial,
+  BoxBufferGeometry, BufferAttribute, BufferGeometry, Color, DoubleSide, EdgesGeometry, Group, Line, LineBasicMaterial,
   LineSegments, Matrix4, Mesh, PerspectiveCamera, Points, Scene, ShaderMaterial, Vector3, WebGLRenderer,
 } from 'three';
 import { places } from './coding.js';
@@ -16,7 +16,7 @@ const pointShader = (inFront) => ({
     void main() {
       vec4 place = modelViewMatrix * vec4(position, 1.0);
       gl_Position = kind < 0.5 ? vec4(2.0, 2.0, 2.0, 1.0) : projectionMatrix * place;
-      float share = kind > 2.5 ? 1.25 : kind > 1.5 ? 0.55 : 1.0;
+      float share = kind > 2.5 ? (kind > 3.5 ? 1.6 : 1.15) : kind > 1.5 ? 0.55 : 1.0;
       gl_PointSize = max(size * share * perPixel / -place.z, kind > 2.5 ? 9.0 : 1.5);
       colour = tint; which = kind;
     }`,
@@ -60,12 +60,17 @@ function normals(xyz, triangles) {
 
 const kMarked = [0.84, 0.37, 0.0], kMember = [0.94, 0.89, 0.26];
 
+// Null where there is no WebGL. three.js asks for none but says so in the console; so it is asked for here.
+export function contextOf(canvas) {
+  const wanted = { alpha: false, antialias: true, depth: true, stencil: false, preserveDrawingBuffer: true };
+  return canvas.getContext('webgl2', wanted) || canvas.getContext('webgl', wanted);
+}
+
 export class View {
-  // Throws where there is no WebGL.
-  constructor(canvas, data) {
+  constructor(canvas, context, data) {
     this.data = data;
     this.canvas = canvas;
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
+    this.renderer = new WebGLRenderer({ canvas, context });
     this.scene = new Scene();
     this.body = new Group();
     this.scene.add(this.body);
@@ -102,13 +107,13 @@ export class View {
   makeBlade() {
     const h = this.data.body.spacing;
     const [length, depth, thickness] = this.data.blade.map((x) => x / h);
-    const box = new BoxGeometry(length, Math.max(thickness, 0.05), depth);
+    const box = new BoxBufferGeometry(length, Math.max(thickness, 0.05), depth);
     box.translate(0, 0, depth / 2);
     const steel = new ShaderMaterial(skinShader());
-    steel.uniforms.fade.value = 0.55;
+    steel.uniforms.fade.value = 0.36;
     steel.depthWrite = false;
     const tint = new Float32Array(box.attributes.position.count * 3);
-    for (let i = 0; i < tint.length; i += 3) tint.set([0.6, 0.68, 0.76], i);
+    for (let i = 0; i < tint.length; i += 3) tint.set([0.72, 0.8, 0.88], i);
     box.setAttribute('tint', new BufferAttribute(tint, 3));
     const plate = new Mesh(box, steel);
     plate.renderOrder = 1;
@@ -142,6 +147,25 @@ export class View {
     return radius / Math.sin(across);
   }
 
+  // So far away that the body, as it began, fills the view.
+  distanceForAll() {
+    const { around, above } = this.orbit.home;
+    const up = Math.tan((this.camera.fov * Math.PI) / 360), across = up * this.camera.aspect;
+    const m = this.data.body.orientation;
+    let most = 1;
+    const every = 3 * Math.max(1, Math.floor(this.start.length / 30000));
+    for (let i = 0; i < this.start.length; i += every) {
+      const p = this.start.subarray(i, i + 3);
+      if (Number.isNaN(p[0])) continue;
+      const [x, y, z] = [0, 3, 6].map((k) => m[k] * p[0] + m[k + 1] * p[1] + m[k + 2] * p[2]);
+      const out = x * Math.cos(around) + y * Math.sin(around);
+      const right = Math.abs(-x * Math.sin(around) + y * Math.cos(around)) + 1;
+      const high = Math.abs(z * Math.cos(above) - out * Math.sin(above)) + 1;
+      most = Math.max(most, Math.max(right / across, high / up) + out * Math.cos(above) + z * Math.sin(above));
+    }
+    return 1.15 * most;  // room for what moves, and for the blade
+  }
+
   resize() {
     const { clientWidth, clientHeight } = this.canvas;
     if (clientWidth === 0 || !this.centre) return;
@@ -149,7 +173,7 @@ export class View {
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.camera.aspect = clientWidth / clientHeight;
     const was = this.orbit.home.distance;
-    this.orbit.home.distance = this.distanceFor(this.radius * 0.92);
+    this.orbit.home.distance = this.distanceForAll();
     this.orbit.at.distance *= this.orbit.home.distance / was;
     this.orbit.place();
   }
@@ -189,16 +213,19 @@ export class View {
     const spacing = this.data.body.spacing || 1;
     const xyz = places(moment.x, moment, this.centre, spacing);
     const n = xyz.length / 3;
+    const hasSkin = look.skin && moment.triangles.length > 0;
+    // A moment without a skin, as the start is, shows particles rather than nothing.
+    const hasParticles = look.particles || !hasSkin;
     const { colour, words, scale } = look.colouring.of({ moment, xyz, start: this.start, edges });
     const tint = new Float32Array(3 * n), kind = new Float32Array(n);
     for (let i = 0; i < n; ++i) {
       tint.set(moment.alive[i] ? colour(i) : [0.45, 0.45, 0.45], 3 * i);
-      kind[i] = Number.isNaN(xyz[3 * i]) ? 0 : moment.alive[i] ? (look.particles ? 1 : 0) : look.removed ? 2 : 0;
+      kind[i] = Number.isNaN(xyz[3 * i]) ? 0 : moment.alive[i] ? (hasParticles ? 1 : 0) : look.removed ? 2 : 0;
       if (kind[i] === 0) xyz.set([0, 0, 0], 3 * i);  // drawn nowhere, but some drivers mind NaN
     }
     this.fill(this.particles, xyz, tint, kind);
     this.particles.material.uniforms.fade.value = marks ? 0.72 : 0;
-    this.showSkin(moment, spacing, look.skin, colour, Boolean(marks));
+    this.showSkin(moment, spacing, hasSkin, colour, Boolean(marks));
     this.blade.visible = Boolean(blade);
     if (blade) this.placeBlade(blade, spacing);
     this.showMarks(moment, spacing, marks);
@@ -214,7 +241,7 @@ export class View {
   }
 
   showSkin(moment, spacing, wanted, colour, isFaded) {
-    this.skin.visible = wanted && moment.triangles.length > 0;
+    this.skin.visible = wanted;
     if (!this.skin.visible) return;
     const xyz = places(moment.skin, moment, this.centre, spacing);
     const tint = new Float32Array(xyz.length);
@@ -248,7 +275,7 @@ export class View {
       const isThere = !Number.isNaN(xyz[3 * i]);
       if (isThere) place.set(xyz.subarray(3 * i, 3 * i + 3), 3 * k);
       tint.set(k < members.length ? kMember : kMarked, 3 * k);
-      kind[k] = isThere ? 3 : 0;
+      kind[k] = isThere ? (k < members.length ? 3 : 4) : 0;
     });
     this.fill(this.marks, place, tint, kind);
     const path = marks ? marks.path.filter((i) => !Number.isNaN(xyz[3 * i])) : [];
