@@ -125,6 +125,9 @@ json data_json(const Source& source, const Results& results, const Pictures& pic
       {"blade", setup.has_blade ? json{setup.blade.length, setup.blade.depth, setup.blade.thickness} : json(nullptr)},
       {"moments", pictures.details},
       {"firstMoment", pictures.first_moment},
+      {"reach",
+       {{pictures.reach_low.x, pictures.reach_low.y, pictures.reach_low.z},
+        {pictures.reach_high.x, pictures.reach_high.y, pictures.reach_high.z}}},
       {"loss", pictures.loss},
       {"nowhere", pictures.nowhere},
       {"thinned", thinned_in_words(pictures, body.particle_count())}};

@@ -228,6 +228,7 @@ std::pair<int64_t, bool> moment_of(const std::vector<Moment>& moments, const Fin
 struct Survey {
   std::vector<Moment> moments;
   std::vector<FrameEnd> frames;
+  Box reach = kNothing;
 };
 
 // Walks all snapshots once.
@@ -236,6 +237,7 @@ Survey survey_of(const Source& source) {
   Pieces pieces;
   std::vector<uint8_t> alive;
   int64_t removed = 0;
+  const Box outer = outer_box(source.setup.body);
   for (int64_t i = 0; i < source.count; ++i) {
     const io::Snapshot snapshot = source.snapshot(i);
     const State& state = snapshot.state;
@@ -245,6 +247,9 @@ Survey survey_of(const Source& source) {
     if (i == 0 || state.alive != alive) {
       alive = state.alive;
       pieces = pieces_of(source.setup.body, alive);
+    }
+    for (std::size_t p = 0; p < state.x.size(); ++p) {
+      if (alive[p] != 0 && is_within(state.x[p], outer)) widen(survey.reach, state.x[p]);
     }
     removed = std::ssize(state.removed) + std::ssize(state.debris);
     survey.frames.push_back(
@@ -308,6 +313,8 @@ Pictures draw(const Source& source, const Survey& survey, const std::vector<Find
   Pictures result;
   result.thinning = thinning;
   result.frames = survey.frames;
+  result.reach_low = or_origin(survey.reach).low;
+  result.reach_high = or_origin(survey.reach).high;
   result.moments = kept_moments(survey.moments, findings, thinning.every_frame);
   const Kept kept = kept_particles(body.particle_count(), thinning.every_particle, marks);
   result.particles = static_cast<int32_t>(kept.particle.size());

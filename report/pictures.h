@@ -61,7 +61,8 @@ struct Pictures {
   double loss = 0;                        // by how much a place may be off [h]
   int64_t nowhere = 0;  // greatest count of particles that one moment does not show: not finite, or far outside
   Thinning thinning;
-  int64_t bytes = 0;  // of all chunks
+  Vec3 reach_low, reach_high;  // box of all that is alive at the end of any frame, as far as it is drawn [m]
+  int64_t bytes = 0;           // of all chunks
 };
 
 // Thins until the chunks have about so many bytes at most: frames first, then particles too. Throws what snapshot()

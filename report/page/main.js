@@ -81,8 +81,8 @@ function lookControls(hasSkin) {
   const shows = [['skin', 'skin'], ['particles', 'particles'], ['both', 'both']];
   return element('div', { class: 'row looks' },
     hasSkin && select('Show', 'show', shows, (value) => { look.skin = value !== 'particles'; look.particles = value !== 'skin'; }),
-    select('Colour by', 'colour', Object.entries(all).map(([key, one]) => [key, one.name]), (value) => { look.colouring = all[value]; }),
-    element('label', {}, element('input', { type: 'checkbox', id: 'removed', onchange: (event) => { look.removed = event.target.checked; update(); } }), element('span', { text: 'removed particles' })),
+    select('Colour', 'colour', Object.entries(all).map(([key, one]) => [key, one.name]), (value) => { look.colouring = all[value]; }),
+    element('label', {}, element('input', { type: 'checkbox', id: 'removed', onchange: (event) => { look.removed = event.target.checked; update(); } }), element('span', { text: 'removed' })),
     view && element('button', { type: 'button', class: 'quiet', text: 'Whole body', onclick: () => view.orbit.goHome() }));
 }
 

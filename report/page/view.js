@@ -62,7 +62,13 @@ const kMarked = [0.84, 0.37, 0.0], kMember = [0.94, 0.89, 0.26];
 
 // Null where there is no WebGL. three.js asks for none but says so in the console; so it is asked for here.
 export function contextOf(canvas) {
-  const wanted = { alpha: false, antialias: true, depth: true, stencil: false, preserveDrawingBuffer: true };
+  // Where the processor draws, smooth edges cost more than all else, and nobody scrubs fluently.
+  const trial = document.createElement('canvas').getContext('webgl');
+  const named = trial && trial.getExtension('WEBGL_debug_renderer_info');
+  const drawer = named ? trial.getParameter(named.UNMASKED_RENDERER_WEBGL) : '';
+  const antialias = !/swiftshader|llvmpipe|software|basic render/i.test(drawer);
+  if (trial && trial.getExtension('WEBGL_lose_context')) trial.getExtension('WEBGL_lose_context').loseContext();
+  const wanted = { alpha: false, antialias, depth: true, stencil: false, preserveDrawingBuffer: true };
   return canvas.getContext('webgl2', wanted) || canvas.getContext('webgl', wanted);
 }
 
@@ -153,17 +159,24 @@ export class View {
     const up = Math.tan((this.camera.fov * Math.PI) / 360), across = up * this.camera.aspect;
     const m = this.data.body.orientation;
     let most = 1;
-    const every = 3 * Math.max(1, Math.floor(this.start.length / 30000));
-    for (let i = 0; i < this.start.length; i += every) {
-      const p = this.start.subarray(i, i + 3);
-      if (Number.isNaN(p[0])) continue;
+    const add = (p) => {
       const [x, y, z] = [0, 3, 6].map((k) => m[k] * p[0] + m[k + 1] * p[1] + m[k + 2] * p[2]);
       const out = x * Math.cos(around) + y * Math.sin(around);
       const right = Math.abs(-x * Math.sin(around) + y * Math.cos(around)) + 1;
       const high = Math.abs(z * Math.cos(above) - out * Math.sin(above)) + 1;
       most = Math.max(most, Math.max(right / across, high / up) + out * Math.cos(above) + z * Math.sin(above));
+    };
+    const every = 3 * Math.max(1, Math.floor(this.start.length / 30000));
+    for (let i = 0; i < this.start.length; i += every) {
+      if (!Number.isNaN(this.start[i])) add(this.start.subarray(i, i + 3));
     }
-    return 1.15 * most;  // room for what moves, and for the blade
+    // With room for the blade; and for what moves, unless the body would become small for it.
+    const begins = 1.12 * most;
+    const spacing = this.data.body.spacing || 1;
+    for (let corner = 0; corner < 8; ++corner) {
+      add([0, 1, 2].map((k) => (this.data.reach[(corner >> k) & 1][k] - this.centre[k]) / spacing));
+    }
+    return Math.min(Math.max(begins, 0.95 * most), 1.5 * begins);
   }
 
   resize() {
@@ -217,10 +230,11 @@ export class View {
     // A moment without a skin, as the start is, shows particles rather than nothing.
     const hasParticles = look.particles || !hasSkin;
     const { colour, words, scale } = look.colouring.of({ moment, xyz, start: this.start, edges });
+    const hidden = hasParticles ? this.enclosed(moment, edges) : new Uint8Array(n);
     const tint = new Float32Array(3 * n), kind = new Float32Array(n);
     for (let i = 0; i < n; ++i) {
       tint.set(moment.alive[i] ? colour(i) : [0.45, 0.45, 0.45], 3 * i);
-      kind[i] = Number.isNaN(xyz[3 * i]) ? 0 : moment.alive[i] ? (hasParticles ? 1 : 0) : look.removed ? 2 : 0;
+      kind[i] = Number.isNaN(xyz[3 * i]) ? 0 : moment.alive[i] ? (hasParticles && !hidden[i] ? 1 : 0) : look.removed ? 2 : 0;
       if (kind[i] === 0) xyz.set([0, 0, 0], 3 * i);  // drawn nowhere, but some drivers mind NaN
     }
     this.fill(this.particles, xyz, tint, kind);
@@ -231,6 +245,17 @@ export class View {
     this.showMarks(moment, spacing, marks);
     this.draw();
     return { words, scale };
+  }
+
+  // Particles of which all six neighbours are there are behind these.
+  enclosed(moment, edges) {
+    const found = new Uint8Array(moment.alive.length);
+    if (!edges || !this.data.body.onGrid) return found;
+    for (let e = 0; e < edges.a.length; ++e) {
+      const a = edges.a[e], b = edges.b[e];
+      if (moment.alive[a] && moment.alive[b]) ++found[a], ++found[b];
+    }
+    return found.map((count) => (count === 6 ? 1 : 0));
   }
 
   fill(points, xyz, tint, kind) {
@@ -253,6 +278,7 @@ export class View {
     if (this.triangles !== moment.triangles) geometry.setIndex(new BufferAttribute(new Uint32Array(moment.triangles), 1));
     this.triangles = moment.triangles;
     this.skin.material.uniforms.fade.value = isFaded ? 0.22 : 1;
+    this.skin.material.transparent = isFaded;
     this.skin.material.depthWrite = !isFaded;
   }
 
