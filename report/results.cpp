@@ -23,6 +23,8 @@ using nlohmann::json;
 
 constexpr const char* kRemedy = "give what `cutproof run --json F` or `cutproof check --json F` has written";
 
+constexpr int64_t kMostCount = 1'000'000'000'000;
+
 // A field of a document, which knows where it stands.
 struct Field {
   const json* value;  // null: it is not there
@@ -56,6 +58,8 @@ struct Field {
       refuse("this is too large");
     const auto number = value->get<int64_t>();
     if (number < 0) refuse("this is below 0");
+    // So that no sum of such numbers ends beyond what an integer holds.
+    if (number > kMostCount) refuse("this is too large");
     return number;
   }
   int64_t count_or(int64_t otherwise) const { return value == nullptr ? otherwise : count(); }

@@ -176,7 +176,7 @@ export class View {
     for (let corner = 0; corner < 8; ++corner) {
       add([0, 1, 2].map((k) => (this.data.reach[(corner >> k) & 1][k] - this.centre[k]) / spacing));
     }
-    return Math.min(Math.max(begins, 0.95 * most), 1.5 * begins);
+    return Math.min(Math.max(begins, 0.85 * most), 1.4 * begins);
   }
 
   resize() {

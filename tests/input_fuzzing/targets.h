@@ -44,7 +44,7 @@ Outcome outcome_of(F&& action);
 
 // One for each reader, in files of their names.
 extern const Target kScene, kStl, kObj, kPly, kOff, kRecording, kRecordingContents, kArrays, kCounterexample, kCampaign,
-    kQuestion;
+    kResults, kQuestion;
 
 }  // namespace cutproof::input_fuzzing
 
