@@ -7,9 +7,11 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/report_page.h"
+#include "cli/screen.h"
 #include "model/io/atomic_file.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
+#include "model/printable.h"
 #include "report/page.h"
 
 namespace cutproof::cli {
@@ -40,6 +42,7 @@ int make_report(const ReportOptions& options) {
   io::write_text(options.output,
                  report::page(source, results, "cutproof check " + quoted(options.recording), kVersion));
   print_written(options.output);
+  insist("{}\n", printable(report::summary_sentence(results)));
   return 0;
 }
 
