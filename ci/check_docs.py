@@ -19,7 +19,7 @@ import subprocess
 import sys
 import tempfile
 
-ROOMS = ("model", "fixtures", "reference_cpu", "gpu", "oracles", "harness", "property_tests", "tuning", "benchmarks",
+ROOMS = ("model", "fixtures", "reference_cpu", "gpu", "oracles", "harness", "report", "property_tests", "tuning", "benchmarks",
          "cli", "tests", "ci", "docs", "cmake")
 CODE = (".h", ".cpp", ".cu", ".cuh", ".py", ".sh", ".cmake", ".slurm", ".yml")
 FILES = r"(?:h|cuh|cpp|cu|py|sh|md|json|cmake|svg|png|patch|slurm|yml)"

@@ -12,11 +12,14 @@ packages=(
   nlohmann-json3-dev libfmt-dev libcli11-dev
   libgtest-dev librapidcheck-dev libbullet-dev
   python3 python3-h5py python3-numpy
+  zlib1g-dev esbuild libjs-three  # report pages
   python3-scipy python3-skimage  # judged as examples: docs/results/libraries.md
   groff-base     # the manual page, rendered by a test
   dpkg-dev file  # packages: which libraries they depend on
   openmpi-bin    # mpirun, for a test of ci/cluster/; no program is linked with it
 )
+# Report pages in a browser, opened by a test. Ubuntu has Chromium as a snap alone: there that test is skipped, by name.
+[ "$(. /etc/os-release && echo "${ID:-}")" != debian ] || packages+=(chromium chromium-driver python3-selenium)
 # libFuzzer and the sanitizers of clang; llvm has the symbolizer that gives their reports file and line.
 fuzzing_packages=(clang libclang-rt-dev llvm)
 vtk=no

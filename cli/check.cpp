@@ -9,6 +9,7 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/progress.h"
+#include "cli/report_page.h"
 #include "cli/results.h"
 #include "cli/screen.h"
 #include "cli/terminal.h"
@@ -27,7 +28,7 @@ namespace {
 struct CheckOptions {
   std::string recording;
   std::string depth{name_of(harness::Depth::motion)};
-  std::string json, junit;
+  std::string json, junit, report;
   std::string again;  // the command line
 };
 
@@ -40,6 +41,7 @@ int check_recording(const CheckOptions& options) {
   if (!recording.scene_json.empty()) scene = io::parse_scene(recording.scene_json, options.recording + " (its scene)");
   require_writable(options.json);
   require_writable(options.junit);
+  require_report(options.report);
 
   const auto initial = std::make_shared<const State>(reader.snapshot(0).state);
   say("recording {}: scene {}, backend {}, {} snapshots of {} particles\n", options.recording,
@@ -66,13 +68,16 @@ int check_recording(const CheckOptions& options) {
   }
   judge.finish();
   // The file first: it is kept even if standard output cannot be written.
-  write_document(options.json, to_json(result, &judge));
+  const nlohmann::json document = to_json(result, &judge);
+  write_document(options.json, document);
+  if (!options.report.empty()) write_report(options.report, reader, document, options.again);
   const Judging judging{"cutproof check", "cutproof.check." + (scene.name.empty() ? "recording" : scene.name),
                         options.again};
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
   write_junit(options.junit, judging, seconds.count(), cases_of(judge, judging));
   print_verdicts(judge, options.again);
   print_written(options.json);
+  print_written(options.report);
   print_conclusion(judge);
   print_annotations(failures_of(judge.verdicts(), judging,
                                 [&](const Verdict& verdict) { return judge.is_expected_failure(verdict); }));
@@ -81,6 +86,10 @@ int check_recording(const CheckOptions& options) {
 
 int check(const CheckOptions& options) {
   if (!io::is_array_file(options.recording)) return check_recording(options);
+  if (!options.report.empty()) {
+    refuse("--report", "a state in a file of arrays is a single moment, of which no page is made",
+           "leave it out; --json has every verdict with its witness");
+  }
   depth_asked(options.depth);  // there is no motion to leave out, but a depth that is none is refused all the same
   return check_state(options.recording, {options.json, options.junit, options.again});
 }
@@ -97,6 +106,7 @@ void add_check(CLI::App& program, Work& work) {
   add_check_depth(*command, options->depth, "how much is judged");
   add_json(*command, options->json, "write verdicts and counts");
   add_junit(*command, options->junit);
+  add_report_option(*command, options->report);
   command->callback([options, command, &work] {
     options->again = as_given(*command);
     work = [options] { return check(*options); };

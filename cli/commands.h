@@ -22,6 +22,7 @@ void add_fuzz(CLI::App& program, Work& work);
 void add_replay(CLI::App& program, Work& work);
 void add_bench(CLI::App& program, Work& work);
 void add_tune(CLI::App& program, Work& work);
+void add_report(CLI::App& program, Work& work);
 void add_digest(CLI::App& program, Work& work);
 void add_judge(CLI::App& program, Work& work);
 void add_vectors(CLI::App& program, Work& work);

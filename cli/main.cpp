@@ -68,7 +68,7 @@ int run_command_line(int argc, char** argv) {
   app.require_subcommand(1);
   Work work;
   for (const auto add : {add_run, add_judge, add_check, add_kick, add_vectors, add_check_vectors, add_info, add_bench,
-                         add_tune, add_fuzz, add_replay, add_digest})
+                         add_tune, add_fuzz, add_replay, add_report, add_digest})
     add(app, work);
   AskedStyle asked_style;
   add_style(app, asked_style);

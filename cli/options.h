@@ -56,7 +56,7 @@ void add_junit(CLI::App& command, std::string& path);
 
 // A word as a shell takes it.
 std::string quoted(const std::string& word);
-// The command line that names `command` as it was given, without what it writes (--json, --junit, --record): to be
+// The command line that names `command` as it was given, without what it writes (--json, --junit, --record, --report): to be
 // given again. Requires that it has been parsed.
 std::string as_given(const CLI::App& command);
 

@@ -40,7 +40,7 @@ void divert_standard_output(const CLI::App& program) {
     for (const CLI::Option* const option : command->get_options()) {
       const std::string name = option->get_name();
       if (option->results() != std::vector<std::string>{kStandardOutput}) continue;
-      if (name == "--record" || name == "--write" || name == "--output" || name == "--save") {
+      if (name == "--record" || name == "--write" || name == "--output" || name == "--save" || name == "--report") {
         refuse(name, "this is not written to standard output", "give a name; ./- is a file");
       }
       if (name != "--json" && name != "--junit") continue;

@@ -14,6 +14,7 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/progress.h"
+#include "cli/report_page.h"
 #include "cli/results.h"
 #include "cli/scene_files.h"
 #include "cli/scene_options.h"
@@ -50,7 +51,7 @@ struct RunOptions {
   std::string mode = "both";  // of the comparison: lockstep, free-running, both
   std::string errors;         // names of errors with commas between them, or "all"; empty: none
   std::string record;
-  std::string json, junit;
+  std::string json, junit, report;
   std::string again;  // the command line
 };
 
@@ -173,12 +174,15 @@ int run(const RunOptions& options) {
                                        [&] { return fixtures::build(scene, options.scene.file, build_options); });
   require_writable(options.json);
   require_writable(options.junit);
+  require_report(options.report);
   if (!options.junit.empty() && !depth && !mode) {
     refuse("--junit", "nothing is judged, so there are no test cases", "add --check or --against");
   }
   std::optional<io::Recorder> recorder;
-  if (!options.record.empty())
-    recorder.emplace(options.record, built.setup, io::write_scene(scene), options.backend.name);
+  // A page is made from a recording, whether somebody wants to keep that or not.
+  const std::string record =
+      options.record.empty() && !options.report.empty() ? passing_recording(options.report) : options.record;
+  if (!record.empty()) recorder.emplace(record, built.setup, io::write_scene(scene), options.backend.name);
   std::optional<harness::SceneJudge> judge;
   std::optional<harness::RelationSample> relations;
   std::optional<Against> against;
@@ -237,7 +241,7 @@ int run(const RunOptions& options) {
   }
   if (recorder) recorder->finish();
   // Files first: they are kept even if standard output cannot be written.
-  if (!options.json.empty()) {
+  if (!options.json.empty() || !options.report.empty()) {
     nlohmann::json document = to_json(result, judge ? &*judge : nullptr);
     document["build"] = build_json(built);
     document["changes"] = given_changes(changes);
@@ -247,6 +251,11 @@ int run(const RunOptions& options) {
     }
     if (errors) document["errors"] = errors_document;
     write_document(options.json, document);
+    if (!options.report.empty()) {
+      const auto recording =
+          options.record.empty() ? read_passing(record) : std::make_unique<io::RecordingReader>(record);
+      write_report(options.report, *recording, document, options.again);
+    }
   }
 
   const Judging judging{"cutproof run", "cutproof.run." + scene.name, options.again};
@@ -263,7 +272,7 @@ int run(const RunOptions& options) {
   if (judge) print_verdicts(*judge, options.again);
   if (against) print_against(*against, options.again);
   if (errors) print_errors(*errors, errors_document);
-  if (recorder) {
+  if (!options.record.empty()) {
     const io::RecordingPaths paths = io::recording_paths(options.record);
     say_copy("recorded", paths.index);
     say("for ParaView:\n");
@@ -271,6 +280,7 @@ int run(const RunOptions& options) {
   }
   print_written(options.json);
   print_written(options.junit);
+  print_written(options.report);
   if (judge) {
     print_conclusion(*judge);
   } else {
@@ -332,6 +342,7 @@ void add_run(CLI::App& program, Work& work) {
       ->type_name("F");
   add_json(*command, options->json, "write verdicts, stage times and counts");
   add_junit(*command, options->junit);
+  add_report_option(*command, options->report);
   command->callback([options, command, &work] {
     options->again = as_given(*command);
     // Whoever writes --check before the scene means no depth by it.

@@ -1,8 +1,10 @@
 #include "model/io/hdf5_file.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
@@ -232,6 +234,20 @@ void Id::close(const std::string& where) {
   if (id_ >= 0) check(close_(std::exchange(id_, H5I_INVALID_HID)), where);
 }
 
+namespace {
+
+// A process that this one starts, as a plugin's, must not hold the file open: HDF5 locks what is written, and the lock
+// would last as long as that process.
+void close_on_exec(hid_t file, const std::string& where) {
+  void* handle = nullptr;
+  check(H5Fget_vfd_handle(file, H5P_DEFAULT, &handle), where);
+  const int descriptor = *static_cast<int*>(handle);
+  if (::fcntl(descriptor, F_SETFD, FD_CLOEXEC) != 0)
+    throw Error(where, fmt::format("It cannot be kept from other processes: {}.", std::strerror(errno)));
+}
+
+}  // namespace
+
 File File::create(const std::string& path) {
   require_memory();
   const Id access = property_list(H5P_FILE_ACCESS);
@@ -240,6 +256,7 @@ File File::create(const std::string& path) {
   forget_times(creation);
   File file;
   file.id_ = Id(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.get(), access.get()), H5Fclose, path);
+  close_on_exec(file.id_.get(), path);
   return file;
 }
 
@@ -247,6 +264,7 @@ File File::open(const std::string& path) {
   require_memory();
   File file;
   file.id_ = Id(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose, path);
+  close_on_exec(file.id_.get(), path);
   std::error_code error;
   file.bytes_ = std::filesystem::file_size(path, error);
   if (error) throw Error(path, fmt::format("Its size cannot be found: {}.", error.message()));

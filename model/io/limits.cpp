@@ -82,6 +82,7 @@ std::string limits_reference() {
       row("", "particles, commands, decisions of a schedule",
           fmt::format("{}, {}, {}", count_text(kMostCaseNodes), count_text(kMostCommands), count_text(kMostDecisions)));
   text += row("", "grid nodes of the box around the particles", count_text(kMostCaseCells));
+  text += json_rows(kResultsLimits, "`report`");
   text += json_rows(kCampaignLimits, "`fuzz --merge`");
   text += row("", "properties", count_text(kMostProperties));
   text += json_rows(kQuestionLimits, "`judge --case`");
@@ -91,7 +92,7 @@ std::string limits_reference() {
               fmt::format("{}, {}", kMostArrays, kMostArrayAxes));
   text += row("", "bytes of all arrays in memory, of a text",
               fmt::format("{}, {}", bytes_text(kMostArrayBytes), bytes_text(kMostTextBytes)));
-  text += row("A recording (`check`, `digest`)", "snapshots", count_text(static_cast<uint64_t>(kMostSnapshots)));
+  text += row("A recording (`check`, `digest`, `report`)", "snapshots", count_text(static_cast<uint64_t>(kMostSnapshots)));
   text += row("What is compressed", "bytes that it may become in any case", bytes_text(kFreeInflation));
   text += row("", "and beyond these, in sizes of the file", fmt::format("{} times", kMostInflation));
   text += kRest;

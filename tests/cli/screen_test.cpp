@@ -93,6 +93,7 @@ TEST_F(Screen, IsNotLeftByAnyPageOfHelp) {
                            "tune",
                            "fuzz",
                            "replay",
+                           "report",
                            "digest",
                            "bench stages",
                            "bench sampling",

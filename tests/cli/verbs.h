@@ -40,25 +40,31 @@ class Verbs : public Program {
   // One command line of each verb but judge, of each list of info, and of two suites of bench. Those that name `seen`
   // need record() first.
   std::vector<std::string> commands() const {
-    return {"info",
-            "info --scene",
-            "info --scenes",
-            "info --limits",
-            "info --mesh organ.off",
-            "--help",
-            "--version",
-            "run cut.json --check",
-            "check seen",
-            "check state.npz",
-            "kick kick.npz",
-            "vectors split -o split.h5 --cases 1",
-            "check-vectors vectors.npz answers.npz",
-            "digest seen",
-            "fuzz --cases 20 --sizes 0-20",
-            "replay '" + counterexample() + "'",
-            "tune cut.json --tolerance 0.5 --reference substeps --repeats 1 --frames 1",
-            "bench stages --sizes 1000 --frames 1 --repeats 1",
-            "bench machine_limits --repeats 1"};
+    std::vector<std::string> all = {"info",
+                                    "info --scene",
+                                    "info --scenes",
+                                    "info --limits",
+                                    "info --mesh organ.off",
+                                    "--help",
+                                    "--version",
+                                    "run cut.json --check",
+                                    "check seen",
+                                    "check state.npz",
+                                    "kick kick.npz",
+                                    "vectors split -o split.h5 --cases 1",
+                                    "check-vectors vectors.npz answers.npz",
+                                    "digest seen",
+                                    "fuzz --cases 20 --sizes 0-20",
+                                    "replay '" + counterexample() + "'",
+                                    "tune cut.json --tolerance 0.5 --reference substeps --repeats 1 --frames 1",
+                                    "bench stages --sizes 1000 --frames 1 --repeats 1",
+                                    "bench machine_limits --repeats 1"};
+    if (CUTPROOF_HAS_PAGES != 0) {
+      for (const char* const one :
+           {"run cut.json --check --report page.html", "check seen --report page.html", "report seen -o page.html"})
+        all.push_back(one);
+    }
+    return all;
   }
   void record() { ASSERT_EQ(cutproof("run cut.json --record seen").status, 0); }
 };

@@ -63,6 +63,39 @@ TEST_F(Verbs, DigestTellsRunsApartByTheirBits) {
   expect_refused("digest nowhere", {"nowhere"});
 }
 
+// --- report ----------------------------------------------------------------------------------------------------------
+
+TEST_F(Verbs, ReportMakesAPageOfARunACheckAndARecording) {
+  record();
+  if (CUTPROOF_HAS_PAGES == 0) {
+    for (const char* const one : {"run cut.json --report page.html", "check seen --report page.html"})
+      expect_refused(one, {"--report", "built without report pages", "libjs-three"});
+    expect_refused("report seen -o page.html", {"built without report pages", "libjs-three"});
+    return;
+  }
+  // Nothing but the page: what it was made from is gone.
+  std::set<std::string> before = listing();
+  ASSERT_EQ(cutproof("run cut.json --check --report run.html --json run.json").status, 0);
+  before.insert({"run.html", "run.json"});
+  EXPECT_EQ(listing(), before);
+  ASSERT_EQ(cutproof("check seen --report check.html").status, 0);
+  const Outcome made = cutproof("report seen run.json -o report.html");
+  EXPECT_EQ(made.status, 0) << made.output;
+  EXPECT_NE(made.output.find("wrote report.html"), std::string::npos) << made.output;
+  for (const char* const name : {"run.html", "check.html", "report.html"}) {
+    const std::string page = read(name);
+    EXPECT_TRUE(page.starts_with("<!DOCTYPE html>")) << name;
+    EXPECT_NE(page.find("scene small"), std::string::npos) << name;
+  }
+  EXPECT_NE(read("run.html").find("\"again\":\"cutproof run cut.json --check"), std::string::npos);
+  EXPECT_NE(read("report.html").find("\"again\":\"cutproof check seen\""), std::string::npos);
+  expect_refused("report nowhere -o page.html", {"nowhere"});
+  expect_refused("report seen cut.json -o page.html", {"cut.json", "format", "remedy"});
+  expect_refused("report seen run.json -o nowhere/page.html", {"nowhere"});
+  write("bad.json", "{");
+  expect_refused("report seen bad.json -o page.html", {"bad.json", "--json"});
+}
+
 // --- Usage
 // ------------------------------------------------------------------------------------------------------------
 
@@ -89,6 +122,10 @@ TEST_F(Verbs, RefuseWhatIsGivenButEmpty) {
                                                         {"check-vectors vectors.npz answers.npz --json ''", "--json"},
                                                         {"check-vectors vectors.npz answers.npz --junit ''", "--junit"},
                                                         {"digest ''", "recording"},
+                                                        {"run cut.json --report ''", "--report"},
+                                                        {"check seen --report ''", "--report"},
+                                                        {"report '' -o page.html", "recording"},
+                                                        {"report seen -o ''", "--output"},
                                                         {"fuzz --cases 5 --json ''", "--json"},
                                                         {"fuzz --cases 5 --shard ''", "--shard"},
                                                         {"fuzz --cases 5 --save ''", "--save"},
@@ -134,6 +171,11 @@ TEST_F(Verbs, RefuseUnknownOptionsMissingValuesAndNegativeCounts) {
                                                         {"check kick.npz", "kicked"},
                                                         {"check state.npz --check deep", "deep"},
                                                         {"digest seen --frobnicate", "--frobnicate"},
+                                                        {"report seen", "--output"},
+                                                        {"report -o page.html", "recording"},
+                                                        {"report seen -o -", "--output"},
+                                                        {"run cut.json --report -", "--report"},
+                                                        {"check state.npz --report page.html", "--report"},
                                                         {"check seen --json", "--json"},
                                                         {"info --frobnicate", "--frobnicate"},
                                                         {"fuzz --frobnicate", "--frobnicate"},

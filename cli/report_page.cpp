@@ -1,0 +1,39 @@
+#include "cli/report_page.h"
+
+#include "cli/commands.h"
+#include "cli/output.h"
+#include "model/io/atomic_file.h"
+#include "model/io/unfinished.h"
+#include "report/page.h"
+
+namespace cutproof::cli {
+
+void add_report_option(CLI::App& command, std::string& path) {
+  command.add_option("--report", path, "write a page for a browser: what happened, what holds, what fails and where")
+      ->type_name("F");
+}
+
+void require_report(const std::string& path) {
+  if (path.empty()) return;
+  report::require_pages("--report");
+  require_writable(path);
+}
+
+std::string passing_recording(const std::string& page) { return io::unfinished_name(page); }
+
+std::unique_ptr<io::RecordingReader> read_passing(const std::string& recording) {
+  const io::RecordingPaths paths = io::recording_paths(recording);
+  const io::Unfinished index(paths.index), particles(paths.particles), skin(paths.skin), blade(paths.blade);
+  // The reader keeps its files open, and what is open lives on without a name: however this program ends, nothing of
+  // the recording stays.
+  return std::make_unique<io::RecordingReader>(recording);
+}
+
+void write_report(const std::string& path, const io::RecordingReader& recording, const nlohmann::json& document,
+                  const std::string& again) {
+  const report::Source source = {recording.header().setup, recording.header().snapshot_count,
+                                 [&](int64_t index) { return recording.snapshot(index); }};
+  io::write_text(path, report::page(source, report::results_of(document, path), again, kVersion));
+}
+
+}  // namespace cutproof::cli

@@ -1,0 +1,26 @@
+// --report F, for verbs that run or judge a recording.
+#pragma once
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "model/io/recording.h"
+
+namespace cutproof::cli {
+
+void add_report_option(CLI::App& command, std::string& path);
+// A failure now rather than after the run: throws InputError if this build makes no pages, or the folder is not there
+// or not writable. Nothing if `path` is empty.
+void require_report(const std::string& path);
+
+// The name of a recording that nobody asked for and a page is made from: beside the page, and gone with it.
+std::string passing_recording(const std::string& page);
+// Reads a passing recording, whose files have no name from then on.
+std::unique_ptr<io::RecordingReader> read_passing(const std::string& recording);
+
+// `document`: what --json writes of `run` or `check`. `again`: the command line that shows it again.
+void write_report(const std::string& path, const io::RecordingReader& recording, const nlohmann::json& document,
+                  const std::string& again);
+
+}  // namespace cutproof::cli

@@ -1,0 +1,207 @@
+#include "report/page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "model/error.h"
+#include "model/io/json_number.h"
+#include "model/io/json_text.h"
+#include "report/assets.h"
+#include "report/coding.h"
+
+namespace cutproof::report {
+
+namespace {
+
+using nlohmann::json;
+
+json finding_json(const Finding& finding, const Marks& marks) {
+  return {{"property", finding.property},
+          {"stage", name_of(finding.stage)},
+          {"frame", finding.frame},
+          {"measured", finding.measured},
+          {"bound", finding.bound},
+          {"unit", finding.unit},
+          {"ofBound", json_number(finding.of_bound)},
+          {"source", finding.bound_source},
+          {"text", finding.text},
+          {"expected", finding.is_expected},
+          {"marks",
+           {{"moment", marks.moment},
+            {"exact", marks.is_exact},
+            {"partly", marks.is_partly},
+            {"particles", marks.particles},
+            {"path", marks.path},
+            {"members", marks.clusters}}}};
+}
+
+json row_json(const PropertyRow& row) {
+  return {{"property", row.property},   {"stage", name_of(row.stage)},
+          {"unit", row.unit},           {"source", row.bound_source},
+          {"judged", row.judged},       {"checked", row.checked},
+          {"failed", row.failed},       {"expected", row.expected},
+          {"undecided", row.undecided}, {"vacuous", row.vacuous},
+          {"frame", row.frame},         {"measured", row.measured},
+          {"bound", row.bound},         {"ofBound", json_number(row.of_bound)}};
+}
+
+json series_json(const std::vector<Series>& all) {
+  json list = json::array();
+  for (const Series& one : all) {
+    json values = json::array();
+    for (const std::optional<double>& value : one.values) values.push_back(json_number(value));
+    list.push_back({{"name", one.name}, {"values", std::move(values)}});
+  }
+  return list;
+}
+
+json frames_json(const std::vector<FrameEnd>& frames) {
+  json columns = json::object();
+  for (const auto& [name, member] : {std::pair{"frame", &FrameEnd::frame},
+                                     {"particles", &FrameEnd::particles},
+                                     {"clusters", &FrameEnd::clusters},
+                                     {"components", &FrameEnd::components},
+                                     {"triangles", &FrameEnd::triangles},
+                                     {"removed", &FrameEnd::removed}}) {
+    json& column = columns[name] = json::array();
+    for (const FrameEnd& frame : frames) column.push_back(frame.*member);
+  }
+  return columns;
+}
+
+std::string thinned_in_words(const Pictures& pictures, int32_t particles) {
+  std::string words;
+  if (pictures.thinning.every_frame > 1) {
+    words += fmt::format(
+        "To keep this page small, it shows one frame in {}, at its end, and every stage of the frames "
+        "in which something fails. ",
+        pictures.thinning.every_frame);
+  }
+  if (pictures.thinning.every_particle > 1) {
+    words += fmt::format(
+        "It shows {} of {} particles, among them all that a failing verdict names; the skin is whole, "
+        "and takes its colours from particles nearby. ",
+        pictures.particles, particles);
+  }
+  return words;
+}
+
+json data_json(const Source& source, const Results& results, const Pictures& pictures, const std::string& again,
+               const std::string& program) {
+  const Setup& setup = source.setup;
+  const Body& body = setup.body;
+  json rows = json::array(), findings = json::array();
+  for (const PropertyRow& row : results.rows) rows.push_back(row_json(row));
+  for (std::size_t k = 0; k < results.findings.size(); ++k)
+    findings.push_back(finding_json(results.findings[k], pictures.marks[k]));
+  return {
+      {"summary", summary_sentence(results)},
+      {"command", results.command},
+      {"scene", results.scene},
+      {"backend", results.backend},
+      {"judgedBy", results.version},
+      {"program", program},
+      {"checked", results.checked},
+      {"holds", results.holds},
+      {"verdicts", results.verdicts},
+      {"again", again},
+      {"rows", std::move(rows)},
+      {"findings", std::move(findings)},
+      {"findingsLeftOut", results.findings_left_out},
+      {"notes", results.notes},
+      {"notReached", results.not_reached},
+      {"seconds", series_json(results.seconds)},
+      {"errors", series_json(results.errors)},
+      {"frames", frames_json(pictures.frames)},
+      {"body",
+       {{"name", body.name},
+        {"particles", body.particle_count()},
+        {"kept", pictures.particles},
+        {"spacing", body.grid.spacing},
+        {"onGrid", body.on_grid()},
+        {"orientation", body.orientation.m}}},
+      {"blade", setup.has_blade ? json{setup.blade.length, setup.blade.depth, setup.blade.thickness} : json(nullptr)},
+      {"moments", pictures.details},
+      {"firstMoment", pictures.first_moment},
+      {"reach",
+       {{pictures.reach_low.x, pictures.reach_low.y, pictures.reach_low.z},
+        {pictures.reach_high.x, pictures.reach_high.y, pictures.reach_high.z}}},
+      {"loss", pictures.loss},
+      {"nowhere", pictures.nowhere},
+      {"thinned", thinned_in_words(pictures, body.particle_count())}};
+}
+
+// The template with its marks replaced, each by what may hold any text: nothing in it is looked at again.
+std::string filled(std::string_view page, const std::vector<std::pair<std::string_view, std::string_view>>& contents) {
+  std::string text;
+  while (!page.empty()) {
+    std::size_t first = std::string_view::npos;
+    const std::pair<std::string_view, std::string_view>* next = nullptr;
+    for (const auto& content : contents) {
+      const std::size_t found = page.find(content.first);
+      if (found < first) {
+        first = found;
+        next = &content;
+      }
+    }
+    text += page.substr(0, first);
+    if (next == nullptr) break;
+    text += next->second;
+    page.remove_prefix(first + next->first.size());
+  }
+  return text;
+}
+
+}  // namespace
+
+void require_pages(const std::string& option) {
+  if (!kPageScript.empty()) return;
+  throw InputError("cutproof", option, "this program was built without report pages",
+                   "install the packages esbuild and libjs-three (ci/install.sh does), configure and build again; "
+                   "--json has the same verdicts");
+}
+
+void require_same_run(const io::Recording& recording, const std::string& recording_file, const Results& results,
+                      const std::string& results_file) {
+  const auto refuse = [&](const std::string& field, const std::string& of_results, const std::string& of_recording) {
+    throw InputError(results_file, field,
+                     fmt::format("these are results of {}, and {} holds {}", of_results, recording_file, of_recording),
+                     "give the results of the run that was recorded, or leave them out");
+  };
+  if (results.backend != recording.backend)
+    refuse("backend", "backend " + results.backend, "backend " + recording.backend);
+  const int64_t particles = recording.setup.body.particle_count();
+  if (results.particles && *results.particles != particles)
+    refuse("body.particles", fmt::format("{} particles", *results.particles), fmt::format("{}", particles));
+}
+
+Results unjudged(const io::Recording& recording, const std::string& scene) {
+  Results results;
+  results.command = "recording";
+  results.scene = scene;
+  results.backend = recording.backend;
+  return results;
+}
+
+std::string page(const Source& source, const Results& results, const std::string& again, const std::string& program,
+                 int64_t most_picture_bytes) {
+  const Pictures pictures = pictures_of(source, results.findings, most_picture_bytes);
+  const std::string data = script_json(io::json_text(data_json(source, results, pictures, again, program)));
+  std::string later;
+  for (std::size_t k = 1; k < pictures.chunks.size(); ++k) {
+    later += fmt::format("<script type=\"application/octet-stream\" id=\"chunk-{}\">", k);
+    later += pictures.chunks[k];
+    later += "</script>\n";
+  }
+  return filled(kPageHtml, {{"@STYLE_HASH@", kPageStyleHash},
+                            {"@SCRIPT_HASH@", kPageScriptHash},
+                            {"@STYLE@", kPageStyle},
+                            {"@SCRIPT@", kPageScript},
+                            {"@DATA@", data},
+                            {"@FIRST_CHUNK@", pictures.chunks.empty() ? std::string_view() : pictures.chunks.front()},
+                            {"@LATER_CHUNKS@", later}});
+}
+
+}  // namespace cutproof::report

@@ -1,0 +1,28 @@
+// A report: one HTML file that a browser opens without anything beside it, and without a network.
+#pragma once
+#include <cstdint>
+#include <string>
+
+#include "report/pictures.h"
+#include "report/results.h"
+
+namespace cutproof::report {
+
+// Throws InputError, naming `option`, in a build without esbuild or three.js, of which pages are made.
+void require_pages(const std::string& option);
+
+// About as much of a page is particles and skin at most.
+inline constexpr int64_t kMostPictureBytes = int64_t{28} << 20;
+
+// The page as text. `again`: the command line that shows it again, `program` the version of this program. Results of
+// another body than the recording's are refused (InputError naming `results_file`).
+std::string page(const Source& source, const Results& results, const std::string& again, const std::string& program,
+                 int64_t most_picture_bytes = kMostPictureBytes);
+// Throws InputError if these are not the results of that recording.
+void require_same_run(const io::Recording& recording, const std::string& recording_file, const Results& results,
+                      const std::string& results_file);
+
+// The results of a recording that nobody judged.
+Results unjudged(const io::Recording& recording, const std::string& scene);
+
+}  // namespace cutproof::report

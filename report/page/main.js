@@ -1,0 +1,231 @@
+// The page: reads its data, puts them together, and keeps view, player, verdicts and plots at the same moment.
+import { Moments } from './coding.js';
+import { colourings, rampStops } from './colours.js';
+import { byId, count, drawing, element, figure, plural } from './dom.js';
+import { plotsOf } from './plots.js';
+import { cards, command, table } from './verdicts.js';
+import { View, contextOf } from './view.js';
+
+const data = JSON.parse(byId('data').textContent);
+const moments = new Moments(data.firstMoment);
+const last = data.moments.length - 1;
+const kFramesPerSecond = 15;
+
+const state = { at: 0, finding: null, isPlaying: false };
+let view = null, edges = null, plots = [], shown = 0;
+
+const words = (moment) => (moment.start ? 'As loaded' : `Frame ${moment.frame}, after ${moment.stage}`);
+
+function header() {
+  const name = data.scene || 'a recording';
+  document.title = `${data.checked ? (data.holds ? 'Holds: ' : 'Fails: ') : ''}${name} · cutproof report`;
+  byId('title').textContent = name;
+  const kind = !data.checked ? 'muted' : data.holds ? 'good' : 'bad';
+  byId('summary').append(element('span', { class: `badge ${kind}`, text: !data.checked ? 'not judged' : data.holds ? '✓ holds' : '✕ fails' }), element('span', { text: data.summary }));
+  const facts = [`${plural(data.body.particles, 'particle')}`, `h = ${figure(1e3 * data.body.spacing)} mm`, `${plural(data.frames.frame.length - 1, 'frame')}`];
+  if (data.checked) facts.push(plural(data.verdicts, 'verdict'));
+  facts.push(`cutproof ${data.judgedBy || data.program}`);
+  byId('facts').textContent = facts.join(' · ');
+}
+
+// --- The view and its player
+
+const look = { skin: true, particles: false, removed: false, colouring: null };
+const canvas = element('canvas', { id: 'canvas', tabindex: 0, role: 'application', 'aria-label': '3D view. Arrow keys turn it, plus and minus come nearer and go away, 0 goes back; space plays, comma and full stop go back and on.' });
+const status = element('p', { id: 'status' });
+const witness = element('p', { id: 'witness', role: 'status' });
+const legend = element('p', { id: 'legend', class: 'small' });
+const range = element('input', { type: 'range', id: 'scrub', min: 0, max: last, step: 1, value: 0, 'aria-label': 'Moment of the run' });
+const play = element('button', { type: 'button', id: 'play', text: '▶ Play' });
+
+const frameOf = (k) => (data.moments[k].start ? -1 : data.moments[k].frame);
+const isEnd = (k) => k === last || frameOf(k + 1) !== frameOf(k);
+function nextFrame(k, by) {
+  let next = k + by;
+  while (next > 0 && next < last && !isEnd(next)) next += by;
+  return Math.min(Math.max(next, 0), last);
+}
+
+function timeline() {
+  const svg = drawing('svg', { class: 'timeline', viewBox: '0 0 1000 14', preserveAspectRatio: 'none', 'aria-hidden': 'true' });
+  const x = (k) => (last ? (1000 * k) / last : 0);
+  const mark = (k, kind, y, height) => svg.append(drawing('rect', { class: kind, x: x(k) - 1.5, width: 3, y, height }));
+  data.moments.forEach((moment, k) => { if (moment.removed > 0 && isEnd(k)) mark(k, 'cut', 9, 5); });
+  for (const finding of data.findings) if (finding.marks.moment >= 0) mark(finding.marks.moment, finding.expected ? 'warn' : 'bad', 0, 8);
+  const keys = [];
+  if (data.findings.some((f) => !f.expected)) keys.push(['bad', 'a verdict fails']);
+  if (data.findings.some((f) => f.expected)) keys.push(['warn', 'fails as expected']);
+  if (data.moments.some((m) => m.removed > 0)) keys.push(['cut', 'particles are removed']);
+  const legendOfIt = element('ul', { class: 'legend' }, ...keys.map(([kind, text]) => element('li', {}, element('span', { class: `key ${kind}` }), element('span', { text }))));
+  return [svg, legendOfIt];
+}
+
+function controls() {
+  const button = (text, name, onclick) => element('button', { type: 'button', text, 'aria-label': name, title: name, onclick });
+  play.addEventListener('click', () => setPlaying(!state.isPlaying));
+  range.addEventListener('input', () => { setPlaying(false); go(Number(range.value)); });
+  const step = (by) => () => { setPlaying(false); go(state.at + by); };
+  const frame = (by) => () => { setPlaying(false); go(nextFrame(state.at, by)); };
+  const [marks, keys] = timeline();
+  return element('div', { class: 'player' },
+    element('div', { class: 'track' }, marks, range),
+    element('div', { class: 'row' }, play, button('« Frame', 'Previous frame', frame(-1)), button('‹ Stage', 'Previous stage', step(-1)), button('Stage ›', 'Next stage', step(1)), button('Frame »', 'Next frame', frame(1)), keys));
+}
+
+function lookControls(hasSkin) {
+  const all = colourings(Boolean(edges) && data.body.onGrid);
+  look.colouring = all.piece;
+  look.skin = hasSkin;
+  look.particles = !hasSkin;
+  const select = (label, id, options, onchange) => element('label', {}, element('span', { text: label }), element('select', { id, onchange: (event) => { onchange(event.target.value); update(); } }, ...options.map(([value, text]) => element('option', { value, text }))));
+  const shows = [['skin', 'skin'], ['particles', 'particles'], ['both', 'both']];
+  return element('div', { class: 'row looks' },
+    hasSkin && select('Show', 'show', shows, (value) => { look.skin = value !== 'particles'; look.particles = value !== 'skin'; }),
+    select('Colour', 'colour', Object.entries(all).map(([key, one]) => [key, one.name]), (value) => { look.colouring = all[value]; }),
+    element('label', {}, element('input', { type: 'checkbox', id: 'removed', onchange: (event) => { look.removed = event.target.checked; update(); } }), element('span', { text: 'removed' })),
+    view && element('button', { type: 'button', class: 'quiet', text: 'Whole body', onclick: () => view.orbit.goHome() }));
+}
+
+function setPlaying(isPlaying) {
+  if (isPlaying && state.at === last) go(0);
+  state.isPlaying = isPlaying;
+  play.textContent = isPlaying ? '⏸ Pause' : '▶ Play';
+  if (!isPlaying) return;
+  let due = performance.now() + 1000 / kFramesPerSecond;
+  const tick = async (now) => {
+    if (!state.isPlaying) return;
+    if (now >= due) {
+      due = Math.max(due + 1000 / kFramesPerSecond, now);
+      await go(nextFrame(state.at, 1));
+      if (state.at === last) return setPlaying(false);
+    }
+    requestAnimationFrame(tick);
+  };
+  requestAnimationFrame(tick);
+}
+
+// To a moment. What was marked stays marked only where it was found.
+async function go(at, finding = null) {
+  state.at = Math.min(Math.max(at, 0), last);
+  if (finding !== state.finding) {
+    state.finding = finding;
+    for (const button of document.querySelectorAll('[data-finding]')) button.setAttribute('aria-pressed', String(Number(button.dataset.finding) === finding && finding !== null));
+  }
+  await update();
+}
+
+async function update() {
+  const ticket = ++shown;
+  const moment = data.moments[state.at];
+  const found = state.finding === null ? null : data.findings[state.finding];
+  range.value = state.at;
+  range.setAttribute('aria-valuetext', words(moment));
+  const facts = [plural(moment.components, 'piece'), plural(moment.clusters, 'cluster'), plural(moment.particles, 'particle')];
+  if (moment.removed > 0) facts.push(`${count(moment.removed)} removed in this frame`);
+  if (data.blade) facts.push(moment.blade ? 'blade down' : 'blade up');
+  status.replaceChildren(element('strong', { text: words(moment) }), element('span', { class: 'muted', text: ` · ${facts.join(' · ')}` }));
+  witness.textContent = found ? `${found.property} fails here: ${found.text}` : '';
+  for (const one of plots) one.setFrame(frameOf(state.at));
+  document.documentElement.dataset.moment = state.at;
+  if (!view) return;
+  const arrays = await moments.get(state.at);
+  if (ticket !== shown) return;  // somebody has gone on meanwhile
+  const said = view.show(arrays, moment.blade, look, found && found.marks, edges);
+  legend.replaceChildren(element('span', { text: said.words }));
+  if (said.scale) {
+    const ramp = drawing('svg', { class: 'ramp', viewBox: '0 0 70 10', 'aria-hidden': 'true' }, ...rampStops.map((fill, k) => drawing('rect', { x: 10 * k, y: 0, width: 10.5, height: 10, fill })));
+    legend.append(element('span', { text: ` ${said.scale[0]} ` }), ramp, element('span', { text: ` ${said.scale[1]}.` }));
+  }
+  if (found) legend.append(element('span', { class: 'marked-key', text: ' Marked orange: what the verdict names.' }), found.marks.members.length > 0 && element('span', { text: ' Yellow: the members of its clusters.' }) || '', found.marks.partly && element('span', { text: ' There are more than are marked.' }) || '', !found.marks.exact && element('span', { text: ' The recording has no moment after this stage; this is the next one.' }) || '');
+  document.documentElement.dataset.shown = `${state.at}/${state.finding === null ? '' : state.finding}`;
+}
+
+// The moment after a stage of a frame, or the nearest that this page holds.
+function momentOf(frame, stage) {
+  let best = 0, apart = Infinity;
+  data.moments.forEach((moment, k) => {
+    if (moment.start && frame >= 0) return;
+    const far = Math.abs(frameOf(k) - frame) * 10 + (moment.stage === stage ? 0 : isEnd(k) ? 1 : 2);
+    if (far < apart) [best, apart] = [k, far];
+  });
+  return best;
+}
+
+async function jump(frame, stage) {
+  setPlaying(false);
+  await go(momentOf(frame, stage));
+  byId('view').scrollIntoView({ block: 'nearest' });
+}
+
+async function showFinding(k) {
+  setPlaying(false);
+  const { marks } = data.findings[k];
+  await go(Math.max(marks.moment, 0), k);
+  if (view) view.flyToMarks();
+  byId('view').scrollIntoView({ block: 'nearest' });
+}
+
+// --- Put together
+
+function findings() {
+  const section = byId('findings');
+  const failing = data.findings.filter((one) => !one.expected);
+  byId('findings-title').textContent = failing.length ? 'What fails' : !data.checked ? 'Nothing was judged' : data.holds ? 'Nothing fails' : 'It does not hold';
+  if (!data.checked) section.append(element('p', { text: 'This page shows what happened. Whether it is right, this command judges:' }));
+  if (data.checked && data.holds && !failing.length) {
+    const near = data.rows.filter((row) => row.judged > 0 && row.ofBound !== null).sort((a, b) => b.ofBound - a.ofBound)[0];
+    section.append(element('p', { text: `All ${plural(data.rows.filter((row) => row.judged > 0).length, 'property', 'properties')} hold${data.findings.length ? ', but for what the scene expects to fail' : ''}.${near ? ` The nearest to its bound is ${near.property} after ${near.stage}, at ${figure(near.ofBound)} of it, in frame ${near.frame}.` : ''}` }));
+  }
+  section.append(...cards(data, showFinding));
+  if (data.findingsLeftOut > 0) section.append(element('p', { class: 'muted', text: `${plural(data.findingsLeftOut, 'later failure')} of the same properties are counted in the table, and not shown.` }));
+  section.append(element('h3', { text: data.checked ? 'See it again' : 'Judge it' }), command(data.again));
+  const notes = [...data.notReached.map((text) => `Not reached: ${text}`), ...data.notes];
+  if (notes.length) section.append(element('h3', { text: 'Good to know' }), element('ul', { class: 'notes' }, ...notes.map((text) => element('li', { text }))));
+}
+
+function about() {
+  const section = byId('about');
+  const say = (text) => section.append(element('p', { text }));
+  say(`Positions on this page are rounded to steps of 16 bits, and so off by at most ${figure(data.loss)} h (h is the spacing of particles). Verdicts were made from the full numbers.`);
+  if (data.thinned) say(data.thinned);
+  if (data.nowhere > 0) say(`Up to ${plural(data.nowhere, 'particle')} of a moment are not drawn: their positions are no numbers, or far outside the body.`);
+  say(`Frames count from 0. A frame is step, detect, split, merge, expand and skin; a stage that had nothing to do is left out. This page holds ${plural(data.moments.length, 'moment')}. It needs no network. Keys in the 3D view: arrows turn, with Shift they shift; + and − zoom, 0 shows the whole body; space plays, comma and full stop go a stage back and on.`);
+}
+
+async function main() {
+  header();
+  findings();
+  if (data.rows.length) byId('verdicts').append(table(data, jump)); else byId('verdicts').remove();
+  plots = plotsOf(data, (frame) => jump(frame, 'skin'));
+  if (plots.length) byId('plots').append(element('div', { class: 'grid' }, ...plots.map((one) => one.card))); else byId('plots').remove();
+  about();
+
+  const place = element('div', { class: 'canvas' }, canvas);
+  const section = byId('view');
+  section.append(place);
+  if (last < 0) return place.replaceChildren(element('p', { class: 'card', text: 'This recording holds no moment to show.' }));
+  const context = contextOf(canvas);
+  if (context) {
+    view = new View(canvas, context, data);
+  } else {
+    place.replaceChildren(element('p', { class: 'nothing', id: 'no-webgl', text: 'This browser shows no 3D view (WebGL is not there). Everything else on this page works.' }));
+  }
+  if (view) {
+    const first = await moments.chunk(0);
+    edges = first.edges || null;
+    view.begin(first.moments[0]);
+    section.append(controls(), status, witness, lookControls(data.frames.triangles.some((triangles) => triangles > 0)), legend);
+  } else {
+    section.append(controls(), status, witness);
+  }
+  const keys = { ' ': () => setPlaying(!state.isPlaying), ',': () => go(state.at - 1), '.': () => go(state.at + 1) };
+  canvas.addEventListener('keydown', (event) => {
+    if (!keys[event.key]) return;
+    event.preventDefault();
+    keys[event.key]();
+  });
+  await go(0);
+  document.documentElement.dataset.ready = 'true';
+}
+
+main();

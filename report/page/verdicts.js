@@ -1,0 +1,92 @@
+// What fails, each with its witness; and a table of every property.
+import { count, element, plural } from './dom.js';
+
+const withUnit = (text, unit) => (unit ? `${text} ${unit}` : text);
+
+export function command(text) {
+  const code = element('code', { class: 'command', tabindex: 0, text });
+  const said = element('span', { class: 'muted', role: 'status' });
+  const copy = element('button', { type: 'button', text: 'Copy', onclick: async () => {
+    getSelection().selectAllChildren(code);
+    try {
+      await navigator.clipboard.writeText(text);
+      said.textContent = 'Copied.';
+    } catch {
+      said.textContent = 'Selected: copy it with the keyboard.';
+    }
+  } });
+  return element('div', { class: 'again' }, code, element('div', { class: 'row' }, copy, said));
+}
+
+// Measured over bound: the bar ends at the bound, and what goes beyond is drawn beyond it.
+function bar(row, fails) {
+  if (row.ofBound === null) return element('span', { class: 'muted', text: row.bound === '0' && !fails ? 'exact' : '' });
+  const share = Math.min(row.ofBound, 1.25);
+  const filled = element('span', { class: fails ? 'filled bad' : 'filled' });
+  filled.style.width = `${(100 * share) / 1.25}%`;
+  const limit = element('span', { class: 'limit' });
+  const text = row.ofBound >= 100 ? row.ofBound.toExponential(1).replace('e+', 'e') : row.ofBound.toPrecision(2);
+  return element('span', { class: 'measure' }, element('span', { class: 'bar', 'aria-hidden': 'true' }, filled, limit), element('span', { class: 'share', text: `${Number(text)} of it` }));
+}
+
+function statusOf(row) {
+  if (row.failed > 0) return ['bad', '✕ fails'];
+  if (row.expected > 0) return ['warn', '! fails, as expected'];
+  if (row.judged === 0) return ['muted', '– nothing to look at'];
+  if (row.undecided > 0) return ['good', '✓ holds, some within rounding'];
+  return ['good', '✓ holds'];
+}
+
+export function table(data, jump) {
+  const body = element('tbody');
+  for (const row of data.rows) {
+    const [kind, words] = statusOf(row);
+    const fails = row.failed + row.expected > 0;
+    const details = [];
+    if (row.failed > 0) details.push(`${count(row.failed)} of ${plural(row.judged, 'verdict')} fail`);
+    else if (row.expected > 0) details.push(`${count(row.expected)} of ${plural(row.judged, 'verdict')} fail, which the scene expects`);
+    else if (row.judged > 0) details.push(plural(row.judged, 'verdict'));
+    else details.push(row.vacuous || 'there was nothing to look at');
+    if (row.undecided > 0) details.push(`${plural(row.undecided, 'thing')} undecidable within rounding, counted as right`);
+    body.append(element('tr', { class: fails ? kind : null },
+      element('th', { scope: 'row' }, element('span', { text: row.property }), element('span', { class: 'muted small', text: ` after ${row.stage}` })),
+      element('td', {}, element('span', { class: `status ${kind}`, text: words }), element("span", { class: "muted small block", text: details.join('; ') })),
+      element('td', {}, row.judged > 0 && bar(row, fails)),
+      element('td', { class: 'figures' }, row.judged > 0 && element('span', { text: withUnit(row.measured, row.unit) }), row.judged > 0 && element('span', { class: 'muted small block', text: `bound ${withUnit(row.bound, row.unit)}` })),
+      element('td', {}, row.judged > 0 && element('button', { type: 'button', class: 'quiet', text: `frame ${row.frame}`, 'aria-label': `Show frame ${row.frame}, after ${row.stage}: ${fails ? 'where' : 'the nearest to the bound of'} ${row.property}${fails ? ' fails first' : ''}`, onclick: () => jump(row.frame, row.stage) })),
+      element('td', { class: 'muted small', text: row.source })));
+  }
+  const head = ['Property', 'Result', 'Measured / bound', 'Measured', fails(data) ? 'First failure, or nearest to the bound' : 'Nearest to the bound', 'Where the bound comes from'];
+  return element('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': 'Every property' }, element('table', { class: 'verdicts' },
+    element('thead', {}, element('tr', {}, ...head.map((text) => element('th', { scope: 'col', text })))), body));
+}
+
+const fails = (data) => data.rows.some((row) => row.failed + row.expected > 0);
+
+// One card for each property and stage that fails, with its first witness; its later ones behind it.
+export function cards(data, show) {
+  const groups = new Map();
+  data.findings.forEach((finding, k) => {
+    const key = `${finding.property}\n${finding.stage}`;
+    if (!groups.has(key)) groups.set(key, []);
+    groups.get(key).push(k);
+  });
+  const found = [];
+  for (const members of groups.values()) {
+    const first = data.findings[members[0]];
+    const button = (k, text) => element('button', { type: 'button', class: 'finding', 'data-finding': k, 'aria-pressed': 'false', text, onclick: () => show(k) });
+    const row = data.rows.find((one) => one.property === first.property && one.stage === first.stage);
+    const text = element('p', { class: 'witness', text: first.text || 'It has no witness.' });
+    const marks = first.marks.particles.length + first.marks.path.length + first.marks.members.length > 0;
+    found.push(element('article', { class: `card ${first.expected ? 'warn' : 'bad'}` },
+      element('h3', {}, element('span', { text: first.property }), element('span', { class: 'muted', text: ` after ${first.stage}` })),
+      text,
+      element('p', { class: 'muted small' }, element('span', { text: `Measured ${withUnit(first.measured, first.unit)}, bound ${withUnit(first.bound, first.unit)} (${first.source}). ` }),
+        element('span', { text: row && row.failed + row.expected > 1 ? `It fails in ${count(row.failed + row.expected)} of ${plural(row.judged, 'verdict')}.` : '' }),
+        first.expected && element('span', { text: ' The scene expects it to fail.' })),
+      element('div', { class: 'row' }, button(members[0], marks ? `Show me: frame ${first.frame}` : `Go to frame ${first.frame}`)),
+      members.length > 1 && element('details', {}, element('summary', { text: `Again in ${plural(members.length - 1, 'later verdict')}` }),
+        element('ul', { class: 'again-in' }, ...members.slice(1).map((k) => element('li', {}, button(k, `frame ${data.findings[k].frame}`), element('span', { class: 'small', text: ` ${data.findings[k].text}` })))))));
+  }
+  return found;
+}

@@ -1,0 +1,446 @@
+#include "report/pictures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "report/coding.h"
+#include "report/pieces.h"
+
+namespace cutproof::report {
+
+namespace {
+
+using nlohmann::json;
+
+// Bytes of a chunk before it is compressed, and its moments: little enough to be inflated while somebody scrubs.
+constexpr std::size_t kChunkBytes = std::size_t{3} << 20;
+constexpr std::size_t kChunkMoments = 16;
+// Nobody looks at more frames than these, so particles are thinned as well rather than frames beyond it.
+constexpr int64_t kFewestFrames = 40;
+// A box reaches so many times the body's size beyond the body: what has flown farther would cost all others their
+// places.
+constexpr double kReach = 8;
+
+// What a moment shows, of kept particles only; an empty list is as it was in the moment before.
+struct Picture {
+  std::vector<Vec3> x, skin;
+  std::vector<uint8_t> alive, holders;
+  std::vector<int32_t> cluster, piece, owner, triangles;
+  bool has_skin = false, has_owner = false, has_triangles = false;
+};
+
+// The middle of what moments have in common: the particles that are kept, and their numbers on the page.
+struct Kept {
+  std::vector<int32_t> particle;  // ascending
+  std::vector<int32_t> place;     // [n] on the page; of one that is not kept, of the next one that is
+};
+
+Kept kept_particles(int32_t n, int32_t every, const std::vector<Marks>& named) {
+  std::vector<uint8_t> keep(static_cast<std::size_t>(n), 0);
+  for (int32_t i = 0; i < n; i += every) keep[static_cast<std::size_t>(i)] = 1;
+  for (const Marks& marks : named) {
+    for (const auto* list : {&marks.particles, &marks.path, &marks.clusters}) {
+      for (const int32_t particle : *list) keep[static_cast<std::size_t>(particle)] = 1;
+    }
+  }
+  Kept kept;
+  kept.place.resize(static_cast<std::size_t>(n));
+  for (int32_t i = 0; i < n; ++i) {
+    kept.place[static_cast<std::size_t>(i)] = static_cast<int32_t>(kept.particle.size());
+    if (keep[static_cast<std::size_t>(i)] != 0) kept.particle.push_back(i);
+  }
+  // Particles behind the last that is kept.
+  for (int32_t& place : kept.place) place = std::min(place, static_cast<int32_t>(kept.particle.size()) - 1);
+  return kept;
+}
+
+template <class T>
+std::vector<T> only(const std::vector<T>& all, const Kept& kept) {
+  std::vector<T> some;
+  some.reserve(kept.particle.size());
+  for (const int32_t particle : kept.particle) some.push_back(all[static_cast<std::size_t>(particle)]);
+  return some;
+}
+
+// The skin of a state that may be as wrong as it likes: triangles of vertices that are there, owners that are.
+void add_skin(Picture& picture, const State& state, const Kept& kept) {
+  const Skin& skin = state.skin;
+  picture.has_skin = picture.has_owner = picture.has_triangles = true;
+  picture.skin = skin.position;
+  const auto vertices = static_cast<int32_t>(skin.position.size());
+  for (const int32_t owner : skin.owner) {
+    const bool is_there = owner >= 0 && owner < std::ssize(kept.place);
+    picture.owner.push_back(is_there ? kept.place[static_cast<std::size_t>(owner)] : -1);
+  }
+  picture.owner.resize(skin.position.size(), -1);
+  for (const auto& triangle : skin.triangles) {
+    if (std::all_of(triangle.begin(), triangle.end(), [&](int32_t v) { return v >= 0 && v < vertices; }))
+      picture.triangles.insert(picture.triangles.end(), triangle.begin(), triangle.end());
+  }
+}
+
+void widen(Box& box, Vec3 point) {
+  if (!is_finite(point)) return;
+  for (int axis = 0; axis < 3; ++axis) {
+    box.low[axis] = std::min(box.low[axis], point[axis]);
+    box.high[axis] = std::max(box.high[axis], point[axis]);
+  }
+}
+constexpr double kFar = std::numeric_limits<double>::infinity();
+constexpr Box kNothing = {{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
+Box or_origin(const Box& box) { return box.low.x <= box.high.x ? box : Box{{}, {}}; }
+
+// Around the body at rest, with room: no chunk's box is larger.
+Box outer_box(const Body& body) {
+  Box box = kNothing;
+  for (int32_t i = 0; i < body.particle_count(); ++i) widen(box, body.rest_position(i));
+  box = or_origin(box);
+  const Vec3 size = box.high - box.low;
+  const double reach = kReach * std::max({size.x, size.y, size.z, body.grid.spacing});
+  return {box.low - Vec3{reach, reach, reach}, box.high + Vec3{reach, reach, reach}};
+}
+bool is_within(Vec3 p, const Box& box) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(p[axis] >= box.low[axis] && p[axis] <= box.high[axis])) return false;  // NaN too
+  }
+  return true;
+}
+
+// Writes a chunk: a length of four bytes, a description in JSON, and the arrays that it describes.
+class Chunk {
+ public:
+  bool is_empty() const { return pictures_.empty(); }
+  bool is_full() const { return pictures_.size() >= kChunkMoments || size_ >= kChunkBytes; }
+  void add(Picture picture) {
+    size_ += 6 * (picture.x.size() + picture.skin.size()) + 4 * (picture.cluster.size() + picture.triangles.size());
+    pictures_.push_back(std::move(picture));
+  }
+  // base64; empties it. `edges`: ends of each, only of the first chunk.
+  std::string finish(const Box& outer, const std::vector<int32_t>& edge_a, const std::vector<int32_t>& edge_b,
+                     Pictures& result, double spacing) {
+    Box box = kNothing;
+    for (const Picture& picture : pictures_) {
+      for (const auto* points : {&picture.x, &picture.skin}) {
+        for (const Vec3 point : *points) {
+          if (is_within(point, outer)) widen(box, point);
+        }
+      }
+    }
+    box = or_origin(box);
+    result.loss = std::max(result.loss, spacing > 0 ? loss(box) / spacing : 0);
+    json head = {{"low", {box.low.x, box.low.y, box.low.z}}, {"high", {box.high.x, box.high.y, box.high.z}}};
+    json moments = json::array();
+    std::string bytes;
+    if (!edge_a.empty()) {
+      head["edges"] = {bytes.size(), edge_a.size()};
+      append_integers(bytes, edge_a);
+      append_integers(bytes, edge_b);
+    }
+    std::vector<uint16_t> before_x, before_skin;
+    for (const Picture& picture : pictures_) {
+      json one = json::object();
+      const auto add_points = [&](const char* name, const std::vector<Vec3>& points, std::vector<uint16_t>& before) {
+        std::vector<uint16_t> steps = steps_of(points, box);
+        const bool is_difference = before.size() == steps.size();
+        one[name] = {bytes.size(), points.size(), is_difference ? 1 : 0};
+        append_steps(bytes, steps, is_difference ? before : std::vector<uint16_t>());
+        before = std::move(steps);
+      };
+      const auto add_integers = [&](const char* name, const std::vector<int32_t>& values) {
+        one[name] = {bytes.size(), values.size()};
+        append_integers(bytes, values);
+      };
+      if (!picture.x.empty()) {
+        add_points("x", picture.x, before_x);
+        const std::size_t n = picture.x.size();
+        int64_t nowhere = 0;
+        for (std::size_t i = 0; i < n; ++i) nowhere += before_x[i] == kNowhere;
+        result.nowhere = std::max(result.nowhere, nowhere);
+      }
+      if (!picture.alive.empty()) {
+        one["alive"] = {bytes.size(), picture.alive.size()};
+        append_flags(bytes, picture.alive);
+        add_integers("piece", picture.piece);
+      }
+      if (!picture.cluster.empty()) {
+        add_integers("cluster", picture.cluster);
+        one["holders"] = {bytes.size(), picture.holders.size()};
+        bytes.append(reinterpret_cast<const char*>(picture.holders.data()), picture.holders.size());
+      }
+      if (picture.has_skin) {
+        add_points("skin", picture.skin, before_skin);
+        if (picture.has_owner) add_integers("owner", picture.owner);
+        if (picture.has_triangles) add_integers("triangles", picture.triangles);
+      }
+      moments.push_back(std::move(one));
+    }
+    head["moments"] = std::move(moments);
+    const std::string text = head.dump();
+    std::string whole;
+    for (std::size_t k = 0; k < 4; ++k) whole += static_cast<char>(text.size() >> (8 * k) & 0xFF);
+    whole += text;
+    whole += bytes;
+    pictures_.clear();
+    size_ = 0;
+    return base64(gzip(whole));
+  }
+
+ private:
+  std::vector<Picture> pictures_;
+  std::size_t size_ = 0;
+};
+
+json point_json(Vec3 p) { return {p.x, p.y, p.z}; }
+
+json blade_json(const Setup& setup, const Moment& moment) {
+  const BladePose* const pose = moment.is_start ? nullptr : last_lowered(setup, moment.frame);
+  if (pose == nullptr) return nullptr;
+  return {point_json(pose->edge), point_json(pose->along), point_json(pose->back)};
+}
+
+json detail(const Setup& setup, const Moment& moment, const State& state, int32_t pieces, int64_t alive) {
+  return {{"frame", moment.frame},
+          {"stage", name_of(moment.stage)},
+          {"start", moment.is_start},
+          {"particles", alive},
+          {"clusters", state.clusters.number.size()},
+          {"components", pieces},
+          {"removed", state.removed.size() + state.debris.size()},
+          {"blade", blade_json(setup, moment)}};
+}
+
+// The moment that shows a finding: after its stage in its frame, or the next one that there is.
+std::pair<int64_t, bool> moment_of(const std::vector<Moment>& moments, const Finding& finding) {
+  for (std::size_t k = 0; k < moments.size(); ++k) {
+    const Moment& moment = moments[k];
+    if (moment.is_start) continue;
+    if (moment.frame == finding.frame && moment.stage >= finding.stage)
+      return {static_cast<int64_t>(k), moment.stage == finding.stage};
+    if (moment.frame > finding.frame) return {static_cast<int64_t>(k), false};
+  }
+  return {moments.empty() ? -1 : static_cast<int64_t>(moments.size()) - 1, false};
+}
+
+struct Survey {
+  std::vector<Moment> moments;
+  std::vector<FrameEnd> frames;
+  Box reach = kNothing;
+};
+
+// Walks all snapshots once.
+Survey survey_of(const Source& source) {
+  Survey survey;
+  Pieces pieces;
+  std::vector<uint8_t> alive;
+  int64_t removed = 0;
+  const Box outer = outer_box(source.setup.body);
+  for (int64_t i = 0; i < source.count; ++i) {
+    const io::Snapshot snapshot = source.snapshot(i);
+    const State& state = snapshot.state;
+    const bool is_end = snapshot.stage == Stage::skin;
+    survey.moments.push_back({i, state.frame - (i > 0 && is_end ? 1 : 0), snapshot.stage, i == 0});
+    if (!is_end) continue;
+    if (i == 0 || state.alive != alive) {
+      alive = state.alive;
+      pieces = pieces_of(source.setup.body, alive);
+    }
+    for (std::size_t p = 0; p < state.x.size(); ++p) {
+      if (alive[p] != 0 && is_within(state.x[p], outer)) widen(survey.reach, state.x[p]);
+    }
+    removed = std::ssize(state.removed) + std::ssize(state.debris);
+    survey.frames.push_back(
+        {i == 0 ? -1 : state.frame - 1, std::count_if(alive.begin(), alive.end(), [](uint8_t a) { return a != 0; }),
+         std::ssize(state.clusters.number), pieces.count, std::ssize(state.skin.triangles), removed});
+  }
+  return survey;
+}
+
+// How many particles are marked: of a finding in each of its lists, and of all findings together before each has few.
+constexpr std::size_t kMostMarks = 2000, kFewMarks = 60, kManyMarks = 80'000;
+
+std::vector<int32_t> within(const std::vector<int32_t>& particles, int32_t n, std::size_t most, Marks& marks) {
+  std::vector<int32_t> found;
+  for (const int32_t particle : particles) {
+    if (particle < 0 || particle >= n) continue;
+    if (found.size() == most) {
+      marks.is_partly = true;
+      break;
+    }
+    found.push_back(particle);
+  }
+  return found;
+}
+
+// Of each finding, with particles as the body numbers them.
+std::vector<Marks> marks_of(const Source& source, const std::vector<Moment>& moments,
+                            const std::vector<Finding>& findings) {
+  const int32_t n = source.setup.body.particle_count();
+  std::vector<Marks> all;
+  int64_t read = -1;
+  io::Snapshot snapshot;
+  std::size_t marked = 0;
+  for (const Finding& finding : findings) {
+    Marks marks;
+    const std::size_t most = marked < kManyMarks ? kMostMarks : kFewMarks;
+    std::tie(marks.moment, marks.is_exact) = moment_of(moments, finding);
+    marks.particles = within(finding.particles, n, most, marks);
+    marks.path = within(finding.path, n, most, marks);
+    if (marks.moment >= 0 && !finding.clusters.empty()) {
+      if (const int64_t index = moments[static_cast<std::size_t>(marks.moment)].snapshot; index != read) {
+        snapshot = source.snapshot(index);
+        read = index;
+      }
+      std::set<int32_t> members;
+      for (const int32_t cluster : finding.clusters) {
+        for (const int32_t member : members_of(snapshot.state.clusters, cluster, n)) members.insert(member);
+        if (members.size() > most) break;
+      }
+      marks.clusters = within({members.begin(), members.end()}, n, most, marks);
+    }
+    marked += marks.particles.size() + marks.path.size() + marks.clusters.size();
+    all.push_back(std::move(marks));
+  }
+  return all;
+}
+
+Pictures draw(const Source& source, const Survey& survey, const std::vector<Finding>& findings,
+              const std::vector<Marks>& marks, Thinning thinning) {
+  const Body& body = source.setup.body;
+  Pictures result;
+  result.thinning = thinning;
+  result.frames = survey.frames;
+  result.reach_low = or_origin(survey.reach).low;
+  result.reach_high = or_origin(survey.reach).high;
+  result.moments = kept_moments(survey.moments, findings, thinning.every_frame);
+  const Kept kept = kept_particles(body.particle_count(), thinning.every_particle, marks);
+  result.particles = static_cast<int32_t>(kept.particle.size());
+  for (Marks one : marks) {
+    std::tie(one.moment, one.is_exact) = moment_of(result.moments, findings[result.marks.size()]);
+    for (auto* list : {&one.particles, &one.path, &one.clusters}) {
+      for (int32_t& particle : *list) particle = kept.place[static_cast<std::size_t>(particle)];
+    }
+    result.marks.push_back(std::move(one));
+  }
+  // Stretch is seen along edges, which a thinned body does not have.
+  std::vector<int32_t> edge_a, edge_b;
+  for (int32_t i = 0; thinning.every_particle == 1 && i < body.particle_count(); ++i) {
+    for (const int32_t other : body.neighbours(i)) {
+      if (other <= i) continue;
+      edge_a.push_back(i);
+      edge_b.push_back(other);
+    }
+  }
+  const Box outer = outer_box(body);
+  result.details = json::array();
+  Chunk chunk;
+  State before;
+  Pieces pieces;
+  int64_t alive = 0;
+  const auto close = [&] {
+    const bool is_first = result.chunks.empty();
+    static const std::vector<int32_t> kNone;
+    result.chunks.push_back(
+        chunk.finish(outer, is_first ? edge_a : kNone, is_first ? edge_b : kNone, result, body.grid.spacing));
+    result.bytes += std::ssize(result.chunks.back());
+  };
+  for (std::size_t k = 0; k < result.moments.size(); ++k) {
+    const Moment& moment = result.moments[k];
+    State state = source.snapshot(moment.snapshot).state;
+    const bool is_new = chunk.is_empty();  // the first of a chunk says everything
+    if (is_new) result.first_moment.push_back(k);
+    Picture picture;
+    if (is_new || state.x != before.x) picture.x = only(state.x, kept);
+    if (k == 0 || state.alive != before.alive) {
+      pieces = pieces_of(body, state.alive);
+      alive = std::count_if(state.alive.begin(), state.alive.end(), [](uint8_t a) { return a != 0; });
+    }
+    if (is_new || state.alive != before.alive) {
+      picture.alive = only(state.alive, kept);
+      picture.piece = only(pieces.of, kept);
+    }
+    if (is_new || state.clusters.offsets != before.clusters.offsets ||
+        state.clusters.members != before.clusters.members) {
+      const Holders holders = holders_of(state.clusters, body.particle_count());
+      picture.cluster = only(holders.lowest, kept);
+      picture.holders = only(holders.count, kept);
+    }
+    if (is_new || state.skin != before.skin) {
+      add_skin(picture, state, kept);
+      picture.has_owner = is_new || state.skin.owner != before.skin.owner;
+      picture.has_triangles = is_new || state.skin.triangles != before.skin.triangles;
+    }
+    result.details.push_back(detail(source.setup, moment, state, pieces.count, alive));
+    chunk.add(std::move(picture));
+    before = std::move(state);
+    if (k == 0 || chunk.is_full()) close();
+  }
+  if (!chunk.is_empty()) close();
+  return result;
+}
+
+// About as many bytes as a place takes in a chunk, of what is not noise.
+constexpr double kBytesOfPlace = 4.5;
+
+}  // namespace
+
+std::vector<Moment> kept_moments(const std::vector<Moment>& all, const std::vector<Finding>& findings,
+                                 int64_t every_frame) {
+  std::set<int64_t> named;
+  for (const Finding& finding : findings) named.insert(finding.frame);
+  const int64_t last = all.empty() ? 0 : all.back().frame;
+  std::vector<Moment> kept;
+  for (const Moment& moment : all) {
+    // Where frames are left out, those that are kept are seen at their ends, unless somebody asks what a stage did.
+    const bool is_named = named.count(moment.frame) != 0;
+    const bool is_in_turn = moment.frame % every_frame == 0 || moment.frame == last;
+    if (moment.is_start || is_named || (is_in_turn && (every_frame == 1 || moment.stage == Stage::skin)))
+      kept.push_back(moment);
+  }
+  return kept;
+}
+
+Pictures pictures_of(const Source& source, const std::vector<Finding>& findings, int64_t most_bytes) {
+  const Survey survey = survey_of(source);
+  const std::vector<Marks> marks = marks_of(source, survey.moments, findings);
+  const int64_t frames = std::max<int64_t>(1, std::ssize(survey.frames));
+  const auto n = static_cast<double>(source.setup.body.particle_count());
+  int64_t vertices = 0;
+  for (const FrameEnd& end : survey.frames) vertices = std::max(vertices, end.triangles / 2);
+  Thinning thinning;
+  // A guess first, so that a large run is not drawn in full only to be thrown away.
+  const auto guessed = [&] {
+    const auto shown = static_cast<double>((frames - 1) / thinning.every_frame + 1);
+    return shown * kBytesOfPlace * (n / thinning.every_particle + static_cast<double>(vertices));
+  };
+  const auto thin_more = [&] {
+    const bool has_frames = frames / (thinning.every_frame + 1) >= kFewestFrames;
+    const bool has_particles = n / (thinning.every_particle + 1) >= 20'000;
+    if (has_frames) {
+      ++thinning.every_frame;
+    } else if (has_particles) {
+      ++thinning.every_particle;
+    } else if (thinning.every_frame < frames) {
+      ++thinning.every_frame;
+    } else {
+      return false;
+    }
+    return true;
+  };
+  while (guessed() > static_cast<double>(most_bytes) && thin_more()) {
+  }
+  for (;;) {
+    Pictures pictures = draw(source, survey, findings, marks, thinning);
+    if (pictures.bytes <= most_bytes) return pictures;
+    // By as much as it was too large, at once.
+    const double goal = guessed() * static_cast<double>(most_bytes) / static_cast<double>(pictures.bytes);
+    bool is_thinner = false;
+    while (guessed() > goal * 0.98 && thin_more()) is_thinner = true;
+    if (!is_thinner) return pictures;
+  }
+}
+
+}  // namespace cutproof::report

@@ -1,0 +1,29 @@
+// What a page shows of a state beside what stands in it: the pieces of the tissue, and each particle's clusters.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "model/body.h"
+#include "model/clusters.h"
+
+namespace cutproof::report {
+
+struct Pieces {
+  std::vector<int32_t> of;  // [n] piece of each particle, -1 of the dead; 0 is the largest, of equals that of the
+                            // lowest particle
+  int32_t count = 0;
+};
+// Components of the alive particles along edges of the body. `alive`: [n].
+Pieces pieces_of(const Body& body, const std::vector<uint8_t>& alive);
+
+// Clusters of a state that may be as wrong as it likes: nothing is read that is not there.
+struct Holders {
+  std::vector<int32_t> lowest;  // [n] lowest member of the first cluster that holds a particle, -1 without one: it
+                                // stays the same where clusters are numbered anew
+  std::vector<uint8_t> count;   // [n] how many clusters hold it, at most 255
+};
+Holders holders_of(const Clusters& clusters, int32_t particles);
+// Particles of the cluster of this number, none twice; empty if there is no such cluster.
+std::vector<int32_t> members_of(const Clusters& clusters, int32_t number, int32_t particles);
+
+}  // namespace cutproof::report

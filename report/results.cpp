@@ -1,0 +1,340 @@
+#include "report/results.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "model/error.h"
+#include "model/io/columns.h"
+#include "model/io/json_reader.h"
+#include "model/io/limits.h"
+
+namespace cutproof::report {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kRemedy = "give what `cutproof run --json F` or `cutproof check --json F` has written";
+
+constexpr int64_t kMostCount = 1'000'000'000'000;
+
+// A field of a document, which knows where it stands.
+struct Field {
+  const json* value;  // null: it is not there
+  const std::string& file;
+  std::string path;
+
+  [[noreturn]] void refuse(const std::string& problem) const { throw InputError(file, path, problem, kRemedy); }
+  Field operator[](const char* name) const {
+    if (!value->is_object()) refuse("this is no object");
+    const auto found = value->find(name);
+    return {found == value->end() ? nullptr : &*found, file, path.empty() ? name : path + "." + name};
+  }
+  const json& there() const {
+    if (value == nullptr) refuse("this is missing");
+    return *value;
+  }
+  std::string text() const {
+    if (!there().is_string()) refuse("this is no text");
+    return value->get<std::string>();
+  }
+  std::string text_or(const char* otherwise) const { return value == nullptr ? otherwise : text(); }
+  bool flag() const {
+    if (!there().is_boolean()) refuse("this is neither true nor false");
+    return value->get<bool>();
+  }
+  bool flag_or(bool otherwise) const { return value == nullptr ? otherwise : flag(); }
+  int64_t count() const {
+    if (!there().is_number_integer()) refuse("this is no whole number");
+    if (value->is_number_unsigned() &&
+        value->get<uint64_t>() > static_cast<uint64_t>(std::numeric_limits<int64_t>::max()))
+      refuse("this is too large");
+    const auto number = value->get<int64_t>();
+    if (number < 0) refuse("this is below 0");
+    // So that no sum of such numbers ends beyond what an integer holds.
+    if (number > kMostCount) refuse("this is too large");
+    return number;
+  }
+  int64_t count_or(int64_t otherwise) const { return value == nullptr ? otherwise : count(); }
+  // A number, or "nan", "inf", "-inf".
+  double number() const {
+    if (there().is_number()) return value->get<double>();
+    if (value->is_string()) {
+      const auto& word = value->get_ref<const std::string&>();
+      if (word == "nan") return std::numeric_limits<double>::quiet_NaN();
+      if (word == "inf") return std::numeric_limits<double>::infinity();
+      if (word == "-inf") return -std::numeric_limits<double>::infinity();
+    }
+    refuse("this is no number");
+  }
+  std::optional<double> number_or_null() const {
+    if (value == nullptr || value->is_null()) return std::nullopt;
+    const double found = number();
+    return std::isfinite(found) ? std::optional(found) : std::nullopt;
+  }
+  std::size_t length() const {
+    if (!there().is_array()) refuse("this is no list");
+    return value->size();
+  }
+  Field at(std::size_t k) const { return {&(*value)[k], file, path + "[" + std::to_string(k) + "]"}; }
+  std::vector<std::string> texts() const {
+    std::vector<std::string> found;
+    for (std::size_t k = 0; value != nullptr && k < length(); ++k) found.push_back(at(k).text());
+    return found;
+  }
+  std::vector<int32_t> numbers() const {
+    std::vector<int32_t> found;
+    for (std::size_t k = 0; value != nullptr && k < std::min(length(), kMostWitnesses); ++k) {
+      const json& one = (*value)[k];
+      if (!one.is_number_integer() || one.get<int64_t>() < std::numeric_limits<int32_t>::min() ||
+          one.get<int64_t>() > std::numeric_limits<int32_t>::max())
+        at(k).refuse("this is the number of no particle or cluster");
+      found.push_back(one.get<int32_t>());
+    }
+    return found;
+  }
+  Stage stage() const {
+    const std::string name = text();
+    for (const Stage one : kStages) {
+      if (name == name_of(one)) return one;
+    }
+    refuse("'" + name + "' is none of the six stages");
+  }
+};
+
+std::string figure(double value) { return fmt::format("{:.4g}", value); }
+
+// Properties of which measured / bound says how much room there is: those of the summary. What a scene expects and
+// what is held against the run as a whole has a bound that is to be met, or exceeded.
+using Measured = std::set<std::pair<std::string, Stage>>;
+Measured measured_properties(const Field& document) {
+  Measured found;
+  const Field properties = document["properties"];
+  for (std::size_t k = 0; properties.value != nullptr && k < properties.length(); ++k)
+    found.emplace(properties.at(k)["property"].text(), properties.at(k)["stage"].stage());
+  return found;
+}
+
+struct Row {
+  PropertyRow shown;
+  double worst = -1;  // measured / bound of the verdict shown
+};
+
+void add_verdict(const Field& verdict, const Measured* known, std::vector<Row>& rows,
+                 std::map<std::pair<std::string, Stage>, std::size_t>& at, Results& results) {
+  const std::string property = verdict["property"].text();
+  const Stage stage = verdict["stage"].stage();
+  const auto [place, is_new] = at.try_emplace({property, stage}, rows.size());
+  if (is_new) {
+    rows.emplace_back();
+    rows.back().shown.property = property;
+    rows.back().shown.stage = stage;
+  }
+  Row& row = rows[place->second];
+  PropertyRow& shown = row.shown;
+  const bool holds = verdict["holds"].flag(), is_expected = !holds && verdict["expected_failure"].flag_or(false);
+  const int64_t checked = verdict["checked"].count(), frame = verdict["frame"].count();
+  const double measured = verdict["measured"].number(), bound = verdict["bound"].number();
+  const std::string given_unit = verdict["unit"].text();
+  const std::string unit = given_unit == "1" ? "" : given_unit, source = verdict["bound_source"].text();
+  const bool has_ratio = (known == nullptr || known->count({property, stage}) != 0) && std::isfinite(measured) &&
+                         std::isfinite(bound) && bound > 0;
+  const std::optional<double> of_bound = has_ratio ? std::optional(measured / bound) : std::nullopt;
+  ++results.verdicts;
+  shown.unit = unit;
+  if (shown.bound_source.empty()) shown.bound_source = source;
+  shown.checked += checked;
+  shown.undecided += verdict["undecided"].count_or(0);
+  if (holds && checked == 0) {
+    if (shown.judged == 0 && shown.vacuous.empty()) shown.vacuous = verdict["vacuous"].text_or("");
+    return;
+  }
+  const bool is_first_failure = !holds && shown.failed + shown.expected == 0;
+  if (is_first_failure || (shown.failed + shown.expected == 0 && of_bound.value_or(0) > row.worst)) {
+    row.worst = of_bound.value_or(0);
+    shown.frame = frame;
+    shown.measured = figure(measured);
+    shown.bound = figure(bound);
+    shown.of_bound = of_bound;
+  }
+  ++shown.judged;
+  if (holds) return;
+  ++(is_expected ? shown.expected : shown.failed);
+  if (shown.failed + shown.expected > kMostFindingsOfOne) {
+    ++results.findings_left_out;
+    return;
+  }
+  const Field witness = verdict["witness"];
+  witness.there();
+  results.findings.push_back({property, stage, frame, figure(measured), figure(bound), unit, of_bound, source,
+                              witness["text"].text(), witness["clusters"].numbers(), witness["particles"].numbers(),
+                              witness["path"].numbers(), is_expected});
+}
+
+void add_verdicts(const Field& document, Results& results) {
+  std::vector<Row> rows;
+  std::map<std::pair<std::string, Stage>, std::size_t> at;
+  const Measured known = measured_properties(document);
+  const auto add_list = [&](const Field& list, const Measured* measured) {
+    const std::size_t count = list.length();
+    for (std::size_t k = 0; k < count; ++k) add_verdict(list.at(k), measured, rows, at, results);
+  };
+  if (results.checked) add_list(document["verdicts"], &known);
+  if (const Field against = document["against"]; against.value != nullptr) {
+    results.checked = true;
+    add_list(against["verdicts"], nullptr);
+  }
+  for (Row& row : rows) {
+    if (row.shown.judged > 0) row.shown.vacuous.clear();
+    results.rows.push_back(std::move(row.shown));
+  }
+  std::stable_sort(results.rows.begin(), results.rows.end(), [](const PropertyRow& a, const PropertyRow& b) {
+    const auto rank = [](const PropertyRow& row) {
+      return row.failed > 0 ? 0 : row.expected > 0 ? 1 : row.judged > 0 ? 2 : 3;
+    };
+    // Of those that hold, the nearest to its bound first.
+    const int of_a = rank(a), of_b = rank(b);
+    return of_a != of_b ? of_a < of_b : of_a == 2 && a.of_bound.value_or(-1) > b.of_bound.value_or(-1);
+  });
+  std::stable_sort(results.findings.begin(), results.findings.end(), [](const Finding& a, const Finding& b) {
+    return std::tuple(a.is_expected, a.frame, a.stage) < std::tuple(b.is_expected, b.frame, b.stage);
+  });
+  if (results.findings.size() > kMostFindings) {
+    results.findings_left_out += static_cast<int64_t>(results.findings.size() - kMostFindings);
+    results.findings.resize(kMostFindings);
+  }
+}
+
+void set_value(std::vector<Series>& all, const std::string& name, std::size_t frames, std::size_t frame,
+               std::optional<double> value) {
+  auto series = std::find_if(all.begin(), all.end(), [&](const Series& one) { return one.name == name; });
+  if (series == all.end()) series = all.insert(all.end(), {name, std::vector<std::optional<double>>(frames)});
+  if (frame < frames) series->values[frame] = value;
+}
+
+// Arrays of equal length: in which frame, and what.
+void add_columns(const Field& frames, const char* column, const std::string& name, std::size_t count,
+                 std::vector<Series>& errors) {
+  const Field frame = frames["frame"], values = frames[column];
+  if (values.value == nullptr) return;
+  if (frame.length() != values.length()) values.refuse("this has not as many entries as 'frame'");
+  for (std::size_t k = 0; k < values.length(); ++k)
+    set_value(errors, name, count, static_cast<std::size_t>(frame.at(k).count()), values.at(k).number_or_null());
+}
+
+void add_series(const Field& document, Results& results) {
+  const Field frames = document["frames"];
+  const std::size_t count = frames.length();
+  for (std::size_t k = 0; k < count; ++k) {
+    const Field seconds = frames.at(k)["seconds"];
+    for (const Stage stage : kStages) {
+      if (seconds.value == nullptr) continue;
+      const Field one = seconds[std::string(name_of(stage)).c_str()];
+      if (one.value != nullptr) set_value(results.seconds, std::string(name_of(stage)), count, k, one.number_or_null());
+    }
+  }
+  // In the order of stages, whichever came first.
+  std::vector<Series> ordered;
+  for (const Stage stage : kStages) {
+    for (Series& one : results.seconds) {
+      if (one.name == name_of(stage)) ordered.push_back(std::move(one));
+    }
+  }
+  results.seconds = std::move(ordered);
+  if (const Field against = document["against"]; against.value != nullptr) {
+    if (const Field lockstep = against["lockstep"]; lockstep.value != nullptr && !lockstep.value->is_null())
+      add_columns(lockstep["frames"], "position_max", "greatest, from the same state", count, results.errors);
+    if (const Field free = against["free_running"]; free.value != nullptr && !free.value->is_null()) {
+      add_columns(free["frames"], "position_max", "greatest, running freely", count, results.errors);
+      add_columns(free["frames"], "position_rms", "RMS, running freely", count, results.errors);
+    }
+  }
+  if (const Field errors = document["errors"]; errors.value != nullptr) {
+    if (const Field solver = errors["solver"]; solver.value != nullptr && !solver.value->is_null()) {
+      const Field rows = solver["frames"];
+      for (std::size_t k = 0; k < rows.length(); ++k) {
+        const Field row = rows.at(k);
+        set_value(results.errors, "greatest, of the solver", count, static_cast<std::size_t>(row["frame"].count()),
+                  row["max"].number_or_null());
+      }
+    }
+    if (const Field step = errors["time_step"]; step.value != nullptr && !step.value->is_null()) {
+      const Field rms = step["rms"];
+      for (std::size_t k = 0; k < rms.length(); ++k)
+        set_value(results.errors, "RMS, of the time step", count, k, rms.at(k).number_or_null());
+    }
+  }
+}
+
+}  // namespace
+
+Results results_of(const json& given, const std::string& file) {
+  const Field document = {&given, file, ""};
+  if (!given.is_object()) document.refuse("this is no result of cutproof");
+  Results results;
+  const std::string format = document["format"].text();
+  if (format != "cutproof.run" && format != "cutproof.check")
+    document["format"].refuse("'" + format + "' is no result of a run or of a check, of which alone a page is made");
+  results.command = format.substr(format.find('.') + 1);
+  if (const int64_t version = document["format_version"].count(); version != 2)
+    document["format_version"].refuse(fmt::format("this is version {}, and only 2 is read", version));
+  results.version = document["cutproof"].text();
+  results.scene = document["scene"].text();
+  results.backend = document["backend"].text();
+  results.particles = document["body"]["particles"].count();
+  results.checked = document["checked"].flag();
+  add_verdicts(document, results);
+  int64_t failed = 0;
+  for (const PropertyRow& row : results.rows) failed += row.failed;
+  results.holds = results.checked && failed == 0;
+  // A run of which nothing was judged does not hold, though nothing fails.
+  if (const Field summary = document["summary"]; summary.value != nullptr)
+    results.holds = results.holds && summary["holds"].flag();
+  results.notes = document["notes"].texts();
+  results.not_reached = document["not_reached"].texts();
+  add_series(document, results);
+  return results;
+}
+
+Results read_results(const std::string& file) {
+  return results_of(io::read_json(file, io::kResultsLimits,
+                                  "Give what `cutproof run --json F` or `cutproof check --json F` has written."),
+                    file);
+}
+
+std::string summary_sentence(const Results& results) {
+  const std::string scene = results.scene.empty() ? "a scene without a name" : "scene " + results.scene;
+  const std::string subject =
+      results.command == "run" ? fmt::format("cutproof ran {} on backend {}", scene, results.backend)
+      : results.command == "check"
+          ? fmt::format("cutproof judged a recording of {}, simulated by backend {}", scene, results.backend)
+          : fmt::format("This is a recording of {}, simulated by backend {}", scene, results.backend);
+  if (!results.checked) return subject + ". Nothing was judged.";
+  int64_t looked = 0, failing = 0;
+  for (const PropertyRow& row : results.rows) {
+    looked += row.judged > 0;
+    failing += row.failed > 0;
+  }
+  const auto first = std::find_if(results.findings.begin(), results.findings.end(),
+                                  [](const Finding& finding) { return !finding.is_expected; });
+  if (failing == 0 && !results.holds) return subject + ". It does not hold: nothing was judged, or not all of it.";
+  if (failing == 0) {
+    const std::string what = looked == 1 ? "the one property that was judged holds"
+                                         : fmt::format("all {} properties that were judged hold", looked);
+    return subject + fmt::format(": {}, in {} verdicts.", what, io::grouped(results.verdicts));
+  }
+  std::string sentence = subject + fmt::format(": {} of {} properties {}", looked - failing, looked,
+                                               looked - failing == 1 ? "holds" : "hold");
+  if (first == results.findings.end()) return sentence + ".";
+  return sentence + fmt::format("; {} fails{} in frame {} after {}.", first->property, failing > 1 ? " first," : "",
+                                first->frame, name_of(first->stage));
+}
+
+}  // namespace cutproof::report

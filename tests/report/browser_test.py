@@ -1,0 +1,267 @@
+#!/usr/bin/env python3
+"""Pages of real runs in a real browser: what they show, what a click does, and that they ask nobody for anything.
+Usage: browser_test.py CUTPROOF CXX SOURCES WORK
+Exit status 77, with the name of what is missing, where there is no Chromium, no driver of it or no selenium."""
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import time
+
+program, cxx, sources, work = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3]), pathlib.Path(sys.argv[4]).resolve()
+chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
+try:
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
+except ImportError:
+    print("Report.InABrowser is skipped: python3-selenium is not installed")
+    sys.exit(77)
+if not chromium or not driver:
+    print(f"Report.InABrowser is skipped: there is no {'chromium' if not chromium else 'chromium-driver'}")
+    sys.exit(77)
+
+shutil.rmtree(work, ignore_errors=True)
+work.mkdir(parents=True)
+environment = dict(os.environ, PATH=f"{pathlib.Path(program).parent}:{os.environ['PATH']}")
+
+
+def run(arguments, status):
+    done = subprocess.run(arguments if isinstance(arguments, str) else [str(one) for one in arguments],
+                          shell=isinstance(arguments, str), cwd=work, env=environment, capture_output=True, text=True,
+                          timeout=200)
+    assert done.returncode == status, f"{arguments}: {done.returncode}\n{done.stdout}{done.stderr}"
+    return done.stdout + done.stderr
+
+
+class Browser:
+    """A page, opened as by double click, with the network watched and every line of the console kept."""
+
+    def __init__(self, page, *flags, width=1280, dark=False):
+        options = webdriver.ChromeOptions()
+        for flag in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle",
+                     "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--window-size=1280,1000", *flags):
+            options.add_argument(flag)
+        options.binary_location = chromium
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+        self.driver = webdriver.Chrome(service=Service(driver), options=options)
+        self.driver.set_script_timeout(60)
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [
+            {"name": "prefers-color-scheme", "value": "dark" if dark else "light"},
+            {"name": "prefers-reduced-motion", "value": "reduce"}]})
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
+                                    {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False})
+        self.url = (work / page).as_uri()
+        begin = time.monotonic()
+        self.driver.get(self.url)
+        self.until("return document.documentElement.dataset.ready === 'true'")
+        print(f"{page}: {(work / page).stat().st_size / 1e6:.2f} MB, there after {time.monotonic() - begin:.1f} s")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, *_):
+        try:
+            if kind is None:
+                log = [line for line in self.driver.get_log("browser")]
+                assert not log, f"the console says: {log}"
+                asked = []
+                for entry in self.driver.get_log("performance"):
+                    message = json.loads(entry["message"])["message"]
+                    if message["method"] == "Network.requestWillBeSent":
+                        asked.append(message["params"]["request"]["url"])
+                outside = [url for url in asked if url != self.url and not url.startswith("data:")]
+                assert not outside, f"the page asked for {outside}"
+        finally:
+            self.driver.quit()
+
+    def ask(self, script, *arguments):
+        return self.driver.execute_script(script, *arguments)
+
+    def until(self, script, *arguments, seconds=60):
+        end = time.monotonic() + seconds
+        while not self.ask(script, *arguments):
+            assert time.monotonic() < end, f"not within {seconds} s: {script}"
+            time.sleep(0.02)
+
+    def text(self, selector):
+        return self.driver.find_element(By.CSS_SELECTOR, selector).text
+
+    def shown(self, moment, finding=""):
+        """Until the view shows a moment, and a finding in it."""
+        self.until("return document.documentElement.dataset.shown === arguments[0]", f"{moment}/{finding}")
+        self.driver.execute_async_script("const done = arguments[0];"
+                                         "requestAnimationFrame(() => requestAnimationFrame(() => done()));")
+
+    def scrub(self, moment):
+        self.ask("const range = document.getElementById('scrub'); range.value = arguments[0];"
+                 "range.dispatchEvent(new Event('input'));", moment)
+        self.shown(moment)
+
+    def pixels(self):
+        """Every pixel of the view, as text; and how many are not of its ground."""
+        return self.driver.execute_async_script("""
+          const done = arguments[0], canvas = document.getElementById('canvas');
+          requestAnimationFrame(() => {
+            const copy = document.createElement('canvas');
+            [copy.width, copy.height] = [canvas.width, canvas.height];
+            const pen = copy.getContext('2d');
+            pen.drawImage(canvas, 0, 0);
+            const all = pen.getImageData(0, 0, copy.width, copy.height).data;
+            let drawn = 0, sum = 0, orange = 0;
+            for (let i = 0; i < all.length; i += 4) {
+              if (all[i] !== all[0] || all[i + 1] !== all[1] || all[i + 2] !== all[2]) ++drawn;
+              if (all[i] > 150 && all[i] > 1.6 * all[i + 1] && all[i + 2] < 40) ++orange;
+              sum = (Math.imul(sum, 31) + all[i] + 7 * all[i + 1] + 13 * all[i + 2]) | 0;
+            }
+            done({sum, share: drawn / (all.length / 4), orange});
+          });""")
+
+    def data(self, what):
+        return self.ask(f"return JSON.parse(document.getElementById('data').textContent).{what}")
+
+
+def picture(browser, name):
+    browser.driver.save_screenshot(str(work / f"{name}.png"))
+
+
+# --- Three runs: one that holds, one that fails after split, and one whose names are hostile ---
+
+box = {"version": 1, "name": "two halves",
+       "body": {"shape": {"kind": "box", "size": [0.08, 0.05, 0.05]}, "spacing": 0.01},
+       "frame": {"settle": 0.016}, "detect": {"criterion": "geometric"}, "ground": {"friction": 0.5},
+       "blade": {"speed": 2, "strokes": [{"points": [[0.5, 0.5, 1.3], [0.5, 0.5, -0.3]], "along": [0, 1, 0]}]},
+       "expect": {"components_at_end": 2}}
+hostile = "</script><script>window.hacked=1</script><img src=x onerror=window.hacked=1>"
+(work / "halves.json").write_text(json.dumps(box))
+(work / "hostile.json").write_text(json.dumps(dict(box, name=hostile, expect={"components_at_end": 5})))
+run([program, "run", "halves.json", "--check", "--report", "holds.html"], 0)
+run([program, "run", "hostile.json", "--check", "topology", "--report", "hostile.html"], 1)
+# The simulator of the tutorial, whose split takes particles for neighbours that are none.
+run([cxx, "-std=c++20", "-O1", "-shared", "-fPIC", f"-I{sources / 'guests/include'}",
+     sources / "guests/examples/splitter.cpp", "-o", "libsplitter.so"], 0)
+run([program, "run", "three_cuts", "--backend", "plugin:./libsplitter.so", "--check", "topology", "--record", "seen",
+     "--json", "seen.json", "--report", "fails.html"], 1)
+run([program, "report", "seen", "seen.json", "-o", "reported.html"], 0)
+run([program, "report", "seen", "-o", "unjudged.html"], 0)
+
+# --- What holds ---
+
+with Browser("holds.html") as page:
+    assert page.driver.title == "Holds: two halves · cutproof report", page.driver.title
+    summary = page.text("#summary")
+    assert "cutproof ran scene two halves on backend reference: all" in summary and "hold" in summary, summary
+    assert page.text("#findings-title") == "Nothing fails"
+    assert not page.driver.find_elements(By.CSS_SELECTOR, "[data-finding]")
+    last = page.data("moments.length") - 1
+    first = page.pixels()
+    assert 0.1 < first["share"] < 0.7, f"the body fills {first['share']} of the view"
+    page.scrub(last)
+    end = page.pixels()
+    assert end["sum"] != first["sum"], "scrubbing changed no pixel"
+    assert "2 pieces" in page.text("#status"), page.text("#status")
+    # By keys, in the view.
+    canvas = page.driver.find_element(By.ID, "canvas")
+    canvas.send_keys(",")
+    page.shown(last - 1)
+    canvas.send_keys(".")
+    page.shown(last)
+    canvas.send_keys(Keys.ARROW_LEFT)
+    assert page.pixels()["sum"] != end["sum"], "an arrow did not turn the view"
+    canvas.send_keys("0")
+    time.sleep(0.1)
+    assert page.pixels()["sum"] == end["sum"], "0 did not bring the whole body back"
+    # What is shown, and by which colours.
+    seen = {end["sum"]}
+    for colour in ("cluster", "displacement", "stretch", "holders"):
+        page.ask("const s = document.getElementById('colour'); s.value = arguments[0];"
+                 "s.dispatchEvent(new Event('change'));", colour)
+        time.sleep(0.1)
+        seen.add(page.pixels()["sum"])
+    page.ask("const s = document.getElementById('show'); s.value = 'particles'; s.dispatchEvent(new Event('change'));")
+    time.sleep(0.1)
+    seen.add(page.pixels()["sum"])
+    page.driver.find_element(By.ID, "removed").click()
+    time.sleep(0.1)
+    seen.add(page.pixels()["sum"])
+    assert len(seen) == 7, f"of 7 ways to look at it {len(seen)} differ"
+    # It plays from the start to the end, where it stops.
+    page.driver.find_element(By.ID, "play").click()
+    page.until("return document.documentElement.dataset.moment == arguments[0]"
+               " && document.getElementById('play').textContent.includes('Play')", last)
+    # A property leads to the frame in which it is nearest to its bound.
+    page.scrub(0)
+    button = page.driver.find_element(By.CSS_SELECTOR, "#verdicts button")
+    page.ask("arguments[0].click()", button)
+    page.until("return document.documentElement.dataset.moment != 0")
+    assert button.text in page.text("#status").lower(), (button.text, page.text("#status"))
+    # Plots have units, words, and the same as a table.
+    for plot in page.driver.find_elements(By.CSS_SELECTOR, ".plot"):
+        assert len(plot.find_elements(By.CSS_SELECTOR, ".axis")) == 2
+        assert plot.find_element(By.TAG_NAME, "svg").get_attribute("aria-label")
+        page.ask("arguments[0].open = true", plot.find_element(By.TAG_NAME, "details"))
+    page.until("return document.querySelectorAll('.plot table').length === document.querySelectorAll('.plot').length")
+
+# --- What fails: from the verdict to the place ---
+
+for name in ("fails.html", "reported.html"):
+    with Browser(name) as page:
+        assert "fails" in page.text("#summary") and "after split" in page.text("#summary"), page.text("#summary")
+        first = page.driver.find_element(By.CSS_SELECTOR, "[data-finding='0']")
+        row = page.driver.find_element(By.CSS_SELECTOR, "#verdicts tbody tr")
+        assert "fails" in row.text, f"the first row is {row.text}"
+        before = page.pixels()
+        assert before["orange"] == 0
+        first.click()
+        marks = page.data("findings[0].marks")
+        assert marks["exact"] and marks["particles"]
+        page.shown(marks["moment"], 0)
+        after = page.pixels()
+        assert after["orange"] > 100, f"{after['orange']} pixels are marked"
+        assert page.data("findings[0].text") in page.text("#witness")
+        assert f"Frame {page.data('findings[0].frame')}, after split" in page.text("#status"), page.text("#status")
+        assert first.get_attribute("aria-pressed") == "true"
+        # Elsewhere nothing is marked.
+        page.scrub(0)
+        assert page.pixels()["orange"] == 0 and page.text("#witness") == ""
+        command = page.text(".command")
+        if name == "fails.html":
+            page.ask("document.querySelector('.again button').click()")
+            page.until("return document.querySelector('.again [role=status]').textContent !== ''")
+            assert "split exactness" in run(command, 1), "the command shows something else"
+        else:
+            assert command == "cutproof check seen", command
+            run(command, 1)
+
+with Browser("unjudged.html") as page:
+    assert "Nothing was judged" in page.text("#summary")
+    assert page.text(".command") == "cutproof check seen"
+    assert not page.driver.find_elements(By.ID, "verdicts")
+
+# --- Names are text ---
+
+with Browser("hostile.html") as page:
+    assert page.ask("return window.hacked === undefined && document.images.length === 0")
+    assert page.text("#title") == hostile, page.text("#title")
+    assert len(page.driver.find_elements(By.CSS_SELECTOR, "script:not([type])")) == 1
+with Browser("hostile.html") as page:
+    # Nor does a script run that gets into the page all the same: the policy allows the page's own alone.
+    page.ask("const s = document.createElement('script'); s.textContent = 'window.hacked = 1'; document.body.append(s);")
+    assert page.ask("return window.hacked === undefined")
+    assert page.driver.get_log("browser"), "the refusal is logged, and read here so that it counts as no error"
+
+# --- Without WebGL, on a phone, in the dark ---
+
+with Browser("fails.html", "--disable-gpu", "--disable-software-rasterizer", "--disable-3d-apis") as page:
+    assert "no 3D view" in page.text("#no-webgl")
+    page.driver.find_element(By.CSS_SELECTOR, "[data-finding='0']").click()
+    page.until("return document.documentElement.dataset.moment == arguments[0]", page.data("findings[0].marks.moment"))
+    assert "after split" in page.text("#status") and page.text("#witness")
+for width, dark in ((390, False), (390, True), (1280, True)):
+    with Browser("fails.html", width=width, dark=dark) as page:
+        assert page.ask("return document.documentElement.scrollWidth <= window.innerWidth"), f"wider than {width} pixels"
+        picture(page, f"{width}_{'dark' if dark else 'light'}")
+print("pages show what happened")

@@ -1,0 +1,295 @@
+// Which moments, particles and verdicts a page shows, and what is left out of it.
+#include "report/page.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "model/error.h"
+#include "report/assets.h"
+#include "report/pieces.h"
+#include "tests/report/made_run.h"
+
+namespace cutproof::report {
+namespace {
+
+using nlohmann::json;
+
+json verdict(const std::string& property, const std::string& stage, int64_t frame, bool holds, double measured,
+             double bound) {
+  json one = {{"property", property},
+              {"stage", stage},
+              {"backend", "mine"},
+              {"frame", frame},
+              {"body", 0},
+              {"holds", holds},
+              {"measured", measured},
+              {"bound", bound},
+              {"unit", "h"},
+              {"bound_source", "some page"},
+              {"checked", 3}};
+  if (!holds) one["witness"] = {{"text", "here"}, {"clusters", {7}}, {"particles", {3, 999'999}}, {"path", {4}}};
+  return one;
+}
+
+json document(const std::vector<json>& verdicts) {
+  json properties = json::array();
+  for (const json& one : verdicts) {
+    if (!one.at("property").get<std::string>().starts_with("expected"))
+      properties.push_back({{"property", one.at("property")}, {"stage", one.at("stage")}});
+  }
+  return {{"format", "cutproof.run"},   {"format_version", 2},  {"cutproof", "1"},
+          {"scene", "block"},           {"backend", "mine"},    {"checked", true},
+          {"frames", json::array()},    {"verdicts", verdicts}, {"properties", properties},
+          {"body", {{"particles", 27}}}};
+}
+
+// --- Results ---
+
+TEST(Results, PutWhatFailsFirstAndThenTheNearestToItsBound) {
+  const Results results = results_of(
+      document({verdict("far", "step", 0, true, 0.1, 1), verdict("near", "step", 0, true, 0.5, 1),
+                verdict("near", "step", 4, true, 0.9, 1), verdict("wrong", "split", 9, false, 2, 1),
+                verdict("wrong", "split", 3, false, 3, 1), verdict("expected pieces", "skin", 9, true, 4, 4)}),
+      "results.json");
+  std::vector<std::string> order;
+  for (const PropertyRow& row : results.rows) order.push_back(row.property);
+  EXPECT_EQ(order, (std::vector<std::string>{"wrong", "near", "far", "expected pieces"}));
+  EXPECT_EQ(results.rows[1].frame, 4);
+  EXPECT_EQ(results.rows[1].of_bound, 0.9);
+  EXPECT_EQ(results.rows[3].of_bound, std::nullopt) << "what is to be met is no room that is left";
+  ASSERT_EQ(results.findings.size(), 2u);
+  EXPECT_EQ(results.findings[0].frame, 3);
+  EXPECT_FALSE(results.holds);
+  EXPECT_EQ(summary_sentence(results),
+            "cutproof ran scene block on backend mine: 3 of 4 properties hold; wrong fails in frame 3 after split.");
+}
+
+TEST(Results, OfARunThatHoldsAndOfOneThatWasNotJudgedSaySo) {
+  json holds = document({verdict("near", "step", 0, true, 0.5, 1)});
+  EXPECT_EQ(summary_sentence(results_of(holds, "f")),
+            "cutproof ran scene block on backend mine: the one property that was judged holds, in 1 verdicts.");
+  holds["checked"] = false;
+  EXPECT_EQ(summary_sentence(results_of(holds, "f")), "cutproof ran scene block on backend mine. Nothing was judged.");
+}
+
+TEST(Results, ThatAreExpectedToFailDoNotCount) {
+  json expected = verdict("isolation", "skin", 2, false, 2, 0);
+  expected["expected_failure"] = true;
+  const Results results = results_of(document({expected, verdict("near", "step", 0, true, 0.5, 1)}), "f");
+  EXPECT_TRUE(results.holds);
+  EXPECT_TRUE(results.findings.at(0).is_expected);
+}
+
+TEST(Results, KeepSoManyFailuresOfOnePropertyAndCountTheOthers) {
+  std::vector<json> verdicts;
+  for (int frame = 0; frame < 100; ++frame) verdicts.push_back(verdict("wrong", "split", frame, false, 2, 1));
+  const Results results = results_of(document(verdicts), "f");
+  EXPECT_EQ(std::ssize(results.findings), kMostFindingsOfOne);
+  EXPECT_EQ(results.findings_left_out, 100 - kMostFindingsOfOne);
+  EXPECT_EQ(results.rows.at(0).failed, 100);
+}
+
+TEST(Results, ThatAreNoneAreRefusedByFieldWithARemedy) {
+  const json good = document({verdict("wrong", "split", 3, false, 3, 1)});
+  const auto refused = [&](const std::string& pointer, const json& value, const std::string& field) {
+    json bad = good;
+    bad[json::json_pointer(pointer)] = value;
+    try {
+      results_of(bad, "results.json");
+      ADD_FAILURE() << pointer << " was read";
+    } catch (const InputError& error) {
+      EXPECT_EQ(error.file(), "results.json");
+      EXPECT_EQ(error.field(), field);
+      EXPECT_NE(std::string(error.what()).find("remedy"), std::string::npos) << error.what();
+    }
+  };
+  refused("/format", "cutproof.bench", "format");
+  refused("/format_version", 3, "format_version");
+  refused("/scene", 5, "scene");
+  refused("/verdicts", "none", "verdicts");
+  refused("/verdicts/0/stage", "boil", "verdicts[0].stage");
+  refused("/verdicts/0/holds", 1, "verdicts[0].holds");
+  refused("/verdicts/0/frame", -1, "verdicts[0].frame");
+  refused("/verdicts/0/measured", "much", "verdicts[0].measured");
+  refused("/verdicts/0/witness", nullptr, "verdicts[0].witness");
+  refused("/verdicts/0/witness/particles", {1.5}, "verdicts[0].witness.particles[0]");
+  refused("/body/particles", nullptr, "body.particles");
+}
+
+// --- Pieces ---
+
+TEST(Pieces, AreNumberedByTheirSize) {
+  const auto setup = block(3);
+  std::vector<uint8_t> alive(27, 1);
+  for (std::size_t i = 0; i < 27; ++i) alive[i] = i / 9 == 1 ? 0 : 1;  // the middle layer is gone
+  alive[0] = 0;                                                        // so the upper one is larger
+  const Pieces pieces = pieces_of(setup.body, alive);
+  EXPECT_EQ(pieces.count, 2);
+  EXPECT_EQ(pieces.of[0], -1);
+  EXPECT_EQ(pieces.of[1], 1);
+  EXPECT_EQ(pieces.of[26], 0);
+}
+
+TEST(Holders, OfBrokenClustersReadNothingThatIsNotThere) {
+  Clusters clusters;
+  clusters.offsets = {0, 2, 1, 99, -3};
+  clusters.members = {1, 2, 77, -5};
+  clusters.number = {4, 5, 6, 7};
+  const Holders holders = holders_of(clusters, 3);
+  EXPECT_EQ(holders.lowest, (std::vector<int32_t>{-1, 1, 1}));
+  EXPECT_EQ(holders.count, (std::vector<uint8_t>{0, 1, 1}));
+  EXPECT_EQ(members_of(clusters, 4, 3), (std::vector<int32_t>{1, 2}));
+  for (const int32_t number : {5, 6, 7, 8}) EXPECT_TRUE(members_of(clusters, number, 3).empty()) << number;
+}
+
+// --- Pictures ---
+
+Finding finding_in(int64_t frame) {
+  Finding finding;
+  finding.property = "wrong";
+  finding.stage = Stage::split;
+  finding.frame = frame;
+  finding.particles = {3, 999'999, -2};
+  finding.clusters = {7};
+  return finding;
+}
+
+TEST(Pictures, OfASmallRunHoldEveryMomentAndEveryParticle) {
+  const auto setup = block(3);
+  const Pictures pictures = pictures_of(source_of(setup, 5), {finding_in(2)}, kMostPictureBytes);
+  EXPECT_EQ(pictures.moments.size(), 11u);
+  EXPECT_EQ(pictures.particles, 27);
+  EXPECT_EQ(pictures.thinning, Thinning());
+  EXPECT_EQ(pictures.first_moment, (std::vector<std::size_t>{0, 1}))
+      << "the first moment comes alone, to be there at once";
+  const Marks& marks = pictures.marks.at(0);
+  EXPECT_TRUE(marks.is_exact);
+  EXPECT_EQ(pictures.moments.at(static_cast<std::size_t>(marks.moment)).frame, 2);
+  EXPECT_EQ(pictures.moments.at(static_cast<std::size_t>(marks.moment)).stage, Stage::split);
+  EXPECT_EQ(marks.particles, (std::vector<int32_t>{3})) << "particles that are not there are not marked";
+  EXPECT_EQ(marks.clusters.size(), 27u);
+  EXPECT_FALSE(marks.is_partly);
+  EXPECT_GT(pictures.loss, 0);
+  EXPECT_LT(pictures.loss, 1e-3);
+}
+
+TEST(Pictures, ThatAreTooLargeLoseFramesButNotTheOnesThatFail) {
+  const auto setup = block(10);
+  const Source source = source_of(setup, 200);
+  const Pictures whole = pictures_of(source, {}, kMostPictureBytes);
+  const Pictures thinned = pictures_of(source, {finding_in(101)}, whole.bytes / 3);
+  EXPECT_GT(thinned.thinning.every_frame, 1);
+  EXPECT_LE(thinned.bytes, whole.bytes / 3);
+  EXPECT_EQ(thinned.frames.size(), 201u) << "plots have every frame";
+  std::set<std::pair<int64_t, Stage>> shown;
+  for (const Moment& moment : thinned.moments) shown.emplace(moment.frame, moment.stage);
+  EXPECT_TRUE(shown.count({101, Stage::split})) << "a stage that fails";
+  EXPECT_TRUE(shown.count({199, Stage::skin})) << "the end";
+  EXPECT_TRUE(thinned.moments.front().is_start);
+  EXPECT_EQ(thinned.particles, 1000);
+}
+
+TEST(Pictures, OfManyParticlesLoseParticlesButNotTheOnesThatAreNamed) {
+  const auto setup = block(40);
+  Finding finding = finding_in(0);
+  finding.clusters.clear();
+  finding.particles = {64'000 - 1, 1};
+  const Pictures pictures = pictures_of(source_of(setup, 3), {finding}, 300'000);
+  EXPECT_GT(pictures.thinning.every_particle, 1);
+  EXPECT_LT(pictures.particles, 64'000 / 2);
+  EXPECT_EQ(pictures.marks.at(0).particles, (std::vector<int32_t>{pictures.particles - 1, 1}));
+}
+
+TEST(Pictures, OfAStateWithoutSenseAreDrawnAllTheSame) {
+  const auto setup = block(3);
+  const Source source = {setup, 2, [&](int64_t index) {
+                           io::Snapshot snapshot = {Stage::skin, at_rest(setup.body)};
+                           State& state = snapshot.state;
+                           state.frame = index;
+                           state.x[0].x = std::nan("");
+                           state.x[1].y = 1e300;
+                           state.skin.position = {{0, 0, 0}, {0, std::nan(""), 0}};
+                           state.skin.owner = {-4, 5000};
+                           state.skin.direction = {0, 9};
+                           state.skin.triangles = {{0, 1, 99}, {-1, 0, 1}};
+                           state.clusters.offsets = {5, -2};
+                           return snapshot;
+                         }};
+  const Pictures pictures = pictures_of(source, {finding_in(500)}, kMostPictureBytes);
+  EXPECT_EQ(pictures.nowhere, 2);
+  EXPECT_LT(pictures.loss, 1e-3) << "what is far away costs the others no places";
+  EXPECT_FALSE(pictures.marks.at(0).is_exact);
+}
+
+TEST(Pictures, OfNoParticlesAndOfOneAreDrawn) {
+  for (const int32_t n : {0, 1}) {
+    const auto setup = block(n);
+    EXPECT_EQ(pictures_of(source_of(setup, 2), {}, kMostPictureBytes).moments.size(), 5u);
+  }
+}
+
+// --- The page ---
+
+constexpr const char* kHostile = "</script><script>window.hacked=1</script>";
+
+TEST(Page, HoldsNamesAsTextOnly) {
+  if (kPageScript.empty()) GTEST_SKIP() << "this build has no report pages";
+  const auto setup = block(3);
+  json given = document({verdict(kHostile, "split", 0, false, 3, 1)});
+  given["scene"] = given["backend"] = kHostile;
+  given["verdicts"][0]["witness"]["text"] = "@SCRIPT@ @DATA@ @FIRST_CHUNK@";
+  const std::string text = page(source_of(setup, 2), results_of(given, "f"), kHostile, "1");
+  EXPECT_EQ(text.find("<script>window"), std::string::npos);
+  EXPECT_EQ(text.find("@LATER_CHUNKS@"), std::string::npos) << "every mark of the template is filled";
+  const std::string begin = "id=\"data\">";
+  const std::size_t first = text.find(begin) + begin.size();
+  const json data = json::parse(text.substr(first, text.find("</script>", first) - first));
+  EXPECT_EQ(data.at("scene"), kHostile);
+  EXPECT_EQ(data.at("again"), kHostile);
+  EXPECT_EQ(data.at("findings").at(0).at("property"), kHostile);
+  EXPECT_EQ(data.at("findings").at(0).at("text"), "@SCRIPT@ @DATA@ @FIRST_CHUNK@") << "what it holds is no mark";
+}
+
+TEST(Page, AllowsItsOwnScriptAndNothingElse) {
+  if (kPageScript.empty()) GTEST_SKIP() << "this build has no report pages";
+  const auto setup = block(3);
+  const std::string text = page(source_of(setup, 2), results_of(document({}), "f"), "again", "1");
+  EXPECT_NE(text.find("default-src 'none'; script-src '" + std::string(kPageScriptHash) + "'; style-src '" +
+                      std::string(kPageStyleHash) + "'; img-src data:;"),
+            std::string::npos);
+  EXPECT_NE(text.find("<script>" + std::string(kPageScript) + "</script>"), std::string::npos);
+  for (const char* const outside : {" src=\"", "href=\"http", "@import", "url("})
+    EXPECT_EQ(std::string(text).find(outside), std::string::npos) << outside;
+}
+
+// What a browser has to read before it shows verdicts, plots and the first frame.
+TEST(Page, IsUnderTwoMegabytesUpToTheFirstFrame) {
+  if (kPageScript.empty()) GTEST_SKIP() << "this build has no report pages";
+  const auto setup = block(47);  // 103,823 particles
+  std::vector<json> verdicts;
+  for (int frame = 0; frame < 3000; ++frame) {
+    verdicts.push_back(verdict("property " + std::to_string(frame % 50), "split", frame / 50, frame % 7 != 0, 1, 1));
+  }
+  const std::string text = page(source_of(setup, 2), results_of(document(verdicts), "f"), "again", "1");
+  const std::size_t later = text.find("id=\"chunk-1\"");
+  ASSERT_NE(later, std::string::npos);
+  EXPECT_LT(later, 2'000'000u);
+  std::printf("first page of 103,823 particles: %zu bytes, of %zu\n", later, text.size());
+}
+
+TEST(Page, RefusesResultsOfAnotherRun) {
+  io::Recording recording;
+  recording.setup = block(3);
+  recording.backend = "mine";
+  EXPECT_NO_THROW(require_same_run(recording, "r", results_of(document({}), "f"), "f"));
+  recording.backend = "other";
+  EXPECT_THROW(require_same_run(recording, "r", results_of(document({}), "f"), "f"), InputError);
+  recording.backend = "mine";
+  recording.setup = block(4);
+  EXPECT_THROW(require_same_run(recording, "r", results_of(document({}), "f"), "f"), InputError);
+}
+
+}  // namespace
+}  // namespace cutproof::report
