@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs what building and testing needs, from Debian or Ubuntu packages; does nothing if all of it is there.
-# Usage: ci/install.sh [fuzzing | libraries]
+# Usage: ci/install.sh [browser | fuzzing | libraries]
+#   browser     also Chromium, in which tests/report/browser_test.py opens report pages; without it that test is skipped
 #   fuzzing     also what ci/input_fuzzing.sh needs, and nothing else does
 #   libraries   also VTK, which tests/guests/libraries_test.cpp judges; without it those tests are skipped
 set -euo pipefail
@@ -18,16 +19,17 @@ packages=(
   dpkg-dev file  # packages: which libraries they depend on
   openmpi-bin    # mpirun, for a test of ci/cluster/; no program is linked with it
 )
-# Report pages in a browser, opened by a test. Ubuntu has Chromium as a snap alone: there that test is skipped, by name.
-[ "$(. /etc/os-release && echo "${ID:-}")" != debian ] || packages+=(chromium chromium-driver python3-selenium)
+browser_packages=(chromium chromium-driver python3-selenium)
 # libFuzzer and the sanitizers of clang; llvm has the symbolizer that gives their reports file and line.
 fuzzing_packages=(clang libclang-rt-dev llvm)
 vtk=no
 case "$*" in
   "") ;;
+  # Ubuntu has Chromium as a snap alone.
+  browser) [ "$(. /etc/os-release && echo "${ID:-}")" != debian ] || packages+=("${browser_packages[@]}") ;;
   fuzzing) packages+=("${fuzzing_packages[@]}") ;;
   libraries) vtk=yes ;;
-  *) echo "ci/install.sh: \"$*\" is no list of packages; there are: fuzzing, libraries" >&2; exit 2 ;;
+  *) echo "ci/install.sh: \"$*\" is no list of packages; there are: browser, fuzzing, libraries" >&2; exit 2 ;;
 esac
 
 missing=()

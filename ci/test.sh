@@ -6,7 +6,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 preset=${CUTPROOF_PRESET:-default}
 
-ci/install.sh
+ci/install.sh browser
 werror=()
 [ "${CI:-}" = true ] && werror=(-DCUTPROOF_WERROR=ON)
 cmake --preset "$preset" -DBUILD_TESTING=ON "${werror[@]}" >/dev/null
