@@ -136,6 +136,7 @@ async function update() {
     const ramp = drawing('svg', { class: 'ramp', viewBox: '0 0 70 10', 'aria-hidden': 'true' }, ...rampStops.map((fill, k) => drawing('rect', { x: 10 * k, y: 0, width: 10.5, height: 10, fill })));
     legend.append(element('span', { text: ` ${said.scale[0]} ` }), ramp, element('span', { text: ` ${said.scale[1]}.` }));
   }
+  if (moment.start && look.skin && !look.particles) legend.append(element('span', { text: ' The skin comes with the first frame; until then particles are shown.' }));
   if (found) legend.append(element('span', { class: 'marked-key', text: ' Marked orange: what the verdict names.' }), found.marks.members.length > 0 && element('span', { text: ' Yellow: the members of its clusters.' }) || '', found.marks.partly && element('span', { text: ' There are more than are marked.' }) || '', !found.marks.exact && element('span', { text: ' The recording has no moment after this stage; this is the next one.' }) || '');
   document.documentElement.dataset.shown = `${state.at}/${state.finding === null ? '' : state.finding}`;
 }

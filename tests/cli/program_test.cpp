@@ -464,8 +464,16 @@ TEST_F(Program, JudgesBackendsOfWholeFramesAndOfOneStageOnWhatTheyRun) {
 // --- Bad input ------------------------------------------------------------------------------------------------------
 
 TEST_F(Program, SaysWhatToDoNextWhenRunHasNoScene) {
-  expect_refused("run", {"cutproof run kidney_discontinuous", "--check", "--mesh", "info --scenes"});
-  expect_refused("", {"run", "check", "info"});
+  // Pages of what there is, in place of an error and its remedy.
+  for (const auto& [arguments, words] : std::vector<std::pair<std::string, std::vector<std::string>>>{
+           {"run", {"cutproof run kidney_discontinuous", "--check", "--mesh", "info --scenes"}},
+           {"", {"run", "check", "info"}}}) {
+    const std::set<std::string> before = listing();
+    const Outcome outcome = cutproof(arguments);
+    EXPECT_EQ(outcome.status, 2) << arguments;
+    for (const std::string& word : words) EXPECT_NE(outcome.output.find(word), std::string::npos) << outcome.output;
+    EXPECT_EQ(listing(), before) << "something was written";
+  }
 }
 
 TEST_F(Program, RefusesWrongUsageWithStatusTwo) {
