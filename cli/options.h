@@ -56,8 +56,8 @@ void add_junit(CLI::App& command, std::string& path);
 
 // A word as a shell takes it.
 std::string quoted(const std::string& word);
-// The command line that names `command` as it was given, without what it writes (--json, --junit, --record, --report): to be
-// given again. Requires that it has been parsed.
+// The command line that names `command` as it was given, without what it writes (--json, --junit, --record, --report):
+// to be given again. Requires that it has been parsed.
 std::string as_given(const CLI::App& command);
 
 void add_json(CLI::App& command, std::string& path, const std::string& what);

@@ -26,15 +26,15 @@ int make_report(const ReportOptions& options) {
   require_writable(options.output);
   const io::RecordingReader reader(options.recording);
   const io::Recording& recording = reader.header();
+  std::string scene;
+  if (!recording.scene_json.empty())
+    scene = io::parse_scene(recording.scene_json, options.recording + " (its scene)").name;
   report::Results results;
   if (options.results.empty()) {
-    std::string scene;
-    if (!recording.scene_json.empty())
-      scene = io::parse_scene(recording.scene_json, options.recording + " (its scene)").name;
     results = report::unjudged(recording, scene);
   } else {
     results = report::read_results(options.results);
-    report::require_same_run(recording, options.recording, results, options.results);
+    report::require_same_run(recording, scene, options.recording, results, options.results);
   }
   const report::Source source = {recording.setup, recording.snapshot_count,
                                  [&](int64_t index) { return reader.snapshot(index); }};

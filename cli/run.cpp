@@ -125,8 +125,8 @@ void print_summary(const RunResult& result) {
         1e3 * total / static_cast<double>(result.frames.size()));
   }
   const int64_t clusters = result.frames.empty() ? result.clusters_at_start : result.frames.back().clusters;
-  say("removed {} ({} as debris); clusters {} -> {}\n", counted(removed + debris, "particle", "particles"), debris, result.clusters_at_start,
-      clusters);
+  say("removed {} ({} as debris); clusters {} -> {}\n", counted(removed + debris, "particle", "particles"), debris,
+      result.clusters_at_start, clusters);
 }
 
 constexpr const char* kConservation = "conservation";
@@ -240,8 +240,13 @@ int run(const RunOptions& options) {
     errors_document = to_json(*errors, wanted.implementation && against ? &*against->lockstep : nullptr);
   }
   if (recorder) recorder->finish();
+  // At once: whatever ends the run from here on leaves nothing that nobody asked for.
+  std::unique_ptr<io::RecordingReader> recording;
+  if (!options.report.empty()) {
+    recording = options.record.empty() ? read_passing(record) : std::make_unique<io::RecordingReader>(record);
+  }
   // Files first: they are kept even if standard output cannot be written.
-  if (!options.json.empty() || !options.report.empty()) {
+  if (!options.json.empty() || recording) {
     nlohmann::json document = to_json(result, judge ? &*judge : nullptr);
     document["build"] = build_json(built);
     document["changes"] = given_changes(changes);
@@ -251,11 +256,7 @@ int run(const RunOptions& options) {
     }
     if (errors) document["errors"] = errors_document;
     write_document(options.json, document);
-    if (!options.report.empty()) {
-      const auto recording =
-          options.record.empty() ? read_passing(record) : std::make_unique<io::RecordingReader>(record);
-      write_report(options.report, *recording, document, options.again);
-    }
+    if (recording) write_report(options.report, *recording, document, options.again);
   }
 
   const Judging judging{"cutproof run", "cutproof.run." + scene.name, options.again};

@@ -90,7 +90,11 @@ UncoveredEdges uncovered_edges(const TissueGraph& graph, const Clusters& cluster
 
 Partition graph_components(const Setup& setup, const State& state) {
   if (!well_formed(setup, state).holds) return {};
-  return components_of_graph(TissueGraph(setup.body, state.alive));
+  return graph_components(setup.body, state.alive);
+}
+
+Partition graph_components(const Body& body, const std::vector<uint8_t>& alive) {
+  return components_of_graph(TissueGraph(body, alive));
 }
 
 Partition coupling_components(const Setup& setup, const State& state) {

@@ -163,13 +163,14 @@ void require_pages(const std::string& option) {
                    "--json has the same verdicts");
 }
 
-void require_same_run(const io::Recording& recording, const std::string& recording_file, const Results& results,
-                      const std::string& results_file) {
+void require_same_run(const io::Recording& recording, const std::string& scene, const std::string& recording_file,
+                      const Results& results, const std::string& results_file) {
   const auto refuse = [&](const std::string& field, const std::string& of_results, const std::string& of_recording) {
     throw InputError(results_file, field,
                      fmt::format("these are results of {}, and {} holds {}", of_results, recording_file, of_recording),
                      "give the results of the run that was recorded, or leave them out");
   };
+  if (!scene.empty() && results.scene != scene) refuse("scene", "scene " + results.scene, "scene " + scene);
   if (results.backend != recording.backend)
     refuse("backend", "backend " + results.backend, "backend " + recording.backend);
   const int64_t particles = recording.setup.body.particle_count();

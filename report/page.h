@@ -18,9 +18,10 @@ inline constexpr int64_t kMostPictureBytes = int64_t{28} << 20;
 // another body than the recording's are refused (InputError naming `results_file`).
 std::string page(const Source& source, const Results& results, const std::string& again, const std::string& program,
                  int64_t most_picture_bytes = kMostPictureBytes);
-// Throws InputError if these are not the results of that recording.
-void require_same_run(const io::Recording& recording, const std::string& recording_file, const Results& results,
-                      const std::string& results_file);
+// Throws InputError if these are not the results of that recording. `scene`: its name in the recording, empty if that
+// does not say.
+void require_same_run(const io::Recording& recording, const std::string& scene, const std::string& recording_file,
+                      const Results& results, const std::string& results_file);
 
 // The results of a recording that nobody judged.
 Results unjudged(const io::Recording& recording, const std::string& scene);

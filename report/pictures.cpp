@@ -7,6 +7,7 @@
 #include <tuple>
 #include <utility>
 
+#include "model/at.h"
 #include "report/coding.h"
 #include "report/pieces.h"
 
@@ -33,25 +34,25 @@ struct Picture {
   bool has_skin = false, has_owner = false, has_triangles = false;
 };
 
-// The middle of what moments have in common: the particles that are kept, and their numbers on the page.
+// The particles that are kept, and their numbers on the page.
 struct Kept {
   std::vector<int32_t> particle;  // ascending
   std::vector<int32_t> place;     // [n] on the page; of one that is not kept, of the next one that is
 };
 
 Kept kept_particles(int32_t n, int32_t every, const std::vector<Marks>& named) {
-  std::vector<uint8_t> keep(static_cast<std::size_t>(n), 0);
-  for (int32_t i = 0; i < n; i += every) keep[static_cast<std::size_t>(i)] = 1;
+  std::vector<uint8_t> keep(at(n), 0);
+  for (int32_t i = 0; i < n; i += every) keep[at(i)] = 1;
   for (const Marks& marks : named) {
     for (const auto* list : {&marks.particles, &marks.path, &marks.clusters}) {
-      for (const int32_t particle : *list) keep[static_cast<std::size_t>(particle)] = 1;
+      for (const int32_t particle : *list) keep[at(particle)] = 1;
     }
   }
   Kept kept;
-  kept.place.resize(static_cast<std::size_t>(n));
+  kept.place.resize(at(n));
   for (int32_t i = 0; i < n; ++i) {
-    kept.place[static_cast<std::size_t>(i)] = static_cast<int32_t>(kept.particle.size());
-    if (keep[static_cast<std::size_t>(i)] != 0) kept.particle.push_back(i);
+    kept.place[at(i)] = static_cast<int32_t>(kept.particle.size());
+    if (keep[at(i)] != 0) kept.particle.push_back(i);
   }
   // Particles behind the last that is kept.
   for (int32_t& place : kept.place) place = std::min(place, static_cast<int32_t>(kept.particle.size()) - 1);
@@ -62,7 +63,7 @@ template <class T>
 std::vector<T> only(const std::vector<T>& all, const Kept& kept) {
   std::vector<T> some;
   some.reserve(kept.particle.size());
-  for (const int32_t particle : kept.particle) some.push_back(all[static_cast<std::size_t>(particle)]);
+  for (const int32_t particle : kept.particle) some.push_back(all[at(particle)]);
   return some;
 }
 
@@ -74,7 +75,7 @@ void add_skin(Picture& picture, const State& state, const Kept& kept) {
   const auto vertices = static_cast<int32_t>(skin.position.size());
   for (const int32_t owner : skin.owner) {
     const bool is_there = owner >= 0 && owner < std::ssize(kept.place);
-    picture.owner.push_back(is_there ? kept.place[static_cast<std::size_t>(owner)] : -1);
+    picture.owner.push_back(is_there ? kept.place[at(owner)] : -1);
   }
   picture.owner.resize(skin.position.size(), -1);
   for (const auto& triangle : skin.triangles) {
@@ -236,7 +237,6 @@ Survey survey_of(const Source& source) {
   Survey survey;
   Pieces pieces;
   std::vector<uint8_t> alive;
-  int64_t removed = 0;
   const Box outer = outer_box(source.setup.body);
   for (int64_t i = 0; i < source.count; ++i) {
     const io::Snapshot snapshot = source.snapshot(i);
@@ -251,7 +251,7 @@ Survey survey_of(const Source& source) {
     for (std::size_t p = 0; p < state.x.size(); ++p) {
       if (alive[p] != 0 && is_within(state.x[p], outer)) widen(survey.reach, state.x[p]);
     }
-    removed = std::ssize(state.removed) + std::ssize(state.debris);
+    const int64_t removed = std::ssize(state.removed) + std::ssize(state.debris);
     survey.frames.push_back(
         {i == 0 ? -1 : state.frame - 1, std::count_if(alive.begin(), alive.end(), [](uint8_t a) { return a != 0; }),
          std::ssize(state.clusters.number), pieces.count, std::ssize(state.skin.triangles), removed});
@@ -290,7 +290,7 @@ std::vector<Marks> marks_of(const Source& source, const std::vector<Moment>& mom
     marks.particles = within(finding.particles, n, most, marks);
     marks.path = within(finding.path, n, most, marks);
     if (marks.moment >= 0 && !finding.clusters.empty()) {
-      if (const int64_t index = moments[static_cast<std::size_t>(marks.moment)].snapshot; index != read) {
+      if (const int64_t index = moments[at(marks.moment)].snapshot; index != read) {
         snapshot = source.snapshot(index);
         read = index;
       }
@@ -321,7 +321,7 @@ Pictures draw(const Source& source, const Survey& survey, const std::vector<Find
   for (Marks one : marks) {
     std::tie(one.moment, one.is_exact) = moment_of(result.moments, findings[result.marks.size()]);
     for (auto* list : {&one.particles, &one.path, &one.clusters}) {
-      for (int32_t& particle : *list) particle = kept.place[static_cast<std::size_t>(particle)];
+      for (int32_t& particle : *list) particle = kept.place[at(particle)];
     }
     result.marks.push_back(std::move(one));
   }

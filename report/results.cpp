@@ -33,7 +33,7 @@ struct Field {
 
   [[noreturn]] void refuse(const std::string& problem) const { throw InputError(file, path, problem, kRemedy); }
   Field operator[](const char* name) const {
-    if (!value->is_object()) refuse("this is no object");
+    if (!there().is_object()) refuse("this is no object");
     const auto found = value->find(name);
     return {found == value->end() ? nullptr : &*found, file, path.empty() ? name : path + "." + name};
   }
@@ -172,7 +172,6 @@ void add_verdict(const Field& verdict, const Measured* known, std::vector<Row>& 
     return;
   }
   const Field witness = verdict["witness"];
-  witness.there();
   results.findings.push_back({property, stage, frame, figure(measured), figure(bound), unit, of_bound, source,
                               witness["text"].text(), witness["clusters"].numbers(), witness["particles"].numbers(),
                               witness["path"].numbers(), is_expected});
@@ -291,12 +290,14 @@ Results results_of(const json& given, const std::string& file) {
   results.particles = document["body"]["particles"].count();
   results.checked = document["checked"].flag();
   add_verdicts(document, results);
-  int64_t failed = 0;
-  for (const PropertyRow& row : results.rows) failed += row.failed;
-  results.holds = results.checked && failed == 0;
-  // A run of which nothing was judged does not hold, though nothing fails.
-  if (const Field summary = document["summary"]; summary.value != nullptr)
-    results.holds = results.holds && summary["holds"].flag();
+  int64_t looked = 0, failed = 0;
+  for (const PropertyRow& row : results.rows) {
+    looked += row.judged;
+    failed += row.failed;
+  }
+  // What nobody looked at does not hold, though nothing fails.
+  results.holds = looked > 0 && failed == 0;
+  if (document["checked"].flag()) results.holds = document["summary"]["holds"].flag() && results.holds;
   results.notes = document["notes"].texts();
   results.not_reached = document["not_reached"].texts();
   add_series(document, results);

@@ -96,6 +96,15 @@ TEST_F(Verbs, ReportMakesAPageOfARunACheckAndARecording) {
   expect_refused("report seen bad.json -o page.html", {"bad.json", "--json"});
 }
 
+// What a page is made from has a name no longer than it is written.
+TEST_F(Verbs, ReportLeavesNothingOfARunThatFailsAfterIt) {
+  if (CUTPROOF_HAS_PAGES == 0) GTEST_SKIP() << "this build has no report pages";
+  if (!files::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
+  const std::set<std::string> before = listing();
+  EXPECT_EQ(cutproof("run cut.json --check --report page.html --json /dev/full").status, 3);
+  EXPECT_EQ(listing(), before);
+}
+
 // --- Usage
 // ------------------------------------------------------------------------------------------------------------
 

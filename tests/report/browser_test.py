@@ -120,6 +120,14 @@ class Browser:
             done({sum, share: drawn / (all.length / 4), orange});
           });""")
 
+    def pixels_after(self, action, seen):
+        """What is drawn once an action has changed it, which must be none of what was seen before."""
+        action()
+        end = time.monotonic() + 60
+        while (now := self.pixels())["sum"] in seen:
+            assert time.monotonic() < end, "nothing new is drawn"
+        return now
+
     def data(self, what):
         return self.ask(f"return JSON.parse(document.getElementById('data').textContent).{what}")
 
@@ -157,6 +165,7 @@ with Browser("holds.html") as page:
     assert page.text("#findings-title") == "Nothing fails"
     assert not page.driver.find_elements(By.CSS_SELECTOR, "[data-finding]")
     last = page.data("moments.length") - 1
+    assert "until then particles are shown" in page.text("#legend"), page.text("#legend")
     first = page.pixels()
     assert 0.1 < first["share"] < 0.7, f"the body fills {first['share']} of the view"
     page.scrub(last)
@@ -169,25 +178,21 @@ with Browser("holds.html") as page:
     page.shown(last - 1)
     canvas.send_keys(".")
     page.shown(last)
-    canvas.send_keys(Keys.ARROW_LEFT)
-    assert page.pixels()["sum"] != end["sum"], "an arrow did not turn the view"
-    canvas.send_keys("0")
-    time.sleep(0.1)
-    assert page.pixels()["sum"] == end["sum"], "0 did not bring the whole body back"
+    turned = page.pixels_after(lambda: canvas.send_keys(Keys.ARROW_LEFT), {end["sum"]})
+    back = page.pixels_after(lambda: canvas.send_keys("0"), {turned["sum"]})
+    assert back["sum"] == end["sum"], "0 did not bring the whole body back"
     # What is shown, and by which colours.
     seen = {end["sum"]}
+
+    def choose(select, value):
+        page.ask("const s = document.getElementById(arguments[0]); s.value = arguments[1];"
+                 "s.dispatchEvent(new Event('change'));", select, value)
+
+    # Each differs from all before it.
     for colour in ("cluster", "displacement", "stretch", "holders"):
-        page.ask("const s = document.getElementById('colour'); s.value = arguments[0];"
-                 "s.dispatchEvent(new Event('change'));", colour)
-        time.sleep(0.1)
-        seen.add(page.pixels()["sum"])
-    page.ask("const s = document.getElementById('show'); s.value = 'particles'; s.dispatchEvent(new Event('change'));")
-    time.sleep(0.1)
-    seen.add(page.pixels()["sum"])
-    page.driver.find_element(By.ID, "removed").click()
-    time.sleep(0.1)
-    seen.add(page.pixels()["sum"])
-    assert len(seen) == 7, f"of 7 ways to look at it {len(seen)} differ"
+        seen.add(page.pixels_after(lambda: choose("colour", colour), seen)["sum"])
+    seen.add(page.pixels_after(lambda: choose("show", "particles"), seen)["sum"])
+    page.pixels_after(page.driver.find_element(By.ID, "removed").click, seen)
     # It plays from the start to the end, where it stops.
     page.driver.find_element(By.ID, "play").click()
     page.until("return document.documentElement.dataset.moment == arguments[0]"
