@@ -21,7 +21,8 @@ seed=${CUTPROOF_FUZZING_SEED:-1}
 ci/install.sh fuzzing
 cmake --preset fuzzing >/dev/null
 build=build/fuzzing
-cmake --build "$build" --target input_fuzzers
+cmake --build "$build" --target input_fuzzer
+fuzzer=$build/tests/input_fuzzing/input_fuzzer
 
 # Readers take files: thousands of them a second, which belong into memory.
 memory=/dev/shm
@@ -34,7 +35,7 @@ declare -A longest=([scene]=8192 [stl]=4096 [obj]=4096 [ply]=4096 [off]=4096 [re
 table=$(printf '%-20s %11s %8s %9s %7s %9s' target executions seconds coverage corpus findings)
 status=0
 for target in "${targets[@]}"; do
-  fuzzer=$build/tests/input_fuzzing/fuzz_$target
+  export CUTPROOF_INPUT_TARGET=$target
   seeds=$build/seeds/$target corpus=$build/corpus/$target findings=$build/findings/$target
   regressions=fixtures/regressions/inputs/$target
   rm -rf "$seeds" "$findings"
