@@ -132,12 +132,15 @@ void add_entries(Arrays& arrays, const std::vector<Entry>& entries) {
   });
 }
 
-// All fields of a setup but the body's, which the tissue has.
+// Whether the tissue that a guest is given has this field already.
+bool is_of_tissue(const SetupField& field) { return field.group == "body" && field.name != "surface_crossing"; }
+
+// All fields of a setup but those.
 Arrays arrays_of(const Setup& setup) {
   Arrays arrays;
   for_each_setup_field([&](const SetupField& field, auto get) {
     using T = std::remove_cvref_t<decltype(get(setup))>;
-    if (field.group == "body") return;
+    if (is_of_tissue(field)) return;
     const std::string name =
         field.group.empty() ? std::string(field.name) : std::string(field.group) + "/" + std::string(field.name);
     if constexpr (is_list_of_entries<T>) {

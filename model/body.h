@@ -32,6 +32,11 @@ class Neighbours {
   std::size_t count_ = 0;
 };
 
+// In what part of a grid edge its crossing with the surface is told, and the least and the greatest there is: a vertex
+// on a node would make triangles without area.
+inline constexpr int kCrossingSteps = 256, kLeastCrossing = kCrossingSteps / 16,
+                     kGreatestCrossing = kCrossingSteps - kLeastCrossing;
+
 struct Body {
   std::string name;  // "kidney", or the mesh's file name
   // Of a bare graph without nodes; the spacing is h all the same: its longest edge at rest, or what was given.
@@ -44,6 +49,9 @@ struct Body {
   std::vector<int64_t> edge_offsets;  // [n + 1] those of particle i: edge_ends[edge_offsets[i] .. edge_offsets[i + 1])
   std::vector<int32_t> edge_ends;     // their other ends: each edge at both of its ends, none twice, none to itself
   std::vector<double> mass;           // [n] m_i > 0 [kg]
+  // [6 n], or empty. Of a grid edge that leaves particle i for a node without a particle, where the body's surface
+  // crosses it: surface_crossing[6 i + direction] / 256 of h from i, within 1/16 and 15/16; 0: not known.
+  std::vector<uint8_t> surface_crossing;
   // Body frame to world: x_world = orientation · x + origin. Everything a backend sees is in the body frame,
   // so a body far from the world's origin computes with the same bits (method.md §1).
   Vec3 origin;       // [m], double precision, fixed at load
@@ -58,6 +66,12 @@ struct Body {
   // Of the edge between two neighbours [m].
   double rest_length(int32_t a, int32_t b) const {
     return on_grid() ? grid.spacing : norm(rest_position(a) - rest_position(b));
+  }
+  // How far from `particle` the surface crosses that edge, as a fraction of h; 0: not known, or the edge stays inside.
+  double crossing(int32_t particle, int direction) const {
+    if (surface_crossing.empty()) return 0;
+    return surface_crossing[6 * static_cast<std::size_t>(particle) + static_cast<std::size_t>(direction)] /
+           double{kCrossingSteps};
   }
   // The particle at the other end of the grid edge that leaves `particle` along kDirections[direction], or -1. Requires
   // a grid.

@@ -38,6 +38,7 @@ struct BodySpec {
   double spacing = 0;     // h [m]; exactly one of spacing and particles is positive
   int64_t particles = 0;  // wanted count, met within 2 %
   double density = 1000;  // [kg/m³]; m_i = density · h³
+  bool fit_skin = true;   // the skin lies where the surface crosses the grid edges, else alpha beyond each particle
   bool align = true;      // turn the principal axes (longest, middle, shortest) to x, y, z
   Vec3 origin;            // where the body's frame lies in the world [m]
   friend bool operator==(const BodySpec&, const BodySpec&) = default;
@@ -115,7 +116,7 @@ struct Expectations {
 
 // Of the format. What a scene leaves out is as it was when its version was new: in version 1 the plain iteration, in 1
 // and 2 both ends of an open edge.
-inline constexpr int32_t kSceneVersion = 3;
+inline constexpr int32_t kSceneVersion = 4;
 
 // How often the scene's frames detect. substep: each frame is laid out as as many frames of one substep, in all of
 // which every stage runs: what a blade has parted goes at the end of that substep, and not of up to S of them.

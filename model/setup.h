@@ -62,7 +62,7 @@ struct ExpandParameters {
 
 struct SkinParameters {
   bool wanted = true;  // false: no skin is made
-  double alpha = 0.5;  // vertex at X_i + alpha h e, in (0, 1)
+  double alpha = 0.5;  // vertex at X_i + alpha h e where no crossing is known, in (0, 1)
   friend bool operator==(const SkinParameters&, const SkinParameters&) = default;
 };
 
@@ -116,6 +116,12 @@ struct Setup {
 
   int64_t frame_count() const { return static_cast<int64_t>(substep_length.size()); }
 };
+
+// How far from its owner a skin vertex lies on its grid edge at rest, as a fraction of h (method.md §8).
+inline double vertex_reach(const Setup& setup, int32_t owner, int direction) {
+  const double crossing = setup.body.crossing(owner, direction);
+  return crossing > 0 ? crossing : setup.skin.alpha;
+}
 
 // Whether frames of this setup launch the detect stage.
 inline bool needs_detection(const Setup& setup) {

@@ -44,8 +44,8 @@ namespace fields_detail {
 inline void know_every_member(const Setup& setup) {
   [[maybe_unused]] const auto& [body, step, detect, split, merge, expand, skin, walls, grips, has_blade, blade,
                                 substep_length, blade_moves, stroke_end] = setup;
-  [[maybe_unused]] const auto& [name, grid, node, particle_at, rest, edge_offsets, edge_ends, mass, origin,
-                                orientation] = body;
+  [[maybe_unused]] const auto& [name, grid, node, particle_at, rest, edge_offsets, edge_ends, mass, surface_crossing,
+                                origin, orientation] = body;
   [[maybe_unused]] const auto& [nodes, spacing] = grid;
   [[maybe_unused]] const auto& [solver, substeps, iterations, stiffness, relaxation, acceleration, damping, gravity] =
       step;
@@ -86,6 +86,7 @@ constexpr void for_each_setup_field(Visit&& visit) {
   CUTPROOF_FIELD(body.edge_offsets, "body", "edge_offsets", free, "1", 0);
   CUTPROOF_FIELD(body.edge_ends, "body", "edge_ends", free, "1", 0);
   CUTPROOF_FIELD(body.mass, "body", "mass", particle, "kg", 0, true);
+  CUTPROOF_FIELD(body.surface_crossing, "body", "surface_crossing", free, "h/256", 0, false, 5);
   CUTPROOF_FIELD(step.solver, "step", "solver", one);
   CUTPROOF_FIELD(step.substeps, "step", "substeps", one, "1", 1);
   CUTPROOF_FIELD(step.iterations, "step", "iterations", one, "1", 0);

@@ -11,8 +11,8 @@ struct Shells {
   std::vector<int32_t> of_vertex;  // [v] shell, -1 if no triangle uses the vertex
   std::vector<double> volume;      // [shells] six times [m³]
   // [shells] its vertex that lies farthest along x, at rest: on an edge along x, because those on other edges lie in
-  // planes of nodes, of which the last one has tissue, or emptiness, half an edge beyond. Tissue lies before it where
-  // the shell goes around tissue, and behind it where it goes around a cavity, whatever way the triangles turn.
+  // planes of nodes, of which the last one has tissue, or emptiness, a part of an edge beyond. Tissue lies before it
+  // where the shell goes around tissue, and behind it where it goes around a cavity, whatever way the triangles turn.
   std::vector<int32_t> farthest;
 };
 // `points`: where the vertices are [v]. Requires triangles to name vertices that exist.
@@ -21,7 +21,7 @@ Shells shells_of(const Skin& skin, const std::vector<Vec3>& points);
 // Where a vertex is at rest [m].
 inline Vec3 vertex_at_rest(const Setup& setup, const Skin& skin, std::size_t v) {
   const auto& d = kDirections[skin.direction[v]];
-  const double reach = setup.skin.alpha * setup.body.grid.spacing;
+  const double reach = vertex_reach(setup, skin.owner[v], skin.direction[v]) * setup.body.grid.spacing;
   return setup.body.rest_position(skin.owner[v]) + reach * Vec3{1.0 * d[0], 1.0 * d[1], 1.0 * d[2]};
 }
 

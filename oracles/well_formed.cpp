@@ -16,6 +16,9 @@ void check_bare_graph_form(const Body& body, Verdict& verdict) {
   if (body.mass.size() != body.rest.size()) {
     return violate(verdict, {}, "the body has {} masses for {} particles", body.mass.size(), body.rest.size());
   }
+  if (!body.surface_crossing.empty()) {
+    return violate(verdict, {}, "a body without a grid has crossings of its surface with grid edges");
+  }
   const std::string problem = problem_of_edges(body);
   if (!problem.empty()) violate(verdict, {}, "{}", problem);
 }
@@ -32,6 +35,10 @@ void check_grid_form(const Body& body, Verdict& verdict) {
     return violate(verdict, {}, "the body has {} masses for {} particles", body.mass.size(), body.node.size());
   }
   const int32_t n = body.particle_count();
+  if (!body.surface_crossing.empty() && body.surface_crossing.size() != 6 * at(n)) {
+    return violate(verdict, {}, "the body has {} crossings of its surface for {} particles",
+                   body.surface_crossing.size(), n);
+  }
   for (int32_t i = 0; i < n; ++i) {
     const int64_t node = body.node[at(i)];
     if (node < 0 || node >= grid.node_count()) return violate(verdict, {{}, {i}}, "particle {} is on no node", i);
@@ -48,6 +55,11 @@ void check_grid_form(const Body& body, Verdict& verdict) {
       const int32_t other = body.neighbour(i, direction);
       if (other < -1 || other >= n) {
         return violate(verdict, {{}, {i}}, "particle_at names a particle {} that does not exist", other);
+      }
+      const double crossing = body.crossing(i, direction) * kCrossingSteps;
+      if (crossing != 0 && (other >= 0 || crossing < kLeastCrossing || crossing > kGreatestCrossing)) {
+        return violate(verdict, {{}, {i}}, "the surface crosses the edge of particle {} in direction {} at {}/{}{}", i,
+                       direction, crossing, kCrossingSteps, other >= 0 ? ", and it leads to another particle" : "");
       }
     }
   }

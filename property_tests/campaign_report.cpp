@@ -178,8 +178,8 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
 
 namespace {
 
-// Throws json::exception if something is missing, or of another kind, that merging or a conclusion reads; InputError if
-// there is too much.
+// Throws json::exception or std::invalid_argument if something is missing, or of another kind, that merging or a
+// conclusion reads; InputError if there is too much.
 void require_fields(const json& part, const std::string& file) {
   // Counts are added up: those of a million shards must fit.
   const auto require_count = [&](const json& within, const char* name) {
@@ -194,7 +194,7 @@ void require_fields(const json& part, const std::string& file) {
   }
   for (const char* flag : {"dynamics", "complete"}) static_cast<void>(part.at(flag).get<bool>());
   static_cast<void>(part.at("backend").get<std::string>());
-  static_cast<void>(part.at("sizes").at(1).get<int>());
+  static_cast<void>(whole_number<int>(part.at("sizes").at(1)));
   for (const CoverageClass& each : kCoverageClasses) require_count(part.at("coverage"), each.name);
   if (part.at("properties").size() > io::kMostProperties) {
     throw InputError(
@@ -208,7 +208,7 @@ void require_fields(const json& part, const std::string& file) {
     for (const char* figure : {"measured", "of_bound"}) static_cast<void>(property.at(figure));
   }
   for (const json& violation : part.at("violations").get<std::vector<json>>()) {
-    static_cast<void>(violation.at("index").get<int64_t>());
+    static_cast<void>(whole_number<int64_t>(violation.at("index")));
     for (const char* word : {"text", "file"}) static_cast<void>(violation.at(word).get<std::string>());
   }
   if (!part.contains("steps_compared")) return;
@@ -227,7 +227,7 @@ json read_shard(const std::string& file) {
   if (part.contains("merged_shards")) {
     throw InputError(file, "merged_shards", "these are shards that were put together already", kRemedy);
   }
-  const auto shard = part.at("shard").get<int64_t>(), shards = part.at("shards").get<int64_t>();
+  const auto shard = whole_number<int64_t>(part.at("shard")), shards = whole_number<int64_t>(part.at("shards"));
   if (shards < 1 || shards > kMostShards || shard < 1 || shard > shards) {
     throw InputError(file, "shard", fmt::format("there is no shard {} of {}", shard, shards), kRemedy);
   }
@@ -259,6 +259,8 @@ json merge_shards(const std::vector<std::string>& files) {
       if (file_of.size() > 1) add_shard(whole, part);
       if (!part.at("complete").get<bool>()) stopped.insert(shard);
     } catch (const json::exception& error) {
+      throw InputError(file, "", fmt::format("this is not a result of `cutproof fuzz` ({})", error.what()), kRemedy);
+    } catch (const std::invalid_argument& error) {
       throw InputError(file, "", fmt::format("this is not a result of `cutproof fuzz` ({})", error.what()), kRemedy);
     }
   }

@@ -575,6 +575,9 @@ Case draw_case(uint64_t seed, int size) {
     }
   }
   if (random.chance(0.3)) c.alpha = random.between(1, 9);
+  // By random numbers of its own: the rest of a case is what it was before there were crossings.
+  Random surface(seed ^ 0x5u);
+  if (surface.chance(0.4)) c.surface = surface.between(1, 1'000'000);
   incline(random, c);
   return c;
 }
@@ -617,10 +620,37 @@ std::vector<Stroke> resolved_strokes(const Case& c) {
   return strokes;
 }
 
+// Of each edge that leaves the tissue by itself, so that a simpler case keeps those that it still has. Some are at the
+// least and some at the greatest that there is; of some nothing is known.
+std::vector<uint8_t> random_crossings(const Body& body, int32_t seed) {
+  constexpr int kBetween = kGreatestCrossing - kLeastCrossing + 1;
+  std::vector<uint8_t> crossings(6 * static_cast<std::size_t>(body.particle_count()), 0);
+  for (std::size_t k = 0; k < crossings.size(); ++k) {
+    const auto particle = static_cast<int32_t>(k / 6);
+    if (body.neighbour(particle, static_cast<int>(k % 6)) >= 0) continue;
+    // splitmix64 of what names the edge; a generator for each of them would take longer than the rest of a small case.
+    uint64_t z = static_cast<uint64_t>(seed);
+    const Vec3 place = body.rest_position(particle) / body.grid.spacing;
+    for (int axis = 0; axis < 3; ++axis) z = z * 1'048'583 + static_cast<uint64_t>(std::llround(place[axis]));
+    z = (6 * z + k % 6) * 0x9E3779B97F4A7C15u;
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+    z ^= z >> 31;
+    const int kind = static_cast<int>(z % 5);
+    const int anywhere = kLeastCrossing + static_cast<int>(z / 5 % kBetween);
+    crossings[k] = static_cast<uint8_t>(kind == 0   ? 0
+                                        : kind == 1 ? kLeastCrossing
+                                        : kind == 2 ? kGreatestCrossing
+                                                    : anywhere);
+  }
+  return crossings;
+}
+
 Setup setup_of(const Case& c) {
   Setup setup;
   const double h = c.spacing;
   setup.body = fixtures::body_from_nodes(c.nodes, h);
+  if (c.surface != 0) setup.body.surface_crossing = random_crossings(setup.body, c.surface);
   setup.step.substeps = c.moves ? c.substeps : c.together;
   setup.step.iterations = c.moves ? c.iterations : 0;
   setup.step.stiffness = std::pow(10.0, c.stiffness);
@@ -776,6 +806,7 @@ std::vector<std::function<void(Case&)>> simplifications(const Case& c) {
   towards(c, &Case::pace, 1, edits);
   towards(c, &Case::blade_friction, 0, edits);
   towards(c, &Case::alpha, 5, edits);
+  towards(c, &Case::surface, 0, edits);
   towards(c, &Case::acceleration, Acceleration::none, edits);
   towards(c, &Case::together, 1, edits);
   towards(c, &Case::substeps, 1, edits);
@@ -875,8 +906,8 @@ namespace cutproof::property_tests {
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Case, nodes, spacing, clusters, side, seed_spacing, ball_radius, most, tau, cap,
                                    seed, merge, expand, expand_depth, debris, blade_length, blade_depth,
                                    blade_thickness, strokes, together, moves, substeps, iterations, stiffness,
-                                   acceleration, ground, alpha, removal, remove, epsilon, strain, solver, relaxation,
-                                   damping, time_step, pace, blade_friction, gravity, walls, grips)
+                                   acceleration, ground, alpha, surface, removal, remove, epsilon, strain, solver,
+                                   relaxation, damping, time_step, pace, blade_friction, gravity, walls, grips)
 
 std::string to_json(const Case& c) { return nlohmann::json(c).dump(); }
 
@@ -939,6 +970,7 @@ void require_sane(const Case& c) {
     require(is_within(stroke.turn, 180), "strokes.turn", "within -180 .. 180");
   }
   require(c.alpha >= 1 && c.alpha <= 9, "alpha", "in [1, 9]");
+  require(c.surface >= 0, "surface", ">= 0");
   require(c.epsilon >= 1 && c.epsilon <= 1000, "epsilon", "in [1, 1000]");
   require(c.strain >= 1 && c.strain <= 100'000, "strain", "in [1, 100000]");
   require(c.relaxation >= 1 && c.relaxation <= 10, "relaxation", "in [1, 10]");
@@ -969,8 +1001,8 @@ Case from_json(const std::string& text) {
     if (document.is_object()) {
       const nlohmann::json plain = Case{};
       for (const char* field :
-           {"acceleration", "together", "alpha", "removal", "remove", "epsilon", "strain", "solver", "relaxation",
-            "damping", "time_step", "pace", "blade_friction", "gravity", "walls", "grips"}) {
+           {"acceleration", "together", "alpha", "surface", "removal", "remove", "epsilon", "strain", "solver",
+            "relaxation", "damping", "time_step", "pace", "blade_friction", "gravity", "walls", "grips"}) {
         document.emplace(field, plain.at(field));
       }
       for (auto& stroke : document.at("strokes")) {

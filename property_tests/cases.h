@@ -73,7 +73,8 @@ struct Case {
   std::vector<Stroke> strokes;                    // in this order; if the body moves, each takes whole frames
   int32_t together = 1;                           // strokes of one frame, where nothing moves; >= 1
 
-  int32_t alpha = 5;  // where skin vertices sit on their grid edge [tenths]
+  int32_t alpha = 5;    // where skin vertices sit on their grid edge [tenths]
+  int32_t surface = 0;  // whose random numbers say where the surface crosses grid edges; 0: not known
 
   // false: nothing moves, and cuts are geometric. true: the body is soft, and the blade cuts what it stretches apart.
   bool moves = false;

@@ -1,11 +1,15 @@
 #include "property_tests/counterexample.h"
 
+#include <array>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <type_traits>
+#include <vector>
 
 #include "model/error.h"
 #include "model/io/input_file.h"
+#include "model/io/json_number.h"
 #include "model/io/json_reader.h"
 #include "model/io/json_text.h"
 
@@ -38,6 +42,22 @@ std::string to_json(const Counterexample& counterexample) {
   return io::json_text(document);
 }
 
+namespace {
+
+// Cases and commands have whole numbers but for the spacing. Empty, or which field has another: read as an integer it
+// would become anything (json_number.h).
+std::string fraction_in(const nlohmann::json& document) {
+  for (const auto& [key, value] : document.items()) {
+    const bool may_be = document.is_object() && key == "spacing";
+    if (value.is_number_float() && !may_be) return "'" + key + "' is " + value.dump() + ", which is no whole number";
+    if (!value.is_structured()) continue;
+    if (std::string problem = fraction_in(value); !problem.empty()) return problem;
+  }
+  return {};
+}
+
+}  // namespace
+
 Counterexample counterexample_from_json(const std::string& text, const std::string& file) {
   const auto refuse = [&](const std::string& field, const std::string& problem) -> InputError {
     return {file, field, problem, kWhatToGive};
@@ -47,13 +67,18 @@ Counterexample counterexample_from_json(const std::string& text, const std::stri
   try {
     const auto document = io::parse_json(text, file, io::kCounterexampleLimits, std::string(kWhatToGive) + ".");
     if (!document.is_object()) throw refuse("", "this is not a counterexample");
+    if (const std::string problem = fraction_in(document); !problem.empty()) throw refuse("", problem);
     if (!document.contains("format")) {
       result.failing = from_json(text);
       return result;
     }
-    const auto get = [&](const char* name, auto& value) {
+    const auto get = [&]<class T>(const char* name, T& value) {
       field = name;
-      document.at(name).get_to(value);
+      if constexpr (std::is_integral_v<T>) {
+        value = whole_number<T>(document.at(name));
+      } else {
+        document.at(name).get_to(value);
+      }
     };
     std::string format;
     int version = 0;
@@ -69,9 +94,10 @@ Counterexample counterexample_from_json(const std::string& text, const std::stri
     get("found", result.found);
     get("seed", result.seed);
     get("index", result.index);
-    std::vector<std::pair<std::size_t, std::uint16_t>> choices;
-    get("schedule", choices);
-    for (const auto& [decision, choice] : choices) {
+    field = "schedule";
+    for (const auto& pair : document.at("schedule").get<std::vector<std::array<nlohmann::json, 2>>>()) {
+      const auto decision = whole_number<std::size_t>(pair[0]);
+      const auto choice = whole_number<uint16_t>(pair[1]);
       if (decision >= io::kMostDecisions)
         throw refuse("schedule", "a decision with number " + std::to_string(decision));
       if (decision >= result.schedule.size()) result.schedule.resize(decision + 1, 0);

@@ -145,6 +145,7 @@ void note_what_a_stage_did(const Setup& setup, Stage stage, const State& before,
       break;
     case Stage::skin:
       if (setup.skin.alpha != SkinParameters{}.alpha && !after.skin.triangles.empty()) seen["alpha"] = true;
+      if (!setup.body.surface_crossing.empty() && !after.skin.triangles.empty()) seen["fitted skin"] = true;
       break;
   }
 }

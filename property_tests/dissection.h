@@ -56,6 +56,7 @@ inline constexpr std::array kCoverageClasses = {
     CoverageClass{"uncoupled without promise"},      // connected tissue is, where no rule promises otherwise
     CoverageClass{"above the cap without promise"},  // a single pass made a cluster larger than cap
     CoverageClass{"alpha"},                          // a skin whose vertices are not halfway
+    CoverageClass{"fitted skin"},                    // a skin of which each vertex has a place of its own on its edge
     CoverageClass{"cavity"},                         // the skin has an inner shell
     CoverageClass{"consumed body"},                  // it is cut away entirely
     // Of steps, in which something moved.

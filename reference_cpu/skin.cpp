@@ -3,6 +3,7 @@
 #include <array>
 #include <vector>
 
+#include "model/at.h"
 #include "reference_cpu/reference.h"
 #include "reference_cpu/skin_cases.h"
 
@@ -78,10 +79,12 @@ void place_vertices(const Setup& setup, State& state) {
   const Body& body = setup.body;
   const Memberships memberships = memberships_of(state.clusters, body.particle_count());
   const std::vector<Vec3> centers = current_centers(body, state, memberships);
-  const double reach = setup.skin.alpha * body.grid.spacing;
   for (std::size_t v = 0; v < state.skin.owner.size(); ++v) {
     const int32_t owner = state.skin.owner[v];
-    const auto& e = kDirections[state.skin.direction[v]];
+    const int direction = state.skin.direction[v];
+    const double crossing = body.crossing(owner, direction);
+    const double reach = (crossing > 0 ? crossing : setup.skin.alpha) * body.grid.spacing;
+    const auto& e = kDirections[at(direction)];
     const Vec3 offset = {reach * e[0], reach * e[1], reach * e[2]};
     const Vec3 rest = body.rest_position(owner) + offset;
     Vec3 sum;

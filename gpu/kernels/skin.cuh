@@ -321,7 +321,9 @@ CUTPROOF_DEVICE void place_vertices_kernel(Block& block, const DeviceView& w) {
     if (!skin_detail::skinned(w, b)) continue;
     const BodyConstants& body = w.body[b];
     const int direction = w.vertex_direction[v];
-    const float reach = (direction % 2 == 0 ? body.alpha : -body.alpha) * body.h;
+    const int crossing = w.any_crossing ? w.surface_crossing[int64_t{6} * p + direction] : 0;
+    const float part = crossing > 0 ? static_cast<float>(crossing) / kCrossingSteps : body.alpha;
+    const float reach = (direction % 2 == 0 ? part : -part) * body.h;
     const Float3 arm = {direction / 2 == 0 ? reach : 0.0f, direction / 2 == 1 ? reach : 0.0f,
                         direction / 2 == 2 ? reach : 0.0f};
     // Relative to where the first cluster puts it, so that summing costs no digits of d. (Not to the owner: where a

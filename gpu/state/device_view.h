@@ -211,6 +211,7 @@ struct Extents {
   int most_iterations = 0;    // of any body, in a substep
   int accelerated = 0;        // some body's iterations are
   int any_contact = 0;        // some body has a blade, a wall or a grip
+  int any_crossing = 0;       // of some body it is known where its surface crosses grid edges
   int slot_capacity = 0, member_capacity = 0, vertex_capacity = 0, cell_capacity = 0, addition_capacity = 0;
   int slots_expected = 0;  // how many clusters grids are made for: fewer than there is room for, and not the most
   int group_capacity = 0, pair_capacity = 0, place_capacity = 0;

@@ -93,8 +93,8 @@ Skin extract_skin(const StagingBuffers& staging, const Setup& setup, const BodyC
     const auto owner = static_cast<int32_t>(name / 6);
     const auto direction = static_cast<uint8_t>(name % 6);
     const auto& e = kDirections[direction];
-    const Vec3 rest =
-        setup.body.rest_position(owner) + (setup.skin.alpha * h) * Vec3{double(e[0]), double(e[1]), double(e[2])};
+    const Vec3 rest = setup.body.rest_position(owner) +
+                      (vertex_reach(setup, owner, direction) * h) * Vec3{double(e[0]), double(e[1]), double(e[2])};
     skin.owner.push_back(owner);
     skin.direction.push_back(direction);
     skin.position.push_back(rest + d(xyz(staging.vertex_position[at(index)])));

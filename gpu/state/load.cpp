@@ -255,6 +255,13 @@ StagingBuffers make_contents(const std::vector<Setup>& setups, const std::vector
     nodes += setups[b].body.grid.node_count();
   }
   find_memberships(staging);
+  const auto knows_crossings = [](const Setup& setup) { return !setup.body.surface_crossing.empty(); };
+  const bool any_crossing = std::any_of(setups.begin(), setups.end(), knows_crossings);
+  for (std::size_t b = 0; b < setups.size() && any_crossing; ++b) {
+    const std::vector<uint8_t>& known = setups[b].body.surface_crossing;
+    staging.surface_crossing.insert(staging.surface_crossing.end(), known.begin(), known.end());
+    staging.surface_crossing.resize(at(int64_t{6} * staging.body[b].particle_end), 0);
+  }
   Counters counters{};
   counters.slots_used = narrow(static_cast<int64_t>(staging.slot_size.size()), "clusters");
   counters.members_used = narrow(static_cast<int64_t>(staging.members.size()), "cluster members");

@@ -117,6 +117,10 @@ void describe(auto& v, BodySpec& s) {
                         "of `spacing` and `particles` must be given.",
                         between(1, kMany), kZeroIsAbsent});
   v.field(s.density, {"density", "Mass per volume: each particle weighs density · h³.", above(0, 1e9, "kg/m³")});
+  v.field(s.fit_skin, {"fit_skin",
+                       "Whether the skin of the uncut body lies where its surface crosses the grid edges; otherwise "
+                       "it lies `skin.alpha` beyond its particles, as cut faces do (method.md §8). Left out, it is "
+                       "false in a scene of version 1 to 3."});
   v.field(s.align, {"align",
                     "Turn the principal axes of a mesh (longest, middle, shortest) to x, y, z before anything else. "
                     "Implicit shapes stay as their numbers put them."});
@@ -196,7 +200,8 @@ void describe(auto& v, ExpandParameters& s) {
 
 void describe(auto& v, SkinParameters& s) {
   v.field(s.wanted, {"wanted", "Whether a skin is made at all."});
-  v.field(s.alpha, {"alpha", "How far beyond its particle a skin vertex lies.", inside(0, 1, "h")});
+  v.field(s.alpha, {"alpha", "How far beyond its particle a skin vertex lies where no surface tells (`body.fit_skin`).",
+                    inside(0, 1, "h")});
 }
 
 void describe(auto& v, StrokeSpec& s) {
@@ -295,7 +300,7 @@ void describe(auto& v, FrameFields& s) {
 }
 
 void describe(auto& v, Scene& s) {
-  v.field(s.version, {"version", "Of this format: 3; 1 and 2 are read as ever.", between(1, kSceneVersion), kRequired});
+  v.field(s.version, {"version", "Of this format: 4; 1 to 3 are read as ever.", between(1, kSceneVersion), kRequired});
   v.field(s.name, {"name", "A short name, for reports.", {}, kOptional, kMostNameBytes});
   v.field(s.description, {"description", "What the scene shows, for people.", {}, kOptional, kMostDescriptionBytes});
   v.field(s.seed, {"seed", "Of everything random.", between(0, 18446744073709551615.0)});

@@ -88,6 +88,7 @@ Defect bare_graph_defect(const Setup& setup) {
     return SetupDefect{"body/mass",
                        fmt::format("This has {} entries for {} particles.", body.mass.size(), body.rest.size())};
   }
+  if (!body.surface_crossing.empty()) return SetupDefect{"body/surface_crossing", "Only a body on a grid has these."};
   if (setup.skin.wanted) return SetupDefect{"skin/wanted", "A body without a grid has no skin."};
   if (std::string problem = problem_of_edges(body); !problem.empty()) {
     problem.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(problem.front())));
@@ -139,6 +140,25 @@ Defect grid_defect(const Body& body) {
   const auto empty = std::count(body.particle_at.begin(), body.particle_at.end(), -1);
   if (occupied != static_cast<std::ptrdiff_t>(n) || occupied + empty != rest) {
     return SetupDefect{"body/particle_at", "A node names a particle that is not there."};
+  }
+  if (body.surface_crossing.empty()) return std::nullopt;
+  if (body.surface_crossing.size() != 6 * n) {
+    return SetupDefect{"body/surface_crossing",
+                       fmt::format("This has {} entries for {} particles, and should have six for each or none.",
+                                   body.surface_crossing.size(), n)};
+  }
+  for (std::size_t k = 0; k < body.surface_crossing.size(); ++k) {
+    const int crossing = body.surface_crossing[k];
+    if (crossing == 0) continue;
+    if (crossing < kLeastCrossing || crossing > kGreatestCrossing) {
+      return SetupDefect{"body/surface_crossing", fmt::format("Entry {} is {}, and should be 0 or from {} to {}.", k,
+                                                              crossing, kLeastCrossing, kGreatestCrossing)};
+    }
+    if (body.neighbour(static_cast<int32_t>(k / 6), static_cast<int>(k % 6)) >= 0) {
+      return SetupDefect{"body/surface_crossing",
+                         fmt::format("Entry {} is {}, and the grid edge of particle {} leads to another particle.", k,
+                                     crossing, k / 6)};
+    }
   }
   return std::nullopt;
 }

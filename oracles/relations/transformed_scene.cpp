@@ -66,6 +66,12 @@ Body TransformedScene::transform_body(const Body& body) {
   if (body.on_grid()) {
     std::sort(order.begin(), order.end(), [&](int32_t i, int32_t j) { return node[at(i)] < node[at(j)]; });
   }
+  // Where each direction of kDirections comes to lie.
+  std::array<std::size_t, 6> turned{};
+  for (std::size_t d = 0; d < 6; ++d) {
+    const std::size_t against = (d % 2 != 0) != (transform_.sign[d / 2] < 0) ? 1 : 0;
+    turned[d] = 2 * at(transform_.target[d / 2]) + against;
+  }
   particle_.resize(order.size());
   transformed.particle_at.assign(at(transformed.grid.node_count()), -1);
   for (std::size_t j = 0; j < order.size(); ++j) {
@@ -75,6 +81,9 @@ Body TransformedScene::transform_body(const Body& body) {
     if (!body.on_grid()) continue;
     transformed.node[j] = node[i];
     transformed.particle_at[at(node[i])] = static_cast<int32_t>(j);
+    for (std::size_t d = 0; d < 6 && !body.surface_crossing.empty(); ++d) {
+      transformed.surface_crossing[6 * j + turned[d]] = body.surface_crossing[6 * i + d];
+    }
   }
   // The body lies in the (scaled) world as it did: orientation' = orientation · Pᵀ.
   for (int row = 0; row < 3; ++row) {

@@ -89,7 +89,7 @@ std::vector<Vec3> rest_points(const Setup& setup, const Skin& skin) {
     const auto& step = kDirections[skin.direction[v]];
     for (int axis = 0; axis < 3; ++axis) {
       const auto i = at(axis);
-      points[v][axis] = node[i] + setup.skin.alpha * step[i];
+      points[v][axis] = node[i] + vertex_reach(setup, skin.owner[v], skin.direction[v]) * step[i];
     }
   }
   return points;
@@ -170,9 +170,9 @@ void check_skin_geometry(Judged& judged, Verdict& verdict) {
                 outer, inner, components, cavities, pieces_in_words(judged.components()));
   }
 
-  const VolumeRange range = tissue_volume(setup.body.grid, tissue, setup.skin.alpha);
-  const double rounding =
-      (static_cast<double>(skin.triangles.size()) + 512) * kUnitRoundoff * (magnitude + std::abs(range.high));
+  const VolumeRange range = tissue_volume(setup, tissue);
+  const auto triangles = static_cast<double>(skin.triangles.size());
+  const double rounding = (triangles + 512) * kUnitRoundoff * (magnitude + std::abs(range.high) + 2 * triangles);
   const double outside = std::max(range.low - volume, volume - range.high);
   verdict.measured = std::max(0.0, outside);
   verdict.bound = rounding;

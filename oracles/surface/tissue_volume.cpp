@@ -20,13 +20,21 @@ struct CellVertex {
   friend auto operator<=>(const CellVertex&, const CellVertex&) = default;
 };
 
+// How far from its inner end each grid edge of a cell carries its vertex, in h: by inner corner and axis.
+using Reaches = std::array<std::array<double, 3>, 8>;
+
+int axis_between(int a, int b) { return (a ^ b) == 1 ? 0 : (a ^ b) == 2 ? 1 : 2; }
+double reach_of(const Reaches& reaches, CellVertex v) {
+  return reaches[static_cast<std::size_t>(v.inside)][static_cast<std::size_t>(axis_between(v.inside, v.outside))];
+}
+
 // Relative to the middle of the cell, in units of h.
-Vec3 cell_position(CellVertex v, double alpha) {
+Vec3 cell_position(CellVertex v, const Reaches& reaches) {
   const auto a = corner_coordinates(v.inside), b = corner_coordinates(v.outside);
   Vec3 p;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
-    p[axis] = a[i] + alpha * (b[i] - a[i]) - 0.5;
+    p[axis] = a[i] + reach_of(reaches, v) * (b[i] - a[i]) - 0.5;
   }
   return p;
 }
@@ -78,27 +86,44 @@ VolumeRange polygon_volume(const std::vector<Vec3>& p) {
   return best[0][n - 1];
 }
 
-// Area of tissue on a face of a cell: marching squares, diagonal inside corners apart.
-double face_area(int pattern, const std::array<int, 4>& face, double alpha) {
-  std::array<bool, 4> in{};
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < 4; ++i) {
-    in[i] = ((pattern >> face[i]) & 1) != 0;
-    count += in[i];
+// Area of tissue on a face of a cell: marching squares, diagonal inside corners apart. Each run of inside corners is a
+// polygon of its own: its corners, and the vertices where it is left and entered.
+double face_area(int pattern, const std::array<int, 4>& face, const Reaches& reaches) {
+  const auto inside = [&](std::size_t i) { return ((pattern >> face[i % 4]) & 1) != 0; };
+  // Of corner i of the face, and of the vertex on the edge from inner corner i to corner j: on the unit square.
+  const auto corner = [](std::size_t i) {
+    return std::array<double, 2>{i % 4 == 1 || i % 4 == 2 ? 1.0 : 0.0, i % 4 >= 2 ? 1.0 : 0.0};
+  };
+  const auto vertex = [&](std::size_t i, std::size_t j) {
+    const double reach = reach_of(reaches, {face[i % 4], face[j % 4]});
+    const auto a = corner(i), b = corner(j);
+    return std::array<double, 2>{a[0] + reach * (b[0] - a[0]), a[1] + reach * (b[1] - a[1])};
+  };
+  if (inside(0) && inside(1) && inside(2) && inside(3)) return 1;
+  double twice = 0;
+  for (std::size_t first = 0; first < 4; ++first) {
+    if (!inside(first) || inside(first + 3)) continue;
+    std::vector<std::array<double, 2>> run = {vertex(first, first + 3), corner(first)};
+    std::size_t last = first;
+    while (inside(last + 1)) run.push_back(corner(++last));
+    run.push_back(vertex(last, last + 1));
+    for (std::size_t k = 0; k < run.size(); ++k) {
+      const auto &p = run[k], &q = run[(k + 1) % run.size()];
+      twice += p[0] * q[1] - p[1] * q[0];
+    }
   }
-  const double two = in[0] == in[2] ? alpha * alpha : alpha;  // diagonal, or side by side
-  return std::array{0.0, alpha * alpha / 2, two, 1 - (1 - alpha) * (1 - alpha) / 2, 1.0}[count];
+  return twice / 2;
 }
 
-VolumeRange cell_volume(int pattern, double alpha) {
+VolumeRange cell_volume(int pattern, const Reaches& reaches) {
   VolumeRange total;
   for (const auto& face : kFaceCorners) {
-    const double cone = face_area(pattern, face, alpha) / 6;  // area times half an edge over three
+    const double cone = face_area(pattern, face, reaches) / 6;  // area times half an edge over three
     total.add({cone, cone});
   }
   for (const auto& loop : cell_loops(pattern)) {
     std::vector<Vec3> points;
-    for (const CellVertex v : loop) points.push_back(cell_position(v, alpha));
+    for (const CellVertex v : loop) points.push_back(cell_position(v, reaches));
     total.add(polygon_volume(points));
   }
   return total;
@@ -106,27 +131,47 @@ VolumeRange cell_volume(int pattern, double alpha) {
 
 }  // namespace
 
-VolumeRange tissue_volume(const Grid& grid, const std::vector<uint8_t>& tissue, double alpha) {
-  std::array<int64_t, 256> cells{};
+VolumeRange tissue_volume(const Setup& setup, const std::vector<uint8_t>& tissue) {
+  const Body& body = setup.body;
+  const Grid& grid = body.grid;
+  // Where nothing is known of crossings, all cells of a pattern are alike.
+  std::array<int64_t, 256> alike{};
+  VolumeRange total;
   for (int32_t k = 0; k + 1 < grid.nodes[2]; ++k) {
     for (int32_t j = 0; j + 1 < grid.nodes[1]; ++j) {
       for (int32_t i = 0; i + 1 < grid.nodes[0]; ++i) {
         const int64_t node = grid.index(i, j, k);
         int pattern = 0;
+        std::array<std::size_t, 8> node_of{};
         for (int corner = 0; corner < 8; ++corner) {
           const auto c = corner_coordinates(corner);
-          const int64_t at = node + c[0] + int64_t{grid.nodes[0]} * (c[1] + int64_t{grid.nodes[1]} * c[2]);
-          pattern |= tissue[static_cast<std::size_t>(at)] << corner;
+          const auto at =
+              static_cast<std::size_t>(node + c[0] + int64_t{grid.nodes[0]} * (c[1] + int64_t{grid.nodes[1]} * c[2]));
+          node_of[static_cast<std::size_t>(corner)] = at;
+          pattern |= tissue[at] << corner;
         }
-        ++cells[static_cast<std::size_t>(pattern)];
+        if (body.surface_crossing.empty() || pattern == 0 || pattern == 255) {
+          ++alike[static_cast<std::size_t>(pattern)];
+          continue;
+        }
+        Reaches reaches{};
+        for (int corner = 0; corner < 8; ++corner) {
+          if ((pattern >> corner & 1) == 0) continue;
+          const auto at = static_cast<std::size_t>(corner);
+          for (int axis = 0; axis < 3; ++axis) {
+            const int direction = 2 * axis + (corner >> axis & 1);  // into the cell
+            reaches[at][static_cast<std::size_t>(axis)] = vertex_reach(setup, body.particle_at[node_of[at]], direction);
+          }
+        }
+        total.add(cell_volume(pattern, reaches));
       }
     }
   }
-  VolumeRange total;
+  Reaches same;
+  for (auto& of_corner : same) of_corner.fill(setup.skin.alpha);
   for (int pattern = 1; pattern < 256; ++pattern) {
-    const auto count = static_cast<double>(cells[static_cast<std::size_t>(pattern)]);
-    if (count == 0) continue;
-    total.add(cell_volume(pattern, alpha), count);
+    const auto count = static_cast<double>(alike[static_cast<std::size_t>(pattern)]);
+    if (count != 0) total.add(cell_volume(pattern, same), count);
   }
   return total;
 }

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "model/grid.h"
+#include "model/setup.h"
 
 namespace cutproof::oracles {
 
@@ -16,7 +16,7 @@ struct VolumeRange {
 };
 
 // Least and greatest volume under any triangulation of the cells' polygons. `tissue`: [node_count] 1 where an alive
-// particle sits; `alpha`: where along its grid edge a vertex lies.
-VolumeRange tissue_volume(const Grid& grid, const std::vector<uint8_t>& tissue, double alpha);
+// particle sits.
+VolumeRange tissue_volume(const Setup& setup, const std::vector<uint8_t>& tissue);
 
 }  // namespace cutproof::oracles

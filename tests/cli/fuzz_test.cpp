@@ -154,6 +154,14 @@ TEST_F(Fuzz, PutsShardsTogetherToTheWhole) {
     write("none_of_them.json", none.dump());
     expect_refused("fuzz --merge none_of_them.json", {"none_of_them.json", "there is no shard"});
   }
+  // Numbers that no integer holds.
+  for (const auto& [field, value] :
+       {std::pair{"shard", json(1e300)}, {"shards", json(2.5)}, {"sizes", json{0, 1e20}}}) {
+    json none = result("3.json");
+    none[field] = value;
+    write("none_of_them.json", none.dump());
+    expect_refused("fuzz --merge none_of_them.json", {"none_of_them.json", "not a whole number"});
+  }
   // Whatever is missing, or of another kind: a result that is refused, and no defect of the program.
   const json third = result("3.json");
   for (const auto& [field, value] : third.items()) {

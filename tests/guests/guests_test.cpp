@@ -325,6 +325,16 @@ TEST(Questions, AreRefusedWithAnythingUnknown) {
   EXPECT_TRUE(contains(problem([](json& j) { j["given"]["alive"]["type"] = "float64"; }), "alive"));
   EXPECT_TRUE(contains(problem([](json& j) { j["given"]["edge_ends"]["values"][0] = 1'000'000; }), "edge"));
   EXPECT_TRUE(contains(problem([](json& j) { j["given"]["stranger"] = j["given"]["alive"]; }), "not known"));
+  const auto is_no_whole_number = [&](const std::function<void(json&)>& change) {
+    return contains(problem(change), "not a whole number");
+  };
+  for (const json& value : {json(2.1e36), json(0.5), json("nan")}) {
+    EXPECT_TRUE(is_no_whole_number([&](json& j) { j["given"]["edge_ends"]["values"][0] = value; })) << value;
+    EXPECT_TRUE(is_no_whole_number([&](json& j) { j["given"]["alive"]["shape"][0] = value; })) << value;
+  }
+  EXPECT_TRUE(is_no_whole_number([](json& j) { j["given"]["edge_ends"]["values"][0] = 3'000'000'000; }));
+  EXPECT_TRUE(is_no_whole_number([](json& j) { j["seed"] = -1; }));
+  EXPECT_TRUE(is_no_whole_number([](json& j) { j["index"] = 1e300; }));
   EXPECT_TRUE(contains(problem([](json& j) { j = 5; }), "it is no question"));
   EXPECT_THROW(question_from_json("{", "q.json"), InputError);
 }

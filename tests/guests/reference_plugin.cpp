@@ -226,7 +226,7 @@ int load(const cutproof_host* host, void* self, const cutproof_tissue* tissue, c
   if (static_cast<Instance*>(self)->spoiled == "refuse" && setup.body.mass.size() % 2 == 1) return 9;
   for_each_setup_field([&](const SetupField& field, auto get) {
     using T = std::remove_cvref_t<decltype(get(setup))>;
-    if (field.group == "body") return;
+    if (field.group == "body" && field.name != "surface_crossing") return;  // the tissue has the others
     if constexpr (is_list_of_entries<T>) {
       get_entries(host, get(setup));
     } else {

@@ -89,7 +89,8 @@ TEST(Fields, AreTheMembersOfASetupEachOnce) {
   for_each_setup_field([&](const SetupField&, auto get) { visited.see(get(setup)); });
   const auto& [body, step, detect, split, merge, expand, skin, walls, grips, has_blade, blade, substep_length,
                blade_moves, stroke_end] = setup;
-  const auto& [name, grid, node, particle_at, rest, edge_offsets, edge_ends, mass, origin, orientation] = body;
+  const auto& [name, grid, node, particle_at, rest, edge_offsets, edge_ends, mass, surface_crossing, origin,
+               orientation] = body;
   const auto& [nodes, spacing] = grid;
   const auto& [solver, substeps, iterations, stiffness, relaxation, acceleration, damping, gravity] = step;
   const auto& [criterion, remove, epsilon, strain, without_blade] = detect;
@@ -98,11 +99,11 @@ TEST(Fields, AreTheMembersOfASetupEachOnce) {
   const auto& [expand_rule, depth] = expand;
   const auto& [wanted, alpha] = skin;
   const auto& [length, blade_depth, thickness, friction] = blade;
-  visited.expect_once(name, nodes, spacing, node, particle_at, rest, edge_offsets, edge_ends, mass, origin, orientation,
-                      solver, substeps, iterations, stiffness, relaxation, acceleration, damping, gravity, criterion,
-                      remove, epsilon, strain, without_blade, debris, merge_rule, expand_rule, depth, wanted, alpha,
-                      walls, grips, has_blade, length, blade_depth, thickness, friction, substep_length, blade_moves,
-                      stroke_end);
+  visited.expect_once(name, nodes, spacing, node, particle_at, rest, edge_offsets, edge_ends, mass, surface_crossing,
+                      origin, orientation, solver, substeps, iterations, stiffness, relaxation, acceleration, damping,
+                      gravity, criterion, remove, epsilon, strain, without_blade, debris, merge_rule, expand_rule,
+                      depth, wanted, alpha, walls, grips, has_blade, length, blade_depth, thickness, friction,
+                      substep_length, blade_moves, stroke_end);
 }
 
 template <class Entry>

@@ -68,6 +68,12 @@ void add_surroundings(Setup& setup) {
   setup.merge.rule = MergeRule::single_pass;
   setup.expand = {ExpandRule::published, 2};
   setup.skin = {true, 0.25};
+  Body& body = setup.body;
+  body.surface_crossing.resize(6 * body.node.size());
+  for (std::size_t k = 0; k < body.surface_crossing.size(); ++k) {
+    const bool leaves = body.neighbour(static_cast<int32_t>(k / 6), static_cast<int>(k % 6)) < 0;
+    if (leaves) body.surface_crossing[k] = static_cast<uint8_t>(kLeastCrossing + k % 225);
+  }
   setup.walls = {{2, +1, 0.1, 0.3}, {0, -1, 2, 0}};
   setup.grips = {{{0, 2}, {1, 1, 1, 0, 0, 0}, std::vector<Vec3>(6)},
                  {{1}, {0, 0, 1, 1, 1, 1}, std::vector<Vec3>(6, {0, 0, 1e-3})}};
@@ -895,10 +901,11 @@ TEST_F(RecordingTest, IsNotMadeOfASetupWhoseCriterionHasNoEndsToTake) {
   EXPECT_THROW(Recorder(path("run"), setup, "{}", "reference"), std::invalid_argument);
 }
 
-// Format 3 had no detect/remove: both ends of an edge went.
-TEST_F(RecordingTest, IsReadIfItIsOfTheFormatBefore) {
+// Format 3 had no detect/remove: both ends of an edge went. Format 4 had no body/surface_crossing: none was known.
+TEST_F(RecordingTest, IsReadIfItIsOfAFormatBefore) {
   Setup setup = block_setup(2, 1, 1);
   setup.detect.remove = RemovedEnds::one;
+  setup.body.surface_crossing = {0, 128, 99, 16, 240, 0, 77, 0, 0, 0, 0, 0};
   {
     Recorder recorder(path("run"), setup, "{}", "reference");
     recorder.finish();
@@ -909,14 +916,22 @@ TEST_F(RecordingTest, IsReadIfItIsOfTheFormatBefore) {
       tamper(file, [&](hid_t id) { set_attribute<int32_t>(id, "/", "cutproof_format", format); });
     }
   };
-  const auto removed = [&] { return RecordingReader(path("run")).header().setup.detect.remove; };
-  EXPECT_EQ(removed(), RemovedEnds::one);
-  call_it(kFormatVersion - 1);
-  EXPECT_EQ(removed(), RemovedEnds::both);
+  const auto read = [&] { return RecordingReader(path("run")).header().setup; };
+  EXPECT_EQ(read().detect.remove, RemovedEnds::one);
+  EXPECT_EQ(read().body.surface_crossing, setup.body.surface_crossing);
+  call_it(4);
+  EXPECT_EQ(read().detect.remove, RemovedEnds::one);
+  EXPECT_TRUE(read().body.surface_crossing.empty());
+  tamper(files.index, [](hid_t file) { H5Ldelete(file, "/setup/body/surface_crossing", H5P_DEFAULT); });
+  EXPECT_TRUE(read().body.surface_crossing.empty());
+  call_it(3);
+  EXPECT_EQ(read().detect.remove, RemovedEnds::both);
   tamper(files.index, [](hid_t file) { H5Adelete_by_name(file, "/setup/detect", "remove", H5P_DEFAULT); });
-  EXPECT_EQ(removed(), RemovedEnds::both);
+  EXPECT_EQ(read().detect.remove, RemovedEnds::both);
+  call_it(4);
+  expect_input_error([&] { read(); }, files.index, "remove");
   call_it(kFormatVersion);
-  expect_input_error([&] { RecordingReader reader(path("run")); }, files.index, "remove");
+  expect_input_error([&] { read(); }, files.index, "surface_crossing");
 }
 
 TEST_F(RecordingTest, IsRefusedIfAFileOfItIsMissingOrOfAnother) {
@@ -1011,6 +1026,9 @@ TEST_F(RecordingTest, IsRefusedIfItIsInconsistent) {
   entry("/setup/body/particle_at", 0, int32_t{3});
   entry("/setup/body/mass", 1, kNan);
   entry("/setup/body/mass", 1, -1.0);
+  entry("/setup/body/surface_crossing", 1, uint8_t{15});
+  entry("/setup/body/surface_crossing", 1, uint8_t{241});
+  entry("/setup/body/surface_crossing", 0, uint8_t{128});  // of an edge that leads to another particle
   attribute("/setup/body", "spacing", kNan);
   attribute("/setup/body", "spacing", 0.0);
   attribute("/setup/step", "stiffness", kNan);

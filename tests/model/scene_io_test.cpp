@@ -23,7 +23,7 @@ namespace {
 
 using nlohmann::json;
 
-const char* const kSmallest = R"({"version": 3, "body": {"shape": {"kind": "box"}, "spacing": 0.01}})";
+const char* const kSmallest = R"({"version": 4, "body": {"shape": {"kind": "box"}, "spacing": 0.01}})";
 
 json smallest() { return json::parse(kSmallest); }
 json with_blade() {
@@ -667,8 +667,29 @@ TEST(SceneIo, AScenesVersionSaysWhichEndsGoIfNothingElseDoes) {
   EXPECT_EQ(parse_scene(write_scene(old), "again"), old);
 }
 
+TEST(SceneIo, AScenesVersionSaysWhetherItsSkinIsFittedIfNothingElseDoes) {
+  const auto fitted = [](const std::string& version, const std::string& more) {
+    return parse_scene(
+               R"({"version": )" + version + R"(, "body": {"shape": {"kind": "box"}, "spacing": 0.01)" + more + "}}",
+               "scene.json")
+        .body.fit_skin;
+  };
+  for (const char* version : {"1", "2", "3"}) {
+    EXPECT_FALSE(fitted(version, "")) << version;
+    EXPECT_TRUE(fitted(version, R"(, "fit_skin": true)")) << version;
+  }
+  EXPECT_TRUE(fitted("4", ""));
+  EXPECT_FALSE(fitted("4", R"(, "fit_skin": false)"));
+  const std::string plain = R"(, "body": {"shape": {"kind": "box"}, "spacing": 0.01}})";
+  EXPECT_EQ(parse_scene(R"({"version": 4)" + plain, "").body.fit_skin, Scene{}.body.fit_skin);
+  // A scene of version 3 stays what it is when it is written and read again.
+  const Scene old = parse_scene(R"({"version": 3)" + plain, "scene.json");
+  EXPECT_EQ(old.version, 3);
+  EXPECT_EQ(parse_scene(write_scene(old), "again"), old);
+}
+
 TEST(SceneIoErrors, AnotherVersionIsRefusedBeforeAnythingElse) {
-  expect_error(std::string(R"({"version": 4, "new_field": true})"), "version", {"4", "versions 1 to 3"});
+  expect_error(std::string(R"({"version": 5, "new_field": true})"), "version", {"5", "versions 1 to 4"});
   expect_error(std::string(R"({"version": 1.5})"), "version", {"1.5"});
   expect_error(std::string(R"({"version": "1"})"), "version", {"\"1\""});
   expect_error(std::string(R"([1])"), "", {"object", "list"});

@@ -251,6 +251,19 @@ TEST(SkinVertices, RejectsAVertexThatIsOffByABillionthOfTheSpacing) {
   EXPECT_FALSE(skin_vertices(scene.setup, scene.state).holds);
 }
 
+TEST(SkinVertices, RejectsAVertexThatIgnoresWhereTheSurfaceCrossesItsEdge) {
+  Scene scene = scene_of(block_nodes({0, 0, 0}, {3, 3, 3}));
+  ASSERT_TRUE(skin_vertices(scene.setup, scene.state).holds);
+  scene.setup.body.surface_crossing.assign(6 * 27, 0);
+  scene.setup.body.surface_crossing[1] = 128;  // where it lies anyway
+  EXPECT_TRUE(skin_vertices(scene.setup, scene.state).holds);
+  scene.setup.body.surface_crossing[1] = 129;
+  const Verdict verdict = skin_vertices(scene.setup, scene.state);
+  EXPECT_FALSE(verdict.holds) << "one step of the crossing away";
+  EXPECT_NEAR(verdict.measured, 1.0 / 256, 1e-12);
+  EXPECT_EQ(verdict.witness.particles, std::vector<int32_t>{0});
+}
+
 TEST(SkinVertices, RejectsAnOwnerThatIsDead) {
   Scene scene = scene_of({{0, 0, 0}, {1, 0, 0}});
   scene.state.alive[1] = 0;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -66,6 +67,17 @@ TEST(WellFormed, RejectsABodyWhoseTablesDisagree) {
   EXPECT_FALSE(well_formed(block.setup, block.state).holds);
   block = Block();
   block.setup.body.node[0] = 0;  // on the ring
+  EXPECT_FALSE(well_formed(block.setup, block.state).holds);
+  // Of the block's first particle: +x leads to the next one, -x leaves it.
+  const std::size_t n = block.setup.body.node.size();
+  for (const auto& [entry, crossing, right] :
+       {std::tuple(1, 128, true), {1, 16, true}, {1, 240, true}, {1, 15, false}, {1, 241, false}, {0, 128, false}}) {
+    block = Block();
+    block.setup.body.surface_crossing.assign(6 * n, 0);
+    block.setup.body.surface_crossing[static_cast<std::size_t>(entry)] = static_cast<uint8_t>(crossing);
+    EXPECT_EQ(well_formed(block.setup, block.state).holds, right) << entry << " " << crossing;
+  }
+  block.setup.body.surface_crossing.assign(6 * n - 1, 0);
   EXPECT_FALSE(well_formed(block.setup, block.state).holds);
   block = Block();
   block.setup.has_blade = true;  // without moves

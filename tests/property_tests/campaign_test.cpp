@@ -296,6 +296,11 @@ TEST(ACounterexample, IsRefusedWithItsFieldIfItIsNone) {
   refused("\"substeps\":2", "\"substeps\":0", "substeps");
   refused("\"link\":\"", "\"link\":\"not ", "strokes");
   refused("\"back\":", "\"back\":7", "");
+  // Numbers that no integer holds.
+  refused("\"seed\":0", "\"seed\":4.6e93", "seed");
+  refused("\"index\":0", "\"index\":-0.5", "index");
+  refused("\"substeps\":2", "\"substeps\":2e73", "substeps");
+  refused("\"schedule\":[]", "\"schedule\":[[0,65536]]", "schedule");
   EXPECT_THROW(counterexample_from_json("[]", "f.json"), InputError);
   EXPECT_THROW(counterexample_from_json("", "f.json"), InputError);
 }

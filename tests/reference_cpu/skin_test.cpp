@@ -318,6 +318,30 @@ TEST(Skin, StandsAlphaSpacingsFromTheOwnerAtRest) {
   }
 }
 
+TEST(Skin, LiesWhereTheSurfaceCrossesItsEdgeAndOnCutFacesAlphaAway) {
+  auto setup = setup_of(block_body(2, 1, 1, 0.5));
+  setup.skin.alpha = 0.3;
+  setup.body.surface_crossing.assign(12, 0);
+  setup.body.surface_crossing[1] = 64;   // of particle 0 along -x: a quarter
+  setup.body.surface_crossing[4] = 240;  // along +z
+  setup.body.surface_crossing[6] = 16;   // of particle 1 along +x
+  State state = state_of(setup.body, {{0, 1}});
+  const auto vertex = [&](int32_t owner, int direction) {
+    const Skin skin = skin_of(setup, state);
+    for (std::size_t v = 0; v < skin.owner.size(); ++v) {
+      if (skin.owner[v] == owner && skin.direction[v] == direction) return skin.position[v];
+    }
+    return Vec3{-1, -1, -1};
+  };
+  EXPECT_LT(norm(vertex(0, 1) - Vec3{0.5 - 0.125, 0.5, 0.5}), 1e-15);
+  EXPECT_LT(norm(vertex(0, 4) - Vec3{0.5, 0.5, 0.5 + 0.5 * 240 / 256}), 1e-15);
+  EXPECT_LT(norm(vertex(0, 5) - Vec3{0.5, 0.5, 0.5 - 0.15}), 1e-15) << "not known";
+  EXPECT_LT(norm(vertex(1, 0) - Vec3{1 + 0.5 / 16, 0.5, 0.5}), 1e-15);
+  remove_particles(state, {1});
+  EXPECT_LT(norm(vertex(0, 0) - Vec3{0.5 + 0.15, 0.5, 0.5}), 1e-15) << "a cut face";
+  EXPECT_LT(norm(vertex(0, 1) - Vec3{0.5 - 0.125, 0.5, 0.5}), 1e-15) << "as before the cut";
+}
+
 TEST(Skin, FollowsTheAverageOfItsOwnersClusters) {
   // Two particles of masses 1 and 3 at x = 1 and 2. Cluster A holds both, B only the second. Weights: 1 and 3/2 in A,
   // 3/2 in B. They move to x = 1 and y = 4 for the second; A has turned by a quarter about z.

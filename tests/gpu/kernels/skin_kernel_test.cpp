@@ -312,6 +312,17 @@ Bodies random_bodies(std::mt19937& random, int count, int64_t frames) {
     states.push_back(state_of(body, lists));
     Setup setup = setup_of(std::move(body), frames);
     setup.skin.alpha = 0.1 * draw(random, 1, 9);
+    if (random() % 2 == 0) {  // beside bodies of which nothing is known
+      setup.body.surface_crossing.resize(6 * at(setup.body.particle_count()));
+      for (uint8_t& crossing : setup.body.surface_crossing) {
+        crossing = static_cast<uint8_t>(random() % 4 == 0 ? 0 : draw(random, kLeastCrossing, kGreatestCrossing));
+      }
+      for (std::size_t k = 0; k < setup.body.surface_crossing.size(); ++k) {
+        if (setup.body.neighbour(static_cast<int32_t>(k / 6), static_cast<int>(k % 6)) >= 0) {
+          setup.body.surface_crossing[k] = 0;
+        }
+      }
+    }
     setups.push_back(std::move(setup));
   }
   return make_bodies(std::move(setups), states);

@@ -2,9 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <functional>
+#include <iostream>
+#include <numbers>
 #include <string>
 
+#include "oracles/surface/tissue_volume.h"
 #include "tests/oracles/skins.h"
 
 namespace cutproof::oracles {
@@ -94,6 +99,73 @@ TEST(SkinGeometry, RejectsASkinOfTheRightShapeAndTheWrongVolume) {
   EXPECT_FALSE(verdict.holds);
   EXPECT_EQ(verdict.unit, "h³");
   EXPECT_GT(verdict.measured, 0.4) << "a corner holds about half a cell";
+}
+
+TEST(SkinGeometry, KnowsTheVolumeUnderEachVertexOfItsOwn) {
+  // One particle whose surface is known: four pyramids above and four below, from the vertices' own distances.
+  Scene scene = scene_of({{0, 0, 0}});
+  scene.setup.body.surface_crossing = {64, 128, 192, 240, 16, 32};
+  ASSERT_TRUE(skin_geometry(scene.setup, scene.state).holds) << skin_geometry(scene.setup, scene.state).witness.text;
+  const auto sum = [&](int axis) {
+    return scene.setup.body.crossing(0, 2 * axis) + scene.setup.body.crossing(0, 2 * axis + 1);
+  };
+  const VolumeRange volume = tissue_volume(scene.setup, [&] {
+    std::vector<uint8_t> tissue(static_cast<std::size_t>(scene.setup.body.grid.node_count()), 0);
+    tissue[static_cast<std::size_t>(scene.setup.body.node[0])] = 1;
+    return tissue;
+  }());
+  EXPECT_NEAR(volume.low, sum(0) * sum(1) * sum(2) / 6, 1e-15);
+  EXPECT_NEAR(volume.high, volume.low, 1e-15);
+}
+
+std::vector<uint8_t> tissue_of(const Body& body) {
+  std::vector<uint8_t> tissue(static_cast<std::size_t>(body.grid.node_count()), 0);
+  for (const int64_t node : body.node) tissue[static_cast<std::size_t>(node)] = 1;
+  return tissue;
+}
+
+// Balls of which the skin is exact at the grid edges: below the ball's volume by what chords cut off, which goes with
+// h². Crossings from the equation of the ball.
+TEST(SkinGeometry, OfAFittedBallHoldsItsVolumeToTheSquareOfTheSpacing) {
+  double last = 0;
+  for (const double radius : {7.1, 14.2, 28.4}) {  // [h]
+    const auto side = static_cast<int32_t>(2 * radius + 2);
+    const Vec3 middle = {radius + 0.5, radius + 0.4, radius + 0.3};
+    std::vector<std::array<int32_t, 3>> nodes;
+    for (int32_t k = 0; k < side; ++k) {
+      for (int32_t j = 0; j < side; ++j) {
+        for (int32_t i = 0; i < side; ++i) {
+          if (norm(Vec3{1.0 * i, 1.0 * j, 1.0 * k} - middle) < radius) nodes.push_back({i, j, k});
+        }
+      }
+    }
+    cutproof::Setup setup;
+    setup.body = scene_of(nodes).setup.body;
+    Body& body = setup.body;
+    const double h = body.grid.spacing, whole = 4.0 / 3 * std::numbers::pi * radius * radius * radius;
+    const double plain = tissue_volume(setup, tissue_of(body)).high / whole - 1;
+    body.surface_crossing.resize(6 * body.node.size());
+    for (std::size_t k = 0; k < body.surface_crossing.size(); ++k) {
+      const auto particle = static_cast<int32_t>(k / 6);
+      if (body.neighbour(particle, static_cast<int>(k % 6)) >= 0) continue;
+      const auto& d = kDirections[k % 6];
+      const Vec3 x = body.rest_position(particle) / h - Vec3{1, 1, 1} - middle,
+                 e = {1.0 * d[0], 1.0 * d[1], 1.0 * d[2]};
+      const double along = dot(x, e), meets = -along + std::sqrt(along * along + radius * radius - dot(x, x));
+      body.surface_crossing[k] = static_cast<uint8_t>(
+          std::clamp<long>(std::lround(meets * kCrossingSteps), kLeastCrossing, kGreatestCrossing));
+    }
+    const VolumeRange volume = tissue_volume(setup, tissue_of(body));
+    const double low = volume.low / whole - 1, high = volume.high / whole - 1;
+    EXPECT_LT(high, 0) << "chords";
+    EXPECT_LT(plain, 4 * low) << "octahedra around the particles hold less";
+    if (last != 0) {
+      EXPECT_NEAR(last / low, 4, 0.8) << radius;
+    }
+    last = low;
+    std::cout << body.node.size() << " particles: " << 100 * low << " to " << 100 * high << " %, halfway "
+              << 100 * plain << " %\n";
+  }
 }
 
 TEST(SkinShells, AgreeWithShellsJoinedAtVerticesOnEverySurface) {
