@@ -125,5 +125,5 @@ assert abs(errors[-1]) < 0.005, "the goal: half a percent from 20,000 particles 
 # The spacing goes with the cube root of four: the error with its square, 2.52 times less at each step.
 for before, after in zip(errors, errors[1:]):
     assert 1.8 < before / after < 3.5, f"{before} to {after} is no error of second order"
-_, skin, off = measure(*surface, mesh, 6000, fit_skin=False)
-assert skin > 0.15 and abs(off) > 0.02, "halfway between particles it is worse, or nothing was measured"
+_, skin, _ = measure(*surface, mesh, 6000, fit_skin=False)
+assert skin > 0.15, "halfway between particles it is worse, or nothing was measured"
