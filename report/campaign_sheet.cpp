@@ -27,14 +27,15 @@ void add_coverage(Sheet& sheet, const Field& document, bool moves) {
     grid.rows.push_back({{name, io::grouped(count)}, count == 0 ? "warn" : ""});
     const auto note = [&](const char* of, const char* words) {
       if (name == of && count > 0)
-        sheet.notes.push_back(fmt::format("Not promised: in {} {}; this is counted and not judged.",
-                                          cases_in_words(count), words));
+        sheet.notes.push_back(
+            fmt::format("Not promised: in {} {}; this is counted and not judged.", cases_in_words(count), words));
     };
     note("uncoupled without promise", "connected tissue lost its coupling, where no rule promises otherwise");
     note("above the cap without promise",
          "a single pass of merging made a cluster larger than its cap, which that rule does not promise to keep");
   }
-  std::stable_sort(grid.rows.begin(), grid.rows.end(), [](const Row& a, const Row& b) { return a.kind > b.kind; });
+  std::stable_sort(grid.rows.begin(), grid.rows.end(),
+                   [](const GridRow& a, const GridRow& b) { return a.kind > b.kind; });
   sheet.pieces.emplace_back(std::move(grid));
 }
 
@@ -55,6 +56,19 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
     card.words = one["witness"].text_or("");
     if (card.words.empty()) card.words = one["text"].text();
     card.facts = {{"Case", io::grouped(one["index"].count())}, {"Counterexample", one["file"].text()}};
+    if (const Field drawn = one["drawn"]; drawn.is_there()) {
+      const auto size = [](const Field& of) {
+        const int64_t particles = of["particles"].count(), strokes = of["strokes"].count();
+        return fmt::format("{} {} and {} {}", io::grouped(particles), particles == 1 ? "particle" : "particles",
+                           io::grouped(strokes), strokes == 1 ? "stroke" : "strokes");
+      };
+      const Field simplified = one["simplified"];
+      card.facts.emplace_back(
+          "Simplification",
+          simplified.is_there()
+              ? fmt::format("from {} to {}; as it was drawn: {}", size(drawn), size(simplified), one["text"].text())
+              : fmt::format("none: of {}, it fails only with the other bodies of its load", size(drawn)));
+    }
     if (sheet.cards.size() < kMostCards) {
       sheet.cards.push_back(std::move(card));
     } else {
@@ -68,8 +82,8 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
                 verdicts > 0 && is_complete && failure.empty();
   sheet.badge = *sheet.holds ? "✓ holds" : wrong == 0 && !is_complete ? "✕ incomplete" : "✕ fails";
   const std::string subject =
-      fmt::format("cutproof tried {} random dissections{} on backend {}, {:.3g} particles on average", io::grouped(cases),
-                  moves ? " of moving bodies" : "", backend, document["mean_particles"].number());
+      fmt::format("cutproof tried {} random dissections{} on backend {}, {:.3g} particles on average",
+                  io::grouped(cases), moves ? " of moving bodies" : "", backend, document["mean_particles"].number());
   if (wrong > 0) {
     sheet.summary = fmt::format("{}: {} of them {} a property.", subject, io::grouped(static_cast<long long>(wrong)),
                                 wrong == 1 ? "violates" : "violate");
@@ -125,31 +139,36 @@ Sheet judge_sheet(const Field& document) {
   Grid operations;
   operations.title = "Operations";
   operations.words = "A question is one call of the plugin; a case is a matrix or a body within it.";
-  operations.columns = {{"operation"},       {"result"},        {"cases", true},
-                        {"of"},              {"questions", true}, {"refused", true},
-                        {"not answered", true}, {"failed", true}, {"seconds", true}};
+  operations.columns = {{"operation"},       {"result"},        {"cases", true},        {"of"},
+                        {"questions", true}, {"refused", true}, {"not answered", true}, {"failed", true},
+                        {"seconds", true}};
   std::vector<Piece> tables;
   int64_t failing = 0, judged = 0;
   bool all_hold = true;
   document["operations"].each([&](const Field& one) {
     const std::string operation = one["operation"].text();
-    const int64_t questions = one["questions"].count(), refused = one["refused"].count(), failed = one["failed"].count();
+    const int64_t questions = one["questions"].count(), refused = one["refused"].count(),
+                  failed = one["failed"].count();
     PropertyTable properties = property_table(one["properties"]);
     const std::size_t failures = one["failures"].length();
-    const bool holds = one["holds"].flag() && failed == 0 && failures == 0 && properties.failing == 0 &&
-                       questions > refused;
+    const bool holds =
+        one["holds"].flag() && failed == 0 && failures == 0 && properties.failing == 0 && questions > refused;
     const bool is_whole = one["complete"].flag_or(true);
     all_hold = all_hold && holds;
     failing += !holds;
     ++judged;
     operations.rows.push_back(
-        {{operation, !holds ? "fails" : is_whole ? "holds" : "holds as far as it went", io::grouped(one["cases"].count()),
-          one["of"].text(), io::grouped(questions), io::grouped(refused), io::grouped(one["not_answered"].count()),
-          io::grouped(failed), figure_text(one["seconds"].number())},
+        {{operation,
+          !holds     ? "fails"
+          : is_whole ? "holds"
+                     : "holds as far as it went",
+          io::grouped(one["cases"].count()), one["of"].text(), io::grouped(questions), io::grouped(refused),
+          io::grouped(one["not_answered"].count()), io::grouped(failed), figure_text(one["seconds"].number())},
          holds ? "" : "bad"});
     if (questions <= refused) sheet.notes.push_back(operation + ": every question was refused, so nothing was judged.");
     if (one["ended"].flag_or(false))
-      sheet.notes.push_back(operation + ": the plugin's process ended and could not be started again; nothing more was asked.");
+      sheet.notes.push_back(operation +
+                            ": the plugin's process ended and could not be started again; nothing more was asked.");
     else if (one["gave_up"].flag_or(false))
       sheet.notes.push_back(operation + ": given up after too many questions without an answer; --keep-going goes on.");
     one["unpromised"].each([&](const Field& property) {
@@ -188,13 +207,14 @@ Sheet judge_sheet(const Field& document) {
   sheet.holds = document["holds"].flag() && all_hold && judged > 0 && is_complete;
   sheet.badge = *sheet.holds ? "✓ holds" : failing == 0 && !is_complete ? "✕ incomplete" : "✕ fails";
   const std::string what = library.empty() ? sheet.title : fmt::format("{} ({})", sheet.title, library);
-  sheet.summary = *sheet.holds ? fmt::format("cutproof judged the kernels of {}: everything that was judged holds.", what)
-                  : failing > 0 ? fmt::format("cutproof judged the kernels of {}: {} of {} operations {}.", what, failing,
-                                              judged, failing == 1 ? "fails" : "fail")
-                  : !is_complete
-                      ? fmt::format("cutproof judged the kernels of {}; it was stopped before its end, and so it does not hold.",
-                                    what)
-                      : fmt::format("cutproof judged the kernels of {}; it does not hold: nothing was judged.", what);
+  sheet.summary =
+      *sheet.holds  ? fmt::format("cutproof judged the kernels of {}: everything that was judged holds.", what)
+      : failing > 0 ? fmt::format("cutproof judged the kernels of {}: {} of {} operations {}.", what, failing, judged,
+                                  failing == 1 ? "fails" : "fail")
+      : !is_complete
+          ? fmt::format("cutproof judged the kernels of {}; it was stopped before its end, and so it does not hold.",
+                        what)
+          : fmt::format("cutproof judged the kernels of {}; it does not hold: nothing was judged.", what);
   sheet.facts = {plugin["precision"].text() + " precision", "on " + plugin["device"].text(),
                  fmt::format("seed {}", document["seed"].seed()), "cutproof " + document["cutproof"].text()};
   sheet.again = document["again"].text_or("");

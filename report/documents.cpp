@@ -51,7 +51,8 @@ Sheet sheet_of(const json& given, const std::string& file, const std::string& fa
       require_version(document, kBenchVersion);
       return tune_sheet(document);
     case DocumentKind::run:
-    case DocumentKind::counterexample: break;
+    case DocumentKind::counterexample:
+      break;
   }
   document["format"].refuse("this is no campaign and no measurement");
 }
@@ -87,14 +88,15 @@ PropertyTable property_table(const Field& properties) {
   struct Read {
     int rank;
     double of_bound;
-    Row row;
+    GridRow row;
   };
   std::vector<Read> all;
   PropertyTable table;
   properties.each([&](const Field& one) {
     const int64_t judged = one["judged"].count(), failed = one["failed"].count(), checked = one["checked"].count();
     const int64_t undecided = one["undecided"].count();
-    const std::optional<double> of_bound = one["of_bound"].number_or_null(), measured = one["measured"].number_or_null();
+    const std::optional<double> of_bound = one["of_bound"].number_or_null(),
+                                measured = one["measured"].number_or_null();
     const std::string given_unit = one["unit"].text_or(""), unit = given_unit == "1" ? "" : " " + given_unit;
     const bool fails = failed > 0, looked = judged > 0;
     table.failing += fails;
@@ -103,7 +105,10 @@ PropertyTable property_table(const Field& properties) {
     const std::string result = fails ? "fails" : looked ? "holds" : "nothing to look at";
     const std::string doubt =
         undecided > 0 ? fmt::format("{} of {}", io::grouped(undecided), io::grouped(checked)) : std::string("none");
-    all.push_back({fails ? 0 : looked ? 1 : 2, of_bound.value_or(-1),
+    all.push_back({fails    ? 0
+                   : looked ? 1
+                            : 2,
+                   of_bound.value_or(-1),
                    {{one["property"].text(), one["stage"].text(), result, io::grouped(judged), io::grouped(failed),
                      looked || fails ? figure_text(measured) + unit : "–",
                      looked && of_bound ? fmt::format("{:.2g}", *of_bound) : "–", looked ? doubt : "–"},
@@ -116,9 +121,14 @@ PropertyTable property_table(const Field& properties) {
   table.grid.words =
       "What fails comes first, then what comes nearest to its bound. “Undecidable within rounding” counts things that "
       "may be wrong and were not found to be; they count as right.";
-  table.grid.columns = {{"property"},        {"after"},          {"result"},
-                        {"verdicts", true},  {"failed", true},   {"greatest measured", true},
-                        {"of its bound", true}, {"undecidable within rounding", true}};
+  table.grid.columns = {{"property"},
+                        {"after"},
+                        {"result"},
+                        {"verdicts", true},
+                        {"failed", true},
+                        {"greatest measured", true},
+                        {"of its bound", true},
+                        {"undecidable within rounding", true}};
   table.grid.filter = 2;
   for (Read& one : all) table.grid.rows.push_back(std::move(one.row));
   return table;
@@ -129,10 +139,7 @@ void add_measurement(Sheet& sheet, const Field& document) {
   const Field holds = document["holds"];
   if (holds.is_there()) sheet.holds = holds.flag();
   if (!is_complete) sheet.holds = false;
-  sheet.badge = !is_complete             ? "✕ incomplete"
-                : !sheet.holds           ? "measured"
-                : *sheet.holds           ? "✓ holds"
-                                         : "✕ fails";
+  sheet.badge = !is_complete ? "✕ incomplete" : !sheet.holds ? "measured" : *sheet.holds ? "✓ holds" : "✕ fails";
   for (const char* const fact : {"backend", "device", "date"}) {
     const std::string text = document[fact].text();
     sheet.facts.push_back(std::string(fact) == "backend" ? "backend " + text : text);
@@ -140,7 +147,8 @@ void add_measurement(Sheet& sheet, const Field& document) {
   if (document["commit"].is_there()) sheet.facts.push_back("commit " + document["commit"].text());
   sheet.facts.push_back("cutproof " + document["cutproof"].text());
   sheet.again = document["again"].text_or("");
-  if (!is_complete) sheet.notes.push_back("The measurement was stopped before its end: this is what there was by then.");
+  if (!is_complete)
+    sheet.notes.push_back("The measurement was stopped before its end: this is what there was by then.");
 }
 
 }  // namespace cutproof::report

@@ -33,8 +33,12 @@ json to_json(const Chart& chart) {
     const char* const look = curve.look == Look::dots ? "dots" : curve.look == Look::joined ? "joined" : "level";
     curves.push_back({{"name", curve.name}, {"look", look}, {"dots", std::move(dots)}});
   }
-  return {{"kind", "chart"},      {"title", chart.title}, {"words", chart.words},
-          {"x", to_json(chart.x)}, {"y", to_json(chart.y)}, {"curves", std::move(curves)},
+  return {{"kind", "chart"},
+          {"title", chart.title},
+          {"words", chart.words},
+          {"x", to_json(chart.x)},
+          {"y", to_json(chart.y)},
+          {"curves", std::move(curves)},
           {"leftOut", left_out(count, "points")}};
 }
 
@@ -45,7 +49,7 @@ json to_json(const Stack& stack) {
     for (const std::optional<double>& value : part.values) values.push_back(json_number(value));
     parts.push_back({{"name", part.name}, {"values", std::move(values)}});
   }
-  return {{"kind", "stack"}, {"title", stack.title},   {"words", stack.words},
+  return {{"kind", "stack"},    {"title", stack.title},   {"words", stack.words},
           {"unit", stack.unit}, {"labels", stack.labels}, {"parts", std::move(parts)}};
 }
 
@@ -54,8 +58,12 @@ json to_json(const Grid& grid) {
   for (const Column& column : grid.columns) columns.push_back({column.head, column.is_number});
   for (std::size_t k = 0; k < std::min(grid.rows.size(), kMostRows); ++k)
     rows.push_back({{"cells", grid.rows[k].cells}, {"kind", grid.rows[k].kind}});
-  return {{"kind", "grid"},          {"title", grid.title},    {"words", grid.words},
-          {"columns", std::move(columns)}, {"rows", std::move(rows)}, {"filter", grid.filter},
+  return {{"kind", "grid"},
+          {"title", grid.title},
+          {"words", grid.words},
+          {"columns", std::move(columns)},
+          {"rows", std::move(rows)},
+          {"filter", grid.filter},
           {"leftOut", left_out(grid.rows.size(), "rows")}};
 }
 
@@ -74,11 +82,11 @@ json to_json(const Sheet& sheet) {
   }
   for (const Piece& piece : sheet.pieces)
     pieces.push_back(std::visit([](const auto& one) { return to_json(one); }, piece));
-  return {{"kind", sheet.kind},       {"title", sheet.title},
-          {"summary", sheet.summary}, {"holds", sheet.holds ? json(*sheet.holds) : json(nullptr)},
-          {"badge", sheet.badge},     {"facts", sheet.facts},
-          {"notes", sheet.notes},     {"again", sheet.again},
-          {"cards", std::move(cards)}, {"cardsLeftOut", sheet.cards_left_out},
+  return {{"kind", sheet.kind},         {"title", sheet.title},
+          {"summary", sheet.summary},   {"holds", sheet.holds ? json(*sheet.holds) : json(nullptr)},
+          {"badge", sheet.badge},       {"facts", sheet.facts},
+          {"notes", sheet.notes},       {"again", sheet.again},
+          {"cards", std::move(cards)},  {"cardsLeftOut", sheet.cards_left_out},
           {"pieces", std::move(pieces)}};
 }
 

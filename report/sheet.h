@@ -45,14 +45,14 @@ struct Column {
   std::string head;
   bool is_number = false;
 };
-struct Row {
+struct GridRow {
   std::vector<std::string> cells;
   std::string kind = {};  // good, bad, warn, paper; empty: as any other
 };
 struct Grid {
   std::string title, words;
   std::vector<Column> columns;
-  std::vector<Row> rows;
+  std::vector<GridRow> rows;
   int filter = -1;  // by which column rows may be filtered
 };
 

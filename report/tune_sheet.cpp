@@ -6,8 +6,8 @@ namespace cutproof::report {
 namespace {
 
 std::string configuration(const Field& trial) {
-  std::string text = fmt::format("{} × {}, {}", trial["substeps"].count(), trial["iterations"].count(),
-                                 trial["acceleration"].text());
+  std::string text =
+      fmt::format("{} × {}, {}", trial["substeps"].count(), trial["iterations"].count(), trial["acceleration"].text());
   if (!trial["rotation"].is_nothing()) text += ", rotation " + trial["rotation"].text();
   if (const std::string more = trial["differences"].text(); !more.empty()) text += ", " + more;
   return text;
@@ -16,12 +16,10 @@ std::string configuration(const Field& trial) {
 struct Outcome {
   const char *word, *name;  // in the document, and on the page
 };
-constexpr Outcome kOutcomes[] = {{"within", "within the tolerance"},
-                                 {"over", "over the tolerance"},
-                                 {"topology", "another number of parts"},
-                                 {"schedule", "another number of frames"},
-                                 {"refused", "cannot be built"},
-                                 {"more_expensive", "given up as more expensive"}};
+constexpr Outcome kOutcomes[] = {
+    {"within", "within the tolerance"},      {"over", "over the tolerance"},
+    {"topology", "another number of parts"}, {"schedule", "another number of frames"},
+    {"refused", "cannot be built"},          {"more_expensive", "given up as more expensive"}};
 
 }  // namespace
 
@@ -48,10 +46,16 @@ Sheet tune_sheet(const Field& document) {
   std::vector<Dot> timed;
   Grid grid;
   grid.title = "Every configuration that was tried";
-  grid.words = "In the order in which they were tried; the first is the scene as it was given. Without a time: it was "
-               "given up before its end.";
-  grid.columns = {{"configuration: substeps × iterations, acceleration"}, {"outcome"},
-                  {"ms a frame", true},  {"RMS [h]", true}, {"greatest [h]", true}, {"removed otherwise", true}, {"why"}};
+  grid.words =
+      "In the order in which they were tried; the first is the scene as it was given. Without a time: it was "
+      "given up before its end.";
+  grid.columns = {{"configuration: substeps × iterations, acceleration"},
+                  {"outcome"},
+                  {"ms a frame", true},
+                  {"RMS [h]", true},
+                  {"greatest [h]", true},
+                  {"removed otherwise", true},
+                  {"why"}};
   grid.filter = 1;
   Dot chosen, given;
   for (std::size_t k = 0; k < count; ++k) {
@@ -70,8 +74,11 @@ Sheet tune_sheet(const Field& document) {
     curves[which].dots.push_back(std::move(dot));
     const std::string otherwise =
         trial["removed_otherwise"].is_nothing() ? "–" : io::grouped(trial["removed_otherwise"].count());
-    grid.rows.push_back({{what + (k == answer ? " (the answer)" : k == 0 ? " (as given)" : ""), kOutcomes[which].name,
-                          figure_text(seconds, 1e3), figure_text(rms), figure_text(most), otherwise, trial["why"].text()},
+    grid.rows.push_back({{what + (k == answer ? " (the answer)"
+                                  : k == 0    ? " (as given)"
+                                              : ""),
+                          kOutcomes[which].name, figure_text(seconds, 1e3), figure_text(rms), figure_text(most),
+                          otherwise, trial["why"].text()},
                          k == answer ? "good" : ""});
   }
   for (Curve& curve : curves) {
@@ -105,23 +112,25 @@ Sheet tune_sheet(const Field& document) {
   } else {
     sheet.holds = false;
     if (sheet.badge != "✕ incomplete") sheet.badge = "✕ nothing found";
-    sheet.summary = fmt::format("Of {} configurations of {} that were tried none is known to be within {:.4g} h of the "
-                                "reference solution.",
-                                io::grouped(static_cast<long long>(count)), sheet.title, tolerance);
+    sheet.summary = fmt::format(
+        "Of {} configurations of {} that were tried none is known to be within {:.4g} h of the "
+        "reference solution.",
+        io::grouped(static_cast<long long>(count)), sheet.title, tolerance);
   }
   if (const Field reference = document["reference"]; !reference.is_nothing()) {
     const std::string kind = reference["kind"].text();
-    sheet.notes.push_back(kind == "limit"
-                              ? "The reference solution is the limit of short time steps."
-                              : "The reference solution is the scene's own substeps, each solved until it is converged.");
-    if (const std::string known = reference["known_text"].text_or(""); !known.empty()) sheet.notes.push_back(known + ".");
+    sheet.notes.push_back(
+        kind == "limit" ? "The reference solution is the limit of short time steps."
+                        : "The reference solution is the scene's own substeps, each solved until it is converged.");
+    if (const std::string known = reference["known_text"].text_or(""); !known.empty())
+      sheet.notes.push_back(known + ".");
   }
   document["left"].each([&](const Field& left) {
     const Field trial = left["trial"];
     const auto k = static_cast<std::size_t>(trial.count());
     if (k >= count) trial.refuse("there is no such trial");
-    sheet.notes.push_back(fmt::format("{} would be cheaper, and is not taken: {}.", configuration(trials.at(k)),
-                                      left["why"].text()));
+    sheet.notes.push_back(
+        fmt::format("{} would be cheaper, and is not taken: {}.", configuration(trials.at(k)), left["why"].text()));
   });
   if (count > 0) sheet.pieces.emplace_back(std::move(chart));
   if (has_found) {
@@ -134,7 +143,8 @@ Sheet tune_sheet(const Field& document) {
       Curve curve = {name, Look::joined, {}};
       const Field values = trial["rms_h_by_frame"];
       for (std::size_t k = 0; k < values.length(); ++k)
-        curve.dots.push_back({static_cast<double>(k), values.at(k).number_or_null(), fmt::format("{}, frame {}", name, k)});
+        curve.dots.push_back(
+            {static_cast<double>(k), values.at(k).number_or_null(), fmt::format("{}, frame {}", name, k)});
       frames.curves.push_back(std::move(curve));
     };
     add(trials.at(0), "as given");
