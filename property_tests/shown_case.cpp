@@ -39,7 +39,7 @@ std::string in_words(const Case& c) {
   std::string text = counted(c.nodes.size(), "particle", "particles");
   switch (c.clusters) {
     case ClusterKind::boxes:
-      text += fmt::format(" in boxes of {} nodes a side", c.side);
+      text += fmt::format(" in boxes of {} a side", counted(c.side, "node", "nodes"));
       break;
     case ClusterKind::sampled:
       text += fmt::format(" in balls of {:g} h, {:g} h apart", spacings(c.ball_radius), spacings(c.seed_spacing));

@@ -66,8 +66,9 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
       card.facts.emplace_back(
           "Simplification",
           simplified.is_there()
-              ? fmt::format("from {} to {}; as it was drawn: {}", size(drawn), size(simplified), one["text"].text())
+              ? fmt::format("from {} to {}", size(drawn), size(simplified))
               : fmt::format("none: of {}, it fails only with the other bodies of its load", size(drawn)));
+      card.facts.emplace_back("As it was drawn", one["text"].text());
     }
     if (sheet.cards.size() < kMostCards) {
       sheet.cards.push_back(std::move(card));

@@ -1,3 +1,5 @@
+#include <filesystem>
+
 #include "model/io/columns.h"
 #include "report/document_fields.h"
 
@@ -26,7 +28,7 @@ constexpr Outcome kOutcomes[] = {
 Sheet tune_sheet(const Field& document) {
   Sheet sheet;
   sheet.kind = "tuning";
-  sheet.title = document["scene"].text();
+  sheet.title = std::filesystem::path(document["scene"].text()).stem().string();
   add_measurement(sheet, document);
   const double tolerance = document["tolerance_h"].number();
   const Field found = document["found"], trials = document["trials"];
@@ -40,7 +42,7 @@ Sheet tune_sheet(const Field& document) {
       "Each point is a configuration, substeps × iterations, that was timed. Left is cheaper, below is nearer to the "
       "reference solution. The thin line joins the best: no other configuration is both cheaper and nearer.";
   chart.x = {"time of a frame", "ms", true};
-  chart.y = {"greatest RMS distance from the reference solution", "h", true};
+  chart.y = {"greatest RMS distance", "h", true};
   std::vector<Curve> curves;
   for (const Outcome& outcome : kOutcomes) curves.push_back({outcome.name, Look::dots, {}});
   std::vector<Dot> timed;
@@ -123,7 +125,7 @@ Sheet tune_sheet(const Field& document) {
         kind == "limit" ? "The reference solution is the limit of short time steps."
                         : "The reference solution is the scene's own substeps, each solved until it is converged.");
     if (const std::string known = reference["known_text"].text_or(""); !known.empty())
-      sheet.notes.push_back(known + ".");
+      sheet.notes.push_back("It is " + known + ".");
   }
   document["left"].each([&](const Field& left) {
     const Field trial = left["trial"];

@@ -9,7 +9,7 @@ const right = kWidth - kRight, bottom = kHeight - kBottom;
 const kShapes = 6;  // and colours
 
 const isThere = (v) => v !== null && typeof v === 'number';
-const named = (axis) => (axis.unit ? `${axis.name} [${axis.unit}]` : axis.name);
+const named = (axis) => (axis.unit && axis.unit !== '1' ? `${axis.name} [${axis.unit}]` : axis.name);
 
 // From data to the page, and the marks of the axis.
 function scaleOf(values, isLogarithmic, from, to) {
@@ -96,6 +96,7 @@ export function chart(given) {
   const groups = [[], []];  // lines below dots
   for (const curve of given.curves) {
     const isLevel = curve.look === 'level';
+    if (!curve.dots.some(isShown)) continue;  // in the table alone
     const kind = isLevel ? null : which++;
     if (curve.look !== 'dots') {
       let path = '', isDown = false;
@@ -138,7 +139,7 @@ export function chart(given) {
   return element('figure', { class: 'card plot chart' },
     element('figcaption', {}, element('h3', { text: given.title }), element('p', { class: 'muted', text: given.words })),
     svg, element('ul', { class: 'legend' }, ...entries), dots.length > 0 && readout,
-    hidden > 0 && element('p', { class: 'muted small', text: `${hidden} without ${given.x.logarithmic || given.y.logarithmic ? 'a figure above 0' : 'a figure'} on both axes: only in the table.` }),
+    hidden > 0 && element('p', { class: 'muted small', text: `${hidden} without ${given.x.logarithmic || given.y.logarithmic ? 'a figure above 0' : 'a figure'} on both axes: only in the table below.` }),
     table(['configuration', 'curve', named(given.x), named(given.y)], rows, given.leftOut));
 }
 
