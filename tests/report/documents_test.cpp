@@ -223,7 +223,7 @@ TEST(ADocument, ThatIsNoneIsRefusedByFieldWithARemedy) {
   refused(good, "/seed", -1, "seed");
   refused(good, "/sizes", {1}, "sizes");
   refused(good, "/properties/0/failed", "many", "properties[0].failed");
-  refused(good, "/violations", {{{"index", 0}}}, "violations[0].property");
+  refused(good, "/violations", {{{"index", 0}, {"property", "p"}}}, "violations[0].stage");
   refused(good, "/coverage/boxes", 1.5, "coverage.boxes");
   refused(tuning(nullptr), "/trials/0/outcome", "lucky", "trials[0].outcome");
   refused(tuning(nullptr), "/found", {{"trial", 5}}, "found.trial");
