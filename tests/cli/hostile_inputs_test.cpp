@@ -327,9 +327,10 @@ const std::vector<Hostile>& hostile_inputs() {
       {"APipeBesideARecordingForAPage",
        [] {
          make_pipe();
+         files::rename("input", "pipe");
          changed_recording("")();
        },
-       "report input.cutproof.h5 input -o page.html",
+       "report input pipe -o page.html",
        {"a pipe"}},
       {"ADocumentOfATerabyteForAPage", sparse("input"), "report input -o page.html", {"too large", "64 MiB"}},
       {"ADocumentOfBracketsForAPage",

@@ -121,7 +121,8 @@ TEST_F(Verbs, ReportMakesAPageOfEveryDocumentAndRefusesWhatDoesNotGoTogether) {
   }
   EXPECT_NE(read("fuzz.html").find("cutproof fuzz --cases 20 --seed 3 --sizes 0-9"), std::string::npos);
   EXPECT_NE(read("limits.html").find("cutproof bench machine_limits --repeats 2"), std::string::npos);
-  std::set<std::string> before = listing();
+  write("copy.json", read("fuzz.json"));
+  const std::set<std::string> before = listing();
   expect_refused("report fuzz.json limits.json -o p.html", {"limits.json", "format", "does not go with"});
   expect_refused("report seen limits.json -o p.html", {"limits.json", "does not go with a recording"});
   expect_refused("report run.json -o p.html", {"run.json", "give the recording"});
@@ -129,7 +130,6 @@ TEST_F(Verbs, ReportMakesAPageOfEveryDocumentAndRefusesWhatDoesNotGoTogether) {
   expect_refused("report seen.cutproof.h5 other -o p.html", {"other"});
   const std::string counterexample = CUTPROOF_SOURCE "/fixtures/regressions/pair_on_a_wall.json";
   expect_refused("report fuzz.json " + counterexample + " -o p.html", {"pair_on_a_wall.json", "no such violation"});
-  write("copy.json", read("fuzz.json"));
   expect_refused("report fuzz.json copy.json -o p.html", {"json", "a page shows one"});
   EXPECT_EQ(listing(), before) << "nothing half-written is left";
   const Outcome alone = cutproof("report " + counterexample + " -o alone.html --backend reference");

@@ -315,7 +315,7 @@ run([program, "judge", "./libsplitter.so", "--cases", "80", "--seed", "5", "--si
 run([program, "fuzz", "--cases", "30", "--sizes", "0-9", "--report", "good.html"], 0)
 run([program, "tune", "halves.json", "--tolerance", "100", "--frames", "2", "--reference", "substeps", "--repeats", "1",
      "--full", "--write", "tuned.json", "--report", "tuning.html"], 0)
-run([program, "bench", "stages", "--sizes", "200,500", "--frames", "2", "--repeats", "1", "--report",
+run([program, "bench", "stages", "--sizes", "300,1000", "--frames", "2", "--repeats", "1", "--report",
      "stages.html"], 0)
 
 with Browser("campaign.html") as page:
