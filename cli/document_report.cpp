@@ -38,7 +38,7 @@ report::Sheet campaign(const json& document, const std::string& file, const std:
   property_tests::require_campaign(document, name);
   const std::string failure = property_tests::conclude(document, document.at("shards") == 1).failure;
   report::Sheet sheet = report::sheet_of(document, name, document.at("violations").empty() ? failure : std::string());
-  if (sheet.again.empty()) sheet.again = campaign_again(document);
+  sheet.again = campaign_again(document);
   const json& violations = document.at("violations");
   for (std::size_t k = 0; k < sheet.cards.size(); ++k) {
     report::Card& card = sheet.cards[k];
@@ -75,6 +75,10 @@ std::string campaign_again(const json& document) {
   const auto text = [&](const char* name) { return document.value(name, std::string()); };
   std::string command = "cutproof fuzz --backend " + quoted(text("backend"));
   if (text("split") == "global") command += " --split global";
+  BackendChoice usual;
+  usual.name = text("backend");
+  const bool is_known = harness::find_backend(usual.name) != nullptr;
+  if (is_known && harness::rotation_of(usual) != text("rotation")) command += " --rotation " + quoted(text("rotation"));
   if (!text("schedule").empty()) command += " --schedule " + quoted(text("schedule"));
   if (document.contains("schedule_seed"))
     command += fmt::format(" --schedule-seed {}", document.at("schedule_seed").get<uint64_t>());

@@ -299,9 +299,7 @@ nlohmann::json fuzz_campaign(const FuzzOptions& options) {
     const int64_t load = (violation.index - asked.shard) / asked.shards / asked.batch;
     violations.push_back(keep(violation, options, harness::choice_for_load(options.backend, load), asked.batch));
   }
-  json document = campaign_document(options.backend, asked, campaign, violations);
-  document["again"] = options.again;
-  return document;
+  return campaign_document(options.backend, asked, campaign, violations);
 }
 
 namespace {

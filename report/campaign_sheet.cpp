@@ -123,7 +123,6 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
         "farther.",
         io::grouped(steps["steps"].count()), io::grouped(steps["particles"].count()),
         figure_text(steps["greatest_h"].number()), io::grouped(steps["undecidable"].count())));
-  sheet.again = document["again"].text_or("");
   sheet.pieces.emplace_back(std::move(properties.grid));
   add_coverage(sheet, document, moves);
   return sheet;

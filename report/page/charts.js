@@ -84,8 +84,10 @@ const cell = (v) => (isThere(v) ? figure(v) : typeof v === 'string' ? v : '–')
 
 export function chart(given) {
   const all = given.curves.flatMap((curve) => curve.dots);
-  const xScale = scaleOf(all.map((dot) => dot[0]), given.x.logarithmic, kLeft, right);
-  const yScale = scaleOf(all.map((dot) => dot[1]), given.y.logarithmic, bottom, kTop);
+  // What is not drawn stretches no axis.
+  const drawn = all.filter((dot) => [[dot[0], given.x], [dot[1], given.y]].every(([v, axis]) => isThere(v) && (!axis.logarithmic || v > 0)));
+  const xScale = scaleOf(drawn.map((dot) => dot[0]), given.x.logarithmic, kLeft, right);
+  const yScale = scaleOf(drawn.map((dot) => dot[1]), given.y.logarithmic, bottom, kTop);
   const readout = element('p', { class: 'readout', role: 'status', text: 'Point at a dot, or go to the plot with Tab and from dot to dot with the arrow keys: here stands which configuration it is.' });
   const svg = drawing('svg', { viewBox: `0 0 ${kWidth} ${kHeight}`, role: 'group', 'aria-label': `${given.title}. ${given.words}` });
   axes(svg, named(given.x), named(given.y), xScale, yScale);
@@ -104,14 +106,14 @@ export function chart(given) {
         if (isShown(dot)) path += `${isDown ? 'L' : 'M'}${xScale.at(dot[0]).toFixed(1)} ${yScale.at(dot[1]).toFixed(1)}`;
         isDown = isShown(dot);
       }
-      groups[0].push(drawing('path', { class: isLevel ? 'level' : `line joined line-${kind % kShapes}`, d: path }));
+      groups[0].push(drawing('path', { class: isLevel ? 'level' : `line joined line-${kind % kShapes}`, d: path }, drawing('title', { text: curve.name })));
     }
-    entries.push(element('li', {}, isLevel ? element('span', { class: 'key level-key', 'aria-hidden': 'true' }) : drawing('svg', { class: `sample fill-${kind % kShapes}`, viewBox: '-8 -8 16 16', 'aria-hidden': 'true' }, shape(kind, 0, 0)), element('span', { text: curve.name })));
+    entries.push(element('li', {}, isLevel ? element('span', { class: 'key level-key', 'aria-hidden': 'true' }) : drawing('svg', { class: `sample fill-${kind % kShapes}`, viewBox: '-8 -8 16 16', 'aria-hidden': 'true' }, shape(kind + Math.floor(kind / kShapes), 0, 0)), element('span', { text: curve.name })));
     if (isLevel) continue;
     for (const dot of curve.dots) {
       if (!isShown(dot)) continue;
       const words = `${dot[2]}${dot[2].includes(curve.name) ? '' : ` (${curve.name})`}: ${given.x.name} ${figure(dot[0])}${given.x.unit ? ` ${given.x.unit}` : ''}, ${given.y.name} ${figure(dot[1])}${given.y.unit && given.y.unit !== '1' ? ` ${given.y.unit}` : ''}`;
-      const node = drawing('g', { class: `dot fill-${kind % kShapes}`, role: 'img', tabindex: -1, 'aria-label': words }, shape(kind, xScale.at(dot[0]), yScale.at(dot[1])));
+      const node = drawing('g', { class: `dot fill-${kind % kShapes}`, role: 'img', tabindex: -1, 'aria-label': words }, shape(kind + Math.floor(kind / kShapes), xScale.at(dot[0]), yScale.at(dot[1])));
       const say = () => { readout.textContent = words; };
       node.addEventListener('pointerenter', say);
       node.addEventListener('focus', say);
@@ -139,7 +141,7 @@ export function chart(given) {
   return element('figure', { class: 'card plot chart' },
     element('figcaption', {}, element('h3', { text: given.title }), element('p', { class: 'muted', text: given.words })),
     svg, element('ul', { class: 'legend' }, ...entries), dots.length > 0 && readout,
-    hidden > 0 && element('p', { class: 'muted small', text: `${hidden} without ${given.x.logarithmic || given.y.logarithmic ? 'a figure above 0' : 'a figure'} on both axes: only in the table below.` }),
+    hidden > 0 && element('p', { class: 'muted small', text: `${hidden} of ${all.length} ${all.length === 1 ? 'point lacks' : 'points lack'} a figure on one axis${given.x.logarithmic || given.y.logarithmic ? ', or have 0, which a logarithmic axis cannot show' : ''}: they are in the table below.` }),
     table(['configuration', 'curve', named(given.x), named(given.y)], rows, given.leftOut));
 }
 
