@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "cli/bench/suites.h"
+#include "cli/document_report.h"
 #include "cli/interruption.h"
 #include "cli/output.h"
+#include "cli/report_page.h"
 #include "model/nearest_word.h"
 #include "model/stop.h"
 
@@ -45,12 +47,15 @@ void add_bench(CLI::App& program, Work& work) {
 namespace {
 
 // Of a suite that was stopped. What it has measured has been written after each row.
-int print_how_far(const std::string& path, const nlohmann::json& document, const Suite& suite) {
+int print_how_far(const std::string& path, const std::string& report, const nlohmann::json& document,
+                  const Suite& suite) {
   const std::size_t rows = document.at(suite.rows).size();
   if (rows > 0) suite.end(document);
   insist("\n{}: it was stopped after {} row{}\n", undecided("INCOMPLETE"), rows, rows == 1 ? "" : "s");
   write_document(path, document);
+  write_document_report(report, document);
   print_written(path);
+  print_written(report);
   return 1;
 }
 
@@ -58,10 +63,13 @@ int print_how_far(const std::string& path, const nlohmann::json& document, const
 
 void add_suite(CLI::App& command, Work& work, const std::string& what, Suite suite) {
   const auto path = std::make_shared<std::string>();
+  const auto report = std::make_shared<std::string>();
   add_json(command, *path, what);
-  command.callback([path, suite, &work] {
-    work = [path, suite] {
+  add_report_option(command, *report);
+  command.callback([path, report, suite, &command, &work] {
+    work = [path, report, suite, again = as_given(command)] {
       require_writable(*path);
+      require_report(*report);
       const EndsInOrder in_order;
       nlohmann::json document;  // so far
       bool begun = false;
@@ -76,6 +84,7 @@ void add_suite(CLI::App& command, Work& work, const std::string& what, Suite sui
         }
         flush_output();
         document = so_far;
+        document["again"] = again;
         throw_if_asked(stop_asked);
         const auto rows_at_most = so_far.value("rows_at_most", int64_t{0});
         if (rows_at_most == 0) return;
@@ -85,9 +94,10 @@ void add_suite(CLI::App& command, Work& work, const std::string& what, Suite sui
       };
       try {
         document = suite.run(show);
+        document["again"] = again;
       } catch (const Stopped&) {
         progress.reset();
-        return print_how_far(*path, document, suite);
+        return print_how_far(*path, *report, document, suite);
       }
       if (document.at(suite.rows).empty()) {
         insist("{}: nothing was measured\n", failing("FAILS"));
@@ -95,8 +105,10 @@ void add_suite(CLI::App& command, Work& work, const std::string& what, Suite sui
       }
       progress.reset();
       write_document(*path, document);
+      write_document_report(*report, document);
       suite.end(document);
       print_written(*path);
+      print_written(*report);
       const bool holds = document.value("holds", true);
       const std::size_t rows = document.at(suite.rows).size();
       insist("measured: {} {}{}\n", rows, rows == 1 ? "row" : "rows",

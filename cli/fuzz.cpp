@@ -12,11 +12,13 @@
 #include <optional>
 
 #include "cli/commands.h"
+#include "cli/document_report.h"
 #include "cli/findings.h"
 #include "cli/interruption.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/progress.h"
+#include "cli/report_page.h"
 #include "cli/screen.h"
 #include "cli/table.h"
 #include "cli/terminal.h"
@@ -179,9 +181,12 @@ int conclude_campaign(const FuzzOptions& options, const json& document, bool who
   const CampaignConclusion conclusion = conclude(document, whole);
   const Judging judging{"cutproof fuzz", "cutproof.fuzz." + document.at("backend").get<std::string>(), options.again};
   write_document(options.json, document);
+  const bool is_plugin = options.backend.name.starts_with(guests::kPluginPrefix);
+  write_document_report(options.report, document, is_plugin ? std::optional(options.backend) : std::nullopt);
   write_junit(options.junit, judging, document.at("seconds").get<double>(),
               cases_of_campaign(document, conclusion.failure, judging));
   const int status = print_conclusion(document, conclusion);
+  print_written(options.report);
   print_annotations(failures_of_campaign(document, conclusion.failure, judging));
   return status;
 }
@@ -189,6 +194,7 @@ int conclude_campaign(const FuzzOptions& options, const json& document, bool who
 int merge(const FuzzOptions& options) {
   require_writable(options.json);
   require_writable(options.junit);
+  require_report(options.report);
   const json whole = merge_shards(options.merge);
   if (!whole.at("complete").get<bool>()) {
     insist("INCOMPLETE: missing {}; run each of these again with --shard i/{}\n", missing_shards(whole),
@@ -205,8 +211,10 @@ std::string name_in_files(const std::string& backend) {
   return std::filesystem::path(guests::options_of_name(backend).library).stem().string();
 }
 
-// Simplifies, saves, records; returns the file's name.
-std::string keep(const Violation& violation, const FuzzOptions& options, const BackendChoice& choice, int batch) {
+json size_of(const Case& c) { return {{"particles", c.nodes.size()}, {"strokes", c.strokes.size()}}; }
+
+// Simplifies, saves, records; returns what the document has of it.
+json keep(const Violation& violation, const FuzzOptions& options, const BackendChoice& choice, int batch) {
   insist("case {} {}: {}\n", violation.index, failing("FAILS"), describe(violation.verdict));
   flush_output();
   Simplified simplified = simplify(violation, choice, options.simplify, stop_asked);
@@ -235,7 +243,13 @@ std::string keep(const Violation& violation, const FuzzOptions& options, const B
            options.campaign.seed, batch);
   }
   insist_copy("saved; to see it again:", "cutproof replay " + quoted(file));
-  return file;
+  json kept = violation_json(violation, file);
+  kept["drawn"] = size_of(violation.failing);
+  if (simplified.alone) {
+    kept["simplified"] = size_of(found.failing);
+    kept["simplified"]["text"] = simplified.text;
+  }
+  return kept;
 }
 
 Campaign run(const FuzzOptions& options, const CampaignOptions& asked) {
@@ -269,6 +283,7 @@ nlohmann::json fuzz_campaign(const FuzzOptions& options) {
   static_cast<void>(harness::make_backend(harness::choice_for_load(options.backend, 0)));
   require_writable(options.json);
   require_writable(options.junit);
+  require_report(options.report);
   make_folder("--save", options.save);
 
   say("fuzzing backend {}: {}{} from seed {}{}, {} bodies a load, {} threads\n", options.backend.name,
@@ -282,8 +297,7 @@ nlohmann::json fuzz_campaign(const FuzzOptions& options) {
   json violations = json::array();
   for (const Violation& violation : campaign.violations) {
     const int64_t load = (violation.index - asked.shard) / asked.shards / asked.batch;
-    violations.push_back(violation_json(
-        violation, keep(violation, options, harness::choice_for_load(options.backend, load), asked.batch)));
+    violations.push_back(keep(violation, options, harness::choice_for_load(options.backend, load), asked.batch));
   }
   return campaign_document(options.backend, asked, campaign, violations);
 }
@@ -322,6 +336,7 @@ void add_fuzz(CLI::App& program, Work& work) {
   command->add_option("--save", options->save, "folder for counterexamples")->capture_default_str()->type_name("DIR");
   add_json(*command, options->json, "write counts, classes and violations");
   add_junit(*command, options->junit);
+  add_report_option(*command, options->report);
   command
       ->add_option("--merge", options->merge,
                    "put the results of all shards together, and name those that are missing; runs nothing")

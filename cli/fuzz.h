@@ -21,7 +21,7 @@ struct FuzzOptions {
   std::string shard;             // "i/N"; empty: all
   double simplify = 60;          // [s] for each violation
   std::string save = ".";        // the folder for counterexamples
-  std::string json, junit;
+  std::string json, junit, report;
   std::string again;               // the command line
   std::vector<std::string> merge;  // results of shards, to be put together; nothing is run
 };

@@ -7,12 +7,14 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
+#include "cli/document_report.h"
 #include "cli/findings.h"
 #include "cli/fuzz.h"
 #include "cli/interruption.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/progress.h"
+#include "cli/report_page.h"
 #include "cli/screen.h"
 #include "cli/terminal.h"
 #include "guests/campaign.h"
@@ -36,7 +38,7 @@ struct JudgeOptions {
   int64_t cases = 0;        // 0: of each operation what it takes a second or a few for
   bool keep_going = false;  // beyond ten questions that were not answered
   std::string save = ".";
-  std::string json, junit, replay;
+  std::string json, junit, report, replay;
   std::string again;          // the command line
   std::vector<int> attached;  // open files of a guest that runs already: its channel, its memory
 };
@@ -192,12 +194,17 @@ bool steps(const PluginInfo& plugin) {
   return false;
 }
 
+// The plugin as a backend.
+std::string plugin_backend(const JudgeOptions& options) {
+  return std::string(kPluginPrefix) + options.guest.library +
+         (options.guest.parameters.empty() ? "" : "," + options.guest.parameters);
+}
+
 // Random dissections by the stages that the plugin has.
 bool judge_stages(const JudgeOptions& options, bool dynamics, json& document, std::vector<io::JunitCase>& cases,
                   std::vector<Failure>& failures) {
   FuzzOptions fuzz;
-  fuzz.backend.name = std::string(kPluginPrefix) + options.guest.library +
-                      (options.guest.parameters.empty() ? "" : "," + options.guest.parameters);
+  fuzz.backend.name = plugin_backend(options);
   fuzz.campaign.seed = options.campaign.seed;
   fuzz.campaign.seconds = options.campaign.seconds;
   fuzz.campaign.dynamics = dynamics;
@@ -244,6 +251,9 @@ int judge(JudgeOptions options) {
   const EndsInOrder in_order;
   require_writable(options.json);
   require_writable(options.junit);
+  require_report(options.report);
+  if (!options.report.empty() && !options.replay.empty())
+    refuse("--report", "one saved question makes no page", "leave out --report, or --case");
   if (!options.attached.empty()) {
     if (options.attached.size() != 2) {
       refuse("--attached", fmt::format("{} numbers", options.attached.size()), "give those of a socket and of memory");
@@ -332,10 +342,19 @@ int judge(JudgeOptions options) {
   holds = holds && complete;
   document["complete"] = complete;
   document["holds"] = holds;
+  document["again"] = options.again;
   write_document(options.json, document);
+  if (options.attached.empty()) {
+    harness::BackendChoice plugin;
+    plugin.name = plugin_backend(options);
+    write_document_report(options.report, document, plugin);
+  } else {
+    write_document_report(options.report, document);
+  }
   double seconds = 0;
   for (const io::JunitCase& each : junit) seconds += each.seconds;
   write_junit(options.junit, {"cutproof judge", kClass, options.again}, seconds, std::move(junit));
+  print_written(options.report);
   if (complete) insist("{}\n", holds ? holding("all hold") : failing("FAILS"));
   print_annotations(failures);
   return holds ? 0 : 1;
@@ -379,6 +398,7 @@ void add_judge(CLI::App& program, Work& work) {
       ->check(whole_number(0, std::numeric_limits<int>::max()));
   add_json(*command, options->json, "write counts and failures");
   add_junit(*command, options->junit);
+  add_report_option(*command, options->report);
   command->add_option("--case", options->replay, "one saved question again, and nothing else")->type_name("CASE");
   command->callback([options, command, &work] {
     options->again = as_given(*command);

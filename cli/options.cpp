@@ -115,7 +115,12 @@ std::string as_given(const CLI::App& command) {
       if (!value.empty()) text += " " + quoted(value);
     }
   }
-  return "cutproof " + command.get_name() + words + options;
+  std::string name = command.get_name();
+  for (const CLI::App* parent = command.get_parent(); parent != nullptr && parent->get_parent() != nullptr;
+       parent = parent->get_parent()) {
+    name = parent->get_name() + " " + name;
+  }
+  return "cutproof " + name + words + options;
 }
 
 void add_json(CLI::App& command, std::string& path, const std::string& what) {

@@ -8,11 +8,13 @@
 #include <memory>
 
 #include "cli/commands.h"
+#include "cli/document_report.h"
 #include "cli/interruption.h"
 #include "cli/mesh_report.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/progress.h"
+#include "cli/report_page.h"
 #include "cli/scene_files.h"
 #include "cli/scene_options.h"
 #include "cli/screen.h"
@@ -32,7 +34,8 @@ struct Asked {
   TuneOptions tune;
   SceneOptions scene;
   std::string reference = "limit";
-  std::string json;
+  std::string json, report;
+  std::string again;  // the command line
 };
 
 // The default name of the scene that is written. Throws InputError if two of the three files are one.
@@ -51,7 +54,11 @@ void settle_files(Asked& asked) {
   require_other("--write", options.write, options.scene, "the scene that is tuned");
   require_other("--json", asked.json, options.scene, "the scene that is tuned");
   require_other("--json", asked.json, options.write, "the scene that is written");
+  require_other("--report", asked.report, options.scene, "the scene that is tuned");
+  require_other("--report", asked.report, options.write, "the scene that is written");
+  require_other("--report", asked.report, asked.json, "what --json writes");
   require_writable(asked.json);
+  require_report(asked.report);
   require_writable(options.write);
 }
 
@@ -193,9 +200,13 @@ int tune(Asked asked) {
     json document = so_far;
     document["build"] = build_json(built);
     document["changes"] = given_changes(asked.tune.changes);
+    document["again"] = asked.again;
     // After each trial, so that what has been measured is kept if a later one fails; and in the end.
     if (step == TuneStep::trial) keep_document(asked.json, document);
-    if (step == TuneStep::stopped || document.at("complete")) write_document(asked.json, document);
+    if (step == TuneStep::stopped || document.at("complete")) {
+      write_document(asked.json, document);
+      write_document_report(asked.report, document);
+    }
     print(asked.tune, step, document, given, built);
     if (step == TuneStep::trial) part = std::max(part, part_searched(document, given));  // what is varied begins anew
     flush_output();
@@ -207,6 +218,7 @@ int tune(Asked asked) {
   };
   const bool found = with_sources(asked.tune.scene, asked.tune.changes, [&] { return run_tune(asked.tune, tell); });
   print_written(asked.json);
+  print_written(asked.report);
   if (found) insist_copy("wrote", asked.tune.write);
   return found ? 0 : 1;
 }
@@ -242,7 +254,9 @@ void add_tune(CLI::App& program, Work& work) {
   command->add_option("--write", options.write, "the scene that was found (default: NAME_tuned.json here)")
       ->type_name("F");
   add_json(*command, asked->json, "write everything that was tried");
-  command->callback([asked, &work] {
+  add_report_option(*command, asked->report);
+  command->callback([asked, command, &work] {
+    asked->again = as_given(*command);
     work = [asked] {
       asked->scene.file = scene_file(asked->scene.file);
       return tune(*asked);

@@ -237,6 +237,27 @@ json read_shard(const std::string& file) {
 
 }  // namespace
 
+void require_campaign(const json& document, const std::string& file) {
+  try {
+    require_fields(document, file);
+    if (document.contains("seconds_asked")) {
+      static_cast<void>(document.at("seconds_asked").get<double>());
+    } else {
+      static_cast<void>(document.at("cases_asked").get<int64_t>());
+    }
+    for (const char* const count : {"shard", "shards"}) {
+      if (document.at(count).get<int64_t>() < 1 || document.at(count).get<int64_t>() > kMostShards)
+        throw InputError(file, count, "there is no such shard", kRemedy);
+    }
+    if (document.contains("missing_shards")) {
+      static_cast<void>(document.at("missing_shards").get<std::vector<int64_t>>());
+      static_cast<void>(document.at("merged_shards").get<int64_t>());
+    }
+  } catch (const json::exception& error) {
+    throw InputError(file, "", fmt::format("this is not a result of `cutproof fuzz` ({})", error.what()), kRemedy);
+  }
+}
+
 json merge_shards(const std::vector<std::string>& files) {
   json whole;
   std::map<int64_t, std::string> file_of;  // shard -> its file

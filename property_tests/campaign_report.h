@@ -25,6 +25,9 @@ nlohmann::json merge_shards(const std::vector<std::string>& files);
 // Of a merged document, as job arrays write it: "3,7-12"; empty: none is missing.
 std::string missing_shards(const nlohmann::json& document);
 
+// Throws InputError, naming `file`, if something is missing, or of another kind, that a conclusion reads.
+void require_campaign(const nlohmann::json& document, const std::string& file);
+
 // What follows from a document. `whole`: it is of all shards, so classes of cases that never occurred say something.
 struct CampaignConclusion {
   std::string failure;  // what is wrong, as a sentence without an end; empty: all hold

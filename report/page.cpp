@@ -10,6 +10,7 @@
 #include "model/io/json_text.h"
 #include "report/assets.h"
 #include "report/coding.h"
+#include "report/html.h"
 
 namespace cutproof::report {
 
@@ -133,27 +134,6 @@ json data_json(const Source& source, const Results& results, const Pictures& pic
       {"thinned", thinned_in_words(pictures, body.particle_count())}};
 }
 
-// The template with its marks replaced, each by what may hold any text: nothing in it is looked at again.
-std::string filled(std::string_view page, const std::vector<std::pair<std::string_view, std::string_view>>& contents) {
-  std::string text;
-  while (!page.empty()) {
-    std::size_t first = std::string_view::npos;
-    const std::pair<std::string_view, std::string_view>* next = nullptr;
-    for (const auto& content : contents) {
-      const std::size_t found = page.find(content.first);
-      if (found < first) {
-        first = found;
-        next = &content;
-      }
-    }
-    text += page.substr(0, first);
-    if (next == nullptr) break;
-    text += next->second;
-    page.remove_prefix(first + next->first.size());
-  }
-  return text;
-}
-
 }  // namespace
 
 void require_pages(const std::string& option) {
@@ -190,19 +170,7 @@ std::string page(const Source& source, const Results& results, const std::string
                  int64_t most_picture_bytes) {
   const Pictures pictures = pictures_of(source, results.findings, most_picture_bytes);
   const std::string data = script_json(io::json_text(data_json(source, results, pictures, again, program)));
-  std::string later;
-  for (std::size_t k = 1; k < pictures.chunks.size(); ++k) {
-    later += fmt::format("<script type=\"application/octet-stream\" id=\"chunk-{}\">", k);
-    later += pictures.chunks[k];
-    later += "</script>\n";
-  }
-  return filled(kPageHtml, {{"@STYLE_HASH@", kPageStyleHash},
-                            {"@SCRIPT_HASH@", kPageScriptHash},
-                            {"@STYLE@", kPageStyle},
-                            {"@SCRIPT@", kPageScript},
-                            {"@DATA@", data},
-                            {"@FIRST_CHUNK@", pictures.chunks.empty() ? std::string_view() : pictures.chunks.front()},
-                            {"@LATER_CHUNKS@", later}});
+  return html(data, pictures.chunks);
 }
 
 }  // namespace cutproof::report

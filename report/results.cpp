@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <set>
 #include <tuple>
@@ -14,6 +13,7 @@
 #include "model/io/columns.h"
 #include "model/io/json_reader.h"
 #include "model/io/limits.h"
+#include "report/field.h"
 
 namespace cutproof::report {
 
@@ -22,92 +22,6 @@ namespace {
 using nlohmann::json;
 
 constexpr const char* kRemedy = "give what `cutproof run --json F` or `cutproof check --json F` has written";
-
-constexpr int64_t kMostCount = 1'000'000'000'000;
-
-// A field of a document, which knows where it stands.
-struct Field {
-  const json* value;  // null: it is not there
-  const std::string& file;
-  std::string path;
-
-  [[noreturn]] void refuse(const std::string& problem) const { throw InputError(file, path, problem, kRemedy); }
-  Field operator[](const char* name) const {
-    if (!there().is_object()) refuse("this is no object");
-    const auto found = value->find(name);
-    return {found == value->end() ? nullptr : &*found, file, path.empty() ? name : path + "." + name};
-  }
-  const json& there() const {
-    if (value == nullptr) refuse("this is missing");
-    return *value;
-  }
-  std::string text() const {
-    if (!there().is_string()) refuse("this is no text");
-    return value->get<std::string>();
-  }
-  std::string text_or(const char* otherwise) const { return value == nullptr ? otherwise : text(); }
-  bool flag() const {
-    if (!there().is_boolean()) refuse("this is neither true nor false");
-    return value->get<bool>();
-  }
-  bool flag_or(bool otherwise) const { return value == nullptr ? otherwise : flag(); }
-  int64_t count() const {
-    if (!there().is_number_integer()) refuse("this is no whole number");
-    if (value->is_number_unsigned() &&
-        value->get<uint64_t>() > static_cast<uint64_t>(std::numeric_limits<int64_t>::max()))
-      refuse("this is too large");
-    const auto number = value->get<int64_t>();
-    if (number < 0) refuse("this is below 0");
-    // So that no sum of such numbers ends beyond what an integer holds.
-    if (number > kMostCount) refuse("this is too large");
-    return number;
-  }
-  int64_t count_or(int64_t otherwise) const { return value == nullptr ? otherwise : count(); }
-  // A number, or "nan", "inf", "-inf".
-  double number() const {
-    if (there().is_number()) return value->get<double>();
-    if (value->is_string()) {
-      const auto& word = value->get_ref<const std::string&>();
-      if (word == "nan") return std::numeric_limits<double>::quiet_NaN();
-      if (word == "inf") return std::numeric_limits<double>::infinity();
-      if (word == "-inf") return -std::numeric_limits<double>::infinity();
-    }
-    refuse("this is no number");
-  }
-  std::optional<double> number_or_null() const {
-    if (value == nullptr || value->is_null()) return std::nullopt;
-    const double found = number();
-    return std::isfinite(found) ? std::optional(found) : std::nullopt;
-  }
-  std::size_t length() const {
-    if (!there().is_array()) refuse("this is no list");
-    return value->size();
-  }
-  Field at(std::size_t k) const { return {&(*value)[k], file, path + "[" + std::to_string(k) + "]"}; }
-  std::vector<std::string> texts() const {
-    std::vector<std::string> found;
-    for (std::size_t k = 0; value != nullptr && k < length(); ++k) found.push_back(at(k).text());
-    return found;
-  }
-  std::vector<int32_t> numbers() const {
-    std::vector<int32_t> found;
-    for (std::size_t k = 0; value != nullptr && k < std::min(length(), kMostWitnesses); ++k) {
-      const json& one = (*value)[k];
-      if (!one.is_number_integer() || one.get<int64_t>() < std::numeric_limits<int32_t>::min() ||
-          one.get<int64_t>() > std::numeric_limits<int32_t>::max())
-        at(k).refuse("this is the number of no particle or cluster");
-      found.push_back(one.get<int32_t>());
-    }
-    return found;
-  }
-  Stage stage() const {
-    const std::string name = text();
-    for (const Stage one : kStages) {
-      if (name == name_of(one)) return one;
-    }
-    refuse("'" + name + "' is none of the six stages");
-  }
-};
 
 std::string figure(double value) { return fmt::format("{:.4g}", value); }
 
@@ -173,8 +87,9 @@ void add_verdict(const Field& verdict, const Measured* known, std::vector<Row>& 
   }
   const Field witness = verdict["witness"];
   results.findings.push_back({property, stage, frame, figure(measured), figure(bound), unit, of_bound, source,
-                              witness["text"].text(), witness["clusters"].numbers(), witness["particles"].numbers(),
-                              witness["path"].numbers(), is_expected});
+                              witness["text"].text(), witness["clusters"].numbers(kMostWitnesses),
+                              witness["particles"].numbers(kMostWitnesses), witness["path"].numbers(kMostWitnesses),
+                              is_expected});
 }
 
 void add_verdicts(const Field& document, Results& results) {
@@ -275,7 +190,7 @@ void add_series(const Field& document, Results& results) {
 }  // namespace
 
 Results results_of(const json& given, const std::string& file) {
-  const Field document = {&given, file, ""};
+  const Field document = {&given, file, "", kRemedy};
   if (!given.is_object()) document.refuse("this is no result of cutproof");
   Results results;
   const std::string format = document["format"].text();

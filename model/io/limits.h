@@ -22,7 +22,7 @@ struct JsonLimits {
 inline constexpr JsonLimits kSceneLimits = {"A scene", 4 * kMiB, 64, 200'000};
 inline constexpr JsonLimits kCounterexampleLimits = {"A counterexample", 8 * kMiB, 64, 400'000};
 inline constexpr JsonLimits kCampaignLimits = {"A result of fuzz", 64 * kMiB, 64, 2'000'000};
-inline constexpr JsonLimits kResultsLimits = {"A result of run or check", 64 * kMiB, 64, 4'000'000};
+inline constexpr JsonLimits kResultsLimits = {"A result for a report page", 64 * kMiB, 64, 4'000'000};
 inline constexpr JsonLimits kQuestionLimits = {"A question to a kernel", 32 * kMiB, 64, 2'000'000};
 
 // Of a scene.

@@ -1,14 +1,16 @@
 // The page: reads its data, puts them together, and keeps view, player, verdicts and plots at the same moment.
 import { Moments } from './coding.js';
 import { colourings, rampStops } from './colours.js';
+import { showDocuments } from './documents.js';
 import { byId, count, drawing, element, figure, plural } from './dom.js';
 import { plotsOf } from './plots.js';
 import { cards, command, table } from './verdicts.js';
 import { View, contextOf } from './view.js';
 
 const data = JSON.parse(byId('data').textContent);
-const moments = new Moments(data.firstMoment);
-const last = data.moments.length - 1;
+// A page of documents has no moments of its own.
+const moments = new Moments(data.firstMoment || []);
+const last = (data.moments || []).length - 1;
 const kFramesPerSecond = 15;
 
 const state = { at: 0, finding: null, isPlaying: false };
@@ -229,4 +231,5 @@ async function main() {
   document.documentElement.dataset.ready = 'true';
 }
 
-main();
+if (data.sheets) showDocuments(data);
+else main();

@@ -4,7 +4,7 @@ import { count, drawing, element, figure } from './dom.js';
 const kWidth = 520, kHeight = 220, kLeft = 58, kRight = 14, kTop = 14, kBottom = 40;
 const kMostBars = 130;
 
-function ticks(low, high, most) {
+export function ticks(low, high, most) {
   const raw = (high - low) / most;
   const power = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 5, 10].map((k) => k * power).find((k) => k >= raw);

@@ -322,6 +322,56 @@ const std::vector<Hostile>& hostile_inputs() {
        "judge './caf\xe9.so'",
        {R"(caf\xe9.so)", "not UTF-8"}},
 
+      // --- For a page
+      {"APipeForAPage", make_pipe, "report input -o page.html", {"a pipe"}},
+      {"APipeBesideARecordingForAPage",
+       [] {
+         make_pipe();
+         files::rename("input", "pipe");
+         changed_recording("")();
+       },
+       "report input pipe -o page.html",
+       {"a pipe"}},
+      {"ADocumentOfATerabyteForAPage", sparse("input"), "report input -o page.html", {"too large", "64 MiB"}},
+      {"ADocumentOfBracketsForAPage",
+       repeated("", "[", 1'000'000, ""),
+       "report input -o page.html",
+       {"nested too deeply"}},
+      {"ADocumentOfManyValuesForAPage",
+       repeated("[", "{},", 5'000'000, "0]"),
+       "report input -o page.html",
+       {"too many values"}},
+      {"ADocumentThatIsNothingForAPage",
+       text(R"({"format":"\u001b[31mred"})"),
+       "report input -o page.html",
+       {"format", R"(\x1b[31mred)"}},
+      {"ACampaignOfAnotherVersionForAPage",
+       text(R"({"format":"cutproof.fuzz","format_version":99})"),
+       "report input -o page.html",
+       {"format_version", "version 99"}},
+      {"ACampaignWithoutFieldsForAPage",
+       text(R"({"format":"cutproof.fuzz","format_version":4})"),
+       "report input -o page.html",
+       {"backend", "missing"}},
+      {"ABenchmarkOfAnUnknownSuiteForAPage",
+       text(
+           R"({"format":"cutproof.bench","format_version":3,"suite":"\u001b[31m","backend":"","device":"","date":"","cutproof":""})"),
+       "report input -o page.html",
+       {"suite", R"(\x1b[31m)", "sensitivity"}},
+      {"ATuningWhoseAnswerIsNoTrialForAPage",
+       text(
+           R"({"format":"cutproof.bench","format_version":3,"suite":"tune","backend":"","device":"","date":"","cutproof":"",)"
+           R"("scene":"s","tolerance_h":1,"trials":[],"found":{"trial":7}})"),
+       "report input -o page.html",
+       {"found.trial", "no such trial"}},
+      {"ACounterexampleOfManyNodesForAPage",
+       [] {
+         Writer()(R"({"format":"cutproof.counterexample","format_version":1,"case":{"nodes":[)")("[0,0,0],",
+                                                                                                 600'000)("[1,0,0]]}}");
+       },
+       "report input -o page.html",
+       {"too many values"}},
+
       // --- Meshes
       {"AMeshOfATerabyte",
        [] {

@@ -96,6 +96,61 @@ TEST_F(Verbs, ReportMakesAPageOfARunACheckAndARecording) {
   expect_refused("report seen bad.json -o page.html", {"bad.json", "--json"});
 }
 
+// Of what verbs other than run and check write; what does not go together is refused by the file that does not.
+TEST_F(Verbs, ReportMakesAPageOfEveryDocumentAndRefusesWhatDoesNotGoTogether) {
+  if (CUTPROOF_HAS_PAGES == 0) {
+    for (const char* const one : {"fuzz --cases 5 --report page.html", "bench machine_limits --report page.html",
+                                  "tune cut.json --tolerance 1 --report page.html"})
+      expect_refused(one, {"--report", "built without report pages"});
+    return;
+  }
+  record();
+  for (const char* const one :
+       {"fuzz --cases 5 --report nowhere/p.html", "bench machine_limits --report nowhere/p.html",
+        "tune cut.json --tolerance 1 --report nowhere/p.html"})
+    expect_refused(one, {"nowhere"});
+  ASSERT_EQ(cutproof("fuzz --cases 20 --sizes 0-9 --seed 3 --json fuzz.json --report fuzz.html").status, 0);
+  ASSERT_EQ(cutproof("bench machine_limits --repeats 2 --json limits.json --report limits.html").status, 0);
+  ASSERT_EQ(cutproof("run cut.json --check topology --json run.json").status, 0);
+  for (const char* const name : {"fuzz", "limits"}) {
+    const std::string file(name);
+    const Outcome made = cutproof("report " + file + ".json -o again.html");
+    EXPECT_EQ(made.status, 0) << made.output;
+    EXPECT_NE(made.output.find("everything on the page holds"), std::string::npos) << made.output;
+    EXPECT_EQ(read("again.html"), read(file + ".html")) << "--report and report make the same page";
+  }
+  EXPECT_NE(read("fuzz.html").find("cutproof fuzz --backend host --cases 20 --seed 3 --sizes 0-9"), std::string::npos);
+  EXPECT_NE(read("limits.html").find("cutproof bench machine_limits --repeats 2"), std::string::npos);
+  write("copy.json", read("fuzz.json"));
+  const std::set<std::string> before = listing();
+  expect_refused("report fuzz.json limits.json -o p.html", {"limits.json", "format", "does not go with"});
+  expect_refused("report seen limits.json -o p.html", {"limits.json", "does not go with a recording"});
+  expect_refused("report run.json -o p.html", {"run.json", "give the recording"});
+  expect_refused("report limits.json limits.json -o p.html", {"limits.json", "twice"});
+  expect_refused("report seen.cutproof.h5 other -o p.html", {"other"});
+  const std::string counterexample = CUTPROOF_SOURCE "/fixtures/regressions/pair_on_a_wall.json";
+  expect_refused("report fuzz.json " + counterexample + " -o p.html", {"pair_on_a_wall.json", "no such violation"});
+  expect_refused("report fuzz.json copy.json -o p.html", {"json", "a page shows one"});
+  EXPECT_EQ(listing(), before) << "nothing half-written is left";
+  const Outcome alone = cutproof("report " + counterexample + " -o alone.html --backend reference");
+  EXPECT_EQ(alone.status, 0) << alone.output;
+  EXPECT_NE(alone.output.find("everything on the page holds"), std::string::npos) << alone.output;
+}
+
+// A document may name any library; none is run because a document says so.
+TEST_F(Verbs, ReportRunsAPluginOnlyIfTheCommandLineNamesIt) {
+  if (CUTPROOF_HAS_PAGES == 0) GTEST_SKIP() << "this build has no report pages";
+  std::string text = read(CUTPROOF_SOURCE "/fixtures/regressions/split_leaves_a_component_out.json");
+  const std::string key = "\"backend\":\"";
+  const std::size_t first = text.find(key) + key.size();
+  text.replace(first, text.find('"', first) - first, "plugin:./libevil.so");
+  write("evil.json", text);
+  const Outcome made = cutproof("report evil.json -o page.html");
+  EXPECT_EQ(made.status, 0) << made.output;
+  EXPECT_NE(made.output.find("nothing on the page is judged"), std::string::npos) << made.output;
+  EXPECT_NE(read("page.html").find("a plugin is run only if --backend names it"), std::string::npos);
+}
+
 // What a page is made from has a name no longer than it is written.
 TEST_F(Verbs, ReportLeavesNothingOfARunThatFailsAfterIt) {
   if (CUTPROOF_HAS_PAGES == 0) GTEST_SKIP() << "this build has no report pages";
@@ -133,7 +188,7 @@ TEST_F(Verbs, RefuseWhatIsGivenButEmpty) {
                                                         {"digest ''", "recording"},
                                                         {"run cut.json --report ''", "--report"},
                                                         {"check seen --report ''", "--report"},
-                                                        {"report '' -o page.html", "recording"},
+                                                        {"report '' -o page.html", "files"},
                                                         {"report seen -o ''", "--output"},
                                                         {"fuzz --cases 5 --json ''", "--json"},
                                                         {"fuzz --cases 5 --shard ''", "--shard"},
@@ -181,7 +236,7 @@ TEST_F(Verbs, RefuseUnknownOptionsMissingValuesAndNegativeCounts) {
                                                         {"check state.npz --check deep", "deep"},
                                                         {"digest seen --frobnicate", "--frobnicate"},
                                                         {"report seen", "--output"},
-                                                        {"report -o page.html", "recording"},
+                                                        {"report -o page.html", "files"},
                                                         {"report seen -o -", "--output"},
                                                         {"run cut.json --report -", "--report"},
                                                         {"check state.npz --report page.html", "--report"},

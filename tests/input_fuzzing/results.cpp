@@ -3,14 +3,39 @@
 
 #include <nlohmann/json.hpp>
 
+#include "model/io/json_reader.h"
+#include "model/io/limits.h"
+#include "report/documents.h"
 #include "tests/input_fuzzing/targets.h"
 
 namespace cutproof::input_fuzzing {
 namespace {
 
+// A campaign, a measurement.
+void feed_document(const nlohmann::json& document, const std::string& file) {
+  const report::Sheet sheet = report::sheet_of(document, file);
+  if (sheet.summary.empty() || sheet.badge.empty()) broken_contract("there is nothing to say");
+  if (sheet.cards.size() > report::kMostCards) broken_contract("more failures are shown than there may be");
+  if (sheet.holds.value_or(false) && sheet.kind != "benchmark" && !sheet.cards.empty())
+    broken_contract("what has failures holds");
+  for (const nlohmann::json& piece : report::to_json(sheet).at("pieces")) {
+    if (piece.at("kind") != "grid") continue;
+    for (const nlohmann::json& row : piece.at("rows")) {
+      if (row.at("cells").size() != piece.at("columns").size())
+        broken_contract("a row has other columns than its table");
+    }
+  }
+}
+
 Outcome feed(std::string_view bytes) {
   return outcome_of([&] {
     write_scratch("results.json", bytes);
+    const std::string file = scratch_path("results.json");
+    const nlohmann::json document = io::read_json(file, io::kResultsLimits, "Give a result.");
+    if (const report::DocumentKind kind = report::kind_of(document, file);
+        kind != report::DocumentKind::run && kind != report::DocumentKind::counterexample) {
+      return feed_document(document, file);
+    }
     const report::Results results = report::read_results(scratch_path("results.json"));
     int64_t failed = 0;
     for (const report::PropertyRow& row : results.rows) {
@@ -53,7 +78,66 @@ std::vector<std::string> seeds() {
                     {"lockstep", {{"frames", {{"frame", {0}}, {"position_max", {1e-7}}}}}},
                     {"free_running", nullptr}};
   run["errors"] = {{"solver", {{"frames", {{{"frame", 0}, {"max", 0.1}}}}}}, {"time_step", {{"rms", {0.1, nullptr}}}}};
-  return {run.dump(), check.dump()};
+  const nlohmann::json property = {{"property", "coverage"}, {"stage", "split"}, {"unit", "1"},    {"judged", 3},
+                                   {"checked", 9},           {"failed", 1},      {"undecided", 2}, {"measured", 1},
+                                   {"of_bound", nullptr}};
+  const nlohmann::json campaign = {{"format", "cutproof.fuzz"},
+                                   {"format_version", 4},
+                                   {"cutproof", "0.1.0"},
+                                   {"backend", "host"},
+                                   {"dynamics", true},
+                                   {"complete", true},
+                                   {"cases", 10},
+                                   {"verdicts", 30},
+                                   {"refused", 1},
+                                   {"mean_particles", 12.5},
+                                   {"seed", 7},
+                                   {"sizes", {0, 79}},
+                                   {"seconds", 0.5},
+                                   {"shard", 1},
+                                   {"shards", 1},
+                                   {"properties", {property}},
+                                   {"coverage", {{"boxes", 3}, {"merge", 0}}},
+                                   {"holds", false},
+                                   {"violations",
+                                    {{{"index", 3},
+                                      {"property", "coverage"},
+                                      {"stage", "split"},
+                                      {"text", "all of it"},
+                                      {"file", "a.json"},
+                                      {"drawn", {{"particles", 90}, {"strokes", 4}}},
+                                      {"simplified", {{"particles", 2}, {"strokes", 1}}}}}}};
+  const nlohmann::json times = {{"median", 0.002}, {"min", 0.001}, {"max", 0.003}};
+  const nlohmann::json head = {
+      {"format", "cutproof.bench"}, {"format_version", 3}, {"cutproof", "0.1.0"}, {"backend", "host"},
+      {"device", "a CPU"},          {"date", "today"},     {"complete", true}};
+  nlohmann::json limits = head;
+  limits.update({{"suite", "machine_limits"},
+                 {"holds", true},
+                 {"rows", {{{"what", "copy"}, {"seconds", times}, {"bytes_per_second", 1e9}, {"lost", 0}}}}});
+  nlohmann::json tune = head;
+  const nlohmann::json trial = {{"substeps", 4},
+                                {"iterations", 2},
+                                {"acceleration", "none"},
+                                {"rotation", nullptr},
+                                {"differences", ""},
+                                {"outcome", "within"},
+                                {"why", ""},
+                                {"rms_h", 0.01},
+                                {"max_h", 0.02},
+                                {"rms_h_by_frame", {0.001, 0.01}},
+                                {"removed_otherwise", 0},
+                                {"seconds_per_frame", times}};
+  tune.update(
+      {{"suite", "tune"},
+       {"scene", "a.json"},
+       {"tolerance_h", 0.1},
+       {"reference", {{"kind", "limit"}}},
+       {"trials", {trial}},
+       {"left", nlohmann::json::array()},
+       {"found",
+        {{"trial", 0}, {"verified", trial}, {"verdicts", 9}, {"seconds_per_frame", times}, {"times_cheaper", 1.0}}}});
+  return {run.dump(), check.dump(), campaign.dump(), limits.dump(), tune.dump()};
 }
 
 }  // namespace

@@ -269,4 +269,127 @@ for width, dark in ((390, False), (390, True), (1280, True)):
     with Browser("fails.html", width=width, dark=dark) as page:
         assert page.ask("return document.documentElement.scrollWidth <= window.innerWidth"), f"wider than {width} pixels"
         picture(page, f"{width}_{'dark' if dark else 'light'}")
+
+# --- Documents: a campaign and a judged plugin that fail, a tuning, benchmarks ---
+
+def filtered(page, nth=0):
+    """Each value of a table's filter shows its own rows, and together all."""
+    select = page.driver.find_elements(By.CSS_SELECTOR, "select.filter")[nth]
+    rows = "return [...arguments[0].closest('section').querySelectorAll('tbody tr')].filter((r) => !r.hidden).length"
+    every, seen = page.ask(rows, select), 0
+    options = page.ask("return [...arguments[0].options].map((o) => o.value)", select)
+    assert len(options) > 2, options
+    for value in options[1:]:
+        page.ask("arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('change'))", select, value)
+        shown = page.ask(rows, select)
+        assert 0 < shown < every, (value, shown, every)
+        seen += shown
+    assert seen == every, (seen, every)
+
+
+def dots_say(page):
+    """Hovering over a point and reaching it by keys say which configuration it is; the table below has it, too."""
+    chart = page.driver.find_element(By.CSS_SELECTOR, ".chart:has(.dot)")
+    readout = "return arguments[0].querySelector('.readout').textContent"
+    first = page.ask("return arguments[0].querySelector('.dot[tabindex=\"0\"]')", chart)
+    page.ask("arguments[0].focus()", first)
+    words = page.ask(readout, chart)
+    assert words == first.get_attribute("aria-label"), words
+    page.driver.switch_to.active_element.send_keys(Keys.ARROW_RIGHT)
+    after = page.ask(readout, chart)
+    assert after != words and after == page.driver.switch_to.active_element.get_attribute("aria-label"), after
+    page.ask("arguments[0].dispatchEvent(new PointerEvent('pointerenter'))", first)
+    assert page.ask(readout, chart) == words
+    page.ask("arguments[0].querySelector('details').open = true", chart)
+    page.until("return arguments[0].querySelector('table') !== null", chart)
+    table = page.ask("return arguments[0].querySelector('table').textContent", chart)
+    assert words.split(":")[0].split(" (")[0] in table, (words, table[:300])
+    for plot in page.driver.find_elements(By.CSS_SELECTOR, ".chart svg[role=group]"):
+        assert len(plot.find_elements(By.CSS_SELECTOR, ".axis")) == 2
+
+
+run([program, "fuzz", "--backend", "plugin:./libsplitter.so", "--cases", "200", "--seed", "5", "--simplify", "5",
+     "--report", "campaign.html", "--json", "campaign.json"], 1)
+run([program, "judge", "./libsplitter.so", "--cases", "80", "--seed", "5", "--simplify", "5", "--report",
+     "judged.html"], 1)
+run([program, "fuzz", "--cases", "30", "--sizes", "0-9", "--report", "good.html"], 0)
+run([program, "tune", "halves.json", "--tolerance", "100", "--frames", "2", "--reference", "substeps", "--repeats", "1",
+     "--full", "--write", "tuned.json", "--report", "tuning.html"], 0)
+run([program, "bench", "stages", "--sizes", "300,1000", "--frames", "2", "--repeats", "1", "--report",
+     "stages.html"], 0)
+
+with Browser("campaign.html") as page:
+    assert "Campaign" in page.text("#title") and "violates a property" in page.text("#summary"), page.text("#summary")
+    assert "seed 5" in page.text("#facts"), page.text("#facts")
+    facts = page.text(".failure dl")
+    for word in ("Simplification", "from ", "The case", "Measured / bound", "it fails on plugin:./libsplitter.so"):
+        assert word in facts, (word, facts)
+    # Both states, the witness marked in each, and not elsewhere.
+    names = [one.text for one in page.driver.find_elements(By.CSS_SELECTOR, ".pane figcaption")]
+    assert names == ["backend plugin:./libsplitter.so", "the reference"], names
+    orange = """const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(() => done(
+        [...document.querySelectorAll('.pane canvas')].map((canvas) => {
+          const copy = document.createElement('canvas'); [copy.width, copy.height] = [canvas.width, canvas.height];
+          const pen = copy.getContext('2d'); pen.drawImage(canvas, 0, 0);
+          const all = pen.getImageData(0, 0, copy.width, copy.height).data; let n = 0;
+          for (let i = 0; i < all.length; i += 4) {
+            if (all[i] > 150 && all[i] > 1.6 * all[i + 1] && all[i + 2] < 40) ++n;
+          }
+          return n; }))));"""
+    marked = page.driver.execute_async_script(orange)
+    assert len(marked) == 2 and min(marked) > 100, marked
+    assert "fails here" in page.text("#witness") and "after split" in page.text("#status")
+    page.ask("const r = document.getElementById('scrub'); r.value = 0;"
+             "r.dispatchEvent(new Event('input'));")
+    page.until("return document.documentElement.dataset.scenery === '0/0'")
+    assert page.driver.execute_async_script(orange) == [0, 0]
+    assert page.text("#witness") == ""
+    page.driver.find_element(By.CSS_SELECTOR, "[data-scenery='0']").click()
+    page.until("return document.documentElement.dataset.scenery !== '0/0'")
+    assert "fails here" in page.text("#witness")
+    filtered(page)
+    command = page.text(".failure .command")
+    assert command.startswith("cutproof replay "), command
+    assert "split exactness" in run(command, 1), "the command shows something else"
+    again = page.driver.find_element(By.CSS_SELECTOR, ".notes-card .command").text
+    assert "--seed 5" in again and "1 of " in run(again, 1), again
+    picture(page, "campaign")
+
+# The same from the document; a plugin runs only if it is named.
+run([program, "report", "campaign.json", "-o", "unrun.html"], 0)
+with Browser("unrun.html") as page:
+    assert "a plugin is run only if --backend names it" in page.text(".failure dl")
+    assert not page.driver.find_elements(By.ID, "view")
+run([program, "report", "campaign.json", "--backend", "plugin:./libsplitter.so", "-o", "named.html"], 0)
+with Browser("named.html", "--disable-gpu", "--disable-software-rasterizer", "--disable-3d-apis") as page:
+    assert len(page.driver.find_elements(By.CSS_SELECTOR, ".no-webgl")) == 2
+    assert "split exactness" in page.text(".failure") and "after split" in page.text("#status")
+    filtered(page)
+
+with Browser("judged.html") as page:
+    assert "fails" in page.text("#summary") or "Not everything" in page.text("#summary"), page.text("#summary")
+    assert "fails" in page.text(".badge"), page.text(".badge")
+    assert page.driver.find_elements(By.CSS_SELECTOR, ".failure .command")
+with Browser("good.html") as page:
+    assert "none violates any property" in page.text("#summary"), page.text("#summary")
+    assert "Nothing fails" in page.text(".failures")
+
+with Browser("tuning.html") as page:
+    assert "found" in page.text(".badge") and "The cheapest configuration of halves" in page.text("#summary")
+    dots_say(page)
+    assert "tolerance" in page.text(".chart .legend") and "the answer" in page.text(".chart .legend")
+    picture(page, "tuning")
+with Browser("stages.html") as page:
+    dots_say(page)
+    filtered(page)
+    bars = page.driver.find_elements(By.CSS_SELECTOR, ".chart rect")
+    assert len(bars) >= 6, f"{len(bars)} parts of two stacks"
+    page.ask("document.querySelector('.chart details').open = true")
+    page.until("return document.querySelector('.chart table') !== null")
+    assert "time [ms]" in page.ask("return document.querySelector('.chart table').textContent")
+for name in ("campaign", "judged", "tuning", "stages"):
+    for dark in (False, True):
+        with Browser(f"{name}.html", width=390, dark=dark) as page:
+            assert page.ask("return document.documentElement.scrollWidth <= window.innerWidth"), f"{name} is too wide"
+            picture(page, f"{name}_390_{'dark' if dark else 'light'}")
 print("pages show what happened")

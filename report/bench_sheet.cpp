@@ -1,0 +1,741 @@
+// Benchmarks: a reader for each suite.
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "model/io/columns.h"
+#include "report/document_fields.h"
+
+namespace cutproof::report {
+
+namespace {
+
+std::optional<double> times(const std::optional<double>& value, double factor) {
+  return value ? std::optional(factor * *value) : std::nullopt;
+}
+std::optional<double> in_ms(const Field& field) { return times(seconds_of(field), 1e3); }
+std::string ms_text(const Field& field, const char* which = "median") {
+  return figure_text(seconds_of(field, which), 1e3);
+}
+std::string whole(int64_t count) { return io::grouped(count); }
+
+// A curve of a name, made when it is first asked for.
+Curve& curve_named(Chart& chart, const std::string& name, Look look) {
+  for (Curve& curve : chart.curves) {
+    if (curve.name == name) return curve;
+  }
+  return chart.curves.emplace_back(Curve{name, look, {}});
+}
+
+// Times and limits over particles, from row to row.
+Chart over_particles(const std::string& title, const std::string& words) {
+  return {title, words, {"particles", "", true}, {"median time", "ms", true}, {}};
+}
+void sort_by_x(Chart& chart) {
+  for (Curve& curve : chart.curves) {
+    std::stable_sort(curve.dots.begin(), curve.dots.end(), [](const Dot& a, const Dot& b) { return a.x < b.x; });
+  }
+}
+
+// What sets one row apart from another of the same scene, where rows differ in it.
+class Variants {
+ public:
+  explicit Variants(const Field& rows) {
+    rows.each([&](const Field& row) {
+      for (std::size_t k = 0; k < std::size(kNames); ++k) seen_[k].insert(row[kNames[k]].text_or(""));
+    });
+  }
+  std::string of(const Field& row) const {
+    std::string text;
+    for (std::size_t k = 0; k < std::size(kNames); ++k) {
+      const std::string value = row[kNames[k]].text_or("");
+      if (seen_[k].size() < 2 || value.empty()) continue;
+      text += fmt::format("{}{} {}", text.empty() ? "" : ", ", kNames[k], value);
+    }
+    return text;
+  }
+
+ private:
+  static constexpr const char* kNames[] = {"cooking", "split", "acceleration", "rotation", "remove"};
+  std::set<std::string> seen_[std::size(kNames)];
+};
+std::string with(const std::string& name, const std::string& variant) {
+  return variant.empty() ? name : name + ", " + variant;
+}
+
+std::string solver_text(const Field& row) {
+  return fmt::format("{} substeps × {} iterations, acceleration {}, rotation {}, split {}", row["substeps"].count(),
+                     row["iterations"].count(), row["acceleration"].text_or("none"), row["rotation"].text(),
+                     row["split"].text());
+}
+
+Stack stage_stack(const std::string& words) {
+  Stack stack = {"Time of each stage", words, "ms", {}, {}};
+  for (const Stage stage : kStages) stack.parts.push_back({std::string(name_of(stage)), {}});
+  return stack;
+}
+constexpr const char* kStackWords =
+    "Medians of spans of one stage, one above the other. A frame runs them as one piece, so it may take less than "
+    "their "
+    "sum; its own time is in the table. A stage that did not run has no part.";
+
+void drop_empty_parts(Stack& stack) {
+  std::erase_if(stack.parts, [](const Series& part) {
+    return std::none_of(part.values.begin(), part.values.end(), [](const auto& value) { return value && *value > 0; });
+  });
+}
+
+// --- stages: rows of one scene stand one after the other and begin with whole frames
+
+void stages_pieces(Sheet& sheet, const Field& document) {
+  const Field rows = document["rows"];
+  const Variants variants(rows);
+  Stack stack = stage_stack(kStackWords);
+  Chart chart = over_particles("Time over size",
+                               "Each stage and the whole frame by number of particles, both axes "
+                               "logarithmic. Thin lines: the least that this machine could need.");
+  Grid grid;
+  grid.title = "Every time, beside its limit and its error";
+  grid.words =
+      "The limit is what the machine would need at best for the bytes and the dependent launches of a stage; "
+      "the error is that of the same step, against the reference.";
+  grid.columns = {{"scene"},
+                  {"what"},
+                  {"particles", true},
+                  {"median [ms]", true},
+                  {"least [ms]", true},
+                  {"most [ms]", true},
+                  {"limit [ms]", true},
+                  {"× limit", true},
+                  {"frames", true},
+                  {"paper [ms]", true},
+                  {"error"}};
+  grid.filter = 1;
+  std::vector<std::string> scenes;
+  std::map<std::string, std::map<std::string, std::string>> ours, papers;  // [scene][what]
+  std::map<std::string, std::string> particles_of;
+  std::set<int64_t> sizes;
+  rows.each([&](const Field& row) {
+    const std::string scene = with(row["scene"].text(), variants.of(row)), what = row["what"].text();
+    const int64_t particles = row["particles"].count();
+    sizes.insert(particles);
+    if (scenes.empty() || scenes.back() != scene) {
+      scenes.push_back(scene);
+      stack.labels.push_back(scene);
+      for (Series& part : stack.parts) part.values.emplace_back();
+      particles_of[scene] = whole(particles);
+    }
+    const Field seconds = row["seconds"], limit = row["limit"];
+    const std::optional<double> median = in_ms(seconds), paper = times(row["paper_seconds"].number_or_null(), 1e3);
+    for (Series& part : stack.parts) {
+      if (part.name == what) part.values.back() = median;
+    }
+    ours[scene][what] = figure_text(median);
+    if (paper) papers[scene][what] = figure_text(paper);
+    const auto size = static_cast<double>(particles);
+    const std::string text = fmt::format("{} of {}: {}", what, scene, solver_text(row));
+    const std::string variant = variants.of(row);
+    curve_named(chart, with(what, variant), Look::joined).dots.push_back({size, median, text});
+    std::optional<double> least, multiple;
+    if (!limit.is_nothing()) {
+      least = times(limit["seconds"].number_or_null(), 1e3);
+      multiple = limit["multiple"].number_or_null();
+      if (least && *least > 0)
+        curve_named(chart, "limit of " + what, Look::level).dots.push_back({size, least, "limit of " + what});
+    }
+    grid.rows.push_back(
+        {{scene, what, whole(particles), figure_text(median), ms_text(seconds, "min"), ms_text(seconds, "max"),
+          figure_text(least), figure_text(multiple), fmt::format("{} of {}", row["frames"].count(), row["of"].count()),
+          figure_text(paper), row["error_text"].text_or("")}});
+  });
+  drop_empty_parts(stack);
+  const bool has_paper = !papers.empty();
+  if (!stack.labels.empty()) sheet.pieces.emplace_back(std::move(stack));
+  if (sizes.size() > 1 && !has_paper) {
+    sort_by_x(chart);
+    sheet.pieces.emplace_back(std::move(chart));
+  }
+  if (has_paper) {
+    Grid table;
+    table.title = "Table 1 of the paper, beside ours";
+    table.words =
+        "Medians in milliseconds. The paper's figures are of an Intel i7-10700F and an Nvidia RTX 2060; the "
+        "device of ours stands at the top of this page.";
+    table.columns = {{"scene"}, {"whose"}, {"particles", true}};
+    for (const Stage stage : kStages) table.columns.push_back({std::string(name_of(stage)), true});
+    table.columns.push_back({"frame", true});
+    for (const std::string& scene : scenes) {
+      const auto add = [&](const char* whose, const std::string& particles, auto& figures, const char* kind) {
+        GridRow row = {{scene, whose, particles}, kind};
+        while (row.cells.size() < table.columns.size()) {
+          const auto found = figures.find(table.columns[row.cells.size()].head);
+          row.cells.push_back(found == figures.end() || found->second.empty() ? "–" : found->second);
+        }
+        table.rows.push_back(std::move(row));
+      };
+      add("ours", particles_of[scene], ours[scene], "");
+      if (const auto found = papers.find(scene); found != papers.end()) add("the paper's", "–", found->second, "paper");
+    }
+    sheet.pieces.emplace_back(std::move(table));
+  }
+  sheet.pieces.emplace_back(std::move(grid));
+  int64_t failing = 0;
+  document["scenes"].each([&](const Field& scene) {
+    const Field topology = scene["topology"];
+    if (!topology.is_there()) {
+      sheet.notes.push_back(scene["scene"].text() +
+                            ": errors were not measured, because at this size the reference would take minutes.");
+      return;
+    }
+    topology.each([&](const Field& verdict) {
+      if (verdict["holds"].flag()) return;
+      ++failing;
+      Card card;
+      card.title = fmt::format("{}: {}", scene["scene"].text(), verdict["property"].text());
+      card.words = verdict["witness"]["text"].text();
+      if (sheet.cards.size() < kMostCards) sheet.cards.push_back(std::move(card));
+    });
+  });
+  if (failing > 0) sheet.holds = false;
+  sheet.summary = fmt::format("Times of whole frames and of each stage while a blade cuts, of {} {}.", scenes.size(),
+                              scenes.size() == 1 ? "configuration" : "configurations");
+}
+
+// --- scale and sampling: a row has all stages
+
+void add_scene_rows(Sheet& sheet, const Field& document, bool is_sampling) {
+  const Field rows = document["rows"];
+  const Variants variants(rows);
+  const bool is_whole = !is_sampling || document["scaled_down"].count() == 1;
+  Stack stack = stage_stack(kStackWords);
+  Chart chart = over_particles("Time over size",
+                               is_sampling ? "A whole frame by number of particles, ours and the paper's, both axes "
+                                             "logarithmic."
+                                           : "Each stage and the whole frame by number of particles, both axes "
+                                             "logarithmic.");
+  Chart memory = {"Memory over size",
+                  "What the backend keeps after the timed frames, for each particle.",
+                  {"particles", "", true},
+                  {"memory of a particle", "bytes", false},
+                  {}};
+  Grid table;
+  if (is_sampling) {
+    table.title = "Table 2 of the paper, beside ours";
+    table.words = is_whole
+                      ? "The discontinuous cut of a kidney at four samplings. “To first”: the frame's time over that "
+                        "of the first row."
+                      : fmt::format(
+                            "The discontinuous cut of a kidney at four samplings, of 1/{} of the paper's "
+                            "particles: --full takes them all. “To first”: the frame's time over that of "
+                            "the first row.",
+                            document["scaled_down"].count());
+    table.columns = {{"particles", true},         {"clusters", true},         {"frame [ms]", true},
+                     {"to first", true},          {"paper: particles", true}, {"paper: clusters", true},
+                     {"paper: frame [ms]", true}, {"paper: to first", true}};
+  }
+  Grid grid;
+  grid.title = "Every time, beside its error";
+  grid.words =
+      "Medians in milliseconds. The error is the greatest distance of a position after one step from the "
+      "reference's, in particle spacings h.";
+  grid.columns = {{"scene"}, {"particles", true}, {"clusters", true}};
+  for (const Stage stage : kStages) grid.columns.push_back({std::string(name_of(stage)), true});
+  for (const char* const head : {"frame", "least", "most"}) grid.columns.push_back({head, true});
+  if (!is_sampling) {
+    grid.columns.push_back({"million particles/s", true});
+    grid.columns.push_back({"bytes/particle", true});
+  }
+  grid.columns.push_back({"error of step [h]", true});
+  grid.columns.push_back({"topology"});
+  int64_t failing = 0;
+  rows.each([&](const Field& row) {
+    const std::string variant = variants.of(row), scene = with(row["scene"].text(), variant);
+    const int64_t particles = row["particles"].count();
+    const auto size = static_cast<double>(particles);
+    const Field seconds = row["seconds"], error = row["error"];
+    stack.labels.push_back(scene);
+    GridRow cells = {{scene, whole(particles), whole(row["clusters"].count())}};
+    std::size_t part = 0;
+    for (const Stage stage : kStages) {
+      const std::string name(name_of(stage));
+      const std::optional<double> median = in_ms(seconds[name.c_str()]);
+      stack.parts[part++].values.push_back(median);
+      cells.cells.push_back(figure_text(median));
+      if (!is_sampling && median)
+        curve_named(chart, with(name, variant), Look::joined)
+            .dots.push_back({size, median, fmt::format("{} of {}: {}", name, scene, solver_text(row))});
+    }
+    const Field frame = seconds["frame"];
+    curve_named(chart, with(is_sampling ? "frame, ours" : "frame", variant), Look::joined)
+        .dots.push_back({size, in_ms(frame), fmt::format("frame of {}: {}", scene, solver_text(row))});
+    for (const char* const which : {"median", "min", "max"}) cells.cells.push_back(ms_text(frame, which));
+    if (!is_sampling) {
+      const std::optional<double> bytes = row["bytes"].number_or_null();
+      const std::optional<double> of_one = bytes && size > 0 ? std::optional(*bytes / size) : std::nullopt;
+      cells.cells.push_back(figure_text(row["particles_per_second"].number_or_null(), 1e-6));
+      cells.cells.push_back(of_one ? fmt::format("{:.0f}", *of_one) : "–");
+      curve_named(memory, with("memory", variant), Look::joined)
+          .dots.push_back({size, of_one, fmt::format("{}: {} clusters", scene, row["clusters"].count())});
+    } else {
+      const Field paper = row["paper"];
+      const std::optional<double> theirs = times(paper["frame_seconds"].number_or_null(), 1e3);
+      const int64_t their_particles = paper["particles"].count();
+      if (is_whole)
+        curve_named(chart, "frame, the paper's", Look::joined)
+            .dots.push_back({static_cast<double>(their_particles), theirs,
+                             fmt::format("the paper's: {} clusters", whole(paper["clusters"].count()))});
+      const auto ratio = [](const Field& field) {
+        const auto value = field.number_or_null();
+        return value ? fmt::format("{:.2f}", *value) : std::string("–");
+      };
+      table.rows.push_back({{whole(particles), whole(row["clusters"].count()), ms_text(frame),
+                             ratio(row["frame_to_first"]), whole(their_particles), whole(paper["clusters"].count()),
+                             figure_text(theirs), ratio(paper["frame_to_first"])}});
+    }
+    const Field step = error["step"], whole_frame = error["frame"];
+    cells.cells.push_back(step.is_nothing() ? "not measured" : figure_text(step["max_h"].number_or_null()));
+    const bool holds = whole_frame.is_nothing() || whole_frame["topology_holds"].flag();
+    cells.cells.push_back(whole_frame.is_nothing() ? "not judged" : holds ? "holds" : "fails");
+    if (!holds) {
+      cells.kind = "bad";
+      ++failing;
+    }
+    grid.rows.push_back(std::move(cells));
+  });
+  if (failing > 0) sheet.holds = false;
+  drop_empty_parts(stack);
+  sort_by_x(chart);
+  sort_by_x(memory);
+  if (!is_sampling) sheet.pieces.emplace_back(std::move(chart));
+  if (!stack.labels.empty()) sheet.pieces.emplace_back(std::move(stack));
+  if (is_sampling) {
+    sheet.pieces.emplace_back(std::move(chart));
+    sheet.pieces.emplace_back(std::move(table));
+  } else {
+    sheet.pieces.emplace_back(std::move(memory));
+  }
+  sheet.pieces.emplace_back(std::move(grid));
+  sheet.summary = is_sampling ? "Times of the cut of a kidney at four samplings."
+                              : "Times of a frame and of its stages, and memory, by number of particles.";
+}
+void scale_pieces(Sheet& sheet, const Field& document) { add_scene_rows(sheet, document, false); }
+void sampling_pieces(Sheet& sheet, const Field& document) { add_scene_rows(sheet, document, true); }
+
+// --- clusters: how many there are while a kidney is cut through
+
+void clusters_pieces(Sheet& sheet, const Field& document) {
+  Chart chart = {"Clusters during a cut",
+                 "How many clusters there are after each frame, for each threshold τ of merging.",
+                 {"frame of the scene", "", false},
+                 {"clusters", "", false},
+                 {}};
+  Grid grid;
+  grid.title = "Growth for each τ";
+  const double wanted = document["wanted_growth"].number();
+  grid.words = fmt::format("Growth from the first frame to the last. The paper's is {:.3g} %; {:.3g} % are wanted.",
+                           100 * document["paper"]["growth"].number(), 100 * wanted);
+  grid.columns = {{"merging"},         {"growth [%]", true}, {"greatest growth [%]", true}, {"as wanted"},
+                  {"particles", true}, {"removed", true},    {"frame, median [ms]", true},  {"verdicts", true},
+                  {"failed", true}};
+  int64_t failing = 0;
+  document["rows"].each([&](const Field& row) {
+    const Field tau = row["tau"], frames = row["scene_frame"], counts = row["clusters"];
+    const std::string name = tau.is_nothing() ? "no merging" : fmt::format("τ = {:.4g}", tau.number());
+    if (frames.length() != counts.length()) counts.refuse("this has not as many entries as 'scene_frame'");
+    Curve curve = {name, Look::joined, {}};
+    for (std::size_t k = 0; k < frames.length(); ++k)
+      curve.dots.push_back(
+          {static_cast<double>(frames.at(k).count()), static_cast<double>(counts.at(k).count()), name});
+    chart.curves.push_back(std::move(curve));
+    const Field error = row["error"];
+    const std::size_t failed = error["failed"].length();
+    failing += failed > 0;
+    grid.rows.push_back(
+        {{name, figure_text(row["growth"].number_or_null(), 100),
+          figure_text(row["greatest_growth"].number_or_null(), 100), row["within_wanted"].flag() ? "yes" : "no",
+          whole(row["particles"].count()), whole(row["removed"].count()), ms_text(row["seconds"]),
+          whole(error["verdicts"].count()), whole(static_cast<int64_t>(failed))},
+         failed > 0 ? "bad" : ""});
+  });
+  if (failing > 0) sheet.holds = false;
+  sheet.summary = "How the number of clusters grows while a kidney is cut through.";
+  sheet.pieces.emplace_back(std::move(chart));
+  sheet.pieces.emplace_back(std::move(grid));
+}
+
+// --- rotations
+
+void rotations_pieces(Sheet& sheet, const Field& document) {
+  std::map<std::string, Chart> charts;
+  std::map<std::string, std::vector<Dot>> fronts;
+  Grid grid;
+  grid.title = "Methods";
+  grid.words =
+      "Worst over all hard cases. A gap says by how much the answer is worse than the best rotation, relative to "
+      "it. “On the front”: no other method of this precision is both as fast and as near.";
+  grid.columns = {{"method"},          {"precision"},   {"ms a million", true},    {"× limit", true},
+                  {"worst gap", true}, {"in the case"}, {"worst ‖RᵀR − I‖", true}, {"answers", true},
+                  {"wrong", true},     {"on the front"}};
+  grid.filter = 1;
+  document["methods"].each([&](const Field& method) {
+    const std::string name = method["method"].text(), precision = method["precision"].text();
+    if (precision != "single" && precision != "double")
+      method["precision"].refuse("'" + precision + "' is no precision");
+    const Field near = method["near_seconds_per_million"];
+    const std::optional<double> gap = method["worst_gap"].number_or_null();
+    const int64_t wrong = method["wrong"].count();
+    const bool is_default = method["default"].flag();
+    const std::string text = fmt::format("{}{}, {} precision; worst case {}, {} of {} answers wrong", name,
+                                         is_default ? " (the default)" : "", precision,
+                                         method["worst_case"].is_nothing() ? "–" : method["worst_case"].text(),
+                                         whole(wrong), whole(method["answers"].count()));
+    Chart& chart = charts
+                       .try_emplace(precision, Chart{"Speed against error, " + precision + " precision",
+                                                     "Left is faster, below is nearer to the best rotation. The thin "
+                                                     "line joins the methods that no other beats in both.",
+                                                     {"median time of a million matrices", "ms", true},
+                                                     {"worst gap to the best rotation", "1", true},
+                                                     {}})
+                       .first->second;
+    const Dot dot = {in_ms(near), gap, text};
+    curve_named(chart,
+                wrong > 0    ? "some answers wrong"
+                : is_default ? "the default"
+                             : "all answers right",
+                Look::dots)
+        .dots.push_back(dot);
+    const bool on_front = method["on_front"].flag();
+    if (on_front) fronts[precision].push_back(dot);
+    grid.rows.push_back({{name + (is_default ? " (default)" : ""), precision, ms_text(near),
+                          figure_text(method["multiple_of_limit"].number_or_null()), figure_text(gap),
+                          method["worst_case"].is_nothing() ? "–" : method["worst_case"].text(),
+                          figure_text(method["worst_orthogonality"].number_or_null()), whole(method["answers"].count()),
+                          whole(wrong), on_front ? "yes" : "no"},
+                         wrong > 0  ? "warn"
+                         : on_front ? "good"
+                                    : ""});
+  });
+  Grid cases;
+  cases.title = "Every method in every case";
+  cases.words = "The hard cases are described in the documentation (method, Hard cases).";
+  cases.columns = {
+      {"case"},         {"method"}, {"precision"}, {"worst gap", true}, {"wrong", true}, {"reflections", true},
+      {"flagged", true}};
+  cases.filter = 1;
+  document["rows"].each([&](const Field& row) {
+    const int64_t wrong = row["wrong"].count();
+    cases.rows.push_back({{row["case"].text(), row["method"].text(), row["precision"].text(),
+                           figure_text(row["worst_gap"].number_or_null()), whole(wrong),
+                           whole(row["reflections"].count()), whole(row["flagged"].count())},
+                          wrong > 0 ? "warn" : ""});
+  });
+  for (const char* const precision : {"single", "double"}) {
+    const auto found = charts.find(precision);
+    if (found == charts.end()) continue;
+    found->second.curves.push_back(front_of(fronts[precision], "the best"));
+    sheet.pieces.emplace_back(std::move(found->second));
+  }
+  sheet.summary = "Every way of finding the best rotation, on hard cases, and its time.";
+  sheet.pieces.emplace_back(std::move(grid));
+  sheet.pieces.emplace_back(std::move(cases));
+}
+
+// --- solver
+
+void solver_pieces(Sheet& sheet, const Field& document) {
+  const double tolerance = document["tolerance_h"].number();
+  Grid grid;
+  grid.title = "Every row";
+  grid.words = "Errors are distances from the reference solution, in particle spacings h.";
+  grid.columns = {{"scene"},           {"acceleration"},       {"iterations", true},
+                  {"ms a step", true}, {"greatest [h]", true}, {"RMS [h]", true},
+                  {"energy gap", true}};
+  grid.filter = 0;
+  document["scenes"].each([&](const Field& scene) {
+    const std::string name =
+        fmt::format("{}, k = {:.3g} s⁻², {} {}", scene["scene"].text(), scene["stiffness"].number(),
+                    scene["substeps"].count(), scene["substeps"].count() == 1 ? "substep" : "substeps");
+    Chart chart = {
+        "Speed against error: " + name,
+        fmt::format("{} particles in {} clusters. Each point is a number of iterations; left is faster, below "
+                    "is nearer to the reference solution.",
+                    whole(scene["particles"].count()), whole(scene["clusters"].count())),
+        {"median time of a step", "ms", true},
+        {"greatest distance", "h", true},
+        {}};
+    double low = 0, high = 0;
+    std::vector<Dot> all;
+    scene["rows"].each([&](const Field& row) {
+      const std::string acceleration = row["acceleration"].text();
+      const std::optional<double> ms = in_ms(row["seconds"]), most = row["max_h"].number_or_null();
+      const Dot dot = {ms, most,
+                       fmt::format("{} iterations, acceleration {}", row["iterations"].count(), acceleration)};
+      curve_named(chart, "acceleration " + acceleration, Look::joined).dots.push_back(dot);
+      all.push_back(dot);
+      if (ms) {
+        low = low == 0 ? *ms : std::min(low, *ms);
+        high = std::max(high, *ms);
+      }
+      grid.rows.push_back(
+          {{name, acceleration, whole(row["iterations"].count()), figure_text(ms), figure_text(most),
+            figure_text(row["rms_h"].number_or_null()), figure_text(row["energy_gap"].number_or_null())}});
+    });
+    chart.curves.push_back(front_of(all, "the best"));
+    const std::string limit = fmt::format("tolerance, {:.4g} h", tolerance);
+    if (high > 0)
+      chart.curves.push_back({"tolerance", Look::level, {{low, tolerance, limit}, {high, tolerance, limit}}});
+    if (!scene["converged"].flag())
+      sheet.notes.push_back(name + ": the reference solution did not converge, so these errors are not known.");
+    sheet.pieces.emplace_back(std::move(chart));
+  });
+  sheet.summary = "What iterations of the solver cost, and how near they come to the reference solution.";
+  sheet.pieces.emplace_back(std::move(grid));
+}
+
+// --- machine_limits
+
+void machine_limits_pieces(Sheet& sheet, const Field& document) {
+  Grid grid;
+  grid.title = "What this machine can do at best";
+  grid.words = "Times of other benchmarks are given as multiples of these.";
+  grid.columns = {{"what"},       {"median [ms]", true}, {"least [ms]", true}, {"most [ms]", true},
+                  {"GB/s", true}, {"lost", true}};
+  document["rows"].each([&](const Field& row) {
+    const std::optional<double> lost = row["lost"].number_or_null();
+    if (lost && *lost > 0) sheet.holds = false;
+    grid.rows.push_back(
+        {{row["what"].text(), ms_text(row["seconds"]), ms_text(row["seconds"], "min"), ms_text(row["seconds"], "max"),
+          figure_text(row["bytes_per_second"].number_or_null(), 1e-9), figure_text(lost)},
+         lost && *lost > 0 ? "bad" : ""});
+  });
+  sheet.summary = "The limits of the machine: copies and launches.";
+  sheet.pieces.emplace_back(std::move(grid));
+}
+
+// --- baselines
+
+void baselines_pieces(Sheet& sheet, const Field& document) {
+  Chart chart = {"Speed against the error of the cut",
+                 "Each point is a method. The distance is the Hausdorff distance: the lower, the nearer the skin of "
+                 "the cut lies to the ideal cut; left is faster.",
+                 {"median time of a frame", "ms", true},
+                 {"distance from the ideal cut", "h", false},
+                 {}};
+  Grid grid;
+  grid.title = "Methods";
+  grid.words =
+      "Components of the tissue, of the coupling, and shells of the skin must be equal in every frame; "
+      "“isolated” counts groups of clusters that are coupled to nothing inside connected tissue.";
+  grid.columns = {{"method"},
+                  {"source"},
+                  {"frame [ms]", true},
+                  {"components", true},
+                  {"couplings", true},
+                  {"shells", true},
+                  {"frames where they differ", true},
+                  {"isolated", true},
+                  {"removed", true},
+                  {"Hausdorff [h]", true},
+                  {"lost volume [h³]", true},
+                  {"interpenetration [h³]", true}};
+  document["rows"].each([&](const Field& row) {
+    const std::string name = row["name"].text();
+    const int64_t unequal = row["unequal_frames"].count(), isolated = row["isolated"].count();
+    const Field geometry = row["geometry"];
+    const std::optional<double> distance =
+        geometry.is_nothing() ? std::nullopt : geometry["hausdorff"].number_or_null();
+    const Field settings = row["settings"];
+    const std::string text = fmt::format("{} ({}): expand {}, merge {}, detect {}, deletion {}", name,
+                                         row["source"].text(), settings["expand"].text(), settings["merge"].text(),
+                                         settings["detect"].text(), settings["deletion"].text());
+    const bool is_right = unequal == 0 && isolated == 0;
+    curve_named(chart, is_right ? "components always equal, none isolated" : "unequal or isolated in some frame",
+                Look::dots)
+        .dots.push_back({in_ms(row["seconds"]), distance, text});
+    const Field volume = row["interpenetration"];
+    grid.rows.push_back({{name, row["source"].text(), ms_text(row["seconds"]), whole(row["components"].count()),
+                          whole(row["couplings"].count()), whole(row["shells"].count()), whole(unequal),
+                          whole(isolated), whole(row["removed"].count()), figure_text(distance),
+                          geometry.is_nothing() ? "–" : figure_text(geometry["lost_volume"].number_or_null()),
+                          volume.is_nothing() ? "–" : figure_text(volume["volume"].number_or_null())},
+                         is_right ? "" : "warn"});
+  });
+  sheet.summary = fmt::format("This method beside others, on the same kidney of {} particles.",
+                              whole(document["particles"].count()));
+  sheet.pieces.emplace_back(std::move(chart));
+  sheet.pieces.emplace_back(std::move(grid));
+}
+
+// --- factors
+
+void factors_pieces(Sheet& sheet, const Field& document) {
+  std::map<std::string, Chart> charts;
+  std::vector<std::string> cuts;
+  Grid grid;
+  grid.title = "Every row";
+  grid.words = "Ways of bringing the factor of the system up to date after a cut.";
+  grid.columns = {{"scene"},
+                  {"cut"},
+                  {"way"},
+                  {"particles", true},
+                  {"rows of the system", true},
+                  {"changed", true},
+                  {"median [ms]", true},
+                  {"a solve [ms]", true},
+                  {"entries of the factor", true},
+                  {"residual", true},
+                  {"its bound", true}};
+  grid.filter = 1;
+  document["scenes"].each([&](const Field& scene) {
+    const std::string name = scene["scene"].text();
+    const int64_t particles = scene["particles"].count();
+    scene["rows"].each([&](const Field& row) {
+      const std::string cut = row["cut"].text(), way = row["way"].text();
+      const std::optional<double> residual = row["residual"].number_or_null(),
+                                  bound = row["residual_bound"].number_or_null();
+      const bool holds = residual && bound && *residual <= *bound;
+      if (!holds) sheet.holds = false;
+      if (std::find(cuts.begin(), cuts.end(), cut) == cuts.end()) cuts.push_back(cut);
+      Chart& chart =
+          charts
+              .try_emplace(cut, over_particles("The factor after " + cut,
+                                               "Time to bring the factor up to date, by number of particles, "
+                                               "both axes logarithmic."))
+              .first->second;
+      curve_named(chart, way, Look::joined)
+          .dots.push_back({static_cast<double>(particles), in_ms(row["seconds"]),
+                           fmt::format("{}, {}: {} of {} rows changed", way, name, whole(row["changed_rows"].count()),
+                                       whole(row["rows"].count()))});
+      grid.rows.push_back({{name, cut, way, whole(particles), whole(row["rows"].count()),
+                            whole(row["changed_rows"].count()), ms_text(row["seconds"]), ms_text(row["solve_seconds"]),
+                            whole(row["entries"].count()), figure_text(residual), figure_text(bound)},
+                           holds ? "" : "bad"});
+    });
+  });
+  for (const std::string& cut : cuts) {
+    sort_by_x(charts[cut]);
+    sheet.pieces.emplace_back(std::move(charts[cut]));
+  }
+  sheet.summary = "What it costs to bring a sparse factor up to date after a cut.";
+  sheet.pieces.emplace_back(std::move(grid));
+}
+
+// --- sensitivity
+
+void sensitivity_pieces(Sheet& sheet, const Field& document) {
+  // Sizes of one unit share a plot: a length and a weight have no common axis.
+  std::map<std::string, Chart> charts;
+  std::vector<std::string> units;
+  Grid grid;
+  grid.title = "Every disturbance";
+  grid.words =
+      "The least size of a disturbance that some property rejects, beside what rounding does to the same figure. "
+      "The goal is ten times rounding.";
+  grid.columns = {{"scene"},
+                  {"stage"},
+                  {"disturbance"},
+                  {"unit"},
+                  {"least rejected", true},
+                  {"rounding", true},
+                  {"ratio", true},
+                  {"goal", true},
+                  {"within the goal"},
+                  {"rejected by"}};
+  grid.filter = 1;
+  int64_t within = 0, judged = 0;
+  document["rows"].each([&](const Field& row) {
+    const std::string scene = row["scene"].text(), disturbance = row["disturbance"].text(), unit = row["unit"].text();
+    const std::string stage(name_of(row["stage"].stage()));
+    const std::optional<double> least = row["least"].number_or_null(), rounding = row["rounding"].number_or_null();
+    const std::string property = row["property"].is_nothing() ? "nothing" : row["property"].text();
+    const Field goal = row["within_goal"];
+    const bool has_goal = !goal.is_nothing();
+    if (has_goal) {
+      ++judged;
+      within += goal.flag();
+    }
+    if (rounding && *rounding > 0 && least) {
+      if (!charts.contains(unit)) units.push_back(unit);
+      Chart& chart =
+          charts
+              .try_emplace(unit, Chart{"Least size that is rejected, in " + (unit == "1" ? "relative terms" : unit),
+                                       "Each point is a disturbance. The nearer to the diagonal line, ten "
+                                       "times what rounding does, the sharper the judge.",
+                                       {"what rounding does", unit, true},
+                                       {"least size that is rejected", unit, true},
+                                       {}})
+              .first->second;
+      curve_named(chart, stage, Look::dots)
+          .dots.push_back(
+              {rounding, least, fmt::format("{} after {} in {}: rejected by {}", disturbance, stage, scene, property)});
+    }
+    grid.rows.push_back(
+        {{scene, stage, disturbance, unit, least ? figure_text(least) : "not rejected at all", figure_text(rounding),
+          figure_text(row["ratio"].number_or_null()), figure_text(row["goal"].number_or_null()),
+          !has_goal     ? "no goal"
+          : goal.flag() ? "yes"
+                        : "no",
+          property},
+         !least                     ? "bad"
+         : has_goal && !goal.flag() ? "warn"
+                                    : ""});
+  });
+  for (const std::string& unit : units) {
+    Chart& chart = charts[unit];
+    double low = INFINITY, high = 0;
+    for (const Curve& curve : chart.curves) {
+      for (const Dot& dot : curve.dots) {
+        low = std::min(low, *dot.x);
+        high = std::max(high, *dot.x);
+      }
+    }
+    chart.curves.push_back({"ten times rounding",
+                            Look::level,
+                            {{low, 10 * low, "ten times rounding"}, {high, 10 * high, "ten times rounding"}}});
+    sheet.pieces.emplace_back(std::move(chart));
+  }
+  sheet.summary =
+      fmt::format("How small a fault the judge still rejects: {} of {} disturbances that have a goal are within it.",
+                  whole(within), whole(judged));
+  sheet.pieces.emplace_back(std::move(grid));
+}
+
+struct Suite {
+  const char *name, *rows;
+  void (*add)(Sheet& sheet, const Field& document);
+};
+constexpr Suite kSuites[] = {
+    {"stages", "rows", stages_pieces},          {"sampling", "rows", sampling_pieces},
+    {"clusters", "rows", clusters_pieces},      {"scale", "rows", scale_pieces},
+    {"rotations", "methods", rotations_pieces}, {"machine_limits", "rows", machine_limits_pieces},
+    {"solver", "scenes", solver_pieces},        {"baselines", "rows", baselines_pieces},
+    {"factors", "scenes", factors_pieces},      {"sensitivity", "rows", sensitivity_pieces}};
+
+}  // namespace
+
+Sheet bench_sheet(const Field& document) {
+  const Field named = document["suite"];
+  const std::string name = named.text();
+  for (const Suite& suite : kSuites) {
+    if (name != suite.name) continue;
+    Sheet sheet;
+    sheet.kind = "benchmark";
+    sheet.title = name;
+    add_measurement(sheet, document);
+    if (document[suite.rows].length() == 0) sheet.holds = false;
+    suite.add(sheet, document);
+    if (document[suite.rows].length() == 0) {
+      sheet.summary = "Nothing was measured.";
+      sheet.pieces.clear();
+    }
+    // What is worse than the document says is said as it is.
+    if (sheet.holds && !*sheet.holds && sheet.badge != "✕ incomplete") sheet.badge = "✕ fails";
+    return sheet;
+  }
+  std::string known;
+  for (const Suite& suite : kSuites) known += (known.empty() ? "" : ", ") + std::string(suite.name);
+  named.refuse("'" + name + "' is no suite that a page is made of; these are: " + known + ", tune");
+}
+
+}  // namespace cutproof::report

@@ -1,0 +1,67 @@
+#include "report/document_page.h"
+
+#include "model/io/json_text.h"
+#include "report/coding.h"
+#include "report/html.h"
+
+namespace cutproof::report {
+
+using nlohmann::json;
+
+json body_json(const Setup& setup, int32_t kept) {
+  const Body& body = setup.body;
+  return {
+      {"name", body.name},        {"particles", body.particle_count()}, {"kept", kept}, {"spacing", body.grid.spacing},
+      {"onGrid", body.on_grid()}, {"orientation", body.orientation.m}};
+}
+
+json blade_size_json(const Setup& setup) {
+  if (!setup.has_blade) return nullptr;
+  return {setup.blade.length, setup.blade.depth, setup.blade.thickness};
+}
+
+namespace {
+
+json side_json(const Side& side, std::vector<std::string>& chunks) {
+  const Pictures& pictures = side.pictures;
+  const std::size_t first = chunks.size();
+  chunks.insert(chunks.end(), pictures.chunks.begin(), pictures.chunks.end());
+  json marks = nullptr;
+  if (!pictures.marks.empty()) {
+    const Marks& of_first = pictures.marks.front();
+    marks = {{"moment", of_first.moment},       {"exact", of_first.is_exact}, {"partly", of_first.is_partly},
+             {"particles", of_first.particles}, {"path", of_first.path},      {"members", of_first.clusters}};
+  }
+  return {{"name", side.name},
+          {"moments", pictures.details},
+          {"chunks", {first, chunks.size()}},
+          {"marks", std::move(marks)},
+          {"loss", pictures.loss},
+          {"nowhere", pictures.nowhere},
+          {"thinned", pictures.thinning != Thinning()},
+          {"reach",
+           {{pictures.reach_low.x, pictures.reach_low.y, pictures.reach_low.z},
+            {pictures.reach_high.x, pictures.reach_high.y, pictures.reach_high.z}}}};
+}
+
+}  // namespace
+
+std::string document_page(const std::vector<Sheet>& sheets, const std::vector<Scenery>& sceneries,
+                          const std::string& program) {
+  std::vector<std::string> chunks;
+  json shown = json::array(), views = json::array();
+  for (const Sheet& sheet : sheets) shown.push_back(to_json(sheet));
+  for (const Scenery& scenery : sceneries) {
+    json sides = json::array();
+    for (const Side& side : scenery.sides) sides.push_back(side_json(side, chunks));
+    views.push_back({{"body", scenery.body},
+                     {"blade", scenery.blade},
+                     {"property", scenery.property},
+                     {"text", scenery.text},
+                     {"sides", std::move(sides)}});
+  }
+  const json data = {{"sheets", std::move(shown)}, {"sceneries", std::move(views)}, {"program", program}};
+  return html(script_json(io::json_text(data)), chunks);
+}
+
+}  // namespace cutproof::report

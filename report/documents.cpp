@@ -1,0 +1,154 @@
+#include "report/documents.h"
+
+#include <algorithm>
+
+#include "model/io/columns.h"
+#include "report/document_fields.h"
+
+namespace cutproof::report {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr int64_t kFuzzVersion = 4, kJudgeVersion = 1, kBenchVersion = 3;
+
+void require_version(const Field& document, int64_t known) {
+  const Field version = document["format_version"];
+  if (const int64_t found = version.count(); found != known)
+    version.refuse(fmt::format("this is version {}, and only {} is read", found, known));
+}
+
+}  // namespace
+
+DocumentKind kind_of(const json& given, const std::string& file) {
+  const Field document = {&given, file, "", kDocumentRemedy};
+  if (!given.is_object()) document.refuse("this is no result of cutproof");
+  // A counterexample may be the line of a case alone.
+  if (!given.contains("format") && given.contains("nodes")) return DocumentKind::counterexample;
+  const std::string format = document["format"].text();
+  if (format == "cutproof.run" || format == "cutproof.check") return DocumentKind::run;
+  if (format == "cutproof.fuzz") return DocumentKind::fuzz;
+  if (format == "cutproof.judge") return DocumentKind::judge;
+  if (format == "cutproof.counterexample") return DocumentKind::counterexample;
+  if (format == "cutproof.bench") return document["suite"].text() == "tune" ? DocumentKind::tune : DocumentKind::bench;
+  document["format"].refuse("'" + format + "' is nothing that a page is made of");
+}
+
+Sheet sheet_of(const json& given, const std::string& file, const std::string& failure) {
+  const Field document = {&given, file, "", kDocumentRemedy};
+  switch (kind_of(given, file)) {
+    case DocumentKind::fuzz:
+      require_version(document, kFuzzVersion);
+      return campaign_sheet(document, failure);
+    case DocumentKind::judge:
+      require_version(document, kJudgeVersion);
+      return judge_sheet(document);
+    case DocumentKind::bench:
+      require_version(document, kBenchVersion);
+      return bench_sheet(document);
+    case DocumentKind::tune:
+      require_version(document, kBenchVersion);
+      return tune_sheet(document);
+    case DocumentKind::run:
+    case DocumentKind::counterexample:
+      break;
+  }
+  document["format"].refuse("this is no campaign and no measurement");
+}
+
+std::vector<std::pair<std::string, const json*>> dissections_in(const json& document) {
+  std::vector<std::pair<std::string, const json*>> found;
+  for (const char* const name : {"dissections", "moving_dissections"}) {
+    if (const auto one = document.find(name); one != document.end()) found.emplace_back(name, &*one);
+  }
+  return found;
+}
+
+std::optional<double> seconds_of(const Field& times, const char* which) {
+  if (times.is_nothing()) return std::nullopt;
+  return times[which].number_or_null();
+}
+
+Curve front_of(const std::vector<Dot>& dots, const std::string& name) {
+  std::vector<Dot> sorted;
+  for (const Dot& dot : dots) {
+    if (dot.x && dot.y) sorted.push_back(dot);
+  }
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const Dot& a, const Dot& b) { return std::pair(*a.x, *a.y) < std::pair(*b.x, *b.y); });
+  Curve front = {name, Look::level, {}};
+  for (const Dot& dot : sorted) {
+    if (front.dots.empty() || *dot.y < *front.dots.back().y) front.dots.push_back(dot);
+  }
+  return front;
+}
+
+PropertyTable property_table(const Field& properties) {
+  struct Read {
+    int rank;
+    double of_bound;
+    GridRow row;
+  };
+  std::vector<Read> all;
+  PropertyTable table;
+  properties.each([&](const Field& one) {
+    const int64_t judged = one["judged"].count(), failed = one["failed"].count(), checked = one["checked"].count();
+    const int64_t undecided = one["undecided"].count();
+    const std::optional<double> of_bound = one["of_bound"].number_or_null(),
+                                measured = one["measured"].number_or_null();
+    const std::string given_unit = one["unit"].text_or(""), unit = given_unit == "1" ? "" : " " + given_unit;
+    const bool fails = failed > 0, looked = judged > 0;
+    table.failing += fails;
+    table.judged += looked || fails;
+    table.undecided += undecided;
+    const std::string result = fails ? "fails" : looked ? "holds" : "nothing to look at";
+    const std::string doubt =
+        undecided > 0 ? fmt::format("{} of {}", io::grouped(undecided), io::grouped(checked)) : std::string("none");
+    all.push_back({fails    ? 0
+                   : looked ? 1
+                            : 2,
+                   of_bound.value_or(-1),
+                   {{one["property"].text(), one["stage"].text(), result, io::grouped(judged), io::grouped(failed),
+                     looked || fails ? figure_text(measured) + unit : "–",
+                     looked && of_bound ? fmt::format("{:.2g}", *of_bound) : "–", looked ? doubt : "–"},
+                    fails ? "bad" : ""}});
+  });
+  std::stable_sort(all.begin(), all.end(), [](const Read& a, const Read& b) {
+    return a.rank != b.rank ? a.rank < b.rank : a.of_bound > b.of_bound;
+  });
+  table.grid.title = "Every property";
+  table.grid.words =
+      "What fails comes first, then what comes nearest to its bound. “Undecidable within rounding” counts things that "
+      "may be wrong and were not found to be; they count as right.";
+  table.grid.columns = {{"property"},
+                        {"after"},
+                        {"result"},
+                        {"verdicts", true},
+                        {"failed", true},
+                        {"greatest measured", true},
+                        {"of its bound", true},
+                        {"undecidable within rounding", true}};
+  table.grid.filter = 2;
+  for (Read& one : all) table.grid.rows.push_back(std::move(one.row));
+  return table;
+}
+
+void add_measurement(Sheet& sheet, const Field& document) {
+  const bool is_complete = document["complete"].flag_or(true);
+  const Field holds = document["holds"];
+  if (holds.is_there()) sheet.holds = holds.flag();
+  if (!is_complete) sheet.holds = false;
+  sheet.badge = !is_complete ? "✕ incomplete" : !sheet.holds ? "measured" : *sheet.holds ? "✓ holds" : "✕ fails";
+  for (const char* const fact : {"backend", "device", "date"}) {
+    const std::string text = document[fact].text();
+    sheet.facts.push_back(std::string(fact) == "backend" ? "backend " + text : text);
+  }
+  if (document["commit"].is_there()) sheet.facts.push_back("commit " + document["commit"].text());
+  sheet.facts.push_back("cutproof " + document["cutproof"].text());
+  sheet.again = document["again"].text_or("");
+  if (!is_complete)
+    sheet.notes.push_back("The measurement was stopped before its end: this is what there was by then.");
+}
+
+}  // namespace cutproof::report

@@ -1,0 +1,52 @@
+#include "report/html.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "report/assets.h"
+
+namespace cutproof::report {
+
+namespace {
+
+// The template with its marks replaced, each by what may hold any text: nothing in it is looked at again.
+std::string filled(std::string_view page, const std::vector<std::pair<std::string_view, std::string_view>>& contents) {
+  std::string text;
+  while (!page.empty()) {
+    std::size_t first = std::string_view::npos;
+    const std::pair<std::string_view, std::string_view>* next = nullptr;
+    for (const auto& content : contents) {
+      const std::size_t found = page.find(content.first);
+      if (found < first) {
+        first = found;
+        next = &content;
+      }
+    }
+    text += page.substr(0, first);
+    if (next == nullptr) break;
+    text += next->second;
+    page.remove_prefix(first + next->first.size());
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string html(const std::string& data, const std::vector<std::string>& chunks) {
+  std::string later;
+  for (std::size_t k = 1; k < chunks.size(); ++k) {
+    later += fmt::format("<script type=\"application/octet-stream\" id=\"chunk-{}\">", k);
+    later += chunks[k];
+    later += "</script>\n";
+  }
+  return filled(kPageHtml, {{"@STYLE_HASH@", kPageStyleHash},
+                            {"@SCRIPT_HASH@", kPageScriptHash},
+                            {"@STYLE@", kPageStyle},
+                            {"@SCRIPT@", kPageScript},
+                            {"@DATA@", data},
+                            {"@FIRST_CHUNK@", chunks.empty() ? std::string_view() : chunks.front()},
+                            {"@LATER_CHUNKS@", later}});
+}
+
+}  // namespace cutproof::report

@@ -1,0 +1,103 @@
+// Both runs of a counterexample, side by side: the backend's and the reference's, at the same moment.
+import { inflate, unpack } from './coding.js';
+import { colourings } from './colours.js';
+import { byId, element, plural } from './dom.js';
+import { View, contextOf } from './view.js';
+
+const words = (moment) => (moment.start ? 'As loaded' : `Frame ${moment.frame}, after ${moment.stage}`);
+
+async function momentsOf(side) {
+  const chunks = [];
+  for (let k = side.chunks[0]; k < side.chunks[1]; ++k) {
+    while (!byId(`chunk-${k}`) && document.readyState === 'loading') await new Promise((resolve) => setTimeout(resolve, 30));
+    chunks.push(inflate(byId(`chunk-${k}`).textContent.trim()).then(unpack));
+  }
+  const done = await Promise.all(chunks);
+  return { arrays: done.flatMap((chunk) => chunk.moments), edges: done.length ? done[0].edges : null };
+}
+
+// The moment of another run that is nearest to one of this.
+function sameMoment(moments, like) {
+  let best = 0, apart = Infinity;
+  moments.forEach((moment, k) => {
+    if (moment.start !== like.start) return;
+    const far = Math.abs(moment.frame - like.frame) * 10 + (moment.stage === like.stage ? 0 : 1);
+    if (far <= apart) [best, apart] = [k, far];
+  });
+  return best;
+}
+
+// One place of the page for all of them: a browser has few contexts of WebGL.
+export class Sceneries {
+  constructor(sceneries) {
+    this.sceneries = sceneries;
+    this.panes = element('div', { class: 'panes' });
+    this.status = element('p', { id: 'status' });
+    this.witness = element('p', { id: 'witness', role: 'status' });
+    this.range = element('input', { type: 'range', id: 'scrub', min: 0, step: 1, 'aria-label': 'Moment of both runs', oninput: () => this.go(Number(this.range.value)) });
+    const button = (text, name, by) => element('button', { type: 'button', text, 'aria-label': name, title: name, onclick: () => this.go(this.at + by) });
+    this.skin = element('select', { id: 'show', onchange: () => this.go(this.at) }, element('option', { value: 'particles', text: 'particles' }), element('option', { value: 'skin', text: 'skin' }), element('option', { value: 'both', text: 'both' }));
+    this.colour = element('select', { id: 'colour', onchange: () => this.go(this.at) }, ...Object.entries(colourings(false)).map(([key, one]) => element('option', { value: key, text: one.name })));
+    this.fails = element('button', { type: 'button', text: 'Where it fails', onclick: () => this.show(this.number) });
+    this.legend = element('p', { id: 'legend', class: 'small' });
+    this.section = element('section', { id: 'view', class: 'card', 'aria-labelledby': 'view-title' },
+      element('h2', { id: 'view-title' }), this.panes,
+      element('div', { class: 'player' }, this.range, element('div', { class: 'row' }, button('‹ Stage', 'Previous stage', -1), button('Stage ›', 'Next stage', 1), this.fails,
+        element('label', {}, element('span', { text: 'Show' }), this.skin), element('label', {}, element('span', { text: 'Colour' }), this.colour))),
+      this.status, this.witness, this.legend);
+  }
+
+  async show(number) {
+    const scenery = this.sceneries[number];
+    const [first] = scenery.sides;
+    if (this.number !== number) {
+      this.number = number;
+      for (const one of this.views || []) one.view && one.view.renderer.dispose();
+      byId('view-title').textContent = scenery.property || 'It holds now';
+      this.views = [];
+      this.panes.replaceChildren();
+      for (const side of scenery.sides) {
+        const canvas = element('canvas', { tabindex: 0, role: 'application', 'aria-label': `3D view of ${side.name}. Arrow keys turn it, plus and minus come nearer and go away, 0 goes back.` });
+        const place = element('div', { class: 'canvas' }, canvas);
+        this.panes.append(element('figure', { class: 'pane' }, element('figcaption', { text: side.name }), place));
+        const context = contextOf(canvas);
+        if (!context) place.replaceChildren(element('p', { class: 'nothing no-webgl', text: 'This browser shows no 3D view (WebGL is not there). Everything else on this page works.' }));
+        const { arrays, edges } = await momentsOf(side);
+        if (this.number !== number) return;
+        const view = context && new View(canvas, context, { body: scenery.body, blade: scenery.blade, reach: side.reach });
+        if (view && arrays.length) view.begin(arrays[0]);
+        this.views.push({ view, side, arrays, edges });
+      }
+      this.range.max = first.moments.length - 1;
+      this.fails.hidden = !scenery.property;
+    }
+    await this.go(scenery.property && first.marks ? Math.max(first.marks.moment, 0) : first.moments.length - 1);
+    // From one side, as far as they can be compared.
+    for (const { view } of this.views) if (view) view.flyToMarks();
+  }
+
+  async go(at) {
+    const scenery = this.sceneries[this.number];
+    const { moments, marks } = scenery.sides[0];
+    this.at = Math.min(Math.max(at, 0), moments.length - 1);
+    const moment = moments[this.at];
+    this.range.value = this.at;
+    this.range.setAttribute('aria-valuetext', words(moment));
+    const isWhere = Boolean(scenery.property) && marks && marks.moment === this.at;
+    const look = { skin: this.skin.value !== 'particles', particles: this.skin.value !== 'skin', removed: true, colouring: colourings(false)[this.colour.value] };
+    const said = [];
+    for (const { view, side, arrays, edges } of this.views) {
+      const k = side === scenery.sides[0] ? this.at : sameMoment(side.moments, moment);
+      said.push(`${side.name}: ${plural(side.moments[k].components, 'piece')}, ${plural(side.moments[k].clusters, 'cluster')}, ${plural(side.moments[k].particles, 'particle')}`);
+      // Particles are the same ones in both runs; clusters need not be.
+      const marked = isWhere && { ...marks, members: side === scenery.sides[0] ? marks.members : [] };
+      if (view && arrays[k]) {
+        const { words: legend } = view.show(arrays[k], side.moments[k].blade, look, marked || null, edges || null);
+        this.legend.textContent = `${legend} Removed particles are rings.${isWhere ? ' Marked orange: what the verdict names; yellow: the members of its clusters.' : ''}`;
+      }
+    }
+    this.status.replaceChildren(element('strong', { text: words(moment) }), element('span', { class: 'muted', text: ` · ${said.join(' · ')}` }));
+    this.witness.textContent = isWhere ? `${scenery.property} fails here: ${scenery.text}` : '';
+    document.documentElement.dataset.scenery = `${this.number}/${this.at}`;
+  }
+}

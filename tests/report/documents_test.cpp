@@ -1,0 +1,250 @@
+// What a page shows of campaigns and measurements, and what of their documents is refused.
+#include "report/documents.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "model/error.h"
+#include "report/assets.h"
+#include "report/document_page.h"
+
+namespace cutproof::report {
+namespace {
+
+using nlohmann::json;
+
+json property(const std::string& name, int64_t failed, int64_t undecided = 0, int64_t judged = 3) {
+  return {{"property", name}, {"stage", "split"},       {"unit", "h"},     {"judged", judged}, {"checked", 9 * judged},
+          {"failed", failed}, {"undecided", undecided}, {"measured", 2.0}, {"of_bound", 0.5}};
+}
+
+json campaign(const std::vector<json>& properties, const std::vector<json>& violations = {}) {
+  return {{"format", "cutproof.fuzz"},
+          {"format_version", 4},
+          {"cutproof", "1"},
+          {"backend", "host"},
+          {"dynamics", false},
+          {"complete", true},
+          {"cases", 1000},
+          {"verdicts", 12345},
+          {"refused", 0},
+          {"mean_particles", 20.0},
+          {"seed", 7},
+          {"sizes", {0, 79}},
+          {"seconds", 1.0},
+          {"shard", 1},
+          {"shards", 1},
+          {"properties", properties},
+          {"violations", violations},
+          {"holds", violations.empty()},
+          {"coverage", {{"boxes", 40}, {"uncoupled without promise", 3}, {"wall", 0}}}};
+}
+
+const Grid& grid_of(const Sheet& sheet, std::size_t k) { return std::get<Grid>(sheet.pieces.at(k)); }
+
+TEST(ACampaign, WithoutViolationSaysSoPlainly) {
+  const Sheet sheet = sheet_of(campaign({property("coverage", 0, 2), property("cap", 0, 0, 0)}), "f");
+  EXPECT_EQ(sheet.holds, true);
+  EXPECT_EQ(sheet.badge, "✓ holds");
+  EXPECT_NE(sheet.summary.find("none violates any property, in 12,345 verdicts"), std::string::npos) << sheet.summary;
+  EXPECT_TRUE(sheet.cards.empty());
+  const Grid& properties = grid_of(sheet, 0);
+  EXPECT_EQ(properties.rows.at(0).cells.at(7), "2 of 27") << "what is undecidable within rounding is said";
+  EXPECT_EQ(properties.rows.at(1).cells.at(2), "nothing to look at");
+  EXPECT_NE(sheet.notes.at(0).find("2 of the things"), std::string::npos);
+}
+
+// A page may not call good what its document only claims to be.
+TEST(ACampaign, DoesNotHoldBecauseItsDocumentSaysSo) {
+  const json good = campaign({property("coverage", 0)});
+  ASSERT_EQ(sheet_of(good, "f").holds, true);
+  EXPECT_EQ(sheet_of(good, "f", "no case had: merge").holds, false) << "what a conclusion says counts";
+  json bad = campaign({property("coverage", 2)});
+  EXPECT_EQ(sheet_of(bad, "f").holds, false) << "a property fails";
+  bad = campaign({property("coverage", 0, 0, 0)});
+  EXPECT_EQ(sheet_of(bad, "f").holds, false) << "nothing was looked at";
+  bad = good;
+  bad["complete"] = false;
+  EXPECT_EQ(sheet_of(bad, "f").holds, false);
+  EXPECT_EQ(sheet_of(bad, "f").badge, "✕ incomplete");
+  bad = good;
+  bad["verdicts"] = 0;
+  EXPECT_EQ(sheet_of(bad, "f").holds, false);
+  bad = campaign({property("coverage", 0)},
+                 {{{"index", 3}, {"property", "p"}, {"stage", "split"}, {"text", "t"}, {"file", "a"}}});
+  bad["holds"] = true;
+  EXPECT_EQ(sheet_of(bad, "f").holds, false);
+}
+
+TEST(ACampaign, HasACardForEachViolationWithWhatRemainsOfItsCase) {
+  const json violation = {{"index", 41},
+                          {"property", "coverage"},
+                          {"stage", "split"},
+                          {"text", "all of it"},
+                          {"witness", "here"},
+                          {"file", "a.json"},
+                          {"drawn", {{"particles", 812}, {"strokes", 5}}},
+                          {"simplified", {{"particles", 3}, {"strokes", 1}}}};
+  const Sheet sheet = sheet_of(campaign({property("coverage", 1)}, {violation}), "f");
+  ASSERT_EQ(sheet.cards.size(), 1u);
+  EXPECT_EQ(sheet.cards[0].title, "coverage after split");
+  EXPECT_EQ(sheet.cards[0].words, "here");
+  EXPECT_EQ(sheet.cards[0].facts.at(2).second, "from 812 particles and 5 strokes to 3 particles and 1 stroke");
+  EXPECT_EQ(grid_of(sheet, 0).rows.at(0).kind, "bad") << "what fails comes first";
+}
+
+json times(double ms) { return {{"median", 1e-3 * ms}, {"min", 1e-3 * ms}, {"max", 1e-3 * ms}}; }
+json bench(const std::string& suite) {
+  return {{"format", "cutproof.bench"}, {"format_version", 3}, {"cutproof", "1"}, {"backend", "host"},
+          {"device", "a CPU"},          {"date", "today"},     {"suite", suite},  {"complete", true}};
+}
+json trial(int iterations, double rms, std::optional<double> ms, const std::string& outcome) {
+  return {{"substeps", 2},
+          {"iterations", iterations},
+          {"acceleration", "none"},
+          {"rotation", nullptr},
+          {"differences", ""},
+          {"outcome", outcome},
+          {"why", ""},
+          {"rms_h", rms},
+          {"max_h", 2 * rms},
+          {"rms_h_by_frame", {0.0, rms}},
+          {"removed_otherwise", 0},
+          {"seconds_per_frame", ms ? times(*ms) : json(nullptr)}};
+}
+json tuning(const json& found) {
+  json document = bench("tune");
+  document.update({{"scene", "scenes/liver.json"},
+                   {"tolerance_h", 0.1},
+                   {"reference", nullptr},
+                   {"left", json::array()},
+                   {"found", found},
+                   {"trials",
+                    {trial(8, 0.01, 8.0, "within"), trial(4, 0.05, 4.0, "within"), trial(6, 0.06, 6.0, "within"),
+                     trial(1, 0.4, 1.0, "over"), trial(2, 0.2, std::nullopt, "over")}}});
+  return document;
+}
+
+TEST(ATuning, ShowsAllThatWasTriedItsFrontAndTheAnswer) {
+  const json found = {{"trial", 1},
+                      {"verified", trial(4, 0.05, std::nullopt, "within")},
+                      {"verdicts", 77},
+                      {"seconds_per_frame", times(4)},
+                      {"times_cheaper", 2.0}};
+  const Sheet sheet = sheet_of(tuning(found), "f");
+  EXPECT_EQ(sheet.title, "liver");
+  EXPECT_EQ(sheet.badge, "✓ found");
+  EXPECT_NE(sheet.summary.find("2 × 4, none: 4 ms a frame, 2.00 times cheaper than as given"), std::string::npos)
+      << sheet.summary;
+  const Chart& chart = std::get<Chart>(sheet.pieces.at(0));
+  EXPECT_EQ(chart.x.unit, "ms");
+  EXPECT_EQ(chart.y.unit, "h");
+  const auto curve = [&](const std::string& name) {
+    for (const Curve& one : chart.curves) {
+      if (one.name == name) return one;
+    }
+    ADD_FAILURE() << "no curve " << name;
+    return Curve();
+  };
+  std::vector<double> front;
+  for (const Dot& dot : curve("the best").dots) front.push_back(*dot.x);
+  EXPECT_EQ(front, (std::vector<double>{1, 4, 8})) << "6 ms are beaten in both, and who has no time is nowhere";
+  EXPECT_EQ(curve("the answer").dots.at(0).text, "2 × 4, none");
+  EXPECT_EQ(curve("tolerance").dots.at(0).y, 0.1);
+  EXPECT_EQ(grid_of(sheet, 2).rows.size(), 5u);
+  EXPECT_EQ(grid_of(sheet, 2).rows.at(1).kind, "good");
+  EXPECT_EQ(sheet_of(tuning(nullptr), "f").holds, false);
+}
+
+json stage_row(const std::string& what, double ms, const json& paper) {
+  return {{"scene", "kidney"},
+          {"what", what},
+          {"particles", 100},
+          {"substeps", 4},
+          {"iterations", 4},
+          {"rotation", "svd"},
+          {"split", "blocks"},
+          {"cooking", "boxes"},
+          {"acceleration", "none"},
+          {"frames", 3},
+          {"of", 3},
+          {"seconds", times(ms)},
+          {"limit", nullptr},
+          {"paper_seconds", paper},
+          {"error_text", "equal"}};
+}
+
+TEST(ABenchmark, OfStagesStacksThemAndHasThePapersFiguresBesideOurs) {
+  json document = bench("stages");
+  document.update(
+      {{"holds", true},
+       {"scenes", json::array()},
+       {"rows", {stage_row("frame", 5, 0.05975), stage_row("step", 3, 0.04), stage_row("split", 1, nullptr)}}});
+  const Sheet sheet = sheet_of(document, "f");
+  const Stack& stack = std::get<Stack>(sheet.pieces.at(0));
+  ASSERT_EQ(stack.parts.size(), 2u) << "stages that did not run have no part, nor has the frame";
+  EXPECT_EQ(stack.parts[0].values.at(0), 3.0);
+  const Grid& table = grid_of(sheet, 1);
+  EXPECT_EQ(table.rows.at(0).cells.back(), "5");
+  EXPECT_EQ(table.rows.at(1).cells.back(), "59.75");
+  EXPECT_EQ(table.rows.at(1).kind, "paper");
+}
+
+TEST(ABenchmark, ThatMeasuredNothingOrWasStoppedDoesNotHold) {
+  json document = bench("machine_limits");
+  document.update({{"holds", true}, {"rows", json::array()}});
+  EXPECT_EQ(sheet_of(document, "f").holds, false);
+  document["rows"] = {{{"what", "copy"}, {"seconds", times(1)}, {"bytes_per_second", 1e9}, {"lost", 0}}};
+  EXPECT_EQ(sheet_of(document, "f").holds, true);
+  document["rows"][0]["lost"] = 4;
+  EXPECT_EQ(sheet_of(document, "f").holds, false) << "bytes that were lost, whatever the document says of itself";
+  document["rows"][0]["lost"] = 0;
+  document["complete"] = false;
+  EXPECT_EQ(sheet_of(document, "f").holds, false);
+}
+
+TEST(ADocument, ThatIsNoneIsRefusedByFieldWithARemedy) {
+  const json good = campaign({property("coverage", 0)});
+  const auto refused = [](json bad, const std::string& pointer, const json& value, const std::string& field) {
+    bad[json::json_pointer(pointer)] = value;
+    try {
+      sheet_of(bad, "f.json");
+      ADD_FAILURE() << pointer << " was read";
+    } catch (const InputError& error) {
+      EXPECT_EQ(error.file(), "f.json");
+      EXPECT_EQ(error.field(), field);
+      EXPECT_NE(std::string(error.what()).find("remedy"), std::string::npos) << error.what();
+    }
+  };
+  refused(good, "/format", "cutproof.mesh", "format");
+  refused(good, "/format_version", 3, "format_version");
+  refused(good, "/cases", -1, "cases");
+  refused(good, "/seed", -1, "seed");
+  refused(good, "/sizes", {1}, "sizes");
+  refused(good, "/properties/0/failed", "many", "properties[0].failed");
+  refused(good, "/violations", {{{"index", 0}, {"property", "p"}}}, "violations[0].stage");
+  refused(good, "/coverage/boxes", 1.5, "coverage.boxes");
+  refused(tuning(nullptr), "/trials/0/outcome", "lucky", "trials[0].outcome");
+  refused(tuning(nullptr), "/found", {{"trial", 5}}, "found.trial");
+  refused(bench("stages"), "/suite", "nonsense", "suite");
+}
+
+TEST(DocumentPages, HoldNamesAsTextOnly) {
+  if (kPageScript.empty()) GTEST_SKIP() << "this build has no report pages";
+  constexpr const char* kHostile = "</script><script>window.hacked=1</script>";
+  json document =
+      campaign({property(kHostile, 1)},
+               {{{"index", 3}, {"property", kHostile}, {"stage", "split"}, {"text", "@DATA@"}, {"file", kHostile}}});
+  document["backend"] = kHostile;
+  const std::string text = document_page({sheet_of(document, "f")}, {}, "1");
+  EXPECT_EQ(text.find("<script>window"), std::string::npos);
+  const std::string begin = "id=\"data\">";
+  const std::size_t first = text.find(begin) + begin.size();
+  const json data = json::parse(text.substr(first, text.find("</script>", first) - first));
+  EXPECT_EQ(data.at("sheets").at(0).at("cards").at(0).at("title"), std::string(kHostile) + " after split");
+  EXPECT_EQ(data.at("sheets").at(0).at("cards").at(0).at("words"), "@DATA@") << "what it holds is no mark";
+}
+
+}  // namespace
+}  // namespace cutproof::report
