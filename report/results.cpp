@@ -174,7 +174,7 @@ void add_verdict(const Field& verdict, const Measured* known, std::vector<Row>& 
   const Field witness = verdict["witness"];
   results.findings.push_back({property, stage, frame, figure(measured), figure(bound), unit, of_bound, source,
                               witness["text"].text(), witness["clusters"].numbers(), witness["particles"].numbers(),
-                              witness["path"].numbers(), is_expected});
+                              witness["path"].numbers(), witness["triangles"].numbers(), is_expected});
 }
 
 void add_verdicts(const Field& document, Results& results) {
