@@ -34,7 +34,8 @@ json finding_json(const Finding& finding, const Marks& marks) {
             {"partly", marks.is_partly},
             {"particles", marks.particles},
             {"path", marks.path},
-            {"members", marks.clusters}}}};
+            {"members", marks.clusters},
+            {"corners", marks.corners}}}};
 }
 
 json row_json(const PropertyRow& row) {
@@ -123,13 +124,16 @@ json data_json(const Source& source, const Results& results, const Pictures& pic
         {"onGrid", body.on_grid()},
         {"orientation", body.orientation.m}}},
       {"blade", setup.has_blade ? json{setup.blade.length, setup.blade.depth, setup.blade.thickness} : json(nullptr)},
-      {"moments", pictures.details},
-      {"firstMoment", pictures.first_moment},
+      {"moments", pictures.own.details},
+      {"firstMoment", pictures.own.first_moment},
+      {"comparison", pictures.comparison},
+      {"besideMoments", pictures.beside.details},
+      {"besideFirst", pictures.beside.first_moment},
       {"reach",
        {{pictures.reach_low.x, pictures.reach_low.y, pictures.reach_low.z},
         {pictures.reach_high.x, pictures.reach_high.y, pictures.reach_high.z}}},
-      {"loss", pictures.loss},
-      {"nowhere", pictures.nowhere},
+      {"loss", std::max(pictures.own.loss, pictures.beside.loss)},
+      {"nowhere", std::max(pictures.own.nowhere, pictures.beside.nowhere)},
       {"thinned", thinned_in_words(pictures, body.particle_count())}};
 }
 
@@ -178,6 +182,27 @@ void require_same_run(const io::Recording& recording, const std::string& scene, 
     refuse("body.particles", fmt::format("{} particles", *results.particles), fmt::format("{}", particles));
 }
 
+void require_same_body(const io::Recording& recording, const std::string& recording_file, const io::Recording& other,
+                       const std::string& other_file) {
+  const Body &one = recording.setup.body, &two = other.setup.body;
+  const auto refuse = [&](const std::string& field, const std::string& problem) {
+    throw InputError(other_file, field, problem,
+                     "give two recordings of one scene: with the same particles, from the same seed");
+  };
+  if (one.particle_count() != two.particle_count()) {
+    refuse("setup/body", fmt::format("this body has {} particles, and that of {} has {}", two.particle_count(),
+                                     recording_file, one.particle_count()));
+  }
+  if (one.grid.spacing != two.grid.spacing) {
+    refuse("setup/body", fmt::format("the spacing of this body is {} m, and that of {} is {} m", two.grid.spacing,
+                                     recording_file, one.grid.spacing));
+  }
+  for (int32_t i = 0; i < one.particle_count(); ++i) {
+    if (!(one.rest_position(i) == two.rest_position(i)))
+      refuse("setup/body", fmt::format("particle {} rests elsewhere than in {}", i, recording_file));
+  }
+}
+
 Results unjudged(const io::Recording& recording, const std::string& scene) {
   Results results;
   results.command = "recording";
@@ -187,21 +212,27 @@ Results unjudged(const io::Recording& recording, const std::string& scene) {
 }
 
 std::string page(const Source& source, const Results& results, const std::string& again, const std::string& program,
-                 int64_t most_picture_bytes) {
-  const Pictures pictures = pictures_of(source, results.findings, most_picture_bytes);
+                 const Beside* beside, int64_t most_picture_bytes) {
+  const Pictures pictures = pictures_of(source, results.findings, most_picture_bytes, beside);
   const std::string data = script_json(io::json_text(data_json(source, results, pictures, again, program)));
   std::string later;
-  for (std::size_t k = 1; k < pictures.chunks.size(); ++k) {
-    later += fmt::format("<script type=\"application/octet-stream\" id=\"chunk-{}\">", k);
-    later += pictures.chunks[k];
+  const auto add = [&](const char* name, std::size_t k, const std::string& chunk) {
+    later += fmt::format("<script type=\"application/octet-stream\" id=\"{}-{}\">", name, k);
+    later += chunk;
     later += "</script>\n";
+  };
+  // In the order in which they are looked at: of both runs what belongs to the same moments.
+  const std::vector<std::string>&own = pictures.own.text, &other = pictures.beside.text;
+  for (std::size_t k = 0; k < std::max(own.size(), other.size()); ++k) {
+    if (k > 0 && k < own.size()) add("chunk", k, own[k]);
+    if (k < other.size()) add("beside", k, other[k]);
   }
   return filled(kPageHtml, {{"@STYLE_HASH@", kPageStyleHash},
                             {"@SCRIPT_HASH@", kPageScriptHash},
                             {"@STYLE@", kPageStyle},
                             {"@SCRIPT@", kPageScript},
                             {"@DATA@", data},
-                            {"@FIRST_CHUNK@", pictures.chunks.empty() ? std::string_view() : pictures.chunks.front()},
+                            {"@FIRST_CHUNK@", own.empty() ? std::string_view() : own.front()},
                             {"@LATER_CHUNKS@", later}});
 }
 

@@ -197,7 +197,7 @@ TEST(Pictures, OfASmallRunHoldEveryMomentAndEveryParticle) {
   EXPECT_EQ(pictures.moments.size(), 11u);
   EXPECT_EQ(pictures.particles, 27);
   EXPECT_EQ(pictures.thinning, Thinning());
-  EXPECT_EQ(pictures.first_moment, (std::vector<std::size_t>{0, 1}))
+  EXPECT_EQ(pictures.own.first_moment, (std::vector<std::size_t>{0, 1}))
       << "the first moment comes alone, to be there at once";
   const Marks& marks = pictures.marks.at(0);
   EXPECT_TRUE(marks.is_exact);
@@ -208,8 +208,8 @@ TEST(Pictures, OfASmallRunHoldEveryMomentAndEveryParticle) {
   EXPECT_FALSE(marks.is_partly);
   // Half of one of 65,534 steps: of the body's 2 h, its drift of 3e-4 m a frame and what it sways.
   const double extent = 2 + (5 * 3e-4 + 2e-4) / kSpacing;
-  EXPECT_LE(pictures.loss, extent / 65'534 / 2);
-  EXPECT_GE(pictures.loss, 2.0 / 65'534 / 2);
+  EXPECT_LE(pictures.own.loss, extent / 65'534 / 2);
+  EXPECT_GE(pictures.own.loss, 2.0 / 65'534 / 2);
 }
 
 TEST(Pictures, ThatAreTooLargeLoseFramesButNotTheOnesThatFail) {
@@ -255,9 +255,9 @@ TEST(Pictures, OfAStateWithoutSenseAreDrawnAllTheSame) {
                            return snapshot;
                          }};
   const Pictures pictures = pictures_of(source, {finding_in(500)}, kMostPictureBytes);
-  EXPECT_EQ(pictures.nowhere, 2);
+  EXPECT_EQ(pictures.own.nowhere, 2);
   // The body's 2 h, and the skin's vertex one spacing before it; rounded once or twice.
-  EXPECT_LE(pictures.loss, 3.0 / 65'534 / 2 * (1 + 1e-12)) << "what is far away costs the others no places";
+  EXPECT_LE(pictures.own.loss, 3.0 / 65'534 / 2 * (1 + 1e-12)) << "what is far away costs the others no places";
   EXPECT_FALSE(pictures.marks.at(0).is_exact);
 }
 
