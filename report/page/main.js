@@ -122,6 +122,19 @@ async function go(at, finding = null, spot = null) {
   await update();
 }
 
+// Plots follow a little later while somebody scrubs: a browser draws each of them anew.
+let plotted = -Infinity, plotting = null;
+function showInPlots() {
+  const kEvery = 200, left = plotted + kEvery - performance.now();
+  clearTimeout(plotting);
+  if (left > 0 && view && view.isQuick) {
+    plotting = setTimeout(showInPlots, left);
+    return;
+  }
+  plotted = performance.now();
+  for (const one of plots) one.setFrame(frameOf(state.at));
+}
+
 async function update() {
   const ticket = ++shown;
   const moment = data.moments[state.at];
@@ -135,7 +148,7 @@ async function update() {
   if (apart) facts.push(apart);
   status.replaceChildren(element('strong', { text: words(moment) }), element('span', { class: 'muted', text: ` · ${facts.join(' · ')}` }));
   witness.textContent = found ? `${found.property} fails here: ${found.text}` : '';
-  for (const one of plots) one.setFrame(frameOf(state.at));
+  showInPlots();
   document.documentElement.dataset.moment = state.at;
   if (!view) return;
   const arrays = await Promise.all([moments.get(state.at), ...(besides ? [besides.get(state.at)] : [])]);
