@@ -122,6 +122,19 @@ async function go(at, finding = null, spot = null) {
   await update();
 }
 
+// What the colours of marks mean, of those that there are.
+function markedWords({ particles, path, members, corners, partly, exact }) {
+  const said = [];
+  const triangles = corners.length / 3;
+  if (particles.length + path.length > 0) said.push(`Marked orange: what the verdict names${triangles ? `, ${plural(triangles, 'triangle')} of the skin among it` : ''}.`);
+  else if (triangles) said.push(`Marked orange: ${plural(triangles, 'triangle')} of the skin, which the verdict names.`);
+  if (members.length > 0) said.push('Yellow: the members of its clusters.');
+  if (said.length === 0) said.push('The verdict names no place.');
+  if (partly) said.push('There are more than are marked.');
+  if (!exact) said.push('The recording has no moment after this stage; this is the next one.');
+  return ` ${said.join(' ')}`;
+}
+
 // Plots follow a little later while somebody scrubs: a browser draws each of them anew.
 let plotted = -Infinity, plotting = null;
 function showInPlots() {
@@ -164,7 +177,7 @@ async function update() {
   if (said.keys) legend.append(...said.keys.map(([fill, text]) => element('span', { class: 'keyed' }, drawing('svg', { class: 'swatch', viewBox: '0 0 10 10', 'aria-hidden': 'true' }, drawing('rect', { width: 10, height: 10, fill })), element('span', { text }))));
   if (view.plane.isOn) legend.append(element('span', { id: 'cut-words', text: ` ${view.plane.words()}${data.body.kept < data.body.particles ? ' This page holds some of the particles only, so the face has holes.' : ''}` }));
   if (moment.start && look.skin && !look.particles) legend.append(element('span', { text: ' The skin comes with the first frame; until then particles are shown.' }));
-  if (found) legend.append(element('span', { class: 'marked-key', text: ` Marked orange: what the verdict names${(found.marks.corners || []).length ? `, ${plural(found.marks.corners.length / 3, 'triangle')} of the skin among it` : ''}.` }), found.marks.members.length > 0 && element('span', { text: ' Yellow: the members of its clusters.' }) || '', found.marks.partly && element('span', { text: ' There are more than are marked.' }) || '', !found.marks.exact && element('span', { text: ' The recording has no moment after this stage; this is the next one.' }) || '');
+  if (found) legend.append(element('span', { class: 'marked-key', text: markedWords(found.marks) }));
   document.documentElement.dataset.shown = `${state.at}/${state.finding === null ? '' : state.finding}`;
 }
 
