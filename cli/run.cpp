@@ -211,8 +211,13 @@ int run(const RunOptions& options) {
   if (against && !options.report.empty()) {
     reference_record = passing_recording(options.report);
     reference_recorder.emplace(reference_record, built.setup, "", std::string(harness::reference_backend().name));
-    reference_recorder->add(Stage::skin, built.state);
-    against->observe_reference([&](Stage stage, const State& after) { reference_recorder->add(stage, after); });
+    // The reference computes in double precision, whatever it was handed.
+    const auto add = [&](Stage stage, State after) {
+      after.precision = Precision::binary64;
+      reference_recorder->add(stage, after);
+    };
+    add(Stage::skin, built.state);
+    against->observe_reference(add);
   }
   const harness::Observer see = [&](const harness::Moment& moment) {
     if (judge) judge->see(moment);

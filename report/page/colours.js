@@ -126,7 +126,7 @@ export function colourings(hasStretch, comparison) {
         const low = Math.min(least, most - 4);
         return {
           colour: (i) => { const code = codes ? codes[i] : 0; return code === kIncomparable ? changeColours[3] : code === 0 ? ramp[0] : onRamp((code - low) / (most - low)); },
-          words: `Distance to ${comparison.obtained}; each colour is so many times the one before. Orange: there in one of the two only.`,
+          words: `Distance to ${comparison.obtained}; on a logarithmic scale. Orange: there in one of the two only.`,
           scale: codes ? [`0 or ${figure(10 ** decade(low))} h`, `${figure(10 ** decade(most))} h`] : ['0 h', 'nowhere more'],
         };
       },

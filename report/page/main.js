@@ -231,12 +231,12 @@ function findings() {
   const section = byId('findings');
   const failing = data.findings.filter((one) => !one.expected);
   byId('findings-title').textContent = failing.length ? 'What fails' : !data.checked ? 'Nothing was judged' : data.holds ? 'Nothing fails' : 'It does not hold';
+  if (comparison) section.append(comparisonCard(comparison, showApart));
   if (!data.checked) section.append(element('p', { text: 'This page shows what happened. Whether it is right, this command judges:' }));
   if (data.checked && data.holds && !failing.length) {
     const near = data.rows.filter((row) => row.judged > 0 && row.ofBound !== null).sort((a, b) => b.ofBound - a.ofBound)[0];
     section.append(element('p', { text: `All ${plural(data.rows.filter((row) => row.judged > 0).length, 'property', 'properties')} hold${data.findings.length ? ', but for what the scene expects to fail' : ''}.${near ? ` The nearest to its bound is ${near.property} after ${near.stage}, at ${figure(near.ofBound)} of it, in frame ${near.frame}.` : ''}` }));
   }
-  if (comparison) section.append(comparisonCard(comparison, showApart));
   section.append(...cards(data, showFinding));
   if (data.findingsLeftOut > 0) section.append(element('p', { class: 'muted', text: `${plural(data.findingsLeftOut, 'later failure')} of the same properties are counted in the table, and not shown.` }));
   section.append(element('h3', { text: data.checked ? 'See it again' : 'Judge it' }), command(data.again));

@@ -12,7 +12,7 @@ const kLight = 'vec3 light(vec3 colour, vec3 n) { float lit = 0.42 + 0.58 * max(
 const kPlace = 'uniform vec3 low, step3; vec3 placed(vec3 steps) { return low + step3 * steps; }';
 
 // Balls as discs that face the camera. The fourth number of a tint says what a point is: 0 nothing, 1 alive,
-// 2 removed, 3 and 4 marked. `slab`: above 0, only what lies so near behind the cut plane.
+// 2 removed, 3 and 4 marked, 5 marked as a ring, so that triangles are seen through it. `slab`: above 0, only what lies so near behind the cut plane.
 const pointShader = (isInFront, plane) => ({
   uniforms: { perPixel: { value: 1 }, size: { value: 0.95 }, fade: { value: 0 }, slab: { value: 0 }, back: { value: new Color() },
     low: { value: new Vector3() }, step3: { value: new Vector3(1, 1, 1) }, plane },
@@ -30,10 +30,11 @@ const pointShader = (isInFront, plane) => ({
   fragmentShader: `${kLight} uniform vec3 back; uniform float fade; varying vec3 colour; varying float which;
     void main() {
       vec2 p = 2.0 * gl_PointCoord - 1.0; float r = dot(p, p);
-      if (r > 1.0 || (which > 1.5 && which < 2.5 && r < 0.4)) discard;
+      if (r > 1.0 || (which > 1.5 && which < 2.5 && r < 0.4) || (which > 4.5 && r < 0.7)) discard;
       vec3 n = vec3(p.x, -p.y, sqrt(max(1.0 - r, 0.0)));
       vec3 lit = light(colour, n);
-      if (which > 2.5) lit = r > 0.66 ? vec3(0.07) : mix(lit, colour, 0.5);
+      if (which > 4.5) lit = r > 0.9 ? vec3(0.07) : colour;
+      else if (which > 2.5) lit = r > 0.66 ? vec3(0.07) : mix(lit, colour, 0.5);
       else if (r > 0.8) lit *= 0.8;
       gl_FragColor = vec4(mix(lit, back, which > 2.5 ? 0.0 : fade), 1.0);
     }`,
@@ -94,6 +95,7 @@ export class Tissue {
     this.body.add(this.blade);
     const nowhere = { value: plane.value.clone().set(0, 0, 0, 1e9) };  // what is marked is never cut away
     this.triangles = add(new Mesh(new BufferGeometry(), new ShaderMaterial({ ...surfaceShader(nowhere, true), depthTest: false })), 2);
+    this.rims = add(new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color: 0x111111, depthTest: false })), 2.5);
     this.path = add(new Line(new BufferGeometry(), new LineBasicMaterial({ color: 0xd55e00, depthTest: false })), 3);
     this.marks = add(new Points(new BufferGeometry(), new ShaderMaterial(pointShader(true, nowhere))), 4);
     if (data.blade) this.makeBlade();
@@ -208,10 +210,12 @@ export class Tissue {
     const all = [...members, ...named];
     const xyz = all.length ? placesOfIt() : new Float32Array(0);
     const isThere = (i) => !Number.isNaN(xyz[3 * i]);
+    // Balls would hide the triangles at whose corners they sit.
+    const kNamed = marks && (marks.corners || []).length ? 5 : 4;
     const place = new Float32Array(3 * all.length), tint = new Uint8Array(4 * all.length);
     all.forEach((i, k) => {
       if (isThere(i)) place.set(xyz.subarray(3 * i, 3 * i + 3), 3 * k);
-      tint.set([...(k < members.length ? kMember : kMarked), isThere(i) ? (k < members.length ? 3 : 4) : 0], 4 * k);
+      tint.set([...(k < members.length ? kMember : kMarked), isThere(i) ? (k < members.length ? 3 : kNamed) : 0], 4 * k);
     });
     write(this.marks.geometry, 'position', place, 3);
     write(this.marks.geometry, 'tint', tint, 4, true);
@@ -241,6 +245,11 @@ export class Tissue {
     write(this.triangles.geometry, 'tint', tint, 4, true);
     this.triangles.geometry.setDrawRange(0, found.length / 3);
     this.triangles.visible = found.length > 0;
+    const rims = [];
+    for (let k = 0; k < found.length; k += 9) for (const c of [0, 1, 1, 2, 2, 0]) rims.push(...found.slice(k + 3 * c, k + 3 * c + 3));
+    write(this.rims.geometry, 'position', new Float32Array(rims), 3);
+    this.rims.geometry.setDrawRange(0, rims.length / 3);
+    this.rims.visible = found.length > 0;
     return found;
   }
 

@@ -110,14 +110,21 @@ with Browser(work / "holds.html") as page:
     stages = page.ask("return JSON.parse(document.getElementById('data').textContent).moments.map((m) => m.stage)")
     page.choose("colour", "change")
     for stage, words in (("step", "moved"), ("detect", "removed"), ("split", "in a cluster that lost members"),
-                         ("expand", "a cluster grew over it"), ("merge", "merged"), ("skin", "skin made here")):
+                         ("merge", "merged"), ("skin", "skin made here")):
         at = [k for k, one in enumerate(stages) if one == stage and k > 0]
         found = []
         for k in at:
             page.scrub(k)
             found.append(page.text("#legend"))
+            assert ("particle)" in found[-1] or "particles)" in found[-1]) == bool(
+                page.driver.find_elements(By.CSS_SELECTOR, "#legend .swatch")), found[-1]
         assert any(words in text for text in found), f"no {stage} says '{words}': {found[:3]}"
-    assert page.ask("return document.querySelectorAll('#legend .swatch').length") > 0
+
+with Browser(work / "expand.html") as page:
+    # Here a cluster grows, over the particle that the fault gives it.
+    page.choose("colour", "change")
+    page.scrub(page.data("findings[0].marks.moment"))
+    assert "a cluster grew over it (1 particle)" in page.text("#legend"), page.text("#legend")
 
 # --- Two recordings: the same twice, and one that goes its own way ---
 
@@ -145,7 +152,7 @@ with Browser(work / "two.html") as page:
     # One camera: a turn moves both halves of the picture.
     halves = """const done = arguments[0], canvas = document.getElementById('canvas');
       const copy = document.createElement('canvas'); [copy.width, copy.height] = [canvas.width, canvas.height];
-      const pen = copy.getContext('2d'); pen.drawImage(canvas, 0, 0);
+      const pen = copy.getContext('2d', { willReadFrequently: true }); pen.drawImage(canvas, 0, 0);
       const sum = (x) => pen.getImageData(x, 0, copy.width / 2 - 4, copy.height).data.reduce((s, v) => (Math.imul(s, 31) + v) | 0, 0);
       done([sum(0), sum(copy.width / 2 + 4)]);"""
     page.pixels()
