@@ -35,7 +35,7 @@ export function apartInWords(comparison, about) {
   if (!comparison) return '';
   if (!about.apart) return comparison.shown ? 'no counterpart in the other' : '';
   const { max, rms, differs } = about.apart;
-  if (!differs) return 'both the same';
+  if (!differs) return comparison.shown ? 'both the same' : `as ${comparison.name} has it`;
   const where = about.apart.particle >= 0 && max !== 0 ? `apart by up to ${far(max)} (particle ${about.apart.particle}), RMS ${typeof rms === 'number' ? figure(rms) : '∞'} h` : '';
   return [where, differs === 'positions' ? '' : `different: ${differs}`].filter(Boolean).join('; ');
 }
