@@ -529,8 +529,25 @@ Plan plan_of(const Source& source, const std::vector<Finding>& findings, const B
   return plan;
 }
 
-// About as many bytes as a place takes in a chunk, of what is not noise.
+// As many bytes as a place takes in a chunk at most, of what is not noise.
 constexpr double kBytesOfPlace = 4.5;
+// Moments that are drawn to see how many it takes in this run.
+constexpr std::size_t kSampled = 16;
+
+// Bytes that a place takes in this run, seen from some moments in its middle.
+double sampled_bytes(const Plan& plan, double places) {
+  const std::size_t count = plan.moments.size(), first = count <= kSampled ? 0 : (count - kSampled) / 2;
+  const auto begin = plan.moments.begin() + static_cast<std::ptrdiff_t>(first);
+  const std::vector<Together> some(begin, begin + static_cast<std::ptrdiff_t>(std::min(count, kSampled)));
+  const Kept kept = kept_particles(plan.source.setup.body.particle_count(), 1, {});
+  const Source* const other = plan.beside == nullptr ? nullptr : &plan.beside->source;
+  const Chunks chunks = drawn(plan.source, other, true, some, kept, {}, {});
+  // Of a frame as such: one in which several stages ran has several moments.
+  std::set<int64_t> frames;
+  for (const Together& one : some) frames.insert(one.moment.frame);
+  const double found = static_cast<double>(chunks.bytes) / (static_cast<double>(frames.size()) * places);
+  return std::clamp(found, 0.01, kBytesOfPlace);
+}
 
 }  // namespace
 
@@ -555,11 +572,12 @@ Pictures pictures_of(const Source& source, const std::vector<Finding>& findings,
   int64_t vertices = 0;
   for (const FrameEnd& end : plan.survey.frames) vertices = std::max(vertices, end.triangles / 2);
   Thinning thinning;
+  double bytes_of_place = kBytesOfPlace;
   // A guess first, so that a large run is not drawn in full only to be thrown away.
   const auto guessed = [&] {
     const auto shown = static_cast<double>((frames - 1) / thinning.every_frame + 1);
     const double runs = beside != nullptr && beside->is_shown ? 2 : 1;
-    return runs * shown * kBytesOfPlace * (n / thinning.every_particle + static_cast<double>(vertices));
+    return runs * shown * bytes_of_place * (n / thinning.every_particle + static_cast<double>(vertices));
   };
   const auto thin_more = [&] {
     const bool has_frames = frames / (thinning.every_frame + 1) >= kFewestFrames;
@@ -575,6 +593,8 @@ Pictures pictures_of(const Source& source, const std::vector<Finding>& findings,
     }
     return true;
   };
+  if (guessed() > static_cast<double>(most_bytes) && !plan.moments.empty() && n > 0)
+    bytes_of_place = sampled_bytes(plan, n + static_cast<double>(vertices));
   while (guessed() > static_cast<double>(most_bytes) && thin_more()) {
   }
   for (;;) {
