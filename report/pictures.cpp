@@ -22,7 +22,7 @@ namespace {
 using nlohmann::json;
 
 // Bytes of a chunk before it is compressed, and its moments: little enough to be inflated while somebody scrubs.
-constexpr std::size_t kChunkBytes = std::size_t{3} << 20;
+constexpr std::size_t kChunkBytes = std::size_t{12} << 20;
 constexpr std::size_t kChunkMoments = 16;
 // Nobody looks at more frames than these, so particles are thinned as well rather than frames beyond it.
 constexpr int64_t kFewestFrames = 40;

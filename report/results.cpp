@@ -95,7 +95,7 @@ struct Field {
       const json& one = (*value)[k];
       if (!one.is_number_integer() || one.get<int64_t>() < std::numeric_limits<int32_t>::min() ||
           one.get<int64_t>() > std::numeric_limits<int32_t>::max())
-        at(k).refuse("this is the number of no particle or cluster");
+        at(k).refuse("this is the number of no particle, cluster or triangle");
       found.push_back(one.get<int32_t>());
     }
     return found;

@@ -15,11 +15,23 @@ namespace {
 
 using namespace cutproof;
 
-// Bends the block in a wave that grows, which is smooth in space as real motion is.
-Vec3 bent(Vec3 p, double frame, double size) {
+// A number in [-1, 1] that nothing compresses away (splitmix64; G. Steele, D. Lea, C. Flood, OOPSLA 2014).
+double noise(uint64_t key) {
+  key += 0x9E3779B97F4A7C15u;
+  key = (key ^ key >> 30) * 0xBF58476D1CE4E5B9u;
+  key = (key ^ key >> 27) * 0x94D049BB133111EBu;
+  return static_cast<double>((key ^ key >> 31) >> 11) * 0x1p-52 - 1;
+}
+
+// Bends the block in a wave that grows, and shakes each particle a little by itself, so that a page of this is about as
+// large as one of a simulated body.
+Vec3 bent(Vec3 p, double frame, double size, uint64_t particle) {
   const double phase = 6 * p.x / size + 0.11 * frame;
-  return {p.x + 0.03 * size * std::sin(phase + p.z / size), p.y + 0.01 * size * std::cos(phase),
-          p.z + 0.06 * size * std::sin(phase) * std::min(1.0, frame / 20)};
+  const auto shaken = [&](uint64_t axis) {
+    return 0.002 * report::kSpacing * noise(3 * (1'000'003 * static_cast<uint64_t>(frame) + particle) + axis);
+  };
+  return {p.x + 0.03 * size * std::sin(phase + p.z / size) + shaken(0), p.y + 0.01 * size * std::cos(phase) + shaken(1),
+          p.z + 0.06 * size * std::sin(phase) * std::min(1.0, frame / 20) + shaken(2)};
 }
 
 // Two triangles to each square of the block's sides; a vertex for each particle there.
@@ -67,19 +79,20 @@ int main(int argc, char** argv) {
   const Setup setup = report::block(n);
   const Skin skin = skin_around(setup, n);
   const double size = n * report::kSpacing;
-  const report::Source source = {
-      setup, frames + 1, [&](int64_t index) {
-        io::Snapshot snapshot = {Stage::skin, report::at_rest(setup.body)};
-        State& state = snapshot.state;
-        state.frame = index;
-        const auto moved = static_cast<double>(index - index % every);
-        for (Vec3& x : state.x) x = bent(x, moved, size);
-        state.skin = skin;
-        for (const int32_t owner : skin.owner) {
-          state.skin.position.push_back(bent(setup.body.rest_position(owner), static_cast<double>(index), size));
-        }
-        return snapshot;
-      }};
+  const report::Source source = {setup, frames + 1, [&](int64_t index) {
+                                   io::Snapshot snapshot = {Stage::skin, report::at_rest(setup.body)};
+                                   State& state = snapshot.state;
+                                   state.frame = index;
+                                   const auto moved = static_cast<double>(index - index % every);
+                                   for (std::size_t i = 0; i < state.x.size(); ++i)
+                                     state.x[i] = bent(state.x[i], moved, size, i);
+                                   state.skin = skin;
+                                   for (const int32_t owner : skin.owner) {
+                                     state.skin.position.push_back(bent(setup.body.rest_position(owner),
+                                                                        static_cast<double>(index), size, at(owner)));
+                                   }
+                                   return snapshot;
+                                 }};
   report::Results results;
   results.command = "recording";
   results.scene = "a bent block";
