@@ -43,7 +43,8 @@ struct ReportOptions {
 };
 
 constexpr const char* kSets =
-    "give a recording, alone or with results of its run or check; or a result of fuzz, alone or with counterexamples "
+    "give a recording, alone, with results of its run or check, or with another recording of its scene; or a result of "
+    "fuzz, alone or with counterexamples "
     "of it; or a result of judge; or results of bench; or results of tune; or counterexamples";
 
 // What the command line names, by what the files hold.
@@ -107,8 +108,8 @@ const char* word_of(report::DocumentKind kind) {
 // Throws InputError, naming the first file that does not go with the others.
 void require_set(const Given& given) {
   using Kind = report::DocumentKind;
-  if (given.recordings.size() > 1)
-    throw InputError(given.recordings[1], "", "a page shows one recording, and there is one already", kSets);
+  if (given.recordings.size() > 2)
+    throw InputError(given.recordings[2], "", "a page shows two recordings at most, and there are two already", kSets);
   const bool has_recording = !given.recordings.empty(), has_campaign = given.documents.contains(Kind::fuzz);
   const Kind first = given.documents.empty() ? Kind::run : given.documents.begin()->first;
   for (const auto& [kind, numbers] : given.documents) {
@@ -152,22 +153,40 @@ void say_whether(std::optional<bool> holds) {
                           : "NOT everything on the page holds");
 }
 
-int report_recording(const ReportOptions& options, const std::string& recording_file, const std::string& results_file) {
-  const io::RecordingReader reader(recording_file);
+std::string scene_name(const io::Recording& recording, const std::string& file) {
+  return recording.scene_json.empty() ? "" : io::parse_scene(recording.scene_json, file + " (its scene)").name;
+}
+
+// Names of two recordings that a person tells apart: by backends, unless these are alike.
+std::pair<std::string, std::string> told_apart(const io::Recording& one, const std::string& one_file,
+                                               const io::Recording& other, const std::string& other_file) {
+  if (one.backend != other.backend) return {one.backend, other.backend};
+  return {one_file, other_file};
+}
+
+// Results are those of the first recording.
+int report_recordings(const ReportOptions& options, const std::vector<std::string>& files,
+                      const std::string& results_file) {
+  const io::RecordingReader reader(files.front());
   const io::Recording& recording = reader.header();
-  std::string scene;
-  if (!recording.scene_json.empty())
-    scene = io::parse_scene(recording.scene_json, recording_file + " (its scene)").name;
+  const std::string scene = scene_name(recording, files.front());
   report::Results results;
   if (results_file.empty()) {
     results = report::unjudged(recording, scene);
   } else {
     results = report::read_results(results_file);
-    report::require_same_run(recording, scene, recording_file, results, results_file);
+    report::require_same_run(recording, scene, files.front(), results, results_file);
   }
-  const report::Source source = {recording.setup, recording.snapshot_count,
-                                 [&](int64_t index) { return reader.snapshot(index); }};
-  io::write_text(options.output, report::page(source, results, "cutproof check " + quoted(recording_file), kVersion));
+  std::optional<io::RecordingReader> other;
+  std::optional<ReadBeside> beside;
+  if (files.size() > 1) {
+    other.emplace(files[1]);
+    report::require_same_body(recording, files.front(), other->header(), files[1]);
+    auto [own_name, name] = told_apart(recording, files.front(), other->header(), files[1]);
+    beside.emplace(ReadBeside{*other, true, std::move(name), std::move(own_name),
+                              "the same particle of the other recording, in the same moment"});
+  }
+  write_page(options.output, reader, results, "cutproof check " + quoted(files.front()), beside ? &*beside : nullptr);
   print_written(options.output);
   insist("{}\n", !results.checked ? "nothing on the page is judged: give results for that"
                  : results.holds  ? "everything on the page holds"
@@ -181,7 +200,7 @@ int make_report(const ReportOptions& options) {
   Given given = read_all(options.files);
   require_set(given);
   if (!given.recordings.empty())
-    return report_recording(options, given.recordings.front(), given.names.empty() ? "" : given.names.front());
+    return report_recordings(options, given.recordings, given.names.empty() ? "" : given.names.front());
   std::optional<harness::BackendChoice> chosen;
   if (!options.backend.empty()) {
     chosen.emplace();
@@ -229,7 +248,8 @@ void add_report(CLI::App& program, Work& work) {
       ->add_option(
           "files", options->files,
           "a recording, and what `run --json` or `check --json` has written of it (without, nothing on the page "
-          "is judged); or what `fuzz`, `judge`, `bench` or `tune` has written with --json; or counterexamples")
+          "is judged), or another recording of the same scene, to stand beside it; or what `fuzz`, `judge`, `bench` or "
+          "`tune` has written with --json; or counterexamples")
       ->required()
       ->type_name("FILE...");
   command->add_option("-o,--output", options->output, "the page to write")->required()->type_name("F");

@@ -1,5 +1,7 @@
 #include "cli/report_page.h"
 
+#include <optional>
+
 #include "cli/commands.h"
 #include "cli/output.h"
 #include "model/io/atomic_file.h"
@@ -29,11 +31,28 @@ std::unique_ptr<io::RecordingReader> read_passing(const std::string& recording) 
   return std::make_unique<io::RecordingReader>(recording);
 }
 
+namespace {
+
+report::Source source_of(const io::RecordingReader& recording) {
+  return {recording.header().setup, recording.header().snapshot_count,
+          [&recording](int64_t index) { return recording.snapshot(index); }};
+}
+
+}  // namespace
+
+void write_page(const std::string& path, const io::RecordingReader& recording, const report::Results& results,
+                const std::string& again, const ReadBeside* beside) {
+  std::optional<report::Beside> other;
+  if (beside != nullptr) {
+    other.emplace(report::Beside{source_of(beside->recording), beside->is_shown, beside->name, beside->own_name,
+                                 beside->obtained});
+  }
+  io::write_text(path, report::page(source_of(recording), results, again, kVersion, other ? &*other : nullptr));
+}
+
 void write_report(const std::string& path, const io::RecordingReader& recording, const nlohmann::json& document,
-                  const std::string& again) {
-  const report::Source source = {recording.header().setup, recording.header().snapshot_count,
-                                 [&](int64_t index) { return recording.snapshot(index); }};
-  io::write_text(path, report::page(source, report::results_of(document, path), again, kVersion));
+                  const std::string& again, const ReadBeside* beside) {
+  write_page(path, recording, report::results_of(document, path), again, beside);
 }
 
 }  // namespace cutproof::cli

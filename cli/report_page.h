@@ -6,6 +6,7 @@
 #include <string>
 
 #include "model/io/recording.h"
+#include "report/results.h"
 
 namespace cutproof::cli {
 
@@ -19,8 +20,19 @@ std::string passing_recording(const std::string& page);
 // Reads a passing recording, whose files have no name from then on.
 std::unique_ptr<io::RecordingReader> read_passing(const std::string& recording);
 
-// `document`: what --json writes of `run` or `check`. `again`: the command line that shows it again.
+// A recording that lies beside the one that a page is about, with the words for it.
+struct ReadBeside {
+  const io::RecordingReader& recording;
+  bool is_shown = false;
+  std::string name, own_name, obtained;  // as in report::Beside
+};
+
+// `document`: what --json writes of `run` or `check`. `again`: the command line that shows it again. `beside` may be
+// null.
 void write_report(const std::string& path, const io::RecordingReader& recording, const nlohmann::json& document,
-                  const std::string& again);
+                  const std::string& again, const ReadBeside* beside = nullptr);
+// The same of results that are read already.
+void write_page(const std::string& path, const io::RecordingReader& recording, const report::Results& results,
+                const std::string& again, const ReadBeside* beside);
 
 }  // namespace cutproof::cli

@@ -205,6 +205,20 @@ int run(const RunOptions& options) {
     errors.emplace(wanted, built.setup, state(), [&] { return make_backend(options.backend); });
   }
   if (recorder) recorder->add(Stage::skin, state());
+  // What the reference makes of the same, so that the page can show how far that is.
+  std::optional<io::Recorder> reference_recorder;
+  std::string reference_record;
+  if (against && !options.report.empty()) {
+    reference_record = passing_recording(options.report);
+    reference_recorder.emplace(reference_record, built.setup, "", std::string(harness::reference_backend().name));
+    // The reference computes in double precision, whatever it was handed.
+    const auto add = [&](Stage stage, State after) {
+      after.precision = Precision::binary64;
+      reference_recorder->add(stage, after);
+    };
+    add(Stage::skin, built.state);
+    against->observe_reference(add);
+  }
   const harness::Observer see = [&](const harness::Moment& moment) {
     if (judge) judge->see(moment);
     if (relations) {
@@ -245,6 +259,18 @@ int run(const RunOptions& options) {
   if (!options.report.empty()) {
     recording = options.record.empty() ? read_passing(record) : std::make_unique<io::RecordingReader>(record);
   }
+  std::unique_ptr<io::RecordingReader> reference_recording;
+  std::optional<ReadBeside> page_beside;
+  if (reference_recorder) {
+    reference_recorder->finish();
+    reference_recording = read_passing(reference_record);
+    page_beside.emplace(
+        ReadBeside{*reference_recording, false, std::string(harness::reference_backend().name), options.backend.name,
+                   against->lockstep ? "the same particle of the reference, which ran each stage from this "
+                                       "run's own state before it (lockstep)"
+                                     : "the same particle of the reference, which began alike and ran by "
+                                       "itself, up to the first decision in which the two differ"});
+  }
   // Files first: they are kept even if standard output cannot be written.
   if (!options.json.empty() || recording) {
     nlohmann::json document = to_json(result, judge ? &*judge : nullptr);
@@ -256,7 +282,8 @@ int run(const RunOptions& options) {
     }
     if (errors) document["errors"] = errors_document;
     write_document(options.json, document);
-    if (recording) write_report(options.report, *recording, document, options.again);
+    if (recording)
+      write_report(options.report, *recording, document, options.again, page_beside ? &*page_beside : nullptr);
   }
 
   const Judging judging{"cutproof run", "cutproof.run." + scene.name, options.again};

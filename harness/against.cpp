@@ -1,6 +1,7 @@
 #include "harness/against.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace cutproof::harness {
 
@@ -8,6 +9,14 @@ Against::Against(const Setup& setup, const State& start, const State& loaded, co
                  AgainstMode mode) {
   if (mode != AgainstMode::free_running) lockstep.emplace(setup, start, loaded, backend);
   if (mode != AgainstMode::lockstep) free_running.emplace(setup, start, loaded, backend);
+}
+
+void Against::observe_reference(std::function<void(Stage, const State&)> observer) {
+  if (lockstep) {
+    lockstep->observe_reference(std::move(observer));
+  } else if (free_running) {
+    free_running->observe_reference(std::move(observer));
+  }
 }
 
 void Against::see(Stage stage, const State& after, bool launched) {

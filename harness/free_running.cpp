@@ -105,6 +105,7 @@ void FreeRunning::see(Stage stage, const State& after) {
   }
   reference_->run({stage, stage});
   const State expected = reference_->snapshot().front();
+  if (observer_ && reference_->report().ran[at(static_cast<int>(stage))]) observer_(stage, expected);
   if (stage == Stage::step) {
     frames_.push_back({frame_, oracles::position_error(setup_, expected.x, after.x, after.alive)});
   }

@@ -2,9 +2,11 @@
 // (guide.md, Implementation).
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "model/backend.h"
@@ -40,6 +42,9 @@ class FreeRunning {
   // `start` is what was loaded, `loaded` the backend's first snapshot. `setup` must outlive this.
   FreeRunning(const Setup& setup, const State& start, const State& loaded, std::string backend);
 
+  // From now on: told the reference's state after each stage that it ran, up to the first decision that differs.
+  void observe_reference(std::function<void(Stage, const State&)> observer) { observer_ = std::move(observer); }
+
   // The backend's state after `stage`, of every stage of every frame, in order. A state that is not well formed is a
   // difference.
   void see(Stage stage, const State& after);
@@ -55,9 +60,10 @@ class FreeRunning {
 
   const Setup& setup_;
   std::string backend_;
-  int64_t frame_ = 0;                   // in progress
-  State before_;                        // the backend's last snapshot
-  std::unique_ptr<Backend> reference_;  // null once the runs differ
+  int64_t frame_ = 0;                                  // in progress
+  State before_;                                       // the backend's last snapshot
+  std::unique_ptr<Backend> reference_;                 // null once the runs differ
+  std::function<void(Stage, const State&)> observer_;  // may be empty
   std::vector<FreeFrame> frames_;
   std::optional<FirstDifference> first_difference_;
 };

@@ -77,6 +77,11 @@ void Lockstep::see(Stage stage, const State& after, bool launched) {
   const oracles::StageDifference found = comparison_.compare(stage, before_, after, launched);
   broken_ = !found.is_readable;
   if (broken_) return differ(stage, found.decisions.front());
+  if (observer_ && launched && found.due) {
+    State expected = found.expected;
+    expected.frame = after.frame;  // a stage by itself does not say whether it ends the frame
+    observer_(stage, expected);
+  }
   if (stage == Stage::step) frames_.emplace_back().frame = frame_;
   LockstepFrame& frame = frames_.back();
   ++stages_;

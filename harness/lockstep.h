@@ -4,6 +4,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -46,6 +47,9 @@ class Lockstep {
   // A state that is not well formed is a difference, and ends the comparison.
   void see(Stage stage, const State& after, bool launched);
 
+  // From now on: told what the reference has made of the backend's state, of every stage that the backend launched.
+  void observe_reference(std::function<void(Stage, const State&)> observer) { observer_ = std::move(observer); }
+
   // One verdict for each thing that was measured, over the whole run so far; see docs/reference/results_schema.md.
   std::vector<Verdict> verdicts() const;
 
@@ -75,6 +79,7 @@ class Lockstep {
   State before_;         // the backend's last snapshot
   bool broken_ = false;  // a snapshot could not be read: nothing can be compared any more
   oracles::StageComparison comparison_;
+  std::function<void(Stage, const State&)> observer_;  // may be empty
   std::vector<LockstepFrame> frames_;
   std::array<Track, 6> tracks_;
   Failures topology_, removals_, steps_failed_;

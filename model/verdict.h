@@ -9,12 +9,17 @@
 
 namespace cutproof {
 
+// A skin that is torn open has a defect at every second triangle, and nobody looks at each of them.
+inline constexpr int32_t kMostWitnessTriangles = 100;
+
 // The smallest thing that shows the failure.
 struct Witness {
   std::vector<int32_t> clusters;   // numbers of the clusters concerned
   std::vector<int32_t> particles;  // the particles concerned
   std::vector<int32_t> path;       // particles along a path of G that shows it, where there is one
   std::string text;                // one sentence for a person
+  // Triangles of the skin that show it, by their place in it, at most kMostWitnessTriangles.
+  std::vector<int32_t> triangles = {};
 
   friend bool operator==(const Witness&, const Witness&) = default;
 };

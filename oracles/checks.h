@@ -61,7 +61,9 @@ inline constexpr Due kSkinThere = {"at the end of a frame, if there is a skin or
                                    }};
 // Only where nothing is alive may it have no triangles.
 bool skin_is_missing(const Setup& setup, const State& state);
-// For witnesses: the owners of these vertices.
-Concerned owners_of(const Skin& skin, const std::vector<int32_t>& vertices);
+// For witnesses: the owners of these vertices, and these triangles; the triangles that have one of these vertices, at
+// most as many as a witness names.
+Concerned owners_of(const Skin& skin, const std::vector<int32_t>& vertices, std::vector<int32_t> triangles = {});
+std::vector<int32_t> triangles_at(const Skin& skin, const std::vector<int32_t>& vertices);
 
 }  // namespace cutproof::oracles

@@ -62,18 +62,23 @@ void check_skin_match(Judged& judged, Verdict& verdict) {
   verdict.checked = components.count;
   const auto shell_count = static_cast<int32_t>(shells.volume.size());
 
+  // Of the first violation only, which is the witness: each call walks the whole skin.
+  const auto around = [&](std::size_t v) {
+    return verdict.holds ? triangles_at(skin, {static_cast<int32_t>(v)}) : std::vector<int32_t>();
+  };
+
   std::vector<int32_t> first_owner(at(shell_count), -1);
   for (std::size_t v = 0; v < skin.owner.size(); ++v) {
     const int32_t shell = shells.of_vertex[v], owner = skin.owner[v];
     if (shell < 0) continue;
     if (!judged.alive(owner)) {
-      violate(verdict, {{}, {owner}}, "skin vertex {} is owned by particle {}, which is dead", v, owner);
+      violate(verdict, {{}, {owner}, {}, around(v)}, "skin vertex {} is owned by particle {}, which is dead", v, owner);
       continue;
     }
     int32_t& first = first_owner[at(shell)];
     if (first < 0) first = owner;
     if (components.label[at(first)] != components.label[at(owner)]) {
-      violate(verdict, {{}, {first, owner}},
+      violate(verdict, {{}, {first, owner}, {}, around(v)},
               "one shell of the skin joins particles {} and {}, which lie in components {} and "
               "{} of the tissue",
               first, owner, components.label[at(first)], components.label[at(owner)]);
@@ -84,7 +89,7 @@ void check_skin_match(Judged& judged, Verdict& verdict) {
     const int32_t v = shells.farthest[at(shell)];
     const bool around_tissue = kDirections[skin.direction[at(v)]][0] > 0;
     if (around_tissue == (shells.volume[at(shell)] > 0)) continue;
-    violate(verdict, {{}, {skin.owner[at(v)]}},
+    violate(verdict, {{}, {skin.owner[at(v)]}, {}, around(at(v))},
             "the shell {} particle {} is inside out: its triangles turn clockwise, seen from outside the tissue",
             around_tissue ? "around" : "of a cavity beside", skin.owner[at(v)]);
   }

@@ -45,7 +45,8 @@ void check_triangles(const Skin& skin, Verdict& verdict) {
   for (std::size_t t = 0; t < skin.triangles.size(); ++t) {
     const auto& [a, b, c] = skin.triangles[t];
     if (a != b && b != c && c != a) continue;
-    return violate(verdict, owners_of(skin, {a, b, c}), "triangle {} names a vertex twice: {}, {}, {}", t, a, b, c);
+    return violate(verdict, owners_of(skin, {a, b, c}, {static_cast<int32_t>(t)}),
+                   "triangle {} names a vertex twice: {}, {}, {}", t, a, b, c);
   }
 }
 
@@ -56,7 +57,7 @@ void check_duplicates(const Skin& skin, int32_t particle_count, Verdict& verdict
     const int32_t owner = skin.owner[at(v)];
     int32_t& slot = vertex_at[6 * at(owner) + skin.direction[at(v)]];
     if (slot >= 0) {
-      return violate(verdict, owners_of(skin, {slot, v}),
+      return violate(verdict, owners_of(skin, {slot, v}, triangles_at(skin, {slot, v})),
                      "vertices {} and {} lie on the same grid edge: from particle {} in direction {}", slot, v, owner,
                      skin.direction[at(v)]);
     }
@@ -70,13 +71,13 @@ void check_edges(const Skin& skin, const HalfEdges& half_edges, Verdict& verdict
     for (const HalfEdge& e : half_edges.of(a)) {
       const HalfEdge* const first = between(half_edges, a, e.to);
       if (const HalfEdge* const second = between(half_edges, a, e.to, first)) {
-        return violate(verdict, owners_of(skin, {a, e.to}),
+        return violate(verdict, owners_of(skin, {a, e.to}, {first->triangle, second->triangle}),
                        "triangles {} and {} both run from vertex {} to vertex {}: one is flipped, doubled, or the edge "
                        "has more than two triangles",
                        first->triangle, second->triangle, a, e.to);
       }
       if (between(half_edges, e.to, a) == nullptr) {
-        return violate(verdict, owners_of(skin, {a, e.to}),
+        return violate(verdict, owners_of(skin, {a, e.to}, {e.triangle}),
                        "the surface is open: triangle {} runs from vertex {} to vertex {}, and none runs back",
                        e.triangle, a, e.to);
       }
@@ -96,7 +97,7 @@ void check_fans(const Skin& skin, const HalfEdges& half_edges, Verdict& verdict)
       here = between(half_edges, v, here->after);
     } while (here->triangle != fan[0].triangle && length <= fan.size());
     if (length == fan.size()) continue;
-    return violate(verdict, owners_of(skin, {v}),
+    return violate(verdict, owners_of(skin, {v}, triangles_at(skin, {v})),
                    "the surface is pinched at vertex {}: {} triangles meet there, but only {} of them lie in one cycle",
                    v, fan.size(), length);
   }
@@ -111,11 +112,22 @@ void check_closed(const Skin& skin, Verdict& verdict) {
 
 }  // namespace
 
-Concerned owners_of(const Skin& skin, const std::vector<int32_t>& vertices) {
+Concerned owners_of(const Skin& skin, const std::vector<int32_t>& vertices, std::vector<int32_t> triangles) {
   std::set<int32_t> owners;
-  if (skin.owner.empty()) return {};
-  for (const int32_t v : vertices) owners.insert(skin.owner[at(v)]);
-  return {{}, {owners.begin(), owners.end()}};
+  if (!skin.owner.empty()) {
+    for (const int32_t v : vertices) owners.insert(skin.owner[at(v)]);
+  }
+  return {{}, {owners.begin(), owners.end()}, {}, std::move(triangles)};
+}
+
+std::vector<int32_t> triangles_at(const Skin& skin, const std::vector<int32_t>& vertices) {
+  std::vector<int32_t> found;
+  for (std::size_t t = 0; t < skin.triangles.size() && std::ssize(found) < kMostWitnessTriangles; ++t) {
+    const auto& corners = skin.triangles[t];
+    if (std::find_first_of(corners.begin(), corners.end(), vertices.begin(), vertices.end()) != corners.end())
+      found.push_back(static_cast<int32_t>(t));
+  }
+  return found;
 }
 
 bool skin_is_missing(const Setup& setup, const State& state) {
@@ -159,6 +171,7 @@ void check_skin_vertices(Judged& judged, Verdict& verdict) {
   verdict.checked = static_cast<int64_t>(skin.owner.size());
   if (!has_skin(state) && !skin_is_missing(setup, state)) return;
   const Body& body = setup.body;
+  const auto around = [&](std::size_t v) { return triangles_at(skin, {static_cast<int32_t>(v)}); };
   // The vertices are those of the grid edges with one alive end, each once.
   const auto is_alive = [&](int32_t i) { return i >= 0 && state.alive[at(i)] != 0; };
   std::vector<uint8_t> vertices_on(6 * static_cast<std::size_t>(body.particle_count()), 0);
@@ -166,15 +179,15 @@ void check_skin_vertices(Judged& judged, Verdict& verdict) {
     const int32_t owner = skin.owner[v];
     const int direction = skin.direction[v];
     if (!is_alive(owner))
-      return fail(verdict, {{}, {owner}}, "vertex {} is owned by particle {}, which is dead", v, owner);
+      return fail(verdict, {{}, {owner}, {}, around(v)}, "vertex {} is owned by particle {}, which is dead", v, owner);
     const int32_t other = body.neighbour(owner, direction);
     if (is_alive(other)) {
-      return fail(verdict, {{}, {owner, other}},
+      return fail(verdict, {{}, {owner, other}, {}, around(v)},
                   "vertex {} lies on the edge from particle {} to particle {}, and both are alive", v, owner, other);
     }
     if (vertices_on[6 * at(owner) + at(direction)]++) {
-      return fail(verdict, {{}, {owner}}, "the edge from particle {} in direction {} carries two vertices", owner,
-                  direction);
+      return fail(verdict, {{}, {owner}, {}, around(v)},
+                  "the edge from particle {} in direction {} carries two vertices", owner, direction);
     }
   }
   for (int32_t i = 0; i < body.particle_count(); ++i) {
@@ -190,7 +203,7 @@ void check_skin_vertices(Judged& judged, Verdict& verdict) {
   for (std::size_t v = 0; v < skin.owner.size(); ++v) {
     const int32_t owner = skin.owner[v];
     if (memberships.of(owner).empty())
-      return fail(verdict, {{}, {owner}}, "particle {} owns vertex {} and lies in no cluster", owner, v);
+      return fail(verdict, {{}, {owner}, {}, around(v)}, "particle {} owns vertex {} and lies in no cluster", owner, v);
   }
   const double h = body.grid.spacing;
   Nearest nearest;
@@ -203,8 +216,9 @@ void check_skin_vertices(Judged& judged, Verdict& verdict) {
   verdict.bound = nearest.bound;
   if (nearest.holds()) return;
   const int32_t owner = skin.owner[at(nearest.where)];
-  fail(verdict, {{}, {owner}}, "vertex {} of particle {} is {} h from where the particle's clusters put it",
-       nearest.where, owner, verdict.measured);
+  fail(verdict, {{}, {owner}, {}, around(at(nearest.where))},
+       "vertex {} of particle {} is {} h from where the particle's clusters put it", nearest.where, owner,
+       verdict.measured);
 }
 
 }  // namespace cutproof::oracles

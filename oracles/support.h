@@ -111,16 +111,18 @@ inline Verdict start_verdict(std::string_view property, const State& state, std:
   return verdict;
 }
 
-// What a witness names: numbers of clusters, particles, and particles along a path of G that shows it.
+// What a witness names: numbers of clusters, particles, particles along a path of G that shows it, and triangles of the
+// skin, of which only the first kMostWitnessTriangles are kept.
 struct Concerned {
-  std::vector<int32_t> clusters = {}, particles = {}, path = {};
+  std::vector<int32_t> clusters = {}, particles = {}, path = {}, triangles = {};
 };
 
 // With a sentence for a person.
 template <class... Args>
 Witness witness_of(Concerned concerned, fmt::format_string<Args...> text, Args&&... args) {
+  if (std::ssize(concerned.triangles) > kMostWitnessTriangles) concerned.triangles.resize(kMostWitnessTriangles);
   return {std::move(concerned.clusters), std::move(concerned.particles), std::move(concerned.path),
-          fmt::format(text, std::forward<Args>(args)...)};
+          fmt::format(text, std::forward<Args>(args)...), std::move(concerned.triangles)};
 }
 
 // For a verdict that fills in by itself what was measured.

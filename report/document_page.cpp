@@ -25,19 +25,21 @@ namespace {
 json side_json(const Side& side, std::vector<std::string>& chunks) {
   const Pictures& pictures = side.pictures;
   const std::size_t first = chunks.size();
-  chunks.insert(chunks.end(), pictures.chunks.begin(), pictures.chunks.end());
+  chunks.insert(chunks.end(), pictures.own.text.begin(), pictures.own.text.end());
   json marks = nullptr;
   if (!pictures.marks.empty()) {
     const Marks& of_first = pictures.marks.front();
     marks = {{"moment", of_first.moment},       {"exact", of_first.is_exact}, {"partly", of_first.is_partly},
-             {"particles", of_first.particles}, {"path", of_first.path},      {"members", of_first.clusters}};
+             {"particles", of_first.particles}, {"path", of_first.path},      {"members", of_first.clusters},
+             {"corners", of_first.corners}};
   }
   return {{"name", side.name},
-          {"moments", pictures.details},
-          {"chunks", {first, chunks.size()}},
+          {"moments", pictures.own.details},
+          {"firstMoment", pictures.own.first_moment},
+          {"firstChunk", first},
           {"marks", std::move(marks)},
-          {"loss", pictures.loss},
-          {"nowhere", pictures.nowhere},
+          {"loss", pictures.own.loss},
+          {"nowhere", pictures.own.nowhere},
           {"thinned", pictures.thinning != Thinning()},
           {"reach",
            {{pictures.reach_low.x, pictures.reach_low.y, pictures.reach_low.z},

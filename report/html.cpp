@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "report/assets.h"
@@ -33,12 +34,18 @@ std::string filled(std::string_view page, const std::vector<std::pair<std::strin
 
 }  // namespace
 
-std::string html(const std::string& data, const std::vector<std::string>& chunks) {
+std::string html(const std::string& data, const std::vector<std::string>& chunks,
+                 const std::vector<std::string>& beside) {
   std::string later;
-  for (std::size_t k = 1; k < chunks.size(); ++k) {
-    later += fmt::format("<script type=\"application/octet-stream\" id=\"chunk-{}\">", k);
-    later += chunks[k];
+  const auto add = [&](const char* name, std::size_t k, const std::string& chunk) {
+    later += fmt::format("<script type=\"application/octet-stream\" id=\"{}-{}\">", name, k);
+    later += chunk;
     later += "</script>\n";
+  };
+  // In the order in which they are looked at: of both runs what belongs to the same moments.
+  for (std::size_t k = 0; k < std::max(chunks.size(), beside.size()); ++k) {
+    if (k > 0 && k < chunks.size()) add("chunk", k, chunks[k]);
+    if (k < beside.size()) add("beside", k, beside[k]);
   }
   return filled(kPageHtml, {{"@STYLE_HASH@", kPageStyleHash},
                             {"@SCRIPT_HASH@", kPageScriptHash},

@@ -5,7 +5,9 @@
 
 namespace cutproof::report {
 
-// `data`: JSON as it may stand in a script element (script_json). `chunks`: base64, elements chunk-0, chunk-1, ...
-std::string html(const std::string& data, const std::vector<std::string>& chunks);
+// `data`: JSON as it may stand in a script element (script_json). Base64: `chunks`, elements chunk-0, chunk-1, ..., and
+// those of a run beside it, beside-0, beside-1, ...
+std::string html(const std::string& data, const std::vector<std::string>& chunks,
+                 const std::vector<std::string>& beside = {});
 
 }  // namespace cutproof::report

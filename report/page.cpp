@@ -35,7 +35,8 @@ json finding_json(const Finding& finding, const Marks& marks) {
             {"partly", marks.is_partly},
             {"particles", marks.particles},
             {"path", marks.path},
-            {"members", marks.clusters}}}};
+            {"members", marks.clusters},
+            {"corners", marks.corners}}}};
 }
 
 json row_json(const PropertyRow& row) {
@@ -124,13 +125,16 @@ json data_json(const Source& source, const Results& results, const Pictures& pic
         {"onGrid", body.on_grid()},
         {"orientation", body.orientation.m}}},
       {"blade", setup.has_blade ? json{setup.blade.length, setup.blade.depth, setup.blade.thickness} : json(nullptr)},
-      {"moments", pictures.details},
-      {"firstMoment", pictures.first_moment},
+      {"moments", pictures.own.details},
+      {"firstMoment", pictures.own.first_moment},
+      {"comparison", pictures.comparison},
+      {"besideMoments", pictures.beside.details},
+      {"besideFirst", pictures.beside.first_moment},
       {"reach",
        {{pictures.reach_low.x, pictures.reach_low.y, pictures.reach_low.z},
         {pictures.reach_high.x, pictures.reach_high.y, pictures.reach_high.z}}},
-      {"loss", pictures.loss},
-      {"nowhere", pictures.nowhere},
+      {"loss", std::max(pictures.own.loss, pictures.beside.loss)},
+      {"nowhere", std::max(pictures.own.nowhere, pictures.beside.nowhere)},
       {"thinned", thinned_in_words(pictures, body.particle_count())}};
 }
 
@@ -158,6 +162,27 @@ void require_same_run(const io::Recording& recording, const std::string& scene, 
     refuse("body.particles", fmt::format("{} particles", *results.particles), fmt::format("{}", particles));
 }
 
+void require_same_body(const io::Recording& recording, const std::string& recording_file, const io::Recording& other,
+                       const std::string& other_file) {
+  const Body &one = recording.setup.body, &two = other.setup.body;
+  const auto refuse = [&](const std::string& field, const std::string& problem) {
+    throw InputError(other_file, field, problem,
+                     "give two recordings of one scene: with the same particles, from the same seed");
+  };
+  if (one.particle_count() != two.particle_count()) {
+    refuse("setup/body", fmt::format("this body has {} particles, and that of {} has {}", two.particle_count(),
+                                     recording_file, one.particle_count()));
+  }
+  if (one.grid.spacing != two.grid.spacing) {
+    refuse("setup/body", fmt::format("the spacing of this body is {} m, and that of {} is {} m", two.grid.spacing,
+                                     recording_file, one.grid.spacing));
+  }
+  for (int32_t i = 0; i < one.particle_count(); ++i) {
+    if (!(one.rest_position(i) == two.rest_position(i)))
+      refuse("setup/body", fmt::format("particle {} rests elsewhere than in {}", i, recording_file));
+  }
+}
+
 Results unjudged(const io::Recording& recording, const std::string& scene) {
   Results results;
   results.command = "recording";
@@ -167,10 +192,10 @@ Results unjudged(const io::Recording& recording, const std::string& scene) {
 }
 
 std::string page(const Source& source, const Results& results, const std::string& again, const std::string& program,
-                 int64_t most_picture_bytes) {
-  const Pictures pictures = pictures_of(source, results.findings, most_picture_bytes);
+                 const Beside* beside, int64_t most_picture_bytes) {
+  const Pictures pictures = pictures_of(source, results.findings, most_picture_bytes, beside);
   const std::string data = script_json(io::json_text(data_json(source, results, pictures, again, program)));
-  return html(data, pictures.chunks);
+  return html(data, pictures.own.text, pictures.beside.text);
 }
 
 }  // namespace cutproof::report

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 
+#include "report/beside.h"
 #include "report/pictures.h"
 #include "report/results.h"
 
@@ -16,8 +17,13 @@ inline constexpr int64_t kMostPictureBytes = int64_t{28} << 20;
 
 // The page as text. `again`: the command line that shows it again, `program` the version of this program. Results of
 // another body than the recording's are refused (InputError naming `results_file`).
+// `beside`: another run of the same body, shown or measured beside the one that the page is about; or null.
 std::string page(const Source& source, const Results& results, const std::string& again, const std::string& program,
-                 int64_t most_picture_bytes = kMostPictureBytes);
+                 const Beside* beside = nullptr, int64_t most_picture_bytes = kMostPictureBytes);
+// Throws InputError naming `other_file` if the two do not hold the same body: as many particles, in the same places at
+// rest, with the same edges.
+void require_same_body(const io::Recording& recording, const std::string& recording_file, const io::Recording& other,
+                       const std::string& other_file);
 // Throws InputError if these are not the results of that recording. `scene`: its name in the recording, empty if that
 // does not say.
 void require_same_run(const io::Recording& recording, const std::string& scene, const std::string& recording_file,

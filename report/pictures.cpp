@@ -8,6 +8,10 @@
 #include <utility>
 
 #include "model/at.h"
+#include "model/io/json_number.h"
+#include "model/verdict.h"
+#include "report/beside.h"
+#include "report/changes.h"
 #include "report/coding.h"
 #include "report/pieces.h"
 
@@ -18,7 +22,7 @@ namespace {
 using nlohmann::json;
 
 // Bytes of a chunk before it is compressed, and its moments: little enough to be inflated while somebody scrubs.
-constexpr std::size_t kChunkBytes = std::size_t{3} << 20;
+constexpr std::size_t kChunkBytes = std::size_t{12} << 20;
 constexpr std::size_t kChunkMoments = 16;
 // Nobody looks at more frames than these, so particles are thinned as well rather than frames beyond it.
 constexpr int64_t kFewestFrames = 40;
@@ -30,6 +34,7 @@ constexpr double kReach = 8;
 struct Picture {
   std::vector<Vec3> x, skin;
   std::vector<uint8_t> alive, holders;
+  std::vector<uint8_t> change, apart;  // what is not there is nothing, whatever the moment before had
   std::vector<int32_t> cluster, piece, owner, triangles;
   bool has_skin = false, has_owner = false, has_triangles = false;
 };
@@ -122,7 +127,7 @@ class Chunk {
   }
   // base64; empties it. `edges`: ends of each, only of the first chunk.
   std::string finish(const Box& outer, const std::vector<int32_t>& edge_a, const std::vector<int32_t>& edge_b,
-                     Pictures& result, double spacing) {
+                     Chunks& result, double spacing) {
     Box box = kNothing;
     for (const Picture& picture : pictures_) {
       for (const auto* points : {&picture.x, &picture.skin}) {
@@ -171,6 +176,11 @@ class Chunk {
         add_integers("cluster", picture.cluster);
         one["holders"] = {bytes.size(), picture.holders.size()};
         bytes.append(reinterpret_cast<const char*>(picture.holders.data()), picture.holders.size());
+      }
+      for (const auto& [name, codes] : {std::pair{"change", &picture.change}, std::pair{"apart", &picture.apart}}) {
+        if (std::all_of(codes->begin(), codes->end(), [](uint8_t code) { return code == 0; })) continue;
+        one[name] = {bytes.size(), codes->size()};
+        bytes.append(reinterpret_cast<const char*>(codes->data()), codes->size());
       }
       if (picture.has_skin) {
         add_points("skin", picture.skin, before_skin);
@@ -301,55 +311,107 @@ std::vector<Marks> marks_of(const Source& source, const std::vector<Moment>& mom
       }
       marks.clusters = within({members.begin(), members.end()}, n, most, marks);
     }
+    if (marks.moment >= 0 && !finding.triangles.empty()) {
+      if (const int64_t index = moments[at(marks.moment)].snapshot; index != read) {
+        snapshot = source.snapshot(index);
+        read = index;
+      }
+      const Skin& skin = snapshot.state.skin;
+      for (const int32_t t : finding.triangles) {
+        if (t < 0 || t >= std::ssize(skin.triangles)) continue;
+        if (std::ssize(marks.corners) >= 3 * kMostWitnessTriangles) {
+          marks.is_partly = true;
+          break;
+        }
+        const auto& corners = skin.triangles[at(t)];
+        if (std::all_of(corners.begin(), corners.end(),
+                        [&](int32_t v) { return v >= 0 && v < std::ssize(skin.position); }))
+          marks.corners.insert(marks.corners.end(), corners.begin(), corners.end());
+      }
+    }
     marked += marks.particles.size() + marks.path.size() + marks.clusters.size();
     all.push_back(std::move(marks));
   }
   return all;
 }
 
-Pictures draw(const Source& source, const Survey& survey, const std::vector<Finding>& findings,
-              const std::vector<Marks>& marks, Thinning thinning) {
+// What all drawings of a page have in common, however much they are thinned.
+struct Plan {
+  const Source& source;
+  const Beside* beside;  // or null
+  const std::vector<Finding>& findings;
+  Survey survey;
+  std::vector<Marks> marks;
+  std::vector<Together> moments;  // of both runs, or of the one that there is
+  std::set<int64_t> named;        // frames of which every stage is kept
+  json comparison;
+};
+
+// Snapshots of one run, one after the other. The one that was asked for last is at hand, and the one before it, so that
+// a walk reads each once.
+class Walk {
+ public:
+  explicit Walk(const Source& source) : source_(source) {}
+  const State& at_snapshot(int64_t index) {
+    if (index == index_) return now_;
+    if (index_ == index - 1) {
+      before_ = std::move(now_);
+      before_index_ = index_;
+    }
+    now_ = source_.snapshot(index).state;
+    index_ = index;
+    return now_;
+  }
+  // The state of the snapshot before the one that was asked for last, which is not the first.
+  const State& before() {
+    if (before_index_ != index_ - 1) {
+      before_ = source_.snapshot(index_ - 1).state;
+      before_index_ = index_ - 1;
+    }
+    return before_;
+  }
+
+ private:
+  const Source& source_;
+  State now_, before_;
+  int64_t index_ = -1, before_index_ = -2;
+};
+
+json apart_json(const Apart& apart, const Kept& kept) {
+  const bool is_kept = apart.where >= 0 && std::binary_search(kept.particle.begin(), kept.particle.end(), apart.where);
+  return {{"max", json_number(apart.max)},
+          {"rms", json_number(apart.rms)},
+          {"particle", apart.where},
+          {"place", is_kept ? kept.place[at(apart.where)] : -1},
+          {"differs", apart.differs}};
+}
+
+// Pictures of one of the two runs at these moments. `other`: the one beside it, to which the distance is measured; null
+// for none. Stretch is seen along edges, of which the first chunk holds the ends.
+Chunks drawn(const Source& source, const Source* other, bool is_own, const std::vector<Together>& moments,
+             const Kept& kept, const std::vector<int32_t>& edge_a, const std::vector<int32_t>& edge_b) {
   const Body& body = source.setup.body;
-  Pictures result;
-  result.thinning = thinning;
-  result.frames = survey.frames;
-  result.reach_low = or_origin(survey.reach).low;
-  result.reach_high = or_origin(survey.reach).high;
-  result.moments = kept_moments(survey.moments, findings, thinning.every_frame);
-  const Kept kept = kept_particles(body.particle_count(), thinning.every_particle, marks);
-  result.particles = static_cast<int32_t>(kept.particle.size());
-  for (Marks one : marks) {
-    std::tie(one.moment, one.is_exact) = moment_of(result.moments, findings[result.marks.size()]);
-    for (auto* list : {&one.particles, &one.path, &one.clusters}) {
-      for (int32_t& particle : *list) particle = kept.place[at(particle)];
-    }
-    result.marks.push_back(std::move(one));
-  }
-  // Stretch is seen along edges, which a thinned body does not have.
-  std::vector<int32_t> edge_a, edge_b;
-  for (int32_t i = 0; thinning.every_particle == 1 && i < body.particle_count(); ++i) {
-    for (const int32_t other : body.neighbours(i)) {
-      if (other <= i) continue;
-      edge_a.push_back(i);
-      edge_b.push_back(other);
-    }
-  }
+  Chunks result;
   const Box outer = outer_box(body);
   result.details = json::array();
   Chunk chunk;
-  State before;
+  State before;  // of the moment before, which need not be the snapshot before
+  Walk walk(source);
+  std::optional<Walk> other_walk;
+  if (other != nullptr) other_walk.emplace(*other);
   Pieces pieces;
   int64_t alive = 0;
   const auto close = [&] {
-    const bool is_first = result.chunks.empty();
+    const bool is_first = result.text.empty();
     static const std::vector<int32_t> kNone;
-    result.chunks.push_back(
+    result.text.push_back(
         chunk.finish(outer, is_first ? edge_a : kNone, is_first ? edge_b : kNone, result, body.grid.spacing));
-    result.bytes += std::ssize(result.chunks.back());
+    result.bytes += std::ssize(result.text.back());
   };
-  for (std::size_t k = 0; k < result.moments.size(); ++k) {
-    const Moment& moment = result.moments[k];
-    State state = source.snapshot(moment.snapshot).state;
+  for (std::size_t k = 0; k < moments.size(); ++k) {
+    const Together& both = moments[k];
+    const int64_t snapshot = is_own ? both.own : both.other;
+    const State& state = walk.at_snapshot(snapshot);
     const bool is_new = chunk.is_empty();  // the first of a chunk says everything
     if (is_new) result.first_moment.push_back(k);
     Picture picture;
@@ -373,24 +435,123 @@ Pictures draw(const Source& source, const Survey& survey, const std::vector<Find
       picture.has_owner = is_new || state.skin.owner != before.skin.owner;
       picture.has_triangles = is_new || state.skin.triangles != before.skin.triangles;
     }
-    result.details.push_back(detail(source.setup, moment, state, pieces.count, alive));
+    // A moment that only the other run has changed nothing here.
+    const bool is_of_this = is_own ? both.is_own : both.is_other;
+    if (snapshot > 0 && is_of_this) picture.change = only(changes_between(walk.before(), state), kept);
+    json one = detail(source.setup, both.moment, state, pieces.count, alive);
+    if (other_walk && both.is_comparable) {
+      const Apart apart = apart_of(state, other_walk->at_snapshot(is_own ? both.other : both.own), body.grid.spacing);
+      picture.apart = only(apart.codes, kept);
+      one["apart"] = apart_json(apart, kept);
+    }
+    result.details.push_back(std::move(one));
     chunk.add(std::move(picture));
-    before = std::move(state);
+    before = state;
     if (k == 0 || chunk.is_full()) close();
   }
   if (!chunk.is_empty()) close();
   return result;
 }
 
-// About as many bytes as a place takes in a chunk, of what is not noise.
+Pictures draw(const Plan& plan, Thinning thinning) {
+  const Body& body = plan.source.setup.body;
+  Pictures result;
+  result.thinning = thinning;
+  result.frames = plan.survey.frames;
+  result.reach_low = or_origin(plan.survey.reach).low;
+  result.reach_high = or_origin(plan.survey.reach).high;
+  std::vector<Moment> all;
+  for (const Together& both : plan.moments) all.push_back(both.moment);
+  std::vector<Together> kept_together;
+  result.moments = kept_moments(all, plan.named, thinning.every_frame);
+  for (const Together& both : plan.moments) {
+    const std::size_t next = kept_together.size();
+    if (next < result.moments.size() && both.moment == result.moments[next]) kept_together.push_back(both);
+  }
+  const Kept kept = kept_particles(body.particle_count(), thinning.every_particle, plan.marks);
+  result.particles = static_cast<int32_t>(kept.particle.size());
+  for (Marks one : plan.marks) {
+    std::tie(one.moment, one.is_exact) = moment_of(result.moments, plan.findings[result.marks.size()]);
+    for (auto* list : {&one.particles, &one.path, &one.clusters}) {
+      for (int32_t& particle : *list) particle = kept.place[at(particle)];
+    }
+    result.marks.push_back(std::move(one));
+  }
+  // A thinned body has no edges.
+  std::vector<int32_t> edge_a, edge_b;
+  for (int32_t i = 0; thinning.every_particle == 1 && i < body.particle_count(); ++i) {
+    for (const int32_t other : body.neighbours(i)) {
+      if (other <= i) continue;
+      edge_a.push_back(i);
+      edge_b.push_back(other);
+    }
+  }
+  const Source* const other = plan.beside == nullptr ? nullptr : &plan.beside->source;
+  result.own = drawn(plan.source, other, true, kept_together, kept, edge_a, edge_b);
+  result.bytes = result.own.bytes;
+  if (plan.beside != nullptr && plan.beside->is_shown) {
+    result.beside = drawn(*other, &plan.source, false, kept_together, kept, {}, {});
+    result.bytes += result.beside.bytes;
+  }
+  result.comparison = plan.comparison;
+  return result;
+}
+
+json first_json(const std::optional<FirstApart>& first) {
+  if (!first) return nullptr;
+  return {{"frame", first->moment.is_start ? -1 : first->moment.frame},
+          {"stage", name_of(first->moment.stage)},
+          {"differs", first->differs},
+          {"max", json_number(first->max)}};
+}
+
+Plan plan_of(const Source& source, const std::vector<Finding>& findings, const Beside* beside) {
+  Plan plan = {source, beside, findings, survey_of(source), {}, {}, {}, nullptr};
+  plan.marks = marks_of(source, plan.survey.moments, findings);
+  for (const Finding& finding : findings) plan.named.insert(finding.frame);
+  if (beside == nullptr) {
+    for (const Moment& moment : plan.survey.moments) plan.moments.push_back({moment, moment.snapshot, -1});
+    return plan;
+  }
+  plan.moments = together(plan.survey.moments, moments_of(beside->source), beside->is_shown);
+  const Comparison comparison = compare(source, *beside, plan.moments);
+  for (const auto* first : {&comparison.any, &comparison.decision, &comparison.greatest}) {
+    if (*first) plan.named.insert((*first)->moment.frame);
+  }
+  plan.comparison = {{"name", beside->name},
+                     {"ownName", beside->own_name},
+                     {"shown", beside->is_shown},
+                     {"obtained", beside->obtained},
+                     {"compared", comparison.compared},
+                     {"any", first_json(comparison.any)},
+                     {"decision", first_json(comparison.decision)},
+                     {"greatest", first_json(comparison.greatest)}};
+  return plan;
+}
+
+// As many bytes as a place takes in a chunk at most, of what is not noise.
 constexpr double kBytesOfPlace = 4.5;
+// Moments that are drawn to see how many it takes in this run.
+constexpr std::size_t kSampled = 16;
+
+// Bytes that a place takes in this run, seen from some moments in its middle.
+double sampled_bytes(const Plan& plan, double places) {
+  const std::size_t count = plan.moments.size(), first = count <= kSampled ? 0 : (count - kSampled) / 2;
+  const auto begin = plan.moments.begin() + static_cast<std::ptrdiff_t>(first);
+  const std::vector<Together> some(begin, begin + static_cast<std::ptrdiff_t>(std::min(count, kSampled)));
+  const Kept kept = kept_particles(plan.source.setup.body.particle_count(), 1, {});
+  const Source* const other = plan.beside == nullptr ? nullptr : &plan.beside->source;
+  const Chunks chunks = drawn(plan.source, other, true, some, kept, {}, {});
+  // Of a frame as such: one in which several stages ran has several moments.
+  std::set<int64_t> frames;
+  for (const Together& one : some) frames.insert(one.moment.frame);
+  const double found = static_cast<double>(chunks.bytes) / (static_cast<double>(frames.size()) * places);
+  return std::clamp(found, 0.01, kBytesOfPlace);
+}
 
 }  // namespace
 
-std::vector<Moment> kept_moments(const std::vector<Moment>& all, const std::vector<Finding>& findings,
-                                 int64_t every_frame) {
-  std::set<int64_t> named;
-  for (const Finding& finding : findings) named.insert(finding.frame);
+std::vector<Moment> kept_moments(const std::vector<Moment>& all, const std::set<int64_t>& named, int64_t every_frame) {
   const int64_t last = all.empty() ? 0 : all.back().frame;
   std::vector<Moment> kept;
   for (const Moment& moment : all) {
@@ -403,18 +564,20 @@ std::vector<Moment> kept_moments(const std::vector<Moment>& all, const std::vect
   return kept;
 }
 
-Pictures pictures_of(const Source& source, const std::vector<Finding>& findings, int64_t most_bytes) {
-  const Survey survey = survey_of(source);
-  const std::vector<Marks> marks = marks_of(source, survey.moments, findings);
-  const int64_t frames = std::max<int64_t>(1, std::ssize(survey.frames));
+Pictures pictures_of(const Source& source, const std::vector<Finding>& findings, int64_t most_bytes,
+                     const Beside* beside) {
+  const Plan plan = plan_of(source, findings, beside);
+  const int64_t frames = std::max<int64_t>(1, std::ssize(plan.survey.frames));
   const auto n = static_cast<double>(source.setup.body.particle_count());
   int64_t vertices = 0;
-  for (const FrameEnd& end : survey.frames) vertices = std::max(vertices, end.triangles / 2);
+  for (const FrameEnd& end : plan.survey.frames) vertices = std::max(vertices, end.triangles / 2);
   Thinning thinning;
+  double bytes_of_place = kBytesOfPlace;
   // A guess first, so that a large run is not drawn in full only to be thrown away.
   const auto guessed = [&] {
     const auto shown = static_cast<double>((frames - 1) / thinning.every_frame + 1);
-    return shown * kBytesOfPlace * (n / thinning.every_particle + static_cast<double>(vertices));
+    const double runs = beside != nullptr && beside->is_shown ? 2 : 1;
+    return runs * shown * bytes_of_place * (n / thinning.every_particle + static_cast<double>(vertices));
   };
   const auto thin_more = [&] {
     const bool has_frames = frames / (thinning.every_frame + 1) >= kFewestFrames;
@@ -430,10 +593,12 @@ Pictures pictures_of(const Source& source, const std::vector<Finding>& findings,
     }
     return true;
   };
+  if (guessed() > static_cast<double>(most_bytes) && !plan.moments.empty() && n > 0)
+    bytes_of_place = sampled_bytes(plan, n + static_cast<double>(vertices));
   while (guessed() > static_cast<double>(most_bytes) && thin_more()) {
   }
   for (;;) {
-    Pictures pictures = draw(source, survey, findings, marks, thinning);
+    Pictures pictures = draw(plan, thinning);
     if (pictures.bytes <= most_bytes) return pictures;
     // By as much as it was too large, at once.
     const double goal = guessed() * static_cast<double>(most_bytes) / static_cast<double>(pictures.bytes);

@@ -5,6 +5,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,7 @@ struct Moment {
   int64_t frame = 0;  // that it belongs to: the state after skin counts to the frame that it ends
   Stage stage = Stage::skin;
   bool is_start = false;  // the state as loaded
+  friend bool operator==(const Moment&, const Moment&) = default;
 };
 
 // The state of a frame's end, or as loaded.
@@ -48,30 +50,41 @@ struct Marks {
   bool is_partly = false;                // there are more than are marked
   std::vector<int32_t> particles, path;  // of the witness
   std::vector<int32_t> clusters;         // members of its clusters
+  std::vector<int32_t> corners;          // of its triangles, three of each: vertices of that moment's skin
 };
+
+// Pictures of one run as a browser takes them apart.
+struct Chunks {
+  std::vector<std::string> text;          // base64 of gzip; the first holds the first moment alone
+  std::vector<std::size_t> first_moment;  // of each
+  nlohmann::json details;                 // one for each moment: what the page's words need
+  double loss = 0;                        // by how much a place may be off [h]
+  int64_t nowhere = 0;  // greatest count of particles that one moment does not show: not finite, or far outside
+  int64_t bytes = 0;
+};
+
+struct Beside;
+struct FirstApart;
 
 struct Pictures {
   std::vector<Moment> moments;
-  std::vector<FrameEnd> frames;           // all of the recording, whatever was thinned
-  std::vector<Marks> marks;               // one for each finding
-  nlohmann::json details;                 // one for each moment: what the page's words need
-  std::vector<std::string> chunks;        // base64 of gzip; the first holds the first moment alone
-  std::vector<std::size_t> first_moment;  // of each chunk
-  int32_t particles = 0;                  // kept
-  double loss = 0;                        // by how much a place may be off [h]
-  int64_t nowhere = 0;  // greatest count of particles that one moment does not show: not finite, or far outside
+  std::vector<FrameEnd> frames;  // all of the recording, whatever was thinned
+  std::vector<Marks> marks;      // one for each finding
+  Chunks own, beside;            // of the run itself; of the one beside it, if that is shown
+  int32_t particles = 0;         // kept
   Thinning thinning;
   Vec3 reach_low, reach_high;  // box of all that is alive at the end of any frame, as far as it is drawn [m]
   int64_t bytes = 0;           // of all chunks
+  nlohmann::json comparison;   // with the run beside it, or null
 };
 
 // Thins until the chunks have about so many bytes at most: frames first, then particles too. Throws what snapshot()
-// throws.
-Pictures pictures_of(const Source& source, const std::vector<Finding>& findings, int64_t most_bytes);
+// throws. `beside`: another run of the same body, or null.
+Pictures pictures_of(const Source& source, const std::vector<Finding>& findings, int64_t most_bytes,
+                     const Beside* beside = nullptr);
 
-// Of all moments those that a page shows: the start, the last frame, one frame in so many, and every stage of frames in
-// which a finding arose.
-std::vector<Moment> kept_moments(const std::vector<Moment>& all, const std::vector<Finding>& findings,
-                                 int64_t every_frame);
+// Of all moments those that a page shows: the start, the last frame, one frame in so many, and every stage of the
+// frames that are named, because something in them is spoken of.
+std::vector<Moment> kept_moments(const std::vector<Moment>& all, const std::set<int64_t>& named, int64_t every_frame);
 
 }  // namespace cutproof::report

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 #include <span>
+#include <utility>
 
 #include "model/at.h"
 #include "oracles/partitions.h"
@@ -56,17 +57,33 @@ Holders holders_of(const Clusters& clusters, int32_t particles) {
   return holders;
 }
 
-std::vector<int32_t> members_of(const Clusters& clusters, int32_t number, int32_t particles) {
-  std::vector<int32_t> members;
-  for (std::size_t k = 0; k < clusters.number.size(); ++k) {
-    if (clusters.number[k] != number) continue;
-    for (const int32_t member : extent(clusters, k)) {
-      if (member >= 0 && member < particles) members.push_back(member);
-    }
+namespace {
+
+void add_members(std::vector<int32_t>& members, std::span<const int32_t> given, int32_t particles) {
+  for (const int32_t member : given) {
+    if (member >= 0 && member < particles) members.push_back(member);
   }
+}
+std::vector<int32_t> each_once(std::vector<int32_t> members) {
   std::sort(members.begin(), members.end());
   members.erase(std::unique(members.begin(), members.end()), members.end());
   return members;
+}
+
+}  // namespace
+
+std::vector<int32_t> members_of(const Clusters& clusters, int32_t number, int32_t particles) {
+  std::vector<int32_t> members;
+  for (std::size_t k = 0; k < clusters.number.size(); ++k) {
+    if (clusters.number[k] == number) add_members(members, extent(clusters, k), particles);
+  }
+  return each_once(std::move(members));
+}
+
+std::vector<int32_t> members_at(const Clusters& clusters, std::size_t place, int32_t particles) {
+  std::vector<int32_t> members;
+  add_members(members, extent(clusters, place), particles);
+  return each_once(std::move(members));
 }
 
 }  // namespace cutproof::report

@@ -26,4 +26,7 @@ Holders holders_of(const Clusters& clusters, int32_t particles);
 // Particles of the cluster of this number, none twice; empty if there is no such cluster.
 std::vector<int32_t> members_of(const Clusters& clusters, int32_t number, int32_t particles);
 
+// The same of the cluster in this place of the list.
+std::vector<int32_t> members_at(const Clusters& clusters, std::size_t place, int32_t particles);
+
 }  // namespace cutproof::report

@@ -89,7 +89,7 @@ void add_verdict(const Field& verdict, const Measured* known, std::vector<Row>& 
   results.findings.push_back({property, stage, frame, figure(measured), figure(bound), unit, of_bound, source,
                               witness["text"].text(), witness["clusters"].numbers(kMostWitnesses),
                               witness["particles"].numbers(kMostWitnesses), witness["path"].numbers(kMostWitnesses),
-                              is_expected});
+                              witness["triangles"].numbers(kMostWitnesses), is_expected});
 }
 
 void add_verdicts(const Field& document, Results& results) {

@@ -19,7 +19,7 @@ struct Finding {
   std::optional<double> of_bound;     // measured / bound; nothing where the bound is 0 or one of them is not finite
   std::string bound_source;
   std::string text;  // the witness in words
-  std::vector<int32_t> clusters, particles, path;
+  std::vector<int32_t> clusters, particles, path, triangles;
   bool is_expected = false;
 };
 

@@ -26,7 +26,8 @@ nlohmann::json verdict_json(const Verdict& verdict, bool expected_failure) {
     result["witness"] = {{"text", verdict.witness.text},
                          {"clusters", verdict.witness.clusters},
                          {"particles", verdict.witness.particles},
-                         {"path", verdict.witness.path}};
+                         {"path", verdict.witness.path},
+                         {"triangles", verdict.witness.triangles}};
   }
   return result;
 }

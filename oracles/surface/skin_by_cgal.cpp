@@ -135,8 +135,8 @@ void check_skin_geometry(Judged& judged, Verdict& verdict) {
   pmp::degenerate_faces(*mesh, std::back_inserter(degenerate));
   if (!degenerate.empty()) {
     verdict.measured = static_cast<double>(degenerate.size());
-    return fail(verdict, owners_of(skin, vertices_of(degenerate[0])), "triangle {} has no area at rest",
-                static_cast<uint32_t>(degenerate[0]));
+    return fail(verdict, owners_of(skin, vertices_of(degenerate[0]), {static_cast<int32_t>(degenerate[0])}),
+                "triangle {} has no area at rest", static_cast<uint32_t>(degenerate[0]));
   }
   std::vector<std::pair<Mesh::Face_index, Mesh::Face_index>> crossing;
   pmp::self_intersections(*mesh, std::back_inserter(crossing));
@@ -144,8 +144,8 @@ void check_skin_geometry(Judged& judged, Verdict& verdict) {
     verdict.measured = static_cast<double>(crossing.size());
     auto vertices = vertices_of(crossing[0].first);
     for (const int32_t v : vertices_of(crossing[0].second)) vertices.push_back(v);
-    return fail(verdict, owners_of(skin, vertices), "triangles {} and {} intersect at rest",
-                static_cast<uint32_t>(crossing[0].first), static_cast<uint32_t>(crossing[0].second));
+    const auto one = static_cast<int32_t>(crossing[0].first), other = static_cast<int32_t>(crossing[0].second);
+    return fail(verdict, owners_of(skin, vertices, {one, other}), "triangles {} and {} intersect at rest", one, other);
   }
 
   double volume = 0, magnitude = 0;

@@ -1,29 +1,42 @@
 // What particles are coloured by. Colours of Okabe and Ito and of cividis, which people of all kinds of colour vision
-// tell apart.
-import { figure } from './dom.js';
+// tell apart (tests/report/colours_test.py). A colour is a number as the GPU takes it: red in its lowest byte.
+import { figure, plural } from './dom.js';
 
 const kOkabeIto = ['#56B4E9', '#E69F00', '#009E73', '#F0E442', '#CC79A7', '#0072B2', '#D55E00'];
 const kCividis = ['#00224e', '#2a3f6d', '#575d6d', '#7d7c78', '#a59c74', '#d2c060', '#fee838'];
-export const kTissue = [0.82, 0.62, 0.55];
+// What a stage changed, in the order of report/changes.h.
+const kChanges = ['#bdb6ae', '#56b4e9', '#f0e442', '#e69f00', '#009e73', '#0b3c8c', '#1b1b1b'];
+const kChangeWords = ['nothing', 'moved', 'skin made here', 'in a cluster that lost members, or is new', 'a cluster grew over it', 'in a cluster that was merged', 'removed'];
 
-const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16) / 255);
-const palette = kOkabeIto.map(rgb);
-const ramp = kCividis.map(rgb);
+const channels = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
+const packed = ([r, g, b]) => ((r & 255) | ((g & 255) << 8) | ((b & 255) << 16)) >>> 0;
+export const kTissue = packed([209, 158, 140]);
+export const kGrey = packed([128, 128, 128]);
+export const kDead = packed([115, 115, 115]);
+const palette = kOkabeIto.map((hex) => packed(channels(hex)));
+const changeColours = kChanges.map((hex) => packed(channels(hex)));
 export const rampStops = kCividis;
+export const kIncomparable = 255;
+const kRemoved = 6;
 
-function onRamp(share) {
-  const at = Math.min(Math.max(share, 0), 1) * (ramp.length - 1);
-  const k = Math.min(Math.floor(at), ramp.length - 2);
-  return ramp[k].map((low, c) => low + (at - k) * (ramp[k + 1][c] - low));
+const ramp = new Uint32Array(256);
+for (let k = 0; k < 256; ++k) {
+  const at = (k / 255) * (kCividis.length - 1), low = Math.min(Math.floor(at), kCividis.length - 2);
+  const a = channels(kCividis[low]), b = channels(kCividis[low + 1]);
+  ramp[k] = packed(a.map((x, c) => Math.round(x + (at - low) * (b[c] - x))));
 }
+const onRamp = (share) => ramp[Math.round(255 * Math.min(Math.max(share, 0), 1))];
 
 // A number's own colour: the same in every frame.
+const shades = [];
+for (let k = 0; k < 3 * kOkabeIto.length; ++k) {
+  const light = 0.72 + 0.14 * (k % 3);
+  shades.push(packed(channels(kOkabeIto[Math.floor(k / 3)]).map((x) => Math.round(x * light))));
+}
 function coloured(key) {
-  if (key < 0) return [0.5, 0.5, 0.5];
+  if (key < 0) return kGrey;
   const mixed = Math.imul(key + 1, 0x9e3779b1) >>> 0;
-  const hue = palette[mixed % palette.length];
-  const light = 0.72 + 0.14 * ((mixed >>> 8) % 3);
-  return hue.map((c) => c * light);
+  return shades[3 * (mixed % kOkabeIto.length) + ((mixed >>> 8) % 3)];
 }
 
 // A nice number, not below x: 1, 2 or 5 times a power of ten.
@@ -45,9 +58,14 @@ function stretches(xyz, alive, edges) {
   return found;
 }
 
-// Each: what it is called, and of a picture the colour of each particle and a legend.
-export function colourings(hasStretch) {
+// A distance of its byte (report/beside.h): four to a decade from 1e-12 h on.
+const decade = (code) => code / 4 - 12;
+
+// Each: what it is called, and of a picture the colour of each particle and a legend: words, a scale or keys.
+// `comparison`: with another run, or null.
+export function colourings(hasStretch, comparison) {
   let farthest = 1e-9;  // so far, so that colours mean the same from frame to frame
+  let least = 250, most = 1;
   const all = {
     piece: {
       name: 'piece of tissue',
@@ -55,7 +73,7 @@ export function colourings(hasStretch) {
         let pieces = 0;
         for (const piece of moment.piece) if (piece >= pieces) pieces = piece + 1;
         return {
-          colour: (i) => (moment.piece[i] < 0 ? [0.5, 0.5, 0.5] : moment.piece[i] === 0 ? kTissue
+          colour: (i) => (moment.piece[i] < 0 ? kGrey : moment.piece[i] === 0 ? kTissue
             : palette[(moment.piece[i] - 1) % palette.length]),
           words: pieces <= 1 ? 'One piece of tissue.' : `${pieces} pieces of tissue, each in a colour of its own; the largest is pink.`,
         };
@@ -65,34 +83,71 @@ export function colourings(hasStretch) {
       name: 'cluster',
       of: ({ moment }) => ({ colour: (i) => coloured(moment.cluster[i]), words: 'Each particle has the colour of the first cluster that holds it.' }),
     },
+    change: {
+      name: 'what the last stage changed',
+      of({ moment, stage, isStart }) {
+        const counts = new Array(kChanges.length).fill(0);
+        const change = moment.change;
+        if (change) for (const code of change) if (code < counts.length) ++counts[code];
+        const keys = counts.map((n, code) => [kChanges[code], `${kChangeWords[code]} (${plural(n, 'particle')})`, n]).filter(([, , n], code) => code > 0 && n > 0);
+        return {
+          colour: (i) => changeColours[change ? change[i] : 0] || kGrey,
+          shows: (i) => (change && change[i] === kRemoved ? 2 : 0),
+          words: isStart ? 'Nothing has run yet.' : keys.length ? `Since the snapshot before, ${stage} has changed:` : `Since the snapshot before, ${stage} has changed no particle.`,
+          keys,
+        };
+      },
+    },
     displacement: {
       name: 'displacement',
-      of({ xyz, start }) {
+      of({ places, start }) {
+        const xyz = places();
         const far = new Float32Array(xyz.length / 3);
         for (let i = 0; i < far.length; ++i) {
           far[i] = Math.hypot(xyz[3 * i] - start[3 * i], xyz[3 * i + 1] - start[3 * i + 1], xyz[3 * i + 2] - start[3 * i + 2]);
           if (far[i] > farthest) farthest = far[i];
         }
-        const most = roundUp(farthest);
-        return { colour: (i) => onRamp(far[i] / most), words: 'How far each particle is from where it began.', scale: ['0 h', `${figure(most)} h`] };
+        const end = roundUp(farthest);
+        return { colour: (i) => onRamp(far[i] / end), words: 'How far each particle is from where it began.', scale: ['0 h', `${figure(end)} h`] };
+      },
+    },
+    apart: {
+      name: comparison && comparison.shown ? 'distance between the two' : 'distance to the reference',
+      of({ moment, apart }) {
+        const codes = moment.apart;
+        if (!apart) return { colour: () => kGrey, words: 'This moment has no counterpart, so there is no distance.' };
+        if (codes) {
+          for (const code of codes) {
+            if (code === 0 || code === kIncomparable) continue;
+            if (code < least) least = code;
+            if (code > most) most = code;
+          }
+        }
+        const low = Math.min(least, most - 4);
+        return {
+          colour: (i) => { const code = codes ? codes[i] : 0; return code === kIncomparable ? changeColours[3] : code === 0 ? ramp[0] : onRamp((code - low) / (most - low)); },
+          words: `Distance to ${comparison.obtained}; on a logarithmic scale. Orange: there in one of the two only.`,
+          scale: codes ? [`0 or ${figure(10 ** decade(low))} h`, `${figure(10 ** decade(most))} h`] : ['0 h', 'nowhere more'],
+        };
       },
     },
     stretch: {
       name: 'stretch',
-      of({ xyz, moment, edges }) {
-        const found = stretches(xyz, moment.alive, edges);
+      of({ places, moment, edges }) {
+        const found = stretches(places(), moment.alive, edges);
         return { colour: (i) => onRamp((found[i] - 1) / 0.5), words: 'Length of each particle’s longest edge.', scale: ['1 h: at rest', '1.5 h and more'] };
       },
     },
     holders: {
       name: 'number of clusters',
       of({ moment }) {
-        let most = 1;
-        for (const holders of moment.holders) if (holders > most) most = holders;
-        return { colour: (i) => onRamp(moment.holders[i] / most), words: 'How many clusters hold each particle.', scale: ['0', String(most)] };
+        let greatest = 1;
+        for (const holders of moment.holders) if (holders > greatest) greatest = holders;
+        return { colour: (i) => onRamp(moment.holders[i] / greatest), words: 'How many clusters hold each particle.', scale: ['0', String(greatest)] };
       },
     },
   };
   if (!hasStretch) delete all.stretch;
+  if (!comparison) delete all.apart;
   return all;
 }

@@ -1,6 +1,7 @@
 // The page: reads its data, puts them together, and keeps view, player, verdicts and plots at the same moment.
 import { Moments } from './coding.js';
 import { colourings, rampStops } from './colours.js';
+import { apartInWords, comparisonCard } from './compare.js';
 import { showDocuments } from './documents.js';
 import { byId, count, drawing, element, figure, plural } from './dom.js';
 import { plotsOf } from './plots.js';
@@ -10,11 +11,14 @@ import { View, contextOf } from './view.js';
 const data = JSON.parse(byId('data').textContent);
 // A page of documents has no moments of its own.
 const moments = new Moments(data.firstMoment || []);
+const comparison = data.comparison;
+const besides = comparison && comparison.shown ? new Moments(data.besideFirst, 'beside') : null;
 const last = (data.moments || []).length - 1;
 const kFramesPerSecond = 15;
 
-const state = { at: 0, finding: null, isPlaying: false };
-let view = null, edges = null, plots = [], shown = 0;
+// spot: a particle that is marked where no verdict names any, by its place on the page.
+const state = { at: 0, finding: null, isPlaying: false, spot: null };
+let view = null, edges = null, plots = [], shown = 0, colours = null;
 
 const words = (moment) => (moment.start ? 'As loaded' : `Frame ${moment.frame}, after ${moment.stage}`);
 
@@ -33,7 +37,7 @@ function header() {
 // --- The view and its player
 
 const look = { skin: true, particles: false, removed: false, colouring: null };
-const canvas = element('canvas', { id: 'canvas', tabindex: 0, role: 'application', 'aria-label': '3D view. Arrow keys turn it, plus and minus come nearer and go away, 0 goes back; space plays, comma and full stop go back and on.' });
+const canvas = element('canvas', { id: 'canvas', tabindex: 0, role: 'application', 'aria-label': '3D view. Arrow keys turn it, plus and minus come nearer and go away, 0 goes back; space plays, comma and full stop go back and on. C cuts the body open; brackets move the cut, Alt with arrows turns it.' });
 const status = element('p', { id: 'status' });
 const witness = element('p', { id: 'witness', role: 'status' });
 const legend = element('p', { id: 'legend', class: 'small' });
@@ -65,7 +69,7 @@ function timeline() {
 function controls() {
   const button = (text, name, onclick) => element('button', { type: 'button', text, 'aria-label': name, title: name, onclick });
   play.addEventListener('click', () => setPlaying(!state.isPlaying));
-  range.addEventListener('input', () => { setPlaying(false); go(Number(range.value)); });
+  range.addEventListener('input', () => { setPlaying(false); if (view) view.hurry(); go(Number(range.value)); });
   const step = (by) => () => { setPlaying(false); go(state.at + by); };
   const frame = (by) => () => { setPlaying(false); go(nextFrame(state.at, by)); };
   const [marks, keys] = timeline();
@@ -75,7 +79,8 @@ function controls() {
 }
 
 function lookControls(hasSkin) {
-  const all = colourings(Boolean(edges) && data.body.onGrid);
+  const all = colourings(Boolean(edges) && data.body.onGrid, comparison);
+  colours = all;
   look.colouring = all.piece;
   look.skin = hasSkin;
   look.particles = !hasSkin;
@@ -85,7 +90,8 @@ function lookControls(hasSkin) {
     hasSkin && select('Show', 'show', shows, (value) => { look.skin = value !== 'particles'; look.particles = value !== 'skin'; }),
     select('Colour', 'colour', Object.entries(all).map(([key, one]) => [key, one.name]), (value) => { look.colouring = all[value]; }),
     element('label', {}, element('input', { type: 'checkbox', id: 'removed', onchange: (event) => { look.removed = event.target.checked; update(); } }), element('span', { text: 'removed' })),
-    view && element('button', { type: 'button', class: 'quiet', text: 'Whole body', onclick: () => view.orbit.goHome() }));
+    ...view.plane.controls(view.orbit),
+    element('button', { type: 'button', class: 'quiet', text: 'Whole body', onclick: () => view.orbit.goHome() }));
 }
 
 function setPlaying(isPlaying) {
@@ -98,6 +104,7 @@ function setPlaying(isPlaying) {
     if (!state.isPlaying) return;
     if (now >= due) {
       due = Math.max(due + 1000 / kFramesPerSecond, now);
+      if (view) view.hurry();
       await go(nextFrame(state.at, 1));
       if (state.at === last) return setPlaying(false);
     }
@@ -107,13 +114,40 @@ function setPlaying(isPlaying) {
 }
 
 // To a moment. What was marked stays marked only where it was found.
-async function go(at, finding = null) {
+async function go(at, finding = null, spot = null) {
+  state.spot = spot;
   state.at = Math.min(Math.max(at, 0), last);
   if (finding !== state.finding) {
     state.finding = finding;
     for (const button of document.querySelectorAll('[data-finding]')) button.setAttribute('aria-pressed', String(Number(button.dataset.finding) === finding && finding !== null));
   }
   await update();
+}
+
+// What the colours of marks mean, of those that there are.
+function markedWords({ particles, path, members, corners, partly, exact }) {
+  const said = [];
+  const triangles = corners.length / 3;
+  if (particles.length + path.length > 0) said.push(`Marked orange: what the verdict names${triangles ? `, ${plural(triangles, 'triangle')} of the skin among it` : ''}.`);
+  else if (triangles) said.push(`Marked orange: ${plural(triangles, 'triangle')} of the skin, which the verdict names.`);
+  if (members.length > 0) said.push('Yellow: the members of its clusters.');
+  if (said.length === 0) said.push('The verdict names no place.');
+  if (partly) said.push('There are more than are marked.');
+  if (!exact) said.push('The recording has no moment after this stage; this is the next one.');
+  return ` ${said.join(' ')}`;
+}
+
+// Plots follow a little later while somebody scrubs: a browser draws each of them anew.
+let plotted = -Infinity, plotting = null;
+function showInPlots() {
+  const kEvery = 200, left = plotted + kEvery - performance.now();
+  clearTimeout(plotting);
+  if (left > 0 && view && view.isQuick) {
+    plotting = setTimeout(showInPlots, left);
+    return;
+  }
+  plotted = performance.now();
+  for (const one of plots) one.setFrame(frameOf(state.at));
 }
 
 async function update() {
@@ -125,22 +159,33 @@ async function update() {
   const facts = [plural(moment.components, 'piece'), plural(moment.clusters, 'cluster'), plural(moment.particles, 'particle')];
   if (moment.removed > 0) facts.push(`${count(moment.removed)} removed in this frame`);
   if (data.blade) facts.push(moment.blade ? 'blade down' : 'blade up');
+  const apart = apartInWords(comparison, moment);
+  if (apart) facts.push(apart);
   status.replaceChildren(element('strong', { text: words(moment) }), element('span', { class: 'muted', text: ` · ${facts.join(' · ')}` }));
   witness.textContent = found ? `${found.property} fails here: ${found.text}` : '';
-  for (const one of plots) one.setFrame(frameOf(state.at));
+  showInPlots();
   document.documentElement.dataset.moment = state.at;
   if (!view) return;
-  const arrays = await moments.get(state.at);
+  const arrays = await Promise.all([moments.get(state.at), ...(besides ? [besides.get(state.at)] : [])]);
   if (ticket !== shown) return;  // somebody has gone on meanwhile
-  const said = view.show(arrays, moment.blade, look, found && found.marks, edges);
+  const abouts = besides ? [moment, data.besideMoments[state.at]] : [moment];
+  const spot = state.spot === null ? null : { particles: [state.spot], path: [], members: [] };
+  const said = view.show(arrays, abouts, look, found ? found.marks : spot);
   legend.replaceChildren(element('span', { text: said.words }));
   if (said.scale) {
     const ramp = drawing('svg', { class: 'ramp', viewBox: '0 0 70 10', 'aria-hidden': 'true' }, ...rampStops.map((fill, k) => drawing('rect', { x: 10 * k, y: 0, width: 10.5, height: 10, fill })));
     legend.append(element('span', { text: ` ${said.scale[0]} ` }), ramp, element('span', { text: ` ${said.scale[1]}.` }));
   }
+  if (said.keys) legend.append(...said.keys.map(([fill, text]) => element('span', { class: 'keyed' }, drawing('svg', { class: 'swatch', viewBox: '0 0 10 10', 'aria-hidden': 'true' }, drawing('rect', { width: 10, height: 10, fill })), element('span', { text }))));
+  if (view.plane.isOn) legend.append(element('span', { id: 'cut-words', text: ` ${view.plane.words()}${data.body.kept < data.body.particles ? ' This page holds some of the particles only, so the face has holes.' : ''}` }));
   if (moment.start && look.skin && !look.particles) legend.append(element('span', { text: ' The skin comes with the first frame; until then particles are shown.' }));
-  if (found) legend.append(element('span', { class: 'marked-key', text: ' Marked orange: what the verdict names.' }), found.marks.members.length > 0 && element('span', { text: ' Yellow: the members of its clusters.' }) || '', found.marks.partly && element('span', { text: ' There are more than are marked.' }) || '', !found.marks.exact && element('span', { text: ' The recording has no moment after this stage; this is the next one.' }) || '');
+  if (found) legend.append(element('span', { class: 'marked-key', text: markedWords(found.marks) }));
   document.documentElement.dataset.shown = `${state.at}/${state.finding === null ? '' : state.finding}`;
+}
+
+function sayCut() {
+  const words = byId('cut-words');
+  if (words) words.textContent = ` ${view.plane.words()}`;
 }
 
 // The moment after a stage of a frame, or the nearest that this page holds.
@@ -160,6 +205,20 @@ async function jump(frame, stage) {
   byId('view').scrollIntoView({ block: 'nearest' });
 }
 
+// Where the two runs are apart, with the particle that is farthest.
+async function showApart(frame, stage) {
+  setPlaying(false);
+  const at = frame < 0 ? 0 : momentOf(frame, stage);
+  const { apart } = data.moments[at];
+  if (view) {
+    look.colouring = colours.apart;
+    byId('colour').value = 'apart';
+  }
+  await go(at, null, apart && apart.place >= 0 && apart.max !== 0 ? apart.place : null);
+  if (view) view.flyToMarks();
+  byId('view').scrollIntoView({ block: 'nearest' });
+}
+
 async function showFinding(k) {
   setPlaying(false);
   const { marks } = data.findings[k];
@@ -174,6 +233,7 @@ function findings() {
   const section = byId('findings');
   const failing = data.findings.filter((one) => !one.expected);
   byId('findings-title').textContent = failing.length ? 'What fails' : !data.checked ? 'Nothing was judged' : data.holds ? 'Nothing fails' : 'It does not hold';
+  if (comparison) section.append(comparisonCard(comparison, showApart));
   if (!data.checked) section.append(element('p', { text: 'This page shows what happened. Whether it is right, this command judges:' }));
   if (data.checked && data.holds && !failing.length) {
     const near = data.rows.filter((row) => row.judged > 0 && row.ofBound !== null).sort((a, b) => b.ofBound - a.ofBound)[0];
@@ -192,7 +252,8 @@ function about() {
   say(`Positions on this page are rounded to steps of 16 bits, and so off by at most ${figure(data.loss)} h (h is the spacing of particles). Verdicts were made from the full numbers.`);
   if (data.thinned) say(data.thinned);
   if (data.nowhere > 0) say(`Up to ${plural(data.nowhere, 'particle')} of a moment are not drawn: their positions are no numbers, or far outside the body.`);
-  say(`Frames count from 0. A frame is step, detect, split, merge, expand and skin; a stage that had nothing to do is left out. This page holds ${plural(data.moments.length, 'moment')}. It needs no network. Keys in the 3D view: arrows turn, with Shift they shift; + and − zoom, 0 shows the whole body; space plays, comma and full stop go a stage back and on.`);
+  say(`Frames count from 0. A frame is step, detect, split, merge, expand and skin; a stage that had nothing to do is left out. This page holds ${plural(data.moments.length, 'moment')}. It needs no network. Keys in the 3D view: arrows turn, with Shift they shift; + and − zoom, 0 shows the whole body; space plays, comma and full stop go a stage back and on; C cuts the body open, [ and ] move the cut and Alt with arrows turns it, as dragging with Alt and with Alt and Shift does.`);
+  if (!comparison) say('A distance to the reference is shown where one was asked for: cutproof run --against reference --report, or cutproof report with a second recording.');
 }
 
 async function main() {
@@ -207,22 +268,26 @@ async function main() {
   const section = byId('view');
   section.append(place);
   if (last < 0) return place.replaceChildren(element('p', { class: 'card', text: 'This recording holds no moment to show.' }));
-  const context = contextOf(canvas);
-  if (context) {
-    view = new View(canvas, context, data);
+  const found = contextOf(canvas);
+  if (found) {
+    view = new View(canvas, found, data);
+    if (comparison && comparison.shown) place.append(element('p', { class: 'side', text: comparison.ownName }), element('p', { class: 'side other', text: comparison.name }));
   } else {
     place.replaceChildren(element('p', { class: 'nothing', id: 'no-webgl', text: 'This browser shows no 3D view (WebGL is not there). Everything else on this page works.' }));
   }
   if (view) {
     const first = await moments.chunk(0);
     edges = first.edges || null;
-    view.begin(first.moments[0]);
+    view.begin(first.moment(0), edges);
+    // What is drawn depends on whether there is a cut; where it lies, the GPU knows.
+    view.plane.changed = (isOther) => { view.hurry(); if (isOther) update(); else { view.draw(); sayCut(); } };
     section.append(controls(), status, witness, lookControls(data.frames.triangles.some((triangles) => triangles > 0)), legend);
   } else {
     section.append(controls(), status, witness);
   }
   const keys = { ' ': () => setPlaying(!state.isPlaying), ',': () => go(state.at - 1), '.': () => go(state.at + 1) };
   canvas.addEventListener('keydown', (event) => {
+    if (view && view.plane.key(event)) return event.preventDefault();
     if (!keys[event.key]) return;
     event.preventDefault();
     keys[event.key]();

@@ -27,6 +27,8 @@ export class Orbit {
         if (apart > 0 && now > 0) this.at.distance *= apart / now;
         apart = now;
         this.pan(dx / 2, dy / 2, element.clientHeight);
+      } else if (event.altKey && this.onAltDrag) {
+        this.onAltDrag(dx, dy, event.shiftKey);
       } else if (event.shiftKey || event.buttons & 6) {
         this.pan(dx, dy, element.clientHeight);
       } else {

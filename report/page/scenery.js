@@ -1,20 +1,10 @@
 // Both runs of a counterexample, side by side: the backend's and the reference's, at the same moment.
-import { inflate, unpack } from './coding.js';
+import { Moments } from './coding.js';
 import { colourings } from './colours.js';
 import { byId, element, plural } from './dom.js';
 import { View, contextOf } from './view.js';
 
 const words = (moment) => (moment.start ? 'As loaded' : `Frame ${moment.frame}, after ${moment.stage}`);
-
-async function momentsOf(side) {
-  const chunks = [];
-  for (let k = side.chunks[0]; k < side.chunks[1]; ++k) {
-    while (!byId(`chunk-${k}`) && document.readyState === 'loading') await new Promise((resolve) => setTimeout(resolve, 30));
-    chunks.push(inflate(byId(`chunk-${k}`).textContent.trim()).then(unpack));
-  }
-  const done = await Promise.all(chunks);
-  return { arrays: done.flatMap((chunk) => chunk.moments), edges: done.length ? done[0].edges : null };
-}
 
 // The moment of another run that is nearest to one of this.
 function sameMoment(moments, like) {
@@ -37,7 +27,7 @@ export class Sceneries {
     this.range = element('input', { type: 'range', id: 'scrub', min: 0, step: 1, 'aria-label': 'Moment of both runs', oninput: () => this.go(Number(this.range.value)) });
     const button = (text, name, by) => element('button', { type: 'button', text, 'aria-label': name, title: name, onclick: () => this.go(this.at + by) });
     this.skin = element('select', { id: 'show', onchange: () => this.go(this.at) }, element('option', { value: 'particles', text: 'particles' }), element('option', { value: 'skin', text: 'skin' }), element('option', { value: 'both', text: 'both' }));
-    this.colour = element('select', { id: 'colour', onchange: () => this.go(this.at) }, ...Object.entries(colourings(false)).map(([key, one]) => element('option', { value: key, text: one.name })));
+    this.colour = element('select', { id: 'colour', onchange: () => this.go(this.at) }, ...Object.entries(colourings(false, null)).map(([key, one]) => element('option', { value: key, text: one.name })));
     this.fails = element('button', { type: 'button', text: 'Where it fails', onclick: () => this.show(this.number) });
     this.legend = element('p', { id: 'legend', class: 'small' });
     this.section = element('section', { id: 'view', class: 'card', 'aria-labelledby': 'view-title' },
@@ -62,11 +52,12 @@ export class Sceneries {
         this.panes.append(element('figure', { class: 'pane' }, element('figcaption', { text: side.name }), place));
         const context = contextOf(canvas);
         if (!context) place.replaceChildren(element('p', { class: 'nothing no-webgl', text: 'This browser shows no 3D view (WebGL is not there). Everything else on this page works.' }));
-        const { arrays, edges } = await momentsOf(side);
+        const moments = new Moments(side.firstMoment, 'chunk', side.firstChunk);
+        const begin = side.moments.length ? await moments.chunk(0) : null;
         if (this.number !== number) return;
-        const view = context && new View(canvas, context, { body: scenery.body, blade: scenery.blade, reach: side.reach });
-        if (view && arrays.length) view.begin(arrays[0]);
-        this.views.push({ view, side, arrays, edges });
+        const view = context && begin && new View(canvas, context, { body: scenery.body, blade: scenery.blade, reach: side.reach });
+        if (view) view.begin(begin.moment(0), begin.edges || null);
+        this.views.push({ view, side, moments });
       }
       this.range.max = first.moments.length - 1;
       this.fails.hidden = !scenery.property;
@@ -84,15 +75,17 @@ export class Sceneries {
     this.range.value = this.at;
     this.range.setAttribute('aria-valuetext', words(moment));
     const isWhere = Boolean(scenery.property) && marks && marks.moment === this.at;
-    const look = { skin: this.skin.value !== 'particles', particles: this.skin.value !== 'skin', removed: true, colouring: colourings(false)[this.colour.value] };
-    const said = [];
-    for (const { view, side, arrays, edges } of this.views) {
+    const look = { skin: this.skin.value !== 'particles', particles: this.skin.value !== 'skin', removed: true, colouring: colourings(false, null)[this.colour.value] };
+    const said = [], ticket = (this.ticket = (this.ticket || 0) + 1);
+    for (const { view, side, moments: own } of this.views) {
       const k = side === scenery.sides[0] ? this.at : sameMoment(side.moments, moment);
       said.push(`${side.name}: ${plural(side.moments[k].components, 'piece')}, ${plural(side.moments[k].clusters, 'cluster')}, ${plural(side.moments[k].particles, 'particle')}`);
-      // Particles are the same ones in both runs; clusters need not be.
-      const marked = isWhere && { ...marks, members: side === scenery.sides[0] ? marks.members : [] };
-      if (view && arrays[k]) {
-        const { words: legend } = view.show(arrays[k], side.moments[k].blade, look, marked || null, edges || null);
+      // Particles are the same ones in both runs; clusters and vertices of the skin need not be.
+      const marked = isWhere && (side === scenery.sides[0] ? marks : { ...marks, members: [], corners: [] });
+      if (view) {
+        const arrays = await own.get(k);
+        if (ticket !== this.ticket) return;  // somebody has gone on meanwhile
+        const { words: legend } = view.show([arrays], [side.moments[k]], look, marked || null);
         this.legend.textContent = `${legend} Removed particles are rings.${isWhere ? ' Marked orange: what the verdict names; yellow: the members of its clusters.' : ''}`;
       }
     }

@@ -249,6 +249,21 @@ void spoil(const std::string& what, int last, const State& before, State& state)
       }
     }
   }
+  // The first particle that the blade takes stays.
+  if (what == "detect" && last == CUTPROOF_DETECT && !state.removed.empty()) {
+    state.alive[at(state.removed.front())] = 1;
+    state.removed.erase(state.removed.begin());
+  }
+  // The first cluster takes the last living particle, wherever that is.
+  if (what == "expand" && last == CUTPROOF_EXPAND && clusters.count() > 0) {
+    int32_t i = static_cast<int32_t>(state.x.size()) - 1;
+    while (i >= 0 && state.alive[at(i)] == 0) --i;
+    const int64_t end = clusters.offsets[1];
+    if (i >= 0 && clusters.members[at(end - 1)] < i) {
+      clusters.members.insert(clusters.members.begin() + end, i);
+      for (std::size_t c = 1; c < clusters.offsets.size(); ++c) ++clusters.offsets[c];
+    }
+  }
   // The last cluster that a split made is lost.
   if (what == "split" && last == CUTPROOF_SPLIT && clusters.count() > before.clusters.count()) {
     clusters.offsets.pop_back();

@@ -86,6 +86,8 @@ TEST(SkinSurface, RejectsAnOpenSkin) {
   const Verdict verdict = skin_surface(scene.setup, scene.state);
   EXPECT_FALSE(verdict.holds);
   EXPECT_TRUE(mentions(verdict, "the surface is open"));
+  ASSERT_EQ(verdict.witness.triangles.size(), 1u);
+  EXPECT_TRUE(mentions(verdict, "triangle " + std::to_string(verdict.witness.triangles[0])));
   std::vector<int32_t> owners;
   for (const int32_t v : gone) owners.push_back(scene.state.skin.owner[static_cast<std::size_t>(v)]);
   for (const int32_t p : verdict.witness.particles) {
@@ -100,6 +102,7 @@ TEST(SkinSurface, RejectsAFlippedTriangle) {
   const Verdict verdict = skin_surface(scene.setup, scene.state);
   EXPECT_FALSE(verdict.holds);
   EXPECT_TRUE(mentions(verdict, "both run from vertex"));
+  EXPECT_EQ(verdict.witness.triangles.size(), 2u);
   EXPECT_TRUE(mentions(verdict, "3")) << verdict.witness.text;
 }
 

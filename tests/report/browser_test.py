@@ -3,138 +3,14 @@
 Usage: browser_test.py CUTPROOF CXX SOURCES WORK
 Exit status 77, with the name of what is missing, where there is no Chromium, no driver of it or no selenium."""
 import json
-import os
 import pathlib
-import shutil
-import subprocess
 import sys
-import time
 
-program, cxx, sources, work = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3]), pathlib.Path(sys.argv[4]).resolve()
-chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
-try:
-    from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
-    from selenium.webdriver.common.by import By
-    from selenium.webdriver.common.keys import Keys
-except ImportError:
-    print("Report.InABrowser is skipped: python3-selenium is not installed")
-    sys.exit(77)
-if not chromium or not driver:
-    print(f"Report.InABrowser is skipped: there is no {'chromium' if not chromium else 'chromium-driver'}")
-    sys.exit(77)
+from browser import Browser, By, Folder, Keys
 
-shutil.rmtree(work, ignore_errors=True)
-work.mkdir(parents=True)
-environment = dict(os.environ, PATH=f"{pathlib.Path(program).parent}:{os.environ['PATH']}")
-
-
-def run(arguments, status):
-    done = subprocess.run(arguments if isinstance(arguments, str) else [str(one) for one in arguments],
-                          shell=isinstance(arguments, str), cwd=work, env=environment, capture_output=True, text=True,
-                          timeout=200)
-    assert done.returncode == status, f"{arguments}: {done.returncode}\n{done.stdout}{done.stderr}"
-    return done.stdout + done.stderr
-
-
-class Browser:
-    """A page, opened as by double click, with the network watched and every line of the console kept."""
-
-    def __init__(self, page, *flags, width=1280, dark=False):
-        options = webdriver.ChromeOptions()
-        for flag in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle",
-                     "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--window-size=1280,1000", *flags):
-            options.add_argument(flag)
-        options.binary_location = chromium
-        options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-        self.driver = webdriver.Chrome(service=Service(driver), options=options)
-        self.driver.set_script_timeout(60)
-        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [
-            {"name": "prefers-color-scheme", "value": "dark" if dark else "light"},
-            {"name": "prefers-reduced-motion", "value": "reduce"}]})
-        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
-                                    {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False})
-        self.url = (work / page).as_uri()
-        begin = time.monotonic()
-        self.driver.get(self.url)
-        self.until("return document.documentElement.dataset.ready === 'true'")
-        print(f"{page}: {(work / page).stat().st_size / 1e6:.2f} MB, there after {time.monotonic() - begin:.1f} s")
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, kind, *_):
-        try:
-            if kind is None:
-                log = [line for line in self.driver.get_log("browser")]
-                assert not log, f"the console says: {log}"
-                asked = []
-                for entry in self.driver.get_log("performance"):
-                    message = json.loads(entry["message"])["message"]
-                    if message["method"] == "Network.requestWillBeSent":
-                        asked.append(message["params"]["request"]["url"])
-                outside = [url for url in asked if url != self.url and not url.startswith("data:")]
-                assert not outside, f"the page asked for {outside}"
-        finally:
-            self.driver.quit()
-
-    def ask(self, script, *arguments):
-        return self.driver.execute_script(script, *arguments)
-
-    def until(self, script, *arguments, seconds=60):
-        end = time.monotonic() + seconds
-        while not self.ask(script, *arguments):
-            assert time.monotonic() < end, f"not within {seconds} s: {script}"
-            time.sleep(0.02)
-
-    def text(self, selector):
-        return self.driver.find_element(By.CSS_SELECTOR, selector).text
-
-    def shown(self, moment, finding=""):
-        """Until the view shows a moment, and a finding in it."""
-        self.until("return document.documentElement.dataset.shown === arguments[0]", f"{moment}/{finding}")
-        self.driver.execute_async_script("const done = arguments[0];"
-                                         "requestAnimationFrame(() => requestAnimationFrame(() => done()));")
-
-    def scrub(self, moment):
-        self.ask("const range = document.getElementById('scrub'); range.value = arguments[0];"
-                 "range.dispatchEvent(new Event('input'));", moment)
-        self.shown(moment)
-
-    def pixels(self):
-        """Every pixel of the view, as text; and how many are not of its ground."""
-        return self.driver.execute_async_script("""
-          const done = arguments[0], canvas = document.getElementById('canvas');
-          requestAnimationFrame(() => {
-            const copy = document.createElement('canvas');
-            [copy.width, copy.height] = [canvas.width, canvas.height];
-            const pen = copy.getContext('2d');
-            pen.drawImage(canvas, 0, 0);
-            const all = pen.getImageData(0, 0, copy.width, copy.height).data;
-            let drawn = 0, sum = 0, orange = 0;
-            for (let i = 0; i < all.length; i += 4) {
-              if (all[i] !== all[0] || all[i + 1] !== all[1] || all[i + 2] !== all[2]) ++drawn;
-              if (all[i] > 150 && all[i] > 1.6 * all[i + 1] && all[i + 2] < 40) ++orange;
-              sum = (Math.imul(sum, 31) + all[i] + 7 * all[i + 1] + 13 * all[i + 2]) | 0;
-            }
-            done({sum, share: drawn / (all.length / 4), orange});
-          });""")
-
-    def pixels_after(self, action, seen):
-        """What is drawn once an action has changed it, which must be none of what was seen before."""
-        action()
-        end = time.monotonic() + 60
-        while (now := self.pixels())["sum"] in seen:
-            assert time.monotonic() < end, "nothing new is drawn"
-        return now
-
-    def data(self, what):
-        return self.ask(f"return JSON.parse(document.getElementById('data').textContent).{what}")
-
-
-def picture(browser, name):
-    browser.driver.save_screenshot(str(work / f"{name}.png"))
-
+program, cxx, sources = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
+work = Folder(sys.argv[4], program)
+run = work.run
 
 # --- Three runs: one that holds, one that fails after split, and one whose names are hostile ---
 
@@ -158,7 +34,7 @@ run([program, "report", "seen", "-o", "unjudged.html"], 0)
 
 # --- What holds ---
 
-with Browser("holds.html") as page:
+with Browser(work / "holds.html") as page:
     assert page.driver.title == "Holds: two halves · cutproof report", page.driver.title
     summary = page.text("#summary")
     assert "cutproof ran scene two halves on backend reference: all" in summary and "hold" in summary, summary
@@ -184,14 +60,10 @@ with Browser("holds.html") as page:
     # What is shown, and by which colours.
     seen = {end["sum"]}
 
-    def choose(select, value):
-        page.ask("const s = document.getElementById(arguments[0]); s.value = arguments[1];"
-                 "s.dispatchEvent(new Event('change'));", select, value)
-
     # Each differs from all before it.
     for colour in ("cluster", "displacement", "stretch", "holders"):
-        seen.add(page.pixels_after(lambda: choose("colour", colour), seen)["sum"])
-    seen.add(page.pixels_after(lambda: choose("show", "particles"), seen)["sum"])
+        seen.add(page.pixels_after(lambda: page.choose("colour", colour), seen)["sum"])
+    seen.add(page.pixels_after(lambda: page.choose("show", "particles"), seen)["sum"])
     page.pixels_after(page.driver.find_element(By.ID, "removed").click, seen)
     # It plays from the start to the end, where it stops.
     page.driver.find_element(By.ID, "play").click()
@@ -213,7 +85,7 @@ with Browser("holds.html") as page:
 # --- What fails: from the verdict to the place ---
 
 for name in ("fails.html", "reported.html"):
-    with Browser(name) as page:
+    with Browser(work / name) as page:
         assert "fails" in page.text("#summary") and "after split" in page.text("#summary"), page.text("#summary")
         first = page.driver.find_element(By.CSS_SELECTOR, "[data-finding='0']")
         row = page.driver.find_element(By.CSS_SELECTOR, "#verdicts tbody tr")
@@ -241,18 +113,18 @@ for name in ("fails.html", "reported.html"):
             assert command == "cutproof check seen", command
             run(command, 1)
 
-with Browser("unjudged.html") as page:
+with Browser(work / "unjudged.html") as page:
     assert "Nothing was judged" in page.text("#summary")
     assert page.text(".command") == "cutproof check seen"
     assert not page.driver.find_elements(By.ID, "verdicts")
 
 # --- Names are text ---
 
-with Browser("hostile.html") as page:
+with Browser(work / "hostile.html") as page:
     assert page.ask("return window.hacked === undefined && document.images.length === 0")
     assert page.text("#title") == hostile, page.text("#title")
     assert len(page.driver.find_elements(By.CSS_SELECTOR, "script:not([type])")) == 1
-with Browser("hostile.html") as page:
+with Browser(work / "hostile.html") as page:
     # Nor does a script run that gets into the page all the same: the policy allows the page's own alone.
     page.ask("const s = document.createElement('script'); s.textContent = 'window.hacked = 1'; document.body.append(s);")
     assert page.ask("return window.hacked === undefined")
@@ -260,15 +132,15 @@ with Browser("hostile.html") as page:
 
 # --- Without WebGL, on a phone, in the dark ---
 
-with Browser("fails.html", "--disable-gpu", "--disable-software-rasterizer", "--disable-3d-apis") as page:
+with Browser(work / "fails.html", "--disable-gpu", "--disable-software-rasterizer", "--disable-3d-apis") as page:
     assert "no 3D view" in page.text("#no-webgl")
     page.driver.find_element(By.CSS_SELECTOR, "[data-finding='0']").click()
     page.until("return document.documentElement.dataset.moment == arguments[0]", page.data("findings[0].marks.moment"))
     assert "after split" in page.text("#status") and page.text("#witness")
 for width, dark in ((390, False), (390, True), (1280, True)):
-    with Browser("fails.html", width=width, dark=dark) as page:
+    with Browser(work / "fails.html", width=width, dark=dark) as page:
         assert page.ask("return document.documentElement.scrollWidth <= window.innerWidth"), f"wider than {width} pixels"
-        picture(page, f"{width}_{'dark' if dark else 'light'}")
+        page.picture(work / f"{width}_{'dark' if dark else 'light'}.png")
 
 # --- Documents: a campaign and a judged plugin that fail, a tuning, benchmarks ---
 
@@ -318,7 +190,7 @@ run([program, "tune", "halves.json", "--tolerance", "100", "--frames", "2", "--r
 run([program, "bench", "stages", "--sizes", "300,1000", "--frames", "2", "--repeats", "1", "--report",
      "stages.html"], 0)
 
-with Browser("campaign.html") as page:
+with Browser(work / "campaign.html") as page:
     assert "Campaign" in page.text("#title") and "violates a property" in page.text("#summary"), page.text("#summary")
     assert "seed 5" in page.text("#facts"), page.text("#facts")
     facts = page.text(".failure dl")
@@ -353,33 +225,33 @@ with Browser("campaign.html") as page:
     assert "split exactness" in run(command, 1), "the command shows something else"
     again = page.driver.find_element(By.CSS_SELECTOR, ".notes-card .command").text
     assert "--seed 5" in again and "1 of " in run(again, 1), again
-    picture(page, "campaign")
+    page.picture(work / "campaign.png")
 
 # The same from the document; a plugin runs only if it is named.
 run([program, "report", "campaign.json", "-o", "unrun.html"], 0)
-with Browser("unrun.html") as page:
+with Browser(work / "unrun.html") as page:
     assert "a plugin is run only if --backend names it" in page.text(".failure dl")
     assert not page.driver.find_elements(By.ID, "view")
 run([program, "report", "campaign.json", "--backend", "plugin:./libsplitter.so", "-o", "named.html"], 0)
-with Browser("named.html", "--disable-gpu", "--disable-software-rasterizer", "--disable-3d-apis") as page:
+with Browser(work / "named.html", "--disable-gpu", "--disable-software-rasterizer", "--disable-3d-apis") as page:
     assert len(page.driver.find_elements(By.CSS_SELECTOR, ".no-webgl")) == 2
     assert "split exactness" in page.text(".failure") and "after split" in page.text("#status")
     filtered(page)
 
-with Browser("judged.html") as page:
+with Browser(work / "judged.html") as page:
     assert "fails" in page.text("#summary") or "Not everything" in page.text("#summary"), page.text("#summary")
     assert "fails" in page.text(".badge"), page.text(".badge")
     assert page.driver.find_elements(By.CSS_SELECTOR, ".failure .command")
-with Browser("good.html") as page:
+with Browser(work / "good.html") as page:
     assert "none violates any property" in page.text("#summary"), page.text("#summary")
     assert "Nothing fails" in page.text(".failures")
 
-with Browser("tuning.html") as page:
+with Browser(work / "tuning.html") as page:
     assert "found" in page.text(".badge") and "The cheapest configuration of halves" in page.text("#summary")
     dots_say(page)
     assert "tolerance" in page.text(".chart .legend") and "the answer" in page.text(".chart .legend")
-    picture(page, "tuning")
-with Browser("stages.html") as page:
+    page.picture(work / "tuning.png")
+with Browser(work / "stages.html") as page:
     dots_say(page)
     filtered(page)
     bars = page.driver.find_elements(By.CSS_SELECTOR, ".chart rect")
@@ -389,7 +261,7 @@ with Browser("stages.html") as page:
     assert "time [ms]" in page.ask("return document.querySelector('.chart table').textContent")
 for name in ("campaign", "judged", "tuning", "stages"):
     for dark in (False, True):
-        with Browser(f"{name}.html", width=390, dark=dark) as page:
+        with Browser(work / f"{name}.html", width=390, dark=dark) as page:
             assert page.ask("return document.documentElement.scrollWidth <= window.innerWidth"), f"{name} is too wide"
-            picture(page, f"{name}_390_{'dark' if dark else 'light'}")
+            page.picture(work / f"{name}_390_{'dark' if dark else 'light'}.png")
 print("pages show what happened")

@@ -3,11 +3,16 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <initializer_list>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "model/error.h"
 #include "report/assets.h"
+#include "report/beside.h"
+#include "report/changes.h"
 #include "report/pieces.h"
 #include "tests/report/made_run.h"
 
@@ -197,7 +202,7 @@ TEST(Pictures, OfASmallRunHoldEveryMomentAndEveryParticle) {
   EXPECT_EQ(pictures.moments.size(), 11u);
   EXPECT_EQ(pictures.particles, 27);
   EXPECT_EQ(pictures.thinning, Thinning());
-  EXPECT_EQ(pictures.first_moment, (std::vector<std::size_t>{0, 1}))
+  EXPECT_EQ(pictures.own.first_moment, (std::vector<std::size_t>{0, 1}))
       << "the first moment comes alone, to be there at once";
   const Marks& marks = pictures.marks.at(0);
   EXPECT_TRUE(marks.is_exact);
@@ -208,8 +213,8 @@ TEST(Pictures, OfASmallRunHoldEveryMomentAndEveryParticle) {
   EXPECT_FALSE(marks.is_partly);
   // Half of one of 65,534 steps: of the body's 2 h, its drift of 3e-4 m a frame and what it sways.
   const double extent = 2 + (5 * 3e-4 + 2e-4) / kSpacing;
-  EXPECT_LE(pictures.loss, extent / 65'534 / 2);
-  EXPECT_GE(pictures.loss, 2.0 / 65'534 / 2);
+  EXPECT_LE(pictures.own.loss, extent / 65'534 / 2);
+  EXPECT_GE(pictures.own.loss, 2.0 / 65'534 / 2);
 }
 
 TEST(Pictures, ThatAreTooLargeLoseFramesButNotTheOnesThatFail) {
@@ -233,9 +238,11 @@ TEST(Pictures, OfManyParticlesLoseParticlesButNotTheOnesThatAreNamed) {
   Finding finding = finding_in(0);
   finding.clusters.clear();
   finding.particles = {64'000 - 1, 1};
-  const Pictures pictures = pictures_of(source_of(setup, 3), {finding}, 300'000);
+  const int64_t whole = pictures_of(source_of(setup, 3), {finding}, kMostPictureBytes).bytes;
+  const Pictures pictures = pictures_of(source_of(setup, 3), {finding}, whole / 2);
+  EXPECT_LE(pictures.bytes, whole / 2);
   EXPECT_GT(pictures.thinning.every_particle, 1);
-  EXPECT_LT(pictures.particles, 64'000 / 2);
+  EXPECT_LE(pictures.particles, 64'000 / 2 + 1);
   EXPECT_EQ(pictures.marks.at(0).particles, (std::vector<int32_t>{pictures.particles - 1, 1}));
 }
 
@@ -255,9 +262,9 @@ TEST(Pictures, OfAStateWithoutSenseAreDrawnAllTheSame) {
                            return snapshot;
                          }};
   const Pictures pictures = pictures_of(source, {finding_in(500)}, kMostPictureBytes);
-  EXPECT_EQ(pictures.nowhere, 2);
+  EXPECT_EQ(pictures.own.nowhere, 2);
   // The body's 2 h, and the skin's vertex one spacing before it; rounded once or twice.
-  EXPECT_LE(pictures.loss, 3.0 / 65'534 / 2 * (1 + 1e-12)) << "what is far away costs the others no places";
+  EXPECT_LE(pictures.own.loss, 3.0 / 65'534 / 2 * (1 + 1e-12)) << "what is far away costs the others no places";
   EXPECT_FALSE(pictures.marks.at(0).is_exact);
 }
 
@@ -266,6 +273,139 @@ TEST(Pictures, OfNoParticlesAndOfOneAreDrawn) {
     const auto setup = block(n);
     EXPECT_EQ(pictures_of(source_of(setup, 2), {}, kMostPictureBytes).moments.size(), 5u);
   }
+}
+
+// --- What a stage changed ---
+
+std::vector<uint8_t> codes(std::initializer_list<Change> changes) {
+  std::vector<uint8_t> found;
+  for (const Change change : changes) found.push_back(static_cast<uint8_t>(change));
+  return found;
+}
+
+State four_particles() {
+  State state;
+  for (int i = 0; i < 4; ++i) state.x.push_back({static_cast<double>(i), 0, 0});
+  state.alive.assign(4, 1);
+  state.clusters.offsets = {0, 2, 4};
+  state.clusters.members = {0, 1, 2, 3};
+  state.clusters.number = {3, 5};
+  return state;
+}
+
+TEST(Changes, AreWhatAStageDoesToEachParticle) {
+  const State before = four_particles();
+  constexpr Change kNot = Change::nothing;
+  EXPECT_EQ(changes_between(before, before), codes({kNot, kNot, kNot, kNot}));
+  State moved = before;
+  moved.x[2].y = 1e-9;
+  EXPECT_EQ(changes_between(before, moved), codes({kNot, kNot, Change::moved, kNot}));
+  State removed = before;
+  removed.alive[1] = 0;
+  EXPECT_EQ(changes_between(before, removed), codes({kNot, Change::removed, kNot, kNot}));
+  EXPECT_EQ(changes_between(removed, removed), codes({kNot, kNot, kNot, kNot})) << "only once";
+  State split = before;  // cluster 5 keeps particle 2, and 3 is a cluster of its own
+  split.clusters.offsets = {0, 2, 3, 4};
+  split.clusters.number = {3, 5, 6};
+  EXPECT_EQ(changes_between(before, split), codes({kNot, kNot, Change::reclustered, Change::reclustered}));
+  State merged = before;  // 3 takes over what 5 held
+  merged.clusters.offsets = {0, 4};
+  merged.clusters.number = {3};
+  EXPECT_EQ(changes_between(before, merged), codes({Change::merged, Change::merged, Change::merged, Change::merged}));
+  State expanded = before;  // 3 takes in particle 2, which 5 keeps
+  expanded.clusters.offsets = {0, 3, 5};
+  expanded.clusters.members = {0, 1, 2, 2, 3};
+  EXPECT_EQ(changes_between(before, expanded), codes({kNot, kNot, Change::expanded, kNot}));
+  State skinned = before;
+  skinned.skin.owner = {1, -7, 99};
+  skinned.skin.direction = {0, 0, 0};
+  EXPECT_EQ(changes_between(before, skinned), codes({kNot, Change::skin, kNot, kNot}));
+}
+
+// --- Two runs beside each other ---
+
+TEST(Apart, SaysHowFarAndInWhatFirst) {
+  const State one = four_particles();
+  Apart apart = apart_of(one, one, kSpacing);
+  EXPECT_EQ(apart.differs, "");
+  EXPECT_EQ(apart.max, 0);
+  EXPECT_EQ(apart.codes, (std::vector<uint8_t>{0, 0, 0, 0}));
+  State other = one;
+  other.x[3].z = 3e-3 * kSpacing;
+  other.x[1].z = 4e-3 * kSpacing;
+  apart = apart_of(one, other, kSpacing);
+  EXPECT_EQ(apart.differs, "positions");
+  EXPECT_FALSE(apart.is_decision);
+  EXPECT_EQ(apart.where, 1);
+  EXPECT_NEAR(apart.max, 4e-3, 1e-15);
+  EXPECT_NEAR(apart.rms, 2.5e-3, 1e-15);
+  EXPECT_EQ(apart.codes[0], 0);
+  EXPECT_NEAR(apart.codes[1], 4 * (std::log10(4e-3) + 12), 0.51);
+  other.x[1].z = std::nan("");
+  EXPECT_EQ(apart_of(one, other, kSpacing).max, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(apart_of(other, other, kSpacing).max, 0) << "equal to the bit, if nowhere";
+  other.alive[1] = 0;
+  apart = apart_of(one, other, kSpacing);
+  EXPECT_TRUE(apart.is_decision);
+  EXPECT_EQ(apart.codes[1], kIncomparable);
+  EXPECT_EQ(apart.where, 3);
+}
+
+TEST(Together, RunsShareOneTimelineAndAStageThatDidNothingIsNoDifference) {
+  const Moment start = {0, 0, Stage::skin, true};
+  const std::vector<Moment> one = {start,
+                                   {1, 0, Stage::step, false},
+                                   {2, 0, Stage::detect, false},
+                                   {3, 0, Stage::skin, false},
+                                   {4, 1, Stage::step, false},
+                                   {5, 1, Stage::skin, false}};
+  const std::vector<Moment> other = {start, {1, 0, Stage::step, false}, {2, 0, Stage::skin, false}};
+  const std::vector<Together> both = together(one, other, true);
+  ASSERT_EQ(both.size(), 6u);
+  EXPECT_EQ(both[2].other, 1) << "it has nothing of detect, so that is as after its step";
+  EXPECT_TRUE(both[2].is_comparable);
+  EXPECT_FALSE(both[4].is_comparable) << "it has ended";
+  // Of a run that has the ends of frames alone nobody knows what lies between.
+  const std::vector<Together> ends = together(one, {start, {1, 0, Stage::skin, false}}, true);
+  EXPECT_FALSE(ends[1].is_comparable);
+  EXPECT_TRUE(ends[3].is_comparable);
+  EXPECT_EQ(together(other, one, false).size(), 3u) << "what is not shown adds no moments";
+}
+
+TEST(Pages, OfTwoRunsNameTheFirstMomentInWhichTheyDiffer) {
+  const auto setup = block(3);
+  const Source own = source_of(setup, 5);
+  const Source other = {setup, own.count, [&](int64_t index) {
+                          io::Snapshot snapshot = own.snapshot(index);
+                          if (index >= 5) snapshot.state.x[7].x += 1e-6;
+                          if (index >= 8) snapshot.state.alive[2] = 0;
+                          return snapshot;
+                        }};
+  const Beside beside = {other, true, "other", "own", "it"};
+  const Pictures pictures = pictures_of(own, {}, kMostPictureBytes, &beside);
+  EXPECT_EQ(pictures.comparison.at("any").at("frame"), 2);
+  EXPECT_EQ(pictures.comparison.at("any").at("stage"), "split");
+  EXPECT_NEAR(pictures.comparison.at("any").at("max").get<double>(), 1e-6 / kSpacing, 1e-12);
+  EXPECT_EQ(pictures.comparison.at("decision").at("frame"), 3);
+  EXPECT_EQ(pictures.own.details.size(), pictures.beside.details.size());
+  EXPECT_EQ(pictures.own.details.at(5).at("apart").at("particle"), 7);
+  EXPECT_EQ(pictures.own.details.at(4).at("apart").at("differs"), "");
+}
+
+TEST(Pictures, OfAWitnessOfTheSkinMarkTheCornersOfItsTriangles) {
+  const auto setup = block(3);
+  const Source source = {setup, 2, [&](int64_t index) {
+                           io::Snapshot snapshot = {Stage::skin, at_rest(setup.body)};
+                           snapshot.state.frame = index;
+                           snapshot.state.skin.position = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+                           snapshot.state.skin.triangles = {{0, 1, 2}, {2, 1, 0}, {0, 1, 99}};
+                           return snapshot;
+                         }};
+  Finding finding = finding_in(0);
+  finding.stage = Stage::skin;
+  finding.triangles = {1, 2, -1, 77};
+  EXPECT_EQ(pictures_of(source, {finding}, kMostPictureBytes).marks.at(0).corners, (std::vector<int32_t>{2, 1, 0}))
+      << "a triangle that is not there, or whose vertices are not, is not marked";
 }
 
 // --- The page ---
@@ -328,6 +468,13 @@ TEST(Page, RefusesResultsOfAnotherRun) {
   recording.backend = "other";
   EXPECT_THROW(require_same_run(recording, "block", "r", results, "f"), InputError);
   recording.backend = "mine";
+  EXPECT_NO_THROW(require_same_body(recording, "r", recording, "o"));
+  io::Recording larger = recording;
+  larger.setup = block(4);
+  EXPECT_THROW(require_same_body(recording, "r", larger, "o"), InputError);
+  io::Recording wider = recording;
+  wider.setup.body.grid.spacing *= 2;
+  EXPECT_THROW(require_same_body(recording, "r", wider, "o"), InputError);
   recording.setup = block(4);
   EXPECT_THROW(require_same_run(recording, "block", "r", results, "f"), InputError);
 }

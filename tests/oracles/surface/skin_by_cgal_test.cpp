@@ -36,6 +36,7 @@ TEST(SkinGeometry, RejectsTrianglesThatIntersect) {
   const Verdict verdict = skin_geometry(scene.setup, scene.state);
   EXPECT_FALSE(verdict.holds);
   EXPECT_TRUE(mentions(verdict, "intersect at rest")) << verdict.witness.text;
+  EXPECT_EQ(verdict.witness.triangles.size(), 2u);
   EXPECT_FALSE(verdict.witness.particles.empty());
 }
 

@@ -1,0 +1,257 @@
+// One run in the 3D view: particles, skin, blade, and what a verdict names. Lengths are in h, the middle of the body
+// is 0. Places go to the GPU as they lie in the page, and surfaces find their normals there: per moment this writes a
+// colour for each particle and nothing else.
+import {
+  BoxBufferGeometry, BufferAttribute, BufferGeometry, Color, DoubleSide, EdgesGeometry, Group, Line, LineBasicMaterial,
+  LineSegments, Matrix4, Mesh, Points, ShaderMaterial, Vector3,
+} from 'three';
+import { kNowhere, kStride, places, scaleOf } from './coding.js';
+import { kDead, kTissue } from './colours.js';
+
+const kLight = 'vec3 light(vec3 colour, vec3 n) { float lit = 0.42 + 0.58 * max(dot(n, normalize(vec3(0.35, 0.5, 0.8))), 0.0); return colour * lit; }';
+const kPlace = 'uniform vec3 low, step3; vec3 placed(vec3 steps) { return low + step3 * steps; }';
+
+// Balls as discs that face the camera. The fourth number of a tint says what a point is: 0 nothing, 1 alive,
+// 2 removed, 3 and 4 marked, 5 marked as a ring, so that triangles are seen through it. `slab`: above 0, only what lies so near behind the cut plane.
+const pointShader = (isInFront, plane) => ({
+  uniforms: { perPixel: { value: 1 }, size: { value: 0.95 }, fade: { value: 0 }, slab: { value: 0 }, back: { value: new Color() },
+    low: { value: new Vector3() }, step3: { value: new Vector3(1, 1, 1) }, plane },
+  vertexShader: `${kPlace} attribute vec4 tint; uniform float perPixel, size, slab; uniform vec4 plane; varying vec3 colour; varying float which;
+    void main() {
+      vec3 here = placed(position);
+      float kind = floor(tint.a * 255.0 + 0.5), behind = plane.w - dot(plane.xyz, here);
+      bool isCut = kind < 2.5 && (behind < 0.0 || (slab > 0.0 && behind > slab));
+      vec4 place = modelViewMatrix * vec4(here, 1.0);
+      gl_Position = kind < 0.5 || isCut || position.x > ${kNowhere - 0.5} ? vec4(2.0, 2.0, 2.0, 1.0) : projectionMatrix * place;
+      float share = kind > 2.5 ? (kind > 3.5 ? 1.6 : 1.15) : kind > 1.5 ? 0.55 : 1.0;
+      gl_PointSize = max(size * share * perPixel / -place.z, kind > 2.5 ? 9.0 : 1.5);
+      colour = tint.rgb; which = kind;
+    }`,
+  fragmentShader: `${kLight} uniform vec3 back; uniform float fade; varying vec3 colour; varying float which;
+    void main() {
+      vec2 p = 2.0 * gl_PointCoord - 1.0; float r = dot(p, p);
+      if (r > 1.0 || (which > 1.5 && which < 2.5 && r < 0.4) || (which > 4.5 && r < 0.7)) discard;
+      vec3 n = vec3(p.x, -p.y, sqrt(max(1.0 - r, 0.0)));
+      vec3 lit = light(colour, n);
+      if (which > 4.5) lit = r > 0.9 ? vec3(0.07) : colour;
+      else if (which > 2.5) lit = r > 0.66 ? vec3(0.07) : mix(lit, colour, 0.5);
+      else if (r > 0.8) lit *= 0.8;
+      gl_FragColor = vec4(mix(lit, back, which > 2.5 ? 0.0 : fade), 1.0);
+    }`,
+  depthTest: !isInFront, transparent: isInFront,
+});
+
+// A surface without normals: the GPU derives each triangle's from where its pixels lie.
+const surfaceShader = (plane, isFlat = false) => ({
+  uniforms: { fade: { value: 1 }, low: { value: new Vector3() }, step3: { value: new Vector3(1, 1, 1) }, plane },
+  vertexShader: `${kPlace} attribute vec4 tint; varying vec3 colour, seen, here;
+    void main() { colour = tint.rgb; here = placed(position); vec4 place = modelViewMatrix * vec4(here, 1.0); seen = place.xyz; gl_Position = projectionMatrix * place; }`,
+  fragmentShader: `${kLight} uniform float fade; uniform vec4 plane; varying vec3 colour, seen, here;
+    void main() {
+      if (dot(plane.xyz, here) > plane.w) discard;
+      vec3 n = normalize(cross(dFdx(seen), dFdy(seen)));
+      vec3 lit = ${isFlat ? 'mix(colour, light(colour, n), 0.35)' : 'light(gl_FrontFacing ? colour : colour * 0.6, n)'};
+      gl_FragColor = vec4(lit, fade);
+    }`,
+  side: DoubleSide, transparent: true, extensions: { derivatives: true },
+});
+
+const kMarked = [214, 94, 0], kMember = [240, 227, 66];
+
+// Writes a list to the GPU in memory that stays: it grows by half where it is too small, and else is written again.
+function write(geometry, name, list, size, isNormal = false) {
+  let attribute = name === 'index' ? geometry.index : geometry.attributes[name];
+  if (attribute && attribute.written === list) return;
+  if (!attribute || attribute.array.length < list.length) {
+    if (attribute) geometry.dispose();  // or the old memory would stay with the GPU
+    const room = attribute ? Math.ceil((1.5 * list.length) / size) * size : list.length;
+    const array = new list.constructor(room);
+    attribute = new BufferAttribute(array, size, isNormal);
+    if (name === 'index') geometry.setIndex(attribute); else geometry.setAttribute(name, attribute);
+  }
+  attribute.array.set(list);
+  attribute.updateRange.offset = 0;
+  attribute.updateRange.count = list.length;
+  attribute.needsUpdate = true;
+  attribute.written = list;
+}
+
+export class Tissue {
+  constructor(data, plane) {
+    this.data = data;
+    this.body = new Group();
+    const m = data.body.orientation;
+    this.body.matrixAutoUpdate = false;
+    this.body.matrix = new Matrix4().set(m[0], m[1], m[2], 0, m[3], m[4], m[5], 0, m[6], m[7], m[8], 0, 0, 0, 0, 1);
+    const add = (made, order = 0) => {
+      made.frustumCulled = false;
+      made.renderOrder = order;
+      this.body.add(made);
+      return made;
+    };
+    this.skin = add(new Mesh(new BufferGeometry(), new ShaderMaterial(surfaceShader(plane))));
+    this.particles = add(new Points(new BufferGeometry(), new ShaderMaterial(pointShader(false, plane))));
+    this.blade = new Group();
+    this.body.add(this.blade);
+    const nowhere = { value: plane.value.clone().set(0, 0, 0, 1e9) };  // what is marked is never cut away
+    this.triangles = add(new Mesh(new BufferGeometry(), new ShaderMaterial({ ...surfaceShader(nowhere, true), depthTest: false })), 2);
+    this.rims = add(new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color: 0x111111, depthTest: false })), 2.5);
+    this.path = add(new Line(new BufferGeometry(), new LineBasicMaterial({ color: 0xd55e00, depthTest: false })), 3);
+    this.marks = add(new Points(new BufferGeometry(), new ShaderMaterial(pointShader(true, nowhere))), 4);
+    if (data.blade) this.makeBlade();
+  }
+
+  makeBlade() {
+    const h = this.data.body.spacing;
+    const [length, depth, thickness] = this.data.blade.map((x) => x / h);
+    const box = new BoxBufferGeometry(length, Math.max(thickness, 0.05), depth);
+    box.translate(0, 0, depth / 2);
+    const steel = new ShaderMaterial(surfaceShader({ value: { x: 0, y: 0, z: 0, w: 1e9 } }));
+    steel.uniforms.fade.value = 0.36;
+    steel.depthWrite = false;
+    const tint = new Uint8Array(box.attributes.position.count * 4);
+    for (let i = 0; i < tint.length; i += 4) tint.set([184, 204, 224, 255], i);
+    box.setAttribute('tint', new BufferAttribute(tint, 4, true));
+    const plate = new Mesh(box, steel);
+    plate.renderOrder = 1;
+    this.blade.add(plate, new LineSegments(new EdgesGeometry(box), new LineBasicMaterial({ color: 0x5a6b7b })));
+    this.blade.matrixAutoUpdate = false;
+  }
+
+  static scale(material, moment, centre, spacing) {
+    const { low, step } = scaleOf(moment, centre, spacing);
+    material.uniforms.low.value.set(...low);
+    material.uniforms.step3.value.set(...step);
+  }
+
+  // moment: its arrays; about: of the moment what the page says of it; look: {skin, particles, removed, colouring,
+  // isCut}; marks: of a finding, or null. Returns the legend.
+  show(moment, about, look, marks, { centre, start, edges }) {
+    const spacing = this.data.body.spacing || 1;
+    const n = moment.x.length / kStride;
+    const hasSkin = look.skin && moment.triangles.length > 0;
+    // A moment without a skin, as the start is, shows particles rather than nothing.
+    const hasParticles = look.particles || !hasSkin;
+    let xyz = null;
+    const placesOfIt = () => xyz || (xyz = places(moment.x, moment, centre, spacing));
+    const { colour, shows, words, scale, keys } = look.colouring.of({ moment, places: placesOfIt, start, edges, stage: about.stage, isStart: about.start, apart: about.apart });
+    const hidden = hasParticles && !look.isCut ? this.enclosed(moment, edges) : null;
+    const tint = new Uint32Array(n);
+    let drawn = 0;
+    for (let i = 0; i < n; ++i) {
+      const isAlive = moment.alive[i] !== 0;
+      let kind = isAlive ? ((hasParticles && !(hidden && hidden[i] === 6)) || look.isCut ? 1 : 0) : look.removed ? 2 : 0;
+      if (shows && shows(i)) kind = shows(i);
+      if (kind > 0) ++drawn;
+      const c = isAlive || kind === 2 && shows ? colour(i) : kDead;
+      tint[i] = ((kind << 24) | c) >>> 0;
+    }
+    const bytes = new Uint8Array(tint.buffer);
+    write(this.particles.geometry, 'position', moment.x, kStride);
+    write(this.particles.geometry, 'tint', bytes, 4, true);
+    this.particles.geometry.setDrawRange(0, n);
+    Tissue.scale(this.particles.material, moment, centre, spacing);
+    this.particles.visible = drawn > 0;
+    this.particles.material.uniforms.fade.value = marks ? 0.72 : 0;
+    // The face of a cut is closed by what lies behind it.
+    this.particles.material.uniforms.slab.value = look.isCut && !hasParticles ? 1 : 0;
+    this.showSkin(moment, hasSkin, tint, colour, Boolean(marks), centre, spacing);
+    this.blade.visible = Boolean(about.blade);
+    if (about.blade) this.placeBlade(about.blade, centre, spacing);
+    this.showMarks(moment, marks, placesOfIt, centre, spacing);
+    return { words, scale, keys };
+  }
+
+  // How many of their six neighbours are there: particles that have all of them are behind these.
+  enclosed(moment, edges) {
+    if (!edges || !this.data.body.onGrid) return null;
+    if (this.enclosedOf === moment.alive) return this.enclosedCount;
+    const found = new Uint8Array(moment.alive.length);
+    for (let e = 0; e < edges.a.length; ++e) {
+      const a = edges.a[e], b = edges.b[e];
+      if (moment.alive[a] && moment.alive[b]) ++found[a], ++found[b];
+    }
+    [this.enclosedOf, this.enclosedCount] = [moment.alive, found];
+    return found;
+  }
+
+  showSkin(moment, wanted, tint, colour, isFaded, centre, spacing) {
+    this.skin.visible = wanted;
+    if (!wanted) return;
+    const count = moment.owner.length;
+    const ofVertex = new Uint32Array(count);
+    for (let v = 0; v < count; ++v) {
+      const owner = moment.owner[v];
+      ofVertex[v] = owner < 0 ? kTissue : moment.alive[owner] ? tint[owner] : colour(owner);
+    }
+    const geometry = this.skin.geometry;
+    write(geometry, 'position', moment.skin, kStride);
+    write(geometry, 'tint', new Uint8Array(ofVertex.buffer), 4, true);
+    if (moment.triangles !== this.shownTriangles) write(geometry, 'index', new Uint32Array(moment.triangles), 1);
+    this.shownTriangles = moment.triangles;
+    geometry.setDrawRange(0, moment.triangles.length);
+    Tissue.scale(this.skin.material, moment, centre, spacing);
+    this.skin.material.uniforms.fade.value = isFaded ? 0.22 : 1;
+    this.skin.material.transparent = isFaded;
+    this.skin.material.depthWrite = !isFaded;
+  }
+
+  placeBlade([edge, along, back], centre, spacing) {
+    const x = new Vector3(...along), z = new Vector3(...back);
+    const y = new Vector3().crossVectors(z, x);
+    const at = edge.map((c, k) => (c - centre[k]) / spacing);
+    this.blade.matrix.makeBasis(x, y, z).setPosition(at[0], at[1], at[2]);
+  }
+
+  showMarks(moment, marks, placesOfIt, centre, spacing) {
+    const named = marks ? [...new Set([...marks.particles, ...marks.path])] : [];
+    const chosen = new Set(named);
+    const members = marks ? marks.members.filter((i) => !chosen.has(i)) : [];
+    const all = [...members, ...named];
+    const xyz = all.length ? placesOfIt() : new Float32Array(0);
+    const isThere = (i) => !Number.isNaN(xyz[3 * i]);
+    // Balls would hide the triangles at whose corners they sit.
+    const kNamed = marks && (marks.corners || []).length ? 5 : 4;
+    const place = new Float32Array(3 * all.length), tint = new Uint8Array(4 * all.length);
+    all.forEach((i, k) => {
+      if (isThere(i)) place.set(xyz.subarray(3 * i, 3 * i + 3), 3 * k);
+      tint.set([...(k < members.length ? kMember : kMarked), isThere(i) ? (k < members.length ? 3 : kNamed) : 0], 4 * k);
+    });
+    write(this.marks.geometry, 'position', place, 3);
+    write(this.marks.geometry, 'tint', tint, 4, true);
+    this.marks.geometry.setDrawRange(0, all.length);
+    this.marks.visible = all.length > 0;
+    const path = marks ? marks.path.filter(isThere) : [];
+    const line = new Float32Array(3 * path.length);
+    path.forEach((i, k) => line.set(xyz.subarray(3 * i, 3 * i + 3), 3 * k));
+    write(this.path.geometry, 'position', line, 3);
+    this.path.geometry.setDrawRange(0, path.length);
+    this.path.visible = path.length > 1;
+    const corners = this.showTriangles(moment, marks ? marks.corners || [] : [], centre, spacing);
+    this.marked = [...corners, ...place.filter((_, k) => tint[4 * Math.floor(k / 3) + 3] > 0)];
+  }
+
+  // The corners of marked triangles that are somewhere.
+  showTriangles(moment, corners, centre, spacing) {
+    const skin = corners.length ? places(moment.skin, moment, centre, spacing) : null;
+    const found = [];
+    for (let k = 0; k + 2 < corners.length; k += 3) {
+      const three = corners.slice(k, k + 3);
+      if (three.every((v) => 3 * v < skin.length && !Number.isNaN(skin[3 * v]))) for (const v of three) found.push(...skin.subarray(3 * v, 3 * v + 3));
+    }
+    const tint = new Uint8Array((4 * found.length) / 3);
+    for (let i = 0; i < tint.length; i += 4) tint.set([...kMarked, 255], i);
+    write(this.triangles.geometry, 'position', new Float32Array(found), 3);
+    write(this.triangles.geometry, 'tint', tint, 4, true);
+    this.triangles.geometry.setDrawRange(0, found.length / 3);
+    this.triangles.visible = found.length > 0;
+    const rims = [];
+    for (let k = 0; k < found.length; k += 9) for (const c of [0, 1, 1, 2, 2, 0]) rims.push(...found.slice(k + 3 * c, k + 3 * c + 3));
+    write(this.rims.geometry, 'position', new Float32Array(rims), 3);
+    this.rims.geometry.setDrawRange(0, rims.length / 3);
+    this.rims.visible = found.length > 0;
+    return found;
+  }
+
+  points() { return [this.particles, this.marks]; }
+}
