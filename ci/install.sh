@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs what building and testing needs, from Debian or Ubuntu packages; does nothing if all of it is there.
 # Usage: ci/install.sh [browser | fuzzing | libraries]
-#   browser     also Chromium, in which tests/report/browser_test.py opens report pages; without it that test is skipped
+#   browser     also Chromium, in which tests/report/ opens report pages; without it those tests are skipped
 #   fuzzing     also what ci/input_fuzzing.sh needs, and nothing else does
 #   libraries   also VTK, which tests/guests/libraries_test.cpp judges; without it those tests are skipped
 set -euo pipefail

@@ -131,13 +131,14 @@ export class Moments {
       found = { chunk: null };
       found.promise = (async () => {
         const id = `${this.name}-${this.from + k}`;
-        // A large page may still be on its way.
-        while (!document.getElementById(id) && document.readyState === 'loading') {
-          await new Promise((resolve) => setTimeout(resolve, 30));
-        }
+        // A large page may still be on its way, and an element is there before all of its text is.
+        const isWhole = () => document.readyState !== 'loading' || Boolean((document.getElementById(id) || {}).nextElementSibling);
+        while (!isWhole()) await new Promise((resolve) => setTimeout(resolve, 30));
         found.chunk = new Chunk(await inflate(document.getElementById(id).textContent.trim()));
         return found.chunk;
       })();
+      // What could not be had, for want of memory perhaps, is tried again when it is asked for again.
+      found.promise.catch(() => this.chunks.delete(k));
     }
     this.chunks.delete(k);
     this.chunks.set(k, found);

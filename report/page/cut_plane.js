@@ -64,7 +64,7 @@ export class CutPlane {
   face({ around, above }) { this.set({ isOn: true, around: (around * 180) / Math.PI, above: (above * 180) / Math.PI }); }
 
   words() {
-    return this.isOn ? `Cut open at ${figure(Math.round(10 * this.at) / 10)} h from the middle. The cut face is made of the particles within 1 h behind the plane, because a skin alone is hollow.` : '';
+    return this.isOn ? `Cut open at ${figure(Math.round(10 * this.at) / 10)} h from the middle. The cut face is made of the particles within 2 h behind the plane, because a skin alone is hollow.` : '';
   }
 
   // orbit: whose view the plane can be turned to.

@@ -154,7 +154,7 @@ export class Tissue {
     this.particles.visible = drawn > 0;
     this.particles.material.uniforms.fade.value = marks ? 0.72 : 0;
     // The face of a cut is closed by what lies behind it.
-    this.particles.material.uniforms.slab.value = look.isCut && !hasParticles ? 1 : 0;
+    this.particles.material.uniforms.slab.value = look.isCut && !hasParticles ? 2 : 0;
     this.showSkin(moment, hasSkin, tint, colour, Boolean(marks), centre, spacing);
     this.blade.visible = Boolean(about.blade);
     if (about.blade) this.placeBlade(about.blade, centre, spacing);

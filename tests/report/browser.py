@@ -73,7 +73,9 @@ class Browser:
 
     def __exit__(self, kind, *_):
         try:
-            if kind is None:
+            if kind is not None:
+                print(f"the console says: {self.driver.get_log('browser')}", flush=True)
+            else:
                 log = [line for line in self.driver.get_log("browser")]
                 assert not log, f"the console says: {log}"
                 asked = []
