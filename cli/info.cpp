@@ -149,7 +149,7 @@ int info(const InfoOptions& options, const CLI::App& program) {
   print_properties();
   insist(
       "scene files: versions 1 to {} (`cutproof info --scene` lists every field)\n"
-      "recordings: temporal VTKHDF 2.0, format {} (format {} is read too)\n"
+      "recordings: temporal VTKHDF 2.0, format {} ({} and later are read too)\n"
       "licence: sources MIT; this program links CGAL and SuiteSparse, which makes it GPL\n",
       kSceneVersion, io::kFormatVersion, io::kOldestFormatVersion);
   return 0;

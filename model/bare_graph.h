@@ -55,6 +55,7 @@ inline Body as_bare_graph(const Body& body) {
   bare.grid.nodes = {0, 0, 0};
   bare.node.clear();
   bare.particle_at.clear();
+  bare.surface_crossing.clear();
   bare.rest.clear();
   bare.edge_ends.clear();
   bare.edge_offsets = {0};
