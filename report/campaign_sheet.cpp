@@ -21,7 +21,9 @@ void add_coverage(Sheet& sheet, const Field& document, bool moves) {
                      : "Coverage classes: what a campaign must have met to say anything about it. Classes that need "
                        "bodies that move (--dynamics) are left out.";
   grid.columns = {{"class"}, {"cases", true}};
-  for (const auto& [name, value] : coverage.value->items()) {
+  for (const auto& each : coverage.value->items()) {
+    const std::string name = each.key();  // clang captures no binding
+    const nlohmann::json& value = each.value();
     const int64_t count = Field{&value, coverage.file, coverage.path + "." + name, coverage.remedy}.count();
     if (count == 0 && !moves) continue;
     grid.rows.push_back({{name, io::grouped(count)}, count == 0 ? "warn" : ""});

@@ -53,7 +53,9 @@ nlohmann::json verdict(const std::string& property, bool holds) {
                         {"frame", 3},           {"body", 0},        {"holds", holds},
                         {"measured", 0.5},      {"bound", "inf"},   {"unit", "h"},
                         {"checked", 7},         {"undecided", 2},   {"bound_source", "a page"}};
-  if (!holds) one["witness"] = {{"text", "there"}, {"clusters", {1}}, {"particles", {2, 3}}, {"path", {2, 4, 3}}, {"triangles", {0, 1}}};
+  if (!holds)
+    one["witness"] = {
+        {"text", "there"}, {"clusters", {1}}, {"particles", {2, 3}}, {"path", {2, 4, 3}}, {"triangles", {0, 1}}};
   return one;
 }
 
