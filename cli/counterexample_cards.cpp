@@ -33,6 +33,7 @@ report::Finding finding_of(const Verdict& verdict) {
   finding.clusters = verdict.witness.clusters;
   finding.particles = verdict.witness.particles;
   finding.path = verdict.witness.path;
+  finding.triangles = verdict.witness.triangles;
   return finding;
 }
 

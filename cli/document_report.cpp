@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <stdexcept>
 #include <utility>
 
 #include "cli/commands.h"
@@ -10,6 +11,7 @@
 #include "cli/options.h"
 #include "model/error.h"
 #include "model/io/atomic_file.h"
+#include "model/io/json_number.h"
 #include "property_tests/campaign_report.h"
 #include "report/document_page.h"
 #include "report/documents.h"
@@ -81,18 +83,20 @@ std::string campaign_again(const json& document) {
   if (is_known && harness::rotation_of(usual) != text("rotation")) command += " --rotation " + quoted(text("rotation"));
   if (!text("schedule").empty()) command += " --schedule " + quoted(text("schedule"));
   if (document.contains("schedule_seed"))
-    command += fmt::format(" --schedule-seed {}", document.at("schedule_seed").get<uint64_t>());
+    command += fmt::format(" --schedule-seed {}", integer_from<uint64_t>(document.at("schedule_seed")));
   if (document.contains("cases_asked"))
-    command += fmt::format(" --cases {}", document.at("cases_asked").get<int64_t>());
+    command += fmt::format(" --cases {}", integer_from<int64_t>(document.at("cases_asked")));
   if (document.contains("seconds_asked"))
     command += fmt::format(" --seconds {:g}", document.at("seconds_asked").get<double>());
-  command += fmt::format(" --seed {} --sizes {}-{}", document.at("seed").get<uint64_t>(),
-                         document.at("sizes").at(0).get<int64_t>(), document.at("sizes").at(1).get<int64_t>());
+  command +=
+      fmt::format(" --seed {} --sizes {}-{}", integer_from<uint64_t>(document.at("seed")),
+                  integer_from<int64_t>(document.at("sizes").at(0)), integer_from<int64_t>(document.at("sizes").at(1)));
   if (document.value("dynamics", false)) command += " --dynamics";
-  if (document.contains("batch")) command += fmt::format(" --batch {}", document.at("batch").get<int64_t>());
+  if (document.contains("batch")) command += fmt::format(" --batch {}", integer_from<int64_t>(document.at("batch")));
   if (document.value("keep_going", false)) command += " --keep-going";
-  if (document.at("shards").get<int64_t>() > 1)
-    command += fmt::format(" --shard {}/{}", document.at("shard").get<int64_t>(), document.at("shards").get<int64_t>());
+  if (integer_from<int64_t>(document.at("shards")) > 1)
+    command += fmt::format(" --shard {}/{}", integer_from<int64_t>(document.at("shard")),
+                           integer_from<int64_t>(document.at("shards")));
   return command;
 }
 
@@ -101,11 +105,16 @@ DocumentPage page_of_documents(const std::vector<json>& documents, const std::ve
   std::vector<report::Sheet> sheets;
   std::vector<report::Scenery> sceneries;
   for (std::size_t k = 0; k < documents.size(); ++k) {
+    const auto unreadable = [&](const std::exception& why) {
+      return InputError(files[k].empty() ? "the document" : files[k], "", why.what(),
+                        "give what this version of cutproof has written with --json");
+    };
     try {
       add_sheets(documents[k], files[k], chosen, sheets, sceneries);
     } catch (const json::exception& error) {
-      throw InputError(files[k].empty() ? "the document" : files[k], "", error.what(),
-                       "give what this version of cutproof has written with --json");
+      throw unreadable(error);
+    } catch (const std::invalid_argument& error) {
+      throw unreadable(error);
     }
   }
   DocumentPage page;

@@ -192,14 +192,14 @@ Array array_from(const std::string& name, const json& j) {
     if (j.at("type") == name_of(each)) type = each;
   }
   std::vector<int64_t> shape;
-  for (const json& extent : j.at("shape").get<std::vector<json>>()) shape.push_back(whole_number<int64_t>(extent));
+  for (const json& extent : j.at("shape").get<std::vector<json>>()) shape.push_back(integer_from<int64_t>(extent));
   if (j.size() != 3 || type == ElementType{}) throw std::invalid_argument(name + " is no array");
   const json& values = j.at("values");
   const auto filled = [&]<class T>(T) {
     std::vector<T> numbers;
     for (const json& value : values) {
       if constexpr (std::is_integral_v<T>) {
-        numbers.push_back(whole_number<T>(value));
+        numbers.push_back(integer_from<T>(value));
       } else if (!value.is_string()) {
         numbers.push_back(value.get<T>());
       } else {
@@ -274,8 +274,8 @@ SavedQuestion question_from_json(const std::string& text, const std::string& fil
     saved.at_end = j.at("at_end");
     saved.plugin = j.at("plugin");
     saved.found = j.at("found");
-    saved.seed = whole_number<uint64_t>(j.at("seed"));
-    saved.index = whole_number<int64_t>(j.at("index"));
+    saved.seed = integer_from<uint64_t>(j.at("seed"));
+    saved.index = integer_from<int64_t>(j.at("index"));
     // In the order in which the operation gives them, each of its type and as many columns.
     Question grid_model = operation->draw(1, 0, saved.precision);
     for (int64_t k = 0; k < static_cast<int64_t>(operation->kinds().size()); ++k) {

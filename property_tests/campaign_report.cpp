@@ -194,7 +194,7 @@ void require_fields(const json& part, const std::string& file) {
   }
   for (const char* flag : {"dynamics", "complete"}) static_cast<void>(part.at(flag).get<bool>());
   static_cast<void>(part.at("backend").get<std::string>());
-  static_cast<void>(whole_number<int>(part.at("sizes").at(1)));
+  static_cast<void>(integer_from<int>(part.at("sizes").at(1)));
   for (const CoverageClass& each : kCoverageClasses) require_count(part.at("coverage"), each.name);
   if (part.at("properties").size() > io::kMostProperties) {
     throw InputError(
@@ -208,12 +208,16 @@ void require_fields(const json& part, const std::string& file) {
     for (const char* figure : {"measured", "of_bound"}) static_cast<void>(property.at(figure));
   }
   for (const json& violation : part.at("violations").get<std::vector<json>>()) {
-    static_cast<void>(whole_number<int64_t>(violation.at("index")));
+    static_cast<void>(integer_from<int64_t>(violation.at("index")));
     for (const char* word : {"text", "file"}) static_cast<void>(violation.at(word).get<std::string>());
   }
   if (!part.contains("steps_compared")) return;
   for (const char* count : kCountsOfSteps) require_count(part.at("steps_compared"), count);
   static_cast<void>(part.at("steps_compared").at("greatest_h"));
+}
+
+InputError no_result(const std::string& file, const std::exception& why) {
+  return {file, "", fmt::format("this is not a result of `cutproof fuzz` ({})", why.what()), kRemedy};
 }
 
 // One result as it stands in its file.
@@ -227,7 +231,7 @@ json read_shard(const std::string& file) {
   if (part.contains("merged_shards")) {
     throw InputError(file, "merged_shards", "these are shards that were put together already", kRemedy);
   }
-  const auto shard = whole_number<int64_t>(part.at("shard")), shards = whole_number<int64_t>(part.at("shards"));
+  const auto shard = integer_from<int64_t>(part.at("shard")), shards = integer_from<int64_t>(part.at("shards"));
   if (shards < 1 || shards > kMostShards || shard < 1 || shard > shards) {
     throw InputError(file, "shard", fmt::format("there is no shard {} of {}", shard, shards), kRemedy);
   }
@@ -243,18 +247,21 @@ void require_campaign(const json& document, const std::string& file) {
     if (document.contains("seconds_asked")) {
       static_cast<void>(document.at("seconds_asked").get<double>());
     } else {
-      static_cast<void>(document.at("cases_asked").get<int64_t>());
+      static_cast<void>(integer_from<int64_t>(document.at("cases_asked")));
     }
     for (const char* const count : {"shard", "shards"}) {
-      if (document.at(count).get<int64_t>() < 1 || document.at(count).get<int64_t>() > kMostShards)
-        throw InputError(file, count, "there is no such shard", kRemedy);
+      const auto number = integer_from<int64_t>(document.at(count));
+      if (number < 1 || number > kMostShards) throw InputError(file, count, "there is no such shard", kRemedy);
     }
     if (document.contains("missing_shards")) {
-      static_cast<void>(document.at("missing_shards").get<std::vector<int64_t>>());
-      static_cast<void>(document.at("merged_shards").get<int64_t>());
+      for (const json& missing : document.at("missing_shards").get<std::vector<json>>())
+        static_cast<void>(integer_from<int64_t>(missing));
+      static_cast<void>(integer_from<int64_t>(document.at("merged_shards")));
     }
   } catch (const json::exception& error) {
-    throw InputError(file, "", fmt::format("this is not a result of `cutproof fuzz` ({})", error.what()), kRemedy);
+    throw no_result(file, error);
+  } catch (const std::invalid_argument& error) {
+    throw no_result(file, error);
   }
 }
 
@@ -280,9 +287,9 @@ json merge_shards(const std::vector<std::string>& files) {
       if (file_of.size() > 1) add_shard(whole, part);
       if (!part.at("complete").get<bool>()) stopped.insert(shard);
     } catch (const json::exception& error) {
-      throw InputError(file, "", fmt::format("this is not a result of `cutproof fuzz` ({})", error.what()), kRemedy);
+      throw no_result(file, error);
     } catch (const std::invalid_argument& error) {
-      throw InputError(file, "", fmt::format("this is not a result of `cutproof fuzz` ({})", error.what()), kRemedy);
+      throw no_result(file, error);
     }
   }
   const auto expected = whole.at("shards").get<int64_t>();

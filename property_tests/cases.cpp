@@ -620,6 +620,8 @@ std::vector<Stroke> resolved_strokes(const Case& c) {
   return strokes;
 }
 
+namespace {
+
 // Of each edge that leaves the tissue by itself, so that a simpler case keeps those that it still has. Some are at the
 // least and some at the greatest that there is; of some nothing is known.
 std::vector<uint8_t> random_crossings(const Body& body, int32_t seed) {
@@ -645,6 +647,8 @@ std::vector<uint8_t> random_crossings(const Body& body, int32_t seed) {
   }
   return crossings;
 }
+
+}  // namespace
 
 Setup setup_of(const Case& c) {
   Setup setup;

@@ -44,16 +44,15 @@ std::string to_json(const Counterexample& counterexample) {
 
 namespace {
 
-// Cases and commands have whole numbers but for the spacing. Empty, or which field has another: read as an integer it
-// would become anything (json_number.h).
-std::string fraction_in(const nlohmann::json& document) {
+// Cases and commands have whole numbers but for the spacing: any other, read as an integer, would become anything
+// (json_number.h). Throws InputError, naming the field.
+void require_whole_numbers(const nlohmann::json& document, const std::string& file) {
   for (const auto& [key, value] : document.items()) {
     const bool may_be = document.is_object() && key == "spacing";
-    if (value.is_number_float() && !may_be) return "'" + key + "' is " + value.dump() + ", which is no whole number";
-    if (!value.is_structured()) continue;
-    if (std::string problem = fraction_in(value); !problem.empty()) return problem;
+    if (value.is_number_float() && !may_be)
+      throw InputError(file, key, value.dump() + " is no whole number", kWhatToGive);
+    if (value.is_structured()) require_whole_numbers(value, file);
   }
-  return {};
 }
 
 }  // namespace
@@ -67,7 +66,7 @@ Counterexample counterexample_from_json(const std::string& text, const std::stri
   try {
     const auto document = io::parse_json(text, file, io::kCounterexampleLimits, std::string(kWhatToGive) + ".");
     if (!document.is_object()) throw refuse("", "this is not a counterexample");
-    if (const std::string problem = fraction_in(document); !problem.empty()) throw refuse("", problem);
+    require_whole_numbers(document, file);
     if (!document.contains("format")) {
       result.failing = from_json(text);
       return result;
@@ -75,7 +74,7 @@ Counterexample counterexample_from_json(const std::string& text, const std::stri
     const auto get = [&]<class T>(const char* name, T& value) {
       field = name;
       if constexpr (std::is_integral_v<T>) {
-        value = whole_number<T>(document.at(name));
+        value = integer_from<T>(document.at(name));
       } else {
         document.at(name).get_to(value);
       }
@@ -96,8 +95,8 @@ Counterexample counterexample_from_json(const std::string& text, const std::stri
     get("index", result.index);
     field = "schedule";
     for (const auto& pair : document.at("schedule").get<std::vector<std::array<nlohmann::json, 2>>>()) {
-      const auto decision = whole_number<std::size_t>(pair[0]);
-      const auto choice = whole_number<uint16_t>(pair[1]);
+      const auto decision = integer_from<std::size_t>(pair[0]);
+      const auto choice = integer_from<uint16_t>(pair[1]);
       if (decision >= io::kMostDecisions)
         throw refuse("schedule", "a decision with number " + std::to_string(decision));
       if (decision >= result.schedule.size()) result.schedule.resize(decision + 1, 0);

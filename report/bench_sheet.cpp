@@ -464,7 +464,6 @@ void solver_pieces(Sheet& sheet, const Field& document) {
         {"median time of a step", "ms", true},
         {"greatest distance", "h", true},
         {}};
-    double low = 0, high = 0;
     std::vector<Dot> all;
     scene["rows"].each([&](const Field& row) {
       const std::string acceleration = row["acceleration"].text();
@@ -473,18 +472,12 @@ void solver_pieces(Sheet& sheet, const Field& document) {
                        fmt::format("{} iterations, acceleration {}", row["iterations"].count(), acceleration)};
       curve_named(chart, "acceleration " + acceleration, Look::joined).dots.push_back(dot);
       all.push_back(dot);
-      if (ms) {
-        low = low == 0 ? *ms : std::min(low, *ms);
-        high = std::max(high, *ms);
-      }
       grid.rows.push_back(
           {{name, acceleration, whole(row["iterations"].count()), figure_text(ms), figure_text(most),
             figure_text(row["rms_h"].number_or_null()), figure_text(row["energy_gap"].number_or_null())}});
     });
     chart.curves.push_back(front_of(all, "the best"));
-    const std::string limit = fmt::format("tolerance, {:.4g} h", tolerance);
-    if (high > 0)
-      chart.curves.push_back({"tolerance", Look::level, {{low, tolerance, limit}, {high, tolerance, limit}}});
+    add_tolerance(chart, all, tolerance);
     if (!scene["converged"].flag())
       sheet.notes.push_back(name + ": the reference solution did not converge, so these errors are not known.");
     sheet.pieces.emplace_back(std::move(chart));

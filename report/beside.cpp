@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <map>
 #include <set>
@@ -10,6 +9,7 @@
 #include <utility>
 
 #include "model/at.h"
+#include "model/fields.h"
 
 namespace cutproof::report {
 
@@ -32,8 +32,7 @@ Apart apart_of(const State& one, const State& other, double spacing) {
     }
     if (one.alive[i] == 0) continue;
     // Two that are equal to the bit are not apart, even where they are no places.
-    double distance =
-        std::memcmp(&one.x[i], &other.x[i], sizeof(Vec3)) == 0 ? 0 : norm(one.x[i] - other.x[i]) / spacing;
+    double distance = same_bits(one.x[i], other.x[i]) ? 0 : norm(one.x[i] - other.x[i]) / spacing;
     if (!std::isfinite(distance)) distance = std::numeric_limits<double>::infinity();
     apart.codes[i] = code_of(distance);
     squares += distance * distance;

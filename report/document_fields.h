@@ -31,6 +31,9 @@ std::optional<double> seconds_of(const Field& times, const char* which = "median
 // Of the points of least x and y: those that no other beats in one without being beaten in the other, by x.
 Curve front_of(const std::vector<Dot>& dots, const std::string& name);
 
+// Draws a tolerance [h] across the points that have an x; nothing if none has.
+void add_tolerance(Chart& chart, const std::vector<Dot>& dots, double tolerance);
+
 // What every benchmark and tuning begins with: badge, facts, the command to repeat it.
 void add_measurement(Sheet& sheet, const Field& document);
 

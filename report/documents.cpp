@@ -84,6 +84,18 @@ Curve front_of(const std::vector<Dot>& dots, const std::string& name) {
   return front;
 }
 
+void add_tolerance(Chart& chart, const std::vector<Dot>& dots, double tolerance) {
+  std::optional<double> low, high;
+  for (const Dot& dot : dots) {
+    if (!dot.x) continue;
+    low = std::min(low.value_or(*dot.x), *dot.x);
+    high = std::max(high.value_or(*dot.x), *dot.x);
+  }
+  if (!low) return;
+  const std::string text = fmt::format("tolerance, {:.4g} h", tolerance);
+  chart.curves.push_back({"tolerance", Look::level, {{low, tolerance, text}, {high, tolerance, text}}});
+}
+
 PropertyTable property_table(const Field& properties) {
   struct Read {
     int rank;

@@ -89,14 +89,7 @@ Sheet tune_sheet(const Field& document) {
   if (given.x) chart.curves.push_back({"the scene as given", Look::dots, {given}});
   if (has_found) chart.curves.push_back({"the answer", Look::dots, {chosen}});
   chart.curves.push_back(front_of(timed, "the best"));
-  double low = 0, high = 0;
-  for (const Dot& dot : timed) {
-    if (!dot.x) continue;
-    low = low == 0 ? *dot.x : std::min(low, *dot.x);
-    high = std::max(high, *dot.x);
-  }
-  const std::string limit = fmt::format("tolerance, {:.4g} h", tolerance);
-  if (high > 0) chart.curves.push_back({"tolerance", Look::level, {{low, tolerance, limit}, {high, tolerance, limit}}});
+  add_tolerance(chart, timed, tolerance);
   if (has_found) {
     sheet.holds = sheet.badge != "✕ incomplete";
     if (*sheet.holds) sheet.badge = "✓ found";

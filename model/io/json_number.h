@@ -27,7 +27,7 @@ inline nlohmann::json json_number(const std::optional<double>& value) {
 // The whole number that a value from outside is. Throws std::invalid_argument if it is none, or T does not reach so
 // far: nlohmann's get() makes an integer of any number, which for 1e93 has no defined result.
 template <std::integral T>
-T whole_number(const nlohmann::json& value) {
+T integer_from(const nlohmann::json& value) {
   if (value.is_number_unsigned()) {
     if (const auto number = value.get<uint64_t>(); std::in_range<T>(number)) return static_cast<T>(number);
   } else if (value.is_number_integer()) {

@@ -1,6 +1,9 @@
-// Results of campaigns: one, or two with a NUL between them, are put together and concluded from.
+// Results of campaigns: one, or two with a NUL between them, are put together and concluded from; the first is also
+// read as a page reads it.
 #include <nlohmann/json.hpp>
 
+#include "model/io/json_reader.h"
+#include "model/io/limits.h"
 #include "property_tests/campaign_report.h"
 #include "tests/input_fuzzing/targets.h"
 
@@ -19,6 +22,9 @@ Outcome feed(std::string_view bytes) {
     const nlohmann::json whole = property_tests::merge_shards(files);
     const property_tests::CampaignConclusion conclusion = property_tests::conclude(whole, true);
     if (conclusion.holds() && !whole.at("violations").empty()) broken_contract("violations hold");
+    // As a page of it reads it: alone, and not put together.
+    property_tests::require_campaign(io::read_json(files.front(), io::kCampaignLimits, "Give a result."),
+                                     files.front());
   });
 }
 

@@ -305,5 +305,30 @@ TEST(ACounterexample, IsRefusedWithItsFieldIfItIsNone) {
   EXPECT_THROW(counterexample_from_json("", "f.json"), InputError);
 }
 
+// What a page reads of a campaign without asking again.
+TEST(CampaignDocument, IsRefusedWithNumbersThatNoIntegerHolds) {
+  harness::BackendChoice backend;
+  backend.name = "host";
+  CampaignOptions options;
+  options.cases = 7;
+  const nlohmann::json right = campaign_document(backend, options, {}, nlohmann::json::array());
+  EXPECT_NO_THROW(require_campaign(right, "c.json"));
+  for (const char* field : {"cases_asked", "shard", "shards"}) {
+    for (const nlohmann::json& value : {nlohmann::json(1e300), nlohmann::json(2.5), nlohmann::json("7")}) {
+      nlohmann::json wrong = right;
+      wrong[field] = value;
+      EXPECT_THROW(require_campaign(wrong, "c.json"), InputError) << field << " " << value;
+    }
+  }
+  nlohmann::json merged = right;
+  merged["missing_shards"] = {1e300};
+  merged["merged_shards"] = 2;
+  EXPECT_THROW(require_campaign(merged, "c.json"), InputError);
+  merged["missing_shards"] = {1};
+  EXPECT_NO_THROW(require_campaign(merged, "c.json"));
+  merged["merged_shards"] = -1e300;
+  EXPECT_THROW(require_campaign(merged, "c.json"), InputError);
+}
+
 }  // namespace
 }  // namespace cutproof::property_tests
