@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 """Colours of the report pages under simulated protanopia and deuteranopia: how far apart those of a palette are (CIE76
 in CIELAB). Simulation: G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, IEEE TVCG 15(6), 2009, severity 1.
-Usage: colours_test.py report/page/colours.js report/page/page.css"""
+Usage: colours_test.py report/page/colours.js report/page/page.css report/page/tissue.js"""
 import itertools
 import math
 import pathlib
 import re
 import sys
 
-script, style = (pathlib.Path(name).read_text() for name in sys.argv[1:3])
+script, style, drawing = (pathlib.Path(name).read_text() for name in sys.argv[1:4])
 SEEN = {
     "as it is": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
     "protanopia": ((0.152286, 1.052583, -0.204868), (0.114503, 0.786281, 0.099216), (-0.003882, -0.048116, 1.051998)),
@@ -61,7 +61,13 @@ for kind, matrix in SEEN.items():
     light = [lab(colour, matrix)[0] for colour in palette("kCividis")]
     assert all(b - a > 5 for a, b in zip(light, light[1:])), (kind, light)
 # What is marked stands out from what it lies on.
-marked, tissue = "#d65e00", "#d19e8c"
+def triple(source, name):
+    found = re.search(rf"{name} = (?:packed\()?\[(\d+), (\d+), (\d+)\]", source)
+    assert found, f"there is no {name}"
+    return "#%02x%02x%02x" % tuple(int(x) for x in found.groups())
+
+
+marked, tissue = triple(drawing, "kMarked"), triple(script, "kTissue")
 for kind, matrix in SEEN.items():
     apart = math.dist(lab(marked, matrix), lab(tissue, matrix))
     print(f"marked beside tissue, {kind}: {apart:.1f}")

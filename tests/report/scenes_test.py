@@ -53,8 +53,9 @@ for stage in STAGES:
             corners = page.data("findings[0].marks.corners")
             witness = first["witness"]["triangles"]
             assert witness and len(corners) == 3 * len(witness), (corners, witness)
-            words = page.ask("document.querySelector(\"[data-finding='0']\").click();"
-                             "return new Promise((done) => setTimeout(() => done(document.getElementById('legend').textContent), 500));")
+            page.driver.find_element(By.CSS_SELECTOR, "[data-finding='0']").click()
+            page.shown(marks["moment"], 0)
+            words = page.text("#legend")
             assert f"{len(witness)} triangles of the skin" in words, words
         # The command runs as it stands, and comes to the same. A terminal shows a few of many, so all are compared.
         command = page.text(".command")
