@@ -278,6 +278,9 @@ class PluginBackend final : public Backend {
       }
     }
     take_state(answer.arrays, state);
+    if (!find_array(answer.arrays, "state/reach") && find_array(answer.arrays, "state/owner")) {
+      state.skin.reach = uncut_reaches(setups_[b], state.skin);
+    }
     if (state.clusters.offsets.empty()) state.clusters.offsets = {0};
   }
 

@@ -398,6 +398,7 @@ class Reader {
       skin.direction.push_back(d >= 0 && d < 6 ? static_cast<uint8_t>(d) : uint8_t{255});  // found by "well formed"
     }
     out_.state.skin = std::move(skin);
+    out_.state.skin.reach = uncut_reaches(out_.setup, out_.state.skin);
     out_.setup.skin.wanted = true;
     out_.state.frame = 1;  // a skin is due at the end of a frame, and this is one
   }

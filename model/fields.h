@@ -63,6 +63,7 @@ struct Field {
   std::string_view derived_from;  // "": it is not; else what determines it
   // What two right backends must agree on: bits for decisions, distances for what is computed.
   bool is_decision;
+  int32_t since = 0;  // recordings of earlier formats do not have it: recording_reader.cpp says what it is there
 };
 
 // visit(field, get) for each field, in a fixed order. get(state) is a reference to the field of a State or const State.
@@ -105,6 +106,7 @@ constexpr void for_each_field(Visit&& visit) {
   CUTPROOF_FIELD(skin.owner, "owner", "a skin vertex's owner", vertex, Q::particle, "1", kSkin, by_skin, "alive", true);
   CUTPROOF_FIELD(skin.direction, "direction", "a skin vertex's direction", vertex, Q::direction, "1", kSkin, by_skin,
                  "alive", true);
+  CUTPROOF_FIELD(skin.reach, "reach", "a skin vertex's reach", vertex, Q::number, "h", kSkin, by_skin, "", false, 6);
   CUTPROOF_FIELD(skin.position, "skin_position", "a skin vertex's position", vertex, Q::point, "m", kSkin, by_skin,
                  "x, rotation, rest_center, members", false);
   CUTPROOF_FIELD(skin.triangles, "triangles", "a skin triangle", triangle, Q::vertices, "1", kSkin, by_skin, "alive",
@@ -118,7 +120,7 @@ inline void know_every_member(const State& state) {
   [[maybe_unused]] const auto& [frame, x, v, alive, removed, debris, clusters, tau, cap, edge_covered, impulse, skin,
                                 precision, place_rounding] = state;
   [[maybe_unused]] const auto& [offsets, members, number, rotation, rest_center, mass, degenerate] = clusters;
-  [[maybe_unused]] const auto& [owner, direction, position, triangles] = skin;
+  [[maybe_unused]] const auto& [owner, direction, reach, position, triangles] = skin;
 }
 }  // namespace fields_detail
 

@@ -2,11 +2,13 @@
 // outside world does in each substep. Paths are resolved to tables, so that a backend looks them up and two
 // backends cannot disagree about kinematics.
 #pragma once
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
 #include "model/blade.h"
 #include "model/body.h"
+#include "model/skin.h"
 
 namespace cutproof {
 
@@ -63,6 +65,7 @@ struct ExpandParameters {
 struct SkinParameters {
   bool wanted = true;  // false: no skin is made
   double alpha = 0.5;  // vertex at X_i + alpha h e where no crossing is known, in (0, 1)
+  bool fit_cuts = false;  // a vertex that a blade brings about lies where the blade has crossed its grid edge
   friend bool operator==(const SkinParameters&, const SkinParameters&) = default;
 };
 
@@ -117,10 +120,33 @@ struct Setup {
   int64_t frame_count() const { return static_cast<int64_t>(substep_length.size()); }
 };
 
-// How far from its owner a skin vertex lies on its grid edge at rest, as a fraction of h (method.md §8).
-inline double vertex_reach(const Setup& setup, int32_t owner, int direction) {
+// How far from its owner a skin vertex lies on a grid edge that no cut has opened, as a fraction of h (method.md §8).
+inline double uncut_reach(const Setup& setup, int32_t owner, int direction) {
   const double crossing = setup.body.crossing(owner, direction);
   return crossing > 0 ? crossing : setup.skin.alpha;
+}
+
+// The same for all vertices of a skin, which may name what is not there: such a vertex has alpha.
+inline std::vector<double> uncut_reaches(const Setup& setup, const Skin& skin) {
+  std::vector<double> reaches(skin.owner.size(), setup.skin.alpha);
+  for (std::size_t v = 0; v < std::min(skin.owner.size(), skin.direction.size()); ++v) {
+    const bool exists = skin.owner[v] >= 0 && skin.owner[v] < setup.body.particle_count() && skin.direction[v] < 6;
+    if (exists) reaches[v] = uncut_reach(setup, skin.owner[v], skin.direction[v]);
+  }
+  return reaches;
+}
+
+// How far from its owner a vertex lies that a cut brings about, as a fraction of h, given how far from the plane of the
+// blade the owner's clusters carry the two ends of its grid edge [any unit, with signs]: where the edge crosses that
+// plane; within [1/16, 15/16], because it stays on its edge; and the farther the plane is from the edge, the nearer to
+// alpha. Continuous, so that rounding moves the vertex and decides nothing (method.md §8).
+inline double cut_reach(double owner, double end, double alpha) {
+  constexpr double kLeast = double{kLeastCrossing} / kCrossingSteps, kGreatest = 1 - kLeast;
+  const double t = owner / (owner - end);  // of the edge, from the owner on
+  if (!(t > -1 && t < 3)) return alpha;    // so if it is parallel to the plane
+  if (t < 0) return kLeast - t * (alpha - kLeast);
+  if (t > 2) return kGreatest + (t - 2) * (alpha - kGreatest);
+  return t < kLeast ? kLeast : t > kGreatest ? kGreatest : t;
 }
 
 // Whether frames of this setup launch the detect stage.

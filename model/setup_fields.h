@@ -53,7 +53,7 @@ inline void know_every_member(const Setup& setup) {
   [[maybe_unused]] const auto& [debris] = split;
   [[maybe_unused]] const auto& [merge_rule] = merge;
   [[maybe_unused]] const auto& [expand_rule, expand_depth] = expand;
-  [[maybe_unused]] const auto& [wanted, alpha] = skin;
+  [[maybe_unused]] const auto& [wanted, alpha, fit_cuts] = skin;
   [[maybe_unused]] const auto& [length, blade_depth, thickness, friction] = blade;
 }
 inline void know_every_member(const Wall& wall) { [[maybe_unused]] const auto& [axis, side, offset, friction] = wall; }
@@ -106,6 +106,7 @@ constexpr void for_each_setup_field(Visit&& visit) {
   CUTPROOF_FIELD(expand.depth, "expand", "depth", one, "layers", 1);
   CUTPROOF_FIELD(skin.wanted, "skin", "wanted", one);
   CUTPROOF_FIELD(skin.alpha, "skin", "alpha", one, "h");
+  CUTPROOF_FIELD(skin.fit_cuts, "skin", "fit_cuts", one, "1", kAnyNumber, false, 6);
   CUTPROOF_FIELD(walls, "walls", "", wall);
   CUTPROOF_FIELD(grips, "grips", "", grip);
   CUTPROOF_FIELD(has_blade, "blade", "present", one);

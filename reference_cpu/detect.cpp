@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "model/at.h"
+#include "reference_cpu/lowered_blade.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::reference {
@@ -41,16 +42,6 @@ std::vector<uint8_t> both_ends(const std::vector<OpenEdge>& open, std::size_t pa
   std::vector<uint8_t> found(particles, 0);
   for (const OpenEdge edge : open) found[at(edge.low)] = found[at(edge.high)] = 1;
   return found;
-}
-
-// Where the blade stood last in this frame while it was lowered.
-const BladePose* lowered_blade(const Setup& setup, int64_t frame) {
-  const BladePose* pose = nullptr;
-  for (int32_t s = 0; setup.has_blade && s < setup.step.substeps; ++s) {
-    const BladeMove& move = setup.blade_moves[at(frame * setup.step.substeps + s)];
-    if (move.down) pose = &move.to;
-  }
-  return pose;
 }
 
 // The end on the blade's negative side, if its plane lies between them; otherwise the one with more open edges; of

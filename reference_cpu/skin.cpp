@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "model/at.h"
+#include "reference_cpu/lowered_blade.h"
 #include "reference_cpu/reference.h"
 #include "reference_cpu/skin_cases.h"
 
@@ -11,6 +12,9 @@ namespace cutproof::reference {
 namespace {
 
 // --- Extraction -------------------------------------------------------------------------------------------------
+
+// The edge of a vertex: 6 · owner + direction.
+std::size_t edge_of(int32_t owner, int direction) { return at(owner) * 6 + at(direction); }
 
 // Vertices are ordered by owner, then direction; triangles by the cell's lowest node, then as in the case table.
 void extract(const Body& body, const std::vector<uint8_t>& alive, Skin& skin) {
@@ -21,8 +25,7 @@ void extract(const Body& body, const std::vector<uint8_t>& alive, Skin& skin) {
   for (int32_t p = 0; p < body.particle_count(); ++p) {
     for (int direction = 0; direction < 6 && is_tissue(p); ++direction) {
       if (is_tissue(body.neighbour(p, direction))) continue;
-      vertex[static_cast<std::size_t>(p) * 6 + static_cast<std::size_t>(direction)] =
-          static_cast<int32_t>(skin.owner.size());
+      vertex[edge_of(p, direction)] = static_cast<int32_t>(skin.owner.size());
       skin.owner.push_back(p);
       skin.direction.push_back(static_cast<uint8_t>(direction));
     }
@@ -46,8 +49,8 @@ void extract(const Body& body, const std::vector<uint8_t>& alive, Skin& skin) {
         const auto vertex_on = [&](int cell_edge) {
           const CellEdge& edge = cell_edges()[static_cast<std::size_t>(cell_edge)];
           const bool low_owns = (inside >> edge.low & 1) != 0;
-          const auto owner = static_cast<std::size_t>(body.particle_at[corner(low_owns ? edge.low : edge.high)]);
-          return vertex[owner * 6 + static_cast<std::size_t>(2 * edge.axis + (low_owns ? 0 : 1))];
+          const int32_t owner = body.particle_at[corner(low_owns ? edge.low : edge.high)];
+          return vertex[edge_of(owner, 2 * edge.axis + (low_owns ? 0 : 1))];
         };
         for (const auto& [a, b, c] : skin_cases()[static_cast<std::size_t>(inside)].triangles) {
           skin.triangles.push_back({vertex_on(a), vertex_on(b), vertex_on(c)});
@@ -75,27 +78,65 @@ std::vector<Vec3> current_centers(const Body& body, const State& state, const Me
   return centers;
 }
 
-void place_vertices(const Setup& setup, State& state) {
-  const Body& body = setup.body;
-  const Memberships memberships = memberships_of(state.clusters, body.particle_count());
-  const std::vector<Vec3> centers = current_centers(body, state, memberships);
-  for (std::size_t v = 0; v < state.skin.owner.size(); ++v) {
-    const int32_t owner = state.skin.owner[v];
-    const int direction = state.skin.direction[v];
-    const double crossing = body.crossing(owner, direction);
-    const double reach = (crossing > 0 ? crossing : setup.skin.alpha) * body.grid.spacing;
+// Where the clusters of a particle carry what rests on one of its grid edges.
+class Carrier {
+ public:
+  Carrier(const Setup& setup, const State& state)
+      : body_(setup.body),
+        state_(state),
+        memberships_(memberships_of(state.clusters, setup.body.particle_count())),
+        centers_(current_centers(setup.body, state, memberships_)) {}
+
+  Vec3 operator()(int32_t owner, int direction, double reach) const {
+    const double far = reach * body_.grid.spacing;
     const auto& e = kDirections[at(direction)];
-    const Vec3 offset = {reach * e[0], reach * e[1], reach * e[2]};
-    const Vec3 rest = body.rest_position(owner) + offset;
+    const Vec3 offset = {far * e[0], far * e[1], far * e[2]};
+    const Vec3 rest = body_.rest_position(owner) + offset;
     Vec3 sum;
-    for (const int32_t cluster : memberships.of(owner)) {
+    for (const int32_t cluster : memberships_.of(owner)) {
       const auto c = static_cast<std::size_t>(cluster);
-      sum += centers[c] + state.clusters.rotation[c] * (rest - state.clusters.rest_center[c]);
+      sum += centers_[c] + state_.clusters.rotation[c] * (rest - state_.clusters.rest_center[c]);
     }
     // An owner without a cluster breaks I2. Its vertex then goes with the particle, unrotated.
-    const auto count = memberships.count(owner);
-    state.skin.position[v] =
-        count > 0 ? sum / static_cast<double>(count) : state.x[static_cast<std::size_t>(owner)] + offset;
+    const auto count = memberships_.count(owner);
+    return count > 0 ? sum / static_cast<double>(count) : state_.x[static_cast<std::size_t>(owner)] + offset;
+  }
+
+ private:
+  const Body& body_;
+  const State& state_;
+  Memberships memberships_;
+  std::vector<Vec3> centers_;
+};
+
+// Vertices that were there before stay where they were on their edges. Beside what has died in this frame the blade has
+// brought about new ones, where it crosses their edges; of all others the body knows.
+void find_reaches(const Setup& setup, const Skin& before, const Carrier& carried, State& state) {
+  const Body& body = setup.body;
+  Skin& skin = state.skin;
+  std::vector<double> known(at(body.particle_count()) * 6, 0);
+  for (std::size_t v = 0; v < before.owner.size(); ++v) {
+    known[edge_of(before.owner[v], before.direction[v])] = before.reach[v];
+  }
+  std::vector<uint8_t> died(at(body.particle_count()), 0);
+  for (const auto* list : {&state.removed, &state.debris}) {
+    for (const int32_t i : *list) died[at(i)] = 1;
+  }
+  const BladePose* const blade = setup.skin.fit_cuts ? lowered_blade(setup, state.frame) : nullptr;
+  skin.reach.clear();
+  for (std::size_t v = 0; v < skin.owner.size(); ++v) {
+    const int32_t owner = skin.owner[v];
+    const int direction = skin.direction[v];
+    const int32_t end = body.neighbour(owner, direction);
+    double reach = known[edge_of(owner, direction)];
+    if (reach == 0 && blade != nullptr && end >= 0 && died[at(end)]) {
+      const Vec3 normal = cross(blade->along, blade->back);
+      reach = cut_reach(dot(carried(owner, direction, 0) - blade->edge, normal),
+                        dot(carried(owner, direction, 1) - blade->edge, normal), setup.skin.alpha);
+    } else if (reach == 0) {
+      reach = uncut_reach(setup, owner, direction);
+    }
+    skin.reach.push_back(reach);
   }
 }
 
@@ -107,8 +148,16 @@ void skin(const Setup& setup, State& state) {
     return;
   }
   const bool changed = !state.removed.empty() || !state.debris.empty();
-  if (changed || state.skin.owner.empty()) extract(setup.body, state.alive, state.skin);
-  place_vertices(setup, state);
+  const Carrier carried(setup, state);
+  if (changed || state.skin.owner.empty()) {
+    const Skin before = state.skin;
+    extract(setup.body, state.alive, state.skin);
+    find_reaches(setup, before, carried, state);
+  }
+  Skin& skin = state.skin;
+  for (std::size_t v = 0; v < skin.owner.size(); ++v) {
+    skin.position[v] = carried(skin.owner[v], skin.direction[v], skin.reach[v]);
+  }
 }
 
 }  // namespace cutproof::reference

@@ -12,6 +12,7 @@
 //   go to removal, so the reach is longer by swept_slack(), which is more than that: what is within the reach always
 //   goes, and what is farther by up to twice the slack may go.
 #pragma once
+#include "gpu/kernels/lowered_plane.cuh"
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/plan.h"
 #include "gpu/launch/team.h"
@@ -70,22 +71,8 @@ struct OpenEdges {
 CUTPROOF_DEVICE inline int packed(OpenEdges edges) { return edges.count << 6 | static_cast<int>(edges.contested); }
 CUTPROOF_DEVICE inline OpenEdges unpacked(int word) { return {word >> 6, static_cast<unsigned>(word) & 63u}; }
 
-// The plane of the blade where it stood last in this frame while it was lowered.
-struct Plane {
-  bool exists = false;
-  Float3 edge, normal;
-};
-CUTPROOF_DEVICE inline Plane lowered_plane(const DeviceView& w, const BodyConstants& body, int b) {
-  Plane plane;
-  if (!body.has_blade) return plane;
-  const MoveF* const moves = w.moves + body.schedule + int64_t{w.frame[b]} * body.substeps;
-  for (int s = body.substeps - 1; s >= 0 && !plane.exists; --s) {
-    if (moves[s].down) plane = {true, moves[s].to.edge, cross(moves[s].to.along, moves[s].to.back)};
-  }
-  return plane;
-}
 CUTPROOF_DEVICE inline bool is_negative(const DeviceView& w, const BodyConstants& body, const Plane& plane, int p) {
-  return dot(rest_position(body, w.node[p]) + xyz(w.displacement[p]) - plane.edge, plane.normal) < 0;
+  return height_over(plane, rest_position(body, w.node[p]) + xyz(w.displacement[p])) < 0;
 }
 
 // What becomes of a particle that has an edge longer than the root of `limit`.

@@ -7,6 +7,7 @@
 // listed first, ascending; places of vertices and cells are given out in their order.
 #pragma once
 #include "gpu/kernels/float3.h"
+#include "gpu/kernels/lowered_plane.cuh"
 #include "gpu/kernels/skin_table.h"
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/plan.h"
@@ -64,6 +65,34 @@ CUTPROOF_DEVICE inline NewVertex new_vertex(const DeviceView& w, int b, int p, i
   const bool q_alive = q >= 0 && alive(w, q);
   if (w.skin_made[b]) return {q_alive && w.vertex_of[6 * q + (d ^ 1)] < 0 ? q : -1, d ^ 1};
   return {!q_alive && w.vertex_of[6 * p + d] < 0 ? p : -1, d};
+}
+
+// Where a vertex lies on its grid edge, as far as its owner and direction say: where the surface of the uncut body
+// crosses that edge, where the skin that was loaded had it, and otherwise alpha; kReachUnknown of one that the blade
+// may have brought about in this frame.
+CUTPROOF_DEVICE inline float known_reach(const DeviceView& w, int b, NewVertex made) {
+  const BodyConstants& body = w.body[b];
+  const int edge = 6 * made.owner + made.direction;
+  const int end = neighbour(w, body, made.owner, made.direction);
+  if (end < 0) {
+    const int crossing = w.any_crossing ? w.surface_crossing[edge] : 0;
+    return crossing > 0 ? static_cast<float>(crossing) / kCrossingSteps : body.alpha;
+  }
+  if (!w.skin_made[b]) {
+    int low = 0, high = w.kept_count;  // the first that is not less than the edge
+    while (low < high) {
+      const int middle = low + (high - low) / 2;
+      if (w.kept_edge[middle] < edge) {
+        low = middle + 1;
+      } else {
+        high = middle;
+      }
+    }
+    if (low < w.kept_count && w.kept_edge[low] == edge) return w.kept_reach[low];
+  }
+  const int death = w.death[end];
+  const bool died = death >= 2 * w.frame[b] && death != kDeadBefore;
+  return body.fit_cuts && died ? kReachUnknown : body.alpha;
 }
 
 // Lanes that share a particle's cells: one for each corner that it is.
@@ -188,6 +217,7 @@ CUTPROOF_DEVICE void renew_vertices_kernel(Block& block, const DeviceView& w) {
         w.vertex_of[6 * made.owner + made.direction] = v;
         w.vertex_owner[v] = made.owner;
         w.vertex_direction[v] = static_cast<unsigned char>(made.direction);
+        w.vertex_reach[v] = known_reach(w, b, made);
       }
       if (!dies || d >= 6) continue;
       const int gone = w.vertex_of[6 * p + d];
@@ -310,8 +340,59 @@ CUTPROOF_DEVICE void recenter_clusters_kernel(Block& block, const DeviceView& w)
 }
 CUTPROOF_KERNEL(recenter_clusters_kernel);
 
-// The mean over the owner's clusters of (t - T) + (R - I)(X_v - T), as displacement from X_v. An owner without a
-// cluster takes its vertices with it.
+namespace skin_detail {
+
+// From p towards the vertex on its edge in a direction [m].
+CUTPROOF_DEVICE inline Float3 arm_of(const BodyConstants& body, int direction, float reach) {
+  const float far = (direction % 2 == 0 ? reach : -reach) * body.h;
+  return {direction / 2 == 0 ? far : 0.0f, direction / 2 == 1 ? far : 0.0f, direction / 2 == 2 ? far : 0.0f};
+}
+
+// The mean over p's clusters of (t - T) + (R - I)(X - T) for what rests at X = X_p + arm, as displacement from X. Without
+// a cluster that of p.
+CUTPROOF_DEVICE inline Float3 carried(const DeviceView& w, const BodyConstants& body, int p, Float3 arm) {
+  // Relative to where the first cluster puts it, so that summing costs no digits of d. (Not to the owner: where a
+  // blade has pushed it away, that is far from what all of them say.)
+  Float3 base = xyz(w.displacement[p]), sum;
+  int clusters = 0;
+  for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
+    const int s = w.memberships[k];
+    if (s < 0) continue;
+    const Float3 r = from_rest_center(w, body, p, s) + arm;
+    const Float3 center = w.center[s], turned = w.rotation[s] * r - r;
+    if (clusters == 0) base = center + turned;
+    sum = sum + ((center - base) + turned);
+    ++clusters;
+  }
+  return clusters > 0 ? base + (1.0f / static_cast<float>(clusters)) * sum : base;
+}
+
+// cut_reach of model/setup.h.
+CUTPROOF_DEVICE inline float cut_reach_of(float owner, float end, float alpha) {
+  constexpr float kLeast = static_cast<float>(kLeastCrossing) / kCrossingSteps, kGreatest = 1.0f - kLeast;
+  const float t = owner / (owner - end);
+  if (!(t > -1 && t < 3)) return alpha;
+  if (t < 0) return kLeast - t * (alpha - kLeast);
+  if (t > 2) return kGreatest + (t - 2) * (alpha - kGreatest);
+  return t < kLeast ? kLeast : t > kGreatest ? kGreatest : t;
+}
+
+// Where the plane of the blade crosses the edge, as p's clusters carry it; alpha without a blade.
+CUTPROOF_DEVICE inline float reach_by_blade(const DeviceView& w, const BodyConstants& body, int b, int p,
+                                            int direction) {
+  const Plane plane = lowered_plane(w, body, b);
+  if (!plane.exists) return body.alpha;
+  float height[2] = {};
+  CUTPROOF_ROLLED for (int end = 0; end < 2; ++end) {
+    const Float3 arm = arm_of(body, direction, static_cast<float>(end));
+    height[end] = height_over(plane, rest_position(body, w.node[p]) + arm + carried(w, body, p, arm));
+  }
+  return cut_reach_of(height[0], height[1], body.alpha);
+}
+
+}  // namespace skin_detail
+
+// Puts each vertex where its owner's clusters carry it, as displacement from X_v.
 template <class Block>
 CUTPROOF_DEVICE void place_vertices_kernel(Block& block, const DeviceView& w) {
   for (int64_t v = block.first(); v < w.counters->vertices_used; v += block.stride()) {
@@ -321,25 +402,12 @@ CUTPROOF_DEVICE void place_vertices_kernel(Block& block, const DeviceView& w) {
     if (!skin_detail::skinned(w, b)) continue;
     const BodyConstants& body = w.body[b];
     const int direction = w.vertex_direction[v];
-    const int crossing = w.any_crossing ? w.surface_crossing[int64_t{6} * p + direction] : 0;
-    const float part = crossing > 0 ? static_cast<float>(crossing) / kCrossingSteps : body.alpha;
-    const float reach = (direction % 2 == 0 ? part : -part) * body.h;
-    const Float3 arm = {direction / 2 == 0 ? reach : 0.0f, direction / 2 == 1 ? reach : 0.0f,
-                        direction / 2 == 2 ? reach : 0.0f};
-    // Relative to where the first cluster puts it, so that summing costs no digits of d. (Not to the owner: where a
-    // blade has pushed it away, that is far from what all of them say.)
-    Float3 base = xyz(w.displacement[p]), sum;
-    int clusters = 0;
-    for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
-      const int s = w.memberships[k];
-      if (s < 0) continue;
-      const Float3 r = from_rest_center(w, body, p, s) + arm;
-      const Float3 center = w.center[s], turned = w.rotation[s] * r - r;
-      if (clusters == 0) base = center + turned;
-      sum = sum + ((center - base) + turned);
-      ++clusters;
+    float reach = w.vertex_reach[v];
+    if (reach == kReachUnknown) {
+      reach = skin_detail::reach_by_blade(w, body, b, p, direction);
+      w.vertex_reach[v] = reach;
     }
-    w.vertex_position[v] = with_w(clusters > 0 ? base + (1.0f / static_cast<float>(clusters)) * sum : base, 0.0f);
+    w.vertex_position[v] = with_w(skin_detail::carried(w, body, p, skin_detail::arm_of(body, direction, reach)), 0.0f);
   }
 }
 CUTPROOF_KERNEL(place_vertices_kernel);

@@ -56,6 +56,7 @@ Extents extents_of(const StagingBuffers& loaded, Capacity capacity) {
     return b.has_blade || b.wall_end > b.wall_begin || b.grip_end > b.grip_begin;
   });
   extents.any_crossing = !loaded.surface_crossing.empty();
+  extents.kept_count = narrow(size(loaded.kept_edge), "skin vertices");
   // A cut makes at most one new cluster for each member that it touches: all of a small body at once, a plane's share
   // of a large one. A merge writes unions behind the present lists, and no round of it needs more than all lists
   // together; expansion copies what it enlarges.

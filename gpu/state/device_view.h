@@ -64,7 +64,7 @@ struct BodyConstants {
   int tau, cap;
   ExpandRule expand_rule;
   int depth;
-  int skin_wanted;
+  int skin_wanted, fit_cuts;
   float alpha;
   int wall_begin, wall_end;  // in DeviceView::walls
   int grip_begin, grip_end;  // in DeviceView::grips
@@ -212,6 +212,7 @@ struct Extents {
   int accelerated = 0;        // some body's iterations are
   int any_contact = 0;        // some body has a blade, a wall or a grip
   int any_crossing = 0;       // of some body it is known where its surface crosses grid edges
+  int kept_count = 0;         // vertices of the skins that were loaded, on edges that a cut has opened
   int slot_capacity = 0, member_capacity = 0, vertex_capacity = 0, cell_capacity = 0, addition_capacity = 0;
   int slots_expected = 0;  // how many clusters grids are made for: fewer than there is room for, and not the most
   int group_capacity = 0, pair_capacity = 0, place_capacity = 0;
@@ -224,6 +225,8 @@ struct DeviceView : Extents {
 };
 
 inline constexpr int kDeadBefore = 0x7fffffff;
+// DeviceView::vertex_reach of a vertex that a blade has brought about, until it is placed.
+inline constexpr float kReachUnknown = -1;
 
 CUTPROOF_BOTH inline bool alive(const DeviceView& w, int p) { return w.death[p] < 0; }
 

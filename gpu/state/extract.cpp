@@ -86,6 +86,7 @@ Skin extract_skin(const StagingBuffers& staging, const Setup& setup, const BodyC
   Skin skin;
   skin.owner.reserve(vertices.size());
   skin.direction.reserve(vertices.size());
+  skin.reach.reserve(vertices.size());
   skin.position.reserve(vertices.size());
   const double h = setup.body.grid.spacing;
   for (const auto& [name, index] : vertices) {
@@ -93,10 +94,12 @@ Skin extract_skin(const StagingBuffers& staging, const Setup& setup, const BodyC
     const auto owner = static_cast<int32_t>(name / 6);
     const auto direction = static_cast<uint8_t>(name % 6);
     const auto& e = kDirections[direction];
+    const double reach = staging.vertex_reach[at(index)];
     const Vec3 rest = setup.body.rest_position(owner) +
-                      (vertex_reach(setup, owner, direction) * h) * Vec3{double(e[0]), double(e[1]), double(e[2])};
+                      (reach * h) * Vec3{double(e[0]), double(e[1]), double(e[2])};
     skin.owner.push_back(owner);
     skin.direction.push_back(direction);
+    skin.reach.push_back(reach);
     skin.position.push_back(rest + d(xyz(staging.vertex_position[at(index)])));
   }
   std::vector<std::pair<int, int>> cells;  // node, cell

@@ -46,6 +46,13 @@ void require_fit(const Setup& setup, const State& state) {
   for (const int32_t i : c.members) {
     require(i >= 0 && at(i) < n, "cluster members must be particles of the body");
   }
+  const Skin& skin = state.skin;
+  require(skin.direction.size() == skin.owner.size() && skin.reach.size() == skin.owner.size(),
+          "every array of skin vertices needs one entry per vertex");
+  for (std::size_t v = 0; v < skin.owner.size(); ++v) {
+    require(skin.owner[v] >= 0 && at(skin.owner[v]) < n && skin.direction[v] < 6,
+            "skin vertices must lie on grid edges of the body's particles");
+  }
 }
 
 void add_constants(StagingBuffers& staging, const Setup& setup, const State& state, int64_t particles, int64_t nodes) {
@@ -79,6 +86,7 @@ void add_constants(StagingBuffers& staging, const Setup& setup, const State& sta
   body.depth = setup.expand.depth;
   body.skin_wanted = setup.skin.wanted;
   body.alpha = f(setup.skin.alpha);
+  body.fit_cuts = setup.skin.fit_cuts;
   body.has_blade = setup.has_blade;
   body.blade_length = f(setup.blade.length);
   body.blade_depth = f(setup.blade.depth);
@@ -175,6 +183,23 @@ void add_particles(StagingBuffers& staging, const Setup& setup, const State& sta
   staging.loaded_skin.push_back(state.skin);
 }
 
+// The first skin is made anew. What it cannot know, where vertices lie that cuts have brought about, is kept.
+void add_kept_reaches(StagingBuffers& staging, const Setup& setup, const Skin& skin) {
+  const BodyConstants& body = staging.body.back();
+  std::vector<std::pair<int, float>> kept;
+  for (std::size_t v = 0; v < skin.owner.size(); ++v) {
+    const int32_t owner = skin.owner[v];
+    const int direction = skin.direction[v];
+    if (setup.body.neighbour(owner, direction) < 0) continue;
+    kept.emplace_back(narrow(6 * (int64_t{body.particle_begin} + owner) + direction, "particles"), f(skin.reach[v]));
+  }
+  std::sort(kept.begin(), kept.end());
+  for (const auto& [edge, reach] : kept) {
+    staging.kept_edge.push_back(edge);
+    staging.kept_reach.push_back(reach);
+  }
+}
+
 void add_clusters(StagingBuffers& staging, const Setup& setup, const State& state, int body_index) {
   const BodyConstants& body = staging.body.back();
   const Clusters& clusters = state.clusters;
@@ -251,6 +276,7 @@ StagingBuffers make_contents(const std::vector<Setup>& setups, const std::vector
     add_constants(staging, setups[b], states[b], particles, nodes);
     add_particles(staging, setups[b], states[b], static_cast<int>(b));
     add_clusters(staging, setups[b], states[b], static_cast<int>(b));
+    add_kept_reaches(staging, setups[b], states[b].skin);
     particles += setups[b].body.particle_count();
     nodes += setups[b].body.grid.node_count();
   }

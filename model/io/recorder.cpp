@@ -333,7 +333,7 @@ void Recorder::File::add(Stage stage, const State& state) {
 void Recorder::File::finish() {
   WritingArchive root(index.id());
   root("unit_roundoff", unit_roundoff(precision.value_or(Precision::binary64)));
-  root.group("snapshots", [&](auto& archive) { walk_snapshots(archive, columns); });
+  root.group("snapshots", [&](auto& archive) { walk_snapshots(archive, columns, kFormatVersion); });
   const std::pair<hid_t, const char*> kinds[] = {{index.id(), kIndexKind},
                                                  {particles.file.id(), kParticlesKind},
                                                  {skin.file.id(), kSkinKind},

@@ -140,6 +140,7 @@ struct RecordingReader::File {
   Part index, particles, skin;
   hdf5::InflationBudget budget;
   uint64_t recording = 0;
+  int32_t format = 0;
   SnapshotColumns columns;
   std::vector<hdf5::Table> tables = std::vector<hdf5::Table>(recorded_fields().size());  // of rows and cells
 };
@@ -162,7 +163,7 @@ RecordingReader::File::File(const std::string& name) {
       }
       for (std::size_t k = 0; k < tables.size(); ++k) {
         const RecordedField& recorded = recorded_fields()[k];
-        if (&part_of(recorded) != part) continue;
+        if (&part_of(recorded) != part || recorded.field.since > format) continue;
         if (recorded.storage == Storage::cells) {
           tables[k] = archive.table("VTKHDF/Polygons/Connectivity", hdf5::layout_of<int64_t>());
         } else if (recorded.storage == Storage::rows) {
@@ -186,7 +187,6 @@ void RecordingReader::File::read_index(const ReadingArchive& root) {
   std::vector<uint8_t> scene;
   root("scene", scene);
   header.scene_json.assign(scene.begin(), scene.end());
-  int32_t format = 0;
   root("cutproof_format", format);
   header.setup = read_setup(index.file.id(), budget, format);
   double u = 0;
@@ -196,7 +196,7 @@ void RecordingReader::File::read_index(const ReadingArchive& root) {
     throw hdf5::Error("/unit_roundoff", fmt::format("This is {}, and should be 2^-53 or 2^-24.", u));
   }
   if (const auto defect = defect_of(header.setup)) throw hdf5::Error("/setup/" + defect->field, defect->problem);
-  root.group("snapshots", [&](auto& archive) { walk_snapshots(archive, columns); });
+  root.group("snapshots", [&](auto& archive) { walk_snapshots(archive, columns, format); });
 }
 
 // The file with the rows of a field.
@@ -233,6 +233,7 @@ void RecordingReader::File::check_ranges() const {
   }
   for (std::size_t k = 0; k < tables.size(); ++k) {
     const RecordedField& recorded = recorded_fields()[k];
+    if (recorded.field.since > format) continue;
     const auto& [values, index_column] = columns.fields[k];
     const std::string column = at + recorded.name();
     const std::size_t entries = values.size() / recorded.entry.bytes();
@@ -275,6 +276,7 @@ Snapshot RecordingReader::File::snapshot(std::size_t i) const {
   state.precision = header.precision;
   for (std::size_t k = 0; k < tables.size(); ++k) {
     const RecordedField& recorded = recorded_fields()[k];
+    if (recorded.field.since > format) continue;
     // No structured binding: clang 14 does not capture these.
     const std::vector<std::byte>& values = columns.fields[k].values;
     const std::vector<int64_t>& index_column = columns.fields[k].index;
@@ -296,6 +298,8 @@ Snapshot RecordingReader::File::snapshot(std::size_t i) const {
       }
     });
   }
+  // Before cuts had reaches of their own, each vertex lay where the body's surface or alpha says.
+  if (format < 6) state.skin.reach = uncut_reaches(header.setup, state.skin);
   return snapshot;
 }
 
