@@ -278,7 +278,8 @@ class PluginBackend final : public Backend {
       }
     }
     take_state(answer.arrays, state);
-    if (!find_array(answer.arrays, "state/reach") && find_array(answer.arrays, "state/owner")) {
+    // A guest that knows nothing of reaches leaves as many as it was given.
+    if (state.skin.reach.size() != state.skin.owner.size()) {
       state.skin.reach = uncut_reaches(setups_[b], state.skin);
     }
     if (state.clusters.offsets.empty()) state.clusters.offsets = {0};

@@ -138,7 +138,7 @@ struct Scene {
   SplitParameters split;
   MergeParameters merge;
   ExpandParameters expand;
-  SkinParameters skin;
+  SkinParameters skin = {.fit_cuts = true};
   std::optional<BladeSpec> blade;
   std::vector<WallSpec> walls;
   std::vector<GripSpec> grips;

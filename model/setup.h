@@ -63,8 +63,8 @@ struct ExpandParameters {
 };
 
 struct SkinParameters {
-  bool wanted = true;  // false: no skin is made
-  double alpha = 0.5;  // vertex at X_i + alpha h e where no crossing is known, in (0, 1)
+  bool wanted = true;     // false: no skin is made
+  double alpha = 0.5;     // vertex at X_i + alpha h e where no crossing is known, in (0, 1)
   bool fit_cuts = false;  // a vertex that a blade brings about lies where the blade has crossed its grid edge
   friend bool operator==(const SkinParameters&, const SkinParameters&) = default;
 };
@@ -134,19 +134,6 @@ inline std::vector<double> uncut_reaches(const Setup& setup, const Skin& skin) {
     if (exists) reaches[v] = uncut_reach(setup, skin.owner[v], skin.direction[v]);
   }
   return reaches;
-}
-
-// How far from its owner a vertex lies that a cut brings about, as a fraction of h, given how far from the plane of the
-// blade the owner's clusters carry the two ends of its grid edge [any unit, with signs]: where the edge crosses that
-// plane; within [1/16, 15/16], because it stays on its edge; and the farther the plane is from the edge, the nearer to
-// alpha. Continuous, so that rounding moves the vertex and decides nothing (method.md §8).
-inline double cut_reach(double owner, double end, double alpha) {
-  constexpr double kLeast = double{kLeastCrossing} / kCrossingSteps, kGreatest = 1 - kLeast;
-  const double t = owner / (owner - end);  // of the edge, from the owner on
-  if (!(t > -1 && t < 3)) return alpha;    // so if it is parallel to the plane
-  if (t < 0) return kLeast - t * (alpha - kLeast);
-  if (t > 2) return kGreatest + (t - 2) * (alpha - kGreatest);
-  return t < kLeast ? kLeast : t > kGreatest ? kGreatest : t;
 }
 
 // Whether frames of this setup launch the detect stage.

@@ -32,6 +32,7 @@ void check_tissue_kept(Judged& judged, Verdict& verdict);
 void check_no_pass(Judged& judged, Verdict& verdict);
 void check_skin_surface(Judged& judged, Verdict& verdict);
 void check_skin_vertices(Judged& judged, Verdict& verdict);
+void check_skin_reach(const StageRun& run, Verdict& verdict);
 
 // Of a stage.
 void check_momentum(const StageRun& run, Verdict& verdict);

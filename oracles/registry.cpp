@@ -89,6 +89,9 @@ PropertyList make_core_properties() {
                check_skin_surface),
       of_state("skin vertices", "tolerances.md, One goal position", "h", kAlive | kSkin | kSets | kRotations | kMotion,
                kSkinThere, "no skin", check_skin_vertices),
+      of_stage("skin reach",
+               "method.md §8: where a vertex lies on its edge; tolerances.md, Where a blade crossed an edge", "h",
+               stages(skin), "no skin", check_skin_reach),
       of_stage("untouched", "method.md §9: what a stage may change; model/fields.h", "1",
                stages(step, detect, split, merge, expand, skin), "nothing there that must stay", check_untouched),
   };

@@ -21,7 +21,7 @@ Shells shells_of(const Skin& skin, const std::vector<Vec3>& points);
 // Where a vertex is at rest [m].
 inline Vec3 vertex_at_rest(const Setup& setup, const Skin& skin, std::size_t v) {
   const auto& d = kDirections[skin.direction[v]];
-  const double reach = vertex_reach(setup, skin.owner[v], skin.direction[v]) * setup.body.grid.spacing;
+  const double reach = skin.reach[v] * setup.body.grid.spacing;
   return setup.body.rest_position(skin.owner[v]) + reach * Vec3{1.0 * d[0], 1.0 * d[1], 1.0 * d[2]};
 }
 

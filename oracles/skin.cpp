@@ -3,9 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include "oracles/checks.h"
+#include "oracles/open_edges.h"
 #include "oracles/rounding.h"
 #include "oracles/shells.h"
 
@@ -205,6 +212,19 @@ void check_skin_vertices(Judged& judged, Verdict& verdict) {
     if (memberships.of(owner).empty())
       return fail(verdict, {{}, {owner}, {}, around(v)}, "particle {} owns vertex {} and lies in no cluster", owner, v);
   }
+  // What the state alone says of where they lie on their edges: a cut's, only that they lie on them.
+  const double u = unit_roundoff(state);
+  for (std::size_t v = 0; v < skin.owner.size(); ++v) {
+    const bool opened = body.neighbour(skin.owner[v], skin.direction[v]) >= 0;
+    if (opened && setup.skin.fit_cuts) continue;
+    const double expected = uncut_reach(setup, skin.owner[v], skin.direction[v]);
+    verdict.measured = std::abs(skin.reach[v] - expected);
+    verdict.bound = u * expected;
+    if (verdict.measured <= verdict.bound) continue;
+    return fail(verdict, {{}, {skin.owner[v]}, {}, around(v)},
+                "vertex {} lies {} h from particle {} in direction {}, where it should lie {} h from it", v,
+                skin.reach[v], skin.owner[v], skin.direction[v], expected);
+  }
   const double h = body.grid.spacing;
   Nearest nearest;
   const std::vector<VertexPlace> places = vertex_places(setup, state, memberships);
@@ -219,6 +239,145 @@ void check_skin_vertices(Judged& judged, Verdict& verdict) {
   fail(verdict, {{}, {owner}, {}, around(at(nearest.where))},
        "vertex {} of particle {} is {} h from where the particle's clusters put it", nearest.where, owner,
        verdict.measured);
+}
+
+namespace {
+
+struct Range {
+  double low = 0, high = 0;
+  bool contains(double value) const { return low <= value && value <= high; }
+};
+
+// Where a vertex lies on an edge that a plane crosses at t, from the owner on, in parts of the edge: by these points,
+// linearly between them, alpha before and behind.
+class ReachByBlade {
+ public:
+  explicit ReachByBlade(double alpha)
+      : points_{
+            {{-1, alpha}, {0, 1.0 / 16}, {1.0 / 16, 1.0 / 16}, {15.0 / 16, 15.0 / 16}, {2, 15.0 / 16}, {3, alpha}}} {}
+
+  double at_crossing(double t) const {
+    if (!(t > points_.front()[0])) return points_.front()[1];
+    for (std::size_t k = 1; k < points_.size(); ++k) {
+      const auto& [begin, from] = points_[k - 1];
+      const auto& [end, to] = points_[k];
+      if (t <= end) return from + (to - from) * (t - begin) / (end - begin);
+    }
+    return points_.back()[1];
+  }
+  Range over(Range t) const {
+    Range found = {at_crossing(t.low), at_crossing(t.low)};
+    const auto see = [&](double reach) { found = {std::min(found.low, reach), std::max(found.high, reach)}; };
+    see(at_crossing(t.high));
+    for (const auto& [crossing, reach] : points_) {
+      if (t.contains(crossing)) see(reach);
+    }
+    return found;
+  }
+  Range anywhere() const {
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    return over({-kInfinity, kInfinity});
+  }
+
+ private:
+  std::array<std::array<double, 2>, 6> points_;
+};
+
+// Of the two ends of grid edges how far from a plane the owners' clusters carry them, and by how much that may be off
+// [m].
+struct Heights {
+  std::vector<double> owner, end, owner_bound, end_bound;
+};
+Heights heights_of(const Setup& setup, const State& state, const std::vector<std::size_t>& vertices,
+                   const BladePose& plane, const Memberships& memberships) {
+  const Vec3 normal = cross(plane.along, plane.back);
+  Heights heights;
+  State edges = state;  // its skin: one end of each edge, then the other
+  for (const double reach : {0.0, 1.0}) {
+    edges.skin = {};
+    for (const std::size_t v : vertices) {
+      edges.skin.owner.push_back(state.skin.owner[v]);
+      edges.skin.direction.push_back(state.skin.direction[v]);
+      edges.skin.reach.push_back(reach);
+    }
+    for (const auto& [place, bound] : vertex_places(setup, edges, memberships)) {
+      (reach == 0 ? heights.owner : heights.end).push_back(dot(place - plane.edge, normal));
+      (reach == 0 ? heights.owner_bound : heights.end_bound)
+          .push_back(bound + kPlacesBand * unit_roundoff(state) * (norm(place) + norm(plane.edge)));
+    }
+  }
+  return heights;
+}
+
+// Where rounding leaves the crossing of a plane: t = owner / (owner - end) is monotone in both heights where the two
+// cannot be equal, so its least and its greatest value lie at corners.
+std::optional<Range> crossings(double owner, double owner_bound, double end, double end_bound) {
+  const double apart = owner - end, apart_bound = owner_bound + end_bound;
+  if (!(std::abs(apart) > apart_bound)) return std::nullopt;
+  Range found = {owner / apart, owner / apart};
+  for (const double a : {owner - owner_bound, owner + owner_bound}) {
+    for (const double b : {end - end_bound, end + end_bound}) {
+      found = {std::min(found.low, a / (a - b)), std::max(found.high, a / (a - b))};
+    }
+  }
+  return found;
+}
+
+}  // namespace
+
+// Vertices that were there before stay where they are on their edges. Beside what has died in this frame they lie where
+// the blade's plane crosses their edges, if cuts are fitted; all others where the body says, or alpha.
+void check_skin_reach(const StageRun& run, Verdict& verdict) {
+  const Setup& setup = run.setup;
+  const State &before = run.before, &after = run.after;
+  const Skin& skin = after.skin;
+  verdict.checked = static_cast<int64_t>(skin.owner.size());
+  std::map<std::pair<int32_t, uint8_t>, double> known;
+  for (std::size_t v = 0; v < before.skin.owner.size(); ++v) {
+    known[{before.skin.owner[v], before.skin.direction[v]}] = before.skin.reach[v];
+  }
+  const std::set<int32_t> died = [&] {
+    std::set<int32_t> all(before.removed.begin(), before.removed.end());
+    all.insert(before.debris.begin(), before.debris.end());
+    return all;
+  }();
+  const BladePose* const blade = setup.skin.fit_cuts ? last_lowered(setup, before.frame) : nullptr;
+  const double u = unit_roundoff(after);
+  Nearest nearest;
+  std::vector<std::size_t> by_blade;
+  for (std::size_t v = 0; v < skin.owner.size(); ++v) {
+    const int32_t owner = skin.owner[v], end = setup.body.neighbour(owner, skin.direction[v]);
+    const auto found = known.find({owner, skin.direction[v]});
+    if (found == known.end() && blade != nullptr && died.count(end) > 0) {
+      by_blade.push_back(v);
+      continue;
+    }
+    const double expected = found != known.end() ? found->second : uncut_reach(setup, owner, skin.direction[v]);
+    nearest.see(std::abs(skin.reach[v] - expected), u * expected, static_cast<int32_t>(v));
+  }
+  const Memberships memberships = memberships_of(after.clusters, setup.body.particle_count());
+  std::erase_if(by_blade, [&](std::size_t v) { return memberships.of(skin.owner[v]).empty(); });  // "coverage" says so
+  if (!by_blade.empty()) {
+    const Heights heights = heights_of(setup, after, by_blade, *blade, memberships);
+    const ReachByBlade reach_by_blade(setup.skin.alpha);
+    for (std::size_t k = 0; k < by_blade.size(); ++k) {
+      const double owner = heights.owner[k], end = heights.end[k];
+      const auto t = crossings(owner, heights.owner_bound[k], end, heights.end_bound[k]);
+      const Range allowed = t ? reach_by_blade.over(*t) : reach_by_blade.anywhere();
+      const double expected = reach_by_blade.at_crossing(owner / (owner - end));
+      // What is left of the arithmetic: a quotient, a product and two sums of numbers up to 1.
+      const double bound = std::max(allowed.high - expected, expected - allowed.low) + 4 * u;
+      nearest.see(std::abs(skin.reach[by_blade[k]] - expected), bound, static_cast<int32_t>(by_blade[k]));
+    }
+  }
+  if (nearest.where < 0) return;
+  verdict.measured = nearest.measured;
+  verdict.bound = nearest.bound;
+  if (nearest.holds()) return;
+  const std::size_t v = at(nearest.where);
+  fail(verdict, {{}, {skin.owner[v]}, {}, triangles_at(skin, {nearest.where})},
+       "vertex {} lies {} h from particle {} in direction {}, which is {} h from where it should lie", v, skin.reach[v],
+       skin.owner[v], skin.direction[v], verdict.measured);
 }
 
 }  // namespace cutproof::oracles

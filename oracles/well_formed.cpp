@@ -133,15 +133,19 @@ void check_clusters_form(const Clusters& clusters, bool members_exist, int32_t n
 
 void check_skin_form(const Skin& skin, int32_t n, Verdict& verdict) {
   const std::size_t vertices = skin.owner.size();
-  if (skin.direction.size() != vertices || skin.position.size() != vertices) {
-    violate(verdict, {}, "the skin has {} owners, {} directions, {} positions", vertices, skin.direction.size(),
-            skin.position.size());
+  if (skin.direction.size() != vertices || skin.reach.size() != vertices || skin.position.size() != vertices) {
+    violate(verdict, {}, "the skin has {} owners, {} directions, {} reaches, {} positions", vertices,
+            skin.direction.size(), skin.reach.size(), skin.position.size());
     return;
   }
   for (std::size_t v = 0; v < vertices; ++v) {
     if (skin.owner[v] < 0 || skin.owner[v] >= n || skin.direction[v] >= kDirections.size()) {
       violate(verdict, {{}, {skin.owner[v]}}, "skin vertex {} has owner {} and direction {}", v, skin.owner[v],
               skin.direction[v]);
+    }
+    if (!(skin.reach[v] > 0 && skin.reach[v] < 1)) {
+      violate(verdict, {{}, {skin.owner[v]}}, "skin vertex {} lies {} h from its owner, and not on its edge", v,
+              skin.reach[v]);
     }
   }
   for (std::size_t t = 0; t < skin.triangles.size(); ++t) {

@@ -660,6 +660,7 @@ Setup setup_of(const Case& c) {
   setup.step.stiffness = std::pow(10.0, c.stiffness);
   setup.detect.criterion = c.moves ? Criterion::distance : Criterion::geometric;
   setup.skin.alpha = c.alpha / 10.0;
+  setup.skin.fit_cuts = c.surface != 0;
   setup.split.debris = c.debris;
   setup.merge.rule = c.merge;
   setup.expand = {c.expand, c.expand_depth};

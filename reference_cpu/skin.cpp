@@ -109,6 +109,19 @@ class Carrier {
   std::vector<Vec3> centers_;
 };
 
+// How far from its owner a vertex lies that a cut brings about, as a fraction of h, given how far from the plane of the
+// blade the owner's clusters carry the two ends of its grid edge [any unit, with signs]: where the edge crosses that
+// plane; within [1/16, 15/16], because it stays on its edge; and the farther the plane is from the edge, the nearer to
+// alpha. Continuous, so that rounding moves the vertex and decides nothing (method.md §8).
+double cut_reach(double owner, double end, double alpha) {
+  constexpr double kLeast = double{kLeastCrossing} / kCrossingSteps, kGreatest = 1 - kLeast;
+  const double t = owner / (owner - end);  // of the edge, from the owner on
+  if (!(t > -1 && t < 3)) return alpha;    // so if it is parallel to the plane
+  if (t < 0) return kLeast - t * (alpha - kLeast);
+  if (t > 2) return kGreatest + (t - 2) * (alpha - kGreatest);
+  return t < kLeast ? kLeast : t > kGreatest ? kGreatest : t;
+}
+
 // Vertices that were there before stay where they were on their edges. Beside what has died in this frame the blade has
 // brought about new ones, where it crosses their edges; of all others the body knows.
 void find_reaches(const Setup& setup, const Skin& before, const Carrier& carried, State& state) {

@@ -348,8 +348,8 @@ CUTPROOF_DEVICE inline Float3 arm_of(const BodyConstants& body, int direction, f
   return {direction / 2 == 0 ? far : 0.0f, direction / 2 == 1 ? far : 0.0f, direction / 2 == 2 ? far : 0.0f};
 }
 
-// The mean over p's clusters of (t - T) + (R - I)(X - T) for what rests at X = X_p + arm, as displacement from X. Without
-// a cluster that of p.
+// The mean over p's clusters of (t - T) + (R - I)(X - T) for what rests at X = X_p + arm, as displacement from X.
+// Without a cluster that of p.
 CUTPROOF_DEVICE inline Float3 carried(const DeviceView& w, const BodyConstants& body, int p, Float3 arm) {
   // Relative to where the first cluster puts it, so that summing costs no digits of d. (Not to the owner: where a
   // blade has pushed it away, that is far from what all of them say.)
@@ -367,8 +367,11 @@ CUTPROOF_DEVICE inline Float3 carried(const DeviceView& w, const BodyConstants& 
   return clusters > 0 ? base + (1.0f / static_cast<float>(clusters)) * sum : base;
 }
 
-// cut_reach of model/setup.h.
-CUTPROOF_DEVICE inline float cut_reach_of(float owner, float end, float alpha) {
+// How far from its owner a vertex lies that a cut brings about, given how far from the plane of the blade the two ends
+// of its grid edge are carried: where the edge crosses the plane, within [1/16, 15/16], and the nearer to alpha the
+// farther the plane is from the edge (docs/design/method.md §8). t is off by what the heights are, over their
+// difference.
+CUTPROOF_DEVICE inline float cut_reach(float owner, float end, float alpha) {
   constexpr float kLeast = static_cast<float>(kLeastCrossing) / kCrossingSteps, kGreatest = 1.0f - kLeast;
   const float t = owner / (owner - end);
   if (!(t > -1 && t < 3)) return alpha;
@@ -387,7 +390,7 @@ CUTPROOF_DEVICE inline float reach_by_blade(const DeviceView& w, const BodyConst
     const Float3 arm = arm_of(body, direction, static_cast<float>(end));
     height[end] = height_over(plane, rest_position(body, w.node[p]) + arm + carried(w, body, p, arm));
   }
-  return cut_reach_of(height[0], height[1], body.alpha);
+  return cut_reach(height[0], height[1], body.alpha);
 }
 
 }  // namespace skin_detail

@@ -119,7 +119,7 @@ void describe(auto& v, BodySpec& s) {
   v.field(s.density, {"density", "Mass per volume: each particle weighs density · h³.", above(0, 1e9, "kg/m³")});
   v.field(s.fit_skin, {"fit_skin",
                        "Whether the skin of the uncut body lies where its surface crosses the grid edges; otherwise "
-                       "it lies `skin.alpha` beyond its particles, as cut faces do (method.md §8). Left out, it is "
+                       "it lies `skin.alpha` beyond its particles (method.md §8). Left out, it is "
                        "false in a scene of version 1 to 3."});
   v.field(s.align, {"align",
                     "Turn the principal axes of a mesh (longest, middle, shortest) to x, y, z before anything else. "
@@ -200,8 +200,15 @@ void describe(auto& v, ExpandParameters& s) {
 
 void describe(auto& v, SkinParameters& s) {
   v.field(s.wanted, {"wanted", "Whether a skin is made at all."});
-  v.field(s.alpha, {"alpha", "How far beyond its particle a skin vertex lies where no surface tells (`body.fit_skin`).",
+  v.field(s.alpha, {"alpha",
+                    "How far beyond its particle a skin vertex lies where neither the body's surface (`body.fit_skin`) "
+                    "nor a blade (`fit_cuts`) tells.",
                     inside(0, 1, "h")});
+  v.field(s.fit_cuts,
+          {"fit_cuts",
+           "Whether a vertex that a cut brings about lies where the plane of the blade crosses its grid edge; "
+           "otherwise it lies `alpha` beyond its particle (method.md §8). Left out, it is false in a scene of "
+           "version 1 to 3."});
 }
 
 void describe(auto& v, StrokeSpec& s) {

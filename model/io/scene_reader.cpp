@@ -381,7 +381,7 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::v
   Scene scene;
   scene.step.acceleration = default_acceleration(tree, version);
   scene.detect.remove = default_remove(tree, version);
-  scene.body.fit_skin = version >= 4;
+  scene.body.fit_skin = scene.skin.fit_cuts = version >= 4;
   read(tree, Place{name, "", changes}, SceneField{}, scene);
   return scene;
 }

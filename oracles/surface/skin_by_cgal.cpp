@@ -89,7 +89,7 @@ std::vector<Vec3> rest_points(const Setup& setup, const Skin& skin) {
     const auto& step = kDirections[skin.direction[v]];
     for (int axis = 0; axis < 3; ++axis) {
       const auto i = at(axis);
-      points[v][axis] = node[i] + vertex_reach(setup, skin.owner[v], skin.direction[v]) * step[i];
+      points[v][axis] = node[i] + skin.reach[v] * step[i];
     }
   }
   return points;
@@ -170,10 +170,11 @@ void check_skin_geometry(Judged& judged, Verdict& verdict) {
                 outer, inner, components, cavities, pieces_in_words(judged.components()));
   }
 
-  const VolumeRange range = tissue_volume(setup, tissue);
+  const VolumeRange range = tissue_volume(setup, skin, tissue);
   const auto triangles = static_cast<double>(skin.triangles.size());
   // What the two bounds add up cell by cell, where vertices have places of their own (tolerances.md).
-  const double cells = setup.body.surface_crossing.empty() ? 0 : 1.25 * triangles;
+  const bool own_places = !setup.body.surface_crossing.empty() || setup.skin.fit_cuts;
+  const double cells = own_places ? 1.25 * triangles : 0;
   const double rounding = (triangles + 512) * kUnitRoundoff * (magnitude + std::abs(range.high) + cells);
   const double outside = std::max(range.low - volume, volume - range.high);
   verdict.measured = std::max(0.0, outside);

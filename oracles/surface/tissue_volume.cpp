@@ -131,10 +131,16 @@ VolumeRange cell_volume(int pattern, const Reaches& reaches) {
 
 }  // namespace
 
-VolumeRange tissue_volume(const Setup& setup, const std::vector<uint8_t>& tissue) {
+VolumeRange tissue_volume(const Setup& setup, const Skin& skin, const std::vector<uint8_t>& tissue) {
   const Body& body = setup.body;
   const Grid& grid = body.grid;
-  // Where nothing is known of crossings, all cells of a pattern are alike.
+  // Where each vertex lies on its edge. Where all of them lie alike, so are all cells of a pattern.
+  const double alpha = skin.reach.empty() ? setup.skin.alpha : skin.reach.front();
+  const bool all_alike = std::ranges::all_of(skin.reach, [&](double reach) { return reach == alpha; });
+  std::vector<double> reach_on(all_alike ? 0 : 6 * static_cast<std::size_t>(body.particle_count()), setup.skin.alpha);
+  for (std::size_t v = 0; v < skin.owner.size() && !all_alike; ++v) {
+    reach_on[6 * static_cast<std::size_t>(skin.owner[v]) + skin.direction[v]] = skin.reach[v];
+  }
   std::array<int64_t, 256> alike{};
   VolumeRange total;
   for (int32_t k = 0; k + 1 < grid.nodes[2]; ++k) {
@@ -150,7 +156,7 @@ VolumeRange tissue_volume(const Setup& setup, const std::vector<uint8_t>& tissue
           node_of[static_cast<std::size_t>(corner)] = at;
           pattern |= tissue[at] << corner;
         }
-        if (body.surface_crossing.empty() || pattern == 0 || pattern == 255) {
+        if (all_alike || pattern == 0 || pattern == 255) {
           ++alike[static_cast<std::size_t>(pattern)];
           continue;
         }
@@ -160,7 +166,8 @@ VolumeRange tissue_volume(const Setup& setup, const std::vector<uint8_t>& tissue
           const auto at = static_cast<std::size_t>(corner);
           for (int axis = 0; axis < 3; ++axis) {
             const int direction = 2 * axis + (corner >> axis & 1);  // into the cell
-            reaches[at][static_cast<std::size_t>(axis)] = vertex_reach(setup, body.particle_at[node_of[at]], direction);
+            const auto owner = static_cast<std::size_t>(body.particle_at[node_of[at]]);
+            reaches[at][static_cast<std::size_t>(axis)] = reach_on[6 * owner + static_cast<std::size_t>(direction)];
           }
         }
         total.add(cell_volume(pattern, reaches));
@@ -168,7 +175,7 @@ VolumeRange tissue_volume(const Setup& setup, const std::vector<uint8_t>& tissue
     }
   }
   Reaches same;
-  for (auto& of_corner : same) of_corner.fill(setup.skin.alpha);
+  for (auto& of_corner : same) of_corner.fill(alpha);
   for (int pattern = 1; pattern < 256; ++pattern) {
     const auto count = static_cast<double>(alike[static_cast<std::size_t>(pattern)]);
     if (count != 0) total.add(cell_volume(pattern, same), count);

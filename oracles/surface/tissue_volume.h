@@ -17,6 +17,6 @@ struct VolumeRange {
 
 // Least and greatest volume under any triangulation of the cells' polygons. `tissue`: [node_count] 1 where an alive
 // particle sits.
-VolumeRange tissue_volume(const Setup& setup, const std::vector<uint8_t>& tissue);
+VolumeRange tissue_volume(const Setup& setup, const Skin& skin, const std::vector<uint8_t>& tissue);
 
 }  // namespace cutproof::oracles

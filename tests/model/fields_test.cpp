@@ -78,9 +78,9 @@ TEST(Fields, AreTheMembersOfAStateEachOnce) {
   const auto& [frame, x, v, alive, removed, debris, clusters, tau, cap, edge_covered, impulse, skin, precision,
                place_rounding] = state;
   const auto& [offsets, members, number, rotation, rest_center, mass, degenerate] = clusters;
-  const auto& [owner, direction, position, triangles] = skin;
+  const auto& [owner, direction, reach, position, triangles] = skin;
   visited.expect_once(frame, x, v, alive, removed, debris, tau, cap, edge_covered, impulse, offsets, members, number,
-                      rotation, rest_center, mass, degenerate, owner, direction, position, triangles);
+                      rotation, rest_center, mass, degenerate, owner, direction, reach, position, triangles);
 }
 
 TEST(Fields, AreTheMembersOfASetupEachOnce) {
@@ -97,12 +97,12 @@ TEST(Fields, AreTheMembersOfASetupEachOnce) {
   const auto& [debris] = split;
   const auto& [merge_rule] = merge;
   const auto& [expand_rule, depth] = expand;
-  const auto& [wanted, alpha] = skin;
+  const auto& [wanted, alpha, fit_cuts] = skin;
   const auto& [length, blade_depth, thickness, friction] = blade;
   visited.expect_once(name, nodes, spacing, node, particle_at, rest, edge_offsets, edge_ends, mass, surface_crossing,
                       origin, orientation, solver, substeps, iterations, stiffness, relaxation, acceleration, damping,
                       gravity, criterion, remove, epsilon, strain, without_blade, debris, merge_rule, expand_rule,
-                      depth, wanted, alpha, walls, grips, has_blade, length, blade_depth, thickness, friction,
+                      depth, wanted, alpha, fit_cuts, walls, grips, has_blade, length, blade_depth, thickness, friction,
                       substep_length, blade_moves, stroke_end);
 }
 

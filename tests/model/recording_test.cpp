@@ -124,6 +124,7 @@ Skin some_skin(const State& state, int32_t count) {
     for (uint8_t direction = 0; direction < 3; ++direction) {
       skin.owner.push_back(i);
       skin.direction.push_back(static_cast<uint8_t>(2 * direction));
+      skin.reach.push_back(0.25 + 0.125 * direction);
       Vec3 p = state.x[static_cast<std::size_t>(i)];
       p[direction] += 0.05;
       skin.position.push_back(p);

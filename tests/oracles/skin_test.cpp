@@ -131,6 +131,7 @@ TEST(SkinSurface, RejectsAPinchedVertex) {
   const auto at = static_cast<std::ptrdiff_t>(dropped);
   skin.owner.erase(skin.owner.begin() + at);
   skin.direction.erase(skin.direction.begin() + at);
+  skin.reach.erase(skin.reach.begin() + at);
   skin.position.erase(skin.position.begin() + at);
   const Verdict verdict = skin_surface(scene.setup, scene.state);
   EXPECT_FALSE(verdict.holds);
@@ -161,6 +162,7 @@ TEST(SkinSurface, RejectsIndicesOutOfRangeRepeatedIndicesAndStrayVertices) {
       [](Skin& s) {
         s.owner.push_back(0);
         s.direction.push_back(0);
+        s.reach.push_back(0.5);
         s.position.push_back({});
       },
       "");  // a vertex more: on an edge that has one, or used by no triangle
@@ -303,6 +305,7 @@ class ClosedSurface : public ::testing::Test {
   ClosedSurface() : skin(scene_of({{1, 1, 1}}).state.skin) {
     skin.owner.clear();
     skin.direction.clear();
+    skin.reach.clear();
   }
   void expect_rejected_for(const char* text) const {
     const Verdict verdict = closed_surface(skin);

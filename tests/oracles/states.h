@@ -168,6 +168,7 @@ inline Skin convex_cell_skin(const Setup& setup, const State& state) {
       const auto& d = kDirections[static_cast<std::size_t>(direction)];
       skin.owner.push_back(owner);
       skin.direction.push_back(static_cast<uint8_t>(direction));
+      skin.reach.push_back(setup.skin.alpha);
       skin.position.push_back(body.rest_position(owner) + setup.skin.alpha * grid.spacing *
                                                               Vec3{static_cast<double>(d[0]), static_cast<double>(d[1]),
                                                                    static_cast<double>(d[2])});

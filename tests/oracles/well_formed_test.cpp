@@ -38,6 +38,10 @@ TEST(WellFormed, RejectsWhatCannotBeReadSafely) {
          s.debris = {4, 4};
        }},
       {"directions", [](State& s) { s.skin.direction.pop_back(); }},
+      {"reaches", [](State& s) { s.skin.reach.pop_back(); }},
+      {"not on its edge", [](State& s) { s.skin.reach[0] = 0; }},
+      {"not on its edge", [](State& s) { s.skin.reach[0] = 1; }},
+      {"not on its edge", [](State& s) { s.skin.reach[0] = std::nan(""); }},
       {"has owner", [](State& s) { s.skin.owner[0] = -1; }},
       {"has owner", [](State& s) { s.skin.direction[0] = 6; }},
       {"names vertex", [](State& s) { s.skin.triangles[0][1] = -1; }},

@@ -44,6 +44,7 @@ Skin skin_around(const Setup& setup, int32_t n) {
       vertex[at(p)] = static_cast<int32_t>(skin.owner.size());
       skin.owner.push_back(p);
       skin.direction.push_back(0);
+      skin.reach.push_back(0.5);
     }
     return vertex[at(p)];
   };

@@ -456,6 +456,7 @@ TEST(GpuSkin, IsLeftAloneWhereNoneIsWantedOrTheScheduleHasEnded) {
     setups.push_back(setup_of(std::move(body), b == 1 ? 0 : 2));
     states.back().skin.owner = {b};  // something to recognise it by
     states.back().skin.direction = {1};
+    states.back().skin.reach = {0.25};
     states.back().skin.position = {{1, 2, 3}};
   }
   setups[0].skin.wanted = false;

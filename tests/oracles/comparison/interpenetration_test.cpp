@@ -31,6 +31,7 @@ struct TwoBoxes {
       p[(axis + 2) % 3] = low[(axis + 2) % 3] + (high[(axis + 2) % 3] - low[(axis + 2) % 3]) * j / kSquares;
       skin.owner.push_back(owner);
       skin.direction.push_back(0);
+      skin.reach.push_back(0.5);
       skin.position.push_back(kH * p);
       return static_cast<int32_t>(skin.owner.size()) - 1;
     };

@@ -199,6 +199,7 @@ TEST(StateDifference, OfDecisionsDoesNotSeeTheOrderOfTheSkin) {
   for (auto& triangle : skin.triangles) std::rotate(triangle.begin(), triangle.begin() + 1, triangle.end());
   std::reverse(skin.owner.begin(), skin.owner.end());
   std::reverse(skin.direction.begin(), skin.direction.end());
+  std::reverse(skin.reach.begin(), skin.reach.end());
   std::reverse(skin.position.begin(), skin.position.end());
   const auto last = static_cast<int32_t>(skin.owner.size()) - 1;
   for (auto& triangle : skin.triangles) {

@@ -49,6 +49,7 @@ TEST(SkinGeometry, RejectsATriangleWithoutArea) {
   for (const int32_t v : {vertex_of(skin, 0, 4), vertex_of(skin, 1, 4), vertex_of(skin, 2, 4), vertex_of(skin, 1, 5)}) {
     small.owner.push_back(skin.owner[static_cast<std::size_t>(v)]);
     small.direction.push_back(skin.direction[static_cast<std::size_t>(v)]);
+    small.reach.push_back(0.5);
     small.position.push_back(skin.position[static_cast<std::size_t>(v)]);
   }
   small.triangles = {{0, 1, 3}, {1, 2, 3}, {2, 0, 3}, {0, 2, 1}};
@@ -106,17 +107,32 @@ TEST(SkinGeometry, KnowsTheVolumeUnderEachVertexOfItsOwn) {
   // One particle whose surface is known: four pyramids above and four below, from the vertices' own distances.
   Scene scene = scene_of({{0, 0, 0}});
   scene.setup.body.surface_crossing = {64, 128, 192, 240, 16, 32};
+  scene.state.skin.reach = uncut_reaches(scene.setup, scene.state.skin);
   ASSERT_TRUE(skin_geometry(scene.setup, scene.state).holds) << skin_geometry(scene.setup, scene.state).witness.text;
   const auto sum = [&](int axis) {
     return scene.setup.body.crossing(0, 2 * axis) + scene.setup.body.crossing(0, 2 * axis + 1);
   };
-  const VolumeRange volume = tissue_volume(scene.setup, [&] {
+  const VolumeRange volume = tissue_volume(scene.setup, scene.state.skin, [&] {
     std::vector<uint8_t> tissue(static_cast<std::size_t>(scene.setup.body.grid.node_count()), 0);
     tissue[static_cast<std::size_t>(scene.setup.body.node[0])] = 1;
     return tissue;
   }());
   EXPECT_NEAR(volume.low, sum(0) * sum(1) * sum(2) / 6, 1e-15);
   EXPECT_NEAR(volume.high, volume.low, 1e-15);
+}
+
+// Which vertices there are, and where they lie on their edges.
+Skin skin_at_rest(const cutproof::Setup& setup) {
+  Skin skin;
+  for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
+    for (uint8_t d = 0; d < 6; ++d) {
+      if (setup.body.neighbour(i, d) >= 0) continue;
+      skin.owner.push_back(i);
+      skin.direction.push_back(d);
+    }
+  }
+  skin.reach = uncut_reaches(setup, skin);
+  return skin;
 }
 
 std::vector<uint8_t> tissue_of(const Body& body) {
@@ -155,7 +171,7 @@ TEST(SkinGeometry, OfAFittedBallHoldsItsVolumeToTheSquareOfTheSpacing) {
       body.surface_crossing[k] = static_cast<uint8_t>(
           std::clamp<long>(std::lround(meets * kCrossingSteps), kLeastCrossing, kGreatestCrossing));
     }
-    const VolumeRange volume = tissue_volume(setup, tissue_of(body));
+    const VolumeRange volume = tissue_volume(setup, skin_at_rest(setup), tissue_of(body));
     const double low = volume.low / whole - 1, high = volume.high / whole - 1;
     EXPECT_LT(high, 0) << "chords";
     if (last != 0) {
