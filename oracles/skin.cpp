@@ -274,6 +274,12 @@ class ReachByBlade {
     }
     return found;
   }
+  // The flatter an edge lies to the plane, the less the crossing counts; `apart`: how much farther from the plane one
+  // end of it is than the other [h].
+  double of(double crossing, double apart) const {
+    const double counts = std::min(1.0, 4 * std::abs(apart)), alpha = points_.front()[1];
+    return counts * crossing + (1 - counts) * alpha;
+  }
   Range anywhere() const {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     return over({-kInfinity, kInfinity});
@@ -360,13 +366,21 @@ void check_skin_reach(const StageRun& run, Verdict& verdict) {
   if (!by_blade.empty()) {
     const Heights heights = heights_of(setup, after, by_blade, *blade, memberships);
     const ReachByBlade reach_by_blade(setup.skin.alpha);
+    const double h = setup.body.grid.spacing;
     for (std::size_t k = 0; k < by_blade.size(); ++k) {
       const double owner = heights.owner[k], end = heights.end[k];
+      const double apart_bound = heights.owner_bound[k] + heights.end_bound[k];
       const auto t = crossings(owner, heights.owner_bound[k], end, heights.end_bound[k]);
-      const Range allowed = t ? reach_by_blade.over(*t) : reach_by_blade.anywhere();
-      const double expected = reach_by_blade.at_crossing(owner / (owner - end));
-      // What is left of the arithmetic: a quotient, a product and two sums of numbers up to 1.
-      const double bound = std::max(allowed.high - expected, expected - allowed.low) + 4 * u;
+      const Range crossing = t ? reach_by_blade.over(*t) : reach_by_blade.anywhere();
+      const double expected = reach_by_blade.of(reach_by_blade.at_crossing(owner / (owner - end)), (owner - end) / h);
+      // What the arithmetic adds: a quotient, a product and two sums of numbers up to 1.
+      double bound = 4 * u;
+      for (const double there : {crossing.low, crossing.high}) {
+        for (const double apart : {std::abs(owner - end) + apart_bound, std::abs(owner - end) - apart_bound}) {
+          const double other = reach_by_blade.of(there, std::max(0.0, apart) / h);
+          bound = std::max(bound, std::abs(other - expected) + 4 * u);
+        }
+      }
       nearest.see(std::abs(skin.reach[by_blade[k]] - expected), bound, static_cast<int32_t>(by_blade[k]));
     }
   }

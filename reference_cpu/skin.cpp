@@ -1,6 +1,7 @@
 // Skin (method.md §8): marching cubes on the background grid, its vertices carried by the clusters.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "model/at.h"
@@ -110,16 +111,19 @@ class Carrier {
 };
 
 // How far from its owner a vertex lies that a cut brings about, as a fraction of h, given how far from the plane of the
-// blade the owner's clusters carry the two ends of its grid edge [any unit, with signs]: where the edge crosses that
-// plane; within [1/16, 15/16], because it stays on its edge; and the farther the plane is from the edge, the nearer to
-// alpha. Continuous, so that rounding moves the vertex and decides nothing (method.md §8).
+// blade the owner's clusters carry the two ends of its grid edge [h, with signs]: where the edge crosses that plane;
+// within [1/16, 15/16], because it stays on its edge; and the farther the plane is from the edge, or the flatter the
+// edge lies to it, the nearer to alpha. Continuous, so that rounding moves the vertex and decides nothing (method.md
+// §8).
 double cut_reach(double owner, double end, double alpha) {
   constexpr double kLeast = double{kLeastCrossing} / kCrossingSteps, kGreatest = 1 - kLeast;
+  constexpr double kFlat = 0.25;           // the sine of the angle below which an edge says less and less
   const double t = owner / (owner - end);  // of the edge, from the owner on
   if (!(t > -1 && t < 3)) return alpha;    // so if it is parallel to the plane
-  if (t < 0) return kLeast - t * (alpha - kLeast);
-  if (t > 2) return kGreatest + (t - 2) * (alpha - kGreatest);
-  return t < kLeast ? kLeast : t > kGreatest ? kGreatest : t;
+  const double crossing = t < 0   ? kLeast - t * (alpha - kLeast)
+                          : t > 2 ? kGreatest + (t - 2) * (alpha - kGreatest)
+                                  : std::clamp(t, kLeast, kGreatest);
+  return alpha + std::min(1.0, std::abs(owner - end) / kFlat) * (crossing - alpha);
 }
 
 // Vertices that were there before stay where they were on their edges. Beside what has died in this frame the blade has
@@ -144,8 +148,10 @@ void find_reaches(const Setup& setup, const Skin& before, const Carrier& carried
     double reach = known[edge_of(owner, direction)];
     if (reach == 0 && blade != nullptr && end >= 0 && died[at(end)]) {
       const Vec3 normal = cross(blade->along, blade->back);
-      reach = cut_reach(dot(carried(owner, direction, 0) - blade->edge, normal),
-                        dot(carried(owner, direction, 1) - blade->edge, normal), setup.skin.alpha);
+      const auto height = [&](double part) {
+        return dot(carried(owner, direction, part) - blade->edge, normal) / body.grid.spacing;
+      };
+      reach = cut_reach(height(0), height(1), setup.skin.alpha);
     } else if (reach == 0) {
       reach = uncut_reach(setup, owner, direction);
     }

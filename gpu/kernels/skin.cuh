@@ -368,16 +368,18 @@ CUTPROOF_DEVICE inline Float3 carried(const DeviceView& w, const BodyConstants& 
 }
 
 // How far from its owner a vertex lies that a cut brings about, given how far from the plane of the blade the two ends
-// of its grid edge are carried: where the edge crosses the plane, within [1/16, 15/16], and the nearer to alpha the
-// farther the plane is from the edge (docs/design/method.md §8). t is off by what the heights are, over their
-// difference.
+// of its grid edge are carried [h]: where the edge crosses the plane, within [1/16, 15/16], and the nearer to alpha the
+// farther the plane is from the edge, or the flatter the edge lies to it (docs/design/method.md §8). t is off by what
+// the heights are, over their difference; what is made of it never by more than 16 times what they are.
 CUTPROOF_DEVICE inline float cut_reach(float owner, float end, float alpha) {
-  constexpr float kLeast = static_cast<float>(kLeastCrossing) / kCrossingSteps, kGreatest = 1.0f - kLeast;
+  constexpr float kLeast = static_cast<float>(kLeastCrossing) / kCrossingSteps, kGreatest = 1.0f - kLeast,
+                  kFlat = 0.25f;
   const float t = owner / (owner - end);
   if (!(t > -1 && t < 3)) return alpha;
-  if (t < 0) return kLeast - t * (alpha - kLeast);
-  if (t > 2) return kGreatest + (t - 2) * (alpha - kGreatest);
-  return t < kLeast ? kLeast : t > kGreatest ? kGreatest : t;
+  const float crossing = t < 0   ? kLeast - t * (alpha - kLeast)
+                         : t > 2 ? kGreatest + (t - 2) * (alpha - kGreatest)
+                                 : fminf(fmaxf(t, kLeast), kGreatest);
+  return alpha + fminf(1.0f, fabsf(owner - end) / kFlat) * (crossing - alpha);
 }
 
 // Where the plane of the blade crosses the edge, as p's clusters carry it; alpha without a blade.
@@ -390,7 +392,7 @@ CUTPROOF_DEVICE inline float reach_by_blade(const DeviceView& w, const BodyConst
     const Float3 arm = arm_of(body, direction, static_cast<float>(end));
     height[end] = height_over(plane, rest_position(body, w.node[p]) + arm + carried(w, body, p, arm));
   }
-  return cut_reach(height[0], height[1], body.alpha);
+  return cut_reach(height[0] / body.h, height[1] / body.h, body.alpha);
 }
 
 }  // namespace skin_detail

@@ -279,6 +279,7 @@ cutproof_state state() {
   s.direction = call.shown("state/direction");
   s.skin_position = call.shown("state/skin_position");
   s.triangles = call.shown("state/triangles");
+  s.reach = call.shown("state/reach");
   return s;
 }
 

@@ -108,6 +108,7 @@ cutproof_array* member(const cutproof_state* state, std::string_view name) {
   MEMBER(direction);
   MEMBER(skin_position);
   MEMBER(triangles);
+  MEMBER(reach);
 #undef MEMBER
   return nullptr;
 }

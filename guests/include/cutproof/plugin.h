@@ -52,6 +52,7 @@ typedef struct cutproof_state { /* docs/reference/recording.md; n particles, m c
   cutproof_array *rest_center, *mass, *rotation, *degenerate; /* real [m x 3] m, [m] kg, [m x 9], u8 [m] */
   cutproof_array *owner, *direction, *skin_position;          /* skin: i32 [k], u8 [k], real [k x 3] m */
   cutproof_array* triangles;                                  /* i32 [t x 3] */
+  cutproof_array* reach;                                      /* skin: real [k] h, from the owner at rest, in (0, 1) */
 } cutproof_state;
 
 typedef struct cutproof_host {

@@ -90,7 +90,7 @@ TEST(StateDifference, InBitsIsFoundUnderTheNameOfTheOneFieldThatDiffers) {
     EXPECT_EQ(found->field, field.name);
     EXPECT_EQ(found->text, field.text);
   });
-  EXPECT_EQ(fields, 21);
+  EXPECT_EQ(fields, 22);
 }
 
 TEST(StateDifference, IsOneOfDecisionsExactlyInTheFieldsThatAreDecided) {
