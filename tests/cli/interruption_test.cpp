@@ -295,6 +295,14 @@ TEST_F(Interrupted, JudgeWritesWhatItHas) {
   EXPECT_TRUE(files::is_directory(path("kept")));
 }
 
+TEST_F(Interrupted, JudgeOfStagesCountsThemAsAnOperation) {
+  start("judge " CUTPROOF_PLUGIN_OF_STAGES " --cases 100000000 --json out.json");
+  wait_until_in_the_middle();
+  EXPECT_EQ(end(SIGINT), 128 + SIGINT);
+  EXPECT_FALSE(json::parse(read("out.json")).at("complete"));
+  EXPECT_TRUE(has_printed("INCOMPLETE: it was stopped after 1 of 1 operation was begun")) << read("out");
+}
+
 TEST_F(Interrupted, TheTerminalsSignalIsForTheHostAndNotForItsGuest) {
   // A group of its own, as a shell makes one; all of it gets what a terminal sends.
   start("judge " CUTPROOF_PLUGIN_IN_C " --cases 100000000 --json out.json", [] { setpgid(0, 0); });
