@@ -90,13 +90,14 @@ RotationReport measure_rotations(const std::vector<RotationMethod>& methods, con
   }
   int64_t done = 0;
   for (const fixtures::HardCase& hard : fixtures::hard_cases()) {
-    show(++done, hard.name);
+    ++done;
     for (const Precision precision : {Precision::binary32, Precision::binary64}) {
       const fixtures::Problems problems = pose(hard, std::max(counts.matrices, hard.fewest), precision, counts.seed);
       double& error = precision == Precision::binary32 ? report.reference_error_single : report.reference_error_double;
       error = std::max(error, problems.reference_error);
       for (std::size_t k = 0; k < methods.size(); ++k) {
         if (methods[k].precision != precision) continue;
+        show(done, hard.name);
         const auto solve = [&](const std::vector<Mat3>& a, const std::vector<Mat3>& previous) {
           return methods[k].solve(a, previous, 0).answers;
         };

@@ -44,7 +44,8 @@ struct RotationReport {
   bool default_holds() const;
 };
 
-// Called before each case, and before each method is timed: how many cases have begun, and what is done now.
+// Called before each method is asked, in each case and to be timed: how many cases have begun, and what is done now.
+// What it throws ends the measurement (model/stop.h).
 using RotationProgress = std::function<void(int64_t cases_begun, const std::string& what)>;
 
 // `copy_bytes_per_second` for the limits. The default is the selectable method named `default_name`.

@@ -206,14 +206,17 @@ const std::vector<Disturbance>& disturbances() {
   return all;
 }
 
-KeptRun keep_run(Backend& backend, const ReadyScene& scene) {
+KeptRun keep_run(Backend& backend, const ReadyScene& scene, const StopAsked& stop_asked) {
   harness::Traces traces = harness::run_to_the_end(backend, {scene.setup}, {scene.state});
   KeptRun kept;
   kept.trace = std::move(traces.of_body.front());
   kept.failed = std::move(traces.broken_contracts);
   harness::Judge judge(scene.setup, backend.name(), harness::Promises{}, harness::Thorough::never);
   judge.begin(kept.trace.initial);
-  for (const harness::Moment& moment : kept.trace.moments) judge.see(moment);
+  for (const harness::Moment& moment : kept.trace.moments) {
+    throw_if_asked(stop_asked);
+    judge.see(moment);
+  }
   for (const Verdict& verdict : judge.verdicts()) {
     kept.properties.add(verdict);
     if (!verdict.holds) kept.failed.push_back(verdict);
@@ -235,10 +238,11 @@ std::vector<harness::Moment> moments_of(const Setup& setup, const harness::Trace
 }
 
 Sensitivity least_rejected(Backend& backend, const Setup& setup, const Disturbance& disturbance, Stage stage,
-                           const std::vector<harness::Moment>& moments) {
+                           const std::vector<harness::Moment>& moments, const StopAsked& stop_asked) {
   Sensitivity found;
   std::vector<harness::Moment> fit;
   for (const harness::Moment& moment : moments) {
+    throw_if_asked(stop_asked);
     if (disturbed(backend, setup, disturbance, disturbance.greatest, moment)) fit.push_back(moment);
   }
   found.moments = static_cast<int64_t>(fit.size());
@@ -247,12 +251,14 @@ Sensitivity least_rejected(Backend& backend, const Setup& setup, const Disturban
     oracles::StageComparison comparison(setup, harness::reference_stages());
     found.rounding = 0;
     for (const harness::Moment& moment : fit) {
+      throw_if_asked(stop_asked);
       const double off = disturbance.rounding(comparison.compare(stage, *moment.before, *moment.after, true));
       found.rounding = std::max(*found.rounding, off);
     }
   }
   const auto rejects = [&](double size) {
     for (const harness::Moment& moment : fit) {
+      throw_if_asked(stop_asked);
       const std::optional<harness::Moment> wrong = disturbed(backend, setup, disturbance, size, moment);
       const std::optional<Verdict> failure = wrong ? first_failure(setup, *wrong) : std::nullopt;
       if (!failure) continue;

@@ -9,6 +9,7 @@
 #include "harness/moments.h"
 #include "harness/property_summary.h"
 #include "model/backend.h"
+#include "model/stop.h"
 #include "oracles/comparison/stage_comparison.h"
 
 namespace cutproof::benchmarks {
@@ -41,7 +42,8 @@ struct KeptRun {
   harness::PropertySummaries properties;
   std::vector<Verdict> failed;
 };
-KeptRun keep_run(Backend& backend, const ReadyScene& scene);
+// Throws Stopped between two of its moments, here and below, if that is asked.
+KeptRun keep_run(Backend& backend, const ReadyScene& scene, const StopAsked& stop_asked = {});
 
 // At most `count` moments, evenly over those in which this stage alone was due.
 std::vector<harness::Moment> moments_of(const Setup& setup, const harness::Trace& trace, Stage stage, int64_t count);
@@ -55,6 +57,6 @@ struct Sensitivity {
 };
 // Bisects, as if all that is greater than a size that is rejected were rejected too, up to 5 % of the size.
 Sensitivity least_rejected(Backend& backend, const Setup& setup, const Disturbance& disturbance, Stage stage,
-                           const std::vector<harness::Moment>& moments);
+                           const std::vector<harness::Moment>& moments, const StopAsked& stop_asked = {});
 
 }  // namespace cutproof::benchmarks

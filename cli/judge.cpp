@@ -19,6 +19,7 @@
 #include "cli/terminal.h"
 #include "guests/campaign.h"
 #include "guests/plugin_backend.h"
+#include "model/counted.h"
 #include "model/error.h"
 #include "model/io/atomic_file.h"
 #include "model/nearest_word.h"
@@ -79,6 +80,7 @@ std::vector<const OperationDescription*> asked_operations(const JudgeOptions& op
       refuse("OPS", fmt::format("there is no operation '{}'", name),
              did_you_mean(name, listed(known + ", stages")) + "use some of " + known + ", stages");
     if (!plugin.offers(found->number)) {
+      if (has_stages(plugin)) offered += (offered.empty() ? "" : ", ") + std::string(kOnStages);
       throw InputError(options.guest.library, name, "the plugin does not have this operation",
                        offered.empty() ? "it has none" : "it has " + offered);
     }
@@ -322,8 +324,9 @@ int judge(JudgeOptions options) {
     if (campaign.ended || stop_asked()) break;
   }
   const auto& names = options.operations;
-  if (has_stages(guest.plugin()) &&
-      (names.empty() || std::find(names.begin(), names.end(), kOnStages) != names.end())) {
+  const bool on_stages =
+      has_stages(guest.plugin()) && (names.empty() || std::find(names.begin(), names.end(), kOnStages) != names.end());
+  if (on_stages) {
     for (const bool dynamics : {false, true}) {
       if (stop_asked() || (dynamics && !steps(guest.plugin()))) continue;
       holds = judge_stages(options, dynamics, document, junit, failures) && holds;
@@ -331,8 +334,10 @@ int judge(JudgeOptions options) {
   }
   const bool complete = !stop_asked();
   if (!complete) {
+    const std::size_t begun = document["operations"].size() + (document.contains("dissections") ? 1 : 0);
+    const std::size_t all = asked.size() + (on_stages ? 1 : 0);
     const std::string how_far =
-        fmt::format("it was stopped after {} of {} operations were begun", document["operations"].size(), asked.size());
+        fmt::format("it was stopped after {} of {} begun", begun, counted(all, "operation was", "operations were"));
     insist("{}: {}\n", undecided("INCOMPLETE"), how_far);
     io::JunitCase& stopped = junit.emplace_back(io::JunitCase{"enough was judged", kClass});
     stopped.outcome = io::JunitOutcome::error;

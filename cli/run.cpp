@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
@@ -169,7 +170,8 @@ int run(const RunOptions& options) {
   const std::unique_ptr<Backend> backend = make_backend(options.backend);
 
   const std::vector<io::SceneChange> changes = changes_of(options.scene);
-  const Scene scene = io::read_scene(options.scene.file, changes);
+  Scene scene = io::read_scene(options.scene.file, changes);
+  const std::vector<std::string> not_asked = take_replaced_counts(options.scene, scene.expect);
   fixtures::Built built = with_sources(options.scene.file, changes,
                                        [&] { return fixtures::build(scene, options.scene.file, build_options); });
   require_writable(options.json);
@@ -245,6 +247,11 @@ int run(const RunOptions& options) {
     for (const Verdict& verdict : broken) judge->add(verdict);
     if (relations) {
       for (std::string& sentence : relations->notes()) judge->note(std::move(sentence));
+    }
+    if (!not_asked.empty()) {
+      judge->note(
+          fmt::format("Of how many {} there are, what the scene expects was not asked: {} makes another number.",
+                      fmt::join(not_asked, " and "), options.scene.particles ? "--particles" : "--spacing"));
     }
     judge->finish();
   }

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "cli/options.h"
 #include "cli/scene_files.h"
 
@@ -54,6 +56,21 @@ std::vector<io::SceneChange> changes_of(const SceneOptions& options) {
   }
   if (options.seed) replace(fmt::format("--seed {}", *options.seed), "seed", fmt::format("{}", *options.seed), nullptr);
   return changes;
+}
+
+std::vector<std::string> take_replaced_counts(const SceneOptions& options, Expectations& expected) {
+  std::vector<std::string> taken;
+  if (!options.particles && !options.spacing) return taken;
+  const auto take = [&](std::optional<Range>& range, const std::string& what) {
+    const bool is_set = std::any_of(options.set.begin(), options.set.end(),
+                                    [&](const std::string& set) { return set.starts_with("expect." + what); });
+    if (!range || is_set) return;
+    range.reset();
+    taken.push_back(what);
+  };
+  take(expected.particles, "particles");
+  take(expected.clusters, "clusters");
+  return taken;
 }
 
 std::vector<std::string> given_changes(const std::vector<io::SceneChange>& changes) {

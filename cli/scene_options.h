@@ -26,6 +26,10 @@ CLI::Option* add_scene(CLI::App& command, SceneOptions& options);
 // for fields. Throws InputError for what is none, or for two of them that contradict each other.
 std::vector<io::SceneChange> changes_of(const SceneOptions& options);
 
+// Of what a scene expects takes away how many particles and clusters there are, where the command line asks for another
+// number of particles: that is then no outcome. A --set of such an expectation stays. Gives what was taken, in words.
+std::vector<std::string> take_replaced_counts(const SceneOptions& options, Expectations& expected);
+
 // As documents have them.
 std::vector<std::string> given_changes(const std::vector<io::SceneChange>& changes);
 

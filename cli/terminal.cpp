@@ -11,6 +11,7 @@
 
 #include "cli/screen.h"
 #include "cli/table.h"
+#include "model/counted.h"
 #include "model/io/columns.h"
 #include "model/io/filled.h"
 #include "model/io/verdict_json.h"
@@ -121,7 +122,8 @@ void print_failing(const std::vector<Row>& rows, const Shown& shown) {
     }
   }
   if (failures > kMostFailuresShown) {
-    insist("\n… and {} more properties fail; --json holds all verdicts.\n", failures - kMostFailuresShown);
+    insist("\n… and {}; --json holds all verdicts.\n",
+           counted(failures - kMostFailuresShown, "more property fails", "more properties fail"));
   }
   if (failures > 0 && !shown.again.empty()) {
     say("\n");

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <string_view>
+
 #include "model/error.h"
 #include "model/nearest_word.h"
 
@@ -24,6 +27,32 @@ std::string full_name(const CLI::App& command) {
 
 std::string help_of(const CLI::App& command) {
   return fmt::format("`{} --help` lists what there is", full_name(command));
+}
+
+// Without the dashes, which are no letters that were hit: of '--seed' and '--help' most are other ones.
+std::string_view letters_of(std::string_view option) {
+  return option.substr(std::min(option.find_first_not_of('-'), option.size()));
+}
+
+std::string option_meant(const std::string& given, const std::vector<std::string>& names) {
+  std::vector<std::string_view> letters;
+  for (const std::string& name : names) letters.push_back(letters_of(name));
+  const std::string nearest = nearest_word(letters_of(given), letters);
+  if (nearest.empty()) return "";
+  const auto name =
+      std::find_if(names.begin(), names.end(), [&](const std::string& n) { return letters_of(n) == nearest; });
+  return fmt::format("did you mean '{}'? ", *name);
+}
+
+// One that was given more often than it may be, if there is one.
+const CLI::Option* given_too_often(const CLI::App& command) {
+  for (const CLI::App* app = &command; app != nullptr; app = app->get_parent()) {
+    for (const CLI::Option* const option : app->get_options()) {
+      const bool one_each = option->get_multi_option_policy() == CLI::MultiOptionPolicy::Throw;
+      if (one_each && option->count() > static_cast<std::size_t>(option->get_items_expected_max())) return option;
+    }
+  }
+  return nullptr;
 }
 
 std::vector<std::string> names_of_options(const CLI::App& command) {
@@ -74,11 +103,17 @@ std::string usage_error(const CLI::App& program, const CLI::ParseError& error, c
     if (!word.starts_with('-') || word == "--") continue;
     const std::string option = word.substr(0, word.find('='));
     return sentence(option, fmt::format("{} has no such option", full_name(command)),
-                    did_you_mean(option, names_of_options(command)) + help_of(command));
+                    option_meant(option, names_of_options(command)) + help_of(command));
   }
   if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
     return sentence(fmt::format("{}", fmt::join(program.remaining(true), " ")),
                     fmt::format("{} takes no further argument", full_name(command)), help_of(command));
+  }
+  const CLI::Option* const repeated = given_too_often(command);
+  if (repeated != nullptr && dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr) {
+    const std::size_t times = repeated->count();
+    return sentence(repeated->get_name(), times == 2 ? "it is given twice" : fmt::format("it is given {} times", times),
+                    "give it once");
   }
   return sentence("", error.what(), help_of(command));
 }

@@ -118,13 +118,14 @@ json run_sensitivity(const SensitivityOptions& options, const Progress& progress
       scene.name = name;
       scene.setup.step.gravity = {kAcross, 0, -kAcross};
     }
-    const KeptRun run = keep_run(*backend, scene);
+    const KeptRun run = keep_run(*backend, scene, options.stop_asked);
     report.document["scenes"].push_back(scene_entry(scene, run));
     for (const Stage stage : kStages) {
       const std::vector<harness::Moment> moments = moments_of(scene.setup, run.trace, stage, options.moments);
       for (const Disturbance& disturbance : disturbances()) {
         if (disturbance.of_run && stage != Stage::step) continue;
-        const Sensitivity found = least_rejected(*backend, scene.setup, disturbance, stage, moments);
+        const Sensitivity found =
+            least_rejected(*backend, scene.setup, disturbance, stage, moments, options.stop_asked);
         if (found.moments == 0) continue;
         report.add(row_of(scene, run, disturbance, stage, found), run.failed.empty());
       }

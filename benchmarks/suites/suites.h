@@ -9,6 +9,7 @@
 #include "benchmarks/measured_scene.h"
 #include "benchmarks/report.h"
 #include "benchmarks/rotations.h"
+#include "model/stop.h"
 
 namespace cutproof::benchmarks {
 
@@ -92,7 +93,8 @@ nlohmann::json run_factors(const FactorsOptions& options, const Progress& progre
 struct SensitivityOptions {
   std::string backend = harness::kReferenceName;
   int64_t particles = 1000;
-  int64_t moments = 8;  // of each stage
+  int64_t moments = 8;        // of each stage
+  StopAsked stop_asked = {};  // ends it between two moments
 };
 nlohmann::json run_sensitivity(const SensitivityOptions& options, const Progress& progress);
 

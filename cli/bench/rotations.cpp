@@ -1,6 +1,8 @@
 #include <optional>
 
 #include "cli/bench/suites.h"
+#include "cli/interruption.h"
+#include "model/stop.h"
 
 namespace cutproof::cli {
 
@@ -97,6 +99,7 @@ void add_rotations(CLI::App& bench, Work& work) {
   const auto run = [asked](const benchmarks::Progress& found) {
     std::optional<Progress> progress;
     return run_rotations(*asked, found, [&](int64_t cases_begun, const std::string& what) {
+      throw_if_asked(stop_asked);
       if (!progress) progress.emplace("case", static_cast<int64_t>(fixtures::hard_cases().size()));
       progress->show(cases_begun, what);
     });

@@ -1,4 +1,5 @@
 #include "cli/bench/suites.h"
+#include "cli/interruption.h"
 #include "model/io/verdict_json.h"
 
 namespace cutproof::cli {
@@ -55,6 +56,7 @@ void print_sensitivity(const nlohmann::json& document) {
 
 void add_sensitivity(CLI::App& bench, Work& work) {
   const auto options = std::make_shared<benchmarks::SensitivityOptions>();
+  options->stop_asked = stop_asked;
   CLI::App* const command = bench.add_subcommand("sensitivity", "the least disturbance that the judge of runs rejects");
   add_backend_name(*command, options->backend, "whose runs are disturbed");
   add_count(*command, "--particles", options->particles, "of each scene", whole_number(100, 3000));

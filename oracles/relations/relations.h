@@ -9,7 +9,7 @@
 namespace cutproof::oracles {
 
 // Every particle of every other component ends `frames` frames with the same bits when the component of `particle`
-// is kicked: displaced by `kick` and given the velocity `kick` / dt.
+// is kicked: displaced by `kick` and given the velocity `kick` / dt. Neither run drops debris.
 Verdict no_ghost_force(Backend& backend, const Setup& setup, const State& state, int32_t particle, Vec3 kick,
                        int64_t frames);
 // Same input, same bits, over `frames` frames.

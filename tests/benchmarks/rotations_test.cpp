@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "harness/backends.h"
+#include "model/stop.h"
 #include "tests/cli/program.h"
 
 namespace {
@@ -224,6 +225,19 @@ TEST(MeasureRotations, DoesNotHoldWithoutADefault) {
       cutproof::benchmarks::measure_rotations({method_named("svd", Precision::binary32)}, kFew, "newton", 1e9);
   EXPECT_EQ(report.results.front().all.wrong, 0);
   EXPECT_FALSE(report.default_holds());
+}
+
+// A case of all methods takes seconds: whoever asks it to stop is heard before the next method.
+TEST(MeasureRotations, CanBeStoppedBeforeEachMethod) {
+  const std::vector<RotationMethod> methods = {method_named("svd", Precision::binary32),
+                                               method_named("newton", Precision::binary32)};
+  std::vector<int64_t> begun;
+  const auto stop_at_third = [&](int64_t cases_begun, const std::string&) {
+    begun.push_back(cases_begun);
+    if (begun.size() == 3) throw cutproof::Stopped();
+  };
+  EXPECT_THROW(cutproof::benchmarks::measure_rotations(methods, kFew, "newton", 1e9, stop_at_third), cutproof::Stopped);
+  EXPECT_EQ(begun, (std::vector<int64_t>{1, 1, 2}));
 }
 
 TEST(RotationFront, HoldsWhatNoOtherMethodBeats) {

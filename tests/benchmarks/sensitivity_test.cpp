@@ -105,6 +105,21 @@ TEST(LeastRejected, OfAForceNeedsTwoPieces) {
   EXPECT_LT(all, static_cast<int64_t>(moments_of(kept.scene.setup, kept.run.trace, Stage::step, 1000).size()));
 }
 
+TEST(LeastRejected, AsksInEachMomentWhetherItIsToStop) {
+  Kept kept;
+  const auto moments = moments_of(kept.scene.setup, kept.run.trace, Stage::step, 4);
+  ASSERT_EQ(moments.size(), 4u);
+  for (const int most : {0, 3, 6}) {  // while it looks what there is to change, measures rounding, and tries
+    int asked = 0;
+    EXPECT_THROW(least_rejected(*kept.backend, kept.scene.setup, disturbance_named("position"), Stage::step, moments,
+                                [&] { return ++asked > most; }),
+                 Stopped);
+    EXPECT_EQ(asked, most + 1);
+  }
+  int asked = 0;
+  EXPECT_THROW(keep_run(*kept.backend, kept.scene, [&] { return ++asked > 5; }), Stopped);
+}
+
 TEST(KeptRun, HoldsAndIsSummedUp) {
   Kept kept;
   EXPECT_TRUE(kept.run.failed.empty());

@@ -7,12 +7,15 @@
 #include <time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <stdexcept>
+#include <string_view>
 #include <thread>
 
 #include "tests/cli/program.h"
@@ -245,6 +248,36 @@ TEST_F(Interrupted, BenchWritesTheRowsThatItHas) {
   EXPECT_EQ(listing(), (std::set<std::string>{"out", "error", "out.json"}));
 }
 
+// All that there are, as the program names them: one that is new is asked too, with what it does when nothing is said.
+TEST_F(Interrupted, EverySuiteOfBenchWritesItsDocumentHoweverEarly) {
+  const std::map<std::string, std::string> few = {
+      {"stages", "--sizes 1000,1000,1000,1000"}, {"scale", "--sizes 1000,1000,1000,1000"},
+      {"sampling", "--frames 1 --repeats 1"},    {"clusters", "--particles 500"},
+      {"machine_limits", "--repeats 300"},       {"factors", "--sides 8,8,8,8"},
+      {"baselines", "--particles 300"},          {"solver", "--particles 0 --iterations 1,2"}};
+  const std::string refusal = on_one_line(cutproof("bench").output);
+  constexpr std::string_view kBefore = "use one of ";
+  const std::size_t begin = refusal.find(kBefore);
+  ASSERT_NE(begin, std::string::npos) << refusal;
+  std::istringstream suites(refusal.substr(begin + kBefore.size()));
+  int asked = 0;
+  for (std::string suite; suites >> suite; ++asked) {
+    suite.erase(std::remove(suite.begin(), suite.end(), ','), suite.end());
+    start("bench " + suite + " --json out.json " + (few.contains(suite) ? few.at(suite) : ""));
+    // Its head is printed before anything is measured.
+    wait_until([&] { return !read("out").empty(); });
+    EXPECT_EQ(end(SIGINT), 128 + SIGINT) << suite << ": " << read("out") << read("error");
+    EXPECT_EQ(read("error"), "") << suite;
+    ASSERT_TRUE(files::exists(path("out.json"))) << suite;
+    const json document = json::parse(read("out.json"));
+    EXPECT_EQ(document.at("suite"), suite);
+    EXPECT_FALSE(document.at("complete")) << suite;
+    EXPECT_TRUE(has_printed("INCOMPLETE: it was stopped after ")) << suite << ": " << read("out");
+    files::remove(path("out.json"));
+  }
+  EXPECT_GE(asked, 10) << refusal;
+}
+
 // A guest that hangs ends with its host, which is not reached by the terminal's signals.
 TEST_F(Interrupted, JudgeWritesWhatItHas) {
   start("judge " CUTPROOF_PLUGIN_IN_C " --cases 100000000 --json out.json --junit out.xml --save kept");
@@ -260,6 +293,14 @@ TEST_F(Interrupted, JudgeWritesWhatItHas) {
   EXPECT_TRUE(has_printed("INCOMPLETE: it was stopped")) << read("out");
   EXPECT_NE(read("out.xml").find("it was stopped"), std::string::npos);
   EXPECT_TRUE(files::is_directory(path("kept")));
+}
+
+TEST_F(Interrupted, JudgeOfStagesCountsThemAsAnOperation) {
+  start("judge " CUTPROOF_PLUGIN_OF_STAGES " --cases 100000000 --json out.json");
+  wait_until_in_the_middle();
+  EXPECT_EQ(end(SIGINT), 128 + SIGINT);
+  EXPECT_FALSE(json::parse(read("out.json")).at("complete"));
+  EXPECT_TRUE(has_printed("INCOMPLETE: it was stopped after 1 of 1 operation was begun")) << read("out");
 }
 
 TEST_F(Interrupted, TheTerminalsSignalIsForTheHostAndNotForItsGuest) {

@@ -75,8 +75,25 @@ TEST_F(Options, SayWhatWasMeant) {
            {"bench sampling --clusters box", {"did you mean 'boxes'?"}}}) {
     expect_refused(command, words);
   }
-  // Nothing is near to this.
-  EXPECT_EQ(cutproof("run s.json --zzzzzzzzzz").output.find("did you mean"), std::string::npos);
+  // Nothing is near to these: of short ones too most letters have to be right, and dashes are none.
+  for (const char* command : {"run s.json --zzzzzzzzzz", "--seed 3", "check r --sead 3", "run s.json --abcd"}) {
+    expect_refused(command, {"has no such option"});
+    EXPECT_EQ(cutproof(command).output.find("did you mean"), std::string::npos) << command;
+  }
+}
+
+TEST_F(Options, SayWhichOneIsGivenTwice) {
+  for (const auto& [command, words] : std::vector<std::pair<std::string, std::vector<std::string>>>{
+           {"run s.json --json a --json b", {"--json: it is given twice", "give it once"}},
+           {"run s.json --frames 1 --frames 1 --frames 1", {"--frames: it is given 3 times"}},
+           {"run s.json --check motion --check topology", {"--check: it is given twice"}},
+           {"bench solver --samples 3 --samples 4", {"--samples: it is given twice"}},
+           {"judge x.so --seed 1 --seed 2", {"--seed: it is given twice"}}}) {
+    expect_refused(command, words);
+    EXPECT_EQ(cutproof(command).output.find("equired"), std::string::npos) << command;
+  }
+  EXPECT_EQ(cutproof("run s.json --set seed=1 --set frame.count=1").status, 0) << "this one is for many";
+  expect_refused("run s.json --json", {"--json"});
 }
 
 TEST_F(Options, SayRangesInWordsAndTakeNoNumberForAnother) {

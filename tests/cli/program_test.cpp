@@ -296,6 +296,32 @@ bool has_note(const json& document, const std::string& words) {
   return false;
 }
 
+// How many there are is no outcome where the command line asks for another number; everything else still is.
+TEST_F(Program, AnotherNumberOfParticlesIsNotHeldAgainstTheScenes) {
+  json counting = small_block();
+  counting["expect"]["particles"] = {{"at_least", 1}, {"at_most", 2}};
+  counting["expect"]["clusters"] = {{"at_least", 1000}};
+  write("counting.json", counting.dump());
+  EXPECT_EQ(cutproof("run counting.json --check").status, 1) << "or this test is about nothing";
+  for (const std::string option : {"--particles 150", "--spacing 0.012"}) {
+    const Outcome outcome = cutproof("run counting.json --check --json out.json --record seen " + option);
+    EXPECT_EQ(outcome.status, 0) << outcome.output;
+    const json document = json::parse(read("out.json"));
+    EXPECT_TRUE(
+        has_note(document, "Of how many particles and clusters there are, what the scene expects was not asked"));
+    EXPECT_NE(outcome.output.find("components at the end: 2"), std::string::npos) << outcome.output;
+    const Outcome checked = cutproof("check seen");
+    EXPECT_EQ(checked.status, 0) << checked.output;
+  }
+  const Outcome asked = cutproof("run counting.json --check --particles 150 --set expect.particles.at_most=3");
+  EXPECT_EQ(asked.status, 1) << asked.output;
+  EXPECT_NE(asked.output.find("expected particles"), std::string::npos) << asked.output;
+  EXPECT_EQ(asked.output.find("expected clusters"), std::string::npos) << asked.output;
+  counting["expect"]["components_at_end"] = 3;
+  write("wrong.json", counting.dump());
+  EXPECT_EQ(cutproof("run wrong.json --check --particles 150").status, 1);
+}
+
 // A block that is pulled apart by its ends: what goes too far apart goes in the substep in which it does.
 TEST_F(Program, DetectsInEverySubstepIfTheSceneSaysSo) {
   json scene = json::parse(R"({"version": 2, "name": "torn",

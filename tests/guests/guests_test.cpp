@@ -798,6 +798,9 @@ TEST_F(JudgeVerb, EndsWithTheStatusThatSaysWhatHappened) {
   EXPECT_EQ(run("judge nowhere.so").status, 2);
   EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " magic").status, 2);
   EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " rotations").status, 2) << "it has none";
+  const Ran only_stages = run(std::string("judge ") + PLUGIN_only_stages_plugin + " rotations");
+  EXPECT_EQ(only_stages.status, 2);
+  EXPECT_NE(only_stages.output.find("remedy: it has stages"), std::string::npos) << only_stages.output;
   EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " --save /dev/null/nowhere").status, 2);
   const Ran skipped = run(std::string("judge ") + PLUGIN_in_c + " --parameters cannot");
   EXPECT_EQ(skipped.status, 77);

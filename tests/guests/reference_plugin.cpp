@@ -336,6 +336,10 @@ int surface(const cutproof_host* host, void* self, const cutproof_tissue* tissue
   return 0;
 }
 
+#ifndef PLUGIN_ONLY_STAGES
+#define PLUGIN_ONLY_STAGES false
+#endif
+
 #ifdef PLUGIN_SPANS
 // Of so many stages alone.
 int can_run(int first, int last) { return last - first + 1 == PLUGIN_SPANS ? 1 : 0; }
@@ -353,8 +357,8 @@ const cutproof_plugin plugin = {
     .real = CUTPROOF_F64,
     .create = create,
     .destroy = destroy,
-    .rotations = rotations,
-    .surface = surface,
+    .rotations = PLUGIN_ONLY_STAGES ? nullptr : rotations,
+    .surface = PLUGIN_ONLY_STAGES ? nullptr : surface,
 #ifdef PLUGIN_SPANS
     .can_run = can_run,
 #endif

@@ -394,6 +394,95 @@ TEST(NoGhostForce, RejectsASolverThatSubtractsTheGlobalMean) {
   EXPECT_EQ(verdict.measured, 27) << "every particle of the other block felt it";
 }
 
+// A block, and two particles beside it that are fewer than debris has to be. The block is held at one side, so that a
+// kick tears it.
+Scene held_block_and_crumb() {
+  std::vector<Node> nodes = {{6, 1, 1}, {6, 1, 2}};
+  for (int32_t k = 0; k < 3; ++k) {
+    for (int32_t j = 0; j < 3; ++j) {
+      for (int32_t i = 0; i < 4; ++i) nodes.push_back({i, j, k});
+    }
+  }
+  Scene scene{setup_of(body_of(nodes), 3), {}};
+  std::vector<std::vector<int32_t>> lists(2);
+  Grip grip{{}, std::vector<uint8_t>(12, 1), std::vector<Vec3>(12)};
+  for (int32_t i = 0; i < scene.setup.body.particle_count(); ++i) {
+    const auto x = scene.setup.body.grid.coordinates(scene.setup.body.node[static_cast<std::size_t>(i)])[0];
+    lists[x > 5].push_back(i);
+    if (x == 1) grip.particles.push_back(i);
+  }
+  scene.state = state_of(scene.setup.body, lists);
+  scene.setup.detect.without_blade = true;
+  scene.setup.split.debris = 8;
+  scene.setup.grips = {grip};
+  return scene;
+}
+constexpr Vec3 kTearing = {3, 0, 0};  // [h] and in a substep
+
+// The crumb goes in the one run, as it must: something was removed.
+TEST(NoGhostForce, IsNotWhatACutElsewhereTakesAwayAsDebris) {
+  const auto backend = reference::make_backend();
+  const Scene scene = held_block_and_crumb();
+  State kicked = scene.state;
+  const Partition parts = graph_components(scene.setup, scene.state);
+  for (std::size_t i = 0; i < kicked.x.size(); ++i) {
+    if (parts.label[i] != parts.label[0]) continue;
+    kicked.x[i] += kTearing;
+    kicked.v[i] += kTearing / 0.004;
+  }
+  const auto after_a_frame = [&](const State& state) {
+    backend->load({scene.setup}, {state});
+    backend->run(Span{});
+    return backend->snapshot().at(0);
+  };
+  EXPECT_TRUE(after_a_frame(scene.state).removed.empty());
+  EXPECT_FALSE(after_a_frame(kicked).removed.empty());
+  EXPECT_EQ(after_a_frame(kicked).debris.size(), 2u) << "or this test is about nothing";
+
+  const Verdict verdict = no_ghost_force(*backend, scene.setup, scene.state, 0, kTearing, 1);
+  expect_holds(verdict);
+  EXPECT_EQ(verdict.checked, 2);
+}
+
+TEST(NoGhostForce, IsFoundInACrumb) {
+  const Scene scene = held_block_and_crumb();
+  FakeBackend pulling({[](const cutproof::Setup& setup, State& state) {
+                         reference::step(setup, state);
+                         for (std::size_t i = 0; i < state.x.size(); ++i) {
+                           if (state.x[i].x > 5) state.x[i].y += 1e-15 * state.x[0].x;
+                         }
+                       },
+                       reference::detect,
+                       reference::split,
+                       {},
+                       {},
+                       {}});
+  const Verdict verdict = no_ghost_force(pulling, scene.setup, scene.state, 0, kTearing, 1);
+  EXPECT_FALSE(verdict.holds);
+  EXPECT_EQ(verdict.measured, 2);
+  EXPECT_TRUE(mentions(verdict, "m elsewhere")) << verdict.witness.text;
+}
+
+TEST(NoGhostForce, SaysWhatBecameOfWhoFeltIt) {
+  const Scene scene = two_blocks();
+  const Partition parts = graph_components(scene.setup, scene.state);
+  const auto last = parts.label.size() - 1;
+  ASSERT_NE(parts.label[last], parts.label[0]);
+  const auto witness_if = [&](const std::function<void(State&)>& ghost) {
+    FakeBackend backend = fake_step([&](const cutproof::Setup&, State& state) {
+      if (state.v[0].x > 1) ghost(state);  // kicked
+    });
+    return no_ghost_force(backend, scene.setup, scene.state, 0, {1, 0, 0}, 1).witness.text;
+  };
+  const std::string removed = witness_if([&](State& state) { state.alive[last] = 0; });
+  EXPECT_NE(removed.find(" is removed in one run only because the component of particle 0"), std::string::npos)
+      << removed;
+  const std::string faster = witness_if([&](State& state) { state.v[last].y += 0.5; });
+  EXPECT_NE(faster.find(" ends 0.5 m/s faster or slower because"), std::string::npos) << faster;
+  const std::string elsewhere = witness_if([&](State& state) { state.x[last].y += 0.5; });
+  EXPECT_NE(elsewhere.find(" ends 0.5 m elsewhere because"), std::string::npos) << elsewhere;
+}
+
 TEST(Determinism, RejectsABackendThatRemembers) {
   int calls = 0;
   FakeBackend moody = fake_step([&calls](const cutproof::Setup&, State& state) {
