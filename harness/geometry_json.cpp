@@ -15,6 +15,7 @@ json to_json(const oracles::CutGeometry& geometry) {
           {"least_per_area", json_number(geometry.least_per_area)},
           {"hausdorff", json_number(geometry.hausdorff())},
           {"skin_to_ideal", json_number(geometry.skin_to_ideal)},
+          {"skin_rms", json_number(geometry.skin_rms)},
           {"ideal_to_skin", json_number(geometry.ideal_to_skin)},
           {"sampling", {{"skin_to_ideal", geometry.sampling_skin}, {"ideal_to_skin", geometry.sampling_ideal}}}};
 }

@@ -90,6 +90,9 @@ inline constexpr StageOracle merge_legality{"merge legality", Stage::merge};
 // No union has more than `cap` particles, where the rule promises that.
 inline constexpr StageOracle cap_kept{"cap kept", Stage::merge};
 inline constexpr StageOracle expansion{"expansion", Stage::expand};
+// Where vertices lie on their grid edges: those that were there before stay, those that a blade has brought about lie
+// where its plane crosses the edge, within what rounding leaves open. `measured` and `bound` [h].
+inline constexpr StageOracle skin_reach{"skin reach", Stage::skin};
 // Nothing but what a stage may change has changed (positions by split, clusters by step, …).
 inline Verdict untouched(const Setup& setup, Stage stage, const State& before, const State& after) {
   return StageOracle{"untouched", stage}(setup, before, after);

@@ -247,6 +247,9 @@ CutGeometry cut_geometry(const Setup& setup, const State& before, const State& a
   if (skin.vertices.empty() || surface.empty()) return geometry;
   std::vector<Vec3> points = points_of(skin.triangles, kEdge * h);
   points.insert(points.end(), skin.vertices.begin(), skin.vertices.end());
+  double squares = 0;
+  for (const double apart : distances_to(surface, {}, skin.vertices)) squares += apart * apart;
+  geometry.skin_rms = std::sqrt(squares / static_cast<double>(skin.vertices.size())) / h;
   geometry.skin_to_ideal = greatest_of(distances_to(surface, {}, points)) / h;
   if (!ideal.samples.empty()) {
     geometry.ideal_to_skin = greatest_of(distances_to(skin.triangles, skin.vertices, ideal.samples)) / h;

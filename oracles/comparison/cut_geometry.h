@@ -28,6 +28,7 @@ struct CutGeometry {
   std::optional<double> least_per_area;  // [h] the ideal: the fewest particles whose removal leaves no edge of the grid
                                          // that the ideal cut crosses, per cut area
   std::optional<double> skin_to_ideal;   // [h] greatest distance of the new skin at rest from the ideal cut
+  std::optional<double> skin_rms;        // [h] root mean square of the distances of the new skin's vertices from it
   std::optional<double> ideal_to_skin;   // [h] greatest distance of the ideal cut inside the tissue from the new skin
   double sampling_skin = 0, sampling_ideal = 0;  // [h] by how much these two may be too small
   std::optional<double> hausdorff() const;       // the greater of the two

@@ -902,6 +902,31 @@ TEST_F(RecordingTest, IsNotMadeOfASetupWhoseCriterionHasNoEndsToTake) {
   EXPECT_THROW(Recorder(path("run"), setup, "{}", "reference"), std::invalid_argument);
 }
 
+// Format 5 had no reach of vertices: each lay where the body's surface or alpha says. And cuts were not fitted.
+TEST_F(RecordingTest, OfFormatFiveHasItsVerticesWhereTheBodySays) {
+  Setup setup = block_setup(2, 1, 1);
+  setup.skin.alpha = 0.3;
+  setup.skin.fit_cuts = true;
+  setup.body.surface_crossing = {0, 128, 64, 16, 240, 0, 77, 0, 0, 0, 0, 0};
+  State state = block_state(setup);
+  state.skin = some_skin(state, 1);
+  {
+    Recorder recorder(path("run"), setup, "{}", "reference");
+    recorder.record(Stage::skin, state);
+    recorder.finish();
+  }
+  const RecordingPaths files = recording_paths(path("run"));
+  EXPECT_EQ(RecordingReader(path("run")).snapshot(0).state.skin.reach, state.skin.reach);
+  EXPECT_TRUE(RecordingReader(path("run")).header().setup.skin.fit_cuts);
+  for (const std::string& file : {files.index, files.particles, files.skin}) {
+    tamper(file, [&](hid_t id) { set_attribute<int32_t>(id, "/", "cutproof_format", 5); });
+  }
+  tamper(files.skin, [](hid_t file) { H5Ldelete(file, "/VTKHDF/PointData/reach", H5P_DEFAULT); });
+  const RecordingReader old(path("run"));
+  EXPECT_EQ(old.snapshot(0).state.skin.reach, (std::vector<double>{0.3, 0.25, 0.9375})) << "+x leads to a particle";
+  EXPECT_FALSE(old.header().setup.skin.fit_cuts);
+}
+
 // Format 3 had no detect/remove: both ends of an edge went. Format 4 had no body/surface_crossing: none was known.
 TEST_F(RecordingTest, IsReadIfItIsOfAFormatBefore) {
   Setup setup = block_setup(2, 1, 1);

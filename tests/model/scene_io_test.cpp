@@ -682,6 +682,15 @@ TEST(SceneIo, AScenesVersionSaysWhetherItsSkinIsFittedIfNothingElseDoes) {
   EXPECT_FALSE(fitted("4", R"(, "fit_skin": false)"));
   const std::string plain = R"(, "body": {"shape": {"kind": "box"}, "spacing": 0.01}})";
   EXPECT_EQ(parse_scene(R"({"version": 4)" + plain, "").body.fit_skin, Scene{}.body.fit_skin);
+  // Cut faces likewise.
+  const auto cuts = [&](const std::string& version, const std::string& more) {
+    return parse_scene(R"({"version": )" + version + more + plain, "scene.json").skin.fit_cuts;
+  };
+  EXPECT_FALSE(cuts("3", ""));
+  EXPECT_TRUE(cuts("3", R"(, "skin": {"fit_cuts": true})"));
+  EXPECT_TRUE(cuts("4", ""));
+  EXPECT_TRUE(cuts("4", R"(, "skin": {"alpha": 0.4})"));
+  EXPECT_FALSE(cuts("4", R"(, "skin": {"fit_cuts": false})"));
   // A scene of version 3 stays what it is when it is written and read again.
   const Scene old = parse_scene(R"({"version": 3)" + plain, "scene.json");
   EXPECT_EQ(old.version, 3);

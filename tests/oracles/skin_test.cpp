@@ -256,6 +256,63 @@ TEST(SkinVertices, RejectsAVertexThatIsOffByABillionthOfTheSpacing) {
   EXPECT_FALSE(skin_vertices(scene.setup, scene.state).holds);
 }
 
+TEST(SkinReach, IsWhereTheBladeCrossesAnEdgeThatACutHasOpened) {
+  // A row of three cut between the second and the third: the third dies, and the blade stands 0.4 h from the second.
+  Scene before = scene_of(block_nodes({0, 0, 0}, {3, 1, 1}));
+  cutproof::Setup& setup = before.setup;
+  setup.skin.fit_cuts = setup.has_blade = true;
+  setup.blade = {10, 10, 0, 0};
+  const double h = setup.body.grid.spacing;
+  const BladePose pose = {setup.body.rest_position(1) + Vec3{0.4 * h, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  setup.substep_length = {0.01};
+  setup.blade_moves.assign(static_cast<std::size_t>(setup.step.substeps), {pose, pose, true, 0});
+  before.state.frame = 0;
+  before.state.alive[2] = 0;
+  before.state.removed = {2};
+  Clusters& clusters = before.state.clusters;
+  clusters.offsets = {0, 2};
+  clusters.members = {0, 1};
+  clusters.number.resize(1);
+  clusters.rotation.resize(1);
+  clusters.degenerate.resize(1);
+  clusters.rest_center.resize(1);
+  clusters.mass.resize(1);
+  reference::update_rest_frames(setup.body, clusters);
+  State after = before.state;
+  reference::skin(setup, after);
+  after.frame = 1;
+  const auto verdict_of = [&] { return skin_reach(setup, before.state, after); };
+  const auto v = static_cast<std::size_t>(vertex_of(after.skin, 1, 0));
+  const auto old = static_cast<std::size_t>(vertex_of(after.skin, 0, 1));
+  ASSERT_TRUE(verdict_of().holds) << verdict_of().witness.text;
+  EXPECT_EQ(verdict_of().checked, 10);
+  EXPECT_NEAR(after.skin.reach[v], 0.4, 1e-12);
+  after.skin.reach[v] += 1e-12;
+  EXPECT_FALSE(verdict_of().holds) << "bound " << verdict_of().bound;
+  EXPECT_TRUE(names_particle(verdict_of(), 1));
+  for (const double wrong : {0.5, 0.6, 1.0 / 16, 15.0 / 16}) {
+    after.skin.reach[v] = wrong;
+    EXPECT_FALSE(verdict_of().holds) << wrong;
+    EXPECT_NEAR(verdict_of().measured, std::abs(wrong - 0.4), 1e-9);
+  }
+  after.skin.reach[v] = 0.4;
+  ASSERT_TRUE(verdict_of().holds);
+  // What was there stays, whatever it is.
+  before.state.skin.reach[static_cast<std::size_t>(vertex_of(before.state.skin, 0, 1))] = 0.7;
+  EXPECT_FALSE(verdict_of().holds) << "it was at 0.7";
+  after.skin.reach[old] = 0.7;
+  EXPECT_TRUE(verdict_of().holds);
+  // Not beside what had died before, and not if nothing is fitted.
+  before.state.removed.clear();
+  EXPECT_FALSE(verdict_of().holds);
+  after.skin.reach[v] = setup.skin.alpha;
+  EXPECT_TRUE(verdict_of().holds);
+  before.state.removed = {2};
+  EXPECT_FALSE(verdict_of().holds);
+  setup.skin.fit_cuts = false;
+  EXPECT_TRUE(verdict_of().holds);
+}
+
 TEST(SkinVertices, RejectsAVertexThatIgnoresWhereTheSurfaceCrossesItsEdge) {
   Scene scene = scene_of(block_nodes({0, 0, 0}, {3, 3, 3}));
   ASSERT_TRUE(skin_vertices(scene.setup, scene.state).holds);

@@ -342,6 +342,74 @@ TEST(Skin, LiesWhereTheSurfaceCrossesItsEdgeAndOnCutFacesAlphaAway) {
   EXPECT_LT(norm(vertex(0, 1) - Vec3{0.5 - 0.125, 0.5, 0.5}), 1e-15) << "as before the cut";
 }
 
+// A row of four particles along x whose third dies beside a blade that stands at x = `plane`, tilted by `tilt` about z.
+struct BesideABlade {
+  explicit BesideABlade(double plane, double tilt = 0, double alpha = 0.3) : setup(setup_of(block_body(4, 1, 1, 0.5))) {
+    setup.skin.alpha = alpha;
+    setup.skin.fit_cuts = true;
+    setup.has_blade = true;
+    setup.blade = {10, 10, 0.1, 0};
+    setup.step.substeps = 2;
+    setup.substep_length = {0.01};
+    // The last substep in which it is lowered counts, and its end.
+    const BladePose pose = {{plane * 0.5, 0.5, 0}, {std::sin(tilt), std::cos(tilt), 0}, {0, 0, 1}};
+    const BladePose away = {{-70, 0.5, 0}, {0, 1, 0}, {0, 0, 1}};
+    setup.blade_moves = {{away, pose, true, 0}, {away, away, false, 0}};
+    state = state_of(setup.body, {{0, 1, 2, 3}});
+    reference::skin(setup, state);
+    remove_particles(state, {2});
+    state.clusters = state_of(setup.body, {{0, 1}, {3}}).clusters;
+  }
+  // Of the vertex that particle 1 or 3 has on its edge to 2.
+  double reach(int32_t owner) {
+    reference::skin(setup, state);
+    for (std::size_t v = 0; v < state.skin.owner.size(); ++v) {
+      if (state.skin.owner[v] == owner && state.skin.direction[v] == (owner == 1 ? 0 : 1)) return state.skin.reach[v];
+    }
+    return -1;
+  }
+  Setup setup;
+  State state;
+};
+
+TEST(Skin, LiesWhereTheBladeCrossesTheEdgesThatACutHasOpened) {
+  constexpr double kExact = 1e-14;
+  // The row rests at x = 1, 2, 3, 4 spacings.
+  EXPECT_NEAR(BesideABlade(2.4).reach(1), 0.4, kExact);
+  EXPECT_NEAR(BesideABlade(2.4).reach(3), 15.0 / 16, kExact) << "the dead one lies between";
+  EXPECT_NEAR(BesideABlade(3.4).reach(1), 15.0 / 16, kExact);
+  EXPECT_NEAR(BesideABlade(3.4).reach(3), 0.6, kExact);
+  EXPECT_NEAR(BesideABlade(2.01).reach(1), 1.0 / 16, kExact) << "not on its owner";
+  EXPECT_NEAR(BesideABlade(4.5).reach(1), 15.0 / 16 + 0.5 * (0.3 - 15.0 / 16), kExact) << "farther away";
+  EXPECT_NEAR(BesideABlade(5.1).reach(1), 0.3, kExact) << "too far away to be of this blade";
+  EXPECT_NEAR(BesideABlade(1.5).reach(1), 1.0 / 16 + 0.5 * (0.3 - 1.0 / 16), kExact) << "behind its owner";
+  EXPECT_NEAR(BesideABlade(0.9).reach(1), 0.3, kExact);
+  EXPECT_NEAR(BesideABlade(2.4, 0.7).reach(1), 0.4, kExact) << "tilted: in the same point";
+  // An edge that is nearly parallel to the plane says little, and one that lies in it nothing.
+  EXPECT_NEAR(BesideABlade(2.6, std::acos(0.125)).reach(1), 0.3 + 0.5 * (0.6 - 0.3), 1e-12);
+  EXPECT_NEAR(BesideABlade(2.6, std::acos(0.0)).reach(1), 0.3, 1e-12);
+}
+
+TEST(Skin, KeepsWhereAnEarlierCutLeftItsVertices) {
+  BesideABlade row(2.4);
+  ASSERT_NEAR(row.reach(1), 0.4, 1e-14);
+  row.setup.blade_moves[0].to.edge.x += 0.1;
+  EXPECT_NEAR(row.reach(1), 0.4, 1e-14) << "it is there already";
+  row.state.skin = {};
+  row.state.removed.clear();
+  EXPECT_EQ(row.reach(1), 0.3) << "nobody knows any more";
+}
+
+TEST(Skin, LeavesCutFacesAlphaAwayWithoutABladeOrIfTheyAreNotFitted) {
+  BesideABlade plain(2.4), raised(2.4), over(2.4);
+  plain.setup.skin.fit_cuts = false;
+  EXPECT_EQ(plain.reach(1), 0.3);
+  raised.setup.blade_moves[0].down = false;
+  EXPECT_EQ(raised.reach(1), 0.3);
+  over.state.frame = 1;
+  EXPECT_EQ(over.reach(1), 0.3) << "the schedule is over";
+}
+
 TEST(Skin, FollowsTheAverageOfItsOwnersClusters) {
   // Two particles of masses 1 and 3 at x = 1 and 2. Cluster A holds both, B only the second. Weights: 1 and 3/2 in A,
   // 3/2 in B. They move to x = 1 and y = 4 for the second; A has turned by a quarter about z.

@@ -269,12 +269,12 @@ std::multiset<std::array<int32_t, 3>> turned_to_lowest(const Skin& skin) {
 }
 
 // Every body's skin against the reference's, made from scratch of the very state that the kernels have reached.
-void expect_reference_skins(const Bodies& bodies, const std::string& where) {
+void expect_reference_skins(const Bodies& bodies, const std::string& where, const std::vector<Skin>& before = {}) {
   const std::vector<State> states = extract_states(bodies.staging, bodies.setups);
   for (std::size_t b = 0; b < states.size(); ++b) {
     const Setup& setup = bodies.setups[b];
     State expected = states[b];
-    expected.skin = {};
+    expected.skin = before.empty() ? Skin{} : before[b];
     reference::skin(setup, expected);
     const Skin& skin = states[b].skin;
     ASSERT_EQ(skin.owner, expected.skin.owner) << where << ", body " << b;
@@ -282,6 +282,7 @@ void expect_reference_skins(const Bodies& bodies, const std::string& where) {
     ASSERT_EQ(turned_to_lowest(skin), turned_to_lowest(expected.skin)) << where << ", body " << b;
     double worst = 0;
     for (std::size_t v = 0; v < skin.owner.size(); ++v) {
+      ASSERT_NEAR(skin.reach[v], expected.skin.reach[v], 1e-5) << where << ", body " << b << ", vertex " << v;
       worst = std::max(worst, norm(skin.position[v] - expected.skin.position[v]) / setup.body.grid.spacing);
     }
     ASSERT_LE(worst, 1e-5) << where << ", body " << b;
@@ -312,6 +313,18 @@ Bodies random_bodies(std::mt19937& random, int count, int64_t frames) {
     states.push_back(state_of(body, lists));
     Setup setup = setup_of(std::move(body), frames);
     setup.skin.alpha = 0.1 * draw(random, 1, 9);
+    if (random() % 2 == 0) {
+      setup.skin.fit_cuts = setup.has_blade = true;
+      setup.blade = {1, 1, 0, 0};
+      const double h = setup.body.grid.spacing;
+      for (int64_t s = 0; s < setup.frame_count() * setup.step.substeps; ++s) {
+        const double turn = 0.1 * draw(random, 0, 62);
+        const BladePose pose = {{h * draw(random, 0, 8), h * draw(random, 0, 7), h * draw(random, 0, 6)},
+                                {std::cos(turn), std::sin(turn), 0},
+                                {0, 0, 1}};
+        setup.blade_moves.push_back({pose, pose, random() % 4 != 0, 0});
+      }
+    }
     if (random() % 2 == 0) {  // beside bodies of which nothing is known
       setup.body.surface_crossing.resize(6 * at(setup.body.particle_count()));
       for (uint8_t& crossing : setup.body.surface_crossing) {
@@ -342,6 +355,7 @@ TEST(GpuSkin, AfterAnyRemovalsIsTheSkinFromScratchWhateverTheSchedule) {
       std::mt19937 random(seed);
       Bodies bodies = random_bodies(random, draw(random, 1, 4), kFrames);
       HostLauncher launcher = mode.make(seed);
+      std::vector<Skin> before;
       for (int frame = 0; frame < kFrames; ++frame) {
         const std::string where =
             std::string(mode.name) + ", seed " + std::to_string(seed) + ", frame " + std::to_string(frame);
@@ -356,8 +370,10 @@ TEST(GpuSkin, AfterAnyRemovalsIsTheSkinFromScratchWhateverTheSchedule) {
         shake(bodies, random);
         run_skin(launcher, bodies);
         ASSERT_EQ(bodies.staging.counters[0].fault, 0);
-        expect_reference_skins(bodies, where);
+        expect_reference_skins(bodies, where, before);
         if (HasFatalFailure()) return;
+        before.clear();
+        for (State& state : extract_states(bodies.staging, bodies.setups)) before.push_back(std::move(state.skin));
         next_frame(bodies);
       }
       all.push_back(std::move(bodies));
@@ -365,6 +381,7 @@ TEST(GpuSkin, AfterAnyRemovalsIsTheSkinFromScratchWhateverTheSchedule) {
     for (std::size_t k = 1; k < all.size(); ++k) {
       const std::string where = std::string(kModes[k].name) + ", seed " + std::to_string(seed);
       expect_same_bytes(all[k].staging.vertex_owner, all[0].staging.vertex_owner, where);
+      expect_same_bytes(all[k].staging.vertex_reach, all[0].staging.vertex_reach, where);
       expect_same_bytes(all[k].staging.vertex_position, all[0].staging.vertex_position, where);
       expect_same_bytes(all[k].staging.cell_node, all[0].staging.cell_node, where);
       expect_same_bytes(all[k].staging.cell_triangles, all[0].staging.cell_triangles, where);

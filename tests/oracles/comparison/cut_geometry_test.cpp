@@ -76,6 +76,7 @@ TEST(CutGeometry, OneLayerIsTheLeastThatAPlaneAlongTheGridCosts) {
     EXPECT_NEAR(geometry.least_per_area.value(), 1, 1e-12);
     // The new faces are half a spacing from the layer that is gone.
     EXPECT_NEAR(geometry.skin_to_ideal.value(), 0.5 + std::abs(aside), 1e-12);
+    EXPECT_NEAR(geometry.skin_rms.value(), std::hypot(0.5, aside), 1e-12) << "half of them lie on either side";
     // The cut's corner is the farthest from the skin, whose edges are cut off there: half a spacing along y and z, and
     // half less what the blade is aside along x. The outermost line runs an eighth of a spacing inside the corner.
     const double across = 0.5 - std::abs(aside);
