@@ -908,11 +908,11 @@ TEST_F(RecordingTest, OfFormatFiveHasItsVerticesWhereTheBodySays) {
   setup.skin.alpha = 0.3;
   setup.skin.fit_cuts = true;
   setup.body.surface_crossing = {0, 128, 64, 16, 240, 0, 77, 0, 0, 0, 0, 0};
-  State state = block_state(setup);
+  State state = rest_state(setup);
   state.skin = some_skin(state, 1);
   {
     Recorder recorder(path("run"), setup, "{}", "reference");
-    recorder.record(Stage::skin, state);
+    recorder.add(Stage::skin, state);
     recorder.finish();
   }
   const RecordingPaths files = recording_paths(path("run"));
