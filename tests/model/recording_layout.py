@@ -130,7 +130,7 @@ def read_all(stem):
                 require(file.attrs["cutproof_file"] == f"recording {name}".encode(), f"{stem}: cutproof_file of {name}")
         require(len(ids) == 1, f"{stem}: files of different recordings")
         require(index.attrs["cutproof_file"] == b"recording index", f"{stem}: cutproof_file")
-        require(index.attrs["cutproof_format"] == 5, f"{stem}: cutproof_format")
+        require(index.attrs["cutproof_format"] == 6, f"{stem}: cutproof_format")
     return files
 
 
@@ -192,6 +192,7 @@ def check_cut(folder):
     require([list(c) for c in skin[2]["cells"]["Polygons"]] == [[3 * i, 3 * i + 1, 3 * i + 2] for i in range(6)], "skin")
     require(list(skin[2]["data"]["owner"]) == [i for i in range(6) for _ in range(3)], "owners of the skin")
     require(list(skin[2]["data"]["direction"]) == 6 * [0, 2, 4], "directions of the skin")
+    require(list(skin[2]["data"]["reach"]) == 6 * [0.25, 0.375, 0.5], "reaches of the skin")
     require(np.array_equal(skin[3]["points"][0], particles[3]["points"][0] + [0.05, 0, 0]), "positions of the skin")
 
     require([len(only(step, "Polygons")) for step in blade] == [0, 0, 6, 0], "the blade is up, up, down, up")
