@@ -23,10 +23,10 @@ constexpr std::array kRotations = {std::string_view("rotation")};
 constexpr std::array kMomentum = {std::string_view("linear momentum"), std::string_view("component momentum")};
 constexpr std::array kMotion = {std::string_view("motion"), std::string_view("admissible step")};
 constexpr std::array kBladeOut = {std::string_view("no pass")};
-constexpr std::array kSkin = {std::string_view("skin match"),       std::string_view("skin surface"),
-                              std::string_view("skin vertices"),    std::string_view("skin shells"),
-                              std::string_view("skin geometry"),    std::string_view("surface"),
-                              std::string_view("surface vertices"), std::string_view("surface shells")};
+constexpr std::array kSkin = {
+    std::string_view("skin match"),  std::string_view("skin surface"),     std::string_view("skin vertices"),
+    std::string_view("skin shells"), std::string_view("skin geometry"),    std::string_view("skin reach"),
+    std::string_view("surface"),     std::string_view("surface vertices"), std::string_view("surface shells")};
 constexpr std::array kBest = {std::string_view("best rotation")};
 constexpr std::array kNearest = {std::string_view("nearest rotation")};
 constexpr std::array kKeepsPrevious = {std::string_view("previous rotation kept")};

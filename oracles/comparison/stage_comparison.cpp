@@ -251,7 +251,10 @@ void StageComparison::compare_later_stage(const State& before, const State& afte
   }
   if (found.stage == Stage::skin && found.due && !difference) {
     MeasuredError& skin = found.error(Measure::skin);
-    skin.norm = error_of(errors_of_fields(setup_, expected, after, dt, before.alive), "skin_position");
+    const std::vector<FieldError> errors = errors_of_fields(setup_, expected, after, dt, before.alive);
+    skin.norm = error_of(errors, "skin_position");
+    // Where they lie on their edges shows in their places, unless one of the two is not what it says.
+    if (const ErrorNorm& reach = error_of(errors, "reach"); !(reach.max <= skin.norm.max)) skin.norm = reach;
     // Far from where it rests, single precision cannot have what is asked: then what rounding does is.
     for (const VertexPlace& vertex :
          vertex_places(setup_, after, memberships_of(after.clusters, setup_.body.particle_count()))) {

@@ -182,6 +182,7 @@ double error_of_entry(Quantity quantity, const T& expected, const T& actual, Sca
   } else if constexpr (std::is_same_v<T, Mat3>) {
     return angle_between(expected, actual);
   } else if constexpr (std::is_same_v<T, double>) {
+    if (quantity == Quantity::number) return std::abs(actual - expected);
     return expected == actual ? 0 : std::abs(actual - expected) / std::abs(expected);
   } else if constexpr (std::is_same_v<T, uint8_t>) {
     return expected == actual ? 0 : 1;

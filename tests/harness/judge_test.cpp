@@ -505,6 +505,12 @@ std::vector<Wrong> wrong_states() {
          s.skin.position[7].y += 1e-6 * setup.body.grid.spacing;
        },
        {{"skin vertices", 1}}},
+      {"a vertex lies elsewhere on its edge",
+       all,
+       skin,
+       true,
+       [](const cutproof::Setup&, const State&, State& s) { s.skin.reach[0] = 0.4; },
+       {{"skin reach", 1}, {"skin vertices", 1}}},
       {"the skin is turned inside out", all, skin, true, turn_inside_out, {{"skin geometry", 1}, {"skin match", 1}}},
       {"the skin is that of before",
        all,
@@ -578,7 +584,7 @@ TEST(Judge, AcceptsEveryStageOfARightRunAndAsksAsOftenAsItMust) {
         {"well formed", 13},     {"rest frames", 13},    {"rotation", 13},          {"cluster connectivity", 9},
         {"coverage", 9},         {"edge cover", 7},      {"component match", 7},    {"isolation", 7},
         {"merge maximality", 7}, {"skin match", 4},      {"skin surface", 4},       {"skin vertices", 4},
-        {"skin shells", 4},      {"skin geometry", 4}}},
+        {"skin shells", 4},      {"skin geometry", 4},   {"skin reach", 4}}},
       // Every edge is covered from the beginning.
       {kPressed,
        {{step, 3}, {detect, 3}, {split, 1}, {merge, 1}, {skin, 3}},
@@ -590,7 +596,7 @@ TEST(Judge, AcceptsEveryStageOfARightRunAndAsksAsOftenAsItMust) {
         {"coverage", 5},        {"edge cover", 5},       {"component match", 5},
         {"isolation", 5},       {"merge maximality", 4}, {"skin match", 3},
         {"skin surface", 3},    {"skin vertices", 3},    {"skin shells", 3},
-        {"skin geometry", 3}}}};
+        {"skin geometry", 3},   {"skin reach", 3}}}};
   for (const auto& [scene, moments, counts] : expected) {
     const SceneRun& run = run_of(scene);
     std::map<Stage, int> seen;
