@@ -322,7 +322,8 @@ Bodies random_bodies(std::mt19937& random, int count, int64_t frames) {
         const BladePose pose = {{h * draw(random, 0, 8), h * draw(random, 0, 7), h * draw(random, 0, 6)},
                                 {std::cos(turn), std::sin(turn), 0},
                                 {0, 0, 1}};
-        setup.blade_moves.push_back({pose, pose, random() % 4 != 0, 0});
+        const BladePose before = {pose.edge - Vec3{0.3 * h, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+        setup.blade_moves.push_back({before, pose, random() % 4 != 0, 0});
       }
     }
     if (random() % 2 == 0) {  // beside bodies of which nothing is known
