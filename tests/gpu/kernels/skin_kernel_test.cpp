@@ -390,6 +390,36 @@ TEST(GpuSkin, AfterAnyRemovalsIsTheSkinFromScratchWhateverTheSchedule) {
   }
 }
 
+TEST(GpuSkin, KeepsAcrossALoadWhereEarlierCutsLeftItsVertices) {
+  constexpr int kFrames = 4;
+  int kept = 0;  // vertices that no load could make anew
+  for (uint32_t seed = 1; seed <= 12; ++seed) {
+    std::mt19937 random(seed);
+    Bodies bodies = random_bodies(random, draw(random, 1, 4), kFrames);
+    HostLauncher launcher;
+    for (int frame = 0; frame + 1 < kFrames; ++frame) {
+      for (int b = 0; b < static_cast<int>(bodies.setups.size()); ++b) {
+        const std::vector<int32_t> removed = draw_alive(random, bodies, b, 0.1);
+        if (!removed.empty()) remove_now(bodies, b, removed, {});
+      }
+      shake(bodies, random);
+      run_skin(launcher, bodies);
+      next_frame(bodies);
+      const std::vector<State> states = extract_states(bodies.staging, bodies.setups);
+      Bodies loaded = make_bodies(bodies.setups, states);
+      run_skin(launcher, loaded);
+      const std::vector<State> again = extract_states(loaded.staging, loaded.setups);
+      for (std::size_t b = 0; b < states.size(); ++b) {
+        ASSERT_EQ(again[b].skin.owner, states[b].skin.owner) << "seed " << seed << ", frame " << frame;
+        ASSERT_EQ(again[b].skin.reach, states[b].skin.reach) << "seed " << seed << ", frame " << frame;
+        const std::vector<double> uncut = uncut_reaches(bodies.setups[b], states[b].skin);
+        for (std::size_t v = 0; v < uncut.size(); ++v) kept += std::abs(states[b].skin.reach[v] - uncut[v]) > 0.01;
+      }
+    }
+  }
+  EXPECT_GT(kept, 100);
+}
+
 TEST(GpuSkin, ExtractsOnlyTheCellsAroundADeadParticleAndNothingWithoutACut) {
   Body body = block_body(6, 6, 6);
   State state = state_of(body, box_clusters(6, 6, 6, 3));
