@@ -10,10 +10,10 @@
 namespace cutproof {
 
 struct Skin {
-  std::vector<int32_t> owner;                     // [v] the alive particle whose grid edge carries the vertex
-  std::vector<uint8_t> direction;                 // [v] index into kDirections: from the owner to the empty end
-  std::vector<double> reach;                      // [v] how far from its owner it lies on that edge at rest [h], in (0, 1)
-  std::vector<Vec3> position;                     // [v] current position, body frame [m]
+  std::vector<int32_t> owner;      // [v] the alive particle whose grid edge carries the vertex
+  std::vector<uint8_t> direction;  // [v] index into kDirections: from the owner to the empty end
+  std::vector<double> reach;       // [v] how far from its owner it lies on that edge at rest [h], in (0, 1)
+  std::vector<Vec3> position;      // [v] current position, body frame [m]
   std::vector<std::array<int32_t, 3>> triangles;  // [t] vertex indices, counter-clockwise seen from outside
 
   friend bool operator==(const Skin&, const Skin&) = default;

@@ -95,8 +95,7 @@ Skin extract_skin(const StagingBuffers& staging, const Setup& setup, const BodyC
     const auto direction = static_cast<uint8_t>(name % 6);
     const auto& e = kDirections[direction];
     const double reach = staging.vertex_reach[at(index)];
-    const Vec3 rest = setup.body.rest_position(owner) +
-                      (reach * h) * Vec3{double(e[0]), double(e[1]), double(e[2])};
+    const Vec3 rest = setup.body.rest_position(owner) + (reach * h) * Vec3{double(e[0]), double(e[1]), double(e[2])};
     skin.owner.push_back(owner);
     skin.direction.push_back(direction);
     skin.reach.push_back(reach);
