@@ -277,9 +277,11 @@ class PluginBackend final : public Backend {
         throw std::runtime_error(what + ": it leaves '" + one + "' without its one value");
       }
     }
+    const std::vector<double> reaches_before = state.skin.reach;
     take_state(answer.arrays, state);
-    // A guest that knows nothing of reaches leaves as many as it was given.
-    if (state.skin.reach.size() != state.skin.owner.size()) {
+    // A guest built before there were reaches leaves those that it was given, however many vertices it makes. Any other
+    // number of them is for "well formed" to find.
+    if (state.skin.reach.size() != state.skin.owner.size() && same_bits(state.skin.reach, reaches_before)) {
       state.skin.reach = uncut_reaches(setups_[b], state.skin);
     }
     if (state.clusters.offsets.empty()) state.clusters.offsets = {0};

@@ -153,7 +153,8 @@ void find_reaches(const Setup& setup, const Skin& before, const Carrier& carried
       };
       reach = cut_reach(height(0), height(1), setup.skin.alpha);
     } else if (reach == 0) {
-      reach = uncut_reach(setup, owner, direction);
+      const double crossing = body.crossing(owner, direction);
+      reach = crossing > 0 ? crossing : setup.skin.alpha;
     }
     skin.reach.push_back(reach);
   }

@@ -245,12 +245,14 @@ CutGeometry cut_geometry(const Setup& setup, const State& before, const State& a
   geometry.sampling_ideal = std::sqrt(3.0) * std::sqrt(2.0) / 2 / kLinesPerSpacing;
   const NewSkin skin = new_skin(setup, before, after);
   if (skin.vertices.empty() || surface.empty()) return geometry;
-  std::vector<Vec3> points = points_of(skin.triangles, kEdge * h);
-  points.insert(points.end(), skin.vertices.begin(), skin.vertices.end());
+  std::vector<Vec3> points = skin.vertices;
+  const std::vector<Vec3> inner = points_of(skin.triangles, kEdge * h);
+  points.insert(points.end(), inner.begin(), inner.end());
+  const std::vector<double> apart = distances_to(surface, {}, points);
   double squares = 0;
-  for (const double apart : distances_to(surface, {}, skin.vertices)) squares += apart * apart;
+  for (std::size_t v = 0; v < skin.vertices.size(); ++v) squares += apart[v] * apart[v];
   geometry.skin_rms = std::sqrt(squares / static_cast<double>(skin.vertices.size())) / h;
-  geometry.skin_to_ideal = greatest_of(distances_to(surface, {}, points)) / h;
+  geometry.skin_to_ideal = greatest_of(apart) / h;
   if (!ideal.samples.empty()) {
     geometry.ideal_to_skin = greatest_of(distances_to(skin.triangles, skin.vertices, ideal.samples)) / h;
   }

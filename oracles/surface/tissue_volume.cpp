@@ -131,12 +131,16 @@ VolumeRange cell_volume(int pattern, const Reaches& reaches) {
 
 }  // namespace
 
+bool lie_alike(const Skin& skin) {
+  return std::ranges::all_of(skin.reach, [&](double reach) { return reach == skin.reach.front(); });
+}
+
 VolumeRange tissue_volume(const Setup& setup, const Skin& skin, const std::vector<uint8_t>& tissue) {
   const Body& body = setup.body;
   const Grid& grid = body.grid;
-  // Where each vertex lies on its edge. Where all of them lie alike, so are all cells of a pattern.
+  // Where each vertex lies on its edge.
   const double alpha = skin.reach.empty() ? setup.skin.alpha : skin.reach.front();
-  const bool all_alike = std::ranges::all_of(skin.reach, [&](double reach) { return reach == alpha; });
+  const bool all_alike = lie_alike(skin);
   std::vector<double> reach_on(all_alike ? 0 : 6 * static_cast<std::size_t>(body.particle_count()), setup.skin.alpha);
   for (std::size_t v = 0; v < skin.owner.size() && !all_alike; ++v) {
     reach_on[6 * static_cast<std::size_t>(skin.owner[v]) + skin.direction[v]] = skin.reach[v];

@@ -15,6 +15,9 @@ struct VolumeRange {
   }
 };
 
+// Whether all vertices lie equally far from their owners. Then so do those of all cells of a pattern.
+bool lie_alike(const Skin& skin);
+
 // Least and greatest volume under any triangulation of the cells' polygons. `tissue`: [node_count] 1 where an alive
 // particle sits.
 VolumeRange tissue_volume(const Setup& setup, const Skin& skin, const std::vector<uint8_t>& tissue);

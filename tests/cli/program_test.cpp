@@ -130,7 +130,9 @@ TEST_P(OutsideMesh, RunsInEverySceneOfKidneysAndLiversWithRepair) {
 
 INSTANTIATE_TEST_SUITE_P(Organs, OutsideMesh,
                          testing::Values("openhelp_Heart.stl", "openhelp_Kidney_left.stl", "beamadapter_carotids.stl",
-                                         "sksurgery_Tumor.ply", "sofa_liver-smooth.obj", "bp3d_FMA7197_Liver.obj"),
+                                         "sksurgery_Tumor.ply", "sofa_liver-smooth.obj", "bp3d_FMA7197_Liver.obj",
+                                         "bp3d_FMA7205_Left_Kidney.obj", "openhelp_Liver.stl", "sksurgery_liver.ply",
+                                         "sksurgery_intraop_surface.stl"),
                          [](const auto& instance) {
                            std::string name = instance.param;
                            for (char& c : name) c = std::isalnum(static_cast<unsigned char>(c)) ? c : '_';

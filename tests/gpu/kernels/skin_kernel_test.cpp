@@ -282,6 +282,7 @@ void expect_reference_skins(const Bodies& bodies, const std::string& where, cons
     ASSERT_EQ(turned_to_lowest(skin), turned_to_lowest(expected.skin)) << where << ", body " << b;
     double worst = 0;
     for (std::size_t v = 0; v < skin.owner.size(); ++v) {
+      // 16 times what heights over the blade are off by: some roundings of places within 10 h.
       ASSERT_NEAR(skin.reach[v], expected.skin.reach[v], 1e-5) << where << ", body " << b << ", vertex " << v;
       worst = std::max(worst, norm(skin.position[v] - expected.skin.position[v]) / setup.body.grid.spacing);
     }
