@@ -752,6 +752,20 @@ TEST(PluginBackend, IsFoundAndSimplifiedWhereOneStageIsWrong) {
   }
 }
 
+// Who gives a wrong number of reaches is told so. Who gives none, as a plugin built before there were any, is taken to
+// have its vertices where the body says, which is wrong beside a cut that is to be fitted.
+TEST(PluginBackend, IsAskedForTheReachesOfItsVertices) {
+  const property_tests::Campaign short_of_one = dissected(backend_name(PLUGIN_one_stage_plugin, "one reach"), 100);
+  ASSERT_EQ(short_of_one.violations.size(), 1u);
+  EXPECT_EQ(short_of_one.violations.front().verdict.property, "well formed");
+  EXPECT_EQ(short_of_one.violations.front().verdict.stage, Stage::skin);
+  const property_tests::Campaign without = dissected(backend_name(PLUGIN_one_stage_plugin, "all reaches"), 500);
+  ASSERT_EQ(without.violations.size(), 1u);
+  EXPECT_TRUE(without.violations.front().verdict.property.starts_with("skin"))
+      << property_tests::describe(without.violations.front().verdict);
+  EXPECT_GT(without.verdicts, 0);
+}
+
 // Bodies of an odd number of particles are refused: they count as that, and the others are judged.
 TEST(PluginBackend, CountsWhatIsRefused) {
   const property_tests::Campaign campaign = dissected(backend_name(PLUGIN_one_stage_plugin, "refuse"), 120);

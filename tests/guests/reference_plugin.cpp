@@ -6,6 +6,7 @@
 #include <cstring>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -129,9 +130,11 @@ State state_of(const cutproof_state* from) {
   return state;
 }
 
-bool give(const cutproof_host* host, const State& state, cutproof_state* to) {
+// But for the field `kept_back`.
+bool give(const cutproof_host* host, const State& state, cutproof_state* to, std::string_view kept_back) {
   bool had = true;
   for_each_field([&](const Field& field, auto get) {
+    if (field.name == kept_back) return;
     const auto& from = get(state);
     using T = std::remove_cvref_t<decltype(from)>;
     cutproof_array* const array = member(to, field.name);
@@ -282,6 +285,7 @@ void spoil(const std::string& what, int last, const State& before, State& state)
   if (what == "skin" && last == CUTPROOF_SKIN && !state.skin.triangles.empty()) {
     std::swap(state.skin.triangles.back()[0], state.skin.triangles.back()[1]);
   }
+  if (what == "one reach" && last == CUTPROOF_SKIN && !state.skin.reach.empty()) state.skin.reach.pop_back();
 }
 
 int run(const cutproof_host* host, void* self, int first, int last, cutproof_state* given) {
@@ -291,7 +295,7 @@ int run(const cutproof_host* host, void* self, int first, int last, cutproof_sta
   instance->reference->run({static_cast<Stage>(first), static_cast<Stage>(last)});
   State state = instance->reference->snapshot().front();
   spoil(instance->spoiled, last, before, state);
-  return give(host, state, given) ? 0 : 1;
+  return give(host, state, given, instance->spoiled == "all reaches" ? "reach" : "") ? 0 : 1;
 }
 
 int rotations(const cutproof_host*, void* self, const cutproof_array* a, const cutproof_array* previous,
