@@ -120,6 +120,7 @@ export class View {
     this.orbit.home.distance = this.distanceForAll();
     this.orbit.at.distance *= this.orbit.home.distance / was;
     this.orbit.place();
+    this.render();  // at once: a canvas of another size is empty
   }
 
   setQuick(isQuick) {
@@ -142,9 +143,10 @@ export class View {
   draw() {
     if (this.isDue) return;
     this.isDue = true;
+    this.canvas.dataset.drawn = 'due';
     const asked = performance.now();
     requestAnimationFrame(() => {
-      this.render();
+      if (this.isDue) this.render();
       // A machine that needs long for a picture says so by when it comes to the next.
       requestAnimationFrame(() => { if (performance.now() - asked > 3 * kLong) this.isSlow = true; });
     });
@@ -179,7 +181,7 @@ export class View {
       outline.visible = this.plane.isOn;
       this.renderer.render(this.scene, this.camera);
     });
-    document.documentElement.dataset.drawn = this.isQuick ? 'quick' : 'sharp';
+    this.canvas.dataset.drawn = this.isQuick ? 'quick' : 'sharp';
   }
 
   // moments: of each run its arrays; abouts: what the page says of them. Returns the legend, of the first.

@@ -111,13 +111,14 @@ class Browser:
                  "range.dispatchEvent(new Event('input'));", moment)
         self.shown(moment)
 
-    def pixels(self):
-        """Every pixel of the view, as a sum; how many are not of its ground, and how many are marked. Of the sharp
-        picture, which comes after a quick one."""
-        self.until("return document.documentElement.dataset.drawn === 'sharp'")
-        return self.driver.execute_async_script("""
-          const done = arguments[0], canvas = document.getElementById('canvas');
-          requestAnimationFrame(() => {
+    def pixels_of(self, selector):
+        """Of each of these views every pixel, as a sum; how many are not of its ground, and how many are marked. Of
+        the sharp pictures, which come after quick ones, and of all in one moment in which none is due."""
+        end = time.monotonic() + 60
+        while (seen := self.ask("""
+          const all = [...document.querySelectorAll(arguments[0])];
+          if (all.length === 0 || all.some((canvas) => canvas.dataset.drawn !== 'sharp')) return null;
+          return all.map((canvas) => {
             const copy = document.createElement('canvas');
             [copy.width, copy.height] = [canvas.width, canvas.height];
             const pen = copy.getContext('2d');
@@ -129,8 +130,14 @@ class Browser:
               if (all[i] > 150 && all[i] > 1.6 * all[i + 1] && all[i + 2] < 40) ++orange;
               sum = (Math.imul(sum, 31) + all[i] + 7 * all[i + 1] + 13 * all[i + 2]) | 0;
             }
-            done({sum, share: drawn / (all.length / 4), orange});
-          });""")
+            return {sum, share: drawn / (all.length / 4), orange};
+          });""", selector)) is None:
+            assert time.monotonic() < end, f"{selector} is not drawn within 60 s"
+            time.sleep(0.02)
+        return seen
+
+    def pixels(self):
+        return self.pixels_of("#canvas")[0]
 
     def pixels_after(self, action, seen):
         """What is drawn once an action has changed it, which must be none of what was seen before."""

@@ -199,22 +199,13 @@ with Browser(work / "campaign.html") as page:
     # Both states, the witness marked in each, and not elsewhere.
     names = [one.text for one in page.driver.find_elements(By.CSS_SELECTOR, ".pane figcaption")]
     assert names == ["backend plugin:./libsplitter.so", "the reference"], names
-    orange = """const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(() => done(
-        [...document.querySelectorAll('.pane canvas')].map((canvas) => {
-          const copy = document.createElement('canvas'); [copy.width, copy.height] = [canvas.width, canvas.height];
-          const pen = copy.getContext('2d'); pen.drawImage(canvas, 0, 0);
-          const all = pen.getImageData(0, 0, copy.width, copy.height).data; let n = 0;
-          for (let i = 0; i < all.length; i += 4) {
-            if (all[i] > 150 && all[i] > 1.6 * all[i + 1] && all[i + 2] < 40) ++n;
-          }
-          return n; }))));"""
-    marked = page.driver.execute_async_script(orange)
+    marked = [one["orange"] for one in page.pixels_of(".pane canvas")]
     assert len(marked) == 2 and min(marked) > 100, marked
     assert "fails here" in page.text("#witness") and "after split" in page.text("#status")
     page.ask("const r = document.getElementById('scrub'); r.value = 0;"
              "r.dispatchEvent(new Event('input'));")
     page.until("return document.documentElement.dataset.scenery === '0/0'")
-    assert page.driver.execute_async_script(orange) == [0, 0]
+    assert [one["orange"] for one in page.pixels_of(".pane canvas")] == [0, 0]
     assert page.text("#witness") == ""
     page.driver.find_element(By.CSS_SELECTOR, "[data-scenery='0']").click()
     page.until("return document.documentElement.dataset.scenery !== '0/0'")
