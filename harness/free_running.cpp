@@ -1,14 +1,17 @@
 #include "harness/free_running.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <utility>
 
 #include "model/at.h"
 #include "model/rules.h"
 #include "oracles/comparison/stage_comparison.h"
 #include "oracles/oracles.h"
+#include "oracles/shells.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::harness {
@@ -42,9 +45,11 @@ struct Closeness {
 };
 
 // Of a particle's removal, with positions at most `apart` from each other in the two runs [h]. If both ends of an edge
-// go: by how much its longest edge is longer than allowed. If one does: of the edges at it and at its neighbours, and
-// of the sides of these of the plane of the blade where it was lowered last, whatever is nearest to being otherwise.
-Closeness closeness_of(const Setup& setup, const State& state, int32_t particle, double apart, double u) {
+// go: by how much its longest edge is longer than allowed. If one does: of the edges at it and at its neighbours, of
+// the sides of these of the plane of the blade where it was lowered last, and by the nearer end of how much nearer to
+// it one end of these edges is, whatever is nearest to being otherwise.
+Closeness closeness_of(const Setup& setup, const State& state, const State& other_run, int32_t particle, double apart,
+                       double u) {
   // Each end of an edge is off by at most `apart`, so the edge's length by at most twice that.
   const double of_edges = 2 * apart + kDistanceBand * u;
   if (setup.detect.remove == RemovedEnds::both) {
@@ -69,6 +74,29 @@ Closeness closeness_of(const Setup& setup, const State& state, int32_t particle,
     for (const int32_t i : near) {
       const double places = (norm(state.x[at(i)]) + norm(pose->edge)) / h;
       note(dot(state.x[at(i)] - pose->edge, normal) / h, apart + kPlacesBand * u * places);
+    }
+    if (setup.detect.remove != RemovedEnds::nearer) return nearest;
+    std::vector<int32_t> ends = near;
+    for (const int32_t i : near) for_edges(setup, state, i, [&](int32_t other) { ends.push_back(other); });
+    std::map<int32_t, std::array<double, 2>> from_plane;  // in the two runs [h]
+    const auto here = oracles::carried_places(setup, state, ends),
+               there = oracles::carried_places(setup, other_run, ends);
+    double rounding = 0;
+    for (std::size_t k = 0; k < ends.size(); ++k) {
+      from_plane[ends[k]] = {std::abs(dot(here[k].place - pose->edge, normal)) / h,
+                             std::abs(dot(there[k].place - pose->edge, normal)) / h};
+      const double places = (norm(here[k].place) + norm(pose->edge)) / h;
+      rounding = std::max(rounding, (here[k].bound + there[k].bound) / h + kPlacesBand * u * places);
+    }
+    const auto is_negative = [&](int32_t i) { return dot(state.x[at(i)] - pose->edge, normal) < 0; };
+    for (const int32_t i : near) {
+      for_edges(setup, state, i, [&](int32_t other) {
+        if (is_negative(i) == is_negative(other)) return;  // which of them is nearer does not matter
+        const auto &negative = from_plane[is_negative(i) ? i : other],
+                   &positive = from_plane[is_negative(i) ? other : i];
+        const double lead = negative[0] - positive[0], in_other_run = negative[1] - positive[1];
+        note(lead - kNearerBy, std::abs(lead - in_other_run) + 2 * rounding);
+      });
     }
   }
   return nearest;
@@ -121,7 +149,8 @@ void FreeRunning::see(Stage stage, const State& after) {
         for (const int32_t i : expected.removed) present.alive[at(i)] = 1;
         Closeness farthest{0, 0};
         for (const int32_t i : undecided) {
-          const Closeness of = closeness_of(setup_, present, i, frames_.back().position.max, unit_roundoff(after));
+          const Closeness of =
+              closeness_of(setup_, present, after, i, frames_.back().position.max, unit_roundoff(after));
           if (i == undecided.front() || !(of.beyond() <= farthest.beyond())) farthest = of;
         }
         first.margin = farthest.margin;

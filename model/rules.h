@@ -16,7 +16,7 @@ namespace cutproof {
 inline constexpr std::array<std::string_view, 2> kSolverNames = {"implicit", "published"};
 inline constexpr std::array<std::string_view, 2> kAccelerationNames = {"none", "chebyshev"};
 inline constexpr std::array<std::string_view, 4> kCriterionNames = {"none", "distance", "geometric", "strain"};
-inline constexpr std::array<std::string_view, 2> kRemovedEndsNames = {"both", "one"};
+inline constexpr std::array<std::string_view, 3> kRemovedEndsNames = {"both", "one", "nearer"};
 inline constexpr std::array<std::string_view, 4> kMergeRuleNames = {"none", "deterministic", "published",
                                                                     "single_pass"};
 inline constexpr std::array<std::string_view, 3> kExpandRuleNames = {"none", "edge_cover", "published"};

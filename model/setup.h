@@ -15,7 +15,7 @@ namespace cutproof {
 enum class Solver { implicit, published };                             // method.md §3
 enum class Acceleration { none, chebyshev };                           // of the implicit solver, method.md §11
 enum class Criterion { none, distance, geometric, strain };            // method.md §4; none: nothing is ever removed
-enum class RemovedEnds { both, one };                                  // of an edge that is too long, method.md §4
+enum class RemovedEnds { both, one, nearer };                          // of an edge that is too long, method.md §4
 enum class MergeRule { none, deterministic, published, single_pass };  // method.md §6
 enum class ExpandRule { none, edge_cover, published };                 // method.md §7
 
@@ -39,6 +39,11 @@ struct DetectParameters {
   bool without_blade = false;              // false: a scene without a blade launches no detection
   friend bool operator==(const DetectParameters&, const DetectParameters&) = default;
 };
+
+// With RemovedEnds::nearer the end on the positive side goes if it is nearer to the blade's plane by more than this
+// [h]: where both are equally near, which is where blades are set between two layers, the negative side goes as a
+// whole.
+inline constexpr double kNearerBy = 0.125;
 
 // Nothing is ever removed: with what that leaves without a meaning as it is by default.
 inline void remove_nothing(DetectParameters& detect) {

@@ -188,7 +188,7 @@ void check_detection(const StageRun& run, Verdict& verdict) {
   const Swept swept(setup, criterion == Criterion::geometric ? before.frame : setup.frame_count());
   const std::vector<StrainDemand> strained =
       criterion == Criterion::strain ? demands_of_strain(setup, before) : std::vector<StrainDemand>{};
-  const bool one_end = criterion == Criterion::distance && setup.detect.remove == RemovedEnds::one;
+  const bool one_end = criterion == Criterion::distance && setup.detect.remove != RemovedEnds::both;
   std::vector<int32_t> gone;
   std::vector<uint8_t> is_gone(before.alive.size(), 0);
   for (int32_t i = 0; i < graph.particle_count(); ++i) {

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "oracles/shape_sums.h"
+#include "oracles/shells.h"
 
 namespace cutproof::oracles {
 namespace {
@@ -45,7 +46,7 @@ OneEndOfEach::OneEndOfEach(const Setup& setup, const TissueGraph& graph, const S
       const Demand open = openness(setup.body, before.x, i, j, setup.detect.epsilon, u);
       if (open == Demand::keep) continue;
       for (const int32_t end : {i, j}) edges_at_[at(end)].push_back(static_cast<int32_t>(edges_.size()));
-      edges_.push_back({i, j, open == Demand::either ? bits_++ : -1});
+      edges_.push_back({.low = i, .high = j, .bit = open == Demand::either ? bits_++ : -1});
     }
   }
   const BladePose* const pose = last_lowered(setup, before.frame);
@@ -57,6 +58,39 @@ OneEndOfEach::OneEndOfEach(const Setup& setup, const TissueGraph& graph, const S
     const double band = kPlacesBand * u * (norm(before.x[at(i)]) + norm(pose->edge));
     if (std::abs(n) <= band) side_bit_[at(i)] = bits_++;
     negative_[at(i)] = n < 0;
+  }
+  if (has_lowered_blade_ && setup.detect.remove == RemovedEnds::nearer) find_nearer_ends(*pose);
+}
+
+void OneEndOfEach::find_nearer_ends(const BladePose& pose) {
+  std::vector<int32_t> ends;
+  std::vector<std::size_t> place_of(before_.alive.size());
+  for (std::size_t i = 0; i < edges_at_.size(); ++i) {
+    if (edges_at_[i].empty()) continue;
+    place_of[i] = ends.size();
+    ends.push_back(static_cast<int32_t>(i));
+  }
+  const std::vector<VertexPlace> places = carried_places(setup_, before_, ends);
+  const double u = unit_roundoff(before_), h = setup_.body.grid.spacing;
+  struct Height {
+    double distance, bound;
+  };
+  const auto height = [&](int32_t i) -> Height {
+    const auto& [place, bound] = places[place_of[at(i)]];
+    return {std::abs(to_local(pose, place - pose.edge).n), bound + kPlacesBand * u * (norm(place) + norm(pose.edge))};
+  };
+  for (Edge& edge : edges_) {
+    for (const std::size_t k : {0u, 1u}) {
+      // Only if rounding leaves it open may it be the one as well as the other.
+      const int32_t negative = k == 0 ? edge.low : edge.high, positive = k == 0 ? edge.high : edge.low;
+      const bool may_be = (side_bit_[at(negative)] >= 0 || negative_[at(negative)] != 0) &&
+                          (side_bit_[at(positive)] >= 0 || negative_[at(positive)] == 0);
+      if (!may_be) continue;
+      const Height here = height(negative), there = height(positive);
+      const double lead = here.distance - there.distance - kNearerBy * h;
+      edge.positive_goes[k] = lead > 0;
+      if (!(std::abs(lead) > here.bound + there.bound + 4 * u * h)) edge.positive_bit[k] = bits_++;
+    }
   }
 }
 
@@ -74,7 +108,7 @@ const OneEndOfEach::Edge* OneEndOfEach::edge_that_removes(int32_t i, const Value
     const int32_t j = other_end(edge, i);
     const bool negative = is_negative(i, value);
     if (has_lowered_blade_ && negative != is_negative(j, value)) {
-      if (negative) return &edge;
+      if (goes_by_side(edge, i, negative, value)) return &edge;
       continue;
     }
     const int here = open_at(i, value), there = open_at(j, value);
@@ -84,12 +118,13 @@ const OneEndOfEach::Edge* OneEndOfEach::edge_that_removes(int32_t i, const Value
 }
 
 // All that rounding decides and the particle's fate depends on: which of its edges are open, on which side their ends
-// are, and how many open edges the other ends have.
+// are and which is nearer to the blade, and how many open edges the other ends have.
 std::vector<int32_t> OneEndOfEach::bits_of(int32_t i) const {
   std::vector<int32_t> bits = {side_bit_[at(i)]};
   for (const int32_t e : edges_at_[at(i)]) {
     const int32_t j = other_end(edges_[at(e)], i);
     bits.push_back(side_bit_[at(j)]);
+    for (const int32_t bit : edges_[at(e)].positive_bit) bits.push_back(bit);
     for (const int32_t beyond : edges_at_[at(j)]) bits.push_back(edges_[at(beyond)].bit);
   }
   std::sort(bits.begin(), bits.end());
@@ -108,13 +143,15 @@ Demand OneEndOfEach::bluntly(int32_t i) const {
   for (const int32_t e : edges_at_[at(i)]) {
     const Edge& edge = edges_[at(e)];
     const int32_t j = other_end(edge, i);
-    const bool sides_known = !has_lowered_blade_ || (!undecided_side(i) && !undecided_side(j));
+    const bool nearer_known = edge.positive_bit[0] < 0 && edge.positive_bit[1] < 0;
+    const bool sides_known = !has_lowered_blade_ || (!undecided_side(i) && !undecided_side(j) && nearer_known);
     const bool between = has_lowered_blade_ && is_negative(i, surely) != is_negative(j, surely);
     const int least_there = open_at(j, surely), most_there = open_at(j, perhaps);
     const bool must_by_count = least_here > most_there || (least_here >= most_there && i < j);
     const bool may_by_count = most_here > least_there || (most_here >= least_there && i < j);
-    const bool must = sides_known && (between ? is_negative(i, surely) : must_by_count);
-    const bool may = !sides_known || (between ? is_negative(i, surely) : may_by_count);
+    const bool by_side = goes_by_side(edge, i, is_negative(i, surely), surely);
+    const bool must = sides_known && (between ? by_side : must_by_count);
+    const bool may = !sides_known || (between ? by_side : may_by_count);
     if (must && edge.bit < 0) return Demand::remove;
     if (may) demand = Demand::either;
   }
@@ -149,8 +186,9 @@ void OneEndOfEach::reject(int32_t i, bool gone, Verdict& verdict) const {
     const double length = norm(before_.x[at(i)] - before_.x[at(other)]) / setup_.body.grid.spacing;
     particles.push_back(other);
     why = has_lowered_blade_ && is_negative(i, never) != is_negative(other, never)
-              ? fmt::format("of its edge to particle {}, {:.17g} h long, it is the end on the blade's negative side",
-                            other, length)
+              ? fmt::format("of its edge to particle {}, {:.17g} h long, it is the end {}", other, length,
+                            is_negative(i, never) ? "on the blade's negative side"
+                                                  : "that its clusters carry nearer to the blade")
               : fmt::format(
                     "its edge to particle {} is {:.17g} h long, and of its edges {} are too long, of the other's {}",
                     other, length, open_at(i, never), open_at(other, never));

@@ -1,6 +1,7 @@
 // Edges that the criterion `distance` finds too long, and which of their ends go where one is enough (method.md §4).
 // Internal to oracles/.
 #pragma once
+#include <array>
 #include <vector>
 
 #include "oracles/blade_motion.h"
@@ -18,8 +19,9 @@ constexpr double kPlacesBand = 32;
 // it is not, however a backend of unit roundoff u computes it.
 Demand openness(const Body& body, const std::vector<Vec3>& x, int32_t i, int32_t j, double epsilon, double u);
 
-// Detection with `detect.remove` = `one`. Each particle's fate follows from whether edges near it are open, and from
-// which side of the blade's plane their ends are on. Where rounding leaves some of that open, one choice of all of it
+// Detection with `detect.remove` = `one` or `nearer`. Each particle's fate follows from whether edges near it are open,
+// from which side of the blade's plane their ends are on, and with `nearer` from which end the clusters carry nearer to
+// it. Where rounding leaves some of that open, one choice of all of it
 // must explain all particles that hang on it. Where that is too much to try, each particle must be explained by some
 // choice of its own; and where even that is, it must stay if no choice takes it, and go if every one does, as far as
 // bounds of its count of open edges tell. Whoever may do both then counts as undecided.
@@ -33,6 +35,10 @@ class OneEndOfEach {
   struct Edge {
     int32_t low, high;
     int32_t bit;  // whether it is open, if rounding decides; -1: it is
+    // If the blade's plane is between the ends, of which `low` or (second) `high` is on its negative side: whether the
+    // other one goes, which is nearer to it; and its bit, if rounding decides.
+    std::array<uint8_t, 2> positive_goes = {0, 0};
+    std::array<int32_t, 2> positive_bit = {-1, -1};
   };
   int32_t other_end(const Edge& edge, int32_t i) const { return edge.low == i ? edge.high : edge.low; }
   template <class Value>
@@ -42,6 +48,13 @@ class OneEndOfEach {
   template <class Value>
   bool is_negative(int32_t i, const Value& value) const {
     return side_bit_[at(i)] < 0 ? negative_[at(i)] != 0 : value(side_bit_[at(i)]);
+  }
+  // Of an edge with the plane between its ends, of which i is on the negative side or on the positive: whether i goes.
+  template <class Value>
+  bool goes_by_side(const Edge& edge, int32_t i, bool negative, const Value& value) const {
+    const std::size_t k = (edge.low == i) == negative ? 0 : 1;
+    const bool positive = edge.positive_bit[k] < 0 ? edge.positive_goes[k] != 0 : value(edge.positive_bit[k]);
+    return negative != positive;
   }
   template <class Value>
   int open_at(int32_t i, const Value& value) const;
@@ -55,6 +68,8 @@ class OneEndOfEach {
   // `keep` or `remove` only if that is so in all values of the bits.
   Demand bluntly(int32_t i) const;
   void reject(int32_t i, bool gone, Verdict& verdict) const;
+  // Of the edges, which end is nearer to the blade.
+  void find_nearer_ends(const BladePose& pose);
 
   const Setup& setup_;
   const State& before_;

@@ -130,4 +130,23 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
   return places;
 }
 
+std::vector<VertexPlace> carried_places(const Setup& setup, const State& state, const std::vector<int32_t>& particles) {
+  const Memberships memberships = memberships_of(state.clusters, setup.body.particle_count());
+  State asked = state;
+  asked.skin = {};
+  for (const int32_t i : particles) {
+    if (memberships.of(i).empty()) continue;
+    asked.skin.owner.push_back(i);
+    asked.skin.direction.push_back(0);
+    asked.skin.reach.push_back(0);
+  }
+  const std::vector<VertexPlace> carried = vertex_places(setup, asked, memberships);
+  std::vector<VertexPlace> places;
+  auto next = carried.begin();
+  for (const int32_t i : particles) {
+    places.push_back(memberships.of(i).empty() ? VertexPlace{state.x[at(i)], 0} : *next++);
+  }
+  return places;
+}
+
 }  // namespace cutproof::oracles

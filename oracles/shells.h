@@ -32,6 +32,8 @@ struct VertexPlace {
   double bound = 0;
 };
 std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, const Memberships& memberships);
+// The same of particles, each where it rests itself; without a cluster where it is.
+std::vector<VertexPlace> carried_places(const Setup& setup, const State& state, const std::vector<int32_t>& particles);
 
 struct ShellCount {
   int32_t outer = 0, inner = 0;

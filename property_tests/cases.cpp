@@ -592,7 +592,7 @@ Case draw_moving_case(uint64_t seed, int size) {
   c.ground = random.chance(0.5);
   c.acceleration = random.chance(0.5) ? Acceleration::chebyshev : Acceleration::none;
   draw_dynamics(random, c);
-  c.remove = random.chance(0.4) ? RemovedEnds::one : RemovedEnds::both;
+  if (random.chance(0.4)) c.remove = random.chance(0.5) ? RemovedEnds::nearer : RemovedEnds::one;
   return c;
 }
 

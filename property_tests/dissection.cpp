@@ -89,6 +89,7 @@ void note_what_was_removed(const Setup& setup, CaseCoverage& seen) {
     seen["cut at another epsilon"] = true;
   }
   if (detect.remove == RemovedEnds::one) seen["one end of each edge"] = true;
+  if (detect.remove == RemovedEnds::nearer) seen["nearer end of each edge"] = true;
   if (detect.criterion == Criterion::strain) seen["cut by strain"] = true;
   if (detect.criterion == Criterion::geometric && setup.step.iterations > 0) seen["geometric cut of what moves"] = true;
 }

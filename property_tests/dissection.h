@@ -68,6 +68,7 @@ inline constexpr std::array kCoverageClasses = {
     // Something was removed.
     CoverageClass{"cut at another epsilon", Occurs::where_bodies_move},
     CoverageClass{"one end of each edge", Occurs::where_bodies_move},
+    CoverageClass{"nearer end of each edge", Occurs::where_bodies_move},
     CoverageClass{"cut by strain", Occurs::where_bodies_move},
     CoverageClass{"geometric cut of what moves", Occurs::where_bodies_move},
     // Touches (touching.h).

@@ -332,7 +332,7 @@ TEST_P(HardCases, ABladeFasterThanASpacingInASubstepTunnelsThroughNothing) {
     stroke.along = Vec3{0, 1, 0};
     blade.strokes = {stroke};
     scene.blade = blade;
-    for (const RemovedEnds remove : {RemovedEnds::both, RemovedEnds::one}) {
+    for (const RemovedEnds remove : {RemovedEnds::both, RemovedEnds::one, RemovedEnds::nearer}) {
       scene.detect.remove = remove;
       const fixtures::Built built = fixtures::build(scene, "hard_cases");
       ASSERT_EQ(built.setup.body.particle_count(), 9 * 4 * 4);

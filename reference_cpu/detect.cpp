@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "model/at.h"
+#include "reference_cpu/carrier.h"
 #include "reference_cpu/lowered_blade.h"
 #include "reference_cpu/reference.h"
 
@@ -44,12 +46,18 @@ std::vector<uint8_t> both_ends(const std::vector<OpenEdge>& open, std::size_t pa
   return found;
 }
 
-// The end on the blade's negative side, if its plane lies between them; otherwise the one with more open edges; of
-// equals the one with the lower number.
+// The end on the blade's negative side, if its plane lies between them, or by RemovedEnds::nearer the other one, if its
+// clusters carry it nearer to the plane by more than kNearerBy; otherwise the one with more open edges; of equals the
+// one with the lower number.
 std::vector<uint8_t> one_end_of_each(const Setup& setup, const State& state, const std::vector<OpenEdge>& open) {
   const BladePose* blade = lowered_blade(setup, state.frame);
-  const auto is_negative = [&](int32_t i) {
-    return dot(state.x[at(i)] - blade->edge, cross(blade->along, blade->back)) < 0;
+  const auto height = [&](Vec3 x) { return dot(x - blade->edge, cross(blade->along, blade->back)); };
+  const auto is_negative = [&](int32_t i) { return height(state.x[at(i)]) < 0; };
+  std::optional<Carrier> carried;
+  if (blade != nullptr && setup.detect.remove == RemovedEnds::nearer) carried.emplace(setup, state);
+  const auto negative_goes = [&](int32_t negative, int32_t positive) {
+    const double slack = kNearerBy * setup.body.grid.spacing;
+    return !carried || std::abs(height((*carried)(negative))) <= std::abs(height((*carried)(positive))) + slack;
   };
   std::vector<int> open_at(state.alive.size(), 0);
   for (const OpenEdge edge : open) {
@@ -59,7 +67,9 @@ std::vector<uint8_t> one_end_of_each(const Setup& setup, const State& state, con
   std::vector<uint8_t> found(state.alive.size(), 0);
   for (const auto [low, high] : open) {
     bool low_goes = open_at[at(low)] >= open_at[at(high)];
-    if (blade != nullptr && is_negative(low) != is_negative(high)) low_goes = is_negative(low);
+    if (blade != nullptr && is_negative(low) != is_negative(high)) {
+      low_goes = is_negative(low) ? negative_goes(low, high) : !negative_goes(high, low);
+    }
     found[at(low_goes ? low : high)] = 1;
   }
   return found;
@@ -71,6 +81,7 @@ std::vector<uint8_t> too_far_apart(const Setup& setup, const State& state) {
     case RemovedEnds::both:
       return both_ends(open, state.alive.size());
     case RemovedEnds::one:
+    case RemovedEnds::nearer:
       return one_end_of_each(setup, state, open);
   }
   return {};

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "model/at.h"
+#include "reference_cpu/carrier.h"
 #include "reference_cpu/lowered_blade.h"
 #include "reference_cpu/reference.h"
 #include "reference_cpu/skin_cases.h"
@@ -62,53 +63,6 @@ void extract(const Body& body, const std::vector<uint8_t>& alive, Skin& skin) {
 }
 
 // --- Positions --------------------------------------------------------------------------------------------------
-
-// t_c: where the weighted centre of each cluster is now, with the weights w_ic = m_i / n_i.
-std::vector<Vec3> current_centers(const Body& body, const State& state, const Memberships& memberships) {
-  std::vector<Vec3> centers(static_cast<std::size_t>(state.clusters.count()));
-  for (int32_t c = 0; c < state.clusters.count(); ++c) {
-    double mass = 0;
-    Vec3 moment;
-    for (const int32_t i : state.clusters.of(c)) {
-      const double weight = body.mass[static_cast<std::size_t>(i)] / static_cast<double>(memberships.count(i));
-      mass += weight;
-      moment += weight * state.x[static_cast<std::size_t>(i)];
-    }
-    centers[static_cast<std::size_t>(c)] = moment / mass;
-  }
-  return centers;
-}
-
-// Where the clusters of a particle carry what rests on one of its grid edges.
-class Carrier {
- public:
-  Carrier(const Setup& setup, const State& state)
-      : body_(setup.body),
-        state_(state),
-        memberships_(memberships_of(state.clusters, setup.body.particle_count())),
-        centers_(current_centers(setup.body, state, memberships_)) {}
-
-  Vec3 operator()(int32_t owner, int direction, double reach) const {
-    const double far = reach * body_.grid.spacing;
-    const auto& e = kDirections[at(direction)];
-    const Vec3 offset = {far * e[0], far * e[1], far * e[2]};
-    const Vec3 rest = body_.rest_position(owner) + offset;
-    Vec3 sum;
-    for (const int32_t cluster : memberships_.of(owner)) {
-      const auto c = static_cast<std::size_t>(cluster);
-      sum += centers_[c] + state_.clusters.rotation[c] * (rest - state_.clusters.rest_center[c]);
-    }
-    // An owner without a cluster breaks I2. Its vertex then goes with the particle, unrotated.
-    const auto count = memberships_.count(owner);
-    return count > 0 ? sum / static_cast<double>(count) : state_.x[static_cast<std::size_t>(owner)] + offset;
-  }
-
- private:
-  const Body& body_;
-  const State& state_;
-  Memberships memberships_;
-  std::vector<Vec3> centers_;
-};
 
 // How far from its owner a vertex lies that a cut brings about, as a fraction of h, given how far from the plane of the
 // blade the owner's clusters carry the two ends of its grid edge [h, with signs]: where the edge crosses that plane;

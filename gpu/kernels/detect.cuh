@@ -6,12 +6,15 @@
 //   plus a difference of displacements, so where the body is does not matter: u for the difference, u for the sum, 1.5
 //   u for the squares and their sum, and u each for h, epsilon, their product and its square. Where one end of
 //   each edge goes, a fate may also come out either way where that holds of an edge of a neighbour, or where an end is
-//   as near to the plane of the blade as places are rounded (as for geometric).
+//   as near to the plane of the blade as places are rounded (as for geometric), or, by the nearer end, where how far
+//   the clusters carry both ends from it differs from the limit by no more than both are rounded: as skin vertices,
+//   and as places.
 // - geometric: distances to the blade are between places in the body, so they carry 10 u |x| + 8 u |edge|: u each for
 //   h, X, X + d and the stored edge, and for x - edge the difference, the stored axes and the products with them. Ties
 //   go to removal, so the reach is longer by swept_slack(), which is more than that: what is within the reach always
 //   goes, and what is farther by up to twice the slack may go.
 #pragma once
+#include "gpu/kernels/carried.cuh"
 #include "gpu/kernels/lowered_plane.cuh"
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/plan.h"
@@ -75,6 +78,27 @@ CUTPROOF_DEVICE inline bool is_negative(const DeviceView& w, const BodyConstants
   return height_over(plane, rest_position(body, w.node[p]) + xyz(w.displacement[p])) < 0;
 }
 
+// Whether the choice between the two sides of the blade hangs on where clusters carry particles.
+CUTPROOF_DEVICE inline bool asks_clusters(const DeviceView& w, int b) {
+  const BodyConstants& body = w.body[b];
+  return body.criterion == Criterion::distance && body.remove == RemovedEnds::nearer && detects(w, b) &&
+         lowered_plane(w, body, b).exists;
+}
+
+// How far the clusters carry a particle from the plane.
+CUTPROOF_DEVICE inline float carried_from(const DeviceView& w, const BodyConstants& body, const Plane& plane, int p) {
+  return fabsf(height_over(plane, rest_position(body, w.node[p]) + carried(w, body, p, {0, 0, 0})));
+}
+
+// Of an edge with ends on both sides of the plane: whether that on its negative side goes. Both ends ask with the same
+// numbers.
+CUTPROOF_DEVICE inline bool negative_goes(const DeviceView& w, const BodyConstants& body, const Plane& plane,
+                                          int negative, int positive) {
+  if (body.remove != RemovedEnds::nearer) return true;
+  const float limit = static_cast<float>(kNearerBy) * body.h;
+  return carried_from(w, body, plane, negative) <= carried_from(w, body, plane, positive) + limit;
+}
+
 // What becomes of a particle that has an edge longer than the root of `limit`.
 CUTPROOF_DEVICE inline unsigned char flag_of_open(const DeviceView& w, const BodyConstants& body, int b, int p,
                                                   float limit) {
@@ -87,7 +111,7 @@ CUTPROOF_DEVICE inline unsigned char flag_of_open(const DeviceView& w, const Bod
     if (!(squared > limit)) return;
     ++open.count;
     if (plane.exists && is_negative(w, body, plane, q) != negative) {
-      goes = goes || negative;
+      goes = goes || negative_goes(w, body, plane, negative ? p : q, negative ? q : p) == negative;
     } else {
       open.contested |= 1u << direction;
     }
@@ -426,6 +450,18 @@ CUTPROOF_DEVICE void flag_strained_clusters_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(flag_strained_clusters_kernel);
 
+// DeviceView::center, of the bodies in which the nearer end of an edge goes.
+template <class Block>
+CUTPROOF_DEVICE void recenter_asked_clusters_kernel(Block& block, DeviceView w) {
+  using namespace detect_detail;
+  const Team<Block, kCenterTeam> team(block);
+  for (int64_t i = team.first(); i < w.counters->slots_used; i += team.stride()) {
+    const int s = static_cast<int>(i);
+    if (w.slot_size[s] > 0 && asks_clusters(w, w.slot_body[s])) recenter(w, team, s);
+  }
+}
+CUTPROOF_KERNEL(recenter_asked_clusters_kernel);
+
 // Judges the particles of every body, but those of geometric cuts.
 template <class Block>
 CUTPROOF_DEVICE void flag_particles_kernel(Block& block, DeviceView w) {
@@ -505,6 +541,7 @@ template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_detect(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   using namespace detect_detail;
   if (plan.strain) launcher.teams(flag_strained_clusters_kernel_object{}, kStrainTeam, w.slots_expected, w);
+  if (plan.nearer) launcher.teams(recenter_asked_clusters_kernel_object{}, kCenterTeam, w.slots_expected, w);
   launcher.items(flag_particles_kernel_object{}, w.particles, w);
   if (plan.geometric) launcher.items(flag_swept_particles_kernel_object{}, w.particles, w);
   launcher.items(remove_particles_kernel_object{}, w.particles, w);

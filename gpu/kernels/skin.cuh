@@ -6,6 +6,7 @@
 // corners keep their triangles as they are. What there is to do hangs on the particles that have changed, so they are
 // listed first, ascending; places of vertices and cells are given out in their order.
 #pragma once
+#include "gpu/kernels/carried.cuh"
 #include "gpu/kernels/float3.h"
 #include "gpu/kernels/lowered_plane.cuh"
 #include "gpu/kernels/skin_table.h"
@@ -20,8 +21,6 @@ namespace skin_detail {
 
 // Use of Counters::scratch.
 enum : int { kVertexBase = 0, kCellBase = 1, kSound = 2 };
-
-inline constexpr int kClusterTeam = 32;  // lanes that find where a cluster is
 
 CUTPROOF_DEVICE inline bool skinned(const DeviceView& w, int b) { return running(w, b) && w.body[b].skin_wanted; }
 CUTPROOF_DEVICE inline bool extracts(const DeviceView& w, int b) {
@@ -302,40 +301,15 @@ CUTPROOF_ENQUEUE void enqueue_skin_cells(Launcher& launcher, const DeviceView& w
 
 // ---- Positions
 
-// DeviceView::center from the final displacements, of the clusters that a vertex hangs on: deep in the tissue nobody
-// asks.
+// DeviceView::center of the clusters that a vertex hangs on: deep in the tissue nobody asks.
 template <class Block>
 CUTPROOF_DEVICE void recenter_clusters_kernel(Block& block, const DeviceView& w) {
   using namespace skin_detail;
-  const Team<Block, kClusterTeam> team(block);
+  const Team<Block, kCenterTeam> team(block);
   for (int64_t i = team.first(); i < w.counters->slots_used; i += team.stride()) {
     const int s = static_cast<int>(i);
-    const int size = w.slot_size[s], b = w.slot_body[s];
-    if (size == 0 || !skinned(w, b) || w.under_skin[s] == 0) continue;
-    const int* const members = w.members + w.slot_begin[s];
-    const Float3 base = xyz(w.displacement[members[0]]);
-    // Σ w (d - base), Σ w (X - T), which is zero but for the rounding of T, and Σ w.
-    typename Team<Block, kClusterTeam>::template Sums<7> sums;
-    team.each(size, [&](int k) {
-      const int p = members[k];
-      const Float4 now = w.displacement[p];
-      const float weight = now.w / static_cast<float>(w.membership_count[p]);
-      const Float3 moved = weight * (xyz(now) - base), rest = weight * from_rest_center(w, w.body[b], p, s);
-      float* const sum = sums.of(k);
-      sum[0] += moved.x;
-      sum[1] += moved.y;
-      sum[2] += moved.z;
-      sum[3] += rest.x;
-      sum[4] += rest.y;
-      sum[5] += rest.z;
-      sum[6] += weight;
-    });
-    const auto total = team.total(sums);
-    if (!team.leads()) continue;
-    const Float3 moved = {total.v[0], total.v[1], total.v[2]}, rest = {total.v[3], total.v[4], total.v[5]};
-    // The rounded T must not move the cluster (docs/design/decisions.md, Momentum and the rounding of sums).
-    const Float3 turned = w.rotation[s] * rest - rest;
-    w.center[s] = base + (1.0f / total.v[6]) * (moved - turned);
+    if (w.slot_size[s] == 0 || !skinned(w, w.slot_body[s]) || w.under_skin[s] == 0) continue;
+    recenter(w, team, s);
   }
 }
 CUTPROOF_KERNEL(recenter_clusters_kernel);
@@ -346,25 +320,6 @@ namespace skin_detail {
 CUTPROOF_DEVICE inline Float3 arm_of(const BodyConstants& body, int direction, float reach) {
   const float far = (direction % 2 == 0 ? reach : -reach) * body.h;
   return {direction / 2 == 0 ? far : 0.0f, direction / 2 == 1 ? far : 0.0f, direction / 2 == 2 ? far : 0.0f};
-}
-
-// The mean over p's clusters of (t - T) + (R - I)(X - T) for what rests at X = X_p + arm, as displacement from X.
-// Without a cluster that of p.
-CUTPROOF_DEVICE inline Float3 carried(const DeviceView& w, const BodyConstants& body, int p, Float3 arm) {
-  // Relative to where the first cluster puts it, so that summing costs no digits of d. (Not to the owner: where a
-  // blade has pushed it away, that is far from what all of them say.)
-  Float3 base = xyz(w.displacement[p]), sum;
-  int clusters = 0;
-  for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
-    const int s = w.memberships[k];
-    if (s < 0) continue;
-    const Float3 r = from_rest_center(w, body, p, s) + arm;
-    const Float3 center = w.center[s], turned = w.rotation[s] * r - r;
-    if (clusters == 0) base = center + turned;
-    sum = sum + ((center - base) + turned);
-    ++clusters;
-  }
-  return clusters > 0 ? base + (1.0f / static_cast<float>(clusters)) * sum : base;
 }
 
 // How far from its owner a vertex lies that a cut brings about, given how far from the plane of the blade the two ends
@@ -412,14 +367,14 @@ CUTPROOF_DEVICE void place_vertices_kernel(Block& block, const DeviceView& w) {
       reach = skin_detail::reach_by_blade(w, body, b, p, direction);
       w.vertex_reach[v] = reach;
     }
-    w.vertex_position[v] = with_w(skin_detail::carried(w, body, p, skin_detail::arm_of(body, direction, reach)), 0.0f);
+    w.vertex_position[v] = with_w(carried(w, body, p, skin_detail::arm_of(body, direction, reach)), 0.0f);
   }
 }
 CUTPROOF_KERNEL(place_vertices_kernel);
 
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_skin_positions(Launcher& launcher, const DeviceView& w, const Plan&) {
-  launcher.teams(recenter_clusters_kernel_object{}, skin_detail::kClusterTeam, w.slots_expected, w);
+  launcher.teams(recenter_clusters_kernel_object{}, kCenterTeam, w.slots_expected, w);
   launcher.items(place_vertices_kernel_object{}, w.vertex_capacity, w);
 }
 

@@ -21,6 +21,7 @@ Plan make_plan(const std::vector<Setup>& setups, const std::vector<State>& state
     const bool detection = needs_detection(setup);
     plan.detection = plan.detection || detection;
     plan.distance = plan.distance || (detection && setup.detect.criterion == Criterion::distance);
+    plan.nearer = plan.nearer || (detection && setup.detect.remove == RemovedEnds::nearer && setup.has_blade);
     plan.geometric = plan.geometric || (detection && setup.detect.criterion == Criterion::geometric);
     plan.strain = plan.strain || (detection && setup.detect.criterion == Criterion::strain);
     plan.debris = plan.debris || setup.split.debris > 0;

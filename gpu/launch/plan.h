@@ -17,6 +17,7 @@ struct Plan {
   bool accelerated = false;                                  // some body's iterations are
   bool detection = false;                                    // some body launches detect
   bool distance = false, geometric = false, strain = false;  // criteria in use
+  bool nearer = false;  // by distance, of some edge the end nearer to the blade goes
   bool debris = false;
   bool merge = false;  // some body merges
   bool published_merge = false, deterministic_merge = false, single_pass_merge = false;

@@ -168,6 +168,47 @@ TEST(DetectionOfOneEnd, AcceptsOnlyTheEndOnTheBladesNegativeSide) {
   }
 }
 
+// The same row, one cluster that is not turned, carries its particles h from each other, wherever they are themselves.
+// Of the edge from 2 to 3, across which the blade stands, the negative end goes until the other is nearer by h/8.
+TEST(DetectionOfNearerEnd, AcceptsOnlyTheNegativeEndUntilTheOtherIsNearerByAnEighth) {
+  Pair pair = pulled(1.6);
+  pair.setup.detect.remove = RemovedEnds::nearer;
+  pair.setup.has_blade = true;
+  pair.setup.blade = {1, 1, 0, 0};
+  double middle = 0;  // of 2 and 3, as they are carried
+  for (const int32_t i : {0, 1, 2, 3}) {
+    middle += (pair.before.x[at(i)].x - pair.setup.body.rest_position(i).x) / 4;
+    if (i >= 2) middle += pair.setup.body.rest_position(i).x / 2;
+  }
+  ASSERT_GT(std::abs(middle - (pair.before.x[2].x + pair.before.x[3].x) / 2), 0.1) << "not where the ends are";
+  const auto removes = [&](double x, double along, int32_t end, Precision precision = Precision::binary64) {
+    const BladePose pose = {{x, 1, 1}, {0, along, 0}, {0, 0, 1}};
+    Pair at_blade = pair;
+    at_blade.setup.blade_moves.assign(at(pair.setup.step.substeps), BladeMove{pose, pose, true, 0});
+    at_blade.before.precision = at_blade.after.precision = precision;
+    return accepts(at_blade, {end});
+  };
+  for (const double along : {1.0, -1.0}) {
+    const int32_t negative = along > 0 ? 2 : 3, positive = 5 - negative;
+    const double limit = middle + along * kNearerBy / 2;
+    for (const double nearer : {-0.2, -1e-12, 1e-12, 0.2}) {
+      const int32_t right = nearer > 0 ? positive : negative;
+      EXPECT_TRUE(removes(limit + along * nearer, along, right)) << along << ' ' << nearer;
+      EXPECT_FALSE(removes(limit + along * nearer, along, 5 - right)) << along << ' ' << nearer;
+    }
+    // What rounding leaves open: either.
+    for (const int32_t end : {2, 3}) {
+      EXPECT_TRUE(removes(limit, along, end)) << along;
+      EXPECT_TRUE(removes(limit + 1e-7, along, end, Precision::binary32)) << along;
+      EXPECT_EQ(removes(limit + along * 1e-4, along, end, Precision::binary32), end == positive) << along;
+    }
+  }
+  // With `one` the negative end goes wherever between them the blade stands.
+  pair.setup.detect.remove = RemovedEnds::one;
+  EXPECT_TRUE(removes(middle + 0.3, 1, 2));
+  EXPECT_FALSE(removes(middle + 0.3, 1, 3));
+}
+
 // Two edges at particle 2, both at the limit to rounding: their four choices give {}, {1}, {2}; no one gives {1, 2} or
 // {3}.
 TEST(DetectionOfOneEnd, AcceptsWhatOneChoiceOfRoundingGivesAndNothingElse) {
@@ -235,7 +276,7 @@ TEST(DetectionOfOneEnd, RejectsEverySingleParticleThatIsOtherwise) {
   std::mt19937_64 random(11);
   std::normal_distribution<double> normal;
   int64_t removed = 0;
-  for (int round = 0; round < 6; ++round) {
+  for (int round = 0; round < 8; ++round) {
     Pair pair = one_end(pair_of(block_body(5, 4, 3), {range(0, 60)}, {range(0, 60)}));
     const Body& body = pair.setup.body;
     for (Vec3& x : pair.before.x) x += 0.25 * Vec3{normal(random), normal(random), normal(random)};
@@ -251,12 +292,20 @@ TEST(DetectionOfOneEnd, RejectsEverySingleParticleThatIsOtherwise) {
       for (const int32_t j : body.neighbours(i)) open += is_open(i, j);
       return open;
     };
+    const bool by_nearer = round >= 4;
+    if (by_nearer) pair.setup.detect.remove = RemovedEnds::nearer;
+    double moved = 0;  // of the one cluster, which is not turned
+    for (int32_t i = 0; i < 60; ++i) moved += (pair.before.x[at(i)].x - body.rest_position(i).x) / 60;
+    const auto carried = [&](int32_t i) { return std::abs(body.rest_position(i).x + moved - 3.1); };
     const auto goes = [&](int32_t i) {
       const bool negative = round % 2 == 0 && pair.before.x[at(i)].x < 3.1;
       for (const int32_t j : body.neighbours(i)) {
         if (!is_open(i, j)) continue;
         const bool other = round % 2 == 0 && pair.before.x[at(j)].x < 3.1;
-        if (negative != other ? negative : std::pair(count(i), -i) > std::pair(count(j), -j)) return true;
+        const bool positive_goes = by_nearer && carried(negative ? i : j) > carried(negative ? j : i) + kNearerBy;
+        if (negative != other ? negative != positive_goes : std::pair(count(i), -i) > std::pair(count(j), -j)) {
+          return true;
+        }
       }
       return false;
     };

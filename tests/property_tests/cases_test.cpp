@@ -265,6 +265,7 @@ TEST(DrawnCases, VaryEveryFieldAndArePlainInMost) {
            {"removal by strain", [](const Case& c) { return c.removal == Removal::strain; }},
            {"geometric removal", [](const Case& c) { return c.removal == Removal::geometric; }},
            {"one end", [](const Case& c) { return c.remove == RemovedEnds::one; }},
+           {"nearer end", [](const Case& c) { return c.remove == RemovedEnds::nearer; }},
            {"epsilon", [&](const Case& c) { return c.epsilon != plain.epsilon; }},
            {"solver", [](const Case& c) { return c.solver == Solver::published; }},
            {"relaxation", [&](const Case& c) { return c.relaxation != plain.relaxation; }},

@@ -139,6 +139,48 @@ TEST(DetectOneEnd, AsksTheBladeWhereItStoodLastWhileItWasLowered) {
   EXPECT_EQ(state.removed, (std::vector<int32_t>{0}));
 }
 
+// Two halves of a row, of one cluster each, in one piece: the clusters carry their particles where they are. The blade
+// stands between them nearer to one, and takes that one by `nearer`, but the negative one, 3, where they are as near as
+// to h/8.
+TEST(DetectNearerEnd, TakesTheEndThatItsClustersCarryNearerToTheBlade) {
+  cutproof::Setup setup = one_end(fixtures::block(6, 1, 1, 1.0));  // at x = 1 … 6
+  setup.detect.remove = RemovedEnds::nearer;
+  State state = cooked(setup);
+  state.clusters = {};
+  for (int32_t c = 0; c < 2; ++c) {
+    state.clusters.number.push_back(c);
+    state.clusters.offsets.push_back(3 * (c + 1));
+    for (int32_t i = 0; i < 3; ++i) state.clusters.members.push_back(3 * c + i);
+    state.clusters.rotation.push_back(Mat3{});
+  }
+  state.clusters.mass.resize(2);
+  state.clusters.rest_center.resize(2);
+  update_rest_frames(setup.body, state.clusters);
+  for (std::size_t i = 3; i < 6; ++i) state.x[i].x += 1;  // 2 at 3, 3 at 5
+  // What a contact does to the ends themselves is not asked.
+  state.x[2].x -= 0.3;
+  state.x[1].x += 0.3;
+  setup.has_blade = true;
+  setup.blade = {1, 1, 0, 0};
+  for (const bool turned : {false, true}) {  // which end is the negative one
+    for (const double from_middle : {-0.5, -0.07, -0.06, 0.0, 0.06, 0.07, 0.5}) {
+      const BladePose pose = {{4 + from_middle, 1, 1}, {0, turned ? -1.0 : 1.0, 0}, {0, 0, 1}};
+      setup.blade_moves = {{pose, pose, true, 0}};
+      const int32_t negative = turned ? 3 : 2, nearer = from_middle < 0 ? 2 : 3;
+      State cut = state;
+      detect(setup, cut);
+      const int32_t expected = 2 * std::abs(from_middle) > kNearerBy ? nearer : negative;
+      EXPECT_EQ(cut.removed, std::vector<int32_t>{expected}) << from_middle << (turned ? " turned" : "");
+    }
+  }
+  // Beside both ends it has no say.
+  const BladePose beside = {{9, 1, 1}, {0, 1, 0}, {0, 0, 1}};
+  setup.blade_moves = {{beside, beside, true, 0}};
+  State cut = state;
+  detect(setup, cut);
+  EXPECT_EQ(cut.removed, std::vector<int32_t>{2});
+}
+
 // On random bodies: no edge that is too long keeps both ends, who goes had such an edge, and no more go than with both.
 TEST(DetectOneEnd, LeavesNoOpenEdgeAndTakesNobodyWithoutOne) {
   std::mt19937_64 random(5);
@@ -150,6 +192,7 @@ TEST(DetectOneEnd, LeavesNoOpenEdgeAndTakesNobodyWithoutOne) {
     setup.has_blade = true;
     setup.blade = {1, 1, 0, 0};
     setup.blade_moves = {{pose, pose, trial % 2 == 0, 0}};
+    setup.detect.remove = trial % 4 < 2 ? RemovedEnds::one : RemovedEnds::nearer;
     State before = cooked(setup);
     for (Vec3& x : before.x) x += 0.2 * Vec3{normal(random), normal(random), normal(random)};
     State after = before;

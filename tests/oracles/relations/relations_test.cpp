@@ -230,6 +230,8 @@ TEST(Relations, TheReferenceIsEquivariant) {
   std::array<int, kEquivarianceKinds> judged{};
   Scene one_end = cut_block(Criterion::distance);
   one_end.setup.detect.remove = RemovedEnds::one;
+  Scene nearer_end = one_end;
+  nearer_end.setup.detect.remove = RemovedEnds::nearer;
   // Another crossing in each direction and at each particle: a turn that took them for each other would show.
   Scene fitted = cut_block(Criterion::geometric);
   Body& body = fitted.setup.body;
@@ -238,8 +240,8 @@ TEST(Relations, TheReferenceIsEquivariant) {
     const bool leaves = body.neighbour(static_cast<int32_t>(k / 6), static_cast<int>(k % 6)) < 0;
     body.surface_crossing[k] = leaves ? static_cast<uint8_t>(kLeastCrossing + 37 * k % 225) : uint8_t{0};
   }
-  for (const Scene& scene :
-       {spinning_block(), cut_block(Criterion::geometric), cut_block(Criterion::distance), one_end, fitted}) {
+  for (const Scene& scene : {spinning_block(), cut_block(Criterion::geometric), cut_block(Criterion::distance), one_end,
+                             nearer_end, fitted}) {
     // From the beginning, and from the middle of the run with a skin, dead particles and split clusters.
     backend->load({scene.setup}, {scene.state});
     backend->run(Span{});

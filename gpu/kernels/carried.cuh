@@ -1,0 +1,62 @@
+// Where clusters carry what rests on their particles and beside them (docs/design/method.md §4 and §8): by which
+// detection and skin tell how far tissue is from the blade that holds it apart.
+#pragma once
+#include "gpu/kernels/float3.h"
+#include "gpu/launch/launcher.h"
+#include "gpu/launch/team.h"
+#include "gpu/state/device_view.h"
+
+namespace cutproof::gpu {
+
+inline constexpr int kCenterTeam = 32;  // lanes that find where a cluster is
+
+// DeviceView::center of a cluster from the present displacements.
+template <class Block>
+CUTPROOF_DEVICE void recenter(const DeviceView& w, const Team<Block, kCenterTeam>& team, int s) {
+  const BodyConstants& body = w.body[w.slot_body[s]];
+  const int* const members = w.members + w.slot_begin[s];
+  const Float3 base = xyz(w.displacement[members[0]]);
+  // Σ w (d - base), Σ w (X - T), which is zero but for the rounding of T, and Σ w.
+  typename Team<Block, kCenterTeam>::template Sums<7> sums;
+  team.each(w.slot_size[s], [&](int k) {
+    const int p = members[k];
+    const Float4 now = w.displacement[p];
+    const float weight = now.w / static_cast<float>(w.membership_count[p]);
+    const Float3 moved = weight * (xyz(now) - base), rest = weight * from_rest_center(w, body, p, s);
+    float* const sum = sums.of(k);
+    sum[0] += moved.x;
+    sum[1] += moved.y;
+    sum[2] += moved.z;
+    sum[3] += rest.x;
+    sum[4] += rest.y;
+    sum[5] += rest.z;
+    sum[6] += weight;
+  });
+  const auto total = team.total(sums);
+  if (!team.leads()) return;
+  const Float3 moved = {total.v[0], total.v[1], total.v[2]}, rest = {total.v[3], total.v[4], total.v[5]};
+  // The rounded T must not move the cluster (docs/design/decisions.md, Momentum and the rounding of sums).
+  const Float3 turned = w.rotation[s] * rest - rest;
+  w.center[s] = base + (1.0f / total.v[6]) * (moved - turned);
+}
+
+// The mean over p's clusters of (t - T) + (R - I)(X - T) for what rests at X = X_p + arm, as displacement from X.
+// Without a cluster that of p.
+CUTPROOF_DEVICE inline Float3 carried(const DeviceView& w, const BodyConstants& body, int p, Float3 arm) {
+  // Relative to where the first cluster puts it, so that summing costs no digits of d. (Not to the owner: where a
+  // blade has pushed it away, that is far from what all of them say.)
+  Float3 base = xyz(w.displacement[p]), sum;
+  int clusters = 0;
+  for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
+    const int s = w.memberships[k];
+    if (s < 0) continue;
+    const Float3 r = from_rest_center(w, body, p, s) + arm;
+    const Float3 center = w.center[s], turned = w.rotation[s] * r - r;
+    if (clusters == 0) base = center + turned;
+    sum = sum + ((center - base) + turned);
+    ++clusters;
+  }
+  return clusters > 0 ? base + (1.0f / static_cast<float>(clusters)) * sum : base;
+}
+
+}  // namespace cutproof::gpu
