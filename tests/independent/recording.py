@@ -13,10 +13,7 @@ def text(value):
 
 class Recording:
     def __init__(self, path):
-        with h5py.File(f"{path}.cutproof.h5") as index, h5py.File(f"{path}.particles.vtkhdf") as particles:
-            self._read(index, particles)
-
-    def _read(self, index, particles):
+        index, particles = h5py.File(f"{path}.cutproof.h5"), h5py.File(f"{path}.particles.vtkhdf")
         given = index["setup"]
         body, step, detect = given["body"].attrs, given["step"].attrs, given["detect"].attrs
         n = len(given["body/mass"])
@@ -31,7 +28,9 @@ class Recording:
             stiffness=float(step["stiffness"]), acceleration=text(step["acceleration"]), damping=float(step["damping"]),
             gravity=step["gravity"][:], criterion=text(detect["criterion"]), remove=text(detect["remove"]),
             epsilon=float(detect["epsilon"]), without_blade=bool(detect["without_blade"]),
-            debris=int(given["split"].attrs["debris"]), merge=text(given["merge"].attrs["rule"]),
+            strain=float(detect["strain"]), debris=int(given["split"].attrs["debris"]),
+            merge=text(given["merge"].attrs["rule"]), expand=text(given["expand"].attrs["rule"]),
+            depth=int(given["expand"].attrs["depth"]),
             substep_length=given["substep_length"][:])
         setup.walls = [types.SimpleNamespace(axis=int(a), side=int(s), offset=float(o), friction=float(f)) for a, s, o, f in
                        zip(*(given[f"walls/{name}"][:] for name in ("axis", "side", "offset", "friction")))]
@@ -40,7 +39,7 @@ class Recording:
         setup.moves = moves(given["blade_moves"]) if blade["present"] else []
         for name in ("length", "depth", "thickness", "friction"):
             setattr(setup, f"blade_{name}", float(blade[name]))
-        self.setup, self.count = setup, n
+        self.setup, self.count, self.scene = setup, n, index["scene"][:].tobytes().decode()
 
         cover = index["clusters"]
         clusters = int(rows["cluster_count"][0])
@@ -54,14 +53,20 @@ class Recording:
             edge_covered=bool(rows["edge_covered"][0]),
             clusters=[members[offsets[c]:offsets[c + 1]].astype(int) for c in range(clusters)],
             rotations=cover["rotation"][rows["rotation_row"][0]:][:clusters].reshape(-1, 3, 3))
-        assert np.abs(self.state.x - setup.rest).max() == 0 or True
 
         # What the program has made of it: the last snapshot of each frame.
+        self._points, self._alive = points, alive
         frame, stage = rows["frame"][:], rows["stage"][:]
-        ends = [k for k in range(1, len(frame)) if stage[k] == 5]
-        self.x = np.stack([at(points, "position_row", k).T for k in ends])
-        self.alive = np.stack([at(alive, "alive_row", k) == 1 for k in ends])
-        self.clusters = [int(rows["cluster_count"][k]) for k in ends]
+        self._ends = [k for k in range(1, len(frame)) if stage[k] == 5]
+        self._rows = {name: rows[name][:] for name in ("position_row", "alive_row", "cluster_count")}
+        self.times = np.cumsum(setup.substep_length * setup.substeps)[:len(self._ends)]
+
+    def after(self, frame):
+        """Positions [3, n], who is alive, and the number of clusters."""
+        k = self._ends[frame]
+        row, alive = int(self._rows["position_row"][k]), int(self._rows["alive_row"][k])
+        return (self._points[row:row + self.count].T, self._alive[alive:alive + self.count] == 1,
+                int(self._rows["cluster_count"][k]))
 
 
 def grid_edges(place):

@@ -3,8 +3,8 @@ detection (§4), removal, splitting (§5), merging (§6). It shares nothing with
 intermediate result. What it is given is a setup and a first state (recording.py): particles, clusters, and by how much
 the outside world moves blade and grips in each substep.
 
-What it does not do is refused by name: `published`, strain, debris, expansion, other merge rules than `deterministic`,
-and frictionless walls beside a blade. No skin is made. Lengths in m, arrays of points [3, n].
+What it does not do is refused by name: the rules `published` and `single_pass`, expansion by more than one layer, a
+geometric blade that turns, and frictionless walls beside a blade. No skin is made. Lengths in m, points [3, n].
 
 `Wrong` makes it a wrong simulator on purpose, so that a test can show that it would be found."""
 import dataclasses
@@ -12,14 +12,16 @@ import dataclasses
 import numpy as np
 
 TOUCH_MARGIN = 1 / 1024  # h, method.md §11
-MOST_TURNS = 16  # of blade and walls, decisions.md
+MOST_TURNS = 16  # of blade and walls, method.md §3
+MOST_ITERATIONS = 2000  # where a substep is solved
 
 
 @dataclasses.dataclass
 class Wrong:
     damping: float = 1.0  # times the rate
     relaxation: float | None = None  # instead of s = k dt² / (1 + k dt²): the same whatever dt
-    velocity_lag: float = 0.0  # share of v that stays what it was
+    late_gravity: bool = False  # gravity moves a particle one substep later than it should
+    decay: float | None = None  # of velocities in a substep, whatever dt
     detect_late: bool = False  # detection sees the positions at which the frame began
     keep_cut_clusters: bool = False  # clusters that lost a particle are not split
 
@@ -51,21 +53,49 @@ class Cover:
         """Mean of the best rigid fits of each particle's clusters; of particles in none, where they are."""
         at = x[:, self.member]
         mean = sums(self.weight * at, self.offsets) / self.mass
-        off = self.weight * (at - mean[:, self.cluster])
-        moment = np.empty((len(self.sets), 3, 3))
+        self.rotations = best_rotations(self.moments(x), self.rotations)
+        fit = mean[:, self.cluster]
         for i in range(3):
-            moment[:, i, :] = sums(off[i] * self.arm, self.offsets).T
-        self.rotations = best_rotations(moment, self.rotations)
-        turned = np.ascontiguousarray(self.rotations.transpose(1, 2, 0))[:, :, self.cluster]
-        fit = mean[:, self.cluster] + (turned * self.arm).sum(axis=1)
+            for k in range(3):
+                fit[i] += self.rotations[:, i, k][self.cluster] * self.arm[k]
         goal = x.copy()
         goal[:, self.held] = sums(fit[:, self.by_particle], self.held_offsets) / self.holders[self.held]
         return goal
 
+    def moments(self, x):
+        """A of each cluster [C, 3, 3]."""
+        at = x[:, self.member]
+        off = self.weight * (at - (sums(self.weight * at, self.offsets) / self.mass)[:, self.cluster])
+        return np.stack([sums(off[i] * self.arm, self.offsets).T for i in range(3)], axis=1)
+
 
 def best_rotations(moment, previous):
-    """argmax of tr(Rᵀ A) over rotations, by singular values; where it is not unique, of the best ones the nearest to the
-    previous one."""
+    """argmax of tr(Rᵀ A) over rotations. Of a matrix that is far from singular and has a positive determinant it is the
+    orthogonal factor of the polar decomposition, by Newton's iteration (Higham 1986)."""
+    best = np.empty_like(moment)
+    scale = np.sqrt((moment**2).sum(axis=(1, 2)))
+    plain = np.linalg.det(moment) > 1e-3 * scale**3
+    best[~plain] = by_singular_values(moment[~plain], previous[~plain])
+    x = np.ascontiguousarray((moment[plain] / scale[plain, None, None]).transpose(1, 2, 0))
+    for _ in range(30):
+        cofactors = np.stack([cross(x[1], x[2]), cross(x[2], x[0]), cross(x[0], x[1])])
+        inverse = cofactors / (x[0] * cofactors[0]).sum(axis=0)  # transposed
+        gamma = np.sqrt(np.sqrt((inverse**2).sum(axis=(0, 1)) / (x**2).sum(axis=(0, 1))))
+        new = (gamma * x + inverse / gamma) / 2
+        change = np.abs(new - x).max(initial=0)
+        x = new
+        if change < 1e-9:  # converges quadratically: what is left is rounding
+            break
+    best[plain] = x.transpose(2, 0, 1)
+    return best
+
+
+def cross(a, b):
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def by_singular_values(moment, previous):
+    """The same of any matrix; where the answer is not unique, of the best ones the nearest to the previous one."""
     u, sigma, vt = np.linalg.svd(moment)
     sign = np.where(np.linalg.det(u) * np.linalg.det(vt) < 0, -1.0, 1.0)
     least = sigma[:, 1] + sign * sigma[:, 2]
@@ -228,17 +258,17 @@ class Contacts:
 
 
 class Simulator:
-    def __init__(self, setup, state, wrong=None):
-        self.setup, self.wrong = setup, wrong or Wrong()
-        for name, given, known in (("solver", setup.solver, ("implicit",)), ("debris", setup.debris, (0,)),
-                                   ("criterion", setup.criterion, ("none", "distance", "geometric")),
-                                   ("ends", setup.remove, ("both", "one")), ("merge", setup.merge, ("none", "deterministic")),
-                                   ("state without edge cover", state.edge_covered, (True,))):
+    def __init__(self, setup, state, wrong=None, solve_to=None):
+        """`solve_to`: iterate until no particle moves by more than this [h], instead of a number of times."""
+        self.setup, self.wrong, self.solve_to = setup, wrong or Wrong(), solve_to
+        for name, given, known in (("solver", setup.solver, ("implicit",)), ("depth", setup.depth, (1,)),
+                                   ("merge", setup.merge, ("none", "deterministic")),
+                                   ("expand", setup.expand, ("none", "edge_cover"))):
             if given not in known:
                 raise NotImplementedError(f"{name}: {given}")
         self.x, self.v = state.x.copy(), state.v.copy()
         self.alive = state.alive.copy()
-        self.tau, self.cap = state.tau, state.cap
+        self.tau, self.cap, self.edge_covered = state.tau, state.cap, state.edge_covered
         self.cover = Cover(list(state.clusters), state.rotations.copy(), setup.rest, setup.mass)
         self.frame = 0
 
@@ -255,7 +285,9 @@ class Simulator:
             if grip.active[index]:
                 held[grip.particles] = True
                 shift[:, grip.particles] = grip.displacement[index][:, None]
-        predicted = start + dt * self.v + dt * dt * setup.gravity[:, None]
+        predicted = start + dt * self.v
+        if not wrong.late_gravity:
+            predicted = predicted + dt * dt * setup.gravity[:, None]
         free_to_move = ~held & self.alive & (self.cover.holders > 0)
         still = ~free_to_move & ~held  # dead, or in no cluster
         x = contacts.project(predicted)
@@ -266,7 +298,7 @@ class Simulator:
         before, omega = x, 1.0
         b = min(s, 0.95)
         rho = b / (2 - b)
-        for j in range(setup.iterations):
+        for j in range(setup.iterations if self.solve_to is None else MOST_ITERATIONS):
             plain = predicted + s * (self.cover.goals(x) - predicted)
             if setup.acceleration == "chebyshev" and j > 0:
                 omega = 2 / (2 - rho * rho) if j == 2 else omega if j == 1 else 4 / (4 - rho * rho * omega)
@@ -279,8 +311,12 @@ class Simulator:
             new = contacts.project(mixed)
             new[:, ~free_to_move] = x[:, ~free_to_move]
             before, x = x, new
-        v = np.exp(-wrong.damping * setup.damping * dt) * (x - start) / dt
-        self.v = wrong.velocity_lag * self.v + (1 - wrong.velocity_lag) * v
+            if self.solve_to is not None and np.abs(x - before).max(initial=0) < self.solve_to * setup.h:
+                break
+        decay = np.exp(-wrong.damping * setup.damping * dt) if wrong.decay is None else wrong.decay
+        self.v = decay * (x - start) / dt
+        if wrong.late_gravity:
+            self.v = self.v + dt * setup.gravity[:, None]
         self.x = x
 
     # §4
@@ -294,6 +330,12 @@ class Simulator:
         lowered = [m for m in setup.moves[first:first + setup.substeps] if m.down] if setup.moves else []
         if setup.criterion == "none" or not (setup.moves or setup.without_blade):
             return np.zeros(0, int)
+        if setup.criterion == "strain":
+            arm, cover = self.cover.arm, self.cover
+            at_rest = np.stack([sums(cover.weight * arm[i] * arm, cover.offsets).T for i in range(3)], axis=1)
+            gradient = cover.moments(x) @ np.linalg.pinv(at_rest, rcond=1e-9, hermitian=True)
+            stretched = np.flatnonzero(np.linalg.svd(gradient, compute_uv=False)[:, 0] > setup.strain)
+            return np.unique(np.concatenate([cover.sets[c] for c in stretched] or [np.zeros(0, int)]))
         length = np.sqrt(((x[:, e[0]] - x[:, e[1]])**2).sum(axis=0))
         if setup.criterion == "geometric":
             stretch = np.zeros(x.shape[1])
@@ -323,6 +365,11 @@ class Simulator:
         gone = np.zeros(self.x.shape[1], bool)
         gone[removed] = True
         self.alive = self.alive & ~gone
+        if self.setup.debris:
+            for piece in components(np.flatnonzero(self.alive), self.neighbours()):
+                if len(piece) < self.setup.debris:
+                    gone[piece] = True
+                    self.alive[piece] = False
         neighbours = self.neighbours()
         sets, rotations, new = [], [], []
         for members, rotation in zip(self.cover.sets, self.cover.rotations):
@@ -389,6 +436,24 @@ class Simulator:
                     now[t] = now[t] | now.pop(s)
             turn += 1
 
+    # §7
+    def expand(self, now):
+        """For every edge that no cluster contains the smaller cluster of one end takes in the other end."""
+        if self.setup.expand == "none" or self.edge_covered:
+            return
+        holders = [set() for _ in range(self.x.shape[1])]
+        for number, members in now.items():
+            for i in members:
+                holders[i].add(number)
+        taken = []
+        for i, j in self.edges().T.tolist():
+            if not holders[i] & holders[j]:
+                _, number, other = min((len(now[c]), c, other) for end, other in ((i, j), (j, i)) for c in holders[end])
+                taken.append((number, other))
+        for number, other in taken:
+            now[number] = now[number] | {other}
+        self.edge_covered = True
+
     # §9
     def run_frame(self):
         setup, substeps = self.setup, self.setup.substeps
@@ -399,6 +464,7 @@ class Simulator:
         if len(removed):
             sets, rotations = self.split(removed)
             sets = self.merge(sets)
+            self.expand(sets)
             numbers = sorted(sets)
             self.cover = Cover([np.array(sorted(sets[k])) for k in numbers],
                                np.array([rotations[k] for k in numbers]).reshape(-1, 3, 3), setup.rest, setup.mass)
