@@ -22,6 +22,7 @@ except ImportError as missing:
     print(f"{missing.name} is missing (Debian: python3-numpy, python3-h5py)")
     sys.exit(77)
 
+sys.dont_write_bytecode = True  # nothing is left in the source tree
 from measures import Trajectory, apart, errors, orders, rounding_bound
 from recording import Recording
 from simulator import Simulator, Wrong
@@ -180,11 +181,10 @@ if "trajectories" in options.only:
 
 if "orders" in options.only:
     section("Orders, with detection in every substep")
-    cases = [("uniform_stretch", (4, 8, 16, 32), 4), ("small_block", (4, 8, 16), 20)]
+    cases = [("uniform_stretch", (8, 16, 32, 64), 2), ("small_block", (4, 8, 16), 20)]
     if options.all:
         cases = [("uniform_stretch", (4, 8, 16, 32, 64), 20), ("small_block", (4, 8, 16, 32, 64), None),
-                 ("cuboid_press", (4, 8, 16, 32), None), ("three_cuts", (4, 8, 16, 32), None),
-                 ("kidney_discontinuous", (4, 8, 16, 32), 30)]
+                 ("three_cuts", (4, 8, 16), None), ("cuboid_press", (4, 8, 16), None)]
     for scene, substeps, frames in cases:
         for problem in orders_agree(scene, substeps, frames):
             check(False, problem)
@@ -192,14 +192,14 @@ if "orders" in options.only:
 if options.all and "solved" in options.only:
     # The program by iterations enough for every level, the independent one until nothing moves: of the time step alone.
     section("Orders where every substep is solved")
-    for scene, substeps, frames in [("uniform_stretch", (4, 8, 16, 32, 64, 128), 4), ("small_block", (4, 8, 16, 32), None)]:
+    for scene, substeps, frames in [("uniform_stretch", (8, 16, 32, 64, 128, 256), 2), ("small_block", (4, 8, 16, 32), 30)]:
         for problem in orders_agree(scene, substeps, frames, solve_to=1e-11, iterations=40):
             check(False, problem)
 
 if options.all and "printed" in options.only:
     section("Orders that the program prints")
-    for scene, frames, settings in [("uniform_stretch", 10, {}), ("small_block", None, {}),
-                                    ("small_block", 15, {"every": "substep"}), ("three_cuts", 20, {})]:
+    for scene, frames, settings in [("uniform_stretch", 4, {}), ("small_block", None, {}),
+                                    ("small_block", 12, {"every": "substep"})]:
         for problem in printed_orders_agree(scene, frames, **settings):
             check(False, problem)
 
