@@ -58,7 +58,7 @@ def recorded(scene, frames=None, **settings):
     """Made by the program. Settings: substeps=8 for step.substeps=8."""
     command = [program, "run", scene_path(scene), "--record", "run", "--set", "skin.wanted=false"]
     for name, value in settings.items():
-        command += ["--set", f"{'detect' if name == 'every' else 'step'}.{name}={value}"]
+        command += ["--set", f"{'detect' if name in ('every', 'remove') else 'step'}.{name}={value}"]
     done = subprocess.run(command + (["--frames", str(frames)] if frames else []), cwd=work, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     return Recording(work / "run")
@@ -90,12 +90,12 @@ def trajectories_agree(scene, frames=None, wrong=None, **settings):
     substeps = len(recording.times) * recording.setup.substeps
     bound = rounding_bound(recording.setup, recording.state, substeps)
     removed = recording.count - int(min(alive.sum() for _, alive in ours.at.values()))
-    print(f"  {scene}: {recording.count} particles, {len(recording.state.clusters)} clusters, {substeps} substeps, "
+    print(f"  {scene}{''.join(f', {k}={v}' for k, v in settings.items())}: {recording.count} particles, {len(recording.state.clusters)} clusters, {substeps} substeps, "
           f"{removed} removed: {found.worst:.1e} h apart at worst, bound {bound:.1e}; {found.differ} removed in one alone"
           + ("" if clusters is None else f"; other clusters from frame {clusters} on"), flush=True)
     if wrong is None:
         document.setdefault("trajectories", []).append(
-            {"scene": scene, "particles": recording.count, "substeps": substeps, "removed": removed,
+            {"scene": scene, "settings": settings, "particles": recording.count, "substeps": substeps, "removed": removed,
              "worst_h": found.worst, "bound_h": bound, "removed_in_one": found.differ})
     problems = []
     if not found.worst <= bound:
@@ -143,7 +143,7 @@ def printed_orders_agree(scene, frames=None, **settings):
     before its search; and the same levels by the independent simulator."""
     command = [program, "tune", scene_path(scene), "--tolerance", "1e-9", "--json", "tune.json", "--set", "skin.wanted=false"]
     for name, value in settings.items():
-        command += ["--set", f"{'detect' if name == 'every' else 'step'}.{name}={value}"]
+        command += ["--set", f"{'detect' if name in ('every', 'remove') else 'step'}.{name}={value}"]
     done = subprocess.run(command + (["--frames", str(frames)] if frames else []), cwd=work, capture_output=True, text=True)
     assert done.returncode == 1, done.stdout + done.stderr
     levels = json.loads((work / "tune.json").read_text())["reference"]["levels"]
@@ -178,6 +178,8 @@ if "trajectories" in options.only:
     for scene, frames in cases:
         for problem in trajectories_agree(scene, frames):
             check(False, problem)
+    for problem in trajectories_agree("small_block", remove="one", every="substep"):
+        check(False, problem)
 
 if "orders" in options.only:
     section("Orders, with detection in every substep")
