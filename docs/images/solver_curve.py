@@ -68,9 +68,11 @@ def main():
     found = curves(document, options.scene, options.substeps, options.x)
     if not any(points for _, _, points in found):
         sys.exit(f"{options.bench}: no rows of scene '{options.scene}' with {options.substeps} substeps")
-    device = document["device"].split(",")[0]
-    title = f"{options.scene}: {document['backend']}, {document['precision']} precision, {device}"
-    label = "time of a step [ms]" if options.x == "seconds" else "iterations of a substep"
+    title = f"{options.scene}: {document['backend']}, {document['precision']} precision"
+    label = "iterations of a substep"
+    if options.x == "seconds":  # errors are the same on every machine
+        title += f", {document['device'].split(',')[0]}"
+        label = "time of a step [ms]"
     with open(options.output, "w", encoding="utf-8") as file:
         file.write(picture(found, title, label, document["tolerance_h"]))
 

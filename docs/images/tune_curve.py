@@ -52,6 +52,8 @@ def picture(document, before=None):
     axes.text(right + 6, py(document["tolerance_h"]) + 4, f"tolerance {document['tolerance_h']:g} h")
 
     for front, dashes in [(front_before, 'stroke-dasharray="5 3"'), (front_of(points), "")]:
+        if not front:
+            continue
         corners = " ".join(f"{px(x):.1f},{py(y):.1f}" for x, y, _ in front)
         parts.append(f'<polyline points="{corners}" fill="none" stroke="#999" stroke-width="1.5" {dashes}/>')
     for x, y, trial in points:

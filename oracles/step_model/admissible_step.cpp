@@ -179,7 +179,7 @@ class Search {
     std::vector<NearDecision> ties;   // that rounding may take the other way, known once looked at closely; settled too
     std::vector<int32_t> violations;  // particles beyond their bounds, or of clusters that are
     double worst = -1;                // of measured / bound
-    double left = 0;                  // how far the backend is from it: of positions and velocities, squares [m²]
+    double left = 0;  // how far the backend is from it: squares, by what rounding explains (off_outcome)
     StepPart part = StepPart::position;
     int32_t where = -1;
     double measured = 0, bound = 0;
@@ -536,7 +536,9 @@ class Search {
   Branch explain(Branch first) {
     // The sides that particles tell of: of the last substep they are certain, of earlier ones only likely.
     const Settled certain = sides_of(first, setup_.step.substeps - 1), likely = sides_of(first, 0);
-    const Branch root = likely.empty() ? std::move(first) : branch_of(likely);
+    Branch root = likely.empty() ? std::move(first) : branch_of(likely);
+    scale_by(root.bounds);
+    root.left = square_left(root.outcome);
     Branch best = root;
     // What an outcome rounds is first taken for what the root does; that may be less.
     const std::optional<Branch> open = likely == certain ? std::nullopt : std::optional(branch_of(certain));
@@ -643,17 +645,29 @@ class Search {
     return settled;
   }
 
-  // How far particles are from an outcome, where they are; positions and velocities as one list.
+  // How far particles are from an outcome, where they are; positions and velocities as one list, each in what rounding
+  // explains of it: else what the blade has pushed far, and so rounds much, would hide what beside it does not round.
   std::vector<std::pair<std::size_t, Vec3>> off_outcome(const std::vector<Vec3>& x, const std::vector<Vec3>& v,
                                                         const StepOutcome& o) const {
     std::vector<std::pair<std::size_t, Vec3>> off;
     for (std::size_t i = 0; i < x.size(); ++i) {
       if (before_.alive[i] == 0) continue;
       const Vec3 place = x[i] - o.x[i], way = dt_ * (v[i] - o.v[i]);
-      if (!(place == Vec3{})) off.emplace_back(2 * i, place);
-      if (!(way == Vec3{})) off.emplace_back(2 * i + 1, way);
+      if (!(place == Vec3{})) off.emplace_back(2 * i, scale_of(2 * i) * place);
+      if (!(way == Vec3{})) off.emplace_back(2 * i + 1, scale_of(2 * i + 1) * way);
     }
     return off;
+  }
+
+  double scale_of(std::size_t k) const { return scale_.empty() ? 1 : scale_[k]; }
+  // Compares outcomes from here on by what rounding does to this one.
+  void scale_by(const Bounds& bounds) {
+    scale_.clear();
+    for (std::size_t i = 0; i < before_.x.size(); ++i) {
+      for (const double bound : {bounds.position[i], bounds.velocity[i]}) {
+        scale_.push_back(h_ / std::max(bound, kUnitRoundoff * h_));
+      }
+    }
   }
 
   // What becomes of an outcome if a tie goes the other way, alone or also together with the same question asked again.
@@ -888,6 +902,7 @@ class Search {
   StepModel model_;
   std::vector<int32_t> holders_;  // [n] clusters of a particle
   std::vector<double> reach_;     // [m] greatest |X - T|
+  std::vector<double> scale_;     // [2 n] of positions and velocities, by which outcomes are compared; empty: 1
   Partition coupled_;
   int most_outcomes_ = kMostOutcomes;
   uint64_t at_once_ = 1;  // disturbed runs
