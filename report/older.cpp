@@ -2,7 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <map>
+#include <string>
 
 #include "report/document_fields.h"
 
@@ -49,23 +50,30 @@ void rename_campaign(Renamed& to, int64_t version) {
   lacks("refused", "Whether the backend refused any case is not known.");
 }
 
+// What a row of `stages` and the scene that it is of have in common, as one text.
+std::string of_scene(const json& one) {
+  json key = json::array();
+  for (const char* const name : kOfAScene) key.push_back(one.value(name, json()));
+  return key.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
 // Version 2 and before had a limit of the step alone, with the scene.
 void move_limits(Renamed& to) {
   json& document = to.document;
+  std::multimap<std::string, json*> steps;
+  each(document, "rows", [&](json& row) {
+    if (row.value("what", json()) == "step" && !row.contains("limit")) steps.emplace(of_scene(row), &row);
+  });
   bool is_any = false;
   each(document, "scenes", [&](json& scene) {
     rename(scene, "step_floor", "step_limit");
     if (!scene.contains("step_limit") || !scene["step_limit"].is_object()) return;
-    const auto is_of_it = [&](const json& row) {
-      return row.value("what", json()) == "step" &&
-             std::all_of(std::begin(kOfAScene), std::end(kOfAScene),
-                         [&](const char* name) { return row.value(name, json()) == scene.value(name, json()); });
-    };
-    each(document, "rows", [&](json& row) {
-      if (!is_of_it(row) || row.contains("limit")) return;
-      row["limit"] = scene["step_limit"];
+    const auto [first, last] = steps.equal_range(of_scene(scene));
+    for (auto step = first; step != last; ++step) {
+      (*step->second)["limit"] = scene["step_limit"];
       is_any = true;
-    });
+    }
+    steps.erase(first, last);
   });
   to.notes.emplace_back(
       is_any ? "Of the stages the step alone has a limit: what its bytes or its launches take at best. Today's limits "
