@@ -109,14 +109,16 @@ class Table3 {
     const bool is_any =
         std::any_of(table.rows.begin(), table.rows.end(), [](const GridRow& row) { return row.kind != "paper"; });
     if (!is_any && !is_asked) return;
-    table.words = fmt::format(
+    table.words =
         "Comparison with previous works: milliseconds a frame, by number of particles. Their columns and the paper's "
-        "are "
-        "as the paper gives them; its machine was an Intel i7-10700F with an Nvidia RTX 2060. Ours are medians of a "
-        "whole frame on another machine: {}. So ours beside theirs compares machines as well as methods, and no ratio "
-        "is given.{}",
-        document["device"].text(),
-        missing.empty() ? "" : " Not measured in this document: kidneys of about " + missing + " particles.");
+        "are as the paper gives them; its machine was an Intel i7-10700F with an Nvidia RTX 2060.";
+    if (is_any) {
+      table.words += fmt::format(
+          " Ours are medians of a whole frame on another machine: {}. So ours beside theirs compares machines as well "
+          "as methods, and no ratio is given.",
+          document["device"].text());
+    }
+    if (!missing.empty()) table.words += " Not measured in this document: kidneys of about " + missing + " particles.";
     sheet.pieces.emplace_back(std::move(table));
   }
 

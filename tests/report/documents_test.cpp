@@ -280,6 +280,7 @@ TEST(ABenchmark, OfOtherSizesHasNoTable3UnlessItIsAboutThem) {
   const Grid* const said = grid_named(sheet_of(small, "f"), kTable3);
   ASSERT_NE(said, nullptr);
   EXPECT_NE(said->words.find("12,800, 37,704, 48,385, 101,096"), std::string::npos) << said->words;
+  EXPECT_EQ(said->words.find("Ours are"), std::string::npos) << "there are none: " << said->words;
   json document = bench("stages");
   document.update({{"holds", true}, {"scenes", json::array()}, {"rows", {stage_row("frame", 5, nullptr)}}});
   EXPECT_EQ(grid_named(sheet_of(document, "f"), kTable3), nullptr);
