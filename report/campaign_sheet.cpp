@@ -143,7 +143,13 @@ Sheet judge_sheet(const Field& document) {
   const std::string name = plugin["name"].text(), version = plugin["version"].text();
   const std::string library = plugin["library"].is_nothing() ? "" : plugin["library"].text();
   sheet.title = name.empty() ? (library.empty() ? "a plugin" : library) : name + (version.empty() ? "" : " " + version);
-  const bool is_complete = document["complete"].flag();
+  // Documents without it are of a time in which one that was stopped wrote nothing.
+  const Field complete = document["complete"];
+  const bool is_complete = complete.flag_or(true);
+  if (!complete.is_there())
+    sheet.notes.push_back(
+        "An older version of cutproof has written this. It does not say that it was not stopped before its end; what "
+        "was stopped wrote nothing then.");
   Grid operations;
   operations.title = "Operations";
   operations.words = "A question is one call of the plugin; a case is a matrix or a body within it.";

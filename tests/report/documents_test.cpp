@@ -344,6 +344,35 @@ TEST(AnOlderDocument, MayLackWhatTodaysMustHave) {
   EXPECT_FALSE(has_note(sheet_of(campaign({property("coverage", 0)}), "f"), "older version"));
 }
 
+TEST(AnOlderDocument, OfAPluginDoesNotSayThatItIsComplete) {
+  const json operation = {{"operation", "rotations"},
+                          {"cases", 5},
+                          {"of", "matrices"},
+                          {"questions", 5},
+                          {"refused", 0},
+                          {"not_answered", 0},
+                          {"failed", 0},
+                          {"seconds", 1.0},
+                          {"holds", true},
+                          {"unpromised", json::array()},
+                          {"failures", json::array()},
+                          {"properties", {property("best rotation", 0)}}};
+  json document = {
+      {"format", "cutproof.judge"},
+      {"format_version", 1},
+      {"cutproof", "1"},
+      {"seed", 1},
+      {"holds", true},
+      {"operations", {operation}},
+      {"plugin", {{"library", "a.so"}, {"name", ""}, {"version", ""}, {"precision", "single"}, {"device", "cpu"}}}};
+  EXPECT_EQ(sheet_of(document, "f").holds, true);
+  EXPECT_TRUE(has_note(sheet_of(document, "f"), "what was stopped wrote nothing then"));
+  document["complete"] = true;
+  EXPECT_FALSE(has_note(sheet_of(document, "f"), "older version"));
+  document["complete"] = false;
+  EXPECT_EQ(sheet_of(document, "f").holds, false);
+}
+
 TEST(AnOlderDocument, OfATuningHasTheNamesOfItsTime) {
   json old = tuning(nullptr);
   old["format_version"] = 1;
