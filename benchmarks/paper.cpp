@@ -40,7 +40,7 @@ const PaperScene* find_paper_scene(const std::string& name) {
 
 const std::vector<PaperSampling>& paper_samplings() {
   static const std::vector<PaperSampling> rows = {
-      {37'704, 301, 42.05}, {48'385, 383, 46.99}, {63'649, 506, 48.34}, {101'096, 795, 59.75}};
+      {37'704, 301, 42.05}, {48'385, 383, 46.99}, {63'649, 506, 48.34}, {101'096, 795, 59.75}, {12'800, {}, 20.2}};
   return rows;
 }
 

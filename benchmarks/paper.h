@@ -37,11 +37,14 @@ struct PaperScene {
 const std::vector<PaperScene>& paper_scenes();
 const PaperScene* find_paper_scene(const std::string& name);
 
-// A row of Table 2: a kidney's discontinuous cut.
+// A row of Table 2: a kidney's discontinuous cut. Or the size of Table 3 that Table 2 does not have, without clusters,
+// because the paper does not say how many there are.
 struct PaperSampling {
-  int64_t particles = 0, clusters = 0;
+  int64_t particles = 0;
+  std::optional<int64_t> clusters;
   double frame_ms = 0;
 };
+// Those of Table 2 first.
 const std::vector<PaperSampling>& paper_samplings();
 
 // Fig. 10: how many more clusters there are at the end of a cut than at its start.

@@ -60,6 +60,7 @@ std::optional<bool> add_counterexample(report::Card& card, const Counterexample&
   add("The case", in_words(c) + (is_history ? fmt::format("; a history of {}", counted(counterexample.commands.size(),
                                                                                        "command", "commands"))
                                             : ""));
+  if (is_history) add("What is done with it", in_words(counterexample.commands));
   BackendChoice choice;
   if (chosen) {
     choice = *chosen;
@@ -100,16 +101,15 @@ std::optional<bool> add_counterexample(report::Card& card, const Counterexample&
   } else {
     add("Run again", fmt::format("it holds on {} now, in {} verdicts", choice.name, judgement.verdicts));
   }
-  if (is_history) {
-    add("3D view", "none: a history of commands is no single run");
-    return failure.has_value();
-  }
   if (sceneries.size() >= report::kMostSceneries) {
     add("3D view",
         fmt::format("none: a page shows {} counterexamples; make one of this alone", report::kMostSceneries));
     return failure.has_value();
   }
-  const ShownCase shown = run_to_show(make, c);
+  const auto shown_on = [&](const auto& backend) {
+    return is_history ? run_to_show(backend, c, counterexample.commands) : run_to_show(backend, c);
+  };
+  const ShownCase shown = shown_on(make);
   if (!shown.problem.empty()) {
     add("3D view", "none: " + shown.problem);
     return failure.has_value();
@@ -126,7 +126,7 @@ std::optional<bool> add_counterexample(report::Card& card, const Counterexample&
   if (choice.name != reference) {
     BackendChoice other;
     other.name = reference;
-    const ShownCase beside = run_to_show([&] { return harness::make_backend(other); }, c);
+    const ShownCase beside = shown_on([&] { return harness::make_backend(other); });
     // The same particles are marked in it.
     if (beside.problem.empty()) scenery.sides.push_back(side_of("the reference", beside, findings));
   }

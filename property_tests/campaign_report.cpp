@@ -180,7 +180,7 @@ namespace {
 
 // Throws json::exception or std::invalid_argument if something is missing, or of another kind, that merging or a
 // conclusion reads; InputError if there is too much.
-void require_fields(const json& part, const std::string& file) {
+void require_fields(const json& part, const std::string& file, bool has_every_class) {
   // Counts are added up: those of a million shards must fit.
   const auto require_count = [&](const json& within, const char* name) {
     const double count = within.at(name).get<double>();
@@ -195,7 +195,9 @@ void require_fields(const json& part, const std::string& file) {
   for (const char* flag : {"dynamics", "complete"}) static_cast<void>(part.at(flag).get<bool>());
   static_cast<void>(part.at("backend").get<std::string>());
   static_cast<void>(integer_from<int>(part.at("sizes").at(1)));
-  for (const CoverageClass& each : kCoverageClasses) require_count(part.at("coverage"), each.name);
+  for (const CoverageClass& each : kCoverageClasses) {
+    if (has_every_class || part.at("coverage").contains(each.name)) require_count(part.at("coverage"), each.name);
+  }
   if (part.at("properties").size() > io::kMostProperties) {
     throw InputError(
         file, "properties",
@@ -235,7 +237,7 @@ json read_shard(const std::string& file) {
   if (shards < 1 || shards > kMostShards || shard < 1 || shard > shards) {
     throw InputError(file, "shard", fmt::format("there is no shard {} of {}", shard, shards), kRemedy);
   }
-  require_fields(part, file);
+  require_fields(part, file, true);
   return part;
 }
 
@@ -243,7 +245,7 @@ json read_shard(const std::string& file) {
 
 void require_campaign(const json& document, const std::string& file) {
   try {
-    require_fields(document, file);
+    require_fields(document, file, false);
     if (document.contains("seconds_asked")) {
       static_cast<void>(document.at("seconds_asked").get<double>());
     } else {
@@ -339,6 +341,16 @@ std::string how_far(const json& document) {
 
 }  // namespace
 
+std::vector<std::string> uncounted_classes(const json& document) {
+  const bool moves = document.at("dynamics").get<bool>();
+  std::vector<std::string> found;
+  for (const CoverageClass& each : kCoverageClasses) {
+    const bool is_asked = moves || each.occurs == Occurs::always;
+    if (is_asked && !document.at("coverage").contains(each.name)) found.emplace_back(each.name);
+  }
+  return found;
+}
+
 CampaignConclusion conclude(const json& document, bool whole) {
   const auto cases = document.at("cases").get<int64_t>();
   const std::size_t violations = document.at("violations").size();
@@ -347,7 +359,7 @@ CampaignConclusion conclude(const json& document, bool whole) {
   if (!missing.empty()) {
     lost = fmt::format("of {} shards these are missing or were stopped, and not all of their cases were judged: {}",
                        document.at("merged_shards").get<int64_t>(), missing);
-  } else if (!document.at("complete").get<bool>()) {
+  } else if (!document.value("complete", true)) {
     lost = how_far(document);
   }
   if (violations > 0) {
@@ -358,6 +370,7 @@ CampaignConclusion conclude(const json& document, bool whole) {
   if (!whole || cases < kCasesThatMeetEveryClass) return {};
   std::vector<std::string> empty, rare;
   for (const CoverageClass& wanted : kCoverageClasses) {
+    if (!document.at("coverage").contains(wanted.name)) continue;
     const auto count = document.at("coverage").at(wanted.name).get<int64_t>();
     if (count >= least_count(wanted, cases, document.at("dynamics").get<bool>())) continue;
     (count == 0 ? empty : rare).emplace_back(count == 0 ? wanted.name : fmt::format("{} ({})", wanted.name, count));
@@ -373,7 +386,7 @@ CampaignConclusion conclude(const json& document, bool whole) {
   if (document.contains("steps_compared") && document.at("steps_compared").at("particles").get<int64_t>() == 0) {
     return {"no position after a step was compared with the reference's"};
   }
-  for (const json& property : document.at("properties")) {
+  for (const json& property : document.value("properties", json::array())) {
     if (property.at("property") != "admissible step") continue;
     const double undecided = property.at("undecided").get<double>(), checked = property.at("checked").get<double>();
     if (undecided <= kMostUndecided * checked) continue;

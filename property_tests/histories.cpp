@@ -141,16 +141,18 @@ std::vector<Command> commands_from_json(const std::string& list) {
 
 // --- History ------------------------------------------------------------------------------------------------------
 
-History::History(Source make, Case c)
+History::History(Source make, Case c, bool keeps_moments)
     : make_(std::move(make)),
       case_(std::move(c)),
       loaded_(instance_of(case_)),
       staged_(make_()),
-      state_(loaded_.state) {
+      state_(loaded_.state),
+      keeps_moments_(keeps_moments) {
   if (case_.together != 1) throw std::invalid_argument("a history needs a case with one stroke a frame (together: 1)");
   if (promise_of(case_.merge).unique) whole_ = make_();
   given_strokes_ = static_cast<int32_t>(loaded_.setup.stroke_end.size());
   load_both(true);
+  if (keeps_moments_) trace_.initial = std::make_shared<const State>(state_);
 }
 
 void History::execute(const Command& command) {
@@ -179,6 +181,7 @@ void History::run_span(Span span, bool whole) {
   run.has_expanded = has_expanded_;
   staged_run_->run(span, [&](const harness::Moment& moment) {
     run.trace.moments.push_back(moment);
+    if (keeps_moments_) trace_.moments.push_back(moment);
     const Clusters &before = moment.before->clusters, &after = moment.after->clusters;
     if (moment.span.contains(Stage::expand) && before.members != after.members) has_expanded_ = true;
   });

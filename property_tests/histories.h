@@ -84,8 +84,8 @@ class History {
  public:
   using Source = std::function<std::unique_ptr<Backend>()>;
   // Loads the case. Requires one stroke a frame (Case::together): a stroke that is added later takes a frame of its
-  // own. Throws std::invalid_argument.
-  History(Source make, Case c);
+  // own. `keeps_moments`: for somebody to look at. Throws std::invalid_argument.
+  History(Source make, Case c, bool keeps_moments = false);
 
   // Does nothing once there is a failure. Throws what backends throw.
   void execute(const Command& command);
@@ -94,6 +94,11 @@ class History {
   const std::optional<Verdict>& failure() const { return failure_; }
   const HistoryCoverage& coverage() const { return coverage_; }
   int64_t verdicts() const { return verdicts_; }
+  // Of the backend that is judged, from its first load to where it is, over kicks and loads, which make no moments of
+  // their own; empty unless they are kept. The setup is that of the last command: strokes that came later leave the
+  // frames before them as they were.
+  const harness::Trace& trace() const { return trace_; }
+  const Setup& setup() const { return loaded_.setup; }
 
  private:
   void carry_out(const RunStages& command);
@@ -128,6 +133,8 @@ class History {
   std::optional<Verdict> failure_;
   HistoryCoverage coverage_;
   int64_t verdicts_ = 0;
+  bool keeps_moments_ = false;
+  harness::Trace trace_;
 };
 
 // A whole history: all of its commands, unless one fails before. Throws what backends throw.

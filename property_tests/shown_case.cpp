@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <exception>
+#include <optional>
+#include <variant>
 #include <vector>
 
 #include "model/counted.h"
@@ -27,6 +29,47 @@ ShownCase run_to_show(const std::function<std::unique_ptr<Backend>()>& make, con
     shown.problem = error.what();
   }
   return shown;
+}
+
+ShownCase run_to_show(const std::function<std::unique_ptr<Backend>()>& make, const Case& c,
+                      const std::vector<Command>& commands) {
+  std::optional<History> history;
+  ShownCase shown;
+  try {
+    history.emplace(make, c, true);
+    for (const Command& command : commands) history->execute(command);
+  } catch (const MachineError&) {
+    throw;
+  } catch (const std::exception& error) {
+    shown.problem = error.what();
+  }
+  if (history && !history->trace().moments.empty()) shown.problem.clear();
+  if (!shown.problem.empty()) return shown;
+  shown.trace = history->trace();
+  shown.loaded = {history->setup(), *shown.trace.initial};
+  return shown;
+}
+
+namespace {
+
+std::string words_of(const RunStages& run) {
+  return counted(run.stages, "stage", "stages") + (run.whole && run.stages > 1 ? " as one span" : "");
+}
+std::string words_of(const Cut& cut) { return cut.stroke.down ? "one more stroke" : "one more stroke, blade up"; }
+std::string words_of(const Kick& kick) { return fmt::format("a kick of piece {}", kick.component); }
+std::string words_of(const SaveAndLoad& load) {
+  return load.through_files ? "saved and loaded through files" : "saved and loaded";
+}
+
+}  // namespace
+
+std::string in_words(const std::vector<Command>& commands) {
+  std::string text;
+  for (const Command& command : commands) {
+    if (!text.empty()) text += ", then ";
+    text += std::visit([](const auto& one) { return words_of(one); }, command);
+  }
+  return text;
 }
 
 namespace {

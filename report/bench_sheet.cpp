@@ -6,6 +6,7 @@
 
 #include "model/io/columns.h"
 #include "report/document_fields.h"
+#include "report/paper_comparison.h"
 
 namespace cutproof::report {
 
@@ -65,10 +66,72 @@ std::string with(const std::string& name, const std::string& variant) {
 }
 
 std::string solver_text(const Field& row) {
-  return fmt::format("{} substeps × {} iterations, acceleration {}, rotation {}, split {}", row["substeps"].count(),
-                     row["iterations"].count(), row["acceleration"].text_or("none"), row["rotation"].text(),
-                     row["split"].text());
+  // Documents of versions before 3 do not all say how iterations were accelerated.
+  const std::string acceleration = row["acceleration"].text_or("");
+  return fmt::format("{} substeps × {} iterations, {}rotation {}, split {}", row["substeps"].count(),
+                     row["iterations"].count(), acceleration.empty() ? "" : "acceleration " + acceleration + ", ",
+                     row["rotation"].text(), row["split"].text());
 }
+
+// Kidneys that a document has timed, beside Table 3 of the paper: those of about as many particles as it has.
+class Table3 {
+ public:
+  void add(const Field& row, const std::string& scene, const std::optional<double>& ms) {
+    if (!scene.starts_with("kidney")) return;
+    std::string text = with(scene, row["cooking"].text_or(""));
+    rows_.push_back({row["particles"].count(), ms, text + "; " + solver_text(row)});
+  }
+  // `is_asked`: the document is about the paper's sizes, so that none of them was measured is said as well.
+  void show(Sheet& sheet, const Field& document, bool is_asked) const {
+    Grid table;
+    table.title = "Table 3 of the paper, beside ours";
+    table.columns = {{"particles", true}};
+    for (const char* const work : kComparedWorks) table.columns.push_back({work, true});
+    for (const Column& column : {Column{"ours: frame", true}, {"ours: particles", true}, {"ours: what"}})
+      table.columns.push_back(column);
+    std::string missing;
+    for (const ComparedSize& size : kComparedSizes) {
+      std::vector<std::string> cells = {whole(size.particles)};
+      for (const double ms : size.frame_ms) cells.push_back(fmt::format("{:.1f}", ms));
+      bool is_there = false;
+      for (const Row& row : rows_) {
+        if (!is_about(row.particles, size.particles)) continue;
+        GridRow made = {cells};
+        made.cells.insert(made.cells.end(), {figure_text(row.ms), whole(row.particles), row.text});
+        table.rows.push_back(std::move(made));
+        is_there = true;
+      }
+      if (is_there) continue;
+      missing += (missing.empty() ? "" : ", ") + whole(size.particles);
+      cells.insert(cells.end(), {"–", "–", "not measured in this document"});
+      table.rows.push_back({std::move(cells), "paper"});
+    }
+    const bool is_any =
+        std::any_of(table.rows.begin(), table.rows.end(), [](const GridRow& row) { return row.kind != "paper"; });
+    if (!is_any && !is_asked) return;
+    table.words =
+        "Comparison with previous works: milliseconds a frame, by number of particles. Their columns and the paper's "
+        "are as the paper gives them; its machine was an Intel i7-10700F with an Nvidia RTX 2060.";
+    if (is_any) {
+      table.words += fmt::format(
+          " Ours are medians of a whole frame on another machine: {}. So ours beside theirs compares machines as well "
+          "as methods, and no ratio is given.",
+          document["device"].text());
+    }
+    if (!missing.empty()) table.words += " Not measured in this document: kidneys of about " + missing + " particles.";
+    sheet.pieces.emplace_back(std::move(table));
+  }
+
+ private:
+  struct Row {
+    int64_t particles;
+    std::optional<double> ms;
+    std::string text;
+  };
+  // Within 2 %: a body takes whole layers of nodes, so it never has exactly as many.
+  static bool is_about(int64_t ours, int64_t theirs) { return 50 * std::abs(ours - theirs) <= theirs; }
+  std::vector<Row> rows_;
+};
 
 Stack stage_stack(const std::string& words) {
   Stack stack = {"Time of each stage", words, "ms", {}, {}};
@@ -112,6 +175,7 @@ void stages_pieces(Sheet& sheet, const Field& document) {
                   {"paper [ms]", true},
                   {"error"}};
   grid.filter = 1;
+  Table3 table_3;
   std::vector<std::string> scenes;
   std::map<std::string, std::map<std::string, std::string>> ours, papers;  // [scene][what]
   std::map<std::string, std::string> particles_of;
@@ -133,6 +197,7 @@ void stages_pieces(Sheet& sheet, const Field& document) {
     }
     ours[scene][what] = figure_text(median);
     if (paper) papers[scene][what] = figure_text(paper);
+    if (what == "frame") table_3.add(row, row["scene"].text(), median);
     const auto size = static_cast<double>(particles);
     const std::string text = fmt::format("{} of {}: {}", what, scene, solver_text(row));
     const std::string variant = variants.of(row);
@@ -179,6 +244,7 @@ void stages_pieces(Sheet& sheet, const Field& document) {
     }
     sheet.pieces.emplace_back(std::move(table));
   }
+  table_3.show(sheet, document, false);
   sheet.pieces.emplace_back(std::move(grid));
   int64_t failing = 0;
   document["scenes"].each([&](const Field& scene) {
@@ -249,6 +315,7 @@ void add_scene_rows(Sheet& sheet, const Field& document, bool is_sampling) {
   grid.columns.push_back({"error of step [h]", true});
   grid.columns.push_back({"topology"});
   int64_t failing = 0;
+  Table3 table_3;
   rows.each([&](const Field& row) {
     const std::string variant = variants.of(row), scene = with(row["scene"].text(), variant);
     const int64_t particles = row["particles"].count();
@@ -269,6 +336,7 @@ void add_scene_rows(Sheet& sheet, const Field& document, bool is_sampling) {
     const Field frame = seconds["frame"];
     curve_named(chart, with(is_sampling ? "frame, ours" : "frame", variant), Look::joined)
         .dots.push_back({size, in_ms(frame), fmt::format("frame of {}: {}", scene, solver_text(row))});
+    table_3.add(row, row["scene"].text(), in_ms(frame));
     for (const char* const which : {"median", "min", "max"}) cells.cells.push_back(ms_text(frame, which));
     if (!is_sampling) {
       const std::optional<double> bytes = row["bytes"].number_or_null();
@@ -281,17 +349,22 @@ void add_scene_rows(Sheet& sheet, const Field& document, bool is_sampling) {
       const Field paper = row["paper"];
       const std::optional<double> theirs = times(paper["frame_seconds"].number_or_null(), 1e3);
       const int64_t their_particles = paper["particles"].count();
+      const Field their_clusters = paper["clusters"];  // null: of a size of Table 3 alone, which has no clusters
       if (is_whole)
         curve_named(chart, "frame, the paper's", Look::joined)
             .dots.push_back({static_cast<double>(their_particles), theirs,
-                             fmt::format("the paper's: {} clusters", whole(paper["clusters"].count()))});
+                             their_clusters.is_nothing()
+                                 ? std::string("the paper's, of its Table 3")
+                                 : fmt::format("the paper's: {} clusters", whole(their_clusters.count()))});
       const auto ratio = [](const Field& field) {
         const auto value = field.number_or_null();
         return value ? fmt::format("{:.2f}", *value) : std::string("–");
       };
-      table.rows.push_back({{whole(particles), whole(row["clusters"].count()), ms_text(frame),
-                             ratio(row["frame_to_first"]), whole(their_particles), whole(paper["clusters"].count()),
-                             figure_text(theirs), ratio(paper["frame_to_first"])}});
+      if (!their_clusters.is_nothing()) {
+        table.rows.push_back({{whole(particles), whole(row["clusters"].count()), ms_text(frame),
+                               ratio(row["frame_to_first"]), whole(their_particles), whole(their_clusters.count()),
+                               figure_text(theirs), ratio(paper["frame_to_first"])}});
+      }
     }
     const Field step = error["step"], whole_frame = error["frame"];
     cells.cells.push_back(step.is_nothing() ? "not measured" : figure_text(step["max_h"].number_or_null()));
@@ -315,8 +388,9 @@ void add_scene_rows(Sheet& sheet, const Field& document, bool is_sampling) {
   } else {
     sheet.pieces.emplace_back(std::move(memory));
   }
+  table_3.show(sheet, document, is_sampling);
   sheet.pieces.emplace_back(std::move(grid));
-  sheet.summary = is_sampling ? "Times of the cut of a kidney at four samplings."
+  sheet.summary = is_sampling ? "Times of the cut of a kidney at the samplings of the paper's tables."
                               : "Times of a frame and of its stages, and memory, by number of particles.";
 }
 void scale_pieces(Sheet& sheet, const Field& document) { add_scene_rows(sheet, document, false); }

@@ -3,6 +3,7 @@
 
 #include "model/io/columns.h"
 #include "report/document_fields.h"
+#include "report/older.h"
 
 namespace cutproof::report {
 
@@ -47,10 +48,15 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
   Sheet sheet;
   sheet.kind = "campaign";
   const std::string backend = document["backend"].text();
-  const bool moves = document["dynamics"].flag(), is_complete = document["complete"].flag();
+  // Before version 4 a campaign that was stopped wrote nothing, unless shards were put together.
+  const bool was_older = is_older(document);
+  const bool moves = document["dynamics"].flag();
+  const bool is_complete = was_older ? document["complete"].flag_or(true) : document["complete"].flag();
   const int64_t cases = document["cases"].count(), verdicts = document["verdicts"].count();
-  const int64_t refused = document["refused"].count();
-  PropertyTable properties = property_table(document["properties"]);
+  const int64_t refused = was_older ? document["refused"].count_or(0) : document["refused"].count();
+  const bool has_properties = !was_older || document["properties"].is_there();
+  PropertyTable properties;
+  if (has_properties) properties = property_table(document["properties"]);
   const Field violations = document["violations"];
   violations.each([&](const Field& one) {
     Card card;
@@ -81,8 +87,8 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
   const std::size_t wrong = violations.length();
   sheet.title = "backend " + backend;
   // Nothing holds because its document says so.
-  sheet.holds = document["holds"].flag() && wrong == 0 && properties.failing == 0 && properties.judged > 0 &&
-                verdicts > 0 && is_complete && failure.empty();
+  sheet.holds = document["holds"].flag() && wrong == 0 && properties.failing == 0 &&
+                (properties.judged > 0 || !has_properties) && verdicts > 0 && is_complete && failure.empty();
   sheet.badge = *sheet.holds ? "✓ holds" : wrong == 0 && !is_complete ? "✕ incomplete" : "✕ fails";
   const std::string subject =
       fmt::format("cutproof tried {} random dissections{} on backend {}, {:.3g} particles on average",
@@ -125,7 +131,7 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
         "farther.",
         io::grouped(steps["steps"].count()), io::grouped(steps["particles"].count()),
         figure_text(steps["greatest_h"].number()), io::grouped(steps["undecidable"].count())));
-  sheet.pieces.emplace_back(std::move(properties.grid));
+  if (has_properties) sheet.pieces.emplace_back(std::move(properties.grid));
   add_coverage(sheet, document, moves);
   return sheet;
 }
@@ -137,7 +143,13 @@ Sheet judge_sheet(const Field& document) {
   const std::string name = plugin["name"].text(), version = plugin["version"].text();
   const std::string library = plugin["library"].is_nothing() ? "" : plugin["library"].text();
   sheet.title = name.empty() ? (library.empty() ? "a plugin" : library) : name + (version.empty() ? "" : " " + version);
-  const bool is_complete = document["complete"].flag();
+  // Documents without it are of a time in which one that was stopped wrote nothing.
+  const Field complete = document["complete"];
+  const bool is_complete = complete.flag_or(true);
+  if (!complete.is_there())
+    sheet.notes.push_back(
+        "An older version of cutproof has written this. It does not say that it was not stopped before its end; what "
+        "was stopped wrote nothing then.");
   Grid operations;
   operations.title = "Operations";
   operations.words = "A question is one call of the plugin; a case is a matrix or a body within it.";

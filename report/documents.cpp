@@ -2,8 +2,10 @@
 
 #include <algorithm>
 
+#include "model/counted.h"
 #include "model/io/columns.h"
 #include "report/document_fields.h"
+#include "report/older.h"
 
 namespace cutproof::report {
 
@@ -11,12 +13,39 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int64_t kFuzzVersion = 4, kJudgeVersion = 1, kBenchVersion = 3;
+// Documents of cutproof within something that is none: how many, and where the first one is.
+struct Within {
+  int64_t count = 0;
+  std::string first;
+};
+void look_within(const json& given, const std::string& path, int depth, Within& found) {
+  if (given.is_object() && given.contains("format") && given["format"].is_string() &&
+      given["format"].get_ref<const std::string&>().starts_with("cutproof.")) {
+    if (found.count++ == 0) found.first = path;
+    return;
+  }
+  if (depth == 0) return;
+  for (const auto& each : given.items()) {
+    const std::string inner = given.is_array() ? fmt::format("{}[{}]", path, each.key())
+                              : path.empty()   ? each.key()
+                                               : path + "." + each.key();
+    if (each.value().is_structured()) look_within(each.value(), inner, depth - 1, found);
+  }
+}
 
-void require_version(const Field& document, int64_t known) {
-  const Field version = document["format_version"];
-  if (const int64_t found = version.count(); found != known)
-    version.refuse(fmt::format("this is version {}, and only {} is read", found, known));
+[[noreturn]] void refuse_without_format(const json& given, const std::string& file) {
+  constexpr int kDepth = 3;
+  Within within;
+  look_within(given, "", kDepth, within);
+  if (within.count == 0)
+    throw InputError(file, "format", "this is missing, so no command of cutproof has written the file",
+                     kDocumentRemedy);
+  throw InputError(
+      file, "format",
+      fmt::format("this is missing; the file holds {} within another, the first as '{}'",
+                  counted(static_cast<std::size_t>(within.count), "document of cutproof", "documents of cutproof"),
+                  within.first),
+      "write what it holds to files of their own, and give those");
 }
 
 }  // namespace
@@ -26,35 +55,31 @@ DocumentKind kind_of(const json& given, const std::string& file) {
   if (!given.is_object()) document.refuse("this is no result of cutproof");
   // A counterexample may be the line of a case alone.
   if (!given.contains("format") && given.contains("nodes")) return DocumentKind::counterexample;
+  if (!given.contains("format")) refuse_without_format(given, file);
   const std::string format = document["format"].text();
   if (format == "cutproof.run" || format == "cutproof.check") return DocumentKind::run;
   if (format == "cutproof.fuzz") return DocumentKind::fuzz;
   if (format == "cutproof.judge") return DocumentKind::judge;
   if (format == "cutproof.counterexample") return DocumentKind::counterexample;
-  if (format == "cutproof.bench") return document["suite"].text() == "tune" ? DocumentKind::tune : DocumentKind::bench;
+  // The first version of bench had no suite, and its reader says so of a later one.
+  if (format == "cutproof.bench")
+    return document["suite"].text_or("") == "tune" ? DocumentKind::tune : DocumentKind::bench;
   document["format"].refuse("'" + format + "' is nothing that a page is made of");
 }
 
 Sheet sheet_of(const json& given, const std::string& file, const std::string& failure) {
-  const Field document = {&given, file, "", kDocumentRemedy};
-  switch (kind_of(given, file)) {
-    case DocumentKind::fuzz:
-      require_version(document, kFuzzVersion);
-      return campaign_sheet(document, failure);
-    case DocumentKind::judge:
-      require_version(document, kJudgeVersion);
-      return judge_sheet(document);
-    case DocumentKind::bench:
-      require_version(document, kBenchVersion);
-      return bench_sheet(document);
-    case DocumentKind::tune:
-      require_version(document, kBenchVersion);
-      return tune_sheet(document);
-    case DocumentKind::run:
-    case DocumentKind::counterexample:
-      break;
-  }
-  document["format"].refuse("this is no campaign and no measurement");
+  const DocumentKind kind = kind_of(given, file);
+  const Field as_given = {&given, file, "", kDocumentRemedy};
+  if (kind == DocumentKind::run || kind == DocumentKind::counterexample)
+    as_given["format"].refuse("this is no campaign and no measurement");
+  const std::optional<Renamed> older = renamed(as_given);
+  const Field document = {older ? &older->document : &given, file, "", kDocumentRemedy};
+  Sheet sheet = kind == DocumentKind::fuzz    ? campaign_sheet(document, failure)
+                : kind == DocumentKind::judge ? judge_sheet(document)
+                : kind == DocumentKind::bench ? bench_sheet(document)
+                                              : tune_sheet(document);
+  if (older) sheet.notes.insert(sheet.notes.begin(), older->notes.begin(), older->notes.end());
+  return sheet;
 }
 
 std::vector<std::pair<std::string, const json*>> dissections_in(const json& document) {

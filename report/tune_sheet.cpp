@@ -117,8 +117,11 @@ Sheet tune_sheet(const Field& document) {
     sheet.notes.push_back(
         kind == "limit" ? "The reference solution is the limit of short time steps."
                         : "The reference solution is the scene's own substeps, each solved until it is converged.");
-    if (const std::string known = reference["known_text"].text_or(""); !known.empty())
+    if (const std::string known = reference["known_text"].text_or(""); !known.empty()) {
       sheet.notes.push_back("It is " + known + ".");
+    } else if (!reference["known_h"].is_there()) {
+      sheet.notes.push_back("How well it is known is not said.");
+    }
   }
   document["left"].each([&](const Field& left) {
     const Field trial = left["trial"];

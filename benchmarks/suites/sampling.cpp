@@ -40,11 +40,16 @@ nlohmann::json run_sampling(const SamplingOptions& options, const Progress& prog
         const double frame = measured.timings.frame.median;
         if (first_frame == 0) first_frame = frame;
         nlohmann::json row = scene_row(scene, contender, measured);
-        row["frame_to_first"] = frame / first_frame;
+        row["frame_to_first"] = nullptr;
         row["paper"] = {{"particles", paper.particles},
-                        {"clusters", paper.clusters},
+                        {"clusters", nullptr},
                         {"frame_seconds", 1e-3 * paper.frame_ms},
-                        {"frame_to_first", paper.frame_ms / paper_samplings().front().frame_ms}};
+                        {"frame_to_first", nullptr}};
+        if (paper.clusters) {
+          row["frame_to_first"] = frame / first_frame;
+          row["paper"]["clusters"] = *paper.clusters;
+          row["paper"]["frame_to_first"] = paper.frame_ms / paper_samplings().front().frame_ms;
+        }
         report.add(std::move(row), measured.holds());
       }
     }

@@ -6,7 +6,10 @@ namespace {
 
 void print_sampling(const nlohmann::json& document) {
   const bool whole = document.at("scaled_down") == 1;
-  const auto to_first = [](const nlohmann::json& of) { return percent(of.at("frame_to_first").get<double>() - 1); };
+  const auto to_first = [](const nlohmann::json& of) {
+    const nlohmann::json& ratio = of.at("frame_to_first");
+    return ratio.is_null() ? "-" : percent(ratio.get<double>() - 1);
+  };
   print_scenes(document, {{"paper's", whole ? "{paper/clusters}" : "-"}},
                {{"to first", to_first},
                 {"paper ms", "{1e3*paper/frame_seconds:.2f}"},
@@ -18,7 +21,7 @@ void print_sampling(const nlohmann::json& document) {
 
 void add_sampling(CLI::App& bench, Work& work) {
   const auto options = std::make_shared<benchmarks::SamplingOptions>();
-  CLI::App* const command = bench.add_subcommand("sampling", "the cut of a kidney at the four samplings of Table 2");
+  CLI::App* const command = bench.add_subcommand("sampling", "the cut of a kidney at the samplings of Tables 2 and 3");
   add_timing(*command, *options);
   command->add_option("--clusters", options->cooking, "how they are cooked: boxes or sampled")
       ->capture_default_str()

@@ -150,6 +150,13 @@ function showInPlots() {
   for (const one of plots) one.setFrame(frameOf(state.at));
 }
 
+// Only what is said otherwise than before is written: where the processor draws, text costs as much as the picture.
+function say(where, ...parts) {
+  const had = [...where.childNodes];
+  if (had.length !== parts.length) return where.replaceChildren(...parts);
+  parts.forEach((part, k) => { if (!part.isEqualNode(had[k])) had[k].replaceWith(part); });
+}
+
 async function update() {
   const ticket = ++shown;
   const moment = data.moments[state.at];
@@ -161,25 +168,27 @@ async function update() {
   if (data.blade) facts.push(moment.blade ? 'blade down' : 'blade up');
   const apart = apartInWords(comparison, moment);
   if (apart) facts.push(apart);
-  status.replaceChildren(element('strong', { text: words(moment) }), element('span', { class: 'muted', text: ` · ${facts.join(' · ')}` }));
+  say(status, element('strong', { text: words(moment) }), element('span', { class: 'muted', text: ` · ${facts.join(' · ')}` }));
   witness.textContent = found ? `${found.property} fails here: ${found.text}` : '';
   showInPlots();
   document.documentElement.dataset.moment = state.at;
   if (!view) return;
-  const arrays = await Promise.all([moments.get(state.at), ...(besides ? [besides.get(state.at)] : [])]);
+  view.isAwaited = true;
+  const arrays = await Promise.all([moments.get(state.at), ...(besides ? [besides.get(state.at)] : [])]).finally(() => { if (ticket === shown) view.isAwaited = false; });
   if (ticket !== shown) return;  // somebody has gone on meanwhile
   const abouts = besides ? [moment, data.besideMoments[state.at]] : [moment];
   const spot = state.spot === null ? null : { particles: [state.spot], path: [], members: [] };
   const said = view.show(arrays, abouts, look, found ? found.marks : spot);
-  legend.replaceChildren(element('span', { text: said.words }));
+  const legends = [element('span', { text: said.words })];
   if (said.scale) {
     const ramp = drawing('svg', { class: 'ramp', viewBox: '0 0 70 10', 'aria-hidden': 'true' }, ...rampStops.map((fill, k) => drawing('rect', { x: 10 * k, y: 0, width: 10.5, height: 10, fill })));
-    legend.append(element('span', { text: ` ${said.scale[0]} ` }), ramp, element('span', { text: ` ${said.scale[1]}.` }));
+    legends.push(element('span', { text: ` ${said.scale[0]} ` }), ramp, element('span', { text: ` ${said.scale[1]}.` }));
   }
-  if (said.keys) legend.append(...said.keys.map(([fill, text]) => element('span', { class: 'keyed' }, drawing('svg', { class: 'swatch', viewBox: '0 0 10 10', 'aria-hidden': 'true' }, drawing('rect', { width: 10, height: 10, fill })), element('span', { text }))));
-  if (view.plane.isOn) legend.append(element('span', { id: 'cut-words', text: ` ${view.plane.words()}${data.body.kept < data.body.particles ? ' This page holds some of the particles only, so the face has holes.' : ''}` }));
-  if (moment.start && look.skin && !look.particles) legend.append(element('span', { text: ' The skin comes with the first frame; until then particles are shown.' }));
-  if (found) legend.append(element('span', { class: 'marked-key', text: markedWords(found.marks) }));
+  if (said.keys) legends.push(...said.keys.map(([fill, text]) => element('span', { class: 'keyed' }, drawing('svg', { class: 'swatch', viewBox: '0 0 10 10', 'aria-hidden': 'true' }, drawing('rect', { width: 10, height: 10, fill })), element('span', { text }))));
+  if (view.plane.isOn) legends.push(element('span', { id: 'cut-words', text: ` ${view.plane.words()}${data.body.kept < data.body.particles ? ' This page holds some of the particles only, so the face has holes.' : ''}` }));
+  if (moment.start && look.skin && !look.particles) legends.push(element('span', { text: ' The skin comes with the first frame; until then particles are shown.' }));
+  if (found) legends.push(element('span', { class: 'marked-key', text: markedWords(found.marks) }));
+  say(legend, ...legends);
   document.documentElement.dataset.shown = `${state.at}/${state.finding === null ? '' : state.finding}`;
 }
 

@@ -136,22 +136,27 @@ export class Tissue {
     const placesOfIt = () => xyz || (xyz = places(moment.x, moment, centre, spacing));
     const { colour, shows, words, scale, keys } = look.colouring.of({ moment, places: placesOfIt, start, edges, stage: about.stage, isStart: about.start, apart: about.apart });
     const hidden = hasParticles && !look.isCut ? this.enclosed(moment, edges) : null;
-    const tint = new Uint32Array(n);
+    // Written over in each moment: a browser that makes and drops megabytes so often stops to tidy up.
+    if (!this.tint || this.tint.length < n) [this.tint, this.seen] = [new Uint32Array(n), new Uint32Array(n)];
+    const { tint, seen } = this;
     let drawn = 0;
     for (let i = 0; i < n; ++i) {
       const isAlive = moment.alive[i] !== 0;
       let kind = isAlive ? ((hasParticles && !(hidden && hidden[i] === 6)) || look.isCut ? 1 : 0) : look.removed ? 2 : 0;
       if (shows && shows(i)) kind = shows(i);
-      if (kind > 0) ++drawn;
+      if (kind > 0) seen[drawn++] = i;
       const c = isAlive || kind === 2 && shows ? colour(i) : kDead;
       tint[i] = ((kind << 24) | c) >>> 0;
     }
-    const bytes = new Uint8Array(tint.buffer);
-    write(this.particles.geometry, 'position', moment.x, kStride);
-    write(this.particles.geometry, 'tint', bytes, 4, true);
-    this.particles.geometry.setDrawRange(0, n);
-    Tissue.scale(this.particles.material, moment, centre, spacing);
     this.particles.visible = drawn > 0;
+    if (drawn > 0) {
+      // Only those that are seen go through the GPU, which may be the processor: of a large body these are few.
+      write(this.particles.geometry, 'position', moment.x, kStride);
+      write(this.particles.geometry, 'tint', new Uint8Array(tint.buffer, 0, 4 * n), 4, true);
+      write(this.particles.geometry, 'index', seen.subarray(0, drawn), 1);
+      this.particles.geometry.setDrawRange(0, drawn);
+      Tissue.scale(this.particles.material, moment, centre, spacing);
+    }
     this.particles.material.uniforms.fade.value = marks ? 0.72 : 0;
     // The face of a cut is closed by what lies behind it.
     this.particles.material.uniforms.slab.value = look.isCut && !hasParticles ? 2 : 0;

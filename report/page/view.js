@@ -6,8 +6,9 @@ import { Orbit } from './orbit.js';
 import { Tissue } from './tissue.js';
 
 // While somebody scrubs, plays or turns where pictures take long: a picture of so many times fewer pixels along each
-// side now rather than a sharp one later; and a sharp one after so long a rest.
-const kQuickShare = 0.5, kRest = 180, kLong = 50;
+// side now rather than a sharp one later, of the next as many if a few in a row take too long; and a sharp one after so
+// long a rest.
+const kQuickShares = [0.5, 0.35, 0.25], kTooLong = 65, kInARow = 3, kRest = 180, kLong = 50;
 
 // Null where there is no WebGL. three.js asks for none but says so in the console; so it is asked for here.
 export function contextOf(canvas) {
@@ -27,7 +28,10 @@ export class View {
     this.data = data;
     this.canvas = canvas;
     this.isSlow = isSoftware;
+    canvas.parentElement.classList.toggle('plain', isSoftware);
     this.isQuick = false;
+    this.coarse = 0;  // index into kQuickShares
+    this.late = 0;    // quick pictures in a row that took too long
     this.renderer = new WebGLRenderer({ canvas, context });
     this.renderer.autoClear = false;
   
@@ -110,10 +114,8 @@ export class View {
   }
 
   resize() {
-    const { clientWidth, clientHeight } = this.canvas;
-    if (clientWidth === 0 || !this.centre) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2) * (this.isQuick ? kQuickShare : 1));
-    this.renderer.setSize(clientWidth, clientHeight, false);
+    if (this.canvas.clientWidth === 0 || !this.centre) return;
+    this.resizeBuffer();
     const [, , width, height] = this.parts()[0];
     this.camera.aspect = width / height;
     const was = this.orbit.home.distance;
@@ -126,18 +128,38 @@ export class View {
   setQuick(isQuick) {
     if (isQuick === this.isQuick) return;
     this.isQuick = isQuick;
-    const { clientWidth, clientHeight } = this.canvas;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2) * (isQuick ? kQuickShare : 1));
-    this.renderer.setSize(clientWidth, clientHeight, false);
+    this.late = 0;
+    this.resizeBuffer();
     this.draw();
+  }
+
+  resizeBuffer() {
+    const { clientWidth, clientHeight } = this.canvas;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2) * (this.isQuick ? kQuickShares[this.coarse] : 1));
+    this.renderer.setSize(clientWidth, clientHeight, false);
+  }
+
+  // A quick picture took so long, from when it was asked of the GPU to when the browser came to the next.
+  took(milliseconds) {
+    this.late = milliseconds > kTooLong ? this.late + 1 : 0;
+    if (this.late < kInARow || this.coarse === kQuickShares.length - 1) return;
+    this.late = 0;
+    ++this.coarse;
+    this.resizeBuffer();
+    this.draw();  // a canvas of another size is empty
   }
 
   // Somebody wants the next pictures soon.
   hurry() {
     if (!this.isSlow || !this.centre) return;
     this.setQuick(true);
+    this.restLater();
+  }
+
+  // Nobody rests while what they want is on its way: a sharp picture in between costs more than many quick ones.
+  restLater() {
     clearTimeout(this.rest);
-    this.rest = setTimeout(() => this.setQuick(false), kRest);
+    this.rest = setTimeout(() => (this.isDue || this.isDrawing || this.isAwaited ? this.restLater() : this.setQuick(false)), kRest);
   }
 
   draw() {
@@ -147,8 +169,16 @@ export class View {
     const asked = performance.now();
     requestAnimationFrame(() => {
       if (this.isDue) this.render();
+      this.isDrawing = true;
+      const begun = performance.now();
       // A machine that needs long for a picture says so by when it comes to the next.
-      requestAnimationFrame(() => { if (performance.now() - asked > 3 * kLong) this.isSlow = true; });
+      requestAnimationFrame(() => {
+        this.isDrawing = false;
+        if (performance.now() - asked > 3 * kLong) this.isSlow = true;
+        if (!this.isQuick) return;
+        this.took(performance.now() - begun);
+        this.restLater();
+      });
     });
   }
 

@@ -18,6 +18,7 @@
 #include "gpu/launch/load.h"
 #include "model/error.h"
 #include "model/fields.h"
+#include "property_tests/shown_case.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::property_tests {
@@ -101,6 +102,35 @@ TEST(Histories, HoldOnTheReferenceAndOnKernels) {
       EXPECT_GT(seen[what], 0) << what;
     }
   }
+}
+
+// For somebody to look at: every stage that ran, over loads, kicks and strokes that came later.
+TEST(Histories, AreShownMomentByMoment) {
+  const std::vector<Command> commands = {kToSplit,           SaveAndLoad{true}, RunStages{4, true},
+                                         Kick{1, {3, 0, 0}}, Cut{{}},           RunStages{7, false}};
+  const ShownCase shown = run_to_show(reference::make_backend, wire(), commands);
+  EXPECT_EQ(shown.problem, "");
+  ASSERT_TRUE(shown.trace.initial);
+  std::vector<std::pair<int64_t, Stage>> seen;
+  for (const harness::Moment& moment : shown.trace.moments) seen.emplace_back(moment.before->frame, moment.span.last);
+  ASSERT_FALSE(seen.empty());
+  EXPECT_TRUE(std::is_sorted(seen.begin(), seen.end())) << "each goes on where the one before ended";
+  EXPECT_EQ(seen.front(), std::pair(int64_t{0}, Stage::step));
+  EXPECT_EQ(seen.back(), std::pair(int64_t{2}, Stage::step));
+  EXPECT_GE(shown.loaded.setup.frame_count(), 3) << "the setup knows the strokes that came later";
+  EXPECT_EQ(in_words(commands),
+            "2 stages, then saved and loaded through files, then 4 stages as one span, then a kick of piece 1, then "
+            "one more stroke, then 7 stages");
+  // Up to where it fails; what was judged keeps no moments.
+  const Faults stops = {{}, {}, [](Span span, int, State& state) {
+                          if (span.contains(Stage::detect) && !state.x.empty()) state.x[0].x = 1e9;
+                        }};
+  const auto make = [&] { return std::make_unique<Faulty>(stops); };
+  const ShownCase stopped = run_to_show(make, wire(), commands);
+  EXPECT_EQ(stopped.problem, "");
+  ASSERT_FALSE(stopped.trace.moments.empty());
+  EXPECT_EQ(stopped.trace.moments.back().span.last, Stage::detect);
+  EXPECT_TRUE(history_of(reference::make_backend, wire(), commands).trace().moments.empty());
 }
 
 TEST(Histories, RejectALoadThatForgets) {

@@ -218,6 +218,25 @@ with Browser(work / "campaign.html") as page:
     assert "--seed 5" in again and "1 of " in run(again, 1), again
     page.picture(work / "campaign.png")
 
+# A history of commands is shown like any case: the same body with a load, a kick and more stages in between.
+history = json.loads((work / json.loads((work / "campaign.json").read_text())["violations"][0]["file"]).read_text())
+history["commands"] = [{"run": 1, "whole": False}, {"save_and_load": "memory"}, {"run": 29, "whole": False}]
+history["case"]["together"] = 1
+(work / "history.json").write_text(json.dumps(history))
+run([program, "report", "history.json", "--backend", "plugin:./libsplitter.so", "-o", "history.html"], 0)
+with Browser(work / "history.html") as page:
+    facts = page.text(".failure dl")
+    assert "1 stage, then saved and loaded, then 29 stages" in facts and "3D view" not in facts, facts
+    assert "it fails on plugin:./libsplitter.so" in facts, facts
+    assert len(page.driver.find_elements(By.CSS_SELECTOR, ".pane canvas")) == 2
+    assert min(one["orange"] for one in page.pixels_of(".pane canvas")) > 100
+    assert "fails here" in page.text("#witness") and "after split" in page.text("#status"), page.text("#status")
+    # From the beginning: the stages before the load are there as well as those behind it.
+    page.ask("const r = document.getElementById('scrub'); r.value = 1; r.dispatchEvent(new Event('input'));")
+    page.until("return document.documentElement.dataset.scenery === '0/1'")
+    assert "Frame 0, after step" in page.text("#status"), page.text("#status")
+    page.picture(work / "history.png")
+
 # The same from the document; a plugin runs only if it is named.
 run([program, "report", "campaign.json", "-o", "unrun.html"], 0)
 with Browser(work / "unrun.html") as page:

@@ -3,7 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <variant>
+#include <vector>
 
 #include "model/error.h"
 #include "report/assets.h"
@@ -204,6 +208,259 @@ TEST(ABenchmark, ThatMeasuredNothingOrWasStoppedDoesNotHold) {
   EXPECT_EQ(sheet_of(document, "f").holds, false);
 }
 
+// --- Table 3
+
+json sampling_row(int64_t particles, const json& paper, double ms) {
+  json row = stage_row("", ms, nullptr);
+  row["scene"] = "kidney_" + std::to_string(paper.at("particles").get<int64_t>());
+  row.update({{"particles", particles},
+              {"clusters", 311},
+              {"seconds",
+               {{"frame", times(ms)},
+                {"step", times(ms)},
+                {"detect", nullptr},
+                {"split", nullptr},
+                {"merge", nullptr},
+                {"expand", nullptr},
+                {"skin", nullptr}}},
+              {"error", {{"step", nullptr}, {"frame", nullptr}}},
+              {"frame_to_first", 1.0},
+              {"paper", paper}});
+  return row;
+}
+json table_2(int64_t particles, double ms) {
+  return {{"particles", particles}, {"clusters", 301}, {"frame_seconds", 1e-3 * ms}, {"frame_to_first", 1.0}};
+}
+json sampling(const std::vector<json>& rows) {
+  json document = bench("sampling");
+  document.update({{"holds", true}, {"scaled_down", 1}, {"rows", rows}});
+  return document;
+}
+const Grid* grid_named(const Sheet& sheet, const std::string& title) {
+  for (const Piece& piece : sheet.pieces) {
+    const Grid* const grid = std::get_if<Grid>(&piece);
+    if (grid && grid->title == title) return grid;
+  }
+  return nullptr;
+}
+constexpr const char* kTable3 = "Table 3 of the paper, beside ours";
+
+TEST(ABenchmark, OfKidneysHasTable3OfThePaperBesideOurs) {
+  const json only_table_3 = {
+      {"particles", 12800}, {"clusters", nullptr}, {"frame_seconds", 0.0202}, {"frame_to_first", nullptr}};
+  json small = sampling_row(12790, only_table_3, 0.4);
+  small["frame_to_first"] = nullptr;
+  const Sheet sheet = sheet_of(sampling({sampling_row(37724, table_2(37704, 42.05), 0.59),
+                                         sampling_row(101056, table_2(101096, 59.75), 0.85), small}),
+                               "f");
+  const Grid* const table = grid_named(sheet, kTable3);
+  ASSERT_NE(table, nullptr);
+  ASSERT_EQ(table->rows.size(), 4u);
+  const std::vector<std::string> first = {"12,800", "22.1", "70.2", "13.6", "22.4", "20.2", "0.4", "12,790"};
+  EXPECT_TRUE(std::equal(first.begin(), first.end(), table->rows[0].cells.begin())) << table->rows[0].cells.at(6);
+  const std::vector<std::string> last = {"101,096", "105.7", "2038.6", "56.2", "70.2", "59.8", "0.85", "101,056"};
+  EXPECT_TRUE(std::equal(last.begin(), last.end(), table->rows[3].cells.begin())) << table->rows[3].cells.at(6);
+  // What was not measured is said, and no figure stands for it.
+  const std::vector<std::string> none = {
+      "48,385", "64.4", "601.1", "46.0", "52.0", "47.0", "–", "–", "not measured in this document"};
+  EXPECT_EQ(table->rows[2].cells, none);
+  EXPECT_NE(table->words.find("Not measured in this document: kidneys of about 48,385 particles"), std::string::npos);
+  EXPECT_NE(table->words.find("RTX 2060"), std::string::npos) << "the paper's device";
+  EXPECT_NE(table->words.find("another machine: a CPU"), std::string::npos) << "and ours: " << table->words;
+  for (const Column& column : table->columns) EXPECT_EQ(column.head.find("×"), std::string::npos) << "no ratio";
+  // The size that Table 2 does not have is in Table 3 alone.
+  const Grid* const other = grid_named(sheet, "Table 2 of the paper, beside ours");
+  ASSERT_NE(other, nullptr);
+  EXPECT_EQ(other->rows.size(), 2u);
+}
+
+TEST(ABenchmark, OfOtherSizesHasNoTable3UnlessItIsAboutThem) {
+  json small = sampling({sampling_row(2359, table_2(37704, 42.05), 3.7)});
+  small["scaled_down"] = 16;
+  const Grid* const said = grid_named(sheet_of(small, "f"), kTable3);
+  ASSERT_NE(said, nullptr);
+  EXPECT_NE(said->words.find("12,800, 37,704, 48,385, 101,096"), std::string::npos) << said->words;
+  EXPECT_EQ(said->words.find("Ours are"), std::string::npos) << "there are none: " << said->words;
+  json document = bench("stages");
+  document.update({{"holds", true}, {"scenes", json::array()}, {"rows", {stage_row("frame", 5, nullptr)}}});
+  EXPECT_EQ(grid_named(sheet_of(document, "f"), kTable3), nullptr);
+  // Stages of a kidney of such a size have it; another body of as many particles has not.
+  document["rows"][0]["particles"] = 101011;
+  ASSERT_NE(grid_named(sheet_of(document, "f"), kTable3), nullptr);
+  document["rows"][0]["scene"] = "box_101011";
+  EXPECT_EQ(grid_named(sheet_of(document, "f"), kTable3), nullptr);
+}
+
+// --- Documents of older versions
+
+bool has_note(const Sheet& sheet, const std::string& words) {
+  return std::any_of(sheet.notes.begin(), sheet.notes.end(),
+                     [&](const std::string& note) { return note.find(words) != std::string::npos; });
+}
+
+TEST(AnOlderDocument, OfACampaignIsShownWithWhatItHas) {
+  json old = campaign({});
+  for (const char* const later : {"properties", "refused", "complete", "cutproof"}) old.erase(later);
+  old["version"] = "0.0.9";
+  old["happened"] = old["coverage"];
+  old.erase("coverage");
+  old["format_version"] = 1;
+  old["dynamics"] = true;
+  old["steps_compared"] = {{"steps", 5}, {"particles", 70}, {"greatest_h", 1e-7}, {"either", 3}};
+  const Sheet sheet = sheet_of(old, "f");
+  EXPECT_EQ(sheet.holds, true) << "no property is known to have been looked at, and verdicts are";
+  EXPECT_NE(sheet.summary.find("none violates any property, in 12,345 verdicts"), std::string::npos) << sheet.summary;
+  EXPECT_TRUE(has_note(sheet, "An older version of cutproof has written this (format version 1; today's is 4)"));
+  EXPECT_TRUE(has_note(sheet, "It counts verdicts of all properties together"));
+  EXPECT_TRUE(has_note(sheet, "Whether the backend refused any case is not known"));
+  EXPECT_TRUE(has_note(sheet, "70 positions at most 1e-07 h apart, and 3 that rounding may carry"))
+      << sheet.notes.back();
+  EXPECT_EQ(sheet.facts.back(), "cutproof 0.0.9");
+  ASSERT_EQ(sheet.pieces.size(), 1u) << "no table of properties";
+  EXPECT_EQ(grid_of(sheet, 0).rows.size(), 3u);
+  // What it says against itself counts, as ever.
+  json bad = old;
+  bad["verdicts"] = 0;
+  EXPECT_EQ(sheet_of(bad, "f").holds, false);
+  bad = old;
+  bad["violations"] = {{{"index", 3}, {"property", "p"}, {"stage", "split"}, {"text", "t"}, {"file", "a"}}};
+  EXPECT_EQ(sheet_of(bad, "f").holds, false);
+  EXPECT_EQ(sheet_of(bad, "f").cards.size(), 1u);
+  bad = old;
+  bad["complete"] = false;
+  EXPECT_EQ(sheet_of(bad, "f").holds, false);
+}
+
+TEST(AnOlderDocument, MayLackWhatTodaysMustHave) {
+  for (const char* const field : {"properties", "refused", "complete"}) {
+    json document = campaign({property("coverage", 0)});
+    document.erase(field);
+    EXPECT_THROW(sheet_of(document, "f"), InputError) << field;
+    document["format_version"] = 3;
+    document["version"] = document["cutproof"];
+    document.erase("cutproof");
+    EXPECT_EQ(sheet_of(document, "f").holds, true) << field;
+  }
+  EXPECT_FALSE(has_note(sheet_of(campaign({property("coverage", 0)}), "f"), "older version"));
+}
+
+TEST(AnOlderDocument, OfAPluginDoesNotSayThatItIsComplete) {
+  const json operation = {{"operation", "rotations"},
+                          {"cases", 5},
+                          {"of", "matrices"},
+                          {"questions", 5},
+                          {"refused", 0},
+                          {"not_answered", 0},
+                          {"failed", 0},
+                          {"seconds", 1.0},
+                          {"holds", true},
+                          {"unpromised", json::array()},
+                          {"failures", json::array()},
+                          {"properties", {property("best rotation", 0)}}};
+  json document = {
+      {"format", "cutproof.judge"},
+      {"format_version", 1},
+      {"cutproof", "1"},
+      {"seed", 1},
+      {"holds", true},
+      {"operations", {operation}},
+      {"plugin", {{"library", "a.so"}, {"name", ""}, {"version", ""}, {"precision", "single"}, {"device", "cpu"}}}};
+  EXPECT_EQ(sheet_of(document, "f").holds, true);
+  EXPECT_TRUE(has_note(sheet_of(document, "f"), "what was stopped wrote nothing then"));
+  document["complete"] = true;
+  EXPECT_FALSE(has_note(sheet_of(document, "f"), "older version"));
+  document["complete"] = false;
+  EXPECT_EQ(sheet_of(document, "f").holds, false);
+}
+
+TEST(AnOlderDocument, OfATuningHasTheNamesOfItsTime) {
+  json old = tuning(nullptr);
+  old["format_version"] = 1;
+  old["answer"] = {{"kind", "substeps"}, {"levels", json::array()}};
+  old.erase("reference");
+  old["trials"][3]["outcome"] = "dearer";
+  const Sheet sheet = sheet_of(old, "f");
+  EXPECT_TRUE(has_note(sheet, "the scene's own substeps, each solved")) << "what the reference solution is";
+  EXPECT_TRUE(has_note(sheet, "How well it is known is not said"));
+  EXPECT_EQ(std::get<Grid>(sheet.pieces.back()).rows.at(3).cells.at(1), "given up as more expensive");
+  old["format_version"] = 3;
+  EXPECT_THROW(sheet_of(old, "f"), InputError) << "today's have no such outcome";
+}
+
+TEST(AnOlderDocument, OfStagesHasALimitOfTheStepAndMayNameNoSuite) {
+  json old = bench("stages");
+  old["format_version"] = 1;
+  old.erase("suite");
+  json scene = {{"scene", "kidney"},         {"split", "blocks"},
+                {"rotation", "svd"},         {"backend", "gpu"},
+                {"topology", json::array()}, {"step_floor", {{"seconds", 1e-3}, {"multiple", 3.0}}},
+                {"cooking", "boxes"}};
+  json step = stage_row("step", 3, nullptr), frame = stage_row("frame", 5, nullptr), other = step;
+  for (json* const row : {&step, &frame, &other}) {
+    row->erase("limit");
+    row->erase("acceleration");
+    (*row)["backend"] = "gpu";
+  }
+  other["split"] = "global";
+  old.update({{"holds", true}, {"scenes", {scene}}, {"rows", {frame, step, other}}});
+  const Sheet sheet = sheet_of(old, "f");
+  EXPECT_EQ(sheet.title, "stages");
+  const Grid* const table = grid_named(sheet, "Every time, beside its limit and its error");
+  ASSERT_NE(table, nullptr);
+  EXPECT_EQ(table->rows.at(0).cells.at(6), "–");
+  EXPECT_EQ(table->rows.at(1).cells.at(6), "1") << "its limit in ms, at the row of its step";
+  EXPECT_EQ(table->rows.at(1).cells.at(7), "3");
+  EXPECT_EQ(table->rows.at(2).cells.at(6), "–") << "of another way of splitting";
+  EXPECT_TRUE(has_note(sheet, "It does not say of which suite it is"));
+  EXPECT_TRUE(has_note(sheet, "they are not to be compared with this one"));
+  for (const Piece& piece : sheet.pieces) {
+    const Chart* const chart = std::get_if<Chart>(&piece);
+    if (!chart) continue;
+    for (const Curve& curve : chart->curves) {
+      for (const Dot& dot : curve.dots) EXPECT_EQ(dot.text.find("acceleration"), std::string::npos) << dot.text;
+    }
+  }
+  old["format_version"] = 3;
+  EXPECT_THROW(sheet_of(old, "f"), InputError);
+}
+
+TEST(AnOlderDocument, OfRotationsHasLimitsThatWereCalledFloors) {
+  json old = bench("rotations");
+  old["format_version"] = 1;
+  old.update({{"holds", true},
+              {"rows", json::array()},
+              {"methods",
+               {{{"method", "svd"},
+                 {"precision", "single"},
+                 {"default", true},
+                 {"on_front", true},
+                 {"near_seconds_per_million", times(2)},
+                 {"worst_gap", 1e-7},
+                 {"worst_case", "plain"},
+                 {"worst_orthogonality", 1e-7},
+                 {"answers", 5},
+                 {"wrong", 0},
+                 {"multiple_of_floor", 128.0}}}}});
+  EXPECT_EQ(grid_named(sheet_of(old, "f"), "Methods")->rows.at(0).cells.at(3), "128");
+}
+
+TEST(ADocument, WithoutAFormatIsRefusedByWhatItHolds) {
+  const auto said = [](const json& document) {
+    try {
+      kind_of(document, "f.json");
+    } catch (const InputError& error) {
+      EXPECT_EQ(error.field(), "format");
+      return std::string(error.what());
+    }
+    return std::string("nothing");
+  };
+  EXPECT_NE(said({{"steps", json::array()}}).find("no command of cutproof has written the file"), std::string::npos);
+  const std::string collection = said({{"runs", {{{"a", 1}}, bench("stages"), bench("stages")}}});
+  EXPECT_NE(collection.find("holds 2 documents of cutproof within another, the first as 'runs[1]'"), std::string::npos)
+      << collection;
+  EXPECT_NE(collection.find("files of their own"), std::string::npos) << collection;
+}
+
 TEST(ADocument, ThatIsNoneIsRefusedByFieldWithARemedy) {
   const json good = campaign({property("coverage", 0)});
   const auto refused = [](json bad, const std::string& pointer, const json& value, const std::string& field) {
@@ -218,7 +475,9 @@ TEST(ADocument, ThatIsNoneIsRefusedByFieldWithARemedy) {
     }
   };
   refused(good, "/format", "cutproof.mesh", "format");
-  refused(good, "/format_version", 3, "format_version");
+  refused(good, "/format_version", 5, "format_version");
+  refused(good, "/format_version", 0, "format_version");
+  refused(bench("stages"), "/format_version", 4, "format_version");
   refused(good, "/cases", -1, "cases");
   refused(good, "/seed", -1, "seed");
   refused(good, "/sizes", {1}, "sizes");

@@ -126,6 +126,57 @@ with Browser(work / "expand.html") as page:
     page.scrub(page.data("findings[0].marks.moment"))
     assert "a cluster grew over it (1 particle)" in page.text("#legend"), page.text("#legend")
 
+# --- Scrubbing where pictures take long: no figure of time, but in what order things happen ---
+
+with Browser(work / "holds.html", still=False) as page:
+    page.pixels()
+    # The page is kept from going on for longer than a rest, between what somebody wants and its picture.
+    drawn = page.driver.execute_async_script("""const done = arguments[0], range = document.getElementById('scrub'), canvas = document.getElementById('canvas');
+      const busy = (ms) => { const end = performance.now() + ms; while (performance.now() < end); };
+      const drawn = [], sizes = [];
+      new MutationObserver(() => drawn.push(canvas.dataset.drawn)).observe(canvas, { attributeFilter: ['data-drawn'] });
+      (async () => {
+        for (let k = 1; k <= 10; ++k) {
+          range.value = k;
+          range.dispatchEvent(new Event('input'));
+          busy(300);
+          while (document.documentElement.dataset.shown !== `${k}/`) await new Promise((next) => setTimeout(next, 0));
+          await new Promise((next) => requestAnimationFrame(next));
+          busy(120);  // as a picture that is drawn for so long
+          await new Promise((next) => requestAnimationFrame(next));
+          sizes.push(canvas.width / canvas.clientWidth);
+        }
+        done({ drawn: [...drawn], sizes });
+      })();""")
+    assert drawn["drawn"].count("quick") >= 10, drawn
+    assert "sharp" not in drawn["drawn"], f"somebody who scrubs waits for a sharp picture: {drawn}"
+    assert drawn["sizes"][0] > 0.45 > 0.3 > drawn["sizes"][-1] > 0.2, f"pictures become no coarser: {drawn['sizes']}"
+    page.pixels()  # a sharp one comes at rest
+    assert page.ask("const c = document.getElementById('canvas'); return c.width / c.clientWidth") > 0.99
+    # Without a GPU corners that are rounded off cost a quarter of each moment.
+    assert page.ask("const c = document.getElementById('canvas'); return [c, c.parentElement].every((e) => getComputedStyle(e).borderRadius === '0px')")
+    # What is said as before is not written again.
+    page.ask("window.kept = document.getElementById('legend').firstChild")
+    page.scrub(3)
+    assert page.ask("return window.kept === document.getElementById('legend').firstChild && window.kept.isConnected")
+    # Particles behind others do not go through the GPU.
+    page.ask("""window.points = [];
+      for (const kind of [WebGLRenderingContext, WebGL2RenderingContext]) {
+        const { drawElements, drawArrays } = kind.prototype;
+        kind.prototype.drawElements = function (mode, count, ...more) { if (mode === 0) window.points.push(count); return drawElements.call(this, mode, count, ...more); };
+        kind.prototype.drawArrays = function (mode, first, count) { if (mode === 0) window.points.push(count); return drawArrays.call(this, mode, first, count); };
+      }""")
+    page.choose("show", "particles")
+    page.scrub(2)
+    assert page.pixels()["share"] > 0.02
+    counts, kept = page.ask("return window.points"), page.data("body.kept")
+    assert counts and 0 < max(counts) < 0.9 * kept, (counts, kept)
+    # Removed ones are drawn if somebody wants them, wherever they are in the list.
+    page.ask("window.points = []; document.getElementById('removed').click()")
+    page.scrub(page.data("moments.length") - 1)
+    removed = page.data("body.particles") - page.data("moments")[-1]["particles"]
+    assert removed > 0 and max(page.ask("return window.points")) > removed
+
 # --- Two recordings: the same twice, and one that goes its own way ---
 
 work.run([program, "run", "halves.json", "--record", "again"], 0)

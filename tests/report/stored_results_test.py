@@ -1,0 +1,83 @@
+#!/usr/bin/env python3
+"""Every stored result (docs/results/*.json), whatever version has written it: `cutproof report` makes a page of it, or
+says in a clear sentence why there is none. Usage: stored_results_test.py CUTPROOF RESULTS WORK. Needs no browser."""
+import json
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+
+program, results, work = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
+shutil.rmtree(work, ignore_errors=True)
+work.mkdir(parents=True)
+
+# Put together by hand of several results, so no command has written them: what they hold has no page as it stands.
+COLLECTIONS = {"cpu_scenes_converged", "h200_baselines_sizes", "h200_geometry_sizes", "h200_guests", "h200_kit_summary",
+               "h200_lockstep", "h200_lockstep_groups", "h200_scenes_converged"}
+LATEST = {"cutproof.fuzz": 4, "cutproof.bench": 3, "cutproof.judge": 1}
+
+
+def shown_in(page):
+    text = page.read_text()
+    begin = text.index('id="data">') + len('id="data">')
+    return json.loads(text[begin:text.index("</script>", begin)])
+
+
+def made(file, page):
+    return subprocess.run([program, "report", file, "-o", page], capture_output=True, text=True, timeout=100)
+
+
+files = sorted(results.glob("*.json"))
+assert len(files) > 100, f"{len(files)} files in {results}"
+older = inner = 0
+for file in files:
+    page = work / (file.stem + ".html")
+    done = made(file, page)
+    said = done.stdout + done.stderr
+    if file.stem in COLLECTIONS:
+        assert done.returncode == 2 and not page.exists(), f"{file}: {done.returncode}\n{said}"
+        assert str(file) in said and "format" in said and "remedy" in said, said
+        print(f"no page: {said.strip()}")
+        # The remedy holds: what such a file has within it, as a file of its own, makes a page; a run's needs a recording.
+        within = json.loads(file.read_text())
+        held = within.get("runs", []) if "runs" in within else list(within.get("judged", within).values())
+        for one in held:
+            if not isinstance(one, dict) or not one.get("format", "").startswith("cutproof."):
+                continue
+            (work / "one.json").write_text(json.dumps(one))
+            done = made(work / "one.json", page)
+            is_run = one["format"] == "cutproof.run"
+            assert done.returncode == (2 if is_run else 0), f"{file}: {done.stdout}{done.stderr}"
+            assert not is_run or "give the recording as well" in done.stdout + done.stderr, done.stderr
+            if not is_run:
+                assert shown_in(page)["sheets"][0]["holds"] == one["holds"], file
+                inner += 1
+        page.unlink(missing_ok=True)
+        continue
+    assert done.returncode == 0, f"{file}: {done.returncode}\n{said}"
+    document, (sheet,) = json.loads(file.read_text()), shown_in(page)["sheets"]
+    is_older = document["format_version"] < LATEST[document["format"]]
+    older += is_older
+    says_so = any("An older version of cutproof has written this" in note for note in sheet["notes"])
+    assert says_so == is_older, f"{file}: {sheet['notes']}"
+    # What the document says of itself is what the page says of it: none of these is worse than it says.
+    assert sheet["holds"] in (document.get("holds"), document.get("found") is not None), (file, sheet["holds"])
+    if document["format"] == "cutproof.fuzz":
+        assert f"{document['cases']:,} random dissections" in sheet["summary"], sheet["summary"]
+        counted = document.get("coverage", document.get("happened"))
+        rows = next(one for one in sheet["pieces"] if one["title"] == "What occurred in the cases")["rows"]
+        seen = {name: int(count.replace(",", "")) for name, count in (row["cells"] for row in rows)}
+        assert seen == {name: n for name, n in counted.items() if n or document["dynamics"]}, file
+        tables = [one["title"] for one in sheet["pieces"]]
+        assert ("Every property" in tables) == ("properties" in document), (file, tables)
+        assert sheet["again"].startswith(f"cutproof fuzz --backend {document['backend']} "), sheet["again"]
+        assert not re.search(r"--rotation( |'')", sheet["again"]) or "rotation" in document, sheet["again"]
+    if document.get("suite") == "tune":
+        outcomes = [row["cells"][1] for row in sheet["pieces"][-1]["rows"]]
+        late = sum(one["outcome"] in ("dearer", "more_expensive") for one in document["trials"])
+        assert outcomes.count("given up as more expensive") == late, file
+    page.unlink()
+assert older > 60 and inner == 29, (older, inner)
+print(f"{len(files)} files: {len(files) - len(COLLECTIONS)} pages, {older} of them of older versions; "
+      f"{len(COLLECTIONS)} refused by name, and {inner} pages of what they hold")
