@@ -136,7 +136,8 @@ void add_timing(CLI::App& command, benchmarks::TimingOptions& options) {
   add_count(command, "--iterations", options.iterations, "of a substep, instead of the scene's",
             whole_number(1, 1'000'000));
   command
-      .add_option("--remove", options.remove, "ends of an edge that is too long: both or one, instead of the scene's")
+      .add_option("--remove", options.remove,
+                  "ends of an edge that is too long: both, one or nearer, instead of the scene's")
       ->type_name("E")
       ->check(one_of({"both", "one"}));
 }

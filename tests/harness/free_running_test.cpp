@@ -90,6 +90,56 @@ TEST(FreeRunning, ExplainsAnotherEndOfAnEdgeByTheSideOfTheBladeThatItIsOn) {
   }
 }
 
+// The nearer end of each edge: two particles too far apart, each a cluster of its own, and the plane of the blade all
+// but so much nearer to the positive one that it goes. In the other run it went: right where that run has it nearer by
+// so much, and explained by how far the runs are apart; wrong where it has not.
+TEST(FreeRunning, ExplainsAnotherEndOfAnEdgeByWhichIsNearerToTheBlade) {
+  constexpr double off = 1e-6;
+  for (const bool nearer_there : {true, false}) {
+    cutproof::Setup setup;
+    setup.body = fixtures::block(2, 1, 1, 1.0);
+    setup.step.substeps = 1;
+    setup.step.iterations = 0;
+    setup.substep_length = {0.01};
+    setup.detect.remove = RemovedEnds::nearer;
+    State start = fixtures::cook(setup.body, {}, setup.expand, setup.merge, 1);
+    start.clusters = {};
+    for (int32_t c = 0; c < 2; ++c) {
+      start.clusters.number.push_back(c);
+      start.clusters.offsets.push_back(c + 1);
+      start.clusters.members.push_back(c);
+      start.clusters.rotation.emplace_back();
+      start.clusters.degenerate.push_back(1);
+    }
+    start.clusters.mass.resize(2);
+    start.clusters.rest_center.resize(2);
+    reference::update_rest_frames(setup.body, start.clusters);
+    start.x[1].x += 1;
+    const double middle = (start.x[0].x + start.x[1].x) / 2;
+    // Its negative side is that of 0, from which it is farther by an eighth of h, less 2 off.
+    const BladePose pose = {{middle + kNearerBy / 2 - off, 100, 100}, {0, 1, 0}, {0, 0, 1}};
+    setup.has_blade = true;
+    setup.blade = {0.001, 0.001, 0, 0};
+    setup.blade_moves = {{pose, pose, true, 0}};
+    setup.stroke_end = {0};
+    FreeRunning running(setup, start, start, "a backend");
+    State other = start;
+    if (nearer_there) other.x[1].x -= 2 * off + 1e-9;
+    running.see(Stage::step, other);
+    ASSERT_FALSE(running.first_difference());
+    other.alive[1] = 0;
+    other.removed = {1};
+    running.see(Stage::detect, other);
+    ASSERT_TRUE(running.first_difference());
+    const FirstDifference& first = *running.first_difference();
+    EXPECT_EQ(first.what.particles, (std::vector<int32_t>{0, 1}));
+    ASSERT_TRUE(first.margin);
+    EXPECT_NEAR(*first.margin, 2 * off, 1e-12);
+    EXPECT_EQ(first.reach > 2 * off, nearer_there);
+    EXPECT_EQ(first.explained, nearer_there);
+  }
+}
+
 TEST(FreeRunning, EndsWithAStateThatCannotBeRead) {
   State torn = scene().state;
   torn.clusters.members.front() = 1 << 30;
