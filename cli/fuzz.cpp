@@ -248,6 +248,13 @@ json keep(const Violation& violation, const FuzzOptions& options, const BackendC
   if (simplified.alone) {
     kept["simplified"] = size_of(found.failing);
     kept["simplified"]["text"] = simplified.text;
+    // Another property may fail first in it than in the case as it was drawn.
+    const Judgement judged = dissect_alone([&] { return backend_of(found, choice); }, found.failing, true);
+    if (judged.failure) {
+      kept["simplified"]["property"] = judged.failure->property;
+      kept["simplified"]["stage"] = name_of(judged.failure->stage);
+      kept["simplified"]["witness"] = judged.failure->witness.text;
+    }
   }
   return kept;
 }

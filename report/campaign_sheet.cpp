@@ -55,7 +55,10 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
   violations.each([&](const Field& one) {
     Card card;
     card.title = one["property"].text() + " after " + one["stage"].text();
-    card.words = one["witness"].text_or("");
+    // Of the case that its counterexample shows.
+    const Field simplified = one["simplified"];
+    if (simplified.is_there()) card.words = simplified["witness"].text_or("");
+    if (card.words.empty()) card.words = one["witness"].text_or("");
     if (card.words.empty()) card.words = one["text"].text();
     card.facts = {{"Case", io::grouped(one["index"].count())}, {"Counterexample", one["file"].text()}};
     if (const Field drawn = one["drawn"]; drawn.is_there()) {
@@ -64,7 +67,6 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
         return fmt::format("{} {} and {} {}", io::grouped(particles), particles == 1 ? "particle" : "particles",
                            io::grouped(strokes), strokes == 1 ? "stroke" : "strokes");
       };
-      const Field simplified = one["simplified"];
       card.facts.emplace_back(
           "Simplification",
           simplified.is_there()

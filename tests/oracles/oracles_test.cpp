@@ -57,14 +57,14 @@ TEST(OneStateOracles, AcceptABodyThatIsCutAwayEntirely) {
   for (const auto oracle : kOracles) expect_holds(oracle(block.setup, block.state));
 }
 
-TEST(OneStateOracles, SayNotJudgedOnAStateThatIsNotWellFormed) {
+TEST(OneStateOracles, SayThatTheyCouldNotJudgeAStateThatIsNotWellFormed) {
   Block block;
   block.state.clusters.members[5] = 1000;
   for (const auto oracle : kOracles) {
     const Verdict verdict = oracle(block.setup, block.state);
     EXPECT_FALSE(verdict.holds);
     if (oracle == well_formed) continue;
-    EXPECT_NE(verdict.witness.text.find("not judged"), std::string::npos) << verdict.property;
+    EXPECT_NE(verdict.witness.text.find("could not be judged"), std::string::npos) << verdict.property;
     EXPECT_EQ(verdict.checked, 0);
   }
 }
@@ -93,7 +93,7 @@ TEST(OneStateOracles, SurviveRandomCorruption) {
   EXPECT_GT(rejected, 4000);
 }
 
-TEST(StageOracles, SayNotJudgedIfEitherStateIsNotWellFormed) {
+TEST(StageOracles, SayThatTheyCouldNotJudgeIfEitherStateIsNotWellFormed) {
   const Pair good = cut_row();
   for (const bool before : {true, false}) {
     Pair pair = good;
@@ -101,7 +101,7 @@ TEST(StageOracles, SayNotJudgedIfEitherStateIsNotWellFormed) {
     for (const auto oracle : {detection, split_exactness, merge_legality, expansion}) {
       const Verdict verdict = oracle(pair.setup, pair.before, pair.after);
       EXPECT_FALSE(verdict.holds);
-      EXPECT_NE(verdict.witness.text.find("not judged"), std::string::npos);
+      EXPECT_NE(verdict.witness.text.find("could not be judged"), std::string::npos);
       EXPECT_NE(verdict.witness.text.find(before ? "before the stage" : "after the stage"), std::string::npos);
     }
   }

@@ -785,7 +785,7 @@ TEST(Relations, StatesThatAreNotWellFormedAreNotJudged) {
         translation_is_exact(*backend, scene.setup, scene.state, {}),
         refinement(*backend, scene.setup, scene.state, 1)}) {
     EXPECT_FALSE(verdict.holds) << verdict.property;
-    EXPECT_TRUE(mentions(verdict, "not judged")) << verdict.property;
+    EXPECT_TRUE(mentions(verdict, "could not be judged")) << verdict.property;
   }
 }
 
