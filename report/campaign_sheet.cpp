@@ -212,7 +212,9 @@ Sheet judge_sheet(const Field& document) {
   sheet.badge = *sheet.holds ? "✓ holds" : failing == 0 && !is_complete ? "✕ incomplete" : "✕ fails";
   const std::string what = library.empty() ? sheet.title : fmt::format("{} ({})", sheet.title, library);
   sheet.summary =
-      *sheet.holds  ? fmt::format("cutproof judged the kernels of {}: everything that was judged holds.", what)
+      *sheet.holds ? fmt::format("cutproof judged the kernels of {}: everything that was judged holds.", what)
+      : failing == 1 && judged == 1
+          ? fmt::format("cutproof judged the kernels of {}: the one operation that was judged fails.", what)
       : failing > 0 ? fmt::format("cutproof judged the kernels of {}: {} of {} operations {}.", what, failing, judged,
                                   failing == 1 ? "fails" : "fail")
       : !is_complete

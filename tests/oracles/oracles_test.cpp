@@ -9,6 +9,7 @@
 #include <set>
 #include <string>
 
+#include "oracles/figures.h"
 #include "oracles/surface/surface.h"
 #include "tests/oracles/corruptions.h"
 #include "tests/oracles/expectations.h"
@@ -55,6 +56,16 @@ TEST(OneStateOracles, AcceptABodyThatIsCutAwayEntirely) {
   block.state.skin = {};
   block.state.frame = 3;
   for (const auto oracle : kOracles) expect_holds(oracle(block.setup, block.state));
+}
+
+TEST(Figures, HaveSixDigitsUnlessThoseHideWhatIsSaid) {
+  EXPECT_EQ(figure(1.0000000000000002), "1");
+  EXPECT_EQ(figure(1.0 / 3), "0.333333");
+  EXPECT_EQ(figure_beside(1.0000000000000002, 1), "1.0000000000000002");
+  EXPECT_EQ(figure_beside(1, 1), "1");
+  EXPECT_EQ(figure_beside(0.25000004, 0.25), "0.25000004");
+  EXPECT_EQ(figure_beside(kNan, kNan), figure(kNan));
+  EXPECT_EQ(sentence("{} {:.3g} {} {}", 2.0 / 3, 2.0 / 3, 1'234'567, "h"), "0.666667 0.667 1234567 h");
 }
 
 TEST(OneStateOracles, SayThatTheyCouldNotJudgeAStateThatIsNotWellFormed) {
