@@ -49,7 +49,7 @@ TEST(SplitExactness, SaysWhatHasBecomeOfAPiece) {
   const auto text_of = [](const Lists& lists, const Numbers& numbers) {
     Pair pair = cut_row();
     set_clusters(pair.setup, pair.after, lists, numbers);
-    pair.after.clusters.rotation.assign(lists.size(), Mat3{});
+    pair.after.clusters.rotation.assign(lists.size(), turn_about_z(0));
     return split_exactness(pair.setup, pair.before, pair.after).witness.text;
   };
   EXPECT_EQ(text_of({{0, 1, 2}, {1, 2, 3}, {3}, {7, 8}, {5, 6, 7}}, {0, 2, 5, 6, 8}),
