@@ -150,8 +150,8 @@ void violate(Verdict& verdict, Concerned concerned, fmt::format_string<Readable<
 inline Verdict conclude(Verdict verdict, std::string_view nothing) {
   if (verdict.holds && !(std::isfinite(verdict.measured) && std::isfinite(verdict.bound))) {
     verdict.holds = false;
-    verdict.witness.text = fmt::format("what was measured, {} {}, or its bound, {} {}, is not finite", verdict.measured,
-                                       verdict.unit, verdict.bound, verdict.unit);
+    verdict.witness.text = sentence("what was measured, {} {}, or its bound, {} {}, is not finite", verdict.measured,
+                                    verdict.unit, verdict.bound, verdict.unit);
   }
   const bool is_vacuous = verdict.holds && verdict.checked == 0;
   if (!is_vacuous) verdict.vacuous.clear();
