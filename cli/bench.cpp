@@ -139,7 +139,7 @@ void add_timing(CLI::App& command, benchmarks::TimingOptions& options) {
       .add_option("--remove", options.remove,
                   "ends of an edge that is too long: both, one or nearer, instead of the scene's")
       ->type_name("E")
-      ->check(one_of({"both", "one"}));
+      ->check(one_of({"both", "one", "nearer"}));
 }
 
 void print_scene(const nlohmann::json& document) {

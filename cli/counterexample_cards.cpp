@@ -9,6 +9,7 @@
 #include "model/at.h"
 #include "model/counted.h"
 #include "model/error.h"
+#include "oracles/registry.h"
 #include "property_tests/campaign.h"
 #include "property_tests/shown_case.h"
 #include "property_tests/simplify.h"
@@ -90,10 +91,12 @@ std::optional<bool> add_counterexample(report::Card& card, const Counterexample&
   }
   const std::optional<Verdict>& failure = judgement.failure;
   if (failure) {
-    add("Run again", fmt::format("it fails on {}: {} in frame {} after {}", choice.name, failure->property,
+    add("Run again", fmt::format("it fails on {}: '{}' in frame {} after {}", choice.name, failure->property,
                                  failure->frame, name_of(failure->stage)));
     add("Measured / bound",
-        with_unit(failure->measured, failure->unit) + " / " + with_unit(failure->bound, failure->unit));
+        oracles::could_be_judged(failure->witness.text)
+            ? with_unit(failure->measured, failure->unit) + " / " + with_unit(failure->bound, failure->unit)
+            : std::string("nothing / none"));
     if (!failure->bound_source.empty()) add("Where the bound comes from", failure->bound_source);
     if (!failure->witness.text.empty()) card.words = failure->witness.text;
   } else if (judgement.verdicts == 0) {

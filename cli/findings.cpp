@@ -26,9 +26,16 @@ std::string what_was_found(const Verdict& verdict) {
   return verdict.witness.text.empty() ? io::verdict_text(verdict) : verdict.witness.text;
 }
 
+// Of the case that its command shows: the simplified one, where there is one.
+const json& as_it_is_shown(const json& violation) {
+  const auto simplified = violation.find("simplified");
+  return simplified != violation.end() && simplified->contains("text") ? *simplified : violation;
+}
+
 std::string what_was_found(const json& violation) {
-  const std::string witness = violation.value("witness", "");
-  return witness.empty() ? violation.at("text").get<std::string>() : witness;
+  const json& shown = as_it_is_shown(violation);
+  const std::string witness = shown.value("witness", "");
+  return witness.empty() ? shown.at("text").get<std::string>() : witness;
 }
 
 // Of one property after one stage.
@@ -128,7 +135,7 @@ std::vector<JunitCase> cases_of_campaign(const json& document, const std::string
   for (const json& violation : document.at("violations")) {
     JunitCase& one =
         case_named(case_name(violation.value("property", "violation"), violation.value("stage", "a case")));
-    const auto text = violation.at("text").get<std::string>();
+    const auto text = as_it_is_shown(violation).at("text").get<std::string>();
     if (one.outcome != JunitOutcome::failed || one.text.empty()) one.message = what_was_found(violation);
     one.outcome = JunitOutcome::failed;
     one.text += fmt::format("case {}: {}\nsee it again: {}\n", violation.at("index").get<int64_t>(), text,
@@ -161,8 +168,8 @@ std::vector<Failure> failures_of_campaign(const json& document, const std::strin
   std::vector<Failure> failures;
   if (is_about_the_whole(document, failure)) failures.push_back({kWholeCampaign, failure, judging.again});
   for (const json& violation : document.at("violations")) {
-    failures.push_back(
-        {violation.value("property", "violation"), what_was_found(violation), replay_command(violation, judging)});
+    failures.push_back({as_it_is_shown(violation).value("property", violation.value("property", "violation")),
+                        what_was_found(violation), replay_command(violation, judging)});
   }
   return failures;
 }

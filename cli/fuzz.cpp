@@ -118,6 +118,7 @@ void print_properties(const json& properties) {
   Table table({"property", "after", "judged", "failed", "of bound", "undecided"});
   const json* nearest = nullptr;
   int64_t holds = 0, judged = 0, doubtful = 0;
+  std::vector<std::string> failed;
   for (const json& each : properties) {
     const bool has_share = each.at("of_bound").is_number();
     table.add({printable(io::filled("{property}", each)), printable(io::filled("{stage}", each)),
@@ -125,8 +126,7 @@ void print_properties(const json& properties) {
                has_share ? io::filled("{of_bound:.2g}", each) : "-",
                each.at("undecided") > 0 ? io::filled("{undecided} of {checked}", each) : "-"});
     if (each.at("failed") > 0) {
-      insist("{}: {}\n", failing("FAILS"),
-             io::filled("{property} after {stage}, in {failed} of {judged} verdicts", each));
+      failed.push_back(printable(io::filled("{property} after {stage} ({failed} of {judged} verdicts)", each)));
     } else if (each.at("judged") > 0) {
       ++holds;
       judged += each.at("judged").get<int64_t>();
@@ -135,6 +135,7 @@ void print_properties(const json& properties) {
     doubtful += each.at("undecided").get<int64_t>();
   }
   if (style().verbose) say_as_it_is(table.text());
+  if (!failed.empty()) insist("{}: {}\n", failing("what fails"), fmt::join(failed, ", "));
   if (holds > 0) {
     say("{} pairs of a property and a stage {}, in {} verdicts", holds, holding(holds == 1 ? "holds" : "hold"),
         io::grouped(judged));
@@ -148,7 +149,7 @@ void print_properties(const json& properties) {
 
 }  // namespace
 
-int print_conclusion(const json& document, const CampaignConclusion& conclusion) {
+void print_campaign(const json& document) {
   print_coverage(document);
   print_properties(document.at("properties"));
   if (document.contains("steps_compared")) {
@@ -164,6 +165,12 @@ int print_conclusion(const json& document, const CampaignConclusion& conclusion)
       "{cases} cases of {mean_particles:.0f} particles on average, {verdicts} verdicts, {seconds:.1f} s, "
       "{cases_per_second:.0f} cases/s\n",
       document);
+}
+
+namespace {
+
+int print_conclusion(const json& document, const CampaignConclusion& conclusion) {
+  print_campaign(document);
   if (conclusion.holds()) {
     insist("{}\n", holding("all hold"));
   } else {
@@ -173,8 +180,6 @@ int print_conclusion(const json& document, const CampaignConclusion& conclusion)
   }
   return conclusion.holds() ? 0 : 1;
 }
-
-namespace {
 
 // What a campaign came to goes into files first: these are kept even if standard output cannot be written.
 int conclude_campaign(const FuzzOptions& options, const json& document, bool whole) {
@@ -248,6 +253,13 @@ json keep(const Violation& violation, const FuzzOptions& options, const BackendC
   if (simplified.alone) {
     kept["simplified"] = size_of(found.failing);
     kept["simplified"]["text"] = simplified.text;
+    // Another property may fail first in it than in the case as it was drawn.
+    const Judgement judged = dissect_alone([&] { return backend_of(found, choice); }, found.failing, true);
+    if (judged.failure) {
+      kept["simplified"]["property"] = judged.failure->property;
+      kept["simplified"]["stage"] = name_of(judged.failure->stage);
+      kept["simplified"]["witness"] = judged.failure->witness.text;
+    }
   }
   return kept;
 }

@@ -1,5 +1,6 @@
 // `cutproof judge`: somebody's own kernels, from a shared library.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -221,7 +222,10 @@ bool judge_stages(const JudgeOptions& options, bool dynamics, json& document, st
   for (io::JunitCase& each : cases_of_campaign(result, conclusion.failure, judging)) cases.push_back(std::move(each));
   for (Failure& each : failures_of_campaign(result, conclusion.failure, judging)) failures.push_back(std::move(each));
   document[dynamics ? "moving_dissections" : "dissections"] = result;
-  return print_conclusion(result, conclusion) == 0;
+  print_campaign(result);
+  // That cases fail has been said of each.
+  if (!conclusion.holds() && result.at("violations").empty()) insist("{}: {}\n", failing("FAILS"), conclusion.failure);
+  return conclusion.holds();
 }
 
 int replay(const JudgeOptions& options, Guest& guest) {
@@ -276,6 +280,7 @@ int judge(JudgeOptions options) {
   say("{}, seed {}\n", title(guest.plugin(), options.guest.library), options.campaign.seed);
   flush_output();
   bool holds = true;
+  std::vector<std::string> failed;  // operations
   std::vector<io::JunitCase> junit;
   std::vector<Failure> failures;
   json document = {{"format", "cutproof.judge"},
@@ -320,6 +325,7 @@ int judge(JudgeOptions options) {
     }
     document["operations"].push_back(std::move(result));
     holds = holds && campaign.holds();
+    if (!campaign.holds()) failed.emplace_back(operation->name);
     flush_output();
     if (campaign.ended || stop_asked()) break;
   }
@@ -327,10 +333,13 @@ int judge(JudgeOptions options) {
   const bool on_stages =
       has_stages(guest.plugin()) && (names.empty() || std::find(names.begin(), names.end(), kOnStages) != names.end());
   if (on_stages) {
+    bool all_hold = true;
     for (const bool dynamics : {false, true}) {
       if (stop_asked() || (dynamics && !steps(guest.plugin()))) continue;
-      holds = judge_stages(options, dynamics, document, junit, failures) && holds;
+      all_hold = judge_stages(options, dynamics, document, junit, failures) && all_hold;
     }
+    holds = holds && all_hold;
+    if (!all_hold) failed.emplace_back(kOnStages);
   }
   const bool complete = !stop_asked();
   if (!complete) {
@@ -360,7 +369,8 @@ int judge(JudgeOptions options) {
   for (const io::JunitCase& each : junit) seconds += each.seconds;
   write_junit(options.junit, {"cutproof judge", kClass, options.again}, seconds, std::move(junit));
   print_written(options.report);
-  if (complete) insist("{}\n", holds ? holding("all hold") : failing("FAILS"));
+  if (complete && holds) insist("{}\n", holding("all hold"));
+  if (complete && !holds) insist("{}{}{}\n", failing("FAILS"), failed.empty() ? "" : ": ", fmt::join(failed, ", "));
   print_annotations(failures);
   return holds ? 0 : 1;
 }

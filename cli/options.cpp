@@ -109,10 +109,12 @@ std::string as_given(const CLI::App& command) {
     if (option->get_group() == kStyleGroup) continue;  // how it is printed changes nothing
     const bool is_word = option->get_lnames().empty() && option->get_snames().empty();
     std::string& text = is_word ? words : options;
-    if (!is_word) text += " " + name;
+    // Of one that takes one value each time, each value behind the name; else all behind one.
+    const bool again = !is_word && !option->get_allow_extra_args() && option->results().size() > 1;
+    if (!is_word && !again) text += " " + name;
     if (option->get_expected_max() == 0) continue;  // a flag
     for (const std::string& value : option->results()) {
-      if (!value.empty()) text += " " + quoted(value);
+      if (!value.empty()) text += (again ? " " + name : "") + " " + quoted(value);
     }
   }
   std::string name = command.get_name();

@@ -15,6 +15,8 @@
 #include "model/io/columns.h"
 #include "model/io/filled.h"
 #include "model/io/verdict_json.h"
+#include "oracles/property_count.h"
+#include "oracles/registry.h"
 
 namespace cutproof::cli {
 
@@ -91,8 +93,8 @@ std::string plural(int64_t count, const char* one, const char* several) {
 }
 
 // What a scene expects is not of a stage.
-constexpr std::string_view kExpected = "expected ";
-bool is_expectation(const Row& row) { return row.any->property.starts_with(kExpected); }
+bool is_expectation(const Row& row) { return row.any->property.starts_with(oracles::kExpectation); }
+bool was_judged(const Verdict& verdict) { return verdict.holds || oracles::could_be_judged(verdict.witness.text); }
 
 std::string name_of_row(const Row& row, const Shown& shown) {
   const bool has_stage = shown.in_frames && !is_expectation(row);
@@ -107,17 +109,27 @@ std::string measured_and_bound(const Verdict& verdict) {
 std::string listed(const std::vector<std::string>& names) { return fmt::format("{}", fmt::join(names, ", ")); }
 
 void print_failing(const std::vector<Row>& rows, const Shown& shown) {
-  std::size_t failures = 0;
+  // By the time at which each begins to fail: what comes first is nearest to the cause.
+  std::vector<const Row*> failing_rows;
   for (const Row& row : rows) {
-    if (row.failed == 0 || ++failures > kMostFailuresShown) continue;
+    if (row.failed > 0) failing_rows.push_back(&row);
+  }
+  std::stable_sort(failing_rows.begin(), failing_rows.end(), [](const Row* a, const Row* b) {
+    const Verdict &one = *a->first_failing, &other = *b->first_failing;
+    return std::pair(one.frame, one.stage) < std::pair(other.frame, other.stage);
+  });
+  const std::size_t failures = failing_rows.size();
+  for (std::size_t k = 0; k < std::min(failures, kMostFailuresShown); ++k) {
+    const Row& row = *failing_rows[k];
     const Verdict &first = *row.first_failing, &worst = *row.worst_failing;
     say("\n");
     insist("{}: {}", failing("FAILS"), name_of_row(row, shown));
     if (shown.in_frames) insist(", {}in frame {}", row.failed > 1 ? "first " : "", first.frame);
     if (row.failed > 1) insist(" ({} of {} verdicts)", io::grouped(row.failed), io::grouped(row.verdicts));
-    insist("\n  {} ({})\n", measured_and_bound(first), first.bound_source);
+    insist("\n");
+    if (was_judged(first)) insist("  {} ({})\n", measured_and_bound(first), first.bound_source);
     if (!first.witness.text.empty()) insist("  {}\n", first.witness.text);
-    if (&worst != &first && worst.measured > first.measured) {
+    if (&worst != &first && worst.measured > first.measured && was_judged(first) && was_judged(worst)) {
       insist("  worst in frame {}: {}\n", worst.frame, measured_and_bound(worst));
     }
   }
@@ -142,10 +154,11 @@ void print_table(const std::vector<Row>& rows, const Shown& shown) {
     const std::string failed = row.failed + row.expected == 0 ? "-" : fmt::format("{}", row.failed + row.expected);
     std::vector<std::string> cells = {worst.property};
     if (shown.in_frames) cells.insert(cells.end(), {std::string(name_of(worst.stage)), fmt::format("{}", row.looked)});
-    cells.insert(cells.end(),
-                 {short_figure(static_cast<double>(row.checked)), row.failed > 0 ? failing(failed) : failed,
-                  short_figure(worst.measured), short_figure(worst.bound), worst.unit == "1" ? "" : worst.unit,
-                  row.of_bound < 0 ? "-" : share(row.of_bound)});
+    cells.insert(
+        cells.end(),
+        {short_figure(static_cast<double>(row.checked)), row.failed > 0 ? failing(failed) : failed,
+         was_judged(worst) ? short_figure(worst.measured) : "-", was_judged(worst) ? short_figure(worst.bound) : "-",
+         worst.unit == "1" ? "" : worst.unit, row.of_bound < 0 ? "-" : share(row.of_bound)});
     table.add(cells);
   }
   say_as_it_is("\n" + table.text());
@@ -153,29 +166,30 @@ void print_table(const std::vector<Row>& rows, const Shown& shown) {
 
 // What holds, and how near it came.
 void print_holding(const std::vector<Row>& rows, const Shown& shown) {
-  std::set<std::string> wrong, right;
+  std::set<std::string> wrong;
+  std::vector<oracles::AfterStage> counted_rows;
   int64_t verdicts = 0;
   const Row* nearest = nullptr;
   for (const Row& row : rows) {
     if (row.failed + row.expected > 0) wrong.insert(row.any->property);
+    counted_rows.push_back({row.any->property, row.looked > 0, row.failed > 0, row.expected > 0});
   }
+  const int64_t right = oracles::count_properties(counted_rows).hold;
   std::vector<std::string> expected;
   for (const Row& row : rows) {
     if (row.looked == 0 || wrong.contains(row.any->property)) continue;
     if (is_expectation(row)) {
-      expected.push_back(fmt::format("{}: {}", row.any->property.substr(kExpected.size()),
+      expected.push_back(fmt::format("{}: {}", row.any->property.substr(oracles::kExpectation.size()),
                                      io::in_unit(figure(row.any->measured), row.any->unit)));
       continue;
     }
-    right.insert(row.any->property);
     verdicts += row.looked;
     if (row.of_bound > 0 && (nearest == nullptr || row.of_bound > nearest->of_bound)) nearest = &row;
   }
   if (!expected.empty()) say("\n{}: {}.\n", holding("As the scene expects"), listed(expected));
-  if (right.empty()) return;
-  say("{}{} {}, in {}", expected.empty() ? "\n" : "",
-      plural(static_cast<int64_t>(right.size()), "property", "properties"),
-      right.size() == 1 ? holding("holds") : holding("hold"), plural(verdicts, "verdict", "verdicts"));
+  if (right == 0) return;
+  say("{}{} {}, in {}", expected.empty() ? "\n" : "", plural(right, "property", "properties"),
+      right == 1 ? holding("holds") : holding("hold"), plural(verdicts, "verdict", "verdicts"));
   if (nearest != nullptr) {
     say("; the nearest to its bound: {}, at {:.2g} of it", name_of_row(*nearest, shown), nearest->of_bound);
   }

@@ -74,15 +74,16 @@ void RelationSample::ask(const State& begin) {
 }
 
 std::vector<std::string> RelationSample::notes() const {
+  const bool runs_frames = second_->can_run({});
+  if (!runs_frames && !second_->can_run({Stage::step, Stage::step})) {
+    return {
+        "This backend runs neither whole frames nor the step by itself: no relation between its runs could be "
+        "asked of it."};
+  }
   std::vector<std::string> notes = {fmt::format(
       "Relations between runs were asked in {} of {} frames: every {}th, after each cut, and where pieces are new.",
       asked_, frames_, kFramesBetweenSamples)};
-  if (!second_->can_run({})) {
-    const bool steps = second_->can_run({Stage::step, Stage::step});
-    notes.push_back(steps ? "This backend runs no whole frames: 'no ghost force' could not be asked of it."
-                          : "This backend runs neither whole frames nor the step by itself: no relation between its "
-                            "runs could be asked of it.");
-  }
+  if (!runs_frames) notes.push_back("This backend runs no whole frames: 'no ghost force' could not be asked of it.");
   return notes;
 }
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "oracles/blade_motion.h"
@@ -88,15 +90,27 @@ constexpr double kSweepBand = 5e-10;
 constexpr double kTurningSlack = 0.1;
 constexpr double kTurningStep = 1e-3;
 
+// At t in [0, 1] of its turning move.
+double distance_to_turning(const Blade& blade, const BladeMove& move, const Turn& turn, double t, Vec3 x) {
+  const BladePose pose = {move.from.edge + t * (move.to.edge - move.from.edge), rotated(move.from.along, turn, t),
+                          rotated(move.from.back, turn, t)};
+  return distance_to_rectangle(blade, to_local(pose, x - pose.edge));
+}
+
+double least_of_turning(const Blade& blade, const BladeMove& move, const Turn& turn, double h, Vec3 x) {
+  const double rate = norm(move.to.edge - move.from.edge) + std::hypot(blade.length / 2, blade.depth) * turn.angle;
+  const double parts = std::clamp(std::ceil(rate / (2 * kTurningStep * h)), 1.0, 1e6);
+  double least = distance_to_turning(blade, move, turn, 0, x);
+  for (double part = 1; part <= parts; ++part)
+    least = std::min(least, distance_to_turning(blade, move, turn, part / parts, x));
+  return least;
+}
+
 Demand demand_of_turning(const Blade& blade, const BladeMove& move, const Turn& turn, double h, double reach, Vec3 x) {
   const Vec3 way = move.to.edge - move.from.edge;
   const double rate = norm(way) + std::hypot(blade.length / 2, blade.depth) * turn.angle;
   const double must = reach * (1 + kTie - kSweepBand), most = reach + kTurningSlack * h;
-  const auto distance = [&](double t) {
-    const BladePose pose = {move.from.edge + t * way, rotated(move.from.along, turn, t),
-                            rotated(move.from.back, turn, t)};
-    return distance_to_rectangle(blade, to_local(pose, x - pose.edge));
-  };
+  const auto distance = [&](double t) { return distance_to_turning(blade, move, turn, t, x); };
   Demand demand = Demand::keep;
   struct Interval {
     double middle, half;
@@ -137,10 +151,29 @@ class Swept {
     }
   }
 
+  // How near the blade has to come to a particle for that to go [m].
+  double reach_to(double stretch) const {
+    return std::max({setup_.blade.thickness, setup_.body.grid.spacing, stretch}) / 2;
+  }
+
+  // How near it came to x [m], of a turning sweep to kTurningStep · h: for sentences. Nothing: it is not down.
+  std::optional<double> least_distance(Vec3 x) const {
+    const Blade& blade = setup_.blade;
+    std::optional<double> least;
+    for (const auto& [move, extent, turns, turn] : moves_) {
+      const Vec3 way = move->to.edge - move->from.edge;
+      const double distance =
+          turns ? least_of_turning(blade, *move, turn, setup_.body.grid.spacing, x)
+                : distance_to_translated(blade, to_local(move->from, x - move->from.edge), to_local(move->from, way));
+      least = std::min(least.value_or(distance), distance);
+    }
+    return least;
+  }
+
   Demand demand_of(double stretch, Vec3 x, double u) const {
     const Blade& blade = setup_.blade;
     const double h = setup_.body.grid.spacing;
-    const double reach = std::max({blade.thickness, h, stretch}) / 2;
+    const double reach = reach_to(stretch);
     Demand demand = Demand::keep;
     for (const auto& [move, extent, turns, turn] : moves_) {
       const Vec3 way = move->to.edge - move->from.edge;
@@ -163,6 +196,15 @@ class Swept {
       if (here == Demand::either) demand = here;
     }
     return demand;
+  }
+
+  std::string in_words(double stretch, Vec3 x) const {
+    const double h = setup_.body.grid.spacing, limit = reach_to(stretch) / h;
+    const std::optional<double> least = least_distance(x);
+    if (!least) return "the blade is not down in this frame";
+    const double found = *least / h;
+    return sentence("the nearest that the blade comes to it is {} h, and it takes what it comes within {} h of",
+                    figure_beside(found, limit), figure_beside(limit, found));
   }
 
  private:
@@ -212,15 +254,24 @@ void check_detection(const StageRun& run, Verdict& verdict) {
     if (demand == Demand::either || (demand == Demand::remove) == !is) continue;
     std::vector<int32_t> particles = {i};
     if (stretch.neighbour >= 0) particles.push_back(stretch.neighbour);
-    violate(verdict, {{}, particles},
-            "particle {} {} removed, but should {}have been: its greatest neighbour distance is "
-            "{:.17g} h{}",
-            i, is ? "was not" : "was", is ? "" : "not ", stretch.distance / h,
-            criterion == Criterion::distance ? fmt::format(", epsilon = {}", setup.detect.epsilon)
-            : criterion == Criterion::strain
-                ? fmt::format(", the greatest stretch of its clusters {:.17g}, the limit {}", strained[at(i)].stretch,
-                              setup.detect.strain)
-                : "");
+    // Of the first one only, which is the witness: each looks at the whole sweep.
+    std::string why;
+    if (verdict.holds && criterion == Criterion::distance && stretch.neighbour < 0) {
+      why = "it has no living neighbour";
+    } else if (verdict.holds && criterion == Criterion::distance) {
+      why = sentence("it is {} h from its farthest neighbour, and edges beyond {} times their rest length are cut",
+                     figure_beside(stretch.distance / h, epsilon), figure_beside(epsilon, stretch.distance / h));
+    } else if (verdict.holds && criterion == Criterion::geometric) {
+      why = swept.in_words(stretch.distance, before.x[at(i)]);
+    } else if (verdict.holds && criterion == Criterion::strain) {
+      const double found = strained[at(i)].stretch, limit = setup.detect.strain;
+      why = sentence("the greatest stretch of its clusters is {}, and the limit is {}", figure_beside(found, limit),
+                     figure_beside(limit, found));
+    } else if (verdict.holds) {
+      why = "nothing is ever removed in this scene";
+    }
+    violate(verdict, {{}, particles}, "particle {} {} removed, but should {}have been: {}", i, is ? "was not" : "was",
+            is ? "" : "not ", why);
   }
   if (one_end) OneEndOfEach(setup, graph, before).judge(is_gone, verdict);
   if (const auto wrong = first_in_one_only(gone, after.removed)) {

@@ -106,8 +106,8 @@ void check_expansion(const StageRun& run, Verdict& verdict) {
       continue;
     }
     if (published && isolated_before[at(c)] == 0) {
-      violate(verdict, {{number}, {added.front()}}, "cluster {} took in particle {}, but it was not isolated", number,
-              added.front());
+      violate(verdict, {{number}, {added.front()}},
+              "cluster {} took in particle {}, though that cluster was not isolated", number, added.front());
       continue;
     }
     if (!open) open = uncovered_edges(graph, a);

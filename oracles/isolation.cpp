@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "model/counted.h"
 #include "oracles/checks.h"
 
 namespace cutproof::oracles {
@@ -28,9 +29,10 @@ void check_isolation(Judged& judged, Verdict& verdict) {
     }
   }
   fail(verdict, {group, {edge.a, edge.b}, {edge.a, edge.b}},
-       "{} of {} clusters form a group of {} particles that shares no particle with any other cluster, though particle "
+       "{} of {} clusters {} a group of {} that shares no particle with any other cluster, though particle "
        "{} of it is a neighbour of particle {}",
-       group.size(), judged.clusters.count(), group_size(edge.a), edge.a, edge.b);
+       group.size(), judged.clusters.count(), group.size() == 1 ? "is" : "form",
+       counted(group_size(edge.a), "particle", "particles"), edge.a, edge.b);
 }
 
 }  // namespace cutproof::oracles

@@ -6,6 +6,7 @@
 
 #include "model/rules.h"
 #include "oracles/checks.h"
+#include "oracles/rotation_change.h"
 
 namespace cutproof::oracles {
 namespace {
@@ -44,7 +45,8 @@ class MergeDecomposition {
       result_of_[at(c)] = r;
       if (!same_bits(after_.rotation[at(r)], before_.rotation[at(c)]) ||
           after_.degenerate[at(r)] != before_.degenerate[at(c)]) {
-        violate(verdict, {{number}}, "cluster {} did not keep its rotation", number);
+        violate(verdict, {{number}}, "cluster {} did not keep its rotation: {}", number,
+                rotation_change(before_, c, after_, r));
       }
     }
   }

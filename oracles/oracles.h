@@ -4,8 +4,8 @@
 // Every function fills property, holds, measured, bound, unit, bound_source, checked, vacuous and witness, and the
 // frame from the state; the caller adds stage, backend and body. None throws on a broken state, however broken: offsets
 // out of range, particles that do not exist and NaN are verdicts. Of a state that is not well formed all but
-// well_formed answer "not judged" (holds = false, witness.text says why). A verdict of which measured value or bound is
-// not finite fails.
+// well_formed answer that they could not be judged (holds = false; could_be_judged). A verdict of which measured value
+// or bound is not finite fails.
 //
 // Each is a property of oracles/registry.h, asked by itself; oracles/judge.h asks them all.
 #pragma once

@@ -223,7 +223,8 @@ void check_skin_vertices(Judged& judged, Verdict& verdict) {
     if (verdict.measured <= verdict.bound) continue;
     return fail(verdict, {{}, {skin.owner[v]}, {}, around(v)},
                 "vertex {} lies {} h from particle {} in direction {}, where it should lie {} h from it", v,
-                skin.reach[v], skin.owner[v], skin.direction[v], expected);
+                figure_beside(skin.reach[v], expected), skin.owner[v], skin.direction[v],
+                figure_beside(expected, skin.reach[v]));
   }
   const double h = body.grid.spacing;
   Nearest nearest;

@@ -1,10 +1,13 @@
 // Split (method.md §5): exactly the components of what is left of each cluster.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <map>
 #include <set>
 #include <span>
 
 #include "oracles/checks.h"
+#include "oracles/rotation_change.h"
 
 namespace cutproof::oracles {
 namespace {
@@ -128,6 +131,30 @@ void check_split_exactness(const StageRun& run, Verdict& verdict) {
   const TissueGraph graph(setup.body, after.alive);
   const std::vector<ExpectedCluster> expected = expected_split(graph, before.clusters);
   const Clusters& found = after.clusters;
+  // A cluster that must have come out, and did not: where it comes from, and what there is instead.
+  const auto tell_missing = [&](const ExpectedCluster& cluster) {
+    const auto number = static_cast<int32_t>(cluster.number);
+    const int32_t parent = before.clusters.number[at(cluster.parent)];
+    const std::vector<int32_t>& members = cluster.members;
+    if (members.empty()) return violate(verdict, {{number}}, "cluster {} is missing, which was empty before", number);
+    std::string piece = members.size() == 1
+                            ? fmt::format("1 particle ({})", members.front())
+                            : fmt::format("{} particles (the smallest {})", members.size(), members.front());
+    if (cluster.number == parent) {
+      return violate(verdict, {{number}, {members.front()}}, "cluster {} is missing{} {}", number,
+                     cluster.lost ? ": it should have kept the first piece of what is left of it,"
+                                  : ", though it lost nothing: it has",
+                     piece);
+    }
+    std::string instead = "has become no cluster";
+    for (int32_t c = 0; c < found.count(); ++c) {
+      const auto held = found.of(c);
+      if (std::equal(members.begin(), members.end(), held.begin(), held.end()))
+        instead = fmt::format("is cluster {}, where it should be cluster {}", found.number[at(c)], cluster.number);
+    }
+    violate(verdict, {{number, parent}, {members.front()}}, "cluster {} fell apart, and its piece of {} {}", parent,
+            piece, instead);
+  };
   // The first of its members, if it has any.
   const auto first_of = [](std::span<const int32_t> members) {
     return std::vector<int32_t>(members.begin(), members.begin() + (members.empty() ? 0 : 1));
@@ -137,12 +164,7 @@ void check_split_exactness(const StageRun& run, Verdict& verdict) {
   int32_t f = 0;
   while (e < expected.size() || f < found.count()) {
     if (f >= found.count() || (e < expected.size() && expected[e].number < found.number[at(f)])) {
-      const ExpectedCluster& cluster = expected[e++];
-      violate(verdict, {{static_cast<int32_t>(cluster.number)}, first_of(cluster.members)},
-              "cluster {} is missing: it holds {} particles{}, {} of cluster {}", cluster.number,
-              cluster.members.size(),
-              cluster.members.empty() ? "" : fmt::format(", the smallest {}", cluster.members.front()),
-              cluster.lost ? "a component of what is left" : "all", before.clusters.number[at(cluster.parent)]);
+      tell_missing(expected[e++]);
       continue;
     }
     const int32_t number = found.number[at(f)];
@@ -157,8 +179,8 @@ void check_split_exactness(const StageRun& run, Verdict& verdict) {
       tell_difference(verdict, number, cluster.members, members, left_of(graph, before.clusters.of(cluster.parent)));
     } else if (!same_bits(found.rotation[at(f)], before.clusters.rotation[at(cluster.parent)]) ||
                found.degenerate[at(f)] != before.clusters.degenerate[at(cluster.parent)]) {
-      violate(verdict, {{number}}, "cluster {} did not inherit the rotation of cluster {}", number,
-              before.clusters.number[at(cluster.parent)]);
+      violate(verdict, {{number}}, "cluster {} did not inherit the rotation of cluster {}: {}", number,
+              before.clusters.number[at(cluster.parent)], rotation_change(before.clusters, cluster.parent, found, f));
     }
     ++e;
     ++f;

@@ -133,7 +133,8 @@ void check_momentum(const StageRun& run, Verdict& verdict) {
       verdict, {},
       "the frame began with momentum ({}, {}, {}), gravity and contacts account for ({}, {}, {}) at its end, and it is "
       "({}, {}, {}) kg m/s",
-      p.x, p.y, p.z, expected.x, expected.y, expected.z, q.x, q.y, q.z);
+      p.x, p.y, p.z, figure_beside(expected.x, q.x), figure_beside(expected.y, q.y), figure_beside(expected.z, q.z),
+      figure_beside(q.x, expected.x), figure_beside(q.y, expected.y), figure_beside(q.z, expected.z));
 }
 
 // No force joins what is not connected, and the clusters of a component pull at nothing but that component: its
@@ -172,8 +173,9 @@ void check_component_momentum(const StageRun& run, Verdict& verdict) {
       fail(verdict, {{}, {balance.first}},
            "the component of particle {} ({} particles, one of {} components) ends the frame with momentum {} kg m/s "
            "along axis {}; without a force from outside it would be {}",
-           balance.first, balance.particles, components.count, balance.after.total_momentum()[axis], axis,
-           balance.expected[axis]);
+           balance.first, balance.particles, components.count,
+           figure_beside(balance.after.total_momentum()[axis], balance.expected[axis]), axis,
+           figure_beside(balance.expected[axis], balance.after.total_momentum()[axis]));
     }
   }
 }

@@ -20,8 +20,10 @@
 #include "model/at.h"
 #include "model/fields.h"
 #include "model/verdict.h"
+#include "oracles/figures.h"
 #include "oracles/memberships.h"
 #include "oracles/partitions.h"
+#include "oracles/registry.h"
 
 namespace cutproof::oracles {
 
@@ -117,12 +119,12 @@ struct Concerned {
   std::vector<int32_t> clusters = {}, particles = {}, path = {}, triangles = {};
 };
 
-// With a sentence for a person.
+// With a sentence for a person (oracles/figures.h).
 template <class... Args>
-Witness witness_of(Concerned concerned, fmt::format_string<Args...> text, Args&&... args) {
+Witness witness_of(Concerned concerned, fmt::format_string<Readable<Args>...> text, Args&&... args) {
   if (std::ssize(concerned.triangles) > kMostWitnessTriangles) concerned.triangles.resize(kMostWitnessTriangles);
   return {std::move(concerned.clusters), std::move(concerned.particles), std::move(concerned.path),
-          fmt::format(text, std::forward<Args>(args)...), std::move(concerned.triangles)};
+          sentence<Args...>(text, std::forward<Args>(args)...), std::move(concerned.triangles)};
 }
 
 // For a verdict that fills in by itself what was measured.
@@ -131,14 +133,14 @@ inline void fail(Verdict& verdict, Witness witness) {
   verdict.witness = std::move(witness);
 }
 template <class... Args>
-void fail(Verdict& verdict, Concerned concerned, fmt::format_string<Args...> text, Args&&... args) {
-  fail(verdict, witness_of(std::move(concerned), text, std::forward<Args>(args)...));
+void fail(Verdict& verdict, Concerned concerned, fmt::format_string<Readable<Args>...> text, Args&&... args) {
+  fail(verdict, witness_of<Args...>(std::move(concerned), text, std::forward<Args>(args)...));
 }
 
 // Counts one more violation; the first one is the witness.
 template <class... Args>
-void violate(Verdict& verdict, Concerned concerned, fmt::format_string<Args...> text, Args&&... args) {
-  if (verdict.holds) verdict.witness = witness_of(std::move(concerned), text, std::forward<Args>(args)...);
+void violate(Verdict& verdict, Concerned concerned, fmt::format_string<Readable<Args>...> text, Args&&... args) {
+  if (verdict.holds) verdict.witness = witness_of<Args...>(std::move(concerned), text, std::forward<Args>(args)...);
   verdict.holds = false;
   verdict.measured += 1;
 }
@@ -148,8 +150,8 @@ void violate(Verdict& verdict, Concerned concerned, fmt::format_string<Args...> 
 inline Verdict conclude(Verdict verdict, std::string_view nothing) {
   if (verdict.holds && !(std::isfinite(verdict.measured) && std::isfinite(verdict.bound))) {
     verdict.holds = false;
-    verdict.witness.text = fmt::format("what was measured, {} {}, or its bound, {} {}, is not finite", verdict.measured,
-                                       verdict.unit, verdict.bound, verdict.unit);
+    verdict.witness.text = sentence("what was measured, {} {}, or its bound, {} {}, is not finite", verdict.measured,
+                                    verdict.unit, verdict.bound, verdict.unit);
   }
   const bool is_vacuous = verdict.holds && verdict.checked == 0;
   if (!is_vacuous) verdict.vacuous.clear();
@@ -161,7 +163,7 @@ inline Verdict conclude(Verdict verdict, std::string_view nothing) {
 inline Verdict not_judged(std::string_view property, const Verdict& form) {
   Verdict verdict = form;
   verdict.property = property;
-  verdict.witness.text = "not judged: the state is not well formed: " + form.witness.text;
+  verdict.witness.text = fmt::format("{}: the state is not well formed: {}", kNotJudged, form.witness.text);
   verdict.checked = 0;
   return verdict;
 }

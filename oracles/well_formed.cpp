@@ -145,7 +145,7 @@ void check_skin_form(const Skin& skin, int32_t n, Verdict& verdict) {
     }
     if (!(skin.reach[v] > 0 && skin.reach[v] < 1)) {
       violate(verdict, {{}, {skin.owner[v]}}, "skin vertex {} lies {} h from its owner, and not on its edge", v,
-              skin.reach[v]);
+              figure_beside(skin.reach[v], 1));
     }
   }
   for (std::size_t t = 0; t < skin.triangles.size(); ++t) {

@@ -61,7 +61,10 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
   violations.each([&](const Field& one) {
     Card card;
     card.title = one["property"].text() + " after " + one["stage"].text();
-    card.words = one["witness"].text_or("");
+    // Of the case that its counterexample shows.
+    const Field simplified = one["simplified"];
+    if (simplified.is_there()) card.words = simplified["witness"].text_or("");
+    if (card.words.empty()) card.words = one["witness"].text_or("");
     if (card.words.empty()) card.words = one["text"].text();
     card.facts = {{"Case", io::grouped(one["index"].count())}, {"Counterexample", one["file"].text()}};
     if (const Field drawn = one["drawn"]; drawn.is_there()) {
@@ -70,7 +73,6 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
         return fmt::format("{} {} and {} {}", io::grouped(particles), particles == 1 ? "particle" : "particles",
                            io::grouped(strokes), strokes == 1 ? "stroke" : "strokes");
       };
-      const Field simplified = one["simplified"];
       card.facts.emplace_back(
           "Simplification",
           simplified.is_there()
@@ -222,7 +224,9 @@ Sheet judge_sheet(const Field& document) {
   sheet.badge = *sheet.holds ? "✓ holds" : failing == 0 && !is_complete ? "✕ incomplete" : "✕ fails";
   const std::string what = library.empty() ? sheet.title : fmt::format("{} ({})", sheet.title, library);
   sheet.summary =
-      *sheet.holds  ? fmt::format("cutproof judged the kernels of {}: everything that was judged holds.", what)
+      *sheet.holds ? fmt::format("cutproof judged the kernels of {}: everything that was judged holds.", what)
+      : failing == 1 && judged == 1
+          ? fmt::format("cutproof judged the kernels of {}: the one operation that was judged fails.", what)
       : failing > 0 ? fmt::format("cutproof judged the kernels of {}: {} of {} operations {}.", what, failing, judged,
                                   failing == 1 ? "fails" : "fail")
       : !is_complete

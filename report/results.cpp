@@ -13,6 +13,8 @@
 #include "model/io/columns.h"
 #include "model/io/json_reader.h"
 #include "model/io/limits.h"
+#include "oracles/property_count.h"
+#include "oracles/registry.h"
 #include "report/field.h"
 
 namespace cutproof::report {
@@ -57,12 +59,15 @@ void add_verdict(const Field& verdict, const Measured* known, std::vector<Row>& 
   const int64_t checked = verdict["checked"].count(), frame = verdict["frame"].count();
   const double measured = verdict["measured"].number(), bound = verdict["bound"].number();
   const std::string given_unit = verdict["unit"].text();
-  const std::string unit = given_unit == "1" ? "" : given_unit, source = verdict["bound_source"].text();
-  const bool has_ratio = (known == nullptr || known->count({property, stage}) != 0) && std::isfinite(measured) &&
-                         std::isfinite(bound) && bound > 0;
+  const bool was_judged =
+      holds || !verdict["witness"].is_there() || oracles::could_be_judged(verdict["witness"]["text"].text_or(""));
+  const std::string measured_text = was_judged ? figure(measured) : "nothing",
+                    bound_text = was_judged ? figure(bound) : "none";
+  const std::string unit = given_unit == "1" || !was_judged ? "" : given_unit, source = verdict["bound_source"].text();
+  const bool has_ratio = was_judged && (known == nullptr || known->count({property, stage}) != 0) &&
+                         std::isfinite(measured) && std::isfinite(bound) && bound > 0;
   const std::optional<double> of_bound = has_ratio ? std::optional(measured / bound) : std::nullopt;
   ++results.verdicts;
-  shown.unit = unit;
   if (shown.bound_source.empty()) shown.bound_source = source;
   shown.checked += checked;
   shown.undecided += verdict["undecided"].count_or(0);
@@ -74,8 +79,9 @@ void add_verdict(const Field& verdict, const Measured* known, std::vector<Row>& 
   if (is_first_failure || (shown.failed + shown.expected == 0 && of_bound.value_or(0) > row.worst)) {
     row.worst = of_bound.value_or(0);
     shown.frame = frame;
-    shown.measured = figure(measured);
-    shown.bound = figure(bound);
+    shown.measured = measured_text;
+    shown.bound = bound_text;
+    shown.unit = unit;
     shown.of_bound = of_bound;
   }
   ++shown.judged;
@@ -86,7 +92,7 @@ void add_verdict(const Field& verdict, const Measured* known, std::vector<Row>& 
     return;
   }
   const Field witness = verdict["witness"];
-  results.findings.push_back({property, stage, frame, figure(measured), figure(bound), unit, of_bound, source,
+  results.findings.push_back({property, stage, frame, measured_text, bound_text, unit, of_bound, source,
                               witness["text"].text(), witness["clusters"].numbers(kMostWitnesses),
                               witness["particles"].numbers(kMostWitnesses), witness["path"].numbers(kMostWitnesses),
                               witness["triangles"].numbers(kMostWitnesses), is_expected});
@@ -113,8 +119,9 @@ void add_verdicts(const Field& document, Results& results) {
     const auto rank = [](const PropertyRow& row) {
       return row.failed > 0 ? 0 : row.expected > 0 ? 1 : row.judged > 0 ? 2 : 3;
     };
-    // Of those that hold, the nearest to its bound first.
+    // Of those that fail what fails first, of those that hold the nearest to its bound.
     const int of_a = rank(a), of_b = rank(b);
+    if (of_a == of_b && of_a < 2) return std::pair(a.frame, a.stage) < std::pair(b.frame, b.stage);
     return of_a != of_b ? of_a < of_b : of_a == 2 && a.of_bound.value_or(-1) > b.of_bound.value_or(-1);
   });
   std::stable_sort(results.findings.begin(), results.findings.end(), [](const Finding& a, const Finding& b) {
@@ -225,6 +232,38 @@ Results read_results(const std::string& file) {
                     file);
 }
 
+namespace {
+
+// "27 properties hold, and …": those that a terminal counts, too (cli/terminal.cpp).
+std::string count_in_words(const std::vector<PropertyRow>& rows) {
+  std::vector<oracles::AfterStage> all;
+  for (const PropertyRow& row : rows) all.push_back({row.property, row.judged > 0, row.failed > 0, row.expected > 0});
+  const oracles::PropertyCount count = oracles::count_properties(all);
+  const int64_t properties = count.properties(), expectations = count.met + count.unmet;
+  std::string words;
+  const auto add = [&](const std::string& more) { words += (words.empty() ? "" : ", and ") + more; };
+  if (properties == 1 && count.hold == 1) {
+    add("the one property that was judged holds");
+  } else if (properties > 0 && properties == count.hold) {
+    add(fmt::format("all {} properties that were judged hold", properties));
+  } else if (properties > 0) {
+    add(fmt::format("{} of {} properties {}", count.hold, properties, count.hold == 1 ? "holds" : "hold"));
+  }
+  if (count.fail_as_expected > 0)
+    add(fmt::format("{} {} as the scene expects", count.fail_as_expected,
+                    count.fail_as_expected == 1 ? "fails" : "fail"));
+  if (expectations == 1) {
+    add(fmt::format("the one expectation of the scene is {}", count.met == 1 ? "met" : "not met"));
+  } else if (expectations > 1) {
+    add(count.unmet == 0 ? fmt::format("all {} expectations of the scene are met", expectations)
+                         : fmt::format("{} of {} expectations of the scene {} met", count.met, expectations,
+                                       count.met == 1 ? "is" : "are"));
+  }
+  return words;
+}
+
+}  // namespace
+
 std::string summary_sentence(const Results& results) {
   const std::string scene = results.scene.empty() ? "a scene without a name" : "scene " + results.scene;
   const std::string subject =
@@ -233,23 +272,17 @@ std::string summary_sentence(const Results& results) {
           ? fmt::format("cutproof judged a recording of {}, simulated by backend {}", scene, results.backend)
           : fmt::format("This is a recording of {}, simulated by backend {}", scene, results.backend);
   if (!results.checked) return subject + ". Nothing was judged.";
-  int64_t looked = 0, failing = 0;
-  for (const PropertyRow& row : results.rows) {
-    looked += row.judged > 0;
-    failing += row.failed > 0;
-  }
+  const auto failing =
+      std::count_if(results.rows.begin(), results.rows.end(), [](const PropertyRow& row) { return row.failed > 0; });
   const auto first = std::find_if(results.findings.begin(), results.findings.end(),
                                   [](const Finding& finding) { return !finding.is_expected; });
   if (failing == 0 && !results.holds) return subject + ". It does not hold: nothing was judged, or not all of it.";
-  if (failing == 0) {
-    const std::string what = looked == 1 ? "the one property that was judged holds"
-                                         : fmt::format("all {} properties that were judged hold", looked);
-    return subject + fmt::format(": {}, in {} verdicts.", what, io::grouped(results.verdicts));
-  }
-  std::string sentence = subject + fmt::format(": {} of {} properties {}", looked - failing, looked,
-                                               looked - failing == 1 ? "holds" : "hold");
+  std::string sentence = subject + ": " + count_in_words(results.rows);
+  if (failing == 0)
+    return sentence +
+           fmt::format(", in {} {}.", io::grouped(results.verdicts), results.verdicts == 1 ? "verdict" : "verdicts");
   if (first == results.findings.end()) return sentence + ".";
-  return sentence + fmt::format("; {} fails{} in frame {} after {}.", first->property, failing > 1 ? " first," : "",
+  return sentence + fmt::format("; '{}' fails{} in frame {} after {}.", first->property, failing > 1 ? " first," : "",
                                 first->frame, name_of(first->stage));
 }
 

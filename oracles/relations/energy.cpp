@@ -71,8 +71,8 @@ Verdict energy_is_monotone(Backend& backend, const Setup& setup, const State& gi
       if (!(growth <= bound)) {
         verdict.measured = growth;
         verdict.bound = bound;
-        return fail(verdict, {}, "iteration {} raises the energy of the substep from {} to {} J", iteration, previous,
-                    energy);
+        return fail(verdict, {}, "iteration {} raises the energy of the substep from {} to {} J", iteration,
+                    figure_beside(previous, energy), figure_beside(energy, previous));
       }
       if (iteration > 0 && growth / bound > worst) {
         worst = growth / bound;

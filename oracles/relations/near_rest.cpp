@@ -30,7 +30,7 @@ State at_rest(const Setup& setup, const State& state, Vec3 velocity) {
 
 // Takes one substep from rest with this velocity, in which `free` says what acts, and expects the body to move rigidly.
 Verdict throw_body(const Relation& relation, Backend& backend, const Setup& setup, const State& given, Vec3 velocity,
-                   void (*free)(StepParameters&), bool also_velocities, fmt::format_string<int32_t&, double&> text) {
+                   void (*free)(StepParameters&), bool also_velocities, fmt::format_string<int32_t&, Figure> text) {
   const State state = in_arithmetic_of(backend, given);
   return judge_relation(relation, backend, step_span(backend), setup, state, [&](Verdict& verdict) {
     if (setup.frame_count() == 0) return vacuous(verdict, "the schedule has no frames");
@@ -65,15 +65,19 @@ Verdict throw_body(const Relation& relation, Backend& backend, const Setup& setu
 Verdict rest_is_fixed(Backend& backend, const Setup& setup, const State& state) {
   const Relation relation = {"rest is fixed", "h", "tolerances.md, At rest", "nothing is alive"};
   const auto calm = [](StepParameters& step) { step.gravity = {}; };
-  return throw_body(relation, backend, setup, state, {}, calm, false,
-                    "particle {} of the rest state moves by {} h in one substep");
+  return throw_body(
+      relation, backend, setup, state, {}, calm, false,
+      "in a second run of one substep, in which the body is at rest and no force acts, particle {} moves by {} h; "
+      "pictures show the run itself");
 }
 
 Verdict translation_is_exact(Backend& backend, const Setup& setup, const State& state, Vec3 velocity) {
   const Relation relation = {"translation is exact", "h", "tolerances.md, At rest", "nothing is alive"};
   const auto undamped = [](StepParameters& step) { step.damping = 0; };
-  return throw_body(relation, backend, setup, state, velocity, undamped, true,
-                    "particle {} of a body that is thrown ends {} h from where it should");
+  return throw_body(
+      relation, backend, setup, state, velocity, undamped, true,
+      "in a second run of one substep, in which the body is thrown and only gravity acts, particle {} ends {} h "
+      "from where it should; pictures show the run itself");
 }
 
 }  // namespace cutproof::oracles

@@ -24,7 +24,7 @@ Verdict judge_relation(const Relation& relation, const Backend& backend, Span sp
 
 bool is_fit(Verdict& verdict, const Setup& setup, const State& state) {
   const Verdict form = well_formed(setup, state);
-  if (!form.holds) fail(verdict, {}, "not judged: the state is not well formed: {}", form.witness.text);
+  if (!form.holds) fail(verdict, {}, "{}: the state is not well formed: {}", kNotJudged, form.witness.text);
   return form.holds;
 }
 

@@ -75,7 +75,8 @@ struct Measured {
     ++checked;
     if (value <= limit * ratio) return;
     ratio = limit > 0 && !std::isnan(value) ? value / limit : std::numeric_limits<double>::infinity();
-    difference = witness_of(concerned, "{} differs by {}, more than {}", what, value, limit);
+    difference = witness_of(concerned, "{} differs by {}, more than {}", what, figure_beside(value, limit),
+                            figure_beside(limit, value));
   }
 };
 

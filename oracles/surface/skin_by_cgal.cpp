@@ -103,11 +103,10 @@ void check_skin_shells(Judged& judged, Verdict& verdict) {
   const ShellCount joined = count_shells(skin);
   const std::optional<ShellCount> counted = skin_shells(skin);
   if (!counted) {
-    violate(verdict, {}, "CGAL does not take the triangles as a surface, so its shells cannot be counted");
+    violate(verdict, {}, "the triangles do not join to a surface, so its shells cannot be counted");
   } else if (counted->outer + counted->inner != joined.outer + joined.inner) {
     violate(verdict, {},
-            "CGAL counts {} shells of the skin, joining triangles at vertices gives {}: shells "
-            "touch",
+            "where triangles join at edges the skin has {} shells, and where they join at vertices {}: shells touch",
             counted->outer + counted->inner, joined.outer + joined.inner);
   }
 }
@@ -120,7 +119,7 @@ void check_skin_geometry(Judged& judged, Verdict& verdict) {
   if (!has_skin(state) && !skin_is_missing(setup, state)) return;
   const Verdict surface = ask(property_named(core_properties(), "skin surface"), judged);
   if (!surface.holds) {
-    return fail(verdict, {}, "not judged: the skin is not a closed surface ({})", surface.witness.text);
+    return fail(verdict, {}, "{}: the skin is not a closed surface ({})", kNotJudged, surface.witness.text);
   }
   const auto vertices_of = [&](Mesh::Face_index face) {
     const auto& t = skin.triangles[at(face)];
@@ -129,7 +128,7 @@ void check_skin_geometry(Judged& judged, Verdict& verdict) {
 
   const std::vector<Vec3> points = rest_points(setup, skin);
   std::optional<Mesh> mesh = mesh_of(skin, points);
-  if (!mesh) return fail(verdict, {}, "not judged: CGAL does not take the triangles as a surface");
+  if (!mesh) return fail(verdict, {}, "{}: the triangles do not join to a surface", kNotJudged);
 
   std::vector<Mesh::Face_index> degenerate;
   pmp::degenerate_faces(*mesh, std::back_inserter(degenerate));
@@ -180,8 +179,9 @@ void check_skin_geometry(Judged& judged, Verdict& verdict) {
   verdict.bound = rounding;
   verdict.unit = "h³";
   if (!(outside <= rounding)) {
-    return fail(verdict, {}, "the skin holds {} h³, and this tissue between {} and {} h³", volume, range.low,
-                range.high);
+    return fail(verdict, {}, "the skin holds {} h³, and this tissue between {} and {} h³",
+                figure_beside(volume, volume < range.low ? range.low : range.high), figure_beside(range.low, volume),
+                figure_beside(range.high, volume));
   }
 }
 

@@ -50,6 +50,17 @@ class Options : public Program {
   }
 };
 
+// What an option takes one at a time it has again before each value.
+TEST_F(Options, AreSaidSoThatTheyCanBeGivenAgain) {
+  const Outcome bad = cutproof("run s.json --set expect.components_at_end=7 --set step.iterations=3 --check topology");
+  EXPECT_EQ(bad.status, 1) << bad.output;
+  const std::string again = "run s.json --set expect.components_at_end=7 --set step.iterations=3 --check topology";
+  std::string line = bad.output;
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  ASSERT_NE(line.find("cutproof " + again), std::string::npos) << bad.output;
+  EXPECT_EQ(cutproof(again).status, 1);
+}
+
 // Anybody can add a line: what is given, and what the error has to say.
 TEST_F(Options, SayWhatWasMeant) {
   for (const auto& [command, words] : std::vector<std::pair<std::string, std::vector<std::string>>>{

@@ -151,21 +151,25 @@ def campaigns(program):
     failed["violations"] = [
         {"index": 4, "property": "coverage", "stage": "skin", "text": "'coverage' fails: 5 % <of> it",
          "witness": "5 % <of>\nit", "file": "found here.json"},
-        {"index": 7, "property": "runs to its end", "stage": "skin", "text": "thrown", "witness": "", "file": "b.json"}]
+        {"index": 7, "property": "runs to its end", "stage": "skin", "text": "thrown", "witness": "", "file": "b.json",
+         "simplified": {"particles": 1, "strokes": 0, "property": "isolation", "stage": "skin",
+                        "text": "'isolation' fails: alone", "witness": "alone"}}]
     (program.folder / "2.json").write_text(json.dumps(failed))
     merging = ["fuzz", "--merge", "1.json", "2.json"]
     cases = program.junit(1, *merging)
     message, text = of(cases["coverage after skin"], "failure")
     expect(message == "5 % <of>\nit", f"message {message!r}")
     expect("cutproof replay 'found here.json'" in text and "case 4: 'coverage' fails: 5 % <of> it" in text, text)
-    expect(of(cases["runs to its end after skin"], "failure")[0] == "thrown", "a violation of no listed property")
+    # Its command shows the simplified case, so that is what is told of it.
+    message, text = of(cases["runs to its end after skin"], "failure")
+    expect(message == "alone" and "case 7: 'isolation' fails: alone" in text, f"a violation of no listed property {text}")
     message, text = of(cases["enough was judged"], "error")
     expect("missing" in message and message.endswith(": 3") and "cutproof fuzz --merge 1.json 2.json" in text,
            f"the missing shard: {message!r} {text!r}")
     found = program.annotations(1, *merging)
     expect(len(found) == 3 and ": 3; see it again: cutproof fuzz --merge 1.json 2.json" in found[0] and found[1:] == [
         "::error title=cutproof: coverage::5 %25 <of>%0Ait; see it again: cutproof replay 'found here.json'",
-        "::error title=cutproof: runs to its end::thrown; see it again: cutproof replay b.json"], f"annotations: {found}")
+        "::error title=cutproof: isolation::alone; see it again: cutproof replay b.json"], f"annotations: {found}")
     done = program.run(*campaign, "--junit", "nowhere/report.xml")
     expect(done.returncode == 2 and "nowhere" in done.stderr and "fuzzing" not in done.stdout, f"{done}")
 

@@ -33,5 +33,44 @@ TEST(ShownVerdicts, CountThoseThatAreNotShown) {
   }
 }
 
+Verdict failing_verdict(const char* property, Stage stage, int64_t frame, const char* witness) {
+  Verdict verdict;
+  verdict.property = property;
+  verdict.stage = stage;
+  verdict.frame = frame;
+  verdict.holds = false;
+  verdict.checked = 1;
+  verdict.bound_source = "some page";
+  verdict.witness.text = witness;
+  return verdict;
+}
+
+std::string printed(const std::vector<Verdict>& verdicts) {
+  testing::internal::CaptureStdout();
+  print_verdicts(verdicts, Shown{});
+  return testing::internal::GetCapturedStdout();
+}
+
+// Momentum is judged first in each frame, and was fine until what the split did.
+TEST(ShownVerdicts, BeginWithWhatFailsFirst) {
+  Verdict fine = failing_verdict("momentum", Stage::step, 0, "");
+  fine.holds = true;
+  const std::string text = printed({fine, failing_verdict("exactness", Stage::split, 0, "a"),
+                                    failing_verdict("earlier in the frame", Stage::detect, 0, "b"),
+                                    failing_verdict("momentum", Stage::step, 1, "c")});
+  const std::size_t first = text.find("earlier in the frame"), second = text.find("exactness"),
+                    third = text.find("momentum after step");
+  ASSERT_NE(third, std::string::npos) << text;
+  EXPECT_LT(first, second) << text;
+  EXPECT_LT(second, third) << text;
+}
+
+TEST(ShownVerdicts, HaveNoFiguresOfWhatCouldNotBeJudged) {
+  const std::string text = printed({failing_verdict("geometry", Stage::skin, 3, "could not be judged: it is open")});
+  EXPECT_NE(text.find("FAILS: geometry"), std::string::npos) << text;
+  EXPECT_NE(text.find("could not be judged: it is open"), std::string::npos) << text;
+  EXPECT_EQ(text.find("measured"), std::string::npos) << text;
+}
+
 }  // namespace
 }  // namespace cutproof::cli

@@ -46,6 +46,20 @@ TEST(Detection, RejectsRemovalOfWhatIsNotStretched) {
   EXPECT_EQ(verdict.witness.particles[0], 1);
 }
 
+// Six digits, and more only where they would not tell a distance from its limit.
+TEST(Detection, SaysHowFarNeighboursAreInFewDigits) {
+  Pair pair = pulled(1.4);
+  pair.before.x[1].x += 1e-12;
+  pair.after.x = pair.before.x;
+  remove_particles(pair.after, {1});
+  EXPECT_EQ(detection(pair.setup, pair.before, pair.after).witness.text,
+            "particle 1 was removed, but should not have been: it is 1 h from its farthest neighbour, and edges beyond "
+            "1.5 times their rest length are cut");
+  const Pair over = pulled(1.5 * (1 + 1e-13));
+  EXPECT_NE(detection(over.setup, over.before, over.after).witness.text.find("it is 1.500000000000"), std::string::npos)
+      << detection(over.setup, over.before, over.after).witness.text;
+}
+
 TEST(Detection, CallsEitherOnlyWhatRoundingCanTip) {
   for (const bool removes : {false, true}) {
     // Within a few ulp of εh both answers are right.
@@ -429,6 +443,26 @@ TEST(Detection, OfAGeometricCutTakesWhatLiesWithinHalfASpacingOfTheSweep) {
   State more = pair.before;
   remove_particles(more, {7, 12, 17, 22});
   EXPECT_EQ(detection(pair.setup, pair.before, more).witness.particles.at(0), 7);
+}
+
+TEST(Detection, OfAGeometricCutSaysHowNearTheBladeCame) {
+  Pair pair = struck(3.2, 0.1);
+  const auto text_of = [&](const std::vector<int32_t>& gone) {
+    State after = pair.before;
+    remove_particles(after, gone);
+    return detection(pair.setup, pair.before, after).witness.text;
+  };
+  EXPECT_EQ(text_of({17, 22}),
+            "particle 12 was not removed, but should have been: the nearest that the blade comes to it is 0.2 h, and "
+            "it takes what it comes within 0.5 h of");
+  EXPECT_EQ(text_of({7, 12, 17, 22}),
+            "particle 7 was removed, but should not have been: the nearest that the blade comes to it is 1.0198 h, and "
+            "it takes what it comes within 0.5 h of");
+  // The same way, while it turns about its edge's axis by a little.
+  for (auto& move : pair.setup.blade_moves) move.to.back = {std::sin(1e-4), 0, std::cos(1e-4)};
+  EXPECT_NE(text_of({7, 12, 17, 22}).find("comes to it is 1.01"), std::string::npos) << text_of({7, 12, 17, 22});
+  for (auto& move : pair.setup.blade_moves) move.down = false;
+  EXPECT_EQ(text_of({7}), "particle 7 was removed, but should not have been: the blade is not down in this frame");
 }
 
 TEST(Detection, OfAGeometricCutTakesBothLayersOfATie) {

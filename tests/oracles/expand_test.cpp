@@ -96,6 +96,8 @@ TEST(Expansion, PublishedFreesSingleIsolatedClustersOnly) {
   expect_holds(expansion(groups.setup, groups.before, groups.after));
   set_clusters(groups.setup, groups.after, {{0, 1}, {1, 2, 3}, {3, 4}, {4, 5}}, {0, 1, 2, 3});
   expect_rejected(expansion(groups.setup, groups.before, groups.after), {1}, {3});
+  EXPECT_EQ(expansion(groups.setup, groups.before, groups.after).witness.text,
+            "cluster 1 took in particle 3, though that cluster was not isolated");
 }
 
 TEST(Expansion, AcceptsABodyOfNoneAndOfOneParticle) {

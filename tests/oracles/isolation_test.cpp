@@ -29,6 +29,8 @@ TEST(Isolation, IsNotHiddenByAClusterThatCouplesAcrossAGap) {
   Row row(7, {{0, 1}, {1, 4}, {2}, {5, 6}, {4, 5}});
   remove_particles(row.state, {3});
   expect_rejected(isolation(row.setup, row.state), {2}, {2, 1});
+  EXPECT_NE(isolation(row.setup, row.state).witness.text.find("clusters is a group of 1 particle that"),
+            std::string::npos);
 }
 
 }  // namespace

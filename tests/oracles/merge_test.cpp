@@ -166,7 +166,14 @@ TEST(MergeLegality, RejectsARotationThatIsNotTheTargets) {
   Merge merge(5, {{0, 1, 2}, {3, 4}}, 3, 8);
   (void)merge.judge({range(0, 5)}, {0});
   merge.pair.after.clusters.rotation[0] = turn_about_z(1);
-  expect_rejected(merge_legality(merge.pair.setup, merge.pair.before, merge.pair.after), {0}, {});
+  const auto judged = [&] { return merge_legality(merge.pair.setup, merge.pair.before, merge.pair.after); };
+  expect_rejected(judged(), {0}, {});
+  EXPECT_EQ(judged().witness.text, "cluster 0 did not keep its rotation: it is turned by 57.3 degrees");
+  merge.pair.after.clusters.rotation[0] = turn_about_z(1e-9);
+  EXPECT_EQ(judged().witness.text, "cluster 0 did not keep its rotation: it is turned by 5.73e-08 degrees");
+  merge.pair.after.clusters.rotation[0] = merge.pair.before.clusters.rotation[0];
+  merge.pair.after.clusters.degenerate[0] = 1;
+  EXPECT_EQ(judged().witness.text, "cluster 0 did not keep its rotation: it is the same, but is marked as not unique");
 }
 
 TEST(MergeLegality, AcceptsABodyOfNoneAndOfOneParticle) {

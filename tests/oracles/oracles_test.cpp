@@ -9,6 +9,7 @@
 #include <set>
 #include <string>
 
+#include "oracles/figures.h"
 #include "oracles/surface/surface.h"
 #include "tests/oracles/corruptions.h"
 #include "tests/oracles/expectations.h"
@@ -57,14 +58,24 @@ TEST(OneStateOracles, AcceptABodyThatIsCutAwayEntirely) {
   for (const auto oracle : kOracles) expect_holds(oracle(block.setup, block.state));
 }
 
-TEST(OneStateOracles, SayNotJudgedOnAStateThatIsNotWellFormed) {
+TEST(Figures, HaveSixDigitsUnlessThoseHideWhatIsSaid) {
+  EXPECT_EQ(figure(1.0000000000000002), "1");
+  EXPECT_EQ(figure(1.0 / 3), "0.333333");
+  EXPECT_EQ(figure_beside(1.0000000000000002, 1), "1.0000000000000002");
+  EXPECT_EQ(figure_beside(1, 1), "1");
+  EXPECT_EQ(figure_beside(0.25000004, 0.25), "0.25000004");
+  EXPECT_EQ(figure_beside(kNan, kNan), figure(kNan));
+  EXPECT_EQ(sentence("{} {:.3g} {} {}", 2.0 / 3, 2.0 / 3, 1'234'567, "h"), "0.666667 0.667 1234567 h");
+}
+
+TEST(OneStateOracles, SayThatTheyCouldNotJudgeAStateThatIsNotWellFormed) {
   Block block;
   block.state.clusters.members[5] = 1000;
   for (const auto oracle : kOracles) {
     const Verdict verdict = oracle(block.setup, block.state);
     EXPECT_FALSE(verdict.holds);
     if (oracle == well_formed) continue;
-    EXPECT_NE(verdict.witness.text.find("not judged"), std::string::npos) << verdict.property;
+    EXPECT_NE(verdict.witness.text.find("could not be judged"), std::string::npos) << verdict.property;
     EXPECT_EQ(verdict.checked, 0);
   }
 }
@@ -93,7 +104,7 @@ TEST(OneStateOracles, SurviveRandomCorruption) {
   EXPECT_GT(rejected, 4000);
 }
 
-TEST(StageOracles, SayNotJudgedIfEitherStateIsNotWellFormed) {
+TEST(StageOracles, SayThatTheyCouldNotJudgeIfEitherStateIsNotWellFormed) {
   const Pair good = cut_row();
   for (const bool before : {true, false}) {
     Pair pair = good;
@@ -101,7 +112,7 @@ TEST(StageOracles, SayNotJudgedIfEitherStateIsNotWellFormed) {
     for (const auto oracle : {detection, split_exactness, merge_legality, expansion}) {
       const Verdict verdict = oracle(pair.setup, pair.before, pair.after);
       EXPECT_FALSE(verdict.holds);
-      EXPECT_NE(verdict.witness.text.find("not judged"), std::string::npos);
+      EXPECT_NE(verdict.witness.text.find("could not be judged"), std::string::npos);
       EXPECT_NE(verdict.witness.text.find(before ? "before the stage" : "after the stage"), std::string::npos);
     }
   }

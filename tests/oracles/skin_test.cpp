@@ -93,7 +93,9 @@ TEST(SkinSurface, RejectsAnOpenSkin) {
   for (const int32_t p : verdict.witness.particles) {
     EXPECT_NE(std::find(owners.begin(), owners.end(), p), owners.end()) << "the witness lies on the hole";
   }
-  EXPECT_FALSE(skin_geometry(scene.setup, scene.state).holds) << "not judged is not accepted";
+  const Verdict geometry = skin_geometry(scene.setup, scene.state);
+  EXPECT_FALSE(geometry.holds) << "not judged is not accepted";
+  EXPECT_FALSE(could_be_judged(geometry.witness.text)) << geometry.witness.text;
 }
 
 TEST(SkinSurface, RejectsAFlippedTriangle) {

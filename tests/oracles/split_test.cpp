@@ -39,7 +39,36 @@ TEST(SplitExactness, RejectsATailThatWasLost) {
   const auto rotations = pair.after.clusters.rotation;
   set_clusters(pair.setup, pair.after, {{0, 1, 2}, {1, 2, 3}, {3}, {7, 8}, {5}}, {0, 2, 5, 6, 7});
   pair.after.clusters.rotation.assign(rotations.begin(), rotations.begin() + 5);
-  expect_rejected(split_exactness(pair.setup, pair.before, pair.after), {8}, {5});
+  const Verdict verdict = split_exactness(pair.setup, pair.before, pair.after);
+  expect_rejected(verdict, {8, 5}, {5});  // what is left of 5 is there to be shown, 8 is not
+  EXPECT_EQ(verdict.witness.text,
+            "cluster 5 fell apart, and its piece of 3 particles (the smallest 5) has become no cluster");
+}
+
+TEST(SplitExactness, SaysWhatHasBecomeOfAPiece) {
+  const auto text_of = [](const Lists& lists, const Numbers& numbers) {
+    Pair pair = cut_row();
+    set_clusters(pair.setup, pair.after, lists, numbers);
+    pair.after.clusters.rotation.assign(lists.size(), turn_about_z(0));
+    return split_exactness(pair.setup, pair.before, pair.after).witness.text;
+  };
+  EXPECT_EQ(text_of({{0, 1, 2}, {1, 2, 3}, {3}, {7, 8}, {5, 6, 7}}, {0, 2, 5, 6, 8}),
+            "cluster 2 did not inherit the rotation of cluster 2: it is turned by 57.3 degrees");
+  EXPECT_EQ(text_of({{0, 1, 2}, {3}, {7, 8}, {5}, {5, 6, 7}}, {0, 5, 6, 7, 8}),
+            "cluster 2 is missing: it should have kept the first piece of what is left of it, 3 particles (the "
+            "smallest 1)");
+  EXPECT_EQ(text_of({{1, 2, 3}, {3}, {7, 8}, {5}, {5, 6, 7}}, {2, 5, 6, 7, 8}),
+            "cluster 0 is missing, though it lost nothing: it has 3 particles (the smallest 0)");
+  Pair pair = cut_row();
+  const auto rotations = pair.after.clusters.rotation;
+  set_clusters(pair.setup, pair.after, {{0, 1, 2}, {1, 2, 3}, {3}, {7, 8}, {5, 6, 7}}, {0, 2, 5, 6, 8});
+  pair.after.clusters.rotation = {rotations[0], rotations[1], rotations[2], rotations[3], rotations[5]};
+  EXPECT_EQ(split_exactness(pair.setup, pair.before, pair.after).witness.text,
+            "cluster 2 fell apart, and its piece of 1 particle (5) has become no cluster");
+  set_clusters(pair.setup, pair.after, {{0, 1, 2}, {1, 2, 3}, {3}, {7, 8}, {5, 6, 7}, {5}}, {0, 2, 5, 6, 8, 9});
+  pair.after.clusters.rotation = {rotations[0], rotations[1], rotations[2], rotations[3], rotations[5], rotations[4]};
+  EXPECT_EQ(split_exactness(pair.setup, pair.before, pair.after).witness.text,
+            "cluster 2 fell apart, and its piece of 1 particle (5) is cluster 9, where it should be cluster 7");
 }
 
 TEST(SplitExactness, RejectsNumbersInAnotherOrder) {

@@ -90,7 +90,7 @@ TEST(Momentum, IsNotJudgedOnAStateThatIsNotWellFormed) {
   scene.after.v.pop_back();
   const Verdict verdict = momentum(scene.setup, scene.before, scene.after);
   EXPECT_FALSE(verdict.holds);
-  EXPECT_NE(verdict.witness.text.find("not judged"), std::string::npos);
+  EXPECT_NE(verdict.witness.text.find("could not be judged"), std::string::npos);
 }
 
 TEST(Momentum, CountsOnlyWhatIsAliveBeforeDetection) {

@@ -95,6 +95,10 @@ TEST(ACampaign, HasACardForEachViolationWithWhatRemainsOfItsCase) {
   EXPECT_EQ(sheet.cards[0].title, "coverage after split");
   EXPECT_EQ(sheet.cards[0].words, "here");
   EXPECT_EQ(sheet.cards[0].facts.at(2).second, "from 812 particles and 5 strokes to 3 particles and 1 stroke");
+  json simpler = violation;
+  simpler["simplified"]["witness"] = "there";
+  EXPECT_EQ(sheet_of(campaign({property("coverage", 1)}, {simpler}), "f").cards.at(0).words, "there")
+      << "the counterexample shows the simplified case";
   EXPECT_EQ(grid_of(sheet, 0).rows.at(0).kind, "bad") << "what fails comes first";
 }
 

@@ -75,13 +75,14 @@ TEST(Results, PutWhatFailsFirstAndThenTheNearestToItsBound) {
   EXPECT_EQ(results.findings[0].frame, 3);
   EXPECT_FALSE(results.holds);
   EXPECT_EQ(summary_sentence(results),
-            "cutproof ran scene block on backend mine: 3 of 4 properties hold; wrong fails in frame 3 after split.");
+            "cutproof ran scene block on backend mine: 2 of 3 properties hold, and the one expectation of the scene is "
+            "met; 'wrong' fails in frame 3 after split.");
 }
 
 TEST(Results, OfARunThatHoldsAndOfOneThatWasNotJudgedSaySo) {
   json holds = document({verdict("near", "step", 0, true, 0.5, 1)});
   EXPECT_EQ(summary_sentence(results_of(holds, "f")),
-            "cutproof ran scene block on backend mine: the one property that was judged holds, in 1 verdicts.");
+            "cutproof ran scene block on backend mine: the one property that was judged holds, in 1 verdict.");
   holds["checked"] = false;
   EXPECT_EQ(summary_sentence(results_of(holds, "f")), "cutproof ran scene block on backend mine. Nothing was judged.");
 }
@@ -100,6 +101,44 @@ TEST(Results, OfWhichNothingWasLookedAtOrWhoseSummaryFailsDoNotHold) {
   EXPECT_FALSE(results_of(failing, "f").holds);
   EXPECT_EQ(summary_sentence(results_of(failing, "f")),
             "cutproof ran scene block on backend mine. It does not hold: nothing was judged, or not all of it.");
+}
+
+// As on a terminal: not each pair of a property and a stage.
+TEST(Results, CountEachPropertyOnceAfterHoweverManyStages) {
+  std::vector<json> verdicts = {verdict("near", "step", 0, true, 0.5, 1), verdict("near", "split", 0, true, 0.5, 1),
+                                verdict("far", "split", 0, true, 0.1, 1),
+                                verdict("expected pieces", "skin", 9, true, 4, 4),
+                                verdict("expected shells", "skin", 9, true, 4, 4)};
+  EXPECT_EQ(summary_sentence(results_of(document(verdicts), "f")),
+            "cutproof ran scene block on backend mine: all 2 properties that were judged hold, and all 2 expectations "
+            "of the scene are met, in 5 verdicts.");
+  verdicts.push_back(verdict("near", "merge", 0, false, 2, 1));
+  verdicts.push_back(verdict("wrong", "merge", 0, false, 2, 1));
+  verdicts.back()["expected_failure"] = true;
+  EXPECT_EQ(summary_sentence(results_of(document(verdicts), "f")),
+            "cutproof ran scene block on backend mine: 1 of 3 properties holds, and 1 fails as the scene expects, and "
+            "all 2 expectations of the scene are met; 'near' fails in frame 0 after merge.");
+}
+
+TEST(Results, BeginWithWhatFailsFirst) {
+  const Results results =
+      results_of(document({verdict("momentum", "step", 0, true, 0.1, 1), verdict("exactness", "split", 0, false, 2, 1),
+                           verdict("earlier", "detect", 0, false, 2, 1), verdict("momentum", "step", 1, false, 2, 1)}),
+                 "f");
+  std::vector<std::string> order;
+  for (const PropertyRow& row : results.rows) order.push_back(row.property);
+  EXPECT_EQ(order, (std::vector<std::string>{"earlier", "exactness", "momentum"}));
+}
+
+TEST(Results, HaveNoFiguresOfWhatCouldNotBeJudged) {
+  json open = verdict("geometry", "skin", 3, false, 0, 0);
+  open["witness"]["text"] = "could not be judged: it is open";
+  const Results results = results_of(document({open}), "f");
+  EXPECT_FALSE(results.holds);
+  EXPECT_EQ(results.rows.at(0).measured, "nothing");
+  EXPECT_EQ(results.findings.at(0).measured, "nothing");
+  EXPECT_EQ(results.findings.at(0).bound, "none");
+  EXPECT_EQ(results.findings.at(0).unit, "");
 }
 
 TEST(Results, ThatAreExpectedToFailDoNotCount) {

@@ -1,0 +1,48 @@
+// How many properties hold, for what people read: each property counts once, after however many stages it is asked.
+#pragma once
+#include <cstdint>
+#include <map>
+#include <string_view>
+#include <vector>
+
+namespace cutproof::oracles {
+
+// What a scene expects of its whole run is no property of the method: the names of those verdicts begin so.
+inline constexpr std::string_view kExpectation = "expected ";
+
+// All verdicts of one property after one stage.
+struct AfterStage {
+  std::string_view property;
+  bool looked = false;  // some verdict looked at something, or fails
+  bool fails = false;   // and the scene does not expect it
+  bool fails_as_expected = false;
+};
+
+// Of those that looked at something.
+struct PropertyCount {
+  int64_t hold = 0, fail = 0, fail_as_expected = 0;
+  int64_t met = 0, unmet = 0;  // of what the scene expects
+  int64_t properties() const { return hold + fail + fail_as_expected; }
+};
+
+inline PropertyCount count_properties(const std::vector<AfterStage>& all) {
+  std::map<std::string_view, AfterStage> by_name;
+  for (const AfterStage& one : all) {
+    AfterStage& known = by_name[one.property];
+    known.looked |= one.looked;
+    known.fails |= one.fails;
+    known.fails_as_expected |= one.fails_as_expected;
+  }
+  PropertyCount count;
+  for (const auto& [name, one] : by_name) {
+    if (!one.looked) continue;
+    if (name.starts_with(kExpectation)) {
+      ++(one.fails || one.fails_as_expected ? count.unmet : count.met);
+    } else {
+      ++(one.fails ? count.fail : one.fails_as_expected ? count.fail_as_expected : count.hold);
+    }
+  }
+  return count;
+}
+
+}  // namespace cutproof::oracles
