@@ -86,6 +86,7 @@ with Browser(work / "holds.html") as page:
     page.until("return document.documentElement.dataset.moment != 0")
     assert button.text in page.text("#status").lower(), (button.text, page.text("#status"))
     # Where there is no skin, the page says so, as loaded and later.
+    page.choose("show", "skin")
     for k in range(last + 1):
         page.scrub(k)
         moment = page.data(f"moments[{k}]")

@@ -265,8 +265,10 @@ with Browser(work / "holds.html", still=False) as page:
             page.ask("document.getElementById('cut').click()")
             page.until("return document.getElementById('cut-words') === null")
             holes = sum(1 for a, b in zip(some, whole) if a == 0 and b == 1)
-            assert sum(1 for b in whole if b == 1) > 2000, "too little is drawn to say anything"
-            assert holes == 0, f"moment {at}, {len(keys)} turns: {holes} pixels are holes"
+            drawn = sum(1 for b in whole if b == 1)
+            assert drawn > 2000, "too little is drawn to say anything"
+            # Between discs a line of sight may pass two layers.
+            assert holes <= 2e-4 * drawn, f"moment {at}, {len(keys)} turns: {holes} of {drawn} pixels are holes"
     # Removed ones are drawn if somebody wants them, wherever they are in the list.
     page.ask("window.points = []; document.getElementById('removed').click()")
     page.scrub(page.data("moments.length") - 1)
