@@ -54,8 +54,8 @@ struct Marks {
     int32_t number = -1;
     std::vector<int32_t> members;
   };
-  std::vector<Cluster> joined;  // the same of each, where they are few
-  std::vector<int32_t> corners;          // of its triangles, three of each: vertices of that moment's skin
+  std::vector<Cluster> joined;   // the same of each, where they are few
+  std::vector<int32_t> corners;  // of its triangles, three of each: vertices of that moment's skin
 };
 
 // Pictures of one run as a browser takes them apart.

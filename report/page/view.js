@@ -5,8 +5,8 @@ import { CutPlane } from './cut_plane.js';
 import { Orbit } from './orbit.js';
 import { Tissue } from './tissue.js';
 
-// A body of fewer particles is small; what is marked is looked at from so far towards the middle of the body.
-const kSmallBody = 1000, kTowardsMiddle = 0.3;
+// A body of fewer particles is small. Beside what is marked, the view's middle lies so far towards that of the body.
+const kSmallBody = 1000, kTowardsMiddle = 0.3, kTowardsMiddleOfSmall = 0.5;
 
 // While somebody scrubs, plays or turns where pictures take long: a picture of so many times fewer pixels along each
 // side now rather than a sharp one later, of the next as many if a few in a row take too long; and a sharp one after so
@@ -255,7 +255,7 @@ export class View {
     const nearest = this.radius * (isTriangle ? (isSmall ? 0.6 : 0.3) : isSmall ? 0.8 : 0.5);
     const seen = Math.min(this.radius, Math.max(1.8 * radius + 2, nearest));
     // Marks at the rim would leave half of the view empty.
-    const target = middle.map((x) => (1 - kTowardsMiddle) * x);
+    const target = middle.map((x) => (1 - (isSmall ? kTowardsMiddleOfSmall : kTowardsMiddle)) * x);
     return [target, this.distanceFor(seen), isTriangle ? this.anglesFacing(this.sides[0].facing) : undefined];
   }
 
