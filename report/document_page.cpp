@@ -27,12 +27,7 @@ json side_json(const Side& side, std::vector<std::string>& chunks) {
   const std::size_t first = chunks.size();
   chunks.insert(chunks.end(), pictures.own.text.begin(), pictures.own.text.end());
   json marks = nullptr;
-  if (!pictures.marks.empty()) {
-    const Marks& of_first = pictures.marks.front();
-    marks = {{"moment", of_first.moment},       {"exact", of_first.is_exact}, {"partly", of_first.is_partly},
-             {"particles", of_first.particles}, {"path", of_first.path},      {"members", of_first.clusters},
-             {"corners", of_first.corners}};
-  }
+  if (!pictures.marks.empty()) marks = to_json(pictures.marks.front());
   return {{"name", side.name},
           {"moments", pictures.own.details},
           {"firstMoment", pictures.own.first_moment},

@@ -102,7 +102,7 @@ Curve front_of(const std::vector<Dot>& dots, const std::string& name) {
   }
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const Dot& a, const Dot& b) { return std::pair(*a.x, *a.y) < std::pair(*b.x, *b.y); });
-  Curve front = {name, Look::level, {}};
+  Curve front = {name, Look::front, {}};
   for (const Dot& dot : sorted) {
     if (front.dots.empty() || *dot.y < *front.dots.back().y) front.dots.push_back(dot);
   }

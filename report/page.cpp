@@ -29,14 +29,8 @@ json finding_json(const Finding& finding, const Marks& marks) {
           {"source", finding.bound_source},
           {"text", finding.text},
           {"expected", finding.is_expected},
-          {"marks",
-           {{"moment", marks.moment},
-            {"exact", marks.is_exact},
-            {"partly", marks.is_partly},
-            {"particles", marks.particles},
-            {"path", marks.path},
-            {"members", marks.clusters},
-            {"corners", marks.corners}}}};
+          {"clusters", finding.clusters},
+          {"marks", to_json(marks)}};
 }
 
 json row_json(const PropertyRow& row) {

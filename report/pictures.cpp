@@ -271,6 +271,8 @@ Survey survey_of(const Source& source) {
 
 // How many particles are marked: of a finding in each of its lists, and of all findings together before each has few.
 constexpr std::size_t kMostMarks = 2000, kFewMarks = 60, kManyMarks = 80'000;
+// Lines between the members of more would hide what they join.
+constexpr std::size_t kMostJoined = 24;
 
 std::vector<int32_t> within(const std::vector<int32_t>& particles, int32_t n, std::size_t most, Marks& marks) {
   std::vector<int32_t> found;
@@ -306,9 +308,12 @@ std::vector<Marks> marks_of(const Source& source, const std::vector<Moment>& mom
       }
       std::set<int32_t> members;
       for (const int32_t cluster : finding.clusters) {
-        for (const int32_t member : members_of(snapshot.state.clusters, cluster, n)) members.insert(member);
+        std::vector<int32_t> of_it = members_of(snapshot.state.clusters, cluster, n);
+        members.insert(of_it.begin(), of_it.end());
+        if (!of_it.empty()) marks.joined.push_back({cluster, std::move(of_it)});
         if (members.size() > most) break;
       }
+      if (members.size() > std::min(most, kMostJoined)) marks.joined.clear();
       marks.clusters = within({members.begin(), members.end()}, n, most, marks);
     }
     if (marks.moment >= 0 && !finding.triangles.empty()) {
@@ -475,6 +480,9 @@ Pictures draw(const Plan& plan, Thinning thinning) {
     for (auto* list : {&one.particles, &one.path, &one.clusters}) {
       for (int32_t& particle : *list) particle = kept.place[at(particle)];
     }
+    for (Marks::Cluster& cluster : one.joined) {
+      for (int32_t& particle : cluster.members) particle = kept.place[at(particle)];
+    }
     result.marks.push_back(std::move(one));
   }
   // A thinned body has no edges.
@@ -550,6 +558,15 @@ double sampled_bytes(const Plan& plan, double places) {
 }
 
 }  // namespace
+
+json to_json(const Marks& marks) {
+  json joined = json::array();
+  for (const Marks::Cluster& cluster : marks.joined)
+    joined.push_back({{"number", cluster.number}, {"members", cluster.members}});
+  return {{"moment", marks.moment},       {"exact", marks.is_exact}, {"partly", marks.is_partly},
+          {"particles", marks.particles}, {"path", marks.path},      {"members", marks.clusters},
+          {"joined", std::move(joined)},  {"corners", marks.corners}};
+}
 
 std::vector<Moment> kept_moments(const std::vector<Moment>& all, const std::set<int64_t>& named, int64_t every_frame) {
   const int64_t last = all.empty() ? 0 : all.back().frame;

@@ -50,7 +50,12 @@ struct Marks {
   bool is_partly = false;                // there are more than are marked
   std::vector<int32_t> particles, path;  // of the witness
   std::vector<int32_t> clusters;         // members of its clusters
-  std::vector<int32_t> corners;          // of its triangles, three of each: vertices of that moment's skin
+  struct Cluster {
+    int32_t number = -1;
+    std::vector<int32_t> members;
+  };
+  std::vector<Cluster> joined;   // the same of each, where they are few
+  std::vector<int32_t> corners;  // of its triangles, three of each: vertices of that moment's skin
 };
 
 // Pictures of one run as a browser takes them apart.
@@ -86,5 +91,8 @@ Pictures pictures_of(const Source& source, const std::vector<Finding>& findings,
 // Of all moments those that a page shows: the start, the last frame, one frame in so many, and every stage of the
 // frames that are named, because something in them is spoken of.
 std::vector<Moment> kept_moments(const std::vector<Moment>& all, const std::set<int64_t>& named, int64_t every_frame);
+
+// As the page's script has it.
+nlohmann::json to_json(const Marks& marks);
 
 }  // namespace cutproof::report

@@ -46,7 +46,11 @@ Holders holders_of(const Clusters& clusters, int32_t particles) {
   for (std::size_t k = 0; k + 1 < clusters.offsets.size(); ++k) {
     const std::span<const int32_t> members = extent(clusters, k);
     if (members.empty()) continue;
-    const int32_t lowest = *std::min_element(members.begin(), members.end());
+    const auto is_first = [&](int32_t member) {
+      return member >= 0 && member < particles && holders.lowest[at(member)] < 0;
+    };
+    int32_t lowest = particles;
+    for (const int32_t member : members) lowest = is_first(member) ? std::min(lowest, member) : lowest;
     for (const int32_t member : members) {
       if (member < 0 || member >= particles) continue;
       const std::size_t i = at(member);

@@ -18,8 +18,9 @@ Pieces pieces_of(const Body& body, const std::vector<uint8_t>& alive);
 
 // Clusters of a state that may be as wrong as it likes: nothing is read that is not there.
 struct Holders {
-  std::vector<int32_t> lowest;  // [n] lowest member of the first cluster that holds a particle, -1 without one: it
-                                // stays the same where clusters are numbered anew
+  std::vector<int32_t> lowest;  // [n] of the first cluster that holds a particle the lowest of those that it is the
+                                // first to hold, -1 without one: no two clusters have the same, and it stays where
+                                // clusters are numbered anew
   std::vector<uint8_t> count;   // [n] how many clusters hold it, at most 255
 };
 Holders holders_of(const Clusters& clusters, int32_t particles);

@@ -30,7 +30,8 @@ json to_json(const Chart& chart) {
       if (++count > kMostRows) continue;
       dots.push_back({json_number(dot.x), json_number(dot.y), dot.text});
     }
-    const char* const look = curve.look == Look::dots ? "dots" : curve.look == Look::joined ? "joined" : "level";
+    constexpr const char* kLooks[] = {"dots", "joined", "level", "front"};
+    const char* const look = kLooks[static_cast<std::size_t>(curve.look)];
     curves.push_back({{"name", curve.name}, {"look", look}, {"dots", std::move(dots)}});
   }
   return {{"kind", "chart"},

@@ -22,7 +22,8 @@ struct Dot {
   std::optional<double> x, y;
   std::string text;  // which configuration this is, in words
 };
-enum class Look { dots, joined, level };  // level: a limit or a goal, drawn as a thin line without dots
+// Without dots: level, a limit or a goal, is a dashed line; front, which no dot beats in both, a thin one.
+enum class Look { dots, joined, level, front };
 struct Curve {
   std::string name;
   Look look = Look::dots;

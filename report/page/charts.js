@@ -97,7 +97,7 @@ export function chart(given) {
   const entries = [];
   const groups = [[], []];  // lines below dots
   for (const curve of given.curves) {
-    const isLevel = curve.look === 'level';
+    const isLevel = curve.look === 'level' || curve.look === 'front';
     if (!curve.dots.some(isShown)) continue;  // in the table alone
     const kind = isLevel ? null : which++;
     if (curve.look !== 'dots') {
@@ -106,9 +106,9 @@ export function chart(given) {
         if (isShown(dot)) path += `${isDown ? 'L' : 'M'}${xScale.at(dot[0]).toFixed(1)} ${yScale.at(dot[1]).toFixed(1)}`;
         isDown = isShown(dot);
       }
-      groups[0].push(drawing('path', { class: isLevel ? 'level' : `line joined line-${kind % kShapes}`, d: path }, drawing('title', { text: curve.name })));
+      groups[0].push(drawing('path', { class: isLevel ? curve.look : `line joined line-${kind % kShapes}`, d: path }, drawing('title', { text: curve.name })));
     }
-    entries.push(element('li', {}, isLevel ? element('span', { class: 'key level-key', 'aria-hidden': 'true' }) : drawing('svg', { class: `sample fill-${kind % kShapes}`, viewBox: '-8 -8 16 16', 'aria-hidden': 'true' }, shape(kind + Math.floor(kind / kShapes), 0, 0)), element('span', { text: curve.name })));
+    entries.push(element('li', {}, isLevel ? element('span', { class: `key ${curve.look}-key`, 'aria-hidden': 'true' }) : drawing('svg', { class: `sample fill-${kind % kShapes}`, viewBox: '-8 -8 16 16', 'aria-hidden': 'true' }, shape(kind + Math.floor(kind / kShapes), 0, 0)), element('span', { text: curve.name })));
     if (isLevel) continue;
     for (const dot of curve.dots) {
       if (!isShown(dot)) continue;
@@ -137,7 +137,7 @@ export function chart(given) {
     next.focus();
   });
   const hidden = all.filter((dot) => !isShown(dot)).length;
-  const rows = given.curves.filter((curve) => curve.look !== 'level' || curve.name.startsWith('limit')).flatMap((curve) => curve.dots.map((dot) => [dot[2], curve.name, cell(dot[0]), cell(dot[1])]));
+  const rows = given.curves.filter((curve) => (curve.look !== 'level' && curve.look !== 'front') || curve.name.startsWith('limit')).flatMap((curve) => curve.dots.map((dot) => [dot[2], curve.name, cell(dot[0]), cell(dot[1])]));
   return element('figure', { class: 'card plot chart' },
     element('figcaption', {}, element('h3', { text: given.title }), element('p', { class: 'muted', text: given.words })),
     svg, element('ul', { class: 'legend' }, ...entries), dots.length > 0 && readout,

@@ -1,9 +1,13 @@
 // What particles are coloured by. Colours of Okabe and Ito and of cividis, which people of all kinds of colour vision
 // tell apart (tests/report/colours_test.py). A colour is a number as the GPU takes it: red in its lowest byte.
+import { coloursOfClusters } from './cluster_colours.js';
 import { figure, plural } from './dom.js';
 
 const kOkabeIto = ['#56B4E9', '#E69F00', '#009E73', '#F0E442', '#CC79A7', '#0072B2', '#D55E00'];
 const kCividis = ['#00224e', '#2a3f6d', '#575d6d', '#7d7c78', '#a59c74', '#d2c060', '#fee838'];
+// Clusters, without the colour of what a verdict names; those behind them where a cluster touches so many others.
+const kClusters = ['#56B4E9', '#E69F00', '#009E73', '#F0E442', '#CC79A7', '#0072B2'];
+const kMoreClusters = ['#2a5a75', '#7d5600', '#005a41', '#857e1e', '#6b3a55', '#063a58', '#b9dff6', '#f5d58f', '#8fd3bf', '#f8f3b0', '#e8c3d6', '#8cbfdf'];
 // What a stage changed, in the order of report/changes.h.
 const kChanges = ['#bdb6ae', '#56b4e9', '#f0e442', '#e69f00', '#009e73', '#0b3c8c', '#1b1b1b'];
 const kChangeWords = ['nothing', 'moved', 'skin made here', 'in a cluster that lost members, or is new', 'a cluster grew over it', 'in a cluster that was merged', 'removed'];
@@ -27,16 +31,16 @@ for (let k = 0; k < 256; ++k) {
 }
 const onRamp = (share) => ramp[Math.round(255 * Math.min(Math.max(share, 0), 1))];
 
-// A number's own colour: the same in every frame.
-const shades = [];
-for (let k = 0; k < 3 * kOkabeIto.length; ++k) {
-  const light = 0.72 + 0.14 * (k % 3);
-  shades.push(packed(channels(kOkabeIto[Math.floor(k / 3)]).map((x) => Math.round(x * light))));
-}
-function coloured(key) {
-  if (key < 0) return kGrey;
-  const mixed = Math.imul(key + 1, 0x9e3779b1) >>> 0;
-  return shades[3 * (mixed % kOkabeIto.length) + ((mixed >>> 8) % 3)];
+// The colours of a moment's clusters, found once: moments that have the same clusters share their arrays.
+const clusterColours = [...kClusters, ...kMoreClusters].map((hex) => packed(channels(hex)));
+const kTiers = [kClusters.length, kMoreClusters.length];
+const known = new WeakMap();
+function choices(moment, edges, before) {
+  const had = known.get(moment.cluster);
+  if (had && had.alive === moment.alive && had.edges === edges) return had.found;
+  const found = coloursOfClusters(moment.cluster, moment.alive, edges, kTiers, before);
+  known.set(moment.cluster, { alive: moment.alive, edges, found });
+  return found;
 }
 
 // A nice number, not below x: 1, 2 or 5 times a power of ten.
@@ -69,6 +73,7 @@ export function colourings(hasStretch, comparison) {
   const all = {
     piece: {
       name: 'piece of tissue',
+      mayBeCovered: true,  // by what is marked
       of({ moment }) {
         let pieces = 0;
         for (const piece of moment.piece) if (piece >= pieces) pieces = piece + 1;
@@ -81,7 +86,13 @@ export function colourings(hasStretch, comparison) {
     },
     cluster: {
       name: 'cluster',
-      of: ({ moment }) => ({ colour: (i) => coloured(moment.cluster[i]), words: 'Each particle has the colour of the first cluster that holds it.' }),
+      of({ moment, edges, first }) {
+        const chosen = choices(moment, edges, first && first !== moment ? choices(first, edges, null) : null);
+        return {
+          colour: (i) => (moment.cluster[i] < 0 ? kGrey : clusterColours[chosen[moment.cluster[i]]]),
+          words: `Each particle has the colour of the first cluster that holds it${edges ? '; where two such meet, or no more than two layers of removed particles lie between them, their colours differ' : ''}.`,
+        };
+      },
     },
     change: {
       name: 'what the last stage changed',

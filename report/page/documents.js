@@ -3,6 +3,7 @@ import { chart, stack } from './charts.js';
 import { grid } from './documents_table.js';
 import { byId, count, element, plural } from './dom.js';
 import { Sceneries } from './scenery.js';
+import { sourceInWords } from './sources.js';
 import { command } from './verdicts.js';
 
 const make = { chart, stack, grid };
@@ -14,7 +15,7 @@ function card(given, sceneries, number) {
   return element('article', { class: 'card bad failure', 'aria-labelledby': id },
     element('h3', { id, text: given.title }),
     given.words && element('p', { class: 'witness', text: given.words }),
-    element('dl', {}, ...given.facts.flatMap(([what, value]) => [element('dt', { text: what }), element('dd', { text: value })])),
+    element('dl', {}, ...given.facts.flatMap(([what, value]) => [element('dt', { text: what }), element('dd', { text: sourceInWords(value) })])),
     sceneries && given.picture >= 0 && element('div', { class: 'row' }, element('button', { type: 'button', class: 'finding', 'data-scenery': given.picture, 'aria-pressed': 'false', text: 'Show me', onclick: (event) => {
       for (const other of document.querySelectorAll('[data-scenery]')) other.setAttribute('aria-pressed', String(other === event.currentTarget));
       sceneries.show(given.picture);
@@ -40,8 +41,8 @@ function put(main, sheet, isAlone, sceneries, first) {
     const holder = isPictured && !sceneries.isPlaced ? element('div', { class: 'stage' }, sceneries.section, cards) : cards;
     if (isPictured) sceneries.isPlaced = true;
     main.append(holder);
-  } else if (judges) {
-    main.append(element('section', { class: 'card failures' }, element('h2', { text: sheet.holds ? 'Nothing fails' : 'It does not hold' }), element('p', { text: sheet.holds ? `${sheet.kind === 'campaign' ? 'No case of this campaign violates' : 'No question showed a violation of'} any property. That says nothing about cases that it did not draw: another seed draws others.` : sheet.summary })));
+  } else if (judges && sheet.holds) {  // where it does not hold, the summary has said so
+    main.append(element('section', { class: 'card failures' }, element('h2', { text: 'Nothing fails' }), element('p', { text: `${sheet.kind === 'campaign' ? 'No case of this campaign violates' : 'No question showed a violation of'} any property. That says nothing about cases that it did not draw: another seed draws others.` })));
   }
   if (sheet.again || sheet.notes.length) {
     main.append(element('section', { class: 'card notes-card' }, sheet.again && element('h2', { text: 'Repeat it' }), sheet.again && command(sheet.again),

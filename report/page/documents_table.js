@@ -1,5 +1,6 @@
 // Tables of documents, which may be filtered by what stands in one of their columns.
 import { count, element } from './dom.js';
+import { sourceInWords } from './sources.js';
 
 export const byNumber = (isNumber) => (isNumber ? 'number' : null);
 const kinds = { good: '✓ ', bad: '✕ ', warn: '! ' };
@@ -7,7 +8,7 @@ const kinds = { good: '✓ ', bad: '✕ ', warn: '! ' };
 export function grid(given) {
   const rows = given.rows.map((row) => {
     const words = row.cells[given.filter];
-    const node = element('tr', { class: row.kind || null }, ...row.cells.map((text, k) => element(k === 0 ? 'th' : 'td', { scope: k === 0 ? 'row' : null, class: byNumber(given.columns[k][1]), text: k === 0 ? (kinds[row.kind] || '') + text : text })));
+    const node = element('tr', { class: row.kind || null }, ...row.cells.map((text, k) => element(k === 0 ? 'th' : 'td', { scope: k === 0 ? 'row' : null, class: byNumber(given.columns[k][1]), text: k === 0 ? (kinds[row.kind] || '') + text : sourceInWords(text) })));
     return { node, words };
   });
   const shown = element('span', { class: 'muted small', role: 'status' });

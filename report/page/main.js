@@ -4,6 +4,7 @@ import { colourings, rampStops } from './colours.js';
 import { apartInWords, comparisonCard } from './compare.js';
 import { showDocuments } from './documents.js';
 import { byId, count, drawing, element, figure, plural } from './dom.js';
+import { markedWords, marksOf } from './marks.js';
 import { plotsOf } from './plots.js';
 import { cards, command, table } from './verdicts.js';
 import { View, contextOf } from './view.js';
@@ -124,19 +125,6 @@ async function go(at, finding = null, spot = null) {
   await update();
 }
 
-// What the colours of marks mean, of those that there are.
-function markedWords({ particles, path, members, corners, partly, exact }) {
-  const said = [];
-  const triangles = corners.length / 3;
-  if (particles.length + path.length > 0) said.push(`Marked orange: what the verdict names${triangles ? `, ${plural(triangles, 'triangle')} of the skin among it` : ''}.`);
-  else if (triangles) said.push(`Marked orange: ${plural(triangles, 'triangle')} of the skin, which the verdict names.`);
-  if (members.length > 0) said.push('Yellow: the members of its clusters.');
-  if (said.length === 0) said.push('The verdict names no place.');
-  if (partly) said.push('There are more than are marked.');
-  if (!exact) said.push('The recording has no moment after this stage; this is the next one.');
-  return ` ${said.join(' ')}`;
-}
-
 // Plots follow a little later while somebody scrubs: a browser draws each of them anew.
 let plotted = -Infinity, plotting = null;
 function showInPlots() {
@@ -153,8 +141,11 @@ function showInPlots() {
 // Only what is said otherwise than before is written: where the processor draws, text costs as much as the picture.
 function say(where, ...parts) {
   const had = [...where.childNodes];
-  if (had.length !== parts.length) return where.replaceChildren(...parts);
-  parts.forEach((part, k) => { if (!part.isEqualNode(had[k])) had[k].replaceWith(part); });
+  parts.forEach((part, k) => {
+    if (k >= had.length) where.append(part);
+    else if (!part.isEqualNode(had[k])) had[k].replaceWith(part);
+  });
+  for (const more of had.slice(parts.length)) more.remove();
 }
 
 async function update() {
@@ -178,7 +169,8 @@ async function update() {
   if (ticket !== shown) return;  // somebody has gone on meanwhile
   const abouts = besides ? [moment, data.besideMoments[state.at]] : [moment];
   const spot = state.spot === null ? null : { particles: [state.spot], path: [], members: [] };
-  const said = view.show(arrays, abouts, look, found ? found.marks : spot);
+  const marks = found && marksOf(found);
+  const said = view.show(arrays, abouts, look, marks || spot);
   const legends = [element('span', { text: said.words })];
   if (said.scale) {
     const ramp = drawing('svg', { class: 'ramp', viewBox: '0 0 70 10', 'aria-hidden': 'true' }, ...rampStops.map((fill, k) => drawing('rect', { x: 10 * k, y: 0, width: 10.5, height: 10, fill })));
@@ -186,10 +178,18 @@ async function update() {
   }
   if (said.keys) legends.push(...said.keys.map(([fill, text]) => element('span', { class: 'keyed' }, drawing('svg', { class: 'swatch', viewBox: '0 0 10 10', 'aria-hidden': 'true' }, drawing('rect', { width: 10, height: 10, fill })), element('span', { text }))));
   if (view.plane.isOn) legends.push(element('span', { id: 'cut-words', text: ` ${view.plane.words()}${data.body.kept < data.body.particles ? ' This page holds some of the particles only, so the face has holes.' : ''}` }));
-  if (moment.start && look.skin && !look.particles) legends.push(element('span', { text: ' The skin comes with the first frame; until then particles are shown.' }));
-  if (found) legends.push(element('span', { class: 'marked-key', text: markedWords(found.marks) }));
+  if (look.skin && !look.particles && arrays[0].triangles.length === 0) legends.push(element('span', { id: 'no-skin', text: ` ${noSkinInWords(moment)}` }));
+  if (found) legends.push(element('span', { class: 'marked-key', text: ` ${markedWords(marks, found.clusters)}` }));
   say(legend, ...legends);
   document.documentElement.dataset.shown = `${state.at}/${state.finding === null ? '' : state.finding}`;
+}
+
+// Particles are shown where there is no skin, though somebody has asked for it.
+function noSkinInWords(moment) {
+  const { frame, triangles } = data.frames;
+  const first = frame.find((_, k) => triangles[k] > 0);
+  return first !== undefined && (moment.start || moment.frame <= first)
+    ? `The skin comes at the end of frame ${first}; until then particles are shown.` : 'This moment has no skin, so particles are shown.';
 }
 
 function sayCut() {

@@ -46,9 +46,11 @@ export function plot(options) {
     svg.append(drawing('line', { class: 'rule', x1: kLeft, x2: right, y1: y(v), y2: y(v) }),
       drawing('text', { class: 'tick', x: kLeft - 6, y: y(v) + 4, 'text-anchor': 'end', text: options.whole ? count(v) : figure(v) }));
   }
-  for (const f of ticks(first, last, 6).filter((v) => Number.isInteger(v))) {
+  for (const f of ticks(first, last, 6).filter((v) => Number.isInteger(v) && v >= 0)) {
     svg.append(drawing('text', { class: 'tick', x: x(f), y: bottom + 16, 'text-anchor': 'middle', text: String(f) }));
   }
+  // Where the state as loaded comes first, it is no frame.
+  if (first < 0) svg.append(drawing('text', { class: 'tick', x: x(first), y: bottom + 28, 'text-anchor': 'middle', text: 'as loaded' }), drawing('line', { class: 'rule', x1: x(first), x2: x(first), y1: bottom, y2: bottom + 16 }));
   svg.append(drawing('text', { class: 'axis', x: (kLeft + right) / 2, y: kHeight - 6, 'text-anchor': 'middle', text: 'frame' }),
     drawing('text', { class: 'axis', x: 12, y: (kTop + bottom) / 2, 'text-anchor': 'middle', transform: `rotate(-90 12 ${(kTop + bottom) / 2})`, text: options.unit }));
 
@@ -97,7 +99,7 @@ export function plot(options) {
     table.append(element('div', { class: 'scroll' }, element('table', {},
       element('thead', {}, element('tr', {}, element('th', { scope: 'col', text: 'frame' }),
         ...series.map((one) => element('th', { scope: 'col', text: series.length > 1 ? `${one.name} [${options.unit}]` : options.unit })))),
-      element('tbody', {}, ...frames.map((frame, k) => element('tr', {}, element('th', { scope: 'row', text: frame < 0 ? 'start' : String(frame) }), ...series.map((one) => cell(one.values[k]))))))));
+      element('tbody', {}, ...frames.map((frame, k) => element('tr', {}, element('th', { scope: 'row', text: frame < 0 ? 'as loaded' : String(frame) }), ...series.map((one) => cell(one.values[k]))))))));
   });
   return {
     card: element('figure', { class: 'card plot' }, element('figcaption', {}, element('h3', { text: options.title }), element('p', { class: 'muted', text: options.words })), svg, legend, table),

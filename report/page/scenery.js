@@ -2,6 +2,7 @@
 import { Moments } from './coding.js';
 import { colourings } from './colours.js';
 import { byId, element, plural } from './dom.js';
+import { markedWords, marksOf } from './marks.js';
 import { View, contextOf } from './view.js';
 
 const words = (moment) => (moment.start ? 'As loaded' : `Frame ${moment.frame}, after ${moment.stage}`);
@@ -27,7 +28,7 @@ export class Sceneries {
     this.range = element('input', { type: 'range', id: 'scrub', min: 0, step: 1, 'aria-label': 'Moment of both runs', oninput: () => this.go(Number(this.range.value)) });
     const button = (text, name, by) => element('button', { type: 'button', text, 'aria-label': name, title: name, onclick: () => this.go(this.at + by) });
     this.skin = element('select', { id: 'show', onchange: () => this.go(this.at) }, element('option', { value: 'particles', text: 'particles' }), element('option', { value: 'skin', text: 'skin' }), element('option', { value: 'both', text: 'both' }));
-    this.colour = element('select', { id: 'colour', onchange: () => this.go(this.at) }, ...Object.entries(colourings(false, null)).map(([key, one]) => element('option', { value: key, text: one.name })));
+    this.colour = element('select', { id: 'colour', onchange: () => { this.isChosen = true; this.go(this.at); } }, ...Object.entries(colourings(false, null)).map(([key, one]) => element('option', { value: key, text: one.name })));
     this.fails = element('button', { type: 'button', text: 'Where it fails', onclick: () => this.show(this.number) });
     this.legend = element('p', { id: 'legend', class: 'small' });
     this.section = element('section', { id: 'view', class: 'card', 'aria-labelledby': 'view-title' },
@@ -61,10 +62,13 @@ export class Sceneries {
       }
       this.range.max = first.moments.length - 1;
       this.fails.hidden = !scenery.property;
+      // Where a cluster is what is wrong, the two may differ in nothing else.
+      if (!this.isChosen) this.colour.value = scenery.sides.some((side) => side.marks && side.marks.members.length > 0) ? 'cluster' : 'piece';
     }
     await this.go(scenery.property && first.marks ? Math.max(first.marks.moment, 0) : first.moments.length - 1);
     // From one side, as far as they can be compared.
-    for (const { view } of this.views) if (view) view.flyToMarks();
+    let place;
+    for (const { view } of this.views) if (view) place = view.flyToMarks(place || undefined);
   }
 
   async go(at) {
@@ -80,13 +84,17 @@ export class Sceneries {
     for (const { view, side, moments: own } of this.views) {
       const k = side === scenery.sides[0] ? this.at : sameMoment(side.moments, moment);
       said.push(`${side.name}: ${plural(side.moments[k].components, 'piece')}, ${plural(side.moments[k].clusters, 'cluster')}, ${plural(side.moments[k].particles, 'particle')}`);
-      // Particles are the same ones in both runs; clusters and vertices of the skin need not be.
-      const marked = isWhere && (side === scenery.sides[0] ? marks : { ...marks, members: [], corners: [] });
+      // Particles are the same ones in both runs; clusters and vertices of the skin need not be: of the other run its
+      // own cluster of the same number.
+      const theirs = side.marks && side.marks.moment === k ? side.marks : { members: [], joined: [] };
+      const marked = isWhere && marksOf({ text: scenery.text, marks: side === scenery.sides[0] ? marks : { ...marks, members: theirs.members, joined: theirs.joined, corners: [] } });
       if (view) {
         const arrays = await own.get(k);
         if (ticket !== this.ticket) return;  // somebody has gone on meanwhile
         const { words: legend } = view.show([arrays], [side.moments[k]], look, marked || null);
-        this.legend.textContent = `${legend} Removed particles are rings.${isWhere ? ' Marked orange: what the verdict names; yellow: the members of its clusters.' : ''}`;
+        const isFirst = side === scenery.sides[0];
+        if (isFirst) this.legend.textContent = `${legend} Removed particles are rings.${marked ? ` ${markedWords(marked, marked.joined.map((one) => one.number))}` : ''}`;
+        if (isFirst && this.skin.value === 'skin' && arrays.triangles.length === 0) this.legend.textContent += ' This moment has no skin, so particles are shown.';
       }
     }
     this.status.replaceChildren(element('strong', { text: words(moment) }), element('span', { class: 'muted', text: ` · ${said.join(' · ')}` }));

@@ -1,5 +1,6 @@
 // What fails, each with its witness; and a table of every property.
 import { count, element, plural } from './dom.js';
+import { sourceInWords } from './sources.js';
 
 const withUnit = (text, unit) => (unit ? `${text} ${unit}` : text);
 
@@ -54,7 +55,7 @@ export function table(data, jump) {
       element('td', {}, row.judged > 0 && bar(row, fails)),
       element('td', { class: 'figures' }, row.judged > 0 && element('span', { text: withUnit(row.measured, row.unit) }), row.judged > 0 && element('span', { class: 'muted small block', text: `bound ${withUnit(row.bound, row.unit)}` })),
       element('td', {}, row.judged > 0 && element('button', { type: 'button', class: 'quiet', text: `frame ${row.frame}`, 'aria-label': `Show frame ${row.frame}, after ${row.stage}: ${fails ? 'where' : 'the nearest to the bound of'} ${row.property}${fails ? ' fails first' : ''}`, onclick: () => jump(row.frame, row.stage) })),
-      element('td', { class: 'muted small', text: row.source })));
+      element('td', { class: 'muted small', text: sourceInWords(row.source) })));
   }
   const head = ['Property', 'Result', 'Measured / bound', 'Measured', fails(data) ? 'First failure, or nearest to the bound' : 'Nearest to the bound', 'Where the bound comes from'];
   return element('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': 'Every property' }, element('table', { class: 'verdicts' },
@@ -81,7 +82,7 @@ export function cards(data, show) {
     found.push(element('article', { class: `card ${first.expected ? 'warn' : 'bad'}` },
       element('h3', {}, element('span', { text: first.property }), element('span', { class: 'muted', text: ` after ${first.stage}` })),
       text,
-      element('p', { class: 'muted small' }, element('span', { text: `Measured ${withUnit(first.measured, first.unit)}, bound ${withUnit(first.bound, first.unit)} (${first.source}). ` }),
+      element('p', { class: 'muted small' }, element('span', { text: `Measured ${withUnit(first.measured, first.unit)}, bound ${withUnit(first.bound, first.unit)} (${sourceInWords(first.source)}). ` }),
         element('span', { text: row && row.failed + row.expected > 1 ? `It fails in ${count(row.failed + row.expected)} of ${plural(row.judged, 'verdict')}.` : '' }),
         first.expected && element('span', { text: ' The scene expects it to fail.' })),
       element('div', { class: 'row' }, button(members[0], marks ? `Show me: frame ${first.frame}` : `Go to frame ${first.frame}`)),

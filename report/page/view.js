@@ -5,6 +5,9 @@ import { CutPlane } from './cut_plane.js';
 import { Orbit } from './orbit.js';
 import { Tissue } from './tissue.js';
 
+// A body of fewer particles is small. Beside what is marked, the view's middle lies so far towards that of the body.
+const kSmallBody = 1000, kTowardsMiddle = 0.3, kTowardsMiddleOfSmall = 0.5;
+
 // While somebody scrubs, plays or turns where pictures take long: a picture of so many times fewer pixels along each
 // side now rather than a sharp one later, of the next as many if a few in a row take too long; and a sharp one after so
 // long a rest.
@@ -64,6 +67,7 @@ export class View {
     this.radius = Math.hypot(...this.extent) / 2 + 1;
     this.start = places(moment.x, moment, this.centre, spacing);
     this.edges = edges;
+    this.first = moment;
     this.plane.begin(this.radius);
     for (const { body } of this.sides) body.add(this.plane.outline.clone());
     this.resize();
@@ -216,17 +220,23 @@ export class View {
 
   // moments: of each run its arrays; abouts: what the page says of them. Returns the legend, of the first.
   show(moments, abouts, look, marks) {
-    const about = { centre: this.centre, start: this.start, edges: this.edges };
+    const about = { centre: this.centre, start: this.start, edges: this.edges, first: this.first };
     const seen = { ...look, isCut: this.plane.isOn };
     const legends = this.sides.map((side, k) => side.show(moments[k], abouts[k], seen, k === 0 ? marks : null, about));
     this.draw();
     return legends[0];
   }
 
-  // Flies to what is marked, if anything is.
-  flyToMarks() {
+  // Flies to what is marked, if anything is; or to where another view has flown.
+  flyToMarks(place = this.placeOfMarks()) {
+    if (place) this.orbit.fly(...place);
+    return place;
+  }
+
+  // Where to look, from how far away, and from where if that matters.
+  placeOfMarks() {
     const { marked } = this.sides[0];
-    if (!marked || marked.length === 0) return;
+    if (!marked || marked.length === 0) return null;
     const m = this.data.body.orientation;
     const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
     for (let i = 0; i < marked.length; i += 3) {
@@ -238,8 +248,28 @@ export class View {
       }
     }
     const radius = Math.hypot(...low.map((x, k) => high[k] - x)) / 2;
-    // Never so near that nobody sees where in the body it is.
-    const seen = Math.min(this.radius, Math.max(1.8 * radius + 2, 0.5 * this.radius));
-    this.orbit.fly(low.map((x, k) => (x + high[k]) / 2), this.distanceFor(seen));
+    const middle = low.map((x, k) => (x + high[k]) / 2);
+    // Never so near that nobody sees where in the body it is: little is seen of a small body at all, and a triangle of
+    // the skin is small.
+    const isSmall = this.data.body.particles < kSmallBody, isTriangle = this.sides[0].facing !== null;
+    const nearest = this.radius * (isTriangle ? (isSmall ? 0.6 : 0.3) : isSmall ? 0.8 : 0.5);
+    const seen = Math.min(this.radius, Math.max(1.8 * radius + 2, nearest));
+    // Marks at the rim would leave half of the view empty.
+    const target = middle.map((x) => (1 - (isSmall ? kTowardsMiddleOfSmall : kTowardsMiddle)) * x);
+    return [target, this.distanceFor(seen), isTriangle ? this.anglesFacing(this.sides[0].facing) : undefined];
+  }
+
+  // The angles from which a surface is seen that faces this way. Not from straight above or
+  // below, where nobody knows which way they look.
+  anglesFacing(facing) {
+    const m = this.data.body.orientation;
+    const [x, y, z] = [0, 3, 6].map((k) => m[k] * facing[0] + m[k + 1] * facing[1] + m[k + 2] * facing[2]);
+    const flat = Math.hypot(x, y);
+    const limit = (angle) => Math.min(Math.max(angle, -1.2), 1.2);
+    let around = flat > 1e-3 ? Math.atan2(y, x) : this.orbit.at.around;
+    // The shorter way round.
+    while (around - this.orbit.at.around > Math.PI) around -= 2 * Math.PI;
+    while (around - this.orbit.at.around < -Math.PI) around += 2 * Math.PI;
+    return { around, above: limit(Math.atan2(z, flat)) };
   }
 }

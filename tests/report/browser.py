@@ -47,13 +47,7 @@ class Browser:
     """A page, opened as by double click, with the network watched and every line of the console kept."""
 
     def __init__(self, page, *flags, width=1280, dark=False, still=True):
-        options = webdriver.ChromeOptions()
-        for flag in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle",
-                     "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--window-size=1280,1000", *flags):
-            options.add_argument(flag)
-        options.binary_location = chromium
-        options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-        self.driver = webdriver.Chrome(service=Service(driver), options=options)
+        self.driver = Browser.blank(*flags)
         self.driver.set_script_timeout(60)
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [
             {"name": "prefers-color-scheme", "value": "dark" if dark else "light"},
@@ -67,6 +61,17 @@ class Browser:
         self.until("return document.documentElement.dataset.ready === 'true'")
         self.there_after = time.monotonic() - begin
         print(f"{page.name}: {page.stat().st_size / 1e6:.2f} MB, there after {self.there_after:.1f} s", flush=True)
+
+    @staticmethod
+    def blank(*flags):
+        """Chromium with no page in it, to be quit by whoever asks."""
+        options = webdriver.ChromeOptions()
+        for flag in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle",
+                     "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--window-size=1280,1000", *flags):
+            options.add_argument(flag)
+        options.binary_location = chromium
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+        return webdriver.Chrome(service=Service(driver), options=options)
 
     def __enter__(self):
         return self

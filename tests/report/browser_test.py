@@ -4,6 +4,7 @@ Usage: browser_test.py CUTPROOF CXX SOURCES WORK
 Exit status 77, with the name of what is missing, where there is no Chromium, no driver of it or no selenium."""
 import json
 import pathlib
+import re
 import sys
 
 from browser import Browser, By, Folder, Keys
@@ -11,6 +12,15 @@ from browser import Browser, By, Folder, Keys
 program, cxx, sources = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
 work = Folder(sys.argv[4], program)
 run = work.run
+
+# --- Titles of sections are those of the document ---
+
+titles = [line.split(". ", 1)[1] for line in (sources / "docs/design/method.md").read_text().splitlines()
+          if line.startswith("## ")]
+given = re.search(r"kSections = \[(.*?)\]", (sources / "report/page/sources.js").read_text(), re.S)[1]
+given = re.findall(r"'([^']+)'", given)
+assert len(given) == len(titles), (given, titles)
+assert all(title.lower().startswith(one) for one, title in zip(given, titles)), (given, titles)
 
 # --- Three runs: one that holds, one that fails after split, and one whose names are hostile ---
 
@@ -75,6 +85,20 @@ with Browser(work / "holds.html") as page:
     page.ask("arguments[0].click()", button)
     page.until("return document.documentElement.dataset.moment != 0")
     assert button.text in page.text("#status").lower(), (button.text, page.text("#status"))
+    # Where there is no skin, the page says so, as loaded and later.
+    page.choose("show", "skin")
+    for k in range(last + 1):
+        page.scrub(k)
+        moment = page.data(f"moments[{k}]")
+        is_without = moment["start"] or (moment["frame"] == 0 and moment["stage"] != "skin")
+        assert bool(page.driver.find_elements(By.ID, "no-skin")) == is_without, moment
+    # What a bound comes from is said in words as well.
+    assert "method.md §5 (split)" in page.text("#verdicts")
+    # The state as loaded is no frame.
+    for plot in page.driver.find_elements(By.CSS_SELECTOR, ".plot"):
+        ticks = [one.text for one in plot.find_elements(By.CSS_SELECTOR, ".tick")]
+        assert "-1" not in ticks and ("as loaded" in ticks) == ("Pieces" in plot.text or "Clusters" in plot.text
+                                                               or "removed" in plot.text), ticks
     # Plots have units, words, and the same as a table.
     for plot in page.driver.find_elements(By.CSS_SELECTOR, ".plot"):
         assert len(plot.find_elements(By.CSS_SELECTOR, ".axis")) == 2
@@ -196,6 +220,11 @@ with Browser(work / "campaign.html") as page:
     facts = page.text(".failure dl")
     for word in ("Simplification", "from ", "The case", "Measured / bound", "it fails on plugin:./libsplitter.so"):
         assert word in facts, (word, facts)
+    # Where clusters are what differs they are seen: by their colours, and by lines between members of the one named.
+    assert page.ask("return document.getElementById('colour').value") == "cluster"
+    left, right = page.pixels_of(".pane canvas")
+    assert left["sum"] != right["sum"], "a wrong split looks like a right one"
+    assert "Lines join the members of cluster " in page.text("#legend"), page.text("#legend")
     # Both states, the witness marked in each, and not elsewhere.
     names = [one.text for one in page.driver.find_elements(By.CSS_SELECTOR, ".pane figcaption")]
     assert names == ["backend plugin:./libsplitter.so", "the reference"], names
@@ -259,6 +288,8 @@ with Browser(work / "good.html") as page:
 with Browser(work / "tuning.html") as page:
     assert "found" in page.text(".badge") and "The cheapest configuration of halves" in page.text("#summary")
     dots_say(page)
+    dashes = page.ask("return ['.front', '.level'].map((s) => getComputedStyle(document.querySelector(`.chart ${s}`)).strokeDasharray)")
+    assert dashes[0] == "none" and dashes[1] != "none", f"the front and the tolerance look alike: {dashes}"
     assert "tolerance" in page.text(".chart .legend") and "the answer" in page.text(".chart .legend")
     page.picture(work / "tuning.png")
 with Browser(work / "stages.html") as page:

@@ -44,7 +44,7 @@ def lines(mode):
 
 # What two colours of a list that are told apart by nothing else must have between them; a difference of 10 is seen at a
 # glance. Lines of plots differ in their dashes as well.
-LEAST = {"kOkabeIto": 10, "kChanges": 10}
+LEAST = {"kOkabeIto": 10, "kChanges": 10, "kClusters": 10}
 for name, least in LEAST.items():
     for kind, matrix in SEEN.items():
         nearest = min((math.dist(lab(a, matrix), lab(b, matrix)), a, b)
@@ -72,4 +72,9 @@ for kind, matrix in SEEN.items():
     apart = math.dist(lab(marked, matrix), lab(tissue, matrix))
     print(f"marked beside tissue, {kind}: {apart:.1f}")
     assert apart >= 20, (kind, apart)
+# Nor is it taken for a cluster, or for what else is marked.
+for kind, matrix in SEEN.items():
+    for name, other in [("kMember", triple(drawing, "kMember"))] + [("kClusters", one) for one in palette("kClusters")]:
+        apart = math.dist(lab(marked, matrix), lab(other, matrix))
+        assert apart >= 10, (kind, name, other, apart)
 print("colours are told apart")

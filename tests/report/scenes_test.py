@@ -4,6 +4,7 @@ click. And what the 3D view can do beside: cut open, colour by what changed and 
 Usage: scenes_test.py CUTPROOF PLUGIN WORK (PLUGIN: the reference as a plugin, wrong in the stage that it is told)
 Exit status 77 where there is no browser (browser.py)."""
 import json
+import pathlib
 import sys
 
 from browser import Browser, By, Folder, Keys
@@ -19,6 +20,23 @@ scene = {"version": 3, "name": "two halves",
          "blade": {"speed": 2, "strokes": [{"points": [[0.5, 0.5, 1.3], [0.5, 0.5, -0.3]], "along": [0, 1, 0]}]}}
 (work / "halves.json").write_text(json.dumps(scene))
 STAGES = ("step", "detect", "split", "merge", "expand", "skin")
+
+# Of the picture, as it is drawn: how much of each half is not ground, and how many pixels are yellow.
+PIXELS = """const canvas = document.getElementById('canvas'), copy = document.createElement('canvas');
+  [copy.width, copy.height] = [canvas.width, canvas.height];
+  const pen = copy.getContext('2d'); pen.drawImage(canvas, 0, 0);
+  const all = pen.getImageData(0, 0, copy.width, copy.height).data;
+  const [r0, g0, b0] = getComputedStyle(canvas.parentElement).backgroundColor.match(/\\d+/g).map(Number);
+  const isGround = (i) => Math.abs(all[i] - r0) + Math.abs(all[i + 1] - g0) + Math.abs(all[i + 2] - b0) < 4;
+"""
+HALVES = PIXELS + """const drawn = [0, 0];
+  for (let i = 0; i < all.length; i += 4) if (!isGround(i)) ++drawn[(i / 4) % copy.width < copy.width / 2 ? 0 : 1];
+  return drawn.map((n) => n / (all.length / 8));"""
+YELLOW = PIXELS + """let n = 0;
+  for (let i = 0; i < all.length; i += 4) if (all[i] > 200 && all[i + 1] > 180 && all[i + 2] < 100) ++n;
+  return n;"""
+DRAWN = PIXELS + """return Array.from({ length: all.length / 4 }, (_, k) => isGround(4 * k) ? 0
+  : all[4 * k] < 8 && all[4 * k + 1] > 105 && all[4 * k + 2] > 165 ? 2 : 1);"""
 
 # --- A fault in each stage ---
 
@@ -46,6 +64,16 @@ for stage in STAGES:
         assert f"Frame {page.data('findings[0].frame')}, after {stage}" in page.text("#status"), page.text("#status")
         assert page.data("findings[0].text") in page.text("#witness")
         page.picture(work / f"{stage}_after.png")
+        # Wherever the marks lie, neither half of the view is empty.
+        for half, share in zip(("left", "right"), page.ask(HALVES)):
+            assert share > 0.1, f"{stage}: the {half} half of the view is empty: {share}"
+        words = page.text("#legend")
+        if stage == "detect":
+            assert len(marks["particles"]) == 2 and "yellow: its neighbour" in words, words
+            assert page.ask(YELLOW) > 60, "the neighbour is marked as the particle itself"
+        if stage == "merge":
+            number = page.data("findings[0].clusters[0]")
+            assert f"the members of cluster {number}" in words, words
         # What is marked is what changes: without it the same moment has other pixels, and none are orange.
         page.scrub(0)
         assert page.pixels()["orange"] == 0, stage
@@ -57,6 +85,8 @@ for stage in STAGES:
             page.shown(marks["moment"], 0)
             words = page.text("#legend")
             assert f"{len(witness)} triangles of the skin" in words, words
+            # They face whoever looks: from where the body as a whole is looked at, these are seen edge-on.
+            assert seen["orange"] > 250, f"{seen['orange']} pixels are marked"
         # The command runs as it stands, and comes to the same. A terminal shows a few of many, so all are compared.
         command = page.text(".command")
         assert page.data("findings[0].property") in page.text("#verdicts")
@@ -65,6 +95,52 @@ for stage in STAGES:
         again = json.loads((work / "again.json").read_text())["verdicts"]
         assert again == verdicts, f"{stage}: the command comes to other verdicts"
 work.run([program, "run", "halves.json", "--backend", f"plugin:{plugin},none", "--check"], 0)  # it is the fault alone
+
+# --- Colours of clusters: those that touch differ, whatever goes; and they stay ---
+
+colouring = (pathlib.Path(__file__).parents[2] / "report/page/cluster_colours.js").read_text().replace("export ", "")
+blank = Browser.blank()
+try:
+    said = blank.execute_script(colouring + """
+      const n = 24, at = (x, y, z) => (z * n + y) * n + x, all = n * n * n;
+      const edges = { a: [], b: [] }, cluster = new Int32Array(all), alive = new Uint8Array(all).fill(1);
+      let seed = 7;
+      const random = (m) => { seed = (Math.imul(seed, 1103515245) + 12345) >>> 0; return (seed >>> 8) % m; };
+      const seeds = Array.from({ length: 400 }, () => [random(n), random(n), random(n)]);
+      for (let z = 0; z < n; ++z) for (let y = 0; y < n; ++y) for (let x = 0; x < n; ++x) {
+        let best = 0, least = Infinity;
+        seeds.forEach(([a, b, c], k) => { const d = (a - x) ** 2 + (b - y) ** 2 + (c - z) ** 2; if (d < least) [best, least] = [k, d]; });
+        cluster[at(x, y, z)] = 3 * best;
+        for (const [i, ok] of [[at(x + 1, y, z), x + 1 < n], [at(x, y + 1, z), y + 1 < n], [at(x, y, z + 1), z + 1 < n]]) if (ok) { edges.a.push(at(x, y, z)); edges.b.push(i); }
+      }
+      // How many touching pairs have one colour; over a cut of two layers, too.
+      const clashes = (of, there, colours) => {
+        let found = 0;
+        edges.a.forEach((a, e) => { const b = edges.b[e]; if (there[a] && there[b] && of[a] !== of[b] && colours[of[a]] === colours[of[b]]) ++found; });
+        for (let z = 0; z < n; ++z) for (let y = 0; y < n; ++y) {
+          const a = at(10, y, z), b = at(13, y, z);
+          if (!there[at(11, y, z)] && !there[at(12, y, z)] && of[a] !== of[b] && colours[of[a]] === colours[of[b]]) ++found;
+        }
+        return found;
+      };
+      const first = coloursOfClusters(cluster, alive, edges, [6, 12], null);
+      const again = coloursOfClusters(cluster, alive, edges, [6, 12], first);
+      // A cut parts the clusters that it goes through.
+      const cut = alive.slice(), parted = cluster.slice();
+      for (let z = 0; z < n; ++z) for (let y = 0; y < n; ++y) for (let x = 0; x < n; ++x) {
+        if (x === 11 || x === 12) { cut[at(x, y, z)] = 0; parted[at(x, y, z)] = -1; }
+        if (x > 12 && new Set([cluster[at(10, y, z)]]).has(cluster[at(x, y, z)])) parted[at(x, y, z)] = cluster[at(x, y, z)] + 1;
+      }
+      const later = coloursOfClusters(parted, cut, edges, [6, 12], first);
+      const kept = seeds.map((_, k) => 3 * k).filter((k) => first[k] >= 0 && later[k] >= 0);
+      return { first: clashes(cluster, alive, first), later: clashes(parted, cut, later), used: new Set(first).size,
+        same: first.every((c, k) => c === again[k]), kept: kept.filter((k) => first[k] === later[k]).length / kept.length,
+        unknown: coloursOfClusters(cluster, alive, null, [6, 12], null).every((c, k) => (first[k] < 0) === (c < 0)) };""")
+finally:
+    blank.quit()
+print(f"colours of clusters: {said}")
+assert said["first"] == 0 and said["later"] == 0, f"clusters that touch have one colour: {said}"
+assert said["same"] and said["kept"] > 0.9 and said["unknown"], said
 
 # --- Cut open, by mouse, keys and sliders ---
 
@@ -170,7 +246,29 @@ with Browser(work / "holds.html", still=False) as page:
     page.scrub(2)
     assert page.pixels()["share"] > 0.02
     counts, kept = page.ask("return window.points"), page.data("body.kept")
-    assert counts and 0 < max(counts) < 0.9 * kept, (counts, kept)
+    assert counts and 0 < max(counts) < kept, (counts, kept)
+    # And what is left out is behind others from wherever somebody looks, when the tissue is stretched too: a cut that
+    # cuts nothing draws all of them, and its frame in blue.
+    canvas = page.driver.find_element(By.ID, "canvas")
+    for at in (2, page.data("moments.length") - 1):
+        page.scrub(at)
+        for keys in ([], [Keys.ARROW_UP] * 9, [Keys.ARROW_DOWN] * 20):
+            if keys:
+                canvas.send_keys(*keys)
+            page.pixels()
+            some = page.ask(DRAWN)
+            page.ask("const c = document.getElementById('cut'); c.click(); const s = document.getElementById('cut-at');"
+                     "s.value = 1; s.dispatchEvent(new Event('input'));")
+            page.until("return document.getElementById('cut-words') !== null")
+            page.pixels()
+            whole = page.ask(DRAWN)
+            page.ask("document.getElementById('cut').click()")
+            page.until("return document.getElementById('cut-words') === null")
+            holes = sum(1 for a, b in zip(some, whole) if a == 0 and b == 1)
+            drawn = sum(1 for b in whole if b == 1)
+            assert drawn > 2000, "too little is drawn to say anything"
+            # Between discs a line of sight may pass two layers.
+            assert holes <= 2e-4 * drawn, f"moment {at}, {len(keys)} turns: {holes} of {drawn} pixels are holes"
     # Removed ones are drawn if somebody wants them, wherever they are in the list.
     page.ask("window.points = []; document.getElementById('removed').click()")
     page.scrub(page.data("moments.length") - 1)
