@@ -26,8 +26,8 @@ function bar(row, fails) {
   const filled = element('span', { class: fails ? 'filled bad' : 'filled' });
   filled.style.width = `${(100 * share) / 1.25}%`;
   const limit = element('span', { class: 'limit' });
-  const text = row.ofBound >= 100 ? row.ofBound.toExponential(1).replace('e+', 'e') : row.ofBound.toPrecision(2);
-  return element('span', { class: 'measure' }, element('span', { class: 'bar', 'aria-hidden': 'true' }, filled, limit), element('span', { class: 'share', text: `${Number(text)} of it` }));
+  const text = row.ofBound >= 100 ? `${row.ofBound.toExponential(1).replace('e+', 'e')} times the bound` : `${Number(row.ofBound.toPrecision(2))} of it`;
+  return element('span', { class: 'measure' }, element('span', { class: 'bar', 'aria-hidden': 'true' }, filled, limit), element('span', { class: 'share', text }));
 }
 
 function statusOf(row) {
@@ -82,7 +82,7 @@ export function cards(data, show) {
     found.push(element('article', { class: `card ${first.expected ? 'warn' : 'bad'}` },
       element('h3', {}, element('span', { text: first.property }), element('span', { class: 'muted', text: ` after ${first.stage}` })),
       text,
-      element('p', { class: 'muted small' }, element('span', { text: `Measured ${withUnit(first.measured, first.unit)}, bound ${withUnit(first.bound, first.unit)} (${sourceInWords(first.source)}). ` }),
+      element('p', { class: 'muted small' }, first.measured !== 'nothing' && element('span', { text: `Measured ${withUnit(first.measured, first.unit)}, bound ${withUnit(first.bound, first.unit)} (${sourceInWords(first.source)}). ` }),
         element('span', { text: row && row.failed + row.expected > 1 ? `It fails in ${count(row.failed + row.expected)} of ${plural(row.judged, 'verdict')}.` : '' }),
         first.expected && element('span', { text: ' The scene expects it to fail.' })),
       element('div', { class: 'row' }, button(members[0], marks ? `Show me: frame ${first.frame}` : `Go to frame ${first.frame}`)),
