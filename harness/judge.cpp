@@ -202,18 +202,19 @@ void Judge::see_several(const Moment& moment, const std::array<bool, 6>& seen) {
   // Each stands still until this has returned: judge_ may look at the last two.
   std::vector<std::shared_ptr<State>> between;
   const State* before = moment.before.get();
+  bool rotations_are_known = true;
   const auto follow = [&](Stage stage, State state) {
     between.push_back(std::make_shared<State>(std::move(state)));
-    see_stage(stage, *before, *between.back());
+    see_stage(stage, *before, *between.back(), rotations_are_known);
     before = between.back().get();
   };
   if (sees(Stage::step)) {
-    between.push_back(std::make_shared<State>(after_step(*before, end)));
-    see_stage(Stage::step, *before, *between.back(), same_sets(before->clusters, end.clusters));
-    before = between.back().get();
+    rotations_are_known = same_sets(before->clusters, end.clusters);
+    follow(Stage::step, after_step(*before, end));
   }
   if (sees(Stage::detect) && (cuts || sees(Stage::skin))) follow(Stage::detect, after_detection(*before, end));
-  if (sees(Stage::detect) && !cuts && !sees(Stage::skin)) return see_stage(Stage::detect, *before, end);
+  if (sees(Stage::detect) && !cuts && !sees(Stage::skin))
+    return see_stage(Stage::detect, *before, end, rotations_are_known);
   if (cuts) {
     // What each of these did cannot be told apart. Together they must have made what the reference makes of the same
     // removal, where the rules leave one answer only.

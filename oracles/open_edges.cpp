@@ -34,7 +34,7 @@ Demand openness(const Body& body, const std::vector<Vec3>& x, int32_t i, int32_t
   return distance < limit * (1 - band) ? Demand::keep : Demand::either;
 }
 
-OneEndOfEach::OneEndOfEach(const Setup& setup, const TissueGraph& graph, const State& before)
+OneEndOfEach::OneEndOfEach(const Setup& setup, const TissueGraph& graph, const State& before, bool rotations_are_known)
     : setup_(setup),
       before_(before),
       edges_at_(before.alive.size()),
@@ -59,10 +59,10 @@ OneEndOfEach::OneEndOfEach(const Setup& setup, const TissueGraph& graph, const S
     if (std::abs(n) <= band) side_bit_[at(i)] = bits_++;
     negative_[at(i)] = n < 0;
   }
-  if (has_lowered_blade_ && setup.detect.remove == RemovedEnds::nearer) find_nearer_ends(*pose);
+  if (has_lowered_blade_ && setup.detect.remove == RemovedEnds::nearer) find_nearer_ends(*pose, rotations_are_known);
 }
 
-void OneEndOfEach::find_nearer_ends(const BladePose& pose) {
+void OneEndOfEach::find_nearer_ends(const BladePose& pose, bool rotations_are_known) {
   std::vector<int32_t> ends;
   std::vector<std::size_t> place_of(before_.alive.size());
   for (std::size_t i = 0; i < edges_at_.size(); ++i) {
@@ -89,7 +89,8 @@ void OneEndOfEach::find_nearer_ends(const BladePose& pose) {
       const Height here = height(negative), there = height(positive);
       const double lead = here.distance - there.distance - kNearerBy * h;
       edge.positive_goes[k] = lead > 0;
-      if (!(std::abs(lead) > here.bound + there.bound + 4 * u * h)) edge.positive_bit[k] = bits_++;
+      const bool is_decided = rotations_are_known && std::abs(lead) > here.bound + there.bound + 4 * u * h;
+      if (!is_decided) edge.positive_bit[k] = bits_++;
     }
   }
 }

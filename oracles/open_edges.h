@@ -27,7 +27,8 @@ Demand openness(const Body& body, const std::vector<Vec3>& x, int32_t i, int32_t
 // bounds of its count of open edges tell. Whoever may do both then counts as undecided.
 class OneEndOfEach {
  public:
-  OneEndOfEach(const Setup& setup, const TissueGraph& graph, const State& before);
+  // `rotations_are_known`: as StageRun has it. Where nobody knows them, either end may be the nearer one.
+  OneEndOfEach(const Setup& setup, const TissueGraph& graph, const State& before, bool rotations_are_known = true);
   // `gone`: [n] particles that were alive and are not any more.
   void judge(const std::vector<uint8_t>& gone, Verdict& verdict) const;
 
@@ -69,7 +70,7 @@ class OneEndOfEach {
   Demand bluntly(int32_t i) const;
   void reject(int32_t i, bool gone, Verdict& verdict) const;
   // Of the edges, which end is nearer to the blade.
-  void find_nearer_ends(const BladePose& pose);
+  void find_nearer_ends(const BladePose& pose, bool rotations_are_known);
 
   const Setup& setup_;
   const State& before_;

@@ -19,7 +19,8 @@ struct StageRun {
   Stage stage;
   const State& before;
   const State& after;
-  // Of a step: false where `after` was made from a later state, in which clusters have changed.
+  // Of a step, and of the detection after it: false where the state after the step was made from a later one, in which
+  // clusters have changed.
   bool rotations_are_known = true;
 };
 
