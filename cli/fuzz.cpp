@@ -236,7 +236,7 @@ json keep(const Violation& violation, const FuzzOptions& options, const BackendC
            harness::described_backend(choice.name).takes_schedule
                ? ", " + counted(gpu::preemptions(found.schedule), "preemption", "preemptions")
                : "",
-           simplified.text);
+           describe(simplified.verdict));
     const std::string problem = record_case(stem, backend_of(found, choice), found.failing);
     if (problem.empty()) {
       say_copy("recorded", io::recording_paths(stem).index);
@@ -252,14 +252,11 @@ json keep(const Violation& violation, const FuzzOptions& options, const BackendC
   kept["drawn"] = size_of(violation.failing);
   if (simplified.alone) {
     kept["simplified"] = size_of(found.failing);
-    kept["simplified"]["text"] = simplified.text;
     // Another property may fail first in it than in the case as it was drawn.
-    const Judgement judged = dissect_alone([&] { return backend_of(found, choice); }, found.failing, true);
-    if (judged.failure) {
-      kept["simplified"]["property"] = judged.failure->property;
-      kept["simplified"]["stage"] = name_of(judged.failure->stage);
-      kept["simplified"]["witness"] = judged.failure->witness.text;
-    }
+    kept["simplified"]["text"] = describe(simplified.verdict);
+    kept["simplified"]["property"] = simplified.verdict.property;
+    kept["simplified"]["stage"] = name_of(simplified.verdict.stage);
+    kept["simplified"]["witness"] = simplified.verdict.witness.text;
   }
   return kept;
 }

@@ -80,18 +80,21 @@ void OneEndOfEach::find_nearer_ends(const BladePose& pose, bool rotations_are_kn
     return {std::abs(to_local(pose, place - pose.edge).n), bound + kPlacesBand * u * (norm(place) + norm(pose.edge))};
   };
   for (Edge& edge : edges_) {
+    bool is_between = false;
     for (const std::size_t k : {0u, 1u}) {
       // Only if rounding leaves it open may it be the one as well as the other.
       const int32_t negative = k == 0 ? edge.low : edge.high, positive = k == 0 ? edge.high : edge.low;
       const bool may_be = (side_bit_[at(negative)] >= 0 || negative_[at(negative)] != 0) &&
                           (side_bit_[at(positive)] >= 0 || negative_[at(positive)] == 0);
       if (!may_be) continue;
+      is_between = true;
       const Height here = height(negative), there = height(positive);
       const double lead = here.distance - there.distance - kNearerBy * h;
       edge.positive_goes[k] = lead > 0;
       const bool is_decided = rotations_are_known && std::abs(lead) > here.bound + there.bound + 4 * u * h;
       if (!is_decided) edge.positive_bit[k] = bits_++;
     }
+    if (is_between && !rotations_are_known) ++unknown_;
   }
 }
 
@@ -185,14 +188,14 @@ void OneEndOfEach::reject(int32_t i, bool gone, Verdict& verdict) const {
   } else {
     const int32_t other = other_end(*edge, i);
     const double length = norm(before_.x[at(i)] - before_.x[at(other)]) / setup_.body.grid.spacing;
+    const std::string shown = figure_beside(length, setup_.detect.epsilon);
     particles.push_back(other);
     why = has_lowered_blade_ && is_negative(i, never) != is_negative(other, never)
-              ? fmt::format("of its edge to particle {}, {:.17g} h long, it is the end {}", other, length,
+              ? fmt::format("of its edge to particle {}, {} h long, it is the end {}", other, shown,
                             is_negative(i, never) ? "on the blade's negative side"
                                                   : "that its clusters carry nearer to the blade")
-              : fmt::format(
-                    "its edge to particle {} is {:.17g} h long, and of its edges {} are too long, of the other's {}",
-                    other, length, open_at(i, never), open_at(other, never));
+              : fmt::format("its edge to particle {} is {} h long, and of its edges {} are too long, of the other's {}",
+                            other, shown, open_at(i, never), open_at(other, never));
   }
   violate(verdict, {{}, particles}, "particle {} {} removed, but should {}have been: {}", i, gone ? "was" : "was not",
           gone ? "not " : "", why);
@@ -200,6 +203,7 @@ void OneEndOfEach::reject(int32_t i, bool gone, Verdict& verdict) const {
 
 void OneEndOfEach::judge(const std::vector<uint8_t>& gone, Verdict& verdict) const {
   const auto none = [](int32_t) { return false; };
+  verdict.undecided += unknown_;
   DisjointSets together(bits_);
   std::vector<std::vector<int32_t>> bits(gone.size());
   for (std::size_t i = 0; i < gone.size(); ++i) {

@@ -21,13 +21,14 @@ Demand openness(const Body& body, const std::vector<Vec3>& x, int32_t i, int32_t
 
 // Detection with `detect.remove` = `one` or `nearer`. Each particle's fate follows from whether edges near it are open,
 // from which side of the blade's plane their ends are on, and with `nearer` from which end the clusters carry nearer to
-// it. Where rounding leaves some of that open, one choice of all of it
-// must explain all particles that hang on it. Where that is too much to try, each particle must be explained by some
-// choice of its own; and where even that is, it must stay if no choice takes it, and go if every one does, as far as
-// bounds of its count of open edges tell. Whoever may do both then counts as undecided.
+// it. Where rounding leaves some of that open, one choice of all of it must explain all particles that hang on it.
+// Where that is too much to try, each particle must be explained by some choice of its own; and where even that is, it
+// must stay if no choice takes it, and go if every one does, as far as bounds of its count of open edges tell. Whoever
+// may do both then counts as undecided.
 class OneEndOfEach {
  public:
-  // `rotations_are_known`: as StageRun has it. Where nobody knows them, either end may be the nearer one.
+  // `rotations_are_known`: as StageRun has it. Where nobody knows them, either end may be the nearer one, and each such
+  // edge counts as undecided.
   OneEndOfEach(const Setup& setup, const TissueGraph& graph, const State& before, bool rotations_are_known = true);
   // `gone`: [n] particles that were alive and are not any more.
   void judge(const std::vector<uint8_t>& gone, Verdict& verdict) const;
@@ -80,6 +81,7 @@ class OneEndOfEach {
   std::vector<uint8_t> negative_;               // [n] whether it is on the blade's negative side, if that is decided
   std::vector<int32_t> side_bit_;               // [n] whether it is, if rounding decides; -1: that is decided
   int32_t bits_ = 0;                            // what rounding decides
+  int64_t unknown_ = 0;                         // edges of which nobody knows the nearer end
 };
 
 }  // namespace cutproof::oracles

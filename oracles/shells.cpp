@@ -79,10 +79,10 @@ ShellCount count_shells(const Skin& skin) {
   return count;
 }
 
-std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, const Memberships& memberships) {
+std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, const Skin& skin,
+                                       const Memberships& memberships) {
   const Body& body = setup.body;
   const Clusters& clusters = state.clusters;
-  const Skin& skin = state.skin;
   const WeightedRest weighted = weighted_rest(body, clusters);
   const double u = unit_roundoff(state) + kUnitRoundoff;
   std::vector<ClusterMeans> means;
@@ -132,15 +132,14 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
 
 std::vector<VertexPlace> carried_places(const Setup& setup, const State& state, const std::vector<int32_t>& particles) {
   const Memberships memberships = memberships_of(state.clusters, setup.body.particle_count());
-  State asked = state;
-  asked.skin = {};
+  Skin on_particles;
   for (const int32_t i : particles) {
     if (memberships.of(i).empty()) continue;
-    asked.skin.owner.push_back(i);
-    asked.skin.direction.push_back(0);
-    asked.skin.reach.push_back(0);
+    on_particles.owner.push_back(i);
+    on_particles.direction.push_back(0);
+    on_particles.reach.push_back(0);
   }
-  const std::vector<VertexPlace> carried = vertex_places(setup, asked, memberships);
+  const std::vector<VertexPlace> carried = vertex_places(setup, state, on_particles, memberships);
   std::vector<VertexPlace> places;
   auto next = carried.begin();
   for (const int32_t i : particles) {

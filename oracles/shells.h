@@ -31,7 +31,9 @@ struct VertexPlace {
   Vec3 place;
   double bound = 0;
 };
-std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, const Memberships& memberships);
+// `skin`: the state's own, or other vertices that hang on its particles (owner, direction and reach alone are read).
+std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, const Skin& skin,
+                                       const Memberships& memberships);
 // The same of particles, each where it rests itself; without a cluster where it is.
 std::vector<VertexPlace> carried_places(const Setup& setup, const State& state, const std::vector<int32_t>& particles);
 

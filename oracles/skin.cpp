@@ -228,7 +228,7 @@ void check_skin_vertices(Judged& judged, Verdict& verdict) {
   }
   const double h = body.grid.spacing;
   Nearest nearest;
-  const std::vector<VertexPlace> places = vertex_places(setup, state, memberships);
+  const std::vector<VertexPlace> places = vertex_places(setup, state, skin, memberships);
   for (std::size_t v = 0; v < places.size(); ++v) {
     nearest.see(norm(skin.position[v] - places[v].place) / h, places[v].bound / h, static_cast<int32_t>(v));
   }
@@ -299,15 +299,14 @@ Heights heights_of(const Setup& setup, const State& state, const std::vector<std
                    const BladePose& plane, const Memberships& memberships) {
   const Vec3 normal = cross(plane.along, plane.back);
   Heights heights;
-  State edges = state;  // its skin: one end of each edge, then the other
-  for (const double reach : {0.0, 1.0}) {
-    edges.skin = {};
+  for (const double reach : {0.0, 1.0}) {  // one end of each edge, then the other
+    Skin ends;
     for (const std::size_t v : vertices) {
-      edges.skin.owner.push_back(state.skin.owner[v]);
-      edges.skin.direction.push_back(state.skin.direction[v]);
-      edges.skin.reach.push_back(reach);
+      ends.owner.push_back(state.skin.owner[v]);
+      ends.direction.push_back(state.skin.direction[v]);
+      ends.reach.push_back(reach);
     }
-    for (const auto& [place, bound] : vertex_places(setup, edges, memberships)) {
+    for (const auto& [place, bound] : vertex_places(setup, state, ends, memberships)) {
       (reach == 0 ? heights.owner : heights.end).push_back(dot(place - plane.edge, normal));
       (reach == 0 ? heights.owner_bound : heights.end_bound)
           .push_back(bound + kPlacesBand * unit_roundoff(state) * (norm(place) + norm(plane.edge)));

@@ -137,9 +137,9 @@ void check_split_exactness(const StageRun& run, Verdict& verdict) {
     const int32_t parent = before.clusters.number[at(cluster.parent)];
     const std::vector<int32_t>& members = cluster.members;
     if (members.empty()) return violate(verdict, {{number}}, "cluster {} is missing, which was empty before", number);
-    std::string piece = members.size() == 1
-                            ? fmt::format("1 particle ({})", members.front())
-                            : fmt::format("{} particles (the smallest {})", members.size(), members.front());
+    const std::string piece = members.size() == 1
+                                  ? fmt::format("1 particle ({})", members.front())
+                                  : fmt::format("{} particles (the smallest {})", members.size(), members.front());
     if (cluster.number == parent) {
       return violate(verdict, {{number}, {members.front()}}, "cluster {} is missing{} {}", number,
                      cluster.lost ? ": it should have kept the first piece of what is left of it,"

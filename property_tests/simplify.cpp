@@ -23,7 +23,7 @@ Simplified simplify(const Violation& violation, const BackendChoice& choice, dou
   found.backend = choice.name;
   found.split = choice.split;
   found.index = violation.index;
-  result.text = describe(violation.verdict);
+  result.verdict = violation.verdict;
 
   // Another case is another run of the schedule, so several are tried.
   const bool scheduled = takes_schedule(choice);
@@ -36,7 +36,7 @@ Simplified simplify(const Violation& violation, const BackendChoice& choice, dou
       const Judgement judgement = dissect_alone([&] { return harness::make_backend(tried); }, c, true);
       if (!judgement.failure) continue;
       failing_choice = tried;
-      result.text = describe(*judgement.failure);
+      result.verdict = *judgement.failure;
       return true;
     }
     return false;
@@ -58,7 +58,7 @@ Simplified simplify(const Violation& violation, const BackendChoice& choice, dou
           .failure.has_value();
     });
   }
-  found.found = result.text;
+  found.found = describe(result.verdict);
   return result;
 }
 

@@ -11,7 +11,7 @@ namespace cutproof::property_tests {
 
 struct Simplified {
   Counterexample counterexample;
-  std::string text;    // what fails now
+  Verdict verdict;     // what fails now
   bool alone = false;  // fails without the other bodies of its load
 };
 // The simplest case, and under a chosen schedule the fewest preemptions, that still fail; as far as this time reaches

@@ -257,7 +257,7 @@ void StageComparison::compare_later_stage(const State& before, const State& afte
     if (const ErrorNorm& reach = error_of(errors, "reach"); !(reach.max <= skin.norm.max)) skin.norm = reach;
     // Far from where it rests, single precision cannot have what is asked: then what rounding does is.
     for (const VertexPlace& vertex :
-         vertex_places(setup_, after, memberships_of(after.clusters, setup_.body.particle_count()))) {
+         vertex_places(setup_, after, after.skin, memberships_of(after.clusters, setup_.body.particle_count()))) {
       skin.bound = std::max(skin.bound, vertex.bound / setup_.body.grid.spacing);
     }
   }

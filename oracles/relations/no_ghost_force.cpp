@@ -55,7 +55,7 @@ Verdict no_ghost_force(Backend& backend, const Setup& given, const State& state,
       } else if (!same_bits(quiet.x[i], moved.x[i])) {
         felt(sentence("ends {} m elsewhere", norm(quiet.x[i] - moved.x[i])));
       } else if (!same_bits(quiet.v[i], moved.v[i])) {
-        felt(fmt::format("ends {} m/s faster or slower", norm(quiet.v[i] - moved.v[i])));
+        felt(sentence("ends {} m/s faster or slower", norm(quiet.v[i] - moved.v[i])));
       }
     }
   });

@@ -245,10 +245,8 @@ function findings() {
   if (comparison) section.append(comparisonCard(comparison, showApart));
   if (!data.checked) section.append(element('p', { text: 'This page shows what happened. Whether it is right, this command judges:' }));
   if (data.checked && data.holds && !failing.length) {
-    // As the sentence at the top: each property once, and what the scene expects of its run is none.
-    const properties = new Set(data.rows.filter((row) => row.judged > 0 && !row.property.startsWith('expected ')).map((row) => row.property)).size;
     const near = data.rows.filter((row) => row.judged > 0 && row.ofBound !== null).sort((a, b) => b.ofBound - a.ofBound)[0];
-    section.append(element('p', { text: `All ${plural(properties, 'property', 'properties')} hold${data.findings.length ? ', but for what the scene expects to fail' : ''}.${near ? ` The nearest to its bound is ${near.property} after ${near.stage}, at ${figure(near.ofBound)} of it, in frame ${near.frame}.` : ''}` }));
+    section.append(element('p', { text: `All that was judged holds${data.findings.length ? ', but for what the scene expects to fail' : ''}.${near ? ` The nearest to its bound is ${near.property} after ${near.stage}, at ${figure(near.ofBound)} of it, in frame ${near.frame}.` : ''}` }));
   }
   section.append(...cards(data, showFinding));
   if (data.findingsLeftOut > 0) section.append(element('p', { class: 'muted', text: `${plural(data.findingsLeftOut, 'later failure')} of the same properties are counted in the table, and not shown.` }));

@@ -1,10 +1,10 @@
 // What is marked of a verdict, and what the colours of the marks mean.
 import { plural } from './dom.js';
 
-// A detection names the particle that it judges, and a neighbour by whose distance it does.
-export function marksOf({ text, marks }) {
-  const isDetection = /^particle \d+ was (not )?removed, but should/.test(text);
-  return { ...marks, neighbours: isDetection ? marks.particles.slice(1) : [] };
+// A detection that names two particles judges the first, by how far from it the second is.
+export function marksOf({ property, marks }) {
+  const isPair = property === 'detection' && marks.particles.length === 2;
+  return { ...marks, neighbours: isPair ? marks.particles.slice(1) : [] };
 }
 
 function listed(numbers) {

@@ -87,7 +87,7 @@ export class Sceneries {
       // Particles are the same ones in both runs; clusters and vertices of the skin need not be: of the other run its
       // own cluster of the same number.
       const theirs = side.marks && side.marks.moment === k ? side.marks : { members: [], joined: [] };
-      const marked = isWhere && marksOf({ text: scenery.text, marks: side === scenery.sides[0] ? marks : { ...marks, members: theirs.members, joined: theirs.joined, corners: [] } });
+      const marked = isWhere && marksOf({ property: scenery.property, marks: side === scenery.sides[0] ? marks : { ...marks, members: theirs.members, joined: theirs.joined, corners: [] } });
       if (view) {
         const arrays = await own.get(k);
         if (ticket !== this.ticket) return;  // somebody has gone on meanwhile

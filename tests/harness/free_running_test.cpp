@@ -53,36 +53,59 @@ TEST(FreeRunning, DoesNotExplainAMergeThatIsNoAnswerOfItsRule) {
   }
 }
 
-// One end of each edge: two particles too far apart, and the plane of the blade just beside the second. (The plate
-// itself is far away, and touches nobody.) The first goes instead of the second: right for a run in which the second is
-// on the other side of the plane, and explained by how far the runs are apart; wrong for one in which it is not.
-TEST(FreeRunning, ExplainsAnotherEndOfAnEdgeByTheSideOfTheBladeThatItIsOn) {
-  constexpr double off = 1e-6;
-  for (const bool on_the_other_side : {true, false}) {
-    cutproof::Setup setup;
-    setup.body = fixtures::block(2, 1, 1, 1.0);
-    setup.step.substeps = 1;
-    setup.step.iterations = 0;
-    setup.substep_length = {0.01};
-    setup.detect.remove = RemovedEnds::one;
-    State start = fixtures::cook(setup.body, {}, setup.expand, setup.merge, 1);
-    start.x[1].x += 1;
-    const BladePose pose = {{start.x[1].x - off, 100, 100}, {0, -1, 0}, {0, 0, 1}};  // its negative side is that of 1
+// Two particles, one too far from the other, and a blade in a plane across the x axis, its negative side that of lower
+// x or, turned, of higher. (The plate itself is far away, and touches nobody.)
+struct PulledPair {
+  cutproof::Setup setup;
+  State state;
+  void put_blade(double x, bool turned) {
+    const BladePose pose = {{x, 100, 100}, {0, turned ? -1.0 : 1.0, 0}, {0, 0, 1}};
     setup.has_blade = true;
     setup.blade = {0.001, 0.001, 0, 0};
     setup.blade_moves = {{pose, pose, true, 0}};
     setup.stroke_end = {0};
-    FreeRunning running(setup, start, start, "a backend");
-    State other = start;
-    if (on_the_other_side) other.x[1].x -= off + 1e-9;
-    running.see(Stage::step, other);
-    ASSERT_FALSE(running.first_difference());
-    other.alive[0] = 0;
-    other.removed = {0};
-    running.see(Stage::detect, other);
-    ASSERT_TRUE(running.first_difference());
-    const FirstDifference& first = *running.first_difference();
-    EXPECT_EQ(first.what.particles, (std::vector<int32_t>{0, 1}));
+  }
+};
+PulledPair pulled_pair(RemovedEnds remove) {
+  PulledPair pair;
+  cutproof::Setup& setup = pair.setup;
+  setup.body = fixtures::block(2, 1, 1, 1.0);
+  setup.step.substeps = 1;
+  setup.step.iterations = 0;
+  setup.substep_length = {0.01};
+  setup.detect.remove = remove;
+  pair.state = fixtures::cook(setup.body, {}, setup.expand, setup.merge, 1);
+  pair.state.x[1].x += 1;
+  return pair;
+}
+
+// The run whose second particle is moved by `moved` after the step, and which removes `gone`, beside the reference's.
+FirstDifference where_runs_part(const PulledPair& pair, double moved, int32_t gone) {
+  FreeRunning running(pair.setup, pair.state, pair.state, "a backend");
+  State other = pair.state;
+  other.x[1].x += moved;
+  running.see(Stage::step, other);
+  EXPECT_FALSE(running.first_difference());
+  other.alive[at(gone)] = 0;
+  other.removed = {gone};
+  running.see(Stage::detect, other);
+  if (!running.first_difference()) {
+    ADD_FAILURE() << "they decide alike";
+    return {};
+  }
+  EXPECT_EQ(running.first_difference()->what.particles, (std::vector<int32_t>{0, 1}));
+  return *running.first_difference();
+}
+
+// One end of each edge: the plane of the blade is just beside the second. The first goes instead of the second: right
+// for a run in which the second is on the other side of the plane, and explained by how far the runs are apart; wrong
+// for one in which it is not.
+TEST(FreeRunning, ExplainsAnotherEndOfAnEdgeByTheSideOfTheBladeThatItIsOn) {
+  constexpr double off = 1e-6;
+  PulledPair pair = pulled_pair(RemovedEnds::one);
+  pair.put_blade(pair.state.x[1].x - off, true);
+  for (const bool on_the_other_side : {true, false}) {
+    const FirstDifference first = where_runs_part(pair, on_the_other_side ? -off - 1e-9 : 0, 0);
     ASSERT_TRUE(first.margin);
     EXPECT_NEAR(*first.margin, off, 1e-12);
     EXPECT_EQ(first.reach > off, on_the_other_side);
@@ -90,49 +113,25 @@ TEST(FreeRunning, ExplainsAnotherEndOfAnEdgeByTheSideOfTheBladeThatItIsOn) {
   }
 }
 
-// The nearer end of each edge: two particles too far apart, each a cluster of its own, and the plane of the blade all
-// but so much nearer to the positive one that it goes. In the other run it went: right where that run has it nearer by
-// so much, and explained by how far the runs are apart; wrong where it has not.
+// The nearer end of each edge: each particle is a cluster of its own, and the plane all but so much nearer to the
+// positive one that it goes. In the other run it went: right where that run has it nearer by so much, and explained by
+// how far the runs are apart; wrong where it has not.
 TEST(FreeRunning, ExplainsAnotherEndOfAnEdgeByWhichIsNearerToTheBlade) {
   constexpr double off = 1e-6;
+  PulledPair pair = pulled_pair(RemovedEnds::nearer);
+  Clusters& clusters = pair.state.clusters;
+  clusters = {};
+  clusters.number = clusters.members = {0, 1};
+  clusters.offsets = {0, 1, 2};
+  clusters.rotation.resize(2);
+  clusters.degenerate = {1, 1};
+  clusters.mass.resize(2);
+  clusters.rest_center.resize(2);
+  reference::update_rest_frames(pair.setup.body, clusters);
+  const double middle = (pair.state.x[0].x + pair.state.x[1].x) / 2;
+  pair.put_blade(middle + kNearerBy / 2 - off, false);
   for (const bool nearer_there : {true, false}) {
-    cutproof::Setup setup;
-    setup.body = fixtures::block(2, 1, 1, 1.0);
-    setup.step.substeps = 1;
-    setup.step.iterations = 0;
-    setup.substep_length = {0.01};
-    setup.detect.remove = RemovedEnds::nearer;
-    State start = fixtures::cook(setup.body, {}, setup.expand, setup.merge, 1);
-    start.clusters = {};
-    for (int32_t c = 0; c < 2; ++c) {
-      start.clusters.number.push_back(c);
-      start.clusters.offsets.push_back(c + 1);
-      start.clusters.members.push_back(c);
-      start.clusters.rotation.emplace_back();
-      start.clusters.degenerate.push_back(1);
-    }
-    start.clusters.mass.resize(2);
-    start.clusters.rest_center.resize(2);
-    reference::update_rest_frames(setup.body, start.clusters);
-    start.x[1].x += 1;
-    const double middle = (start.x[0].x + start.x[1].x) / 2;
-    // Its negative side is that of 0, from which it is farther by an eighth of h, less 2 off.
-    const BladePose pose = {{middle + kNearerBy / 2 - off, 100, 100}, {0, 1, 0}, {0, 0, 1}};
-    setup.has_blade = true;
-    setup.blade = {0.001, 0.001, 0, 0};
-    setup.blade_moves = {{pose, pose, true, 0}};
-    setup.stroke_end = {0};
-    FreeRunning running(setup, start, start, "a backend");
-    State other = start;
-    if (nearer_there) other.x[1].x -= 2 * off + 1e-9;
-    running.see(Stage::step, other);
-    ASSERT_FALSE(running.first_difference());
-    other.alive[1] = 0;
-    other.removed = {1};
-    running.see(Stage::detect, other);
-    ASSERT_TRUE(running.first_difference());
-    const FirstDifference& first = *running.first_difference();
-    EXPECT_EQ(first.what.particles, (std::vector<int32_t>{0, 1}));
+    const FirstDifference first = where_runs_part(pair, nearer_there ? -2 * off - 1e-9 : 0, 1);
     ASSERT_TRUE(first.margin);
     EXPECT_NEAR(*first.margin, 2 * off, 1e-12);
     EXPECT_EQ(first.reach > 2 * off, nearer_there);

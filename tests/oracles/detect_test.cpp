@@ -7,6 +7,7 @@
 #include <random>
 
 #include "model/at.h"
+#include "oracles/open_edges.h"
 #include "oracles/oracles.h"
 #include "tests/oracles/expectations.h"
 
@@ -221,6 +222,32 @@ TEST(DetectionOfNearerEnd, AcceptsOnlyTheNegativeEndUntilTheOtherIsNearerByAnEig
   pair.setup.detect.remove = RemovedEnds::one;
   EXPECT_TRUE(removes(middle + 0.3, 1, 2));
   EXPECT_FALSE(removes(middle + 0.3, 1, 3));
+}
+
+// Where nobody knows the rotations, either end may be the nearer one, but one of them it is, and that is counted.
+TEST(DetectionOfNearerEnd, CountsWhatUnknownRotationsLeaveOpen) {
+  Pair pair = pulled(1.6);
+  pair.setup.detect.remove = RemovedEnds::nearer;
+  pair.setup.has_blade = true;
+  pair.setup.blade = {1, 1, 0, 0};
+  const BladePose pose = {{pair.before.x[2].x + 0.3, 1, 1}, {0, 1, 0}, {0, 0, 1}};
+  pair.setup.blade_moves.assign(at(pair.setup.step.substeps), BladeMove{pose, pose, true, 0});
+  const TissueGraph graph(pair.setup.body, pair.before.alive);
+  const auto judged = [&](const std::vector<uint8_t>& gone, bool rotations_are_known) {
+    Verdict verdict;
+    OneEndOfEach(pair.setup, graph, pair.before, rotations_are_known).judge(gone, verdict);
+    return verdict;
+  };
+  const std::vector<uint8_t> negative = {0, 0, 1, 0}, positive = {0, 0, 0, 1};
+  EXPECT_NE(judged(negative, true).holds, judged(positive, true).holds);
+  EXPECT_EQ(judged(negative, true).undecided, 0);
+  for (const std::vector<uint8_t>& gone : {negative, positive}) {
+    EXPECT_TRUE(judged(gone, false).holds);
+    EXPECT_EQ(judged(gone, false).undecided, 1);
+  }
+  for (const std::vector<uint8_t>& gone : std::vector<std::vector<uint8_t>>{{0, 0, 0, 0}, {0, 0, 1, 1}, {0, 1, 1, 0}}) {
+    EXPECT_FALSE(judged(gone, false).holds);
+  }
 }
 
 // Two edges at particle 2, both at the limit to rounding: their four choices give {}, {1}, {2}; no one gives {1, 2} or
