@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "model/io/hdf5_file.h"
 #include "model/setup.h"
 
 namespace cutproof::io {
