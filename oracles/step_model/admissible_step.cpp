@@ -564,17 +564,22 @@ class Search {
       return is_nearer(b, a) || (!is_nearer(a, b) && a.settled.size() > b.settled.size());
     };
     std::vector<Branch> open = {root};
-    std::set<Settled> seen = {root.settled};
+    std::set<Settled> seen = {root.settled}, seen_taken = {taken_by(root)};
     int tried = 0;
+    int64_t runs_left = int64_t{kDisturbedRuns + 1} * most_outcomes_;
     const auto keep = [&](Branch next) {
       if (is_nearer(next, best)) best = next;
       open.push_back(std::move(next));
       std::push_heap(open.begin(), open.end(), comes_later);
     };
+    const auto may_try = [&] { return tried < most_outcomes_ && runs_left > 0; };
     const auto try_out = [&](const Settled& settled) -> std::optional<Branch> {
-      if (tried >= most_outcomes_ || !seen.insert(settled).second) return std::nullopt;
-      ++tried;
+      if (!may_try() || !seen.insert(settled).second) return std::nullopt;
+      --runs_left;
       Branch next = start(settled);
+      // What is settled of a decision that never comes up, or as the numbers say, leads where another way has led.
+      if (!seen_taken.insert(taken_by(next)).second) return std::nullopt;
+      ++tried;
       next.bounds = root.bounds;  // until it is worth a closer look
       compare(next);
       if (closely || next.left <= best.left || next.violations.size() <= best.violations.size()) {
@@ -611,7 +616,7 @@ class Search {
       const std::optional<Branch> next = try_out(settled);
       if (next && !best.holds()) try_fitted(*next);
     }
-    if (other_root && !best.holds() && seen.insert(other_root->settled).second) keep(*other_root);
+    if (other_root && !best.holds() && seen_taken.insert(taken_by(*other_root)).second) keep(*other_root);
     if (other_root && !best.holds()) try_fitted(*other_root);
     if (!best.holds()) try_fitted(Branch(best));
     for (bool any = true; any && !best.holds();) {
@@ -619,7 +624,7 @@ class Search {
       any = way.has_value() && try_out(*way).has_value();
       if (any && !best.holds()) try_fitted(Branch(best));
     }
-    while (!open.empty() && !best.holds() && tried < most_outcomes_) {
+    while (!open.empty() && !best.holds() && may_try()) {
       std::pop_heap(open.begin(), open.end(), comes_later);
       const Branch present = std::move(open.back());
       open.pop_back();
@@ -629,7 +634,14 @@ class Search {
         if (best.holds()) break;
       }
     }
-    return best.holds() || open.empty();
+    return best.holds() || (open.empty() && may_try());
+  }
+
+  // The decisions of an outcome that were near, as it has taken them: all that tells it from others.
+  static Settled taken_by(const Branch& branch) {
+    Settled taken;
+    for (const NearDecision& d : branch.outcome.near) taken[d.key] = d.taken;
+    return taken;
   }
 
   // A tie the other way. `again`: and the same question in the substep's other iterations (what tips one iteration's
