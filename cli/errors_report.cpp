@@ -83,12 +83,18 @@ json to_json(const Errors& errors, const harness::Lockstep* lockstep) {
     json frames = json::array();
     ErrorNorm all;
     for (const auto& [frame, error] : errors.solver()) {
+      json elsewhere = nullptr;
+      if (error.elsewhere) {
+        elsewhere = {{"distance", json_number(error.elsewhere->distance)},
+                     {"energy", json_number(error.elsewhere->energy)}};
+      }
       frames.push_back({{"frame", frame},
                         {"max", json_number(error.position.max)},
                         {"rms", json_number(error.position.rms())},
                         {"energy", json_number(error.energy)},
-                        {"by_energy", error.by_energy},
-                        {"converged", error.converged}});
+                        {"solved_by", name_of(error.solved_by)},
+                        {"converged", error.converged},
+                        {"elsewhere", elsewhere}});
       all.join(error.position);
     }
     result["solver"] = {{"max", json_number(all.max)}, {"rms", json_number(all.rms())}, {"frames", frames}};
@@ -153,14 +159,16 @@ void print_errors(const Errors& errors, const json& document) {
   };
   say_text(row("implementation", "implementation", "the table above"));
   std::optional<double> energy;
-  int64_t unconverged = 0;
+  int64_t unconverged = 0, by_iteration = 0;
   for (const auto& [frame, error] : errors.solver()) {
     if (error.energy) energy = std::max(energy.value_or(0), *error.energy);
     unconverged += !error.converged;
+    by_iteration += error.converged && error.solved_by == oracles::SolvedBy::iteration;
   }
   say_text(row("solver", "solver",
-               fmt::format("max {{max:.3g}} h, RMS {{rms:.3g}} h, energy {} above the least; {} substeps{}",
+               fmt::format("max {{max:.3g}} h, RMS {{rms:.3g}} h, energy {} above the least; {} substeps{}{}",
                            energy ? fmt::format("{:.3g}", *energy) : "-", errors.solver().size(),
+                           by_iteration > 0 ? fmt::format(", {} beside the reference's own limit", by_iteration) : "",
                            unconverged > 0 ? fmt::format(", {} without a reference solution", unconverged) : "")));
   const auto& steps = errors.time_step();
   say_text(

@@ -26,12 +26,13 @@ bool is_timed(const harness::BackendDescriptor& backend);
 
 // --name N. A default of 0 says that there is none, and is not told.
 template <class Integer>
-void add_count(CLI::App& command, const std::string& name, Integer& value, const std::string& what,
-               const CLI::Validator& allowed) {
+CLI::Option* add_count(CLI::App& command, const std::string& name, Integer& value, const std::string& what,
+                       const CLI::Validator& allowed) {
   CLI::Option* const option = command.add_option(name, value, what)->type_name("N")->check(allowed);
   if constexpr (std::is_integral_v<Integer>) {
     if (value != 0) option->capture_default_str();
   }
+  return option;
 }
 // --seed N. A negative one would wrap around.
 void add_seed(CLI::App& command, uint64_t& seed, const std::string& what, const std::string& name = "--seed");

@@ -51,6 +51,7 @@ struct RunOptions {
   std::string against;        // "" or the reference
   std::string mode = "both";  // of the comparison: lockstep, free-running, both
   std::string errors;         // names of errors with commas between them, or "all"; empty: none
+  int64_t error_frames = harness::ErrorsWanted{}.frames;
   std::string record;
   std::string json, junit, report;
   std::string again;  // the command line
@@ -159,7 +160,8 @@ int run(const RunOptions& options) {
   if (!options.check.empty()) depth = depth_asked(options.check);
   std::optional<AgainstMode> mode;
   if (!options.against.empty()) mode = against_mode(options);
-  const harness::ErrorsWanted wanted = errors_wanted(options.errors);
+  harness::ErrorsWanted wanted = errors_wanted(options.errors);
+  wanted.frames = options.error_frames;
   if (wanted.implementation)
     mode = mode.value_or(AgainstMode::lockstep) == AgainstMode::lockstep ? AgainstMode::lockstep : AgainstMode::both;
   fixtures::BuildOptions build_options;
@@ -373,6 +375,9 @@ void add_run(CLI::App& program, Work& work) {
                    "geometry, topology, conservation")
       ->type_name("E,E...")
       ->check(usually_one_of(error_names()));
+  add_count(*command, "--error-frames", options->error_frames,
+            "look at solver error and interpenetration in so many frames, evenly over the run", whole_number(1))
+      ->needs("--errors");
   command->add_option("--record", options->record, "keep every frame, for `cutproof check` and ParaView")
       ->type_name("F");
   add_json(*command, options->json, "write verdicts, stage times and counts");

@@ -37,7 +37,7 @@ Errors::Errors(const ErrorsWanted& wanted, const Setup& setup, const State& star
 bool Errors::looked_at(int64_t frame) const {
   const int64_t frames = setup_.frame_count();
   // Frame f is the last one of its part if the next frame belongs to another.
-  return (frame + 1) * kLookedAt / frames != frame * kLookedAt / frames;
+  return wanted_.frames >= frames || (frame + 1) * wanted_.frames / frames != frame * wanted_.frames / frames;
 }
 
 bool Errors::wants(int64_t frame) const {

@@ -18,10 +18,11 @@ namespace cutproof::harness {
 struct ErrorsWanted {
   bool implementation = false, solver = false, time_step = false, geometry = false, topology = false,
        conservation = false;
+  // Frames in which solver error and interpenetration are looked at, evenly over the run, the last one among them; all
+  // if there are no more. At least 1.
+  int64_t frames = 8;
 };
 
-// Frames in which solver error and interpenetration are looked at, evenly over the run; the last one among them.
-inline constexpr int64_t kLookedAt = 8;
 // Of the free body whose momentum and energy are followed.
 inline constexpr int64_t kFreeFrames = 1000;
 // Bound of the relative drift of momentum, in double precision (tolerances.md, Conservation).

@@ -43,27 +43,16 @@ ClusterSystem cluster_system(const Body& body, const Clusters& clusters, double 
 }
 
 Sparse matrix_of(const ClusterSystem& system, Cholmod& cholmod) {
-  const std::size_t count = system.mass.size();
-  std::size_t entries = count;
-  for (const ClusterSystem::Shared& shared : system.shared) {
-    entries += shared.clusters.size() * (shared.clusters.size() + 1) / 2;
-  }
-  const Triplets triplets(cholmod_allocate_triplet(count, count, entries, -1, CHOLMOD_REAL, cholmod.get()), cholmod);
-  auto* rows = static_cast<int*>(triplets->i);
-  auto* columns = static_cast<int*>(triplets->j);
-  auto* values = static_cast<double*>(triplets->x);
-  const auto add = [&](int32_t row, int32_t column, double value) {
-    rows[triplets->nnz] = row;
-    columns[triplets->nnz] = column;
-    values[triplets->nnz++] = value;
-  };
+  std::vector<Entry> entries;
   for (const auto& [clusters, weight] : system.shared) {
     for (std::size_t p = 0; p < clusters.size(); ++p) {
-      for (std::size_t q = 0; q <= p; ++q) add(clusters[p], clusters[q], -weight);
+      for (std::size_t q = 0; q <= p; ++q) entries.push_back({clusters[p], clusters[q], -weight});
     }
   }
-  for (std::size_t c = 0; c < count; ++c) add(static_cast<int32_t>(c), static_cast<int32_t>(c), system.mass[c]);
-  return Sparse(cholmod_triplet_to_sparse(triplets.get(), triplets->nnz, cholmod.get()), cholmod);
+  for (std::size_t c = 0; c < system.mass.size(); ++c) {
+    entries.push_back({static_cast<int>(c), static_cast<int>(c), system.mass[c]});
+  }
+  return sparse_of(system.mass.size(), entries, cholmod);
 }
 
 }  // namespace cutproof::oracles

@@ -1,5 +1,5 @@
-// The reference solution of one implicit substep (method.md §3), by CHOLMOD: for fixed rotations minimise E over x and
-// t together, alternate with the rotations. With frictionless walls and pinned particles.
+// The reference solution of one implicit substep (method.md §3), without its iteration: for fixed rotations find where
+// x and t come to rest together, by sparse factors; alternate with the rotations.
 #pragma once
 #include <vector>
 
@@ -9,16 +9,19 @@
 namespace cutproof::oracles {
 
 struct ReferenceSolution {
-  std::vector<Vec3> x;         // [n] the minimiser [m]; dead particles keep their position
+  std::vector<Vec3> x;         // [n] where the substep comes to rest [m]; dead particles keep their position
   std::vector<Mat3> rotation;  // [m]
   double energy = 0;           // E(x) [kg m²/s²]
   int32_t alternations = 0;
-  double last_change = 0;  // greatest change of a position in the last alternation [h]
-  bool converged = false;  // last_change < 1e-12
+  double last_change = 0;   // greatest change of a position in the last alternation [h]
+  bool converged = false;   // last_change < 1e-12
+  bool is_minimum = false;  // of E where contacts let x be, for its rotations: without friction, and no particle
+                            // between blade and walls that are projected in turn
 };
 
-// The first substep of frame state.frame. Requires Solver::implicit; no blade down, no friction (throws
-// std::invalid_argument).
+// The first substep of frame state.frame. Requires Solver::implicit and room between the walls (throws
+// std::invalid_argument). With a blade or friction there may be several places of rest: which one it is, the first
+// plain iterations say.
 ReferenceSolution reference_solution(const Setup& setup, const State& state);
 
 // E of method.md §3 at positions x, minimised over t and R: what `energy_is_monotone` compares. x~ is computed from

@@ -20,17 +20,20 @@ State after_frame(Backend& backend, const Setup& setup, const State& state) {
   return std::move(backend.snapshot().front());
 }
 
-// Whether reference_solution takes the first substep of the state's frame.
-bool has_energy(const Setup& setup, const State& state) {
+// Whether there may be several places of rest.
+bool may_rest_elsewhere(const Setup& setup, const State& state) {
   const auto has_friction = [](const Wall& wall) { return wall.friction > 0; };
-  if (std::any_of(setup.walls.begin(), setup.walls.end(), has_friction)) return false;
-  return !setup.has_blade || setup.detect.criterion == Criterion::geometric ||
-         !setup.blade_moves[at(state.frame * setup.step.substeps)].down;
+  if (std::any_of(setup.walls.begin(), setup.walls.end(), has_friction)) return true;
+  return setup.has_blade && setup.detect.criterion != Criterion::geometric &&
+         setup.blade_moves[at(state.frame * setup.step.substeps)].down;
 }
 
 struct Solution {
   std::vector<Vec3> x;
   bool converged = false;
+  SolvedBy by = SolvedBy::iteration;
+  double energy = 0;  // of a minimum
+  std::optional<SolverError::Elsewhere> elsewhere = {};
 };
 
 Solution fixed_point(Backend& exact, Setup setup, const State& state) {
@@ -40,6 +43,25 @@ Solution fixed_point(Backend& exact, Setup setup, const State& state) {
     solution.converged = !solution.x.empty() && position_error(setup, solution.x, x, state.alive).max <= kFixedPoint;
     solution.x = std::move(x);
     if (solution.converged) break;
+  }
+  return solution;
+}
+
+Solution solution_of(Backend& exact, const Setup& setup, const State& state) {
+  ReferenceSolution rest = reference_solution(setup, state);
+  const SolvedBy by = rest.is_minimum ? SolvedBy::minimum : SolvedBy::rest;
+  if (!may_rest_elsewhere(setup, state)) {
+    return {.x = std::move(rest.x), .converged = rest.converged, .by = SolvedBy::minimum, .energy = rest.energy};
+  }
+  const PlainLimit limit = plain_limit(setup, state, kFixedPoint / 1000, kMostIterations);
+  const double apart = position_error(setup, rest.x, limit.x, state.alive).max;
+  if (rest.converged && apart <= kFixedPoint) {
+    return {.x = std::move(rest.x), .converged = true, .by = by, .energy = rest.energy};
+  }
+  Solution solution = fixed_point(exact, setup, state);
+  if (rest.converged && limit.last_change <= kFixedPoint) {
+    const double end = limit.energy.back();
+    solution.elsewhere = {apart, end > 0 ? (rest.energy - end) / end : 0};
   }
   return solution;
 }
@@ -58,22 +80,16 @@ std::optional<SolverError> solver_error(Backend& judged, Backend& exact, const S
     error.position = infinite_error();
     return error;
   }
-  error.by_energy = has_energy(one, start);
-  Solution solution;
-  double least = 0;
-  if (error.by_energy) {
-    ReferenceSolution minimiser = reference_solution(one, start);
-    solution = {std::move(minimiser.x), minimiser.converged};
-    least = minimiser.energy;
-  } else {
-    solution = fixed_point(exact, one, start);
-  }
+  const Solution solution = solution_of(exact, one, start);
+  error.solved_by = solution.by;
   error.converged = solution.converged;
+  error.elsewhere = solution.elsewhere;
 
   // What is judged begins where the solution does: at the state as the backend holds it, which may be rounded.
   const State end = after_frame(judged, one, start);
   error.position = measurable(one, end) ? position_error(one, solution.x, end.x, start.alive) : infinite_error();
-  if (error.by_energy && least > 0 && std::isfinite(error.position.max)) {
+  const double least = solution.energy;
+  if (solution.by == SolvedBy::minimum && least > 0 && std::isfinite(error.position.max)) {
     error.energy = (substep_energy(one, start, end.x) - least) / least;
   }
   return error;

@@ -55,6 +55,28 @@ using Sparse = Made<cholmod_sparse, cholmod_free_sparse>;
 using Dense = Made<cholmod_dense, cholmod_free_dense>;
 using Factor = Made<cholmod_factor, cholmod_free_factor>;
 
+// One entry of a matrix; what several say of one place is added up.
+struct Entry {
+  int r = 0, c = 0;
+  double v = 0;
+  // As Eigen reads them.
+  int row() const { return r; }
+  int col() const { return c; }
+  double value() const { return v; }
+};
+
+// A symmetric matrix by its lower triangle.
+inline Sparse sparse_of(std::size_t size, const std::vector<Entry>& entries, Cholmod& cholmod) {
+  const Triplets triplets(cholmod_allocate_triplet(size, size, entries.size(), -1, CHOLMOD_REAL, cholmod.get()),
+                          cholmod);
+  for (const Entry& entry : entries) {
+    static_cast<int*>(triplets->i)[triplets->nnz] = entry.r;
+    static_cast<int*>(triplets->j)[triplets->nnz] = entry.c;
+    static_cast<double*>(triplets->x)[triplets->nnz++] = entry.v;
+  }
+  return Sparse(cholmod_triplet_to_sparse(triplets.get(), triplets->nnz, cholmod.get()), cholmod);
+}
+
 // x of A x = right by A's factor.
 inline std::vector<double> solve(Cholmod& cholmod, cholmod_factor* factor, std::vector<double> right) {
   cholmod_dense b{};

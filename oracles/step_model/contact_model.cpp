@@ -159,6 +159,12 @@ Vec3 ContactModel::nearest(Vec3 x, const Began& began, Decisions& decisions, boo
   return present;
 }
 
+bool ContactModel::acts_in_turn(Vec3 free, const Began& began, Decisions& decisions) const {
+  bool in_turn = false;
+  nearest(free, began, decisions, &in_turn);
+  return in_turn;
+}
+
 double ContactModel::depth(Vec3 free, const Began& began, Decisions& decisions) const {
   double deepest = -std::numeric_limits<double>::infinity();
   for (const Wall& wall : walls_) deepest = std::max(deepest, wall.side * (wall.offset - free[wall.axis]));

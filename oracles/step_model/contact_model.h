@@ -24,6 +24,7 @@ class ContactModel {
 
   bool any() const { return plate_ || !walls_.empty(); }
   bool has_plate() const { return plate_; }
+  bool has_friction() const { return friction_; }
   // Friction, or room that is not convex.
   bool path_matters() const { return plate_ || friction_; }
 
@@ -50,6 +51,9 @@ class ContactModel {
   // prediction, which comes from nowhere). `hold`: falls to how far, at least, `free` is from where a contact that
   // holds would let go [m]; nullptr: nobody asks.
   Vec3 place(Vec3 free, const Began& began, Present* present, Decisions& decisions, double* hold = nullptr) const;
+
+  // Whether blade and walls both move one that would go to `free`, in turn: its place need not be the nearest one then.
+  bool acts_in_turn(Vec3 free, const Began& began, Decisions& decisions) const;
 
   // By how much one that would go to `free` is inside of what it may not enter [m]; <= 0: it stays there.
   double depth(Vec3 free, const Began& began, Decisions& decisions) const;

@@ -53,7 +53,9 @@ TEST_F(RunErrors, AllOfThem) {
     const json& solver = all.at("solver");
     EXPECT_LT(solver.at("max"), backend == "reference" ? 1e-12 : 1e-5);
     EXPECT_EQ(solver.at("frames").size(), 7u) << "the scene has no more";
-    for (const json& frame : solver.at("frames")) EXPECT_TRUE(frame.at("by_energy") && frame.at("converged"));
+    for (const json& frame : solver.at("frames")) {
+      EXPECT_TRUE(frame.at("solved_by") == "minimum" && frame.at("converged"));
+    }
     const json& time_step = all.at("time_step");
     EXPECT_EQ(time_step.at("first_difference"), nullptr);
     EXPECT_EQ(time_step.at("rms").size(), time_step.at("frames"));
@@ -81,18 +83,22 @@ TEST_F(RunErrors, OnlyThoseThatAreAskedFor) {
   EXPECT_FALSE(json::parse(read("none.json")).contains("errors"));
 }
 
-// In the first frames of a press the blade dents the block: there is no energy, and the iteration's own limit serves.
-TEST_F(RunErrors, UnderADentingBladeTheFixedPointCounts) {
+// Of a press every frame has an answer of its own, which is none of the iteration's: its floor and its blade have
+// friction, and nothing is minimised.
+TEST_F(RunErrors, UnderADentingBladeEachFrameHasAnAnswerOfItsOwn) {
   const Outcome outcome = cutproof("run " + scene("cuboid_press") +
-                                   " --particles 400 --frames 12 --errors solver,time_step --json out.json");
+                                   " --particles 400 --frames 12 --errors solver,time_step --error-frames 100 "
+                                   "--json out.json");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
   const json errors = json::parse(read("out.json")).at("errors");
-  int by_iteration = 0;
-  for (const json& frame : errors.at("solver").at("frames")) {
-    by_iteration += !frame.at("by_energy").get<bool>();
-    EXPECT_EQ(frame.at("energy") == nullptr, !frame.at("by_energy").get<bool>());
+  const json& frames = errors.at("solver").at("frames");
+  EXPECT_EQ(frames.size(), 12u) << "all that there are";
+  for (const json& frame : frames) {
+    EXPECT_EQ(frame.at("solved_by"), "rest");
+    EXPECT_TRUE(frame.at("converged"));
+    EXPECT_EQ(frame.at("energy"), nullptr);
+    EXPECT_EQ(frame.at("elsewhere"), nullptr);
   }
-  EXPECT_GT(by_iteration, 0);
   EXPECT_GT(errors.at("solver").at("max"), 0);
   EXPECT_GT(errors.at("time_step").at("greatest_rms"), 0);
 }
@@ -101,6 +107,8 @@ TEST_F(RunErrors, RefusesWhatIsNoError) {
   write("scene.json", kScene);
   expect_refused("run scene.json --errors speed", {"--errors", "speed", "time_step"});
   expect_refused("run scene.json --errors geometry,,topology", {"--errors"});
+  expect_refused("run scene.json --errors solver --error-frames 0", {"--error-frames"});
+  expect_refused("run scene.json --error-frames 4", {"--errors"});
 }
 
 }  // namespace

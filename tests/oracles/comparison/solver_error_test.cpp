@@ -8,6 +8,7 @@
 
 #include "oracles/comparison/reference_solution.h"
 #include "reference_cpu/reference.h"
+#include "tests/oracles/comparison/twisted_block.h"
 #include "tests/oracles/states.h"
 
 namespace cutproof::oracles {
@@ -26,7 +27,7 @@ struct Moving {
 };
 
 // A block of 6³ particles, stretched and twisted by its velocities.
-Moving twisted_block(int32_t iterations) {
+Moving twisting_block(int32_t iterations) {
   Moving scene{setup_of(block_body(6, 6, 6, kH)), {}};
   scene.setup.step.iterations = iterations;
   scene.state = state_of(scene.setup.body, box_clusters(6, 6, 6, 3));
@@ -39,14 +40,14 @@ Moving twisted_block(int32_t iterations) {
 
 TEST(SolverError, IsThatOfThePlainIterationAsItIsWrittenDownElsewhere) {
   for (const int32_t iterations : {1, 4, 600}) {
-    const Moving scene = twisted_block(iterations);
+    const Moving scene = twisting_block(iterations);
     const auto judged = reference::make_backend(), exact = reference::make_backend();
     const SolverError error = solver_error(*judged, *exact, scene.setup, scene.state).value();
     const ReferenceSolution answer = reference_solution(scene.setup, scene.state);
     const PlainLimit plain = plain_limit(scene.setup, scene.state, 0, iterations);
     double greatest = 0;
     for (std::size_t i = 0; i < plain.x.size(); ++i) greatest = std::max(greatest, norm(plain.x[i] - answer.x[i]) / kH);
-    EXPECT_TRUE(error.by_energy);
+    EXPECT_EQ(error.solved_by, SolvedBy::minimum);
     EXPECT_TRUE(error.converged);
     EXPECT_EQ(error.position.count, 216);
     EXPECT_NEAR(error.position.max, greatest, 1e-11);
@@ -56,19 +57,49 @@ TEST(SolverError, IsThatOfThePlainIterationAsItIsWrittenDownElsewhere) {
   }
 }
 
-TEST(SolverError, WithoutAnEnergyIsTheDistanceToTheFixedPoint) {
-  Moving scene = twisted_block(4);
+TEST(SolverError, IsTheSameBesideContactsThatAreNeverTouched) {
+  Moving scene = twisting_block(4);
   const auto judged = reference::make_backend(), exact = reference::make_backend();
-  const SolverError by_energy = solver_error(*judged, *exact, scene.setup, scene.state).value();
+  const SolverError without = solver_error(*judged, *exact, scene.setup, scene.state).value();
   scene.setup.walls = {{.axis = 2, .side = +1, .offset = -1, .friction = 0.5}};  // far away
-  const SolverError by_iteration = solver_error(*judged, *exact, scene.setup, scene.state).value();
-  EXPECT_FALSE(by_iteration.by_energy);
-  EXPECT_FALSE(by_iteration.energy);
-  EXPECT_TRUE(by_iteration.converged);
-  EXPECT_NEAR(by_iteration.position.max, by_energy.position.max, 2 * kFixedPoint);
-  EXPECT_NEAR(by_iteration.position.rms(), by_energy.position.rms(), 2 * kFixedPoint);
+  const SolverError beside = solver_error(*judged, *exact, scene.setup, scene.state).value();
+  EXPECT_EQ(beside.solved_by, SolvedBy::rest);
+  EXPECT_FALSE(beside.energy);
+  EXPECT_TRUE(beside.converged);
+  EXPECT_NEAR(beside.position.max, without.position.max, 1e-11);
+  EXPECT_NEAR(beside.position.rms(), without.position.rms(), 1e-11);
   scene.setup.step.solver = Solver::published;
   EXPECT_FALSE(solver_error(*judged, *exact, scene.setup, scene.state)) << "stiffer with every iteration";
+}
+
+class NeverRun : public Backend {
+ public:
+  std::string name() const override { return "never run"; }
+  bool can_run(Span span) const override { return reference_->can_run(span); }
+  void load(std::vector<cutproof::Setup>, std::vector<State>) override { ADD_FAILURE(); }
+  void run(Span) override { ADD_FAILURE(); }
+  std::vector<State> snapshot() const override { return {}; }
+  SpanReport report() const override { return {}; }
+  const std::unique_ptr<Backend> reference_ = reference::make_backend();
+};
+
+// Under a blade, on a floor: nothing of the figure is the reference's, which stands by as `exact` and is never run.
+TEST(SolverError, UnderABladeIsTheDistanceToAnAnswerOfItsOwn) {
+  for (const double friction : {0.0, 0.3}) {
+    testing::Scene scene = testing::pressed_block(1e5, friction);
+    for (const int32_t iterations : {4, 1500}) {
+      scene.setup.step.iterations = iterations;
+      NeverRun exact;
+      const auto judged = reference::make_backend();
+      const SolverError error = solver_error(*judged, exact, scene.setup, scene.state).value();
+      EXPECT_EQ(error.solved_by, friction == 0 ? SolvedBy::minimum : SolvedBy::rest);
+      EXPECT_TRUE(error.converged);
+      EXPECT_FALSE(error.elsewhere);
+      EXPECT_EQ(error.energy.has_value(), friction == 0);
+      EXPECT_EQ(iterations == 1500, error.position.max < 1e-10) << error.position.max;
+      EXPECT_GE(error.energy.value_or(0), -1e-12);
+    }
+  }
 }
 
 }  // namespace

@@ -40,4 +40,19 @@ inline Scene obstructed_block(double stiffness) {
   return scene;
 }
 
+// A block that falls on a floor while a blade, at a slant, is pressed into its top: both with the same friction.
+inline Scene pressed_block(double stiffness, double friction) {
+  Scene scene = twisted_block(6, 0.4, 1.1, 0.01);
+  scene.setup.step.stiffness = stiffness;
+  scene.setup.step.gravity = {0, 0, -9.81};
+  scene.setup.walls = {{.axis = 2, .side = +1, .offset = 0.009, .friction = friction}};
+  scene.setup.has_blade = true;
+  scene.setup.blade = {0.05, 0.04, 0.004, friction};
+  const Vec3 along = normalized(Vec3{1, 0.2, 0.1}), back = normalized(cross(cross(along, Vec3{0, 0.3, 1}), along));
+  const BladePose from = {{0.034, 0.0362, 0.055}, along, back}, to = {{0.034, 0.0362, 0.052}, along, back};
+  scene.setup.blade_moves = {{from, to, true, 0}};
+  for (Vec3& v : scene.state.v) v += Vec3{0.6, 0.2, -1.0};
+  return scene;
+}
+
 }  // namespace cutproof::testing

@@ -1,0 +1,216 @@
+#include "oracles/comparison/substep_problem.h"
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "oracles/eigen.h"
+#include "oracles/oracles.h"
+#include "oracles/support.h"
+
+namespace cutproof::oracles {
+namespace {
+
+void require(bool condition, const char* what) {
+  if (!condition) throw std::invalid_argument(std::string("the reference solution of a substep: ") + what);
+}
+
+// What the substep is made of, checked before anything is computed from it.
+const Setup& checked(const Setup& setup, const State& state) {
+  require(setup.step.solver == Solver::implicit, "only the implicit solver has one");
+  require(0 <= state.frame && state.frame < setup.frame_count(), "the state's frame is not in the schedule");
+  const Verdict form = well_formed(setup, state);
+  require(form.holds, form.witness.text.c_str());
+  return setup;
+}
+
+// nullptr: no blade in the tissue.
+const BladeMove* lowered(const Setup& setup, const State& state) {
+  if (!setup.has_blade) return nullptr;
+  const BladeMove& move = setup.blade_moves[at(state.frame * setup.step.substeps)];
+  return move.down ? &move : nullptr;
+}
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// argmax over rotations of tr(Rᵀ A), by SVD (Kabsch 1976, Umeyama 1991): A = U Σ Vᵀ, R = U diag(1, 1, d) Vᵀ with
+// d = det(U Vᵀ). Where σ2 + d σ3 = 0 a whole circle of rotations about u1 is as good (a sphere of them if σ1 = σ2
+// too); of these the one nearest to `previous`.
+Mat3 best_rotation(const Eigen::Matrix3d& a, const Mat3& previous) {
+  constexpr double kSame = 1e-12;  // far above the rounding of A, far below what can be told from a circle
+  const double scale = a.cwiseAbs().maxCoeff();
+  if (!(scale > 0) || !std::isfinite(scale)) return previous;
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(a / scale, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Matrix3d u = svd.matrixU(), v = svd.matrixV();
+  const Eigen::Vector3d sigma = svd.singularValues();
+  const double d = (u * v.transpose()).determinant() < 0 ? -1 : 1;
+  const Eigen::Matrix3d best = u * Eigen::Vector3d(1, 1, d).asDiagonal() * v.transpose();
+  if (sigma[1] + d * sigma[2] > kSame * sigma[0]) return to_mat3(best);
+
+  const Eigen::Matrix3d before = as_eigen(previous);
+  if (d < 0 && sigma[0] - sigma[1] <= kSame * sigma[0]) {
+    // A = −σ Q: all Q (2 n nᵀ − I) are best, and tr(Rᵀ R_prev) = 2 nᵀ (Qᵀ R_prev) n − tr(Qᵀ R_prev).
+    const Eigen::Matrix3d q = -(u * v.transpose());
+    const Eigen::Matrix3d m = q.transpose() * before;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen((m + m.transpose()) / 2);
+    const Eigen::Vector3d n = eigen.eigenvectors().col(2);
+    return to_mat3(q * (2 * n * n.transpose() - Eigen::Matrix3d::Identity()));
+  }
+  const Eigen::Matrix3d b = u.transpose() * before * v * Eigen::Vector3d(1, 1, d).asDiagonal();
+  const double angle = std::atan2(b(2, 1) - b(1, 2), b(1, 1) + b(2, 2));
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+  turn(1, 1) = turn(2, 2) = std::cos(angle);
+  turn(2, 1) = std::sin(angle);
+  turn(1, 2) = -turn(2, 1);
+  return to_mat3(u * turn * Eigen::Vector3d(1, 1, d).asDiagonal() * v.transpose());
+}
+
+}  // namespace
+
+SubstepProblem::SubstepProblem(const Setup& setup, const State& state)
+    : body(checked(setup, state).body),
+      clusters(state.clusters),
+      dt(setup.substep_length[at(state.frame)]),
+      stiffness(setup.step.stiffness),
+      alive(state.alive),
+      held(at(body.particle_count()), 0),
+      start(state.x),
+      predicted(state.x),
+      rest(weighted_rest(body, clusters)),
+      memberships(memberships_of(clusters, body.particle_count())),
+      low{-kInfinity, -kInfinity, -kInfinity},
+      high{kInfinity, kInfinity, kInfinity},
+      contacts(setup, lowered(setup, state), setup.walls) {
+  const auto index = at(state.frame * setup.step.substeps);
+  const double kdt2 = stiffness * dt * dt;
+  s = kdt2 / (1 + kdt2);
+  for (const Wall& wall : setup.walls) {
+    const auto axis = at(wall.axis);
+    if (wall.side > 0) low[axis] = std::max(low[axis], wall.offset);
+    if (wall.side < 0) high[axis] = std::min(high[axis], wall.offset);
+  }
+
+  for (std::size_t i = 0; i < start.size(); ++i) {
+    if (alive[i] != 0) predicted[i] = start[i] + dt * state.v[i] + (dt * dt) * setup.step.gravity;
+    began.push_back({start[i], contacts.height_at_start(start[i]), 0, {}});
+  }
+  for (const Grip& grip : setup.grips) {
+    if (!grip.active[index]) continue;
+    for (const int32_t i : grip.particles) {
+      if (!alive[at(i)]) continue;
+      held[at(i)] = 1;
+      predicted[at(i)] = start[at(i)] + grip.displacement[index];
+    }
+  }
+
+  for (int32_t c = 0; c < clusters.count(); ++c) {
+    const Vec3 center = cluster_means(rest, clusters, start, c).rest;
+    for (const int32_t i : clusters.of(c)) offset.push_back(rest.position[at(i)] - center);
+  }
+}
+
+namespace {
+// Takes every decision as the numbers say.
+struct AsTheNumbersSay {
+  Settled nothing;
+  Decisions decisions{nothing, 0, kUnitRoundoff};
+};
+}  // namespace
+
+Vec3 SubstepProblem::placed(int32_t i, Vec3 free, const Vec3* present) const {
+  if (!contacts.any()) return free;
+  AsTheNumbersSay natural;
+  if (present == nullptr) return contacts.place(free, began[at(i)], nullptr, natural.decisions);
+  ContactModel::Present now = {*present, norm(*present), kUnitRoundoff};
+  return contacts.place(free, began[at(i)], &now, natural.decisions);
+}
+
+bool SubstepProblem::is_placed_in_turn(int32_t i, Vec3 free) const {
+  AsTheNumbersSay natural;
+  return contacts.any() && contacts.acts_in_turn(free, began[at(i)], natural.decisions);
+}
+
+std::vector<Vec3> first_positions(const SubstepProblem& problem) {
+  std::vector<Vec3> x = problem.predicted;
+  for (int32_t i = 0; i < problem.body.particle_count(); ++i) {
+    if (problem.is_free(i)) x[at(i)] = problem.placed(i, x[at(i)]);
+  }
+  return x;
+}
+
+Poses poses_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const std::vector<Mat3>& previous) {
+  const Clusters& clusters = problem.clusters;
+  Poses poses;
+  for (int32_t c = 0; c < clusters.count(); ++c) {
+    const Vec3 center = cluster_means(problem.rest, clusters, x, c).current;
+    Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
+    auto offset = problem.offset.begin() + clusters.offsets[at(c)];
+    for (const int32_t i : clusters.of(c)) {
+      a += as_eigen(problem.rest.weight[at(i)] * (x[at(i)] - center)) * as_eigen(*offset++).transpose();
+    }
+    poses.center.push_back(center);
+    poses.rotation.push_back(best_rotation(a, previous[at(c)]));
+  }
+  return poses;
+}
+
+std::vector<Vec3> turned_offsets(const SubstepProblem& problem, const std::vector<Mat3>& rotation) {
+  std::vector<Vec3> mean(at(problem.body.particle_count()));
+  const Clusters& clusters = problem.clusters;
+  for (int32_t c = 0; c < clusters.count(); ++c) {
+    auto offset = problem.offset.begin() + clusters.offsets[at(c)];
+    for (const int32_t i : clusters.of(c)) mean[at(i)] += rotation[at(c)] * *offset++;
+  }
+  for (int32_t i = 0; i < problem.body.particle_count(); ++i) {
+    const auto count = problem.memberships.of(i).size();
+    if (count > 0) mean[at(i)] = mean[at(i)] / static_cast<double>(count);
+  }
+  return mean;
+}
+
+std::vector<Vec3> goals_of(const SubstepProblem& problem, const Poses& poses) {
+  std::vector<Vec3> goal = turned_offsets(problem, poses.rotation);
+  for (int32_t i = 0; i < problem.body.particle_count(); ++i) {
+    const auto clusters = problem.memberships.of(i);
+    if (clusters.empty()) {
+      goal[at(i)] = problem.predicted[at(i)];
+      continue;
+    }
+    Vec3 sum;
+    for (const int32_t c : clusters) sum += poses.center[at(c)];
+    goal[at(i)] += sum / static_cast<double>(clusters.size());
+  }
+  return goal;
+}
+
+std::vector<Vec3> plain_iterate(const SubstepProblem& problem, const std::vector<Vec3>& x, const Poses& poses) {
+  const std::vector<Vec3> goal = goals_of(problem, poses);
+  std::vector<Vec3> next = x;
+  for (int32_t i = 0; i < problem.body.particle_count(); ++i) {
+    if (!problem.is_free(i)) continue;
+    const Vec3 from = problem.predicted[at(i)];
+    next[at(i)] = problem.placed(i, from + problem.s * (goal[at(i)] - from), &x[at(i)]);
+  }
+  return next;
+}
+
+double energy_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const Poses& poses) {
+  double inertial = 0, elastic = 0;
+  for (int32_t i = 0; i < problem.body.particle_count(); ++i) {
+    if (!problem.is_free(i)) continue;
+    const Vec3 d = x[at(i)] - problem.predicted[at(i)];
+    inertial += problem.body.mass[at(i)] * dot(d, d);
+  }
+  for (int32_t c = 0; c < problem.clusters.count(); ++c) {
+    auto offset = problem.offset.begin() + problem.clusters.offsets[at(c)];
+    for (const int32_t i : problem.clusters.of(c)) {
+      const Vec3 d = x[at(i)] - poses.center[at(c)] - poses.rotation[at(c)] * *offset++;
+      elastic += problem.rest.weight[at(i)] * dot(d, d);
+    }
+  }
+  return inertial / (2 * problem.dt * problem.dt) + problem.stiffness / 2 * elastic;
+}
+
+}  // namespace cutproof::oracles

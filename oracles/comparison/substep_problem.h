@@ -1,0 +1,69 @@
+// One implicit substep as a problem (method.md §3): what its energy is made of, and where contacts let particles be.
+// Shares nothing with a backend. Internal to oracles/.
+#pragma once
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "model/setup.h"
+#include "model/state.h"
+#include "oracles/memberships.h"
+#include "oracles/shape_sums.h"
+#include "oracles/step_model/contact_model.h"
+
+namespace cutproof::oracles {
+
+// Everything of E that stays constant during the substep, and what contacts need to know. Keeps references to setup and
+// state.
+struct SubstepProblem {
+  // The first substep of frame state.frame. Throws std::invalid_argument if the solver is not implicit, the schedule is
+  // over, or the state is not well formed.
+  SubstepProblem(const Setup& setup, const State& state);
+
+  const Body& body;
+  const Clusters& clusters;
+  double dt = 0;
+  double stiffness = 0;
+  double s = 0;  // k dt² / (1 + k dt²)
+  std::vector<uint8_t> alive, held;
+  std::vector<Vec3> start;      // x_prev
+  std::vector<Vec3> predicted;  // x~ of method.md §3, before contacts; of held particles, where the grip puts them
+  WeightedRest rest;
+  std::vector<Vec3> offset;  // [members] X_i − T_c
+  Memberships memberships;
+  std::array<double, 3> low, high;  // walls: low <= x <= high
+  ContactModel contacts;
+  std::vector<ContactModel::Began> began;  // [n]
+
+  bool is_free(int32_t i) const { return alive[at(i)] && !held[at(i)]; }
+  double clamped(double value, int axis) const { return std::clamp(value, low[at(axis)], high[at(axis)]); }
+  // Where contacts let a free particle be that would go to `free`. `present`, if given: where it is, which it does not
+  // leave for what is worse.
+  Vec3 placed(int32_t i, Vec3 free, const Vec3* present = nullptr) const;
+  // Whether blade and walls both move it, in turn: then its place need not be the nearest one.
+  bool is_placed_in_turn(int32_t i, Vec3 free) const;
+};
+
+// Positions from which the iteration begins: x~ where contacts let it be.
+std::vector<Vec3> first_positions(const SubstepProblem& problem);
+
+struct Poses {
+  std::vector<Vec3> center;    // t_c
+  std::vector<Mat3> rotation;  // R_c
+};
+// The best at positions x. Where many rotations are, the one nearest to `previous`.
+Poses poses_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const std::vector<Mat3>& previous);
+
+// [n] the mean over a particle's clusters of R_c (X_i − T_c), to which the mean of t_c is added to give g_i.
+std::vector<Vec3> turned_offsets(const SubstepProblem& problem, const std::vector<Mat3>& rotation);
+
+// [n] g_i; of a particle in no cluster, where it wants to be anyway.
+std::vector<Vec3> goals_of(const SubstepProblem& problem, const Poses& poses);
+
+// One plain iteration from x, whose poses are given.
+std::vector<Vec3> plain_iterate(const SubstepProblem& problem, const std::vector<Vec3>& x, const Poses& poses);
+
+// E at positions x with the best t and R there [kg m²/s²]. Held particles have no inertia: their positions are given.
+double energy_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const Poses& poses);
+
+}  // namespace cutproof::oracles
