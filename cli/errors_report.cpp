@@ -168,7 +168,7 @@ void print_errors(const Errors& errors, const json& document) {
   say_text(row("solver", "solver",
                fmt::format("max {{max:.3g}} h, RMS {{rms:.3g}} h, energy {} above the least; {} substeps{}{}",
                            energy ? fmt::format("{:.3g}", *energy) : "-", errors.solver().size(),
-                           by_iteration > 0 ? fmt::format(", {} beside the reference's own limit", by_iteration) : "",
+                           by_iteration > 0 ? fmt::format(", {} beside where plain iterations end", by_iteration) : "",
                            unconverged > 0 ? fmt::format(", {} without a reference solution", unconverged) : "")));
   const auto& steps = errors.time_step();
   say_text(

@@ -72,12 +72,25 @@ void print_beginning(const TuneOptions& options, const json& document, const Sce
   }
 }
 
+// Of a level of the reference solution.
+std::string level_text(const json& level) {
+  if (!level.at("iterations").is_null()) return io::filled("reference, {substeps} × {iterations}", level);
+  const json& solved = level.at("solved");
+  const std::string others = solved.at("by_iteration") == 0
+                                 ? ""
+                                 : io::filled(
+                                       " ({by_iteration} of {substeps} by iterations of their own, {unsolved} "
+                                       "of these not to their end)",
+                                       solved);
+  return io::filled("scene's {substeps} substeps, each solved without the reference's step", level) + others;
+}
+
 void print_reference(const TuneOptions& options, const json& reference) {
   say("the reference solution: {}\n", options.reference == ReferenceKind::limit
                                           ? "the limit of short time steps"
                                           : "the scene's own substeps, each solved until converged");
   for (const json& level : reference.at("levels")) {
-    say_filled("  reference, {substeps} × {iterations}", level);
+    say("  {}", level_text(level));
     if (!level.at("apart_h").is_null()) say_filled(": {apart_h:.2g} h from the one before", level);
     say("\n");
   }
@@ -134,8 +147,9 @@ void print_found(const TuneOptions& options, const json& document) {
                    : fmt::format("{:.2f} times as expensive, and what was given is not within", 1 / ratio));
   }
   say_filled("  verified: RMS {rms_h:.2g} h, max {max_h:.2g} h ", found.at("verified"));
-  say_filled("from the reference's {substeps} × {iterations}, {apart_h:.2g} h from the one before; ",
-             document.at("reference").at("levels").back());
+  const json& level = document.at("reference").at("levels").back();
+  say("from the {}", level_text(level));
+  say_filled(", {apart_h:.2g} h from the one before; ", level);
   say_filled("{verdicts} verdicts hold\n", found);
   if (trial.at("rotation") != given.at("rotation")) {
     say_filled("  rotations are no part of a scene: run it with --rotation {rotation}\n", trial);

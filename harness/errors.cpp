@@ -6,7 +6,6 @@
 
 #include "oracles/oracles.h"
 #include "oracles/surface/surface.h"
-#include "reference_cpu/reference.h"
 
 namespace cutproof::harness {
 
@@ -28,10 +27,7 @@ Errors::Errors(const ErrorsWanted& wanted, const Setup& setup, const State& star
       start_(start),
       make_(std::move(make)),
       sweep_(setup) {
-  if (wanted_.solver) {
-    judged_ = make_();
-    exact_ = reference::make_backend();
-  }
+  if (wanted_.solver) judged_ = make_();
 }
 
 bool Errors::looked_at(int64_t frame) const {
@@ -48,7 +44,7 @@ bool Errors::wants(int64_t frame) const {
 void Errors::frame_begins(const State& state) {
   if (wanted_.geometry && sweep_.wants(state.frame)) frame_start_ = state;
   if (!wanted_.solver || !looked_at(state.frame)) return;
-  if (auto error = oracles::solver_error(*judged_, *exact_, setup_, state)) solver_.push_back({state.frame, *error});
+  if (auto error = oracles::solver_error(*judged_, setup_, state)) solver_.push_back({state.frame, *error});
 }
 
 void Errors::frame_ends(const State& state) {

@@ -88,7 +88,7 @@ class Errors {
   Precision precision_;
   State start_;
   oracles::MakeBackend make_;
-  std::unique_ptr<Backend> judged_, exact_;
+  std::unique_ptr<Backend> judged_;
   std::vector<Solver> solver_;
   Topology topology_;
   std::optional<Overlap> overlap_;  // the greatest

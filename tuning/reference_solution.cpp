@@ -64,15 +64,22 @@ ReferenceSolution::ReferenceSolution(ReferenceKind kind, const Scene& scene, std
   setup_ = PreparedScene(scene_, source_, frames_).setup();
   levels_ = {next_level()};
   // At least two levels are needed. They know nothing of each other, so they are run at once.
-  const RefinementLevel first = levels_.front(), second = next_level();
+  RefinementLevel first = levels_.front(), second = next_level();
   std::future<Trajectory> finer = std::async(std::launch::async, [&] { return run(second); });
   trajectory_ = run(first);
   take(second, finer.get());
   const auto is_allowed = [](const RefinementLevel& next) {
-    return next.substeps <= kMostSubsteps && next.iterations <= kMostIterations;
+    return next.substeps <= kMostSubsteps && next.iterations.value_or(0) <= kMostIterations;
   };
   // The third, which tells how fast they come nearer, is run in any case.
-  while (levels_.size() < 3 || (known_to_h() > known && is_allowed(next_level()))) refine();
+  while (levels_.size() < 3 || (known_to_h() > known && !is_last())) {
+    RefinementLevel next = next_level();
+    if (levels_.size() >= 3 && !is_allowed(next)) {
+      if (kind_ == ReferenceKind::limit) break;
+      next.iterations.reset();
+    }
+    add(next);
+  }
 }
 
 RefinementLevel ReferenceSolution::next_level() const {
@@ -80,7 +87,7 @@ RefinementLevel ReferenceSolution::next_level() const {
   if (kind_ == ReferenceKind::substeps) {
     level.substeps = scene_.step.substeps;
     level.iterations =
-        levels_.empty() ? std::max(kLeastIterations, scene_.step.iterations) : 2 * levels_.back().iterations;
+        levels_.empty() ? std::max(kLeastIterations, scene_.step.iterations) : 2 * levels_.back().iterations.value();
   } else {
     level.substeps = levels_.empty() ? std::max(kLeastSubsteps, 4 * scene_.step.substeps) : 2 * levels_.back().substeps;
     level.iterations = enough_iterations(scene_, level.substeps);
@@ -88,20 +95,23 @@ RefinementLevel ReferenceSolution::next_level() const {
   return level;
 }
 
-Trajectory ReferenceSolution::run(const RefinementLevel& level) const {
+Trajectory ReferenceSolution::run(RefinementLevel& level) const {
   Scene scene = scene_;
   scene.step.substeps = level.substeps;
-  scene.step.iterations = level.iterations;
+  scene.step.iterations = level.iterations.value_or(scene.step.iterations);
   const PreparedScene prepared(scene, source_, frames_);
-  const std::unique_ptr<Backend> reference = reference::make_backend();
+  SolvedSteps solved;
+  const std::unique_ptr<Backend> iterated = reference::make_backend();
+  Backend& backend = level.iterations ? *iterated : solved;
   Trajectory trajectory;
   trajectory.stroke_end = prepared.stroke_end();
-  prepared.run(*reference, [&](double) {
+  prepared.run(backend, [&](double) {
     throw_if_asked(stop_asked_);
-    trajectory.frames.push_back(oracles::pose_of(prepared.setup(), reference->snapshot().front(),
+    trajectory.frames.push_back(oracles::pose_of(prepared.setup(), backend.snapshot().front(),
                                                  trajectory.frames.empty() ? nullptr : &trajectory.frames.back()));
     return true;
   });
+  level.solved = solved.count();
   return trajectory;
 }
 
@@ -119,9 +129,16 @@ void ReferenceSolution::take(RefinementLevel level, Trajectory trajectory) {
   trajectory_ = std::move(trajectory);
 }
 
+void ReferenceSolution::add(RefinementLevel next) {
+  Trajectory trajectory = run(next);
+  take(next, std::move(trajectory));
+}
+
 void ReferenceSolution::refine() {
-  const RefinementLevel next = next_level();
-  take(next, run(next));
+  if (is_last()) return;
+  RefinementLevel next = next_level();
+  if (kind_ == ReferenceKind::substeps) next.iterations.reset();
+  add(next);
 }
 
 bool ReferenceSolution::nothing_removed() const {

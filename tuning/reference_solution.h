@@ -1,5 +1,5 @@
 // The solution that configurations of a scene are measured against, by the double-precision reference, and how well it
-// is known.
+// is known; with the scene's own substeps at last without the reference's step.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -10,19 +10,24 @@
 #include "model/scene.h"
 #include "model/setup.h"
 #include "model/stop.h"
+#include "tuning/solved_steps.h"
 #include "tuning/trajectory.h"
 
 namespace cutproof::tuning {
 
 enum class ReferenceKind {
-  limit,    // of ever shorter time steps, and of iterations that are enough for them
-  substeps  // of ever more iterations, with the scene's own substeps: the time step is part of the scene
+  limit,  // of ever shorter time steps, and of iterations that are enough for them
+  // Of ever more iterations, with the scene's own substeps, which are part of the scene; the last level has each of
+  // them solved without iteration (tuning/solved_steps.h), and so does not hang on the reference's step.
+  substeps
 };
 
 // One approximation of the solution.
 struct RefinementLevel {
-  int32_t substeps = 0, iterations = 0;
-  std::optional<double> apart_h;  // from the level before: greatest RMS distance in any frame [h]
+  int32_t substeps = 0;
+  std::optional<int32_t> iterations;  // of the reference; none: each substep is solved
+  std::optional<double> apart_h;      // from the level before: greatest RMS distance in any frame [h]
+  SolvedSteps::Count solved = {};     // where each substep is: how
 };
 
 // By how much the last of these levels may be off [h], as its distances tell. If they fall by a factor r from level to
@@ -37,8 +42,9 @@ std::string known_to(std::span<const RefinementLevel> levels);
 class ReferenceSolution {
  public:
   // Refines, a factor of 2 at a time, until the solution is known to `known` [h] or no further level is allowed
-  // (kMostSubsteps, kMostIterations); but the first three are run in any case, because fewer tell nothing. The scene
-  // must have the implicit solver. Here and in refine(): throws Stopped between two frames once it is asked to stop.
+  // (kMostSubsteps, kMostIterations, after which each substep is solved); but the first three are run in any case,
+  // because fewer tell nothing. The scene must have the implicit solver. Here and in refine(): throws Stopped between
+  // two frames once it is asked to stop.
   ReferenceSolution(ReferenceKind kind, const Scene& scene, std::string source, std::optional<int64_t> frames,
                     double known, StopAsked stop_asked = {});
 
@@ -48,7 +54,8 @@ class ReferenceSolution {
   double known_to_h() const { return remaining_error(levels_); }
   bool nothing_removed() const;
 
-  // One more level, whatever it costs: what the search has not seen.
+  // One more level, whatever it costs: what the search has not seen. Of the scene's own substeps it is the one in which
+  // each is solved; after that there is none.
   void refine();
 
   static constexpr int32_t kMostSubsteps = 256;    // per frame
@@ -56,7 +63,9 @@ class ReferenceSolution {
 
  private:
   RefinementLevel next_level() const;
-  Trajectory run(const RefinementLevel& level) const;
+  bool is_last() const { return !levels_.empty() && !levels_.back().iterations; }
+  Trajectory run(RefinementLevel& level) const;
+  void add(RefinementLevel next);
   void take(RefinementLevel level, Trajectory trajectory);
 
   ReferenceKind kind_;

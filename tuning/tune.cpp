@@ -124,8 +124,14 @@ std::optional<Found> take_cheapest(const Measuring& measuring, const ReferenceSo
 json levels_json(const ReferenceSolution& reference) {
   json levels = json::array();
   for (const RefinementLevel& level : reference.levels()) {
-    levels.push_back(
-        {{"substeps", level.substeps}, {"iterations", level.iterations}, {"apart_h", json_number(level.apart_h)}});
+    levels.push_back({{"substeps", level.substeps}, {"iterations", nullptr}, {"apart_h", json_number(level.apart_h)}});
+    if (level.iterations) {
+      levels.back()["iterations"] = *level.iterations;
+    } else {
+      levels.back()["solved"] = {{"substeps", level.solved.substeps},
+                                 {"by_iteration", level.solved.by_iteration},
+                                 {"unsolved", level.solved.unsolved}};
+    }
   }
   return levels;
 }

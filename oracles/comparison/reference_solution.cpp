@@ -210,6 +210,34 @@ ReferenceSolution reference_solution(const Setup& setup, const State& state) {
   return result;
 }
 
+SubstepAnswer substep_answer(const Setup& setup, const State& state) {
+  ReferenceSolution rest = reference_solution(setup, state);
+  SubstepAnswer answer = {.x = std::move(rest.x),
+                          .rotation = std::move(rest.rotation),
+                          .energy = rest.energy,
+                          .by = rest.is_minimum ? SolvedBy::minimum : SolvedBy::rest,
+                          .converged = rest.converged,
+                          .elsewhere = {}};
+  const SubstepProblem problem(setup, state);
+  if (!problem.contacts.path_matters()) {
+    answer.by = SolvedBy::minimum;
+    return answer;
+  }
+  PlainLimit limit = plain_limit(setup, state, kMeets / 1000, kMostIterations);
+  const double apart = greatest_change(answer.x, limit.x) / setup.body.grid.spacing;
+  if (rest.converged && apart <= kMeets) return answer;
+  answer.by = SolvedBy::iteration;
+  answer.converged = limit.last_change < kMeets / 1000;
+  if (rest.converged && answer.converged) {
+    const double end = limit.energy.back();
+    answer.elsewhere = {apart, end > 0 ? (rest.energy - end) / end : 0};
+  }
+  answer.x = std::move(limit.x);
+  answer.rotation = std::move(limit.rotation);
+  answer.energy = limit.energy.back();
+  return answer;
+}
+
 double substep_energy(const Setup& setup, const State& state, const std::vector<Vec3>& x) {
   const SubstepProblem problem(setup, state);
   return energy_at(problem, x, poses_at(problem, x, state.clusters.rotation));
@@ -265,6 +293,7 @@ PlainLimit plain_limit(const Setup& setup, const State& state, double tolerance,
     ++result.iterations;
     if (result.last_change < tolerance) break;
   }
+  result.rotation = std::move(poses.rotation);
   return result;
 }
 

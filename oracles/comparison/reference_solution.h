@@ -1,6 +1,8 @@
 // The reference solution of one implicit substep (method.md §3), without its iteration: for fixed rotations find where
 // x and t come to rest together, by sparse factors; alternate with the rotations.
 #pragma once
+#include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "model/setup.h"
@@ -24,6 +26,37 @@ struct ReferenceSolution {
 // plain iterations say.
 ReferenceSolution reference_solution(const Setup& setup, const State& state);
 
+// Which answer of a substep counts (method.md §3), and how it was found.
+enum class SolvedBy : uint8_t {
+  minimum,   // reference_solution, a minimum of E where contacts let it be
+  rest,      // reference_solution where nothing is minimised: friction, or a particle that blade and walls move in turn
+  iteration  // plain iterations, because they end elsewhere, or it has found nothing
+};
+constexpr const char* name_of(SolvedBy by) {
+  constexpr const char* kNames[] = {"minimum", "rest", "iteration"};
+  return kNames[static_cast<int>(by)];
+}
+inline constexpr int64_t kMostIterations = 4096;
+inline constexpr double kMeets = 1e-9;  // [h]
+
+struct SubstepAnswer {
+  std::vector<Vec3> x;         // [n] [m]
+  std::vector<Mat3> rotation;  // [m]
+  double energy = 0;           // E there [kg m²/s²]
+  SolvedBy by = SolvedBy::iteration;
+  bool converged = false;  // by iteration: kMostIterations were enough to change nothing by more than kMeets / 1000
+  // Set where reference_solution rests, and plain iterations elsewhere.
+  struct Elsewhere {
+    double distance = 0;  // greatest of a particle [h]
+    double energy = 0;    // (E there − E where plain iterations end) / E where they end [1]; 0 if that is 0
+  };
+  std::optional<Elsewhere> elsewhere;
+};
+// With a blade in the tissue or friction there may be several places of rest, and the answer is that to which the plain
+// iteration leads: what reference_solution has found counts where plain_limit comes within kMeets of it. Without them
+// its minimum is the answer. Requires what reference_solution does.
+SubstepAnswer substep_answer(const Setup& setup, const State& state);
+
 // E of method.md §3 at positions x, minimised over t and R: what `energy_is_monotone` compares. x~ is computed from
 // the state; it is the free motion, before contacts: walls bound x, and held particles have no inertia. Blade and
 // friction do not enter it. Throws if the solver is not implicit.
@@ -36,6 +69,7 @@ std::vector<Vec3> substep_gradient(const Setup& setup, const State& state, const
 // reference_solution does.
 struct PlainLimit {
   std::vector<Vec3> x;
+  std::vector<Mat3> rotation;
   std::vector<double> energy;          // after each iteration, from x~ on
   std::vector<double> momentum_drift;  // after each iteration: |Σ m (x − x~)| / Σ m |x~ − x_prev|
   int64_t iterations = 0;

@@ -57,7 +57,7 @@ TEST(ReferenceSolution, IsRefinedUntilItIsKnown) {
 TEST(ReferenceSolution, IsKnownAsItsLevelsComeNearer) {
   const auto known = [](std::vector<double> apart) {
     std::vector<RefinementLevel> levels(1);
-    for (const double distance : apart) levels.push_back({1, 1, distance});
+    for (const double distance : apart) levels.push_back({1, 1, distance, {}});
     return remaining_error(levels);
   };
   EXPECT_DOUBLE_EQ(known({1, 0.5, 0.25}), 0.25);                         // first order
@@ -79,7 +79,7 @@ TEST(ReferenceSolution, IsKnownAsItsLevelsComeNearer) {
   EXPECT_EQ(known({1e-15, 2e-15}), 2e-15) << "what rounding leaves does not fall";
   const auto text = [](std::vector<double> apart) {
     std::vector<RefinementLevel> levels(1);
-    for (const double distance : apart) levels.push_back({1, 1, distance});
+    for (const double distance : apart) levels.push_back({1, 1, distance, {}});
     return known_to(levels);
   };
   EXPECT_EQ(text({1, 0.5, 0.25}), "known to 0.25 h");
@@ -99,7 +99,7 @@ TEST(ReferenceSolution, IsKnownToTheGreatestDistanceOfAnyFrame) {
   ASSERT_EQ(solution.levels().size(), 3u);
   std::vector<std::vector<std::vector<Vec3>>> runs;  // of each level, frame by frame
   for (const RefinementLevel& level : solution.levels()) {
-    scene.step.iterations = level.iterations;
+    scene.step.iterations = level.iterations.value();
     const PreparedScene prepared(scene, "test", {});
     const std::unique_ptr<Backend> backend = reference::make_backend();
     prepared.run(*backend, [&, frames = &runs.emplace_back()](double) {
@@ -158,6 +158,43 @@ TEST(ReferenceSolution, OfItsOwnSubstepsIsWhatASparseFactorisationFinds) {
     moved = std::max(moved, oracles::poses_apart(prepared.setup(), pose, rest).position.max);
   }
   EXPECT_GT(moved, 0.05) << "it hangs from a grip: it has to move, else nothing is compared";
+}
+
+// A press on a floor with friction, and its cut: after levels of the reference one in which every substep is solved,
+// and meets them. It is the last, and none of it is the reference's step.
+TEST(ReferenceSolution, OfItsOwnSubstepsEndsWithEachOfThemSolved) {
+  const Scene scene = scene_of(R"({"version": 4, "name": "pressed",
+    "body": {"shape": {"kind": "box", "size": [0.06, 0.03, 0.03]}, "spacing": 0.01}, "clusters": {"side": 2},
+    "frame": {"length": 0.016, "count": 24}, "step": {"substeps": 2, "gravity": [0, 0, -9.81], "damping": 5},
+    "ground": {"friction": 0.4}, "detect": {"criterion": "distance"},
+    "blade": {"length": 0.08, "depth": 0.06, "speed": 0.15, "friction": 0.2, "strokes": [
+      {"points": [[0.5, 0.5, 1.3], [0.5, 0.5, 0.2]], "along": [0, 1, 0]}]}})");
+  ReferenceSolution solution(ReferenceKind::substeps, scene, "test", {}, 1e-7);
+  ASSERT_TRUE(solution.levels().back().iterations);
+  const std::size_t levels = solution.levels().size();
+  solution.refine();
+  ASSERT_EQ(solution.levels().size(), levels + 1);
+  const RefinementLevel& last = solution.levels().back();
+  EXPECT_FALSE(last.iterations);
+  EXPECT_GE(last.solved.substeps, 48);
+  EXPECT_EQ(last.solved.by_iteration, 0);
+  EXPECT_LE(*last.apart_h, 1e-7);
+  EXPECT_FALSE(solution.nothing_removed()) << "no cut, so this shows less than it should";
+  solution.refine();
+  EXPECT_EQ(solution.levels().size(), levels + 1) << "there is none after it";
+}
+
+// Where iterations do not lead far enough: the answer is had all the same, and what they lack shows.
+TEST(ReferenceSolution, IsSolvedWhereIterationsAreTooFew) {
+  const Scene scene = scene_of(R"({"version": 1, "name": "stiff",
+    "body": {"shape": {"kind": "box", "size": [0.16, 0.02, 0.02]}, "spacing": 0.01}, "clusters": {"side": 2},
+    "frame": {"length": 0.016, "count": 4}, "step": {"substeps": 1, "stiffness": 1e7, "gravity": [0, 0, -9.81]},
+    "grips": [{"low": [0, 0, 0], "high": [0.1, 1, 1]}]})");
+  const ReferenceSolution solution(ReferenceKind::substeps, scene, "test", {}, 1e-6);
+  EXPECT_FALSE(solution.levels().back().iterations);
+  EXPECT_EQ(solution.levels()[solution.levels().size() - 2].iterations, ReferenceSolution::kMostIterations);
+  EXPECT_EQ(solution.levels().back().solved.unsolved, 0);
+  EXPECT_GT(*solution.levels().back().apart_h, 1e-6);
 }
 
 // A blade so fast that its frames are divided: those of the scene are counted all the same, and each part runs once.

@@ -538,6 +538,30 @@ TEST(GpuSkin, FollowsATranslationExactlyAndAnOwnerWithoutAClusterAlone) {
   EXPECT_EQ(alone, 3);
 }
 
+// A blade may have pushed a particle far from where its clusters are; its vertices go where these say, and no number as
+// large as its own displacement may enter them.
+TEST(GpuSkin, VerticesAreNoLessExactWhereTheirOwnerIsFarAway) {
+  Body body = block_body(6, 6, 6);
+  State state = state_of(body, {range(0, 216), range(0, 216), range(0, 216)});
+  Bodies bodies = make_bodies({setup_of(std::move(body))}, {state});
+  const DeviceView w = bodies.staging.view();
+  const Float3 pushed = {4096.3f, -4096.7f, 4096.9f};
+  w.displacement[215] = with_w(pushed, w.displacement[215].w);
+  HostLauncher launcher;
+  run_skin(launcher, bodies);
+  int own = 0;
+  for (int v = 0; v < w.counters->vertices_used; ++v) {
+    if (w.vertex_owner[v] != 215) continue;
+    ++own;
+    for (int axis = 0; axis < 3; ++axis) {
+      // All clusters are the body, and turned by nothing; their members are summed from the first one's place on.
+      const double mean = static_cast<double>(pushed[axis]) / 216;
+      EXPECT_NEAR(xyz(w.vertex_position[v])[axis], mean, 8 * 0x1p-24 * std::abs(mean));
+    }
+  }
+  EXPECT_EQ(own, 3);
+}
+
 // Places of the centres that the step has left must not be taken for the final ones.
 TEST(GpuSkin, DoesNotTrustTheCentresOfTheStep) {
   Body body = block_body(3, 3, 3);

@@ -41,8 +41,8 @@ Moving twisting_block(int32_t iterations) {
 TEST(SolverError, IsThatOfThePlainIterationAsItIsWrittenDownElsewhere) {
   for (const int32_t iterations : {1, 4, 600}) {
     const Moving scene = twisting_block(iterations);
-    const auto judged = reference::make_backend(), exact = reference::make_backend();
-    const SolverError error = solver_error(*judged, *exact, scene.setup, scene.state).value();
+    const auto judged = reference::make_backend();
+    const SolverError error = solver_error(*judged, scene.setup, scene.state).value();
     const ReferenceSolution answer = reference_solution(scene.setup, scene.state);
     const PlainLimit plain = plain_limit(scene.setup, scene.state, 0, iterations);
     double greatest = 0;
@@ -59,39 +59,26 @@ TEST(SolverError, IsThatOfThePlainIterationAsItIsWrittenDownElsewhere) {
 
 TEST(SolverError, IsTheSameBesideContactsThatAreNeverTouched) {
   Moving scene = twisting_block(4);
-  const auto judged = reference::make_backend(), exact = reference::make_backend();
-  const SolverError without = solver_error(*judged, *exact, scene.setup, scene.state).value();
+  const auto judged = reference::make_backend();
+  const SolverError without = solver_error(*judged, scene.setup, scene.state).value();
   scene.setup.walls = {{.axis = 2, .side = +1, .offset = -1, .friction = 0.5}};  // far away
-  const SolverError beside = solver_error(*judged, *exact, scene.setup, scene.state).value();
+  const SolverError beside = solver_error(*judged, scene.setup, scene.state).value();
   EXPECT_EQ(beside.solved_by, SolvedBy::rest);
   EXPECT_FALSE(beside.energy);
   EXPECT_TRUE(beside.converged);
   EXPECT_NEAR(beside.position.max, without.position.max, 1e-11);
   EXPECT_NEAR(beside.position.rms(), without.position.rms(), 1e-11);
   scene.setup.step.solver = Solver::published;
-  EXPECT_FALSE(solver_error(*judged, *exact, scene.setup, scene.state)) << "stiffer with every iteration";
+  EXPECT_FALSE(solver_error(*judged, scene.setup, scene.state)) << "stiffer with every iteration";
 }
 
-class NeverRun : public Backend {
- public:
-  std::string name() const override { return "never run"; }
-  bool can_run(Span span) const override { return reference_->can_run(span); }
-  void load(std::vector<cutproof::Setup>, std::vector<State>) override { ADD_FAILURE(); }
-  void run(Span) override { ADD_FAILURE(); }
-  std::vector<State> snapshot() const override { return {}; }
-  SpanReport report() const override { return {}; }
-  const std::unique_ptr<Backend> reference_ = reference::make_backend();
-};
-
-// Under a blade, on a floor: nothing of the figure is the reference's, which stands by as `exact` and is never run.
 TEST(SolverError, UnderABladeIsTheDistanceToAnAnswerOfItsOwn) {
   for (const double friction : {0.0, 0.3}) {
     testing::Scene scene = testing::pressed_block(1e5, friction);
     for (const int32_t iterations : {4, 1500}) {
       scene.setup.step.iterations = iterations;
-      NeverRun exact;
       const auto judged = reference::make_backend();
-      const SolverError error = solver_error(*judged, exact, scene.setup, scene.state).value();
+      const SolverError error = solver_error(*judged, scene.setup, scene.state).value();
       EXPECT_EQ(error.solved_by, friction == 0 ? SolvedBy::minimum : SolvedBy::rest);
       EXPECT_TRUE(error.converged);
       EXPECT_FALSE(error.elsewhere);
