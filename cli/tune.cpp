@@ -120,6 +120,41 @@ void print_trials(const json& trials) {
                                2));
 }
 
+// The cheapest for each tolerance, and what it costs beside the scene as given.
+void print_front(const json& document) {
+  const json& trials = document.at("trials");
+  json rows = json::array();
+  for (const json& point : document.at("front")) {
+    if (point.at("trial").is_null()) {
+      rows.push_back({{"tolerance_h", point.at("tolerance_h")}, {"what", "nothing that was tried"}});
+      continue;
+    }
+    json row = trials.at(point.at("trial").get<std::size_t>());
+    row["tolerance_h"] = point.at("tolerance_h");
+    row["what"] = io::filled("{substeps} × {iterations}, {acceleration}", row);
+    if (row.at("differences") != "") row["what"] = io::filled("{what}, {differences}", row);
+    const double given = trials.front().at("seconds_per_frame").at("median").get<double>();
+    row["of_given"] = row.at("seconds_per_frame").at("median").get<double>() / given;
+    rows.push_back(std::move(row));
+  }
+  const auto times = [](const json& row) {
+    if (!row.contains("seconds_per_frame")) return std::string("-");
+    return io::filled("{1e3*median:.3f} ({1e3*min:.3f} to {1e3*max:.3f})", row.at("seconds_per_frame"));
+  };
+  const auto figure = [](const char* name, const char* format) {
+    return [=](const json& row) { return row.contains(name) ? io::filled(format, row) : std::string("-"); };
+  };
+  say("\nthe cheapest that was tried, by tolerance\n");
+  say_as_it_is(table_of(rows,
+                        {{"within h", "{tolerance_h:g}"},
+                         {"configuration", "{what}"},
+                         {"ms a frame", times},
+                         {"of given", figure("of_given", "{of_given:.2f}")},
+                         {"RMS h", figure("rms_h", "{rms_h:.2g}")},
+                         {"max h", figure("max_h", "{max_h:.2g}")}},
+                        2));
+}
+
 void print_not_taken(const json& document) {
   const json& left = document.at("left").back();
   say_filled("{substeps} × {iterations}, acceleration {acceleration}, is not taken",
@@ -167,7 +202,8 @@ void print(const TuneOptions& options, TuneStep step, const json& document, cons
     case TuneStep::trial:
       return;
     case TuneStep::searched:
-      return print_trials(document.at("trials"));
+      print_trials(document.at("trials"));
+      return print_front(document);
     case TuneStep::not_taken:
       return print_not_taken(document);
     case TuneStep::found:

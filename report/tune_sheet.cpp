@@ -149,6 +149,33 @@ Sheet tune_sheet(const Field& document) {
     if (answer != 0) add(trials.at(answer), "the answer");
     sheet.pieces.emplace_back(std::move(frames));
   }
+  if (const Field front = document["front"]; front.is_there() && front.length() > 0) {
+    Grid best;
+    best.title = "The cheapest, by tolerance";
+    best.words = "Of all that were carried to their end; what is not known of the reference solution counts.";
+    best.columns = {{"within [h]", true}, {"configuration"}, {"ms a frame", true},  {"least to most", true},
+                    {"of given", true},   {"RMS [h]", true}, {"greatest [h]", true}};
+    const std::optional<double> of_given = seconds_of(trials.at(0)["seconds_per_frame"]);
+    front.each([&](const Field& point) {
+      const std::string within = fmt::format("{:g}", point["tolerance_h"].number());
+      const Field which = point["trial"];
+      if (which.is_nothing()) {
+        best.rows.push_back({{within, "nothing that was tried", "", "", "", "", ""}, ""});
+        return;
+      }
+      const auto k = static_cast<std::size_t>(which.count());
+      if (k >= count) which.refuse("there is no such trial");
+      const Field trial = trials.at(k), times = trial["seconds_per_frame"];
+      const std::optional<double> seconds = seconds_of(times);
+      best.rows.push_back(
+          {{within, configuration(trial), figure_text(seconds, 1e3),
+            figure_text(seconds_of(times, "min"), 1e3) + " to " + figure_text(seconds_of(times, "max"), 1e3),
+            seconds && of_given ? figure_text(*seconds / *of_given) : "–", figure_text(trial["rms_h"].number_or_null()),
+            figure_text(trial["max_h"].number_or_null())},
+           k == answer ? "good" : ""});
+    });
+    sheet.pieces.emplace_back(std::move(best));
+  }
   sheet.pieces.emplace_back(std::move(grid));
   return sheet;
 }

@@ -1,6 +1,7 @@
 #include "tuning/search.h"
 
 #include <algorithm>
+#include <functional>
 #include <utility>
 
 namespace cutproof::tuning {
@@ -174,6 +175,26 @@ std::vector<std::size_t> by_cost(const std::vector<Trial>& trials) {
     left.erase(next);
   }
   return order;
+}
+
+std::vector<FrontPoint> front(const std::vector<Trial>& trials, double asked, bool all, double known) {
+  std::vector<double> tolerances = {asked};
+  for (const double tolerance : kFrontTolerances) {
+    if (tolerance != asked && (all || tolerance < asked)) tolerances.push_back(tolerance);
+  }
+  std::sort(tolerances.begin(), tolerances.end(), std::greater());
+  std::vector<FrontPoint> points;
+  for (const double tolerance : tolerances) {
+    FrontPoint point = {tolerance, {}};
+    for (std::size_t k = 0; k < trials.size(); ++k) {
+      const Trial& trial = trials[k];
+      const bool is_comparable = trial.outcome == Outcome::within || trial.outcome == Outcome::over;
+      if (!is_comparable || trial.frame.count == 0 || !(trial.greatest_rms_h + known <= tolerance)) continue;
+      if (!point.trial || trial.frame.median < trials[*point.trial].frame.median) point.trial = k;
+    }
+    points.push_back(point);
+  }
+  return points;
 }
 
 }  // namespace cutproof::tuning

@@ -1,6 +1,7 @@
 // Which configurations of a scene `cutproof tune` tries, and in which order. Knows nothing of backends: what a
 // configuration costs and how far it is from the reference solution is asked of `Measure`.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -43,5 +44,15 @@ std::vector<Trial> search(const Configuration& given, const SearchSpace& space, 
 // Indices of those within, the cheapest first; of those that cost the same but for noise (kCheaper), the one that was
 // tried first, which has less changed.
 std::vector<std::size_t> by_cost(const std::vector<Trial>& trials);
+
+// Speed against error, of trials that were carried to their end: the cheapest within each tolerance.
+struct FrontPoint {
+  double tolerance = 0;              // [h]
+  std::optional<std::size_t> trial;  // none: nothing that was tried is within it
+};
+inline constexpr std::array<double, 4> kFrontTolerances = {0.5, 0.2, 0.05, 0.01};  // [h]
+// For `asked` and those of kFrontTolerances, the greatest first; without `all` only up to `asked`, because what goes
+// beyond that is given up. `known`: by how much the reference solution may be off [h].
+std::vector<FrontPoint> front(const std::vector<Trial>& trials, double asked, bool all, double known);
 
 }  // namespace cutproof::tuning

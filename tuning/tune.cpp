@@ -161,6 +161,7 @@ bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
                    {"full", options.full},
                    {"without_skin", options.without_skin},
                    {"trials", json::array()},
+                   {"front", json::array()},
                    {"left", json::array()},
                    {"found", nullptr}});
   const auto show = [&](TuneStep step) { progress(step, document, measuring.given.scene, measuring.built); };
@@ -188,6 +189,11 @@ bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
                                                show(TuneStep::trial);
                                                return trial;
                                              });
+    document["front"] = json::array();
+    for (const FrontPoint& point : front(trials, options.tolerance, options.full, reference.known_to_h())) {
+      document["front"].push_back({{"tolerance_h", point.tolerance}, {"trial", nullptr}});
+      if (point.trial) document["front"].back()["trial"] = *point.trial;
+    }
     show(TuneStep::searched);
     if (by_cost(trials).empty()) return conclude(TuneStep::none_within);
 

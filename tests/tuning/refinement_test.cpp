@@ -160,15 +160,63 @@ TEST(ReferenceSolution, OfItsOwnSubstepsIsWhatASparseFactorisationFinds) {
   EXPECT_GT(moved, 0.05) << "it hangs from a grip: it has to move, else nothing is compared";
 }
 
-// A press on a floor with friction, and its cut: after levels of the reference one in which every substep is solved,
-// and meets them. It is the last, and none of it is the reference's step.
-TEST(ReferenceSolution, OfItsOwnSubstepsEndsWithEachOfThemSolved) {
-  const Scene scene = scene_of(R"({"version": 4, "name": "pressed",
+// A press on a floor with friction, and its cut.
+Scene pressed() {
+  return scene_of(R"({"version": 4, "name": "pressed",
     "body": {"shape": {"kind": "box", "size": [0.06, 0.03, 0.03]}, "spacing": 0.01}, "clusters": {"side": 2},
     "frame": {"length": 0.016, "count": 24}, "step": {"substeps": 2, "gravity": [0, 0, -9.81], "damping": 5},
     "ground": {"friction": 0.4}, "detect": {"criterion": "distance"},
     "blade": {"length": 0.08, "depth": 0.06, "speed": 0.15, "friction": 0.2, "strokes": [
       {"points": [[0.5, 0.5, 1.3], [0.5, 0.5, 0.2]], "along": [0, 1, 0]}]}})");
+}
+
+// All of a state, after every frame: positions, velocities, rotations, what contacts have done, and who was removed.
+TEST(SolvedSteps, AreTheReferencesWithIterationsThatAreEnough) {
+  Scene scene = pressed();
+  scene.step.iterations = 600;
+  scene.step.acceleration = Acceleration::none;
+  const PreparedScene prepared(scene, "test", {});
+  const cutproof::Setup& setup = prepared.setup();
+  const double h = setup.body.grid.spacing, dt = setup.substep_length.front();
+  double mass = 0;
+  for (const double m : setup.body.mass) mass += m;
+  const auto iterated = reference::make_backend();
+  SolvedSteps solved;
+  iterated->load({setup}, {prepared.start()});
+  solved.load({setup}, {prepared.start()});
+  double impulses = 0;
+  int64_t removed = 0;
+  for (int64_t frame = 0; frame < setup.frame_count(); ++frame) {
+    iterated->run(Span{});
+    solved.run(Span{});
+    const State a = iterated->snapshot().front(), b = solved.snapshot().front();
+    ASSERT_EQ(a.frame, b.frame);
+    ASSERT_EQ(a.removed, b.removed) << frame;
+    ASSERT_EQ(a.alive, b.alive) << frame;
+    ASSERT_EQ(a.clusters.members, b.clusters.members) << frame;
+    for (std::size_t i = 0; i < a.x.size(); ++i) {
+      ASSERT_LE(norm(a.x[i] - b.x[i]), 1e-8 * h) << frame;
+      ASSERT_LE(norm(a.v[i] - b.v[i]) * dt, 1e-8 * h) << frame;
+    }
+    for (std::size_t c = 0; c < a.clusters.rotation.size(); ++c) {
+      for (std::size_t k = 0; k < 9; ++k) {
+        ASSERT_NEAR(a.clusters.rotation[c].m[k], b.clusters.rotation[c].m[k], 1e-8) << frame;
+      }
+    }
+    ASSERT_LE(norm(a.impulse - b.impulse) * dt / mass, 1e-8 * h) << frame;
+    impulses = std::max(impulses, norm(a.impulse) * dt / mass / h);
+    removed += static_cast<int64_t>(a.removed.size());
+  }
+  EXPECT_GT(impulses, 1e-3);
+  EXPECT_GT(removed, 0);
+  EXPECT_EQ(solved.count().by_iteration, 0);
+  EXPECT_EQ(solved.count().substeps, setup.frame_count() * setup.step.substeps);
+}
+
+// After levels of the reference comes one in which every substep is solved, and meets them. It is the last, and none of
+// it is the reference's step.
+TEST(ReferenceSolution, OfItsOwnSubstepsEndsWithEachOfThemSolved) {
+  const Scene scene = pressed();
   ReferenceSolution solution(ReferenceKind::substeps, scene, "test", {}, 1e-7);
   ASSERT_TRUE(solution.levels().back().iterations);
   const std::size_t levels = solution.levels().size();

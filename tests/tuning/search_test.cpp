@@ -103,6 +103,32 @@ TEST(ByCost, TakesTheFirstOfThoseThatCostTheSameButForNoise) {
   EXPECT_TRUE(by_cost({trial(1, Outcome::more_expensive)}).empty());
 }
 
+TEST(Front, HasTheCheapestOfThoseThatWereCarriedThroughForEachTolerance) {
+  const auto trial = [](double error, double seconds, Outcome outcome) {
+    Trial made;
+    made.outcome = outcome;
+    made.greatest_rms_h = error;
+    if (seconds > 0) made.frame = {seconds, seconds, seconds, 1};
+    return made;
+  };
+  const std::vector<Trial> trials = {trial(0.004, 9, Outcome::within),       trial(0.04, 5, Outcome::within),
+                                     trial(0.3, 2, Outcome::over),           trial(0.1, 1, Outcome::topology),
+                                     trial(0.1, 0, Outcome::more_expensive), trial(0.15, 3, Outcome::over),
+                                     trial(0.0495, 4, Outcome::within)};
+  const auto told = [&](double asked, bool all, double known) {
+    std::vector<std::pair<double, int>> result;
+    for (const FrontPoint& point : front(trials, asked, all, known)) {
+      result.emplace_back(point.tolerance, point.trial ? static_cast<int>(*point.trial) : -1);
+    }
+    return result;
+  };
+  using Told = std::vector<std::pair<double, int>>;
+  EXPECT_EQ(told(0.05, true, 0), (Told{{0.5, 2}, {0.2, 5}, {0.05, 6}, {0.01, 0}}));
+  EXPECT_EQ(told(0.05, true, 0.001), (Told{{0.5, 2}, {0.2, 5}, {0.05, 1}, {0.01, 0}})) << "what is not known counts";
+  EXPECT_EQ(told(0.05, true, 0.008), (Told{{0.5, 2}, {0.2, 5}, {0.05, 1}, {0.01, -1}}));
+  EXPECT_EQ(told(0.1, false, 0), (Told{{0.1, 6}, {0.05, 6}, {0.01, 0}})) << "beyond what was asked runs are given up";
+}
+
 TEST(Search, TriesTheGivenFirstAndNothingTwice) {
   const std::vector<Trial> trials = search(given(), space_of_steps(), Model{});
   EXPECT_EQ(trials.front().configuration, given());
