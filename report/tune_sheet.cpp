@@ -117,6 +117,17 @@ Sheet tune_sheet(const Field& document) {
     sheet.notes.push_back(
         kind == "limit" ? "The reference solution is the limit of short time steps."
                         : "The reference solution is the scene's own substeps, each solved until it is converged.");
+    if (const Field levels = reference["levels"]; levels.is_there() && levels.length() > 0) {
+      if (const Field solved = levels.at(levels.length() - 1)["solved"]; solved.is_there()) {
+        const int64_t iterated = solved["by_iteration"].count(), unsolved = solved["unsolved"].count();
+        sheet.notes.push_back(fmt::format(
+            "In the end each of its {} substeps was solved without the reference's step{}.",
+            io::grouped(solved["substeps"].count()),
+            iterated == 0 ? ""
+                          : fmt::format(", {} of them by iterations of their own, and {} of these not to their end",
+                                        io::grouped(iterated), io::grouped(unsolved))));
+      }
+    }
     if (const std::string known = reference["known_text"].text_or(""); !known.empty()) {
       sheet.notes.push_back("It is " + known + ".");
     } else if (!reference["known_h"].is_there()) {
