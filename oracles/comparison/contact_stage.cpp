@@ -33,7 +33,9 @@ class ContactStage::Linear {
     auto linear = std::make_unique<Linear>(problem);
     return linear->factorise(free, x) ? std::move(linear) : nullptr;
   }
-  explicit Linear(const SubstepProblem& problem) : problem_(problem) {}
+  explicit Linear(const SubstepProblem& problem) : problem_(problem) {
+    cholmod_.get()->final_ll = 1;  // L D Lᵀ, which small systems are given else, exists where D is negative too
+  }
 
   // Whether it is the derivative itself, and positive definite.
   bool is_exact() const { return is_exact_; }

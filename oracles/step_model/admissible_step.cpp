@@ -45,6 +45,8 @@ constexpr int kMostOutcomes = 1024;
 constexpr int64_t kMostEvaluations = 20'000'000;
 // Particles whose own ways are looked through, and how many ways of each.
 constexpr std::size_t kFollowed = 4, kMostWays = 128;
+// So many particles at most are few enough to look for the ways that they have gone together, and so many ways of each.
+constexpr std::size_t kFew = 12, kWaysOfFew = 16;
 // How often a fit goes through all ties; it ends when none brings it nearer.
 constexpr int kFitPasses = 32;
 
@@ -564,7 +566,7 @@ class Search {
       return is_nearer(b, a) || (!is_nearer(a, b) && a.settled.size() > b.settled.size());
     };
     std::vector<Branch> open = {root};
-    std::set<Settled> seen = {root.settled}, seen_taken = {taken_by(root)};
+    std::set<Settled> seen = {root.settled}, seen_taken = {taken_by(root.outcome)};
     int tried = 0;
     int64_t runs_left = int64_t{kDisturbedRuns + 1} * most_outcomes_;
     const auto keep = [&](Branch next) {
@@ -578,7 +580,7 @@ class Search {
       --runs_left;
       Branch next = start(settled);
       // What is settled of a decision that never comes up, or as the numbers say, leads where another way has led.
-      if (!seen_taken.insert(taken_by(next)).second) return std::nullopt;
+      if (!seen_taken.insert(taken_by(next.outcome)).second) return std::nullopt;
       ++tried;
       next.bounds = root.bounds;  // until it is worth a closer look
       compare(next);
@@ -600,7 +602,11 @@ class Search {
     const auto try_fitted = [&](Branch branch) {
       for (double before = kInfinite; !best.holds() && branch.left < before;) {
         before = branch.left;
-        std::optional<Branch> next = try_out(fitted(branch));
+        std::optional<Branch> next;
+        if (const std::optional<Settled> together = ways_together(branch)) next = try_out(*together);
+        if (!best.holds() && !(next && next->left < before)) {
+          if (std::optional<Branch> other = try_out(fitted(branch))) next = std::move(other);
+        }
         if (!next) return;
         branch = std::move(*next);
       }
@@ -616,7 +622,7 @@ class Search {
       const std::optional<Branch> next = try_out(settled);
       if (next && !best.holds()) try_fitted(*next);
     }
-    if (other_root && !best.holds() && seen_taken.insert(taken_by(*other_root)).second) keep(*other_root);
+    if (other_root && !best.holds() && seen_taken.insert(taken_by(other_root->outcome)).second) keep(*other_root);
     if (other_root && !best.holds()) try_fitted(*other_root);
     if (!best.holds()) try_fitted(Branch(best));
     for (bool any = true; any && !best.holds();) {
@@ -638,9 +644,9 @@ class Search {
   }
 
   // The decisions of an outcome that were near, as it has taken them: all that tells it from others.
-  static Settled taken_by(const Branch& branch) {
+  static Settled taken_by(const StepOutcome& outcome) {
     Settled taken;
-    for (const NearDecision& d : branch.outcome.near) taken[d.key] = d.taken;
+    for (const NearDecision& d : outcome.near) taken[d.key] = d.taken;
     return taken;
   }
 
@@ -750,15 +756,15 @@ class Search {
   }
 
   // One particle alone may take several decisions on its way, each of which only comes up because of those before, and
-  // only all of them together lead where it is. So the ways of one are looked through, with few decisions taken
-  // otherwise first: of that which is farthest from where it should be, then of the next. What brings the whole
-  // nearest, if anything brings it nearer.
-  std::optional<Settled> way_of_farthest(const Branch& branch) const {
+  // only all of them together lead where it is. Calls `visit` with what is settled, and what becomes of it, for each
+  // way of particle i that is another one: all with one decision taken otherwise, all with two, … At most `most` runs.
+  template <class Visit>
+  void for_ways_of(int32_t i, const Branch& branch, std::size_t most, const Visit& visit) const {
     struct Way {
       Settled settled;
       std::vector<NearDecision> ties;  // that come after the last one taken otherwise
     };
-    const auto ties_of = [&](int32_t i, const StepOutcome& outcome, const DecisionKey* last) {
+    const auto ties_of = [&](const StepOutcome& outcome, const DecisionKey* last) {
       std::map<std::pair<DecisionKey, int>, NearDecision> ties;
       for (const NearDecision& d : outcome.near) {
         if (d.key.particle != i || d.key.kind == DecisionKind::kept || (last != nullptr && d.key <= *last)) continue;
@@ -768,6 +774,26 @@ class Search {
       for (const auto& [key, d] : ties) listed.push_back(d);
       return listed;
     };
+    std::set<Settled> seen = {branch.settled}, seen_taken = {taken_by(branch.outcome)};
+    std::vector<Way> ways = {{branch.settled, ties_of(branch.outcome, nullptr)}};
+    for (std::size_t k = 0; k < ways.size(); ++k) {
+      const Way way = ways[k];
+      for (const NearDecision& tie : way.ties) {
+        for (const bool again : {true, false}) {
+          const Settled settled = with_other(way.settled, tie, again);
+          if (seen.size() > most || !seen.insert(settled).second) continue;
+          const StepOutcome o = model_.run({settled, 0, kNear * h_, branch.given});
+          if (!seen_taken.insert(taken_by(o)).second) continue;
+          visit(settled, o);
+          ways.push_back({settled, ties_of(o, &tie.key)});
+        }
+      }
+    }
+  }
+
+  // The ways of that particle are looked through which is farthest from where it should be, then of the next: what
+  // brings the whole nearest, if anything brings it nearer.
+  std::optional<Settled> way_of_farthest(const Branch& branch) const {
     std::map<int32_t, double> off;  // of those that have decisions to take
     for (const NearDecision& d : branch.outcome.near) {
       const std::size_t i = at(d.key.particle);
@@ -782,27 +808,104 @@ class Search {
     double least = branch.left;
     std::optional<Settled> best;
     for (const int32_t i : farthest) {
-      std::set<Settled> seen = {branch.settled};
-      std::vector<Way> ways = {{branch.settled, ties_of(i, branch.outcome, nullptr)}};
-      // In order: all with one decision taken otherwise, all with two, ...
-      for (std::size_t k = 0; k < ways.size() && seen.size() < kMostWays; ++k) {
-        const Way way = ways[k];
-        for (const NearDecision& tie : way.ties) {
-          for (const bool again : {true, false}) {
-            const Settled settled = with_other(way.settled, tie, again);
-            if (seen.size() >= kMostWays || !seen.insert(settled).second) continue;
-            const StepOutcome o = model_.run({settled, 0, kNear * h_, branch.given});
-            if (const double square = square_left(o); square < least) {
-              least = square;
-              best = settled;
-            }
-            ways.push_back({settled, ties_of(i, o, &tie.key)});
-          }
+      for_ways_of(i, branch, kMostWays, [&](const Settled& settled, const StepOutcome& o) {
+        if (const double square = square_left(o); square < least) {
+          least = square;
+          best = settled;
         }
-      }
+      });
       if (best) return best;
     }
     return best;
+  }
+
+  // Of few particles, which may each go one of several ways, the ways that together bring an outcome nearest to what
+  // the backend states, in the sense of least squares, if what they do alone adds up. Two are changed at a time: none
+  // of two that have both gone round an end may come nearer without the other. Nothing: there are many, or none is
+  // nearer.
+  std::optional<Settled> ways_together(const Branch& branch) const {
+    struct Way {
+      std::size_t of = 0;  // of the particles, counted
+      Settled settled;
+      std::vector<std::pair<std::size_t, Vec3>> does;
+    };
+    std::set<int32_t> particles;
+    for (const NearDecision& tie : branch.ties) {
+      if (tie.key.kind != DecisionKind::kept) particles.insert(tie.key.particle);
+    }
+    if (particles.size() < 2 || particles.size() > kFew) return std::nullopt;
+    std::vector<Way> ways;
+    std::size_t counted = 0;
+    for (const int32_t i : particles) {
+      for_ways_of(i, branch, kWaysOfFew, [&](const Settled& settled, const StepOutcome& o) {
+        ways.push_back({counted, settled, off_outcome(o.x, o.v, branch.outcome)});
+      });
+      ++counted;
+    }
+    // |left − Σ does|² less |left|², for the ways that are taken: gains once, products twice.
+    const std::vector<Vec3> left = left_by(branch.outcome);
+    std::vector<double> gain(ways.size(), 0), product(ways.size() * ways.size());
+    for (std::size_t a = 0; a < ways.size(); ++a) {
+      for (const auto& [k, way] : ways[a].does) gain[a] += dot(left[k], way);
+      for (std::size_t b = a; b < ways.size(); ++b) {
+        double sum = 0;
+        auto next = ways[b].does.begin();
+        for (const auto& [k, way] : ways[a].does) {
+          while (next != ways[b].does.end() && next->first < k) ++next;
+          if (next != ways[b].does.end() && next->first == k) sum += dot(way, next->second);
+        }
+        product[a * ways.size() + b] = product[b * ways.size() + a] = sum;
+      }
+    }
+    constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+    using Taken = std::vector<std::size_t>;  // by particle
+    const auto square = [&](const Taken& taken) {
+      double sum = 0;
+      for (const std::size_t a : taken) {
+        if (a == kNone) continue;
+        sum -= 2 * gain[a];
+        for (const std::size_t b : taken) sum += b == kNone ? 0 : product[a * ways.size() + b];
+      }
+      return sum;
+    };
+    const auto with_way = [&](Taken taken, std::size_t particle, std::size_t way) {
+      taken[particle] = way;
+      return taken;
+    };
+    std::vector<std::pair<std::size_t, std::size_t>> changes;  // particle, way
+    for (std::size_t p = 0; p < counted; ++p) changes.emplace_back(p, kNone);
+    for (std::size_t w = 0; w < ways.size(); ++w) changes.emplace_back(ways[w].of, w);
+    Taken best(counted, kNone);
+    for (double before = kInfinite, least = 0; least < before;) {
+      before = least;
+      const Taken from = best;
+      for (std::size_t a = 0; a < changes.size(); ++a) {
+        for (std::size_t b = a; b < changes.size(); ++b) {
+          const Taken next =
+              with_way(with_way(from, changes[a].first, changes[a].second), changes[b].first, changes[b].second);
+          if (const double now = square(next); now < least) {
+            least = now;
+            best = next;
+          }
+        }
+      }
+    }
+    Settled settled = branch.settled;
+    for (const std::size_t way : best) {
+      if (way != kNone) settled = changed(std::move(settled), branch.settled, ways[way].settled);
+    }
+    return settled == branch.settled ? std::nullopt : std::optional(settled);
+  }
+  // `settled`, with what `to` has changed in `from`.
+  static Settled changed(Settled settled, const Settled& from, const Settled& to) {
+    for (const auto& [key, outcome] : from) {
+      if (!to.contains(key)) settled.erase(key);
+    }
+    for (const auto& [key, outcome] : to) {
+      const auto before = from.find(key);
+      if (before == from.end() || before->second != outcome) settled[key] = outcome;
+    }
+    return settled;
   }
 
   // Those that are open. What was settled is open again where that has not helped.

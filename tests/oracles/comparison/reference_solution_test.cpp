@@ -9,6 +9,8 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "oracles/comparison/contact_stage.h"
+#include "oracles/comparison/substep_problem.h"
 #include "oracles/oracles.h"
 #include "reference_cpu/reference.h"
 #include "tests/oracles/comparison/twisted_block.h"
@@ -291,6 +293,31 @@ TEST(ReferenceSolution, NoNeighbourBesideABladeHasLessEnergy) {
       if (away < rho) x[i] = nearest + (rho / away) * (x[i] - nearest);
     }
     EXPECT_GT(substep_energy(scene.setup, scene.state, x), lowest) << round;
+  }
+}
+
+// By hand: one particle that balances on the edge of a blade. Where it is drawn to, x~, is below the edge: then any
+// step aside lets it come nearer, and it rests on a saddle; or above it, where it lies in a minimum.
+TEST(ReferenceSolution, TellsAMinimumFromASaddle) {
+  for (const bool below : {true, false}) {
+    Scene scene{setup_of(block_body(1, 1, 1)), {}};
+    scene.setup.step.substeps = 1;
+    scene.setup.step.stiffness = 1e5;
+    scene.state = state_of(scene.setup.body, {{0}});
+    const double rho = 1.001 * 1.5 / 2, dt = scene.setup.substep_length[0];
+    const Vec3 start = scene.state.x[0], edge = start - Vec3{0, 0, rho};
+    scene.setup.has_blade = true;
+    scene.setup.blade = {4, 4, 0, 0};
+    const BladePose pose = {edge, {1, 0, 0}, {0, 0, -1}};
+    scene.setup.blade_moves = {{pose, pose, true, 0}};
+    scene.state.v[0] = Vec3{0, 0, -(rho + (below ? 0.5 : -0.5)) / dt};
+    const SubstepProblem problem(scene.setup, scene.state);
+    ContactStage contacts(problem);
+    std::vector<Vec3> center = {start};
+    const ContactStage::Rest rest = contacts.rest(scene.state.clusters.rotation, center);
+    ASSERT_TRUE(rest.found);
+    EXPECT_LT(norm(rest.x[0] - start), 1e-12);
+    EXPECT_EQ(contacts.is_strict_minimum(rest), !below);
   }
 }
 
