@@ -82,6 +82,20 @@ class Searcher {
     }
   }
 
+  void follow_down(const Configuration& given, double error) {
+    for (const Acceleration acceleration : {Acceleration::none, Acceleration::chebyshev}) {
+      Configuration configuration = given;
+      configuration.scene.step.acceleration = acceleration;
+      for (const int32_t iterations : substeps_to_try(1, space_.most_iterations)) {
+        if (acceleration == Acceleration::chebyshev && iterations < 2) continue;  // the first is a plain one
+        configuration.scene.step.iterations = iterations;
+        const Trial& trial = trials_[attempt(configuration)];
+        if (trial.outcome == Outcome::refused || trial.outcome == Outcome::schedule) break;
+        if (trial.outcome != Outcome::topology && trial.greatest_rms_h <= error) break;
+      }
+    }
+  }
+
   bool vary() {
     if (!cheapest_) return false;
     bool kept = false;
@@ -138,6 +152,7 @@ class Searcher {
     attempt(given);
     search_steps(given);
     if (vary()) least_iterations(trials_[*cheapest_].configuration, 1, space_.most_iterations);
+    if (space_.followed_to) follow_down(given, *space_.followed_to);
     return std::move(trials_);
   }
 

@@ -23,6 +23,8 @@ struct SearchSpace {
   bool may_resize = true;              // false: the number of clusters is part of what the scene expects
   bool may_drop_skin = false;          // nobody looks at it
   bool nothing_removed = false;        // in the reference solution: a scene without a blade then needs no detection
+  // Of runs that are all carried to their end: the given substeps are followed down to this error, too [h].
+  std::optional<double> followed_to;
 };
 // 1, 2, 3, 4, 6, 8, 12, … up to `most`, and `given`.
 std::vector<int32_t> substeps_to_try(int32_t given, int32_t most);
@@ -35,6 +37,9 @@ std::vector<int32_t> substeps_to_try(int32_t given, int32_t most);
 // 2. From the cheapest of these: stages without which the scene's trajectory is the same, sizes of clusters, debris and
 //    rotation methods, one after the other; each is kept if it is within the tolerance and cheaper.
 // 3. If one was kept: the least number of iterations once more.
+// 4. With `followed_to`: the given substeps with 1, 2, 3, 4, 6, 8, … iterations of each acceleration, until the error
+// is
+//    no greater: the curve that front() is read from.
 // Nothing is tried twice.
 inline constexpr double kHelps = 0.05;
 // A configuration counts as cheaper than another if its median is by this much less: below it is the timer's noise.

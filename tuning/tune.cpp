@@ -70,6 +70,9 @@ SearchSpace space_of(const Measuring& measuring, const TuneOptions& options, con
     }
   }
   space.nothing_removed = reference.nothing_removed();
+  if (options.full) {
+    space.followed_to = std::max(kFrontTolerances.back() - reference.known_to_h(), kFrontTolerances.back() / 2);
+  }
   space.may_resize = !scene.expect.clusters.has_value();
   // A scene that counts the skin's shells looks at it.
   space.may_drop_skin = options.without_skin && !scene.expect.shells_at_end;

@@ -175,6 +175,25 @@ TEST(Search, GoesOnFromAGivenOneThatWasRunToItsEnd) {
   EXPECT_EQ(trials[order.front()].configuration.scene.step.iterations, 7);
 }
 
+// For a curve: the given substeps with ever more iterations, until they are near enough for any tolerance that is told.
+TEST(Search, FollowsTheGivenSubstepsDown) {
+  const Model model{0.3, 0.4};
+  SearchSpace space = space_of_steps();
+  const auto iterations_of = [&](Acceleration acceleration) {
+    std::vector<int32_t> found;
+    for (const Trial& trial : search(given(), space, model)) {
+      const StepParameters& step = trial.configuration.scene.step;
+      if (step.substeps == 8 && step.acceleration == acceleration) found.push_back(step.iterations);
+    }
+    std::sort(found.begin(), found.end());
+    return found;
+  };
+  EXPECT_LT(iterations_of(Acceleration::chebyshev).size(), 4u) << "what is enough for 0.3 h";
+  space.followed_to = 0.126;  // 1 / 8, and 0.001 of its solver
+  EXPECT_EQ(iterations_of(Acceleration::none), (std::vector<int32_t>{1, 2, 3, 4, 6, 8, 12, 16, 24}));
+  EXPECT_EQ(iterations_of(Acceleration::chebyshev), (std::vector<int32_t>{2, 3, 4, 6, 8}));
+}
+
 TEST(Search, LeavesANumberOfSubstepsThatCannotBe) {
   const Model model{2.0, 0.4};
   const auto measure = [&](const Configuration& configuration, std::optional<double> limit) {
