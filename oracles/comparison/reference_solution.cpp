@@ -1,4 +1,4 @@
-// The reference solution of one implicit substep (method.md §3), twice: by alternating a sparse Cholesky solve with the
+// The reference solution of one implicit substep (method.md §3), twice: by alternating a sparse solve with the
 // rotations, and by the plain iteration. Both work on the same problem (oracles/comparison/substep_problem.h) and share
 // nothing with a backend.
 #include "oracles/comparison/reference_solution.h"
@@ -27,7 +27,7 @@ constexpr int kMostActiveSets = 100;
 // Plain iterations from which contacts are solved for: a way round a blade is found by going there.
 constexpr int kFirstIterations = 32;
 
-// E alone says where the substep goes.
+// Nothing rests between walls that leave no room.
 void require_room(const SubstepProblem& problem) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (problem.low[axis] > problem.high[axis]) {
