@@ -92,6 +92,7 @@ json to_json(const Errors& errors, const harness::Lockstep* lockstep) {
                         {"max", json_number(error.position.max)},
                         {"rms", json_number(error.position.rms())},
                         {"energy", json_number(error.energy)},
+                        {"by_energy", error.solved_by == oracles::SolvedBy::minimum},
                         {"solved_by", name_of(error.solved_by)},
                         {"converged", error.converged},
                         {"elsewhere", elsewhere}});

@@ -120,6 +120,11 @@ void print_trials(const json& trials) {
                                2));
 }
 
+// Of seconds a frame: milliseconds, and between which they lay.
+std::string ms_and_range(const json& times) {
+  return io::filled("{1e3*median:.3f} ({1e3*min:.3f} to {1e3*max:.3f})", times);
+}
+
 // The cheapest for each tolerance, and what it costs beside the scene as given.
 void print_front(const json& document) {
   const json& trials = document.at("trials");
@@ -138,8 +143,7 @@ void print_front(const json& document) {
     rows.push_back(std::move(row));
   }
   const auto times = [](const json& row) {
-    if (!row.contains("seconds_per_frame")) return std::string("-");
-    return io::filled("{1e3*median:.3f} ({1e3*min:.3f} to {1e3*max:.3f})", row.at("seconds_per_frame"));
+    return row.contains("seconds_per_frame") ? ms_and_range(row.at("seconds_per_frame")) : std::string("-");
   };
   const auto figure = [](const char* name, const char* format) {
     return [=](const json& row) { return row.contains(name) ? io::filled(format, row) : std::string("-"); };
@@ -166,9 +170,6 @@ void print_found(const TuneOptions& options, const json& document) {
   const json &found = document.at("found"), &given = document.at("trials").front();
   const auto index = found.at("trial").get<std::size_t>();
   const json& trial = document.at("trials").at(index);
-  const auto ms_and_range = [](const json& times) {
-    return io::filled("{1e3*median:.3f} ({1e3*min:.3f} to {1e3*max:.3f})", times);
-  };
   const std::string tuned =
       io::filled("{1e3*median:.3f} ms a frame ({1e3*min:.3f} to {1e3*max:.3f})", found.at("seconds_per_frame"));
   if (index == 0) {

@@ -32,7 +32,8 @@ Errors::Errors(const ErrorsWanted& wanted, const Setup& setup, const State& star
 
 bool Errors::looked_at(int64_t frame) const {
   const int64_t frames = setup_.frame_count();
-  // Frame f is the last one of its part if the next frame belongs to another.
+  // Frame f is the last one of its part if the next frame belongs to another. (More parts than frames: the products
+  // might not fit.)
   return wanted_.frames >= frames || (frame + 1) * wanted_.frames / frames != frame * wanted_.frames / frames;
 }
 

@@ -38,8 +38,7 @@ std::vector<int32_t> substeps_to_try(int32_t given, int32_t most);
 //    rotation methods, one after the other; each is kept if it is within the tolerance and cheaper.
 // 3. If one was kept: the least number of iterations once more.
 // 4. With `followed_to`: the given substeps with 1, 2, 3, 4, 6, 8, … iterations of each acceleration, until the error
-// is
-//    no greater: the curve that front() is read from.
+//    is no greater: the curve that front() is read from.
 // Nothing is tried twice.
 inline constexpr double kHelps = 0.05;
 // A configuration counts as cheaper than another if its median is by this much less: below it is the timer's noise.

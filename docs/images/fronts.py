@@ -6,71 +6,54 @@ Usage: docs/images/fronts.py TUNE.json... -o F.svg
 import argparse
 import json
 import math
-from html import escape
 
+from log_axes import HEIGHT, LEFT, WIDTH, LogAxes
 from tune_curve import ACCELERATED, MARK, PLAIN, front_of, points_of
 
-COLUMNS, WIDTH, HEIGHT = 2, 420, 250
-LEFT, RIGHT, TOP, BOTTOM = 58, 14, 30, 42
+COLUMNS = 2
 TOLERANCES = (0.5, 0.2, 0.05, 0.01)
+X, Y = (-1.0, 0.7), (-3.3, 1.0)  # exponents of ten: the same in every panel
+LEGEND = 40
 
 
-def panel(document, x_range, y_range):
+def panel(document):
     """One scene: plain and accelerated configurations, what none beats in both, the scene as given."""
-    parts = []
-    px = lambda ms: LEFT + (math.log10(ms) - x_range[0]) / (x_range[1] - x_range[0]) * (WIDTH - LEFT - RIGHT)
-    py = lambda h: HEIGHT - BOTTOM - (math.log10(h) - y_range[0]) / (y_range[1] - y_range[0]) * (HEIGHT - TOP - BOTTOM)
-    def text(x, y, what, anchor="start", extra=""):
-        parts.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" {extra}>{escape(what)}</text>')
-    name = document["scene"].rsplit("/", 1)[-1].removesuffix(".json")
-    text(LEFT, 18, name, extra='font-size="14"')
-    for ms in (0.1, 0.2, 0.5, 1, 2, 5):
-        if not x_range[0] <= math.log10(ms) <= x_range[1]:
-            continue
-        parts.append(f'<line x1="{px(ms):.1f}" y1="{TOP}" x2="{px(ms):.1f}" y2="{HEIGHT - BOTTOM}" stroke="#e6e6e6"/>')
-        text(px(ms), HEIGHT - BOTTOM + 16, f"{ms:g}", "middle")
-    for h in (0.001, 0.01, 0.1, 1, 10):
-        if not y_range[0] <= math.log10(h) <= y_range[1]:
-            continue
-        parts.append(f'<line x1="{LEFT}" y1="{py(h):.1f}" x2="{WIDTH - RIGHT}" y2="{py(h):.1f}" stroke="#e6e6e6"/>')
-        text(LEFT - 6, py(h) + 4, f"{h:g}", "end")
-    for h in TOLERANCES:
-        parts.append(f'<line x1="{LEFT}" y1="{py(h):.1f}" x2="{WIDTH - RIGHT}" y2="{py(h):.1f}" '
-                     'stroke="#777" stroke-dasharray="2 4"/>')
-    inside = [p for p in points_of(document)
-              if x_range[0] <= math.log10(p[0]) <= x_range[1] and y_range[0] <= math.log10(p[1]) <= y_range[1]]
-    corners = " ".join(f"{px(x):.1f},{py(y):.1f}" for x, y, _ in front_of([p for p in inside if p[2]["outcome"] != "topology"]))
-    parts.append(f'<polyline points="{corners}" fill="none" stroke="#999" stroke-width="1.5"/>')
+    axes = LogAxes(X, Y, document["scene"].rsplit("/", 1)[-1].removesuffix(".json"), beside=30)
+    axes.ticks((0.1, 0.2, 0.5, 1, 2, 5), (0.001, 0.01, 0.1, 1, 10))
+    axes.labels("ms a frame", "greatest RMS error [h]")
+    for tolerance in TOLERANCES:
+        axes.tolerance(tolerance)
+    points = points_of(document)
+    inside = [p for p in points if X[0] <= math.log10(p[0]) <= X[1] and Y[0] <= math.log10(p[1]) <= Y[1]]
+    front = front_of([p for p in inside if p[2]["outcome"] != "topology"])
+    corners = " ".join(f"{axes.px(x):.1f},{axes.py(y):.1f}" for x, y, _ in front)
+    axes.parts.append(f'<polyline points="{corners}" fill="none" stroke="#999" stroke-width="2"/>')
     for x, y, trial in inside:
         colour = PLAIN if trial["acceleration"] == "none" else ACCELERATED
         fill = "white" if trial["outcome"] == "topology" else colour
-        parts.append(f'<circle cx="{px(x):.1f}" cy="{py(y):.1f}" r="3" fill="{fill}" stroke="{colour}"/>')
-    x, y, _ = points_of(document)[0]
-    parts.append(f'<circle cx="{px(x):.1f}" cy="{py(y):.1f}" r="7" fill="none" stroke="{MARK}" stroke-width="2"/>')
-    text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 8, "ms a frame", "middle")
-    middle = (TOP + HEIGHT - BOTTOM) / 2
-    text(14, middle, "greatest RMS error [h]", "middle", f'transform="rotate(-90 14 {middle:.0f})"')
-    return parts
+        axes.parts.append(f'<circle cx="{axes.px(x):.1f}" cy="{axes.py(y):.1f}" r="5" fill="{fill}" stroke="{colour}"/>')
+    x, y, _ = points[0]
+    axes.parts.append(f'<circle cx="{axes.px(x):.1f}" cy="{axes.py(y):.1f}" r="11" fill="none" stroke="{MARK}" '
+                      'stroke-width="3"/>')
+    return axes.svg()
 
 
 def picture(documents):
-    rows = math.ceil(len(documents) / COLUMNS)
-    width, height = COLUMNS * WIDTH, rows * HEIGHT + 30
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="sans-serif" '
-        'font-size="12">',
-        f'<rect width="{width}" height="{height}" fill="white"/>',
-    ]
+    width, rows = COLUMNS * WIDTH, math.ceil(len(documents) / COLUMNS)
+    height = rows * HEIGHT + LEGEND
+    parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="sans-serif" '
+             'font-size="20">', f'<rect width="{width}" height="{height}" fill="white"/>']
     for k, document in enumerate(documents):
-        parts.append(f'<g transform="translate({k % COLUMNS * WIDTH} {k // COLUMNS * HEIGHT})">')
-        parts += panel(document, (-1.0, 0.7), (-3.3, 1.0))
-        parts.append("</g>")
+        place = f'x="{k % COLUMNS * WIDTH}" y="{k // COLUMNS * HEIGHT}" width="{WIDTH}" height="{HEIGHT}"'
+        parts.append(panel(document).replace("<svg ", f"<svg {place} ", 1).replace('font-size="13"', 'font-size="17"')
+                     .replace('font-size="15"', 'font-size="21"'))
     y = height - 12
     for k, (what, colour, fill) in enumerate([("plain", PLAIN, PLAIN), ("chebyshev", ACCELERATED, ACCELERATED),
                                               ("other parts", PLAIN, "white"), ("as given", MARK, "white")]):
-        parts.append(f'<circle cx="{LEFT + 110 * k}" cy="{y - 4}" r="4" fill="{fill}" stroke="{colour}" stroke-width="1.5"/>')
-        parts.append(f'<text x="{LEFT + 110 * k + 10}" y="{y}">{what}</text>')
-    parts.append(f'<text x="{LEFT + 430}" y="{y}">grey: none beats these in both; dotted: 0.5, 0.2, 0.05, 0.01 h</text>')
+        x = LEFT + 180 * k
+        parts.append(f'<circle cx="{x}" cy="{y - 6}" r="7" fill="{fill}" stroke="{colour}" stroke-width="2"/>')
+        parts.append(f'<text x="{x + 16}" y="{y}">{what}</text>')
+    parts.append(f'<text x="{LEFT + 740}" y="{y}">grey: none beats these in both; dashed: 0.5, 0.2, 0.05, 0.01 h</text>')
     return "\n".join(parts + ["</svg>"]) + "\n"
 
 

@@ -7,12 +7,14 @@ LEFT, RIGHT, TOP, BOTTOM = 70, 230, 40, 50
 
 
 class LogAxes:
-    """`x` and `y`: least and greatest exponent of ten. Everything is drawn in the order of the calls."""
+    """`x` and `y`: least and greatest exponent of ten; `beside`: what is left free right of the chart. Everything is
+    drawn in the order of the calls."""
 
-    right, bottom = WIDTH - RIGHT, HEIGHT - BOTTOM
+    bottom = HEIGHT - BOTTOM
 
-    def __init__(self, x, y, title):
+    def __init__(self, x, y, title, beside=RIGHT):
         self.x, self.y = x, y
+        self.right = WIDTH - beside
         self.parts = [
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" font-size="13">',
             f'<rect width="{WIDTH}" height="{HEIGHT}" fill="white"/>',

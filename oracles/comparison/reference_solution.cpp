@@ -27,13 +27,15 @@ constexpr int kMostActiveSets = 100;
 // Plain iterations from which contacts are solved for: a way round a blade is found by going there.
 constexpr int kFirstIterations = 32;
 
-// Nothing rests between walls that leave no room.
-void require_room(const SubstepProblem& problem) {
+// Throws std::invalid_argument if nothing can rest between the walls.
+SubstepProblem problem_with_room(const Setup& setup, const State& state) {
+  SubstepProblem problem(setup, state);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (problem.low[axis] > problem.high[axis]) {
       throw std::invalid_argument("the reference solution of a substep: two walls leave no room between them");
     }
   }
+  return problem;
 }
 
 double greatest_change(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
@@ -178,21 +180,18 @@ ReferenceSolution alternated(const SubstepProblem& problem, std::vector<Vec3> fi
   return result;
 }
 
-}  // namespace
-
-ReferenceSolution reference_solution(const Setup& setup, const State& state) {
-  const SubstepProblem problem(setup, state);
-  require_room(problem);
+// `previous`: [m] rotations before the substep.
+ReferenceSolution solution_of(const SubstepProblem& problem, const std::vector<Mat3>& previous) {
   std::vector<Vec3> first = first_positions(problem);
-  if (!problem.contacts.has_plate() && !problem.contacts.has_friction()) {
+  if (!problem.contacts.path_matters()) {
     LinearStage linear(problem);
-    ReferenceSolution result = alternated(problem, std::move(first), state.clusters.rotation, [&](const Poses& poses) {
+    ReferenceSolution result = alternated(problem, std::move(first), previous, [&](const Poses& poses) {
       return std::optional(linear.positions(poses.rotation));
     });
     result.is_minimum = result.converged;
     return result;
   }
-  std::vector<Mat3> rotation = state.clusters.rotation;
+  std::vector<Mat3> rotation = previous;
   for (int k = 0; k < kFirstIterations; ++k) {
     const Poses poses = poses_at(problem, first, rotation);
     first = plain_iterate(problem, first, poses);
@@ -210,20 +209,59 @@ ReferenceSolution reference_solution(const Setup& setup, const State& state) {
   return result;
 }
 
+PlainLimit limit_of(const SubstepProblem& problem, const std::vector<Mat3>& previous, double tolerance, int64_t most) {
+  const double h = problem.body.grid.spacing;
+  const auto drift = [&](const std::vector<Vec3>& x) {
+    Vec3 sum;
+    double scale = 0;
+    for (int32_t i = 0; i < problem.body.particle_count(); ++i) {
+      if (!problem.alive[at(i)]) continue;
+      sum += problem.body.mass[at(i)] * (x[at(i)] - problem.predicted[at(i)]);
+      scale += problem.body.mass[at(i)] * norm(problem.predicted[at(i)] - problem.start[at(i)]);
+    }
+    return scale > 0 ? norm(sum) / scale : norm(sum);
+  };
+  PlainLimit result;
+  result.x = first_positions(problem);
+  Poses poses = poses_at(problem, result.x, previous);
+  const auto note = [&] {
+    result.energy.push_back(energy_at(problem, result.x, poses));
+    result.momentum_drift.push_back(drift(result.x));
+  };
+  note();
+  while (result.iterations < most) {
+    std::vector<Vec3> x = plain_iterate(problem, result.x, poses);
+    result.last_change = greatest_change(x, result.x) / h;
+    result.x = std::move(x);
+    poses = poses_at(problem, result.x, poses.rotation);
+    note();
+    ++result.iterations;
+    if (result.last_change < tolerance) break;
+  }
+  result.rotation = std::move(poses.rotation);
+  return result;
+}
+
+}  // namespace
+
+ReferenceSolution reference_solution(const Setup& setup, const State& state) {
+  return solution_of(problem_with_room(setup, state), state.clusters.rotation);
+}
+
 SubstepAnswer substep_answer(const Setup& setup, const State& state) {
-  ReferenceSolution rest = reference_solution(setup, state);
+  const SubstepProblem problem = problem_with_room(setup, state);
+  ReferenceSolution rest = solution_of(problem, state.clusters.rotation);
   SubstepAnswer answer = {.x = std::move(rest.x),
                           .rotation = std::move(rest.rotation),
                           .energy = rest.energy,
                           .by = rest.is_minimum ? SolvedBy::minimum : SolvedBy::rest,
                           .converged = rest.converged,
                           .elsewhere = {}};
-  const SubstepProblem problem(setup, state);
   if (!problem.contacts.path_matters()) {
     answer.by = SolvedBy::minimum;
     return answer;
   }
-  PlainLimit limit = plain_limit(setup, state, kMeets / 1000, kMostIterations);
+  PlainLimit limit = limit_of(problem, state.clusters.rotation, kMeets / 1000, kMostIterations);
   const double apart = greatest_change(answer.x, limit.x) / setup.body.grid.spacing;
   if (rest.converged && apart <= kMeets) return answer;
   answer.by = SolvedBy::iteration;
@@ -236,6 +274,10 @@ SubstepAnswer substep_answer(const Setup& setup, const State& state) {
   answer.rotation = std::move(limit.rotation);
   answer.energy = limit.energy.back();
   return answer;
+}
+
+PlainLimit plain_limit(const Setup& setup, const State& state, double tolerance, int64_t most) {
+  return limit_of(problem_with_room(setup, state), state.clusters.rotation, tolerance, most);
 }
 
 double substep_energy(const Setup& setup, const State& state, const std::vector<Vec3>& x) {
@@ -260,41 +302,6 @@ std::vector<Vec3> substep_gradient(const Setup& setup, const State& state, const
     gradient[at(i)] += problem.body.mass[at(i)] / (problem.dt * problem.dt) * d;
   }
   return gradient;
-}
-
-PlainLimit plain_limit(const Setup& setup, const State& state, double tolerance, int64_t most) {
-  const SubstepProblem problem(setup, state);
-  require_room(problem);
-  const double h = setup.body.grid.spacing;
-  const auto drift = [&](const std::vector<Vec3>& x) {
-    Vec3 sum;
-    double scale = 0;
-    for (int32_t i = 0; i < problem.body.particle_count(); ++i) {
-      if (!problem.alive[at(i)]) continue;
-      sum += problem.body.mass[at(i)] * (x[at(i)] - problem.predicted[at(i)]);
-      scale += problem.body.mass[at(i)] * norm(problem.predicted[at(i)] - problem.start[at(i)]);
-    }
-    return scale > 0 ? norm(sum) / scale : norm(sum);
-  };
-  PlainLimit result;
-  result.x = first_positions(problem);
-  Poses poses = poses_at(problem, result.x, state.clusters.rotation);
-  const auto note = [&] {
-    result.energy.push_back(energy_at(problem, result.x, poses));
-    result.momentum_drift.push_back(drift(result.x));
-  };
-  note();
-  while (result.iterations < most) {
-    std::vector<Vec3> x = plain_iterate(problem, result.x, poses);
-    result.last_change = greatest_change(x, result.x) / h;
-    result.x = std::move(x);
-    poses = poses_at(problem, result.x, poses.rotation);
-    note();
-    ++result.iterations;
-    if (result.last_change < tolerance) break;
-  }
-  result.rotation = std::move(poses.rotation);
-  return result;
 }
 
 }  // namespace cutproof::oracles

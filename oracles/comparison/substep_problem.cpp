@@ -170,6 +170,8 @@ std::vector<Vec3> turned_offsets(const SubstepProblem& problem, const std::vecto
   return mean;
 }
 
+namespace {
+// [n] g_i; of a particle in no cluster, where it wants to be anyway.
 std::vector<Vec3> goals_of(const SubstepProblem& problem, const Poses& poses) {
   std::vector<Vec3> goal = turned_offsets(problem, poses.rotation);
   for (int32_t i = 0; i < problem.body.particle_count(); ++i) {
@@ -184,6 +186,7 @@ std::vector<Vec3> goals_of(const SubstepProblem& problem, const Poses& poses) {
   }
   return goal;
 }
+}  // namespace
 
 std::vector<Vec3> plain_iterate(const SubstepProblem& problem, const std::vector<Vec3>& x, const Poses& poses) {
   const std::vector<Vec3> goal = goals_of(problem, poses);

@@ -57,9 +57,6 @@ Poses poses_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const 
 // [n] the mean over a particle's clusters of R_c (X_i − T_c), to which the mean of t_c is added to give g_i.
 std::vector<Vec3> turned_offsets(const SubstepProblem& problem, const std::vector<Mat3>& rotation);
 
-// [n] g_i; of a particle in no cluster, where it wants to be anyway.
-std::vector<Vec3> goals_of(const SubstepProblem& problem, const Poses& poses);
-
 // One plain iteration from x, whose poses are given.
 std::vector<Vec3> plain_iterate(const SubstepProblem& problem, const std::vector<Vec3>& x, const Poses& poses);
 

@@ -574,9 +574,13 @@ class Search {
       open.push_back(std::move(next));
       std::push_heap(open.begin(), open.end(), comes_later);
     };
+    bool is_cut_off = false;  // something that was to be tried was not
     const auto may_try = [&] { return tried < most_outcomes_ && runs_left > 0; };
     const auto try_out = [&](const Settled& settled) -> std::optional<Branch> {
-      if (!may_try() || !seen.insert(settled).second) return std::nullopt;
+      if (seen.contains(settled)) return std::nullopt;
+      is_cut_off = is_cut_off || !may_try();
+      if (is_cut_off) return std::nullopt;
+      seen.insert(settled);
       --runs_left;
       Branch next = start(settled);
       // What is settled of a decision that never comes up, or as the numbers say, leads where another way has led.
@@ -640,7 +644,7 @@ class Search {
         if (best.holds()) break;
       }
     }
-    return best.holds() || (open.empty() && may_try());
+    return best.holds() || (open.empty() && !is_cut_off);
   }
 
   // The decisions of an outcome that were near, as it has taken them: all that tells it from others.

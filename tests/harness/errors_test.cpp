@@ -54,7 +54,7 @@ TEST_F(RunErrors, AllOfThem) {
     EXPECT_LT(solver.at("max"), backend == "reference" ? 1e-12 : 1e-5);
     EXPECT_EQ(solver.at("frames").size(), 7u) << "the scene has no more";
     for (const json& frame : solver.at("frames")) {
-      EXPECT_TRUE(frame.at("solved_by") == "minimum" && frame.at("converged"));
+      EXPECT_TRUE(frame.at("solved_by") == "minimum" && frame.at("by_energy") && frame.at("converged"));
     }
     const json& time_step = all.at("time_step");
     EXPECT_EQ(time_step.at("first_difference"), nullptr);
@@ -95,6 +95,7 @@ TEST_F(RunErrors, UnderADentingBladeEachFrameHasAnAnswerOfItsOwn) {
   EXPECT_EQ(frames.size(), 12u) << "all that there are";
   for (const json& frame : frames) {
     EXPECT_EQ(frame.at("solved_by"), "rest");
+    EXPECT_FALSE(frame.at("by_energy"));
     EXPECT_TRUE(frame.at("converged"));
     EXPECT_EQ(frame.at("energy"), nullptr);
     EXPECT_EQ(frame.at("elsewhere"), nullptr);
