@@ -27,6 +27,7 @@ struct StepParameters {
   double relaxation = 0.5;                         // s in (0, 1], published
   Acceleration acceleration = Acceleration::none;  // implicit only
   double damping = 0;                              // c [1/s]: v = exp(-c dt) (x - x_prev) / dt
+  double retardation = 0;                          // τ [s], implicit only: elasticity acts at x + τ v, method.md §3
   Vec3 gravity = {};                               // [m/s²], body frame
   friend bool operator==(const StepParameters&, const StepParameters&) = default;
 };

@@ -47,8 +47,8 @@ inline void know_every_member(const Setup& setup) {
   [[maybe_unused]] const auto& [name, grid, node, particle_at, rest, edge_offsets, edge_ends, mass, surface_crossing,
                                 origin, orientation] = body;
   [[maybe_unused]] const auto& [nodes, spacing] = grid;
-  [[maybe_unused]] const auto& [solver, substeps, iterations, stiffness, relaxation, acceleration, damping, gravity] =
-      step;
+  [[maybe_unused]] const auto& [solver, substeps, iterations, stiffness, relaxation, acceleration, damping, retardation,
+                                gravity] = step;
   [[maybe_unused]] const auto& [criterion, remove, epsilon, strain, without_blade] = detect;
   [[maybe_unused]] const auto& [debris] = split;
   [[maybe_unused]] const auto& [merge_rule] = merge;
@@ -94,6 +94,7 @@ constexpr void for_each_setup_field(Visit&& visit) {
   CUTPROOF_FIELD(step.relaxation, "step", "relaxation", one);
   CUTPROOF_FIELD(step.acceleration, "step", "acceleration", one);
   CUTPROOF_FIELD(step.damping, "step", "damping", one, "1/s");
+  CUTPROOF_FIELD(step.retardation, "step", "retardation", one, "s", kAnyNumber, false, 7);
   CUTPROOF_FIELD(step.gravity, "step", "gravity", one, "m/s²");
   CUTPROOF_FIELD(detect.criterion, "detect", "criterion", one);
   CUTPROOF_FIELD(detect.remove, "detect", "remove", one, "1", kAnyNumber, false, 4);

@@ -84,7 +84,9 @@ class MomentumRounding {
       : step_(run.setup.step),
         scale_(rounding_scale(run.setup, run.before)),
         u_(unit_roundoff(run.after)),
-        length_(u_ * std::max(stored_extent(run.setup, run.before), stored_extent(run.setup, run.after)) +
+        // With retardation evaluations are of y, and enter x times σ: of σ |y| <= |x| + |x_prev|.
+        length_((step_.retardation > 0 ? 2 : 1) * u_ *
+                    std::max(stored_extent(run.setup, run.before), stored_extent(run.setup, run.after)) +
                 kUnitRoundoff * std::max(scale_.extent, rounding_scale(run.setup, run.after).extent)),
         dt_(run.setup.substep_length[at(run.before.frame)]) {}
 

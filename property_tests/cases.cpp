@@ -473,6 +473,7 @@ void add_dynamics(const Case& c, Vec3 first_node, Setup& setup) {
   setup.step.relaxation = c.relaxation / 10.0;
   if (c.solver == Solver::implicit) setup.step.acceleration = c.acceleration;
   setup.step.damping = c.damping;
+  if (c.solver == Solver::implicit) setup.step.retardation = c.retardation / 10.0 * dt;
   setup.step.gravity = (h / 1000 / (dt * dt)) * whole_vector(c.gravity);
   setup.detect.epsilon = c.epsilon / 10.0;
   setup.detect.strain = c.strain / 100.0;
@@ -593,6 +594,9 @@ Case draw_moving_case(uint64_t seed, int size) {
   c.acceleration = random.chance(0.5) ? Acceleration::chebyshev : Acceleration::none;
   draw_dynamics(random, c);
   if (random.chance(0.4)) c.remove = random.chance(0.5) ? RemovedEnds::nearer : RemovedEnds::one;
+  // By random numbers of its own, as `surface`.
+  Random retarded(seed ^ 0x7u);
+  if (c.solver == Solver::implicit && retarded.chance(0.3)) c.retardation = retarded.pick({1, 10, 40, 200});
   return c;
 }
 
@@ -807,6 +811,7 @@ std::vector<std::function<void(Case&)>> simplifications(const Case& c) {
   towards(c, &Case::solver, Solver::implicit, edits);
   towards(c, &Case::relaxation, 5, edits);
   towards(c, &Case::damping, 0, edits);
+  towards(c, &Case::retardation, 0, edits);
   towards(c, &Case::time_step, 1000, edits);
   towards(c, &Case::pace, 1, edits);
   towards(c, &Case::blade_friction, 0, edits);
@@ -912,7 +917,8 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Case, nodes, spacing, clusters, side, seed_sp
                                    seed, merge, expand, expand_depth, debris, blade_length, blade_depth,
                                    blade_thickness, strokes, together, moves, substeps, iterations, stiffness,
                                    acceleration, ground, alpha, surface, removal, remove, epsilon, strain, solver,
-                                   relaxation, damping, time_step, pace, blade_friction, gravity, walls, grips)
+                                   relaxation, damping, retardation, time_step, pace, blade_friction, gravity, walls,
+                                   grips)
 
 std::string to_json(const Case& c) { return nlohmann::json(c).dump(); }
 
@@ -980,6 +986,7 @@ void require_sane(const Case& c) {
   require(c.strain >= 1 && c.strain <= 100'000, "strain", "in [1, 100000]");
   require(c.relaxation >= 1 && c.relaxation <= 10, "relaxation", "in [1, 10]");
   require(c.damping >= 0 && c.damping <= 100'000, "damping", "in [0, 100000]");
+  require(c.retardation >= 0 && c.retardation <= 10'000, "retardation", "in [0, 10000]");
   require(c.time_step >= 1 && c.time_step <= 1'000'000, "time_step", "in [1, 1000000]");
   require(c.pace >= 1 && c.pace <= 1000, "pace", "in [1, 1000]");
   require(c.blade_friction >= 0 && c.blade_friction <= 10'000, "blade_friction", "in [0, 10000]");
@@ -1005,9 +1012,9 @@ Case from_json(const std::string& text) {
     // Cases that were saved before there were these fields.
     if (document.is_object()) {
       const nlohmann::json plain = Case{};
-      for (const char* field :
-           {"acceleration", "together", "alpha", "surface", "removal", "remove", "epsilon", "strain", "solver",
-            "relaxation", "damping", "time_step", "pace", "blade_friction", "gravity", "walls", "grips"}) {
+      for (const char* field : {"acceleration", "together", "alpha", "surface", "removal", "remove", "epsilon",
+                                "strain", "solver", "relaxation", "damping", "retardation", "time_step", "pace",
+                                "blade_friction", "gravity", "walls", "grips"}) {
         document.emplace(field, plain.at(field));
       }
       for (auto& stroke : document.at("strokes")) {

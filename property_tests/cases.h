@@ -91,6 +91,7 @@ struct Case {
   Solver solver = Solver::implicit;            // published: without acceleration
   int32_t relaxation = 5;                      // published [tenths]
   int32_t damping = 0;                         // [1/s]
+  int32_t retardation = 0;                     // implicit [tenths of dt]
   int32_t time_step = 1000;                    // dt [µs]
   int32_t pace = 1;                            // so many times the frames that the blade needs
   int32_t blade_friction = 0;                  // [tenths]

@@ -100,6 +100,7 @@ std::string in_words(const Case& c) {
   text +=
       fmt::format("; the body moves: {} substeps × {} iterations, dt = {} µs", c.substeps, c.iterations, c.time_step);
   if (c.acceleration != Acceleration::none) text += ", accelerated";
+  if (c.retardation > 0) text += fmt::format(", retarded by {:g} dt", c.retardation / 10.0);
   if (c.ground) text += ", gravity and a floor";
   if (!c.walls.empty()) text += ", " + counted(c.walls.size(), "wall", "walls");
   if (!c.grips.empty()) text += ", " + counted(c.grips.size(), "grip", "grips");

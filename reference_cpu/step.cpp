@@ -64,6 +64,21 @@ class Chebyshev {
   int64_t order_ = 0;
 };
 
+// Where elasticity acts (method.md §3): on y = x + τ v, with v the velocity of the substep, which a particle that began
+// it at x_prev ends with. As x - x_prev = dt v, y lies ahead of x by τ / dt of the way that x has come.
+class Ahead {
+ public:
+  Ahead(double dt, double retardation) : share_(dt / (dt + retardation)) {}
+  // dt / (dt + τ): of the way to y, x has come so far.
+  double share() const { return share_; }
+  // Without retardation the two are one, to the bit.
+  Vec3 of(Vec3 x, Vec3 start) const { return share_ == 1 ? x : start + (x - start) / share_; }
+  Vec3 back(Vec3 y, Vec3 start) const { return share_ == 1 ? y : start + share_ * (y - start); }
+
+ private:
+  double share_;
+};
+
 // t_c = Σ w x / M, A = Σ w (x - t)(X - T)ᵀ, R_c = argmax tr(Rᵀ A).
 std::vector<Pose> match_shapes(const Body& body, const Memberships& memberships, const std::vector<Vec3>& x,
                                Clusters& clusters) {
@@ -119,11 +134,14 @@ void substep(const Setup& setup, const Memberships& memberships, int64_t index, 
   const Contacts contacts(setup, move != nullptr && move->down ? move : nullptr);
   const Held held = held_particles(setup, index);
   const bool implicit = parameters.solver == Solver::implicit;
-  const double kdt2 = parameters.stiffness * dt * dt;
+  const Ahead ahead(dt, parameters.retardation);
+  const double kdt2 = parameters.stiffness * dt * (dt + parameters.retardation);
   const double s = implicit ? kdt2 / (1 + kdt2) : parameters.relaxation;
 
   const std::vector<Vec3> start = state.x;
-  std::vector<Vec3> predicted(at(n));
+  std::vector<Vec3> predicted(at(n));  // x~, and where elasticity would act on it
+  std::vector<Vec3> predicted_ahead(at(n));
+  std::vector<Vec3> y(at(n));
   std::vector<int> side(at(n), +1);
   // What contacts and grips have displaced, times mass: Σ m (x - where the solver alone would have put it), carried
   // through the iterations as the solver carries positions. Divided by dt it is their impulse.
@@ -132,26 +150,31 @@ void substep(const Setup& setup, const Memberships& memberships, int64_t index, 
   Chebyshev chebyshev(kdt2);
 
   for (int32_t i = 0; i < n; ++i) {
+    y[at(i)] = start[at(i)];
     if (!state.alive[at(i)]) continue;
     predicted[at(i)] = start[at(i)] + dt * state.v[at(i)] + (dt * dt) * parameters.gravity;
     side[at(i)] = contacts.side(start[at(i)]);
     state.x[at(i)] = held.yes[at(i)] ? start[at(i)] + held.displacement[at(i)]
                                      : contacts.project_with_friction(predicted[at(i)], side[at(i)], start[at(i)]);
     pushed += body.mass[at(i)] * (state.x[at(i)] - predicted[at(i)]);
+    predicted_ahead[at(i)] = ahead.of(predicted[at(i)], start[at(i)]);
+    y[at(i)] = ahead.of(state.x[at(i)], start[at(i)]);
   }
 
-  std::vector<Vec3> earlier = state.x;  // one iteration ago
+  std::vector<Vec3> earlier = y;  // one iteration ago
   Vec3 pushed_earlier = pushed;
   for (int32_t iteration = 0; iteration < parameters.iterations; ++iteration) {
-    const std::vector<Pose> poses = match_shapes(body, memberships, state.x, state.clusters);
-    const std::vector<Vec3> now = state.x;
+    const std::vector<Pose> poses = match_shapes(body, memberships, y, state.clusters);
+    const std::vector<Vec3> now = y;
     Vec3 pushed_now;
     for (int32_t i = 0; i < n; ++i) {
       if (!state.alive[at(i)]) continue;
-      const Vec3 x = now[at(i)];
-      const Vec3 g = goal(body, memberships, state.clusters, poses, i, x);
-      const Vec3 plain = implicit ? predicted[at(i)] + s * (g - predicted[at(i)]) : x + s * (g - x);
-      const Vec3 free = accelerated ? chebyshev.combine(plain, x, earlier[at(i)]) : plain;
+      const Vec3 g = goal(body, memberships, state.clusters, poses, i, now[at(i)]);
+      const Vec3 from = implicit ? predicted_ahead[at(i)] : now[at(i)];
+      const Vec3 plain_ahead = from + s * (g - from);
+      const Vec3 free_ahead = accelerated ? chebyshev.combine(plain_ahead, now[at(i)], earlier[at(i)]) : plain_ahead;
+      const Vec3 plain = ahead.back(plain_ahead, start[at(i)]), free = ahead.back(free_ahead, start[at(i)]);
+      const Vec3 x = state.x[at(i)];
       Vec3 next = x;  // a held particle stays where its grip has put it
       if (!held.yes[at(i)]) {
         next = contacts.next_position(free, side[at(i)], start[at(i)], x);
@@ -163,6 +186,7 @@ void substep(const Setup& setup, const Memberships& memberships, int64_t index, 
       }
       pushed_now += body.mass[at(i)] * (next - free);
       state.x[at(i)] = next;
+      y[at(i)] = ahead.of(next, start[at(i)]);
     }
     // Both solvers carry Σ m x from one iteration to the next exactly: the implicit one draws it to x~ by 1 - s, and
     // acceleration combines the sums as it does the positions.

@@ -20,9 +20,10 @@ constexpr double kLeft = 1e-4;
 constexpr int32_t kLeastSubsteps = 32, kLeastIterations = 16;
 
 // Iterations that shrink every error of a substep to kLeft: with rotations held, each multiplies it by at most
-// s = k dt² / (1 + k dt²) (method.md §3).
+// s (method.md §3).
 int32_t enough_iterations(const Scene& scene, int32_t substeps) {
-  const double dt = scene.frame_length / substeps, kdt2 = scene.step.stiffness * dt * dt, s = kdt2 / (1 + kdt2);
+  const double dt = scene.frame_length / substeps, kdt2 = scene.step.stiffness * dt * (dt + scene.step.retardation);
+  const double s = kdt2 / (1 + kdt2);
   if (s < kLeft) return 2;
   const double iterations = std::ceil(std::log(kLeft) / std::log(s));
   return static_cast<int32_t>(std::clamp(iterations, 2.0, 1.0 * ReferenceSolution::kMostIterations));

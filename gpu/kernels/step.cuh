@@ -178,9 +178,9 @@ CUTPROOF_DEVICE inline Iteration iteration_of(const Pace& pace, int iteration, c
   return now;
 }
 // Computed once a frame, because a root and powers take long.
-CUTPROOF_DEVICE inline IterationNumbers iteration_numbers(const Pace& pace, int iteration) {
+CUTPROOF_DEVICE inline IterationNumbers iteration_numbers(const Pace& pace, float kdt2, int iteration) {
   Combination combination = {};
-  if (pace.acceleration == Acceleration::chebyshev && iteration > 0) combination = chebyshev(pace.kdt2, iteration);
+  if (pace.acceleration == Acceleration::chebyshev && iteration > 0) combination = chebyshev(kdt2, iteration);
   return {combination.pull, combination.carry, lost_fraction(pace, iteration), lost_fraction(pace, iteration + 1)};
 }
 CUTPROOF_DEVICE inline IterationNumbers* numbers_of(const DeviceView& w, int body, int iteration) {
@@ -309,17 +309,39 @@ inline constexpr float kFarBase = 1.0f / 16.0f;
 inline constexpr float kOfRoundings = 0x1p-20f;
 
 // Predicts, from a particle's end of the last substep.
-CUTPROOF_DEVICE inline Float3 predict(const Pace& pace, Float3 d, Float3 v) { return d + (pace.dt * v + pace.fall); }
+CUTPROOF_DEVICE inline Float3 predict(const Pace& pace, Float3 d, Float3 v) { return d + (pace.ahead * v + pace.fall); }
+
+// Predictions, and where iterations lead, are places y = x + τ v, on which elasticity acts (docs/design/method.md §3):
+// a particle has come `share` of the way to there. Number: of places, or of what is linear in them.
+template <class Number>
+CUTPROOF_DEVICE inline Number come_to(const Pace& pace, Number start, Number ahead) {
+  return pace.share == 1.0f ? ahead : start + pace.share * (ahead - start);
+}
+// The y of a particle that contacts have put at x, where nothing would have put it at `free`, with the y `free_ahead`:
+// the same to the bit where they do nothing.
+CUTPROOF_DEVICE inline Float3 ahead_of(const Pace& pace, Float3 x, Float3 free, Float3 free_ahead) {
+  return pace.share == 1.0f ? x : free_ahead + (1.0f / pace.share) * (x - free);
+}
+
+// How far from their predictions particles may go, which lie in `ahead`, and began the substep in `began`: what touches
+// nothing is x, and x lies between the two.
+CUTPROOF_DEVICE inline float room_ahead(const Pace& pace, const Contacts& contacts, const Ball& began, Ball ahead,
+                                        int side) {
+  if (pace.share == 1.0f) return room_around(contacts, ahead, side);
+  ahead.d = come_to(pace, began.d, ahead.d);
+  ahead.radius = come_to(pace, began.radius, ahead.radius) * (1.0f + kOfRoundings);
+  return room_around(contacts, ahead, side) / pace.share;
+}
 
 // While a grip holds a group, its particles stay where it has put them, and what changes in an iteration is how much
 // they are pushed: by alpha (x - d~) + beta e - M(r), M being a map as those of carried groups are.
 enum : int { kCarried = 0, kResolved = 1, kHeld = 2 };  // DeviceView::group_resolved
 // Sets alpha and beta of the end of a substep. They follow from what an iteration does with one particle
 // (advance_particle), whose pull is G(r) - e, or, from where it is, G(r) - e - (x - d~).
-CUTPROOF_DEVICE inline void set_held_push(Pace& pace) {
+CUTPROOF_DEVICE inline void set_held_push(Pace& pace, float kdt2) {
   float alpha = 1.0f, beta = 0.0f, earlier_alpha = 1.0f, earlier_beta = 0.0f;
   for (int j = 0; j < pace.iterations; ++j) {
-    const Iteration now = iteration_of(pace, j, iteration_numbers(pace, j));
+    const Iteration now = iteration_of(pace, j, iteration_numbers(pace, kdt2, j));
     const float kept = now.implicit ? now.s : 1.0f, part = now.combined ? now.combination.pull : 1.0f;
     const auto next = [&](float is, float was, float added) {
       const float carried = now.combined ? now.combination(kept * is, is, was) : kept * is;
@@ -336,16 +358,17 @@ CUTPROOF_DEVICE inline void set_held_push(Pace& pace) {
   pace.held_beta = beta;
 }
 
-// The displacement that contacts, or its grip, let a particle have that is predicted at `predicted`.
-CUTPROOF_DEVICE inline Float3 enter_substep(const DeviceView& w, const Contacts& contacts, const Held& held,
-                                            const RestPoint& rest, int64_t o, Float4 predicted, Float3 start,
-                                            float share) {
+// The displacement (y) that contacts, or its grip, let a particle have that is predicted at `predicted`.
+CUTPROOF_DEVICE inline Float3 enter_substep(const DeviceView& w, const Pace& pace, const Contacts& contacts,
+                                            const Held& held, const RestPoint& rest, int64_t o, Float4 predicted,
+                                            Float3 start, float share) {
   bool in_turn = false;  // of no interest: there is no earlier point to compare with
-  const Float3 x =
-      held.active ? start + held.moved : project(contacts, rest, xyz(predicted), predicted.w, start, in_turn);
-  w.position[o] = with_w(x, share);
-  w.pushed[o] = with_w(x - xyz(predicted), 0.0f);
-  return x;
+  const Float3 free = come_to(pace, start, xyz(predicted));
+  const Float3 x = held.active ? start + held.moved : project(contacts, rest, free, predicted.w, start, in_turn);
+  const Float3 ahead = ahead_of(pace, x, free, xyz(predicted));
+  w.position[o] = with_w(ahead, share);
+  w.pushed[o] = with_w(x - free, 0.0f);
+  return ahead;
 }
 
 CUTPROOF_DEVICE inline void end_impulse(const DeviceView& w, int p, const Pace& pace, Float3 pushed) {
@@ -425,12 +448,13 @@ struct FrameParts {
   Parts place, velocity;
 };
 CUTPROOF_DEVICE inline Parts predicted_parts(const Pace& pace, const FrameParts& now) {
-  return {now.place.shape + pace.dt * now.velocity.shape, now.place.motion + pace.dt * now.velocity.motion};
+  return {now.place.shape + pace.ahead * now.velocity.shape, now.place.motion + pace.ahead * now.velocity.motion};
 }
 CUTPROOF_DEVICE inline FrameParts parts_after(const Pace& pace, float lost, const FrameParts& now) {
   const Parts predicted = predicted_parts(pace, now);
   FrameParts next;
-  next.place = {predicted.shape - lost * (1.0f + predicted.shape), predicted.motion - lost * predicted.motion};
+  next.place = {come_to(pace, now.place.shape, predicted.shape - lost * (1.0f + predicted.shape)),
+                come_to(pace, now.place.motion, predicted.motion - lost * predicted.motion)};
   next.velocity = {pace.decay_per_dt * (next.place.shape - now.place.shape),
                    pace.decay_per_dt * (next.place.motion - now.place.motion)};
   return next;
@@ -442,8 +466,13 @@ CUTPROOF_DEVICE inline FrameParts load_parts(const DeviceView& w, int body, int 
   const Float4 parts = constant(parts_of(w, body, substep));
   return {{parts.x, parts.y}, {parts.z, parts.w}};
 }
+// k dt (dt + τ); without retardation k dt².
+CUTPROOF_DEVICE inline float kdt2_of(const BodyConstants& body, const Pace& pace) {
+  return body.stiffness * (pace.share == 1.0f ? pace.ahead : pace.share * pace.ahead) * pace.ahead;
+}
 // What the substeps and iterations of a body's frame have in common.
 CUTPROOF_DEVICE inline void store_numbers(const DeviceView& w, int body, const Pace& pace) {
+  const float kdt2 = kdt2_of(w.body[body], pace);
   const float lost = lost_fraction(pace, pace.iterations);
   FrameParts now = {{0, 0}, {0, 1}};
   for (int substep = 0; substep <= pace.substeps; ++substep) {
@@ -451,7 +480,7 @@ CUTPROOF_DEVICE inline void store_numbers(const DeviceView& w, int body, const P
     now = parts_after(pace, lost, now);
   }
   for (int iteration = 0; iteration <= pace.iterations; ++iteration) {
-    *numbers_of(w, body, iteration) = iteration_numbers(pace, iteration);
+    *numbers_of(w, body, iteration) = iteration_numbers(pace, kdt2, iteration);
   }
 }
 
@@ -464,8 +493,8 @@ CUTPROOF_DEVICE inline Axis load_axis(const DeviceView& w, int64_t at) {
 }
 // Its prediction, as predict().
 CUTPROOF_DEVICE inline Float4 predicted_row(const Pace& pace, int axis, const Axis& now) {
-  return {now.place.x + pace.dt * now.velocity.x, now.place.y + pace.dt * now.velocity.y,
-          now.place.z + pace.dt * now.velocity.z, now.place.w + (pace.dt * now.velocity.w + pace.fall[axis])};
+  return {now.place.x + pace.ahead * now.velocity.x, now.place.y + pace.ahead * now.velocity.y,
+          now.place.z + pace.ahead * now.velocity.z, now.place.w + (pace.ahead * now.velocity.w + pace.fall[axis])};
 }
 // What its particles have in common when the frame begins.
 struct Origin {
@@ -482,12 +511,12 @@ CUTPROOF_DEVICE inline Origin origin_of(const DeviceView& w, int g) {
 CUTPROOF_DEVICE inline Axis axis_after(const Pace& pace, int axis, float lost, const Origin& origin,
                                        const Parts& predicted_part, Float4 map, const Axis& now) {
   const Float4 predicted = predicted_row(pace, axis, now);
-  const auto led = [&](float is, float by_map) { return is + (by_map - lost * is); };
+  const auto led = [&](float was, float is, float by_map) { return come_to(pace, was, is + (by_map - lost * is)); };
   const auto rate = [&](float is, float was) { return pace.decay_per_dt * (is - was); };
   const float lost_motion = origin.uniform() ? 0.0f : lost * (predicted_part.motion * xyz(origin.velocity)[axis]);
   Axis next;
-  next.place = {led(predicted.x, map.x), led(predicted.y, map.y), led(predicted.z, map.z),
-                predicted.w + (map.w + lost_motion)};
+  next.place = {led(now.place.x, predicted.x, map.x), led(now.place.y, predicted.y, map.y),
+                led(now.place.z, predicted.z, map.z), come_to(pace, now.place.w, predicted.w + (map.w + lost_motion))};
   next.velocity = row_of(rate, next.place, now.place);
   return next;
 }
@@ -623,7 +652,7 @@ CUTPROOF_DEVICE void sum_group(Block& block, const AnyTeam& team, const DeviceVi
         const int p = particle(k);
         return with_w(xyz(w.velocity[p]), mass_share(w.displacement[p].w));
       },
-      kFarBase * pace.h / pace.dt, w.frame_motion);
+      kFarBase * pace.h / pace.ahead, w.frame_motion);
   if (!team.leads()) return;
   w.group_origin[2 * int64_t{g}] = origin.place;
   w.group_origin[2 * int64_t{g} + 1] = origin.velocity;
@@ -693,17 +722,17 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
     const float own = reach_of(of_prediction);
     base.w = (greatest_stretch(to, 0.0f) * head.radius + own) * (1.0f + kOfRoundings);
     int side = 1;
-    if (contacts.move != nullptr) {
+    Ball began = {};
+    if (contacts.move != nullptr || pace.share != 1.0f) {
       const Map from = place.all(team);
-      side = side_of_all(
-          contacts,
-          ball_around(pace, group, with_w(origin.from(parts.place.motion), reach_of(parts.place)), 1.0f, from));
+      began = ball_around(pace, group, with_w(origin.from(parts.place.motion), reach_of(parts.place)), 1.0f, from);
+      if (contacts.move != nullptr) side = side_of_all(contacts, began);
     }
     // What an iteration adds is M(r), and takes is a part of e: a ball that contains the rest shape too contains every
     // such d~ - l e.
     Ball ball = ball_around(pace, group, with_w(xyz(base), own), 1.0f, to);
     ball.radius = fmaxf(ball.radius, pace.h * head.radius);
-    const float room = room_around(contacts, ball, side);
+    const float room = room_ahead(pace, contacts, began, ball, side);
     const bool held = held_by(w, pace, head.hold_set, substep).active;
     if (team.leads()) {
       w.group_base[g] = base;
@@ -739,9 +768,14 @@ struct Ending {
   Float3 base;
   float lost;
   int state;
+  Held held;
 };
-CUTPROOF_DEVICE inline Ending ending_of(const DeviceView& w, int body, const Pace& pace, int g) {
-  Ending ending = {{}, xyz(w.group_base[g]), lost_in_all(w, body, pace), w.group_resolved[g]};
+// substep: the one that ends.
+CUTPROOF_DEVICE inline Ending ending_of(const DeviceView& w, int body, const Pace& pace, const Group& group,
+                                        int substep) {
+  const int g = group.index;
+  Ending ending = {{}, xyz(w.group_base[g]), lost_in_all(w, body, pace), w.group_resolved[g], {}};
+  if (pace.share != 1.0f && ending.state == kHeld) ending.held = held_by(w, pace, group.head.hold_set, substep);
   if (pace.iterations > 0) ending.map = load_map(w.group_map, g);
   return ending;
 }
@@ -751,13 +785,15 @@ CUTPROOF_DEVICE inline Float4 end_tracked(const DeviceView& w, const Pace& pace,
   const int o = group.head.begin + k;
   const Float4 start = w.start[o];
   const Float3 predicted = xyz(w.predicted[o]), r = group.rest(w, pace, k);
-  Float3 d = carried_to(ending.base, ending.lost, predicted, ending.map, r);
+  Float3 ahead = carried_to(ending.base, ending.lost, predicted, ending.map, r);
   Float3 pushed;
-  if (ending.state != kCarried) d = xyz(w.position[o]);
+  if (ending.state != kCarried) ahead = xyz(w.position[o]);
   if (ending.state == kResolved) pushed = xyz(w.pushed[o]);
   if (ending.state == kHeld) {
-    pushed = pace.held_alpha * (d - predicted) + (pace.held_beta * (predicted - ending.base) - ending.map(r));
+    pushed = pace.held_alpha * (ahead - predicted) + (pace.held_beta * (predicted - ending.base) - ending.map(r));
+    pushed = pace.share * pushed;
   }
+  const Float3 d = ending.held.active ? xyz(start) + ending.held.moved : come_to(pace, xyz(start), ahead);
   end_impulse(w, w.place_particle[o], pace, pushed);
   v = pace.decay_per_dt * (d - xyz(start));
   return with_w(d, start.w);
@@ -794,9 +830,15 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const Devi
       w.group_base[g] = with_w(base, 0.0f);  // how far from it particles are is asked of carried groups only
     }
   } else {
-    const Ending ending = ending_of(w, body, pace, g);
+    const Ending ending = ending_of(w, body, pace, group, substep - 1);
     const float of_each = 1.0f / static_cast<float>(head.holder_count);
     bool before = false, behind = false;  // the blade, when the substep begins
+    Float3 began;                         // somewhere among its particles, when the substep begins
+    float reach = 0;                      // of them from there, squared
+    if (pace.share != 1.0f) {
+      began = xyz(w.start[head.begin]);
+      team.sync();  // all have read it
+    }
     team.each(head.size, [&](int k) {
       const int o = head.begin + k;
       Float3 v;
@@ -807,6 +849,8 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const Devi
         (side < 0 ? behind : before) = true;
       }
       const Float4 predicted = with_w(predict(pace, xyz(d), v), side);
+      const Float3 off = xyz(d) - began;
+      reach = fmaxf(reach, dot(off, off));
       w.start[o] = d;
       w.predicted[o] = predicted;
       if (k == first) {
@@ -822,8 +866,11 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const Devi
     behind = team.any(behind);
     const int side = before && behind ? 0 : behind ? -1 : 1;
     // (Of a group that a grip holds nobody asks.)
-    const float room =
-        held.active ? 0.0f : room_around(contacts, ball_around(pace, group, base_and_reach, 1.0f, Map{}), side);
+    const float spread = sqrtf(team.greatest(reach)) * (1.0f + kOfRoundings);
+    const float room = held.active
+                           ? 0.0f
+                           : room_ahead(pace, contacts, ball_around(pace, group, with_w(began, spread), 1.0f, Map{}),
+                                        ball_around(pace, group, base_and_reach, 1.0f, Map{}), side);
     resolve = !(room > 0);
     base = xyz(base_and_reach);
     if (team.leads()) {
@@ -848,7 +895,7 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const Devi
     const int o = head.begin + k;
     const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
     const Float4 start = start_of(k);
-    const Float3 x = enter_substep(w, contacts, held, rest, o, predicted_of(k), xyz(start), 0.0f);
+    const Float3 x = enter_substep(w, pace, contacts, held, rest, o, predicted_of(k), xyz(start), 0.0f);
     if (k == first) first_at = with_w(x, start.w);
   });
   sum_resolved(team, w, group, pace, base, first_at);
@@ -864,7 +911,12 @@ CUTPROOF_DEVICE inline Float4 end_loose(const DeviceView& w, const Pace& pace, i
     return w.displacement[p];
   }
   const Float4 start = w.start[o];
-  const Float3 d = xyz(w.position[o]);
+  Float3 d = come_to(pace, xyz(start), xyz(w.position[o]));
+  if constexpr (kContacts) {
+    if (pace.share != 1.0f && w.predicted[o].w == 0) {
+      d = xyz(start) + held_by(w, pace, groups_detail::hold_set(w, p), substep - 1).moved;
+    }
+  }
   if constexpr (kContacts) end_impulse(w, p, pace, xyz(w.pushed[o]));
   v = pace.decay_per_dt * (d - xyz(start));
   return with_w(d, start.w);
@@ -886,7 +938,7 @@ CUTPROOF_DEVICE inline void begin_loose(const DeviceView& w, int o, int substep)
     const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
     const Held held = held_by(w, pace, groups_detail::hold_set(w, p), substep);
     predicted.w = held.active ? 0.0f : blade_side(contacts, rest, xyz(d));
-    enter_substep(w, contacts, held, rest, o, predicted, xyz(d), share);
+    enter_substep(w, pace, contacts, held, rest, o, predicted, xyz(d), share);
   } else {
     w.position[o] = with_w(xyz(predicted), share);
   }
@@ -904,7 +956,7 @@ CUTPROOF_DEVICE void end_group(const AnyTeam& team, const DeviceView& w, int g) 
   if (head.size == 0 || pace.substeps == 0) return;
   if constexpr (kContacts) {
     if (w.group_tracked[g] != kUntouched) {
-      const Ending ending = ending_of(w, body, pace, g);
+      const Ending ending = ending_of(w, body, pace, group, pace.substeps - 1);
       team.each(head.size, [&](int k) {
         const int p = w.place_particle[head.begin + k];
         Float3 v;
@@ -969,12 +1021,14 @@ CUTPROOF_DEVICE inline Pace pace_of(const DeviceView& w, int b) {
   pace.frame = w.frame[b];
   pace.h = body.h;
   pace.per_h = 1.0f / body.h;
-  pace.dt = w.substep_length[body.frame_begin + pace.frame];
-  pace.kdt2 = body.stiffness * pace.dt * pace.dt;
-  pace.decay = decay_by(body.damping * pace.dt);
-  pace.decay_per_dt = pace.decay / pace.dt;
-  pace.s = body.solver == Solver::implicit ? pace.kdt2 / (1.0f + pace.kdt2) : body.relaxation;
-  pace.fall = (pace.dt * pace.dt) * body.gravity;
+  const float dt = w.substep_length[body.frame_begin + pace.frame];
+  pace.ahead = dt + body.retardation;
+  pace.share = dt / pace.ahead;
+  const float kdt2 = kdt2_of(body, pace);
+  pace.decay = decay_by(body.damping * dt);
+  pace.decay_per_dt = pace.decay / dt;
+  pace.s = body.solver == Solver::implicit ? kdt2 / (1.0f + kdt2) : body.relaxation;
+  pace.fall = (dt * pace.ahead) * body.gravity;
   pace.solver = body.solver;
   pace.acceleration = body.acceleration;
   for (int axis = 0; axis < 2; ++axis) pace.nodes[axis] = body.nodes[axis];
@@ -994,7 +1048,7 @@ CUTPROOF_DEVICE inline Pace pace_of(const DeviceView& w, int b) {
   pace.depth = body.blade_depth;
   pace.clearance = body.clearance;
   pace.blade_friction = body.blade_friction;
-  set_held_push(pace);
+  set_held_push(pace, kdt2);
   return pace;
 }
 
@@ -1407,23 +1461,29 @@ CUTPROOF_DEVICE inline Float3 advance_particle(const DeviceView& w, const Pace& 
   Float3 next = free;
   if constexpr (kContacts) {
     const float side = particle.predicted.w;
+    const Float3 start = xyz(particle.start), free_place = come_to(pace, start, free);
+    Float3 push;
     if (side == 0) {
       next = x;  // a held particle stays where its grip has put it
+      push = come_to(pace, start, next) - free_place;
     } else {
       const RestPoint rest = {pace.h, grid_node(pace, particle.node)};
-      Float3 wanted = free;
+      const Float3 plain_place = come_to(pace, start, plain);
+      Float3 wanted = free_place;
       if constexpr (kAccelerated) {
         // Where several answers are right, the way there decides: touched particles go the plain way.
         if (now.combined && path_matters(contacts)) {
           bool touched = false;
           CUTPROOF_ROLLED
           for (int k = 0; k < 2; ++k) {
-            touched = touched || contacts_detail::touches(contacts, rest, k == 0 ? free : plain, side);
+            touched = touched || contacts_detail::touches(contacts, rest, k == 0 ? free_place : plain_place, side);
           }
-          if (touched) wanted = plain;
+          if (touched) wanted = plain_place;
         }
       }
-      next = next_position(contacts, rest, wanted, side, xyz(particle.start), x);
+      const Float3 place = next_position(contacts, rest, wanted, side, start, come_to(pace, start, x));
+      push = place - free_place;
+      next = ahead_of(pace, place, free_place, free);
     }
     const Float3 before = xyz(particle.pushed);
     Float3 carried = (now.implicit ? now.s : 1.0f) * before;
@@ -1431,7 +1491,7 @@ CUTPROOF_DEVICE inline Float3 advance_particle(const DeviceView& w, const Pace& 
       if (now.combined) carried = now.combination(carried, before, xyz(particle.pushed_earlier));
       if (now.kept) w.pushed_earlier[o] = particle.pushed;
     }
-    w.pushed[o] = with_w(carried + (next - free), 0.0f);
+    w.pushed[o] = with_w(carried + push, 0.0f);
   }
   w.position[o] = with_w(next, particle.at.w);
   return next;
@@ -1665,7 +1725,9 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
       near = near || !(way_along(plain.of(axis), head.radius) <= kOfRoom * room) ||
              (now.combined && !(way_along(next.of(axis), head.radius) <= kOfRoom * room));
     });
+    // (With retardation x lies between y and where it began, which is not at hand: resolved, nothing is left out.)
     if (team.any(near)) {
+      if (pace.share != 1.0f) return true;
       const Contacts contacts = contacts_of(w, pace, substep);
       const int side = w.group_side[g];
       CUTPROOF_ROLLED

@@ -53,7 +53,7 @@ struct BodyConstants {
   Solver solver;
   Acceleration acceleration;
   int substeps, iterations;
-  float stiffness, relaxation, damping;
+  float stiffness, relaxation, damping, retardation;
   Float3 gravity;
   Criterion criterion;
   RemovedEnds remove;
@@ -103,11 +103,11 @@ struct alignas(128) Pace {
   int substeps, iterations;  // 0: its schedule is over
   int frame;
   float h, per_h;
-  float dt, kdt2;
+  float ahead, share;           // dt + τ: from where the substep begins to y; dt / (dt + τ): of this way to x
   float decay, decay_per_dt;    // decay: e^(-c dt)
   float held_alpha, held_beta;  // step.cuh, how much held particles are pushed
   float s;                      // pull towards the goal (docs/design/method.md §3)
-  Float3 fall;                  // dt² · gravity
+  Float3 fall;                  // dt (dt + τ) · gravity
   Solver solver;
   Acceleration acceleration;
   int nodes[2];

@@ -72,6 +72,7 @@ void add_constants(StagingBuffers& staging, const Setup& setup, const State& sta
   body.stiffness = f(setup.step.stiffness);
   body.relaxation = f(setup.step.relaxation);
   body.damping = f(setup.step.damping);
+  body.retardation = f(setup.step.retardation);
   body.gravity = f(setup.step.gravity);
   body.criterion = setup.detect.criterion;
   body.remove = setup.detect.remove;

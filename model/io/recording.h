@@ -13,7 +13,7 @@
 namespace cutproof::io {
 
 // What is written, and the oldest that is read; a field with a later `since` keeps its default.
-inline constexpr int32_t kFormatVersion = 6;
+inline constexpr int32_t kFormatVersion = 7;
 inline constexpr int32_t kOldestFormatVersion = 3;
 
 // One moment of one body: the state after a span of stages. Who records a run keeps one after each stage that was due

@@ -155,6 +155,13 @@ void describe(auto& v, StepParameters& s) {
                            "energy need not fall in every one (method.md §11). `implicit` only: left out, it is `none` "
                            "with `published`, and in a scene of version 1."});
   v.field(s.damping, {"damping", "c: velocities decay as exp(−c t).", between(0, 1e9, "1/s")});
+  v.field(
+      s.retardation,
+      {"retardation",
+       "τ: elasticity acts on x + τ v, so deformations fade and not motion as a whole (Kelvin and Voigt's material, "
+       "of viscosity τ times its elastic modulus). What the time step damps is then less than what the material "
+       "does, and cuts converge in time (method.md §3). `implicit` only.",
+       between(0, 1e3, "s")});
   v.field(s.gravity, {"gravity", "In the body's frame.", between(-1e6, 1e6, "m/s²")});
 }
 

@@ -218,6 +218,11 @@ void check(const StepParameters& s, const Place& at) {
         .fail("The solver \"published\" has no converged answer that it could reach sooner.",
               "Choose \"solver\": \"implicit\", or \"acceleration\": \"none\".");
   }
+  if (s.solver == Solver::published && s.retardation != 0) {
+    at.inner("retardation")
+        .fail("The solver \"published\" has no elastic modulus, and so no viscosity.",
+              "Choose \"solver\": \"implicit\", or leave \"retardation\" out.");
+  }
 }
 
 void check(const DetectFields& s, const Place& at) {

@@ -167,6 +167,9 @@ Defect parameter_defect(const Setup& setup) {
   if (setup.step.solver == Solver::published && setup.step.acceleration != Acceleration::none) {
     return SetupDefect{"step/acceleration", "The solver \"published\" has no acceleration."};
   }
+  if (setup.step.solver == Solver::published && setup.step.retardation != 0) {
+    return SetupDefect{"step/retardation", "The solver \"published\" has no elastic modulus, and so no viscosity."};
+  }
   if (setup.detect.criterion != Criterion::distance && setup.detect.remove != RemovedEnds::both) {
     return SetupDefect{"detect/remove", fmt::format("The criterion \"{}\" asks particles, and not edges.",
                                                     name_of(setup.detect.criterion))};

@@ -164,7 +164,8 @@ ContactStage::ContactStage(const SubstepProblem& problem)
     : problem_(problem), mass_(at(problem.clusters.count()), 0.0) {
   double extent = 0;
   for (const Vec3& x : problem.predicted) extent = std::max(extent, norm(x));
-  at_rest_ = std::max(kAtRest * problem.body.grid.spacing, kRestRounds * kUnitRoundoff * extent);
+  // What rounds x is as many times greater in y as that lies farther off.
+  at_rest_ = std::max(kAtRest * problem.body.grid.spacing, kRestRounds * kUnitRoundoff * extent) / problem.share;
   for (int32_t c = 0; c < problem.clusters.count(); ++c) {
     for (const int32_t i : problem.clusters.of(c)) mass_[at(c)] += problem.rest.weight[at(i)];
   }
@@ -182,14 +183,15 @@ ContactStage::Places ContactStage::places(const std::vector<Vec3>& turned, const
     for (const int32_t c : clusters) sum += center[at(c)];
     if (!clusters.empty()) {
       const Vec3 goal = sum / static_cast<double>(clusters.size()) + turned[at(i)];
-      result.free[at(i)] += problem_.s * (goal - result.free[at(i)]);
+      const Vec3 from = problem_.predicted_ahead[at(i)];
+      result.free[at(i)] = problem_.back(i, from + problem_.s * (goal - from));
     }
     result.x[at(i)] = problem_.placed(i, result.free[at(i)]);
   }
   for (int32_t c = 0; c < problem_.clusters.count(); ++c) {
     Vec3 sum;
     for (const int32_t i : problem_.clusters.of(c)) {
-      sum += problem_.rest.weight[at(i)] * (result.x[at(i)] - center[at(c)]);
+      sum += problem_.rest.weight[at(i)] * (problem_.ahead(i, result.x[at(i)]) - center[at(c)]);
     }
     result.left.push_back(sum / mass_[at(c)]);
     result.most = std::max(result.most, norm(result.left.back()));

@@ -93,17 +93,29 @@ class LinearStage {
     factor_[at(axis)] = std::move(same);
   }
 
-  // The sum over a particle's clusters of w · (its coordinate, as far as it does not depend on t).
+  // One coordinate of where elasticity acts on a particle that is at x, and the other way.
+  double ahead(int32_t i, int axis, double x) const {
+    Vec3 place = problem_.start[at(i)];
+    place[axis] = x;
+    return problem_.ahead(i, place)[axis];
+  }
+  double back(int32_t i, int axis, double y) const {
+    Vec3 place = problem_.start[at(i)];
+    place[axis] = y;
+    return problem_.back(i, place)[axis];
+  }
+
+  // The sum over a particle's clusters of w · (its coordinate of y, as far as it does not depend on t).
   double known_part(int32_t i, int axis, const std::vector<Vec3>& turned) const {
     switch (fixed_[at(axis)][at(i)]) {
       case kOnLowWall:
-        return problem_.low[at(axis)];
+        return ahead(i, axis, problem_.low[at(axis)]);
       case kOnHighWall:
-        return problem_.high[at(axis)];
+        return ahead(i, axis, problem_.high[at(axis)]);
       case kGiven:
-        return problem_.predicted[at(i)][axis];
+        return problem_.predicted_ahead[at(i)][axis];
       default:
-        return (1 - problem_.s) * problem_.predicted[at(i)][axis] + problem_.s * turned[at(i)][axis];
+        return (1 - problem_.s) * problem_.predicted_ahead[at(i)][axis] + problem_.s * turned[at(i)][axis];
     }
   }
 
@@ -114,7 +126,7 @@ class LinearStage {
     double sum = 0;
     for (const int32_t c : clusters) sum += t[at(c)];
     const double goal = sum / static_cast<double>(clusters.size()) + turned[at(i)][axis];
-    return (1 - problem_.s) * problem_.predicted[at(i)][axis] + problem_.s * goal;
+    return back(i, axis, (1 - problem_.s) * problem_.predicted_ahead[at(i)][axis] + problem_.s * goal);
   }
 
   // One coordinate of all particles. Particles that stand on a wall are fixed there; the rest is solved; who stands
@@ -288,19 +300,21 @@ double substep_energy(const Setup& setup, const State& state, const std::vector<
 std::vector<Vec3> substep_gradient(const Setup& setup, const State& state, const std::vector<Vec3>& x) {
   const SubstepProblem problem(setup, state);
   const Poses poses = poses_at(problem, x, state.clusters.rotation);
+  const std::vector<Vec3> y = problem.ahead(x);
   std::vector<Vec3> gradient(x.size());
   for (int32_t c = 0; c < problem.clusters.count(); ++c) {
     auto offset = problem.offset.begin() + problem.clusters.offsets[at(c)];
     for (const int32_t i : problem.clusters.of(c)) {
-      const Vec3 d = x[at(i)] - poses.center[at(c)] - poses.rotation[at(c)] * *offset++;
+      const Vec3 d = y[at(i)] - poses.center[at(c)] - poses.rotation[at(c)] * *offset++;
       gradient[at(i)] += problem.stiffness * problem.rest.weight[at(i)] * d;
     }
   }
   for (int32_t i = 0; i < problem.body.particle_count(); ++i) {
     if (!problem.is_free(i)) continue;
-    const Vec3 d = x[at(i)] - problem.predicted[at(i)];
-    gradient[at(i)] += problem.body.mass[at(i)] / (problem.dt * problem.dt) * d;
+    const Vec3 d = y[at(i)] - problem.predicted_ahead[at(i)];
+    gradient[at(i)] += problem.body.mass[at(i)] / (problem.dt * (problem.dt + problem.retardation)) * d;
   }
+  for (Vec3& of_particle : gradient) of_particle = of_particle / problem.share;  // y moves so much more than x
   return gradient;
 }
 

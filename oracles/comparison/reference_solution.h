@@ -61,7 +61,8 @@ SubstepAnswer substep_answer(const Setup& setup, const State& state);
 // the state; it is the free motion, before contacts: walls bound x, and held particles have no inertia. Blade and
 // friction do not enter it. Throws if the solver is not implicit.
 double substep_energy(const Setup& setup, const State& state, const std::vector<Vec3>& x);
-// Its gradient [N]: t and R being the best, m (x - x~) / dt² + k Σ_c w (x - t - R (X - T)).
+// Its gradient with respect to x [N]: t and R being the best, m (x - x~) / dt² + k Σ_c w (x - t - R (X - T)), and with
+// retardation (m (y - y~) / (dt (dt + τ)) + k Σ_c w (y - t - R (X - T))) (dt + τ) / dt.
 std::vector<Vec3> substep_gradient(const Setup& setup, const State& state, const std::vector<Vec3>& x);
 
 // The limit of the plain iteration, in double, written down a second time without reference_cpu/: iterates until the

@@ -73,6 +73,8 @@ SubstepProblem::SubstepProblem(const Setup& setup, const State& state)
     : body(checked(setup, state).body),
       clusters(state.clusters),
       dt(setup.substep_length[at(state.frame)]),
+      retardation(setup.step.retardation),
+      share(dt / (dt + retardation)),
       stiffness(setup.step.stiffness),
       alive(state.alive),
       held(at(body.particle_count()), 0),
@@ -84,7 +86,7 @@ SubstepProblem::SubstepProblem(const Setup& setup, const State& state)
       high{kInfinity, kInfinity, kInfinity},
       contacts(setup, lowered(setup, state), setup.walls) {
   const auto index = at(state.frame * setup.step.substeps);
-  const double kdt2 = stiffness * dt * dt;
+  const double kdt2 = stiffness * dt * (dt + retardation);
   s = kdt2 / (1 + kdt2);
   for (const Wall& wall : setup.walls) {
     const auto axis = at(wall.axis);
@@ -105,10 +107,20 @@ SubstepProblem::SubstepProblem(const Setup& setup, const State& state)
     }
   }
 
+  predicted_ahead = ahead(predicted);
+
   for (int32_t c = 0; c < clusters.count(); ++c) {
     const Vec3 center = cluster_means(rest, clusters, start, c).rest;
     for (const int32_t i : clusters.of(c)) offset.push_back(rest.position[at(i)] - center);
   }
+}
+
+std::vector<Vec3> SubstepProblem::ahead(const std::vector<Vec3>& x) const {
+  std::vector<Vec3> y = x;
+  for (int32_t i = 0; i < body.particle_count(); ++i) {
+    if (alive[at(i)]) y[at(i)] = ahead(i, x[at(i)]);
+  }
+  return y;
 }
 
 namespace {
@@ -142,13 +154,14 @@ std::vector<Vec3> first_positions(const SubstepProblem& problem) {
 
 Poses poses_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const std::vector<Mat3>& previous) {
   const Clusters& clusters = problem.clusters;
+  const std::vector<Vec3> y = problem.ahead(x);
   Poses poses;
   for (int32_t c = 0; c < clusters.count(); ++c) {
-    const Vec3 center = cluster_means(problem.rest, clusters, x, c).current;
+    const Vec3 center = cluster_means(problem.rest, clusters, y, c).current;
     Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
     auto offset = problem.offset.begin() + clusters.offsets[at(c)];
     for (const int32_t i : clusters.of(c)) {
-      a += as_eigen(problem.rest.weight[at(i)] * (x[at(i)] - center)) * as_eigen(*offset++).transpose();
+      a += as_eigen(problem.rest.weight[at(i)] * (y[at(i)] - center)) * as_eigen(*offset++).transpose();
     }
     poses.center.push_back(center);
     poses.rotation.push_back(best_rotation(a, previous[at(c)]));
@@ -177,7 +190,7 @@ std::vector<Vec3> goals_of(const SubstepProblem& problem, const Poses& poses) {
   for (int32_t i = 0; i < problem.body.particle_count(); ++i) {
     const auto clusters = problem.memberships.of(i);
     if (clusters.empty()) {
-      goal[at(i)] = problem.predicted[at(i)];
+      goal[at(i)] = problem.predicted_ahead[at(i)];
       continue;
     }
     Vec3 sum;
@@ -193,27 +206,28 @@ std::vector<Vec3> plain_iterate(const SubstepProblem& problem, const std::vector
   std::vector<Vec3> next = x;
   for (int32_t i = 0; i < problem.body.particle_count(); ++i) {
     if (!problem.is_free(i)) continue;
-    const Vec3 from = problem.predicted[at(i)];
-    next[at(i)] = problem.placed(i, from + problem.s * (goal[at(i)] - from), &x[at(i)]);
+    const Vec3 from = problem.predicted_ahead[at(i)];
+    next[at(i)] = problem.placed(i, problem.back(i, from + problem.s * (goal[at(i)] - from)), &x[at(i)]);
   }
   return next;
 }
 
 double energy_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const Poses& poses) {
+  const std::vector<Vec3> y = problem.ahead(x);
   double inertial = 0, elastic = 0;
   for (int32_t i = 0; i < problem.body.particle_count(); ++i) {
     if (!problem.is_free(i)) continue;
-    const Vec3 d = x[at(i)] - problem.predicted[at(i)];
+    const Vec3 d = y[at(i)] - problem.predicted_ahead[at(i)];
     inertial += problem.body.mass[at(i)] * dot(d, d);
   }
   for (int32_t c = 0; c < problem.clusters.count(); ++c) {
     auto offset = problem.offset.begin() + problem.clusters.offsets[at(c)];
     for (const int32_t i : problem.clusters.of(c)) {
-      const Vec3 d = x[at(i)] - poses.center[at(c)] - poses.rotation[at(c)] * *offset++;
+      const Vec3 d = y[at(i)] - poses.center[at(c)] - poses.rotation[at(c)] * *offset++;
       elastic += problem.rest.weight[at(i)] * dot(d, d);
     }
   }
-  return inertial / (2 * problem.dt * problem.dt) + problem.stiffness / 2 * elastic;
+  return inertial / (2 * problem.dt * (problem.dt + problem.retardation)) + problem.stiffness / 2 * elastic;
 }
 
 }  // namespace cutproof::oracles

@@ -23,11 +23,14 @@ struct SubstepProblem {
   const Body& body;
   const Clusters& clusters;
   double dt = 0;
+  double retardation = 0;  // τ
+  double share = 1;        // dt / (dt + τ)
   double stiffness = 0;
-  double s = 0;  // k dt² / (1 + k dt²)
+  double s = 0;  // k dt (dt + τ) / (1 + k dt (dt + τ))
   std::vector<uint8_t> alive, held;
   std::vector<Vec3> start;      // x_prev
   std::vector<Vec3> predicted;  // x~ of method.md §3, before contacts; of held particles, where the grip puts them
+  std::vector<Vec3> predicted_ahead;  // its y~
   WeightedRest rest;
   std::vector<Vec3> offset;  // [members] X_i − T_c
   Memberships memberships;
@@ -36,6 +39,10 @@ struct SubstepProblem {
   std::vector<ContactModel::Began> began;  // [n]
 
   bool is_free(int32_t i) const { return alive[at(i)] && !held[at(i)]; }
+  // Elasticity acts on y = x + τ (x − x_prev) / dt. Without retardation the two are one.
+  Vec3 ahead(int32_t i, Vec3 x) const { return share == 1 ? x : start[at(i)] + (x - start[at(i)]) / share; }
+  Vec3 back(int32_t i, Vec3 y) const { return share == 1 ? y : start[at(i)] + share * (y - start[at(i)]); }
+  std::vector<Vec3> ahead(const std::vector<Vec3>& x) const;
   double clamped(double value, int axis) const { return std::clamp(value, low[at(axis)], high[at(axis)]); }
   // Where contacts let a free particle be that would go to `free`. `present`, if given: where it is, which it does not
   // leave for what is worse.
@@ -51,7 +58,7 @@ struct Poses {
   std::vector<Vec3> center;    // t_c
   std::vector<Mat3> rotation;  // R_c
 };
-// The best at positions x. Where many rotations are, the one nearest to `previous`.
+// The best where elasticity acts when particles are at x. Where many rotations are, the one nearest to `previous`.
 Poses poses_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const std::vector<Mat3>& previous);
 
 // [n] the mean over a particle's clusters of R_c (X_i − T_c), to which the mean of t_c is added to give g_i.
@@ -60,7 +67,7 @@ std::vector<Vec3> turned_offsets(const SubstepProblem& problem, const std::vecto
 // One plain iteration from x, whose poses are given.
 std::vector<Vec3> plain_iterate(const SubstepProblem& problem, const std::vector<Vec3>& x, const Poses& poses);
 
-// E at positions x with the best t and R there [kg m²/s²]. Held particles have no inertia: their positions are given.
+// E at positions x with these t and R [kg m²/s²]. Held particles have no inertia: their positions are given.
 double energy_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const Poses& poses);
 
 }  // namespace cutproof::oracles

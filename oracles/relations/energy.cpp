@@ -31,16 +31,18 @@ Verdict energy_is_monotone(Backend& backend, const Setup& setup, const State& gi
 
     double mass = 0;
     for (std::size_t i = 0; i < state.alive.size(); ++i) mass += state.alive[i] != 0 ? single.body.mass[i] : 0;
-    const double dt = single.substep_length[0], k = single.step.stiffness;
+    const double dt = single.substep_length[0], k = single.step.stiffness, ahead = dt + single.step.retardation;
+    // Of E by x, for each unit of mass: it is quadratic in y, which moves (dt + τ) / dt times as far.
+    const double curvature = (1 / (dt * ahead) + k) * (ahead / dt) * (ahead / dt);
     const auto terms = static_cast<double>(state.clusters.members.size() + state.x.size());
-    // By how much rounding may move the energy of an iterate that it moves by b: Σ |∇E| b + (1 / dt² + k) / 2 Σ m b².
+    // By how much rounding may move the energy of an iterate that it moves by b: Σ |∇E| b + κ / 2 Σ m b², κ as above.
     const auto rounding_of = [&](const std::vector<Vec3>& x, const std::vector<double>& bound) {
       const std::vector<Vec3> gradient = substep_gradient(single, start, x);
       double sum = 0;
       for (std::size_t i = 0; i < x.size(); ++i) {
         if (state.alive[i] == 0) continue;
         const double off = bound[i] * single.body.grid.spacing;
-        sum += norm(gradient[i]) * off + (1 / (dt * dt) + k) * single.body.mass[i] * off * off / 2;
+        sum += norm(gradient[i]) * off + curvature * single.body.mass[i] * off * off / 2;
       }
       return sum;
     };
@@ -58,12 +60,13 @@ Verdict energy_is_monotone(Backend& backend, const Setup& setup, const State& gi
       scale.unit_roundoff = kUnitRoundoff;
       const double rho = 2 * goal_rounding(scale);
       const double evaluation =
-          rho * (std::sqrt(2 * mass * energy) / dt + std::sqrt(2 * k * mass * energy)) + terms * kUnitRoundoff * energy;
+          rho * (ahead / dt) * (std::sqrt(2 * mass * energy / (dt * ahead)) + std::sqrt(2 * k * mass * energy)) +
+          terms * kUnitRoundoff * energy;
       // E is isotropic in each particle: what a place was allowed to be worse.
       double raised = 0;
       for (std::size_t i = 0; i < end.x.size(); ++i) {
         if (state.alive[i] == 0) continue;
-        raised += (1 / (dt * dt) + k) / 2 * single.body.mass[i] * again.step->outcome.raised[i];
+        raised += curvature / 2 * single.body.mass[i] * again.step->outcome.raised[i];
       }
       const double bound = previous_rounding + rounding + evaluation + raised;
       const double growth = iteration == 0 ? 0 : energy - previous;

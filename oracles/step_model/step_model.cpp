@@ -204,6 +204,7 @@ class StepModel::Run {
       }
       parameter_off_ = kParameterRounds * u_ * lasting_();
       step_off_ = u_ * lasting_();
+      if (setup_.step.retardation > 0) share_off_ = kParameterRounds * u_ * lasting_();
     }
   }
 
@@ -284,13 +285,15 @@ class StepModel::Run {
   Decisions decisions_;
   const bool stores_positions_;
   StepOutcome out_;
+  std::vector<Vec3> y_;                // [n] where elasticity acts
   std::vector<Vec3> sum_;              // [n] Σ_c t + R (X - T)
   std::vector<double> goal_rounding_;  // [n] Σ_c of squares
   std::vector<double> rounding_now_;   // [n] of this substep
   std::vector<double> own_now_;        // [n] of it, the particle's own
   double shared_rounding_ = 0;         // of this substep, of Σ m goal: of squares
   std::vector<Vec3> rest_off_;         // [m]
-  double parameter_off_ = 0, step_off_ = 0;
+  double parameter_off_ = 0, step_off_ = 0, share_off_ = 0;
+  double share_ = 1;           // dt / (dt + τ): of the way to y, x has come so far
   double turn_amplitude_ = 0;  // of the last rotation [rad]
   uint64_t time_ = 0;          // evaluations so far
   int32_t substep_ = 0, iteration_ = 0;
@@ -386,7 +389,7 @@ void StepModel::Run::match_shapes(int32_t s, int32_t j) {
   substep_ = s;
   iteration_ = j;
   const Clusters& clusters = before_.clusters;
-  const std::vector<Vec3>& x = out_.x;
+  const std::vector<Vec3>& x = y_;
   std::fill(sum_.begin(), sum_.end(), Vec3{});
   if (!disturbed_) std::fill(goal_rounding_.begin(), goal_rounding_.end(), 0.0);
   if (is_last) out_.shape.resize(model_.clusters_.size());
@@ -438,7 +441,7 @@ void StepModel::Run::match_shapes(int32_t s, int32_t j) {
         }
       }
       t += noise_.off((2 * u_) * center, mean_amplitude);
-      r = rotation_of(c, a, as_eigen(sum), size.sum(), u_ * farthest * cluster.arms, is_last);
+      r = rotation_of(c, a, as_eigen(sum), size.sum(), u_ * farthest / share_ * cluster.arms, is_last);
       const Vec3 turn = turn_amplitude_ * noise_.vector();
       if (cluster.extent != Cluster::Extent::point) {
         for (int column = 0; column < 3; ++column) {
@@ -447,7 +450,7 @@ void StepModel::Run::match_shapes(int32_t s, int32_t j) {
         }
       }
     } else {
-      r = rotation_of(c, a, a, size.sum(), u_ * farthest * cluster.arms, is_last);
+      r = rotation_of(c, a, a, size.sum(), u_ * farthest / share_ * cluster.arms, is_last);
     }
     out_.rotation[at(c)] = r;
     if (disturbed_) t -= r * rest_off_[at(c)];
@@ -472,7 +475,7 @@ void StepModel::Run::substep(int32_t s) {
   const int64_t index = before_.frame * step.substeps + s;
   const double dt = setup_.substep_length[at(before_.frame)] * (1 + step_off_);
   const bool implicit = step.solver == Solver::implicit;
-  const double kdt2 = step.stiffness * dt * dt * (1 + parameter_off_);
+  const double kdt2 = step.stiffness * dt * (dt + step.retardation) * (1 + parameter_off_);
   const double pull = implicit ? kdt2 / (1 + kdt2) : step.relaxation;
   const bool accelerated = step.acceleration == Acceleration::chebyshev;
   const std::vector<ChebyshevWeights> weights =
@@ -490,7 +493,11 @@ void StepModel::Run::substep(int32_t s) {
   }
 
   const std::vector<Vec3> start = out_.x;
-  std::vector<Vec3> predicted(start.size());
+  const bool retarded = step.retardation > 0;
+  share_ = retarded ? dt / (dt + step.retardation) * (1 + share_off_) : 1;
+  const auto ahead = [&](std::size_t i, Vec3 x) { return retarded ? start[i] + (x - start[i]) / share_ : x; };
+  const auto back = [&](std::size_t i, Vec3 y) { return retarded ? start[i] + share_ * (y - start[i]) : y; };
+  std::vector<Vec3> predicted(start.size()), predicted_ahead(start.size());
   std::vector<ContactModel::Began> began(start.size());
   // Of a disturbed run: Σ m times displacements by contacts and grips, carried on as backends do.
   Vec3 pushed, pushed_earlier;
@@ -503,6 +510,8 @@ void StepModel::Run::substep(int32_t s) {
     double amplitude = more;
     if (!(x == free) && contacts.has_plate()) amplitude += kContactRounds * u_ * norm(x - move.to.edge);
     const Vec3 place = stored(i, x);
+    // A backend may keep y, which it rounds by u |y| <= u (|x| + |start|) / share, and make x of it.
+    if (retarded) amplitude += u_ * (norm(place) + norm(stored(i, start[i])) + 3 * norm(x - start[i]));
     amplitude += kUnitRoundoff * norm(x);  // states hold places in double precision, whatever a backend stores
     if (disturbed_) {
       x += noise_.off(u_ * place, amplitude);
@@ -512,6 +521,7 @@ void StepModel::Run::substep(int32_t s) {
       own_now_[i] += square;
     }
   };
+  y_ = start;
   for (std::size_t i = 0; i < start.size(); ++i) {
     if (before_.alive[i] == 0) continue;
     const Vec3 inertia = dt * out_.v[i] + (dt * dt) * step.gravity;
@@ -529,10 +539,12 @@ void StepModel::Run::substep(int32_t s) {
                                    : predicted[i];
     const bool is_pushed = !(out_.x[i] == predicted[i]);
     settle(i, predicted[i], out_.x[i], 2 * u_ * norm(inertia));
+    predicted_ahead[i] = ahead(i, predicted[i]);
+    y_[i] = ahead(i, out_.x[i]);
     if (disturbed_ && is_pushed) pushed += body_.mass[i] * (out_.x[i] - predicted[i]);
   }
 
-  std::vector<Vec3> earlier = out_.x, now;
+  std::vector<Vec3> earlier = y_, now;
   for (int32_t j = 0; j < step.iterations; ++j) {
     ++time_;
     // The implicit solver draws what earlier iterations have rounded to the prediction; others keep it.
@@ -542,21 +554,22 @@ void StepModel::Run::substep(int32_t s) {
       shared_rounding_ *= pull * pull;
     }
     match_shapes(s, j);
-    now = out_.x;
+    now = y_;
     const bool combined = accelerated && j > 0;
     Vec3 pushed_now;
     for (std::size_t i = 0; i < start.size(); ++i) {
       if (before_.alive[i] == 0) continue;
       const double holders = model_.holders_[i];
       const Vec3 goal = holders > 0 ? sum_[i] / holders : now[i];
-      const Vec3 from = implicit ? predicted[i] : now[i];
-      const Vec3 plain = from + pull * (goal - from);
+      const Vec3 from = implicit ? predicted_ahead[i] : now[i];
+      const Vec3 plain_ahead = from + pull * (goal - from), plain = back(i, plain_ahead);
       Vec3 free = plain;
-      double amplitude = u_ * pull * (2 * norm(goal - from) + model_.lever_[i]);
+      double amplitude = share_ * u_ * pull * (2 * norm(goal - from) + model_.lever_[i]);
       if (combined) {
-        const Vec3 drawn = weights[at(j)].pull * (plain - now[i]), swung = weights[at(j)].carry * (now[i] - earlier[i]);
-        free = now[i] + drawn + swung;
-        amplitude += kParameterRounds * u_ * (norm(drawn) + norm(swung));
+        const Vec3 drawn = weights[at(j)].pull * (plain_ahead - now[i]);
+        const Vec3 swung = weights[at(j)].carry * (now[i] - earlier[i]);
+        free = back(i, now[i] + drawn + swung);
+        amplitude += share_ * kParameterRounds * u_ * (norm(drawn) + norm(swung));
       }
       // A backend knows how far a contact or a grip has displaced a particle from where it has rounded it to.
       const auto note_push = [&] {
@@ -569,6 +582,7 @@ void StepModel::Run::substep(int32_t s) {
         continue;
       }
       Vec3& next = out_.x[i];
+      const Vec3 present_place = next;
       next = free;
       round(Rounded::place, i);
       Vec3 wanted = free;
@@ -583,15 +597,18 @@ void StepModel::Run::substep(int32_t s) {
           if (touched) wanted = plain;
         }
         if (touched) {
-          ContactModel::Present present = {now[i], norm(stored(i, now[i])), u_ - kUnitRoundoff};
+          ContactModel::Present present = {present_place, norm(stored(i, present_place)), u_ - kUnitRoundoff};
           next = contacts.place(wanted, began[i], &present, decisions_, hold_of(i));
           if (s + 1 == step.substeps && j + 1 == step.iterations) out_.raised[i] = present.raised;
         }
       }
       const bool is_pushed = !(next == free);
       settle(i, wanted, next, amplitude);
+      y_[i] = ahead(i, next);
       if (is_pushed) note_push();
-      if (!disturbed_ && holders > 0) rounding_now_[i] += pull * pull * goal_rounding_[i] / (holders * holders);
+      if (!disturbed_ && holders > 0) {
+        rounding_now_[i] += share_ * share_ * pull * pull * goal_rounding_[i] / (holders * holders);
+      }
     }
     earlier = now;
     Vec3 carried = (implicit ? pull : 1.0) * pushed;
@@ -603,7 +620,7 @@ void StepModel::Run::substep(int32_t s) {
   }
 
   const double decay = std::exp(-step.damping * dt);
-  double pushed_rounding = pull * pull * shared_rounding_, summed = 0;
+  double pushed_rounding = share_ * share_ * pull * pull * shared_rounding_, summed = 0;
   const double carried_on = step.substeps - s, carrying = kParameterRounds * std::sqrt(step.iterations + 1.0);
   for (std::size_t i = 0; i < start.size(); ++i) {
     if (before_.alive[i] == 0) continue;

@@ -26,6 +26,7 @@ class Recording:
             h=h, mass=given["body/mass"][:], rest=h * place.astype(float), edges=grid_edges(place),
             solver=text(step["solver"]), substeps=int(step["substeps"]), iterations=int(step["iterations"]),
             stiffness=float(step["stiffness"]), acceleration=text(step["acceleration"]), damping=float(step["damping"]),
+            retardation=float(step.get("retardation", 0)),
             gravity=step["gravity"][:], criterion=text(detect["criterion"]), remove=text(detect["remove"]),
             epsilon=float(detect["epsilon"]), without_blade=bool(detect["without_blade"]),
             strain=float(detect["strain"]), debris=int(given["split"].attrs["debris"]),

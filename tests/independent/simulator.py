@@ -23,6 +23,7 @@ class Wrong:
     late_gravity: bool = False  # gravity moves a particle one substep later than it should
     decay: float | None = None  # of velocities in a substep, whatever dt
     detect_late: bool = False  # detection sees the positions at which the frame began
+    retardation: float = 1.0  # times the time
     keep_cut_clusters: bool = False  # clusters that lost a particle are not split
 
 
@@ -293,13 +294,17 @@ class Simulator:
         x = contacts.project(predicted)
         x[:, held] = (start + shift)[:, held]
         x[:, still] = start[:, still]
-        stiff = setup.stiffness * dt * dt
+        # Elasticity acts τ later: at y = x + τ v, v = (x - start) / dt, where the same force makes the same motion.
+        lead = setup.retardation * wrong.retardation / dt
+        to_y, to_x = (lambda x: x + lead * (x - start)), (lambda y: (y + lead * start) / (1 + lead))
+        aim = to_y(predicted)
+        stiff = setup.stiffness * dt * dt * (1 + lead)
         s = stiff / (1 + stiff) if wrong.relaxation is None else wrong.relaxation
         before, omega = x, 1.0
         b = min(s, 0.95)
         rho = b / (2 - b)
         for j in range(setup.iterations if self.solve_to is None else MOST_ITERATIONS):
-            plain = predicted + s * (self.cover.goals(x) - predicted)
+            plain = to_x(aim + s * (self.cover.goals(to_y(x)) - aim))
             if setup.acceleration == "chebyshev" and j > 0:
                 omega = 2 / (2 - rho * rho) if j == 2 else omega if j == 1 else 4 / (4 - rho * rho * omega)
                 mixed = x + omega * 2 / (2 - b) * (plain - x) + (omega - 1) * (x - before)

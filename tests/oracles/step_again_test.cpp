@@ -29,13 +29,15 @@ struct StepScene {
 };
 
 // A bent, spinning block on a floor with friction, held at one end, with a blade that presses its middle.
-StepScene pressed_block(Solver solver = Solver::implicit, Acceleration acceleration = Acceleration::none) {
+StepScene pressed_block(Solver solver = Solver::implicit, Acceleration acceleration = Acceleration::none,
+                        double retardation = 0) {
   StepScene scene{setup_of(block_body(9, 5, 4, kSpacing, 0.002)), {}, {}};
   cutproof::Setup& setup = scene.setup;
   setup.step.solver = solver;
   setup.step.acceleration = acceleration;
   setup.step.gravity = {1, -2, -9.81};
   setup.step.damping = 3;
+  setup.step.retardation = retardation;
   setup.walls = {{.axis = 2, .side = +1, .offset = 0.0102, .friction = 0.4}};
   setup.grips = {{.particles = {0, 9, 18}, .active = {1, 1, 0, 1}, .displacement = {4, Vec3{0.001, 0, 0.0005}}}};
   setup.has_blade = true;
@@ -90,14 +92,46 @@ TEST(AdmissibleStep, IsTheSameHoweverManyRunsGoAtTheSameTime) {
 TEST(AdmissibleStep, IsTheReferencesWithEveryCauseAtWork) {
   for (const Solver solver : {Solver::implicit, Solver::published}) {
     for (const Acceleration acceleration : {Acceleration::none, Acceleration::chebyshev}) {
-      if (solver == Solver::published && acceleration != Acceleration::none) continue;
-      const StepScene scene = pressed_block(solver, acceleration);
-      const Verdict verdict = admissible_step(scene.setup, scene.before, scene.after);
-      expect_holds(verdict);
-      EXPECT_EQ(verdict.undecided, 0);
-      EXPECT_GT(verdict.measured, 0.01 * verdict.bound) << "the bound must be near to what it bounds";
-      EXPECT_LT(verdict.bound, 1e-11) << "[h]";
+      for (const double retardation : {0.0, 0.0004, 0.004, 0.1}) {  // dt is 4 ms
+        if (solver == Solver::published && (acceleration != Acceleration::none || retardation > 0)) continue;
+        const StepScene scene = pressed_block(solver, acceleration, retardation);
+        const Verdict verdict = admissible_step(scene.setup, scene.before, scene.after);
+        expect_holds(verdict);
+        EXPECT_EQ(verdict.undecided, 0);
+        EXPECT_GT(verdict.measured, 0.01 * verdict.bound) << "the bound must be near to what it bounds";
+        EXPECT_LT(verdict.bound, 1e-11) << "[h]";
+      }
     }
+  }
+}
+
+// By as little of the retardation as of stiffness, and by less than its whole where there is none.
+TEST(AdmissibleStep, RejectsAnotherRetardation) {
+  const double dt = pressed_block().setup.substep_length[0];
+  for (const double retardation : {0.1 * dt, dt, 20 * dt}) {
+    const StepScene good = pressed_block(Solver::implicit, Acceleration::none, retardation);
+    StepScene single = good;
+    round_to_single(single.setup.body, single.before);
+    for (const StepScene* scene : {&good, &std::as_const(single)}) {
+      const auto judged = [&](const auto& edit) {
+        StepScene other = *scene;
+        edit(other.setup);
+        other.take_step();
+        if (scene == &single) round_to_single(other.setup.body, other.after);
+        return admissible_step(scene->setup, scene->before, other.after);
+      };
+      expect_holds(judged([](cutproof::Setup&) {}));
+      EXPECT_FALSE(judged([](cutproof::Setup& s) { s.step.retardation *= 1.01; }).holds) << retardation;
+      EXPECT_FALSE(judged([](cutproof::Setup& s) { s.step.retardation = 0; }).holds) << retardation;
+      EXPECT_FALSE(judged([](cutproof::Setup& s) { s.step.stiffness *= 1.001; }).holds) << retardation;
+      EXPECT_FALSE(judged([](cutproof::Setup& s) { s.walls[0].offset += 1e-3 * kSpacing; }).holds) << retardation;
+      EXPECT_FALSE(judged([](cutproof::Setup& s) { s.walls[0].friction *= 1.001; }).holds) << retardation;
+      EXPECT_FALSE(judged([](cutproof::Setup& s) { --s.step.iterations; }).holds) << retardation;
+    }
+    if (retardation > dt) continue;
+    StepScene plain = pressed_block();
+    const StepScene retarded = pressed_block(Solver::implicit, Acceleration::none, 1e-3 * retardation);
+    EXPECT_FALSE(admissible_step(plain.setup, plain.before, retarded.after).holds) << retardation;
   }
 }
 

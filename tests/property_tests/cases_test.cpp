@@ -29,8 +29,8 @@ TEST(Cases, ThatWereSavedBeforeThereWereMoreFieldsHaveThePlainOnes) {
   plain.strokes = {{{0, 0, 0}, {4, 0, 0}, 4, true, Link::apart}};
   json old = json::parse(to_json(plain));
   const std::vector<std::string> later = {
-      "acceleration", "together",  "alpha", "removal", "epsilon", "strain", "solver",         "relaxation",
-      "damping",      "time_step", "pace",  "gravity", "walls",   "grips",  "blade_friction", "remove"};
+      "acceleration", "together",  "alpha", "removal", "epsilon", "strain", "solver",         "relaxation", "damping",
+      "retardation",  "time_step", "pace",  "gravity", "walls",   "grips",  "blade_friction", "remove"};
   for (const std::string& field : later) {
     ASSERT_EQ(old.erase(field), 1u) << field;
     EXPECT_EQ(from_json(old.dump()), plain) << "without " << field;

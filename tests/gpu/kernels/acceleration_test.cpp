@@ -16,56 +16,30 @@
 #include "oracles/oracles.h"
 #include "oracles/relations/relations.h"
 #include "reference_cpu/reference.h"
+#include "tests/gpu/kernels/every_backend.h"
 #include "tests/oracles/comparison/twisted_block.h"
 
 namespace cutproof {
 namespace {
 
+using testing::distance;
+using testing::EveryBackend;
 using testing::obstructed_block;
 using testing::Scene;
 using testing::twisted_block;
 
-struct NamedBackend {
-  std::string name;
-  std::function<std::unique_ptr<Backend>()> make;
-};
-void PrintTo(const NamedBackend& backend, std::ostream* os) { *os << backend.name; }
-
-std::vector<NamedBackend> all_backends() {
-  std::vector<NamedBackend> backends = {{"reference", reference::make_backend},
-                                        {"host", [] { return gpu::make_host_backend(2, {}); }}};
-#if CUTPROOF_HAS_CUDA
-  std::string why;
-  if (!gpu::device_description(why).empty()) backends.push_back({"gpu", [] { return gpu::make_gpu_backend({}); }});
-#endif
-  return backends;
-}
-
-class Accelerated : public ::testing::TestWithParam<NamedBackend> {
+class Accelerated : public EveryBackend {
  protected:
   // The first frame's step with so many iterations.
   State step(cutproof::Setup setup, const State& state, Acceleration acceleration, int32_t iterations) const {
     setup.step.acceleration = acceleration;
     setup.step.iterations = iterations;
-    backend_->load({setup}, {state});
-    backend_->run({Stage::step, Stage::step});
-    return backend_->snapshot().front();
+    return EveryBackend::step(setup, state);
   }
   // What of an error in double precision is asked for [h], and what rounding leaves in single: as in
   // docs/design/tolerances.md, Against the reference.
-  double tolerance(double in_double) const { return backend_->precision() == Precision::binary64 ? in_double : 1e-4; }
-
-  std::unique_ptr<Backend> backend_ = GetParam().make();
+  double tolerance(double in_double) const { return EveryBackend::tolerance(in_double, 1e-4); }
 };
-
-double distance(const Setup& setup, const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-  double greatest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const double apart = norm(a[i] - b[i]);
-    if (!(apart <= greatest)) greatest = apart;  // NaN is greater than everything
-  }
-  return greatest / setup.body.grid.spacing;
-}
 
 void expect_holds(const Verdict& verdict) {
   EXPECT_TRUE(verdict.holds) << verdict.property << ": " << verdict.witness.text;
@@ -303,7 +277,7 @@ TEST_P(Accelerated, KeepsWhatEveryStepMust) {
   EXPECT_EQ(energy.checked, 1) << "only the first iteration is promised";
 }
 
-INSTANTIATE_TEST_SUITE_P(Over, Accelerated, ::testing::ValuesIn(all_backends()),
+INSTANTIATE_TEST_SUITE_P(Over, Accelerated, ::testing::ValuesIn(testing::all_backends()),
                          [](const auto& tested) { return tested.param.name; });
 
 }  // namespace

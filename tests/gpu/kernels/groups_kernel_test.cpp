@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <map>
@@ -762,8 +763,8 @@ TEST(Groups, AreResolvedIfEitherCandidateTouches) {
     HostLauncher launcher;
     begin_frame(launcher, w);
     begin_substep(launcher, w, 0);
-    const Pace& pace = staging.pace.front();
-    const step_detail::Combination combination = step_detail::chebyshev(pace.kdt2, kIteration);
+    const IterationNumbers& numbers = *step_detail::numbers_of(w, 0, kIteration);
+    const step_detail::Combination combination = {numbers.pull, numbers.carry};
     // Where all is now, and where it was that the two lead to the candidate that is wanted.
     const float now = -0.005f;
     const float earlier =
@@ -771,7 +772,7 @@ TEST(Groups, AreResolvedIfEitherCandidateTouches) {
     ASSERT_NEAR(combination(wanted.plain, now, earlier), wanted.accelerated, 1e-6);
     for (int slot = 0; slot < w.slot_capacity; ++slot) {
       w.placement[3 * slot] = w.placement[3 * slot + 1] = {};
-      w.placement[3 * slot + 2] = {0, 0, 0, wanted.plain / pace.s};
+      w.placement[3 * slot + 2] = {0, 0, 0, wanted.plain / staging.pace.front().s};
     }
     const int groups = staging.counters.front().groups;
     ASSERT_GT(groups, 20);
@@ -803,7 +804,7 @@ TEST(Groups, TouchNothingWithinTheirRoom) {
     return Float3{static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
   };
   const float h = 0.01f;
-  int roomy = 0, tight = 0;
+  int roomy = 0, tight = 0, retarded = 0;
   for (int turn = 0; turn < 20'000; ++turn) {
     // A blade with its normal along a diagonal every other time, and a floor.
     const double third = 1 / std::sqrt(3.0);
@@ -832,13 +833,20 @@ TEST(Groups, TouchNothingWithinTheirRoom) {
     Ball ball = {
         {h, node}, single(uniform(random, 0, 0.3) * h * direction()), static_cast<float>(uniform(random, 0, 2) * h)};
     const int side = turn % 5 == 0 ? 0 : uniform(random, -1, 1) < 0 ? -1 : 1;
-    const float room = room_around(contacts, ball, side);
+    // With retardation the ball is of what lies ahead, and what touches is between there and where it began.
+    Pace pace = {};
+    pace.share = turn % 4 == 1 ? static_cast<float>(uniform(random, 0.02, 0.9)) : 1.0f;
+    const Ball began = {
+        {h, node}, single(uniform(random, 0, 0.3) * h * direction()), static_cast<float>(uniform(random, 0, 2) * h)};
+    const float room = step_detail::room_ahead(pace, contacts, began, ball, side);
     if (!(room > 0)) continue;
     ++roomy;
+    if (pace.share < 1) ++retarded;
     // Whether some point of the ball is projected or touches when all of it is moved, the foremost among them.
     const auto meets = [&](const Vec3& moved, const Vec3& way) {
       for (const Vec3& from_middle : {way, direction(), direction()}) {
-        const Float3 d = ball.d + single(moved + double{ball.radius} * from_middle);
+        const Float3 ahead = ball.d + single(moved + double{ball.radius} * from_middle);
+        const Float3 d = step_detail::come_to(pace, began.d + single(double{began.radius} * from_middle), ahead);
         for (const float own : {-1.0f, 1.0f}) {
           if (side != 0 && own != static_cast<float>(side)) continue;
           bool in_turn = false;
@@ -857,6 +865,7 @@ TEST(Groups, TouchNothingWithinTheirRoom) {
     }
   }
   EXPECT_GT(roomy, 5'000);
+  EXPECT_GT(retarded, 1'000);
   EXPECT_GT(tight, 500) << "there is much more room than what is said of it";
 }
 
@@ -888,7 +897,7 @@ TEST(Groups, GiveWhatTheirParticlesAloneGive) {
   Random random(17);
   int carried = 0, resolved = 0, held = 0;
   double worst = 0;
-  for (int trial = 0; trial < 60; ++trial) {
+  for (int trial = 0; trial < 120; ++trial) {
     SCOPED_TRACE(trial);
     cutproof::Setup setup = block_on_floor(trial % 3 == 0 ? 0.0 : uniform(random, 0, 0.03));
     setup.body = fixtures::block(7 + trial % 5, 9, 8, 0.01);
@@ -897,6 +906,9 @@ TEST(Groups, GiveWhatTheirParticlesAloneGive) {
     setup.step.solver = trial % 4 == 3 ? Solver::published : Solver::implicit;
     setup.step.acceleration = trial % 4 == 1 ? Acceleration::chebyshev : Acceleration::none;
     setup.step.damping = trial % 2;
+    if (trial >= 60 && setup.step.solver == Solver::implicit) {
+      setup.step.retardation = std::array{0.1, 1.0, 10.0}[at(trial % 3)] * setup.substep_length.front();
+    }
     if (trial % 5 != 0) {
       setup.has_blade = true;
       setup.blade = {0.06, 0.05, 0.004, trial % 2 == 0 ? 0.2 : 0.0};

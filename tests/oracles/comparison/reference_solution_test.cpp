@@ -110,9 +110,11 @@ TEST(ReferenceSolution, InternalTorqueVanishesAtTheAnswerAndNotOnTheWay) {
 }
 
 TEST(ReferenceSolution, TheReferencesIterationConvergesToIt) {
-  for (const double stiffness : {1e4, 1e5, 1e6}) {
+  for (const auto& [stiffness, retardation] :
+       {std::pair{1e4, 0.0}, {1e5, 0.0}, {1e6, 0.0}, {1e4, 0.001}, {1e4, 0.02}, {1e5, 0.001}, {1e5, 0.02}}) {
     Scene scene = twisted_block(8, 1.0, 1.3, 0.01);
     scene.setup.step.stiffness = stiffness;
+    scene.setup.step.retardation = retardation;
     scene.setup.step.gravity = {0, 0, -9.81};
     const ReferenceSolution answer = reference_solution(scene.setup, scene.state);
     ASSERT_TRUE(answer.converged);
@@ -129,8 +131,10 @@ TEST(ReferenceSolution, TheReferencesIterationConvergesToIt) {
 }
 
 TEST(ReferenceSolution, WallsAndHeldParticlesAreMetExactly) {
-  for (const double stiffness : {1e4, 1e6}) {
+  for (const auto& [stiffness, retardation] :
+       {std::pair{1e4, 0.0}, {1e6, 0.0}, {1e4, 0.001}, {1e4, 0.02}, {1e5, 0.001}}) {
     Scene scene = obstructed_block(stiffness);
+    scene.setup.step.retardation = retardation;
     const ReferenceSolution answer = reference_solution(scene.setup, scene.state);
     ASSERT_TRUE(answer.converged);
     const PlainLimit limit = plain_limit(scene.setup, scene.state, 1e-15, 4000);
@@ -164,8 +168,9 @@ TEST(ReferenceSolution, WallsAndHeldParticlesAreMetExactly) {
 
 // No small change of the answer that walls and grips allow has less energy.
 TEST(ReferenceSolution, NoNeighbourHasLessEnergy) {
-  for (const bool obstructed : {false, true}) {
-    const Scene scene = obstructed ? obstructed_block(1e5) : twisted_block(6, 2.0, 1.5, 0.01);
+  for (const auto& [obstructed, retardation] : {std::pair{false, 0.0}, {true, 0.0}, {false, 0.002}, {true, 0.002}}) {
+    Scene scene = obstructed ? obstructed_block(1e5) : twisted_block(6, 2.0, 1.5, 0.01);
+    scene.setup.step.retardation = retardation;
     const ReferenceSolution answer = reference_solution(scene.setup, scene.state);
     const double lowest = substep_energy(scene.setup, scene.state, answer.x);
     for (int round = 0; round < 60; ++round) {
@@ -192,8 +197,10 @@ Vec3 nearest_on_plate(const Setup& setup, const BladePose& pose, Vec3 x) {
 
 TEST(ReferenceSolution, MeetsThePlainLimitAndTheReferenceUnderABladeAndWithFriction) {
   for (const double friction : {0.0, 0.3, 2.0}) {
-    for (const double stiffness : {1e4, 1e5, 1e6}) {
+    for (const auto& [stiffness, retardation] :
+         {std::pair{1e4, 0.0}, {1e5, 0.0}, {1e6, 0.0}, {1e4, 0.001}, {1e5, 0.001}, {1e4, 0.02}}) {
       Scene scene = pressed_block(stiffness, friction);
+      scene.setup.step.retardation = retardation;
       const ReferenceSolution answer = reference_solution(scene.setup, scene.state);
       ASSERT_TRUE(answer.converged) << stiffness << " " << friction;
       EXPECT_EQ(answer.is_minimum, friction == 0);
