@@ -77,6 +77,7 @@ for part in $parts; do
       try fuzz_dynamics cutproof fuzz --backend gpu --dynamics --cases 10000 --seed 2000001 \
         --save "$results" --json "$results/fuzz_dynamics.json"
       try acceleration acceleration_test --gtest_filter='*/gpu'
+      try retardation retardation_test --gtest_filter='*/gpu'
       try rapidcheck property_tests --gtest_filter='*/gpu*:Cases*:Paths.OfTheDevice*' ;;
     guests)
       for plugin in cuda_components cuda_components_in_a_block; do
@@ -100,6 +101,8 @@ for part in $parts; do
           --backend gpu-eager --threads 1 --cases "${CUTPROOF_SANITIZER_CASES:-128}" --save "$results"
         try "sanitizer_${tool}_step" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof run \
           fixtures/scenes/small_block.json --backend gpu-eager
+        try "sanitizer_${tool}_retarded" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof run \
+          fixtures/scenes/small_block.json --backend gpu-eager --set step.retardation=0.004 --frames 30
       done ;;
     timings)
       try rotations cutproof bench rotations --backend gpu --cases --json "$results/rotations.json"
