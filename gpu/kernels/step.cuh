@@ -358,6 +358,12 @@ CUTPROOF_DEVICE inline void set_held_push(Pace& pace, float kdt2) {
   pace.held_beta = beta;
 }
 
+// Where a particle is that contacts may have put there, with this y. (Not found from y, which would round: what
+// friction holds would creep.)
+CUTPROOF_DEVICE inline Float3 place_of(const DeviceView& w, const Pace& pace, int64_t o, Float3 ahead) {
+  return pace.share == 1.0f ? ahead : xyz(w.place[o]);
+}
+
 // The displacement (y) that contacts, or its grip, let a particle have that is predicted at `predicted`.
 CUTPROOF_DEVICE inline Float3 enter_substep(const DeviceView& w, const Pace& pace, const Contacts& contacts,
                                             const Held& held, const RestPoint& rest, int64_t o, Float4 predicted,
@@ -367,6 +373,7 @@ CUTPROOF_DEVICE inline Float3 enter_substep(const DeviceView& w, const Pace& pac
   const Float3 x = held.active ? start + held.moved : project(contacts, rest, free, predicted.w, start, in_turn);
   const Float3 ahead = ahead_of(pace, x, free, xyz(predicted));
   w.position[o] = with_w(ahead, share);
+  if (pace.share != 1.0f) w.place[o] = with_w(x, 0.0f);
   w.pushed[o] = with_w(x - free, 0.0f);
   return ahead;
 }
@@ -768,14 +775,9 @@ struct Ending {
   Float3 base;
   float lost;
   int state;
-  Held held;
 };
-// substep: the one that ends.
-CUTPROOF_DEVICE inline Ending ending_of(const DeviceView& w, int body, const Pace& pace, const Group& group,
-                                        int substep) {
-  const int g = group.index;
-  Ending ending = {{}, xyz(w.group_base[g]), lost_in_all(w, body, pace), w.group_resolved[g], {}};
-  if (pace.share != 1.0f && ending.state == kHeld) ending.held = held_by(w, pace, group.head.hold_set, substep);
+CUTPROOF_DEVICE inline Ending ending_of(const DeviceView& w, int body, const Pace& pace, int g) {
+  Ending ending = {{}, xyz(w.group_base[g]), lost_in_all(w, body, pace), w.group_resolved[g]};
   if (pace.iterations > 0) ending.map = load_map(w.group_map, g);
   return ending;
 }
@@ -793,7 +795,7 @@ CUTPROOF_DEVICE inline Float4 end_tracked(const DeviceView& w, const Pace& pace,
     pushed = pace.held_alpha * (ahead - predicted) + (pace.held_beta * (predicted - ending.base) - ending.map(r));
     pushed = pace.share * pushed;
   }
-  const Float3 d = ending.held.active ? xyz(start) + ending.held.moved : come_to(pace, xyz(start), ahead);
+  const Float3 d = ending.state == kCarried ? come_to(pace, xyz(start), ahead) : place_of(w, pace, o, ahead);
   end_impulse(w, w.place_particle[o], pace, pushed);
   v = pace.decay_per_dt * (d - xyz(start));
   return with_w(d, start.w);
@@ -830,7 +832,7 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const Devi
       w.group_base[g] = with_w(base, 0.0f);  // how far from it particles are is asked of carried groups only
     }
   } else {
-    const Ending ending = ending_of(w, body, pace, group, substep - 1);
+    const Ending ending = ending_of(w, body, pace, g);
     const float of_each = 1.0f / static_cast<float>(head.holder_count);
     bool before = false, behind = false;  // the blade, when the substep begins
     Float3 began;                         // somewhere among its particles, when the substep begins
@@ -911,13 +913,14 @@ CUTPROOF_DEVICE inline Float4 end_loose(const DeviceView& w, const Pace& pace, i
     return w.displacement[p];
   }
   const Float4 start = w.start[o];
-  Float3 d = come_to(pace, xyz(start), xyz(w.position[o]));
+  const Float3 ahead = xyz(w.position[o]);
+  Float3 d;
   if constexpr (kContacts) {
-    if (pace.share != 1.0f && w.predicted[o].w == 0) {
-      d = xyz(start) + held_by(w, pace, groups_detail::hold_set(w, p), substep - 1).moved;
-    }
+    d = place_of(w, pace, o, ahead);
+    end_impulse(w, p, pace, xyz(w.pushed[o]));
+  } else {
+    d = come_to(pace, xyz(start), ahead);
   }
-  if constexpr (kContacts) end_impulse(w, p, pace, xyz(w.pushed[o]));
   v = pace.decay_per_dt * (d - xyz(start));
   return with_w(d, start.w);
 }
@@ -956,7 +959,7 @@ CUTPROOF_DEVICE void end_group(const AnyTeam& team, const DeviceView& w, int g) 
   if (head.size == 0 || pace.substeps == 0) return;
   if constexpr (kContacts) {
     if (w.group_tracked[g] != kUntouched) {
-      const Ending ending = ending_of(w, body, pace, group, pace.substeps - 1);
+      const Ending ending = ending_of(w, body, pace, g);
       team.each(head.size, [&](int k) {
         const int p = w.place_particle[head.begin + k];
         Float3 v;
@@ -1465,7 +1468,7 @@ CUTPROOF_DEVICE inline Float3 advance_particle(const DeviceView& w, const Pace& 
     Float3 push;
     if (side == 0) {
       next = x;  // a held particle stays where its grip has put it
-      push = come_to(pace, start, next) - free_place;
+      push = place_of(w, pace, o, x) - free_place;
     } else {
       const RestPoint rest = {pace.h, grid_node(pace, particle.node)};
       const Float3 plain_place = come_to(pace, start, plain);
@@ -1481,7 +1484,8 @@ CUTPROOF_DEVICE inline Float3 advance_particle(const DeviceView& w, const Pace& 
           if (touched) wanted = plain_place;
         }
       }
-      const Float3 place = next_position(contacts, rest, wanted, side, start, come_to(pace, start, x));
+      const Float3 place = next_position(contacts, rest, wanted, side, start, place_of(w, pace, o, x));
+      if (pace.share != 1.0f) w.place[o] = with_w(place, 0.0f);
       push = place - free_place;
       next = ahead_of(pace, place, free_place, free);
     }
@@ -1574,7 +1578,9 @@ CUTPROOF_DEVICE void resolve(Block& block, const Team<Block, kResolvedTeam>& tea
   team.each(group.head.size, [&](int k) {
     const int o = group.head.begin + k;
     const Float3 predicted = xyz(w.predicted[o]), r = group.rest(w, pace, k);
-    w.position[o] = with_w(carried_to(base, lost, predicted, is, r), 0.0f);
+    const Float3 ahead = carried_to(base, lost, predicted, is, r);
+    w.position[o] = with_w(ahead, 0.0f);
+    if (pace.share != 1.0f) w.place[o] = with_w(come_to(pace, xyz(w.start[o]), ahead), 0.0f);
     w.pushed[o] = Float4{};
     if constexpr (kAccelerated) {
       w.earlier[o] = with_w(carried_to(base, lost_earlier, predicted, was, r), 0.0f);

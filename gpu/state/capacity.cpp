@@ -52,6 +52,7 @@ Extents extents_of(const StagingBuffers& loaded, Capacity capacity) {
     extents.most_iterations = std::max(extents.most_iterations, body.iterations);
   }
   extents.accelerated = some_body(loaded, [](const BodyConstants& b) { return b.acceleration != Acceleration::none; });
+  extents.retarded = some_body(loaded, [](const BodyConstants& b) { return b.retardation > 0; });
   extents.any_contact = some_body(loaded, [](const BodyConstants& b) {
     return b.has_blade || b.wall_end > b.wall_begin || b.grip_end > b.grip_begin;
   });

@@ -211,6 +211,7 @@ struct Extents {
   int most_iterations = 0;    // of any body, in a substep
   int accelerated = 0;        // some body's iterations are
   int any_contact = 0;        // some body has a blade, a wall or a grip
+  int retarded = 0;           // some body's elasticity acts ahead of where it is
   int any_crossing = 0;       // of some body it is known where its surface crosses grid edges
   int kept_count = 0;         // vertices of the skins that were loaded, on edges that a cut has opened
   int slot_capacity = 0, member_capacity = 0, vertex_capacity = 0, cell_capacity = 0, addition_capacity = 0;
