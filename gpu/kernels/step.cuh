@@ -313,23 +313,30 @@ CUTPROOF_DEVICE inline Float3 predict(const Pace& pace, Float3 d, Float3 v) { re
 
 // Predictions, and where iterations lead, are places y = x + τ v, on which elasticity acts (docs/design/method.md §3):
 // a particle has come `share` of the way to there. Number: of places, or of what is linear in them.
-template <class Number>
+// kRetarded: some body of the load has retardation; the kernels of others know nothing of it.
+template <bool kRetarded>
+CUTPROOF_DEVICE inline bool leads(const Pace& pace) {
+  return kRetarded && pace.share != 1.0f;
+}
+template <bool kRetarded, class Number>
 CUTPROOF_DEVICE inline Number come_to(const Pace& pace, Number start, Number ahead) {
-  return pace.share == 1.0f ? ahead : start + pace.share * (ahead - start);
+  return leads<kRetarded>(pace) ? start + pace.share * (ahead - start) : ahead;
 }
 // The y of a particle that contacts have put at x, where nothing would have put it at `free`, with the y `free_ahead`:
 // the same to the bit where they do nothing.
+template <bool kRetarded>
 CUTPROOF_DEVICE inline Float3 ahead_of(const Pace& pace, Float3 x, Float3 free, Float3 free_ahead) {
-  return pace.share == 1.0f ? x : free_ahead + (1.0f / pace.share) * (x - free);
+  return leads<kRetarded>(pace) ? free_ahead + (1.0f / pace.share) * (x - free) : x;
 }
 
 // How far from their predictions particles may go, which lie in `ahead`, and began the substep in `began`: what touches
 // nothing is x, and x lies between the two.
+template <bool kRetarded>
 CUTPROOF_DEVICE inline float room_ahead(const Pace& pace, const Contacts& contacts, const Ball& began, Ball ahead,
                                         int side) {
-  if (pace.share == 1.0f) return room_around(contacts, ahead, side);
-  ahead.d = come_to(pace, began.d, ahead.d);
-  ahead.radius = come_to(pace, began.radius, ahead.radius) * (1.0f + kOfRoundings);
+  if (!leads<kRetarded>(pace)) return room_around(contacts, ahead, side);
+  ahead.d = come_to<kRetarded>(pace, began.d, ahead.d);
+  ahead.radius = come_to<kRetarded>(pace, began.radius, ahead.radius) * (1.0f + kOfRoundings);
   return room_around(contacts, ahead, side) / pace.share;
 }
 
@@ -360,20 +367,22 @@ CUTPROOF_DEVICE inline void set_held_push(Pace& pace, float kdt2) {
 
 // Where a particle is that contacts may have put there, with this y. (Not found from y, which would round: what
 // friction holds would creep.)
+template <bool kRetarded>
 CUTPROOF_DEVICE inline Float3 place_of(const DeviceView& w, const Pace& pace, int64_t o, Float3 ahead) {
-  return pace.share == 1.0f ? ahead : xyz(w.place[o]);
+  return leads<kRetarded>(pace) ? xyz(w.place[o]) : ahead;
 }
 
 // The displacement (y) that contacts, or its grip, let a particle have that is predicted at `predicted`.
+template <bool kRetarded>
 CUTPROOF_DEVICE inline Float3 enter_substep(const DeviceView& w, const Pace& pace, const Contacts& contacts,
                                             const Held& held, const RestPoint& rest, int64_t o, Float4 predicted,
                                             Float3 start, float share) {
   bool in_turn = false;  // of no interest: there is no earlier point to compare with
-  const Float3 free = come_to(pace, start, xyz(predicted));
+  const Float3 free = come_to<kRetarded>(pace, start, xyz(predicted));
   const Float3 x = held.active ? start + held.moved : project(contacts, rest, free, predicted.w, start, in_turn);
-  const Float3 ahead = ahead_of(pace, x, free, xyz(predicted));
+  const Float3 ahead = ahead_of<kRetarded>(pace, x, free, xyz(predicted));
   w.position[o] = with_w(ahead, share);
-  if (pace.share != 1.0f) w.place[o] = with_w(x, 0.0f);
+  if (leads<kRetarded>(pace)) w.place[o] = with_w(x, 0.0f);
   w.pushed[o] = with_w(x - free, 0.0f);
   return ahead;
 }
@@ -460,8 +469,8 @@ CUTPROOF_DEVICE inline Parts predicted_parts(const Pace& pace, const FrameParts&
 CUTPROOF_DEVICE inline FrameParts parts_after(const Pace& pace, float lost, const FrameParts& now) {
   const Parts predicted = predicted_parts(pace, now);
   FrameParts next;
-  next.place = {come_to(pace, now.place.shape, predicted.shape - lost * (1.0f + predicted.shape)),
-                come_to(pace, now.place.motion, predicted.motion - lost * predicted.motion)};
+  next.place = {come_to<true>(pace, now.place.shape, predicted.shape - lost * (1.0f + predicted.shape)),
+                come_to<true>(pace, now.place.motion, predicted.motion - lost * predicted.motion)};
   next.velocity = {pace.decay_per_dt * (next.place.shape - now.place.shape),
                    pace.decay_per_dt * (next.place.motion - now.place.motion)};
   return next;
@@ -515,15 +524,19 @@ CUTPROOF_DEVICE inline Origin origin_of(const DeviceView& w, int g) {
 }
 
 // After a substep with this map, whose shift is that of the base. predicted: parts of the prediction.
+template <bool kRetarded>
 CUTPROOF_DEVICE inline Axis axis_after(const Pace& pace, int axis, float lost, const Origin& origin,
                                        const Parts& predicted_part, Float4 map, const Axis& now) {
   const Float4 predicted = predicted_row(pace, axis, now);
-  const auto led = [&](float was, float is, float by_map) { return come_to(pace, was, is + (by_map - lost * is)); };
+  const auto led = [&](float was, float is, float by_map) {
+    return come_to<kRetarded>(pace, was, is + (by_map - lost * is));
+  };
   const auto rate = [&](float is, float was) { return pace.decay_per_dt * (is - was); };
   const float lost_motion = origin.uniform() ? 0.0f : lost * (predicted_part.motion * xyz(origin.velocity)[axis]);
   Axis next;
   next.place = {led(now.place.x, predicted.x, map.x), led(now.place.y, predicted.y, map.y),
-                led(now.place.z, predicted.z, map.z), come_to(pace, now.place.w, predicted.w + (map.w + lost_motion))};
+                led(now.place.z, predicted.z, map.z),
+                come_to<kRetarded>(pace, now.place.w, predicted.w + (map.w + lost_motion))};
   next.velocity = row_of(rate, next.place, now.place);
   return next;
 }
@@ -673,7 +686,7 @@ CUTPROOF_DEVICE void sum_group(Block& block, const AnyTeam& team, const DeviceVi
 
 // Begins a substep of a group that nothing has touched so far. Says whether something may in its prediction, or a grip
 // holds it: then its particles are to be tracked.
-template <bool kContacts, class Block, int kRows>
+template <bool kContacts, bool kRetarded, class Block, int kRows>
 CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& team, const DeviceView& w, int g,
                                      int substep) {
   const Group group = group_of(w, g);
@@ -711,7 +724,7 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
     const int64_t at = 3 * int64_t{g} + axis;
     Axis now = {place.of(axis), velocity.of(axis)};
     if (substep > 0) {
-      now = axis_after(pace, axis, lost, origin, of_last_prediction, map.of(axis), now);
+      now = axis_after<kRetarded>(pace, axis, lost, origin, of_last_prediction, map.of(axis), now);
       place.of(axis) = w.group_place[at] = now.place;
       w.group_velocity[at] = now.velocity;
     }
@@ -730,7 +743,7 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
     base.w = (greatest_stretch(to, 0.0f) * head.radius + own) * (1.0f + kOfRoundings);
     int side = 1;
     Ball began = {};
-    if (contacts.move != nullptr || pace.share != 1.0f) {
+    if (contacts.move != nullptr || leads<kRetarded>(pace)) {
       const Map from = place.all(team);
       began = ball_around(pace, group, with_w(origin.from(parts.place.motion), reach_of(parts.place)), 1.0f, from);
       if (contacts.move != nullptr) side = side_of_all(contacts, began);
@@ -739,7 +752,7 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
     // such d~ - l e.
     Ball ball = ball_around(pace, group, with_w(xyz(base), own), 1.0f, to);
     ball.radius = fmaxf(ball.radius, pace.h * head.radius);
-    const float room = room_ahead(pace, contacts, began, ball, side);
+    const float room = room_ahead<kRetarded>(pace, contacts, began, ball, side);
     const bool held = held_by(w, pace, head.hold_set, substep).active;
     if (team.leads()) {
       w.group_base[g] = base;
@@ -782,6 +795,7 @@ CUTPROOF_DEVICE inline Ending ending_of(const DeviceView& w, int body, const Pac
   return ending;
 }
 // Displacement and mass of its particle k; sets its velocity, and ends its impulse.
+template <bool kRetarded>
 CUTPROOF_DEVICE inline Float4 end_tracked(const DeviceView& w, const Pace& pace, const Group& group,
                                           const Ending& ending, int k, Float3& v) {
   const int o = group.head.begin + k;
@@ -793,16 +807,17 @@ CUTPROOF_DEVICE inline Float4 end_tracked(const DeviceView& w, const Pace& pace,
   if (ending.state == kResolved) pushed = xyz(w.pushed[o]);
   if (ending.state == kHeld) {
     pushed = pace.held_alpha * (ahead - predicted) + (pace.held_beta * (predicted - ending.base) - ending.map(r));
-    pushed = pace.share * pushed;
+    if constexpr (kRetarded) pushed = pace.share * pushed;
   }
-  const Float3 d = ending.state == kCarried ? come_to(pace, xyz(start), ahead) : place_of(w, pace, o, ahead);
+  const Float3 d =
+      ending.state == kCarried ? come_to<kRetarded>(pace, xyz(start), ahead) : place_of<kRetarded>(w, pace, o, ahead);
   end_impulse(w, w.place_particle[o], pace, pushed);
   v = pace.decay_per_dt * (d - xyz(start));
   return with_w(d, start.w);
 }
 
 // Begins a substep of a group whose particles are to be tracked from here on (`begins`), or have been.
-template <class Block, class AnyTeam>
+template <bool kRetarded, class Block, class AnyTeam>
 CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const DeviceView& w, int g, int substep,
                                    int tracked, bool begins) {
   const Group group = group_of(w, g);
@@ -837,22 +852,24 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const Devi
     bool before = false, behind = false;  // the blade, when the substep begins
     Float3 began;                         // somewhere among its particles, when the substep begins
     float reach = 0;                      // of them from there, squared
-    if (pace.share != 1.0f) {
+    if (leads<kRetarded>(pace)) {
       began = xyz(w.start[head.begin]);
       team.sync();  // all have read it
     }
     team.each(head.size, [&](int k) {
       const int o = head.begin + k;
       Float3 v;
-      const Float4 d = end_tracked(w, pace, group, ending, k, v);
+      const Float4 d = end_tracked<kRetarded>(w, pace, group, ending, k, v);
       float side = 0.0f;
       if (!held.active) {
         side = blade_side(contacts, {pace.h, grid_node(pace, constant(&w.place_node[o]))}, xyz(d));
         (side < 0 ? behind : before) = true;
       }
       const Float4 predicted = with_w(predict(pace, xyz(d), v), side);
-      const Float3 off = xyz(d) - began;
-      reach = fmaxf(reach, dot(off, off));
+      if constexpr (kRetarded) {
+        const Float3 off = xyz(d) - began;
+        reach = fmaxf(reach, dot(off, off));
+      }
       w.start[o] = d;
       w.predicted[o] = predicted;
       if (k == first) {
@@ -868,11 +885,12 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const Devi
     behind = team.any(behind);
     const int side = before && behind ? 0 : behind ? -1 : 1;
     // (Of a group that a grip holds nobody asks.)
-    const float spread = sqrtf(team.greatest(reach)) * (1.0f + kOfRoundings);
-    const float room = held.active
-                           ? 0.0f
-                           : room_ahead(pace, contacts, ball_around(pace, group, with_w(began, spread), 1.0f, Map{}),
-                                        ball_around(pace, group, base_and_reach, 1.0f, Map{}), side);
+    const Ball ahead = ball_around(pace, group, base_and_reach, 1.0f, Map{});
+    Ball start = {};
+    if constexpr (kRetarded) {
+      start = ball_around(pace, group, with_w(began, sqrtf(team.greatest(reach)) * (1.0f + kOfRoundings)), 1.0f, Map{});
+    }
+    const float room = held.active ? 0.0f : room_ahead<kRetarded>(pace, contacts, start, ahead, side);
     resolve = !(room > 0);
     base = xyz(base_and_reach);
     if (team.leads()) {
@@ -897,7 +915,7 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const Devi
     const int o = head.begin + k;
     const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
     const Float4 start = start_of(k);
-    const Float3 x = enter_substep(w, pace, contacts, held, rest, o, predicted_of(k), xyz(start), 0.0f);
+    const Float3 x = enter_substep<kRetarded>(w, pace, contacts, held, rest, o, predicted_of(k), xyz(start), 0.0f);
     if (k == first) first_at = with_w(x, start.w);
   });
   sum_resolved(team, w, group, pace, base, first_at);
@@ -906,7 +924,7 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const Devi
 // ---- particles that are in no group
 
 // Where the substep before, if there was one, has left the particle at place o.
-template <bool kContacts>
+template <bool kContacts, bool kRetarded>
 CUTPROOF_DEVICE inline Float4 end_loose(const DeviceView& w, const Pace& pace, int o, int p, int substep, Float3& v) {
   if (substep == 0) {
     v = xyz(w.velocity[p]);
@@ -916,23 +934,23 @@ CUTPROOF_DEVICE inline Float4 end_loose(const DeviceView& w, const Pace& pace, i
   const Float3 ahead = xyz(w.position[o]);
   Float3 d;
   if constexpr (kContacts) {
-    d = place_of(w, pace, o, ahead);
+    d = place_of<kRetarded>(w, pace, o, ahead);
     end_impulse(w, p, pace, xyz(w.pushed[o]));
   } else {
-    d = come_to(pace, xyz(start), ahead);
+    d = come_to<kRetarded>(pace, xyz(start), ahead);
   }
   v = pace.decay_per_dt * (d - xyz(start));
   return with_w(d, start.w);
 }
 
-template <bool kContacts>
+template <bool kContacts, bool kRetarded>
 CUTPROOF_DEVICE inline void begin_loose(const DeviceView& w, int o, int substep) {
   if (o < 0) return;
   const int p = w.place_particle[o];
   const Pace pace = constant(&w.pace[body_index(w, p)]);
   if (substep >= pace.substeps) return;
   Float3 v;
-  const Float4 d = end_loose<kContacts>(w, pace, o, p, substep, v);
+  const Float4 d = end_loose<kContacts, kRetarded>(w, pace, o, p, substep, v);
   const float share = d.w / static_cast<float>(w.membership_count[p]);
   Float4 predicted = with_w(predict(pace, xyz(d), v), 1.0f);
   w.start[o] = d;
@@ -941,7 +959,7 @@ CUTPROOF_DEVICE inline void begin_loose(const DeviceView& w, int o, int substep)
     const RestPoint rest = {pace.h, grid_node(pace, constant(&w.place_node[o]))};
     const Held held = held_by(w, pace, groups_detail::hold_set(w, p), substep);
     predicted.w = held.active ? 0.0f : blade_side(contacts, rest, xyz(d));
-    enter_substep(w, pace, contacts, held, rest, o, predicted, xyz(d), share);
+    enter_substep<kRetarded>(w, pace, contacts, held, rest, o, predicted, xyz(d), share);
   } else {
     w.position[o] = with_w(xyz(predicted), share);
   }
@@ -950,7 +968,7 @@ CUTPROOF_DEVICE inline void begin_loose(const DeviceView& w, int o, int substep)
 
 // ---- the end of the last substep
 
-template <bool kContacts, class AnyTeam>
+template <bool kContacts, bool kRetarded, class AnyTeam>
 CUTPROOF_DEVICE void end_group(const AnyTeam& team, const DeviceView& w, int g) {
   const Group group = group_of(w, g);
   const GroupHead& head = group.head;
@@ -963,7 +981,7 @@ CUTPROOF_DEVICE void end_group(const AnyTeam& team, const DeviceView& w, int g) 
       team.each(head.size, [&](int k) {
         const int p = w.place_particle[head.begin + k];
         Float3 v;
-        w.displacement[p] = end_tracked(w, pace, group, ending, k, v);
+        w.displacement[p] = end_tracked<kRetarded>(w, pace, group, ending, k, v);
         w.velocity[p] = with_w(v, 0.0f);
       });
       return;
@@ -978,7 +996,7 @@ CUTPROOF_DEVICE void end_group(const AnyTeam& team, const DeviceView& w, int g) 
     const Float4 map = pace.iterations > 0 ? w.group_map[at] : Float4{};
     const Axis now = load_axis(w, at);
     start.row[axis] = now.place;
-    end.row[axis] = axis_after(pace, axis, lost, origin, predicted_parts(pace, before), map, now).place;
+    end.row[axis] = axis_after<kRetarded>(pace, axis, lost, origin, predicted_parts(pace, before), map, now).place;
   }
   // Several particles at once: behind a store, each would be waited for by itself.
   constexpr int kAtOnce = 2;
@@ -1003,14 +1021,14 @@ CUTPROOF_DEVICE void end_group(const AnyTeam& team, const DeviceView& w, int g) 
   }
 }
 
-template <bool kContacts>
+template <bool kContacts, bool kRetarded>
 CUTPROOF_DEVICE inline void finish_loose(const DeviceView& w, int o) {
   if (o < 0) return;
   const int p = w.place_particle[o];
   const Pace pace = constant(&w.pace[body_index(w, p)]);
   if (pace.substeps == 0) return;
   Float3 v;
-  w.displacement[p] = end_loose<kContacts>(w, pace, o, p, pace.substeps, v);
+  w.displacement[p] = end_loose<kContacts, kRetarded>(w, pace, o, p, pace.substeps, v);
   w.velocity[p] = with_w(v, 0.0f);
 }
 
@@ -1100,7 +1118,7 @@ CUTPROOF_DEVICE void sum_groups_kernel(Block& block, const DeviceView& w) {
 
 // Ends the substep before `substep`, if there is one, and begins that one, of the bodies that have it. kRows: lanes
 // that share a group that is not tracked.
-template <bool kContacts, int kRows, class Block>
+template <bool kContacts, bool kRetarded, int kRows, class Block>
 CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int substep) {
   using namespace step_detail;
   const Team<Block, kRows> rows(block);
@@ -1126,7 +1144,8 @@ CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int
         if (k == team.first() % kTeams) g = next;
       }
     } else if (row - in_warp < groups) {
-      const bool touches = row < groups && begin_untouched<kContacts>(block, rows, w, static_cast<int>(row), substep);
+      const bool touches =
+          row < groups && begin_untouched<kContacts, kRetarded>(block, rows, w, static_cast<int>(row), substep);
       if constexpr (kContacts) {
         found = warp.found(touches && rows.leads());
         warp.sync();  // its base is all lanes' to read
@@ -1144,7 +1163,7 @@ CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int
         g = block.load(&w.tracked_groups[listed]);
         listed += team.stride();
       }
-      if (g >= 0) begin_tracked(block, team, w, g, substep, tracked, begins);
+      if (g >= 0) begin_tracked<kRetarded>(block, team, w, g, substep, tracked, begins);
     } else {
       break;
     }
@@ -1155,21 +1174,21 @@ CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int
     block.store(&w.counters->newly_tracked[(substep + 1) % 3], 0);
   }
   for (int64_t k = from_last(block); k < loose; k += block.stride()) {
-    begin_loose<kContacts>(w, w.loose_places[k], substep);
+    begin_loose<kContacts, kRetarded>(w, w.loose_places[k], substep);
   }
 }
 
 // Once a frame: where all particles have come to. kLanes: that share a group; no sum goes by them.
-template <bool kContacts, int kLanes, class Block>
+template <bool kContacts, bool kRetarded, int kLanes, class Block>
 CUTPROOF_DEVICE void end_step_kernel(Block& block, const DeviceView& w) {
   using namespace step_detail;
   const Team<Block, kLanes> team(block);
   const int groups = w.counters->groups;
   for (int64_t g = team.first(); g < groups; g += team.stride()) {
-    end_group<kContacts>(team, w, static_cast<int>(g));
+    end_group<kContacts, kRetarded>(team, w, static_cast<int>(g));
   }
   for (int64_t k = from_last(block); k < w.counters->loose; k += block.stride()) {
-    finish_loose<kContacts>(w, w.loose_places[k]);
+    finish_loose<kContacts, kRetarded>(w, w.loose_places[k]);
   }
 }
 
@@ -1450,7 +1469,7 @@ CUTPROOF_DEVICE inline Particle particle_at(const DeviceView& w, const Iteration
 
 // Particle by particle: the one at place o goes from where it is towards `from` + pull, `from` being its prediction, or
 // where it is in the published way. Gives where it has come to.
-template <bool kContacts, bool kAccelerated>
+template <bool kContacts, bool kAccelerated, bool kRetarded>
 CUTPROOF_DEVICE inline Float3 advance_particle(const DeviceView& w, const Pace& pace, const Contacts& contacts,
                                                const Iteration& now, int64_t o, const Particle& particle, Float3 from,
                                                Float3 pull) {
@@ -1464,14 +1483,14 @@ CUTPROOF_DEVICE inline Float3 advance_particle(const DeviceView& w, const Pace& 
   Float3 next = free;
   if constexpr (kContacts) {
     const float side = particle.predicted.w;
-    const Float3 start = xyz(particle.start), free_place = come_to(pace, start, free);
+    const Float3 start = xyz(particle.start), free_place = come_to<kRetarded>(pace, start, free);
     Float3 push;
     if (side == 0) {
       next = x;  // a held particle stays where its grip has put it
-      push = place_of(w, pace, o, x) - free_place;
+      push = place_of<kRetarded>(w, pace, o, x) - free_place;
     } else {
       const RestPoint rest = {pace.h, grid_node(pace, particle.node)};
-      const Float3 plain_place = come_to(pace, start, plain);
+      const Float3 plain_place = come_to<kRetarded>(pace, start, plain);
       Float3 wanted = free_place;
       if constexpr (kAccelerated) {
         // Where several answers are right, the way there decides: touched particles go the plain way.
@@ -1484,10 +1503,10 @@ CUTPROOF_DEVICE inline Float3 advance_particle(const DeviceView& w, const Pace& 
           if (touched) wanted = plain_place;
         }
       }
-      const Float3 place = next_position(contacts, rest, wanted, side, start, place_of(w, pace, o, x));
-      if (pace.share != 1.0f) w.place[o] = with_w(place, 0.0f);
+      const Float3 place = next_position(contacts, rest, wanted, side, start, place_of<kRetarded>(w, pace, o, x));
+      if (leads<kRetarded>(pace)) w.place[o] = with_w(place, 0.0f);
       push = place - free_place;
-      next = ahead_of(pace, place, free_place, free);
+      next = ahead_of<kRetarded>(pace, place, free_place, free);
     }
     const Float3 before = xyz(particle.pushed);
     Float3 carried = (now.implicit ? now.s : 1.0f) * before;
@@ -1556,7 +1575,7 @@ CUTPROOF_DEVICE inline Rows<AnyTeam> mean_goal(const AnyTeam& team, const Device
 
 // A group that has been carried so far is resolved from here on: where its particles are, and, accelerated, were one
 // iteration ago. Nothing has touched them.
-template <bool kAccelerated, class Block>
+template <bool kAccelerated, bool kRetarded, class Block>
 CUTPROOF_DEVICE void resolve(Block& block, const Team<Block, kResolvedTeam>& team, const DeviceView& w,
                              const Group& group, const Pace& pace, const Contacts& contacts, const Iteration& now,
                              Float3 base, int substep, int iteration) {
@@ -1580,7 +1599,7 @@ CUTPROOF_DEVICE void resolve(Block& block, const Team<Block, kResolvedTeam>& tea
     const Float3 predicted = xyz(w.predicted[o]), r = group.rest(w, pace, k);
     const Float3 ahead = carried_to(base, lost, predicted, is, r);
     w.position[o] = with_w(ahead, 0.0f);
-    if (pace.share != 1.0f) w.place[o] = with_w(come_to(pace, xyz(w.start[o]), ahead), 0.0f);
+    if (leads<kRetarded>(pace)) w.place[o] = with_w(come_to<kRetarded>(pace, xyz(w.start[o]), ahead), 0.0f);
     w.pushed[o] = Float4{};
     if constexpr (kAccelerated) {
       w.earlier[o] = with_w(carried_to(base, lost_earlier, predicted, was, r), 0.0f);
@@ -1607,7 +1626,7 @@ template <int kRows>
 inline constexpr int kHoldersAtOnce = kRows > 1 ? 8 : 4;
 
 // One iteration of the particles of a resolved group. begins: it has been carried so far.
-template <bool kContacts, bool kAccelerated, class Block, int kAtOnce>
+template <bool kContacts, bool kAccelerated, bool kRetarded, class Block, int kAtOnce>
 CUTPROOF_DEVICE void advance_resolved(Block& block, const Team<Block, kResolvedTeam>& team, const DeviceView& w,
                                       const GroupAhead<kAtOnce>& ahead, int substep, int iteration, bool begins) {
   const Group& group = ahead.group;
@@ -1618,7 +1637,7 @@ CUTPROOF_DEVICE void advance_resolved(Block& block, const Team<Block, kResolvedT
   const Contacts contacts = contacts_of(w, pace, substep);
   const Iteration now = iteration_of(w, body, pace, iteration);
   const Float3 base = xyz(ahead.base);
-  if (begins) resolve<kAccelerated>(block, team, w, group, pace, contacts, now, base, substep, iteration);
+  if (begins) resolve<kAccelerated, kRetarded>(block, team, w, group, pace, contacts, now, base, substep, iteration);
   const int first = team.lane();  // of this lane's particles
   Particle of_first;
   if (first < head.size) of_first = particle_at<kContacts, kAccelerated>(w, now, head.begin + first);
@@ -1630,7 +1649,8 @@ CUTPROOF_DEVICE void advance_resolved(Block& block, const Team<Block, kResolvedT
     const Particle particle = k == first ? of_first : particle_at<kContacts, kAccelerated>(w, now, o);
     const Float3 from = now.implicit ? xyz(particle.predicted) : xyz(particle.at);
     const Float3 pull = (base - from) + goal(group.rest_of(pace, particle.node));
-    const Float3 x = advance_particle<kContacts, kAccelerated>(w, pace, contacts, now, o, particle, from, pull);
+    const Float3 x =
+        advance_particle<kContacts, kAccelerated, kRetarded>(w, pace, contacts, now, o, particle, from, pull);
     if (k == first) first_at = with_w(x, particle.start.w);
   });
   sum_resolved(team, w, group, pace, base, first_at);
@@ -1638,7 +1658,7 @@ CUTPROOF_DEVICE void advance_resolved(Block& block, const Team<Block, kResolvedT
 
 // Of a group that was carried until now. Says whether it may touch a contact in this iteration: then nothing has been
 // done.
-template <bool kContacts, bool kAccelerated, class Block, int kRows>
+template <bool kContacts, bool kAccelerated, bool kRetarded, class Block, int kRows>
 CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& team, const DeviceView& w, int g,
                                      int substep, int iteration) {
   const GroupAhead<kHoldersAtOnce<kRows>> ahead = group_ahead<kHoldersAtOnce<kRows>>(w, g);
@@ -1733,7 +1753,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
     });
     // (With retardation x lies between y and where it began, which is not at hand: resolved, nothing is left out.)
     if (team.any(near)) {
-      if (pace.share != 1.0f) return true;
+      if (leads<kRetarded>(pace)) return true;
       const Contacts contacts = contacts_of(w, pace, substep);
       const int side = w.group_side[g];
       CUTPROOF_ROLLED
@@ -1766,7 +1786,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
   return false;
 }
 
-template <bool kContacts, bool kAccelerated, class Block>
+template <bool kContacts, bool kAccelerated, bool kRetarded, class Block>
 CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int substep, int iteration) {
   if (o < 0) return;
   const int p = w.place_particle[o], body = body_index(w, p);
@@ -1796,13 +1816,13 @@ CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int
     }
     pull = (1.0f / static_cast<float>(clusters)) * sum;
   }
-  advance_particle<kContacts, kAccelerated>(w, pace, contacts, now, o, particle, from, pull);
+  advance_particle<kContacts, kAccelerated, kRetarded>(w, pace, contacts, now, o, particle, from, pull);
 }
 
 }  // namespace step_detail
 
 // kRows: lanes that share a carried group.
-template <bool kContacts, bool kAccelerated, int kRows, class Block>
+template <bool kContacts, bool kAccelerated, bool kRetarded, int kRows, class Block>
 CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int substep, int iteration) {
   using namespace step_detail;
   const Team<Block, kRows> rows(block);
@@ -1821,7 +1841,7 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
       begins = true;
       g = team.take(found, static_cast<int>(row - rows.stride()));
     } else if (row - in_warp < groups) {
-      const bool touches = row < groups && advance_carried<kContacts, kAccelerated>(
+      const bool touches = row < groups && advance_carried<kContacts, kAccelerated, kRetarded>(
                                                block, rows, w, static_cast<int>(row), substep, iteration);
       if constexpr (kContacts) found = team.found(touches && rows.leads());
       row += rows.stride();
@@ -1833,13 +1853,13 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
       break;
     }
     if constexpr (kContacts) {
-      advance_resolved<kContacts, kAccelerated>(block, team, w, group_ahead<kHoldersAtOnce<kRows>>(w, g), substep,
-                                                iteration, begins);
+      advance_resolved<kContacts, kAccelerated, kRetarded>(block, team, w, group_ahead<kHoldersAtOnce<kRows>>(w, g),
+                                                           substep, iteration, begins);
     }
   }
   if (loose == 0) return;
   for (int64_t k = from_last(block); k < loose; k += block.stride()) {
-    advance_loose<kContacts, kAccelerated>(block, w, w.loose_places[k], substep, iteration);
+    advance_loose<kContacts, kAccelerated, kRetarded>(block, w, w.loose_places[k], substep, iteration);
   }
 }
 
@@ -1852,39 +1872,39 @@ struct sum_groups_kernel_object {
     sum_groups_kernel<kContacts, kLanes>(block, w);
   }
 };
-template <bool kContacts, int kRows>
+template <bool kContacts, bool kRetarded, int kRows>
 struct begin_substep_kernel_object {
   static constexpr const char* kName = "begin_substep_kernel";
   static constexpr int kMaxThreads = 128, kMinBlocks = 4;
   static constexpr bool kReadsAhead = true;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep) const {
-    begin_substep_kernel<kContacts, kRows>(block, w, substep);
+    begin_substep_kernel<kContacts, kRetarded, kRows>(block, w, substep);
   }
 };
-template <bool kContacts, int kLanes>
+template <bool kContacts, bool kRetarded, int kLanes>
 struct end_step_kernel_object {
   static constexpr const char* kName = "end_step_kernel";
   static constexpr int kMaxThreads = 128, kMinBlocks = 5;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w) const {
-    end_step_kernel<kContacts, kLanes>(block, w);
+    end_step_kernel<kContacts, kRetarded, kLanes>(block, w);
   }
 };
-template <bool kContacts, bool kAccelerated, int kRows>
+template <bool kContacts, bool kAccelerated, bool kRetarded, int kRows>
 struct advance_kernel_object {
   static constexpr const char* kName = "advance_kernel";
   static constexpr int kMaxThreads = 128, kMinBlocks = kRows > 1 ? 3 : 4;
   static constexpr bool kReadsAhead = true;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, int iteration) const {
-    advance_kernel<kContacts, kAccelerated, kRows>(block, w, substep, iteration);
+    advance_kernel<kContacts, kAccelerated, kRetarded, kRows>(block, w, substep, iteration);
   }
 };
 
 namespace step_detail {
 
-template <int Method, bool kContacts, bool kAccelerated, class Launcher>
+template <int Method, bool kContacts, bool kAccelerated, bool kRetarded, class Launcher>
 CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   const int64_t particles = w.particles > w.bodies ? w.particles : w.bodies;
   const int64_t of_places = (w.place_capacity + kParticleTeam - 1) / kParticleTeam;
@@ -1917,7 +1937,7 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
       [&](auto lanes) { launcher.teams(sum_groups_kernel_object<kContacts, lanes.value>{}, lanes.value, teams, w); });
   for (int substep = 0; substep < plan.substeps; ++substep) {
     by_rows([&](auto rows) {
-      launcher.teams(begin_substep_kernel_object<kContacts, rows.value>{}, kParticleTeam, teams, w, substep);
+      launcher.teams(begin_substep_kernel_object<kContacts, kRetarded, rows.value>{}, kParticleTeam, teams, w, substep);
     });
     for (int iteration = 0; iteration < plan.iterations; ++iteration) {
       by_clusters([&](auto lanes) {
@@ -1926,25 +1946,28 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
                         kMatchThreads, kMatchShared<lanes.value>, w, substep, iteration);
       });
       by_rows([&](auto rows) {
-        launcher.teams(advance_kernel_object<kContacts, kAccelerated, rows.value>{}, kParticleTeam, teams, w, substep,
-                       iteration);
+        launcher.teams(advance_kernel_object<kContacts, kAccelerated, kRetarded, rows.value>{}, kParticleTeam, teams, w,
+                       substep, iteration);
       });
     }
   }
-  by_particles(
-      [&](auto lanes) { launcher.teams(end_step_kernel_object<kContacts, lanes.value>{}, lanes.value, teams, w); });
+  by_particles([&](auto lanes) {
+    launcher.teams(end_step_kernel_object<kContacts, kRetarded, lanes.value>{}, lanes.value, teams, w);
+  });
 }
 
 template <int Method, class Launcher>
 CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan) {
-  if (plan.contacts && plan.accelerated) {
-    enqueue<Method, true, true>(launcher, w, plan);
+  if (plan.retarded) {
+    enqueue<Method, true, true, true>(launcher, w, plan);
+  } else if (plan.contacts && plan.accelerated) {
+    enqueue<Method, true, true, false>(launcher, w, plan);
   } else if (plan.contacts) {
-    enqueue<Method, true, false>(launcher, w, plan);
+    enqueue<Method, true, false, false>(launcher, w, plan);
   } else if (plan.accelerated) {
-    enqueue<Method, false, true>(launcher, w, plan);
+    enqueue<Method, false, true, false>(launcher, w, plan);
   } else {
-    enqueue<Method, false, false>(launcher, w, plan);
+    enqueue<Method, false, false, false>(launcher, w, plan);
   }
 }
 

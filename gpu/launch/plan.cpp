@@ -17,6 +17,7 @@ Plan make_plan(const std::vector<Setup>& setups, const std::vector<State>& state
     plan.substeps = std::max(plan.substeps, setup.step.substeps);
     plan.iterations = std::max(plan.iterations, setup.step.iterations);
     plan.accelerated = plan.accelerated || setup.step.acceleration != Acceleration::none;
+    plan.retarded = plan.retarded || setup.step.retardation > 0;
     plan.contacts = plan.contacts || setup.has_blade || !setup.walls.empty() || !setup.grips.empty();
     const bool detection = needs_detection(setup);
     plan.detection = plan.detection || detection;

@@ -15,6 +15,7 @@ struct Plan {
   int iterations = 0;                                        // most of any body
   bool contacts = false;                                     // some body has a blade, a wall or a grip
   bool accelerated = false;                                  // some body's iterations are
+  bool retarded = false;                                     // some body has retardation: its kernels can do all
   bool detection = false;                                    // some body launches detect
   bool distance = false, geometric = false, strain = false;  // criteria in use
   bool nearer = false;  // by distance, of some edge the end nearer to the blade goes

@@ -51,10 +51,12 @@ Extents extents_of(const StagingBuffers& loaded, Capacity capacity) {
     extents.most_substeps = std::max(extents.most_substeps, body.substeps);
     extents.most_iterations = std::max(extents.most_iterations, body.iterations);
   }
-  extents.accelerated = some_body(loaded, [](const BodyConstants& b) { return b.acceleration != Acceleration::none; });
+  // There is one set of kernels for bodies with retardation, which is given everything (plan.h).
   extents.retarded = some_body(loaded, [](const BodyConstants& b) { return b.retardation > 0; });
+  extents.accelerated = some_body(
+      loaded, [](const BodyConstants& b) { return b.acceleration != Acceleration::none || b.retardation > 0; });
   extents.any_contact = some_body(loaded, [](const BodyConstants& b) {
-    return b.has_blade || b.wall_end > b.wall_begin || b.grip_end > b.grip_begin;
+    return b.retardation > 0 || b.has_blade || b.wall_end > b.wall_begin || b.grip_end > b.grip_begin;
   });
   extents.any_crossing = !loaded.surface_crossing.empty();
   extents.kept_count = narrow(size(loaded.kept_edge), "skin vertices");

@@ -579,7 +579,7 @@ void begin_frame(HostLauncher& launcher, const DeviceView& w) {
                  w.group_capacity, w);
 }
 void begin_substep(HostLauncher& launcher, const DeviceView& w, int substep) {
-  launcher.teams(begin_substep_kernel_object<true, step_detail::kRowTeam>{}, step_detail::kParticleTeam,
+  launcher.teams(begin_substep_kernel_object<true, false, step_detail::kRowTeam>{}, step_detail::kParticleTeam,
                  w.group_capacity, w, substep);
 }
 
@@ -783,7 +783,7 @@ TEST(Groups, AreResolvedIfEitherCandidateTouches) {
         w.group_earlier_map[3 * g + axis] = {0, 0, 0, axis == 2 ? earlier : 0};
       }
     }
-    launcher.teams(advance_kernel_object<true, true, step_detail::kRowTeam>{}, step_detail::kParticleTeam,
+    launcher.teams(advance_kernel_object<true, true, false, step_detail::kRowTeam>{}, step_detail::kParticleTeam,
                    w.group_capacity, w, 0, kIteration);
     for (int g = 0; g < groups; ++g) {
       ASSERT_EQ(w.group_resolved[g], wanted.touches ? step_detail::kResolved : step_detail::kCarried)
@@ -838,7 +838,7 @@ TEST(Groups, TouchNothingWithinTheirRoom) {
     pace.share = turn % 4 == 1 ? static_cast<float>(uniform(random, 0.02, 0.9)) : 1.0f;
     const Ball began = {
         {h, node}, single(uniform(random, 0, 0.3) * h * direction()), static_cast<float>(uniform(random, 0, 2) * h)};
-    const float room = step_detail::room_ahead(pace, contacts, began, ball, side);
+    const float room = step_detail::room_ahead<true>(pace, contacts, began, ball, side);
     if (!(room > 0)) continue;
     ++roomy;
     if (pace.share < 1) ++retarded;
@@ -846,7 +846,7 @@ TEST(Groups, TouchNothingWithinTheirRoom) {
     const auto meets = [&](const Vec3& moved, const Vec3& way) {
       for (const Vec3& from_middle : {way, direction(), direction()}) {
         const Float3 ahead = ball.d + single(moved + double{ball.radius} * from_middle);
-        const Float3 d = step_detail::come_to(pace, began.d + single(double{began.radius} * from_middle), ahead);
+        const Float3 d = step_detail::come_to<true>(pace, began.d + single(double{began.radius} * from_middle), ahead);
         for (const float own : {-1.0f, 1.0f}) {
           if (side != 0 && own != static_cast<float>(side)) continue;
           bool in_turn = false;
