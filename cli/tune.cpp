@@ -92,6 +92,7 @@ void print_reference(const TuneOptions& options, const json& reference) {
   for (const json& level : reference.at("levels")) {
     say("  {}", level_text(level));
     if (!level.at("apart_h").is_null()) say_filled(": {apart_h:.2g} h from the one before", level);
+    if (level.contains("order") && !level.at("order").is_null()) say_filled(", order {order:.2f}", level);
     say("\n");
   }
   say_filled("  {known_text}\n", reference);

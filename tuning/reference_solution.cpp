@@ -18,6 +18,8 @@ namespace {
 // What is left, at most, of the error that a substep starts with.
 constexpr double kLeft = 1e-4;
 constexpr int32_t kLeastSubsteps = 32, kLeastIterations = 16;
+// Distances up to this are rounding [h].
+constexpr double kSeen = 1e-9;
 
 // Iterations that shrink every error of a substep to kLeft: with rotations held, each multiplies it by at most
 // s (method.md §3).
@@ -31,8 +33,14 @@ int32_t enough_iterations(const Scene& scene, int32_t substeps) {
 
 }  // namespace
 
+std::optional<double> observed_order(std::span<const RefinementLevel> levels, std::size_t k) {
+  if (k < 2 || !levels[k - 1].apart_h || !levels[k].apart_h) return std::nullopt;
+  const double before = *levels[k - 1].apart_h, after = *levels[k].apart_h;
+  if (!(before > kSeen) || !(after > kSeen) || !std::isfinite(before) || !std::isfinite(after)) return std::nullopt;
+  return std::log2(before / after);
+}
+
 double remaining_error(std::span<const RefinementLevel> levels) {
-  constexpr double kSeen = 1e-9;  // [h]
   constexpr double kNotKnown = std::numeric_limits<double>::infinity();
   if (levels.empty() || !levels.back().apart_h || !std::isfinite(*levels.back().apart_h)) return kNotKnown;
   const double last = *levels.back().apart_h;

@@ -30,6 +30,11 @@ struct RefinementLevel {
   SolvedSteps::Count solved = {};     // where each substep is: how
 };
 
+// The order of convergence in time that levels k - 2, k - 1 and k show, each with twice the substeps of the one before:
+// the base-2 logarithm of the factor by which distances fell. None: there are not two distances, or one is infinite or
+// no more than rounding (1e-9 h).
+std::optional<double> observed_order(std::span<const RefinementLevel> levels, std::size_t k);
+
 // By how much the last of these levels may be off [h], as its distances tell. If they fall by a factor r from level to
 // level, all that are still to come add up to the last one over r - 1 (a geometric series; of first order r is 2, and
 // the sum as much as the last one). r is the least that was seen, because one that is greater may be luck; at least the

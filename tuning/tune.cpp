@@ -124,10 +124,13 @@ std::optional<Found> take_cheapest(const Measuring& measuring, const ReferenceSo
   return given;
 }
 
-json levels_json(const ReferenceSolution& reference) {
+json levels_json(ReferenceKind kind, const ReferenceSolution& reference) {
   json levels = json::array();
   for (const RefinementLevel& level : reference.levels()) {
     levels.push_back({{"substeps", level.substeps}, {"iterations", nullptr}, {"apart_h", json_number(level.apart_h)}});
+    if (kind == ReferenceKind::limit) {
+      levels.back()["order"] = json_number(observed_order(reference.levels(), levels.size() - 1));
+    }
     if (level.iterations) {
       levels.back()["iterations"] = *level.iterations;
     } else {
@@ -178,7 +181,7 @@ bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
     ReferenceSolution reference(options.reference, measuring.given.scene, options.scene, options.frames,
                                 kUnknownShare * options.tolerance, options.stop_asked);
     document["reference"] = {{"kind", options.reference == ReferenceKind::limit ? "limit" : "substeps"},
-                             {"levels", levels_json(reference)},
+                             {"levels", levels_json(options.reference, reference)},
                              {"known_h", json_number(reference.known_to_h())},
                              {"known_text", known_to(reference.levels())},
                              {"searched_level", reference.levels().size() - 1}};
@@ -201,7 +204,7 @@ bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
     if (by_cost(trials).empty()) return conclude(TuneStep::none_within);
 
     reference.refine();
-    document["reference"]["levels"] = levels_json(reference);
+    document["reference"]["levels"] = levels_json(options.reference, reference);
     document["reference"]["known_h"] = json_number(reference.known_to_h());
     document["reference"]["known_text"] = known_to(reference.levels());
     const std::optional<Found> found =

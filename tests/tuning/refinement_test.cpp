@@ -44,6 +44,9 @@ TEST(ReferenceSolution, IsRefinedUntilItIsKnown) {
   EXPECT_EQ(rough.levels().size(), 3u) << "two distances tell how fast it comes nearer";
   EXPECT_FALSE(rough.levels().front().apart_h);
   EXPECT_NEAR(rough.known_to_h(), *rough.levels().back().apart_h, 1e-9) << "first order";
+  EXPECT_FALSE(observed_order(rough.levels(), 0));
+  EXPECT_FALSE(observed_order(rough.levels(), 1)) << "one distance has not fallen";
+  EXPECT_NEAR(observed_order(rough.levels(), 2).value(), 1, 1e-6);
   ReferenceSolution fine(ReferenceKind::limit, scene_of(kFalling), "test", {}, 0.005);
   EXPECT_GT(fine.levels().size(), 3u);
   EXPECT_LE(fine.known_to_h(), 0.005);
@@ -51,6 +54,20 @@ TEST(ReferenceSolution, IsRefinedUntilItIsKnown) {
   fine.refine();
   EXPECT_EQ(fine.levels().size(), levels + 1);
   EXPECT_TRUE(fine.nothing_removed());
+}
+
+TEST(ReferenceSolution, TellsTheOrderInWhichItsLevelsComeNearer) {
+  const auto order = [](std::optional<double> before, std::optional<double> after) {
+    const std::vector<RefinementLevel> levels = {{1, 1, {}, {}}, {2, 1, before, {}}, {4, 1, after, {}}};
+    return observed_order(levels, 2);
+  };
+  EXPECT_DOUBLE_EQ(order(0.4, 0.1).value(), 2);
+  EXPECT_DOUBLE_EQ(order(0.1, 0.2).value(), -1);
+  const double infinity = std::numeric_limits<double>::infinity();
+  EXPECT_FALSE(order({}, 0.1));
+  EXPECT_FALSE(order(infinity, 0.1));
+  EXPECT_FALSE(order(0.1, infinity));
+  EXPECT_FALSE(order(1e-8, 1e-10)) << "rounding";
 }
 
 // Distances that fall by r from level to level are followed by 1 / r, 1 / r², … of the last one.
