@@ -94,7 +94,7 @@ constexpr void for_each_setup_field(Visit&& visit) {
   CUTPROOF_FIELD(step.relaxation, "step", "relaxation", one);
   CUTPROOF_FIELD(step.acceleration, "step", "acceleration", one);
   CUTPROOF_FIELD(step.damping, "step", "damping", one, "1/s");
-  CUTPROOF_FIELD(step.retardation, "step", "retardation", one, "s", kAnyNumber, false, 7);
+  CUTPROOF_FIELD(step.retardation, "step", "retardation", one, "s", 0, false, 7);
   CUTPROOF_FIELD(step.gravity, "step", "gravity", one, "m/s²");
   CUTPROOF_FIELD(detect.criterion, "detect", "criterion", one);
   CUTPROOF_FIELD(detect.remove, "detect", "remove", one, "1", kAnyNumber, false, 4);

@@ -466,6 +466,7 @@ struct FrameParts {
 CUTPROOF_DEVICE inline Parts predicted_parts(const Pace& pace, const FrameParts& now) {
   return {now.place.shape + pace.ahead * now.velocity.shape, now.place.motion + pace.ahead * now.velocity.motion};
 }
+// (Computed once a frame, so whether anybody has retardation is not asked before.)
 CUTPROOF_DEVICE inline FrameParts parts_after(const Pace& pace, float lost, const FrameParts& now) {
   const Parts predicted = predicted_parts(pace, now);
   FrameParts next;
@@ -482,9 +483,9 @@ CUTPROOF_DEVICE inline FrameParts load_parts(const DeviceView& w, int body, int 
   const Float4 parts = constant(parts_of(w, body, substep));
   return {{parts.x, parts.y}, {parts.z, parts.w}};
 }
-// k dt (dt + τ); without retardation k dt².
+// k dt (dt + τ); without retardation k dt², to the bit.
 CUTPROOF_DEVICE inline float kdt2_of(const BodyConstants& body, const Pace& pace) {
-  return body.stiffness * (pace.share == 1.0f ? pace.ahead : pace.share * pace.ahead) * pace.ahead;
+  return body.stiffness * (pace.share * pace.ahead) * pace.ahead;
 }
 // What the substeps and iterations of a body's frame have in common.
 CUTPROOF_DEVICE inline void store_numbers(const DeviceView& w, int body, const Pace& pace) {
@@ -931,14 +932,9 @@ CUTPROOF_DEVICE inline Float4 end_loose(const DeviceView& w, const Pace& pace, i
     return w.displacement[p];
   }
   const Float4 start = w.start[o];
-  const Float3 ahead = xyz(w.position[o]);
-  Float3 d;
-  if constexpr (kContacts) {
-    d = place_of<kRetarded>(w, pace, o, ahead);
-    end_impulse(w, p, pace, xyz(w.pushed[o]));
-  } else {
-    d = come_to<kRetarded>(pace, xyz(start), ahead);
-  }
+  static_assert(kContacts || !kRetarded);  // who has retardation has places (plan.h)
+  const Float3 d = place_of<kRetarded>(w, pace, o, xyz(w.position[o]));
+  if constexpr (kContacts) end_impulse(w, p, pace, xyz(w.pushed[o]));
   v = pace.decay_per_dt * (d - xyz(start));
   return with_w(d, start.w);
 }

@@ -159,8 +159,8 @@ void describe(auto& v, StepParameters& s) {
       s.retardation,
       {"retardation",
        "τ: elasticity acts on x + τ v, so deformations fade and not motion as a whole (Kelvin and Voigt's material, "
-       "of viscosity τ times its elastic modulus). What the time step damps is then less than what the material "
-       "does, and cuts converge in time (method.md §3). `implicit` only.",
+       "of viscosity τ times its elastic modulus). What fades then belongs to the material, and not to the time step "
+       "alone (method.md §3). `implicit` only.",
        between(0, 1e3, "s")});
   v.field(s.gravity, {"gravity", "In the body's frame.", between(-1e6, 1e6, "m/s²")});
 }

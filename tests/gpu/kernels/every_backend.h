@@ -1,4 +1,4 @@
-// A step of the first frame, on the reference and on each backend that runs the kernels here.
+// One step on the reference and on each backend that runs the kernels here.
 #pragma once
 #include <gtest/gtest.h>
 
