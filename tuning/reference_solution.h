@@ -27,6 +27,7 @@ struct RefinementLevel {
   int32_t substeps = 0;
   std::optional<int32_t> iterations;  // of the reference; none: each substep is solved
   std::optional<double> apart_h;      // from the level before: greatest RMS distance in any frame [h]
+  RemovalsApart removals = {};        // from the level before
   SolvedSteps::Count solved = {};     // where each substep is: how
 };
 
@@ -63,7 +64,7 @@ class ReferenceSolution {
   // each is solved; after that there is none.
   void refine();
 
-  static constexpr int32_t kMostSubsteps = 256;    // per frame
+  static constexpr int32_t kMostSubsteps = 512;    // per frame
   static constexpr int32_t kMostIterations = 512;  // per substep
 
  private:

@@ -24,4 +24,27 @@ std::string difference_in_parts(const Trajectory& expected, const Trajectory& ac
   return differs(expected.frames.back(), actual.frames.back(), "at the end");
 }
 
+RemovalsApart removals_apart(const Trajectory& expected, const Trajectory& actual) {
+  RemovalsApart apart;
+  const std::size_t frames = std::min(expected.frames.size(), actual.frames.size());
+  if (frames == 0) return apart;
+  // The first frame at whose end a particle is gone; as many as there are frames: none.
+  const auto gone_at = [&](const Trajectory& trajectory) {
+    std::vector<std::size_t> gone(trajectory.frames.front().alive.size(), frames);
+    for (std::size_t f = frames; f-- > 0;) {
+      const std::vector<uint8_t>& alive = trajectory.frames[f].alive;
+      for (std::size_t i = 0; i < alive.size(); ++i) {
+        if (alive[i] == 0) gone[i] = f;
+      }
+    }
+    return gone;
+  };
+  const std::vector<std::size_t> e = gone_at(expected), a = gone_at(actual);
+  for (std::size_t i = 0; i < e.size(); ++i) {
+    if (e[i] == a[i]) continue;
+    ++(e[i] == frames || a[i] == frames ? apart.alive_in_one : apart.in_another_frame);
+  }
+  return apart;
+}
+
 }  // namespace cutproof::tuning

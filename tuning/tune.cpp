@@ -54,8 +54,9 @@ Measuring prepare(const TuneOptions& options) {
   return measuring;
 }
 
+// An eighth of the limit's finest level at most: what has as many as that level would be compared with itself.
 std::vector<int32_t> searched_substeps(int32_t given) {
-  return substeps_to_try(given, std::max(ReferenceSolution::kMostSubsteps / 4, given));
+  return substeps_to_try(given, std::max(ReferenceSolution::kMostSubsteps / 8, given));
 }
 
 SearchSpace space_of(const Measuring& measuring, const TuneOptions& options, const ReferenceSolution& reference) {
@@ -128,6 +129,10 @@ json levels_json(ReferenceKind kind, const ReferenceSolution& reference) {
   json levels = json::array();
   for (const RefinementLevel& level : reference.levels()) {
     levels.push_back({{"substeps", level.substeps}, {"iterations", nullptr}, {"apart_h", json_number(level.apart_h)}});
+    if (level.apart_h) {
+      levels.back()["removed_in_another_frame"] = level.removals.in_another_frame;
+      levels.back()["alive_in_one"] = level.removals.alive_in_one;
+    }
     if (kind == ReferenceKind::limit) {
       levels.back()["order"] = json_number(observed_order(reference.levels(), levels.size() - 1));
     }

@@ -315,6 +315,30 @@ Trajectory trajectory(std::vector<int32_t> components, std::vector<int64_t> stro
   return made;
 }
 
+TEST(RemovalsApart, AreCountedByParticle) {
+  const auto alive = [](std::vector<std::vector<uint8_t>> frames) {
+    Trajectory made;
+    for (std::vector<uint8_t>& frame : frames) made.frames.push_back({{}, std::move(frame), 1});
+    return made;
+  };
+  // Of five particles one stays, one goes at once, one from the second frame on, and so on.
+  const Trajectory solution = alive({{1, 0, 1, 1, 1}, {1, 0, 0, 1, 1}, {1, 0, 0, 0, 1}});
+  const auto expect = [&](const Trajectory& other, int64_t in_another_frame, int64_t alive_in_one) {
+    for (const bool swapped : {false, true}) {
+      const RemovalsApart apart = swapped ? removals_apart(other, solution) : removals_apart(solution, other);
+      EXPECT_EQ(apart.in_another_frame, in_another_frame);
+      EXPECT_EQ(apart.alive_in_one, alive_in_one);
+    }
+  };
+  expect(solution, 0, 0);
+  expect(alive({{1, 1, 1, 1, 1}, {1, 0, 0, 1, 1}, {1, 0, 0, 0, 1}}), 1, 0);  // the second goes later
+  expect(alive({{1, 0, 1, 1, 1}, {1, 0, 0, 0, 1}, {1, 0, 0, 0, 0}}), 1, 1);  // the fourth earlier, and the last one
+  expect(alive({{1, 0, 1, 1, 1}, {1, 0, 1, 1, 1}, {1, 0, 1, 1, 1}}), 0, 2);
+  // What comes after the last frame of the shorter one is not known of it.
+  expect(alive({{1, 0, 1, 1, 1}, {1, 0, 0, 1, 1}}), 0, 0);
+  expect({}, 0, 0);
+}
+
 TEST(DifferenceInParts, IsSeenAtTheEndOfStrokesAndOfTheScene) {
   const Trajectory solution = trajectory({1, 1, 2, 2}, {1, 2});
   EXPECT_EQ(difference_in_parts(solution, solution), "");

@@ -124,6 +124,63 @@ TEST_F(Tune, AgainstTheLimitOfShortTimeSteps) {
   EXPECT_LE(greatest_rms_h(cutproof::io::read_scene(path("found.json")), given, 512, 4), 0.3);
 }
 
+// The frame at whose end each particle is gone, of a run of so many substeps; as many as there are frames: none.
+std::vector<int64_t> gone_at(Scene scene, int substeps, int iterations) {
+  scene.step.substeps = substeps;
+  scene.step.iterations = iterations;
+  const cutproof::tuning::PreparedScene prepared(scene, "test", {});
+  const auto backend = cutproof::reference::make_backend();
+  backend->load({prepared.setup()}, {prepared.start()});
+  std::vector<int64_t> gone(prepared.start().x.size(), prepared.frame_count());
+  for (int64_t frame = 0; frame < prepared.frame_count(); ++frame) {
+    prepared.for_parts_of(frame, [&] { backend->run({cutproof::Stage::step, cutproof::Stage::skin}); });
+    const cutproof::State state = backend->snapshot().front();
+    for (std::size_t i = 0; i < gone.size(); ++i) {
+      if (!state.alive[i]) gone[i] = std::min(gone[i], frame);
+    }
+  }
+  return gone;
+}
+
+// A cut that motion decides: distances halve until a removal falls into another frame.
+TEST_F(Tune, TellsWhichRemovalsItsLevelsDoNotShare) {
+  std::string text = kScene;
+  const auto replace = [&](const std::string& what, const std::string& by) {
+    ASSERT_NE(text.find(what), std::string::npos) << what;
+    text.replace(text.find(what), what.size(), by);
+  };
+  replace(R"("detect": {"criterion": "geometric"},)", "");
+  replace(R"("substeps": 4)", R"("substeps": 4, "stiffness": 2000)");
+  replace(R"(, {"low": [0.8, 0, 0], "high": [1, 1, 1]})", "");
+  write("scene.json", text);
+  const Outcome outcome = tune("--tolerance 1e-9 --json out.json");
+  EXPECT_EQ(outcome.status, 1) << outcome.output;
+  const json levels = json::parse(read("out.json")).at("reference").at("levels");
+  ASSERT_EQ(levels.size(), 5u);
+  EXPECT_FALSE(levels.front().contains("alive_in_one")) << "there is none before it";
+  const Scene given = cutproof::io::read_scene(path("scene.json"));
+  int64_t most = 0;
+  for (std::size_t k = 1; k < levels.size(); ++k) {
+    const auto gone = [&](std::size_t level) {
+      return gone_at(given, levels[level].at("substeps").get<int>(), levels[level].at("iterations").get<int>());
+    };
+    const std::vector<int64_t> before = gone(k - 1), now = gone(k);
+    const int64_t end = *std::max_element(now.begin(), now.end());  // whoever is never removed is gone then
+    int64_t in_another_frame = 0, alive_in_one = 0;
+    for (std::size_t i = 0; i < now.size(); ++i) {
+      if (now[i] != before[i]) ++(now[i] < end && before[i] < end ? in_another_frame : alive_in_one);
+    }
+    EXPECT_EQ(levels[k].at("removed_in_another_frame"), in_another_frame) << "level " << k;
+    EXPECT_EQ(levels[k].at("alive_in_one"), alive_in_one) << "level " << k;
+    if (in_another_frame == 0 && alive_in_one == 0 && k > 1) {
+      EXPECT_GT(levels[k].at("order"), 0.9) << "level " << k;
+    }
+    most = std::max({most, in_another_frame, alive_in_one});
+  }
+  ASSERT_GT(most, 0) << "a case in which nothing differs asks nothing";
+  EXPECT_NE(outcome.output.find(std::to_string(most) + " particle"), std::string::npos) << outcome.output;
+}
+
 TEST_F(Tune, SaysThatThereIsNone) {
   // The limit is not known so well.
   const Outcome unknown = tune("--tolerance 1e-9 --frames 2");
