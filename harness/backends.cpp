@@ -98,7 +98,7 @@ constexpr BackendDescriptor gpu_path(std::string_view name, std::string_view sum
   };
 }
 
-constexpr bool whole_frames(Span span) { return span.first == Stage::step && span.last == Stage::skin; }
+constexpr bool whole_frames(Span span) { return span.is_whole_frame(); }
 constexpr bool split_alone(Span span) { return span.first == Stage::split && span.last == Stage::split; }
 
 template <int of_block = 1>

@@ -19,6 +19,7 @@ struct Span {
   Stage last = Stage::skin;
 
   constexpr bool contains(Stage stage) const { return first <= stage && stage <= last; }
+  constexpr bool is_whole_frame() const { return first == Stage::step && last == Stage::skin; }
   friend bool operator==(const Span&, const Span&) = default;
 };
 

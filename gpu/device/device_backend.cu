@@ -103,6 +103,10 @@ class GpuBackend final : public Backend {
       if (wants_capacity(device_.view(), then)) take(load_.enlarged(snapshot(), options_));
     }
     const Path path = path_of_load();
+    if (load_.needs_groups(span)) {
+      DeviceLauncher launcher(stream_.get());
+      enqueue_groups_if_stale(launcher, device_.view());
+    }
     if (path == Path::one_block || path == Path::one_grid) {
       CUTPROOF_CUDA(cudaEventRecord(begin_.get(), stream_.get()));
       launch_span(device_.view(), load_.plan, span, static_cast<int*>(partials_.get()),

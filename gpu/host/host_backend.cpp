@@ -35,6 +35,7 @@ class HostBackend final : public Backend {
       if (stage >= 0) report_.seconds[static_cast<std::size_t>(stage)] += seconds(now - since);
       since = now;
     };
+    if (load_.needs_groups(span)) enqueue_groups_if_stale(launcher_, view_);
     enqueue_span(launcher_, view_, load_.plan, span, [&](Stage next) {
       close(Clock::now());
       stage = static_cast<int>(next);

@@ -14,6 +14,8 @@
 //   go to removal, so the reach is longer by swept_slack(), which is more than that: what is within the reach always
 //   goes, and what is farther by up to twice the slack may go.
 #pragma once
+#include <type_traits>
+
 #include "gpu/kernels/carried.cuh"
 #include "gpu/kernels/lowered_plane.cuh"
 #include "gpu/launch/launcher.h"
@@ -25,8 +27,8 @@ namespace cutproof::gpu {
 
 namespace detect_detail {
 
-// DeviceView::particle_flag. kContested: the particle has open edges of which the blade has not chosen an end; whether
-// it loses one of them is asked when all have been counted.
+// DeviceView::particle_flag. kContested: the particle has open edges of which nobody has chosen an end yet; whether it
+// loses one of them is asked when all have been counted, and when it is known where clusters are.
 enum : unsigned char { kStays = 0, kGoes = 1, kWentBefore = 2, kContested = 3 };
 
 inline constexpr float kRounding = 0x1p-24f;
@@ -66,23 +68,20 @@ CUTPROOF_DEVICE inline float greatest_squared_edge(const DeviceView& w, const Bo
 // ---- one end of each edge that is too long
 
 // The open edges of a particle, as they stand in DeviceView::particle_scratch for its neighbours: how many, and the
-// directions of those of which the blade has not chosen an end.
+// directions of those of which the blade does not choose an end, and of which it takes the nearer one.
 struct OpenEdges {
   int count = 0;
-  unsigned contested = 0;
+  unsigned contested = 0, crossing = 0;
 };
-CUTPROOF_DEVICE inline int packed(OpenEdges edges) { return edges.count << 6 | static_cast<int>(edges.contested); }
-CUTPROOF_DEVICE inline OpenEdges unpacked(int word) { return {word >> 6, static_cast<unsigned>(word) & 63u}; }
+CUTPROOF_DEVICE inline int packed(OpenEdges edges) {
+  return edges.count << 12 | static_cast<int>(edges.crossing << 6 | edges.contested);
+}
+CUTPROOF_DEVICE inline OpenEdges unpacked(int word) {
+  return {word >> 12, static_cast<unsigned>(word) & 63u, static_cast<unsigned>(word) >> 6 & 63u};
+}
 
 CUTPROOF_DEVICE inline bool is_negative(const DeviceView& w, const BodyConstants& body, const Plane& plane, int p) {
   return height_over(plane, rest_position(body, w.node[p]) + xyz(w.displacement[p])) < 0;
-}
-
-// Whether the choice between the two sides of the blade hangs on where clusters carry particles.
-CUTPROOF_DEVICE inline bool asks_clusters(const DeviceView& w, int b) {
-  const BodyConstants& body = w.body[b];
-  return body.criterion == Criterion::distance && body.remove == RemovedEnds::nearer && detects(w, b) &&
-         lowered_plane(w, body, b).exists;
 }
 
 // How far the clusters carry a particle from the plane.
@@ -90,18 +89,19 @@ CUTPROOF_DEVICE inline float carried_from(const DeviceView& w, const BodyConstan
   return fabsf(height_over(plane, rest_position(body, w.node[p]) + carried(w, body, p, {0, 0, 0})));
 }
 
-// Of an edge with ends on both sides of the plane: whether that on its negative side goes. Both ends ask with the same
-// numbers.
+// By the nearer end, of an edge with ends on both sides of the plane: whether that on its negative side goes. Both ends
+// ask with the same numbers.
 CUTPROOF_DEVICE inline bool negative_goes(const DeviceView& w, const BodyConstants& body, const Plane& plane,
                                           int negative, int positive) {
-  if (body.remove != RemovedEnds::nearer) return true;
   const float limit = static_cast<float>(kNearerBy) * body.h;
   return carried_from(w, body, plane, negative) <= carried_from(w, body, plane, positive) + limit;
 }
 
-// What becomes of a particle that has an edge longer than the root of `limit`.
-CUTPROOF_DEVICE inline unsigned char flag_of_open(const DeviceView& w, const BodyConstants& body, int b, int p,
-                                                  float limit) {
+// What becomes of a particle that has an edge longer than the root of `limit`. Where clusters will be asked about it,
+// they are marked.
+template <bool kNearer, class Block>
+CUTPROOF_DEVICE unsigned char flag_of_open(Block& block, const DeviceView& w, const BodyConstants& body, int b, int p,
+                                           float limit) {
   if (body.remove == RemovedEnds::both) return kGoes;
   const Plane plane = lowered_plane(w, body, b);
   const bool negative = plane.exists && is_negative(w, body, plane, p);
@@ -110,21 +110,40 @@ CUTPROOF_DEVICE inline unsigned char flag_of_open(const DeviceView& w, const Bod
   for_edges(w, body, p, [&](int direction, float squared, int q) {
     if (!(squared > limit)) return;
     ++open.count;
-    if (plane.exists && is_negative(w, body, plane, q) != negative) {
-      goes = goes || negative_goes(w, body, plane, negative ? p : q, negative ? q : p) == negative;
-    } else {
+    if (!plane.exists || is_negative(w, body, plane, q) == negative) {
       open.contested |= 1u << direction;
+    } else if (kNearer && body.remove == RemovedEnds::nearer) {
+      open.crossing |= 1u << direction;
+    } else {
+      goes = goes || negative;
     }
   });
   w.particle_scratch[p] = packed(open);
-  return goes ? kGoes : open.contested != 0 ? kContested : kStays;
+  if (kNearer && open.crossing != 0) {
+    for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
+      const int s = w.memberships[k];
+      if (s >= 0) block.store(&w.center_asked[s], removal_code(w, b));
+    }
+  }
+  return goes ? kGoes : (open.contested | open.crossing) != 0 ? kContested : kStays;
 }
 
-// Whether the particle loses one of its contested edges: it has more open edges than the other end, or as many and is
-// the lower.
-CUTPROOF_DEVICE inline bool loses(const DeviceView& w, const BodyConstants& body, int p) {
+// Whether the particle loses one of the edges that were left: of one that crosses the blade's plane it is the end that
+// goes; of another it has more open edges than the other end, or as many and is the lower.
+template <bool kNearer>
+CUTPROOF_DEVICE inline bool loses(const DeviceView& w, int b, int p) {
+  const BodyConstants& body = w.body[b];
   const OpenEdges open = unpacked(w.particle_scratch[p]);
   bool goes = false;
+  if (kNearer && open.crossing != 0) {
+    const Plane plane = lowered_plane(w, body, b);
+    const bool negative = is_negative(w, body, plane, p);
+    for (int direction = 0; direction < 6; ++direction) {
+      if (!(open.crossing >> direction & 1u)) continue;
+      const int q = neighbour(w, body, p, direction);
+      goes = goes || negative_goes(w, body, plane, negative ? p : q, negative ? q : p) == negative;
+    }
+  }
   for (int direction = 0; direction < 6; ++direction) {
     if (!(open.contested >> direction & 1u)) continue;
     const int q = neighbour(w, body, p, direction);
@@ -450,21 +469,23 @@ CUTPROOF_DEVICE void flag_strained_clusters_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(flag_strained_clusters_kernel);
 
-// DeviceView::center, of the bodies in which the nearer end of an edge goes.
+// DeviceView::center, of the clusters that carry an end of an edge whose nearer end goes. (What an earlier detection of
+// the same frame has marked may be among them.)
 template <class Block>
 CUTPROOF_DEVICE void recenter_asked_clusters_kernel(Block& block, DeviceView w) {
   using namespace detect_detail;
   const Team<Block, kCenterTeam> team(block);
   for (int64_t i = team.first(); i < w.counters->slots_used; i += team.stride()) {
     const int s = static_cast<int>(i);
-    if (w.slot_size[s] > 0 && asks_clusters(w, w.slot_body[s])) recenter(w, team, s);
+    if (w.slot_size[s] > 0 && w.center_asked[s] == removal_code(w, w.slot_body[s])) recenter(w, team, s);
   }
 }
 CUTPROOF_KERNEL(recenter_asked_clusters_kernel);
 
-// Judges the particles of every body, but those of geometric cuts.
-template <class Block>
-CUTPROOF_DEVICE void flag_particles_kernel(Block& block, DeviceView w) {
+// Judges the particles of every body, but those of geometric cuts. kNearer: of some body the nearer end of an edge
+// goes.
+template <bool kNearer, class Block>
+CUTPROOF_DEVICE void flag_particles_kernel(Block& block, const DeviceView& w) {
   using namespace detect_detail;
   if (block.first() == 0) w.counters->removed = 0;
   for (int64_t b = block.first(); b < w.bodies; b += block.stride()) {
@@ -479,7 +500,8 @@ CUTPROOF_DEVICE void flag_particles_kernel(Block& block, DeviceView w) {
         if (w.death[p] == removal_code(w, b)) flag = kWentBefore;
       } else if (body.criterion == Criterion::distance) {
         const float limit = body.epsilon * body.h;
-        if (greatest_squared_edge(w, body, p) > limit * limit) flag = flag_of_open(w, body, b, p, limit * limit);
+        if (greatest_squared_edge(w, body, p) > limit * limit)
+          flag = flag_of_open<kNearer>(block, w, body, b, p, limit * limit);
       } else if (body.criterion == Criterion::strain) {
         for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
           const int s = w.memberships[k];
@@ -490,7 +512,14 @@ CUTPROOF_DEVICE void flag_particles_kernel(Block& block, DeviceView w) {
     w.particle_flag[p] = flag;
   }
 }
-CUTPROOF_KERNEL(flag_particles_kernel);
+template <bool kNearer>
+struct flag_particles_kernel_object {
+  static constexpr const char* kName = "flag_particles_kernel";
+  template <class Block>
+  CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w) const {
+    flag_particles_kernel<kNearer>(block, w);
+  }
+};
 
 template <class Block>
 CUTPROOF_DEVICE void flag_swept_particles_kernel(Block& block, DeviceView w) {
@@ -514,8 +543,8 @@ CUTPROOF_DEVICE void flag_swept_particles_kernel(Block& block, DeviceView w) {
 CUTPROOF_KERNEL(flag_swept_particles_kernel);
 
 // What a detection earlier in this frame has removed leaves the list, which this one replaces.
-template <class Block>
-CUTPROOF_DEVICE void remove_particles_kernel(Block& block, DeviceView w) {
+template <bool kNearer, class Block>
+CUTPROOF_DEVICE void remove_particles_kernel(Block& block, const DeviceView& w) {
   using namespace detect_detail;
   int removed = 0;
   for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
@@ -528,23 +557,40 @@ CUTPROOF_DEVICE void remove_particles_kernel(Block& block, DeviceView w) {
       continue;
     }
     const int b = body_index(w, p), code = removal_code(w, b);
-    if (flag == kContested && !loses(w, w.body[b], p)) continue;
+    if (flag == kContested && !loses<kNearer>(w, b, p)) continue;
     w.death[p] = code;
     block.store(&w.cut[b], code);
     ++removed;
   }
   if (removed > 0) block.atomic_add(&w.counters->removed, removed);
 }
-CUTPROOF_KERNEL(remove_particles_kernel);
+template <bool kNearer>
+struct remove_particles_kernel_object {
+  static constexpr const char* kName = "remove_particles_kernel";
+  template <class Block>
+  CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w) const {
+    remove_particles_kernel<kNearer>(block, w);
+  }
+};
 
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_detect(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   using namespace detect_detail;
   if (plan.strain) launcher.teams(flag_strained_clusters_kernel_object{}, kStrainTeam, w.slots_expected, w);
-  if (plan.nearer) launcher.teams(recenter_asked_clusters_kernel_object{}, kCenterTeam, w.slots_expected, w);
-  launcher.items(flag_particles_kernel_object{}, w.particles, w);
-  if (plan.geometric) launcher.items(flag_swept_particles_kernel_object{}, w.particles, w);
-  launcher.items(remove_particles_kernel_object{}, w.particles, w);
+  // Only with it do these kernels know of the nearer end: code for what happens to few particles is registers of all.
+  const auto by_ends = [&](auto nearer) {
+    launcher.items(flag_particles_kernel_object<nearer.value>{}, w.particles, w);
+    if (plan.geometric) launcher.items(flag_swept_particles_kernel_object{}, w.particles, w);
+    if constexpr (nearer.value) {
+      launcher.teams(recenter_asked_clusters_kernel_object{}, kCenterTeam, w.slots_expected, w);
+    }
+    launcher.items(remove_particles_kernel_object<nearer.value>{}, w.particles, w);
+  };
+  if (plan.nearer) {
+    by_ends(std::true_type{});
+  } else {
+    by_ends(std::false_type{});
+  }
 }
 
 }  // namespace cutproof::gpu

@@ -34,9 +34,10 @@ CUTPROOF_DEVICE inline bool is_due(const DeviceView& w, int b, int stage) {
   }
 }
 
-// What a span reports of step and detect: which of them some body has due. One block.
+// What a span reports of step and detect: which of them some body has due. By the first block of whichever kernel is
+// the first of the span.
 template <class Block>
-CUTPROOF_DEVICE void begin_span_kernel(Block& block, const DeviceView& w, Span span) {
+CUTPROOF_DEVICE void begin_span(Block& block, const DeviceView& w, Span span) {
   if (block.index() != 0) return;
   Counters& c = *w.counters;
   for (int k = block.thread(); k < static_cast<int>(kStages.size()); k += block.size()) block.store(&c.stage_ran[k], 0);
@@ -46,6 +47,10 @@ CUTPROOF_DEVICE void begin_span_kernel(Block& block, const DeviceView& w, Span s
       if (span.contains(static_cast<Stage>(k)) && is_due(w, b, k)) block.store(&c.stage_ran[k], 1);
     }
   }
+}
+template <class Block>
+CUTPROOF_DEVICE void begin_span_kernel(Block& block, const DeviceView& w, Span span) {
+  begin_span(block, w, span);
 }
 CUTPROOF_KERNEL(begin_span_kernel);
 

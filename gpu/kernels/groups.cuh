@@ -450,7 +450,6 @@ CUTPROOF_DEVICE void measure_clusters_kernel(Block& block, const DeviceView& w) 
   const Team<Block, kMemberTeam> team(block);
   Counters& counters = *w.counters;
   const bool whole = block.load(&counters.groups_whole) != 0;
-  if (block.first() == 0) counters.groups_stale = 0;
   const int clusters = whole ? counters.slots_used : counters.remeasured;
   for (int64_t i = team.first(); i < clusters; i += team.stride()) {
     const int s = whole ? static_cast<int>(i) : remeasured(w)[i], size = w.slot_size[s];
@@ -521,19 +520,24 @@ CUTPROOF_DEVICE void measure_clusters_kernel(Block& block, const DeviceView& w) 
 }
 CUTPROOF_KERNEL(measure_clusters_kernel);
 
-// Groups of the clusters that have changed since the last time.
+// Groups of the clusters that have changed since the last time; none, if none has. Requires memberships in order.
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_groups(Launcher& launcher, const DeviceView& w) {
+  launcher.teams(find_changed_clusters_kernel_object{}, kMemberTeam, w.slots_expected, w);
+  launcher.teams(dissolve_groups_kernel_object{}, kMemberTeam, w.slots_expected, w);
+  launcher.teams(find_classes_kernel_object{}, kMemberTeam, w.slots_expected, w);
+  launcher.blocks(deal_out_groups_kernel_object{}, w.slots_expected, kDealThreads, (3 * kMostDealt + 4) * sizeof(int),
+                  w);
+  launcher.teams(measure_groups_kernel_object{}, kGroupTeam, w.group_capacity, w);
+  launcher.teams(measure_clusters_kernel_object{}, kMemberTeam, w.slots_expected, w);
+  launcher.clear(&w.counters->groups_stale, 6 * sizeof(int));  // and the five behind it
+}
+// The same at any time, where nobody knows whether any has.
+template <class Launcher>
+CUTPROOF_ENQUEUE void enqueue_groups_if_stale(Launcher& launcher, const DeviceView& w) {
   Counters* const c = w.counters;  // an address only: counters lie on the device
   launcher.if_nonzero(&c->groups_stale, [&](Launcher& stale) {
-    stale.teams(find_changed_clusters_kernel_object{}, kMemberTeam, w.slots_expected, w);
-    stale.teams(dissolve_groups_kernel_object{}, kMemberTeam, w.slots_expected, w);
-    stale.teams(find_classes_kernel_object{}, kMemberTeam, w.slots_expected, w);
-    stale.blocks(deal_out_groups_kernel_object{}, w.slots_expected, kDealThreads, (3 * kMostDealt + 4) * sizeof(int),
-                 w);
-    stale.teams(measure_groups_kernel_object{}, kGroupTeam, w.group_capacity, w);
-    stale.teams(measure_clusters_kernel_object{}, kMemberTeam, w.slots_expected, w);
-    stale.clear(&c->groups_whole, sizeof(int));
+    enqueue_groups(stale, w);
   });
 }
 

@@ -17,12 +17,14 @@
 
 #include "gpu/kernels/contacts.cuh"
 #include "gpu/kernels/float3.h"
+#include "gpu/kernels/frame.cuh"
 #include "gpu/kernels/groups.cuh"
 #include "gpu/kernels/rotation.cuh"
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/plan.h"
 #include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
+#include "model/stage.h"
 
 namespace cutproof::gpu {
 
@@ -1071,17 +1073,17 @@ CUTPROOF_DEVICE inline Pace pace_of(const DeviceView& w, int b) {
 
 }  // namespace step_detail
 
-// Clears what a frame counts, and says what its bodies need.
+// Clears what a frame counts, and says what its bodies need. The first kernel of a span that begins with the step.
 template <class Block>
-CUTPROOF_DEVICE void begin_frame_kernel(Block& block, const DeviceView& w) {
+CUTPROOF_DEVICE void begin_frame_kernel(Block& block, const DeviceView& w, Span span) {
   using namespace step_detail;
+  begin_span(block, w, span);
   if (block.first() == 0) {
     w.counters->removed = 0;
     w.counters->debris = 0;
     w.counters->affected = 0;
     *step_detail::listed_before(w, 0, 0) = 0;
     w.counters->tracked[1] = w.counters->newly_tracked[0] = w.counters->newly_tracked[2] = 0;
-    w.counters->regrouped = w.counters->remeasured = w.counters->due_particles = w.counters->due_pairs = 0;
   }
   for (int64_t b = block.first(); b < w.bodies; b += block.stride()) {
     if (running(w, static_cast<int>(b))) w.cut[b] = -1;
@@ -1901,12 +1903,12 @@ struct advance_kernel_object {
 namespace step_detail {
 
 template <int Method, bool kContacts, bool kAccelerated, bool kRetarded, class Launcher>
-CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan, Span span) {
   const int64_t particles = w.particles > w.bodies ? w.particles : w.bodies;
   const int64_t of_places = (w.place_capacity + kParticleTeam - 1) / kParticleTeam;
   const int64_t teams = w.group_capacity > of_places ? w.group_capacity : of_places;
-  launcher.items(begin_frame_kernel_object{}, particles, w);
-  enqueue_groups(launcher, w);
+  launcher.items(begin_frame_kernel_object{}, particles, w, span);
+  if (!span.is_whole_frame()) enqueue_groups_if_stale(launcher, w);
   // Of a small load each group has lanes enough for its rows; of a large one they would all do what one can do for
   // three.
   const auto by_rows = [&](auto start) {
@@ -1953,41 +1955,41 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
 }
 
 template <int Method, class Launcher>
-CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan, Span span) {
   if (plan.retarded) {
-    enqueue<Method, true, true, true>(launcher, w, plan);
+    enqueue<Method, true, true, true>(launcher, w, plan, span);
   } else if (plan.contacts && plan.accelerated) {
-    enqueue<Method, true, true, false>(launcher, w, plan);
+    enqueue<Method, true, true, false>(launcher, w, plan, span);
   } else if (plan.contacts) {
-    enqueue<Method, true, false, false>(launcher, w, plan);
+    enqueue<Method, true, false, false>(launcher, w, plan, span);
   } else if (plan.accelerated) {
-    enqueue<Method, false, true, false>(launcher, w, plan);
+    enqueue<Method, false, true, false>(launcher, w, plan, span);
   } else {
-    enqueue<Method, false, false, false>(launcher, w, plan);
+    enqueue<Method, false, false, false>(launcher, w, plan, span);
   }
 }
 
 }  // namespace step_detail
 
-// All substeps of the frame of every running body.
+// All substeps of the frame of every running body. span: that of which the step is the first stage.
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_step(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+CUTPROOF_ENQUEUE void enqueue_step(Launcher& launcher, const DeviceView& w, const Plan& plan, Span span) {
   if constexpr (requires { typename Launcher::OneLaunch; }) {
-    step_detail::enqueue<kNewton>(launcher, w, plan);
+    step_detail::enqueue<kNewton>(launcher, w, plan, span);
   } else {
     switch (w.rotation_method) {
       case kMueller2016:
-        return step_detail::enqueue<kMueller2016>(launcher, w, plan);
+        return step_detail::enqueue<kMueller2016>(launcher, w, plan, span);
       case kApd:
-        return step_detail::enqueue<kApd>(launcher, w, plan);
+        return step_detail::enqueue<kApd>(launcher, w, plan, span);
       case kSvd:
-        return step_detail::enqueue<kSvd>(launcher, w, plan);
+        return step_detail::enqueue<kSvd>(launcher, w, plan, span);
       case kQuest:
-        return step_detail::enqueue<kQuest>(launcher, w, plan);
+        return step_detail::enqueue<kQuest>(launcher, w, plan, span);
       case kNewton:
-        return step_detail::enqueue<kNewton>(launcher, w, plan);
+        return step_detail::enqueue<kNewton>(launcher, w, plan, span);
       default:
-        return step_detail::enqueue<kJacobi4>(launcher, w, plan);
+        return step_detail::enqueue<kJacobi4>(launcher, w, plan, span);
     }
   }
 }

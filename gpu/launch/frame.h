@@ -18,13 +18,19 @@
 
 namespace cutproof::gpu {
 
+// A span of a whole frame finds groups as the one before has left them, and leaves them as the next needs them: what
+// follows a cut has a condition anyway, and in front of the step there is none. Any other makes them where the step
+// needs them. Before the first of whole frames, and after any other span, Load::needs_groups() says that they are to be
+// made (groups.cuh, enqueue_groups_if_stale).
+//
 // `mark` is called with each stage before its work is handed over (a launcher that works at once can take times).
 template <class Launcher, class Mark>
 CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, const Plan& plan, Span span, Mark mark) {
-  launcher.blocks(begin_span_kernel_object{}, 1, 128, 0, w, span);
   if (span.contains(Stage::step)) {
     mark(Stage::step);
-    enqueue_step(launcher, w, plan);
+    enqueue_step(launcher, w, plan, span);
+  } else {
+    launcher.blocks(begin_span_kernel_object{}, 1, 128, 0, w, span);
   }
   if (span.contains(Stage::detect) && plan.detection) {
     mark(Stage::detect);
@@ -57,6 +63,7 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
         inner.blocks(number_slots_kernel_object{}, w.bodies * slot_runs(w.slots_expected), kListThreads, 0, w);
         if (plan.skin) enqueue_skin_cells(inner, w, plan);
       }
+      if (span.is_whole_frame()) enqueue_groups(inner, w);
     });
   }
   if (skin) {

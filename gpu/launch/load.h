@@ -7,6 +7,7 @@
 #include "gpu/launch/plan.h"
 #include "gpu/state/staging.h"
 #include "model/setup.h"
+#include "model/stage.h"
 #include "model/state.h"
 
 namespace cutproof::gpu {
@@ -53,10 +54,19 @@ struct Load {
   Load enlarged(const std::vector<State>& states, const KernelOptions& options);
   // To be called before a skin stage.
   void forget_skins() { skins.assign(setups.size(), std::nullopt); }
+  // To be called before each span is run. Whether groups have to be made first (frame.h).
+  bool needs_groups(Span span) {
+    const bool needs = span.is_whole_frame() && !groups_made_;
+    groups_made_ = span.is_whole_frame();
+    return needs;
+  }
   // As extract_states; `staging` holds what is to be extracted.
   std::vector<State> states_of(const std::vector<bool>& wanted) {
     return extract_states(staging, setups, wanted, skins);
   }
+
+ private:
+  bool groups_made_ = false;  // by the last span, for the next frame
 };
 
 }  // namespace cutproof::gpu

@@ -15,6 +15,7 @@
 #include "gpu/host/host_launcher.h"
 #include "gpu/kernels/groups.cuh"
 #include "gpu/launch/frame.h"
+#include "gpu/launch/load.h"
 #include "gpu/state/staging.h"
 #include "model/at.h"
 #include "property_tests/cases.h"
@@ -73,7 +74,7 @@ struct Grouped {
       : bodies(std::move(of)), staging(make_staging_buffers(bodies.setups, bodies.states, kNewton, Capacity{})) {
     if (like != nullptr) take_over_rest_frames(*like);
     view = staging.view();
-    enqueue_groups(launcher, view);
+    enqueue_groups_if_stale(launcher, view);
   }
   Grouped(const Grouped&) = delete;
   const Counters& counters() const { return staging.counters.front(); }
@@ -355,33 +356,58 @@ std::string tables_of(const StagingBuffers& s) {
   return text;
 }
 
-// After every frame of dissections that split, merge and expand: the step finds what a load of that state would make.
+// After every frame of dissections that split, merge and expand: the step finds what a load of that state would make,
+// whether frames are run in parts, which make groups in front of the step, as wholes, which leave them to the next one,
+// or now so and now so.
 TEST(Groups, FollowTheClusters) {
-  int in_part = 0, whole = 0, kept = 0;
-  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
-    SCOPED_TRACE(seed);
-    const Bodies bodies = random_bodies(seed, 5, 60);
-    StagingBuffers staging = make_staging_buffers(bodies.setups, bodies.states, kNewton, Capacity{});
-    const DeviceView view = staging.view();
-    const Plan plan = make_plan(bodies.setups, bodies.states, kNewton, SplitMethod::blocks);
-    HostLauncher launcher;
-    std::int64_t frames = 0;
-    for (const cutproof::Setup& setup : bodies.setups) frames = std::max(frames, setup.frame_count());
-    for (std::int64_t f = 0; f < frames; ++f) {
-      const bool stale = f > 0 && staging.counters.front().groups_stale != 0;
-      const Grouped fresh(Bodies{bodies.setups, extract_states(staging, bodies.setups)}, HostLauncher(), &staging);
-      if (HasFatalFailure()) return;
-      enqueue_span(launcher, view, plan, Span{Stage::step, Stage::step}, [](Stage) {});
-      ASSERT_TRUE(tables_of(staging) == tables_of(fresh.staging)) << "frame " << f;
-      if (stale) (staging.counters.front().groups_before > 0 ? in_part : whole)++;
-      if (stale) kept += staging.counters.front().groups_before > 0 && staging.group_head.front().size > 0;
-      enqueue_span(launcher, view, plan, Span{Stage::detect, Stage::skin}, [](Stage) {});
+  enum class Frames { in_parts, whole, either };
+  for (const Frames frames : {Frames::in_parts, Frames::whole, Frames::either}) {
+    int in_part = 0, anew = 0, kept = 0;
+    for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+      SCOPED_TRACE(seed);
+      const Bodies bodies = random_bodies(seed, 5, 60);
+      StagingBuffers staging = make_staging_buffers(bodies.setups, bodies.states, kNewton, Capacity{});
+      Counters& counters = staging.counters.front();
+      const DeviceView view = staging.view();
+      const Plan plan = make_plan(bodies.setups, bodies.states, kNewton, SplitMethod::blocks);
+      HostLauncher launcher;
+      Load load;  // only to be asked
+      const auto begin = [&](Span span) {
+        if (load.needs_groups(span)) enqueue_groups_if_stale(launcher, view);
+      };
+      const auto run = [&](Span span) { enqueue_span(launcher, view, plan, span, [](Stage) {}); };
+      Random random(seed);
+      std::int64_t count = 0;
+      for (const cutproof::Setup& setup : bodies.setups) count = std::max(count, setup.frame_count());
+      for (std::int64_t f = 0; f < count; ++f) {
+        const bool whole = frames == Frames::whole || (frames == Frames::either && uniform(random, 0, 1) < 0.5);
+        const Grouped fresh(Bodies{bodies.setups, extract_states(staging, bodies.setups)}, HostLauncher(), &staging);
+        if (HasFatalFailure()) return;
+        const bool stale = counters.groups_stale != 0;
+        ASSERT_TRUE(f == 0 || frames != Frames::whole || !stale) << "frame " << f;
+        constexpr int kUntouched = -1;
+        counters.groups_before = kUntouched;
+        const Span span = whole ? Span{} : Span{Stage::step, Stage::step};
+        begin(span);
+        if (!whole) run(span);
+        ASSERT_TRUE(tables_of(staging) == tables_of(fresh.staging)) << "frame " << f;
+        if (whole) {
+          run(span);
+        } else {
+          const Span rest{Stage::detect, Stage::skin};
+          begin(rest);
+          run(rest);
+        }
+        if (f == 0 || counters.groups_before == kUntouched) continue;
+        ++(counters.groups_before > 0 ? in_part : anew);
+        kept += counters.groups_before > 0 && staging.group_head.front().size > 0;
+      }
     }
+    std::printf("made in part %d times, as a whole %d times\n", in_part, anew);
+    EXPECT_GT(in_part, 25);
+    EXPECT_GT(kept, 10);
+    EXPECT_GT(anew, 5);
   }
-  std::printf("made in part %d times, as a whole %d times\n", in_part, whole);
-  EXPECT_GT(in_part, 25);
-  EXPECT_GT(kept, 10);
-  EXPECT_GT(whole, 5);
 }
 
 TEST(Groups, AreTheSameUnderEverySchedule) {
@@ -564,7 +590,8 @@ Stepped step(const cutproof::Setup& setup, const State& state) {
   const std::vector<State> states = {state};
   stepped.staging = make_staging_buffers(setups, states, kNewton, Capacity{});
   HostLauncher launcher;
-  enqueue_step(launcher, stepped.staging.view(), make_plan(setups, states, kNewton, SplitMethod::blocks));
+  enqueue_step(launcher, stepped.staging.view(), make_plan(setups, states, kNewton, SplitMethod::blocks),
+               Span{Stage::step, Stage::step});
   stepped.state = extract_states(stepped.staging, setups).front();
   stepped.touched = stepped.staging.group_tracked;
   stepped.touched.resize(at(stepped.staging.counters.front().groups));
@@ -573,8 +600,8 @@ Stepped step(const cutproof::Setup& setup, const State& state) {
 
 // The step's kernels up to where a frame's first substep begins, and what begins one.
 void begin_frame(HostLauncher& launcher, const DeviceView& w) {
-  launcher.items(begin_frame_kernel_object{}, w.particles, w);
-  enqueue_groups(launcher, w);
+  launcher.items(begin_frame_kernel_object{}, w.particles, w, Span{Stage::step, Stage::step});
+  enqueue_groups_if_stale(launcher, w);
   launcher.teams(sum_groups_kernel_object<true, step_detail::kParticleTeam>{}, step_detail::kParticleTeam,
                  w.group_capacity, w);
 }

@@ -55,7 +55,7 @@ std::vector<State> kernel_steps(HostLauncher& launcher, const std::vector<Setup>
   const DeviceView view = staging.view();
   const Plan plan = make_plan(setups, states, method, SplitMethod::blocks);
   for (int f = 0; f < frames; ++f) {
-    enqueue_step(launcher, view, plan);
+    enqueue_step(launcher, view, plan, Span{Stage::step, Stage::step});
     for (std::size_t b = 0; b < setups.size(); ++b) staging.frame[b] += staging.frame[b] < setups[b].frame_count();
   }
   return extract_states(staging, setups);
@@ -482,7 +482,8 @@ TEST(GpuStep, LeavesDeadParticlesAndFinishedBodiesAlone) {
   StagingBuffers staging = make_staging_buffers(setups, states, kJacobi4, Capacity{});
   EXPECT_GE(staging.cut[0], 0);
   HostLauncher launcher;
-  enqueue_step(launcher, staging.view(), make_plan(setups, states, kJacobi4, SplitMethod::blocks));
+  enqueue_step(launcher, staging.view(), make_plan(setups, states, kJacobi4, SplitMethod::blocks),
+               Span{Stage::step, Stage::step});
   EXPECT_EQ(staging.cut[0], -1) << "so that no cluster stage runs";
   State finished = state;
   finished.frame = 1;
