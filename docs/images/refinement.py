@@ -24,7 +24,7 @@ def curve(path):
 
 
 def picture(curves):
-    axes = LogAxes((1.7, 2.8), (-3.4, 0.1), "Distance from half as many substeps; dashed: without retardation, solid: 4 ms")
+    axes = LogAxes((1.7, 2.8), (-3.7, 0.1), "Distance from half as many substeps; dashed: without retardation, solid: 4 ms")
     axes.ticks((64, 128, 256, 512), (0.001, 0.01, 0.1, 1))
     axes.labels("substeps a frame of 16 ms", "greatest RMS distance [h]")
     scenes = sorted({scene for scene, _, _ in curves})
@@ -39,8 +39,8 @@ def picture(curves):
         y = TOP + 14 + 20 * row
         axes.line(axes.right + 12, y - 4, axes.right + 42, y - 4, f'stroke="{COLOURS[row]}" stroke-width="2"')
         axes.text(axes.right + 48, y, scene)
-    axes.line(axes.px(64), axes.py(0.0016), axes.px(256), axes.py(0.0004), 'stroke="#555555" stroke-width="1"')
-    axes.text(axes.px(64), axes.py(0.0016) + 36, "first order", extra='fill="#555555"')
+    axes.line(axes.px(64), axes.py(0.0014), axes.px(256), axes.py(0.00035), 'stroke="#555555" stroke-width="1"')
+    axes.text(axes.px(64), axes.py(0.0014) + 36, "first order", extra='fill="#555555"')
     return axes.svg()
 
 

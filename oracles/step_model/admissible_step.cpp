@@ -539,7 +539,7 @@ class Search {
     // The sides that particles tell of: of the last substep they are certain, of earlier ones only likely.
     const Settled certain = sides_of(first, setup_.step.substeps - 1), likely = sides_of(first, 0);
     Branch root = likely.empty() ? std::move(first) : branch_of(likely);
-    scale_by(root.bounds);
+    scale_by(root);
     root.left = square_left(root.outcome);
     Branch best = root;
     // What an outcome rounds is first taken for what the root does; that may be less.
@@ -669,8 +669,10 @@ class Search {
 
   // How far particles are from an outcome, where they are; positions and velocities as one list, each in what rounding
   // explains of it: else what the blade has pushed far, and so rounds much, would hide what beside it does not round.
+  // Behind them the columns of rotations, which keep what a particle did in the last iteration but one where a contact
+  // has put it back in the last.
   std::vector<std::pair<std::size_t, Vec3>> off_outcome(const std::vector<Vec3>& x, const std::vector<Vec3>& v,
-                                                        const StepOutcome& o) const {
+                                                        const std::vector<Mat3>& rotation, const StepOutcome& o) const {
     std::vector<std::pair<std::size_t, Vec3>> off;
     for (std::size_t i = 0; i < x.size(); ++i) {
       if (before_.alive[i] == 0) continue;
@@ -678,16 +680,31 @@ class Search {
       if (!(place == Vec3{})) off.emplace_back(2 * i, scale_of(2 * i) * place);
       if (!(way == Vec3{})) off.emplace_back(2 * i + 1, scale_of(2 * i + 1) * way);
     }
+    for (std::size_t c = 0; c < reach_.size() && rotations_ == Rotations::stated; ++c) {
+      for (std::size_t column = 0; column < 3; ++column) {
+        const std::size_t k = 2 * x.size() + 3 * c + column;
+        const Vec3 turned = column_of(rotation[c], column) - column_of(o.rotation[c], column);
+        if (!(turned == Vec3{}) && scale_of(k) > 0) off.emplace_back(k, scale_of(k) * (reach_[c] * turned));
+      }
+    }
     return off;
   }
+  static Vec3 column_of(const Mat3& r, std::size_t column) { return {r.m[column], r.m[3 + column], r.m[6 + column]}; }
 
   double scale_of(std::size_t k) const { return scale_.empty() ? 1 : scale_[k]; }
-  // Compares outcomes from here on by what rounding does to this one.
-  void scale_by(const Bounds& bounds) {
+  // Compares outcomes from here on by what rounding does to this one; and not by rotations of which many are the best.
+  void scale_by(const Branch& branch) {
+    const Bounds& b = branch.bounds;
     scale_.clear();
+    const auto add = [&](double bound) { scale_.push_back(h_ / std::max(bound, kUnitRoundoff * h_)); };
     for (std::size_t i = 0; i < before_.x.size(); ++i) {
-      for (const double bound : {bounds.position[i], bounds.velocity[i]}) {
-        scale_.push_back(h_ / std::max(bound, kUnitRoundoff * h_));
+      add(b.position[i]);
+      add(b.velocity[i]);
+    }
+    for (std::size_t c = 0; c < reach_.size(); ++c) {
+      for (int column = 0; column < 3; ++column) {
+        add(reach_[c] * b.rotation[c]);
+        if (is_open(branch, c) || b.rotation[c] >= kAnyRotation) scale_.back() = 0;
       }
     }
   }
@@ -708,7 +725,7 @@ class Search {
         Column column = {with_other({}, tie, again), {}};
         if (!seen.insert(column.settled).second) continue;
         const StepOutcome o = model_.run({with(branch.settled, column.settled), 0, kNear * h_, branch.given});
-        column.does = off_outcome(o.x, o.v, branch.outcome);
+        column.does = off_outcome(o.x, o.v, o.rotation, branch.outcome);
         for (const auto& [k, way] : column.does) column.square += dot(way, way);
         columns.push_back(std::move(column));
       }
@@ -721,8 +738,8 @@ class Search {
   }
   // How far the backend is from an outcome, as columns are.
   std::vector<Vec3> left_by(const StepOutcome& outcome) const {
-    std::vector<Vec3> left(2 * before_.x.size());
-    for (const auto& [k, way] : off_outcome(after_.x, after_.v, outcome)) left[k] = way;
+    std::vector<Vec3> left(2 * before_.x.size() + 3 * reach_.size());
+    for (const auto& [k, way] : off_outcome(after_.x, after_.v, after_.clusters.rotation, outcome)) left[k] = way;
     return left;
   }
   double square_left(const StepOutcome& outcome) const {
@@ -842,7 +859,7 @@ class Search {
     std::size_t counted = 0;
     for (const int32_t i : particles) {
       for_ways_of(i, branch, kWaysOfFew, [&](const Settled& settled, const StepOutcome& o) {
-        ways.push_back({counted, settled, off_outcome(o.x, o.v, branch.outcome)});
+        ways.push_back({counted, settled, off_outcome(o.x, o.v, o.rotation, branch.outcome)});
       });
       ++counted;
     }
@@ -1021,7 +1038,7 @@ class Search {
   StepModel model_;
   std::vector<int32_t> holders_;  // [n] clusters of a particle
   std::vector<double> reach_;     // [m] greatest |X - T|
-  std::vector<double> scale_;     // [2 n] of positions and velocities, by which outcomes are compared; empty: 1
+  std::vector<double> scale_;     // [2 n + 3 m] of positions, velocities, rotations: see scale_by(); empty: 1
   Partition coupled_;
   int most_outcomes_ = kMostOutcomes;
   uint64_t at_once_ = 1;  // disturbed runs
