@@ -546,6 +546,16 @@ class Search {
     const std::optional<Branch> open = likely == certain ? std::nullopt : std::optional(branch_of(certain));
     bool all_tried = explore(root, open, false, best);
     if (all_tried && !best.holds()) all_tried = explore(root, open, true, best);
+    if (!best.holds() && rotations_ == Rotations::stated) {
+      // Where a contact has put particles in the last iteration hides what they did before, which rotations keep. (They
+      // come last: what many ties do to a rotation does not add up.)
+      by_rotations_ = true;
+      root.left = square_left(root.outcome);
+      Branch turned = root;
+      explore(root, open, false, turned);
+      by_rotations_ = false;
+      if (turned.holds()) return turned;
+    }
     if (!best.holds()) {
       look_closer(best, kMostDisturbedRuns);
       compare(best);
@@ -669,8 +679,7 @@ class Search {
 
   // How far particles are from an outcome, where they are; positions and velocities as one list, each in what rounding
   // explains of it: else what the blade has pushed far, and so rounds much, would hide what beside it does not round.
-  // Behind them the columns of rotations, which keep what a particle did in the last iteration but one where a contact
-  // has put it back in the last.
+  // Behind them, if they are asked for, the columns of rotations.
   std::vector<std::pair<std::size_t, Vec3>> off_outcome(const std::vector<Vec3>& x, const std::vector<Vec3>& v,
                                                         const std::vector<Mat3>& rotation, const StepOutcome& o) const {
     std::vector<std::pair<std::size_t, Vec3>> off;
@@ -680,7 +689,7 @@ class Search {
       if (!(place == Vec3{})) off.emplace_back(2 * i, scale_of(2 * i) * place);
       if (!(way == Vec3{})) off.emplace_back(2 * i + 1, scale_of(2 * i + 1) * way);
     }
-    for (std::size_t c = 0; c < reach_.size() && rotations_ == Rotations::stated; ++c) {
+    for (std::size_t c = 0; c < reach_.size() && by_rotations_; ++c) {
       for (std::size_t column = 0; column < 3; ++column) {
         const std::size_t k = 2 * x.size() + 3 * c + column;
         const Vec3 turned = column_of(rotation[c], column) - column_of(o.rotation[c], column);
@@ -1038,6 +1047,7 @@ class Search {
   StepModel model_;
   std::vector<int32_t> holders_;  // [n] clusters of a particle
   std::vector<double> reach_;     // [m] greatest |X - T|
+  bool by_rotations_ = false;     // outcomes are compared by rotations, too
   std::vector<double> scale_;     // [2 n + 3 m] of positions, velocities, rotations: see scale_by(); empty: 1
   Partition coupled_;
   int most_outcomes_ = kMostOutcomes;

@@ -79,6 +79,6 @@ for file in files:
         late = sum(one["outcome"] in ("dearer", "more_expensive") for one in document["trials"])
         assert outcomes.count("given up as more expensive") == late, file
     page.unlink()
-assert older > 60 and inner == 29, (older, inner)
+assert older > 60 and inner == 57, (older, inner)
 print(f"{len(files)} files: {len(files) - len(COLLECTIONS)} pages, {older} of them of older versions; "
       f"{len(COLLECTIONS)} refused by name, and {inner} pages of what they hold")
