@@ -85,15 +85,17 @@ std::string level_text(const json& level) {
   return io::filled("scene's {substeps} substeps, each solved without the reference's step", level) + others;
 }
 
-// Why a distance may not have fallen: what the level and the one before remove at different times, or do not both
-// remove.
-std::string removals_text(const json& level) {
-  const auto count = [&](const char* key) { return level.value(key, int64_t{0}); };
-  const auto particles = [](int64_t n) { return fmt::format("{} particle{}", n, n == 1 ? "" : "s"); };
+// Why a distance may not have fallen: what the level and the one before remove at different times, do not both remove,
+// or have merged otherwise.
+std::string events_text(const json& level) {
   std::string text;
-  if (const int64_t n = count("removed_in_another_frame"); n > 0)
-    text += "; " + particles(n) + " removed in another frame";
-  if (const int64_t n = count("alive_in_one"); n > 0) text += "; " + particles(n) + " alive in one of both";
+  const auto add = [&](const char* key, const char* what, const char* how) {
+    const int64_t n = level.value(key, int64_t{0});
+    if (n > 0) text += fmt::format("; {} {}{} {}", n, what, n == 1 ? "" : "s", how);
+  };
+  add("removed_in_another_frame", "particle", "removed in another frame");
+  add("alive_in_one", "particle", "alive in one of both");
+  add("clusters_in_one", "cluster", "of other tissue");
   return text;
 }
 
@@ -105,7 +107,7 @@ void print_reference(const TuneOptions& options, const json& reference) {
     say("  {}", level_text(level));
     if (!level.at("apart_h").is_null()) say_filled(": {apart_h:.2g} h from the one before", level);
     if (level.contains("order") && !level.at("order").is_null()) say_filled(", order {order:.2f}", level);
-    say("{}", removals_text(level));
+    say("{}", events_text(level));
     say("\n");
   }
   say_filled("  {known_text}\n", reference);

@@ -134,7 +134,7 @@ void ReferenceSolution::take(RefinementLevel level, Trajectory trajectory) {
   if (!difference_in_parts(trajectory, trajectory_).empty() || trajectory.frames.size() != trajectory_.frames.size())
     apart = std::numeric_limits<double>::infinity();
   level.apart_h = apart;
-  level.removals = removals_apart(trajectory, trajectory_);
+  level.events = events_apart(trajectory, trajectory_);
   levels_.push_back(level);
   trajectory_ = std::move(trajectory);
 }

@@ -27,7 +27,7 @@ struct RefinementLevel {
   int32_t substeps = 0;
   std::optional<int32_t> iterations;  // of the reference; none: each substep is solved
   std::optional<double> apart_h;      // from the level before: greatest RMS distance in any frame [h]
-  RemovalsApart removals = {};        // from the level before
+  EventsApart events = {};            // from the level before
   SolvedSteps::Count solved = {};     // where each substep is: how
 };
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 
 namespace cutproof::tuning {
 
@@ -24,8 +25,8 @@ std::string difference_in_parts(const Trajectory& expected, const Trajectory& ac
   return differs(expected.frames.back(), actual.frames.back(), "at the end");
 }
 
-RemovalsApart removals_apart(const Trajectory& expected, const Trajectory& actual) {
-  RemovalsApart apart;
+EventsApart events_apart(const Trajectory& expected, const Trajectory& actual) {
+  EventsApart apart;
   const std::size_t frames = std::min(expected.frames.size(), actual.frames.size());
   if (frames == 0) return apart;
   // The first frame at whose end a particle is gone; as many as there are frames: none.
@@ -43,6 +44,15 @@ RemovalsApart removals_apart(const Trajectory& expected, const Trajectory& actua
   for (std::size_t i = 0; i < e.size(); ++i) {
     if (e[i] == a[i]) continue;
     ++(e[i] == frames || a[i] == frames ? apart.alive_in_one : apart.in_another_frame);
+  }
+  for (std::size_t f = 0; f < frames; ++f) {
+    const oracles::Pose &one = expected.frames[f], &other = actual.frames[f];
+    if (one.alive != other.alive || one.clusters == other.clusters) continue;
+    std::vector<uint64_t> both;
+    std::set_intersection(one.clusters.begin(), one.clusters.end(), other.clusters.begin(), other.clusters.end(),
+                          std::back_inserter(both));
+    const std::size_t most = std::max(one.clusters.size(), other.clusters.size());
+    apart.clusters_in_one = std::max(apart.clusters_in_one, static_cast<int64_t>(most - both.size()));
   }
   return apart;
 }

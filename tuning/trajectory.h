@@ -18,13 +18,16 @@ struct Trajectory {
 // a frame of its own, or at the end; empty: it is not.
 std::string difference_in_parts(const Trajectory& expected, const Trajectory& actual);
 
-// How two runs of a body differ in what they remove, in the frames that both have. A removal is an event of a frame:
-// however near two runs are to each other, what lies between them can fall on either side of it, and then positions
-// differ by what the removal does and no longer by what the runs differ in.
-struct RemovalsApart {
+// How two runs of a body differ in what they remove and unite, in the frames that both have. These are events: however
+// near two runs are to each other, what lies between them can fall on either side of one, and then positions differ by
+// what the event does and no longer by what the runs differ in.
+struct EventsApart {
   int64_t in_another_frame = 0;  // particles that both have lost, each in another frame
   int64_t alive_in_one = 0;      // particles that only one of the two still has after the last frame
+  // Of frames after which both have the same particles, the greatest number of clusters that only one of the two has:
+  // what goes in other substeps of a frame is merged in another order.
+  int64_t clusters_in_one = 0;
 };
-RemovalsApart removals_apart(const Trajectory& expected, const Trajectory& actual);
+EventsApart events_apart(const Trajectory& expected, const Trajectory& actual);
 
 }  // namespace cutproof::tuning

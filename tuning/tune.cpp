@@ -130,8 +130,9 @@ json levels_json(ReferenceKind kind, const ReferenceSolution& reference) {
   for (const RefinementLevel& level : reference.levels()) {
     levels.push_back({{"substeps", level.substeps}, {"iterations", nullptr}, {"apart_h", json_number(level.apart_h)}});
     if (level.apart_h) {
-      levels.back()["removed_in_another_frame"] = level.removals.in_another_frame;
-      levels.back()["alive_in_one"] = level.removals.alive_in_one;
+      levels.back()["removed_in_another_frame"] = level.events.in_another_frame;
+      levels.back()["alive_in_one"] = level.events.alive_in_one;
+      levels.back()["clusters_in_one"] = level.events.clusters_in_one;
     }
     if (kind == ReferenceKind::limit) {
       levels.back()["order"] = json_number(observed_order(reference.levels(), levels.size() - 1));

@@ -1,5 +1,7 @@
 #include "oracles/comparison/trajectory.h"
 
+#include <algorithm>
+
 #include "oracles/comparison/state_difference.h"
 #include "oracles/oracles.h"
 
@@ -9,6 +11,12 @@ Pose pose_of(const Setup& setup, const State& state, const Pose* earlier) {
   Pose pose{state.x, state.alive, 0};
   pose.components = earlier != nullptr && !pose.removed_some_since(*earlier) ? earlier->components
                                                                              : graph_components(setup, state).count;
+  for (int32_t c = 0; c < state.clusters.count(); ++c) {
+    uint64_t hash = 14695981039346656037u;  // FNV-1a, a member at a time
+    for (const int32_t i : state.clusters.of(c)) hash = (hash ^ static_cast<uint64_t>(i)) * 1099511628211u;
+    pose.clusters.push_back(hash);
+  }
+  std::sort(pose.clusters.begin(), pose.clusters.end());
   return pose;
 }
 

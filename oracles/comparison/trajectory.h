@@ -12,9 +12,10 @@
 namespace cutproof::oracles {
 
 struct Pose {
-  std::vector<Vec3> x;         // [n] body frame [m]
-  std::vector<uint8_t> alive;  // [n]
-  int32_t components = 0;      // of the tissue
+  std::vector<Vec3> x;                  // [n] body frame [m]
+  std::vector<uint8_t> alive;           // [n]
+  int32_t components = 0;               // of the tissue
+  std::vector<uint64_t> clusters = {};  // ascending: of each a hash of its members
 
   bool removed_some_since(const Pose& earlier) const { return alive != earlier.alive; }
 };

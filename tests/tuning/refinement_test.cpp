@@ -315,7 +315,7 @@ Trajectory trajectory(std::vector<int32_t> components, std::vector<int64_t> stro
   return made;
 }
 
-TEST(RemovalsApart, AreCountedByParticle) {
+TEST(EventsApart, AreCountedByParticleAndByCluster) {
   const auto alive = [](std::vector<std::vector<uint8_t>> frames) {
     Trajectory made;
     for (std::vector<uint8_t>& frame : frames) made.frames.push_back({{}, std::move(frame), 1});
@@ -325,7 +325,7 @@ TEST(RemovalsApart, AreCountedByParticle) {
   const Trajectory solution = alive({{1, 0, 1, 1, 1}, {1, 0, 0, 1, 1}, {1, 0, 0, 0, 1}});
   const auto expect = [&](const Trajectory& other, int64_t in_another_frame, int64_t alive_in_one) {
     for (const bool swapped : {false, true}) {
-      const RemovalsApart apart = swapped ? removals_apart(other, solution) : removals_apart(solution, other);
+      const EventsApart apart = swapped ? events_apart(other, solution) : events_apart(solution, other);
       EXPECT_EQ(apart.in_another_frame, in_another_frame);
       EXPECT_EQ(apart.alive_in_one, alive_in_one);
     }
@@ -337,6 +337,16 @@ TEST(RemovalsApart, AreCountedByParticle) {
   // What comes after the last frame of the shorter one is not known of it.
   expect(alive({{1, 0, 1, 1, 1}, {1, 0, 0, 1, 1}}), 0, 0);
   expect({}, 0, 0);
+  // Clusters, where both have the same particles.
+  Trajectory one = solution, other = alive({{1, 1, 1, 1, 1}, {1, 0, 0, 1, 1}, {1, 0, 0, 0, 1}});
+  for (Trajectory* made : {&one, &other}) made->frames[1].clusters = {3, 5, 7};
+  one.frames[0].clusters = {1, 2};
+  EXPECT_EQ(events_apart(one, other).clusters_in_one, 0) << "the first frame has other particles, too";
+  other.frames[2].clusters = {9};
+  EXPECT_EQ(events_apart(one, other).clusters_in_one, 1);
+  other.frames[1].clusters = {2, 4, 5, 7, 8};
+  EXPECT_EQ(events_apart(one, other).clusters_in_one, 3);
+  EXPECT_EQ(events_apart(other, one).clusters_in_one, 3);
 }
 
 TEST(DifferenceInParts, IsSeenAtTheEndOfStrokesAndOfTheScene) {

@@ -172,6 +172,7 @@ TEST_F(Tune, TellsWhichRemovalsItsLevelsDoNotShare) {
     }
     EXPECT_EQ(levels[k].at("removed_in_another_frame"), in_another_frame) << "level " << k;
     EXPECT_EQ(levels[k].at("alive_in_one"), alive_in_one) << "level " << k;
+    EXPECT_TRUE(levels[k].at("clusters_in_one").is_number_integer()) << "level " << k;
     if (in_another_frame == 0 && alive_in_one == 0 && k > 1) {
       EXPECT_GT(levels[k].at("order"), 0.9) << "level " << k;
     }
