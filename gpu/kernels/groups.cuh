@@ -536,9 +536,7 @@ CUTPROOF_ENQUEUE void enqueue_groups(Launcher& launcher, const DeviceView& w) {
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_groups_if_stale(Launcher& launcher, const DeviceView& w) {
   Counters* const c = w.counters;  // an address only: counters lie on the device
-  launcher.if_nonzero(&c->groups_stale, [&](Launcher& stale) {
-    enqueue_groups(stale, w);
-  });
+  launcher.if_nonzero(&c->groups_stale, [&](Launcher& stale) { enqueue_groups(stale, w); });
 }
 
 }  // namespace cutproof::gpu

@@ -182,22 +182,22 @@ struct Counters {
   int growth;              // expand: members that the enlarged clusters need
   int memberships_before;  // expand: length of DeviceView::memberships in use before it
   // groups: these six are 0 once they have been made
-  int groups_stale;        // clusters have changed since groups were made, or none were made yet
-  int groups_whole;        // none of them is to stay
-  int regrouped;           // clusters whose groups are made anew
-  int remeasured;          // clusters whose lists of groups are made anew
-  int due_particles;       // particles that get a new place…
-  int due_pairs;           // … and in how many clusters they are
-  int groups;              // how many there are; those of size 0 are no more
-  int placed;              // places given out from the first on, to classes…
-  int placed_last;         // … and from the last on, to particles that are in none
-  int loose;               // length of DeviceView::loose_places: particles that are alive and in no group, and gaps
-  int pairs;               // of group and holder: length of DeviceView::holders
-  int groups_before;       // groups: those from here on are new
-  int listed[2][2];        // step, by turns of substeps: how many groups are listed in DeviceView::resolved_groups; by
-                           // turns of iterations: when this one began, and by now
-  int tracked[2];          // step, by turns of substeps: how many groups are listed in DeviceView::tracked_groups…
-  int newly_tracked[3];    // … and how many came to it in that one
+  int groups_stale;      // clusters have changed since groups were made, or none were made yet
+  int groups_whole;      // none of them is to stay
+  int regrouped;         // clusters whose groups are made anew
+  int remeasured;        // clusters whose lists of groups are made anew
+  int due_particles;     // particles that get a new place…
+  int due_pairs;         // … and in how many clusters they are
+  int groups;            // how many there are; those of size 0 are no more
+  int placed;            // places given out from the first on, to classes…
+  int placed_last;       // … and from the last on, to particles that are in none
+  int loose;             // length of DeviceView::loose_places: particles that are alive and in no group, and gaps
+  int pairs;             // of group and holder: length of DeviceView::holders
+  int groups_before;     // groups: those from here on are new
+  int listed[2][2];      // step, by turns of substeps: how many groups are listed in DeviceView::resolved_groups; by
+                         // turns of iterations: when this one began, and by now
+  int tracked[2];        // step, by turns of substeps: how many groups are listed in DeviceView::tracked_groups…
+  int newly_tracked[3];  // … and how many came to it in that one
   int scratch[8];
 };
 
