@@ -5,6 +5,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
+#include <utility>
+#include <vector>
 
 #include "model/io/scene_io.h"
 #include "reference_cpu/reference.h"
@@ -124,22 +127,34 @@ TEST_F(Tune, AgainstTheLimitOfShortTimeSteps) {
   EXPECT_LE(greatest_rms_h(cutproof::io::read_scene(path("found.json")), given, 512, 4), 0.3);
 }
 
-// The frame at whose end each particle is gone, of a run of so many substeps; as many as there are frames: none.
-std::vector<int64_t> gone_at(Scene scene, int substeps, int iterations) {
+struct Dissected {
+  std::vector<int64_t> gone;  // the frame at whose end each particle is gone; as many as there are frames: none
+  // By frame: who is alive, and of each cluster its members.
+  std::vector<std::vector<uint8_t>> alive;
+  std::vector<std::set<std::vector<int32_t>>> clusters;
+};
+Dissected dissected(Scene scene, int substeps, int iterations) {
   scene.step.substeps = substeps;
   scene.step.iterations = iterations;
   const cutproof::tuning::PreparedScene prepared(scene, "test", {});
   const auto backend = cutproof::reference::make_backend();
   backend->load({prepared.setup()}, {prepared.start()});
-  std::vector<int64_t> gone(prepared.start().x.size(), prepared.frame_count());
+  Dissected run;
+  run.gone.assign(prepared.start().x.size(), prepared.frame_count());
   for (int64_t frame = 0; frame < prepared.frame_count(); ++frame) {
     prepared.for_parts_of(frame, [&] { backend->run({cutproof::Stage::step, cutproof::Stage::skin}); });
     const cutproof::State state = backend->snapshot().front();
-    for (std::size_t i = 0; i < gone.size(); ++i) {
-      if (!state.alive[i]) gone[i] = std::min(gone[i], frame);
+    for (std::size_t i = 0; i < run.gone.size(); ++i) {
+      if (!state.alive[i]) run.gone[i] = std::min(run.gone[i], frame);
+    }
+    run.alive.push_back(state.alive);
+    run.clusters.emplace_back();
+    for (int32_t c = 0; c < state.clusters.count(); ++c) {
+      const auto members = state.clusters.of(c);
+      run.clusters.back().emplace(members.begin(), members.end());
     }
   }
-  return gone;
+  return run;
 }
 
 // A cut that motion decides: distances halve until a removal falls into another frame.
@@ -161,10 +176,11 @@ TEST_F(Tune, TellsWhichRemovalsItsLevelsDoNotShare) {
   const Scene given = cutproof::io::read_scene(path("scene.json"));
   int64_t most = 0;
   for (std::size_t k = 1; k < levels.size(); ++k) {
-    const auto gone = [&](std::size_t level) {
-      return gone_at(given, levels[level].at("substeps").get<int>(), levels[level].at("iterations").get<int>());
+    const auto run = [&](std::size_t level) {
+      return dissected(given, levels[level].at("substeps").get<int>(), levels[level].at("iterations").get<int>());
     };
-    const std::vector<int64_t> before = gone(k - 1), now = gone(k);
+    const Dissected one = run(k - 1), other = run(k);
+    const std::vector<int64_t>&before = one.gone, &now = other.gone;
     const int64_t end = *std::max_element(now.begin(), now.end());  // whoever is never removed is gone then
     int64_t in_another_frame = 0, alive_in_one = 0;
     for (std::size_t i = 0; i < now.size(); ++i) {
@@ -172,7 +188,16 @@ TEST_F(Tune, TellsWhichRemovalsItsLevelsDoNotShare) {
     }
     EXPECT_EQ(levels[k].at("removed_in_another_frame"), in_another_frame) << "level " << k;
     EXPECT_EQ(levels[k].at("alive_in_one"), alive_in_one) << "level " << k;
-    EXPECT_TRUE(levels[k].at("clusters_in_one").is_number_integer()) << "level " << k;
+    int64_t clusters_in_one = 0;
+    for (std::size_t f = 0; f < one.clusters.size(); ++f) {
+      if (one.alive[f] != other.alive[f]) continue;
+      for (const auto& [a, b] : {std::pair(&one, &other), {&other, &one}}) {
+        const std::set<std::vector<int32_t>>& theirs = b->clusters[f];
+        clusters_in_one = std::max(clusters_in_one, std::count_if(a->clusters[f].begin(), a->clusters[f].end(),
+                                                                  [&](const auto& c) { return !theirs.contains(c); }));
+      }
+    }
+    EXPECT_EQ(levels[k].at("clusters_in_one"), clusters_in_one) << "level " << k;
     if (in_another_frame == 0 && alive_in_one == 0 && k > 1) {
       EXPECT_GT(levels[k].at("order"), 0.9) << "level " << k;
     }
