@@ -317,7 +317,9 @@ void add_tune(CLI::App& program, Work& work) {
   command->add_flag("--full", options.full,
                     "run and time everything to its end, for a curve; else what is beyond the tolerance, or more "
                     "expensive than what was found, is given up");
-  add_count(*command, "--repeats", options.repeats, "timed runs of each configuration", whole_number(1, 1000));
+  add_count(*command, "--repeats", options.repeats,
+            "timed runs of each configuration; with --full one of those that are clearly not on the front",
+            whole_number(1, 1000));
   command->add_option("--write", options.write, "the scene that was found (default: NAME_tuned.json here)")
       ->type_name("F");
   add_json(*command, asked->json, "write everything that was tried");

@@ -6,6 +6,7 @@
 
 #include "model/error.h"
 #include "tuning/comparison.h"
+#include "tuning/search.h"
 
 namespace cutproof::tuning {
 
@@ -28,7 +29,7 @@ std::unique_ptr<Backend> Measuring::backend_for(const Configuration& configurati
 }
 
 Trial measure(const Measuring& measuring, const ReferenceSolution& reference, const Configuration& configuration,
-              std::optional<double> limit) {
+              std::optional<double> limit, const std::vector<Trial>& before) {
   Trial trial;
   trial.configuration = configuration;
   const bool is_given = configuration == measuring.given, to_the_end = measuring.asked.full || is_given;
@@ -72,8 +73,12 @@ Trial measure(const Measuring& measuring, const ReferenceSolution& reference, co
   }
   if (trial.outcome == Outcome::within || to_the_end) {
     std::vector<double> samples;
-    for (int repeat = 0; repeat < measuring.asked.repeats; ++repeat)
+    do {
       samples.push_back(seconds_per_frame(*backend, *scene, measuring.asked.stop_asked));
+      // More would only tell more exactly by how much it is no point of the front.
+      if (measuring.asked.full && !is_given && is_behind(trial, samples.front(), before, measuring.asked.tolerance))
+        break;
+    } while (static_cast<int>(samples.size()) < measuring.asked.repeats);
     trial.frame = benchmarks::times_of(samples);
   }
   return trial;

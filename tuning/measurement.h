@@ -25,8 +25,8 @@ struct TuneOptions {
   std::optional<int64_t> frames;                   // looks at so many of the scene's only
   bool without_skin = false;                       // nobody looks at it
   bool full = false;                               // nothing is given up: errors and times of all that is tried
-  int repeats = 3;                                 // timed runs of a configuration
-  StopAsked stop_asked;                            // ends it between two frames
+  int repeats = 3;       // timed runs of a configuration; with `full` one of those that cannot be points of the front
+  StopAsked stop_asked;  // ends it between two frames
 };
 
 // What is measured, and how. `asked` must outlive it.
@@ -40,9 +40,9 @@ struct Measuring {
   std::unique_ptr<Backend> backend_for(const Configuration& configuration) const;
 };
 
-// `limit`: the seconds per frame beyond which it may be given up as too expensive.
+// `limit`: the seconds per frame beyond which it may be given up as too expensive. `before`: what has been measured.
 Trial measure(const Measuring& measuring, const ReferenceSolution& reference, const Configuration& configuration,
-              std::optional<double> limit);
+              std::optional<double> limit, const std::vector<Trial>& before);
 
 // Taken in turns, so that what the machine does meanwhile falls on both; and anew, because the least of many figures
 // is too good.

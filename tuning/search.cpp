@@ -192,6 +192,21 @@ std::vector<std::size_t> by_cost(const std::vector<Trial>& trials) {
   return order;
 }
 
+namespace {
+
+// Only these are compared at all (trial.h).
+bool is_comparable(const Trial& trial) { return trial.outcome == Outcome::within || trial.outcome == Outcome::over; }
+
+}  // namespace
+
+bool is_behind(const Trial& trial, double seconds, const std::vector<Trial>& trials, double asked) {
+  if (!is_comparable(trial) || !(trial.greatest_rms_h <= std::max(asked, kFrontTolerances.front()))) return true;
+  return std::any_of(trials.begin(), trials.end(), [&](const Trial& other) {
+    return is_comparable(other) && other.frame.count > 0 && other.greatest_rms_h <= trial.greatest_rms_h &&
+           kClearly * other.frame.median < seconds;
+  });
+}
+
 std::vector<FrontPoint> front(const std::vector<Trial>& trials, double asked, bool all, double known) {
   std::vector<double> tolerances = {asked};
   for (const double tolerance : kFrontTolerances) {
@@ -203,8 +218,7 @@ std::vector<FrontPoint> front(const std::vector<Trial>& trials, double asked, bo
     FrontPoint point = {tolerance, {}};
     for (std::size_t k = 0; k < trials.size(); ++k) {
       const Trial& trial = trials[k];
-      const bool is_comparable = trial.outcome == Outcome::within || trial.outcome == Outcome::over;
-      if (!is_comparable || trial.frame.count == 0 || !(trial.greatest_rms_h + known <= tolerance)) continue;
+      if (!is_comparable(trial) || trial.frame.count == 0 || !(trial.greatest_rms_h + known <= tolerance)) continue;
       if (!point.trial || trial.frame.median < trials[*point.trial].frame.median) point.trial = k;
     }
     points.push_back(point);

@@ -58,5 +58,10 @@ inline constexpr std::array<double, 4> kFrontTolerances = {0.5, 0.2, 0.05, 0.01}
 // For `asked` and those of kFrontTolerances, the greatest first; without `all` only up to `asked`, because what goes
 // beyond that is given up. `known`: by how much the reference solution may be off [h].
 std::vector<FrontPoint> front(const std::vector<Trial>& trials, double asked, bool all, double known);
+// Whether `trial`, which takes about so many `seconds` a frame, cannot be a point of the front: the tissue falls into
+// other parts, the error is beyond every tolerance, or one of `trials` is no farther from the reference solution and
+// takes less than that over kClearly, which no noise of a timer makes up for.
+inline constexpr double kClearly = 1.5;
+bool is_behind(const Trial& trial, double seconds, const std::vector<Trial>& trials, double asked);
 
 }  // namespace cutproof::tuning

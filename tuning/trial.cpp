@@ -42,7 +42,8 @@ json to_json(const Trial& trial, const Configuration& given) {
           {"max_h", json_number(trial.greatest_h)},
           {"rms_h_by_frame", rms},
           {"removed_otherwise", trial.removed_otherwise},
-          {"seconds_per_frame", benchmarks::to_json(trial.frame)}};
+          {"seconds_per_frame", benchmarks::to_json(trial.frame)},
+          {"timed_runs", trial.frame.count}};
 }
 
 }  // namespace cutproof::tuning

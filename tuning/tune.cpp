@@ -194,13 +194,14 @@ bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
     show(TuneStep::reference_known);
     if (!(measuring.allowed(reference) > 0)) return conclude(TuneStep::reference_unknown);
 
-    const std::vector<Trial> trials = search(measuring.given, space_of(measuring, options, reference),
-                                             [&](const Configuration& configuration, std::optional<double> limit) {
-                                               Trial trial = measure(measuring, reference, configuration, limit);
-                                               document["trials"].push_back(to_json(trial, measuring.given));
-                                               show(TuneStep::trial);
-                                               return trial;
-                                             });
+    std::vector<Trial> trials;
+    search(measuring.given, space_of(measuring, options, reference),
+           [&](const Configuration& configuration, std::optional<double> limit) {
+             trials.push_back(measure(measuring, reference, configuration, limit, trials));
+             document["trials"].push_back(to_json(trials.back(), measuring.given));
+             show(TuneStep::trial);
+             return trials.back();
+           });
     document["front"] = json::array();
     for (const FrontPoint& point : front(trials, options.tolerance, options.full, reference.known_to_h())) {
       document["front"].push_back({{"tolerance_h", point.tolerance}, {"trial", nullptr}});

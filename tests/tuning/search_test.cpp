@@ -129,6 +129,31 @@ TEST(Front, HasTheCheapestOfThoseThatWereCarriedThroughForEachTolerance) {
   EXPECT_EQ(told(0.1, false, 0), (Told{{0.1, 6}, {0.05, 6}, {0.01, 0}})) << "beyond what was asked runs are given up";
 }
 
+TEST(Front, IsNotWhatSomethingNearerClearlyUndercuts) {
+  const auto trial = [](double error, double seconds, Outcome outcome = Outcome::over) {
+    Trial made;
+    made.outcome = outcome;
+    made.greatest_rms_h = error;
+    if (seconds > 0) made.frame = {seconds, seconds, seconds, 1};
+    return made;
+  };
+  const auto behind = [&](double error, double seconds, const std::vector<Trial>& before, double asked = 0.05) {
+    return is_behind(trial(error, 0), seconds, before, asked);
+  };
+  EXPECT_FALSE(behind(0.1, 9, {}));
+  EXPECT_TRUE(behind(0.1, 9, {trial(0.1, 5.99)}));
+  EXPECT_FALSE(behind(0.1, 9, {trial(0.1, 6.01)})) << "a timer's noise may make up for that";
+  EXPECT_FALSE(behind(0.1, 9, {trial(0.101, 1)})) << "that is farther off";
+  EXPECT_TRUE(behind(0.1, 9, {trial(0.2, 1), trial(0.01, 5, Outcome::within)}));
+  EXPECT_FALSE(behind(
+      0.1, 9, {trial(0.01, 1, Outcome::topology), trial(0.01, 1, Outcome::schedule), trial(0.01, 0, Outcome::within)}))
+      << "what falls into other parts, or was given up, is no point of the front";
+  EXPECT_TRUE(behind(0.51, 1, {})) << "no tolerance is as wide";
+  EXPECT_FALSE(behind(0.51, 1, {}, 0.6));
+  EXPECT_TRUE(behind(INFINITY, 1, {}));
+  EXPECT_TRUE(is_behind(trial(0.001, 0, Outcome::topology), 1, {}, 0.05));
+}
+
 TEST(Search, TriesTheGivenFirstAndNothingTwice) {
   const std::vector<Trial> trials = search(given(), space_of_steps(), Model{});
   EXPECT_EQ(trials.front().configuration, given());
