@@ -9,7 +9,6 @@
 #include "model/at.h"
 #include "model/counted.h"
 #include "model/error.h"
-#include "oracles/registry.h"
 #include "property_tests/campaign.h"
 #include "property_tests/shown_case.h"
 #include "property_tests/simplify.h"
@@ -94,7 +93,7 @@ std::optional<bool> add_counterexample(report::Card& card, const Counterexample&
     add("Run again", fmt::format("it fails on {}: '{}' in frame {} after {}", choice.name, failure->property,
                                  failure->frame, name_of(failure->stage)));
     add("Measured / bound",
-        oracles::could_be_judged(failure->witness.text)
+        could_be_judged(failure->witness.text)
             ? with_unit(failure->measured, failure->unit) + " / " + with_unit(failure->bound, failure->unit)
             : std::string("nothing / none"));
     if (!failure->bound_source.empty()) add("Where the bound comes from", failure->bound_source);

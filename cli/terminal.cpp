@@ -94,7 +94,6 @@ std::string plural(int64_t count, const char* one, const char* several) {
 
 // What a scene expects is not of a stage.
 bool is_expectation(const Row& row) { return row.any->property.starts_with(oracles::kExpectation); }
-bool was_judged(const Verdict& verdict) { return verdict.holds || oracles::could_be_judged(verdict.witness.text); }
 
 std::string name_of_row(const Row& row, const Shown& shown) {
   const bool has_stage = shown.in_frames && !is_expectation(row);

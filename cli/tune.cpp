@@ -245,7 +245,10 @@ void print(const TuneOptions& options, TuneStep step, const json& document, cons
       return;
     case TuneStep::stopped: {
       const json& trials = document.at("trials");
-      if (!trials.empty()) print_trials(trials);
+      if (!trials.empty()) {
+        print_trials(trials);
+        print_front(document);
+      }
       insist("\n{}: it was stopped {}; nothing is found yet\n", undecided("INCOMPLETE"),
              trials.empty() ? std::string("before the first configuration was tried")
                             : fmt::format("after {} configuration{}", trials.size(), trials.size() == 1 ? "" : "s"));

@@ -115,8 +115,8 @@ struct Expectations {
 };
 
 // Of the format. What a scene leaves out is as it was when its version was new: in version 1 the plain iteration, in 1
-// and 2 both ends of an open edge.
-inline constexpr int32_t kSceneVersion = 4;
+// and 2 both ends of an open edge, in 3 and 4 one of them and not the nearer one.
+inline constexpr int32_t kSceneVersion = 5;
 
 // How often the scene's frames detect. substep: each frame is laid out as as many frames of one substep, in all of
 // which every stage runs: what a blade has parted goes at the end of that substep, and not of up to S of them.
@@ -133,7 +133,7 @@ struct Scene {
   int64_t frames = 0;           // 0: until the last stroke ends and `settle` is over
   double settle = 0;            // [s] after the last stroke
   StepParameters step = {.acceleration = Acceleration::chebyshev};
-  DetectParameters detect = {.remove = RemovedEnds::one};
+  DetectParameters detect = {.remove = RemovedEnds::nearer};
   DetectEvery detect_every = DetectEvery::frame;
   SplitParameters split;
   MergeParameters merge;

@@ -3,6 +3,7 @@
 #pragma once
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "model/stage.h"
@@ -42,5 +43,11 @@ struct Verdict {
 
   friend bool operator==(const Verdict&, const Verdict&) = default;
 };
+
+// How the witness begins of a verdict that could not be made because what it would rest on is broken. Such a verdict
+// fails; what it measured, and its bound, mean nothing.
+inline constexpr std::string_view kNotJudged = "could not be judged";
+inline bool could_be_judged(std::string_view witness) { return !witness.starts_with(kNotJudged); }
+inline bool was_judged(const Verdict& verdict) { return verdict.holds || could_be_judged(verdict.witness.text); }
 
 }  // namespace cutproof

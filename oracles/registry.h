@@ -50,11 +50,6 @@ struct Property {
   void (*check_stage)(const StageRun& run, Verdict& verdict);
 };
 
-// How the witness begins of a verdict that could not be made because what it would rest on is broken. Such a verdict
-// fails; what it measured, and its bound, mean nothing.
-inline constexpr std::string_view kNotJudged = "could not be judged";
-inline bool could_be_judged(std::string_view witness) { return !witness.starts_with(kNotJudged); }
-
 using PropertyList = std::vector<Property>;
 using PropertyLists = std::vector<const PropertyList*>;
 

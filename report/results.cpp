@@ -60,7 +60,7 @@ void add_verdict(const Field& verdict, const Measured* known, std::vector<Row>& 
   const double measured = verdict["measured"].number(), bound = verdict["bound"].number();
   const std::string given_unit = verdict["unit"].text();
   const bool was_judged =
-      holds || !verdict["witness"].is_there() || oracles::could_be_judged(verdict["witness"]["text"].text_or(""));
+      holds || !verdict["witness"].is_there() || could_be_judged(verdict["witness"]["text"].text_or(""));
   const std::string measured_text = was_judged ? figure(measured) : "nothing",
                     bound_text = was_judged ? figure(bound) : "none";
   const std::string unit = given_unit == "1" || !was_judged ? "" : given_unit, source = verdict["bound_source"].text();

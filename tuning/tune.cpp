@@ -148,6 +148,15 @@ json levels_json(ReferenceKind kind, const ReferenceSolution& reference) {
   return levels;
 }
 
+json front_json(const std::vector<FrontPoint>& points) {
+  json front = json::array();
+  for (const FrontPoint& point : points) {
+    front.push_back({{"tolerance_h", point.tolerance}, {"trial", nullptr}});
+    if (point.trial) front.back()["trial"] = *point.trial;
+  }
+  return front;
+}
+
 }  // namespace
 
 double part_searched(const json& so_far, const Scene& given) {
@@ -199,14 +208,10 @@ bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
            [&](const Configuration& configuration, std::optional<double> limit) {
              trials.push_back(measure(measuring, reference, configuration, limit, trials));
              document["trials"].push_back(to_json(trials.back(), measuring.given));
+             document["front"] = front_json(front(trials, options.tolerance, options.full, reference.known_to_h()));
              show(TuneStep::trial);
              return trials.back();
            });
-    document["front"] = json::array();
-    for (const FrontPoint& point : front(trials, options.tolerance, options.full, reference.known_to_h())) {
-      document["front"].push_back({{"tolerance_h", point.tolerance}, {"trial", nullptr}});
-      if (point.trial) document["front"].back()["trial"] = *point.trial;
-    }
     show(TuneStep::searched);
     if (by_cost(trials).empty()) return conclude(TuneStep::none_within);
 

@@ -12,19 +12,22 @@ from tune_curve import ACCELERATED, MARK, PLAIN, front_of, points_of
 
 COLUMNS = 2
 TOLERANCES = (0.5, 0.2, 0.05, 0.01)
-X, Y = (-1.0, 0.7), (-3.3, 1.0)  # exponents of ten: the same in every panel
+# Exponents of ten, and ticks: the same in every panel of a picture.
+X = {"gpu": ((-1.0, 0.7), (0.1, 0.2, 0.5, 1, 2, 5)), "host": ((-0.2, 1.7), (1, 2, 5, 10, 20, 50))}
+Y = (-3.3, 1.0)
 LEGEND = 40
 
 
 def panel(document):
     """One scene: plain and accelerated configurations, what none beats in both, the scene as given."""
-    axes = LogAxes(X, Y, document["scene"].rsplit("/", 1)[-1].removesuffix(".json"), beside=30)
-    axes.ticks((0.1, 0.2, 0.5, 1, 2, 5), (0.001, 0.01, 0.1, 1, 10))
+    span, ticks = X[document["backend"]]
+    axes = LogAxes(span, Y, document["scene"].rsplit("/", 1)[-1].removesuffix(".json"), beside=30)
+    axes.ticks(ticks, (0.001, 0.01, 0.1, 1, 10))
     axes.labels("ms a frame", "greatest RMS error [h]")
     for tolerance in TOLERANCES:
         axes.tolerance(tolerance)
     points = points_of(document)
-    inside = [p for p in points if X[0] <= math.log10(p[0]) <= X[1] and Y[0] <= math.log10(p[1]) <= Y[1]]
+    inside = [p for p in points if span[0] <= math.log10(p[0]) <= span[1] and Y[0] <= math.log10(p[1]) <= Y[1]]
     front = front_of([p for p in inside if p[2]["outcome"] != "topology"])
     corners = " ".join(f"{axes.px(x):.1f},{axes.py(y):.1f}" for x, y, _ in front)
     axes.parts.append(f'<polyline points="{corners}" fill="none" stroke="#999" stroke-width="2"/>')

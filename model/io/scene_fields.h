@@ -178,7 +178,7 @@ void describe(auto& v, DetectParameters& s) {
            "particle; or `nearer`: as `one`, but of two ends on different sides of that plane the positive "
            "one if the clusters carry it nearer to it by more than h/8, so that both faces of the cut lie "
            "where the blade passed (method.md §4). Left out, it is `both` with other criteria, and in a scene "
-           "of version 1 or 2."});
+           "of version 1 or 2; in one of version 3 or 4 `one`."});
   v.field(s.epsilon,
           {"epsilon", "Distance from a neighbour beyond which a particle is removed. At 1 or less, tissue at rest is.",
            above(0, 1e6, "h")});
@@ -317,7 +317,7 @@ void describe(auto& v, FrameFields& s) {
 }
 
 void describe(auto& v, Scene& s) {
-  v.field(s.version, {"version", "Of this format: 4; 1 to 3 are read as ever.", between(1, kSceneVersion), kRequired});
+  v.field(s.version, {"version", "Of this format: 5; 1 to 4 are read as ever.", between(1, kSceneVersion), kRequired});
   v.field(s.name, {"name", "A short name, for reports.", {}, kOptional, kMostNameBytes});
   v.field(s.description, {"description", "What the scene shows, for people.", {}, kOptional, kMostDescriptionBytes});
   v.field(s.seed, {"seed", "Of everything random.", between(0, 18446744073709551615.0)});

@@ -372,7 +372,8 @@ RemovedEnds default_remove(const json& tree, int32_t version) {
   const auto detect = tree.find("detect");
   const bool by_distance = detect == tree.end() || !detect->is_object() || !detect->contains("criterion") ||
                            detect->at("criterion") == name_of(Criterion::distance);
-  return by_distance ? RemovedEnds::one : RemovedEnds::both;
+  if (!by_distance) return RemovedEnds::both;
+  return version < 5 ? RemovedEnds::one : RemovedEnds::nearer;
 }
 
 }  // namespace

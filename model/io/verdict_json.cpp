@@ -44,11 +44,12 @@ std::string in_unit(const std::string& figure, const std::string& unit) {
 }
 
 std::string verdict_text(const Verdict& verdict) {
-  return fmt::format("'{}' fails after {} in frame {} on backend '{}': measured {}, bound {} ({}). {}",
-                     verdict.property, name_of(verdict.stage), verdict.frame, verdict.backend,
-                     in_unit(fmt::format("{:g}", verdict.measured), verdict.unit),
-                     in_unit(fmt::format("{:g}", verdict.bound), verdict.unit), verdict.bound_source,
-                     verdict.witness.text);
+  const std::string begin = fmt::format("'{}' fails after {} in frame {} on backend '{}': ", verdict.property,
+                                        name_of(verdict.stage), verdict.frame, verdict.backend);
+  if (!was_judged(verdict)) return begin + verdict.witness.text;
+  return fmt::format(
+      "{}measured {}, bound {} ({}). {}", begin, in_unit(fmt::format("{:g}", verdict.measured), verdict.unit),
+      in_unit(fmt::format("{:g}", verdict.bound), verdict.unit), verdict.bound_source, verdict.witness.text);
 }
 
 }  // namespace cutproof::io

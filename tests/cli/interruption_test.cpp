@@ -227,6 +227,9 @@ TEST_F(Interrupted, TuneWritesWhatItHasTried) {
   EXPECT_TRUE(document.at("found").is_null());
   EXPECT_TRUE(has_printed("INCOMPLETE: it was stopped after " + std::to_string(count("trials")) + " configuration"))
       << read("out");
+  // What has been tried says something already.
+  EXPECT_FALSE(document.at("front").empty());
+  EXPECT_TRUE(has_printed("the cheapest that was tried, by tolerance")) << read("out");
   EXPECT_EQ(listing(), (std::set<std::string>{"out", "error", "out.json", "falling.json"}));
 }
 

@@ -225,7 +225,7 @@ TEST_F(Options, DoNotBlameASceneForAMesh) {
 TEST_F(Options, AreListedByInfo) {
   const std::string info = cutproof("info").output;
   for (const char* word : {"reference", "host-split", "plugin:FILE.so", "newton", "round_robin", "topology", "motion",
-                           "conservation", "rotations, components", "connected", "versions 1 to 4"}) {
+                           "conservation", "rotations, components", "connected", "versions 1 to 5"}) {
     EXPECT_NE(info.find(word), std::string::npos) << "no '" << word << "' in:\n" << info;
   }
   EXPECT_NE(cutproof("info --scene").output.find("iterations"), std::string::npos);

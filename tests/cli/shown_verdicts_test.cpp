@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/findings.h"
 #include "cli/terminal.h"
 
 namespace cutproof::cli {
@@ -70,6 +71,19 @@ TEST(ShownVerdicts, HaveNoFiguresOfWhatCouldNotBeJudged) {
   EXPECT_NE(text.find("FAILS: geometry"), std::string::npos) << text;
   EXPECT_NE(text.find("could not be judged: it is open"), std::string::npos) << text;
   EXPECT_EQ(text.find("measured"), std::string::npos) << text;
+}
+
+// Nor has a JUnit file: "measured 0, bound 0" reads as if nothing were wrong.
+TEST(JunitCases, HaveNoFiguresOfWhatCouldNotBeJudged) {
+  const Judging judging{"cutproof check", "cutproof.check", "cutproof check it"};
+  const auto cases = cases_of({failing_verdict("geometry", Stage::skin, 3, "could not be judged: it is open"),
+                               failing_verdict("coverage", Stage::split, 3, "an edge")},
+                              judging);
+  ASSERT_EQ(cases.size(), 2U);
+  const auto has = [](const io::JunitCase& one, const char* part) { return one.text.find(part) != std::string::npos; };
+  EXPECT_TRUE(has(cases[0], "could not be judged: it is open")) << cases[0].text;
+  EXPECT_FALSE(has(cases[0], "measured")) << cases[0].text;
+  EXPECT_TRUE(has(cases[1], "measured 0, bound 0 (some page)")) << cases[1].text;
 }
 
 }  // namespace

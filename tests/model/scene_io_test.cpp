@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
@@ -23,7 +24,7 @@ namespace {
 
 using nlohmann::json;
 
-const char* const kSmallest = R"({"version": 4, "body": {"shape": {"kind": "box"}, "spacing": 0.01}})";
+const char* const kSmallest = R"({"version": 5, "body": {"shape": {"kind": "box"}, "spacing": 0.01}})";
 
 json smallest() { return json::parse(kSmallest); }
 json with_blade() {
@@ -393,7 +394,7 @@ TEST(SceneIo, RetardationIsForTheImplicitSolver) {
 
 TEST(SceneIo, OneEndIsForTheCriterionOfEdges) {
   Scene scene = parse_scene(kSmallest, "scene.json");
-  EXPECT_EQ(scene.detect.remove, RemovedEnds::one);
+  EXPECT_EQ(scene.detect.remove, RemovedEnds::nearer);
   EXPECT_EQ(parse_scene(write_scene(scene), "scene.json").detect, scene.detect);
   json tree = json::parse(write_scene(scene));
   for (const char* criterion : {"none", "geometric", "strain"}) {
@@ -667,19 +668,26 @@ TEST(SceneIo, AScenesVersionSaysWhichEndsGoIfNothingElseDoes) {
   };
   EXPECT_EQ(removed("1", "{}"), RemovedEnds::both);
   EXPECT_EQ(removed("2", "{}"), RemovedEnds::both);
-  EXPECT_EQ(removed("3", "{}"), RemovedEnds::one);
-  EXPECT_EQ(removed("3", R"({"criterion": "distance", "epsilon": 2})"), RemovedEnds::one);
-  for (const char* criterion : {"none", "geometric", "strain"}) {
-    EXPECT_EQ(removed("3", R"({"criterion": ")" + std::string(criterion) + R"("})"), RemovedEnds::both) << criterion;
+  for (const auto& [version, ends] : std::map<std::string, RemovedEnds>{
+           {"3", RemovedEnds::one}, {"4", RemovedEnds::one}, {"5", RemovedEnds::nearer}}) {
+    EXPECT_EQ(removed(version, "{}"), ends);
+    EXPECT_EQ(removed(version, R"({"criterion": "distance", "epsilon": 2})"), ends);
+    for (const char* criterion : {"none", "geometric", "strain"}) {
+      EXPECT_EQ(removed(version, R"({"criterion": ")" + std::string(criterion) + R"("})"), RemovedEnds::both)
+          << criterion;
+    }
   }
+  EXPECT_EQ(removed("5", R"({"remove": "one"})"), RemovedEnds::one);
   EXPECT_EQ(removed("3", R"({"remove": "both"})"), RemovedEnds::both);
   EXPECT_EQ(removed("2", R"({"remove": "one"})"), RemovedEnds::one);
   const std::string plain = R"(, "body": {"shape": {"kind": "box"}, "spacing": 0.01}})";
-  EXPECT_EQ(parse_scene(R"({"version": 3)" + plain, "").detect, Scene{}.detect);
-  // A scene of version 2 stays what it is when it is written and read again.
-  const Scene old = parse_scene(R"({"version": 2)" + plain, "scene.json");
-  EXPECT_EQ(old.version, 2);
-  EXPECT_EQ(parse_scene(write_scene(old), "again"), old);
+  EXPECT_EQ(parse_scene(R"({"version": 5)" + plain, "").detect, Scene{}.detect);
+  // A scene of an older version stays what it is when it is written and read again.
+  for (const int32_t version : {2, 4}) {
+    const Scene old = parse_scene(R"({"version": )" + std::to_string(version) + plain, "scene.json");
+    EXPECT_EQ(old.version, version);
+    EXPECT_EQ(parse_scene(write_scene(old), "again"), old);
+  }
 }
 
 TEST(SceneIo, AScenesVersionSaysWhetherItsSkinIsFittedIfNothingElseDoes) {
@@ -696,7 +704,7 @@ TEST(SceneIo, AScenesVersionSaysWhetherItsSkinIsFittedIfNothingElseDoes) {
   EXPECT_TRUE(fitted("4", ""));
   EXPECT_FALSE(fitted("4", R"(, "fit_skin": false)"));
   const std::string plain = R"(, "body": {"shape": {"kind": "box"}, "spacing": 0.01}})";
-  EXPECT_EQ(parse_scene(R"({"version": 4)" + plain, "").body.fit_skin, Scene{}.body.fit_skin);
+  EXPECT_EQ(parse_scene(R"({"version": 5)" + plain, "").body.fit_skin, Scene{}.body.fit_skin);
   // Cut faces likewise.
   const auto cuts = [&](const std::string& version, const std::string& more) {
     return parse_scene(R"({"version": )" + version + more + plain, "scene.json").skin.fit_cuts;
@@ -713,7 +721,7 @@ TEST(SceneIo, AScenesVersionSaysWhetherItsSkinIsFittedIfNothingElseDoes) {
 }
 
 TEST(SceneIoErrors, AnotherVersionIsRefusedBeforeAnythingElse) {
-  expect_error(std::string(R"({"version": 5, "new_field": true})"), "version", {"5", "versions 1 to 4"});
+  expect_error(std::string(R"({"version": 6, "new_field": true})"), "version", {"6", "versions 1 to 5"});
   expect_error(std::string(R"({"version": 1.5})"), "version", {"1.5"});
   expect_error(std::string(R"({"version": "1"})"), "version", {"\"1\""});
   expect_error(std::string(R"([1])"), "", {"object", "list"});
