@@ -13,9 +13,10 @@ shutil.rmtree(work, ignore_errors=True)
 work.mkdir(parents=True)
 
 # Put together by hand of several results, so no command has written them: what they hold has no page as it stands.
-COLLECTIONS = {"cpu_scenes_converged", "h200_baselines_sizes", "h200_baselines_sizes_nearer", "h200_geometry_nearer", "h200_geometry_nearer_sizes",
-               "h200_geometry_sizes", "h200_guests", "h200_kit_summary", "h200_lockstep", "h200_lockstep_groups",
-               "h200_scenes_converged", "h200_solver_every_frame", "h200_stages_asked", "h200_stages_before_asked"}
+COLLECTIONS = {"cpu_scenes_converged", "h200_baselines_sizes", "h200_baselines_sizes_nearer", "h200_geometry_nearer",
+               "h200_geometry_nearer_sizes", "h200_geometry_sizes", "h200_guests", "h200_kit_summary", "h200_lockstep",
+               "h200_lockstep_groups", "h200_scenes_converged", "h200_solver_every_frame", "h200_stages_asked",
+               "h200_stages_before_asked"}
 LATEST = {"cutproof.fuzz": 4, "cutproof.bench": 3, "cutproof.judge": 1}
 
 
