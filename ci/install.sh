@@ -16,6 +16,7 @@ packages=(
   zlib1g-dev esbuild libjs-three  # report pages
   python3-scipy python3-skimage  # judged as examples: docs/results/libraries.md
   groff-base     # the manual page, rendered by a test
+  zsh fish       # shells that a test has read their completions
   dpkg-dev file  # packages: which libraries they depend on
   openmpi-bin    # mpirun, for a test of ci/cluster/; no program is linked with it
 )

@@ -203,7 +203,7 @@ bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
     show(TuneStep::reference_known);
     if (!(measuring.allowed(reference) > 0)) return conclude(TuneStep::reference_unknown);
 
-    std::vector<Trial> trials;
+    std::vector<Trial> trials;  // here and not by what search() gives back: they are needed while it goes on
     search(measuring.given, space_of(measuring, options, reference),
            [&](const Configuration& configuration, std::optional<double> limit) {
              trials.push_back(measure(measuring, reference, configuration, limit, trials));

@@ -69,6 +69,8 @@ def main():
     for path in arguments.json:
         with open(path, encoding="utf-8") as file:
             documents.append(json.load(file))
+        if documents[-1]["backend"] not in X:
+            parser.error(f"{path}: its backend is {documents[-1]['backend']}, and axes are known of {', '.join(X)}")
         if not points_of(documents[-1]):
             parser.error(f"{path}: nothing in it was carried through")
     with open(arguments.output, "w", encoding="utf-8") as file:
