@@ -16,10 +16,14 @@ class Comparison {
 
   // The state at the end of the next frame of the scene.
   void add(const State& state);
+  // A whole run, of which no frame was added.
+  void add(Trajectory run);
   bool beyond() const { return trial_.first_beyond.has_value(); }
   Trajectory& trajectory() { return trajectory_; }
 
  private:
+  void compare(std::size_t frame);
+
   const Setup& setup_;
   const Trajectory& reference_;
   double allowed_;

@@ -71,34 +71,37 @@ ReferenceSolution::ReferenceSolution(ReferenceKind kind, const Scene& scene, std
   scene_.skin.wanted = false;  // nothing moves with it
   scene_.step.acceleration = Acceleration::none;
   setup_ = PreparedScene(scene_, source_, frames_).setup();
-  levels_ = {next_level()};
-  // At least two levels are needed. They know nothing of each other, so they are run at once.
-  RefinementLevel first = levels_.front(), second = next_level();
-  std::future<Trajectory> finer = std::async(std::launch::async, [&] { return run(second); });
+  // The first three are run in any case, because only the third tells how fast they come nearer to each other. They
+  // know nothing of each other, so they are run at once: the third takes as long as both others or longer.
+  RefinementLevel first = level_after(nullptr), second = level_after(&first), third = level_after(&second);
+  std::future<Trajectory> finest = std::async(std::launch::async, [&] { return run(third); });
   trajectory_ = run(first);
-  take(second, finer.get());
+  levels_ = {first};
+  Trajectory finer = run(second);
+  take(second, std::move(finer));
+  take(third, finest.get());
   const auto is_allowed = [](const RefinementLevel& next) {
     return next.substeps <= kMostSubsteps && next.iterations.value_or(0) <= kMostIterations;
   };
-  // The third, which tells how fast they come nearer, is run in any case.
-  while (levels_.size() < 3 || (known_to_h() > known && !is_last())) {
-    RefinementLevel next = next_level();
-    if (levels_.size() >= 3 && !is_allowed(next)) {
+  while (known_to_h() > known && !is_last()) {
+    RefinementLevel next = level_after(&levels_.back());
+    if (!is_allowed(next)) {
       if (kind_ == ReferenceKind::limit) break;
       next.iterations.reset();
     }
-    add(next);
+    Trajectory trajectory = run(next);
+    take(next, std::move(trajectory));
   }
 }
 
-RefinementLevel ReferenceSolution::next_level() const {
+RefinementLevel ReferenceSolution::level_after(const RefinementLevel* before) const {
   RefinementLevel level;
   if (kind_ == ReferenceKind::substeps) {
     level.substeps = scene_.step.substeps;
     level.iterations =
-        levels_.empty() ? std::max(kLeastIterations, scene_.step.iterations) : 2 * levels_.back().iterations.value();
+        before == nullptr ? std::max(kLeastIterations, scene_.step.iterations) : 2 * before->iterations.value();
   } else {
-    level.substeps = levels_.empty() ? std::max(kLeastSubsteps, 4 * scene_.step.substeps) : 2 * levels_.back().substeps;
+    level.substeps = before == nullptr ? std::max(kLeastSubsteps, 4 * scene_.step.substeps) : 2 * before->substeps;
     level.iterations = enough_iterations(scene_, level.substeps);
   }
   return level;
@@ -116,8 +119,7 @@ Trajectory ReferenceSolution::run(RefinementLevel& level) const {
   trajectory.stroke_end = prepared.stroke_end();
   prepared.run(backend, [&](double) {
     throw_if_asked(stop_asked_);
-    trajectory.frames.push_back(oracles::pose_of(prepared.setup(), backend.snapshot().front(),
-                                                 trajectory.frames.empty() ? nullptr : &trajectory.frames.back()));
+    add_frame(trajectory, prepared.setup(), backend.snapshot().front());
     return true;
   });
   level.solved = solved.count();
@@ -139,16 +141,12 @@ void ReferenceSolution::take(RefinementLevel level, Trajectory trajectory) {
   trajectory_ = std::move(trajectory);
 }
 
-void ReferenceSolution::add(RefinementLevel next) {
-  Trajectory trajectory = run(next);
-  take(next, std::move(trajectory));
-}
-
 void ReferenceSolution::refine() {
   if (is_last()) return;
-  RefinementLevel next = next_level();
+  RefinementLevel next = level_after(&levels_.back());
   if (kind_ == ReferenceKind::substeps) next.iterations.reset();
-  add(next);
+  Trajectory trajectory = run(next);
+  take(next, std::move(trajectory));
 }
 
 bool ReferenceSolution::nothing_removed() const {

@@ -68,10 +68,10 @@ class ReferenceSolution {
   static constexpr int32_t kMostIterations = 512;  // per substep
 
  private:
-  RefinementLevel next_level() const;
+  // That which follows `before`; null: the first.
+  RefinementLevel level_after(const RefinementLevel* before) const;
   bool is_last() const { return !levels_.empty() && !levels_.back().iterations; }
   Trajectory run(RefinementLevel& level) const;
-  void add(RefinementLevel next);
   void take(RefinementLevel level, Trajectory trajectory);
 
   ReferenceKind kind_;

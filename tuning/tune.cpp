@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <future>
+#include <map>
 #include <utility>
 
 #include "benchmarks/report.h"
@@ -10,7 +12,6 @@
 #include "model/io/json_number.h"
 #include "model/io/scene_io.h"
 #include "tuning/search.h"
-#include "tuning/tuned_scene.h"
 #include "tuning/verification.h"
 
 namespace cutproof::tuning {
@@ -88,14 +89,33 @@ struct Found {
   TimedInTurns times;
 };
 
-// The cheapest that holds when it is verified and, timed again, is still cheaper than what was given.
+using JudgedRuns = std::map<std::size_t, JudgedRun>;  // by trial
+
+// Refines the reference solution. Meanwhile what is asked of it first is judged, which knows nothing of it: what was
+// given, and the cheapest.
+JudgedRuns judge_while_refining(const Measuring& measuring, ReferenceSolution& reference,
+                                const std::vector<Trial>& trials) {
+  std::future<void> refined = std::async(std::launch::async, [&] { reference.refine(); });
+  JudgedRuns judged;
+  for (const std::size_t index : {std::size_t{0}, by_cost(trials).front()}) {
+    if (trials[index].outcome != Outcome::within || judged.contains(index)) continue;
+    judged.emplace(index, judged_run(measuring, trials[index].configuration, measuring.asked.write));
+  }
+  refined.get();
+  return judged;
+}
+
+// The cheapest that holds when it is verified and, timed again, is still cheaper than what was given. `judged`: runs of
+// those that have been judged before.
 std::optional<Found> take_cheapest(const Measuring& measuring, const ReferenceSolution& reference,
-                                   const std::vector<Trial>& trials, const std::string& path,
+                                   const std::vector<Trial>& trials, JudgedRuns judged,
                                    const std::function<void(std::size_t, const std::string&)>& leave) {
   const auto verified = [&](std::size_t index) {
-    const Configuration& configuration = trials[index].configuration;
-    Found found{index, tuned_scene_text(configuration, measuring.asked.scene, path), {}, {}};
-    found.verified = verify(measuring, reference, configuration, found.text, path);
+    const auto before = judged.find(index);
+    JudgedRun run = before != judged.end() ? std::move(before->second)
+                                           : judged_run(measuring, trials[index].configuration, measuring.asked.write);
+    Found found{index, run.text, {}, {}};
+    found.verified = verify(measuring, reference, std::move(run));
     return found;
   };
   std::optional<Found> given;  // if it holds
@@ -215,12 +235,12 @@ bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
     show(TuneStep::searched);
     if (by_cost(trials).empty()) return conclude(TuneStep::none_within);
 
-    reference.refine();
+    JudgedRuns judged = judge_while_refining(measuring, reference, trials);
     document["reference"]["levels"] = levels_json(options.reference, reference);
     document["reference"]["known_h"] = json_number(reference.known_to_h());
     document["reference"]["known_text"] = known_to(reference.levels());
     const std::optional<Found> found =
-        take_cheapest(measuring, reference, trials, options.write, [&](std::size_t trial, const std::string& why) {
+        take_cheapest(measuring, reference, trials, std::move(judged), [&](std::size_t trial, const std::string& why) {
           document["left"].push_back({{"trial", trial}, {"why", why}});
           show(TuneStep::not_taken);
         });

@@ -8,16 +8,18 @@
 #include "harness/scene_judge.h"
 #include "model/io/scene_io.h"
 #include "tuning/comparison.h"
+#include "tuning/tuned_scene.h"
 
 namespace cutproof::tuning {
 
-Verified verify(const Measuring& measuring, const ReferenceSolution& reference, const Configuration& configuration,
-                const std::string& text, const std::string& path) {
-  Verified verified;
-  verified.trial.configuration = configuration;
-  const Scene scene = io::parse_scene(text, path);
+JudgedRun judged_run(const Measuring& measuring, const Configuration& configuration, const std::string& path) {
+  JudgedRun run;
+  run.configuration = configuration;
+  run.text = tuned_scene_text(configuration, measuring.asked.scene, path);
+  const Scene scene = io::parse_scene(run.text, path);
   const std::unique_ptr<Backend> backend = measuring.backend_for(configuration);
   const PreparedScene prepared(scene, path, measuring.asked.frames);
+  run.setup = prepared.setup();
   harness::FrameRunner runner(*backend, {prepared.setup()}, {prepared.start()});
   // What a scene expects is of all of it; but isolation that it expects fails no verdict in a part of it either.
   Expectations expected = scene.expect;
@@ -28,17 +30,30 @@ Verified verify(const Measuring& measuring, const ReferenceSolution& reference, 
     }
   }
   harness::SceneJudge judge(prepared.setup(), expected, measuring.asked.backend.name, runner.states().front());
-  Comparison comparison(prepared.setup(), reference.trajectory(), measuring.allowed(reference), verified.trial);
   for (int64_t frame = 0; frame < prepared.frame_count(); ++frame) {
     throw_if_asked(measuring.asked.stop_asked);
     prepared.for_parts_of(frame, [&] { runner.run_frame([&](const harness::Moment& moment) { judge.see(moment); }); });
-    comparison.add(*runner.states().front());
+    add_frame(run.trajectory, prepared.setup(), *runner.states().front());
   }
+  run.trajectory.stroke_end = prepared.stroke_end();
   for (Verdict& verdict : runner.take_broken_contracts()) judge.add(std::move(verdict));
   judge.finish();
-  comparison.trajectory().stroke_end = prepared.stroke_end();
-  verified.verdicts = static_cast<int64_t>(judge.verdicts().size());
+  run.verdicts = static_cast<int64_t>(judge.verdicts().size());
+  for (const Verdict& verdict : judge.verdicts()) {
+    if (verdict.holds || judge.is_expected_failure(verdict)) continue;
+    run.failure = fmt::format("{} fails in frame {}: {}", verdict.property, verdict.frame, verdict.witness.text);
+    break;
+  }
+  return run;
+}
+
+Verified verify(const Measuring& measuring, const ReferenceSolution& reference, JudgedRun run) {
+  Verified verified;
+  verified.trial.configuration = std::move(run.configuration);
+  verified.verdicts = run.verdicts;
   const Trajectory& wanted = reference.trajectory();
+  Comparison comparison(run.setup, wanted, measuring.allowed(reference), verified.trial);
+  comparison.add(std::move(run.trajectory));
   if (wanted.frames.size() != comparison.trajectory().frames.size()) {
     verified.failure = "it has another number of frames than a finer reference solution";
     verified.trial.outcome = Outcome::schedule;
@@ -49,12 +64,8 @@ Verified verify(const Measuring& measuring, const ReferenceSolution& reference, 
                                    verified.trial.greatest_rms_h, known_to(reference.levels()));
     verified.trial.outcome = Outcome::over;
   } else {
+    verified.failure = std::move(run.failure);
     verified.trial.outcome = Outcome::within;
-  }
-  for (const Verdict& verdict : judge.verdicts()) {
-    if (!verified.failure.empty()) break;
-    if (verdict.holds || judge.is_expected_failure(verdict)) continue;
-    verified.failure = fmt::format("{} fails in frame {}: {}", verdict.property, verdict.frame, verdict.witness.text);
   }
   return verified;
 }

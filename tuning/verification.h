@@ -7,14 +7,24 @@
 
 namespace cutproof::tuning {
 
+// A run of it that is looked at by every oracle and by every expectation of the scene.
+struct JudgedRun {
+  Configuration configuration;
+  std::string text;  // the scene's
+  Setup setup;
+  Trajectory trajectory;
+  int64_t verdicts = 0;  // that were asked for
+  std::string failure;   // of a verdict; empty: all hold
+};
+// `path`: where the scene will be written.
+JudgedRun judged_run(const Measuring& measuring, const Configuration& configuration, const std::string& path);
+
 struct Verified {
   Trial trial;           // without times
   int64_t verdicts = 0;  // that were asked for
   std::string failure;   // empty: it holds
 };
-// Every oracle, every expectation of the scene, and the distance from a reference solution that the search has not
-// seen. `text` is the scene's, `path` where it will be written.
-Verified verify(const Measuring& measuring, const ReferenceSolution& reference, const Configuration& configuration,
-                const std::string& text, const std::string& path);
+// What was judged, and how far it is from a reference solution that the search has not seen.
+Verified verify(const Measuring& measuring, const ReferenceSolution& reference, JudgedRun run);
 
 }  // namespace cutproof::tuning
