@@ -71,15 +71,15 @@ ReferenceSolution::ReferenceSolution(ReferenceKind kind, const Scene& scene, std
   scene_.skin.wanted = false;  // nothing moves with it
   scene_.step.acceleration = Acceleration::none;
   setup_ = PreparedScene(scene_, source_, frames_).setup();
-  // The first three are run in any case, because only the third tells how fast they come nearer to each other. They
-  // know nothing of each other, so they are run at once: the third takes as long as both others or longer.
-  RefinementLevel first = level_after(nullptr), second = level_after(&first), third = level_after(&second);
-  std::future<Trajectory> finest = std::async(std::launch::async, [&] { return run(third); });
-  trajectory_ = run(first);
-  levels_ = {first};
-  Trajectory finer = run(second);
-  take(second, std::move(finer));
-  take(third, finest.get());
+  // The first three are run in any case, because only the third tells how fast they come nearer to each other, and of
+  // the scene's own substeps the one in which each is solved, because it comes last. They know nothing of each other,
+  // so they are run at once: the third takes as long as both others or longer, and the solved one about as long.
+  const RefinementLevel first = level_after(nullptr), second = level_after(&first), third = level_after(&second);
+  if (kind_ == ReferenceKind::substeps) solved_ = start(solved_level());
+  std::future<Ran> finest = start(third);
+  take(run(first));
+  take(run(second));
+  take(finest.get());
   const auto is_allowed = [](const RefinementLevel& next) {
     return next.substeps <= kMostSubsteps && next.iterations.value_or(0) <= kMostIterations;
   };
@@ -87,11 +87,12 @@ ReferenceSolution::ReferenceSolution(ReferenceKind kind, const Scene& scene, std
     RefinementLevel next = level_after(&levels_.back());
     if (!is_allowed(next)) {
       if (kind_ == ReferenceKind::limit) break;
-      next.iterations.reset();
+      next = solved_level();
     }
-    Trajectory trajectory = run(next);
-    take(next, std::move(trajectory));
+    take(next.iterations ? run(next) : solved_.get());
   }
+  // Nothing else is under way when somebody measures times.
+  if (solved_.valid()) solved_.wait();
 }
 
 RefinementLevel ReferenceSolution::level_after(const RefinementLevel* before) const {
@@ -107,7 +108,17 @@ RefinementLevel ReferenceSolution::level_after(const RefinementLevel* before) co
   return level;
 }
 
-Trajectory ReferenceSolution::run(RefinementLevel& level) const {
+RefinementLevel ReferenceSolution::solved_level() const {
+  RefinementLevel level;
+  level.substeps = scene_.step.substeps;
+  return level;
+}
+
+std::future<ReferenceSolution::Ran> ReferenceSolution::start(RefinementLevel level) const {
+  return std::async(std::launch::async, [this, level] { return run(level); });
+}
+
+ReferenceSolution::Ran ReferenceSolution::run(RefinementLevel level) const {
   Scene scene = scene_;
   scene.step.substeps = level.substeps;
   scene.step.iterations = level.iterations.value_or(scene.step.iterations);
@@ -123,10 +134,16 @@ Trajectory ReferenceSolution::run(RefinementLevel& level) const {
     return true;
   });
   level.solved = solved.count();
-  return trajectory;
+  return {level, std::move(trajectory)};
 }
 
-void ReferenceSolution::take(RefinementLevel level, Trajectory trajectory) {
+void ReferenceSolution::take(Ran next) {
+  auto& [level, trajectory] = next;
+  if (levels_.empty()) {
+    levels_.push_back(level);
+    trajectory_ = std::move(trajectory);
+    return;
+  }
   double apart = 0;
   for (std::size_t f = 0; f < std::min(trajectory.frames.size(), trajectory_.frames.size()); ++f) {
     apart = std::max(apart, oracles::poses_apart(setup_, trajectory.frames[f], trajectory_.frames[f]).position.rms());
@@ -143,10 +160,11 @@ void ReferenceSolution::take(RefinementLevel level, Trajectory trajectory) {
 
 void ReferenceSolution::refine() {
   if (is_last()) return;
-  RefinementLevel next = level_after(&levels_.back());
-  if (kind_ == ReferenceKind::substeps) next.iterations.reset();
-  Trajectory trajectory = run(next);
-  take(next, std::move(trajectory));
+  if (kind_ == ReferenceKind::limit) {
+    take(run(level_after(&levels_.back())));
+  } else {
+    take(solved_.get());
+  }
 }
 
 bool ReferenceSolution::nothing_removed() const {

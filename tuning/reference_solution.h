@@ -2,6 +2,7 @@
 // is known; with the scene's own substeps at last without the reference's step.
 #pragma once
 #include <cstdint>
+#include <future>
 #include <optional>
 #include <span>
 #include <string>
@@ -68,11 +69,18 @@ class ReferenceSolution {
   static constexpr int32_t kMostIterations = 512;  // per substep
 
  private:
+  struct Ran {
+    RefinementLevel level;
+    Trajectory trajectory;
+  };
   // That which follows `before`; null: the first.
   RefinementLevel level_after(const RefinementLevel* before) const;
+  // The scene's own substeps, each of them solved.
+  RefinementLevel solved_level() const;
   bool is_last() const { return !levels_.empty() && !levels_.back().iterations; }
-  Trajectory run(RefinementLevel& level) const;
-  void take(RefinementLevel level, Trajectory trajectory);
+  Ran run(RefinementLevel level) const;
+  std::future<Ran> start(RefinementLevel level) const;
+  void take(Ran next);
 
   ReferenceKind kind_;
   Scene scene_;
@@ -82,6 +90,7 @@ class ReferenceSolution {
   Setup setup_;
   std::vector<RefinementLevel> levels_;
   Trajectory trajectory_;
+  std::future<Ran> solved_;  // of the scene's own substeps: the last level; declared last, because it uses all above
 };
 
 }  // namespace cutproof::tuning

@@ -95,13 +95,16 @@ using JudgedRuns = std::map<std::size_t, JudgedRun>;  // by trial
 // given, and the cheapest.
 JudgedRuns judge_while_refining(const Measuring& measuring, ReferenceSolution& reference,
                                 const std::vector<Trial>& trials) {
-  std::future<void> refined = std::async(std::launch::async, [&] { reference.refine(); });
-  JudgedRuns judged;
+  std::map<std::size_t, std::future<JudgedRun>> judging;
   for (const std::size_t index : {std::size_t{0}, by_cost(trials).front()}) {
-    if (trials[index].outcome != Outcome::within || judged.contains(index)) continue;
-    judged.emplace(index, judged_run(measuring, trials[index].configuration, measuring.asked.write));
+    if (trials[index].outcome != Outcome::within || judging.contains(index)) continue;
+    judging.emplace(index, std::async(std::launch::async, [&, index] {
+                      return judged_run(measuring, trials[index].configuration, measuring.asked.write);
+                    }));
   }
-  refined.get();
+  reference.refine();
+  JudgedRuns judged;
+  for (auto& [index, run] : judging) judged.emplace(index, run.get());
   return judged;
 }
 
