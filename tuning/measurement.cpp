@@ -12,7 +12,7 @@ namespace cutproof::tuning {
 
 namespace {
 
-double seconds_per_frame(Backend& backend, const PreparedScene& scene, const StopAsked& stop_asked) {
+double seconds_per_frame(Backend& backend, const benchmarks::PreparedScene& scene, const StopAsked& stop_asked) {
   const auto look_up = [&](double) {
     throw_if_asked(stop_asked);
     return true;
@@ -34,7 +34,7 @@ Trial measure(const Measuring& measuring, const ReferenceSolution& reference, co
   trial.configuration = configuration;
   const bool is_given = configuration == measuring.given, to_the_end = measuring.asked.full || is_given;
   const std::unique_ptr<Backend> backend = measuring.backend_for(configuration);
-  std::optional<PreparedScene> scene;
+  std::optional<benchmarks::PreparedScene> scene;
   try {
     scene.emplace(configuration.scene, measuring.asked.scene, measuring.asked.frames);
   } catch (const InputError& error) {  // such as a blade that few substeps cannot follow
@@ -90,7 +90,7 @@ TimedInTurns time_in_turns(const Measuring& measuring, const Configuration& foun
     for (const bool given : {true, false}) {
       const Configuration& timed = given ? measuring.given : found;
       const std::unique_ptr<Backend> backend = measuring.backend_for(timed);
-      const PreparedScene scene(timed.scene, measuring.asked.scene, measuring.asked.frames);
+      const benchmarks::PreparedScene scene(timed.scene, measuring.asked.scene, measuring.asked.frames);
       (given ? before : after).push_back(seconds_per_frame(*backend, scene, measuring.asked.stop_asked));
     }
   }

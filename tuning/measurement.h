@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "benchmarks/prepared_scene.h"
 #include "harness/backends.h"
 #include "model/io/scene_io.h"
 #include "model/stop.h"
-#include "tuning/prepared_scene.h"
 #include "tuning/reference_solution.h"
 #include "tuning/trial.h"
 

@@ -8,8 +8,8 @@
 #include <limits>
 #include <memory>
 
+#include "benchmarks/prepared_scene.h"
 #include "reference_cpu/reference.h"
-#include "tuning/prepared_scene.h"
 
 namespace cutproof::tuning {
 
@@ -70,7 +70,7 @@ ReferenceSolution::ReferenceSolution(ReferenceKind kind, const Scene& scene, std
     : kind_(kind), scene_(scene), source_(std::move(source)), frames_(frames), stop_asked_(std::move(stop_asked)) {
   scene_.skin.wanted = false;  // nothing moves with it
   scene_.step.acceleration = Acceleration::none;
-  setup_ = PreparedScene(scene_, source_, frames_).setup();
+  setup_ = benchmarks::PreparedScene(scene_, source_, frames_).setup();
   // The first three are run in any case, because only the third tells how fast they come nearer to each other, and of
   // the scene's own substeps the one in which each is solved, because it comes last. They know nothing of each other,
   // so they are run at once: the third takes as long as both others or longer, and the solved one about as long.
@@ -122,7 +122,7 @@ ReferenceSolution::Ran ReferenceSolution::run(RefinementLevel level) const {
   Scene scene = scene_;
   scene.step.substeps = level.substeps;
   scene.step.iterations = level.iterations.value_or(scene.step.iterations);
-  const PreparedScene prepared(scene, source_, frames_);
+  const benchmarks::PreparedScene prepared(scene, source_, frames_);
   SolvedSteps solved;
   const std::unique_ptr<Backend> iterated = reference::make_backend();
   Backend& backend = level.iterations ? *iterated : solved;

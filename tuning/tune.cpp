@@ -45,7 +45,7 @@ Measuring prepare(const TuneOptions& options) {
   }
   const harness::BackendDescriptor& backend = benchmarks::require_timed_backend(options.backend.name);
   static_cast<void>(harness::make_backend(options.backend));
-  const PreparedScene prepared(scene, options.scene, options.frames);
+  const benchmarks::PreparedScene prepared(scene, options.scene, options.frames);
   if (prepared.frame_count() == 0) {
     throw InputError(options.scene, "frame.count", "the scene has no frame, so nothing happens that could be compared",
                      "give a number of frames, a blade, or a grip that ends");

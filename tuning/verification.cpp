@@ -18,7 +18,7 @@ JudgedRun judged_run(const Measuring& measuring, const Configuration& configurat
   run.text = tuned_scene_text(configuration, measuring.asked.scene, path);
   const Scene scene = io::parse_scene(run.text, path);
   const std::unique_ptr<Backend> backend = measuring.backend_for(configuration);
-  const PreparedScene prepared(scene, path, measuring.asked.frames);
+  const benchmarks::PreparedScene prepared(scene, path, measuring.asked.frames);
   run.setup = prepared.setup();
   harness::FrameRunner runner(*backend, {prepared.setup()}, {prepared.start()});
   // What a scene expects is of all of it; but isolation that it expects fails no verdict in a part of it either.

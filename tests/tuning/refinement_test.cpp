@@ -11,11 +11,13 @@
 #include "oracles/comparison/reference_solution.h"
 #include "oracles/relations/relations.h"
 #include "reference_cpu/reference.h"
-#include "tuning/prepared_scene.h"
+#include "benchmarks/prepared_scene.h"
 #include "tuning/reference_solution.h"
 
 namespace cutproof::tuning {
 namespace {
+
+using benchmarks::PreparedScene;
 
 Scene scene_of(const std::string& text) { return io::parse_scene(text, "test"); }
 

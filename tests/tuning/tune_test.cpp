@@ -12,7 +12,7 @@
 #include "model/io/scene_io.h"
 #include "reference_cpu/reference.h"
 #include "tests/cli/program.h"
-#include "tuning/prepared_scene.h"
+#include "benchmarks/prepared_scene.h"
 
 namespace {
 
@@ -43,7 +43,7 @@ double greatest_rms_h(const Scene& tuned, Scene scene, int substeps, int iterati
                       std::optional<int64_t> frames = {}) {
   scene.step.substeps = substeps;
   scene.step.iterations = iterations;
-  const cutproof::tuning::PreparedScene a(scene, "test", frames), b(tuned, "test", frames);
+  const cutproof::benchmarks::PreparedScene a(scene, "test", frames), b(tuned, "test", frames);
   const auto first = cutproof::reference::make_backend(), second = cutproof::reference::make_backend();
   first->load({a.setup()}, {a.start()});
   second->load({b.setup()}, {b.start()});
@@ -136,7 +136,7 @@ struct Dissected {
 Dissected dissected(Scene scene, int substeps, int iterations) {
   scene.step.substeps = substeps;
   scene.step.iterations = iterations;
-  const cutproof::tuning::PreparedScene prepared(scene, "test", {});
+  const cutproof::benchmarks::PreparedScene prepared(scene, "test", {});
   const auto backend = cutproof::reference::make_backend();
   backend->load({prepared.setup()}, {prepared.start()});
   Dissected run;

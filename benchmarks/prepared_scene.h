@@ -11,7 +11,7 @@
 #include "model/backend.h"
 #include "model/scene.h"
 
-namespace cutproof::tuning {
+namespace cutproof::benchmarks {
 
 class PreparedScene {
  public:
@@ -42,4 +42,4 @@ class PreparedScene {
   std::vector<int64_t> last_of_;  // [scene frames] the last frame of the schedule that belongs to it
 };
 
-}  // namespace cutproof::tuning
+}  // namespace cutproof::benchmarks

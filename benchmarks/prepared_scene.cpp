@@ -1,9 +1,9 @@
-#include "tuning/prepared_scene.h"
+#include "benchmarks/prepared_scene.h"
 
 #include <algorithm>
 #include <utility>
 
-namespace cutproof::tuning {
+namespace cutproof::benchmarks {
 
 PreparedScene::PreparedScene(const Scene& scene, const std::string& source, std::optional<int64_t> frames) {
   fixtures::BuildOptions options;
@@ -41,4 +41,4 @@ std::vector<int64_t> PreparedScene::stroke_end() const {
   return ends;
 }
 
-}  // namespace cutproof::tuning
+}  // namespace cutproof::benchmarks
