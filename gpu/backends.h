@@ -11,6 +11,13 @@
 
 namespace cutproof::gpu {
 
+// What runs the kernels.
+class KernelBackend : public Backend {
+ public:
+  // Of all bodies together. Requires that the last span was the step alone. Waits for it.
+  virtual StepWork step_work() const = 0;
+};
+
 // Kernels on `threads` threads of the CPU. `of_block`: threads of a block (HostLauncher::Threads), which give the same
 // bits: 1 is quick, kHostThreads tells whether kernels keep the rules of block.h.
 std::unique_ptr<Backend> make_host_backend(int threads = 1, KernelOptions options = {}, int of_block = 1);

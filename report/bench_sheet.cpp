@@ -768,16 +768,96 @@ void sensitivity_pieces(Sheet& sheet, const Field& document) {
   sheet.pieces.emplace_back(std::move(grid));
 }
 
+// --- parts
+
+void parts_pieces(Sheet& sheet, const Field& document) {
+  Chart chart = {"What the scene takes without a part, and how much else then happens",
+                 "Each point is a run without one part: the farther left, the more the part costs; at zero distance "
+                 "the tissue goes where it goes with it, so nobody would miss it but for what it makes.",
+                 {"time of a frame, of that of the scene as it is", "1", false},
+                 {"greatest RMS distance from the scene as it is", "h", false},
+                 {}};
+  Grid grid;
+  grid.title = "Every run";
+  grid.words =
+      "The distance is from the run of the scene as it is, in the worst of its frames: what the part does, and no "
+      "error.";
+  grid.columns = {{"scene"},
+                  {"without"},
+                  {"median [ms]", true},
+                  {"least [ms]", true},
+                  {"most [ms]", true},
+                  {"of the time as it is", true},
+                  {"RMS [h]", true},
+                  {"max [h]", true},
+                  {"removed otherwise", true},
+                  {"resolved particles", true},
+                  {"what else"}};
+  grid.filter = 1;
+  Grid stages;
+  stages.title = "Stages of the scenes as they are";
+  stages.words = "Each stage alone, in the mean of all frames; and in how many of them it ran.";
+  stages.columns = {{"scene"}, {"stage"}, {"ms a frame", true}, {"frames", true}};
+  stages.filter = 1;
+  int64_t scenes = 0, runs = 0;
+  document["rows"].each([&](const Field& row) {
+    const std::string scene = row["scene"].text();
+    const Field without = row["without"], error = row["error"], work = row["work"], judged = row["judged"];
+    const bool is_given = without.is_nothing();
+    const std::string part = is_given ? "nothing" : without.text();
+    ++(is_given ? scenes : runs);
+    if (error.is_nothing()) {
+      grid.rows.push_back({{scene, part, "–", "–", "–", "–", "–", "–", "–", "–", row["refused"].text()}, "warn"});
+      return;
+    }
+    const std::optional<double> of_given = row["of_given"].number_or_null(), rms = error["rms_h"].number_or_null();
+    std::string else_ = error["same_components"].flag() ? "" : "the tissue falls into other parts";
+    std::string mark;
+    if (is_given) {
+      const bool holds = judged["topology_holds"].flag();
+      const std::optional<double> step = judged["step_max_h"].number_or_null();
+      else_ = fmt::format("beside the reference: step {} h, topology {}", figure_text(step), holds ? "holds" : "fails");
+      if (!holds) {
+        sheet.holds = false;
+        mark = "bad";
+      }
+      for (const Stage stage : kStages) {
+        const std::string name(name_of(stage));
+        const Field one = row["stages"][name.c_str()];
+        stages.rows.push_back({{scene, name, figure_text(one["seconds_per_frame"].number_or_null(), 1e3),
+                                fmt::format("{} of {}", one["frames"].count(), row["frames"].count())}});
+      }
+    } else {
+      curve_named(chart, part, Look::dots).dots.push_back({of_given, rms, fmt::format("{} without {}", scene, part)});
+    }
+    grid.rows.push_back({{scene, part, ms_text(row["seconds_per_frame"]), ms_text(row["seconds_per_frame"], "min"),
+                          ms_text(row["seconds_per_frame"], "max"), figure_text(of_given), figure_text(rms),
+                          figure_text(error["max_h"].number_or_null()), whole(error["removed_otherwise"].count()),
+                          work.is_nothing() ? "–" : figure_text(work["resolved"].number_or_null()), else_},
+                         mark});
+  });
+  sheet.summary = fmt::format("What each part of {} {} costs: {} runs without one.", whole(scenes),
+                              scenes == 1 ? "scene" : "scenes", whole(runs));
+  sheet.pieces.emplace_back(std::move(chart));
+  sheet.pieces.emplace_back(std::move(grid));
+  sheet.pieces.emplace_back(std::move(stages));
+}
+
 struct Suite {
   const char *name, *rows;
   void (*add)(Sheet& sheet, const Field& document);
 };
-constexpr Suite kSuites[] = {
-    {"stages", "rows", stages_pieces},          {"sampling", "rows", sampling_pieces},
-    {"clusters", "rows", clusters_pieces},      {"scale", "rows", scale_pieces},
-    {"rotations", "methods", rotations_pieces}, {"machine_limits", "rows", machine_limits_pieces},
-    {"solver", "scenes", solver_pieces},        {"baselines", "rows", baselines_pieces},
-    {"factors", "scenes", factors_pieces},      {"sensitivity", "rows", sensitivity_pieces}};
+constexpr Suite kSuites[] = {{"stages", "rows", stages_pieces},
+                             {"sampling", "rows", sampling_pieces},
+                             {"clusters", "rows", clusters_pieces},
+                             {"scale", "rows", scale_pieces},
+                             {"rotations", "methods", rotations_pieces},
+                             {"machine_limits", "rows", machine_limits_pieces},
+                             {"solver", "scenes", solver_pieces},
+                             {"baselines", "rows", baselines_pieces},
+                             {"factors", "scenes", factors_pieces},
+                             {"sensitivity", "rows", sensitivity_pieces},
+                             {"parts", "rows", parts_pieces}};
 
 }  // namespace
 

@@ -98,4 +98,22 @@ struct SensitivityOptions {
 };
 nlohmann::json run_sensitivity(const SensitivityOptions& options, const Progress& progress);
 
+// What each part of a scene costs, and what the scene does without it.
+struct PartsOptions {
+  std::string backend = harness::kReferenceName;
+  std::vector<std::string> scenes;  // their files
+  std::optional<int64_t> frames;    // of each scene at most
+  int64_t repeats = 3;
+  std::string split, rotation;  // empty: the kernels' default
+  StopAsked stop_asked = {};    // ends it between two frames
+};
+nlohmann::json run_parts(const PartsOptions& options, const Progress& progress);
+
+// Least squares of y over x: the slope, and what its standard error is. None of fewer than three points, or if all x
+// are equal.
+struct Slope {
+  double value = 0, standard_error = 0;
+};
+std::optional<Slope> slope_of(const std::vector<double>& x, const std::vector<double>& y);
+
 }  // namespace cutproof::benchmarks

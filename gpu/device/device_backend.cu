@@ -12,6 +12,7 @@
 #include <memory>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "gpu/backends.h"
 #include "gpu/device/cuda_check.h"
@@ -72,7 +73,7 @@ class DeviceArrays {
   std::vector<DeviceMemory> memory_;
 };
 
-class GpuBackend final : public Backend {
+class GpuBackend final : public KernelBackend {
  public:
   explicit GpuBackend(KernelOptions options) : options_(options) {
     for (Event& event : end_) event = make_event();
@@ -150,6 +151,22 @@ class GpuBackend final : public Backend {
     report.total_seconds = 1e-3 * milliseconds;
     if (span_.first == span_.last) report.seconds[static_cast<std::size_t>(span_.first)] = report.total_seconds;
     return report;
+  }
+
+  StepWork step_work() const override {
+    wait();
+    const DeviceView& view = device_.view();
+    const auto copy_of = [](const auto* from, int64_t count) {
+      std::vector<std::remove_const_t<std::remove_pointer_t<decltype(from)>>> copy(static_cast<std::size_t>(count));
+      CUTPROOF_CUDA(cudaMemcpy(copy.data(), from, copy.size() * sizeof(*from), cudaMemcpyDeviceToHost));
+      return copy;
+    };
+    const Counters counters = copy_of(view.counters, 1).front();
+    const auto heads = copy_of(view.group_head, counters.groups);
+    const bool contacts = load_.plan.contacts;
+    const auto resolved = copy_of(view.group_resolved, contacts ? counters.groups : 0);
+    const auto loose = copy_of(view.loose_places, counters.loose);
+    return step_work_of(counters, heads.data(), contacts ? resolved.data() : nullptr, loose.data());
   }
 
  private:

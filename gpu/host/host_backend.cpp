@@ -10,7 +10,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-class HostBackend final : public Backend {
+class HostBackend final : public KernelBackend {
  public:
   HostBackend(std::string name, HostLauncher launcher, KernelOptions options)
       : name_(std::move(name)), launcher_(std::move(launcher)), options_(options) {}
@@ -51,6 +51,10 @@ class HostBackend final : public Backend {
   std::vector<State> snapshot() const override { return snapshot_of(std::vector<bool>(load_.setups.size(), true)); }
   std::vector<State> snapshot_of(const std::vector<bool>& wanted) const override { return load_.states_of(wanted); }
   SpanReport report() const override { return report_; }
+  StepWork step_work() const override {
+    return step_work_of(load_.staging.counters.front(), view_.group_head,
+                        load_.plan.contacts ? view_.group_resolved : nullptr, view_.loose_places);
+  }
 
  private:
   void take(Load load) {

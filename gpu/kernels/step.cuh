@@ -344,7 +344,6 @@ CUTPROOF_DEVICE inline float room_ahead(const Pace& pace, const Contacts& contac
 
 // While a grip holds a group, its particles stay where it has put them, and what changes in an iteration is how much
 // they are pushed: by alpha (x - d~) + beta e - M(r), M being a map as those of carried groups are.
-enum : int { kCarried = 0, kResolved = 1, kHeld = 2 };  // DeviceView::group_resolved
 // Sets alpha and beta of the end of a substep. They follow from what an iteration does with one particle
 // (advance_particle), whose pull is G(r) - e, or, from where it is, G(r) - e - (x - d~).
 CUTPROOF_DEVICE inline void set_held_push(Pace& pace, float kdt2) {

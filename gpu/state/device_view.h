@@ -153,6 +153,9 @@ inline constexpr int kMostInGroup = 64;
 // Fewer particles with the same holders are not worth a map; they are loose.
 inline constexpr int kLeastInGroup = 4;
 
+// DeviceView::group_resolved: a group's particles are moved by its map, one by one, or by its map and a grip.
+enum : int { kCarried = 0, kResolved = 1, kHeld = 2 };
+
 // What changes in size or says what happened. One copy for all bodies.
 struct Counters {
   int fault;               // see above

@@ -117,6 +117,16 @@ Skin extract_skin(const StagingBuffers& staging, const Setup& setup, const BodyC
 
 }  // namespace
 
+StepWork step_work_of(const Counters& counters, const GroupHead* heads, const int* resolved, const int* loose_places) {
+  StepWork work;
+  for (int g = 0; g < counters.groups; ++g) {
+    const int state = resolved == nullptr || heads[g].size == 0 ? kCarried : resolved[g];
+    (state == kResolved ? work.resolved : state == kHeld ? work.held : work.carried) += heads[g].size;
+  }
+  work.loose = std::count_if(loose_places, loose_places + counters.loose, [](int place) { return place >= 0; });
+  return work;
+}
+
 std::vector<State> extract_states(const StagingBuffers& staging, const std::vector<Setup>& setups) {
   KnownSkins skins(setups.size());
   return extract_states(staging, setups, std::vector<bool>(setups.size(), true), skins);

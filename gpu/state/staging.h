@@ -88,6 +88,15 @@ using KnownSkins = std::vector<std::optional<Skin>>;
 std::vector<State> extract_states(const StagingBuffers& staging, const std::vector<Setup>& setups,
                                   const std::vector<bool>& wanted, KnownSkins& skins);
 
+// How the last substep of a step moved the particles that are alive: how many of them by their group's map alone; by
+// it, in a grip; one by one, because something may touch their group; one by one, because they are in no group.
+struct StepWork {
+  int64_t carried = 0, held = 0, resolved = 0, loose = 0;
+};
+// extract.cpp. From what the step leaves: of each group its head, and of each whether it is resolved (null: nothing can
+// touch any); the list of loose places.
+StepWork step_work_of(const Counters& counters, const GroupHead* heads, const int* resolved, const int* loose_places);
+
 // capacity.cpp. The extents of what has been loaded, whose arrays are as long as their contents. Throws MachineError if
 // one is beyond 32 bits.
 Extents extents_of(const StagingBuffers& loaded, Capacity capacity);

@@ -804,7 +804,7 @@ TEST(Groups, AreResolvedIfEitherCandidateTouches) {
     const int groups = staging.counters.front().groups;
     ASSERT_GT(groups, 20);
     for (int g = 0; g < groups; ++g) {
-      ASSERT_EQ(w.group_resolved[g], step_detail::kCarried);
+      ASSERT_EQ(w.group_resolved[g], kCarried);
       for (int axis = 0; axis < 3; ++axis) {
         w.group_map[3 * g + axis] = {0, 0, 0, axis == 2 ? now : 0};
         w.group_earlier_map[3 * g + axis] = {0, 0, 0, axis == 2 ? earlier : 0};
@@ -813,7 +813,7 @@ TEST(Groups, AreResolvedIfEitherCandidateTouches) {
     launcher.teams(advance_kernel_object<true, true, false, step_detail::kRowTeam>{}, step_detail::kParticleTeam,
                    w.group_capacity, w, 0, kIteration);
     for (int g = 0; g < groups; ++g) {
-      ASSERT_EQ(w.group_resolved[g], wanted.touches ? step_detail::kResolved : step_detail::kCarried)
+      ASSERT_EQ(w.group_resolved[g], wanted.touches ? kResolved : kCarried)
           << "plain " << wanted.plain << ", accelerated " << wanted.accelerated << ", group " << g;
     }
   }

@@ -1,0 +1,21 @@
+// What a scene could do without, one part at a time.
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "model/scene.h"
+
+namespace cutproof::benchmarks {
+
+struct ScenePart {
+  std::string name;  // as results_schema.md lists them (`cutproof bench parts`)
+  Scene without;     // has everything else
+};
+// Those that `scene` has, in the order in which a frame comes to them. Without its blade a scene has as many frames as
+// before, `frames`, and what counts from the end of the last stroke still happens then (`strokes_end` [s]; none: the
+// frames end before).
+std::vector<ScenePart> parts_of(const Scene& scene, int64_t frames, std::optional<double> strokes_end);
+
+}  // namespace cutproof::benchmarks

@@ -1,0 +1,239 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "benchmarks/prepared_scene.h"
+#include "benchmarks/scene_parts.h"
+#include "benchmarks/suites/suites.h"
+#include "gpu/backends.h"
+#include "model/at.h"
+#include "model/error.h"
+#include "model/io/json_number.h"
+#include "model/io/scene_io.h"
+#include "oracles/comparison/trajectory.h"
+
+namespace cutproof::benchmarks {
+
+namespace {
+
+using nlohmann::json;
+
+// What a scene does, stage by stage.
+struct Looked {
+  std::vector<oracles::Pose> poses;                 // at the end of each of its frames
+  std::array<double, kStages.size()> seconds = {};  // in all
+  std::array<int64_t, kStages.size()> ran = {};     // in how many of its frames
+  std::vector<gpu::StepWork> work;                  // of each step; empty if the backend does not tell
+  std::vector<double> step_seconds;                 // of each step
+};
+Looked look_at(Backend& backend, const PreparedScene& scene, const StopAsked& stop_asked) {
+  Looked looked;
+  const auto* const kernels = dynamic_cast<const gpu::KernelBackend*>(&backend);
+  backend.load({scene.setup()}, {scene.start()});
+  for (int64_t frame = 0; frame < scene.frame_count(); ++frame) {
+    throw_if_asked(stop_asked);
+    std::array<bool, kStages.size()> ran = {};
+    scene.for_parts_of(frame, [&] {
+      for (const Stage stage : kStages) {
+        backend.run({stage, stage});
+        const SpanReport report = backend.report();
+        looked.seconds[at(stage)] += report.total_seconds;
+        ran[at(stage)] = ran[at(stage)] || report.ran[at(stage)];
+        if (stage != Stage::step) continue;
+        looked.step_seconds.push_back(report.total_seconds);
+        if (kernels != nullptr) looked.work.push_back(kernels->step_work());
+      }
+    });
+    for (std::size_t s = 0; s < ran.size(); ++s) looked.ran[s] += ran[s];
+    looked.poses.push_back(oracles::pose_of(scene.setup(), backend.snapshot().front(),
+                                            looked.poses.empty() ? nullptr : &looked.poses.back()));
+  }
+  return looked;
+}
+
+// How a run differs from that of the scene as it is.
+json error_of_run(const Setup& setup, const Looked& given, const Looked& without) {
+  double rms = 0, max = 0;
+  int64_t alive_in_one = 0;
+  bool same_components = true;
+  for (std::size_t f = 0; f < std::min(given.poses.size(), without.poses.size()); ++f) {
+    const oracles::Apart apart = oracles::poses_apart(setup, given.poses[f], without.poses[f]);
+    rms = std::max(rms, apart.position.rms());
+    max = std::max(max, apart.position.max);
+    alive_in_one = apart.alive_in_one;
+    same_components = same_components && given.poses[f].components == without.poses[f].components;
+  }
+  return {{"rms_h", json_number(rms)},
+          {"max_h", json_number(max)},
+          {"removed_otherwise", alive_in_one},
+          {"same_components", same_components}};
+}
+
+// Means over the steps; null if the backend does not tell.
+json work_json(const std::vector<gpu::StepWork>& work) {
+  if (work.empty()) return nullptr;
+  const auto mean = [&](int64_t gpu::StepWork::*number) {
+    double sum = 0;
+    for (const gpu::StepWork& step : work) sum += static_cast<double>(step.*number);
+    return sum / static_cast<double>(work.size());
+  };
+  return {{"carried", mean(&gpu::StepWork::carried)},
+          {"held", mean(&gpu::StepWork::held)},
+          {"resolved", mean(&gpu::StepWork::resolved)},
+          {"loose", mean(&gpu::StepWork::loose)}};
+}
+
+json stages_json(const Looked& looked, int64_t frames) {
+  json stages = json::object();
+  for (const Stage stage : kStages) {
+    stages[std::string(name_of(stage))] = {
+        {"seconds_per_frame", looked.seconds[at(stage)] / static_cast<double>(frames)},
+        {"frames", looked.ran[at(stage)]}};
+  }
+  return stages;
+}
+
+}  // namespace
+
+std::optional<Slope> slope_of(const std::vector<double>& x, const std::vector<double>& y) {
+  const std::size_t n = std::min(x.size(), y.size());
+  if (n < 3) return std::nullopt;
+  const auto count = static_cast<double>(n);
+  double mean_x = 0, mean_y = 0, xx = 0, xy = 0;
+  for (std::size_t k = 0; k < n; ++k) {
+    mean_x += x[k] / count;
+    mean_y += y[k] / count;
+  }
+  for (std::size_t k = 0; k < n; ++k) {
+    xx += (x[k] - mean_x) * (x[k] - mean_x);
+    xy += (x[k] - mean_x) * (y[k] - mean_y);
+  }
+  if (!(xx > 0)) return std::nullopt;
+  const double slope = xy / xx;
+  double left = 0;
+  for (std::size_t k = 0; k < n; ++k) {
+    const double off = (y[k] - mean_y) - slope * (x[k] - mean_x);
+    left += off * off;
+  }
+  return Slope{slope, std::sqrt(left / (count - 2) / xx)};
+}
+
+json run_parts(const PartsOptions& options, const Progress& progress) {
+  require_timed_backend(options.backend);
+  const std::vector<Contender> contenders = make_contenders(options.backend, options.split, options.rotation);
+  struct Variant {
+    std::string part;  // that is left out; empty: none
+    std::optional<PreparedScene> scene;
+    std::string refused;
+    Looked looked;
+    std::vector<double> seconds;
+  };
+  // Whatever is wrong with a scene is found out before anything is measured.
+  struct Asked {
+    std::string file;
+    Scene scene;
+    std::vector<ScenePart> parts;
+  };
+  std::vector<Asked> scenes;
+  std::size_t rows = 0;
+  for (const std::string& file : options.scenes) {
+    Asked asked = {file, io::read_scene(file, {}), {}};
+    const PreparedScene given(asked.scene, file, options.frames);
+    const std::vector<int64_t> ends = given.stroke_end();
+    std::optional<double> strokes_end;
+    if (!ends.empty() && ends.back() >= 0) {
+      strokes_end = static_cast<double>(ends.back() + 1) * asked.scene.frame_length;
+    }
+    asked.parts = parts_of(asked.scene, given.frame_count(), strokes_end);
+    rows += (asked.parts.size() + 1) * contenders.size();
+    scenes.push_back(std::move(asked));
+  }
+  Report report("parts", options.backend,
+                {{"frames", options.frames ? json(*options.frames) : json(nullptr)},
+                 {"repeats", options.repeats},
+                 {"rows_at_most", rows},
+                 {"holds", true}},
+                progress);
+  for (const Asked& asked : scenes) {
+    for (const Contender& contender : contenders) {
+      Backend& backend = *contender.instance;
+      std::vector<Variant> variants(1 + asked.parts.size());
+      for (std::size_t v = 0; v < variants.size(); ++v) {
+        if (v > 0) variants[v].part = asked.parts[v - 1].name;
+        try {
+          variants[v].scene.emplace(v > 0 ? asked.parts[v - 1].without : asked.scene, asked.file, options.frames);
+        } catch (const InputError& error) {  // such as grips that nothing else holds
+          if (v == 0) throw;
+          variants[v].refused = error.what();
+          continue;
+        }
+        variants[v].looked = look_at(backend, *variants[v].scene, options.stop_asked);
+      }
+      const auto frames = static_cast<double>(variants.front().scene->frame_count());
+      // In turns, so that what the machine does meanwhile falls on all of them.
+      for (int64_t repeat = 0; repeat < options.repeats; ++repeat) {
+        for (Variant& variant : variants) {
+          throw_if_asked(options.stop_asked);
+          if (variant.scene) variant.seconds.push_back(variant.scene->run(backend, {}) / frames);
+        }
+      }
+      // The given scene's steps once more each time: what is read from them hangs on single frames.
+      Variant& given = variants.front();
+      std::vector<std::vector<double>> steps(given.looked.step_seconds.size());
+      for (int64_t repeat = 0; repeat < options.repeats; ++repeat) {
+        const Looked again = look_at(backend, *given.scene, options.stop_asked);
+        for (std::size_t k = 0; k < steps.size(); ++k) steps[k].push_back(again.step_seconds[k]);
+      }
+      std::vector<double> resolved, seconds;
+      for (std::size_t k = 0; k < given.looked.work.size(); ++k) {
+        resolved.push_back(static_cast<double>(given.looked.work[k].resolved));
+        seconds.push_back(times_of(steps[k]).median);
+      }
+      const std::optional<Slope> slope = slope_of(resolved, seconds);
+      // Judged where the blade is under way.
+      backend.load({given.scene->setup()}, {given.scene->start()});
+      for (int64_t frame = 0; frame < given.scene->frame_count() / 2; ++frame) {
+        given.scene->for_parts_of(frame, [&] { backend.run(kWholeFrame); });
+      }
+      const FrameErrors judged = judge_frames(backend, given.scene->setup());
+      const double median = times_of(given.seconds).median;
+      for (const Variant& variant : variants) {
+        const Setup& setup = given.scene->setup();
+        json row = {{"scene", asked.scene.name},
+                    {"particles", setup.body.particle_count()},
+                    {"clusters", given.scene->start().clusters.count()},
+                    {"backend", contender.described->name},
+                    {"precision", name_of(contender.described->precision)},
+                    {"substeps", asked.scene.step.substeps},
+                    {"iterations", asked.scene.step.iterations},
+                    {"rotation", contender.rotation},
+                    {"split", contender.split},
+                    {"frames", given.scene->frame_count()},
+                    {"without", variant.part.empty() ? json(nullptr) : json(variant.part)},
+                    {"refused", variant.refused},
+                    {"seconds_per_frame", to_json(times_of(variant.seconds))},
+                    {"of_given", nullptr},
+                    {"error", nullptr},
+                    {"work", work_json(variant.looked.work)}};
+        if (variant.scene) {
+          row["of_given"] = times_of(variant.seconds).median / median;
+          row["error"] = error_of_run(setup, given.looked, variant.looked);
+          row["stages"] = stages_json(variant.looked, given.scene->frame_count());
+        }
+        if (&variant == &given) {
+          row["judged"] = {{"frames", judged.frames},
+                           {"topology_holds", judged.topology_holds()},
+                           {"step_max_h", judged.step ? json_number(judged.step->position.max) : json(nullptr)}};
+          row["per_resolved"] = nullptr;
+          if (slope) row["per_resolved"] = {{"seconds", slope->value}, {"standard_error", slope->standard_error}};
+        }
+        report.add(std::move(row), &variant != &given || judged.topology_holds());
+      }
+    }
+  }
+  return report.complete();
+}
+
+}  // namespace cutproof::benchmarks

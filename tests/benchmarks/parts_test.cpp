@@ -1,0 +1,264 @@
+// `cutproof bench parts`: what is left out is what is named, distances are what leaving it out does, and how many
+// particles a step takes one by one is what the kernels did. What the times are is not tested.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "benchmarks/prepared_scene.h"
+#include "benchmarks/scene_parts.h"
+#include "benchmarks/suites/suites.h"
+#include "gpu/backends.h"
+#include "model/io/scene_io.h"
+#include "tests/cli/program.h"
+
+namespace {
+
+using cutproof::Scene;
+using cutproof::Span;
+using cutproof::Stage;
+using cutproof::benchmarks::parts_of;
+using cutproof::benchmarks::PreparedScene;
+using cutproof::benchmarks::ScenePart;
+using cutproof::benchmarks::slope_of;
+using cutproof::gpu::StepWork;
+using nlohmann::json;
+
+// A block that lies on the ground, held at one end; a blade goes through its middle, and its other end is pulled away
+// once it has.
+constexpr const char* kScene = R"({"version": 5, "name": "everything",
+  "body": {"shape": {"kind": "box", "size": [0.12, 0.04, 0.04]}, "spacing": 0.01}, "clusters": {"side": 3},
+  "frame": {"settle": 0.08}, "split": {"debris": 4},
+  "step": {"substeps": 2, "iterations": 3, "gravity": [0, 0, -9.81], "damping": 5, "retardation": 0.002},
+  "walls": [{"axis": 2, "side": 1, "offset": 0, "friction": 0.3}],
+  "grips": [{"low": [0, 0, 0], "high": [0.15, 1, 1]},
+            {"low": [0.9, 0, 0], "high": [1, 1, 1], "after_strokes": true, "velocity": [0.1, 0, 0], "end": 0.032}],
+  "blade": {"speed": 0.5, "friction": 0.1,
+            "strokes": [{"points": [[0.5, 0.5, 1.3], [0.5, 0.5, -0.3]], "along": [0, 1, 0]}]}})";
+
+Scene everything() { return cutproof::io::parse_scene(kScene, "test"); }
+
+std::vector<std::string> names_of(const std::vector<ScenePart>& parts) {
+  std::vector<std::string> names;
+  for (const ScenePart& part : parts) names.push_back(part.name);
+  return names;
+}
+const Scene& without(const std::vector<ScenePart>& parts, const std::string& name) {
+  for (const ScenePart& part : parts) {
+    if (part.name == name) return part.without;
+  }
+  throw std::out_of_range(name);
+}
+
+TEST(SceneParts, AreThoseThatASceneHas) {
+  const Scene scene = everything();
+  EXPECT_EQ(names_of(parts_of(scene, 20, 0.2)),
+            (std::vector<std::string>{"acceleration", "retardation", "blade", "walls", "friction", "grips", "detection",
+                                      "choice of ends", "debris", "merging", "expansion", "skin", "fitted skin"}));
+  Scene bare;
+  bare.body = scene.body;
+  bare.body.fit_skin = false;
+  bare.step.acceleration = cutproof::Acceleration::none;
+  bare.merge.rule = cutproof::MergeRule::none;
+  bare.expand.rule = cutproof::ExpandRule::none;
+  bare.skin = {.wanted = false};
+  EXPECT_TRUE(parts_of(bare, 20, {}).empty());
+  bare.skin.wanted = true;
+  EXPECT_EQ(names_of(parts_of(bare, 20, {})), std::vector<std::string>{"skin"});
+}
+
+TEST(SceneParts, LeaveOutOneThingAndKeepTheRest) {
+  const Scene scene = everything();
+  const std::vector<ScenePart> parts = parts_of(scene, 20, 0.2);
+  for (const ScenePart& part : parts) EXPECT_NE(part.without, scene) << part.name;
+  Scene expected = scene;
+  expected.split.debris = 0;
+  EXPECT_EQ(without(parts, "debris"), expected);
+  expected = scene;
+  expected.skin.wanted = false;
+  EXPECT_EQ(without(parts, "skin"), expected);
+  expected = scene;
+  expected.blade->friction = 0;
+  expected.walls.front().friction = 0;
+  EXPECT_EQ(without(parts, "friction"), expected);
+  expected = scene;
+  expected.detect.remove = cutproof::RemovedEnds::both;
+  EXPECT_EQ(without(parts, "choice of ends"), expected);
+}
+
+TEST(SceneParts, WithoutABladeAllElseHappensWhenItDid) {
+  const PreparedScene given(everything(), "test", {});
+  const double end = static_cast<double>(given.stroke_end().back() + 1) * everything().frame_length;
+  const Scene bare = without(parts_of(everything(), given.frame_count(), end), "blade");
+  const PreparedScene prepared(bare, "test", {});
+  EXPECT_EQ(prepared.frame_count(), given.frame_count());
+  ASSERT_EQ(prepared.setup().grips.size(), 2U);
+  for (std::size_t g = 0; g < 2; ++g) {
+    EXPECT_EQ(prepared.setup().grips[g].particles, given.setup().grips[g].particles);
+    EXPECT_EQ(prepared.setup().grips[g].active, given.setup().grips[g].active) << g;
+  }
+  // Where the frames end before, nobody is gripped after the strokes.
+  EXPECT_EQ(without(parts_of(everything(), 3, {}), "blade").grips.size(), 1U);
+}
+
+// By hand: slope 1/2, residuals -1/6, 1/3 and -1/6, so (1/6 / 1 / 2)^(1/2).
+TEST(Slope, IsThatOfLeastSquaresWithItsStandardError) {
+  const auto slope = slope_of({0, 1, 2}, {0, 1, 1});
+  ASSERT_TRUE(slope.has_value());
+  EXPECT_NEAR(slope->value, 0.5, 1e-15);
+  EXPECT_NEAR(slope->standard_error, std::sqrt(1.0 / 12), 1e-15);
+  const auto line = slope_of({100, 200, 300, 400}, {1, 3, 5, 7});
+  EXPECT_NEAR(line->value, 0.02, 1e-15);
+  EXPECT_NEAR(line->standard_error, 0, 1e-15);
+  EXPECT_FALSE(slope_of({1, 1, 1, 1}, {1, 2, 3, 4}).has_value()) << "nothing to see";
+  EXPECT_FALSE(slope_of({1, 2}, {1, 2}).has_value()) << "no error can be told";
+}
+
+// ---- what a step does with its particles, on one thread, several, and as kernels of many threads
+
+class StepWorkOf : public testing::TestWithParam<int> {
+ protected:
+  // After so many frames, and the step of the next one.
+  static StepWork after(const PreparedScene& scene, int64_t frames) {
+    const auto backend = cutproof::gpu::make_host_backend(GetParam() == 1 ? 1 : 2, {}, GetParam());
+    backend->load({scene.setup()}, {scene.start()});
+    for (int64_t frame = 0; frame < frames; ++frame) scene.for_parts_of(frame, [&] { backend->run({}); });
+    backend->run({Stage::step, Stage::step});
+    const cutproof::State state = backend->snapshot().front();
+    const auto& kernels = dynamic_cast<const cutproof::gpu::KernelBackend&>(*backend);
+    const StepWork work = kernels.step_work();
+    EXPECT_EQ(work.carried + work.held + work.resolved + work.loose,
+              std::accumulate(state.alive.begin(), state.alive.end(), int64_t{0}));
+    return work;
+  }
+};
+
+TEST_P(StepWorkOf, ABodyThatNothingTouchesIsCarried) {
+  Scene scene = everything();
+  scene.blade.reset();
+  scene.grips.clear();
+  scene.frames = 4;
+  scene.walls.front().offset = -100;
+  const StepWork falling = after(PreparedScene(scene, "test", {}), 1);
+  EXPECT_EQ(falling.resolved, 0);
+  EXPECT_EQ(falling.held, 0);
+  EXPECT_GT(falling.carried, 0);
+  scene.walls.clear();  // kernels that know no contacts
+  scene.step.retardation = 0;
+  const StepWork free = after(PreparedScene(scene, "test", {}), 1);
+  EXPECT_EQ(free.resolved, 0);
+  EXPECT_EQ(free.carried, falling.carried);
+  EXPECT_EQ(free.loose, falling.loose);
+}
+
+TEST_P(StepWorkOf, AGripHoldsTheGroupsOfItsParticles) {
+  Scene scene = everything();
+  scene.blade.reset();
+  scene.walls.clear();
+  scene.grips.resize(1);
+  scene.frames = 4;
+  const PreparedScene prepared(scene, "test", {});
+  const auto named = static_cast<int64_t>(prepared.setup().grips.front().particles.size());
+  const StepWork work = after(prepared, 1);
+  EXPECT_GT(work.held, 0);
+  EXPECT_LE(work.held, named);
+  EXPECT_GE(work.held, named - work.loose) << "whoever is held in no group is loose";
+  EXPECT_EQ(work.resolved, 0);
+}
+
+TEST_P(StepWorkOf, WhatLiesOnTheGroundAndAroundTheBladeIsResolved) {
+  const PreparedScene prepared(everything(), "test", {});
+  const StepWork early = after(prepared, 1), late = after(prepared, prepared.stroke_end().back() - 2);
+  EXPECT_GT(early.resolved, 0) << "the lowest layer";
+  EXPECT_GT(late.resolved, early.resolved) << "the blade is in the tissue";
+  EXPECT_GT(early.carried, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(ThreadsOfABlock, StepWorkOf, testing::Values(1, 32));
+
+// ---- the program
+
+class BenchParts : public Program {
+ protected:
+  void write_scene() { write("everything.json", kScene); }
+};
+
+TEST_F(BenchParts, TellsWhatEachPartCostsBesideWhatItDoes) {
+  write_scene();
+  const Outcome outcome =
+      cutproof("bench parts everything.json --backend host --repeats 2 --json out.json --report out.html");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  const json document = json::parse(read("out.json"));
+  EXPECT_EQ(document.at("suite"), "parts");
+  EXPECT_EQ(document.at("complete"), true);
+  EXPECT_EQ(document.at("holds"), true);
+  ASSERT_EQ(document.at("rows").size(), 14U);
+  EXPECT_EQ(document.at("rows_at_most"), 14);
+  const json& given = document.at("rows").front();
+  EXPECT_TRUE(given.at("without").is_null());
+  EXPECT_EQ(given.at("of_given"), 1);
+  EXPECT_EQ(given.at("error").at("max_h"), 0) << "the same run twice";
+  EXPECT_TRUE(given.at("judged").at("topology_holds"));
+  EXPECT_LT(given.at("judged").at("step_max_h"), 1e-4);
+  EXPECT_GT(given.at("stages").at("detect").at("frames"), 0);
+  EXPECT_GT(given.at("work").at("resolved"), 0);
+  EXPECT_FALSE(given.at("per_resolved").is_null());
+  std::set<std::string> still;  // without which all goes where it goes with them
+  for (const json& row : document.at("rows")) {
+    if (row.at("without").is_null()) continue;
+    const std::string part = row.at("without");
+    EXPECT_EQ(row.at("refused"), "") << part;
+    EXPECT_GT(row.at("seconds_per_frame").at("median"), 0) << part;
+    EXPECT_EQ(row.at("seconds_per_frame").at("median").get<double>() /
+                  given.at("seconds_per_frame").at("median").get<double>(),
+              row.at("of_given"))
+        << part;
+    EXPECT_LE(row.at("error").at("rms_h"), row.at("error").at("max_h")) << part;
+    if (row.at("error").at("max_h") == 0) still.insert(part);
+    if (part == "skin") {
+      EXPECT_EQ(row.at("stages").at("skin").at("frames"), 0);
+    }
+    if (part == "grips") {
+      EXPECT_EQ(row.at("work").at("held"), 0);
+    }
+    if (part == "detection" || part == "blade") {
+      EXPECT_GT(row.at("error").at("removed_otherwise"), 0) << part;
+      EXPECT_FALSE(row.at("error").at("same_components")) << part;
+      EXPECT_EQ(row.at("stages").at("split").at("frames"), 0) << part;
+    }
+  }
+  for (const char* part : {"skin", "fitted skin"}) EXPECT_TRUE(still.contains(part)) << part;
+  for (const char* part : {"acceleration", "retardation", "blade", "walls", "friction", "grips", "detection"}) {
+    EXPECT_FALSE(still.contains(part)) << part;
+  }
+  const std::string text = on_one_line(outcome.output);
+  for (const char* words : {"as it is", "without fitted skin", "each resolved particle", "beside the reference"}) {
+    EXPECT_NE(text.find(words), std::string::npos) << "no '" << words << "' in:\n" << outcome.output;
+  }
+  EXPECT_NE(read("out.html").find("What each part of 1 scene costs"), std::string::npos);
+}
+
+TEST_F(BenchParts, OfTheReferenceSaysNothingAboutGroups) {
+  write_scene();
+  const Outcome outcome = cutproof("bench parts everything.json --frames 2 --repeats 1 --json out.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  for (const json& row : json::parse(read("out.json")).at("rows")) EXPECT_TRUE(row.at("work").is_null());
+  EXPECT_EQ(outcome.output.find("resolved"), std::string::npos) << outcome.output;
+}
+
+TEST_F(BenchParts, SaysWhichPartNothingIsLeftWithout) {
+  write("still.json", R"({"version": 5, "name": "still",
+    "body": {"shape": {"kind": "box", "size": [0.04, 0.04, 0.04]}, "spacing": 0.01}, "clusters": {"side": 2}})");
+  expect_refused("bench parts still.json", {"still.json", "frame.count"});
+  expect_refused("bench parts nothing.json", {"nothing.json"});
+  write_scene();
+  expect_refused("bench parts everything.json --backend simulated", {"simulated"});
+  expect_refused("bench parts everything.json --frames 0", {"--frames"});
+  expect_refused("bench parts everything.json --json nowhere/out.json", {"nowhere"});
+}
+
+}  // namespace
