@@ -799,6 +799,21 @@ void parts_pieces(Sheet& sheet, const Field& document) {
   stages.words = "Each stage alone, in the mean of all frames; and in how many of them it ran.";
   stages.columns = {{"scene"}, {"stage"}, {"ms a frame", true}, {"frames", true}};
   stages.filter = 1;
+  Grid each;
+  each.title = "What a step does with particles, and what each costs";
+  each.words =
+      "In the mean of all steps: particles carried by the map of their group, likewise in a grip, one by one because a "
+      "contact may touch their group, and in no group. What one more costs is read from how the times of steps go with "
+      "these numbers, with its standard error; what else changes with them is in it.";
+  each.columns = {{"scene"},
+                  {"carried", true},
+                  {"in a grip", true},
+                  {"resolved", true},
+                  {"in no group", true},
+                  {"groups", true},
+                  {"a group [ns]", true},
+                  {"a resolved particle [ns]", true},
+                  {"one in no group [ns]", true}};
   int64_t scenes = 0, runs = 0;
   document["rows"].each([&](const Field& row) {
     const std::string scene = row["scene"].text();
@@ -827,6 +842,19 @@ void parts_pieces(Sheet& sheet, const Field& document) {
         stages.rows.push_back({{scene, name, figure_text(one["seconds_per_frame"].number_or_null(), 1e3),
                                 fmt::format("{} of {}", one["frames"].count(), row["frames"].count())}});
       }
+      if (!work.is_nothing()) {
+        std::vector<std::string> cells = {scene};
+        for (const char* number : {"carried", "held", "resolved", "loose", "groups"}) {
+          cells.push_back(figure_text(work[number].number_or_null()));
+        }
+        for (const char* name : {"group", "resolved", "loose"}) {
+          const Field cost = row["each"][name];
+          cells.push_back(cost.is_nothing() ? "–"
+                                            : fmt::format("{} ± {}", figure_text(cost["seconds"].number_or_null(), 1e9),
+                                                          figure_text(cost["standard_error"].number_or_null(), 1e9)));
+        }
+        each.rows.push_back({cells});
+      }
     } else {
       curve_named(chart, part, Look::dots).dots.push_back({of_given, rms, fmt::format("{} without {}", scene, part)});
     }
@@ -841,6 +869,7 @@ void parts_pieces(Sheet& sheet, const Field& document) {
   sheet.pieces.emplace_back(std::move(chart));
   sheet.pieces.emplace_back(std::move(grid));
   sheet.pieces.emplace_back(std::move(stages));
+  if (!each.rows.empty()) sheet.pieces.emplace_back(std::move(each));
 }
 
 struct Suite {

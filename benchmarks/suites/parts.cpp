@@ -1,9 +1,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
+#include <utility>
 
+#include "benchmarks/least_squares.h"
 #include "benchmarks/prepared_scene.h"
 #include "benchmarks/scene_parts.h"
 #include "benchmarks/suites/suites.h"
@@ -82,7 +83,30 @@ json work_json(const std::vector<gpu::StepWork>& work) {
   return {{"carried", mean(&gpu::StepWork::carried)},
           {"held", mean(&gpu::StepWork::held)},
           {"resolved", mean(&gpu::StepWork::resolved)},
-          {"loose", mean(&gpu::StepWork::loose)}};
+          {"loose", mean(&gpu::StepWork::loose)},
+          {"groups", mean(&gpu::StepWork::groups)}};
+}
+
+// What a step takes more for each of these, from how its time goes with their numbers: null for what is as many in all
+// steps. seconds: of each step, in several runs.
+json cost_of_each(const std::vector<gpu::StepWork>& work, const std::vector<std::vector<double>>& seconds) {
+  if (work.empty()) return nullptr;
+  std::vector<double> medians;
+  for (const std::vector<double>& of_step : seconds) medians.push_back(times_of(of_step).median);
+  const std::vector<std::pair<const char*, int64_t gpu::StepWork::*>> counted = {
+      {"group", &gpu::StepWork::groups}, {"resolved", &gpu::StepWork::resolved}, {"loose", &gpu::StepWork::loose}};
+  std::vector<std::vector<double>> numbers;
+  for (const auto& [name, number] : counted) {
+    numbers.emplace_back();
+    for (const gpu::StepWork& step : work) numbers.back().push_back(static_cast<double>(step.*number));
+  }
+  json each = json::object();
+  const std::vector<std::optional<Slope>> slopes = slopes_of(numbers, medians);
+  for (std::size_t k = 0; k < counted.size(); ++k) {
+    json& entry = each[counted[k].first];
+    if (slopes[k]) entry = {{"seconds", slopes[k]->value}, {"standard_error", slopes[k]->standard_error}};
+  }
+  return each;
 }
 
 json stages_json(const Looked& looked, int64_t frames) {
@@ -96,29 +120,6 @@ json stages_json(const Looked& looked, int64_t frames) {
 }
 
 }  // namespace
-
-std::optional<Slope> slope_of(const std::vector<double>& x, const std::vector<double>& y) {
-  const std::size_t n = std::min(x.size(), y.size());
-  if (n < 3) return std::nullopt;
-  const auto count = static_cast<double>(n);
-  double mean_x = 0, mean_y = 0, xx = 0, xy = 0;
-  for (std::size_t k = 0; k < n; ++k) {
-    mean_x += x[k] / count;
-    mean_y += y[k] / count;
-  }
-  for (std::size_t k = 0; k < n; ++k) {
-    xx += (x[k] - mean_x) * (x[k] - mean_x);
-    xy += (x[k] - mean_x) * (y[k] - mean_y);
-  }
-  if (!(xx > 0)) return std::nullopt;
-  const double slope = xy / xx;
-  double left = 0;
-  for (std::size_t k = 0; k < n; ++k) {
-    const double off = (y[k] - mean_y) - slope * (x[k] - mean_x);
-    left += off * off;
-  }
-  return Slope{slope, std::sqrt(left / (count - 2) / xx)};
-}
 
 json run_parts(const PartsOptions& options, const Progress& progress) {
   require_timed_backend(options.backend);
@@ -186,19 +187,13 @@ json run_parts(const PartsOptions& options, const Progress& progress) {
         const Looked again = look_at(backend, *given.scene, options.stop_asked);
         for (std::size_t k = 0; k < steps.size(); ++k) steps[k].push_back(again.step_seconds[k]);
       }
-      std::vector<double> resolved, seconds;
-      for (std::size_t k = 0; k < given.looked.work.size(); ++k) {
-        resolved.push_back(static_cast<double>(given.looked.work[k].resolved));
-        seconds.push_back(times_of(steps[k]).median);
-      }
-      const std::optional<Slope> slope = slope_of(resolved, seconds);
+      const json each = cost_of_each(given.looked.work, steps);
       // Judged where the blade is under way.
       backend.load({given.scene->setup()}, {given.scene->start()});
       for (int64_t frame = 0; frame < given.scene->frame_count() / 2; ++frame) {
         given.scene->for_parts_of(frame, [&] { backend.run(kWholeFrame); });
       }
       const FrameErrors judged = judge_frames(backend, given.scene->setup());
-      const double median = times_of(given.seconds).median;
       for (const Variant& variant : variants) {
         const Setup& setup = given.scene->setup();
         json row = {{"scene", asked.scene.name},
@@ -218,7 +213,11 @@ json run_parts(const PartsOptions& options, const Progress& progress) {
                     {"error", nullptr},
                     {"work", work_json(variant.looked.work)}};
         if (variant.scene) {
-          row["of_given"] = times_of(variant.seconds).median / median;
+          std::vector<double> of_given;  // turn by turn
+          for (std::size_t k = 0; k < variant.seconds.size(); ++k) {
+            of_given.push_back(variant.seconds[k] / given.seconds[k]);
+          }
+          row["of_given"] = times_of(of_given).median;
           row["error"] = error_of_run(setup, given.looked, variant.looked);
           row["stages"] = stages_json(variant.looked, given.scene->frame_count());
         }
@@ -226,8 +225,7 @@ json run_parts(const PartsOptions& options, const Progress& progress) {
           row["judged"] = {{"frames", judged.frames},
                            {"topology_holds", judged.topology_holds()},
                            {"step_max_h", judged.step ? json_number(judged.step->position.max) : json(nullptr)}};
-          row["per_resolved"] = nullptr;
-          if (slope) row["per_resolved"] = {{"seconds", slope->value}, {"standard_error", slope->standard_error}};
+          row["each"] = each;
         }
         report.add(std::move(row), &variant != &given || judged.topology_holds());
       }

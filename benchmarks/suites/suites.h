@@ -109,11 +109,4 @@ struct PartsOptions {
 };
 nlohmann::json run_parts(const PartsOptions& options, const Progress& progress);
 
-// Least squares of y over x: the slope, and what its standard error is. None of fewer than three points, or if all x
-// are equal.
-struct Slope {
-  double value = 0, standard_error = 0;
-};
-std::optional<Slope> slope_of(const std::vector<double>& x, const std::vector<double>& y);
-
 }  // namespace cutproof::benchmarks

@@ -120,7 +120,9 @@ Skin extract_skin(const StagingBuffers& staging, const Setup& setup, const BodyC
 StepWork step_work_of(const Counters& counters, const GroupHead* heads, const int* resolved, const int* loose_places) {
   StepWork work;
   for (int g = 0; g < counters.groups; ++g) {
-    const int state = resolved == nullptr || heads[g].size == 0 ? kCarried : resolved[g];
+    if (heads[g].size == 0) continue;
+    ++work.groups;
+    const int state = resolved == nullptr ? kCarried : resolved[g];
     (state == kResolved ? work.resolved : state == kHeld ? work.held : work.carried) += heads[g].size;
   }
   work.loose = std::count_if(loose_places, loose_places + counters.loose, [](int place) { return place >= 0; });

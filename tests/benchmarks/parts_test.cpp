@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "benchmarks/least_squares.h"
 #include "benchmarks/prepared_scene.h"
 #include "benchmarks/scene_parts.h"
-#include "benchmarks/suites/suites.h"
 #include "gpu/backends.h"
 #include "model/io/scene_io.h"
 #include "tests/cli/program.h"
@@ -24,7 +24,7 @@ using cutproof::Stage;
 using cutproof::benchmarks::parts_of;
 using cutproof::benchmarks::PreparedScene;
 using cutproof::benchmarks::ScenePart;
-using cutproof::benchmarks::slope_of;
+using cutproof::benchmarks::slopes_of;
 using cutproof::gpu::StepWork;
 using nlohmann::json;
 
@@ -106,16 +106,34 @@ TEST(SceneParts, WithoutABladeAllElseHappensWhenItDid) {
 }
 
 // By hand: slope 1/2, residuals -1/6, 1/3 and -1/6, so (1/6 / 1 / 2)^(1/2).
-TEST(Slope, IsThatOfLeastSquaresWithItsStandardError) {
-  const auto slope = slope_of({0, 1, 2}, {0, 1, 1});
+TEST(LeastSquares, GivesTheSlopeAndItsStandardError) {
+  const auto slope = slopes_of({{0, 1, 2}}, {0, 1, 1}).front();
   ASSERT_TRUE(slope.has_value());
   EXPECT_NEAR(slope->value, 0.5, 1e-15);
   EXPECT_NEAR(slope->standard_error, std::sqrt(1.0 / 12), 1e-15);
-  const auto line = slope_of({100, 200, 300, 400}, {1, 3, 5, 7});
-  EXPECT_NEAR(line->value, 0.02, 1e-15);
-  EXPECT_NEAR(line->standard_error, 0, 1e-15);
-  EXPECT_FALSE(slope_of({1, 1, 1, 1}, {1, 2, 3, 4}).has_value()) << "nothing to see";
-  EXPECT_FALSE(slope_of({1, 2}, {1, 2}).has_value()) << "no error can be told";
+}
+
+// y = 7 + 2 a - 3 b, with another column that has nothing to do with it, and one that does not change.
+TEST(LeastSquares, TellsColumnsApart) {
+  const std::vector<double> a = {0, 1, 2, 3, 4, 5}, b = {1, 0, 1, 0, 0, 1}, other = {1, 4, 1, 5, 9, 2};
+  std::vector<double> y;
+  for (std::size_t k = 0; k < a.size(); ++k) y.push_back(7 + 2 * a[k] - 3 * b[k]);
+  const auto slopes = slopes_of({a, {4, 4, 4, 4, 4, 4}, b, other}, y);
+  ASSERT_TRUE(slopes[0] && slopes[2] && slopes[3]);
+  EXPECT_FALSE(slopes[1].has_value());
+  EXPECT_NEAR(slopes[0]->value, 2, 1e-13);
+  EXPECT_NEAR(slopes[2]->value, -3, 1e-13);
+  EXPECT_NEAR(slopes[3]->value, 0, 1e-13);
+  EXPECT_NEAR(slopes[2]->standard_error, 0, 1e-13);
+}
+
+TEST(LeastSquares, SaysNothingWhereNothingTells) {
+  EXPECT_FALSE(slopes_of({{1, 1, 1, 1}}, {1, 2, 3, 4}).front().has_value());
+  EXPECT_FALSE(slopes_of({{1, 2}}, {1, 2}).front().has_value()) << "no error can be told";
+  EXPECT_FALSE(slopes_of({{}}, {}).front().has_value());
+  for (const auto& slope : slopes_of({{1, 2, 3, 4}, {3, 5, 7, 9}}, {1, 2, 4, 4})) {
+    EXPECT_FALSE(slope.has_value()) << "both columns are one";
+  }
 }
 
 // ---- what a step does with its particles, on one thread, several, and as kernels of many threads
@@ -206,17 +224,15 @@ TEST_F(BenchParts, TellsWhatEachPartCostsBesideWhatItDoes) {
   EXPECT_LT(given.at("judged").at("step_max_h"), 1e-4);
   EXPECT_GT(given.at("stages").at("detect").at("frames"), 0);
   EXPECT_GT(given.at("work").at("resolved"), 0);
-  EXPECT_FALSE(given.at("per_resolved").is_null());
+  EXPECT_FALSE(given.at("each").at("resolved").is_null());
+  EXPECT_GT(given.at("each").at("resolved").at("standard_error"), 0);
   std::set<std::string> still;  // without which all goes where it goes with them
   for (const json& row : document.at("rows")) {
     if (row.at("without").is_null()) continue;
     const std::string part = row.at("without");
     EXPECT_EQ(row.at("refused"), "") << part;
     EXPECT_GT(row.at("seconds_per_frame").at("median"), 0) << part;
-    EXPECT_EQ(row.at("seconds_per_frame").at("median").get<double>() /
-                  given.at("seconds_per_frame").at("median").get<double>(),
-              row.at("of_given"))
-        << part;
+    EXPECT_GT(row.at("of_given"), 0) << part;
     EXPECT_LE(row.at("error").at("rms_h"), row.at("error").at("max_h")) << part;
     if (row.at("error").at("max_h") == 0) still.insert(part);
     if (part == "skin") {
@@ -236,7 +252,7 @@ TEST_F(BenchParts, TellsWhatEachPartCostsBesideWhatItDoes) {
     EXPECT_FALSE(still.contains(part)) << part;
   }
   const std::string text = on_one_line(outcome.output);
-  for (const char* words : {"as it is", "without fitted skin", "each resolved particle", "beside the reference"}) {
+  for (const char* words : {"as it is", "without fitted skin", "resolved particle", "beside the reference"}) {
     EXPECT_NE(text.find(words), std::string::npos) << "no '" << words << "' in:\n" << outcome.output;
   }
   EXPECT_NE(read("out.html").find("What each part of 1 scene costs"), std::string::npos);
