@@ -800,20 +800,18 @@ void parts_pieces(Sheet& sheet, const Field& document) {
   stages.columns = {{"scene"}, {"stage"}, {"ms a frame", true}, {"frames", true}};
   stages.filter = 1;
   Grid each;
-  each.title = "What a step does with particles, and what each costs";
+  each.title = "What a step does with particles, and what one by one costs";
   each.words =
       "In the mean of all steps: particles carried by the map of their group, likewise in a grip, one by one because a "
-      "contact may touch their group, and in no group. What one more costs is read from how the times of steps go with "
-      "these numbers, with its standard error; what else changes with them is in it.";
+      "contact may touch their group, and in no group. What one that is resolved costs is read from how the times of "
+      "steps go with their number, with its standard error; what else changes with it is in that.";
   each.columns = {{"scene"},
                   {"carried", true},
                   {"in a grip", true},
                   {"resolved", true},
                   {"in no group", true},
                   {"groups", true},
-                  {"a group [ns]", true},
-                  {"a resolved particle [ns]", true},
-                  {"one in no group [ns]", true}};
+                  {"a resolved one costs [ns]", true}};
   int64_t scenes = 0, runs = 0;
   document["rows"].each([&](const Field& row) {
     const std::string scene = row["scene"].text();
@@ -847,12 +845,10 @@ void parts_pieces(Sheet& sheet, const Field& document) {
         for (const char* number : {"carried", "held", "resolved", "loose", "groups"}) {
           cells.push_back(figure_text(work[number].number_or_null()));
         }
-        for (const char* name : {"group", "resolved", "loose"}) {
-          const Field cost = row["each"][name];
-          cells.push_back(cost.is_nothing() ? "–"
-                                            : fmt::format("{} ± {}", figure_text(cost["seconds"].number_or_null(), 1e9),
-                                                          figure_text(cost["standard_error"].number_or_null(), 1e9)));
-        }
+        const Field cost = row["per_resolved"];
+        cells.push_back(cost.is_nothing() ? "–"
+                                          : fmt::format("{} ± {}", figure_text(cost["seconds"].number_or_null(), 1e9),
+                                                        figure_text(cost["standard_error"].number_or_null(), 1e9)));
         each.rows.push_back({cells});
       }
     } else {

@@ -87,26 +87,19 @@ json work_json(const std::vector<gpu::StepWork>& work) {
           {"groups", mean(&gpu::StepWork::groups)}};
 }
 
-// What a step takes more for each of these, from how its time goes with their numbers: null for what is as many in all
-// steps. seconds: of each step, in several runs.
-json cost_of_each(const std::vector<gpu::StepWork>& work, const std::vector<std::vector<double>>& seconds) {
+// What a step takes more for each particle that is resolved, from how its time goes with their number; how many groups
+// and loose particles there are, which a cut changes, is told apart from it. seconds: of each step, in several runs.
+json cost_of_resolved(const std::vector<gpu::StepWork>& work, const std::vector<std::vector<double>>& seconds) {
   if (work.empty()) return nullptr;
   std::vector<double> medians;
   for (const std::vector<double>& of_step : seconds) medians.push_back(times_of(of_step).median);
-  const std::vector<std::pair<const char*, int64_t gpu::StepWork::*>> counted = {
-      {"group", &gpu::StepWork::groups}, {"resolved", &gpu::StepWork::resolved}, {"loose", &gpu::StepWork::loose}};
   std::vector<std::vector<double>> numbers;
-  for (const auto& [name, number] : counted) {
+  for (const auto number : {&gpu::StepWork::resolved, &gpu::StepWork::groups, &gpu::StepWork::loose}) {
     numbers.emplace_back();
     for (const gpu::StepWork& step : work) numbers.back().push_back(static_cast<double>(step.*number));
   }
-  json each = json::object();
-  const std::vector<std::optional<Slope>> slopes = slopes_of(numbers, medians);
-  for (std::size_t k = 0; k < counted.size(); ++k) {
-    json& entry = each[counted[k].first];
-    if (slopes[k]) entry = {{"seconds", slopes[k]->value}, {"standard_error", slopes[k]->standard_error}};
-  }
-  return each;
+  const std::optional<Slope> slope = slopes_of(numbers, medians).front();
+  return slope ? json{{"seconds", slope->value}, {"standard_error", slope->standard_error}} : json(nullptr);
 }
 
 json stages_json(const Looked& looked, int64_t frames) {
@@ -187,7 +180,7 @@ json run_parts(const PartsOptions& options, const Progress& progress) {
         const Looked again = look_at(backend, *given.scene, options.stop_asked);
         for (std::size_t k = 0; k < steps.size(); ++k) steps[k].push_back(again.step_seconds[k]);
       }
-      const json each = cost_of_each(given.looked.work, steps);
+      const json per_resolved = cost_of_resolved(given.looked.work, steps);
       // Judged where the blade is under way.
       backend.load({given.scene->setup()}, {given.scene->start()});
       for (int64_t frame = 0; frame < given.scene->frame_count() / 2; ++frame) {
@@ -225,7 +218,7 @@ json run_parts(const PartsOptions& options, const Progress& progress) {
           row["judged"] = {{"frames", judged.frames},
                            {"topology_holds", judged.topology_holds()},
                            {"step_max_h", judged.step ? json_number(judged.step->position.max) : json(nullptr)}};
-          row["each"] = each;
+          row["per_resolved"] = per_resolved;
         }
         report.add(std::move(row), &variant != &given || judged.topology_holds());
       }

@@ -48,16 +48,11 @@ void print_given(const json& row) {
         "{work/resolved:.0f} resolved, {work/loose:.0f} in no group\n",
         row);
   }
-  if (!row.at("each").is_null()) {
-    std::string costs;
-    for (const auto& [name, words] :
-         {std::pair{"group", "group"}, {"resolved", "resolved particle"}, {"loose", "particle in no group"}}) {
-      const json& cost = row.at("each").at(name);
-      if (cost.is_null()) continue;
-      costs += (costs.empty() ? "" : ", ") + std::string(words) +
-               io::filled(" {1e9*seconds:.3g} ± {1e9*standard_error:.2g}", cost);
-    }
-    if (!costs.empty()) say("  what each adds to a step, ns: {}\n", costs);
+  if (!row.at("per_resolved").is_null()) {
+    say_filled(
+        "  a resolved particle adds {1e9*per_resolved/seconds:.3g} ± {1e9*per_resolved/standard_error:.2g} ns to a "
+        "step\n",
+        row);
   }
   const json& judged = row.at("judged");
   say("  beside the reference: step {}, topology {}\n",

@@ -224,8 +224,8 @@ TEST_F(BenchParts, TellsWhatEachPartCostsBesideWhatItDoes) {
   EXPECT_LT(given.at("judged").at("step_max_h"), 1e-4);
   EXPECT_GT(given.at("stages").at("detect").at("frames"), 0);
   EXPECT_GT(given.at("work").at("resolved"), 0);
-  EXPECT_FALSE(given.at("each").at("resolved").is_null());
-  EXPECT_GT(given.at("each").at("resolved").at("standard_error"), 0);
+  ASSERT_FALSE(given.at("per_resolved").is_null());
+  EXPECT_GT(given.at("per_resolved").at("standard_error"), 0);
   std::set<std::string> still;  // without which all goes where it goes with them
   for (const json& row : document.at("rows")) {
     if (row.at("without").is_null()) continue;
@@ -252,7 +252,7 @@ TEST_F(BenchParts, TellsWhatEachPartCostsBesideWhatItDoes) {
     EXPECT_FALSE(still.contains(part)) << part;
   }
   const std::string text = on_one_line(outcome.output);
-  for (const char* words : {"as it is", "without fitted skin", "resolved particle", "beside the reference"}) {
+  for (const char* words : {"as it is", "without fitted skin", "a resolved particle adds", "beside the reference"}) {
     EXPECT_NE(text.find(words), std::string::npos) << "no '" << words << "' in:\n" << outcome.output;
   }
   EXPECT_NE(read("out.html").find("What each part of 1 scene costs"), std::string::npos);
