@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fixtures/build.h"
@@ -20,6 +21,8 @@ class PreparedScene {
   PreparedScene(const Scene& scene, const std::string& source, std::optional<int64_t> frames);
   const Setup& setup() const { return setup_; }
   const State& start() const { return start_; }
+  // Of the same body.
+  void begin_with(State start) { start_ = std::move(start); }
   const fixtures::BuildReport& report() const { return report_; }
   int64_t frame_count() const { return static_cast<int64_t>(last_of_.size()); }
 

@@ -32,9 +32,9 @@ void drop_blade(Scene& scene, int64_t frames, std::optional<double> strokes_end)
 
 std::vector<ScenePart> parts_of(const Scene& scene, int64_t frames, std::optional<double> strokes_end) {
   std::vector<ScenePart> parts;
-  const auto add = [&](bool has, const char* name, const auto& drop) {
+  const auto add = [&](bool has, const char* name, const auto& drop, bool cooks = false) {
     if (!has) return;
-    parts.push_back({name, scene});
+    parts.push_back({name, scene, cooks});
     drop(parts.back().without);
   };
   const StepParameters& step = scene.step;
@@ -50,8 +50,10 @@ std::vector<ScenePart> parts_of(const Scene& scene, int64_t frames, std::optiona
   add(cuts && scene.detect.criterion == Criterion::distance && scene.detect.remove != RemovedEnds::both,
       "choice of ends", [](Scene& s) { s.detect.remove = RemovedEnds::both; });
   add(scene.split.debris > 0, "debris", [](Scene& s) { s.split.debris = 0; });
-  add(scene.merge.rule != MergeRule::none, "merging", [](Scene& s) { s.merge.rule = MergeRule::none; });
-  add(scene.expand.rule != ExpandRule::none, "expansion", [](Scene& s) { s.expand.rule = ExpandRule::none; });
+  add(
+      scene.merge.rule != MergeRule::none, "merging", [](Scene& s) { s.merge.rule = MergeRule::none; }, true);
+  add(
+      scene.expand.rule != ExpandRule::none, "expansion", [](Scene& s) { s.expand.rule = ExpandRule::none; }, true);
   add(scene.skin.wanted, "skin", [](Scene& s) { s.skin.wanted = false; });
   add(scene.skin.wanted && (scene.body.fit_skin || scene.skin.fit_cuts), "fitted skin", [](Scene& s) {
     s.body.fit_skin = false;

@@ -12,6 +12,9 @@ namespace cutproof::benchmarks {
 struct ScenePart {
   std::string name;  // as results_schema.md lists them (`cutproof bench parts`)
   Scene without;     // has everything else
+  // Clusters are cooked by it, too: so that nothing else differs, a run without it begins with those of the scene as it
+  // is.
+  bool cooks = false;
 };
 // Those that `scene` has, in the order in which a frame comes to them. Without its blade a scene has as many frames as
 // before, `frames`, and what counts from the end of the last stroke still happens then (`strokes_end` [s]; none: the

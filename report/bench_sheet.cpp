@@ -774,9 +774,12 @@ void parts_pieces(Sheet& sheet, const Field& document) {
   Chart chart = {"What the scene takes without a part, and how much else then happens",
                  "Each point is a run without one part: the farther left, the more the part costs; at zero distance "
                  "the tissue goes where it goes with it, so nobody would miss it but for what it makes.",
-                 {"time of a frame, of that of the scene as it is", "1", false},
-                 {"greatest RMS distance from the scene as it is", "h", false},
+                 {"of the time as it is", "1", false},
+                 {"RMS distance", "h", false},
                  {}};
+  // What falls away without a floor would leave all else on one line.
+  constexpr double kFarthest = 10;  // [h]
+  int64_t beyond = 0;
   Grid grid;
   grid.title = "Every run";
   grid.words =
@@ -852,7 +855,11 @@ void parts_pieces(Sheet& sheet, const Field& document) {
         each.rows.push_back({cells});
       }
     } else {
-      curve_named(chart, part, Look::dots).dots.push_back({of_given, rms, fmt::format("{} without {}", scene, part)});
+      if (rms && *rms > kFarthest) {
+        ++beyond;
+      } else {
+        curve_named(chart, part, Look::dots).dots.push_back({of_given, rms, fmt::format("{} without {}", scene, part)});
+      }
     }
     grid.rows.push_back({{scene, part, ms_text(row["seconds_per_frame"]), ms_text(row["seconds_per_frame"], "min"),
                           ms_text(row["seconds_per_frame"], "max"), figure_text(of_given), figure_text(rms),
@@ -860,6 +867,7 @@ void parts_pieces(Sheet& sheet, const Field& document) {
                           work.is_nothing() ? "–" : figure_text(work["resolved"].number_or_null()), else_},
                          mark});
   });
+  if (beyond > 0) chart.words += fmt::format(" Not drawn, because beyond {} h: {}.", kFarthest, whole(beyond));
   sheet.summary = fmt::format("What each part of {} {} costs: {} runs without one.", whole(scenes),
                               scenes == 1 ? "scene" : "scenes", whole(runs));
   sheet.pieces.emplace_back(std::move(chart));

@@ -169,6 +169,7 @@ json run_parts(const PartsOptions& options, const Progress& progress) {
           variants[v].refused = error.what();
           continue;
         }
+        if (v > 0 && asked.parts[v - 1].cooks) variants[v].scene->begin_with(variants.front().scene->start());
         variants[v].looked = look_at(backend, *variants[v].scene, options.stop_asked);
       }
       const auto frames = static_cast<double>(variants.front().scene->frame_count());

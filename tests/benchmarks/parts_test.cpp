@@ -42,6 +42,11 @@ constexpr const char* kScene = R"({"version": 5, "name": "everything",
 
 Scene everything() { return cutproof::io::parse_scene(kScene, "test"); }
 
+class BenchParts : public Program {
+ protected:
+  void write_scene() { write("everything.json", kScene); }
+};
+
 std::vector<std::string> names_of(const std::vector<ScenePart>& parts) {
   std::vector<std::string> names;
   for (const ScenePart& part : parts) names.push_back(part.name);
@@ -88,6 +93,35 @@ TEST(SceneParts, LeaveOutOneThingAndKeepTheRest) {
   expected = scene;
   expected.detect.remove = cutproof::RemovedEnds::both;
   EXPECT_EQ(without(parts, "choice of ends"), expected);
+}
+
+TEST(SceneParts, SaysWhatClustersAreCookedBy) {
+  std::set<std::string> cooks;
+  for (const ScenePart& part : parts_of(everything(), 20, 0.2)) {
+    const PreparedScene given(everything(), "test", 1), prepared(part.without, "test", 1);
+    if (part.cooks) cooks.insert(part.name);
+    const auto &a = given.start().clusters, &b = prepared.start().clusters;
+    if (a.offsets != b.offsets || a.members != b.members) {
+      EXPECT_TRUE(part.cooks) << part.name;
+    }
+  }
+  EXPECT_EQ(cooks, (std::set<std::string>{"merging", "expansion"}));
+}
+
+// In tissue that nothing cuts no stage of clusters runs, so a run without them is the same.
+TEST_F(BenchParts, LeavesStagesOutOfTheFramesAndClustersAsTheyWereCooked) {
+  write("uncut.json", R"({"version": 5, "name": "uncut", "frame": {"count": 4},
+    "body": {"shape": {"kind": "box", "size": [0.11, 0.04, 0.04]}, "spacing": 0.01}, "clusters": {"side": 2},
+    "step": {"gravity": [0, 0, -9.81]}, "grips": [{"low": [0, 0, 0], "high": [0.15, 1, 1]}]})");
+  ASSERT_EQ(cutproof("bench parts uncut.json --repeats 1 --json out.json").status, 0);
+  std::set<std::string> still;
+  const json document = json::parse(read("out.json"));
+  for (const json& row : document.at("rows")) {
+    if (!row.at("without").is_null() && row.at("error").at("max_h") == 0) still.insert(row.at("without"));
+  }
+  EXPECT_TRUE(still.contains("merging"));
+  EXPECT_TRUE(still.contains("expansion"));
+  EXPECT_FALSE(still.contains("grips"));
 }
 
 TEST(SceneParts, WithoutABladeAllElseHappensWhenItDid) {
@@ -200,11 +234,6 @@ INSTANTIATE_TEST_SUITE_P(ThreadsOfABlock, StepWorkOf, testing::Values(1, 32));
 
 // ---- the program
 
-class BenchParts : public Program {
- protected:
-  void write_scene() { write("everything.json", kScene); }
-};
-
 TEST_F(BenchParts, TellsWhatEachPartCostsBesideWhatItDoes) {
   write_scene();
   const Outcome outcome =
@@ -262,7 +291,8 @@ TEST_F(BenchParts, OfTheReferenceSaysNothingAboutGroups) {
   write_scene();
   const Outcome outcome = cutproof("bench parts everything.json --frames 2 --repeats 1 --json out.json");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
-  for (const json& row : json::parse(read("out.json")).at("rows")) EXPECT_TRUE(row.at("work").is_null());
+  const json document = json::parse(read("out.json"));
+  for (const json& row : document.at("rows")) EXPECT_TRUE(row.at("work").is_null());
   EXPECT_EQ(outcome.output.find("resolved"), std::string::npos) << outcome.output;
 }
 
