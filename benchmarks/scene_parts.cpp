@@ -17,9 +17,8 @@ void drop_friction(Scene& scene) {
   for (WallSpec& wall : scene.walls) wall.friction = 0;
 }
 
-void drop_blade(Scene& scene, int64_t frames, std::optional<double> strokes_end) {
+void drop_blade(Scene& scene, std::optional<double> strokes_end) {
   scene.blade.reset();
-  scene.frames = frames;
   if (!strokes_end) std::erase_if(scene.grips, [](const GripSpec& grip) { return grip.after_strokes; });
   for (GripSpec& grip : scene.grips) {
     if (!std::exchange(grip.after_strokes, false)) continue;
@@ -35,6 +34,7 @@ std::vector<ScenePart> parts_of(const Scene& scene, int64_t frames, std::optiona
   const auto add = [&](bool has, const char* name, const auto& drop, bool cooks = false) {
     if (!has) return;
     parts.push_back({name, scene, cooks});
+    parts.back().without.frames = frames;
     drop(parts.back().without);
   };
   const StepParameters& step = scene.step;
@@ -42,7 +42,7 @@ std::vector<ScenePart> parts_of(const Scene& scene, int64_t frames, std::optiona
   add(step.acceleration != Acceleration::none, "acceleration",
       [](Scene& s) { s.step.acceleration = Acceleration::none; });
   add(step.retardation > 0, "retardation", [](Scene& s) { s.step.retardation = 0; });
-  add(scene.blade.has_value(), "blade", [&](Scene& s) { drop_blade(s, frames, strokes_end); });
+  add(scene.blade.has_value(), "blade", [&](Scene& s) { drop_blade(s, strokes_end); });
   add(!scene.walls.empty(), "walls", [](Scene& s) { s.walls.clear(); });
   add(has_friction(scene), "friction", drop_friction);
   add(!scene.grips.empty(), "grips", [](Scene& s) { s.grips.clear(); });

@@ -16,9 +16,9 @@ struct ScenePart {
   // is.
   bool cooks = false;
 };
-// Those that `scene` has, in the order in which a frame comes to them. Without its blade a scene has as many frames as
-// before, `frames`, and what counts from the end of the last stroke still happens then (`strokes_end` [s]; none: the
-// frames end before).
+// Those that `scene` has, in the order in which a frame comes to them. What is left of it has as many frames as before,
+// `frames`, though it may end with what is left out; and without its blade what counts from the end of the last stroke
+// still happens then (`strokes_end` [s]; none: the frames end before).
 std::vector<ScenePart> parts_of(const Scene& scene, int64_t frames, std::optional<double> strokes_end);
 
 }  // namespace cutproof::benchmarks

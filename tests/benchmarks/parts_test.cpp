@@ -79,18 +79,20 @@ TEST(SceneParts, AreThoseThatASceneHas) {
 TEST(SceneParts, LeaveOutOneThingAndKeepTheRest) {
   const Scene scene = everything();
   const std::vector<ScenePart> parts = parts_of(scene, 20, 0.2);
-  for (const ScenePart& part : parts) EXPECT_NE(part.without, scene) << part.name;
-  Scene expected = scene;
+  Scene as_long = scene;
+  as_long.frames = 20;
+  for (const ScenePart& part : parts) EXPECT_NE(part.without, as_long) << part.name;
+  Scene expected = as_long;
   expected.split.debris = 0;
   EXPECT_EQ(without(parts, "debris"), expected);
-  expected = scene;
+  expected = as_long;
   expected.skin.wanted = false;
   EXPECT_EQ(without(parts, "skin"), expected);
-  expected = scene;
+  expected = as_long;
   expected.blade->friction = 0;
   expected.walls.front().friction = 0;
   EXPECT_EQ(without(parts, "friction"), expected);
-  expected = scene;
+  expected = as_long;
   expected.detect.remove = cutproof::RemovedEnds::both;
   EXPECT_EQ(without(parts, "choice of ends"), expected);
 }
@@ -122,6 +124,19 @@ TEST_F(BenchParts, LeavesStagesOutOfTheFramesAndClustersAsTheyWereCooked) {
   EXPECT_TRUE(still.contains("merging"));
   EXPECT_TRUE(still.contains("expansion"));
   EXPECT_FALSE(still.contains("grips"));
+}
+
+// A scene may end with its blade, or with a grip.
+TEST(SceneParts, LeaveAsManyFrames) {
+  Scene scene = everything();
+  scene.blade.reset();
+  scene.grips.resize(1);
+  scene.grips.front().end = 0.16;
+  const int64_t frames = PreparedScene(scene, "test", {}).frame_count();
+  EXPECT_EQ(frames, 15) << "while the grip holds, and until all has settled";
+  for (const ScenePart& part : parts_of(scene, frames, {})) {
+    EXPECT_EQ(PreparedScene(part.without, "test", {}).frame_count(), frames) << part.name;
+  }
 }
 
 TEST(SceneParts, WithoutABladeAllElseHappensWhenItDid) {
