@@ -118,37 +118,119 @@ json stages_json(const Looked& looked, int64_t frames) {
   return stages;
 }
 
+// A scene, and what there is to leave out of it.
+struct Asked {
+  std::string file;
+  Scene scene;
+  std::vector<ScenePart> parts;
+};
+Asked asked_of(const std::string& file, std::optional<int64_t> frames) {
+  Asked asked = {file, io::read_scene(file, {}), {}};
+  const PreparedScene given(asked.scene, file, frames);
+  const std::vector<int64_t> ends = given.stroke_end();
+  std::optional<double> strokes_end;
+  if (!ends.empty() && ends.back() >= 0) {
+    strokes_end = static_cast<double>(ends.back() + 1) * asked.scene.frame_length;
+  }
+  asked.parts = parts_of(asked.scene, given.frame_count(), strokes_end);
+  return asked;
+}
+
+// A run of it as it is, or without one part.
+struct Variant {
+  std::string part;  // empty: nothing is left out
+  std::optional<PreparedScene> scene;
+  std::string refused;  // why there is none
+  Looked looked;
+  std::vector<double> seconds;  // a frame, by turn
+};
+// The first is the scene as it is.
+std::vector<Variant> look_at_all(Backend& backend, const Asked& asked, const PartsOptions& options) {
+  std::vector<Variant> variants(1 + asked.parts.size());
+  variants.front().scene.emplace(asked.scene, asked.file, options.frames);
+  for (std::size_t p = 0; p < asked.parts.size(); ++p) {
+    const ScenePart& part = asked.parts[p];
+    Variant& variant = variants[p + 1];
+    variant.part = part.name;
+    try {
+      variant.scene.emplace(part.without, asked.file, options.frames);
+    } catch (const InputError& error) {
+      variant.refused = error.what();
+      continue;
+    }
+    if (part.cooks) variant.scene->begin_with(variants.front().scene->start());
+  }
+  for (Variant& variant : variants) {
+    if (variant.scene) variant.looked = look_at(backend, *variant.scene, options.stop_asked);
+  }
+  return variants;
+}
+
+// In turns, so that what the machine does meanwhile falls on all of them. Gives the times of the steps of the scene as
+// it is, which hang on single frames, once for each turn.
+std::vector<std::vector<double>> time_in_turns(Backend& backend, std::vector<Variant>& variants,
+                                               const PartsOptions& options) {
+  const Variant& given = variants.front();
+  const auto frames = static_cast<double>(given.scene->frame_count());
+  std::vector<std::vector<double>> steps(given.looked.step_seconds.size());
+  for (int64_t repeat = 0; repeat < options.repeats; ++repeat) {
+    for (Variant& variant : variants) {
+      throw_if_asked(options.stop_asked);
+      if (variant.scene) variant.seconds.push_back(variant.scene->run(backend, {}) / frames);
+    }
+    const Looked again = look_at(backend, *given.scene, options.stop_asked);
+    for (std::size_t k = 0; k < steps.size(); ++k) steps[k].push_back(again.step_seconds[k]);
+  }
+  return steps;
+}
+
+// From the middle of its frames on, where a blade is under way.
+FrameErrors judge_midway(Backend& backend, const PreparedScene& scene) {
+  backend.load({scene.setup()}, {scene.start()});
+  for (int64_t frame = 0; frame < scene.frame_count() / 2; ++frame) {
+    scene.for_parts_of(frame, [&] { backend.run(kWholeFrame); });
+  }
+  return judge_frames(backend, scene.setup());
+}
+
+json row_of(const Asked& asked, const Contender& contender, const Variant& given, const Variant& variant) {
+  const Setup& setup = given.scene->setup();
+  json row = {{"scene", asked.scene.name},
+              {"particles", setup.body.particle_count()},
+              {"clusters", given.scene->start().clusters.count()},
+              {"backend", contender.described->name},
+              {"precision", name_of(contender.described->precision)},
+              {"substeps", asked.scene.step.substeps},
+              {"iterations", asked.scene.step.iterations},
+              {"rotation", contender.rotation},
+              {"split", contender.split},
+              {"frames", given.scene->frame_count()},
+              {"without", variant.part.empty() ? json(nullptr) : json(variant.part)},
+              {"refused", variant.refused},
+              {"seconds_per_frame", to_json(times_of(variant.seconds))},
+              {"of_given", nullptr},
+              {"error", nullptr},
+              {"work", work_json(variant.looked.work)}};
+  if (!variant.scene) return row;
+  std::vector<double> of_given;  // turn by turn
+  for (std::size_t k = 0; k < variant.seconds.size(); ++k) of_given.push_back(variant.seconds[k] / given.seconds[k]);
+  row["of_given"] = times_of(of_given).median;
+  row["error"] = error_of_run(setup, given.looked, variant.looked);
+  row["stages"] = stages_json(variant.looked, given.scene->frame_count());
+  return row;
+}
+
 }  // namespace
 
 json run_parts(const PartsOptions& options, const Progress& progress) {
   require_timed_backend(options.backend);
   const std::vector<Contender> contenders = make_contenders(options.backend, options.split, options.rotation);
-  struct Variant {
-    std::string part;  // that is left out; empty: none
-    std::optional<PreparedScene> scene;
-    std::string refused;
-    Looked looked;
-    std::vector<double> seconds;
-  };
   // Whatever is wrong with a scene is found out before anything is measured.
-  struct Asked {
-    std::string file;
-    Scene scene;
-    std::vector<ScenePart> parts;
-  };
   std::vector<Asked> scenes;
   std::size_t rows = 0;
   for (const std::string& file : options.scenes) {
-    Asked asked = {file, io::read_scene(file, {}), {}};
-    const PreparedScene given(asked.scene, file, options.frames);
-    const std::vector<int64_t> ends = given.stroke_end();
-    std::optional<double> strokes_end;
-    if (!ends.empty() && ends.back() >= 0) {
-      strokes_end = static_cast<double>(ends.back() + 1) * asked.scene.frame_length;
-    }
-    asked.parts = parts_of(asked.scene, given.frame_count(), strokes_end);
-    rows += (asked.parts.size() + 1) * contenders.size();
-    scenes.push_back(std::move(asked));
+    scenes.push_back(asked_of(file, options.frames));
+    rows += (scenes.back().parts.size() + 1) * contenders.size();
   }
   Report report("parts", options.backend,
                 {{"frames", options.frames ? json(*options.frames) : json(nullptr)},
@@ -159,73 +241,17 @@ json run_parts(const PartsOptions& options, const Progress& progress) {
   for (const Asked& asked : scenes) {
     for (const Contender& contender : contenders) {
       Backend& backend = *contender.instance;
-      std::vector<Variant> variants(1 + asked.parts.size());
-      for (std::size_t v = 0; v < variants.size(); ++v) {
-        if (v > 0) variants[v].part = asked.parts[v - 1].name;
-        try {
-          variants[v].scene.emplace(v > 0 ? asked.parts[v - 1].without : asked.scene, asked.file, options.frames);
-        } catch (const InputError& error) {  // such as grips that nothing else holds
-          if (v == 0) throw;
-          variants[v].refused = error.what();
-          continue;
-        }
-        if (v > 0 && asked.parts[v - 1].cooks) variants[v].scene->begin_with(variants.front().scene->start());
-        variants[v].looked = look_at(backend, *variants[v].scene, options.stop_asked);
-      }
-      const auto frames = static_cast<double>(variants.front().scene->frame_count());
-      // In turns, so that what the machine does meanwhile falls on all of them.
-      for (int64_t repeat = 0; repeat < options.repeats; ++repeat) {
-        for (Variant& variant : variants) {
-          throw_if_asked(options.stop_asked);
-          if (variant.scene) variant.seconds.push_back(variant.scene->run(backend, {}) / frames);
-        }
-      }
-      // The given scene's steps once more each time: what is read from them hangs on single frames.
-      Variant& given = variants.front();
-      std::vector<std::vector<double>> steps(given.looked.step_seconds.size());
-      for (int64_t repeat = 0; repeat < options.repeats; ++repeat) {
-        const Looked again = look_at(backend, *given.scene, options.stop_asked);
-        for (std::size_t k = 0; k < steps.size(); ++k) steps[k].push_back(again.step_seconds[k]);
-      }
-      const json per_resolved = cost_of_resolved(given.looked.work, steps);
-      // Judged where the blade is under way.
-      backend.load({given.scene->setup()}, {given.scene->start()});
-      for (int64_t frame = 0; frame < given.scene->frame_count() / 2; ++frame) {
-        given.scene->for_parts_of(frame, [&] { backend.run(kWholeFrame); });
-      }
-      const FrameErrors judged = judge_frames(backend, given.scene->setup());
+      std::vector<Variant> variants = look_at_all(backend, asked, options);
+      const Variant& given = variants.front();
+      const std::vector<std::vector<double>> steps = time_in_turns(backend, variants, options);
+      const FrameErrors judged = judge_midway(backend, *given.scene);
       for (const Variant& variant : variants) {
-        const Setup& setup = given.scene->setup();
-        json row = {{"scene", asked.scene.name},
-                    {"particles", setup.body.particle_count()},
-                    {"clusters", given.scene->start().clusters.count()},
-                    {"backend", contender.described->name},
-                    {"precision", name_of(contender.described->precision)},
-                    {"substeps", asked.scene.step.substeps},
-                    {"iterations", asked.scene.step.iterations},
-                    {"rotation", contender.rotation},
-                    {"split", contender.split},
-                    {"frames", given.scene->frame_count()},
-                    {"without", variant.part.empty() ? json(nullptr) : json(variant.part)},
-                    {"refused", variant.refused},
-                    {"seconds_per_frame", to_json(times_of(variant.seconds))},
-                    {"of_given", nullptr},
-                    {"error", nullptr},
-                    {"work", work_json(variant.looked.work)}};
-        if (variant.scene) {
-          std::vector<double> of_given;  // turn by turn
-          for (std::size_t k = 0; k < variant.seconds.size(); ++k) {
-            of_given.push_back(variant.seconds[k] / given.seconds[k]);
-          }
-          row["of_given"] = times_of(of_given).median;
-          row["error"] = error_of_run(setup, given.looked, variant.looked);
-          row["stages"] = stages_json(variant.looked, given.scene->frame_count());
-        }
+        json row = row_of(asked, contender, given, variant);
         if (&variant == &given) {
           row["judged"] = {{"frames", judged.frames},
                            {"topology_holds", judged.topology_holds()},
                            {"step_max_h", judged.step ? json_number(judged.step->position.max) : json(nullptr)}};
-          row["per_resolved"] = per_resolved;
+          row["per_resolved"] = cost_of_resolved(given.looked.work, steps);
         }
         report.add(std::move(row), &variant != &given || judged.topology_holds());
       }
