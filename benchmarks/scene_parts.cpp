@@ -38,7 +38,9 @@ std::vector<ScenePart> parts_of(const Scene& scene, int64_t frames, std::optiona
     drop(parts.back().without);
   };
   const StepParameters& step = scene.step;
-  const bool cuts = scene.blade && scene.detect.criterion != Criterion::none;
+  // A geometric blade does nothing but cut, and one that does not cut would push instead: there detection is the blade.
+  const Criterion criterion = scene.detect.criterion;
+  const bool cuts = scene.blade && criterion != Criterion::none && criterion != Criterion::geometric;
   add(step.acceleration != Acceleration::none, "acceleration",
       [](Scene& s) { s.step.acceleration = Acceleration::none; });
   add(step.retardation > 0, "retardation", [](Scene& s) { s.step.retardation = 0; });
@@ -46,9 +48,10 @@ std::vector<ScenePart> parts_of(const Scene& scene, int64_t frames, std::optiona
   add(!scene.walls.empty(), "walls", [](Scene& s) { s.walls.clear(); });
   add(has_friction(scene), "friction", drop_friction);
   add(!scene.grips.empty(), "grips", [](Scene& s) { s.grips.clear(); });
-  add(cuts || scene.detect.without_blade, "detection", [](Scene& s) { s.detect.criterion = Criterion::none; });
-  add(cuts && scene.detect.criterion == Criterion::distance && scene.detect.remove != RemovedEnds::both,
-      "choice of ends", [](Scene& s) { s.detect.remove = RemovedEnds::both; });
+  add(cuts || (!scene.blade && scene.detect.without_blade), "detection",
+      [](Scene& s) { s.detect.criterion = Criterion::none; });
+  add(cuts && criterion == Criterion::distance && scene.detect.remove != RemovedEnds::both, "choice of ends",
+      [](Scene& s) { s.detect.remove = RemovedEnds::both; });
   add(scene.split.debris > 0, "debris", [](Scene& s) { s.split.debris = 0; });
   add(
       scene.merge.rule != MergeRule::none, "merging", [](Scene& s) { s.merge.rule = MergeRule::none; }, true);

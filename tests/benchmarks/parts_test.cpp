@@ -19,7 +19,6 @@
 namespace {
 
 using cutproof::Scene;
-using cutproof::Span;
 using cutproof::Stage;
 using cutproof::benchmarks::parts_of;
 using cutproof::benchmarks::PreparedScene;
@@ -64,6 +63,9 @@ TEST(SceneParts, AreThoseThatASceneHas) {
   EXPECT_EQ(names_of(parts_of(scene, 20, 0.2)),
             (std::vector<std::string>{"acceleration", "retardation", "blade", "walls", "friction", "grips", "detection",
                                       "choice of ends", "debris", "merging", "expansion", "skin", "fitted skin"}));
+  Scene geometric = scene;
+  geometric.detect.criterion = cutproof::Criterion::geometric;
+  for (const ScenePart& part : parts_of(geometric, 20, 0.2)) EXPECT_NE(part.name, "detection") << "it would push";
   Scene bare;
   bare.body = scene.body;
   bare.body.fit_skin = false;
@@ -311,7 +313,7 @@ TEST_F(BenchParts, OfTheReferenceSaysNothingAboutGroups) {
   EXPECT_EQ(outcome.output.find("resolved"), std::string::npos) << outcome.output;
 }
 
-TEST_F(BenchParts, SaysWhichPartNothingIsLeftWithout) {
+TEST_F(BenchParts, RefusesBadUsage) {
   write("still.json", R"({"version": 5, "name": "still",
     "body": {"shape": {"kind": "box", "size": [0.04, 0.04, 0.04]}, "spacing": 0.01}, "clusters": {"side": 2}})");
   expect_refused("bench parts still.json", {"still.json", "frame.count"});

@@ -7,11 +7,11 @@
 #include <memory>
 #include <vector>
 
+#include "benchmarks/prepared_scene.h"
 #include "model/io/scene_io.h"
 #include "oracles/comparison/reference_solution.h"
 #include "oracles/relations/relations.h"
 #include "reference_cpu/reference.h"
-#include "benchmarks/prepared_scene.h"
 #include "tuning/reference_solution.h"
 
 namespace cutproof::tuning {

@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
+#include "benchmarks/prepared_scene.h"
 #include "model/io/scene_io.h"
 #include "reference_cpu/reference.h"
 #include "tests/cli/program.h"
-#include "benchmarks/prepared_scene.h"
 
 namespace {
 
