@@ -6,7 +6,7 @@
 namespace cutproof::tuning {
 
 void Comparison::add(const State& state) {
-  add_frame(trajectory_, setup_, state);
+  oracles::add_pose(trajectory_.frames, setup_, state);
   compare(trajectory_.frames.size() - 1);
 }
 

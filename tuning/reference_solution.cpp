@@ -130,7 +130,7 @@ ReferenceSolution::Ran ReferenceSolution::run(RefinementLevel level) const {
   trajectory.stroke_end = prepared.stroke_end();
   prepared.run(backend, [&](double) {
     throw_if_asked(stop_asked_);
-    add_frame(trajectory, prepared.setup(), backend.snapshot().front());
+    oracles::add_pose(trajectory.frames, prepared.setup(), backend.snapshot().front());
     return true;
   });
   level.solved = solved.count();

@@ -7,11 +7,6 @@
 
 namespace cutproof::tuning {
 
-void add_frame(Trajectory& trajectory, const Setup& setup, const State& state) {
-  std::vector<oracles::Pose>& frames = trajectory.frames;
-  frames.push_back(oracles::pose_of(setup, state, frames.empty() ? nullptr : &frames.back()));
-}
-
 std::string difference_in_parts(const Trajectory& expected, const Trajectory& actual) {
   const auto differs = [](const oracles::Pose& e, const oracles::Pose& a, const std::string& when) {
     return e.components == a.components ? std::string()

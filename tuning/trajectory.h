@@ -4,8 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "model/setup.h"
-#include "model/state.h"
 #include "oracles/comparison/trajectory.h"
 
 namespace cutproof::tuning {
@@ -15,9 +13,6 @@ struct Trajectory {
   std::vector<oracles::Pose> frames;  // at the end of each
   std::vector<int64_t> stroke_end;    // [strokes] the frame at whose end a stroke is complete; -1: the run ends before
 };
-
-// Appends where `state`, at the end of the next frame, has the body.
-void add_frame(Trajectory& trajectory, const Setup& setup, const State& state);
 
 // In which way the tissue is in a different number of parts at the end of a stroke, which each of the two may reach in
 // a frame of its own, or at the end; empty: it is not.

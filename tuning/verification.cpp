@@ -33,7 +33,7 @@ JudgedRun judged_run(const Measuring& measuring, const Configuration& configurat
   for (int64_t frame = 0; frame < prepared.frame_count(); ++frame) {
     throw_if_asked(measuring.asked.stop_asked);
     prepared.for_parts_of(frame, [&] { runner.run_frame([&](const harness::Moment& moment) { judge.see(moment); }); });
-    add_frame(run.trajectory, prepared.setup(), *runner.states().front());
+    oracles::add_pose(run.trajectory.frames, prepared.setup(), *runner.states().front());
   }
   run.trajectory.stroke_end = prepared.stroke_end();
   for (Verdict& verdict : runner.take_broken_contracts()) judge.add(std::move(verdict));

@@ -48,8 +48,7 @@ Looked look_at(Backend& backend, const PreparedScene& scene, const StopAsked& st
       }
     });
     for (std::size_t s = 0; s < ran.size(); ++s) looked.ran[s] += ran[s];
-    looked.poses.push_back(oracles::pose_of(scene.setup(), backend.snapshot().front(),
-                                            looked.poses.empty() ? nullptr : &looked.poses.back()));
+    oracles::add_pose(looked.poses, scene.setup(), backend.snapshot().front());
   }
   return looked;
 }

@@ -93,6 +93,8 @@ std::vector<State> extract_states(const StagingBuffers& staging, const std::vect
 struct StepWork {
   int64_t carried = 0, held = 0, resolved = 0, loose = 0;
   int64_t groups = 0;  // of the first three
+
+  friend bool operator==(const StepWork&, const StepWork&) = default;
 };
 // extract.cpp. From what the step leaves: of each group its head, and of each whether it is resolved (null: nothing can
 // touch any); the list of loose places.

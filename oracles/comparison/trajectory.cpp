@@ -20,6 +20,10 @@ Pose pose_of(const Setup& setup, const State& state, const Pose* earlier) {
   return pose;
 }
 
+void add_pose(std::vector<Pose>& poses, const Setup& setup, const State& state) {
+  poses.push_back(pose_of(setup, state, poses.empty() ? nullptr : &poses.back()));
+}
+
 Apart poses_apart(const Setup& setup, const Pose& expected, const Pose& actual) {
   Apart apart;
   std::vector<uint8_t> both(expected.alive.size());

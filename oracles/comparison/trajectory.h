@@ -23,6 +23,8 @@ struct Pose {
 // Of a well-formed state. `earlier` is a pose of the same body, whose components are taken over where nothing was
 // removed since; null: they are counted.
 Pose pose_of(const Setup& setup, const State& state, const Pose* earlier);
+// Appends the pose of a state that follows those before.
+void add_pose(std::vector<Pose>& poses, const Setup& setup, const State& state);
 
 // Particles that only one of the two has are counted, and nothing else is asked of them: in a cut that is decided by
 // the tissue's motion, layers next to it may or may not go.

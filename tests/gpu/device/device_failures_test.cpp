@@ -278,19 +278,30 @@ bool named_by_kernel(const std::string& call) {
   return launches().count(call) != 0 || asked_around_a_launch().count(call) != 0;
 }
 
+struct Done {
+  State state;
+  StepWork work;  // of the step that was run alone
+  friend bool operator==(const Done&, const Done&) = default;
+};
+
 // All that a backend does: enlarges its arrays by the way, and runs whole frames and stages one by one.
-State load_and_run(Backend& backend) {
+Done load_and_run(Backend& backend) {
   const fixtures::Built& built = small_body();
+  Done done;
   backend.load({built.setup}, {built.state});
   for (int64_t frame = 0; frame < built.setup.frame_count(); ++frame) {
     if (frame != 1) {
       backend.run(kFrame);
-    } else {
-      for (const Stage stage : kStages) backend.run({stage, stage});
+      continue;
+    }
+    for (const Stage stage : kStages) {
+      backend.run({stage, stage});
+      if (stage == Stage::step) done.work = dynamic_cast<const KernelBackend&>(backend).step_work();
     }
   }
   static_cast<void>(backend.report());
-  return backend.snapshot().front();
+  done.state = backend.snapshot().front();
+  return done;
 }
 
 std::string setting(const char* name, const std::string& otherwise) {
@@ -374,11 +385,11 @@ class DeviceFailures : public testing::Test {
       KernelOptions with = options(path);
       if (on_demand_) with.on_demand = *on_demand_;
       const std::unique_ptr<Backend> backend = make_gpu_backend(with);
-      State state = load_and_run(*backend);
+      Done done = load_and_run(*backend);
       calls.stop();
-      return state;
+      return done;
     };
-    const State right = work();  // also fills what CUB and the runtime keep for the process
+    const Done right = work();  // also fills what CUB and the runtime keep for the process
     calls.start(0, failing);
     ASSERT_TRUE(work() == right) << "two runs differ";
     const std::vector<const char*> trace = made_ = calls.trace;
@@ -447,7 +458,7 @@ TEST_F(DeviceFailures, ACallThatFailsWithMemoryOnDemandLeavesNothing) {
 
 TEST_F(DeviceFailures, ABackendWhoseCallFailedCanBeLoadedAnew) {
   for (const Path path : {Path::graph, Path::eager, Path::one_block, Path::one_grid}) {
-    const State right = load_and_run(*make_gpu_backend(options(path)));
+    const Done right = load_and_run(*make_gpu_backend(options(path)));
     std::unique_ptr<Backend> backend = make_gpu_backend(options(path));
     calls.start(0, Failing::once);
     static_cast<void>(load_and_run(*backend));
@@ -462,6 +473,15 @@ TEST_F(DeviceFailures, ABackendWhoseCallFailedCanBeLoadedAnew) {
     }
     backend.reset();
     expect_nothing_outstanding();
+  }
+}
+
+// No failure: the work of a step, counted from what is read back, is that of the same kernels on the CPU.
+TEST_F(DeviceFailures, WhatAStepDoesWithItsParticlesIsAsOnTheHost) {
+  const StepWork host = load_and_run(*make_host_backend()).work;
+  EXPECT_GT(host.resolved + host.loose, 0);
+  for (const Path path : {Path::graph, Path::eager, Path::one_block, Path::one_grid}) {
+    EXPECT_EQ(load_and_run(*make_gpu_backend(options(path))).work, host) << static_cast<int>(path);
   }
 }
 

@@ -65,6 +65,17 @@ TEST(PoseOf, CountsPartsAnewOnlyWhereSomethingWasRemoved) {
   State cut = wire.state;
   cut.alive[1] = 0;
   EXPECT_EQ(pose_of(wire.setup, cut, &earlier).components, 2);
+
+  std::vector<Pose> poses;
+  add_pose(poses, wire.setup, wire.state);
+  EXPECT_EQ(poses.back().components, 1) << "there is none before";
+  poses.back() = earlier;
+  add_pose(poses, wire.setup, wire.state);
+  add_pose(poses, wire.setup, cut);
+  ASSERT_EQ(poses.size(), 3u);
+  EXPECT_EQ(poses[1].components, 17);
+  EXPECT_EQ(poses[2].components, 2);
+  EXPECT_EQ(poses[2].alive, cut.alive);
 }
 
 }  // namespace
