@@ -15,6 +15,7 @@
 #include <random>
 #include <set>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -495,21 +496,27 @@ Taken taken_by(const Scene& scene) {
   const auto bytes = [&](OnDemand on_demand) {
     KernelOptions with;
     with.on_demand = on_demand;
-    const std::unique_ptr<Backend> backend = make_gpu_backend(with);
+    const int64_t without = device_bytes_in_use();
+    std::unique_ptr<Backend> backend = make_gpu_backend(with);
     const int64_t before = device_bytes_in_use();
     backend->load({built.setup}, {built.state});
     for (int64_t frame = 0; frame < built.setup.frame_count(); ++frame) backend->run(kFrame);
     static_cast<void>(backend->report());
     const int64_t taken = device_bytes_in_use() - before;
-    return std::pair(taken, backend->snapshot().front());
+    State state = backend->snapshot().front();
+    backend.reset();
+    return std::tuple(taken, device_bytes_in_use() - without, std::move(state));
   };
   const OnDemand as_ever = KernelOptions{}.on_demand;
   StagingBuffers contents = make_contents({built.setup}, {built.state}, KernelOptions{}.rotation_method, {});
   const auto room = static_cast<int64_t>(empty_bytes(contents, as_ever.array));
   static_cast<void>(bytes(as_ever));  // what CUDA takes once for all, with the first of a kind
-  const auto [on_demand, state] = bytes(as_ever);
-  const auto [at_once, same] = bytes({as_ever.array, std::size_t{1} << 60});
+  const auto [on_demand, left, state] = bytes(as_ever);
+  const auto [at_once, also_left, same] = bytes({as_ever.array, std::size_t{1} << 60});
   EXPECT_TRUE(state == same);
+  // The device counts everybody's memory.
+  EXPECT_EQ(left, 0) << "bytes lost, or another program's: then nothing here tells anything, run this alone";
+  EXPECT_EQ(also_left, 0) << "bytes lost, or another program's: then nothing here tells anything, run this alone";
   const int64_t particles = built.setup.body.particle_count();
   std::cout << fmt::format("{}: {} bytes a particle, {} with all memory at once, of which {} are room", scene.name,
                            on_demand / particles, at_once / particles, room / particles)
