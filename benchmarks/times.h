@@ -1,6 +1,7 @@
 // Times that were measured several times over.
 #pragma once
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <vector>
@@ -25,6 +26,16 @@ std::vector<double> seconds_of(int repeats, const Work& work) {
     seconds.push_back(seconds_since(begin));
   }
   return seconds;
+}
+// What `measure` gives for each of `count`, all of them in turns, so many times over: what the machine does meanwhile,
+// such as being half as fast for a while, falls on all. [count][repeats]
+template <class Measure>
+std::vector<std::vector<double>> in_turns(int repeats, std::size_t count, const Measure& measure) {
+  std::vector<std::vector<double>> measured(count);
+  for (int turn = 0; turn < repeats; ++turn) {
+    for (std::size_t k = 0; k < count; ++k) measured[k].push_back(measure(k));
+  }
+  return measured;
 }
 // null if nothing was measured.
 nlohmann::json to_json(const Times& times);

@@ -217,6 +217,7 @@ void print(const TuneOptions& options, TuneStep step, const json& document, cons
     case TuneStep::reference_known:
       return print_reference(options, document.at("reference"));
     case TuneStep::trial:
+    case TuneStep::tried:
       return;
     case TuneStep::searched:
       print_trials(document.at("trials"));
@@ -272,7 +273,7 @@ int tune(Asked asked) {
     document["changes"] = given_changes(asked.tune.changes);
     document["again"] = asked.again;
     // After each trial, so that what has been measured is kept if a later one fails; and in the end.
-    if (step == TuneStep::trial) keep_document(asked.json, document);
+    if (step == TuneStep::trial || step == TuneStep::searched) keep_document(asked.json, document);
     if (step == TuneStep::stopped || document.at("complete")) {
       write_document(asked.json, document);
       write_document_report(asked.report, document);
@@ -282,6 +283,7 @@ int tune(Asked asked) {
     flush_output();
     if (step == TuneStep::stopped || document.at("complete")) return;
     const char* const what = step == TuneStep::begun      ? "computing the reference solution"
+                             : step == TuneStep::tried    ? "timing"
                              : step == TuneStep::searched ? "verifying"
                                                           : "searching";
     progress.show(static_cast<int64_t>(document.at("trials").size()), what, part);

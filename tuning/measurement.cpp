@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
 #include <vector>
 
 #include "model/error.h"
@@ -11,6 +13,9 @@
 namespace cutproof::tuning {
 
 namespace {
+
+// Timed runs by which a search with `full` compares what it tries.
+constexpr int kSearchRuns = 3;
 
 double seconds_per_frame(Backend& backend, const benchmarks::PreparedScene& scene, const StopAsked& stop_asked) {
   const auto look_up = [&](double) {
@@ -72,29 +77,38 @@ Trial measure(const Measuring& measuring, const ReferenceSolution& reference, co
     trial.outcome = !trial.why.empty() ? Outcome::topology : comparison.beyond() ? Outcome::over : Outcome::within;
   }
   if (trial.outcome == Outcome::within || to_the_end) {
+    const int most = measuring.asked.full ? std::min(kSearchRuns, measuring.asked.repeats) : measuring.asked.repeats;
     std::vector<double> samples;
     do {
       samples.push_back(seconds_per_frame(*backend, *scene, measuring.asked.stop_asked));
       // More would only tell more exactly by how much it is no point of the front.
       if (measuring.asked.full && !is_given && is_behind(trial, samples.front(), before, measuring.asked.tolerance))
         break;
-    } while (static_cast<int>(samples.size()) < measuring.asked.repeats);
+    } while (static_cast<int>(samples.size()) < most);
     trial.frame = benchmarks::times_of(samples);
   }
   return trial;
 }
 
-TimedInTurns time_in_turns(const Measuring& measuring, const Configuration& found) {
-  std::vector<double> before, after;
-  for (int repeat = 0; repeat < measuring.asked.repeats; ++repeat) {
-    for (const bool given : {true, false}) {
-      const Configuration& timed = given ? measuring.given : found;
-      const std::unique_ptr<Backend> backend = measuring.backend_for(timed);
-      const benchmarks::PreparedScene scene(timed.scene, measuring.asked.scene, measuring.asked.frames);
-      (given ? before : after).push_back(seconds_per_frame(*backend, scene, measuring.asked.stop_asked));
-    }
+std::vector<benchmarks::Times> times_in_turns(const Measuring& measuring,
+                                              const std::vector<Configuration>& configurations) {
+  std::vector<benchmarks::PreparedScene> scenes;
+  std::map<std::string, std::unique_ptr<Backend>> backends;  // by rotation: all else comes with a load
+  const auto run = [&](std::size_t k) {
+    return seconds_per_frame(*backends.at(configurations[k].rotation), scenes[k], measuring.asked.stop_asked);
+  };
+  for (const Configuration& configuration : configurations) {
+    scenes.emplace_back(configuration.scene, measuring.asked.scene, measuring.asked.frames);
+    std::unique_ptr<Backend>& backend = backends[configuration.rotation];
+    if (backend) continue;
+    backend = measuring.backend_for(configuration);
+    static_cast<void>(run(scenes.size() - 1));  // a backend's first run takes longer
   }
-  return {benchmarks::times_of(before), benchmarks::times_of(after)};
+  std::vector<benchmarks::Times> times;
+  for (const std::vector<double>& samples : benchmarks::in_turns(measuring.asked.repeats, scenes.size(), run)) {
+    times.push_back(benchmarks::times_of(samples));
+  }
+  return times;
 }
 
 }  // namespace cutproof::tuning

@@ -25,7 +25,7 @@ struct TuneOptions {
   std::optional<int64_t> frames;                   // looks at so many of the scene's only
   bool without_skin = false;                       // nobody looks at it
   bool full = false;                               // nothing is given up: errors and times of all that is tried
-  int repeats = 3;       // timed runs of a configuration; with `full` one of those that cannot be points of the front
+  int repeats = 3;       // timed runs of a configuration; with `full` of those that may be points of the front
   StopAsked stop_asked;  // ends it between two frames
 };
 
@@ -41,14 +41,13 @@ struct Measuring {
 };
 
 // `limit`: the seconds per frame beyond which it may be given up as too expensive. `before`: what has been measured.
+// With `full` it is timed as often as the search needs; what a front is told from is times_in_turns().
 Trial measure(const Measuring& measuring, const ReferenceSolution& reference, const Configuration& configuration,
               std::optional<double> limit, const std::vector<Trial>& before);
 
-// Taken in turns, so that what the machine does meanwhile falls on both; and anew, because the least of many figures
-// is too good.
-struct TimedInTurns {
-  benchmarks::Times given, found;  // per frame
-};
-TimedInTurns time_in_turns(const Measuring& measuring, const Configuration& found);
+// Seconds per frame of each of them, `repeats` runs in turns with the others; and anew, because the least of many
+// figures is too good.
+std::vector<benchmarks::Times> times_in_turns(const Measuring& measuring,
+                                              const std::vector<Configuration>& configurations);
 
 }  // namespace cutproof::tuning

@@ -207,6 +207,15 @@ bool is_behind(const Trial& trial, double seconds, const std::vector<Trial>& tri
   });
 }
 
+std::vector<std::size_t> may_be_points(const std::vector<Trial>& trials, double asked) {
+  std::vector<std::size_t> points;
+  for (std::size_t k = 0; k < trials.size(); ++k) {
+    const benchmarks::Times& times = trials[k].frame;
+    if (times.count > 0 && (k == 0 || !is_behind(trials[k], times.min, trials, asked))) points.push_back(k);
+  }
+  return points;
+}
+
 std::vector<FrontPoint> front(const std::vector<Trial>& trials, double asked, bool all, double known) {
   std::vector<double> tolerances = {asked};
   for (const double tolerance : kFrontTolerances) {

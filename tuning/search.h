@@ -63,5 +63,7 @@ std::vector<FrontPoint> front(const std::vector<Trial>& trials, double asked, bo
 // takes less than that over kClearly, which no noise of a timer makes up for.
 inline constexpr double kClearly = 1.5;
 bool is_behind(const Trial& trial, double seconds, const std::vector<Trial>& trials, double asked);
+// Indices of those that may be points of the front by the least of their times, and of the first.
+std::vector<std::size_t> may_be_points(const std::vector<Trial>& trials, double asked);
 
 }  // namespace cutproof::tuning

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <future>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "benchmarks/report.h"
@@ -81,12 +82,29 @@ SearchSpace space_of(const Measuring& measuring, const TuneOptions& options, con
   return space;
 }
 
+// What may be a point of the front, in turns. What it shows may bring others into question.
+void time_front(const Measuring& measuring, std::vector<Trial>& trials) {
+  std::set<std::size_t> timed;
+  while (true) {
+    std::vector<std::size_t> wanted;
+    std::vector<Configuration> configurations;
+    for (const std::size_t index : may_be_points(trials, measuring.asked.tolerance)) {
+      if (!timed.insert(index).second) continue;
+      wanted.push_back(index);
+      configurations.push_back(trials[index].configuration);
+    }
+    if (wanted.empty()) return;
+    const std::vector<benchmarks::Times> times = times_in_turns(measuring, configurations);
+    for (std::size_t k = 0; k < wanted.size(); ++k) trials[wanted[k]].frame = times[k];
+  }
+}
+
 // A trial that was verified, as the scene that would be written.
 struct Found {
   std::size_t trial = 0;
   std::string text;
   Verified verified;
-  TimedInTurns times;
+  benchmarks::Times as_given, tuned;  // seconds per frame, in turns
 };
 
 using JudgedRuns = std::map<std::size_t, JudgedRun>;  // by trial
@@ -117,7 +135,7 @@ std::optional<Found> take_cheapest(const Measuring& measuring, const ReferenceSo
     const auto before = judged.find(index);
     JudgedRun run = before != judged.end() ? std::move(before->second)
                                            : judged_run(measuring, trials[index].configuration, measuring.asked.write);
-    Found found{index, run.text, {}, {}};
+    Found found{index, run.text, {}, {}, {}};
     found.verified = verify(measuring, reference, std::move(run));
     return found;
   };
@@ -137,14 +155,16 @@ std::optional<Found> take_cheapest(const Measuring& measuring, const ReferenceSo
       leave(index, found.verified.failure);
       continue;
     }
-    found.times = time_in_turns(measuring, trials[index].configuration);
-    if (given && found.times.found.median > (1 - kCheaper) * found.times.given.median) {
+    const auto times = times_in_turns(measuring, {measuring.given, trials[index].configuration});
+    found.as_given = times[0];
+    found.tuned = times[1];
+    if (given && found.tuned.median > (1 - kCheaper) * found.as_given.median) {
       leave(index, "timed again it is no cheaper than what was given");
       continue;
     }
     return found;
   }
-  if (given) given->times = {trials.front().frame, trials.front().frame};
+  if (given) given->as_given = given->tuned = trials.front().frame;
   return given;
 }
 
@@ -235,6 +255,12 @@ bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
              show(TuneStep::trial);
              return trials.back();
            });
+    show(TuneStep::tried);
+    if (options.full) {
+      time_front(measuring, trials);
+      for (std::size_t k = 0; k < trials.size(); ++k) document["trials"][k] = to_json(trials[k], measuring.given);
+      document["front"] = front_json(front(trials, options.tolerance, true, reference.known_to_h()));
+    }
     show(TuneStep::searched);
     if (by_cost(trials).empty()) return conclude(TuneStep::none_within);
 
@@ -252,9 +278,9 @@ bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
     document["found"] = {{"trial", found->trial},
                          {"verified", to_json(found->verified.trial, measuring.given)},
                          {"verdicts", found->verified.verdicts},
-                         {"seconds_per_frame", benchmarks::to_json(found->times.found)},
-                         {"seconds_per_frame_as_given", benchmarks::to_json(found->times.given)},
-                         {"times_cheaper", found->times.given.median / found->times.found.median}};
+                         {"seconds_per_frame", benchmarks::to_json(found->tuned)},
+                         {"seconds_per_frame_as_given", benchmarks::to_json(found->as_given)},
+                         {"times_cheaper", found->as_given.median / found->tuned.median}};
     return conclude(TuneStep::found);
   } catch (const Stopped&) {
     show(TuneStep::stopped);

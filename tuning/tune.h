@@ -12,6 +12,7 @@ enum class TuneStep {
   begun,
   reference_known,
   trial,
+  tried,  // all; with `full` what may be a point of the front is timed next
   searched,
   not_taken,  // a trial that was cheaper and does not hold
   found,

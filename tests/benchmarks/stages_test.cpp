@@ -448,4 +448,14 @@ TEST(Times, AreTheMedianTheLeastAndTheMost) {
   EXPECT_EQ(cutproof::benchmarks::times_of({}).count, 0);
 }
 
+TEST(Times, AreTakenInTurns) {
+  std::vector<std::size_t> order;
+  const auto measured = cutproof::benchmarks::in_turns(3, 2, [&](std::size_t k) {
+    order.push_back(k);
+    return static_cast<double>(order.size());
+  });
+  EXPECT_EQ(order, (std::vector<std::size_t>{0, 1, 0, 1, 0, 1}));
+  EXPECT_EQ(measured, (std::vector<std::vector<double>>{{1, 3, 5}, {2, 4, 6}}));
+}
+
 }  // namespace
