@@ -82,20 +82,20 @@ SearchSpace space_of(const Measuring& measuring, const TuneOptions& options, con
   return space;
 }
 
-// What may be a point of the front, in turns. What it shows may bring others into question.
+// All that may be points of the front, in turns. What their times show may bring others into question; then all of them
+// once more, because a round of those alone would be another while.
 void time_front(const Measuring& measuring, std::vector<Trial>& trials) {
   std::set<std::size_t> timed;
   while (true) {
-    std::vector<std::size_t> wanted;
+    std::set<std::size_t> wanted = timed;
+    for (const std::size_t index : may_be_points(trials, measuring.asked.tolerance)) wanted.insert(index);
+    if (wanted == timed) return;
+    timed = std::move(wanted);
     std::vector<Configuration> configurations;
-    for (const std::size_t index : may_be_points(trials, measuring.asked.tolerance)) {
-      if (!timed.insert(index).second) continue;
-      wanted.push_back(index);
-      configurations.push_back(trials[index].configuration);
-    }
-    if (wanted.empty()) return;
+    for (const std::size_t index : timed) configurations.push_back(trials[index].configuration);
     const std::vector<benchmarks::Times> times = times_in_turns(measuring, configurations);
-    for (std::size_t k = 0; k < wanted.size(); ++k) trials[wanted[k]].frame = times[k];
+    auto time = times.begin();
+    for (const std::size_t index : timed) trials[index].frame = *time++;
   }
 }
 
