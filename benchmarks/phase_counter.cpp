@@ -1,5 +1,6 @@
 #include "benchmarks/phase_counter.h"
 
+#include <algorithm>
 #include <cstddef>
 
 #include "gpu/launch/frame.h"
@@ -35,6 +36,15 @@ class PhaseCounter {
   void while_nonzero(int*, Body body) {
     ++phases_;
     body(*this);
+  }
+  // Of two chains the longer one counts.
+  template <class First, class Second>
+  void side_by_side(First first, Second second) {
+    PhaseCounter beside;
+    const int64_t before = phases_;
+    first(*this);
+    second(beside);
+    phases_ = std::max(phases_, before + beside.phases_);
   }
   void exclusive_scan(const int*, int*, int64_t, int*, const int* = nullptr) { ++phases_; }
   void select(const unsigned char*, int64_t, int*, int*, const int* = nullptr) { ++phases_; }

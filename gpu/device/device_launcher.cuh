@@ -202,13 +202,16 @@ class ScanOutput {
   std::ptrdiff_t at_ = 0;
 };
 
-// What the launches of a launcher or graph share. They never overlap: a graph is one chain of nodes.
+// What the launches of a launcher or graph share. They never overlap: a graph is one chain of nodes, and what runs
+// beside a part of it another.
 struct DeviceResources {
   int multiprocessors = 0;
   std::size_t required = 0;  // most bytes of temporary memory that any launch asked for
   std::size_t allocated = 0;
   DeviceMemory temporary;
   std::vector<Stream> inner;  // for capturing bodies of conditions, by depth
+  std::shared_ptr<DeviceResources> beside;  // null: nothing runs beside anything
+  Event parted, met;                        // for capturing that
 
   DeviceResources() {
     int device = 0;
@@ -218,6 +221,7 @@ struct DeviceResources {
 
   // Frees what was there; nothing may be using it.
   void allocate() {
+    if (beside != nullptr) beside->allocate();
     if (required <= allocated) return;
     temporary.reset();
     allocated = 0;
@@ -338,6 +342,32 @@ class DeviceLauncher {
     } else {
       conditional(flag, cudaGraphCondTypeWhile, body);
     }
+  }
+
+  template <class First, class Second>
+  void side_by_side(First first, Second second) {
+    if (mode_ == Mode::at_once) {
+      first(*this);
+      second(*this);
+      return;
+    }
+    if (resources_->beside == nullptr) {
+      resources_->beside = std::make_shared<detail::DeviceResources>();
+      resources_->parted = make_event();
+      resources_->met = make_event();
+    }
+    DeviceLauncher other(mode_, resources_->beside->stream(depth_), resources_->beside, depth_);
+    if (mode_ == Mode::capture) {
+      CUTPROOF_CUDA(cudaEventRecord(resources_->parted.get(), stream_));
+      CUTPROOF_CUDA(cudaStreamWaitEvent(other.stream_, resources_->parted.get()));
+    }
+    first(*this);
+    second(other);
+    if (mode_ == Mode::capture) {
+      CUTPROOF_CUDA(cudaEventRecord(resources_->met.get(), other.stream_));
+      CUTPROOF_CUDA(cudaStreamWaitEvent(stream_, resources_->met.get()));
+    }
+    after_launch_ = false;
   }
 
   void exclusive_scan(const int* in, int* out, std::int64_t count, int* total, const int* used = nullptr) {

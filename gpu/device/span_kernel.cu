@@ -62,6 +62,12 @@ class SpanLauncher {
     while (agreed(flag)) body(*this);
   }
 
+  template <class First, class Second>
+  __device__ __forceinline__ void side_by_side(First first, Second second) {
+    first(*this);
+    second(*this);
+  }
+
   __device__ void exclusive_scan(const int* in, int* out, std::int64_t count, int* total, const int* used = nullptr) {
     DeviceBlock block;
     if (used != nullptr) count = *used;

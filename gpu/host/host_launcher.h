@@ -80,6 +80,12 @@ class HostLauncher {
     }
   }
 
+  template <class First, class Second>
+  void side_by_side(First first, Second second) {
+    first(*this);
+    second(*this);
+  }
+
   void exclusive_scan(const int* in, int* out, std::int64_t count, int* total, const int* used = nullptr) {
     count = used_of(count, used, "exclusive_scan");
     const int sum = std::accumulate(in, in + count, 0);

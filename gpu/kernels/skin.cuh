@@ -1,5 +1,6 @@
 // Stage skin (docs/design/method.md §8). enqueue_skin_cells extracts again the cells that lost a corner in this frame,
-// or every cell of a body that has no skin yet; enqueue_skin_positions puts all vertices where the clusters carry them.
+// or every cell of a body that has no skin yet; enqueue_skin_clusters then notes the clusters that its vertices hang on,
+// and enqueue_skin_positions puts all vertices where the clusters carry them.
 //
 // A vertex is known by its owner and direction. It is made when the particle beyond its grid edge dies (or with the
 // body's first skin) and lasts as long as its owner, because the dead do not come back; so cells that kept all
@@ -101,8 +102,8 @@ inline constexpr int kReserveThreads = 512;
 // Particles that change the cells around them, ascending: as many as Counters::skin_changes. And for each of them,
 // first how many vertices and cells it needs, then how many those before it do.
 CUTPROOF_BOTH inline int* changed(const DeviceView& w) { return w.fallen; }
-CUTPROOF_BOTH inline int* new_vertices(const DeviceView& w) { return w.particle_scratch; }
-CUTPROOF_BOTH inline int* new_cells(const DeviceView& w) { return w.particle_scratch + w.particles; }
+CUTPROOF_BOTH inline int* new_vertices(const DeviceView& w) { return w.skin_counts; }
+CUTPROOF_BOTH inline int* new_cells(const DeviceView& w) { return w.skin_counts + w.particles; }
 // By particle: the corners at which it is the lowest of its cell's that change, as bits: those cells are its own.
 CUTPROOF_BOTH inline unsigned char* own_corners(const DeviceView& w) { return w.particle_flag; }
 
@@ -228,7 +229,7 @@ CUTPROOF_DEVICE void renew_vertices_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL(renew_vertices_kernel);
 
-// Writes the triangles of the cells around what has changed. Says which clusters vertices hang on.
+// Writes the triangles of the cells around what has changed.
 template <class Block>
 CUTPROOF_DEVICE void extract_cells_kernel(Block& block, const DeviceView& w) {
   using namespace skin_detail;
@@ -275,19 +276,26 @@ CUTPROOF_DEVICE void extract_cells_kernel(Block& block, const DeviceView& w) {
       }
     }
   }
-  for (int64_t v = block.first(); v < w.counters->vertices_used; v += block.stride()) {
-    const int p = w.vertex_owner[v];
-    if (p < 0 || !skinned(w, w.body_of[p])) continue;
-    for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
-      if (w.memberships[k] >= 0) block.store(&w.under_skin[w.memberships[k]], 1);
-    }
-  }
   for (int64_t b = block.first(); b < w.bodies; b += block.stride()) {
     if (sound && skinned(w, static_cast<int>(b))) w.skin_made[b] = 1;
   }
 }
 CUTPROOF_KERNEL(extract_cells_kernel);
 
+// Says which clusters vertices hang on.
+template <class Block>
+CUTPROOF_DEVICE void mark_under_skin_kernel(Block& block, const DeviceView& w) {
+  for (int64_t v = block.first(); v < w.counters->vertices_used; v += block.stride()) {
+    const int p = w.vertex_owner[v];
+    if (p < 0 || !skin_detail::skinned(w, w.body_of[p])) continue;
+    for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
+      if (w.memberships[k] >= 0) block.store(&w.under_skin[w.memberships[k]], 1);
+    }
+  }
+}
+CUTPROOF_KERNEL(mark_under_skin_kernel);
+
+// Asks which particles are there, and nothing of clusters: what changes these may go on meanwhile.
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_skin_cells(Launcher& launcher, const DeviceView& w, const Plan&) {
   using namespace skin_detail;
@@ -297,6 +305,11 @@ CUTPROOF_ENQUEUE void enqueue_skin_cells(Launcher& launcher, const DeviceView& w
   launcher.blocks(reserve_skin_kernel_object{}, 1, kReserveThreads, 0, w);
   launcher.teams(renew_vertices_kernel_object{}, kCornerTeam, w.particles, w);
   launcher.teams(extract_cells_kernel_object{}, kCornerTeam, w.particles, w);
+}
+// When clusters and cells have changed.
+template <class Launcher>
+CUTPROOF_ENQUEUE void enqueue_skin_clusters(Launcher& launcher, const DeviceView& w, const Plan&) {
+  launcher.items(mark_under_skin_kernel_object{}, w.vertex_capacity, w);
 }
 
 // ---- Positions

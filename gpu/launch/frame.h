@@ -47,23 +47,28 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
         mark(Stage::split);
         enqueue_split(inner, w, plan);
       }
-      if (span.contains(Stage::merge) && plan.merge) {
-        mark(Stage::merge);
-        enqueue_merge(inner, w, plan);
-      }
-      if (span.contains(Stage::expand) && plan.expand) {
-        inner.if_nonzero(&w.counters->expanding, [&](Launcher& innermost) {
-          mark(Stage::expand);
-          enqueue_expand(innermost, w, plan);
-        });
-      }
-      if (skin) {
-        mark(Stage::skin);
-        inner.teams(sort_memberships_kernel_object{}, kParticleTile, particle_tiles(w.particles), w);
-        inner.blocks(number_slots_kernel_object{}, w.bodies * slot_runs(w.slots_expected), kListThreads, 0, w);
-        if (plan.skin) enqueue_skin_cells(inner, w, plan);
-      }
-      if (span.is_whole_frame()) enqueue_groups(inner, w);
+      // Which particles there are is known from here on, and cells ask for nothing else.
+      const auto change_clusters = [&](Launcher& on) {
+        if (span.contains(Stage::merge) && plan.merge) {
+          mark(Stage::merge);
+          enqueue_merge(on, w, plan);
+        }
+        if (span.contains(Stage::expand) && plan.expand) {
+          on.if_nonzero(&w.counters->expanding, [&](Launcher& innermost) {
+            mark(Stage::expand);
+            enqueue_expand(innermost, w, plan);
+          });
+        }
+        if (skin) {
+          mark(Stage::skin);
+          on.teams(sort_memberships_kernel_object{}, kParticleTile, particle_tiles(w.particles), w);
+          on.blocks(number_slots_kernel_object{}, w.bodies * slot_runs(w.slots_expected), kListThreads, 0, w);
+        }
+        if (span.is_whole_frame()) enqueue_groups(on, w);
+      };
+      if (!skin || !plan.skin) return change_clusters(inner);
+      inner.side_by_side(change_clusters, [&](Launcher& on) { enqueue_skin_cells(on, w, plan); });
+      enqueue_skin_clusters(inner, w, plan);
     });
   }
   if (skin) {

@@ -188,7 +188,10 @@ void run_skin(HostLauncher& launcher, Bodies& bodies, const DeviceView& w) {
   for (int b = 0; b < w.bodies; ++b) {
     if (running(w, b) && w.body[b].skin_wanted && (w.cut[b] >= 0 || !w.skin_made[b])) w.counters->changing = 1;
   }
-  launcher.if_nonzero(&w.counters->changing, [&](HostLauncher& inner) { enqueue_skin_cells(inner, w, bodies.plan); });
+  launcher.if_nonzero(&w.counters->changing, [&](HostLauncher& inner) {
+    enqueue_skin_cells(inner, w, bodies.plan);
+    enqueue_skin_clusters(inner, w, bodies.plan);
+  });
   enqueue_skin_positions(launcher, w, bodies.plan);
 }
 void run_skin(HostLauncher& launcher, Bodies& bodies) { run_skin(launcher, bodies, bodies.staging.view()); }
