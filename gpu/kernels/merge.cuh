@@ -222,6 +222,7 @@ template <class Block>
 CUTPROOF_DEVICE void propose_merges_kernel(Block& block, DeviceView w) {
   const TouchTable table = take_candidate_table(block);
   Counters& c = *w.counters;
+  if (block.first() == 0) c.merging = 0;
   if (c.failed) return;
   const int round = c.round;
   int* best = best_of_round(w, round);
@@ -249,7 +250,6 @@ CUTPROOF_DEVICE void propose_merges_kernel(Block& block, DeviceView w) {
     }
     block.store(&w.proposal[s], t);
     if (t < 0) continue;
-    block.store(&c.changed, 1);
     if (body.merge_rule == MergeRule::deterministic) {
       block.fence();
       offer_key(block, w, best, s, s, t, round);
@@ -303,7 +303,8 @@ CUTPROOF_DEVICE void hand_over(Block& block, const DeviceView& w, int s, int t, 
   }
 }
 
-// Carries out the proposals that got both ends: those of them, if it is called again, that found no places.
+// Carries out the proposals that got both ends: those of them, if it is called again, that found no places. There is
+// another round if one got neither, or a union is still small: nobody else would propose in it.
 template <class Block>
 CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, DeviceView w) {
   int* place = block.template shared<int>(1);
@@ -313,7 +314,12 @@ CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, DeviceView w) {
   for (int job = block.index(); job < c.small && !failed; job += block.count()) {
     const int s = w.small_clusters[job];
     const int t = w.proposal[s];
-    if (t < 0 || best[s] != s || best[t] != s || w.body[w.slot_body[s]].merge_rule == MergeRule::single_pass) continue;
+    const BodyConstants& body = w.body[w.slot_body[s]];
+    if (t < 0 || body.merge_rule == MergeRule::single_pass) continue;
+    if (best[s] != s || best[t] != s) {
+      if (block.thread() == 0) block.store(&c.merging, 1);
+      continue;
+    }
     if (w.slot_size[s] == 0) continue;  // done
     const int size = w.slot_size[s], target_size = w.slot_size[t];
     const int* members = w.members + w.slot_begin[s];
@@ -343,12 +349,10 @@ CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, DeviceView w) {
       w.slot_size[t] = target_size + missing;
       w.slot_size[s] = 0;
       block.store(&rest_marks(w)[t], 1);
+      if (target_size + missing < body.tau) block.store(&c.merging, 1);
     }
   }
-  if (block.first() != 0) return;
-  c.merging = c.changed;
-  c.round = c.merging_round + 1;
-  c.changed = 0;
+  if (block.first() == 0) c.round = c.merging_round + 1;
 }
 CUTPROOF_KERNEL_THREADS(merge_pairs_kernel, kMergeThreads);
 
@@ -484,7 +488,6 @@ CUTPROOF_DEVICE void begin_rounds_kernel(Block& block, const DeviceView& w) {
   }
   c.merging = c.small > 0;
   c.round = 0;
-  c.changed = 0;
   c.failed = 0;
 }
 CUTPROOF_KERNEL_THREADS(begin_rounds_kernel, kListThreads);
@@ -516,7 +519,7 @@ CUTPROOF_DEVICE void place_members_kernel(Block& block, DeviceView w) {
   for (int64_t s = block.first(); s < w.counters->slots_used; s += block.stride()) w.slot_begin[s] = moved_begin(w)[s];
   if (block.first() != 0) return;
   w.counters->failed = 0;
-  w.counters->changed = 1;
+  w.counters->merging = 1;
   w.counters->groups_whole = 1;  // what groups say of clusters lies where their members lay
 }
 CUTPROOF_KERNEL(place_members_kernel);

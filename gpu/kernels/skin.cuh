@@ -314,10 +314,12 @@ CUTPROOF_ENQUEUE void enqueue_skin_clusters(Launcher& launcher, const DeviceView
 
 // ---- Positions
 
-// DeviceView::center of the clusters that a vertex hangs on: deep in the tissue nobody asks.
+// DeviceView::center of the clusters that a vertex hangs on: deep in the tissue nobody asks. made: in frames with
+// Counters::changing that has been done.
 template <class Block>
-CUTPROOF_DEVICE void recenter_clusters_kernel(Block& block, const DeviceView& w) {
+CUTPROOF_DEVICE void recenter_clusters_kernel(Block& block, const DeviceView& w, bool made) {
   using namespace skin_detail;
+  if (made && w.counters->changing != 0) return;
   const Team<Block, kCenterTeam> team(block);
   for (int64_t i = team.first(); i < w.counters->slots_used; i += team.stride()) {
     const int s = static_cast<int>(i);
@@ -367,7 +369,8 @@ CUTPROOF_DEVICE inline float reach_by_blade(const DeviceView& w, const BodyConst
 
 // Puts each vertex where its owner's clusters carry it, as displacement from X_v.
 template <class Block>
-CUTPROOF_DEVICE void place_vertices_kernel(Block& block, const DeviceView& w) {
+CUTPROOF_DEVICE void place_vertices_kernel(Block& block, const DeviceView& w, bool made) {
+  if (made && w.counters->changing != 0) return;
   for (int64_t v = block.first(); v < w.counters->vertices_used; v += block.stride()) {
     const int p = w.vertex_owner[v];
     if (p < 0) continue;
@@ -385,10 +388,11 @@ CUTPROOF_DEVICE void place_vertices_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL(place_vertices_kernel);
 
+// made: as said above.
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_skin_positions(Launcher& launcher, const DeviceView& w, const Plan&) {
-  launcher.teams(recenter_clusters_kernel_object{}, kCenterTeam, w.slots_expected, w);
-  launcher.items(place_vertices_kernel_object{}, w.vertex_capacity, w);
+CUTPROOF_ENQUEUE void enqueue_skin_positions(Launcher& launcher, const DeviceView& w, bool made) {
+  launcher.teams(recenter_clusters_kernel_object{}, kCenterTeam, w.slots_expected, w, made);
+  launcher.items(place_vertices_kernel_object{}, w.vertex_capacity, w, made);
 }
 
 }  // namespace cutproof::gpu

@@ -213,19 +213,6 @@ CUTPROOF_DEVICE void search_debris_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(search_debris_kernel);
 
-// The slots that are left are too few for the stage.
-template <class Block>
-CUTPROOF_DEVICE void put_debris_back_kernel(Block& block, DeviceView w) {
-  using namespace split_detail;
-  const Counters& c = *w.counters;
-  for (int64_t k = block.first(); k < c.debris; k += block.stride()) {
-    const int p = w.fallen[c.fallen + k];
-    w.death[p] = -1;
-    block.store(&w.debris_anywhere[body_index(w, p)], 1);
-  }
-}
-CUTPROOF_KERNEL(put_debris_back_kernel);
-
 // ---- which clusters
 
 // By I2 no cluster held a dead particle when the frame began: one that holds one now has lost it.
@@ -543,12 +530,20 @@ CUTPROOF_DEVICE void regroup_members_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL_THREADS(regroup_members_kernel, split_detail::kRegroupThreads);
 
-// Of what is left of affected clusters, and of the new ones; their slots count as given out from now on.
+// Of what is left of affected clusters, and of the new ones; their slots count as given out from now on. Where the
+// slots that are left are too few for the stage, debris is put back.
 template <class Block>
 CUTPROOF_DEVICE void rest_frames_of_components_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
   Counters& counters = *w.counters;
-  if (counters.failed) return;
+  if (counters.failed) {
+    for (int64_t k = block.first(); k < counters.debris; k += block.stride()) {
+      const int p = w.fallen[counters.fallen + k];
+      w.death[p] = -1;
+      block.store(&w.debris_anywhere[body_index(w, p)], 1);
+    }
+    return;
+  }
   const int first_new = counters.scratch[kFirstNewSlot], added = counters.scratch[kNewClusters];
   if (block.first() == 0) counters.slots_used = first_new + added;
   const Team<Block, kRestTeam> team(block);
@@ -602,12 +597,6 @@ CUTPROOF_ENQUEUE void enqueue_split(Launcher& launcher, const DeviceView& w, con
   launcher.blocks(number_components_kernel_object{}, w.bodies, 256, 0, w);
   launcher.blocks(regroup_members_kernel_object{}, w.slots_expected, kRegroupThreads, sizeof(int) * kRegroupThreads, w);
   launcher.teams(rest_frames_of_components_kernel_object{}, kRestTeam, 2 * int64_t{w.slots_expected}, w);
-  if (plan.debris) {
-    launcher.if_nonzero(&counters->failed, [&](Launcher& inner) {
-      inner.items(put_debris_back_kernel_object{}, w.particles, w);
-      inner.clear(&counters->debris, sizeof(int));
-    });
-  }
 }
 
 }  // namespace cutproof::gpu

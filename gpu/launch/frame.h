@@ -38,6 +38,8 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
   }
   const bool clusters = span.contains(Stage::split) || span.contains(Stage::merge) || span.contains(Stage::expand);
   const bool skin = span.contains(Stage::skin);
+  // In a whole frame vertices need not wait for the groups of the next one.
+  const bool places_at_once = span.is_whole_frame() && plan.skin;
   if (clusters || skin) {
     launcher.blocks(note_cuts_kernel_object{}, 1, 128, 0, w, span);
     // One condition for all that a frame without a cut does not need: each costs as much as ten launches. (A first skin
@@ -62,18 +64,30 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
         if (skin) {
           mark(Stage::skin);
           on.teams(sort_memberships_kernel_object{}, kParticleTile, particle_tiles(w.particles), w);
-          on.blocks(number_slots_kernel_object{}, w.bodies * slot_runs(w.slots_expected), kListThreads, 0, w);
         }
-        if (span.is_whole_frame()) enqueue_groups(on, w);
       };
-      if (!skin || !plan.skin) return change_clusters(inner);
-      inner.side_by_side(change_clusters, [&](Launcher& on) { enqueue_skin_cells(on, w, plan); });
-      enqueue_skin_clusters(inner, w, plan);
+      const auto follow_clusters = [&](Launcher& on) {
+        if (skin) {
+          on.blocks(number_slots_kernel_object{}, w.bodies * slot_runs(w.slots_expected), kListThreads, 0, w);
+          if (plan.skin) enqueue_skin_clusters(on, w, plan);
+        }
+        if (places_at_once) enqueue_skin_positions(on, w, false);
+      };
+      if (skin && plan.skin) {
+        inner.side_by_side(change_clusters, [&](Launcher& on) { enqueue_skin_cells(on, w, plan); });
+      } else {
+        change_clusters(inner);
+      }
+      if (span.is_whole_frame()) {
+        inner.side_by_side([&](Launcher& on) { enqueue_groups(on, w); }, follow_clusters);
+      } else {
+        follow_clusters(inner);
+      }
     });
   }
   if (skin) {
     mark(Stage::skin);
-    if (plan.skin) enqueue_skin_positions(launcher, w, plan);
+    if (plan.skin) enqueue_skin_positions(launcher, w, places_at_once);
     launcher.items(end_frame_kernel_object{}, w.bodies, w);
   }
 }

@@ -192,7 +192,7 @@ void run_skin(HostLauncher& launcher, Bodies& bodies, const DeviceView& w) {
     enqueue_skin_cells(inner, w, bodies.plan);
     enqueue_skin_clusters(inner, w, bodies.plan);
   });
-  enqueue_skin_positions(launcher, w, bodies.plan);
+  enqueue_skin_positions(launcher, w, false);
 }
 void run_skin(HostLauncher& launcher, Bodies& bodies) { run_skin(launcher, bodies, bodies.staging.view()); }
 
