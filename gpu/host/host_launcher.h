@@ -15,6 +15,7 @@
 
 #include "gpu/host/host_block.h"
 #include "gpu/host/host_runtime.h"
+#include "gpu/host/turns.h"
 #include "gpu/launch/launcher.h"
 
 namespace cutproof::gpu {
@@ -68,10 +69,12 @@ class HostLauncher {
 
   template <class Body>
   void if_nonzero(const int* flag, Body body) {
+    next_turn();
     if (*flag != 0) body(*this);
   }
   template <class Body>
   void while_nonzero(int* flag, Body body) {
+    next_turn();
     for (std::int64_t round = 0; *flag != 0; ++round) {
       if (round == kMostRounds) {
         throw KernelFault("livelock: a loop did not end within " + std::to_string(kMostRounds) + " rounds.");
@@ -82,11 +85,24 @@ class HostLauncher {
 
   template <class First, class Second>
   void side_by_side(First first, Second second) {
-    first(*this);
-    second(*this);
+    if (!simulated() || turns_ != nullptr) {
+      first(*this);
+      second(*this);
+      return;
+    }
+    Turns turns([&](int current) { return runtime_->choose(2, current); });
+    turns_ = &turns;
+    try {
+      turns.run([&] { first(*this); }, [&] { second(*this); });
+    } catch (...) {
+      turns_ = nullptr;
+      throw;
+    }
+    turns_ = nullptr;
   }
 
   void exclusive_scan(const int* in, int* out, std::int64_t count, int* total, const int* used = nullptr) {
+    next_turn();
     count = used_of(count, used, "exclusive_scan");
     const int sum = std::accumulate(in, in + count, 0);
     std::exclusive_scan(in, in + count, out, 0);
@@ -94,6 +110,7 @@ class HostLauncher {
   }
   void select(const unsigned char* flags, std::int64_t count, int* selected, int* selected_count,
               const int* used = nullptr) {
+    next_turn();
     count = used_of(count, used, "select");
     int* end = selected;
     for (std::int64_t i = 0; i < count; ++i) {
@@ -102,6 +119,7 @@ class HostLauncher {
     *selected_count = static_cast<int>(end - selected);
   }
   void sort_unique(unsigned long long* keys, int* count, std::int64_t capacity) {
+    next_turn();
     if (*count < 0 || *count > capacity) {
       throw KernelFault("sort_unique: " + std::to_string(*count) + " keys with a capacity of " +
                         std::to_string(capacity) + '.');
@@ -113,6 +131,7 @@ class HostLauncher {
     *count = static_cast<int>(end - keys);
   }
   void clear(void* data, std::size_t bytes) {
+    next_turn();
     if (bytes > 0) std::memset(data, 0, bytes);
   }
 
@@ -124,6 +143,10 @@ class HostLauncher {
   bool simulated() const { return runtime_->simulated(); }
 
  private:
+  // Of two pieces of work that run side by side, lets the other one go on if the schedule says so.
+  void next_turn() {
+    if (turns_ != nullptr) turns_->next();
+  }
   static std::int64_t used_of(std::int64_t count, const int* used, const char* what) {
     if (used == nullptr) return count;
     if (*used < 0 || *used > count) {
@@ -134,6 +157,7 @@ class HostLauncher {
   }
   template <class Kernel, class... Args>
   void launch(const Kernel& kernel, std::int64_t blocks, int threads, std::size_t shared_bytes, const Args&... args) {
+    next_turn();
     const auto call = [&](HostBlock& block) { kernel(block, args...); };
     Job job;
     job.kernel = kernel_name<Kernel>();
@@ -146,6 +170,7 @@ class HostLauncher {
   }
 
   std::unique_ptr<HostRuntime> runtime_;
+  Turns* turns_ = nullptr;  // null: nothing runs side by side
   int blocks_ = kMostBlocks;
   int threads_ = kHostThreads;  // of a block
   bool unshared_ = false;       // one thread does everything

@@ -82,6 +82,15 @@ void HostRuntime::reschedule(Generator schedule) {
   recorded_.clear();
 }
 
+int HostRuntime::choose(int count, int current) {
+  if (simulation_ == nullptr) throw std::logic_error("HostRuntime: threads follow no schedule.");
+  const std::uint32_t mask = (1u << count) - 1;
+  const Candidates candidates{{&mask, 1}, current};
+  const int chosen = simulation_->schedule(candidates);
+  if (simulation_->record) recorded_.push_back(static_cast<std::uint16_t>(candidates.rank(chosen)));
+  return chosen;
+}
+
 void HostRuntime::run(const Job& job) {
   Worker& own = *workers_.front();
   if (simulation_ != nullptr) {

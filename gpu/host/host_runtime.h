@@ -27,6 +27,8 @@ class HostRuntime {
   // Carries out the launch. Rethrows what a kernel threw; of several failures that of the lowest block.
   void run(const Job& job);
   const ThreadSchedule& recorded() const { return recorded_; }
+  // A decision between launches: which of `count` goes on, `current` being what went last. Requires simulated().
+  int choose(int count, int current);
   // Goes on under another schedule, with nothing recorded. Requires simulated().
   void reschedule(Generator schedule);
 

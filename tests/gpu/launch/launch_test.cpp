@@ -66,6 +66,7 @@ TEST_P(LaunchOnHost, ScansAnyNumberOfItems) { check_scan(machine); }
 TEST_P(LaunchOnHost, SelectsFlaggedIndicesInOrder) { check_select(machine); }
 TEST_P(LaunchOnHost, SortsAndDropsDuplicates) { check_sort_unique(machine); }
 TEST_P(LaunchOnHost, ClearsWhatItIsGiven) { check_clear(machine); }
+TEST_P(LaunchOnHost, RunsPiecesSideBySide) { check_side_by_side(machine); }
 
 // Kernels that break the rules. `how` chooses what the last thread does.
 
@@ -411,6 +412,66 @@ TEST(Schedules, ALoopThatNeverEndsIsALivelock) {
   expect_mentions(fault_of([&] { launcher.while_nonzero(&always, [](HostLauncher&) {}); }), {"livelock"});
 }
 
+HostLauncher exploring(Generator generator) {
+  return HostLauncher(HostLauncher::Simulated{
+      .schedule = std::move(generator), .live_blocks = 2, .step_budget = 20'000, .record = true});
+}
+
+// What two pieces that each multiply and add leave of a number, launch by launch: different for every order.
+template <class Block>
+CUTPROOF_DEVICE void append_digit_kernel(Block& block, int* number, int digit) {
+  if (block.first() == 0) *number = 10 * *number + digit;
+}
+CUTPROOF_KERNEL(append_digit_kernel);
+
+int digits_of_two_pieces(HostLauncher& launcher) {
+  int number = 0;
+  const append_digit_kernel_object append;
+  launcher.side_by_side(
+      [&](HostLauncher& on) {
+        on.items(append, 1, &number, 1);
+        on.items(append, 1, &number, 2);
+      },
+      [&](HostLauncher& on) {
+        on.items(append, 1, &number, 3);
+        on.items(append, 1, &number, 4);
+      });
+  return number;
+}
+
+TEST(Schedules, PiecesSideBySideTakeTurnsInEveryOrder) {
+  std::set<int> seen;
+  HostLauncher launcher = exploring(forward());
+  for (int seed = 0; seed < 200; ++seed) {
+    launcher.reschedule(random_walk(static_cast<std::uint64_t>(seed)));
+    const int number = digits_of_two_pieces(launcher);
+    seen.insert(number);
+    const ThreadSchedule schedule = launcher.recorded();
+    launcher.reschedule(replay(schedule));
+    EXPECT_EQ(digits_of_two_pieces(launcher), number) << testing::PrintToString(schedule);
+  }
+  EXPECT_EQ(seen, (std::set<int>{1234, 1324, 1342, 3124, 3142, 3412}));
+  HostLauncher in_order;  // without a schedule
+  EXPECT_EQ(digits_of_two_pieces(in_order), 1234);
+}
+
+TEST(Schedules, APieceThatFailsEndsTheOtherOne) {
+  for (int seed = 0; seed < 40; ++seed) {
+    HostLauncher launcher = exploring(random_walk(static_cast<std::uint64_t>(seed)));
+    const bool first_fails = seed % 2 == 0;
+    int launches = 0, number = 0;
+    const auto fails = [](HostLauncher& on) { on.items(diverging_barrier_kernel_object{}, 1, int{kLeaves}); };
+    const auto goes_on = [&](HostLauncher& on) {
+      for (; launches < 1000; ++launches) on.items(append_digit_kernel_object{}, 1, &number, 0);
+    };
+    expect_mentions(fault_of([&] {
+                      first_fails ? launcher.side_by_side(fails, goes_on) : launcher.side_by_side(goes_on, fails);
+                    }),
+                    {"diverging_barrier_kernel"});
+    EXPECT_NO_THROW(digits_of_two_pieces(launcher));
+  }
+}
+
 // Union-find as GPUs do it (ECL-CC, Jaiganesh and Burtscher 2018): roots are hooked under smaller ones by
 // compare-and-swap, paths are halved by plain stores of ancestors. And with faults planted.
 
@@ -491,11 +552,6 @@ bool joins_rightly(int fault, int graph, HostLauncher& launcher) {
     if (root != label[static_cast<std::size_t>(v)]) return false;
   }
   return true;
-}
-
-HostLauncher exploring(Generator generator) {
-  return HostLauncher(HostLauncher::Simulated{
-      .schedule = std::move(generator), .live_blocks = 2, .step_budget = 20'000, .record = true});
 }
 
 Generator exploration(int seed) {
