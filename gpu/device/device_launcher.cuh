@@ -209,7 +209,7 @@ struct DeviceResources {
   std::size_t required = 0;  // most bytes of temporary memory that any launch asked for
   std::size_t allocated = 0;
   DeviceMemory temporary;
-  std::vector<Stream> inner;  // for capturing bodies of conditions, by depth
+  std::vector<Stream> inner;                // for capturing bodies of conditions, by depth
   std::shared_ptr<DeviceResources> beside;  // null: nothing runs beside anything
   Event parted, met;                        // for capturing that
 

@@ -1,5 +1,5 @@
-// Two pieces of work that take turns, launch by launch, as somebody chooses: what HostLauncher::side_by_side does under a
-// simulated schedule. Each has an operating-system thread, of which one goes at a time.
+// Two pieces of work that take turns, launch by launch, as somebody chooses: what HostLauncher::side_by_side does under
+// a simulated schedule. Each has an operating-system thread, of which one goes at a time.
 #pragma once
 #include <condition_variable>
 #include <exception>

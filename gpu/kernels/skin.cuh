@@ -1,6 +1,6 @@
 // Stage skin (docs/design/method.md §8). enqueue_skin_cells extracts again the cells that lost a corner in this frame,
-// or every cell of a body that has no skin yet; enqueue_skin_clusters then notes the clusters that its vertices hang on,
-// and enqueue_skin_positions puts all vertices where the clusters carry them.
+// or every cell of a body that has no skin yet; enqueue_skin_clusters then notes the clusters that its vertices hang
+// on, and enqueue_skin_positions puts all vertices where the clusters carry them.
 //
 // A vertex is known by its owner and direction. It is made when the particle beyond its grid edge dies (or with the
 // body's first skin) and lasts as long as its owner, because the dead do not come back; so cells that kept all

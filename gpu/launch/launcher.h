@@ -17,7 +17,8 @@
 //                                                              if *flag is not 0 when the work before it is done
 //   void while_nonzero(int* flag, Body);                       again and again while *flag is not 0
 //   template <class First, class Second>
-//   void side_by_side(First, Second);                          what the two do, each in its order, happens in any order,
+//   void side_by_side(First, Second);                          what the two do, each in its order, happens in any
+//   order,
 //                                                              or at once: neither touches what the other writes
 //   void exclusive_scan(const int* in, int* out, int64_t count, int* total, const int* used = nullptr);
 //                                                              out[i] = Σ in[0..i), *total = Σ all; in == out is
@@ -30,8 +31,8 @@
 //                                                              *count <= capacity valid keys before and after; what
 //                                                              lies beyond them is overwritten; ~0 is not a key
 //   void clear(void* data, std::size_t bytes);                 zero bytes, of whole ints
-// `Body`, `First` and `Second` take the Launcher to use inside as its argument. Even with a capacity of 0 one block runs: a kernel may
-// have something to do once.
+// `Body`, `First` and `Second` take the Launcher to use inside as its argument. Even with a capacity of 0 one block
+// runs: a kernel may have something to do once.
 //
 // A kernel is handed over as an object, because a function template cannot be: CUTPROOF_KERNEL(verb_noun_kernel)
 // defines the type verb_noun_kernel_object, whose operator() calls it. CUTPROOF_KERNEL_THREADS(verb_noun_kernel, n)

@@ -464,10 +464,9 @@ TEST(Schedules, APieceThatFailsEndsTheOtherOne) {
     const auto goes_on = [&](HostLauncher& on) {
       for (; launches < 1000; ++launches) on.items(append_digit_kernel_object{}, 1, &number, 0);
     };
-    expect_mentions(fault_of([&] {
-                      first_fails ? launcher.side_by_side(fails, goes_on) : launcher.side_by_side(goes_on, fails);
-                    }),
-                    {"diverging_barrier_kernel"});
+    expect_mentions(
+        fault_of([&] { first_fails ? launcher.side_by_side(fails, goes_on) : launcher.side_by_side(goes_on, fails); }),
+        {"diverging_barrier_kernel"});
     EXPECT_NO_THROW(digits_of_two_pieces(launcher));
   }
 }
