@@ -4,7 +4,7 @@
 #include <system_error>
 #include <thread>
 
-#include "model/backend.h"
+#include "model/error.h"
 
 namespace cutproof::gpu {
 

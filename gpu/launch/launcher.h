@@ -17,9 +17,8 @@
 //                                                              if *flag is not 0 when the work before it is done
 //   void while_nonzero(int* flag, Body);                       again and again while *flag is not 0
 //   template <class First, class Second>
-//   void side_by_side(First, Second);                          what the two do, each in its order, happens in any
-//   order,
-//                                                              or at once: neither touches what the other writes
+//   void side_by_side(First, Second);                          each of the two launches in its order, one beside the
+//                                                              other: neither touches what the other writes
 //   void exclusive_scan(const int* in, int* out, int64_t count, int* total, const int* used = nullptr);
 //                                                              out[i] = Σ in[0..i), *total = Σ all; in == out is
 //                                                              allowed
