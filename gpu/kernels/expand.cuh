@@ -157,10 +157,10 @@ CUTPROOF_KERNEL(end_layer_kernel);
 
 // --- Carrying out ----------------------------------------------------------------------------------------------------
 
-// Scratch by particle: where its memberships began, and how many there will be; the latter then becomes the place where
-// the next one goes.
-CUTPROOF_BOTH inline int* old_begin(const DeviceView& w) { return w.particle_scratch; }
-CUTPROOF_BOTH inline int* new_count(const DeviceView& w) { return w.particle_scratch + w.particles; }
+// By particle: where its memberships began, and how many there will be; the latter then becomes the place where the
+// next one goes. (Not in particle_scratch, which the skin has meanwhile.)
+CUTPROOF_BOTH inline int* old_begin(const DeviceView& w) { return w.class_data; }
+CUTPROOF_BOTH inline int* new_count(const DeviceView& w) { return w.class_data + w.particles; }
 CUTPROOF_BOTH inline int old_count(const DeviceView& w, int64_t p) {
   return (p + 1 < w.particles ? old_begin(w)[p + 1] : w.counters->memberships_before) - old_begin(w)[p];
 }

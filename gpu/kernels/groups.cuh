@@ -329,7 +329,8 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
       pair_begin += next[2];
       block.sync();  // before the next tile has others
       if (count == 0) continue;
-      w.class_data[first] = static_cast<unsigned long long>(group_begin) << 32 | static_cast<unsigned>(place_begin);
+      w.class_data[2 * int64_t{first}] = group_begin;
+      w.class_data[2 * int64_t{first} + 1] = place_begin;
       for (int chunk = 0; chunk < own; ++chunk) {
         const int left = count - chunk * kMostInGroup;
         GroupHead head = {};
@@ -348,11 +349,11 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
       const int entry = entry_at(k);
       if (entry < 0) continue;
       const int p = members[k], rank = rank_at(k);
-      const unsigned long long data = w.class_data[block.load(&classes[entry]) - 1];
-      const int o = static_cast<int>(data & 0xffffffffu) + rank;
+      const int* const data = w.class_data + 2 * int64_t{block.load(&classes[entry]) - 1};
+      const int o = data[1] + rank;
       const bool loose = rank >= grouped_of(block.load(&sizes[entry]));
       w.group_at[p] = loose                      ? int{kLoose}
-                      : rank % kMostInGroup == 0 ? static_cast<int>(data >> 32) + rank / kMostInGroup
+                      : rank % kMostInGroup == 0 ? data[0] + rank / kMostInGroup
                                                  : int{kInside};
       place(w, p, o);
       if (loose) w.loose_places[block.atomic_add(&counters.loose, 1)] = o;

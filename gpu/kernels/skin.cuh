@@ -102,8 +102,8 @@ inline constexpr int kReserveThreads = 512;
 // Particles that change the cells around them, ascending: as many as Counters::skin_changes. And for each of them,
 // first how many vertices and cells it needs, then how many those before it do.
 CUTPROOF_BOTH inline int* changed(const DeviceView& w) { return w.fallen; }
-CUTPROOF_BOTH inline int* new_vertices(const DeviceView& w) { return w.skin_counts; }
-CUTPROOF_BOTH inline int* new_cells(const DeviceView& w) { return w.skin_counts + w.particles; }
+CUTPROOF_BOTH inline int* new_vertices(const DeviceView& w) { return w.particle_scratch; }
+CUTPROOF_BOTH inline int* new_cells(const DeviceView& w) { return w.particle_scratch + w.particles; }
 // By particle: the corners at which it is the lowest of its cell's that change, as bits: those cells are its own.
 CUTPROOF_BOTH inline unsigned char* own_corners(const DeviceView& w) { return w.particle_flag; }
 
