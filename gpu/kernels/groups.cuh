@@ -352,9 +352,7 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
       const int* const data = w.class_data + 2 * int64_t{block.load(&classes[entry]) - 1};
       const int o = data[1] + rank;
       const bool loose = rank >= grouped_of(block.load(&sizes[entry]));
-      w.group_at[p] = loose                      ? int{kLoose}
-                      : rank % kMostInGroup == 0 ? data[0] + rank / kMostInGroup
-                                                 : int{kInside};
+      w.group_at[p] = loose ? int{kLoose} : rank % kMostInGroup == 0 ? data[0] + rank / kMostInGroup : int{kInside};
       place(w, p, o);
       if (loose) w.loose_places[block.atomic_add(&counters.loose, 1)] = o;
     }
