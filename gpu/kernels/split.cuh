@@ -537,11 +537,14 @@ CUTPROOF_DEVICE void rest_frames_of_components_kernel(Block& block, DeviceView w
   using namespace split_detail;
   Counters& counters = *w.counters;
   if (counters.failed) {
-    for (int64_t k = block.first(); k < counters.debris; k += block.stride()) {
+    if (block.index() != 0) return;
+    for (int k = block.thread(); k < counters.debris; k += block.size()) {
       const int p = w.fallen[counters.fallen + k];
       w.death[p] = -1;
       block.store(&w.debris_anywhere[body_index(w, p)], 1);
     }
+    block.sync();
+    if (block.thread() == 0) counters.debris = 0;
     return;
   }
   const int first_new = counters.scratch[kFirstNewSlot], added = counters.scratch[kNewClusters];
