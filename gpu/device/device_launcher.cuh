@@ -211,7 +211,6 @@ struct DeviceResources {
   DeviceMemory temporary;
   std::vector<Stream> inner;                // for capturing bodies of conditions, by depth
   std::shared_ptr<DeviceResources> beside;  // null: nothing runs beside anything
-  Event parted, met;                        // for capturing that
 
   DeviceResources() {
     int device = 0;
@@ -245,6 +244,36 @@ inline void capture_info(cudaStream_t stream, cudaGraph_t* graph, const cudaGrap
 #endif
   if (status != cudaStreamCaptureStatusActive) throw MachineError("CUDA failed: a stream stopped being captured.");
 }
+// What the next node that is captured on a stream waits for.
+class Dependencies {
+ public:
+  static Dependencies of(cudaStream_t stream) {
+    cudaGraph_t graph = nullptr;
+    const cudaGraphNode_t* nodes = nullptr;
+    const cudaGraphEdgeData* edges = nullptr;
+    std::size_t count = 0;
+    capture_info(stream, &graph, &nodes, &edges, &count);
+    Dependencies found;
+    found.nodes_.assign(nodes, nodes + count);
+    if (edges != nullptr) found.edges_.assign(edges, edges + count);
+    return found;
+  }
+  // how: cudaStreamSetCaptureDependencies, instead of what there is, or cudaStreamAddCaptureDependencies.
+  void give(cudaStream_t stream, unsigned how) const {
+    auto nodes = nodes_;  // not taken as constant
+    const cudaGraphEdgeData* const edges = edges_.empty() ? nullptr : edges_.data();
+#if CUDART_VERSION >= 13000
+    CUTPROOF_CUDA(cudaStreamUpdateCaptureDependencies(stream, nodes.data(), edges, nodes.size(), how));
+#else
+    CUTPROOF_CUDA(cudaStreamUpdateCaptureDependencies_v2(stream, nodes.data(), edges, nodes.size(), how));
+#endif
+  }
+
+ private:
+  std::vector<cudaGraphNode_t> nodes_;
+  std::vector<cudaGraphEdgeData> edges_;
+};
+
 inline cudaGraphNode_t append_node(cudaStream_t stream, cudaGraphNodeParams* parameters) {
   cudaGraph_t graph = nullptr;
   const cudaGraphNode_t* dependencies = nullptr;
@@ -351,22 +380,21 @@ class DeviceLauncher {
       second(*this);
       return;
     }
-    if (resources_->beside == nullptr) {
-      resources_->beside = std::make_shared<detail::DeviceResources>();
-      resources_->parted = make_event();
-      resources_->met = make_event();
+    if (resources_->beside == nullptr) resources_->beside = std::make_shared<detail::DeviceResources>();
+    DeviceLauncher other(mode_, stream_, resources_->beside, depth_);
+    if (mode_ == Mode::measure) {
+      first(*this);
+      second(other);
+      return;
     }
-    DeviceLauncher other(mode_, resources_->beside->stream(depth_), resources_->beside, depth_);
-    if (mode_ == Mode::capture) {
-      CUTPROOF_CUDA(cudaEventRecord(resources_->parted.get(), stream_));
-      CUTPROOF_CUDA(cudaStreamWaitEvent(other.stream_, resources_->parted.get()));
-    }
+    // Both on one stream, told anew what it waits for: a second one that were not brought back, because some call fails
+    // in between, would be left in the middle of capturing.
+    const auto parted = detail::Dependencies::of(stream_);
     first(*this);
+    const auto end_of_first = detail::Dependencies::of(stream_);
+    parted.give(stream_, cudaStreamSetCaptureDependencies);
     second(other);
-    if (mode_ == Mode::capture) {
-      CUTPROOF_CUDA(cudaEventRecord(resources_->met.get(), other.stream_));
-      CUTPROOF_CUDA(cudaStreamWaitEvent(stream_, resources_->met.get()));
-    }
+    end_of_first.give(stream_, cudaStreamAddCaptureDependencies);
     after_launch_ = false;
   }
 

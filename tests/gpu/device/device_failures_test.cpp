@@ -164,7 +164,6 @@ INTERCEPT(cudaEventElapsedTime, (float* milliseconds, cudaEvent_t begin, cudaEve
 INTERCEPT(cudaEventRecord, (cudaEvent_t event, cudaStream_t stream), (event, stream))
 INTERCEPT_WAIT(cudaEventSynchronize, (cudaEvent_t event), (event))
 INTERCEPT_WAIT(cudaStreamSynchronize, (cudaStream_t stream), (stream))
-INTERCEPT(cudaStreamWaitEvent, (cudaStream_t stream, cudaEvent_t event, unsigned flags), (stream, event, flags))
 INTERCEPT(cudaMemGetInfo, (size_t * free, size_t* all), (free, all))
 INTERCEPT(cudaMemAdvise, (const void* memory, size_t bytes, cudaMemoryAdvise advice, cudaMemLocation place),
           (memory, bytes, advice, place))
