@@ -1072,28 +1072,9 @@ CUTPROOF_DEVICE inline Pace pace_of(const DeviceView& w, int b) {
 
 }  // namespace step_detail
 
-// Every frame counts its own impulse and removals.
-template <class Block>
-CUTPROOF_DEVICE void begin_particles(Block& block, const DeviceView& w) {
-  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
-    const int p = static_cast<int>(i);
-    const int b = step_detail::body_index(w, p);
-    if (!running(w, b)) continue;
-    w.impulse[p] = Float4{};
-    const int death = w.death[p];
-    if (death >= 2 * w.frame[b] && death != kDeadBefore) w.death[p] = kDeadBefore;
-  }
-}
-template <class Block>
-CUTPROOF_DEVICE void begin_particles_kernel(Block& block, const DeviceView& w) {
-  begin_particles(block, w);
-}
-CUTPROOF_KERNEL(begin_particles_kernel);
-
 // Clears what a frame counts, and says what its bodies need. The first kernel of a span that begins with the step.
-// particles_too: what begin_particles_kernel does is done here.
 template <class Block>
-CUTPROOF_DEVICE void begin_frame_kernel(Block& block, const DeviceView& w, Span span, bool particles_too) {
+CUTPROOF_DEVICE void begin_frame_kernel(Block& block, const DeviceView& w, Span span) {
   using namespace step_detail;
   begin_span(block, w, span);
   if (block.first() == 0) {
@@ -1109,7 +1090,15 @@ CUTPROOF_DEVICE void begin_frame_kernel(Block& block, const DeviceView& w, Span 
     w.pace[b] = pace;
     store_numbers(w, static_cast<int>(b), pace);
   }
-  if (particles_too) begin_particles(block, w);
+  for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
+    const int p = static_cast<int>(i);
+    const int b = body_index(w, p);
+    if (!running(w, b)) continue;
+    // Every frame counts its own impulse and removals.
+    w.impulse[p] = Float4{};
+    const int death = w.death[p];
+    if (death >= 2 * w.frame[b] && death != kDeadBefore) w.death[p] = kDeadBefore;
+  }
 }
 CUTPROOF_KERNEL(begin_frame_kernel);
 
@@ -1917,9 +1906,7 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
   const int64_t particles = w.particles > w.bodies ? w.particles : w.bodies;
   const int64_t of_places = (w.place_capacity + kParticleTeam - 1) / kParticleTeam;
   const int64_t teams = w.group_capacity > of_places ? w.group_capacity : of_places;
-  // Of a large load what memory limits goes on beside what instructions do.
-  const bool large = w.particles > kMostByRows;
-  launcher.items(begin_frame_kernel_object{}, large ? w.bodies : particles, w, span, !large);
+  launcher.items(begin_frame_kernel_object{}, particles, w, span);
   if (!span.is_whole_frame()) enqueue_groups_if_stale(launcher, w);
   // Of a small load each group has lanes enough for its rows; of a large one they would all do what one can do for
   // three.
@@ -1943,15 +1930,8 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
       start(std::integral_constant<int, kLanes>{});
     });
   };
-  const auto sum_groups = [&](Launcher& on) {
-    by_particles(
-        [&](auto lanes) { on.teams(sum_groups_kernel_object<kContacts, lanes.value>{}, lanes.value, teams, w); });
-  };
-  if (large) {
-    launcher.side_by_side(sum_groups, [&](Launcher& on) { on.items(begin_particles_kernel_object{}, particles, w); });
-  } else {
-    sum_groups(launcher);
-  }
+  by_particles(
+      [&](auto lanes) { launcher.teams(sum_groups_kernel_object<kContacts, lanes.value>{}, lanes.value, teams, w); });
   for (int substep = 0; substep < plan.substeps; ++substep) {
     by_rows([&](auto rows) {
       launcher.teams(begin_substep_kernel_object<kContacts, kRetarded, rows.value>{}, kParticleTeam, teams, w, substep);

@@ -600,7 +600,7 @@ Stepped step(const cutproof::Setup& setup, const State& state) {
 
 // The step's kernels up to where a frame's first substep begins, and what begins one.
 void begin_frame(HostLauncher& launcher, const DeviceView& w) {
-  launcher.items(begin_frame_kernel_object{}, w.particles, w, Span{Stage::step, Stage::step}, true);
+  launcher.items(begin_frame_kernel_object{}, w.particles, w, Span{Stage::step, Stage::step});
   enqueue_groups_if_stale(launcher, w);
   launcher.teams(sum_groups_kernel_object<true, step_detail::kParticleTeam>{}, step_detail::kParticleTeam,
                  w.group_capacity, w);
