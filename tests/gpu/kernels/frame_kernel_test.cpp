@@ -10,6 +10,7 @@
 #include "fixtures/bodies.h"
 #include "fixtures/cook.h"
 #include "gpu/host/host_launcher.h"
+#include "gpu/host/thread_schedule.h"
 #include "gpu/launch/frame.h"
 #include "model/at.h"
 #include "tests/gpu/kernels/cluster_stages.h"
@@ -19,6 +20,7 @@ namespace {
 
 using testing::Bench;
 using testing::Bodies;
+using testing::expect_memberships_agree;
 
 bool is_in_order(const StagingBuffers& staging, std::size_t p) {
   const auto list = staging.memberships.begin();
@@ -59,6 +61,52 @@ TEST(Frame, BringsMembershipsIntoTheirOrder) {
   }
   EXPECT_GT(out_of_order, 100);
   EXPECT_GT(left_alone, 1000);
+}
+
+// What runs side by side in a frame touches nothing of one another: whole frames that cut, merge, expand and have a
+// skin end with the same bits in whatever order their launches come.
+TEST(Frame, RunsItsPiecesSideBySideInAnyOrder) {
+  int growing = 0, merging = 0, first_skins = 0;
+  for (std::uint64_t seed = 1; seed <= 120; ++seed) {
+    SCOPED_TRACE(seed);
+    property_tests::Random random(seed);
+    Bodies bodies;
+    std::int64_t frames = 0;
+    for (int k = 0; k < 3; ++k) {
+      auto [setup, state] = property_tests::instance_of(property_tests::draw_case(random.seed(), 60));
+      setup.expand.rule = ExpandRule::published;
+      setup.merge.rule = MergeRule::deterministic;
+      setup.skin.wanted = true;
+      frames = std::max(frames, setup.frame_count());
+      bodies.add(std::move(setup), std::move(state));
+    }
+    Bench in_order(bodies), in_turns(std::move(bodies));
+    HostLauncher plain;
+    HostLauncher scheduled(HostLauncher::Simulated{.schedule = random_walk(seed), .live_blocks = 2});
+    const auto run = [](HostLauncher& launcher, Bench& bench) {
+      enqueue_span(launcher, bench.view, bench.plan, Span{Stage::step, Stage::skin}, [](Stage) {});
+    };
+    for (Bench* bench : {&in_order, &in_turns}) {
+      enqueue_groups_if_stale(plain, bench->view);
+      bench->spoil_scratch();
+    }
+    for (std::int64_t f = 0; f < frames; ++f) {
+      const Counters& counters = in_order.staging.counters.front();
+      run(plain, in_order);
+      growing += counters.skin_changes > 0 && counters.expanding != 0 && counters.growth > 0;
+      merging += counters.changing != 0 && counters.small > 0;
+      first_skins += f == 0 && counters.changing != 0;
+      run(scheduled, in_turns);
+      ASSERT_EQ(in_order.fault(), 0);
+      ASSERT_EQ(in_turns.fault(), 0);
+      ASSERT_TRUE(in_order.states() == in_turns.states()) << "frame " << f;
+      expect_memberships_agree(in_turns.staging);
+      ASSERT_EQ(in_turns.staging.counters.front().groups, counters.groups);
+    }
+  }
+  EXPECT_GT(growing, 20);
+  EXPECT_GT(merging, 20);
+  EXPECT_GT(first_skins, 20);
 }
 
 // What nobody has marked costs no look: a list that is put out of order behind everybody's back stays so.
