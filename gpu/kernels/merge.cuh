@@ -304,7 +304,8 @@ CUTPROOF_DEVICE void hand_over(Block& block, const DeviceView& w, int s, int t, 
 }
 
 // Carries out the proposals that got both ends: those of them, if it is called again, that found no places. There is
-// another round if one got neither, or a union is still small: nobody else would propose in it.
+// another round if one did not get both: nobody else would propose in it. (Whoever is small and taken has proposed
+// something itself, and lost, or never will again.)
 template <class Block>
 CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, DeviceView w) {
   int* place = block.template shared<int>(1);
@@ -349,7 +350,6 @@ CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, DeviceView w) {
       w.slot_size[t] = target_size + missing;
       w.slot_size[s] = 0;
       block.store(&rest_marks(w)[t], 1);
-      if (target_size + missing < body.tau) block.store(&c.merging, 1);
     }
   }
   if (block.first() == 0) c.round = c.merging_round + 1;

@@ -28,19 +28,28 @@ bool is_in_order(const StagingBuffers& staging, std::size_t p) {
                         [](int a, int b) { return static_cast<unsigned>(a) < static_cast<unsigned>(b); });
 }
 
+// Three random bodies, as `change` leaves their setups; and how many frames the longest has.
+template <class Change>
+Bodies three_bodies(std::uint64_t seed, Change change, std::int64_t& frames) {
+  property_tests::Random random(seed);
+  Bodies bodies;
+  frames = 0;
+  for (int k = 0; k < 3; ++k) {
+    auto [setup, state] = property_tests::instance_of(property_tests::draw_case(random.seed(), 60));
+    change(setup);
+    frames = std::max(frames, setup.frame_count());
+    bodies.add(std::move(setup), std::move(state));
+  }
+  return bodies;
+}
+
 TEST(Frame, BringsMembershipsIntoTheirOrder) {
   int out_of_order = 0, left_alone = 0;  // the latter in frames that mark others
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     SCOPED_TRACE(seed);
-    property_tests::Random random(seed);
-    Bodies bodies;
     std::int64_t frames = 0;
-    for (int k = 0; k < 3; ++k) {
-      auto [setup, state] = property_tests::instance_of(property_tests::draw_case(random.seed(), 60));
-      frames = std::max(frames, setup.frame_count());
-      bodies.add(std::move(setup), std::move(state));
-    }
-    Bench bench(std::move(bodies));
+    Bench bench(three_bodies(
+        seed, [](cutproof::Setup&) {}, frames));
     HostLauncher launcher;
     for (std::int64_t f = 0; f < frames; ++f) {
       enqueue_span(launcher, bench.view, bench.plan, Span{Stage::step, Stage::expand}, [](Stage) {});
@@ -69,18 +78,16 @@ TEST(Frame, RunsItsPiecesSideBySideInAnyOrder) {
   int growing = 0, merging = 0, first_skins = 0;
   for (std::uint64_t seed = 1; seed <= 120; ++seed) {
     SCOPED_TRACE(seed);
-    property_tests::Random random(seed);
-    Bodies bodies;
     std::int64_t frames = 0;
-    for (int k = 0; k < 3; ++k) {
-      auto [setup, state] = property_tests::instance_of(property_tests::draw_case(random.seed(), 60));
-      setup.expand.rule = ExpandRule::published;
-      setup.merge.rule = MergeRule::deterministic;
-      setup.skin.wanted = true;
-      frames = std::max(frames, setup.frame_count());
-      bodies.add(std::move(setup), std::move(state));
-    }
-    Bench in_order(bodies), in_turns(std::move(bodies));
+    const Bodies bodies = three_bodies(
+        seed,
+        [](cutproof::Setup& setup) {
+          setup.expand.rule = ExpandRule::published;
+          setup.merge.rule = MergeRule::deterministic;
+          setup.skin.wanted = true;
+        },
+        frames);
+    Bench in_order(bodies), in_turns(bodies);
     HostLauncher plain;
     HostLauncher scheduled(HostLauncher::Simulated{.schedule = random_walk(seed), .live_blocks = 2});
     const auto run = [](HostLauncher& launcher, Bench& bench) {
