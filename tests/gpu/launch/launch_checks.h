@@ -675,26 +675,21 @@ CUTPROOF_KERNEL(add_up_kernel);
 // other where both need temporary memory, have conditions, or are side by side themselves.
 template <class Machine>
 void check_side_by_side(Machine& machine) {
-  constexpr int kKeys = 70'001, kDifferent[2] = {20'011, 30'011};
-  auto values = machine.array(std::vector<int>(6));  // of each piece: a number, a loop's counter, what is counted
+  constexpr int kPieces = 4;  // two in the open, two within a condition
+  constexpr int kKeys = 70'001, kRoom = 70'016, kDifferent[kPieces] = {20'011, 30'011, 25'013, 35'023};
+  auto values = machine.array(std::vector<int>(3 * kPieces));  // of each: a number, a loop's counter, what is counted
   auto sum = machine.array(std::vector<int>(2, -1));
-  std::set<unsigned long long> expected[2];
-  for (int piece = 0; piece < 2; ++piece) {
-    for (int i = 0; i < kDifferent[piece]; ++i) {
-      expected[piece].insert(static_cast<unsigned long long>(scramble(static_cast<unsigned>(i), 7u)) << 17);
-    }
-  }
-  auto first_keys = machine.array(std::vector<unsigned long long>(kKeys, 42));
-  auto second_keys = machine.array(std::vector<unsigned long long>(kKeys, 42));
-  auto numbers = machine.array(std::vector<int>(2, -1));
+  auto keys = machine.array(std::vector<unsigned long long>(kPieces * kRoom, 42));
+  auto numbers = machine.array(std::vector<int>(kPieces, -1));
   int* const value = values.at();
   const set_kernel_object set;
   const add_kernel_object add;
-  const auto piece = [&](auto& on, int which, unsigned long long* keys) {
+  const auto piece = [&](auto& on, int which) {
     int* const own = value + 3 * which;
-    on.items(make_keys_kernel_object{}, kKeys, keys, numbers.at() + which, int{kKeys}, kDifferent[which]);
+    unsigned long long* const own_keys = keys.at() + which * kRoom;
+    on.items(make_keys_kernel_object{}, kKeys, own_keys, numbers.at() + which, int{kKeys}, kDifferent[which]);
     on.items(add, 1, own, 10);
-    on.sort_unique(keys, numbers.at() + which, kKeys);
+    on.sort_unique(own_keys, numbers.at() + which, kKeys);
     on.while_nonzero(own + 1, [&](auto& inside) {
       inside.items(add, 1, own + 2, 1);
       inside.items(add, 1, own + 1, -1);
@@ -702,12 +697,11 @@ void check_side_by_side(Machine& machine) {
     on.if_nonzero(own + 2, [&](auto& inside) { inside.items(add, 1, own, 100 + which); });
   };
   machine.run([&](auto& launcher) {
-    for (int which = 0; which < 2; ++which) {
+    for (int which = 0; which < kPieces; ++which) {
       launcher.items(set, 1, value + 3 * which, 1 + which);
       launcher.items(set, 1, value + 3 * which + 1, 3 + which);
     }
-    launcher.side_by_side([&](auto& on) { piece(on, 0, first_keys.at()); },
-                          [&](auto& on) { piece(on, 1, second_keys.at()); });
+    launcher.side_by_side([&](auto& on) { piece(on, 0); }, [&](auto& on) { piece(on, 1); });
     launcher.items(add_up_kernel_object{}, 1, value, value + 3, sum.at());
     // Within a condition, and again.
     launcher.if_nonzero(sum.at(), [&](auto& inside) {
@@ -720,15 +714,22 @@ void check_side_by_side(Machine& machine) {
           },
           [&](auto& on) { on.items(add, 1, value + 5, 50); });
       inside.items(add_up_kernel_object{}, 1, sum.at() + 1, value + 5, sum.at() + 1);
+      inside.side_by_side([&](auto& on) { piece(on, 2); }, [&](auto& on) { piece(on, 3); });
+      inside.items(add_up_kernel_object{}, 1, sum.at() + 1, value + 6, sum.at() + 1);
+      inside.items(add_up_kernel_object{}, 1, sum.at() + 1, value + 9, sum.at() + 1);
     });
   });
-  EXPECT_EQ(sum.get(), (std::vector<int>{224, 224 + 4000 + 54}));
-  EXPECT_EQ(values.get(), (std::vector<int>{2111, 0, 3, 2113, 0, 54}));
-  for (int which = 0; which < 2; ++which) {
-    ASSERT_EQ(numbers.get()[static_cast<std::size_t>(which)], static_cast<int>(expected[which].size()));
-    std::vector<unsigned long long> got = (which == 0 ? first_keys : second_keys).get();
-    got.resize(expected[which].size());
-    EXPECT_EQ(got, std::vector<unsigned long long>(expected[which].begin(), expected[which].end())) << which;
+  EXPECT_EQ(sum.get(), (std::vector<int>{224, 224 + 4000 + 54 + 115 + 117}));
+  EXPECT_EQ(values.get(), (std::vector<int>{2111, 0, 3, 2113, 0, 54, 115, 0, 5, 117, 0, 6}));
+  for (int which = 0; which < kPieces; ++which) {
+    std::set<unsigned long long> expected;
+    for (int i = 0; i < kDifferent[which]; ++i) {
+      expected.insert(static_cast<unsigned long long>(scramble(static_cast<unsigned>(i), 7u)) << 17);
+    }
+    ASSERT_EQ(numbers.get()[static_cast<std::size_t>(which)], static_cast<int>(expected.size()));
+    const std::vector<unsigned long long> all = keys.get();
+    const auto from = all.begin() + which * kRoom;
+    EXPECT_TRUE(std::equal(expected.begin(), expected.end(), from)) << which;
   }
 }
 
