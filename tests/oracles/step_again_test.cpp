@@ -418,6 +418,30 @@ TEST(StepModel, DrawsEachCoordinateWhereAMatrixIsLostAndThePreviousRotation) {
   EXPECT_LT(nearest_to({0.36, -0.8, 0.48}), 1e-5);
 }
 
+// A particle in front of the cutting edge, and by less than a rounding beside the plane of the blade: in single
+// precision it is as if it lay in the plane, and the edge pushes it straight ahead. In double precision it leads it
+// sideways, too.
+TEST(StepModel, TakesWhatIsNearThePlaneForInItInSinglePrecision) {
+  StepScene scene{setup_of(block_body(1, 1, 2, kSpacing)), {}, {}};
+  cutproof::Setup& setup = scene.setup;
+  setup.step.substeps = 1;
+  setup.step.iterations = 1;
+  setup.step.gravity = {};
+  scene.before = state_of(setup.body, {{0}, {1}});
+  const double beside = 1e-7 * kSpacing;
+  stand_in_plane(setup, setup.body.rest_position(0) + Vec3{beside, 0, 0.1 + 0.3 * kSpacing});
+  const auto pushed = [&](double unit_roundoff) {
+    return StepModel(setup, scene.before, unit_roundoff).run({{}, 0, 2e-3 * kSpacing, {}}).x[0] - scene.before.x[0];
+  };
+  const Vec3 in_double = pushed(0x1p-53);
+  EXPECT_LT(in_double.z, -0.1 * kSpacing);
+  EXPECT_LT(in_double.x, -0.1 * beside);
+  round_to_single(setup.body, scene.before);
+  const Vec3 in_single = pushed(0x1p-24);
+  EXPECT_NEAR(in_single.z, in_double.z, 1e-6 * kSpacing);
+  EXPECT_EQ(in_single.x, 0);
+}
+
 // A layer that rests on a wall exactly, beside a blade, in accelerated iterations: where rounding puts the wall decides
 // nothing, because what nearly touches counts as touching.
 TEST(AdmissibleStep, TakesALayerOnAWallAsOneRoundingPutsIt) {
