@@ -331,6 +331,10 @@ TEST(AdmissibleStep, TakesManyTiesAsTheyWereAndExcusesNothingElse) {
     State wrong = led.after;
     wrong.v[0].y += 0.1 * kSpacing / setup.substep_length[0];
     EXPECT_FALSE(admissible_step(setup, scene.before, wrong).holds);
+    // No particle moves otherwise than its neighbours do.
+    wrong = led.after;
+    for (Vec3& v : wrong.v) v.y += 0.1 * kSpacing / setup.substep_length[0];
+    EXPECT_FALSE(admissible_step(setup, scene.before, wrong).holds);
     wrong = led.after;
     wrong.impulse.x += 0.01;
     EXPECT_FALSE(admissible_step(setup, scene.before, wrong).holds);
