@@ -105,6 +105,13 @@ for part in $parts; do
           fixtures/scenes/small_block.json --backend gpu-eager
         try "sanitizer_${tool}_retarded" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof run \
           fixtures/scenes/small_block.json --backend gpu-eager --set step.retardation=0.004 --frames 30
+      done
+      # The graph as well, by those that get through its conditions, which they do with nothing else on the device.
+      for tool in memcheck initcheck; do
+        for scene in small_block kidney_discontinuous cluster_growth; do
+          try "sanitizer_${tool}_graph_$scene" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof run \
+            "fixtures/scenes/$scene.json" --backend gpu --frames 30
+        done
       done ;;
     timings)
       try rotations cutproof bench rotations --backend gpu --cases --json "$results/rotations.json"
