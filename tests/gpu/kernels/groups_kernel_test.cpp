@@ -21,6 +21,7 @@
 #include "property_tests/cases.h"
 #include "property_tests/random.h"
 #include "reference_cpu/reference.h"
+#include "tests/oracles/states.h"
 
 namespace cutproof::gpu {
 namespace {
@@ -438,6 +439,43 @@ TEST(Groups, FollowListsThatAreMovedTogether) {
                 followed.in_part, followed.anew);
     EXPECT_GT(followed.moved, 10);
   }
+}
+
+// Three boxes in a row, of which the one in the middle is small and shares a layer with either end, merged into one of
+// these. What it shared with the other one are groups of that one, which else nothing changes. (A fourth is there so
+// that there is room for new groups behind those that stay.)
+TEST(Groups, FollowParticlesThatPassFromOneClusterToAnother) {
+  const Body body = fixtures::block(120, 3, 3, 0.01);
+  const auto layers = [&](int from, int to) {
+    std::vector<int32_t> members;
+    for (int32_t p = 0; p < body.particle_count(); ++p) {
+      if (p % 120 >= from && p % 120 <= to) members.push_back(p);
+    }
+    return members;
+  };
+  const std::vector<int32_t> ends[2] = {layers(0, 3), layers(4, 8)}, middle = layers(3, 4), rest = layers(9, 119);
+  int passed = 0;
+  for (const auto& lists : {std::vector{ends[0], middle, ends[1], rest}, std::vector{ends[1], middle, ends[0], rest}}) {
+    cutproof::Setup setup = cutproof::testing::setup_of(body);
+    setup.merge.rule = MergeRule::deterministic;
+    const Bodies bodies{{setup}, {cutproof::testing::state_of(body, lists, 20)}};
+    StagingBuffers staging = make_staging_buffers(bodies.setups, bodies.states, kNewton, Capacity{});
+    const DeviceView view = staging.view();
+    const Plan plan = make_plan(bodies.setups, bodies.states, kNewton, SplitMethod::blocks);
+    HostLauncher launcher;
+    enqueue_groups_if_stale(launcher, view);
+    staging.cut[0] = 2 * staging.frame[0];
+    enqueue_merge(launcher, view, plan);
+    launcher.teams(sort_memberships_kernel_object{}, kParticleTile, particle_tiles(view.particles), view);
+    ASSERT_EQ(staging.slot_size[1], 0);
+    passed += staging.slot_size[2] > static_cast<int>(lists[2].size());
+    enqueue_groups(launcher, view);
+    ASSERT_GT(staging.counters.front().groups_before, 0) << "all were made anew";
+    const Grouped fresh(Bodies{bodies.setups, extract_states(staging, bodies.setups)}, HostLauncher(), &staging);
+    ASSERT_NO_FATAL_FAILURE();
+    EXPECT_TRUE(tables_of(staging) == tables_of(fresh.staging));
+  }
+  EXPECT_EQ(passed, 1) << "once, groups are listed with a cluster that neither is the small one nor gets its particles";
 }
 
 TEST(Groups, AreTheSameUnderEverySchedule) {
