@@ -358,6 +358,39 @@ TEST(GpuStep, AccountsForWhatContactsAndGripsGive) {
   }
 }
 
+// Two grips that share particles take turns: what both name goes with the one that is active, and is free in between.
+TEST(GpuStep, GoesWithEachOfTheGripsThatShareAParticle) {
+  for (const auto& [solver, acceleration] : kIterations) {
+    Random random(35);
+    cutproof::Setup setup = setup_of(fixtures::block(8, 6, 5, 0.01));
+    setup.step.solver = solver;
+    setup.step.acceleration = acceleration;
+    setup.step.substeps = 5;
+    Grip first, second;
+    for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
+      if (i % 8 < 3) first.particles.push_back(i);
+      if (i % 8 == 2 || i % 8 == 3) second.particles.push_back(i);
+    }
+    for (const bool of_first : {true, false}) {
+      Grip& grip = of_first ? first : second;
+      for (int s = 0; s < setup.step.substeps; ++s) {
+        grip.active.push_back(of_first ? s < 2 : s > 2);
+        grip.displacement.push_back(0.001 * vector(random));
+      }
+    }
+    setup.grips = {first, second};
+    State state = cooked(setup);
+    perturb(setup, state, random);
+    state = seeded(setup, state);
+    State expected = state;
+    reference::step(setup, expected);
+    const State reached = kernel_step(setup, state);
+    const double bound = frame_bound(setup, state, expected);
+    EXPECT_LE(greatest_distance(reached.x, expected.x), bound);
+    EXPECT_LE(norm(reached.impulse - expected.impulse), 2 * bound / setup.substep_length[0] * total_mass(setup));
+  }
+}
+
 TEST(GpuStep, KeepsNaNInTheBodyThatHadIt) {
   Random random(25);
   cutproof::Setup setup = setup_of(fixtures::block(5, 5, 5, 0.01));
