@@ -276,6 +276,17 @@ CaseGrip draw_grip(Random& random, const Case& c) {
   return grip;
 }
 
+// Takes over what an earlier one releases, and some of what is beside it.
+CaseGrip draw_next_grip(Random& random, const CaseGrip& earlier) {
+  CaseGrip grip = earlier;
+  ++grip.high[random.index(3)];
+  for (int32_t& p : grip.pull) p = random.between(-5, 5);
+  grip.from = earlier.until + random.pick({0, 0, 1});
+  grip.until = random.chance(0.5) ? -1 : grip.from + random.between(1, 8);
+  grip.shared = true;
+  return grip;
+}
+
 void draw_dynamics(Random& random, Case& c) {
   if (random.chance(0.2)) {
     c.solver = Solver::published;
@@ -302,7 +313,10 @@ void draw_dynamics(Random& random, Case& c) {
   }
   if (random.chance(0.3)) {
     const int32_t grips = random.between(1, 2);
-    for (int32_t g = 0; g < grips; ++g) c.grips.push_back(draw_grip(random, c));
+    for (int32_t g = 0; g < grips; ++g) {
+      const bool takes_over = g > 0 && c.grips.back().until >= 0 && random.chance(0.5);
+      c.grips.push_back(takes_over ? draw_next_grip(random, c.grips.back()) : draw_grip(random, c));
+    }
   }
 }
 
@@ -441,21 +455,25 @@ void add_schedule(const Case& c, Vec3 first_node, Setup& setup) {
   setup.substep_length.assign(setup.blade_moves.size() / substeps, 1e-6 * c.time_step);
 }
 
-// A strip of substeps for each grip. What one grip holds no later one does, whenever it does.
+bool is_over_before(const CaseGrip& a, const CaseGrip& b) { return a.until >= 0 && a.until <= b.from; }
+
+// A strip of substeps for each grip.
 void add_grips(const Case& c, Setup& setup) {
-  std::vector<uint8_t> taken(c.nodes.size(), 0);
+  std::vector<std::vector<const CaseGrip*>> holding(c.nodes.size());
   const auto substeps = static_cast<int64_t>(setup.blade_moves.size());
   for (const CaseGrip& asked : c.grips) {
     Grip grip;
     for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
       const auto node = setup.body.grid.coordinates(setup.body.node[at(i)]);
-      bool inside = taken[at(i)] == 0;
+      bool inside = std::ranges::all_of(holding[at(i)], [&](const CaseGrip* other) {
+        return asked.shared && (is_over_before(*other, asked) || is_over_before(asked, *other));
+      });
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const int32_t k = node[axis] - 1;  // behind the ring of empty nodes
         inside = inside && asked.low[axis] <= k && k <= asked.high[axis];
       }
       if (!inside) continue;
-      taken[at(i)] = 1;
+      holding[at(i)].push_back(&asked);
       grip.particles.push_back(i);
     }
     for (int64_t s = 0; s < substeps; ++s) {
@@ -788,6 +806,7 @@ void simplify_grip(std::size_t k, Edits& edits) {
   edits.push_back([k](Case& c) { c.grips[k].from = 0; });
   edits.push_back([k](Case& c) { c.grips[k].until = -1; });
   edits.push_back([k](Case& c) { c.grips[k].high = c.grips[k].low; });
+  edits.push_back([k](Case& c) { c.grips[k].shared = false; });
 }
 
 }  // namespace
@@ -876,7 +895,20 @@ NLOHMANN_JSON_SERIALIZE_ENUM(Removal, {{Removal::usual, "usual"},
                                        {Removal::geometric, "geometric"},
                                        {Removal::strain, "strain"}})
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CaseWall, axis, side, offset, friction)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CaseGrip, low, high, pull, from, until)
+
+// Written where a grip is: those that were saved before read the same.
+void to_json(nlohmann::json& json, const CaseGrip& g) {
+  json = {{"low", g.low}, {"high", g.high}, {"pull", g.pull}, {"from", g.from}, {"until", g.until}};
+  if (g.shared) json["shared"] = true;
+}
+void from_json(const nlohmann::json& json, CaseGrip& g) {
+  json.at("low").get_to(g.low);
+  json.at("high").get_to(g.high);
+  json.at("pull").get_to(g.pull);
+  json.at("from").get_to(g.from);
+  json.at("until").get_to(g.until);
+  g.shared = json.value("shared", false);
+}
 
 // How the blade stands is written where it is not plain: strokes that were saved before read the same, wherever strokes
 // are kept (histories.h).

@@ -43,11 +43,13 @@ struct CaseWall {
   friend bool operator==(const CaseWall&, const CaseWall&) = default;
 };
 
-// Holds the particles of a box of nodes that no earlier grip of the case holds.
+// Holds the particles of a box of nodes that no earlier grip of the case holds at any time; or, of one that is shared,
+// at the same time.
 struct CaseGrip {
   Node low = {0, 0, 0}, high = {0, 0, 0};  // both included
   Quarters pull = {0, 0, 0};               // in each substep [h/100]; 0: pinned
   int32_t from = 0, until = -1;            // substeps of the run; -1: never released
+  bool shared = false;
   friend bool operator==(const CaseGrip&, const CaseGrip&) = default;
 };
 

@@ -66,6 +66,7 @@ void note_parameters(const Setup& setup, const State& before, const State& after
 void note_touches(const Touches& touches, CaseCoverage& seen) {
   const std::pair<const char*, bool> noted[] = {{"grip", touches.held},
                                                 {"grip released", touches.released},
+                                                {"grip taken over", touches.taken_over},
                                                 {"wall", touches.wall},
                                                 {"wall that is no floor", touches.wall_that_is_no_floor},
                                                 {"blade face", touches.blade_face},

@@ -75,6 +75,7 @@ inline constexpr std::array kCoverageClasses = {
     // Touches (touching.h).
     CoverageClass{"grip", Occurs::where_bodies_move},
     CoverageClass{"grip released", Occurs::where_bodies_move},
+    CoverageClass{"grip taken over", Occurs::where_bodies_move},
     CoverageClass{"wall", Occurs::often_where_bodies_move},
     CoverageClass{"wall that is no floor", Occurs::often_where_bodies_move},
     CoverageClass{"blade face", Occurs::often_where_bodies_move},

@@ -44,14 +44,20 @@ class Looker {
     // v = exp(-c dt) (x - x_prev) / dt
     to_moved_ = dt * std::exp(setup.step.damping * dt);
     held_.assign(after.x.size(), 0);
+    std::vector<uint8_t> let_go(after.x.size(), 0);  // by some grip
     for (const Grip& grip : setup.grips) {
       const bool was = std::any_of(grip.active.begin(), grip.active.begin() + static_cast<std::ptrdiff_t>(last),
                                    [](uint8_t active) { return active != 0; });
       for (const int32_t i : grip.particles) {
-        if (!before.alive[at(i)]) continue;
         if (grip.active[last] != 0) held_[at(i)] = 1;
-        (grip.active[last] != 0 ? seen_.held : seen_.released) |= grip.active[last] != 0 || was;
+        if (grip.active[last] == 0 && was) let_go[at(i)] = 1;
       }
+    }
+    for (std::size_t i = 0; i < held_.size(); ++i) {
+      if (!before.alive[i]) continue;
+      seen_.held |= held_[i] != 0;
+      seen_.released |= held_[i] == 0 && let_go[i] != 0;
+      seen_.taken_over |= held_[i] != 0 && let_go[i] != 0;
     }
     const bool blade_touches = setup.has_blade && setup.detect.criterion != Criterion::geometric;
     if (blade_touches && setup.blade_moves[last].down) move_ = &setup.blade_moves[last];

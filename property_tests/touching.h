@@ -21,8 +21,9 @@ struct Touches {
   bool blade_and_wall = false;  // one particle touches both
   // On a surface with friction: the particle moved along it in the last substep, or it did not though a neighbour did.
   bool slides = false, sticks = false;
-  bool held = false;      // by a grip
-  bool released = false;  // not held now, but in an earlier substep of the run
+  bool held = false;        // by a grip
+  bool released = false;    // not held now, but in an earlier substep of the run
+  bool taken_over = false;  // held by one grip now, by another in an earlier substep
 };
 
 // `before` and `after`: around the step of frame before.frame.

@@ -134,6 +134,16 @@ TEST(ACase, BecomesTheSetupThatItsFieldsSay) {
   ASSERT_EQ(setup.grips.size(), 2u);
   EXPECT_EQ(setup.grips[0].particles, (std::vector<int32_t>{0, 1}));
   EXPECT_EQ(setup.grips[1].particles, (std::vector<int32_t>{2})) << "one grip a particle";
+  // One that is shared takes what another holds at other times.
+  for (const auto& [from, until, shared] : {std::tuple{3, -1, true}, {3, -1, false}, {0, 1, true}, {2, -1, true}}) {
+    Case next = c;
+    next.grips[1].from = from;
+    next.grips[1].until = until;
+    next.grips[1].shared = shared;
+    const bool takes = shared && (from >= 3 || until == 1);
+    EXPECT_EQ(setup_of(next).grips[1].particles, takes ? (std::vector<int32_t>{1, 2}) : std::vector<int32_t>{2});
+    EXPECT_EQ(from_json(to_json(next)), next);
+  }
   ASSERT_EQ(setup.grips[0].active.size(), setup.blade_moves.size());
   for (std::size_t s = 0; s < setup.grips[0].active.size(); ++s) {
     EXPECT_EQ(setup.grips[0].active[s], s == 1 || s == 2) << s;

@@ -164,6 +164,11 @@ TEST(Touching, KnowsWhatGripsHoldAndHaveHeld) {
   s.before.frame = 1;
   found = touches_of(s.setup, s.before, s.after);
   EXPECT_TRUE(found.released && !found.held);
+  // Another grip has it now.
+  s.setup.grips.push_back({{0}, {0, 1}, {Vec3{}, Vec3{}}});
+  found = touches_of(s.setup, s.before, s.after);
+  EXPECT_TRUE(found.taken_over && found.held && !found.released);
+  s.setup.grips.pop_back();
   s.before.alive[0] = 0;
   found = touches_of(s.setup, s.before, s.after);
   EXPECT_FALSE(found.released) << "it is gone";
