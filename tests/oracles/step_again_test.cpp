@@ -1,13 +1,16 @@
 // A step computed again: the reference's holds, and what is least wrong does not.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "oracles/oracles.h"
 #include "oracles/step_model/admissible_step.h"
+#include "oracles/step_model/decisions.h"
 #include "oracles/step_model/step_model.h"
 #include "reference_cpu/reference.h"
 #include "tests/oracles/expectations.h"
@@ -420,6 +423,25 @@ TEST(StepModel, DrawsEachCoordinateWhereAMatrixIsLostAndThePreviousRotation) {
     EXPECT_LT(nearest_to(-1 * way), 1e-5);
   }
   EXPECT_LT(nearest_to({0.36, -0.8, 0.48}), 1e-5);
+}
+
+// A way out that is settled for all from one turn on is taken there and later, where the scales are even; nothing is
+// said of the turns before it, of other particles and of other substeps.
+TEST(Decisions, FollowAWayOutFromTheTurnOnThatItIsSettledFor) {
+  const DecisionKey from_second = {1, 2, 7, 1, DecisionKind::way_out};
+  const Settled settled = {{from_second.all_alike(), 1}};
+  const auto ways_of = [&](int32_t substep, int32_t particle) {
+    Decisions decisions(settled, 1e-3, 0x1p-24);
+    decisions.begin(substep, 1, particle);
+    std::vector<int> ways;
+    for (int turn = 0; turn < 3; ++turn) {
+      ways.push_back(decisions.least(DecisionKind::way_out, std::array<double, 2>{0.5, 0.5 + 1e-9}));
+    }
+    return ways;
+  };
+  EXPECT_EQ(ways_of(1, 7), (std::vector<int>{0, 1, 1}));
+  EXPECT_EQ(ways_of(0, 7), (std::vector<int>{0, 0, 0}));
+  EXPECT_EQ(ways_of(1, 8), (std::vector<int>{0, 0, 0}));
 }
 
 // A particle in front of the cutting edge, and by less than a rounding beside the plane of the blade: in single
