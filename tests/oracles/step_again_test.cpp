@@ -423,6 +423,22 @@ TEST(StepModel, DrawsEachCoordinateWhereAMatrixIsLostAndThePreviousRotation) {
     EXPECT_LT(nearest_to(-1 * way), 1e-5);
   }
   EXPECT_LT(nearest_to({0.36, -0.8, 0.48}), 1e-5);
+  // In every run of that kind, as a decision that may be settled.
+  for (uint64_t run = 3; run <= 48; run += 4) {
+    const StepOutcome outcome = model.run({{}, run, 2e-3 * kSpacing, {}});
+    double off = 0;
+    for (std::size_t k = 0; k < 9; ++k) {
+      off = std::max(off, std::abs(outcome.rotation[0].m[k] - scene.before.clusters.rotation[0].m[k]));
+    }
+    EXPECT_LT(off, 1e-5) << "run " << run;
+  }
+  bool is_decided = false;
+  for (uint64_t run = 1; run <= 48; ++run) {
+    for (const NearDecision& decision : model.run({{}, run, 2e-3 * kSpacing, {}}).near) {
+      is_decided = is_decided || decision.key.kind == DecisionKind::kept;
+    }
+  }
+  EXPECT_TRUE(is_decided);
 }
 
 // A way out that is settled for all from one turn on is taken there and later, where the scales are even; nothing is
