@@ -459,21 +459,24 @@ bool is_over_before(const CaseGrip& a, const CaseGrip& b) { return a.until >= 0 
 
 // A strip of substeps for each grip.
 void add_grips(const Case& c, Setup& setup) {
-  std::vector<std::vector<const CaseGrip*>> holding(c.nodes.size());
   const auto substeps = static_cast<int64_t>(setup.blade_moves.size());
-  for (const CaseGrip& asked : c.grips) {
+  for (std::size_t g = 0; g < c.grips.size(); ++g) {
+    const CaseGrip& asked = c.grips[g];
     Grip grip;
+    std::vector<uint8_t> taken(c.nodes.size(), 0);
+    for (std::size_t k = 0; k < g; ++k) {
+      const CaseGrip& other = c.grips[k];
+      if (asked.shared && (is_over_before(other, asked) || is_over_before(asked, other))) continue;
+      for (const int32_t i : setup.grips[k].particles) taken[at(i)] = 1;
+    }
     for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
       const auto node = setup.body.grid.coordinates(setup.body.node[at(i)]);
-      bool inside = std::ranges::all_of(holding[at(i)], [&](const CaseGrip* other) {
-        return asked.shared && (is_over_before(*other, asked) || is_over_before(asked, *other));
-      });
+      bool inside = taken[at(i)] == 0;
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const int32_t k = node[axis] - 1;  // behind the ring of empty nodes
         inside = inside && asked.low[axis] <= k && k <= asked.high[axis];
       }
       if (!inside) continue;
-      holding[at(i)].push_back(&asked);
       grip.particles.push_back(i);
     }
     for (int64_t s = 0; s < substeps; ++s) {
@@ -895,20 +898,7 @@ NLOHMANN_JSON_SERIALIZE_ENUM(Removal, {{Removal::usual, "usual"},
                                        {Removal::geometric, "geometric"},
                                        {Removal::strain, "strain"}})
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CaseWall, axis, side, offset, friction)
-
-// Written where a grip is: those that were saved before read the same.
-void to_json(nlohmann::json& json, const CaseGrip& g) {
-  json = {{"low", g.low}, {"high", g.high}, {"pull", g.pull}, {"from", g.from}, {"until", g.until}};
-  if (g.shared) json["shared"] = true;
-}
-void from_json(const nlohmann::json& json, CaseGrip& g) {
-  json.at("low").get_to(g.low);
-  json.at("high").get_to(g.high);
-  json.at("pull").get_to(g.pull);
-  json.at("from").get_to(g.from);
-  json.at("until").get_to(g.until);
-  g.shared = json.value("shared", false);
-}
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CaseGrip, low, high, pull, from, until, shared)
 
 // How the blade stands is written where it is not plain: strokes that were saved before read the same, wherever strokes
 // are kept (histories.h).
@@ -1048,6 +1038,9 @@ Case from_json(const std::string& text) {
                                 "strain", "solver", "relaxation", "damping", "retardation", "time_step", "pace",
                                 "blade_friction", "gravity", "walls", "grips"}) {
         document.emplace(field, plain.at(field));
+      }
+      for (auto& grip : document.at("grips")) {
+        if (grip.is_object()) grip.emplace("shared", false);
       }
       for (auto& stroke : document.at("strokes")) {
         for (const char* field : {"tilt", "along", "turn"}) {

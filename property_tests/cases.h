@@ -43,13 +43,12 @@ struct CaseWall {
   friend bool operator==(const CaseWall&, const CaseWall&) = default;
 };
 
-// Holds the particles of a box of nodes that no earlier grip of the case holds at any time; or, of one that is shared,
-// at the same time.
+// Holds the particles of a box of nodes that no earlier grip of the case holds.
 struct CaseGrip {
   Node low = {0, 0, 0}, high = {0, 0, 0};  // both included
   Quarters pull = {0, 0, 0};               // in each substep [h/100]; 0: pinned
   int32_t from = 0, until = -1;            // substeps of the run; -1: never released
-  bool shared = false;
+  bool shared = false;                     // also holds what earlier ones hold at other times
   friend bool operator==(const CaseGrip&, const CaseGrip&) = default;
 };
 

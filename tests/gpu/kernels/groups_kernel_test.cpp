@@ -472,7 +472,7 @@ TEST(Groups, FollowParticlesThatPassFromOneClusterToAnother) {
     enqueue_groups(launcher, view);
     ASSERT_GT(staging.counters.front().groups_before, 0) << "all were made anew";
     const Grouped fresh(Bodies{bodies.setups, extract_states(staging, bodies.setups)}, HostLauncher(), &staging);
-    ASSERT_NO_FATAL_FAILURE();
+    ASSERT_FALSE(HasFatalFailure());
     EXPECT_TRUE(tables_of(staging) == tables_of(fresh.staging));
   }
   EXPECT_EQ(passed, 1) << "once, groups are listed with a cluster that neither is the small one nor gets its particles";
