@@ -231,10 +231,11 @@ CUTPROOF_DEVICE inline Float3 next_position(const Contacts& contacts, const Rest
                                             Float3 start, Float3 x) {
   bool in_turn = false;
   const Float3 next = project(contacts, rest, free, side, start, in_turn);
+  if (!in_turn || !contacts.frictionless) return next;
   constexpr float kRounds = static_cast<float>(kRefusalRoundings) * 0x1p-24f;
   const float present = norm(x - free);
   const bool worse = norm(next - free) > present + kRounds * (present + norm(x));
-  return in_turn && contacts.frictionless && worse ? x : next;
+  return worse ? x : next;
 }
 
 // Points of the body within `radius` of one, all displaced alike.

@@ -614,8 +614,44 @@ CUTPROOF_DEVICE Float4 sum_about(const AnyTeam& team, const DeviceView& w, const
   return with_w(base, sqrtf(team.greatest(reach)) * (1.0f + kOfRoundings));
 }
 
+// Whether a contact may touch such a group in its prediction. Notes what is asked of it if none does: its base, and how
+// far from there it may go. from: where it begins the substep, if a blade or retardation asks; parts: of that; to: what
+// its prediction adds to `base`, which is `moved` from there.
+template <bool kRetarded, class AnyTeam, class From>
+CUTPROOF_DEVICE bool may_touch(const AnyTeam& team, const DeviceView& w, const Group& group, const Pace& pace,
+                               const Contacts& contacts, const Origin& origin, const Parts& parts,
+                               const Parts& of_prediction, From from, Map to) {
+  const int g = group.index;
+  Float4 base = with_w(origin.from(of_prediction.motion) + to.moved(), 0.0f);
+  for (Float4& row : to.row) row.w = 0;
+  // Every particle's own part of where it is, and of its prediction.
+  const auto reach_of = [&](const Parts& part) {
+    return (fabsf(1.0f + part.shape) * origin.place.w + fabsf(part.motion) * origin.velocity.w) * (1.0f + kOfRoundings);
+  };
+  const float own = reach_of(of_prediction);
+  base.w = (greatest_stretch(to, 0.0f) * group.head.radius + own) * (1.0f + kOfRoundings);
+  int side = 1;
+  Ball began = {};
+  if (contacts.move != nullptr || leads<kRetarded>(pace)) {
+    began = ball_around(pace, group, with_w(origin.from(parts.motion), reach_of(parts)), 1.0f, from());
+    if (contacts.move != nullptr) side = side_of_all(contacts, began);
+  }
+  // What an iteration adds is M(r), and takes is a part of e: a ball that contains the rest shape too contains every
+  // such d~ - l e.
+  Ball ball = ball_around(pace, group, with_w(xyz(base), own), 1.0f, to);
+  ball.radius = fmaxf(ball.radius, pace.h * group.head.radius);
+  const float room = room_ahead<kRetarded>(pace, contacts, began, ball, side);
+  if (team.leads()) {
+    w.group_base[g] = base;
+    w.group_room[g] = room;
+    w.group_side[g] = side;
+    w.group_resolved[g] = kCarried;
+  }
+  return !(room > 0);
+}
+
 // What a group begins the frame with.
-template <bool kContacts, class Block, class AnyTeam>
+template <bool kContacts, bool kRetarded, class Block, class AnyTeam>
 CUTPROOF_DEVICE void sum_group(Block& block, const AnyTeam& team, const DeviceView& w, int g) {
   if constexpr (kContacts) {
     if (team.leads()) w.group_tracked[g] = kUntouched;
@@ -629,9 +665,6 @@ CUTPROOF_DEVICE void sum_group(Block& block, const AnyTeam& team, const DeviceVi
     w.group_base[g] = Float4{};
     if constexpr (kContacts) w.group_resolved[g] = kCarried;
     return;
-  }
-  if constexpr (kContacts) {
-    if (held_by(w, pace, head.hold_set, 0).active) list_tracked(block, team, w, g, -1, 0, kDue);
   }
   const float per_mass = 1.0f / constant(&w.group_mass[g]).w;
   const float of_each = 1.0f / static_cast<float>(head.holder_count);
@@ -675,11 +708,24 @@ CUTPROOF_DEVICE void sum_group(Block& block, const AnyTeam& team, const DeviceVi
         return with_w(xyz(w.velocity[p]), mass_share(w.displacement[p].w));
       },
       kFarBase * pace.h / pace.ahead, w.frame_motion);
+  const Float3 since = origin.uniform() ? xyz(origin.place) : Float3{};
+  const Float3 began = origin.uniform() ? xyz(origin.velocity) : Float3{};
+  if constexpr (kContacts) {
+    Map from, to;
+    for (int axis = 0; axis < 3; ++axis) {
+      const Axis now = {{0, 0, 0, since[axis]}, {0, 0, 0, began[axis]}};
+      from.row[axis] = now.place;
+      to.row[axis] = predicted_row(pace, axis, now);
+    }
+    const FrameParts parts = {{0, 0}, {0, 1}};
+    const bool touches = may_touch<kRetarded>(
+        team, w, group, pace, contacts_of(w, pace, 0), origin, parts.place, predicted_parts(pace, parts),
+        [&] { return from; }, to);
+    if (touches || held_by(w, pace, head.hold_set, 0).active) list_tracked(block, team, w, g, -1, 0, kDue);
+  }
   if (!team.leads()) return;
   w.group_origin[2 * int64_t{g}] = origin.place;
   w.group_origin[2 * int64_t{g} + 1] = origin.velocity;
-  const Float3 since = origin.uniform() ? xyz(origin.place) : Float3{};
-  const Float3 began = origin.uniform() ? xyz(origin.velocity) : Float3{};
   for (int axis = 0; axis < 3; ++axis) {
     w.group_place[3 * int64_t{g} + axis] = {0, 0, 0, since[axis]};
     w.group_velocity[3 * int64_t{g} + axis] = {0, 0, 0, began[axis]};
@@ -732,39 +778,17 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
     }
     predicted.of(axis) = predicted_row(pace, axis, now);
   });
-  Map to = predicted.all(team);
-  Float4 base = with_w(origin.from(of_prediction.motion) + to.moved(), 0.0f);
-  for (Float4& row : to.row) row.w = 0;
   if constexpr (kContacts) {
-    // Every particle's own part of where it is, and of its prediction.
-    const auto reach_of = [&](const Parts& part) {
-      return (fabsf(1.0f + part.shape) * origin.place.w + fabsf(part.motion) * origin.velocity.w) *
-             (1.0f + kOfRoundings);
-    };
-    const float own = reach_of(of_prediction);
-    base.w = (greatest_stretch(to, 0.0f) * head.radius + own) * (1.0f + kOfRoundings);
-    int side = 1;
-    Ball began = {};
-    if (contacts.move != nullptr || leads<kRetarded>(pace)) {
-      const Map from = place.all(team);
-      began = ball_around(pace, group, with_w(origin.from(parts.place.motion), reach_of(parts.place)), 1.0f, from);
-      if (contacts.move != nullptr) side = side_of_all(contacts, began);
+    // (Of the first substep it is known already.)
+    if (substep > 0) {
+      const bool touches = may_touch<kRetarded>(
+          team, w, group, pace, contacts, origin, parts.place, of_prediction, [&] { return place.all(team); },
+          predicted.all(team));
+      if (touches || held_by(w, pace, head.hold_set, substep).active) return true;
     }
-    // What an iteration adds is M(r), and takes is a part of e: a ball that contains the rest shape too contains every
-    // such d~ - l e.
-    Ball ball = ball_around(pace, group, with_w(xyz(base), own), 1.0f, to);
-    ball.radius = fmaxf(ball.radius, pace.h * head.radius);
-    const float room = room_ahead<kRetarded>(pace, contacts, began, ball, side);
-    const bool held = held_by(w, pace, head.hold_set, substep).active;
-    if (team.leads()) {
-      w.group_base[g] = base;
-      w.group_room[g] = room;
-      w.group_side[g] = side;
-      w.group_resolved[g] = kCarried;
-    }
-    if (held || !(room > 0)) return true;
-  } else if (team.leads()) {
-    w.group_base[g] = base;
+  } else {
+    const Float3 base = origin.from(of_prediction.motion) + predicted.all(team).moved();
+    if (team.leads()) w.group_base[g] = with_w(base, 0.0f);
   }
   team.each(3, [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
@@ -1103,13 +1127,13 @@ CUTPROOF_DEVICE void begin_frame_kernel(Block& block, const DeviceView& w, Span 
 CUTPROOF_KERNEL(begin_frame_kernel);
 
 // Once a frame: what each group begins it with. kLanes: that share a group.
-template <bool kContacts, int kLanes, class Block>
+template <bool kContacts, bool kRetarded, int kLanes, class Block>
 CUTPROOF_DEVICE void sum_groups_kernel(Block& block, const DeviceView& w) {
   using namespace step_detail;
   const Team<Block, kLanes> team(block);
   const int groups = w.counters->groups;
   for (int64_t g = team.first(); g < groups; g += team.stride()) {
-    sum_group<kContacts>(block, team, w, static_cast<int>(g));
+    sum_group<kContacts, kRetarded>(block, team, w, static_cast<int>(g));
   }
 }
 
@@ -1860,13 +1884,13 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
   }
 }
 
-template <bool kContacts, int kLanes>
+template <bool kContacts, bool kRetarded, int kLanes>
 struct sum_groups_kernel_object {
   static constexpr const char* kName = "sum_groups_kernel";
-  static constexpr int kMaxThreads = 128, kMinBlocks = kLanes == step_detail::kParticleTeam ? 6 : 5;
+  static constexpr int kMaxThreads = 128, kMinBlocks = kLanes == step_detail::kParticleTeam ? 5 : 4;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w) const {
-    sum_groups_kernel<kContacts, kLanes>(block, w);
+    sum_groups_kernel<kContacts, kRetarded, kLanes>(block, w);
   }
 };
 template <bool kContacts, bool kRetarded, int kRows>
@@ -1930,8 +1954,9 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
       start(std::integral_constant<int, kLanes>{});
     });
   };
-  by_particles(
-      [&](auto lanes) { launcher.teams(sum_groups_kernel_object<kContacts, lanes.value>{}, lanes.value, teams, w); });
+  by_particles([&](auto lanes) {
+    launcher.teams(sum_groups_kernel_object<kContacts, kRetarded, lanes.value>{}, lanes.value, teams, w);
+  });
   for (int substep = 0; substep < plan.substeps; ++substep) {
     by_rows([&](auto rows) {
       launcher.teams(begin_substep_kernel_object<kContacts, kRetarded, rows.value>{}, kParticleTeam, teams, w, substep);

@@ -670,7 +670,7 @@ Stepped step(const cutproof::Setup& setup, const State& state) {
 void begin_frame(HostLauncher& launcher, const DeviceView& w) {
   launcher.items(begin_frame_kernel_object{}, w.particles, w, Span{Stage::step, Stage::step});
   enqueue_groups_if_stale(launcher, w);
-  launcher.teams(sum_groups_kernel_object<true, step_detail::kParticleTeam>{}, step_detail::kParticleTeam,
+  launcher.teams(sum_groups_kernel_object<true, false, step_detail::kParticleTeam>{}, step_detail::kParticleTeam,
                  w.group_capacity, w);
 }
 void begin_substep(HostLauncher& launcher, const DeviceView& w, int substep) {
