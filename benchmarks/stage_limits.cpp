@@ -83,20 +83,22 @@ double step_bytes(const Setup& setup, const State& state) {
                          4 * of.loose_memberships + (of.loose > 0 ? 72 : 48) * clusters;
   // begin_substep. Group: head 32, masses 48, map 48, base in and out 32, place and velocity in and out 192, what the
   // frame began with 96, moments out 96; with contacts rest centre 16, its first displacement and velocity 32, room,
-  // side, resolved and tracked 16. The first substep of a frame has no map, no base before and leaves place and
-  // velocity alone. Loose particle: places and count of holders 12, where it was and how it moved 32, start, predicted
-  // and position out 48; with contacts node, pushed and impulse, in and out 68.
-  const double substep = (544 + (contacts ? 64 : 0)) * of.groups + (92 + (contacts ? 68 : 0)) * of.loose;
-  const double first = -160 * of.groups;
-  // Once a frame. begin_frame, particle: impulse and death 20. sum_groups, particle of a group: places 8, displacement
-  // and velocity 32; group: head and rest centre 48, mass 16, its first displacement and velocity, place and velocity
-  // 128, moments of both 96; with contacts tracked 4. end_step, particle: places 8, displacement and velocity in and
-  // out 64; group: head and rest centre 48, its first displacement and velocity 32, base and map 64, place and velocity
-  // 96; with contacts tracked 4. Loose particle: places 8, start and position 32, displacement and velocity out 32;
-  // with contacts pushed and impulse in and out 48.
-  const double frame = 20 * particles + 112 * (particles - of.loose) + (528 + (contacts ? 8 : 0)) * of.groups +
+  // side, resolved and tracked 16. Loose particle: places and count of holders 12, where it was and how it moved 32,
+  // start, predicted and position out 48; with contacts node, pushed and impulse, in and out 68.
+  const double of_loose = (92 + (contacts ? 68 : 0)) * of.loose;
+  const double substep = (544 + (contacts ? 64 : 0)) * of.groups + of_loose;
+  // begin_first_substep, particle of a group: places 8, displacement and velocity 32; group: head and rest centre 48,
+  // mass 16, its first displacement and velocity, place and velocity 128, moments of both 96, base and moments out 112;
+  // with contacts room, side, resolved and tracked 16.
+  const double first = 40 * (particles - of.loose) + (400 + (contacts ? 16 : 0)) * of.groups + of_loose;
+  // Once a frame. begin_frame, particle: impulse and death 20. end_step, particle: places 8, displacement and velocity
+  // in and out 64; group: head and rest centre 48, its first displacement and velocity 32, base and map 64, place and
+  // velocity 96; with contacts tracked 4. Loose particle: places 8, start and position 32, displacement and velocity
+  // out 32; with contacts pushed and impulse in and out 48.
+  const double frame = 20 * particles + 72 * (particles - of.loose) + (240 + (contacts ? 4 : 0)) * of.groups +
                        (72 + (contacts ? 48 : 0)) * of.loose;
-  return frame + first + setup.step.substeps * (substep + setup.step.iterations * (match + advance));
+  const int iterations = setup.step.substeps * setup.step.iterations;
+  return frame + first + (setup.step.substeps - 1) * substep + iterations * (match + advance);
 }
 
 // Detection by distance. Particle: death and node 8, displacement 16, flag out and in 2. Node: its particle 4. By

@@ -133,8 +133,13 @@ struct Map {
   // a + L (h r)
   CUTPROOF_DEVICE Float3 operator()(Float3 r) const { return moved() + linear(r); }
 };
-CUTPROOF_DEVICE inline Map load_map(const Float4* rows, int g) {
-  return {{rows[3 * int64_t{g}], rows[3 * int64_t{g} + 1], rows[3 * int64_t{g} + 2]}};
+// Rows of groups lie axis by axis: where a thread has a group, neighbours then read what lies side by side. (Moments do
+// not, which clusters read, group by group.)
+CUTPROOF_DEVICE inline int64_t row_of_group(const DeviceView& w, int g, int axis) {
+  return axis * w.group_capacity + g;
+}
+CUTPROOF_DEVICE inline Map load_map(const DeviceView& w, const Float4* rows, int g) {
+  return {{rows[row_of_group(w, g, 0)], rows[row_of_group(w, g, 1)], rows[row_of_group(w, g, 2)]}};
 }
 // Entry by entry.
 template <class Of>
@@ -235,6 +240,9 @@ CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) {
 // work of all, but in an iteration, whose resolved groups are few.
 inline constexpr int kRowTeam = 4, kParticleTeam = 16, kResolvedTeam = 32;
 inline constexpr int kMostByRows = 150'000;  // particles of a load
+// Those that a tracked or a resolved group gets, where so many lanes share a carried one.
+template <int kRows>
+inline constexpr int kResolvedLanes = kRows == 1 ? kResolvedTeam / 2 : kResolvedTeam;
 
 // Weighted sums in the order of arrays.inc: 4 axis + k: of e rᵀ / h; 4 axis + 3: of e. kOrder: lanes whose work the
 // team does.
@@ -264,9 +272,9 @@ CUTPROOF_DEVICE inline void add_moments(float* sums, float weight, Float3 e, Flo
     sums[4 * axis + 3] += weight * e[axis];
   }
 }
-// Sum n of group g.
-CUTPROOF_DEVICE inline void store_moment(Float4* rows, int g, int n, float sum) {
-  Float4& row = rows[3 * int64_t{g} + n / 4];
+CUTPROOF_DEVICE inline Float4* moments_of(const DeviceView& w, int g) { return w.group_moments + 3 * int64_t{g}; }
+// Sum n of a group, whose row this is.
+CUTPROOF_DEVICE inline void store_sum(Float4& row, int n, float sum) {
   (n % 4 == 0 ? row.x : n % 4 == 1 ? row.y : n % 4 == 2 ? row.z : row.w) = sum;
 }
 
@@ -418,7 +426,7 @@ CUTPROOF_DEVICE void sum_resolved(const AnyTeam& team, const DeviceView& w, cons
     const Float3 e = xyz(at) - base;
     add_moments(sum, of_each * at.w, e, per_h * e, group.rest(w, pace, k));
   });
-  team.parted(sums).each(team, [&](int n, float sum) { store_moment(w.group_moments, group.index, n, sum); });
+  team.parted(sums).each(team, [&](int n, float sum) { store_sum(moments_of(w, group.index)[n / 4], n, sum); });
 }
 
 // How many groups were tracked when a substep began, for begin_substep_kernel, which then has it in `tracked`; those of
@@ -427,28 +435,27 @@ CUTPROOF_DEVICE inline int tracked_before(const DeviceView& w, int substep) {
   return w.counters->tracked[(substep + 1) % 2] + w.counters->newly_tracked[(substep + 2) % 3];
 }
 
-// DeviceView::group_tracked. Groups that a grip holds when the frame begins are listed before, to be tracked when the
-// first substep begins: they are many, and lie side by side, so that few warps would find all of them.
-enum : int { kUntouched = 0, kTracked = 1, kDue = 2 };
+// DeviceView::group_tracked.
+enum : int { kUntouched = 0, kTracked = 1 };
 // A group is resolved, and tracked from now on. before: the iteration that it is to be resolved in from the first.
 template <class AnyTeam, class Block>
 CUTPROOF_DEVICE void list_resolved(Block& block, const AnyTeam& team, const DeviceView& w, const Pace& pace, int g,
                                    int substep, int before) {
   // It has no map any more, and may never have had one; who reads ahead reads it all the same.
   team.sync();  // all have read the last one
-  team.each(3, [&](int axis) { w.group_map[3 * int64_t{g} + axis] = Float4{}; });
+  team.each(3, [&](int axis) { w.group_map[row_of_group(w, g, axis)] = Float4{}; });
   if (!team.leads()) return;
   w.group_resolved[g] = kResolved;
   if (pace.iterations == 0) return;  // nobody asks for the list, or empties it
   block.store(&w.resolved_groups[block.atomic_add(listed_before(w, substep, before), 1)], g);
 }
-// tracked: how many were before this substep (-1: before the first).
+// tracked: how many were before this substep.
 template <class AnyTeam, class Block>
 CUTPROOF_DEVICE void list_tracked(Block& block, const AnyTeam& team, const DeviceView& w, int g, int substep,
-                                  int tracked, int state = kTracked) {
+                                  int tracked) {
   if (!team.leads()) return;
-  w.group_tracked[g] = state;
-  block.store(&w.tracked_groups[tracked + block.atomic_add(&w.counters->newly_tracked[(substep + 3) % 3], 1)], g);
+  w.group_tracked[g] = kTracked;
+  block.store(&w.tracked_groups[tracked + block.atomic_add(&w.counters->newly_tracked[substep % 3], 1)], g);
 }
 
 // ---- groups that nothing has touched in this frame
@@ -565,13 +572,12 @@ CUTPROOF_DEVICE inline Float3 led_to(const Map& map, const Parts& parts, const O
 template <class AnyTeam>
 CUTPROOF_DEVICE Float3 track_particles(const AnyTeam& team, const DeviceView& w, const Group& group, const Pace& pace,
                                        const Contacts& contacts, bool held, int substep) {
-  const int64_t g = group.index;
   const FrameParts parts = load_parts(w, body_of_group(w, group.head), substep);
   const Parts of_prediction = predicted_parts(pace, parts);
   const Origin origin = origin_of(w, group.index);
   Map now, next;
   for (int axis = 0; axis < 3; ++axis) {
-    const Axis is = load_axis(w, 3 * g + axis);
+    const Axis is = load_axis(w, row_of_group(w, group.index, axis));
     now.row[axis] = is.place;
     next.row[axis] = predicted_row(pace, axis, is);
   }
@@ -650,88 +656,6 @@ CUTPROOF_DEVICE bool may_touch(const AnyTeam& team, const DeviceView& w, const G
   return !(room > 0);
 }
 
-// What a group begins the frame with.
-template <bool kContacts, bool kRetarded, class Block, class AnyTeam>
-CUTPROOF_DEVICE void sum_group(Block& block, const AnyTeam& team, const DeviceView& w, int g) {
-  if constexpr (kContacts) {
-    if (team.leads()) w.group_tracked[g] = kUntouched;
-  }
-  const Group group = group_of(w, g);
-  const GroupHead& head = group.head;
-  const Pace pace = constant(&w.pace[body_of_group(w, head)]);
-  if (head.size == 0 || pace.substeps == 0) {
-    // Who reads ahead reads these before it knows that nothing is to be done.
-    if (!team.leads()) return;
-    w.group_base[g] = Float4{};
-    if constexpr (kContacts) w.group_resolved[g] = kCarried;
-    return;
-  }
-  const float per_mass = 1.0f / constant(&w.group_mass[g]).w;
-  const float of_each = 1.0f / static_cast<float>(head.holder_count);
-  const auto particle = [&](int k) { return w.place_particle[head.begin + k]; };
-  const auto mass_share = [&](float mass) { return of_each * mass; };
-  // The first of this lane's particles, one for each lane that it stands for: nearly always all that it has.
-  constexpr int kFirst = AnyTeam::kLanes > 1 ? kParticleTeam / AnyTeam::kLanes : 1;
-  static_assert(kFirst <= 2);
-  Float4 first_place[kFirst], first_velocity[kFirst];
-  int index[kFirst];
-  for (int t = 0; t < kFirst; ++t) {
-    const int k = team.lane() + t * team.kLanes;
-    index[t] = k < head.size ? particle(k) : -1;
-  }
-  for (int t = 0; t < kFirst; ++t) {
-    if (index[t] < 0) continue;
-    first_place[t] = w.displacement[index[t]];
-    first_velocity[t] = w.velocity[index[t]];
-  }
-  for (int t = 0; t < kFirst; ++t) first_velocity[t].w = first_place[t].w = mass_share(first_place[t].w);
-  const auto sum = [&](auto value, float far, Float4* rows) {
-    typename AnyTeam::template Parted<12> total;
-    const Float4 base = sum_about<kParticleTeam>(team, w, group, pace, per_mass, far, value, total);
-    total.each(team, [&](int n, float of) { store_moment(rows, g, n, of); });
-    return base;
-  };
-  Origin origin;
-  origin.place = sum(
-      [&](int k) {
-        if (k == team.lane()) return first_place[0];
-        if (kFirst > 1 && k == team.lane() + team.kLanes) return first_place[kFirst - 1];
-        const Float4 d = w.displacement[particle(k)];
-        return with_w(xyz(d), mass_share(d.w));
-      },
-      kFarBase * pace.h, w.frame_shape);
-  origin.velocity = sum(
-      [&](int k) {
-        if (k == team.lane()) return first_velocity[0];
-        if (kFirst > 1 && k == team.lane() + team.kLanes) return first_velocity[kFirst - 1];
-        const int p = particle(k);
-        return with_w(xyz(w.velocity[p]), mass_share(w.displacement[p].w));
-      },
-      kFarBase * pace.h / pace.ahead, w.frame_motion);
-  const Float3 since = origin.uniform() ? xyz(origin.place) : Float3{};
-  const Float3 began = origin.uniform() ? xyz(origin.velocity) : Float3{};
-  if constexpr (kContacts) {
-    Map from, to;
-    for (int axis = 0; axis < 3; ++axis) {
-      const Axis now = {{0, 0, 0, since[axis]}, {0, 0, 0, began[axis]}};
-      from.row[axis] = now.place;
-      to.row[axis] = predicted_row(pace, axis, now);
-    }
-    const FrameParts parts = {{0, 0}, {0, 1}};
-    const bool touches = may_touch<kRetarded>(
-        team, w, group, pace, contacts_of(w, pace, 0), origin, parts.place, predicted_parts(pace, parts),
-        [&] { return from; }, to);
-    if (touches || held_by(w, pace, head.hold_set, 0).active) list_tracked(block, team, w, g, -1, 0, kDue);
-  }
-  if (!team.leads()) return;
-  w.group_origin[2 * int64_t{g}] = origin.place;
-  w.group_origin[2 * int64_t{g} + 1] = origin.velocity;
-  for (int axis = 0; axis < 3; ++axis) {
-    w.group_place[3 * int64_t{g} + axis] = {0, 0, 0, since[axis]};
-    w.group_velocity[3 * int64_t{g} + axis] = {0, 0, 0, began[axis]};
-  }
-}
-
 // Begins a substep of a group that nothing has touched so far. Says whether something may in its prediction, or a grip
 // holds it: then its particles are to be tracked.
 template <bool kContacts, bool kRetarded, class Block, int kRows>
@@ -749,7 +673,7 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
   if (active) parts = load_parts(w, body, substep);
   const Parts of_prediction = predicted_parts(pace, parts);
   Parts of_last_prediction = {};
-  if (active && substep > 0) of_last_prediction = predicted_parts(pace, load_parts(w, body, substep - 1));
+  if (active) of_last_prediction = predicted_parts(pace, load_parts(w, body, substep - 1));
   const float lost = lost_in_all(w, body, pace), per_h = pace.per_h;
   block.wait_for_earlier();
   if (!active) return false;
@@ -759,39 +683,34 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
   Rows<Team<Block, kRows>> place, velocity, map, shape, motion;
   const Origin origin = origin_of(w, g);
   team.each(3, [&](int axis) {
-    const int64_t at = 3 * int64_t{g} + axis;
+    const int64_t at = row_of_group(w, g, axis);
     place.of(axis) = w.group_place[at];
     velocity.of(axis) = w.group_velocity[at];
-    if (substep > 0 && pace.iterations > 0) map.of(axis) = w.group_map[at];
+    if (pace.iterations > 0) map.of(axis) = w.group_map[at];
     shape.of(axis) = w.frame_shape[at];
     motion.of(axis) = w.frame_motion[at];
   });
   if (state != kUntouched) return false;
   Rows<Team<Block, kRows>>& predicted = map;
   team.each(3, [&](int axis) {
-    const int64_t at = 3 * int64_t{g} + axis;
-    Axis now = {place.of(axis), velocity.of(axis)};
-    if (substep > 0) {
-      now = axis_after<kRetarded>(pace, axis, lost, origin, of_last_prediction, map.of(axis), now);
-      place.of(axis) = w.group_place[at] = now.place;
-      w.group_velocity[at] = now.velocity;
-    }
+    const int64_t at = row_of_group(w, g, axis);
+    const Axis now = axis_after<kRetarded>(pace, axis, lost, origin, of_last_prediction, map.of(axis),
+                                           {place.of(axis), velocity.of(axis)});
+    place.of(axis) = w.group_place[at] = now.place;
+    w.group_velocity[at] = now.velocity;
     predicted.of(axis) = predicted_row(pace, axis, now);
   });
   if constexpr (kContacts) {
-    // (Of the first substep it is known already.)
-    if (substep > 0) {
-      const bool touches = may_touch<kRetarded>(
-          team, w, group, pace, contacts, origin, parts.place, of_prediction, [&] { return place.all(team); },
-          predicted.all(team));
-      if (touches || held_by(w, pace, head.hold_set, substep).active) return true;
-    }
+    const bool touches = may_touch<kRetarded>(
+        team, w, group, pace, contacts, origin, parts.place, of_prediction, [&] { return place.all(team); },
+        predicted.all(team));
+    if (touches || held_by(w, pace, head.hold_set, substep).active) return true;
   } else {
     const Float3 base = origin.from(of_prediction.motion) + predicted.all(team).moved();
     if (team.leads()) w.group_base[g] = with_w(base, 0.0f);
   }
   team.each(3, [&](int axis) {
-    const int64_t at = 3 * int64_t{g} + axis;
+    const int64_t at = row_of_group(w, g, axis);
     const Float4 row = predicted.of(axis), u = shape.of(axis), m = motion.of(axis);
     const auto own = [&](float of_shape, float of_motion) {
       return (1.0f + of_prediction.shape) * of_shape + of_prediction.motion * of_motion;
@@ -801,7 +720,7 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
                            own(u.z, m.z) + per_h * (row.x * upper.z + row.y * lower.x + row.z * lower.y),
                            own(u.w, m.w) + (row.x * mass.x + row.y * mass.y + row.z * mass.z)};
     w.group_predicted[at] = moment;
-    w.group_moments[at] = moment;
+    moments_of(w, g)[axis] = moment;
   });
   return false;
 }
@@ -817,7 +736,7 @@ struct Ending {
 };
 CUTPROOF_DEVICE inline Ending ending_of(const DeviceView& w, int body, const Pace& pace, int g) {
   Ending ending = {{}, xyz(w.group_base[g]), lost_in_all(w, body, pace), w.group_resolved[g]};
-  if (pace.iterations > 0) ending.map = load_map(w.group_map, g);
+  if (pace.iterations > 0) ending.map = load_map(w, w.group_map, g);
   return ending;
 }
 // Displacement and mass of its particle k; sets its velocity, and ends its impulse.
@@ -860,18 +779,13 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const Devi
   Float4 first_start, first_predicted;
   const auto start_of = [&](int k) { return k == first ? first_start : w.start[head.begin + k]; };
   const auto predicted_of = [&](int k) { return k == first ? first_predicted : w.predicted[head.begin + k]; };
-  const bool due = team.any(w.group_tracked[g] == kDue);
-  if (begins || due) {
+  if (begins) {
     base = track_particles(team, w, group, pace, contacts, held.active, substep);
     if (first < head.size) {
       first_start = w.start[head.begin + first];
       first_predicted = w.predicted[head.begin + first];
     }
-    if (begins) list_tracked(block, team, w, g, substep, tracked);
-    if (due && team.leads()) {
-      w.group_tracked[g] = kTracked;
-      w.group_base[g] = with_w(base, 0.0f);  // how far from it particles are is asked of carried groups only
-    }
+    list_tracked(block, team, w, g, substep, tracked);
   } else {
     const Ending ending = ending_of(w, body, pace, g);
     const float of_each = 1.0f / static_cast<float>(head.holder_count);
@@ -926,8 +840,8 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const Devi
       w.group_resolved[g] = kCarried;
     }
     total.each(team, [&](int n, float sum) {
-      store_moment(w.group_predicted, g, n, sum);
-      if (!resolve) store_moment(w.group_moments, g, n, sum);
+      store_sum(w.group_predicted[row_of_group(w, g, n / 4)], n, sum);
+      if (!resolve) store_sum(moments_of(w, g)[n / 4], n, sum);
     });
   }
   if (!resolve) return;
@@ -987,6 +901,101 @@ CUTPROOF_DEVICE inline void begin_loose(const DeviceView& w, int o, int substep)
   w.predicted[o] = predicted;
 }
 
+// ---- the beginning of a frame
+
+// What a group begins the frame with, and its first substep.
+template <bool kContacts, bool kRetarded, class Block, class AnyTeam>
+CUTPROOF_DEVICE void begin_group(Block& block, const AnyTeam& team, const DeviceView& w, int g) {
+  if constexpr (kContacts) {
+    if (team.leads()) w.group_tracked[g] = kUntouched;
+  }
+  const Group group = group_of(w, g);
+  const GroupHead& head = group.head;
+  const Pace pace = constant(&w.pace[body_of_group(w, head)]);
+  if (head.size == 0 || pace.substeps == 0) {
+    // Who reads ahead reads these before it knows that nothing is to be done.
+    if (!team.leads()) return;
+    w.group_base[g] = Float4{};
+    if constexpr (kContacts) w.group_resolved[g] = kCarried;
+    return;
+  }
+  const float per_mass = 1.0f / constant(&w.group_mass[g]).w;
+  const float of_each = 1.0f / static_cast<float>(head.holder_count);
+  const auto particle = [&](int k) { return w.place_particle[head.begin + k]; };
+  const auto mass_share = [&](float mass) { return of_each * mass; };
+  // The first of this lane's particles, one for each lane that it stands for: nearly always all that it has.
+  constexpr int kFirst = AnyTeam::kLanes > 1 ? kParticleTeam / AnyTeam::kLanes : 1;
+  static_assert(kFirst <= 2);
+  Float4 first_place[kFirst], first_velocity[kFirst];
+  int index[kFirst];
+  for (int t = 0; t < kFirst; ++t) {
+    const int k = team.lane() + t * team.kLanes;
+    index[t] = k < head.size ? particle(k) : -1;
+  }
+  for (int t = 0; t < kFirst; ++t) {
+    if (index[t] < 0) continue;
+    first_place[t] = w.displacement[index[t]];
+    first_velocity[t] = w.velocity[index[t]];
+  }
+  for (int t = 0; t < kFirst; ++t) first_velocity[t].w = first_place[t].w = mass_share(first_place[t].w);
+  using Total = typename AnyTeam::template Parted<12>;
+  const auto sum = [&](auto value, float far, Float4* rows, Total& total) {
+    const Float4 base = sum_about<kParticleTeam>(team, w, group, pace, per_mass, far, value, total);
+    total.each(team, [&](int n, float of) { store_sum(rows[row_of_group(w, g, n / 4)], n, of); });
+    return base;
+  };
+  Origin origin;
+  Total shape, motion;
+  origin.place = sum(
+      [&](int k) {
+        if (k == team.lane()) return first_place[0];
+        if (kFirst > 1 && k == team.lane() + team.kLanes) return first_place[kFirst - 1];
+        const Float4 d = w.displacement[particle(k)];
+        return with_w(xyz(d), mass_share(d.w));
+      },
+      kFarBase * pace.h, w.frame_shape, shape);
+  origin.velocity = sum(
+      [&](int k) {
+        if (k == team.lane()) return first_velocity[0];
+        if (kFirst > 1 && k == team.lane() + team.kLanes) return first_velocity[kFirst - 1];
+        const int p = particle(k);
+        return with_w(xyz(w.velocity[p]), mass_share(w.displacement[p].w));
+      },
+      kFarBase * pace.h / pace.ahead, w.frame_motion, motion);
+  const Float3 since = origin.uniform() ? xyz(origin.place) : Float3{};
+  const Float3 began = origin.uniform() ? xyz(origin.velocity) : Float3{};
+  const Parts of_place = {}, of_prediction = {0, pace.ahead};
+  Map from, to;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Axis now = {{0, 0, 0, since[axis]}, {0, 0, 0, began[axis]}};
+    from.row[axis] = now.place;
+    to.row[axis] = predicted_row(pace, axis, now);
+    if (!team.leads()) continue;
+    w.group_place[row_of_group(w, g, axis)] = now.place;
+    w.group_velocity[row_of_group(w, g, axis)] = now.velocity;
+  }
+  if (team.leads()) {
+    w.group_origin[2 * int64_t{g}] = origin.place;
+    w.group_origin[2 * int64_t{g} + 1] = origin.velocity;
+  }
+  if constexpr (kContacts) {
+    const bool touches = may_touch<kRetarded>(
+        team, w, group, pace, contacts_of(w, pace, 0), origin, of_place, of_prediction, [&] { return from; }, to);
+    if (touches || held_by(w, pace, head.hold_set, 0).active) {
+      team.sync();  // what its leader has written is all lanes' to read
+      begin_tracked<kRetarded>(block, team, w, g, 0, 0, true);
+      return;
+    }
+  } else if (team.leads()) {
+    w.group_base[g] = with_w(origin.from(of_prediction.motion) + to.moved(), 0.0f);
+  }
+  shape.each(team, motion, [&](int n, float of_shape, float of_motion) {
+    const float moment = of_shape + pace.ahead * of_motion;  // a prediction begins with no shape of the group's own
+    store_sum(w.group_predicted[row_of_group(w, g, n / 4)], n, moment);
+    store_sum(moments_of(w, g)[n / 4], n, moment);
+  });
+}
+
 // ---- the end of the last substep
 
 template <bool kContacts, bool kRetarded, class AnyTeam>
@@ -1013,7 +1022,7 @@ CUTPROOF_DEVICE void end_group(const AnyTeam& team, const DeviceView& w, int g) 
   const float lost = lost_in_all(w, body, pace);
   Map start, end;
   for (int axis = 0; axis < 3; ++axis) {
-    const int64_t at = 3 * int64_t{g} + axis;
+    const int64_t at = row_of_group(w, g, axis);
     const Float4 map = pace.iterations > 0 ? w.group_map[at] : Float4{};
     const Axis now = load_axis(w, at);
     start.row[axis] = now.place;
@@ -1106,7 +1115,7 @@ CUTPROOF_DEVICE void begin_frame_kernel(Block& block, const DeviceView& w, Span 
     w.counters->debris = 0;
     w.counters->affected = 0;
     *step_detail::listed_before(w, 0, 0) = 0;
-    w.counters->tracked[1] = w.counters->newly_tracked[0] = w.counters->newly_tracked[2] = 0;
+    w.counters->tracked[0] = w.counters->newly_tracked[0] = w.counters->newly_tracked[1] = 0;
   }
   for (int64_t b = block.first(); b < w.bodies; b += block.stride()) {
     if (running(w, static_cast<int>(b))) w.cut[b] = -1;
@@ -1126,19 +1135,22 @@ CUTPROOF_DEVICE void begin_frame_kernel(Block& block, const DeviceView& w, Span 
 }
 CUTPROOF_KERNEL(begin_frame_kernel);
 
-// Once a frame: what each group begins it with. kLanes: that share a group.
+// Begins a frame's first substep. kLanes: that share a group.
 template <bool kContacts, bool kRetarded, int kLanes, class Block>
-CUTPROOF_DEVICE void sum_groups_kernel(Block& block, const DeviceView& w) {
+CUTPROOF_DEVICE void begin_first_substep_kernel(Block& block, const DeviceView& w) {
   using namespace step_detail;
   const Team<Block, kLanes> team(block);
-  const int groups = w.counters->groups;
+  const int groups = w.counters->groups, loose = w.counters->loose;
   for (int64_t g = team.first(); g < groups; g += team.stride()) {
-    sum_group<kContacts, kRetarded>(block, team, w, static_cast<int>(g));
+    begin_group<kContacts, kRetarded>(block, team, w, static_cast<int>(g));
+  }
+  for (int64_t k = from_last(block); k < loose; k += block.stride()) {
+    begin_loose<kContacts, kRetarded>(w, w.loose_places[k], 0);
   }
 }
 
-// Ends the substep before `substep`, if there is one, and begins that one, of the bodies that have it. kRows: lanes
-// that share a group that is not tracked.
+// Ends the substep before `substep`, which is not the first, and begins that one, of the bodies that have it. kRows:
+// lanes that share a group that is not tracked.
 template <bool kContacts, bool kRetarded, int kRows, class Block>
 CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int substep) {
   using namespace step_detail;
@@ -1146,7 +1158,7 @@ CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int
   // A warp, and what it has of teams for the groups that are tracked: where a grip holds a part of a large body these
   // are many, and two of them side by side.
   const Team<Block, kResolvedTeam> warp(block);
-  const Team<Block, kRows == 1 ? kResolvedTeam / 2 : kResolvedTeam> team(block);
+  const Team<Block, kResolvedLanes<kRows>> team(block);
   constexpr int kTeams = warp.kLanes / team.kLanes;
   const int groups = w.counters->groups, loose = w.counters->loose;
   // Whole warps at a time, as in advance_kernel.
@@ -1274,7 +1286,7 @@ struct Moments {
   Float4 row[3];
 };
 CUTPROOF_DEVICE inline Moments load_moments(const DeviceView& w, int g) {
-  const Float4* const row = w.group_moments + 3 * int64_t{g};
+  const Float4* const row = moments_of(w, g);
   return {{row[0], row[1], row[2]}};
 }
 
@@ -1596,18 +1608,18 @@ CUTPROOF_DEVICE inline Rows<AnyTeam> mean_goal(const AnyTeam& team, const Device
 
 // A group that has been carried so far is resolved from here on: where its particles are, and, accelerated, were one
 // iteration ago. Nothing has touched them.
-template <bool kAccelerated, bool kRetarded, class Block>
-CUTPROOF_DEVICE void resolve(Block& block, const Team<Block, kResolvedTeam>& team, const DeviceView& w,
-                             const Group& group, const Pace& pace, const Contacts& contacts, const Iteration& now,
-                             Float3 base, int substep, int iteration) {
+template <bool kAccelerated, bool kRetarded, class Block, class AnyTeam>
+CUTPROOF_DEVICE void resolve(Block& block, const AnyTeam& team, const DeviceView& w, const Group& group,
+                             const Pace& pace, const Contacts& contacts, const Iteration& now, Float3 base, int substep,
+                             int iteration) {
   const int g = group.index;
   if (!team.any(w.group_tracked[g] != kUntouched)) {
     track_particles(team, w, group, pace, contacts, false, substep);
     list_tracked(block, team, w, g, substep, w.counters->tracked[substep % 2]);
   }
   Map is = {}, was = {};
-  if (iteration > 0) is = load_map(w.group_map, g);
-  if constexpr (kAccelerated) was = iteration > 1 && now.combined ? load_map(w.group_earlier_map, g) : is;
+  if (iteration > 0) is = load_map(w, w.group_map, g);
+  if constexpr (kAccelerated) was = iteration > 1 && now.combined ? load_map(w, w.group_earlier_map, g) : is;
   const float lost = now.lost_before;
   [[maybe_unused]] float lost_earlier = 0;
   if constexpr (kAccelerated) {
@@ -1647,8 +1659,8 @@ template <int kRows>
 inline constexpr int kHoldersAtOnce = kRows > 1 ? 8 : 4;
 
 // One iteration of the particles of a resolved group. begins: it has been carried so far.
-template <bool kContacts, bool kAccelerated, bool kRetarded, class Block, int kAtOnce>
-CUTPROOF_DEVICE void advance_resolved(Block& block, const Team<Block, kResolvedTeam>& team, const DeviceView& w,
+template <bool kContacts, bool kAccelerated, bool kRetarded, class Block, class AnyTeam, int kAtOnce>
+CUTPROOF_DEVICE void advance_resolved(Block& block, const AnyTeam& team, const DeviceView& w,
                                       const GroupAhead<kAtOnce>& ahead, int substep, int iteration, bool begins) {
   const Group& group = ahead.group;
   const GroupHead& head = group.head;
@@ -1701,7 +1713,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
   Rows<Team<Block, kRows>> present, earlier, of_prediction;
   Float4 mass, upper, lower;
   const auto read_maps = [&](int axis) {
-    const int64_t at = 3 * int64_t{g} + axis;
+    const int64_t at = row_of_group(w, g, axis);
     if (iteration > 0) earlier.of(axis) = present.of(axis) = w.group_map[at];
     // The one before the first is no map of this kind, and of no weight.
     if constexpr (kAccelerated) {
@@ -1712,7 +1724,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
     mass = constant(&w.group_mass[g]);
     upper = constant(&w.group_spread[2 * int64_t{g}]);
     lower = constant(&w.group_spread[2 * int64_t{g} + 1]);
-    if (more) team.each(3, [&](int axis) { of_prediction.of(axis) = w.group_predicted[3 * int64_t{g} + axis]; });
+    if (more) team.each(3, [&](int axis) { of_prediction.of(axis) = w.group_predicted[row_of_group(w, g, axis)]; });
   };
   constexpr bool kAllAhead = kRows > 1;  // one thread has no registers for so much
   if constexpr (kAllAhead) {
@@ -1727,7 +1739,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
   Rows<Team<Block, kRows>> goals = mean_goal(team, w, head, ahead.holders, pace.h, base), plain, next;
   if constexpr (!kAllAhead) team.each(3, read_maps);
   team.each(3, [&](int axis) {
-    const int64_t at = 3 * int64_t{g} + axis;
+    const int64_t at = row_of_group(w, g, axis);
     const Float4 goal = goals.of(axis);
     if constexpr (kContacts) {
       if (state == kHeld) {
@@ -1789,7 +1801,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
   // All that is read before anything is written: behind a store, each would be waited for by itself.
   if constexpr (!kAllAhead) read_moments();
   team.each(3, [&](int axis) {
-    const int64_t at = 3 * int64_t{g} + axis;
+    const int64_t at = row_of_group(w, g, axis);
     const Float4 row = next.of(axis);
     w.group_map[at] = row;
     if constexpr (kAccelerated) {
@@ -1798,7 +1810,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
     if (!more) return;
     const Float4 predicted = of_prediction.of(axis);
     const auto moved = [&](float at_first, float by_map) { return at_first + (by_map - lost_next * at_first); };
-    w.group_moments[at] = {
+    moments_of(w, g)[axis] = {
         moved(predicted.x, per_h * (row.w * mass.x + (row.x * upper.x + row.y * upper.y + row.z * upper.z))),
         moved(predicted.y, per_h * (row.w * mass.y + (row.x * upper.y + row.y * upper.w + row.z * lower.x))),
         moved(predicted.z, per_h * (row.w * mass.z + (row.x * upper.z + row.y * lower.x + row.z * lower.y))),
@@ -1828,7 +1840,8 @@ CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int
       const int slot = w.memberships[k];
       if (slot < 0) continue;
       const Float3 r = pace.h * nodes_from_rest_center(w, c, slot);
-      const Map place = load_map(w.placement, slot);
+      const Float4* const row = w.placement + 3 * int64_t{slot};
+      const Map place = {{row[0], row[1], row[2]}};
       const Float3 center = {place.row[0].w, place.row[1].w, place.row[2].w};
       const Float3 turned = {place.row[0].x * r.x + place.row[0].y * r.y + place.row[0].z * r.z,
                              place.row[1].x * r.x + place.row[1].y * r.y + place.row[1].z * r.z,
@@ -1847,12 +1860,15 @@ template <bool kContacts, bool kAccelerated, bool kRetarded, int kRows, class Bl
 CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int substep, int iteration) {
   using namespace step_detail;
   const Team<Block, kRows> rows(block);
-  const Team<Block, kResolvedTeam> team(block);
+  // A warp, and what it has of teams for resolved groups, as in begin_substep_kernel.
+  const Team<Block, kResolvedTeam> warp(block);
+  const Team<Block, kResolvedLanes<kRows>> team(block);
+  constexpr int kTeams = warp.kLanes / team.kLanes;
   const int groups = w.counters->groups, loose = w.counters->loose;
   const int resolved = kContacts ? *listed_before(w, substep, iteration) : 0;
   // Whole warps at a time: groups that turn out to be no longer clear are everybody's, as are those that were resolved
   // before, with which the warps behind begin. All of them in one place, because there is much to it.
-  const int64_t in_warp = rows.first() % (team.kLanes / rows.kLanes);
+  const int64_t in_warp = rows.first() % (warp.kLanes / rows.kLanes);
   int64_t row = rows.first(), listed = behind(rows, team, groups);
   [[maybe_unused]] unsigned found = 0;
   while (true) {
@@ -1860,11 +1876,14 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
     [[maybe_unused]] int g = -1;
     if (found != 0) {
       begins = true;
-      g = team.take(found, static_cast<int>(row - rows.stride()));
+      for (int k = 0; k < kTeams && found != 0; ++k) {
+        const int next = warp.take(found, static_cast<int>(row - rows.stride()));
+        if (k == team.first() % kTeams) g = next;
+      }
     } else if (row - in_warp < groups) {
       const bool touches = row < groups && advance_carried<kContacts, kAccelerated, kRetarded>(
                                                block, rows, w, static_cast<int>(row), substep, iteration);
-      if constexpr (kContacts) found = team.found(touches && rows.leads());
+      if constexpr (kContacts) found = warp.found(touches && rows.leads());
       row += rows.stride();
       continue;
     } else if (listed < resolved) {
@@ -1874,8 +1893,10 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
       break;
     }
     if constexpr (kContacts) {
-      advance_resolved<kContacts, kAccelerated, kRetarded>(block, team, w, group_ahead<kHoldersAtOnce<kRows>>(w, g),
-                                                           substep, iteration, begins);
+      if (g >= 0) {
+        advance_resolved<kContacts, kAccelerated, kRetarded>(block, team, w, group_ahead<kHoldersAtOnce<kRows>>(w, g),
+                                                             substep, iteration, begins);
+      }
     }
   }
   if (loose == 0) return;
@@ -1885,12 +1906,12 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
 }
 
 template <bool kContacts, bool kRetarded, int kLanes>
-struct sum_groups_kernel_object {
-  static constexpr const char* kName = "sum_groups_kernel";
-  static constexpr int kMaxThreads = 128, kMinBlocks = kLanes == step_detail::kParticleTeam ? 5 : 4;
+struct begin_first_substep_kernel_object {
+  static constexpr const char* kName = "begin_first_substep_kernel";
+  static constexpr int kMaxThreads = 128, kMinBlocks = 4;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w) const {
-    sum_groups_kernel<kContacts, kRetarded, kLanes>(block, w);
+    begin_first_substep_kernel<kContacts, kRetarded, kLanes>(block, w);
   }
 };
 template <bool kContacts, bool kRetarded, int kRows>
@@ -1955,12 +1976,15 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
     });
   };
   by_particles([&](auto lanes) {
-    launcher.teams(sum_groups_kernel_object<kContacts, kRetarded, lanes.value>{}, lanes.value, teams, w);
+    launcher.teams(begin_first_substep_kernel_object<kContacts, kRetarded, lanes.value>{}, lanes.value, teams, w);
   });
   for (int substep = 0; substep < plan.substeps; ++substep) {
-    by_rows([&](auto rows) {
-      launcher.teams(begin_substep_kernel_object<kContacts, kRetarded, rows.value>{}, kParticleTeam, teams, w, substep);
-    });
+    if (substep > 0) {
+      by_rows([&](auto rows) {
+        launcher.teams(begin_substep_kernel_object<kContacts, kRetarded, rows.value>{}, kParticleTeam, teams, w,
+                       substep);
+      });
+    }
     for (int iteration = 0; iteration < plan.iterations; ++iteration) {
       by_clusters([&](auto lanes) {
         constexpr int kTeams = kMatchThreads / lanes.value;

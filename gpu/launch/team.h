@@ -91,6 +91,18 @@ class Team {
         for (int k = 0; k < N; ++k) give(k, value_[k]);
       }
     }
+    // give(n, sum, sum of `other`)
+    template <class Give>
+    CUTPROOF_DEVICE void each(const Team& team, const Parted& other, Give give) const {
+      if constexpr (Block::on_device) {
+        for (int k = 0; k < kOwn; ++k) {
+          const int which = team.lane() / kShare * kOwn + k;
+          if (team.lane() % kShare == 0 && which < N) give(which, value_[k], other.value_[k]);
+        }
+      } else {
+        for (int k = 0; k < N; ++k) give(k, value_[k], other.value_[k]);
+      }
+    }
     // Sum n, to every lane.
     CUTPROOF_DEVICE float get(const Team& team, int n) const {
       return team.from(n / kOwn * kShare, value_[Block::on_device ? n % kOwn : n]);

@@ -666,12 +666,12 @@ Stepped step(const cutproof::Setup& setup, const State& state) {
   return stepped;
 }
 
-// The step's kernels up to where a frame's first substep begins, and what begins one.
+// The step's kernels up to where a frame's first substep has begun, and what begins each that follows.
 void begin_frame(HostLauncher& launcher, const DeviceView& w) {
   launcher.items(begin_frame_kernel_object{}, w.particles, w, Span{Stage::step, Stage::step});
   enqueue_groups_if_stale(launcher, w);
-  launcher.teams(sum_groups_kernel_object<true, false, step_detail::kParticleTeam>{}, step_detail::kParticleTeam,
-                 w.group_capacity, w);
+  launcher.teams(begin_first_substep_kernel_object<true, false, step_detail::kParticleTeam>{},
+                 step_detail::kParticleTeam, w.group_capacity, w);
 }
 void begin_substep(HostLauncher& launcher, const DeviceView& w, int substep) {
   launcher.teams(begin_substep_kernel_object<true, false, step_detail::kRowTeam>{}, step_detail::kParticleTeam,
@@ -735,7 +735,7 @@ TEST(Groups, AreOnBothSidesOfTheBladeIfTheirParticlesAre) {
   const DeviceView w = staging.view();
   HostLauncher launcher;
   begin_frame(launcher, w);
-  for (int substep = 0; substep < 2; ++substep) begin_substep(launcher, w, substep);
+  begin_substep(launcher, w, 1);
   int both = 0, one = 0;
   for (int g = 0; g < staging.counters.front().groups; ++g) {
     if (w.group_tracked[g] == step_detail::kUntouched) continue;
@@ -765,7 +765,8 @@ TEST(Groups, HaveTheirBasesNearTheirMeans) {
   for (std::size_t i = 0; i < state.v.size(); i += 11) {
     state.v[i] += Vec3{normal(random), normal(random), 1 + std::abs(normal(random))} * 50.0;
   }
-  const Stepped found = step(setup, state);
+  Stepped found = step(setup, state);
+  const DeviceView w = found.staging.view();
   const StagingBuffers& staging = found.staging;
   const StagingBuffers begun = make_staging_buffers({setup}, {state}, kNewton, Capacity{});
   const double near = (1.0 / 16 + 1e-3) * setup.body.grid.spacing;
@@ -775,7 +776,9 @@ TEST(Groups, HaveTheirBasesNearTheirMeans) {
     const double mass = staging.group_mass[g].w;
     ASSERT_GT(mass, 0);
     const auto off = [&](const Elements<Float4>& moments) {
-      const auto along = [&](std::size_t axis) { return moments[3 * g + axis].w / mass; };
+      const auto along = [&](int axis) {
+        return moments[at(step_detail::row_of_group(w, static_cast<int>(g), axis))].w / mass;
+      };
       return norm(Vec3{along(0), along(1), along(2)});
     };
     EXPECT_LE(off(staging.frame_shape), near) << "group " << g;
@@ -802,7 +805,7 @@ TEST(Groups, HaveTheirBasesNearTheirMeans) {
 // are at rest about the base: whatever an earlier substep has made of their group, no room is more than that leaves.
 TEST(Groups, LeaveRoomForTheirRestShape) {
   cutproof::Setup setup = block_on_floor(0.05);
-  setup.step.substeps = 1;
+  setup.step.substeps = 2;
   const std::vector<cutproof::Setup> setups = {setup};
   StagingBuffers staging = make_staging_buffers(setups, {cooked(setup)}, kNewton, Capacity{});
   const DeviceView w = staging.view();
@@ -811,12 +814,20 @@ TEST(Groups, LeaveRoomForTheirRestShape) {
   const int groups = staging.counters.front().groups;
   ASSERT_GT(groups, 20);
   const auto h = static_cast<float>(setup.body.grid.spacing);
-  const float smaller = -0.9f * h;  // all are pressed together to a tenth
+  const float smaller = -0.9f * h;  // all are pressed together to a tenth, and stay so in the substep that ends
+  const float lost = step_detail::numbers_of(w, 0, setup.step.iterations)->lost_before;
   for (int g = 0; g < groups; ++g) {
-    Float4* const rows = w.group_place + 3 * g;
-    rows[0].x = rows[1].y = rows[2].z = smaller;
+    for (int axis = 0; axis < 3; ++axis) {
+      const int64_t row = step_detail::row_of_group(w, g, axis);
+      const auto diagonal = [&](float entry) {
+        return Float4{axis == 0 ? entry : 0, axis == 1 ? entry : 0, axis == 2 ? entry : 0, 0};
+      };
+      w.group_place[row] = diagonal(smaller);
+      w.group_velocity[row] = {};
+      w.group_map[row] = diagonal(lost * smaller);
+    }
   }
-  begin_substep(launcher, w, 0);
+  begin_substep(launcher, w, 1);
   for (int g = 0; g < groups; ++g) {
     ASSERT_EQ(w.group_tracked[g], step_detail::kUntouched);
     double lowest = 1;
@@ -857,7 +868,6 @@ TEST(Groups, AreResolvedIfEitherCandidateTouches) {
     const DeviceView w = staging.view();
     HostLauncher launcher;
     begin_frame(launcher, w);
-    begin_substep(launcher, w, 0);
     const IterationNumbers& numbers = *step_detail::numbers_of(w, 0, kIteration);
     const step_detail::Combination combination = {numbers.pull, numbers.carry};
     // Where all is now, and where it was that the two lead to the candidate that is wanted.
@@ -874,8 +884,9 @@ TEST(Groups, AreResolvedIfEitherCandidateTouches) {
     for (int g = 0; g < groups; ++g) {
       ASSERT_EQ(w.group_resolved[g], kCarried);
       for (int axis = 0; axis < 3; ++axis) {
-        w.group_map[3 * g + axis] = {0, 0, 0, axis == 2 ? now : 0};
-        w.group_earlier_map[3 * g + axis] = {0, 0, 0, axis == 2 ? earlier : 0};
+        const int64_t row = step_detail::row_of_group(w, g, axis);
+        w.group_map[row] = {0, 0, 0, axis == 2 ? now : 0};
+        w.group_earlier_map[row] = {0, 0, 0, axis == 2 ? earlier : 0};
       }
     }
     launcher.teams(advance_kernel_object<true, true, false, step_detail::kRowTeam>{}, step_detail::kParticleTeam,
