@@ -133,13 +133,8 @@ struct Map {
   // a + L (h r)
   CUTPROOF_DEVICE Float3 operator()(Float3 r) const { return moved() + linear(r); }
 };
-// Rows of groups lie axis by axis: where a thread has a group, neighbours then read what lies side by side. (Moments do
-// not, which clusters read, group by group.)
-CUTPROOF_DEVICE inline int64_t row_of_group(const DeviceView& w, int g, int axis) {
-  return axis * w.group_capacity + g;
-}
-CUTPROOF_DEVICE inline Map load_map(const DeviceView& w, const Float4* rows, int g) {
-  return {{rows[row_of_group(w, g, 0)], rows[row_of_group(w, g, 1)], rows[row_of_group(w, g, 2)]}};
+CUTPROOF_DEVICE inline Map load_map(const Float4* rows, int g) {
+  return {{rows[3 * int64_t{g}], rows[3 * int64_t{g} + 1], rows[3 * int64_t{g} + 2]}};
 }
 // Entry by entry.
 template <class Of>
@@ -240,7 +235,9 @@ CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) {
 // work of all, but in an iteration, whose resolved groups are few.
 inline constexpr int kRowTeam = 4, kParticleTeam = 16, kResolvedTeam = 32;
 inline constexpr int kMostByRows = 150'000;  // particles of a load
-// Those that a tracked or a resolved group gets, where so many lanes share a carried one.
+// Lanes that a tracked or a resolved group gets, where kRows of them share a carried one. (Half a warp leaves half as many
+// idle, and takes longer: of a million particles on a floor a frame is an eighth shorter, of a million that only a blade
+// touches a hundredth longer.)
 template <int kRows>
 inline constexpr int kResolvedLanes = kRows == 1 ? kResolvedTeam / 2 : kResolvedTeam;
 
@@ -272,9 +269,9 @@ CUTPROOF_DEVICE inline void add_moments(float* sums, float weight, Float3 e, Flo
     sums[4 * axis + 3] += weight * e[axis];
   }
 }
-CUTPROOF_DEVICE inline Float4* moments_of(const DeviceView& w, int g) { return w.group_moments + 3 * int64_t{g}; }
-// Sum n of a group, whose row this is.
-CUTPROOF_DEVICE inline void store_sum(Float4& row, int n, float sum) {
+// Sum n of group g.
+CUTPROOF_DEVICE inline void store_moment(Float4* rows, int g, int n, float sum) {
+  Float4& row = rows[3 * int64_t{g} + n / 4];
   (n % 4 == 0 ? row.x : n % 4 == 1 ? row.y : n % 4 == 2 ? row.z : row.w) = sum;
 }
 
@@ -426,7 +423,7 @@ CUTPROOF_DEVICE void sum_resolved(const AnyTeam& team, const DeviceView& w, cons
     const Float3 e = xyz(at) - base;
     add_moments(sum, of_each * at.w, e, per_h * e, group.rest(w, pace, k));
   });
-  team.parted(sums).each(team, [&](int n, float sum) { store_sum(moments_of(w, group.index)[n / 4], n, sum); });
+  team.parted(sums).each(team, [&](int n, float sum) { store_moment(w.group_moments, group.index, n, sum); });
 }
 
 // How many groups were tracked when a substep began, for begin_substep_kernel, which then has it in `tracked`; those of
@@ -443,7 +440,7 @@ CUTPROOF_DEVICE void list_resolved(Block& block, const AnyTeam& team, const Devi
                                    int substep, int before) {
   // It has no map any more, and may never have had one; who reads ahead reads it all the same.
   team.sync();  // all have read the last one
-  team.each(3, [&](int axis) { w.group_map[row_of_group(w, g, axis)] = Float4{}; });
+  team.each(3, [&](int axis) { w.group_map[3 * int64_t{g} + axis] = Float4{}; });
   if (!team.leads()) return;
   w.group_resolved[g] = kResolved;
   if (pace.iterations == 0) return;  // nobody asks for the list, or empties it
@@ -572,12 +569,13 @@ CUTPROOF_DEVICE inline Float3 led_to(const Map& map, const Parts& parts, const O
 template <class AnyTeam>
 CUTPROOF_DEVICE Float3 track_particles(const AnyTeam& team, const DeviceView& w, const Group& group, const Pace& pace,
                                        const Contacts& contacts, bool held, int substep) {
+  const int64_t g = group.index;
   const FrameParts parts = load_parts(w, body_of_group(w, group.head), substep);
   const Parts of_prediction = predicted_parts(pace, parts);
   const Origin origin = origin_of(w, group.index);
   Map now, next;
   for (int axis = 0; axis < 3; ++axis) {
-    const Axis is = load_axis(w, row_of_group(w, group.index, axis));
+    const Axis is = load_axis(w, 3 * g + axis);
     now.row[axis] = is.place;
     next.row[axis] = predicted_row(pace, axis, is);
   }
@@ -683,7 +681,7 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
   Rows<Team<Block, kRows>> place, velocity, map, shape, motion;
   const Origin origin = origin_of(w, g);
   team.each(3, [&](int axis) {
-    const int64_t at = row_of_group(w, g, axis);
+    const int64_t at = 3 * int64_t{g} + axis;
     place.of(axis) = w.group_place[at];
     velocity.of(axis) = w.group_velocity[at];
     if (pace.iterations > 0) map.of(axis) = w.group_map[at];
@@ -693,7 +691,7 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
   if (state != kUntouched) return false;
   Rows<Team<Block, kRows>>& predicted = map;
   team.each(3, [&](int axis) {
-    const int64_t at = row_of_group(w, g, axis);
+    const int64_t at = 3 * int64_t{g} + axis;
     const Axis now = axis_after<kRetarded>(pace, axis, lost, origin, of_last_prediction, map.of(axis),
                                            {place.of(axis), velocity.of(axis)});
     place.of(axis) = w.group_place[at] = now.place;
@@ -710,7 +708,7 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
     if (team.leads()) w.group_base[g] = with_w(base, 0.0f);
   }
   team.each(3, [&](int axis) {
-    const int64_t at = row_of_group(w, g, axis);
+    const int64_t at = 3 * int64_t{g} + axis;
     const Float4 row = predicted.of(axis), u = shape.of(axis), m = motion.of(axis);
     const auto own = [&](float of_shape, float of_motion) {
       return (1.0f + of_prediction.shape) * of_shape + of_prediction.motion * of_motion;
@@ -720,7 +718,7 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
                            own(u.z, m.z) + per_h * (row.x * upper.z + row.y * lower.x + row.z * lower.y),
                            own(u.w, m.w) + (row.x * mass.x + row.y * mass.y + row.z * mass.z)};
     w.group_predicted[at] = moment;
-    moments_of(w, g)[axis] = moment;
+    w.group_moments[at] = moment;
   });
   return false;
 }
@@ -736,7 +734,7 @@ struct Ending {
 };
 CUTPROOF_DEVICE inline Ending ending_of(const DeviceView& w, int body, const Pace& pace, int g) {
   Ending ending = {{}, xyz(w.group_base[g]), lost_in_all(w, body, pace), w.group_resolved[g]};
-  if (pace.iterations > 0) ending.map = load_map(w, w.group_map, g);
+  if (pace.iterations > 0) ending.map = load_map(w.group_map, g);
   return ending;
 }
 // Displacement and mass of its particle k; sets its velocity, and ends its impulse.
@@ -840,8 +838,8 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const Devi
       w.group_resolved[g] = kCarried;
     }
     total.each(team, [&](int n, float sum) {
-      store_sum(w.group_predicted[row_of_group(w, g, n / 4)], n, sum);
-      if (!resolve) store_sum(moments_of(w, g)[n / 4], n, sum);
+      store_moment(w.group_predicted, g, n, sum);
+      if (!resolve) store_moment(w.group_moments, g, n, sum);
     });
   }
   if (!resolve) return;
@@ -941,7 +939,7 @@ CUTPROOF_DEVICE void begin_group(Block& block, const AnyTeam& team, const Device
   using Total = typename AnyTeam::template Parted<12>;
   const auto sum = [&](auto value, float far, Float4* rows, Total& total) {
     const Float4 base = sum_about<kParticleTeam>(team, w, group, pace, per_mass, far, value, total);
-    total.each(team, [&](int n, float of) { store_sum(rows[row_of_group(w, g, n / 4)], n, of); });
+    total.each(team, [&](int n, float of) { store_moment(rows, g, n, of); });
     return base;
   };
   Origin origin;
@@ -971,8 +969,8 @@ CUTPROOF_DEVICE void begin_group(Block& block, const AnyTeam& team, const Device
     from.row[axis] = now.place;
     to.row[axis] = predicted_row(pace, axis, now);
     if (!team.leads()) continue;
-    w.group_place[row_of_group(w, g, axis)] = now.place;
-    w.group_velocity[row_of_group(w, g, axis)] = now.velocity;
+    w.group_place[3 * int64_t{g} + axis] = now.place;
+    w.group_velocity[3 * int64_t{g} + axis] = now.velocity;
   }
   if (team.leads()) {
     w.group_origin[2 * int64_t{g}] = origin.place;
@@ -991,8 +989,8 @@ CUTPROOF_DEVICE void begin_group(Block& block, const AnyTeam& team, const Device
   }
   shape.each(team, motion, [&](int n, float of_shape, float of_motion) {
     const float moment = of_shape + pace.ahead * of_motion;  // a prediction begins with no shape of the group's own
-    store_sum(w.group_predicted[row_of_group(w, g, n / 4)], n, moment);
-    store_sum(moments_of(w, g)[n / 4], n, moment);
+    store_moment(w.group_predicted, g, n, moment);
+    store_moment(w.group_moments, g, n, moment);
   });
 }
 
@@ -1022,7 +1020,7 @@ CUTPROOF_DEVICE void end_group(const AnyTeam& team, const DeviceView& w, int g) 
   const float lost = lost_in_all(w, body, pace);
   Map start, end;
   for (int axis = 0; axis < 3; ++axis) {
-    const int64_t at = row_of_group(w, g, axis);
+    const int64_t at = 3 * int64_t{g} + axis;
     const Float4 map = pace.iterations > 0 ? w.group_map[at] : Float4{};
     const Axis now = load_axis(w, at);
     start.row[axis] = now.place;
@@ -1286,7 +1284,7 @@ struct Moments {
   Float4 row[3];
 };
 CUTPROOF_DEVICE inline Moments load_moments(const DeviceView& w, int g) {
-  const Float4* const row = moments_of(w, g);
+  const Float4* const row = w.group_moments + 3 * int64_t{g};
   return {{row[0], row[1], row[2]}};
 }
 
@@ -1618,8 +1616,8 @@ CUTPROOF_DEVICE void resolve(Block& block, const AnyTeam& team, const DeviceView
     list_tracked(block, team, w, g, substep, w.counters->tracked[substep % 2]);
   }
   Map is = {}, was = {};
-  if (iteration > 0) is = load_map(w, w.group_map, g);
-  if constexpr (kAccelerated) was = iteration > 1 && now.combined ? load_map(w, w.group_earlier_map, g) : is;
+  if (iteration > 0) is = load_map(w.group_map, g);
+  if constexpr (kAccelerated) was = iteration > 1 && now.combined ? load_map(w.group_earlier_map, g) : is;
   const float lost = now.lost_before;
   [[maybe_unused]] float lost_earlier = 0;
   if constexpr (kAccelerated) {
@@ -1713,7 +1711,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
   Rows<Team<Block, kRows>> present, earlier, of_prediction;
   Float4 mass, upper, lower;
   const auto read_maps = [&](int axis) {
-    const int64_t at = row_of_group(w, g, axis);
+    const int64_t at = 3 * int64_t{g} + axis;
     if (iteration > 0) earlier.of(axis) = present.of(axis) = w.group_map[at];
     // The one before the first is no map of this kind, and of no weight.
     if constexpr (kAccelerated) {
@@ -1724,7 +1722,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
     mass = constant(&w.group_mass[g]);
     upper = constant(&w.group_spread[2 * int64_t{g}]);
     lower = constant(&w.group_spread[2 * int64_t{g} + 1]);
-    if (more) team.each(3, [&](int axis) { of_prediction.of(axis) = w.group_predicted[row_of_group(w, g, axis)]; });
+    if (more) team.each(3, [&](int axis) { of_prediction.of(axis) = w.group_predicted[3 * int64_t{g} + axis]; });
   };
   constexpr bool kAllAhead = kRows > 1;  // one thread has no registers for so much
   if constexpr (kAllAhead) {
@@ -1739,7 +1737,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
   Rows<Team<Block, kRows>> goals = mean_goal(team, w, head, ahead.holders, pace.h, base), plain, next;
   if constexpr (!kAllAhead) team.each(3, read_maps);
   team.each(3, [&](int axis) {
-    const int64_t at = row_of_group(w, g, axis);
+    const int64_t at = 3 * int64_t{g} + axis;
     const Float4 goal = goals.of(axis);
     if constexpr (kContacts) {
       if (state == kHeld) {
@@ -1801,7 +1799,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
   // All that is read before anything is written: behind a store, each would be waited for by itself.
   if constexpr (!kAllAhead) read_moments();
   team.each(3, [&](int axis) {
-    const int64_t at = row_of_group(w, g, axis);
+    const int64_t at = 3 * int64_t{g} + axis;
     const Float4 row = next.of(axis);
     w.group_map[at] = row;
     if constexpr (kAccelerated) {
@@ -1810,7 +1808,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
     if (!more) return;
     const Float4 predicted = of_prediction.of(axis);
     const auto moved = [&](float at_first, float by_map) { return at_first + (by_map - lost_next * at_first); };
-    moments_of(w, g)[axis] = {
+    w.group_moments[at] = {
         moved(predicted.x, per_h * (row.w * mass.x + (row.x * upper.x + row.y * upper.y + row.z * upper.z))),
         moved(predicted.y, per_h * (row.w * mass.y + (row.x * upper.y + row.y * upper.w + row.z * lower.x))),
         moved(predicted.z, per_h * (row.w * mass.z + (row.x * upper.z + row.y * lower.x + row.z * lower.y))),
@@ -1840,8 +1838,7 @@ CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int
       const int slot = w.memberships[k];
       if (slot < 0) continue;
       const Float3 r = pace.h * nodes_from_rest_center(w, c, slot);
-      const Float4* const row = w.placement + 3 * int64_t{slot};
-      const Map place = {{row[0], row[1], row[2]}};
+      const Map place = load_map(w.placement, slot);
       const Float3 center = {place.row[0].w, place.row[1].w, place.row[2].w};
       const Float3 turned = {place.row[0].x * r.x + place.row[0].y * r.y + place.row[0].z * r.z,
                              place.row[1].x * r.x + place.row[1].y * r.y + place.row[1].z * r.z,
