@@ -3,7 +3,7 @@
 // The particles of a group (groups.cuh) are carried: they are at d~ + M(r) - l e, with e = d~ - base from the
 // prediction, r = X - X_g, l a number of body and iteration, and M one affine map for all of them. A prediction follows
 // from the map of the substep before in the same way, so a frame touches particles twice: it sums what they begin with
-// (sum_groups), and puts them where they have come to (end_step). Between these a substep touches groups
+// (begin_first_substep), and puts them where they have come to (end_step). Between these a substep touches groups
 // (begin_substep) and an iteration touches clusters (match_shapes, from the moments of their groups) and groups
 // (advance: the mean of their holders' goals is the next map, and has the next moments). A group that may touch a
 // contact is resolved: from there to the end of the substep its particles have positions of their own, and to the end
