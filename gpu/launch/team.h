@@ -79,29 +79,14 @@ class Team {
   template <int N>
   class Parted {
    public:
-    // give(n, sum) for the sums that this lane has.
+    // give(n, sum) for the sums that this lane has; give(n, sum, sum of `other`).
     template <class Give>
     CUTPROOF_DEVICE void each(const Team& team, Give give) const {
-      if constexpr (Block::on_device) {
-        for (int k = 0; k < kOwn; ++k) {
-          const int which = team.lane() / kShare * kOwn + k;
-          if (team.lane() % kShare == 0 && which < N) give(which, value_[k]);
-        }
-      } else {
-        for (int k = 0; k < N; ++k) give(k, value_[k]);
-      }
+      each_own(team, [&](int n, int k) { give(n, value_[k]); });
     }
-    // give(n, sum, sum of `other`)
     template <class Give>
     CUTPROOF_DEVICE void each(const Team& team, const Parted& other, Give give) const {
-      if constexpr (Block::on_device) {
-        for (int k = 0; k < kOwn; ++k) {
-          const int which = team.lane() / kShare * kOwn + k;
-          if (team.lane() % kShare == 0 && which < N) give(which, value_[k], other.value_[k]);
-        }
-      } else {
-        for (int k = 0; k < N; ++k) give(k, value_[k], other.value_[k]);
-      }
+      each_own(team, [&](int n, int k) { give(n, value_[k], other.value_[k]); });
     }
     // Sum n, to every lane.
     CUTPROOF_DEVICE float get(const Team& team, int n) const {
@@ -114,6 +99,18 @@ class Team {
     static constexpr int kShare = kWidth > kMost ? kWidth / kMost : 1;  // lanes that end up with the same sums…
     static constexpr int kOwn = kWidth < kMost ? kMost / kWidth : 1;    // … and how many these are
     static_assert(N <= kMost);
+    // visit(n, k) for the sums n that this lane has, as value_[k].
+    template <class Visit>
+    CUTPROOF_DEVICE static void each_own(const Team& team, Visit visit) {
+      if constexpr (Block::on_device) {
+        for (int k = 0; k < kOwn; ++k) {
+          const int which = team.lane() / kShare * kOwn + k;
+          if (team.lane() % kShare == 0 && which < N) visit(which, k);
+        }
+      } else {
+        for (int k = 0; k < N; ++k) visit(k, k);
+      }
+    }
     float value_[Block::on_device ? kOwn : N] = {};
   };
   template <int N, int kOrder>
