@@ -85,12 +85,13 @@ double step_bytes(const Setup& setup, const State& state) {
   // frame began with 96, moments out 96; with contacts rest centre 16, its first displacement and velocity 32, room,
   // side, resolved and tracked 16. Loose particle: places and count of holders 12, where it was and how it moved 32,
   // start, predicted and position out 48; with contacts node, pushed and impulse, in and out 68.
-  const double of_loose = (92 + (contacts ? 68 : 0)) * of.loose;
-  const double substep = (544 + (contacts ? 64 : 0)) * of.groups + of_loose;
+  const double substep = (544 + (contacts ? 64 : 0)) * of.groups + (92 + (contacts ? 68 : 0)) * of.loose;
   // begin_first_substep, particle of a group: places 8, displacement and velocity 32; group: head and rest centre 48,
   // mass 16, its first displacement and velocity, place and velocity 128, moments of both 96, base and moments out 112;
-  // with contacts room, side, resolved and tracked 16.
-  const double first = 40 * (particles - of.loose) + (400 + (contacts ? 16 : 0)) * of.groups + of_loose;
+  // with contacts room, side, resolved and tracked 16. Loose particle: as above, but nothing has pushed it: with
+  // contacts node, and pushed out 20.
+  const double first =
+      40 * (particles - of.loose) + (400 + (contacts ? 16 : 0)) * of.groups + (92 + (contacts ? 20 : 0)) * of.loose;
   // Once a frame. begin_frame, particle: impulse and death 20. end_step, particle: places 8, displacement and velocity
   // in and out 64; group: head and rest centre 48, its first displacement and velocity 32, base and map 64, place and
   // velocity 96; with contacts tracked 4. Loose particle: places 8, start and position 32, displacement and velocity

@@ -45,6 +45,18 @@ CUTPROOF_DEVICE int64_t behind(const Small&, const Large& large, int jobs) {
   return first < 0 ? first + teams : first;
 }
 
+// Of the jobs that the lanes of a warp have found, one for each of its teams: this one's, or -1 if none is left for it.
+template <class Warp, class AnyTeam>
+CUTPROOF_DEVICE int take_each(const Warp& warp, const AnyTeam& team, unsigned& found, int job) {
+  constexpr int kTeams = Warp::kLanes / AnyTeam::kLanes;
+  int mine = -1;
+  for (int k = 0; k < kTeams && found != 0; ++k) {
+    const int next = warp.take(found, job);
+    if (k == team.first() % kTeams) mine = next;
+  }
+  return mine;
+}
+
 namespace step_detail {
 
 // Whether a body takes part in this iteration. One with fewer substeps or iterations than others waits.
@@ -468,8 +480,13 @@ struct Parts {
 struct FrameParts {
   Parts place, velocity;
 };
+CUTPROOF_DEVICE inline FrameParts first_parts() { return {{0, 0}, {0, 1}}; }  // where a frame begins
 CUTPROOF_DEVICE inline Parts predicted_parts(const Pace& pace, const FrameParts& now) {
   return {now.place.shape + pace.ahead * now.velocity.shape, now.place.motion + pace.ahead * now.velocity.motion};
+}
+// One entry of the moments of what is left there of u and v, from those of u and of v - V.
+CUTPROOF_DEVICE inline float own_moment(const Parts& now, float of_shape, float of_motion) {
+  return (1.0f + now.shape) * of_shape + now.motion * of_motion;
 }
 // (Computed once a frame, so whether anybody has retardation is not asked before.)
 CUTPROOF_DEVICE inline FrameParts parts_after(const Pace& pace, float lost, const FrameParts& now) {
@@ -496,7 +513,7 @@ CUTPROOF_DEVICE inline float kdt2_of(const BodyConstants& body, const Pace& pace
 CUTPROOF_DEVICE inline void store_numbers(const DeviceView& w, int body, const Pace& pace) {
   const float kdt2 = kdt2_of(w.body[body], pace);
   const float lost = lost_fraction(pace, pace.iterations);
-  FrameParts now = {{0, 0}, {0, 1}};
+  FrameParts now = first_parts();
   for (int substep = 0; substep <= pace.substeps; ++substep) {
     *parts_of(w, body, substep) = {now.place.shape, now.place.motion, now.velocity.shape, now.velocity.motion};
     now = parts_after(pace, lost, now);
@@ -618,13 +635,13 @@ CUTPROOF_DEVICE Float4 sum_about(const AnyTeam& team, const DeviceView& w, const
   return with_w(base, sqrtf(team.greatest(reach)) * (1.0f + kOfRoundings));
 }
 
-// Whether a contact may touch such a group in its prediction. Notes what is asked of it if none does: its base, and how
-// far from there it may go. from: where it begins the substep, if a blade or retardation asks; parts: of that; to: what
-// its prediction adds to `base`, which is `moved` from there.
+// Notes the base of such a group in this substep, and how far from its prediction it may go: the room, which it gives;
+// not positive: a contact may touch it there. from: where it begins the substep, asked for if there is a blade or
+// retardation; parts: of that; to: what its prediction adds to `base`, which is `moved` from there.
 template <bool kRetarded, class AnyTeam, class From>
-CUTPROOF_DEVICE bool may_touch(const AnyTeam& team, const DeviceView& w, const Group& group, const Pace& pace,
-                               const Contacts& contacts, const Origin& origin, const Parts& parts,
-                               const Parts& of_prediction, From from, Map to) {
+CUTPROOF_DEVICE float note_room(const AnyTeam& team, const DeviceView& w, const Group& group, const Pace& pace,
+                                const Contacts& contacts, const Origin& origin, const Parts& parts,
+                                const Parts& of_prediction, From from, Map to) {
   const int g = group.index;
   Float4 base = with_w(origin.from(of_prediction.motion) + to.moved(), 0.0f);
   for (Float4& row : to.row) row.w = 0;
@@ -651,7 +668,7 @@ CUTPROOF_DEVICE bool may_touch(const AnyTeam& team, const DeviceView& w, const G
     w.group_side[g] = side;
     w.group_resolved[g] = kCarried;
   }
-  return !(room > 0);
+  return room;
 }
 
 // Begins a substep of a group that nothing has touched so far. Says whether something may in its prediction, or a grip
@@ -699,10 +716,10 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
     predicted.of(axis) = predicted_row(pace, axis, now);
   });
   if constexpr (kContacts) {
-    const bool touches = may_touch<kRetarded>(
+    const float room = note_room<kRetarded>(
         team, w, group, pace, contacts, origin, parts.place, of_prediction, [&] { return place.all(team); },
         predicted.all(team));
-    if (touches || held_by(w, pace, head.hold_set, substep).active) return true;
+    if (!(room > 0) || held_by(w, pace, head.hold_set, substep).active) return true;
   } else {
     const Float3 base = origin.from(of_prediction.motion) + predicted.all(team).moved();
     if (team.leads()) w.group_base[g] = with_w(base, 0.0f);
@@ -710,9 +727,7 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
   team.each(3, [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
     const Float4 row = predicted.of(axis), u = shape.of(axis), m = motion.of(axis);
-    const auto own = [&](float of_shape, float of_motion) {
-      return (1.0f + of_prediction.shape) * of_shape + of_prediction.motion * of_motion;
-    };
+    const auto own = [&](float of_shape, float of_motion) { return own_moment(of_prediction, of_shape, of_motion); };
     const Float4 moment = {own(u.x, m.x) + per_h * (row.x * upper.x + row.y * upper.y + row.z * upper.z),
                            own(u.y, m.y) + per_h * (row.x * upper.y + row.y * upper.w + row.z * lower.x),
                            own(u.z, m.z) + per_h * (row.x * upper.z + row.y * lower.x + row.z * lower.y),
@@ -962,7 +977,7 @@ CUTPROOF_DEVICE void begin_group(Block& block, const AnyTeam& team, const Device
       kFarBase * pace.h / pace.ahead, w.frame_motion, motion);
   const Float3 since = origin.uniform() ? xyz(origin.place) : Float3{};
   const Float3 began = origin.uniform() ? xyz(origin.velocity) : Float3{};
-  const Parts of_place = {}, of_prediction = {0, pace.ahead};
+  const Parts of_prediction = predicted_parts(pace, first_parts());
   Map from, to;
   for (int axis = 0; axis < 3; ++axis) {
     const Axis now = {{0, 0, 0, since[axis]}, {0, 0, 0, began[axis]}};
@@ -977,9 +992,10 @@ CUTPROOF_DEVICE void begin_group(Block& block, const AnyTeam& team, const Device
     w.group_origin[2 * int64_t{g} + 1] = origin.velocity;
   }
   if constexpr (kContacts) {
-    const bool touches = may_touch<kRetarded>(
-        team, w, group, pace, contacts_of(w, pace, 0), origin, of_place, of_prediction, [&] { return from; }, to);
-    if (touches || held_by(w, pace, head.hold_set, 0).active) {
+    const float room = note_room<kRetarded>(
+        team, w, group, pace, contacts_of(w, pace, 0), origin, first_parts().place, of_prediction, [&] { return from; },
+        to);
+    if (!(room > 0) || held_by(w, pace, head.hold_set, 0).active) {
       team.sync();  // what its leader has written is all lanes' to read
       begin_tracked<kRetarded>(block, team, w, g, 0, 0, true);
       return;
@@ -988,7 +1004,8 @@ CUTPROOF_DEVICE void begin_group(Block& block, const AnyTeam& team, const Device
     w.group_base[g] = with_w(origin.from(of_prediction.motion) + to.moved(), 0.0f);
   }
   shape.each(team, motion, [&](int n, float of_shape, float of_motion) {
-    const float moment = of_shape + pace.ahead * of_motion;  // a prediction begins with no shape of the group's own
+    // (A group begins with no shape of its own.)
+    const float moment = own_moment(of_prediction, of_shape, of_motion);
     store_moment(w.group_predicted, g, n, moment);
     store_moment(w.group_moments, g, n, moment);
   });
@@ -1157,7 +1174,6 @@ CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int
   // are many, and two of them side by side.
   const Team<Block, kResolvedTeam> warp(block);
   const Team<Block, kResolvedLanes<kRows>> team(block);
-  constexpr int kTeams = warp.kLanes / team.kLanes;
   const int groups = w.counters->groups, loose = w.counters->loose;
   // Whole warps at a time, as in advance_kernel.
   const int64_t in_warp = rows.first() % (warp.kLanes / rows.kLanes);
@@ -1170,10 +1186,7 @@ CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int
     [[maybe_unused]] int g = -1;
     if (found != 0) {
       begins = true;
-      for (int k = 0; k < kTeams && found != 0; ++k) {
-        const int next = warp.take(found, static_cast<int>(row - rows.stride()));
-        if (k == team.first() % kTeams) g = next;
-      }
+      g = take_each(warp, team, found, static_cast<int>(row - rows.stride()));
     } else if (row - in_warp < groups) {
       const bool touches =
           row < groups && begin_untouched<kContacts, kRetarded>(block, rows, w, static_cast<int>(row), substep);
@@ -1860,7 +1873,6 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
   // A warp, and what it has of teams for resolved groups, as in begin_substep_kernel.
   const Team<Block, kResolvedTeam> warp(block);
   const Team<Block, kResolvedLanes<kRows>> team(block);
-  constexpr int kTeams = warp.kLanes / team.kLanes;
   const int groups = w.counters->groups, loose = w.counters->loose;
   const int resolved = kContacts ? *listed_before(w, substep, iteration) : 0;
   // Whole warps at a time: groups that turn out to be no longer clear are everybody's, as are those that were resolved
@@ -1873,10 +1885,7 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
     [[maybe_unused]] int g = -1;
     if (found != 0) {
       begins = true;
-      for (int k = 0; k < kTeams && found != 0; ++k) {
-        const int next = warp.take(found, static_cast<int>(row - rows.stride()));
-        if (k == team.first() % kTeams) g = next;
-      }
+      g = take_each(warp, team, found, static_cast<int>(row - rows.stride()));
     } else if (row - in_warp < groups) {
       const bool touches = row < groups && advance_carried<kContacts, kAccelerated, kRetarded>(
                                                block, rows, w, static_cast<int>(row), substep, iteration);
