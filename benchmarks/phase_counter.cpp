@@ -37,14 +37,21 @@ class PhaseCounter {
     ++phases_;
     body(*this);
   }
-  // Of two chains the longer one counts.
+  // Of chains the longest one counts.
   template <class First, class Second>
   void side_by_side(First first, Second second) {
+    side_by_side(first, second, [](PhaseCounter&) {}, [](PhaseCounter&) {});
+  }
+  template <class First, class Second, class AfterFirst, class AfterBoth>
+  void side_by_side(First first, Second second, AfterFirst after_first, AfterBoth after_both) {
     PhaseCounter beside;
-    const int64_t before = phases_;
+    beside.phases_ = phases_;
     first(*this);
     second(beside);
-    phases_ = std::max(phases_, before + beside.phases_);
+    beside.phases_ = std::max(beside.phases_, phases_);
+    after_first(*this);
+    after_both(beside);
+    phases_ = std::max(phases_, beside.phases_);
   }
   void exclusive_scan(const int*, int*, int64_t, int*, const int* = nullptr) { ++phases_; }
   void select(const unsigned char*, int64_t, int*, int*, const int* = nullptr) { ++phases_; }

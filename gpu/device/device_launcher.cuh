@@ -74,6 +74,7 @@ namespace detail {
 
 template <class = void>
 __global__ void set_condition_kernel(cudaGraphConditionalHandle handle, const int* flag) {
+  DeviceBlock().wait_for_earlier();
   cudaGraphSetConditional(handle, *flag != 0 ? 1u : 0u);
 }
 
@@ -258,20 +259,32 @@ class Dependencies {
     if (edges != nullptr) found.edges_.assign(edges, edges + count);
     return found;
   }
-  // how: cudaStreamSetCaptureDependencies, instead of what there is, or cudaStreamAddCaptureDependencies.
-  void give(cudaStream_t stream, unsigned how) const {
+  // Instead of what there is.
+  void give(cudaStream_t stream) const {
     auto nodes = nodes_;  // not taken as constant
     const cudaGraphEdgeData* const edges = edges_.empty() ? nullptr : edges_.data();
+    constexpr unsigned how = cudaStreamSetCaptureDependencies;
 #if CUDART_VERSION >= 13000
     CUTPROOF_CUDA(cudaStreamUpdateCaptureDependencies(stream, nodes.data(), edges, nodes.size(), how));
 #else
     CUTPROOF_CUDA(cudaStreamUpdateCaptureDependencies_v2(stream, nodes.data(), edges, nodes.size(), how));
 #endif
   }
+  // What either waits for; once, whatever both do.
+  Dependencies with(const Dependencies& other) const {
+    Dependencies both = *this;
+    for (std::size_t k = 0; k < other.nodes_.size(); ++k) {
+      if (std::find(nodes_.begin(), nodes_.end(), other.nodes_[k]) != nodes_.end()) continue;
+      both.edges_.resize(both.nodes_.size());
+      both.nodes_.push_back(other.nodes_[k]);
+      both.edges_.push_back(k < other.edges_.size() ? other.edges_[k] : cudaGraphEdgeData{});
+    }
+    return both;
+  }
 
  private:
   std::vector<cudaGraphNode_t> nodes_;
-  std::vector<cudaGraphEdgeData> edges_;
+  std::vector<cudaGraphEdgeData> edges_;  // empty: plain ones
 };
 
 inline cudaGraphNode_t append_node(cudaStream_t stream, cudaGraphNodeParams* parameters) {
@@ -375,9 +388,15 @@ class DeviceLauncher {
 
   template <class First, class Second>
   void side_by_side(First first, Second second) {
+    side_by_side(first, second, [](DeviceLauncher&) {}, [](DeviceLauncher&) {});
+  }
+  template <class First, class Second, class AfterFirst, class AfterBoth>
+  void side_by_side(First first, Second second, AfterFirst after_first, AfterBoth after_both) {
     if (mode_ == Mode::at_once) {
       first(*this);
       second(*this);
+      after_first(*this);
+      after_both(*this);
       return;
     }
     if (resources_->beside == nullptr) resources_->beside = std::make_shared<detail::DeviceResources>();
@@ -385,16 +404,23 @@ class DeviceLauncher {
     if (mode_ == Mode::measure) {
       first(*this);
       second(other);
+      after_first(*this);
+      after_both(other);
       return;
     }
-    // Both on one stream, told anew what it waits for: a second one that were not brought back, because some call fails
+    // All on one stream, told anew what it waits for: a second one that were not brought back, because some call fails
     // in between, would be left in the middle of capturing.
     const auto parted = detail::Dependencies::of(stream_);
     first(*this);
     const auto end_of_first = detail::Dependencies::of(stream_);
-    parted.give(stream_, cudaStreamSetCaptureDependencies);
+    after_first(*this);
+    const auto end_of_chain = detail::Dependencies::of(stream_);
+    parted.give(stream_);
     second(other);
-    end_of_first.give(stream_, cudaStreamAddCaptureDependencies);
+    detail::Dependencies::of(stream_).with(end_of_first).give(stream_);
+    other.after_launch_ = false;
+    after_both(other);
+    detail::Dependencies::of(stream_).with(end_of_chain).give(stream_);
     after_launch_ = false;
   }
 
@@ -466,7 +492,7 @@ class DeviceLauncher {
   template <class Kernel, class... Args>
   void launch(std::int64_t wanted, int threads, std::size_t shared_bytes, const Args&... args) {
     const auto arguments = detail::bundle(args...);
-    const auto kernel = &run_kernel<Kernel, detail::Arguments<Args...>>;
+    constexpr auto kernel = &run_kernel<Kernel, detail::Arguments<Args...>>;
     // Beyond this a kernel must ask; what collectives use (up to 6 KB) counts as well.
     constexpr std::size_t kWithoutAsking = 40 * 1024;
     if (shared_bytes > kWithoutAsking && mode_ != Mode::capture) {
@@ -486,27 +512,25 @@ class DeviceLauncher {
     config.gridDim = static_cast<unsigned>(std::clamp<std::int64_t>(wanted, 1, most));
     config.blockDim = static_cast<unsigned>(threads);
     config.dynamicSmemBytes = shared_bytes;
-    config.stream = stream_;
-    // Begins while the last blocks of the launch before it work, where both know to wait (launcher.h).
+    start<kernel>(config, kernel_name<Kernel>(), arguments);
+  }
+  // Begins while the last blocks of the launch before it work, where both know to wait (launcher.h).
+  template <auto kKernel, class... Arguments>
+  void start(cudaLaunchConfig_t config, const char* name, const Arguments&... arguments) {
     cudaLaunchAttribute overlap = {};
     overlap.id = cudaLaunchAttributeProgrammaticStreamSerialization;
     overlap.val.programmaticStreamSerializationAllowed = 1;
+    config.stream = stream_;
     config.attrs = &overlap;
-    const bool waits = waits_for_earlier<Kernel>(kernel);
-    config.numAttrs = mode_ == Mode::capture && waits && after_launch_ ? 1 : 0;
-    check_cuda(cudaLaunchKernelEx(&config, kernel, arguments), kernel_name<Kernel>(), __FILE__, __LINE__);
-    after_launch_ = waits;
-  }
-
-  // Code for devices before 9.0 knows no such waiting, wherever it runs.
-  template <class Kernel, class Function>
-  static bool waits_for_earlier(Function kernel) {
+    // Code for devices before 9.0 knows no such waiting, wherever it runs.
     static const bool waits = [&] {
       cudaFuncAttributes attributes = {};
-      check_cuda(cudaFuncGetAttributes(&attributes, kernel), kernel_name<Kernel>(), __FILE__, __LINE__);
+      check_cuda(cudaFuncGetAttributes(&attributes, kKernel), name, __FILE__, __LINE__);
       return attributes.ptxVersion >= 90;
     }();
-    return waits;
+    config.numAttrs = mode_ == Mode::capture && waits && after_launch_ ? 1 : 0;
+    check_cuda(cudaLaunchKernelEx(&config, kKernel, arguments...), name, __FILE__, __LINE__);
+    after_launch_ = waits;
   }
 
   int read(const int* flag) {
@@ -520,7 +544,6 @@ class DeviceLauncher {
   // end.
   template <class Body>
   void conditional(const int* flag, cudaGraphConditionalNodeType type, Body& body) {
-    after_launch_ = false;
     if (mode_ == Mode::measure) {
       DeviceLauncher inside(mode_, nullptr, resources_, depth_ + 1);
       body(inside);
@@ -534,7 +557,8 @@ class DeviceLauncher {
     detail::capture_info(stream_, &graph, &dependencies, &edges, &count);
     cudaGraphConditionalHandle handle{};
     CUTPROOF_CUDA(cudaGraphConditionalHandleCreate(&handle, graph, 0, cudaGraphCondAssignDefault));
-    set_condition(handle, flag, stream_);
+    set_condition(handle, flag);
+    after_launch_ = false;
 
     cudaGraphNodeParams parameters = {};
     parameters.type = cudaGraphNodeTypeConditional;
@@ -550,16 +574,17 @@ class DeviceLauncher {
     try {
       DeviceLauncher inside(mode_, stream, resources_, depth_ + 1);
       body(inside);
-      if (type == cudaGraphCondTypeWhile) set_condition(handle, flag, stream);
+      if (type == cudaGraphCondTypeWhile) inside.set_condition(handle, flag);
     } catch (...) {
       static_cast<void>(cudaStreamEndCapture(stream, &captured));
       throw;
     }
     CUTPROOF_CUDA(cudaStreamEndCapture(stream, &captured));
   }
-  static void set_condition(cudaGraphConditionalHandle handle, const int* flag, cudaStream_t stream) {
-    detail::set_condition_kernel<><<<1, 1, 0, stream>>>(handle, flag);
-    check_cuda(cudaGetLastError(), "set_condition_kernel", __FILE__, __LINE__);
+  void set_condition(cudaGraphConditionalHandle handle, const int* flag) {
+    cudaLaunchConfig_t config = {};
+    config.gridDim = config.blockDim = 1;
+    start<&detail::set_condition_kernel<>>(config, "set_condition_kernel", handle, flag);
   }
 
   template <class Call>

@@ -67,6 +67,14 @@ class SpanLauncher {
     first(*this);
     second(*this);
   }
+  template <class First, class Second, class AfterFirst, class AfterBoth>
+  __device__ __forceinline__ void side_by_side(First first, Second second, AfterFirst after_first,
+                                               AfterBoth after_both) {
+    first(*this);
+    second(*this);
+    after_first(*this);
+    after_both(*this);
+  }
 
   __device__ void exclusive_scan(const int* in, int* out, std::int64_t count, int* total, const int* used = nullptr) {
     DeviceBlock block;

@@ -85,15 +85,31 @@ class HostLauncher {
 
   template <class First, class Second>
   void side_by_side(First first, Second second) {
+    side_by_side(first, second, [](HostLauncher&) {}, [](HostLauncher&) {});
+  }
+  template <class First, class Second, class AfterFirst, class AfterBoth>
+  void side_by_side(First first, Second second, AfterFirst after_first, AfterBoth after_both) {
     if (!simulated() || turns_ != nullptr) {
       first(*this);
       second(*this);
+      after_first(*this);
+      after_both(*this);
       return;
     }
     Turns turns([&](int current) { return runtime_->choose(2, current); });
     turns_ = &turns;
     try {
-      turns.run([&] { first(*this); }, [&] { second(*this); });
+      turns.run(
+          [&] {
+            first(*this);
+            turns.arrive();
+            after_first(*this);
+          },
+          [&] {
+            second(*this);
+            turns.await();
+            after_both(*this);
+          });
     } catch (...) {
       turns_ = nullptr;
       throw;

@@ -29,9 +29,28 @@ void Turns::run(const std::function<void()>& first, const std::function<void()>&
 void Turns::next() {
   std::unique_lock lock(mutex_);
   const int own = going_;
-  if (ended_[1 - own]) return;
-  going_ = choose_(own);
-  if (going_ == own) return;
+  if (ended_[1 - own] || awaited_) return;
+  const int chosen = choose_(own);
+  if (chosen != own) let(chosen, lock);
+}
+
+void Turns::arrive() {
+  const std::lock_guard lock(mutex_);
+  arrived_ = true;
+  awaited_ = false;
+}
+
+void Turns::await() {
+  std::unique_lock lock(mutex_);
+  if (arrived_) return;
+  awaited_ = true;
+  let(0, lock);
+}
+
+// Comes back when the piece that goes lets this one go on.
+void Turns::let(int piece, std::unique_lock<std::mutex>& lock) {
+  const int own = going_;
+  going_ = piece;
   changed_.notify_all();
   changed_.wait(lock, [&] { return going_ == own; });
   if (error_ != nullptr) throw Abandoned{};

@@ -18,11 +18,19 @@ CUTPROOF_DEVICE void recenter(const DeviceView& w, const Team<Block, kCenterTeam
   const Float3 base = xyz(w.displacement[members[0]]);
   // Σ w (d - base), Σ w (X - T), which is zero but for the rounding of T, and Σ w.
   typename Team<Block, kCenterTeam>::template Sums<7> sums;
-  team.each(w.slot_size[s], [&](int k) {
+  struct Member {
+    Float4 now;
+    int clusters, node;
+  };
+  const auto ask = [&](int k) {
     const int p = members[k];
-    const Float4 now = w.displacement[p];
-    const float weight = now.w / static_cast<float>(w.membership_count[p]);
-    const Float3 moved = weight * (xyz(now) - base), rest = weight * from_rest_center(w, body, p, s);
+    return Member{w.displacement[p], w.membership_count[p], w.node[p]};
+  };
+  const RestCenter center = rest_center(w, s);
+  team.template each_asked<4>(w.slot_size[s], ask, [&](int k, const Member& member) {
+    const float weight = member.now.w / static_cast<float>(member.clusters);
+    const Float3 moved = weight * (xyz(member.now) - base);
+    const Float3 rest = weight * (body.h * nodes_between(center, coordinates(body, member.node)));
     float* const sum = sums.of(k);
     sum[0] += moved.x;
     sum[1] += moved.y;
@@ -46,15 +54,28 @@ CUTPROOF_DEVICE inline Float3 carried(const DeviceView& w, const BodyConstants& 
   // Relative to where the first cluster puts it, so that summing costs no digits of d. (Not to the owner: where a
   // blade has pushed it away, that is far from what all of them say.)
   Float3 base = xyz(w.displacement[p]), sum;
-  int clusters = 0;
-  for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
-    const int s = w.memberships[k];
-    if (s < 0) continue;
-    const Float3 r = from_rest_center(w, body, p, s) + arm;
-    const Float3 center = w.center[s], turned = w.rotation[s] * r - r;
-    if (clusters == 0) base = center + turned;
-    sum = sum + ((center - base) + turned);
-    ++clusters;
+  const Coordinates at = coordinates(body, w.node[p]);
+  struct Holder {
+    RestCenter rest;
+    Float3 center;
+    Matrix3 rotation;
+  };
+  // Several at once: one by one, each would wait for what the one before has asked for.
+  constexpr int kAtOnce = 4;
+  const int clusters = w.membership_count[p], begin = w.membership_begin[p];
+  CUTPROOF_ROLLED for (int first = 0; first < clusters; first += kAtOnce) {
+    Holder holder[kAtOnce];
+    for (int t = 0; t < kAtOnce; ++t) {
+      const int s = w.memberships[begin + (first + t < clusters ? first + t : first)];
+      holder[t] = {rest_center(w, s), w.center[s], w.rotation[s]};
+    }
+    for (int t = 0; t < kAtOnce; ++t) {
+      if (first + t >= clusters) break;
+      const Float3 r = body.h * nodes_between(holder[t].rest, at) + arm;
+      const Float3 center = holder[t].center, turned = holder[t].rotation * r - r;
+      if (first + t == 0) base = center + turned;
+      sum = sum + ((center - base) + turned);
+    }
   }
   return clusters > 0 ? base + (1.0f / static_cast<float>(clusters)) * sum : base;
 }

@@ -34,11 +34,11 @@ CUTPROOF_DEVICE inline bool is_due(const DeviceView& w, int b, int stage) {
   }
 }
 
-// What a span reports of step and detect: which of them some body has due. By the first block of whichever kernel is
-// the first of the span.
+// What a span reports of step and detect: which of them some body has due. By the last block of whichever kernel is the
+// first of the span; the first one has other things to do.
 template <class Block>
 CUTPROOF_DEVICE void begin_span(Block& block, const DeviceView& w, Span span) {
-  if (block.index() != 0) return;
+  if (block.index() != block.count() - 1) return;
   Counters& c = *w.counters;
   for (int k = block.thread(); k < static_cast<int>(kStages.size()); k += block.size()) block.store(&c.stage_ran[k], 0);
   block.sync();

@@ -17,8 +17,8 @@ namespace cutproof::gpu {
 // Lanes that measure a group, and that look through the members of a cluster.
 inline constexpr int kGroupTeam = 8;
 inline constexpr int kMemberTeam = 32;
-// Teams that share a cluster where each of its members is looked at alone.
-inline constexpr int kShares = 8;
+// Teams that share a cluster where each of its members is looked at alone, and where they are counted.
+inline constexpr int kShares = 8, kCountShares = 4;
 // Where a cluster is dealt out: threads, and how many members have room in their shared memory.
 inline constexpr int kDealThreads = 256;
 inline constexpr int kMostDealt = 2048;
@@ -36,9 +36,10 @@ CUTPROOF_BOTH inline int* class_size(const DeviceView& w) { return w.member_scra
 CUTPROOF_BOTH inline int* changed(const DeviceView& w) { return w.slot_scratch; }
 CUTPROOF_BOTH inline int* remeasured(const DeviceView& w) { return w.slot_scratch + w.slot_capacity; }
 inline constexpr int kRemeasured = 2;  // in DeviceView::regroup: it is listed among the latter
-// By particle: its class's place in that table, or -1; and how many of its class are smaller.
-CUTPROOF_BOTH inline int* entry_of(const DeviceView& w) { return w.particle_scratch; }
-CUTPROOF_BOTH inline int* rank_of(const DeviceView& w) { return w.particle_scratch + w.particles; }
+// Likewise by place: the entry of the member's class in that table, -1 if its class is not this cluster's.
+CUTPROOF_BOTH inline int* entry_of_member(const DeviceView& w) { return w.cluster_loose; }
+// By particle of a class that is dealt out, where there is no shared memory for it: how many of the class are smaller.
+CUTPROOF_BOTH inline int* rank_of(const DeviceView& w) { return w.place_of; }
 
 // A particle's holders: the gaps of its list (-1) are at its end.
 struct HolderList {
@@ -93,14 +94,6 @@ CUTPROOF_DEVICE inline void place(const DeviceView& w, int p, int o) {
   w.place_of[p] = o;
 }
 
-CUTPROOF_DEVICE inline Float3 nodes_between(RestCenter from, Coordinates to) {
-  return {static_cast<float>(to.i - from.i) - from.x, static_cast<float>(to.j - from.j) - from.y,
-          static_cast<float>(to.k - from.k) - from.z};
-}
-CUTPROOF_DEVICE inline RestCenter rest_center(const DeviceView& w, int s) {
-  const Float3 o = w.rest_offset[s];
-  return {w.rest_base[3 * s], w.rest_base[3 * s + 1], w.rest_base[3 * s + 2], o.x, o.y, o.z};
-}
 // X_g - T_s [h]: an exact difference of grid coordinates, and one of offsets.
 CUTPROOF_DEVICE inline Offset offset_between(RestCenter group, RestCenter cluster, int index) {
   return {static_cast<float>(group.i - cluster.i) + (group.x - cluster.x),
@@ -131,12 +124,10 @@ CUTPROOF_DEVICE void find_changed_clusters_kernel(Block& block, const DeviceView
   const Team<Block, kMemberTeam> team(block);
   Counters& c = *w.counters;
   if (c.groups_whole) return;
-  for (int64_t i = team.first(); i < c.slots_used; i += team.stride()) {
-    const int s = static_cast<int>(i);
-    if (w.regroup[s] == 0) continue;
+  const auto count_members = [&](int s, int share) {
     const int begin = w.slot_begin[s], size = w.slot_size[s];
     int particles = 0, pairs = 0;
-    for (int tile = 0; tile < size; tile += kAtOnce * team.kLanes) {
+    for (int tile = share * kAtOnce * team.kLanes; tile < size; tile += kCountShares * kAtOnce * team.kLanes) {
       int member[kAtOnce], count[kAtOnce], first[kAtOnce];
       for (int t = 0; t < kAtOnce; ++t) {
         const int k = tile + t * team.kLanes + team.lane();
@@ -156,10 +147,21 @@ CUTPROOF_DEVICE void find_changed_clusters_kernel(Block& block, const DeviceView
     }
     particles = team.total(particles);
     pairs = team.total(pairs);
-    if (!team.leads()) continue;
-    changed(w)[block.atomic_add(&c.regrouped, 1)] = s;
-    block.atomic_add(&c.due_particles, particles);
-    block.atomic_add(&c.due_pairs, pairs);
+    if (!team.leads()) return;
+    if (share == 0) changed(w)[block.atomic_add(&c.regrouped, 1)] = s;
+    if (particles > 0) block.atomic_add(&c.due_particles, particles);
+    if (pairs > 0) block.atomic_add(&c.due_pairs, pairs);
+  };
+  // Each lane looks whether a cluster has changed, far apart from those of its neighbours: changed ones lie side by side.
+  const int64_t jobs = int64_t{kCountShares} * c.slots_used;
+  for (int64_t begin = team.first(); begin < jobs; begin += team.kLanes * team.stride()) {
+    const int64_t job = begin + team.lane() * team.stride();
+    const bool has_changed = job < jobs && w.regroup[job / kCountShares] != 0;
+    unsigned found = team.found(has_changed);
+    while (found != 0) {
+      const int which = team.take(found, static_cast<int>(job));
+      count_members(which / kCountShares, which % kCountShares);
+    }
   }
 }
 CUTPROOF_KERNEL(find_changed_clusters_kernel);
@@ -187,7 +189,6 @@ CUTPROOF_DEVICE void dissolve_groups_kernel(Block& block, const DeviceView& w) {
     team.each(w.slot_size[s], [&](int k) {
       table(w)[begin + k] = 0;
       class_size(w)[begin + k] = 0;
-      block.store(&entry_of(w)[w.members[begin + k]], -1);
     });
     if (whole) continue;
     const ClusterHead head = w.cluster_head[s];  // as it was when groups were made
@@ -215,8 +216,8 @@ CUTPROOF_DEVICE void find_classes_kernel(Block& block, const DeviceView& w) {
   Counters& c = *w.counters;
   const bool whole = c.groups_whole != 0;
   if (whole && block.first() == 0) c.groups = c.placed = c.placed_last = c.loose = c.pairs = 0;
-  const auto remeasure = [&](int s) {
-    if (whole || block.load(&w.regroup[s]) >= kRemeasured) return;
+  const auto remeasure = [&](int s, int known) {
+    if (whole || known >= kRemeasured) return;
     if ((block.atomic_or(&w.regroup[s], kRemeasured) & kRemeasured) != 0) return;
     remeasured(w)[block.atomic_add(&c.remeasured, 1)] = s;
   };
@@ -226,12 +227,15 @@ CUTPROOF_DEVICE void find_classes_kernel(Block& block, const DeviceView& w) {
     const int share = static_cast<int>(i % kShares),
               s = whole ? static_cast<int>(i / kShares) : changed(w)[i / kShares];
     const int begin = w.slot_begin[s], size = w.slot_size[s];
-    if (team.leads() && share == 0) remeasure(s);
+    if (team.leads() && share == 0) remeasure(s, block.load(&w.regroup[s]));
     int* const classes = table(w) + begin;
     for (int k = share * team.kLanes + team.lane(); k < size; k += kShares * team.kLanes) {
       const int p = w.members[begin + k];
       const HolderList list = holders_of(w, p);
-      if (list.begin[0] != s) continue;
+      if (list.begin[0] != s) {
+        entry_of_member(w)[begin + k] = -1;
+        continue;
+      }
       int entry = static_cast<int>(
           static_cast<unsigned long long>(hash_of(list, hold_set(w, p))) * static_cast<unsigned>(size) >> 32);
       bool first = false;
@@ -244,8 +248,13 @@ CUTPROOF_DEVICE void find_classes_kernel(Block& block, const DeviceView& w) {
         if (first || same_class(w, p, found - 1)) break;
         entry = entry + 1 == size ? 0 : entry + 1;
       }
-      entry_of(w)[p] = begin + entry;
-      for (int h = 0; h < list.size && first; ++h) remeasure(list.begin[h]);
+      entry_of_member(w)[begin + k] = entry;
+      for (int h = 0; h < list.size && first; h += kAtOnce) {
+        int holder[kAtOnce], known[kAtOnce];
+        for (int j = 0; j < kAtOnce; ++j) holder[j] = list.begin[h + j < list.size ? h + j : h];
+        for (int j = 0; j < kAtOnce; ++j) known[j] = block.load(&w.regroup[holder[j]]);
+        for (int j = 0; j < kAtOnce && h + j < list.size; ++j) remeasure(holder[j], known[j]);
+      }
     }
   }
 }
@@ -279,16 +288,13 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
     const bool fits = size <= kMostDealt;
     // By member: the entry of its class in `classes`, -1 if that is not this cluster's to deal out, and how many of its
     // class come before it. By entry: how many the class has.
-    const auto looked_up = [&](int p) {
-      const int entry = entry_of(w)[p] - begin;
-      return entry >= 0 && entry < size ? entry : -1;
-    };
-    const auto entry_at = [&](int k) { return fits ? shared[k] : looked_up(members[k]); };
+    const int* const entries = entry_of_member(w) + begin;
+    const auto entry_at = [&](int k) { return fits ? shared[k] : entries[k]; };
     const auto rank_at = [&](int k) -> int& { return fits ? shared[kMostDealt + k] : rank_of(w)[members[k]]; };
     int* const sizes = fits ? shared + 2 * kMostDealt : class_size(w) + begin;
     if (fits) {
       for (int k = block.thread(); k < size; k += block.size()) {
-        shared[k] = looked_up(members[k]);
+        shared[k] = entries[k];
         sizes[k] = 0;
       }
       block.sync();
@@ -502,10 +508,16 @@ CUTPROOF_DEVICE void measure_clusters_kernel(Block& block, const DeviceView& w) 
         if (at[t] >= 0) w.cluster_groups[list_begin + group] = to[t];
       }
       if (whole) continue;
+      // Those that are new have been told.
       for (int t = 0; t < kAtOnce; ++t) {
-        if (at[t] < 0) continue;
-        for (int h = head[t].holder_begin; h < head[t].holder_begin + head[t].holder_count; ++h) {
-          if (w.holders[h].index == s) w.holders[h] = {to[t].x, to[t].y, to[t].z, s};
+        if (at[t] < 0 || at[t] >= counters.groups_before) continue;
+        const int end = head[t].holder_begin + head[t].holder_count;
+        for (int first = head[t].holder_begin; first < end; first += kAtOnce) {
+          int index[kAtOnce];
+          for (int j = 0; j < kAtOnce; ++j) index[j] = w.holders[first + j < end ? first + j : first].index;
+          for (int j = 0; j < kAtOnce; ++j) {
+            if (index[j] == s && first + j < end) w.holders[first + j] = {to[t].x, to[t].y, to[t].z, s};
+          }
         }
       }
     }

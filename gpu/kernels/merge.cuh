@@ -89,10 +89,9 @@ CUTPROOF_DEVICE void for_touching(Block& block, const DeviceView& w, int s, Visi
       q = alive(w, p) ? neighbour(w, body, p, direction) : -1;
       if (q < 0 || !alive(w, q)) continue;
     }
-    for (int h = w.membership_begin[q]; h < w.membership_begin[q + 1]; ++h) {
-      const int t = block.load(&w.memberships[h]);
+    each_membership(block, w, q, [&](int, int t) {
       if (t >= 0 && t != s) visit(t, direction < 0);
-    }
+    });
   }
 }
 
@@ -289,17 +288,13 @@ CUTPROOF_DEVICE void hand_over(Block& block, const DeviceView& w, int s, int t, 
     const int p = members[k];
     const bool twice = contains(list, size, p);
     mark_unsorted(block, w, p);
-    const int begin = w.membership_begin[p], end = w.membership_begin[p + 1];
-    for (int h = begin; h < end; ++h) {
-      if (block.load(&w.memberships[h]) == s) block.store(&w.memberships[h], twice ? -1 : t);
-    }
     if (twice) block.atomic_add(&w.membership_count[p], -1);
-    for (int h = begin; h < end; ++h) {
-      const int slot = block.load(&w.memberships[h]);
-      if (slot < 0) continue;
+    each_membership(block, w, p, [&](int h, int slot) {
+      if (slot == s) return block.store(&w.memberships[h], twice ? -1 : t);
+      if (slot < 0) return;
       block.store(&w.regroup[slot], 1);
       if (twice) block.store(&marks[slot], 1);
-    }
+    });
   }
 }
 

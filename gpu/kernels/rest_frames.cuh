@@ -18,13 +18,20 @@ CUTPROOF_DEVICE void recompute_rest_frame(const Team<Block, kRestTeam>& team, co
   const int* const members = w.members + w.slot_begin[s];
   const Coordinates base = coordinates(body, w.node[members[0]]);
   // add(k, w, X / h - base) for the members of this lane.
+  struct Member {
+    float mass;
+    int clusters, node;
+  };
+  const auto ask = [&](int k) {
+    const int p = members[k];
+    return Member{w.displacement[p].w, w.membership_count[p], w.node[p]};
+  };
   const auto weighted = [&](auto add) {
-    team.each(w.slot_size[s], [&](int k) {
-      const int p = members[k];
-      const Coordinates c = coordinates(body, w.node[p]);
+    team.template each_asked<4>(w.slot_size[s], ask, [&](int k, const Member& member) {
+      const Coordinates c = coordinates(body, member.node);
       const Float3 from_base = {static_cast<float>(c.i - base.i), static_cast<float>(c.j - base.j),
                                 static_cast<float>(c.k - base.k)};
-      add(k, w.displacement[p].w / static_cast<float>(w.membership_count[p]), from_base);
+      add(k, member.mass / static_cast<float>(member.clusters), from_base);
     });
   };
   typename Team<Block, kRestTeam>::template Sums<4> sums;

@@ -27,30 +27,32 @@ CUTPROOF_DEVICE inline bool skinned(const DeviceView& w, int b) { return running
 CUTPROOF_DEVICE inline bool extracts(const DeviceView& w, int b) {
   return skinned(w, b) && (w.cut[b] >= 0 || !w.skin_made[b]);
 }
-// Whether p died in this frame, by detection or as debris. Only of a body that was cut.
-CUTPROOF_DEVICE inline bool died_now(const DeviceView& w, int b, int p) {
-  return w.death[p] == w.cut[b] || w.death[p] == w.cut[b] + 1;
-}
-// Whether p changes the cells around it: it died, or there is no skin yet and it is tissue.
-CUTPROOF_DEVICE inline bool changes_cells(const DeviceView& w, int b, int p) {
-  return w.skin_made[b] ? died_now(w, b, p) : alive(w, p);
+// Whether a particle with that DeviceView::death changes the cells around it: it died in this frame, by detection or as
+// debris, or there is no skin yet and it is tissue. Only of a body that was cut.
+CUTPROOF_DEVICE inline bool changes_cells(const DeviceView& w, int b, int death) {
+  return w.skin_made[b] ? death == w.cut[b] || death == w.cut[b] + 1 : death < 0;
 }
 CUTPROOF_DEVICE inline int corner_step(const BodyConstants& body, int corner) {
   return (corner & 1) + body.nodes[0] * ((corner >> 1 & 1) + body.nodes[1] * (corner >> 2));
 }
 
-// The particles at a cell's corners, -1 where there is none, and which of them are tissue, as bits.
+// The particles at a cell's corners, -1 where there is none, which of them are tissue, and which change the cells
+// around them, as bits. All are asked for at once.
 struct Cell {
   int corner[8];
-  int inside;
+  int inside, changing;
 };
-CUTPROOF_DEVICE inline Cell cell_at(const DeviceView& w, const BodyConstants& body, int64_t node) {
+CUTPROOF_DEVICE inline Cell cell_at(const DeviceView& w, int b, int64_t node) {
+  const BodyConstants& body = w.body[b];
   Cell cell;
-  cell.inside = 0;
+  cell.inside = cell.changing = 0;
+  int death[8];
+  for (int c = 0; c < 8; ++c) cell.corner[c] = w.particle_at[node + corner_step(body, c)];
+  for (int c = 0; c < 8; ++c) death[c] = cell.corner[c] < 0 ? kDeadBefore : w.death[cell.corner[c]];
   for (int c = 0; c < 8; ++c) {
-    const int p = w.particle_at[node + corner_step(body, c)];
-    cell.corner[c] = p;
-    if (p >= 0 && alive(w, p)) cell.inside |= 1 << c;
+    if (cell.corner[c] < 0) continue;
+    if (death[c] < 0) cell.inside |= 1 << c;
+    if (changes_cells(w, b, death[c])) cell.changing |= 1 << c;
   }
   return cell;
 }
@@ -119,7 +121,7 @@ CUTPROOF_DEVICE void flag_changed_particles_kernel(Block& block, const DeviceVie
   }
   for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
     const int p = static_cast<int>(i), b = w.body_of[p];
-    w.particle_flag[p] = extracts(w, b) && changes_cells(w, b, p);
+    w.particle_flag[p] = extracts(w, b) && changes_cells(w, b, w.death[p]);
   }
 }
 CUTPROOF_KERNEL(flag_changed_particles_kernel);
@@ -135,12 +137,11 @@ CUTPROOF_DEVICE void count_skin_changes_kernel(Block& block, const DeviceView& w
     int own_bits = 0, cells = 0, vertices = 0;
     team.each(8, [&](int corner) {
       const int64_t node = body.node_begin + w.node[p] - corner_step(body, corner);
-      for (int lower = 0; lower < corner; ++lower) {
-        const int q = w.particle_at[node + corner_step(body, lower)];
-        if (q >= 0 && changes_cells(w, b, q)) return;
-      }
+      const int present = w.cell_of[node];
+      const Cell cell = cell_at(w, b, node);
+      if ((cell.changing & ((1 << corner) - 1)) != 0) return;
       own_bits += 1 << corner;
-      if (w.cell_of[node] < 0 && skin_table().corners[cell_at(w, body, node).inside][0] >= 0) ++cells;
+      if (present < 0 && skin_table().corners[cell.inside][0] >= 0) ++cells;
     });
     team.each(6, [&](int d) { vertices += new_vertex(w, b, p, d).owner >= 0 ? 1 : 0; });
     own_bits = team.total(own_bits);
@@ -237,8 +238,8 @@ CUTPROOF_DEVICE void extract_cells_kernel(Block& block, const DeviceView& w) {
   const bool sound = w.counters->scratch[kSound];
   const Team<Block, kCornerTeam> team(block);
   for (int64_t j = team.first(); j < w.counters->skin_changes && sound; j += team.stride()) {
-    const int p = changed(w)[j];
-    const BodyConstants& body = w.body[w.body_of[p]];
+    const int p = changed(w)[j], b = w.body_of[p];
+    const BodyConstants& body = w.body[b];
     const int own = own_corners(w)[p];
     int next = w.counters->scratch[kCellBase] + new_cells(w)[j];
     for (int tile = 0; tile < 8; tile += team.kLanes) {
@@ -248,7 +249,7 @@ CUTPROOF_DEVICE void extract_cells_kernel(Block& block, const DeviceView& w) {
       const signed char* corners = table.corners[0];
       Cell cell = {};
       if (own >> at & 1) {
-        cell = cell_at(w, body, node);
+        cell = cell_at(w, b, node);
         corners = table.corners[cell.inside];
         place = w.cell_of[node];
       }
@@ -263,16 +264,18 @@ CUTPROOF_DEVICE void extract_cells_kernel(Block& block, const DeviceView& w) {
         w.cell_node[place] = static_cast<int>(node);
       }
       if (place < 0) continue;
+      int vertex[3 * kMostSkinTriangles];  // all asked for before the first is written
       for (int c = 0; c < 3 * kMostSkinTriangles; ++c) {
-        int vertex = -1;
+        vertex[c] = -1;
         const int edge = corners[c];
-        if (edge >= 0) {
-          const int low = table.low[edge], axis = table.axis[edge];
-          const bool low_owns = cell.inside >> low & 1;
-          const int owner = cell.corner[low_owns ? low : low + (1 << axis)];
-          vertex = w.vertex_of[6 * owner + 2 * axis + (low_owns ? 0 : 1)];
-        }
-        w.cell_triangles[15 * static_cast<int64_t>(place) + c] = vertex;
+        if (edge < 0) continue;
+        const int low = table.low[edge], axis = table.axis[edge];
+        const bool low_owns = cell.inside >> low & 1;
+        const int owner = cell.corner[low_owns ? low : low + (1 << axis)];
+        vertex[c] = w.vertex_of[6 * owner + 2 * axis + (low_owns ? 0 : 1)];
+      }
+      for (int c = 0; c < 3 * kMostSkinTriangles; ++c) {
+        w.cell_triangles[15 * static_cast<int64_t>(place) + c] = vertex[c];
       }
     }
   }
@@ -288,9 +291,9 @@ CUTPROOF_DEVICE void mark_under_skin_kernel(Block& block, const DeviceView& w) {
   for (int64_t v = block.first(); v < w.counters->vertices_used; v += block.stride()) {
     const int p = w.vertex_owner[v];
     if (p < 0 || !skin_detail::skinned(w, w.body_of[p])) continue;
-    for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
-      if (w.memberships[k] >= 0) block.store(&w.under_skin[w.memberships[k]], 1);
-    }
+    each_membership(block, w, p, [&](int, int slot) {
+      if (slot >= 0) block.store(&w.under_skin[slot], 1);
+    });
   }
 }
 CUTPROOF_KERNEL(mark_under_skin_kernel);

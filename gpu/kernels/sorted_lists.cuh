@@ -98,6 +98,21 @@ CUTPROOF_DEVICE void mark_unsorted(Block& block, const DeviceView& w, int p) {
   block.store(&w.unsorted[p / kParticleTile], 1);
 }
 
+// visit(h, slot) for the places h of p's memberships, in which slot is, or -1. Several are read before the first is
+// visited: one by one, each would wait for the one before.
+template <class Block, class Visit>
+CUTPROOF_DEVICE void each_membership(Block& block, const DeviceView& w, int p, Visit visit) {
+  constexpr int kAtOnce = 4;
+  const int end = w.membership_begin[p + 1];
+  CUTPROOF_ROLLED for (int first = w.membership_begin[p]; first < end; first += kAtOnce) {
+    int slot[kAtOnce];
+    for (int t = 0; t < kAtOnce; ++t) slot[t] = block.load(&w.memberships[first + t < end ? first + t : first]);
+    for (int t = 0; t < kAtOnce; ++t) {
+      if (first + t < end) visit(first + t, slot[t]);
+    }
+  }
+}
+
 // Memberships of a particle in ascending order, -1 last.
 CUTPROOF_DEVICE inline void sort_memberships(const DeviceView& w, int64_t p) {
   for (int end = w.membership_begin[p] + 1; end < w.membership_begin[p + 1]; ++end) {

@@ -221,9 +221,9 @@ CUTPROOF_DEVICE void mark_affected_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
   for (int64_t i = block.first(); i < w.counters->fallen + w.counters->debris; i += block.stride()) {
     const int p = w.fallen[i];
-    for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
-      if (w.memberships[k] >= 0) block.store(&by_slot(w)[w.memberships[k]], 1);
-    }
+    each_membership(block, w, p, [&](int, int slot) {
+      if (slot >= 0) block.store(&by_slot(w)[slot], 1);
+    });
   }
 }
 CUTPROOF_KERNEL(mark_affected_kernel);
@@ -267,8 +267,10 @@ CUTPROOF_DEVICE void label_in_blocks_kernel(Block& block, DeviceView w, int most
     for (int k = block.thread(); k < size; k += block.size()) {
       if (peek<Memory::shared>(block, &parent[k]) < 0) continue;
       bool first = true;
+      int lower[3];  // all asked for before the first is looked for
+      for (int d = 0; d < 3; ++d) lower[d] = neighbour(w, body, members[k], lower_direction(d));
       for (int d = 0; d < 3; ++d) {
-        const int q = neighbour(w, body, members[k], lower_direction(d));
+        const int q = lower[d];
         if (q < 0) continue;
         const int place = place_of_lower(members, k, q, lower_direction(d));
         if (place < 0 || peek<Memory::shared>(block, &parent[place]) < 0) continue;
@@ -416,11 +418,10 @@ namespace split_detail {
 template <class Block>
 CUTPROOF_DEVICE void rename_holder(Block& block, const DeviceView& w, int p, int from, int to) {
   mark_unsorted(block, w, p);
-  for (int k = w.membership_begin[p]; k < w.membership_begin[p + 1]; ++k) {
-    const int slot = block.load(&w.memberships[k]);
-    if (slot == from) block.store(&w.memberships[k], to);
+  each_membership(block, w, p, [&](int h, int slot) {
+    if (slot == from) block.store(&w.memberships[h], to);
     if (slot >= 0 && to >= 0) block.store(&w.regroup[slot], 1);
-  }
+  });
 }
 
 }  // namespace split_detail

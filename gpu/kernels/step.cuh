@@ -76,11 +76,9 @@ CUTPROOF_DEVICE inline Float3 grid_node(const Pace& pace, int node) {
   return {static_cast<float>(c.i), static_cast<float>(c.j), static_cast<float>(c.k)};
 }
 
-// (X_p - T_s) / h. The difference of grid coordinates is exact.
+// (X_p - T_s) / h.
 CUTPROOF_DEVICE inline Float3 nodes_from_rest_center(const DeviceView& w, Coordinates c, int s) {
-  const Float3 o = w.rest_offset[s];
-  return {static_cast<float>(c.i - w.rest_base[3 * s]) - o.x, static_cast<float>(c.j - w.rest_base[3 * s + 1]) - o.y,
-          static_cast<float>(c.k - w.rest_base[3 * s + 2]) - o.z};
+  return nodes_between(rest_center(w, s), c);
 }
 
 // e^(-x) for x >= 0, within 2 units in the last place, by operations that give the same bits on every machine (the
@@ -235,7 +233,7 @@ struct Group {
   }
   // The same of the particle that is at this node.
   CUTPROOF_DEVICE Float3 rest_of(const Pace& pace, int node) const {
-    return groups_detail::nodes_between(center, coordinates(pace, node));
+    return nodes_between(center, coordinates(pace, node));
   }
 };
 CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) {

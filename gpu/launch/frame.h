@@ -73,16 +73,15 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
         }
         if (places_at_once) enqueue_skin_positions(on, w, false);
       };
-      if (skin && plan.skin) {
-        inner.side_by_side(change_clusters, [&](Launcher& on) { enqueue_skin_cells(on, w, plan); });
-      } else {
-        change_clusters(inner);
-      }
-      if (span.is_whole_frame()) {
-        inner.side_by_side([&](Launcher& on) { enqueue_groups(on, w); }, follow_clusters);
-      } else {
-        follow_clusters(inner);
-      }
+      inner.side_by_side(
+          change_clusters,
+          [&](Launcher& on) {
+            if (skin && plan.skin) enqueue_skin_cells(on, w, plan);
+          },
+          [&](Launcher& on) {
+            if (span.is_whole_frame()) enqueue_groups(on, w);
+          },
+          follow_clusters);
     });
   }
   if (skin) {

@@ -19,6 +19,10 @@
 //   template <class First, class Second>
 //   void side_by_side(First, Second);                          each of the two launches in its order, one beside the
 //                                                              other: neither touches what the other writes
+//   template <class First, class Second, class AfterFirst, class AfterBoth>
+//   void side_by_side(First, Second, AfterFirst, AfterBoth);   likewise, and behind them two more, each as soon as what
+//                                                              its name says is done: none touches what another writes
+//                                                              that it does not wait for
 //   void exclusive_scan(const int* in, int* out, int64_t count, int* total, const int* used = nullptr);
 //                                                              out[i] = Σ in[0..i), *total = Σ all; in == out is
 //                                                              allowed
@@ -30,7 +34,7 @@
 //                                                              *count <= capacity valid keys before and after; what
 //                                                              lies beyond them is overwritten; ~0 is not a key
 //   void clear(void* data, std::size_t bytes);                 zero bytes, of whole ints
-// `Body`, `First` and `Second` take the Launcher to use inside as its argument. Even with a capacity of 0 one block
+// `Body`, `First` and the others take the Launcher to use inside as their argument. Even with a capacity of 0 one block
 // runs: a kernel may have something to do once.
 //
 // A kernel is handed over as an object, because a function template cannot be: CUTPROOF_KERNEL(verb_noun_kernel)

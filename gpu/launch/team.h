@@ -37,6 +37,23 @@ class Team {
     for (int k = lane(); k < count; k += kLanes) visit(k);
   }
 
+  // use(k, ask(k)) for the same items, several of which are asked for before the first of them is used: one by one, each
+  // would wait for what the one before has asked for. ask() may be called more than once for an item.
+  template <int kAtOnce, class Ask, class Use>
+  CUTPROOF_DEVICE void each_asked(int count, Ask ask, Use use) const {
+    for (int begin = lane(); begin < count; begin += kAtOnce * kLanes) {
+      decltype(ask(0)) asked[kAtOnce];
+      for (int t = 0; t < kAtOnce; ++t) {
+        const int k = begin + t * kLanes;
+        asked[t] = ask(k < count ? k : begin);
+      }
+      for (int t = 0; t < kAtOnce; ++t) {
+        const int k = begin + t * kLanes;
+        if (k < count) use(k, asked[t]);
+      }
+    }
+  }
+
   // N sums over items. Item k adds to of(k), in the order of each(). The order of adding is that of kOrder lanes, of
   // which each lane here does the work of several if it is not the team's width: so teams of several widths give the
   // same bits.

@@ -259,13 +259,19 @@ CUTPROOF_BOTH inline Float3 rest_position(const BodyConstants& body, int node) {
   const Coordinates c = coordinates(body, node);
   return {body.h * static_cast<float>(c.i), body.h * static_cast<float>(c.j), body.h * static_cast<float>(c.k)};
 }
-// X_p - T_s: exact differences of grid coordinates, then one rounding.
-CUTPROOF_BOTH inline Float3 from_rest_center(const DeviceView& w, const BodyConstants& body, int p, int s) {
-  const Coordinates c = coordinates(body, w.node[p]);
+// T_s.
+CUTPROOF_BOTH inline RestCenter rest_center(const DeviceView& w, int s) {
   const Float3 o = w.rest_offset[s];
-  return {body.h * (static_cast<float>(c.i - w.rest_base[3 * s]) - o.x),
-          body.h * (static_cast<float>(c.j - w.rest_base[3 * s + 1]) - o.y),
-          body.h * (static_cast<float>(c.k - w.rest_base[3 * s + 2]) - o.z)};
+  return {w.rest_base[3 * s], w.rest_base[3 * s + 1], w.rest_base[3 * s + 2], o.x, o.y, o.z};
+}
+// From a rest centre to a node [h]: exact differences of grid coordinates, then one rounding.
+CUTPROOF_BOTH inline Float3 nodes_between(RestCenter from, Coordinates to) {
+  return {static_cast<float>(to.i - from.i) - from.x, static_cast<float>(to.j - from.j) - from.y,
+          static_cast<float>(to.k - from.k) - from.z};
+}
+// X_p - T_s.
+CUTPROOF_BOTH inline Float3 from_rest_center(const DeviceView& w, const BodyConstants& body, int p, int s) {
+  return body.h * nodes_between(rest_center(w, s), coordinates(body, w.node[p]));
 }
 // Whether the body has lost particles in the frame in progress, so that its cluster stages run.
 CUTPROOF_BOTH inline bool cut_now(const DeviceView& w, int b) { return w.frame[b] < w.body[b].frames && w.cut[b] >= 0; }
