@@ -152,17 +152,9 @@ CUTPROOF_DEVICE void find_changed_clusters_kernel(Block& block, const DeviceView
     if (particles > 0) block.atomic_add(&c.due_particles, particles);
     if (pairs > 0) block.atomic_add(&c.due_pairs, pairs);
   };
-  // Each lane looks whether a cluster has changed, far apart from those of its neighbours: changed ones lie side by side.
-  const int64_t jobs = int64_t{kCountShares} * c.slots_used;
-  for (int64_t begin = team.first(); begin < jobs; begin += team.kLanes * team.stride()) {
-    const int64_t job = begin + team.lane() * team.stride();
-    const bool has_changed = job < jobs && w.regroup[job / kCountShares] != 0;
-    unsigned found = team.found(has_changed);
-    while (found != 0) {
-      const int which = team.take(found, static_cast<int>(job));
-      count_members(which / kCountShares, which % kCountShares);
-    }
-  }
+  team.each_wanted(
+      int64_t{kCountShares} * c.slots_used, [&](int job) { return w.regroup[job / kCountShares] != 0; },
+      [&](int job) { count_members(job / kCountShares, job % kCountShares); });
 }
 CUTPROOF_KERNEL(find_changed_clusters_kernel);
 

@@ -221,8 +221,7 @@ template <class Block>
 CUTPROOF_DEVICE void propose_merges_kernel(Block& block, DeviceView w) {
   const TouchTable table = take_candidate_table(block);
   Counters& c = *w.counters;
-  if (block.first() == 0) c.merging = 0;
-  if (c.failed) return;
+  if (block.first() == 0) c.merging = c.moving = 0;
   const int round = c.round;
   int* best = best_of_round(w, round);
   int* best_before = best_of_round(w, round + 1);
@@ -270,7 +269,7 @@ CUTPROOF_DEVICE int reserve_members(Block& block, const DeviceView& w, int count
   const int begin = block.atomic_add(&c.members_used, count);
   if (begin <= w.member_capacity - count) return begin;
   block.atomic_add(&c.members_used, -count);
-  block.store(&c.failed, 1);
+  block.store(&c.moving, c.slots_used);
   return -1;
 }
 
@@ -298,16 +297,16 @@ CUTPROOF_DEVICE void hand_over(Block& block, const DeviceView& w, int s, int t, 
   }
 }
 
-// Carries out the proposals that got both ends: those of them, if it is called again, that found no places. There is
-// another round if one did not get both: nobody else would propose in it. (Whoever is small and taken has proposed
-// something itself, and lost, or never will again.)
+// Carries out the proposals that got both ends; again: those that found no places, if there were any and lists have been
+// moved together. There is another round if one did not get both: nobody else would propose in it. (Whoever is small and
+// taken has proposed something itself, and lost, or never will again.)
 template <class Block>
-CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, DeviceView w) {
+CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, DeviceView w, bool again) {
   int* place = block.template shared<int>(1);
   Counters& c = *w.counters;
   const int* best = best_of_round(w, c.merging_round);
-  const bool failed = block.any(block.thread() == 0 && block.load(&c.failed) != 0);
-  for (int job = block.index(); job < c.small && !failed; job += block.count()) {
+  const bool moving = block.any(block.thread() == 0 && block.load(&c.moving) != 0);
+  for (int job = block.index(); job < c.small && moving == again; job += block.count()) {
     const int s = w.small_clusters[job];
     const int t = w.proposal[s];
     const BodyConstants& body = w.body[w.slot_body[s]];
@@ -385,10 +384,12 @@ CUTPROOF_DEVICE inline OwnerChain chain_of(const DeviceView& w, int s) {
   return at == s ? OwnerChain{s, w.best[s]} : OwnerChain{};
 }
 
-// Owners and owned form chains and cycles, each of which becomes one cluster, above the cap or not.
+// Owners and owned form chains and cycles, each of which becomes one cluster, above the cap or not. again: those that
+// found no places, if there were any and lists have been moved together.
 template <class Block>
-CUTPROOF_DEVICE void merge_chains_kernel(Block& block, DeviceView w) {
+CUTPROOF_DEVICE void merge_chains_kernel(Block& block, DeviceView w, bool again) {
   int* place = block.template shared<int>(2);  // and how many of them
+  if (again && w.counters->moving == 0) return;
   for (int job = block.index(); job < w.counters->small; job += block.count()) {
     if (w.body[w.slot_body[w.small_clusters[job]]].merge_rule != MergeRule::single_pass) continue;
     const auto [end, first] = chain_of(w, w.small_clusters[job]);
@@ -483,46 +484,52 @@ CUTPROOF_DEVICE void begin_rounds_kernel(Block& block, const DeviceView& w) {
   }
   c.merging = c.small > 0;
   c.round = 0;
-  c.failed = 0;
+  c.moving = 0;
 }
 CUTPROOF_KERNEL_THREADS(begin_rounds_kernel, kListThreads);
 
+// Of clusters that have grown, and of those whose particles are now in fewer.
 template <class Block>
-CUTPROOF_DEVICE void note_rest_dirty_kernel(Block& block, DeviceView w) {
-  for (int64_t s = block.first(); s < w.counters->slots_used; s += block.stride()) {
-    if (merges_now(w, w.slot_body[s]) && w.slot_size[s] > 0 && rest_marks(w)[s] != 0) w.rest_dirty[s] = 1;
-  }
+CUTPROOF_DEVICE void rest_frames_after_merge_kernel(Block& block, DeviceView w) {
+  if (w.counters->small == 0) return;
+  const Team<Block, kRestTeam> team(block);
+  team.each_wanted(
+      w.counters->slots_used,
+      [&](int s) { return rest_marks(w)[s] != 0 && w.slot_size[s] > 0 && merges_now(w, w.slot_body[s]); },
+      [&](int s) { recompute_rest_frame(team, w, s); });
 }
-CUTPROOF_KERNEL(note_rest_dirty_kernel);
+CUTPROOF_KERNEL(rest_frames_after_merge_kernel);
 
 // --- Moving all lists together ---------------------------------------------------------------------------------------
 
 // To DeviceView::label, in the order of slots.
 template <class Block>
 CUTPROOF_DEVICE void gather_members_kernel(Block& block, DeviceView w) {
-  for (int s = block.index(); s < w.counters->slots_used; s += block.count()) {
+  for (int s = block.index(); s < w.counters->moving; s += block.count()) {
     const int from = w.slot_begin[s], to = moved_begin(w)[s];
     for (int k = block.thread(); k < w.slot_size[s]; k += block.size()) w.label[to + k] = w.members[from + k];
   }
 }
 CUTPROOF_KERNEL(gather_members_kernel);
 
-// And back. What found no places tries again, and rounds go on.
+// And back.
 template <class Block>
 CUTPROOF_DEVICE void place_members_kernel(Block& block, DeviceView w) {
-  for (int64_t q = block.first(); q < w.counters->members_used; q += block.stride()) w.members[q] = w.label[q];
-  for (int64_t s = block.first(); s < w.counters->slots_used; s += block.stride()) w.slot_begin[s] = moved_begin(w)[s];
+  Counters& c = *w.counters;
+  if (c.moving == 0) return;
+  for (int64_t q = block.first(); q < c.moved_members; q += block.stride()) w.members[q] = w.label[q];
+  for (int64_t s = block.first(); s < c.moving; s += block.stride()) w.slot_begin[s] = moved_begin(w)[s];
   if (block.first() != 0) return;
-  w.counters->failed = 0;
-  w.counters->merging = 1;
-  w.counters->groups_whole = 1;  // what groups say of clusters lies where their members lay
+  c.members_used = c.moved_members;
+  c.groups_whole = 1;  // what groups say of clusters lies where their members lay
 }
 CUTPROOF_KERNEL(place_members_kernel);
 
+// None, unless Counters::moving says so.
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_move_together(Launcher& launcher, const DeviceView& w) {
-  launcher.exclusive_scan(w.slot_size, moved_begin(w), w.slot_capacity, &w.counters->members_used,
-                          &w.counters->slots_used);
+  launcher.exclusive_scan(w.slot_size, moved_begin(w), w.slot_capacity, &w.counters->moved_members,
+                          &w.counters->moving);
   launcher.blocks(gather_members_kernel_object{}, w.slots_expected, 128, 0, w);
   launcher.items(place_members_kernel_object{}, w.member_capacity, w);
 }
@@ -535,36 +542,30 @@ CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, con
   Counters* const c = w.counters;
   const int64_t most = w.slots_expected < kMergeBlocks ? w.slots_expected : kMergeBlocks;
   const auto propose = [&](Launcher& on, auto kernel) { on.blocks(kernel, most, kMergeThreads, kCandidateBytes, w); };
-  const auto carry_out = [&](Launcher& on, auto kernel) { on.blocks(kernel, most, kMergeThreads, 16, w); };
-  const auto round = [&](Launcher& on) {
-    propose(on, propose_merges_kernel_object{});
-    carry_out(on, merge_pairs_kernel_object{});
+  const auto carry_out = [&](Launcher& on, auto kernel, auto... more) {
+    on.blocks(kernel, most, kMergeThreads, 16, w, more...);
   };
-  const auto rounds = [&](Launcher& on) { on.while_nonzero(&c->merging, round); };
 
   launcher.items(begin_merge_kernel_object{}, w.slots_expected, w);
   launcher.blocks(begin_rounds_kernel_object{}, 1, kListThreads, 0, w);
-  launcher.if_nonzero(&c->small, [&](Launcher& inner) {
-    if (plan.single_pass_merge) {
-      propose(inner, propose_once_kernel_object{});
-      carry_out(inner, merge_chains_kernel_object{});
-      inner.if_nonzero(&c->failed, [&](Launcher& again) {
-        enqueue_move_together(again, w);
-        carry_out(again, merge_chains_kernel_object{});
-      });
-    }
-    if (plan.deterministic_merge || plan.published_merge) {
-      round(inner);  // the first: a loop would ask whether there is one
-      rounds(inner);
-      inner.while_nonzero(&c->failed, [&](Launcher& again) {
-        enqueue_move_together(again, w);
-        carry_out(again, merge_pairs_kernel_object{});
-        rounds(again);
-      });
-    }
-    inner.items(note_rest_dirty_kernel_object{}, w.slots_expected, w);
-    enqueue_rest_frames(inner, w);
-  });
+  if (plan.single_pass_merge) {
+    launcher.if_nonzero(&c->small, [&](Launcher& once) {
+      propose(once, propose_once_kernel_object{});
+      carry_out(once, merge_chains_kernel_object{}, false);
+      enqueue_move_together(once, w);
+      carry_out(once, merge_chains_kernel_object{}, true);
+    });
+  }
+  if (plan.deterministic_merge || plan.published_merge) {
+    // One condition, whatever happens: it costs as much as ten launches of kernels that find nothing to do.
+    launcher.while_nonzero(&c->merging, [&](Launcher& round) {
+      propose(round, propose_merges_kernel_object{});
+      carry_out(round, merge_pairs_kernel_object{}, false);
+      enqueue_move_together(round, w);
+      carry_out(round, merge_pairs_kernel_object{}, true);
+    });
+  }
+  launcher.teams(rest_frames_after_merge_kernel_object{}, kRestTeam, w.slots_expected, w);
 }
 
 }  // namespace cutproof::gpu

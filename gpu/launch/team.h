@@ -54,6 +54,18 @@ class Team {
     }
   }
 
+  // visit(i), by the whole team, for those i of [0, count) that are wanted. Each lane asks of one of them, far from those
+  // of its neighbours: what is wanted lies side by side.
+  template <class Wanted, class Visit>
+  CUTPROOF_DEVICE void each_wanted(int64_t count, Wanted wanted, Visit visit) const {
+    for (int64_t begin = first(); begin < count; begin += kLanes * stride()) {
+      const int64_t own = begin + lane() * stride();
+      const bool is = own < count && wanted(static_cast<int>(own));
+      unsigned lanes = found(is);
+      while (lanes != 0) visit(take(lanes, static_cast<int>(own)));
+    }
+  }
+
   // N sums over items. Item k adds to of(k), in the order of each(). The order of adding is that of kOrder lanes, of
   // which each lane here does the work of several if it is not the team's width: so teams of several widths give the
   // same bits.

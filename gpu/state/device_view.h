@@ -173,6 +173,8 @@ struct Counters {
   int round;               // merge round, from 0: the next one
   int merging_round;       // merge: the round whose proposals are being carried out
   int live_members;        // merge: members of all clusters
+  int moving;              // merge: slots whose lists are to be moved together, because some union found no places…
+  int moved_members;       // … and what they have in all
   int small;               // length of DeviceView::small_clusters
   int expanding;           // some body of this span needs the expand stage
   int additions;           // length of DeviceView::additions
