@@ -27,7 +27,7 @@ CUTPROOF_DEVICE void recenter(const DeviceView& w, const Team<Block, kCenterTeam
     return Member{w.displacement[p], w.membership_count[p], w.node[p]};
   };
   const RestCenter center = rest_center(w, s);
-  team.template each_asked<4>(w.slot_size[s], ask, [&](int k, const Member& member) {
+  team.template each_asked<8>(w.slot_size[s], ask, [&](int k, const Member& member) {
     const float weight = member.now.w / static_cast<float>(member.clusters);
     const Float3 moved = weight * (xyz(member.now) - base);
     const Float3 rest = weight * (body.h * nodes_between(center, coordinates(body, member.node)));

@@ -479,11 +479,8 @@ CUTPROOF_DEVICE void measure_clusters_kernel(Block& block, const DeviceView& w) 
         place[t] = w.place_of[p];
       }
       Offset to[kAtOnce];
-      GroupHead head[kAtOnce];
       for (int t = 0; t < kAtOnce; ++t) {
-        if (at[t] < 0) continue;
-        to[t] = offset_between(w.group_center[at[t]], center, at[t]);
-        if (!whole) head[t] = w.group_head[at[t]];
+        if (at[t] >= 0) to[t] = offset_between(w.group_center[at[t]], center, at[t]);
       }
       for (int t = 0; t < kAtOnce; ++t) {
         const int k = tile + t * team.kLanes + team.lane();
@@ -499,20 +496,22 @@ CUTPROOF_DEVICE void measure_clusters_kernel(Block& block, const DeviceView& w) 
         groups += found;
         if (at[t] >= 0) w.cluster_groups[list_begin + group] = to[t];
       }
-      if (whole) continue;
-      // Those that are new have been told.
-      for (int t = 0; t < kAtOnce; ++t) {
-        if (at[t] < 0 || at[t] >= counters.groups_before) continue;
-        const int end = head[t].holder_begin + head[t].holder_count;
-        for (int first = head[t].holder_begin; first < end; first += kAtOnce) {
-          int index[kAtOnce];
-          for (int j = 0; j < kAtOnce; ++j) index[j] = w.holders[first + j < end ? first + j : first].index;
-          for (int j = 0; j < kAtOnce; ++j) {
-            if (index[j] == s && first + j < end) w.holders[first + j] = {to[t].x, to[t].y, to[t].z, s};
-          }
+    }
+    // Groups that stay; those that are new have been told.
+    team.sync();  // the list
+    team.each(groups, [&](int k) {
+      const Offset to = w.cluster_groups[list_begin + k];
+      if (to.index >= counters.groups_before) return;
+      const GroupHead head = w.group_head[to.index];
+      const int end = head.holder_begin + head.holder_count;
+      for (int first = head.holder_begin; first < end; first += kAtOnce) {
+        int index[kAtOnce];
+        for (int j = 0; j < kAtOnce; ++j) index[j] = w.holders[first + j < end ? first + j : first].index;
+        for (int j = 0; j < kAtOnce; ++j) {
+          if (index[j] == s && first + j < end) w.holders[first + j] = {to.x, to.y, to.z, s};
         }
       }
-    }
+    });
     const auto total = team.total(sums);
     if (!team.leads()) continue;
     w.cluster_head[s] = {list_begin, groups, w.slot_begin[s], loose};

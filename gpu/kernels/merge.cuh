@@ -530,12 +530,14 @@ template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_move_together(Launcher& launcher, const DeviceView& w) {
   launcher.exclusive_scan(w.slot_size, moved_begin(w), w.slot_capacity, &w.counters->moved_members,
                           &w.counters->moving);
-  launcher.blocks(gather_members_kernel_object{}, w.slots_expected, 128, 0, w);
-  launcher.items(place_members_kernel_object{}, w.member_capacity, w);
+  // Hardly ever is anything moved, so what there is to launch and to end at once is kept small.
+  constexpr int64_t kBlocks = 128, kThreads = 256;
+  launcher.blocks(gather_members_kernel_object{}, kBlocks, kThreads, 0, w);
+  launcher.items(place_members_kernel_object{}, kBlocks * kThreads, w);
 }
 
 // The work that follows a cut is small, so grids are kept small too: blocks take several clusters if there are many.
-inline constexpr int kMergeBlocks = 2048;
+inline constexpr int kMergeBlocks = 2048, kBlocksAgain = 128;
 
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, const Plan& plan) {
@@ -562,7 +564,7 @@ CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, con
       propose(round, propose_merges_kernel_object{});
       carry_out(round, merge_pairs_kernel_object{}, false);
       enqueue_move_together(round, w);
-      carry_out(round, merge_pairs_kernel_object{}, true);
+      round.blocks(merge_pairs_kernel_object{}, kBlocksAgain, kMergeThreads, 16, w, true);
     });
   }
   launcher.teams(rest_frames_after_merge_kernel_object{}, kRestTeam, w.slots_expected, w);

@@ -27,7 +27,7 @@ CUTPROOF_DEVICE void recompute_rest_frame(const Team<Block, kRestTeam>& team, co
     return Member{w.displacement[p].w, w.membership_count[p], w.node[p]};
   };
   const auto weighted = [&](auto add) {
-    team.template each_asked<4>(w.slot_size[s], ask, [&](int k, const Member& member) {
+    team.template each_asked<12>(w.slot_size[s], ask, [&](int k, const Member& member) {
       const Coordinates c = coordinates(body, member.node);
       const Float3 from_base = {static_cast<float>(c.i - base.i), static_cast<float>(c.j - base.j),
                                 static_cast<float>(c.k - base.k)};

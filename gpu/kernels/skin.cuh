@@ -135,6 +135,7 @@ CUTPROOF_DEVICE void count_skin_changes_kernel(Block& block, const DeviceView& w
     const int p = changed(w)[j], b = w.body_of[p];
     const BodyConstants& body = w.body[b];
     int own_bits = 0, cells = 0, vertices = 0;
+    team.each(6, [&](int d) { vertices += new_vertex(w, b, p, d).owner >= 0 ? 1 : 0; });
     team.each(8, [&](int corner) {
       const int64_t node = body.node_begin + w.node[p] - corner_step(body, corner);
       const int present = w.cell_of[node];
@@ -143,7 +144,6 @@ CUTPROOF_DEVICE void count_skin_changes_kernel(Block& block, const DeviceView& w
       own_bits += 1 << corner;
       if (present < 0 && skin_table().corners[cell.inside][0] >= 0) ++cells;
     });
-    team.each(6, [&](int d) { vertices += new_vertex(w, b, p, d).owner >= 0 ? 1 : 0; });
     own_bits = team.total(own_bits);
     cells = team.total(cells);
     vertices = team.total(vertices);

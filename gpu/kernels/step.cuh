@@ -245,6 +245,7 @@ CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) {
 // work of all, but in an iteration, whose resolved groups are few.
 inline constexpr int kRowTeam = 4, kParticleTeam = 16, kResolvedTeam = 32;
 inline constexpr int kMostByRows = 150'000;  // particles of a load
+inline constexpr int kMostByParticles = 60'000;
 // Lanes that a tracked or a resolved group gets, where kRows of them share a carried one. (Half a warp leaves half as
 // many idle, and takes longer: of a million particles on a floor a frame is an eighth shorter, of a million that only a
 // blade touches a hundredth longer.)
@@ -1828,7 +1829,8 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
   return false;
 }
 
-template <bool kContacts, bool kAccelerated, bool kRetarded, class Block>
+// kAhead: of how many of its clusters is read before the wait where the particle rests in them.
+template <bool kContacts, bool kAccelerated, bool kRetarded, int kAhead, class Block>
 CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int substep, int iteration) {
   if (o < 0) return;
   const int p = w.place_particle[o], body = body_index(w, p);
@@ -1838,23 +1840,46 @@ CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int
   const Particle particle = particle_at<kContacts, kAccelerated>(w, now, o);
   const Float3 at = xyz(particle.at), from = now.implicit ? xyz(particle.predicted) : at;
   // Mean of the goals, less `from`: small numbers, so that summing them costs no digits of d.
-  const int clusters = w.membership_count[p], begin = w.membership_begin[p], end = w.membership_begin[p + 1];
+  const int clusters = w.membership_count[p], begin = w.membership_begin[p];
   const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
+  const Coordinates c = coordinates(pace, particle.node);
+  struct Holder {
+    int slot;
+    Float3 r;
+  };
+  const auto holder_at = [&](int k) {
+    const int slot = constant(&w.memberships[begin + (k < clusters ? k : 0)]);
+    return Holder{slot, pace.h * nodes_from_rest_center(w, c, slot)};
+  };
+  Holder ahead[kAhead] = {};
+  if (clusters > 0) {
+    for (int t = 0; t < kAhead; ++t) ahead[t] = holder_at(t);
+  }
   block.wait_for_earlier();  // for the clusters: all else is older
   Float3 pull = at - from;   // a particle in no cluster stays where it is
   if (clusters > 0) {
-    const Coordinates c = coordinates(pace, particle.node);
     Float3 sum;
-    for (int k = begin; k < end; ++k) {
-      const int slot = w.memberships[k];
-      if (slot < 0) continue;
-      const Float3 r = pace.h * nodes_from_rest_center(w, c, slot);
-      const Map place = load_map(w.placement, slot);
-      const Float3 center = {place.row[0].w, place.row[1].w, place.row[2].w};
-      const Float3 turned = {place.row[0].x * r.x + place.row[0].y * r.y + place.row[0].z * r.z,
-                             place.row[1].x * r.x + place.row[1].y * r.y + place.row[1].z * r.z,
-                             place.row[2].x * r.x + place.row[2].y * r.y + place.row[2].z * r.z};
-      sum = sum + ((center - from) + turned);
+    // Several at once: one by one, each would wait for the one before.
+    const auto add = [&](const Holder* some, int first) {
+      constexpr int kAtOnce = 4;
+      Map place[kAtOnce];
+      for (int t = 0; t < kAtOnce; ++t) place[t] = load_map(w.placement, some[t].slot);
+      for (int t = 0; t < kAtOnce; ++t) {
+        if (first + t >= clusters) break;
+        const Float4* const row = place[t].row;
+        const Float3 r = some[t].r, center = {row[0].w, row[1].w, row[2].w};
+        const Float3 turned = {row[0].x * r.x + row[0].y * r.y + row[0].z * r.z,
+                               row[1].x * r.x + row[1].y * r.y + row[1].z * r.z,
+                               row[2].x * r.x + row[2].y * r.y + row[2].z * r.z};
+        sum = sum + ((center - from) + turned);
+      }
+    };
+    for (int first = 0; first < kAhead; first += 4) {
+      if (first < clusters) add(ahead + first, first);
+    }
+    CUTPROOF_ROLLED for (int first = kAhead; first < clusters; first += 4) {
+      for (int t = 0; t < 4; ++t) ahead[t] = holder_at(first + t);
+      add(ahead, first);
     }
     pull = (1.0f / static_cast<float>(clusters)) * sum;
   }
@@ -1905,7 +1930,8 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
   }
   if (loose == 0) return;
   for (int64_t k = from_last(block); k < loose; k += block.stride()) {
-    advance_loose<kContacts, kAccelerated, kRetarded>(block, w, w.loose_places[k], substep, iteration);
+    advance_loose<kContacts, kAccelerated, kRetarded, kHoldersAtOnce<kRows>>(block, w, w.loose_places[k], substep,
+                                                                             iteration);
   }
 }
 
@@ -1974,10 +2000,10 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
   };
   // The same for the lanes that share a group's particles.
   const auto by_particles = [&](auto start) {
-    by_rows([&](auto rows) {
-      constexpr int kLanes = rows.value == 1 ? kParticleTeam / 2 : kParticleTeam;
-      start(std::integral_constant<int, kLanes>{});
-    });
+    if constexpr (!requires { typename Launcher::OneLaunch; }) {
+      if (w.particles > kMostByParticles) return start(std::integral_constant<int, kParticleTeam / 2>{});
+    }
+    start(std::integral_constant<int, kParticleTeam>{});
   };
   by_particles([&](auto lanes) {
     launcher.teams(begin_first_substep_kernel_object<kContacts, kRetarded, lanes.value>{}, lanes.value, teams, w);
