@@ -258,19 +258,34 @@ CUTPROOF_DEVICE void label_in_blocks_kernel(Block& block, DeviceView w, int most
       if (block.thread() == 0) block.store(&w.counters->scratch[kTooLarge], 1);
       continue;
     }
-    for (int k = block.thread(); k < size; k += block.size()) {
-      const int p = w.members[begin + k];
-      members[k] = p;
-      parent[k] = alive(w, p) ? k : -1;
+    struct Member {
+      int particle, lower[3];
+      bool is_alive;
+    };
+    const auto ask = [&](int k) {
+      Member member;
+      member.particle = w.members[begin + k];
+      member.is_alive = alive(w, member.particle);
+      for (int d = 0; d < 3; ++d) member.lower[d] = neighbour(w, body, member.particle, lower_direction(d));
+      return member;
+    };
+    // A thread has hardly ever more than one.
+    const int own = block.thread();
+    Member first_own;
+    if (own < size) first_own = ask(own);
+    const auto member_at = [&](int k) { return k == own ? first_own : ask(k); };
+    for (int k = own; k < size; k += block.size()) {
+      const Member member = member_at(k);
+      members[k] = member.particle;
+      parent[k] = member.is_alive ? k : -1;
     }
     block.sync();
-    for (int k = block.thread(); k < size; k += block.size()) {
+    for (int k = own; k < size; k += block.size()) {
       if (peek<Memory::shared>(block, &parent[k]) < 0) continue;
       bool first = true;
-      int lower[3];  // all asked for before the first is looked for
-      for (int d = 0; d < 3; ++d) lower[d] = neighbour(w, body, members[k], lower_direction(d));
+      const Member member = member_at(k);
       for (int d = 0; d < 3; ++d) {
-        const int q = lower[d];
+        const int q = member.lower[d];
         if (q < 0) continue;
         const int place = place_of_lower(members, k, q, lower_direction(d));
         if (place < 0 || peek<Memory::shared>(block, &parent[place]) < 0) continue;

@@ -28,20 +28,14 @@
 
 namespace cutproof::gpu {
 
-// As block.first(), counted from the last thread: other work than that which the first threads have.
-template <class Block>
-CUTPROOF_DEVICE int64_t from_last(const Block& block) {
-  return block.stride() - 1 - block.first();
-}
-
-// What other work a team begins with where `jobs` of smaller teams are everybody's first: those behind them begin with
-// the first. (Not the last teams of all, which are the last to come.)
-template <class Small, class Large>
-CUTPROOF_DEVICE int64_t behind(const Small&, const Large& large, int jobs) {
-  const auto teams = static_cast<unsigned>(large.stride());  // a remainder of 64 bits takes a hundred instructions
-  unsigned busy = (static_cast<unsigned>(jobs) * Small::kLanes + Large::kLanes - 1) / Large::kLanes;
+// What other work a team begins with where so many threads have had something to do, the first of all and those behind
+// them: the next ones begin with the first. (Not the last threads of all, which are the last to come.)
+template <class AnyTeam>
+CUTPROOF_DEVICE int64_t behind(const AnyTeam& team, int threads) {
+  const auto teams = static_cast<unsigned>(team.stride());  // a remainder of 64 bits takes a hundred instructions
+  unsigned busy = (static_cast<unsigned>(threads) + AnyTeam::kLanes - 1) / AnyTeam::kLanes;
   if (busy >= teams) busy %= teams;
-  const int64_t first = large.first() - busy;
+  const int64_t first = team.first() - busy;
   return first < 0 ? first + teams : first;
 }
 
@@ -1158,7 +1152,8 @@ CUTPROOF_DEVICE void begin_first_substep_kernel(Block& block, const DeviceView& 
   for (int64_t g = team.first(); g < groups; g += team.stride()) {
     begin_group<kContacts, kRetarded>(block, team, w, static_cast<int>(g));
   }
-  for (int64_t k = from_last(block); k < loose; k += block.stride()) {
+  const Team<Block, 1> thread(block);
+  for (int64_t k = behind(thread, groups * team.kLanes); k < loose; k += thread.stride()) {
     begin_loose<kContacts, kRetarded>(w, w.loose_places[k], 0);
   }
 }
@@ -1177,7 +1172,7 @@ CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int
   // Whole warps at a time, as in advance_kernel.
   const int64_t in_warp = rows.first() % (warp.kLanes / rows.kLanes);
   int64_t row = rows.first();
-  [[maybe_unused]] int64_t listed = behind(rows, team, groups);
+  [[maybe_unused]] int64_t listed = behind(team, groups * rows.kLanes);
   [[maybe_unused]] unsigned found = 0;
   [[maybe_unused]] int tracked = -1;
   while (true) {
@@ -1216,7 +1211,9 @@ CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int
     w.counters->tracked[substep % 2] = tracked;
     block.store(&w.counters->newly_tracked[(substep + 1) % 3], 0);
   }
-  for (int64_t k = from_last(block); k < loose; k += block.stride()) {
+  const Team<Block, 1> thread(block);
+  const int busy = groups * rows.kLanes + (tracked > 0 ? (tracked + 1) * team.kLanes : 0);
+  for (int64_t k = behind(thread, busy); k < loose; k += thread.stride()) {
     begin_loose<kContacts, kRetarded>(w, w.loose_places[k], substep);
   }
 }
@@ -1230,7 +1227,8 @@ CUTPROOF_DEVICE void end_step_kernel(Block& block, const DeviceView& w) {
   for (int64_t g = team.first(); g < groups; g += team.stride()) {
     end_group<kContacts, kRetarded>(team, w, static_cast<int>(g));
   }
-  for (int64_t k = from_last(block); k < w.counters->loose; k += block.stride()) {
+  const Team<Block, 1> thread(block);
+  for (int64_t k = behind(thread, groups * team.kLanes); k < w.counters->loose; k += thread.stride()) {
     finish_loose<kContacts, kRetarded>(w, w.loose_places[k]);
   }
 }
@@ -1901,7 +1899,7 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
   // Whole warps at a time: groups that turn out to be no longer clear are everybody's, as are those that were resolved
   // before, with which the warps behind begin. All of them in one place, because there is much to it.
   const int64_t in_warp = rows.first() % (warp.kLanes / rows.kLanes);
-  int64_t row = rows.first(), listed = behind(rows, team, groups);
+  int64_t row = rows.first(), listed = behind(team, groups * rows.kLanes);
   [[maybe_unused]] unsigned found = 0;
   while (true) {
     [[maybe_unused]] bool begins = false;
@@ -1929,7 +1927,9 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
     }
   }
   if (loose == 0) return;
-  for (int64_t k = from_last(block); k < loose; k += block.stride()) {
+  const Team<Block, 1> thread(block);
+  const int busy = groups * rows.kLanes + (resolved > 0 ? (resolved + 1) * team.kLanes : 0);
+  for (int64_t k = behind(thread, busy); k < loose; k += thread.stride()) {
     advance_loose<kContacts, kAccelerated, kRetarded, kHoldersAtOnce<kRows>>(block, w, w.loose_places[k], substep,
                                                                              iteration);
   }
