@@ -37,6 +37,7 @@ class PhaseCounter {
     ++phases_;
     body(*this);
   }
+  static constexpr bool overlaps() { return true; }
   // Of chains the longest one counts.
   template <class First, class Second>
   void side_by_side(First first, Second second) {

@@ -386,6 +386,7 @@ class DeviceLauncher {
     }
   }
 
+  bool overlaps() const { return mode_ != Mode::at_once; }
   template <class First, class Second>
   void side_by_side(First first, Second second) {
     side_by_side(first, second, [](DeviceLauncher&) {}, [](DeviceLauncher&) {});

@@ -62,6 +62,7 @@ class SpanLauncher {
     while (agreed(flag)) body(*this);
   }
 
+  __device__ static constexpr bool overlaps() { return false; }
   template <class First, class Second>
   __device__ __forceinline__ void side_by_side(First first, Second second) {
     first(*this);

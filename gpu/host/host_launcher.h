@@ -83,6 +83,7 @@ class HostLauncher {
     }
   }
 
+  bool overlaps() const { return simulated(); }
   template <class First, class Second>
   void side_by_side(First first, Second second) {
     side_by_side(first, second, [](HostLauncher&) {}, [](HostLauncher&) {});

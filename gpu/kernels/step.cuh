@@ -239,7 +239,7 @@ CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) {
 // work of all, but in an iteration, whose resolved groups are few.
 inline constexpr int kRowTeam = 4, kParticleTeam = 16, kResolvedTeam = 32;
 inline constexpr int kMostByRows = 150'000;  // particles of a load
-inline constexpr int kMostByParticles = 60'000;
+inline constexpr int kMostByParticles = 150'000;
 // Lanes that a tracked or a resolved group gets, where kRows of them share a carried one. (Half a warp leaves half as
 // many idle, and takes longer: of a million particles on a floor a frame is an eighth shorter, of a million that only a
 // blade touches a hundredth longer.)

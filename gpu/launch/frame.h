@@ -18,6 +18,9 @@
 
 namespace cutproof::gpu {
 
+// Particles of a load whose vertices are placed beside its detection.
+inline constexpr int kMostPlacedEarly = 150'000;
+
 // A span of a whole frame finds groups as the one before has left them, and leaves them as the next needs them: what
 // follows a cut has a condition anyway, and in front of the step there is none. Any other makes them where the step
 // needs them. Before the first of whole frames, and after any other span, Load::needs_groups() says that they are to be
@@ -32,16 +35,27 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
   } else {
     launcher.blocks(begin_span_kernel_object{}, 1, 128, 0, w, span);
   }
-  if (span.contains(Stage::detect) && plan.detection) {
-    mark(Stage::detect);
-    enqueue_detect(launcher, w, plan);
-  }
   const bool clusters = span.contains(Stage::split) || span.contains(Stage::merge) || span.contains(Stage::expand);
   const bool skin = span.contains(Stage::skin);
   // In a whole frame vertices need not wait for the groups of the next one.
   const bool places_at_once = span.is_whole_frame() && plan.skin;
+  // Nor for what detection finds, as if nothing were cut: if something is, they are placed again, which costs a small load
+  // nothing that it would wait for. (Where the nearer end goes, detection asks where clusters are, too.)
+  const bool places_early = places_at_once && plan.detection && !plan.nearer && w.particles <= kMostPlacedEarly &&
+                            launcher.overlaps();
+  const auto detect = [&](Launcher& on) {
+    if (span.contains(Stage::detect) && plan.detection) {
+      mark(Stage::detect);
+      enqueue_detect(on, w, plan);
+    }
+    if (clusters || skin) on.blocks(note_cuts_kernel_object{}, 1, 128, 0, w, span);
+  };
+  if (places_early) {
+    launcher.side_by_side(detect, [&](Launcher& on) { enqueue_skin_positions(on, w, false); });
+  } else {
+    detect(launcher);
+  }
   if (clusters || skin) {
-    launcher.blocks(note_cuts_kernel_object{}, 1, 128, 0, w, span);
     // One condition for all that a frame without a cut does not need: each costs as much as ten launches. (A first skin
     // needs only the cells; the rest finds no body that was cut.)
     launcher.if_nonzero(&w.counters->changing, [&](Launcher& inner) {
@@ -86,7 +100,7 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
   }
   if (skin) {
     mark(Stage::skin);
-    if (plan.skin) enqueue_skin_positions(launcher, w, places_at_once);
+    if (plan.skin && !places_early) enqueue_skin_positions(launcher, w, places_at_once);
     launcher.items(end_frame_kernel_object{}, w.bodies, w);
   }
 }

@@ -23,6 +23,7 @@
 //   void side_by_side(First, Second, AfterFirst, AfterBoth);   likewise, and behind them two more, each as soon as what
 //                                                              its name says is done: none touches what another writes
 //                                                              that it does not wait for
+//   bool overlaps() const;                                     whether it makes a difference that they are side by side
 //   void exclusive_scan(const int* in, int* out, int64_t count, int* total, const int* used = nullptr);
 //                                                              out[i] = Σ in[0..i), *total = Σ all; in == out is
 //                                                              allowed
