@@ -210,8 +210,8 @@ struct DeviceResources {
   std::size_t required = 0;  // most bytes of temporary memory that any launch asked for
   std::size_t allocated = 0;
   DeviceMemory temporary;
-  std::vector<Stream> inner;                // for capturing bodies of conditions, by depth
-  std::shared_ptr<DeviceResources> beside;  // null: nothing runs beside anything
+  std::vector<Stream> inner;  // for capturing bodies of conditions, by depth
+  std::vector<std::shared_ptr<DeviceResources>> beside;  // of what runs beside; and beside a part of the first piece, …
 
   DeviceResources() {
     int device = 0;
@@ -221,7 +221,7 @@ struct DeviceResources {
 
   // Frees what was there; nothing may be using it.
   void allocate() {
-    if (beside != nullptr) beside->allocate();
+    for (const auto& other : beside) other->allocate();
     if (required <= allocated) return;
     temporary.reset();
     allocated = 0;
@@ -281,6 +281,7 @@ class Dependencies {
     }
     return both;
   }
+  bool operator==(const Dependencies& other) const { return nodes_ == other.nodes_; }
 
  private:
   std::vector<cudaGraphNode_t> nodes_;
@@ -400,13 +401,15 @@ class DeviceLauncher {
       after_both(*this);
       return;
     }
-    if (resources_->beside == nullptr) resources_->beside = std::make_shared<detail::DeviceResources>();
-    DeviceLauncher other(mode_, stream_, resources_->beside, depth_);
+    if (resources_->beside.size() == beside_) resources_->beside.push_back(std::make_shared<detail::DeviceResources>());
+    DeviceLauncher other(mode_, stream_, resources_->beside[beside_], depth_);
+    ++beside_;  // what is side by side within the first piece needs another one
     if (mode_ == Mode::measure) {
       first(*this);
       second(other);
       after_first(*this);
       after_both(other);
+      --beside_;
       return;
     }
     // All on one stream, told anew what it waits for: a second one that were not brought back, because some call fails
@@ -415,13 +418,18 @@ class DeviceLauncher {
     first(*this);
     const auto end_of_first = detail::Dependencies::of(stream_);
     after_first(*this);
+    --beside_;
     const auto end_of_chain = detail::Dependencies::of(stream_);
     parted.give(stream_);
     second(other);
-    detail::Dependencies::of(stream_).with(end_of_first).give(stream_);
+    const auto both = detail::Dependencies::of(stream_).with(end_of_first);
+    both.give(stream_);
     other.after_launch_ = false;
     after_both(other);
-    detail::Dependencies::of(stream_).with(end_of_chain).give(stream_);
+    const auto end = detail::Dependencies::of(stream_);
+    after_launch_ = other.after_launch_;
+    if (end_of_chain == end_of_first && !(end == both)) return;  // what follows both waits for all there is
+    end.with(end_of_chain).give(stream_);
     after_launch_ = false;
   }
 
@@ -547,6 +555,7 @@ class DeviceLauncher {
   void conditional(const int* flag, cudaGraphConditionalNodeType type, Body& body) {
     if (mode_ == Mode::measure) {
       DeviceLauncher inside(mode_, nullptr, resources_, depth_ + 1);
+      inside.beside_ = beside_;
       body(inside);
       resources_->stream(depth_ + 1);
       return;
@@ -574,6 +583,7 @@ class DeviceLauncher {
     cudaGraph_t captured = nullptr;  // the node's own graph: not ours to destroy
     try {
       DeviceLauncher inside(mode_, stream, resources_, depth_ + 1);
+      inside.beside_ = beside_;
       body(inside);
       if (type == cudaGraphCondTypeWhile) inside.set_condition(handle, flag);
     } catch (...) {
@@ -627,7 +637,7 @@ class DeviceLauncher {
   Mode mode_;
   cudaStream_t stream_;
   std::shared_ptr<detail::DeviceResources> resources_;
-  std::size_t depth_ = 0;
+  std::size_t depth_ = 0, beside_ = 0;  // how many conditions, and how many first pieces, this is within
   bool after_launch_ = false;  // what was handed over last is a kernel that lets the next one begin
 };
 

@@ -539,8 +539,15 @@ CUTPROOF_ENQUEUE void enqueue_move_together(Launcher& launcher, const DeviceView
 // The work that follows a cut is small, so grids are kept small too: blocks take several clusters if there are many.
 inline constexpr int kMergeBlocks = 2048, kBlocksAgain = 128;
 
+// Asks which clusters are small, and nothing of where any is.
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+CUTPROOF_ENQUEUE void enqueue_begin_merge(Launcher& launcher, const DeviceView& w) {
+  launcher.items(begin_merge_kernel_object{}, w.slots_expected, w);
+  launcher.blocks(begin_rounds_kernel_object{}, 1, kListThreads, 0, w);
+}
+// The rest of it.
+template <class Launcher>
+CUTPROOF_ENQUEUE void enqueue_merge_rounds(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   Counters* const c = w.counters;
   const int64_t most = w.slots_expected < kMergeBlocks ? w.slots_expected : kMergeBlocks;
   const auto propose = [&](Launcher& on, auto kernel) { on.blocks(kernel, most, kMergeThreads, kCandidateBytes, w); };
@@ -548,8 +555,6 @@ CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, con
     on.blocks(kernel, most, kMergeThreads, 16, w, more...);
   };
 
-  launcher.items(begin_merge_kernel_object{}, w.slots_expected, w);
-  launcher.blocks(begin_rounds_kernel_object{}, 1, kListThreads, 0, w);
   if (plan.single_pass_merge) {
     launcher.if_nonzero(&c->small, [&](Launcher& once) {
       propose(once, propose_once_kernel_object{});

@@ -429,6 +429,20 @@ CUTPROOF_KERNEL(number_components_kernel);
 
 namespace split_detail {
 
+// Where the slots that are left are too few for the stage.
+template <class Block>
+CUTPROOF_DEVICE void put_back_debris(Block& block, const DeviceView& w) {
+  if (block.index() != 0) return;
+  Counters& counters = *w.counters;
+  for (int k = block.thread(); k < counters.debris; k += block.size()) {
+    const int p = w.fallen[counters.fallen + k];
+    w.death[p] = -1;
+    block.store(&w.debris_anywhere[body_index(w, p)], 1);
+  }
+  block.sync();
+  if (block.thread() == 0) counters.debris = 0;
+}
+
 // In the list of p's clusters `to` takes the place of `from`. Each block renames a slot of its own.
 template <class Block>
 CUTPROOF_DEVICE void rename_holder(Block& block, const DeviceView& w, int p, int from, int to) {
@@ -442,14 +456,18 @@ CUTPROOF_DEVICE void rename_holder(Block& block, const DeviceView& w, int p, int
 }  // namespace split_detail
 
 // A block for each affected cluster. Its first component keeps slot and number; component c > 0, in the order of
-// smallest particles, gets the c-th of the cluster's new slots. Members stay within their places: component after
-// component, each ascending; the places of the dead are left over at the end.
+// smallest particles, gets the c-th of the cluster's new slots, which count as given out from now on. Members stay within
+// their places: component after component, each ascending; the places of the dead are left over at the end.
 template <class Block>
 CUTPROOF_DEVICE void regroup_members_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
-  const Counters& counters = *w.counters;
+  Counters& counters = *w.counters;
   int* const chunk = block.template shared<int>(block.size());
-  if (counters.failed) return;
+  if (counters.failed) {
+    put_back_debris(block, w);
+    return;
+  }
+  if (block.first() == 0) counters.slots_used = counters.scratch[kFirstNewSlot] + counters.scratch[kNewClusters];
   for (int a = block.index(); a < counters.affected; a += block.count()) {
     const int s = w.affected[a], begin = w.slot_begin[s], size = w.slot_size[s];
     const int first_new = counters.scratch[kFirstNewSlot] + extra_before(w)[a];
@@ -546,25 +564,13 @@ CUTPROOF_DEVICE void regroup_members_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL_THREADS(regroup_members_kernel, split_detail::kRegroupThreads);
 
-// Of what is left of affected clusters, and of the new ones; their slots count as given out from now on. Where the
-// slots that are left are too few for the stage, debris is put back.
+// Of what is left of affected clusters, and of the new ones.
 template <class Block>
 CUTPROOF_DEVICE void rest_frames_of_components_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
-  Counters& counters = *w.counters;
-  if (counters.failed) {
-    if (block.index() != 0) return;
-    for (int k = block.thread(); k < counters.debris; k += block.size()) {
-      const int p = w.fallen[counters.fallen + k];
-      w.death[p] = -1;
-      block.store(&w.debris_anywhere[body_index(w, p)], 1);
-    }
-    block.sync();
-    if (block.thread() == 0) counters.debris = 0;
-    return;
-  }
+  const Counters& counters = *w.counters;
+  if (counters.failed) return;
   const int first_new = counters.scratch[kFirstNewSlot], added = counters.scratch[kNewClusters];
-  if (block.first() == 0) counters.slots_used = first_new + added;
   const Team<Block, kRestTeam> team(block);
   for (int64_t i = team.first(); i < counters.affected + added; i += team.stride()) {
     const int job = static_cast<int>(i);
@@ -615,6 +621,10 @@ CUTPROOF_ENQUEUE void enqueue_split(Launcher& launcher, const DeviceView& w, con
                           &counters->affected);
   launcher.blocks(number_components_kernel_object{}, w.bodies, 256, 0, w);
   launcher.blocks(regroup_members_kernel_object{}, w.slots_expected, kRegroupThreads, sizeof(int) * kRegroupThreads, w);
+}
+// What is left to do then: nobody asks for it until clusters are united.
+template <class Launcher>
+CUTPROOF_ENQUEUE void enqueue_rest_frames_of_components(Launcher& launcher, const DeviceView& w) {
   launcher.teams(rest_frames_of_components_kernel_object{}, kRestTeam, 2 * int64_t{w.slots_expected}, w);
 }
 

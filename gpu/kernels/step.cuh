@@ -239,7 +239,6 @@ CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) {
 // work of all, but in an iteration, whose resolved groups are few.
 inline constexpr int kRowTeam = 4, kParticleTeam = 16, kResolvedTeam = 32;
 inline constexpr int kMostByRows = 150'000;  // particles of a load
-inline constexpr int kMostByParticles = 150'000;
 // Lanes that a tracked or a resolved group gets, where kRows of them share a carried one. (Half a warp leaves half as
 // many idle, and takes longer: of a million particles on a floor a frame is an eighth shorter, of a million that only a
 // blade touches a hundredth longer.)
@@ -2000,10 +1999,10 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
   };
   // The same for the lanes that share a group's particles.
   const auto by_particles = [&](auto start) {
-    if constexpr (!requires { typename Launcher::OneLaunch; }) {
-      if (w.particles > kMostByParticles) return start(std::integral_constant<int, kParticleTeam / 2>{});
-    }
-    start(std::integral_constant<int, kParticleTeam>{});
+    by_rows([&](auto rows) {
+      constexpr int kLanes = rows.value == 1 ? kParticleTeam / 2 : kParticleTeam;
+      start(std::integral_constant<int, kLanes>{});
+    });
   };
   by_particles([&](auto lanes) {
     launcher.teams(begin_first_substep_kernel_object<kContacts, kRetarded, lanes.value>{}, lanes.value, teams, w);

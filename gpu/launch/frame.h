@@ -65,10 +65,20 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
       }
       // Which particles there are is known from here on, and cells ask for nothing else.
       const auto change_clusters = [&](Launcher& on) {
-        if (span.contains(Stage::merge) && plan.merge) {
-          mark(Stage::merge);
-          enqueue_merge(on, w, plan);
-        }
+        const bool merges = span.contains(Stage::merge) && plan.merge;
+        on.side_by_side(
+            [&](Launcher& own) {
+              if (span.contains(Stage::split)) enqueue_rest_frames_of_components(own, w);
+            },
+            [&](Launcher& own) {
+              if (!merges) return;
+              mark(Stage::merge);
+              enqueue_begin_merge(own, w);
+            },
+            [](Launcher&) {},
+            [&](Launcher& own) {
+              if (merges) enqueue_merge_rounds(own, w, plan);
+            });
         if (span.contains(Stage::expand) && plan.expand) {
           on.if_nonzero(&w.counters->expanding, [&](Launcher& innermost) {
             mark(Stage::expand);

@@ -665,6 +665,64 @@ void check_sort_unique(Machine& machine) {
   }
 }
 
+// Pieces of work that need temporary memory and have conditions: each makes keys, sorts them, adds 10 to its number, and
+// counts to three and further, the first of them least; then it adds 100 and which one it is.
+template <class Machine>
+class SortingPieces {
+ public:
+  static constexpr int kMost = 8;
+
+  explicit SortingPieces(Machine& machine)
+      : values_(machine.array(std::vector<int>(3 * kMost))),
+        keys_(machine.array(std::vector<unsigned long long>(kMost * kRoom, 42))),
+        numbers_(machine.array(std::vector<int>(kMost, -1))) {}
+
+  int* value(int which) { return values_.at() + 3 * which; }
+  int* counted(int which) { return value(which) + 2; }
+  template <class Launcher>
+  void begin(Launcher& on, int which) {
+    on.items(set_kernel_object{}, 1, value(which), 1 + which);
+    on.items(set_kernel_object{}, 1, value(which) + 1, 3 + which);
+  }
+  template <class Launcher>
+  void run(Launcher& on, int which) {
+    int* const own = value(which);
+    unsigned long long* const own_keys = keys_.at() + which * kRoom;
+    const add_kernel_object add;
+    on.items(make_keys_kernel_object{}, kKeys, own_keys, numbers_.at() + which, int{kKeys}, different(which));
+    on.items(add, 1, own, 10);
+    on.sort_unique(own_keys, numbers_.at() + which, kKeys);
+    on.while_nonzero(own + 1, [&](auto& inside) {
+      inside.items(add, 1, own + 2, 1);
+      inside.items(add, 1, own + 1, -1);
+    });
+    on.if_nonzero(own + 2, [&](auto& inside) { inside.items(add, 1, own, 100 + which); });
+  }
+  // Of each piece that has run: its number, what is left to count, and what it has counted to.
+  static std::vector<int> expected(int which) { return {111 + 2 * which, 0, 3 + which}; }
+  std::vector<int> values(int which) const {
+    const std::vector<int> all = values_.get();
+    return {all.begin() + 3 * which, all.begin() + 3 * which + 3};
+  }
+  void expect_keys(int which) const {
+    std::set<unsigned long long> expected;
+    for (int i = 0; i < different(which); ++i) {
+      expected.insert(static_cast<unsigned long long>(scramble(static_cast<unsigned>(i), 7u)) << 17);
+    }
+    ASSERT_EQ(numbers_.get()[static_cast<std::size_t>(which)], static_cast<int>(expected.size())) << which;
+    const std::vector<unsigned long long> all = keys_.get();
+    EXPECT_TRUE(std::equal(expected.begin(), expected.end(), all.begin() + which * kRoom)) << which;
+  }
+
+ private:
+  static constexpr int kKeys = 70'001, kRoom = 70'016;
+  static int different(int which) { return 20'011 + 5'003 * which; }
+
+  decltype(std::declval<Machine&>().array(std::vector<int>())) values_;
+  decltype(std::declval<Machine&>().array(std::vector<unsigned long long>())) keys_;
+  decltype(std::declval<Machine&>().array(std::vector<int>())) numbers_;
+};
+
 template <class Block>
 CUTPROOF_DEVICE void add_up_kernel(Block& block, const int* a, const int* b, int* sum) {
   if (block.first() == 0) *sum = *a + *b;
@@ -675,61 +733,87 @@ CUTPROOF_KERNEL(add_up_kernel);
 // other where both need temporary memory, have conditions, or are side by side themselves.
 template <class Machine>
 void check_side_by_side(Machine& machine) {
-  constexpr int kPieces = 4;  // two in the open, two within a condition
-  constexpr int kKeys = 70'001, kRoom = 70'016, kDifferent[kPieces] = {20'011, 30'011, 25'013, 35'023};
-  auto values = machine.array(std::vector<int>(3 * kPieces));  // of each: a number, a loop's counter, what is counted
+  SortingPieces<Machine> pieces(machine);  // two in the open, two within a condition
   auto sum = machine.array(std::vector<int>(2, -1));
-  auto keys = machine.array(std::vector<unsigned long long>(kPieces * kRoom, 42));
-  auto numbers = machine.array(std::vector<int>(kPieces, -1));
-  int* const value = values.at();
-  const set_kernel_object set;
   const add_kernel_object add;
-  const auto piece = [&](auto& on, int which) {
-    int* const own = value + 3 * which;
-    unsigned long long* const own_keys = keys.at() + which * kRoom;
-    on.items(make_keys_kernel_object{}, kKeys, own_keys, numbers.at() + which, int{kKeys}, kDifferent[which]);
-    on.items(add, 1, own, 10);
-    on.sort_unique(own_keys, numbers.at() + which, kKeys);
-    on.while_nonzero(own + 1, [&](auto& inside) {
-      inside.items(add, 1, own + 2, 1);
-      inside.items(add, 1, own + 1, -1);
-    });
-    on.if_nonzero(own + 2, [&](auto& inside) { inside.items(add, 1, own, 100 + which); });
-  };
+  const add_up_kernel_object add_up;
+  const auto piece = [&](int which) { return [&, which](auto& on) { pieces.run(on, which); }; };
   machine.run([&](auto& launcher) {
-    for (int which = 0; which < kPieces; ++which) {
-      launcher.items(set, 1, value + 3 * which, 1 + which);
-      launcher.items(set, 1, value + 3 * which + 1, 3 + which);
-    }
-    launcher.side_by_side([&](auto& on) { piece(on, 0); }, [&](auto& on) { piece(on, 1); });
-    launcher.items(add_up_kernel_object{}, 1, value, value + 3, sum.at());
+    for (int which = 0; which < 4; ++which) pieces.begin(launcher, which);
+    launcher.side_by_side(piece(0), piece(1));
+    launcher.items(add_up, 1, pieces.value(0), pieces.value(1), sum.at());
     // Within a condition, and again.
     launcher.if_nonzero(sum.at(), [&](auto& inside) {
       inside.side_by_side(
           [&](auto& on) {
-            on.items(add, 1, value, 1000);
-            on.side_by_side([&](auto& one) { one.items(add, 1, value, 1000); },
-                            [&](auto& other) { other.items(add, 1, value + 3, 2000); });
-            on.items(add_up_kernel_object{}, 1, value, value + 3, sum.at() + 1);
+            on.items(add, 1, pieces.value(0), 1000);
+            on.side_by_side([&](auto& one) { one.items(add, 1, pieces.value(0), 1000); },
+                            [&](auto& other) { other.items(add, 1, pieces.value(1), 2000); });
+            on.items(add_up, 1, pieces.value(0), pieces.value(1), sum.at() + 1);
           },
-          [&](auto& on) { on.items(add, 1, value + 5, 50); });
-      inside.items(add_up_kernel_object{}, 1, sum.at() + 1, value + 5, sum.at() + 1);
-      inside.side_by_side([&](auto& on) { piece(on, 2); }, [&](auto& on) { piece(on, 3); });
-      inside.items(add_up_kernel_object{}, 1, sum.at() + 1, value + 6, sum.at() + 1);
-      inside.items(add_up_kernel_object{}, 1, sum.at() + 1, value + 9, sum.at() + 1);
+          [&](auto& on) { on.items(add, 1, pieces.counted(1), 50); });
+      inside.items(add_up, 1, sum.at() + 1, pieces.counted(1), sum.at() + 1);
+      inside.side_by_side(piece(2), piece(3));
+      inside.items(add_up, 1, sum.at() + 1, pieces.value(2), sum.at() + 1);
+      inside.items(add_up, 1, sum.at() + 1, pieces.value(3), sum.at() + 1);
     });
   });
   EXPECT_EQ(sum.get(), (std::vector<int>{224, 224 + 4000 + 54 + 115 + 117}));
-  EXPECT_EQ(values.get(), (std::vector<int>{2111, 0, 3, 2113, 0, 54, 115, 0, 5, 117, 0, 6}));
-  for (int which = 0; which < kPieces; ++which) {
-    std::set<unsigned long long> expected;
-    for (int i = 0; i < kDifferent[which]; ++i) {
-      expected.insert(static_cast<unsigned long long>(scramble(static_cast<unsigned>(i), 7u)) << 17);
+  EXPECT_EQ(pieces.values(0), (std::vector<int>{2111, 0, 3}));
+  EXPECT_EQ(pieces.values(1), (std::vector<int>{2113, 0, 54}));
+  for (int which = 2; which < 4; ++which) EXPECT_EQ(pieces.values(which), pieces.expected(which)) << which;
+  for (int which = 0; which < 4; ++which) pieces.expect_keys(which);
+}
+
+// What comes after the first piece, and what comes after both, begins when that is done, and what follows all of them
+// when all are; whichever of them are empty, and where the first piece has two side by side itself, of which each needs
+// temporary memory of its own.
+template <class Machine>
+void check_pieces_behind(Machine& machine) {
+  const auto none = [](auto&) {};
+  for (int present = 0; present < 16; ++present) {
+    SortingPieces<Machine> pieces(machine);
+    auto sum = machine.array(std::vector<int>(4, 0));
+    const add_up_kernel_object add_up;
+    machine.run([&](auto& launcher) {
+      for (int which = 0; which < 6; ++which) pieces.begin(launcher, which);
+      const auto work = [&](auto& inside) {
+        const auto if_present = [&](int bit, auto run) {
+          return [=](auto& on) {
+            if (present >> bit & 1) run(on);
+          };
+        };
+        inside.side_by_side(
+            if_present(0,
+                       [&](auto& on) {
+                         on.side_by_side([&](auto& own) { pieces.run(own, 0); }, [&](auto& own) { pieces.run(own, 1); },
+                                         none, [&](auto& own) { pieces.run(own, 2); });
+                         on.items(add_up, 1, pieces.value(0), pieces.value(1), sum.at());
+                       }),
+            if_present(1, [&](auto& on) { pieces.run(on, 3); }),
+            if_present(2,
+                       [&](auto& on) {
+                         pieces.run(on, 4);
+                         on.items(add_up, 1, sum.at(), pieces.value(4), sum.at() + 1);
+                       }),
+            if_present(3, [&](auto& on) {
+              pieces.run(on, 5);
+              on.items(add_up, 1, sum.at(), pieces.value(3), sum.at() + 2);
+            }));
+        inside.items(add_up, 1, sum.at() + 1, sum.at() + 2, sum.at() + 3);
+      };
+      work(launcher);
+    });
+    const bool is[] = {(present & 1) != 0, (present & 2) != 0, (present & 4) != 0, (present & 8) != 0};
+    const int first = is[0] ? 111 + 113 : 0, second = is[1] ? 117 : 4;
+    const int after_first = is[2] ? first + 119 : 0, after_both = is[3] ? first + second : 0;
+    EXPECT_EQ(sum.get(), (std::vector<int>{first, after_first, after_both, after_first + after_both})) << present;
+    for (int which = 0; which < 6; ++which) {
+      if (is[which < 3 ? 0 : which - 2]) {
+        EXPECT_EQ(pieces.values(which), pieces.expected(which)) << present << ' ' << which;
+        pieces.expect_keys(which);
+      }
     }
-    ASSERT_EQ(numbers.get()[static_cast<std::size_t>(which)], static_cast<int>(expected.size()));
-    const std::vector<unsigned long long> all = keys.get();
-    const auto from = all.begin() + which * kRoom;
-    EXPECT_TRUE(std::equal(expected.begin(), expected.end(), from)) << which;
   }
 }
 

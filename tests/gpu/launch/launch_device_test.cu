@@ -81,6 +81,7 @@ TEST_P(LaunchOnDevice, SelectsFlaggedIndicesInOrder) { check_select(machine); }
 TEST_P(LaunchOnDevice, SortsAndDropsDuplicates) { check_sort_unique(machine); }
 TEST_P(LaunchOnDevice, ClearsWhatItIsGiven) { check_clear(machine); }
 TEST_P(LaunchOnDevice, RunsPiecesSideBySide) { check_side_by_side(machine); }
+TEST_P(LaunchOnDevice, RunsPiecesBehindOthers) { check_pieces_behind(machine); }
 
 INSTANTIATE_TEST_SUITE_P(Modes, LaunchOnDevice, testing::Bool(),
                          [](const auto& info) { return info.param ? "Graph" : "AtOnce"; });

@@ -67,6 +67,7 @@ TEST_P(LaunchOnHost, SelectsFlaggedIndicesInOrder) { check_select(machine); }
 TEST_P(LaunchOnHost, SortsAndDropsDuplicates) { check_sort_unique(machine); }
 TEST_P(LaunchOnHost, ClearsWhatItIsGiven) { check_clear(machine); }
 TEST_P(LaunchOnHost, RunsPiecesSideBySide) { check_side_by_side(machine); }
+TEST_P(LaunchOnHost, RunsPiecesBehindOthers) { check_pieces_behind(machine); }
 
 // Kernels that break the rules. `how` chooses what the last thread does.
 
@@ -455,6 +456,31 @@ TEST(Schedules, PiecesSideBySideTakeTurnsInEveryOrder) {
   EXPECT_EQ(digits_of_two_pieces(in_order), 1234);
 }
 
+// What comes after the first piece may be before any of the second; what comes after both is behind both.
+TEST(Schedules, WhatComesAfterPiecesTakesTurnsInEveryOrder) {
+  std::set<int> seen;
+  HostLauncher launcher = exploring(forward());
+  const append_digit_kernel_object append;
+  int number = 0;
+  const auto digit = [&](int d) { return [&, d](HostLauncher& on) { on.items(append, 1, &number, d); }; };
+  const auto all = [&](HostLauncher& on) {
+    number = 0;
+    on.side_by_side(digit(1), digit(2), digit(3), digit(4));
+    return number;
+  };
+  for (int seed = 0; seed < 400; ++seed) {
+    launcher.reschedule(random_walk(static_cast<std::uint64_t>(seed)));
+    const int found = all(launcher);
+    seen.insert(found);
+    const ThreadSchedule schedule = launcher.recorded();
+    launcher.reschedule(replay(schedule));
+    EXPECT_EQ(all(launcher), found) << testing::PrintToString(schedule);
+  }
+  EXPECT_EQ(seen, (std::set<int>{1234, 1243, 1324, 2134, 2143}));
+  HostLauncher in_order;  // without a schedule
+  EXPECT_EQ(all(in_order), 1234);
+}
+
 TEST(Schedules, APieceThatFailsEndsTheOtherOne) {
   for (int seed = 0; seed < 40; ++seed) {
     HostLauncher launcher = exploring(random_walk(static_cast<std::uint64_t>(seed)));
@@ -467,6 +493,17 @@ TEST(Schedules, APieceThatFailsEndsTheOtherOne) {
     expect_mentions(
         fault_of([&] { first_fails ? launcher.side_by_side(fails, goes_on) : launcher.side_by_side(goes_on, fails); }),
         {"diverging_barrier_kernel"});
+    EXPECT_NO_THROW(digits_of_two_pieces(launcher));
+    // And one that waits for it, or goes on behind it.
+    expect_mentions(fault_of([&] {
+                      launcher.side_by_side(
+                          fails, [](HostLauncher&) {}, goes_on, goes_on);
+                    }),
+                    {"diverging_barrier_kernel"});
+    expect_mentions(fault_of([&] {
+                      launcher.side_by_side([](HostLauncher&) {}, fails, goes_on, goes_on);
+                    }),
+                    {"diverging_barrier_kernel"});
     EXPECT_NO_THROW(digits_of_two_pieces(launcher));
   }
 }
