@@ -41,7 +41,8 @@ class PhaseCounter {
   // Of chains the longest one counts.
   template <class First, class Second>
   void side_by_side(First first, Second second) {
-    side_by_side(first, second, [](PhaseCounter&) {}, [](PhaseCounter&) {});
+    side_by_side(
+        first, second, [](PhaseCounter&) {}, [](PhaseCounter&) {});
   }
   template <class First, class Second, class AfterFirst, class AfterBoth>
   void side_by_side(First first, Second second, AfterFirst after_first, AfterBoth after_both) {

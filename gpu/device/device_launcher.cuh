@@ -210,7 +210,7 @@ struct DeviceResources {
   std::size_t required = 0;  // most bytes of temporary memory that any launch asked for
   std::size_t allocated = 0;
   DeviceMemory temporary;
-  std::vector<Stream> inner;  // for capturing bodies of conditions, by depth
+  std::vector<Stream> inner;                             // for capturing bodies of conditions, by depth
   std::vector<std::shared_ptr<DeviceResources>> beside;  // of what runs beside; and beside a part of the first piece, …
 
   DeviceResources() {
@@ -390,7 +390,8 @@ class DeviceLauncher {
   bool overlaps() const { return mode_ != Mode::at_once; }
   template <class First, class Second>
   void side_by_side(First first, Second second) {
-    side_by_side(first, second, [](DeviceLauncher&) {}, [](DeviceLauncher&) {});
+    side_by_side(
+        first, second, [](DeviceLauncher&) {}, [](DeviceLauncher&) {});
   }
   template <class First, class Second, class AfterFirst, class AfterBoth>
   void side_by_side(First first, Second second, AfterFirst after_first, AfterBoth after_both) {
@@ -638,7 +639,7 @@ class DeviceLauncher {
   cudaStream_t stream_;
   std::shared_ptr<detail::DeviceResources> resources_;
   std::size_t depth_ = 0, beside_ = 0;  // how many conditions, and how many first pieces, this is within
-  bool after_launch_ = false;  // what was handed over last is a kernel that lets the next one begin
+  bool after_launch_ = false;           // what was handed over last is a kernel that lets the next one begin
 };
 
 }  // namespace cutproof::gpu

@@ -297,9 +297,9 @@ CUTPROOF_DEVICE void hand_over(Block& block, const DeviceView& w, int s, int t, 
   }
 }
 
-// Carries out the proposals that got both ends; again: those that found no places, if there were any and lists have been
-// moved together. There is another round if one did not get both: nobody else would propose in it. (Whoever is small and
-// taken has proposed something itself, and lost, or never will again.)
+// Carries out the proposals that got both ends; again: those that found no places, if there were any and lists have
+// been moved together. There is another round if one did not get both: nobody else would propose in it. (Whoever is
+// small and taken has proposed something itself, and lost, or never will again.)
 template <class Block>
 CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, DeviceView w, bool again) {
   int* place = block.template shared<int>(1);
@@ -539,13 +539,6 @@ CUTPROOF_ENQUEUE void enqueue_move_together(Launcher& launcher, const DeviceView
 // The work that follows a cut is small, so grids are kept small too: blocks take several clusters if there are many.
 inline constexpr int kMergeBlocks = 2048, kBlocksAgain = 128;
 
-// Asks which clusters are small, and nothing of where any is.
-template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_begin_merge(Launcher& launcher, const DeviceView& w) {
-  launcher.items(begin_merge_kernel_object{}, w.slots_expected, w);
-  launcher.blocks(begin_rounds_kernel_object{}, 1, kListThreads, 0, w);
-}
-// The rest of it.
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_merge_rounds(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   Counters* const c = w.counters;
@@ -573,6 +566,22 @@ CUTPROOF_ENQUEUE void enqueue_merge_rounds(Launcher& launcher, const DeviceView&
     });
   }
   launcher.teams(rest_frames_after_merge_kernel_object{}, kRestTeam, w.slots_expected, w);
+}
+
+// rest_frames: what launches those of clusters as they are. Which of them are small is asked meanwhile.
+template <class Launcher, class RestFrames>
+CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, const Plan& plan, RestFrames rest_frames) {
+  launcher.side_by_side(
+      rest_frames,
+      [&](Launcher& on) {
+        on.items(begin_merge_kernel_object{}, w.slots_expected, w);
+        on.blocks(begin_rounds_kernel_object{}, 1, kListThreads, 0, w);
+      },
+      [](Launcher&) {}, [&](Launcher& on) { enqueue_merge_rounds(on, w, plan); });
+}
+template <class Launcher>
+CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+  enqueue_merge(launcher, w, plan, [](Launcher&) {});
 }
 
 }  // namespace cutproof::gpu

@@ -11,6 +11,7 @@
 #include "gpu/kernels/float3.h"
 #include "gpu/kernels/lowered_plane.cuh"
 #include "gpu/kernels/skin_table.h"
+#include "gpu/kernels/sorted_lists.cuh"
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/plan.h"
 #include "gpu/launch/team.h"

@@ -456,8 +456,8 @@ CUTPROOF_DEVICE void rename_holder(Block& block, const DeviceView& w, int p, int
 }  // namespace split_detail
 
 // A block for each affected cluster. Its first component keeps slot and number; component c > 0, in the order of
-// smallest particles, gets the c-th of the cluster's new slots, which count as given out from now on. Members stay within
-// their places: component after component, each ascending; the places of the dead are left over at the end.
+// smallest particles, gets the c-th of the cluster's new slots, which count as given out from now on. Members stay
+// within their places: component after component, each ascending; the places of the dead are left over at the end.
 template <class Block>
 CUTPROOF_DEVICE void regroup_members_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
@@ -580,8 +580,9 @@ CUTPROOF_DEVICE void rest_frames_of_components_kernel(Block& block, DeviceView w
 }
 CUTPROOF_KERNEL(rest_frames_of_components_kernel);
 
+// All but the rest frames, for which nobody asks until clusters are united.
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_split(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+CUTPROOF_ENQUEUE void enqueue_components(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   using namespace split_detail;
   Counters* const counters = w.counters;
   launcher.items(begin_split_kernel_object{}, 1, w);
@@ -622,10 +623,14 @@ CUTPROOF_ENQUEUE void enqueue_split(Launcher& launcher, const DeviceView& w, con
   launcher.blocks(number_components_kernel_object{}, w.bodies, 256, 0, w);
   launcher.blocks(regroup_members_kernel_object{}, w.slots_expected, kRegroupThreads, sizeof(int) * kRegroupThreads, w);
 }
-// What is left to do then: nobody asks for it until clusters are united.
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_rest_frames_of_components(Launcher& launcher, const DeviceView& w) {
   launcher.teams(rest_frames_of_components_kernel_object{}, kRestTeam, 2 * int64_t{w.slots_expected}, w);
+}
+template <class Launcher>
+CUTPROOF_ENQUEUE void enqueue_split(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+  enqueue_components(launcher, w, plan);
+  enqueue_rest_frames_of_components(launcher, w);
 }
 
 }  // namespace cutproof::gpu

@@ -39,10 +39,10 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
   const bool skin = span.contains(Stage::skin);
   // In a whole frame vertices need not wait for the groups of the next one.
   const bool places_at_once = span.is_whole_frame() && plan.skin;
-  // Nor for what detection finds, as if nothing were cut: if something is, they are placed again, which costs a small load
-  // nothing that it would wait for. (Where the nearer end goes, detection asks where clusters are, too.)
-  const bool places_early = places_at_once && plan.detection && !plan.nearer && w.particles <= kMostPlacedEarly &&
-                            launcher.overlaps();
+  // Nor for what detection finds, as if nothing were cut: if something is, they are placed again, which costs a small
+  // load nothing that it would wait for. (Where the nearer end goes, detection asks where clusters are, too.)
+  const bool places_early =
+      places_at_once && plan.detection && !plan.nearer && w.particles <= kMostPlacedEarly && launcher.overlaps();
   const auto detect = [&](Launcher& on) {
     if (span.contains(Stage::detect) && plan.detection) {
       mark(Stage::detect);
@@ -61,24 +61,20 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
     launcher.if_nonzero(&w.counters->changing, [&](Launcher& inner) {
       if (span.contains(Stage::split)) {
         mark(Stage::split);
-        enqueue_split(inner, w, plan);
+        enqueue_components(inner, w, plan);
       }
       // Which particles there are is known from here on, and cells ask for nothing else.
       const auto change_clusters = [&](Launcher& on) {
         const bool merges = span.contains(Stage::merge) && plan.merge;
-        on.side_by_side(
-            [&](Launcher& own) {
-              if (span.contains(Stage::split)) enqueue_rest_frames_of_components(own, w);
-            },
-            [&](Launcher& own) {
-              if (!merges) return;
-              mark(Stage::merge);
-              enqueue_begin_merge(own, w);
-            },
-            [](Launcher&) {},
-            [&](Launcher& own) {
-              if (merges) enqueue_merge_rounds(own, w, plan);
-            });
+        const auto rest_frames = [&](Launcher& own) {
+          if (span.contains(Stage::split)) enqueue_rest_frames_of_components(own, w);
+          if (merges) mark(Stage::merge);
+        };
+        if (merges) {
+          enqueue_merge(on, w, plan, rest_frames);
+        } else {
+          rest_frames(on);
+        }
         if (span.contains(Stage::expand) && plan.expand) {
           on.if_nonzero(&w.counters->expanding, [&](Launcher& innermost) {
             mark(Stage::expand);

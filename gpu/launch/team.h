@@ -37,8 +37,8 @@ class Team {
     for (int k = lane(); k < count; k += kLanes) visit(k);
   }
 
-  // use(k, ask(k)) for the same items, several of which are asked for before the first of them is used: one by one, each
-  // would wait for what the one before has asked for. ask() may be called more than once for an item.
+  // use(k, ask(k)) for the same items, several of which are asked for before the first of them is used: one by one,
+  // each would wait for what the one before has asked for. ask() may be called more than once for an item.
   template <int kAtOnce, class Ask, class Use>
   CUTPROOF_DEVICE void each_asked(int count, Ask ask, Use use) const {
     for (int begin = lane(); begin < count; begin += kAtOnce * kLanes) {
@@ -54,8 +54,8 @@ class Team {
     }
   }
 
-  // visit(i), by the whole team, for those i of [0, count) that are wanted. Each lane asks of one of them, far from those
-  // of its neighbours: what is wanted lies side by side.
+  // visit(i), by the whole team, for those i of [0, count) that are wanted. Each lane asks of one of them, far from
+  // those of its neighbours: what is wanted lies side by side.
   template <class Wanted, class Visit>
   CUTPROOF_DEVICE void each_wanted(int64_t count, Wanted wanted, Visit visit) const {
     for (int64_t begin = first(); begin < count; begin += kLanes * stride()) {

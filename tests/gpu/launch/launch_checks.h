@@ -665,8 +665,8 @@ void check_sort_unique(Machine& machine) {
   }
 }
 
-// Pieces of work that need temporary memory and have conditions: each makes keys, sorts them, adds 10 to its number, and
-// counts to three and further, the first of them least; then it adds 100 and which one it is.
+// Pieces of work that need temporary memory and have conditions: each makes keys, sorts them, adds 10 to its number,
+// and counts to three and further, the first of them least; then it adds 100 and which one it is.
 template <class Machine>
 class SortingPieces {
  public:
@@ -783,23 +783,23 @@ void check_pieces_behind(Machine& machine) {
             if (present >> bit & 1) run(on);
           };
         };
-        inside.side_by_side(
-            if_present(0,
-                       [&](auto& on) {
-                         on.side_by_side([&](auto& own) { pieces.run(own, 0); }, [&](auto& own) { pieces.run(own, 1); },
-                                         none, [&](auto& own) { pieces.run(own, 2); });
-                         on.items(add_up, 1, pieces.value(0), pieces.value(1), sum.at());
-                       }),
-            if_present(1, [&](auto& on) { pieces.run(on, 3); }),
-            if_present(2,
-                       [&](auto& on) {
-                         pieces.run(on, 4);
-                         on.items(add_up, 1, sum.at(), pieces.value(4), sum.at() + 1);
-                       }),
-            if_present(3, [&](auto& on) {
-              pieces.run(on, 5);
-              on.items(add_up, 1, sum.at(), pieces.value(3), sum.at() + 2);
-            }));
+        inside.side_by_side(if_present(0,
+                                       [&](auto& on) {
+                                         on.side_by_side([&](auto& own) { pieces.run(own, 0); },
+                                                         [&](auto& own) { pieces.run(own, 1); }, none,
+                                                         [&](auto& own) { pieces.run(own, 2); });
+                                         on.items(add_up, 1, pieces.value(0), pieces.value(1), sum.at());
+                                       }),
+                            if_present(1, [&](auto& on) { pieces.run(on, 3); }),
+                            if_present(2,
+                                       [&](auto& on) {
+                                         pieces.run(on, 4);
+                                         on.items(add_up, 1, sum.at(), pieces.value(4), sum.at() + 1);
+                                       }),
+                            if_present(3, [&](auto& on) {
+                              pieces.run(on, 5);
+                              on.items(add_up, 1, sum.at(), pieces.value(3), sum.at() + 2);
+                            }));
         inside.items(add_up, 1, sum.at() + 1, sum.at() + 2, sum.at() + 3);
       };
       work(launcher);

@@ -500,9 +500,7 @@ TEST(Schedules, APieceThatFailsEndsTheOtherOne) {
                           fails, [](HostLauncher&) {}, goes_on, goes_on);
                     }),
                     {"diverging_barrier_kernel"});
-    expect_mentions(fault_of([&] {
-                      launcher.side_by_side([](HostLauncher&) {}, fails, goes_on, goes_on);
-                    }),
+    expect_mentions(fault_of([&] { launcher.side_by_side([](HostLauncher&) {}, fails, goes_on, goes_on); }),
                     {"diverging_barrier_kernel"});
     EXPECT_NO_THROW(digits_of_two_pieces(launcher));
   }
