@@ -208,8 +208,9 @@ CUTPROOF_DEVICE void find_classes_kernel(Block& block, const DeviceView& w) {
   Counters& c = *w.counters;
   const bool whole = c.groups_whole != 0;
   if (whole && block.first() == 0) c.groups = c.placed = c.placed_last = c.loose = c.pairs = 0;
+  // known: what DeviceView::regroup has of s.
   const auto remeasure = [&](int s, int known) {
-    if (whole || known >= kRemeasured) return;
+    if (known >= kRemeasured) return;
     if ((block.atomic_or(&w.regroup[s], kRemeasured) & kRemeasured) != 0) return;
     remeasured(w)[block.atomic_add(&c.remeasured, 1)] = s;
   };
@@ -219,7 +220,7 @@ CUTPROOF_DEVICE void find_classes_kernel(Block& block, const DeviceView& w) {
     const int share = static_cast<int>(i % kShares),
               s = whole ? static_cast<int>(i / kShares) : changed(w)[i / kShares];
     const int begin = w.slot_begin[s], size = w.slot_size[s];
-    if (team.leads() && share == 0) remeasure(s, block.load(&w.regroup[s]));
+    if (!whole && team.leads() && share == 0) remeasure(s, block.load(&w.regroup[s]));
     int* const classes = table(w) + begin;
     for (int k = share * team.kLanes + team.lane(); k < size; k += kShares * team.kLanes) {
       const int p = w.members[begin + k];
@@ -241,7 +242,7 @@ CUTPROOF_DEVICE void find_classes_kernel(Block& block, const DeviceView& w) {
         entry = entry + 1 == size ? 0 : entry + 1;
       }
       entry_of_member(w)[begin + k] = entry;
-      for (int h = 0; h < list.size && first; h += kAtOnce) {
+      for (int h = 0; h < list.size && first && !whole; h += kAtOnce) {
         int holder[kAtOnce], known[kAtOnce];
         for (int j = 0; j < kAtOnce; ++j) holder[j] = list.begin[h + j < list.size ? h + j : h];
         for (int j = 0; j < kAtOnce; ++j) known[j] = block.load(&w.regroup[holder[j]]);

@@ -495,7 +495,7 @@ CUTPROOF_DEVICE void rest_frames_after_merge_kernel(Block& block, DeviceView w) 
   const Team<Block, kRestTeam> team(block);
   team.each_wanted(
       w.counters->slots_used,
-      [&](int s) { return rest_marks(w)[s] != 0 && w.slot_size[s] > 0 && merges_now(w, w.slot_body[s]); },
+      [&](int s) { return merges_now(w, w.slot_body[s]) && w.slot_size[s] > 0 && rest_marks(w)[s] != 0; },
       [&](int s) { recompute_rest_frame(team, w, s); });
 }
 CUTPROOF_KERNEL(rest_frames_after_merge_kernel);
