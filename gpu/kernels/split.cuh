@@ -40,8 +40,8 @@ CUTPROOF_BOTH inline constexpr int lower_direction(int d) { return 5 - 2 * d; }
 
 CUTPROOF_DEVICE inline int body_index(const DeviceView& w, int p) { return w.bodies == 1 ? 0 : w.body_of[p]; }
 
-// What Counters::scratch holds.
-enum : int { kNewClusters = 0, kFirstNewSlot = 1, kFirstNewNumber = 2, kTooLarge = 3 };
+// What Counters::scratch holds, until there are new lists: from then on the skin has it.
+enum : int { kNewClusters = 0, kFirstNewNumber = 1, kTooLarge = 2 };
 
 // The quarters of DeviceView::slot_scratch. By place in DeviceView::affected: how many components need a new slot; the
 // same of all before; several bodies: the number of the first of them. By slot: marks, then places that are filled
@@ -393,7 +393,7 @@ CUTPROOF_DEVICE void number_components_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
   Counters& counters = *w.counters;
   if (block.first() == 0) {
-    counters.scratch[kFirstNewSlot] = counters.slots_used;
+    counters.slots_before = counters.slots_used;
     if (counters.slots_used + int64_t{counters.scratch[kNewClusters]} > w.slot_capacity) {
       counters.failed = 1;
       block.atomic_or(&counters.fault, kSlotsFull);
@@ -467,10 +467,10 @@ CUTPROOF_DEVICE void regroup_members_kernel(Block& block, DeviceView w) {
     put_back_debris(block, w);
     return;
   }
-  if (block.first() == 0) counters.slots_used = counters.scratch[kFirstNewSlot] + counters.scratch[kNewClusters];
+  if (block.first() == 0) counters.slots_used = counters.slots_before + counters.scratch[kNewClusters];
   for (int a = block.index(); a < counters.affected; a += block.count()) {
     const int s = w.affected[a], begin = w.slot_begin[s], size = w.slot_size[s];
-    const int first_new = counters.scratch[kFirstNewSlot] + extra_before(w)[a];
+    const int first_new = counters.slots_before + extra_before(w)[a];
     const int number = w.bodies == 1 ? counters.scratch[kFirstNewNumber] + extra_before(w)[a] : first_number(w)[a];
     int* const fill = by_slot(w);  // first the size of a component, then the place that it fills next
     int* const slot_of_root = w.member_scratch + begin;
@@ -570,7 +570,7 @@ CUTPROOF_DEVICE void rest_frames_of_components_kernel(Block& block, DeviceView w
   using namespace split_detail;
   const Counters& counters = *w.counters;
   if (counters.failed) return;
-  const int first_new = counters.scratch[kFirstNewSlot], added = counters.scratch[kNewClusters];
+  const int first_new = counters.slots_before, added = counters.slots_used - first_new;
   const Team<Block, kRestTeam> team(block);
   for (int64_t i = team.first(); i < counters.affected + added; i += team.stride()) {
     const int job = static_cast<int>(i);

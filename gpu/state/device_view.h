@@ -168,6 +168,7 @@ struct Counters {
   int debris;              // …, by this frame's split
   int fallen;              // split: length of DeviceView::fallen, without debris, which follows
   int whole_tissue;        // split: debris may be anywhere in some body, so all of its tissue is labelled
+  int slots_before;        // split: slots that had been given out before it
   int affected;            // clusters that lost a particle in this frame: length of DeviceView::affected
   int merging;             // merge rounds go on while this is not 0
   int round;               // merge round, from 0: the next one
