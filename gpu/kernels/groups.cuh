@@ -20,7 +20,7 @@ inline constexpr int kMemberTeam = 32;
 // Teams that share a cluster where each of its members is looked at alone, and where they are counted.
 inline constexpr int kShares = 8, kCountShares = 4;
 // Where a cluster is dealt out: threads, and how many members have room in their shared memory.
-inline constexpr int kDealThreads = 384;
+inline constexpr int kDealThreads = 256;
 inline constexpr int kMostDealt = 2048;
 
 namespace groups_detail {
@@ -358,7 +358,7 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
     block.sync();  // before the next cluster's lists
   }
 }
-CUTPROOF_KERNEL_THREADS(deal_out_groups_kernel, kDealThreads);
+CUTPROOF_KERNEL(deal_out_groups_kernel);
 
 // X_g, the moments of the masses about it, and the offsets from the holders' rest centres.
 template <class Block>

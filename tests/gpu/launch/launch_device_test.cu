@@ -53,7 +53,7 @@ struct DeviceMachine {
       CUTPROOF_CUDA(cudaStreamSynchronize(nullptr));
     }
   }
-  std::vector<int> block_sizes() const { return {32, 64, 96, 256, 992, 1024}; }
+  std::vector<int> block_sizes() const { return {32, 64, 128, 256, 512, 1024}; }
 };
 
 class LaunchOnDevice : public testing::TestWithParam<bool> {
