@@ -183,7 +183,7 @@ struct Counters {
   int skin_changes;        // skin: particles that change the cells around them: length of DeviceView::fallen
   int stage_ran[6];        // by stage: launched in this span
   int changed;             // scratch of a stage's loop
-  int failed;              // a capacity was too small for the stage in progress
+  int failed;              // split: there are too few slots for it
   int additions_before;    // expand: length of DeviceView::additions before the layer in progress
   int growth;              // expand: members that the enlarged clusters need
   int memberships_before;  // expand: length of DeviceView::memberships in use before it
