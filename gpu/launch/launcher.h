@@ -103,7 +103,8 @@ constexpr bool reads_ahead() {
   }
 }
 
-// A block is a part of one of 512 threads where a frame runs in one kernel: threads that fill no part would meet nobody.
+// A block is a part of one of 512 threads where a frame runs in one kernel: threads that fill no part would meet
+// nobody.
 template <class Kernel>
 void check_threads(int threads) {
   if (threads < 32 || threads > max_threads<Kernel>() || (threads & (threads - 1)) != 0) {
