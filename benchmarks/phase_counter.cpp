@@ -39,13 +39,8 @@ class PhaseCounter {
   }
   static constexpr bool overlaps() { return true; }
   // Of chains the longest one counts.
-  template <class First, class Second>
-  void side_by_side(First first, Second second) {
-    side_by_side(
-        first, second, [](PhaseCounter&) {}, [](PhaseCounter&) {});
-  }
-  template <class First, class Second, class AfterFirst, class AfterBoth>
-  void side_by_side(First first, Second second, AfterFirst after_first, AfterBoth after_both) {
+  template <class First, class Second, class AfterFirst = gpu::NoWork, class AfterBoth = gpu::NoWork>
+  void side_by_side(First first, Second second, AfterFirst after_first = {}, AfterBoth after_both = {}) {
     PhaseCounter beside;
     beside.phases_ = phases_;
     first(*this);

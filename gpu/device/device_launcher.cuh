@@ -388,13 +388,8 @@ class DeviceLauncher {
   }
 
   bool overlaps() const { return mode_ != Mode::at_once; }
-  template <class First, class Second>
-  void side_by_side(First first, Second second) {
-    side_by_side(
-        first, second, [](DeviceLauncher&) {}, [](DeviceLauncher&) {});
-  }
-  template <class First, class Second, class AfterFirst, class AfterBoth>
-  void side_by_side(First first, Second second, AfterFirst after_first, AfterBoth after_both) {
+  template <class First, class Second, class AfterFirst = NoWork, class AfterBoth = NoWork>
+  void side_by_side(First first, Second second, AfterFirst after_first = {}, AfterBoth after_both = {}) {
     if (mode_ == Mode::at_once) {
       first(*this);
       second(*this);

@@ -63,14 +63,9 @@ class SpanLauncher {
   }
 
   __device__ static constexpr bool overlaps() { return false; }
-  template <class First, class Second>
-  __device__ __forceinline__ void side_by_side(First first, Second second) {
-    first(*this);
-    second(*this);
-  }
-  template <class First, class Second, class AfterFirst, class AfterBoth>
-  __device__ __forceinline__ void side_by_side(First first, Second second, AfterFirst after_first,
-                                               AfterBoth after_both) {
+  template <class First, class Second, class AfterFirst = NoWork, class AfterBoth = NoWork>
+  __device__ __forceinline__ void side_by_side(First first, Second second, AfterFirst after_first = {},
+                                               AfterBoth after_both = {}) {
     first(*this);
     second(*this);
     after_first(*this);

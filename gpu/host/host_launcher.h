@@ -84,13 +84,8 @@ class HostLauncher {
   }
 
   bool overlaps() const { return simulated(); }
-  template <class First, class Second>
-  void side_by_side(First first, Second second) {
-    side_by_side(
-        first, second, [](HostLauncher&) {}, [](HostLauncher&) {});
-  }
-  template <class First, class Second, class AfterFirst, class AfterBoth>
-  void side_by_side(First first, Second second, AfterFirst after_first, AfterBoth after_both) {
+  template <class First, class Second, class AfterFirst = NoWork, class AfterBoth = NoWork>
+  void side_by_side(First first, Second second, AfterFirst after_first = {}, AfterBoth after_both = {}) {
     if (!simulated() || turns_ != nullptr) {
       first(*this);
       second(*this);

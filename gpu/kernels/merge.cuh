@@ -569,19 +569,16 @@ CUTPROOF_ENQUEUE void enqueue_merge_rounds(Launcher& launcher, const DeviceView&
 }
 
 // rest_frames: what launches those of clusters as they are. Which of them are small is asked meanwhile.
-template <class Launcher, class RestFrames>
-CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, const Plan& plan, RestFrames rest_frames) {
+template <class Launcher, class RestFrames = NoWork>
+CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, const Plan& plan,
+                                    RestFrames rest_frames = {}) {
   launcher.side_by_side(
       rest_frames,
       [&](Launcher& on) {
         on.items(begin_merge_kernel_object{}, w.slots_expected, w);
         on.blocks(begin_rounds_kernel_object{}, 1, kListThreads, 0, w);
       },
-      [](Launcher&) {}, [&](Launcher& on) { enqueue_merge_rounds(on, w, plan); });
-}
-template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, const Plan& plan) {
-  enqueue_merge(launcher, w, plan, [](Launcher&) {});
+      NoWork{}, [&](Launcher& on) { enqueue_merge_rounds(on, w, plan); });
 }
 
 }  // namespace cutproof::gpu

@@ -627,6 +627,7 @@ template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_rest_frames_of_components(Launcher& launcher, const DeviceView& w) {
   launcher.teams(rest_frames_of_components_kernel_object{}, kRestTeam, 2 * int64_t{w.slots_expected}, w);
 }
+// All of it, for who runs nothing beside it.
 template <class Launcher>
 CUTPROOF_ENQUEUE void enqueue_split(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   enqueue_components(launcher, w, plan);

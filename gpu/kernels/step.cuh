@@ -39,6 +39,13 @@ CUTPROOF_DEVICE int64_t behind(const AnyTeam& team, int threads) {
   return first < 0 ? first + teams : first;
 }
 
+// Threads that have had something to do where `jobs` of smaller teams come first, and behind them `others` of larger
+// ones.
+template <class Small, class Large>
+CUTPROOF_DEVICE int busy_threads(const Small&, int jobs, const Large&, int others) {
+  return jobs * Small::kLanes + (others > 0 ? (others + 1) * Large::kLanes : 0);  // + 1: they begin with a whole team
+}
+
 // Of the jobs that the lanes of a warp have found, one for each of its teams: this one's, or -1 if none is left for it.
 template <class Warp, class AnyTeam>
 CUTPROOF_DEVICE int take_each(const Warp& warp, const AnyTeam& team, unsigned& found, int job) {
@@ -238,7 +245,7 @@ CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) {
 // over all of them and while it is resolved. Of a large load one thread has all rows, and half as many lanes do the
 // work of all, but in an iteration, whose resolved groups are few.
 inline constexpr int kRowTeam = 4, kParticleTeam = 16, kResolvedTeam = 32;
-inline constexpr int kMostByRows = 150'000;  // particles of a load
+inline constexpr int kMostByRows = 150'000;  // particles of a load; more make it a large one
 // Lanes that a tracked or a resolved group gets, where kRows of them share a carried one. (Half a warp leaves half as
 // many idle, and takes longer: of a million particles on a floor a frame is an eighth shorter, of a million that only a
 // blade touches a hundredth longer.)
@@ -1211,8 +1218,7 @@ CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int
     block.store(&w.counters->newly_tracked[(substep + 1) % 3], 0);
   }
   const Team<Block, 1> thread(block);
-  const int busy = groups * rows.kLanes + (tracked > 0 ? (tracked + 1) * team.kLanes : 0);
-  for (int64_t k = behind(thread, busy); k < loose; k += thread.stride()) {
+  for (int64_t k = behind(thread, busy_threads(rows, groups, team, tracked)); k < loose; k += thread.stride()) {
     begin_loose<kContacts, kRetarded>(w, w.loose_places[k], substep);
   }
 }
@@ -1857,8 +1863,9 @@ CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int
   if (clusters > 0) {
     Float3 sum;
     // Several at once: one by one, each would wait for the one before.
+    constexpr int kAtOnce = 4;
+    static_assert(kAhead % kAtOnce == 0);
     const auto add = [&](const Holder* some, int first) {
-      constexpr int kAtOnce = 4;
       Map place[kAtOnce];
       for (int t = 0; t < kAtOnce; ++t) place[t] = load_map(w.placement, some[t].slot);
       for (int t = 0; t < kAtOnce; ++t) {
@@ -1871,11 +1878,11 @@ CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int
         sum = sum + ((center - from) + turned);
       }
     };
-    for (int first = 0; first < kAhead; first += 4) {
+    for (int first = 0; first < kAhead; first += kAtOnce) {
       if (first < clusters) add(ahead + first, first);
     }
-    CUTPROOF_ROLLED for (int first = kAhead; first < clusters; first += 4) {
-      for (int t = 0; t < 4; ++t) ahead[t] = holder_at(first + t);
+    CUTPROOF_ROLLED for (int first = kAhead; first < clusters; first += kAtOnce) {
+      for (int t = 0; t < kAtOnce; ++t) ahead[t] = holder_at(first + t);
       add(ahead, first);
     }
     pull = (1.0f / static_cast<float>(clusters)) * sum;
@@ -1927,8 +1934,7 @@ CUTPROOF_DEVICE void advance_kernel(Block& block, const DeviceView& w, int subst
   }
   if (loose == 0) return;
   const Team<Block, 1> thread(block);
-  const int busy = groups * rows.kLanes + (resolved > 0 ? (resolved + 1) * team.kLanes : 0);
-  for (int64_t k = behind(thread, busy); k < loose; k += thread.stride()) {
+  for (int64_t k = behind(thread, busy_threads(rows, groups, team, resolved)); k < loose; k += thread.stride()) {
     advance_loose<kContacts, kAccelerated, kRetarded, kHoldersAtOnce<kRows>>(block, w, w.loose_places[k], substep,
                                                                              iteration);
   }

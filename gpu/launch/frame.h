@@ -18,9 +18,6 @@
 
 namespace cutproof::gpu {
 
-// Particles of a load whose vertices are placed beside its detection.
-inline constexpr int kMostPlacedEarly = 150'000;
-
 // A span of a whole frame finds groups as the one before has left them, and leaves them as the next needs them: what
 // follows a cut has a condition anyway, and in front of the step there is none. Any other makes them where the step
 // needs them. Before the first of whole frames, and after any other span, Load::needs_groups() says that they are to be
@@ -41,8 +38,8 @@ CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, cons
   const bool places_at_once = span.is_whole_frame() && plan.skin;
   // Nor for what detection finds, as if nothing were cut: if something is, they are placed again, which costs a small
   // load nothing that it would wait for. (Where the nearer end goes, detection asks where clusters are, too.)
-  const bool places_early =
-      places_at_once && plan.detection && !plan.nearer && w.particles <= kMostPlacedEarly && launcher.overlaps();
+  const bool places_early = places_at_once && plan.detection && !plan.nearer &&
+                            w.particles <= step_detail::kMostByRows && launcher.overlaps();
   const auto detect = [&](Launcher& on) {
     if (span.contains(Stage::detect) && plan.detection) {
       mark(Stage::detect);

@@ -16,11 +16,10 @@
 //   void if_nonzero(const int* flag, Body);                    what `Body` (a callable that launches) does happens only
 //                                                              if *flag is not 0 when the work before it is done
 //   void while_nonzero(int* flag, Body);                       again and again while *flag is not 0
-//   template <class First, class Second>
-//   void side_by_side(First, Second);                          each of the two launches in its order, one beside the
-//                                                              other: neither touches what the other writes
-//   template <class First, class Second, class AfterFirst, class AfterBoth>
-//   void side_by_side(First, Second, AfterFirst, AfterBoth);   likewise, and behind them two more, each as soon as what
+//   template <class First, class Second, class AfterFirst = NoWork, class AfterBoth = NoWork>
+//   void side_by_side(First, Second, AfterFirst = {}, AfterBoth = {});
+//                                                              each launches in its order, the two one beside the
+//                                                              other, and behind them two more, each as soon as what
 //                                                              its name says is done: none touches what another writes
 //                                                              that it does not wait for
 //   bool overlaps() const;                                     whether it makes a difference that they are side by side
@@ -64,6 +63,12 @@
 #define CUTPROOF_KERNEL(name) CUTPROOF_KERNEL_THREADS(name, 256)
 
 namespace cutproof::gpu {
+
+// A piece of work that launches nothing.
+struct NoWork {
+  template <class Launcher>
+  CUTPROOF_ENQUEUE void operator()(Launcher&) const {}
+};
 
 template <class Kernel>
 constexpr const char* kernel_name() {

@@ -665,8 +665,8 @@ void check_sort_unique(Machine& machine) {
   }
 }
 
-// Pieces of work that need temporary memory and have conditions: each makes keys, sorts them, adds 10 to its number,
-// and counts to three and further, the first of them least; then it adds 100 and which one it is.
+// Pieces of work that need temporary memory and have conditions: piece k makes keys and sorts them, counts to k + 3,
+// and adds 10 and then, because it has counted to something, 100 + k to its number, which was k + 1.
 template <class Machine>
 class SortingPieces {
  public:
@@ -770,23 +770,21 @@ void check_side_by_side(Machine& machine) {
 // temporary memory of its own.
 template <class Machine>
 void check_pieces_behind(Machine& machine) {
-  const auto none = [](auto&) {};
   for (int present = 0; present < 16; ++present) {
     SortingPieces<Machine> pieces(machine);
     auto sum = machine.array(std::vector<int>(4, 0));
     const add_up_kernel_object add_up;
     machine.run([&](auto& launcher) {
       for (int which = 0; which < 6; ++which) pieces.begin(launcher, which);
-      const auto work = [&](auto& inside) {
-        const auto if_present = [&](int bit, auto run) {
-          return [=](auto& on) {
-            if (present >> bit & 1) run(on);
-          };
+      const auto if_present = [&](int bit, auto run) {
+        return [=](auto& on) {
+          if (present >> bit & 1) run(on);
         };
-        inside.side_by_side(if_present(0,
+      };
+      launcher.side_by_side(if_present(0,
                                        [&](auto& on) {
                                          on.side_by_side([&](auto& own) { pieces.run(own, 0); },
-                                                         [&](auto& own) { pieces.run(own, 1); }, none,
+                                                         [&](auto& own) { pieces.run(own, 1); }, NoWork{},
                                                          [&](auto& own) { pieces.run(own, 2); });
                                          on.items(add_up, 1, pieces.value(0), pieces.value(1), sum.at());
                                        }),
@@ -800,9 +798,7 @@ void check_pieces_behind(Machine& machine) {
                               pieces.run(on, 5);
                               on.items(add_up, 1, sum.at(), pieces.value(3), sum.at() + 2);
                             }));
-        inside.items(add_up, 1, sum.at() + 1, sum.at() + 2, sum.at() + 3);
-      };
-      work(launcher);
+      launcher.items(add_up, 1, sum.at() + 1, sum.at() + 2, sum.at() + 3);
     });
     const bool is[] = {(present & 1) != 0, (present & 2) != 0, (present & 4) != 0, (present & 8) != 0};
     const int first = is[0] ? 111 + 113 : 0, second = is[1] ? 117 : 4;
