@@ -359,7 +359,7 @@ TEST(Paths, OfTheHostGiveTheSameBitsAloneAndInALoad) {
   expect_same_bits("Paths.OfTheHostGiveTheSameBitsAloneAndInALoad", std::max<int64_t>(wanted_cases() / 100, 5), paths);
 }
 
-TEST(Paths, OfTheDeviceGiveTheSameBitsAloneAndInALoad) {
+TEST(Paths, OfTheDeviceGiveTheBitsOfTheHostAloneAndInALoad) {
   Paths paths;
   for (const harness::BackendDescriptor& backend : harness::backends()) {
     if (!backend.is_built() || !backend.needs_device() || harness::processor_of(backend).empty()) continue;
@@ -369,6 +369,11 @@ TEST(Paths, OfTheDeviceGiveTheSameBitsAloneAndInALoad) {
   }
   if (paths.empty()) GTEST_SKIP() << "there is no device";
   ASSERT_GE(paths.size(), 4u);
+  // All beside the host's, which are the same operations in the same order: a product and a sum that a device rounds
+  // once instead of twice are found, as is whatever else is wrong by no more than rounding.
+  harness::BackendChoice host;
+  host.name = harness::kHostName;
+  paths.emplace(paths.begin(), host.name, harness::make_backend(host));
 #if CUTPROOF_HAS_CUDA
   // Whatever memory holds before anything is put into it, and where it has to be made first.
   for (const gpu::Path path : {gpu::Path::graph, gpu::Path::eager, gpu::Path::one_block, gpu::Path::one_grid}) {
@@ -382,15 +387,15 @@ TEST(Paths, OfTheDeviceGiveTheSameBitsAloneAndInALoad) {
     }
   }
 #endif
-  expect_same_bits("Paths.OfTheDeviceGiveTheSameBitsAloneAndInALoad", std::max<int64_t>(wanted_cases() / 20, 5), paths);
+  expect_same_bits("Paths.OfTheDeviceGiveTheBitsOfTheHostAloneAndInALoad", std::max<int64_t>(wanted_cases() / 20, 5),
+                   paths);
 }
 
 // A large load runs other kernels, with fewer lanes for each group and each cluster: so large that all of them do.
-TEST(Paths, OfTheDeviceGiveTheSameBitsInALargeLoad) {
+TEST(Paths, OfTheDeviceGiveTheBitsOfTheHostInALargeLoad) {
   constexpr int32_t kCopies = 72;
-  harness::BackendChoice choice;
-  choice.name = "gpu";
-  const harness::BackendDescriptor* const backend = harness::find_backend(choice.name);
+  constexpr const char* kDevice = "gpu";
+  const harness::BackendDescriptor* const backend = harness::find_backend(kDevice);
   if (backend == nullptr || !backend->is_built() || harness::processor_of(*backend).empty())
     GTEST_SKIP() << "there is no device";
   Scene scene;
@@ -412,15 +417,18 @@ TEST(Paths, OfTheDeviceGiveTheSameBitsInALargeLoad) {
     const int32_t particles = built.setup.body.particle_count();
     ASSERT_GT(kCopies * built.state.clusters.count(), gpu::step_detail::kFewClusters);
     ASSERT_GT(kCopies * particles, gpu::step_detail::kMostByRows);
-    const auto run = [&](std::size_t copies) {
-      const auto gpu = harness::make_backend(choice);
-      gpu->load(std::vector<cutproof::Setup>(copies, built.setup), std::vector<State>(copies, built.state));
-      for (int64_t frame = 0; frame < scene.frames; ++frame) gpu->run({});
-      return gpu->snapshot();
+    const auto run = [&](const char* name, std::size_t copies) {
+      harness::BackendChoice choice;
+      choice.name = name;
+      const auto kernels = harness::make_backend(choice);
+      kernels->load(std::vector<cutproof::Setup>(copies, built.setup), std::vector<State>(copies, built.state));
+      for (int64_t frame = 0; frame < scene.frames; ++frame) kernels->run({});
+      return kernels->snapshot();
     };
-    const State alone = run(1).front();
+    const State alone = run(harness::kHostName, 1).front();
     EXPECT_GT(std::count(alone.alive.begin(), alone.alive.end(), 0), 0) << "nothing was cut";
-    for (const State& together : run(kCopies)) ASSERT_TRUE(together == alone);
+    EXPECT_TRUE(run(kDevice, 1).front() == alone);
+    for (const State& together : run(kDevice, kCopies)) ASSERT_TRUE(together == alone);
   }
 }
 
