@@ -2,7 +2,10 @@
 """Mutation testing: applies one mutant at a time to a copy of the code and asks the gate to find it.
 
 Usage: run.py [--only NAME...] [--shard I/N] [--jobs N] [--json F] [--check]
-       run.py --merge JSON...     makes the table of runs of parts; runs nothing
+       run.py --alone [--only NAME...] [--shard I/N] [--jobs N] --json F
+                                  what a user's commands find without this project's tests (ALONE, below)
+       run.py --merge JSON...     makes the table of runs of parts; runs nothing. Results of --alone
+                                  make their section alone
 
 A mutant is a patch, mutants/NN_name.patch, with a head of lines `Field: text` (a line that begins with a space goes on):
   Stage     step detect split merge expand skin, or launch: what runs kernels and puts frames together; judge: what
@@ -59,6 +62,13 @@ TESTS_OF_JUDGES = {
     "guests": ("guests_test",),
 }
 FIELDS = ("Stage", "Fault", "Suspect", "Livelock")
+# What finds a simulator's fault without the tests of this project: campaigns, and scenes that are checked.
+ALONE = {
+    "dissections": [f"fuzz --cases 2000 --seed 1 --simplify 0 --save {RUN}"],
+    "moving cases": [f"fuzz --dynamics --cases 2000 --seed 1 --simplify 0 --save {RUN}"],
+    "scenes": [f"run fixtures/scenes/{scene}.json --check" for scene in ("three_cuts", "cuboid_press", "small_block")],
+}
+ALONE_FORMAT, ALONE_TITLE = "cutproof.mutants_alone", "What campaigns and scenes find alone"
 MOST_SECONDS = 420  # of one command
 FUZZ_SECONDS = 300  # of the last resort
 FUZZ_FAILS = re.compile(r"case (\d+) FAILS: '(.*?)' fails after")
@@ -303,6 +313,44 @@ def passes_unchanged(command, jobs):
     return not outcome.found
 
 
+def backends_of(mutant):
+    return [backend for folder, backend in (("reference_cpu", "reference"), ("gpu", "host")) if folder in mutant.code]
+
+
+def alone(backends):
+    """For each of ALONE the property that fails first of the program that is built; "" if everything holds."""
+    program = next(path for path in BUILD.glob("**/cutproof") if path.is_file() and os.access(path, os.X_OK))
+    RUN.mkdir(parents=True, exist_ok=True)
+    result = RUN / "alone.json"
+    found = {}
+    for name, commands in ALONE.items():
+        found[name] = ""
+        for command in [f"{c} --backend {backend}" for backend in backends for c in commands]:
+            result.unlink(missing_ok=True)
+            try:
+                done = subprocess.run([str(program), *command.split(), "--json", str(result)], cwd=TREE,
+                                      capture_output=True, text=True, errors="replace", timeout=MOST_SECONDS)
+            except subprocess.TimeoutExpired:
+                found[name] = "no end"
+                break
+            if done.returncode == 2:
+                raise BadMutant(f"'{command}': {done.stderr.strip()}")
+            if done.returncode != 0:
+                found[name] = first_failure(result) or f"status {done.returncode}"
+                break
+    return found
+
+
+def first_failure(result):
+    try:
+        document = json.loads(result.read_text())
+    except (OSError, ValueError):
+        return None
+    if isinstance(document.get("verdicts"), list):  # of `run`; `fuzz` counts them and lists what fails
+        return next((v["property"] for v in document["verdicts"] if not v["holds"]), None)
+    return next((v["property"] for v in document["violations"]), None)
+
+
 # --- Results ---------------------------------------------------------------------------------------------------------
 
 def is_simple(row):
@@ -314,6 +362,27 @@ def simplicity(rows):
     simple = sum(1 for row in sized if is_simple(row))
     return (f"Of {plural(len(sized), 'counterexample')} that `cutproof fuzz` has simplified, {simple} "
             f"{'has' if simple == 1 else 'have'} at most {MOST_STROKES} strokes and {MOST_PARTICLES} particles.")
+
+
+def write_alone(by_itself):
+    """Puts the section of --alone into the table's page, counts by stage; what else stands there stays."""
+    stages = {name: read_mutant(HERE / "mutants" / f"{name}.patch").stage for name in by_itself}
+    lines = ["## " + ALONE_TITLE, "",
+             "Without this project's tests: " + "; ".join(f"*{name}*: " + ", ".join(
+                 f"`cutproof {command.split(' --simplify')[0]}`" for command in commands)
+                                                         for name, commands in ALONE.items())
+             + "; on each backend that the mutant changes.", "",
+             "| stage | mutants | " + " | ".join(ALONE) + " | any of them |", "|---|---|" + "---|" * (len(ALONE) + 1)]
+    for stage in (*STAGES, "all"):
+        of_stage = [found for name, found in by_itself.items() if stage in (stages[name], "all")]
+        if of_stage:
+            counts = [sum(1 for found in of_stage if found[name]) for name in ALONE]
+            counts.append(sum(1 for found in of_stage if any(found.values())))
+            lines.append(f"| {stage} | {len(of_stage)} | " + " | ".join(map(str, counts)) + " |")
+    missed = [name for name in sorted(by_itself) if not any(by_itself[name].values())]
+    section = "\n".join(lines + ["", f"None of them finds: {', '.join(missed) or 'no mutant'}."]) + "\n\n"
+    head, *sections = re.split(r"^(?=## )", TABLE.read_text(), flags=re.MULTILINE)
+    TABLE.write_text(head + section + "".join(s for s in sections if ALONE_TITLE not in s))
 
 
 def write_table(rows):
@@ -343,10 +412,13 @@ def write_table(rows):
 
 
 def merge(files):
-    rows = {}
+    rows, by_itself = {}, {}
     for file in files:
         try:
             document = json.loads(pathlib.Path(file).read_text())
+            if document["format"] == ALONE_FORMAT:
+                by_itself.update(document["rows"])
+                continue
             if not document["unchanged_passes"]:
                 raise BadMutant(f"{file}: the unchanged code failed")
             for row in document["faults"]:
@@ -356,11 +428,15 @@ def merge(files):
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise BadMutant(f"{file} is no result of --json: {error!r}") from None
     names = {path.stem for path in (HERE / "mutants").glob("*.patch")}
-    for what, wrong in (("missing", names - rows.keys()), ("no mutants any more", rows.keys() - names)):
+    missing = names - rows.keys() if rows else set()
+    for what, wrong in (("missing", missing), ("no mutants any more", (rows.keys() | by_itself.keys()) - names)):
         if wrong:
             named = ", ".join(sorted(wrong)[:5]) + (f" and {len(wrong) - 5} more" if len(wrong) > 5 else "")
             raise BadMutant(f"--merge: {what}: {named}; run these parts again")
-    return conclude([rows[name] for name in sorted(rows)], True, True)
+    status = conclude([rows[name] for name in sorted(rows)], True, True) if rows else 0
+    if by_itself:
+        write_alone(by_itself)
+    return status
 
 
 def conclude(rows, holds, whole):
@@ -373,12 +449,30 @@ def conclude(rows, holds, whole):
     return 0 if holds and not survivors else 1
 
 
+def run_alone(mutants, options):
+    build({"cutproof"}, options.jobs)
+    unchanged = alone(("reference", "host"))
+    if any(unchanged.values()):
+        raise BadMutant(f"the unchanged code fails: {unchanged}")
+    rows = {}
+    for mutant in mutants:
+        with applied(mutant):
+            build({"cutproof"}, options.jobs)
+            rows[mutant.name] = alone(backends_of(mutant))
+        print(f"{mutant.name}: " + "; ".join(f"{name}: {by or 'not found'}" for name, by in rows[mutant.name].items()),
+              flush=True)
+        if options.json:
+            pathlib.Path(options.json).write_text(json.dumps({"format": ALONE_FORMAT, "rows": rows}, indent=1) + "\n")
+    return 0
+
+
 def main():
     parser = argparse.ArgumentParser(description="Applies mutants and asks the gate to find them.")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="mutants whose name begins with one of these")
     parser.add_argument("--shard", metavar="I/N", help="every N-th of these mutants, beginning with the I-th")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="of the builds")
     parser.add_argument("--json", metavar="F", help="write the results there as well")
+    parser.add_argument("--alone", action="store_true", help="what campaigns and checked scenes find of simulators' mutants")
     parser.add_argument("--check", action="store_true", help="only whether every mutant applies to the code as it is")
     parser.add_argument("--merge", nargs="+", metavar="JSON", help="the table of runs of parts; runs nothing")
     options = parser.parse_args()
@@ -409,6 +503,8 @@ def main():
     for mutant in mutants:
         apply(mutant, check_only=True)
     configure()
+    if options.alone:
+        return run_alone([mutant for mutant in mutants if mutant.stage != "judge"], options)
     holds = True
     commands = sorted({command for mutant in mutants for command in mutant.suspects})
     build({target_of(command) for command in commands}, options.jobs)
