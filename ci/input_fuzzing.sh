@@ -18,7 +18,7 @@ for target in "${targets[@]}"; do
 done
 seed=${CUTPROOF_FUZZING_SEED:-1}
 
-ci/install.sh fuzzing
+ci/install.sh tests fuzzing
 cmake --preset fuzzing >/dev/null
 build=build/fuzzing
 cmake --build "$build" --target input_fuzzer

@@ -6,13 +6,16 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 preset=${CUTPROOF_PRESET:-default}
 
-ci/install.sh browser
+ci/install.sh tests browser
 werror=()
 [ "${CI:-}" = true ] && werror=(-DCUTPROOF_WERROR=ON)
 cmake --preset "$preset" -DBUILD_TESTING=ON "${werror[@]}" >/dev/null
 build=build/$preset
 cmake --build "$build"
 
+# Tests see no other programs than they would on a bare machine.
+PATH=$(python3 ci/packages.py --path "$build/programs")
+export PATH
 report=$build/tests.xml
 status=0
 ctest --test-dir "$build" --output-on-failure --no-tests=error -j "$(nproc)" --output-junit "$PWD/$report" || status=$?

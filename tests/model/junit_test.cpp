@@ -20,7 +20,7 @@ std::string as_python_reads(const std::string& xml) {
   const auto file = std::filesystem::temp_directory_path() / ("cutproof.junit." + std::to_string(getpid()) + ".xml");
   write_text(file.string(), xml);
   const std::string command =
-      "python3 -c 'import sys, xml.etree.ElementTree as tree\n"
+      "/usr/bin/python3 -c 'import sys, xml.etree.ElementTree as tree\n"
       "for e in tree.parse(sys.argv[1]).getroot().iter():\n"
       "    print(e.tag, *(k + \"=\" + ascii(v) for k, v in sorted(e.attrib.items())), ascii(e.text or \"\"))' '" +
       file.string() + "' 2>&1";
