@@ -1,6 +1,7 @@
 """A page in headless Chromium, for the tests of report pages: opened as by double click, with the network watched and
 every line of the console kept. SystemExit 77, with the name of what is missing, without Chromium, its driver or
 selenium."""
+import atexit
 import json
 import os
 import pathlib
@@ -13,6 +14,7 @@ chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
 try:
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
+    from selenium.webdriver.common import utils
     from selenium.webdriver.common.by import By
     from selenium.webdriver.common.keys import Keys
 except ImportError:
@@ -43,11 +45,26 @@ class Folder:
         return done.stdout + done.stderr
 
 
+class Driver(Service):
+    """The driver, asked by its address: without /etc/hosts nothing has the name localhost."""
+
+    @property
+    def service_url(self):
+        return f"http://127.0.0.1:{self.port}"
+
+    def is_connectable(self):
+        return utils.is_connectable(self.port, "127.0.0.1")
+
+
 class Browser:
     """A page, opened as by double click, with the network watched and every line of the console kept."""
+    started = None  # the Chromium of all pages for which no flags are given
 
     def __init__(self, page, *flags, width=1280, dark=False, still=True):
-        self.driver = Browser.blank(*flags)
+        if flags:
+            self.driver = Browser.blank(*flags)
+        else:
+            Browser.started = self.driver = Browser.started or Browser.blank()
         self.driver.set_script_timeout(60)
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [
             {"name": "prefers-color-scheme", "value": "dark" if dark else "light"},
@@ -64,33 +81,33 @@ class Browser:
 
     @staticmethod
     def blank(*flags):
-        """Chromium with no page in it, to be quit by whoever asks."""
+        """Chromium with no page in it."""
         options = webdriver.ChromeOptions()
-        for flag in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle",
+        # The driver reaches Chromium through a pipe, not at localhost.
+        for flag in ("--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle",
                      "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--window-size=1280,1000", *flags):
             options.add_argument(flag)
         options.binary_location = chromium
         options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-        return webdriver.Chrome(service=Service(driver), options=options)
+        chrome = webdriver.Chrome(service=Driver(driver), options=options)
+        atexit.register(chrome.quit)
+        return chrome
 
     def __enter__(self):
         return self
 
     def __exit__(self, kind, *_):
-        try:
-            if kind is not None:
-                print(f"the console says: {self.driver.get_log('browser')}", flush=True)
-            else:
-                log = [line for line in self.driver.get_log("browser")]
-                assert not log, f"the console says: {log}"
-                asked = []
-                for entry in self.driver.get_log("performance"):
-                    message = json.loads(entry["message"])["message"]
-                    if message["method"] == "Network.requestWillBeSent":
-                        asked.append(message["params"]["request"]["url"])
-                outside = [url for url in asked if url != self.url and not url.startswith("data:")]
-                assert not outside, f"the page asked for {outside}"
-        finally:
+        log = self.driver.get_log("browser")
+        if kind is not None:
+            print(f"the console says: {log}", flush=True)
+            return
+        assert not log, f"the console says: {log}"
+        messages = [json.loads(entry["message"])["message"] for entry in self.driver.get_log("performance")]
+        asked = [one["params"]["request"]["url"] for one in messages if one["method"] == "Network.requestWillBeSent"]
+        assert self.url in asked, f"the network was not watched: {asked}"
+        outside = [url for url in asked if url != self.url and not url.startswith("data:")]
+        assert not outside, f"the page asked for {outside}"
+        if self.driver is not Browser.started:
             self.driver.quit()
 
     def ask(self, script, *arguments):

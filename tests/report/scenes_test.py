@@ -99,9 +99,7 @@ work.run([program, "run", "halves.json", "--backend", f"plugin:{plugin},none", "
 # --- Colours of clusters: those that touch differ, whatever goes; and they stay ---
 
 colouring = (pathlib.Path(__file__).parents[2] / "report/page/cluster_colours.js").read_text().replace("export ", "")
-blank = Browser.blank()
-try:
-    said = blank.execute_script(colouring + """
+said = Browser.blank().execute_script(colouring + """
       const n = 24, at = (x, y, z) => (z * n + y) * n + x, all = n * n * n;
       const edges = { a: [], b: [] }, cluster = new Int32Array(all), alive = new Uint8Array(all).fill(1);
       let seed = 7;
@@ -136,8 +134,6 @@ try:
       return { first: clashes(cluster, alive, first), later: clashes(parted, cut, later), used: new Set(first).size,
         same: first.every((c, k) => c === again[k]), kept: kept.filter((k) => first[k] === later[k]).length / kept.length,
         unknown: coloursOfClusters(cluster, alive, null, [6, 12], null).every((c, k) => (first[k] < 0) === (c < 0)) };""")
-finally:
-    blank.quit()
 print(f"colours of clusters: {said}")
 assert said["first"] == 0 and said["later"] == 0, f"clusters that touch have one colour: {said}"
 assert said["same"] and said["kept"] > 0.9 and said["unknown"], said
