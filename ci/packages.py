@@ -2,7 +2,8 @@
 """Checks that the build and the tests use nothing but what ci/install.sh installs, on a Debian 12.
 
 Usage: packages.py BUILD               every file that the build in this folder has read, the programs that it calls, the
-                                       Python modules that tests import
+                                       Python modules that tests import; and what the program cutproof alone needs, by the
+                                       packages that are listed for it
        packages.py BUILD --self-test   that a file of no package, a package that is not listed, and a program that tests
                                        must not see are found
        packages.py --path FOLDER       prints a PATH for tests: FOLDER, with a link to each program of these packages. So a
@@ -153,25 +154,27 @@ class Build:
     def ninja(self, *words):
         return output("ninja", "-C", str(self.folder), *words)
 
-    def files(self):
+    def files(self, target="all"):
         read = {}
         who = ""
+        inputs = {line.strip() for line in self.ninja("-t", "inputs", target).splitlines()}
         for line in self.ninja("-t", "deps").splitlines():
-            if line.startswith("    "):
-                read.setdefault(line.strip(), f"read to compile {who}")
-            else:
+            if not line.startswith("    "):
                 who = line.partition(":")[0]
-        for line in self.ninja("-t", "inputs", "all").splitlines():
-            read.setdefault(line.strip(), "linked, or read by a command of the build")
-        for line in self.ninja("-t", "query", "build.ninja").splitlines():
-            read.setdefault(line.strip().lstrip("| "), "read by CMake")
+            elif who in inputs:
+                read.setdefault(line.strip(), f"read to compile {who}")
+        for path in inputs:
+            read.setdefault(path, "linked, or read by a command of the build")
+        if target == "all":
+            for line in self.ninja("-t", "query", "build.ninja").splitlines():
+                read.setdefault(line.strip().lstrip("| "), "read by CMake")
         for name in ("CMAKE_MAKE_PROGRAM", "CMAKE_COMMAND", "CMAKE_CTEST_COMMAND", "CMAKE_CPACK_COMMAND"):
             read[self.cache[name]] = "called for the build, the tests or a package"
         compiler = self.cache["CMAKE_CXX_COMPILER"]
         for part in ("cc1plus", "collect2", "as", "ld"):
             read[output(compiler, f"-print-prog-name={part}").strip()] = "called by the compiler"
         libraries, folders = set(), set()
-        for line in set(self.ninja("-t", "commands", "all").splitlines()):
+        for line in set(self.ninja("-t", "commands", target).splitlines()):
             first = True
             for word in shlex.split(line):
                 if first or word.startswith("/"):
@@ -192,10 +195,11 @@ class Build:
         """Where files need no package, by name."""
         rules = {"the source tree": pathlib.Path(self.cache["CMAKE_HOME_DIRECTORY"]), "the build folder": self.folder,
                  "VTK's headers, as ci/install.sh unpacks them": pathlib.Path(self.cache["CMAKE_HOME_DIRECTORY"]) / "build/libraries"}
+        rules["ccache, which is used where it is installed"] = pathlib.Path(self.cache["CCACHE"])
         toolkit = pathlib.Path(self.cache.get("CUDAToolkit_BIN_DIR", "/none")).parent
         if toolkit != pathlib.Path("/usr"):
             rules["the CUDA toolkit"] = toolkit
-        return {f"{place}/": name for name, folder in rules.items() for place in {folder, folder.resolve()}}
+        return {str(place): name for name, path in rules.items() for place in {path, path.resolve()}}
 
 
 def named_in_tests():
@@ -236,8 +240,9 @@ sys.__stdout__.write("\\nFILES\\n" + "\\n".join(files))
 
 def check(packages, build, used):
     """What is used and would be missing on a bare machine: {package: [(file, who uses it)]}."""
-    left_out = tuple(build.left_out())
-    asked = {path: who for path, who in used.items() if not path.startswith(left_out)}
+    left_out = build.left_out()
+    asked = {path: who for path, who in used.items()
+             if not any(path == place or path.startswith(f"{place}/") for place in left_out)}
     packages.ask(asked)
     missing = {}
     for path, who in sorted(asked.items()):
@@ -264,8 +269,8 @@ def programs(packages):
     return seen
 
 
-def listed():
-    return output(str(SOURCE / "ci/install.sh"), "--list", *GROUPS).split()
+def listed(*groups):
+    return output(str(SOURCE / "ci/install.sh"), "--list", *groups).split()
 
 
 def self_test(build):
@@ -274,16 +279,16 @@ def self_test(build):
     with tempfile.TemporaryDirectory(dir="/var/tmp") as folder:
         planted = pathlib.Path(folder) / "planted.h"
         planted.touch()
-        missing, _ = check(Packages(listed()), build, {**used, str(planted): "planted"})
+        missing, _ = check(Packages(listed(*GROUPS)), build, {**used, str(planted): "planted"})
         if missing != {"no package": [(str(planted), "planted")]}:
             wrong.append(f"a planted file of no package: {missing}")
         for name, file in (("libgmock-dev", "/usr/include/gmock/gmock.h"), ("python3-h5py", "h5py"), ("esbuild", "esbuild"),
                            ("ninja-build", "ninja"), ("libjs-three", "three.module.js"), ("libsuitesparse-dev", "spqr")):
-            missing, _ = check(Packages([one for one in listed() if one != name]), build, used)
+            missing, _ = check(Packages([one for one in listed(*GROUPS) if one != name]), build, used)
             if not any(name in package and any(file in path for path, _ in files) for package, files in missing.items()):
                 wrong.append(f"without {name}: {missing}")
-    without = programs(Packages([one for one in listed() if one not in ("zsh", "openmpi-bin")]))
-    seen = programs(Packages(listed()))
+    without = programs(Packages([one for one in listed(*GROUPS) if one not in ("zsh", "openmpi-bin")]))
+    seen = programs(Packages(listed(*GROUPS)))
     for name in ("zsh", "mpirun"):
         if name not in seen or name in without:
             wrong.append(f"{name} is seen: {name in seen}, without its package: {name in without}")
@@ -302,7 +307,7 @@ def main():
     if options.path:
         shutil.rmtree(options.path, ignore_errors=True)
         options.path.mkdir(parents=True)
-        for name, path in programs(Packages(listed())).items():
+        for name, path in programs(Packages(listed(*GROUPS))).items():
             (options.path / name).symlink_to(path)
         print(options.path.resolve())
         return 0
@@ -311,7 +316,8 @@ def main():
         wrong = self_test(build)
         print("\n".join(wrong) or "everything that is missing is found and named")
         return 1 if wrong else 0
-    missing, count = check(Packages(listed()), build, {**build.files(), **named_in_tests()})
+    missing, count = check(Packages(listed(*GROUPS)), build, {**build.files(), **named_in_tests()})
+    missing.update(check(Packages(listed()), build, build.files("cutproof"))[0])
     for package, files in missing.items():
         print(f"MISSING: {package}: {len(files)} files, e.g.")
         for path, who in files[:5]:
@@ -321,7 +327,7 @@ def main():
               "  remedy: add the package to its list in ci/install.sh, or do without the file")
         return 1
     print(f"{count} files are used, each of a package that ci/install.sh installs. Left out: "
-          + ", ".join(sorted(set(build.left_out().values()))))
+          + ", ".join(sorted(set(build.left_out().values()))) + ".")
     return 0
 
 
