@@ -65,7 +65,7 @@ std::string basis_of(const oracles::Property& property) {
 void print_properties() {
   insist("properties: where each comes from, when it is judged, what it rests on\n");
   oracles::PropertyLists lists = oracles::properties();
-  lists.push_back(&oracles::history_properties());
+  lists.push_back(&oracles::lone_state_properties());
   for (const oracles::PropertyList* const list : lists) {
     for (const oracles::Property& property : *list) {
       insist("{}\n", io::hanging(fmt::format("  {:<21} {}", property.name, property.source), 24));

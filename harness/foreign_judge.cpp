@@ -21,6 +21,8 @@ const std::vector<Needs>& all_needs() {
   static const std::vector<Needs> needs = {
       {"rest frames", {{"rest_centers", "cluster_masses"}}},
       {"rotation", {{"rotations"}}},
+      {"rotation match", {{"rotations"}, {"rest", "nodes"}}},
+      {"best rotation", {{"rotations"}, {"rest", "nodes"}}},
       {"merge maximality", {{"tau"}}},
       {"tissue kept", {{"removed"}}},
       {"skin surface", {{"vertices"}}},
@@ -56,6 +58,8 @@ std::string why_not(const ForeignState& foreign, const oracles::Property& proper
   if (property.check_state == nullptr) return "one state does not show what a stage does";
   if (property.name == "no pass") return "a file of arrays has no blade";
   if (!foreign.promises.cover(property.name)) return "not promised";
+  // Rotations are taken before the positions that follow from them, so this goes without saying of nobody.
+  if (property.name == "best rotation" && !foreign.promises_given) return "not promised";
   if (std::string why = missing(foreign, property.name); !why.empty()) return why;
   if (property.name == "rest frames" && centers_hang_in_the_air(foreign)) return "the file has no rest or nodes";
   return "";
@@ -118,7 +122,7 @@ bool ForeignVerdicts::holds() const {
 ForeignVerdicts judge_foreign_state(const ForeignState& foreign) {
   ForeignVerdicts found;
   oracles::PropertyLists lists = properties_of(Depth::motion);
-  lists.push_back(&oracles::history_properties());
+  lists.push_back(&oracles::lone_state_properties());
   const bool surface_alone = foreign.loose_skin.position.size() + foreign.loose_skin.triangles.size() > 0 ||
                              (foreign.given.contains("vertices") && !foreign.given.contains("vertex_owner"));
 

@@ -19,7 +19,7 @@ constexpr std::array kCapKept = {std::string_view("cap kept")};
 constexpr std::array kMaximal = {std::string_view("merge maximality")};
 constexpr std::array kTissueKept = {std::string_view("tissue kept")};
 constexpr std::array kRestFrames = {std::string_view("rest frames")};
-constexpr std::array kRotations = {std::string_view("rotation")};
+constexpr std::array kRotations = {std::string_view("rotation"), std::string_view("rotation match")};
 constexpr std::array kMomentum = {std::string_view("linear momentum"), std::string_view("component momentum")};
 constexpr std::array kMotion = {std::string_view("motion"), std::string_view("admissible step")};
 constexpr std::array kBladeOut = {std::string_view("no pass")};
@@ -43,7 +43,7 @@ constexpr std::array kWords = {
     PromiseWord{"maximal", "no small cluster is left that could still merge", kMaximal},
     PromiseWord{"tissue_kept", "what is gone was cut: nothing else was deleted", kTissueKept},
     PromiseWord{"rest_frames", "centers and masses of clusters at rest follow from their members", kRestFrames},
-    PromiseWord{"rotations", "the rotation of each cluster is one", kRotations},
+    PromiseWord{"rotations", "each rotation is one, and that of a cluster fits where its particles are", kRotations},
     PromiseWord{"best", "no rotation is better", kBest},
     PromiseWord{"nearest", "of several best rotations it is the nearest to the previous one", kNearest},
     PromiseWord{"keeps_previous", "where nothing is known of a rotation the previous one stays", kKeepsPrevious},

@@ -34,9 +34,11 @@ BestRotation best_rotation(const Mat3& given) {
   best.value = sigma[0] + sigma[1] + sign * sigma[2];
   best.separation = static_cast<double>((sigma[1] + sign * sigma[2]) / sigma[0]);
   for (int k = 0; k < 3; ++k) {
+    best.sigma[static_cast<std::size_t>(k)] = static_cast<double>(sigma[k]);
     best.u[static_cast<std::size_t>(k)] = static_cast<double>(u(k, 0));
     best.v[static_cast<std::size_t>(k)] = static_cast<double>(v(k, 0));
   }
+  best.r = to_mat3((u * Vector(1, 1, sign).asDiagonal() * v.transpose()).cast<double>());
   // With U' and V' the orthogonal matrices nearest to U and V (at a distance of at most ‖UᵀU - I‖), A differs from
   // U' Σ V'ᵀ, whose value is the one above, by no more than the residual and what U - U' and V - V' make of Σ. A value
   // changes by at most √3 times the Frobenius norm of a change of A. Each product of two 3 × 3 matrices here is off by

@@ -12,8 +12,10 @@ struct BestRotation {
   std::array<long double, 9> a;  // A scaled; row-major
   long double value = 0;         // σ1 + σ2 + s σ3, s the sign of det A
   long double sum = 0;           // σ1 + σ2 + σ3
+  std::array<double, 3> sigma;   // descending
   double separation = 0;         // (σ2 + s σ3) / σ1: how well the best rotation is determined; at 0 it is not unique
   std::array<double, 3> u, v;    // A v = σ1 u
+  Mat3 r;                        // a rotation that reaches it
   double error = 0;              // of value / sum
 };
 

@@ -27,6 +27,8 @@ void check_isolation(Judged& judged, Verdict& verdict);
 void check_edge_cover(Judged& judged, Verdict& verdict);
 void check_rest_frames(Judged& judged, Verdict& verdict);
 void check_rotation_quality(Judged& judged, Verdict& verdict);
+void check_rotation_match(Judged& judged, Verdict& verdict);
+void check_best_rotation(Judged& judged, Verdict& verdict);
 void check_merge_maximality(Judged& judged, Verdict& verdict);
 void check_tissue_kept(Judged& judged, Verdict& verdict);
 void check_no_pass(Judged& judged, Verdict& verdict);

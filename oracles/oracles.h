@@ -50,6 +50,10 @@ inline constexpr StateOracle isolation{core_properties, "isolation"};
 inline constexpr StateOracle edge_cover{core_properties, "edge cover"};    // I4, where state.edge_covered promises it
 inline constexpr StateOracle rest_frames{core_properties, "rest frames"};  // T_c and M_c of every cluster
 inline constexpr StateOracle rotation_quality{core_properties, "rotation"};  // ‖RᵀR − I‖ and det > 0 of every cluster
+// The rotation of each cluster is within half a right angle of the best one for where its particles are; or is the best
+// one. Of a state that comes by itself (`lone_state_properties`).
+inline constexpr StateOracle rotation_fits{lone_state_properties, "rotation match"};
+inline constexpr StateOracle rotation_is_best{lone_state_properties, "best rotation"};
 // Small clusters that could still merge (method.md §6, maximal): none, given that nothing else is owed.
 inline constexpr StateOracle merge_maximality{core_properties, "merge maximality"};
 // No alive edge with two free ends crosses the blade where it stands at the end of the frame just simulated (pass

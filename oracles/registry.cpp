@@ -114,9 +114,15 @@ const PropertyList& motion_properties() {
   return list;
 }
 
-const PropertyList& history_properties() {
-  static const PropertyList list = {of_state("tissue kept", "oracles.md, Somebody else's state", "1", kAlive | kCut,
-                                             kAlways, "nothing is dead", check_tissue_kept)};
+const PropertyList& lone_state_properties() {
+  constexpr unsigned kFit = kSets | kMotion | kRotations;
+  static const PropertyList list = {
+      of_state("tissue kept", "oracles.md, Somebody else's state", "1", kAlive | kCut, kAlways, "nothing is dead",
+               check_tissue_kept),
+      of_state("rotation match", "tolerances.md, Rotations of a state", "1", kFit, kAlways,
+               "no cluster whose particles tell its rotation", check_rotation_match),
+      of_state("best rotation", "tolerances.md, Rotations of a state", "1", kFit, kAlways,
+               "no cluster whose particles tell its rotation", check_best_rotation)};
   return list;
 }
 

@@ -60,9 +60,10 @@ const PropertyList& core_properties();
 // The motion, computed again: what a step of the reference costs, and a few times that where rounding decides much.
 const PropertyList& motion_properties();
 
-// Of a state that stands for all that came before it: its list of removed particles names every one that was ever taken
-// out, where a state of a run names those of its frame. Who judges such a state adds this list.
-const PropertyList& history_properties();
+// Of a state that comes by itself, without the run that led to it: its list of removed particles names every one that
+// was ever taken out, where a state of a run names those of its frame; and its rotations are held against its
+// positions, where those of a run follow from the step. Who judges such a state adds this list.
+const PropertyList& lone_state_properties();
 
 // Throws std::out_of_range if the list has no property of this name.
 const Property& property_named(const PropertyList& list, std::string_view name);

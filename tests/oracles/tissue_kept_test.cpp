@@ -9,7 +9,7 @@ namespace {
 
 using namespace cutproof::testing;
 
-constexpr StateOracle tissue_kept{history_properties, "tissue kept"};
+constexpr StateOracle tissue_kept{lone_state_properties, "tissue kept"};
 
 TEST(TissueKept, RejectsADeadParticleThatNobodyTookOut) {
   Row row(4, {{0, 1}, {1, 2}});
