@@ -1,5 +1,6 @@
 // Named arrays of a file that somebody else wrote, taken out one by one: each is there or not, has the shape and the
-// kind of numbers that it should have, and no name is unknown. Whatever is not so is an InputError.
+// kind of numbers that it should have, and no name is unknown. Whatever is not so is an InputError. What MATLAB and
+// numpy do by themselves is no error: a list as a matrix of one row or one column, and an empty list without a type.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "model/io/array_file.h"
+#include "model/precision.h"
 #include "model/vec.h"
 
 namespace cutproof::harness {
@@ -19,6 +21,7 @@ struct KnownArray {
 class NamedArrays {
  public:
   // Keeps references. Throws InputError for an array or a text that is not among `known`, naming those that are.
+  // Attributes of an HDF5 file's root that are unknown are passed over: notes() names them.
   NamedArrays(const io::ArrayFile& contents, const std::string& file, const std::vector<KnownArray>& known,
               const std::vector<KnownArray>& known_texts);
 
@@ -43,13 +46,18 @@ class NamedArrays {
   std::optional<int64_t> whole_number(std::string_view name) const;
 
   const std::string& file() const { return file_; }
+  const std::vector<std::string>& notes() const { return notes_; }  // for whoever reads what became of the file
 
  private:
   void require_whole(const Array& array) const;
   const io::ArrayFile& contents_;
   const std::string& file_;
+  std::vector<std::string> notes_;
 };
 
 bool is_real(const Array& array);
+// In what arithmetic the numbers of an array were computed. float64 whose numbers are all float32's was single
+// precision, unless it has no number of more than 16 bits: those are round, and tell nothing.
+Precision precision_of(const Array& array);
 
 }  // namespace cutproof::harness

@@ -26,9 +26,21 @@ static_assert(std::endian::native == std::endian::little, "arrays are copied as 
 
 enum class Format { npz, hdf5, other, empty };
 
+// HDF5 begins at the start of the file, or behind a block of the user's: at 512 bytes, 1,024, 2,048, …
+bool has_hdf5_behind(std::ifstream& stream, uint64_t file_bytes, std::string_view signature) {
+  std::string found(signature.size(), '\0');
+  for (uint64_t start = 512; start + signature.size() <= file_bytes; start *= 2) {
+    stream.clear();
+    stream.seekg(static_cast<std::streamoff>(start));
+    stream.read(found.data(), static_cast<std::streamsize>(found.size()));
+    if (stream.gcount() == static_cast<std::streamsize>(found.size()) && found == signature) return true;
+  }
+  return false;
+}
+
 // Throws InputError if there is no regular file, or if it cannot be opened.
 Format format_of(const std::string& path) {
-  require_regular_file(path);
+  const uint64_t file_bytes = require_regular_file(path);
   constexpr std::array<char, 8> kHdf5 = {'\x89', 'H', 'D', 'F', '\r', '\n', '\x1a', '\n'};
   std::array<char, 8> begin = {};
   std::ifstream stream;
@@ -43,24 +55,14 @@ Format format_of(const std::string& path) {
   if (begin == kHdf5) return Format::hdf5;
   // An archive begins with its first file, or, where it has none, with its end.
   const std::string_view head(begin.data(), 4);
-  return head == "PK\x03\x04" || head == "PK\x05\x06" ? Format::npz : Format::other;
+  if (head == "PK\x03\x04" || head == "PK\x05\x06") return Format::npz;
+  return has_hdf5_behind(stream, file_bytes, {kHdf5.data(), kHdf5.size()}) ? Format::hdf5 : Format::other;
 }
 
 int64_t count_of(const std::vector<int64_t>& shape) {
   int64_t count = 1;
   for (const int64_t extent : shape) count *= extent;
   return count;
-}
-
-float widened(uint16_t half) {
-  const uint32_t sign = static_cast<uint32_t>(half & 0x8000u) << 16, exponent = half >> 10 & 0x1fu,
-                 fraction = half & 0x3ffu;
-  if (exponent == 0) {  // zero and denormals: a multiple of 2^-24
-    const float value = static_cast<float>(fraction) * 0x1p-24f;
-    return sign != 0 ? -value : value;
-  }
-  const uint32_t wide = exponent == 0x1f ? 0xffu : exponent + 112;
-  return std::bit_cast<float>(sign | wide << 23 | fraction << 13);
 }
 
 template <class To, class From>
@@ -122,19 +124,14 @@ const std::string* find_text(const ArrayFile& contents, std::string_view name) {
   return nullptr;
 }
 
+void refuse_half_precision(const std::string& file, const std::string& name) {
+  throw InputError(file, name, "It holds float16. Half precision has three digits, too few to be judged.",
+                   "Write float32 or float64, as it was computed.");
+}
+
 Array array_of(std::string name, RawNumbers raw, const std::string& file) {
   const auto as_it_is = [&](ElementType type) { return Array{std::move(name), type, raw.shape, std::move(raw.bytes)}; };
-  if (raw.kind == RawKind::real) {
-    if (raw.bytes_each == 8) return as_it_is(ElementType::f64);
-    if (raw.bytes_each == 4) return as_it_is(ElementType::f32);
-    std::vector<float> values(at(count_of(raw.shape)));
-    for (std::size_t k = 0; k < values.size(); ++k) {
-      uint16_t half;
-      std::memcpy(&half, raw.bytes.data() + 2 * k, 2);
-      values[k] = widened(half);
-    }
-    return make_array(std::move(name), raw.shape, values);
-  }
+  if (raw.kind == RawKind::real) return as_it_is(raw.bytes_each == 8 ? ElementType::f64 : ElementType::f32);
   const bool is_signed = raw.kind == RawKind::signed_integer;
   if (raw.bytes_each == 1) {
     if (is_signed && any_negative(raw)) return converted<int32_t, int8_t>(std::move(name), raw);
@@ -194,14 +191,14 @@ void ArrayCollector::add(const std::string& name, RawNumbers raw) {
   contents_.arrays.push_back(array_of(name, std::move(raw), file_));
 }
 
-void ArrayCollector::add(const std::string& name, const std::vector<std::string>& texts) {
+void ArrayCollector::add(const std::string& name, const std::vector<std::string>& texts, bool is_attribute) {
   std::string joined;
   for (const std::string& text : texts) joined += (joined.empty() ? "" : " ") + text;
   if (joined.size() > kMostTextBytes) {
     throw InputError(file_, name, fmt::format("This text has {} bytes, more than {}.", joined.size(), kMostTextBytes),
                      "Write a short text.");
   }
-  contents_.texts.push_back({name, std::move(joined)});
+  contents_.texts.push_back({name, std::move(joined), is_attribute});
 }
 
 bool is_array_file(const std::string& path) {

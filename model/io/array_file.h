@@ -12,13 +12,15 @@ namespace cutproof::io {
 struct NamedText {
   std::string name;
   std::string text;
-  friend bool operator==(const NamedText&, const NamedText&) = default;
+  bool is_attribute = false;  // of the root of an HDF5 file, where other programs leave texts of their own
+  friend bool operator==(const NamedText& a, const NamedText& b) { return a.name == b.name && a.text == b.text; }
 };
 
 // In the order of the file; no name is there twice, among arrays and texts together.
 struct ArrayFile {
   Arrays arrays;
   std::vector<NamedText> texts;
+  std::vector<std::string> ignored;  // attributes of the root of an HDF5 file that are no text
   friend bool operator==(const ArrayFile&, const ArrayFile&) = default;
 };
 
@@ -30,9 +32,10 @@ const std::string* find_text(const ArrayFile& contents, std::string_view name);
 bool is_array_file(const std::string& path);
 
 // NPZ or HDF5, told apart by how the file begins. Truth values, int8 and uint8 become u8; other integers i32 where
-// every value fits, int64 i64 always; half precision becomes f32. Throws InputError, naming file, array, problem and
-// remedy, for anything that is not a file of arrays within the limits (model/io/limits.h), before anything large is
-// allocated. Texts of HDF5 are string datasets or attributes of the root group.
+// every value fits, int64 i64 always. What lies in Fortran's order or big endian is turned round. Throws InputError,
+// naming file, array, problem and remedy, for half precision and for anything that is not a file of arrays within the
+// limits (model/io/limits.h), before anything large is allocated. Texts of HDF5 are string datasets, attributes of the
+// root group, or what MATLAB calls char.
 ArrayFile read_array_file(const std::string& path);
 
 // NPZ if the name ends in ".npz", else HDF5. The file is whole or not there, and the same for the same contents. Throws

@@ -14,13 +14,17 @@ namespace cutproof::io {
 enum class RawKind { signed_integer, unsigned_integer, real };
 struct RawNumbers {
   RawKind kind = RawKind::real;
-  int64_t bytes_each = 8;  // 1, 2, 4 or 8; a real: 2, 4 or 8
+  int64_t bytes_each = 8;  // 1, 2, 4 or 8; a real: 4 or 8
   std::vector<int64_t> shape;
   std::vector<std::byte> bytes;
 };
 
 // As one of the five types of model/arrays.h. Throws InputError if a value fits none.
 Array array_of(std::string name, RawNumbers raw, const std::string& file);
+
+// In single precision's bounds right numbers would fail; in bounds of its own, half a spacing wide a thousand spacings
+// from the origin, little that is wrong would.
+[[noreturn]] void refuse_half_precision(const std::string& file, const std::string& name);
 
 // Adds to what was read. Throws InputError if the name is taken, if it is no plain name, or if the limits are exceeded.
 class ArrayCollector {
@@ -29,7 +33,8 @@ class ArrayCollector {
   // Before an array of that size is allocated.
   void announce(const std::string& name, uint64_t bytes);
   void add(const std::string& name, RawNumbers raw);
-  void add(const std::string& name, const std::vector<std::string>& texts);
+  void add(const std::string& name, const std::vector<std::string>& texts, bool is_attribute = false);
+  void ignore(std::string name) { contents_.ignored.push_back(std::move(name)); }
   // Throws InputError if a file of this size may not hold arrays of so many bytes in all.
   void require_sum(const std::string& name, uint64_t bytes) const;
   ArrayFile take() { return std::move(contents_); }

@@ -18,32 +18,57 @@ RawKind kind_of(hdf5::ValueKind kind) {
   return kind == hdf5::ValueKind::signed_integer ? RawKind::signed_integer : RawKind::unsigned_integer;
 }
 
-void collect_text(const hdf5::Values& values, const std::string& name, ArrayCollector& found) {
-  if (values.shape().size() > 1) throw hdf5::Error(name, "A text is one string, or a list of them.");
-  found.announce(name, values.bytes());
-  found.add(name, values.texts(kMostTextBytes));
+// MATLAB has texts as arrays of 16-bit letters, in one row.
+std::string matlab_text(const std::string& name, const RawNumbers& raw) {
+  std::string text;
+  for (std::size_t k = 0; k + 1 < raw.bytes.size(); k += 2) {
+    if (raw.bytes[k + 1] != std::byte{0} || raw.bytes[k] > std::byte{127}) {
+      throw hdf5::Error(name, "This text has letters that are not ASCII.");
+    }
+    text += static_cast<char>(raw.bytes[k]);
+  }
+  return text;
 }
 
-void collect(const hdf5::File& file, ArrayCollector& found) {
+// Other programs leave attributes of their own in the root. Those that are no text, or none that can be read, are
+// named.
+void collect_attribute(const hdf5::File& file, hid_t root, const std::string& name, ArrayCollector& found) {
+  std::vector<std::string> texts;
+  uint64_t bytes = 0;
+  try {
+    const hdf5::Values values = hdf5::Values::of_attribute(root, name, kMostTextBytes, file.bytes());
+    if (values.kind() != hdf5::ValueKind::text || values.shape().size() > 1) return found.ignore(name);
+    bytes = values.bytes();
+    texts = values.texts(kMostTextBytes);
+  } catch (const hdf5::Error&) {
+    return found.ignore(name);
+  }
+  found.announce(name, bytes);
+  found.add(name, texts, true);
+}
+
+void collect(const hdf5::File& file, const std::string& path, ArrayCollector& found) {
   const hdf5::Id root = hdf5::open_group(file.id(), "/");
   for (const std::string& name : hdf5::names_in(root.get(), kMostArrays)) {
     const hdf5::Values values = hdf5::Values::of_dataset(root.get(), name, kMostArrayBytes, file.bytes());
+    if (values.kind() == hdf5::ValueKind::real && values.bytes_each() == 2) refuse_half_precision(path, name);
+    found.announce(name, values.bytes());
     if (values.kind() == hdf5::ValueKind::text) {
-      collect_text(values, name, found);
+      if (values.shape().size() > 1) throw hdf5::Error(name, "A text is one string, or a list of them.");
+      found.add(name, values.texts(kMostTextBytes));
       continue;
     }
-    found.announce(name, values.bytes());
     RawNumbers raw{kind_of(values.kind()), values.bytes_each(), values.shape(), {}};
     raw.bytes.resize(values.bytes());
     values.read(raw.bytes.data());
-    found.add(name, std::move(raw));
+    if (raw.bytes_each == 2 && values.has_text("MATLAB_class", "char")) {
+      found.add(name, {matlab_text(name, raw)});
+    } else {
+      found.add(name, std::move(raw));
+    }
   }
   for (const std::string& name : hdf5::attribute_names(root.get(), kMostArrays)) {
-    const hdf5::Values values = hdf5::Values::of_attribute(root.get(), name, kMostTextBytes, file.bytes());
-    if (values.kind() != hdf5::ValueKind::text) {
-      throw hdf5::Error(name, "This attribute is no text. Numbers are read from datasets.");
-    }
-    collect_text(values, name, found);
+    collect_attribute(file, root.get(), name, found);
   }
 }
 
@@ -61,7 +86,7 @@ ArrayFile read_hdf5_arrays(const std::string& path) {
   const hdf5::Quiet quiet;
   ArrayCollector found(path, require_regular_file(path));
   try {
-    collect(hdf5::File::open(path), found);
+    collect(hdf5::File::open(path), path, found);
   } catch (const hdf5::Error& error) {
     throw InputError(path, error.where() == path ? "" : error.where(), error.what(), kArraysRemedy);
   }

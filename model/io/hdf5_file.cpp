@@ -502,7 +502,6 @@ void Values::look(Id type, const Id& space, uint64_t most_bytes) {
     if (H5Tis_variable_str(type.get()) > 0) bytes = sizeof(char*);
   } else if (kind == H5T_FLOAT && (bytes == 2 || bytes == 4 || bytes == 8)) {
     kind_ = ValueKind::real;
-    bytes = std::max<std::size_t>(bytes, 4);             // half precision is widened
   } else if (kind == H5T_INTEGER || kind == H5T_ENUM) {  // truth values are enumerations
     const Id number = kind == H5T_ENUM ? Id(H5Tget_super(type.get()), H5Tclose, name_) : Id();
     const hid_t integer = kind == H5T_ENUM ? number.get() : type.get();
@@ -573,6 +572,13 @@ Values Values::of_dataset(hid_t parent, const std::string& name, uint64_t most_b
     throw Error(name, fmt::format("It claims {} bytes, and {} are stored for it.", values.bytes(), stored));
   }
   return values;
+}
+
+bool Values::has_text(const std::string& attribute, const std::string& text) const {
+  if (!has_attribute(id_.get(), attribute)) return false;
+  constexpr uint64_t kMost = 256;
+  const Values found = of_attribute(id_.get(), attribute, kMost, file_bytes_);
+  return found.kind() == ValueKind::text && found.texts(kMost) == std::vector{text};
 }
 
 uint64_t Values::bytes() const {

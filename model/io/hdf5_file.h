@@ -190,10 +190,12 @@ class Values {
   static Values of_dataset(hid_t parent, const std::string& name, uint64_t most_bytes, uint64_t file_bytes);
   static Values of_attribute(hid_t object, const std::string& name, uint64_t most_bytes, uint64_t file_bytes);
   ValueKind kind() const { return kind_; }
-  int64_t bytes_each() const { return bytes_each_; }  // of a number: 1, 2, 4 or 8; a real: 4 or 8
+  int64_t bytes_each() const { return bytes_each_; }  // of a number: 1, 2, 4 or 8; a real: 2, 4 or 8
   const std::vector<int64_t>& shape() const { return shape_; }
   uint64_t bytes() const;
-  // Requires numbers, and room for bytes(). In the machine's own order of bytes.
+  // Whether it has an attribute of this name that is this text. Throws Error if the attribute has more than 256 bytes.
+  bool has_text(const std::string& attribute, const std::string& text) const;
+  // Requires numbers (no reals of 2 bytes), and room for bytes(). In the machine's own order of bytes.
   void read(std::byte* values) const;
   // Requires text. Throws Error if there is more than `most` bytes of it.
   std::vector<std::string> texts(uint64_t most) const;

@@ -172,6 +172,24 @@ std::optional<uint64_t> count_of_archive(const std::string& path, uint64_t file_
   return large_count;
 }
 
+// Numbers of `each` bytes that lie column by column, the first index running fastest, row by row.
+std::vector<std::byte> row_by_row(const std::vector<std::byte>& columns, const std::vector<int64_t>& shape,
+                                  std::size_t each) {
+  std::vector<std::byte> rows(columns.size());
+  std::vector<int64_t> index(shape.size(), 0);
+  for (std::size_t to = 0; to < rows.size(); to += each) {
+    std::size_t from = 0;
+    for (std::size_t axis = shape.size(); axis-- > 0;) from = from * at(shape[axis]) + at(index[axis]);
+    std::memcpy(rows.data() + to, columns.data() + from * each, each);
+    for (std::size_t axis = shape.size(); axis-- > 0 && ++index[axis] == shape[axis];) index[axis] = 0;
+  }
+  return rows;
+}
+
+void swap_bytes(std::byte* bytes, std::size_t count, std::size_t each) {
+  for (std::size_t k = 0; k < count; k += each) std::reverse(bytes + k, bytes + k + each);
+}
+
 // --- Reading
 // -------------------------------------------------------------------------------------------------------------
 
@@ -319,13 +337,7 @@ class NpzReader {
                                         : kind == 'b' && each == 1;
     if (!is_known || (order != '<' && order != '|' && order != '>' && order != '=')) {
       refuse(name_, fmt::format("Its type is \"{}\".", type),
-             "Write truth values, integers, floating-point numbers of 16, 32 or 64 bits, or texts.");
-    }
-    if (order == '>' && each > 1 && kind != 'S') {
-      refuse(name_, "Its bytes are in big-endian order.", "Write it as array.astype(array.dtype.newbyteorder('<')).");
-    }
-    if (header.fortran_order && header.shape.size() > 1) {
-      refuse(name_, "It lies column by column (Fortran's order).", "Write numpy.ascontiguousarray(array).");
+             "Write truth values, integers, floating-point numbers of 32 or 64 bits, or texts.");
     }
     if (header.shape.size() > kMostArrayAxes) {
       refuse(name_, fmt::format("It has {} axes, more than {}.", header.shape.size(), kMostArrayAxes), kNpzRemedy);
@@ -342,7 +354,9 @@ class NpzReader {
       refuse(name_, fmt::format("It has {} bytes, which do not fit its shape.", left), kNpzRemedy);
     }
     found_.announce(name_, bytes);
-    if (is_text) return read_texts(header, kind, bytes, left);
+    if (kind == 'f' && each == 2) refuse_half_precision(path_, name_);
+    const bool big_endian = order == '>' && kind != 'S';
+    if (is_text) return read_texts(header, kind, big_endian, bytes, left);
     RawNumbers raw{kind == 'f'   ? RawKind::real
                    : kind == 'i' ? RawKind::signed_integer
                                  : RawKind::unsigned_integer,
@@ -351,10 +365,12 @@ class NpzReader {
                    {}};
     raw.bytes.resize(bytes);
     take(raw.bytes.data(), bytes, left);
+    if (big_endian) swap_bytes(raw.bytes.data(), raw.bytes.size(), at(each));
+    if (header.fortran_order && header.shape.size() > 1) raw.bytes = row_by_row(raw.bytes, header.shape, at(each));
     found_.add(name_, std::move(raw));
   }
 
-  void read_texts(const NpyHeader& header, char kind, uint64_t bytes, uint64_t& left) {
+  void read_texts(const NpyHeader& header, char kind, bool big_endian, uint64_t bytes, uint64_t& left) {
     if (header.shape.size() > 1) refuse(name_, "A text is one string, or a list of them.", "Write it as one string.");
     const uint64_t count = header.shape.empty() ? 1 : static_cast<uint64_t>(header.shape[0]);
     if (bytes > 8 * kMostTextBytes || count > kMostTextBytes) {
@@ -362,6 +378,7 @@ class NpzReader {
     }
     std::string all(bytes, '\0');
     take(all.data(), bytes, left);
+    if (big_endian) swap_bytes(reinterpret_cast<std::byte*>(all.data()), all.size(), 4);
     std::vector<std::string> texts(count);
     const std::size_t each = count == 0 ? 0 : bytes / count, step = kind == 'U' ? 4 : 1;
     for (std::size_t k = 0; k < count; ++k) {

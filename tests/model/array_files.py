@@ -24,7 +24,8 @@ NUMBERS = {
     "large_uint32": np.array([0, 2**32 - 1], "u4"),
     "int64": np.array([-2**63, 2**63 - 1], "i8"),
     "uint64": np.array([0, 2**63 - 1], "u8"),
-    "half": np.array([1.5, -2.0**-24, 65504, np.inf, -0.0, 2.0**-14], "f2"),
+    "columns": np.asfortranarray(np.arange(24, dtype="f8").reshape(2, 3, 4)),
+    "table": np.arange(6, dtype="i2").reshape(3, 2).T,
     "single": np.array([[0.1, -np.inf], [1e-45, 3e38]], "f4"),
     "double": np.arange(24, dtype="f8").reshape(2, 3, 4) / 7,
     "scalar": np.float64(0.1),
@@ -45,6 +46,9 @@ def write_good(folder):
     np.savez(folder / "plain.npz", promises=WORDS, **NUMBERS)
     np.savez_compressed(folder / "deflated.npz", promises=np.array(WORDS.split()), **NUMBERS)
     np.savez(folder / "bytes.npz", promises=np.bytes_(WORDS), **NUMBERS)
+    np.savez(folder / "big_endian.npz", promises=np.array(WORDS, ">U17"),
+             **{name: np.asarray(values).astype(np.asarray(values).dtype.newbyteorder(">"))
+                for name, values in NUMBERS.items()})
     with h5py.File(folder / "plain.h5", "w") as file:
         for name, values in NUMBERS.items():
             file[name] = values
@@ -61,6 +65,21 @@ def write_good(folder):
             values = np.asarray(values)
             file[name] = values.astype(values.dtype.newbyteorder(">"))
         file["promises"] = np.array(WORDS.split(), "S9")
+    # As MATLAB 7.3 writes: behind a block of its own, with a class beside each array and texts of 16-bit letters. What
+    # else is in the root is nobody's business here.
+    with h5py.File(folder / "matlab.mat", "w", userblock_size=4096) as file:
+        for name, values in NUMBERS.items():
+            file[name] = values
+            file[name].attrs["MATLAB_class"] = np.bytes_(np.asarray(values).dtype.name)
+        file["promises"] = np.array([[ord(letter)] for letter in WORDS], "u2")
+        file["promises"].attrs["MATLAB_class"] = np.bytes_("char")
+        file.attrs["frame_rate"] = 30.0
+        file.attrs["nothing"] = h5py.Empty("f8")
+        file.attrs["pairs"] = np.zeros(2, [("a", "f8")])
+        file.attrs["long"] = "a" * 40000
+        file.attrs["author"] = "somebody"
+    with open(folder / "matlab.mat", "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file")
     with zipfile.ZipFile(folder / "version_2.npz", "w") as archive:
         write_npy(archive, "a.npy", 2, "{'descr': '<i4', 'fortran_order': False, 'shape': (2,), }\n", b"\1\0\0\0\2\0\0\0")
         write_npy(archive, "b.npy", 1, "{\"shape\": (2,),'fortran_order':True,'descr':\"<i4\"}", b"\1\0\0\0\2\0\0\0")
@@ -68,9 +87,8 @@ def write_good(folder):
 
 def write_bad(folder):
     x = np.arange(6.0).reshape(2, 3)
-    np.savez(folder / "fortran.npz", x=np.asfortranarray(x))
+    np.savez(folder / "half.npz", x=x.astype("f2"))
     np.savez(folder / "objects.npz", x=np.array([{}, None], object))
-    np.savez(folder / "big_endian.npz", x=x.astype(">f8"))
     np.savez(folder / "complex.npz", x=x.astype(complex))
     np.savez(folder / "long_double.npz", x=x.astype(np.longdouble))
     np.savez(folder / "dates.npz", x=np.array(["2026-01-01"], "M8[D]"))
@@ -154,8 +172,12 @@ def write_bad(folder):
         file["x"] = np.zeros(2, [("a", "f8")])
     with h5py.File(folder / "null.h5", "w") as file:
         file["x"] = h5py.Empty("f8")
-    with h5py.File(folder / "number_attribute.h5", "w") as file:
-        file.attrs["spacing"] = 0.1
+    with h5py.File(folder / "half.h5", "w") as file:
+        file["x"] = x.astype("f2")
+    with h5py.File(folder / "umlaut.mat", "w", userblock_size=512) as file:
+        file["x"] = np.array([[0x142]], "u2")
+        file["x"].attrs["MATLAB_class"] = np.bytes_("char")
+    (folder / "block.h5").write_bytes(b"x" * 512 + (folder / "plain.h5").read_bytes()[:-20])
     with h5py.File(folder / "many.h5", "w") as file:
         for k in range(65):
             file[f"x{k}"] = x
