@@ -27,8 +27,9 @@ struct KickOptions {
 };
 
 // What a reader of the verdicts has to know.
-std::vector<std::string> notes_of(const oracles::KickReport& report, const oracles::KickedRuns& runs) {
-  std::vector<std::string> notes;
+std::vector<std::string> notes_of(const oracles::KickReport& report, const harness::RecordedKick& kick) {
+  const oracles::KickedRuns& runs = kick.runs;
+  std::vector<std::string> notes = kick.notes;
   if (runs.again.empty()) {
     notes.push_back("Without again, the simulator is taken to repeat itself to the last bit.");
   } else if (!report.repeats) {
@@ -84,7 +85,7 @@ nlohmann::json to_json(const KickOptions& options, const harness::RecordedKick& 
           {"pieces", pieces},
           {"verdicts", io::verdicts_json(report.verdicts)},
           {"summary", {{"holds", report.holds()}, {"verdicts", report.verdicts.size()}, {"failed", failed}}},
-          {"notes", notes_of(report, kick.runs)}};
+          {"notes", notes_of(report, kick)}};
 }
 
 void print_pieces(const harness::RecordedKick& kick, const oracles::KickReport& report) {
@@ -115,7 +116,7 @@ int kick(const KickOptions& options) {
   Shown shown{options.again};
   shown.in_frames = false;
   print_verdicts(report.verdicts, shown);
-  print_notes(notes_of(report, kick.runs));
+  print_notes(notes_of(report, kick));
   print_written(options.json);
   print_conclusion(report.verdicts, shown, "what was judged holds.");
   print_annotations(failures_of(report.verdicts, judging));

@@ -15,6 +15,7 @@ const std::vector<KnownArray>& kick_arrays() {
       {"positions", "where particles were, frame by frame [m]"},
       {"kicked", "the same simulation with a kick of one piece"},
       {"piece", "which particles belong together"},
+      {"alive", "frame by frame, 1: the particle exists, 0: not yet, or no longer"},
       {"again", "the first simulation once more: its noise"},
       {"kicked_piece", "which piece was kicked"},
       {"spacing", "h [m], for the report"},
@@ -36,7 +37,7 @@ RecordedKick recorded_kick_of(const io::ArrayFile& contents, const std::string& 
   }
   runs.frames = positions.shape[0];
   runs.particles = static_cast<int32_t>(positions.shape[1]);
-  runs.precision = positions.type == ElementType::f32 ? Precision::binary32 : Precision::binary64;
+  runs.precision = precision_of(positions);
   const auto run_of = [&](const Array& array) {
     if (!is_real(array) || array.type != positions.type) {
       in.refuse(array.name,
@@ -48,6 +49,12 @@ RecordedKick recorded_kick_of(const io::ArrayFile& contents, const std::string& 
   runs.positions = run_of(positions);
   runs.kicked = run_of(in.require("kicked", positions.shape));
   if (const Array* const again = in.find("again", positions.shape)) runs.again = run_of(*again);
+  if (const Array* const alive = in.find("alive", {runs.frames, runs.particles})) {
+    for (const int64_t flag : in.long_integers(*alive)) {
+      if (flag != 0 && flag != 1) in.refuse("alive", fmt::format("It holds {}.", flag), "Write 1 or 0.");
+      runs.alive.push_back(static_cast<uint8_t>(flag));
+    }
+  }
   runs.piece = in.integers(in.require("piece", {runs.particles}));
   if (const auto piece = in.whole_number("kicked_piece")) {
     const auto found = std::find(runs.piece.begin(), runs.piece.end(), *piece);
@@ -63,6 +70,7 @@ RecordedKick recorded_kick_of(const io::ArrayFile& contents, const std::string& 
     runs.spacing = *spacing;
   }
   if (const Array* const time = in.find("time", {runs.frames})) kick.time = in.numbers(*time);
+  kick.notes = in.notes();
   return kick;
 }
 

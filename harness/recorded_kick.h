@@ -10,7 +10,8 @@ namespace cutproof::harness {
 
 struct RecordedKick {
   oracles::KickedRuns runs;
-  std::vector<double> time;  // [frames] [s]; empty: not given
+  std::vector<double> time;        // [frames] [s]; empty: not given
+  std::vector<std::string> notes;  // on what was passed over
 };
 
 const std::vector<KnownArray>& kick_arrays();

@@ -20,11 +20,42 @@ std::size_t entry(const KickedRuns& runs, int64_t frame, int32_t particle) {
   return 3 * (at(frame) * at(runs.particles) + at(particle));
 }
 
-// [m]; infinite where one of the two is not a number.
-double distance(const std::vector<double>& a, const std::vector<double>& b, std::size_t first) {
-  double sum = 0;
-  for (std::size_t k = first; k < first + 3; ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
-  return std::isnan(sum) ? INFINITY : std::sqrt(sum);
+// One of the runs, with the frame from which on each particle exists in it.
+class Run {
+ public:
+  Run(const KickedRuns& runs, const std::vector<double>& positions) : runs_(runs), positions_(positions) {
+    if (!runs.alive.empty() || positions.empty()) return;
+    for (int32_t i = 0; i < runs.particles; ++i) {
+      int64_t frame = 0;
+      while (frame < runs.frames && is_blank(frame, i)) ++frame;
+      begins_.push_back(frame);
+    }
+  }
+  bool exists(int64_t frame, int32_t i) const {
+    if (!runs_.alive.empty()) return runs_.alive[at(frame) * at(runs_.particles) + at(i)] != 0;
+    return frame >= begins_[at(i)];
+  }
+  const double* at_frame(int64_t frame, int32_t i) const { return positions_.data() + entry(runs_, frame, i); }
+
+ private:
+  bool is_blank(int64_t frame, int32_t i) const {
+    const double* const x = at_frame(frame, i);
+    return std::isnan(x[0]) && std::isnan(x[1]) && std::isnan(x[2]);
+  }
+  const KickedRuns& runs_;
+  const std::vector<double>& positions_;
+  std::vector<int64_t> begins_;  // [n]
+};
+
+// [m]; infinite where one of the two is not a number, or exists in one run alone. No square is taken: that of 1e-163 m
+// is 0.
+double distance(const Run& a, const Run& b, int64_t frame, int32_t i) {
+  const bool in_a = a.exists(frame, i), in_b = b.exists(frame, i);
+  if (!in_a && !in_b) return 0;
+  if (in_a != in_b) return INFINITY;
+  const double *const p = a.at_frame(frame, i), *const q = b.at_frame(frame, i);
+  const double length = std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
+  return std::isnan(length) ? INFINITY : length;
 }
 
 Verdict kick_verdict(const char* property, const char* source, const char* unit) {
@@ -38,42 +69,56 @@ Verdict kick_verdict(const char* property, const char* source, const char* unit)
 
 Verdict check_numbers(const KickedRuns& runs) {
   Verdict verdict = kick_verdict("finite", "oracles.md, A kick", "1");
-  for (const auto& [name, run] :
+  for (const auto& [name, positions] :
        {std::pair{"positions", &runs.positions}, std::pair{"kicked", &runs.kicked}, std::pair{"again", &runs.again}}) {
-    for (std::size_t k = 0; k < run->size(); ++k) {
-      ++verdict.checked;
-      if (std::isfinite((*run)[k])) continue;
-      verdict.measured += 1;
-      if (!verdict.holds) continue;
-      verdict.holds = false;
-      const std::size_t particle = k / 3 % at(runs.particles), frame = k / 3 / at(runs.particles);
-      verdict.frame = static_cast<int64_t>(frame);
-      verdict.witness.particles = {static_cast<int32_t>(particle)};
-      verdict.witness.text = fmt::format("{} of particle {} in frame {} is not finite", name, particle, frame);
+    if (positions->empty()) continue;
+    const Run run(runs, *positions);
+    for (int64_t frame = 0; frame < runs.frames; ++frame) {
+      for (int32_t i = 0; i < runs.particles; ++i) {
+        if (!run.exists(frame, i)) continue;
+        for (int axis = 0; axis < 3; ++axis) {
+          ++verdict.checked;
+          if (std::isfinite(run.at_frame(frame, i)[axis])) continue;
+          verdict.measured += 1;
+          if (!verdict.holds) continue;
+          verdict.holds = false;
+          verdict.frame = frame;
+          verdict.witness.particles = {i};
+          verdict.witness.text = fmt::format("{} of particle {} in frame {} is not finite", name, i, frame);
+        }
+      }
     }
   }
   if (verdict.checked == 0) verdict.vacuous = "no numbers";
   return verdict;
 }
 
-// The particle that is off by most.
+// The particle that is off by most, of so many that exist.
 struct Farthest {
   int32_t particle = -1;
   double distance = 0;  // [m]
+  int64_t among = 0;
 };
 
 struct Differences {
+  Differences(const KickedRuns& of_runs, const std::vector<double>& within)
+      : runs(of_runs), bounds(within), plain(runs, runs.positions), kicked(runs, runs.kicked) {}
   const KickedRuns& runs;
   const std::vector<double>& bounds;
+  const Run plain, kicked;
 
-  double of(int64_t frame, int32_t i) const { return distance(runs.positions, runs.kicked, entry(runs, frame, i)); }
+  double of(int64_t frame, int32_t i) const { return distance(plain, kicked, frame, i); }
   // Among the particles whose piece `counts`.
   template <class Counts>
   Farthest farthest(int64_t frame, const Counts& counts) const {
     Farthest found;
     for (int32_t i = 0; i < runs.particles; ++i) {
-      if (!counts(runs.piece[at(i)])) continue;
-      if (const double off = of(frame, i); found.particle < 0 || off > found.distance) found = {i, off};
+      if (!counts(runs.piece[at(i)]) || !(plain.exists(frame, i) || kicked.exists(frame, i))) continue;
+      ++found.among;
+      if (const double off = of(frame, i); found.particle < 0 || off > found.distance) {
+        found.particle = i;
+        found.distance = off;
+      }
     }
     return found;
   }
@@ -155,9 +200,10 @@ Verdict others_feel_nothing(const Differences& differences, KickReport& report) 
   double share = -1;
   for (int64_t f = 0; f < runs.frames; ++f) {
     const Farthest farthest = differences.farthest(f, is_other);
-    if (farthest.particle < 0) break;
     const double bound = differences.bounds[at(f)];
-    if (!std::isfinite(bound)) break;
+    verdict.checked += farthest.among;
+    if (!std::isfinite(bound)) verdict.undecided += farthest.among;
+    if (farthest.particle < 0 || !std::isfinite(bound)) continue;
     if (f >= report.kick_frame && (report.sharpest_frame < 0 || bound < report.least_bound)) {
       report.least_bound = bound;
       report.sharpest_frame = f;
@@ -171,10 +217,12 @@ Verdict others_feel_nothing(const Differences& differences, KickReport& report) 
       verdict.bound = bound;
       const int32_t piece = runs.piece[at(farthest.particle)];
       verdict.witness.particles = {farthest.particle};
+      const std::string by = std::isfinite(farthest.distance) ? "by " + in_spacings(runs, farthest.distance)
+                                                              : "which is there in one of the runs alone";
       verdict.witness.text = fmt::format(
-          "particle {} of piece {} felt it first, from frame {} on, by {}, because piece {} was kicked, to which it is "
+          "particle {} of piece {} felt it first, from frame {} on, {}, because piece {} was kicked, to which it is "
           "not connected",
-          farthest.particle, piece, f, in_spacings(runs, farthest.distance), kicked);
+          farthest.particle, piece, f, by, kicked);
     } else if (const double of_bound = farthest.distance > 0 ? farthest.distance / bound : 0;
                verdict.holds && of_bound > share) {
       share = of_bound;
@@ -184,14 +232,11 @@ Verdict others_feel_nothing(const Differences& differences, KickReport& report) 
     }
   }
   for (const KickedPiece& piece : report.pieces) {
-    if (piece.piece == kicked) continue;
-    verdict.checked += piece.particles * runs.frames;
-    verdict.undecided += piece.particles * (runs.frames - report.judged_frames);
-    if (piece.felt == 0) continue;
+    if (piece.piece == kicked || piece.felt == 0) continue;
     verdict.witness.text +=
         fmt::format("; {} of {} particles of piece {} did", piece.felt, piece.particles, piece.piece);
   }
-  if (verdict.checked == 0) verdict.vacuous = "there is no other piece";
+  if (verdict.checked == 0) verdict.vacuous = "there is no other piece, or nothing of one exists";
   return verdict;
 }
 
@@ -205,12 +250,14 @@ std::vector<double> noise_bounds(const KickedRuns& runs) {
   std::vector<double> noise(at(runs.frames), 0.0), bounds(at(runs.frames), 0.0);
   int64_t first = -1;  // frame with noise
   double extent = 0;
-  for (int64_t f = 0; f < runs.frames && !runs.again.empty(); ++f) {
+  if (runs.again.empty()) return bounds;
+  const Run plain(runs, runs.positions), again(runs, runs.again);
+  for (int64_t f = 0; f < runs.frames; ++f) {
     noise[at(f)] = f > 0 ? noise[at(f - 1)] : 0;
     for (int32_t i = 0; i < runs.particles; ++i) {
-      const std::size_t k = entry(runs, f, i);
-      noise[at(f)] = std::max(noise[at(f)], distance(runs.positions, runs.again, k));
-      for (std::size_t c = k; c < k + 3; ++c) extent = std::max(extent, std::abs(runs.positions[c]));
+      noise[at(f)] = std::max(noise[at(f)], distance(plain, again, f, i));
+      if (!plain.exists(f, i)) continue;
+      for (int axis = 0; axis < 3; ++axis) extent = std::max(extent, std::abs(plain.at_frame(f, i)[axis]));
     }
     if (first < 0 && noise[at(f)] > 0) first = f;
   }
@@ -231,7 +278,7 @@ KickReport judge_kick(const KickedRuns& runs) {
   const std::vector<double> bounds = noise_bounds(runs);
   report.judged_frames = std::count_if(bounds.begin(), bounds.end(), [](double bound) { return std::isfinite(bound); });
   report.repeats = std::all_of(bounds.begin(), bounds.end(), [](double bound) { return bound == 0; });
-  const Differences differences{runs, bounds};
+  const Differences differences(runs, bounds);
   look_at_pieces(differences, report);
   find_kicked_piece(differences, report);
   report.verdicts.push_back(the_kick_was_felt(runs, report));

@@ -17,6 +17,9 @@ struct KickedRuns {
   int32_t particles = 0;
   // [frames][n][3] positions [m], as doubles whatever they were computed in.
   std::vector<double> positions, kicked;
+  // [frames][n] 1: the particle exists, in every run. Empty: in each run from the first frame on in which one of its
+  // coordinates is a number.
+  std::vector<uint8_t> alive;
   std::vector<double> again;   // the first run once more; empty: not given
   std::vector<int32_t> piece;  // [n] which particles belong together
   std::optional<int32_t> kicked_piece;
@@ -30,7 +33,7 @@ struct KickedPiece {
   int64_t particles = 0;
   int64_t felt = 0;          // particles that were beyond the bound in some frame
   int64_t first_frame = -1;  // in which one was; -1: none
-  double greatest = 0;       // difference of a position in any frame [m]
+  double greatest = 0;       // difference of a position in any frame [m]; infinite: a particle exists in one run alone
 };
 
 struct KickReport {

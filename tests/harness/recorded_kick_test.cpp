@@ -168,6 +168,56 @@ TEST(Kick, WithNumbersThatAreNoneFails) {
   }
 }
 
+// A cut makes vertices: until they exist they are NaN, or `alive` says so.
+TEST(Kick, LooksAtParticlesFromTheFrameOnInWhichTheyExist) {
+  Runs growing;
+  growing.again = growing.positions;
+  for (std::vector<double>* const run : {&growing.positions, &growing.kicked, &growing.again}) {
+    for (int64_t f = 0; f < 6; ++f)
+      std::fill_n(run->begin() + static_cast<std::ptrdiff_t>(place(f, 2)), 3, std::nan(""));
+  }
+  const oracles::KickReport report = judged(growing.file());
+  EXPECT_THAT(failing(report), IsEmpty());
+  EXPECT_EQ(verdict_on(report, "finite").checked, 3 * 3 * (6 * kFrames - 6));
+  EXPECT_EQ(verdict_on(report, "no ghost force").checked, 3 * kFrames - 6);
+  // From then on it is held to what everybody is held to.
+  Runs felt = growing;
+  felt.kicked[place(7, 2)] += 1e-12;
+  EXPECT_THAT(failing(judged(felt.file())), ElementsAre("no ghost force"));
+  Runs lost = growing;
+  lost.kicked[place(7, 2)] = std::nan("");
+  EXPECT_THAT(failing(judged(lost.file())), ElementsAre("finite"));
+  // That it comes to exist in another frame because a piece was kicked is a ghost force, too.
+  Runs sooner = growing;
+  for (int64_t axis = 0; axis < 3; ++axis) sooner.kicked[place(5, 2, axis)] = sooner.kicked[place(6, 2, axis)];
+  const oracles::KickReport early = judged(sooner.file());
+  EXPECT_THAT(failing(early), ElementsAre("no ghost force"));
+  EXPECT_EQ(verdict_on(early, "no ghost force").frame, 5);
+  EXPECT_THAT(verdict_on(early, "no ghost force").witness.text, HasSubstr("in one of the runs alone"));
+
+  // The same by `alive`, which says of what is gone, too.
+  io::ArrayFile file = lost.file();
+  std::vector<uint8_t> alive(at(kFrames * kParticles), 1);
+  for (int64_t f = 0; f < kFrames; ++f) alive[at(f * kParticles + 2)] = f == 6;
+  file.arrays.push_back(make_array("alive", {kFrames, kParticles}, alive));
+  EXPECT_THAT(failing(judged(file)), IsEmpty());
+  EXPECT_EQ(verdict_on(judged(file), "no ghost force").checked, 3 * kFrames - 9);
+  for (int64_t f = 0; f < kFrames; ++f) alive[at(f * kParticles + 2)] = 1;
+  file.arrays.back() = make_array("alive", {kFrames, kParticles}, alive);
+  EXPECT_THAT(failing(judged(file)), ElementsAre("finite"));
+}
+
+TEST(Kick, ThatIsFeltByLessThanASquareCanHoldIsRejected) {
+  for (const double push : {1e-163, 5e-324}) {
+    Runs runs;
+    runs.positions[place(6, 0)] = 0;  // particle 0 is at x = 0 throughout
+    runs.kicked[place(6, 0)] = push;
+    const oracles::KickReport report = judged(runs.file());
+    EXPECT_THAT(failing(report), ElementsAre("no ghost force")) << push;
+    EXPECT_EQ(verdict_on(report, "no ghost force").measured, push);
+  }
+}
+
 // --- A simulator that does not repeat itself
 // --------------------------------------------------------------------------------
 
@@ -277,6 +327,16 @@ TEST(Kick, ThatCannotBeUnderstoodIsRefused) {
       {[&](auto& f) { replace(f, make_array("kicked_piece", {}, Integers{3})); }, {"kicked_piece", "no piece 3"}},
       {[&](auto& f) { replace(f, make_array("spacing", {}, Doubles{-1})); }, {"spacing", "positive"}},
       {[&](auto& f) { replace(f, make_array("time", {9}, Doubles(9))); }, {"time", "(9,)"}},
+      {[&](auto& f) {
+         replace(f, make_array("alive", {10, 6}, Integers(60, 2)));
+       },
+       {"alive", "holds 2"}},
+      {[&](auto& f) {
+         replace(f, make_array("alive", {6, 10}, Integers(60)));
+       },
+       {"alive", "transposed"}},
+      {[&](auto& f) { replace(f, make_array("position", {1}, Doubles{1})); },
+       {"position", "Did you mean 'positions'?"}},
   };
   for (const Bad& bad : all) {
     io::ArrayFile file = Runs().file();
