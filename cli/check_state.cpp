@@ -37,7 +37,10 @@ nlohmann::json to_json(const std::string& file, const harness::ForeignState& for
            {{"particles", foreign.state.x.size()},
             {"clusters", foreign.state.clusters.count()},
             {"spacing", foreign.setup.body.grid.spacing},
-            {"on_grid", foreign.setup.body.on_grid()}}},
+            {"on_grid", foreign.setup.body.on_grid()},
+            {"pieces", judged.pieces ? nlohmann::json(*judged.pieces) : nlohmann::json()},
+            {"coincident_particles", judged.coincident}}},
+          {"weights", foreign.plain_weights ? "plain" : "shared"},
           {"arrays", foreign.given},
           {"promises", promises},
           {"promises_given", foreign.promises_given},
@@ -64,8 +67,8 @@ int check_state(const std::string& file, const StateReports& reports) {
     skipped.message = "not judged: " + each.why;
   }
   write_junit(reports.junit, judging, 0, std::move(cases));
-  say("state {}: {} particles in {} clusters, {}\n", file, foreign.state.x.size(), foreign.state.clusters.count(),
-      foreign.given.contains("nodes") ? "on a grid" : "as a graph");
+  say("state {}: {} particles in {} clusters, {}{}\n", file, foreign.state.x.size(), foreign.state.clusters.count(),
+      foreign.given.contains("nodes") ? "on a grid" : "as a graph", judged.pieces ? "; " + judged.pieces_in_words : "");
   Shown shown{reports.again};
   shown.in_frames = false;
   print_verdicts(judged.verdicts, shown);

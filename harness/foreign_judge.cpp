@@ -3,9 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <tuple>
 
 #include "harness/depth.h"
+#include "model/at.h"
+#include "model/counted.h"
 #include "oracles/oracles.h"
+#include "oracles/piece_sizes.h"
 
 namespace cutproof::harness {
 
@@ -77,12 +83,18 @@ Verdict closed(const ForeignState& foreign) {
   return verdict;
 }
 
+// A verdict of no row of the registry.
+Verdict of_file(std::string_view property, std::string_view source) {
+  Verdict verdict;
+  verdict.property = property;
+  verdict.unit = "1";
+  verdict.bound_source = source;
+  return verdict;
+}
+
 Verdict malformed(const ForeignState& foreign) {
   const oracles::Property& form = oracles::core_properties().front();
-  Verdict verdict;
-  verdict.property = form.name;
-  verdict.unit = form.unit;
-  verdict.bound_source = form.source;
+  Verdict verdict = of_file(form.name, form.source);
   verdict.holds = false;
   verdict.measured = 1;
   verdict.checked = 1;
@@ -90,10 +102,179 @@ Verdict malformed(const ForeignState& foreign) {
   return verdict;
 }
 
+// Of what is there, where nothing is known of rest: a single particle far away makes the longest edge what it likes.
+double median_edge(const ForeignState& foreign) {
+  const Body& body = foreign.setup.body;
+  std::vector<double> lengths;
+  for (int32_t i = 0; i < body.particle_count(); ++i) {
+    for (const int32_t other : body.neighbours(i)) {
+      if (other > i && body.rest_length(i, other) > 0) lengths.push_back(body.rest_length(i, other));
+    }
+  }
+  if (lengths.empty()) return body.grid.spacing;
+  const auto middle = lengths.begin() + std::ssize(lengths) / 2;
+  std::nth_element(lengths.begin(), middle, lengths.end());
+  return *middle;
+}
+
+// Far enough from the origin the coordinates of two neighbours are the same number. No tissue, and no material, can be
+// stretched a thousandfold (tolerances.md, Absolute coordinates).
+Verdict plausible_places(const ForeignState& foreign) {
+  constexpr double kMostStretch = 1000;
+  Verdict verdict = of_file("plausible places", "tolerances.md, Absolute coordinates");
+  verdict.bound = 1;
+  const Body& body = foreign.setup.body;
+  const State& state = foreign.state;
+  const bool rests = foreign.given.contains("rest") || foreign.given.contains("nodes");
+  const double h = rests ? body.grid.spacing : median_edge(foreign), u = unit_roundoff(state.precision);
+  const auto see = [&](double measured, std::vector<int32_t> particles, const auto& text) {
+    if (!(measured > verdict.measured)) return;
+    verdict.measured = measured;
+    if (measured <= verdict.bound) return;
+    verdict.holds = false;
+    verdict.witness.particles = std::move(particles);
+    verdict.witness.text = text();
+  };
+  for (int32_t i = 0; i < body.particle_count(); ++i) {
+    const Vec3 x = state.x[at(i)];
+    if (state.alive[at(i)] == 0 || !is_finite(x)) continue;
+    ++verdict.checked;
+    const double reach = std::max({std::abs(x.x), std::abs(x.y), std::abs(x.z)});
+    see(2 * u * reach / h, {i}, [&] {
+      return fmt::format("particle {} is at ({:.6g}, {:.6g}, {:.6g}) m, where coordinates are {:.3g} h apart", i, x.x,
+                         x.y, x.z, 2 * u * reach / h);
+    });
+    if (!rests) continue;
+    for (const int32_t other : body.neighbours(i)) {
+      if (other < i || state.alive[at(other)] == 0 || !is_finite(state.x[at(other)])) continue;
+      const Vec3 d = state.x[at(other)] - x;
+      const double length = std::hypot(d.x, d.y, d.z), rest = body.rest_length(i, other);
+      if (!(rest > 0)) continue;
+      see(length / rest / kMostStretch, {i, other}, [&] {
+        return fmt::format("the edge of particles {} and {} is {:.3g} times as long as at rest", i, other,
+                           length / rest);
+      });
+    }
+  }
+  if (verdict.checked == 0) verdict.vacuous = "nothing is alive";
+  return verdict;
+}
+
+// Living particles that rest at one place, within what rounds there; where nothing is known of rest, that are there.
+struct Coincident {
+  int64_t particles = 0;  // of which another is at the same place
+  int32_t first = -1, second = -1;
+};
+Coincident coincident_particles(const ForeignState& foreign) {
+  const Body& body = foreign.setup.body;
+  const State& state = foreign.state;
+  const double h = body.grid.spacing, near = std::min(8 * state.place_rounding, h / 64);
+  // Places that are near have the same box, unless a face lies between them: then other boxes tell.
+  const double side = near > 0 ? std::min(64 * near, h / 8) : h / 8;
+  struct Boxed {
+    std::array<int64_t, 3> box;
+    int32_t particle;
+  };
+  Coincident found;
+  if (body.on_grid()) return found;  // two particles on one node are not well formed
+  std::vector<uint8_t> seen(state.x.size(), 0);
+  for (const double offset : {0.0, 0.37, 0.71}) {
+    std::vector<Boxed> boxed;
+    for (int32_t i = 0; i < body.particle_count(); ++i) {
+      const Vec3 x = body.rest_position(i);
+      if (state.alive[at(i)] == 0 || !is_finite(x) || !(norm(x) < 0x1p60 * side)) continue;
+      Boxed& each = boxed.emplace_back(Boxed{{}, i});
+      for (int axis = 0; axis < 3; ++axis) {
+        each.box[at(axis)] = static_cast<int64_t>(std::floor(x[axis] / side + offset));
+      }
+    }
+    std::sort(boxed.begin(), boxed.end(),
+              [](const Boxed& a, const Boxed& b) { return std::tie(a.box, a.particle) < std::tie(b.box, b.particle); });
+    for (std::size_t first = 0, k = 1; k < boxed.size(); ++k) {
+      if (boxed[k].box != boxed[first].box) {
+        first = k;
+        continue;
+      }
+      const int32_t a = boxed[first].particle, b = boxed[k].particle;
+      if (seen[at(b)] != 0 || norm(body.rest_position(a) - body.rest_position(b)) > near) continue;
+      seen[at(b)] = 1;
+      ++found.particles;
+      if (found.second < 0 || b < found.second) {
+        found.first = a;
+        found.second = b;
+      }
+    }
+  }
+  return found;
+}
+
+Verdict as_many_pieces(const ForeignState& foreign, const ForeignVerdicts& found) {
+  Verdict verdict = of_file("pieces", "foreign_state.md, A state");
+  verdict.checked = 1;
+  verdict.measured = static_cast<double>(*found.pieces);
+  verdict.bound = static_cast<double>(*foreign.pieces);
+  verdict.holds = *found.pieces == *foreign.pieces;
+  if (!verdict.holds) {
+    verdict.witness.text =
+        fmt::format("the tissue is {}, and the file says {}", found.pieces_in_words, *foreign.pieces);
+  }
+  return verdict;
+}
+
+void look_at_pieces(const ForeignState& foreign, ForeignVerdicts& found) {
+  const oracles::Partition pieces = oracles::graph_components(foreign.setup.body, foreign.state.alive);
+  found.pieces = pieces.count;
+  found.pieces_in_words = oracles::pieces_in_words(pieces);
+  const Coincident coincident = coincident_particles(foreign);
+  found.coincident = coincident.particles;
+  if (coincident.particles > 0) {
+    found.notes.push_back(fmt::format(
+        "{} where another one is, first particle {} where particle {} is. Is this a seam that was not welded?",
+        counted(coincident.particles, "particle is", "particles are"), coincident.second, coincident.first));
+  }
+}
+
+// Says with which weights rest frames were asked, and whether the other ones explain what was given.
+void explain_weights(const ForeignState& foreign, Verdict& verdict) {
+  const State& given = foreign.state;
+  State other = given;
+  Setup setup = foreign.setup;
+  std::vector<int32_t> held(given.x.size(), 0);
+  for (const int32_t i : given.clusters.members) ++held[at(i)];
+  for (std::size_t i = 0; i < held.size(); ++i) {
+    if (held[i] > 0)
+      setup.body.mass[i] = foreign.plain_weights ? setup.body.mass[i] / held[i] : setup.body.mass[i] * held[i];
+  }
+  // What was not given was made of the weights that were asked.
+  for (int32_t c = 0; c < given.clusters.count(); ++c) {
+    double mass = 0;
+    Vec3 sum;
+    for (const int32_t i : given.clusters.of(c)) {
+      const double w = setup.body.mass[at(i)] / held[at(i)];
+      mass += w;
+      sum += w * setup.body.rest_position(i);
+    }
+    if (!foreign.given.contains("cluster_masses")) other.clusters.mass[at(c)] = mass;
+    if (!foreign.given.contains("rest_centers")) other.clusters.rest_center[at(c)] = sum / mass;
+  }
+  const bool explains = oracles::rest_frames(setup, other).holds;
+  const char* const shared = "mass / number of clusters that hold the particle";
+  verdict.witness.text +=
+      fmt::format("; the weights that were asked are {}", foreign.plain_weights ? "plain masses" : shared);
+  if (explains) {
+    verdict.witness.text += foreign.plain_weights
+                                ? fmt::format(", and with {} all is right: write the text weights = 'shared'", shared)
+                                : ", and with plain masses all is right: write the text weights = 'plain'";
+  }
+}
+
 // Beyond that the state can be read and has no NaN.
 bool anything_was_judged(const std::vector<Verdict>& verdicts) {
   return std::any_of(verdicts.begin(), verdicts.end(), [](const Verdict& verdict) {
-    return verdict.property != "well formed" && verdict.property != "finite" && verdict.checked > 0;
+    constexpr std::array kOfEverybody = {std::string_view("well formed"), std::string_view("finite"),
+                                         std::string_view("plausible places")};
+    return verdict.checked > 0 &&
+           std::find(kOfEverybody.begin(), kOfEverybody.end(), verdict.property) == kOfEverybody.end();
   });
 }
 
@@ -103,8 +284,8 @@ void note_what_matters(const ForeignState& foreign, ForeignVerdicts& found) {
   }
   if (foreign.state.precision == Precision::binary32 && foreign.defect.empty()) {
     found.notes.push_back(
-        fmt::format("Some of the file is float32: rest frames and skin are judged as single precision, in which an "
-                    "absolute coordinate is off by up to {:.2g} h.",
+        fmt::format("Some of the file is float32: rest frames, rotations and skin are judged as single precision, in "
+                    "which an absolute coordinate is off by up to {:.2g} h.",
                     foreign.state.place_rounding / foreign.setup.body.grid.spacing));
   }
   if (foreign.promises.cover("rest frames") && !foreign.given.contains("mass") &&
@@ -121,6 +302,7 @@ bool ForeignVerdicts::holds() const {
 
 ForeignVerdicts judge_foreign_state(const ForeignState& foreign) {
   ForeignVerdicts found;
+  found.notes = foreign.notes;
   oracles::PropertyLists lists = properties_of(Depth::motion);
   lists.push_back(&oracles::lone_state_properties());
   const bool surface_alone = foreign.loose_skin.position.size() + foreign.loose_skin.triangles.size() > 0 ||
@@ -150,12 +332,15 @@ ForeignVerdicts judge_foreign_state(const ForeignState& foreign) {
         continue;
       }
       found.verdicts.push_back(*verdict);
+      if (property.name == "rest frames" && !verdict->holds) explain_weights(foreign, found.verdicts.back());
     }
   }
-  Verdict judged;
-  judged.property = "something was judged";
-  judged.unit = "1";
-  judged.bound_source = "oracles.md, Somebody else's state";
+  if (well_formed) {
+    look_at_pieces(foreign, found);
+    found.verdicts.push_back(plausible_places(foreign));
+    if (foreign.pieces) found.verdicts.push_back(as_many_pieces(foreign, found));
+  }
+  Verdict judged = of_file("something was judged", "oracles.md, Somebody else's state");
   judged.checked = 1;
   judged.measured = anything_was_judged(found.verdicts) ? 1 : 0;
   judged.bound = 1;

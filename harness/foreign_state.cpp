@@ -1,6 +1,7 @@
 #include "harness/foreign_state.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -30,6 +31,13 @@ class Reader {
       out_.promises.words = parse_promises(*words, file, "promises");
       out_.promises_given = true;
     }
+    if (const std::string* const weights = io::find_text(contents, "weights")) {
+      out_.plain_weights = *weights == "plain";
+      if (*weights != "plain" && *weights != "shared") {
+        in_.refuse("weights", fmt::format("This is '{}'.", *weights),
+                   "Write 'shared' (mass / number of clusters that hold the particle) or 'plain' (mass).");
+      }
+    }
   }
 
   ForeignState read() {
@@ -39,6 +47,7 @@ class Reader {
     read_clusters();
     read_skin();
     if (out_.defect.empty()) move_into_body_frame();
+    take_notes();
     return std::move(out_);
   }
 
@@ -59,19 +68,37 @@ class Reader {
   }
 
   // The coarsest arithmetic of what is given counts for all.
-  void see_precision(const Array& array) {
+  void see_type(const Array& array) {
     if (array.type == ElementType::f32) out_.state.precision = Precision::binary32;
+  }
+  // Of what a simulator computes. Masses and velocities may be parameters, as short as anyone likes; places of rest
+  // come from meshes, whose files have single precision.
+  void see_precision(const Array& array) {
+    see_type(array);
+    if (array.type == ElementType::f32 || precision_of(array) != Precision::binary32) return;
+    out_.state.precision = Precision::binary32;
+    widened_.push_back(array.name);
   }
   std::vector<Vec3> vectors(const Array& array) {
     see_precision(array);
     return in_.vectors(array);
   }
+  void see_place(Vec3 x) {
+    if (is_finite(x)) out_.extent = std::max(out_.extent, norm(x));
+  }
   std::vector<Vec3> places(const Array& array) {
     std::vector<Vec3> found = vectors(array);
-    for (const Vec3 x : found) {
-      if (is_finite(x)) out_.extent = std::max(out_.extent, norm(x));
-    }
+    for (const Vec3 x : found) see_place(x);
     return found;
+  }
+
+  void take_notes() {
+    out_.notes = in_.notes();
+    if (widened_.empty()) return;
+    out_.notes.push_back(
+        fmt::format("Each number of {} is one of single precision, stored as float64: the state is "
+                    "judged as single precision.",
+                    fmt::join(widened_, ", ")));
   }
 
   void read_parameters() {
@@ -87,6 +114,9 @@ class Reader {
       *member = static_cast<int32_t>(*value);
     }
     in_.both("tau", "cap");
+    if ((out_.pieces = in_.whole_number("pieces")) && *out_.pieces < 0) {
+      in_.refuse("pieces", fmt::format("This is {}.", *out_.pieces), "Give how many pieces the tissue is in.");
+    }
     if (const auto alpha = in_.number("alpha")) {
       if (!(*alpha > 0 && *alpha < 1)) {
         in_.refuse("alpha", fmt::format("This is {}.", *alpha), "Give a number between 0 and 1.");
@@ -102,16 +132,22 @@ class Reader {
     if (positions.rows() > std::numeric_limits<int32_t>::max()) {
       in_.refuse("positions", "There are more particles than 32-bit numbers can name.", "Write a smaller body.");
     }
-    state.x = places(positions);
+    state.x = vectors(positions);
     state.v.assign(state.x.size(), {});
     state.alive.assign(state.x.size(), 1);
-    if (const Array* const v = in_.find("velocities", {n(), 3})) state.v = vectors(*v);
+    if (const Array* const v = in_.find("velocities", {n(), 3})) {
+      see_type(*v);
+      state.v = in_.vectors(*v);
+    }
     if (const Array* const alive = in_.find("alive", {n()})) {
       const std::vector<int64_t> flags = in_.long_integers(*alive);
       // What is neither is found by "well formed".
       for (std::size_t i = 0; i < flags.size(); ++i) {
         state.alive[i] = flags[i] == 0 || flags[i] == 1 ? static_cast<uint8_t>(flags[i]) : uint8_t{2};
       }
+    }
+    for (int32_t i = 0; i < n(); ++i) {  // what is gone may be put anywhere
+      if (state.alive[at(i)] != 0) see_place(state.x[at(i)]);
     }
     if (const Array* const removed = in_.find("removed", {-1})) {
       state.removed = in_.integers(*removed);
@@ -120,7 +156,7 @@ class Reader {
     }
     out_.setup.body.mass.assign(state.x.size(), 1.0);
     if (const Array* const mass = in_.find("mass", {n()})) {
-      see_precision(*mass);
+      see_type(*mass);
       out_.setup.body.mass = in_.numbers(*mass);
       for (int32_t i = 0; i < n(); ++i) {
         const double m = out_.setup.body.mass[at(i)];
@@ -128,7 +164,9 @@ class Reader {
       }
     }
     if (const Array* const rest = in_.find("rest", {n(), 3})) {
-      rest_ = places(*rest);
+      see_type(*rest);
+      rest_ = in_.vectors(*rest);
+      for (const Vec3 x : rest_) see_place(x);
       for (int32_t i = 0; i < n(); ++i) {
         if (!is_finite(rest_[at(i)])) defect("the rest position of particle {} is not finite", i);
       }
@@ -284,10 +322,10 @@ class Reader {
   void read_clusters() {
     Clusters& clusters = out_.state.clusters;
     const Array& offsets = in_.require("cluster_offsets", {-1});
-    if (offsets.rows() == 0) in_.refuse("cluster_offsets", "This is empty.", "It has one entry more than clusters.");
+    if (offsets.count() == 0) in_.refuse("cluster_offsets", "This is empty.", "It has one entry more than clusters.");
     clusters.offsets = in_.long_integers(offsets);
     clusters.members = in_.integers(in_.require("cluster_members", {-1}));
-    const int64_t m = offsets.rows() - 1;
+    const int64_t m = offsets.count() - 1;
     const auto count = static_cast<int64_t>(clusters.members.size());
     bool readable = clusters.offsets.front() == 0 && clusters.offsets.back() == count;
     readable = readable && std::is_sorted(clusters.offsets.begin(), clusters.offsets.end());
@@ -316,22 +354,32 @@ class Reader {
       see_precision(*masses);
       clusters.mass = in_.numbers(*masses);
     }
-    if (readable) fill_rest_frames();
+    if (readable) {
+      const std::vector<int32_t> held = times_held();
+      for (int32_t i = 0; i < n() && out_.plain_weights; ++i) out_.setup.body.mass[at(i)] *= std::max(held[at(i)], 1);
+      fill_rest_frames(held);
+    }
     clusters.rest_center.resize(at(m));
     clusters.mass.resize(at(m), 1.0);
     if (readable) sort_by_number();
   }
 
+  bool exists(int32_t i) const { return i >= 0 && i < n(); }
+
+  // [n] In how many clusters each particle is.
+  std::vector<int32_t> times_held() const {
+    std::vector<int32_t> held(at(n()), 0);
+    for (const int32_t i : out_.state.clusters.members) {
+      if (exists(i)) ++held[at(i)];
+    }
+    return held;
+  }
+
   // What is not given of rest frames follows from the members, and is not judged.
-  void fill_rest_frames() {
+  void fill_rest_frames(const std::vector<int32_t>& held) {
     Clusters& clusters = out_.state.clusters;
     const bool with_centers = clusters.rest_center.empty(), with_masses = clusters.mass.empty();
     if (!with_centers && !with_masses) return;
-    const auto exists = [this](int32_t i) { return i >= 0 && i < n(); };
-    std::vector<int32_t> held(at(n()), 0);
-    for (const int32_t i : clusters.members) {
-      if (exists(i)) ++held[at(i)];
-    }
     const std::vector<Vec3>& rest = rest_.empty() ? out_.state.x : rest_;
     for (int32_t c = 0; c < clusters.count(); ++c) {
       double mass = 0;
@@ -422,6 +470,7 @@ class Reader {
   std::vector<Vec3> rest_;                          // as given, or as the nodes say; empty: neither
   std::vector<std::pair<int32_t, int32_t>> edges_;  // at both ends
   std::string why_no_grid_;                         // a grid was given, and its body has none
+  std::vector<std::string> widened_;                // arrays of float64 that hold single precision
   Vec3 origin_;                                     // of the body's frame, in the file's [m]
 };
 
@@ -453,12 +502,16 @@ const std::vector<KnownArray>& foreign_state_arrays() {
       {"alpha", "how far along its edge a vertex lies"},
       {"tau", "a cluster of fewer particles is small"},
       {"cap", "most particles of a merged cluster"},
+      {"pieces", "how many the tissue is in"},
   };
   return known;
 }
 
 const std::vector<KnownArray>& foreign_state_texts() {
-  static const std::vector<KnownArray> known = {{"promises", "what is to be judged, in words"}};
+  static const std::vector<KnownArray> known = {
+      {"promises", "what is to be judged, in words"},
+      {"weights", "of particles in their clusters: 'shared' or 'plain'"},
+  };
   return known;
 }
 

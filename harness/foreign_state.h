@@ -1,5 +1,6 @@
 // One state that somebody else's simulator wrote, from named arrays (docs/reference/foreign_state.md).
 #pragma once
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -21,10 +22,15 @@ struct ForeignState {
   bool promises_given = false;  // else all that the arrays allow
   // A surface without owners, which is no Skin of a state. Empty if `vertices` is not there or owners are.
   Skin loose_skin;
-  double extent = 0;  // L: the greatest distance of a given place from the origin of the file [m]
+  double extent = 0;  // L: the greatest distance of a living or resting place from the origin of the file [m]
+  // m_i in each cluster that holds particle i, instead of m_i / n_i. Then the masses of `setup` are n_i m_i, which
+  // share out to that.
+  bool plain_weights = false;
+  std::optional<int64_t> pieces;   // how many the tissue is said to be in
+  std::vector<std::string> notes;  // on what was passed over, or read as something else
 };
 
-// What a file may hold. Of texts: `promises`.
+// What a file may hold. Of texts: `promises` and `weights`.
 const std::vector<KnownArray>& foreign_state_arrays();
 const std::vector<KnownArray>& foreign_state_texts();
 

@@ -11,20 +11,20 @@ void check_finite(Judged& judged, Verdict& verdict) {
     if (finite) return;
     Concerned concerned;
     concerned.*kind = {name};
-    violate(verdict, concerned, "{} is not finite", what);
+    violate(verdict, concerned, "the {} {} is not finite", what, name);
   };
   const State& state = judged.state;
   for (int32_t i = 0; i < judged.body.particle_count(); ++i) {
-    look(is_finite(state.x[at(i)]), &Concerned::particles, i, "a position");
-    look(is_finite(state.v[at(i)]), &Concerned::particles, i, "a velocity");
+    look(is_finite(state.x[at(i)]), &Concerned::particles, i, "position of particle");
+    look(is_finite(state.v[at(i)]), &Concerned::particles, i, "velocity of particle");
   }
   for (int32_t c = 0; c < judged.clusters.count(); ++c) {
     const int32_t number = judged.number(c);
     const auto& entries = judged.clusters.rotation[at(c)].m;
     look(std::all_of(entries.begin(), entries.end(), [](double entry) { return std::isfinite(entry); }),
-         &Concerned::clusters, number, "a cluster's rotation");
-    look(is_finite(judged.clusters.rest_center[at(c)]), &Concerned::clusters, number, "a cluster's rest center");
-    look(std::isfinite(judged.clusters.mass[at(c)]), &Concerned::clusters, number, "a cluster's mass");
+         &Concerned::clusters, number, "rotation of cluster");
+    look(is_finite(judged.clusters.rest_center[at(c)]), &Concerned::clusters, number, "rest center of cluster");
+    look(std::isfinite(judged.clusters.mass[at(c)]), &Concerned::clusters, number, "mass of cluster");
   }
   for (std::size_t v = 0; v < state.skin.position.size(); ++v) {
     ++verdict.checked;

@@ -153,6 +153,9 @@ TEST_F(Foreign, StateThatTheReferenceCutHolds) {
       EXPECT_EQ(outcome.output.find(as == As::grid ? "on a grid" : "as a graph") != std::string::npos, true);
     }
   }
+  const Outcome pieces = cutproof("check cut.h5 --json pieces.json");
+  EXPECT_NE(pieces.output.find("; 2 pieces (of "), std::string::npos) << pieces.output;
+  EXPECT_EQ(json::parse(read("pieces.json")).at("body").at("pieces"), 2);
   State torn = cut.state;
   torn.alive[0] = 0;
   io::write_array_file(path("torn.h5"), tests::arrays_of(cut.setup, torn, As::pairs));

@@ -138,6 +138,25 @@ inline void leave_out(io::ArrayFile& file, std::string_view name) {
   }
 }
 
+// Every number in double precision, as a program writes it that knows no other.
+inline io::ArrayFile widened(io::ArrayFile file) {
+  for (Array& array : file.arrays) {
+    if (array.type != ElementType::f32) continue;
+    const std::span<const float> values = array.of<float>();
+    array = make_array(array.name, array.shape, std::vector<double>(values.begin(), values.end()));
+  }
+  return file;
+}
+// All lengths times this, in the arithmetic of the file.
+template <class Real>
+void scale(io::ArrayFile& file, Real factor) {
+  for (const char* const name : {"positions", "rest", "rest_centers", "vertices"}) {
+    if (find_array(file.arrays, name) == nullptr) continue;
+    for (Real& x : values_in<Real>(file, name)) x *= factor;
+  }
+  if (find_array(file.arrays, "spacing") != nullptr) values_in<double>(file, "spacing")[0] *= factor;
+}
+
 inline harness::ForeignVerdicts judged(const io::ArrayFile& file) {
   return harness::judge_foreign_state(harness::foreign_state_of(file, "state.npz"));
 }

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <tuple>
 
 #include "model/error.h"
 #include "tests/harness/foreign_files.h"
@@ -115,6 +116,91 @@ TEST(ForeignState, IsTheSameWhereverTheFileHasItsOriginAndInWhateverPrecision) {
       EXPECT_THAT(failing(single), IsEmpty()) << shift.x;
       EXPECT_THAT(single.notes, Contains(HasSubstr("float32")));
     }
+  }
+}
+
+// Simulators that compute in single precision write float64 as well.
+TEST(ForeignState, IsOfThePrecisionOfItsNumbersWhateverTypeTheyAreStoredIn) {
+  for (const As as : {As::grid, As::pairs}) {
+    io::ArrayFile widened = tests::widened(arrays_of<float>(cut().setup, cut().state, as, {1, -2, 3}));
+    const ForeignVerdicts found = judged(widened);
+    EXPECT_THAT(failing(found), IsEmpty());
+    EXPECT_THAT(found.notes, Contains(HasSubstr("stored as float64")));
+  }
+  // One number that single precision has not, in each array of what was computed, and it was not.
+  io::ArrayFile twice = tests::widened(arrays_of<float>(cut().setup, cut().state, As::pairs));
+  for (const char* const name : {"positions", "rest", "rotations", "rest_centers", "cluster_masses"}) {
+    values_in<double>(twice, name)[0] += 1e-14;
+  }
+  EXPECT_THAT(failing(judged(twice)), Contains("rest frames")) << "judged as double precision";
+  // A mesh of single precision may be simulated in double.
+  io::ArrayFile mesh = file();
+  const tests::CutBody& body = cut();
+  io::ArrayFile single = tests::widened(arrays_of<float>(body.setup, body.state, As::pairs));
+  put(mesh, "rest", tests::array_in(single, "rest").shape,
+      std::vector<double>(values_in<double>(single, "rest").begin(), values_in<double>(single, "rest").end()));
+  EXPECT_THAT(judged(mesh).notes, Not(Contains(HasSubstr("float32"))));
+  // Round numbers say nothing of how they were computed.
+  io::ArrayFile round = right_row();
+  put<double>(round, "rest", {4, 3}, {0, 0, 0, 1, 0, 0, 2, 0, 0, 3, 0, 0});
+  put<double>(round, "rest_centers", {3, 3}, {2 / 6.0 - 1e-12, 0, 0, 1.5, 0, 0, 16 / 6.0, 0, 0});
+  EXPECT_THAT(failing(judged(round)), ElementsAre("rest frames"));
+  EXPECT_THAT(judged(round).notes, Not(Contains(HasSubstr("float32"))));
+}
+
+TEST(ForeignState, MayBeInMillimetres) {
+  for (const As as : {As::grid, As::pairs}) {
+    for (const Vec3 shift : {Vec3{}, Vec3{7, -3, 20}}) {
+      io::ArrayFile twice = arrays_of<double>(cut().setup, cut().state, as, shift);
+      tests::scale<double>(twice, 1000);
+      EXPECT_THAT(failing(judged(twice)), IsEmpty()) << shift.x;
+      io::ArrayFile single = arrays_of<float>(cut().setup, cut().state, as, shift);
+      tests::scale<float>(single, 1000);
+      EXPECT_THAT(failing(judged(single)), IsEmpty()) << shift.x;
+    }
+  }
+}
+
+// Mueller 2005 and FleX: a particle counts with its whole mass in each of its clusters.
+TEST(ForeignState, MayHaveRestFramesOfPlainMasses) {
+  for (const As as : {As::grid, As::pairs}) {
+    io::ArrayFile plain = file(as);
+    const Clusters& clusters = cut().state.clusters;
+    const Body& body = cut().setup.body;
+    for (int32_t c = 0; c < clusters.count(); ++c) {
+      Vec3 sum;
+      double mass = 0;
+      for (const int32_t i : clusters.of(c)) {
+        mass += body.mass[at(i)];
+        sum += body.mass[at(i)] * body.rest_position(i);
+      }
+      for (int axis = 0; axis < 3; ++axis) {
+        values_in<double>(plain, "rest_centers")[3 * at(c) + at(axis)] = sum[axis] / mass;
+      }
+      values_in<double>(plain, "cluster_masses")[at(c)] = mass;
+    }
+    for (const char* const name : {"vertices", "triangles", "vertex_owner", "vertex_direction"}) {
+      if (as == As::grid) leave_out(plain, name);  // was put by shared weights
+    }
+    const ForeignVerdicts unsaid = judged(plain);
+    EXPECT_THAT(failing(unsaid), ElementsAre("rest frames"));
+    EXPECT_THAT(verdict_on(unsaid, "rest frames")->witness.text,
+                HasSubstr("the weights that were asked are mass / number of clusters"));
+    EXPECT_THAT(verdict_on(unsaid, "rest frames")->witness.text, HasSubstr("write the text weights = 'plain'"));
+    plain.texts = {{"weights", "plain"}};
+    EXPECT_THAT(failing(judged(plain)), IsEmpty());
+    // With centers alone; and said of a file that has none of it.
+    io::ArrayFile centers = plain;
+    leave_out(centers, "cluster_masses");
+    EXPECT_THAT(failing(judged(centers)), IsEmpty());
+    centers.texts.clear();
+    EXPECT_THAT(verdict_on(judged(centers), "rest frames")->witness.text, HasSubstr("'plain'"));
+    io::ArrayFile shared = file(As::pairs);
+    shared.texts = {{"weights", "plain"}};
+    EXPECT_THAT(verdict_on(judged(shared), "rest frames")->witness.text, HasSubstr("weights = 'shared'"));
+    values_in<double>(plain, "rest_centers")[3] += 1e-12;
+    EXPECT_THAT(failing(judged(plain)), ElementsAre("rest frames"));
+    EXPECT_THAT(verdict_on(judged(plain), "rest frames")->witness.text, Not(HasSubstr("write the text")));
   }
 }
 
@@ -267,6 +353,115 @@ TEST(ForeignState, WithARotationThatIsNoneIsRejected) {
   EXPECT_THAT(failing(judged(flat)), IsEmpty());
 }
 
+// The body that was cut, turned as a whole by 90 degrees.
+template <class Real>
+io::ArrayFile turned() {
+  io::ArrayFile file = arrays_of<Real>(cut().setup, cut().state, As::pairs);
+  const auto x = values_in<Real>(file, "positions");
+  for (std::size_t k = 0; k < x.size(); k += 3) std::tie(x[k], x[k + 1]) = std::pair(-x[k + 1], x[k]);
+  const auto r = values_in<Real>(file, "rotations");
+  for (std::size_t k = 0; k < r.size(); k += 9) {
+    for (std::size_t column = 0; column < 3; ++column) {
+      std::tie(r[k + column], r[k + 3 + column]) = std::pair(-r[k + 3 + column], r[k + column]);
+    }
+  }
+  return file;
+}
+
+template <class Real>
+void transpose_rotations(io::ArrayFile& file) {
+  const auto r = values_in<Real>(file, "rotations");
+  for (std::size_t k = 0; k < r.size(); k += 9) {
+    for (const auto& [a, b] : {std::pair{1, 3}, std::pair{2, 6}, std::pair{5, 7}})
+      std::swap(r[k + at(a)], r[k + at(b)]);
+  }
+}
+
+TEST(ForeignState, WithRotationsThatDoNotFitItsPositionsIsRejected) {
+  EXPECT_THAT(failing(judged(turned<double>())), IsEmpty());
+  EXPECT_THAT(failing(judged(turned<float>())), IsEmpty());
+  EXPECT_EQ(verdict_on(judged(turned<double>()), "rotation match")->checked, cut().state.clusters.count());
+  io::ArrayFile transposed = turned<double>();
+  transpose_rotations<double>(transposed);
+  EXPECT_THAT(failing(judged(transposed)), ElementsAre("rotation match"));
+  EXPECT_THAT(verdict_on(judged(transposed), "rotation match")->witness.text, HasSubstr("transpose"));
+  io::ArrayFile identity = turned<double>();
+  const auto r = values_in<double>(identity, "rotations");
+  for (std::size_t k = 0; k < r.size(); ++k) r[k] = k % 9 % 4 == 0 ? 1 : 0;
+  EXPECT_THAT(failing(judged(identity)), ElementsAre("rotation match"));
+  EXPECT_THAT(verdict_on(judged(identity), "rotation match")->witness.text, HasSubstr("it is the identity"));
+  io::ArrayFile restless = turned<double>();
+  leave_out(restless, "rest");
+  EXPECT_EQ(why_not(judged(restless), "rotation match"), "the file has no rest or nodes");
+  // Who says that they are the best ones for these positions is asked for that, within rounding: a turn by 1e-5 fails.
+  EXPECT_EQ(why_not(judged(turned<double>()), "best rotation"), "not promised");
+  io::ArrayFile best = turned<double>();
+  best.texts = {{"promises", "rotations best"}};
+  EXPECT_THAT(failing(judged(best)), IsEmpty());
+  const auto entries = values_in<double>(best, "rotations").subspan(9 * 2, 9);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double above = entries[k], below = entries[3 + k], turn = 1e-5;
+    entries[k] = above - turn * below;
+    entries[3 + k] = below + turn * above;
+  }
+  EXPECT_THAT(failing(judged(best)), ElementsAre("best rotation"));
+  EXPECT_THAT(verdict_on(judged(best), "best rotation")->witness.clusters, ElementsAre(2));
+}
+
+TEST(ForeignState, SaysInHowManyPiecesItsTissueIs) {
+  io::ArrayFile file = right_row();
+  EXPECT_EQ(judged(file).pieces, 1);
+  put<int32_t>(file, "pieces", {}, {1});
+  EXPECT_THAT(failing(judged(file)), IsEmpty());
+  put<int32_t>(file, "edges", {2, 2}, {0, 1, 2, 3});
+  put<int32_t>(file, "cluster_members", {4}, {0, 1, 2, 3});
+  put<int32_t>(file, "cluster_offsets", {3}, {0, 2, 4});
+  EXPECT_THAT(failing(judged(file)), ElementsAre("pieces"));
+  EXPECT_EQ(judged(file).pieces, 2);
+  EXPECT_THAT(verdict_on(judged(file), "pieces")->witness.text, HasSubstr("2 pieces (of 2 and 2 particles)"));
+  EXPECT_EQ(judged(file).coincident, 0);
+  // A seam: the end of one piece lies where the other one begins, to the last bit or nearly.
+  for (const double off : {0.0, 0x1p-56}) {
+    put<double>(file, "positions", {4, 3}, {0, 0, 0, 0.1, 0, 0, 0.1 + off, 0, 0, 0.2, 0, 0});
+    const ForeignVerdicts seam = judged(file);
+    EXPECT_EQ(seam.coincident, 1);
+    EXPECT_THAT(seam.notes, Contains(HasSubstr("first particle 2 where particle 1 is")));
+  }
+  put<double>(file, "positions", {4, 3}, {0, 0, 0, 0.1, 0, 0, 0.101, 0, 0, 0.2, 0, 0});
+  EXPECT_EQ(judged(file).coincident, 0);
+}
+
+TEST(ForeignState, WithAParticleFarBeyondAllReasonIsRejected) {
+  // What lies so far out that coordinates are a spacing apart there; in single precision sooner.
+  for (const double far : {1e28, 1e200, 4e11}) {
+    io::ArrayFile wrong = file(As::pairs);
+    values_in<double>(wrong, "positions")[3 * 7 + 1] = far;
+    EXPECT_THAT(failing(judged(wrong)), Contains("plausible places")) << far;
+    EXPECT_THAT(verdict_on(judged(wrong), "plausible places")->witness.particles, Contains(7)) << far;
+  }
+  io::ArrayFile restless = right_row();
+  values_in<double>(restless, "positions")[9] = 1e28;
+  EXPECT_THAT(failing(judged(restless)), ElementsAre("plausible places"));
+  // Edges a thousand times as long as at rest.
+  for (const auto& [stretch, holds] : {std::pair{999.0, true}, std::pair{1001.0, false}}) {
+    io::ArrayFile row = right_row();
+    put<double>(row, "rest", {4, 3}, {0, 0, 0, 1, 0, 0, 2, 0, 0, 3, 0, 0});
+    values_in<double>(row, "positions")[9] = 2 + stretch;
+    const ForeignVerdicts found = judged(row);
+    EXPECT_EQ(verdict_on(found, "plausible places")->holds, holds) << stretch;
+    if (holds) continue;
+    EXPECT_EQ(verdict_on(found, "plausible places")->witness.particles, (std::vector<int32_t>{2, 3}));
+    // What is gone may be anywhere.
+    put<uint8_t>(row, "alive", {4}, {1, 1, 1, 0});
+    put<int32_t>(row, "cluster_members", {4}, {0, 1, 1, 2});
+    put<int32_t>(row, "cluster_offsets", {3}, {0, 2, 4});
+    EXPECT_THAT(failing(judged(row)), IsEmpty());
+  }
+  io::ArrayFile dead = file(As::pairs);
+  values_in<double>(dead, "positions")[3 * at(cut().state.removed.front())] = 1e30;
+  EXPECT_THAT(failing(judged(dead)), IsEmpty());
+}
+
 TEST(ForeignState, WithARestCenterThatIsOffIsRejected) {
   io::ArrayFile wrong = file();
   values_in<double>(wrong, "rest_centers")[3 * 1] += 1e-12;  // 1e-10 h
@@ -328,6 +523,7 @@ TEST(ForeignState, WithNumbersThatAreNoneIsRejected) {
   io::ArrayFile lost = right_row();
   values_in<double>(lost, "positions")[3 * 2] = INFINITY;
   EXPECT_FALSE(verdict_on(judged(lost), "finite")->holds);
+  EXPECT_EQ(verdict_on(judged(lost), "finite")->witness.text, "the position of particle 2 is not finite");
   EXPECT_TRUE(verdict_on(judged(lost), "well formed")->holds);
 }
 
@@ -518,6 +714,30 @@ TEST(ForeignState, ThatCannotBeUnderstoodIsRefused) {
        },
        {"author", "no such text", "promises"}},
       {[](auto& f) {
+         f.texts = {{"weights", "equal"}};
+       },
+       {"weights", "'equal'", "'plain'"}},
+      {[](auto& f) {
+         f.texts = {{"Promises", "covered", true}};
+       },
+       {"Promises", "Did you mean 'promises'?"}},
+      {[](auto& f) { f.ignored = {"promises"}; }, {"promises", "no text"}},
+      {[](auto& f) { f.ignored = {"spacing"}; }, {"spacing", "dataset"}},
+      {[](auto& f) {
+         put<double>(f, "position", {4, 3}, std::vector<double>(12));
+       },
+       {"position", "Did you mean 'positions'?"}},
+      {[](auto& f) { put<int32_t>(f, "cluster_member", {1}, {0}); }, {"Did you mean 'cluster_members'?"}},
+      {[](auto& f) {
+         put<double>(f, "positions", {3, 5}, std::vector<double>(15));
+       },
+       {"positions", "transposed", "(3, 5)", "(any, 3)"}},
+      {[](auto& f) {
+         put<int32_t>(f, "edges", {2, 3}, {0, 1, 2, 1, 2, 3});
+       },
+       {"edges", "transposed"}},
+      {[](auto& f) { put<int32_t>(f, "pieces", {}, {-1}); }, {"pieces", "-1"}},
+      {[](auto& f) {
          f.texts = {{"alive", "all"}};
        },
        {"alive", "This is a text"}},
@@ -650,6 +870,32 @@ TEST(ForeignState, ThatCannotBeUnderstoodIsRefused) {
       for (const std::string& word : bad.words) EXPECT_THAT(text, HasSubstr(word));
     }
   }
+}
+
+// MATLAB has no lists, numpy no type for what is empty, and other programs leave attributes in a file.
+TEST(ForeignState, IsReadAsOtherProgramsWriteIt) {
+  io::ArrayFile matrices = right_row();
+  for (const char* const name : {"cluster_offsets", "cluster_members"}) {
+    Array& list = tests::array_in(matrices, name);
+    list.shape = name == std::string("cluster_members") ? std::vector<int64_t>{1, list.count()}
+                                                        : std::vector<int64_t>{list.count(), 1};
+  }
+  put<uint8_t>(matrices, "alive", {1, 4}, {1, 1, 1, 1});
+  put<double>(matrices, "spacing", {1, 1}, {1});
+  put<double>(matrices, "removed", {0}, {});
+  EXPECT_THAT(failing(judged(matrices)), IsEmpty());
+  EXPECT_EQ(verdict_on(judged(matrices), "edge cover")->checked, 3);
+  EXPECT_THAT(why_not(judged(matrices), "tissue kept"), HasSubstr("was judged"));
+  io::ArrayFile loose = row({{0}, {1}, {2}, {3}});
+  put<double>(loose, "edges", {0}, {});
+  put<double>(loose, "spacing", {}, {1});
+  EXPECT_THAT(failing(judged(loose)), IsEmpty());
+  EXPECT_EQ(judged(loose).pieces, 4);
+  io::ArrayFile attributes = right_row();
+  attributes.texts = {{"author", "me", true}, {"promises", "covered", true}};
+  attributes.ignored = {"frame_rate"};
+  EXPECT_THAT(failing(judged(attributes)), IsEmpty());
+  EXPECT_THAT(judged(attributes).notes, Contains(HasSubstr("passed over: author, frame_rate")));
 }
 
 TEST(ForeignState, OnAGridMayRestAnywhere) {
