@@ -1,13 +1,14 @@
 #include "harness/judge.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
+#include "harness/cut_again.h"
 #include "model/at.h"
 #include "model/fields.h"
 #include "model/rules.h"
 #include "oracles/comparison/state_difference.h"
-#include "reference_cpu/reference.h"
 
 namespace cutproof::harness {
 
@@ -32,23 +33,6 @@ State before_skin(const State& before, const State& end) {
   state.frame = before.frame;
   state.skin = before.skin;
   if (same_sets(before.clusters, end.clusters)) state.clusters.number = before.clusters.number;
-  return state;
-}
-
-// What a split alone has left, where only a later end is known. The rotations are those of the end: that they are right
-// is nobody's to tell who does not know what the step made of them.
-State before_merge(const Setup& setup, const State& detected, const State& end, bool rotations_are_known) {
-  const std::unique_ptr<Backend> reference = reference::make_backend();
-  reference->load({setup}, {detected});
-  reference->run({Stage::split, Stage::split});
-  State state = reference->snapshot().front();
-  const std::vector<int32_t>& numbers = end.clusters.number;
-  for (int32_t c = 0; c < state.clusters.count() && !rotations_are_known; ++c) {
-    const auto place = std::lower_bound(numbers.begin(), numbers.end(), state.clusters.number[at(c)]);
-    if (place == numbers.end() || *place != state.clusters.number[at(c)]) continue;
-    state.clusters.rotation[at(c)] = end.clusters.rotation[at(place - numbers.begin())];
-    state.clusters.degenerate[at(c)] = end.clusters.degenerate[at(place - numbers.begin())];
-  }
   return state;
 }
 
@@ -153,7 +137,7 @@ void Judge::see(const Moment& moment) {
     verdicts_.back().witness.text = "the state after " + std::string(name_of(moment.span.last)) + " of frame " +
                                     std::to_string(frame_) + " is of frame " + std::to_string(after.frame);
     lost_ = true;
-  } else if (was_lost) {
+  } else if (was_lost && moment.by_backend) {
     take(judge_.state(after, moment.span.last, thorough_ != Thorough::never), moment.span.last, after);
   } else if (moment.by_backend) {
     const std::array<bool, 6> due = due_stages(setup_, before, moment.span, after);
@@ -175,9 +159,9 @@ void Judge::see(const Moment& moment) {
   if (ends) ++frame_;
 }
 
-void Judge::see_stage(Stage stage, const State& before, const State& after, bool rotations_are_known) {
+void Judge::see_stage(Stage stage, const State& before, const State& after, std::span<const uint8_t> known_rotations) {
   if (stage == Stage::expand && before.clusters.members != after.clusters.members) has_expanded_ = true;
-  std::vector<Verdict> found = judge_.stage(stage, before, after, rotations_are_known);
+  std::vector<Verdict> found = judge_.stage(stage, before, after, known_rotations);
   if (stage == Stage::step) return take(std::move(found), stage, after);
   const bool cut = !after.removed.empty() || !after.debris.empty();
   const bool thorough = thorough_ == Thorough::always ||
@@ -197,43 +181,63 @@ void Judge::see_stage(Stage stage, const State& before, const State& after, bool
 
 void Judge::see_several(const Moment& moment, const std::array<bool, 6>& seen) {
   const State& end = *moment.after;
+  const Stage last = moment.span.last;
   const auto sees = [&](Stage stage) { return seen[at(stage)]; };
   const bool cuts = sees(Stage::split) || sees(Stage::merge) || sees(Stage::expand);
   // Each stands still until this has returned: judge_ may look at the last two.
   std::vector<std::shared_ptr<State>> between;
   const State* before = moment.before.get();
-  bool rotations_are_known = true;
+  State stepped = sees(Stage::step) ? after_step(*before, end) : *before;
+  const auto detected = [&] { return sees(Stage::detect) ? after_detection(stepped, end) : stepped; };
+  std::vector<uint8_t> known_rotations;  // of the state after the step; empty: all are
+  std::optional<CutAgain> expected;
+  Origins origins;
+  if (cuts) {
+    expected = cut_again(setup_, detected(), last);
+    origins = origins_of(setup_, detected(), last, *expected, end);
+    if (sees(Stage::step) && !same_sets(before->clusters, end.clusters)) {
+      known_rotations = hand_back(origins, end.clusters, stepped.clusters);
+    }
+  }
   const auto follow = [&](Stage stage, State state) {
     between.push_back(std::make_shared<State>(std::move(state)));
-    see_stage(stage, *before, *between.back(), rotations_are_known);
+    see_stage(stage, *before, *between.back(), known_rotations);
     before = between.back().get();
   };
-  if (sees(Stage::step)) {
-    rotations_are_known = same_sets(before->clusters, end.clusters);
-    follow(Stage::step, after_step(*before, end));
-  }
-  if (sees(Stage::detect) && (cuts || sees(Stage::skin))) follow(Stage::detect, after_detection(*before, end));
+  if (sees(Stage::step)) follow(Stage::step, stepped);
+  if (sees(Stage::detect) && (cuts || sees(Stage::skin))) follow(Stage::detect, detected());
   if (sees(Stage::detect) && !cuts && !sees(Stage::skin))
-    return see_stage(Stage::detect, *before, end, rotations_are_known);
+    return see_stage(Stage::detect, *before, end, known_rotations);
   if (cuts) {
     // What each of these did cannot be told apart. Together they must have made what the reference makes of the same
     // removal, where the rules leave one answer only.
     const bool unique = promise_of(setup_.merge.rule).unique;
-    const std::unique_ptr<Backend> reference = reference::make_backend();
-    reference->load({setup_}, {*before});
-    reference->run({Stage::split, moment.span.last});
-    const State expected = reference->snapshot().front();
     Verdict verdict;
     verdict.property = "stages in one piece";
     verdict.bound_source = "method.md §5 to §8: the reference's answer to the same removal";
     verdict.unit = "1";
     verdict.checked = unique ? end.clusters.count() : 1;
     if (verdict.checked == 0) verdict.vacuous = "no cluster";
-    const auto sets = unique ? oracles::Sets::compared : oracles::Sets::open;
-    if (const auto difference = oracles::difference_of_decisions(expected, end, sets)) {
+    const auto reject = [&](Witness witness) {
+      if (!verdict.holds) return;
       verdict.holds = false;
       verdict.measured = 1;
-      verdict.witness = {difference->clusters, difference->particles, {}, difference->text};
+      verdict.witness = std::move(witness);
+    };
+    const auto sets = unique ? oracles::Sets::compared : oracles::Sets::open;
+    if (auto difference = oracles::difference_of_decisions(expected->state, end, sets)) reject(std::move(*difference));
+    const int32_t c = first_that_inherits_otherwise(setup_, origins, stepped, known_rotations, end.clusters);
+    if (c >= 0) {
+      const int32_t number = end.clusters.number[at(c)];
+      std::string from;
+      for (const int32_t place : origins[at(c)]) {
+        from += (from.empty() ? "" : " or ") + std::to_string(stepped.clusters.number[at(place)]);
+      }
+      reject(
+          {{number},
+           {},
+           {},
+           "cluster " + std::to_string(number) + " has not the rotation of cluster " + from + ", from which it comes"});
     }
     if (!unique && sees(Stage::merge)) {
       // Of the rule's answers the reference knows one. The split leaves one, and what was merged of it the oracle
@@ -241,13 +245,13 @@ void Judge::see_several(const Moment& moment, const std::array<bool, 6>& seen) {
       if (sees(Stage::expand) || sees(Stage::skin)) {
         verdict.undecided = end.clusters.count();
       } else {
-        const State split = before_merge(setup_, *before, end, !moment.span.contains(Stage::step));
+        const State split = cut_again(setup_, detected(), Stage::split).state;
         take({oracles::merge_legality(setup_, split, end), oracles::cap_kept(setup_, split, end)}, Stage::merge, end);
       }
     }
     if (before->clusters.members != end.clusters.members) has_expanded_ = has_expanded_ || sees(Stage::expand);
-    take({verdict}, moment.span.last, end);
-    if (!sees(Stage::skin)) return take(judge_.state(end, moment.span.last, false), moment.span.last, end);
+    take({verdict}, last, end);
+    if (!sees(Stage::skin)) return take(judge_.state(end, last, false), last, end);
     between.push_back(std::make_shared<State>(before_skin(*before, end)));
     before = between.back().get();
   }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -52,8 +53,8 @@ class Judge {
   int32_t inner_shells();
 
  private:
-  // `rotations_are_known`: as oracles::StageRun has it.
-  void see_stage(Stage stage, const State& before, const State& after, bool rotations_are_known = true);
+  // `known_rotations`: as oracles::StageRun has it.
+  void see_stage(Stage stage, const State& before, const State& after, std::span<const uint8_t> known_rotations = {});
   void see_several(const Moment& moment, const std::array<bool, 6>& due);
   void take(std::vector<Verdict> found, Stage stage, const State& state);
   void leave_out(const Verdict& verdict);

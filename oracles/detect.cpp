@@ -273,7 +273,7 @@ void check_detection(const StageRun& run, Verdict& verdict) {
     violate(verdict, {{}, particles}, "particle {} {} removed, but should {}have been: {}", i, is ? "was not" : "was",
             is ? "" : "not ", why);
   }
-  if (one_end) OneEndOfEach(setup, graph, before, run.rotations_are_known).judge(is_gone, verdict);
+  if (one_end) OneEndOfEach(setup, graph, before, run.known_rotations).judge(is_gone, verdict);
   if (const auto wrong = first_in_one_only(gone, after.removed)) {
     violate(verdict, {{}, {wrong->element}}, "particle {} {}", wrong->element,
             wrong->in_second ? "is listed as removed, but did not die in this stage"

@@ -82,7 +82,8 @@ std::vector<Verdict> Judge::state(const State& state, Stage after, bool thorough
   return verdicts;
 }
 
-std::vector<Verdict> Judge::stage(Stage stage, const State& before, const State& after, bool rotations_are_known) {
+std::vector<Verdict> Judge::stage(Stage stage, const State& before, const State& after,
+                                  std::span<const uint8_t> known_rotations) {
   Memory& m = *memory_;
   m.look_at(before);
   const Verdict form_before = m.form;
@@ -91,7 +92,7 @@ std::vector<Verdict> Judge::stage(Stage stage, const State& before, const State&
   m.for_each_property([&](const Property& property) {
     if (!property.promised_by.contains(stage)) return;
     if (property.check_stage != nullptr) {
-      verdicts.push_back(ask(property, {m.setup, stage, before, after, rotations_are_known}, form_before, m.form));
+      verdicts.push_back(ask(property, {m.setup, stage, before, after, known_rotations}, form_before, m.form));
     } else if (property.due.holds(m.setup, after, stage)) {
       verdicts.push_back(m.answer(property));
     }

@@ -20,7 +20,9 @@ class Judge {
   // The last state that was given must stay as it is, and where it is, until another was given.
   std::vector<Verdict> state(const State& state, Stage after, bool thorough);
   // All properties of the stage, and those of the state after it that are this stage's promise.
-  std::vector<Verdict> stage(Stage stage, const State& before, const State& after, bool rotations_are_known = true);
+  // `known_rotations`: as StageRun has it.
+  std::vector<Verdict> stage(Stage stage, const State& before, const State& after,
+                             std::span<const uint8_t> known_rotations = {});
 
   // For reports. Components of G, and shells of the skin whose volume at `position` is not positive, triangles joined
   // at their vertices; 0 if the state is not well formed.

@@ -34,7 +34,8 @@ Demand openness(const Body& body, const std::vector<Vec3>& x, int32_t i, int32_t
   return distance < limit * (1 - band) ? Demand::keep : Demand::either;
 }
 
-OneEndOfEach::OneEndOfEach(const Setup& setup, const TissueGraph& graph, const State& before, bool rotations_are_known)
+OneEndOfEach::OneEndOfEach(const Setup& setup, const TissueGraph& graph, const State& before,
+                           std::span<const uint8_t> known_rotations)
     : setup_(setup),
       before_(before),
       edges_at_(before.alive.size()),
@@ -59,10 +60,15 @@ OneEndOfEach::OneEndOfEach(const Setup& setup, const TissueGraph& graph, const S
     if (std::abs(n) <= band) side_bit_[at(i)] = bits_++;
     negative_[at(i)] = n < 0;
   }
-  if (has_lowered_blade_ && setup.detect.remove == RemovedEnds::nearer) find_nearer_ends(*pose, rotations_are_known);
+  if (has_lowered_blade_ && setup.detect.remove == RemovedEnds::nearer) find_nearer_ends(*pose, known_rotations);
 }
 
-void OneEndOfEach::find_nearer_ends(const BladePose& pose, bool rotations_are_known) {
+void OneEndOfEach::find_nearer_ends(const BladePose& pose, std::span<const uint8_t> known_rotations) {
+  std::vector<uint8_t> is_unknown(before_.alive.size(), 0);  // where its clusters carry it
+  for (std::size_t c = 0; c < known_rotations.size(); ++c) {
+    if (known_rotations[c] != 0) continue;
+    for (const int32_t i : before_.clusters.of(static_cast<int32_t>(c))) is_unknown[at(i)] = 1;
+  }
   std::vector<int32_t> ends;
   std::vector<std::size_t> place_of(before_.alive.size());
   for (std::size_t i = 0; i < edges_at_.size(); ++i) {
@@ -80,6 +86,7 @@ void OneEndOfEach::find_nearer_ends(const BladePose& pose, bool rotations_are_kn
     return {std::abs(to_local(pose, place - pose.edge).n), bound + kPlacesBand * u * (norm(place) + norm(pose.edge))};
   };
   for (Edge& edge : edges_) {
+    const bool is_known = is_unknown[at(edge.low)] == 0 && is_unknown[at(edge.high)] == 0;
     bool is_between = false;
     for (const std::size_t k : {0u, 1u}) {
       // Only if rounding leaves it open may it be the one as well as the other.
@@ -91,10 +98,10 @@ void OneEndOfEach::find_nearer_ends(const BladePose& pose, bool rotations_are_kn
       const Height here = height(negative), there = height(positive);
       const double lead = here.distance - there.distance - kNearerBy * h;
       edge.positive_goes[k] = lead > 0;
-      const bool is_decided = rotations_are_known && std::abs(lead) > here.bound + there.bound + 4 * u * h;
+      const bool is_decided = is_known && std::abs(lead) > here.bound + there.bound + 4 * u * h;
       if (!is_decided) edge.positive_bit[k] = bits_++;
     }
-    if (is_between && !rotations_are_known) ++unknown_;
+    if (is_between && !is_known) ++unknown_;
   }
 }
 

@@ -2,6 +2,7 @@
 // Internal to oracles/.
 #pragma once
 #include <array>
+#include <span>
 #include <vector>
 
 #include "oracles/blade_motion.h"
@@ -27,9 +28,10 @@ Demand openness(const Body& body, const std::vector<Vec3>& x, int32_t i, int32_t
 // may do both then counts as undecided.
 class OneEndOfEach {
  public:
-  // `rotations_are_known`: as StageRun has it. Where nobody knows them, either end may be the nearer one, and each such
-  // edge counts as undecided.
-  OneEndOfEach(const Setup& setup, const TissueGraph& graph, const State& before, bool rotations_are_known = true);
+  // `known_rotations`: as StageRun has it. Where that of a cluster is not known which holds an end of an edge, either
+  // end may be the nearer one, and the edge counts as undecided.
+  OneEndOfEach(const Setup& setup, const TissueGraph& graph, const State& before,
+               std::span<const uint8_t> known_rotations = {});
   // `gone`: [n] particles that were alive and are not any more.
   void judge(const std::vector<uint8_t>& gone, Verdict& verdict) const;
 
@@ -71,7 +73,7 @@ class OneEndOfEach {
   Demand bluntly(int32_t i) const;
   void reject(int32_t i, bool gone, Verdict& verdict) const;
   // Of the edges, which end is nearer to the blade.
-  void find_nearer_ends(const BladePose& pose, bool rotations_are_known);
+  void find_nearer_ends(const BladePose& pose, std::span<const uint8_t> known_rotations);
 
   const Setup& setup_;
   const State& before_;

@@ -1,6 +1,8 @@
 // What can be judged: every property once, with its name, where it comes from, what it rests on, when it applies, and
 // the check. Who judges walks such a list and names no property by itself.
 #pragma once
+#include <cstdint>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -19,9 +21,10 @@ struct StageRun {
   Stage stage;
   const State& before;
   const State& after;
-  // Of a step, and of the detection after it: false where the state after the step was made from a later one, in which
-  // clusters have changed.
-  bool rotations_are_known = true;
+  // [clusters] Of a step, and of the detection after it, where the state after the step was made from a later one, in
+  // which clusters have changed: 0 where none of that state's clusters has kept the rotation, so that nobody knows it.
+  // Empty: all are known.
+  std::span<const uint8_t> known_rotations = {};
 };
 
 // What a check costs beside a frame of the reference: less, or more.

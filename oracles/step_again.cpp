@@ -8,7 +8,8 @@
 
 namespace cutproof::oracles {
 
-StepAgain step_again(const Setup& setup, const State& before, const State& after, Rotations rotations) {
+StepAgain step_again(const Setup& setup, const State& before, const State& after,
+                     std::span<const uint8_t> known_rotations) {
   Verdict verdict = start_verdict(kAdmissibleStep, after, "h", kAdmissibleStepSource);
   const auto done = [&] { return StepAgain{conclude(std::move(verdict), kNoStep)}; };
   const Clusters &was = before.clusters, &is = after.clusters;
@@ -26,7 +27,7 @@ StepAgain step_again(const Setup& setup, const State& before, const State& after
     return done();
   }
   StepAgain again;
-  again.step = nearest_admissible_step(setup, before, after, rotations);
+  again.step = nearest_admissible_step(setup, before, after, known_rotations);
   const AdmissibleStep& step = *again.step;
   verdict.measured = step.measured;
   verdict.bound = step.bound;
@@ -50,8 +51,7 @@ StepAgain step_again(const Setup& setup, const State& before, const State& after
 }
 
 void check_admissible_step(const StageRun& run, Verdict& verdict) {
-  const Rotations rotations = run.rotations_are_known ? Rotations::stated : Rotations::unknown;
-  verdict = step_again(run.setup, run.before, run.after, rotations).verdict;
+  verdict = step_again(run.setup, run.before, run.after, run.known_rotations).verdict;
 }
 
 }  // namespace cutproof::oracles

@@ -128,12 +128,12 @@ class Search {
  public:
   // `of_all`: of the whole body; else of one coupled set, of which nobody has stated the impulse.
   // `at_once`: as nearest_admissible_step() has it.
-  Search(const Setup& setup, const State& before, const State& after, Rotations rotations, int at_once,
-         bool of_all = true)
+  Search(const Setup& setup, const State& before, const State& after, std::span<const uint8_t> known_rotations,
+         int at_once, bool of_all = true)
       : setup_(setup),
         before_(before),
         after_(after),
-        rotations_(rotations),
+        known_(known_rotations.begin(), known_rotations.end()),
         of_all_(of_all),
         h_(setup.body.grid.spacing),
         dt_(setup.substep_length[at(before.frame)]),
@@ -159,7 +159,7 @@ class Search {
 
   AdmissibleStep find() {
     Branch branch = looked_at({});
-    if (rotations_ == Rotations::unknown && !branch.holds() && any_open(branch)) return nothing_known();
+    if (!branch.holds() && hangs_on_unknown(branch)) return nothing_known();
     if (!branch.holds() && !branch.ties.empty() && of_all_ && coupled_.count > 1) {
       Apart apart = settled_apart(branch);
       if (!apart.settled.empty()) branch = looked_at(std::move(apart.settled));
@@ -215,7 +215,9 @@ class Search {
     Apart apart;
     for (const int32_t set : sets) {
       const CoupledSet alone(before_, after_, coupled_, set);
-      Search search(setup_, alone.before, alone.after, rotations_, static_cast<int>(at_once_), false);
+      std::vector<uint8_t> known;
+      for (const int32_t c : alone.clusters) known.push_back(is_known(at(c)) ? 1 : 0);
+      Search search(setup_, alone.before, alone.after, known, static_cast<int>(at_once_), false);
       Branch found = search.looked_at({});
       if (!found.holds() && !found.ties.empty()) found = search.explain(std::move(found));
       for (const auto& [key_alone, outcome] : found.settled) {
@@ -230,12 +232,17 @@ class Search {
     return apart;
   }
 
-  // Whether where particles are hangs on a rotation that could be any of many.
-  bool any_open(const Branch& branch) const {
-    for (std::size_t c = 0; c < reach_.size(); ++c) {
-      if (is_open(branch, c) && reach_[c] > 0) return true;
+  // Whether the rotation of a cluster (by its place) was stated.
+  bool is_known(std::size_t c) const { return known_.empty() || known_[c] != 0; }
+  // Whether where all violating particles are hangs on rotations that could be any of many, and that nobody has stated.
+  bool hangs_on_unknown(const Branch& branch) const {
+    std::set<int32_t> sets;
+    for (int32_t c = 0; c < before_.clusters.count(); ++c) {
+      const bool is_any = !is_known(at(c)) && is_open(branch, at(c)) && reach_[at(c)] > 0;
+      if (is_any) sets.insert(coupled_.label[at(before_.clusters.of(c).front())]);
     }
-    return false;
+    return !sets.empty() && std::all_of(branch.violations.begin(), branch.violations.end(),
+                                        [&](int32_t i) { return sets.contains(coupled_.label[at(i)]); });
   }
   AdmissibleStep nothing_known() const {
     AdmissibleStep found;
@@ -285,7 +292,7 @@ class Search {
     branch.given.resize(reach_.size(), nullptr);
     bool any = false;
     for (std::size_t c = 0; c < reach_.size(); ++c) {
-      if (!is_open(branch, c) || rotations_ == Rotations::unknown) continue;
+      if (!is_open(branch, c) || !is_known(c)) continue;
       if (!(off_agreed(o.shape[c], after_.clusters.rotation[c]) <= agreed_bound(branch, c))) continue;
       branch.given[c] = &after_.clusters.rotation[c];
       any = true;
@@ -486,7 +493,8 @@ class Search {
       see(branch, StepPart::position, static_cast<int32_t>(i), off / h_, b.position[i] / h_, blunt);
       see(branch, StepPart::velocity, static_cast<int32_t>(i), fast / h_, b.velocity[i] / h_, blunt);
     }
-    for (int32_t c = 0; c < before_.clusters.count() && rotations_ == Rotations::stated; ++c) {
+    for (int32_t c = 0; c < before_.clusters.count(); ++c) {
+      if (!is_known(at(c))) continue;
       const Mat3& r = after_.clusters.rotation[at(c)];
       const double turned =
           is_open(branch, at(c)) ? off_agreed(o.shape[at(c)], r) : or_infinite(apart(r, o.rotation[at(c)]));
@@ -546,7 +554,7 @@ class Search {
     const std::optional<Branch> open = likely == certain ? std::nullopt : std::optional(branch_of(certain));
     bool all_tried = explore(root, open, false, best);
     if (all_tried && !best.holds()) all_tried = explore(root, open, true, best);
-    if (!best.holds() && rotations_ == Rotations::stated) {
+    if (!best.holds()) {
       // Where a contact has put particles in the last iteration hides what they did before, which rotations keep. (They
       // come last: what many ties do to a rotation does not add up.)
       by_rotations_ = true;
@@ -713,7 +721,7 @@ class Search {
     for (std::size_t c = 0; c < reach_.size(); ++c) {
       for (int column = 0; column < 3; ++column) {
         add(reach_[c] * b.rotation[c]);
-        if (is_open(branch, c) || b.rotation[c] >= kAnyRotation) scale_.back() = 0;
+        if (is_open(branch, c) || !is_known(c) || b.rotation[c] >= kAnyRotation) scale_.back() = 0;
       }
     }
   }
@@ -1032,7 +1040,7 @@ class Search {
       found.reach.push_back(std::max(reach_[c] / h_, 1.0));
       found.rotation_bound.push_back(branch.bounds.rotation[c] * found.reach.back());
       // As of positions: beyond this, nothing sharp was asked.
-      if (!(found.rotation_bound.back() <= kSmall) || rotations_ == Rotations::unknown) ++found.undecided;
+      if (!(found.rotation_bound.back() <= kSmall) || !is_known(c)) ++found.undecided;
     }
     found.outcome = std::move(branch.outcome);
     return found;
@@ -1040,7 +1048,7 @@ class Search {
 
   const Setup& setup_;
   const State &before_, &after_;
-  const Rotations rotations_;
+  const std::vector<uint8_t> known_;  // [m] 0: the rotation was not stated; empty: all were
   const bool of_all_;
   const double h_, dt_;
   double mass_ = 0;
@@ -1056,9 +1064,9 @@ class Search {
 
 }  // namespace
 
-AdmissibleStep nearest_admissible_step(const Setup& setup, const State& before, const State& after, Rotations rotations,
-                                       int at_once) {
-  return Search(setup, before, after, rotations, at_once).find();
+AdmissibleStep nearest_admissible_step(const Setup& setup, const State& before, const State& after,
+                                       std::span<const uint8_t> known_rotations, int at_once) {
+  return Search(setup, before, after, known_rotations, at_once).find();
 }
 
 }  // namespace cutproof::oracles

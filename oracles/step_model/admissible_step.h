@@ -3,6 +3,7 @@
 #pragma once
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -41,14 +42,11 @@ struct AdmissibleStep {
   std::vector<double> reach;           // [m] of the farthest member from the center at rest, or 1 if that is less [h]
 };
 
-// Whether `after` has the rotations that the step left. Where only a later state is known, in which clusters have
-// changed, nobody knows them: then none is judged, and each counts as undecided.
-enum class Rotations { stated, unknown };
-
-// `before` and `after`: well formed, of the same clusters; `before` finite, its schedule not over. `at_once`: threads
-// for disturbed runs; 0: one, or where runs are long one for each processor. The answer is the same with any number.
+// `before` and `after`: well formed, of the same clusters; `before` finite, its schedule not over. `known_rotations`:
+// as StageRun has it; one that is not known is not judged, and counts as undecided. `at_once`: threads for disturbed
+// runs; 0: one, or where runs are long one for each processor. The answer is the same with any number.
 AdmissibleStep nearest_admissible_step(const Setup& setup, const State& before, const State& after,
-                                       Rotations rotations = Rotations::stated, int at_once = 0);
+                                       std::span<const uint8_t> known_rotations = {}, int at_once = 0);
 
 // The same with its verdict, of any two well-formed states; without the step where none can be computed.
 struct StepAgain {
@@ -56,6 +54,6 @@ struct StepAgain {
   std::optional<AdmissibleStep> step = {};
 };
 StepAgain step_again(const Setup& setup, const State& before, const State& after,
-                     Rotations rotations = Rotations::stated);
+                     std::span<const uint8_t> known_rotations = {});
 
 }  // namespace cutproof::oracles

@@ -58,6 +58,12 @@ constexpr const char* kPressed = R"({"version": 1, "name": "pressed",
   "frame": {"settle": 0.016}, "ground": {"friction": 0.5},
   "blade": {"speed": 1, "strokes": [{"points": [[0.5, 0.5, 1.3], [0.5, 0.5, 0.3]], "along": [0, 1, 0]}]}})";
 
+// One cluster of all, which the stroke parts.
+constexpr const char* kHalved = R"({"version": 1, "name": "halved",
+  "body": {"shape": {"kind": "box", "size": [0.08, 0.04, 0.02]}, "spacing": 0.01}, "clusters": {"side": 8},
+  "frame": {"settle": 0.032}, "detect": {"criterion": "geometric"}, "step": {"gravity": [0, 0, -9.81]},
+  "blade": {"speed": 4, "strokes": [{"points": [[0.5, 0.5, 1.3], [0.5, 0.5, -0.3]], "along": [0, 1, 0]}]}})";
+
 int32_t first_alive(const State& state) {
   return static_cast<int32_t>(std::find(state.alive.begin(), state.alive.end(), 1) - state.alive.begin());
 }
@@ -835,15 +841,27 @@ TEST(StagesInOnePiece, ThatLeaveSeveralRightAnswersAreJudgedByTheOracleWhereItCa
   }
 }
 
-TEST(StagesInOnePiece, ThatNobodyCanTellApartAreCounted) {
-  SceneRun run(kEveryStage, [](cutproof::Setup& setup) { setup.merge.rule = MergeRule::published; });
-  std::vector<Moment> frames;  // whole ones
+// The same run, of which the stages from `first` to skin are seen as one.
+SceneRun joined_from(Stage first, SceneRun run) {
+  std::vector<Moment> moments;
   for (const Moment& moment : run.moments) {
-    if (moment.span.first == Stage::step) frames.push_back(moment);
-    if (moment.span.last == Stage::skin) frames.back().after = moment.after;
-    if (moment.span.last == Stage::skin) frames.back().span.last = Stage::skin;
+    const bool begins =
+        moment.span.first <= first || moments.back().span.last == Stage::skin || moments.back().span.last < first;
+    if (begins) {
+      moments.push_back(moment);
+    } else {
+      moments.back().after = moment.after;
+      moments.back().span.last = moment.span.last;
+    }
   }
-  run.moments = frames;
+  run.moments = moments;
+  return run;
+}
+SceneRun in_whole_frames(SceneRun run) { return joined_from(Stage::step, std::move(run)); }
+
+TEST(StagesInOnePiece, ThatNobodyCanTellApartAreCounted) {
+  const SceneRun run =
+      in_whole_frames(SceneRun(kEveryStage, [](cutproof::Setup& setup) { setup.merge.rule = MergeRule::published; }));
   const auto verdicts = run.judged();
   EXPECT_THAT(failures(verdicts), IsEmpty()) << first_failure(verdicts);
   int64_t undecided = 0;
@@ -853,6 +871,144 @@ TEST(StagesInOnePiece, ThatNobodyCanTellApartAreCounted) {
     undecided += verdict.undecided;
   }
   EXPECT_GT(undecided, 0);
+}
+
+// --- Rotations through a cut of which only the end is seen
+// ------------------------------------------------------------
+
+// Turned about z, as a state and its skin would have it.
+void turn(const cutproof::Setup& setup, State& state, int32_t c, double angle) {
+  const double s = std::sin(angle), k = std::cos(angle);
+  const Mat3 by = {{k, -s, 0, s, k, 0, 0, 0, 1}};
+  Mat3& r = state.clusters.rotation[at(c)];
+  Mat3 turned;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      double sum = 0;
+      for (int i = 0; i < 3; ++i) sum += by(row, i) * r(i, column);
+      turned(row, column) = sum;
+    }
+  }
+  r = turned;
+  reference::skin(setup, state);
+}
+
+// A whole frame that cuts, or that does not, in which clusters are turned; what follows begins with the right state.
+SceneRun with_turned(const SceneRun& frames, bool cutting, const std::function<bool(int32_t)>& which, double angle) {
+  SceneRun run = frames;
+  Moment& moment = run.moments[run.find(Stage::skin, cutting)];
+  State after = *moment.after;
+  for (int32_t c = 0; c < after.clusters.count(); ++c) {
+    if (which(c)) turn(run.built.setup, after, c, angle);
+  }
+  moment.after = std::make_shared<const State>(std::move(after));
+  return run;
+}
+
+const std::array kRules = {MergeRule::deterministic, MergeRule::published};
+
+// Skins are made for the turned clusters, so nothing but the rotations is wrong.
+TEST(WholeFrames, ThatCutAreRejectedIfEveryClusterIsTurned) {
+  for (const MergeRule rule : kRules) {
+    const SceneRun frames =
+        in_whole_frames(SceneRun(kEveryStage, [&](cutproof::Setup& setup) { setup.merge.rule = rule; }));
+    EXPECT_THAT(failures(frames.judged()), IsEmpty()) << first_failure(frames.judged());
+    for (const double angle : {3.0, 0.1, 1e-6, 1e-10}) {
+      SCOPED_TRACE(std::string(cutproof::name_of(rule)) + " by " + std::to_string(angle));
+      const auto verdicts = with_turned(
+                                frames, true, [](int32_t) { return true; }, angle)
+                                .judged();
+      EXPECT_THAT(failures(verdicts), testing::Contains(testing::Key("admissible step")));
+      for (const Verdict& verdict : verdicts) {
+        if (verdict.holds || verdict.property != "admissible step") continue;
+        EXPECT_EQ(verdict.witness.clusters.size(), 1u);
+        EXPECT_NE(verdict.witness.text.find("the rotation of cluster"), std::string::npos) << verdict.witness.text;
+      }
+    }
+  }
+}
+
+// Each by itself, but for what several small ones were merged to by a rule that leaves several answers.
+TEST(WholeFrames, ThatCutAreRejectedIfOneClusterIsTurned) {
+  for (const MergeRule rule : kRules) {
+    const SceneRun frames =
+        in_whole_frames(SceneRun(kEveryStage, [&](cutproof::Setup& setup) { setup.merge.rule = rule; }));
+    const int32_t clusters = frames.moments[frames.find(Stage::skin, true)].after->clusters.count();
+    int32_t accepted = 0;
+    for (int32_t c = 0; c < clusters; ++c) {
+      const Counts found = failures(with_turned(
+                                        frames, true, [&](int32_t other) { return other == c; }, 0.1)
+                                        .judged());
+      accepted += found.contains("admissible step") || found.contains("stages in one piece") ? 0 : 1;
+    }
+    EXPECT_GT(clusters, 3);
+    EXPECT_LE(accepted, rule == MergeRule::deterministic ? 0 : clusters / 4) << cutproof::name_of(rule);
+  }
+}
+
+TEST(WholeFrames, ThatCutNothingAreRejectedIfAClusterIsTurned) {
+  const SceneRun frames = in_whole_frames(run_of(kEveryStage));
+  for (const double angle : {0.1, 1e-9}) {
+    const auto verdicts = with_turned(
+                              frames, false, [](int32_t c) { return c == 1; }, angle)
+                              .judged();
+    EXPECT_THAT(failures(verdicts), testing::Contains(testing::Key("admissible step"))) << angle;
+  }
+}
+
+// What a split has parted has one rotation, and a union that of the cluster whose number it keeps; where the step was
+// seen before, theirs.
+TEST(StagesInOnePiece, LeaveEveryClusterTheRotationThatItInherits) {
+  for (const char* scene : {kEveryStage, kHalved}) {
+    for (const Stage first : {Stage::step, Stage::detect, Stage::split}) {
+      const SceneRun run = joined_from(first, run_of(scene));
+      EXPECT_THAT(failures(run.judged()), IsEmpty()) << first_failure(run.judged());
+      const std::size_t cut = run.find(Stage::skin, true);
+      const int32_t clusters = run.moments[cut].after->clusters.count();
+      int32_t found = 0;
+      for (int32_t c = 0; c < clusters; ++c) {
+        State after = *run.moments[cut].after;
+        after.clusters.degenerate[at(c)] ^= 1;
+        SceneRun wrong = run;
+        wrong.moments[cut].after = std::make_shared<const State>(std::move(after));
+        for (const Verdict& verdict : wrong.judged()) {
+          if (verdict.holds || verdict.property != "stages in one piece") continue;
+          ++found;
+          EXPECT_FALSE(verdict.witness.clusters.empty());
+          EXPECT_NE(verdict.witness.text.find("has not the rotation"), std::string::npos) << verdict.witness.text;
+        }
+      }
+      // Of a step that nobody saw by itself one piece tells of the other, and a cluster by itself of nothing.
+      if (first != Stage::step || scene == kHalved) {
+        EXPECT_EQ(found, clusters) << name_of(first);
+      }
+      EXPECT_GT(clusters, 1);
+    }
+  }
+}
+
+// Every rotation of a right frame is known, but those of clusters that were merged away, or cut away.
+TEST(WholeFrames, LeaveOpenTheRotationsOfWhatIsGoneAlone) {
+  for (const MergeRule rule : kRules) {
+    for (const bool kernels : {false, true}) {
+      const auto backend = kernels ? gpu::make_host_backend() : reference::make_backend();
+      const SceneRun run =
+          in_whole_frames(SceneRun(kEveryStage, *backend, [&](cutproof::Setup& setup) { setup.merge.rule = rule; }));
+      const auto verdicts = run.judged();
+      EXPECT_THAT(failures(verdicts), IsEmpty()) << first_failure(verdicts);
+      int64_t undecided = 0, checked = 0, clusters = 0;
+      for (const Verdict& verdict : verdicts) {
+        if (verdict.property != "admissible step") continue;
+        undecided += verdict.undecided;
+        checked += verdict.checked;
+      }
+      for (const Moment& moment : run.moments) {
+        if (!moment.after->removed.empty()) clusters += moment.before->clusters.count();
+      }
+      EXPECT_LT(undecided, clusters / 2) << undecided << " of " << clusters << " clusters";
+      EXPECT_GT(checked, clusters);
+    }
+  }
 }
 
 // --- What a scene expects --------------------------------------------------------------------------------------------

@@ -235,7 +235,8 @@ TEST(DetectionOfNearerEnd, CountsWhatUnknownRotationsLeaveOpen) {
   const TissueGraph graph(pair.setup.body, pair.before.alive);
   const auto judged = [&](const std::vector<uint8_t>& gone, bool rotations_are_known) {
     Verdict verdict;
-    OneEndOfEach(pair.setup, graph, pair.before, rotations_are_known).judge(gone, verdict);
+    const std::vector<uint8_t> known(rotations_are_known ? 0 : at(pair.before.clusters.count()), 0);
+    OneEndOfEach(pair.setup, graph, pair.before, known).judge(gone, verdict);
     return verdict;
   };
   const std::vector<uint8_t> negative = {0, 0, 1, 0}, positive = {0, 0, 0, 1};

@@ -75,7 +75,7 @@ TEST(AdmissibleStep, IsTheSameHoweverManyRunsGoAtTheSameTime) {
   scene.take_step();
   round_to_single(scene.setup.body, scene.after);
   const auto found = [&](int at_once) {
-    return nearest_admissible_step(scene.setup, scene.before, scene.after, Rotations::stated, at_once);
+    return nearest_admissible_step(scene.setup, scene.before, scene.after, {}, at_once);
   };
   const double surely = found(1).position_bound[kInside];
   scene.after.x[kInside].y += 1.5 * surely * kSpacing;
