@@ -10,8 +10,14 @@ namespace cutproof::harness {
 
 namespace {
 
+// What is no number is greater than any.
+void raise(double& greatest, double value) {
+  if (std::isnan(value) || value > greatest) greatest = value;
+}
 void raise(std::optional<double>& greatest, std::optional<double> value) {
-  if (value && !(greatest && *greatest >= *value)) greatest = value;
+  if (!value) return;
+  if (!greatest) greatest = value;
+  raise(*greatest, *value);
 }
 
 }  // namespace
@@ -71,9 +77,10 @@ void PropertySummaries::add(const Verdict& verdict) {
   summary.failed += !verdict.holds;
   summary.undecided += verdict.undecided;
   if (verdict.checked == 0) return;
-  // Comparisons with a NaN are false, so it must not be the first to stand here.
-  if (!(verdict.measured <= summary.measured)) summary.measured = verdict.measured;
-  if (verdict.bound > 0 && std::isfinite(verdict.bound)) raise(summary.of_bound, verdict.measured / verdict.bound);
+  raise(summary.measured, verdict.measured);
+  if (verdict.bound > 0 && std::isfinite(verdict.bound)) {
+    raise(summary.of_bound, std::optional(verdict.measured / verdict.bound));
+  }
 }
 
 void PropertySummaries::join(const PropertySummaries& other) {
@@ -83,7 +90,7 @@ void PropertySummaries::join(const PropertySummaries& other) {
     ours.checked += theirs.checked;
     ours.failed += theirs.failed;
     ours.undecided += theirs.undecided;
-    if (!(theirs.measured <= ours.measured)) ours.measured = theirs.measured;
+    raise(ours.measured, theirs.measured);
     raise(ours.of_bound, theirs.of_bound);
   }
 }
