@@ -1,6 +1,7 @@
 #include "cli/annotations.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -46,7 +47,11 @@ std::string annotation(const Failure& failure) {
                      escaped(failure.text, false), escaped(failure.again, false));
 }
 
-void print_annotations(const std::vector<Failure>& failures) {
+std::string warning(const std::string& title, const std::string& text) {
+  return fmt::format("::warning title=cutproof: {}::{}", escaped(title, true), escaped(text, false));
+}
+
+void print_annotations(const std::vector<Failure>& failures, const std::vector<std::string>& left) {
   const char* const asked = std::getenv("GITHUB_ACTIONS");
   if (asked == nullptr || std::string_view(asked) != "true") return;
   const std::size_t shown = std::min(failures.size(), kMostShown);
@@ -56,6 +61,10 @@ void print_annotations(const std::vector<Failure>& failures) {
       failure.text += fmt::format(" (and {} more that are not shown here)", failures.size() - shown);
     }
     fmt::print("{}\n", annotation(failure));
+  }
+  if (!left.empty()) {
+    fmt::print("{}\n",
+               warning("not judged", fmt::format("the reference ran {} for the backend", fmt::join(left, ", "))));
   }
 }
 

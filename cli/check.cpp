@@ -80,7 +80,8 @@ int check_recording(const CheckOptions& options) {
   print_written(options.report);
   print_conclusion(judge);
   print_annotations(failures_of(judge.verdicts(), judging,
-                                [&](const Verdict& verdict) { return judge.is_expected_failure(verdict); }));
+                                [&](const Verdict& verdict) { return judge.is_expected_failure(verdict); }),
+                    judge.left_to_reference());
   return judge.holds() ? 0 : 1;
 }
 

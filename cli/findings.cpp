@@ -47,6 +47,11 @@ struct CaseRow {
   std::string vacuous = {};  // the first reason that was given
 };
 
+// Of a campaign; documents of earlier versions do not say it.
+std::vector<std::string> left_stages(const json& document) {
+  return document.value("left_to_reference", std::vector<std::string>());
+}
+
 std::string replay_command(const json& violation, const Judging& judging) {
   const std::string file = violation.value("file", "");
   return file.empty() ? judging.again : "cutproof replay " + quoted(file);
@@ -106,9 +111,23 @@ std::vector<JunitCase> cases_of(const harness::SceneJudge& judge, const Judging&
                      JunitOutcome::skipped,
                      fmt::format("not promised: of {} states it would not hold in {}", one.states, one.failing)});
   }
-  for (const std::string& one : judge.not_reached()) {
-    cases.push_back({case_name("expected " + one, name_of(Stage::skin)), judging.class_name, 0, JunitOutcome::skipped,
-                     "not reached: the run stops before"});
+  const auto skip_expected = [&](const std::vector<std::string>& expected, const char* why) {
+    for (const std::string& one : expected) {
+      cases.push_back(
+          {case_name("expected " + one, name_of(Stage::skin)), judging.class_name, 0, JunitOutcome::skipped, why});
+    }
+  };
+  skip_expected(judge.not_reached(), "not reached: the run stops before");
+  skip_expected(judge.not_its_own(), "not judged: only stages decide it that the reference ran for the backend");
+  for (JunitCase& one : cases_of_left(judge.left_to_reference(), judging)) cases.push_back(std::move(one));
+  return cases;
+}
+
+std::vector<JunitCase> cases_of_left(const std::vector<std::string>& stages, const Judging& judging) {
+  std::vector<JunitCase> cases;
+  for (const std::string& stage : stages) {
+    cases.push_back({"stage " + stage, judging.class_name, 0, JunitOutcome::skipped,
+                     "not judged: the reference ran it for the backend"});
   }
   return cases;
 }
@@ -144,6 +163,7 @@ std::vector<JunitCase> cases_of_campaign(const json& document, const std::string
   for (JunitCase& one : cases) {
     if (one.outcome == JunitOutcome::failed && one.text.empty()) one.text = "see it again: " + judging.again + "\n";
   }
+  for (JunitCase& one : cases_of_left(left_stages(document), judging)) cases.push_back(std::move(one));
   JunitCase& whole = case_named(kWholeCampaign);
   if (is_about_the_whole(document, failure)) {
     // Cases that are missing could not be judged; what was judged too little was judged, and that is the failure.

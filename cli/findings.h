@@ -23,8 +23,11 @@ struct Judging {
 // `is_expected`: a failure that the scene asks for, which passes.
 std::vector<io::JunitCase> cases_of(const std::vector<Verdict>& verdicts, const Judging& judging,
                                     const std::function<bool(const Verdict&)>& is_expected = {});
-// The same of all that was judged of a run; what was not promised is skipped, with how often it would not hold.
+// The same of all that was judged of a run. Skipped are what was not promised, with how often it would not hold, and
+// each stage that was left to the reference.
 std::vector<io::JunitCase> cases_of(const harness::SceneJudge& judge, const Judging& judging);
+// A skipped case for each stage that the reference ran for the backend.
+std::vector<io::JunitCase> cases_of_left(const std::vector<std::string>& stages, const Judging& judging);
 // Of a campaign's document. `failure`: of its conclusion, empty if it holds; it is a case by itself unless it is that
 // properties fail.
 std::vector<io::JunitCase> cases_of_campaign(const nlohmann::json& document, const std::string& failure,

@@ -28,6 +28,7 @@
 #include "model/io/columns.h"
 #include "model/io/filled.h"
 #include "model/io/recording.h"
+#include "model/left_stages.h"
 #include "model/printable.h"
 #include "property_tests/campaign.h"
 #include "property_tests/campaign_report.h"
@@ -158,6 +159,9 @@ void print_campaign(const json& document) {
         "rounding may carry farther\n",
         document.at("steps_compared"));
   }
+  if (const auto left = document.value("left_to_reference", std::vector<std::string>()); !left.empty()) {
+    say("{}\n", undecided(printable(left_in_words(left))));
+  }
   if (document.at("refused") > 0) {
     say("{}\n", undecided(io::filled("{refused} cases were refused: nothing is known of them", document)));
   }
@@ -192,7 +196,8 @@ int conclude_campaign(const FuzzOptions& options, const json& document, bool who
               cases_of_campaign(document, conclusion.failure, judging));
   const int status = print_conclusion(document, conclusion);
   print_written(options.report);
-  print_annotations(failures_of_campaign(document, conclusion.failure, judging));
+  print_annotations(failures_of_campaign(document, conclusion.failure, judging),
+                    document.value("left_to_reference", std::vector<std::string>()));
   return status;
 }
 

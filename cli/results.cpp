@@ -62,6 +62,7 @@ nlohmann::json to_json(const RunResult& result, const harness::SceneJudge* judge
     document["properties"] = judge->summaries().to_json();
     document["notes"] = judge->notes();
     document["not_reached"] = judge->not_reached();
+    document["left_to_reference"] = {{"stages", judge->left_to_reference()}, {"expected", judge->not_its_own()}};
   }
   return document;
 }

@@ -32,6 +32,7 @@
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
 #include "model/io/verdict_json.h"
+#include "model/left_stages.h"
 #include "model/printable.h"
 
 namespace cutproof::cli {
@@ -151,7 +152,16 @@ void compare(Against& against, const Setup& setup, const harness::Moment& moment
     refuse("--against", "this backend runs several stages in one piece",
            "choose one that runs them one by one, or leave --against out");
   }
-  against.see(moment.span.last, *moment.after, ran[static_cast<std::size_t>(moment.span.last)]);
+  against.see(moment.span.last, *moment.after, ran[static_cast<std::size_t>(moment.span.last)], moment.by_backend);
+}
+
+// These are measured by runs of their own.
+void require_errors(const Backend& backend, const harness::ErrorsWanted& wanted) {
+  const bool frames = backend.can_run({}), steps = frames || backend.can_run({Stage::step, Stage::step});
+  if ((wanted.time_step || wanted.conservation) && !frames) {
+    refuse("--errors", "this backend does not run whole frames", "leave time_step and conservation out");
+  }
+  if (wanted.solver && !steps) refuse("--errors", "this backend does not run the step", "leave solver out");
 }
 
 int run(const RunOptions& options) {
@@ -170,6 +180,7 @@ int run(const RunOptions& options) {
     build_options.mesh = MeshSpec{options.mesh, metres_per(options.unit), options.repair};
   }
   const std::unique_ptr<Backend> backend = make_backend(options.backend);
+  require_errors(*backend, wanted);
 
   const std::vector<io::SceneChange> changes = changes_of(options.scene);
   Scene scene = io::read_scene(options.scene.file, changes);
@@ -186,7 +197,10 @@ int run(const RunOptions& options) {
   // A page is made from a recording, whether somebody wants to keep that or not.
   const std::string record =
       options.record.empty() && !options.report.empty() ? passing_recording(options.report) : options.record;
-  if (!record.empty()) recorder.emplace(record, built.setup, io::write_scene(scene), options.backend.name);
+  if (!record.empty()) {
+    recorder.emplace(record, built.setup, io::write_scene(scene), options.backend.name,
+                     harness::left_to_reference(*backend));
+  }
   std::optional<harness::SceneJudge> judge;
   std::optional<harness::RelationSample> relations;
   std::optional<Against> against;
@@ -223,7 +237,9 @@ int run(const RunOptions& options) {
     add(Stage::skin, built.state);
     against->observe_reference(add);
   }
+  harness::StagesRun stages;
   const harness::Observer see = [&](const harness::Moment& moment) {
+    stages.see(built.setup, moment);
     if (judge) judge->see(moment);
     if (relations) {
       relations->see(moment);
@@ -285,6 +301,7 @@ int run(const RunOptions& options) {
     nlohmann::json document = to_json(result, judge ? &*judge : nullptr);
     document["build"] = build_json(built);
     document["changes"] = given_changes(changes);
+    if (!judge) document["left_to_reference"] = {{"stages", stages.left()}, {"expected", nlohmann::json::array()}};
     if (against) {
       document["against"] = to_json(*against, built.setup);
       document["against"]["verdicts"] = io::verdicts_json(against->verdicts());
@@ -299,6 +316,9 @@ int run(const RunOptions& options) {
   const std::vector<Verdict> beside = against ? against->verdicts() : std::vector<Verdict>();
   if (!options.junit.empty()) {
     std::vector<io::JunitCase> cases = judge ? cases_of(*judge, judging) : cases_of(broken, judging);
+    if (!judge) {
+      for (io::JunitCase& one : cases_of_left(stages.left(), judging)) cases.push_back(std::move(one));
+    }
     for (io::JunitCase& one : cases_of(beside, judging)) cases.push_back(std::move(one));
     if (errors && errors->conservation()) cases.push_back(conservation_case(*errors, judging));
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
@@ -323,6 +343,7 @@ int run(const RunOptions& options) {
   } else {
     const Shown of_the_run{options.again};
     print_verdicts(broken, of_the_run);
+    if (against && !stages.left().empty()) say("{}\n", undecided(left_in_words(stages.left())));
     if (against) {
       std::vector<Verdict> all = beside;
       all.insert(all.end(), broken.begin(), broken.end());
@@ -337,7 +358,7 @@ int run(const RunOptions& options) {
             : failures_of(broken, judging);
   for (Failure& failure : failures_of(beside, judging)) failures.push_back(std::move(failure));
   if (errors && !errors->holds()) failures.push_back({kConservation, kNotConserved, judging.again});
-  print_annotations(failures);
+  print_annotations(failures, judge ? judge->left_to_reference() : stages.left());
   return broken.empty() && (!judge || judge->holds()) && (!against || against->holds()) && (!errors || errors->holds())
              ? 0
              : 1;

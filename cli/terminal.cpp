@@ -15,6 +15,7 @@
 #include "model/io/columns.h"
 #include "model/io/filled.h"
 #include "model/io/verdict_json.h"
+#include "model/left_stages.h"
 #include "oracles/property_count.h"
 #include "oracles/registry.h"
 
@@ -254,6 +255,12 @@ void print_verdicts(const harness::SceneJudge& judge, const std::string& again) 
   if (!judge.not_reached().empty()) {
     say("{}: {}.\n", undecided("Not reached, because the run stops before"), listed(judge.not_reached()));
   }
+  if (const std::vector<std::string> left = judge.left_to_reference(); !left.empty()) {
+    say("{}\n", undecided(left_in_words(left)));
+  }
+  if (!judge.not_its_own().empty()) {
+    say("{}: {}.\n", undecided("Not judged, because only such stages decide it"), listed(judge.not_its_own()));
+  }
   std::vector<std::string> unpromised;
   for (const harness::Judge::Unpromised& u : judge.unpromised()) {
     unpromised.push_back(u.failing > 0 ? fmt::format("{} (would not hold in {} of {} states)", u.property,
@@ -261,7 +268,7 @@ void print_verdicts(const harness::SceneJudge& judge, const std::string& again) 
                                        : u.property);
   }
   if (!unpromised.empty()) say("{}: {}.\n", undecided("Not promised here, so not judged"), listed(unpromised));
-  print_notes(judge.notes_beside_promises());
+  print_notes(judge.notes_beside_lists());
 }
 
 void print_grouped(const std::string& what, const std::vector<std::pair<std::string, std::string>>& names_and_reasons) {
@@ -300,8 +307,10 @@ void print_conclusion(const std::vector<Verdict>& verdicts, const Shown& shown, 
 }
 
 void print_conclusion(const harness::SceneJudge& judge) {
-  print_conclusion(judge.verdicts().size(), failures_in(judge.verdicts(), shown_of(judge, "")), judge.holds(),
-                   judge.not_reached().empty() ? "everything holds." : "what was reached holds.");
+  const char* const holds = !judge.left_to_reference().empty() ? "what the backend ran holds."
+                            : judge.not_reached().empty()      ? "everything holds."
+                                                               : "what was reached holds.";
+  print_conclusion(judge.verdicts().size(), failures_in(judge.verdicts(), shown_of(judge, "")), judge.holds(), holds);
 }
 
 }  // namespace cutproof::cli

@@ -1,5 +1,6 @@
 // `cutproof run --against reference`: a backend's run beside the reference's, in lockstep, free-running or both.
 #pragma once
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -21,9 +22,15 @@ struct Against {
   Against(const Setup& setup, const State& start, const State& loaded, const std::string& backend, AgainstMode mode);
   // From now on: told the reference's states, of lockstep where that was asked for, else of the free run.
   void observe_reference(std::function<void(Stage, const State&)> observer);
-  void see(Stage stage, const State& after, bool launched);
+  // `by_backend`: false of a stage that the reference ran for the backend, which is not compared.
+  void see(Stage stage, const State& after, bool launched, bool by_backend = true);
+  // A comparison of stages of which the backend ran none does not hold.
   std::vector<Verdict> verdicts() const;
   bool holds() const;
+
+ private:
+  std::string backend_;
+  int64_t compared_ = 0, left_ = 0;  // stages
 };
 
 }  // namespace cutproof::harness

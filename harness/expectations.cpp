@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "model/at.h"
+#include "model/fields.h"
 #include "oracles/oracles.h"
 #include "oracles/piece_sizes.h"
 #include "oracles/surface/surface.h"
@@ -86,8 +87,26 @@ void ExpectationCheck::see(const Moment& moment) {
   }
 }
 
-ExpectationCheck::Judged ExpectationCheck::judged() const {
+ExpectationCheck::Judged ExpectationCheck::judged(const StagesRun& stages) const {
+  using enum Stage;
   Judged found;
+  // What of a frame an outcome hangs on. A split removes particles only where it is asked to.
+  const StageSet removal =
+                     setup_.split.debris > 0 ? cutproof::stages(step, detect, split) : cutproof::stages(step, detect),
+                 of_skin = {removal.bits | cutproof::stages(skin).bits},
+                 of_clusters = cutproof::stages(step, detect, split, merge, expand),
+                 of_motion = cutproof::stages(step, detect), of_the_scene = cutproof::stages();
+  const auto is_its_own = [&](const std::string& what, StageSet decided_by) {
+    bool by_backend = false, by_reference = false;
+    for (const Stage stage : kStages) {
+      if (!decided_by.contains(stage)) continue;
+      by_backend = by_backend || stages.by_backend[at(stage)] > 0;
+      by_reference = by_reference || stages.by_reference[at(stage)] > 0;
+    }
+    if (by_backend || !by_reference) return true;
+    found.not_its_own.push_back(what);
+    return false;
+  };
   const auto add = [&](const std::string& what, double measured, double low, double high, const std::string& unit,
                        int64_t frame, const std::string& text) {
     Verdict& verdict = found.verdicts.emplace_back();
@@ -113,9 +132,10 @@ ExpectationCheck::Judged ExpectationCheck::judged() const {
     if (!measured) found.verdicts.back().holds = false;
   };
   // What may change until the run ends, unless it `is_final`, and what is too much and will not become less.
-  const auto within = [&](const std::string& what, double measured, const std::optional<Range>& range,
-                          const std::string& unit, int64_t frame, bool is_final, bool grows_only) {
-    if (!range) return;
+  const auto within = [&](const std::string& what, StageSet decided_by, double measured,
+                          const std::optional<Range>& range, const std::string& unit, int64_t frame, bool is_final,
+                          bool grows_only) {
+    if (!range || !is_its_own(what, decided_by)) return;
     if (!is_whole && !is_final && !(grows_only && measured > range->high)) {
       found.not_reached.push_back(what);
       return;
@@ -123,13 +143,14 @@ ExpectationCheck::Judged ExpectationCheck::judged() const {
     add(what, measured, range->low, range->high, unit, frame,
         fmt::format("{} is {:.6g}, expected {:.6g} to {:.6g}", what, measured, range->low, range->high));
   };
-  const auto greatest = [&](const std::string& what, const Greatest& of, const std::optional<Range>& range,
-                            const std::string& unit, bool is_final = false) {
-    within(what, of.value, range, unit, of.beyond.value_or(last_frame()), is_final, true);
+  const auto greatest = [&](const std::string& what, StageSet decided_by, const Greatest& of,
+                            const std::optional<Range>& range, const std::string& unit, bool is_final = false) {
+    within(what, decided_by, of.value, range, unit, of.beyond.value_or(last_frame()), is_final, true);
   };
   const auto& after_stroke = expectations_.components_after_stroke;
   for (std::size_t s = 0; s < after_stroke.size(); ++s) {
     const std::string stroke = std::to_string(s + 1), what = "components after stroke " + stroke;
+    if (!is_its_own(what, removal)) continue;
     const bool exists = s < after_stroke_.size();
     if (exists && !is_whole && setup_.stroke_end[s] < 0) {
       found.not_reached.push_back(what);
@@ -142,35 +163,38 @@ ExpectationCheck::Judged ExpectationCheck::judged() const {
                  : "the scene has no stroke " + stroke);
   }
   const State& last = *last_;
-  const auto at_end = [&](const std::string& what, const std::optional<int64_t>& wanted, const auto& judge) {
-    if (!wanted) return;
+  const auto at_end = [&](const std::string& what, StageSet decided_by, const std::optional<int64_t>& wanted,
+                          const auto& judge) {
+    if (!wanted || !is_its_own(what, decided_by)) return;
     if (is_whole) {
       judge(what, *wanted);
     } else {
       found.not_reached.push_back(what);
     }
   };
-  at_end("components at the end", expectations_.components_at_end, [&](const std::string& what, int64_t wanted) {
+  const auto judge_components = [&](const std::string& what, int64_t wanted) {
     const oracles::Partition pieces = oracles::graph_components(setup_, last);
     const bool known_since = pieces.count == components_ && pieces.count > wanted;
     equal(what, pieces.count, wanted, known_since ? components_since_ : last_frame(), "at the end",
           oracles::pieces_in_words(pieces), "");
-  });
-  at_end("shells at the end", expectations_.shells_at_end, [&](const std::string& what, int64_t wanted) {
+  };
+  const auto judge_shells = [&](const std::string& what, int64_t wanted) {
     const std::optional<oracles::ShellCount> shells = oracles::skin_shells(last.skin);
     equal(what, shells ? std::optional<int64_t>(shells->outer) : std::nullopt, wanted, last_frame(), "at the end",
           oracles::pieces_in_words(oracles::graph_components(setup_, last)),
           "the shells of the skin at the end cannot be counted: its triangles are no closed surface");
-  });
+  };
+  at_end("components at the end", removal, expectations_.components_at_end, judge_components);
+  at_end("shells at the end", of_skin, expectations_.shells_at_end, judge_shells);
   const double clusters = static_cast<double>(initial_clusters_);
-  greatest("removed particles", removed_, expectations_.removed, "1");
-  greatest("isolated groups of clusters", isolated_, expectations_.isolated_clusters, "1");
-  within("cluster growth", clusters > 0 ? (last.clusters.count() - clusters) / clusters : 0,
+  greatest("removed particles", removal, removed_, expectations_.removed, "1");
+  greatest("isolated groups of clusters", of_clusters, isolated_, expectations_.isolated_clusters, "1");
+  within("cluster growth", of_clusters, clusters > 0 ? (last.clusters.count() - clusters) / clusters : 0,
          expectations_.cluster_growth, "1", last_frame(), false, false);
-  within("clusters", clusters, expectations_.clusters, "1", 0, true, false);
-  within("particles", setup_.body.particle_count(), expectations_.particles, "1", 0, true, false);
-  greatest("dent before the first removal", dent_, expectations_.dent, "h", removed_.value > 0);
-  greatest("greatest stretch", greatest_stretch_, expectations_.greatest_stretch, "h");
+  within("clusters", of_the_scene, clusters, expectations_.clusters, "1", 0, true, false);
+  within("particles", of_the_scene, setup_.body.particle_count(), expectations_.particles, "1", 0, true, false);
+  greatest("dent before the first removal", of_motion, dent_, expectations_.dent, "h", removed_.value > 0);
+  greatest("greatest stretch", of_motion, greatest_stretch_, expectations_.greatest_stretch, "h");
   return found;
 }
 

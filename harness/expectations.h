@@ -33,9 +33,11 @@ class ExpectationCheck {
     std::vector<Verdict> verdicts;
     // The rest of what is expected, which such a run has not reached.
     std::vector<std::string> not_reached;
+    // What is decided by stages of which the backend ran none: the reference's outcome, held against nobody.
+    std::vector<std::string> not_its_own;
   };
-  // After the last moment.
-  Judged judged() const;
+  // After the last moment. `stages`: who ran them.
+  Judged judged(const StagesRun& stages) const;
 
   // Whether the scene expects anything at all.
   bool any() const;

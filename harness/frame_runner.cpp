@@ -48,6 +48,14 @@ std::vector<PlannedSpan> plan_spans(const Backend& backend, Span span, bool fine
   return plan;
 }
 
+std::array<bool, 6> left_to_reference(const Backend& backend) {
+  std::array<bool, 6> left = {};
+  for (const PlannedSpan& piece : plan_spans(backend, {}, true)) {
+    if (!piece.by_backend) left[at(piece.span.first)] = true;  // it is a stage by itself
+  }
+  return left;
+}
+
 FrameRunner::FrameRunner(Backend& backend, std::vector<Setup> setups, const std::vector<State>& states)
     : backend_(backend), setups_(std::move(setups)) {
   backend_.load(setups_, states);

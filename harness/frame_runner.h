@@ -19,6 +19,8 @@ struct PlannedSpan {
 // ways the one in which the backend runs the most stages, and of these the one with the most pieces (`finest`), or the
 // fewest.
 std::vector<PlannedSpan> plan_spans(const Backend& backend, Span span, bool finest);
+// By stage: whether the reference will run it in the frames of this backend.
+std::array<bool, 6> left_to_reference(const Backend& backend);
 
 // One load of one or more bodies.
 class FrameRunner {

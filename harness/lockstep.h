@@ -44,8 +44,9 @@ class Lockstep {
   Lockstep(const Setup& setup, const State& start, const State& loaded, std::string backend);
 
   // The backend's state after `stage`, of every stage of every frame, in order; whether the backend launched it.
-  // A state that is not well formed is a difference, and ends the comparison.
-  void see(Stage stage, const State& after, bool launched);
+  // A state that is not well formed is a difference, and ends the comparison. `by_backend`: false of a stage that the
+  // reference ran for the backend: it is passed over.
+  void see(Stage stage, const State& after, bool launched, bool by_backend = true);
 
   // From now on: told what the reference has made of the backend's state, of every stage that the backend launched.
   void observe_reference(std::function<void(Stage, const State&)> observer) { observer_ = std::move(observer); }

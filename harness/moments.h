@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "model/setup.h"
@@ -38,6 +39,20 @@ struct Trace {
 // The stages of a span that model/backend.h has a body run, given the states before and after it (`after` is asked only
 // for what was removed in it). The skin stage ends the frame whether a skin is wanted or not.
 std::array<bool, 6> due_stages(const Setup& setup, const State& before, Span span, const State& after);
+
+// Who ran the stages that were due: of each stage in how many moments the backend did, and in how many the reference
+// did it for a backend that cannot.
+struct StagesRun {
+  std::array<int64_t, 6> by_backend = {}, by_reference = {};
+
+  void see(const Setup& setup, const Moment& moment);
+  void join(const StagesRun& other);
+  bool any_by_backend() const;
+  // The backend could not run it, so the reference did.
+  bool is_left(Stage stage) const;
+  // Names of those, in order.
+  std::vector<std::string> left() const;
+};
 
 // A failing verdict: something that model/backend.h promises does not hold.
 Verdict broken_contract(std::string what, Stage stage, int64_t frame, int32_t body = 0);

@@ -1,5 +1,6 @@
 #include "harness/recorded_run.h"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -26,7 +27,12 @@ std::vector<Verdict> walk_recording(const io::RecordingReader& reader, const Sna
     const Span span = {next, last};
     const auto due = due_stages(setup, *before, span, *after);
     for (std::size_t s = 0; s < due.size(); ++s) frame.ran[s] = frame.ran[s] || due[s];
-    observe({0, span, std::exchange(before, after), after, true});
+    // Of what is due nothing was left; or where nothing is, the stage that was recorded was not.
+    const std::array<bool, 6>& left = reader.header().left_to_reference;
+    const bool any_due = std::find(due.begin(), due.end(), true) != due.end();
+    bool by_backend = any_due || !left[static_cast<std::size_t>(last)];
+    for (std::size_t s = 0; s < due.size(); ++s) by_backend = by_backend && !(due[s] && left[s]);
+    observe({0, span, std::exchange(before, after), after, by_backend});
     next = last == Stage::skin ? Stage::step : static_cast<Stage>(static_cast<int>(last) + 1);
     if (last != Stage::skin) continue;
     count(frame, *after);

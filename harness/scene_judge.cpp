@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <map>
 
+#include "model/left_stages.h"
+
 namespace cutproof::harness {
 
 SceneJudge::SceneJudge(const Setup& setup, const Expectations& expectations, std::string backend,
@@ -17,6 +19,7 @@ SceneJudge::SceneJudge(const Setup& setup, const Expectations& expectations, std
 }
 
 void SceneJudge::see(const Moment& moment) {
+  stages_.see(setup_, moment);
   judge_.see(moment);
   expectations_.see(moment);
 }
@@ -47,10 +50,11 @@ void SceneJudge::finish() {
     looked.checked += verdict.checked;
     looked.excused = looked.excused || !verdict.vacuous.empty() || !verdict.holds;
   }
-  ExpectationCheck::Judged expected = expectations_.judged();
+  ExpectationCheck::Judged expected = expectations_.judged(stages_);
   const bool none_reached = expected.verdicts.empty();
   for (Verdict& verdict : expected.verdicts) judge_.add(std::move(verdict));
   not_reached_ = std::move(expected.not_reached);
+  not_its_own_ = std::move(expected.not_its_own);
   if (none_reached && !not_reached_.empty()) {
     note("The run stops before anything that the scene expects could be told: no outcome was held against it.");
   }
@@ -62,9 +66,15 @@ void SceneJudge::finish() {
     whole("every property looked at something", false, 0, 1,
           fmt::format("'{}' holds, but it looked at nothing and does not say why", property));
   }
-  const double moments = seen * setup_.body.particle_count();
-  whole("something was judged", moments > 0, moments, 1,
-        "there was nothing to judge: there are no frames, or the body has no particles");
+  int64_t judged = 0;
+  for (const PropertySummary& summary : summaries_.all()) judged += summary.judged;
+  const bool is_empty = seen == 0 || setup_.body.particle_count() == 0;
+  const bool ran_nothing = !stages_.any_by_backend() && !stages_.left().empty();
+  whole("something was judged", judged > 0 && !is_empty && !ran_nothing,
+        is_empty || ran_nothing ? 0 : static_cast<double>(judged), 1,
+        ran_nothing ? "the backend ran no stage: the reference ran all of them for it"
+        : is_empty  ? "there was nothing to judge: there are no frames, or the body has no particles"
+                    : "no property looked at anything");
 }
 
 bool SceneJudge::holds() const {
@@ -73,7 +83,7 @@ bool SceneJudge::holds() const {
                      [this](const Verdict& verdict) { return verdict.holds || is_expected_failure(verdict); });
 }
 
-std::vector<std::string> SceneJudge::notes_beside_promises() const {
+std::vector<std::string> SceneJudge::notes_beside_lists() const {
   std::vector<std::string> notes;
   if (!expectations_.any()) notes.push_back("The scene expects nothing: no outcome was held against it.");
   if (depth_ == Depth::topology) {
@@ -86,7 +96,8 @@ std::vector<std::string> SceneJudge::notes_beside_promises() const {
 }
 
 std::vector<std::string> SceneJudge::notes() const {
-  std::vector<std::string> notes = notes_beside_promises();
+  std::vector<std::string> notes = notes_beside_lists();
+  if (const std::vector<std::string> left = left_to_reference(); !left.empty()) notes.push_back(left_in_words(left));
   for (const Judge::Unpromised& u : judge_.unpromised()) {
     notes.push_back(fmt::format("'{}' is not promised here: of {} states it would not hold in {}.", u.property,
                                 u.states, u.failing));

@@ -24,7 +24,8 @@ class SceneJudge {
   void note(std::string sentence) { notes_.push_back(std::move(sentence)); }
 
   // After the last moment: what the scene expects, whether the run came to the end of its schedule, and whether each
-  // property that applied looked at anything at all. A run of which nothing was judged does not hold.
+  // property that applied looked at anything at all. A run of which nothing was judged does not hold, nor does one in
+  // which the backend ran no stage.
   void finish();
 
   const std::vector<Verdict>& verdicts() const { return judge_.verdicts(); }
@@ -37,18 +38,25 @@ class SceneJudge {
   // What the scene expects of frames and strokes that a run that is cut short has not reached: neither failures nor
   // passes. Complete after finish().
   const std::vector<std::string>& not_reached() const { return not_reached_; }
+  // The stages that the backend cannot run, so that the reference did: none of them was judged. Complete after the last
+  // moment.
+  std::vector<std::string> left_to_reference() const { return stages_.left(); }
+  // What the scene expects and only such stages decide: neither failures nor passes. Complete after finish().
+  const std::vector<std::string>& not_its_own() const { return not_its_own_; }
   // What a reader of the verdicts has to know, one sentence each: that the scene expects nothing, what was not judged,
   // which properties were not promised.
   std::vector<std::string> notes() const;
-  // The same but for those on promises, of which unpromised() says more.
-  std::vector<std::string> notes_beside_promises() const;
+  // The same but for those on promises and on stages that were left to the reference, of which unpromised(),
+  // left_to_reference() and not_its_own() say more.
+  std::vector<std::string> notes_beside_lists() const;
 
  private:
   const Setup& setup_;
   Depth depth_;
   Judge judge_;
   PropertySummaries summaries_;
-  std::vector<std::string> notes_, not_reached_;
+  StagesRun stages_;
+  std::vector<std::string> notes_, not_reached_, not_its_own_;
   ExpectationCheck expectations_;
 };
 

@@ -192,6 +192,7 @@ class Runner {
       campaign_.coverage.add(judgement.coverage);
       campaign_.compared.join(judgement.compared);
       campaign_.properties.join(judgement.properties);
+      campaign_.stages.join(judgement.stages);
       if (!judgement.failure) continue;
       campaign_.violations.push_back({load.indices[k], load.cases[k], std::move(*judgement.failure)});
       if (!options_.keep_going) stop_ = true;

@@ -49,6 +49,7 @@ struct Campaign {
   CaseCoverage coverage;
   StepsCompared compared;
   harness::PropertySummaries properties;
+  harness::StagesRun stages;
   std::vector<Violation> violations;  // by index; without keep_going the first alone
   double seconds = 0;                 // wall time
   // Of all threads together [s].

@@ -74,6 +74,20 @@ void require_same_campaign(const json& whole, const json& part, const std::strin
   }
 }
 
+// Stages that the reference ran for the backend, in order; documents of earlier versions do not say it.
+std::vector<std::string> left_stages(const json& document) {
+  return document.value("left_to_reference", std::vector<std::string>());
+}
+json left_in_either(const json& one, const json& other) {
+  const std::vector<std::string> here = left_stages(one), there = left_stages(other);
+  json both = json::array();
+  for (const std::string_view stage : kStageNames) {
+    const auto has = [&](const auto& list) { return std::find(list.begin(), list.end(), stage) != list.end(); };
+    if (has(here) || has(there)) both.push_back(stage);
+  }
+  return both;
+}
+
 // `part` is added to `whole`.
 void add_shard(json& whole, const json& part) {
   for (const char* count : kCounts) add_count(whole.at(count), part.at(count));
@@ -107,6 +121,7 @@ void add_shard(json& whole, const json& part) {
       harness::add_summary(*known, theirs);
     }
   }
+  whole["left_to_reference"] = left_in_either(whole, part);
   for (const json& violation : part.at("violations")) whole["violations"].push_back(violation);
 }
 
@@ -153,6 +168,7 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
        {{"generating", campaign.generating}, {"running", campaign.running}, {"judging", campaign.judging}}},
       {"coverage", coverage},
       {"properties", campaign.properties.to_json()},
+      {"left_to_reference", campaign.stages.left()},
       {"violations", violations},
       {"holds", violations.empty() && campaign.verdicts > 0 && !campaign.stopped}};
   sort_properties(document["properties"]);
@@ -209,6 +225,7 @@ void require_fields(const json& part, const std::string& file, bool has_every_cl
     for (const char* count : {"judged", "checked", "failed", "undecided"}) require_count(property, count);
     for (const char* figure : {"measured", "of_bound"}) static_cast<void>(property.at(figure));
   }
+  static_cast<void>(left_stages(part));
   for (const json& violation : part.at("violations").get<std::vector<json>>()) {
     static_cast<void>(integer_from<int64_t>(violation.at("index")));
     for (const char* word : {"text", "file"}) static_cast<void>(violation.at(word).get<std::string>());
@@ -366,7 +383,11 @@ CampaignConclusion conclude(const json& document, bool whole) {
     return {fmt::format("{} of {} cases{}", violations, cases, lost.empty() ? "" : "; " + lost)};
   }
   if (!lost.empty()) return {lost};
-  if (cases == 0 || document.at("verdicts").get<int64_t>() == 0) return {"nothing was judged"};
+  const std::vector<std::string> left = left_stages(document);
+  if (cases == 0 || document.at("verdicts").get<int64_t>() == 0) {
+    return {left.empty() ? "nothing was judged"
+                         : "nothing was judged: the backend ran no stage, the reference ran all of them for it"};
+  }
   if (!whole || cases < kCasesThatMeetEveryClass) return {};
   std::vector<std::string> empty, rare;
   for (const CoverageClass& wanted : kCoverageClasses) {
@@ -383,7 +404,9 @@ CampaignConclusion conclude(const json& document, bool whole) {
     return {fmt::format("of {} cases fewer than one in ten had: {}, so too little was tested there", cases,
                         fmt::join(rare, ", "))};
   }
-  if (document.contains("steps_compared") && document.at("steps_compared").at("particles").get<int64_t>() == 0) {
+  const bool steps = std::find(left.begin(), left.end(), name_of(Stage::step)) == left.end();
+  if (steps && document.contains("steps_compared") &&
+      document.at("steps_compared").at("particles").get<int64_t>() == 0) {
     return {"no position after a step was compared with the reference's"};
   }
   for (const json& property : document.value("properties", json::array())) {

@@ -238,6 +238,7 @@ Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, 
   for (const harness::Moment& moment : run.trace.moments) {
     if (judgement.failure) break;
     const State &before = *moment.before, &after = *moment.after;
+    judgement.stages.see(setup, moment);
     judge.see(moment);
     take(judge.take_verdicts());
     for (const harness::Judge::Unpromised& u : judge.unpromised()) {

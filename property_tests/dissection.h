@@ -112,6 +112,7 @@ struct Judgement {
   CaseCoverage coverage;  // 1 for what happened
   StepsCompared compared;
   harness::PropertySummaries properties;
+  harness::StagesRun stages;
   int64_t verdicts = 0;            // how many were asked for
   std::optional<Verdict> failure;  // the first that does not hold
   bool refused = false;            // by the backend, so nothing was judged

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "harness/frame_runner.h"
 #include "model/error.h"
 #include "model/io/recording.h"
 #include "property_tests/dissection.h"
@@ -11,8 +12,8 @@ namespace cutproof::property_tests {
 namespace {
 
 // Frames as a recording holds them (io::Recorder).
-void record(const std::string& name, const Instance& loaded, const harness::Trace& trace, const std::string& backend) {
-  io::Recorder recorder(name, loaded.setup, "", backend);
+void record(const std::string& name, const Instance& loaded, const harness::Trace& trace, const Backend& backend) {
+  io::Recorder recorder(name, loaded.setup, "", backend.name(), harness::left_to_reference(backend));
   recorder.add(Stage::skin, *trace.initial);
   for (const harness::Moment& moment : trace.moments) recorder.add(moment.span.last, *moment.after);
   recorder.finish();
@@ -24,7 +25,7 @@ std::string record_case(const std::string& name, const std::unique_ptr<Backend>&
   try {
     std::vector<Instance> loaded = {instance_of(c)};
     const std::vector<CaseRun> runs = run_cases(*backend, loaded);
-    record(name, loaded.front(), runs.front().trace, backend->name());
+    record(name, loaded.front(), runs.front().trace, *backend);
     return {};
   } catch (const MachineError&) {
     throw;

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "model/io/columns.h"
+#include "model/left_stages.h"
 #include "report/document_fields.h"
 #include "report/older.h"
 
@@ -120,6 +121,8 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
     sheet.facts.push_back(fmt::format("shard {} of {}", document["shard"].count(), document["shards"].count()));
   if (document["commit"].is_there()) sheet.facts.push_back("commit " + document["commit"].text());
   sheet.facts.push_back("cutproof " + document["cutproof"].text());
+  if (const Field left = document["left_to_reference"]; left.is_there() && left.length() > 0)
+    sheet.notes.push_back(left_in_words(left.texts()));
   if (refused > 0)
     sheet.notes.push_back(fmt::format("The backend refused {}: nothing is known of them.", cases_in_words(refused)));
   if (properties.undecided > 0)

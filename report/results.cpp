@@ -13,6 +13,7 @@
 #include "model/io/columns.h"
 #include "model/io/json_reader.h"
 #include "model/io/limits.h"
+#include "model/left_stages.h"
 #include "oracles/property_count.h"
 #include "oracles/registry.h"
 #include "report/field.h"
@@ -222,6 +223,12 @@ Results results_of(const json& given, const std::string& file) {
   if (document["checked"].flag()) results.holds = document["summary"]["holds"].flag() && results.holds;
   results.notes = document["notes"].texts();
   results.not_reached = document["not_reached"].texts();
+  if (const Field left = document["left_to_reference"]; left.is_there()) {
+    results.left_stages = left["stages"].texts();
+    // The stages are among the notes already.
+    for (const std::string& one : left["expected"].texts())
+      results.notes.push_back("Not judged, because only such stages decide it: " + one + ".");
+  }
   add_series(document, results);
   return results;
 }
@@ -262,9 +269,7 @@ std::string count_in_words(const std::vector<PropertyRow>& rows) {
   return words;
 }
 
-}  // namespace
-
-std::string summary_sentence(const Results& results) {
+std::string of_what_was_judged(const Results& results) {
   const std::string scene = results.scene.empty() ? "a scene without a name" : "scene " + results.scene;
   const std::string subject =
       results.command == "run" ? fmt::format("cutproof ran {} on backend {}", scene, results.backend)
@@ -284,6 +289,13 @@ std::string summary_sentence(const Results& results) {
   if (first == results.findings.end()) return sentence + ".";
   return sentence + fmt::format("; '{}' fails{} in frame {} after {}.", first->property, failing > 1 ? " first," : "",
                                 first->frame, name_of(first->stage));
+}
+
+}  // namespace
+
+std::string summary_sentence(const Results& results) {
+  const std::string sentence = of_what_was_judged(results);
+  return results.left_stages.empty() ? sentence : sentence + " " + left_in_words(results.left_stages);
 }
 
 }  // namespace cutproof::report

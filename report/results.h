@@ -56,8 +56,9 @@ struct Results {
   std::vector<Finding> findings;  // by frame and stage, those that were expected at the end; at most kMostFindings
   int64_t findings_left_out = 0;
   std::vector<std::string> notes, not_reached;
-  std::vector<Series> seconds;  // of each stage that was timed [s]
-  std::vector<Series> errors;   // [h]
+  std::vector<std::string> left_stages;  // that the reference ran for the backend: not judged
+  std::vector<Series> seconds;           // of each stage that was timed [s]
+  std::vector<Series> errors;            // [h]
 };
 inline constexpr std::size_t kMostFindings = 300;      // of all properties, and
 inline constexpr int64_t kMostFindingsOfOne = 30;      // of one property after one stage

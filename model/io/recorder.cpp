@@ -115,7 +115,8 @@ auto writing(const std::string& file, const std::string& what, F&& action) {
 }  // namespace
 
 struct Recorder::File {
-  File(const std::string& name, const Setup& given, const std::string& scene_json, const std::string& backend);
+  File(const std::string& name, const Setup& given, const std::string& scene_json, const std::string& backend,
+       const std::array<bool, 6>& left_to_reference);
   void add(Stage stage, const State& state);
   void finish();
 
@@ -181,7 +182,7 @@ struct Recorder::File {
 };
 
 Recorder::File::File(const std::string& given_name, const Setup& given, const std::string& scene_json,
-                     const std::string& backend)
+                     const std::string& backend, const std::array<bool, 6>& left_to_reference)
     : name(recording_paths(given_name).index),
       setup(given),
       time(1, 0.0),
@@ -200,6 +201,10 @@ Recorder::File::File(const std::string& given_name, const Setup& given, const st
   digest.add(std::string_view(scene_json));
   digest.add(std::string_view(backend));
   hdf5::write_text_attribute(index.id(), "backend", backend);
+  if (const std::string left = words_of_stages(left_to_reference); !left.empty()) {
+    digest.add(std::string_view(left));
+    hdf5::write_text_attribute(index.id(), kLeftToReference, left);
+  }
   hdf5::write_table(index.id(), "scene", std::vector<uint8_t>(scene_json.begin(), scene_json.end()));
   write_setup(index.id(), setup);
 
@@ -354,7 +359,7 @@ void Recorder::File::finish() {
 }
 
 Recorder::Recorder(const std::string& name, const Setup& setup, const std::string& scene_json,
-                   const std::string& backend) {
+                   const std::string& backend, std::array<bool, 6> left_to_reference) {
   const std::string stem = std::filesystem::path(stem_of(name)).filename().string();
   if (stem.empty()) {
     throw InputError(name, "", "This names no file to record to.", "Give a name such as \"run1\" or \"out/run1\".");
@@ -363,7 +368,7 @@ Recorder::Recorder(const std::string& name, const Setup& setup, const std::strin
     throw std::invalid_argument("A setup to be recorded is not valid: " + defect->field + ": " + defect->problem);
   }
   file_ = writing(recording_paths(name).index, "The recording cannot be begun",
-                  [&] { return std::make_unique<File>(name, setup, scene_json, backend); });
+                  [&] { return std::make_unique<File>(name, setup, scene_json, backend, left_to_reference); });
 }
 
 Recorder::~Recorder() {

@@ -1,6 +1,7 @@
 // Recordings: temporal VTKHDF 2.0, one file per dataset (particles, skin, blade) and an index file
 // (docs/reference/recording.md).
 #pragma once
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -37,9 +38,11 @@ RecordingPaths recording_paths(const std::string& name);
 // behind. What did not change since the snapshot before is stored once. One recorder holds one body.
 class Recorder {
  public:
-  // scene_json and backend are kept as they are. Throws InputError if the folder is not there or not writable, before
-  // anything else is done; std::invalid_argument if the setup is not valid; MachineError if the disk fails.
-  Recorder(const std::string& name, const Setup& setup, const std::string& scene_json, const std::string& backend);
+  // scene_json and backend are kept as they are. `left_to_reference`: as Recording has it. Throws InputError if the
+  // folder is not there or not writable, before anything else is done; std::invalid_argument if the setup is not valid;
+  // MachineError if the disk fails.
+  Recorder(const std::string& name, const Setup& setup, const std::string& scene_json, const std::string& backend,
+           std::array<bool, 6> left_to_reference = {});
   ~Recorder();
   // The contents of a state may be anything (an oracle is to judge them), but its arrays must have the lengths of the
   // setup and of each other: std::invalid_argument otherwise. Throws MachineError if the disk fails, is full, …; the
@@ -58,7 +61,8 @@ struct Recording {
   Setup setup;
   std::string scene_json;
   std::string backend;
-  Precision precision = Precision::binary64;  // of all states
+  std::array<bool, 6> left_to_reference = {};  // by stage: the backend cannot run it, the reference did
+  Precision precision = Precision::binary64;   // of all states
   int64_t snapshot_count = 0;
 };
 

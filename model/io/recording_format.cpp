@@ -1,5 +1,9 @@
 #include "model/io/recording_format.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <sstream>
 #include <type_traits>
 
 #include "model/io/recording.h"
@@ -40,6 +44,27 @@ std::string stem_of(const std::string& name) {
 RecordingPaths recording_paths(const std::string& name) {
   const std::string stem = stem_of(name);
   return {stem + std::string(kIndexSuffix), stem + ".particles.vtkhdf", stem + ".skin.vtkhdf", stem + ".blade.vtkhdf"};
+}
+
+std::string words_of_stages(const std::array<bool, 6>& stages) {
+  std::string words;
+  for (std::size_t s = 0; s < stages.size(); ++s) {
+    if (stages[s]) words += (words.empty() ? "" : " ") + std::string(kStageNames[s]);
+  }
+  return words;
+}
+
+std::array<bool, 6> stages_of_words(const std::string& words) {
+  std::array<bool, 6> stages = {};
+  std::istringstream stream(words);
+  for (std::string word; stream >> word;) {
+    const auto found = std::ranges::find(kStageNames, word);
+    if (found == kStageNames.end()) {
+      throw hdf5::Error(kLeftToReference, fmt::format("\"{}\" is no stage.", word));
+    }
+    stages[static_cast<std::size_t>(found - kStageNames.begin())] = true;
+  }
+  return stages;
 }
 
 }  // namespace cutproof::io

@@ -83,6 +83,13 @@ void walk_snapshots(Archive& archive, Columns& columns, int32_t format) {
   }
 }
 
+// The root attribute of stages that the reference ran for the backend, as their names with blanks between them; absent
+// if there are none.
+inline constexpr const char* kLeftToReference = "left_to_reference";
+std::string words_of_stages(const std::array<bool, 6>& stages);
+// Throws hdf5::Error for a word that is no stage.
+std::array<bool, 6> stages_of_words(const std::string& words);
+
 // F for F and for F.cutproof.h5.
 std::string stem_of(const std::string& name);
 

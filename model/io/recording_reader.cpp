@@ -184,6 +184,11 @@ RecordingReader::File::File(const std::string& name) {
 void RecordingReader::File::read_index(const ReadingArchive& root) {
   root("cutproof_recording", recording);
   root("backend", header.backend);
+  if (hdf5::has_attribute(index.file.id(), kLeftToReference)) {
+    std::string left;
+    root(kLeftToReference, left);
+    header.left_to_reference = stages_of_words(left);
+  }
   std::vector<uint8_t> scene;
   root("scene", scene);
   header.scene_json.assign(scene.begin(), scene.end());

@@ -52,5 +52,18 @@ TEST(Annotations, SayHowManyGitHubWouldNotShow) {
   EXPECT_NE(more.find("a (and 3 more that are not shown here); see"), std::string::npos) << more;
 }
 
+TEST(Annotations, WarnOfStagesThatWereLeftToTheReferenceBesideFailures) {
+  const Failure failure = {"coverage", "a", "b"};
+  const std::string warned = "::warning title=cutproof: not judged::the reference ran step, skin for the backend\n";
+  setenv("GITHUB_ACTIONS", "true", 1);
+  testing::internal::CaptureStdout();
+  print_annotations({failure}, {"step", "skin"});
+  print_annotations({}, {"step", "skin"});
+  std::fflush(stdout);
+  unsetenv("GITHUB_ACTIONS");
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), annotation(failure) + "\n" + warned + warned);
+  EXPECT_EQ(warning("a: b", "100 %"), "::warning title=cutproof: a%3A b::100 %25");
+}
+
 }  // namespace
 }  // namespace cutproof::cli

@@ -497,6 +497,54 @@ TEST_F(Program, JudgesBackendsOfWholeFramesAndOfOneStageOnWhatTheyRun) {
   EXPECT_NE(against.output.find("--against"), std::string::npos);
 }
 
+// Wherever verdicts are shown: as text, JSON, JUnit, annotations, on a page, and of the recording.
+TEST_F(Program, SaysWhichStagesTheReferenceRanForTheBackend) {
+  write("cut.json", small_block().dump());
+  const std::string sentence = "The reference ran step, detect, merge and skin for the backend: not judged.";
+  const auto shows = [&](const std::string& command) {
+    const std::string page = CUTPROOF_HAS_PAGES != 0 ? " --report out.html" : "";
+    const Outcome outcome = cutproof(command + " --json out.json --junit out.xml" + page, "GITHUB_ACTIONS=true");
+    EXPECT_EQ(outcome.status, 0) << outcome.output;
+    EXPECT_NE(on_one_line(outcome.output).find(sentence), std::string::npos) << outcome.output;
+    EXPECT_NE(outcome.output.find("::warning title=cutproof: not judged::the reference ran step, detect, merge, skin"),
+              std::string::npos)
+        << outcome.output;
+    const json left = json::parse(read("out.json")).at("left_to_reference");
+    EXPECT_EQ(left.at("stages"), json({"step", "detect", "merge", "skin"}));
+    EXPECT_NE(read("out.xml").find("name=\"stage skin\""), std::string::npos);
+    EXPECT_TRUE(page.empty() || read("out.html").find(sentence) != std::string::npos);
+    return left;
+  };
+  const json left = shows("run cut.json --check --record cut --backend host-split");
+  EXPECT_FALSE(left.at("expected").empty());
+  EXPECT_EQ(shows("check cut").at("expected"), left.at("expected"));
+  const Outcome fuzz = cutproof("fuzz --cases 60 --backend host-split --json out.json");
+  EXPECT_NE(on_one_line(fuzz.output).find("The reference ran step, detect, merge, expand and skin"), std::string::npos)
+      << fuzz.output;
+  const Outcome all = cutproof("run cut.json --check --backend host");
+  EXPECT_EQ(all.output.find("The reference ran"), std::string::npos) << all.output;
+}
+
+TEST_F(Program, FailsAPluginThatRunsNoStage) {
+  write("cut.json", small_block().dump());
+  const std::string plugin = std::string(" --backend 'plugin:") + CUTPROOF_PLUGIN_THAT_RUNS_NOTHING + "'";
+  for (const char* verb :
+       {"run cut.json --check --record cut", "run cut.json --against reference", "fuzz --cases 20"}) {
+    const Outcome outcome = cutproof(verb + plugin);
+    EXPECT_EQ(outcome.status, 1) << verb << outcome.output;
+    EXPECT_NE(on_one_line(outcome.output).find("the backend ran no stage"), std::string::npos) << outcome.output;
+  }
+  EXPECT_EQ(cutproof("check cut").status, 1);
+}
+
+TEST_F(Program, RefusesToMeasureErrorsOfStagesThatTheBackendCannotRun) {
+  write("cut.json", small_block().dump());
+  for (const char* error : {"solver", "time_step", "conservation"}) {
+    expect_refused(std::string("run cut.json --backend host-split --errors ") + error, {"--errors", error});
+  }
+  EXPECT_EQ(cutproof("run cut.json --backend host-split --errors topology").status, 0);
+}
+
 // --- Bad input ------------------------------------------------------------------------------------------------------
 
 TEST_F(Program, SaysWhatToDoNextWhenRunHasNoScene) {

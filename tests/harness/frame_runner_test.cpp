@@ -3,8 +3,16 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "model/io/atomic_file.h"
 #include "property_tests/campaign.h"
+#include "property_tests/campaign_report.h"
 #include "reference_cpu/reference.h"
 #include "tests/cli/cut_scene.h"
 #include "tests/harness/recorded_scene.h"
@@ -159,9 +167,10 @@ TEST(PartialBackend, ThatLoadsSomethingElseIsFoundWrong) {
 
 // --- By `fuzz` -------------------------------------------------------------------------------------------------------
 
-property_tests::Campaign fuzzed(const Partial::Can& can, const Partial::Fault& fault) {
+property_tests::Campaign fuzzed(const Partial::Can& can, const Partial::Fault& fault, bool dynamics = false) {
   property_tests::CampaignOptions options;
-  options.cases = 200;
+  options.cases = dynamics ? 80 : 200;
+  options.dynamics = dynamics;
   options.keep_going = true;
   return property_tests::run_campaign(options, {[&](int64_t) { return std::make_unique<Partial>(can, fault); }, false},
                                       nullptr);
@@ -173,6 +182,72 @@ TEST(PartialBackend, IsJudgedByFuzzWhateverItCanRun) {
     EXPECT_TRUE(campaign.violations.empty());
     EXPECT_GT(campaign.verdicts, 1000);
   }
+}
+
+TEST(PartialBackend, ThatRunsWholeFramesOfBodiesThatMoveIsJudgedByFuzz) {
+  const property_tests::Campaign campaign = fuzzed(whole_frames_only, {}, true);
+  for (const auto& violation : campaign.violations) {
+    ADD_FAILURE() << violation.index << ": " << violation.verdict.property << ": " << violation.verdict.witness.text;
+  }
+  EXPECT_EQ(campaign.stages.left(), std::vector<std::string>{});
+  const harness::PropertySummary* const step = campaign.properties.find("admissible step", Stage::step);
+  ASSERT_NE(step, nullptr);
+  EXPECT_LE(static_cast<double>(step->undecided), 0.01 * static_cast<double>(step->checked));
+}
+
+// A tenth of a radian, in frames that cut.
+TEST(PartialBackend, ThatTurnsClustersInWholeFramesThatCutIsFoundWrongByFuzz) {
+  const auto turns = [](Span, State& state) {
+    if (state.removed.empty()) return;
+    for (Mat3& r : state.clusters.rotation) {
+      const Mat3 was = r;
+      for (int column = 0; column < 3; ++column) {
+        r(0, column) = std::cos(0.1) * was(0, column) - std::sin(0.1) * was(1, column);
+        r(1, column) = std::sin(0.1) * was(0, column) + std::cos(0.1) * was(1, column);
+      }
+    }
+  };
+  const property_tests::Campaign campaign = fuzzed(whole_frames_only, turns, true);
+  EXPECT_GT(campaign.violations.size(), 10u);
+  EXPECT_GT(std::count_if(campaign.violations.begin(), campaign.violations.end(),
+                          [](const auto& violation) { return violation.verdict.property == "admissible step"; }),
+            10);
+}
+
+// --- Who ran what, of a campaign -------------------------------------------------------------------------------------
+
+TEST(PartialBackend, IsSaidByFuzzToHaveLeftStagesToTheReference) {
+  const harness::BackendChoice choice;
+  const auto document = [&](const Partial::Can& can, int64_t shard) {
+    property_tests::CampaignOptions options;
+    options.cases = 60;
+    options.shards = 2;
+    options.shard = shard;
+    const property_tests::Campaign campaign = property_tests::run_campaign(
+        options, {[&](int64_t) { return std::make_unique<Partial>(can); }, false}, nullptr);
+    return property_tests::campaign_document(choice, options, campaign, nlohmann::json::array());
+  };
+  using Stages = std::vector<std::string>;
+  const nlohmann::json split = document(split_only, 0), nothing = document([](Span) { return false; }, 0);
+  EXPECT_EQ(split.at("left_to_reference").get<Stages>(), (Stages{"step", "detect", "merge", "expand", "skin"}));
+  EXPECT_EQ(property_tests::conclude(split, false).failure, "");
+  EXPECT_EQ(nothing.at("left_to_reference").get<Stages>().size(), 6u);
+  EXPECT_NE(property_tests::conclude(nothing, false).failure.find("the backend ran no stage"), std::string::npos);
+  EXPECT_EQ(document([](Span) { return true; }, 0).at("left_to_reference").get<Stages>(), Stages{});
+
+  // Of shards, all together.
+  const auto folder = std::filesystem::temp_directory_path() / ("cutproof.left." + std::to_string(getpid()));
+  std::filesystem::create_directories(folder);
+  std::vector<std::string> files;
+  for (const int64_t shard : {0, 1}) {
+    nlohmann::json one = document(split_only, shard);
+    one["left_to_reference"] = shard == 0 ? Stages{"skin"} : Stages{"step", "skin"};
+    files.push_back((folder / (std::to_string(shard) + ".json")).string());
+    io::write_text(files.back(), one.dump());
+  }
+  const nlohmann::json whole = property_tests::merge_shards(files);
+  std::filesystem::remove_all(folder);
+  EXPECT_EQ(whole.at("left_to_reference").get<Stages>(), (Stages{"step", "skin"}));
 }
 
 TEST(PartialBackend, IsFoundWrongByFuzzWhateverItCanRun) {

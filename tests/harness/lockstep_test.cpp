@@ -393,5 +393,27 @@ TEST(WithinItsRounding, ARotationAboutAWireIsNotFree) {
   EXPECT_EQ(found.error(Measure::position).norm.count, 5);
 }
 
+// What the reference ran for the backend is passed over; if that is all, nothing was compared.
+TEST(Lockstep, ComparesOnlyTheStagesThatTheBackendRan) {
+  fixtures::Built built = build("small_block");
+  const std::unique_ptr<Backend> backend = reference::make_backend();
+  const auto compared = [&](std::optional<Stage> own, Stage wrong) {
+    backend->load({built.setup}, {built.state});
+    Against against(built.setup, built.state, backend->snapshot().front(), "in part", AgainstMode::lockstep);
+    for (const Stage stage : kStages) {
+      backend->run({stage, stage});
+      State after = backend->snapshot().front();
+      if (stage == wrong) after.x[0].x += 0.01 * built.setup.body.grid.spacing;
+      against.see(stage, after, backend->report().ran[static_cast<std::size_t>(stage)], own == stage);
+    }
+    return against;
+  };
+  EXPECT_TRUE(compared(Stage::step, Stage::skin).holds()) << "the skin is not its own";
+  EXPECT_FALSE(compared(Stage::step, Stage::step).holds());
+  const Against nothing = compared(std::nullopt, Stage::step);
+  EXPECT_FALSE(nothing.holds());
+  EXPECT_FALSE(verdict_named(nothing, "something was compared").holds);
+}
+
 }  // namespace
 }  // namespace cutproof::harness

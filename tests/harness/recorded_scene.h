@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -26,6 +27,7 @@ struct RecordedScene {
   std::vector<io::Snapshot> snapshots;  // the first as loaded, then one after each span that the backend ran
   harness::Trace trace;                 // the same as it was seen live
   std::vector<Verdict> broken_contracts;
+  std::array<bool, 6> left_to_reference = {};  // as it is recorded
 
   // `adapt` may change what is loaded.
   RecordedScene(
@@ -33,6 +35,7 @@ struct RecordedScene {
       const std::function<void(Setup&, State&)>& adapt = [](Setup&, State&) {})
       : scene(io::parse_scene(json, "the test's scene")), built(fixtures::build(scene, "the test's scene")) {
     adapt(built.setup, built.state);
+    left_to_reference = harness::left_to_reference(backend);
     harness::FrameRunner runner(backend, {built.setup}, {built.state});
     trace.initial = runner.states().front();
     snapshots.push_back({Stage::skin, *trace.initial});
@@ -64,7 +67,7 @@ struct RecordedScene {
     std::filesystem::create_directories(folder);
     const std::string name = (folder / "r").string();
     {
-      io::Recorder recorder(name, built.setup, io::write_scene(scene), "a backend");
+      io::Recorder recorder(name, built.setup, io::write_scene(scene), "a backend", left_to_reference);
       for (const io::Snapshot& snapshot : snapshots) recorder.add(snapshot.stage, snapshot.state);
       recorder.finish();
     }

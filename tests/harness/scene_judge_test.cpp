@@ -5,8 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
+#include <set>
 #include <string>
 
+#include "harness/partial_backend.h"
 #include "reference_cpu/reference.h"
 #include "tests/cli/cut_scene.h"
 #include "tests/harness/recorded_scene.h"
@@ -339,6 +342,29 @@ TEST(PropertySummaries, JoinAsIfAllHadBeenAddedToOne) {
   }
 }
 
+// What is no number is the worst, whatever comes after it; and what fails counts as judged though it looked at nothing.
+TEST(PropertySummaries, KeepWhatIsNoNumberAndWhatCouldNotBeJudged) {
+  Verdict one;
+  one.property = "a";
+  one.bound = 1;
+  one.checked = 1;
+  one.holds = false;
+  harness::PropertySummaries first, second;
+  for (const double measured : {1.0, std::nan(""), 2.0}) {
+    one.measured = measured;
+    first.add(one);
+  }
+  EXPECT_TRUE(std::isnan(first.all().front().measured));
+  second.add(one);
+  second.join(first);
+  EXPECT_TRUE(std::isnan(second.all().front().measured));
+  one.checked = 0;
+  second.add(one);
+  EXPECT_EQ(second.all().front().judged, 5);
+  EXPECT_EQ(second.all().front().failed, 5);
+  EXPECT_EQ(second.all().front().checked, 4);
+}
+
 // --- Depth -----------------------------------------------------------------------------------------------------------
 
 TEST_F(WrongRecording, IsSaidToHaveOnlyItsTopologyJudged) {
@@ -356,6 +382,151 @@ TEST_F(WrongRecording, IsSaidToHaveOnlyItsTopologyJudged) {
     EXPECT_EQ(harness::depth_named(name_of(depth)), depth);
   }
   EXPECT_EQ(harness::depth_named("everything"), std::nullopt);
+}
+
+// --- The whole run ---------------------------------------------------------------------------------------------------
+
+TEST_F(WrongRecording, FailsWhereAPropertyLookedAtNothingAndDoesNotSayWhy) {
+  const RecordedScene recorded(tests::kCutScene, *reference_);
+  const auto failing_with = [&](int64_t checked, const std::string& vacuous) {
+    harness::SceneJudge judge(recorded.built.setup, recorded.scene.expect, "a backend", recorded.trace.initial);
+    for (const harness::Moment& moment : recorded.trace.moments) judge.see(moment);
+    Verdict verdict;
+    verdict.property = "a property";
+    verdict.checked = checked;
+    verdict.vacuous = vacuous;
+    for (int frame = 0; frame < 2; ++frame) judge.add(verdict);
+    judge.finish();
+    EXPECT_EQ(judge.holds(), failing(judge).empty());
+    return failing(judge);
+  };
+  EXPECT_THAT(failing_with(0, ""), ElementsAre("every property looked at something"));
+  EXPECT_THAT(failing_with(0, "no blade"), IsEmpty());
+  EXPECT_THAT(failing_with(1, ""), IsEmpty());
+}
+
+// CGAL's checks of the skin cost more than a frame: they are made of the first skin, and after every cut.
+TEST_F(WrongRecording, HasItsSkinJudgedThoroughlyAtFirstAndAfterEveryCut) {
+  constexpr const char* kTwoStrokes = R"({"version": 1, "name": "two strokes",
+    "body": {"shape": {"kind": "box", "size": [0.06, 0.02, 0.02]}, "spacing": 0.01},
+    "frame": {"settle": 0.032}, "detect": {"criterion": "geometric"},
+    "blade": {"speed": 2, "strokes": [{"points": [[0.3, 0.5, 5], [0.3, 0.5, -1]], "along": [0, 1, 0]},
+      {"points": [[0.7, 0.5, 2], [0.7, 0.5, -1]], "along": [0, 1, 0]}]}})";
+  const RecordedScene recorded(kTwoStrokes, *reference_);
+  std::set<int64_t> cuts, others;
+  for (const harness::Moment& moment : recorded.trace.moments) {
+    if (moment.span.last != Stage::skin) continue;
+    (moment.after->removed.empty() ? others : cuts).insert(moment.before->frame);
+  }
+  ASSERT_GE(cuts.size(), 2u);
+  ASSERT_GE(others.size(), 2u);
+  ASSERT_TRUE(others.contains(0));
+  std::set<int64_t> expected = cuts;
+  expected.insert(0);
+  harness::SceneJudge judge(recorded.built.setup, recorded.scene.expect, "a backend", recorded.trace.initial);
+  for (const harness::Moment& moment : recorded.trace.moments) judge.see(moment);
+  judge.finish();
+  std::map<std::string, std::set<int64_t>> judged;
+  for (const Verdict& verdict : judge.verdicts()) {
+    if (verdict.checked > 0) judged[verdict.property].insert(verdict.frame);
+  }
+  EXPECT_EQ(judged.at("skin geometry"), expected);
+  EXPECT_EQ(judged.at("skin shells"), expected);
+  EXPECT_GT(judged.at("skin surface").size(), expected.size()) << "the cheap ones in every frame";
+
+  // A hole in it after the first cut, and after the last.
+  for (const int64_t frame : {*cuts.begin(), *cuts.rbegin()}) {
+    RecordedScene wrong(kTwoStrokes, *reference_);
+    for (io::Snapshot& snapshot : wrong.snapshots) {
+      if (snapshot.stage == Stage::skin && snapshot.state.frame == frame + 1) {
+        snapshot.state.skin.triangles.pop_back();
+      }
+    }
+    EXPECT_THAT(failing(*wrong.judged()), Contains("skin geometry")) << frame;
+  }
+}
+
+// --- Who did the work ------------------------------------------------------------------------------------------------
+
+using Stages = std::vector<std::string>;
+
+// The reference, offered in part.
+std::unique_ptr<Backend> only(bool (*can_run)(Span)) {
+  return harness::offer_only(reference::make_backend(), "in part", can_run);
+}
+constexpr bool nothing(Span) { return false; }
+template <Stage stage>
+constexpr bool alone(Span span) {
+  return span == Span{stage, stage};
+}
+
+std::unique_ptr<harness::SceneJudge> judged_live(const RecordedScene& recorded) {
+  auto judge = std::make_unique<harness::SceneJudge>(recorded.built.setup, recorded.scene.expect, "a backend",
+                                                     recorded.trace.initial);
+  for (const harness::Moment& moment : recorded.trace.moments) judge->see(moment);
+  judge->finish();
+  return judge;
+}
+
+TEST(WhoDidTheWork, IsNobodyWhereTheBackendRunsNothingAndThenTheRunFails) {
+  RecordedScene recorded(tests::kCutScene, *only(nothing));
+  const auto live = judged_live(recorded), from_files = recorded.judged();
+  for (const harness::SceneJudge* judge : {live.get(), from_files.get()}) {
+    EXPECT_FALSE(judge->holds());
+    EXPECT_THAT(failing(*judge), ElementsAre("something was judged"));
+    EXPECT_THAT(judge->verdicts().back().witness.text, testing::HasSubstr("the backend ran no stage"));
+    EXPECT_EQ(judge->left_to_reference(), (Stages{"step", "detect", "split", "merge", "skin"}));
+    EXPECT_THAT(judge->not_its_own(), ElementsAre("components at the end", "shells at the end"));
+    EXPECT_TRUE(judge->summaries().all().empty());
+    for (const Verdict& verdict : judge->verdicts())
+      EXPECT_FALSE(verdict.property.starts_with("expected")) << verdict.property;
+  }
+}
+
+TEST(WhoDidTheWork, IsSaidByStageAndOnlyWhatTheBackendRanIsJudged) {
+  const struct {
+    bool (*can_run)(Span);
+    Stages left, not_its_own;
+    const char* judged;
+  } all[] = {{alone<Stage::step>, {"detect", "split", "merge", "skin"}, {}, "admissible step"},
+             {alone<Stage::split>,
+              {"step", "detect", "merge", "skin"},
+              {"components at the end", "shells at the end"},
+              "split exactness"},
+             {alone<Stage::skin>, {"step", "detect", "split", "merge"}, {"components at the end"}, "skin vertices"}};
+  for (const auto& [can_run, left, not_its_own, judged] : all) {
+    RecordedScene recorded(tests::kCutScene, *only(can_run));
+    const auto live = judged_live(recorded), from_files = recorded.judged();
+    for (const harness::SceneJudge* judge : {live.get(), from_files.get()}) {
+      EXPECT_TRUE(judge->holds());
+      EXPECT_EQ(judge->left_to_reference(), left);
+      EXPECT_EQ(judge->not_its_own(), not_its_own);
+      std::set<std::string> stages, properties;
+      for (const harness::PropertySummary& summary : judge->summaries().all()) {
+        stages.emplace(name_of(summary.stage));
+        properties.insert(summary.property);
+      }
+      EXPECT_EQ(stages.size(), 1u) << *stages.begin();
+      EXPECT_TRUE(properties.contains(judged)) << judged;
+      EXPECT_THAT(judge->notes(), Contains(testing::HasSubstr("The reference ran " + left.front())));
+    }
+    EXPECT_EQ(live->verdicts(), from_files->verdicts()) << "a recording keeps who ran what";
+  }
+}
+
+TEST(WhoDidTheWork, IsTheBackendsWhereItRunsAllAndThenNothingIsSaid) {
+  RecordedScene recorded(tests::kCutScene, *reference::make_backend());
+  const auto judge = recorded.judged();
+  EXPECT_THAT(judge->left_to_reference(), IsEmpty());
+  EXPECT_THAT(judge->not_its_own(), IsEmpty());
+  EXPECT_THAT(judge->notes(), IsEmpty());
+}
+
+// Whoever records the ends of frames alone and says that a stage was not its own has shown nothing of its own.
+TEST(WhoDidTheWork, CannotBeToldOfARecordingOfEndsOfFramesInWhichAStageWasLeft) {
+  RecordedScene recorded(tests::kCutScene, *only(alone<Stage::skin>));
+  recorded.keep_ends_of_frames();
+  EXPECT_THAT(failing(*recorded.judged()), ElementsAre("something was judged"));
 }
 
 // --- Nothing to judge ------------------------------------------------------------------------------------------------

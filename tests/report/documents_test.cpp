@@ -59,6 +59,17 @@ TEST(ACampaign, WithoutViolationSaysSoPlainly) {
   EXPECT_NE(sheet.notes.at(0).find("2 of the things"), std::string::npos);
 }
 
+TEST(ACampaign, SaysWhichStagesWereLeftToTheReference) {
+  json split = campaign({property("exactness", 0)});
+  const std::size_t notes = sheet_of(split, "f").notes.size();
+  split["left_to_reference"] = json::array();
+  EXPECT_EQ(sheet_of(split, "f").notes.size(), notes);
+  split["left_to_reference"] = {"step", "skin"};
+  const Sheet sheet = sheet_of(split, "f");
+  ASSERT_EQ(sheet.notes.size(), notes + 1);
+  EXPECT_EQ(sheet.notes.front(), "The reference ran step and skin for the backend: not judged.");
+}
+
 // A page may not call good what its document only claims to be.
 TEST(ACampaign, DoesNotHoldBecauseItsDocumentSaysSo) {
   const json good = campaign({property("coverage", 0)});

@@ -130,6 +130,51 @@ TEST(Results, BeginWithWhatFailsFirst) {
   EXPECT_EQ(order, (std::vector<std::string>{"earlier", "exactness", "momentum"}));
 }
 
+// Of one property after one stage: sums over all frames, and of the verdict that is shown its own figures.
+TEST(Results, AddUpWhatVerdictsOfOnePropertyLookedAtAndLeftOpen) {
+  std::vector<json> verdicts = {verdict("near", "step", 0, true, 0.9, 1), verdict("near", "step", 1, true, 0.5, 1),
+                                verdict("near", "step", 2, true, 0, 0)};
+  verdicts[0]["undecided"] = 2;
+  verdicts[1]["undecided"] = 1;
+  verdicts[2]["checked"] = 0;
+  verdicts[2]["vacuous"] = "nothing is alive";
+  const Results results = results_of(document(verdicts), "f");
+  ASSERT_EQ(results.rows.size(), 1u);
+  const PropertyRow& row = results.rows.front();
+  EXPECT_EQ(row.checked, 6);
+  EXPECT_EQ(row.judged, 2) << "one looked at nothing";
+  EXPECT_EQ(row.undecided, 3);
+  EXPECT_EQ(row.vacuous, "") << "others looked";
+  EXPECT_EQ(row.frame, 0);
+  EXPECT_EQ(results.verdicts, 3);
+}
+
+// Failures of several properties: the first ones by frame, and how many are left out.
+TEST(Results, KeepTheFirstFailuresOfAllPropertiesAndCountTheOthers) {
+  std::vector<json> verdicts;
+  for (int property = 0; property < 20; ++property) {
+    for (int frame = 0; frame < 20; ++frame) {
+      verdicts.push_back(verdict("wrong " + std::to_string(property), "split", frame, false, 2, 1));
+    }
+  }
+  const Results results = results_of(document(verdicts), "f");
+  EXPECT_EQ(results.findings.size(), kMostFindings);
+  EXPECT_EQ(results.findings_left_out, 400 - std::ssize(results.findings));
+  EXPECT_EQ(results.findings.back().frame, 14) << "the earliest are kept";
+}
+
+TEST(Results, SayWhichStagesWereLeftToTheReference) {
+  json split = document({verdict("exactness", "split", 0, true, 0.5, 1)});
+  split["left_to_reference"] = {{"stages", {"step", "detect", "skin"}}, {"expected", {"shells at the end"}}};
+  split["notes"] = {"The reference ran step, detect and skin for the backend: not judged."};
+  const Results results = results_of(split, "f");
+  EXPECT_EQ(summary_sentence(results),
+            "cutproof ran scene block on backend mine: the one property that was judged holds, in 1 verdict. The "
+            "reference ran step, detect and skin for the backend: not judged.");
+  ASSERT_EQ(results.notes.size(), 2u);
+  EXPECT_NE(results.notes[1].find("shells at the end"), std::string::npos);
+}
+
 TEST(Results, HaveNoFiguresOfWhatCouldNotBeJudged) {
   json open = verdict("geometry", "skin", 3, false, 0, 0);
   open["witness"]["text"] = "could not be judged: it is open";
