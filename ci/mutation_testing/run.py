@@ -52,13 +52,14 @@ TESTS_OF_JUDGES = {
                 "relations_test", "judge_test"),
     "harness": ("judge_test", "scene_judge_test", "every_field_test", "frame_runner_test", "lockstep_test",
                 "free_running_test", "against_test", "errors_test", "backends_test", "foreign_state_test",
-                "recorded_kick_test"),
+                "recorded_kick_test", "expectations_test", "relation_sample_test"),
     "model": ("fields_test", "atomic_file_test", "scene_io_test", "recording_test", "array_file_test", "judge_test"),
     "fixtures": ("shapes_test", "bodies_test", "cook_test", "schedule_test", "build_test"),
     "property_tests": ("campaign_test", "histories_test", "every_field_test"),
     "tuning": ("search_test", "refinement_test", "tune_test"),
     "benchmarks": ("clusters_test", "solver_test", "tune_test"),
-    "cli": ("table_test", "verbs_test", "program_test", "fuzz_test"),
+    "cli": ("table_test", "verbs_test", "program_test", "fuzz_test", "shown_verdicts_test", "annotations_test"),
+    "report": ("page_test", "documents_test"),
     "guests": ("guests_test",),
 }
 FIELDS = ("Stage", "Fault", "Suspect", "Livelock")

@@ -1,6 +1,8 @@
 // What a person sees of verdicts that were made by hand.
 #include <gtest/gtest.h>
 
+#include <map>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -84,6 +86,100 @@ TEST(JunitCases, HaveNoFiguresOfWhatCouldNotBeJudged) {
   EXPECT_TRUE(has(cases[0], "could not be judged: it is open")) << cases[0].text;
   EXPECT_FALSE(has(cases[0], "measured")) << cases[0].text;
   EXPECT_TRUE(has(cases[1], "measured 0, bound 0 (some page)")) << cases[1].text;
+}
+
+// In one row, in whatever order: what the scene expects excuses nothing else.
+TEST(JunitCases, AreNotPassedByAnExpectedFailureBesideAnUnexpectedOne) {
+  const Judging judging{"cutproof check", "cutproof.check", "cutproof check it"};
+  const Verdict foreseen = failing_verdict("isolation", Stage::skin, 3, "as expected"),
+                unforeseen = failing_verdict("isolation", Stage::skin, 4, "nobody expects this");
+  Verdict fine = foreseen;
+  fine.holds = true;
+  const auto is_expected = [&](const Verdict& verdict) { return verdict.witness.text == "as expected"; };
+  for (const auto& verdicts : {std::vector<Verdict>{foreseen, unforeseen, fine}, {unforeseen, fine, foreseen}}) {
+    const auto cases = cases_of(verdicts, judging, is_expected);
+    ASSERT_EQ(cases.size(), 1U);
+    EXPECT_EQ(cases[0].outcome, io::JunitOutcome::failed);
+    EXPECT_EQ(cases[0].message, "nobody expects this");
+    EXPECT_NE(cases[0].text.find("1 of 3 verdicts fail"), std::string::npos) << cases[0].text;
+    const std::vector<Failure> failures = failures_of(verdicts, judging, is_expected);
+    ASSERT_EQ(failures.size(), 1U);
+    EXPECT_EQ(failures[0].text, "nobody expects this");
+  }
+  const auto alone = cases_of({foreseen, fine}, judging, is_expected);
+  EXPECT_EQ(alone.at(0).outcome, io::JunitOutcome::passed);
+  EXPECT_NE(alone.at(0).text.find("as the scene expects"), std::string::npos);
+}
+
+// A row that looked at nothing is skipped with its reason; one verdict that looked is enough for it to pass.
+TEST(JunitCases, AreSkippedWhereNoVerdictLookedAtAnything) {
+  const Judging judging{"cutproof check", "cutproof.check", "cutproof check it"};
+  Verdict vacuous = failing_verdict("no pass", Stage::detect, 0, "");
+  vacuous.holds = true;
+  vacuous.checked = 0;
+  vacuous.vacuous = "no blade";
+  Verdict looked = vacuous;
+  looked.checked = 1;
+  EXPECT_EQ(cases_of({vacuous, vacuous}, judging).at(0).outcome, io::JunitOutcome::skipped);
+  EXPECT_EQ(cases_of({vacuous, vacuous}, judging).at(0).message, "vacuous: no blade");
+  EXPECT_EQ(cases_of({vacuous, looked}, judging).at(0).outcome, io::JunitOutcome::passed);
+}
+
+TEST(JunitCases, SkipEachStageThatWasLeftToTheReference) {
+  const auto cases = cases_of_left({"step", "skin"}, {"cutproof run", "cutproof.run", "cutproof run it"});
+  ASSERT_EQ(cases.size(), 2U);
+  EXPECT_EQ(cases[1].name, "stage skin");
+  EXPECT_EQ(cases[1].outcome, io::JunitOutcome::skipped);
+  EXPECT_NE(cases[1].message.find("not judged"), std::string::npos);
+}
+
+// A campaign's document: what fails, in the case that is shown, and what as a whole was too little.
+TEST(JunitCases, OfACampaignNameEveryViolationAndTheWhole) {
+  const Judging judging{"cutproof fuzz", "cutproof.fuzz", "cutproof fuzz it"};
+  const auto property = [](const char* name, int64_t judged, int64_t failed) {
+    return nlohmann::json{{"property", name}, {"stage", "step"}, {"judged", judged}, {"failed", failed}};
+  };
+  const nlohmann::json violation = {
+      {"index", 7},
+      {"property", "motion"},
+      {"stage", "step"},
+      {"text", "as it was drawn"},
+      {"witness", "far"},
+      {"file", "found.json"},
+      {"simplified", {{"text", "as it is shown"}, {"property", "coverage"}, {"witness", "near"}}}};
+  const nlohmann::json document = {
+      {"properties", {property("motion", 3, 1), property("finite", 3, 0), property("no pass", 0, 0)}},
+      {"violations", {violation}},
+      {"left_to_reference", {"skin"}}};
+  const auto cases = cases_of_campaign(document, "1 of 8 cases", judging);
+  std::map<std::string, io::JunitCase> by_name;
+  for (const io::JunitCase& one : cases) by_name[one.name] = one;
+  EXPECT_EQ(by_name.size(), cases.size());
+  EXPECT_EQ(by_name.at("motion after step").outcome, io::JunitOutcome::failed);
+  EXPECT_EQ(by_name.at("motion after step").message, "near");
+  EXPECT_NE(by_name.at("motion after step").text.find("case 7: as it is shown"), std::string::npos);
+  EXPECT_NE(by_name.at("motion after step").text.find("cutproof replay found.json"), std::string::npos);
+  EXPECT_EQ(by_name.at("finite after step").outcome, io::JunitOutcome::passed);
+  EXPECT_EQ(by_name.at("no pass after step").outcome, io::JunitOutcome::skipped);
+  EXPECT_EQ(by_name.at("stage skin").outcome, io::JunitOutcome::skipped);
+  EXPECT_EQ(by_name.at("enough was judged").outcome, io::JunitOutcome::passed) << "a property fails, and says so";
+  const std::vector<Failure> failures = failures_of_campaign(document, "1 of 8 cases", judging);
+  ASSERT_EQ(failures.size(), 1U);
+  EXPECT_EQ(failures[0].property, "coverage") << "of the case that the command shows";
+  EXPECT_EQ(failures[0].text, "near");
+  EXPECT_EQ(failures[0].again, "cutproof replay found.json");
+
+  // Nothing fails, and too little was judged; or not all of it.
+  nlohmann::json little = document;
+  little["violations"] = nlohmann::json::array();
+  for (const bool complete : {true, false}) {
+    little["complete"] = complete;
+    const io::JunitCase whole = cases_of_campaign(little, "nothing was judged", judging).back();
+    EXPECT_EQ(whole.name, "enough was judged");
+    EXPECT_EQ(whole.outcome, complete ? io::JunitOutcome::failed : io::JunitOutcome::error);
+    EXPECT_EQ(whole.message, "nothing was judged");
+    ASSERT_EQ(failures_of_campaign(little, "nothing was judged", judging).size(), 1U);
+  }
 }
 
 }  // namespace

@@ -114,6 +114,20 @@ TEST_F(Relations, RejectAForceBetweenPieces) {
   EXPECT_THAT(rejected_by(fault), Contains("no ghost force"));
 }
 
+// A kick of the first piece moves nothing else; one of the last moves the first.
+TEST_F(Relations, RejectAForceThatOnlyAnotherPieceThanTheFirstExerts) {
+  Fault fault{"OneWay"};
+  fault.before_step = [](const cutproof::Setup& setup, State& state) {
+    const oracles::Partition pieces = oracles::graph_components(setup, state);
+    if (pieces.count < 2) return;
+    const Vec3 last = state.v.back();
+    for (std::size_t i = 0; i < state.v.size(); ++i) {
+      if (pieces.label[i] == 0) state.v[i] += 1e-3 * last;
+    }
+  };
+  EXPECT_THAT(rejected_by(fault), Contains("no ghost force"));
+}
+
 // The bounds of these two grow with the body and with the roundoff of single precision, up to several spacings: there
 // they see next to nothing, so they are tested in double.
 TEST_F(Relations, RejectARestStateThatMoves) {
