@@ -31,6 +31,12 @@ int32_t enough_iterations(const Scene& scene, int32_t substeps) {
   return static_cast<int32_t>(std::clamp(iterations, 2.0, 1.0 * ReferenceSolution::kMostIterations));
 }
 
+// Of the last two distances, neither may have an event in it.
+bool last_three_remove_the_same(std::span<const RefinementLevel> levels) {
+  const auto apart = levels.last(std::min<std::size_t>(2, levels.empty() ? 0 : levels.size() - 1));
+  return std::ranges::all_of(apart, [](const RefinementLevel& level) { return level.events.remove_the_same(); });
+}
+
 }  // namespace
 
 std::optional<double> observed_order(std::span<const RefinementLevel> levels, std::size_t k) {
@@ -43,6 +49,7 @@ std::optional<double> observed_order(std::span<const RefinementLevel> levels, st
 double remaining_error(std::span<const RefinementLevel> levels) {
   constexpr double kNotKnown = std::numeric_limits<double>::infinity();
   if (levels.empty() || !levels.back().apart_h || !std::isfinite(*levels.back().apart_h)) return kNotKnown;
+  if (!last_three_remove_the_same(levels)) return kNotKnown;
   const double last = *levels.back().apart_h;
   if (last <= kSeen) return last;
   double falls_by = std::numeric_limits<double>::infinity();
@@ -60,9 +67,12 @@ std::string known_to(std::span<const RefinementLevel> levels) {
   const bool all_compare =
       std::all_of(levels.begin() + (levels.empty() ? 0 : 1), levels.end(),
                   [](const RefinementLevel& level) { return level.apart_h && std::isfinite(*level.apart_h); });
-  return all_compare
+  if (!all_compare) {
+    return "not known: between its levels tissue falls into other parts, or the blade arrives in another frame";
+  }
+  return last_three_remove_the_same(levels)
              ? "not known: its levels do not come nearer to each other each time"
-             : "not known: between its levels tissue falls into other parts, or the blade arrives in another frame";
+             : "not known: its last three levels do not remove the same particles in the same frames";
 }
 
 ReferenceSolution::ReferenceSolution(ReferenceKind kind, const Scene& scene, std::string source,

@@ -27,6 +27,8 @@ struct EventsApart {
   // Of frames after which both have the same particles, the greatest number of clusters that only one of the two has:
   // what goes in other substeps of a frame is merged in another order.
   int64_t clusters_in_one = 0;
+
+  bool remove_the_same() const { return in_another_frame == 0 && alive_in_one == 0; }
 };
 EventsApart events_apart(const Trajectory& expected, const Trajectory& actual);
 

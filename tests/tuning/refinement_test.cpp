@@ -106,6 +106,35 @@ TEST(ReferenceSolution, IsKnownAsItsLevelsComeNearer) {
   EXPECT_NE(text({kNothing, 0.05}).find("other parts"), std::string::npos);
 }
 
+// However near levels are, a removal that falls between two of them makes a distance of its own. Of the liver, with
+// retardation, levels of 64, 128, 256 and 512 substeps are 0.019, 0.0097, 0.0093 and 0.080 h from the one before:
+// the third level would be known to 0.010 h.
+TEST(ReferenceSolution, IsNotKnownWhileItsLastThreeLevelsRemoveOtherParticlesOrInOtherFrames) {
+  struct Level {
+    double apart_h;
+    int64_t in_another_frame, alive_in_one;
+  };
+  const auto levels_of = [](const std::vector<Level>& given) {
+    std::vector<RefinementLevel> levels(1);
+    for (const Level& level : given) {
+      levels.push_back({1, 1, level.apart_h, {level.in_another_frame, level.alive_in_one, 0}, {}});
+    }
+    return levels;
+  };
+  const auto known = [&](const std::vector<Level>& given) { return remaining_error(levels_of(given)); };
+  constexpr double kNothing = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(known({{0.019, 6, 2}, {0.0097, 1, 0}}), kNothing) << "the liver";
+  EXPECT_EQ(known({{0.032, 8, 5}, {0.0097, 0, 0}}), kNothing) << "detection in every substep: 0.053 h follow";
+  EXPECT_EQ(known({{1, 0, 0}, {0.5, 1, 0}}), kNothing);
+  EXPECT_EQ(known({{1, 0, 0}, {0.5, 0, 1}}), kNothing);
+  EXPECT_EQ(known({{1, 0, 1}, {0.5, 0, 0}}), kNothing);
+  EXPECT_EQ(known({{1e-3, 0, 1}, {1e-12, 0, 0}}), kNothing) << "not by rounding either";
+  EXPECT_DOUBLE_EQ(known({{1, 0, 0}, {0.5, 0, 0}}), 0.5);
+  EXPECT_DOUBLE_EQ(known({{2, 1, 1}, {1, 0, 0}, {0.5, 0, 0}}), 0.5) << "three levels that agree";
+  EXPECT_NE(known_to(levels_of({{0.019, 6, 2}, {0.0097, 1, 0}})).find("do not remove the same"), std::string::npos);
+  EXPECT_NE(known_to(levels_of({{0.05, 0, 0}, {0.05, 0, 0}})).find("nearer"), std::string::npos);
+}
+
 // A block is pulled aside by its end and comes to rest again, where every solution is the same: in the end nothing is
 // seen any more of how far they were apart.
 TEST(ReferenceSolution, IsKnownToTheGreatestDistanceOfAnyFrame) {
