@@ -8,6 +8,32 @@
 
 namespace cutproof::oracles {
 
+namespace {
+
+// Whether each cluster says of its rotation whether another would be as good (method.md §3). Without iterations nobody
+// asks: what a cluster said, it says. Where rounding or a backend's threshold decides, nobody can tell.
+void check_flags(const State& before, const State& after, const StepOutcome& outcome,
+                 std::span<const uint8_t> known_rotations, Verdict& verdict) {
+  const Clusters& clusters = after.clusters;
+  for (int32_t c = 0; c < clusters.count(); ++c) {
+    if (!known_rotations.empty() && known_rotations[at(c)] == 0) continue;
+    const bool says = clusters.degenerate[at(c)] != 0, said = before.clusters.degenerate[at(c)] != 0;
+    const int32_t number = before.clusters.number[at(c)];
+    if (outcome.is_thin.empty()) {
+      if (says != said)
+        fail(verdict, {{number}}, "no iteration has looked at cluster {}, but its flag changed", number);
+    } else if (outcome.is_thin[at(c)] != 0) {
+      if (!says)
+        fail(verdict, {{number}}, "cluster {} lies on a line at rest, but is not marked as not unique", number);
+    } else if (outcome.is_free[at(c)] == 0 && says) {
+      fail(verdict, {{number}}, "the rotation of cluster {} is the only best one, but is marked as not unique", number);
+    }
+    if (!verdict.holds) return;
+  }
+}
+
+}  // namespace
+
 StepAgain step_again(const Setup& setup, const State& before, const State& after,
                      std::span<const uint8_t> known_rotations) {
   Verdict verdict = start_verdict(kAdmissibleStep, after, "h", kAdmissibleStepSource);
@@ -45,6 +71,8 @@ StepAgain step_again(const Setup& setup, const State& before, const State& after
     }
     fail(verdict, concerned, "the {}{} is {:.3g} h from where an admissible step ends, rounding explains {:.3g} h",
          name_of(step.part), whose, step.measured, step.bound);
+  } else if (!step.outcome.x.empty()) {
+    check_flags(before, after, step.outcome, known_rotations, verdict);
   }
   again.verdict = conclude(std::move(verdict), kNoStep);
   return again;

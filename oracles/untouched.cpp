@@ -29,14 +29,18 @@ void compare(const Field& field, const T& before, const T& after, const State& n
   }
 }
 
-// A step moves what is alive, and starts the frame's lists anew.
+// A step moves what is alive, and starts the frame's lists anew. The dead keep the place and the velocity with which
+// they died.
 void check_conditions_of_step(const StageRun& run, Verdict& verdict) {
   const State &before = run.before, &after = run.after;
   for (std::size_t i = 0; i < before.alive.size(); ++i) {
     if (before.alive[i] != 0) continue;
-    ++verdict.checked;
-    if (same_bits(before.x[i], after.x[i])) continue;
-    violate(verdict, {{}, {static_cast<int32_t>(i)}}, "particle {} is dead, but moved", i);
+    verdict.checked += 2;
+    if (!same_bits(before.x[i], after.x[i])) {
+      violate(verdict, {{}, {static_cast<int32_t>(i)}}, "particle {} is dead, but moved", i);
+    } else if (!same_bits(before.v[i], after.v[i])) {
+      violate(verdict, {{}, {static_cast<int32_t>(i)}}, "particle {} is dead, but its velocity changed", i);
+    }
   }
   if (after.removed.empty() && after.debris.empty()) return;
   violate(verdict, {{}, after.removed.empty() ? after.debris : after.removed},

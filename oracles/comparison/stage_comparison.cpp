@@ -46,12 +46,24 @@ void note_if_any(MeasuredError& error, const ErrorNorm& norm) {
   if (norm.max > 0) error.norm = norm;
 }
 
-// What is computed and what the stage must leave as it is, to the bit. Positions and velocities are measured instead.
+// What is computed and what the stage must leave as it is, to the bit. Positions and velocities of what is alive are
+// measured instead; the dead keep theirs.
 std::optional<DecisionDifference> difference_of_kept(const StageDifference& stage, const State& before,
                                                      const State& after) {
   std::optional<DecisionDifference> found;
   for_each_field([&](const Field& field, auto get) {
-    if (found || field.is_decision || field.space == IndexSpace::particle) return;
+    if (found || field.is_decision) return;
+    if constexpr (requires { get(before).size(); }) {
+      if (field.space == IndexSpace::particle) {
+        for (std::size_t i = 0; i < before.alive.size() && !found; ++i) {
+          if (before.alive[i] != 0 || same_bits(get(before)[i], get(after)[i])) continue;
+          found = DecisionDifference{
+              witness_of({{}, {static_cast<int32_t>(i)}}, "particle {} is dead, but {} changed", i, field.text),
+              field.name};
+        }
+        return;
+      }
+    }
     if ((stage.due && field.changed_by.contains(stage.stage)) || same_bits(get(before), get(after))) return;
     found = DecisionDifference{
         witness_of({}, "{} changed, which {} must leave as it is", field.text, name_of(stage.stage)), field.name};

@@ -392,7 +392,10 @@ void StepModel::Run::match_shapes(int32_t s, int32_t j) {
   const std::vector<Vec3>& x = y_;
   std::fill(sum_.begin(), sum_.end(), Vec3{});
   if (!disturbed_) std::fill(goal_rounding_.begin(), goal_rounding_.end(), 0.0);
-  if (is_last) out_.shape.resize(model_.clusters_.size());
+  if (is_last) {
+    out_.shape.resize(model_.clusters_.size());
+    for (const Cluster& cluster : model_.clusters_) out_.is_thin.push_back(cluster.extent != Cluster::Extent::more);
+  }
   for (int32_t c = 0; c < clusters.count(); ++c) {
     const Cluster& cluster = model_.clusters_[at(c)];
     const auto members = clusters.of(c);

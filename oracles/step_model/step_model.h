@@ -22,6 +22,9 @@ struct StepOutcome {
   // [m] 1: rounding, or a backend's threshold, decides which of many best rotations a cluster has in the end. It is the
   // nearest to the previous one here, unless it was given; any of them in a disturbed run.
   std::vector<uint8_t> is_free;
+  // [m] 1: at rest a point or a line, so that many rotations are the best wherever its members are. Empty without
+  // iterations.
+  std::vector<uint8_t> is_thin;
   // [n] By how much the last iteration has raised the square of a particle's distance from where it would go, as it may
   // by rounding where blade and walls act in turn [m²].
   std::vector<double> raised;

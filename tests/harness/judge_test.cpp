@@ -291,6 +291,20 @@ std::vector<Wrong> wrong_states() {
          s.x[at(static_cast<int32_t>(std::find(s.alive.begin(), s.alive.end(), 0) - s.alive.begin()))].x += 1e-3;
        },
        {{"untouched", 1}}},
+      {"a dead particle gets another velocity",
+       all,
+       step,
+       false,
+       [](const cutproof::Setup&, const State&, State& s) {
+         s.v[at(static_cast<int32_t>(std::find(s.alive.begin(), s.alive.end(), 0) - s.alive.begin()))].x += 1e-3;
+       },
+       {{"untouched", 1}}},
+      {"a cluster says that another rotation would be as good",
+       all,
+       step,
+       true,
+       [](const cutproof::Setup&, const State&, State& s) { s.clusters.degenerate[1] = 1; },
+       {{"admissible step", 1}}},
       {"a step keeps a list of removals",
        all,
        step,
