@@ -9,16 +9,15 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/progress.h"
+#include "cli/recordings.h"
 #include "cli/report_page.h"
 #include "cli/results.h"
 #include "cli/screen.h"
 #include "cli/terminal.h"
-#include "fixtures/reach.h"
 #include "harness/recorded_run.h"
 #include "harness/scene_judge.h"
 #include "model/io/array_file.h"
 #include "model/io/recording.h"
-#include "model/io/scene_io.h"
 #include "model/printable.h"
 
 namespace cutproof::cli {
@@ -35,10 +34,10 @@ struct CheckOptions {
 int check_recording(const CheckOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
   const harness::Depth depth = depth_asked(options.depth);
-  const io::RecordingReader reader(options.recording);
+  const OpenRecording opened = open_recording(options.recording);
+  const io::RecordingReader& reader = *opened.reader;
   const io::Recording& recording = reader.header();
-  Scene scene;
-  if (!recording.scene_json.empty()) scene = io::parse_scene(recording.scene_json, options.recording + " (its scene)");
+  const Scene& scene = opened.scene;
   require_writable(options.json);
   require_writable(options.junit);
   require_report(options.report);
@@ -47,10 +46,8 @@ int check_recording(const CheckOptions& options) {
   say("recording {}: scene {}, backend {}, {} snapshots of {} particles\n", options.recording,
       scene.name.empty() ? "(none)" : printable(scene.name), printable(recording.backend), recording.snapshot_count,
       recording.setup.body.particle_count());
-  const bool is_cut_short =
-      !recording.scene_json.empty() && fixtures::stops_early(scene, options.recording, recording.setup);
   harness::SceneJudge judge(recording.setup, scene.expect, recording.backend, initial, depth, {},
-                            is_cut_short ? harness::Extent::cut_short : harness::Extent::whole);
+                            opened.is_cut_short ? harness::Extent::cut_short : harness::Extent::whole);
   RunResult result{"check", options.recording,    recording.backend,
                    scene,   recording.setup.body, initial->clusters.count()};
   {

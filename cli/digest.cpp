@@ -8,6 +8,7 @@
 
 #include "cli/commands.h"
 #include "cli/options.h"
+#include "cli/recordings.h"
 #include "cli/screen.h"
 #include "model/io/recording.h"
 
@@ -16,7 +17,8 @@ namespace cutproof::cli {
 namespace {
 
 int print_digests(const std::string& recording) {
-  const io::RecordingReader reader(recording);
+  const OpenRecording opened = open_recording(recording);
+  const io::RecordingReader& reader = *opened.reader;
   Digest all;
   for (int64_t i = 0; i < reader.header().snapshot_count; ++i) {
     const io::Snapshot snapshot = reader.snapshot(i);

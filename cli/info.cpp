@@ -149,9 +149,9 @@ int info(const InfoOptions& options, const CLI::App& program) {
   print_properties();
   insist(
       "scene files: versions 1 to {} (`cutproof info --scene` lists every field)\n"
-      "recordings: temporal VTKHDF 2.0, format {} ({} and later are read too)\n"
+      "recordings: temporal VTKHDF 2.0, format {}\n"
       "licence: sources MIT; this program links CGAL and SuiteSparse, which makes it GPL\n",
-      kSceneVersion, io::kFormatVersion, io::kOldestFormatVersion);
+      kSceneVersion, io::kFormatVersion);
   return 0;
 }
 

@@ -20,6 +20,7 @@
 #include "cli/document_report.h"
 #include "cli/options.h"
 #include "cli/output.h"
+#include "cli/recordings.h"
 #include "cli/report_page.h"
 #include "cli/screen.h"
 #include "model/error.h"
@@ -27,7 +28,6 @@
 #include "model/io/json_reader.h"
 #include "model/io/limits.h"
 #include "model/io/recording.h"
-#include "model/io/scene_io.h"
 #include "property_tests/counterexample.h"
 #include "report/document_page.h"
 #include "report/documents.h"
@@ -153,10 +153,6 @@ void say_whether(std::optional<bool> holds) {
                           : "NOT everything on the page holds");
 }
 
-std::string scene_name(const io::Recording& recording, const std::string& file) {
-  return recording.scene_json.empty() ? "" : io::parse_scene(recording.scene_json, file + " (its scene)").name;
-}
-
 // Names of two recordings that a person tells apart: by backends, unless these are alike.
 std::pair<std::string, std::string> told_apart(const io::Recording& one, const std::string& one_file,
                                                const io::Recording& other, const std::string& other_file) {
@@ -167,9 +163,10 @@ std::pair<std::string, std::string> told_apart(const io::Recording& one, const s
 // Results are those of the first recording.
 int report_recordings(const ReportOptions& options, const std::vector<std::string>& files,
                       const std::string& results_file) {
-  const io::RecordingReader reader(files.front());
+  const OpenRecording opened = open_recording(files.front());
+  const io::RecordingReader& reader = *opened.reader;
   const io::Recording& recording = reader.header();
-  const std::string scene = scene_name(recording, files.front());
+  const std::string& scene = opened.scene.name;
   report::Results results;
   if (results_file.empty()) {
     results = report::unjudged(recording, scene);
@@ -177,13 +174,13 @@ int report_recordings(const ReportOptions& options, const std::vector<std::strin
     results = report::read_results(results_file);
     report::require_same_run(recording, scene, files.front(), results, results_file);
   }
-  std::optional<io::RecordingReader> other;
+  std::optional<OpenRecording> other;
   std::optional<ReadBeside> beside;
   if (files.size() > 1) {
-    other.emplace(files[1]);
+    other.emplace(open_recording(files[1]));
     report::require_same_body(recording, files.front(), other->header(), files[1]);
     auto [own_name, name] = told_apart(recording, files.front(), other->header(), files[1]);
-    beside.emplace(ReadBeside{*other, true, std::move(name), std::move(own_name),
+    beside.emplace(ReadBeside{*other->reader, true, std::move(name), std::move(own_name),
                               "the same particle of the other recording, in the same moment"});
   }
   write_page(options.output, reader, results, "cutproof check " + quoted(files.front()), beside ? &*beside : nullptr);

@@ -198,8 +198,14 @@ int run(const RunOptions& options) {
   const std::string record =
       options.record.empty() && !options.report.empty() ? passing_recording(options.report) : options.record;
   if (!record.empty()) {
-    recorder.emplace(record, built.setup, io::write_scene(scene), options.backend.name,
-                     harness::left_to_reference(*backend));
+    Scene recorded = scene;
+    if (build_options.mesh) {
+      recorded.body.shape.reset();
+      recorded.body.mesh = build_options.mesh;
+    }
+    const bool is_cut_short = built.schedule.is_cut_short;
+    recorder.emplace(record, built.setup, io::write_scene(recorded), options.backend.name,
+                     harness::left_to_reference(*backend), is_cut_short ? options.frames : std::nullopt);
   }
   std::optional<harness::SceneJudge> judge;
   std::optional<harness::RelationSample> relations;

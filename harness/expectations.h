@@ -14,7 +14,7 @@ namespace cutproof::harness {
 // How much of its scene a run is.
 enum class Extent {
   whole,
-  cut_short  // it was asked to stop before the scene's end (fixtures/reach.h)
+  cut_short  // it was asked to stop before the scene's end
 };
 
 class ExpectationCheck {

@@ -20,6 +20,7 @@
 #include "model/io/recording_format.h"
 #include "model/io/recording_setup.h"
 #include "model/io/setup_check.h"
+#include "model/io/shown_run.h"
 #include "model/io/vtkhdf.h"
 
 namespace cutproof::io {
@@ -30,50 +31,6 @@ using Bytes = std::span<const std::byte>;
 template <class T>
 Bytes bytes_of(const T& values) {
   return std::as_bytes(std::span(values));
-}
-
-// For each particle the number of the first cluster that holds it, -1 if none does. Makes sense of any clusters, also
-// of broken ones.
-std::vector<int32_t> cluster_of_particles(const Clusters& clusters, std::size_t particles) {
-  std::vector<int32_t> found(particles, -1);
-  const auto most = static_cast<int64_t>(clusters.members.size());
-  for (std::size_t c = 0; c + 1 < clusters.offsets.size(); ++c) {
-    const int64_t from = std::max<int64_t>(clusters.offsets[c], 0), to = std::min(clusters.offsets[c + 1], most);
-    for (int64_t k = from; k < to; ++k) {
-      const int32_t particle = clusters.members[at(k)];
-      if (particle < 0 || static_cast<std::size_t>(particle) >= particles) continue;
-      int32_t& number = found[at(particle)];
-      if (number == -1) number = clusters.number[c];
-    }
-  }
-  return found;
-}
-
-// The box around the rounded plate: the plate's mid-surface, thickness / 2 wider on all sides.
-std::vector<Vec3> blade_corners(const Blade& blade, const BladePose& pose) {
-  const double margin = blade.thickness / 2;
-  const Vec3 normal = cross(pose.along, pose.back);
-  std::vector<Vec3> corners;
-  for (const double n : {-margin, margin}) {
-    for (const double w : {-margin, blade.depth + margin}) {
-      for (const double u : {-blade.length / 2 - margin, blade.length / 2 + margin}) {
-        corners.push_back(pose.edge + u * pose.along + w * pose.back + n * normal);
-      }
-    }
-  }
-  return corners;
-}
-
-// Six quadrangles on the corners, counter-clockwise seen from outside (along, back, normal: right-handed).
-constexpr std::array<int64_t, 7> kBoxOffsets = {0, 4, 8, 12, 16, 20, 24};
-constexpr std::array<int64_t, 24> kBoxCorners = {0, 2, 3, 1, 4, 5, 7, 6, 0, 1, 5, 4,
-                                                 2, 6, 7, 3, 0, 4, 6, 2, 1, 3, 7, 5};
-
-// How many frames are over in a snapshot. Within a frame (any stage but skin) the positions are already those of its
-// end.
-int64_t frames_done(Stage stage, int64_t frame) {
-  const bool within = stage != Stage::skin && frame < std::numeric_limits<int64_t>::max();
-  return within ? frame + 1 : frame;
 }
 
 // A recording is of one backend, so all of its states are of one precision.
@@ -116,7 +73,7 @@ auto writing(const std::string& file, const std::string& what, F&& action) {
 
 struct Recorder::File {
   File(const std::string& name, const Setup& given, const std::string& scene_json, const std::string& backend,
-       const std::array<bool, 6>& left_to_reference);
+       const std::array<bool, 6>& left_to_reference, std::optional<int64_t> frames_asked);
   void add(Stage stage, const State& state);
   void finish();
 
@@ -154,8 +111,8 @@ struct Recorder::File {
 
   std::string name;
   Setup setup;
-  std::vector<double> time;  // [frames + 1] at the start of each frame [s]
-  Digest digest;
+  std::vector<double> starts;          // [frames + 1] of frames [s]
+  Digest beginning, digest;            // of what the run begins with, and of all
   std::optional<Precision> precision;  // of all states
   bool is_open = true;                 // false: finished, or something could not be written
 
@@ -167,7 +124,8 @@ struct Recorder::File {
   // One row per snapshot. Whatever did not change since the snapshot before is stored once.
   SnapshotColumns columns;
   std::vector<Track> tracks = std::vector<Track>(recorded_fields().size());
-  Latest cluster_of, blade_points;
+  Latest cluster_rows, blade_points;
+  std::vector<int32_t> cluster_of;  // [n] of the last snapshot, not stored yet: another may take its place
 
   PolyDataFile::Part body_part = PolyDataFile::kNothing, skin_part = PolyDataFile::kNothing,
                      blade_part = PolyDataFile::kNothing;
@@ -175,37 +133,32 @@ struct Recorder::File {
 
  private:
   bool is_new_mesh(const State& state) const;
+  void store_clusters();
   int64_t store_triangles(Latest& latest, const State& state, bool anew);
   PolyDataFile::Step step_on(IndexSpace points, double seconds, PolyDataFile::Part part) const;
   PolyDataFile::Step blade_step(int64_t frames, double seconds);
-  double time_at(int64_t frames) const { return time[at(std::clamp<int64_t>(frames, 0, setup.frame_count()))]; }
 };
 
 Recorder::File::File(const std::string& given_name, const Setup& given, const std::string& scene_json,
-                     const std::string& backend, const std::array<bool, 6>& left_to_reference)
+                     const std::string& backend, const std::array<bool, 6>& left_to_reference,
+                     std::optional<int64_t> frames_asked)
     : name(recording_paths(given_name).index),
       setup(given),
-      time(1, 0.0),
+      starts(frame_starts(given)),
+      beginning(digest_of_beginning(given, scene_json, left_to_reference, frames_asked)),
       index_target(name),
       index(hdf5::File::create(index_target.temporary())),
       particles(recording_paths(given_name).particles, PolyDataFile::Cells::vertices),
       skin(recording_paths(given_name).skin, PolyDataFile::Cells::polygons),
       blade(recording_paths(given_name).blade, PolyDataFile::Cells::polygons) {
-  for (const double dt : setup.substep_length) time.push_back(time.back() + dt * setup.step.substeps);
-
-  digest.add(setup.body.node);
-  if (!setup.body.on_grid()) {
-    digest.add(setup.body.rest);
-    digest.add(setup.body.edge_ends);
-  }
-  digest.add(std::string_view(scene_json));
+  digest.add(beginning.value());
   digest.add(std::string_view(backend));
   hdf5::write_text_attribute(index.id(), "backend", backend);
   if (const std::string left = words_of_stages(left_to_reference); !left.empty()) {
-    digest.add(std::string_view(left));
     hdf5::write_text_attribute(index.id(), kLeftToReference, left);
   }
   hdf5::write_table(index.id(), "scene", std::vector<uint8_t>(scene_json.begin(), scene_json.end()));
+  hdf5::write_attribute(index.id(), "frames_asked", frames_asked.value_or(-1));
   write_setup(index.id(), setup);
 
   // Point data is made in the order of the fields, after `particle` and before `cluster`.
@@ -284,21 +237,18 @@ PolyDataFile::Step Recorder::File::step_on(IndexSpace points, double seconds, Po
 
 PolyDataFile::Step Recorder::File::blade_step(int64_t frames, double seconds) {
   PolyDataFile::Step step{seconds, PolyDataFile::kNothing, 0, {}};
-  if (!setup.has_blade || setup.blade_moves.empty()) return step;
-  // Where it stands at the end of the frames that are over; before the first one, where it begins.
-  const int64_t last = std::clamp<int64_t>(frames, 0, setup.frame_count()) * setup.step.substeps - 1;
-  const BladeMove& move = setup.blade_moves[at(std::max<int64_t>(last, 0))];
-  if (!move.down) return step;
+  const std::optional<std::vector<Vec3>> corners = blade_box(setup, frames);
+  if (!corners) return step;
   if (blade_part == PolyDataFile::kNothing) blade_part = blade.file.add_part(8, kBoxOffsets, kBoxCorners);
   step.part = blade_part;
-  const std::vector<Vec3> corners = blade_corners(setup.blade, last < 0 ? move.from : move.to);
-  step.point_row = blade_points.store(blade.file.points(), bytes_of(corners));
+  step.point_row = blade_points.store(blade.file.points(), bytes_of(*corners));
   return step;
 }
 
 void Recorder::File::add(Stage stage, const State& state) {
   digest.add(stage);
   digest.add(cutproof::digest(state));
+  if (columns.stage.empty()) beginning.add(cutproof::digest(state));
   columns.stage.push_back(static_cast<uint8_t>(stage));
   for (std::size_t c = 0; c < kCountColumns.size(); ++c) {
     columns.counts[c].push_back(count_of(kCountColumns[c].space, state));
@@ -324,21 +274,30 @@ void Recorder::File::add(Stage stage, const State& state) {
   // ParaView sees one step per frame: a later snapshot of a frame takes the place of an earlier one.
   const int64_t frames = frames_done(stage, state.frame);
   const bool again = step_frames == frames;
+  if (!again) store_clusters();
+  cluster_of = cluster_of_particles(state.clusters, state.x.size());
   step_frames = frames;
-  const double seconds = time_at(frames);
+  const double seconds = time_after(starts, frames);
   PolyDataFile::Step particle_step = step_on(IndexSpace::particle, seconds, body_part);
   particle_step.data_rows.insert(particle_step.data_rows.begin(), 0);  // `particle` is written once
-  particle_step.data_rows.push_back(
-      cluster_of.store(cluster_table, bytes_of(cluster_of_particles(state.clusters, state.x.size()))));
+  particle_step.data_rows.push_back(0);                                // of the clusters: store_clusters() says it
   particles.show(std::move(particle_step), again);
   skin.show(step_on(IndexSpace::vertex, seconds, skin_part), again);
   blade.show(blade_step(frames, seconds), again);
 }
 
+// Those that the last step of the particles shows.
+void Recorder::File::store_clusters() {
+  if (particles.steps.empty()) return;
+  particles.steps.back().data_rows.back() = cluster_rows.store(cluster_table, bytes_of(cluster_of));
+}
+
 void Recorder::File::finish() {
+  store_clusters();
   WritingArchive root(index.id());
+  root("cutproof_beginning", beginning.value());
   root("unit_roundoff", unit_roundoff(precision.value_or(Precision::binary64)));
-  root.group("snapshots", [&](auto& archive) { walk_snapshots(archive, columns, kFormatVersion); });
+  root.group("snapshots", [&](auto& archive) { walk_snapshots(archive, columns); });
   const std::pair<hid_t, const char*> kinds[] = {{index.id(), kIndexKind},
                                                  {particles.file.id(), kParticlesKind},
                                                  {skin.file.id(), kSkinKind},
@@ -359,7 +318,8 @@ void Recorder::File::finish() {
 }
 
 Recorder::Recorder(const std::string& name, const Setup& setup, const std::string& scene_json,
-                   const std::string& backend, std::array<bool, 6> left_to_reference) {
+                   const std::string& backend, std::array<bool, 6> left_to_reference,
+                   std::optional<int64_t> frames_asked) {
   const std::string stem = std::filesystem::path(stem_of(name)).filename().string();
   if (stem.empty()) {
     throw InputError(name, "", "This names no file to record to.", "Give a name such as \"run1\" or \"out/run1\".");
@@ -367,8 +327,9 @@ Recorder::Recorder(const std::string& name, const Setup& setup, const std::strin
   if (const auto defect = defect_of(setup)) {
     throw std::invalid_argument("A setup to be recorded is not valid: " + defect->field + ": " + defect->problem);
   }
-  file_ = writing(recording_paths(name).index, "The recording cannot be begun",
-                  [&] { return std::make_unique<File>(name, setup, scene_json, backend, left_to_reference); });
+  file_ = writing(recording_paths(name).index, "The recording cannot be begun", [&] {
+    return std::make_unique<File>(name, setup, scene_json, backend, left_to_reference, frames_asked);
+  });
 }
 
 Recorder::~Recorder() {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,9 +14,8 @@
 
 namespace cutproof::io {
 
-// What is written, and the oldest that is read; a field with a later `since` keeps its default.
-inline constexpr int32_t kFormatVersion = 7;
-inline constexpr int32_t kOldestFormatVersion = 3;
+// What is written, and all that is read.
+inline constexpr int32_t kFormatVersion = 8;
 
 // One moment of one body: the state after a span of stages. Who records a run keeps one after each stage that was due
 // and at the end of each frame; who looks on from farther off may keep the ends of frames alone. Snapshot 0 is the
@@ -38,11 +38,12 @@ RecordingPaths recording_paths(const std::string& name);
 // behind. What did not change since the snapshot before is stored once. One recorder holds one body.
 class Recorder {
  public:
-  // scene_json and backend are kept as they are. `left_to_reference`: as Recording has it. Throws InputError if the
-  // folder is not there or not writable, before anything else is done; std::invalid_argument if the setup is not valid;
-  // MachineError if the disk fails.
+  // scene_json and backend are kept as they are. `left_to_reference`: as Recording has it. `frames_asked`: the run was
+  // asked to stop after so many of the scene's frames, which are not all of them; nothing: it goes to the scene's end.
+  // Throws InputError if the folder is not there or not writable, before anything else is done; std::invalid_argument
+  // if the setup is not valid; MachineError if the disk fails.
   Recorder(const std::string& name, const Setup& setup, const std::string& scene_json, const std::string& backend,
-           std::array<bool, 6> left_to_reference = {});
+           std::array<bool, 6> left_to_reference = {}, std::optional<int64_t> frames_asked = {});
   ~Recorder();
   // The contents of a state may be anything (an oracle is to judge them), but its arrays must have the lengths of the
   // setup and of each other: std::invalid_argument otherwise. Throws MachineError if the disk fails, is full, …; the
@@ -64,17 +65,22 @@ struct Recording {
   std::array<bool, 6> left_to_reference = {};  // by stage: the backend cannot run it, the reference did
   Precision precision = Precision::binary64;   // of all states
   int64_t snapshot_count = 0;
+  std::optional<int64_t> frames_asked;  // as the recorder was told
+  // Whether scene, frames_asked, setup and the first snapshot are those that were recorded, to the bit.
+  bool begins_as_recorded = false;
 };
 
 class RecordingReader {
  public:
-  // Throws InputError if the file is missing, cut off, not a recording, of a newer version, or inconsistent: sizes and
-  // rows that do not fit each other, a setup with particles out of range or NaN, …. What a snapshot's state contains
-  // is not judged. The particles and skin files must be beside the index; the blade's is not needed.
+  // Throws InputError if the file is missing, cut off, not a recording, of another version, or inconsistent: sizes and
+  // rows that do not fit each other, a setup with particles out of range or NaN, files for ParaView that show another
+  // run than the index, …. What a snapshot's state contains is not judged, nor whether the setup is the scene's
+  // (fixtures/recorded_scene.h). The particles and skin files must be beside the index; the blade's is not needed.
   explicit RecordingReader(const std::string& name);
   ~RecordingReader();
   const Recording& header() const;
-  // 0 <= index < snapshot_count, std::out_of_range otherwise. Throws InputError if that part of a file is damaged.
+  // 0 <= index < snapshot_count, std::out_of_range otherwise. Throws InputError if that part of a file is damaged, or
+  // if the particles file shows other clusters than the index.
   Snapshot snapshot(int64_t index) const;
 
  private:

@@ -93,6 +93,9 @@ class ReadingArchive {
   hdf5::Table table(const std::string& name, const hdf5::Layout& row) const {
     return located(name, [&] { return hdf5::Table::open(group_, name, row, budget_.file_bytes()); });
   }
+  // Whether a group or a dataset of this name is there.
+  bool has(const std::string& name) const { return H5Lexists(group_, name.c_str(), H5P_DEFAULT) > 0; }
+  std::string path_of(const std::string& name) const { return path_ + "/" + name; }
   template <class F>
   void group(const std::string& name, F&& fields) const {
     const hdf5::Id id = located(name, [&] { return hdf5::open_group(group_, name); });

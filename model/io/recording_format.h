@@ -70,12 +70,11 @@ struct SnapshotColumns {
 
 // Columns is SnapshotColumns or const SnapshotColumns.
 template <class Archive, class Columns>
-void walk_snapshots(Archive& archive, Columns& columns, int32_t format) {
+void walk_snapshots(Archive& archive, Columns& columns) {
   archive("stage", columns.stage);
   for (std::size_t c = 0; c < kCountColumns.size(); ++c) archive(kCountColumns[c].name, columns.counts[c]);
   for (std::size_t k = 0; k < columns.fields.size(); ++k) {
     const RecordedField& field = recorded_fields()[k];
-    if (field.field.since > format) continue;
     const bool elsewhere = field.storage == Storage::rows || field.storage == Storage::cells;
     if (elsewhere) archive(field.name() + "_row", columns.fields[k].index);
     if (field.storage == Storage::list) archive(field.name() + "_offsets", columns.fields[k].index);

@@ -7,12 +7,16 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <map>
 #include <new>
+#include <optional>
+#include <set>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
 
 #include "model/at.h"
+#include "model/digest.h"
 #include "model/error.h"
 #include "model/io/hdf5_file.h"
 #include "model/io/input_file.h"
@@ -22,6 +26,8 @@
 #include "model/io/recording_format.h"
 #include "model/io/recording_setup.h"
 #include "model/io/setup_check.h"
+#include "model/io/shown_run.h"
+#include "model/io/vtkhdf.h"
 
 namespace cutproof::io {
 namespace {
@@ -65,10 +71,9 @@ hdf5::File open_part(const std::string& path, const char* kind) {
                        "Give the name of the index, which ends in \".cutproof.h5\".");
     }
     const auto version = hdf5::read_attribute<int32_t>(file.id(), "cutproof_format");
-    if (version < kOldestFormatVersion || version > kFormatVersion) {
+    if (version != kFormatVersion) {
       throw InputError(path, "cutproof_format",
-                       fmt::format("The recording has format {}, and this program reads {} to {}.", version,
-                                   kOldestFormatVersion, kFormatVersion),
+                       fmt::format("The recording has format {}, and this program reads {}.", version, kFormatVersion),
                        version > kFormatVersion ? "Use a newer cutproof." : "Record the scene again.");
     }
     return file;
@@ -123,11 +128,11 @@ struct RecordingReader::File {
 
     // Runs an action on what it holds.
     template <class F>
-    void reading(F&& action) const {
+    void reading(F&& action, const char* remedy = kRemedy) const {
       try {
         action(ReadingArchive(file.id(), "", *budget));
       } catch (const hdf5::Error& error) {
-        throw InputError(path, error.where(), error.what(), kRemedy);
+        throw InputError(path, error.where(), error.what(), remedy);
       }
     }
   };
@@ -136,12 +141,25 @@ struct RecordingReader::File {
   void check_sizes() const;
   const Part& part_of(const RecordedField& recorded) const;
   int64_t count_in(IndexSpace space, std::size_t i) const;
+  void check_shown();
+  ShownStep shown(IndexSpace points, std::size_t step) const;
+  void check_particles();
+  void check_blade() const;
+  void check_clusters(std::size_t i, const State& state) const;
 
   Part index, particles, skin;
+  std::optional<Part> blade;
   hdf5::InflationBudget budget;
-  uint64_t recording = 0;
-  int32_t format = 0;
+  uint64_t recording = 0, recorded_beginning = 0;
   SnapshotColumns columns;
+  // Of the files for ParaView: the snapshot of each step, and how many frames are over in it.
+  struct Step {
+    std::size_t snapshot;
+    int64_t frames;
+  };
+  std::vector<Step> steps;
+  std::vector<double> starts;
+  std::map<std::size_t, int64_t> cluster_row;                                            // by snapshot that is a step
   std::vector<hdf5::Table> tables = std::vector<hdf5::Table>(recorded_fields().size());  // of rows and cells
 };
 
@@ -151,9 +169,17 @@ RecordingReader::File::File(const std::string& name) {
   index = {paths.index, open_part(paths.index, kIndexKind), &budget};
   particles = {paths.particles, open_part(paths.particles, kParticlesKind), &budget};
   skin = {paths.skin, open_part(paths.skin, kSkinKind), &budget};
-  budget = hdf5::InflationBudget(index.file.bytes() + particles.file.bytes() + skin.file.bytes());
+  std::error_code no_status;
+  if (std::filesystem::exists(paths.blade, no_status)) {
+    blade = Part{paths.blade, open_part(paths.blade, kBladeKind), &budget};
+  }
+  budget = hdf5::InflationBudget(index.file.bytes() + particles.file.bytes() + skin.file.bytes() +
+                                 (blade ? blade->file.bytes() : 0));
   index.reading([&](const ReadingArchive& root) { read_index(root); });
-  for (const Part* part : {&index, &particles, &skin}) {
+  const Part* const of_blade = blade ? &*blade : nullptr;
+  for (const Part* part : {static_cast<const Part*>(&index), static_cast<const Part*>(&particles),
+                           static_cast<const Part*>(&skin), of_blade}) {
+    if (part == nullptr) continue;
     part->reading([&](const ReadingArchive& archive) {
       uint64_t found = 0;
       archive("cutproof_recording", found);
@@ -163,7 +189,7 @@ RecordingReader::File::File(const std::string& name) {
       }
       for (std::size_t k = 0; k < tables.size(); ++k) {
         const RecordedField& recorded = recorded_fields()[k];
-        if (&part_of(recorded) != part || recorded.field.since > format) continue;
+        if (&part_of(recorded) != part) continue;
         if (recorded.storage == Storage::cells) {
           tables[k] = archive.table("VTKHDF/Polygons/Connectivity", hdf5::layout_of<int64_t>());
         } else if (recorded.storage == Storage::rows) {
@@ -179,6 +205,11 @@ RecordingReader::File::File(const std::string& name) {
     check_sizes();
   });
   header.snapshot_count = static_cast<int64_t>(columns.stage.size());
+  check_shown();
+  Digest beginning =
+      digest_of_beginning(header.setup, header.scene_json, header.left_to_reference, header.frames_asked);
+  if (header.snapshot_count > 0) beginning.add(cutproof::digest(snapshot(0).state));
+  header.begins_as_recorded = beginning.value() == recorded_beginning;
 }
 
 void RecordingReader::File::read_index(const ReadingArchive& root) {
@@ -192,8 +223,13 @@ void RecordingReader::File::read_index(const ReadingArchive& root) {
   std::vector<uint8_t> scene;
   root("scene", scene);
   header.scene_json.assign(scene.begin(), scene.end());
-  root("cutproof_format", format);
-  header.setup = read_setup(index.file.id(), budget, format);
+  int64_t frames_asked = 0;
+  root("frames_asked", frames_asked);
+  if (frames_asked < -1)
+    throw hdf5::Error("/frames_asked", fmt::format("This is {}, and should be at least -1.", frames_asked));
+  if (frames_asked >= 0) header.frames_asked = frames_asked;
+  root("cutproof_beginning", recorded_beginning);
+  header.setup = read_setup(index.file.id(), budget);
   double u = 0;
   root("unit_roundoff", u);
   header.precision = u == unit_roundoff(Precision::binary64) ? Precision::binary64 : Precision::binary32;
@@ -201,7 +237,7 @@ void RecordingReader::File::read_index(const ReadingArchive& root) {
     throw hdf5::Error("/unit_roundoff", fmt::format("This is {}, and should be 2^-53 or 2^-24.", u));
   }
   if (const auto defect = defect_of(header.setup)) throw hdf5::Error("/setup/" + defect->field, defect->problem);
-  root.group("snapshots", [&](auto& archive) { walk_snapshots(archive, columns, format); });
+  root.group("snapshots", [&](auto& archive) { walk_snapshots(archive, columns); });
 }
 
 // The file with the rows of a field.
@@ -238,7 +274,6 @@ void RecordingReader::File::check_ranges() const {
   }
   for (std::size_t k = 0; k < tables.size(); ++k) {
     const RecordedField& recorded = recorded_fields()[k];
-    if (recorded.field.since > format) continue;
     const auto& [values, index_column] = columns.fields[k];
     const std::string column = at + recorded.name();
     const std::size_t entries = values.size() / recorded.entry.bytes();
@@ -281,7 +316,6 @@ Snapshot RecordingReader::File::snapshot(std::size_t i) const {
   state.precision = header.precision;
   for (std::size_t k = 0; k < tables.size(); ++k) {
     const RecordedField& recorded = recorded_fields()[k];
-    if (recorded.field.since > format) continue;
     // No structured binding: clang 14 does not capture these.
     const std::vector<std::byte>& values = columns.fields[k].values;
     const std::vector<int64_t>& index_column = columns.fields[k].index;
@@ -303,9 +337,143 @@ Snapshot RecordingReader::File::snapshot(std::size_t i) const {
       }
     });
   }
-  // Before cuts had reaches of their own, each vertex lay where the body's surface or alpha says.
-  if (format < 6) state.skin.reach = uncut_reaches(header.setup, state.skin);
+  check_clusters(i, state);
   return snapshot;
+}
+
+// --- What the files for ParaView say of the same run -----------------------------------------------------------------
+
+// Whoever has written them need not: then they show nothing.
+constexpr const char* kShownRemedy =
+    "Copy all files of the recording once more from where they were made, or record the scene again. A program that "
+    "writes recordings can leave out the group VTKHDF/Steps.";
+
+// What a step has to show of the particles or of the skin, but for what depends on what else is in the file.
+ShownStep RecordingReader::File::shown(IndexSpace points, std::size_t step) const {
+  const std::size_t i = steps[step].snapshot;
+  ShownStep wanted;
+  wanted.time = time_after(starts, steps[step].frames);
+  wanted.points = count_in(points, i);
+  for (std::size_t k = 0; k < tables.size(); ++k) {
+    const RecordedField& recorded = recorded_fields()[k];
+    if (recorded.field.space != points) continue;
+    const int64_t row = columns.fields[k].index[i];
+    if (recorded.is_points()) {
+      wanted.point_row = row;
+    } else {
+      wanted.data_rows.emplace_back(row);
+    }
+  }
+  return wanted;
+}
+
+void RecordingReader::File::check_shown() {
+  starts = frame_starts(header.setup);
+  const auto frame = std::ranges::find(recorded_fields(), "frame", &RecordedField::name) - recorded_fields().begin();
+  for (std::size_t i = 0; i < columns.stage.size(); ++i) {
+    int64_t in_progress = 0;
+    std::memcpy(&in_progress, columns.fields[at(frame)].values.data() + i * sizeof in_progress, sizeof in_progress);
+    const int64_t frames = frames_done(static_cast<Stage>(columns.stage[i]), in_progress);
+    if (!steps.empty() && steps.back().frames == frames) steps.pop_back();
+    steps.push_back({i, frames});
+  }
+  if (steps.empty()) return;
+  particles.reading([&](const ReadingArchive&) { check_particles(); }, kShownRemedy);
+  skin.reading(
+      [&](const ReadingArchive& file) {
+        std::vector<std::string> names;
+        const RecordedField* triangles = nullptr;
+        std::size_t of_triangles = 0;
+        for (std::size_t k = 0; k < tables.size(); ++k) {
+          const RecordedField& recorded = recorded_fields()[k];
+          if (recorded.storage == Storage::cells) triangles = &recorded, of_triangles = k;
+          if (recorded.field.space == IndexSpace::vertex && !recorded.is_points()) names.push_back(recorded.name());
+        }
+        std::vector<ShownStep> wanted;
+        for (std::size_t s = 0; s < steps.size(); ++s) {
+          const std::size_t i = steps[s].snapshot;
+          wanted.push_back(shown(IndexSpace::vertex, s));
+          wanted.back().cells = count_in(triangles->field.space, i);
+          wanted.back().corner_row = 3 * columns.fields[of_triangles].index[i];
+        }
+        require_steps(file, PolyDataFile::Cells::polygons, 3, names, wanted);
+      },
+      kShownRemedy);
+  if (blade) blade->reading([&](const ReadingArchive&) { check_blade(); }, kShownRemedy);
+}
+
+// Besides the fields of a state: the number of each particle, and of a cluster that holds it.
+void RecordingReader::File::check_particles() {
+  std::vector<std::string> names = {"particle"};
+  for (const RecordedField& recorded : recorded_fields()) {
+    if (recorded.field.space == IndexSpace::particle && !recorded.is_points()) names.push_back(recorded.name());
+  }
+  names.emplace_back("cluster");
+  const int64_t n = header.setup.body.particle_count();
+  std::vector<ShownStep> wanted;
+  for (std::size_t s = 0; s < steps.size(); ++s) {
+    wanted.push_back(shown(IndexSpace::particle, s));
+    wanted.back().cells = n;
+    wanted.back().data_rows.insert(wanted.back().data_rows.begin(), std::optional<int64_t>());
+    wanted.back().data_rows.emplace_back();
+  }
+  const ReadingArchive file(particles.file.id(), "", budget);
+  const auto rows = require_steps(file, PolyDataFile::Cells::vertices, 1, names, wanted);
+  if (!rows) return;
+  const std::string cells = "VTKHDF/Vertices/Connectivity", number = "VTKHDF/PointData/particle";
+  for (const int64_t first : std::set(rows->corners.begin(), rows->corners.end())) {
+    for_each_entry<int64_t>(file, cells, first, n, [&](int64_t k, int64_t corner) {
+      require_entry(file.path_of(cells), first + k, corner, k);
+    });
+  }
+  for (const int64_t first : std::set(rows->data.front().begin(), rows->data.front().end())) {
+    for_each_entry<int32_t>(file, number, first, n, [&](int64_t k, int32_t particle) {
+      require_entry(file.path_of(number), first + k, particle, static_cast<int32_t>(k));
+    });
+  }
+  for (std::size_t s = 0; s < steps.size(); ++s) cluster_row[steps[s].snapshot] = rows->data.back()[s];
+}
+
+// Of a snapshot that a step shows, whose clusters are known once it is read.
+void RecordingReader::File::check_clusters(std::size_t i, const State& state) const {
+  const auto found = cluster_row.find(i);
+  if (found == cluster_row.end()) return;
+  particles.reading(
+      [&](const ReadingArchive& file) {
+        const std::string name = "VTKHDF/PointData/cluster";
+        const std::vector<int32_t> wanted = cluster_of_particles(state.clusters, state.x.size());
+        for_each_entry<int32_t>(file, name, found->second, std::ssize(wanted), [&](int64_t k, int32_t cluster) {
+          require_entry(file.path_of(name), found->second + k, cluster, wanted[at(k)]);
+        });
+      },
+      kShownRemedy);
+}
+
+void RecordingReader::File::check_blade() const {
+  const int64_t faces = std::ssize(kBoxOffsets) - 1, corners = std::ssize(kBoxCorners);
+  std::vector<ShownStep> wanted;
+  std::vector<std::optional<std::vector<Vec3>>> boxes;
+  for (const Step& step : steps) {
+    boxes.push_back(blade_box(header.setup, step.frames));
+    wanted.push_back({time_after(starts, step.frames), 0, 0, {}, {}, {}});
+    if (boxes.back()) wanted.back().points = std::ssize(*boxes.back()), wanted.back().cells = faces;
+  }
+  const ReadingArchive file(blade->file.id(), "", *blade->budget);
+  const auto rows = require_steps(file, PolyDataFile::Cells::polygons, corners / faces, {}, wanted);
+  if (!rows) return;
+  const std::string places = "VTKHDF/Points", cells = "VTKHDF/Polygons/Connectivity";
+  for (std::size_t s = 0; s < steps.size(); ++s) {
+    if (!boxes[s]) continue;
+    for_each_entry<Vec3>(file, places, rows->points[s], std::ssize(*boxes[s]), [&](int64_t k, const Vec3& corner) {
+      const Vec3& box = (*boxes[s])[at(k)];
+      for (int axis = 0; axis < 3; ++axis) {
+        require_entry(file.path_of(places), rows->points[s] + k, corner[axis], box[axis]);
+      }
+    });
+    for_each_entry<int64_t>(file, cells, rows->corners[s], corners, [&](int64_t k, int64_t corner) {
+      require_entry(file.path_of(cells), rows->corners[s] + k, corner, kBoxCorners[at(k)]);
+    });
+  }
 }
 
 RecordingReader::RecordingReader(const std::string& name) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -19,8 +20,8 @@ namespace {
 template <class T>
 using Stored = std::conditional_t<std::is_same_v<T, bool>, uint8_t, T>;
 
-template <class Entry>
-void write_entries(WritingArchive& archive, const std::vector<Entry>& entries) {
+template <class Archive, class Entry>
+void write_entries(Archive& archive, const std::vector<Entry>& entries) {
   for_each_entry_field<Entry>([&](const SetupField& field, auto get) {
     using T = std::remove_cvref_t<decltype(get(entries[0]))>;
     const std::string name(field.name);
@@ -74,11 +75,10 @@ void read_entries(const ReadingArchive& archive, std::vector<Entry>& entries) {
   });
 }
 
-// The whole of /setup as recordings of a format have it. S is Setup or const Setup.
+// The whole of /setup. S is Setup or const Setup.
 template <class Archive, class S>
-void walk_setup(Archive& archive, S& setup, int32_t format) {
+void walk_setup(Archive& archive, S& setup) {
   for_each_setup_field([&](const SetupField& field, auto get) {
-    if (field.since > format) return;
     const auto add = [&](auto& group) {
       if constexpr (!is_list_of_entries<std::remove_cvref_t<decltype(get(setup))>>) {
         group(std::string(field.name), get(setup));
@@ -96,18 +96,56 @@ void walk_setup(Archive& archive, S& setup, int32_t format) {
   });
 }
 
+// What it walks over goes into a digest.
+class DigestArchive {
+ public:
+  static constexpr bool kReading = false;
+  explicit DigestArchive(Digest& digest) : digest_(digest) {}
+
+  template <class T>
+  void operator()(const std::string& name, const T& value) {
+    digest_.add(std::string_view(name));
+    if constexpr (NamedChoice<T>) {
+      digest_.add(name_of(value));
+    } else if constexpr (std::is_same_v<T, std::string>) {
+      digest_.add(std::string_view(value));
+    } else {
+      digest_.add(value);
+    }
+  }
+  template <class F>
+  void group(const std::string& name, F&& fields) {
+    digest_.add(std::string_view(name));
+    fields(*this);
+  }
+
+ private:
+  Digest& digest_;
+};
+
 }  // namespace
 
 void write_setup(hid_t file, const Setup& setup) {
   WritingArchive root(file);
-  root.group("setup", [&](auto& archive) { walk_setup(archive, setup, kFormatVersion); });
+  root.group("setup", [&](auto& archive) { walk_setup(archive, setup); });
 }
 
-Setup read_setup(hid_t file, hdf5::InflationBudget& budget, int32_t format) {
+Setup read_setup(hid_t file, hdf5::InflationBudget& budget) {
   Setup setup;
   const ReadingArchive root(file, "", budget);
-  root.group("setup", [&](auto& archive) { walk_setup(archive, setup, format); });
+  root.group("setup", [&](auto& archive) { walk_setup(archive, setup); });
   return setup;
+}
+
+Digest digest_of_beginning(const Setup& setup, std::string_view scene_json,
+                           const std::array<bool, 6>& left_to_reference, std::optional<int64_t> frames_asked) {
+  Digest digest;
+  digest.add(scene_json);
+  digest.add(std::string_view(words_of_stages(left_to_reference)));
+  digest.add(frames_asked.value_or(-1));
+  DigestArchive archive(digest);
+  walk_setup(archive, setup);
+  return digest;
 }
 
 }  // namespace cutproof::io

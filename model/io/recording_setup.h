@@ -2,8 +2,12 @@
 #pragma once
 #include <hdf5.h>
 
+#include <array>
 #include <cstdint>
+#include <optional>
+#include <string_view>
 
+#include "model/digest.h"
 #include "model/io/hdf5_file.h"
 #include "model/setup.h"
 
@@ -11,7 +15,10 @@ namespace cutproof::io {
 
 // Both throw hdf5::Error; what is read is not yet checked by defect_of.
 void write_setup(hid_t file, const Setup& setup);
-// `format`: of the recording, which lacks what is newer (SetupField::since).
-Setup read_setup(hid_t file, hdf5::InflationBudget& budget, int32_t format);
+Setup read_setup(hid_t file, hdf5::InflationBudget& budget);
+
+// Of all that a run begins with but the state as loaded, which is to be added.
+Digest digest_of_beginning(const Setup& setup, std::string_view scene_json,
+                           const std::array<bool, 6>& left_to_reference, std::optional<int64_t> frames_asked);
 
 }  // namespace cutproof::io

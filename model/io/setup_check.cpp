@@ -163,6 +163,17 @@ Defect grid_defect(const Body& body) {
   return std::nullopt;
 }
 
+// Numbers of a mesh's axes are rounded some dozens of times; a reflection is off by 2.
+Defect orientation_defect(const Mat3& m) {
+  constexpr double kRounding = 1e-12;
+  const std::array<Vec3, 3> row = {
+      {{m(0, 0), m(0, 1), m(0, 2)}, {m(1, 0), m(1, 1), m(1, 2)}, {m(2, 0), m(2, 1), m(2, 2)}}};
+  const double off = std::max({std::abs(norm(row[0]) - 1), std::abs(norm(row[1]) - 1), std::abs(dot(row[0], row[1])),
+                               norm(cross(row[0], row[1]) - row[2])});
+  if (off <= kRounding) return std::nullopt;
+  return SetupDefect{"body/orientation", fmt::format("This is off by {:.3g} from a rotation.", off)};
+}
+
 Defect parameter_defect(const Setup& setup) {
   if (setup.step.solver == Solver::published && setup.step.acceleration != Acceleration::none) {
     return SetupDefect{"step/acceleration", "The solver \"published\" has no acceleration."};
@@ -227,6 +238,7 @@ Defect schedule_defect(const Setup& setup) {
 
 std::optional<SetupDefect> defect_of(const Setup& setup) {
   if (Defect defect = number_defect(setup)) return defect;
+  if (Defect defect = orientation_defect(setup.body.orientation)) return defect;
   if (Defect defect = setup.body.on_grid() ? grid_defect(setup.body) : bare_graph_defect(setup)) return defect;
   if (Defect defect = parameter_defect(setup)) return defect;
   return schedule_defect(setup);

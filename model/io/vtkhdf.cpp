@@ -1,19 +1,27 @@
 #include "model/io/vtkhdf.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <array>
+#include <utility>
+
+#include "model/at.h"
 
 namespace cutproof::io {
 namespace {
 
 constexpr std::array<const char*, 4> kCellGroups = {"Vertices", "Lines", "Polygons", "Strips"};
+constexpr std::array<int64_t, 2> kVersion = {2, 0};
+constexpr const char* kType = "PolyData";
 
 }  // namespace
 
 PolyDataFile::PolyDataFile(const std::string& path, Cells cells) : file_(hdf5::File::create(path)), cells_(cells) {
   root_ = hdf5::create_group(file_.id(), "VTKHDF");
-  hdf5::write_attribute(root_.get(), "Version", std::array<int64_t, 2>{2, 0});
-  hdf5::write_text_attribute(root_.get(), "Type", "PolyData");
+  hdf5::write_attribute(root_.get(), "Version", kVersion);
+  hdf5::write_text_attribute(root_.get(), "Type", kType);
   points_ = hdf5::Table::create(root_.get(), "Points", hdf5::layout_of<Vec3>());
   point_data_ = hdf5::create_group(root_.get(), "PointData");
   const hdf5::Id group = hdf5::create_group(root_.get(), kCellGroups[static_cast<std::size_t>(cells)]);
@@ -93,6 +101,143 @@ void PolyDataFile::finish(const std::vector<Step>& given) {
   point_data_ = {};
   root_ = {};
   file_.close();
+}
+
+namespace {
+
+// The parts of a file: how many points, and which rows of cells and corners.
+struct Parts {
+  std::vector<int64_t> points, cells, first_cell, first_corner;
+};
+
+void require_rows(const ReadingArchive& group, const std::string& name, int64_t found, int64_t wanted) {
+  if (found == wanted) return;
+  throw hdf5::Error(group.path_of(name), fmt::format("This has {} entries, and should have {}.", found, wanted));
+}
+
+// Cells of one kind, of which a part has `corners` corners each, or none.
+void read_cells(const ReadingArchive& group, bool ours, int64_t corners, Parts& parts) {
+  const auto count = std::ssize(parts.points);
+  std::vector<int64_t> cells, ids;
+  group("NumberOfCells", cells);
+  group("NumberOfConnectivityIds", ids);
+  require_rows(group, "NumberOfCells", std::ssize(cells), count);
+  require_rows(group, "NumberOfConnectivityIds", std::ssize(ids), count);
+  const int64_t stored = group.table("Offsets", hdf5::layout_of<int64_t>()).rows();
+  int64_t all = 0;
+  for (int64_t p = 0; p < count; ++p) {
+    const int64_t found = cells[at(p)];
+    if (!ours) require_entry<int64_t>(group.path_of("NumberOfCells"), p, found, 0);
+    // Compared by division: a corrupted count times the corners need not fit.
+    if (found < 0 || found >= stored || ids[at(p)] % corners != 0 || ids[at(p)] / corners != found) {
+      throw hdf5::Error(group.path_of("NumberOfConnectivityIds"),
+                        fmt::format("Entry {} is {}, for {} cells of {} corners.", p, ids[at(p)], found, corners));
+    }
+    if (ours) {
+      parts.first_cell.push_back(all);
+      parts.first_corner.push_back(all * corners);
+    }
+    all += found;
+  }
+  require_rows(group, "Offsets", stored, all + count);
+  int64_t part = 0, cell = 0;  // each part has one more offset than cells
+  for_each_entry<int64_t>(group, "Offsets", 0, stored, [&](int64_t i, int64_t offset) {
+    require_entry(group.path_of("Offsets"), i, offset, corners * cell);
+    const bool ends = cell == cells[at(part)];
+    part += ends ? 1 : 0;
+    cell = ends ? 0 : cell + 1;
+  });
+  require_rows(group, "Connectivity", group.table("Connectivity", hdf5::layout_of<int64_t>()).rows(), all * corners);
+  if (ours) parts.cells = std::move(cells);
+}
+
+// Tables of parts and steps are read by entries, each of which must be what `wanted` says of step i.
+template <class T, class Wanted>
+std::vector<T> read_steps(const ReadingArchive& group, const std::string& name, int64_t steps, const Wanted& wanted) {
+  require_rows(group, name, group.table(name, hdf5::layout_of<T>()).rows(), steps);
+  std::vector<T> values;
+  for_each_entry<T>(group, name, 0, steps, [&](int64_t i, const T& value) {
+    const std::optional<T> other = wanted(at(i));
+    if (other) require_entry(group.path_of(name), i, value, *other);
+    values.push_back(value);
+  });
+  return values;
+}
+
+}  // namespace
+
+std::optional<ShownRows> require_steps(const ReadingArchive& file, PolyDataFile::Cells cells, int64_t corners,
+                                       const std::vector<std::string>& data_names,
+                                       const std::vector<ShownStep>& steps) {
+  std::optional<ShownRows> rows;
+  file.group("VTKHDF", [&](const ReadingArchive& root) {
+    if (!root.has("Steps")) return;
+    rows.emplace();
+    std::array<int64_t, 2> version = {};
+    std::string type;
+    root("Version", version);
+    root("Type", type);
+    if (version != kVersion || type != kType) {
+      throw hdf5::Error("/VTKHDF", fmt::format("This is {} of version {}.{}, and should be {} of version {}.{}.", type,
+                                               version[0], version[1], kType, kVersion[0], kVersion[1]));
+    }
+    const auto kind = static_cast<std::size_t>(cells);
+    const auto count = std::ssize(steps);
+    Parts parts;
+    root("NumberOfPoints", parts.points);
+    for (std::size_t k = 0; k < kCellGroups.size(); ++k) {
+      root.group(kCellGroups[k], [&](const ReadingArchive& group) { read_cells(group, k == kind, corners, parts); });
+    }
+    root.group("Steps", [&](const ReadingArchive& group) {
+      int64_t found = 0;
+      group("NSteps", found);
+      if (found != count) {
+        throw hdf5::Error(group.path_of("NSteps"),
+                          fmt::format("This is {}, and the rest of the recording makes it {}.", found, count));
+      }
+      read_steps<double>(group, "Values", count, [&](std::size_t i) { return std::optional(steps[i].time); });
+      read_steps<int64_t>(group, "NumberOfParts", count, [](std::size_t) { return std::optional<int64_t>(1); });
+      const std::vector<int64_t> part =
+          read_steps<int64_t>(group, "PartOffsets", count, [](std::size_t) { return std::optional<int64_t>(); });
+      for (std::size_t i = 0; i < steps.size(); ++i) {
+        const std::string name = group.path_of("PartOffsets");
+        if (part[i] < 0 || part[i] >= std::ssize(parts.points)) {
+          throw hdf5::Error(name,
+                            fmt::format("Entry {} is {}, and there are {} parts.", i, part[i], parts.points.size()));
+        }
+        const int64_t points = parts.points[at(part[i])], of_part = parts.cells[at(part[i])];
+        if (points == steps[i].points && of_part == steps[i].cells) continue;
+        throw hdf5::Error(name, fmt::format("Entry {} leads to a part of {} points and {} cells, and the rest of the "
+                                            "recording has {} and {}.",
+                                            i, points, of_part, steps[i].points, steps[i].cells));
+      }
+      rows->points =
+          read_steps<int64_t>(group, "PointOffsets", count, [&](std::size_t i) { return steps[i].point_row; });
+      const auto of_kind = [&](const std::vector<int64_t>& first, std::size_t i) {
+        std::array<int64_t, 4> wanted = {};
+        wanted[kind] = first[at(part[i])];
+        return std::optional(wanted);
+      };
+      read_steps<std::array<int64_t, 4>>(group, "CellOffsets", count,
+                                         [&](std::size_t i) { return of_kind(parts.first_cell, i); });
+      read_steps<std::array<int64_t, 4>>(group, "ConnectivityIdOffsets", count,
+                                         [&](std::size_t i) { return of_kind(parts.first_corner, i); });
+      for (std::size_t i = 0; i < steps.size(); ++i) {
+        rows->corners.push_back(parts.first_corner[at(part[i])]);
+        if (steps[i].corner_row && steps[i].cells > 0) {
+          require_entry(group.path_of("ConnectivityIdOffsets"), static_cast<int64_t>(i), rows->corners.back(),
+                        *steps[i].corner_row);
+        }
+      }
+      group.group("PointDataOffsets", [&](const ReadingArchive& data) {
+        for (std::size_t d = 0; d < data_names.size(); ++d) {
+          rows->data.push_back(
+              read_steps<int64_t>(data, data_names[d], count, [&](std::size_t i) { return steps[i].data_rows[d]; }));
+        }
+      });
+    });
+  });
+  return rows;
 }
 
 }  // namespace cutproof::io

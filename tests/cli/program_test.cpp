@@ -474,6 +474,30 @@ TEST_F(Program, RefusesARecordingThatIsCutOffOrNone) {
   expect_refused("check nothing_there", {"nothing_there", "remedy"});
 }
 
+// Whatever has made it: its scene, its setup and its first snapshot belong together.
+TEST_F(Program, ChecksRecordingsOfKernelsOfMeshesAndOfRunsThatWereCutShort) {
+  write("cut.json", small_block().dump());
+  write("box.off",
+        "OFF 8 12 0\n0 0 0\n80 0 0\n80 30 0\n0 30 0\n0 0 20\n80 0 20\n80 30 20\n0 30 20\n"
+        "3 0 2 1\n3 0 3 2\n3 4 5 6\n3 4 6 7\n3 0 1 5\n3 0 5 4\n3 1 2 6\n3 1 6 5\n3 2 3 7\n3 2 7 6\n3 3 0 4\n"
+        "3 3 4 7\n");
+  for (const std::string options : {"--backend host", "--backend host-split", "--mesh box.off --spacing 0.01",
+                                    "--frames 3", "--set detect.every=substep --frames 2"}) {
+    ASSERT_EQ(cutproof("run cut.json --record seen " + options).status, 0) << options;
+    const Outcome checked = cutproof("check seen --check topology");
+    EXPECT_NE(checked.status, 2) << options << "\n" << checked.output;
+    EXPECT_EQ(cutproof("digest seen").status, 0) << options;
+  }
+  EXPECT_EQ(cutproof("run cut.json --record seen --backend host --frames 3").status, 0);
+  EXPECT_EQ(cutproof("check seen").status, 0);
+  const std::string claim = "cd '" + folder_.string() +
+                            "' && /usr/bin/python3 -c \"import h5py; "
+                            "h5py.File('seen.cutproof.h5', 'r+').attrs.modify('unit_roundoff', 2.0**-53)\"";
+  ASSERT_EQ(std::system(claim.c_str()), 0);
+  expect_refused("check seen", {"seen.cutproof.h5", "unit_roundoff", "the backend host has", "remedy"});
+  expect_refused("report seen -o page.html", {"unit_roundoff"});
+}
+
 // --- Backends that can run some spans only ---------------------------------------------------------------------------
 
 TEST_F(Program, JudgesBackendsOfWholeFramesAndOfOneStageOnWhatTheyRun) {

@@ -107,7 +107,7 @@ Outcome read_recording() {
   return outcome_of([] {
     const Contents contents = contents_of(scratch_path("fed"));
     io::Recorder again(scratch_path("again"), contents.header.setup, contents.header.scene_json,
-                       contents.header.backend);
+                       contents.header.backend, contents.header.left_to_reference, contents.header.frames_asked);
     for (const io::Snapshot& snapshot : contents.snapshots) again.add(snapshot.stage, snapshot.state);
     again.finish();
     if (bits_of(contents_of(scratch_path("again"))) != bits_of(contents)) {

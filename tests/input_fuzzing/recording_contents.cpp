@@ -8,6 +8,7 @@
 
 #include "model/io/hdf5_file.h"
 #include "tests/input_fuzzing/recording_target.h"
+#include "tests/model/recorded_items.h"
 
 namespace cutproof::input_fuzzing {
 namespace {
@@ -45,20 +46,6 @@ std::string bytes_of(const Edit& edit) {
   return bytes;
 }
 
-herr_t note_attribute(hid_t, const char* name, const H5A_info_t*, void* names) {
-  static_cast<std::vector<std::string>*>(names)->emplace_back(name);
-  return 0;
-}
-
-struct Object {
-  std::string path;
-  bool is_dataset;
-};
-herr_t note_object(hid_t, const char* name, const H5O_info_t* info, void* objects) {
-  static_cast<std::vector<Object>*>(objects)->push_back({name, info->type == H5O_TYPE_DATASET});
-  return 0;
-}
-
 hdf5::Id opened(std::size_t part, unsigned flags) {
   const std::string path = recording_path(part);
   return {H5Fopen(path.c_str(), flags, H5P_DEFAULT), H5Fclose, path};
@@ -70,15 +57,8 @@ std::vector<Item> found_items() {
   std::vector<Item> items;
   for (std::size_t part = 0; part < 3; ++part) {
     write_recording_part(part, small_recording()[part]);
-    const hdf5::Id file = opened(part, H5F_ACC_RDONLY);
-    std::vector<Object> objects;
-    H5Ovisit2(file.get(), H5_INDEX_NAME, H5_ITER_INC, note_object, &objects, H5O_INFO_BASIC);
-    for (const Object& object : objects) {
-      const hdf5::Id id(H5Oopen(file.get(), object.path.c_str(), H5P_DEFAULT), H5Oclose, object.path);
-      std::vector<std::string> attributes;
-      H5Aiterate2(id.get(), H5_INDEX_NAME, H5_ITER_INC, nullptr, note_attribute, &attributes);
-      if (object.is_dataset) items.push_back({part, object.path, ""});
-      for (const std::string& name : attributes) items.push_back({part, object.path, name});
+    for (const tests::RecordedItem& item : tests::items_of(recording_path(part))) {
+      items.push_back({part, item.object, item.attribute});
     }
   }
   return items;

@@ -394,7 +394,7 @@ TEST_F(RecordingTest, GivesBackEachFieldOfASetupThatChangedAlone) {
     file.close();
     const hdf5::File opened = hdf5::File::open(path("setup.h5"));
     hdf5::InflationBudget budget(opened.bytes());
-    return bits_of(read_setup(opened.id(), budget, kFormatVersion));
+    return bits_of(read_setup(opened.id(), budget));
   };
   // No body has both a grid and edges of its own, but each field is kept for itself.
   const Body bare = as_bare_graph(base.body);
@@ -887,13 +887,13 @@ TEST_F(RecordingTest, IsRefusedIfItIsNoneAtAll) {
   refused("swapped", "recording particles");
 }
 
-TEST_F(RecordingTest, IsRefusedIfItIsOfANewerVersion) {
+TEST_F(RecordingTest, IsRefusedIfItIsOfAnotherVersion) {
   record("run");
   tamper(path("run.cutproof.h5"),
          [](hid_t file) { set_attribute<int32_t>(file, "/", "cutproof_format", kFormatVersion + 1); });
   expect_input_error([&] { RecordingReader reader(path("run")); }, path("run.cutproof.h5"), "newer cutproof");
-  tamper(path("run.cutproof.h5"), [](hid_t file) { set_attribute<int32_t>(file, "/", "cutproof_format", 0); });
-  expect_input_error([&] { RecordingReader reader(path("run")); }, path("run.cutproof.h5"), "format 0");
+  tamper(path("run.cutproof.h5"), [](hid_t file) { set_attribute<int32_t>(file, "/", "cutproof_format", 7); });
+  expect_input_error([&] { RecordingReader reader(path("run")); }, path("run.cutproof.h5"), "format 7");
 }
 
 TEST_F(RecordingTest, IsNotMadeOfASetupWhoseCriterionHasNoEndsToTake) {
@@ -901,64 +901,6 @@ TEST_F(RecordingTest, IsNotMadeOfASetupWhoseCriterionHasNoEndsToTake) {
   setup.detect.remove = RemovedEnds::one;
   setup.detect.criterion = Criterion::geometric;
   EXPECT_THROW(Recorder(path("run"), setup, "{}", "reference"), std::invalid_argument);
-}
-
-// Format 5 had no reach of vertices: each lay where the body's surface or alpha says. And cuts were not fitted.
-TEST_F(RecordingTest, OfFormatFiveHasItsVerticesWhereTheBodySays) {
-  Setup setup = block_setup(2, 1, 1);
-  setup.skin.alpha = 0.3;
-  setup.skin.fit_cuts = true;
-  setup.body.surface_crossing = {0, 128, 64, 16, 240, 0, 77, 0, 0, 0, 0, 0};
-  State state = rest_state(setup);
-  state.skin = some_skin(state, 1);
-  {
-    Recorder recorder(path("run"), setup, "{}", "reference");
-    recorder.add(Stage::skin, state);
-    recorder.finish();
-  }
-  const RecordingPaths files = recording_paths(path("run"));
-  EXPECT_EQ(RecordingReader(path("run")).snapshot(0).state.skin.reach, state.skin.reach);
-  EXPECT_TRUE(RecordingReader(path("run")).header().setup.skin.fit_cuts);
-  for (const std::string& file : {files.index, files.particles, files.skin}) {
-    tamper(file, [&](hid_t id) { set_attribute<int32_t>(id, "/", "cutproof_format", 5); });
-  }
-  tamper(files.skin, [](hid_t file) { H5Ldelete(file, "/VTKHDF/PointData/reach", H5P_DEFAULT); });
-  const RecordingReader old(path("run"));
-  EXPECT_EQ(old.snapshot(0).state.skin.reach, (std::vector<double>{0.3, 0.25, 0.9375})) << "+x leads to a particle";
-  EXPECT_FALSE(old.header().setup.skin.fit_cuts);
-}
-
-// Format 3 had no detect/remove: both ends of an edge went. Format 4 had no body/surface_crossing: none was known.
-TEST_F(RecordingTest, IsReadIfItIsOfAFormatBefore) {
-  Setup setup = block_setup(2, 1, 1);
-  setup.detect.remove = RemovedEnds::one;
-  setup.body.surface_crossing = {0, 128, 99, 16, 240, 0, 77, 0, 0, 0, 0, 0};
-  {
-    Recorder recorder(path("run"), setup, "{}", "reference");
-    recorder.finish();
-  }
-  const RecordingPaths files = recording_paths(path("run"));
-  const auto call_it = [&](int32_t format) {
-    for (const std::string& file : {files.index, files.particles, files.skin}) {
-      tamper(file, [&](hid_t id) { set_attribute<int32_t>(id, "/", "cutproof_format", format); });
-    }
-  };
-  const auto read = [&] { return RecordingReader(path("run")).header().setup; };
-  EXPECT_EQ(read().detect.remove, RemovedEnds::one);
-  EXPECT_EQ(read().body.surface_crossing, setup.body.surface_crossing);
-  call_it(4);
-  EXPECT_EQ(read().detect.remove, RemovedEnds::one);
-  EXPECT_TRUE(read().body.surface_crossing.empty());
-  tamper(files.index, [](hid_t file) { H5Ldelete(file, "/setup/body/surface_crossing", H5P_DEFAULT); });
-  EXPECT_TRUE(read().body.surface_crossing.empty());
-  call_it(3);
-  EXPECT_EQ(read().detect.remove, RemovedEnds::both);
-  tamper(files.index, [](hid_t file) { H5Adelete_by_name(file, "/setup/detect", "remove", H5P_DEFAULT); });
-  EXPECT_EQ(read().detect.remove, RemovedEnds::both);
-  call_it(4);
-  expect_input_error([&] { read(); }, files.index, "remove");
-  call_it(kFormatVersion);
-  expect_input_error([&] { read(); }, files.index, "surface_crossing");
 }
 
 TEST_F(RecordingTest, IsRefusedIfAFileOfItIsMissingOrOfAnother) {
@@ -973,7 +915,9 @@ TEST_F(RecordingTest, IsRefusedIfAFileOfItIsMissingOrOfAnother) {
     fs::rename(ours + ".kept", ours);
   }
   read_everything(path("run"));
-  // The blade's file is for ParaView alone.
+  // The blade's file is for ParaView alone, but it is of this run if it is there.
+  fs::copy(other.blade, run.blade, fs::copy_options::overwrite_existing);
+  expect_input_error([&] { RecordingReader reader(path("run")); }, run.blade, "another recording");
   fs::remove(run.blade);
   read_everything(path("run"));
 }
@@ -981,7 +925,7 @@ TEST_F(RecordingTest, IsRefusedIfAFileOfItIsMissingOrOfAnother) {
 TEST_F(RecordingTest, IsRefusedWhereverItIsCutOff) {
   record("run");
   const RecordingPaths files = recording_paths(path("run"));
-  for (const std::string& file : {files.index, files.particles, files.skin}) {
+  for (const std::string& file : {files.index, files.particles, files.skin, files.blade}) {
     const std::string whole = read_bytes(file);
     const std::size_t step = std::max<std::size_t>(1, whole.size() / 150);
     std::vector<std::size_t> lengths = {1, 7, 8, 9, 47, 48, 49, whole.size() - 1, whole.size() - 2};
@@ -1005,7 +949,7 @@ TEST_F(RecordingTest, NeverGivesWrongDataFromADamagedFile) {
   std::cout << "seed " << kSeed << "\n";
   std::mt19937_64 random(kSeed);
   int refused = 0, unharmed = 0;
-  for (const std::string& file : {files.index, files.particles, files.skin}) {
+  for (const std::string& file : {files.index, files.particles, files.skin, files.blade}) {
     const std::string whole = read_bytes(file);
     for (int trial = 0; trial < 150; ++trial) {
       std::string damaged = whole;

@@ -1,0 +1,26 @@
+#include "cli/recordings.h"
+
+#include <fmt/format.h>
+
+#include "harness/backends.h"
+#include "model/error.h"
+#include "model/precision.h"
+
+namespace cutproof::cli {
+
+OpenRecording open_recording(const std::string& name) {
+  OpenRecording opened;
+  opened.reader = std::make_unique<io::RecordingReader>(name);
+  static_cast<fixtures::RecordedScene&>(opened) = fixtures::scene_of(*opened.reader, name);
+  const io::Recording& recording = opened.header();
+  const harness::BackendDescriptor* const backend = harness::find_backend(recording.backend);
+  if (backend != nullptr && backend->precision != recording.precision) {
+    throw InputError(io::recording_paths(name).index, "unit_roundoff",
+                     fmt::format("This is {}, and the backend {} has {}.", unit_roundoff(recording.precision),
+                                 backend->name, unit_roundoff(backend->precision)),
+                     "A program that writes recordings gives its own name as `backend`; else record the scene again.");
+  }
+  return opened;
+}
+
+}  // namespace cutproof::cli
