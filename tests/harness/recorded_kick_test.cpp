@@ -187,6 +187,12 @@ TEST(Kick, LooksAtParticlesFromTheFrameOnInWhichTheyExist) {
   Runs lost = growing;
   lost.kicked[place(7, 2)] = std::nan("");
   EXPECT_THAT(failing(judged(lost.file())), ElementsAre("finite"));
+  // What has blown up is not what does not exist yet, in every run alike or not.
+  Runs blown_up = growing;
+  for (std::vector<double>* const run : {&blown_up.positions, &blown_up.kicked, &blown_up.again}) {
+    std::fill_n(run->begin() + static_cast<std::ptrdiff_t>(place(8, 2)), 3, std::nan(""));
+  }
+  EXPECT_THAT(failing(judged(blown_up.file())), ElementsAre("finite"));
   // That it comes to exist in another frame because a piece was kicked is a ghost force, too.
   Runs sooner = growing;
   for (int64_t axis = 0; axis < 3; ++axis) sooner.kicked[place(5, 2, axis)] = sooner.kicked[place(6, 2, axis)];
