@@ -1,11 +1,13 @@
 #include "guests/plugin_backend.h"
 
+#include <algorithm>
 #include <chrono>
 #include <type_traits>
 #include <utility>
 
 #include "guests/tissue_arrays.h"
 #include "model/at.h"
+#include "model/coordinates.h"
 #include "model/error.h"
 #include "model/fields.h"
 #include "model/rules.h"
@@ -180,7 +182,6 @@ class PluginBackend final : public Backend {
     setup_arrays_.clear();
     report_ = {};
     for (std::size_t b = 0; b < setups_.size(); ++b) {
-      states_[b].precision = std::max(states_[b].precision, precision());
       setup_arrays_.push_back(arrays_of(setups_[b]));
       load_body(b);
     }
@@ -222,6 +223,7 @@ class PluginBackend final : public Backend {
     if (answer.kind == Answer::Kind::refused) throw Refused("the plugin, load: " + answer.text);
     if (answer.kind == Answer::Kind::fault) throw std::runtime_error("load: " + answer.text);
     take_state(state, states_[b]);  // rounded, where it is in single precision
+    note_rounding(setups_[b].body, states_[b]);
   }
 
   void run_body(std::size_t b, Span span) {
@@ -256,7 +258,7 @@ class PluginBackend final : public Backend {
         next.clusters.number[c] = static_cast<int32_t>(c);
       }
     }
-    next.precision = std::max(next.precision, precision());
+    note_rounding(setup.body, next);
     states_[b] = std::move(next);
   }
 
@@ -285,6 +287,12 @@ class PluginBackend final : public Backend {
       state.skin.reach = uncut_reaches(setups_[b], state.skin);
     }
     if (state.clusters.offsets.empty()) state.clusters.offsets = {0};
+  }
+
+  // Places are handed over and come back as absolute coordinates of the body's frame.
+  void note_rounding(const Body& body, State& state) const {
+    state.precision = std::max(state.precision, precision());
+    if (precision() != Precision::binary64) state.place_rounding = rounding_of_coordinates(body, state);
   }
 
   // A process that was started anew knows no body.

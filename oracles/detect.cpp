@@ -33,10 +33,9 @@ Stretch stretch_of(const TissueGraph& graph, const std::vector<Vec3>& x, int32_t
 }
 
 // An edge is too long beyond ε times its own rest length: then both of its ends go.
-Demand demand_of_distance(const Body& body, const TissueGraph& graph, const std::vector<Vec3>& x, int32_t i,
-                          double epsilon, double u) {
+Demand demand_of_distance(const Body& body, const TissueGraph& graph, const State& state, int32_t i, double epsilon) {
   Demand demand = Demand::keep;
-  for (const int32_t other : graph.neighbours(i)) demand = std::max(demand, openness(body, x, i, other, epsilon, u));
+  for (const int32_t other : graph.neighbours(i)) demand = std::max(demand, openness(body, state, i, other, epsilon));
   return demand;
 }
 
@@ -246,8 +245,7 @@ void check_detection(const StageRun& run, Verdict& verdict) {
     }
     if (one_end) continue;
     const Stretch stretch = stretch_of(graph, before.x, i);
-    const Demand demand = criterion == Criterion::distance
-                              ? demand_of_distance(setup.body, graph, before.x, i, epsilon, u)
+    const Demand demand = criterion == Criterion::distance ? demand_of_distance(setup.body, graph, before, i, epsilon)
                           : criterion == Criterion::geometric ? swept.demand_of(stretch.distance, before.x[at(i)], u)
                           : criterion == Criterion::strain    ? strained[at(i)].demand
                                                               : Demand::keep;

@@ -8,12 +8,11 @@
 
 #include "oracles/checks.h"
 #include "oracles/pushes.h"
+#include "oracles/rounding.h"
 #include "oracles/totals.h"
 
 namespace cutproof::oracles {
 namespace {
-
-constexpr double kStored = 0x1p-53;  // positions of a state are doubles, whatever they were computed in
 
 class Motion {
  public:
@@ -26,7 +25,8 @@ class Motion {
         h_(setup_.body.grid.spacing),
         dt_(setup_.substep_length[at(before_.frame)]),
         decay_(std::exp(-setup_.step.damping * dt_)),
-        u_(std::max(unit_roundoff(before_), unit_roundoff(after_))) {}
+        u_(std::max(unit_roundoff(before_), unit_roundoff(after_))),
+        stored_(std::max(unit_of_places(before_), unit_of_places(after_))) {}
 
   void judge() {
     if (setup_.step.substeps == 1) judge_single_substep();
@@ -38,7 +38,7 @@ class Motion {
   Vec3 displacement(const State& state, std::size_t i) const {
     return state.x[i] - setup_.body.rest_position(static_cast<int32_t>(i));
   }
-  double stored(std::size_t i) const { return 4 * kStored * (norm(before_.x[i]) + norm(after_.x[i])); }
+  double stored(std::size_t i) const { return 4 * stored_ * (norm(before_.x[i]) + norm(after_.x[i])); }
 
   // [m] off by `distance`, of which rounding explains `bound`.
   template <class Text>
@@ -84,7 +84,7 @@ class Motion {
         if (before_.alive[i] == 0) continue;
         const double reach = norm(displacement(before_, i)) + norm(displacement(after_, i)) + length;
         const double rounding = 2 * u_ * static_cast<double>(substeps + 1) * reach +
-                                static_cast<double>(substeps) * (stored(i) + 4 * kStored * length);
+                                static_cast<double>(substeps) * (stored(i) + 4 * stored_ * length);
         if (throughout) {
           compare(norm(after_.x[i] - before_.x[i] - path), rounding, {particle}, [&] {
             return fmt::format("particle {} is held and should have moved by {:.6g} h, it moved by {:.6g} h", particle,
@@ -124,7 +124,10 @@ class Motion {
     // Each substep's mean velocity is off by as much as the momentum of the frame may be (Linear momentum).
     Verdict linear;
     check_momentum(run_, linear);
-    const double rounding = 2 * substeps * dt_ / decay * linear.bound / mass + 8 * kStored * (norm(start) + norm(end));
+    const double rounding =
+        2 * substeps * dt_ / decay * linear.bound / mass +
+        8 * unit_roundoff(Precision::binary64) * (norm(start) + norm(end)) +
+        2 * substeps * std::max(before_.place_rounding, after_.place_rounding);  // of each place that is stored
     const std::array<Pushes, 3> pushes = pushes_of(setup_, before_);
     for (int axis = 0; axis < 3; ++axis) {
       const double impulse = after_.impulse[axis];
@@ -155,6 +158,7 @@ class Motion {
   const State &before_, &after_;
   Verdict& verdict_;
   const double h_, dt_, decay_, u_;
+  const double stored_;  // u of a place that is stored
   double worst_ = -1;
 };
 

@@ -27,11 +27,13 @@ constexpr std::size_t kMostTried = 12;
 
 }  // namespace
 
-Demand openness(const Body& body, const std::vector<Vec3>& x, int32_t i, int32_t j, double epsilon, double u) {
-  const double band = kStretchBand * u + (body.on_grid() ? 0 : kRestBand * kUnitRoundoff);
-  const double distance = norm(x[at(i)] - x[at(j)]), limit = epsilon * body.rest_length(i, j);
-  if (distance > limit * (1 + band)) return Demand::remove;
-  return distance < limit * (1 - band) ? Demand::keep : Demand::either;
+Demand openness(const Body& body, const State& state, int32_t i, int32_t j, double epsilon) {
+  const double band = kStretchBand * unit_roundoff(state) + (body.on_grid() ? 0 : kRestBand * kUnitRoundoff);
+  const double distance = norm(state.x[at(i)] - state.x[at(j)]), limit = epsilon * body.rest_length(i, j);
+  // Of absolute coordinates the rest length is known as well as the places at rest of both ends.
+  const double off = limit * band + 2 * epsilon * state.place_rounding;
+  if (distance > limit + off) return Demand::remove;
+  return distance < limit - off ? Demand::keep : Demand::either;
 }
 
 OneEndOfEach::OneEndOfEach(const Setup& setup, const TissueGraph& graph, const State& before,
@@ -44,7 +46,7 @@ OneEndOfEach::OneEndOfEach(const Setup& setup, const TissueGraph& graph, const S
   const double u = unit_roundoff(before);
   for (int32_t i = 0; i < graph.particle_count(); ++i) {
     for (const int32_t j : graph.upper_neighbours(i)) {
-      const Demand open = openness(setup.body, before.x, i, j, setup.detect.epsilon, u);
+      const Demand open = openness(setup.body, before, i, j, setup.detect.epsilon);
       if (open == Demand::keep) continue;
       for (const int32_t end : {i, j}) edges_at_[at(end)].push_back(static_cast<int32_t>(edges_.size()));
       edges_.push_back({.low = i, .high = j, .bit = open == Demand::either ? bits_++ : -1});

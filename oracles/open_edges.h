@@ -17,8 +17,8 @@ namespace cutproof::oracles {
 constexpr double kPlacesBand = 32;
 
 // Whether the edge between two neighbours is open, longer than epsilon times its rest length: `remove`: it is, `keep`:
-// it is not, however a backend of unit roundoff u computes it.
-Demand openness(const Body& body, const std::vector<Vec3>& x, int32_t i, int32_t j, double epsilon, double u);
+// it is not, however a backend of the state's precision computes it.
+Demand openness(const Body& body, const State& state, int32_t i, int32_t j, double epsilon);
 
 // Detection with `detect.remove` = `one` or `nearer`. Each particle's fate follows from whether edges near it are open,
 // from which side of the blade's plane their ends are on, and with `nearer` from which end the clusters carry nearer to

@@ -10,14 +10,26 @@
 
 namespace cutproof::oracles {
 
-// A sum of N terms, one after the other, in units of u times the sum of their sizes.
+// A sum of N terms, one after the other, in units of u times the sum of their sizes: in standard deviations.
 inline double sum_rounds(double terms) { return 2 + std::sqrt(terms) / 2; }
 
-// A mean of `terms` places that were summed and stored as absolute coordinates, each rounded by at most
-// State::place_rounding [m]: as such a sum, and once more for each place and for the mean itself (tolerances.md,
-// Absolute coordinates). Squares of this are the share of a single mean.
-inline double absolute_mean_rounding(const State& state, double terms) {
-  return (2 + sum_rounds(terms)) * state.place_rounding;
+// The same at most, in whatever order and however the roundings are related: terms of a grid are equal, and then all
+// round the same way. No partial sum of j terms exceeds the sum of all sizes, nor j times the greatest.
+inline double sum_rounds_at_most(double terms, double total, double greatest) {
+  return greatest > 0 ? terms + 0.5 - total / (2 * greatest) : 0;
+}
+
+// At most, of a mean of absolute coordinates [m] (tolerances.md, Absolute coordinates). `weights`: what the sum of the
+// weights rounds, in units of u; the weighted sum of places rounds as much. Beyond these a place is rounded when it is
+// handed over, its product, the quotient, and the mean when it is stored.
+inline double absolute_mean_rounding(const State& state, double weights) {
+  return (2 * weights + 4) * state.place_rounding;
+}
+
+// u of places as such: where they are absolute coordinates that of the state, else that of the doubles in which states
+// hold them.
+inline double unit_of_places(const State& state) {
+  return state.place_rounding > 0 ? unit_roundoff(state) : unit_roundoff(Precision::binary64);
 }
 
 // The number that arithmetic of this precision keeps of a place x of particle i [m]: in single precision its
@@ -29,10 +41,6 @@ inline Vec3 stored_place(const Body& body, Precision precision, int32_t i, Vec3 
 // What a rounding error of so many roundings of one size seldom exceeds, in standard deviations: 8, with probability
 // 3e-14 (Higham and Mary 2019; tolerances.md, Linear momentum).
 inline constexpr double kDeviations = 8;
-
-inline double absolute_place_bound(const State& state, double terms) {
-  return kDeviations * absolute_mean_rounding(state, terms);
-}
 
 // Of many comparisons the one that comes nearest to its bound, or goes farthest beyond. What is not a number is beyond.
 struct Nearest {

@@ -87,11 +87,12 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
   const double u = unit_roundoff(state) + kUnitRoundoff;
   std::vector<ClusterMeans> means;
   std::vector<double> center_rounding;  // what the sum of a cluster's center rounds: squares [m²]
+  std::vector<double> absolute;         // both centers of a cluster, as absolute coordinates: at most [m]
   for (int32_t c = 0; c < clusters.count(); ++c) {
     means.push_back(cluster_means(weighted, clusters, state.x, c));
     const auto members = clusters.of(c);
     Vec3 mean;
-    double spread = 0, radius = 0;
+    double spread = 0, radius = 0, heaviest = 0;
     for (const int32_t i : members) {
       const double share = weighted.weight[at(i)] / means[at(c)].mass;
       const Vec3 kept = stored_place(body, state.precision, i, state.x[at(i)]);
@@ -99,11 +100,12 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
       mean += share * kept;
       spread += share * norm(kept - stored_place(body, state.precision, first, state.x[at(first)]));
       radius = std::max(radius, norm(weighted.position[at(i)] - means[at(c)].rest));
+      heaviest = std::max(heaviest, weighted.weight[at(i)]);
     }
     const double sum = sum_rounds(static_cast<double>(members.size())) * u * spread;
-    const double absolute = absolute_mean_rounding(state, static_cast<double>(members.size()));
-    center_rounding.push_back(4 * u * u * dot(mean, mean) + 3 * sum * sum + 3 * u * u * radius * radius +
-                              2 * absolute * absolute);  // now and at rest
+    center_rounding.push_back(4 * u * u * dot(mean, mean) + 3 * sum * sum + 3 * u * u * radius * radius);
+    const double weights = sum_rounds_at_most(static_cast<double>(members.size()), means[at(c)].mass, heaviest);
+    absolute.push_back(2 * absolute_mean_rounding(state, weights));  // now and at rest
   }
   std::vector<VertexPlace> places(skin.owner.size());
   for (std::size_t v = 0; v < places.size(); ++v) {
@@ -111,6 +113,7 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
     const auto holders = memberships.of(skin.owner[v]);
     Vec3 sum, first;
     double squares = 0, terms = 0;  // of single clusters; how far they are from the first
+    double at_most = 0;
     for (const int32_t c : holders) {
       const ClusterMeans& m = means[at(c)];
       const Vec3 arm = rest - m.rest, goal = m.current + clusters.rotation[at(c)] * arm;
@@ -118,14 +121,17 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
       sum += goal;
       terms += norm(goal - first);
       squares += center_rounding[at(c)] + 4 * u * u * dot(arm, arm);
+      at_most += absolute[at(c)];
     }
     const auto count = static_cast<double>(holders.size());
     // Partial sums of terms that are as large as their mean: u² q² (1² + … + n²) / 3n².
     squares += count * u * u * terms * terms / 9;
     const Vec3 place = sum / count, kept = state.precision == Precision::binary32 ? place - rest : place;
-    const double in_doubles = 4 * kUnitRoundoff * norm(place), absolute = absolute_mean_rounding(state, count);
-    squares = squares / (count * count) + u * u * dot(kept, kept) + in_doubles * in_doubles + absolute * absolute;
-    places[v] = {place, kDeviations * std::sqrt(squares)};
+    const double in_doubles = 4 * kUnitRoundoff * norm(place);
+    squares = squares / (count * count) + u * u * dot(kept, kept) + in_doubles * in_doubles;
+    // Of the mean of the clusters' answers, whose weights are equal; and where it rests.
+    const double of_answers = absolute_mean_rounding(state, (count + 1) / 2);
+    places[v] = {place, kDeviations * std::sqrt(squares) + at_most / count + of_answers};
   }
   return places;
 }

@@ -87,7 +87,8 @@ class MomentumRounding {
         // With retardation evaluations are of y, and enter x times σ: of σ |y| <= |x| + |x_prev|.
         length_((step_.retardation > 0 ? 2 : 1) * u_ *
                     std::max(stored_extent(run.setup, run.before), stored_extent(run.setup, run.after)) +
-                kUnitRoundoff * std::max(scale_.extent, rounding_scale(run.setup, run.after).extent)),
+                std::max(unit_of_places(run.before), unit_of_places(run.after)) *
+                    std::max(scale_.extent, rounding_scale(run.setup, run.after).extent)),
         dt_(run.setup.substep_length[at(run.before.frame)]) {}
 
   // `impulse`: what contacts, pins and grips have given, in all.

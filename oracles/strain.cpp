@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "oracles/rounding.h"
 #include "oracles/shape_sums.h"
 
 namespace cutproof::oracles {
@@ -32,7 +33,9 @@ constexpr long double kMeasurable = 1e15L;
 // a backend that works with displacements, F = 1 + (A - A0) A0⁺, by as much of both together. Errors of the means enter
 // in second order, because Σ w (X - T) is zero. So F is off by (N + 8) u (S1 + (1 + σ) S2) / λ, λ the least eigenvalue
 // of A0 that is not zero. Twice that covers eigenvalues found by some sweeps of rotations in the same precision, and so
-// does 64 u σ for those of FᵀF, the root, and the threshold as it is stored.
+// does 64 u σ for those of FᵀF, the root, and the threshold as it is stored. Absolute coordinates are off by p at rest,
+// and by as much as their means are: that puts A off by p Σ w |x - t| and A0 by 2 p Σ w |X - T|, and both by M e², with
+// e what rounds in a mean.
 constexpr long double kTerms = 8, kSweeps = 64;
 
 struct ClusterStretch {
@@ -43,18 +46,19 @@ struct ClusterStretch {
 ClusterStretch stretch_of_cluster(const WeightedRest& rest, const State& state, int32_t cluster, double u) {
   const auto members = state.clusters.of(cluster);
   if (members.size() == 1) return {};  // it has no extent, whatever rounding leaves of its center
-  long double mass = 0;
+  long double mass = 0, heaviest = 0;
   WideVector rest_center = WideVector::Zero(), center = WideVector::Zero();
   for (const int32_t i : members) {
     const long double w = rest.weight[at(i)];
     mass += w;
+    heaviest = std::max(heaviest, w);
     rest_center += w * widened(rest.position[at(i)]);
     center += w * widened(state.x[at(i)]);
   }
   rest_center /= mass;
   center /= mass;
   Wide a = Wide::Zero(), a0 = Wide::Zero();
-  long double s1 = 0, s2 = 0;
+  long double s1 = 0, s2 = 0, arms_now = 0, arms_at_rest = 0;
   for (const int32_t i : members) {
     const long double w = rest.weight[at(i)];
     const WideVector from = widened(rest.position[at(i)]) - rest_center, to = widened(state.x[at(i)]) - center;
@@ -62,6 +66,8 @@ ClusterStretch stretch_of_cluster(const WeightedRest& rest, const State& state, 
     a0 += w * from * from.transpose();
     s1 += w * to.norm() * from.norm();
     s2 += w * from.squaredNorm();
+    arms_now += w * to.norm();
+    arms_at_rest += w * from.norm();
   }
   if (!a.allFinite()) return {0, 0, true};
   const Eigen::SelfAdjointEigenSolver<Wide> extents(a0);
@@ -80,7 +86,12 @@ ClusterStretch stretch_of_cluster(const WeightedRest& rest, const State& state, 
   found.stretch = std::sqrt(std::max(0.0L, stretches.eigenvalues()[2]));
   found.is_open = found.is_open || !(found.stretch < kMeasurable);
   const auto n = static_cast<long double>(members.size());
-  found.band = 2 * (n + kTerms) * u * (s1 + (1 + found.stretch) * s2) / least + kSweeps * u * found.stretch;
+  const double mean = absolute_mean_rounding(
+      state, sum_rounds_at_most(static_cast<double>(n), static_cast<double>(mass), static_cast<double>(heaviest)));
+  const long double of_means = mass * mean * mean, p = state.place_rounding;
+  const long double a_off = (n + kTerms) * u * s1 + p * arms_now + of_means;
+  const long double a0_off = (n + kTerms) * u * s2 + 2 * p * arms_at_rest + of_means;
+  found.band = 2 * (a_off + (1 + found.stretch) * a0_off) / least + kSweeps * u * found.stretch;
   return found;
 }
 

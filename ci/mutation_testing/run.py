@@ -12,7 +12,7 @@ A mutant is a patch, mutants/NN_name.patch, with a head of lines `Field: text` (
             judges, reads, draws, searches or prints, so that a wrong program may pass unseen
   Fault     what is wrong with the program, for a person
   Suspect   the gate's command that is expected to find it; may be given several times, tried in this order. A program
-            is known by its name, which is that of its CMake target.
+            is known by its name, which is that of its CMake target; a test in Python by its file's.
   Livelock  yes: the mutant may show as a program that does not end, so running out of time counts as found
 
 There is one copy (build/mutation_testing/tree) with one build folder, without CUDA. The unchanged code must pass every
@@ -61,7 +61,7 @@ TESTS_OF_JUDGES = {
     "benchmarks": ("clusters_test", "solver_test", "tune_test"),
     "cli": ("table_test", "verbs_test", "program_test", "fuzz_test", "shown_verdicts_test", "annotations_test"),
     "report": ("page_test", "documents_test"),
-    "guests": ("guests_test",),
+    "guests": ("guests_test", "vectors_test"),
 }
 FIELDS = ("Stage", "Fault", "Suspect", "Livelock")
 # What finds a simulator's fault without the tests of this project: campaigns, and scenes that are checked.
@@ -183,8 +183,20 @@ def build(targets, jobs):
 
 # --- The gate --------------------------------------------------------------------------------------------------------
 
-def target_of(command):
-    return shlex.split(command)[0]
+def targets_of(commands):
+    targets = set()
+    for name in (shlex.split(command)[0] for command in commands):
+        targets |= {"cutproof", "wire_layout"} if name.endswith(".py") else {name}
+    return targets
+
+
+def program(name):
+    programs = [path for path in BUILD.glob(f"**/{name}") if path.is_file() and os.access(path, os.X_OK)]
+    if name.endswith(".py"):
+        programs = list((TREE / "tests").glob(f"**/{name}"))
+    if len(programs) != 1:
+        raise BadMutant(f"there is no program '{name}'")
+    return str(programs[0])
 
 
 def fallbacks(mutant):
@@ -214,12 +226,10 @@ class Outcome:
 def run(command, may_hang=False):
     """One command of the gate. Raises BadMutant if it says nothing: it ran no test, or did not understand its options."""
     name, *arguments = shlex.split(command)
-    programs = [path for path in BUILD.glob(f"**/{name}") if path.is_file() and os.access(path, os.X_OK)]
-    if len(programs) != 1:
-        raise BadMutant(f"'{command}': there is no program '{name}'")
-    is_fuzz = name == "cutproof"
+    is_fuzz, is_python = name == "cutproof", name.endswith(".py")
+    started = ["/usr/bin/python3", "-B", program(name)] if is_python else [program(name)]
     if not is_fuzz:
-        arguments.append("--gtest_fail_fast")
+        arguments.append("--failfast" if is_python else "--gtest_fail_fast")
     RUN.mkdir(exist_ok=True)
     # Counterexamples of `cutproof fuzz` are simplified and counted; nobody reads those of rapidcheck.
     saved = RUN / "counterexamples"
@@ -228,7 +238,9 @@ def run(command, may_hang=False):
     if is_fuzz:
         arguments += ["--save", str(saved)]
     environment = dict(os.environ, RC_PARAMS="noshrink=1 seed=1")
-    process = subprocess.Popen([str(programs[0]), *arguments], cwd=RUN, env=environment, stdout=subprocess.PIPE,
+    if is_python:
+        environment.update(CUTPROOF=program("cutproof"), CUTPROOF_WIRE_LAYOUT=program("wire_layout"))
+    process = subprocess.Popen([*started, *arguments], cwd=RUN, env=environment, stdout=subprocess.PIPE,
                                stderr=subprocess.STDOUT, text=True, errors="replace")
     late = threading.Event()
     timer = threading.Timer(MOST_SECONDS, lambda: (late.set(), process.kill()))
@@ -246,7 +258,7 @@ def run(command, may_hang=False):
         raise BadMutant(f"'{command}' does not end within {MOST_SECONDS} s, and the mutant is not marked as a livelock")
     if is_fuzz and status == 2:
         raise BadMutant(f"'{command}': {text.strip()}")
-    outcome = (read_fuzz if is_fuzz else read_tests)(text)
+    outcome = (read_fuzz if is_fuzz else read_python if is_python else read_tests)(text)
     outcome.found = status != 0
     if not outcome.found:
         return outcome
@@ -288,6 +300,16 @@ def read_tests(text):
     return Outcome(True, failed, took, failure.group(1) if failure else "")
 
 
+def read_python(text):
+    ran = re.search(r"^Ran (\d+) test", text, re.MULTILINE)
+    if not ran or int(ran.group(1)) == 0:
+        raise BadMutant("its suspect runs no test: " + text.strip()[-200:])
+    failed = re.search(r"^(?:FAIL|ERROR): (\w+) \((?:__main__\.)?(\w+)", text, re.MULTILINE)
+    if not failed:
+        return Outcome(False)
+    return Outcome(True, f"{failed.group(2)}.{failed.group(1)}", "unit test", text.strip()[-300:])
+
+
 def plural(count, noun):
     return f"{count} {noun}{'' if count == 1 else 's'}"
 
@@ -297,7 +319,7 @@ def judge(mutant, jobs):
     with applied(mutant):
         built = set()
         for command in mutant.suspects + fallbacks(mutant):
-            needed = {target_of(c) for c in (mutant.suspects if command in mutant.suspects else [command])}
+            needed = targets_of(mutant.suspects if command in mutant.suspects else [command])
             if not needed <= built:
                 build(needed, jobs)
                 built |= needed
@@ -308,7 +330,7 @@ def judge(mutant, jobs):
 
 
 def passes_unchanged(command, jobs):
-    build({target_of(command)}, jobs)
+    build(targets_of([command]), jobs)
     outcome = run(command)
     if outcome.found:
         print(f"FAILS on the unchanged code: {command}: {outcome.by}: {outcome.message}", flush=True)
@@ -509,7 +531,7 @@ def main():
         return run_alone([mutant for mutant in mutants if mutant.stage != "judge"], options)
     holds = True
     commands = sorted({command for mutant in mutants for command in mutant.suspects})
-    build({target_of(command) for command in commands}, options.jobs)
+    build(targets_of(commands), options.jobs)
     begin = time.monotonic()
     for command in commands:
         holds = passes_unchanged(command, options.jobs) and holds

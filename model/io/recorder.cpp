@@ -114,6 +114,7 @@ struct Recorder::File {
   std::vector<double> starts;          // [frames + 1] of frames [s]
   Digest beginning, digest;            // of what the run begins with, and of all
   std::optional<Precision> precision;  // of all states
+  bool absolute_coordinates = false;   // of any state
   bool is_open = true;                 // false: finished, or something could not be written
 
   AtomicFile index_target;
@@ -297,6 +298,7 @@ void Recorder::File::finish() {
   WritingArchive root(index.id());
   root("cutproof_beginning", beginning.value());
   root("unit_roundoff", unit_roundoff(precision.value_or(Precision::binary64)));
+  if (absolute_coordinates) hdf5::write_attribute(index.id(), kAbsoluteCoordinates, uint8_t{1});
   root.group("snapshots", [&](auto& archive) { walk_snapshots(archive, columns); });
   const std::pair<hid_t, const char*> kinds[] = {{index.id(), kIndexKind},
                                                  {particles.file.id(), kParticlesKind},
@@ -344,6 +346,7 @@ void Recorder::add(Stage stage, const State& state) {
   }
   require_lengths(file_->setup, state);
   require_precision(file_->precision, state);
+  file_->absolute_coordinates = file_->absolute_coordinates || state.place_rounding > 0;
   file_->is_open = false;  // until all is done: after an exception its columns may differ in length
   writing(file_->name, fmt::format("Snapshot {} cannot be written", file_->columns.stage.size()),
           [&] { file_->add(stage, state); });

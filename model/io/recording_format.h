@@ -88,6 +88,8 @@ inline constexpr const char* kLeftToReference = "left_to_reference";
 std::string words_of_stages(const std::array<bool, 6>& stages);
 // Throws hdf5::Error for a word that is no stage.
 std::array<bool, 6> stages_of_words(const std::string& words);
+// The root attribute of Recording::absolute_coordinates; absent: false.
+inline constexpr const char* kAbsoluteCoordinates = "absolute_coordinates";
 
 // F for F and for F.cutproof.h5.
 std::string stem_of(const std::string& name);

@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "model/at.h"
+#include "model/coordinates.h"
 #include "model/digest.h"
 #include "model/error.h"
 #include "model/io/hdf5_file.h"
@@ -236,6 +237,11 @@ void RecordingReader::File::read_index(const ReadingArchive& root) {
   if (u != unit_roundoff(header.precision)) {
     throw hdf5::Error("/unit_roundoff", fmt::format("This is {}, and should be 2^-53 or 2^-24.", u));
   }
+  if (hdf5::has_attribute(index.file.id(), kAbsoluteCoordinates)) {
+    uint8_t absolute = 0;
+    root(kAbsoluteCoordinates, absolute);
+    header.absolute_coordinates = absolute != 0;
+  }
   if (const auto defect = defect_of(header.setup)) throw hdf5::Error("/setup/" + defect->field, defect->problem);
   root.group("snapshots", [&](auto& archive) { walk_snapshots(archive, columns); });
 }
@@ -337,6 +343,7 @@ Snapshot RecordingReader::File::snapshot(std::size_t i) const {
       }
     });
   }
+  if (header.absolute_coordinates) state.place_rounding = rounding_of_coordinates(header.setup.body, state);
   check_clusters(i, state);
   return snapshot;
 }

@@ -10,6 +10,7 @@
 #include "model/rules.h"
 #include "oracles/oracles.h"
 #include "oracles/rest_places.h"
+#include "oracles/rounding.h"
 #include "oracles/shape_sums.h"
 #include "oracles/shells.h"
 #include "oracles/step_model/admissible_step.h"
@@ -108,13 +109,18 @@ RestFrameComparison compare_rest_frames(const Setup& setup, const State& state) 
   const WeightedRest rest = weighted_rest(setup.body, clusters);
   RestFrameComparison found;
   int64_t largest = 0;
+  double absolute = 0;  // what absolute coordinates round
   for (int32_t c = 0; c < clusters.count(); ++c) {
     const ClusterMeans fresh = cluster_means(rest, clusters, rest.position, c);
     found.center.norm.add(norm(clusters.rest_center[at(c)] - fresh.rest) / setup.body.grid.spacing, c);
     found.mass.norm.add(std::abs(clusters.mass[at(c)] - fresh.mass) / fresh.mass, c);
     largest = std::max(largest, clusters.size(c));
+    double heaviest = 0;
+    for (const int32_t i : clusters.of(c)) heaviest = std::max(heaviest, rest.weight[at(i)]);
+    const auto terms = static_cast<double>(clusters.size(c));
+    absolute = std::max(absolute, absolute_mean_rounding(state, sum_rounds_at_most(terms, fresh.mass, heaviest)));
   }
-  found.center.bound = position_bound(setup.body);
+  found.center.bound = position_bound(setup.body) + absolute / setup.body.grid.spacing;
   // Each weight carries one rounding, a sum of N positive terms at most N - 1, on both sides; and the state's.
   found.mass.bound = 2 * static_cast<double>(largest + 4) * unit_roundoff(state);
   return found;

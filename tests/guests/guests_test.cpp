@@ -25,7 +25,9 @@
 #include "model/at.h"
 #include "model/error.h"
 #include "model/fields.h"
+#include "oracles/oracles.h"
 #include "property_tests/campaign.h"
+#include "property_tests/dissection.h"
 #include "property_tests/simplify.h"
 #include "reference_cpu/reference.h"
 
@@ -63,6 +65,10 @@ TEST(Guest, SaysWhatAPluginDidInsteadOfAnswering) {
        "it writes to byte 1 before the beginning of 'label'"},
       {"behind", "components", "it writes to byte 1 behind the end of 'label', which has ",
        "it wrote to byte 1 behind the end of 'label', which has "},
+      {"behind_by_100", "components", "it writes to byte 100 behind the end of 'label'",
+       "it wrote to byte 100 behind the end of 'label'"},
+      {"behind_with_ones", "components", "it writes to byte 1 behind the end of 'label'",
+       "it wrote to byte 1 behind the end of 'label'"},
       {"far_behind", "components", "it writes to byte 100001 behind the end of 'label'",
        "it writes to byte 100001 behind the end of 'label'"},
       {"behind", "clusters", "it writes to byte 1 behind the end of 'members'",
@@ -109,6 +115,22 @@ TEST(Guest, SaysWhatAPluginDidInsteadOfAnswering) {
       }
     }
   }
+}
+
+// What it wrote for the question before is no answer to this one, not even if the questions are the same.
+TEST(Guest, BeginsEveryOutputAnew) {
+  Guest guest(plugin(PLUGIN_in_c, "lazy"));
+  const OperationDescription& operation = named("components");
+  const Question question = operation.draw(1, 12, Precision::binary32);
+  const auto holds = [&](const Answer& answer) {
+    const std::vector<Verdict> verdicts = operation.judge(question, answer.arrays, Precision::binary32);
+    return std::all_of(verdicts.begin(), verdicts.end(), [](const Verdict& verdict) { return verdict.holds; });
+  };
+  EXPECT_TRUE(holds(ask(guest, operation, question, true)));
+  const Answer unwritten = ask(guest, operation, question, true);
+  EXPECT_EQ(unwritten.kind, Answer::Kind::answered);
+  for (const int32_t label : unwritten.arrays[0].of<int32_t>()) EXPECT_EQ(label, -1);
+  EXPECT_FALSE(holds(unwritten));
 }
 
 TEST(Guest, DoesNotWaitForOneThatHangs) {
@@ -462,6 +484,28 @@ TEST(JudgeOfSurfaces, RejectsTheLeastThatIsWrong) {
   EXPECT_FALSE(cavity.judged(Skinned::arrays({}, {})).empty());
 }
 
+TEST(JudgeOfSurfaces, AcceptsBothPrecisionsInWhateverUnits) {
+  for (const auto& [library, precision] : {std::pair{PLUGIN_one_stage_plugin_in_single, Precision::binary32},
+                                           {PLUGIN_one_stage_plugin, Precision::binary64}}) {
+    Guest guest(plugin(library));
+    for (const double spacing : {1e-6, 0.01, 1e3}) {
+      for (int64_t index = 0; index < 40; ++index) {
+        Question question = named("surface").draw(3, index, precision);
+        const double scale = spacing / find_array(question.given, "spacing")->number(0);
+        for (Array& array : question.given) {
+          if (array.name != "rest" && array.name != "spacing") continue;
+          std::vector<double> scaled;
+          for (const double value : array.of<double>()) scaled.push_back(value * scale);
+          array = make_array(array.name, array.shape, scaled);
+        }
+        const Answer answer = ask(guest, named("surface"), question, true);
+        const auto found = failing(named("surface").judge(question, answer.arrays, precision));
+        EXPECT_TRUE(found.empty()) << spacing << ", " << question.kind << ": " << found.begin()->second;
+      }
+    }
+  }
+}
+
 // The surface with inside and outside exchanged: what meets across the diagonal of a face is joined. It is made of the
 // empty nodes, whose own surface keeps such apart.
 Arrays other_polarity(const Question& question) {
@@ -579,7 +623,9 @@ TEST(KernelCampaign, HoldsOfWhatIsRight) {
   for (const auto& [library, operation] : {std::pair{PLUGIN_in_c, "components"},
                                            {PLUGIN_in_c, "clusters"},
                                            {PLUGIN_reference_plugin, "rotations"},
-                                           {PLUGIN_reference_plugin, "surface"}}) {
+                                           {PLUGIN_reference_plugin, "surface"},
+                                           {PLUGIN_one_stage_plugin_in_single, "rotations"},
+                                           {PLUGIN_one_stage_plugin_in_single, "surface"}}) {
     const KernelCampaign campaign = judged(library, operation, "right");
     EXPECT_TRUE(campaign.holds()) << operation;
     EXPECT_GE(campaign.cases, 300);
@@ -764,6 +810,197 @@ TEST(PluginBackend, IsAskedForTheReachesOfItsVertices) {
   EXPECT_TRUE(without.violations.front().verdict.property.starts_with("skin"))
       << property_tests::describe(without.violations.front().verdict);
   EXPECT_GT(without.verdicts, 0);
+}
+
+// --- Single precision ------------------------------------------------------------------------------------------------
+
+constexpr const char* kOneStage[] = {PLUGIN_one_stage_plugin_in_single, PLUGIN_one_stage_plugin};
+
+// How a right plugin may sum: in double precision what it was given; by coordinates in the plain order, in its own
+// precision; by distances from the first member.
+constexpr const char* kSums[] = {"", "plain", "from the first"};
+
+std::vector<property_tests::Judgement> judged_in_one_load(const std::string& backend, const std::vector<Case>& cases) {
+  std::vector<property_tests::Instance> loaded;
+  for (const Case& c : cases) loaded.push_back(property_tests::instance_of(c));
+  const std::unique_ptr<Backend> guest = make_plugin_backend(backend);
+  const std::vector<property_tests::CaseRun> runs = property_tests::run_cases(*guest, loaded);
+  std::vector<property_tests::Judgement> judged;
+  for (std::size_t k = 0; k < cases.size(); ++k) {
+    judged.push_back(property_tests::judge_case(cases[k], loaded[k], runs[k], backend, false));
+  }
+  return judged;
+}
+
+TEST(PluginsInBothPrecisions, HoldInWhateverUnitsAndHoweverTheySum) {
+  std::vector<Case> cases;
+  for (const double spacing : {1e-6, 0.01, 1e3}) {
+    for (uint64_t seed = 1; seed <= 8; ++seed) {
+      cases.push_back(property_tests::draw_case(seed, 30 + 5 * static_cast<int>(seed)));
+      cases.back().spacing = spacing;
+      cases.back().clusters = static_cast<property_tests::ClusterKind>(seed % 3);
+    }
+  }
+  for (const char* const library : kOneStage) {
+    for (const char* const sums : kSums) {
+      SCOPED_TRACE(std::string(library) + ": " + sums);
+      harness::PropertySummaries all;
+      for (const property_tests::Judgement& judgement : judged_in_one_load(backend_name(library, sums), cases)) {
+        EXPECT_FALSE(judgement.failure) << property_tests::describe(*judgement.failure);
+        all.join(judgement.properties);
+      }
+      for (const Stage stage : {Stage::split, Stage::merge, Stage::expand}) {
+        ASSERT_NE(all.find("rest frames", stage), nullptr) << name_of(stage);
+        EXPECT_GT(all.find("rest frames", stage)->checked, 100) << name_of(stage);
+      }
+      ASSERT_NE(all.find("skin vertices", Stage::skin), nullptr);
+      EXPECT_GT(all.find("skin vertices", Stage::skin)->checked, 1000);
+    }
+  }
+}
+
+// A block without a grid, far from the origin and all in one cluster, and a cluster of one particle; its middle layer
+// is gone.
+property_tests::Instance far_away(int32_t side, double spacing, Vec3 shift) {
+  property_tests::Instance one;
+  Body& body = one.setup.body;
+  body.grid.spacing = spacing;
+  const auto index = [&](int32_t x, int32_t y, int32_t z) { return x + side * (y + side * z); };
+  body.edge_offsets = {0};
+  for (int32_t z = 0; z < side; ++z) {
+    for (int32_t y = 0; y < side; ++y) {
+      for (int32_t x = 0; x < side; ++x) {
+        body.rest.push_back(shift + spacing * Vec3{1.0 * x, 1.0 * y, 1.0 * z});
+        body.mass.push_back(0.0123);  // no dyadic fraction: equal terms all round the same way
+        for (const auto& [dx, dy, dz] : kDirections) {
+          const std::array<int32_t, 3> to = {x + dx, y + dy, z + dz};
+          if (std::any_of(to.begin(), to.end(), [&](int32_t k) { return k < 0 || k >= side; })) continue;
+          body.edge_ends.push_back(index(to[0], to[1], to[2]));
+        }
+        body.edge_offsets.push_back(static_cast<int64_t>(body.edge_ends.size()));
+      }
+    }
+  }
+  one.setup.skin.wanted = false;
+  one.setup.substep_length = {1e-3};
+  State& state = one.state;
+  state.x = body.rest;
+  state.v.resize(state.x.size());
+  state.alive.assign(state.x.size(), 1);
+  state.cap = 1'000'000;
+  Clusters& clusters = state.clusters;
+  for (int32_t i = 0; i < body.particle_count(); ++i) clusters.members.push_back(i);
+  clusters.members.push_back(0);
+  clusters.offsets = {0, body.particle_count(), body.particle_count() + 1};
+  clusters.number = {0, 1};
+  clusters.rotation.resize(2);
+  clusters.degenerate.resize(2);
+  reference::update_rest_frames(body, clusters);
+  for (int32_t z = 0; z < side; ++z) {
+    for (int32_t y = 0; y < side; ++y) {
+      state.removed.push_back(index(side / 2, y, z));
+      state.alive[at(state.removed.back())] = 0;
+    }
+  }
+  std::sort(state.removed.begin(), state.removed.end());
+  return one;
+}
+
+TEST(PluginsInBothPrecisions, HoldFarFromTheOriginAndFailThereByTwiceTheBound) {
+  // A thousand extents away; on a grid of thousandths and of thousands of metres.
+  for (const double spacing : {1e-3, 1e3}) {
+    const property_tests::Instance one = far_away(10, spacing, spacing * Vec3{10'000, -7'000, 3'000});
+    for (const char* const library : kOneStage) {
+      for (const char* const sums : kSums) {
+        SCOPED_TRACE(fmt::format("{}: {} {}", library, spacing, sums));
+        const std::unique_ptr<Backend> guest = make_plugin_backend(backend_name(library, sums));
+        guest->load({one.setup}, {one.state});
+        const State before = guest->snapshot().front();
+        guest->run({Stage::split, Stage::split});
+        const State after = guest->snapshot().front();
+        ASSERT_EQ(after.clusters.count(), 3);
+        if (*sums != 0) {
+          EXPECT_EQ(after.clusters.rest_center[1], before.x[0]) << "of one particle, to the bit";
+        }
+        for (const Verdict& verdict :
+             oracles::judge_stage(one.setup, Stage::split, before, after, {&oracles::core_properties()})) {
+          EXPECT_TRUE(verdict.holds) << verdict.property << ": " << verdict.witness.text;
+        }
+        const Verdict right = oracles::rest_frames(one.setup, after);
+        // Places of this precision are off by 2⁻²⁴ or 2⁻⁵³ of 12,570 h, and sums of 400 by 400 times as much.
+        EXPECT_LT(right.bound, after.precision == Precision::binary32 ? 0.4 : 1e-8);
+        for (const int32_t c : {0, 1, 2}) {
+          State wrong = after;
+          wrong.clusters.rest_center[at(c)].y += (right.measured + 2 * right.bound) * spacing;
+          EXPECT_FALSE(oracles::rest_frames(one.setup, wrong).holds) << c;
+        }
+      }
+    }
+  }
+}
+
+// The same of a body that lies where most do.
+TEST(PluginsInBothPrecisions, FailByTheLeastThatIsWrong) {
+  const property_tests::Instance one = far_away(5, 0.01, {0.01, 0.01, 0.01});
+  for (const char* const library : kOneStage) {
+    SCOPED_TRACE(library);
+    const std::unique_ptr<Backend> guest = make_plugin_backend(backend_name(library, "plain"));
+    guest->load({one.setup}, {one.state});
+    guest->run({Stage::split, Stage::split});
+    const State right = guest->snapshot().front();
+    EXPECT_TRUE(oracles::rest_frames(one.setup, right).holds);
+    const bool is_single = library == kOneStage[0];
+    State center = right, mass = right;
+    center.clusters.rest_center[0].x += (is_single ? 1e-4 : 5e-13) * 0.01;
+    EXPECT_FALSE(oracles::rest_frames(one.setup, center).holds);
+    mass.clusters.mass[0] *= 1 + (is_single ? 5e-6 : 2e-14);
+    EXPECT_FALSE(oracles::rest_frames(one.setup, mass).holds);
+  }
+}
+
+// What no precision explains.
+TEST(PluginsInBothPrecisions, AreFoundWhereWeightsOrPiecesAreWrong) {
+  for (const char* const library : kOneStage) {
+    SCOPED_TRACE(library);
+    const property_tests::Campaign whole = dissected(backend_name(library, "whole masses"), 100);
+    ASSERT_EQ(whole.violations.size(), 1u);
+    EXPECT_EQ(whole.violations.front().verdict.property, "rest frames");
+    const property_tests::Campaign small = dissected(backend_name(library, "small pieces"), 300);
+    ASSERT_EQ(small.violations.size(), 1u);
+    EXPECT_EQ(small.violations.front().verdict.property, "split exactness");
+  }
+}
+
+// Turn this round when the step is judged iterate by iterate: its judge measures what rounds in a place by its
+// displacement from rest, and a plugin in single precision keeps coordinates. All else of such steps holds.
+TEST(KnownGap, TheJudgeOfTheStepRejectsRightPluginsInSinglePrecision) {
+  std::vector<Case> cases;
+  for (uint64_t seed = 1; seed <= 6; ++seed) cases.push_back(property_tests::draw_moving_case(seed, 30));
+  harness::PropertySummaries all;
+  const std::string backend = backend_name(PLUGIN_one_stage_plugin_in_single, "plain");
+  for (const property_tests::Judgement& judgement : judged_in_one_load(backend, cases)) all.join(judgement.properties);
+  int64_t rejected = 0;
+  for (const harness::PropertySummary& property : all.all()) {
+    const bool is_of_step = contains(property.property, "admissible step");
+    rejected += is_of_step ? property.failed : 0;
+    EXPECT_TRUE(is_of_step || property.failed == 0) << property.property;
+  }
+  EXPECT_GT(rejected, 0) << "the gap is closed: this plugin must hold now";
+  for (const char* const property : {"linear momentum", "motion"}) {
+    ASSERT_NE(all.find(property, Stage::step), nullptr) << property;
+    EXPECT_GT(all.find(property, Stage::step)->checked, 100) << property;
+  }
+}
+
+// Turn this round when the step is judged iterate by iterate: right whole frames leave more of their steps undecided
+// than a campaign may (1 %), so `fuzz` ends with "too little was tested".
+TEST(KnownGap, TheJudgeOfTheStepLeavesTooMuchOfRightWholeFramesUndecided) {
+  const property_tests::Campaign moving = dissected(backend_name(PLUGIN_whole_frames_plugin), 60, true);
+  ASSERT_TRUE(moving.violations.empty()) << property_tests::describe(moving.violations.front().verdict);
+  const harness::PropertySummary* const step = moving.properties.find("admissible step", Stage::step);
+  ASSERT_NE(step, nullptr);
+  EXPECT_GT(static_cast<double>(step->undecided), 0.01 * static_cast<double>(step->checked))
+      << "the gap is closed: a right plugin of whole frames must pass `fuzz` now";
 }
 
 // Bodies of an odd number of particles are refused: they count as that, and the others are judged.

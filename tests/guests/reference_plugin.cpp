@@ -1,13 +1,18 @@
 // The reference as a plugin: all operations, right unless the parameters name a stage or an operation to spoil. It
-// knows its body, its setup and its state through cutproof/plugin.h alone.
+// knows its body, its setup and its state through cutproof/plugin.h alone. As "plain" and "from the first" it sums rest
+// frames and skin itself, in the arithmetic of its numbers, as a kernel would.
 #include <cutproof/plugin.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "model/at.h"
@@ -18,6 +23,11 @@
 namespace {
 
 using namespace cutproof;
+
+#ifndef PLUGIN_REAL
+#define PLUGIN_REAL CUTPROOF_F64
+#endif
+using Real = std::conditional_t<PLUGIN_REAL == CUTPROOF_F32, float, double>;
 
 template <class T>
 inline constexpr bool is_vector = false;
@@ -242,6 +252,108 @@ int load(const cutproof_host* host, void* self, const cutproof_tissue* tissue, c
   return 0;
 }
 
+// --- Sums of its own -------------------------------------------------------------------------------------------------
+
+using Sum = std::array<Real, 3>;
+Sum real(Vec3 v) { return {static_cast<Real>(v.x), static_cast<Real>(v.y), static_cast<Real>(v.z)}; }
+Vec3 wide(const Sum& s) { return {s[0], s[1], s[2]}; }
+
+// The weighted mean of the members' places, in the order of the members: of the coordinates themselves, or of how far
+// they are from the first member's.
+template <class Place>
+std::pair<Sum, Real> mean_of(std::span<const int32_t> members, const std::vector<Real>& weight, const Place& place,
+                             bool from_first) {
+  const Sum origin = from_first ? place(members.front()) : Sum{};
+  Real mass = 0;
+  Sum sum = {};
+  for (const int32_t i : members) {
+    const Sum there = place(i);
+    mass += weight[at(i)];
+    for (std::size_t axis = 0; axis < 3; ++axis) sum[axis] += weight[at(i)] * (there[axis] - origin[axis]);
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) sum[axis] = origin[axis] + sum[axis] / mass;
+  return {sum, mass};
+}
+
+// Of each particle its mass over the number of its clusters. `whole`: wrong, as if each lay in one.
+std::vector<Real> weights_of(const Body& body, const Clusters& clusters, bool whole) {
+  std::vector<Real> count(body.mass.size(), 0), weight;
+  for (const int32_t i : clusters.members) count[at(i)] += 1;
+  for (std::size_t i = 0; i < count.size(); ++i) {
+    weight.push_back(static_cast<Real>(body.mass[i]) / (whole ? 1 : count[i]));
+  }
+  return weight;
+}
+
+void sum_rest_frames(const Body& body, const std::string& how, Clusters& clusters) {
+  const std::vector<Real> weight = weights_of(body, clusters, how == "whole masses");
+  const auto place = [&](int32_t i) { return real(body.rest_position(i)); };
+  for (int32_t c = 0; c < clusters.count(); ++c) {
+    const auto [center, mass] = mean_of(clusters.of(c), weight, place, how == "from the first");
+    clusters.mass[at(c)] = mass;
+    // Of one particle it is what was given, to the bit.
+    clusters.rest_center[at(c)] = wide(clusters.size(c) == 1 ? place(clusters.of(c).front()) : center);
+  }
+}
+
+void sum_skin(const Setup& setup, const std::string& how, State& state) {
+  const Body& body = setup.body;
+  const Clusters& clusters = state.clusters;
+  const std::vector<Real> weight = weights_of(body, clusters, false);
+  std::vector<Sum> center;
+  std::vector<std::vector<int32_t>> holders(body.mass.size());
+  for (int32_t c = 0; c < clusters.count(); ++c) {
+    center.push_back(
+        mean_of(
+            clusters.of(c), weight, [&](int32_t i) { return real(state.x[at(i)]); }, how == "from the first")
+            .first);
+    for (const int32_t i : clusters.of(c)) holders[at(i)].push_back(c);
+  }
+  for (std::size_t v = 0; v < state.skin.owner.size(); ++v) {
+    const int32_t owner = state.skin.owner[v];
+    Sum rest = real(body.rest_position(owner)), sum = {};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      rest[axis] += static_cast<Real>(state.skin.reach[v]) * static_cast<Real>(body.grid.spacing) *
+                    static_cast<Real>(kDirections[state.skin.direction[v]][axis]);
+    }
+    for (const int32_t c : holders[at(owner)]) {
+      const Sum at_rest = real(clusters.rest_center[at(c)]);
+      for (std::size_t row = 0; row < 3; ++row) {
+        Real there = center[at(c)][row];
+        for (std::size_t k = 0; k < 3; ++k) {
+          there += static_cast<Real>(clusters.rotation[at(c)].m[3 * row + k]) * (rest[k] - at_rest[k]);
+        }
+        sum[row] += there;
+      }
+    }
+    for (Real& entry : sum) entry /= static_cast<Real>(holders[at(owner)].size());
+    state.skin.position[v] = wide(sum);
+  }
+}
+
+void sum_anew(const Setup& setup, const std::string& how, int last, State& state) {
+  if (how != "plain" && how != "from the first" && how != "whole masses") return;
+  if (last == CUTPROOF_SKIN) sum_skin(setup, how, state);
+  if (last == CUTPROOF_SPLIT || last == CUTPROOF_MERGE || last == CUTPROOF_EXPAND) {
+    sum_rest_frames(setup.body, how, state.clusters);
+  }
+}
+
+// --- Faults ----------------------------------------------------------------------------------------------------------
+
+void forget_cluster(Clusters& clusters, int32_t c) {
+  const auto first = clusters.members.begin() + clusters.offsets[at(c)];
+  const int64_t size = clusters.size(c);
+  clusters.members.erase(first, first + size);
+  clusters.offsets.erase(clusters.offsets.begin() + c);
+  for (std::size_t k = at(c); k < clusters.offsets.size(); ++k) clusters.offsets[k] -= size;
+  clusters.number.erase(clusters.number.begin() + c);
+  clusters.rest_center.erase(clusters.rest_center.begin() + c);
+  clusters.mass.erase(clusters.mass.begin() + c);
+  clusters.rotation.erase(clusters.rotation.begin() + c);
+  clusters.degenerate.erase(clusters.degenerate.begin() + c);
+}
+
 // The least that is wrong with each stage.
 void spoil(const std::string& what, int last, const State& before, State& state) {
   Clusters& clusters = state.clusters;
@@ -270,13 +382,13 @@ void spoil(const std::string& what, int last, const State& before, State& state)
   }
   // The last cluster that a split made is lost.
   if (what == "split" && last == CUTPROOF_SPLIT && clusters.count() > before.clusters.count()) {
-    clusters.offsets.pop_back();
-    clusters.members.resize(at(clusters.offsets.back()));
-    clusters.number.pop_back();
-    clusters.rest_center.pop_back();
-    clusters.mass.pop_back();
-    clusters.rotation.pop_back();
-    clusters.degenerate.pop_back();
+    forget_cluster(clusters, clusters.count() - 1);
+  }
+  // Pieces of fewer than four particles are lost.
+  if (what == "small pieces" && last == CUTPROOF_SPLIT && before.clusters.count() > 0) {
+    for (int32_t c = clusters.count() - 1; c >= 0 && clusters.number[at(c)] > before.clusters.number.back(); --c) {
+      if (clusters.size(c) < 4) forget_cluster(clusters, c);
+    }
   }
   // What was merged keeps the rotation of the wrong one.
   if (what == "merge" && last == CUTPROOF_MERGE && clusters.count() < before.clusters.count() && clusters.count() > 0) {
@@ -294,6 +406,7 @@ int run(const cutproof_host* host, void* self, int first, int last, cutproof_sta
   instance->reference->load({instance->setup}, {before});
   instance->reference->run({static_cast<Stage>(first), static_cast<Stage>(last)});
   State state = instance->reference->snapshot().front();
+  sum_anew(instance->setup, instance->spoiled, last, state);
   spoil(instance->spoiled, last, before, state);
   return give(host, state, given, instance->spoiled == "all reaches" ? "reach" : "") ? 0 : 1;
 }
@@ -358,7 +471,7 @@ const cutproof_plugin plugin = {
     .promises = PLUGIN_PROMISES,
 #endif
     .device = CUTPROOF_HOST,
-    .real = CUTPROOF_F64,
+    .real = PLUGIN_REAL,
     .create = create,
     .destroy = destroy,
     .rotations = PLUGIN_ONLY_STAGES ? nullptr : rotations,

@@ -752,6 +752,55 @@ TEST_F(VectorsTest, FailForTheLeastWrongAnswersWithTheCaseAndTheWitness) {
   }
 }
 
+// What single precision may round, double precision may not.
+TEST_F(VectorsTest, AreJudgedByTheBoundsOfTheirPrecision) {
+  struct Little {
+    const char* operation;
+    const char* property;
+    void (*edit)(const Question& question, std::vector<double>& numbers);
+  };
+  const Little edits[] = {
+      {"rotations", "rotation", [](const Question&, std::vector<double>& r) { r[0] += 1e-9; }},
+      {"surface", "surface vertices",
+       [](const Question& question, std::vector<double>& v) {
+         const double h = find_array(question.given, "spacing")->number(0);
+         // A coordinate across its edge is a whole number of spacings.
+         for (double& coordinate : v) {
+           if (std::abs(coordinate / h - std::round(coordinate / h)) > 1e-6) continue;
+           coordinate += 1e-9 * h;
+           return;
+         }
+       }},
+  };
+  for (const Little& little : edits) {
+    for (const Precision precision : {Precision::binary32, Precision::binary64}) {
+      const Vectors vectors = draw_vectors(*find_vector_operation(little.operation), 2, 1, precision);
+      AllAnswers answers = answers_to(vectors);
+      for (std::size_t k = 0; k < answers.size(); ++k) {
+        const auto read = answers[k][0].of<double>();
+        std::vector<double> numbers(read.begin(), read.end());
+        if (numbers.empty()) continue;
+        little.edit(vectors.cases[k], numbers);
+        answers[k][0] = make_array(answers[k][0].name, answers[k][0].shape, numbers);
+      }
+      const VectorReport report = judge_vectors(vectors, answers, usual(vectors));
+      EXPECT_EQ(report.holds(), precision == Precision::binary32) << little.operation << "\n" << summary(report);
+      for (const VectorFailure& failure : report.failures) EXPECT_EQ(failure.verdict.property, little.property);
+    }
+  }
+}
+
+// Of a file without cases nothing was judged, and nothing holds.
+TEST_F(VectorsTest, DoNotHoldWhereNothingIsJudged) {
+  const Vectors vectors = draw_vectors(*find_vector_operation("clusters"), 2, 1, Precision::binary32);
+  Vectors none = vectors;
+  none.cases.clear();
+  none.kind.clear();
+  const VectorReport report = judge_vectors(none, {}, usual(none));
+  EXPECT_EQ(report.verdicts, 0);
+  EXPECT_FALSE(report.holds());
+}
+
 TEST_F(VectorsTest, SayWhatIsNotJudged) {
   const Vectors vectors = draw_vectors(*find_vector_operation("split"), 2, 30, Precision::binary32);
   AllAnswers answers = answers_to(vectors);

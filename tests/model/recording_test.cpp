@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "model/bare_graph.h"
+#include "model/coordinates.h"
 #include "model/error.h"
 #include "model/io/container_types.h"
 #include "model/io/hdf5_file.h"
@@ -435,6 +436,17 @@ TEST_F(RecordingTest, GivesBackThePrecisionOfItsStates) {
   Recorder recorder(path("run"), setup, "{}", "reference");
   recorder.add(Stage::skin, state);
   state.precision = Precision::binary32;
+  // What its coordinates round follows from them, where it says that places were kept so.
+  state.place_rounding = rounding_of_coordinates(setup.body, state);
+  EXPECT_GT(state.place_rounding, 0);
+  State farther = state;
+  farther.x[0] = 100 * farther.x[0];
+  farther.place_rounding = rounding_of_coordinates(setup.body, farther);
+  EXPECT_GT(farther.place_rounding, 10 * state.place_rounding);
+  write("absolute", setup, {{Stage::skin, state}, {Stage::step, farther}});
+  const RecordingReader absolute(path("absolute"));
+  EXPECT_EQ(absolute.snapshot(0).state.place_rounding, state.place_rounding);
+  EXPECT_EQ(absolute.snapshot(1).state.place_rounding, farther.place_rounding);
   EXPECT_THROW(recorder.add(Stage::step, state), std::invalid_argument);
 }
 

@@ -78,6 +78,23 @@ TEST(Detection, CallsEitherOnlyWhatRoundingCanTip) {
   }
 }
 
+// Of absolute coordinates the rest length is off by both of its ends: by 2 ε 2⁻²⁴ of a distance of 1,000 here.
+TEST(Detection, KnowsRestLengthsAsWellAsCoordinatesAtRest) {
+  for (const bool removes : {false, true}) {
+    for (const auto& [off, only_one] : {std::pair{1e-4, false}, {3e-4, true}}) {
+      for (const double sign : {-1.0, 1.0}) {
+        Pair pair = pulled(1.5 + sign * off);
+        for (State* const state : {&pair.before, &pair.after}) {
+          state->precision = Precision::binary32;
+          state->place_rounding = 1000 * 0x1p-24;
+        }
+        if (removes) remove_particles(pair.after, {2, 3});
+        EXPECT_EQ(detection(pair.setup, pair.before, pair.after).holds, !only_one || removes == (sign > 0));
+      }
+    }
+  }
+}
+
 TEST(Detection, RejectsDistancesToNeighboursThatWereDeadBefore) {
   Pair pair = pulled(5);
   pair.before.alive[3] = 0;
@@ -443,6 +460,13 @@ TEST(Detection, OfStrainCountsWhatClustersShareOnce) {
   // In single precision, rounding reaches farther, and what lies beyond it still counts.
   pair = bent(limit * (1 + 1e-3));
   pair.before.precision = Precision::binary32;
+  expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {2, 3});
+  // Of absolute coordinates 400 spacings away, it is not clear.
+  pair.before.place_rounding = 400 * 0x1p-24;
+  expect_holds(detection(pair.setup, pair.before, pair.after));
+  pair = bent(limit * (1 + 1e-2));
+  pair.before.precision = Precision::binary32;
+  pair.before.place_rounding = 400 * 0x1p-24;
   expect_rejected(detection(pair.setup, pair.before, pair.after), {}, {2, 3});
 }
 

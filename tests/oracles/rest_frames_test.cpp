@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 
 #include "oracles/oracles.h"
@@ -51,6 +52,48 @@ TEST(RestFrames, AcceptSumsInAnyOrder) {
   block.state.clusters.rest_center = shuffled.clusters.rest_center;
   block.state.clusters.mass = shuffled.clusters.mass;
   expect_holds(rest_frames(block.setup, block.state));
+}
+
+// A thousand equal terms round the same way, so the error of a plain sum grows as their number and not as its root.
+TEST(RestFrames, AcceptPlainSumsOfAThousandMembersInSinglePrecision) {
+  Setup setup = setup_of(block_body(10, 10, 10, 0.1, 0.9487007976901066));
+  const Body& body = setup.body;
+  const State exact = state_of(body, {range(0, 1000)});
+  const auto summed = [&](bool from_first) {
+    State state = exact;
+    state.precision = Precision::binary32;
+    const Vec3 first = from_first ? body.rest_position(0) : Vec3{};
+    float mass = 0, sum[3] = {};
+    for (int32_t i = 0; i < 1000; ++i) {
+      const auto w = static_cast<float>(body.mass[static_cast<std::size_t>(i)]);
+      mass += w;
+      for (int axis = 0; axis < 3; ++axis) {
+        sum[axis] += w * (static_cast<float>(body.rest_position(i)[axis]) - static_cast<float>(first[axis]));
+      }
+    }
+    state.clusters.mass[0] = mass;
+    for (int axis = 0; axis < 3; ++axis) {
+      state.clusters.rest_center[0][axis] =
+          from_first ? first[axis] + static_cast<double>(sum[axis] / mass) : static_cast<double>(sum[axis] / mass);
+    }
+    return state;
+  };
+  const State relative = summed(true);
+  EXPECT_GT(std::abs(relative.clusters.mass[0] / exact.clusters.mass[0] - 1), 200 * 0x1p-24);
+  expect_holds(rest_frames(setup, relative));
+  // Coordinates that were handed over in single precision are off by u of the greatest.
+  State absolute = summed(false);
+  absolute.place_rounding = 0x1p-24 * norm(body.rest_position(999));
+  expect_holds(rest_frames(setup, absolute));
+  // What a cluster of a thousand makes of a member that was forgotten, and of one that counts twice.
+  for (const double share : {-1e-3, 1e-3}) {
+    State wrong = absolute;
+    wrong.clusters.mass[0] *= 1 + share;
+    expect_rejected(rest_frames(setup, wrong), {0}, {});
+    wrong = absolute;
+    wrong.clusters.rest_center[0] += share * (body.rest_position(999) - exact.clusters.rest_center[0]);
+    expect_rejected(rest_frames(setup, wrong), {0}, {});
+  }
 }
 
 TEST(RestFrames, AreThoseOfBeforeBetweenDetectAndSplit) {

@@ -1,0 +1,20 @@
+// What is lost where places are kept as coordinates of the body's frame, and not as displacements from rest.
+#pragma once
+#include <algorithm>
+
+#include "model/at.h"
+#include "model/body.h"
+#include "model/state.h"
+
+namespace cutproof {
+
+// State::place_rounding of a state whose places were handed over, or kept, as such in its precision: u of the greatest
+// distance from the origin, at rest or now [m].
+inline double rounding_of_coordinates(const Body& body, const State& state) {
+  double farthest = 0;
+  for (int32_t i = 0; i < body.particle_count(); ++i) farthest = std::max(farthest, norm(body.rest_position(i)));
+  for (const Vec3& x : state.x) farthest = std::max(farthest, norm(x));  // NaN is no greater
+  return unit_roundoff(state) * farthest;
+}
+
+}  // namespace cutproof
