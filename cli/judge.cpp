@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "cli/commands.h"
 #include "cli/document_report.h"
@@ -17,12 +18,14 @@
 #include "cli/progress.h"
 #include "cli/report_page.h"
 #include "cli/screen.h"
+#include "cli/table.h"
 #include "cli/terminal.h"
 #include "guests/campaign.h"
 #include "guests/plugin_backend.h"
 #include "model/counted.h"
 #include "model/error.h"
 #include "model/io/atomic_file.h"
+#include "model/io/columns.h"
 #include "model/nearest_word.h"
 #include "model/printable.h"
 
@@ -37,8 +40,9 @@ struct JudgeOptions {
   GuestOptions guest;
   std::vector<std::string> operations;  // empty: all that the plugin has
   KernelCampaignOptions campaign;
-  int64_t cases = 0;        // 0: of each operation what it takes a second or a few for
-  bool keep_going = false;  // beyond ten questions that were not answered
+  int64_t cases = 0;                          // 0: of each operation what it takes a second or a few for
+  std::optional<std::vector<int64_t>> sizes;  // of large questions; 0: none; nothing: those of each operation
+  bool keep_going = false;                    // beyond ten questions that were not answered
   std::string save = ".";
   std::string json, junit, report, replay;
   std::string again;          // the command line
@@ -55,6 +59,15 @@ constexpr int64_t kUsualDissections = 500;
 // Operations by what one case costs.
 int64_t usual_cases(const OperationDescription& operation) {
   return operation.number == wire::rotations ? 100'000 : 2'000;
+}
+
+std::vector<int64_t> sizes_of(const JudgeOptions& options, const OperationDescription& operation) {
+  if (!options.sizes) return {operation.sizes.begin(), operation.sizes.end()};
+  std::vector<int64_t> sizes = *options.sizes;
+  std::sort(sizes.begin(), sizes.end());
+  sizes.erase(std::unique(sizes.begin(), sizes.end()), sizes.end());
+  std::erase(sizes, 0);
+  return sizes;
 }
 
 std::vector<const OperationDescription*> asked_operations(const JudgeOptions& options, const PluginInfo& plugin) {
@@ -100,15 +113,40 @@ std::string title(const PluginInfo& plugin, const std::string& library) {
 constexpr std::size_t kMostWitnessBytes = 2000;
 
 void print_head(const KernelCampaign& campaign) {
-  say("{}: {} {} in {} questions, {:.1f} s\n", campaign.operation->name, campaign.cases, campaign.operation->cases,
-      campaign.questions, campaign.seconds);
+  say("{}: {} {} in {} questions, {} wrong, {:.1f} s\n", campaign.operation->name, io::grouped(campaign.cases),
+      campaign.operation->cases, io::grouped(campaign.questions), io::grouped(campaign.failed_cases), campaign.seconds);
+}
+
+// The kinds in which something is wrong, with the worst of each.
+void print_kinds(const KernelCampaign& campaign) {
+  if (campaign.failed == 0) return;
+  Table table({"kind", std::string(campaign.operation->cases), "wrong", "worst in", "measured", "bound", "question"});
+  std::size_t right = 0;
+  for (const KindSummary& kind : campaign.kinds) {
+    if (!kind.first_failure) {
+      ++right;
+      continue;
+    }
+    const KindSummary::Case& worst = *kind.worst;
+    table.add({printable(kind.kind.substr(0, kind.kind.find(':'))), io::grouped(kind.cases),
+               failing(io::grouped(kind.failed)), worst.verdict.property, fmt::format("{:.2g}", worst.verdict.measured),
+               fmt::format("{:.2g}", worst.verdict.bound),
+               worst.size > 0 ? fmt::format("of size {}", worst.size) : fmt::format("{}", worst.index)});
+  }
+  say_as_it_is(table.text());
+  if (right > 0) say("  nothing is wrong in {}\n", counted(right, "other kind", "other kinds"));
 }
 
 void print_properties(const KernelCampaign& campaign) {
-  print_judged(campaign.properties, &harness::PropertySummary::checked);
+  print_judged(campaign.properties, &harness::PropertySummary::judged);
+  print_kinds(campaign);
   for (const Unpromised& u : campaign.unpromised) {
     say("  {}: {}{}\n", undecided("not promised, not judged"), u.property,
         u.failing > 0 ? fmt::format(" (would fail in {} questions)", u.failing) : "");
+  }
+  for (const NotAsked& each : campaign.not_asked) {
+    say("  {}: {} of size {}: that of size {} took {:.2g} s, and --time-limit may be reached\n", undecided("not asked"),
+        each.kind, each.size, each.size_before, each.seconds);
   }
   if (campaign.refused > 0) {
     say("  {}: {} questions, of which nothing is known\n", undecided("refused"), campaign.refused);
@@ -144,8 +182,9 @@ std::string keep(const JudgeOptions& options, const Guest& guest, const KernelCa
        fmt::format("{}_{}_{}_{}.json", saved.operation, property, options.campaign.seed, failure.index))
           .string();
   io::write_text(file, guests::to_json(saved) + "\n");
-  insist("{}: {}, '{}', question {} ({}):\n  {}\n", failing("FAILS"), saved.operation, failure.verdict.property,
-         failure.index, failure.simplest.kind, shortened(failure.verdict.witness.text, kMostWitnessBytes));
+  insist("{}: {}, '{}', {}:\n  {}\n", failing("FAILS"), saved.operation, failure.verdict.property,
+         name_of_question(failure.index, failure.size, failure.simplest.kind),
+         shortened(failure.verdict.witness.text, kMostWitnessBytes));
   insist("  simplified to {}: {}\n", campaign.operation->size_of(failure.simplest),
          shortened(failure.of_simplest.witness.text, kMostWitnessBytes));
   insist_copy("  saved; to see it again:", replay_command(options, file, saved.operation));
@@ -171,9 +210,10 @@ void add_cases(const json& result, const JudgeOptions& options, std::vector<io::
       const std::string again = failure.at("again");
       each.outcome = io::JunitOutcome::failed;
       each.message = failure.at("text");
-      each.text = fmt::format("question {} ({}): {}\nsimplified: {}\nto see it again: {}",
-                              failure.at("index").get<int64_t>(), failure.at("kind").get<std::string>(), each.message,
-                              failure.at("simplified").get<std::string>(), again);
+      each.text = fmt::format(
+          "{}: {}\nsimplified: {}\nto see it again: {}",
+          name_of_question(failure.at("index"), failure.value("drawn_size", int64_t{0}), failure.at("kind")),
+          each.message, failure.at("simplified").get<std::string>(), again);
       failures.push_back({operation + ": " + each.name, each.message, again});
     }
   }
@@ -239,7 +279,7 @@ int replay(const JudgeOptions& options, Guest& guest) {
   say("{}: {}, {}\nfound as: {}\n", options.replay, saved.operation, printable(saved.question.kind),
       printable(saved.found));
   const bool again = guest.plugin().promises && promises.cover("determinism");
-  const std::vector<Verdict> verdicts = judge_answer(guest, operation, saved.question, saved.at_end, again);
+  const std::vector<Verdict> verdicts = judge_answer(guest, operation, question_of(saved), saved.at_end, again);
   int64_t judged = 0, failed = 0;
   for (const Verdict& verdict : verdicts) {
     if (!promises.cover(verdict.property)) continue;
@@ -299,12 +339,15 @@ int judge(JudgeOptions options) {
     KernelCampaignOptions campaign_options = options.campaign;
     campaign_options.stop_asked = stop_asked;
     campaign_options.cases = options.cases > 0 ? options.cases : usual_cases(*operation);
+    campaign_options.sizes = sizes_of(options, *operation);
+    campaign_options.time_limit = options.guest.time_limit;
     if (options.keep_going) campaign_options.most_lost = 0;
     KernelCampaign campaign;
     {
       Progress progress(std::string(operation->name), campaign_options.cases);
       campaign = judge_kernel(guest, *operation, promises, campaign_options, [&](const KernelCampaign& so_far) {
-        const double cases = static_cast<double>(so_far.cases) / static_cast<double>(campaign_options.cases);
+        const double cases =
+            std::min(1.0, static_cast<double>(so_far.cases) / static_cast<double>(campaign_options.cases));
         const std::optional<double>& most = campaign_options.seconds;
         progress.show(so_far.cases, fmt::format("{} failed", so_far.failed),
                       most && *most > 0 ? std::max(cases, so_far.seconds / *most) : cases);
@@ -388,6 +431,13 @@ void add_judge(CLI::App& program, Work& work) {
       ->type_name("OPS");
   add_count(*command, "--cases", options->cases, "matrices or bodies for each operation (default: 100000 or 2000)",
             whole_number(1));
+  command
+      ->add_option("--sizes", options->sizes,
+                   "of large questions, as matrices or particles; 0: ask none (default: beside 65536 and more)")
+      ->delimiter(',')
+      ->allow_extra_args(false)  // what follows are operations
+      ->type_name("N,...")
+      ->check(whole_number(0, static_cast<int>(guests::kMostSize)));
   command->add_option("--seconds", options->campaign.seconds, "for how long, for each operation")
       ->type_name("S")
       ->check(number_from(0));

@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <type_traits>
 #include <utility>
 
@@ -34,29 +37,113 @@ const Verdict* first_failure(const std::vector<Verdict>& verdicts, const harness
   return nullptr;
 }
 
-// By questions that are simpler and still fail in the same property.
+// A question of at most so many particles, or matrices, is saved as data, and simplified as such.
+constexpr int64_t kMostSaved = 2'048;
+
+// Of a failure: the smallest large question of its kind that fails in the same property, and then questions that are
+// simpler and still do.
 void simplify(Guest& guest, const OperationDescription& operation, const harness::Promises& promises, bool again,
               const KernelCampaignOptions& options, KernelFailure& failure) {
   const Clock::time_point begin = Clock::now();
   const auto is_over = [&] {
     return seconds_since(begin) >= options.simplify || guest.has_ended() || is_asked(options.stop_asked);
   };
+  const auto still_fails = [&](Question next) {
+    const std::vector<Verdict> verdicts = judge_answer(guest, operation, next, failure.at_end, again);
+    const Verdict* const failing = first_failure(verdicts, promises, failure.verdict.property);
+    if (failing == nullptr) return false;
+    failure.of_simplest = *failing;
+    failure.simplest = std::move(next);
+    return true;
+  };
+  for (int64_t holds = 0, fails = failure.simplest.size; fails - holds > 1 && !is_over();) {
+    const int64_t size = holds + (fails - holds) / 2;
+    const bool failed = still_fails(operation.draw_large(options.seed, failure.index, size, guest.plugin().precision));
+    (failed ? fails : holds) = size;
+  }
+  if (failure.simplest.size > kMostSaved) return;
+  failure.simplest.size = 0;
   for (bool simpler = true; simpler && !is_over();) {
     simpler = false;
     for (Question& next : operation.simpler(failure.simplest)) {
       if (is_over()) break;
-      const std::vector<Verdict> verdicts = judge_answer(guest, operation, next, failure.at_end, again);
-      const Verdict* const failing = first_failure(verdicts, promises, failure.verdict.property);
-      if (failing == nullptr) continue;
-      failure.of_simplest = *failing;
-      failure.simplest = std::move(next);
-      simpler = true;
-      break;
+      if ((simpler = still_fails(std::move(next)))) break;
     }
   }
 }
 
+// Whether `one` is worse than what is known: it fails, or comes nearer to its bound.
+bool is_worse(const Verdict& one, const std::optional<KindSummary::Case>& known) {
+  const auto share = [](const Verdict& verdict) {
+    if (verdict.bound > 0 && !std::isnan(verdict.measured)) return verdict.measured / verdict.bound;
+    return verdict.holds ? 0 : std::numeric_limits<double>::infinity();
+  };
+  if (!known) return !one.holds || share(one) > 0;
+  if (one.holds != known->verdict.holds) return !one.holds;
+  return share(one) > share(known->verdict);
+}
+
+// What the verdicts on one question add to a campaign.
+void count(KernelCampaign& campaign, const harness::Promises& promises, const Question& question, int64_t index,
+           bool at_end, const std::vector<Verdict>& verdicts) {
+  const OperationDescription& operation = *campaign.operation;
+  const int64_t cases = operation.cases_of(question);
+  const auto known_kind = std::find_if(campaign.kinds.begin(), campaign.kinds.end(),
+                                       [&](const KindSummary& k) { return k.kind == question.kind; });
+  KindSummary& kind = known_kind != campaign.kinds.end() ? *known_kind : campaign.kinds.emplace_back();
+  kind.kind = question.kind;
+  ++campaign.questions;
+  ++kind.questions;
+  campaign.cases += cases;
+  kind.cases += cases;
+  campaign.refused += verdicts.empty() ? 1 : 0;
+  kind.refused += verdicts.empty() ? 1 : 0;
+  std::set<int32_t> wrong;  // cases of a batch
+  bool fails = false, all_fail = false;
+  for (const Verdict& verdict : verdicts) {
+    if (!promises.cover(verdict.property)) {
+      const auto known = std::find_if(campaign.unpromised.begin(), campaign.unpromised.end(),
+                                      [&](const Unpromised& u) { return u.property == verdict.property; });
+      Unpromised& entry = known != campaign.unpromised.end()
+                              ? *known
+                              : campaign.unpromised.emplace_back(Unpromised{verdict.property, 0, 0});
+      entry.checked += verdict.checked > 0 ? 1 : 0;
+      entry.failing += verdict.holds ? 0 : 1;
+      continue;
+    }
+    const auto& named = verdict.witness.particles;
+    if (!operation.is_batch) {
+      campaign.properties.add(verdict);
+    } else {
+      const int64_t wrong_ones = named.empty() ? verdict.checked : static_cast<int64_t>(named.size());
+      campaign.properties.add(verdict, verdict.checked, verdict.holds ? 0 : wrong_ones);
+    }
+    if (is_worse(verdict, kind.worst)) kind.worst = {index, question.size, verdict};
+    if (verdict.holds) continue;
+    fails = true;
+    if (operation.is_batch && !named.empty()) {
+      wrong.insert(named.begin(), named.end());
+    } else {
+      all_fail = true;
+    }
+    if (!kind.first_failure) kind.first_failure = {index, question.size, verdict};
+    if (verdict.property == kAnswersProperty) ++campaign.lost;
+    const bool is_known = std::any_of(campaign.failures.begin(), campaign.failures.end(),
+                                      [&](const KernelFailure& f) { return f.verdict.property == verdict.property; });
+    if (!is_known) campaign.failures.push_back({index, question.size, at_end, verdict, question, verdict});
+  }
+  const int64_t failed = all_fail ? cases : static_cast<int64_t>(wrong.size());
+  kind.failed += failed;
+  campaign.failed_cases += failed;
+  campaign.failed += fails ? 1 : 0;
+}
+
 }  // namespace
+
+std::string name_of_question(int64_t index, int64_t size, const std::string& kind) {
+  return size > 0 ? fmt::format("the question of size {} ({})", size, kind)
+                  : fmt::format("question {} ({})", index, kind);
+}
 
 harness::Promises promises_of(const PluginInfo& plugin, const OperationDescription& operation,
                               const std::string& library) {
@@ -85,25 +172,49 @@ Answer ask(Guest& guest, const OperationDescription& operation, const Question& 
 }
 
 std::vector<Verdict> judge_answer(Guest& guest, const OperationDescription& operation, const Question& question,
-                                  bool at_end, bool again) {
+                                  bool at_end, bool again, double* seconds) {
   const Precision precision = guest.plugin().precision;
+  const Clock::time_point begin = Clock::now();
   const Answer answer = ask(guest, operation, question, at_end);
+  if (seconds != nullptr) *seconds = seconds_since(begin);
   if (answer.kind == Answer::Kind::refused) return {};
-  if (answer.kind == Answer::Kind::fault) return {unreadable(kAnswersProperty, answer.text)};
+  const auto of_all_cases = [&](std::string_view property, const std::string& why) {
+    Verdict verdict = unreadable(property, why);
+    verdict.checked = operation.cases_of(question);
+    return verdict;
+  };
+  if (answer.kind == Answer::Kind::fault) return {of_all_cases(kAnswersProperty, answer.text)};
   std::vector<Verdict> verdicts = operation.judge(question, answer.arrays, precision);
-  Verdict answers = unreadable(kAnswersProperty, "");
+  Verdict answers = of_all_cases(kAnswersProperty, "");
   answers.holds = true;
   answers.measured = 0;
   verdicts.insert(verdicts.begin(), answers);
+  if (!again && question.size == 0) return verdicts;
+  const Answer second = ask(guest, operation, question, !at_end);
+  const bool answered = second.kind == Answer::Kind::answered, is_same = answered && second.arrays == answer.arrays;
   if (again) {
-    const Answer second = ask(guest, operation, question, !at_end);
-    Verdict same = unreadable("determinism", second.text.empty() ? "asked again it answers otherwise" : second.text);
-    same.holds = second.kind == Answer::Kind::answered && second.arrays == answer.arrays;
+    Verdict same = of_all_cases("determinism", second.text.empty() ? "asked again it answers otherwise" : second.text);
+    same.holds = is_same;
     if (same.holds) {
       same.measured = 0;
       same.witness = {};
     }
     verdicts.push_back(same);
+  } else if (!answered) {
+    verdicts.front() = of_all_cases(kAnswersProperty, "asked again: " + second.text);
+  } else if (!is_same) {
+    // Another answer, which may be as right as the first, or what a race leaves now and then.
+    for (Verdict& verdict : operation.judge(question, second.arrays, precision)) {
+      if (verdict.holds) continue;
+      verdict.witness.text = "asked again: " + verdict.witness.text;
+      const auto first = std::find_if(verdicts.begin(), verdicts.end(),
+                                      [&](const Verdict& v) { return v.property == verdict.property; });
+      if (first == verdicts.end()) {
+        verdicts.push_back(std::move(verdict));
+      } else if (first->holds) {
+        *first = std::move(verdict);
+      }
+    }
   }
   return verdicts;
 }
@@ -117,45 +228,52 @@ KernelCampaign judge_kernel(Guest& guest, const OperationDescription& operation,
   // What goes without saying says nothing of bits.
   const bool again = guest.plugin().promises && promises.cover("determinism");
   const auto kinds = static_cast<int64_t>(operation.kinds().size());
-  for (int64_t index = 0; campaign.cases < options.cases || index < kinds; ++index) {
-    if (options.seconds && seconds_since(begin) >= *options.seconds) break;
+  const Precision precision = guest.plugin().precision;
+  const auto goes_on = [&] {
+    if (options.seconds && seconds_since(begin) >= *options.seconds) return false;
     campaign.stopped = is_asked(options.stop_asked);
-    if (campaign.stopped) break;
-    const Question question = operation.draw(options.seed, index, guest.plugin().precision);
-    // By turns both ends of every array are guarded, whatever the number of kinds.
-    const bool at_end = (index + index / kinds) % 2 == 0;
-    const std::vector<Verdict> verdicts = judge_answer(guest, operation, question, at_end, again);
-    ++campaign.questions;
-    campaign.cases += operation.cases_of(question);
-    if (verdicts.empty()) ++campaign.refused;
-    bool fails = false;
-    for (const Verdict& verdict : verdicts) {
-      if (!promises.cover(verdict.property)) {
-        const auto known = std::find_if(campaign.unpromised.begin(), campaign.unpromised.end(),
-                                        [&](const Unpromised& u) { return u.property == verdict.property; });
-        Unpromised& entry = known != campaign.unpromised.end()
-                                ? *known
-                                : campaign.unpromised.emplace_back(Unpromised{verdict.property, 0, 0});
-        entry.checked += verdict.checked > 0 ? 1 : 0;
-        entry.failing += verdict.holds ? 0 : 1;
-        continue;
-      }
-      campaign.properties.add(verdict);
-      if (verdict.holds) continue;
-      fails = true;
-      if (verdict.property == kAnswersProperty) ++campaign.lost;
-      const bool is_known = std::any_of(campaign.failures.begin(), campaign.failures.end(),
-                                        [&](const KernelFailure& f) { return f.verdict.property == verdict.property; });
-      if (!is_known) campaign.failures.push_back({index, at_end, verdict, question, verdict});
-    }
-    campaign.failed += fails ? 1 : 0;
+    return !campaign.stopped && !campaign.gave_up;
+  };
+  // How long the guest took.
+  const auto examine = [&](const Question& question, int64_t index, bool at_end) {
+    double seconds = 0;
+    const std::vector<Verdict> verdicts = judge_answer(guest, operation, question, at_end, again, &seconds);
+    count(campaign, promises, question, index, at_end, verdicts);
     campaign.seconds = seconds_since(begin);
     if (progress) progress(campaign);
     campaign.ended = guest.has_ended();
-    if (campaign.ended || (options.most_lost > 0 && campaign.lost >= options.most_lost)) {
-      campaign.gave_up = true;
-      break;
+    campaign.gave_up = campaign.ended || (options.most_lost > 0 && campaign.lost >= options.most_lost);
+    return seconds;
+  };
+  const auto ask_large_ones = [&] {
+    if (operation.draw_large == nullptr) return;
+    const std::vector<std::string> large = operation.large_kinds();
+    std::vector<NotAsked> last(large.size());  // what was asked last of each kind
+    for (const int64_t size : options.sizes) {
+      for (std::size_t kind = 0; kind < large.size() && goes_on(); ++kind) {
+        NotAsked& before = last[kind];
+        const double factor =
+            before.size_before == 0 ? 0 : static_cast<double>(size) / static_cast<double>(before.size_before);
+        if (before.seconds * factor * factor > options.time_limit) {
+          campaign.not_asked.push_back({large[kind], size, before.size_before, before.seconds});
+          continue;
+        }
+        const Question question = operation.draw_large(options.seed, static_cast<int64_t>(kind), size, precision);
+        before.size_before = size;
+        before.seconds = examine(question, static_cast<int64_t>(kind), kind % 2 == 0);
+      }
     }
+  };
+  // One of each kind, the large ones, all others.
+  int64_t ordinary = 0;
+  for (int64_t index = 0; (ordinary < options.cases || index < kinds) && goes_on(); ++index) {
+    if (index == kinds) ask_large_ones();
+    if (index >= kinds && !goes_on()) break;
+    const Question question = operation.draw(options.seed, index, precision);
+    ordinary += operation.cases_of(question);
+    // By turns both ends of every array are guarded, whatever the number of kinds.
+    examine(question, index, (index + index / kinds) % 2 == 0);
+    if (index + 1 == kinds && ordinary >= options.cases) ask_large_ones();
   }
   for (KernelFailure& failure : campaign.failures) {
     simplify(guest, operation, promises, again, options, failure);
@@ -234,7 +352,25 @@ json to_json(const Arrays& arrays) {
 
 }  // namespace
 
+Question question_of(const SavedQuestion& saved) {
+  if (saved.question.size == 0) return saved.question;
+  return find_operation(saved.operation)->draw_large(saved.seed, saved.index, saved.question.size, saved.precision);
+}
+
 std::string to_json(const SavedQuestion& saved) {
+  if (saved.question.size > 0) {
+    return io::json_text({{"format", kFormat},
+                          {"format_version", kFormatVersion},
+                          {"operation", saved.operation},
+                          {"kind", saved.question.kind},
+                          {"size", saved.question.size},
+                          {"precision", saved.precision == Precision::binary32 ? "single" : "double"},
+                          {"at_end", saved.at_end},
+                          {"plugin", saved.plugin},
+                          {"found", saved.found},
+                          {"seed", saved.seed},
+                          {"index", saved.index}});
+  }
   return io::json_text({{"format", kFormat},
                         {"format_version", kFormatVersion},
                         {"operation", saved.operation},
@@ -260,8 +396,9 @@ SavedQuestion question_from_json(const std::string& text, const std::string& fil
           fmt::format("it has version {}, and this cutproof reads {}", j.at("format_version").dump(), kFormatVersion));
     }
     for (const auto& [key, value] : j.items()) {
-      constexpr std::string_view kKnown[] = {"format", "format_version", "operation", "kind",  "precision", "at_end",
-                                             "plugin", "found",          "seed",      "index", "given",     "known"};
+      constexpr std::string_view kKnown[] = {"format", "format_version", "operation", "kind", "precision",
+                                             "at_end", "plugin",         "found",     "seed", "index",
+                                             "given",  "known",          "size"};
       if (std::find(std::begin(kKnown), std::end(kKnown), key) == std::end(kKnown)) {
         throw refuse("it has a field '" + key + "', which is not known");
       }
@@ -276,6 +413,20 @@ SavedQuestion question_from_json(const std::string& text, const std::string& fil
     saved.found = j.at("found");
     saved.seed = integer_from<uint64_t>(j.at("seed"));
     saved.index = integer_from<int64_t>(j.at("index"));
+    if (j.contains("size")) {
+      saved.question.size = integer_from<int64_t>(j.at("size"));
+      if (j.contains("given") || j.contains("known")) throw refuse("a question with a size has no arrays: it is drawn");
+      if (saved.question.size < 1 || saved.question.size > kMostSize) {
+        throw refuse(fmt::format("'size' is out of range: it goes from 1 to {}", kMostSize));
+      }
+      const std::vector<std::string> large =
+          operation->large_kinds != nullptr ? operation->large_kinds() : std::vector<std::string>{};
+      const bool is_one = saved.index >= 0 && saved.index < static_cast<int64_t>(large.size());
+      if (!is_one || large[at(saved.index)] != saved.question.kind) {
+        throw refuse(fmt::format("'kind' and 'index' are those of no large question of '{}'", saved.operation));
+      }
+      return saved;
+    }
     // In the order in which the operation gives them, each of its type and as many columns.
     Question grid_model = operation->draw(1, 0, saved.precision);
     for (int64_t k = 0; k < static_cast<int64_t>(operation->kinds().size()); ++k) {
@@ -313,8 +464,25 @@ SavedQuestion read_question(const std::string& file) {
   return question_from_json(io::read_file(file, io::kQuestionLimits), file);
 }
 
+namespace {
+
+// Of a large question the size too, which with seed, kind and precision makes it again.
+json to_json(const KindSummary::Case& one) {
+  json j = {{"property", one.verdict.property},
+            {"index", one.index},
+            {"measured", json_number(one.verdict.measured)},
+            {"bound", json_number(one.verdict.bound)},
+            {"unit", one.verdict.unit},
+            {"holds", one.verdict.holds}};
+  if (one.size > 0) j["size"] = one.size;
+  if (!one.verdict.holds) j["text"] = one.verdict.witness.text;
+  return j;
+}
+
+}  // namespace
+
 nlohmann::json to_json(const KernelCampaign& campaign) {
-  json unpromised = json::array(), failures = json::array();
+  json unpromised = json::array(), failures = json::array(), kinds = json::array(), not_asked = json::array();
   for (const Unpromised& u : campaign.unpromised) {
     unpromised.push_back({{"property", u.property}, {"judged", u.checked}, {"failing", u.failing}});
   }
@@ -328,6 +496,20 @@ nlohmann::json to_json(const KernelCampaign& campaign) {
                         {"bound", json_number(f.of_simplest.bound)},
                         {"unit", f.of_simplest.unit},
                         {"size", campaign.operation->size_of(f.simplest)}});
+    if (f.size > 0) failures.back()["drawn_size"] = f.size;
+  }
+  for (const KindSummary& kind : campaign.kinds) {
+    kinds.push_back({{"kind", kind.kind},
+                     {"questions", kind.questions},
+                     {"cases", kind.cases},
+                     {"refused", kind.refused},
+                     {"failed", kind.failed},
+                     {"worst", kind.worst ? to_json(*kind.worst) : json()},
+                     {"first_failure", kind.first_failure ? to_json(*kind.first_failure) : json()}});
+  }
+  for (const NotAsked& each : campaign.not_asked) {
+    not_asked.push_back(
+        {{"kind", each.kind}, {"size", each.size}, {"size_before", each.size_before}, {"seconds", each.seconds}});
   }
   return {{"operation", campaign.operation->name},
           {"cases", campaign.cases},
@@ -335,12 +517,15 @@ nlohmann::json to_json(const KernelCampaign& campaign) {
           {"questions", campaign.questions},
           {"refused", campaign.refused},
           {"not_answered", campaign.lost},
+          {"not_asked", std::move(not_asked)},
           {"complete", !campaign.stopped},
           {"gave_up", campaign.gave_up},
           {"ended", campaign.ended},
           {"failed", campaign.failed},
+          {"failed_cases", campaign.failed_cases},
           {"seconds", campaign.seconds},
           {"properties", campaign.properties.to_json()},
+          {"kinds", std::move(kinds)},
           {"unpromised", std::move(unpromised)},
           {"failures", std::move(failures)},
           {"holds", campaign.holds()}};

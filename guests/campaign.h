@@ -20,7 +20,11 @@ inline constexpr const char* kAnswersProperty = "answers";
 
 struct KernelCampaignOptions {
   uint64_t seed = 1;
-  int64_t cases = 1000;                // matrices, or bodies; at least one question of each kind
+  int64_t cases = 1000;  // matrices, or bodies; at least one question of each kind; large ones beside
+  // Of large questions, ascending: one of each large kind in each size.
+  std::vector<int64_t> sizes = {};
+  double time_limit = 10;  // [s] for an answer; a larger question is not asked if its answer would take longer, should
+                           // the time of an answer grow with the square of the size
   std::optional<double> seconds = {};  // begins no further question after so long
   double simplify = 20;                // [s] for each failure that is kept
   // After so many questions that were not answered at all the campaign ends; 0: never.
@@ -29,11 +33,34 @@ struct KernelCampaignOptions {
 };
 
 struct KernelFailure {
-  int64_t index = 0;   // of the question
+  int64_t index = 0;   // of the question; of a large one, of its kind
+  int64_t size = 0;    // of a large question as it was asked
   bool at_end = true;  // where its arrays lay
   Verdict verdict;     // of the question as it was drawn
   Question simplest;
   Verdict of_simplest;
+};
+
+// What became of the questions of one kind.
+struct KindSummary {
+  // A promised verdict on one of them.
+  struct Case {
+    int64_t index = 0, size = 0;  // of the question, as in KernelFailure
+    Verdict verdict;
+  };
+  std::string kind;
+  int64_t questions = 0, cases = 0, refused = 0;
+  int64_t failed = 0;  // cases
+  // The one that fails, else the one that comes nearest to its bound. Nothing where no bound but 0 was met.
+  std::optional<Case> worst, first_failure;
+};
+
+// A large question that was not asked.
+struct NotAsked {
+  std::string kind;
+  int64_t size = 0;
+  int64_t size_before = 0;  // the last size that was asked,
+  double seconds = 0;       // and how long its answer took
 };
 
 struct Unpromised {
@@ -48,14 +75,20 @@ struct KernelCampaign {
   bool ended = false;    // the guest has, and cannot be started anew
   bool stopped = false;  // it was asked to stop, and did before its end
   double seconds = 0;
-  harness::PropertySummaries properties;
+  harness::PropertySummaries properties;  // judged and failed: cases
+  std::vector<KindSummary> kinds;         // in the order in which they were first asked
+  std::vector<NotAsked> not_asked;
   std::vector<Unpromised> unpromised;
   std::vector<KernelFailure> failures;  // the first of each property
   int64_t failed = 0;                   // questions
+  int64_t failed_cases = 0;
 
   // Something was judged, and nothing failed.
   bool holds() const { return failed == 0 && questions > refused; }
 };
+
+// "question 5 (a wire)"; large ones by their size.
+std::string name_of_question(int64_t index, int64_t size, const std::string& kind);
 
 // What a plugin promises of an operation: what it says, or what goes without saying. Throws InputError, naming the
 // library, for words that there are not.
@@ -65,9 +98,11 @@ harness::Promises promises_of(const PluginInfo& plugin, const OperationDescripti
 // One question to a guest. `at_end`: Guest::call.
 Answer ask(Guest& guest, const OperationDescription& operation, const Question& question, bool at_end);
 
-// All verdicts on one question; empty if the guest refused it. `again`: asks a second time, for the same bits.
+// All verdicts on one question; empty if the guest refused it. `again`: asks a second time, for the same bits. A large
+// question is asked twice in any case, and a second answer that differs is judged as well. `seconds`: how long the
+// guest took for its first answer.
 std::vector<Verdict> judge_answer(Guest& guest, const OperationDescription& operation, const Question& question,
-                                  bool at_end, bool again);
+                                  bool at_end, bool again, double* seconds = nullptr);
 
 // `progress` is called after every question.
 KernelCampaign judge_kernel(Guest& guest, const OperationDescription& operation, const harness::Promises& promises,
@@ -77,13 +112,15 @@ KernelCampaign judge_kernel(Guest& guest, const OperationDescription& operation,
 // A question as data, in a line of JSON: replayed without the plugin's source (results_schema.md, Questions).
 struct SavedQuestion {
   std::string operation;
-  Question question;
+  Question question;  // of a large one kind and size alone
   Precision precision = Precision::binary32;
   bool at_end = true;
   std::string plugin, found;  // who failed, and how
   uint64_t seed = 0;
   int64_t index = 0;
 };
+// The question itself: a large one is drawn again.
+Question question_of(const SavedQuestion& saved);
 std::string to_json(const SavedQuestion& saved);
 // Throws InputError, naming `file`, for anything else, and for fields that are not known.
 SavedQuestion question_from_json(const std::string& text, const std::string& file);

@@ -12,6 +12,7 @@
 #include "model/counted.h"
 #include "oracles/oracles.h"
 #include "oracles/piece_sizes.h"
+#include "oracles/shells.h"
 
 namespace cutproof::harness {
 
@@ -71,10 +72,11 @@ std::string why_not(const ForeignState& foreign, const oracles::Property& proper
   return "";
 }
 
-Verdict closed(const ForeignState& foreign) {
-  Verdict verdict = oracles::closed_surface(foreign.loose_skin);
+Verdict closed(const ForeignState& foreign, bool surface_alone) {
+  const Skin& skin = surface_alone ? foreign.loose_skin : foreign.state.skin;
+  Verdict verdict = oracles::closed_surface(skin);
   const auto& alive = foreign.state.alive;
-  if (foreign.loose_skin.triangles.empty() && std::find(alive.begin(), alive.end(), 1) != alive.end()) {
+  if (skin.triangles.empty() && std::find(alive.begin(), alive.end(), 1) != alive.end()) {
     verdict.holds = false;
     verdict.vacuous.clear();
     verdict.measured = 1;
@@ -323,7 +325,20 @@ ForeignVerdicts judge_foreign_state(const ForeignState& foreign) {
       const bool is_form = property.name == due.front().property;
       if (why.empty() && !well_formed && !is_form) why = "the state is not well formed";
       if (why.empty() && surface_alone && property.name == "skin surface") {
-        found.verdicts.push_back(closed(foreign));
+        found.verdicts.push_back(closed(foreign, true));
+        continue;
+      }
+      // Of vertices without owners nothing is known but where they are, which is all that such a promise is about.
+      const bool is_free_match =
+          property.name == "skin match" && foreign.promises.free_skin_places() && foreign.given.contains("vertices");
+      if (is_free_match && well_formed) {
+        const Verdict surface = closed(foreign, surface_alone);
+        if (surface.holds) {
+          found.verdicts.push_back(oracles::free_skin_match(foreign.setup, foreign.state,
+                                                            surface_alone ? foreign.loose_skin : foreign.state.skin));
+        } else {
+          found.not_judged.push_back({std::string(property.name), "the skin is no closed surface"});
+        }
         continue;
       }
       if (why.empty() && verdict == due.end()) why = fmt::format("not due: {}", property.due.text);

@@ -9,6 +9,7 @@
 #include "model/fields.h"
 #include "model/rules.h"
 #include "oracles/comparison/state_difference.h"
+#include "oracles/shells.h"
 
 namespace cutproof::harness {
 
@@ -113,6 +114,9 @@ bool Judge::is_promised(const Verdict& verdict, Stage stage, const State& state)
 
 void Judge::take(std::vector<Verdict> found, Stage stage, const State& state) {
   for (Verdict& verdict : found) {
+    if (verdict.property == "skin match" && promises_.free_skin_places()) {
+      verdict = oracles::free_skin_match(setup_, state, state.skin);
+    }
     if (!is_promised(verdict, stage, state)) {
       leave_out(verdict);
       continue;

@@ -23,10 +23,14 @@ constexpr std::array kRotations = {std::string_view("rotation"), std::string_vie
 constexpr std::array kMomentum = {std::string_view("linear momentum"), std::string_view("component momentum")};
 constexpr std::array kMotion = {std::string_view("motion"), std::string_view("admissible step")};
 constexpr std::array kBladeOut = {std::string_view("no pass")};
-constexpr std::array kSkin = {
-    std::string_view("skin match"),  std::string_view("skin surface"),     std::string_view("skin vertices"),
-    std::string_view("skin shells"), std::string_view("skin geometry"),    std::string_view("skin reach"),
-    std::string_view("surface"),     std::string_view("surface vertices"), std::string_view("surface shells")};
+constexpr std::array kSkin = {std::string_view("skin match"),     std::string_view("skin surface"),
+                              std::string_view("skin vertices"),  std::string_view("skin shells"),
+                              std::string_view("skin geometry"),  std::string_view("skin reach"),
+                              std::string_view("surface"),        std::string_view("surface vertices"),
+                              std::string_view("surface places"), std::string_view("surface shells")};
+constexpr std::array kFreeSkin = {std::string_view("skin match"),     std::string_view("skin surface"),
+                                  std::string_view("skin shells"),    std::string_view("surface"),
+                                  std::string_view("surface places"), std::string_view("surface shells")};
 constexpr std::array kBest = {std::string_view("best rotation")};
 constexpr std::array kNearest = {std::string_view("nearest rotation")};
 constexpr std::array kKeepsPrevious = {std::string_view("previous rotation kept")};
@@ -51,6 +55,8 @@ constexpr std::array kWords = {
     PromiseWord{"motion", "a step ends where the equations of the method end, within rounding", kMotion},
     PromiseWord{"blade_out", "no tissue stands across the blade", kBladeOut},
     PromiseWord{"skin", "the skin is a closed surface around each piece, and where the tissue is", kSkin},
+    PromiseWord{"free_skin", "the same, with vertices anywhere in the cells that it passes, such as dual methods have",
+                kFreeSkin, "skin"},
     PromiseWord{"same_bits", "the same input gives the same bits", kSameBits},
     PromiseWord{"no_ghost_force", "a piece that is kicked moves no other piece", kNoGhostForce},
 };
@@ -59,12 +65,24 @@ constexpr std::array kWords = {
 
 std::span<const PromiseWord> promise_words() { return kWords; }
 
+namespace {
+
+bool is_given(uint32_t words, std::string_view name) {
+  const auto found = std::find_if(kWords.begin(), kWords.end(), [&](const PromiseWord& w) { return w.name == name; });
+  return (words >> (found - kWords.begin()) & 1u) != 0;
+}
+
+}  // namespace
+
+bool Promises::free_skin_places() const { return is_given(words, "free_skin") && !is_given(words, "skin"); }
+
 bool Promises::cover(std::string_view property) const {
   bool named = false;
   for (std::size_t k = 0; k < kWords.size(); ++k) {
     const auto& properties = kWords[k].properties;
     if (std::find(properties.begin(), properties.end(), property) == properties.end()) continue;
-    if ((words >> k & 1u) != 0) return true;
+    const std::string_view stronger = kWords[k].weaker_than;
+    if ((words >> k & 1u) != 0 && (stronger.empty() || !is_given(words, stronger))) return true;
     named = true;
   }
   return !named;

@@ -13,6 +13,8 @@ struct PromiseWord {
   std::string_view name;  // as in files and plugins
   std::string_view text;  // what is promised, in a sentence
   std::span<const std::string_view> properties;
+  // Where this other promise is made as well, this one says nothing more.
+  std::string_view weaker_than = {};
 };
 // In the order in which people read about them. Properties that no word names are asked of everybody: that what was
 // handed over can be read, and that a stage changes nothing that is not its own.
@@ -30,6 +32,8 @@ struct Promises {
 
   // Whether a word that names this property is given, or none names it.
   bool cover(std::string_view property) const;
+  // Skin vertices lie anywhere within the cells that the surface passes: "free_skin" is given, and not "skin".
+  bool free_skin_places() const;
 };
 // What the rules of a setup promise whatever clusters a body was given.
 inline constexpr Promises kPromisesOfRules = {.coupling_without_edge_cover = false,

@@ -71,10 +71,14 @@ PropertySummary& PropertySummaries::entry(const std::string& property, Stage sta
 }
 
 void PropertySummaries::add(const Verdict& verdict) {
+  add(verdict, verdict.checked > 0 || !verdict.holds ? 1 : 0, verdict.holds ? 0 : 1);
+}
+
+void PropertySummaries::add(const Verdict& verdict, int64_t judged, int64_t failed) {
   PropertySummary& summary = entry(verdict.property, verdict.stage, verdict.unit);
-  summary.judged += verdict.checked > 0 || !verdict.holds;
+  summary.judged += judged;
   summary.checked += verdict.checked;
-  summary.failed += !verdict.holds;
+  summary.failed += failed;
   summary.undecided += verdict.undecided;
   if (verdict.checked == 0) return;
   raise(summary.measured, verdict.measured);

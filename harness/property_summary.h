@@ -32,6 +32,8 @@ void add_summary(nlohmann::json& sum, const nlohmann::json& more);
 class PropertySummaries {
  public:
   void add(const Verdict& verdict);
+  // The same where things are counted that one verdict is about several of: so many were judged, so many are wrong.
+  void add(const Verdict& verdict, int64_t judged, int64_t failed);
   void join(const PropertySummaries& other);
 
   // In the order in which they were first added.

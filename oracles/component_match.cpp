@@ -132,4 +132,47 @@ void check_skin_match(Judged& judged, Verdict& verdict) {
   }
 }
 
+Verdict free_skin_match(const Setup& setup, const State& state, const Skin& skin) {
+  const Property& property = property_named(core_properties(), "skin match");
+  Verdict verdict = start_verdict(property.name, state, property.unit, "tolerances.md, A surface with free places");
+  Judged judged(setup, state);
+  const Partition& components = judged.components();
+  verdict.checked = components.count;
+  const bool owned = skin.owner.size() == skin.position.size();
+  Skin joined;
+  joined.triangles = skin.triangles;
+  joined.owner.assign(skin.position.size(), 0);
+  const Shells shells = shells_of(joined, skin.position);
+  std::vector<int32_t> first_owner(shells.volume.size(), -1);
+  for (std::size_t v = 0; owned && v < skin.owner.size(); ++v) {
+    const int32_t shell = shells.of_vertex[v], owner = skin.owner[v];
+    if (shell < 0) continue;
+    int32_t& first = first_owner[at(shell)];
+    if (first < 0) first = owner;
+    if (!judged.alive(owner)) {
+      violate(verdict, {{}, {owner}}, "skin vertex {} is owned by particle {}, which is dead", v, owner);
+    } else if (components.label[at(first)] != components.label[at(owner)]) {
+      violate(verdict, {{}, {first, owner}},
+              "one shell of the skin joins particles {} and {}, which lie in components "
+              "{} and {} of the tissue",
+              first, owner, components.label[at(first)], components.label[at(owner)]);
+    }
+  }
+  int32_t outer = 0, inner = 0;
+  double enclosed = 0;
+  for (const double volume : shells.volume) {
+    ++(volume > 0 ? outer : inner);
+    enclosed += volume;
+  }
+  if (outer != components.count) {
+    violate(verdict, {}, "the skin has {} outer shells, but the tissue has {} components", outer, components.count);
+  }
+  if (const int32_t cavities = judged.body.on_grid() ? count_cavities(judged) : inner; inner != cavities) {
+    violate(verdict, {}, "the skin has {} inner shells, but the tissue has {} cavities", inner, cavities);
+  }
+  // Each shell inside out may leave their numbers as they were.
+  if (outer + inner > 0 && !(enclosed > 0)) violate(verdict, {}, "the skin is inside out: it encloses no tissue");
+  return conclude(std::move(verdict), property.nothing);
+}
+
 }  // namespace cutproof::oracles

@@ -45,6 +45,12 @@ struct ShellCount {
 // manifold, which "skin surface" shows, these are the shells of triangles joined at their edges.
 ShellCount count_shells(const Skin& skin);
 
+// "skin match" of a skin whose vertices lie anywhere within the cells that it passes, so that nothing is known of where
+// they are at rest: by where they are. One outer shell for each component of the tissue, an inner one for each cavity
+// (on a grid), and all of them together enclose tissue. `skin`: the state's own, or one without owners. Requires
+// triangles to name vertices that exist.
+Verdict free_skin_match(const Setup& setup, const State& state, const Skin& skin);
+
 // Components of the empty nodes (18 neighbours) that do not reach the outer ring.
 int32_t count_cavities(const Judged& judged);
 

@@ -57,21 +57,6 @@ void check_triangles(const Skin& skin, Verdict& verdict) {
   }
 }
 
-// Each grid edge carries at most one vertex.
-void check_duplicates(const Skin& skin, int32_t particle_count, Verdict& verdict) {
-  std::vector<int32_t> vertex_at(6 * at(particle_count), -1);
-  for (int32_t v = 0; v < static_cast<int32_t>(skin.owner.size()); ++v) {
-    const int32_t owner = skin.owner[at(v)];
-    int32_t& slot = vertex_at[6 * at(owner) + skin.direction[at(v)]];
-    if (slot >= 0) {
-      return violate(verdict, owners_of(skin, {slot, v}, triangles_at(skin, {slot, v})),
-                     "vertices {} and {} lie on the same grid edge: from particle {} in direction {}", slot, v, owner,
-                     skin.direction[at(v)]);
-    }
-    slot = v;
-  }
-}
-
 // Closed and oriented: each half-edge is there once, and its opposite once.
 void check_edges(const Skin& skin, const HalfEdges& half_edges, Verdict& verdict) {
   for (int32_t a = 0; a < static_cast<int32_t>(skin.position.size()); ++a) {
@@ -149,7 +134,6 @@ void check_skin_surface(Judged& judged, Verdict& verdict) {
     return violate(verdict, {}, "tissue is alive, and there is no skin");
   }
   check_triangles(skin, verdict);
-  if (verdict.holds) check_duplicates(skin, judged.body.particle_count(), verdict);
   if (verdict.holds) check_closed(skin, verdict);
 }
 

@@ -43,6 +43,36 @@ void add_coverage(Sheet& sheet, const Field& document, bool moves) {
   sheet.pieces.emplace_back(std::move(grid));
 }
 
+// A row for each kind of question, with the worst case of it.
+Grid kinds_of(const Field& operation) {
+  Grid grid;
+  grid.title = "Kinds of " + operation["operation"].text();
+  grid.words = "The worst case of a kind is one that fails, or the one that came nearest to its bound.";
+  grid.columns = {{"kind"},           {operation["of"].text(), true},
+                  {"wrong", true},    {"worst in"},
+                  {"measured", true}, {"bound", true},
+                  {"question", true}};
+  operation["kinds"].each([&](const Field& kind) {
+    const int64_t failed = kind["failed"].count();
+    GridRow row{{kind["kind"].text(), io::grouped(kind["cases"].count()), io::grouped(failed)},
+                failed > 0 ? "bad" : ""};
+    const Field worst = kind["worst"];
+    if (worst.is_nothing()) {
+      row.cells.insert(row.cells.end(), 4, "–");
+    } else {
+      const Field size = worst["size"];
+      for (const std::string& cell :
+           {worst["property"].text(), figure_text(worst["measured"].number_or_null()),
+            figure_text(worst["bound"].number_or_null()),
+            size.is_there() ? "of size " + io::grouped(size.count()) : io::grouped(worst["index"].count())}) {
+        row.cells.push_back(cell);
+      }
+    }
+    grid.rows.push_back(std::move(row));
+  });
+  return grid;
+}
+
 }  // namespace
 
 Sheet campaign_sheet(const Field& document, const std::string& failure) {
@@ -158,9 +188,9 @@ Sheet judge_sheet(const Field& document) {
   Grid operations;
   operations.title = "Operations";
   operations.words = "A question is one call of the plugin; a case is a matrix or a body within it.";
-  operations.columns = {{"operation"},       {"result"},        {"cases", true},        {"of"},
-                        {"questions", true}, {"refused", true}, {"not answered", true}, {"failed", true},
-                        {"seconds", true}};
+  operations.columns = {{"operation"},         {"result"},        {"cases", true},        {"of"},
+                        {"questions", true},   {"refused", true}, {"not answered", true}, {"failed", true},
+                        {"wrong cases", true}, {"seconds", true}};
   std::vector<Piece> tables;
   int64_t failing = 0, judged = 0;
   bool all_hold = true;
@@ -176,20 +206,28 @@ Sheet judge_sheet(const Field& document) {
     all_hold = all_hold && holds;
     failing += !holds;
     ++judged;
-    operations.rows.push_back(
-        {{operation,
-          !holds     ? "fails"
-          : is_whole ? "holds"
-                     : "holds as far as it went",
-          io::grouped(one["cases"].count()), one["of"].text(), io::grouped(questions), io::grouped(refused),
-          io::grouped(one["not_answered"].count()), io::grouped(failed), figure_text(one["seconds"].number())},
-         holds ? "" : "bad"});
+    operations.rows.push_back({{operation,
+                                !holds     ? "fails"
+                                : is_whole ? "holds"
+                                           : "holds as far as it went",
+                                io::grouped(one["cases"].count()), one["of"].text(), io::grouped(questions),
+                                io::grouped(refused), io::grouped(one["not_answered"].count()), io::grouped(failed),
+                                one["failed_cases"].is_there() ? io::grouped(one["failed_cases"].count()) : "–",
+                                figure_text(one["seconds"].number())},
+                               holds ? "" : "bad"});
     if (questions <= refused) sheet.notes.push_back(operation + ": every question was refused, so nothing was judged.");
     if (one["ended"].flag_or(false))
       sheet.notes.push_back(operation +
                             ": the plugin's process ended and could not be started again; nothing more was asked.");
     else if (one["gave_up"].flag_or(false))
       sheet.notes.push_back(operation + ": given up after too many questions without an answer; --keep-going goes on.");
+    if (one["not_asked"].is_there()) {
+      one["not_asked"].each([&](const Field& question) {
+        sheet.notes.push_back(fmt::format("{}: “{}” of size {} was not asked: of size {} its answer took {:.2g} s.",
+                                          operation, question["kind"].text(), io::grouped(question["size"].count()),
+                                          io::grouped(question["size_before"].count()), question["seconds"].number()));
+      });
+    }
     one["unpromised"].each([&](const Field& property) {
       const int64_t would_fail = property["failing"].count();
       sheet.notes.push_back(fmt::format(
@@ -201,7 +239,10 @@ Sheet judge_sheet(const Field& document) {
       card.title = operation + ": " + failure["property"].text();
       card.words = failure["text"].text();
       const std::string given_unit = failure["unit"].text(), unit = given_unit == "1" ? "" : " " + given_unit;
-      card.facts = {{"Question", fmt::format("{} ({})", io::grouped(failure["index"].count()), failure["kind"].text())},
+      const Field drawn = failure["drawn_size"];
+      const std::string which =
+          drawn.is_there() ? "of size " + io::grouped(drawn.count()) : io::grouped(failure["index"].count());
+      card.facts = {{"Question", fmt::format("{} ({})", which, failure["kind"].text())},
                     {"Simplified to", failure["size"].text() + ": " + failure["simplified"].text()},
                     {"Measured / bound", fmt::format("{:.4g}{} / {:.4g}{}", failure["measured"].number(), unit,
                                                      failure["bound"].number(), unit)},
@@ -214,7 +255,9 @@ Sheet judge_sheet(const Field& document) {
       }
     });
     properties.grid.title = "Properties of " + operation;
+    if (one["kinds"].is_there()) properties.grid.columns[3].head = one["of"].text();
     tables.emplace_back(std::move(properties.grid));
+    if (one["kinds"].is_there()) tables.emplace_back(kinds_of(one));
   });
   for (const char* const stages : {"dissections", "moving_dissections"}) {
     const Field one = document[stages];

@@ -560,12 +560,13 @@ class Result:
         return f"<cutproof.Result: all hold ({', '.join(counts) or 'a replay'})>"
 
 
-def judge(*, rotations=None, components=None, surface=None, clusters=None, cases=None, seconds=None, seed=1,
+def judge(*, rotations=None, components=None, surface=None, clusters=None, cases=None, sizes=None, seconds=None, seed=1,
           precision="single", device="host", promises=None, name=None, time_limit=60, simplify=20, save=".",
           keep_going=False, verbose=False):
     """Asks the functions that are given, each in many cases. Returns a Result; raises Failed, Skipped or Error.
 
-    cases, seconds: how many matrices or bodies for each function, or for how long. promises: words of what is vouched
+    cases, seconds: how many matrices or bodies for each function, or for how long. sizes: of large questions, as matrices
+    or particles; (): none; None: beside 65536 and more. promises: words of what is vouched
     for; None: what goes without saying. time_limit: seconds for each answer. simplify: seconds for making each failing
     case smaller. save: folder for failing cases. keep_going: beyond ten questions that were not answered.
     """
@@ -575,6 +576,7 @@ def judge(*, rotations=None, components=None, surface=None, clusters=None, cases
     words = list(functions) + [f"--seed={seed}", f"--time-limit={time_limit}", f"--simplify={simplify}",
                                f"--save={os.fspath(save)}"]
     words += [f"--cases={cases}"] if cases is not None else []
+    words += [f"--sizes={','.join(map(str, sizes)) or 0}"] if sizes is not None else []
     words += [f"--seconds={seconds}"] if seconds is not None else []
     words += ["--keep-going"] if keep_going else []
     with tempfile.TemporaryDirectory(prefix="cutproof") as folder:
@@ -637,7 +639,9 @@ def _describe(guest, document, seed, precision):
             measured, bound = (f"{value:.3g}" if isinstance(value, (int, float)) else "no finite number"
                                for value in (failure["measured"], failure["bound"]))
             unit = f" {failure['unit']}" if failure["unit"] != "1" else ""
-            lines += [f"{name}: '{failure['property']}' fails in question {failure['index']} ({failure['kind']})",
+            question = f"the question of size {failure['drawn_size']}" if "drawn_size" in failure \
+                else f"question {failure['index']}"
+            lines += [f"{name}: '{failure['property']}' fails in {question} ({failure['kind']})",
                       f"  {failure['text']}"]
             lines += [f"  simplified to {failure['size']}: {failure['simplified']}",
                       f"  measured {measured}{unit}, the bound is {bound}{unit}",

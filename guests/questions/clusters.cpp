@@ -18,6 +18,13 @@ Question draw_clusters(uint64_t seed, int64_t index, Precision) {
   return {graph_kinds()[at(index % kinds)], arrays_of(tissue), {}};
 }
 
+Question draw_large_clusters(uint64_t seed, int64_t kind, int64_t size, Precision) {
+  Random random(large_seed(seed, kind));
+  Tissue tissue = draw_large_graph(random, kind, static_cast<int32_t>(size));
+  tissue.alive.assign(tissue.alive.size(), 1);
+  return {large_graph_kinds()[at(kind)], arrays_of(tissue), {}, size};
+}
+
 std::vector<Verdict> judge_clusters(const Question& question, const Arrays& answers, Precision) {
   const Tissue tissue = tissue_of(question.given);
   Setup setup;
@@ -55,6 +62,9 @@ constexpr AnswerArray kClusterAnswers[] = {
     {.name = "offsets", .type = ElementType::i64, .text = "[m + 1] of cluster c: members[offsets[c]] and following"},
     {.name = "members", .type = ElementType::i32, .text = "particles, ascending within each cluster"}};
 
+// Beside 2¹⁶. The least ones show how the time of an answer grows.
+constexpr int64_t kClusterSizes[] = {4'097, 16'385, 65'535, 65'536, 65'537};
+
 }  // namespace
 
 const OperationDescription kClusters = {
@@ -71,6 +81,9 @@ const OperationDescription kClusters = {
     .problem = problem_of_body,
     .simpler = fewer_particles,
     .kinds = graph_kinds,
+    .large_kinds = large_graph_kinds,
+    .sizes = kClusterSizes,
+    .draw_large = draw_large_clusters,
 };
 
 }  // namespace cutproof::guests

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <functional>
 #include <map>
@@ -95,31 +96,45 @@ Tissue bare(int32_t n, const std::vector<std::array<int32_t, 2>>& edges, Random&
   Tissue tissue;
   Body& body = tissue.body;
   body.name = "a graph";
-  std::vector<std::set<int32_t>> ends(at(n));
+  std::vector<int64_t>& offsets = body.edge_offsets;
+  offsets.assign(at(n) + 1, 0);
   for (const auto& [a, b] : edges) {
     if (a == b) continue;
-    ends[at(a)].insert(b);
-    ends[at(b)].insert(a);
+    ++offsets[at(a) + 1];
+    ++offsets[at(b) + 1];
   }
-  body.edge_offsets = {0};
+  std::partial_sum(offsets.begin(), offsets.end(), offsets.begin());
+  std::vector<int32_t> ends(at(offsets.back()));
+  std::vector<int64_t> next(offsets.begin(), offsets.end() - 1);
+  for (const auto& [a, b] : edges) {
+    if (a == b) continue;
+    ends[at(next[at(a)]++)] = b;
+    ends[at(next[at(b)]++)] = a;
+  }
+  for (int64_t i = 0, first = 0; i < n; ++i) {
+    const auto begin = ends.begin() + first, end = ends.begin() + offsets[at(i) + 1];
+    std::sort(begin, end);
+    body.edge_ends.insert(body.edge_ends.end(), begin, std::unique(begin, end));
+    first = offsets[at(i) + 1];
+    offsets[at(i) + 1] = static_cast<int64_t>(body.edge_ends.size());
+  }
   for (int32_t i = 0; i < n; ++i) {
     // On the lattice of 2⁻¹⁰, so that single precision holds the places.
     const auto place = [&] { return static_cast<double>(random.below(1 << 14)) * 0x1p-10; };
     const double x = place(), y = place();
     body.rest.push_back({x, y, place()});
-    body.edge_ends.insert(body.edge_ends.end(), ends[at(i)].begin(), ends[at(i)].end());
-    body.edge_offsets.push_back(static_cast<int64_t>(body.edge_ends.size()));
   }
   // Joined particles at one place would have an edge without length.
   for (int32_t i = 0; i < n; ++i) {
-    for (const int32_t other : ends[at(i)]) {
+    for (const int32_t other : body.neighbours(i)) {
       if (other < i && norm(body.rest[at(i)] - body.rest[at(other)]) == 0) body.rest[at(i)].x += 0x1p-10 * (i + 1);
     }
   }
   body.mass.assign(at(n), 1);
   body.grid.spacing = 0;
   for (int32_t i = 0; i < n; ++i) {
-    for (const int32_t other : ends[at(i)]) body.grid.spacing = std::max(body.grid.spacing, body.rest_length(i, other));
+    for (const int32_t other : body.neighbours(i))
+      body.grid.spacing = std::max(body.grid.spacing, body.rest_length(i, other));
   }
   if (body.grid.spacing == 0) body.grid.spacing = 1;
   tissue.alive.assign(at(n), 1);
@@ -395,6 +410,19 @@ Edges path(int32_t n) {
   for (int32_t i = 1; i < n; ++i) edges.push_back({i - 1, i});
   return edges;
 }
+// 0 .. n - 1 in any order.
+std::vector<int32_t> shuffled(int32_t n, Random& r) {
+  std::vector<int32_t> order(at(n));
+  std::iota(order.begin(), order.end(), 0);
+  for (int32_t k = n - 1; k > 0; --k) std::swap(order[at(k)], order[at(r.below(k + 1))]);
+  return order;
+}
+void renumber(Edges& edges, const std::vector<int32_t>& number) {
+  for (auto& [a, b] : edges) {
+    a = number[at(a)];
+    b = number[at(b)];
+  }
+}
 Edges any_edges(Random& r, int32_t n, int32_t count) {
   Edges edges;
   for (int32_t k = 0; k < count && n > 1; ++k) edges.push_back({r.below(n), r.below(n)});
@@ -445,14 +473,8 @@ constexpr GraphKind kGraphKinds[] = {
     {"a path in any order",
      [](Random& r) {
        const int32_t n = r.between(2, 2000);
-       std::vector<int32_t> order(at(n));
-       std::iota(order.begin(), order.end(), 0);
-       for (int32_t k = n - 1; k > 0; --k) std::swap(order[at(k)], order[at(r.below(k + 1))]);
        Edges edges = path(n);
-       for (auto& [a, b] : edges) {
-         a = order[at(a)];
-         b = order[at(b)];
-       }
+       renumber(edges, shuffled(n, r));
        return bare(n, edges, r);
      }},
     {"a star",
@@ -502,18 +524,73 @@ constexpr GraphKind kGraphKinds[] = {
 };
 constexpr int64_t kGraphKindCount = std::size(kGraphKinds);
 
-}  // namespace
+struct LargeKind {
+  const char* name;
+  Tissue (*draw)(Random& random, int32_t n);
+};
 
-std::vector<std::string> grid_kinds() {
+// The first n nodes, of those that are `wanted`, of a box with about as many nodes along each axis.
+template <class Wanted>
+Tissue first_of_box(int32_t n, double nodes_for_each, Random& r, const Wanted& wanted) {
+  const auto side = std::max(1, static_cast<int32_t>(std::ceil(std::cbrt(nodes_for_each * n))));
+  Nodes nodes;
+  for (int32_t k = 0; static_cast<int32_t>(nodes.size()) < n; ++k) {
+    const std::array<int32_t, 3> node = {k % side, k / side % side, k / side / side};
+    if (wanted(node)) nodes.push_back(node);
+  }
+  return on_grid(std::move(nodes), spacing_of(r));
+}
+
+constexpr LargeKind kLargeGridKinds[] = {
+    {"a large box", [](Random& r, int32_t n) { return first_of_box(n, 1, r, [](const auto&) { return true; }); }},
+    {"a large sponge",
+     [](Random& r, int32_t n) { return first_of_box(n, 2, r, [&](const auto&) { return r.chance(0.5); }); }},
+};
+
+constexpr LargeKind kLargeGraphKinds[] = {
+    {"many vertices without edges", [](Random& r, int32_t n) { return bare(n, {}, r); }},
+    {"a long path in its order", [](Random& r, int32_t n) { return bare(n, path(n), r); }},
+    {"a long path in any order",
+     [](Random& r, int32_t n) {
+       Edges edges = path(n);
+       renumber(edges, shuffled(n, r));
+       return bare(n, edges, r);
+     }},
+    {"many short paths",
+     [](Random& r, int32_t n) {
+       Edges edges = path(n);
+       std::erase_if(edges, [&](const auto&) { return r.chance(0.2); });
+       renumber(edges, shuffled(n, r));
+       return bare(n, edges, r);
+     }},
+    {"many vertices, of which some are dead",
+     [](Random& r, int32_t n) {
+       Tissue t = bare(n, any_edges(r, n, n), r);
+       kill_some(t, r, 0.1);
+       return t;
+     }},
+};
+
+template <class Kinds>
+std::vector<std::string> names_of(const Kinds& kinds) {
   std::vector<std::string> names;
-  for (const GridKind& kind : kGridKinds) names.emplace_back(kind.name);
+  for (const auto& kind : kinds) names.emplace_back(kind.name);
   return names;
 }
+
+}  // namespace
+
+std::vector<std::string> large_grid_kinds() { return names_of(kLargeGridKinds); }
+Tissue draw_large_on_grid(Random& random, int64_t kind, int32_t n) { return kLargeGridKinds[kind].draw(random, n); }
+std::vector<std::string> large_graph_kinds() { return names_of(kLargeGraphKinds); }
+Tissue draw_large_graph(Random& random, int64_t kind, int32_t n) { return kLargeGraphKinds[kind].draw(random, n); }
+uint64_t large_seed(uint64_t seed, int64_t kind) { return mixed(~seed, kind); }
+
+std::vector<std::string> grid_kinds() { return names_of(kGridKinds); }
 Tissue draw_on_grid(Random& random, int64_t kind) { return kGridKinds[kind % kGridKindCount].draw(random); }
 
 std::vector<std::string> graph_kinds() {
-  std::vector<std::string> names;
-  for (const GraphKind& kind : kGraphKinds) names.emplace_back(kind.name);
+  std::vector<std::string> names = names_of(kGraphKinds);
   for (const GridKind& kind : kGridKinds) names.push_back(std::string("on a grid: ") + kind.name);
   return names;
 }

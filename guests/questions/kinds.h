@@ -63,6 +63,13 @@ Tissue draw_on_grid(Random& random, int64_t kind);
 // Random graphs, likewise; the last kinds are those of grids.
 std::vector<std::string> graph_kinds();
 Tissue draw_graph(Random& random, int64_t kind);
+// Those of n particles each that large questions are about; some of the graphs' are dead.
+std::vector<std::string> large_grid_kinds();
+Tissue draw_large_on_grid(Random& random, int64_t kind, int32_t n);
+std::vector<std::string> large_graph_kinds();
+Tissue draw_large_graph(Random& random, int64_t kind, int32_t n);
+// Of large questions, which no ordinary one begins with.
+uint64_t large_seed(uint64_t seed, int64_t kind);
 
 // What a surface around the living particles of a grid has: outer shells and inner ones.
 std::array<int64_t, 2> shells_around(const Tissue& tissue);

@@ -20,6 +20,7 @@ struct Question {
   std::string kind;  // which of the operation's kinds of cases, in words
   Arrays given;      // what the kernel gets, by the names of cutproof/plugin.h
   Arrays known;      // what the judge alone needs
+  int64_t size = 0;  // of a large one, which its seed, kind and size make again; else 0
 
   friend bool operator==(const Question&, const Question&) = default;
 };
@@ -43,6 +44,9 @@ struct OperationDescription {
   std::span<const AnswerArray> answers;
   // Cases are counted by what one question holds of them: matrices, or bodies.
   std::string_view cases;
+  // Witness::particles of a failing verdict names all cases of the question that are wrong. Else a question is one
+  // case.
+  bool is_batch = false;
   // Question `index` of a campaign: the same on every machine. The first ones are one of each kind.
   Question (*draw)(uint64_t seed, int64_t index, Precision precision);
   int64_t (*cases_of)(const Question& question);
@@ -56,7 +60,14 @@ struct OperationDescription {
   std::vector<Question> (*simpler)(const Question& question);
   // Kinds of cases, in the order in which they are drawn.
   std::vector<std::string> (*kinds)();
+  // Large questions, in which faults of width and of launch size show: kinds, sizes that are asked by default
+  // (ascending), and one of them, the same on every machine. Nothing where there are none.
+  std::vector<std::string> (*large_kinds)() = nullptr;
+  std::span<const int64_t> sizes = {};
+  Question (*draw_large)(uint64_t seed, int64_t kind, int64_t size, Precision precision) = nullptr;
 };
+
+inline constexpr int64_t kMostSize = int64_t{1} << 25;  // of a large question
 
 // Those that plugins are asked. guests/vectors.h has more: the stages, which a plugin runs on whole states.
 std::span<const OperationDescription> operations();

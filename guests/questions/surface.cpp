@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <numeric>
+#include <set>
+#include <unordered_map>
+#include <utility>
 
 #include "guests/questions/kinds.h"
 #include "model/at.h"
@@ -19,6 +21,15 @@ Question draw_surface(uint64_t seed, int64_t index, Precision) {
   Random random(mixed(seed, index));
   const auto kinds = static_cast<int64_t>(grid_kinds().size());
   return {grid_kinds()[at(index % kinds)], arrays_of(draw_on_grid(random, index % kinds)), {}};
+}
+
+// Cells number 10⁵ and vertices more than 2¹⁶. The least size shows how the time of an answer grows.
+constexpr int64_t kSurfaceSizes[] = {4'097, 65'537, 100'000};
+
+Question draw_large_surface(uint64_t seed, int64_t kind, int64_t size, Precision) {
+  Random random(large_seed(seed, kind));
+  return {
+      large_grid_kinds()[at(kind)], arrays_of(draw_large_on_grid(random, kind, static_cast<int32_t>(size))), {}, size};
 }
 
 Verdict begin(std::string_view property, std::string_view source) {
@@ -87,48 +98,90 @@ struct Occupancy {
 
 // What a polarity makes of a body: components, and cavities in them.
 struct Topology {
-  Topology(const Occupancy& nodes, bool tissue_across_faces) : component(nodes.groups(true, tissue_across_faces)) {
-    Groups empty = nodes.groups(false, !tissue_across_faces);
-    std::map<std::size_t, int> components, cavities;
+  Topology(const Occupancy& nodes, bool tissue_across_faces)
+      : component(nodes.groups(true, tissue_across_faces)), empty(nodes.groups(false, !tissue_across_faces)) {
     const std::size_t outside = empty.of(0);  // the ring around the tissue
     for (std::size_t k = 0; k < nodes.living.size(); ++k) {
-      if (nodes.living[k] != 0) ++components[component.of(k)];
-      if (nodes.living[k] == 0 && empty.of(k) != outside) ++cavities[empty.of(k)];
+      if (nodes.living[k] != 0 && component.of(k) == k) ++outer;
+      if (nodes.living[k] == 0 && empty.of(k) == k && k != outside) ++inner;
     }
-    outer = static_cast<int64_t>(components.size());
-    inner = static_cast<int64_t>(cavities.size());
   }
-  Groups component;  // of nodes
+  Groups component, empty;  // of nodes
   int64_t outer = 0, inner = 0;
 };
 
-struct Vertex {
-  int64_t node = -1;  // the living end of the grid edge on which it lies; -1: on none
-  int64_t edge = -1;  // 3 · lower node + axis
-};
-
 struct Surface {
-  std::vector<Vec3> vertices;
+  std::vector<Vec3> vertices;  // [h]
   std::vector<std::array<int32_t, 3>> triangles;
-  std::vector<Vertex> placed;
 };
 
-void check_vertices(Surface& surface, const Occupancy& nodes, Precision precision, Verdict& verdict) {
-  const double h = nodes.grid.spacing;
-  std::map<int64_t, std::size_t> vertex_on;
+std::string place_in_words(std::size_t v, Vec3 q) {
+  return fmt::format("vertex {} at ({:g}, {:g}, {:g}) spacings", v, q.x, q.y, q.z);
+}
+
+// Of a coordinate [h]: a product of a whole number and h, a few sums, each rounded relative to the place.
+double place_tolerance(Vec3 q, Precision precision) {
+  return 8 * unit_roundoff(precision) * std::max({std::abs(q.x), std::abs(q.y), std::abs(q.z), 1.0});
+}
+
+// What every surface around the tissue has, wherever its method puts vertices: each lies in a cell that has living
+// corners and empty ones (its boundary included, within rounding).
+void check_places(const Surface& surface, const Occupancy& nodes, Precision precision, Verdict& verdict) {
   for (std::size_t v = 0; v < surface.vertices.size(); ++v) {
     ++verdict.checked;
-    const Vec3 p = surface.vertices[v];
-    std::array<double, 3> q = {p.x / h, p.y / h, p.z / h};
-    Vertex& placed = surface.placed.emplace_back();
-    const std::string where = fmt::format("vertex {} at ({:g}, {:g}, {:g}) spacings", v, q[0], q[1], q[2]);
-    if (!std::isfinite(q[0] + q[1] + q[2])) {
-      fail(verdict, {}, where + " is not finite, or was not written");
+    const Vec3 q = surface.vertices[v];
+    if (!std::isfinite(q.x + q.y + q.z)) {
+      fail(verdict, {}, place_in_words(v, q) + " is not finite, or was not written");
       continue;
     }
-    // A product of a whole number and h, a few sums: each rounded relative to the place.
-    const double greatest = std::max({std::abs(q[0]), std::abs(q[1]), std::abs(q[2]), 1.0});
-    const double tolerance = 8 * unit_roundoff(precision) * greatest;
+    const double tolerance = place_tolerance(q, precision);
+    std::array<int32_t, 3> first = {}, last = {};  // cells that it may lie in, by their lowest nodes
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto cell = [&](double of) {
+        return static_cast<int32_t>(std::clamp(std::floor(of), -2.0, nodes.grid.nodes[axis] + 1.0));
+      };
+      const double of = std::array{q.x, q.y, q.z}[axis];
+      // On the plane between two cells it is in both.
+      first[axis] = cell(std::ceil(of - tolerance) - 1);
+      last[axis] = cell(of + tolerance);
+    }
+    bool alive = false, empty = false, both = false;
+    for (int32_t z = first[2]; z <= last[2] && !both; ++z) {
+      for (int32_t y = first[1]; y <= last[1] && !both; ++y) {
+        for (int32_t x = first[0]; x <= last[0] && !both; ++x) {
+          bool lives = false, dead = false;
+          for (int corner = 0; corner < 8; ++corner) {
+            const std::array<int32_t, 3> node = {x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)};
+            const bool living =
+                nodes.inside(node) && nodes.living[at(nodes.grid.index(node[0], node[1], node[2]))] != 0;
+            (living ? lives : dead) = true;
+          }
+          both = lives && dead;
+          alive = alive || lives;
+          empty = empty || dead;
+        }
+      }
+    }
+    if (both) continue;
+    fail(verdict, {},
+         place_in_words(v, q) + (alive && !empty ? " lies inside the tissue, in a cell without an empty corner"
+                                                 : " lies outside the tissue, in a cell without a living corner"));
+  }
+}
+
+// What marching cubes has besides: one vertex on each grid edge that leaves the tissue.
+void check_vertices(const Surface& surface, const Occupancy& nodes, Precision precision, Verdict& verdict) {
+  std::vector<int32_t> vertex_on(3 * nodes.living.size(), -1);  // by edge: 3 · lower node + axis
+  for (std::size_t v = 0; v < surface.vertices.size(); ++v) {
+    ++verdict.checked;
+    const Vec3 place = surface.vertices[v];
+    const std::array<double, 3> q = {place.x, place.y, place.z};
+    const auto where = [&] { return place_in_words(v, place); };
+    if (!std::isfinite(q[0] + q[1] + q[2])) {
+      fail(verdict, {}, where() + " is not finite, or was not written");
+      continue;
+    }
+    const double tolerance = place_tolerance(place, precision);
     std::size_t axis = 0;
     for (std::size_t k = 1; k < 3; ++k) {
       if (std::abs(q[k] - std::round(q[k])) > std::abs(q[axis] - std::round(q[axis]))) axis = k;
@@ -144,23 +197,22 @@ void check_vertices(Surface& surface, const Occupancy& nodes, Precision precisio
     std::array<int32_t, 3> high = low;
     ++high[axis];
     if (!on_edge || !nodes.inside(low) || !nodes.inside(high)) {
-      fail(verdict, {}, where + " lies between the ends of no edge of the grid");
+      fail(verdict, {}, where() + " lies between the ends of no edge of the grid");
       continue;
     }
     const int64_t below = nodes.grid.index(low[0], low[1], low[2]), above = nodes.grid.index(high[0], high[1], high[2]);
     if (nodes.living[at(below)] == nodes.living[at(above)]) {
       fail(verdict, {},
-           where + (nodes.living[at(below)] != 0 ? " lies inside the tissue" : " lies outside the tissue"));
+           where() + (nodes.living[at(below)] != 0 ? " lies inside the tissue" : " lies outside the tissue"));
       continue;
     }
-    placed.node = nodes.living[at(below)] != 0 ? below : above;
-    placed.edge = 3 * below + static_cast<int64_t>(axis);
-    const auto [known, is_new] = vertex_on.try_emplace(placed.edge, v);
-    if (!is_new) {
+    int32_t& known = vertex_on[3 * at(below) + axis];
+    if (known >= 0) {
       fail(verdict, {},
-           fmt::format("{} and vertex {} lie on the same edge of the grid: vertices are to be shared", where,
-                       known->second));
+           fmt::format("{} and vertex {} lie on the same edge of the grid: vertices are to be shared", where(), known));
+      continue;
     }
+    known = static_cast<int32_t>(v);
   }
   // Each edge between a living and an empty node has its vertex.
   for (int64_t k = 0; k < nodes.grid.node_count(); ++k) {
@@ -172,7 +224,7 @@ void check_vertices(Surface& surface, const Occupancy& nodes, Precision precisio
       const int64_t other = nodes.grid.index(next[0], next[1], next[2]);
       if (nodes.living[at(k)] == nodes.living[at(other)]) continue;
       ++verdict.checked;
-      if (vertex_on.contains(3 * k + static_cast<int64_t>(axis))) continue;
+      if (vertex_on[3 * at(k) + axis] >= 0) continue;
       fail(verdict, {},
            fmt::format("the grid edge from node ({}, {}, {}) along {} leaves the tissue, and has no vertex", node[0],
                        node[1], node[2], "xyz"[axis]));
@@ -180,115 +232,239 @@ void check_vertices(Surface& surface, const Occupancy& nodes, Precision precisio
   }
 }
 
+// Of triangle (from, to, third), an edge that leaves `from`.
+struct Half {
+  int32_t from, to, third, triangle;
+  friend auto operator<=>(const Half&, const Half&) = default;
+};
+
 // Closed, oriented, 2-manifold: each directed edge once, its opposite once; the triangles at a vertex form one fan.
 void check_surface(const Surface& surface, Verdict& verdict) {
-  std::map<std::array<int32_t, 2>, std::array<int32_t, 2>> triangle_at;  // (a, b) -> triangle, third vertex
-  std::vector<int64_t> around(surface.vertices.size(), 0);
+  std::vector<Half> halves;
   for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
     ++verdict.checked;
     const auto& [a, b, c] = surface.triangles[t];
     if (a == b || b == c || c == a) {
-      fail(verdict, {}, fmt::format("triangle {} names a vertex twice: {}, {}, {}", t, a, b, c));
-      return;
+      return fail(verdict, {}, fmt::format("triangle {} names a vertex twice: {}, {}, {}", t, a, b, c));
     }
-    for (const auto& [from, to, third] : {std::array{a, b, c}, std::array{b, c, a}, std::array{c, a, b}}) {
-      ++around[at(from)];
-      const auto [known, is_new] = triangle_at.try_emplace({from, to}, std::array{static_cast<int32_t>(t), third});
-      if (is_new) continue;
-      fail(verdict, {},
-           fmt::format("triangles {} and {} both run from vertex {} to vertex {}: one is flipped or doubled, or more "
-                       "than two triangles meet there",
-                       known->second[0], t, from, to));
-      return;
-    }
+    const auto triangle = static_cast<int32_t>(t);
+    halves.insert(halves.end(), {{a, b, c, triangle}, {b, c, a, triangle}, {c, a, b, triangle}});
   }
-  for (const auto& [edge, triangle] : triangle_at) {
-    if (triangle_at.contains({edge[1], edge[0]})) continue;
-    fail(verdict, {},
-         fmt::format("the surface is open: triangle {} runs from vertex {} to vertex {}, and none runs back",
-                     triangle[0], edge[0], edge[1]));
-    return;
+  std::sort(halves.begin(), halves.end());
+  const auto same = std::adjacent_find(halves.begin(), halves.end(), [](const Half& one, const Half& other) {
+    return one.from == other.from && one.to == other.to;
+  });
+  if (same != halves.end()) {
+    const auto& [first, second] = std::minmax(same->triangle, (same + 1)->triangle);
+    return fail(verdict, {},
+                fmt::format("triangles {} and {} both run from vertex {} to vertex {}: one is flipped or doubled, or "
+                            "more than two triangles meet there",
+                            first, second, same->from, same->to));
   }
-  for (const auto& [edge, triangle] : triangle_at) {
-    if (around[at(edge[0])] <= 0) continue;  // seen
-    int64_t fan = 0;
-    int32_t to = edge[1];
+  const auto half = [&](int32_t from, int32_t to) -> const Half* {
+    const auto found = std::lower_bound(halves.begin(), halves.end(), Half{from, to, -1, -1});
+    return found != halves.end() && found->from == from && found->to == to ? &*found : nullptr;
+  };
+  for (const Half& each : halves) {
+    if (half(each.to, each.from) != nullptr) continue;
+    return fail(verdict, {},
+                fmt::format("the surface is open: triangle {} runs from vertex {} to vertex {}, and none runs back",
+                            each.triangle, each.from, each.to));
+  }
+  std::vector<uint8_t> used(surface.vertices.size(), 0);
+  for (std::size_t first = 0; first < halves.size();) {
+    const int32_t v = halves[first].from;
+    std::size_t end = first;
+    while (end < halves.size() && halves[end].from == v) ++end;
+    used[at(v)] = 1;
+    std::size_t fan = 0;
+    int32_t to = halves[first].to;
     do {
       ++fan;
-      to = triangle_at.at({edge[0], to})[1];
-    } while (to != edge[1] && fan <= around[at(edge[0])]);
-    if (fan != around[at(edge[0])]) {
-      fail(verdict, {},
-           fmt::format("the surface is pinched at vertex {}: of the {} triangles that meet there, {} lie in "
-                       "one fan",
-                       edge[0], around[at(edge[0])], fan));
-      return;
+      to = half(v, to)->third;
+    } while (to != halves[first].to && fan <= end - first);
+    if (fan != end - first) {
+      return fail(verdict, {},
+                  fmt::format("the surface is pinched at vertex {}: of the {} triangles that meet there, {} lie in "
+                              "one fan",
+                              v, end - first, fan));
     }
-    around[at(edge[0])] = -1;
+    first = end;
   }
-  for (std::size_t v = 0; v < around.size(); ++v) {
-    if (around[v] == 0) return fail(verdict, {}, fmt::format("no triangle uses vertex {}", v));
+  for (std::size_t v = 0; v < used.size(); ++v) {
+    if (used[v] == 0) return fail(verdict, {}, fmt::format("no triangle uses vertex {}", v));
   }
 }
 
-struct Shells {
-  int64_t outer = 0, inner = 0, joining = 0, inside_out = 0;
+// --- Shells ----------------------------------------------------------------------------------------------------------
+
+// Where a triangle crosses a line of nodes along x.
+struct Crossing {
+  int64_t line;      // the line's node with x = 0
+  double x, within;  // [h] where, and how far rounding may carry it
+  int32_t shell;
+  int32_t turn;  // 1: the surface goes around what lies behind it; -1: around what lies before it
 };
 
-// By the sign of the volume; `joining`: shells on which components of this topology meet; `inside_out`: those whose
-// triangles turn the wrong way. Which way is right shows at the vertex that lies farthest along x (oracles/shells.h).
-Shells count_shells(const Surface& surface, const Occupancy& nodes, Topology& topology) {
-  Groups groups(surface.vertices.size());
-  for (const auto& [a, b, c] : surface.triangles) {
-    groups.join(at(a), at(b));
-    groups.join(at(b), at(c));
-  }
-  std::map<std::size_t, double> volume;
-  std::map<std::size_t, std::size_t> component, farthest;
-  std::map<std::size_t, bool> joins;
-  for (const auto& [a, b, c] : surface.triangles) {
-    const std::size_t shell = groups.of(at(a));
-    volume[shell] += dot(surface.vertices[at(a)], cross(surface.vertices[at(b)], surface.vertices[at(c)]));
-    for (const int32_t v : {a, b, c}) {
-      const std::size_t of = topology.component.of(at(surface.placed[at(v)].node));
-      if (component.try_emplace(shell, of).first->second != of) joins[shell] = true;
-      std::size_t& last = farthest.try_emplace(shell, at(v)).first->second;
-      if (surface.vertices[at(v)].x > surface.vertices[last].x) last = at(v);
-    }
-  }
-  Shells shells;
-  for (const auto& [shell, six_volumes] : volume) {
-    ++(six_volumes > 0 ? shells.outer : shells.inner);
-    const Vertex& last = surface.placed[farthest.at(shell)];
-    const bool around_tissue = nodes.living[at(last.edge / 3)] != 0;  // the lower end of its edge
-    if (around_tissue != (six_volumes > 0)) ++shells.inside_out;
-  }
-  shells.joining = static_cast<int64_t>(joins.size());
-  return shells;
+// Of an edge, where it crosses the plane y = j: the same for both of its triangles, whose sum over a closed surface is
+// therefore 0 on every line, whatever is rounded.
+std::array<double, 2> place_on_plane(const Surface& surface, int32_t a, int32_t b, double j) {
+  const Vec3 &p = surface.vertices[at(std::min(a, b))], &q = surface.vertices[at(std::max(a, b))];
+  const double t = (j - p.y) / (q.y - p.y);
+  return {p.x + t * (q.x - p.x), p.z + t * (q.z - p.z)};
 }
 
-void check_shells(const Surface& surface, const Occupancy& nodes, Verdict& verdict) {
-  Topology own(nodes, false), other(nodes, true);
-  const Shells shells = count_shells(surface, nodes, own);
+// Every crossing of a line by a triangle, along each line. Nodes on a triangle's rim are counted as if they lay a
+// little above it in y and z.
+std::vector<Crossing> crossings_of(const Surface& surface, const Grid& grid, Groups& shells, Precision precision) {
+  std::vector<Crossing> crossings;
+  for (const auto& triangle : surface.triangles) {
+    double low = surface.vertices[at(triangle[0])].y, high = low;
+    for (const int32_t v : triangle) {
+      low = std::min(low, surface.vertices[at(v)].y);
+      high = std::max(high, surface.vertices[at(v)].y);
+    }
+    for (double j = std::max(std::ceil(low), 0.0); j < high && j < grid.nodes[1]; ++j) {
+      std::array<double, 2> up = {}, down = {};  // x and z of the edges that run towards greater y, and back
+      for (std::size_t k = 0; k < 3; ++k) {
+        const int32_t a = triangle[k], b = triangle[(k + 1) % 3];
+        const bool from_below = surface.vertices[at(a)].y <= j, to_below = surface.vertices[at(b)].y <= j;
+        if (from_below != to_below) (from_below ? up : down) = place_on_plane(surface, a, b, j);
+      }
+      const double least = std::min(up[1], down[1]), most = std::max(up[1], down[1]);
+      for (double k = std::max(std::ceil(least), 0.0); k < most && k < grid.nodes[2]; ++k) {
+        const double part = (k - up[1]) / (down[1] - up[1]), apart = std::abs(down[0] - up[0]);
+        const double tolerance = place_tolerance(surface.vertices[at(triangle[0])], precision);
+        crossings.push_back({grid.index(0, static_cast<int32_t>(j), static_cast<int32_t>(k)),
+                             up[0] + std::clamp(part, 0.0, 1.0) * (down[0] - up[0]),
+                             tolerance + std::min(1.0, tolerance / (most - least)) * apart,
+                             static_cast<int32_t>(shells.of(at(triangle[0]))), down[1] < up[1] ? 1 : -1});
+      }
+    }
+  }
+  std::sort(crossings.begin(), crossings.end(),
+            [](const Crossing& a, const Crossing& b) { return std::pair(a.line, a.x) < std::pair(b.line, b.x); });
+  return crossings;
+}
+
+// A shell between a living node and the empty one beside it.
+struct Between {
+  int32_t shell;
+  int64_t living, empty;
+};
+
+struct Sides {
+  std::vector<Between> between;
+  int64_t outer = 0, inner = 0;        // shells, by the sign of their volume
+  int64_t checked = 0, undecided = 0;  // nodes; on the surface within rounding
+  int64_t wrong = 0, inside_out = 0;   // nodes; shells whose triangles turn the wrong way
+  std::string first_wrong;
+};
+
+Sides sides_of(const Surface& surface, const Occupancy& nodes, Precision precision) {
+  Sides sides;
+  Groups shells(surface.vertices.size());
+  for (const auto& [a, b, c] : surface.triangles) {
+    shells.join(at(a), at(b));
+    shells.join(at(b), at(c));
+  }
+  std::vector<double> volume(surface.vertices.size(), 0);
+  for (const auto& [a, b, c] : surface.triangles) {
+    volume[shells.of(at(a))] += dot(surface.vertices[at(a)], cross(surface.vertices[at(b)], surface.vertices[at(c)]));
+  }
+  std::vector<uint8_t> turned(surface.vertices.size(), 0);
+  for (std::size_t v = 0; v < volume.size(); ++v) {
+    if (shells.of(v) == v) ++(volume[v] > 0 ? sides.outer : sides.inner);
+  }
+  const std::vector<Crossing> crossings = crossings_of(surface, nodes.grid, shells, precision);
+  auto next = crossings.begin();
+  const int32_t length = nodes.grid.nodes[0];
+  for (int64_t line = 0; line < nodes.grid.node_count(); line += length) {
+    int32_t around = 0;                         // how often the surface goes around the node
+    std::vector<std::array<int32_t, 2>> since;  // the last node: shells and their turns
+    const auto end = std::find_if(next, crossings.end(), [&](const Crossing& c) { return c.line != line; });
+    for (int32_t i = 0; i < length; ++i) {
+      const int64_t node = line + i;
+      const bool lives = nodes.living[at(node)] != 0;
+      for (; next != end && next->x <= i; ++next) {
+        around += next->turn;
+        const auto known = std::find_if(since.begin(), since.end(), [&](const auto& s) { return s[0] == next->shell; });
+        if (known == since.end()) {
+          since.push_back({next->shell, next->turn});
+        } else {
+          (*known)[1] += next->turn;
+        }
+      }
+      ++sides.checked;
+      const auto touches = [&](const Crossing& c) { return std::abs(c.x - i) <= c.within; };
+      if ((next != end && touches(*next)) ||
+          (next != crossings.begin() && (next - 1)->line == line && touches(*(next - 1)))) {
+        ++sides.undecided;
+      } else if (around != (lives ? 1 : 0)) {
+        ++sides.wrong;
+        if (sides.first_wrong.empty()) {
+          const auto [x, y, z] = nodes.grid.coordinates(node);
+          sides.first_wrong = fmt::format("node ({}, {}, {}) {}, and the surface goes around it {}", x, y, z,
+                                          lives ? "lives" : "is empty",
+                                          around == 0   ? std::string("not at all")
+                                          : around == 1 ? std::string("once")
+                                                        : fmt::format("{} times", around));
+        }
+      }
+      if (i > 0 && lives != (nodes.living[at(node - 1)] != 0)) {
+        for (const auto& [shell, turns] : since) {
+          if (turns == 0) continue;
+          sides.between.push_back({shell, lives ? node : node - 1, lives ? node - 1 : node});
+          if (turns != (lives ? 1 : -1)) turned[at(shell)] = 1;
+        }
+      }
+      since.clear();
+    }
+    next = end;
+  }
+  sides.inside_out = std::count(turned.begin(), turned.end(), 1);
+  return sides;
+}
+
+// Shells that lie between several components and regions of emptiness, of this topology.
+int64_t count_joining(const Sides& sides, Topology& topology) {
+  std::unordered_map<int32_t, std::array<std::size_t, 2>> lies_between;
+  std::set<int32_t> joining;
+  for (const Between& each : sides.between) {
+    const std::array between = {topology.component.of(at(each.living)), topology.empty.of(at(each.empty))};
+    if (lies_between.try_emplace(each.shell, between).first->second != between) joining.insert(each.shell);
+  }
+  return static_cast<int64_t>(joining.size());
+}
+
+// Each component of the tissue has one shell around it, and each of its cavities one: so each living node lies within
+// the surface, each empty one outside, and no shell lies between two of either.
+void check_shells(const Surface& surface, const Occupancy& nodes, Precision precision, Verdict& verdict) {
+  Topology own(nodes, false);
+  const Sides sides = sides_of(surface, nodes, precision);
+  const int64_t joining = count_joining(sides, own);
   verdict.checked = own.outer + own.inner;
-  verdict.measured = static_cast<double>(std::abs(shells.outer - own.outer) + std::abs(shells.inner - own.inner) +
-                                         shells.joining + shells.inside_out);
+  verdict.undecided = sides.undecided;
+  verdict.measured = static_cast<double>(std::abs(sides.outer - own.outer) + std::abs(sides.inner - own.inner) +
+                                         joining + sides.inside_out + sides.wrong);
   if (verdict.measured == 0) return;
   verdict.holds = false;
-  std::string text = fmt::format("{} outer and {} inner shells around {} components with {} cavities", shells.outer,
-                                 shells.inner, own.outer, own.inner);
-  if (shells.joining > 0) text += fmt::format("; {} shells go around several components", shells.joining);
-  const Shells in_other = count_shells(surface, nodes, other);
-  if (in_other.outer == other.outer && in_other.inner == other.inner && in_other.joining == 0 &&
-      in_other.inside_out == 0) {
+  std::string text = fmt::format("{} outer and {} inner shells around {} components with {} cavities", sides.outer,
+                                 sides.inner, own.outer, own.inner);
+  if (joining > 0) text += fmt::format("; {} shells go around several components", joining);
+  Topology other(nodes, true);
+  if (sides.outer == other.outer && sides.inner == other.inner && count_joining(sides, other) == 0 &&
+      sides.inside_out == 0 && sides.wrong == 0) {
     text += fmt::format(
         ". It is right in the other polarity ({} components, {} cavities): it joins living nodes that meet only across "
         "the diagonal of a face, where no edge joins the tissue; take the cases with inside and outside exchanged",
         other.outer, other.inner);
-  } else if (shells.inside_out > 0) {
+  } else if (sides.inside_out > 0) {
     text +=
         fmt::format(". {} shells are inside out: triangles are to be counter-clockwise seen from outside the tissue",
-                    shells.inside_out);
+                    sides.inside_out);
+  } else if (sides.wrong > 0) {
+    text += fmt::format("; {}, and so of {} nodes", sides.first_wrong, sides.wrong);
   }
   verdict.witness.text = text;
 }
@@ -301,12 +477,14 @@ std::vector<Verdict> judge_surface(const Question& question, const Arrays& answe
   const Tissue tissue = tissue_of(question.given);
   const Occupancy nodes(tissue);
   Verdict vertices = begin("surface vertices", "method.md §8: one vertex on each grid edge that leaves the tissue"),
+          places = begin("surface places", "tolerances.md, A surface with free places"),
           closed = begin("surface", "method.md §8: closed, oriented, 2-manifold"),
           shells = begin("surface shells", "method.md §8, lemma");
   Surface surface;
   const Array &points = answers[0], &corners = answers[1];
+  const double h = nodes.grid.spacing;
   for (int64_t v = 0; v < points.rows(); ++v) {
-    surface.vertices.push_back({points.number(3 * v), points.number(3 * v + 1), points.number(3 * v + 2)});
+    surface.vertices.push_back({points.number(3 * v) / h, points.number(3 * v + 1) / h, points.number(3 * v + 2) / h});
   }
   for (int64_t t = 0; t < corners.rows(); ++t) {
     std::array<int32_t, 3>& triangle = surface.triangles.emplace_back();
@@ -319,20 +497,24 @@ std::vector<Verdict> judge_surface(const Question& question, const Arrays& answe
     }
   }
   check_vertices(surface, nodes, precision, vertices);
+  check_places(surface, nodes, precision, places);
   check_surface(surface, closed);
-  if (!vertices.holds || !closed.holds) {
-    shells.vacuous = "what is no surface has no shells";
+  if (!places.holds || !closed.holds) {
+    shells.vacuous = "what is no surface around the tissue has no shells";
   } else {
-    check_shells(surface, nodes, shells);
+    check_shells(surface, nodes, precision, shells);
   }
-  for (Verdict* const verdict : {&vertices, &closed, &shells}) {
+  for (Verdict* const verdict : {&vertices, &places, &closed, &shells}) {
     if (verdict->checked == 0 && verdict->holds && verdict->vacuous.empty()) verdict->vacuous = "nothing is alive";
   }
-  return {vertices, closed, shells};
+  return {vertices, places, closed, shells};
 }
 
 constexpr AnswerArray kSurfaceAnswers[] = {
-    {.name = "vertices", .real = true, .columns = 3, .text = "places [m]: the living node plus a part of an edge"},
+    {.name = "vertices",
+     .real = true,
+     .columns = 3,
+     .text = "places [m]: the living node plus a part of an edge, unless places are free"},
     {.name = "triangles", .type = ElementType::i32, .columns = 3, .text = "counter-clockwise seen from outside"}};
 
 }  // namespace
@@ -356,6 +538,9 @@ const OperationDescription kSurface = {
     .problem = problem_on_grid,
     .simpler = fewer_particles,
     .kinds = grid_kinds,
+    .large_kinds = large_grid_kinds,
+    .sizes = kSurfaceSizes,
+    .draw_large = draw_large_surface,
 };
 
 }  // namespace cutproof::guests

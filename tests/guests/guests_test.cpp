@@ -17,6 +17,7 @@
 #include <set>
 #include <sstream>
 #include <thread>
+#include <tuple>
 
 #include "guests/campaign.h"
 #include "guests/guest.h"
@@ -358,6 +359,23 @@ TEST(Questions, AreRefusedWithAnythingUnknown) {
   EXPECT_TRUE(is_no_whole_number([](json& j) { j["seed"] = -1; }));
   EXPECT_TRUE(is_no_whole_number([](json& j) { j["index"] = 1e300; }));
   EXPECT_TRUE(contains(problem([](json& j) { j = 5; }), "it is no question"));
+  EXPECT_TRUE(contains(problem([](json& j) { j["size"] = 70'000; }), "a question with a size has no arrays"));
+  const auto problem_of_size = [&](const std::function<void(json&)>& change) {
+    return problem([&](json& j) {
+      j.erase("given");
+      j.erase("known");
+      j["size"] = 70'000;
+      j["kind"] = named("components").large_kinds()[2];
+      j["index"] = 2;
+      change(j);
+    });
+  };
+  EXPECT_EQ(problem_of_size([](json&) {}), "");
+  for (const int64_t size : {int64_t{0}, int64_t{-1}, kMostSize + 1}) {
+    EXPECT_TRUE(contains(problem_of_size([&](json& j) { j["size"] = size; }), "'size' is out of range"));
+  }
+  EXPECT_TRUE(contains(problem_of_size([](json& j) { j["index"] = 1; }), "those of no large question"));
+  EXPECT_TRUE(contains(problem_of_size([](json& j) { j["index"] = 99; }), "those of no large question"));
   EXPECT_THROW(question_from_json("{", "q.json"), InputError);
 }
 
@@ -382,6 +400,10 @@ Arrays rotation_about_z(double angle) {
   const double c = std::cos(angle), s = std::sin(angle);
   return {make_array("r", {1, 9}, std::vector<double>{c, -s, 0, s, c, 0, 0, 0, 1})};
 }
+
+KernelCampaign judged(const std::string& library, const char* operation, const std::string& mode,
+                      KernelCampaignOptions options = {.cases = 300});
+const harness::PropertySummary* summary(const KernelCampaign& campaign, const std::string& property);
 
 TEST(JudgeOfRotations, RejectsTheLeastThatIsWrong) {
   const auto judged = [](const Question& question, const Arrays& r) {
@@ -506,6 +528,70 @@ TEST(JudgeOfSurfaces, AcceptsBothPrecisionsInWhateverUnits) {
   }
 }
 
+// Dual methods have vertices inside of cells: with their promise they hold in either precision, and are found where
+// they are wrong.
+TEST(JudgeOfSurfaces, TakesAClosedSurfaceWithFreePlaces) {
+  for (const char* library : {PLUGIN_surface_nets_float, PLUGIN_surface_nets_double}) {
+    const KernelCampaign right = judged(library, "surface", "", {.cases = 400, .sizes = {65'537}});
+    EXPECT_TRUE(right.holds()) << right.failures.front().verdict.property << ": "
+                               << right.failures.front().verdict.witness.text;
+    ASSERT_EQ(right.unpromised.size(), 1u);
+    EXPECT_EQ(right.unpromised[0].property, "surface vertices");
+    for (const char* property : {"surface", "surface places", "surface shells"}) {
+      EXPECT_GT(summary(right, property)->checked, 1000) << property;
+    }
+    for (const auto& [fault, property, text] :
+         {std::tuple{"pinched", "surface", "the surface is pinched at vertex"},
+          {"doubled", "surface", "both run from vertex"},
+          {"outside", "surface places", "lies outside the tissue, in a cell without a living corner"}}) {
+      const KernelCampaign wrong = judged(library, "surface", fault, {.cases = 400});
+      ASSERT_FALSE(wrong.failures.empty()) << fault;
+      EXPECT_EQ(wrong.failures.front().verdict.property, property);
+      EXPECT_TRUE(contains(wrong.failures.front().verdict.witness.text, text) || std::string(fault) == "pinched")
+          << wrong.failures.front().verdict.witness.text;
+    }
+  }
+  // Who promises nothing promises what marching cubes has.
+  EXPECT_GT(summary(judged(PLUGIN_surface_nets_of_no_promise, "surface", ""), "surface vertices")->failed, 0);
+}
+
+TEST(JudgeOfSurfaces, RejectsTheLeastThatIsWrongOfFreePlaces) {
+  // Vertices at half an edge around one particle at node (1, 1, 1): the one beside it may go as far as node 2.
+  const Skinned one(kind_of_surface("one particle"));
+  const double h = find_array(one.question.given, "spacing")->number(0);
+  const auto moved = [&](double to) {
+    std::vector<double> v = one.vertices();
+    for (std::size_t k = 0; k < v.size(); k += 3) {
+      if (v[k] > 1.1 * h) v[k] = to * h;
+    }
+    return one.judged(Skinned::arrays(v, one.triangles()));
+  };
+  EXPECT_FALSE(moved(1.99).contains("surface places"));
+  EXPECT_FALSE(moved(1.99).contains("surface shells"));
+  EXPECT_FALSE(moved(2 + 8 * 0x1p-24).contains("surface places")) << "within rounding";
+  EXPECT_TRUE(moved(2 + 20 * 0x1p-24).contains("surface places"));
+  // Through the particle, and to the other side of it.
+  EXPECT_TRUE(moved(0.75).contains("surface shells"));
+
+  // A particle without a shell, where another has two.
+  const Skinned two(kind_of_surface("two particles across the diagonal of a cell"));
+  const std::vector<double> v = two.vertices();
+  const std::vector<int32_t> t = two.triangles();
+  ASSERT_EQ(v.size(), 36u);
+  const auto is_of_first = [&](int32_t vertex) { return vertex < 6; };
+  std::vector<int32_t> twice, of_one;
+  for (const int32_t vertex : t) {
+    if (is_of_first(vertex)) of_one.push_back(vertex);
+  }
+  twice = of_one;
+  for (const int32_t vertex : of_one) twice.push_back(vertex + 6);
+  std::vector<double> places(v.begin(), v.begin() + 18);
+  places.insert(places.end(), v.begin(), v.begin() + 18);
+  if (of_one.size() == t.size() / 2) {
+    EXPECT_TRUE(contains(two.judged(Skinned::arrays(places, twice))["surface shells"], "the surface goes around it"));
+  }
+}
+
 // The surface with inside and outside exchanged: what meets across the diagonal of a face is joined. It is made of the
 // empty nodes, whose own surface keeps such apart.
 Arrays other_polarity(const Question& question) {
@@ -610,7 +696,7 @@ TEST(JudgeOfComponents, RejectsOneLabelThatIsWrong) {
 // --- Campaigns -------------------------------------------------------------------------------------------------------
 
 KernelCampaign judged(const std::string& library, const char* operation, const std::string& mode,
-                      KernelCampaignOptions options = {.cases = 300}) {
+                      KernelCampaignOptions options) {
   Guest guest(plugin(library, mode));
   const harness::Promises promises = promises_of(guest.plugin(), named(operation), library);
   return judge_kernel(guest, named(operation), promises, options, {});
@@ -687,6 +773,76 @@ TEST(KernelCampaign, JudgesOnlyWhatIsPromised) {
   }
 }
 
+// Rows count matrices, of which one question has hundreds.
+TEST(KernelCampaign, CountsMatricesWhereAQuestionIsABatch) {
+  const KernelCampaign campaign =
+      judged(PLUGIN_reference_plugin, "rotations", "transpose", {.cases = 300, .simplify = 0});
+  int64_t failed = 0, cases = 0, matrices = 0;
+  for (int64_t index = 0; index < campaign.questions; ++index) {
+    matrices += named("rotations").draw(1, index, Precision::binary64).given[0].rows();
+  }
+  EXPECT_EQ(campaign.cases, matrices);
+  for (const KindSummary& kind : campaign.kinds) {
+    failed += kind.failed;
+    cases += kind.cases;
+    EXPECT_LE(kind.failed, kind.cases) << kind.kind;
+    EXPECT_EQ(kind.first_failure.has_value(), kind.failed > 0) << kind.kind;
+    if (!kind.first_failure) continue;
+    EXPECT_FALSE(kind.worst->verdict.holds) << kind.kind;
+    EXPECT_FALSE(kind.first_failure->verdict.witness.text.empty()) << kind.kind;
+  }
+  EXPECT_EQ(campaign.kinds.size(), named("rotations").kinds().size());
+  EXPECT_EQ(failed, campaign.failed_cases);
+  EXPECT_EQ(cases, campaign.cases);
+  const harness::PropertySummary* const best = summary(campaign, "best rotation");
+  EXPECT_GT(best->failed, 20 * campaign.questions) << "matrices, not questions";
+  EXPECT_EQ(best->judged, best->checked);
+  EXPECT_LE(best->failed, best->judged);
+  EXPECT_EQ(summary(campaign, kAnswersProperty)->judged, campaign.cases);
+  const json document = to_json(campaign);
+  EXPECT_EQ(document.at("kinds").size(), campaign.kinds.size());
+  for (const json& kind : document.at("kinds")) {
+    EXPECT_EQ(kind.at("first_failure").is_null(), kind.at("failed") == 0) << kind;
+    EXPECT_EQ(kind.at("worst").is_null() || kind.at("worst").contains("measured"), true) << kind;
+  }
+  // Of one that is right the worst is what comes nearest to its bound.
+  const KernelCampaign right = judged(PLUGIN_reference_plugin, "rotations", "right");
+  EXPECT_EQ(right.failed_cases, 0);
+  int64_t with_worst = 0;
+  for (const KindSummary& kind : right.kinds) {
+    EXPECT_FALSE(kind.first_failure);
+    with_worst += kind.worst ? 1 : 0;
+    EXPECT_TRUE(!kind.worst || kind.worst->verdict.holds) << kind.kind;
+  }
+  EXPECT_GT(with_worst, 10);
+}
+
+// Nine numbers of each, which are simple, and by what it was mistaken for where that has a name.
+TEST(KernelCampaign, NamesTheConfusionAndShowsSimpleNumbers) {
+  struct Mistake {
+    const char* mode;
+    const char* property;
+    const char* name;
+    const char* simplest;
+  };
+  for (const Mistake& mistake :
+       {Mistake{"transpose", "best rotation", "R is the transpose of the best rotation",
+                "A = [0 -1 0; 1 0 0; 0 0 1], R = [0 1 0; -1 0 0; 0 0 1], best R = [0 -1 0; 1 0 0; 0 0 1]. R is the "
+                "transpose of the best rotation"},
+        {"itself", "rotation", "R is the matrix itself", "A = [1 0 0; 0 1 0; 0 0 0], R = [1 0 0; 0 1 0; 0 0 0]"},
+        {"previous", "best rotation", "R is the previous rotation", "R is the previous rotation"},
+        {"mirrored", "rotation", "a reflection", "A = [1 0 0; 0 1 0; 0 0 1], R = [0 1 0; 1 0 0; 0 0 1]"}}) {
+    SCOPED_TRACE(mistake.mode);
+    const KernelCampaign campaign = judged(PLUGIN_reference_plugin, "rotations", mistake.mode);
+    const auto found = std::find_if(campaign.failures.begin(), campaign.failures.end(),
+                                    [&](const KernelFailure& f) { return f.verdict.property == mistake.property; });
+    ASSERT_NE(found, campaign.failures.end());
+    EXPECT_TRUE(contains(found->verdict.witness.text, mistake.name)) << found->verdict.witness.text;
+    EXPECT_TRUE(contains(found->of_simplest.witness.text, mistake.simplest)) << found->of_simplest.witness.text;
+    EXPECT_EQ(found->simplest.given[0].rows(), 1);
+  }
+}
+
 TEST(KernelCampaign, DoesNotHoldWhereEverythingIsRefused) {
   const KernelCampaign campaign = judged(PLUGIN_in_c, "components", "refuse");
   EXPECT_FALSE(campaign.holds());
@@ -721,6 +877,82 @@ TEST(KernelCampaign, ComesToItsEndThroughTwentyThousandCasesOfAGuestThatCrashesH
   const KernelCampaign hung =
       judge_kernel(hanging, named("components"), {}, {.cases = 60, .simplify = 0, .most_lost = 0}, {});
   EXPECT_EQ(hung.lost, 60);
+}
+
+// --- Large questions
+// --------------------------------------------------------------------------------------------------
+
+TEST(LargeQuestions, HaveTheirSizeAndAreTheSameForTheSameSeed) {
+  for (const OperationDescription& operation : operations()) {
+    const char* const counted = operation.is_batch ? "a" : "alive";
+    EXPECT_TRUE(std::is_sorted(operation.sizes.begin(), operation.sizes.end())) << operation.name;
+    EXPECT_GE(operation.sizes.back(), 65'537) << operation.name;
+    for (std::size_t kind = 0; kind < operation.large_kinds().size(); ++kind) {
+      for (const int64_t size : {1, 2, 1000}) {
+        const Question question = operation.draw_large(3, static_cast<int64_t>(kind), size, Precision::binary32);
+        EXPECT_EQ(find_array(question.given, counted)->rows(), size) << question.kind;
+        EXPECT_EQ(question.size, size);
+        EXPECT_EQ(question.kind, operation.large_kinds()[kind]);
+        EXPECT_EQ(question, operation.draw_large(3, static_cast<int64_t>(kind), size, Precision::binary32));
+      }
+    }
+  }
+  EXPECT_GT(named("components").sizes.back(), 1'000'000);
+  EXPECT_GE(named("surface").sizes.back(), 100'000);
+}
+
+// The least size at which a fault of width shows, or of a launch that is too short, is what is left of it.
+TEST(LargeQuestions, ShowFaultsOfWidthAndOfLaunchSizeAtTheLeastSizeThatHasThem) {
+  struct Wrong {
+    const char* library;
+    const char* operation;
+    const char* mode;
+    int64_t size;  // that is asked
+    int64_t least;
+  };
+  for (const Wrong& wrong : {Wrong{PLUGIN_in_c, "components", "labels16", 65'537, 65'537},
+                             {PLUGIN_in_c, "components", "first_16384", 65'535, 16'385},
+                             {PLUGIN_in_c, "clusters", "members16", 65'537, 65'537},
+                             {PLUGIN_in_c, "clusters", "first_16384", 20'000, 16'385},
+                             {PLUGIN_reference_plugin, "rotations", "index16", 65'536, 65'536},
+                             {PLUGIN_reference_plugin, "rotations", "first_16384", 20'000, 16'385}}) {
+    SCOPED_TRACE(std::string(wrong.operation) + ", " + wrong.mode);
+    const KernelCampaign campaign =
+        judged(wrong.library, wrong.operation, wrong.mode, {.cases = 1, .sizes = {wrong.size}});
+    EXPECT_FALSE(campaign.holds());
+    ASSERT_FALSE(campaign.failures.empty());
+    EXPECT_EQ(campaign.failures.front().simplest.size, wrong.least) << campaign.failures.front().verdict.witness.text;
+    EXPECT_EQ(campaign.failures.front().size, wrong.size);
+    const KernelCampaign below =
+        judged(wrong.library, wrong.operation, wrong.mode, {.cases = 1, .sizes = {wrong.least - 1}});
+    EXPECT_TRUE(below.holds()) << "nothing smaller has it";
+  }
+  // Of vertices, of which a box of 10⁵ cells has too few.
+  const KernelCampaign surface =
+      judged(PLUGIN_reference_plugin, "surface", "index16", {.cases = 1, .sizes = {65'537}, .simplify = 0});
+  ASSERT_FALSE(surface.failures.empty());
+  EXPECT_EQ(surface.failures.front().simplest.kind, "a large sponge");
+}
+
+TEST(LargeQuestions, AreAskedTwiceAndEachAnswerIsJudged) {
+  const KernelCampaign campaign =
+      judged(PLUGIN_in_c, "components", "race", {.cases = 1, .sizes = {5'000}, .simplify = 0});
+  ASSERT_EQ(campaign.failures.size(), 1u);
+  EXPECT_TRUE(campaign.failures[0].verdict.witness.text.starts_with("asked again: an edge joins"))
+      << campaign.failures[0].verdict.witness.text;
+  // Bits that differ are nothing to who promises none: dead particles keep any label.
+  EXPECT_TRUE(judged(PLUGIN_in_c, "components", "right", {.cases = 1, .sizes = {5'000}}).holds());
+}
+
+// A million is not asked of a kernel that would take hours, and that is said.
+TEST(LargeQuestions, AreNotAskedWhereTheAnswerWouldTakeTooLong) {
+  const KernelCampaign campaign =
+      judged(PLUGIN_in_c, "components", "right", {.cases = 1, .sizes = {1'000, 65'537}, .time_limit = 1e-9});
+  EXPECT_TRUE(campaign.holds());
+  ASSERT_EQ(campaign.not_asked.size(), named("components").large_kinds().size());
+  EXPECT_EQ(campaign.not_asked[0].size, 65'537);
+  EXPECT_EQ(campaign.not_asked[0].size_before, 1'000);
+  EXPECT_EQ(to_json(campaign).at("not_asked").size(), campaign.not_asked.size());
 }
 
 // --- Stages ----------------------------------------------------------------------------------------------------------
@@ -1012,6 +1244,15 @@ TEST(PluginBackend, CountsWhatIsRefused) {
   EXPECT_GT(campaign.verdicts, 500);
 }
 
+// A skin whose vertices lie inside of cells, as its plugin promises; and one that is pinched.
+TEST(PluginBackend, TakesASkinWithFreePlaces) {
+  const property_tests::Campaign right = dissected(backend_name(PLUGIN_dual_skin_plugin, "dual"), 200);
+  EXPECT_TRUE(right.violations.empty()) << property_tests::describe(right.violations.front().verdict);
+  const property_tests::Campaign pinched = dissected(backend_name(PLUGIN_dual_skin_plugin, "dualpinched"), 400);
+  ASSERT_EQ(pinched.violations.size(), 1u);
+  EXPECT_EQ(pinched.violations.front().verdict.property, "skin surface");
+}
+
 TEST(PluginBackend, NeedsStages) {
   EXPECT_THROW(make_plugin_backend(backend_name(PLUGIN_in_c)), InputError);
   EXPECT_THROW(make_plugin_backend(backend_name("nowhere.so")), InputError);
@@ -1041,8 +1282,8 @@ class JudgeVerb : public ::testing::Test {
 };
 
 TEST_F(JudgeVerb, EndsWithTheStatusThatSaysWhatHappened) {
-  EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " --cases 60").status, 0);
-  EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " components --cases 60").status, 0);
+  EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " --cases 60").status, 0) << "with all sizes";
+  EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " components --cases 60 --sizes 0").status, 0);
   const Ran version = run(std::string("judge ") + PLUGIN_of_another_version);
   EXPECT_EQ(version.status, 2);
   EXPECT_EQ(std::count(version.output.begin(), version.output.end(), '\n'), 2) << version.output;
@@ -1081,6 +1322,35 @@ TEST_F(JudgeVerb, SavesWhatFailsAndShowsItAgainWithoutThePluginsSource) {
   EXPECT_TRUE(contains(report, "failures=\"1\"")) << report;
   EXPECT_TRUE(contains(report, "an edge joins"));
   EXPECT_TRUE(contains(report, "--case "));
+}
+
+// What only a large question shows is found by default, and saved by what makes it: its kind, its size and its seed.
+TEST_F(JudgeVerb, FindsFaultsOfWidthByDefaultAndSavesTheirSize) {
+  const std::string document = folder_ + "/r.json";
+  const Ran wrong = run(fmt::format("judge {} components --parameters labels16 --cases 100 --save {} --json {}",
+                                    PLUGIN_in_c, folder_, document));
+  EXPECT_EQ(wrong.status, 1);
+  EXPECT_TRUE(contains(wrong.output, "the question of size 65537 (many vertices without edges)")) << wrong.output;
+  EXPECT_TRUE(contains(wrong.output, "simplified to 65537 particles: 0 and 65536 both have the label 0"))
+      << wrong.output;
+  const json failure = json::parse(text_of(document)).at("operations").at(0).at("failures").at(0);
+  const std::string file = failure.at("file");
+  EXPECT_LT(fs::file_size(file), 1000u);
+  const Ran again = run(fmt::format("judge {} --case {} --parameters labels16", PLUGIN_in_c, file));
+  EXPECT_EQ(again.status, 1);
+  EXPECT_TRUE(contains(again.output, "0 and 65536 both have the label 0")) << again.output;
+  EXPECT_EQ(run(fmt::format("judge {} --case {}", PLUGIN_in_c, file)).status, 0);
+
+  EXPECT_EQ(run(fmt::format("judge {} components --parameters first_16384 --cases 1 --simplify 0 --save {}",
+                            PLUGIN_in_c, folder_))
+                .status,
+            1);
+  const std::string narrow =
+      fmt::format("judge {} components --parameters labels16 --cases 1 --save {}", PLUGIN_in_c, folder_);
+  EXPECT_EQ(run(narrow + " --sizes 0").status, 0) << "none is asked";
+  EXPECT_EQ(run(narrow + " --sizes 65536").status, 0);
+  EXPECT_EQ(run(narrow + " --sizes 4097,65537").status, 1);
+  EXPECT_EQ(run(narrow + " --sizes many").status, 2);
 }
 
 TEST_F(JudgeVerb, ShowsACrashAsACaseOfItsReport) {

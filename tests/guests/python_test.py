@@ -85,7 +85,7 @@ class Test(unittest.TestCase):
         self.addCleanup(self.folder.cleanup)
 
     def judge(self, **options):
-        return cutproof.judge(**{"save": self.folder.name, "simplify": 3, "cases": 60, **options})
+        return cutproof.judge(**{"save": self.folder.name, "simplify": 3, "cases": 60, "sizes": (), **options})
 
     def failure(self, expected=cutproof.Failed, **options):
         """The text, and what failed by property."""
@@ -190,6 +190,13 @@ class Operations(Test):
 
     def test_right_labels(self):
         self.judge(components=labels_by_union_find)
+
+    def test_labels_in_16_bits_are_found_in_a_large_question(self):
+        text, failures = self.failure(components=lambda t, alive: numpy.arange(len(alive)).astype("u2").astype("i4")
+                                      if len(t.edge_ends) == 0 else labels_by_union_find(t, alive), sizes=(65537,),
+                                      simplify=0)
+        self.assertIn("fails in the question of size 65537 (many vertices without edges)", text)
+        self.assertIn("0 and 65536 both have the label 0", failures["components"]["text"])
 
     def test_labels_that_go_around_once_are_found(self):
         def once(tissue, alive):

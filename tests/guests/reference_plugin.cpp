@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -19,6 +20,7 @@
 #include "model/fields.h"
 #include "model/setup_fields.h"
 #include "reference_cpu/reference.h"
+#include "surface_nets.h"
 
 namespace {
 
@@ -400,6 +402,39 @@ void spoil(const std::string& what, int last, const State& before, State& state)
   if (what == "one reach" && last == CUTPROOF_SKIN && !state.skin.reach.empty()) state.skin.reach.pop_back();
 }
 
+// The skin of a dual method: where marching cubes has its vertices their means, and no owner's edge.
+void make_dual(const Setup& setup, const std::string& fault, State& state) {
+  state.skin = {};
+  reference::skin(setup, state);
+  const Body& body = setup.body;
+  std::vector<uint8_t> living(at(body.grid.node_count()), 0);
+  for (std::size_t i = 0; i < state.alive.size(); ++i) living[at(body.node[i])] = state.alive[i];
+  std::map<int64_t, std::size_t> vertex_on;
+  for (std::size_t v = 0; v < state.skin.owner.size(); ++v) {
+    const int direction = state.skin.direction[v];
+    auto low = body.grid.coordinates(body.node[at(state.skin.owner[v])]);
+    if (direction % 2 == 1) --low[at(direction / 2)];
+    vertex_on[3 * body.grid.index(low[0], low[1], low[2]) + direction / 2] = v;
+  }
+  const surface_nets::Net net = surface_nets::make(
+      body.grid.nodes, living,
+      [&](int64_t edge) {
+        const Vec3 p = state.skin.position[vertex_on.at(edge)];
+        return surface_nets::Place{p.x, p.y, p.z};
+      },
+      fault);
+  Skin dual;
+  dual.triangles = net.triangles;
+  for (std::size_t v = 0; v < net.vertices.size(); ++v) {
+    const std::size_t from = vertex_on.at(net.edge[v]);
+    dual.owner.push_back(state.skin.owner[from]);
+    dual.direction.push_back(state.skin.direction[from]);
+    dual.reach.push_back(0.5);
+    dual.position.push_back({net.vertices[v][0], net.vertices[v][1], net.vertices[v][2]});
+  }
+  state.skin = std::move(dual);
+}
+
 int run(const cutproof_host* host, void* self, int first, int last, cutproof_state* given) {
   auto* const instance = static_cast<Instance*>(self);
   const State before = state_of(given);
@@ -408,6 +443,9 @@ int run(const cutproof_host* host, void* self, int first, int last, cutproof_sta
   State state = instance->reference->snapshot().front();
   sum_anew(instance->setup, instance->spoiled, last, state);
   spoil(instance->spoiled, last, before, state);
+  if (instance->spoiled.starts_with("dual") && last == CUTPROOF_SKIN && instance->setup.skin.wanted) {
+    make_dual(instance->setup, instance->spoiled.substr(4), state);
+  }
   return give(host, state, given, instance->spoiled == "all reaches" ? "reach" : "") ? 0 : 1;
 }
 
@@ -418,7 +456,14 @@ int rotations(const cutproof_host*, void* self, const cutproof_array* a, const c
     get_row(a, i, from);
     get_row(previous, i, before);
     reference::Rotation best = reference::closest_rotation(from, before);
-    if (static_cast<Instance*>(self)->spoiled == "rotations" && !std::isfinite(from.m[0])) best.r = Mat3{};
+    const std::string& spoiled = static_cast<Instance*>(self)->spoiled;
+    if (spoiled == "rotations" && !std::isfinite(from.m[0])) best.r = Mat3{};
+    if (spoiled == "transpose") best.r = transposed(best.r);
+    if (spoiled == "itself") best.r = from;
+    if (spoiled == "previous") best.r = before;
+    for (std::size_t k = 0; k < 3 && spoiled == "mirrored"; ++k) std::swap(best.r.m[k], best.r.m[3 + k]);
+    if (spoiled == "first_16384" && i >= 16384) return 0;
+    if (spoiled == "index16" && i >= 65535) return 0;
     set_row(r, i, best.r);
   }
   return 0;
@@ -449,6 +494,11 @@ int surface(const cutproof_host* host, void* self, const cutproof_tissue* tissue
   if (host->grow(host, vertices, static_cast<int64_t>(state.skin.position.size())) != 0) return 1;
   if (host->grow(host, triangles, static_cast<int64_t>(state.skin.triangles.size())) != 0) return 1;
   for (int64_t v = 0; v < vertices->rows; ++v) set_row(vertices, v, state.skin.position[at(v)]);
+  if (static_cast<Instance*>(self)->spoiled == "index16") {
+    for (auto& triangle : state.skin.triangles) {
+      for (int32_t& v : triangle) v &= 0xffff;
+    }
+  }
   for (int64_t t = 0; t < triangles->rows; ++t) set_row(triangles, t, state.skin.triangles[at(t)]);
   return 0;
 }

@@ -568,6 +568,31 @@ TEST(ForeignState, WithASurfaceWithoutOwnersIsJudgedAsASurfaceAlone) {
   }
 }
 
+// A dual method's: closed around each piece, and its vertices lie where they like.
+TEST(ForeignState, WithASkinOfFreePlacesIsJudgedByItsShells) {
+  for (const bool owned : {true, false}) {
+    io::ArrayFile dual = file(As::grid);
+    dual.texts.push_back({"promises", "free_skin"});
+    if (!owned) {
+      leave_out(dual, "vertex_owner");
+      leave_out(dual, "vertex_direction");
+    }
+    values_in<double>(dual, "vertices")[0] += 1e-3;
+    const ForeignVerdicts found = judged(dual);
+    EXPECT_THAT(failing(found), IsEmpty());
+    EXPECT_GT(verdict_on(found, "skin match")->checked, 0);
+    EXPECT_GT(verdict_on(found, "skin surface")->checked, 0);
+    EXPECT_EQ(why_not(found, "skin vertices"), "not promised");
+    EXPECT_EQ(why_not(found, "skin geometry"), "not promised");
+    io::ArrayFile inside_out = dual;
+    auto triangles = values_in<int32_t>(inside_out, "triangles");
+    for (std::size_t k = 0; k < triangles.size(); k += 3) std::swap(triangles[k], triangles[k + 1]);
+    EXPECT_THAT(failing(judged(inside_out)), Contains("skin match"));
+    std::swap(values_in<int32_t>(dual, "triangles")[0], values_in<int32_t>(dual, "triangles")[1]);
+    EXPECT_THAT(failing(judged(dual)), ElementsAre("skin surface"));
+  }
+}
+
 // --- Values that are no state: "well formed" fails
 // ------------------------------------------------------------------------
 

@@ -7,6 +7,7 @@
 #include <random>
 #include <string>
 
+#include "oracles/shells.h"
 #include "reference_cpu/reference.h"
 #include "tests/oracles/expectations.h"
 #include "tests/oracles/skins.h"
@@ -159,7 +160,6 @@ TEST(SkinSurface, RejectsIndicesOutOfRangeRepeatedIndicesAndStrayVertices) {
   rejects([](Skin& s) { s.owner[0] = 2; }, "has owner 2");
   rejects([](Skin& s) { s.direction[0] = 6; }, "direction 6");
   rejects([](Skin& s) { s.position.pop_back(); }, "positions");
-  rejects([](Skin& s) { s.owner[1] = s.owner[0], s.direction[1] = s.direction[0]; }, "same grid edge");
   rejects(
       [](Skin& s) {
         s.owner.push_back(0);
@@ -168,6 +168,56 @@ TEST(SkinSurface, RejectsIndicesOutOfRangeRepeatedIndicesAndStrayVertices) {
         s.position.push_back({});
       },
       "");  // a vertex more: on an edge that has one, or used by no triangle
+}
+
+TEST(SkinVertices, RejectsTwoOnOneEdge) {
+  Scene scene = scene_of({{0, 0, 0}, {1, 0, 0}});
+  Skin& skin = scene.state.skin;
+  skin.owner[1] = skin.owner[0];
+  skin.direction[1] = skin.direction[0];
+  const Verdict verdict = skin_vertices(scene.setup, scene.state);
+  EXPECT_FALSE(verdict.holds);
+  EXPECT_TRUE(mentions(verdict, "carries two vertices")) << verdict.witness.text;
+}
+
+// Of a skin whose vertices lie anywhere in their cells: shells by where they are now, with owners or without.
+TEST(FreeSkinMatch, RejectsAShellTooFewTooManyOrInsideOut) {
+  const Scene two = scene_of({{0, 0, 0}, {3, 0, 0}});
+  for (const bool owned : {true, false}) {
+    const auto judged = [&](const std::function<void(Skin&)>& breaks) {
+      Skin skin = two.state.skin;
+      breaks(skin);
+      if (!owned) skin.owner.clear();
+      return free_skin_match(two.setup, two.state, skin);
+    };
+    EXPECT_TRUE(judged([](Skin&) {}).holds);
+    EXPECT_EQ(judged([](Skin&) {}).checked, 2);
+    EXPECT_TRUE(judged([](Skin& s) { s.position[0].x += 0.2; }).holds) << "places are free";
+    const auto of_second = [&](const std::array<int32_t, 3>& t) { return two.state.skin.owner[at(t[0])] == 1; };
+    EXPECT_TRUE(mentions(judged([&](Skin& s) { std::erase_if(s.triangles, of_second); }),
+                         "the skin has 1 outer shells, but the tissue has 2 components"));
+    const auto turned = [&](bool all) {
+      return judged([&](Skin& s) {
+        for (auto& t : s.triangles) {
+          if (all || of_second(t)) std::swap(t[0], t[1]);
+        }
+      });
+    };
+    EXPECT_TRUE(mentions(turned(false), "has 1 outer shells")) << turned(false).witness.text;
+    EXPECT_FALSE(turned(true).holds);
+  }
+  // A cavity's shell and the outer one, both inside out: as many of each as there should be.
+  const Scene hollow = [] {
+    std::vector<std::array<int32_t, 3>> nodes;
+    for (int32_t k = 0; k < 27; ++k) {
+      if (k != 13) nodes.push_back({k % 3, k / 3 % 3, k / 9});
+    }
+    return scene_of(nodes);
+  }();
+  EXPECT_TRUE(free_skin_match(hollow.setup, hollow.state, hollow.state.skin).holds);
+  Skin turned = hollow.state.skin;
+  for (auto& t : turned.triangles) std::swap(t[0], t[1]);
+  EXPECT_TRUE(mentions(free_skin_match(hollow.setup, hollow.state, turned), "encloses no tissue"));
 }
 
 TEST(SkinSurface, RejectsAMissingSkinOnceAFrameHasEnded) {

@@ -388,6 +388,60 @@ TEST(AnOlderDocument, OfAPluginDoesNotSayThatItIsComplete) {
   EXPECT_EQ(sheet_of(document, "f").holds, false);
 }
 
+// Kinds with the worst case of each, and what was not asked.
+TEST(ADocumentOfJudge, ShowsEveryKindWithItsWorstCase) {
+  const json worst = {{"property", "best rotation"},
+                      {"index", 7},
+                      {"measured", 0.5},
+                      {"bound", 1e-6},
+                      {"unit", "1"},
+                      {"holds", false},
+                      {"text", "far off"}};
+  json large = worst;
+  large["size"] = 65'537;
+  const auto kind = [](const char* name, int64_t failed, const json& of) -> json {
+    return {{"kind", name},     {"questions", 2}, {"cases", 512},       {"refused", 0},
+            {"failed", failed}, {"worst", of},    {"first_failure", of}};
+  };
+  const json operation = {
+      {"operation", "rotations"},
+      {"cases", 1536},
+      {"of", "matrices"},
+      {"questions", 6},
+      {"refused", 0},
+      {"not_answered", 0},
+      {"not_asked", {{{"kind", "many"}, {"size", 1'000'000}, {"size_before", 65'537}, {"seconds", 2.0}}}},
+      {"failed", 2},
+      {"failed_cases", 300},
+      {"complete", true},
+      {"seconds", 1.0},
+      {"holds", false},
+      {"unpromised", json::array()},
+      {"failures", json::array()},
+      {"properties", {property("best rotation", 300)}},
+      {"kinds", {kind("any", 44, worst), kind("many", 256, large), kind("right", 0, nullptr)}}};
+  const json document = {
+      {"format", "cutproof.judge"},
+      {"format_version", 1},
+      {"cutproof", "1"},
+      {"seed", 1},
+      {"holds", false},
+      {"complete", true},
+      {"operations", {operation}},
+      {"plugin", {{"library", "a.so"}, {"name", ""}, {"version", ""}, {"precision", "single"}, {"device", "cpu"}}}};
+  const Sheet sheet = sheet_of(document, "f");
+  EXPECT_TRUE(has_note(sheet, "“many” of size 1,000,000 was not asked"));
+  const Grid& properties = grid_of(sheet, 1);
+  EXPECT_EQ(properties.columns.at(3).head, "matrices");
+  const Grid& kinds = grid_of(sheet, 2);
+  ASSERT_EQ(kinds.rows.size(), 3u);
+  EXPECT_EQ(kinds.rows[0].cells, (std::vector<std::string>{"any", "512", "44", "best rotation", "0.5", "1e-06", "7"}));
+  EXPECT_EQ(kinds.rows[0].kind, "bad");
+  EXPECT_EQ(kinds.rows[1].cells.at(6), "of size 65,537");
+  EXPECT_EQ(kinds.rows[2].cells.at(3), "–");
+  EXPECT_EQ(kinds.rows[2].kind, "");
+}
+
 TEST(AnOlderDocument, OfATuningHasTheNamesOfItsTime) {
   json old = tuning(nullptr);
   old["format_version"] = 1;
