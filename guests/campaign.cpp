@@ -252,6 +252,7 @@ KernelCampaign judge_kernel(Guest& guest, const OperationDescription& operation,
     for (const int64_t size : options.sizes) {
       for (std::size_t kind = 0; kind < large.size() && goes_on(); ++kind) {
         NotAsked& before = last[kind];
+        if (before.seconds < 0) continue;
         const double factor =
             before.size_before == 0 ? 0 : static_cast<double>(size) / static_cast<double>(before.size_before);
         if (before.seconds * factor * factor > options.time_limit) {
@@ -260,7 +261,9 @@ KernelCampaign judge_kernel(Guest& guest, const OperationDescription& operation,
         }
         const Question question = operation.draw_large(options.seed, static_cast<int64_t>(kind), size, precision);
         before.size_before = size;
+        const int64_t failed = campaign.failed;
         before.seconds = examine(question, static_cast<int64_t>(kind), kind % 2 == 0);
+        if (campaign.failed > failed) before.seconds = -1;  // nothing larger says more
       }
     }
   };

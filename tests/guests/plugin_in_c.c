@@ -92,8 +92,8 @@ static int components(const cutproof_host* host, void* self, const cutproof_tiss
   const int64_t n = launched(alive->rows);
   for (int64_t i = 0; i < n; ++i) to[i] = (int32_t)i;
   for (int64_t i = 0; i < n; ++i) {
-    for (int64_t k = offsets[i]; living[i] && k < offsets[i + 1] && ends[k] < i; ++k) {
-      if (!living[ends[k]]) continue;
+    for (int64_t k = offsets[i]; living[i] && k < offsets[i + 1]; ++k) {
+      if (ends[k] >= i || !living[ends[k]]) continue;
       const int32_t a = root(to, (int32_t)i), b = root(to, ends[k]);
       to[a > b ? a : b] = a > b ? b : a;
     }

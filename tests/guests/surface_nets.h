@@ -1,7 +1,9 @@
 // Surface nets on a grid whose nodes live or not: a vertex in each cell for each piece of the surface that passes it,
 // and a polygon around each edge that leaves the tissue. Right, or wrong in the ways that such methods are.
 #pragma once
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -102,6 +104,7 @@ inline Net make(const std::array<int32_t, 3>& nodes, const std::vector<uint8_t>&
       const std::array<std::pair<int64_t, std::size_t>, 4> faces = {
           {{low, b_axis}, {low - b, c_axis}, {low - c, b_axis}, {low, c_axis}}};
       std::vector<int32_t> polygon;
+      std::ptrdiff_t apex = 0;
       for (std::size_t k = 0; k < 4; ++k) {
         polygon.push_back(vertex_of.at({cells[k], edge}));
         const auto& [node, normal] = faces[k];
@@ -119,8 +122,11 @@ inline Net make(const std::array<int32_t, 3>& nodes, const std::vector<uint8_t>&
           }
           known = on_face.emplace(key, add_vertex(ends)).first;
         }
+        apex = std::ssize(polygon);
         polygon.push_back(known->second);
       }
+      // Seen from a vertex on a face, so that no diagonal runs beside it, where the other piece may have one too.
+      std::rotate(polygon.begin(), polygon.begin() + apex, polygon.end());
       for (std::size_t k = 1; k + 1 < polygon.size(); ++k) {
         if (lives(low)) {
           net.triangles.push_back({polygon[0], polygon[k], polygon[k + 1]});
