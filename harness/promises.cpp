@@ -56,7 +56,7 @@ constexpr std::array kWords = {
     PromiseWord{"blade_out", "no tissue stands across the blade", kBladeOut},
     PromiseWord{"skin", "the skin is a closed surface around each piece, and where the tissue is", kSkin},
     PromiseWord{"free_skin", "the same, with vertices anywhere in the cells that it passes, such as dual methods have",
-                kFreeSkin, "skin"},
+                kFreeSkin},
     PromiseWord{"same_bits", "the same input gives the same bits", kSameBits},
     PromiseWord{"no_ghost_force", "a piece that is kicked moves no other piece", kNoGhostForce},
 };
@@ -81,8 +81,7 @@ bool Promises::cover(std::string_view property) const {
   for (std::size_t k = 0; k < kWords.size(); ++k) {
     const auto& properties = kWords[k].properties;
     if (std::find(properties.begin(), properties.end(), property) == properties.end()) continue;
-    const std::string_view stronger = kWords[k].weaker_than;
-    if ((words >> k & 1u) != 0 && (stronger.empty() || !is_given(words, stronger))) return true;
+    if ((words >> k & 1u) != 0) return true;
     named = true;
   }
   return !named;

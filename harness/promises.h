@@ -13,8 +13,6 @@ struct PromiseWord {
   std::string_view name;  // as in files and plugins
   std::string_view text;  // what is promised, in a sentence
   std::span<const std::string_view> properties;
-  // Where this other promise is made as well, this one says nothing more.
-  std::string_view weaker_than = {};
 };
 // In the order in which people read about them. Properties that no word names are asked of everybody: that what was
 // handed over can be read, and that a stage changes nothing that is not its own.

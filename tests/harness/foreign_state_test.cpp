@@ -589,7 +589,7 @@ TEST(ForeignState, WithASkinOfFreePlacesIsJudgedByItsShells) {
     for (std::size_t k = 0; k < triangles.size(); k += 3) std::swap(triangles[k], triangles[k + 1]);
     EXPECT_THAT(failing(judged(inside_out)), Contains("skin match"));
     std::swap(values_in<int32_t>(dual, "triangles")[0], values_in<int32_t>(dual, "triangles")[1]);
-    EXPECT_THAT(failing(judged(dual)), ElementsAre("skin surface"));
+    EXPECT_THAT(failing(judged(dual)), Contains("skin surface"));
   }
 }
 

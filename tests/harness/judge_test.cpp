@@ -674,9 +674,13 @@ TEST(Judge, RejectsAStateThatCannotBeReadAfterEachStageAndGoesOn) {
 // that only relations, or states of others, are asked for.
 TEST(Promises, NameEveryPropertyOnce) {
   std::map<std::string_view, int> words;
+  std::map<std::string_view, std::set<std::string_view>> named;
   for (const PromiseWord& word : promise_words()) {
+    named[word.name] = {word.properties.begin(), word.properties.end()};
+    if (word.name == "free_skin") continue;  // part of what "skin" promises
     for (const std::string_view property : word.properties) ++words[property];
   }
+  for (const std::string_view property : named.at("free_skin")) EXPECT_TRUE(named.at("skin").contains(property));
   for (const auto& [property, count] : words) EXPECT_EQ(count, 1) << property;
   const std::set<std::string_view> of_everybody = {"well formed",     "finite",         "untouched", "detection",
                                                    "split exactness", "merge legality", "expansion"};
@@ -686,6 +690,21 @@ TEST(Promises, NameEveryPropertyOnce) {
       EXPECT_EQ(Promises{.words = 0}.cover(property.name), of_everybody.contains(property.name)) << property.name;
       EXPECT_TRUE(Promises{}.cover(property.name)) << property.name;
     }
+  }
+}
+
+TEST(Promises, LeaveThePlacesOfASkinFreeUnlessBothWordsAreGiven) {
+  const Promises free{.words = parse_promises("free_skin", "f", "promises")};
+  const Promises both{.words = parse_promises("free_skin skin", "f", "promises")};
+  EXPECT_TRUE(free.free_skin_places());
+  EXPECT_FALSE(both.free_skin_places());
+  EXPECT_FALSE(Promises{}.free_skin_places()) << "who promises all promises skin";
+  for (const char* property : {"skin surface", "skin match", "surface", "surface shells", "surface places"}) {
+    EXPECT_TRUE(free.cover(property)) << property;
+  }
+  for (const char* property : {"skin vertices", "skin geometry", "skin reach", "surface vertices"}) {
+    EXPECT_FALSE(free.cover(property)) << property;
+    EXPECT_TRUE(both.cover(property)) << property;
   }
 }
 
