@@ -1,6 +1,8 @@
 #include "harness/cut_again.h"
 
 #include <algorithm>
+#include <iterator>
+#include <limits>
 #include <memory>
 
 #include "model/at.h"
@@ -10,6 +12,8 @@
 #include "reference_cpu/reference.h"
 
 namespace cutproof::harness {
+
+using oracles::RotationKnown;
 
 namespace {
 
@@ -49,6 +53,27 @@ Origins by_number(const CutAgain& split, const Clusters& end) {
   return origins;
 }
 
+// Clusters are in the order of their numbers, and each has that of one of its candidates: leaves out what would not
+// ascend. Where nothing ascends, none is left out.
+void keep_ascending(std::vector<std::vector<int32_t>>& candidates) {
+  std::vector<int32_t> least, greatest(candidates.size());
+  int32_t bound = -1;
+  for (const std::vector<int32_t>& of_one : candidates) {
+    const auto next = std::upper_bound(of_one.begin(), of_one.end(), bound);
+    if (next == of_one.end()) return;
+    least.push_back(bound = *next);
+  }
+  bound = std::numeric_limits<int32_t>::max();
+  for (std::size_t c = candidates.size(); c-- > 0;) {
+    const auto end = std::lower_bound(candidates[c].begin(), candidates[c].end(), bound);
+    if (end == candidates[c].begin()) return;
+    greatest[c] = bound = *std::prev(end);
+  }
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    std::erase_if(candidates[c], [&](int32_t s) { return s < least[c] || s > greatest[c]; });
+  }
+}
+
 Origins by_containment(const CutAgain& split, const State& end) {
   const Clusters& pieces = split.state.clusters;
   const auto containers = containers_of(pieces, end.clusters, end.x.size());
@@ -56,14 +81,18 @@ Origins by_containment(const CutAgain& split, const State& end) {
   for (int32_t s = 0; s < pieces.count(); ++s) {
     for (const int32_t c : containers[at(s)]) contained[at(c)].push_back(s);
   }
-  Origins origins;
-  for (const std::vector<int32_t>& candidates : contained) {
+  for (std::vector<int32_t>& candidates : contained) {
     std::vector<int32_t> stays;
     for (const int32_t s : candidates) {
       if (pieces.size(s) >= end.tau && containers[at(s)].size() == 1) stays.push_back(s);
     }
+    if (stays.size() == 1) candidates = stays;
+  }
+  keep_ascending(contained);
+  Origins origins;
+  for (const std::vector<int32_t>& candidates : contained) {
     std::vector<int32_t>& from = origins.emplace_back();
-    for (const int32_t s : stays.size() == 1 ? stays : candidates) from.push_back(split.origin[at(s)]);
+    for (const int32_t s : candidates) from.push_back(split.origin[at(s)]);
     std::sort(from.begin(), from.end());
     from.erase(std::unique(from.begin(), from.end()), from.end());
   }
@@ -103,23 +132,31 @@ Origins origins_of(const Setup& setup, const State& detected, Stage last, const 
   return last < Stage::skin ? by_number(split, end.clusters) : by_containment(split, end);
 }
 
-std::vector<uint8_t> hand_back(const Origins& origins, const Clusters& end, Clusters& before) {
-  std::vector<uint8_t> given(at(before.count()), 0);
+std::vector<RotationKnown> hand_back(const Origins& origins, const Clusters& end, Clusters& before) {
+  std::vector<RotationKnown> known(at(before.count()), RotationKnown::gone);
   for (std::size_t c = 0; c < origins.size(); ++c) {
     if (origins[c].size() != 1) continue;
     const std::size_t from = at(origins[c].front());
-    if (given[from] != 0) continue;
-    given[from] = 1;
+    if (known[from] == RotationKnown::yes) continue;
+    known[from] = RotationKnown::yes;
     before.rotation[from] = end.rotation[c];
     before.degenerate[from] = end.degenerate[c];
   }
-  return given;
+  // One of several is shown, and nobody knows which.
+  for (const std::vector<int32_t>& from : origins) {
+    if (from.size() < 2) continue;
+    const auto one =
+        std::find_if(from.begin(), from.end(), [&](int32_t c) { return known[at(c)] == RotationKnown::gone; });
+    if (one != from.end()) known[at(*one)] = RotationKnown::no;
+  }
+  return known;
 }
 
 int32_t first_that_inherits_otherwise(const Setup& setup, const Origins& origins, const State& before,
-                                      const std::vector<uint8_t>& known, const Clusters& end) {
+                                      const std::vector<RotationKnown>& known, const Clusters& end) {
   const auto fits = [&](std::size_t c, int32_t from) {
-    if (!known.empty() && known[at(from)] == 0) return oracles::fits_cluster(setup, before, from, end.rotation[c]);
+    if (!known.empty() && known[at(from)] != RotationKnown::yes)
+      return oracles::fits_cluster(setup, before, from, end.rotation[c]);
     return same_bits(end.rotation[c], before.clusters.rotation[at(from)]) &&
            end.degenerate[c] == before.clusters.degenerate[at(from)];
   };

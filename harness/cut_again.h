@@ -7,6 +7,7 @@
 #include "model/setup.h"
 #include "model/stage.h"
 #include "model/state.h"
+#include "oracles/registry.h"
 
 namespace cutproof::harness {
 
@@ -25,17 +26,17 @@ CutAgain cut_again(const Setup& setup, const State& detected, Stage last);
 // Of somebody else's `end` of the same stages. `expected`: the reference's answer to them. Where the rule of merging
 // leaves several answers an origin follows from numbers as long as these are kept, up to skin. Later a cluster comes
 // from one of the pieces that it contains: from one that is not small and lies in no other, if there is one, because
-// such a piece never gives its number up.
+// such a piece never gives its number up; and so that numbers ascend, because clusters keep their order.
 Origins origins_of(const Setup& setup, const State& detected, Stage last, const CutAgain& expected, const State& end);
 
 // Gives the clusters before the cut the rotations and flags that those of `end` have from them, as far as that is
-// known. Returns by place which clusters were given one.
-std::vector<uint8_t> hand_back(const Origins& origins, const Clusters& end, Clusters& before);
+// known. Returns by place whether it is.
+std::vector<oracles::RotationKnown> hand_back(const Origins& origins, const Clusters& end, Clusters& before);
 
 // The first cluster of `end` that has no rotation that it could have inherited; -1: all have. `before`: after the step,
 // of the state before the cut; `known`: which of its rotations are (empty: all). Of one that is not, a rotation is
 // accepted that fits where the particles of its cluster are (oracles/rotation_match.h).
 int32_t first_that_inherits_otherwise(const Setup& setup, const Origins& origins, const State& before,
-                                      const std::vector<uint8_t>& known, const Clusters& end);
+                                      const std::vector<oracles::RotationKnown>& known, const Clusters& end);
 
 }  // namespace cutproof::harness

@@ -163,7 +163,8 @@ void Judge::see(const Moment& moment) {
   if (ends) ++frame_;
 }
 
-void Judge::see_stage(Stage stage, const State& before, const State& after, std::span<const uint8_t> known_rotations) {
+void Judge::see_stage(Stage stage, const State& before, const State& after,
+                      std::span<const oracles::RotationKnown> known_rotations) {
   if (stage == Stage::expand && before.clusters.members != after.clusters.members) has_expanded_ = true;
   std::vector<Verdict> found = judge_.stage(stage, before, after, known_rotations);
   if (stage == Stage::step) return take(std::move(found), stage, after);
@@ -193,7 +194,7 @@ void Judge::see_several(const Moment& moment, const std::array<bool, 6>& seen) {
   const State* before = moment.before.get();
   State stepped = sees(Stage::step) ? after_step(*before, end) : *before;
   const auto detected = [&] { return sees(Stage::detect) ? after_detection(stepped, end) : stepped; };
-  std::vector<uint8_t> known_rotations;  // of the state after the step; empty: all are
+  std::vector<oracles::RotationKnown> known_rotations;  // of the state after the step; empty: all are
   std::optional<CutAgain> expected;
   Origins origins;
   if (cuts) {

@@ -54,7 +54,8 @@ class Judge {
 
  private:
   // `known_rotations`: as oracles::StageRun has it.
-  void see_stage(Stage stage, const State& before, const State& after, std::span<const uint8_t> known_rotations = {});
+  void see_stage(Stage stage, const State& before, const State& after,
+                 std::span<const oracles::RotationKnown> known_rotations = {});
   void see_several(const Moment& moment, const std::array<bool, 6>& due);
   void take(std::vector<Verdict> found, Stage stage, const State& state);
   void leave_out(const Verdict& verdict);

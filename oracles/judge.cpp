@@ -83,7 +83,7 @@ std::vector<Verdict> Judge::state(const State& state, Stage after, bool thorough
 }
 
 std::vector<Verdict> Judge::stage(Stage stage, const State& before, const State& after,
-                                  std::span<const uint8_t> known_rotations) {
+                                  std::span<const RotationKnown> known_rotations) {
   Memory& m = *memory_;
   m.look_at(before);
   const Verdict form_before = m.form;

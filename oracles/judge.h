@@ -22,7 +22,7 @@ class Judge {
   // All properties of the stage, and those of the state after it that are this stage's promise.
   // `known_rotations`: as StageRun has it.
   std::vector<Verdict> stage(Stage stage, const State& before, const State& after,
-                             std::span<const uint8_t> known_rotations = {});
+                             std::span<const RotationKnown> known_rotations = {});
 
   // For reports. Components of G, and shells of the skin whose volume at `position` is not positive, triangles joined
   // at their vertices; 0 if the state is not well formed.

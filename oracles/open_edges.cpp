@@ -37,7 +37,7 @@ Demand openness(const Body& body, const State& state, int32_t i, int32_t j, doub
 }
 
 OneEndOfEach::OneEndOfEach(const Setup& setup, const TissueGraph& graph, const State& before,
-                           std::span<const uint8_t> known_rotations)
+                           std::span<const RotationKnown> known_rotations)
     : setup_(setup),
       before_(before),
       edges_at_(before.alive.size()),
@@ -65,10 +65,10 @@ OneEndOfEach::OneEndOfEach(const Setup& setup, const TissueGraph& graph, const S
   if (has_lowered_blade_ && setup.detect.remove == RemovedEnds::nearer) find_nearer_ends(*pose, known_rotations);
 }
 
-void OneEndOfEach::find_nearer_ends(const BladePose& pose, std::span<const uint8_t> known_rotations) {
+void OneEndOfEach::find_nearer_ends(const BladePose& pose, std::span<const RotationKnown> known_rotations) {
   std::vector<uint8_t> is_unknown(before_.alive.size(), 0);  // where its clusters carry it
   for (std::size_t c = 0; c < known_rotations.size(); ++c) {
-    if (known_rotations[c] != 0) continue;
+    if (known_rotations[c] == RotationKnown::yes) continue;
     for (const int32_t i : before_.clusters.of(static_cast<int32_t>(c))) is_unknown[at(i)] = 1;
   }
   std::vector<int32_t> ends;

@@ -8,6 +8,7 @@
 #include "oracles/blade_motion.h"
 #include "oracles/demand.h"
 #include "oracles/judged.h"
+#include "oracles/registry.h"
 
 namespace cutproof::oracles {
 
@@ -31,7 +32,7 @@ class OneEndOfEach {
   // `known_rotations`: as StageRun has it. Where that of a cluster is not known which holds an end of an edge, either
   // end may be the nearer one, and the edge counts as undecided.
   OneEndOfEach(const Setup& setup, const TissueGraph& graph, const State& before,
-               std::span<const uint8_t> known_rotations = {});
+               std::span<const RotationKnown> known_rotations = {});
   // `gone`: [n] particles that were alive and are not any more.
   void judge(const std::vector<uint8_t>& gone, Verdict& verdict) const;
 
@@ -73,7 +74,7 @@ class OneEndOfEach {
   Demand bluntly(int32_t i) const;
   void reject(int32_t i, bool gone, Verdict& verdict) const;
   // Of the edges, which end is nearer to the blade.
-  void find_nearer_ends(const BladePose& pose, std::span<const uint8_t> known_rotations);
+  void find_nearer_ends(const BladePose& pose, std::span<const RotationKnown> known_rotations);
 
   const Setup& setup_;
   const State& before_;

@@ -15,16 +15,19 @@ namespace cutproof::oracles {
 
 class Judged;  // oracles/judged.h: a well-formed state and what follows from it
 
+// Whether the rotation that a step has left to a cluster is in the state after it. Where that was made from a later
+// one, in which clusters have changed, none of those may be known to have kept it; or none may come from it at all, and
+// then nobody is shown it.
+enum class RotationKnown : uint8_t { no, yes, gone };
+
 // A stage that was run: the states before and after it, both well formed.
 struct StageRun {
   const Setup& setup;
   Stage stage;
   const State& before;
   const State& after;
-  // [clusters] Of a step, and of the detection after it, where the state after the step was made from a later one, in
-  // which clusters have changed: 0 where none of that state's clusters has kept the rotation, so that nobody knows it.
-  // Empty: all are known.
-  std::span<const uint8_t> known_rotations = {};
+  // [clusters] Of a step, and of the detection after it. Empty: all are known.
+  std::span<const RotationKnown> known_rotations = {};
 };
 
 // What a check costs beside a frame of the reference: less, or more.

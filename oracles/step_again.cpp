@@ -35,7 +35,7 @@ void check_flags(const State& before, const State& after, const StepOutcome& out
 }  // namespace
 
 StepAgain step_again(const Setup& setup, const State& before, const State& after,
-                     std::span<const uint8_t> known_rotations) {
+                     std::span<const RotationKnown> known_rotations) {
   Verdict verdict = start_verdict(kAdmissibleStep, after, "h", kAdmissibleStepSource);
   const auto done = [&] { return StepAgain{conclude(std::move(verdict), kNoStep)}; };
   const Clusters &was = before.clusters, &is = after.clusters;

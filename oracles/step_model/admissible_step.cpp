@@ -128,7 +128,7 @@ class Search {
  public:
   // `of_all`: of the whole body; else of one coupled set, of which nobody has stated the impulse.
   // `at_once`: as nearest_admissible_step() has it.
-  Search(const Setup& setup, const State& before, const State& after, std::span<const uint8_t> known_rotations,
+  Search(const Setup& setup, const State& before, const State& after, std::span<const RotationKnown> known_rotations,
          int at_once, bool of_all = true)
       : setup_(setup),
         before_(before),
@@ -215,8 +215,8 @@ class Search {
     Apart apart;
     for (const int32_t set : sets) {
       const CoupledSet alone(before_, after_, coupled_, set);
-      std::vector<uint8_t> known;
-      for (const int32_t c : alone.clusters) known.push_back(is_known(at(c)) ? 1 : 0);
+      std::vector<RotationKnown> known;
+      for (const int32_t c : alone.clusters) known.push_back(known_.empty() ? RotationKnown::yes : known_[at(c)]);
       Search search(setup_, alone.before, alone.after, known, static_cast<int>(at_once_), false);
       Branch found = search.looked_at({});
       if (!found.holds() && !found.ties.empty()) found = search.explain(std::move(found));
@@ -233,7 +233,7 @@ class Search {
   }
 
   // Whether the rotation of a cluster (by its place) was stated.
-  bool is_known(std::size_t c) const { return known_.empty() || known_[c] != 0; }
+  bool is_known(std::size_t c) const { return known_.empty() || known_[c] == RotationKnown::yes; }
   // Whether where all violating particles are hangs on rotations that could be any of many, and that nobody has stated.
   bool hangs_on_unknown(const Branch& branch) const {
     std::set<int32_t> sets;
@@ -1040,7 +1040,9 @@ class Search {
       found.reach.push_back(std::max(reach_[c] / h_, 1.0));
       found.rotation_bound.push_back(branch.bounds.rotation[c] * found.reach.back());
       // As of positions: beyond this, nothing sharp was asked.
-      if (!(found.rotation_bound.back() <= kSmall) || !is_known(c)) ++found.undecided;
+      const bool is_gone = !known_.empty() && known_[c] == RotationKnown::gone;
+      if (is_gone) --found.checked;
+      if (!is_gone && (!(found.rotation_bound.back() <= kSmall) || !is_known(c))) ++found.undecided;
     }
     found.outcome = std::move(branch.outcome);
     return found;
@@ -1048,7 +1050,7 @@ class Search {
 
   const Setup& setup_;
   const State &before_, &after_;
-  const std::vector<uint8_t> known_;  // [m] 0: the rotation was not stated; empty: all were
+  const std::vector<RotationKnown> known_;  // [m] of the rotations that the step has left; empty: all are
   const bool of_all_;
   const double h_, dt_;
   double mass_ = 0;
@@ -1065,7 +1067,7 @@ class Search {
 }  // namespace
 
 AdmissibleStep nearest_admissible_step(const Setup& setup, const State& before, const State& after,
-                                       std::span<const uint8_t> known_rotations, int at_once) {
+                                       std::span<const RotationKnown> known_rotations, int at_once) {
   return Search(setup, before, after, known_rotations, at_once).find();
 }
 

@@ -10,6 +10,7 @@
 #include "model/setup.h"
 #include "model/state.h"
 #include "model/verdict.h"
+#include "oracles/registry.h"
 #include "oracles/step_model/step_model.h"
 
 namespace cutproof::oracles {
@@ -43,10 +44,11 @@ struct AdmissibleStep {
 };
 
 // `before` and `after`: well formed, of the same clusters; `before` finite, its schedule not over. `known_rotations`:
-// as StageRun has it; one that is not known is not judged, and counts as undecided. `at_once`: threads for disturbed
+// as StageRun has it; one that is not known is not judged, and counts as undecided; one that is gone is not
+// asked for. `at_once`: threads for disturbed
 // runs; 0: one, or where runs are long one for each processor. The answer is the same with any number.
 AdmissibleStep nearest_admissible_step(const Setup& setup, const State& before, const State& after,
-                                       std::span<const uint8_t> known_rotations = {}, int at_once = 0);
+                                       std::span<const RotationKnown> known_rotations = {}, int at_once = 0);
 
 // The same with its verdict, of any two well-formed states; without the step where none can be computed.
 struct StepAgain {
@@ -54,6 +56,6 @@ struct StepAgain {
   std::optional<AdmissibleStep> step = {};
 };
 StepAgain step_again(const Setup& setup, const State& before, const State& after,
-                     std::span<const uint8_t> known_rotations = {});
+                     std::span<const RotationKnown> known_rotations = {});
 
 }  // namespace cutproof::oracles

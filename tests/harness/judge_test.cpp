@@ -1020,7 +1020,7 @@ TEST(StagesInOnePiece, LeaveEveryClusterTheRotationThatItInherits) {
   }
 }
 
-// Every rotation of a right frame is known, but those of clusters that were merged away, or cut away.
+// Every rotation of a right frame is asked for, but what nobody is shown.
 TEST(WholeFrames, LeaveOpenTheRotationsOfWhatIsGoneAlone) {
   for (const MergeRule rule : kRules) {
     for (const bool kernels : {false, true}) {

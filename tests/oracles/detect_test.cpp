@@ -252,7 +252,8 @@ TEST(DetectionOfNearerEnd, CountsWhatUnknownRotationsLeaveOpen) {
   const TissueGraph graph(pair.setup.body, pair.before.alive);
   const auto judged = [&](const std::vector<uint8_t>& gone, bool rotations_are_known) {
     Verdict verdict;
-    const std::vector<uint8_t> known(rotations_are_known ? 0 : at(pair.before.clusters.count()), 0);
+    const std::vector<RotationKnown> known(rotations_are_known ? 0 : at(pair.before.clusters.count()),
+                                           RotationKnown::no);
     OneEndOfEach(pair.setup, graph, pair.before, known).judge(gone, verdict);
     return verdict;
   };
