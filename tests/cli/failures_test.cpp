@@ -234,7 +234,7 @@ class Allocations : public testing::TestWithParam<Case> {
     ASSERT_GT(made_, 500u) << "nothing counts";
   }
 
-  static WantedAllocations wanted() { return wanted_allocations(100); }
+  static WantedAllocations wanted() { return wanted_allocations(40); }
 
   void fail_in_turn(uint64_t fail_count) {
     const uint64_t with = sample_seed();
@@ -277,7 +277,8 @@ TEST_P(Allocations, EachThatFailsWithAllAfterItEndsTheRunInOrder) { fail_in_turn
 // enough for the first that failed.
 TEST_P(Allocations, AnyAmountOfMemoryThatIsTooLittleEndsTheRunInOrder) {
   const WantedAllocations want = wanted();
-  const int64_t step = want.all ? 1 : std::max<int64_t>(1, most_ / 20000);
+  // A case takes 2 to 10 s: a run for each allocation that is the first beyond its limit, or by steps of the limit.
+  const int64_t step = want.all ? 1 : std::max<int64_t>(1, most_ / 2000);
   // A share begins where the one before it ends; the last goes on until there is enough.
   const auto begins = [&](uint64_t share) {
     return 1 + static_cast<int64_t>((share - 1) * static_cast<uint64_t>(most_) / want.shares);
