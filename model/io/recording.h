@@ -64,7 +64,6 @@ struct Recording {
   std::string backend;
   std::array<bool, 6> left_to_reference = {};  // by stage: the backend cannot run it, the reference did
   Precision precision = Precision::binary64;   // of all states
-  bool absolute_coordinates = false;           // places were kept so: State::place_rounding is not 0
   int64_t snapshot_count = 0;
   std::optional<int64_t> frames_asked;  // as the recorder was told
   // Whether scene, frames_asked, setup and the first snapshot are those that were recorded, to the bit.

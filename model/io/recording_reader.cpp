@@ -152,6 +152,7 @@ struct RecordingReader::File {
   std::optional<Part> blade;
   hdf5::InflationBudget budget;
   uint64_t recording = 0, recorded_beginning = 0;
+  bool absolute_coordinates = false;  // State::place_rounding follows from them
   SnapshotColumns columns;
   // Of the files for ParaView: the snapshot of each step, and how many frames are over in it.
   struct Step {
@@ -240,7 +241,7 @@ void RecordingReader::File::read_index(const ReadingArchive& root) {
   if (hdf5::has_attribute(index.file.id(), kAbsoluteCoordinates)) {
     uint8_t absolute = 0;
     root(kAbsoluteCoordinates, absolute);
-    header.absolute_coordinates = absolute != 0;
+    absolute_coordinates = absolute != 0;
   }
   if (const auto defect = defect_of(header.setup)) throw hdf5::Error("/setup/" + defect->field, defect->problem);
   root.group("snapshots", [&](auto& archive) { walk_snapshots(archive, columns); });
@@ -343,7 +344,7 @@ Snapshot RecordingReader::File::snapshot(std::size_t i) const {
       }
     });
   }
-  if (header.absolute_coordinates) state.place_rounding = rounding_of_coordinates(header.setup.body, state);
+  if (absolute_coordinates) state.place_rounding = rounding_of_coordinates(header.setup.body, state);
   check_clusters(i, state);
   return snapshot;
 }
