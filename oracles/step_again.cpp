@@ -13,10 +13,10 @@ namespace {
 // Whether each cluster says of its rotation whether another would be as good (method.md §3). Without iterations nobody
 // asks: what a cluster said, it says. Where rounding or a backend's threshold decides, nobody can tell.
 void check_flags(const State& before, const State& after, const StepOutcome& outcome,
-                 std::span<const uint8_t> known_rotations, Verdict& verdict) {
+                 std::span<const RotationKnown> known_rotations, Verdict& verdict) {
   const Clusters& clusters = after.clusters;
   for (int32_t c = 0; c < clusters.count(); ++c) {
-    if (!known_rotations.empty() && known_rotations[at(c)] == 0) continue;
+    if (!known_rotations.empty() && known_rotations[at(c)] != RotationKnown::yes) continue;
     const bool says = clusters.degenerate[at(c)] != 0, said = before.clusters.degenerate[at(c)] != 0;
     const int32_t number = before.clusters.number[at(c)];
     if (outcome.is_thin.empty()) {

@@ -20,7 +20,7 @@ struct NamedText {
 struct ArrayFile {
   Arrays arrays;
   std::vector<NamedText> texts;
-  std::vector<std::string> ignored;  // attributes of the root of an HDF5 file that are no text
+  std::vector<std::string> ignored = {};  // attributes of the root of an HDF5 file that are no text
   friend bool operator==(const ArrayFile&, const ArrayFile&) = default;
 };
 
