@@ -56,7 +56,7 @@ TEST(RestFrames, AcceptSumsInAnyOrder) {
 
 // A thousand equal terms round the same way, so the error of a plain sum grows as their number and not as its root.
 TEST(RestFrames, AcceptPlainSumsOfAThousandMembersInSinglePrecision) {
-  Setup setup = setup_of(block_body(10, 10, 10, 0.1, 0.9487007976901066));
+  cutproof::Setup setup = setup_of(block_body(10, 10, 10, 0.1, 0.9487007976901066));
   const Body& body = setup.body;
   const State exact = state_of(body, {range(0, 1000)});
   const auto summed = [&](bool from_first) {
