@@ -47,6 +47,14 @@ everything themselves: links to other files, soft links, data in other files
 (external storage, virtual datasets) and filters that are not HDF5's own are
 refused, and no filter is loaded.
 
+**Meshes** are read as STL (text, or binary with or without attribute bytes
+behind each triangle), OBJ, PLY (text or binary, corners of every type of
+integers, polygons or triangle strips) and OFF as text ([ST][C][N][4]OFF), each
+in ASCII or UTF-8, with or without a byte order mark, with lines that end in
+any way, and with numbers as C or Fortran print them. Colours, normals and
+textures are passed over. Refused by name: text in UTF-16 or UTF-32, decimal
+commas, binary OFF, nOFF, and vertices of an OBJ with a weight other than 1.
+
 **Names.** A file may have any name, UTF-8 or not, without line ends, which are
 refused on the command line. Names of plugins (`judge FILE.so`, `--backend
 plugin:FILE.so`) are kept in counterexamples, so they must be UTF-8. What is
