@@ -88,7 +88,7 @@ int print_scenes() {
 int examine(const InfoOptions& options) {
   const double unit = metres_per(options.unit);
   require_writable(options.json);
-  const fixtures::MeshExamination mesh = fixtures::examine_mesh(options.mesh, unit);
+  const fixtures::MeshExamination mesh = fixtures::examine_mesh(options.mesh, unit, repair_progress());
   write_document(options.json, examination_json(mesh, options.mesh, unit));
   print_examination(mesh, options.unit);
   print_written(options.json);

@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "cli/commands.h"
 #include "cli/options.h"
+#include "cli/progress.h"
 #include "cli/screen.h"
 #include "fixtures/units.h"
 
@@ -21,6 +23,8 @@ using fixtures::Defect;
 using fixtures::MeshExamination;
 using fixtures::RepairReport;
 
+double cubed(double x) { return x * x * x; }
+
 nlohmann::json repair_json(const RepairReport& report) {
   nlohmann::json steps = nlohmann::json::array();
   for (const fixtures::RepairStep& step : report.steps) {
@@ -30,7 +34,11 @@ nlohmann::json repair_json(const RepairReport& report) {
           {"warnings", report.warnings},
           {"triangles_before", report.triangles_before},
           {"triangles_after", report.triangles_after},
+          {"volume_before", cubed(report.unit) * report.volume_before},
+          {"volume_after", cubed(report.unit) * report.volume_after},
+          {"volume_shared", cubed(report.unit) * report.volume_shared},
           {"volume_change", fixtures::volume_change(report)},
+          {"volume_at_stake", fixtures::volume_at_stake(report)},
           {"cap_share", report.cap_share},
           {"made_up", report.is_made_up}};
 }
@@ -80,6 +88,11 @@ double metres_per(const std::string& unit) {
   return std::find_if(units.begin(), units.end(), [&](const auto& each) { return unit == each.name; })->metres;
 }
 
+fixtures::OnRepairStep repair_progress() {
+  const auto line = std::make_shared<Progress>("repair", 0);
+  return [line](std::string_view what) { line->tell(what); };
+}
+
 void print_build(const fixtures::BuildReport& built) {
   if (built.repair) {
     for (const std::string& line : fixtures::report_lines(*built.repair)) say("{}\n", line);
@@ -113,6 +126,10 @@ void print_examination(const MeshExamination& mesh, const std::string& unit) {
     insist("--repair would make it one:\n");
   }
   for (const std::string& line : fixtures::report_lines(*mesh.repair)) say("  {}\n", line);
+  if (mesh.repaired_defects.empty() && fixtures::volume_at_stake(*mesh.repair) > kMostRepairChange) {
+    insist("a run refuses that unless --repair-change allows it: {}\n",
+           fixtures::stake_in_words(*mesh.repair, kMostRepairChange));
+  }
   if (mesh.repaired_defects.empty()) {
     print_volume(mesh.repaired_volume);
     print_usual_counts(mesh.repaired_volume);

@@ -15,6 +15,9 @@ CLI::Option* add_unit(CLI::App& command, std::string& unit);
 // Metres per such a unit.
 double metres_per(const std::string& unit);
 
+// Says on the terminal what repair does, which may take a while.
+fixtures::OnRepairStep repair_progress();
+
 // Nothing if nothing was repaired and there is nothing to note.
 void print_build(const fixtures::BuildReport& built);
 // docs/reference/results_schema.md, The build.

@@ -98,6 +98,10 @@ void Progress::draw(const std::string& line) {
   stands() = true;
 }
 
+void Progress::tell(std::string_view what) {
+  if (terminal_) draw(fmt::format("{}: {}", thing_, what));
+}
+
 void Progress::show(int64_t done, const std::string& what) {
   show(done, what, total_ > 0 ? static_cast<double>(done) / static_cast<double>(total_) : 0);
 }

@@ -5,6 +5,7 @@
 #include <deque>
 #include <optional>
 #include <string>
+#include <string_view>
 
 namespace cutproof::cli {
 
@@ -47,6 +48,9 @@ class Progress {
   void show(int64_t done, const std::string& what);
   // `part`: how much of the whole is done, where that is not done / total.
   void show(int64_t done, const std::string& what, double part);
+
+  // What is done now, where there is nothing to count; shown at once.
+  void tell(std::string_view what);
 
   // Takes the line off the terminal, so that something else can be printed: of whichever there is.
   static void clear_all();

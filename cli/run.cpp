@@ -45,9 +45,10 @@ struct RunOptions {
   SceneOptions scene;
   harness::BackendChoice backend;
   std::optional<int64_t> frames;
-  std::string mesh;           // takes the place of the scene's body
-  std::string unit = "mm";    // of the mesh's numbers
-  bool repair = false;        // the mesh
+  std::string mesh;         // takes the place of the scene's body
+  std::string unit = "mm";  // of the mesh's numbers
+  bool repair = false;      // the mesh
+  double repair_change = kMostRepairChange;
   std::string check;          // a depth; empty: nothing is judged
   std::string against;        // "" or the reference
   std::string mode = "both";  // of the comparison: lockstep, free-running, both
@@ -177,8 +178,9 @@ int run(const RunOptions& options) {
   fixtures::BuildOptions build_options;
   build_options.frames = options.frames;
   if (!options.mesh.empty()) {
-    build_options.mesh = MeshSpec{options.mesh, metres_per(options.unit), options.repair};
+    build_options.mesh = MeshSpec{options.mesh, metres_per(options.unit), options.repair, options.repair_change};
   }
+  build_options.on_repair_step = repair_progress();
   const std::unique_ptr<Backend> backend = make_backend(options.backend);
   require_errors(*backend, wanted);
 
@@ -382,6 +384,13 @@ void add_run(CLI::App& program, Work& work) {
   add_unit(*command, options->unit)->needs("--mesh");
   command->add_flag("--repair", options->repair, "repair the mesh if it does not bound a solid, and say what was done")
       ->needs("--mesh");
+  command
+      ->add_option("--repair-change", options->repair_change,
+                   "most that --repair may change the volume by, as a share of it; 1: by anything")
+      ->capture_default_str()
+      ->type_name("X")
+      ->check(number_between(0, 1))
+      ->needs("--repair");
   add_count(*command, "--frames", options->frames,
             "stop after this many frames of the scene, and judge what is in reach", whole_number(0));
   add_check_depth(*command, options->check, "judge every frame by every property, and by what the scene expects")

@@ -25,10 +25,15 @@ struct Shape {
   friend bool operator==(const Shape&, const Shape&) = default;
 };
 
+// Of the volume: beyond this change, as a share of the greater of what was there and is then, a repaired mesh is
+// another body. Where it is a ball, its surface has moved by half a spacing at 100,000 particles.
+inline constexpr double kMostRepairChange = 0.05;
+
 struct MeshSpec {
-  std::string file;     // as written in the scene; relative to the scene's file
-  double unit = 0;      // metres per unit of the file's numbers: 1e-3 for mm. Must be given.
-  bool repair = false;  // what keeps it from bounding a solid
+  std::string file;                          // as written in the scene; relative to the scene's file
+  double unit = 0;                           // metres per unit of the file's numbers: 1e-3 for mm. Must be given.
+  bool repair = false;                       // what keeps it from bounding a solid
+  double repair_change = kMostRepairChange;  // the mesh is refused if repair changes the volume by more; 1: never
   friend bool operator==(const MeshSpec&, const MeshSpec&) = default;
 };
 

@@ -104,6 +104,11 @@ void describe(auto& v, MeshSpec& s) {
   v.field(s.repair, {"repair",
                      "Repair a surface that does not bound a solid, and say what was done (method.md §1). Otherwise "
                      "such a mesh is refused."});
+  v.field(s.repair_change,
+          {"repair_change",
+           "Most that repair may change the volume by, as a share of the greater of the volumes before "
+           "and after; beyond it the mesh is refused. 1 accepts any change.",
+           between(0, 1)});
 }
 
 void describe(auto& v, BodySpec& s) {

@@ -425,6 +425,36 @@ const std::vector<Hostile>& hostile_inputs() {
        },
        "run scene.json --mesh input.obj",
        {"input.obj", "?[31mv"}},
+      {"AMeshWithDecimalCommas",
+       [] {
+         Writer("input.obj")("v 0 0 0\nv 0,5 0 0\n");
+         Writer("scene.json")(kScene + "}");
+       },
+       "run scene.json --mesh input.obj",
+       {"line 2", "decimal comma", "LC_ALL=C"}},
+      {"AMeshInUtf16",
+       [] {
+         Writer("input.obj")(std::string("\xff\xfev\0 \0000\0", 8));
+         Writer("scene.json")(kScene + "}");
+       },
+       "run scene.json --mesh input.obj",
+       {"UTF-16", "UTF-8"}},
+      {"ATriangleStripThatEndsNowhere",
+       [] {
+         Writer("input.ply")("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n")(
+             "property float z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n")(
+             "0 0 0\n1 0 0\n0 1 0\n2000000000")(" 0 1 2", 1'000'000);
+         Writer("scene.json")(kScene + "}");
+       },
+       "run scene.json --mesh input.ply",
+       {"more than 2000000 faces"}},
+      {"AMeshThatRepairMakesAnotherBody",  // flat, and a shell when it is wrapped
+       [] {
+         Writer("input.off")("OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n");
+         Writer("scene.json")(kScene + "}");
+       },
+       "run scene.json --mesh input.off --repair",
+       {"another body", "the volume went from none to", "--repair-change"}},
 
       // --- Files of arrays
       {"ANpzThatInflates",

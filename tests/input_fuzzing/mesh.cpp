@@ -52,7 +52,7 @@ Outcome feed(const std::string& file, std::string_view bytes) {
   write_scratch(file, bytes);
   const auto read = [&](bool is_repaired) {
     return outcome_of([&] {
-      const SurfaceMesh mesh = fixtures::read_mesh(scratch_path(file), 0.001, is_repaired);
+      const SurfaceMesh mesh = fixtures::read_mesh(scratch_path(file), 0.001, {is_repaired, 1});
       if (const auto defect = defect_of(mesh)) broken_contract("a mesh was read that is not sound: " + *defect);
       require_solid(mesh);
       if (is_repaired && !mesh.repair) broken_contract("a mesh was repaired in silence");
@@ -99,18 +99,61 @@ Outcome feed_obj(std::string_view bytes) { return feed("mesh.obj", bytes); }
 Outcome feed_ply(std::string_view bytes) { return feed("mesh.ply", bytes); }
 Outcome feed_off(std::string_view bytes) { return feed("mesh.off", bytes); }
 
-std::vector<std::string> stl_seeds() {
-  return seeds_of([](const Polygons& body) { return fixtures::as_text_stl(in_triangles(body)); }) +
-         seeds_of([](const Polygons& body) { return fixtures::as_binary_stl(in_triangles(body)); });
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size())) {
+    text.replace(at, from.size(), to);
+  }
+  return text;
 }
-std::vector<std::string> obj_seeds() { return seeds_of(fixtures::as_obj); }
+
+// Two bytes behind each triangle, as its attribute count says.
+std::string with_attributes(const std::string& stl) {
+  constexpr std::size_t kHeader = 84, kTriangle = 50;
+  std::string out = stl.substr(0, kHeader);
+  for (std::size_t at = kHeader; at < stl.size(); at += kTriangle) {
+    out += stl.substr(at, kTriangle - 2) + std::string("\2\0ab", 4);
+  }
+  return out;
+}
+
+// The cube, of one strip around its sides and one over bottom and top.
+std::string of_strips(const std::string& text_ply) {
+  return replaced(text_ply.substr(0, text_ply.find("3 0 2 3")), "element face 12\nproperty list uchar int",
+                  "element tristrips 2\nproperty list int int") +
+         "10 0 4 1 5 3 7 2 6 0 4\n9 0 1 2 3 -1 4 6 5 7\n";
+}
+
+std::vector<std::string> stl_seeds() {
+  const std::string text = fixtures::as_text_stl(fixtures::cube()), bytes = fixtures::as_binary_stl(fixtures::cube());
+  return seeds_of([](const Polygons& body) { return fixtures::as_text_stl(in_triangles(body)); }) +
+         seeds_of([](const Polygons& body) { return fixtures::as_binary_stl(in_triangles(body)); }) +
+         std::vector<std::string>{with_attributes(bytes), bytes + "\n", replaced(text, "\n    ", " "),
+                                  "\xef\xbb\xbf" + replaced(text, "\n", "\r")};
+}
+std::vector<std::string> obj_seeds() {
+  const std::string text = fixtures::as_obj(fixtures::cube());
+  return seeds_of(fixtures::as_obj) +
+         std::vector<std::string>{"\xef\xbb\xbf" + text.substr(text.find("v ")),
+                                  replaced("# C:\\\n" + text, "v 0 1 0", "v +0.D0 \\\r1 0 1")};
+}
 std::vector<std::string> ply_seeds() {
   return seeds_of(fixtures::as_text_ply) +
          seeds_of([](const Polygons& body) { return fixtures::as_binary_ply(body, false); }) +
-         seeds_of([](const Polygons& body) { return fixtures::as_binary_ply(body, true); });
+         seeds_of([](const Polygons& body) { return fixtures::as_binary_ply(body, true); }) +
+         std::vector<std::string>{
+             of_strips(fixtures::as_text_ply(fixtures::cube())),
+             replaced(fixtures::as_text_ply(fixtures::cube()), "list uchar int", "list uint64 int8")};
 }
 std::vector<std::string> off_seeds() {
-  return seeds_of([](const Polygons& body) { return fixtures::as_off(body); });
+  const std::string text = fixtures::as_off(fixtures::cube());
+  std::string four_coordinates = "4OFF\n8 12 0\n";
+  for (const Vec3& p : fixtures::cube().points) {
+    for (int axis = 0; axis < 3; ++axis) fixtures::append_number(four_coordinates += " ", p[axis]);
+    four_coordinates += " 2\n";
+  }
+  return seeds_of([](const Polygons& body) { return fixtures::as_off(body); }) +
+         std::vector<std::string>{replaced(text, "OFF\n8", "OFF8"),
+                                  four_coordinates + text.substr(text.find("3 0 2 3"))};
 }
 
 }  // namespace
