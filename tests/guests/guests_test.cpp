@@ -122,7 +122,8 @@ TEST(Guest, SaysWhatAPluginDidInsteadOfAnswering) {
 TEST(Guest, BeginsEveryOutputAnew) {
   Guest guest(plugin(PLUGIN_in_c, "lazy"));
   const OperationDescription& operation = named("components");
-  const Question question = operation.draw(1, 12, Precision::binary32);
+  const Question question = operation.draw(1, 2, Precision::binary32);
+  ASSERT_EQ(question.kind, "no edges");
   const auto holds = [&](const Answer& answer) {
     const std::vector<Verdict> verdicts = operation.judge(question, answer.arrays, Precision::binary32);
     return std::all_of(verdicts.begin(), verdicts.end(), [](const Verdict& verdict) { return verdict.holds; });
@@ -1081,12 +1082,9 @@ std::vector<property_tests::Judgement> judged_in_one_load(const std::string& bac
 
 TEST(PluginsInBothPrecisions, HoldInWhateverUnitsAndHoweverTheySum) {
   std::vector<Case> cases;
-  for (const double spacing : {1e-6, 0.01, 1e3}) {
-    for (uint64_t seed = 1; seed <= 8; ++seed) {
-      cases.push_back(property_tests::draw_case(seed, 30 + 5 * static_cast<int>(seed)));
-      cases.back().spacing = spacing;
-      cases.back().clusters = static_cast<property_tests::ClusterKind>(seed % 3);
-    }
+  for (int index = 0; index < 24; ++index) {
+    cases.push_back(property_tests::draw_case(1 + static_cast<uint64_t>(index), 40 + index));
+    cases.back().spacing = index % 3 == 0 ? 1e-6 : index % 3 == 1 ? 0.01 : 1e3;
   }
   for (const char* const library : kOneStage) {
     for (const char* const sums : kSums) {
@@ -1098,10 +1096,10 @@ TEST(PluginsInBothPrecisions, HoldInWhateverUnitsAndHoweverTheySum) {
       }
       for (const Stage stage : {Stage::split, Stage::merge, Stage::expand}) {
         ASSERT_NE(all.find("rest frames", stage), nullptr) << name_of(stage);
-        EXPECT_GT(all.find("rest frames", stage)->checked, 100) << name_of(stage);
+        EXPECT_GT(all.find("rest frames", stage)->checked, 20) << name_of(stage);
       }
       ASSERT_NE(all.find("skin vertices", Stage::skin), nullptr);
-      EXPECT_GT(all.find("skin vertices", Stage::skin)->checked, 1000);
+      EXPECT_GT(all.find("skin vertices", Stage::skin)->checked, 500);
     }
   }
 }
@@ -1222,7 +1220,9 @@ TEST(PluginsInBothPrecisions, AreFoundWhereWeightsOrPiecesAreWrong) {
 // displacement from rest, and a plugin in single precision keeps coordinates. All else of such steps holds.
 TEST(KnownGap, TheJudgeOfTheStepRejectsRightPluginsInSinglePrecision) {
   std::vector<Case> cases;
-  for (uint64_t seed = 1; seed <= 6; ++seed) cases.push_back(property_tests::draw_moving_case(seed, 30));
+  for (int index = 0; index < 24; ++index) {
+    cases.push_back(property_tests::draw_moving_case(1 + static_cast<uint64_t>(index), index));
+  }
   harness::PropertySummaries all;
   const std::string backend = backend_name(PLUGIN_one_stage_plugin_in_single, "plain");
   for (const property_tests::Judgement& judgement : judged_in_one_load(backend, cases)) all.join(judgement.properties);

@@ -785,7 +785,10 @@ TEST_F(VectorsTest, AreJudgedByTheBoundsOfTheirPrecision) {
       }
       const VectorReport report = judge_vectors(vectors, answers, usual(vectors));
       EXPECT_EQ(report.holds(), precision == Precision::binary32) << little.operation << "\n" << summary(report);
-      for (const VectorFailure& failure : report.failures) EXPECT_EQ(failure.verdict.property, little.property);
+      const bool is_found =
+          std::any_of(report.failures.begin(), report.failures.end(),
+                      [&](const VectorFailure& failure) { return failure.verdict.property == little.property; });
+      EXPECT_EQ(is_found, precision == Precision::binary64) << little.operation;
     }
   }
 }
