@@ -40,10 +40,10 @@ std::optional<double> observed_order(std::span<const RefinementLevel> levels, st
 // By how much the last of these levels may be off [h], as its distances tell. If they fall by a factor r from level to
 // level, all that are still to come add up to the last one over r - 1 (a geometric series; of first order r is 2, and
 // the sum as much as the last one). r is the least that was seen, because one that is greater may be luck; at least the
-// last distance itself counts. Infinity: not known, because some distance did not fall, because there are not two finite
-// ones side by side, or because the last three levels do not remove the same particles in the same frames: a removal
-// that differs is an event, which makes distances of its own and hides how fast the others fall. Distances up to 1e-9 h
-// are rounding, which does not fall: they count as they are.
+// last distance itself counts. Infinity: not known, because some distance did not fall, because there are not two
+// finite ones side by side, or because the last three levels do not remove the same particles in the same frames: a
+// removal that differs is an event, which makes distances of its own and hides how fast the others fall. Distances up
+// to 1e-9 h are rounding, which does not fall: they count as they are.
 double remaining_error(std::span<const RefinementLevel> levels);
 // The same for people: "known to 0.04 h", or "not known", and why.
 std::string known_to(std::span<const RefinementLevel> levels);

@@ -35,17 +35,17 @@ void PrintTo(const SceneOn& tested, std::ostream* os) { *os << tested.scene << "
 class Scene : public Program, public testing::WithParamInterface<SceneOn> {};
 
 TEST_P(Scene, Holds) {
-  const Outcome outcome = cutproof("run " + scene(GetParam().scene) + " --check " + GetParam().checks + " --backend " +
-                                   GetParam().backend);
+  const Outcome outcome =
+      cutproof("run " + scene(GetParam().scene) + " --check " + GetParam().checks + " --backend " + GetParam().backend);
   EXPECT_EQ(outcome.status, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("0 failed: everything holds."), std::string::npos);
 }
 
 std::vector<SceneOn> scenes_and_backends() {
   std::vector<SceneOn> all;
-  for (const char* scene : {"cuboid_press", "uniform_stretch", "uniform_stretch_strain", "three_cuts", "liver_cut",
-                            "kidney_arc", "kidney_discontinuous", "irregular_sampled", "irregular_sampled_covered",
-                            "small_block"}) {
+  for (const char* scene :
+       {"cuboid_press", "uniform_stretch", "uniform_stretch_strain", "three_cuts", "liver_cut", "kidney_arc",
+        "kidney_discontinuous", "irregular_sampled", "irregular_sampled_covered", "small_block"}) {
     for (const char* backend : {"reference", "host", "simulated"}) all.push_back({scene, backend, ""});
   }
   // 37,704 particles, over 10 s each: kernels go other ways where clusters and particles are many, and what the paper

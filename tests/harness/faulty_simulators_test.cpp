@@ -101,8 +101,8 @@ std::string scene_named(const std::string& name) {
 
 // A block on a floor with friction, under gravity, cut in two.
 std::string small_block() { return scene_named("small_block"); }
-// Two pieces, one of them pulled away; nothing else acts on them. A fault takes 5 to 20 s here: there is an attraction only
-// once there are two pieces, so the whole scene is judged, twice.
+// Two pieces, one of them pulled away; nothing else acts on them. A fault takes 5 to 20 s here: there is an attraction
+// only once there are two pieces, so the whole scene is judged, twice.
 std::string kidney() {
   nlohmann::json scene = nlohmann::json::parse(scene_named("kidney_discontinuous"));
   scene["body"]["particles"] = 600;
