@@ -8,7 +8,6 @@
 #include "model/at.h"
 #include "model/fields.h"
 #include "model/rules.h"
-#include "oracles/rotation_match.h"
 #include "reference_cpu/reference.h"
 
 namespace cutproof::harness {
@@ -152,17 +151,17 @@ std::vector<RotationKnown> hand_back(const Origins& origins, const Clusters& end
   return known;
 }
 
-int32_t first_that_inherits_otherwise(const Setup& setup, const Origins& origins, const State& before,
+int32_t first_that_inherits_otherwise(const Origins& origins, const Clusters& before,
                                       const std::vector<RotationKnown>& known, const Clusters& end) {
-  const auto fits = [&](std::size_t c, int32_t from) {
-    if (!known.empty() && known[at(from)] != RotationKnown::yes)
-      return oracles::fits_cluster(setup, before, from, end.rotation[c]);
-    return same_bits(end.rotation[c], before.clusters.rotation[at(from)]) &&
-           end.degenerate[c] == before.clusters.degenerate[at(from)];
+  const auto may_come_from = [&](std::size_t c, int32_t from) {
+    const bool is_known = known.empty() || known[at(from)] == RotationKnown::yes;
+    return !is_known ||
+           (same_bits(end.rotation[c], before.rotation[at(from)]) && end.degenerate[c] == before.degenerate[at(from)]);
   };
   for (std::size_t c = 0; c < origins.size(); ++c) {
     if (origins[c].empty()) continue;
-    const bool any = std::any_of(origins[c].begin(), origins[c].end(), [&](int32_t from) { return fits(c, from); });
+    const bool any =
+        std::any_of(origins[c].begin(), origins[c].end(), [&](int32_t from) { return may_come_from(c, from); });
     if (!any) return static_cast<int32_t>(c);
   }
   return -1;

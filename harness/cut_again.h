@@ -33,10 +33,10 @@ Origins origins_of(const Setup& setup, const State& detected, Stage last, const 
 // known. Returns by place whether it is.
 std::vector<oracles::RotationKnown> hand_back(const Origins& origins, const Clusters& end, Clusters& before);
 
-// The first cluster of `end` that has no rotation that it could have inherited; -1: all have. `before`: after the step,
-// of the state before the cut; `known`: which of its rotations are (empty: all). Of one that is not, a rotation is
-// accepted that fits where the particles of its cluster are (oracles/rotation_match.h).
-int32_t first_that_inherits_otherwise(const Setup& setup, const Origins& origins, const State& before,
+// The first cluster of `end` that has no rotation that it could have inherited; -1: all have. `before`: the clusters
+// before the cut, as the step has left them; `known`: which of their rotations are (empty: all). One that is not may be
+// any.
+int32_t first_that_inherits_otherwise(const Origins& origins, const Clusters& before,
                                       const std::vector<oracles::RotationKnown>& known, const Clusters& end);
 
 }  // namespace cutproof::harness

@@ -231,7 +231,7 @@ void Judge::see_several(const Moment& moment, const std::array<bool, 6>& seen) {
     };
     const auto sets = unique ? oracles::Sets::compared : oracles::Sets::open;
     if (auto difference = oracles::difference_of_decisions(expected->state, end, sets)) reject(std::move(*difference));
-    const int32_t c = first_that_inherits_otherwise(setup_, origins, stepped, known_rotations, end.clusters);
+    const int32_t c = first_that_inherits_otherwise(origins, stepped.clusters, known_rotations, end.clusters);
     if (c >= 0) {
       const int32_t number = end.clusters.number[at(c)];
       std::string from;

@@ -101,14 +101,6 @@ RotationMatch match_rotation(const ShapeMatrix& shape, const Mat3& r, double uni
   return match(best_rotation(shape.a), shape, r, unit_roundoff, lag);
 }
 
-bool fits_cluster(const Setup& setup, const State& state, int32_t cluster, const Mat3& r) {
-  if (!std::all_of(r.m.begin(), r.m.end(), [](double entry) { return std::isfinite(entry); })) return false;
-  const double u = unit_roundoff(state);
-  const ShapeMatrix shape = shape_matrix(weighted_rest(setup.body, state.clusters), state.clusters.of(cluster), state.x,
-                                         u, state.place_rounding);
-  return match_rotation(shape, r, u, Lag::a_step).holds();
-}
-
 std::string known_confusion(const BestRotation& best, const Mat3& r) {
   if (r == Mat3{}) return "; it is the identity";
   const double turn = angle_to_best(best, r);

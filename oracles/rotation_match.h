@@ -6,8 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "model/setup.h"
-#include "model/state.h"
 #include "model/vec.h"
 #include "oracles/best_rotation.h"
 
@@ -39,10 +37,6 @@ struct RotationMatch {
 };
 // Requires R finite.
 RotationMatch match_rotation(const ShapeMatrix& shape, const Mat3& r, double unit_roundoff, Lag lag);
-
-// Whether a rotation, which may have any entries, fits where the particles of a cluster (by its place) of a state are,
-// as far as a step may leave it.
-bool fits_cluster(const Setup& setup, const State& state, int32_t cluster, const Mat3& r);
 
 // What a rotation that is not the best one is instead, as the end of a sentence: "; its transpose is the best one", or
 // that it is the identity; "" if it is nothing that is known by name.
