@@ -22,6 +22,8 @@ const double kHalfARightAngle = 1 - std::numbers::sqrt2 / 2;
 constexpr double kGap = 1e-6 * 0x1p24;
 // Below that a rotation is told from its transpose by no more than chance.
 constexpr double kFarNearer = 0x1p-10;
+// 5°. One step from rest turns clusters where contacts and grips reach, and not every one by as much.
+constexpr double kNeverTaken = std::numbers::pi / 36;
 
 double frobenius(const Mat3& a, const Mat3& b) {
   double squares = 0;
@@ -120,7 +122,7 @@ void check(Judged& judged, Verdict& verdict, Lag lag) {
   Nearest nearest;
   double greatest = 0, transposed_greatest = 0;  // turns [rad]
   int32_t farthest = -1;
-  bool all_are_best = true;
+  bool all_are_best = true, none_was_taken = true;
   for (int32_t c = 0; c < clusters.count(); ++c) {
     const ShapeMatrix shape = shape_of(c);
     const Mat3& r = clusters.rotation[at(c)];
@@ -132,7 +134,9 @@ void check(Judged& judged, Verdict& verdict, Lag lag) {
     if (!found.determined) continue;
     ++verdict.checked;
     nearest.see(found.gap, found.bound, c);
-    all_are_best = all_are_best && match(best, shape, r, u, Lag::none).holds();
+    const bool is_best = match(best, shape, r, u, Lag::none).holds();
+    all_are_best = all_are_best && is_best;
+    none_was_taken = none_was_taken && !is_best && r == Mat3{} && found.turn > kNeverTaken;
     if (found.turn > greatest) {
       greatest = found.turn;
       farthest = c;
@@ -144,16 +148,18 @@ void check(Judged& judged, Verdict& verdict, Lag lag) {
   verdict.bound = nearest.bound;
   // However small the turns: of all rotations the transposes are the best, and these are not.
   const bool all_transposed = !all_are_best && transposed_greatest <= kFarNearer * greatest;
-  if (nearest.holds() && !all_transposed) return;
+  none_was_taken = none_was_taken && verdict.checked > 1;
+  if (nearest.holds() && !all_transposed && !none_was_taken) return;
   const int32_t c = nearest.holds() ? farthest : nearest.where, number = judged.number(c);
   const BestRotation best = best_rotation(shape_of(c).a);
   const Mat3& r = clusters.rotation[at(c)];
   std::string instead = known_confusion(best, r);
-  if (all_transposed) {
+  if (all_transposed || none_was_taken) {
     const RotationMatch sharp = match(best, shape_of(c), r, u, Lag::none);
     verdict.measured = sharp.gap;
     verdict.bound = sharp.bound;
-    instead = "; the transpose of each rotation is the best one: are they stored column by column?";
+    instead = all_transposed ? "; the transpose of each rotation is the best one: are they stored column by column?"
+                             : "; every rotation is the identity: was none ever taken?";
   }
   for (int32_t other = 0; instead.empty() && other < clusters.count(); ++other) {
     const RotationMatch found = match_rotation(shape_of(other), r, u, Lag::none);

@@ -389,7 +389,7 @@ TEST(ForeignState, WithRotationsThatDoNotFitItsPositionsIsRejected) {
   const auto r = values_in<double>(identity, "rotations");
   for (std::size_t k = 0; k < r.size(); ++k) r[k] = k % 9 % 4 == 0 ? 1 : 0;
   EXPECT_THAT(failing(judged(identity)), ElementsAre("rotation match"));
-  EXPECT_THAT(verdict_on(judged(identity), "rotation match")->witness.text, HasSubstr("it is the identity"));
+  EXPECT_THAT(verdict_on(judged(identity), "rotation match")->witness.text, HasSubstr("is the identity"));
   io::ArrayFile restless = turned<double>();
   leave_out(restless, "rest");
   EXPECT_EQ(why_not(judged(restless), "rotation match"), "the file has no rest or nodes");

@@ -117,12 +117,25 @@ TEST(RotationMatch, TellsTheTransposeFromTheBestRotationHoweverLittleTheBodyIsTu
   EXPECT_FALSE(rotation_is_best(one.setup, one.state).holds);
 }
 
+TEST(RotationMatch, TellsThatNoRotationWasEverTaken) {
+  for (const double degrees : {3.0, 4.0, 30.0}) {  // about each of two axes
+    Turned turned(turn(degrees));
+    turned.give_all([](const Mat3&) { return Mat3{}; });
+    const Verdict verdict = rotation_fits(turned.setup, turned.state);
+    EXPECT_EQ(verdict.holds, degrees < 3.5) << verdict.witness.text;
+    if (!verdict.holds) EXPECT_NE(verdict.witness.text.find("was none ever taken?"), std::string::npos);
+    // One that was taken shows that the others may lag.
+    turned.state.clusters.rotation[3] = turn(degrees);
+    EXPECT_TRUE(rotation_fits(turned.setup, turned.state).holds);
+  }
+}
+
 TEST(RotationMatch, NamesTheIdentityAndTheRotationOfAnotherCluster) {
   Turned turned(turn(90));
   turned.give_all([](const Mat3&) { return Mat3{}; });
   Verdict verdict = rotation_fits(turned.setup, turned.state);
   EXPECT_FALSE(verdict.holds);
-  EXPECT_NE(verdict.witness.text.find("it is the identity"), std::string::npos) << verdict.witness.text;
+  EXPECT_NE(verdict.witness.text.find("every rotation is the identity"), std::string::npos) << verdict.witness.text;
   // Two halves, turned against each other; two rotations have changed places.
   Turned halves(turn(0));
   std::swap(halves.state.clusters.rotation.front(), halves.state.clusters.rotation.back());
