@@ -23,7 +23,7 @@ SCRUB = """const [most, done] = arguments;
   })();"""
 
 
-def scrubbed(page, name, show=None, most=60):
+def scrubbed(page, name, show=None, most=20):
     if show:
         page.choose("show", show)
     page.driver.set_script_timeout(200)  # on a machine that has other work
@@ -45,7 +45,7 @@ assert size < 30e6, f"{size / 1e6:.1f} MB"
 with Browser(work / "many.html", still=False) as page:
     assert page.data("body.kept") == 47 ** 3 and page.data("thinned") == "", page.data("thinned")
     for show in ("skin", "particles"):
-        scrubbed(page, "103,823 particles", show, 30)
+        scrubbed(page, "103,823 particles", show, 10)
 
 # A million particles: what was left out is said.
 print(work.run([made_pages, 100, 40, 1, "million.html"], 0).strip())
@@ -55,4 +55,4 @@ with Browser(work / "million.html", still=False) as page:
     said = page.text("#about")
     assert "of 1000000 particles" in said and "It shows" in said, said
     print(page.data("thinned"))
-    scrubbed(page, "a million particles", None, 10)
+    scrubbed(page, "a million particles", None, 5)
