@@ -25,7 +25,7 @@ std::string pieces_in_words(const Partition& partition) {
     const char* const before = k == 0 ? "" : k + 1 == sizes.size() ? " and " : ", ";
     listed += before + std::to_string(sizes[k]);
   }
-  if (shown < sizes.size()) listed += fmt::format(" and {} smaller", sizes.size() - shown);
+  if (shown < sizes.size()) listed += ", …";
   return fmt::format("{} pieces (of {} particles)", sizes.size(), listed);
 }
 
