@@ -246,6 +246,8 @@ int run(const RunOptions& options) {
     against->observe_reference(add);
   }
   harness::StagesRun stages;
+  // What was handed over to the backend may have been rounded: the state after a stage is kept as the next one begins.
+  std::optional<std::pair<Stage, harness::Snapshot>> not_recorded;
   const harness::Observer see = [&](const harness::Moment& moment) {
     stages.see(built.setup, moment);
     if (judge) judge->see(moment);
@@ -253,7 +255,8 @@ int run(const RunOptions& options) {
       relations->see(moment);
       for (Verdict& verdict : relations->take_verdicts()) judge->add(std::move(verdict));
     }
-    if (recorder) recorder->add(moment.span.last, *moment.after);
+    if (recorder && not_recorded) recorder->add(not_recorded->first, *moment.before);
+    not_recorded.emplace(moment.span.last, moment.after);
     if (against) compare(*against, built.setup, moment, runner.ran());
   };
   {
@@ -286,6 +289,7 @@ int run(const RunOptions& options) {
     errors->finish(state());
     errors_document = to_json(*errors, wanted.implementation && against ? &*against->lockstep : nullptr);
   }
+  if (recorder && not_recorded) recorder->add(not_recorded->first, *not_recorded->second);
   if (recorder) recorder->finish();
   // At once: whatever ends the run from here on leaves nothing that nobody asked for.
   std::unique_ptr<io::RecordingReader> recording;

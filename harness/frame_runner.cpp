@@ -77,18 +77,18 @@ bool FrameRunner::is_over() const {
 
 void FrameRunner::hand_over(bool to_backend) {
   if (to_backend == at_backend_) return;
-  std::vector<State> states = snapshot();
+  const std::vector<State> states = snapshot();  // without an observer present_ is that of an earlier piece
   if (!to_backend && !reference_) reference_ = reference::make_backend();
-  (to_backend ? backend_ : *reference_).load(setups_, std::move(states));
+  (to_backend ? backend_ : *reference_).load(setups_, states);
   at_backend_ = to_backend;
   // In single precision what is loaded is rounded, and the next span begins with that; decisions are not rounded.
   std::vector<State> taken = snapshot();
   for (std::size_t b = 0; b < taken.size(); ++b) {
-    if (taken[b] == *present_[b]) continue;
+    if (taken[b] == states[b]) continue;
     const bool rounds = to_backend && backend_.precision() != Precision::binary64;
-    if (!rounds || oracles::difference_of_decisions(*present_[b], taken[b], oracles::Sets::compared)) {
+    if (!rounds || oracles::difference_of_decisions(states[b], taken[b], oracles::Sets::compared)) {
       broken_.push_back(
-          broken_contract("loading changes nothing", Stage::step, present_[b]->frame, static_cast<int32_t>(b)));
+          broken_contract("loading changes nothing", Stage::step, states[b].frame, static_cast<int32_t>(b)));
     }
     present_[b] = std::make_shared<const State>(std::move(taken[b]));
   }

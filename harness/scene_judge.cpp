@@ -70,8 +70,8 @@ void SceneJudge::finish() {
   for (const PropertySummary& summary : summaries_.all()) judged += summary.judged;
   const bool is_empty = seen == 0 || setup_.body.particle_count() == 0;
   const bool ran_nothing = !stages_.any_by_backend() && !stages_.left().empty();
-  whole("something was judged", judged > 0 && !is_empty && !ran_nothing,
-        is_empty || ran_nothing ? 0 : static_cast<double>(judged), 1,
+  const double moments = ran_nothing ? 0 : seen * setup_.body.particle_count();
+  whole("something was judged", judged > 0 && moments > 0, moments, 1,
         ran_nothing ? "the backend ran no stage: the reference ran all of them for it"
         : is_empty  ? "there was nothing to judge: there are no frames, or the body has no particles"
                     : "no property looked at anything");

@@ -131,6 +131,19 @@ TEST(PartialBackend, ThatRunsOnlySplitIsJudgedOnThatAlone) {
   EXPECT_THAT(failing(*judge), IsEmpty());
 }
 
+// Without anybody who looks on there are no states of what lies between.
+TEST(PartialBackend, KeepsItsContractWhetherOrNotSomebodyLooksOn) {
+  const Scene scene = io::parse_scene(tests::kCutScene, "the test's scene");
+  const fixtures::Built built = fixtures::build(scene, "the test's scene");
+  for (const bool seen : {true, false}) {
+    Partial right(split_only);
+    harness::FrameRunner runner(right, {built.setup}, {built.state});
+    const harness::Observer look = [](const harness::Moment&) {};
+    while (!runner.is_over()) runner.run_frame(seen ? look : nullptr);
+    EXPECT_THAT(runner.take_broken_contracts(), IsEmpty()) << seen;
+  }
+}
+
 TEST(PartialBackend, ThatRunsOnlySplitIsFoundWrong) {
   Partial wrong(split_only, [](Span, State& state) {
     if (state.clusters.count() > 1) std::swap(state.clusters.rotation.front(), state.clusters.rotation.back());
