@@ -2,17 +2,31 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
+#include "oracles/best_rotation.h"
 #include "oracles/checks.h"
+#include "oracles/rounding.h"
 #include "oracles/step_model/admissible_step.h"
 
 namespace cutproof::oracles {
 
 namespace {
 
+// Whether σ2 + σ3 of the matrix of cluster c, whose members may be off by `off` [m], is above every threshold. A
+// singular value changes by at most the change of the matrix, and σ1 is at least |A| / √3.
+bool is_unique(const StepOutcome& outcome, int32_t c, double off, double u) {
+  const Mat3& a = outcome.shape[at(c)];
+  double squares = 0;
+  for (const double entry : a.m) squares += entry * entry;
+  const double change = std::sqrt(3.0 / squares) * outcome.arms[at(c)] * off;  // in units of σ1
+  return best_rotation(a).separation > 3 * change + degenerate_rounds(u) * u;
+}
+
 // Whether each cluster says of its rotation whether another would be as good (method.md §3). Without iterations nobody
 // asks: what a cluster said, it says. Where rounding or a backend's threshold decides, nobody can tell.
-void check_flags(const State& before, const State& after, const StepOutcome& outcome,
+// `off`: by how much the places of the last iteration may be others [m].
+void check_flags(const State& before, const State& after, const StepOutcome& outcome, double off,
                  std::span<const RotationKnown> known_rotations, Verdict& verdict) {
   const Clusters& clusters = after.clusters;
   for (int32_t c = 0; c < clusters.count(); ++c) {
@@ -25,7 +39,7 @@ void check_flags(const State& before, const State& after, const StepOutcome& out
     } else if (outcome.is_thin[at(c)] != 0) {
       if (!says)
         fail(verdict, {{number}}, "cluster {} lies on a line at rest, but is not marked as not unique", number);
-    } else if (outcome.is_free[at(c)] == 0 && says) {
+    } else if (says && is_unique(outcome, c, off, unit_roundoff(after))) {
       fail(verdict, {{number}}, "the rotation of cluster {} is the only best one, but is marked as not unique", number);
     }
     if (!verdict.holds) return;
@@ -72,7 +86,11 @@ StepAgain step_again(const Setup& setup, const State& before, const State& after
     fail(verdict, concerned, "the {}{} is {:.3g} h from where an admissible step ends, rounding explains {:.3g} h",
          name_of(step.part), whose, step.measured, step.bound);
   } else if (!step.outcome.x.empty()) {
-    check_flags(before, after, step.outcome, known_rotations, verdict);
+    double off = step.bound * setup.body.grid.spacing;
+    for (const double square : step.outcome.rounding) off = std::max(off, kDeviations * std::sqrt(square));
+    // With retardation rotations are those of places that are extrapolated by τ / dt.
+    off *= 1 + setup.step.retardation / setup.substep_length[at(before.frame)];
+    check_flags(before, after, step.outcome, off, known_rotations, verdict);
   }
   again.verdict = conclude(std::move(verdict), kNoStep);
   return again;

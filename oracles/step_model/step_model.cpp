@@ -30,9 +30,6 @@ constexpr double kAlikeRounds = 256;
 // What is this near to a border of the blade, in roundings of the distance from its edge, may be on it to the bit.
 constexpr double kBorderRounds = 32;
 
-// Up to this, in units of u, (σ2 + σ3) / σ1 may be taken for zero: backends have thresholds, 9,000 in double precision
-// and 4 to 16 in single, and what rounds moves it.
-double degenerate_rounds(double u) { return u < 1e-10 ? 1e4 : 64; }
 // Up to so many times what the rounding of places makes of the matrix, it says nothing of how a cluster is turned.
 constexpr double kLost = 100;
 // Less than this of the previous rotation is nothing to go by, in whatever precision (the reference takes 1e-9), nor so
@@ -394,7 +391,10 @@ void StepModel::Run::match_shapes(int32_t s, int32_t j) {
   if (!disturbed_) std::fill(goal_rounding_.begin(), goal_rounding_.end(), 0.0);
   if (is_last) {
     out_.shape.resize(model_.clusters_.size());
-    for (const Cluster& cluster : model_.clusters_) out_.is_thin.push_back(cluster.extent != Cluster::Extent::more);
+    for (const Cluster& cluster : model_.clusters_) {
+      out_.is_thin.push_back(cluster.extent != Cluster::Extent::more);
+      out_.arms.push_back(cluster.arms);
+    }
   }
   for (int32_t c = 0; c < clusters.count(); ++c) {
     const Cluster& cluster = model_.clusters_[at(c)];

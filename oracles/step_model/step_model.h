@@ -19,6 +19,8 @@ struct StepOutcome {
   std::vector<NearDecision> near;
   // Of the last iteration: Σ w (x − t)(X − T)ᵀ of each cluster [m], empty without iterations.
   std::vector<Mat3> shape;
+  // [m] Σ w |X − T|: by so much a displacement of its members by 1 m changes `shape` at most [kg m].
+  std::vector<double> arms;
   // [m] 1: rounding, or a backend's threshold, decides which of many best rotations a cluster has in the end. It is the
   // nearest to the previous one here, unless it was given; any of them in a disturbed run.
   std::vector<uint8_t> is_free;
@@ -37,6 +39,10 @@ struct StepOutcome {
   std::vector<double> turn_rounding;  // [m] of rotations [rad²]
   double impulse_rounding = 0;        // [(kg m/s)²]
 };
+
+// Up to this, in units of u, (σ2 + σ3) / σ1 may be taken for zero: backends have thresholds, 9,000 in double precision
+// and 4 to 16 in single, and what rounds moves it.
+inline double degenerate_rounds(double u) { return u < 1e-10 ? 1e4 : 64; }
 
 class StepModel {
  public:

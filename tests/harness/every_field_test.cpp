@@ -34,7 +34,7 @@ constexpr const char* kFieldsScene = R"({"version": 1, "name": "every field",
   "clusters": {"side": 2},
   "frame": {"settle": 0.032}, "detect": {"criterion": "geometric"}, "step": {"gravity": [0, 0, -9.81]},
   "ground": {"friction": 0.5}, "split": {"debris": 2},
-  "blade": {"speed": 1, "strokes": [{"points": [[0.5, 0.5, 2.6], [0.5, 0.5, -0.3]], "along": [0, 1, 0]}]}})";
+  "blade": {"speed": 0.5, "strokes": [{"points": [[0.5, 0.5, 2.6], [0.5, 0.5, -0.3]], "along": [0, 1, 0]}]}})";
 
 fixtures::Built built_scene() {
   fixtures::Built built = fixtures::build(io::parse_scene(kFieldsScene, "the test's scene"), "the test's scene");

@@ -201,7 +201,7 @@ TEST_F(RecordedValues, AreEachHeldAgainstTheOthersOrJudged) {
         if (item.attribute.empty()) {
           const hdf5::Id space(H5Dget_space(object.get()), H5Sclose, "space");
           const auto count = static_cast<std::size_t>(H5Sget_simple_extent_npoints(space.get()));
-          if (count > 0) places = {0, count / 2, count - 1};
+          if (count > 0) places = {0, count - 1};
         } else {
           places = {0};
         }
@@ -233,7 +233,7 @@ TEST_F(RecordedValues, AreEachHeldAgainstTheOthersOrJudged) {
       }
     }
   }
-  EXPECT_GT(changes, 300);
+  EXPECT_GT(changes, 200);
 }
 
 // --- What is in two places names both --------------------------------------------------------------------------------
@@ -262,7 +262,7 @@ TEST_F(RecordedValues, OfTheSceneAreThoseOfTheSetup) {
   refused([](Scene& s) { s.body.shape->size.x = 0.07; }, {"/setup/body/nodes"});
   refused([](Scene& s) { s.clusters.small = 5; }, {"tau of the first"});
   refused([](Scene& s) { s.clusters.cap = 5; }, {"cap of the first"});
-  refused([](Scene& s) { s.blade->speed = 0.99; }, {"/setup/blade_moves"});
+  refused([](Scene& s) { s.blade->speed = 0.5; }, {"/setup/blade_moves"});
   refused([](Scene& s) { s.grips.front().velocity.y = 0.02; }, {"/setup/grips/displacement"});
   refused([](Scene& s) { s.walls.front().friction = 0.25; }, {"/setup/walls/friction", "0.5", "0.25"});
   // The same run, of which less is asked.
