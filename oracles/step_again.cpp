@@ -25,9 +25,11 @@ bool is_unique(const StepOutcome& outcome, int32_t c, double off, double u) {
 
 // Whether each cluster says of its rotation whether another would be as good (method.md §3). Without iterations nobody
 // asks: what a cluster said, it says. Where rounding or a backend's threshold decides, nobody can tell.
-// `off`: by how much the places of the last iteration may be others [m].
-void check_flags(const State& before, const State& after, const StepOutcome& outcome, double off,
+void check_flags(const Setup& setup, const State& before, const State& after, const AdmissibleStep& step,
                  std::span<const RotationKnown> known_rotations, Verdict& verdict) {
+  const StepOutcome& outcome = step.outcome;
+  // With retardation rotations are those of places that are extrapolated by τ / dt.
+  const double stretch = 1 + setup.step.retardation / setup.substep_length[at(before.frame)];
   const Clusters& clusters = after.clusters;
   for (int32_t c = 0; c < clusters.count(); ++c) {
     if (!known_rotations.empty() && known_rotations[at(c)] != RotationKnown::yes) continue;
@@ -39,7 +41,10 @@ void check_flags(const State& before, const State& after, const StepOutcome& out
     } else if (outcome.is_thin[at(c)] != 0) {
       if (!says)
         fail(verdict, {{number}}, "cluster {} lies on a line at rest, but is not marked as not unique", number);
-    } else if (says && is_unique(outcome, c, off, unit_roundoff(after))) {
+    } else if (says) {
+      double off = 0;  // [h]
+      for (const int32_t i : clusters.of(c)) off = std::max(off, step.position_bound[at(i)]);
+      if (!is_unique(outcome, c, off * stretch * setup.body.grid.spacing, unit_roundoff(after))) continue;
       fail(verdict, {{number}}, "the rotation of cluster {} is the only best one, but is marked as not unique", number);
     }
     if (!verdict.holds) return;
@@ -86,11 +91,7 @@ StepAgain step_again(const Setup& setup, const State& before, const State& after
     fail(verdict, concerned, "the {}{} is {:.3g} h from where an admissible step ends, rounding explains {:.3g} h",
          name_of(step.part), whose, step.measured, step.bound);
   } else if (!step.outcome.x.empty()) {
-    double off = step.bound * setup.body.grid.spacing;
-    for (const double square : step.outcome.rounding) off = std::max(off, kDeviations * std::sqrt(square));
-    // With retardation rotations are those of places that are extrapolated by τ / dt.
-    off *= 1 + setup.step.retardation / setup.substep_length[at(before.frame)];
-    check_flags(before, after, step.outcome, off, known_rotations, verdict);
+    check_flags(setup, before, after, step, known_rotations, verdict);
   }
   again.verdict = conclude(std::move(verdict), kNoStep);
   return again;

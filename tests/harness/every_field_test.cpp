@@ -30,7 +30,7 @@ namespace {
 
 // Every stage has something to do in it, and the ground something to push (tests/harness/judge_test.cpp).
 constexpr const char* kFieldsScene = R"({"version": 1, "name": "every field",
-  "body": {"shape": {"kind": "box", "size": [0.08, 0.04, 0.02]}, "spacing": 0.01},
+  "body": {"shape": {"kind": "box", "size": [0.16, 0.06, 0.02]}, "spacing": 0.01},
   "clusters": {"side": 2},
   "frame": {"settle": 0.032}, "detect": {"criterion": "geometric"}, "step": {"gravity": [0, 0, -9.81]},
   "ground": {"friction": 0.5}, "split": {"debris": 2},
@@ -107,6 +107,9 @@ std::vector<Step> a_whole_frame(const fixtures::Built& built) {
   const auto backend = reference::make_backend();
   backend->load({built.setup}, {built.state});
   for (int64_t frame = 0; frame < built.setup.frame_count(); ++frame) {
+    State begin = backend->snapshot().front();
+    begin.edge_covered = false;  // so that an expansion looks after a second cut, too
+    backend->load({built.setup}, {begin});
     std::vector<Step> steps;
     bool all = true;
     for (const Stage stage : kStages) {
