@@ -130,9 +130,9 @@ TEST_F(Relations, RejectAForceThatOnlyAnotherPieceThanTheFirstExerts) {
   EXPECT_THAT(rejected_by(fault), Contains("no ghost force"));
 }
 
-// In single precision one piece pulls at another with 3e-5 of its weight, the more the farther they part. A run is asked
-// for relations between runs, and that finds it. A recording is asked for none, and passes: the last line is to be
-// turned round once it does not.
+// In single precision one piece pulls at another with 3e-5 of its weight, the more the farther they part. A run is
+// asked for relations between runs, and that finds it. A recording is asked for none, and passes: the last line is to
+// be turned round once it does not.
 TEST(KnownGap, AGhostForceOfThreeHundredThousandthsOfAWeightPassesInARecording) {
   Fault fault{"SlightGhostForce"};
   fault.before_step = [](const cutproof::Setup& setup, State& state) {
@@ -158,7 +158,8 @@ TEST(KnownGap, AGhostForceOfThreeHundredThousandthsOfAWeightPassesInARecording) 
   Simulator simulator(fault);
   RecordedScene recorded(kTwoCuts, simulator);
   EXPECT_THAT(failing(ask(recorded, std::make_unique<Simulator>(fault)).verdicts), Contains("no ghost force"));
-  EXPECT_THAT(failing(recorded.judged()->verdicts()), IsEmpty()) << "found: turn this line round, and take the case out of the known gaps";
+  EXPECT_THAT(failing(recorded.judged()->verdicts()), IsEmpty())
+      << "found: turn this line round, and take the case out of the known gaps";
 }
 
 // The bounds of these two grow with the body and with the roundoff of single precision, up to several spacings: there
