@@ -11,15 +11,17 @@ namespace cutproof::cli {
 OpenRecording open_recording(const std::string& name) {
   OpenRecording opened;
   opened.reader = std::make_unique<io::RecordingReader>(name);
-  static_cast<fixtures::RecordedScene&>(opened) = fixtures::scene_of(*opened.reader, name);
   const io::Recording& recording = opened.header();
-  const harness::BackendDescriptor* const backend = harness::find_backend(recording.backend);
+  // A plugin has a precision of its own.
+  const bool is_ours = !recording.backend.starts_with("plugin:");
+  const harness::BackendDescriptor* const backend = is_ours ? harness::find_backend(recording.backend) : nullptr;
   if (backend != nullptr && backend->precision != recording.precision) {
     throw InputError(io::recording_paths(name).index, "unit_roundoff",
                      fmt::format("This is {}, and the backend {} has {}.", unit_roundoff(recording.precision),
                                  backend->name, unit_roundoff(backend->precision)),
                      "A program that writes recordings gives its own name as `backend`; else record the scene again.");
   }
+  static_cast<fixtures::RecordedScene&>(opened) = fixtures::scene_of(*opened.reader, name);
   return opened;
 }
 

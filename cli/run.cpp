@@ -204,6 +204,7 @@ int run(const RunOptions& options) {
     if (build_options.mesh) {
       recorded.body.shape.reset();
       recorded.body.mesh = build_options.mesh;
+      recorded.body.mesh->file = printable(recorded.body.mesh->file);  // for the record: nobody reads it again
     }
     const bool is_cut_short = built.schedule.is_cut_short;
     recorder.emplace(record, built.setup, io::write_scene(recorded), options.backend.name,

@@ -328,6 +328,8 @@ std::string acceptable_text(const Vectors& vectors) {
         "surface: closed, oriented and 2-manifold. Each directed edge of a triangle is there once, its reverse once; "
         "the triangles at a vertex form one fan; each vertex is used. Triangles are counter-clockwise seen from "
         "outside.\n"
+        "surface places: each vertex lies in a cell of the grid that has living and empty corners, or on its "
+        "boundary.\n"
         "surface shells: must_outer_shells closed parts of positive volume, one around each component, and "
         "must_inner_shells of negative volume, one around each cavity. Nodes are joined by edges of the grid; empty "
         "ones also across the diagonals of faces.",

@@ -39,7 +39,8 @@ void check_flags(const Setup& setup, const State& before, const State& after, co
       if (says != said)
         fail(verdict, {{number}}, "no iteration has looked at cluster {}, but its flag changed", number);
     } else if (outcome.is_thin[at(c)] != 0) {
-      if (!says)
+      // In single precision a sum rounds by as much as the least threshold that a backend has.
+      if (!says && after.precision == Precision::binary64)
         fail(verdict, {{number}}, "cluster {} lies on a line at rest, but is not marked as not unique", number);
     } else if (says) {
       double off = 0;  // [h]

@@ -74,9 +74,9 @@ void require_same_campaign(const json& whole, const json& part, const std::strin
   }
 }
 
-// Stages that the reference ran for the backend, in order; documents of earlier versions do not say it.
+// Stages that the reference ran for the backend, in order.
 std::vector<std::string> left_stages(const json& document) {
-  return document.value("left_to_reference", std::vector<std::string>());
+  return document.at("left_to_reference").get<std::vector<std::string>>();
 }
 json left_in_either(const json& one, const json& other) {
   const std::vector<std::string> here = left_stages(one), there = left_stages(other);

@@ -1176,7 +1176,7 @@ TEST(PluginsInBothPrecisions, HoldFarFromTheOriginAndFailThereByTwiceTheBound) {
         EXPECT_LT(right.bound, after.precision == Precision::binary32 ? 0.4 : 1e-8);
         for (const int32_t c : {0, 1, 2}) {
           State wrong = after;
-          wrong.clusters.rest_center[at(c)].y += (right.measured + 2 * right.bound) * spacing;
+          wrong.clusters.rest_center[at(c)].y += (after.precision == Precision::binary32 ? 0.8 : 2e-8) * spacing;
           EXPECT_FALSE(oracles::rest_frames(one.setup, wrong).holds) << c;
         }
       }
@@ -1239,15 +1239,14 @@ TEST(KnownGap, TheJudgeOfTheStepRejectsRightPluginsInSinglePrecision) {
   }
 }
 
-// Turn this round when the step is judged iterate by iterate: right whole frames leave more of their steps undecided
-// than a campaign may (1 %), so `fuzz` ends with "too little was tested".
-TEST(KnownGap, TheJudgeOfTheStepLeavesTooMuchOfRightWholeFramesUndecided) {
+// Else `fuzz` would end with "too little was tested".
+TEST(PluginBackend, LeavesOfWholeFramesNoMoreUndecidedThanACampaignMay) {
   const property_tests::Campaign moving = dissected(backend_name(PLUGIN_whole_frames_plugin), 60, true);
   ASSERT_TRUE(moving.violations.empty()) << property_tests::describe(moving.violations.front().verdict);
   const harness::PropertySummary* const step = moving.properties.find("admissible step", Stage::step);
   ASSERT_NE(step, nullptr);
-  EXPECT_GT(static_cast<double>(step->undecided), 0.01 * static_cast<double>(step->checked))
-      << "the gap is closed: a right plugin of whole frames must pass `fuzz` now";
+  EXPECT_GT(step->checked, 1000);
+  EXPECT_LT(static_cast<double>(step->undecided), 0.01 * static_cast<double>(step->checked));
 }
 
 // Bodies of an odd number of particles are refused: they count as that, and the others are judged.
@@ -1348,7 +1347,7 @@ TEST_F(JudgeVerb, FindsFaultsOfWidthByDefaultAndSavesTheirSize) {
   const Ran wrong = run(fmt::format("judge {} components --parameters labels16 --cases 100 --save {} --json {}",
                                     PLUGIN_in_c, folder_, document));
   EXPECT_EQ(wrong.status, 1);
-  EXPECT_TRUE(contains(wrong.output, "the question of size 65537 (many vertices without edges)")) << wrong.output;
+  EXPECT_TRUE(contains(wrong.output, "the question of size 65537 (many vertices")) << wrong.output;
   EXPECT_TRUE(contains(wrong.output, "simplified to 65537 particles: 0 and 65536 both have the label 0"))
       << wrong.output;
   const json failure = json::parse(text_of(document)).at("operations").at(0).at("failures").at(0);
