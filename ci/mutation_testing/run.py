@@ -390,20 +390,21 @@ def simplicity(rows):
 
 
 def write_alone(by_itself):
-    """Puts the section of --alone into the table's page, counts by stage; what else stands there stays."""
+    """Puts the section of --alone into the table's page, counts by stage of those asked; what else stands there stays."""
     stages = {name: read_mutant(HERE / "mutants" / f"{name}.patch").stage for name in by_itself}
     lines = ["## " + ALONE_TITLE, "",
              "Without this project's tests: " + "; ".join(f"*{name}*: " + ", ".join(
                  f"`cutproof {command.split(' --simplify')[0]}`" for command in commands)
                                                          for name, commands in ALONE.items())
              + "; on each backend that the mutant changes.", "",
-             "| stage | mutants | " + " | ".join(ALONE) + " | any of them |", "|---|---|" + "---|" * (len(ALONE) + 1)]
+             "| stage | " + " | ".join(ALONE) + " | any of them |", "|---|" + "---|" * (len(ALONE) + 1)]
     for stage in (*STAGES, "all"):
         of_stage = [found for name, found in by_itself.items() if stage in (stages[name], "all")]
         if of_stage:
-            counts = [sum(1 for found in of_stage if found[name]) for name in ALONE]
-            counts.append(sum(1 for found in of_stage if any(found.values())))
-            lines.append(f"| {stage} | {len(of_stage)} | " + " | ".join(map(str, counts)) + " |")
+            asked = [[found[name] for found in of_stage if name in found] for name in ALONE]
+            counts = [f"{sum(map(bool, answers))} of {len(answers)}" for answers in asked]
+            counts.append(f"{sum(any(found.values()) for found in of_stage)} of {len(of_stage)}")
+            lines.append(f"| {stage} | " + " | ".join(counts) + " |")
     missed = [name for name in sorted(by_itself) if not any(by_itself[name].values())]
     section = "\n".join(lines + ["", f"None of them finds: {', '.join(missed) or 'no mutant'}."]) + "\n\n"
     head, *sections = re.split(r"^(?=## )", TABLE.read_text(), flags=re.MULTILINE)
