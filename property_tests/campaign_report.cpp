@@ -9,6 +9,7 @@
 #include <iterator>
 #include <map>
 #include <set>
+#include <stdexcept>
 #include <utility>
 
 #include "model/error.h"
@@ -74,9 +75,15 @@ void require_same_campaign(const json& whole, const json& part, const std::strin
   }
 }
 
-// Stages that the reference ran for the backend, in order.
+// Stages that the reference ran for the backend, in order; none where the document does not say it.
 std::vector<std::string> left_stages(const json& document) {
-  return document.at("left_to_reference").get<std::vector<std::string>>();
+  const auto stages = document.value("left_to_reference", std::vector<std::string>());
+  for (const std::string& stage : stages) {
+    if (std::find(kStageNames.begin(), kStageNames.end(), stage) == kStageNames.end()) {
+      throw std::invalid_argument("left_to_reference: there is no stage \"" + stage + "\"");
+    }
+  }
+  return stages;
 }
 json left_in_either(const json& one, const json& other) {
   const std::vector<std::string> here = left_stages(one), there = left_stages(other);
