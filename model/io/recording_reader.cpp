@@ -90,23 +90,6 @@ void require_block(const std::string& column, std::size_t i, int64_t first, int6
                                         first, count, rows));
 }
 
-// Snapshot after snapshot has the rows of the one before, or those after all before: none is skipped, so no entry may
-// be another than it is. Of no cells the first row is 0.
-void require_order(const std::string& column, const std::vector<int64_t>& first, const std::vector<int64_t>& counts,
-                   int64_t rows, bool of_cells) {
-  int64_t next = 0;
-  for (std::size_t i = 0; i < first.size(); ++i) {
-    if (i > 0 && first[i] == first[i - 1] && counts[i] == counts[i - 1]) continue;
-    const int64_t wanted = of_cells && counts[i] == 0 ? 0 : next;
-    if (first[i] != wanted) {
-      throw hdf5::Error(column, fmt::format("Entry {} is {}, and the rows before end at {}.", i, first[i], wanted));
-    }
-    next += counts[i];
-  }
-  if (next != rows)
-    throw hdf5::Error(column, fmt::format("It leads to {} rows of the {} that are stored.", next, rows));
-}
-
 void require_length(const std::string& field, std::size_t entries, std::size_t wanted) {
   if (entries == wanted) return;
   throw hdf5::Error(field, fmt::format("This has {} entries, and should have {}.", entries, wanted));
@@ -314,12 +297,9 @@ void RecordingReader::File::check_ranges() const {
       case Storage::cells:
         require_length(column + "_row", index_column.size(), count);
         const int64_t rows = tables[k].rows() / (recorded.storage == Storage::cells ? 3 : 1);
-        std::vector<int64_t> counts;
         for (std::size_t i = 0; i < count; ++i) {
-          counts.push_back(count_in(recorded.field.space, i));
-          require_block(column + "_row", i, index_column[i], counts.back(), rows);
+          require_block(column + "_row", i, index_column[i], count_in(recorded.field.space, i), rows);
         }
-        require_order(column + "_row", index_column, counts, rows, recorded.storage == Storage::cells);
     }
   }
 }

@@ -184,7 +184,15 @@ void set_all(hid_t file, const std::string& dataset, const std::function<T(T)>& 
 // Said once, and by nobody but the author: there is nothing to hold it against.
 const std::set<std::string> kAuthorsWord = {"0 / backend", "0 / unit_roundoff"};
 
+bool same_states(const std::string& one, const std::string& other) {
+  const io::RecordingReader a(one), b(other);
+  bool same = a.header().snapshot_count == b.header().snapshot_count;
+  for (int64_t i = 0; same && i < a.header().snapshot_count; ++i) same = a.snapshot(i).state == b.snapshot(i).state;
+  return same;
+}
+
 TEST_F(RecordedValues, AreEachHeldAgainstTheOthersOrJudged) {
+  const auto says_the_same = [] { return same_states(whole(), copy()); };
   ASSERT_EQ(checked(whole()).text, "");
   const std::vector<std::string> files = files_of(whole());
   int64_t changes = 0;
@@ -228,6 +236,8 @@ TEST_F(RecordedValues, AreEachHeldAgainstTheOthersOrJudged) {
             }
           });
         });
+        // Rows that hold the same, or none of them, are no other state.
+        if (outcome.text.empty() && item.object.ends_with("_row") && says_the_same()) continue;
         EXPECT_NE(outcome.text, "") << "entry " << place;
         ++changes;
       }
