@@ -6,7 +6,6 @@
 
 #include "oracles/best_rotation.h"
 #include "oracles/checks.h"
-#include "oracles/rounding.h"
 #include "oracles/step_model/admissible_step.h"
 
 namespace cutproof::oracles {

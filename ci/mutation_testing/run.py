@@ -344,7 +344,6 @@ def backends_of(mutant):
 
 def alone(backends):
     """For each of ALONE the property that fails first of the program that is built; "" if everything holds."""
-    program = next(path for path in BUILD.glob("**/cutproof") if path.is_file() and os.access(path, os.X_OK))
     RUN.mkdir(parents=True, exist_ok=True)
     result = RUN / "alone.json"
     found = {}
@@ -353,7 +352,7 @@ def alone(backends):
         for command in [f"{c} --backend {backend}" for backend in backends for c in commands]:
             result.unlink(missing_ok=True)
             try:
-                done = subprocess.run([str(program), *command.split(), "--json", str(result)], cwd=TREE,
+                done = subprocess.run([program("cutproof"), *command.split(), "--json", str(result)], cwd=TREE,
                                       capture_output=True, text=True, errors="replace", timeout=MOST_SECONDS)
             except subprocess.TimeoutExpired:
                 found[name] = "no end"
