@@ -193,13 +193,16 @@ class Build:
 
     def left_out(self):
         """Where files need no package, by name."""
-        rules = {"the source tree": pathlib.Path(self.cache["CMAKE_HOME_DIRECTORY"]), "the build folder": self.folder,
-                 "VTK's headers, as ci/install.sh unpacks them": pathlib.Path(self.cache["CMAKE_HOME_DIRECTORY"]) / "build/libraries"}
-        rules["ccache, which is used where it is installed"] = pathlib.Path(self.cache["CCACHE"])
+        source = pathlib.Path(self.cache["CMAKE_HOME_DIRECTORY"])
+        rules = [("the source tree", source), ("the build folder", self.folder),
+                 ("VTK's headers, as ci/install.sh unpacks them", source / "build/libraries"),
+                 ("ccache, which is used where it is installed", pathlib.Path(self.cache["CCACHE"])),
+                 # its compiler may be a script elsewhere that calls it
+                 ("the CUDA toolkit", pathlib.Path(self.cache.get("CMAKE_CUDA_COMPILER", "/none")))]
         toolkit = pathlib.Path(self.cache.get("CUDAToolkit_BIN_DIR", "/none")).parent
         if toolkit != pathlib.Path("/usr"):
-            rules["the CUDA toolkit"] = toolkit
-        return {str(place): name for name, path in rules.items() for place in {path, path.resolve()}}
+            rules.append(("the CUDA toolkit", toolkit))
+        return {str(place): name for name, path in rules for place in {path, path.resolve()}}
 
 
 def named_in_tests():
