@@ -148,7 +148,7 @@ int info(const InfoOptions& options, const CLI::App& program) {
   print_words();
   print_properties();
   insist(
-      "scene files: versions 1 to {} (`cutproof info --scene` lists every field)\n"
+      "scene files: version {} (`cutproof info --scene` lists every field)\n"
       "recordings: temporal VTKHDF 2.0, format {}\n"
       "licence: sources MIT; this program links CGAL and SuiteSparse, which makes it GPL\n",
       kSceneVersion, io::kFormatVersion);

@@ -119,8 +119,7 @@ struct Expectations {
   friend bool operator==(const Expectations&, const Expectations&) = default;
 };
 
-// Of the format. What a scene leaves out is as it was when its version was new: in version 1 the plain iteration, in 1
-// and 2 both ends of an open edge, in 3 and 4 one of them and not the nearer one.
+// Of the format: a reader refuses any other.
 inline constexpr int32_t kSceneVersion = 5;
 
 // How often the scene's frames detect. substep: each frame is laid out as as many frames of one substep, in all of

@@ -124,8 +124,7 @@ void describe(auto& v, BodySpec& s) {
   v.field(s.density, {"density", "Mass per volume: each particle weighs density · h³.", above(0, 1e9, "kg/m³")});
   v.field(s.fit_skin, {"fit_skin",
                        "Whether the skin of the uncut body lies where its surface crosses the grid edges; otherwise "
-                       "it lies `skin.alpha` beyond its particles (method.md §8). Left out, it is "
-                       "false in a scene of version 1 to 3."});
+                       "it lies `skin.alpha` beyond its particles (method.md §8)."});
   v.field(s.align, {"align",
                     "Turn the principal axes of a mesh (longest, middle, shortest) to x, y, z before anything else. "
                     "Implicit shapes stay as their numbers put them."});
@@ -158,7 +157,7 @@ void describe(auto& v, StepParameters& s) {
   v.field(s.acceleration, {"acceleration",
                            "`chebyshev`: the same answer in fewer iterations, each of which costs a little more; the "
                            "energy need not fall in every one (method.md §11). `implicit` only: left out, it is `none` "
-                           "with `published`, and in a scene of version 1."});
+                           "with `published`."});
   v.field(s.damping, {"damping", "c: velocities decay as exp(−c t).", between(0, 1e9, "1/s")});
   v.field(
       s.retardation,
@@ -182,8 +181,7 @@ void describe(auto& v, DetectParameters& s) {
            "between them (along × back is positive), else the one with more such edges, of equals the lower "
            "particle; or `nearer`: as `one`, but of two ends on different sides of that plane the positive "
            "one if the clusters carry it nearer to it by more than h/8, so that both faces of the cut lie "
-           "where the blade passed (method.md §4). Left out, it is `both` with other criteria, and in a scene "
-           "of version 1 or 2; in one of version 3 or 4 `one`."});
+           "where the blade passed (method.md §4). Left out, it is `both` with other criteria."});
   v.field(s.epsilon,
           {"epsilon", "Distance from a neighbour beyond which a particle is removed. At 1 or less, tissue at rest is.",
            above(0, 1e6, "h")});
@@ -222,8 +220,7 @@ void describe(auto& v, SkinParameters& s) {
   v.field(s.fit_cuts,
           {"fit_cuts",
            "Whether a vertex that a cut brings about lies where the plane of the blade crosses its grid edge; "
-           "otherwise it lies `alpha` beyond its particle (method.md §8). Left out, it is false in a scene of "
-           "version 1 to 3."});
+           "otherwise it lies `alpha` beyond its particle (method.md §8)."});
 }
 
 void describe(auto& v, StrokeSpec& s) {
@@ -322,7 +319,7 @@ void describe(auto& v, FrameFields& s) {
 }
 
 void describe(auto& v, Scene& s) {
-  v.field(s.version, {"version", "Of this format: 5; 1 to 4 are read as ever.", between(1, kSceneVersion), kRequired});
+  v.field(s.version, {"version", "Of this format; no other is read.", between(kSceneVersion, kSceneVersion), kRequired});
   v.field(s.name, {"name", "A short name, for reports.", {}, kOptional, kMostNameBytes});
   v.field(s.description, {"description", "What the scene shows, for people.", {}, kOptional, kMostDescriptionBytes});
   v.field(s.seed, {"seed", "Of everything random.", between(0, 18446744073709551615.0)});

@@ -340,7 +340,7 @@ void read(const json& value, const Place& at, const SceneField&, T& out) {
 }
 
 // A scene of another version has other fields, so this comes before anything else.
-int32_t require_version(const json& tree, const std::string& name) {
+void require_version(const json& tree, const std::string& name) {
   if (!tree.is_object()) {
     throw InputError(name, "", fmt::format("A scene is an object, and this is {}.", type_text(tree)),
                      fmt::format("Put its fields in braces: {{\"version\": {}, \"body\": ...}}.", kSceneVersion));
@@ -350,30 +350,25 @@ int32_t require_version(const json& tree, const std::string& name) {
     throw InputError(name, "version", "This field is missing.",
                      fmt::format("Add \"version\": {} if this is a cutproof scene.", kSceneVersion));
   }
-  for (int32_t known = 1; known <= kSceneVersion; ++known) {
-    if (version->is_number() && version->get<double>() == known) return known;
-  }
-  throw InputError(name, "version",
-                   fmt::format("This is {}, and only versions 1 to {} are known.", type_text(*version), kSceneVersion),
-                   "Use a newer cutproof for a scene of a newer version.");
+  if (version->is_number() && version->get<double>() == kSceneVersion) return;
+  throw InputError(
+      name, "version", fmt::format("This is {}, and only version {} is read.", type_text(*version), kSceneVersion),
+      fmt::format("Write \"version\": {}, with the fields that `cutproof info --scene` lists.", kSceneVersion));
 }
 
 // Of a scene that does not say.
-Acceleration default_acceleration(const json& tree, int32_t version) {
-  if (version < 2) return Acceleration::none;
+Acceleration default_acceleration(const json& tree) {
   const auto step = tree.find("step");
   const bool published = step != tree.end() && step->is_object() && step->contains("solver") &&
                          step->at("solver") == name_of(Solver::published);
   return published ? Acceleration::none : Acceleration::chebyshev;
 }
 
-RemovedEnds default_remove(const json& tree, int32_t version) {
-  if (version < 3) return RemovedEnds::both;
+RemovedEnds default_remove(const json& tree) {
   const auto detect = tree.find("detect");
   const bool by_distance = detect == tree.end() || !detect->is_object() || !detect->contains("criterion") ||
                            detect->at("criterion") == name_of(Criterion::distance);
-  if (!by_distance) return RemovedEnds::both;
-  return version < 5 ? RemovedEnds::one : RemovedEnds::nearer;
+  return by_distance ? RemovedEnds::nearer : RemovedEnds::both;
 }
 
 }  // namespace
@@ -383,11 +378,10 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::v
   for (const SceneChange& change : changes) {
     if (tree.is_object()) make_change(change, tree);
   }
-  const int32_t version = require_version(tree, source_of_field("version", name, changes));
+  require_version(tree, source_of_field("version", name, changes));
   Scene scene;
-  scene.step.acceleration = default_acceleration(tree, version);
-  scene.detect.remove = default_remove(tree, version);
-  scene.body.fit_skin = scene.skin.fit_cuts = version >= 4;
+  scene.step.acceleration = default_acceleration(tree);
+  scene.detect.remove = default_remove(tree);
   read(tree, Place{name, "", changes}, SceneField{}, scene);
   return scene;
 }

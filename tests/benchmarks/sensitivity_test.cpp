@@ -21,9 +21,10 @@ namespace {
 using nlohmann::json;
 
 // Cut in two as it falls; friction where it lands.
-constexpr const char* kFallingApart = R"({"version": 1, "name": "falling apart",
+constexpr const char* kFallingApart = R"({"version": 5, "name": "falling apart",
   "body": {"shape": {"kind": "box", "size": [0.06, 0.02, 0.02]}, "spacing": 0.01},
-  "frame": {"settle": 0.08}, "step": {"gravity": [0, 0, -9.81]}, "detect": {"criterion": "geometric"},
+  "frame": {"settle": 0.08}, "detect": {"criterion": "geometric"},
+  "step": {"acceleration": "none", "gravity": [0, 0, -9.81]},
   "ground": {"friction": 0.5},
   "blade": {"speed": 2, "strokes": [{"points": [[0.5, 0.5, 1.3], [0.5, 0.5, -0.3]], "along": [0, 1, 0]}]}})";
 

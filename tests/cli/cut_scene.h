@@ -3,7 +3,7 @@
 
 namespace cutproof::tests {
 
-inline constexpr const char* kCutScene = R"({"version": 1, "name": "cut",
+inline constexpr const char* kCutScene = R"({"version": 5, "name": "cut",
   "body": {"shape": {"kind": "box", "size": [0.04, 0.02, 0.02]}, "spacing": 0.01},
   "frame": {"settle": 0.016}, "detect": {"criterion": "geometric"}, "ground": {"friction": 0.5},
   "blade": {"speed": 2, "strokes": [{"points": [[0.5, 0.5, 1.3], [0.5, 0.5, -0.3]], "along": [0, 1, 0]}]},

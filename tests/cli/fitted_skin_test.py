@@ -41,7 +41,7 @@ def ellipsoid(path):
 def fitted(mesh, particles, fit_skin):
     """Spacing, and the skin's points (in the mesh's frame) and triangles, of the body at rest; and the mesh's volume as
     the program says it."""
-    scene = {"version": 4, "name": "at_rest", "frame": {"count": 1}, "step": {"iterations": 0, "substeps": 1},
+    scene = {"version": 5, "name": "at_rest", "frame": {"count": 1}, "step": {"iterations": 0, "substeps": 1},
              "body": {"mesh": {"file": str(mesh), "unit": 1, "repair": True}, "align": False, "particles": particles,
                       "fit_skin": fit_skin}}
     (work / "scene.json").write_text(json.dumps(scene))

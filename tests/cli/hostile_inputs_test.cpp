@@ -64,7 +64,7 @@ std::function<void()> repeated(const std::string& before, const std::string& pie
 }
 // A scene whose body is a small box, but for what follows.
 const std::string kScene =
-    R"({"version": 2, "frame": {"count": 1}, "body": {"spacing": 0.02, "shape": {"kind": "box"}})";
+    R"({"version": 5, "frame": {"count": 1}, "body": {"spacing": 0.02, "shape": {"kind": "box"}})";
 
 void run_shell(const std::string& command) {
   if (std::system(command.c_str()) != 0) throw std::runtime_error(command);
@@ -202,7 +202,7 @@ const std::vector<Hostile>& hostile_inputs() {
        {"grips", "1001 entries", "100"}},
       {"GripsOfTooManySubsteps",
        [] {
-         Writer()(R"({"version": 2, "frame": {"count": 50000}, "step": {"substeps": 100},)")(
+         Writer()(R"({"version": 5, "frame": {"count": 50000}, "step": {"substeps": 100},)")(
              R"("body": {"spacing": 0.02, "shape": {"kind": "box"}}, "grips": [)")(
              R"({"low":[0,0,0],"high":[1,1,1]},)", 9)(R"({"low":[0,0,0],"high":[1,1,1]}]})");
        },
@@ -213,69 +213,69 @@ const std::vector<Hostile>& hostile_inputs() {
        "run input",
        {"walls", "1001 entries"}},
       {"AHundredThousandPartsOfAUnion",
-       repeated(R"({"version":2,"body":{"spacing":1,"shape":{"kind":"union","parts":[)", R"({"kind":"ball"},)", 100'000,
+       repeated(R"({"version":5,"body":{"spacing":1,"shape":{"kind":"union","parts":[)", R"({"kind":"ball"},)", 100'000,
                 R"({"kind":"ball"}]}}})"),
        "run input",
        {"too many values"}},
       {"AThousandPartsOfAUnion",
-       repeated(R"({"version":2,"body":{"spacing":1,"shape":{"kind":"union","parts":[)", R"({"kind":"ball"},)", 1000,
+       repeated(R"({"version":5,"body":{"spacing":1,"shape":{"kind":"union","parts":[)", R"({"kind":"ball"},)", 1000,
                 R"({"kind":"ball"}]}}})"),
        "run input",
        {"body.shape.parts", "1001 entries", "100"}},
       {"ManyPartsOfManyUnions",
-       repeated(R"({"version":2,"body":{"spacing":1,"shape":{"kind":"union","parts":[)",
+       repeated(R"({"version":5,"body":{"spacing":1,"shape":{"kind":"union","parts":[)",
                 R"({"kind":"union","parts":[{"kind":"ball"},{"kind":"ball"},{"kind":"ball"}]},)", 50,
                 R"({"kind":"ball"}]}}})"),
        "run input",
        {"body.shape", "202 shapes", "100"}},
       {"ATextOfFiftyMegabytes",
-       repeated(R"({"version":2,"description":")", std::string(1000, 'a'), 50'000, "\"}"),
+       repeated(R"({"version":5,"description":")", std::string(1000, 'a'), 50'000, "\"}"),
        "run input",
        {"too large"}},
       {"ATextOfThreeMegabytes",
-       repeated(R"({"version":2,"description":")", "abc", 1'000'000, "\"}"),
+       repeated(R"({"version":5,"description":")", "abc", 1'000'000, "\"}"),
        "run input",
        {"description", "3000000 bytes", "10000"}},
       {"AnUnknownFieldOfThreeMegabytes",
-       repeated(R"({"version":2,")", "abc", 1'000'000, "\":0}"),
+       repeated(R"({"version":5,")", "abc", 1'000'000, "\":0}"),
        "run input",
        {"not known here", "more bytes"}},
       {"AWordOfThreeMegabytes",
-       repeated(R"({"version":2,"body":)", "abc", 1'000'000, "}"),
+       repeated(R"({"version":5,"body":)", "abc", 1'000'000, "}"),
        "run input",
        {"not valid JSON"}},
       {"ANumberOfAMillionDigits",
-       repeated(R"({"version":2,"seed":)", "9", 1'000'000, "}"),
+       repeated(R"({"version":5,"seed":)", "9", 1'000'000, "}"),
        "run input",
        {"out of range", "more bytes"}},
       {"AFractionOfAMillionDigits",
-       repeated(R"({"version":2,"frame":{"length":0.)", "0", 1'000'000, "1}}"),
+       repeated(R"({"version":5,"frame":{"length":0.)", "0", 1'000'000, "1}}"),
        "run input",
        {"frame.length", "out of bounds"}},
       {"AnExponentOfAMillionDigits",
-       repeated(R"({"version":2,"frame":{"length":1e)", "9", 1'000'000, "}}"),
+       repeated(R"({"version":5,"frame":{"length":1e)", "9", 1'000'000, "}}"),
        "run input",
        {"out of range"}},
       {"AFieldGivenTwice",
-       text(R"({"version":2,"body":{"spacing":1,"spacing":2}})"),
+       text(R"({"version":5,"body":{"spacing":1,"spacing":2}})"),
        "run input",
        {"body.spacing", "given twice"}},
-      {"BytesThatAreNoUtf8", text("{\"version\":2,\"name\":\"\xff\xfe\"}"), "run input", {"not valid JSON", "UTF-8"}},
-      {"HalfOfASurrogatePair", text(R"({"version":2,"name":"\ud800"})"), "run input", {"not valid JSON"}},
+      {"BytesThatAreNoUtf8", text("{\"version\":5,\"name\":\"\xff\xfe\"}"), "run input", {"not valid JSON", "UTF-8"}},
+      {"HalfOfASurrogatePair", text(R"({"version":5,"name":"\ud800"})"), "run input", {"not valid JSON"}},
       {"ANulInAName", text(kScene + R"(,"name":"a\u0000b"})"), "run input", {"name", "NUL"}},
-      {"AnEscapeInAField", text(R"({"version":2,"\u001b]0;owned\u0007":1})"), "run input", {R"(\x1b]0;owned\x07)"}},
+      {"AnEscapeInAField", text(R"({"version":5,"\u001b]0;owned\u0007":1})"), "run input", {R"(\x1b]0;owned\x07)"}},
       {"AC1ControlInAField",
-       text("{\"version\":2,\"\xc2\x9b"
+       text("{\"version\":5,\"\xc2\x9b"
             "31m\":1}"),
        "run input",
        {R"(\u009b31m)"}},
       {"ADirectionOfReadingInAField",
-       text("{\"version\":2,\"\xe2\x80\xae"
+       text("{\"version\":5,\"\xe2\x80\xae"
             "abc\":1}"),
        "run input",
        {R"(\u202eabc)"}},
       {"ALineThatLooksLikeOurs",
-       text(R"({"version":2,"x\ncutproof: all hold":1})"),
+       text(R"({"version":5,"x\ncutproof: all hold":1})"),
        "run input",
        {R"(x\ncutproof: all hold)"}},
       {"AnEscapeInAFileName", [] { Writer("\x1b[31minput")("{"); }, "run '\x1b[31minput'", {R"(\x1b[31minput)"}},
@@ -728,7 +728,7 @@ TEST_P(HostileName, WorksForWhatIsReadAndWritten) {
   // A cube as a mesh; the body takes the file's name.
   Writer(in + ".off")("OFF 8 6 12\n0 0 0\n9 0 0\n9 9 0\n0 9 0\n0 0 9\n9 0 9\n9 9 9\n0 9 9\n")(
       "4 3 2 1 0\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n");
-  Writer("scene.json")(R"({"version": 2, "frame": {"count": 1}, "body": {"particles": 64, "shape": {"kind": "box"}}})");
+  Writer("scene.json")(R"({"version": 5, "frame": {"count": 1}, "body": {"particles": 64, "shape": {"kind": "box"}}})");
   expect("run scene.json --mesh " + in_quotes(in + ".off") + " --record " + in_quotes(in + ".meshed") + " --json " +
              in_quotes(in + ".mesh.json"),
          0);

@@ -24,7 +24,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* kScene = R"({"version": 2, "name": "falling",
+constexpr const char* kScene = R"({"version": 5, "name": "falling",
   "body": {"shape": {"kind": "box", "size": [0.05, 0.03, 0.03]}, "spacing": 0.005}, "frame": {"count": 20},
   "step": {"gravity": [0, 0, -9.81]}})";
 

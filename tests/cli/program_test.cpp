@@ -19,7 +19,7 @@ namespace {
 using nlohmann::json;
 
 json small_block(const std::string& name = "small") {
-  return json::parse(R"({"version": 1, "body": {"shape": {"kind": "box", "size": [0.06, 0.05, 0.05]}, "spacing": 0.01},
+  return json::parse(R"({"version": 5, "body": {"shape": {"kind": "box", "size": [0.06, 0.05, 0.05]}, "spacing": 0.01},
     "frame": {"settle": 0.032}, "detect": {"criterion": "geometric"},
     "blade": {"speed": 1, "strokes": [{"points": [[0.45, 0.5, 1.3], [0.45, 0.5, -0.3]], "along": [0, 1, 0]}]},
     "expect": {"components_after_stroke": [2], "components_at_end": 2}})")
@@ -335,7 +335,7 @@ TEST_F(Program, AnotherNumberOfParticlesIsNotHeldAgainstTheScenes) {
 
 // A block that is pulled apart by its ends: what goes too far apart goes in the substep in which it does.
 TEST_F(Program, DetectsInEverySubstepIfTheSceneSaysSo) {
-  json scene = json::parse(R"({"version": 2, "name": "torn",
+  json scene = json::parse(R"({"version": 5, "name": "torn",
     "body": {"shape": {"kind": "box", "size": [0.12, 0.04, 0.04]}, "spacing": 0.01},
     "frame": {"count": 12}, "step": {"substeps": 4}, "detect": {"without_blade": true},
     "grips": [{"low": [0, 0, 0], "high": [0.2, 1, 1], "velocity": [-0.15, 0, 0]},

@@ -10,7 +10,7 @@ import xml.etree.ElementTree as tree
 import zipfile
 
 wrong = []
-SCENE = {"version": 1, "name": "small", "frame": {"count": 3}, "step": {"gravity": [0, 0, -9.81]},
+SCENE = {"version": 5, "name": "small", "frame": {"count": 3}, "step": {"gravity": [0, 0, -9.81]},
          "body": {"shape": {"kind": "box", "size": [0.04, 0.03, 0.03]}, "spacing": 0.01}}
 
 

@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* kCut = R"({"version": 1, "name": "small",
+constexpr const char* kCut = R"({"version": 5, "name": "small",
   "body": {"shape": {"kind": "box", "size": [0.06, 0.05, 0.05]}, "spacing": 0.01},
   "frame": {"settle": 0.032}, "detect": {"criterion": "geometric"},
   "blade": {"speed": 1, "strokes": [{"points": [[0.45, 0.5, 1.3], [0.45, 0.5, -0.3]], "along": [0, 1, 0]}]},

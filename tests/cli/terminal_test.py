@@ -134,7 +134,7 @@ def errors(program, folder):
 def main():
     program = sys.argv[1]
     with tempfile.TemporaryDirectory() as folder:
-        scene = {"version": 1, "name": "small", "frame": {"count": 3}, "step": {"gravity": [0, 0, -9.81]},
+        scene = {"version": 5, "name": "small", "frame": {"count": 3}, "step": {"gravity": [0, 0, -9.81]},
                  "body": {"shape": {"kind": "box", "size": [0.04, 0.03, 0.03]}, "spacing": 0.01}}
         (pathlib.Path(folder) / "scene.json").write_text(json.dumps(scene))
         (pathlib.Path(folder) / "wrong.json").write_text(json.dumps(scene | {"expect": {"components_at_end": 7}}))

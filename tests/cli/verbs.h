@@ -6,7 +6,7 @@
 #include "model/io/array_file.h"
 #include "tests/cli/program.h"
 
-inline constexpr const char* kScene = R"({"version": 1, "name": "small",
+inline constexpr const char* kScene = R"({"version": 5, "name": "small",
   "body": {"shape": {"kind": "box", "size": [0.04, 0.03, 0.03]}, "spacing": 0.01}, "frame": {"count": 2},
   "step": {"gravity": [0, 0, -9.81]}})";
 

@@ -29,10 +29,11 @@ namespace cutproof::harness {
 namespace {
 
 // Every stage has something to do in it, and the ground something to push (tests/harness/judge_test.cpp).
-constexpr const char* kFieldsScene = R"({"version": 1, "name": "every field",
+constexpr const char* kFieldsScene = R"({"version": 5, "name": "every field",
   "body": {"shape": {"kind": "box", "size": [0.16, 0.06, 0.02]}, "spacing": 0.01},
   "clusters": {"side": 2},
-  "frame": {"settle": 0.032}, "detect": {"criterion": "geometric"}, "step": {"gravity": [0, 0, -9.81]},
+  "frame": {"settle": 0.032}, "detect": {"criterion": "geometric"},
+  "step": {"acceleration": "none", "gravity": [0, 0, -9.81]},
   "ground": {"friction": 0.5}, "split": {"debris": 2},
   "blade": {"speed": 0.5, "strokes": [{"points": [[0.5, 0.5, 2.6], [0.5, 0.5, -0.3]], "along": [0, 1, 0]}]}})";
 

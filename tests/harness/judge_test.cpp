@@ -38,30 +38,32 @@ using Counts = std::map<std::string, int>;  // of verdicts, by property
 
 // Each stage has something to do: a stroke cuts the block in two, what is left of its clusters is small and merges, and
 // what does not cover its edges grows (uncover).
-constexpr const char* kEveryStage = R"({"version": 1, "name": "every stage",
+constexpr const char* kEveryStage = R"({"version": 5, "name": "every stage",
   "body": {"shape": {"kind": "box", "size": [0.08, 0.04, 0.02]}, "spacing": 0.01},
   "clusters": {"side": 2, "small": 1},
-  "frame": {"settle": 0.032}, "detect": {"criterion": "geometric"}, "step": {"gravity": [0, 0, -9.81]},
-  "split": {"debris": 2},
+  "frame": {"settle": 0.032}, "detect": {"criterion": "geometric"}, "split": {"debris": 2},
+  "step": {"acceleration": "none", "gravity": [0, 0, -9.81]},
   "blade": {"speed": 1, "strokes": [{"points": [[0.5, 0.5, 1.3], [0.5, 0.5, -0.3]], "along": [0, 1, 0]}]}})";
 
 // Some clusters are isolated.
-constexpr const char* kSparse = R"({"version": 1, "name": "sparse",
+constexpr const char* kSparse = R"({"version": 5, "name": "sparse",
   "body": {"shape": {"kind": "box", "size": [0.08, 0.04, 0.02]}, "spacing": 0.01},
   "clusters": {"method": "sampled", "spacing": 1.5, "radius": 1}, "expand": {"rule": "none"},
-  "frame": {"settle": 0.032}, "detect": {"criterion": "geometric"},
+  "frame": {"settle": 0.032}, "step": {"acceleration": "none"}, "detect": {"criterion": "geometric"},
   "blade": {"speed": 1, "strokes": [{"points": [[0.5, 0.5, 1.3], [0.5, 0.5, -0.3]], "along": [0, 1, 0]}]}})";
 
 // A block that a blade presses on, and tears by distance.
-constexpr const char* kPressed = R"({"version": 1, "name": "pressed",
+constexpr const char* kPressed = R"({"version": 5, "name": "pressed",
   "body": {"shape": {"kind": "box", "size": [0.08, 0.04, 0.02]}, "spacing": 0.01}, "clusters": {"side": 2},
-  "frame": {"settle": 0.016}, "ground": {"friction": 0.5},
+  "frame": {"settle": 0.016}, "step": {"acceleration": "none"}, "detect": {"remove": "both"},
+  "ground": {"friction": 0.5},
   "blade": {"speed": 1, "strokes": [{"points": [[0.5, 0.5, 1.3], [0.5, 0.5, 0.3]], "along": [0, 1, 0]}]}})";
 
 // One cluster of all, which the stroke parts.
-constexpr const char* kHalved = R"({"version": 1, "name": "halved",
+constexpr const char* kHalved = R"({"version": 5, "name": "halved",
   "body": {"shape": {"kind": "box", "size": [0.08, 0.04, 0.02]}, "spacing": 0.01}, "clusters": {"side": 8},
-  "frame": {"settle": 0.032}, "detect": {"criterion": "geometric"}, "step": {"gravity": [0, 0, -9.81]},
+  "frame": {"settle": 0.032}, "detect": {"criterion": "geometric"},
+  "step": {"acceleration": "none", "gravity": [0, 0, -9.81]},
   "blade": {"speed": 4, "strokes": [{"points": [[0.5, 0.5, 1.3], [0.5, 0.5, -0.3]], "along": [0, 1, 0]}]}})";
 
 int32_t first_alive(const State& state) {

@@ -45,9 +45,9 @@ std::set<std::string> failing(const std::vector<Verdict>& verdicts) {
 }
 
 // A stroke down and up again, fast enough that it goes on cutting in the frame that begins with a new piece.
-constexpr const char* kTwoCuts = R"({"version": 1, "name": "two cuts",
+constexpr const char* kTwoCuts = R"({"version": 5, "name": "two cuts",
   "body": {"shape": {"kind": "box", "size": [0.08, 0.02, 0.02]}, "spacing": 0.01},
-  "frame": {"length": 0.02, "settle": 0.4}, "step": {"gravity": [0, 0, -9.81]},
+  "frame": {"length": 0.02, "settle": 0.4}, "step": {"acceleration": "none", "gravity": [0, 0, -9.81]},
   "detect": {"criterion": "geometric"}, "ground": {"friction": 0.5},
   "blade": {"speed": 2, "friction": 0.3, "strokes": [{"along": [0, 1, 0], "points":
     [[0.375, 0.5, 1.3], [0.375, 0.5, -0.3], [0.625, 0.5, -0.3], [0.625, 0.5, 1.3]]}]}})";

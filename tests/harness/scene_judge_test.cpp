@@ -25,9 +25,9 @@ using tests::failing;
 using tests::RecordedScene;
 
 // Two clusters that overlap; nothing touches the body, and nobody looks for cuts.
-constexpr const char* kFallingScene = R"({"version": 1, "name": "falling",
+constexpr const char* kFallingScene = R"({"version": 5, "name": "falling",
   "body": {"shape": {"kind": "box", "size": [0.08, 0.04, 0.04]}, "spacing": 0.01}, "clusters": {"side": 4},
-  "frame": {"count": 4}, "step": {"gravity": [0, 0, -9.81], "damping": 2}})";
+  "frame": {"count": 4}, "step": {"acceleration": "none", "gravity": [0, 0, -9.81], "damping": 2}})";
 
 class WrongRecording : public testing::Test {
  protected:
@@ -233,9 +233,9 @@ TEST_F(WrongRecording, WhoseVelocitiesAreNotThoseOfItsPositions) {
 }
 
 TEST_F(WrongRecording, InWhichAGripDoesNotHoldWhatItHolds) {
-  constexpr const char* kPulled = R"({"version": 1, "name": "pulled",
+  constexpr const char* kPulled = R"({"version": 5, "name": "pulled",
     "body": {"shape": {"kind": "box", "size": [0.08, 0.02, 0.02]}, "spacing": 0.01}, "clusters": {"side": 4},
-    "frame": {"count": 4}, "grips": [{"low": [0, 0, 0], "high": [0.2, 1, 1]},
+    "frame": {"count": 4}, "step": {"acceleration": "none"}, "grips": [{"low": [0, 0, 0], "high": [0.2, 1, 1]},
       {"low": [0.8, 0, 0], "high": [1, 1, 1], "velocity": [0.1, 0, 0]}]})";
   RecordedScene right(kPulled, *reference_);
   EXPECT_THAT(failing(*right.judged()), IsEmpty());
@@ -249,9 +249,9 @@ TEST_F(WrongRecording, InWhichAGripDoesNotHoldWhatItHolds) {
 // than at its latest (0.6 mm); it does about 1 to 1.6 mm, so a shift of less than that cannot be told without running
 // the step.
 TEST_F(WrongRecording, InWhichTheGroundPushesFartherThanItsImpulse) {
-  constexpr const char* kStanding = R"({"version": 1, "name": "standing",
+  constexpr const char* kStanding = R"({"version": 5, "name": "standing",
     "body": {"shape": {"kind": "box", "size": [0.04, 0.02, 0.02]}, "spacing": 0.01}, "frame": {"count": 4},
-    "step": {"gravity": [0, 0, -9.81]}, "ground": {"friction": 0}})";
+    "step": {"acceleration": "none", "gravity": [0, 0, -9.81]}, "ground": {"friction": 0}})";
   RecordedScene right(kStanding, *reference_);
   EXPECT_THAT(failing(*right.judged()), IsEmpty());
   for (const double by : {2e-3, -1e-3}) {
@@ -407,9 +407,9 @@ TEST_F(WrongRecording, FailsWhereAPropertyLookedAtNothingAndDoesNotSayWhy) {
 
 // CGAL's checks of the skin cost more than a frame: they are made of the first skin, and after every cut.
 TEST_F(WrongRecording, HasItsSkinJudgedThoroughlyAtFirstAndAfterEveryCut) {
-  constexpr const char* kTwoStrokes = R"({"version": 1, "name": "two strokes",
+  constexpr const char* kTwoStrokes = R"({"version": 5, "name": "two strokes",
     "body": {"shape": {"kind": "box", "size": [0.06, 0.02, 0.02]}, "spacing": 0.01},
-    "frame": {"settle": 0.032}, "detect": {"criterion": "geometric"},
+    "frame": {"settle": 0.032}, "step": {"acceleration": "none"}, "detect": {"criterion": "geometric"},
     "blade": {"speed": 2, "strokes": [{"points": [[0.3, 0.5, 5], [0.3, 0.5, -1]], "along": [0, 1, 0]},
       {"points": [[0.7, 0.5, 2], [0.7, 0.5, -1]], "along": [0, 1, 0]}]}})";
   const RecordedScene recorded(kTwoStrokes, *reference_);

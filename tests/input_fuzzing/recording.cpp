@@ -16,12 +16,13 @@ namespace cutproof::input_fuzzing {
 namespace {
 
 constexpr const char* kScene = R"({
-  "version": 1, "name": "small",
-  "body": {"shape": {"kind": "box", "size": [0.03, 0.02, 0.02]}, "spacing": 0.01},
+  "version": 5, "name": "small",
+  "body": {"shape": {"kind": "box", "size": [0.03, 0.02, 0.02]}, "spacing": 0.01, "fit_skin": false},
   "clusters": {"side": 2},
   "frame": {"count": 2},
-  "step": {"substeps": 2, "iterations": 2, "gravity": [0, 0, -9.81]},
+  "step": {"substeps": 2, "iterations": 2, "acceleration": "none", "gravity": [0, 0, -9.81]},
   "detect": {"criterion": "geometric"},
+  "skin": {"fit_cuts": false},
   "ground": {"friction": 0.5},
   "grips": [{"low": [0, 0, 0], "high": [0.2, 1, 1], "end": 0.02}],
   "blade": {"speed": 2, "strokes": [{"points": [[0.4, 0.5, 1.5], [0.4, 0.5, -0.5]], "along": [0, 1, 0]}]}

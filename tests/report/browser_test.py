@@ -24,7 +24,7 @@ assert all(title.lower().startswith(one) for one, title in zip(given, titles)), 
 
 # --- Three runs: one that holds, one that fails after split, and one whose names are hostile ---
 
-box = {"version": 1, "name": "two halves",
+box = {"version": 5, "name": "two halves",
        "body": {"shape": {"kind": "box", "size": [0.08, 0.05, 0.05]}, "spacing": 0.01},
        "frame": {"settle": 0.016}, "detect": {"criterion": "geometric"}, "ground": {"friction": 0.5},
        "blade": {"speed": 2, "strokes": [{"points": [[0.5, 0.5, 1.3], [0.5, 0.5, -0.3]], "along": [0, 1, 0]}]},

@@ -12,7 +12,7 @@ from browser import Browser, By, Folder, Keys
 program, plugin = sys.argv[1], sys.argv[2]
 work = Folder(sys.argv[3], program)
 
-scene = {"version": 3, "name": "two halves",
+scene = {"version": 5, "name": "two halves",
          "body": {"shape": {"kind": "box", "size": [0.08, 0.05, 0.05]}, "spacing": 0.01},
          "clusters": {"method": "sampled", "spacing": 2, "radius": 2},
          "frame": {"settle": 0.016}, "detect": {"criterion": "geometric"}, "ground": {"friction": 0.5},

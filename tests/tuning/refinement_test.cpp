@@ -21,9 +21,9 @@ using benchmarks::PreparedScene;
 
 Scene scene_of(const std::string& text) { return io::parse_scene(text, "test"); }
 
-constexpr const char* kFalling = R"({"version": 1, "name": "falling",
+constexpr const char* kFalling = R"({"version": 5, "name": "falling",
   "body": {"shape": {"kind": "box", "size": [0.04, 0.03, 0.03]}, "spacing": 0.01},
-  "frame": {"length": 0.016, "count": 6}, "step": {"gravity": [0, 0, -9.81]}})";
+  "frame": {"length": 0.016, "count": 6}, "step": {"acceleration": "none", "gravity": [0, 0, -9.81]}})";
 
 // A body that falls freely: x = g t² / 2. Implicit Euler falls g t dt / 2 farther.
 TEST(ReferenceSolution, OfShortTimeStepsIsTheParabola) {
@@ -138,9 +138,9 @@ TEST(ReferenceSolution, IsNotKnownWhileItsLastThreeLevelsRemoveOtherParticlesOrI
 // A block is pulled aside by its end and comes to rest again, where every solution is the same: in the end nothing is
 // seen any more of how far they were apart.
 TEST(ReferenceSolution, IsKnownToTheGreatestDistanceOfAnyFrame) {
-  Scene scene = scene_of(R"({"version": 1, "name": "pulled",
+  Scene scene = scene_of(R"({"version": 5, "name": "pulled",
     "body": {"shape": {"kind": "box", "size": [0.08, 0.03, 0.03]}, "spacing": 0.01}, "clusters": {"side": 2},
-    "frame": {"length": 0.016, "count": 40}, "step": {"substeps": 1, "stiffness": 3e5, "damping": 40},
+    "frame": {"length": 0.016, "count": 40}, "step": {"acceleration": "none", "substeps": 1, "stiffness": 3e5, "damping": 40},
     "grips": [{"low": [0, 0, 0], "high": [0.2, 1, 1], "end": 0.064, "velocity": [0, 0, 0.3]},
               {"low": [0, 0, 0], "high": [0.2, 1, 1], "start": 0.064}]})");
   const ReferenceSolution solution(ReferenceKind::substeps, scene, "test", {}, 1);
@@ -179,9 +179,10 @@ TEST(ReferenceSolution, IsKnownToTheGreatestDistanceOfAnyFrame) {
 
 // Each substep solved exactly, one after the other, by Cholesky factorisation.
 TEST(ReferenceSolution, OfItsOwnSubstepsIsWhatASparseFactorisationFinds) {
-  const Scene scene = scene_of(R"({"version": 1, "name": "hanging",
+  const Scene scene = scene_of(R"({"version": 5, "name": "hanging",
     "body": {"shape": {"kind": "box", "size": [0.08, 0.03, 0.03]}, "spacing": 0.01}, "clusters": {"side": 2},
-    "frame": {"length": 0.016, "count": 5}, "step": {"substeps": 2, "gravity": [0, 0, -9.81], "damping": 3},
+    "frame": {"length": 0.016, "count": 5},
+    "step": {"acceleration": "none", "substeps": 2, "gravity": [0, 0, -9.81], "damping": 3},
     "grips": [{"low": [0, 0, 0], "high": [0.2, 1, 1]}]})");
   const ReferenceSolution solution(ReferenceKind::substeps, scene, "test", {}, 1e-9);
   EXPECT_EQ(solution.levels().back().substeps, 2);
@@ -210,10 +211,10 @@ TEST(ReferenceSolution, OfItsOwnSubstepsIsWhatASparseFactorisationFinds) {
 
 // A press on a floor with friction, and its cut.
 Scene pressed() {
-  return scene_of(R"({"version": 4, "name": "pressed",
+  return scene_of(R"({"version": 5, "name": "pressed",
     "body": {"shape": {"kind": "box", "size": [0.06, 0.03, 0.03]}, "spacing": 0.01}, "clusters": {"side": 2},
     "frame": {"length": 0.016, "count": 24}, "step": {"substeps": 2, "gravity": [0, 0, -9.81], "damping": 5},
-    "ground": {"friction": 0.4}, "detect": {"criterion": "distance"},
+    "ground": {"friction": 0.4}, "detect": {"criterion": "distance", "remove": "one"},
     "blade": {"length": 0.08, "depth": 0.06, "speed": 0.15, "friction": 0.2, "strokes": [
       {"points": [[0.5, 0.5, 1.3], [0.5, 0.5, 0.2]], "along": [0, 1, 0]}]}})");
 }
@@ -282,9 +283,10 @@ TEST(ReferenceSolution, OfItsOwnSubstepsEndsWithEachOfThemSolved) {
 
 // Where iterations do not lead far enough: the answer is had all the same, and what they lack shows.
 TEST(ReferenceSolution, IsSolvedWhereIterationsAreTooFew) {
-  const Scene scene = scene_of(R"({"version": 1, "name": "stiff",
+  const Scene scene = scene_of(R"({"version": 5, "name": "stiff",
     "body": {"shape": {"kind": "box", "size": [0.16, 0.02, 0.02]}, "spacing": 0.01}, "clusters": {"side": 2},
-    "frame": {"length": 0.016, "count": 4}, "step": {"substeps": 1, "stiffness": 1e7, "gravity": [0, 0, -9.81]},
+    "frame": {"length": 0.016, "count": 4},
+    "step": {"acceleration": "none", "substeps": 1, "stiffness": 1e7, "gravity": [0, 0, -9.81]},
     "grips": [{"low": [0, 0, 0], "high": [0.1, 1, 1]}]})");
   const ReferenceSolution solution(ReferenceKind::substeps, scene, "test", {}, 1e-6);
   EXPECT_FALSE(solution.levels().back().iterations);
@@ -295,9 +297,10 @@ TEST(ReferenceSolution, IsSolvedWhereIterationsAreTooFew) {
 
 // A blade so fast that its frames are divided: those of the scene are counted all the same, and each part runs once.
 TEST(PreparedScene, CountsFramesOfTheSceneWhereTheyAreDivided) {
-  const Scene scene = scene_of(R"({"version": 1, "name": "cut",
+  const Scene scene = scene_of(R"({"version": 5, "name": "cut",
     "body": {"shape": {"kind": "box", "size": [0.05, 0.03, 0.03]}, "spacing": 0.01}, "clusters": {"side": 2},
-    "frame": {"length": 0.016, "settle": 0.04}, "step": {"substeps": 1}, "detect": {"criterion": "distance"},
+    "frame": {"length": 0.016, "settle": 0.04}, "step": {"acceleration": "none", "substeps": 1},
+    "detect": {"criterion": "distance", "remove": "both"},
     "blade": {"speed": 2, "start": 0.03, "strokes": [
       {"points": [[0.3, 0.5, 1.5], [0.3, 0.5, -0.5]], "along": [0, 1, 0], "pause": 0.02},
       {"points": [[0.7, 0.5, 1.5], [0.7, 0.5, -0.5]], "along": [0, 1, 0]}]}})");

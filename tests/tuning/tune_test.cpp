@@ -20,10 +20,10 @@ using cutproof::Scene;
 using nlohmann::json;
 
 // A block hangs from its end while a blade cuts off another. Sixteen iterations are many more than it needs.
-constexpr const char* kScene = R"({"version": 1, "name": "hanging",
+constexpr const char* kScene = R"({"version": 5, "name": "hanging",
   "body": {"shape": {"kind": "box", "size": [0.08, 0.03, 0.03]}, "spacing": 0.01}, "clusters": {"side": 2},
   "frame": {"settle": 0.064}, "detect": {"criterion": "geometric"},
-  "step": {"substeps": 4, "iterations": 16, "gravity": [0, 0, -9.81], "damping": 5},
+  "step": {"substeps": 4, "iterations": 16, "acceleration": "none", "gravity": [0, 0, -9.81], "damping": 5},
   "grips": [{"low": [0, 0, 0], "high": [0.2, 1, 1]}, {"low": [0.8, 0, 0], "high": [1, 1, 1]}],
   "blade": {"speed": 1, "strokes": [{"points": [[0.45, 0.5, 1.3], [0.45, 0.5, -0.3]], "along": [0, 1, 0]}]},
   "expect": {"components_after_stroke": [2], "components_at_end": 2}})";
@@ -220,8 +220,8 @@ TEST_F(Tune, KeepsAMeshWithinReachAndSaysWhatItsRepairDid) {
   files::create_directories(path("found"));
   write("meshes/tetrahedron.off", "OFF\n4 3 0\n0 0 0\n60 0 0\n0 60 0\n0 0 60\n3 0 2 1\n3 0 1 3\n3 0 3 2\n");
   write("scene.json",
-        R"({"version": 1, "body": {"mesh": {"file": "meshes/tetrahedron.off", "unit": 0.001, "repair": true},
-    "spacing": 0.008}, "frame": {"count": 2}, "step": {"gravity": [0, 0, -9.81]}})");
+        R"({"version": 5, "body": {"mesh": {"file": "meshes/tetrahedron.off", "unit": 0.001, "repair": true},
+    "spacing": 0.008}, "frame": {"count": 2}, "step": {"acceleration": "none", "gravity": [0, 0, -9.81]}})");
   const Outcome outcome = tune("--tolerance 0.2 --reference substeps --write found/tuned.json --json out.json");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("repaired: 1 hole filled"), std::string::npos) << outcome.output;
@@ -288,8 +288,8 @@ TEST_F(Tune, WithoutASkin) {
 // A path of several pieces takes whole substeps for each, so another number of substeps may take another number of
 // frames. Such runs are not compared.
 TEST_F(Tune, LeavesWhatHasAnotherSchedule) {
-  write("scene.json", R"({"version": 1, "body": {"shape": {"kind": "box", "size": [0.05, 0.03, 0.03]}, "spacing": 0.01},
-    "frame": {"length": 0.016}, "detect": {"criterion": "geometric"}, "step": {"substeps": 4, "iterations": 2},
+  write("scene.json", R"({"version": 5, "body": {"shape": {"kind": "box", "size": [0.05, 0.03, 0.03]}, "spacing": 0.01},
+    "frame": {"length": 0.016}, "detect": {"criterion": "geometric"}, "step": {"substeps": 4, "iterations": 2, "acceleration": "none"},
     "blade": {"speed": 0.5, "strokes": [{"along": [0, 1, 0], "points": [[0.5, 0.5, 1.3], [0.5, 0.5, 1.29],
     [0.5, 0.5, 1.2], [0.5, 0.5, 1.19], [0.5, 0.5, 1.0], [0.5, 0.5, 0.99], [0.5, 0.5, 0.5]]}]}})");
   const Outcome outcome = tune("--tolerance 0.5 --reference substeps --json out.json");
@@ -323,10 +323,10 @@ TEST_F(Tune, RefusesWhatItCannotTune) {
   refused("scene.json --tolerance 1 --json found.json --write found.json", "--json");
   refused("scene.json --tolerance 1 --write nowhere/found.json", "nowhere");
   refused("missing.json --tolerance 1", "missing.json");
-  write("published.json", R"({"version": 1, "body": {"shape": {"kind": "box"}, "particles": 100},
+  write("published.json", R"({"version": 5, "body": {"shape": {"kind": "box"}, "particles": 100},
     "frame": {"count": 1}, "step": {"solver": "published"}})");
   refused("published.json --tolerance 1", "step.solver");
-  write("still.json", R"({"version": 1, "body": {"shape": {"kind": "box"}, "spacing": 0.02}})");
+  write("still.json", R"({"version": 5, "body": {"shape": {"kind": "box"}, "spacing": 0.02}})");
   refused("still.json --tolerance 1", "frame.count");
   EXPECT_EQ(listing(), (std::set<std::string>{"published.json", "scene.json", "still.json"}));
 }
