@@ -899,25 +899,7 @@ NLOHMANN_JSON_SERIALIZE_ENUM(Removal, {{Removal::usual, "usual"},
                                        {Removal::strain, "strain"}})
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CaseWall, axis, side, offset, friction)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CaseGrip, low, high, pull, from, until, shared)
-
-// How the blade stands is written where it is not plain: strokes that were saved before read the same, wherever strokes
-// are kept (histories.h).
-void to_json(nlohmann::json& json, const Stroke& s) {
-  json = {{"from", s.from}, {"to", s.to}, {"back", s.back}, {"down", s.down}, {"link", s.link}};
-  if (s.tilt != Quarters{}) json["tilt"] = s.tilt;
-  if (s.along != Quarters{}) json["along"] = s.along;
-  if (s.turn != Quarters{}) json["turn"] = s.turn;
-}
-void from_json(const nlohmann::json& json, Stroke& s) {
-  json.at("from").get_to(s.from);
-  json.at("to").get_to(s.to);
-  json.at("back").get_to(s.back);
-  json.at("down").get_to(s.down);
-  json.at("link").get_to(s.link);
-  s.tilt = json.value("tilt", Quarters{});
-  s.along = json.value("along", Quarters{});
-  s.turn = json.value("turn", Quarters{});
-}
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Stroke, from, to, back, down, link, tilt, along, turn)
 
 }  // namespace cutproof::property_tests
 
@@ -1030,24 +1012,7 @@ void require_sane(const Case& c) {
 
 Case from_json(const std::string& text) {
   try {
-    auto document = nlohmann::json::parse(text);
-    // Cases that were saved before there were these fields.
-    if (document.is_object()) {
-      const nlohmann::json plain = Case{};
-      for (const char* field : {"acceleration", "together", "alpha", "surface", "removal", "remove", "epsilon",
-                                "strain", "solver", "relaxation", "damping", "retardation", "time_step", "pace",
-                                "blade_friction", "gravity", "walls", "grips"}) {
-        document.emplace(field, plain.at(field));
-      }
-      for (auto& grip : document.at("grips")) {
-        if (grip.is_object()) grip.emplace("shared", false);
-      }
-      for (auto& stroke : document.at("strokes")) {
-        for (const char* field : {"tilt", "along", "turn"}) {
-          if (stroke.value(field, nlohmann::json()) == nlohmann::json(Quarters{})) stroke.erase(field);
-        }
-      }
-    }
+    const auto document = nlohmann::json::parse(text);
     const Case c = document.get<Case>();
     // What nlohmann reads without a word, such as a rule that does not exist, does not come back as it was.
     const nlohmann::json again = c;

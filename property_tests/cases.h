@@ -139,8 +139,8 @@ std::vector<std::function<void(Case&)>> simplifications(const Case& c);
 // The simplest case found that still `fails`, by such edits; looks no further once `is_over`. Requires fails(c).
 Case simplest(Case c, const std::function<bool(const Case&)>& fails, const std::function<bool()>& is_over);
 
-// One line of JSON. from_json throws std::invalid_argument for anything that is not a case, and gives fields that came
-// after the case was saved their plain values.
+// One line of JSON. from_json throws std::invalid_argument for anything that is not a case, of which every field is
+// given.
 std::string to_json(const Case& c);
 Case from_json(const std::string& text);
 

@@ -195,14 +195,20 @@ TEST_P(EveryBackend, GainsNoEnergyBetweenBladeAndWalls) {
   };
   // A particle whose place becomes worse by less than what refuses it, and whose energy rounding alone would not raise
   // so far (found by 4,000 cases).
-  EXPECT_EQ(
-      gained(from_json(R"({"alpha": 5, "ball_radius": 14, "blade_depth": 400, "blade_friction": 0, "blade_length": 4,
-      "blade_thickness": 16, "cap": 1, "clusters": "boxes", "debris": 0, "epsilon": 15, "expand": "none",
-      "expand_depth": 1, "ground": false, "iterations": 1, "merge": "none", "most": 1, "moves": true,
-      "nodes": [[0, 0, 0]], "pace": 1, "relaxation": 5, "removal": "usual", "seed": 1, "seed_spacing": 5, "side": 1,
-      "spacing": 1.0, "stiffness": 5, "strain": 120, "substeps": 1, "tau": 0, "strokes": [
-      {"back": 5, "down": true, "from": [2, 7, -5], "link": "apart", "to": [4, 1, 2]}]})")),
-      "");
+  Case hardly_worse;
+  hardly_worse.nodes = {{0, 0, 0}};
+  hardly_worse.ball_radius = 14;
+  hardly_worse.seed_spacing = 5;
+  hardly_worse.side = hardly_worse.most = hardly_worse.cap = 1;
+  hardly_worse.tau = 0;
+  hardly_worse.merge = MergeRule::none;
+  hardly_worse.expand = ExpandRule::none;
+  hardly_worse.blade_length = 4;
+  hardly_worse.blade_thickness = 16;
+  hardly_worse.moves = true;
+  hardly_worse.substeps = hardly_worse.iterations = 1;
+  hardly_worse.strokes = {{{2, 7, -5}, {4, 1, 2}, 5, true, Link::apart}};
+  EXPECT_EQ(gained(hardly_worse), "");
   check(id(), cases_of(10), GetParam().most_size, gained);
   if (ran_in_full()) {
     EXPECT_GT(iterations, 0);
