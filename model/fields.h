@@ -63,7 +63,6 @@ struct Field {
   std::string_view derived_from;  // "": it is not; else what determines it
   // What two right backends must agree on: bits for decisions, distances for what is computed.
   bool is_decision;
-  int32_t since = 0;  // recordings of earlier formats do not have it: recording_reader.cpp says what it is there
 };
 
 // visit(field, get) for each field, in a fixed order. get(state) is a reference to the field of a State or const State.
@@ -106,7 +105,7 @@ constexpr void for_each_field(Visit&& visit) {
   CUTPROOF_FIELD(skin.owner, "owner", "a skin vertex's owner", vertex, Q::particle, "1", kSkin, by_skin, "alive", true);
   CUTPROOF_FIELD(skin.direction, "direction", "a skin vertex's direction", vertex, Q::direction, "1", kSkin, by_skin,
                  "alive", true);
-  CUTPROOF_FIELD(skin.reach, "reach", "a skin vertex's reach", vertex, Q::number, "h", kSkin, by_skin, "", false, 6);
+  CUTPROOF_FIELD(skin.reach, "reach", "a skin vertex's reach", vertex, Q::number, "h", kSkin, by_skin, "", false);
   CUTPROOF_FIELD(skin.position, "skin_position", "a skin vertex's position", vertex, Q::point, "m", kSkin, by_skin,
                  "x, rotation, rest_center, members", false);
   CUTPROOF_FIELD(skin.triangles, "triangles", "a skin triangle", triangle, Q::vertices, "1", kSkin, by_skin, "alive",

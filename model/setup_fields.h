@@ -36,7 +36,6 @@ struct SetupField {
   // Of a number, of each component of a vector, of each entry of a list. All of them are finite.
   double least = kAnyNumber;
   bool above = false;  // `least` itself is not allowed
-  int32_t since = 0;   // recordings of earlier formats do not have it: there it is as it is by default
 };
 
 namespace fields_detail {
@@ -86,7 +85,7 @@ constexpr void for_each_setup_field(Visit&& visit) {
   CUTPROOF_FIELD(body.edge_offsets, "body", "edge_offsets", free, "1", 0);
   CUTPROOF_FIELD(body.edge_ends, "body", "edge_ends", free, "1", 0);
   CUTPROOF_FIELD(body.mass, "body", "mass", particle, "kg", 0, true);
-  CUTPROOF_FIELD(body.surface_crossing, "body", "surface_crossing", free, "h/256", 0, false, 5);
+  CUTPROOF_FIELD(body.surface_crossing, "body", "surface_crossing", free, "h/256", 0);
   CUTPROOF_FIELD(step.solver, "step", "solver", one);
   CUTPROOF_FIELD(step.substeps, "step", "substeps", one, "1", 1);
   CUTPROOF_FIELD(step.iterations, "step", "iterations", one, "1", 0);
@@ -94,10 +93,10 @@ constexpr void for_each_setup_field(Visit&& visit) {
   CUTPROOF_FIELD(step.relaxation, "step", "relaxation", one);
   CUTPROOF_FIELD(step.acceleration, "step", "acceleration", one);
   CUTPROOF_FIELD(step.damping, "step", "damping", one, "1/s");
-  CUTPROOF_FIELD(step.retardation, "step", "retardation", one, "s", 0, false, 7);
+  CUTPROOF_FIELD(step.retardation, "step", "retardation", one, "s", 0);
   CUTPROOF_FIELD(step.gravity, "step", "gravity", one, "m/s²");
   CUTPROOF_FIELD(detect.criterion, "detect", "criterion", one);
-  CUTPROOF_FIELD(detect.remove, "detect", "remove", one, "1", kAnyNumber, false, 4);
+  CUTPROOF_FIELD(detect.remove, "detect", "remove", one);
   CUTPROOF_FIELD(detect.epsilon, "detect", "epsilon", one, "h");
   CUTPROOF_FIELD(detect.strain, "detect", "strain", one);
   CUTPROOF_FIELD(detect.without_blade, "detect", "without_blade", one);
@@ -107,7 +106,7 @@ constexpr void for_each_setup_field(Visit&& visit) {
   CUTPROOF_FIELD(expand.depth, "expand", "depth", one, "layers", 1);
   CUTPROOF_FIELD(skin.wanted, "skin", "wanted", one);
   CUTPROOF_FIELD(skin.alpha, "skin", "alpha", one, "h");
-  CUTPROOF_FIELD(skin.fit_cuts, "skin", "fit_cuts", one, "1", kAnyNumber, false, 6);
+  CUTPROOF_FIELD(skin.fit_cuts, "skin", "fit_cuts", one);
   CUTPROOF_FIELD(walls, "walls", "", wall);
   CUTPROOF_FIELD(grips, "grips", "", grip);
   CUTPROOF_FIELD(has_blade, "blade", "present", one);
