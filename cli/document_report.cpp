@@ -1,7 +1,6 @@
 #include "cli/document_report.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <filesystem>
 #include <stdexcept>
@@ -16,7 +15,6 @@
 #include "property_tests/campaign_report.h"
 #include "report/document_page.h"
 #include "report/documents.h"
-#include "report/older.h"
 
 namespace cutproof::cli {
 
@@ -34,22 +32,15 @@ std::string place_of(const std::string& named, const std::string& document) {
   return fs::exists(beside, error) ? beside.string() : named;
 }
 
-report::Sheet campaign(const json& given, const std::string& file, const std::optional<BackendChoice>& chosen,
+report::Sheet campaign(const json& document, const std::string& file, const std::optional<BackendChoice>& chosen,
                        std::vector<report::Scenery>& sceneries) {
   const std::string name = file.empty() ? "this campaign" : file;
   // Field by field first: what follows reads it without asking.
-  static_cast<void>(report::sheet_of(given, name));
-  const std::optional<report::Renamed> older =
-      report::renamed({&given, name, "", "give what `cutproof fuzz` has written"});
-  const json& document = older ? older->document : given;
-  if (!older) property_tests::require_campaign(document, name);
+  static_cast<void>(report::sheet_of(document, name));
+  property_tests::require_campaign(document, name);
   const std::string failure = property_tests::conclude(document, document.at("shards") == 1).failure;
-  report::Sheet sheet = report::sheet_of(given, name, document.at("violations").empty() ? failure : std::string());
-  if (const std::vector<std::string> uncounted = property_tests::uncounted_classes(document); !uncounted.empty())
-    sheet.notes.push_back(fmt::format("Not counted when this was written, so nothing is known of cases with: {}.",
-                                      fmt::join(uncounted, ", ")));
+  report::Sheet sheet = report::sheet_of(document, name, document.at("violations").empty() ? failure : std::string());
   sheet.again = campaign_again(document);
-  if (older) sheet.notes.push_back("The command above may draw other cases today: generators have changed since.");
   const json& violations = document.at("violations");
   for (std::size_t k = 0; k < sheet.cards.size(); ++k) {
     report::Card& card = sheet.cards[k];

@@ -47,11 +47,6 @@ struct CaseRow {
   std::string vacuous = {};  // the first reason that was given
 };
 
-// Of a campaign; documents of earlier versions do not say it.
-std::vector<std::string> left_stages(const json& document) {
-  return document.value("left_to_reference", std::vector<std::string>());
-}
-
 std::string replay_command(const json& violation, const Judging& judging) {
   const std::string file = violation.value("file", "");
   return file.empty() ? judging.again : "cutproof replay " + quoted(file);
@@ -59,7 +54,7 @@ std::string replay_command(const json& violation, const Judging& judging) {
 
 // What a campaign that does not hold lacks beside properties that hold.
 bool is_about_the_whole(const json& document, const std::string& failure) {
-  return !failure.empty() && (document.at("violations").empty() || !document.value("complete", true));
+  return !failure.empty() && (document.at("violations").empty() || !document.at("complete"));
 }
 
 constexpr const char* kWholeCampaign = "enough was judged";
@@ -163,11 +158,11 @@ std::vector<JunitCase> cases_of_campaign(const json& document, const std::string
   for (JunitCase& one : cases) {
     if (one.outcome == JunitOutcome::failed && one.text.empty()) one.text = "see it again: " + judging.again + "\n";
   }
-  for (JunitCase& one : cases_of_left(left_stages(document), judging)) cases.push_back(std::move(one));
+  for (JunitCase& one : cases_of_left(document.at("left_to_reference"), judging)) cases.push_back(std::move(one));
   JunitCase& whole = case_named(kWholeCampaign);
   if (is_about_the_whole(document, failure)) {
     // Cases that are missing could not be judged; what was judged too little was judged, and that is the failure.
-    whole.outcome = document.value("complete", true) ? JunitOutcome::failed : JunitOutcome::error;
+    whole.outcome = document.at("complete") ? JunitOutcome::failed : JunitOutcome::error;
     whole.message = failure;
     whole.text = fmt::format("{}\nsee it again: {}\n", failure, judging.again);
   }

@@ -159,7 +159,7 @@ void print_campaign(const json& document) {
         "rounding may carry farther\n",
         document.at("steps_compared"));
   }
-  if (const auto left = document.value("left_to_reference", std::vector<std::string>()); !left.empty()) {
+  if (const std::vector<std::string> left = document.at("left_to_reference"); !left.empty()) {
     say("{}\n", undecided(printable(left_in_words(left))));
   }
   if (document.at("refused") > 0) {
@@ -197,7 +197,7 @@ int conclude_campaign(const FuzzOptions& options, const json& document, bool who
   const int status = print_conclusion(document, conclusion);
   print_written(options.report);
   print_annotations(failures_of_campaign(document, conclusion.failure, judging),
-                    document.value("left_to_reference", std::vector<std::string>()));
+                    document.at("left_to_reference"));
   return status;
 }
 

@@ -75,9 +75,9 @@ void require_same_campaign(const json& whole, const json& part, const std::strin
   }
 }
 
-// Stages that the reference ran for the backend, in order; none where the document does not say it.
+// Stages that the reference ran for the backend, in order.
 std::vector<std::string> left_stages(const json& document) {
-  const auto stages = document.value("left_to_reference", std::vector<std::string>());
+  const auto stages = document.at("left_to_reference").get<std::vector<std::string>>();
   for (const std::string& stage : stages) {
     if (std::find(kStageNames.begin(), kStageNames.end(), stage) == kStageNames.end()) {
       throw std::invalid_argument("left_to_reference: there is no stage \"" + stage + "\"");
@@ -203,7 +203,7 @@ namespace {
 
 // Throws json::exception or std::invalid_argument if something is missing, or of another kind, that merging or a
 // conclusion reads; InputError if there is too much.
-void require_fields(const json& part, const std::string& file, bool has_every_class) {
+void require_fields(const json& part, const std::string& file) {
   // Counts are added up: those of a million shards must fit.
   const auto require_count = [&](const json& within, const char* name) {
     const double count = within.at(name).get<double>();
@@ -218,9 +218,7 @@ void require_fields(const json& part, const std::string& file, bool has_every_cl
   for (const char* flag : {"dynamics", "complete"}) static_cast<void>(part.at(flag).get<bool>());
   static_cast<void>(part.at("backend").get<std::string>());
   static_cast<void>(integer_from<int>(part.at("sizes").at(1)));
-  for (const CoverageClass& each : kCoverageClasses) {
-    if (has_every_class || part.at("coverage").contains(each.name)) require_count(part.at("coverage"), each.name);
-  }
+  for (const CoverageClass& each : kCoverageClasses) require_count(part.at("coverage"), each.name);
   if (part.at("properties").size() > io::kMostProperties) {
     throw InputError(
         file, "properties",
@@ -250,9 +248,13 @@ InputError no_result(const std::string& file, const std::exception& why) {
 json read_shard(const std::string& file) {
   const json part = io::read_json(file, io::kCampaignLimits,
                                   "Copy it again, or leave it out: --merge then names the shard as missing.");
-  if (!part.is_object() || part.value("format", json()) != kResultFormat ||
-      part.value("format_version", json()) != kFormatVersion) {
-    throw InputError(file, "format", "this is not a result of `cutproof fuzz` of this version", kRemedy);
+  if (!part.is_object() || part.value("format", json()) != kResultFormat) {
+    throw InputError(file, "format", "this is not a result of `cutproof fuzz`", kRemedy);
+  }
+  if (const json& version = part.at("format_version"); version != kFormatVersion) {
+    throw InputError(file, "format_version",
+                     fmt::format("this is version {}, and only {} is read", version.dump(), kFormatVersion),
+                     "run the campaign again with this version of cutproof");
   }
   if (part.contains("merged_shards")) {
     throw InputError(file, "merged_shards", "these are shards that were put together already", kRemedy);
@@ -261,7 +263,7 @@ json read_shard(const std::string& file) {
   if (shards < 1 || shards > kMostShards || shard < 1 || shard > shards) {
     throw InputError(file, "shard", fmt::format("there is no shard {} of {}", shard, shards), kRemedy);
   }
-  require_fields(part, file, true);
+  require_fields(part, file);
   return part;
 }
 
@@ -269,7 +271,7 @@ json read_shard(const std::string& file) {
 
 void require_campaign(const json& document, const std::string& file) {
   try {
-    require_fields(document, file, false);
+    require_fields(document, file);
     if (document.contains("seconds_asked")) {
       static_cast<void>(document.at("seconds_asked").get<double>());
     } else {
@@ -365,16 +367,6 @@ std::string how_far(const json& document) {
 
 }  // namespace
 
-std::vector<std::string> uncounted_classes(const json& document) {
-  const bool moves = document.at("dynamics").get<bool>();
-  std::vector<std::string> found;
-  for (const CoverageClass& each : kCoverageClasses) {
-    const bool is_asked = moves || each.occurs == Occurs::always;
-    if (is_asked && !document.at("coverage").contains(each.name)) found.emplace_back(each.name);
-  }
-  return found;
-}
-
 CampaignConclusion conclude(const json& document, bool whole) {
   const auto cases = document.at("cases").get<int64_t>();
   const std::size_t violations = document.at("violations").size();
@@ -383,7 +375,7 @@ CampaignConclusion conclude(const json& document, bool whole) {
   if (!missing.empty()) {
     lost = fmt::format("of {} shards these are missing or were stopped, and not all of their cases were judged: {}",
                        document.at("merged_shards").get<int64_t>(), missing);
-  } else if (!document.value("complete", true)) {
+  } else if (!document.at("complete").get<bool>()) {
     lost = how_far(document);
   }
   if (violations > 0) {
@@ -398,7 +390,6 @@ CampaignConclusion conclude(const json& document, bool whole) {
   if (!whole || cases < kCasesThatMeetEveryClass) return {};
   std::vector<std::string> empty, rare;
   for (const CoverageClass& wanted : kCoverageClasses) {
-    if (!document.at("coverage").contains(wanted.name)) continue;
     const auto count = document.at("coverage").at(wanted.name).get<int64_t>();
     if (count >= least_count(wanted, cases, document.at("dynamics").get<bool>())) continue;
     (count == 0 ? empty : rare).emplace_back(count == 0 ? wanted.name : fmt::format("{} ({})", wanted.name, count));
@@ -416,7 +407,7 @@ CampaignConclusion conclude(const json& document, bool whole) {
       document.at("steps_compared").at("particles").get<int64_t>() == 0) {
     return {"no position after a step was compared with the reference's"};
   }
-  for (const json& property : document.value("properties", json::array())) {
+  for (const json& property : document.at("properties")) {
     if (property.at("property") != "admissible step") continue;
     const double undecided = property.at("undecided").get<double>(), checked = property.at("checked").get<double>();
     if (undecided <= kMostUndecided * checked) continue;

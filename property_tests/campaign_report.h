@@ -25,14 +25,10 @@ nlohmann::json merge_shards(const std::vector<std::string>& files);
 // Of a merged document, as job arrays write it: "3,7-12"; empty: none is missing.
 std::string missing_shards(const nlohmann::json& document);
 
-// Throws InputError, naming `file`, if something is missing, or of another kind, that a conclusion reads. Classes of
-// cases that came after the document was written may be missing.
+// Throws InputError, naming `file`, if something is missing, or of another kind, that a conclusion reads.
 void require_campaign(const nlohmann::json& document, const std::string& file);
-// The classes that today's campaigns count and this one did not: of them nothing is known.
-std::vector<std::string> uncounted_classes(const nlohmann::json& document);
 
-// What follows from a document, from whatever earlier version too, in its own names (report/older.h): what it does not
-// hold says nothing. `whole`: it is of all shards, so classes of cases that never occurred say something.
+// What follows from a document. `whole`: it is of all shards, so classes of cases that never occurred say something.
 struct CampaignConclusion {
   std::string failure;  // what is wrong, as a sentence without an end; empty: all hold
   bool holds() const { return failure.empty(); }

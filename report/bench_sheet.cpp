@@ -66,11 +66,9 @@ std::string with(const std::string& name, const std::string& variant) {
 }
 
 std::string solver_text(const Field& row) {
-  // Documents of versions before 3 do not all say how iterations were accelerated.
-  const std::string acceleration = row["acceleration"].text_or("");
-  return fmt::format("{} substeps × {} iterations, {}rotation {}, split {}", row["substeps"].count(),
-                     row["iterations"].count(), acceleration.empty() ? "" : "acceleration " + acceleration + ", ",
-                     row["rotation"].text(), row["split"].text());
+  return fmt::format("{} substeps × {} iterations, acceleration {}, rotation {}, split {}", row["substeps"].count(),
+                     row["iterations"].count(), row["acceleration"].text(), row["rotation"].text(),
+                     row["split"].text());
 }
 
 // Kidneys that a document has timed, beside Table 3 of the paper: those of about as many particles as it has.

@@ -4,7 +4,6 @@
 #include "model/io/columns.h"
 #include "model/left_stages.h"
 #include "report/document_fields.h"
-#include "report/older.h"
 
 namespace cutproof::report {
 
@@ -79,15 +78,11 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
   Sheet sheet;
   sheet.kind = "campaign";
   const std::string backend = document["backend"].text();
-  // Before version 4 a campaign that was stopped wrote nothing, unless shards were put together.
-  const bool was_older = is_older(document);
   const bool moves = document["dynamics"].flag();
-  const bool is_complete = was_older ? document["complete"].flag_or(true) : document["complete"].flag();
+  const bool is_complete = document["complete"].flag();
   const int64_t cases = document["cases"].count(), verdicts = document["verdicts"].count();
-  const int64_t refused = was_older ? document["refused"].count_or(0) : document["refused"].count();
-  const bool has_properties = !was_older || document["properties"].is_there();
-  PropertyTable properties;
-  if (has_properties) properties = property_table(document["properties"]);
+  const int64_t refused = document["refused"].count();
+  PropertyTable properties = property_table(document["properties"]);
   const Field violations = document["violations"];
   violations.each([&](const Field& one) {
     Card card;
@@ -121,7 +116,7 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
   sheet.title = "backend " + backend;
   // Nothing holds because its document says so.
   sheet.holds = document["holds"].flag() && wrong == 0 && properties.failing == 0 &&
-                (properties.judged > 0 || !has_properties) && verdicts > 0 && is_complete && failure.empty();
+                properties.judged > 0 && verdicts > 0 && is_complete && failure.empty();
   sheet.badge = *sheet.holds ? "✓ holds" : wrong == 0 && !is_complete ? "✕ incomplete" : "✕ fails";
   const std::string subject =
       fmt::format("cutproof tried {} random dissections{} on backend {}, {:.3g} particles on average",
@@ -151,7 +146,7 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
     sheet.facts.push_back(fmt::format("shard {} of {}", document["shard"].count(), document["shards"].count()));
   if (document["commit"].is_there()) sheet.facts.push_back("commit " + document["commit"].text());
   sheet.facts.push_back("cutproof " + document["cutproof"].text());
-  if (const Field left = document["left_to_reference"]; left.is_there() && left.length() > 0)
+  if (const Field left = document["left_to_reference"]; left.length() > 0)
     sheet.notes.push_back(left_in_words(left.texts()));
   if (refused > 0)
     sheet.notes.push_back(fmt::format("The backend refused {}: nothing is known of them.", cases_in_words(refused)));
@@ -166,7 +161,7 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
         "farther.",
         io::grouped(steps["steps"].count()), io::grouped(steps["particles"].count()),
         figure_text(steps["greatest_h"].number()), io::grouped(steps["undecidable"].count())));
-  if (has_properties) sheet.pieces.emplace_back(std::move(properties.grid));
+  sheet.pieces.emplace_back(std::move(properties.grid));
   add_coverage(sheet, document, moves);
   return sheet;
 }
@@ -178,13 +173,7 @@ Sheet judge_sheet(const Field& document) {
   const std::string name = plugin["name"].text(), version = plugin["version"].text();
   const std::string library = plugin["library"].is_nothing() ? "" : plugin["library"].text();
   sheet.title = name.empty() ? (library.empty() ? "a plugin" : library) : name + (version.empty() ? "" : " " + version);
-  // Documents without it are of a time in which one that was stopped wrote nothing.
-  const Field complete = document["complete"];
-  const bool is_complete = complete.flag_or(true);
-  if (!complete.is_there())
-    sheet.notes.push_back(
-        "An older version of cutproof has written this. It does not say that it was not stopped before its end; what "
-        "was stopped wrote nothing then.");
+  const bool is_complete = document["complete"].flag();
   Grid operations;
   operations.title = "Operations";
   operations.words = "A question is one call of the plugin; a case is a matrix or a body within it.";
@@ -202,7 +191,7 @@ Sheet judge_sheet(const Field& document) {
     const std::size_t failures = one["failures"].length();
     const bool holds =
         one["holds"].flag() && failed == 0 && failures == 0 && properties.failing == 0 && questions > refused;
-    const bool is_whole = one["complete"].flag_or(true);
+    const bool is_whole = one["complete"].flag();
     all_hold = all_hold && holds;
     failing += !holds;
     ++judged;
@@ -212,22 +201,19 @@ Sheet judge_sheet(const Field& document) {
                                            : "holds as far as it went",
                                 io::grouped(one["cases"].count()), one["of"].text(), io::grouped(questions),
                                 io::grouped(refused), io::grouped(one["not_answered"].count()), io::grouped(failed),
-                                one["failed_cases"].is_there() ? io::grouped(one["failed_cases"].count()) : "–",
-                                figure_text(one["seconds"].number())},
+                                io::grouped(one["failed_cases"].count()), figure_text(one["seconds"].number())},
                                holds ? "" : "bad"});
     if (questions <= refused) sheet.notes.push_back(operation + ": every question was refused, so nothing was judged.");
-    if (one["ended"].flag_or(false))
+    if (one["ended"].flag())
       sheet.notes.push_back(operation +
                             ": the plugin's process ended and could not be started again; nothing more was asked.");
-    else if (one["gave_up"].flag_or(false))
+    else if (one["gave_up"].flag())
       sheet.notes.push_back(operation + ": given up after too many questions without an answer; --keep-going goes on.");
-    if (one["not_asked"].is_there()) {
-      one["not_asked"].each([&](const Field& question) {
-        sheet.notes.push_back(fmt::format("{}: “{}” of size {} was not asked: of size {} its answer took {:.2g} s.",
-                                          operation, question["kind"].text(), io::grouped(question["size"].count()),
-                                          io::grouped(question["size_before"].count()), question["seconds"].number()));
-      });
-    }
+    one["not_asked"].each([&](const Field& question) {
+      sheet.notes.push_back(fmt::format("{}: “{}” of size {} was not asked: of size {} its answer took {:.2g} s.",
+                                        operation, question["kind"].text(), io::grouped(question["size"].count()),
+                                        io::grouped(question["size_before"].count()), question["seconds"].number()));
+    });
     one["unpromised"].each([&](const Field& property) {
       const int64_t would_fail = property["failing"].count();
       sheet.notes.push_back(fmt::format(
@@ -255,9 +241,9 @@ Sheet judge_sheet(const Field& document) {
       }
     });
     properties.grid.title = "Properties of " + operation;
-    if (one["kinds"].is_there()) properties.grid.columns[3].head = one["of"].text();
+    properties.grid.columns[3].head = one["of"].text();
     tables.emplace_back(std::move(properties.grid));
-    if (one["kinds"].is_there()) tables.emplace_back(kinds_of(one));
+    tables.emplace_back(kinds_of(one));
   });
   for (const char* const stages : {"dissections", "moving_dissections"}) {
     const Field one = document[stages];

@@ -12,12 +12,6 @@ namespace cutproof::report {
 inline constexpr const char* kDocumentRemedy =
     "give what `cutproof fuzz`, `judge`, `bench` or `tune` has written with --json";
 
-// The format versions that this program writes; what earlier ones have written is read, too (older.h).
-inline constexpr int64_t kFuzzVersion = 4, kJudgeVersion = 1, kBenchVersion = 3;
-
-// What rows of `stages` and the scenes that they are of have in common.
-inline constexpr const char* kOfAScene[] = {"scene", "cooking", "split", "rotation", "backend"};
-
 Sheet campaign_sheet(const Field& document, const std::string& failure);
 Sheet judge_sheet(const Field& document);
 Sheet bench_sheet(const Field& document);

@@ -5,7 +5,6 @@
 #include "model/counted.h"
 #include "model/io/columns.h"
 #include "report/document_fields.h"
-#include "report/older.h"
 
 namespace cutproof::report {
 
@@ -48,6 +47,19 @@ void look_within(const json& given, const std::string& path, int depth, Within& 
       "write what it holds to files of their own, and give those");
 }
 
+// The program writes one version of each format, and reads no other.
+void require_version(const Field& document, DocumentKind kind) {
+  constexpr int64_t kFuzzVersion = 4, kJudgeVersion = 1, kBenchVersion = 3;
+  const int64_t known = kind == DocumentKind::fuzz    ? kFuzzVersion
+                        : kind == DocumentKind::judge ? kJudgeVersion
+                                                      : kBenchVersion;
+  const Field field = document["format_version"];
+  const int64_t version = field.count();
+  if (version == known) return;
+  throw InputError(document.file, field.path, fmt::format("this is version {}, and only {} is read", version, known),
+                   "run the command that has written it again, with this version of cutproof");
+}
+
 }  // namespace
 
 DocumentKind kind_of(const json& given, const std::string& file) {
@@ -61,7 +73,7 @@ DocumentKind kind_of(const json& given, const std::string& file) {
   if (format == "cutproof.fuzz") return DocumentKind::fuzz;
   if (format == "cutproof.judge") return DocumentKind::judge;
   if (format == "cutproof.counterexample") return DocumentKind::counterexample;
-  // The first version of bench had no suite, and its reader says so of a later one.
+  // That a suite is missing is said by the reader of benchmarks.
   if (format == "cutproof.bench")
     return document["suite"].text_or("") == "tune" ? DocumentKind::tune : DocumentKind::bench;
   document["format"].refuse("'" + format + "' is nothing that a page is made of");
@@ -69,17 +81,14 @@ DocumentKind kind_of(const json& given, const std::string& file) {
 
 Sheet sheet_of(const json& given, const std::string& file, const std::string& failure) {
   const DocumentKind kind = kind_of(given, file);
-  const Field as_given = {&given, file, "", kDocumentRemedy};
+  const Field document = {&given, file, "", kDocumentRemedy};
   if (kind == DocumentKind::run || kind == DocumentKind::counterexample)
-    as_given["format"].refuse("this is no campaign and no measurement");
-  const std::optional<Renamed> older = renamed(as_given);
-  const Field document = {older ? &older->document : &given, file, "", kDocumentRemedy};
-  Sheet sheet = kind == DocumentKind::fuzz    ? campaign_sheet(document, failure)
-                : kind == DocumentKind::judge ? judge_sheet(document)
-                : kind == DocumentKind::bench ? bench_sheet(document)
-                                              : tune_sheet(document);
-  if (older) sheet.notes.insert(sheet.notes.begin(), older->notes.begin(), older->notes.end());
-  return sheet;
+    document["format"].refuse("this is no campaign and no measurement");
+  require_version(document, kind);
+  return kind == DocumentKind::fuzz    ? campaign_sheet(document, failure)
+         : kind == DocumentKind::judge ? judge_sheet(document)
+         : kind == DocumentKind::bench ? bench_sheet(document)
+                                       : tune_sheet(document);
 }
 
 std::vector<std::pair<std::string, const json*>> dissections_in(const json& document) {
@@ -172,7 +181,7 @@ PropertyTable property_table(const Field& properties) {
 }
 
 void add_measurement(Sheet& sheet, const Field& document) {
-  const bool is_complete = document["complete"].flag_or(true);
+  const bool is_complete = document["complete"].flag();
   const Field holds = document["holds"];
   if (holds.is_there()) sheet.holds = holds.flag();
   if (!is_complete) sheet.holds = false;

@@ -11,9 +11,8 @@ enum class DocumentKind { run, fuzz, judge, bench, tune, counterexample };
 // What a document is, by its own content. Throws InputError, naming `file`, for one of which no page is made.
 DocumentKind kind_of(const nlohmann::json& document, const std::string& file);
 
-// Of a document of fuzz, judge, bench or tune; what older versions have written is shown with what it has, and notes
-// say what it lacks. Throws InputError, naming file and field, for anything that is not as results_schema.md has it.
-// `failure`: what is wrong with a campaign as a whole, as a sentence without an end (property_tests/campaign_report.h);
+// Of a document of fuzz, judge, bench or tune. Throws InputError, naming file and field, for anything that is not as
+// results_schema.md has it, and for a document of another format version than this program writes. `failure`: what is wrong with a campaign as a whole, as a sentence without an end (property_tests/campaign_report.h);
 // empty: nothing.
 Sheet sheet_of(const nlohmann::json& document, const std::string& file, const std::string& failure = {});
 

@@ -117,7 +117,7 @@ Sheet tune_sheet(const Field& document) {
     sheet.notes.push_back(
         kind == "limit" ? "The reference solution is the limit of short time steps."
                         : "The reference solution is the scene's own substeps, each solved until it is converged.");
-    if (const Field levels = reference["levels"]; levels.is_there() && levels.length() > 0) {
+    if (const Field levels = reference["levels"]; levels.length() > 0) {
       if (const Field solved = levels.at(levels.length() - 1)["solved"]; solved.is_there()) {
         const int64_t iterated = solved["by_iteration"].count(), unsolved = solved["unsolved"].count();
         sheet.notes.push_back(fmt::format(
@@ -128,11 +128,8 @@ Sheet tune_sheet(const Field& document) {
                                         io::grouped(iterated), io::grouped(unsolved))));
       }
     }
-    if (const std::string known = reference["known_text"].text_or(""); !known.empty()) {
+    if (const std::string known = reference["known_text"].text(); !known.empty())
       sheet.notes.push_back("It is " + known + ".");
-    } else if (!reference["known_h"].is_there()) {
-      sheet.notes.push_back("How well it is known is not said.");
-    }
   }
   document["left"].each([&](const Field& left) {
     const Field trial = left["trial"];
@@ -160,7 +157,7 @@ Sheet tune_sheet(const Field& document) {
     if (answer != 0) add(trials.at(answer), "the answer");
     sheet.pieces.emplace_back(std::move(frames));
   }
-  if (const Field front = document["front"]; front.is_there() && front.length() > 0) {
+  if (const Field front = document["front"]; front.length() > 0) {
     Grid best;
     best.title = "The cheapest, by tolerance";
     best.words = "Of all that were carried to their end; what is not known of the reference solution counts.";

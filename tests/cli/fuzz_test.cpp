@@ -146,6 +146,13 @@ TEST_F(Fuzz, PutsShardsTogetherToTheWhole) {
     write("bad.json", bad);
     expect_refused("fuzz --merge bad.json", {"bad.json"});
   }
+  json other_version = result("3.json");
+  for (const int version : {3, 5}) {
+    other_version["format_version"] = version;
+    write("other.json", other_version.dump());
+    expect_refused("fuzz --merge 1.json other.json",
+                   {"other.json", "format_version", std::to_string(version), "only 4 is read", "run the campaign again"});
+  }
   // What says that it is no shard: 4 of 3, 0 of 3, 1 of 0, or more than any machine has.
   for (const auto& [shard, shards] : {std::pair{4, 3}, {0, 3}, {1, 0}, {1, 2'000'000'000}}) {
     json none = result("3.json");
@@ -171,10 +178,8 @@ TEST_F(Fuzz, PutsShardsTogetherToTheWhole) {
       if (is_there) broken[field] = value.is_object() ? json{{"x", "y"}} : json{{"x"}};
       write("broken.json", broken.dump());
       const Outcome outcome = cutproof("fuzz --merge 1.json 2.json broken.json");
-      // The machine's threads, and a verdict that merging makes itself, are not read. Stages that nobody names are
-      // none.
-      const bool is_read = field != "threads" && field != "mean_particles" && field != "holds" &&
-                           (field != "left_to_reference" || is_there);
+      // The machine's threads, and a verdict that merging makes itself, are not read.
+      const bool is_read = field != "threads" && field != "mean_particles" && field != "holds";
       EXPECT_EQ(outcome.status, is_read ? 2 : 0) << field << is_there << "\n" << outcome.output;
       EXPECT_EQ(outcome.output.find("broken.json") != std::string::npos, is_read) << outcome.output;
     }

@@ -150,6 +150,7 @@ TEST(JunitCases, OfACampaignNameEveryViolationAndTheWhole) {
   const nlohmann::json document = {
       {"properties", {property("motion", 3, 1), property("finite", 3, 0), property("no pass", 0, 0)}},
       {"violations", {violation}},
+      {"complete", true},
       {"left_to_reference", {"skin"}}};
   const auto cases = cases_of_campaign(document, "1 of 8 cases", judging);
   std::map<std::string, io::JunitCase> by_name;

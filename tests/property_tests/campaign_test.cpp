@@ -194,7 +194,8 @@ nlohmann::json document_with(int64_t cases, bool dynamics, int64_t often) {
   return {{"complete", true},       {"cases", cases},
           {"verdicts", 10 * cases}, {"violations", nlohmann::json::array()},
           {"dynamics", dynamics},   {"coverage", coverage},
-          {"sizes", {0, 79}},       {"properties", nlohmann::json::array()}};
+          {"sizes", {0, 79}},       {"properties", nlohmann::json::array()},
+          {"left_to_reference", nlohmann::json::array()}};
 }
 
 TEST(ACampaign, FailsIfAClassThatItMustMeetIsEmptyOrRare) {
@@ -289,7 +290,9 @@ TEST(ACounterexample, IsRefusedWithItsFieldIfItIsNone) {
       EXPECT_NE(std::string(error.what()).find(field), std::string::npos) << error.what();
     }
   };
-  refused("\"format_version\":1", "\"format_version\":2", "format_version");
+  for (const char* version : {"0", "2"}) {
+    refused("\"format_version\":1", std::string("\"format_version\":") + version, "format_version");
+  }
   refused("cutproof.counterexample", "cutproof.fuzz", "format");
   refused("\"schedule\":[]", "\"schedule\":[[99999999999,1]]", "schedule");
   refused("\"moves\":false", "\"moves\":false,\"tail\":1", "tail");
@@ -313,6 +316,9 @@ TEST(CampaignDocument, IsRefusedWithNumbersThatNoIntegerHolds) {
   options.cases = 7;
   const nlohmann::json right = campaign_document(backend, options, {}, nlohmann::json::array());
   EXPECT_NO_THROW(require_campaign(right, "c.json"));
+  nlohmann::json fewer_classes = right;
+  fewer_classes["coverage"].erase(kCoverageClassNames.front());
+  EXPECT_THROW(require_campaign(fewer_classes, "c.json"), InputError);
   for (const char* field : {"cases_asked", "shard", "shards"}) {
     for (const nlohmann::json& value : {nlohmann::json(1e300), nlohmann::json(2.5), nlohmann::json("7")}) {
       nlohmann::json wrong = right;
