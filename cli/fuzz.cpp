@@ -196,8 +196,7 @@ int conclude_campaign(const FuzzOptions& options, const json& document, bool who
               cases_of_campaign(document, conclusion.failure, judging));
   const int status = print_conclusion(document, conclusion);
   print_written(options.report);
-  print_annotations(failures_of_campaign(document, conclusion.failure, judging),
-                    document.at("left_to_reference"));
+  print_annotations(failures_of_campaign(document, conclusion.failure, judging), document.at("left_to_reference"));
   return status;
 }
 

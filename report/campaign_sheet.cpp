@@ -115,8 +115,8 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
   const std::size_t wrong = violations.length();
   sheet.title = "backend " + backend;
   // Nothing holds because its document says so.
-  sheet.holds = document["holds"].flag() && wrong == 0 && properties.failing == 0 &&
-                properties.judged > 0 && verdicts > 0 && is_complete && failure.empty();
+  sheet.holds = document["holds"].flag() && wrong == 0 && properties.failing == 0 && properties.judged > 0 &&
+                verdicts > 0 && is_complete && failure.empty();
   sheet.badge = *sheet.holds ? "✓ holds" : wrong == 0 && !is_complete ? "✕ incomplete" : "✕ fails";
   const std::string subject =
       fmt::format("cutproof tried {} random dissections{} on backend {}, {:.3g} particles on average",

@@ -174,14 +174,13 @@ void describe(auto& v, DetectParameters& s) {
                         "What removes a particle. `distance`: a neighbour farther than epsilon · h; `geometric`: the "
                         "swept blade comes within max(thickness, h)/2 of its node; `strain`: a cluster's principal "
                         "stretch; `none`: nothing is ever removed (method.md §4)."});
-  v.field(s.remove,
-          {"remove",
-           "`distance` only: of an edge that is longer than epsilon · h `both` ends go, as in the paper, or "
-           "`one`, which halves the loss: the end on the negative side of the plane of a lowered blade "
-           "between them (along × back is positive), else the one with more such edges, of equals the lower "
-           "particle; or `nearer`: as `one`, but of two ends on different sides of that plane the positive "
-           "one if the clusters carry it nearer to it by more than h/8, so that both faces of the cut lie "
-           "where the blade passed (method.md §4). Left out, it is `both` with other criteria."});
+  v.field(s.remove, {"remove",
+                     "`distance` only: of an edge that is longer than epsilon · h `both` ends go, as in the paper, or "
+                     "`one`, which halves the loss: the end on the negative side of the plane of a lowered blade "
+                     "between them (along × back is positive), else the one with more such edges, of equals the lower "
+                     "particle; or `nearer`: as `one`, but of two ends on different sides of that plane the positive "
+                     "one if the clusters carry it nearer to it by more than h/8, so that both faces of the cut lie "
+                     "where the blade passed (method.md §4). Left out, it is `both` with other criteria."});
   v.field(s.epsilon,
           {"epsilon", "Distance from a neighbour beyond which a particle is removed. At 1 or less, tissue at rest is.",
            above(0, 1e6, "h")});
@@ -319,7 +318,8 @@ void describe(auto& v, FrameFields& s) {
 }
 
 void describe(auto& v, Scene& s) {
-  v.field(s.version, {"version", "Of this format; no other is read.", between(kSceneVersion, kSceneVersion), kRequired});
+  v.field(s.version,
+          {"version", "Of this format; no other is read.", between(kSceneVersion, kSceneVersion), kRequired});
   v.field(s.name, {"name", "A short name, for reports.", {}, kOptional, kMostNameBytes});
   v.field(s.description, {"description", "What the scene shows, for people.", {}, kOptional, kMostDescriptionBytes});
   v.field(s.seed, {"seed", "Of everything random.", between(0, 18446744073709551615.0)});

@@ -150,8 +150,8 @@ TEST_F(Fuzz, PutsShardsTogetherToTheWhole) {
   for (const int version : {3, 5}) {
     other_version["format_version"] = version;
     write("other.json", other_version.dump());
-    expect_refused("fuzz --merge 1.json other.json",
-                   {"other.json", "format_version", std::to_string(version), "only 4 is read", "run the campaign again"});
+    expect_refused("fuzz --merge 1.json other.json", {"other.json", "format_version", std::to_string(version),
+                                                      "only 4 is read", "run the campaign again"});
   }
   // What says that it is no shard: 4 of 3, 0 of 3, 1 of 0, or more than any machine has.
   for (const auto& [shard, shards] : {std::pair{4, 3}, {0, 3}, {1, 0}, {1, 2'000'000'000}}) {

@@ -361,9 +361,8 @@ const std::vector<Hostile>& hostile_inputs() {
        "report input -o page.html",
        {"suite", R"(\x1b[31m)", "sensitivity"}},
       {"ATuningWhoseAnswerIsNoTrialForAPage",
-       text(
-           R"({"format":"cutproof.bench","format_version":3,"suite":"tune","complete":true,"backend":"","device":"",)"
-           R"("date":"","cutproof":"","scene":"s","tolerance_h":1,"trials":[],"found":{"trial":7}})"),
+       text(R"({"format":"cutproof.bench","format_version":3,"suite":"tune","complete":true,"backend":"","device":"",)"
+            R"("date":"","cutproof":"","scene":"s","tolerance_h":1,"trials":[],"found":{"trial":7}})"),
        "report input -o page.html",
        {"found.trial", "no such trial"}},
       {"ACounterexampleOfManyNodesForAPage",

@@ -191,10 +191,14 @@ TEST(Simplest, KeepsOnlyWhatTheFaultNeeds) {
 nlohmann::json document_with(int64_t cases, bool dynamics, int64_t often) {
   nlohmann::json coverage;
   for (const char* name : kCoverageClassNames) coverage[name] = often;
-  return {{"complete", true},       {"cases", cases},
-          {"verdicts", 10 * cases}, {"violations", nlohmann::json::array()},
-          {"dynamics", dynamics},   {"coverage", coverage},
-          {"sizes", {0, 79}},       {"properties", nlohmann::json::array()},
+  return {{"complete", true},
+          {"cases", cases},
+          {"verdicts", 10 * cases},
+          {"violations", nlohmann::json::array()},
+          {"dynamics", dynamics},
+          {"coverage", coverage},
+          {"sizes", {0, 79}},
+          {"properties", nlohmann::json::array()},
           {"left_to_reference", nlohmann::json::array()}};
 }
 
