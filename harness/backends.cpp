@@ -82,22 +82,6 @@ template <gpu::Path>
 constexpr std::unique_ptr<Backend> (*make_gpu)(const BackendChoice&) = nullptr;
 #endif
 
-// Of the same kernels, started in another way.
-constexpr BackendDescriptor gpu_path(std::string_view name, std::string_view summary, bool is_timed,
-                                     std::unique_ptr<Backend> (*make)(const BackendChoice&)) {
-  return {
-      .name = name,
-      .summary = summary,
-      .processor = Processor::device,
-      .is_timed = is_timed,
-      .is_another_path = true,
-      .pipelines = is_timed,
-      .timed_frames = 20,
-      .most_parallel_loads = 6,
-      .make = make,
-  };
-}
-
 constexpr bool whole_frames(Span span) { return span.is_whole_frame(); }
 constexpr bool split_alone(Span span) { return span.first == Stage::split && span.last == Stage::split; }
 
@@ -176,9 +160,15 @@ constexpr std::array kBackends = {
         .most_parallel_loads = 6,
         .make = make_gpu<gpu::Path::graph>,
     },
-    gpu_path("gpu-eager", "the same, kernel by kernel", false, make_gpu<gpu::Path::eager>),
-    gpu_path("gpu-block", "the same, one kernel of one block", true, make_gpu<gpu::Path::one_block>),
-    gpu_path("gpu-grid", "the same, one kernel that fills the device", true, make_gpu<gpu::Path::one_grid>),
+    BackendDescriptor{
+        .name = "gpu-eager",
+        .summary = "the same, kernel by kernel",
+        .processor = Processor::device,
+        .is_timed = false,
+        .is_another_path = true,
+        .most_parallel_loads = 6,
+        .make = make_gpu<gpu::Path::eager>,
+    },
 };
 
 std::string cpu_name() {

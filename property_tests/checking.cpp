@@ -56,7 +56,7 @@ std::vector<NamedBackend> all_backends() {
       add(backend, "_random", "", "random", 2, 35);
       add(backend, "_pct", "", "pct", 2, 35);
       add(backend, "_reverse", "global", "reverse", 2, 35);
-    } else if (backend.is_another_path && (backend.is_timed || !backend.needs_device())) {
+    } else if (backend.is_another_path && !backend.needs_device()) {
       add(backend, "", "", "", 10, 100);
     } else if (backend.is_timed) {
       add(backend, "", "", "", 1, 100);

@@ -1,6 +1,3 @@
-// The launchers of this file are the host's, though what writes work down is also the device's.
-#pragma nv_diag_suppress 20011
-#pragma nv_diag_suppress 20014
 #include <cuda_runtime.h>
 
 #include <algorithm>
@@ -18,7 +15,6 @@
 #include "gpu/device/cuda_check.h"
 #include "gpu/device/cuda_handles.h"
 #include "gpu/device/device_launcher.cuh"
-#include "gpu/device/span_kernel.h"
 #include "gpu/launch/frame.h"
 
 namespace cutproof::gpu {
@@ -103,18 +99,11 @@ class GpuBackend final : public KernelBackend {
       require_no_fault(then);
       if (wants_capacity(device_.view(), then)) take(load_.enlarged(snapshot(), options_));
     }
-    const Path path = path_of_load();
     if (load_.needs_groups(span)) {
       DeviceLauncher launcher(stream_.get());
       enqueue_groups_if_stale(launcher, device_.view());
     }
-    if (path == Path::one_block || path == Path::one_grid) {
-      CUTPROOF_CUDA(cudaEventRecord(begin_.get(), stream_.get()));
-      launch_span(device_.view(), load_.plan, span, static_cast<int*>(partials_.get()),
-                  path == Path::one_block ? 1 : most_span_blocks_, stream_.get());
-      return finish(span);
-    }
-    if (path == Path::eager) {
+    if (options_.path == Path::eager) {
       DeviceLauncher launcher(stream_.get());
       CUTPROOF_CUDA(cudaEventRecord(begin_.get(), stream_.get()));
       enqueue_span(launcher, device_.view(), load_.plan, span, [](Stage) {});
@@ -170,10 +159,6 @@ class GpuBackend final : public KernelBackend {
   }
 
  private:
-  Path path_of_load() const {
-    const bool in_one = options_.path == Path::one_block || options_.path == Path::one_grid;
-    return in_one && !fits_span_kernel(device_.view(), load_.plan) ? Path::graph : options_.path;
-  }
   void take(Load load) {
     CUTPROOF_CUDA(cudaStreamSynchronize(stream_.get()));
     graphs_.clear();
@@ -206,8 +191,6 @@ class GpuBackend final : public KernelBackend {
   Stream stream_ = make_stream();
   Event begin_ = make_event();
   std::array<Event, kInFlight> end_;
-  int most_span_blocks_ = prepare_span_kernel();
-  DeviceMemory partials_ = make_device_memory(kMostSpanBlocks * sizeof(int));
   PinnedMemory counters_ = make_pinned_memory(kInFlight * sizeof(Counters));
   uint64_t runs_ = 0;  // since the load
   Span span_;

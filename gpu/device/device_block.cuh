@@ -1,9 +1,6 @@
-// The Blocks of kernels on the device (block.h): everything is inlined to what a plain CUDA kernel would say, and what
+// The Block of kernels on the device (block.h): everything is inlined to what a plain CUDA kernel would say, and what
 // a kernel does not use costs nothing. Block sizes are multiples of 32 (launcher.h checks). Collectives take a number
 // of threads known at run time and combine in a fixed order, so equal block sizes give equal bits.
-//
-// DeviceBlock is a block of the launch. PartOfBlock is one of several parts of it, of neighbouring warps, each of which
-// works like a block: with equal threads it gives the same bits as a DeviceBlock.
 #pragma once
 #include <cstdint>
 #include <cstring>
@@ -13,79 +10,26 @@
 
 namespace cutproof::gpu {
 
-namespace detail {
+class DeviceBlock {
+ public:
+  static constexpr bool on_device = true;
 
-struct WholeBlock {
   __device__ int thread() const { return static_cast<int>(threadIdx.x); }
   __device__ int size() const { return static_cast<int>(blockDim.x); }
   __device__ int index() const { return static_cast<int>(blockIdx.x); }
   __device__ int count() const { return static_cast<int>(gridDim.x); }
-  __device__ int first_warp() const { return 0; }
-  __device__ unsigned first_shared() const { return 0; }
-  __device__ void sync() const { __syncthreads(); }
-  __device__ bool any(bool value) const { return __syncthreads_or(value) != 0; }
-};
-
-class PartShape {
- public:
-  // Parts of so many threads, and so many bytes of shared memory for each (a multiple of 16). At most 15 parts of more
-  // than a warp: a block has 16 barriers, and the first is everybody's.
-  __device__ PartShape(int threads, unsigned shared_bytes)
-      : threads_(threads), part_(static_cast<int>(threadIdx.x) / threads), shared_bytes_(shared_bytes) {}
-
-  __device__ int thread() const { return static_cast<int>(threadIdx.x) - part_ * threads_; }
-  __device__ int size() const { return threads_; }
-  __device__ int index() const { return static_cast<int>(blockIdx.x) * parts() + part_; }
-  __device__ int count() const { return static_cast<int>(gridDim.x) * parts(); }
-  __device__ int first_warp() const { return part_ * threads_ / 32; }
-  __device__ unsigned first_shared() const { return static_cast<unsigned>(part_) * shared_bytes_; }
-  __device__ void sync() const {
-    if (threads_ == 32) return __syncwarp();
-    asm volatile("barrier.sync.aligned %0, %1;" ::"r"(part_ + 1), "r"(threads_) : "memory");
-  }
-  __device__ bool any(bool value) const {
-    if (threads_ == 32) return __any_sync(0xffffffffu, value) != 0;
-    int found = 0;
-    asm volatile(
-        "{\n .reg .pred one, all;\n setp.ne.s32 one, %1, 0;\n barrier.red.or.pred.aligned all, %2, %3, one;\n"
-        " selp.s32 %0, 1, 0, all;\n}"
-        : "=r"(found)
-        : "r"(value ? 1 : 0), "r"(part_ + 1), "r"(threads_)
-        : "memory");
-    return found != 0;
-  }
-
- private:
-  __device__ int parts() const { return static_cast<int>(blockDim.x) / threads_; }
-
-  int threads_, part_;
-  unsigned shared_bytes_;
-};
-
-}  // namespace detail
-
-template <class Shape>
-class BlockOnDevice : private Shape {
- public:
-  static constexpr bool on_device = true;
-
-  using Shape::any;
-  using Shape::count;
-  using Shape::index;
-  using Shape::Shape;
-  using Shape::size;
-  using Shape::sync;
-  using Shape::thread;
   __device__ std::int64_t first() const { return static_cast<std::int64_t>(index()) * size() + thread(); }
   __device__ std::int64_t stride() const { return static_cast<std::int64_t>(count()) * size(); }
   __device__ int lane() const { return static_cast<int>(threadIdx.x & 31u); }
+
+  __device__ void sync() const { __syncthreads(); }
+  __device__ bool any(bool value) const { return __syncthreads_or(value) != 0; }
 
   template <class T>
   __device__ T* shared(int count) {
     static_assert(alignof(T) <= 16);
     extern __shared__ uint4 cutproof_dynamic_shared[];
-    T* const taken = reinterpret_cast<T*>(reinterpret_cast<unsigned char*>(cutproof_dynamic_shared) +
-                                          Shape::first_shared() + shared_used_);
+    T* const taken = reinterpret_cast<T*>(reinterpret_cast<unsigned char*>(cutproof_dynamic_shared) + shared_used_);
     shared_used_ += (static_cast<unsigned>(count) * static_cast<unsigned>(sizeof(T)) + 15u) & ~15u;
     return taken;
   }
@@ -104,8 +48,7 @@ class BlockOnDevice : private Shape {
       total = __shfl_sync(kWarp, through, 31);
       return through - value;
     }
-    __shared__ int partials[32];
-    int* const partial = partials + Shape::first_warp();
+    __shared__ int partial[32];
     const int warp = thread() / 32;
     sync();  // everyone is done with the last use of `partial`
     if (lane() == 31) partial[warp] = through;
@@ -212,8 +155,7 @@ class BlockOnDevice : private Shape {
     }
     const int warps = size() / 32;
     if (warps == 1) return value;
-    __shared__ T partials[32];
-    T* const partial = partials + Shape::first_warp();
+    __shared__ T partial[32];
     const int lane = static_cast<int>(threadIdx.x & 31u);
     sync();  // everyone is done with the last use of `partial`
     if (lane == 0) partial[thread() / 32] = value;
@@ -239,8 +181,5 @@ class BlockOnDevice : private Shape {
 
   unsigned shared_used_ = 0;
 };
-
-using DeviceBlock = BlockOnDevice<detail::WholeBlock>;
-using PartOfBlock = BlockOnDevice<detail::PartShape>;
 
 }  // namespace cutproof::gpu

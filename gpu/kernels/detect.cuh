@@ -574,7 +574,7 @@ struct remove_particles_kernel_object {
 };
 
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_detect(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+void enqueue_detect(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   using namespace detect_detail;
   if (plan.strain) launcher.teams(flag_strained_clusters_kernel_object{}, kStrainTeam, w.slots_expected, w);
   // Only with it do these kernels know of the nearer end: code for what happens to few particles is registers of all.

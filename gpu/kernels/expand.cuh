@@ -296,7 +296,7 @@ CUTPROOF_DEVICE void note_edge_covered_kernel(Block& block, DeviceView w) {
 CUTPROOF_KERNEL(note_edge_covered_kernel);
 
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_expand(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+void enqueue_expand(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   constexpr int kThreads = 64;
   Counters* const c = w.counters;
   const auto collect = [&](Launcher& on) {

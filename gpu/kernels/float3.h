@@ -54,12 +54,11 @@ struct Matrix3x3 {
 using Matrix3 = Matrix3x3<float>;
 
 // What neither this launch writes nor the one before it, with which it may overlap (launcher.h). The compiler may then
-// keep it, which it must not of other memory, that any store could change. Where a whole span is one launch
-// (CUTPROOF_ONE_LAUNCH) nothing is constant.
+// keep it, which it must not of other memory, that any store could change.
 template <class T>
 CUTPROOF_DEVICE inline T constant(const T* at) {
   static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % 4 == 0);
-#if defined(__CUDA_ARCH__) && !defined(CUTPROOF_ONE_LAUNCH)
+#if defined(__CUDA_ARCH__)
   using Word = std::conditional_t<alignof(T) >= 16, uint4, unsigned>;
   constexpr int kWords = static_cast<int>(sizeof(T) / sizeof(Word));
   Word words[kWords];

@@ -526,7 +526,7 @@ CUTPROOF_KERNEL(measure_clusters_kernel);
 
 // Groups of the clusters that have changed since the last time; none, if none has. Requires memberships in order.
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_groups(Launcher& launcher, const DeviceView& w) {
+void enqueue_groups(Launcher& launcher, const DeviceView& w) {
   launcher.teams(find_changed_clusters_kernel_object{}, kMemberTeam, w.slots_expected, w);
   launcher.teams(dissolve_groups_kernel_object{}, kMemberTeam, w.slots_expected, w);
   launcher.teams(find_classes_kernel_object{}, kMemberTeam, w.slots_expected, w);
@@ -538,7 +538,7 @@ CUTPROOF_ENQUEUE void enqueue_groups(Launcher& launcher, const DeviceView& w) {
 }
 // The same at any time, where nobody knows whether any has.
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_groups_if_stale(Launcher& launcher, const DeviceView& w) {
+void enqueue_groups_if_stale(Launcher& launcher, const DeviceView& w) {
   Counters* const c = w.counters;  // an address only: counters lie on the device
   launcher.if_nonzero(&c->groups_stale, [&](Launcher& stale) { enqueue_groups(stale, w); });
 }

@@ -527,7 +527,7 @@ CUTPROOF_KERNEL(place_members_kernel);
 
 // None, unless Counters::moving says so.
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_move_together(Launcher& launcher, const DeviceView& w) {
+void enqueue_move_together(Launcher& launcher, const DeviceView& w) {
   launcher.exclusive_scan(w.slot_size, moved_begin(w), w.slot_capacity, &w.counters->moved_members,
                           &w.counters->moving);
   // Hardly ever is anything moved, so what there is to launch and to end at once is kept small.
@@ -540,7 +540,7 @@ CUTPROOF_ENQUEUE void enqueue_move_together(Launcher& launcher, const DeviceView
 inline constexpr int kMergeBlocks = 2048, kBlocksAgain = 128;
 
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_merge_rounds(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+void enqueue_merge_rounds(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   Counters* const c = w.counters;
   const int64_t most = w.slots_expected < kMergeBlocks ? w.slots_expected : kMergeBlocks;
   const auto propose = [&](Launcher& on, auto kernel) { on.blocks(kernel, most, kMergeThreads, kCandidateBytes, w); };
@@ -570,7 +570,7 @@ CUTPROOF_ENQUEUE void enqueue_merge_rounds(Launcher& launcher, const DeviceView&
 
 // rest_frames: what launches those of clusters as they are. Which of them are small is asked meanwhile.
 template <class Launcher, class RestFrames = NoWork>
-CUTPROOF_ENQUEUE void enqueue_merge(Launcher& launcher, const DeviceView& w, const Plan& plan,
+void enqueue_merge(Launcher& launcher, const DeviceView& w, const Plan& plan,
                                     RestFrames rest_frames = {}) {
   launcher.side_by_side(
       rest_frames,

@@ -80,7 +80,7 @@ CUTPROOF_KERNEL(recompute_rest_frames_kernel);
 // Every slot whose rest_dirty is set; clears the flags. Uses slot_scratch from 3 · slot_capacity on and
 // Counters::scratch[7].
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_rest_frames(Launcher& launcher, const DeviceView& w) {
+void enqueue_rest_frames(Launcher& launcher, const DeviceView& w) {
   int* const slots = w.slot_scratch + int64_t{3} * w.slot_capacity;
   int* const count = &w.counters->scratch[7];
   launcher.select(w.rest_dirty, w.slot_capacity, slots, count, &w.counters->slots_used);

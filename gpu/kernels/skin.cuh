@@ -301,7 +301,7 @@ CUTPROOF_KERNEL(mark_under_skin_kernel);
 
 // Asks which particles are there, and nothing of clusters: what changes these may go on meanwhile.
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_skin_cells(Launcher& launcher, const DeviceView& w, const Plan&) {
+void enqueue_skin_cells(Launcher& launcher, const DeviceView& w, const Plan&) {
   using namespace skin_detail;
   launcher.items(flag_changed_particles_kernel_object{}, w.particles, w);
   launcher.select(w.particle_flag, w.particles, changed(w), &w.counters->skin_changes);
@@ -312,7 +312,7 @@ CUTPROOF_ENQUEUE void enqueue_skin_cells(Launcher& launcher, const DeviceView& w
 }
 // When clusters and cells have changed.
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_skin_clusters(Launcher& launcher, const DeviceView& w, const Plan&) {
+void enqueue_skin_clusters(Launcher& launcher, const DeviceView& w, const Plan&) {
   launcher.items(mark_under_skin_kernel_object{}, w.vertex_capacity, w);
 }
 
@@ -394,7 +394,7 @@ CUTPROOF_KERNEL(place_vertices_kernel);
 
 // made: as said above.
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_skin_positions(Launcher& launcher, const DeviceView& w, bool made) {
+void enqueue_skin_positions(Launcher& launcher, const DeviceView& w, bool made) {
   launcher.teams(recenter_clusters_kernel_object{}, kCenterTeam, w.slots_expected, w, made);
   launcher.items(place_vertices_kernel_object{}, w.vertex_capacity, w, made);
 }

@@ -582,7 +582,7 @@ CUTPROOF_KERNEL(rest_frames_of_components_kernel);
 
 // All but the rest frames, for which nobody asks until clusters are united.
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_components(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+void enqueue_components(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   using namespace split_detail;
   Counters* const counters = w.counters;
   launcher.items(begin_split_kernel_object{}, 1, w);
@@ -624,12 +624,12 @@ CUTPROOF_ENQUEUE void enqueue_components(Launcher& launcher, const DeviceView& w
   launcher.blocks(regroup_members_kernel_object{}, w.slots_expected, kRegroupThreads, sizeof(int) * kRegroupThreads, w);
 }
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_rest_frames_of_components(Launcher& launcher, const DeviceView& w) {
+void enqueue_rest_frames_of_components(Launcher& launcher, const DeviceView& w) {
   launcher.teams(rest_frames_of_components_kernel_object{}, kRestTeam, 2 * int64_t{w.slots_expected}, w);
 }
 // All of it, for who runs nothing beside it.
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_split(Launcher& launcher, const DeviceView& w, const Plan& plan) {
+void enqueue_split(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   enqueue_components(launcher, w, plan);
   enqueue_rest_frames_of_components(launcher, w);
 }

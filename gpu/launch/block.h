@@ -42,14 +42,11 @@
 #if defined(__CUDACC__)
 #define CUTPROOF_DEVICE __device__
 #define CUTPROOF_BOTH __host__ __device__
-// Of what writes work down (launcher.h): in one piece with the kernel that it becomes, where the view is known to be a
-// constant and its pointers to be global.
-#define CUTPROOF_ENQUEUE __host__ __device__ __forceinline__
 #else
 #define CUTPROOF_DEVICE
 #define CUTPROOF_BOTH
-#define CUTPROOF_ENQUEUE
 #endif
+#define CUTPROOF_ENQUEUE
 // Before a loop that stays one: what few threads do, and rarely, has to be fetched anew each time, and code that is
 // fetched takes longer than what it does.
 #if defined(__CUDA_ARCH__)

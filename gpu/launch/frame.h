@@ -25,7 +25,7 @@ namespace cutproof::gpu {
 //
 // `mark` is called with each stage before its work is handed over (a launcher that works at once can take times).
 template <class Launcher, class Mark>
-CUTPROOF_ENQUEUE void enqueue_span(Launcher& launcher, const DeviceView& w, const Plan& plan, Span span, Mark mark) {
+void enqueue_span(Launcher& launcher, const DeviceView& w, const Plan& plan, Span span, Mark mark) {
   if (span.contains(Stage::step)) {
     mark(Stage::step);
     enqueue_step(launcher, w, plan, span);

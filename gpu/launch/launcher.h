@@ -1,6 +1,6 @@
 // How kernels are started. A Launcher is used by frame.h to write down the work of a frame once; DeviceLauncher
-// (device_launcher.cuh) captures it into a CUDA graph, HostLauncher (host_launcher.h) carries it out on the spot, and
-// so does SpanLauncher (span_kernel.cuh), inside one kernel on the device.
+// (device_launcher.cuh) captures it into a CUDA graph or starts its kernels one by one, HostLauncher (host_launcher.h)
+// carries it out on the spot.
 //
 // Members of a Launcher:
 //   template <class Kernel, class... Args>
@@ -11,8 +11,8 @@
 //   template <class Kernel, class... Args>
 //   void blocks(Kernel, int64_t capacity, int threads, std::size_t shared_bytes, Args...);
 //                                                              block-stride over up to `capacity` jobs, one block each;
-//                                                              `threads` is for the device (host: 32 or 1), a power of
-//                                                              two from 32 to kMaxThreads of the kernel
+//                                                              `threads` is for the device (host: 32 or 1), a multiple
+//                                                              of 32 up to kMaxThreads of the kernel
 //   void if_nonzero(const int* flag, Body);                    what `Body` (a callable that launches) does happens only
 //                                                              if *flag is not 0 when the work before it is done
 //   void while_nonzero(int* flag, Body);                       again and again while *flag is not 0
@@ -67,7 +67,7 @@ namespace cutproof::gpu {
 // A piece of work that launches nothing.
 struct NoWork {
   template <class Launcher>
-  CUTPROOF_ENQUEUE void operator()(Launcher&) const {}
+  void operator()(Launcher&) const {}
 };
 
 template <class Kernel>
@@ -108,13 +108,11 @@ constexpr bool reads_ahead() {
   }
 }
 
-// A block is a part of one of 512 threads where a frame runs in one kernel: threads that fill no part would meet
-// nobody.
 template <class Kernel>
 void check_threads(int threads) {
-  if (threads < 32 || threads > max_threads<Kernel>() || (threads & (threads - 1)) != 0) {
+  if (threads < 32 || threads > max_threads<Kernel>() || threads % 32 != 0) {
     throw std::logic_error(std::string(kernel_name<Kernel>()) + ": a block of " + std::to_string(threads) +
-                           " threads was asked for; allowed are powers of two from 32 to " +
+                           " threads was asked for; allowed are multiples of 32 up to " +
                            std::to_string(max_threads<Kernel>()) + '.');
   }
 }

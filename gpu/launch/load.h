@@ -14,10 +14,8 @@ namespace cutproof::gpu {
 
 // gpu: how the work of a span is started. All give the same bits.
 enum class Path {
-  graph,      // kernels and conditions as one CUDA graph
-  eager,      // kernels one by one, waiting for each condition
-  one_block,  // one kernel of one block; a load that does not fit takes the graph
-  one_grid,   // one kernel of as many blocks as run side by side; likewise
+  graph,  // kernels and conditions as one CUDA graph
+  eager,  // kernels one by one, waiting for each condition
 };
 
 // gpu: arrays of at least `array` bytes have memory only where they are touched, by pages of 2 MiB, if a load leaves at

@@ -442,13 +442,6 @@ TEST_F(DeviceFailures, ACallThatFailsInTheEagerModeLeavesNothing) { fail_each(Pa
 
 TEST_F(DeviceFailures, ADeviceThatIsLostInTheEagerModeLeavesNothing) { fail_each(Path::eager, Failing::for_good, 20); }
 
-TEST_F(DeviceFailures, ACallThatFailsInOneKernelLeavesNothing) {
-  for (const Path path : {Path::one_block, Path::one_grid}) {
-    fail_each(path, Failing::once, 60);
-    fail_each(path, Failing::for_good, 20);
-  }
-}
-
 TEST_F(DeviceFailures, ACallThatFailsWithMemoryOnDemandLeavesNothing) {
   on_demand_ = {1, 0};
   fail_each(Path::graph, Failing::once, 60);
@@ -457,7 +450,7 @@ TEST_F(DeviceFailures, ACallThatFailsWithMemoryOnDemandLeavesNothing) {
 }
 
 TEST_F(DeviceFailures, ABackendWhoseCallFailedCanBeLoadedAnew) {
-  for (const Path path : {Path::graph, Path::eager, Path::one_block, Path::one_grid}) {
+  for (const Path path : {Path::graph, Path::eager}) {
     const Done right = load_and_run(*make_gpu_backend(options(path)));
     std::unique_ptr<Backend> backend = make_gpu_backend(options(path));
     calls.start(0, Failing::once);
@@ -480,7 +473,7 @@ TEST_F(DeviceFailures, ABackendWhoseCallFailedCanBeLoadedAnew) {
 TEST_F(DeviceFailures, WhatAStepDoesWithItsParticlesIsAsOnTheHost) {
   const StepWork host = load_and_run(*make_host_backend()).work;
   EXPECT_GT(host.resolved + host.loose, 0);
-  for (const Path path : {Path::graph, Path::eager, Path::one_block, Path::one_grid}) {
+  for (const Path path : {Path::graph, Path::eager}) {
     EXPECT_EQ(load_and_run(*make_gpu_backend(options(path))).work, host) << static_cast<int>(path);
   }
 }
