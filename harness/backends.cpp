@@ -15,7 +15,6 @@
 
 #include "gpu/backends.h"
 #include "guests/plugin_backend.h"
-#include "harness/partial_backend.h"
 #include "model/at.h"
 #include "model/error.h"
 #include "model/nearest_word.h"
@@ -82,9 +81,6 @@ template <gpu::Path>
 constexpr std::unique_ptr<Backend> (*make_gpu)(const BackendChoice&) = nullptr;
 #endif
 
-constexpr bool whole_frames(Span span) { return span.is_whole_frame(); }
-constexpr bool split_alone(Span span) { return span.first == Stage::split && span.last == Stage::split; }
-
 template <int of_block = 1>
 std::unique_ptr<Backend> make_host(const BackendChoice& choice) {
   return gpu::make_host_backend(choice.threads > 0 ? choice.threads : cpu_threads(), kernel_options(choice), of_block);
@@ -122,25 +118,6 @@ constexpr std::array kBackends = {
         .is_another_path = true,
         .bodies_in_a_load = kBodiesOnTheHost,
         .make = make_host<gpu::kHostThreads>,
-    },
-    BackendDescriptor{
-        .name = "host-frames",
-        .summary = "the same, whole frames only: what a guest that cannot be asked for a stage is judged on",
-        .processor = Processor::all_threads,
-        .is_timed = false,
-        .can_run = whole_frames,
-        .bodies_in_a_load = kBodiesOnTheHost,
-        .make =
-            [](const BackendChoice& choice) { return offer_only(make_host<>(choice), "host-frames", whole_frames); },
-    },
-    BackendDescriptor{
-        .name = "host-split",
-        .summary = "the same, the split stage only; all others are the reference's",
-        .processor = Processor::all_threads,
-        .is_timed = false,
-        .can_run = split_alone,
-        .bodies_in_a_load = kBodiesOnTheHost,
-        .make = [](const BackendChoice& choice) { return offer_only(make_host<>(choice), "host-split", split_alone); },
     },
     BackendDescriptor{
         .name = "simulated",

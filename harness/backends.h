@@ -43,7 +43,6 @@ struct BackendDescriptor {
   bool takes_schedule = false;       // --schedule, --schedule-seed: its interleaving is chosen and can be replayed
   // How it splits clusters and finds rotations where nothing can be chosen.
   std::string_view only_split = {}, only_rotation = {};
-  bool (*can_run)(Span span) = [](Span) { return true; };  // as Backend::can_run
 
   // Benchmarks: whether bodies are as large as the paper's unless somebody asks for others, and how many frames are
   // timed.

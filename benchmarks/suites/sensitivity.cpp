@@ -88,19 +88,16 @@ constexpr double kAcross = 7;  // [m/s²]
 }  // namespace
 
 json run_sensitivity(const SensitivityOptions& options, const Progress& progress) {
-  const harness::BackendDescriptor& described = harness::described_backend(options.backend);
-  require_option(
-      described.can_run({Stage::step, Stage::step}), "--backend",
-      fmt::format("'{}' runs no step by itself, so nothing can be disturbed between its stages", options.backend),
-      fmt::format("use one of {}", harness::backend_names([](const harness::BackendDescriptor& b) {
-                    return b.can_run({Stage::step, Stage::step});
-                  })));
   require_option(options.particles >= 100 && options.particles <= 3000, "--particles",
                  fmt::format("{} particles are too few or too many", options.particles),
                  "give a number from 100 to 3000");
   harness::BackendChoice choice;
   choice.name = options.backend;
   const std::unique_ptr<Backend> backend = harness::make_backend(choice);
+  require_option(
+      backend->can_run({Stage::step, Stage::step}), "--backend",
+      fmt::format("'{}' runs no step by itself, so nothing can be disturbed between its stages", options.backend),
+      fmt::format("use one of {}", harness::backend_names()));
   constexpr std::array<const char*, 3> kScenes = {"small_block", "kidney_discontinuous", kSliding};
   std::size_t rows_of_a_scene = 0;
   for (const Disturbance& disturbance : disturbances()) rows_of_a_scene += disturbance.of_run ? 1 : kStages.size();

@@ -172,7 +172,7 @@ TEST_F(BenchSensitivity, HasARowForEachDisturbanceAndStage) {
 
 TEST_F(BenchSensitivity, RefusesBadUsage) {
   expect_refused("bench sensitivity --backend nobody", {"nobody"});
-  expect_refused("bench sensitivity --backend host-frames", {"host-frames", "step"});
+  expect_refused("bench sensitivity --backend 'plugin:" CUTPROOF_PLUGIN_OF_WHOLE_FRAMES "'", {"--backend", "step"});
   expect_refused("bench sensitivity --particles 10", {"particles"});
   expect_refused("bench sensitivity --moments 0", {"moments"});
 }

@@ -224,7 +224,7 @@ TEST_F(Options, DoNotBlameASceneForAMesh) {
 // What a remedy says that `cutproof info` lists.
 TEST_F(Options, AreListedByInfo) {
   const std::string info = cutproof("info").output;
-  for (const char* word : {"reference", "host-split", "plugin:FILE.so", "newton", "round_robin", "topology", "motion",
+  for (const char* word : {"reference", "host-blocks", "plugin:FILE.so", "newton", "round_robin", "topology", "motion",
                            "conservation", "rotations, components", "connected", "version 5"}) {
     EXPECT_NE(info.find(word), std::string::npos) << "no '" << word << "' in:\n" << info;
   }
@@ -249,7 +249,7 @@ TEST_F(Options, AreOfferedByBash) {
   for (const auto& [words, offered] : std::vector<std::pair<std::string, std::string>>{
            {"cutproof r", "run replay report"},
            {"cutproof run --fr", "--frames"},
-           {"cutproof run --backend host-", "host-blocks host-frames host-split"},
+           {"cutproof run --backend host-", "host-blocks"},
            {"cutproof run --backend = sim", "simulated"},
            {"cutproof fuzz --rotation n", "newton"},
            {"cutproof bench so", "solver"},

@@ -26,6 +26,10 @@ json small_block(const std::string& name = "small") {
       .patch(json::array({{{"op", "add"}, {"path", "/name"}, {"value", name}}}));
 }
 
+// Backends that run some spans alone.
+const std::string kOfWholeFrames = "'plugin:" CUTPROOF_PLUGIN_OF_WHOLE_FRAMES "'";
+const std::string kOfSplit = "'plugin:" CUTPROOF_PLUGIN_OF_SPLIT "'";
+
 // --- The paper's scenes ---------------------------------------------------------------------------------------------
 
 struct SceneOn {
@@ -482,8 +486,9 @@ TEST_F(Program, ChecksRecordingsOfKernelsOfMeshesAndOfRunsThatWereCutShort) {
         "OFF 8 12 0\n0 0 0\n80 0 0\n80 30 0\n0 30 0\n0 0 20\n80 0 20\n80 30 20\n0 30 20\n"
         "3 0 2 1\n3 0 3 2\n3 4 5 6\n3 4 6 7\n3 0 1 5\n3 0 5 4\n3 1 2 6\n3 1 6 5\n3 2 3 7\n3 2 7 6\n3 3 0 4\n"
         "3 3 4 7\n");
-  for (const std::string options : {"--backend host", "--backend host-split", "--mesh box.off --spacing 0.01",
-                                    "--frames 3", "--set detect.every=substep --frames 2"}) {
+  for (const std::string& options : {std::string("--backend host"), "--backend " + kOfSplit,
+                                     std::string("--mesh box.off --spacing 0.01"), std::string("--frames 3"),
+                                     std::string("--set detect.every=substep --frames 2")}) {
     ASSERT_EQ(cutproof("run cut.json --record seen " + options).status, 0) << options;
     const Outcome checked = cutproof("check seen --check topology");
     EXPECT_NE(checked.status, 2) << options << "\n" << checked.output;
@@ -503,7 +508,7 @@ TEST_F(Program, ChecksRecordingsOfKernelsOfMeshesAndOfRunsThatWereCutShort) {
 
 TEST_F(Program, JudgesBackendsOfWholeFramesAndOfOneStageOnWhatTheyRun) {
   write("cut.json", small_block().dump());
-  for (const std::string backend : {"host-frames", "host-split"}) {
+  for (const std::string& backend : {kOfWholeFrames, kOfSplit}) {
     const Outcome run = cutproof("run cut.json --check --json out.json --backend " + backend);
     EXPECT_EQ(run.status, 0) << run.output;
     const json document = json::parse(read("out.json"));
@@ -511,13 +516,13 @@ TEST_F(Program, JudgesBackendsOfWholeFramesAndOfOneStageOnWhatTheyRun) {
     for (const json& verdict : document["verdicts"]) {
       if (verdict["checked"] > 0) judged.insert(verdict["property"]);
     }
-    EXPECT_EQ(judged.contains("linear momentum"), backend == "host-frames");
-    EXPECT_EQ(judged.contains("split exactness"), backend == "host-split");
-    EXPECT_EQ(judged.contains("stages in one piece"), backend == "host-frames");
+    EXPECT_EQ(judged.contains("linear momentum"), backend == kOfWholeFrames);
+    EXPECT_EQ(judged.contains("split exactness"), backend == kOfSplit);
+    EXPECT_EQ(judged.contains("stages in one piece"), backend == kOfWholeFrames);
     const Outcome fuzz = cutproof("fuzz --cases 300 --backend " + backend);
     EXPECT_EQ(fuzz.status, 0) << fuzz.output;
   }
-  const Outcome against = cutproof("run cut.json --against reference --backend host-frames");
+  const Outcome against = cutproof("run cut.json --against reference --backend " + kOfWholeFrames);
   EXPECT_EQ(against.status, 2) << against.output;
   EXPECT_NE(against.output.find("--against"), std::string::npos);
 }
@@ -540,10 +545,10 @@ TEST_F(Program, SaysWhichStagesTheReferenceRanForTheBackend) {
     EXPECT_TRUE(page.empty() || read("out.html").find(sentence) != std::string::npos);
     return left;
   };
-  const json left = shows("run cut.json --check --record cut --backend host-split");
+  const json left = shows("run cut.json --check --record cut --backend " + kOfSplit);
   EXPECT_FALSE(left.at("expected").empty());
   EXPECT_EQ(shows("check cut").at("expected"), left.at("expected"));
-  const Outcome fuzz = cutproof("fuzz --cases 60 --backend host-split --json out.json");
+  const Outcome fuzz = cutproof("fuzz --cases 60 --json out.json --backend " + kOfSplit);
   EXPECT_NE(on_one_line(fuzz.output).find("The reference ran step, detect, merge, expand and skin"), std::string::npos)
       << fuzz.output;
   const Outcome all = cutproof("run cut.json --check --backend host");
@@ -565,9 +570,9 @@ TEST_F(Program, FailsAPluginThatRunsNoStage) {
 TEST_F(Program, RefusesToMeasureErrorsOfStagesThatTheBackendCannotRun) {
   write("cut.json", small_block().dump());
   for (const char* error : {"solver", "time_step", "conservation"}) {
-    expect_refused(std::string("run cut.json --backend host-split --errors ") + error, {"--errors", error});
+    expect_refused("run cut.json --backend " + kOfSplit + " --errors " + error, {"--errors", error});
   }
-  EXPECT_EQ(cutproof("run cut.json --backend host-split --errors topology").status, 0);
+  EXPECT_EQ(cutproof("run cut.json --errors topology --backend " + kOfSplit).status, 0);
 }
 
 // --- Bad input ------------------------------------------------------------------------------------------------------

@@ -508,8 +508,11 @@ int surface(const cutproof_host* host, void* self, const cutproof_tissue* tissue
 #endif
 
 #ifdef PLUGIN_SPANS
-// Of so many stages alone.
-int can_run(int first, int last) { return last - first + 1 == PLUGIN_SPANS ? 1 : 0; }
+#ifndef PLUGIN_FIRST
+#define PLUGIN_FIRST first
+#endif
+// Spans of so many stages, from PLUGIN_FIRST on if that is given.
+int can_run(int first, int last) { return first == PLUGIN_FIRST && last - first + 1 == PLUGIN_SPANS ? 1 : 0; }
 #endif
 
 const cutproof_plugin plugin = {

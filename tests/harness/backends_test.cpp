@@ -30,20 +30,16 @@ BackendChoice choice_of(const BackendDescriptor& backend) {
   return choice;
 }
 
-TEST(Backends, HaveTheArithmeticAndTheSpansOfTheirDescription) {
+TEST(Backends, HaveTheArithmeticOfTheirDescriptionAndRunEverySpan) {
   ASSERT_GE(backends_of_this_machine().size(), 3U);
   for (const BackendDescriptor* const described : backends_of_this_machine()) {
     const auto backend = make_backend(choice_of(*described));
     EXPECT_EQ(backend->precision(), described->precision) << described->name;
-    int spans = 0;
     for (const Stage first : kStages) {
       for (const Stage last : kStages) {
-        if (first > last) continue;
-        EXPECT_EQ(backend->can_run({first, last}), described->can_run({first, last})) << described->name;
-        spans += described->can_run({first, last});
+        if (first <= last) EXPECT_TRUE(backend->can_run({first, last})) << described->name;
       }
     }
-    EXPECT_GT(spans, 0) << described->name;
   }
 }
 
