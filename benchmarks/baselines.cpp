@@ -24,7 +24,7 @@ constexpr int64_t kOverlapEvery = 8;
 
 const std::vector<Baseline>& baselines() {
   static const std::vector<Baseline> kAll = [] {
-    std::vector<Baseline> all(9);
+    std::vector<Baseline> all(8);
     all[0] = {.name = "this method", .source = "method.md"};
     all[1] = {.name = "particles deleted, no split", .source = "Berndt 2017", .deletion = Deletion::particles};
     all[2] = {.name = "clusters deleted, no split",
@@ -33,9 +33,8 @@ const std::vector<Baseline>& baselines() {
     all[3] = {.name = "published expansion", .source = "Yu 2024", .expand = ExpandRule::published};
     all[4] = {.name = "no expansion", .source = "Yu 2024, Fig. 13a", .expand = ExpandRule::none};
     all[5] = {.name = "strain detection", .source = "Yu 2024, Fig. 7", .criterion = Criterion::strain};
-    all[6] = {.name = "single_pass merging", .source = "Yu 2024", .merge = MergeRule::single_pass};
-    all[7] = {.name = "one end of each edge", .source = "method.md §4", .remove = RemovedEnds::one};
-    all[8] = {.name = "nearer end of each edge", .source = "method.md §4", .remove = RemovedEnds::nearer};
+    all[6] = {.name = "one end of each edge", .source = "method.md §4", .remove = RemovedEnds::one};
+    all[7] = {.name = "nearer end of each edge", .source = "method.md §4", .remove = RemovedEnds::nearer};
     return all;
   }();
   return kAll;

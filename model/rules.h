@@ -17,8 +17,7 @@ inline constexpr std::array<std::string_view, 2> kSolverNames = {"implicit", "pu
 inline constexpr std::array<std::string_view, 2> kAccelerationNames = {"none", "chebyshev"};
 inline constexpr std::array<std::string_view, 4> kCriterionNames = {"none", "distance", "geometric", "strain"};
 inline constexpr std::array<std::string_view, 3> kRemovedEndsNames = {"both", "one", "nearer"};
-inline constexpr std::array<std::string_view, 4> kMergeRuleNames = {"none", "deterministic", "published",
-                                                                    "single_pass"};
+inline constexpr std::array<std::string_view, 3> kMergeRuleNames = {"none", "deterministic", "published"};
 inline constexpr std::array<std::string_view, 3> kExpandRuleNames = {"none", "edge_cover", "published"};
 
 constexpr std::span<const std::string_view> names_of(Solver) { return kSolverNames; }
@@ -49,15 +48,12 @@ constexpr std::optional<E> choice_named(std::string_view name) {
 
 // What a rule of merging promises (method.md §6).
 struct MergePromise {
-  bool unique;     // a function of the input alone: two right backends give the same clusters
-  bool maximal;    // no small cluster is left that could still merge
-  bool keeps_cap;  // unions have at most `cap` particles, however threads run
+  bool unique;   // a function of the input alone: two right backends give the same clusters
+  bool maximal;  // no small cluster is left that could still merge
 };
 constexpr MergePromise promise_of(MergeRule rule) {
   using enum MergeRule;
-  return {.unique = rule == none || rule == deterministic,
-          .maximal = rule == deterministic || rule == published,
-          .keeps_cap = rule != single_pass};
+  return {.unique = rule == none || rule == deterministic, .maximal = rule != none};
 }
 
 // What a rule of expansion promises (method.md §7).

@@ -12,12 +12,12 @@
 
 namespace cutproof {
 
-enum class Solver { implicit, published };                             // method.md §3
-enum class Acceleration { none, chebyshev };                           // of the implicit solver, method.md §11
-enum class Criterion { none, distance, geometric, strain };            // method.md §4; none: nothing is ever removed
-enum class RemovedEnds { both, one, nearer };                          // of an edge that is too long, method.md §4
-enum class MergeRule { none, deterministic, published, single_pass };  // method.md §6
-enum class ExpandRule { none, edge_cover, published };                 // method.md §7
+enum class Solver { implicit, published };                   // method.md §3
+enum class Acceleration { none, chebyshev };                 // of the implicit solver, method.md §11
+enum class Criterion { none, distance, geometric, strain };  // method.md §4; none: nothing is ever removed
+enum class RemovedEnds { both, one, nearer };                // of an edge that is too long, method.md §4
+enum class MergeRule { none, deterministic, published };     // method.md §6
+enum class ExpandRule { none, edge_cover, published };       // method.md §7
 
 struct StepParameters {
   Solver solver = Solver::implicit;

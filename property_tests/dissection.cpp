@@ -96,13 +96,6 @@ void note_what_was_removed(const Setup& setup, CaseCoverage& seen) {
   if (detect.criterion == Criterion::geometric && setup.step.iterations > 0) seen["geometric cut of what moves"] = true;
 }
 
-// Some merged cluster, under a rule that does not promise it of none.
-bool is_above_its_cap(const Setup& setup, const State& before, const State& after) {
-  Setup promising = setup;
-  promising.merge.rule = MergeRule::published;
-  return !oracles::cap_kept(promising, before, after).holds;
-}
-
 void note_what_a_stage_did(const Setup& setup, Stage stage, const State& before, const State& after,
                            CaseCoverage& seen) {
   const auto clusters_before = before.clusters.count(), clusters_after = after.clusters.count();
@@ -129,10 +122,6 @@ void note_what_a_stage_did(const Setup& setup, Stage stage, const State& before,
       if (clusters_after < clusters_before) {
         seen["merge"] = true;
         if (setup.merge.rule == MergeRule::published) seen["published merge"] = true;
-        if (setup.merge.rule == MergeRule::single_pass) seen["single pass merge"] = true;
-      }
-      if (!promise_of(setup.merge.rule).keeps_cap && is_above_its_cap(setup, before, after)) {
-        seen["above the cap without promise"] = true;
       }
       break;
     case Stage::expand:

@@ -51,14 +51,12 @@ inline constexpr std::array kCoverageClasses = {
     CoverageClass{"merge"},
     CoverageClass{"expansion"},
     CoverageClass{"published merge"},
-    CoverageClass{"single pass merge"},
     CoverageClass{"published expansion"},
-    CoverageClass{"uncoupled without promise"},      // connected tissue is, where no rule promises otherwise
-    CoverageClass{"above the cap without promise"},  // a single pass made a cluster larger than cap
-    CoverageClass{"alpha"},                          // a skin whose vertices are not halfway
-    CoverageClass{"fitted skin"},                    // a skin of which each vertex has a place of its own on its edge
-    CoverageClass{"cavity"},                         // the skin has an inner shell
-    CoverageClass{"consumed body"},                  // it is cut away entirely
+    CoverageClass{"uncoupled without promise"},  // connected tissue is, where no rule promises otherwise
+    CoverageClass{"alpha"},                      // a skin whose vertices are not halfway
+    CoverageClass{"fitted skin"},                // a skin of which each vertex has a place of its own on its edge
+    CoverageClass{"cavity"},                     // the skin has an inner shell
+    CoverageClass{"consumed body"},              // it is cut away entirely
     // Of steps, in which something moved.
     CoverageClass{"published solver", Occurs::where_bodies_move},
     CoverageClass{"accelerated solver", Occurs::where_bodies_move},

@@ -238,39 +238,6 @@ void merge_published(MergingSets& sets, std::size_t slot_count) {
   }
 }
 
-// --- single_pass -----------------------------------------------------------------------------------------------
-
-// The paper's strategy as printed, a baseline. One pass: every small cluster, in the order of numbers, tries to set
-// the owner of its preferred target from "none" to itself (compare-and-swap); whoever comes second gets nothing.
-// Nothing keeps a claimed cluster from claiming, so the claims form chains s -> t -> u and cycles, and each chain is
-// merged into one. Every single claim respects cap, their unions may not: that is this rule's fault, and it is not
-// maximal either. The number that stays is that of the chain's last target; in a cycle, the lowest.
-void merge_single_pass(MergingSets& sets, std::size_t slot_count) {
-  constexpr int32_t kNobody = -1;
-  std::vector<int32_t> owner(slot_count, kNobody), target(slot_count, kNobody);
-  for (const int32_t s : sets.small()) {
-    const auto t = sets.preferred_target(s);
-    if (!t || owner[static_cast<std::size_t>(*t)] != kNobody) continue;
-    owner[static_cast<std::size_t>(*t)] = s;
-    target[static_cast<std::size_t>(s)] = *t;
-  }
-
-  // Clusters come in the order of their numbers, so the first one met in a cycle has the cycle's lowest number:
-  // dropping its claim leaves a chain that ends there.
-  for (const int32_t s : sets.small()) {
-    int32_t end = s;
-    while (target[static_cast<std::size_t>(end)] != kNobody && target[static_cast<std::size_t>(end)] != s) {
-      end = target[static_cast<std::size_t>(end)];
-    }
-    if (target[static_cast<std::size_t>(end)] == s) target[static_cast<std::size_t>(s)] = kNobody;
-  }
-  for (const int32_t s : std::vector<int32_t>(sets.small())) {
-    int32_t end = s;
-    while (target[static_cast<std::size_t>(end)] != kNobody) end = target[static_cast<std::size_t>(end)];
-    if (end != s) sets.join(s, end);
-  }
-}
-
 }  // namespace
 
 Merged merge_sets(const Body& body, const std::vector<uint8_t>& alive, std::vector<std::vector<int32_t>> sets,
@@ -279,7 +246,6 @@ Merged merge_sets(const Body& body, const std::vector<uint8_t>& alive, std::vect
   MergingSets merging(body, alive, std::move(sets), numbers, tau, cap);
   if (rule == MergeRule::deterministic) merge_deterministic(merging, slot_count);
   if (rule == MergeRule::published) merge_published(merging, slot_count);
-  if (rule == MergeRule::single_pass) merge_single_pass(merging, slot_count);
   return std::move(merging).result();
 }
 

@@ -28,14 +28,12 @@ void add_coverage(Sheet& sheet, const Field& document, bool moves) {
     const int64_t count = Field{&value, coverage.file, coverage.path + "." + name, coverage.remedy}.count();
     if (count == 0 && !moves) continue;
     grid.rows.push_back({{name, io::grouped(count)}, count == 0 ? "warn" : ""});
-    const auto note = [&](const char* of, const char* words) {
-      if (name == of && count > 0)
-        sheet.notes.push_back(
-            fmt::format("Not promised: in {} {}; this is counted and not judged.", cases_in_words(count), words));
-    };
-    note("uncoupled without promise", "connected tissue lost its coupling, where no rule promises otherwise");
-    note("above the cap without promise",
-         "a single pass of merging made a cluster larger than its cap, which that rule does not promise to keep");
+    if (name == "uncoupled without promise" && count > 0) {
+      sheet.notes.push_back(
+          fmt::format("Not promised: in {} connected tissue lost its coupling, where no rule promises otherwise; this "
+                      "is counted and not judged.",
+                      cases_in_words(count)));
+    }
   }
   std::stable_sort(grid.rows.begin(), grid.rows.end(),
                    [](const GridRow& a, const GridRow& b) { return a.kind > b.kind; });

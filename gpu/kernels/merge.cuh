@@ -17,7 +17,6 @@
 #include "gpu/kernels/rest_frames.cuh"
 #include "gpu/kernels/sorted_lists.cuh"
 #include "gpu/launch/launcher.h"
-#include "gpu/launch/plan.h"
 #include "gpu/state/device_view.h"
 
 namespace cutproof::gpu {
@@ -229,7 +228,6 @@ CUTPROOF_DEVICE void propose_merges_kernel(Block& block, DeviceView w) {
   for (int job = block.index(); job < c.small; job += block.count()) {
     const int s = w.small_clusters[job];
     const BodyConstants& body = w.body[w.slot_body[s]];
-    if (body.merge_rule == MergeRule::single_pass) continue;
     const int before = w.proposal[s];
     if (round > 0 && before < 0) continue;  // never again
     // Many clusters may wait for the same target, round after round: looking again only where something has changed
@@ -309,8 +307,7 @@ CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, DeviceView w, bool again) 
   for (int job = block.index(); job < c.small && moving == again; job += block.count()) {
     const int s = w.small_clusters[job];
     const int t = w.proposal[s];
-    const BodyConstants& body = w.body[w.slot_body[s]];
-    if (t < 0 || body.merge_rule == MergeRule::single_pass) continue;
+    if (t < 0) continue;
     if (best[s] != s || best[t] != s) {
       if (block.thread() == 0) block.store(&c.merging, 1);
       continue;
@@ -349,88 +346,6 @@ CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, DeviceView w, bool again) 
   if (block.first() == 0) c.round = c.merging_round + 1;
 }
 CUTPROOF_KERNEL_THREADS(merge_pairs_kernel, kMergeThreads);
-
-// --- single_pass: the paper's strategy as printed, a baseline --------------------------------------------------------
-
-// Every small cluster tries once to own its target; nothing keeps an owned cluster from owning. best: owner.
-template <class Block>
-CUTPROOF_DEVICE void propose_once_kernel(Block& block, DeviceView w) {
-  const TouchTable table = take_candidate_table(block);
-  for (int job = block.index(); job < w.counters->small; job += block.count()) {
-    const int s = w.small_clusters[job];
-    if (w.body[w.slot_body[s]].merge_rule != MergeRule::single_pass) continue;
-    const int t = preferred_target(block, w, s, table);
-    if (block.thread() != 0 || t < 0) continue;
-    w.proposal[s] = t;
-    block.atomic_cas(&w.best[t], -1, s);
-  }
-}
-CUTPROOF_KERNEL_THREADS(propose_once_kernel, kMergeThreads);
-
-CUTPROOF_DEVICE inline bool owns_target(const DeviceView& w, int s) {
-  return w.proposal[s] >= 0 && w.best[w.proposal[s]] == s;
-}
-
-// The chain whose last owner is s; or, if s is the lowest of a cycle, that cycle without the claim of s.
-struct OwnerChain {
-  int end = -1;    // takes in the others; -1: there is no such chain
-  int first = -1;  // its owner, whose owner is the next, until none is left or the end comes again
-};
-CUTPROOF_DEVICE inline OwnerChain chain_of(const DeviceView& w, int s) {
-  if (!owns_target(w, s)) return {};
-  int at = w.proposal[s];
-  if (!owns_target(w, at)) return {at, s};
-  while (at > s && owns_target(w, at)) at = w.proposal[at];
-  return at == s ? OwnerChain{s, w.best[s]} : OwnerChain{};
-}
-
-// Owners and owned form chains and cycles, each of which becomes one cluster, above the cap or not. again: those that
-// found no places, if there were any and lists have been moved together.
-template <class Block>
-CUTPROOF_DEVICE void merge_chains_kernel(Block& block, DeviceView w, bool again) {
-  int* place = block.template shared<int>(2);  // and how many of them
-  if (again && w.counters->moving == 0) return;
-  for (int job = block.index(); job < w.counters->small; job += block.count()) {
-    if (w.body[w.slot_body[w.small_clusters[job]]].merge_rule != MergeRule::single_pass) continue;
-    const auto [end, first] = chain_of(w, w.small_clusters[job]);
-    if (end < 0 || w.slot_size[first] == 0) continue;  // not here, or done
-    const auto is_source = [end = end](int s) { return s >= 0 && s != end; };
-    if (block.thread() == 0) {
-      int needed = w.slot_size[end];
-      for (int s = first; is_source(s); s = w.best[s]) needed += w.slot_size[s];
-      place[0] = reserve_members(block, w, needed);
-      place[1] = needed;
-    }
-    block.sync();
-    const int begin = place[0], places = place[1];
-    block.sync();  // everyone has read it
-    if (begin < 0) continue;
-
-    // The union so far lies in its new places or, in turn, in the same places of DeviceView::label.
-    const int* united = w.members + w.slot_begin[end];
-    int size = w.slot_size[end];
-    int* out = w.members + begin;
-    for (int s = first; is_source(s); s = w.best[s]) {
-      hand_over(block, w, s, end, united, size);
-      size = write_union(block, united, size, w.members + w.slot_begin[s], w.slot_size[s], out);
-      block.sync();
-      united = out;
-      out = out == w.members + begin ? w.label + begin : w.members + begin;
-    }
-    if (united == w.label + begin) {
-      for (int k = block.thread(); k < size; k += block.size()) w.members[begin + k] = w.label[begin + k];
-    }
-    // Who was in several of them has one place: the others are read by nobody but a snapshot, which copies all.
-    for (int k = size + block.thread(); k < places; k += block.size()) w.members[begin + k] = -1;
-    block.sync();
-    if (block.thread() != 0) continue;
-    for (int s = first; is_source(s); s = w.best[s]) w.slot_size[s] = 0;
-    w.slot_begin[end] = begin;
-    w.slot_size[end] = size;
-    block.store(&rest_marks(w)[end], 1);
-  }
-}
-CUTPROOF_KERNEL_THREADS(merge_chains_kernel, kMergeThreads);
 
 // --- Beginning and end -----------------------------------------------------------------------------------------------
 
@@ -471,10 +386,7 @@ CUTPROOF_DEVICE void begin_rounds_kernel(Block& block, const DeviceView& w) {
   c.live_members = live;
   int cap = 0;
   for (int b = 0; b < w.bodies; ++b) {
-    const BodyConstants& body = w.body[b];
-    if (!merges_now(w, b)) continue;
-    // A chain of single_pass grows beyond the cap.
-    cap = body.merge_rule == MergeRule::single_pass ? c.live_members : body.cap > cap ? body.cap : cap;
+    if (merges_now(w, b) && w.body[b].cap > cap) cap = w.body[b].cap;
   }
   int64_t most = int64_t{c.small} * cap;
   if (most > c.live_members) most = c.live_members;
@@ -540,45 +452,28 @@ void enqueue_move_together(Launcher& launcher, const DeviceView& w) {
 inline constexpr int kMergeBlocks = 2048, kBlocksAgain = 128;
 
 template <class Launcher>
-void enqueue_merge_rounds(Launcher& launcher, const DeviceView& w, const Plan& plan) {
-  Counters* const c = w.counters;
+void enqueue_merge_rounds(Launcher& launcher, const DeviceView& w) {
   const int64_t most = w.slots_expected < kMergeBlocks ? w.slots_expected : kMergeBlocks;
-  const auto propose = [&](Launcher& on, auto kernel) { on.blocks(kernel, most, kMergeThreads, kCandidateBytes, w); };
-  const auto carry_out = [&](Launcher& on, auto kernel, auto... more) {
-    on.blocks(kernel, most, kMergeThreads, 16, w, more...);
-  };
-
-  if (plan.single_pass_merge) {
-    launcher.if_nonzero(&c->small, [&](Launcher& once) {
-      propose(once, propose_once_kernel_object{});
-      carry_out(once, merge_chains_kernel_object{}, false);
-      enqueue_move_together(once, w);
-      carry_out(once, merge_chains_kernel_object{}, true);
-    });
-  }
-  if (plan.deterministic_merge || plan.published_merge) {
-    // One condition, whatever happens: it costs as much as ten launches of kernels that find nothing to do.
-    launcher.while_nonzero(&c->merging, [&](Launcher& round) {
-      propose(round, propose_merges_kernel_object{});
-      carry_out(round, merge_pairs_kernel_object{}, false);
-      enqueue_move_together(round, w);
-      round.blocks(merge_pairs_kernel_object{}, kBlocksAgain, kMergeThreads, 16, w, true);
-    });
-  }
+  // One condition, whatever happens: it costs as much as ten launches of kernels that find nothing to do.
+  launcher.while_nonzero(&w.counters->merging, [&](Launcher& round) {
+    round.blocks(propose_merges_kernel_object{}, most, kMergeThreads, kCandidateBytes, w);
+    round.blocks(merge_pairs_kernel_object{}, most, kMergeThreads, 16, w, false);
+    enqueue_move_together(round, w);
+    round.blocks(merge_pairs_kernel_object{}, kBlocksAgain, kMergeThreads, 16, w, true);
+  });
   launcher.teams(rest_frames_after_merge_kernel_object{}, kRestTeam, w.slots_expected, w);
 }
 
 // rest_frames: what launches those of clusters as they are. Which of them are small is asked meanwhile.
 template <class Launcher, class RestFrames = NoWork>
-void enqueue_merge(Launcher& launcher, const DeviceView& w, const Plan& plan,
-                                    RestFrames rest_frames = {}) {
+void enqueue_merge(Launcher& launcher, const DeviceView& w, RestFrames rest_frames = {}) {
   launcher.side_by_side(
       rest_frames,
       [&](Launcher& on) {
         on.items(begin_merge_kernel_object{}, w.slots_expected, w);
         on.blocks(begin_rounds_kernel_object{}, 1, kListThreads, 0, w);
       },
-      NoWork{}, [&](Launcher& on) { enqueue_merge_rounds(on, w, plan); });
+      NoWork{}, [&](Launcher& on) { enqueue_merge_rounds(on, w); });
 }
 
 }  // namespace cutproof::gpu

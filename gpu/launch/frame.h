@@ -68,7 +68,7 @@ void enqueue_span(Launcher& launcher, const DeviceView& w, const Plan& plan, Spa
           if (merges) mark(Stage::merge);
         };
         if (merges) {
-          enqueue_merge(on, w, plan, rest_frames);
+          enqueue_merge(on, w, rest_frames);
         } else {
           rest_frames(on);
         }

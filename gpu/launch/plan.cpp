@@ -27,9 +27,6 @@ Plan make_plan(const std::vector<Setup>& setups, const std::vector<State>& state
     plan.strain = plan.strain || (detection && setup.detect.criterion == Criterion::strain);
     plan.debris = plan.debris || setup.split.debris > 0;
     plan.merge = plan.merge || setup.merge.rule != MergeRule::none;
-    plan.deterministic_merge = plan.deterministic_merge || setup.merge.rule == MergeRule::deterministic;
-    plan.published_merge = plan.published_merge || setup.merge.rule == MergeRule::published;
-    plan.single_pass_merge = plan.single_pass_merge || setup.merge.rule == MergeRule::single_pass;
     plan.edge_cover = plan.edge_cover || (setup.expand.rule == ExpandRule::edge_cover && !states[b].edge_covered);
     plan.published_expand = plan.published_expand || setup.expand.rule == ExpandRule::published;
     plan.skin = plan.skin || setup.skin.wanted;

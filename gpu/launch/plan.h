@@ -20,8 +20,7 @@ struct Plan {
   bool distance = false, geometric = false, strain = false;  // criteria in use
   bool nearer = false;  // by distance, of some edge the end nearer to the blade goes
   bool debris = false;
-  bool merge = false;  // some body merges
-  bool published_merge = false, deterministic_merge = false, single_pass_merge = false;
+  bool merge = false;   // some body merges
   bool expand = false;  // some body may expand
   bool edge_cover = false, published_expand = false;
   bool skin = false;

@@ -55,7 +55,7 @@ TEST(Limits, AStageThatIsNotPlannedHasOnlyTheBeginningOfItsSpan) {
   cutproof::gpu::Plan plan;
   plan.detection = plan.distance = true;
   EXPECT_EQ(phases_of(plan, Stage::detect), 3);  // flag, remove
-  plan.merge = plan.deterministic_merge = true;
+  plan.merge = true;
   EXPECT_GT(phases_of(plan, Stage::merge), phases_of(none, Stage::merge));
 }
 

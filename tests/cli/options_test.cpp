@@ -246,23 +246,23 @@ TEST_F(Options, NameTheVersionAlikeInEveryDocument) {
 TEST_F(Options, AreOfferedByBash) {
   write("a scene.json", kScene);
   files::create_directory(folder_ / "afolder");
-  for (const auto& [words, offered] : std::vector<std::pair<std::string, std::string>>{
-           {"cutproof r", "run replay report"},
-           {"cutproof run --fr", "--frames"},
-           {"cutproof run --backend host-", "host-blocks"},
-           {"cutproof run --backend = sim", "simulated"},
-           {"cutproof fuzz --rotation n", "newton"},
-           {"cutproof bench so", "solver"},
-           {"cutproof bench solver --st", "--stiffness"},
-           {"cutproof tune x.json --reference ''", "limit substeps"},
-           {"cutproof vectors s", "surface split"},
-           {"cutproof run --unit ''", "mm cm m"},
-           {"cutproof run kidney_a", "kidney_arc"},
-           {"cutproof run a", "a scene.json afolder"},
-           {"cutproof fuzz --save a", "afolder"},
-           {"cutproof fuzz --cases ''", ""},
-           {"cutproof info --c", "--completion --color"},
-           {"cutproof fuzz --dynamics --se", "--seconds --seed"}}) {
+  for (const auto& [words, offered] :
+       std::vector<std::pair<std::string, std::string>>{{"cutproof r", "run replay report"},
+                                                        {"cutproof run --fr", "--frames"},
+                                                        {"cutproof run --backend host-", "host-blocks"},
+                                                        {"cutproof run --backend = sim", "simulated"},
+                                                        {"cutproof fuzz --rotation n", "newton"},
+                                                        {"cutproof bench so", "solver"},
+                                                        {"cutproof bench solver --st", "--stiffness"},
+                                                        {"cutproof tune x.json --reference ''", "limit substeps"},
+                                                        {"cutproof vectors s", "surface split"},
+                                                        {"cutproof run --unit ''", "mm cm m"},
+                                                        {"cutproof run kidney_a", "kidney_arc"},
+                                                        {"cutproof run a", "a scene.json afolder"},
+                                                        {"cutproof fuzz --save a", "afolder"},
+                                                        {"cutproof fuzz --cases ''", ""},
+                                                        {"cutproof info --c", "--completion --color"},
+                                                        {"cutproof fuzz --dynamics --se", "--seconds --seed"}}) {
     const std::string said = words_offered(words);
     if (words == "cutproof run a") {
       EXPECT_NE(said.find("a scene.json"), std::string::npos) << said;

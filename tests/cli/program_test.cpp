@@ -486,9 +486,9 @@ TEST_F(Program, ChecksRecordingsOfKernelsOfMeshesAndOfRunsThatWereCutShort) {
         "OFF 8 12 0\n0 0 0\n80 0 0\n80 30 0\n0 30 0\n0 0 20\n80 0 20\n80 30 20\n0 30 20\n"
         "3 0 2 1\n3 0 3 2\n3 4 5 6\n3 4 6 7\n3 0 1 5\n3 0 5 4\n3 1 2 6\n3 1 6 5\n3 2 3 7\n3 2 7 6\n3 3 0 4\n"
         "3 3 4 7\n");
-  for (const std::string& options : {std::string("--backend host"), "--backend " + kOfSplit,
-                                     std::string("--mesh box.off --spacing 0.01"), std::string("--frames 3"),
-                                     std::string("--set detect.every=substep --frames 2")}) {
+  for (const std::string& options :
+       {std::string("--backend host"), "--backend " + kOfSplit, std::string("--mesh box.off --spacing 0.01"),
+        std::string("--frames 3"), std::string("--set detect.every=substep --frames 2")}) {
     ASSERT_EQ(cutproof("run cut.json --record seen " + options).status, 0) << options;
     const Outcome checked = cutproof("check seen --check topology");
     EXPECT_NE(checked.status, 2) << options << "\n" << checked.output;

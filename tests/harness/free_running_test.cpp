@@ -37,7 +37,7 @@ TEST(FreeRunning, CarriesADistanceOnAndDecidesNothingByIt) {
 
 // Rules that leave several answers are known by their promise (model/rules.h).
 TEST(FreeRunning, DoesNotExplainAMergeThatIsNoAnswerOfItsRule) {
-  for (const MergeRule rule : {MergeRule::deterministic, MergeRule::published, MergeRule::single_pass}) {
+  for (const MergeRule rule : {MergeRule::deterministic, MergeRule::published}) {
     fixtures::Built built = build("three_cuts");
     built.setup.merge.rule = rule;
     Planted backend(reference::make_backend(), Stage::merge, kFrame,

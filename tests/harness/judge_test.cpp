@@ -858,7 +858,7 @@ SceneRun split_and_merge_joined(MergeRule rule, const Change& change) {
 
 TEST(StagesInOnePiece, ThatLeaveSeveralRightAnswersAreJudgedByTheOracleWhereItCan) {
   const Change nothing = [](const cutproof::Setup&, const State&, State&) {};
-  for (const MergeRule rule : {MergeRule::deterministic, MergeRule::published, MergeRule::single_pass}) {
+  for (const MergeRule rule : {MergeRule::deterministic, MergeRule::published}) {
     const bool unique = rule == MergeRule::deterministic;
     SCOPED_TRACE(cutproof::name_of(rule));
     const auto right = split_and_merge_joined(rule, nothing).judged();

@@ -3,7 +3,7 @@ detection (§4), removal, splitting (§5), merging (§6). It shares nothing with
 intermediate result. What it is given is a setup and a first state (recording.py): particles, clusters, and by how much
 the outside world moves blade and grips in each substep.
 
-What it does not do is refused by name: the rules `published` and `single_pass`, expansion by more than one layer, a
+What it does not do is refused by name: the rule `published`, expansion by more than one layer, a
 geometric blade that turns, and frictionless walls beside a blade. No skin is made. Lengths in m, points [3, n].
 
 `Wrong` makes it a wrong simulator on purpose, so that a test can show that it would be found."""

@@ -181,7 +181,7 @@ TEST(Rules, HaveANameForEachEnumerator) {
   names_differ(Solver::published, 2);
   names_differ(Acceleration::chebyshev, 2);
   names_differ(Criterion::strain, 4);
-  names_differ(MergeRule::single_pass, 4);
+  names_differ(MergeRule::published, 3);
   names_differ(ExpandRule::published, 3);
 }
 

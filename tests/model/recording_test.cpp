@@ -67,7 +67,7 @@ void add_surroundings(Setup& setup) {
   setup.step = {Solver::published, 2, 7, 1e-310, 0.3, Acceleration::none, -0.0, 0, {0, 0, -9.81}};
   setup.detect = {Criterion::strain, RemovedEnds::both, 1.5000000000000002, 1.2, true};
   setup.split.debris = 3;
-  setup.merge.rule = MergeRule::single_pass;
+  setup.merge.rule = MergeRule::published;
   setup.expand = {ExpandRule::published, 2};
   setup.skin = {true, 0.25};
   Body& body = setup.body;

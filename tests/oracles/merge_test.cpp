@@ -43,21 +43,14 @@ TEST(MergeLegality, AcceptsNothingMergedAndSmallClustersMerged) {
 }
 
 TEST(MergeLegality, HoldsOfEveryRuleAlike) {
-  for (const MergeRule rule : {MergeRule::deterministic, MergeRule::published, MergeRule::single_pass}) {
+  for (const MergeRule rule : {MergeRule::deterministic, MergeRule::published}) {
     Merge merge(6, {{0, 1, 2, 3}, {4, 5}}, 3, 6);
     merge.pair.setup.merge.rule = rule;
     expect_holds(merge.judge({range(0, 6)}, {0}));
     expect_holds(merge.cap());
     merge.pair.before.cap = 5;
     expect_holds(merge.judge({range(0, 6)}, {0}));
-    if (rule == MergeRule::single_pass) {
-      const Verdict verdict = merge.cap();
-      EXPECT_TRUE(verdict.holds);
-      EXPECT_EQ(verdict.checked, 0);
-      EXPECT_EQ(verdict.vacuous, "the rule does not promise it");
-    } else {
-      expect_rejected(merge.cap(), {0}, {});
-    }
+    expect_rejected(merge.cap(), {0}, {});
   }
 }
 
@@ -320,14 +313,12 @@ TEST(MergeMaximality, CountsUnionsExactly) {
 }
 
 TEST(MergeMaximality, IsVacuousWhereTheRuleDoesNotPromiseIt) {
-  for (const MergeRule rule : {MergeRule::none, MergeRule::single_pass}) {
-    Row row(6, {{0, 1, 2, 3}, {4, 5}});
-    row.state.tau = 3;
-    row.setup.merge.rule = rule;
-    const Verdict verdict = merge_maximality(row.setup, row.state);
-    expect_holds(verdict);
-    EXPECT_EQ(verdict.checked, 0);
-  }
+  Row row(6, {{0, 1, 2, 3}, {4, 5}});
+  row.state.tau = 3;
+  row.setup.merge.rule = MergeRule::none;
+  const Verdict verdict = merge_maximality(row.setup, row.state);
+  expect_holds(verdict);
+  EXPECT_EQ(verdict.checked, 0);
 }
 
 TEST(JudgeStage, AsksForMaximalityAfterMerge) {

@@ -62,7 +62,7 @@ TEST(Registry, AVerdictThatCheckedNothingSaysWhy) {
   EXPECT_EQ(edge_cover(row.setup, row.state).vacuous, "the state does not promise it");
   EXPECT_EQ(no_pass(row.setup, row.state).vacuous, "no blade");
   EXPECT_EQ(merge_maximality(row.setup, row.state).vacuous, "no cluster is small");
-  row.setup.merge.rule = MergeRule::single_pass;
+  row.setup.merge.rule = MergeRule::none;
   EXPECT_EQ(merge_maximality(row.setup, row.state).vacuous, "the rule does not promise it");
   row.state.frame = 1;
   EXPECT_EQ(momentum(row.setup, row.state, row.state).vacuous, "the schedule is over");

@@ -231,31 +231,6 @@ TEST(ACampaign, FailsIfAClassThatItMustMeetIsEmptyOrRare) {
   EXPECT_TRUE(conclude(small, true).holds());
 }
 
-// A single pass may exceed its cap, which is counted; whatever else is wrong with such a merge is not excused.
-TEST(Campaign, ExcusesASinglePassAboveItsCapAndNothingElse) {
-  CampaignOptions options = small_campaign(3000);
-  options.keep_going = true;
-  const auto campaign_with = [&](Planted::Change change) {
-    return run_campaign(options, {[change](int64_t) { return std::make_unique<Planted>(change); }, false}, {});
-  };
-  const Campaign right = campaign_with({});
-  EXPECT_TRUE(right.violations.empty());
-  CaseCoverage coverage = right.coverage;
-  EXPECT_GT(coverage["above the cap without promise"], 0);
-  // The same, and what a merge leaves has a rotation that no input had.
-  options.batch = 1;
-  const auto clusters = std::make_shared<int32_t>(0);
-  const Campaign wrong = campaign_with([clusters](State& state) {
-    const int32_t count = state.clusters.count(), earlier = std::exchange(*clusters, count);
-    if (state.removed.empty() || count == 0 || count >= earlier) return;
-    state.clusters.rotation.back() = {{0, -1, 0, 1, 0, 0, 0, 0, 1}};
-  });
-  EXPECT_TRUE(std::any_of(wrong.violations.begin(), wrong.violations.end(),
-                          [](const Violation& v) { return v.verdict.property == "merge legality"; }));
-  coverage = wrong.coverage;
-  EXPECT_EQ(coverage["above the cap without promise"], 0);
-}
-
 TEST(ACounterexample, ComesBackFromItsFile) {
   Counterexample found;
   found.failing = draw_moving_case(5, 30);

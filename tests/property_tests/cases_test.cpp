@@ -265,8 +265,7 @@ TEST(DrawnCases, VaryEveryFieldAndArePlainInMost) {
     for (const auto& [what, special] : std::vector<std::pair<std::string, std::function<bool(const Case&)>>>{
              {"alpha", [&](const Case& c) { return c.alpha != plain.alpha; }},
              {"tilt", some_stroke([](const Stroke& s) { return s.tilt != Quarters{}; })},
-             {"turn", some_stroke([](const Stroke& s) { return s.turn != Quarters{}; })},
-             {"single pass", [](const Case& c) { return c.merge == MergeRule::single_pass; }}}) {
+             {"turn", some_stroke([](const Stroke& s) { return s.turn != Quarters{}; })}}) {
       const double found = share(special, moving);
       EXPECT_GT(found, 0.05) << what;
       EXPECT_LT(found, 0.5) << what;

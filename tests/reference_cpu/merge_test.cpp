@@ -194,21 +194,21 @@ TEST(MergeSets, TakesTheSecondChoiceWhenTheFirstWouldExceedCap) {
 
 TEST(MergeSets, AlwaysTakesInAContainedSetWhateverCapSays) {
   const auto f = family_of(block_body(8, 1, 1), {range(0, 8), {3, 4}});
-  for (const auto rule : {MergeRule::deterministic, MergeRule::published, MergeRule::single_pass}) {
+  for (const auto rule : {MergeRule::deterministic, MergeRule::published}) {
     EXPECT_EQ(merged(f, rule, 3, 1).sets, (Lists{range(0, 8)}));
   }
 }
 
 TEST(MergeSets, JoinsTwoEqualSetsIntoOne) {
   const auto f = family_of(block_body(3, 1, 1), {{0, 1, 2}, {0, 1, 2}});
-  for (const auto rule : {MergeRule::deterministic, MergeRule::published, MergeRule::single_pass}) {
+  for (const auto rule : {MergeRule::deterministic, MergeRule::published}) {
     EXPECT_EQ(merged(f, rule, 4, 1).sets, (Lists{{0, 1, 2}}));
   }
 }
 
 TEST(MergeSets, DoesNotCallDiagonalNeighboursTouching) {
   const auto f = family_of(body_of({{0, 0, 0}, {1, 1, 0}, {1, 1, 1}, {2, 2, 2}}), {{0}, {1, 2}, {3}});
-  for (const auto rule : {MergeRule::deterministic, MergeRule::published, MergeRule::single_pass}) {
+  for (const auto rule : {MergeRule::deterministic, MergeRule::published}) {
     EXPECT_EQ(merged(f, rule, 10, 10).sets.size(), 3u);
   }
 }
@@ -216,14 +216,14 @@ TEST(MergeSets, DoesNotCallDiagonalNeighboursTouching) {
 TEST(MergeSets, DoesNotReachAcrossACut) {
   auto f = family_of(block_body(5, 1, 1), {{0, 1}, {3, 4}});
   f.alive[2] = 0;
-  for (const auto rule : {MergeRule::deterministic, MergeRule::published, MergeRule::single_pass}) {
+  for (const auto rule : {MergeRule::deterministic, MergeRule::published}) {
     EXPECT_EQ(merged(f, rule, 10, 10).sets.size(), 2u);
   }
 }
 
 TEST(MergeSets, ReturnsAFamilyWithoutSmallSetsAsItIs) {
   const auto f = wire_family({4, 4, 4});
-  for (const auto rule : {MergeRule::deterministic, MergeRule::published, MergeRule::single_pass}) {
+  for (const auto rule : {MergeRule::deterministic, MergeRule::published}) {
     const Merged result = merged(f, rule, 4, 100);
     EXPECT_EQ(result.sets, f.sets);
     EXPECT_EQ(result.survivor, (std::vector<int32_t>{0, 1, 2}));
@@ -232,7 +232,7 @@ TEST(MergeSets, ReturnsAFamilyWithoutSmallSetsAsItIs) {
 
 TEST(MergeSets, AcceptsAnEmptyFamily) {
   const auto f = family_of(body_of({}), {});
-  for (const auto rule : {MergeRule::deterministic, MergeRule::published, MergeRule::single_pass}) {
+  for (const auto rule : {MergeRule::deterministic, MergeRule::published}) {
     EXPECT_TRUE(merged(f, rule, 4, 100).sets.empty());
   }
 }
@@ -330,42 +330,6 @@ TEST(PublishedMerge, ClaimsInTheOrderOfNumbersWithRolesLocked) {
   const Merged result = merged(f, MergeRule::published, 2, 10);
   EXPECT_EQ(result.sets, (Lists{{0, 1}, {2, 3}}));
   EXPECT_EQ(result.survivor, (std::vector<int32_t>{1, 2}));
-}
-
-TEST(SinglePassMerge, ChainsClaimsBeyondCap) {
-  // 0 claims 1 (7 particles together), 1 claims the smaller 2 (5 together), 2 would have 1, which is taken.
-  const Merged result = merged(wire_family({4, 3, 2, 9}), MergeRule::single_pass, 5, 7);
-  EXPECT_EQ(result.sets, (Lists{range(0, 9), range(9, 18)})) << "9 particles with cap 7: the fault of this rule";
-  EXPECT_EQ(result.survivor, (std::vector<int32_t>{2, 3}));
-}
-
-TEST(SinglePassMerge, LeavesTheLowestNumberOfACycle) {
-  // 0 claims 1, 1 claims the smaller 0, 2 would have 1, which is taken.
-  const Merged result = merged(wire_family({1, 3, 3, 9}), MergeRule::single_pass, 4, 6);
-  EXPECT_EQ(result.sets, (Lists{range(0, 4), range(4, 7), range(7, 16)}));
-  EXPECT_EQ(result.survivor, (std::vector<int32_t>{0, 2, 3}));
-}
-
-TEST(SinglePassMerge, IsNeitherLegalNorMaximalOnRandomFamilies) {
-  constexpr uint32_t kSeed = 600;
-  std::mt19937 random(kSeed);
-  RecordProperty("seed", static_cast<int>(kSeed));
-  int above_cap = 0, not_maximal = 0;
-  for (int round = 0; round < 300; ++round) {
-    const Family f = random_family(random);
-    const int64_t tau = 8, cap = 16;  // no set of the input has more than 14 particles
-    const ByNumber sets = by_number(f, merged(f, MergeRule::single_pass, tau, cap));
-    bool over = false, left = false;
-    for (const auto& [number, set] : sets) {
-      const auto size = static_cast<int64_t>(set.size());
-      over = over || size > cap;
-      left = left || (size < tau && preferred(f, sets, number, cap));
-    }
-    above_cap += over;
-    not_maximal += left;
-  }
-  EXPECT_GT(above_cap, 0);
-  EXPECT_GT(not_maximal, 0);
 }
 
 // --- The stage ---------------------------------------------------------------------------------------------------

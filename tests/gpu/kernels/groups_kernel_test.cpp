@@ -461,11 +461,10 @@ TEST(Groups, FollowParticlesThatPassFromOneClusterToAnother) {
     const Bodies bodies{{setup}, {cutproof::testing::state_of(body, lists, 20)}};
     StagingBuffers staging = make_staging_buffers(bodies.setups, bodies.states, kNewton, Capacity{});
     const DeviceView view = staging.view();
-    const Plan plan = make_plan(bodies.setups, bodies.states, kNewton, SplitMethod::blocks);
     HostLauncher launcher;
     enqueue_groups_if_stale(launcher, view);
     staging.cut[0] = 2 * staging.frame[0];
-    enqueue_merge(launcher, view, plan);
+    enqueue_merge(launcher, view);
     launcher.teams(sort_memberships_kernel_object{}, kParticleTile, particle_tiles(view.particles), view);
     ASSERT_EQ(staging.slot_size[1], 0);
     passed += staging.slot_size[2] > static_cast<int>(lists[2].size());

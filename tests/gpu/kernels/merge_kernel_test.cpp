@@ -19,7 +19,7 @@ using namespace cutproof::testing;
 
 void merge_on(HostLauncher& launcher, Bench& bench) {
   bench.spoil_scratch();
-  enqueue_merge(launcher, bench.view, bench.plan);
+  enqueue_merge(launcher, bench.view);
 }
 
 State reference_merge(const Setup& setup, State state) {
@@ -313,57 +313,6 @@ TEST(GpuMerge, PublishedMergesAChainOfAThousandClusters) {
   });
 }
 
-// The cap is what single_pass does not keep.
-TEST(GpuMerge, SinglePassIsLegalButForTheCapInEverySchedule) {
-  std::uint32_t seed = 0;
-  int beyond = 0, fewer = 0;
-  for_schedules(240, [&](HostLauncher& launcher) {
-    Bench bench(random_foreign(++seed % 40, MergeRule::single_pass), true);
-    merge_on(launcher, bench);
-    ASSERT_EQ(bench.fault(), 0);
-    expect_memberships_agree(bench.staging);
-    const cutproof::Setup& setup = bench.bodies.setups.front();
-    const State before = bench.loaded.front(), after = bench.states().front();
-    fewer += after.clusters.count() < before.clusters.count();
-    const Verdict unpromised = oracles::cap_kept(setup, before, after);
-    ASSERT_TRUE(unpromised.holds);
-    ASSERT_EQ(unpromised.checked, 0);
-    cutproof::Setup promising = setup;
-    promising.merge.rule = MergeRule::published;
-    beyond += !oracles::cap_kept(promising, before, after).holds;
-    const Verdict verdict = oracles::merge_legality(setup, before, after);
-    ASSERT_TRUE(verdict.holds) << verdict.witness.text;
-    State expected = after;
-    reference::update_rest_frames(setup.body, expected.clusters);
-    expect_same_clusters(expected, after, setup.body.grid.spacing);
-  });
-  EXPECT_GT(fewer, 100);
-  EXPECT_GT(beyond, 0) << "this is what the baseline is there to show";
-}
-
-TEST(GpuMerge, SinglePassInTheOrderOfNumbersEqualsTheReference) {
-  int checked = 0;
-  for (std::uint32_t seed = 1; seed <= 100; ++seed) {
-    SCOPED_TRACE("random_foreign(" + std::to_string(seed) + ')');
-    HostLauncher::Simulated options{.schedule = forward()};
-    options.live_blocks = 1;
-    HostLauncher launcher(std::move(options));
-    expect_equal_to_reference(launcher, random_foreign(seed, MergeRule::single_pass), true);
-    ++checked;
-  }
-  EXPECT_EQ(checked, 100);
-}
-
-TEST(GpuMerge, SinglePassMergesAChainAndACycleOfOwners) {
-  HostLauncher::Simulated options{.schedule = forward()};
-  options.live_blocks = 1;
-  HostLauncher launcher(std::move(options));
-  // Lengths fall, so every cluster prefers the next one: a chain that ends in a cycle of the last two, or where the
-  // last one is not small.
-  expect_equal_to_reference(launcher, wire({9, 8, 7, 6, 5, 4, 3, 2}, 100, 100, MergeRule::single_pass), true);
-  expect_equal_to_reference(launcher, wire(std::vector<int32_t>(500, 2), 3, 4, MergeRule::single_pass), true);
-}
-
 TEST(GpuMerge, BodiesOfOneLoadKeepTheirOwnRules) {
   HostLauncher launcher(HostLauncher::Threads{2});
   const auto judge = [&](std::uint32_t seed) {
@@ -411,7 +360,7 @@ TEST(GpuMerge, BodiesOfOneLoadKeepTheirOwnRules) {
 // A capacity for all lists twice is enough for any merge; it is used up in the middle of rounds, again and again.
 TEST(GpuMerge, WhenRoomIsUsedUpListsAreMovedTogetherAndNothingElseChanges) {
   HostLauncher launcher(HostLauncher::Threads{2});
-  for (const MergeRule rule : {MergeRule::deterministic, MergeRule::published, MergeRule::single_pass}) {
+  for (const MergeRule rule : {MergeRule::deterministic, MergeRule::published}) {
     for (std::uint32_t seed = 0; seed < 60; ++seed) {
       SCOPED_TRACE("random_foreign(" + std::to_string(seed) + ')');
       Bodies bodies = seed == 0 ? wire(std::vector<int32_t>(300, 2), 11, 12, rule) : random_foreign(seed, rule);
@@ -428,7 +377,7 @@ TEST(GpuMerge, WhenRoomIsUsedUpListsAreMovedTogetherAndNothingElseChanges) {
       const State after = bench.states().front();
       if (rule == MergeRule::deterministic) {
         expect_same_clusters(reference_merge(setup, bodies.states.front()), after, setup.body.grid.spacing);
-      } else if (rule == MergeRule::published) {
+      } else {
         ASSERT_TRUE(oracles::merge_legality(setup, bench.loaded.front(), after).holds);
         ASSERT_TRUE(oracles::cap_kept(setup, bench.loaded.front(), after).holds);
         ASSERT_TRUE(oracles::merge_maximality(setup, after).holds);
@@ -440,7 +389,7 @@ TEST(GpuMerge, WhenRoomIsUsedUpListsAreMovedTogetherAndNothingElseChanges) {
 
 TEST(GpuMerge, WithoutRoomForItsUnionsAMergeIsFlaggedAndChangesNothing) {
   HostLauncher launcher;
-  for (const MergeRule rule : {MergeRule::deterministic, MergeRule::published, MergeRule::single_pass}) {
+  for (const MergeRule rule : {MergeRule::deterministic, MergeRule::published}) {
     for (const int spare : {0, 1, 100, 199}) {
       Bench bench(wire(std::vector<int32_t>(100, 2), 5, 12, rule), true);
       const int used = bench.staging.counters.front().members_used;
