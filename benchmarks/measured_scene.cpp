@@ -109,9 +109,7 @@ json run_fields(const BenchScene& scene, const Contender& contender) {
           {"substeps", setup.step.substeps},
           {"iterations", setup.step.iterations},
           {"acceleration", name_of(setup.step.acceleration)},
-          {"remove", name_of(setup.detect.remove)},
-          {"rotation", contender.rotation},
-          {"split", contender.split}};
+          {"remove", name_of(setup.detect.remove)}};
 }
 
 json scene_row(const BenchScene& scene, const Contender& contender, const Measured& measured) {

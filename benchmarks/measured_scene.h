@@ -44,7 +44,6 @@ struct TimingOptions {
   std::string backend = harness::kReferenceName;
   std::optional<int64_t> frames;  // timed; absent: by backend
   int64_t repeats = 3;
-  std::string split, rotation;  // empty: the kernels' default
   // How the step iterates: each of these in turn. Empty, absent: as the scene says.
   std::vector<std::string> acceleration;
   std::optional<int32_t> iterations;

@@ -1,12 +1,11 @@
 // The kernel that `cutproof bench rotations` times: it reads A and the previous R, rotates, writes R. On the host and
-// on the device, in both precisions, for the methods that a run can select and for others beside them.
+// on the device, in both precisions, for the method of the step and for others beside it.
 #pragma once
 #include <cstdint>
-#include <string>
+#include <type_traits>
 
 #include "gpu/kernels/rotation.cuh"
 #include "gpu/launch/launcher.h"
-#include "harness/backends.h"
 
 namespace cutproof::benchmarks {
 
@@ -23,14 +22,35 @@ struct RotationBatch {
 template <class Real>
 inline constexpr std::int64_t kRotationBytes = 27 * sizeof(Real) + 1;
 
-// A method: a type with a function `rotate` for both precisions.
+// A method: a type with a name and a function `rotate` for both precisions.
 template <int Number>
-struct Selectable {
+struct OfKernels {
   template <class Real>
   CUTPROOF_BOTH static gpu::Rotation<Real> rotate(const gpu::Matrix3x3<Real>& a, const gpu::Matrix3x3<Real>& previous) {
     return gpu::rotate<Number>(a, previous);
   }
 };
+struct Jacobi4 : OfKernels<gpu::kJacobi4> {
+  static constexpr const char* kName = "jacobi4";
+};
+struct Newton : OfKernels<gpu::kNewton> {
+  static constexpr const char* kName = "newton";
+};
+struct Svd : OfKernels<gpu::kSvd> {
+  static constexpr const char* kName = "svd";
+};
+struct Quest : OfKernels<gpu::kQuest> {
+  static constexpr const char* kName = "quest";
+};
+struct Apd : OfKernels<gpu::kApd> {
+  static constexpr const char* kName = "apd";
+};
+struct Mueller : OfKernels<gpu::kMueller2016> {
+  static constexpr const char* kName = "mueller";
+};
+// What the step does.
+template <class Method, class Real>
+inline constexpr bool kIsDefault = std::is_same_v<Method, Newton> && sizeof(Real) == sizeof(float);
 
 // Müller 2016 without the previous rotation, with as many iterations as it may want.
 struct MuellerCold {
@@ -178,28 +198,17 @@ struct rotate_matrices_kernel_object {
   }
 };
 
-// As `--rotation` and results call it.
-template <class Method>
-std::string name_of_method(int number) {
-  if constexpr (requires { Method::kName; }) {
-    return Method::kName;
-  } else {
-    return harness::rotation_names()[static_cast<std::size_t>(number)];
-  }
-}
-
-// Calls visit(method, number) for each method that kernels know; number: of layout.h, or -1 for one that no run can
-// select.
+// Calls visit(method) for each method that runs on a device.
 template <class Visit>
 void each_kernel_method(Visit visit) {
-  visit(Selectable<gpu::kJacobi4>{}, gpu::kJacobi4);
-  visit(Selectable<gpu::kNewton>{}, gpu::kNewton);
-  visit(Selectable<gpu::kSvd>{}, gpu::kSvd);
-  visit(Selectable<gpu::kQuest>{}, gpu::kQuest);
-  visit(Selectable<gpu::kApd>{}, gpu::kApd);
-  visit(Selectable<gpu::kMueller2016>{}, gpu::kMueller2016);
-  visit(MuellerCold{}, -1);
-  visit(McAdams{}, -1);
+  visit(Jacobi4{});
+  visit(Newton{});
+  visit(Svd{});
+  visit(Quest{});
+  visit(Apd{});
+  visit(Mueller{});
+  visit(MuellerCold{});
+  visit(McAdams{});
 }
 
 }  // namespace cutproof::benchmarks

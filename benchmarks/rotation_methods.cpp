@@ -46,11 +46,11 @@ struct Horn {
 };
 
 template <class Method, class Real>
-RotationMethod on_cpu(std::string name, bool selectable, const std::shared_ptr<gpu::HostLauncher>& launcher) {
+RotationMethod on_cpu(const std::shared_ptr<gpu::HostLauncher>& launcher) {
   RotationMethod method;
-  method.name = std::move(name);
+  method.name = Method::kName;
   method.precision = sizeof(Real) == sizeof(float) ? Precision::binary32 : Precision::binary64;
-  method.selectable = selectable;
+  method.is_default = kIsDefault<Method, Real>;
   method.bytes = kRotationBytes<Real>;
   method.solve = [launcher](const std::vector<Mat3>& a, const std::vector<Mat3>& previous, int repeats) {
     const std::vector<Real> matrices = interleaved<Real>(a), before = interleaved<Real>(previous);
@@ -86,14 +86,13 @@ std::vector<RotationMethod> rotation_methods(const harness::BackendDescriptor& b
     launcher = std::make_shared<gpu::HostLauncher>(gpu::HostLauncher::Threads{harness::cpu_threads()});
   }
   std::vector<RotationMethod> methods;
-  each_kernel_method([&]<class Method>(Method, int number) {
-    const std::string name = name_of_method<Method>(number);
-    methods.push_back(on_cpu<Method, float>(name, number >= 0, launcher));
-    methods.push_back(on_cpu<Method, double>(name, false, launcher));
+  each_kernel_method([&]<class Method>(Method) {
+    methods.push_back(on_cpu<Method, float>(launcher));
+    methods.push_back(on_cpu<Method, double>(launcher));
   });
-  methods.push_back(on_cpu<EigenSvd, float>(EigenSvd::kName, false, launcher));
-  methods.push_back(on_cpu<EigenSvd, double>(EigenSvd::kName, false, launcher));
-  methods.push_back(on_cpu<Horn, double>(Horn::kName, false, launcher));
+  methods.push_back(on_cpu<EigenSvd, float>(launcher));
+  methods.push_back(on_cpu<EigenSvd, double>(launcher));
+  methods.push_back(on_cpu<Horn, double>(launcher));
   return methods;
 }
 

@@ -19,7 +19,7 @@ struct TimedAnswers {
 struct RotationMethod {
   std::string name;
   Precision precision = Precision::binary32;
-  bool selectable = false;  // by `--rotation`, on backends that run the kernels
+  bool is_default = false;  // what the kernels' step does
   int64_t bytes = 0;        // read and written for each matrix
   // Matrix i starts from previous[i], every time.
   std::function<TimedAnswers(const std::vector<Mat3>& a, const std::vector<Mat3>& previous, int repeats)> solve;

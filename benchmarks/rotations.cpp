@@ -74,8 +74,7 @@ void mark_front(std::vector<RotationResult>& results) {
 }
 
 RotationReport measure_rotations(const std::vector<RotationMethod>& methods, const RotationCounts& counts,
-                                 const std::string& default_name, double copy_bytes_per_second,
-                                 const RotationProgress& progress) {
+                                 double copy_bytes_per_second, const RotationProgress& progress) {
   const auto show = [&](int64_t begun, const std::string& what) {
     if (progress) progress(begun, what);
   };
@@ -84,8 +83,7 @@ RotationReport measure_rotations(const std::vector<RotationMethod>& methods, con
     RotationResult& result = report.results.emplace_back();
     result.method = method.name;
     result.precision = method.precision;
-    result.selectable = method.selectable;
-    result.is_default = method.selectable && method.name == default_name;
+    result.is_default = method.is_default;
     result.limit = 1e6 * static_cast<double>(method.bytes) / copy_bytes_per_second;
   }
   int64_t done = 0;
@@ -140,8 +138,7 @@ json to_json(const RotationReport& report) {
   document["rows"] = json::array();
   for (const RotationResult& r : report.results) {
     json method = row_of(r, r.all);
-    method.update({{"selectable", r.selectable},
-                   {"default", r.is_default},
+    method.update({{"default", r.is_default},
                    {"on_front", r.on_front},
                    {"worst_gap", json_number(r.all.worst_gap.value_or(0))},
                    {"worst_case", r.worst_case},

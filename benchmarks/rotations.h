@@ -20,7 +20,7 @@ struct RotationCaseResult {
 struct RotationResult {
   std::string method;
   Precision precision = Precision::binary32;
-  bool selectable = false, is_default = false;
+  bool is_default = false;
   std::vector<RotationCaseResult> cases;
   Times near, cold;        // [s] per million matrices
   double limit = 0;        // [s] per million matrices: bytes / copy bandwidth
@@ -48,10 +48,9 @@ struct RotationReport {
 // What it throws ends the measurement (model/stop.h).
 using RotationProgress = std::function<void(int64_t cases_begun, const std::string& what)>;
 
-// `copy_bytes_per_second` for the limits. The default is the selectable method named `default_name`.
+// `copy_bytes_per_second` for the limits.
 RotationReport measure_rotations(const std::vector<RotationMethod>& methods, const RotationCounts& counts,
-                                 const std::string& default_name, double copy_bytes_per_second,
-                                 const RotationProgress& progress = {});
+                                 double copy_bytes_per_second, const RotationProgress& progress = {});
 
 // Marks on_front: the worst gap against the median time near the answer.
 void mark_front(std::vector<RotationResult>& results);

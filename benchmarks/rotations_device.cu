@@ -56,10 +56,10 @@ TimedAnswers solve_on_device(const std::vector<Mat3>& a, const std::vector<Mat3>
 
 std::vector<RotationMethod> device_rotation_methods() {
   std::vector<RotationMethod> methods;
-  each_kernel_method([&]<class Method>(Method, int number) {
-    methods.push_back({name_of_method<Method>(number), Precision::binary32, number >= 0, kRotationBytes<float>,
+  each_kernel_method([&]<class Method>(Method) {
+    methods.push_back({Method::kName, Precision::binary32, kIsDefault<Method, float>, kRotationBytes<float>,
                        solve_on_device<Method, float>});
-    methods.push_back({name_of_method<Method>(number), Precision::binary64, false, kRotationBytes<double>,
+    methods.push_back({Method::kName, Precision::binary64, kIsDefault<Method, double>, kRotationBytes<double>,
                        solve_on_device<Method, double>});
   });
   return methods;

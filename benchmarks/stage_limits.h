@@ -30,7 +30,7 @@ struct Groups {
 Groups groups_of(const Setup& setup, const State& state);
 
 // Of one frame that cuts, on a backend that runs the kernels. Requires a body on a grid.
-StageLimits stage_limits(const Setup& setup, const State& state, gpu::SplitMethod split);
+StageLimits stage_limits(const Setup& setup, const State& state);
 
 // Beside what the machine does at best; `median` [s]: of the stage, absent if it did not run.
 nlohmann::json limit_json(const StageLimit& limit, const MachineLimits& machine, double median);

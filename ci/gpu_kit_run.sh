@@ -74,8 +74,6 @@ for part in $parts; do
       done ;;
     properties)
       try fuzz cutproof fuzz --backend gpu --cases "$cases" --save "$results" --json "$results/fuzz.json"
-      try fuzz_global_labels cutproof fuzz --backend gpu --split global --cases 10000 --seed 1000001 \
-        --save "$results" --json "$results/fuzz_global_labels.json"
       try fuzz_dynamics cutproof fuzz --backend gpu --dynamics --cases 10000 --seed 2000001 \
         --save "$results" --json "$results/fuzz_dynamics.json"
       try acceleration acceleration_test --gtest_filter='*/gpu'
@@ -116,12 +114,12 @@ for part in $parts; do
     timings)
       try rotations cutproof bench rotations --backend gpu --cases --json "$results/rotations.json"
       try machine_limits cutproof bench machine_limits --backend gpu --json "$results/machine_limits.json"
-      try stages cutproof bench stages --backend gpu --split both --json "$results/stages.json"
-      try sizes cutproof bench stages --backend gpu --split both --sizes 1000,101096,1000000,10000000 \
+      try stages cutproof bench stages --backend gpu --json "$results/stages.json"
+      try sizes cutproof bench stages --backend gpu --sizes 1000,101096,1000000,10000000 \
         --json "$results/stages_sizes.json"
       try sampling cutproof bench sampling --backend gpu --json "$results/sampling.json"
       try clusters cutproof bench clusters --backend gpu --json "$results/clusters.json"
-      try scale cutproof bench scale --backend gpu --split both --json "$results/scale.json"
+      try scale cutproof bench scale --backend gpu --json "$results/scale.json"
       try solver cutproof bench solver --backend gpu --json "$results/solver.json"
       try sensitivity cutproof bench sensitivity --backend gpu --json "$results/sensitivity.json"
       try baselines cutproof bench baselines --backend gpu --json "$results/baselines.json"

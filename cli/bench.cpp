@@ -124,12 +124,6 @@ void add_timing(CLI::App& command, benchmarks::TimingOptions& options) {
             whole_number(1, 10'000));
   add_count(command, "--repeats", options.repeats, "how often they are timed, each time after a warm-up",
             whole_number(1, 1'000));
-  command.add_option("--split", options.split, "kernels: how clusters are split, blocks, global or both")
-      ->type_name("M")
-      ->check(one_of({"blocks", "global", "both"}));
-  command.add_option("--rotation", options.rotation, "kernels: how rotations are found")
-      ->type_name("M")
-      ->check(one_of(harness::rotation_names()));
   add_list(command, "--acceleration", options.acceleration,
            options.acceleration.empty() ? "none, chebyshev or both, instead of the scene's" : "none, chebyshev or both",
            "A");
@@ -144,10 +138,8 @@ void add_timing(CLI::App& command, benchmarks::TimingOptions& options) {
 
 void print_scene(const nlohmann::json& document) {
   const nlohmann::json& row = document.at("rows").back();
-  say_filled(
-      "{scene}, acceleration {acceleration}, split {split}: {particles} particles, frame "
-      "{1e3*seconds/frame/median:.4g} ms\n",
-      row);
+  say_filled("{scene}, acceleration {acceleration}: {particles} particles, frame {1e3*seconds/frame/median:.4g} ms\n",
+             row);
   print_failures(row.at("error").at("frame"));
 }
 

@@ -64,9 +64,8 @@ std::optional<bool> add_counterexample(report::Card& card, const Counterexample&
   BackendChoice choice;
   if (chosen) {
     choice = *chosen;
-  } else {
-    if (!counterexample.backend.empty()) choice.name = counterexample.backend;
-    choice.split = counterexample.split;
+  } else if (!counterexample.backend.empty()) {
+    choice.name = counterexample.backend;
   }
   card.command = "cutproof replay " + quoted(file);
   if (chosen && chosen->name != counterexample.backend) card.command += " --backend " + quoted(chosen->name);

@@ -76,12 +76,6 @@ std::string campaign_again(const json& document) {
   // What a document does not hold as a campaign has it is left out.
   const auto text = [&](const char* name) { return document.value(name, std::string()); };
   std::string command = "cutproof fuzz --backend " + quoted(text("backend"));
-  if (text("split") == "global") command += " --split global";
-  BackendChoice usual;
-  usual.name = text("backend");
-  const bool is_known = harness::find_backend(usual.name) != nullptr;
-  if (is_known && !text("rotation").empty() && harness::rotation_of(usual) != text("rotation"))
-    command += " --rotation " + quoted(text("rotation"));
   if (!text("schedule").empty()) command += " --schedule " + quoted(text("schedule"));
   if (document.contains("schedule_seed"))
     command += fmt::format(" --schedule-seed {}", integer_from<uint64_t>(document.at("schedule_seed")));

@@ -12,7 +12,7 @@
 namespace cutproof::cli {
 
 struct FuzzOptions {
-  harness::BackendChoice backend = {.name = harness::kHostName, .split = {}, .rotation = {}};
+  harness::BackendChoice backend = {.name = harness::kHostName};
   property_tests::CampaignOptions campaign;
   std::optional<int64_t> cases;  // default: 1000, or as many as its `seconds` allow
   std::string sizes = "0-79";    // of cases, which take turns: 0 is nothing, 100 up to about 20,000 particles

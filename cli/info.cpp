@@ -101,7 +101,6 @@ void print_words() {
   const auto line = [](const char* what, const auto& words) {
     insist("{}\n", io::hanging(fmt::format("{}: {}", what, fmt::join(words, ", ")), 2));
   };
-  line("rotations (--rotation)", harness::rotation_names());
   line("schedules (--schedule)", harness::schedule_names());
   line("depths of judging (--check)", harness::kDepthNames);
   line("errors (--errors)", error_names());

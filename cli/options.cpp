@@ -37,14 +37,6 @@ void add_backend_name(CLI::App& command, std::string& name, const std::string& w
 void add_backend(CLI::App& command, harness::BackendChoice& choice, const std::string& what,
                  const std::function<bool(const harness::BackendDescriptor&)>& offered) {
   add_backend_name(command, choice.name, what, offered);
-  command.add_option("--split", choice.split, "kernels: how clusters are split, blocks or global")
-      ->type_name("M")
-      ->check(one_of({"blocks", "global"}));
-  command
-      .add_option("--rotation", choice.rotation,
-                  fmt::format("kernels: how rotations are found, {}", fmt::join(harness::rotation_names(), ", ")))
-      ->type_name("M")
-      ->check(one_of(harness::rotation_names()));
   const std::string scheduled = harness::backend_names([](const auto& backend) { return backend.takes_schedule; });
   command
       .add_option("--schedule", choice.schedule,

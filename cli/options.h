@@ -18,7 +18,7 @@ void refuse_odd_words(const CLI::App& command);
 // --backend alone. `what`: what it does, for the help, which lists those of which `offered` holds.
 void add_backend_name(CLI::App& command, std::string& name, const std::string& what,
                       const std::function<bool(const harness::BackendDescriptor&)>& offered = {});
-// --backend, and what may be said about kernels and schedules.
+// --backend, and what may be said about schedules.
 void add_backend(CLI::App& command, harness::BackendChoice& choice, const std::string& what,
                  const std::function<bool(const harness::BackendDescriptor&)>& offered = {});
 // For what is timed.

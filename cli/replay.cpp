@@ -33,7 +33,6 @@ BackendChoice choice_of(const ReplayOptions& options, const Counterexample& coun
   if (!options.backend.name.empty()) return options.backend;
   BackendChoice choice;
   if (!counterexample.backend.empty()) choice.name = counterexample.backend;
-  choice.split = counterexample.split;
   return choice;
 }
 

@@ -203,9 +203,6 @@ void print_found(const TuneOptions& options, const json& document) {
   say("from the {}", level_text(level));
   say_filled(", {apart_h:.2g} h from the one before; ", level);
   say_filled("{verdicts} verdicts hold\n", found);
-  if (trial.at("rotation") != given.at("rotation")) {
-    say_filled("  rotations are no part of a scene: run it with --rotation {rotation}\n", trial);
-  }
   if (options.frames) say_filled("  the scene was written whole, and looked at for {frames} frames only\n", document);
 }
 

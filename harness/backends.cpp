@@ -34,24 +34,6 @@ constexpr std::int64_t kStepBudget = 5'000'000'000;
   throw InputError("command line", option, problem, remedy);
 }
 
-gpu::KernelOptions kernel_options(const BackendChoice& choice) {
-  gpu::KernelOptions options;
-  if (choice.split == "global") {
-    options.split = gpu::SplitMethod::global_labels;
-  } else if (!choice.split.empty() && choice.split != "blocks") {
-    refuse("--split", fmt::format("there is no split method '{}'", choice.split), "use blocks or global");
-  }
-  if (!choice.rotation.empty()) {
-    const auto found = std::find(rotation_names().begin(), rotation_names().end(), choice.rotation);
-    if (found == rotation_names().end()) {
-      refuse("--rotation", fmt::format("there is no rotation method '{}'", choice.rotation),
-             fmt::format("use one of {}", fmt::join(rotation_names(), ", ")));
-    }
-    options.rotation_method = static_cast<int>(found - rotation_names().begin());
-  }
-  return options;
-}
-
 gpu::Generator generator(const BackendChoice& choice) {
   if (choice.schedule == "random") return gpu::random_walk(choice.seed);
   if (choice.schedule == "pct") return gpu::pct(choice.seed, kPctDepth, kPctLength);
@@ -62,17 +44,17 @@ gpu::Generator generator(const BackendChoice& choice) {
          fmt::format("use one of {}", fmt::join(schedule_names(), ", ")));
 }
 
-std::unique_ptr<Backend> make_simulated(gpu::Generator schedule, const BackendChoice& choice) {
+std::unique_ptr<Backend> make_simulated(gpu::Generator schedule) {
   gpu::HostLauncher::Simulated simulation;
   simulation.schedule = std::move(schedule);
   simulation.step_budget = kStepBudget;
-  return gpu::make_simulated_backend(std::move(simulation), kernel_options(choice));
+  return gpu::make_simulated_backend(std::move(simulation));
 }
 
 #if CUTPROOF_HAS_CUDA
 template <gpu::Path path>
-std::unique_ptr<Backend> make_gpu(const BackendChoice& choice) {
-  gpu::KernelOptions options = kernel_options(choice);
+std::unique_ptr<Backend> make_gpu(const BackendChoice&) {
+  gpu::KernelOptions options;
   options.path = path;
   return gpu::make_gpu_backend(options);
 }
@@ -83,7 +65,7 @@ constexpr std::unique_ptr<Backend> (*make_gpu)(const BackendChoice&) = nullptr;
 
 template <int of_block = 1>
 std::unique_ptr<Backend> make_host(const BackendChoice& choice) {
-  return gpu::make_host_backend(choice.threads > 0 ? choice.threads : cpu_threads(), kernel_options(choice), of_block);
+  return gpu::make_host_backend(choice.threads > 0 ? choice.threads : cpu_threads(), {}, of_block);
 }
 
 // Several, so that kernels see more than one body; no more, so that what they work on stays in the caches.
@@ -96,9 +78,7 @@ constexpr std::array kBackends = {
         .summary = "CPU, double precision, serial: the oracle that everything else is compared with",
         .precision = Precision::binary64,
         .is_the_reference = true,
-        .takes_kernel_options = false,
-        .only_split = "search",
-        .only_rotation = "horn",
+        .runs_kernels = false,
         // It takes body by body, and what a few bodies need stays in the caches.
         .bodies_in_a_load = 16,
         .make = [](const BackendChoice&) { return reference::make_backend(); },
@@ -124,7 +104,7 @@ constexpr std::array kBackends = {
         .summary = "the same on one thread, under a schedule that is chosen and can be replayed",
         .is_timed = false,
         .takes_schedule = true,
-        .make = [](const BackendChoice& choice) { return make_simulated(generator(choice), choice); },
+        .make = [](const BackendChoice& choice) { return make_simulated(generator(choice)); },
     },
     BackendDescriptor{
         .name = "gpu",
@@ -183,8 +163,7 @@ const BackendDescriptor* describe_plugin(std::string_view name) {
   if (is_new) {
     place->second.name = place->first;
     place->second.summary = "a plugin";
-    place->second.takes_kernel_options = false;
-    place->second.only_split = place->second.only_rotation = "its own";
+    place->second.runs_kernels = false;
     place->second.bodies_in_a_load = 16;
     place->second.make = [](const BackendChoice& choice) { return guests::make_plugin_backend(choice.name); };
   }
@@ -249,27 +228,20 @@ std::unique_ptr<Backend> make_backend(const BackendChoice& choice) {
     refuse("--backend", "this cutproof was built without CUDA",
            "build it where a CUDA toolkit of version 12.4 or newer is installed");
   }
-  if (!backend.takes_kernel_options && !(choice.split.empty() && choice.rotation.empty())) {
-    refuse(choice.split.empty() ? "--rotation" : "--split", fmt::format("the {} has one way only", backend.name),
-           fmt::format("leave it out, or choose --backend {}",
-                       backend_names([](const auto& other) { return other.takes_kernel_options; })));
-  }
   return backend.make(choice);
 }
 
 std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice,
                                                std::shared_ptr<gpu::ThreadSchedule> record) {
-  return make_simulated(
-      [inner = generator(choice), record](const gpu::Candidates& candidates) {
-        const int thread = inner(candidates);
-        record->push_back(static_cast<std::uint16_t>(candidates.rank(thread)));
-        return thread;
-      },
-      choice);
+  return make_simulated([inner = generator(choice), record](const gpu::Candidates& candidates) {
+    const int thread = inner(candidates);
+    record->push_back(static_cast<std::uint16_t>(candidates.rank(thread)));
+    return thread;
+  });
 }
 
-std::unique_ptr<Backend> make_replaying_backend(const BackendChoice& choice, gpu::ThreadSchedule schedule) {
-  return make_simulated(gpu::replay(std::move(schedule)), choice);
+std::unique_ptr<Backend> make_replaying_backend(gpu::ThreadSchedule schedule) {
+  return make_simulated(gpu::replay(std::move(schedule)));
 }
 
 BackendChoice choice_for_load(BackendChoice choice, int64_t load) {
@@ -283,28 +255,9 @@ BackendChoice choice_for_load(BackendChoice choice, int64_t load) {
   return choice;
 }
 
-const std::vector<std::string>& rotation_names() {
-  static const std::vector<std::string> names = {"jacobi4", "mueller", "apd", "svd", "quest", "newton"};
-  return names;
-}
-
 const std::vector<std::string>& schedule_names() {
   static const std::vector<std::string> names = {"forward", "reverse", "round_robin", "random", "pct"};
   return names;
-}
-
-const std::string& default_rotation() { return rotation_names()[at(gpu::KernelOptions{}.rotation_method)]; }
-
-std::string rotation_of(const BackendChoice& choice) {
-  const BackendDescriptor& backend = described_backend(choice.name);
-  if (!backend.takes_kernel_options) return std::string(backend.only_rotation);
-  return rotation_names()[at(kernel_options(choice).rotation_method)];
-}
-
-std::string split_of(const BackendChoice& choice) {
-  const BackendDescriptor& backend = described_backend(choice.name);
-  if (!backend.takes_kernel_options) return std::string(backend.only_split);
-  return kernel_options(choice).split == gpu::SplitMethod::global_labels ? "global" : "blocks";
 }
 
 int cpu_threads() { return static_cast<int>(std::max(1u, std::thread::hardware_concurrency())); }

@@ -20,8 +20,6 @@ inline constexpr const char* kHostName = "host";
 
 struct BackendChoice {
   std::string name = kReferenceName;
-  std::string split;                // kernels: blocks or global; empty: blocks
-  std::string rotation;             // kernels: how rotations are found; empty: KernelOptions' default
   std::string schedule = "random";  // of backends that take one: one of schedule_names()
   uint64_t seed = 1;                // of the schedule
   int threads = 0;                  // of backends that use all threads; 0: as many as the machine has
@@ -36,13 +34,11 @@ struct BackendDescriptor {
   // All others are compared with it; it is not compared with itself.
   bool is_the_reference = false;
   Processor processor = Processor::one_thread;
-  bool is_timed = true;              // else it only finds faults: what it takes says nothing
-  bool is_another_path = false;      // another backend, whose kernels are started in another way, with the same bits
-  bool pipelines = false;            // run() does not wait: frames can be handed over back to back
-  bool takes_kernel_options = true;  // it runs the kernels: --split, --rotation
-  bool takes_schedule = false;       // --schedule, --schedule-seed: its interleaving is chosen and can be replayed
-  // How it splits clusters and finds rotations where nothing can be chosen.
-  std::string_view only_split = {}, only_rotation = {};
+  bool is_timed = true;          // else it only finds faults: what it takes says nothing
+  bool is_another_path = false;  // another backend, whose kernels are started in another way, with the same bits
+  bool pipelines = false;        // run() does not wait: frames can be handed over back to back
+  bool runs_kernels = true;
+  bool takes_schedule = false;  // --schedule, --schedule-seed: its interleaving is chosen and can be replayed
 
   // Benchmarks: whether bodies are as large as the paper's unless somebody asks for others, and how many frames are
   // timed.
@@ -75,27 +71,20 @@ std::string description_of(const BackendDescriptor& backend);
 // The processor and how many of its threads work, or the CUDA device; empty if that is not there.
 std::string processor_of(const BackendDescriptor& backend);
 
-// Throws InputError, naming the option, for what does not exist, is not in this build, or says something about kernels
-// to a backend that does not run them; MachineError if there is no device.
+// Throws InputError, naming the option, for what does not exist or is not in this build; MachineError if there is no
+// device.
 std::unique_ptr<Backend> make_backend(const BackendChoice& choice);
 // The same, whose schedule is written down as it is made (architecture.md, Schedules). Requires a backend that takes
 // a schedule.
 std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice,
                                                std::shared_ptr<gpu::ThreadSchedule> record);
-std::unique_ptr<Backend> make_replaying_backend(const BackendChoice& choice, gpu::ThreadSchedule schedule);
+std::unique_ptr<Backend> make_replaying_backend(gpu::ThreadSchedule schedule);
 
 // For one of many loads that run beside each other: each has a schedule of its own, whose kinds take turns; and one
 // thread, because there are as many loads as threads.
 BackendChoice choice_for_load(BackendChoice choice, int64_t load);
 
-// By the number in gpu/state/device_view.h.
-const std::vector<std::string>& rotation_names();
 const std::vector<std::string>& schedule_names();
-// The kernels', where none is chosen.
-const std::string& default_rotation();
-// The methods that the chosen backend will use. Throw InputError as make_backend() does.
-std::string rotation_of(const BackendChoice& choice);
-std::string split_of(const BackendChoice& choice);
 int cpu_threads();
 
 }  // namespace cutproof::harness

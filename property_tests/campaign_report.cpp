@@ -42,9 +42,9 @@ constexpr const char* kRemedy = "give the results (--json) of all shards of one 
 
 // What makes two results shards of one campaign: what decides which cases there are, what runs them, and what judges.
 // Threads are the machine's business: no case depends on them.
-constexpr const char* kOfTheCampaign[] = {"cutproof", "commit",        "backend",     "split",         "rotation",
-                                          "schedule", "schedule_seed", "seed",        "sizes",         "dynamics",
-                                          "batch",    "keep_going",    "cases_asked", "seconds_asked", "shards"};
+constexpr const char* kOfTheCampaign[] = {"cutproof",    "commit",        "backend",  "schedule", "schedule_seed",
+                                          "seed",        "sizes",         "dynamics", "batch",    "keep_going",
+                                          "cases_asked", "seconds_asked", "shards"};
 
 // By stage and name: the order in which threads, or shards, come upon them says nothing.
 void sort_properties(json& properties) {
@@ -154,8 +154,6 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
       {"cutproof", CUTPROOF_VERSION},
       {"complete", !campaign.stopped},
       {"backend", backend.name},
-      {"split", backend.split.empty() ? "blocks" : backend.split},
-      {"rotation", harness::rotation_of(backend)},
       {"seed", options.seed},
       {"sizes", {options.least_size, options.most_size}},
       {"dynamics", options.dynamics},

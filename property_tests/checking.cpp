@@ -5,6 +5,7 @@
 #include <iostream>
 #include <sstream>
 
+#include "gpu/backends.h"
 #include "harness/backends.h"
 
 namespace cutproof::property_tests {
@@ -38,11 +39,10 @@ void PrintTo(const NamedBackend& backend, std::ostream* os) { *os << backend.nam
 
 std::vector<NamedBackend> all_backends() {
   std::vector<NamedBackend> tested;
-  const auto add = [&](const harness::BackendDescriptor& backend, const char* variant, const char* split,
-                       const char* schedule, int64_t fraction, int most_size) {
+  const auto add = [&](const harness::BackendDescriptor& backend, const char* variant, const char* schedule,
+                       int64_t fraction, int most_size) {
     harness::BackendChoice choice;
     choice.name = backend.name;
-    choice.split = split;
     choice.schedule = schedule;
     choice.seed = wanted_seed();
     choice.threads = 2;
@@ -53,16 +53,28 @@ std::vector<NamedBackend> all_backends() {
   for (const harness::BackendDescriptor& backend : harness::backends()) {
     if (!backend.is_built() || (backend.needs_device() && harness::processor_of(backend).empty())) continue;
     if (backend.takes_schedule) {
-      add(backend, "_random", "", "random", 2, 35);
-      add(backend, "_pct", "", "pct", 2, 35);
-      add(backend, "_reverse", "global", "reverse", 2, 35);
+      add(backend, "_random", "random", 2, 35);
+      add(backend, "_pct", "pct", 2, 35);
     } else if (backend.is_another_path && !backend.needs_device()) {
-      add(backend, "", "", "", 10, 100);
+      add(backend, "", "", 10, 100);
     } else if (backend.is_timed) {
-      add(backend, "", "", "", 1, 100);
-      if (backend.takes_kernel_options) add(backend, "_global_labels", "global", "", 4, 100);
+      add(backend, "", "", 1, 100);
     }
   }
+  // The kernels' other way of splitting, which only large clusters take otherwise.
+  gpu::KernelOptions global;
+  global.split = gpu::SplitMethod::global_labels;
+  tested.push_back({"host_global_labels", [=] { return gpu::make_host_backend(2, global); }, 4, 100});
+  tested.push_back(
+      {"simulated_reverse",
+       [=] { return gpu::make_simulated_backend({.schedule = gpu::reverse(), .step_budget = 5'000'000'000}, global); },
+       2, 35});
+#if CUTPROOF_HAS_CUDA
+  std::string why;
+  if (!gpu::device_description(why).empty()) {
+    tested.push_back({"gpu_global_labels", [=] { return gpu::make_gpu_backend(global); }, 4, 100});
+  }
+#endif
   return tested;
 }
 

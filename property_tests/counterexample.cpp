@@ -30,7 +30,6 @@ std::string to_json(const Counterexample& counterexample) {
   nlohmann::json document = {{"format", kFormat},
                              {"format_version", kVersion},
                              {"backend", counterexample.backend},
-                             {"split", counterexample.split},
                              {"schedule", choices},
                              {"found", counterexample.found},
                              {"seed", counterexample.seed},
@@ -89,7 +88,6 @@ Counterexample counterexample_from_json(const std::string& text, const std::stri
                                          std::to_string(kVersion) + " is");
     }
     get("backend", result.backend);
-    get("split", result.split);
     get("found", result.found);
     get("seed", result.seed);
     get("index", result.index);

@@ -14,12 +14,11 @@ namespace cutproof::property_tests {
 struct Counterexample {
   Case failing;
   std::vector<Command> commands;  // a history of that case; empty: it is dissected from beginning to end
-  std::string backend;            // on which it was found, and how its clusters were split; empty: nothing is known
-  std::string split;
-  gpu::ThreadSchedule schedule;  // `simulated`: the choices that make it fail; empty: none were recorded
-  std::string found;             // what was wrong, for a person
-  uint64_t seed = 0;             // of the campaign
-  int64_t index = 0;             // of the case in it, before it was simplified
+  std::string backend;            // on which it was found; empty: that is not known
+  gpu::ThreadSchedule schedule;   // `simulated`: the choices that make it fail; empty: none were recorded
+  std::string found;              // what was wrong, for a person
+  uint64_t seed = 0;              // of the campaign
+  int64_t index = 0;              // of the case in it, before it was simplified
 };
 
 // JSON, one line. The schedule is written as pairs [decision, choice] of the choices that are not 0.

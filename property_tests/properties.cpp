@@ -68,9 +68,7 @@ TEST_P(EveryBackend, AgreesWithEveryOracleOnSavedCounterexamples) {
 TEST(SavedCounterexamples, HoldUnderTheScheduleThatBrokeThem) {
   for (const auto& [file, counterexample] : saved_counterexamples()) {
     if (counterexample.schedule.empty()) continue;
-    harness::BackendChoice choice;
-    choice.split = counterexample.split;
-    const auto backend = harness::make_replaying_backend(choice, counterexample.schedule);
+    const auto backend = harness::make_replaying_backend(counterexample.schedule);
     const auto judgement = dissect(*backend, counterexample.failing, true);
     if (judgement.failure) ADD_FAILURE() << file << ": " << describe(*judgement.failure);
   }

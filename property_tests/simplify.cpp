@@ -21,7 +21,6 @@ Simplified simplify(const Violation& violation, const BackendChoice& choice, dou
   Counterexample& found = result.counterexample;
   found.failing = violation.failing;
   found.backend = choice.name;
-  found.split = choice.split;
   found.index = violation.index;
   result.verdict = violation.verdict;
 
@@ -54,7 +53,7 @@ Simplified simplify(const Violation& violation, const BackendChoice& choice, dou
         dissect_alone([&] { return harness::make_recorded_backend(failing_choice, schedule); }, found.failing, true));
     found.schedule = gpu::shrink(*schedule, [&](const gpu::ThreadSchedule& tried) {
       if (is_over()) return false;
-      return dissect_alone([&] { return harness::make_replaying_backend(failing_choice, tried); }, found.failing, true)
+      return dissect_alone([&] { return harness::make_replaying_backend(tried); }, found.failing, true)
           .failure.has_value();
     });
   }
@@ -64,7 +63,7 @@ Simplified simplify(const Violation& violation, const BackendChoice& choice, dou
 
 std::unique_ptr<Backend> backend_of(const Counterexample& counterexample, const BackendChoice& choice) {
   if (takes_schedule(choice) && !counterexample.schedule.empty()) {
-    return harness::make_replaying_backend(choice, counterexample.schedule);
+    return harness::make_replaying_backend(counterexample.schedule);
   }
   return harness::make_backend(choice);
 }

@@ -58,7 +58,7 @@ class Variants {
   }
 
  private:
-  static constexpr const char* kNames[] = {"cooking", "split", "acceleration", "rotation", "remove"};
+  static constexpr const char* kNames[] = {"cooking", "acceleration", "remove"};
   std::set<std::string> seen_[std::size(kNames)];
 };
 std::string with(const std::string& name, const std::string& variant) {
@@ -66,9 +66,8 @@ std::string with(const std::string& name, const std::string& variant) {
 }
 
 std::string solver_text(const Field& row) {
-  return fmt::format("{} substeps × {} iterations, acceleration {}, rotation {}, split {}", row["substeps"].count(),
-                     row["iterations"].count(), row["acceleration"].text(), row["rotation"].text(),
-                     row["split"].text());
+  return fmt::format("{} substeps × {} iterations, acceleration {}", row["substeps"].count(), row["iterations"].count(),
+                     row["acceleration"].text());
 }
 
 // Kidneys that a document has timed, beside Table 3 of the paper: those of about as many particles as it has.

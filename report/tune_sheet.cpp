@@ -10,7 +10,6 @@ namespace {
 std::string configuration(const Field& trial) {
   std::string text =
       fmt::format("{} × {}, {}", trial["substeps"].count(), trial["iterations"].count(), trial["acceleration"].text());
-  if (!trial["rotation"].is_nothing()) text += ", rotation " + trial["rotation"].text();
   if (const std::string more = trial["differences"].text(); !more.empty()) text += ", " + more;
   return text;
 }

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
 #include <vector>
 
 #include "model/error.h"
@@ -27,18 +26,14 @@ double seconds_per_frame(Backend& backend, const benchmarks::PreparedScene& scen
 
 }  // namespace
 
-std::unique_ptr<Backend> Measuring::backend_for(const Configuration& configuration) const {
-  harness::BackendChoice choice = asked.backend;
-  choice.rotation = configuration.rotation;
-  return harness::make_backend(choice);
-}
+std::unique_ptr<Backend> Measuring::make_backend() const { return harness::make_backend(asked.backend); }
 
 Trial measure(const Measuring& measuring, const ReferenceSolution& reference, const Configuration& configuration,
               std::optional<double> limit, const std::vector<Trial>& before) {
   Trial trial;
   trial.configuration = configuration;
   const bool is_given = configuration == measuring.given, to_the_end = measuring.asked.full || is_given;
-  const std::unique_ptr<Backend> backend = measuring.backend_for(configuration);
+  const std::unique_ptr<Backend> backend = measuring.make_backend();
   std::optional<benchmarks::PreparedScene> scene;
   try {
     scene.emplace(configuration.scene, measuring.asked.scene, measuring.asked.frames);
@@ -93,17 +88,12 @@ Trial measure(const Measuring& measuring, const ReferenceSolution& reference, co
 std::vector<benchmarks::Times> times_in_turns(const Measuring& measuring,
                                               const std::vector<Configuration>& configurations) {
   std::vector<benchmarks::PreparedScene> scenes;
-  std::map<std::string, std::unique_ptr<Backend>> backends;  // by rotation: all else comes with a load
-  const auto run = [&](std::size_t k) {
-    return seconds_per_frame(*backends.at(configurations[k].rotation), scenes[k], measuring.asked.stop_asked);
-  };
   for (const Configuration& configuration : configurations) {
     scenes.emplace_back(configuration.scene, measuring.asked.scene, measuring.asked.frames);
-    std::unique_ptr<Backend>& backend = backends[configuration.rotation];
-    if (backend) continue;
-    backend = measuring.backend_for(configuration);
-    static_cast<void>(run(scenes.size() - 1));  // a backend's first run takes longer
   }
+  const std::unique_ptr<Backend> backend = measuring.make_backend();
+  const auto run = [&](std::size_t k) { return seconds_per_frame(*backend, scenes[k], measuring.asked.stop_asked); };
+  if (!scenes.empty()) static_cast<void>(run(0));  // a backend's first run takes longer
   std::vector<benchmarks::Times> times;
   for (const std::vector<double>& samples : benchmarks::in_turns(measuring.asked.repeats, scenes.size(), run)) {
     times.push_back(benchmarks::times_of(samples));

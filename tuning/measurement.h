@@ -37,7 +37,7 @@ struct Measuring {
 
   // What is left of the tolerance where the reference solution is not known better.
   double allowed(const ReferenceSolution& reference) const { return asked.tolerance - reference.known_to_h(); }
-  std::unique_ptr<Backend> backend_for(const Configuration& configuration) const;
+  std::unique_ptr<Backend> make_backend() const;
 };
 
 // `limit`: the seconds per frame beyond which it may be given up as too expensive. `before`: what has been measured.

@@ -142,9 +142,6 @@ class Searcher {
     for (const int32_t debris : {0, 2, 8}) {
       attempt_with([&](Configuration& c) { return set(c.scene.split.debris, debris); });
     }
-    for (const std::string& rotation : space_.rotations) {
-      attempt_with([&](Configuration& c) { return set(c.rotation, rotation); });
-    }
     return kept;
   }
 

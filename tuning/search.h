@@ -19,10 +19,9 @@ using Measure = std::function<Trial(const Configuration& configuration, std::opt
 struct SearchSpace {
   std::vector<int32_t> substeps;  // ascending
   int32_t most_iterations = 64;
-  std::vector<std::string> rotations;  // that differ from the given one
-  bool may_resize = true;              // false: the number of clusters is part of what the scene expects
-  bool may_drop_skin = false;          // nobody looks at it
-  bool nothing_removed = false;        // in the reference solution: a scene without a blade then needs no detection
+  bool may_resize = true;        // false: the number of clusters is part of what the scene expects
+  bool may_drop_skin = false;    // nobody looks at it
+  bool nothing_removed = false;  // in the reference solution: a scene without a blade then needs no detection
   // Of runs that are all carried to their end: the given substeps are followed down to this error, too [h].
   std::optional<double> followed_to;
 };
@@ -34,8 +33,8 @@ std::vector<int32_t> substeps_to_try(int32_t given, int32_t most);
 //    the tolerance, found by doubling and halving; more iterations are taken to be no less accurate and no cheaper.
 //    Doubling ends where it no longer helps: where the error, in the first frame in which the one before was beyond the
 //    tolerance, has not fallen by kHelps; and where nothing but the number of substeps decides (schedule, refused).
-// 2. From the cheapest of these: stages without which the scene's trajectory is the same, sizes of clusters, debris and
-//    rotation methods, one after the other; each is kept if it is within the tolerance and cheaper.
+// 2. From the cheapest of these: stages without which the scene's trajectory is the same, sizes of clusters and debris,
+//    one after the other; each is kept if it is within the tolerance and cheaper.
 // 3. If one was kept: the least number of iterations once more.
 // 4. With `followed_to`: the given substeps with 1, 2, 3, 4, 6, 8, … iterations of each acceleration, until the error
 //    is no greater: the curve that front() is read from.

@@ -23,7 +23,6 @@ std::string differences(const Configuration& configuration, const Configuration&
   note(scene.detect.criterion != before.detect.criterion, "no detection");
   note(scene.split.debris != before.split.debris, fmt::format("debris {}", scene.split.debris));
   note(scene.skin.wanted != before.skin.wanted, "no skin");
-  note(configuration.rotation != given.rotation, "rotation " + configuration.rotation);
   return fmt::format("{}", fmt::join(found, ", "));
 }
 
@@ -34,7 +33,6 @@ json to_json(const Trial& trial, const Configuration& given) {
   return {{"substeps", scene.step.substeps},
           {"iterations", scene.step.iterations},
           {"acceleration", name_of(scene.step.acceleration)},
-          {"rotation", trial.configuration.rotation.empty() ? json(nullptr) : json(trial.configuration.rotation)},
           {"differences", differences(trial.configuration, given)},
           {"outcome", name_of(trial.outcome)},
           {"why", trial.why},

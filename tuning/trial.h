@@ -13,7 +13,6 @@ namespace cutproof::tuning {
 
 struct Configuration {
   Scene scene;
-  std::string rotation;  // kernels: how rotations are found; empty: the backend's default
   friend bool operator==(const Configuration&, const Configuration&) = default;
 };
 // What differs from `given` apart from substeps, iterations and acceleration, as a person would write it; empty:

@@ -24,16 +24,9 @@ using nlohmann::json;
 // The reference solution is refined until this part of the tolerance is left for what is not known of it, if it can be.
 constexpr double kUnknownShare = 0.25;
 
-// Methods that fail on no hard case (accuracy.md, Rotations). Another might be within the tolerance on this scene and
-// fail on the next cut.
-const std::vector<std::string>& sound_rotations() {
-  static const std::vector<std::string> names = {"newton", "jacobi4", "svd"};
-  return names;
-}
-
 // Whatever is wrong with the choice of a backend, or with the scene, is found out here.
 Measuring prepare(const TuneOptions& options) {
-  Measuring measuring{options, {io::read_scene(options.scene, options.changes), ""}};
+  Measuring measuring{options, {io::read_scene(options.scene, options.changes)}};
   const Scene& scene = measuring.given.scene;
   if (scene.step.solver != Solver::implicit) {
     throw InputError(options.scene, "step.solver",
@@ -44,7 +37,7 @@ Measuring prepare(const TuneOptions& options) {
   if (!std::isfinite(options.tolerance)) {
     throw InputError("command line", "--tolerance", "it is not a number", "give a length in h, such as 0.05");
   }
-  const harness::BackendDescriptor& backend = benchmarks::require_timed_backend(options.backend.name);
+  benchmarks::require_timed_backend(options.backend.name);
   static_cast<void>(harness::make_backend(options.backend));
   const benchmarks::PreparedScene prepared(scene, options.scene, options.frames);
   if (prepared.frame_count() == 0) {
@@ -52,7 +45,6 @@ Measuring prepare(const TuneOptions& options) {
                      "give a number of frames, a blade, or a grip that ends");
   }
   measuring.built = prepared.report();
-  if (backend.takes_kernel_options) measuring.given.rotation = harness::rotation_of(options.backend);
   return measuring;
 }
 
@@ -67,11 +59,6 @@ SearchSpace space_of(const Measuring& measuring, const TuneOptions& options, con
   const int32_t given = scene.step.substeps;
   space.substeps = searched_substeps(given);
   space.most_iterations = std::max(64, scene.step.iterations);
-  if (harness::described_backend(options.backend.name).takes_kernel_options) {
-    for (const std::string& rotation : sound_rotations()) {
-      if (rotation != measuring.given.rotation) space.rotations.push_back(rotation);
-    }
-  }
   space.nothing_removed = reference.nothing_removed();
   if (options.full) {
     space.followed_to = std::max(kFrontTolerances.back() - reference.known_to_h(), kFrontTolerances.back() / 2);

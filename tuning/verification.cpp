@@ -17,7 +17,7 @@ JudgedRun judged_run(const Measuring& measuring, const Configuration& configurat
   run.configuration = configuration;
   run.text = tuned_scene_text(configuration, measuring.asked.scene, path);
   const Scene scene = io::parse_scene(run.text, path);
-  const std::unique_ptr<Backend> backend = measuring.backend_for(configuration);
+  const std::unique_ptr<Backend> backend = measuring.make_backend();
   const benchmarks::PreparedScene prepared(scene, path, measuring.asked.frames);
   run.setup = prepared.setup();
   harness::FrameRunner runner(*backend, {prepared.setup()}, {prepared.start()});

@@ -65,7 +65,6 @@ json run_cut(const Contender& contender, std::optional<double> tau, int64_t part
           {"particles", setup.body.particle_count()},
           {"backend", contender.described->name},
           {"precision", name_of(contender.described->precision)},
-          {"split", contender.split},
           {"scene_frame", scene_frame},
           {"clusters", clusters},
           {"growth", growth},
@@ -87,20 +86,18 @@ json run_clusters(const ClustersOptions& options, const Progress& progress) {
   taus.emplace_back();
   const bool full = options.full || harness::described_backend(options.backend).takes_full_size;
   const int64_t particles = options.particles.value_or(full ? kPaperParticles : kFewParticles);
-  const std::vector<Contender> contenders = make_contenders(options.backend, options.split, "");
+  const Contender contender = make_contender(options.backend);
   Report report("clusters", options.backend,
                 {{"scene", kScene},
                  {"paper", {{"growth", kPaperGrowth}}},
                  {"wanted_growth", kWantedGrowth},
-                 {"rows_at_most", contenders.size() * taus.size()},
+                 {"rows_at_most", taus.size()},
                  {"holds", true}},
                 progress);
-  for (const Contender& contender : contenders) {
-    for (const std::optional<double>& tau : taus) {
-      json row = run_cut(contender, tau, particles);
-      const bool holds = row.at("error").at("failed").empty();
-      report.add(std::move(row), holds);
-    }
+  for (const std::optional<double>& tau : taus) {
+    json row = run_cut(contender, tau, particles);
+    const bool holds = row.at("error").at("failed").empty();
+    report.add(std::move(row), holds);
   }
   return report.complete();
 }

@@ -201,8 +201,6 @@ json row_of(const Asked& asked, const Contender& contender, const Variant& given
               {"precision", name_of(contender.described->precision)},
               {"substeps", asked.scene.step.substeps},
               {"iterations", asked.scene.step.iterations},
-              {"rotation", contender.rotation},
-              {"split", contender.split},
               {"frames", given.scene->frame_count()},
               {"without", variant.part.empty() ? json(nullptr) : json(variant.part)},
               {"refused", variant.refused},
@@ -222,14 +220,14 @@ json row_of(const Asked& asked, const Contender& contender, const Variant& given
 }  // namespace
 
 json run_parts(const PartsOptions& options, const Progress& progress) {
-  require_timed_backend(options.backend);
-  const std::vector<Contender> contenders = make_contenders(options.backend, options.split, options.rotation);
+  const Contender contender = make_contender(options.backend);
+  Backend& backend = *contender.instance;
   // Whatever is wrong with a scene is found out before anything is measured.
   std::vector<Asked> scenes;
   std::size_t rows = 0;
   for (const std::string& file : options.scenes) {
     scenes.push_back(asked_of(file, options.frames));
-    rows += (scenes.back().parts.size() + 1) * contenders.size();
+    rows += scenes.back().parts.size() + 1;
   }
   Report report("parts", options.backend,
                 {{"frames", options.frames ? json(*options.frames) : json(nullptr)},
@@ -238,22 +236,19 @@ json run_parts(const PartsOptions& options, const Progress& progress) {
                  {"holds", true}},
                 progress);
   for (const Asked& asked : scenes) {
-    for (const Contender& contender : contenders) {
-      Backend& backend = *contender.instance;
-      std::vector<Variant> variants = look_at_all(backend, asked, options);
-      const Variant& given = variants.front();
-      const std::vector<std::vector<double>> steps = time_in_turns(backend, variants, options);
-      const FrameErrors judged = judge_midway(backend, *given.scene);
-      for (const Variant& variant : variants) {
-        json row = row_of(asked, contender, given, variant);
-        if (&variant == &given) {
-          row["judged"] = {{"frames", judged.frames},
-                           {"topology_holds", judged.topology_holds()},
-                           {"step_max_h", judged.step ? json_number(judged.step->position.max) : json(nullptr)}};
-          row["per_resolved"] = cost_of_resolved(given.looked.work, steps);
-        }
-        report.add(std::move(row), &variant != &given || judged.topology_holds());
+    std::vector<Variant> variants = look_at_all(backend, asked, options);
+    const Variant& given = variants.front();
+    const std::vector<std::vector<double>> steps = time_in_turns(backend, variants, options);
+    const FrameErrors judged = judge_midway(backend, *given.scene);
+    for (const Variant& variant : variants) {
+      json row = row_of(asked, contender, given, variant);
+      if (&variant == &given) {
+        row["judged"] = {{"frames", judged.frames},
+                         {"topology_holds", judged.topology_holds()},
+                         {"step_max_h", judged.step ? json_number(judged.step->position.max) : json(nullptr)}};
+        row["per_resolved"] = cost_of_resolved(given.looked.work, steps);
       }
+      report.add(std::move(row), &variant != &given || judged.topology_holds());
     }
   }
   return report.complete();

@@ -17,8 +17,7 @@ nlohmann::json run_rotations(const RotationsOptions& options, const Progress& pr
                  {"methods", nlohmann::json::array()},
                  {"machine_limits", {{"copy_bytes_per_second", copied}}}},
                 progress);
-  report.document.update(
-      to_json(measure_rotations(rotation_methods(backend), counts, harness::default_rotation(), copied, step)));
+  report.document.update(to_json(measure_rotations(rotation_methods(backend), counts, copied, step)));
   return report.complete();
 }
 

@@ -54,8 +54,6 @@ json scene_json(const BenchScene& scene, const Contender& contender, const Measu
   json entry = {{"scene", scene.name},
                 {"cooking", name_of(scene.cooking)},
                 {"backend", contender.described->name},
-                {"rotation", contender.rotation},
-                {"split", contender.split},
                 {"body",
                  {{"name", setup.body.name},
                   {"particles", setup.body.particle_count()},
@@ -84,10 +82,8 @@ json scene_json(const BenchScene& scene, const Contender& contender, const Measu
 // What the stages of a backend that runs the kernels take at best, under the name of each.
 std::map<std::string, StageLimit> limits_of(const BenchScene& scene, const Contender& contender) {
   std::map<std::string, StageLimit> limits;
-  if (!contender.described->takes_kernel_options) return limits;
-  const StageLimits found =
-      stage_limits(scene.setup, scene.state,
-                   contender.split == "global" ? gpu::SplitMethod::global_labels : gpu::SplitMethod::blocks);
+  if (!contender.described->runs_kernels) return limits;
+  const StageLimits found = stage_limits(scene.setup, scene.state);
   for (const Stage stage : kStages) limits.emplace(name_of(stage), found[static_cast<std::size_t>(stage)]);
   return limits;
 }
@@ -123,9 +119,9 @@ void add_rows(const BenchScene& scene, const Contender& contender, const Measure
 json run_stages(const StagesOptions& options, const Progress& progress) {
   const int64_t frames = options.frames_or_default();
   const auto scenes = scenes_of(options, frames);
-  const auto contenders = [&] { return make_contenders(options.backend, options.split, options.rotation); };
   // What cannot be made or asked for is refused before anything is measured.
-  const std::size_t rows = scenes.size() * contenders().size() * steps_of(options, {}).size();
+  static_cast<void>(make_contender(options.backend));
+  const std::size_t rows = scenes.size() * steps_of(options, {}).size();
   static_cast<void>(detection_of(options, {}));
   const MachineLimits machine = measure_machine(options.described());
   json fields = {
@@ -142,22 +138,21 @@ json run_stages(const StagesOptions& options, const Progress& progress) {
     scene.setup.detect = detection_of(options, scene.setup.detect);
     for (const StepParameters& asked : steps_of(options, scene.setup.step)) {
       scene.setup.step = asked;
-      for (const Contender& contender : contenders()) {
-        const auto entry_of = [&](const Measured& measured) {
-          json entry = scene_json(scene, contender, measured);
-          entry["frames"] = frames;
-          entry["repeats"] = options.repeats;
-          return entry;
-        };
-        const Measured measured = measure(contender, scene, frames, options.repeats, [&](const Measured& times) {
-          json so_far = report.document;
-          add_rows(scene, contender, times, machine, so_far, "not judged yet");
-          so_far["scenes"].push_back(entry_of(times));
-          report.show_timed(std::move(so_far));
-        });
-        add_rows(scene, contender, measured, machine, report.document);
-        report.add(entry_of(measured), measured.holds());
-      }
+      const Contender contender = make_contender(options.backend);
+      const auto entry_of = [&](const Measured& measured) {
+        json entry = scene_json(scene, contender, measured);
+        entry["frames"] = frames;
+        entry["repeats"] = options.repeats;
+        return entry;
+      };
+      const Measured measured = measure(contender, scene, frames, options.repeats, [&](const Measured& times) {
+        json so_far = report.document;
+        add_rows(scene, contender, times, machine, so_far, "not judged yet");
+        so_far["scenes"].push_back(entry_of(times));
+        report.show_timed(std::move(so_far));
+      });
+      add_rows(scene, contender, measured, machine, report.document);
+      report.add(entry_of(measured), measured.holds());
     }
   }
   return report.complete();

@@ -31,7 +31,7 @@ nlohmann::json run_sampling(const SamplingOptions& options, const Progress& prog
 
 // Fig. 10 of the paper, how the number of clusters changes while a kidney is cut through.
 struct ClustersOptions {
-  std::string backend = harness::kReferenceName, split;
+  std::string backend = harness::kReferenceName;
   std::vector<double> taus = {0.25, 0.5, 0.75};  // each a curve, and one without merging
   std::optional<int64_t> particles;
   bool full = false;  // the paper's count of particles
@@ -104,8 +104,7 @@ struct PartsOptions {
   std::vector<std::string> scenes;  // their files
   std::optional<int64_t> frames;    // of each scene at most
   int64_t repeats = 3;
-  std::string split, rotation;  // empty: the kernels' default
-  StopAsked stop_asked = {};    // ends it between two frames
+  StopAsked stop_asked = {};  // ends it between two frames
 };
 nlohmann::json run_parts(const PartsOptions& options, const Progress& progress);
 

@@ -50,7 +50,7 @@ void print_curves(const std::vector<json>& curves) {
 void print_row(const json& document) {
   const json& curve = document.at("rows").back();
   say("{}, ", name_of(curve));
-  say_filled("split {split}: {particles} particles, ", curve);
+  say_filled("{particles} particles, ", curve);
   say("{} to {} clusters\n", curve.at("clusters").front().dump(), curve.at("clusters").back().dump());
   for (const json& verdict : curve.at("error").at("failed")) {
     insist_text(io::filled("  FAILS in frame {frame}: {property}: {witness/text}\n", verdict));
@@ -82,9 +82,6 @@ void add_clusters(CLI::App& bench, Work& work) {
   add_list(*command, "--tau", options->taus, "below which multiple of the median size a cluster is small", "T");
   add_count(*command, "--particles", options->particles, "of the kidney", whole_number(500, 100'000'000));
   command->add_flag("--full", options->full, "37,704 particles, as always on a device");
-  command->add_option("--split", options->split, "kernels: how clusters are split, blocks, global or both")
-      ->type_name("M")
-      ->check(one_of({"blocks", "global", "both"}));
   add_suite(*command, work, "write curves, times and errors",
             {.run = [options](const auto& progress) { return run_clusters(*options, progress); },
              .row = print_row,

@@ -110,12 +110,6 @@ void add_parts(CLI::App& bench, Work& work) {
   add_count(*command, "--frames", options->frames, "of each scene at most", whole_number(1, 10'000));
   add_count(*command, "--repeats", options->repeats, "timed runs, in turns with those without each part",
             whole_number(1, 1'000));
-  command->add_option("--split", options->split, "kernels: how clusters are split, blocks, global or both")
-      ->type_name("M")
-      ->check(one_of({"blocks", "global", "both"}));
-  command->add_option("--rotation", options->rotation, "kernels: how rotations are found")
-      ->type_name("M")
-      ->check(one_of(harness::rotation_names()));
   add_suite(*command, work, "write times, errors and stages",
             {.run =
                  [options](const auto& progress) {

@@ -50,7 +50,7 @@ void print_last_scene(const json& document) {
   if (!scene.at("bytes").is_null()) say("; {:.0f} bytes a particle", scene.at("bytes").get<double>() / particles);
   say("\n");
   say_filled("{backend}, {precision} precision, {substeps} substeps × {iterations} iterations, ", rows.front());
-  say_filled("acceleration {acceleration}, rotation {rotation}, split {split}, remove {remove}\n", rows.front());
+  say_filled("acceleration {acceleration}, remove {remove}\n", rows.front());
   const bool limits = std::any_of(rows.begin(), rows.end(), [](const json& row) { return !row.at("limit").is_null(); });
   std::vector<std::string> head = {"", "median ms", "least ms", "most ms"};
   if (limits) head.insert(head.end(), {"MB", "phases", "limit ms", "×"});
@@ -99,7 +99,6 @@ void print_table_1(const json& document) {
     }
     std::vector<std::string> column = {any.at("scene"), any.at("cooking"), io::filled("{particles}", body),
                                        io::filled("{clusters}", body)};
-    if (any.at("split") == "global") column[1] += ", global";
     for (const std::string& what : whats) column.push_back(ours.at(what));
     add_column(column);
     if (k + 1 < scenes.size() && scenes[k + 1].front().at("scene") == any.at("scene")) continue;

@@ -77,7 +77,6 @@ void expect_complete(const json& document, const std::set<std::pair<std::string,
       ++defaults;
       EXPECT_EQ(method.at("wrong"), 0) << method;
       EXPECT_EQ(method.at("precision"), "single");
-      EXPECT_TRUE(method.at("selectable"));
       EXPECT_LE(method.at("worst_gap"), 1e-6);
       EXPECT_LE(method.at("worst_orthogonality"), 5e-6);
     }
@@ -180,7 +179,7 @@ RotationReport report_of_spoiled(Spoil spoil) {
     spoil(timed.answers, a);
     return timed;
   };
-  return cutproof::benchmarks::measure_rotations({spoiled}, kFew, "newton", 1e9);
+  return cutproof::benchmarks::measure_rotations({spoiled}, kFew, 1e9);
 }
 
 TEST(MeasureRotations, CountsEveryReflectionOfABrokenDefault) {
@@ -222,7 +221,7 @@ TEST(MeasureRotations, CountsWhatIsNoNumber) {
 
 TEST(MeasureRotations, DoesNotHoldWithoutADefault) {
   const RotationReport report =
-      cutproof::benchmarks::measure_rotations({method_named("svd", Precision::binary32)}, kFew, "newton", 1e9);
+      cutproof::benchmarks::measure_rotations({method_named("svd", Precision::binary32)}, kFew, 1e9);
   EXPECT_EQ(report.results.front().all.wrong, 0);
   EXPECT_FALSE(report.default_holds());
 }
@@ -236,7 +235,7 @@ TEST(MeasureRotations, CanBeStoppedBeforeEachMethod) {
     begun.push_back(cases_begun);
     if (begun.size() == 3) throw cutproof::Stopped();
   };
-  EXPECT_THROW(cutproof::benchmarks::measure_rotations(methods, kFew, "newton", 1e9, stop_at_third), cutproof::Stopped);
+  EXPECT_THROW(cutproof::benchmarks::measure_rotations(methods, kFew, 1e9, stop_at_third), cutproof::Stopped);
   EXPECT_EQ(begun, (std::vector<int64_t>{1, 1, 2}));
 }
 
@@ -261,18 +260,15 @@ TEST(RotationFront, HoldsWhatNoOtherMethodBeats) {
   EXPECT_TRUE(results[0].on_front && results[1].on_front && results[2].on_front && results[5].on_front);
 }
 
-TEST(RotationMethods, OfKernelsAreAllSelectableAndTheOthersAreNot) {
-  std::set<std::string> selectable;
+TEST(RotationMethods, HaveOneDefaultAndReadAndWriteWhatTheySay) {
+  int defaults = 0;
   for (const RotationMethod& method :
        cutproof::benchmarks::rotation_methods(cutproof::harness::described_backend("host"))) {
-    if (method.selectable) {
-      EXPECT_EQ(method.precision, Precision::binary32) << method.name;
-      selectable.insert(method.name);
-    }
+    defaults += method.is_default;
+    EXPECT_EQ(method.is_default, method.name == "newton" && method.precision == Precision::binary32) << method.name;
     EXPECT_EQ(method.bytes, method.precision == Precision::binary32 ? 109 : 217);
   }
-  const auto& names = cutproof::harness::rotation_names();
-  EXPECT_EQ(selectable, std::set<std::string>(names.begin(), names.end()));
+  EXPECT_EQ(defaults, 1);
 }
 
 }  // namespace

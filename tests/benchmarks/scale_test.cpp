@@ -108,7 +108,6 @@ TEST(BytesInUse, CountWhatIsAllocated) {
 
 TEST_F(BenchScale, RefusesBadUsage) {
   expect_refused("bench scale --sizes 5", {"--sizes"});
-  expect_refused("bench scale --split blocks", {"--split"});
   expect_refused("bench scale --acceleration swift", {"--acceleration", "swift", "none and chebyshev"});
   expect_refused("bench scale --iterations 0", {"--iterations"});
   expect_refused("bench scale --remove none", {"--remove", "none", "both, one"});

@@ -64,7 +64,7 @@ TEST(Limits, CountTheBytesOfABlock) {
   const auto scene = cutproof::benchmarks::make_bench_scene(1000, 1);
   ASSERT_EQ(scene.setup.body.particle_count(), 20 * 10 * 5);
   ASSERT_EQ(scene.setup.body.particle_at.size(), 22U * 12 * 7);
-  const auto limits = cutproof::benchmarks::stage_limits(scene.setup, scene.state, cutproof::gpu::SplitMethod::blocks);
+  const auto limits = cutproof::benchmarks::stage_limits(scene.setup, scene.state);
   const auto bytes = [&](Stage stage) { return limits[static_cast<std::size_t>(stage)].bytes; };
   EXPECT_EQ(bytes(Stage::detect), 26 * 1000 + 4 * 1848);
   const double vertices = 2 * (20 * 10 + 10 * 5 + 5 * 20), owners = 20 * 10 * 5 - 18 * 8 * 3;
@@ -111,23 +111,20 @@ class Bench : public Program {
 
 // Every row that stages.cpp owes, each with an error where it ran.
 void expect_rows(const json& document, const std::string& backend, const std::string& precision,
-                 const std::set<std::string>& scenes, const std::set<std::string>& splits) {
+                 const std::set<std::string>& scenes) {
   const std::set<std::string> wanted = {"frame", "frame, cutting", "step",   "detect",
                                         "split", "merge",          "expand", "skin"};
-  std::set<std::array<std::string, 3>> seen, expected;
+  std::set<std::array<std::string, 2>> seen, expected;
   for (const std::string& scene : scenes) {
-    for (const std::string& split : splits) {
-      for (const std::string& what : wanted) expected.insert({scene, split, what});
-    }
+    for (const std::string& what : wanted) expected.insert({scene, what});
   }
   for (const json& row : document.at("rows")) {
     const auto text = [&](const char* field) { return row.at(field).get<std::string>(); };
-    seen.insert(std::array<std::string, 3>{text("scene"), text("split"), text("what")});
+    seen.insert(std::array<std::string, 2>{text("scene"), text("what")});
     EXPECT_EQ(row.at("backend"), backend);
     EXPECT_EQ(row.at("precision"), precision);
     EXPECT_EQ(row.at("substeps"), 4);
     EXPECT_EQ(row.at("iterations"), 4);
-    EXPECT_FALSE(row.at("rotation").get<std::string>().empty());
     EXPECT_EQ(row.at("of"), 3);
     if (row.at("what") == "expand") {  // clusters that cover every edge never need it
       EXPECT_EQ(row.at("frames"), 0);
@@ -141,7 +138,7 @@ void expect_rows(const json& document, const std::string& backend, const std::st
   }
   EXPECT_EQ(seen, expected);
   EXPECT_EQ(document.at("rows").size(), expected.size());
-  ASSERT_EQ(document.at("scenes").size(), scenes.size() * splits.size());
+  ASSERT_EQ(document.at("scenes").size(), scenes.size());
   for (const json& scene : document.at("scenes")) {
     EXPECT_EQ(scene.at("topology").size(), 5U);
     for (const json& verdict : scene.at("topology")) EXPECT_TRUE(verdict.at("holds")) << verdict;
@@ -159,7 +156,7 @@ TEST_F(Bench, TellsEveryTimeOfTheReferenceWithItsError) {
       bench("stages --sizes 1000,3000 --frames 3 --repeats 1 --json out.json", "CUTPROOF_COMMIT=0123456789ab-dirty");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
   const json document = result("out.json");
-  expect_rows(document, "reference", "double", {"box_1000", "kidney_3000"}, {"search"});
+  expect_rows(document, "reference", "double", {"box_1000", "kidney_3000"});
   EXPECT_EQ(document.at("commit"), "0123456789ab-dirty");
   for (const json& row : document.at("rows")) {
     if (row.at("what") != "step") continue;
@@ -171,12 +168,11 @@ TEST_F(Bench, TellsEveryTimeOfTheReferenceWithItsError) {
   }
 }
 
-TEST_F(Bench, TellsBothWaysOfSplittingOnTheHost) {
-  const Outcome outcome =
-      bench("stages --backend host --sizes 1000 --frames 3 --repeats 1 --split both --json out.json");
+TEST_F(Bench, TellsWhatRoundsOnTheHost) {
+  const Outcome outcome = bench("stages --backend host --sizes 1000 --frames 3 --repeats 1 --json out.json");
   ASSERT_EQ(outcome.status, 0) << outcome.output;
   const json document = result("out.json");
-  expect_rows(document, "host", "single", {"box_1000"}, {"blocks", "global"});
+  expect_rows(document, "host", "single", {"box_1000"});
   EXPECT_FALSE(document.contains("commit"));
   for (const json& row : document.at("rows")) {
     if (row.at("what") != "step") continue;
@@ -311,9 +307,6 @@ TEST_F(Bench, RefusesBadUsage) {
       {"stages --clusters spheres", "spheres"},
       {"stages --sizes 1000 --clusters boxes,spheres", "spheres"},
       {"stages --scenes cuboid --frames 1000", "--frames"},
-      {"stages --backend host --split halves", "halves"},
-      {"stages --backend host --rotation guess", "guess"},
-      {"stages --split blocks", "--split"},
       {"stages --sizes 1000 --json nowhere/out.json", "nowhere"},
       {"stages --sizes 200000000000", "--sizes"},
   };

@@ -120,8 +120,6 @@ TEST_F(Fuzz, PutsShardsTogetherToTheWhole) {
                                                                               {"cutproof", "0.0.1"},
                                                                               {"commit", "0123abcd"},
                                                                               {"backend", "host"},
-                                                                              {"split", "global"},
-                                                                              {"rotation", "svd_of_another"},
                                                                               {"schedule_seed", 4},
                                                                               {"sizes", json{0, 41}},
                                                                               {"dynamics", true},
@@ -244,7 +242,6 @@ TEST_F(Fuzz, RefusesBadUsage) {
   write("file", "");
   expect_refused("fuzz --save file/nowhere", {"--save", "file/nowhere"});
   expect_refused("fuzz --json nowhere/f.json", {"nowhere"});
-  expect_refused("fuzz --backend reference --split global", {"--split"});
   expect_refused("fuzz --backend simulated --schedule-seed x", {"--schedule-seed"});
 }
 

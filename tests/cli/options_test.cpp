@@ -73,8 +73,6 @@ TEST_F(Options, SayWhatWasMeant) {
            {"bench solver --sampels 3", {"did you mean '--samples'?", "cutproof bench solver --help"}},
            {"bench solvr", {"solvr", "did you mean 'solver'?"}},
            {"fuzz --backend hots", {"hots", "did you mean 'host'?", "cutproof info"}},
-           {"fuzz --rotation newtn", {"newtn", "did you mean 'newton'?", "jacobi4"}},
-           {"fuzz --split block", {"did you mean 'blocks'?"}},
            {"fuzz --backend simulated --schedule randm", {"did you mean 'random'?"}},
            {"run s.json --check moton", {"did you mean 'motion'?"}},
            {"run s.json --mesh m.stl --unit inch", {"inch", "mm, cm, m"}},
@@ -224,7 +222,7 @@ TEST_F(Options, DoNotBlameASceneForAMesh) {
 // What a remedy says that `cutproof info` lists.
 TEST_F(Options, AreListedByInfo) {
   const std::string info = cutproof("info").output;
-  for (const char* word : {"reference", "host-blocks", "plugin:FILE.so", "newton", "round_robin", "topology", "motion",
+  for (const char* word : {"reference", "host-blocks", "plugin:FILE.so", "round_robin", "topology", "motion",
                            "conservation", "rotations, components", "connected", "version 5"}) {
     EXPECT_NE(info.find(word), std::string::npos) << "no '" << word << "' in:\n" << info;
   }
@@ -251,7 +249,7 @@ TEST_F(Options, AreOfferedByBash) {
                                                         {"cutproof run --fr", "--frames"},
                                                         {"cutproof run --backend host-", "host-blocks"},
                                                         {"cutproof run --backend = sim", "simulated"},
-                                                        {"cutproof fuzz --rotation n", "newton"},
+                                                        {"cutproof fuzz --schedule f", "forward"},
                                                         {"cutproof bench so", "solver"},
                                                         {"cutproof bench solver --st", "--stiffness"},
                                                         {"cutproof tune x.json --reference ''", "limit substeps"},

@@ -1016,8 +1016,7 @@ property_tests::Campaign dissected(const std::string& backend, int64_t cases, bo
   options.cases = cases;
   options.batch = 16;
   options.dynamics = dynamics;
-  const property_tests::BackendSource source{
-      [&](int64_t) { return harness::make_backend({.name = backend, .split = {}, .rotation = {}}); }, false};
+  const property_tests::BackendSource source{[&](int64_t) { return harness::make_backend({.name = backend}); }, false};
   return property_tests::run_campaign(options, source, {});
 }
 
@@ -1038,7 +1037,7 @@ TEST(PluginBackend, IsFoundAndSimplifiedWhereOneStageIsWrong) {
     const property_tests::Campaign campaign = dissected(backend, 1000, dynamics);
     ASSERT_EQ(campaign.violations.size(), 1u);
     const property_tests::Simplified simplified =
-        property_tests::simplify(campaign.violations.front(), {.name = backend, .split = {}, .rotation = {}}, 30);
+        property_tests::simplify(campaign.violations.front(), {.name = backend}, 30);
     EXPECT_TRUE(simplified.alone);
     EXPECT_LE(simplified.counterexample.failing.strokes.size(), 3u);
     EXPECT_LE(simplified.counterexample.failing.nodes.size(), 30u);

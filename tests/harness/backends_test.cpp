@@ -59,24 +59,6 @@ TEST(Backends, HaveNamesOfTheirOwnAndOneReference) {
   EXPECT_EQ(find_backend("nobody"), nullptr);
 }
 
-TEST(Backends, TakeKernelOptionsIfTheyRunTheKernels) {
-  for (const BackendDescriptor* const described : backends_of_this_machine()) {
-    BackendChoice choice = choice_of(*described);
-    choice.split = "global";
-    choice.rotation = "svd";
-    if (described->takes_kernel_options) {
-      EXPECT_NO_THROW(make_backend(choice)) << described->name;
-      EXPECT_EQ(rotation_of(choice), "svd");
-      EXPECT_EQ(split_of(choice), "global");
-      EXPECT_EQ(rotation_of(choice_of(*described)), default_rotation());
-    } else {
-      EXPECT_THROW(make_backend(choice), cutproof::InputError) << described->name;
-      EXPECT_FALSE(rotation_of(choice).empty());
-      EXPECT_FALSE(split_of(choice).empty());
-    }
-  }
-}
-
 // Loads beside each other: no two share threads, and each has a schedule of its own.
 TEST(Backends, AreMadeForLoadsBesideEachOther) {
   for (const BackendDescriptor& backend : backends()) {

@@ -247,8 +247,7 @@ TEST(BareGraph, IsRefusedByKernels) {
   const Cloud right = cloud(random);
   for (const harness::BackendDescriptor& described : harness::backends()) {
     if (!described.is_built() || described.needs_device()) continue;
-    const std::unique_ptr<Backend> backend =
-        harness::make_backend({.name = std::string(described.name), .split = {}, .rotation = {}});
+    const std::unique_ptr<Backend> backend = harness::make_backend({.name = std::string(described.name)});
     if (described.is_the_reference) {
       EXPECT_NO_THROW(backend->load({right.setup}, {right.state}));
     } else {

@@ -235,7 +235,6 @@ TEST(ACounterexample, ComesBackFromItsFile) {
   Counterexample found;
   found.failing = draw_moving_case(5, 30);
   found.backend = "simulated";
-  found.split = "global";
   found.schedule = {0, 0, 3, 0, 1};
   found.found = "'coverage' fails";
   found.seed = 12;

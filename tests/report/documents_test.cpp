@@ -121,7 +121,6 @@ json trial(int iterations, double rms, std::optional<double> ms, const std::stri
   return {{"substeps", 2},
           {"iterations", iterations},
           {"acceleration", "none"},
-          {"rotation", nullptr},
           {"differences", ""},
           {"outcome", outcome},
           {"why", ""},

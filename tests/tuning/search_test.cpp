@@ -286,7 +286,7 @@ TEST(Search, DropsStagesThatNobodyNeeds) {
     double seconds = trial.frame.median;
     seconds += 6.0 * scene.skin.wanted;
     seconds += 6.0 * (scene.detect.criterion != Criterion::none) + 120.0 / scene.clusters.side;
-    seconds += (configuration.rotation == "quick" ? 0.0 : 6.0) + (scene.split.debris == 8 ? 0.0 : 6.0);
+    seconds += scene.split.debris == 8 ? 0.0 : 6.0;
     trial.frame = {seconds, seconds, seconds, 1};
     if (scene.clusters.side > 6) {
       trial.outcome = Outcome::over;
@@ -309,9 +309,8 @@ TEST(Search, DropsStagesThatNobodyNeeds) {
   space.may_resize = true;
   space.may_drop_skin = true;
   space.nothing_removed = true;
-  space.rotations = {"slow", "quick"};
   found = cheapest();
-  EXPECT_EQ(differences(found, start), "clusters.side 6, no detection, debris 8, no skin, rotation quick");
+  EXPECT_EQ(differences(found, start), "clusters.side 6, no detection, debris 8, no skin");
 
   EXPECT_EQ(found.scene.detect.remove, RemovedEnds::both) << "of no criterion, or the scene could not be read";
 

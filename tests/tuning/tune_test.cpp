@@ -94,7 +94,6 @@ TEST_F(Tune, WritesACheaperSceneWithinTheTolerance) {
     EXPECT_EQ(trials.at(0).at("substeps"), 4);
     EXPECT_EQ(trials.at(0).at("iterations"), kIterations);
     EXPECT_EQ(trials.at(0).at("outcome"), "within");
-    EXPECT_EQ(trials.at(0).at("rotation").is_null(), backend == "reference");
     // What it has tried and found wanting is written too.
     EXPECT_TRUE(std::any_of(trials.begin(), trials.end(), [](const json& t) { return t.at("outcome") == "over"; }));
     EXPECT_EQ(found.at("verified").at("outcome"), "within");
@@ -317,7 +316,6 @@ TEST_F(Tune, RefusesWhatItCannotTune) {
   refused("scene.json --tolerance nan", "--tolerance");
   refused("scene.json --tolerance 1 --reference best", "--reference");
   refused("scene.json --tolerance 1 --backend simulated", "--backend");
-  refused("scene.json --tolerance 1 --rotation svd", "--rotation");
   refused("scene.json --tolerance 1 --write scene.json", "--write");
   refused("scene.json --tolerance 1 --json scene.json", "--json");
   refused("scene.json --tolerance 1 --json found.json --write found.json", "--json");
