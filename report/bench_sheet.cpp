@@ -631,60 +631,6 @@ void baselines_pieces(Sheet& sheet, const Field& document) {
   sheet.pieces.emplace_back(std::move(grid));
 }
 
-// --- factors
-
-void factors_pieces(Sheet& sheet, const Field& document) {
-  std::map<std::string, Chart> charts;
-  std::vector<std::string> cuts;
-  Grid grid;
-  grid.title = "Every row";
-  grid.words = "Ways of bringing the factor of the system up to date after a cut.";
-  grid.columns = {{"scene"},
-                  {"cut"},
-                  {"way"},
-                  {"particles", true},
-                  {"rows of the system", true},
-                  {"changed", true},
-                  {"median [ms]", true},
-                  {"a solve [ms]", true},
-                  {"entries of the factor", true},
-                  {"residual", true},
-                  {"its bound", true}};
-  grid.filter = 1;
-  document["scenes"].each([&](const Field& scene) {
-    const std::string name = scene["scene"].text();
-    const int64_t particles = scene["particles"].count();
-    scene["rows"].each([&](const Field& row) {
-      const std::string cut = row["cut"].text(), way = row["way"].text();
-      const std::optional<double> residual = row["residual"].number_or_null(),
-                                  bound = row["residual_bound"].number_or_null();
-      const bool holds = residual && bound && *residual <= *bound;
-      if (!holds) sheet.holds = false;
-      if (std::find(cuts.begin(), cuts.end(), cut) == cuts.end()) cuts.push_back(cut);
-      Chart& chart =
-          charts
-              .try_emplace(cut, over_particles("The factor after " + cut,
-                                               "Time to bring the factor up to date, by number of particles, "
-                                               "both axes logarithmic."))
-              .first->second;
-      curve_named(chart, way, Look::joined)
-          .dots.push_back({static_cast<double>(particles), in_ms(row["seconds"]),
-                           fmt::format("{}, {}: {} of {} rows changed", way, name, whole(row["changed_rows"].count()),
-                                       whole(row["rows"].count()))});
-      grid.rows.push_back({{name, cut, way, whole(particles), whole(row["rows"].count()),
-                            whole(row["changed_rows"].count()), ms_text(row["seconds"]), ms_text(row["solve_seconds"]),
-                            whole(row["entries"].count()), figure_text(residual), figure_text(bound)},
-                           holds ? "" : "bad"});
-    });
-  });
-  for (const std::string& cut : cuts) {
-    sort_by_x(charts[cut]);
-    sheet.pieces.emplace_back(std::move(charts[cut]));
-  }
-  sheet.summary = "What it costs to bring a sparse factor up to date after a cut.";
-  sheet.pieces.emplace_back(std::move(grid));
-}
-
 // --- sensitivity
 
 void sensitivity_pieces(Sheet& sheet, const Field& document) {
@@ -877,17 +823,12 @@ struct Suite {
   const char *name, *rows;
   void (*add)(Sheet& sheet, const Field& document);
 };
-constexpr Suite kSuites[] = {{"stages", "rows", stages_pieces},
-                             {"sampling", "rows", sampling_pieces},
-                             {"clusters", "rows", clusters_pieces},
-                             {"scale", "rows", scale_pieces},
-                             {"rotations", "methods", rotations_pieces},
-                             {"machine_limits", "rows", machine_limits_pieces},
-                             {"solver", "scenes", solver_pieces},
-                             {"baselines", "rows", baselines_pieces},
-                             {"factors", "scenes", factors_pieces},
-                             {"sensitivity", "rows", sensitivity_pieces},
-                             {"parts", "rows", parts_pieces}};
+constexpr Suite kSuites[] = {
+    {"stages", "rows", stages_pieces},           {"sampling", "rows", sampling_pieces},
+    {"clusters", "rows", clusters_pieces},       {"scale", "rows", scale_pieces},
+    {"rotations", "methods", rotations_pieces},  {"machine_limits", "rows", machine_limits_pieces},
+    {"solver", "scenes", solver_pieces},         {"baselines", "rows", baselines_pieces},
+    {"sensitivity", "rows", sensitivity_pieces}, {"parts", "rows", parts_pieces}};
 
 }  // namespace
 

@@ -81,14 +81,6 @@ struct BaselinesOptions {
 };
 nlohmann::json run_baselines(const BaselinesOptions& options, const Progress& progress);
 
-// After a cut, is a factor of the substep's system updated or made anew? (accuracy.md, The factor after a cut)
-struct FactorsOptions {
-  std::vector<int32_t> sides = {10, 20, 30, 40, 50}, fine_sides = {20, 54};  // particles along a cube
-  int64_t repeats = 5;
-  uint64_t seed = 1;  // of right-hand sides and velocities
-};
-nlohmann::json run_factors(const FactorsOptions& options, const Progress& progress);
-
 // The least disturbance of a run that its judge rejects, by property and stage.
 struct SensitivityOptions {
   std::string backend = harness::kReferenceName;

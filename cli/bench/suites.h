@@ -27,7 +27,6 @@ void add_rotations(CLI::App& bench, Work& work);
 void add_machine_limits(CLI::App& bench, Work& work);
 void add_solver(CLI::App& bench, Work& work);
 void add_baselines(CLI::App& bench, Work& work);
-void add_factors(CLI::App& bench, Work& work);
 void add_sensitivity(CLI::App& bench, Work& work);
 void add_parts(CLI::App& bench, Work& work);
 

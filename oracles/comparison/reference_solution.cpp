@@ -47,7 +47,7 @@ double greatest_change(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
 // --- For fixed rotations: E over x and t together --------------------------------------------------------------------
 
 // The factor of a substep's system along one axis. That it is made anew for every substep and every set of fixed
-// particles is what was measured to be best (docs/results/accuracy.md, The factor after a cut).
+// particles is what was measured to be best (docs/design/decisions.md, Reference solutions are factorised anew).
 std::shared_ptr<const Factor> factorised(const Sparse& matrix, Cholmod& cholmod) {
   auto factor = std::make_shared<const Factor>(cholmod_analyze(matrix.get(), cholmod.get()), cholmod);
   cholmod_factorize(matrix.get(), factor->get(), cholmod.get());

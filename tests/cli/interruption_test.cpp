@@ -254,10 +254,10 @@ TEST_F(Interrupted, BenchWritesTheRowsThatItHas) {
 // All that there are, as the program names them: one that is new is asked too, with what it does when nothing is said.
 TEST_F(Interrupted, EverySuiteOfBenchWritesItsDocumentHoweverEarly) {
   const std::map<std::string, std::string> few = {
-      {"stages", "--sizes 1000,1000,1000,1000"}, {"scale", "--sizes 1000,1000,1000,1000"},
-      {"sampling", "--frames 1 --repeats 1"},    {"clusters", "--particles 500"},
-      {"machine_limits", "--repeats 300"},       {"factors", "--sides 8,8,8,8"},
-      {"baselines", "--particles 300"},          {"solver", "--particles 0 --iterations 1,2"}};
+      {"stages", "--sizes 1000,1000,1000,1000"},   {"scale", "--sizes 1000,1000,1000,1000"},
+      {"sampling", "--frames 1 --repeats 1"},      {"clusters", "--particles 500"},
+      {"machine_limits", "--repeats 300"},         {"baselines", "--particles 300"},
+      {"solver", "--particles 0 --iterations 1,2"}};
   const std::string refusal = on_one_line(cutproof("bench").output);
   constexpr std::string_view kBefore = "use one of ";
   const std::size_t begin = refusal.find(kBefore);

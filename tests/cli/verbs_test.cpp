@@ -206,8 +206,7 @@ TEST_F(Verbs, RefuseWhatIsGivenButEmpty) {
                                                         {"bench rotations --json ''", "--json"},
                                                         {"bench machine_limits --json ''", "--json"},
                                                         {"bench solver --json ''", "--json"},
-                                                        {"bench baselines --json ''", "--json"},
-                                                        {"bench factors --json ''", "--json"}}) {
+                                                        {"bench baselines --json ''", "--json"}}) {
     expect_refused(command, {option});
   }
 }
@@ -269,9 +268,7 @@ TEST_F(Verbs, RefuseUnknownOptionsMissingValuesAndNegativeCounts) {
                                                         {"bench floors", "machine_limits"},
                                                         {"bench solver --samples -1", "--samples"},
                                                         {"bench solver --particles -1", "--particles"},
-                                                        {"bench baselines --particles -1", "--particles"},
-                                                        {"bench factors --repeats -1", "--repeats"},
-                                                        {"bench factors --seed -1", "--seed"}}) {
+                                                        {"bench baselines --particles -1", "--particles"}}) {
     expect_refused(command, {word});
   }
 }
