@@ -66,7 +66,6 @@ std::array<int64_t, kStages.size()> phases_of_stages(const gpu::Plan& plan) {
   counters.changing = counters.expanding = counters.additions = counters.small = counters.groups_stale = 1;
   gpu::DeviceView view;
   view.bodies = 1;
-  view.rotation_method = plan.rotation_method;
   view.counters = &counters;
   std::array<int64_t, kStages.size()> phases = {};
   for (const Stage stage : kStages) {

@@ -147,7 +147,7 @@ double skin_bytes(const Setup& setup, const State& state) {
 }  // namespace
 
 StageLimits stage_limits(const Setup& setup, const State& state) {
-  const auto phases = phases_of_stages(gpu::make_plan({setup}, {state}, gpu::kNewton, gpu::SplitMethod::blocks));
+  const auto phases = phases_of_stages(gpu::make_plan({setup}, {state}));
   StageLimits limits;
   for (std::size_t k = 0; k < kStages.size(); ++k) limits[k].phases = phases[k];
   const auto bytes_of = [&](Stage stage) -> double& { return limits[static_cast<std::size_t>(stage)].bytes; };

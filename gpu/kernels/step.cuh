@@ -1354,12 +1354,11 @@ struct ClusterRest {
   float h, per_mass, per_mass_and_h;
   int size;
 };
-template <int Method>
 CUTPROOF_DEVICE inline ClusterRest rest_of_cluster(const DeviceView& w, int s) {
   const Float4* const row = w.cluster_rest + 3 * int64_t{s};
   ClusterRest rest = {};
   for (int k = 0; k < 3; ++k) rest.row[k] = constant(&row[k]);
-  rest.start = start_from<Method>(w.rotation[s]);
+  rest.start = start_from(w.rotation[s]);
   rest.h = constant(&w.pace[body_of_slot(w, s)]).h;
   rest.per_mass = 1.0f / rest.row[0].w;
   rest.per_mass_and_h = 1.0f / (rest.row[0].w * rest.h);
@@ -1368,7 +1367,6 @@ CUTPROOF_DEVICE inline ClusterRest rest_of_cluster(const DeviceView& w, int s) {
 }
 
 // Centre and rotation of a cluster from its sums.
-template <int Method>
 CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const ClusterRest& rest,
                                           const ClusterSums& sums) {
   const float* const moment = sums.moments.v;
@@ -1385,8 +1383,7 @@ CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const Clus
   }
   // One particle has no extent: what is left of A is rounding, and rotate() would make a rotation of it.
   const Matrix3& previous = w.rotation[s];
-  const Rotation<float> best =
-      rest.size > 1 ? rotate<Method>(a, previous, rest.start) : Rotation<float>{previous, true};
+  const Rotation<float> best = rest.size > 1 ? rotate(a, previous, rest.start) : Rotation<float>{previous, true};
   // Such that Σ w (goal) = Σ w x to the rounding of these two sums (docs/design/decisions.md, Momentum and the rounding
   // of sums): the rounded T must not push the cluster.
   const Float3 turned = best.r * rest_moment - rest_moment;
@@ -1404,7 +1401,7 @@ CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const Clus
 // On the device the teams of a block sum. Where clusters are many, each team sums several, and neighbouring threads
 // then compute the rotations of all of them side by side; where they are few, each team's own first thread does, and
 // nobody waits for others.
-template <int Method, int kLanes, class Block>
+template <int kLanes, class Block>
 CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int substep, int iteration) {
   using namespace step_detail;
   const Team<Block, kLanes> team(block);
@@ -1441,7 +1438,7 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
         if (turn == 0) {
           places = apart ? sums && team.leads() : which < turns * kTeams && wanted(placed, ignored);
           // (Where few threads place many clusters, registers for it would be missing in all that sum.)
-          if (apart && places) rest = rest_of_cluster<Method>(w, placed);
+          if (apart && places) rest = rest_of_cluster(w, placed);
         }
         block.wait_for_earlier();
         if (!sums) continue;
@@ -1449,8 +1446,8 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
         sum_cluster(team, w, own, ahead, all[turn * kTeams + mine]);
       }
       apart ? team.sync() : block.sync();
-      if (!apart && places) rest = rest_of_cluster<Method>(w, placed);
-      if (places) place_cluster<Method>(w, placed, rest, all[which]);
+      if (!apart && places) rest = rest_of_cluster(w, placed);
+      if (places) place_cluster(w, placed, rest, all[which]);
       apart ? team.sync() : block.sync();
     }
   } else {
@@ -1462,7 +1459,7 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
       ahead.read_bases(team, w);
       ClusterSums sums;
       sum_cluster(team, w, s, ahead, sums);
-      place_cluster<Method>(w, s, rest_of_cluster<Method>(w, s), sums);
+      place_cluster(w, s, rest_of_cluster(w, s), sums);
     }
   }
   block.wait_for_earlier();
@@ -1472,14 +1469,14 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
   }
 }
 
-template <int Method, int kLanes>
+template <int kLanes>
 struct match_shapes_kernel_object {
   static constexpr const char* kName = "match_shapes_kernel";
   static constexpr bool kReadsAhead = true;
   static constexpr int kMaxThreads = step_detail::kMatchThreads, kMinBlocks = 4;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, int iteration) const {
-    match_shapes_kernel<Method, kLanes>(block, w, substep, iteration);
+    match_shapes_kernel<kLanes>(block, w, substep, iteration);
   }
 };
 
@@ -1981,8 +1978,8 @@ struct advance_kernel_object {
 
 namespace step_detail {
 
-template <int Method, bool kContacts, bool kAccelerated, bool kRetarded, class Launcher>
-CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan, Span span) {
+template <bool kContacts, bool kAccelerated, bool kRetarded, class Launcher>
+void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan, Span span) {
   const int64_t particles = w.particles > w.bodies ? w.particles : w.bodies;
   const int64_t of_places = (w.place_capacity + kParticleTeam - 1) / kParticleTeam;
   const int64_t teams = w.group_capacity > of_places ? w.group_capacity : of_places;
@@ -1991,16 +1988,11 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
   // Of a small load each group has lanes enough for its rows; of a large one they would all do what one can do for
   // three.
   const auto by_rows = [&](auto start) {
-    if constexpr (!requires { typename Launcher::OneLaunch; }) {
-      if (w.particles > kMostByRows) return start(std::integral_constant<int, 1>{});
-    }
+    if (w.particles > kMostByRows) return start(std::integral_constant<int, 1>{});
     start(std::integral_constant<int, kRowTeam>{});
   };
-  // (Other methods than the default one are for comparison.)
   const auto by_clusters = [&](auto start) {
-    if constexpr (!requires { typename Launcher::OneLaunch; } && Method == kNewton) {
-      if (w.slots_expected > kFewClusters) return start(std::integral_constant<int, kHalfTeam>{});
-    }
+    if (w.slots_expected > kFewClusters) return start(std::integral_constant<int, kHalfTeam>{});
     start(std::integral_constant<int, kClusterTeam>{});
   };
   // The same for the lanes that share a group's particles.
@@ -2023,7 +2015,7 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
     for (int iteration = 0; iteration < plan.iterations; ++iteration) {
       by_clusters([&](auto lanes) {
         constexpr int kTeams = kMatchThreads / lanes.value;
-        launcher.blocks(match_shapes_kernel_object<Method, lanes.value>{}, (w.slots_expected + kTeams - 1) / kTeams,
+        launcher.blocks(match_shapes_kernel_object<lanes.value>{}, (w.slots_expected + kTeams - 1) / kTeams,
                         kMatchThreads, kMatchShared<lanes.value>, w, substep, iteration);
       });
       by_rows([&](auto rows) {
@@ -2037,18 +2029,18 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
   });
 }
 
-template <int Method, class Launcher>
-CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan, Span span) {
+template <class Launcher>
+void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan, Span span) {
   if (plan.retarded) {
-    enqueue<Method, true, true, true>(launcher, w, plan, span);
+    enqueue<true, true, true>(launcher, w, plan, span);
   } else if (plan.contacts && plan.accelerated) {
-    enqueue<Method, true, true, false>(launcher, w, plan, span);
+    enqueue<true, true, false>(launcher, w, plan, span);
   } else if (plan.contacts) {
-    enqueue<Method, true, false, false>(launcher, w, plan, span);
+    enqueue<true, false, false>(launcher, w, plan, span);
   } else if (plan.accelerated) {
-    enqueue<Method, false, true, false>(launcher, w, plan, span);
+    enqueue<false, true, false>(launcher, w, plan, span);
   } else {
-    enqueue<Method, false, false, false>(launcher, w, plan, span);
+    enqueue<false, false, false>(launcher, w, plan, span);
   }
 }
 
@@ -2056,25 +2048,8 @@ CUTPROOF_ENQUEUE void enqueue(Launcher& launcher, const DeviceView& w, const Pla
 
 // All substeps of the frame of every running body. span: that of which the step is the first stage.
 template <class Launcher>
-CUTPROOF_ENQUEUE void enqueue_step(Launcher& launcher, const DeviceView& w, const Plan& plan, Span span) {
-  if constexpr (requires { typename Launcher::OneLaunch; }) {
-    step_detail::enqueue<kNewton>(launcher, w, plan, span);
-  } else {
-    switch (w.rotation_method) {
-      case kMueller2016:
-        return step_detail::enqueue<kMueller2016>(launcher, w, plan, span);
-      case kApd:
-        return step_detail::enqueue<kApd>(launcher, w, plan, span);
-      case kSvd:
-        return step_detail::enqueue<kSvd>(launcher, w, plan, span);
-      case kQuest:
-        return step_detail::enqueue<kQuest>(launcher, w, plan, span);
-      case kNewton:
-        return step_detail::enqueue<kNewton>(launcher, w, plan, span);
-      default:
-        return step_detail::enqueue<kJacobi4>(launcher, w, plan, span);
-    }
-  }
+void enqueue_step(Launcher& launcher, const DeviceView& w, const Plan& plan, Span span) {
+  step_detail::enqueue(launcher, w, plan, span);
 }
 
 }  // namespace cutproof::gpu

@@ -46,7 +46,6 @@
 #define CUTPROOF_DEVICE
 #define CUTPROOF_BOTH
 #endif
-#define CUTPROOF_ENQUEUE
 // Before a loop that stays one: what few threads do, and rarely, has to be fetched anew each time, and code that is
 // fetched takes longer than what it does.
 #if defined(__CUDA_ARCH__)

@@ -7,8 +7,8 @@ namespace cutproof::gpu {
 Load::Load(std::vector<Setup> bodies, const std::vector<State>& states, const KernelOptions& options, Capacity with)
     : setups(std::move(bodies)),
       capacity(with),
-      staging(make_contents(setups, states, options.rotation_method, with)),
-      plan(make_plan(setups, states, options.rotation_method, options.split)) {
+      staging(make_contents(setups, states, with)),
+      plan(make_plan(setups, states, options.split)) {
   forget_skins();
 }
 

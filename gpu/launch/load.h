@@ -27,7 +27,6 @@ struct OnDemand {
 };
 
 struct KernelOptions {
-  int rotation_method = kNewton;  // the fastest of those that fail on no hard case (accuracy.md, Rotations)
   SplitMethod split = SplitMethod::blocks;
   Path path = Path::graph;
   Capacity capacity;  // at load; a backend doubles it when it must (for tests)

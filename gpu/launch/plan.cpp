@@ -7,10 +7,8 @@
 
 namespace cutproof::gpu {
 
-Plan make_plan(const std::vector<Setup>& setups, const std::vector<State>& states, int rotation_method,
-               SplitMethod split) {
+Plan make_plan(const std::vector<Setup>& setups, const std::vector<State>& states, SplitMethod split) {
   Plan plan;
-  plan.rotation_method = rotation_method;
   plan.split = split;
   for (std::size_t b = 0; b < setups.size(); ++b) {
     const Setup& setup = setups[b];

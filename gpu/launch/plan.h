@@ -25,13 +25,12 @@ struct Plan {
   bool edge_cover = false, published_expand = false;
   bool skin = false;
   SplitMethod split = SplitMethod::blocks;
-  int rotation_method = 0;  // device_view.h
   int largest_cluster = 0;  // particles; a cluster beyond kMostInBlock is split by global labels whatever `split` says
 };
 
 // Requires states that fit their setups (state/staging.h make_staging_buffers). Throws MachineError if a cluster has
 // more members than 32 bits can count.
-Plan make_plan(const std::vector<Setup>& setups, const std::vector<State>& states, int rotation_method,
-               SplitMethod split);
+Plan make_plan(const std::vector<Setup>& setups, const std::vector<State>& states,
+               SplitMethod split = SplitMethod::blocks);
 
 }  // namespace cutproof::gpu

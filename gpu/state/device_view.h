@@ -19,9 +19,6 @@ namespace cutproof::gpu {
 // nothing.
 enum : int { kSlotsFull = 1, kMembersFull = 2, kVerticesFull = 4, kCellsFull = 8, kAdditionsFull = 16 };
 
-// Which rotation method match_shapes uses (rotation.cuh); chosen by measurement, docs/results/accuracy.md, Rotations.
-enum : int { kJacobi4 = 0, kMueller2016 = 1, kApd = 2, kSvd = 3, kQuest = 4, kNewton = 5 };
-
 // Whose memberships may be out of order is known by tiles of so many particles.
 inline constexpr int kParticleTile = 32;
 CUTPROOF_BOTH inline int64_t particle_tiles(int64_t particles) {
@@ -227,7 +224,6 @@ struct Extents {
 };
 
 struct DeviceView : Extents {
-  int rotation_method = kJacobi4;
 #define ARRAY(name, Element, extent, lifetime, unset) Element* name = nullptr;
 #include "gpu/state/arrays.inc"
 };

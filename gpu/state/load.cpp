@@ -260,16 +260,13 @@ void StagingBuffers::allocate(bool bare) {
 DeviceView StagingBuffers::view() {
   DeviceView view;
   static_cast<Extents&>(view) = *this;
-  view.rotation_method = rotation_method;
   each(view, [](const auto&, auto& vector, auto& pointer) { pointer = vector.data(); });
   return view;
 }
 
-StagingBuffers make_contents(const std::vector<Setup>& setups, const std::vector<State>& states, int rotation_method,
-                             Capacity capacity) {
+StagingBuffers make_contents(const std::vector<Setup>& setups, const std::vector<State>& states, Capacity capacity) {
   require(setups.size() == states.size(), "as many states as setups are needed");
   StagingBuffers staging;
-  staging.rotation_method = rotation_method;
   staging.hold_begin = {0, 0};
   int64_t particles = 0, nodes = 0;
   for (std::size_t b = 0; b < setups.size(); ++b) {
@@ -299,8 +296,8 @@ StagingBuffers make_contents(const std::vector<Setup>& setups, const std::vector
 }
 
 StagingBuffers make_staging_buffers(const std::vector<Setup>& setups, const std::vector<State>& states,
-                                    int rotation_method, Capacity capacity) {
-  StagingBuffers staging = make_contents(setups, states, rotation_method, capacity);
+                                    Capacity capacity) {
+  StagingBuffers staging = make_contents(setups, states, capacity);
   staging.allocate();
   return staging;
 }

@@ -51,7 +51,6 @@ struct StagingBuffers : Extents {
 #define ARRAY(name, Element, extent, lifetime, unset) Elements<Element> name;
 #include "gpu/state/arrays.inc"
 
-  int rotation_method = kJacobi4;
   // Skins as loaded: given back until a skin stage has made a body's own.
   std::vector<Skin> loaded_skin;
 
@@ -73,11 +72,10 @@ struct StagingBuffers : Extents {
 
 // load.cpp. Arrays as long as what the load puts into them. Requires setups.size() == states.size(); throws
 // std::invalid_argument if a state does not fit its setup, and MachineError if an index would not fit into 32 bits.
-StagingBuffers make_contents(const std::vector<Setup>& setups, const std::vector<State>& states, int rotation_method,
-                             Capacity capacity);
+StagingBuffers make_contents(const std::vector<Setup>& setups, const std::vector<State>& states, Capacity capacity);
 // The same with all arrays allocated.
 StagingBuffers make_staging_buffers(const std::vector<Setup>& setups, const std::vector<State>& states,
-                                    int rotation_method, Capacity capacity);
+                                    Capacity capacity);
 
 // extract.cpp. The inverse of make_staging_buffers, after kernels have worked on it. Skin vertices come in the order
 // (owner, direction), triangles in the order of their cells.

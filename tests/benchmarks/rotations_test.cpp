@@ -7,10 +7,13 @@
 #include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "fixtures/hard_matrices.h"
 #include "harness/backends.h"
 #include "model/stop.h"
 #include "tests/cli/program.h"
@@ -258,6 +261,56 @@ TEST(RotationFront, HoldsWhatNoOtherMethodBeats) {
   results.back().precision = Precision::binary64;
   cutproof::benchmarks::mark_front(results);
   EXPECT_TRUE(results[0].on_front && results[1].on_front && results[2].on_front && results[5].on_front);
+}
+
+TEST(RotationMethods, BesideTheDefaultAreRightWhereTheyAreSaidToBe) {
+  // What docs/results/accuracy.md, Rotations, says of them; a method that stops being right there has a fault.
+  constexpr int kMatrices = 2000;
+  namespace fixtures = cutproof::fixtures;
+  for (const char* const name : {"svd", "quest", "apd", "mueller"}) {
+    for (const Precision precision : {Precision::binary32, Precision::binary64}) {
+      const RotationMethod method = method_named(name, precision);
+      const auto judged = [&](const fixtures::HardCase& hard) {
+        return fixtures::judge(fixtures::pose(hard, kMatrices, precision), [&](const auto& a, const auto& previous) {
+          return method.solve(a, previous, 0).answers;
+        });
+      };
+      std::set<std::string> right = {"zero", "one_particle", "coincident_particles", "nan_and_inf"};
+      if (method.name == "quest") right.insert("pure_rotation");
+      // (Müller's method has not converged in double by then.)
+      if (method.name == "apd" || (method.name == "mueller" && precision == Precision::binary32)) right.insert("near");
+      for (const fixtures::HardCase& hard : fixtures::hard_cases()) {
+        const fixtures::Judged result = judged(hard);
+        const std::string where = method.name + ", " + hard.name + ": " + result.first_wrong;
+        EXPECT_EQ(result.not_finite, 0) << where;
+        EXPECT_EQ(result.reflections, 0) << where;
+        if (method.name == "svd" || right.count(hard.name) > 0) {
+          EXPECT_EQ(result.wrong, 0) << where;
+        }
+      }
+    }
+  }
+}
+
+// So a body at rest would stay where it is.
+TEST(RotationMethods, KeepTheIdentityToTheBitForASymmetricMatrix) {
+  std::mt19937_64 random(6);
+  std::normal_distribution<float> normal;
+  std::vector<Mat3> a(200);
+  for (Mat3& matrix : a) {
+    std::array<float, 9> b;
+    for (float& entry : b) entry = normal(random);
+    for (std::size_t row = 0; row < 3; ++row) {
+      for (std::size_t k = 0; k <= row; ++k) {
+        const float product = b[3 * row] * b[3 * k] + b[3 * row + 1] * b[3 * k + 1] + b[3 * row + 2] * b[3 * k + 2];
+        matrix.m[3 * row + k] = matrix.m[3 * k + row] = product;
+      }
+    }
+  }
+  const std::vector<Mat3> identities(a.size());
+  for (const char* const name : {"newton", "jacobi4", "apd", "mueller"}) {
+    EXPECT_EQ(method_named(name, Precision::binary32).solve(a, identities, 0).answers.r, identities) << name;
+  }
 }
 
 TEST(RotationMethods, HaveOneDefaultAndReadAndWriteWhatTheySay) {

@@ -417,8 +417,7 @@ class DeviceFailures : public testing::Test {
 TEST_F(DeviceFailures, TheSceneMakesTheBackendEnlarge) {
   const fixtures::Built& built = small_body();
   const auto wants = [&](double factor) {
-    StagingBuffers staging =
-        make_staging_buffers({built.setup}, {built.state}, KernelOptions{}.rotation_method, Capacity{factor});
+    StagingBuffers staging = make_staging_buffers({built.setup}, {built.state}, Capacity{factor});
     return wants_capacity(staging.view(), staging.counters.front());
   };
   EXPECT_TRUE(wants(kLittle.factor));
@@ -498,7 +497,7 @@ Taken taken_by(const Scene& scene) {
     return std::pair(taken, backend->snapshot().front());
   };
   const OnDemand as_ever = KernelOptions{}.on_demand;
-  StagingBuffers contents = make_contents({built.setup}, {built.state}, KernelOptions{}.rotation_method, {});
+  StagingBuffers contents = make_contents({built.setup}, {built.state}, {});
   const auto room = static_cast<int64_t>(empty_bytes(contents, as_ever.array));
   static_cast<void>(bytes(as_ever));  // what CUDA takes once for all, with the first of a kind
   const auto [on_demand, state] = bytes(as_ever);

@@ -40,12 +40,12 @@ struct Bench {
 
   // `cut`: every body counts as cut in this frame, whether or not it lists removed particles.
   explicit Bench(Bodies of, bool cut = false)
-      : bodies(std::move(of)), staging(make_staging_buffers(bodies.setups, bodies.states, kJacobi4, Capacity{})) {
+      : bodies(std::move(of)), staging(make_staging_buffers(bodies.setups, bodies.states, Capacity{})) {
     if (cut) {
       for (std::size_t b = 0; b < bodies.setups.size(); ++b) staging.cut[b] = 2 * staging.frame[b];
     }
     view = staging.view();
-    plan = make_plan(bodies.setups, bodies.states, kJacobi4, SplitMethod::blocks);
+    plan = make_plan(bodies.setups, bodies.states);
     loaded = states();
   }
   Bench(const Bench&) = delete;

@@ -44,15 +44,15 @@ State cooked(const Setup& setup) { return fixtures::cook(setup.body, {}, setup.e
 
 // The state with the positions that single precision keeps, so that both sides judge the same numbers.
 State kept(const Setup& setup, State state) {
-  const StagingBuffers staging = make_staging_buffers({setup}, {state}, kJacobi4, Capacity{});
+  const StagingBuffers staging = make_staging_buffers({setup}, {state}, Capacity{});
   state.x = extract_states(staging, {setup}).front().x;
   return state;
 }
 
 std::vector<State> detected(const std::vector<Setup>& setups, const std::vector<State>& states, HostLauncher& launcher,
                             Counters* counters = nullptr) {
-  StagingBuffers staging = make_staging_buffers(setups, states, kJacobi4, Capacity{});
-  enqueue_detect(launcher, staging.view(), make_plan(setups, states, kJacobi4, SplitMethod::blocks));
+  StagingBuffers staging = make_staging_buffers(setups, states, Capacity{});
+  enqueue_detect(launcher, staging.view(), make_plan(setups, states));
   if (counters != nullptr) *counters = staging.counters.front();
   return extract_states(staging, setups);
 }
@@ -309,8 +309,8 @@ TEST(GpuDetect, ReplacesTheListWhenItRunsTwiceInAFrame) {
   const cutproof::Setup setup = setup_of(fixtures::block(8, 1, 1, 1.0), Criterion::distance);
   State state = cooked(setup);
   for (std::size_t i = 4; i < 8; ++i) state.x[i].x += 1;
-  StagingBuffers staging = make_staging_buffers({setup}, {state}, kJacobi4, Capacity{});
-  const Plan plan = make_plan({setup}, {state}, kJacobi4, SplitMethod::blocks);
+  StagingBuffers staging = make_staging_buffers({setup}, {state}, Capacity{});
+  const Plan plan = make_plan({setup}, {state});
   HostLauncher launcher;
   const auto again = [&] {
     enqueue_detect(launcher, staging.view(), plan);

@@ -72,7 +72,7 @@ struct Grouped {
   // `like`: loaded before, with these states since; its rest frames are taken over, for a state gives them in double
   // precision, rounded to the last bit but one.
   Grouped(Bodies of, HostLauncher launcher, const StagingBuffers* like = nullptr)
-      : bodies(std::move(of)), staging(make_staging_buffers(bodies.setups, bodies.states, kNewton, Capacity{})) {
+      : bodies(std::move(of)), staging(make_staging_buffers(bodies.setups, bodies.states, Capacity{})) {
     if (like != nullptr) take_over_rest_frames(*like);
     view = staging.view();
     enqueue_groups_if_stale(launcher, view);
@@ -370,14 +370,14 @@ void follow_clusters(Frames frames, double room, Followed& followed) {
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     SCOPED_TRACE(seed);
     const Bodies bodies = random_bodies(seed, 5, 60);
-    StagingBuffers staging = make_staging_buffers(bodies.setups, bodies.states, kNewton, Capacity{});
+    StagingBuffers staging = make_staging_buffers(bodies.setups, bodies.states, Capacity{});
     Counters& counters = staging.counters.front();
     if (room > 0) {
       staging.member_capacity = static_cast<int>(room * counters.members_used);
       staging.allocate();
     }
     const DeviceView view = staging.view();
-    const Plan plan = make_plan(bodies.setups, bodies.states, kNewton, SplitMethod::blocks);
+    const Plan plan = make_plan(bodies.setups, bodies.states);
     HostLauncher launcher;
     Load load;  // only to be asked
     const auto begin = [&](Span span) {
@@ -459,7 +459,7 @@ TEST(Groups, FollowParticlesThatPassFromOneClusterToAnother) {
     cutproof::Setup setup = cutproof::testing::setup_of(body);
     setup.merge.rule = MergeRule::deterministic;
     const Bodies bodies{{setup}, {cutproof::testing::state_of(body, lists, 20)}};
-    StagingBuffers staging = make_staging_buffers(bodies.setups, bodies.states, kNewton, Capacity{});
+    StagingBuffers staging = make_staging_buffers(bodies.setups, bodies.states, Capacity{});
     const DeviceView view = staging.view();
     HostLauncher launcher;
     enqueue_groups_if_stale(launcher, view);
@@ -655,10 +655,9 @@ Stepped step(const cutproof::Setup& setup, const State& state) {
   Stepped stepped;
   const std::vector<cutproof::Setup> setups = {setup};
   const std::vector<State> states = {state};
-  stepped.staging = make_staging_buffers(setups, states, kNewton, Capacity{});
+  stepped.staging = make_staging_buffers(setups, states, Capacity{});
   HostLauncher launcher;
-  enqueue_step(launcher, stepped.staging.view(), make_plan(setups, states, kNewton, SplitMethod::blocks),
-               Span{Stage::step, Stage::step});
+  enqueue_step(launcher, stepped.staging.view(), make_plan(setups, states), Span{Stage::step, Stage::step});
   stepped.state = extract_states(stepped.staging, setups).front();
   stepped.touched = stepped.staging.group_tracked;
   stepped.touched.resize(at(stepped.staging.counters.front().groups));
@@ -730,7 +729,7 @@ TEST(Groups, AreOnBothSidesOfTheBladeIfTheirParticlesAre) {
   const double normal_x = cross(pose.along, pose.back).x;
   setup.blade_moves.assign(2, BladeMove{pose, pose, true, 0});
   const std::vector<cutproof::Setup> setups = {setup};
-  StagingBuffers staging = make_staging_buffers(setups, {cooked(setup)}, kNewton, Capacity{});
+  StagingBuffers staging = make_staging_buffers(setups, {cooked(setup)}, Capacity{});
   const DeviceView w = staging.view();
   HostLauncher launcher;
   begin_frame(launcher, w);
@@ -766,7 +765,7 @@ TEST(Groups, HaveTheirBasesNearTheirMeans) {
   }
   const Stepped found = step(setup, state);
   const StagingBuffers& staging = found.staging;
-  const StagingBuffers begun = make_staging_buffers({setup}, {state}, kNewton, Capacity{});
+  const StagingBuffers begun = make_staging_buffers({setup}, {state}, Capacity{});
   const double near = (1.0 / 16 + 1e-3) * setup.body.grid.spacing;
   int moved = 0, hurried = 0;
   for (std::size_t g = 0; g < found.touched.size(); ++g) {
@@ -803,7 +802,7 @@ TEST(Groups, LeaveRoomForTheirRestShape) {
   cutproof::Setup setup = block_on_floor(0.05);
   setup.step.substeps = 2;
   const std::vector<cutproof::Setup> setups = {setup};
-  StagingBuffers staging = make_staging_buffers(setups, {cooked(setup)}, kNewton, Capacity{});
+  StagingBuffers staging = make_staging_buffers(setups, {cooked(setup)}, Capacity{});
   const DeviceView w = staging.view();
   HostLauncher launcher;
   begin_frame(launcher, w);
@@ -860,7 +859,7 @@ TEST(Groups, AreResolvedIfEitherCandidateTouches) {
   };
   for (const Candidates& wanted : {Candidates{-0.01f, -0.02f, false}, Candidates{-0.01f, -0.4f, true},
                                    Candidates{-0.4f, -0.01f, true}, Candidates{-0.4f, -0.5f, true}}) {
-    StagingBuffers staging = make_staging_buffers(setups, states, kNewton, Capacity{});
+    StagingBuffers staging = make_staging_buffers(setups, states, Capacity{});
     const DeviceView w = staging.view();
     HostLauncher launcher;
     begin_frame(launcher, w);

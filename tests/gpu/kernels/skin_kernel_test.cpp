@@ -177,8 +177,8 @@ struct Bodies {
 
 Bodies make_bodies(std::vector<Setup> setups, const std::vector<State>& states) {
   Bodies bodies;
-  bodies.staging = make_staging_buffers(setups, states, kJacobi4, Capacity{});
-  bodies.plan = make_plan(setups, states, kJacobi4, SplitMethod::blocks);
+  bodies.staging = make_staging_buffers(setups, states, Capacity{});
+  bodies.plan = make_plan(setups, states);
   bodies.setups = std::move(setups);
   return bodies;
 }

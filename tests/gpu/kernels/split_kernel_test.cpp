@@ -30,8 +30,8 @@ struct Scene {
     setups.push_back(std::move(setup));
     states.push_back(std::move(state));
   }
-  StagingBuffers staging() const { return make_staging_buffers(setups, states, kJacobi4, Capacity{}); }
-  Plan plan(SplitMethod method) const { return make_plan(setups, states, kJacobi4, method); }
+  StagingBuffers staging() const { return make_staging_buffers(setups, states, Capacity{}); }
+  Plan plan(SplitMethod method) const { return make_plan(setups, states, method); }
   std::vector<State> expected() const {
     std::vector<State> result = states;
     for (std::size_t b = 0; b < result.size(); ++b) {

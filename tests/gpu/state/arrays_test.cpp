@@ -65,7 +65,7 @@ struct Trace {
 // Runs all frames of these arrays, stage by stage; calls before(staging) before each of them.
 template <class Before>
 Trace run_all(const Bodies& bodies, StagingBuffers staging, Before before) {
-  const Plan plan = make_plan(bodies.setups, bodies.states, kNewton, SplitMethod::blocks);
+  const Plan plan = make_plan(bodies.setups, bodies.states);
   const DeviceView view = staging.view();
   HostLauncher launcher;
   std::int64_t frames = 0;
@@ -86,12 +86,12 @@ Trace run_all(const Bodies& bodies, StagingBuffers staging, Before before) {
 
 template <class Before>
 Trace run_all(const Bodies& bodies, Before before) {
-  return run_all(bodies, make_staging_buffers(bodies.setups, bodies.states, kNewton, Capacity{}), before);
+  return run_all(bodies, make_staging_buffers(bodies.setups, bodies.states, Capacity{}), before);
 }
 
 TEST(Arrays, AreAsLongAsTheirExtentsSay) {
   const Bodies bodies = some_bodies(1, 5);
-  StagingBuffers staging = make_staging_buffers(bodies.setups, bodies.states, kNewton, Capacity{});
+  StagingBuffers staging = make_staging_buffers(bodies.setups, bodies.states, Capacity{});
   DeviceView view = staging.view();
   int arrays = 0;
   staging.each(view, [&](const auto& array, const auto& vector, auto& pointer) {
@@ -107,7 +107,7 @@ TEST(Arrays, AreAsLongAsTheirExtentsSay) {
 // Room for six vertices for each particle, and 64, of 16 bytes. A load makes none.
 TEST(Arrays, TellHowMuchOfThemALoadLeavesEmpty) {
   const Bodies bodies = some_bodies(1, 5);
-  StagingBuffers contents = make_contents(bodies.setups, bodies.states, kNewton, Capacity{});
+  StagingBuffers contents = make_contents(bodies.setups, bodies.states, Capacity{});
   std::size_t particles = 0;
   for (const cutproof::Setup& setup : bodies.setups) particles += static_cast<std::size_t>(setup.body.particle_count());
   const std::size_t vertices = 16 * (6 * particles + 64);
@@ -170,7 +170,7 @@ TEST(Arrays, HoldNothingToRelyOnBeyondWhatHasBeenPutIntoThem) {
     SCOPED_TRACE(seed);
     const Bodies bodies = some_bodies(seed, 8);
     const Trace expected = run_all(bodies, [](StagingBuffers&) {});
-    StagingBuffers staging = make_contents(bodies.setups, bodies.states, kNewton, Capacity{});
+    StagingBuffers staging = make_contents(bodies.setups, bodies.states, Capacity{});
     DeviceView unused;
     std::map<std::string, std::size_t> loaded;
     staging.each(unused, [&](const auto& array, const auto& vector, auto&) { loaded[array.name] = vector.size(); });
