@@ -123,7 +123,6 @@ std::vector<std::string> seeds() {
   const nlohmann::json trial = {{"substeps", 4},
                                 {"iterations", 2},
                                 {"acceleration", "none"},
-                                {"rotation", nullptr},
                                 {"differences", ""},
                                 {"outcome", "within"},
                                 {"why", ""},

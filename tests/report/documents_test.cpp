@@ -181,8 +181,6 @@ json stage_row(const std::string& what, double ms, const json& paper) {
           {"particles", 100},
           {"substeps", 4},
           {"iterations", 4},
-          {"rotation", "svd"},
-          {"split", "blocks"},
           {"cooking", "boxes"},
           {"acceleration", "none"},
           {"frames", 3},
