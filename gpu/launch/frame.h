@@ -10,7 +10,7 @@
 #include "gpu/kernels/merge.cuh"
 #include "gpu/kernels/skin.cuh"
 #include "gpu/kernels/split.cuh"
-#include "gpu/kernels/step.cuh"
+#include "gpu/kernels/step/step.cuh"
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/plan.h"
 #include "gpu/state/device_view.h"
@@ -21,7 +21,7 @@ namespace cutproof::gpu {
 // A span of a whole frame finds groups as the one before has left them, and leaves them as the next needs them: what
 // follows a cut has a condition anyway, and in front of the step there is none. Any other makes them where the step
 // needs them. Before the first of whole frames, and after any other span, Load::needs_groups() says that they are to be
-// made (groups.cuh, enqueue_groups_if_stale).
+// made (step/groups.cuh, enqueue_groups_if_stale).
 //
 // `mark` is called with each stage before its work is handed over (a launcher that works at once can take times).
 template <class Launcher, class Mark>
