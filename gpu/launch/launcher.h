@@ -108,8 +108,8 @@ constexpr bool reads_ahead() {
   }
 }
 
-// A block is a part of one of 512 threads where a frame runs in one kernel: threads that fill no part would meet
-// nobody.
+// Throws std::logic_error if a block may not have so many threads. Where one kernel runs a whole frame, its blocks of
+// 512 threads are divided into blocks of this many.
 template <class Kernel>
 void check_threads(int threads) {
   if (threads < 32 || threads > max_threads<Kernel>() || (threads & (threads - 1)) != 0) {
