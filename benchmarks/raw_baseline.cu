@@ -15,7 +15,7 @@
 namespace cutproof::gpu {
 namespace {
 
-// As step.cuh updates particles, with the goal already averaged: x = x~ + s (g - x~), and v from the motion.
+// As step/particle.cuh updates particles, with the goal already averaged: x = x~ + s (g - x~), and v from the motion.
 struct Particles {
   const Float4* predicted;
   const Float4* goal;

@@ -22,8 +22,8 @@ struct StageLimit {
 };
 using StageLimits = std::array<StageLimit, kStages.size()>;
 
-// What kernels make of the clusters (gpu/kernels/groups.cuh): groups, pairs of a group and a holder, particles that are
-// in no group, and how many clusters have these, counted for each.
+// What kernels make of the clusters (gpu/kernels/step/groups.cuh): groups, pairs of a group and a holder, particles
+// that are in no group, and how many clusters have these, counted for each.
 struct Groups {
   double groups = 0, pairs = 0, loose = 0, loose_memberships = 0;
 };

@@ -11,7 +11,7 @@
 #include "fixtures/build.h"
 #include "fixtures/cook.h"
 #include "gpu/backends.h"
-#include "gpu/kernels/step.cuh"
+#include "gpu/kernels/step/step.cuh"
 #include "harness/backends.h"
 #include "oracles/relations/relations.h"
 #include "property_tests/checking.h"

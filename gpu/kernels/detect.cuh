@@ -16,7 +16,7 @@
 #pragma once
 #include <type_traits>
 
-#include "gpu/kernels/carried.cuh"
+#include "gpu/kernels/carried_tissue.cuh"
 #include "gpu/kernels/lowered_plane.cuh"
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/plan.h"

@@ -1,7 +1,7 @@
-// gpu/kernels: the six stages, a file each, and the pieces that they share. Kernels are templates over the Block of
-// launch/block.h and work on the DeviceView of state/device_view.h; what starts those of one stage in their order is
-// its enqueue_…, over a Launcher (launch/launcher.h). Nothing here depends on whether it runs on a device or on the
-// host.
+// gpu/kernels: the six stages, a file each (the step a folder), and the pieces that they share. Kernels are templates
+// over the Block of launch/block.h and work on the DeviceView of state/device_view.h; what starts those of one stage in
+// their order is its enqueue_…, over a Launcher (launch/launcher.h). Nothing here depends on whether it runs on a
+// device or on the host.
 //
 // This file: what a frame does around its stages: which of them are due, and at its end the order of memberships, the
 // numbers of clusters and the count of frames.

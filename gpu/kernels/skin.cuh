@@ -7,7 +7,7 @@
 // corners keep their triangles as they are. What there is to do hangs on the particles that have changed, so they are
 // listed first, ascending; places of vertices and cells are given out in their order.
 #pragma once
-#include "gpu/kernels/carried.cuh"
+#include "gpu/kernels/carried_tissue.cuh"
 #include "gpu/kernels/float3.h"
 #include "gpu/kernels/lowered_plane.cuh"
 #include "gpu/kernels/skin_table.h"

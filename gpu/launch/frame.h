@@ -10,7 +10,7 @@
 #include "gpu/kernels/merge.cuh"
 #include "gpu/kernels/skin.cuh"
 #include "gpu/kernels/split.cuh"
-#include "gpu/kernels/step.cuh"
+#include "gpu/kernels/step/step.cuh"
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/plan.h"
 #include "gpu/state/device_view.h"
@@ -18,10 +18,10 @@
 
 namespace cutproof::gpu {
 
-// A span of a whole frame finds groups as the one before has left them, and leaves them as the next needs them: what
-// follows a cut has a condition anyway, and in front of the step there is none. Any other makes them where the step
-// needs them. Before the first of whole frames, and after any other span, Load::needs_groups() says that they are to be
-// made (groups.cuh, enqueue_groups_if_stale).
+// A span of a whole frame finds the groups that the frame before has made, and makes those that the next frame needs.
+// (Behind a cut there is a condition anyway, so none is needed in front of the step.) Any other span makes groups where
+// its step needs them. Load::needs_groups() says whether groups have to be made first: before the first whole frame,
+// and after any other span (step/groups.cuh, enqueue_groups_if_stale).
 //
 // `mark` is called with each stage before its work is handed over (a launcher that works at once can take times).
 template <class Launcher, class Mark>
@@ -34,10 +34,11 @@ void enqueue_span(Launcher& launcher, const DeviceView& w, const Plan& plan, Spa
   }
   const bool clusters = span.contains(Stage::split) || span.contains(Stage::merge) || span.contains(Stage::expand);
   const bool skin = span.contains(Stage::skin);
-  // In a whole frame vertices need not wait for the groups of the next one.
+  // In a whole frame vertices are placed without waiting for the groups of the next frame.
   const bool places_at_once = span.is_whole_frame() && plan.skin;
-  // Nor for what detection finds, as if nothing were cut: if something is, they are placed again, which costs a small
-  // load nothing that it would wait for. (Where the nearer end goes, detection asks where clusters are, too.)
+  // In a small load vertices are placed beside detection, as if nothing were cut. After a cut they are placed again,
+  // and in a small load nothing waits for that. (If the nearer ends of edges go, detection computes centres of clusters
+  // too, so vertices wait.)
   const bool places_early = places_at_once && plan.detection && !plan.nearer &&
                             w.particles <= step_detail::kMostByRows && launcher.overlaps();
   const auto detect = [&](Launcher& on) {

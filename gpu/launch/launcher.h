@@ -108,6 +108,7 @@ constexpr bool reads_ahead() {
   }
 }
 
+// Throws std::logic_error if a block may not have so many threads.
 template <class Kernel>
 void check_threads(int threads) {
   if (threads < 32 || threads > max_threads<Kernel>() || threads % 32 != 0) {

@@ -100,9 +100,10 @@ struct alignas(128) Pace {
   int substeps, iterations;  // 0: its schedule is over
   int frame;
   float h, per_h;
-  float ahead, share;           // dt + τ: from where the substep begins to y; dt / (dt + τ): of this way to x
+  float prediction_time;        // dt + τ: from the start of a substep to y (step/prediction.cuh)
+  float dt_fraction;            // dt / (dt + τ): the part of that way after which a particle is at x
   float decay, decay_per_dt;    // decay: e^(-c dt)
-  float held_alpha, held_beta;  // step.cuh, how much held particles are pushed
+  float held_alpha, held_beta;  // how much held particles are pushed (step/iteration_numbers.cuh)
   float s;                      // pull towards the goal (docs/design/method.md §3)
   Float3 fall;                  // dt (dt + τ) · gravity
   Solver solver;
@@ -114,7 +115,7 @@ struct alignas(128) Pace {
 };
 static_assert(sizeof(Pace) == 128);
 
-// What is the same in an iteration of all substeps (kernels/step.cuh).
+// What is the same in an iteration of all substeps (kernels/step/iteration_numbers.cuh).
 struct alignas(16) IterationNumbers {
   float pull, carry;              // of the Chebyshev semi-iteration
   float lost_before, lost_after;  // how much of a prediction's own shape

@@ -13,7 +13,7 @@
 #include "fixtures/bodies.h"
 #include "fixtures/cook.h"
 #include "gpu/host/host_launcher.h"
-#include "gpu/kernels/groups.cuh"
+#include "gpu/kernels/step/groups.cuh"
 #include "gpu/launch/frame.h"
 #include "gpu/launch/load.h"
 #include "gpu/state/staging.h"
@@ -936,18 +936,19 @@ TEST(Groups, TouchNothingWithinTheirRoom) {
     const int side = turn % 5 == 0 ? 0 : uniform(random, -1, 1) < 0 ? -1 : 1;
     // With retardation the ball is of what lies ahead, and what touches is between there and where it began.
     Pace pace = {};
-    pace.share = turn % 4 == 1 ? static_cast<float>(uniform(random, 0.02, 0.9)) : 1.0f;
+    pace.dt_fraction = turn % 4 == 1 ? static_cast<float>(uniform(random, 0.02, 0.9)) : 1.0f;
     const Ball began = {
         {h, node}, single(uniform(random, 0, 0.3) * h * direction()), static_cast<float>(uniform(random, 0, 2) * h)};
-    const float room = step_detail::room_ahead<true>(pace, contacts, began, ball, side);
+    const float room = step_detail::room_of_prediction<true>(pace, contacts, began, ball, side);
     if (!(room > 0)) continue;
     ++roomy;
-    if (pace.share < 1) ++retarded;
+    if (pace.dt_fraction < 1) ++retarded;
     // Whether some point of the ball is projected or touches when all of it is moved, the foremost among them.
     const auto meets = [&](const Vec3& moved, const Vec3& way) {
       for (const Vec3& from_middle : {way, direction(), direction()}) {
         const Float3 ahead = ball.d + single(moved + double{ball.radius} * from_middle);
-        const Float3 d = step_detail::come_to<true>(pace, began.d + single(double{began.radius} * from_middle), ahead);
+        const Float3 d =
+            step_detail::x_between<true>(pace, began.d + single(double{began.radius} * from_middle), ahead);
         for (const float own : {-1.0f, 1.0f}) {
           if (side != 0 && own != static_cast<float>(side)) continue;
           bool in_turn = false;
@@ -960,7 +961,7 @@ TEST(Groups, TouchNothingWithinTheirRoom) {
     for (const Vec3& way : {towards, -1.0 * towards, direction(), Vec3{0, 0, -1}}) {
       // As long as it may be along its longest axis.
       const double longest = std::max({std::abs(way[0]), std::abs(way[1]), std::abs(way[2])});
-      const Vec3 most = step_detail::kOfRoom * double{room} / longest * way;
+      const Vec3 most = step_detail::kPartOfRoom * double{room} / longest * way;
       EXPECT_FALSE(meets(most, way)) << "turn " << turn << ", room " << room;
       tight += meets(1.05 * std::sqrt(3.0) * most, way);
     }

@@ -10,7 +10,7 @@
 #include "fixtures/bodies.h"
 #include "fixtures/cook.h"
 #include "gpu/host/host_launcher.h"
-#include "gpu/kernels/step.cuh"
+#include "gpu/kernels/step/step.cuh"
 #include "gpu/state/staging.h"
 #include "reference_cpu/contacts.h"
 #include "reference_cpu/reference.h"

@@ -1,7 +1,7 @@
 // Contacts of one particle with the blade and the walls within one substep (method.md §3, Blade;
-// docs/design/decisions.md, Contacts with the blade). Everything works on displacements from rest: a distance to the
-// blade is (X - edge) + d with X - edge formed once and rounded once, and a projection is added to d, so that a
-// particle far from the body's origin loses no more than that one rounding.
+// docs/design/decisions.md, Contacts with the blade). Everything works on displacements from rest. A distance to the
+// blade is (X - edge) + d, with X - edge formed once and rounded once, and a projection is added to d. So a particle
+// far from the body's origin loses no more than that one rounding.
 #pragma once
 #include "gpu/kernels/float3.h"
 #include "gpu/state/device_view.h"
@@ -88,8 +88,9 @@ CUTPROOF_DEVICE inline Float3 from_blade(const Contacts& contacts, Float3 c) {
           c.y - fminf(fmaxf(c.y, 0.0f), contacts.depth), c.z};
 }
 
-// By how much, in the blade's frame, one has to move that came through the plate: back to its own side, or round one of
-// the four sides of the rectangle to where it clears the rounded rim. The shortest way, its own side first.
+// The way out, in the blade's frame, of a particle that came through the plate. It leads back to its own side, or round
+// one of the four sides of the rectangle to where it clears the rounded rim. The shortest way is taken, and of equal
+// ways the one to its own side.
 CUTPROOF_DEVICE inline Float3 way_out(const Contacts& contacts, Float3 c, float side) {
   Float3 best = {0, 0, side * contacts.clearance - c.z};
   float shortest = dot(best, best);
@@ -109,9 +110,9 @@ CUTPROOF_DEVICE inline Float3 way_out(const Contacts& contacts, Float3 c, float 
   return best;
 }
 
-// What leads a particle off the blade, zero where it is allowed to be: forbidden is what is nearer than the clearance
-// to the mid-surface, and what lies over it on the other side than where the particle began. Not the difference of two
-// positions, which would have no direction where it is short. Requires contacts.move.
+// The way of a particle off the blade, zero where it is allowed to be. Two sets are forbidden: what is nearer to the
+// mid-surface than the clearance, and what lies over it on the other side than where the particle began. The way is not
+// the difference of two positions, which would have no direction where it is short. Requires contacts.move.
 CUTPROOF_DEVICE inline Float3 way_off_blade(const Contacts& contacts, const RestPoint& rest, Float3 d, float side) {
   const PoseF pose = constant(&contacts.move->to);
   const Float3 c = into_frame(pose, rest.from(pose.edge) + d);
@@ -186,8 +187,8 @@ CUTPROOF_DEVICE inline float blade_side(const Contacts& contacts, const RestPoin
   return contacts_detail::into_frame(pose, rest.from(pose.edge) + d).z < 0 ? -1.0f : 1.0f;
 }
 
-// Where contacts let a particle be that wants to be at d, began the substep at `start` and on side `side`. Sets
-// `in_turn` where that need not be the nearest allowed point, and leaves it alone elsewhere.
+// Where contacts let a particle be that would be at d. It began the substep at `start`, on side `side` of the blade.
+// Sets `in_turn` where that need not be the nearest allowed point, and leaves it alone elsewhere.
 CUTPROOF_DEVICE inline Float3 project(const Contacts& contacts, const RestPoint& rest, Float3 d, float side,
                                       Float3 start, bool& in_turn) {
   using namespace contacts_detail;
@@ -225,8 +226,8 @@ CUTPROOF_DEVICE inline Float3 project(const Contacts& contacts, const RestPoint&
 }
 
 // The same for a solver that comes from x and would go to `free`. Where blade and walls hold at once, projecting in
-// turn need not give the nearest point: never one that is worse than x, so that the energy cannot grow. Elsewhere the
-// projection is the nearest point, and asking would refuse motions below the root of the rounding.
+// turn need not give the nearest point. There a point that is worse than x is refused, so that the energy cannot grow.
+// Elsewhere the projection is the nearest point, and the question would refuse motions below the root of the rounding.
 CUTPROOF_DEVICE inline Float3 next_position(const Contacts& contacts, const RestPoint& rest, Float3 free, float side,
                                             Float3 start, Float3 x) {
   bool in_turn = false;
@@ -256,13 +257,12 @@ CUTPROOF_DEVICE inline float ball_extent(const Ball& ball) {
 
 }  // namespace contacts_detail
 
-// By how much at least the radius of a ball may grow before some point in it is projected, or touches (kTouchMargin),
-// wherever in the ball it lies; not positive: it is not clear. (May be less than there is.) `side`: of the blade, that
-// of all its points when the substep began, or 0 if they were on both.
+// By how much at least the radius of a ball may grow before some point in it is projected, or touches (kTouchMargin).
+// If that is not positive, the ball is not clear. side: the side of the blade on which all points of the ball began the
+// substep, or 0 if they began on both.
 //
-// A point over the plate is projected from any distance if it is on the other side than where it began, so keeping away
-// from the plate is not enough: either the whole ball stays on its side, or it keeps clear of all that lies over and
-// under the plate.
+// Keeping away from the plate is not enough: a point over it is projected from any distance if it began on the other
+// side. So either the whole ball stays on its side, or it keeps clear of all that lies over and under the plate.
 CUTPROOF_DEVICE inline float room_around(const Contacts& contacts, const Ball& ball, int side) {
   using namespace contacts_detail;
   const RestPoint& rest = ball.rest;

@@ -1,47 +1,44 @@
-// Groups: particles that the same clusters hold, which the step carries together (docs/design/method.md §13). Here they
-// are made, from the clusters alone: which particles are in which group, and every constant that sums over groups need.
+// Which particles are in which group. A class is all particles with the same list of holders and the same grips. Its
+// first holder deals it out to groups of kMostInGroup particles, in ascending order. If fewer than kLeastInGroup
+// particles are left over, these are loose. A particle without a holder is loose too. Equal lists meet in a hash table
+// with an entry for each member of the first holder.
 //
-// A class belongs to the first of its holders. There equal lists of holders meet in a hash table as long as the
-// cluster, and one team counts them in ascending order. So a class has its particles, chunk by chunk of kMostInGroup,
-// wherever it is in memory. A particle is loose if its chunk has fewer than kLeastInGroup, and if it has no holder.
-// Particles that different grips hold are in different classes. All of that depends on the body's own clusters and
-// particles only.
+// So a class has its particles in the same chunks wherever it lies in memory. Which particles are in which class
+// depends on their own body only.
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
 
 namespace cutproof::gpu {
 
-// Lanes that measure a group, and that look through the members of a cluster.
-inline constexpr int kGroupTeam = 8;
+// Lanes that go through the members of a cluster.
 inline constexpr int kMemberTeam = 32;
-// Teams that share a cluster where each of its members is looked at alone, and where they are counted.
+// Teams that share a cluster: where each finds the classes of its members, and where they count these.
 inline constexpr int kShares = 8, kCountShares = 4;
-// Where a cluster is dealt out: threads, and how many members have room in their shared memory.
+// Threads that deal out a cluster, and how many of its members have room in their shared memory.
 inline constexpr int kDealThreads = 256;
 inline constexpr int kMostDealt = 2048;
 
 namespace groups_detail {
 
-// DeviceView::group_at of particles that are no group's first.
+// DeviceView::group_at of particles that are not a group's first.
 enum : int { kInside = -1, kLoose = -2 };
 
-// By place in DeviceView::members, those of a cluster being its own table: a particle of the class (from 1; 0: none),
-// and how many of the class have been counted.
+// The table of a cluster has the places of its members in DeviceView::members. An entry has a particle of its class
+// (from 1; 0: none) and the number of particles in the class that are counted so far.
 CUTPROOF_BOTH inline int* table(const DeviceView& w) { return w.label; }
 CUTPROOF_BOTH inline int* class_size(const DeviceView& w) { return w.member_scratch; }
-// Of DeviceView::slot_scratch: clusters whose groups are made anew, and those whose lists of groups are.
+// Parts of DeviceView::slot_scratch: clusters whose groups are made anew, and clusters whose lists of groups are.
 CUTPROOF_BOTH inline int* changed(const DeviceView& w) { return w.slot_scratch; }
 CUTPROOF_BOTH inline int* remeasured(const DeviceView& w) { return w.slot_scratch + w.slot_capacity; }
-inline constexpr int kRemeasured = 2;  // in DeviceView::regroup: it is listed among the latter
-// Likewise by place: the entry of the member's class in that table, -1 if its class is not this cluster's.
+inline constexpr int kRemeasured = 2;  // in DeviceView::regroup: the cluster is in the list remeasured()
+// At the place of a member: the entry of its class in this table, or -1 if another cluster deals out its class.
 CUTPROOF_BOTH inline int* entry_of_member(const DeviceView& w) { return w.cluster_loose; }
-// By particle of a class that is dealt out, where there is no shared memory for it: how many of the class are smaller.
+// By particle of a class that is dealt out without shared memory: how many particles of the class have smaller numbers.
 CUTPROOF_BOTH inline int* rank_of(const DeviceView& w) { return w.place_of; }
 
-// A particle's holders: the gaps of its list (-1) are at its end.
+// A particle's holders. Gaps of the list (-1) are at its end.
 struct HolderList {
   const int* begin;
   int size;
@@ -49,8 +46,9 @@ struct HolderList {
 CUTPROOF_DEVICE inline HolderList holders_of(const DeviceView& w, int p) {
   return {w.memberships + w.membership_begin[p], w.membership_count[p]};
 }
-// Both take several entries at once: one by one, each would wait for the one before.
+// Entries that are read at once: one by one, each would wait for the one before.
 inline constexpr int kAtOnce = 4;
+
 CUTPROOF_DEVICE inline int hold_set(const DeviceView& w, int p) { return w.grip_count > 0 ? w.hold_set[p] : 0; }
 CUTPROOF_DEVICE inline bool same_class(const DeviceView& w, int p, int q) {
   const HolderList a = holders_of(w, p), b = holders_of(w, q);
@@ -88,36 +86,16 @@ CUTPROOF_DEVICE inline int grouped_of(int particles) {
   return left >= kLeastInGroup ? particles : particles - left;
 }
 
+// Gives particle p the place o.
 CUTPROOF_DEVICE inline void place(const DeviceView& w, int p, int o) {
   w.place_particle[o] = p;
   w.place_node[o] = w.node[p];
   w.place_of[p] = o;
 }
 
-// X_g - T_s [h]: an exact difference of grid coordinates, and one of offsets.
-CUTPROOF_DEVICE inline Offset offset_between(RestCenter group, RestCenter cluster, int index) {
-  return {static_cast<float>(group.i - cluster.i) + (group.x - cluster.x),
-          static_cast<float>(group.j - cluster.j) + (group.y - cluster.y),
-          static_cast<float>(group.k - cluster.k) + (group.z - cluster.z), index};
-}
-
-// Sums of masses about a point, in nodes: first moments, mass, second moments (xx xy xz yy yz zz).
-CUTPROOF_DEVICE inline void add_masses(float* sum, float m, Float3 r) {
-  sum[0] += m * r.x;
-  sum[1] += m * r.y;
-  sum[2] += m * r.z;
-  sum[3] += m;
-  sum[4] += m * (r.x * r.x);
-  sum[5] += m * (r.x * r.y);
-  sum[6] += m * (r.x * r.z);
-  sum[7] += m * (r.y * r.y);
-  sum[8] += m * (r.y * r.z);
-  sum[9] += m * (r.z * r.z);
-}
-
 }  // namespace groups_detail
 
-// Clusters that have changed: how many particles and pairs of theirs may need places.
+// Lists the clusters that have changed, and counts how many of their particles and pairs may need places.
 template <class Block>
 CUTPROOF_DEVICE void find_changed_clusters_kernel(Block& block, const DeviceView& w) {
   using namespace groups_detail;
@@ -158,13 +136,13 @@ CUTPROOF_DEVICE void find_changed_clusters_kernel(Block& block, const DeviceView
 }
 CUTPROOF_KERNEL(find_changed_clusters_kernel);
 
-// Groups and loose particles of changed clusters are no more. By its first holder, in whose list it is: whoever's
-// clusters have changed had, as all of its group, a first one that has.
+// Dissolves the groups and the loose particles of changed clusters. The first holder of a group dissolves it: if one
+// holder of a group has changed, so has the first.
 template <class Block>
 CUTPROOF_DEVICE void dissolve_groups_kernel(Block& block, const DeviceView& w) {
   using namespace groups_detail;
   Counters& c = *w.counters;
-  // Where there is no room behind the groups that stay, none does.
+  // No group stays where there is no room behind those that would.
   const bool whole = block.load(&c.groups_whole) != 0 ||
                      c.placed + c.placed_last + c.due_particles > w.place_capacity ||
                      c.groups + c.due_particles / kLeastInGroup > w.group_capacity ||
@@ -173,7 +151,7 @@ CUTPROOF_DEVICE void dissolve_groups_kernel(Block& block, const DeviceView& w) {
     c.groups_before = whole ? 0 : c.groups;
     block.store(&c.groups_whole, whole ? 1 : 0);
   }
-  // Their tables.
+  // The tables of changed clusters are cleared.
   const Team<Block, kMemberTeam> team(block);
   const int clusters = whole ? c.slots_used : c.regrouped;
   for (int64_t i = team.first(); i < clusters; i += team.stride()) {
@@ -200,7 +178,7 @@ CUTPROOF_DEVICE void dissolve_groups_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL(dissolve_groups_kernel);
 
-// Each particle of a changed cluster finds its class in its first holder's table.
+// Puts each particle of a changed cluster into its class, in the table of its first holder.
 template <class Block>
 CUTPROOF_DEVICE void find_classes_kernel(Block& block, const DeviceView& w) {
   using namespace groups_detail;
@@ -208,13 +186,13 @@ CUTPROOF_DEVICE void find_classes_kernel(Block& block, const DeviceView& w) {
   Counters& c = *w.counters;
   const bool whole = c.groups_whole != 0;
   if (whole && block.first() == 0) c.groups = c.placed = c.placed_last = c.loose = c.pairs = 0;
-  // known: what DeviceView::regroup has of s.
+  // known: DeviceView::regroup of s, which may be older.
   const auto remeasure = [&](int s, int known) {
     if (known >= kRemeasured) return;
     if ((block.atomic_or(&w.regroup[s], kRemeasured) & kRemeasured) != 0) return;
     remeasured(w)[block.atomic_add(&c.remeasured, 1)] = s;
   };
-  // Several teams for each cluster: there may be few.
+  // Several teams work on each cluster, because there may be few.
   const int64_t jobs = int64_t{kShares} * (whole ? c.slots_used : c.regrouped);
   for (int64_t i = team.first(); i < jobs; i += team.stride()) {
     const int share = static_cast<int>(i % kShares),
@@ -253,8 +231,8 @@ CUTPROOF_DEVICE void find_classes_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL(find_classes_kernel);
 
-// Deals the classes of each cluster out to groups, and gives places to their particles. A block for each cluster, whose
-// lists are in shared memory, unless there are more than kMostDealt members.
+// Deals out the classes of each cluster to groups, and gives places to their particles. A block works on a cluster. The
+// lists of the cluster are in shared memory, unless it has more than kMostDealt members.
 template <class Block>
 CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
   using namespace groups_detail;
@@ -279,8 +257,8 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
     const int* const members = w.members + begin;
     const int* const classes = table(w) + begin;
     const bool fits = size <= kMostDealt;
-    // By member: the entry of its class in `classes`, -1 if that is not this cluster's to deal out, and how many of its
-    // class come before it. By entry: how many the class has.
+    // By member: the entry of its class in `classes`, or -1 if another cluster deals it out, and its rank in the class.
+    // By entry: the size of the class.
     const int* const entries = entry_of_member(w) + begin;
     const auto entry_at = [&](int k) { return fits ? shared[k] : entries[k]; };
     const auto rank_at = [&](int k) -> int& { return fits ? shared[kMostDealt + k] : rank_of(w)[members[k]]; };
@@ -293,7 +271,7 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
       block.sync();
     }
 
-    // Ranks, tile by tile in ascending order.
+    // Ranks are given tile by tile, in ascending order.
     const Team<Block, kMemberTeam> team(block);
     if (block.thread() < team.kLanes) {
       for (int tile = 0; tile < size; tile += team.kLanes) {
@@ -307,7 +285,7 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
     }
     block.sync();
 
-    // Places and numbers, for as many classes at once as there are threads.
+    // Each thread gives a class its places and numbers.
     for (int tile = 0; tile < size; tile += block.size()) {
       const int entry = tile + block.thread();
       const int first = entry < size ? block.load(&classes[entry]) - 1 : -1;  // a particle of the class
@@ -326,7 +304,7 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
       place_begin += next[0];
       group_begin += next[1];
       pair_begin += next[2];
-      block.sync();  // before the next tile has others
+      block.sync();  // all have read these before the next tile
       if (count == 0) continue;
       w.class_data[2 * int64_t{first}] = group_begin;
       w.class_data[2 * int64_t{first} + 1] = place_begin;
@@ -355,192 +333,9 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
       place(w, p, o);
       if (loose) w.loose_places[block.atomic_add(&counters.loose, 1)] = o;
     }
-    block.sync();  // before the next cluster's lists
+    block.sync();  // all have read these lists before the next cluster's
   }
 }
 CUTPROOF_KERNEL(deal_out_groups_kernel);
-
-// X_g, the moments of the masses about it, and the offsets from the holders' rest centres.
-template <class Block>
-CUTPROOF_DEVICE void measure_groups_kernel(Block& block, const DeviceView& w) {
-  using namespace groups_detail;
-  using Lanes = Team<Block, kGroupTeam>;
-  const Lanes team(block);
-  // Of a lane's own particles, which are asked for once.
-  constexpr int kEach = kMostInGroup / Lanes::kLanes;
-  struct Own {
-    Coordinates node;
-    float mass;  // what each holder gets of it
-  };
-  for (int64_t i = w.counters->groups_before + team.first(); i < w.counters->groups; i += team.stride()) {
-    const int g = static_cast<int>(i);
-    GroupHead head = w.group_head[g];
-    const int first = w.place_particle[head.begin];
-    const BodyConstants& body = w.body[head.body];
-    const float of_each = 1.0f / static_cast<float>(head.holder_count);
-    Own own[kEach];
-    const auto each = [&](auto visit) {  // visit(k, own)
-      for (int n = 0; n < kEach; ++n) {
-        const int k = n * team.kLanes + team.lane();
-        if (k < head.size) visit(k, own[n]);
-      }
-    };
-    each([&](int k, Own& of) {
-      of.node = coordinates(body, w.place_node[head.begin + k]);
-      of.mass = of_each * w.displacement[w.place_particle[head.begin + k]].w;
-    });
-    const Coordinates base = coordinates(body, w.place_node[head.begin]);
-    RestCenter center = {base.i, base.j, base.k, 0, 0, 0};
-    // Twice: what the first centre is off by is taken out.
-    for (int round = 0; round < 2; ++round) {
-      typename Lanes::template Sums<4> sums;
-      each([&](int k, const Own& of) {
-        const Float3 r = nodes_between(center, of.node);
-        float* const sum = sums.of(k);
-        sum[0] += of.mass * r.x;
-        sum[1] += of.mass * r.y;
-        sum[2] += of.mass * r.z;
-        sum[3] += of.mass;
-      });
-      const auto total = team.total(sums);
-      center.x += total.v[0] / total.v[3];
-      center.y += total.v[1] / total.v[3];
-      center.z += total.v[2] / total.v[3];
-    }
-    typename Lanes::template Sums<10> sums;
-    float farthest = 0, nearest = -INFINITY;  // less the square of the least distance
-    each([&](int k, const Own& of) {
-      const Float3 r = nodes_between(center, of.node);
-      add_masses(sums.of(k), of.mass, r);
-      farthest = fmaxf(farthest, dot(r, r));
-      nearest = fmaxf(nearest, -dot(r, r));
-    });
-    const auto total = team.total(sums);
-    farthest = team.greatest(farthest);
-    nearest = team.greatest(nearest);
-    int middle = head.size;  // the first of the nearest
-    each([&](int k, const Own& of) {
-      const Float3 r = nodes_between(center, of.node);
-      if (-dot(r, r) == nearest && k < middle) middle = k;
-    });
-    head.middle = -static_cast<int>(team.greatest(-static_cast<float>(middle)));
-    head.radius = sqrtf(farthest) * (1.0f + 0x1p-20f);
-    if (team.leads()) {
-      w.group_head[g] = head;
-      w.group_center[g] = center;
-      w.group_mass[g] = {total.v[0], total.v[1], total.v[2], total.v[3]};
-      w.group_spread[2 * i] = {total.v[4], total.v[5], total.v[6], total.v[7]};
-      w.group_spread[2 * i + 1] = {total.v[8], total.v[9], 0, 0};
-    }
-    const HolderList list = holders_of(w, first);
-    team.each(list.size, [&](int k) {
-      w.holders[head.holder_begin + k] = offset_between(center, rest_center(w, list.begin[k]), list.begin[k]);
-    });
-  }
-}
-CUTPROOF_KERNEL(measure_groups_kernel);
-
-// What each cluster is made of, and the moments of its members about its rest centre, which may have moved: so groups
-// that stay hear of it too.
-template <class Block>
-CUTPROOF_DEVICE void measure_clusters_kernel(Block& block, const DeviceView& w) {
-  using namespace groups_detail;
-  const Team<Block, kMemberTeam> team(block);
-  Counters& counters = *w.counters;
-  const bool whole = block.load(&counters.groups_whole) != 0;
-  const int clusters = whole ? counters.slots_used : counters.remeasured;
-  for (int64_t i = team.first(); i < clusters; i += team.stride()) {
-    const int s = whole ? static_cast<int>(i) : remeasured(w)[i], size = w.slot_size[s];
-    if (team.leads()) w.regroup[s] = 0;
-    if (size == 0) {
-      if (team.leads()) w.cluster_head[s] = {};
-      continue;
-    }
-    const BodyConstants& body = w.body[w.slot_body[s]];
-    const RestCenter center = rest_center(w, s);
-    const int* const members = w.members + w.slot_begin[s];
-    // A list of groups has a quarter of the room that the members have, for each group has kLeastInGroup of them.
-    const int list_begin = (w.slot_begin[s] + kLeastInGroup - 1) / kLeastInGroup;
-    int groups = 0, loose = 0;
-    typename Team<Block, kMemberTeam>::template Sums<10> sums;
-    // Several tiles at once: each of these steps waits for what the one before has asked for.
-    constexpr int kAtOnce = 6;
-    for (int tile = 0; tile < size; tile += kAtOnce * team.kLanes) {
-      int member[kAtOnce], at[kAtOnce], node[kAtOnce], share[kAtOnce], place[kAtOnce];
-      float mass[kAtOnce];
-      for (int t = 0; t < kAtOnce; ++t) {
-        const int k = tile + t * team.kLanes + team.lane();
-        member[t] = members[k < size ? k : 0];
-      }
-      for (int t = 0; t < kAtOnce; ++t) {
-        const int p = member[t];
-        at[t] = tile + t * team.kLanes + team.lane() < size ? w.group_at[p] : int{kInside};
-        node[t] = w.node[p];
-        mass[t] = w.displacement[p].w;
-        share[t] = w.membership_count[p];
-        place[t] = w.place_of[p];
-      }
-      Offset to[kAtOnce];
-      for (int t = 0; t < kAtOnce; ++t) {
-        if (at[t] >= 0) to[t] = offset_between(w.group_center[at[t]], center, at[t]);
-      }
-      for (int t = 0; t < kAtOnce; ++t) {
-        const int k = tile + t * team.kLanes + team.lane();
-        if (k < size) {
-          const Float3 r = nodes_between(center, coordinates(body, node[t]));
-          add_masses(sums.of(k), mass[t] / static_cast<float>(share[t]), r);
-        }
-        int found = 0;
-        const int before = team.rank(at[t] == kLoose, found);
-        if (at[t] == kLoose) w.cluster_loose[w.slot_begin[s] + loose + before] = place[t];
-        loose += found;
-        const int group = groups + team.rank(at[t] >= 0, found);
-        groups += found;
-        if (at[t] >= 0) w.cluster_groups[list_begin + group] = to[t];
-      }
-    }
-    // Groups that stay; those that are new have been told.
-    team.sync();  // the list
-    team.each(groups, [&](int k) {
-      const Offset to = w.cluster_groups[list_begin + k];
-      if (to.index >= counters.groups_before) return;
-      const GroupHead head = w.group_head[to.index];
-      const int end = head.holder_begin + head.holder_count;
-      for (int first = head.holder_begin; first < end; first += kAtOnce) {
-        int index[kAtOnce];
-        for (int j = 0; j < kAtOnce; ++j) index[j] = w.holders[first + j < end ? first + j : first].index;
-        for (int j = 0; j < kAtOnce; ++j) {
-          if (index[j] == s && first + j < end) w.holders[first + j] = {to.x, to.y, to.z, s};
-        }
-      }
-    });
-    const auto total = team.total(sums);
-    if (!team.leads()) continue;
-    w.cluster_head[s] = {list_begin, groups, w.slot_begin[s], loose};
-    w.cluster_rest[3 * int64_t{s}] = {total.v[0], total.v[1], total.v[2], total.v[3]};
-    w.cluster_rest[3 * int64_t{s} + 1] = {total.v[4], total.v[5], total.v[6], total.v[7]};
-    w.cluster_rest[3 * int64_t{s} + 2] = {total.v[8], total.v[9], 0, 0};
-  }
-}
-CUTPROOF_KERNEL(measure_clusters_kernel);
-
-// Groups of the clusters that have changed since the last time; none, if none has. Requires memberships in order.
-template <class Launcher>
-void enqueue_groups(Launcher& launcher, const DeviceView& w) {
-  launcher.teams(find_changed_clusters_kernel_object{}, kMemberTeam, w.slots_expected, w);
-  launcher.teams(dissolve_groups_kernel_object{}, kMemberTeam, w.slots_expected, w);
-  launcher.teams(find_classes_kernel_object{}, kMemberTeam, w.slots_expected, w);
-  launcher.blocks(deal_out_groups_kernel_object{}, w.slots_expected, kDealThreads, (3 * kMostDealt + 4) * sizeof(int),
-                  w);
-  launcher.teams(measure_groups_kernel_object{}, kGroupTeam, w.group_capacity, w);
-  launcher.teams(measure_clusters_kernel_object{}, kMemberTeam, w.slots_expected, w);
-  launcher.clear(&w.counters->groups_stale, 6 * sizeof(int));  // and the five behind it
-}
-// The same at any time, where nobody knows whether any has.
-template <class Launcher>
-void enqueue_groups_if_stale(Launcher& launcher, const DeviceView& w) {
-  Counters* const c = w.counters;  // an address only: counters lie on the device
-  launcher.if_nonzero(&c->groups_stale, [&](Launcher& stale) { enqueue_groups(stale, w); });
-}
 
 }  // namespace cutproof::gpu

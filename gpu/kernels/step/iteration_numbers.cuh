@@ -1,0 +1,120 @@
+// The numbers that an iteration has in every substep of a body: the weights of the Chebyshev semi-iteration, and how
+// much of the predicted shape is lost (docs/design/method.md §11, §13).
+#pragma once
+#include "gpu/state/device_view.h"
+
+namespace cutproof::gpu::step_detail {
+
+// Whether a body takes part in an iteration. A body with fewer substeps or iterations than others waits.
+CUTPROOF_DEVICE inline bool takes_part(const Pace& pace, int substep, int iteration) {
+  return substep < pace.substeps && iteration < pace.iterations;
+}
+
+// Chebyshev semi-iteration (docs/design/method.md §11) of order 1 and more: x + pull (g - x) + carry (x - earlier),
+// where the plain iteration goes from x to g. The recurrence of the weights in closed form, for j >= 2:
+// omega_j = (1 + q) (1 + q^(j-1)) / (1 + q^j), with q = ((1 - r) / (1 + r))² and r² = 1 - b.
+struct Combination {
+  float pull, carry;
+  template <class Number>
+  CUTPROOF_DEVICE Number operator()(Number plain, Number now, Number earlier) const {
+    return now + (pull * (plain - now) + carry * (now - earlier));
+  }
+};
+
+// 1 - b at least. The weights are made for eigenvalues in [0, b], with b = min(s, 0.95).
+inline constexpr float kLeastGap = 0.05f;
+CUTPROOF_DEVICE inline Combination chebyshev(float kdt2, int order) {
+  const float gap = 1.0f / (1.0f + kdt2);
+  const float r2 = gap > kLeastGap ? gap : kLeastGap;
+  const float r = sqrtf(r2);
+  const float root = (1.0f - r) / (1.0f + r);
+  const float q = root * root;
+  float omega = 1;
+  if (order > 1) {
+    float power = 1, square = q;  // power: q^(order - 1)
+    for (int n = order - 1; n > 0; n /= 2) {
+      if (n % 2 != 0) power *= square;
+      square *= square;
+    }
+    omega = (1.0f + q) * (1.0f + power) / (1.0f + q * power);
+  }
+  return {omega * (2.0f / (1.0f + r2)), omega - 1.0f};
+}
+
+// l: how much of the predicted shape of a group is lost after so many iterations.
+CUTPROOF_DEVICE inline float lost_fraction(const Pace& pace, int iterations) {
+  if (iterations == 0) return 0.0f;
+  if (pace.solver == Solver::implicit) return pace.s;
+  float kept = 1.0f, power = 1.0f - pace.s;
+  for (int n = iterations; n > 0; n /= 2) {
+    if (n % 2 != 0) kept *= power;
+    power *= power;
+  }
+  return 1.0f - kept;
+}
+
+// An iteration of a body.
+struct Iteration {
+  float s;
+  bool implicit;
+  bool combined;  // the first iteration is plain
+  bool keeps;     // stores what the next iteration needs; the last one does not
+  Combination combination;
+  float lost_before, lost_after;
+};
+CUTPROOF_DEVICE inline Iteration iteration_of(const Pace& pace, int iteration, const IterationNumbers& numbers) {
+  Iteration now = {};
+  now.s = pace.s;
+  now.implicit = pace.solver == Solver::implicit;
+  const bool accelerated = pace.acceleration == Acceleration::chebyshev;
+  now.combined = accelerated && iteration > 0;
+  now.keeps = accelerated && iteration + 1 < pace.iterations;
+  now.combination = {numbers.pull, numbers.carry};
+  now.lost_before = numbers.lost_before;
+  now.lost_after = numbers.lost_after;
+  return now;
+}
+// Computed once a frame, because a root and powers take long.
+CUTPROOF_DEVICE inline IterationNumbers iteration_numbers(const Pace& pace, float kdt2, int iteration) {
+  Combination combination = {};
+  if (pace.acceleration == Acceleration::chebyshev && iteration > 0) combination = chebyshev(kdt2, iteration);
+  return {combination.pull, combination.carry, lost_fraction(pace, iteration), lost_fraction(pace, iteration + 1)};
+}
+CUTPROOF_DEVICE inline IterationNumbers* numbers_of(const DeviceView& w, int body, int iteration) {
+  return &w.iterations[int64_t{body} * (w.most_iterations + 1) + iteration];
+}
+CUTPROOF_DEVICE inline Iteration iteration_of(const DeviceView& w, int body, const Pace& pace, int iteration) {
+  return iteration_of(pace, iteration, constant(numbers_of(w, body, iteration)));
+}
+// l at the end of a substep.
+CUTPROOF_DEVICE inline float lost_in_all(const DeviceView& w, int body, const Pace& pace) {
+  return constant(numbers_of(w, body, pace.iterations)).lost_before;
+}
+
+// Sets alpha and beta of the end of a substep. While a grip holds a group, its particles stay where the grip has put
+// them. An iteration then changes only their push: alpha (x - d~) + beta e - M(r). M is a map, like that of a carried
+// group.
+//
+// The recurrences follow from what an iteration does with one particle (advance_particle). Its pull is G(r) - e
+// (implicit), or G(r) - e - (x - d~) (published), with G the mean goal of its group.
+CUTPROOF_DEVICE inline void set_held_push(Pace& pace, float kdt2) {
+  float alpha = 1.0f, beta = 0.0f, earlier_alpha = 1.0f, earlier_beta = 0.0f;
+  for (int j = 0; j < pace.iterations; ++j) {
+    const Iteration now = iteration_of(pace, j, iteration_numbers(pace, kdt2, j));
+    const float push_factor = now.implicit ? now.s : 1.0f, weight = now.combined ? now.combination.pull : 1.0f;
+    const auto next = [&](float is, float was, float added) {
+      const float kept_push = now.combined ? now.combination(push_factor * is, is, was) : push_factor * is;
+      return kept_push + weight * added;
+    };
+    const float next_alpha = next(alpha, earlier_alpha, now.implicit ? 1.0f : now.s);
+    const float next_beta = next(beta, earlier_beta, now.s);
+    earlier_alpha = alpha;
+    earlier_beta = beta;
+    alpha = next_alpha;
+    beta = next_beta;
+  }
+  pace.held_alpha = alpha;
+  pace.held_beta = beta;
+}
+
+}  // namespace cutproof::gpu::step_detail
