@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Which of the long tests a commit runs. ci/test.sh runs a share of them, ci/nightly.sh all.
 
-Usage: long_tests.py BUILD    the first line is a pattern of those that are left out (ctest -E), the second is for a person
+Usage: long_tests.py BUILD    the first line is a pattern of those that are left out (ctest -E), the second for a person
 
 The commit's hash chooses every SHARE-th, so that a day of commits runs all of them. Each row says what no shorter test
 finds. No mutant of docs/results/mutation_testing.md needs one of them.
@@ -14,24 +14,25 @@ import sys
 
 SHARE = 4
 LONG = (
-    (r"Packaging\.subdirectory", "that the libraries compile inside a project of others, without its options"),
     (r"Independent\.TrajectoriesAndOrders", "a step that program and reference both have wrong; orders of convergence"),
+    (r"Packaging\.subdirectory", "that the libraries compile inside a project of others, without its options"),
     (r"OfThePaper/Scene\.Holds/(cluster_growth|kidney_37704)_on_.*", "faults where clusters and particles are many"),
     (r"InEveryScene/FaultySimulator\..*_kidney", "faults of simulators where nothing but a pull acts on two pieces"),
-    (r"FaultlessSimulator\.HoldsInTheSameScenes", "alarms of the same judge without a fault"),
     (r"Programs/Allocations\..*", "what a verb does wrongly when memory ends at some allocation of a whole run"),
     (r"Leaks\.AreNotIn(Recording|ReadingARecording)", "memory that HDF5 or its callers lose"),
-    (r"RecordingTest\.NeverGivesWrongDataFromADamagedFile", "damage to a recording that its reader takes for data"),
     (r"Program\.CheckGivesTheVerdictsThatTheRunGave", "a judge that needs more than a recording keeps"),
     (r"Report\.(InABrowser|ScenesInABrowser|HowFast)", "what a page draws, what a click does, and its pace"),
-    (r"Report\.OfStoredResults", "stored results of which no page can be made"),
+    (r"(PythonWithCudaStandIn\.Arrays|SciPy\.Judged)", "answers in a device's memory; a library that stops to hold"),
+    (r"(Vectors\.ThatThePageAnswersHold|Tutorial\.FromAFailingCutToTheFix)", "programs of a page that no longer run"),
+    (r"JudgeVerb\.JudgesStagesToo", "a verb that reports a plugin's stages wrongly"),
 )
 
 
 def main():
     if len(sys.argv) != 2:
         sys.exit(__doc__)
-    listed = subprocess.run(["ctest", "--test-dir", sys.argv[1], "--show-only=json-v1"], check=True, capture_output=True)
+    listed = subprocess.run(["ctest", "--test-dir", sys.argv[1], "--show-only=json-v1"], check=True,
+                            capture_output=True)
     names = [test["name"] for test in json.loads(listed.stdout)["tests"]]
     long_tests = [name for pattern, _ in LONG for name in names if re.fullmatch(pattern, name)]
     commit = subprocess.run(["git", "-C", pathlib.Path(__file__).parent, "rev-parse", "--short=12", "HEAD"],
@@ -39,7 +40,8 @@ def main():
     chosen = long_tests[int(commit, 16) % SHARE::SHARE]
     left_out = [re.sub(r"([^\w/])", r"[\1]", name) for name in long_tests if name not in chosen]
     print(f"^({'|'.join(left_out)})$")
-    print(f"LONG TESTS: {len(chosen)} of {len(long_tests)} by the commit {commit} (ci/nightly.sh runs all): {' '.join(chosen)}")
+    print(f"LONG TESTS: {len(chosen)} of {len(long_tests)} by the commit {commit} (ci/nightly.sh runs all): "
+          f"{' '.join(chosen)}")
 
 
 if __name__ == "__main__":
