@@ -24,6 +24,8 @@ LONG = (
     (r"Report\.(InABrowser|ScenesInABrowser|HowFast)", "what a page draws, what a click does, and its pace"),
     (r"(PythonWithCudaStandIn\.Arrays|SciPy\.Judged)", "answers in a device's memory; a library that stops to hold"),
     (r"(Vectors\.ThatThePageAnswersHold|Tutorial\.FromAFailingCutToTheFix)", "programs of a page that no longer run"),
+    (r"BenchSensitivity\.HasARowForEachDisturbanceAndStage", "a disturbance that the suite has no row for"),
+    (r"Skin\.LiesOnTheSurfaceOfAnUncutBody", "a skin that reference, kernels and oracles all have off the surface"),
     (r"JudgeVerb\.JudgesStagesToo", "a verb that reports a plugin's stages wrongly"),
 )
 
