@@ -1,11 +1,36 @@
 #!/usr/bin/env python3
-"""Prints which tests were skipped or left out, and as the last line the counts. Usage: count_tests.py REPORT STATUS GPU
+"""Prints which tests were skipped or left out, which kernels no device has run yet, and as the last line the counts.
 
-REPORT is CTest's JUnit file, STATUS CTest's exit status, GPU what `cutproof info` says of the backend gpu. Exits 1 if a test failed or none ran.
+Usage: count_tests.py REPORT STATUS GPU
+
+REPORT is CTest's JUnit file, STATUS CTest's exit status, GPU what `cutproof info` says of the backend gpu. Exits 1 if a
+test failed or none ran.
 """
 import os
+import pathlib
+import re
+import subprocess
 import sys
 import xml.etree.ElementTree as tree
+
+RESULTS = pathlib.Path(__file__).resolve().parent.parent / "docs" / "results"
+ON_A_DEVICE = re.compile(r'"device": ?"NVIDIA')
+COMMIT = re.compile(r'"commit": ?"([0-9a-f]+)"')
+
+
+def kernels_since_the_last_run():
+    """The kernel sources that differ from those of the newest commit of which a run on a device is stored."""
+    def git(*arguments):
+        return subprocess.run(["git", "-C", RESULTS, *arguments], capture_output=True, text=True).stdout.split()
+
+    texts = (file.read_text() for file in RESULTS.glob("*.json"))
+    stored = {commit for text in texts if ON_A_DEVICE.search(text) for commit in COMMIT.findall(text)}
+    newest = next((commit for commit in git("rev-list", "HEAD") if any(commit.startswith(short) for short in stored)), None)
+    if newest is None:
+        return "no stored run on a device is of a commit that is known here"
+    changed = git("diff", "--name-only", newest, "--", ":/gpu/kernels", ":/gpu/device")
+    since = f"kernel sources changed since {newest[:12]}, the last stored run on a device"
+    return f"{len(changed)} {since}: {' '.join(changed)}" if changed else f"no {since}"
 
 
 def main():
@@ -31,6 +56,7 @@ def main():
         print("SKIPPED: tests on outside meshes (CUTPROOF_MESHES is not set)")
     if "not built" in gpu or "none" in gpu:
         print(f"NOT RUN: the backend gpu ({gpu}); ci/gpu_kit.sh packs its tests for a machine that has a GPU")
+    print(f"KERNELS: {kernels_since_the_last_run()}")
     if not passed and not failed:
         print("no test was run")
     wrong = bool(failed) or not passed or status != 0

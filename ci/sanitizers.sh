@@ -12,6 +12,6 @@ for preset in ${*:-asan tsan odr}; do
     cmake --preset odr >/dev/null
     cmake --build build/odr --target cutproof
   else
-    CUTPROOF_PRESET=$preset ci/test.sh
+    CUTPROOF_WHOLE=1 CUTPROOF_PRESET=$preset ci/test.sh
   fi
 done

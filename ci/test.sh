@@ -1,5 +1,7 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds, runs every test. The last line is "N passed, N failed, N skipped".
+# Installs what is missing, builds, runs every test, and of the long ones a share that the commit chooses
+# (ci/long_tests.py). The last line is "N passed, N failed, N skipped".
+# CUTPROOF_WHOLE=1: all of the long ones (ci/nightly.sh).
 # CUTPROOF_MESHES: a folder with outside meshes; tests on them say so when it is unset.
 # CUTPROOF_PRESET: another preset of CMakePresets.json (debug, asan, tsan).
 set -euo pipefail
@@ -18,7 +20,15 @@ PATH=$(python3 ci/packages.py --path "$build/programs")
 export PATH
 report=$build/tests.xml
 status=0
+long="LONG TESTS: all"
+left_out=()
+if [ "${CUTPROOF_WHOLE:-}" != 1 ]; then
+  share=$(python3 ci/long_tests.py "$build")
+  left_out=(-E "${share%%$'\n'*}")
+  long=${share#*$'\n'}
+fi
 # One test more than there are cores: some wait for a browser or a clock.
-ctest --test-dir "$build" --output-on-failure --no-tests=error -j "$(($(nproc) + 1))" --output-junit "$PWD/$report" || status=$?
+ctest --test-dir "$build" --output-on-failure --no-tests=error "${left_out[@]}" -j "$(($(nproc) + 1))" --output-junit "$PWD/$report" || status=$?
 [ -s "$report" ] || { echo "no test was run"; echo "0 passed, 1 failed, 0 skipped"; exit 1; }
+echo "$long"
 exec python3 ci/count_tests.py "$report" "$status" "$("$build/cli/cutproof" info | grep -E "^ +gpu ")"

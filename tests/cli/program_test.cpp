@@ -233,7 +233,7 @@ TEST_F(Program, CallsIsolationAFailureUnlessTheSceneExpectsIt) {
   json foreign = json::parse(file);
   foreign["expect"].erase("isolated_clusters");
   write("isolated.json", foreign.dump());
-  const Outcome outcome = cutproof("run isolated.json --check");
+  const Outcome outcome = cutproof("run isolated.json --check topology");
   EXPECT_EQ(outcome.status, 1) << outcome.output;
   EXPECT_NE(outcome.output.find("FAILS: isolation"), std::string::npos) << outcome.output;
 }

@@ -1,0 +1,50 @@
+#!/usr/bin/env python3
+"""Which of the long tests a commit runs. ci/test.sh runs a share of them, ci/nightly.sh all.
+
+Usage: long_tests.py BUILD    the first line is a pattern of those that are left out (ctest -E), the second for a person
+
+The commit's hash chooses every SHARE-th, so that a day of commits runs all of them. Each row says what no shorter test
+finds. No mutant of docs/results/mutation_testing.md needs one of them.
+"""
+import json
+import pathlib
+import re
+import subprocess
+import sys
+
+SHARE = 4
+LONG = (
+    (r"Independent\.TrajectoriesAndOrders", "a step that program and reference both have wrong; orders of convergence"),
+    (r"Packaging\.subdirectory", "that the libraries compile inside a project of others, without its options"),
+    (r"OfThePaper/Scene\.Holds/.*", "faults where clusters and particles are many; what the paper's scenes come to"),
+    (r".*/FaultySimulator\..*", "a fault of a whole simulator that the judge of a scene accepts"),
+    (r"Programs/Allocations\..*", "what a verb does wrongly when memory ends at some allocation of a whole run"),
+    (r"Program\.CheckGivesTheVerdictsThatTheRunGave", "a judge that needs more than a recording keeps"),
+    (r"Report\.(InABrowser|ScenesInABrowser|HowFast)", "what a page draws, what a click does, and its pace"),
+    (r"(PythonWithCudaStandIn\.Arrays|SciPy\.Judged)", "answers in a device's memory; a library that stops to hold"),
+    (r"(Vectors\.ThatThePageAnswersHold|Tutorial\.FromAFailingCutToTheFix)", "programs of a page that no longer run"),
+    (r"BenchSensitivity\.HasARowForEachDisturbanceAndStage", "a disturbance that the suite has no row for"),
+    (r"Skin\.LiesOnTheSurfaceOfAnUncutBody", "a skin that reference, kernels and oracles all have off the surface"),
+    (r"JudgeVerb\.JudgesStagesToo", "a verb that reports a plugin's stages wrongly"),
+)
+
+
+def main():
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    listed = subprocess.run(["ctest", "--test-dir", sys.argv[1], "--show-only=json-v1"], check=True,
+                            capture_output=True)
+    # The name of a test with a parameter goes on with its value, in words.
+    names = [test["name"].partition("  #")[0] for test in json.loads(listed.stdout)["tests"]]
+    long_tests = [name for pattern, _ in LONG for name in names if re.fullmatch(pattern, name)]
+    commit = subprocess.run(["git", "-C", pathlib.Path(__file__).parent, "rev-parse", "--short=12", "HEAD"],
+                            check=True, capture_output=True, text=True).stdout.strip()
+    chosen = long_tests[int(commit, 16) % SHARE::SHARE]
+    left_out = [re.sub(r"([^\w/])", r"[\1]", name) for name in long_tests if name not in chosen]
+    print(f"^({'|'.join(left_out)})(  #.*)?$")
+    print(f"LONG TESTS: {len(chosen)} of {len(long_tests)} by the commit {commit} (ci/nightly.sh runs all): "
+          f"{' '.join(chosen)}")
+
+
+if __name__ == "__main__":
+    main()
