@@ -183,7 +183,7 @@ void print_not_taken(const json& document) {
 }
 
 void print_found(const TuneOptions& options, const json& document) {
-  const json &found = document.at("found"), &given = document.at("trials").front();
+  const json& found = document.at("found");
   const auto index = found.at("trial").get<std::size_t>();
   const json& trial = document.at("trials").at(index);
   const std::string tuned =

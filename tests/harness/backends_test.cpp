@@ -37,7 +37,8 @@ TEST(Backends, HaveTheArithmeticOfTheirDescriptionAndRunEverySpan) {
     EXPECT_EQ(backend->precision(), described->precision) << described->name;
     for (const Stage first : kStages) {
       for (const Stage last : kStages) {
-        if (first <= last) EXPECT_TRUE(backend->can_run({first, last})) << described->name;
+        if (first > last) continue;
+        EXPECT_TRUE(backend->can_run({first, last})) << described->name;
       }
     }
   }

@@ -12,7 +12,8 @@ using nlohmann::json;
 // 6 × 5 × 5 particles, which rest at 0.5, 1.5, … h of the box. The blade goes down at 2.7 h of 6: it takes the layer at
 // 2.5 h.
 constexpr const char* kScene = R"({"version": 5, "name": "small",
-  "body": {"shape": {"kind": "box", "size": [0.06, 0.05, 0.05]}, "spacing": 0.01},
+  "body": {"shape": {"kind": "box", "size": [0.06, 0.05, 0.05]}, "spacing": 0.01, "fit_skin": false},
+  "skin": {"fit_cuts": false},
   "frame": {"settle": 0.032}, "step": {"acceleration": "none"}, "detect": {"criterion": "geometric"},
   "blade": {"speed": 1, "strokes": [{"points": [[0.45, 0.5, 1.3], [0.45, 0.5, -0.3]], "along": [0, 1, 0]}]}})";
 

@@ -14,7 +14,8 @@ namespace cutproof::tests {
 
 // 10 × 3 × 4 particles in overlapping clusters, cut in two by one stroke, skinned.
 inline constexpr const char* kForeignScene = R"({"version": 5, "name": "foreign",
-  "body": {"shape": {"kind": "box", "size": [0.1, 0.03, 0.04]}, "spacing": 0.01}, "clusters": {"side": 3},
+  "body": {"shape": {"kind": "box", "size": [0.1, 0.03, 0.04]}, "spacing": 0.01, "fit_skin": false},
+  "clusters": {"side": 3}, "skin": {"fit_cuts": false},
   "frame": {"settle": 0.016}, "step": {"acceleration": "none"}, "detect": {"criterion": "geometric"},
   "ground": {"friction": 0.5},
   "blade": {"speed": 2, "strokes": [{"points": [[0.5, 0.5, 1.3], [0.5, 0.5, -0.3]], "along": [0, 1, 0]}]}})";

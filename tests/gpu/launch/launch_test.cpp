@@ -197,7 +197,7 @@ TEST_P(LaunchOnHost, SharedMemoryBeyondTheGrantOrTakenDifferentlyIsAFault) {
 
 TEST_P(LaunchOnHost, BlockSizesThatTheDeviceWouldRefuseAreRefused) {
   EXPECT_THROW(machine.launcher.blocks(take_shared_kernel_object{}, 1, 48, 0, 0, false), std::logic_error);
-  EXPECT_THROW(machine.launcher.blocks(take_shared_kernel_object{}, 1, 192, 0, 0, false), std::logic_error);
+  EXPECT_THROW(machine.launcher.blocks(take_shared_kernel_object{}, 1, 200, 0, 0, false), std::logic_error);
   EXPECT_THROW(machine.launcher.blocks(take_shared_kernel_object{}, 1, 512, 0, 0, false), std::logic_error);
   EXPECT_NO_THROW(machine.launcher.blocks(take_shared_kernel_object{}, 1, 256, 0, 0, false));
 }
