@@ -42,7 +42,7 @@ namespace fields_detail {
 // These do not compile when a member is added or taken away: then the lists below are to be changed as well.
 inline void know_every_member(const Setup& setup) {
   [[maybe_unused]] const auto& [body, step, detect, split, merge, expand, skin, walls, grips, has_blade, blade,
-                                substep_length, blade_moves, stroke_end] = setup;
+                                substep_length, blade_moves, stroke_end, withheld_iterations] = setup;
   [[maybe_unused]] const auto& [name, grid, node, particle_at, rest, edge_offsets, edge_ends, mass, surface_crossing,
                                 origin, orientation] = body;
   [[maybe_unused]] const auto& [nodes, spacing] = grid;

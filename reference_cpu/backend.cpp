@@ -47,6 +47,7 @@ class ReferenceBackend final : public Backend {
  public:
   std::string name() const override { return "reference"; }
   bool can_run(Span) const override { return true; }
+  bool shows_iterates() const override { return true; }
 
   void load(std::vector<Setup> setups, std::vector<State> states) override {
     require(setups.size() == states.size(), "as many states as setups are needed");

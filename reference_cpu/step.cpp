@@ -126,7 +126,8 @@ Vec3 goal(const Body& body, const Memberships& memberships, const Clusters& clus
   return sum / static_cast<double>(memberships.count(i));
 }
 
-void substep(const Setup& setup, const Memberships& memberships, int64_t index, double dt, State& state) {
+void substep(const Setup& setup, const Memberships& memberships, int64_t index, int32_t iterations, double dt,
+             State& state) {
   const StepParameters& parameters = setup.step;
   const Body& body = setup.body;
   const int32_t n = body.particle_count();
@@ -163,7 +164,7 @@ void substep(const Setup& setup, const Memberships& memberships, int64_t index, 
 
   std::vector<Vec3> earlier = y;  // one iteration ago
   Vec3 pushed_earlier = pushed;
-  for (int32_t iteration = 0; iteration < parameters.iterations; ++iteration) {
+  for (int32_t iteration = 0; iteration < iterations; ++iteration) {
     const std::vector<Pose> poses = match_shapes(body, memberships, y, state.clusters);
     const std::vector<Vec3> now = y;
     Vec3 pushed_now;
@@ -216,7 +217,9 @@ void step(const Setup& setup, State& state) {
       setup.step.iterations > 0 ? memberships_of(state.clusters, setup.body.particle_count()) : Memberships{};
   const double dt = setup.substep_length[at(state.frame)];
   for (int32_t s = 0; s < setup.step.substeps; ++s) {
-    substep(setup, memberships, state.frame * setup.step.substeps + s, dt, state);
+    const bool is_last = s + 1 == setup.step.substeps;
+    const int32_t iterations = setup.step.iterations - (is_last ? setup.withheld_iterations : 0);
+    substep(setup, memberships, state.frame * setup.step.substeps + s, iterations, dt, state);
   }
 }
 

@@ -17,6 +17,7 @@ class HostBackend final : public KernelBackend {
 
   std::string name() const override { return name_; }
   Precision precision() const override { return Precision::binary32; }
+  bool shows_iterates() const override { return true; }
   bool can_run(Span) const override { return true; }
 
   void load(std::vector<Setup> setups, std::vector<State> states) override {

@@ -49,7 +49,7 @@ struct BodyConstants {
   float h;
   Solver solver;
   Acceleration acceleration;
-  int substeps, iterations;
+  int substeps, iterations, last_iterations;  // last: of the last substep of a frame
   float stiffness, relaxation, damping, retardation;
   Float3 gravity;
   Criterion criterion;
@@ -97,7 +97,7 @@ struct GripF {
 // else to wait for before their own work.
 struct alignas(128) Pace {
   int64_t first_move;        // of the blade in this frame, in DeviceView::moves; -1: none, or one that touches nothing
-  int substeps, iterations;  // 0: its schedule is over
+  int substeps, iterations, last_iterations;  // 0: its schedule is over
   int frame;
   float h, per_h;
   float prediction_time;        // dt + τ: from the start of a substep to y (step/prediction.cuh)
@@ -110,7 +110,8 @@ struct alignas(128) Pace {
   Acceleration acceleration;
   int nodes[2];
   Divider by_row, by_layer;
-  int wall_begin, wall_count, frictionless_walls;
+  int wall_begin;
+  short wall_count, frictionless_walls;
   float half_length, depth, clearance, blade_friction;
 };
 static_assert(sizeof(Pace) == 128);

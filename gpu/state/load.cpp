@@ -1,5 +1,6 @@
 // From setups and states to staging buffers.
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -69,6 +70,7 @@ void add_constants(StagingBuffers& staging, const Setup& setup, const State& sta
   body.acceleration = setup.step.acceleration;
   body.substeps = setup.step.substeps;
   body.iterations = setup.step.iterations;
+  body.last_iterations = setup.step.iterations - setup.withheld_iterations;
   body.stiffness = f(setup.step.stiffness);
   body.relaxation = f(setup.step.relaxation);
   body.damping = f(setup.step.damping);
@@ -107,6 +109,10 @@ void add_constants(StagingBuffers& staging, const Setup& setup, const State& sta
       move = {pose_of(given.from), pose_of(given.to), given.down};
     }
     staging.moves.push_back(move);
+  }
+  if (setup.walls.size() > std::numeric_limits<short>::max()) {  // Pace::wall_count
+    throw MachineError("the kernels count the walls of a body with 16 bits, and this one has " +
+                       std::to_string(setup.walls.size()));
   }
   body.wall_begin = narrow(static_cast<int64_t>(staging.walls.size()), "walls");
   for (const Wall& wall : setup.walls)

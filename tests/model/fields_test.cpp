@@ -88,7 +88,7 @@ TEST(Fields, AreTheMembersOfASetupEachOnce) {
   Visited visited;
   for_each_setup_field([&](const SetupField&, auto get) { visited.see(get(setup)); });
   const auto& [body, step, detect, split, merge, expand, skin, walls, grips, has_blade, blade, substep_length,
-               blade_moves, stroke_end] = setup;
+               blade_moves, stroke_end, withheld_iterations] = setup;
   const auto& [name, grid, node, particle_at, rest, edge_offsets, edge_ends, mass, surface_crossing, origin,
                orientation] = body;
   const auto& [nodes, spacing] = grid;

@@ -9,6 +9,7 @@
 #include "gpu/kernels/step/iteration_numbers.cuh"
 #include "gpu/kernels/step/lists.cuh"
 #include "gpu/kernels/step/moments.cuh"
+#include "gpu/kernels/step/pace.cuh"
 #include "gpu/kernels/step/particle.cuh"
 #include "gpu/kernels/step/tracked.cuh"
 #include "gpu/kernels/step/untouched.cuh"
@@ -123,11 +124,12 @@ CUTPROOF_DEVICE void end_group(const AnyTeam& team, const DeviceView& w, int g) 
   if (head.size == 0 || pace.substeps == 0) return;
   if constexpr (kContacts) {
     if (w.group_tracked[g] != kUntouched) {
-      const Ending ending = ending_of(w, body, pace, g);
+      const Pace at_end = pace_at_end(w, body);
+      const Ending ending = ending_of(w, body, pace.last_iterations, g);
       team.each(head.size, [&](int k) {
         const int p = w.place_particle[head.begin + k];
         Float3 v;
-        w.displacement[p] = end_tracked<kRetarded>(w, pace, group, ending, k, v);
+        w.displacement[p] = end_tracked<kRetarded>(w, at_end, group, ending, k, v);
         w.velocity[p] = with_w(v, 0.0f);
       });
       return;
@@ -135,11 +137,11 @@ CUTPROOF_DEVICE void end_group(const AnyTeam& team, const DeviceView& w, int g) 
   }
   const Origin origin = origin_of(w, g);
   const FrameParts before = load_parts(w, body, pace.substeps - 1), after = load_parts(w, body, pace.substeps);
-  const float lost = lost_in_all(w, body, pace);
+  const float lost = lost_in_all(w, body, pace.last_iterations);
   Map start, end;
   for (int axis = 0; axis < 3; ++axis) {
     const int64_t at = 3 * int64_t{g} + axis;
-    const Float4 map = pace.iterations > 0 ? w.group_map[at] : Float4{};
+    const Float4 map = pace.last_iterations > 0 ? w.group_map[at] : Float4{};
     const Axis now = load_axis(w, at);
     start.row[axis] = now.place;
     end.row[axis] = axis_after<kRetarded>(pace, axis, lost, origin, predicted_parts(pace, before), map, now).place;

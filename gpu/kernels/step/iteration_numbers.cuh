@@ -7,7 +7,8 @@ namespace cutproof::gpu::step_detail {
 
 // Whether a body takes part in an iteration. A body with fewer substeps or iterations than others waits.
 CUTPROOF_DEVICE inline bool takes_part(const Pace& pace, int substep, int iteration) {
-  return substep < pace.substeps && iteration < pace.iterations;
+  const int iterations = substep + 1 < pace.substeps ? pace.iterations : pace.last_iterations;
+  return substep < pace.substeps && iteration < iterations;
 }
 
 // Chebyshev semi-iteration (docs/design/method.md §11) of order 1 and more: x + pull (g - x) + carry (x - earlier),
@@ -86,20 +87,20 @@ CUTPROOF_DEVICE inline IterationNumbers* numbers_of(const DeviceView& w, int bod
 CUTPROOF_DEVICE inline Iteration iteration_of(const DeviceView& w, int body, const Pace& pace, int iteration) {
   return iteration_of(pace, iteration, constant(numbers_of(w, body, iteration)));
 }
-// l at the end of a substep.
-CUTPROOF_DEVICE inline float lost_in_all(const DeviceView& w, int body, const Pace& pace) {
-  return constant(numbers_of(w, body, pace.iterations)).lost_before;
+// l at the end of a substep of so many iterations.
+CUTPROOF_DEVICE inline float lost_in_all(const DeviceView& w, int body, int iterations) {
+  return constant(numbers_of(w, body, iterations)).lost_before;
 }
 
-// Sets alpha and beta of the end of a substep. While a grip holds a group, its particles stay where the grip has put
-// them. An iteration then changes only their push: alpha (x - d~) + beta e - M(r). M is a map, like that of a carried
-// group.
+// Sets alpha and beta of the end of a substep of so many iterations. While a grip holds a group, its particles stay
+// where the grip has put them. An iteration then changes only their push: alpha (x - d~) + beta e - M(r). M is a map,
+// like that of a carried group.
 //
 // The recurrences follow from what an iteration does with one particle (advance_particle). Its pull is G(r) - e
 // (implicit), or G(r) - e - (x - d~) (published), with G the mean goal of its group.
-CUTPROOF_DEVICE inline void set_held_push(Pace& pace, float kdt2) {
+CUTPROOF_DEVICE inline void set_held_push(Pace& pace, float kdt2, int iterations) {
   float alpha = 1.0f, beta = 0.0f, earlier_alpha = 1.0f, earlier_beta = 0.0f;
-  for (int j = 0; j < pace.iterations; ++j) {
+  for (int j = 0; j < iterations; ++j) {
     const Iteration now = iteration_of(pace, j, iteration_numbers(pace, kdt2, j));
     const float push_factor = now.implicit ? now.s : 1.0f, weight = now.combined ? now.combination.pull : 1.0f;
     const auto next = [&](float is, float was, float added) {

@@ -31,11 +31,11 @@ CUTPROOF_DEVICE inline float kdt2_of(const BodyConstants& body, const Pace& pace
 // Stores the numbers of all substeps and iterations of a body in this frame.
 CUTPROOF_DEVICE inline void store_numbers(const DeviceView& w, int body, const Pace& pace) {
   const float kdt2 = kdt2_of(w.body[body], pace);
-  const float lost = lost_fraction(pace, pace.iterations);
+  const float lost = lost_fraction(pace, pace.iterations), lost_at_last = lost_fraction(pace, pace.last_iterations);
   FrameParts now = first_parts();
   for (int substep = 0; substep <= pace.substeps; ++substep) {
     *parts_of(w, body, substep) = {now.place.shape, now.place.motion, now.velocity.shape, now.velocity.motion};
-    now = parts_after(pace, lost, now);
+    now = parts_after(pace, substep + 1 < pace.substeps ? lost : lost_at_last, now);
   }
   for (int iteration = 0; iteration <= pace.iterations; ++iteration) {
     *numbers_of(w, body, iteration) = iteration_numbers(pace, kdt2, iteration);
@@ -49,6 +49,7 @@ CUTPROOF_DEVICE inline Pace pace_of(const DeviceView& w, int b) {
   if (!running(w, b)) return pace;
   pace.substeps = body.substeps;
   pace.iterations = body.iterations;
+  pace.last_iterations = body.last_iterations;
   pace.frame = w.frame[b];
   pace.h = body.h;
   pace.per_h = 1.0f / body.h;
@@ -70,7 +71,7 @@ CUTPROOF_DEVICE inline Pace pace_of(const DeviceView& w, int b) {
     pace.first_move = body.schedule + int64_t{pace.frame} * body.substeps;
   }
   pace.wall_begin = body.wall_begin;
-  pace.wall_count = body.wall_end - body.wall_begin;
+  pace.wall_count = static_cast<short>(body.wall_end - body.wall_begin);
   pace.frictionless_walls = 1;
   for (int k = body.wall_begin; k < body.wall_end; ++k) {
     if (w.walls[k].friction != 0) pace.frictionless_walls = 0;
@@ -79,7 +80,13 @@ CUTPROOF_DEVICE inline Pace pace_of(const DeviceView& w, int b) {
   pace.depth = body.blade_depth;
   pace.clearance = body.clearance;
   pace.blade_friction = body.blade_friction;
-  set_held_push(pace, kdt2);
+  set_held_push(pace, kdt2, pace.iterations);
+  return pace;
+}
+// The pace with which the last substep of a frame ends.
+CUTPROOF_DEVICE inline Pace pace_at_end(const DeviceView& w, int body) {
+  Pace pace = constant(&w.pace[body]);
+  if (pace.last_iterations != pace.iterations) set_held_push(pace, kdt2_of(w.body[body], pace), pace.last_iterations);
   return pace;
 }
 

@@ -25,9 +25,9 @@ struct Ending {
   float lost;
   int state;
 };
-CUTPROOF_DEVICE inline Ending ending_of(const DeviceView& w, int body, const Pace& pace, int g) {
-  Ending ending = {{}, xyz(w.group_base[g]), lost_in_all(w, body, pace), w.group_resolved[g]};
-  if (pace.iterations > 0) ending.map = load_map(w.group_map, g);
+CUTPROOF_DEVICE inline Ending ending_of(const DeviceView& w, int body, int iterations, int g) {
+  Ending ending = {{}, xyz(w.group_base[g]), lost_in_all(w, body, iterations), w.group_resolved[g]};
+  if (iterations > 0) ending.map = load_map(w.group_map, g);
   return ending;
 }
 // Displacement and mass of particle k of a tracked group at the end of a substep. Sets its velocity, and ends its
@@ -80,7 +80,7 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const Devi
     }
     list_tracked(block, team, w, g, substep, tracked_so_far);
   } else {
-    const Ending ending = ending_of(w, body, pace, g);
+    const Ending ending = ending_of(w, body, pace.iterations, g);
     const float per_holder = 1.0f / static_cast<float>(head.holder_count);
     bool in_front = false, in_back = false;  // of the blade, at the start of the substep
     Float3 start_base;                       // a displacement of one of its particles at the start of the substep

@@ -158,7 +158,7 @@ CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& tea
   const Parts of_prediction = predicted_parts(pace, parts);
   Parts of_last_prediction = {};
   if (active) of_last_prediction = predicted_parts(pace, load_parts(w, body, substep - 1));
-  const float lost = lost_in_all(w, body, pace), per_h = pace.per_h;
+  const float lost = lost_in_all(w, body, pace.iterations), per_h = pace.per_h;
   block.wait_for_earlier();
   if (!active) return false;
   [[maybe_unused]] int state = kUntouched;
