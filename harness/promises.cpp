@@ -21,7 +21,8 @@ constexpr std::array kTissueKept = {std::string_view("tissue kept")};
 constexpr std::array kRestFrames = {std::string_view("rest frames")};
 constexpr std::array kRotations = {std::string_view("rotation"), std::string_view("rotation match")};
 constexpr std::array kMomentum = {std::string_view("linear momentum"), std::string_view("component momentum")};
-constexpr std::array kMotion = {std::string_view("motion"), std::string_view("admissible step")};
+constexpr std::array kMotion = {std::string_view("motion"), std::string_view("admissible step"),
+                                std::string_view("step by iterates")};
 constexpr std::array kBladeOut = {std::string_view("no pass")};
 constexpr std::array kSkin = {std::string_view("skin match"),     std::string_view("skin surface"),
                               std::string_view("skin vertices"),  std::string_view("skin shells"),

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "model/at.h"
+#include "oracles/iterates/probe.h"
 #include "oracles/oracles.h"
 #include "oracles/relations/relations.h"
 
@@ -66,7 +67,9 @@ void RelationSample::ask(const State& begin) {
   for (Verdict verdict : {oracles::no_ghost_force(*second_, setup_, begin, particle, h * kKick, 1),
                           oracles::energy_is_monotone(*second_, frictionless_, begin, iterations),
                           oracles::rest_is_fixed(*second_, setup_, begin),
-                          oracles::translation_is_exact(*second_, setup_, begin, (h / dt) * kThrow)}) {
+                          oracles::translation_is_exact(*second_, setup_, begin, (h / dt) * kThrow),
+                          oracles::step_by_iterates(*second_, setup_, begin, oracles::Iterates::sampled,
+                                                    static_cast<uint64_t>(begin.frame))}) {
     verdict.stage = Stage::step;
     verdict.frame = begin.frame;
     verdicts_.push_back(std::move(verdict));

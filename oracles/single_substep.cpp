@@ -1,5 +1,7 @@
 #include "oracles/single_substep.h"
 
+#include <utility>
+
 #include "oracles/support.h"
 
 namespace cutproof::oracles {
@@ -33,15 +35,42 @@ Setup single_substep_setup(const Setup& setup, int64_t frame) {
   return single;
 }
 
-Setup undisturbed(Setup setup) {
-  setup.has_blade = false;
-  setup.blade_moves.clear();
+Setup first_substeps(const Setup& setup, int64_t frame, int32_t count) {
+  Setup first = setup;
+  first.step.substeps = count;
+  first.substep_length = {setup.substep_length[at(frame)]};
+  first.stroke_end.clear();
+  const auto begin = static_cast<std::ptrdiff_t>(frame * setup.step.substeps);
+  const auto cut = [&](auto& values) {
+    if (values.empty()) return;
+    values.erase(values.begin() + begin + count, values.end());
+    values.erase(values.begin(), values.begin() + begin);
+  };
+  cut(first.blade_moves);
+  for (Grip& grip : first.grips) {
+    cut(grip.active);
+    cut(grip.displacement);
+  }
+  return first;
+}
+
+Setup step_alone(Setup setup) {
+  if (setup.detect.criterion == Criterion::geometric) {
+    setup.has_blade = false;
+    setup.blade_moves.clear();
+  }
   setup.stroke_end.clear();
-  setup.walls.clear();
-  setup.grips.clear();
   remove_nothing(setup.detect);
   setup.skin.wanted = false;
   return setup;
+}
+
+Setup undisturbed(Setup setup) {
+  setup.has_blade = false;
+  setup.blade_moves.clear();
+  setup.walls.clear();
+  setup.grips.clear();
+  return step_alone(std::move(setup));
 }
 
 }  // namespace cutproof::oracles

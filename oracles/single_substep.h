@@ -12,6 +12,13 @@ void take_substep(const Setup& setup, int64_t frame, int64_t substep, Setup& sin
 // Both for the first substep of a frame: a scene of its own.
 Setup single_substep_setup(const Setup& setup, int64_t frame);
 
+// A frame cut to its first `count` substeps: a scene of its own. Requires as above, and 0 < count <= substeps.
+Setup first_substeps(const Setup& setup, int64_t frame, int32_t count);
+
+// Frames of which nothing but the step acts: nothing is removed, and there is no skin. A geometric blade touches
+// nothing, so it goes.
+Setup step_alone(Setup setup);
+
 // Nothing acts from outside: no blade, walls, grips; nothing is removed, and there is no skin.
 Setup undisturbed(Setup setup);
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -13,7 +14,9 @@
 #include "harness/reference_stages.h"
 #include "model/io/verdict_json.h"
 #include "model/rules.h"
+#include "oracles/iterates/probe.h"
 #include "oracles/oracles.h"
+#include "property_tests/random.h"
 #include "property_tests/touching.h"
 
 namespace cutproof::property_tests {
@@ -165,6 +168,58 @@ void StepsCompared::join(const StepsCompared& other) {
   greatest = std::max(greatest, other.greatest);
 }
 
+namespace {
+
+// What a probe of this case draws from, whatever load it is in.
+uint64_t probe_seed(const Instance& loaded) {
+  const State& state = loaded.state;
+  return static_cast<uint64_t>(state.x.size()) ^
+         std::bit_cast<uint64_t>(state.x.empty() ? 0 : state.x.back().x + state.v.back().y);
+}
+oracles::IterateProbe probe_of(const Instance& loaded, const CaseRun& run) {
+  return {loaded.setup, *run.trace.moments[at(run.probed)].before, oracles::Iterates::sampled, probe_seed(loaded)};
+}
+
+// Has the backend show iterates of one step of each body that moves, all in one load.
+void probe_steps(Backend& backend, const std::vector<Instance>& loaded, std::vector<CaseRun>& runs) {
+  std::vector<oracles::IterateProbe> probes;
+  std::vector<std::size_t> probed;
+  for (std::size_t b = 0; b < loaded.size(); ++b) {
+    if (loaded[b].setup.step.iterations == 0 || runs[b].failure) continue;
+    const std::vector<harness::Moment>& moments = runs[b].trace.moments;
+    std::vector<int64_t> steps;
+    for (std::size_t k = 0; k < moments.size(); ++k) {
+      const bool is_step = moments[k].by_backend && moments[k].span.first == Stage::step;
+      if (is_step && oracles::well_formed(loaded[b].setup, *moments[k].before).holds) {
+        steps.push_back(static_cast<int64_t>(k));
+      }
+    }
+    if (steps.empty()) continue;
+    Random random(probe_seed(loaded[b]));
+    runs[b].probed = steps[random.index(steps.size())];
+    probes.push_back(probe_of(loaded[b], runs[b]));
+    probed.push_back(b);
+  }
+  if (probes.empty()) return;
+  std::vector<std::vector<State>> shown = oracles::shown_iterates(backend, probes);
+  for (std::size_t k = 0; k < probed.size(); ++k) runs[probed[k]].iterates = std::move(shown[k]);
+}
+
+Verdict step_by_iterates(const Instance& loaded, const CaseRun& run) {
+  const harness::Moment& moment = run.trace.moments[at(run.probed)];
+  Verdict verdict;
+  verdict.property = "step by iterates";
+  verdict.stage = Stage::step;
+  verdict.frame = moment.before->frame;
+  verdict.unit = "1";
+  verdict.bound_source = "tolerances.md, Iterate by iterate";
+  probe_of(loaded, run).judge(run.iterates, moment.after.get(), verdict);
+  if (verdict.holds && verdict.checked == 0) verdict.vacuous = "nothing is alive";
+  return verdict;
+}
+
+}  // namespace
+
 std::vector<CaseRun> run_cases(Backend& backend, const std::vector<Instance>& loaded) {
   std::vector<Setup> setups;
   std::vector<State> states;
@@ -189,6 +244,7 @@ std::vector<CaseRun> run_cases(Backend& backend, const std::vector<Instance>& lo
     std::optional<Verdict>& failure = runs[at(broken.body)].failure;
     if (!failure) failure = std::move(broken);
   }
+  probe_steps(backend, loaded, runs);
   return runs;
 }
 
@@ -223,6 +279,8 @@ Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, 
     // Of a backend that does not vouch for all that its rules promise the oracles judge what it does.
     if (run.promises.words == harness::kPromisesOfRules.words) take(found.verdicts("the reference's "));
   };
+  if (run.probed >= 0) judge.add(step_by_iterates(loaded, run));
+  take(judge.take_verdicts());
   harness::Snapshot compared_skin;  // equal to the reference's
   for (const harness::Moment& moment : run.trace.moments) {
     if (judgement.failure) break;

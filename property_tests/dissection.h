@@ -122,6 +122,9 @@ struct CaseRun {
   harness::Promises promises = harness::kPromisesOfRules;
   bool has_expanded = false;       // before the first state: an expansion has changed clusters
   std::optional<Verdict> failure;  // of the contract
+  // Of one step of a body that moves, drawn at random: what the backend has shown of its iterates.
+  int64_t probed = -1;  // which moment of the trace; -1: none
+  std::vector<State> iterates;
 };
 
 // Loads all cases at once and runs them to their ends, stage by stage as far as the backend can.

@@ -13,6 +13,8 @@
 #include "gpu/backends.h"
 #include "gpu/kernels/step/step.cuh"
 #include "harness/backends.h"
+#include "oracles/comparison/state_difference.h"
+#include "oracles/iterates/probe.h"
 #include "oracles/relations/relations.h"
 #include "property_tests/checking.h"
 #include "property_tests/counterexample.h"
@@ -166,6 +168,65 @@ TEST_P(EveryBackend, StepsACutBodyWithoutGhostForcesAndWithoutEnergyFromNowhere)
   if (!ran_in_full()) return;
   EXPECT_GT(compared, 0) << "no body had a second component";
   EXPECT_GT(iterations, 0);
+}
+
+// Each follows from the one before it, the last has the bits of the frame, and iterations that are left out change
+// nothing of those before them. (Bits are asked of the state that is loaded: one that was shown is rounded once more.)
+TEST_P(EveryBackend, ShowsEachIterateOfAFrame) {
+  if (!backend_->shows_iterates()) GTEST_SKIP() << "it does not know Setup::withheld_iterations";
+  constexpr Span kStep{Stage::step, Stage::step};
+  int64_t compared = 0;
+  const auto ends_of = [&](std::vector<cutproof::Setup> setups, const State& begin) {
+    std::vector<State> states(setups.size(), begin);
+    backend_->load(std::move(setups), std::move(states));
+    backend_->run(kStep);
+    return backend_->snapshot();
+  };
+  const auto differ = [](const State& a, const State& b) {
+    const std::vector<oracles::FieldDifference> all = oracles::differences_in_bits(a, b);
+    return std::string(all.empty() ? "" : all.front().text);
+  };
+  const auto shown = [&](const Case& c) -> std::string {
+    const Instance loaded = load_for(*backend_, c);
+    const cutproof::Setup& setup = loaded.setup;
+    if (setup.frame_count() == 0 || setup.body.particle_count() == 0) return "";
+    const auto iterates = [&](const State& begin) {
+      const oracles::IterateProbe probe(setup, begin, oracles::Iterates::all, 0);
+      return oracles::shown_iterates(*backend_, {&probe, 1}).front();
+    };
+    const State end = ends_of({setup}, loaded.state).front();
+    if (const std::string what = differ(iterates(loaded.state).back(), end); !what.empty()) {
+      return what + " at the end of a frame that shows its iterates is not that of one that does not";
+    }
+    const cutproof::Setup one = oracles::first_substeps(setup, 0, 1);
+    for (int32_t left = 0; left <= setup.step.iterations; ++left) {
+      cutproof::Setup withheld = one, fewer = one;
+      withheld.withheld_iterations = left;
+      fewer.step.iterations -= left;
+      const std::vector<State> ends = ends_of({withheld, fewer}, loaded.state);
+      if (const std::string what = differ(ends[0], ends[1]); !what.empty()) {
+        return what + " hangs on iterations that are left out";
+      }
+    }
+    backend_->load({setup}, {loaded.state});
+    for (int64_t frame = 0; frame < setup.frame_count() / 2; ++frame) backend_->run({});
+    const State before = backend_->snapshot().front();
+    const oracles::IterateProbe probe(setup, before, oracles::Iterates::all, 0);
+    Verdict verdict;
+    verdict.property = "step by iterates";
+    probe.judge(iterates(before), nullptr, verdict);
+    compared += verdict.checked;
+    return text_of(verdict);
+  };
+  const auto deadline = std::make_shared<Deadline>();
+  const auto cases = random_cases(deadline, draw_moving_case);
+  check(id(), cases_of(10), GetParam().most_size, *deadline, [&] {
+    const Case c = *cases;
+    return Example{to_json(c), shown(c)};
+  });
+  if (ran_in_full()) {
+    EXPECT_GT(compared, 0);
+  }
 }
 
 // Blades push against tissue that walls on all three lower sides hold, so that both act on the same particles and are

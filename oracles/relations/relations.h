@@ -2,6 +2,8 @@
 // the backend is used only through its contract, so they judge any backend. What a backend cannot run is not asked of
 // it: then the verdict is vacuous and says why, and nothing throws. Target cutproof_relations.
 #pragma once
+#include <cstdint>
+
 #include "model/backend.h"
 #include "model/verdict.h"
 #include "oracles/single_substep.h"
@@ -36,5 +38,9 @@ Verdict translation_is_exact(Backend& backend, const Setup& setup, const State& 
 // Implicit: E(x_k) never grows over k = 0 .. iterations in one substep (iterates from runs with k iterations); with an
 // acceleration over the first alone, which is plain.
 Verdict energy_is_monotone(Backend& backend, const Setup& setup, const State& state, int32_t iterations);
+enum class Iterates : uint8_t;  // oracles/iterates/probe.h
+// Every iterate of the step of frame state.frame follows from the one before it, within the rounding of one iteration
+// (tolerances.md, Iterate by iterate); of sampled ones `seed` says which.
+Verdict step_by_iterates(Backend& backend, const Setup& setup, const State& state, Iterates wanted, uint64_t seed);
 
 }  // namespace cutproof::oracles

@@ -131,7 +131,7 @@ TEST(Campaign, FindsAStepThatIsNotTheReferencesWhereNothingElseIsWrong) {
   const Campaign soft = run_campaign(options, with([](cutproof::Setup& setup) { setup.step.stiffness /= 2; }), {});
   ASSERT_EQ(soft.violations.size(), 1u);
   const Verdict& verdict = soft.violations.front().verdict;
-  EXPECT_EQ(verdict.property, "admissible step");
+  EXPECT_EQ(verdict.property, "step by iterates");
   EXPECT_GT(verdict.measured, verdict.bound);
   EXPECT_EQ(verdict.witness.particles.size(), 1u);
 

@@ -1,0 +1,151 @@
+#include "oracles/iterates/contact.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace cutproof::oracles {
+namespace {
+
+// How often blade and walls are projected in turn where both hold (decisions.md, Contacts with the blade).
+constexpr int kTurns = 16;
+
+double length_of(Local c) { return std::hypot(c.u, c.n, c.w); }
+
+// Takes back at most `most` of what `slid` has along a surface with this normal.
+Vec3 rubbed(Vec3 x, Vec3 slid, Vec3 normal, double most) {
+  const Vec3 tangential = slid - dot(slid, normal) * normal;
+  const double length = norm(tangential);
+  return length > most ? x - (most / length) * tangential : x - tangential;
+}
+
+}  // namespace
+
+Contact::Contact(const Setup& setup, const BladeMove* move) : setup_(setup) {
+  for (const Wall& wall : setup.walls) greatest_friction_ = std::max(greatest_friction_, wall.friction);
+  // A geometric blade removes what it sweeps, and touches nothing.
+  has_plate_ = move != nullptr && move->down && setup.detect.criterion != Criterion::geometric;
+  if (!has_plate_) return;
+  from_ = move->from;
+  to_ = move->to;
+  half_length_ = setup.blade.length / 2;
+  depth_ = setup.blade.depth;
+  clearance_ = blade_clearance(setup);
+  greatest_friction_ = std::max(greatest_friction_, setup.blade.friction);
+}
+
+double Contact::height_at_start(Vec3 start) const { return has_plate_ ? to_local(from_, start - from_.edge).n : 1; }
+
+double Contact::rounds(Vec3 x) const {
+  double size = has_plate_ ? 6 * norm(x - to_.edge) + norm(to_.edge) : 0;
+  for (const Wall& wall : setup_.walls) size = std::max(size, std::abs(wall.offset));
+  return size;
+}
+
+Vec3 Contact::turned_back(Local c) const { return c.u * to_.along + c.w * to_.back + c.n * cross(to_.along, to_.back); }
+
+bool Contact::is_over(Local c) const { return std::abs(c.u) < half_length_ && c.w > 0 && c.w < depth_; }
+
+Local Contact::nearest_on_plate(Local c) const {
+  return {std::clamp(c.u, -half_length_, half_length_), 0, std::clamp(c.w, 0.0, depth_)};
+}
+
+double Contact::depth(Vec3 x, int side) const {
+  double deepest = -std::numeric_limits<double>::infinity();
+  for (const Wall& wall : setup_.walls) deepest = std::max(deepest, wall.side * (wall.offset - x[wall.axis]));
+  if (!has_plate_) return deepest;
+  const Local c = seen_from_blade(x), near = nearest_on_plate(c);
+  const double distance = is_over(c) ? side * c.n : length_of({c.u - near.u, c.n, c.w - near.w});
+  return std::max(deepest, clearance_ - distance);
+}
+
+Local Contact::on_border(Local c, double near) const {
+  if (std::abs(c.n) <= near) c.n = 0;
+  if (std::abs(c.w) <= near) c.w = 0;
+  if (std::abs(c.w - depth_) <= near) c.w = depth_;
+  if (std::abs(std::abs(c.u) - half_length_) <= near) c.u = std::copysign(half_length_, c.u);
+  return c;
+}
+
+// Forbidden is what is nearer than ρ to the rectangle, and what lies over it on the side where the particle did not
+// begin.
+Vec3 Contact::way_off_plate(Vec3 x, int side, const Rounding& rounding) const {
+  Local c = seen_from_blade(x);
+  if (rounding.on_borders) c = on_border(c, rounding.relative * rounds(x));
+  if (!is_over(c)) {
+    const Local near = nearest_on_plate(c), away = {c.u - near.u, c.n, c.w - near.w};
+    const double distance = length_of(away);
+    if (distance >= clearance_) return {};
+    if (distance == 0) return turned_back({0, side * clearance_, 0});
+    return (clearance_ / distance - 1) * turned_back(away);
+  }
+  const double height = side * c.n;
+  if (height >= clearance_) return {};
+  Local way = {0, side * clearance_ - c.n, 0};
+  if (height >= 0) return turned_back(way);
+  // It came through the plate: back, or round one of the four sides, where the rounded rim has to be cleared too.
+  const double beyond = -side * std::max(-height, clearance_) - c.n;
+  for (const Local round : {Local{0, beyond, -c.w}, Local{0, beyond, depth_ - c.w},
+                            Local{-half_length_ - c.u, beyond, 0}, Local{half_length_ - c.u, beyond, 0}}) {
+    if (length_of(round) < length_of(way)) way = round;
+  }
+  return turned_back(way);
+}
+
+Vec3 Contact::off_walls(Vec3 x) const {
+  for (const Wall& wall : setup_.walls) {
+    if (wall.side * (x[wall.axis] - wall.offset) < 0) x[wall.axis] = wall.offset;
+  }
+  return x;
+}
+
+Vec3 Contact::projected(Vec3 x, int side, bool& in_turn, const Rounding& rounding) const {
+  if (!has_plate_) return off_walls(x);
+  Vec3 now = x + way_off_plate(x, side, rounding);
+  bool by_plate = !(now == x);
+  for (int turn = 0; turn < kTurns; ++turn) {
+    const Vec3 inside = off_walls(now);
+    if (inside == now) break;
+    Vec3 from = inside;
+    if (rounding.between_turns != nullptr)
+      from += (rounding.relative * rounds(inside)) * rounding.between_turns->vector();
+    now = from + way_off_plate(from, side, rounding);
+    by_plate = by_plate || !(now == from);
+    in_turn = in_turn || by_plate;
+    if (now == from) return inside;
+  }
+  return now;
+}
+
+Vec3 Contact::place(Vec3 free, int side, Vec3 start, bool& in_turn, const Rounding& rounding) const {
+  const Vec3 nearest = projected(free, side, in_turn, rounding);
+  if (!has_friction() || (nearest == free && !in_turn)) return nearest;
+  Vec3 x = nearest;
+  for (const Wall& wall : setup_.walls) {
+    const double pressed = wall.side * (wall.offset - free[wall.axis]);
+    if (pressed <= 0 || wall.friction == 0) continue;
+    Vec3 normal;
+    normal[wall.axis] = 1;
+    x = rubbed(x, x - start, normal, wall.friction * pressed);
+  }
+  if (has_plate_ && setup_.blade.friction > 0) {
+    const Vec3 way = way_off_plate(free, side, rounding);
+    if (const double pressed = norm(way); pressed > 0) {
+      // It slides against the blade's own point beneath it.
+      const Local c = seen_from_blade(x);
+      const Vec3 was = from_.edge + c.u * from_.along + c.w * from_.back + c.n * cross(from_.along, from_.back);
+      x = rubbed(x, was - start, way / pressed, setup_.blade.friction * pressed);
+    }
+  }
+  return projected(x, side, in_turn, rounding);
+}
+
+Vec3 Contact::origin_of(Vec3 seen, Vec3 free) const {
+  if (!has_plate_) return free;
+  const Vec3 foot = to_.edge + turned_back(nearest_on_plate(seen_from_blade(seen))), way = seen - foot;
+  const double squared = dot(way, way);
+  // The foot itself has no direction.
+  return foot + (squared > 0 ? std::clamp(dot(free - foot, way) / squared, 1e-9, 1.0) : 1.0) * way;
+}
+
+}  // namespace cutproof::oracles

@@ -1,0 +1,62 @@
+// Where blade and walls let one particle be within one substep (method.md §3, Blade; decisions.md, Contacts with the
+// blade), written a second time: no line is shared with a backend. Internal to oracles/.
+#pragma once
+#include <vector>
+
+#include "model/setup.h"
+#include "oracles/blade_motion.h"
+#include "oracles/step_model/noise.h"
+
+namespace cutproof::oracles {
+
+class Contact {
+ public:
+  // `move`: what the blade does in this substep; nullptr: there is none. Keeps a reference to `setup`.
+  Contact(const Setup& setup, const BladeMove* move);
+
+  bool any() const { return has_plate_ || !setup_.walls.empty(); }
+  bool has_plate() const { return has_plate_; }
+  bool has_friction() const { return greatest_friction_ > 0; }
+  // Friction, or room that is not convex.
+  bool path_matters() const { return has_plate_ || has_friction(); }
+
+  // Over the plane of the blade where the substep begins [m].
+  double height_at_start(Vec3 start) const;
+  // What arithmetic rounds on the way to a contact at x, in units of u [m]: the blade's pose, the way into its frame
+  // and back, the offset of a wall.
+  double rounds(Vec3 x) const;
+
+  // By how much x is inside of what a particle of this side may not enter [m]; not above 0: it may be there.
+  double depth(Vec3 x, int side) const;
+
+  // What may round where blade and walls act in turn, and doubles with each turn: the places between turns, or, where
+  // one is as near to a border of the plate, it lies on that to the bit, and then nothing leads it sideways.
+  struct Rounding {
+    double relative = 0;  // in units of rounds()
+    Noise* between_turns = nullptr;
+    bool on_borders = false;
+  };
+  // Where one is put that would go to `free`. `in_turn`: set where blade and walls have both moved it.
+  Vec3 place(Vec3 free, int side, Vec3 start, bool& in_turn, const Rounding& rounding) const;
+
+  // A place that the blade alone would have led to `seen`: of all of them the one nearest to `free`. Beside the rim a
+  // way is short and its direction rounds; this undoes it.
+  Vec3 origin_of(Vec3 seen, Vec3 free) const;
+
+ private:
+  Local seen_from_blade(Vec3 x) const { return to_local(to_, x - to_.edge); }
+  Vec3 turned_back(Local c) const;
+  bool is_over(Local c) const;
+  Local nearest_on_plate(Local c) const;
+  Local on_border(Local c, double near) const;
+  Vec3 way_off_plate(Vec3 x, int side, const Rounding& rounding) const;
+  Vec3 off_walls(Vec3 x) const;
+  Vec3 projected(Vec3 x, int side, bool& in_turn, const Rounding& rounding) const;
+
+  const Setup& setup_;
+  bool has_plate_ = false;
+  BladePose from_, to_;
+  double half_length_ = 0, depth_ = 0, clearance_ = 0, greatest_friction_ = 0;
+};
+
+}  // namespace cutproof::oracles

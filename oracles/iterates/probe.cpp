@@ -1,0 +1,219 @@
+#include "oracles/iterates/probe.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "oracles/iterates/substep_judge.h"
+#include "oracles/single_substep.h"
+#include "oracles/step_model/noise.h"
+#include "oracles/support.h"
+
+namespace cutproof::oracles {
+namespace {
+
+// Up to so far apart two runs of one step may end [h]: where substeps were loaded anew single precision has lost what a
+// backend carries from one to the next.
+constexpr double kSameEnd = 1e-4;
+
+}  // namespace
+
+IterateProbe::IterateProbe(const Setup& setup, const State& before, Iterates wanted, uint64_t seed)
+    : setup_(setup), before_(before) {
+  const int32_t substeps = setup.step.substeps, most = setup.step.iterations;
+  if (wanted == Iterates::all) {
+    for (int32_t s = 0; s < substeps; ++s) {
+      wanted_.push_back({s, {}});
+      for (int32_t k = 0; k <= most; ++k) wanted_.back().iterations.push_back(k);
+    }
+  } else {
+    Noise noise(seed);
+    const auto drawn = [&](int32_t count) {
+      return std::min(static_cast<int32_t>((noise() + 1) / 2 * count), count - 1);
+    };
+    const auto add = [&](int32_t substep, int32_t k) {
+      Wanted& of = wanted_.empty() || wanted_.back().substep != substep ? wanted_.emplace_back(Wanted{substep, {}})
+                                                                        : wanted_.back();
+      for (const int32_t j : {k - 1, k, k + 1}) {
+        if (j >= 0 && j <= most) of.iterations.push_back(j);
+      }
+    };
+    const int32_t s = drawn(substeps);
+    if (most > 0) add(s, drawn(most));
+    if (most == 0) add(s, 0);
+    wanted_.back().iterations.push_back(0);
+    add(substeps - 1, std::max(most - 1, 0));
+    for (Wanted& of : wanted_) {
+      std::sort(of.iterations.begin(), of.iterations.end());
+      of.iterations.erase(std::unique(of.iterations.begin(), of.iterations.end()), of.iterations.end());
+    }
+  }
+  for (const Wanted& of : wanted_) {
+    if (of.substep > 0) shown_.push_back({of.substep - 1, most});
+    for (const int32_t k : of.iterations) shown_.push_back({of.substep, k});
+  }
+  std::sort(shown_.begin(), shown_.end());
+  shown_.erase(std::unique(shown_.begin(), shown_.end()), shown_.end());
+}
+
+std::size_t IterateProbe::place_of(Shown wanted) const {
+  return at(std::lower_bound(shown_.begin(), shown_.end(), wanted) - shown_.begin());
+}
+
+Setup IterateProbe::from_the_frame(Shown wanted) const {
+  Setup cut = first_substeps(setup_, before_.frame, wanted.substep + 1);
+  cut.withheld_iterations = setup_.step.iterations - wanted.iterations;
+  return cut;
+}
+
+Setup IterateProbe::from_the_substep(Shown wanted) const {
+  Setup single = frame_of_one_substep(setup_);
+  take_substep(setup_, before_.frame, wanted.substep, single);
+  single.step.iterations = wanted.iterations;
+  return single;
+}
+
+std::vector<std::vector<State>> shown_iterates(Backend& backend, std::span<const IterateProbe> probes) {
+  const Span step{Stage::step, Stage::step};
+  const bool alone = backend.can_run(step);
+  std::vector<Setup> setups;
+  std::vector<State> states;
+  const auto add = [&](Setup setup, State begin) {
+    setups.push_back(alone ? std::move(setup) : step_alone(std::move(setup)));
+    begin.frame = 0;
+    states.push_back(std::move(begin));
+  };
+  const auto run = [&] {
+    backend.load(std::exchange(setups, {}), std::exchange(states, {}));
+    backend.run(alone ? step : Span{Stage::step, Stage::skin});
+    return backend.snapshot();
+  };
+  std::vector<std::vector<State>> shown(probes.size());
+  if (backend.shows_iterates()) {
+    for (const IterateProbe& probe : probes) {
+      for (const auto& wanted : probe.shown_) add(probe.from_the_frame(wanted), probe.before_);
+    }
+    std::vector<State> all = run();
+    auto next = all.begin();
+    for (std::size_t p = 0; p < probes.size(); ++p) {
+      const auto count = static_cast<std::ptrdiff_t>(probes[p].shown_.size());
+      shown[p].assign(std::make_move_iterator(next), std::make_move_iterator(next + count));
+      next += count;
+    }
+    return shown;
+  }
+  // A substep at a time: all wanted iterates of it, and its end, from which the next one begins.
+  std::vector<State> begin;
+  int32_t most = 0;
+  for (const IterateProbe& probe : probes) {
+    begin.push_back(probe.before_);
+    shown[&probe - probes.data()].resize(probe.shown_.size());
+    most = std::max(most, probe.setup_.step.substeps);
+  }
+  for (int32_t s = 0; s < most; ++s) {
+    std::vector<std::pair<std::size_t, IterateProbe::Shown>> loaded;
+    for (std::size_t p = 0; p < probes.size(); ++p) {
+      const int32_t last = probes[p].setup_.step.iterations;
+      const auto want = [&](IterateProbe::Shown wanted) {
+        add(probes[p].from_the_substep(wanted), begin[p]);
+        loaded.emplace_back(p, wanted);
+      };
+      for (const auto& wanted : probes[p].shown_) {
+        if (wanted.substep == s && wanted.iterations != last) want(wanted);
+      }
+      if (s < probes[p].setup_.step.substeps) want({s, last});
+    }
+    const std::vector<State> all = run();
+    for (std::size_t k = 0; k < loaded.size(); ++k) {
+      const auto& [p, wanted] = loaded[k];
+      const std::size_t place = probes[p].place_of(wanted);
+      if (place < probes[p].shown_.size() && probes[p].shown_[place] == wanted) shown[p][place] = all[k];
+      if (wanted.iterations == probes[p].setup_.step.iterations) begin[p] = all[k];
+    }
+  }
+  return shown;
+}
+
+Witness IterateProbe::witness(const State& began, int32_t substep, const IterateFinding& found) const {
+  Concerned concerned;
+  std::string whose;
+  switch (found.part) {
+    case IteratePart::rotation:
+    case IteratePart::orthogonal:
+    case IteratePart::kept:
+    case IteratePart::flag:
+      concerned.clusters = {began.clusters.number[at(found.where)]};
+      whose = fmt::format("of cluster {}", concerned.clusters.front());
+      break;
+    case IteratePart::sum:
+    case IteratePart::pull:
+      concerned.particles = {found.where};
+      whose = fmt::format("of the component of particle {}", found.where);
+      break;
+    case IteratePart::impulse:
+      whose = "of contacts";
+      break;
+    default:
+      concerned.particles = {found.where};
+      whose = fmt::format("of particle {}", found.where);
+  }
+  const std::string after = found.iteration < 0 ? "the prediction" : fmt::format("iteration {}", found.iteration + 1);
+  const double h = setup_.body.grid.spacing;
+  if (found.part == IteratePart::place || found.part == IteratePart::contact || found.part == IteratePart::velocity) {
+    const char* times = found.part == IteratePart::velocity ? " times dt" : "";
+    return witness_of(
+        concerned,
+        "after {} of substep {}, the {} {}{} is {:.3g} h from what follows from the iterate before, rounding "
+        "explains {:.3g} h",
+        after, substep + 1, name_of(found.part), whose, times, found.measured / h, found.bound / h);
+  }
+  return witness_of(
+      concerned,
+      "after {} of substep {}, the {} {} is {:.3g} times as far as rounding explains from what follows from "
+      "the iterate before",
+      after, substep + 1, name_of(found.part), whose, found.share);
+}
+
+// A backend that behaves otherwise when it is asked for iterates would show others than those of its real frames. The
+// last state shown is the frame's end.
+void IterateProbe::compare_ends(const State& shown, const State& after, Verdict& verdict) const {
+  for (int32_t i = 0; i < setup_.body.particle_count(); ++i) {
+    if (before_.alive[at(i)] == 0) continue;
+    const double off = norm(shown.x[at(i)] - after.x[at(i)]) / setup_.body.grid.spacing;
+    ++verdict.checked;
+    if (off <= kSameEnd) continue;
+    verdict.measured = off / kSameEnd;
+    return fail(
+        verdict, {{}, {i}},
+        "a second run of the same step, which shows its iterates, ends {:.3g} h from the first one at particle {}", off,
+        i);
+  }
+}
+
+void IterateProbe::judge(const std::vector<State>& shown, const State* after, Verdict& verdict) const {
+  verdict.bound = 1;
+  if (after != nullptr) compare_ends(shown.back(), *after, verdict);
+  for (const Wanted& of : wanted_) {
+    const State& began = of.substep == 0 ? before_ : shown[place_of({of.substep - 1, setup_.step.iterations})];
+    const auto state = [&](int32_t k) -> const State& { return shown[place_of({of.substep, k})]; };
+    const auto shows = [&](int32_t k) { return std::binary_search(of.iterations.begin(), of.iterations.end(), k); };
+    SubstepJudge judge(setup_, before_.frame, of.substep, began);
+    judge.each = each;
+    judge.context = context;
+    if (shows(0)) judge.prediction(state(0));
+    for (int32_t k = 0; k < setup_.step.iterations; ++k) {
+      if (!shows(k) || !shows(k + 1) || (k > 0 && !shows(k - 1))) continue;
+      judge.iteration(k, k > 0 ? &state(k - 1) : nullptr, state(k), state(k + 1));
+    }
+    verdict.checked += judge.checked();
+    verdict.undecided += judge.undecided();
+    const IterateFinding& worst = judge.worst();
+    if (worst.share <= verdict.measured || !verdict.holds) continue;
+    verdict.measured = worst.share;
+    if (!worst.holds()) fail(verdict, witness(began, of.substep, worst));
+  }
+}
+
+}  // namespace cutproof::oracles

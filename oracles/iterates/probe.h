@@ -1,0 +1,60 @@
+// Which iterates of a frame a backend is asked to show, and the judge of what it has shown (tolerances.md, Iterate by
+// iterate).
+#pragma once
+#include <compare>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "model/backend.h"
+#include "model/verdict.h"
+
+namespace cutproof::oracles {
+
+// Of a frame of S substeps with K iterations: all its iterates, or, by a seed, the prediction of one substep, one
+// iteration of it, and the last one of the frame.
+enum class Iterates : uint8_t { all, sampled };
+
+struct IterateFinding;  // oracles/iterates/substep_judge.h
+
+// For one body and the state in which a frame begins: well formed and finite, its schedule not over. Both must live as
+// long as this.
+class IterateProbe {
+ public:
+  IterateProbe(const Setup& setup, const State& before, Iterates wanted, uint64_t seed);
+
+  // Judges what shown_iterates() gives for it. `after`: how the backend has ended this frame's step; nullptr: nobody
+  // knows. `measured` is the greatest part of its bound of all that is compared, `bound` 1.
+  void judge(const std::vector<State>& shown, const State* after, Verdict& verdict) const;
+
+  // For whoever measures: every comparison.
+  void (*each)(void* context, const IterateFinding&) = nullptr;
+  void* context = nullptr;
+
+ private:
+  friend std::vector<std::vector<State>> shown_iterates(Backend& backend, std::span<const IterateProbe> probes);
+  struct Wanted {
+    int32_t substep;
+    std::vector<int32_t> iterations;  // ascending: of runs that end with so many
+  };
+  struct Shown {
+    int32_t substep, iterations;
+    friend auto operator<=>(const Shown&, const Shown&) = default;
+  };
+  Setup from_the_frame(Shown wanted) const;
+  Setup from_the_substep(Shown wanted) const;
+  void compare_ends(const State& shown, const State& after, Verdict& verdict) const;
+  Witness witness(const State& began, int32_t substep, const IterateFinding& found) const;
+  std::size_t place_of(Shown wanted) const;
+
+  const Setup& setup_;
+  const State& before_;
+  std::vector<Wanted> wanted_;
+  std::vector<Shown> shown_;  // ascending
+};
+
+// For each probe the states that it wants to see. A backend that knows Setup::withheld_iterations runs all of them from
+// the beginning of the frame, in one load; another one runs each substep from the state in which the one before ends.
+std::vector<std::vector<State>> shown_iterates(Backend& backend, std::span<const IterateProbe> probes);
+
+}  // namespace cutproof::oracles

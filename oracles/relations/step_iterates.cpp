@@ -1,0 +1,20 @@
+// A step, iterate by iterate, as the backend itself shows them.
+#include "oracles/iterates/probe.h"
+#include "oracles/relations/relations.h"
+#include "oracles/relations/shared.h"
+
+namespace cutproof::oracles {
+
+Verdict step_by_iterates(Backend& backend, const Setup& setup, const State& given, Iterates wanted, uint64_t seed) {
+  const State state = in_arithmetic_of(backend, given);
+  const Relation relation = {"step by iterates", "1", "tolerances.md, Iterate by iterate", "nothing is alive"};
+  return judge_relation(relation, backend, step_span(backend), setup, state, [&](Verdict& verdict) {
+    if (state.frame >= setup.frame_count()) return vacuous(verdict, "the schedule is over");
+    backend.load({setup}, {state});
+    const State held = backend.snapshot().front();  // in its arithmetic, which may round what it is given
+    const IterateProbe probe(setup, held, wanted, seed);
+    probe.judge(shown_iterates(backend, {&probe, 1}).front(), nullptr, verdict);
+  });
+}
+
+}  // namespace cutproof::oracles
