@@ -213,7 +213,7 @@ Verdict step_by_iterates(const Instance& loaded, const CaseRun& run) {
   verdict.frame = moment.before->frame;
   verdict.unit = "1";
   verdict.bound_source = "tolerances.md, Iterate by iterate";
-  probe_of(loaded, run).judge(run.iterates, moment.after.get(), verdict);
+  probe_of(loaded, run).judge(run.iterates, verdict);
   if (verdict.holds && verdict.checked == 0) verdict.vacuous = "nothing is alive";
   return verdict;
 }

@@ -23,9 +23,9 @@ class IterateProbe {
  public:
   IterateProbe(const Setup& setup, const State& before, Iterates wanted, uint64_t seed);
 
-  // Judges what shown_iterates() gives for it. `after`: how the backend has ended this frame's step; nullptr: nobody
-  // knows. `measured` is the greatest part of its bound of all that is compared, `bound` 1.
-  void judge(const std::vector<State>& shown, const State* after, Verdict& verdict) const;
+  // Judges what shown_iterates() gives for it: `measured` is the greatest part of its bound of all that is compared,
+  // `bound` 1.
+  void judge(const std::vector<State>& shown, Verdict& verdict) const;
 
   // For whoever measures: every comparison.
   void (*each)(void* context, const IterateFinding&) = nullptr;
@@ -43,7 +43,7 @@ class IterateProbe {
   };
   Setup from_the_frame(Shown wanted) const;
   Setup from_the_substep(Shown wanted) const;
-  void compare_ends(const State& shown, const State& after, Verdict& verdict) const;
+  void compare_ends(const State& shown, const State& whole, Verdict& verdict) const;
   Witness witness(const State& began, int32_t substep, const IterateFinding& found) const;
   std::size_t place_of(Shown wanted) const;
 
@@ -53,8 +53,9 @@ class IterateProbe {
   std::vector<Shown> shown_;  // ascending
 };
 
-// For each probe the states that it wants to see. A backend that knows Setup::withheld_iterations runs all of them from
-// the beginning of the frame, in one load; another one runs each substep from the state in which the one before ends.
+// For each probe the states that it wants to see, and last that after the step of the frame as it is. A backend that
+// knows Setup::withheld_iterations runs all of them from the beginning of the frame, in one load; another one runs each
+// substep from the state in which the one before ends.
 std::vector<std::vector<State>> shown_iterates(Backend& backend, std::span<const IterateProbe> probes);
 
 }  // namespace cutproof::oracles

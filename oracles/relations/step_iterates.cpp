@@ -13,7 +13,7 @@ Verdict step_by_iterates(Backend& backend, const Setup& setup, const State& give
     backend.load({setup}, {state});
     const State held = backend.snapshot().front();  // in its arithmetic, which may round what it is given
     const IterateProbe probe(setup, held, wanted, seed);
-    probe.judge(shown_iterates(backend, {&probe, 1}).front(), nullptr, verdict);
+    probe.judge(shown_iterates(backend, {&probe, 1}).front(), verdict);
   });
 }
 

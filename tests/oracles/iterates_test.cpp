@@ -59,7 +59,7 @@ Verdict judged(Backend& backend, const StepScene& scene, Iterates wanted = Itera
   before.precision = backend.precision();
   const IterateProbe probe(scene.setup, before, wanted, seed);
   Verdict verdict = start_verdict("step by iterates", before, "1", "tolerances.md, Iterate by iterate");
-  probe.judge(shown_iterates(backend, {&probe, 1}).front(), nullptr, verdict);
+  probe.judge(shown_iterates(backend, {&probe, 1}).front(), verdict);
   return verdict;
 }
 
@@ -182,17 +182,25 @@ TEST(Iterates, ThatAreSampledShowWhatIsWrongInAll) {
   }
 }
 
-TEST(Iterates, OfAnotherStepThanThatOfTheRunAreNotBelieved) {
-  const StepScene scene = pressed_block();
-  Faulty right;
-  const IterateProbe probe(scene.setup, scene.before, Iterates::sampled, 1);
-  const std::vector<State> shown = shown_iterates(right, {&probe, 1}).front();
-  for (const double off : {0.0, 2e-4}) {
-    State after = shown.back();
-    after.x[kInside].z += off * kSpacing;
-    Verdict verdict;
-    probe.judge(shown, &after, verdict);
-    EXPECT_EQ(verdict.holds, off == 0);
+// It is asked for a frame of its own, while the frame as it is is one of two.
+TEST(Iterates, OfAnotherStepThanThatOfTheFrameAreNotBelieved) {
+  StepScene scene = pressed_block();
+  const auto twice = [](auto& values) {
+    const auto once = values;
+    values.insert(values.end(), once.begin(), once.end());
+  };
+  twice(scene.setup.substep_length);
+  twice(scene.setup.blade_moves);
+  twice(scene.setup.grips[0].active);
+  twice(scene.setup.grips[0].displacement);
+  for (const bool shows : {true, false}) {
+    Faulty right, soft;
+    right.shows = soft.shows = shows;
+    soft.of_setup = [](cutproof::Setup& setup) {
+      if (setup.frame_count() > 1) setup.step.stiffness /= 2;
+    };
+    expect_holds(judged(right, scene));
+    EXPECT_FALSE(judged(soft, scene).holds);
   }
 }
 
