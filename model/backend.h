@@ -44,7 +44,7 @@ class Backend {
   // cannot run, others run for it, and it is not judged on that (harness/frame_runner.h).
   virtual bool can_run(Span span) const = 0;
 
-  // Whether it knows Setup::withheld_iterations. Of others the iterates of each substep are seen by loads of it alone.
+  // Whether it knows Setup::withheld_iterations. Any other backend shows iterates substep by substep, each one loaded.
   virtual bool shows_iterates() const { return false; }
 
   // What it vouches for, as words of harness/promises.h; "*": all that the rules of a setup promise.

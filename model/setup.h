@@ -123,8 +123,8 @@ struct Setup {
   std::vector<BladeMove> blade_moves;  // [frames · S], empty if there is no blade
   std::vector<int64_t> stroke_end;     // [strokes] frame at whose end the stroke is complete; -1: the run ends before
 
-  // Iterations that the last substep of each frame leaves out, 0 .. iterations. No scene does: so a backend can be asked
-  // for every iterate of a frame (oracles/iterates/).
+  // Iterations that the last substep of each frame leaves out, 0 .. iterations. No scene does: so a backend can be
+  // asked for every iterate of a frame (oracles/iterates/).
   int32_t withheld_iterations = 0;
 
   int64_t frame_count() const { return static_cast<int64_t>(substep_length.size()); }

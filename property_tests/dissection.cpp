@@ -205,19 +205,6 @@ void probe_steps(Backend& backend, const std::vector<Instance>& loaded, std::vec
   for (std::size_t k = 0; k < probed.size(); ++k) runs[probed[k]].iterates = std::move(shown[k]);
 }
 
-Verdict step_by_iterates(const Instance& loaded, const CaseRun& run) {
-  const harness::Moment& moment = run.trace.moments[at(run.probed)];
-  Verdict verdict;
-  verdict.property = "step by iterates";
-  verdict.stage = Stage::step;
-  verdict.frame = moment.before->frame;
-  verdict.unit = "1";
-  verdict.bound_source = "tolerances.md, Iterate by iterate";
-  probe_of(loaded, run).judge(run.iterates, verdict);
-  if (verdict.holds && verdict.checked == 0) verdict.vacuous = "nothing is alive";
-  return verdict;
-}
-
 }  // namespace
 
 std::vector<CaseRun> run_cases(Backend& backend, const std::vector<Instance>& loaded) {
@@ -279,7 +266,11 @@ Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, 
     // Of a backend that does not vouch for all that its rules promise the oracles judge what it does.
     if (run.promises.words == harness::kPromisesOfRules.words) take(found.verdicts("the reference's "));
   };
-  if (run.probed >= 0) judge.add(step_by_iterates(loaded, run));
+  if (run.probed >= 0) {
+    Verdict verdict = probe_of(loaded, run).judged(run.iterates);
+    verdict.stage = Stage::step;
+    judge.add(std::move(verdict));
+  }
   take(judge.take_verdicts());
   harness::Snapshot compared_skin;  // equal to the reference's
   for (const harness::Moment& moment : run.trace.moments) {

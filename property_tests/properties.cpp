@@ -170,10 +170,10 @@ TEST_P(EveryBackend, StepsACutBodyWithoutGhostForcesAndWithoutEnergyFromNowhere)
   EXPECT_GT(iterations, 0);
 }
 
-// Each follows from the one before it, the last has the bits of the frame, and iterations that are left out change
-// nothing of those before them. (Bits are asked of the state that is loaded: one that was shown is rounded once more.)
+// Each iterate follows from the one before it, and the last one has the bits of the frame. Iterations that are left out
+// change no earlier iterate. (Bits are asked of the state that is loaded: a state that was shown is rounded once more.)
 TEST_P(EveryBackend, ShowsEachIterateOfAFrame) {
-  if (!backend_->shows_iterates()) GTEST_SKIP() << "it does not know Setup::withheld_iterations";
+  ASSERT_TRUE(backend_->shows_iterates()) << "every backend of this project knows Setup::withheld_iterations";
   constexpr Span kStep{Stage::step, Stage::step};
   int64_t compared = 0;
   const auto ends_of = [&](std::vector<cutproof::Setup> setups, const State& begin) {
@@ -215,9 +215,7 @@ TEST_P(EveryBackend, ShowsEachIterateOfAFrame) {
     for (int64_t frame = 0; frame < setup.frame_count() / 2; ++frame) backend_->run({});
     const State before = backend_->snapshot().front();
     const oracles::IterateProbe probe(setup, before, oracles::Iterates::all, 0);
-    Verdict verdict;
-    verdict.property = "step by iterates";
-    probe.judge(iterates(before), verdict);
+    const Verdict verdict = probe.judged(iterates(before));
     compared += verdict.checked;
     return text_of(verdict);
   };

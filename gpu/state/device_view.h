@@ -96,7 +96,7 @@ struct GripF {
 // What the step of a body needs in the frame in progress, in one line of the cache: most of its threads have nothing
 // else to wait for before their own work.
 struct alignas(128) Pace {
-  int64_t first_move;        // of the blade in this frame, in DeviceView::moves; -1: none, or one that touches nothing
+  int64_t first_move;  // of the blade in this frame, in DeviceView::moves; -1: none, or one that touches nothing
   int substeps, iterations, last_iterations;  // 0: its schedule is over
   int frame;
   float h, per_h;

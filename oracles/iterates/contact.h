@@ -29,8 +29,8 @@ class Contact {
   // By how much x is inside of what a particle of this side may not enter [m]; not above 0: it may be there.
   double depth(Vec3 x, int side) const;
 
-  // What may round where blade and walls act in turn, and doubles with each turn: the places between turns, or, where
-  // one is as near to a border of the plate, it lies on that to the bit, and then nothing leads it sideways.
+  // What rounds where blade and walls act in turn, and may double with each turn. Either each place between turns is
+  // off, or a place that is as near to a border of the plate lies on the border to the bit: nothing leads it sideways.
   struct Rounding {
     double relative = 0;  // in units of rounds()
     Noise* between_turns = nullptr;

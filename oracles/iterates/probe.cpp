@@ -14,8 +14,7 @@
 namespace cutproof::oracles {
 namespace {
 
-// Up to so far apart two runs of one step may end [h]: where substeps were loaded anew single precision has lost what a
-// backend carries from one to the next.
+// As far apart two answers to one step may be [h] (tolerances.md, Against the reference).
 constexpr double kSameEnd = 1e-4;
 
 }  // namespace
@@ -191,10 +190,9 @@ void IterateProbe::compare_ends(const State& shown, const State& whole, Verdict&
     ++verdict.checked;
     if (off <= kSameEnd) continue;
     verdict.measured = off / kSameEnd;
-    return fail(
-        verdict, {{}, {i}},
-        "a second run of the same step, which shows its iterates, ends {:.3g} h from the first one at particle {}", off,
-        i);
+    return fail(verdict, {{}, {i}},
+                "a run of this step that shows its iterates ends {:.3g} h from one that does not, at particle {}", off,
+                i);
   }
 }
 
@@ -206,8 +204,6 @@ void IterateProbe::judge(const std::vector<State>& shown, Verdict& verdict) cons
     const auto state = [&](int32_t k) -> const State& { return shown[place_of({of.substep, k})]; };
     const auto shows = [&](int32_t k) { return std::binary_search(of.iterations.begin(), of.iterations.end(), k); };
     SubstepJudge judge(setup_, before_.frame, of.substep, began);
-    judge.each = each;
-    judge.context = context;
     if (shows(0)) judge.prediction(state(0));
     for (int32_t k = 0; k < setup_.step.iterations; ++k) {
       if (!shows(k) || !shows(k + 1) || (k > 0 && !shows(k - 1))) continue;
@@ -220,6 +216,12 @@ void IterateProbe::judge(const std::vector<State>& shown, Verdict& verdict) cons
     verdict.measured = worst.share;
     if (!worst.holds()) fail(verdict, witness(began, of.substep, worst));
   }
+}
+
+Verdict IterateProbe::judged(const std::vector<State>& shown) const {
+  Verdict verdict = start_verdict(kStepByIterates, before_, kIteratesUnit, kIteratesSource);
+  judge(shown, verdict);
+  return conclude(std::move(verdict), kNoIterates);
 }
 
 }  // namespace cutproof::oracles

@@ -15,6 +15,9 @@ namespace cutproof::oracles {
 // iteration of it, and the last one of the frame.
 enum class Iterates : uint8_t { all, sampled };
 
+inline constexpr const char *kStepByIterates = "step by iterates", *kIteratesUnit = "1",
+                            *kIteratesSource = "tolerances.md, Iterate by iterate", *kNoIterates = "nothing is alive";
+
 struct IterateFinding;  // oracles/iterates/substep_judge.h
 
 // For one body and the state in which a frame begins: well formed and finite, its schedule not over. Both must live as
@@ -23,13 +26,11 @@ class IterateProbe {
  public:
   IterateProbe(const Setup& setup, const State& before, Iterates wanted, uint64_t seed);
 
-  // Judges what shown_iterates() gives for it: `measured` is the greatest part of its bound of all that is compared,
-  // `bound` 1.
+  // Judges what shown_iterates() gives for it, in a verdict that holds so far. `measured` is the greatest part of its
+  // bound of all that is compared, `bound` 1.
   void judge(const std::vector<State>& shown, Verdict& verdict) const;
-
-  // For whoever measures: every comparison.
-  void (*each)(void* context, const IterateFinding&) = nullptr;
-  void* context = nullptr;
+  // The same in a verdict of its own.
+  Verdict judged(const std::vector<State>& shown) const;
 
  private:
   friend std::vector<std::vector<State>> shown_iterates(Backend& backend, std::span<const IterateProbe> probes);
@@ -53,9 +54,9 @@ class IterateProbe {
   std::vector<Shown> shown_;  // ascending
 };
 
-// For each probe the states that it wants to see, and last that after the step of the frame as it is. A backend that
-// knows Setup::withheld_iterations runs all of them from the beginning of the frame, in one load; another one runs each
-// substep from the state in which the one before ends.
+// For each probe the states that it wants to see, and last the state after the step of the whole frame. A backend that
+// knows Setup::withheld_iterations runs all of them from the beginning of the frame, in one load. Another backend runs
+// each substep from the end of the one before; of its whole frame the state is shown in double precision only.
 std::vector<std::vector<State>> shown_iterates(Backend& backend, std::span<const IterateProbe> probes);
 
 }  // namespace cutproof::oracles

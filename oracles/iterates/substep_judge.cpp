@@ -113,9 +113,9 @@ SubstepJudge::SubstepJudge(const Setup& setup, int64_t frame, int32_t substep, c
     if (holders_[at(i)] > 0) lever_[at(i)] = std::sqrt(lever_[at(i)]) / holders_[at(i)];
     inertia_.push_back(dt_ * began.v[at(i)] + (dt_ * dt_) * step.gravity);
     predicted_.push_back(x + inertia_.back());
-    // A later substep goes on from what has not been rounded to a place: x is off by one rounding, and dt v, the
-    // difference of two places, by two. In a group they are sums of what it has in common, which its members may have
-    // more of.
+    // A backend begins a later substep from places that are not rounded yet. Those shown are off by one rounding, and
+    // dt v, the difference of two places, by two. A group sums what its particles have in common, so the rounding is
+    // that of the greatest place in the particle's clusters.
     const double went_on = first_ ? 0 : 3 * u_ * std::max(norm(stored(i, x)), shared[at(i)]);
     begin_squares_.push_back(square(u_ * norm(stored(i, predicted_.back()))) + square(4 * u_ * norm(inertia_.back())) +
                              square(2 * places_u_ * norm(predicted_.back())) + square(went_on));
@@ -129,7 +129,6 @@ void SubstepJudge::see(IteratePart part, double measured, double bound, int32_t 
   Nearest nearest;
   nearest.see(measured, bound, where);
   const IterateFinding found = {part, k_, where, nearest.share, measured, bound};
-  if (each != nullptr) each(context, found);
   ++checked_;
   if (found.share > worst_.share) worst_ = found;
 }
@@ -268,8 +267,8 @@ void SubstepJudge::iteration(int32_t k, const State* earlier, const State& now, 
   velocities(next);
 }
 
-// R maximises tr(Rᵀ A), with A known to `off`: Rᵀ A is symmetric, and a turn about no axis is better, which is so where
-// the two least eigenvalues of its symmetric part do not sum to less than 0.
+// R maximises tr(Rᵀ A), with A known to `off`. Then Rᵀ A is symmetric, and a turn about no axis is better: the two
+// least eigenvalues of the symmetric part do not sum to less than 0.
 void SubstepJudge::rotation(int32_t c, const Eigen::Matrix3d& a, double off, const Mat3& previous,
                             const Clusters& after) {
   const Cluster& cluster = clusters_[at(c)];
@@ -345,8 +344,8 @@ void SubstepJudge::particle(int32_t i, const Candidate& candidate, Vec3 seen, Ve
   } else {
     ++undecided_;
   }
-  // A backend adds up how far it has put particles from where its solver would have: whether it has put this one
-  // anywhere is not clear where that is no more than rounding.
+  // A backend adds up how far contacts have put particles from where its solver would have. Where that is no more than
+  // rounding, nobody knows whether it has counted this particle.
   const Vec3 push = seen - candidate.free;
   const bool is_clear = norm(push) > wide + after;
   pushed_ += (is_clear ? mass : mass / 2) * push;
@@ -396,20 +395,17 @@ double SubstepJudge::nearest_contact(int32_t i, const Candidate& candidate, Vec3
     if (off <= within) explained |= way.side > 0 ? 1 : 2;
   };
   const double direct = wide + after;
-  bool any_turn = false;
   for (std::size_t k = 0; k < count; ++k) {
     bool in_turn = false;
     take(ways[k], off_by(ways[k], ways[k].candidate, in_turn, {}), direct);
-    any_turn = any_turn || in_turn;
   }
   if (explained != 0) {
     after = direct;
     sides_[at(i)] = explained;
     return best;
   }
-  // Beside a border a candidate within its rounding may lead elsewhere: one that the blade alone has led here, or,
-  // where blade and walls act in turn, one of many, with what rounds between turns.
-  ++searched_;
+  // Beside a border a candidate within its rounding may lead elsewhere: the one that the blade alone has led here, or
+  // one of many, with what rounds between turns of blade and walls.
   best = std::numeric_limits<double>::infinity();
   double spread = 0;
   for (std::size_t k = 0; k < count; ++k) {
@@ -454,8 +450,8 @@ void SubstepJudge::impulse(Vec3 carried, double rounding, const State& after) {
       kTimes * (rounding + pushed_rounding_ + 8 * u_ * norm(pushed_)), 0);
 }
 
-// Over all particles of a component that touch nothing: a force on it, or a parameter, moves them all the same way,
-// while what rounds in each is its own.
+// Sums over the particles of a component that touch nothing. A force on the component, or a parameter, moves them all
+// the same way, while the rounding of each particle is its own.
 void SubstepJudge::sums() {
   struct Part {
     Vec3 off;

@@ -5,7 +5,6 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <utility>
 #include <vector>
 
@@ -57,12 +56,6 @@ class SubstepJudge {
   int64_t checked() const { return checked_; }
   // Particles of which turns of blade and walls let rounding decide, clusters whose rotation is no more than rounding.
   int64_t undecided() const { return undecided_; }
-  // Particles beside a border, for which candidates within the rounding were tried.
-  int64_t searched() const { return searched_; }
-
-  // For whoever measures: every comparison.
-  void (*each)(void* context, const IterateFinding&) = nullptr;
-  void* context = nullptr;
 
  private:
   struct Cluster {
@@ -125,7 +118,7 @@ class SubstepJudge {
   Vec3 pushed_;
   double pushed_rounding_ = 0, push_in_doubt_ = 0;
   IterateFinding worst_;
-  int64_t checked_ = 0, undecided_ = 0, searched_ = 0;
+  int64_t checked_ = 0, undecided_ = 0;
 };
 
 }  // namespace cutproof::oracles

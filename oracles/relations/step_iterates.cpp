@@ -7,7 +7,7 @@ namespace cutproof::oracles {
 
 Verdict step_by_iterates(Backend& backend, const Setup& setup, const State& given, Iterates wanted, uint64_t seed) {
   const State state = in_arithmetic_of(backend, given);
-  const Relation relation = {"step by iterates", "1", "tolerances.md, Iterate by iterate", "nothing is alive"};
+  const Relation relation = {kStepByIterates, kIteratesUnit, kIteratesSource, kNoIterates};
   return judge_relation(relation, backend, step_span(backend), setup, state, [&](Verdict& verdict) {
     if (state.frame >= setup.frame_count()) return vacuous(verdict, "the schedule is over");
     backend.load({setup}, {state});

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "oracles/iterates/probe.h"
-#include "oracles/support.h"
 #include "reference_cpu/reference.h"
 #include "tests/oracles/pressed_block.h"
 
@@ -58,9 +57,7 @@ Verdict judged(Backend& backend, const StepScene& scene, Iterates wanted = Itera
   State before = scene.before;
   before.precision = backend.precision();
   const IterateProbe probe(scene.setup, before, wanted, seed);
-  Verdict verdict = start_verdict("step by iterates", before, "1", "tolerances.md, Iterate by iterate");
-  probe.judge(shown_iterates(backend, {&probe, 1}).front(), verdict);
-  return verdict;
+  return probe.judged(shown_iterates(backend, {&probe, 1}).front());
 }
 
 TEST(Iterates, OfTheReferenceHoldWithEveryCauseAtWork) {

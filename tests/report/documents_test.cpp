@@ -176,19 +176,10 @@ TEST(ATuning, ShowsAllThatWasTriedItsFrontAndTheAnswer) {
 }
 
 json stage_row(const std::string& what, double ms, const json& paper) {
-  return {{"scene", "kidney"},
-          {"what", what},
-          {"particles", 100},
-          {"substeps", 4},
-          {"iterations", 4},
-          {"cooking", "boxes"},
-          {"acceleration", "none"},
-          {"frames", 3},
-          {"of", 3},
-          {"seconds", times(ms)},
-          {"limit", nullptr},
-          {"paper_seconds", paper},
-          {"error_text", "equal"}};
+  return {
+      {"scene", "kidney"},  {"what", what},           {"particles", 100},     {"substeps", 4}, {"iterations", 4},
+      {"cooking", "boxes"}, {"acceleration", "none"}, {"frames", 3},          {"of", 3},       {"seconds", times(ms)},
+      {"limit", nullptr},   {"paper_seconds", paper}, {"error_text", "equal"}};
 }
 
 TEST(ABenchmark, OfStagesStacksThemAndHasThePapersFiguresBesideOurs) {
