@@ -131,7 +131,8 @@ const Wrong kLeast[] = {
      }},
     {"place of the prediction", 1e-12, state(0, [](State& s, double off) { s.x[kInside].y += off * kSpacing; })},
     {"place of an iterate", 1e-12, state(2, [](State& s, double off) { s.x[kInside].y += off * kSpacing; })},
-    {"velocity", 1e-12, state(4, [](State& s, double off) { s.v[kInside].y += off * kSpacing / 0.004; })},
+    // Not of the last iterate, from which the next substep begins.
+    {"velocity", 1e-12, state(2, [](State& s, double off) { s.v[kInside].y += off * kSpacing / 0.004; })},
     {"rotation", 1e-12,
      state(3,
            [](State& s, double off) {
