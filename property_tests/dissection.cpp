@@ -14,7 +14,6 @@
 #include "harness/reference_stages.h"
 #include "model/io/verdict_json.h"
 #include "model/rules.h"
-#include "oracles/iterates/probe.h"
 #include "oracles/oracles.h"
 #include "property_tests/random.h"
 #include "property_tests/touching.h"
@@ -201,7 +200,7 @@ void probe_steps(Backend& backend, const std::vector<Instance>& loaded, std::vec
     probed.push_back(b);
   }
   if (probes.empty()) return;
-  std::vector<std::vector<State>> shown = oracles::shown_iterates(backend, probes);
+  std::vector<oracles::ShownStep> shown = oracles::shown_iterates(backend, probes);
   for (std::size_t k = 0; k < probed.size(); ++k) runs[probed[k]].iterates = std::move(shown[k]);
 }
 

@@ -14,6 +14,7 @@
 #include "model/backend.h"
 #include "model/verdict.h"
 #include "oracles/comparison/stage_comparison.h"
+#include "oracles/iterates/probe.h"
 #include "property_tests/cases.h"
 #include "property_tests/coverage.h"
 
@@ -124,7 +125,7 @@ struct CaseRun {
   std::optional<Verdict> failure;  // of the contract
   // Of one step of a body that moves, drawn at random: what the backend has shown of its iterates.
   int64_t probed = -1;  // which moment of the trace; -1: none
-  std::vector<State> iterates;
+  oracles::ShownStep iterates;
 };
 
 // Loads all cases at once and runs them to their ends, stage by stage as far as the backend can.

@@ -195,8 +195,8 @@ TEST_P(EveryBackend, ShowsEachIterateOfAFrame) {
       return oracles::shown_iterates(*backend_, {&probe, 1}).front();
     };
     const State end = ends_of({setup}, loaded.state).front();
-    const std::vector<State> all = iterates(loaded.state);  // and the frame as it is
-    for (const State* const last : {&all[all.size() - 2], &all.back()}) {
+    const oracles::ShownStep all = iterates(loaded.state);
+    for (const State* const last : {&all.iterates.back(), &*all.whole}) {
       if (const std::string what = differ(*last, end); !what.empty()) {
         return what + " at the end of a frame that shows its iterates is not that of one that does not";
       }

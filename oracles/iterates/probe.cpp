@@ -74,7 +74,7 @@ Setup IterateProbe::from_the_substep(Shown wanted) const {
   return single;
 }
 
-std::vector<std::vector<State>> shown_iterates(Backend& backend, std::span<const IterateProbe> probes) {
+std::vector<ShownStep> shown_iterates(Backend& backend, std::span<const IterateProbe> probes) {
   const Span step{Stage::step, Stage::step};
   const bool alone = backend.can_run(step);
   std::vector<Setup> setups;
@@ -83,24 +83,34 @@ std::vector<std::vector<State>> shown_iterates(Backend& backend, std::span<const
     setups.push_back(alone ? std::move(setup) : step_alone(std::move(setup)));
     begin.frame = frame;
     states.push_back(std::move(begin));
+    return states.size() - 1;
   };
-  const auto run = [&] {
+  std::vector<ShownStep> shown(probes.size());
+  // Bodies in which probes begin a frame: what they hold once they are loaded is kept.
+  const auto run = [&](const std::vector<std::size_t>& first) {
+    std::vector<bool> wanted(setups.size());
+    for (const std::size_t body : first) wanted[body] = true;
     backend.load(std::exchange(setups, {}), std::exchange(states, {}));
+    if (!first.empty()) {
+      std::vector<State> held = backend.snapshot_of(wanted);
+      for (std::size_t p = 0; p < first.size(); ++p) shown[p].before = std::move(held[first[p]]);
+    }
     backend.run(alone ? step : Span{Stage::step, Stage::skin});
     return backend.snapshot();
   };
-  std::vector<std::vector<State>> shown(probes.size());
+  std::vector<std::size_t> first;
   if (backend.shows_iterates()) {
     for (const IterateProbe& probe : probes) {
       for (const auto& wanted : probe.shown_) add(probe.from_the_frame(wanted), probe.before_);
-      add(probe.setup_, probe.before_, probe.before_.frame);
+      first.push_back(add(probe.setup_, probe.before_, probe.before_.frame));
     }
-    std::vector<State> all = run();
+    std::vector<State> all = run(first);
     auto next = all.begin();
     for (std::size_t p = 0; p < probes.size(); ++p) {
-      const auto count = static_cast<std::ptrdiff_t>(probes[p].shown_.size()) + 1;
-      shown[p].assign(std::make_move_iterator(next), std::make_move_iterator(next + count));
-      next += count;
+      const auto end = all.begin() + static_cast<std::ptrdiff_t>(first[p]);
+      shown[p].iterates.assign(std::make_move_iterator(next), std::make_move_iterator(end));
+      shown[p].whole = std::move(*end);
+      next = end + 1;
     }
     return shown;
   }
@@ -109,35 +119,38 @@ std::vector<std::vector<State>> shown_iterates(Backend& backend, std::span<const
   int32_t most = 0;
   for (const IterateProbe& probe : probes) {
     begin.push_back(probe.before_);
-    shown[&probe - probes.data()].resize(probe.shown_.size());
+    shown[begin.size() - 1].iterates.resize(probe.shown_.size());
     most = std::max(most, probe.setup_.step.substeps);
   }
   for (int32_t s = 0; s < most; ++s) {
     std::vector<std::pair<std::size_t, IterateProbe::Shown>> loaded;
+    first.clear();
     for (std::size_t p = 0; p < probes.size(); ++p) {
       const int32_t last = probes[p].setup_.step.iterations;
       const auto want = [&](IterateProbe::Shown wanted) {
-        add(probes[p].from_the_substep(wanted), begin[p]);
         loaded.emplace_back(p, wanted);
+        return add(probes[p].from_the_substep(wanted), begin[p]);
       };
       for (const auto& wanted : probes[p].shown_) {
         if (wanted.substep == s && wanted.iterations != last) want(wanted);
       }
-      if (s < probes[p].setup_.step.substeps) want({s, last});
+      if (s >= probes[p].setup_.step.substeps) continue;
+      const std::size_t body = want({s, last});
+      if (s == 0) first.push_back(body);
     }
-    const std::vector<State> all = run();
+    const std::vector<State> all = run(first);
     for (std::size_t k = 0; k < loaded.size(); ++k) {
       const auto& [p, wanted] = loaded[k];
       const std::size_t place = probes[p].place_of(wanted);
-      if (place < probes[p].shown_.size() && probes[p].shown_[place] == wanted) shown[p][place] = all[k];
+      if (place < probes[p].shown_.size() && probes[p].shown_[place] == wanted) shown[p].iterates[place] = all[k];
       if (wanted.iterations == probes[p].setup_.step.iterations) begin[p] = all[k];
     }
   }
   // Single precision loses what is carried from one substep to the next, where it is loaded between them.
   if (backend.precision() == Precision::binary64) {
     for (const IterateProbe& probe : probes) add(probe.setup_, probe.before_, probe.before_.frame);
-    std::vector<State> whole = run();
-    for (std::size_t p = 0; p < probes.size(); ++p) shown[p].push_back(std::move(whole[p]));
+    std::vector<State> whole = run({});
+    for (std::size_t p = 0; p < probes.size(); ++p) shown[p].whole = std::move(whole[p]);
   }
   return shown;
 }
@@ -196,12 +209,13 @@ void IterateProbe::compare_ends(const State& shown, const State& whole, Verdict&
   }
 }
 
-void IterateProbe::judge(const std::vector<State>& shown, Verdict& verdict) const {
+void IterateProbe::judge(const ShownStep& shown, Verdict& verdict) const {
   verdict.bound = 1;
-  if (shown.size() > shown_.size()) compare_ends(shown[shown_.size() - 1], shown.back(), verdict);
+  if (shown.whole) compare_ends(shown.iterates.back(), *shown.whole, verdict);
   for (const Wanted& of : wanted_) {
-    const State& began = of.substep == 0 ? before_ : shown[place_of({of.substep - 1, setup_.step.iterations})];
-    const auto state = [&](int32_t k) -> const State& { return shown[place_of({of.substep, k})]; };
+    const auto state_after = [&](Shown wanted) -> const State& { return shown.iterates[place_of(wanted)]; };
+    const State& began = of.substep == 0 ? shown.before : state_after({of.substep - 1, setup_.step.iterations});
+    const auto state = [&](int32_t k) -> const State& { return state_after({of.substep, k}); };
     const auto shows = [&](int32_t k) { return std::binary_search(of.iterations.begin(), of.iterations.end(), k); };
     SubstepJudge judge(setup_, before_.frame, of.substep, began);
     if (shows(0)) judge.prediction(state(0));
@@ -218,7 +232,7 @@ void IterateProbe::judge(const std::vector<State>& shown, Verdict& verdict) cons
   }
 }
 
-Verdict IterateProbe::judged(const std::vector<State>& shown) const {
+Verdict IterateProbe::judged(const ShownStep& shown) const {
   Verdict verdict = start_verdict(kStepByIterates, before_, kIteratesUnit, kIteratesSource);
   judge(shown, verdict);
   return conclude(std::move(verdict), kNoIterates);

@@ -3,6 +3,7 @@
 #pragma once
 #include <compare>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -20,6 +21,13 @@ inline constexpr const char *kStepByIterates = "step by iterates", *kIteratesUni
 
 struct IterateFinding;  // oracles/iterates/substep_judge.h
 
+// What a backend has shown of one step.
+struct ShownStep {
+  State before;                 // as the backend holds it: loading rounds in single precision
+  std::vector<State> iterates;  // those that were wanted
+  std::optional<State> whole;   // after the step of the whole frame, run from `before` like these
+};
+
 // For one body and the state in which a frame begins: well formed and finite, its schedule not over. Both must live as
 // long as this.
 class IterateProbe {
@@ -28,12 +36,12 @@ class IterateProbe {
 
   // Judges what shown_iterates() gives for it, in a verdict that holds so far. `measured` is the greatest part of its
   // bound of all that is compared, `bound` 1.
-  void judge(const std::vector<State>& shown, Verdict& verdict) const;
+  void judge(const ShownStep& shown, Verdict& verdict) const;
   // The same in a verdict of its own.
-  Verdict judged(const std::vector<State>& shown) const;
+  Verdict judged(const ShownStep& shown) const;
 
  private:
-  friend std::vector<std::vector<State>> shown_iterates(Backend& backend, std::span<const IterateProbe> probes);
+  friend std::vector<ShownStep> shown_iterates(Backend& backend, std::span<const IterateProbe> probes);
   struct Wanted {
     int32_t substep;
     std::vector<int32_t> iterations;  // ascending: of runs that end with so many
@@ -54,9 +62,9 @@ class IterateProbe {
   std::vector<Shown> shown_;  // ascending
 };
 
-// For each probe the states that it wants to see, and last the state after the step of the whole frame. A backend that
-// knows Setup::withheld_iterations runs all of them from the beginning of the frame, in one load. Another backend runs
-// each substep from the end of the one before; of its whole frame the state is shown in double precision only.
-std::vector<std::vector<State>> shown_iterates(Backend& backend, std::span<const IterateProbe> probes);
+// What each probe wants to see. A backend that knows Setup::withheld_iterations runs all of it from the beginning of
+// the frame, in one load. Another backend runs each substep from the end of the one before; of its whole frame the
+// state is shown in double precision only.
+std::vector<ShownStep> shown_iterates(Backend& backend, std::span<const IterateProbe> probes);
 
 }  // namespace cutproof::oracles

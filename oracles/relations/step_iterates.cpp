@@ -10,9 +10,7 @@ Verdict step_by_iterates(Backend& backend, const Setup& setup, const State& give
   const Relation relation = {kStepByIterates, kIteratesUnit, kIteratesSource, kNoIterates};
   return judge_relation(relation, backend, step_span(backend), setup, state, [&](Verdict& verdict) {
     if (state.frame >= setup.frame_count()) return vacuous(verdict, "the schedule is over");
-    backend.load({setup}, {state});
-    const State held = backend.snapshot().front();  // in its arithmetic, which may round what it is given
-    const IterateProbe probe(setup, held, wanted, seed);
+    const IterateProbe probe(setup, state, wanted, seed);
     probe.judge(shown_iterates(backend, {&probe, 1}).front(), verdict);
   });
 }

@@ -20,7 +20,8 @@ using namespace cutproof::testing;
 class Faulty final : public Backend {
  public:
   std::function<void(cutproof::Setup&)> of_setup = [](cutproof::Setup&) {};
-  // `iterations`: that the last substep has had.
+  // Of states that are given, and of states after a run; `iterations`: that the last substep has had.
+  std::function<void(State&)> of_given = [](State&) {};
   std::function<void(State&, int32_t iterations)> of_state = [](State&, int32_t) {};
   bool shows = true, only_frames = false;
   Precision arithmetic = Precision::binary64;
@@ -35,13 +36,18 @@ class Faulty final : public Backend {
       iterations_.push_back(setup.step.iterations - setup.withheld_iterations);
       of_setup(setup);
     }
+    for (State& state : states) of_given(state);
     inner_->load(std::move(setups), std::move(states));
+    has_run_ = false;
   }
-  void run(Span span) override { inner_->run(span); }
+  void run(Span span) override {
+    inner_->run(span);
+    has_run_ = true;
+  }
   std::vector<State> snapshot() const override {
     std::vector<State> states = inner_->snapshot();
     for (std::size_t b = 0; b < states.size(); ++b) {
-      of_state(states[b], iterations_[b]);
+      if (has_run_) of_state(states[b], iterations_[b]);
       states[b].precision = arithmetic;
     }
     return states;
@@ -51,6 +57,7 @@ class Faulty final : public Backend {
  private:
   std::unique_ptr<Backend> inner_ = reference::make_backend();
   std::vector<int32_t> iterations_;
+  bool has_run_ = false;
 };
 
 Verdict judged(Backend& backend, const StepScene& scene, Iterates wanted = Iterates::all, uint64_t seed = 1) {
@@ -259,6 +266,16 @@ TEST(Iterates, KeepAParticleOnOneSideOfTheBlade) {
   EXPECT_TRUE(with_sides({-1, -1, -1}).holds);
   EXPECT_FALSE(with_sides({1, -1, -1}).holds);
   EXPECT_FALSE(with_sides({1, 1, -1}).holds);
+}
+
+// A backend may round the state that it is given, here by far more than an iteration rounds.
+TEST(Iterates, BeginWithTheStateThatTheBackendHolds) {
+  const StepScene scene = pressed_block();
+  Faulty rounding;
+  rounding.of_given = [](State& state) {
+    for (Vec3& x : state.x) x += Vec3{1e-6, 0, 0};
+  };
+  expect_holds(judged(rounding, scene));
 }
 
 // Without iterations there is the prediction alone.
