@@ -1,8 +1,11 @@
 #include "oracles/iterates/contact.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+
+#include "model/at.h"
 
 namespace cutproof::oracles {
 namespace {
@@ -50,13 +53,19 @@ Local Contact::nearest_on_plate(Local c) const {
   return {std::clamp(c.u, -half_length_, half_length_), 0, std::clamp(c.w, 0.0, depth_)};
 }
 
-double Contact::depth(Vec3 x, int side) const {
-  double deepest = -std::numeric_limits<double>::infinity();
+Contact::Depth Contact::depth(Vec3 x, int side, double near) const {
+  const double infinity = std::numeric_limits<double>::infinity();
+  double deepest = -infinity;
   for (const Wall& wall : setup_.walls) deepest = std::max(deepest, wall.side * (wall.offset - x[wall.axis]));
-  if (!has_plate_) return deepest;
-  const Local c = seen_from_blade(x), near = nearest_on_plate(c);
-  const double distance = is_over(c) ? side * c.n : length_of({c.u - near.u, c.n, c.w - near.w});
-  return std::max(deepest, clearance_ - distance);
+  if (!has_plate_) return {deepest, deepest};
+  const Local c = seen_from_blade(x), on_plate = nearest_on_plate(c);
+  const double over = clearance_ - side * c.n,
+               beside = clearance_ - length_of({c.u - on_plate.u, c.n, c.w - on_plate.w});
+  // Of its borders, the one that is least far inside.
+  const double inside = std::min({half_length_ - std::abs(c.u), c.w, depth_ - c.w});
+  const double least = inside > near ? over : inside < -near ? beside : std::min(over, beside);
+  const double most = inside > near ? over : inside < -near ? beside : std::max(over, beside);
+  return {std::max(deepest, least), std::max(deepest, most)};
 }
 
 Local Contact::on_border(Local c, double near) const {
@@ -81,15 +90,18 @@ Vec3 Contact::way_off_plate(Vec3 x, int side, const Rounding& rounding) const {
   }
   const double height = side * c.n;
   if (height >= clearance_) return {};
-  Local way = {0, side * clearance_ - c.n, 0};
-  if (height >= 0) return turned_back(way);
+  const Local back = {0, side * clearance_ - c.n, 0};
+  if (height >= 0) return turned_back(back);
   // It came through the plate: back, or round one of the four sides, where the rounded rim has to be cleared too.
   const double beyond = -side * std::max(-height, clearance_) - c.n;
-  for (const Local round : {Local{0, beyond, -c.w}, Local{0, beyond, depth_ - c.w},
-                            Local{-half_length_ - c.u, beyond, 0}, Local{half_length_ - c.u, beyond, 0}}) {
-    if (length_of(round) < length_of(way)) way = round;
-  }
-  return turned_back(way);
+  const std::array<Local, kWaysOffPlate> ways = {back, Local{0, beyond, -c.w}, Local{0, beyond, depth_ - c.w},
+                                                 Local{-half_length_ - c.u, beyond, 0},
+                                                 Local{half_length_ - c.u, beyond, 0}};
+  const auto shorter = [](Local a, Local b) { return length_of(a) < length_of(b); };
+  const Local shortest = *std::min_element(ways.begin(), ways.end(), shorter),
+              preferred = ways[at(rounding.preferred_way)];
+  const bool is_as_short = length_of(preferred) <= length_of(shortest) + rounding.relative * rounds(x);
+  return turned_back(is_as_short ? preferred : shortest);
 }
 
 Vec3 Contact::off_walls(Vec3 x) const {

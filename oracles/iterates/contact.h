@@ -26,16 +26,23 @@ class Contact {
   // and back, the offset of a wall.
   double rounds(Vec3 x) const;
 
-  // By how much x is inside of what a particle of this side may not enter [m]; not above 0: it may be there.
-  double depth(Vec3 x, int side) const;
+  // By how much x is inside of what a particle of this side may not enter [m]; not above 0: it may be there. Beside a
+  // border of the plate that is one or the other, as far as a place within `near` of x can tell.
+  struct Depth {
+    double least, most;
+  };
+  Depth depth(Vec3 x, int side, double near) const;
 
   // What rounds where blade and walls act in turn, and may double with each turn. Either each place between turns is
   // off, or a place that is as near to a border of the plate lies on the border to the bit: nothing leads it sideways.
+  // Of ways off the plate that are equally long within rounding, any may be the shortest.
   struct Rounding {
     double relative = 0;  // in units of rounds()
     Noise* between_turns = nullptr;
     bool on_borders = false;
+    int preferred_way = 0;  // of kWaysOffPlate
   };
+  static constexpr int kWaysOffPlate = 5;  // back to the particle's side, or round one of four borders
   // Where one is put that would go to `free`. `in_turn`: set where blade and walls have both moved it.
   Vec3 place(Vec3 free, int side, Vec3 start, bool& in_turn, const Rounding& rounding) const;
 

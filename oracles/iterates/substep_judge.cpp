@@ -111,13 +111,14 @@ SubstepJudge::SubstepJudge(const Setup& setup, int64_t frame, int32_t substep, c
   for (int32_t i = 0; i < n; ++i) {
     const Vec3 x = began.x[at(i)];
     if (holders_[at(i)] > 0) lever_[at(i)] = std::sqrt(lever_[at(i)]) / holders_[at(i)];
-    inertia_.push_back(dt_ * began.v[at(i)] + (dt_ * dt_) * step.gravity);
-    predicted_.push_back(x + inertia_.back());
+    const Vec3 coasts = dt_ * began.v[at(i)], falls = (dt_ * dt_) * step.gravity;
+    inertia_.push_back(norm(coasts) + norm(falls));
+    predicted_.push_back(x + (coasts + falls));
     // A backend begins a later substep from places that are not rounded yet. Those shown are off by one rounding, and
     // dt v, the difference of two places, by two. A group sums what its particles have in common, so the rounding is
     // that of the greatest place in the particle's clusters.
     const double went_on = first_ ? 0 : 3 * u_ * std::max(norm(stored(i, x)), shared[at(i)]);
-    begin_squares_.push_back(square(u_ * norm(stored(i, predicted_.back()))) + square(4 * u_ * norm(inertia_.back())) +
+    begin_squares_.push_back(square(u_ * norm(stored(i, predicted_.back()))) + square(4 * u_ * inertia_.back()) +
                              square(2 * places_u_ * norm(predicted_.back())) + square(went_on));
     const double height = contact_.height_at_start(x);
     const double near = contact_.has_plate() ? kTimes * u_ * (8 * norm(x - move_->from.edge) + 8 * norm(x)) : 0;
@@ -328,7 +329,9 @@ void SubstepJudge::particle(int32_t i, const Candidate& candidate, Vec3 seen, Ve
   double deepest = -std::numeric_limits<double>::infinity();
   for (const int side : {+1, -1}) {
     if ((sides_[at(i)] & (side > 0 ? 1 : 2)) == 0 || !contact_.any()) continue;
-    deepest = std::max({deepest, contact_.depth(candidate.free, side), contact_.depth(candidate.plain, side)});
+    for (const Vec3 x : {candidate.free, candidate.plain}) {
+      deepest = std::max(deepest, contact_.depth(x, side, wide).most);
+    }
   }
   const double margin = k_ > 0 ? kTouchMargin * setup_.body.grid.spacing : 0;
   if (deepest < -wide - margin) {  // nothing touches it
@@ -370,10 +373,11 @@ double SubstepJudge::nearest_contact(int32_t i, const Candidate& candidate, Vec3
   std::size_t count = 0;
   for (const int side : {+1, -1}) {
     if ((sides_[at(i)] & (side > 0 ? 1 : 2)) == 0) continue;
-    const double margin =
-        std::max(contact_.depth(candidate.free, side), contact_.depth(candidate.plain, side)) + kTouchMargin * spacing;
-    if (!asks || margin <= wide) ways[count++] = {side, candidate.free};
-    if (asks && margin >= -wide) ways[count++] = {side, candidate.plain};
+    const Contact::Depth free = contact_.depth(candidate.free, side, wide),
+                         plain = contact_.depth(candidate.plain, side, wide);
+    const double margin = kTouchMargin * spacing;
+    if (!asks || std::max(free.least, plain.least) + margin <= wide) ways[count++] = {side, candidate.free};
+    if (asks && std::max(free.most, plain.most) + margin >= -wide) ways[count++] = {side, candidate.plain};
   }
   const auto off_by = [&](const Way& way, Vec3 from, bool& in_turn, const Contact::Rounding& rounding) {
     const Vec3 x = contact_.place(from, way.side, start, in_turn, rounding);
@@ -395,9 +399,12 @@ double SubstepJudge::nearest_contact(int32_t i, const Candidate& candidate, Vec3
     if (off <= within) explained |= way.side > 0 ? 1 : 2;
   };
   const double direct = wide + after;
-  for (std::size_t k = 0; k < count; ++k) {
-    bool in_turn = false;
-    take(ways[k], off_by(ways[k], ways[k].candidate, in_turn, {}), direct);
+  for (int way = 0; way < Contact::kWaysOffPlate && explained == 0; ++way) {
+    for (std::size_t k = 0; k < count; ++k) {
+      bool in_turn = false;
+      take(ways[k], off_by(ways[k], ways[k].candidate, in_turn, {way > 0 ? kTimes * u_ : 0, nullptr, false, way}),
+           direct);
+    }
   }
   if (explained != 0) {
     after = direct;
@@ -419,7 +426,8 @@ double SubstepJudge::nearest_contact(int32_t i, const Candidate& candidate, Vec3
     for (int run = 0; run < kTries && !(best <= after); ++run) {
       const Vec3 near = way.candidate + (wide * (run / 2 % 4) / 4) * noise.vector();
       const bool on_borders = run % 2 == 0;
-      const double there = off_by(way, near, in_turn, {kTimes * u_, on_borders ? nullptr : &noise, on_borders});
+      const double there = off_by(
+          way, near, in_turn, {kTimes * u_, on_borders ? nullptr : &noise, on_borders, run % Contact::kWaysOffPlate});
       if (run < kTries / 8) spread = std::max(spread, std::abs(there - first));
       take(way, there, after);
     }
@@ -479,13 +487,14 @@ void SubstepJudge::sums() {
     part.off += mass * f.off;
     part.along += mass * dot(f.off, f.pull);
     part.pulls += mass * square(pull);
-    // What is made of dt, of dt² g and of s is common to all.
-    const double parameters = 2 * u_ * (norm(inertia_[at(f.particle)]) + pull);
-    part.common += mass * parameters;
-    part.along_common += mass * parameters * pull;
+    const Vec3 kept = stored(f.particle, began_.x[at(f.particle)] + f.off);
+    // What is made of dt, of dt² g and of s is common to all. So is what a prediction rounds where all move alike:
+    // places are multiples of what a place rounds, and the same is added to each of them.
+    const double common = u_ * (2 * (inertia_[at(f.particle)] + pull) + (k_ < 0 ? norm(kept) : 0));
+    part.common += mass * common;
+    part.along_common += mass * common * pull;
     mass_of[at(f.particle)] = mass;
     pull_of[at(f.particle)] = f.pull;
-    const Vec3 kept = stored(f.particle, began_.x[at(f.particle)] + f.off);
     for (int axis = 0; axis < 3; ++axis) {
       int exponent = 0;
       const double digits = std::round(std::frexp(kept[axis], &exponent) / (kEqualRounds * u_));

@@ -109,7 +109,8 @@ class SubstepJudge {
   std::vector<Cluster> clusters_;
   std::vector<Vec3> arm_;                  // [members] X - T
   std::vector<double> lever_;              // [n] √(Σ_c |X − T_c|²) / n_i
-  std::vector<Vec3> inertia_, predicted_;  // [n] dt v + dt² g; x~
+  std::vector<double> inertia_;            // [n] |dt v| + |dt² g|, which may all but cancel
+  std::vector<Vec3> predicted_;            // [n] x~
   std::vector<double> begin_squares_;      // [n] of what rounds in x~ [m²]
   std::vector<std::optional<Vec3>> held_;  // [n] where a grip puts it
   std::vector<uint8_t> sides_;             // [n] bit 0: positive, bit 1: negative: those that it may have begun on
