@@ -96,7 +96,7 @@ SubstepProblem::SubstepProblem(const Setup& setup, const State& state)
 
   for (std::size_t i = 0; i < start.size(); ++i) {
     if (alive[i] != 0) predicted[i] = start[i] + dt * state.v[i] + (dt * dt) * setup.step.gravity;
-    began.push_back({start[i], contacts.height_at_start(start[i]), 0, {}});
+    side.push_back(contacts.height_at_start(start[i]) < 0 ? -1 : +1);
   }
   for (const Grip& grip : setup.grips) {
     if (!grip.active[index]) continue;
@@ -123,25 +123,19 @@ std::vector<Vec3> SubstepProblem::ahead(const std::vector<Vec3>& x) const {
   return y;
 }
 
-namespace {
-// Takes every decision as the numbers say.
-struct AsTheNumbersSay {
-  Settled nothing;
-  Decisions decisions{nothing, 0, kUnitRoundoff};
-};
-}  // namespace
-
 Vec3 SubstepProblem::placed(int32_t i, Vec3 free, const Vec3* present) const {
   if (!contacts.any()) return free;
-  AsTheNumbersSay natural;
-  if (present == nullptr) return contacts.place(free, began[at(i)], nullptr, natural.decisions);
-  ContactModel::Present now = {*present, norm(*present), kUnitRoundoff};
-  return contacts.place(free, began[at(i)], &now, natural.decisions);
+  Contact::Found found;
+  const Vec3 x = contacts.place(free, side[at(i)], start[at(i)], found, {});
+  if (present == nullptr || !found.in_turn || contacts.has_friction()) return x;
+  const double margin = Contact::refusal_margin(norm(*present), free, *present, kUnitRoundoff);
+  return norm(x - free) > norm(*present - free) + margin ? *present : x;
 }
 
 bool SubstepProblem::is_placed_in_turn(int32_t i, Vec3 free) const {
-  AsTheNumbersSay natural;
-  return contacts.any() && contacts.acts_in_turn(free, began[at(i)], natural.decisions);
+  Contact::Found found;
+  if (contacts.any()) contacts.place(free, side[at(i)], start[at(i)], found, {});
+  return found.in_turn;
 }
 
 std::vector<Vec3> first_positions(const SubstepProblem& problem) {

@@ -7,9 +7,9 @@
 
 #include "model/setup.h"
 #include "model/state.h"
+#include "oracles/contact.h"
 #include "oracles/memberships.h"
 #include "oracles/shape_sums.h"
-#include "oracles/step_model/contact_model.h"
 
 namespace cutproof::oracles {
 
@@ -35,8 +35,8 @@ struct SubstepProblem {
   std::vector<Vec3> offset;  // [members] X_i − T_c
   Memberships memberships;
   std::array<double, 3> low, high;  // walls: low <= x <= high
-  ContactModel contacts;
-  std::vector<ContactModel::Began> began;  // [n]
+  Contact contacts;
+  std::vector<int> side;  // [n] of the blade, on which a particle begins: +1 or -1
 
   bool is_free(int32_t i) const { return alive[at(i)] && !held[at(i)]; }
   // Elasticity acts on y = x + τ (x − x_prev) / dt. Without retardation the two are one.

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "oracles/iterates/substep_judge.h"
+#include "oracles/noise.h"
 #include "oracles/single_substep.h"
-#include "oracles/step_model/noise.h"
 #include "oracles/support.h"
 
 namespace cutproof::oracles {

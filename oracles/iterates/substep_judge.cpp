@@ -61,7 +61,7 @@ SubstepJudge::SubstepJudge(const Setup& setup, int64_t frame, int32_t substep, c
       share_(dt_ / (dt_ + setup.step.retardation)),
       first_(substep == 0),
       move_(move_of(setup, frame, substep)),
-      contact_(setup, move_) {
+      contact_(setup, move_, setup.walls) {
   const Body& body = setup.body;
   const StepParameters& step = setup.step;
   const int32_t n = body.particle_count();
@@ -363,7 +363,6 @@ double SubstepJudge::nearest_contact(int32_t i, const Candidate& candidate, Vec3
   const Vec3 start = began_.x[at(i)];
   const double spacing = setup_.body.grid.spacing;
   const bool asks = k_ > 0 && !(candidate.plain == candidate.free) && contact_.path_matters();
-  const double refusal = kRefusalRoundings * u_;
   // Ways to go: from a candidate of this side, to a place.
   struct Way {
     int side;
@@ -379,12 +378,13 @@ double SubstepJudge::nearest_contact(int32_t i, const Candidate& candidate, Vec3
     if (!asks || std::max(free.least, plain.least) + margin <= wide) ways[count++] = {side, candidate.free};
     if (asks && std::max(free.most, plain.most) + margin >= -wide) ways[count++] = {side, candidate.plain};
   }
-  const auto off_by = [&](const Way& way, Vec3 from, bool& in_turn, const Contact::Rounding& rounding) {
-    const Vec3 x = contact_.place(from, way.side, start, in_turn, rounding);
+  const auto off_by = [&](const Way& way, Vec3 from, const Contact::Rounding& rounding) {
+    Contact::Found found;
+    const Vec3 x = contact_.place(from, way.side, start, found, rounding);
     double off = norm(x - seen);
-    if (in_turn && !contact_.has_friction() && k_ >= 0) {  // refused where it is worse than the present place
+    if (found.in_turn && !contact_.has_friction() && k_ >= 0) {  // refused where it is worse than the present place
       const double there = norm(x - from), here = norm(present - from);
-      const double slack = refusal * (here + norm(stored(i, present))) + 4 * wide;
+      const double slack = Contact::refusal_margin(norm(stored(i, present)), from, present, u_) + 4 * wide;
       if (there > here + slack)
         off = norm(present - seen);
       else if (there > here - slack)
@@ -398,12 +398,10 @@ double SubstepJudge::nearest_contact(int32_t i, const Candidate& candidate, Vec3
     best = std::min(best, off);
     if (off <= within) explained |= way.side > 0 ? 1 : 2;
   };
-  const double direct = wide + after;
+  const double direct = wide + after, rounds = kTimes * u_ * contact_.rounds(candidate.free);
   for (int way = 0; way < Contact::kWaysOffPlate && explained == 0; ++way) {
     for (std::size_t k = 0; k < count; ++k) {
-      bool in_turn = false;
-      take(ways[k], off_by(ways[k], ways[k].candidate, in_turn, {way > 0 ? kTimes * u_ : 0, nullptr, false, way}),
-           direct);
+      take(ways[k], off_by(ways[k], ways[k].candidate, {way > 0 ? rounds : 0, nullptr, false, way}), direct);
     }
   }
   if (explained != 0) {
@@ -418,16 +416,15 @@ double SubstepJudge::nearest_contact(int32_t i, const Candidate& candidate, Vec3
   for (std::size_t k = 0; k < count; ++k) {
     const Way& way = ways[k];
     const Vec3 back = contact_.origin_of(seen, way.candidate), off = back - way.candidate;
-    bool in_turn = false;
     const Vec3 from = norm(off) <= wide ? back : way.candidate + (wide / norm(off)) * off;
-    take(way, off_by(way, from, in_turn, {}), after);
+    take(way, off_by(way, from, {}), after);
     Noise noise(static_cast<uint64_t>(i) + 1);
-    const double first = off_by(way, way.candidate, in_turn, {});
+    const double first = off_by(way, way.candidate, {});
     for (int run = 0; run < kTries && !(best <= after); ++run) {
       const Vec3 near = way.candidate + (wide * (run / 2 % 4) / 4) * noise.vector();
       const bool on_borders = run % 2 == 0;
-      const double there = off_by(
-          way, near, in_turn, {kTimes * u_, on_borders ? nullptr : &noise, on_borders, run % Contact::kWaysOffPlate});
+      const double there =
+          off_by(way, near, {rounds, on_borders ? nullptr : &noise, on_borders, run % Contact::kWaysOffPlate});
       if (run < kTries / 8) spread = std::max(spread, std::abs(there - first));
       take(way, there, after);
     }

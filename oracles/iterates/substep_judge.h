@@ -11,7 +11,7 @@
 #include "model/at.h"
 #include "model/setup.h"
 #include "model/state.h"
-#include "oracles/iterates/contact.h"
+#include "oracles/contact.h"
 #include "oracles/partitions.h"
 #include "oracles/rounding.h"
 

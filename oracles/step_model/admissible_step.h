@@ -1,5 +1,6 @@
-// Whether a step went where it may: within rounding of some admissible outcome, one for all particles that are coupled
-// (docs/design/tolerances.md, The step again). Internal to oracles/.
+// Whether a step went where rounding lets it go, as far as that can be told from where it began and ended: where a
+// decision hangs on rounding, all that is coupled with it is undecided (docs/design/tolerances.md, The step again). A
+// backend that can be asked is asked more: oracles/iterates/. Internal to oracles/.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -24,7 +25,7 @@ constexpr const char* name_of(StepPart part) {
 }
 
 struct AdmissibleStep {
-  StepOutcome outcome;  // the admissible one to which the step comes nearest
+  StepOutcome outcome;  // of exact arithmetic
   // Of the comparison that comes nearest to its bound, or goes farthest beyond.
   StepPart part = StepPart::position;
   int32_t where = -1;   // particle; of a rotation, index of the cluster; of the impulse -1
@@ -32,10 +33,10 @@ struct AdmissibleStep {
   double bound = 0;     // [h]               / M
   bool holds = true;
   int64_t checked = 0;
-  int64_t otherwise = 0;  // decisions that the step has taken, within rounding, the other way than the numbers say
-  // Particles of which no sharp answer could be asked: rounding carries them farther than any rule of small changes
-  // holds, or more decisions are open than can be tried together. They lie within what rounding, or those decisions
-  // one by one, can do.
+  int64_t otherwise = 0;  // rotations that the step had to choose, and that are followed
+  // Particles and rotations of which no sharp answer could be asked: rounding carries them farther than any rule of
+  // small changes holds, or decisions are open on which they hang. They lie within what rounding, or those decisions,
+  // can do.
   int64_t undecided = 0;
   std::vector<double> position_bound;  // [n] what rounding does to the outcome [h]
   std::vector<double> velocity_bound;  // [n] the same, times dt [h]

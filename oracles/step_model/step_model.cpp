@@ -11,13 +11,13 @@
 
 #include "model/at.h"
 #include "oracles/best_rotation.h"
+#include "oracles/contact.h"
 #include "oracles/eigen.h"
 #include "oracles/memberships.h"
+#include "oracles/noise.h"
 #include "oracles/rest_places.h"
 #include "oracles/rounding.h"
 #include "oracles/shape_sums.h"
-#include "oracles/step_model/contact_model.h"
-#include "oracles/step_model/noise.h"
 
 namespace cutproof::oracles {
 namespace {
@@ -27,8 +27,10 @@ constexpr double kRotationRounds = 4;   // a rotation, about each axis, given it
 constexpr double kParameterRounds = 4;  // what is made of parameters once: s, e^(-c dt), Chebyshev's weights
 // Where equal numbers round alike, they are equal to so many roundings: what has rounded before makes them differ.
 constexpr double kAlikeRounds = 256;
-// What is this near to a border of the blade, in roundings of the distance from its edge, may be on it to the bit.
-constexpr double kBorderRounds = 32;
+// How much ways into the blade's frame and back round, in units of u times the distance from its edge.
+constexpr double kContactRounds = 4;
+// By so many roundings of that distance, nobody knows on which side of a border a place is.
+constexpr double kNearRounds = 32;
 
 // Up to so many times what the rounding of places makes of the matrix, it says nothing of how a cluster is turned.
 constexpr double kLost = 100;
@@ -178,11 +180,8 @@ class StepModel::Run {
         lost_(static_cast<Lost>(wanted.disturbance % 4)),
         coordinate_(wanted.disturbance / 4 % 6),
         threshold_(degenerate_rounds(model.u_) * model.u_ / static_cast<double>(2 << wanted.disturbance / 4 % 4)),
-        border_(wanted.disturbance == 0 && model.before_.precision == Precision::binary32
-                    ? ContactModel::Border::exact
-                    : static_cast<ContactModel::Border>(wanted.disturbance / 4 % 5 % 3)),
         u_(model.u_),
-        decisions_(wanted.settled, wanted.near, model.u_),
+        draws_(~wanted.disturbance),
         stores_positions_(before_.precision != Precision::binary32) {
     out_.x = before_.x;
     out_.v = before_.v;
@@ -190,7 +189,8 @@ class StepModel::Run {
     out_.rounding.resize(out_.x.size());
     out_.own_rounding.resize(out_.x.size());
     out_.raised.resize(out_.x.size());
-    out_.hold.assign(out_.x.size(), std::numeric_limits<double>::infinity());
+    out_.lead.assign(out_.x.size(), std::numeric_limits<double>::infinity());
+    out_.hold = out_.lead;
     out_.turn_rounding.resize(model.clusters_.size());
     out_.is_free.assign(model.clusters_.size(), 0);
     sum_.resize(out_.x.size());
@@ -207,7 +207,6 @@ class StepModel::Run {
 
   StepOutcome run() {
     for (int32_t s = 0; s < setup_.step.substeps; ++s) substep(s);
-    out_.near = decisions_.take_near();
     return std::move(out_);
   }
 
@@ -243,7 +242,22 @@ class StepModel::Run {
   Mat3 rotation_of(int32_t c, const Eigen::Matrix3d& a, const Eigen::Matrix3d& summed, double size, double noise,
                    bool is_last);
   Mat3 one_of_many(BestRotation best, const Mat3& previous, bool all);
-  bool keeps_rotation(int32_t c);
+  bool keeps_rotation();
+  // Whether `lead`, of one outcome over another, is above 0; anything where that is drawn. `rounds`: what it rounds
+  // [m].
+  bool exceeds(std::size_t i, double lead, double rounds) {
+    out_.lead[i] = std::min(out_.lead[i], std::max(0.0, std::abs(lead) - rounds));
+    return is_drawn(i, lead, rounds) ? draws_() > 0 : lead > 0;
+  }
+  bool is_drawn(std::size_t i, double lead, double rounds) const {
+    return !wanted_.open.empty() && std::abs(lead) <= wanted_.open[i] + rounds;
+  }
+  // A particle's cluster could be turned in any of many ways.
+  void note_open(int32_t c) {
+    for (const int32_t i : before_.clusters.of(c)) out_.lead[at(i)] = 0;
+  }
+  int side_of(std::size_t i, const Contact& contacts, Vec3 start, const BladeMove& move);
+  Vec3 placed(std::size_t i, Vec3 free, Vec3 start, const Vec3* present, const Contact& contacts, double& raised);
 
   // What is rounded: of clusters and of particles.
   enum class Rounded : uint8_t { shape, prediction, place, push, end, impulse };
@@ -275,11 +289,10 @@ class StepModel::Run {
   Noise noise_;            // of single roundings
   OppositeNoise lasting_;  // of what stays the same throughout a run
   const Lost lost_;
-  const std::size_t coordinate_;       // of ±x, ±y, ±z
-  const double threshold_;             // of this run, for what is degenerate
-  const ContactModel::Border border_;  // dealt out among the runs (tolerances.md, The step again)
+  const std::size_t coordinate_;  // of ±x, ±y, ±z
+  const double threshold_;        // of this run, for what is degenerate
   const double u_;
-  Decisions decisions_;
+  Noise draws_;  // of decisions
   const bool stores_positions_;
   StepOutcome out_;
   std::vector<Vec3> y_;                // [n] where elasticity acts
@@ -293,7 +306,7 @@ class StepModel::Run {
   double share_ = 1;           // dt / (dt + τ): of the way to y, x has come so far
   double turn_amplitude_ = 0;  // of the last rotation [rad]
   uint64_t time_ = 0;          // evaluations so far
-  int32_t substep_ = 0, iteration_ = 0;
+  std::vector<int> sides_;     // [n] of the blade, in this substep
 };
 
 // One of the rotations that take v to u, the nearest to the previous one; any of them in a disturbed run. `all`: of all
@@ -337,7 +350,8 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, const Eige
     // How it is turned about itself moves no member; but it stays.
     if (is_half_turn || (is_lost && is_last)) out_.is_free[at(c)] = 1;
     if (is_given) return *wanted_.given[at(c)];
-    if (is_lost && keeps_rotation(c)) return previous;
+    if (is_half_turn || is_lost) note_open(c);
+    if (is_lost && keeps_rotation()) return previous;
     return is_half_turn || is_lost ? one_of_many(best, previous, is_lost) : nearest.r;
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -352,7 +366,8 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, const Eige
     rounding = is_lost ? 1.0 : u_ * kRotationRounds + sum_amplitude / sigma[0];
     rounding *= rounding;
     if (is_given) return *wanted_.given[at(c)];
-    if (is_lost && keeps_rotation(c)) return previous;
+    note_open(c);
+    if (is_lost && keeps_rotation()) return previous;
     const BestRotation best = best_rotation(to_mat3(a));
     if (!is_lost && (lost_ == Lost::coordinate || lost_ == Lost::kept)) {
       const Eigen::Vector3d exact = Eigen::JacobiSVD<Eigen::Matrix3d>(summed).singularValues();
@@ -371,20 +386,53 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, const Eige
 
 // Whether a cluster whose matrix is no more than rounding keeps its rotation, as it does where a backend finds nothing
 // but zeros: among all rotations that is one which no draw at random finds.
-bool StepModel::Run::keeps_rotation(int32_t c) {
-  decisions_.begin(substep_, iteration_, before_.clusters.of(c).front(), c);
-  constexpr double kLeast = std::numeric_limits<double>::min();
-  const double lead = !disturbed_                 ? 0
-                      : lost_ == Lost::kept       ? kLeast
-                      : lost_ == Lost::coordinate ? -kLeast
-                                                  : kLeast * noise_();
-  return decisions_.exceeds(DecisionKind::kept, lead);
+bool StepModel::Run::keeps_rotation() {
+  if (!disturbed_ || lost_ == Lost::coordinate) return false;
+  return lost_ == Lost::kept || noise_() > 0;
+}
+
+// On which side of the blade a particle begins the substep, +1 or -1.
+int StepModel::Run::side_of(std::size_t i, const Contact& contacts, Vec3 start, const BladeMove& move) {
+  double height = contacts.height_at_start(start);
+  const double distance = u_ * norm(start - move.from.edge), rounds = kNearRounds * distance;
+  if (disturbed_) height += kContactRounds * distance * noise_();
+  const int seen = wanted_.side_of_end.empty() ? 0 : wanted_.side_of_end[i];
+  if (seen != 0 && (std::abs(height) <= rounds || is_drawn(i, height, rounds))) return seen;
+  const bool drawn = exceeds(i, height, rounds);
+  return (is_drawn(i, height, rounds) ? drawn : height >= 0) ? +1 : -1;
+}
+
+// Where contacts put a particle that would go to `free`. `present`: where it is, which it does not leave for what is
+// worse; nullptr: the prediction, which comes from nowhere. `raised`: by how much the square of its distance from where
+// it would go has grown [m²].
+Vec3 StepModel::Run::placed(std::size_t i, Vec3 free, Vec3 start, const Vec3* present, const Contact& contacts,
+                            double& raised) {
+  Contact::Found found;
+  Contact::Rounding rounding;
+  if (disturbed_) {
+    rounding.near = kContactRounds * u_ * contacts.rounds(free);
+    rounding.on_borders = wanted_.disturbance % 2 == 0;
+    rounding.between_turns = rounding.on_borders ? nullptr : &noise_;
+  }
+  if (!wanted_.open.empty() && wanted_.open[i] >= 0) {
+    rounding.near += wanted_.open[i];
+    rounding.preferred_way =
+        std::min(static_cast<int>((draws_() + 1) / 2 * Contact::kWaysOffPlate), Contact::kWaysOffPlate - 1);
+  }
+  Vec3 x = contacts.place(free, sides_[i], start, found, rounding);
+  out_.lead[i] =
+      std::min(out_.lead[i], found.in_turn ? 0 : std::max(0.0, found.lead - kNearRounds * u_ * contacts.rounds(free)));
+  if (!disturbed_) out_.hold[i] = std::min(out_.hold[i], found.hold);
+  if (!found.in_turn || present == nullptr || contacts.has_friction()) return x;
+  const double margin = Contact::refusal_margin(norm(stored(i, *present)), free, *present, u_ - kUnitRoundoff);
+  const double there = norm(x - free), here = norm(*present - free);
+  if (exceeds(i, there - here - margin, 0)) return *present;
+  raised = std::max(0.0, there * there - here * here);
+  return x;
 }
 
 void StepModel::Run::match_shapes(int32_t s, int32_t j) {
   const bool is_last = s + 1 == setup_.step.substeps && j + 1 == setup_.step.iterations;
-  substep_ = s;
-  iteration_ = j;
   const Clusters& clusters = before_.clusters;
   const std::vector<Vec3>& x = y_;
   std::fill(sum_.begin(), sum_.end(), Vec3{});
@@ -487,8 +535,7 @@ void StepModel::Run::substep(int32_t s) {
   const std::vector<Wall> walls = walls_now();
   const bool down = setup_.has_blade && setup_.blade_moves[at(index)].down;
   const BladeMove move = down ? move_now(setup_.blade_moves[at(index)]) : BladeMove{};
-  const ContactModel contacts(setup_, down ? &move : nullptr, walls, border_, kBorderRounds * u_,
-                              disturbed_ ? &noise_ : nullptr, u_);
+  const Contact contacts(setup_, down ? &move : nullptr, walls);
   std::vector<const Grip*> held(out_.x.size(), nullptr);
   for (const Grip& grip : setup_.grips) {
     if (grip.active[at(index)] == 0) continue;
@@ -501,13 +548,12 @@ void StepModel::Run::substep(int32_t s) {
   const auto ahead = [&](std::size_t i, Vec3 x) { return retarded ? start[i] + (x - start[i]) / share_ : x; };
   const auto back = [&](std::size_t i, Vec3 y) { return retarded ? start[i] + share_ * (y - start[i]) : y; };
   std::vector<Vec3> predicted(start.size()), predicted_ahead(start.size());
-  std::vector<ContactModel::Began> began(start.size());
   // Of a disturbed run: Σ m times displacements by contacts and grips, carried on as backends do.
   Vec3 pushed, pushed_earlier;
   rounding_now_.assign(start.size(), 0);
   own_now_.assign(start.size(), 0);
   shared_rounding_ = 0;
-  const auto hold_of = [&](std::size_t i) { return disturbed_ ? nullptr : &out_.hold[i]; };
+  sides_.assign(start.size(), +1);
   // Rounds a place that contacts have made of `free`.
   const auto settle = [&](std::size_t i, Vec3 free, Vec3& x, double more) {
     double amplitude = more;
@@ -531,14 +577,10 @@ void StepModel::Run::substep(int32_t s) {
     round(Rounded::prediction, i);
     predicted[i] = start[i] + inertia;
     if (disturbed_) predicted[i] += noise_.off(u_ * stored(i, predicted[i]), 2 * u_ * norm(inertia));
-    began[i] = {start[i], contacts.height_at_start(start[i]), 0, start[i] - stored(i, start[i])};
-    if (border_ == ContactModel::Border::any) began[i].angle = std::numbers::pi * noise_();
-    if (disturbed_ && contacts.has_plate()) {
-      began[i].height += kContactRounds * u_ * norm(start[i] - move.from.edge) * noise_();
-    }
-    decisions_.begin(s, 0, static_cast<int32_t>(i));
+    if (contacts.has_plate()) sides_[i] = side_of(i, contacts, start[i], move);
+    double raised = 0;
     out_.x[i] = held[i] != nullptr ? start[i] + held[i]->displacement[at(index)]
-                : contacts.any()   ? contacts.place(predicted[i], began[i], nullptr, decisions_, hold_of(i))
+                : contacts.any()   ? placed(i, predicted[i], start[i], nullptr, contacts, raised)
                                    : predicted[i];
     const bool is_pushed = !(out_.x[i] == predicted[i]);
     settle(i, predicted[i], out_.x[i], 2 * u_ * norm(inertia));
@@ -590,19 +632,25 @@ void StepModel::Run::substep(int32_t s) {
       round(Rounded::place, i);
       Vec3 wanted = free;
       if (contacts.any()) {
-        decisions_.begin(s, j + 1, static_cast<int32_t>(i));
         // Where several answers are right, the way there decides: touched particles go the plain way.
         bool touched = true;
         if (combined && contacts.path_matters()) {
-          const double deepest =
-              std::max(contacts.depth(free, began[i], decisions_), contacts.depth(plain, began[i], decisions_));
-          touched = decisions_.exceeds(DecisionKind::touched, deepest + kTouchMargin * body_.grid.spacing);
+          const auto deepest = [&](double near) {
+            const Contact::Depth of_free = contacts.depth(free, sides_[i], near),
+                                 of_plain = contacts.depth(plain, sides_[i], near);
+            const double margin = kTouchMargin * body_.grid.spacing;
+            return Contact::Depth{std::max(of_free.least, of_plain.least) + margin,
+                                  std::max(of_free.most, of_plain.most) + margin};
+          };
+          const double rounds = kNearRounds * u_ * contacts.rounds(free), depth = deepest(0).most;
+          const Contact::Depth near = deepest(rounds);
+          touched = exceeds(i, depth, near.least <= 0 && near.most > 0 ? std::abs(depth) : rounds);
           if (touched) wanted = plain;
         }
         if (touched) {
-          ContactModel::Present present = {present_place, norm(stored(i, present_place)), u_ - kUnitRoundoff};
-          next = contacts.place(wanted, began[i], &present, decisions_, hold_of(i));
-          if (s + 1 == step.substeps && j + 1 == step.iterations) out_.raised[i] = present.raised;
+          double raised = 0;
+          next = placed(i, wanted, start[i], &present_place, contacts, raised);
+          if (s + 1 == step.substeps && j + 1 == step.iterations) out_.raised[i] = raised;
         }
       }
       const bool is_pushed = !(next == free);

@@ -2,13 +2,12 @@
 // singular value decompositions, impulses from the balance of momentum. It can be asked what rounding does to it: a
 // disturbed run rounds at random wherever a backend has to. Internal to oracles/.
 #pragma once
-#include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "model/setup.h"
 #include "model/state.h"
-#include "oracles/step_model/decisions.h"
 
 namespace cutproof::oracles {
 
@@ -16,7 +15,10 @@ struct StepOutcome {
   std::vector<Vec3> x, v;      // [n] [m], [m/s]
   std::vector<Mat3> rotation;  // [m]
   Vec3 impulse;                // as State::impulse
-  std::vector<NearDecision> near;
+  // [n] By how much, at least, what a particle has decided on its way was decided: on which side of the blade it
+  // begins, which way leads off the blade, whether it touches; less what comparing rounds. 0 where a cluster of it
+  // could be turned in any of many ways before the last iteration, or blade and walls have moved it in turn [m].
+  std::vector<double> lead;
   // Of the last iteration: Σ w (x − t)(X − T)ᵀ of each cluster [m], empty without iterations.
   std::vector<Mat3> shape;
   // [m] Σ w |X − T|: by so much a displacement of its members by 1 m changes `shape` at most [kg m].
@@ -51,9 +53,12 @@ class StepModel {
   StepModel(const Setup& setup, const State& before, double unit_roundoff);
 
   struct Wanted {
-    Settled settled = {};
     uint64_t disturbance = 0;  // 0: none; else the seed of one
-    double near = 0;           // what is decided by less is noted [m]
+    // [n] Of a disturbed run: what a particle decides by no more than this is drawn [m]. Empty: nothing is drawn.
+    std::vector<double> open = {};
+    // [n] On which side of the blade a particle ends, as Contact::side_of_end() has it. Where rounding decides on which
+    // side it begins a substep, it is that one.
+    std::vector<int> side_of_end = {};
     // [m] Rotations that are given in the last iteration of the last substep, nullptr: the best one.
     std::vector<const Mat3*> given = {};
   };

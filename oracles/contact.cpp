@@ -1,4 +1,4 @@
-#include "oracles/iterates/contact.h"
+#include "oracles/contact.h"
 
 #include <algorithm>
 #include <array>
@@ -15,17 +15,10 @@ constexpr int kTurns = 16;
 
 double length_of(Local c) { return std::hypot(c.u, c.n, c.w); }
 
-// Takes back at most `most` of what `slid` has along a surface with this normal.
-Vec3 rubbed(Vec3 x, Vec3 slid, Vec3 normal, double most) {
-  const Vec3 tangential = slid - dot(slid, normal) * normal;
-  const double length = norm(tangential);
-  return length > most ? x - (most / length) * tangential : x - tangential;
-}
-
 }  // namespace
 
-Contact::Contact(const Setup& setup, const BladeMove* move) : setup_(setup) {
-  for (const Wall& wall : setup.walls) greatest_friction_ = std::max(greatest_friction_, wall.friction);
+Contact::Contact(const Setup& setup, const BladeMove* move, const std::vector<Wall>& walls) : walls_(walls) {
+  for (const Wall& wall : walls_) greatest_friction_ = std::max(greatest_friction_, wall.friction);
   // A geometric blade removes what it sweeps, and touches nothing.
   has_plate_ = move != nullptr && move->down && setup.detect.criterion != Criterion::geometric;
   if (!has_plate_) return;
@@ -34,14 +27,21 @@ Contact::Contact(const Setup& setup, const BladeMove* move) : setup_(setup) {
   half_length_ = setup.blade.length / 2;
   depth_ = setup.blade.depth;
   clearance_ = blade_clearance(setup);
-  greatest_friction_ = std::max(greatest_friction_, setup.blade.friction);
+  blade_friction_ = setup.blade.friction;
+  greatest_friction_ = std::max(greatest_friction_, blade_friction_);
 }
 
 double Contact::height_at_start(Vec3 start) const { return has_plate_ ? to_local(from_, start - from_.edge).n : 1; }
 
+int Contact::side_of_end(Vec3 x) const {
+  if (!has_plate_) return 0;
+  const Local c = seen_from_blade(x);
+  return !is_over(c) || std::abs(c.n) < clearance_ / 2 ? 0 : c.n < 0 ? -1 : +1;
+}
+
 double Contact::rounds(Vec3 x) const {
   double size = has_plate_ ? 6 * norm(x - to_.edge) + norm(to_.edge) : 0;
-  for (const Wall& wall : setup_.walls) size = std::max(size, std::abs(wall.offset));
+  for (const Wall& wall : walls_) size = std::max(size, std::abs(wall.offset));
   return size;
 }
 
@@ -56,7 +56,7 @@ Local Contact::nearest_on_plate(Local c) const {
 Contact::Depth Contact::depth(Vec3 x, int side, double near) const {
   const double infinity = std::numeric_limits<double>::infinity();
   double deepest = -infinity;
-  for (const Wall& wall : setup_.walls) deepest = std::max(deepest, wall.side * (wall.offset - x[wall.axis]));
+  for (const Wall& wall : walls_) deepest = std::max(deepest, wall.side * (wall.offset - x[wall.axis]));
   if (!has_plate_) return {deepest, deepest};
   const Local c = seen_from_blade(x), on_plate = nearest_on_plate(c);
   const double over = clearance_ - side * c.n,
@@ -78,9 +78,9 @@ Local Contact::on_border(Local c, double near) const {
 
 // Forbidden is what is nearer than ρ to the rectangle, and what lies over it on the side where the particle did not
 // begin.
-Vec3 Contact::way_off_plate(Vec3 x, int side, const Rounding& rounding) const {
+Vec3 Contact::way_off_plate(Vec3 x, int side, Found& found, const Rounding& rounding) const {
   Local c = seen_from_blade(x);
-  if (rounding.on_borders) c = on_border(c, rounding.relative * rounds(x));
+  if (rounding.on_borders) c = on_border(c, rounding.near);
   if (!is_over(c)) {
     const Local near = nearest_on_plate(c), away = {c.u - near.u, c.n, c.w - near.w};
     const double distance = length_of(away);
@@ -97,59 +97,75 @@ Vec3 Contact::way_off_plate(Vec3 x, int side, const Rounding& rounding) const {
   const std::array<Local, kWaysOffPlate> ways = {back, Local{0, beyond, -c.w}, Local{0, beyond, depth_ - c.w},
                                                  Local{-half_length_ - c.u, beyond, 0},
                                                  Local{half_length_ - c.u, beyond, 0}};
-  const auto shorter = [](Local a, Local b) { return length_of(a) < length_of(b); };
-  const Local shortest = *std::min_element(ways.begin(), ways.end(), shorter),
-              preferred = ways[at(rounding.preferred_way)];
-  const bool is_as_short = length_of(preferred) <= length_of(shortest) + rounding.relative * rounds(x);
-  return turned_back(is_as_short ? preferred : shortest);
+  std::array<double, kWaysOffPlate> lengths;
+  std::transform(ways.begin(), ways.end(), lengths.begin(), length_of);
+  const auto shortest = std::min_element(lengths.begin(), lengths.end());
+  for (auto length = lengths.begin(); length != lengths.end(); ++length) {
+    if (length != shortest) found.lead = std::min(found.lead, *length - *shortest);
+  }
+  const auto preferred = at(rounding.preferred_way);
+  const bool is_as_short = lengths[preferred] <= *shortest + rounding.near;
+  return turned_back(ways[is_as_short ? preferred : at(shortest - lengths.begin())]);
 }
 
 Vec3 Contact::off_walls(Vec3 x) const {
-  for (const Wall& wall : setup_.walls) {
+  for (const Wall& wall : walls_) {
     if (wall.side * (x[wall.axis] - wall.offset) < 0) x[wall.axis] = wall.offset;
   }
   return x;
 }
 
-Vec3 Contact::projected(Vec3 x, int side, bool& in_turn, const Rounding& rounding) const {
+Vec3 Contact::projected(Vec3 x, int side, Found& found, const Rounding& rounding) const {
   if (!has_plate_) return off_walls(x);
-  Vec3 now = x + way_off_plate(x, side, rounding);
+  Vec3 now = x + way_off_plate(x, side, found, rounding);
   bool by_plate = !(now == x);
   for (int turn = 0; turn < kTurns; ++turn) {
     const Vec3 inside = off_walls(now);
     if (inside == now) break;
     Vec3 from = inside;
-    if (rounding.between_turns != nullptr)
-      from += (rounding.relative * rounds(inside)) * rounding.between_turns->vector();
-    now = from + way_off_plate(from, side, rounding);
+    if (rounding.between_turns != nullptr) from += rounding.near * rounding.between_turns->vector();
+    now = from + way_off_plate(from, side, found, rounding);
     by_plate = by_plate || !(now == from);
-    in_turn = in_turn || by_plate;
+    found.in_turn = found.in_turn || by_plate;
     if (now == from) return inside;
   }
   return now;
 }
 
-Vec3 Contact::place(Vec3 free, int side, Vec3 start, bool& in_turn, const Rounding& rounding) const {
-  const Vec3 nearest = projected(free, side, in_turn, rounding);
-  if (!has_friction() || (nearest == free && !in_turn)) return nearest;
-  Vec3 x = nearest;
-  for (const Wall& wall : setup_.walls) {
+// Takes back at most `most` of what `slid` has along a surface with this normal.
+Vec3 Contact::rubbed(Vec3 x, Vec3 slid, Vec3 normal, double most, Found& found) {
+  const Vec3 tangential = slid - dot(slid, normal) * normal;
+  const double length = norm(tangential);
+  if (length > most) return x - (most / length) * tangential;
+  found.hold = std::min(found.hold, most - length);
+  return x - tangential;
+}
+
+Vec3 Contact::place(Vec3 free, int side, Vec3 start, Found& found, const Rounding& rounding) const {
+  Vec3 x = projected(free, side, found, rounding);
+  if (x == free && !found.in_turn) return x;
+  // Walls alone, each as deep as that; or the blade alone. Both in turn hold nothing firmly.
+  found.hold = found.in_turn ? 0 : norm(x - free);
+  for (const Wall& wall : walls_) {
     const double pressed = wall.side * (wall.offset - free[wall.axis]);
-    if (pressed <= 0 || wall.friction == 0) continue;
+    if (pressed <= 0) continue;
+    found.hold = std::min(found.hold, pressed);
+    if (wall.friction == 0) continue;
     Vec3 normal;
     normal[wall.axis] = 1;
-    x = rubbed(x, x - start, normal, wall.friction * pressed);
+    x = rubbed(x, x - start, normal, wall.friction * pressed, found);
   }
-  if (has_plate_ && setup_.blade.friction > 0) {
-    const Vec3 way = way_off_plate(free, side, rounding);
+  if (!has_friction()) return x;
+  if (has_plate_ && blade_friction_ > 0) {
+    const Vec3 way = way_off_plate(free, side, found, rounding);
     if (const double pressed = norm(way); pressed > 0) {
       // It slides against the blade's own point beneath it.
       const Local c = seen_from_blade(x);
       const Vec3 was = from_.edge + c.u * from_.along + c.w * from_.back + c.n * cross(from_.along, from_.back);
-      x = rubbed(x, was - start, way / pressed, setup_.blade.friction * pressed);
+      x = rubbed(x, was - start, way / pressed, blade_friction_ * pressed, found);
     }
   }
-  return projected(x, side, in_turn, rounding);
+  return projected(x, side, found, rounding);
 }
 
 Vec3 Contact::origin_of(Vec3 seen, Vec3 free) const {

@@ -1,20 +1,22 @@
 // Where blade and walls let one particle be within one substep (method.md §3, Blade; decisions.md, Contacts with the
 // blade), written a second time: no line is shared with a backend. Internal to oracles/.
 #pragma once
+#include <limits>
 #include <vector>
 
 #include "model/setup.h"
 #include "oracles/blade_motion.h"
-#include "oracles/step_model/noise.h"
+#include "oracles/noise.h"
 
 namespace cutproof::oracles {
 
 class Contact {
  public:
-  // `move`: what the blade does in this substep; nullptr: there is none. Keeps a reference to `setup`.
-  Contact(const Setup& setup, const BladeMove* move);
+  // `move`: what the blade does in this substep; nullptr: there is none. `walls`: the setup's, or those with what
+  // rounds in them. Keeps a reference to both.
+  Contact(const Setup& setup, const BladeMove* move, const std::vector<Wall>& walls);
 
-  bool any() const { return has_plate_ || !setup_.walls.empty(); }
+  bool any() const { return has_plate_ || !walls_.empty(); }
   bool has_plate() const { return has_plate_; }
   bool has_friction() const { return greatest_friction_ > 0; }
   // Friction, or room that is not convex.
@@ -22,6 +24,9 @@ class Contact {
 
   // Over the plane of the blade where the substep begins [m].
   double height_at_start(Vec3 start) const;
+  // On which side of it a particle ends, +1 or -1; 0 where it does not end over the plate, or less than half a
+  // clearance from it.
+  int side_of_end(Vec3 x) const;
   // What arithmetic rounds on the way to a contact at x, in units of u [m]: the blade's pose, the way into its frame
   // and back, the offset of a wall.
   double rounds(Vec3 x) const;
@@ -37,14 +42,28 @@ class Contact {
   // off, or a place that is as near to a border of the plate lies on the border to the bit: nothing leads it sideways.
   // Of ways off the plate that are equally long within rounding, any may be the shortest.
   struct Rounding {
-    double relative = 0;  // in units of rounds()
+    double near = 0;  // [m]
     Noise* between_turns = nullptr;
     bool on_borders = false;
     int preferred_way = 0;  // of kWaysOffPlate
   };
   static constexpr int kWaysOffPlate = 5;  // back to the particle's side, or round one of four borders
-  // Where one is put that would go to `free`. `in_turn`: set where blade and walls have both moved it.
-  Vec3 place(Vec3 free, int side, Vec3 start, bool& in_turn, const Rounding& rounding) const;
+
+  // How a place was found.
+  struct Found {
+    bool in_turn = false;  // blade and walls have both moved it
+    // By how much, at least, the way off the plate was shorter than every other one; and how far it was, at least, from
+    // where a contact that holds it would have let go [m].
+    double lead = std::numeric_limits<double>::infinity(), hold = std::numeric_limits<double>::infinity();
+  };
+  // Where one is put that would go to `free`.
+  Vec3 place(Vec3 free, int side, Vec3 start, Found& found, const Rounding& rounding) const;
+
+  // Whether one that would go to `free` stays at `present`, because blade and walls in turn have made a place that is
+  // worse, by more than this margin [m].
+  static double refusal_margin(double stored, Vec3 free, Vec3 present, double unit_roundoff) {
+    return kRefusalRoundings * unit_roundoff * (norm(present - free) + stored);
+  }
 
   // A place that the blade alone would have led to `seen`: of all of them the one nearest to `free`. Beside the rim a
   // way is short and its direction rounds; this undoes it.
@@ -56,14 +75,15 @@ class Contact {
   bool is_over(Local c) const;
   Local nearest_on_plate(Local c) const;
   Local on_border(Local c, double near) const;
-  Vec3 way_off_plate(Vec3 x, int side, const Rounding& rounding) const;
+  Vec3 way_off_plate(Vec3 x, int side, Found& found, const Rounding& rounding) const;
   Vec3 off_walls(Vec3 x) const;
-  Vec3 projected(Vec3 x, int side, bool& in_turn, const Rounding& rounding) const;
+  Vec3 projected(Vec3 x, int side, Found& found, const Rounding& rounding) const;
+  static Vec3 rubbed(Vec3 x, Vec3 slid, Vec3 normal, double most, Found& found);
 
-  const Setup& setup_;
+  const std::vector<Wall>& walls_;
   bool has_plate_ = false;
   BladePose from_, to_;
-  double half_length_ = 0, depth_ = 0, clearance_ = 0, greatest_friction_ = 0;
+  double half_length_ = 0, depth_ = 0, clearance_ = 0, blade_friction_ = 0, greatest_friction_ = 0;
 };
 
 }  // namespace cutproof::oracles
