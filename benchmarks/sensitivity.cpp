@@ -9,6 +9,7 @@
 #include "harness/judge.h"
 #include "harness/reference_stages.h"
 #include "model/at.h"
+#include "oracles/iterates/probe.h"
 #include "oracles/oracles.h"
 
 namespace cutproof::benchmarks {
@@ -199,6 +200,53 @@ std::optional<harness::Moment> disturbed(Backend& backend, const Setup& setup, c
   return moment;
 }
 
+// Shows the iterates of steps as a simulator would that is wrong in this way.
+class Disturbed final : public Backend {
+ public:
+  Disturbed(Backend& right, const Disturbance& disturbance, double size)
+      : right_(right), disturbance_(disturbance), size_(size) {}
+
+  std::string name() const override { return right_.name(); }
+  Precision precision() const override { return right_.precision(); }
+  bool can_run(Span span) const override { return right_.can_run(span); }
+  bool shows_iterates() const override { return right_.shows_iterates(); }
+  void load(std::vector<Setup> setups, std::vector<State> states) override {
+    setups_ = setups;
+    has_run_ = false;
+    for (std::size_t b = 0; b < setups.size() && disturbance_.of_run; ++b) {
+      disturbance_.of_run(setups[b], states[b], size_);
+    }
+    right_.load(std::move(setups), std::move(states));
+  }
+  void run(Span span) override {
+    right_.run(span);
+    has_run_ = true;
+  }
+  std::vector<State> snapshot() const override {
+    std::vector<State> states = right_.snapshot();
+    for (std::size_t b = 0; b < states.size() && has_run_ && disturbance_.of_state; ++b) {
+      disturbance_.of_state(setups_[b], states[b], size_);
+    }
+    return states;
+  }
+  SpanReport report() const override { return right_.report(); }
+
+ private:
+  Backend& right_;
+  const Disturbance& disturbance_;
+  double size_;
+  std::vector<Setup> setups_;
+  bool has_run_ = false;
+};
+
+std::optional<Verdict> failure_of_iterates(Backend& backend, const Setup& setup, const Disturbance& disturbance,
+                                           double size, const harness::Moment& moment) {
+  Disturbed wrong(backend, disturbance, size);
+  const oracles::IterateProbe probe(setup, *moment.before, oracles::Iterates::sampled, 1);
+  Verdict verdict = probe.judged(oracles::shown_iterates(wrong, {&probe, 1}).front());
+  return verdict.holds ? std::nullopt : std::optional(std::move(verdict));
+}
+
 }  // namespace
 
 const std::vector<Disturbance>& disturbances() {
@@ -260,7 +308,11 @@ Sensitivity least_rejected(Backend& backend, const Setup& setup, const Disturban
     for (const harness::Moment& moment : fit) {
       throw_if_asked(stop_asked);
       const std::optional<harness::Moment> wrong = disturbed(backend, setup, disturbance, size, moment);
-      const std::optional<Verdict> failure = wrong ? first_failure(setup, *wrong) : std::nullopt;
+      if (!wrong) continue;
+      std::optional<Verdict> failure = first_failure(setup, *wrong);
+      if (!failure && stage == Stage::step && setup.step.iterations > 0) {
+        failure = failure_of_iterates(backend, setup, disturbance, size, moment);
+      }
       if (!failure) continue;
       found.property = failure->property;
       return true;

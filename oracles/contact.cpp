@@ -33,10 +33,10 @@ Contact::Contact(const Setup& setup, const BladeMove* move, const std::vector<Wa
 
 double Contact::height_at_start(Vec3 start) const { return has_plate_ ? to_local(from_, start - from_.edge).n : 1; }
 
-int Contact::side_of_end(Vec3 x) const {
+int Contact::side_of_end(Vec3 x, double rim) const {
   if (!has_plate_) return 0;
   const Local c = seen_from_blade(x);
-  return !is_over(c) || std::abs(c.n) < clearance_ / 2 ? 0 : c.n < 0 ? -1 : +1;
+  return !(inside_by(c) > rim) || std::abs(c.n) < clearance_ / 2 ? 0 : c.n < 0 ? -1 : +1;
 }
 
 double Contact::rounds(Vec3 x) const {
@@ -47,7 +47,7 @@ double Contact::rounds(Vec3 x) const {
 
 Vec3 Contact::turned_back(Local c) const { return c.u * to_.along + c.w * to_.back + c.n * cross(to_.along, to_.back); }
 
-bool Contact::is_over(Local c) const { return std::abs(c.u) < half_length_ && c.w > 0 && c.w < depth_; }
+double Contact::inside_by(Local c) const { return std::min({half_length_ - std::abs(c.u), c.w, depth_ - c.w}); }
 
 Local Contact::nearest_on_plate(Local c) const {
   return {std::clamp(c.u, -half_length_, half_length_), 0, std::clamp(c.w, 0.0, depth_)};
@@ -61,8 +61,7 @@ Contact::Depth Contact::depth(Vec3 x, int side, double near) const {
   const Local c = seen_from_blade(x), on_plate = nearest_on_plate(c);
   const double over = clearance_ - side * c.n,
                beside = clearance_ - length_of({c.u - on_plate.u, c.n, c.w - on_plate.w});
-  // Of its borders, the one that is least far inside.
-  const double inside = std::min({half_length_ - std::abs(c.u), c.w, depth_ - c.w});
+  const double inside = inside_by(c);
   const double least = inside > near ? over : inside < -near ? beside : std::min(over, beside);
   const double most = inside > near ? over : inside < -near ? beside : std::max(over, beside);
   return {std::max(deepest, least), std::max(deepest, most)};
@@ -81,7 +80,7 @@ Local Contact::on_border(Local c, double near) const {
 Vec3 Contact::way_off_plate(Vec3 x, int side, Found& found, const Rounding& rounding) const {
   Local c = seen_from_blade(x);
   if (rounding.on_borders) c = on_border(c, rounding.near);
-  if (!is_over(c)) {
+  if (!(inside_by(c) > 0)) {
     const Local near = nearest_on_plate(c), away = {c.u - near.u, c.n, c.w - near.w};
     const double distance = length_of(away);
     if (distance >= clearance_) return {};

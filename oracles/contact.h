@@ -24,9 +24,9 @@ class Contact {
 
   // Over the plane of the blade where the substep begins [m].
   double height_at_start(Vec3 start) const;
-  // On which side of it a particle ends, +1 or -1; 0 where it does not end over the plate, or less than half a
-  // clearance from it.
-  int side_of_end(Vec3 x) const;
+  // On which side of it a particle ends, +1 or -1; 0 where it does not end over the plate, by `rim` at least [m], or
+  // ends less than half a clearance from it.
+  int side_of_end(Vec3 x, double rim) const;
   // What arithmetic rounds on the way to a contact at x, in units of u [m]: the blade's pose, the way into its frame
   // and back, the offset of a wall.
   double rounds(Vec3 x) const;
@@ -72,7 +72,7 @@ class Contact {
  private:
   Local seen_from_blade(Vec3 x) const { return to_local(to_, x - to_.edge); }
   Vec3 turned_back(Local c) const;
-  bool is_over(Local c) const;
+  double inside_by(Local c) const;  // how far it is over the plate, from the nearest of its borders
   Local nearest_on_plate(Local c) const;
   Local on_border(Local c, double near) const;
   Vec3 way_off_plate(Vec3 x, int side, Found& found, const Rounding& rounding) const;

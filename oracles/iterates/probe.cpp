@@ -8,6 +8,7 @@
 
 #include "oracles/iterates/substep_judge.h"
 #include "oracles/noise.h"
+#include "oracles/rounding.h"
 #include "oracles/single_substep.h"
 #include "oracles/support.h"
 
@@ -209,9 +210,29 @@ void IterateProbe::compare_ends(const State& shown, const State& whole, Verdict&
   }
 }
 
+// A backend may round the state that it is given once, and no more.
+void IterateProbe::compare_loaded(const State& held, Verdict& verdict) const {
+  const double u = unit_roundoff(held) + kUnitRoundoff;
+  Nearest nearest;
+  for (int32_t i = 0; i < setup_.body.particle_count(); ++i) {
+    if (before_.alive[at(i)] == 0) continue;
+    const Vec3 x = before_.x[at(i)], v = before_.v[at(i)];
+    const double of_place =
+        u * norm(stored_place(setup_.body, held.precision, i, x)) + 2 * unit_of_places(held) * norm(x);
+    nearest.see(norm(held.x[at(i)] - x), of_place, i);
+    nearest.see(norm(held.v[at(i)] - v), u * norm(v), i);
+    verdict.checked += 2;
+  }
+  verdict.measured = std::max(verdict.measured, nearest.share);
+  if (nearest.holds()) return;
+  fail(verdict, {{}, {nearest.where}}, "particle {} is not loaded as it was given: {:.3g} h or h/dt off", nearest.where,
+       nearest.measured / setup_.body.grid.spacing);
+}
+
 void IterateProbe::judge(const ShownStep& shown, Verdict& verdict) const {
   verdict.bound = 1;
-  if (shown.whole) compare_ends(shown.iterates.back(), *shown.whole, verdict);
+  compare_loaded(shown.before, verdict);
+  if (shown.whole && verdict.holds) compare_ends(shown.iterates.back(), *shown.whole, verdict);
   for (const Wanted& of : wanted_) {
     const auto state_after = [&](Shown wanted) -> const State& { return shown.iterates[place_of(wanted)]; };
     const State& began = of.substep == 0 ? shown.before : state_after({of.substep - 1, setup_.step.iterations});

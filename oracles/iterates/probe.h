@@ -52,6 +52,7 @@ class IterateProbe {
   };
   Setup from_the_frame(Shown wanted) const;
   Setup from_the_substep(Shown wanted) const;
+  void compare_loaded(const State& held, Verdict& verdict) const;
   void compare_ends(const State& shown, const State& whole, Verdict& verdict) const;
   Witness witness(const State& began, int32_t substep, const IterateFinding& found) const;
   std::size_t place_of(Shown wanted) const;

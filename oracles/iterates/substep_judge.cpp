@@ -27,6 +27,9 @@ constexpr double kOrthogonalRounds = 16;
 // Less than this of the previous rotation is nothing to go by, in whatever precision.
 constexpr double kNothingLeft = 1e-8;
 constexpr int kTries = 256;
+// Where the first of these are farther apart than this [h], turns of blade and walls lead anywhere, but no more than so
+// many times as far again.
+constexpr double kAnywhere = 1e-3, kFarther = 8;
 // What single precision makes of a smaller number may be 0 (a velocity times dt [m], what damping leaves of it).
 constexpr double kLeast = 1e-37;
 
@@ -378,25 +381,25 @@ double SubstepJudge::nearest_contact(int32_t i, const Candidate& candidate, Vec3
     if (!asks || std::max(free.least, plain.least) + margin <= wide) ways[count++] = {side, candidate.free};
     if (asks && std::max(free.most, plain.most) + margin >= -wide) ways[count++] = {side, candidate.plain};
   }
+  // How far `seen` is from where one of this way is put that would go to `from`, which is noted as `placed`.
+  Vec3 placed;
   const auto off_by = [&](const Way& way, Vec3 from, const Contact::Rounding& rounding) {
     Contact::Found found;
-    const Vec3 x = contact_.place(from, way.side, start, found, rounding);
-    double off = norm(x - seen);
-    if (found.in_turn && !contact_.has_friction() && k_ >= 0) {  // refused where it is worse than the present place
-      const double there = norm(x - from), here = norm(present - from);
-      const double slack = Contact::refusal_margin(norm(stored(i, present)), from, present, u_) + 4 * wide;
-      if (there > here + slack)
-        off = norm(present - seen);
-      else if (there > here - slack)
-        off = std::min(off, norm(present - seen));
-    }
-    return off;
+    placed = contact_.place(from, way.side, start, found, rounding);
+    const double off = norm(placed - seen);
+    if (!found.in_turn || contact_.has_friction() || k_ < 0) return off;
+    // Refused where it is worse than the present place.
+    const double there = norm(placed - from), here = norm(present - from);
+    const double slack = Contact::refusal_margin(norm(stored(i, present)), from, present, u_) + 4 * wide;
+    if (there < here - slack) return off;
+    return there > here + slack ? norm(present - seen) : std::min(off, norm(present - seen));
   };
   double best = std::numeric_limits<double>::infinity();
+  const auto bit_of = [](const Way& way) -> uint8_t { return way.side > 0 ? 1 : 2; };
   uint8_t explained = 0;
   const auto take = [&](const Way& way, double off, double within) {
     best = std::min(best, off);
-    if (off <= within) explained |= way.side > 0 ? 1 : 2;
+    if (off <= within) explained |= bit_of(way);
   };
   const double direct = wide + after, rounds = kTimes * u_ * contact_.rounds(candidate.free);
   for (int way = 0; way < Contact::kWaysOffPlate && explained == 0; ++way) {
@@ -404,35 +407,40 @@ double SubstepJudge::nearest_contact(int32_t i, const Candidate& candidate, Vec3
       take(ways[k], off_by(ways[k], ways[k].candidate, {way > 0 ? rounds : 0, nullptr, false, way}), direct);
     }
   }
-  if (explained != 0) {
-    after = direct;
-    sides_[at(i)] = explained;
-    return best;
-  }
+  const uint8_t explained_directly = explained;
+  const double best_directly = best;
   // Beside a border a candidate within its rounding may lead elsewhere: the one that the blade alone has led here, or
-  // one of many, with what rounds between turns of blade and walls.
+  // one of many, with what rounds between turns of blade and walls. So may it from a side that has explained nothing
+  // yet.
   best = std::numeric_limits<double>::infinity();
   double spread = 0;
   for (std::size_t k = 0; k < count; ++k) {
     const Way& way = ways[k];
+    if ((explained_directly & bit_of(way)) != 0) continue;
     const Vec3 back = contact_.origin_of(seen, way.candidate), off = back - way.candidate;
     const Vec3 from = norm(off) <= wide ? back : way.candidate + (wide / norm(off)) * off;
     take(way, off_by(way, from, {}), after);
     Noise noise(static_cast<uint64_t>(i) + 1);
-    const double first = off_by(way, way.candidate, {});
-    for (int run = 0; run < kTries && !(best <= after); ++run) {
+    off_by(way, way.candidate, {});
+    const Vec3 first = placed;
+    for (int run = 0; run < kTries && (explained & bit_of(way)) == 0; ++run) {
       const Vec3 near = way.candidate + (wide * (run / 2 % 4) / 4) * noise.vector();
       const bool on_borders = run % 2 == 0;
       const double there =
           off_by(way, near, {rounds, on_borders ? nullptr : &noise, on_borders, run % Contact::kWaysOffPlate});
-      if (run < kTries / 8) spread = std::max(spread, std::abs(there - first));
+      if (run < kTries / 8) spread = std::max(spread, norm(placed - first));
       take(way, there, after);
     }
   }
-  after += 2 * spread;
-  decided = after <= 1e-3 * spacing || best > after;
-  if (explained != 0) sides_[at(i)] = explained;
-  return best;
+  if (explained_directly == 0) {
+    after += 2 * spread;
+    decided = after <= kAnywhere * spacing || best > after + kFarther * spread;
+  }
+  // Where nobody knows which way it went, nobody knows from which side.
+  if (explained != 0 && decided) sides_[at(i)] = explained;
+  if (explained_directly == 0) return best;
+  after = direct;
+  return best_directly;
 }
 
 // A place may be rounded when it is stored, after the velocity was made of it.

@@ -96,7 +96,7 @@ class Judge {
     if (setup.has_blade) {
       const BladeMove& last = setup.blade_moves[at((before.frame + 1) * setup.step.substeps - 1)];
       const Contact contact(setup, &last, setup.walls);
-      for (const Vec3 x : after.x) side_of_end_.push_back(contact.side_of_end(x));
+      for (const Vec3 x : after.x) side_of_end_.push_back(contact.side_of_end(x, kSmall * h_));
     }
     at_once_ = at_once > 0 ? static_cast<uint64_t>(at_once)
                : model_.evaluations() <= kLongRun

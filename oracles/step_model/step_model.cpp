@@ -307,6 +307,7 @@ class StepModel::Run {
   double turn_amplitude_ = 0;  // of the last rotation [rad]
   uint64_t time_ = 0;          // evaluations so far
   std::vector<int> sides_;     // [n] of the blade, in this substep
+  bool is_last_ = false;       // of its substeps
 };
 
 // One of the rotations that take v to u, the nearest to the previous one; any of them in a disturbed run. `all`: of all
@@ -397,7 +398,11 @@ int StepModel::Run::side_of(std::size_t i, const Contact& contacts, Vec3 start, 
   const double distance = u_ * norm(start - move.from.edge), rounds = kNearRounds * distance;
   if (disturbed_) height += kContactRounds * distance * noise_();
   const int seen = wanted_.side_of_end.empty() ? 0 : wanted_.side_of_end[i];
-  if (seen != 0 && (std::abs(height) <= rounds || is_drawn(i, height, rounds))) return seen;
+  if (seen != 0 && (std::abs(height) <= rounds || is_drawn(i, height, rounds))) {
+    // For the last substep that is certain, and for earlier ones likely.
+    if (!is_last_) out_.lead[i] = 0;
+    if (is_last_ || wanted_.open.empty()) return seen;
+  }
   const bool drawn = exceeds(i, height, rounds);
   return (is_drawn(i, height, rounds) ? drawn : height >= 0) ? +1 : -1;
 }
@@ -554,6 +559,7 @@ void StepModel::Run::substep(int32_t s) {
   own_now_.assign(start.size(), 0);
   shared_rounding_ = 0;
   sides_.assign(start.size(), +1);
+  is_last_ = s + 1 == step.substeps;
   // Rounds a place that contacts have made of `free`.
   const auto settle = [&](std::size_t i, Vec3 free, Vec3& x, double more) {
     double amplitude = more;

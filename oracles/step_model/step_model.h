@@ -57,7 +57,7 @@ class StepModel {
     // [n] Of a disturbed run: what a particle decides by no more than this is drawn [m]. Empty: nothing is drawn.
     std::vector<double> open = {};
     // [n] On which side of the blade a particle ends, as Contact::side_of_end() has it. Where rounding decides on which
-    // side it begins a substep, it is that one.
+    // side it begins a substep, it is that one; where decisions are drawn, in the last substep alone.
     std::vector<int> side_of_end = {};
     // [m] Rotations that are given in the last iteration of the last substep, nullptr: the best one.
     std::vector<const Mat3*> given = {};

@@ -268,14 +268,20 @@ TEST(Iterates, KeepAParticleOnOneSideOfTheBlade) {
   EXPECT_FALSE(with_sides({1, 1, -1}).holds);
 }
 
-// A backend may round the state that it is given, here by far more than an iteration rounds.
+// A backend may round the state that it is given, here by far more than an iteration rounds where nothing has moved
+// far.
 TEST(Iterates, BeginWithTheStateThatTheBackendHolds) {
-  const StepScene scene = pressed_block();
+  StepScene scene = pressed_block();
+  for (Vec3& v : scene.before.v) v = {};
   Faulty rounding;
-  rounding.of_given = [](State& state) {
-    for (Vec3& x : state.x) x += Vec3{1e-6, 0, 0};
-  };
+  rounding.arithmetic = Precision::binary32;
+  rounding.of_given = [&](State& state) { round_to_single(scene.setup.body, state); };
+  rounding.of_state = [&](State& state, int32_t) { round_to_single(scene.setup.body, state); };
   expect_holds(judged(rounding, scene));
+  rounding.of_given = [](State& state) { state.x[0].x += 1e-6 * kSpacing; };
+  const Verdict verdict = judged(rounding, scene);
+  EXPECT_FALSE(verdict.holds);
+  EXPECT_NE(verdict.witness.text.find("particle 0 is not loaded as it was given"), std::string::npos);
 }
 
 // Without iterations there is the prediction alone.
