@@ -80,7 +80,10 @@ Local Contact::on_border(Local c, double near) const {
 Vec3 Contact::way_off_plate(Vec3 x, int side, Found& found, const Rounding& rounding) const {
   Local c = seen_from_blade(x);
   if (rounding.on_borders) c = on_border(c, rounding.near);
-  if (!(inside_by(c) > 0)) {
+  const double inside = inside_by(c);
+  // On the other side it matters whether it is over the plate: there are ways round other borders too.
+  if (side * c.n < 0) found.lead = std::min(found.lead, std::abs(inside));
+  if (!(inside > 0)) {
     const Local near = nearest_on_plate(c), away = {c.u - near.u, c.n, c.w - near.w};
     const double distance = length_of(away);
     if (distance >= clearance_) return {};

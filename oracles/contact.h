@@ -52,8 +52,8 @@ class Contact {
   // How a place was found.
   struct Found {
     bool in_turn = false;  // blade and walls have both moved it
-    // By how much, at least, the way off the plate was shorter than every other one; and how far it was, at least, from
-    // where a contact that holds it would have let go [m].
+    // By how much, at least, the way off the plate was shorter than every other one, or a particle on the other side
+    // was from a border; and how far it was, at least, from where a contact that holds it would have let go [m].
     double lead = std::numeric_limits<double>::infinity(), hold = std::numeric_limits<double>::infinity();
   };
   // Where one is put that would go to `free`.

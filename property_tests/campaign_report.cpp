@@ -15,6 +15,7 @@
 #include "model/error.h"
 #include "model/io/json_number.h"
 #include "model/io/json_reader.h"
+#include "oracles/iterates/probe.h"
 
 namespace cutproof::property_tests {
 
@@ -27,9 +28,9 @@ constexpr int kFormatVersion = 4;
 // Classes of cases are rare: below this many cases, or with small ones only, an empty class says nothing.
 constexpr int64_t kCasesThatMeetEveryClass = 1000;
 constexpr int kSizeThatMeetsEveryClass = 79;
-// Of positions after a step, as many as may stay undecided (tolerances.md, The step again). A judge that grants
+// Of what is compared of iterates, as much as may stay undecided (tolerances.md, Iterate by iterate). A judge that grants
 // everything judges nothing. (Merges of whole frames cannot be decided at all; they are counted.)
-constexpr double kMostUndecided = 0.01;
+constexpr double kMostUndecided = 0.001;
 
 constexpr double kMostCounted = 1e12;  // by one shard, of anything
 
@@ -406,7 +407,7 @@ CampaignConclusion conclude(const json& document, bool whole) {
     return {"no position after a step was compared with the reference's"};
   }
   for (const json& property : document.at("properties")) {
-    if (property.at("property") != "admissible step") continue;
+    if (property.at("property") != oracles::kStepByIterates) continue;
     const double undecided = property.at("undecided").get<double>(), checked = property.at("checked").get<double>();
     if (undecided <= kMostUndecided * checked) continue;
     return {fmt::format(

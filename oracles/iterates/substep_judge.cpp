@@ -232,6 +232,7 @@ void SubstepJudge::iteration(int32_t k, const State* earlier, const State& now, 
       goal_squares[at(members[m])] += squares;
     }
   }
+  // The second one is a weight ω less 1, so it rounds as ω does.
   const auto [pull, carry] = combined ? chebyshev(k) : std::pair{1.0, 0.0};
   free_.clear();
   shared_ = share_ * pull * s_;
@@ -253,7 +254,7 @@ void SubstepJudge::iteration(int32_t k, const State* earlier, const State& now, 
       free = is + (pull * (plain - is) + carry * (is - was));
       squares += square((1 + carry - pull) * place[at(i)]) +
                  square(carry * place_rounding(i, earlier->x[at(i)]) / share_) +
-                 square(4 * u_ * (pull * norm(plain - is) + carry * norm(is - was)));
+                 square(4 * u_ * (pull * norm(plain - is) + (1 + carry) * norm(is - was)));
     }
     particle(i, {back(i, plain), back(i, free), square(share_) * squares, (share_ * pull) * (goal - from)},
              next.x[at(i)], now.x[at(i)]);
@@ -262,10 +263,10 @@ void SubstepJudge::iteration(int32_t k, const State* earlier, const State& now, 
   // The recurrence of what contacts have pushed so far, from what the backend states of it.
   const auto of = [&](const State& state) { return (dt_ / decay_) * state.impulse; };
   Vec3 carried = (implicit_ ? s_ : 1.0) * of(now);
-  double rounding = 8 * u_ * norm(of(now)) * (1 + 2 * pull + carry);
+  double rounding = 8 * u_ * norm(of(now)) * (1 + 2 * pull);
   if (combined) {
     carried = of(now) + (pull * (carried - of(now)) + carry * (of(now) - of(*earlier)));
-    rounding += 8 * u_ * carry * norm(of(*earlier));
+    rounding += 8 * u_ * (1 + carry) * norm(of(now) - of(*earlier));
   }
   impulse(carried, rounding, next);
   velocities(next);

@@ -620,7 +620,8 @@ void StepModel::Run::substep(int32_t s) {
         const Vec3 drawn = weights[at(j)].pull * (plain_ahead - now[i]);
         const Vec3 swung = weights[at(j)].carry * (now[i] - earlier[i]);
         free = back(i, now[i] + drawn + swung);
-        amplitude += share_ * kParameterRounds * u_ * (norm(drawn) + norm(swung));
+        // The carry is a weight ω less 1, so it rounds as ω does.
+        amplitude += share_ * kParameterRounds * u_ * (norm(drawn) + norm(swung) + norm(now[i] - earlier[i]));
       }
       // A backend knows how far a contact or a grip has displaced a particle from where it has rounded it to.
       const auto note_push = [&] {
