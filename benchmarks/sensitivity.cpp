@@ -213,6 +213,9 @@ class Disturbed final : public Backend {
   void load(std::vector<Setup> setups, std::vector<State> states) override {
     setups_ = setups;
     has_run_ = false;
+    // What is wrong is the step, and not what it begins with.
+    right_.load(setups, states);
+    held_ = right_.snapshot();
     for (std::size_t b = 0; b < setups.size() && disturbance_.of_run; ++b) {
       disturbance_.of_run(setups[b], states[b], size_);
     }
@@ -223,8 +226,9 @@ class Disturbed final : public Backend {
     has_run_ = true;
   }
   std::vector<State> snapshot() const override {
+    if (!has_run_) return held_;
     std::vector<State> states = right_.snapshot();
-    for (std::size_t b = 0; b < states.size() && has_run_ && disturbance_.of_state; ++b) {
+    for (std::size_t b = 0; b < states.size() && disturbance_.of_state; ++b) {
       disturbance_.of_state(setups_[b], states[b], size_);
     }
     return states;
@@ -236,6 +240,7 @@ class Disturbed final : public Backend {
   const Disturbance& disturbance_;
   double size_;
   std::vector<Setup> setups_;
+  std::vector<State> held_;
   bool has_run_ = false;
 };
 

@@ -18,6 +18,9 @@ namespace {
 // As far apart two answers to one step may be [h] (tolerances.md, Against the reference).
 constexpr double kSameEnd = 1e-4;
 
+// Whether an iterate follows from the two before it.
+bool combines_two(const Setup& setup) { return setup.step.acceleration == Acceleration::chebyshev; }
+
 }  // namespace
 
 IterateProbe::IterateProbe(const Setup& setup, const State& before, Iterates wanted, uint64_t seed)
@@ -36,7 +39,7 @@ IterateProbe::IterateProbe(const Setup& setup, const State& before, Iterates wan
     const auto add = [&](int32_t substep, int32_t k) {
       Wanted& of = wanted_.empty() || wanted_.back().substep != substep ? wanted_.emplace_back(Wanted{substep, {}})
                                                                         : wanted_.back();
-      for (const int32_t j : {k - 1, k, k + 1}) {
+      for (int32_t j = combines_two(setup) ? k - 1 : k; j <= k + 1; ++j) {
         if (j >= 0 && j <= most) of.iterations.push_back(j);
       }
     };
@@ -102,15 +105,16 @@ std::vector<ShownStep> shown_iterates(Backend& backend, std::span<const IterateP
   std::vector<std::size_t> first;
   if (backend.shows_iterates()) {
     for (const IterateProbe& probe : probes) {
-      for (const auto& wanted : probe.shown_) add(probe.from_the_frame(wanted), probe.before_);
+      for (const auto& wanted : probe.shown_) {
+        if (!probe.is_end(wanted)) add(probe.from_the_frame(wanted), probe.before_);
+      }
       first.push_back(add(probe.setup_, probe.before_, probe.before_.frame));
     }
     std::vector<State> all = run(first);
     auto next = all.begin();
     for (std::size_t p = 0; p < probes.size(); ++p) {
       const auto end = all.begin() + static_cast<std::ptrdiff_t>(first[p]);
-      shown[p].iterates.assign(std::make_move_iterator(next), std::make_move_iterator(end));
-      shown[p].whole = std::move(*end);
+      shown[p].iterates.assign(std::make_move_iterator(next), std::make_move_iterator(end + 1));
       next = end + 1;
     }
     return shown;
@@ -241,8 +245,9 @@ void IterateProbe::judge(const ShownStep& shown, Verdict& verdict) const {
     SubstepJudge judge(setup_, before_.frame, of.substep, began);
     if (shows(0)) judge.prediction(state(0));
     for (int32_t k = 0; k < setup_.step.iterations; ++k) {
-      if (!shows(k) || !shows(k + 1) || (k > 0 && !shows(k - 1))) continue;
-      judge.iteration(k, k > 0 ? &state(k - 1) : nullptr, state(k), state(k + 1));
+      const bool needs_earlier = k > 0 && combines_two(setup_);
+      if (!shows(k) || !shows(k + 1) || (needs_earlier && !shows(k - 1))) continue;
+      judge.iteration(k, needs_earlier ? &state(k - 1) : nullptr, state(k), state(k + 1));
     }
     verdict.checked += judge.checked();
     verdict.undecided += judge.undecided();

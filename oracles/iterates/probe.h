@@ -24,8 +24,8 @@ struct IterateFinding;  // oracles/iterates/substep_judge.h
 // What a backend has shown of one step.
 struct ShownStep {
   State before;                 // as the backend holds it: loading rounds in single precision
-  std::vector<State> iterates;  // those that were wanted
-  std::optional<State> whole;   // after the step of the whole frame, run from `before` like these
+  std::vector<State> iterates;  // those that were wanted; the last one ends the step
+  std::optional<State> whole;   // where substeps were run one by one: after the step of the whole frame
 };
 
 // For one body and the state in which a frame begins: well formed and finite, its schedule not over. Both must live as
@@ -50,6 +50,8 @@ class IterateProbe {
     int32_t substep, iterations;
     friend auto operator<=>(const Shown&, const Shown&) = default;
   };
+  // The last iterate of the last substep, which ends the frame: all probes want it.
+  bool is_end(Shown wanted) const { return wanted == Shown{setup_.step.substeps - 1, setup_.step.iterations}; }
   Setup from_the_frame(Shown wanted) const;
   Setup from_the_substep(Shown wanted) const;
   void compare_loaded(const State& held, Verdict& verdict) const;
