@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "gpu/launch/frame.h"
+#include "gpu/frame.h"
 
 namespace cutproof::benchmarks {
 

@@ -1,10 +1,10 @@
 // How many kernels of a frame wait for one another: what the graph of a span is made of, counted from the text that the
-// graph is captured from (gpu/launch/frame.h).
+// graph is captured from (gpu/frame.h).
 #pragma once
 #include <array>
 #include <cstdint>
 
-#include "gpu/launch/plan.h"
+#include "gpu/state/plan.h"
 #include "model/stage.h"
 
 namespace cutproof::benchmarks {

@@ -9,8 +9,8 @@
 #include "gpu/device/cuda_check.h"
 #include "gpu/device/cuda_handles.h"
 #include "gpu/device/device_launcher.cuh"
-#include "gpu/kernels/float3.h"
 #include "gpu/launch/team.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu {
 namespace {

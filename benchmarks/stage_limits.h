@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "benchmarks/machine_limits.h"
-#include "gpu/launch/plan.h"
+#include "gpu/state/plan.h"
 #include "model/setup.h"
 #include "model/stage.h"
 #include "model/state.h"

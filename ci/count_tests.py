@@ -28,7 +28,7 @@ def kernels_since_the_last_run():
     newest = next((commit for commit in git("rev-list", "HEAD") if any(commit.startswith(short) for short in stored)), None)
     if newest is None:
         return "no stored run on a device is of a commit that is known here"
-    changed = git("diff", "--name-only", newest, "--", ":/gpu/kernels", ":/gpu/device")
+    changed = git("diff", "--name-only", newest, "--", ":/gpu", ":(top,exclude)gpu/host")
     since = f"kernel sources changed since {newest[:12]}, the last stored run on a device"
     return f"{len(changed)} {since}: {' '.join(changed)}" if changed else f"no {since}"
 

@@ -17,7 +17,7 @@
 #include "cli/scene_files.h"
 #include "cli/screen.h"
 #include "fixtures/import/mesh.h"
-#include "guests/vectors.h"
+#include "guests/questions/vectors.h"
 #include "harness/promises.h"
 #include "model/error.h"
 #include "model/fields.h"

@@ -1,5 +1,5 @@
 // `cutproof vectors` and `cutproof check-vectors`: questions to single kernels as a file, and the answers to them.
-#include "guests/vectors.h"
+#include "guests/questions/vectors.h"
 
 #include <fmt/format.h>
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "gpu/host/host_launcher.h"
-#include "gpu/launch/load.h"
+#include "gpu/load.h"
 #include "model/backend.h"
 
 namespace cutproof::gpu {

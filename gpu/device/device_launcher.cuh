@@ -1,5 +1,5 @@
-// gpu/device: CUDA. The Block of kernels (device_block.cuh), the backend (device_backend.cu), calls that are checked
-// (cuda_check.h) and handles that are given back (cuda_handles.h).
+// gpu/device: CUDA. The Block of kernels (device_block.cuh), calls that are checked (cuda_check.h) and handles that are
+// given back (cuda_handles.h).
 //
 // This file: the Launcher of launcher.h for the device. capture() writes work down as a CUDA graph, conditions and
 // loops included, which then runs any number of times without the host; a DeviceLauncher made from a stream starts work

@@ -1,10 +1,10 @@
 // Where clusters carry what rests on their particles and beside them (docs/design/method.md §4 and §8): by which
 // detection and skin tell how far tissue is from the blade that holds it apart.
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu {
 

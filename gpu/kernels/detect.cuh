@@ -19,9 +19,9 @@
 #include "gpu/kernels/carried_tissue.cuh"
 #include "gpu/kernels/lowered_plane.cuh"
 #include "gpu/launch/launcher.h"
-#include "gpu/launch/plan.h"
 #include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/plan.h"
 
 namespace cutproof::gpu {
 

@@ -11,8 +11,8 @@
 #include "gpu/kernels/rest_frames.cuh"
 #include "gpu/kernels/sorted_lists.cuh"
 #include "gpu/launch/launcher.h"
-#include "gpu/launch/plan.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/plan.h"
 
 namespace cutproof::gpu {
 

@@ -1,8 +1,8 @@
 // The plane by which detection and skin tell the two sides of a cut (docs/design/method.md §4 and §8).
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/launch/launcher.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu {
 

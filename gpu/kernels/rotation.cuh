@@ -4,8 +4,8 @@
 #pragma once
 #include <limits>
 
-#include "gpu/kernels/float3.h"
 #include "gpu/launch/block.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu {
 

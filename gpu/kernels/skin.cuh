@@ -8,14 +8,14 @@
 // listed first, ascending; places of vertices and cells are given out in their order.
 #pragma once
 #include "gpu/kernels/carried_tissue.cuh"
-#include "gpu/kernels/float3.h"
 #include "gpu/kernels/lowered_plane.cuh"
 #include "gpu/kernels/skin_table.h"
 #include "gpu/kernels/sorted_lists.cuh"
 #include "gpu/launch/launcher.h"
-#include "gpu/launch/plan.h"
 #include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
+#include "gpu/state/plan.h"
 
 namespace cutproof::gpu {
 

@@ -16,8 +16,8 @@
 #include "gpu/kernels/sorted_lists.cuh"
 #include "gpu/kernels/union_find.cuh"
 #include "gpu/launch/launcher.h"
-#include "gpu/launch/plan.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/plan.h"
 
 namespace cutproof::gpu {
 

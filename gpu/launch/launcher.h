@@ -1,6 +1,7 @@
-// How kernels are started. A Launcher is used by frame.h to write down the work of a frame once; DeviceLauncher
-// (device_launcher.cuh) captures it into a CUDA graph or starts its kernels one by one, HostLauncher (host_launcher.h)
-// carries it out on the spot.
+// gpu/launch: what kernels and those who run them have in common: the contracts of a Block (block.h), of a Team
+// (team.h) and, in this file, of a Launcher, which starts kernels. frame.h hands it the work of a frame; DeviceLauncher
+// (device_launcher.cuh) captures that into a CUDA graph or starts its kernels one by one, HostLauncher
+// (host_launcher.h) carries it out on the spot.
 //
 // Members of a Launcher:
 //   template <class Kernel, class... Args>

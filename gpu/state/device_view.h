@@ -10,7 +10,7 @@
 #pragma once
 #include <cstdint>
 
-#include "gpu/kernels/float3.h"
+#include "gpu/state/float3.h"
 #include "model/setup.h"
 
 namespace cutproof::gpu {

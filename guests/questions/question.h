@@ -69,7 +69,7 @@ struct OperationDescription {
 
 inline constexpr int64_t kMostSize = int64_t{1} << 25;  // of a large question
 
-// Those that plugins are asked. guests/vectors.h has more: the stages, which a plugin runs on whole states.
+// Those that plugins are asked. guests/questions/vectors.h has more: the stages, which a plugin runs on whole states.
 std::span<const OperationDescription> operations();
 // Null if there is none of that name.
 const OperationDescription* find_operation(std::string_view name);

@@ -10,8 +10,8 @@
 
 #include "harness/errors.h"
 #include "oracles/oracles.h"
-#include "tests/cli/program.h"
 #include "tests/oracles/states.h"
+#include "tests/program.h"
 
 namespace cutproof::benchmarks {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "harness/backends.h"
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 namespace {
 

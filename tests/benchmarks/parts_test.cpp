@@ -14,7 +14,7 @@
 #include "benchmarks/scene_parts.h"
 #include "gpu/backends.h"
 #include "model/io/scene_io.h"
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 namespace {
 

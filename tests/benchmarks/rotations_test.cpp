@@ -16,7 +16,7 @@
 #include "fixtures/hard_matrices.h"
 #include "harness/backends.h"
 #include "model/stop.h"
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 namespace {
 

@@ -8,7 +8,7 @@
 
 #include "benchmarks/paper.h"
 #include "report/paper_comparison.h"
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 namespace {
 

@@ -7,7 +7,7 @@
 #include "benchmarks/memory.h"
 #include "benchmarks/suites/suites.h"
 #include "model/error.h"
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 namespace {
 

@@ -13,7 +13,7 @@
 #include "model/io/scene_io.h"
 #include "oracles/oracles.h"
 #include "reference_cpu/reference.h"
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 namespace cutproof::benchmarks {
 namespace {

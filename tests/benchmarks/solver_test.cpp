@@ -12,7 +12,7 @@
 
 #include "oracles/comparison/reference_solution.h"
 #include "reference_cpu/reference.h"
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 namespace {
 

@@ -18,7 +18,7 @@
 #include "benchmarks/suites/suites.h"
 #include "benchmarks/times.h"
 #include "reference_cpu/reference.h"
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 namespace {
 

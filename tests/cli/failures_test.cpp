@@ -23,8 +23,8 @@
 
 #include "model/io/array_file.h"
 #include "tests/cli/chosen_allocations.h"
-#include "tests/cli/cut_scene.h"
 #include "tests/cli/failing_allocations.h"
+#include "tests/cut_scene.h"
 
 namespace cutproof::tests {
 namespace {

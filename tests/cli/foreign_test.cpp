@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "model/io/array_file.h"
-#include "tests/cli/program.h"
 #include "tests/harness/foreign_files.h"
+#include "tests/program.h"
 
 namespace {
 

@@ -8,7 +8,7 @@
 
 #include "property_tests/counterexample.h"
 #include "property_tests/dissection.h"
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 namespace {
 

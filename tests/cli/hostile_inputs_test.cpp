@@ -26,7 +26,7 @@
 
 #include "model/io/limits.h"
 #include "model/printable.h"
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 namespace cutproof::tests {
 namespace {

@@ -18,7 +18,7 @@
 #include <string_view>
 #include <thread>
 
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 namespace {
 

@@ -28,8 +28,8 @@
 #include "model/io/scene_io.h"
 #include "reference_cpu/reference.h"
 #include "tests/cli/chosen_allocations.h"
-#include "tests/cli/cut_scene.h"
 #include "tests/cli/failing_allocations.h"
+#include "tests/cut_scene.h"
 
 namespace cutproof::tests {
 namespace {

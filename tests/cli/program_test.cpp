@@ -1,5 +1,5 @@
 // The program as a user meets it: scenes, meshes, recordings, bad input, exit statuses.
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <tuple>
 #include <utility>
 
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 namespace {
 

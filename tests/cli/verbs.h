@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "model/io/array_file.h"
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 inline constexpr const char* kScene = R"({"version": 5, "name": "small",
   "body": {"shape": {"kind": "box", "size": [0.04, 0.03, 0.03]}, "spacing": 0.01}, "frame": {"count": 2},

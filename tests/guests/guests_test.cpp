@@ -19,9 +19,9 @@
 #include <thread>
 #include <tuple>
 
-#include "guests/campaign.h"
 #include "guests/guest.h"
 #include "guests/plugin_backend.h"
+#include "guests/questions/campaign.h"
 #include "harness/backends.h"
 #include "model/at.h"
 #include "model/error.h"

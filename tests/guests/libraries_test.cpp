@@ -8,10 +8,10 @@
 #include <nlohmann/json.hpp>
 
 #include "fixtures/rotation_answers.h"
-#include "guests/campaign.h"
 #include "guests/guest.h"
+#include "guests/questions/campaign.h"
 #include "model/at.h"
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 #ifdef CUTPROOF_HAS_BULLET
 #include <BulletSoftBody/btSoftBody.h>

@@ -1,5 +1,5 @@
 // Test vectors: files of questions, right answers that hold, and the least wrong ones that do not.
-#include "guests/vectors.h"
+#include "guests/questions/vectors.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

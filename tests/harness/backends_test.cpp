@@ -6,7 +6,7 @@
 #include <set>
 
 #include "model/error.h"
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 namespace {
 

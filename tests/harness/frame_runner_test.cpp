@@ -14,7 +14,7 @@
 #include "property_tests/campaign.h"
 #include "property_tests/campaign_report.h"
 #include "reference_cpu/reference.h"
-#include "tests/cli/cut_scene.h"
+#include "tests/cut_scene.h"
 #include "tests/harness/recorded_scene.h"
 
 namespace cutproof {

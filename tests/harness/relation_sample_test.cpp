@@ -10,7 +10,7 @@
 #include <string>
 
 #include "oracles/oracles.h"
-#include "tests/cli/cut_scene.h"
+#include "tests/cut_scene.h"
 #include "tests/harness/recorded_scene.h"
 #include "tests/harness/simulator.h"
 

@@ -12,7 +12,7 @@
 #include <string>
 
 #include "reference_cpu/reference.h"
-#include "tests/cli/cut_scene.h"
+#include "tests/cut_scene.h"
 #include "tests/harness/recorded_scene.h"
 
 namespace cutproof {

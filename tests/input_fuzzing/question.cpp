@@ -1,5 +1,5 @@
 // Questions to kernels: what is read can be written, and reads back the same.
-#include "guests/campaign.h"
+#include "guests/questions/campaign.h"
 #include "tests/input_fuzzing/targets.h"
 
 namespace cutproof::input_fuzzing {

@@ -15,7 +15,7 @@
 
 #include "gpu/backends.h"
 #include "gpu/host/thread_schedule.h"
-#include "gpu/launch/load.h"
+#include "gpu/load.h"
 #include "model/error.h"
 #include "model/fields.h"
 #include "property_tests/shown_case.h"

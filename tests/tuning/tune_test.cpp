@@ -12,7 +12,7 @@
 #include "benchmarks/prepared_scene.h"
 #include "model/io/scene_io.h"
 #include "reference_cpu/reference.h"
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 namespace {
 

@@ -1,7 +1,7 @@
 // The affine map M(r) = a + L h r by which an iteration moves the particles of a group; r = X - X_g is in nodes.
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/launch/team.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu::step_detail {
 

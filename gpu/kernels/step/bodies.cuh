@@ -1,7 +1,7 @@
 // Which body a particle, a cluster or a group belongs to, and where the nodes of its grid lie.
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu::step_detail {
 

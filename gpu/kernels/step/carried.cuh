@@ -1,7 +1,6 @@
 // An iteration of a carried group, whose map is advanced and not its particles; and of a held group, whose map says how
 // much a grip pushes them.
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/kernels/step/affine_map.cuh"
 #include "gpu/kernels/step/bodies.cuh"
 #include "gpu/kernels/step/contacts.cuh"
@@ -11,6 +10,7 @@
 #include "gpu/kernels/step/prediction.cuh"
 #include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu::step_detail {
 

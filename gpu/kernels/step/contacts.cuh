@@ -3,8 +3,8 @@
 // blade is (X - edge) + d, with X - edge formed once and rounded once, and a projection is added to d. So a particle
 // far from the body's origin loses no more than that one rounding.
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu {
 

@@ -1,10 +1,10 @@
 // A group of particles, where they rest, and the ball that contains all of them.
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/kernels/step/affine_map.cuh"
 #include "gpu/kernels/step/contacts.cuh"
 #include "gpu/kernels/step/prediction.cuh"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu::step_detail {
 

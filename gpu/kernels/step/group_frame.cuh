@@ -1,7 +1,6 @@
 // The two passes of a frame over the particles of groups. The first one sums what they begin the frame with; the last
 // one stores their displacements and velocities.
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/kernels/step/bodies.cuh"
 #include "gpu/kernels/step/contacts.cuh"
 #include "gpu/kernels/step/frame_parts.cuh"
@@ -16,6 +15,7 @@
 #include "gpu/kernels/step/work.cuh"
 #include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu::step_detail {
 

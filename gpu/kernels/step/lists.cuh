@@ -1,8 +1,8 @@
 // The lists of groups that contacts or grips have touched: tracked ones, to the end of the frame, and resolved ones, to
 // the end of the substep.
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu::step_detail {
 

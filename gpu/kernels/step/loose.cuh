@@ -1,6 +1,5 @@
 // Loose particles, which are in no group: their substeps and iterations, one particle to a thread.
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/kernels/step/affine_map.cuh"
 #include "gpu/kernels/step/bodies.cuh"
 #include "gpu/kernels/step/contacts.cuh"
@@ -9,6 +8,7 @@
 #include "gpu/kernels/step/particle.cuh"
 #include "gpu/kernels/step/prediction.cuh"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu::step_detail {
 

@@ -7,7 +7,6 @@
 #pragma once
 #include <cstddef>
 
-#include "gpu/kernels/float3.h"
 #include "gpu/kernels/rotation.cuh"
 #include "gpu/kernels/step/bodies.cuh"
 #include "gpu/kernels/step/iteration_numbers.cuh"
@@ -16,6 +15,7 @@
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu {
 

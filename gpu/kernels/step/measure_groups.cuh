@@ -1,11 +1,11 @@
 // The constants of groups and clusters that sums over groups need: rest centres, moments of masses, and the offsets
 // between the two.
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/kernels/step/make_groups.cuh"
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu {
 

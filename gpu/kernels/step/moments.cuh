@@ -1,11 +1,11 @@
 // Moments of a group: the sums over its particles of w e and w e rᵀ / h. Here e is the distance from a base, and w is
 // the mass that one holder gets of a particle.
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/kernels/step/group.cuh"
 #include "gpu/kernels/step/work.cuh"
 #include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu::step_detail {
 

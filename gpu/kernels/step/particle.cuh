@@ -1,12 +1,12 @@
 // A particle that has a position of its own, because it is loose or its group is resolved: grips, contacts and impulse
 // at the start of a substep, and an iteration.
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/kernels/step/bodies.cuh"
 #include "gpu/kernels/step/contacts.cuh"
 #include "gpu/kernels/step/iteration_numbers.cuh"
 #include "gpu/kernels/step/prediction.cuh"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu::step_detail {
 

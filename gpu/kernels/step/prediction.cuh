@@ -5,8 +5,8 @@
 // kRetarded: some body of the load has retardation. The kernels of other loads contain no code for it, and their x is
 // y.
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu::step_detail {
 

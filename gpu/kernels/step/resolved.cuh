@@ -1,7 +1,6 @@
 // Iterations of resolved groups, whose particles move by themselves from the first possible contact to the end of the
 // substep.
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/kernels/step/affine_map.cuh"
 #include "gpu/kernels/step/bodies.cuh"
 #include "gpu/kernels/step/contacts.cuh"
@@ -15,6 +14,7 @@
 #include "gpu/kernels/step/untouched.cuh"
 #include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu::step_detail {
 

@@ -28,9 +28,9 @@
 #include "gpu/kernels/step/untouched.cuh"
 #include "gpu/kernels/step/work.cuh"
 #include "gpu/launch/launcher.h"
-#include "gpu/launch/plan.h"
 #include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/plan.h"
 #include "model/stage.h"
 
 namespace cutproof::gpu {

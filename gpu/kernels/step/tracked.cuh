@@ -1,7 +1,6 @@
 // Substeps of tracked groups: those that a contact or a grip has touched in this frame. Each substep begins with the
 // positions of their particles.
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/kernels/step/affine_map.cuh"
 #include "gpu/kernels/step/bodies.cuh"
 #include "gpu/kernels/step/contacts.cuh"
@@ -15,6 +14,7 @@
 #include "gpu/kernels/step/work.cuh"
 #include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu::step_detail {
 

@@ -1,7 +1,6 @@
 // Substeps of groups that nothing has touched in this frame. Such a group has no positions of particles: it goes from
 // substep to substep by an affine map and by the numbers of frame_parts.cuh.
 #pragma once
-#include "gpu/kernels/float3.h"
 #include "gpu/kernels/step/affine_map.cuh"
 #include "gpu/kernels/step/bodies.cuh"
 #include "gpu/kernels/step/contacts.cuh"
@@ -13,6 +12,7 @@
 #include "gpu/kernels/step/prediction.cuh"
 #include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu::step_detail {
 

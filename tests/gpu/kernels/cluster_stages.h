@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "gpu/host/host_launcher.h"
-#include "gpu/launch/plan.h"
+#include "gpu/state/plan.h"
 #include "gpu/state/staging.h"
 #include "model/backend.h"
 #include "property_tests/cases.h"

@@ -9,9 +9,9 @@
 
 #include "fixtures/bodies.h"
 #include "fixtures/cook.h"
+#include "gpu/frame.h"
 #include "gpu/host/host_launcher.h"
 #include "gpu/host/thread_schedule.h"
-#include "gpu/launch/frame.h"
 #include "model/at.h"
 #include "tests/gpu/kernels/cluster_stages.h"
 

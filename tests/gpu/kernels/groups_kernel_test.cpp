@@ -12,10 +12,10 @@
 
 #include "fixtures/bodies.h"
 #include "fixtures/cook.h"
+#include "gpu/frame.h"
 #include "gpu/host/host_launcher.h"
 #include "gpu/kernels/step/groups.cuh"
-#include "gpu/launch/frame.h"
-#include "gpu/launch/load.h"
+#include "gpu/load.h"
 #include "gpu/state/staging.h"
 #include "model/at.h"
 #include "property_tests/cases.h"

@@ -15,9 +15,9 @@
 #include <set>
 #include <vector>
 
-#include "gpu/kernels/float3.h"
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/team.h"
+#include "gpu/state/float3.h"
 
 namespace cutproof::gpu {
 

@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
+#include "gpu/frame.h"
 #include "gpu/host/host_launcher.h"
-#include "gpu/launch/frame.h"
-#include "gpu/launch/load.h"
+#include "gpu/load.h"
 #include "gpu/state/staging.h"
 #include "model/stage.h"
 #include "property_tests/cases.h"

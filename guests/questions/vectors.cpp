@@ -1,4 +1,4 @@
-#include "guests/vectors.h"
+#include "guests/questions/vectors.h"
 
 #include <algorithm>
 #include <array>

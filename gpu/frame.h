@@ -1,8 +1,5 @@
-// gpu/launch: what host and device have in common when they run kernels: the contracts of a Block (block.h) and of a
-// Launcher (launcher.h), and what is known of a load (plan.h, load.h).
-//
-// This file: the work of a frame, written down once for every launcher: which kernels run, in which order, and under
-// which condition. No size is known here; all of them live in DeviceView::counters.
+// The work of a frame, written down once for every launcher: which kernels run, in which order, and under which
+// condition. No size is known here; all of them live in DeviceView::counters.
 #pragma once
 #include "gpu/kernels/detect.cuh"
 #include "gpu/kernels/expand.cuh"
@@ -12,8 +9,8 @@
 #include "gpu/kernels/split.cuh"
 #include "gpu/kernels/step/step.cuh"
 #include "gpu/launch/launcher.h"
-#include "gpu/launch/plan.h"
 #include "gpu/state/device_view.h"
+#include "gpu/state/plan.h"
 #include "model/stage.h"
 
 namespace cutproof::gpu {

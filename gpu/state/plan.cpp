@@ -1,4 +1,4 @@
-#include "gpu/launch/plan.h"
+#include "gpu/state/plan.h"
 
 #include <algorithm>
 

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "guests/campaign.h"
+#include "guests/questions/campaign.h"
 #include "guests/questions/question.h"
 #include "harness/promises.h"
 #include "harness/property_summary.h"

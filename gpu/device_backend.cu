@@ -15,7 +15,7 @@
 #include "gpu/device/cuda_check.h"
 #include "gpu/device/cuda_handles.h"
 #include "gpu/device/device_launcher.cuh"
-#include "gpu/launch/frame.h"
+#include "gpu/frame.h"
 
 namespace cutproof::gpu {
 

@@ -2,7 +2,7 @@
 #include <utility>
 
 #include "gpu/backends.h"
-#include "gpu/launch/frame.h"
+#include "gpu/frame.h"
 
 namespace cutproof::gpu {
 

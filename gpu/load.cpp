@@ -1,4 +1,4 @@
-#include "gpu/launch/load.h"
+#include "gpu/load.h"
 
 #include <utility>
 

@@ -1,4 +1,4 @@
-#include "guests/campaign.h"
+#include "guests/questions/campaign.h"
 
 #include <fmt/format.h>
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "gpu/launch/plan.h"
+#include "gpu/state/plan.h"
 #include "gpu/state/staging.h"
 #include "model/setup.h"
 #include "model/stage.h"

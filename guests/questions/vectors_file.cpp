@@ -11,7 +11,7 @@
 
 #include "fixtures/rotation_answers.h"
 #include "guests/questions/dissected.h"
-#include "guests/vectors.h"
+#include "guests/questions/vectors.h"
 #include "harness/named_arrays.h"
 #include "model/at.h"
 #include "model/error.h"
