@@ -5,9 +5,11 @@
 // tenths, hundredths or powers of ten. Each has a plain value, its default, which most cases have.
 #pragma once
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "model/at.h"
@@ -53,53 +55,9 @@ struct CaseGrip {
 };
 
 struct Case {
-  std::vector<Node> nodes;  // tissue, >= 0, ascending, without duplicates
-  double spacing = 1;       // h [m]
-
-  ClusterKind clusters = ClusterKind::boxes;
-  int32_t side = 5;           // boxes [nodes]
-  int32_t seed_spacing = 12;  // sampled [quarters]
-  int32_t ball_radius = 16;   // sampled [quarters]
-  int32_t most = 8;           // foreign: most particles of a cluster
-  int32_t tau = 3, cap = 12;  // foreign
-  uint64_t seed = 1;          // sampled and foreign
-
-  MergeRule merge = MergeRule::deterministic;
-  ExpandRule expand = ExpandRule::edge_cover;
-  int32_t expand_depth = 1;
-  int32_t debris = 0;
-
-  int32_t blade_length = 400, blade_depth = 400;  // [quarters], > 0
-  int32_t blade_thickness = 4;                    // [quarters], >= 0
-  std::vector<Stroke> strokes;                    // in this order; if the body moves, each takes whole frames
-  int32_t together = 1;                           // strokes of one frame, where nothing moves; >= 1
-
-  int32_t alpha = 5;    // where skin vertices sit on their grid edge [tenths]
-  int32_t surface = 0;  // whose random numbers say where the surface crosses grid edges; 0: not known
-
-  // false: nothing moves, and cuts are geometric. true: the body is soft, and the blade cuts what it stretches apart.
-  bool moves = false;
-  int32_t substeps = 2, iterations = 2;            // moves: of a frame, of a substep
-  int32_t stiffness = 5;                           // moves: log10 of k [1/s²]
-  Acceleration acceleration = Acceleration::none;  // moves
-  bool ground = false;                             // moves: gravity, and a floor half a spacing below the lowest node
-
-  // All of these only where the body moves.
-  Removal removal = Removal::usual;
-  RemovedEnds remove = RemovedEnds::both;      // usual removal
-  int32_t epsilon = 15;                        // [tenths]
-  int32_t strain = 120;                        // removal by strain: the greatest stretch that is no cut [hundredths]
-  Solver solver = Solver::implicit;            // published: without acceleration
-  int32_t relaxation = 5;                      // published [tenths]
-  int32_t damping = 0;                         // [1/s]
-  int32_t retardation = 0;                     // implicit [tenths of dt]
-  int32_t time_step = 1000;                    // dt [µs]
-  int32_t pace = 1;                            // so many times the frames that the blade needs
-  int32_t blade_friction = 0;                  // [tenths]
-  std::array<int32_t, 3> gravity = {0, 0, 0};  // besides that of `ground` [h/1000 per dt²]
-  std::vector<CaseWall> walls;                 // besides the floor
-  std::vector<CaseGrip> grips;
-
+#define LIST(Element, name, most) std::vector<Element> name;
+#define FIELD(Type, name, value, simplest) Type name = value;
+#include "property_tests/case_fields.inc"
   friend bool operator==(const Case&, const Case&) = default;
 };
 
@@ -117,6 +75,8 @@ Stroke draw_stroke(uint64_t seed, const Case& c);
 
 // Those of a box that are tissue, ascending; asked in the order in which a grid counts them.
 std::vector<Node> nodes_where(Node dims, const std::function<bool(Node)>& is_tissue);
+// Least and greatest coordinate of nodes along an axis; there is one.
+std::pair<int32_t, int32_t> extent(const std::vector<Node>& nodes, std::size_t axis);
 
 // Strokes with links resolved, and what a backend loads. If nothing moves: geometric cuts, one stroke a substep, no
 // iteration. Otherwise no substep takes the blade beyond the limits of method.md §3, Blade.

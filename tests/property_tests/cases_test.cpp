@@ -304,8 +304,6 @@ TEST(Simplest, HasPlainFieldsWhereTheFaultNeedsNoOthers) {
     expected.moves = true;
     expected.nodes = {{0, 0, 0}};
     expected.strokes = simple.strokes;
-    expected.seed_spacing = simple.seed_spacing;
-    expected.ball_radius = simple.ball_radius;
     for (int32_t Case::*field : {&Case::substeps, &Case::iterations, &Case::side, &Case::most, &Case::cap}) {
       expected.*field = 1;
     }
