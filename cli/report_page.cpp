@@ -5,7 +5,6 @@
 #include "cli/commands.h"
 #include "cli/output.h"
 #include "model/io/atomic_file.h"
-#include "model/io/unfinished.h"
 #include "report/page.h"
 
 namespace cutproof::cli {
@@ -19,16 +18,6 @@ void require_report(const std::string& path) {
   if (path.empty()) return;
   report::require_pages("--report");
   require_writable(path);
-}
-
-std::string passing_recording(const std::string& page) { return io::unfinished_name(page); }
-
-std::unique_ptr<io::RecordingReader> read_passing(const std::string& recording) {
-  const io::RecordingPaths paths = io::recording_paths(recording);
-  const io::Unfinished index(paths.index), particles(paths.particles), skin(paths.skin), blade(paths.blade);
-  // The reader keeps its files open, and what is open lives on without a name: however this program ends, nothing of
-  // the recording stays.
-  return std::make_unique<io::RecordingReader>(recording);
 }
 
 namespace {

@@ -1,7 +1,6 @@
 // --report F, for verbs that run or judge a recording.
 #pragma once
 #include <CLI/CLI.hpp>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -14,11 +13,6 @@ void add_report_option(CLI::App& command, std::string& path);
 // A failure now rather than after the run: throws InputError if this build makes no pages, or the folder is not there
 // or not writable. Nothing if `path` is empty.
 void require_report(const std::string& path);
-
-// The name of a recording that nobody asked for and a page is made from: beside the page, and gone with it.
-std::string passing_recording(const std::string& page);
-// Reads a passing recording, whose files have no name from then on.
-std::unique_ptr<io::RecordingReader> read_passing(const std::string& recording);
 
 // A recording that lies beside the one that a page is about, with the words for it.
 struct ReadBeside {

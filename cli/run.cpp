@@ -1,11 +1,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
+#include <array>
 #include <chrono>
-#include <cstdio>
+#include <iterator>
 #include <memory>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "cli/against_report.h"
 #include "cli/commands.h"
@@ -23,11 +25,8 @@
 #include "cli/terminal.h"
 #include "fixtures/bodies.h"
 #include "fixtures/build.h"
-#include "harness/against.h"
 #include "harness/backends.h"
-#include "harness/frame_runner.h"
-#include "harness/relation_sample.h"
-#include "harness/scene_judge.h"
+#include "harness/run_session.h"
 #include "model/counted.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
@@ -72,8 +71,8 @@ constexpr const char* kNextSteps =
     "  cutproof info --scene\n"
     "      lists every field of a scene file\n";
 
-using harness::Against;
 using harness::AgainstMode;
+using harness::RunSession;
 
 AgainstMode against_mode(const RunOptions& options) {
   const harness::BackendDescriptor* const other = harness::find_backend(options.against);
@@ -146,16 +145,6 @@ io::JunitCase conservation_case(const harness::Errors& errors, const Judging& ju
   return one;
 }
 
-// The comparison goes stage by stage.
-void compare(Against& against, const Setup& setup, const harness::Moment& moment, const std::array<bool, 6>& ran) {
-  const auto due = harness::due_stages(setup, *moment.before, moment.span, *moment.after);
-  if (std::count(due.begin(), due.end(), true) > 1) {
-    refuse("--against", "this backend runs several stages in one piece",
-           "choose one that runs them one by one, or leave --against out");
-  }
-  against.see(moment.span.last, *moment.after, ran[static_cast<std::size_t>(moment.span.last)], moment.by_backend);
-}
-
 // These are measured by runs of their own.
 void require_errors(const Backend& backend, const harness::ErrorsWanted& wanted) {
   const bool frames = backend.can_run({}), steps = frames || backend.can_run({Stage::step, Stage::step});
@@ -165,183 +154,175 @@ void require_errors(const Backend& backend, const harness::ErrorsWanted& wanted)
   if (wanted.solver && !steps) refuse("--errors", "this backend does not run the step", "leave solver out");
 }
 
-int run(const RunOptions& options) {
-  const auto begin = std::chrono::steady_clock::now();
-  std::optional<harness::Depth> depth;
-  if (!options.check.empty()) depth = depth_asked(options.check);
-  std::optional<AgainstMode> mode;
-  if (!options.against.empty()) mode = against_mode(options);
-  harness::ErrorsWanted wanted = errors_wanted(options.errors);
-  wanted.frames = options.error_frames;
-  if (wanted.implementation)
-    mode = mode.value_or(AgainstMode::lockstep) == AgainstMode::lockstep ? AgainstMode::lockstep : AgainstMode::both;
+harness::Observers observers_wanted(const RunOptions& options) {
+  harness::Observers observers;
+  if (!options.check.empty()) observers.judge = depth_asked(options.check);
+  if (!options.against.empty()) observers.against = against_mode(options);
+  if (!options.errors.empty()) {
+    observers.errors = errors_wanted(options.errors);
+    observers.errors->frames = options.error_frames;
+    if (observers.errors->implementation) {
+      const bool is_alone = observers.against.value_or(AgainstMode::lockstep) == AgainstMode::lockstep;
+      observers.against = is_alone ? AgainstMode::lockstep : AgainstMode::both;
+    }
+  }
+  observers.record = options.record;
+  observers.page = options.report;
+  return observers;
+}
+
+fixtures::BuildOptions build_options_of(const RunOptions& options) {
   fixtures::BuildOptions build_options;
   build_options.frames = options.frames;
   if (!options.mesh.empty()) {
     build_options.mesh = MeshSpec{options.mesh, metres_per(options.unit), options.repair, options.repair_change};
   }
   build_options.on_repair_step = repair_progress();
+  return build_options;
+}
+
+// As it is kept in a recording, where nobody reads the mesh again.
+std::string recorded_scene(Scene scene, const std::optional<MeshSpec>& mesh) {
+  if (mesh) {
+    scene.body.shape.reset();
+    scene.body.mesh = mesh;
+    scene.body.mesh->file = printable(mesh->file);
+  }
+  return io::write_scene(scene);
+}
+
+nlohmann::json document_of(const RunSession& session, const RunResult& result, const fixtures::Built& built,
+                           const std::vector<io::SceneChange>& changes) {
+  nlohmann::json document = to_json(result, session.judge());
+  document["build"] = build_json(built);
+  document["changes"] = given_changes(changes);
+  if (session.judge() == nullptr) {
+    document["left_to_reference"] = {{"stages", session.left_to_reference()}, {"expected", nlohmann::json::array()}};
+  }
+  const harness::Against* const against = session.against();
+  if (against != nullptr) {
+    document["against"] = to_json(*against, built.setup);
+    document["against"]["verdicts"] = io::verdicts_json(against->verdicts());
+  }
+  if (const harness::Errors* const errors = session.errors(); errors != nullptr) {
+    document["errors"] = to_json(*errors, errors->wanted().implementation ? &*against->lockstep : nullptr);
+  }
+  return document;
+}
+
+void write_run_page(const RunOptions& options, const RunSession& session, const nlohmann::json& document) {
+  if (session.recording() == nullptr) return;
+  std::optional<ReadBeside> beside;
+  if (session.reference_recording() != nullptr) {
+    beside.emplace(ReadBeside{
+        *session.reference_recording(), false, std::string(harness::reference_backend().name), options.backend.name,
+        session.against()->lockstep ? "the same particle of the reference, which ran each stage from this "
+                                      "run's own state before it (lockstep)"
+                                    : "the same particle of the reference, which began alike and ran by "
+                                      "itself, up to the first decision in which the two differ"});
+  }
+  write_report(options.report, *session.recording(), document, options.again, beside ? &*beside : nullptr);
+}
+
+std::vector<io::JunitCase> cases_of_run(const RunSession& session, const Judging& judging) {
+  std::vector<io::JunitCase> cases =
+      session.judge() != nullptr ? cases_of(*session.judge(), judging) : cases_of(session.broken_contracts(), judging);
+  const auto add = [&](std::vector<io::JunitCase> more) {
+    cases.insert(cases.end(), std::move_iterator(more.begin()), std::move_iterator(more.end()));
+  };
+  if (session.judge() == nullptr) add(cases_of_left(session.left_to_reference(), judging));
+  if (session.against() != nullptr) add(cases_of(session.against()->verdicts(), judging));
+  if (session.errors() != nullptr && session.errors()->conservation()) {
+    add({conservation_case(*session.errors(), judging)});
+  }
+  return cases;
+}
+
+void conclude_run(const RunSession& session, const std::string& again) {
+  if (session.judge() != nullptr) {
+    print_conclusion(*session.judge());
+    return;
+  }
+  const Shown of_the_run{again};
+  print_verdicts(session.broken_contracts(), of_the_run);
+  if (session.against() == nullptr) {
+    insist("nothing was judged: add --check for that\n");
+    return;
+  }
+  const std::vector<std::string> left = session.left_to_reference();
+  if (!left.empty()) say("{}\n", undecided(left_in_words(left)));
+  std::vector<Verdict> all = session.against()->verdicts();
+  all.insert(all.end(), session.broken_contracts().begin(), session.broken_contracts().end());
+  print_conclusion(all, of_the_run, "what was compared holds.");
+}
+
+void annotate_run(const RunSession& session, const Judging& judging) {
+  const harness::SceneJudge* const judge = session.judge();
+  std::vector<Failure> failures =
+      judge != nullptr ? failures_of(judge->verdicts(), judging,
+                                     [&](const Verdict& verdict) { return judge->is_expected_failure(verdict); })
+                       : failures_of(session.broken_contracts(), judging);
+  if (session.against() != nullptr) {
+    for (Failure& failure : failures_of(session.against()->verdicts(), judging)) failures.push_back(std::move(failure));
+  }
+  if (session.errors() != nullptr && !session.errors()->holds()) {
+    failures.push_back({kConservation, kNotConserved, judging.again});
+  }
+  print_annotations(failures, judge != nullptr ? judge->left_to_reference() : session.left_to_reference());
+}
+
+int run(const RunOptions& options) {
+  const auto begin = std::chrono::steady_clock::now();
+  const harness::Observers observers = observers_wanted(options);
+  const fixtures::BuildOptions build_options = build_options_of(options);
   const std::unique_ptr<Backend> backend = make_backend(options.backend);
-  require_errors(*backend, wanted);
+  if (observers.errors) require_errors(*backend, *observers.errors);
 
   const std::vector<io::SceneChange> changes = changes_of(options.scene);
   Scene scene = io::read_scene(options.scene.file, changes);
-  const std::vector<std::string> not_asked = take_replaced_counts(options.scene, scene.expect);
-  fixtures::Built built = with_sources(options.scene.file, changes,
-                                       [&] { return fixtures::build(scene, options.scene.file, build_options); });
+  std::vector<std::string> notes;
+  if (const auto not_asked = take_replaced_counts(options.scene, scene.expect); !not_asked.empty()) {
+    notes.push_back(
+        fmt::format("Of how many {} there are, what the scene expects was not asked: {} makes another number.",
+                    fmt::join(not_asked, " and "), options.scene.particles ? "--particles" : "--spacing"));
+  }
+  const fixtures::Built built = with_sources(options.scene.file, changes,
+                                             [&] { return fixtures::build(scene, options.scene.file, build_options); });
   require_writable(options.json);
   require_writable(options.junit);
   require_report(options.report);
-  if (!options.junit.empty() && !depth && !mode) {
+  if (!options.junit.empty() && !observers.judge && !observers.against) {
     refuse("--junit", "nothing is judged, so there are no test cases", "add --check or --against");
   }
-  std::optional<io::Recorder> recorder;
-  // A page is made from a recording, whether somebody wants to keep that or not.
-  const std::string record =
-      options.record.empty() && !options.report.empty() ? passing_recording(options.report) : options.record;
-  if (!record.empty()) {
-    Scene recorded = scene;
-    if (build_options.mesh) {
-      recorded.body.shape.reset();
-      recorded.body.mesh = build_options.mesh;
-      recorded.body.mesh->file = printable(recorded.body.mesh->file);  // for the record: nobody reads it again
-    }
-    const bool is_cut_short = built.schedule.is_cut_short;
-    recorder.emplace(record, built.setup, io::write_scene(recorded), options.backend.name,
-                     harness::left_to_reference(*backend), is_cut_short ? options.frames : std::nullopt);
-  }
-  std::optional<harness::SceneJudge> judge;
-  std::optional<harness::RelationSample> relations;
-  std::optional<Against> against;
-  std::optional<harness::Errors> errors;
+  RunSession session(
+      {built.setup, built.state, scene.expect, options.backend.name, recorded_scene(scene, build_options.mesh),
+       built.schedule.is_cut_short ? options.frames : std::nullopt, notes},
+      observers, *backend, [&] { return make_backend(options.backend); });
   print_header(scene, built, options);
-
-  RunResult result{"run", options.scene.file, options.backend.name,
-                   scene, built.setup.body,   built.state.clusters.count()};
-  harness::FrameRunner runner(*backend, {built.setup}, {built.state});
-  const auto state = [&]() -> const State& { return *runner.states().front(); };
-  if (depth) {
-    harness::Promises promises;
-    promises.words = harness::parse_promises(backend->promises(), options.backend.name, "promises");
-    judge.emplace(built.setup, scene.expect, options.backend.name, runner.states().front(), *depth, promises,
-                  built.schedule.is_cut_short ? harness::Extent::cut_short : harness::Extent::whole);
-  }
-  if (depth == harness::Depth::motion) relations.emplace(built.setup, make_backend(options.backend));
-  if (mode) against.emplace(built.setup, built.state, state(), options.backend.name, *mode);
-  if (!options.errors.empty()) {
-    errors.emplace(wanted, built.setup, state(), [&] { return make_backend(options.backend); });
-  }
-  if (recorder) recorder->add(Stage::skin, state());
-  // What the reference makes of the same, so that the page can show how far that is.
-  std::optional<io::Recorder> reference_recorder;
-  std::string reference_record;
-  if (against && !options.report.empty()) {
-    reference_record = passing_recording(options.report);
-    reference_recorder.emplace(reference_record, built.setup, "", std::string(harness::reference_backend().name));
-    // The reference computes in double precision, whatever it was handed.
-    const auto add = [&](Stage stage, State after) {
-      after.precision = Precision::binary64;
-      reference_recorder->add(stage, after);
-    };
-    add(Stage::skin, built.state);
-    against->observe_reference(add);
-  }
-  harness::StagesRun stages;
-  // What was handed over to the backend may have been rounded: the state after a stage is kept as the next one begins.
-  std::optional<std::pair<Stage, harness::Snapshot>> not_recorded;
-  const harness::Observer see = [&](const harness::Moment& moment) {
-    stages.see(built.setup, moment);
-    if (judge) judge->see(moment);
-    if (relations) {
-      relations->see(moment);
-      for (Verdict& verdict : relations->take_verdicts()) judge->add(std::move(verdict));
-    }
-    if (recorder && not_recorded) recorder->add(not_recorded->first, *moment.before);
-    not_recorded.emplace(moment.span.last, moment.after);
-    if (against) compare(*against, built.setup, moment, runner.ran());
-  };
   {
     Progress progress("frame", built.setup.frame_count());
-    while (!runner.is_over()) {
-      const int64_t frame = state().frame;
-      const bool looked_at = errors && errors->wants(frame);
-      if (looked_at) errors->frame_begins(state());
-      result.frames.push_back(runner.run_frame(judge || recorder || against ? see : nullptr));
-      if (looked_at) errors->frame_ends(state());
-      progress.show(frame + 1, fmt::format("{} clusters, {} particles", result.frames.back().clusters,
-                                           result.frames.back().alive));
-    }
-  }
-  const std::vector<Verdict> broken = runner.take_broken_contracts();
-  if (judge) {
-    for (const Verdict& verdict : broken) judge->add(verdict);
-    if (relations) {
-      for (std::string& sentence : relations->notes()) judge->note(std::move(sentence));
-    }
-    if (!not_asked.empty()) {
-      judge->note(
-          fmt::format("Of how many {} there are, what the scene expects was not asked: {} makes another number.",
-                      fmt::join(not_asked, " and "), options.scene.particles ? "--particles" : "--spacing"));
-    }
-    judge->finish();
-  }
-  nlohmann::json errors_document;
-  if (errors) {
-    errors->finish(state());
-    errors_document = to_json(*errors, wanted.implementation && against ? &*against->lockstep : nullptr);
-  }
-  if (recorder && not_recorded) recorder->add(not_recorded->first, *not_recorded->second);
-  if (recorder) recorder->finish();
-  // At once: whatever ends the run from here on leaves nothing that nobody asked for.
-  std::unique_ptr<io::RecordingReader> recording;
-  if (!options.report.empty()) {
-    recording = options.record.empty() ? read_passing(record) : std::make_unique<io::RecordingReader>(record);
-  }
-  std::unique_ptr<io::RecordingReader> reference_recording;
-  std::optional<ReadBeside> page_beside;
-  if (reference_recorder) {
-    reference_recorder->finish();
-    reference_recording = read_passing(reference_record);
-    page_beside.emplace(
-        ReadBeside{*reference_recording, false, std::string(harness::reference_backend().name), options.backend.name,
-                   against->lockstep ? "the same particle of the reference, which ran each stage from this "
-                                       "run's own state before it (lockstep)"
-                                     : "the same particle of the reference, which began alike and ran by "
-                                       "itself, up to the first decision in which the two differ"});
-  }
-  // Files first: they are kept even if standard output cannot be written.
-  if (!options.json.empty() || recording) {
-    nlohmann::json document = to_json(result, judge ? &*judge : nullptr);
-    document["build"] = build_json(built);
-    document["changes"] = given_changes(changes);
-    if (!judge) document["left_to_reference"] = {{"stages", stages.left()}, {"expected", nlohmann::json::array()}};
-    if (against) {
-      document["against"] = to_json(*against, built.setup);
-      document["against"]["verdicts"] = io::verdicts_json(against->verdicts());
-    }
-    if (errors) document["errors"] = errors_document;
-    write_document(options.json, document);
-    if (recording)
-      write_report(options.report, *recording, document, options.again, page_beside ? &*page_beside : nullptr);
+    session.run([&](const harness::FrameResult& frame) {
+      progress.show(frame.frame + 1, fmt::format("{} clusters, {} particles", frame.clusters, frame.alive));
+    });
   }
 
+  const RunResult result{"run",           options.scene.file, options.backend.name,
+                         scene,           built.setup.body,   built.state.clusters.count(),
+                         session.frames()};
+  const nlohmann::json document = document_of(session, result, built, changes);
+  // Files first: they are kept even if standard output cannot be written.
+  write_document(options.json, document);
+  write_run_page(options, session, document);
   const Judging judging{"cutproof run", "cutproof.run." + scene.name, options.again};
-  const std::vector<Verdict> beside = against ? against->verdicts() : std::vector<Verdict>();
   if (!options.junit.empty()) {
-    std::vector<io::JunitCase> cases = judge ? cases_of(*judge, judging) : cases_of(broken, judging);
-    if (!judge) {
-      for (io::JunitCase& one : cases_of_left(stages.left(), judging)) cases.push_back(std::move(one));
-    }
-    for (io::JunitCase& one : cases_of(beside, judging)) cases.push_back(std::move(one));
-    if (errors && errors->conservation()) cases.push_back(conservation_case(*errors, judging));
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
-    write_junit(options.junit, judging, seconds.count(), std::move(cases));
+    write_junit(options.junit, judging, seconds.count(), cases_of_run(session, judging));
   }
 
   print_summary(result);
-  if (judge) print_verdicts(*judge, options.again);
-  if (against) print_against(*against, options.again);
-  if (errors) print_errors(*errors, errors_document);
+  if (session.judge() != nullptr) print_verdicts(*session.judge(), options.again);
+  if (session.against() != nullptr) print_against(*session.against(), options.again);
+  if (session.errors() != nullptr) print_errors(*session.errors(), document["errors"]);
   if (!options.record.empty()) {
     const io::RecordingPaths paths = io::recording_paths(options.record);
     say_copy("recorded", paths.index);
@@ -351,30 +332,9 @@ int run(const RunOptions& options) {
   print_written(options.json);
   print_written(options.junit);
   print_written(options.report);
-  if (judge) {
-    print_conclusion(*judge);
-  } else {
-    const Shown of_the_run{options.again};
-    print_verdicts(broken, of_the_run);
-    if (against && !stages.left().empty()) say("{}\n", undecided(left_in_words(stages.left())));
-    if (against) {
-      std::vector<Verdict> all = beside;
-      all.insert(all.end(), broken.begin(), broken.end());
-      print_conclusion(all, of_the_run, "what was compared holds.");
-    } else {
-      insist("nothing was judged: add --check for that\n");
-    }
-  }
-  std::vector<Failure> failures =
-      judge ? failures_of(judge->verdicts(), judging,
-                          [&](const Verdict& verdict) { return judge->is_expected_failure(verdict); })
-            : failures_of(broken, judging);
-  for (Failure& failure : failures_of(beside, judging)) failures.push_back(std::move(failure));
-  if (errors && !errors->holds()) failures.push_back({kConservation, kNotConserved, judging.again});
-  print_annotations(failures, judge ? judge->left_to_reference() : stages.left());
-  return broken.empty() && (!judge || judge->holds()) && (!against || against->holds()) && (!errors || errors->holds())
-             ? 0
-             : 1;
+  conclude_run(session, options.again);
+  annotate_run(session, judging);
+  return session.holds() ? 0 : 1;
 }
 
 }  // namespace
