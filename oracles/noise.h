@@ -58,8 +58,7 @@ class Noise {
   uint64_t seed_, state_, of_equals_;
 };
 
-// The greatest there is, one way or the other, and with the opposite sign the other way: few numbers are drawn of it,
-// and each has to be tried both ways.
+// Draws 1 or -1. Two of one seed and opposite signs draw opposite numbers: where few are drawn, each is tried both ways.
 class OppositeNoise : public Noise {
  public:
   OppositeNoise(uint64_t seed, int sign) : Noise(~seed), sign_(sign) {}
