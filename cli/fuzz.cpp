@@ -267,7 +267,7 @@ json keep(const Violation& violation, const FuzzOptions& options, const BackendC
 
 Campaign run(const FuzzOptions& options, const CampaignOptions& asked) {
   const BackendSource source{
-      [&](int64_t load) { return harness::make_backend(harness::choice_for_load(options.backend, load)); },
+      [&](int64_t load, int) { return harness::make_backend(harness::choice_for_load(options.backend, load)); },
       harness::described_backend(options.backend.name).takes_schedule};
   const int64_t of_this_shard = (asked.cases - asked.shard + asked.shards - 1) / asked.shards;
   Progress progress("case", options.cases || !asked.seconds ? of_this_shard : 0);

@@ -4,11 +4,16 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <deque>
 #include <exception>
+#include <iterator>
+#include <limits>
 #include <mutex>
 #include <new>
 #include <thread>
+#include <utility>
 
+#include "model/at.h"
 #include "model/error.h"
 
 namespace cutproof::property_tests {
@@ -45,55 +50,32 @@ std::string problem_of(const std::function<void()>& run) {
   }
 }
 
-// Backends that nobody else uses for as long as they are lent.
-class Pool {
- public:
-  explicit Pool(int count) : idle_(at(count)) {}
-
-  std::unique_ptr<Backend> take() {
-    std::unique_lock lock(guard_);
-    returned_.wait(lock, [&] { return !idle_.empty(); });
-    std::unique_ptr<Backend> backend = std::move(idle_.back());
-    idle_.pop_back();
-    return backend;
-  }
-  void give(std::unique_ptr<Backend> backend) {
-    {
-      const std::lock_guard lock(guard_);
-      idle_.push_back(std::move(backend));
-    }
-    returned_.notify_one();
-  }
-
- private:
-  std::mutex guard_;
-  std::condition_variable returned_;
-  std::vector<std::unique_ptr<Backend>> idle_;  // null: to be made
-};
-
-// A place in the pool, given back whatever happens; with its backend if that `works`: what threw is not used again.
-struct Loan {
-  explicit Loan(Pool& from) : pool(from), backend(from.take()) {}
-  ~Loan() { pool.give(works ? std::move(backend) : nullptr); }
-  Loan(const Loan&) = delete;
-  Loan& operator=(const Loan&) = delete;
-  Pool& pool;
-  std::unique_ptr<Backend> backend;
-  bool works = false;
-};
-
-// One load of cases.
+// One load of cases, on its way through the threads.
 struct Load {
+  int64_t number = 0;
   std::vector<int64_t> indices;
   std::vector<Case> cases;
   std::vector<Instance> loaded;
+
+  // Once it has been run.
+  int device = 0;
+  std::vector<CaseRun> runs;
+  std::string backend;      // its name
+  std::string problem;      // what it threw; empty: nothing
+  bool is_refused = false;  // which of the bodies shows where each is alone
+
+  std::size_t claimed = 0, judged = 0;  // cases: to be judged by some thread; judged
+  bool has_violation = false;
 };
 
+// Threads take what is most wanted of three jobs: to generate a load, to run one, to judge some cases of one.
 class Runner {
  public:
   Runner(const CampaignOptions& options, const BackendSource& source,
          const std::function<void(const Campaign&)>& progress)
-      : options_(options), source_(source), progress_(progress), pool_(options.backends) {}
+      : options_(options), source_(source), progress_(progress) {
+    for (int k = options.backends; k-- > 0;) idle_.push_back({k % options.devices, nullptr});
+  }
 
   Campaign run() {
     std::vector<std::thread> threads;
@@ -110,105 +92,196 @@ class Runner {
   }
 
  private:
+  using LoadPointer = std::shared_ptr<Load>;
+  using Lock = std::unique_lock<std::mutex>;
+
+  struct Place {
+    int device;
+    std::unique_ptr<Backend> backend;  // null: to be made
+  };
+
   void work() {
+    Lock lock(guard_);
     try {
-      while (!stop_) {
-        const int64_t load = next_++;
-        if (!run_load(load)) return;
+      while (!error_) {
+        drop_what_nobody_wants();
+        // Where fewer loads can run than there are threads, a device must not wait for judges: one load is ready before
+        // a place is idle, and one may wait to be judged. Elsewhere a load is judged while the caches hold it.
+        const std::size_t ahead = options_.backends < options_.threads ? 1 : 0;
+        const bool may_begin = waiting_.size() <= ahead;
+        if (may_begin && !ready_.empty() && !idle_.empty()) {
+          run_load(lock);
+        } else if (may_begin && ready_.size() + generating_ < idle_.size() + ahead && may_generate()) {
+          generate(lock);
+        } else if (!waiting_.empty()) {
+          judge(lock);
+        } else if (generating_ == 0 && running_ == 0 && ready_.empty()) {
+          break;  // whoever still judges makes no new work
+        } else {
+          changed_.wait(lock);
+        }
       }
     } catch (...) {
-      const std::lock_guard lock(guard_);
+      if (!lock.owns_lock()) lock.lock();
       if (!error_) error_ = std::current_exception();
-      stop_ = true;
     }
+    changed_.notify_all();
   }
 
-  // False: there is nothing left to do.
-  bool run_load(int64_t number) {
-    const Clock::time_point begin = Clock::now();
-    if (options_.seconds && seconds_since(begin_) >= *options_.seconds) return false;
-    if (options_.shard + number * options_.batch * options_.shards >= options_.cases || is_stopped()) return false;
-    Load load;
-    for (int64_t k = number * options_.batch; k < (number + 1) * options_.batch; ++k) {
-      const int64_t index = options_.shard + k * options_.shards;
-      if (index >= options_.cases) break;
-      load.indices.push_back(index);
-      load.cases.push_back(case_at(options_, index));
-      load.loaded.push_back(property_tests::instance_of(load.cases.back()));
-    }
-    const double generating = seconds_since(begin);
-
-    std::vector<CaseRun> runs;
-    std::string name, problem;
-    bool is_refused = false;
-    double running = 0;
-    {
-      Loan loan(pool_);
-      if (!loan.backend || source_.fresh) loan.backend = source_.make(number);
-      name = loan.backend->name();
-      const Clock::time_point running_since = Clock::now();
-      try {
-        problem = problem_of([&] { runs = run_cases(*loan.backend, load.loaded); });
-      } catch (const Refused& refused) {  // which of the bodies shows where each is alone
-        problem = refused.what();
-        is_refused = true;
-      }
-      running = seconds_since(running_since);
-      loan.works = problem.empty();
-    }
-    const Clock::time_point judging_since = Clock::now();
-    std::vector<Judgement> judgements;
-    for (std::size_t k = 0; k < load.cases.size() && !is_stopped(); ++k) {
-      judgements.push_back(problem.empty() ? judge_case(load.cases[k], load.loaded[k], runs[k], name,
-                                                        load.indices[k] % options_.thorough == 0)
-                                           : dissect_alone([&] { return source_.make(number); }, load.cases[k], true));
-    }
-    if (!problem.empty() && !is_refused && judgements.size() == load.cases.size() &&
-        std::none_of(judgements.begin(), judgements.end(), [](const Judgement& j) { return j.failure.has_value(); })) {
-      judgements.front() = thrown(name, "(with the other bodies of its load only) " + problem);
-    }
-    note(load, judgements, generating, running, seconds_since(judging_since));
-    return true;
+  bool time_is_over() const { return options_.seconds && seconds_since(begin_) >= *options_.seconds; }
+  bool may_generate() {
+    return options_.shard + next_ * options_.batch * options_.shards < options_.cases && next_ <= last_wanted_ &&
+           !time_is_over() && !is_stopped();
   }
-
   // Once it is asked to stop, what is begun counts as far as it was judged.
   bool is_stopped() {
     if (is_asked(options_.stop_asked)) stopped_ = true;
     return stopped_;
   }
-
-  // `judgements`: of the first cases of the load, or of all.
-  void note(const Load& load, std::vector<Judgement>& judgements, double generating, double running, double judging) {
-    const std::lock_guard lock(guard_);
-    campaign_.generating += generating;
-    campaign_.running += running;
-    campaign_.judging += judging;
-    for (std::size_t k = 0; k < judgements.size(); ++k) {
-      Judgement& judgement = judgements[k];
-      ++campaign_.cases;
-      campaign_.verdicts += judgement.verdicts;
-      campaign_.refused += judgement.refused ? 1 : 0;
-      campaign_.particles += load.loaded[k].setup.body.particle_count();
-      campaign_.coverage.add(judgement.coverage);
-      campaign_.compared.join(judgement.compared);
-      campaign_.properties.join(judgement.properties);
-      campaign_.stages.join(judgement.stages);
-      if (!judgement.failure) continue;
-      campaign_.violations.push_back({load.indices[k], load.cases[k], std::move(*judgement.failure)});
-      if (!options_.keep_going) stop_ = true;
+  // When its time is over, some cases of what is begun are judged all the same if none was.
+  bool is_over() { return is_stopped() || (time_is_over() && has_judged_); }
+  // Loads are begun in order, so the first violation is found whatever comes after it.
+  bool is_wanted(const LoadPointer& load) const { return load->number <= last_wanted_; }
+  void drop_what_nobody_wants() {
+    const bool is_all = is_over();
+    for (std::deque<LoadPointer>* loads : {&ready_, &waiting_}) {
+      std::erase_if(*loads, [&](const LoadPointer& load) { return is_all || !is_wanted(load); });
     }
+  }
+
+  void generate(Lock& lock) {
+    const auto load = std::make_shared<Load>();
+    load->number = next_++;
+    ++generating_;
+    lock.unlock();
+    const Clock::time_point begin = Clock::now();
+    for (int64_t k = load->number * options_.batch; k < (load->number + 1) * options_.batch; ++k) {
+      const int64_t index = options_.shard + k * options_.shards;
+      if (index >= options_.cases) break;
+      load->indices.push_back(index);
+      load->cases.push_back(case_at(options_, index));
+      load->loaded.push_back(property_tests::instance_of(load->cases.back()));
+    }
+    const double generating = seconds_since(begin);
+    lock.lock();
+    campaign_.generating += generating;
+    --generating_;
+    ready_.push_back(load);
+    changed_.notify_all();
+  }
+
+  void run_load(Lock& lock) {
+    const LoadPointer load = ready_.front();
+    ready_.pop_front();
+    Place place = std::move(idle_.back());
+    idle_.pop_back();
+    ++running_;
+    lock.unlock();
+    if (!place.backend || source_.fresh) place.backend = source_.make(load->number, place.device);
+    load->device = place.device;
+    load->backend = place.backend->name();
+    const Clock::time_point begin = Clock::now();
+    try {
+      load->problem = problem_of([&] { load->runs = run_cases(*place.backend, load->loaded); });
+    } catch (const Refused& refused) {
+      load->problem = refused.what();
+      load->is_refused = true;
+    }
+    const double running = seconds_since(begin);
+    if (!load->problem.empty()) place.backend.reset();  // what threw is not used again
+    lock.lock();
+    campaign_.running += running;
+    --running_;
+    idle_.push_back(std::move(place));
+    waiting_.push_back(load);
+    changed_.notify_all();
+  }
+
+  Judgement judgement_of(Load& load, std::size_t k) {
+    const Case& c = load.cases[k];
+    if (!load.problem.empty()) {
+      return dissect_alone([&] { return source_.make(load.number, load.device); }, c, true);
+    }
+    Judgement judgement =
+        judge_case(c, load.loaded[k], load.runs[k], load.backend, load.indices[k] % options_.thorough == 0);
+    load.runs[k] = {};  // states are the most of what a campaign holds
+    return judgement;
+  }
+
+  // Some cases of the load that has waited longest.
+  void judge(Lock& lock) {
+    const LoadPointer load = waiting_.front();
+    const std::size_t first = load->claimed, cases = load->cases.size();
+    const std::size_t share = cases / static_cast<std::size_t>(options_.threads);
+    load->claimed = std::min(cases, first + std::clamp<std::size_t>(share, 1, kMostJudgedAtOnce));
+    const std::size_t end = load->claimed;
+    if (end == cases) waiting_.pop_front();
+    lock.unlock();
+    const Clock::time_point begin = Clock::now();
+    Campaign part;
+    for (std::size_t k = first; k < end && (k == first || !is_over()); ++k) {
+      add(part, *load, k, judgement_of(*load, k));
+    }
+    part.judging = seconds_since(begin) - part.reference;
+    lock.lock();
+    load->judged += at(part.cases);
+    load->has_violation = load->has_violation || !part.violations.empty();
+    const bool is_whole = load->judged == cases;
+    if (is_whole && !load->problem.empty() && !load->is_refused && !load->has_violation) {
+      part.violations.push_back(
+          {load->indices.front(), load->cases.front(),
+           *thrown(load->backend, "(with the other bodies of its load only) " + load->problem).failure});
+    }
+    if (!part.violations.empty() && !options_.keep_going) last_wanted_ = std::min<int64_t>(last_wanted_, load->number);
+    has_judged_ = true;
+    join(std::move(part));
     campaign_.seconds = seconds_since(begin_);
     if (progress_) progress_(campaign_);
+    changed_.notify_all();
   }
+
+  static void add(Campaign& part, const Load& load, std::size_t k, Judgement judgement) {
+    ++part.cases;
+    part.verdicts += judgement.verdicts;
+    part.refused += judgement.refused ? 1 : 0;
+    part.particles += load.loaded[k].setup.body.particle_count();
+    part.coverage.add(judgement.coverage);
+    part.compared.join(judgement.compared);
+    part.properties.join(judgement.properties);
+    part.stages.join(judgement.stages);
+    part.reference += judgement.reference_seconds;
+    if (judgement.failure) part.violations.push_back({load.indices[k], load.cases[k], std::move(*judgement.failure)});
+  }
+  void join(Campaign part) {
+    campaign_.cases += part.cases;
+    campaign_.verdicts += part.verdicts;
+    campaign_.refused += part.refused;
+    campaign_.particles += part.particles;
+    campaign_.coverage.add(part.coverage);
+    campaign_.compared.join(part.compared);
+    campaign_.properties.join(part.properties);
+    campaign_.stages.join(part.stages);
+    campaign_.reference += part.reference;
+    campaign_.judging += part.judging;
+    std::move(part.violations.begin(), part.violations.end(), std::back_inserter(campaign_.violations));
+  }
+
+  // Enough that threads seldom wait for each other, few enough that all of them have the last load to judge.
+  static constexpr std::size_t kMostJudgedAtOnce = 16;
 
   const CampaignOptions& options_;
   const BackendSource& source_;
   const std::function<void(const Campaign&)>& progress_;
-  Pool pool_;
-  Clock::time_point begin_ = Clock::now();
-  std::atomic<int64_t> next_{0};  // loads are begun in order, so the first violation is found whatever comes after it
-  std::atomic<bool> stop_{false}, stopped_{false};
-  std::mutex guard_;
+  const Clock::time_point begin_ = Clock::now();
+  std::atomic<bool> stopped_{false}, has_judged_{false};
+
+  std::mutex guard_;  // of all that follows
+  std::condition_variable changed_;
+  int64_t next_ = 0;  // load
+  int64_t last_wanted_ = std::numeric_limits<int64_t>::max();
+  std::vector<Place> idle_;
+  std::size_t generating_ = 0, running_ = 0;  // threads
+  std::deque<LoadPointer> ready_, waiting_;   // to be run; to be judged
   Campaign campaign_;
   std::exception_ptr error_;
 };

@@ -18,21 +18,23 @@ namespace cutproof::property_tests {
 struct CampaignOptions {
   uint64_t seed = 1;
   int64_t cases = 1000;                // of the whole campaign, all shards together
-  std::optional<double> seconds;       // begins no further load after so long
+  std::optional<double> seconds;       // begins no further load after so long, and judges no further case
   int least_size = 0, most_size = 79;  // sizes of cases (cases.h) take turns
   bool dynamics = false;               // bodies move as well, and blades cut what they pass
   int batch = 64;                      // bodies in one load
-  int threads = 1;                     // each generates, loads, runs and judges whole loads
-  int backends = 1;                    // how many of them may run at once
+  int threads = 1;                     // generate cases, run loads and judge case by case
+  int backends = 1;                    // how many loads may run at once
+  int devices = 1;                     // on which they run in turn; at most `backends`
   int thorough = 50;                   // every n-th case with CGAL's geometric check
   int64_t shard = 0, shards = 1;       // of cases 0, 1, 2, …: those that are `shard` modulo `shards`
   bool keep_going = false;             // beyond the first violation
   StopAsked stop_asked;                // begins no further case; those that were judged count
 };
 
-// Makes the backend for a load; called once for each of `backends` and never for others if `fresh` is false.
+// Makes the backend for a load, on one of `devices` (0 ..); called once for each of `backends` and never for others if
+// `fresh` is false.
 struct BackendSource {
-  std::function<std::unique_ptr<Backend>(int64_t load)> make;
+  std::function<std::unique_ptr<Backend>(int64_t load, int device)> make;
   bool fresh = false;  // a new one for every load, e.g. because schedules depend on it
 };
 
@@ -52,15 +54,15 @@ struct Campaign {
   harness::StagesRun stages;
   std::vector<Violation> violations;  // by index; without keep_going the first alone
   double seconds = 0;                 // wall time
-  // Of all threads together [s].
-  double generating = 0, running = 0, judging = 0;
+  // Of all threads together [s]; `reference`: its stages, for comparison.
+  double generating = 0, running = 0, reference = 0, judging = 0;
 };
 
 // Case `index` of a campaign: the same on every platform, whatever the batch, the shards and the backend.
 Case case_at(const CampaignOptions& options, int64_t index);
 
-// `progress` is called from any thread, one at a time, after every load. Throws what the machine throws (MachineError,
-// std::bad_alloc); whatever else a backend throws is a violation of the case that makes it throw.
+// `progress` is called from any thread, one at a time, whenever some cases have been judged. Throws what the machine
+// throws (MachineError, std::bad_alloc); whatever else a backend throws is a violation of the case that makes it throw.
 Campaign run_campaign(const CampaignOptions& options, const BackendSource& source,
                       const std::function<void(const Campaign&)>& progress);
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -206,6 +207,23 @@ void probe_steps(Backend& backend, const std::vector<Instance>& loaded, std::vec
 
 }  // namespace
 
+namespace {
+
+// Adds up what they take.
+oracles::ReferenceStages timed_reference_stages(double& seconds) {
+  oracles::ReferenceStages stages = harness::reference_stages();
+  for (auto& stage : stages) {
+    stage = [run = std::move(stage), &seconds](const Setup& setup, State& state) {
+      const auto begin = std::chrono::steady_clock::now();
+      run(setup, state);
+      seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    };
+  }
+  return stages;
+}
+
+}  // namespace
+
 std::vector<CaseRun> run_cases(Backend& backend, const std::vector<Instance>& loaded) {
   std::vector<Setup> setups;
   std::vector<State> states;
@@ -258,7 +276,7 @@ Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, 
   take(judge.take_verdicts());
   int32_t components = judge.component_count();
   seen["several components"] = components > 1;
-  oracles::StageComparison comparison(setup, harness::reference_stages());
+  oracles::StageComparison comparison(setup, timed_reference_stages(judgement.reference_seconds));
   const auto compare = [&](Stage stage, const State& before, const State& after) {
     const oracles::StageDifference found = comparison.compare(stage, before, after, true);
     if (stage == Stage::step) judgement.compared.add(found);

@@ -115,6 +115,7 @@ struct Judgement {
   int64_t verdicts = 0;            // how many were asked for
   std::optional<Verdict> failure;  // the first that does not hold
   bool refused = false;            // by the backend, so nothing was judged
+  double reference_seconds = 0;    // that the reference took for its stages
 };
 
 // What a backend made of one case: the run, and what of the contract it broke on the way.

@@ -1016,7 +1016,8 @@ property_tests::Campaign dissected(const std::string& backend, int64_t cases, bo
   options.cases = cases;
   options.batch = 16;
   options.dynamics = dynamics;
-  const property_tests::BackendSource source{[&](int64_t) { return harness::make_backend({.name = backend}); }, false};
+  const property_tests::BackendSource source{[&](int64_t, int) { return harness::make_backend({.name = backend}); },
+                                             false};
   return property_tests::run_campaign(options, source, {});
 }
 

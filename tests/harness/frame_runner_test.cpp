@@ -185,8 +185,8 @@ property_tests::Campaign fuzzed(const Partial::Can& can, const Partial::Fault& f
   options.cases = dynamics ? 80 : 200;
   options.dynamics = dynamics;
   options.keep_going = true;
-  return property_tests::run_campaign(options, {[&](int64_t) { return std::make_unique<Partial>(can, fault); }, false},
-                                      nullptr);
+  return property_tests::run_campaign(
+      options, {[&](int64_t, int) { return std::make_unique<Partial>(can, fault); }, false}, nullptr);
 }
 
 TEST(PartialBackend, IsJudgedByFuzzWhateverItCanRun) {
@@ -237,7 +237,7 @@ TEST(PartialBackend, IsSaidByFuzzToHaveLeftStagesToTheReference) {
     options.shards = 2;
     options.shard = shard;
     const property_tests::Campaign campaign = property_tests::run_campaign(
-        options, {[&](int64_t) { return std::make_unique<Partial>(can); }, false}, nullptr);
+        options, {[&](int64_t, int) { return std::make_unique<Partial>(can); }, false}, nullptr);
     return property_tests::campaign_document(choice, options, campaign, nlohmann::json::array());
   };
   using Stages = std::vector<std::string>;
@@ -301,7 +301,7 @@ TEST(Dissection, ComparesMergesWithTheReference) {
   options.cases = 400;
   options.keep_going = true;
   const property_tests::Campaign campaign = property_tests::run_campaign(
-      options, {[](int64_t) { return std::make_unique<MergesByAnotherRule>(); }, false}, nullptr);
+      options, {[](int64_t, int) { return std::make_unique<MergesByAnotherRule>(); }, false}, nullptr);
   EXPECT_FALSE(campaign.violations.empty());
   for (const auto& violation : campaign.violations) {
     EXPECT_EQ(violation.verdict.property, "the reference's topology") << violation.verdict.witness.text;

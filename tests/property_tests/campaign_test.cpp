@@ -4,8 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <functional>
+#include <latch>
+#include <mutex>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -58,21 +62,58 @@ CampaignOptions small_campaign(int64_t cases) {
   return options;
 }
 
-const BackendSource kReference{[](int64_t) { return reference::make_backend(); }, false};
+const BackendSource kReference{[](int64_t, int) { return reference::make_backend(); }, false};
 
 TEST(Campaign, JudgesEveryCaseOnceWhateverTheLoadsAndThreads) {
   const Campaign one = run_campaign(small_campaign(150), kReference, {});
-  CampaignOptions options = small_campaign(150);
-  options.batch = 7;
-  options.threads = options.backends = 3;
-  const Campaign other = run_campaign(options, kReference, {});
   EXPECT_EQ(one.cases, 150);
   EXPECT_TRUE(one.violations.empty());
   EXPECT_GT(one.verdicts, 1000);
-  EXPECT_EQ(other.cases, one.cases);
-  EXPECT_EQ(other.verdicts, one.verdicts);
-  EXPECT_EQ(other.particles, one.particles);
-  EXPECT_EQ(other.coverage, one.coverage);
+  CampaignOptions options = small_campaign(150);
+  options.threads = 3;
+  for (const auto& [batch, backends, devices] : {std::array{7, 3, 1}, {150, 1, 1}, {20, 2, 2}, {5, 3, 3}}) {
+    options.batch = batch;
+    options.backends = backends;
+    options.devices = devices;
+    // Of a device that nobody uses nothing would be known.
+    std::mutex guard;
+    std::set<int> used;
+    const BackendSource source{[&](int64_t, int device) {
+                                 const std::lock_guard lock(guard);
+                                 used.insert(device);
+                                 return reference::make_backend();
+                               },
+                               true};
+    const Campaign other = run_campaign(options, source, {});
+    EXPECT_EQ(other.cases, one.cases);
+    EXPECT_EQ(other.verdicts, one.verdicts);
+    EXPECT_EQ(other.particles, one.particles);
+    EXPECT_EQ(other.coverage, one.coverage);
+    for (const int device : used) EXPECT_LT(device, devices);
+    EXPECT_TRUE(used.contains(0));
+  }
+}
+
+// A backend that runs only once all of them do: so each device has one of the first loads.
+TEST(Campaign, RunsItsFirstLoadsOnAllDevicesAtOnce) {
+  constexpr int kDevices = 3;
+  CampaignOptions options = small_campaign(60);
+  options.batch = 10;
+  options.threads = options.backends = options.devices = kDevices;
+  std::latch all(kDevices);
+  std::mutex guard;
+  std::multiset<int> used;
+  const BackendSource source{[&](int64_t, int device) {
+                               {
+                                 const std::lock_guard lock(guard);
+                                 used.insert(device);
+                               }
+                               all.arrive_and_wait();
+                               return reference::make_backend();
+                             },
+                             false};
+  EXPECT_EQ(run_campaign(options, source, {}).cases, 60);
+  EXPECT_EQ(used, (std::multiset<int>{0, 1, 2}));
 }
 
 TEST(Campaign, ShardsAreTheWhole) {
@@ -97,7 +138,7 @@ TEST(Campaign, BeginsNothingAfterItsTime) {
 }
 
 TEST(Campaign, FindsTheFirstViolationWhateverTheLoadsAndThreads) {
-  const BackendSource planted{[](int64_t) { return std::make_unique<Planted>(break_second_cut); }, false};
+  const BackendSource planted{[](int64_t, int) { return std::make_unique<Planted>(break_second_cut); }, false};
   const Campaign one = run_campaign(small_campaign(400), planted, {});
   ASSERT_EQ(one.violations.size(), 1u);
   CampaignOptions options = small_campaign(400);
@@ -119,7 +160,8 @@ TEST(Campaign, FindsAStepThatIsNotTheReferencesWhereNothingElseIsWrong) {
   CampaignOptions options = small_campaign(60);
   options.dynamics = true;
   const auto with = [](Planted::OnLoad on_load) {
-    return BackendSource{[on_load](int64_t) { return std::make_unique<Planted>(Planted::Change(), on_load); }, false};
+    return BackendSource{[on_load](int64_t, int) { return std::make_unique<Planted>(Planted::Change(), on_load); },
+                         false};
   };
   const Campaign right = run_campaign(options, with({}), {});
   EXPECT_TRUE(right.violations.empty());
@@ -144,7 +186,7 @@ TEST(Campaign, FindsAStepThatIsNotTheReferencesWhereNothingElseIsWrong) {
 
 TEST(Campaign, NamesTheCaseWhoseBodyTheBackendThrowsOver) {
   constexpr int32_t kMost = 30;
-  const BackendSource planted{[](int64_t) {
+  const BackendSource planted{[](int64_t, int) {
                                 return std::make_unique<Planted>(Planted::Change(), [](const cutproof::Setup& setup) {
                                   if (setup.body.particle_count() > kMost) throw std::logic_error("too many for me");
                                 });
@@ -163,7 +205,7 @@ TEST(Campaign, NamesTheCaseWhoseBodyTheBackendThrowsOver) {
 }
 
 TEST(Campaign, EndsWithWhatTheMachineThrows) {
-  const BackendSource broken{[](int64_t) -> std::unique_ptr<Backend> { throw MachineError("no device"); }, false};
+  const BackendSource broken{[](int64_t, int) -> std::unique_ptr<Backend> { throw MachineError("no device"); }, false};
   CampaignOptions options = small_campaign(100);
   options.threads = 3;
   EXPECT_THROW(run_campaign(options, broken, {}), MachineError);
