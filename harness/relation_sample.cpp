@@ -49,31 +49,40 @@ void RelationSample::see(const Moment& moment) {
   const bool removes = !moment.after->removed.empty();
   const bool cut_ended = std::exchange(removed_before_, removes) && !removes;
   const Snapshot begin = std::exchange(begin_, nullptr);
-  if (begin == nullptr) return;
-  if (begin->frame % kFramesBetweenSamples != 0 && !cut_ended && !is_separated_) return;
+  const bool is_asked = begin != nullptr && (begin->frame % kFramesBetweenSamples == 0 || cut_ended || is_separated_);
   // One that is not well formed has been rejected already, and no backend could load it.
-  if (oracles::well_formed(setup_, *begin).holds) ask(*begin);
+  if (is_asked && oracles::well_formed(setup_, *begin).holds) {
+    wait();
+    asking_ = std::async(std::launch::async, [this, begin, turn = asked_++] { return ask(*begin, turn); });
+  }
+  if (moment.after->frame >= setup_.frame_count()) wait();
 }
 
-void RelationSample::ask(const State& begin) {
+void RelationSample::wait() {
+  if (!asking_.valid()) return;
+  for (Verdict& verdict : asking_.get()) verdicts_.push_back(std::move(verdict));
+}
+
+std::vector<Verdict> RelationSample::ask(const State& begin, int64_t turn) {
   const double h = setup_.body.grid.spacing, dt = setup_.substep_length[at(begin.frame)];
   // Each component in turn.
   const oracles::Partition pieces = oracles::graph_components(setup_, begin);
-  const auto kicked = static_cast<int32_t>(asked_++ % std::max(pieces.count, 1));
+  const auto kicked = static_cast<int32_t>(turn % std::max(pieces.count, 1));
   const auto first = std::find(pieces.label.begin(), pieces.label.end(), kicked);
   const auto particle = first == pieces.label.end() ? -1 : static_cast<int32_t>(first - pieces.label.begin());
   // Some iterations even where the scene has none: a simulator that makes some is judged by them.
   const int32_t iterations = std::max(setup_.step.iterations, 2);
-  for (Verdict verdict : {oracles::no_ghost_force(*second_, setup_, begin, particle, h * kKick, 1),
-                          oracles::energy_is_monotone(*second_, frictionless_, begin, iterations),
-                          oracles::rest_is_fixed(*second_, setup_, begin),
-                          oracles::translation_is_exact(*second_, setup_, begin, (h / dt) * kThrow),
-                          oracles::step_by_iterates(*second_, setup_, begin, oracles::Iterates::sampled,
-                                                    static_cast<uint64_t>(begin.frame))}) {
+  std::vector<Verdict> verdicts = {oracles::no_ghost_force(*second_, setup_, begin, particle, h * kKick, 1),
+                                   oracles::energy_is_monotone(*second_, frictionless_, begin, iterations),
+                                   oracles::rest_is_fixed(*second_, setup_, begin),
+                                   oracles::translation_is_exact(*second_, setup_, begin, (h / dt) * kThrow),
+                                   oracles::step_by_iterates(*second_, setup_, begin, oracles::Iterates::sampled,
+                                                             static_cast<uint64_t>(begin.frame))};
+  for (Verdict& verdict : verdicts) {
     verdict.stage = Stage::step;
     verdict.frame = begin.frame;
-    verdicts_.push_back(std::move(verdict));
   }
+  return verdicts;
 }
 
 std::vector<std::string> RelationSample::notes() const {

@@ -2,6 +2,7 @@
 // instance of the backend runs them, from the states in which those frames began.
 #pragma once
 #include <cstdint>
+#include <future>
 #include <memory>
 #include <string>
 #include <vector>
@@ -25,15 +26,18 @@ class RelationSample {
   RelationSample(const Setup& setup, std::unique_ptr<Backend> second);
   ~RelationSample();
 
-  // Every moment of one body in order, whoever ran it. Runs the relations when a frame ends that is asked.
+  // Every moment of one body in order, whoever ran it. When a frame ends that is asked, its relations begin to run in a
+  // thread of their own; what that throws the next call throws.
   void see(const Moment& moment);
+  // Of what has been asked all but the last frame, and that one too once the schedule is over.
   std::vector<Verdict> take_verdicts();
 
   // How many frames were asked, and what could not be asked of this backend: one sentence each.
   std::vector<std::string> notes() const;
 
  private:
-  void ask(const State& begin);
+  std::vector<Verdict> ask(const State& begin, int64_t turn);
+  void wait();
 
   const Setup& setup_;
   const Setup frictionless_;  // friction has no energy, so it is left out where energy is asked about
@@ -44,6 +48,7 @@ class RelationSample {
   bool removed_before_ = false;  // the frame before it removed something
   int64_t frames_ = 0, asked_ = 0;
   std::vector<Verdict> verdicts_;
+  std::future<std::vector<Verdict>> asking_;  // the frame that was asked last; before all that it needs is gone
 };
 
 }  // namespace cutproof::harness

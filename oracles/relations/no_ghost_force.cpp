@@ -1,6 +1,7 @@
 // Tissue that is not connected feels nothing of each other.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <string>
 
 #include "oracles/oracles.h"
@@ -32,6 +33,9 @@ Verdict no_ghost_force(Backend& backend, const Setup& given, const State& state,
     if (state.frame >= setup.frame_count()) return vacuous(verdict, "the schedule is over");
     const Partition partition = graph_components(setup, state);
     const int32_t kicked = partition.label[at(particle)];
+    const bool is_all = std::all_of(partition.label.begin(), partition.label.end(),
+                                    [&](int32_t label) { return label < 0 || label == kicked; });
+    if (is_all) return;  // nobody is there who could feel it
     const double dt = setup.substep_length[at(state.frame)];
     State disturbed_state = state;
     for (std::size_t i = 0; i < state.x.size(); ++i) {
