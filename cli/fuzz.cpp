@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <limits>
 #include <memory>
@@ -59,7 +60,7 @@ std::pair<int64_t, int64_t> two_numbers(const std::string& text, char separator,
   return {number(text.substr(0, at)), number(text.substr(at + 1))};
 }
 
-CampaignOptions campaign_options(const FuzzOptions& options) {
+CampaignOptions campaign_options(const FuzzOptions& options, const std::vector<int>& devices) {
   const harness::BackendDescriptor& backend = harness::described_backend(options.backend.name);
   CampaignOptions campaign = options.campaign;
   campaign.cases = options.cases.value_or(campaign.seconds ? std::numeric_limits<int64_t>::max() / 2 : 1000);
@@ -70,10 +71,9 @@ CampaignOptions campaign_options(const FuzzOptions& options) {
   campaign.stop_asked = stop_asked;
   campaign.least_size = static_cast<int>(least);
   campaign.most_size = static_cast<int>(most);
-  campaign.batch = options.batch > 0 ? options.batch : backend.bodies_in_a_load;
+  campaign.batch = options.batch > 0 ? options.batch : usual_batch(campaign, backend);
   campaign.threads = options.threads > 0 ? options.threads : harness::cpu_threads();
-  campaign.backends =
-      backend.most_parallel_loads > 0 ? std::min(campaign.threads, backend.most_parallel_loads) : campaign.threads;
+  set_parallel_loads(campaign, backend, static_cast<int>(devices.size()));
   if (!options.shard.empty()) {
     const std::string remedy = "give i/N with i from 1 to N, such as 2/8";
     const auto [shard, shards] = two_numbers(options.shard, '/', "--shard", remedy);
@@ -222,19 +222,27 @@ std::string name_in_files(const std::string& backend) {
 
 json size_of(const Case& c) { return {{"particles", c.nodes.size()}, {"strokes", c.strokes.size()}}; }
 
-// Simplifies, saves, records; returns what the document has of it.
-json keep(const Violation& violation, const FuzzOptions& options, const BackendChoice& choice, int batch) {
+// Simplifies, saves, records; returns what the document has of it. Where no time is `left` [s] the case is saved as it
+// was drawn.
+json keep(const Violation& violation, const FuzzOptions& options, const CampaignOptions& asked,
+          const BackendChoice& choice, double left) {
   insist("case {} {}: {}\n", violation.index, failing("FAILS"), describe(violation.verdict));
   flush_output();
-  Simplified simplified = simplify(violation, choice, options.simplify, stop_asked);
-  simplified.counterexample.seed = options.campaign.seed;
+  const bool is_late = left <= 0;
+  Simplified simplified =
+      is_late ? as_drawn(violation, choice) : simplify(violation, choice, std::min(options.simplify, left), stop_asked);
+  simplified.counterexample.seed = asked.seed;
   const Counterexample& found = simplified.counterexample;
   const std::string stem = (std::filesystem::path(options.save) /
                             fmt::format("{}_{}_{}", name_in_files(choice.name), options.campaign.seed, violation.index))
                                .string();
   const std::string file = stem + ".json";
   io::write_text(file, to_json(found) + "\n");
-  if (simplified.alone) {
+  if (is_late) {
+    insist("not simplified, its time is over; to do that: fuzz again with --seed {} --sizes {}-{} --cases 1{}\n",
+           asked.seed + static_cast<uint64_t>(violation.index), size_at(asked, violation.index),
+           size_at(asked, violation.index), asked.dynamics ? " --dynamics" : "");
+  } else if (simplified.alone) {
     insist("simplified to {} and {}{}: {}\n", counted(found.failing.strokes.size(), "stroke", "strokes"),
            counted(found.failing.nodes.size(), "particle", "particles"),
            harness::described_backend(choice.name).takes_schedule
@@ -249,10 +257,11 @@ json keep(const Violation& violation, const FuzzOptions& options, const BackendC
     }
   } else {
     insist("alone it does not fail, only with the other bodies of its load: fuzz again with --seed {} --batch {}\n",
-           options.campaign.seed, batch);
+           asked.seed, asked.batch);
   }
   insist_copy("saved; to see it again:", "cutproof replay " + quoted(file));
   json kept = violation_json(violation, file);
+  if (is_late) return kept;
   kept["drawn"] = size_of(violation.failing);
   if (simplified.alone) {
     kept["simplified"] = size_of(found.failing);
@@ -265,10 +274,7 @@ json keep(const Violation& violation, const FuzzOptions& options, const BackendC
   return kept;
 }
 
-Campaign run(const FuzzOptions& options, const CampaignOptions& asked) {
-  const BackendSource source{
-      [&](int64_t load, int) { return harness::make_backend(harness::choice_for_load(options.backend, load)); },
-      harness::described_backend(options.backend.name).takes_schedule};
+Campaign run(const FuzzOptions& options, const CampaignOptions& asked, const BackendSource& source) {
   const int64_t of_this_shard = (asked.cases - asked.shard + asked.shards - 1) / asked.shards;
   Progress progress("case", options.cases || !asked.seconds ? of_this_shard : 0);
   return run_campaign(asked, source, [&](const Campaign& so_far) {
@@ -291,28 +297,38 @@ Campaign run(const FuzzOptions& options, const CampaignOptions& asked) {
 }  // namespace
 
 nlohmann::json fuzz_campaign(const FuzzOptions& options) {
-  const CampaignOptions asked = campaign_options(options);
+  const std::vector<int> devices =
+      harness::devices_of(options.devices, harness::described_backend(options.backend.name));
+  const CampaignOptions asked = campaign_options(options, devices);
   // What cannot be is said before anything is done.
-  static_cast<void>(harness::make_backend(harness::choice_for_load(options.backend, 0)));
+  const BackendSource source = source_of(options.backend, devices);
+  for (int k = 0; k < asked.devices; ++k) static_cast<void>(source.make(0, k));
   require_writable(options.json);
   require_writable(options.junit);
   require_report(options.report);
   make_folder("--save", options.save);
 
-  say("fuzzing backend {}: {}{} from seed {}{}, {} bodies a load, {} threads\n", options.backend.name,
+  say("fuzzing backend {}: {}{} from seed {}{}, {} bodies a load, {} threads{}\n", options.backend.name,
       options.campaign.seconds ? fmt::format("{:g} s of cases", *options.campaign.seconds)
                                : fmt::format("{} cases", asked.cases),
       asked.dynamics ? " with dynamics" : "", asked.seed,
       asked.shards > 1 ? fmt::format(", shard {} of {}", asked.shard + 1, asked.shards) : "", asked.batch,
-      asked.threads);
+      asked.threads, options.devices.empty() ? "" : fmt::format(", devices {}", fmt::join(devices, ", ")));
   flush_output();
-  const Campaign campaign = run(options, asked);
+  const auto begin = std::chrono::steady_clock::now();
+  const Campaign campaign = run(options, asked, source);
   json violations = json::array();
   for (const Violation& violation : campaign.violations) {
     const int64_t load = (violation.index - asked.shard) / asked.shards / asked.batch;
-    violations.push_back(keep(violation, options, harness::choice_for_load(options.backend, load), asked.batch));
+    BackendChoice choice = harness::choice_for_load(options.backend, load);
+    choice.device = devices.front();
+    const double passed = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    const double left = asked.seconds ? *asked.seconds - passed : std::numeric_limits<double>::infinity();
+    violations.push_back(keep(violation, options, asked, choice, left));
   }
-  return campaign_document(options.backend, asked, campaign, violations);
+  json document = campaign_document(options.backend, asked, campaign, violations);
+  if (!options.devices.empty()) document["devices"] = devices;
+  return document;
 }
 
 namespace {
@@ -340,9 +356,12 @@ void add_fuzz(CLI::App& program, Work& work) {
   command->add_flag("--dynamics", options->campaign.dynamics, "bodies move and blades push what they cut");
   add_count(*command, "--batch", options->batch, "bodies in one load (default: by backend)", whole_number(1, 100'000));
   add_count(*command, "--threads", options->threads, "that generate and judge (default: all)", whole_number(1, 4096));
+  add_devices(*command, options->devices);
   command->add_option("--shard", options->shard, "only part i of N of the cases")->type_name("i/N");
   command->add_flag("--keep-going", options->campaign.keep_going, "beyond the first violation");
-  command->add_option("--simplify", options->simplify, "how long a violation's case is simplified, 0: not at all")
+  command
+      ->add_option("--simplify", options->simplify,
+                   "how long a violation's case is simplified, within --seconds; 0: not at all")
       ->capture_default_str()
       ->type_name("S")
       ->check(number_from(0));

@@ -18,6 +18,7 @@ struct FuzzOptions {
   std::string sizes = "0-79";    // of cases, which take turns: 0 is nothing, 100 up to about 20,000 particles
   int batch = 0;                 // bodies in one load; 0: by backend
   int threads = 0;               // 0: as many as the machine has
+  std::string devices;           // "0,2" or "all"; empty: the first, of backends that need one
   std::string shard;             // "i/N"; empty: all
   double simplify = 60;          // [s] for each violation
   std::string save = ".";        // the folder for counterexamples

@@ -47,6 +47,11 @@ void add_backend(CLI::App& command, harness::BackendChoice& choice, const std::s
   add_seed(command, choice.seed, scheduled + ": what random and pct are drawn from", "--schedule-seed");
 }
 
+void add_devices(CLI::App& command, std::string& devices) {
+  command.add_option("--devices", devices, "of the backend: numbers, or all that this host has (default: 0)")
+      ->type_name("N,N...|all");
+}
+
 bool is_timed(const harness::BackendDescriptor& backend) { return backend.is_timed; }
 
 void add_seed(CLI::App& command, uint64_t& seed, const std::string& what, const std::string& name) {

@@ -21,6 +21,8 @@ void add_backend_name(CLI::App& command, std::string& name, const std::string& w
 // --backend, and what may be said about schedules.
 void add_backend(CLI::App& command, harness::BackendChoice& choice, const std::string& what,
                  const std::function<bool(const harness::BackendDescriptor&)>& offered = {});
+// --devices, for those who run campaigns.
+void add_devices(CLI::App& command, std::string& devices);
 // For what is timed.
 bool is_timed(const harness::BackendDescriptor& backend);
 

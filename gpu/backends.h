@@ -25,10 +25,13 @@ std::unique_ptr<Backend> make_host_backend(int threads = 1, KernelOptions option
 std::unique_ptr<Backend> make_simulated_backend(HostLauncher::Simulated simulation, KernelOptions options = {});
 
 #if CUTPROOF_HAS_CUDA
-// The device in use, e.g. "NVIDIA H200, compute capability 9.0, 139.8 GiB"; empty if there is none, and then `why` says
-// why.
-std::string device_description(std::string& why);
-// State lives on the device. run() does not wait for the device; snapshot() and report() do.
+// How many devices there are; where there is none, `why` says why.
+int device_count(std::string& why);
+// A device, e.g. "NVIDIA H200, compute capability 9.0, 139.8 GiB"; empty if there is none of this number, and then
+// `why` says why.
+std::string device_description(std::string& why, int device = 0);
+// State lives on the device of the options. run() does not wait for the device; snapshot() and report() do. Each call
+// makes that device the one in use of the calling thread.
 std::unique_ptr<Backend> make_gpu_backend(KernelOptions options = {});
 #endif
 

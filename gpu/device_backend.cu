@@ -71,12 +71,15 @@ class DeviceArrays {
 
 class GpuBackend final : public KernelBackend {
  public:
-  explicit GpuBackend(KernelOptions options) : options_(options) {
+  explicit GpuBackend(KernelOptions options) : options_(in_use(options)) {
     for (Event& event : end_) event = make_event();
     std::uninitialized_fill_n(counters(), kInFlight, Counters{});
   }
   // Nothing is given back that the device still uses.
-  ~GpuBackend() override { static_cast<void>(cudaStreamSynchronize(stream_.get())); }
+  ~GpuBackend() override {
+    static_cast<void>(cudaSetDevice(options_.device));
+    static_cast<void>(cudaStreamSynchronize(stream_.get()));
+  }
   GpuBackend(const GpuBackend&) = delete;
   GpuBackend& operator=(const GpuBackend&) = delete;
 
@@ -86,13 +89,16 @@ class GpuBackend final : public KernelBackend {
   bool can_run(Span) const override { return true; }
 
   void load(std::vector<Setup> setups, std::vector<State> states) override {
-    take(Load(std::move(setups), states, options_, options_.capacity));
+    Load load(std::move(setups), states, options_, options_.capacity);
+    use_device();
+    take(std::move(load));
   }
 
   // Starts the span and returns. Whether more capacity is wanted is read from what the counters were kInFlight calls
   // ago: by then they have nearly always arrived, and the answer does not depend on how fast the device is, so two runs
   // enlarge their arrays at the same places and have the same bits.
   void run(Span span) override {
+    use_device();
     if (span.contains(Stage::skin)) load_.forget_skins();
     if (runs_ >= kInFlight) {
       CUTPROOF_CUDA(cudaEventSynchronize(end_[slot()].get()));
@@ -126,6 +132,7 @@ class GpuBackend final : public KernelBackend {
 
   std::vector<State> snapshot() const override { return snapshot_of(std::vector<bool>(load_.setups.size(), true)); }
   std::vector<State> snapshot_of(const std::vector<bool>& wanted) const override {
+    use_device();
     wait();
     device_.download(load_.staging);
     return load_.states_of(wanted);
@@ -134,6 +141,7 @@ class GpuBackend final : public KernelBackend {
   SpanReport report() const override {
     SpanReport report;
     if (runs_ == 0) return report;
+    use_device();
     wait();
     for (std::size_t s = 0; s < 6; ++s) report.ran[s] = counters()[last()].stage_ran[s] != 0;
     float milliseconds = 0;
@@ -144,6 +152,7 @@ class GpuBackend final : public KernelBackend {
   }
 
   StepWork step_work() const override {
+    use_device();
     wait();
     const DeviceView& view = device_.view();
     const auto copy_of = [](const auto* from, int64_t count) {
@@ -160,6 +169,12 @@ class GpuBackend final : public KernelBackend {
   }
 
  private:
+  // Which device is in use is a thread's own.
+  void use_device() const { in_use(options_); }
+  static const KernelOptions& in_use(const KernelOptions& options) {
+    CUTPROOF_CUDA(cudaSetDevice(options.device));
+    return options;
+  }
   void take(Load load) {
     CUTPROOF_CUDA(cudaStreamSynchronize(stream_.get()));
     graphs_.clear();
@@ -202,17 +217,24 @@ class GpuBackend final : public KernelBackend {
 
 }  // namespace
 
-std::string device_description(std::string& why) {
+int device_count(std::string& why) {
   int count = 0;
   const cudaError_t status = cudaGetDeviceCount(&count);
-  if (status != cudaSuccess || count == 0) {
-    static_cast<void>(cudaGetLastError());
-    why = status != cudaSuccess ? std::string("cudaGetDeviceCount says: ") + cudaGetErrorString(status)
-                                : "no CUDA device";
+  if (status == cudaSuccess && count > 0) return count;
+  static_cast<void>(cudaGetLastError());
+  why =
+      status != cudaSuccess ? std::string("cudaGetDeviceCount says: ") + cudaGetErrorString(status) : "no CUDA device";
+  return 0;
+}
+
+std::string device_description(std::string& why, int device) {
+  const int count = device_count(why);
+  if (device >= count) {
+    if (count > 0) why = "there are " + std::to_string(count);
     return {};
   }
   cudaDeviceProp properties;
-  CUTPROOF_CUDA(cudaGetDeviceProperties(&properties, 0));
+  CUTPROOF_CUDA(cudaGetDeviceProperties(&properties, device));
   char text[512];
   std::snprintf(text, sizeof text, "%s, compute capability %d.%d, %.1f GiB", properties.name, properties.major,
                 properties.minor, static_cast<double>(properties.totalGlobalMem) / (1 << 30));
@@ -221,7 +243,7 @@ std::string device_description(std::string& why) {
 
 std::unique_ptr<Backend> make_gpu_backend(KernelOptions options) {
   std::string why;
-  if (device_description(why).empty()) throw MachineError("the backend gpu finds no device: " + why);
+  if (device_description(why, options.device).empty()) throw MachineError("the backend gpu finds no device: " + why);
   return std::make_unique<GpuBackend>(options);
 }
 

@@ -31,6 +31,7 @@ struct KernelOptions {
   Path path = Path::graph;
   Capacity capacity;  // at load; a backend doubles it when it must (for tests)
   OnDemand on_demand;
+  int device = 0;  // gpu: its number
   // gpu, for tests: a byte that fills all memory before anything is put into it.
   std::optional<int> fill;
 };

@@ -53,9 +53,10 @@ std::unique_ptr<Backend> make_simulated(gpu::Generator schedule) {
 
 #if CUTPROOF_HAS_CUDA
 template <gpu::Path path>
-std::unique_ptr<Backend> make_gpu(const BackendChoice&) {
+std::unique_ptr<Backend> make_gpu(const BackendChoice& choice) {
   gpu::KernelOptions options;
   options.path = path;
+  options.device = choice.device;
   return gpu::make_gpu_backend(options);
 }
 #else
@@ -70,6 +71,8 @@ std::unique_ptr<Backend> make_host(const BackendChoice& choice) {
 
 // Several, so that kernels see more than one body; no more, so that what they work on stays in the caches.
 constexpr int kBodiesOnTheHost = 4;
+// What a device does before its kernels and after them it does for a whole load.
+constexpr int64_t kParticlesOnADevice = 50'000;
 
 // No strings that allocate: this table is there before main() and where there is no memory.
 constexpr std::array kBackends = {
@@ -113,6 +116,7 @@ constexpr std::array kBackends = {
         .pipelines = true,
         .takes_full_size = true,
         .timed_frames = 20,
+        .particles_in_a_load = kParticlesOnADevice,
         // It is busy with so many loads at once; more only take memory.
         .most_parallel_loads = 6,
         .make = make_gpu<gpu::Path::graph>,
@@ -123,6 +127,7 @@ constexpr std::array kBackends = {
         .processor = Processor::device,
         .is_timed = false,
         .is_another_path = true,
+        .particles_in_a_load = kParticlesOnADevice,
         .most_parallel_loads = 6,
         .make = make_gpu<gpu::Path::eager>,
     },
@@ -137,16 +142,29 @@ std::string cpu_name() {
   return "CPU";
 }
 
-// Empty if there is no device, and then `why` says why.
-std::string device_name([[maybe_unused]] std::string& why) {
+// Empty if there is no such device, and then `why` says why.
+std::string device_name([[maybe_unused]] std::string& why, [[maybe_unused]] int device = 0) {
 #if CUTPROOF_HAS_CUDA
-  return gpu::device_description(why);
+  return gpu::device_description(why, device);
 #else
   return {};
 #endif
 }
+int device_count([[maybe_unused]] std::string& why) {
+#if CUTPROOF_HAS_CUDA
+  return gpu::device_count(why);
+#else
+  return 0;
+#endif
+}
 
 constexpr const char* kToolkitWanted = "no CUDA toolkit of version 12.4 or newer was there";
+
+void require_built(const BackendDescriptor& backend) {
+  if (backend.is_built()) return;
+  refuse("--backend", "this cutproof was built without CUDA",
+         "build it where a CUDA toolkit of version 12.4 or newer is installed");
+}
 
 }  // namespace
 
@@ -208,7 +226,7 @@ std::string description_of(const BackendDescriptor& backend) {
   return fmt::format("{}; device: {}", backend.summary, device.empty() ? "none (" + why + ")" : device);
 }
 
-std::string processor_of(const BackendDescriptor& backend) {
+std::string processor_of(const BackendDescriptor& backend, int device) {
   switch (backend.processor) {
     case Processor::one_thread:
       return cpu_name() + ", 1 thread";
@@ -216,18 +234,50 @@ std::string processor_of(const BackendDescriptor& backend) {
       return fmt::format("{}, {} threads", cpu_name(), cpu_threads());
     case Processor::device: {
       std::string why;
-      return device_name(why);
+      return device_name(why, device);
     }
   }
   return {};
 }
 
+std::vector<int> devices_of(const std::string& text, const BackendDescriptor& backend) {
+  if (text.empty()) return {0};
+  if (!backend.needs_device()) {
+    refuse("--devices", fmt::format("the backend {} runs on no device", backend.name),
+           "leave it out, or name a backend that does: " +
+               backend_names([](const BackendDescriptor& b) { return b.needs_device(); }));
+  }
+  require_built(backend);
+  std::string why;
+  const int count = device_count(why);
+  if (count == 0) throw MachineError(fmt::format("the backend {} finds no device: {}", backend.name, why));
+  std::vector<int> devices;
+  if (text == "all") {
+    for (int device = 0; device < count; ++device) devices.push_back(device);
+    return devices;
+  }
+  const std::string remedy =
+      count == 1 ? "use 0, or all" : fmt::format("use some of 0 to {}, such as 0,1, or all", count - 1);
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    const std::string number = text.substr(begin, end - begin);
+    begin = end + 1;
+    if (number.empty() || number.size() > 4 || number.find_first_not_of("0123456789") != std::string::npos) {
+      refuse("--devices", fmt::format("'{}' is no list of devices", text), remedy);
+    }
+    const int device = std::stoi(number);
+    if (device >= count) refuse("--devices", fmt::format("there is no device {}", device), remedy);
+    if (std::find(devices.begin(), devices.end(), device) != devices.end()) {
+      refuse("--devices", fmt::format("device {} is named twice", device), remedy);
+    }
+    devices.push_back(device);
+  }
+  return devices;
+}
+
 std::unique_ptr<Backend> make_backend(const BackendChoice& choice) {
   const BackendDescriptor& backend = described_backend(choice.name);
-  if (!backend.is_built()) {
-    refuse("--backend", "this cutproof was built without CUDA",
-           "build it where a CUDA toolkit of version 12.4 or newer is installed");
-  }
+  require_built(backend);
   return backend.make(choice);
 }
 

@@ -23,6 +23,7 @@ struct BackendChoice {
   std::string schedule = "random";  // of backends that take one: one of schedule_names()
   uint64_t seed = 1;                // of the schedule
   int threads = 0;                  // of backends that use all threads; 0: as many as the machine has
+  int device = 0;                   // of backends that need one
 };
 
 enum class Processor { one_thread, all_threads, device };
@@ -44,8 +45,10 @@ struct BackendDescriptor {
   // timed.
   bool takes_full_size = false;
   int64_t timed_frames = 10;
-  // Campaigns: how many bodies one load has; how many loads at once keep it busy (0: as many as there are threads).
+  // Campaigns: how many bodies one load has at least, and particles, if that takes more bodies (0: that is the same);
+  // how many loads at once keep it, or one of its devices, busy (0: as many as there are threads).
   int bodies_in_a_load = 64;
+  int64_t particles_in_a_load = 0;
   int most_parallel_loads = 0;
 
   // Null where this build does not have it.
@@ -69,7 +72,11 @@ std::string backend_names(const std::function<bool(const BackendDescriptor&)>& w
 // Summary, device, or why it is not there: for `cutproof info`. Does not throw.
 std::string description_of(const BackendDescriptor& backend);
 // The processor and how many of its threads work, or the CUDA device; empty if that is not there.
-std::string processor_of(const BackendDescriptor& backend);
+std::string processor_of(const BackendDescriptor& backend, int device = 0);
+// What --devices says, "0,2" or "all"; empty: the first. Of a backend that needs none a list of one, which is nobody's
+// device. Throws InputError, naming --devices, for what is no list, for a device that is not there or is named twice,
+// and if a backend that needs none is given any.
+std::vector<int> devices_of(const std::string& text, const BackendDescriptor& backend);
 
 // Throws InputError, naming the option, for what does not exist or is not in this build; MachineError if there is no
 // device.

@@ -286,13 +286,46 @@ class Runner {
   std::exception_ptr error_;
 };
 
+// Beyond this the states of a load take gigabytes.
+constexpr int64_t kMostBodiesInALoad = 1024;
+
 }  // namespace
 
+int size_at(const CampaignOptions& options, int64_t index) {
+  return options.least_size + static_cast<int>(index % (options.most_size - options.least_size + 1));
+}
+
 Case case_at(const CampaignOptions& options, int64_t index) {
-  const int64_t sizes = options.most_size - options.least_size + 1;
-  const int size = options.least_size + static_cast<int>(index % sizes);
+  const int size = size_at(options, index);
   const uint64_t seed = options.seed + static_cast<uint64_t>(index);
   return options.dynamics ? draw_moving_case(seed, size) : draw_case(seed, size);
+}
+
+BackendSource source_of(const harness::BackendChoice& choice, const std::vector<int>& devices) {
+  return {[choice, devices](int64_t load, int device) {
+            harness::BackendChoice of_load = harness::choice_for_load(choice, load);
+            of_load.device = devices.at(at(device));
+            return harness::make_backend(of_load);
+          },
+          harness::described_backend(choice.name).takes_schedule};
+}
+
+void set_parallel_loads(CampaignOptions& options, const harness::BackendDescriptor& backend, int devices) {
+  const int most = backend.most_parallel_loads > 0 ? backend.most_parallel_loads * devices : options.threads;
+  options.backends = std::min(options.threads, most);
+  options.devices = std::min(options.backends, devices);
+}
+
+int usual_batch(const CampaignOptions& options, const harness::BackendDescriptor& backend) {
+  const int64_t least = backend.bodies_in_a_load;
+  if (backend.particles_in_a_load == 0) return static_cast<int>(least);
+  constexpr int64_t kAsked = 80;  // as many as the sizes that take turns if nobody says which
+  int64_t particles = 0;
+  for (int64_t index = 0; index < kAsked; ++index) particles += std::ssize(case_at(options, index).nodes);
+  const int64_t loads = std::max(backend.most_parallel_loads, 1);
+  const int64_t most = std::max(least, (options.cases + loads - 1) / loads);
+  const int64_t wanted = backend.particles_in_a_load * kAsked / std::max<int64_t>(particles, 1);
+  return static_cast<int>(std::clamp(wanted, least, std::min<int64_t>(most, kMostBodiesInALoad)));
 }
 
 Campaign run_campaign(const CampaignOptions& options, const BackendSource& source,

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/backends.h"
 #include "model/stop.h"
 #include "property_tests/dissection.h"
 #include "property_tests/histories.h"
@@ -38,6 +39,11 @@ struct BackendSource {
   bool fresh = false;  // a new one for every load, e.g. because schedules depend on it
 };
 
+// Backends by name, on these devices.
+BackendSource source_of(const harness::BackendChoice& choice, const std::vector<int>& devices);
+// How many loads run at once: as many as so many devices of the backend take, and no more than there are threads.
+void set_parallel_loads(CampaignOptions& options, const harness::BackendDescriptor& backend, int devices);
+
 struct Violation {
   int64_t index = 0;  // of the case
   Case failing;
@@ -58,6 +64,12 @@ struct Campaign {
   double generating = 0, running = 0, reference = 0, judging = 0;
 };
 
+// How many bodies a load of it has if nobody says it. A small campaign does not become fewer loads than a device runs
+// at once.
+int usual_batch(const CampaignOptions& options, const harness::BackendDescriptor& backend);
+
+// The size of case `index`.
+int size_at(const CampaignOptions& options, int64_t index);
 // Case `index` of a campaign: the same on every platform, whatever the batch, the shards and the backend.
 Case case_at(const CampaignOptions& options, int64_t index);
 

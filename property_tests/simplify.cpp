@@ -15,14 +15,21 @@ bool takes_schedule(const BackendChoice& choice) { return harness::described_bac
 
 }  // namespace
 
-Simplified simplify(const Violation& violation, const BackendChoice& choice, double seconds,
-                    const StopAsked& stop_asked) {
+Simplified as_drawn(const Violation& violation, const BackendChoice& choice) {
   Simplified result;
   Counterexample& found = result.counterexample;
   found.failing = violation.failing;
   found.backend = choice.name;
   found.index = violation.index;
+  found.found = describe(violation.verdict);
   result.verdict = violation.verdict;
+  return result;
+}
+
+Simplified simplify(const Violation& violation, const BackendChoice& choice, double seconds,
+                    const StopAsked& stop_asked) {
+  Simplified result = as_drawn(violation, choice);
+  Counterexample& found = result.counterexample;
 
   // Another case is another run of the schedule, so several are tried.
   const bool scheduled = takes_schedule(choice);

@@ -19,6 +19,9 @@ struct Simplified {
 Simplified simplify(const Violation& violation, const harness::BackendChoice& choice, double seconds,
                     const StopAsked& stop_asked = {});
 
+// The case as it was drawn, without running it.
+Simplified as_drawn(const Violation& violation, const harness::BackendChoice& choice);
+
 // The backend with which a counterexample is run again: under its schedule, if it has one and the backend takes one.
 std::unique_ptr<Backend> backend_of(const Counterexample& counterexample, const harness::BackendChoice& choice);
 

@@ -230,6 +230,54 @@ TEST_F(Fuzz, NamesShardsThatAreMissing) {
   EXPECT_EQ(document["violations"][1]["index"], 11);
 }
 
+// The plugin is the reference, but for the first particle of each removal, which stays.
+TEST_F(Fuzz, KeepsCasesAsTheyWereDrawnWhereNoTimeIsLeftToSimplifyThem) {
+  const std::string wrong = "fuzz --backend plugin:" CUTPROOF_PLUGIN_OF_THE_REFERENCE ",detect --sizes 0-20 --seed 7 ";
+  const Outcome late = cutproof(wrong + "--seconds 2 --keep-going --json late.json");
+  EXPECT_EQ(late.status, 1) << late.output;
+  const json violations = result("late.json").at("violations");
+  ASSERT_FALSE(violations.empty()) << late.output;
+  for (const json& violation : violations) {
+    EXPECT_FALSE(violation.contains("simplified") || violation.contains("drawn")) << violation;
+    const Counterexample kept = counterexample_from_json(read(violation.at("file")), violation.at("file"));
+    EXPECT_EQ(kept.index, violation.at("index"));
+    const int size = static_cast<int>(kept.index % 21);
+    EXPECT_EQ(kept.failing, draw_case(7 + static_cast<uint64_t>(kept.index), size));
+  }
+  // What it says brings the same case, with time to simplify it.
+  const auto index = violations.front().at("index").get<int64_t>();
+  const std::string options = "--seed " + std::to_string(7 + index) + " --sizes " + std::to_string(index % 21) + "-" +
+                              std::to_string(index % 21) + " --cases 1";
+  EXPECT_NE(on_one_line(late.output).find(options), std::string::npos) << late.output;
+  const Outcome again = cutproof("fuzz --backend plugin:" CUTPROOF_PLUGIN_OF_THE_REFERENCE ",detect " + options +
+                                 " --simplify 1 --json again.json");
+  EXPECT_EQ(again.status, 1) << again.output;
+  EXPECT_TRUE(result("again.json").at("violations").at(0).contains("simplified")) << again.output;
+}
+
+TEST_F(Fuzz, RefusesDevicesOfABackendThatNeedsNone) {
+  for (const char* devices : {"0", "all", "nonsense"}) {
+    expect_refused(std::string("fuzz --backend host --devices ") + devices, {"--devices", "no device", "gpu"});
+  }
+}
+
+TEST_F(Fuzz, OnAllDevicesJudgesWhatOneDoesAndRefusesDevicesThatAreNotThere) {
+  const Outcome on_a_device = cutproof("fuzz --backend gpu --cases 1");
+  if (on_a_device.status != 0) GTEST_SKIP() << "there is no device here: " << on_a_device.output;
+  expect_refused("fuzz --backend gpu --devices 1000", {"--devices", "no device 1000", "all"});
+  expect_refused("fuzz --backend gpu --devices 0,0", {"--devices", "0", "twice"});
+  for (const char* devices : {"0,", ",0", "a", "-1", "0-1"}) {
+    expect_refused(std::string("fuzz --backend gpu --devices ") + devices, {"--devices", "no list"});
+  }
+  const Outcome all = cutproof("fuzz --backend gpu --devices all --cases 200 --seed 7 --json all.json");
+  EXPECT_EQ(all.status, 0) << all.output;
+  EXPECT_EQ(cutproof("fuzz --backend gpu --cases 200 --seed 7 --json one.json").status, 0);
+  for (const char* field : {"cases", "particles", "coverage", "batch"}) {
+    EXPECT_EQ(result("all.json").at(field), result("one.json").at(field)) << field;
+  }
+  EXPECT_EQ(result("all.json").at("devices").at(0), 0);
+}
+
 TEST_F(Fuzz, RefusesBadUsage) {
   expect_refused("fuzz --backend nobody", {"--backend", "nobody", "simulated"});
   expect_refused("fuzz --sizes 5", {"--sizes", "0-79"});
