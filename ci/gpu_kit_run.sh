@@ -124,6 +124,7 @@ for part in $parts; do
       try sensitivity cutproof bench sensitivity --backend gpu --json "$results/sensitivity.json"
       try baselines cutproof bench baselines --backend gpu --json "$results/baselines.json"
       try parts cutproof bench parts --backend gpu --json "$results/parts.json"
+      try campaigns cutproof bench campaigns --backend gpu --json "$results/campaigns.json"
       # A body of ten million particles for 100 frames, a blade cutting.
       try ten_million cutproof bench stages --backend gpu --sizes 10000000 --frames 100 --json "$results/stages_10M.json" ;;
     *) echo "run.sh: there is no part '$part'" >&2; exit 2 ;;

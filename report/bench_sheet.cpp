@@ -819,6 +819,52 @@ void parts_pieces(Sheet& sheet, const Field& document) {
   if (!each.rows.empty()) sheet.pieces.emplace_back(std::move(each));
 }
 
+// --- campaigns
+
+void campaigns_pieces(Sheet& sheet, const Field& document) {
+  constexpr const char* kParts[] = {"generating", "simulating", "reference", "judging", "waiting"};
+  Stack stack = {"Where the time of a case goes",
+                 "Time of all threads. Simulating is what they wait for a device, too; reference: its stages, with "
+                 "which the backend's are compared.",
+                 "ms",
+                 {},
+                 {}};
+  for (const char* const part : kParts) stack.parts.push_back({part, {}});
+  Grid grid;
+  grid.title = "Campaigns";
+  grid.words =
+      "What was compared meanwhile stands beside each rate: verdicts, positions after a step beside the reference's "
+      "and "
+      "the greatest distance of one, and what stayed undecided within rounding.";
+  grid.columns = {
+      {"campaign"},         {"backend"},         {"devices", true},   {"particles", true},    {"bodies a load", true},
+      {"threads", true},    {"cases", true},     {"cases/s", true},   {"of reference", true}, {"verdicts", true},
+      {"violations", true}, {"undecided", true}, {"positions", true}, {"greatest [h]", true}};
+  document["rows"].each([&](const Field& row) {
+    const int64_t cases = row["cases"].count();
+    const std::string name = row["campaign"].text(), backend = row["backend"].text();
+    stack.labels.push_back(name + ", " + backend);
+    for (std::size_t k = 0; k < std::size(kParts); ++k) {
+      const std::optional<double> seconds = row["thread_seconds"][kParts[k]].number_or_null();
+      stack.parts[k].values.push_back(cases > 0 ? times(seconds, 1e3 / static_cast<double>(cases)) : std::nullopt);
+    }
+    const Field error = row["error"];
+    const int64_t violations = error["violations"].count();
+    if (violations > 0) sheet.holds = false;
+    grid.rows.push_back(
+        {{name, backend, whole(static_cast<int64_t>(row["devices"].length())),
+          figure_text(row["mean_particles"].number_or_null()), whole(row["batch"].count()),
+          whole(row["threads"].count()), whole(cases), figure_text(row["cases_per_second"].number_or_null()),
+          figure_text(row["of_reference"].number_or_null()), whole(error["verdicts"].count()), whole(violations),
+          whole(error["undecided"].count()), error["positions"].is_nothing() ? "–" : whole(error["positions"].count()),
+          figure_text(error["greatest_h"].number_or_null())},
+         violations > 0 ? "bad" : ""});
+  });
+  sheet.summary = "Cases that random campaigns judge in a second, on " + document["processor"].text() + ".";
+  sheet.pieces.emplace_back(std::move(stack));
+  sheet.pieces.emplace_back(std::move(grid));
+}
+
 struct Suite {
   const char *name, *rows;
   void (*add)(Sheet& sheet, const Field& document);
@@ -828,7 +874,8 @@ constexpr Suite kSuites[] = {
     {"clusters", "rows", clusters_pieces},       {"scale", "rows", scale_pieces},
     {"rotations", "methods", rotations_pieces},  {"machine_limits", "rows", machine_limits_pieces},
     {"solver", "scenes", solver_pieces},         {"baselines", "rows", baselines_pieces},
-    {"sensitivity", "rows", sensitivity_pieces}, {"parts", "rows", parts_pieces}};
+    {"sensitivity", "rows", sensitivity_pieces}, {"parts", "rows", parts_pieces},
+    {"campaigns", "rows", campaigns_pieces}};
 
 }  // namespace
 

@@ -100,4 +100,18 @@ struct PartsOptions {
 };
 nlohmann::json run_parts(const PartsOptions& options, const Progress& progress);
 
+// Campaigns of random cases (property_tests/campaign.h), and the same over the reference.
+struct CampaignsOptions {
+  std::string backend = harness::kReferenceName;
+  std::vector<std::string> kinds = {"small", "large", "moving"};
+  double seconds = 10;           // of each
+  std::optional<int64_t> cases;  // of each, instead of `seconds`
+  uint64_t seed = 1;
+  int batch = 0;              // bodies in one load; 0: by backend and size
+  int threads = 0;            // 0: as many as the machine has
+  std::string devices;        // as harness::devices_of takes them
+  StopAsked stop_asked = {};  // ends it within a campaign, which then is no row
+};
+nlohmann::json run_campaigns(const CampaignsOptions& options, const Progress& progress);
+
 }  // namespace cutproof::benchmarks

@@ -29,6 +29,7 @@ void add_solver(CLI::App& bench, Work& work);
 void add_baselines(CLI::App& bench, Work& work);
 void add_sensitivity(CLI::App& bench, Work& work);
 void add_parts(CLI::App& bench, Work& work);
+void add_campaigns(CLI::App& bench, Work& work);
 
 // What a suite does, and what it shows of its document: once before the first row, after each row, and in the end.
 struct Suite {

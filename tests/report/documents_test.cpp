@@ -198,6 +198,54 @@ TEST(ABenchmark, OfStagesStacksThemAndHasThePapersFiguresBesideOurs) {
   EXPECT_EQ(table.rows.at(1).kind, "paper");
 }
 
+json campaign_row(const std::string& backend, const json& of_reference, int violations) {
+  return {{"campaign", "moving"},
+          {"backend", backend},
+          {"devices", {"a device", "another"}},
+          {"sizes", {0, 79}},
+          {"dynamics", true},
+          {"threads", 8},
+          {"batch", 1024},
+          {"loads_at_once", 6},
+          {"cases", 2000},
+          {"mean_particles", 47.0},
+          {"seconds", 2.0},
+          {"cases_per_second", 1000.0},
+          {"of_reference", of_reference},
+          {"thread_seconds",
+           {{"generating", 1.0}, {"simulating", 4.0}, {"reference", 2.0}, {"judging", 8.0}, {"waiting", 1.0}}},
+          {"error",
+           {{"verdicts", 600000},
+            {"violations", violations},
+            {"refused", 0},
+            {"checked", 20000000},
+            {"undecided", 12},
+            {"positions", of_reference.is_null() ? json(nullptr) : json(900000)},
+            {"greatest_h", of_reference.is_null() ? json(nullptr) : json(2e-5)}}}};
+}
+
+TEST(ABenchmark, OfCampaignsHasWhereACasesTimeGoesAndWhatWasCompared) {
+  json document = bench("campaigns");
+  document.update({{"holds", true},
+                   {"processor", "a processor, 8 threads"},
+                   {"rows", {campaign_row("reference", nullptr, 0), campaign_row("gpu", 0.5, 0)}}});
+  const Sheet sheet = sheet_of(document, "f");
+  EXPECT_EQ(sheet.holds, true);
+  EXPECT_NE(sheet.summary.find("a processor, 8 threads"), std::string::npos) << sheet.summary;
+  const Stack& stack = std::get<Stack>(sheet.pieces.at(0));
+  EXPECT_EQ(stack.labels, (std::vector<std::string>{"moving, reference", "moving, gpu"}));
+  ASSERT_EQ(stack.parts.size(), 5u);
+  EXPECT_EQ(stack.parts[3].name, "judging");
+  EXPECT_EQ(stack.parts[3].values.at(1), 4.0) << "8 s of threads for 2,000 cases are 4 ms";
+  const Grid& table = grid_of(sheet, 1);
+  ASSERT_EQ(table.rows.size(), 2u);
+  for (const GridRow& row : table.rows) EXPECT_EQ(row.cells.size(), table.columns.size());
+  EXPECT_EQ(table.rows[0].cells.back(), "–") << "the reference is not compared with itself";
+  EXPECT_EQ(table.rows[1].cells.at(2), "2");
+  document["rows"][1]["error"]["violations"] = 1;
+  EXPECT_EQ(sheet_of(document, "f").holds, false);
+}
+
 TEST(ABenchmark, ThatMeasuredNothingOrWasStoppedDoesNotHold) {
   json document = bench("machine_limits");
   document.update({{"holds", true}, {"rows", json::array()}});
