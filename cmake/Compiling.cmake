@@ -24,3 +24,11 @@ if(CUTPROOF_LTO)
   add_compile_options("$<$<COMPILE_LANGUAGE:C,CXX>:-flto=auto>")
   add_link_options(-flto=auto -Wodr -Werror=odr -Wlto-type-mismatch -Werror=lto-type-mismatch)
 endif()
+
+# cutproof_optimise_little(TARGET...): targets that call, print and write, and that no figure times. Their own code
+# compiles in two thirds of the time.
+function(cutproof_optimise_little)
+  foreach(target IN LISTS ARGN)
+    target_compile_options(${target} PRIVATE $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CONFIG:Release>>:-O1>)
+  endforeach()
+endfunction()

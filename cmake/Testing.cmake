@@ -4,7 +4,7 @@ function(cutproof_test path)
   get_filename_component(name ${path} NAME)
   add_executable(${name} ${path}.cpp)
   target_link_libraries(${name} PRIVATE cutproof_model ${ARGN} GTest::gtest GTest::gtest_main)
-  # Of what a test does, nearly all is done in the libraries; its own file compiles in two thirds of the time.
-  target_compile_options(${name} PRIVATE $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CONFIG:Release>>:-O1>)
+  # Of what a test does, nearly all is done in the libraries.
+  cutproof_optimise_little(${name})
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT 600)
 endfunction()
