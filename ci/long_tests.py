@@ -25,6 +25,9 @@ LONG = (
     (r"(Vectors\.ThatThePageAnswersHold|Tutorial\.FromAFailingCutToTheFix)", "programs of a page that no longer run"),
     (r"BenchSensitivity\.HasARowForEachDisturbanceAndStage", "a disturbance that the suite has no row for"),
     (r"Skin\.LiesOnTheSurfaceOfAnUncutBody", "a skin that reference, kernels and oracles all have off the surface"),
+    (r"Screen\.IsNotLeftByAnyVerb", "a line of over 80 columns in what a whole campaign or suite prints"),
+    (r"Interrupted\.(TuneWritesWhatItHasTried|EverySuiteOfBenchWritesItsDocumentHoweverEarly)",
+     "a document that an interrupted search or suite does not write"),
     (r"JudgeVerb\.JudgesStagesToo", "a verb that reports a plugin's stages wrongly"),
 )
 
