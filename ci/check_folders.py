@@ -16,14 +16,11 @@ import tempfile
 
 SOURCES = {".h", ".cuh", ".inc", ".cpp", ".cu"}
 INCLUDE = re.compile(r'[ \t]*#[ \t]*include[ \t]+"([^"]+)"')
-# Folders that are a part of the one above them: the judge of the step is one of the files of oracles/.
-PARTS = {"oracles/step_model"}
 MOST_SHOWN = 3
 
 
 def folder_of(file):
-    folder = str(pathlib.PurePath(file).parent)
-    return str(pathlib.PurePath(folder).parent) if folder in PARTS else folder
+    return str(pathlib.PurePath(file).parent)
 
 
 def includes_between(root):
