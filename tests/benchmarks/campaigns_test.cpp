@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "benchmarks/suites/suites.h"
-#include "tests/cli/program.h"
+#include "tests/program.h"
 
 namespace {
 
