@@ -18,7 +18,7 @@ double length_of(Local c) { return std::hypot(c.u, c.n, c.w); }
 }  // namespace
 
 Contact::Contact(const Setup& setup, const BladeMove* move, const std::vector<Wall>& walls) : walls_(walls) {
-  for (const Wall& wall : walls_) greatest_friction_ = std::max(greatest_friction_, wall.friction);
+  for (const Wall& wall : walls_) wall_friction_ = std::max(wall_friction_, wall.friction);
   // A geometric blade removes what it sweeps, and touches nothing.
   has_plate_ = move != nullptr && move->down && setup.detect.criterion != Criterion::geometric;
   if (!has_plate_) return;
@@ -28,7 +28,6 @@ Contact::Contact(const Setup& setup, const BladeMove* move, const std::vector<Wa
   depth_ = setup.blade.depth;
   clearance_ = blade_clearance(setup);
   blade_friction_ = setup.blade.friction;
-  greatest_friction_ = std::max(greatest_friction_, blade_friction_);
 }
 
 double Contact::height_at_start(Vec3 start) const { return has_plate_ ? to_local(from_, start - from_.edge).n : 1; }

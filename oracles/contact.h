@@ -18,7 +18,9 @@ class Contact {
 
   bool any() const { return has_plate_ || !walls_.empty(); }
   bool has_plate() const { return has_plate_; }
-  bool has_friction() const { return greatest_friction_ > 0; }
+  bool has_friction() const { return wall_friction_ > 0 || blade_friction_ > 0; }
+  // How much farther places are apart, at most, than where they would go: friction takes back as much as what presses.
+  double widened_by_friction() const { return (1 + wall_friction_) * (1 + blade_friction_); }
   // Friction, or room that is not convex.
   bool path_matters() const { return has_plate_ || has_friction(); }
 
@@ -83,7 +85,7 @@ class Contact {
   const std::vector<Wall>& walls_;
   bool has_plate_ = false;
   BladePose from_, to_;
-  double half_length_ = 0, depth_ = 0, clearance_ = 0, blade_friction_ = 0, greatest_friction_ = 0;
+  double half_length_ = 0, depth_ = 0, clearance_ = 0, blade_friction_ = 0, wall_friction_ = 0;
 };
 
 }  // namespace cutproof::oracles

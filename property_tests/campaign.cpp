@@ -287,7 +287,7 @@ class Runner {
 };
 
 // Beyond this the states of a load take gigabytes.
-constexpr int64_t kMostBodiesInALoad = 1024;
+constexpr int64_t kMostBodiesInALoad = 1024, kMostMovingBodiesInALoad = 256;
 
 }  // namespace
 
@@ -325,7 +325,9 @@ int usual_batch(const CampaignOptions& options, const harness::BackendDescriptor
   const int64_t loads = std::max(backend.most_parallel_loads, 1);
   const int64_t most = std::max(least, (options.cases + loads - 1) / loads);
   const int64_t wanted = backend.particles_in_a_load * kAsked / std::max<int64_t>(particles, 1);
-  return static_cast<int>(std::clamp(wanted, least, std::min<int64_t>(most, kMostBodiesInALoad)));
+  // A load of moving bodies takes as long as the one with most frames, and nobody judges before.
+  const int64_t at_once = options.dynamics ? kMostMovingBodiesInALoad : kMostBodiesInALoad;
+  return static_cast<int>(std::clamp(wanted, least, std::min(most, at_once)));
 }
 
 Campaign run_campaign(const CampaignOptions& options, const BackendSource& source,

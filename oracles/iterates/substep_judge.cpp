@@ -21,9 +21,9 @@ namespace {
 constexpr double kTimes = 4, kTimesOfSums = 8;
 // Numbers round alike that agree to so many roundings: what has rounded before makes them differ.
 constexpr double kEqualRounds = 256;
-// Entries of RᵀR - I, in units of u: R is made of a unit quaternion, whose length is off by 2 u, by three products and
-// sums.
-constexpr double kOrthogonalRounds = 16;
+// Entries of RᵀR - I, in units of u: R is made of a unit quaternion, whose length is off by 2 u, which is 8 u in them;
+// its entries round by 4 u more, which is 2 √3 times that.
+constexpr double kOrthogonalRounds = 22;
 // Less than this of the previous rotation is nothing to go by, in whatever precision.
 constexpr double kNothingLeft = 1e-8;
 constexpr int kTries = 256;
@@ -402,7 +402,7 @@ double SubstepJudge::nearest_contact(int32_t i, const Candidate& candidate, Vec3
     best = std::min(best, off);
     if (off <= within) explained |= bit_of(way);
   };
-  const double direct = wide + after, rounds = kTimes * u_ * contact_.rounds(candidate.free);
+  const double direct = wide * contact_.widened_by_friction() + after, rounds = kTimes * u_ * contact_.rounds(candidate.free);
   for (int way = 0; way < Contact::kWaysOffPlate && explained == 0; ++way) {
     for (std::size_t k = 0; k < count; ++k) {
       take(ways[k], off_by(ways[k], ways[k].candidate, {way > 0 ? rounds : 0, nullptr, false, way}), direct);
