@@ -58,7 +58,8 @@ class Noise {
   uint64_t seed_, state_, of_equals_;
 };
 
-// Draws 1 or -1. Two of one seed and opposite signs draw opposite numbers: where few are drawn, each is tried both ways.
+// Draws 1 or -1. Two of one seed and opposite signs draw opposite numbers: where few are drawn, each is tried both
+// ways.
 class OppositeNoise : public Noise {
  public:
   OppositeNoise(uint64_t seed, int sign) : Noise(~seed), sign_(sign) {}
