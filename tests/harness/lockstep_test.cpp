@@ -336,7 +336,8 @@ TEST(WithinItsRounding, TheSideOfTheBladeIsUndecidable) {
   const Against against = compare(backend, built, 1, AgainstMode::lockstep, Precision::binary32);
   EXPECT_TRUE(against.holds()) << failures(against);
   EXPECT_GT(against.lockstep->frames().front().undecidable.otherwise, 0);
-  EXPECT_EQ(against.lockstep->frames().front().undecidable.undecided, 0);
+  // Of most particles the place where they end tells on which side they began; of those beside the cutting edge not.
+  EXPECT_LT(against.lockstep->frames().front().undecidable.undecided, built.setup.body.particle_count() / 20);
   EXPECT_GT(against.lockstep->frames().front().error(Measure::position).count, 0);
   // In double precision there is no such excuse.
   EXPECT_FALSE(compare(backend, built, 1, AgainstMode::lockstep).holds());
