@@ -13,13 +13,14 @@ namespace cutproof::oracles {
 class Contact {
  public:
   // `move`: what the blade does in this substep; nullptr: there is none. `walls`: the setup's, or those with what
-  // rounds in them. Keeps a reference to both.
+  // rounds in them. Keeps a reference to them.
   Contact(const Setup& setup, const BladeMove* move, const std::vector<Wall>& walls);
 
   bool any() const { return has_plate_ || !walls_.empty(); }
   bool has_plate() const { return has_plate_; }
   bool has_friction() const { return wall_friction_ > 0 || blade_friction_ > 0; }
-  // How much farther places are apart, at most, than where they would go: friction takes back as much as what presses.
+  // Two particles that would go to points a distance d apart end at most so many times d apart: friction takes back as
+  // much as what presses, times μ.
   double widened_by_friction() const { return (1 + wall_friction_) * (1 + blade_friction_); }
   // Friction, or room that is not convex.
   bool path_matters() const { return has_plate_ || has_friction(); }
@@ -61,8 +62,8 @@ class Contact {
   // Where one is put that would go to `free`.
   Vec3 place(Vec3 free, int side, Vec3 start, Found& found, const Rounding& rounding) const;
 
-  // Whether one that would go to `free` stays at `present`, because blade and walls in turn have made a place that is
-  // worse, by more than this margin [m].
+  // A place that blade and walls have made in turn is refused if it is farther from `free` than `present` is, by more
+  // than this [m].
   static double refusal_margin(double stored, Vec3 free, Vec3 present, double unit_roundoff) {
     return kRefusalRoundings * unit_roundoff * (norm(present - free) + stored);
   }

@@ -28,8 +28,8 @@ constexpr int kFormatVersion = 4;
 // Classes of cases are rare: below this many cases, or with small ones only, an empty class says nothing.
 constexpr int64_t kCasesThatMeetEveryClass = 1000;
 constexpr int kSizeThatMeetsEveryClass = 79;
-// Of what is compared of iterates, as much as may stay undecided (tolerances.md, Iterate by iterate). A judge that grants
-// everything judges nothing. (Merges of whole frames cannot be decided at all; they are counted.)
+// Of what is compared of iterates, as much as may stay undecided (tolerances.md, Iterate by iterate). A judge that
+// grants everything judges nothing. (Merges of whole frames cannot be decided at all; they are counted.)
 constexpr double kMostUndecided = 0.001;
 
 constexpr double kMostCounted = 1e12;  // by one shard, of anything

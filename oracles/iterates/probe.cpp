@@ -44,8 +44,7 @@ IterateProbe::IterateProbe(const Setup& setup, const State& before, Iterates wan
       }
     };
     const int32_t s = drawn(substeps);
-    if (most > 0) add(s, drawn(most));
-    if (most == 0) add(s, 0);
+    add(s, most > 0 ? drawn(most) : 0);
     wanted_.back().iterations.push_back(0);
     add(substeps - 1, std::max(most - 1, 0));
     for (Wanted& of : wanted_) {
@@ -216,7 +215,7 @@ void IterateProbe::compare_ends(const State& shown, const State& whole, Verdict&
 
 // A backend may round the state that it is given once, and no more.
 void IterateProbe::compare_loaded(const State& held, Verdict& verdict) const {
-  const double u = unit_roundoff(held) + kUnitRoundoff;
+  const double u = unit_roundoff(held) + kUnitRoundoff, dt = setup_.substep_length[at(before_.frame)];
   Nearest nearest;
   for (int32_t i = 0; i < setup_.body.particle_count(); ++i) {
     if (before_.alive[at(i)] == 0) continue;
@@ -224,12 +223,13 @@ void IterateProbe::compare_loaded(const State& held, Verdict& verdict) const {
     const double of_place =
         u * norm(stored_place(setup_.body, held.precision, i, x)) + 2 * unit_of_places(held) * norm(x);
     nearest.see(norm(held.x[at(i)] - x), of_place, i);
-    nearest.see(norm(held.v[at(i)] - v), u * norm(v), i);
+    nearest.see(dt * norm(held.v[at(i)] - v), dt * u * norm(v), i);
     verdict.checked += 2;
   }
   verdict.measured = std::max(verdict.measured, nearest.share);
   if (nearest.holds()) return;
-  fail(verdict, {{}, {nearest.where}}, "particle {} is not loaded as it was given: {:.3g} h or h/dt off", nearest.where,
+  fail(verdict, {{}, {nearest.where}},
+       "particle {} is not loaded as it was given: its place, or its velocity times dt, is {:.3g} h off", nearest.where,
        nearest.measured / setup_.body.grid.spacing);
 }
 

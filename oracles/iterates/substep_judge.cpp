@@ -402,7 +402,8 @@ double SubstepJudge::nearest_contact(int32_t i, const Candidate& candidate, Vec3
     best = std::min(best, off);
     if (off <= within) explained |= bit_of(way);
   };
-  const double direct = wide * contact_.widened_by_friction() + after, rounds = kTimes * u_ * contact_.rounds(candidate.free);
+  const double direct = wide * contact_.widened_by_friction() + after,
+               rounds = kTimes * u_ * contact_.rounds(candidate.free);
   for (int way = 0; way < Contact::kWaysOffPlate && explained == 0; ++way) {
     for (std::size_t k = 0; k < count; ++k) {
       take(ways[k], off_by(ways[k], ways[k].candidate, {way > 0 ? rounds : 0, nullptr, false, way}), direct);

@@ -403,8 +403,7 @@ int StepModel::Run::side_of(std::size_t i, const Contact& contacts, Vec3 start, 
     if (!is_last_) out_.lead[i] = 0;
     if (is_last_ || wanted_.open.empty()) return seen;
   }
-  const bool drawn = exceeds(i, height, rounds);
-  return (is_drawn(i, height, rounds) ? drawn : height >= 0) ? +1 : -1;
+  return exceeds(i, -height, rounds) ? -1 : +1;
 }
 
 // Where contacts put a particle that would go to `free`. `present`: where it is, which it does not leave for what is

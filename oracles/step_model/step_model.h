@@ -55,12 +55,12 @@ class StepModel {
   struct Wanted {
     uint64_t disturbance = 0;  // 0: none; else the seed of one
     // [n] Of a disturbed run: what a particle decides by no more than this is drawn [m]. Empty: nothing is drawn.
-    std::vector<double> open = {};
-    // [n] On which side of the blade a particle ends, as Contact::side_of_end() has it. Where rounding decides on which
-    // side it begins a substep, it is that one; where decisions are drawn, in the last substep alone.
-    std::vector<int> side_of_end = {};
+    std::span<const double> open = {};
+    // [n] On which side of the blade a particle ends (Contact::side_of_end()). Where rounding decides on which side it
+    // begins a substep, it begins on that one. Where decisions are drawn, this holds for the last substep alone.
+    std::span<const int> side_of_end = {};
     // [m] Rotations that are given in the last iteration of the last substep, nullptr: the best one.
-    std::vector<const Mat3*> given = {};
+    std::span<const Mat3* const> given = {};
   };
   StepOutcome run(const Wanted& wanted) const;
 
