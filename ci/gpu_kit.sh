@@ -10,7 +10,7 @@ build=${1:-build/default}
 kit=${2:-gpu_kit}
 most_bytes=60000000  # as much as can be sent to such a machine beside the code
 
-programs=(cli/cutproof cli/cutproof-guest tests/gpu/launch_device_test tests/gpu/device_failures_test tests/gpu/acceleration_test tests/gpu/retardation_test
+programs=(cli/cutproof cli/cutproof-guest tests/gpu/launch_device_test tests/gpu/device_failures_test tests/gpu/kernels_test
   property_tests/property_tests)
 [ -f "$build/CMakeCache.txt" ] || { echo "ci/gpu_kit.sh: $build is no build folder: cmake --preset default -B $build first" >&2; exit 2; }
 # The programs look for their libraries beside themselves, and for those that these need as well (a runpath, which is

@@ -76,8 +76,7 @@ for part in $parts; do
       try fuzz cutproof fuzz --backend gpu --cases "$cases" --save "$results" --json "$results/fuzz.json"
       try fuzz_dynamics cutproof fuzz --backend gpu --dynamics --cases 10000 --seed 2000001 \
         --save "$results" --json "$results/fuzz_dynamics.json"
-      try acceleration acceleration_test --gtest_filter='*/gpu'
-      try retardation retardation_test --gtest_filter='*/gpu'
+      try kernels kernels_test --gtest_filter='*/gpu'
       try rapidcheck property_tests --gtest_filter='*/gpu*:Cases*:Paths.OfTheDevice*' ;;
     guests)
       for plugin in cuda_components cuda_components_in_a_block; do

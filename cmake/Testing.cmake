@@ -1,12 +1,13 @@
-# cutproof_test(path LIBRARIES...): an executable from path.cpp, named as the file is, each of its tests known to CTest.
+# cutproof_test(name SOURCES file... LINK library...): a program, each of whose tests is known to CTest. A folder has one,
+# and its files a namespace each, so that they can be compiled in batches.
 include(GoogleTest)
 # Comes with the default linker, and takes a third of its time.
 find_program(CUTPROOF_GOLD ld.gold)
 
-function(cutproof_test path)
-  get_filename_component(name ${path} NAME)
-  add_executable(${name} ${path}.cpp)
-  target_link_libraries(${name} PRIVATE cutproof_model ${ARGN} GTest::gtest GTest::gtest_main)
+function(cutproof_test name)
+  cmake_parse_arguments(test "" "" "SOURCES;LINK" ${ARGN})
+  add_executable(${name} ${test_SOURCES})
+  target_link_libraries(${name} PRIVATE cutproof_model ${test_LINK} GTest::gtest GTest::gtest_main)
   # Of what a test does, nearly all is done in the libraries.
   cutproof_optimise_little(${name})
   if(CUTPROOF_GOLD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CUTPROOF_SANITIZE AND NOT CUTPROOF_LTO)

@@ -13,19 +13,19 @@
 #include "tests/oracles/states.h"
 #include "tests/program.h"
 
-namespace cutproof::benchmarks {
+namespace cutproof::benchmarks::baselines_test {
 namespace {
 
-using cutproof::testing::Lists;
-using cutproof::testing::lists_of;
+using cutproof::tests::Lists;
+using cutproof::tests::lists_of;
 using nlohmann::json;
 
 // Seven particles in a row in three clusters; the middle one, which only the second cluster holds, has been cut.
 struct Row {
-  Setup setup = cutproof::testing::setup_of(cutproof::testing::block_body(7, 1, 1));
-  State state = cutproof::testing::state_of(setup.body, {{0, 1, 2}, {1, 2, 3, 4}, {4, 5, 6}});
+  Setup setup = cutproof::tests::setup_of(cutproof::tests::block_body(7, 1, 1));
+  State state = cutproof::tests::state_of(setup.body, {{0, 1, 2}, {1, 2, 3, 4}, {4, 5, 6}});
   Row() {
-    cutproof::testing::remove_particles(state, {3});
+    cutproof::tests::remove_particles(state, {3});
     state.clusters.rotation[2] = {{0, -1, 0, 1, 0, 0, 0, 0, 1}};
   }
 };
@@ -47,7 +47,7 @@ TEST(Deletion, OfParticlesLeavesClustersWhole) {
 
 TEST(Deletion, OfClustersTakesParticlesThatNoOtherHolds) {
   Row row;
-  row.state.clusters = cutproof::testing::clusters_of(row.setup.body, {{0, 1}, {1, 2, 3, 4}, {4, 5, 6}});
+  row.state.clusters = cutproof::tests::clusters_of(row.setup.body, {{0, 1}, {1, 2, 3, 4}, {4, 5, 6}});
   delete_from_clusters(row.setup, Deletion::clusters, row.state);
   EXPECT_EQ(lists_of(row.state.clusters), (Lists{{0, 1}, {4, 5, 6}}));
   EXPECT_EQ(row.state.clusters.number, (std::vector<int32_t>{0, 2}));
@@ -59,7 +59,7 @@ TEST(Deletion, OfClustersTakesParticlesThatNoOtherHolds) {
 
 TEST(Deletion, OfAClusterOfWhichNothingIsLeftLeavesNone) {
   Row row;
-  row.state.clusters = cutproof::testing::clusters_of(row.setup.body, {{0, 1, 2}, {3}, {4, 5, 6}});
+  row.state.clusters = cutproof::tests::clusters_of(row.setup.body, {{0, 1, 2}, {3}, {4, 5, 6}});
   delete_from_clusters(row.setup, Deletion::particles, row.state);
   EXPECT_EQ(lists_of(row.state.clusters), (Lists{{0, 1, 2}, {4, 5, 6}}));
 }
@@ -137,4 +137,4 @@ TEST_F(BenchBaselines, RefusesBadUsage) {
 }
 
 }  // namespace
-}  // namespace cutproof::benchmarks
+}  // namespace cutproof::benchmarks::baselines_test

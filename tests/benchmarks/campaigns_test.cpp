@@ -7,6 +7,7 @@
 #include "benchmarks/suites/suites.h"
 #include "tests/program.h"
 
+namespace campaigns_test {
 namespace {
 
 using nlohmann::json;
@@ -71,3 +72,4 @@ TEST_F(BenchCampaigns, RefusesBadUsage) {
 }
 
 }  // namespace
+}  // namespace campaigns_test

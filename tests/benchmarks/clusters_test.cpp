@@ -5,6 +5,7 @@
 
 #include "tests/program.h"
 
+namespace clusters_test {
 namespace {
 
 using nlohmann::json;
@@ -48,3 +49,4 @@ TEST_F(BenchClusters, RefusesBadUsage) {
 }
 
 }  // namespace
+}  // namespace clusters_test

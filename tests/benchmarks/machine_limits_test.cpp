@@ -8,6 +8,7 @@
 #include "harness/backends.h"
 #include "tests/program.h"
 
+namespace machine_limits_test {
 namespace {
 
 using nlohmann::json;
@@ -52,3 +53,4 @@ TEST_F(BenchMachineLimits, RefusesBadUsage) {
 }
 
 }  // namespace
+}  // namespace machine_limits_test

@@ -16,6 +16,7 @@
 #include "model/io/scene_io.h"
 #include "tests/program.h"
 
+namespace parts_test {
 namespace {
 
 using cutproof::Scene;
@@ -325,3 +326,4 @@ TEST_F(BenchParts, RefusesBadUsage) {
 }
 
 }  // namespace
+}  // namespace parts_test

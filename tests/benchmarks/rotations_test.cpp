@@ -18,6 +18,7 @@
 #include "model/stop.h"
 #include "tests/program.h"
 
+namespace rotations_test {
 namespace {
 
 using cutproof::Mat3;
@@ -325,3 +326,4 @@ TEST(RotationMethods, HaveOneDefaultAndReadAndWriteWhatTheySay) {
 }
 
 }  // namespace
+}  // namespace rotations_test

@@ -10,6 +10,7 @@
 #include "report/paper_comparison.h"
 #include "tests/program.h"
 
+namespace sampling_test {
 namespace {
 
 using nlohmann::json;
@@ -61,3 +62,4 @@ TEST_F(BenchSampling, RefusesBadUsage) {
 }
 
 }  // namespace
+}  // namespace sampling_test

@@ -9,6 +9,7 @@
 #include "model/error.h"
 #include "tests/program.h"
 
+namespace scale_test {
 namespace {
 
 using nlohmann::json;
@@ -115,3 +116,4 @@ TEST_F(BenchScale, RefusesBadUsage) {
 }
 
 }  // namespace
+}  // namespace scale_test

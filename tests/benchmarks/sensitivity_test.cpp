@@ -15,7 +15,7 @@
 #include "reference_cpu/reference.h"
 #include "tests/program.h"
 
-namespace cutproof::benchmarks {
+namespace cutproof::benchmarks::sensitivity_test {
 namespace {
 
 using nlohmann::json;
@@ -178,4 +178,4 @@ TEST_F(BenchSensitivity, RefusesBadUsage) {
 }
 
 }  // namespace
-}  // namespace cutproof::benchmarks
+}  // namespace cutproof::benchmarks::sensitivity_test

@@ -14,6 +14,7 @@
 #include "reference_cpu/reference.h"
 #include "tests/program.h"
 
+namespace solver_test {
 namespace {
 
 using cutproof::Acceleration;
@@ -147,3 +148,4 @@ TEST(SolverErrors, SeeOneParticleOutOfPlace) {
 }
 
 }  // namespace
+}  // namespace solver_test

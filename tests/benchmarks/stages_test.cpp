@@ -20,6 +20,7 @@
 #include "reference_cpu/reference.h"
 #include "tests/program.h"
 
+namespace stages_test {
 namespace {
 
 using cutproof::Backend;
@@ -453,3 +454,4 @@ TEST(Times, AreTakenInTurns) {
 }
 
 }  // namespace
+}  // namespace stages_test

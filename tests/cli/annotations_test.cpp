@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-namespace cutproof::cli {
+namespace cutproof::cli::annotations_test {
 namespace {
 
 std::string printed(const std::vector<Failure>& failures, const char* github_actions) {
@@ -66,4 +66,4 @@ TEST(Annotations, WarnOfStagesThatWereLeftToTheReferenceBesideFailures) {
 }
 
 }  // namespace
-}  // namespace cutproof::cli
+}  // namespace cutproof::cli::annotations_test

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+namespace columns_test {
 namespace {
 
 using namespace cutproof::io;
@@ -42,3 +43,4 @@ TEST(Columns, GroupDigits) {
 }
 
 }  // namespace
+}  // namespace columns_test

@@ -26,7 +26,7 @@
 #include "tests/cli/failing_allocations.h"
 #include "tests/cut_scene.h"
 
-namespace cutproof::tests {
+namespace cutproof::tests::failures_test {
 namespace {
 
 namespace files = std::filesystem;
@@ -339,4 +339,4 @@ TEST(MissingDevice, IsAMachineErrorAndWritesNothing) {
 }
 
 }  // namespace
-}  // namespace cutproof::tests
+}  // namespace cutproof::tests::failures_test

@@ -8,6 +8,7 @@
 #include "tests/harness/foreign_files.h"
 #include "tests/program.h"
 
+namespace foreign_test {
 namespace {
 
 using namespace cutproof;
@@ -165,3 +166,4 @@ TEST_F(Foreign, StateThatTheReferenceCutHolds) {
 }
 
 }  // namespace
+}  // namespace foreign_test

@@ -10,6 +10,7 @@
 #include "property_tests/dissection.h"
 #include "tests/program.h"
 
+namespace fuzz_test {
 namespace {
 
 using nlohmann::json;
@@ -325,3 +326,4 @@ TEST_F(Fuzz, ReplaysWhereItWasFoundOrElsewhereAndRecords) {
 }
 
 }  // namespace
+}  // namespace fuzz_test

@@ -28,7 +28,7 @@
 #include "model/printable.h"
 #include "tests/program.h"
 
-namespace cutproof::tests {
+namespace cutproof::tests::hostile_inputs_test {
 namespace {
 
 constexpr unsigned kMostSeconds = 60;
@@ -769,4 +769,4 @@ TEST_F(ACommandToBeGivenAgain, IsOneForSuchNamesToo) {
 }
 
 }  // namespace
-}  // namespace cutproof::tests
+}  // namespace cutproof::tests::hostile_inputs_test

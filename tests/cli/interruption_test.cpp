@@ -20,6 +20,7 @@
 
 #include "tests/program.h"
 
+namespace interruption_test {
 namespace {
 
 using nlohmann::json;
@@ -440,3 +441,4 @@ TEST_F(Interrupted, SaveMakesItsFolderAndRefusesWhatCannotBeOneBeforeTheRun) {
 }
 
 }  // namespace
+}  // namespace interruption_test

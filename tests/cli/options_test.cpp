@@ -7,6 +7,7 @@
 
 #include "tests/program.h"
 
+namespace options_test {
 namespace {
 
 using nlohmann::json;
@@ -350,3 +351,4 @@ TEST_F(Options, StandOnAManualPageWithoutWarnings) {
 }
 
 }  // namespace
+}  // namespace options_test

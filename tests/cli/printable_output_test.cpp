@@ -11,7 +11,7 @@
 #include <functional>
 #include <string>
 
-namespace cutproof::cli {
+namespace cutproof::cli::printable_output_test {
 namespace {
 
 std::string printed(const std::function<void()>& print) {
@@ -107,4 +107,4 @@ TEST(PrintableOutput, SaysThatItCannotBeWritten) {
 }
 
 }  // namespace
-}  // namespace cutproof::cli
+}  // namespace cutproof::cli::printable_output_test

@@ -14,6 +14,7 @@
 #include <regex>
 #include <set>
 
+namespace program_test {
 namespace {
 
 using nlohmann::json;
@@ -696,3 +697,4 @@ TEST_F(Program, LetsTheRestOfTheKidneyEndWithTheSameBitsWhetherOrNotThePieceIsPu
 }
 
 }  // namespace
+}  // namespace program_test

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+namespace progress_test {
 namespace {
 
 using namespace cutproof::cli;
@@ -59,3 +60,4 @@ TEST(Remaining, IsSaidInWords) {
 }
 
 }  // namespace
+}  // namespace progress_test

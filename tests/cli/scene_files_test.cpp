@@ -7,6 +7,7 @@
 
 #include "tests/program.h"
 
+namespace scene_files_test {
 namespace {
 
 class SceneNames : public Program {};
@@ -90,3 +91,4 @@ TEST_F(SceneNames, OfYourOwnNeedABodyThatIsHeldOrAGeometricCut) {
 }
 
 }  // namespace
+}  // namespace scene_files_test

@@ -8,6 +8,7 @@
 #include "model/io/columns.h"
 #include "tests/cli/verbs.h"
 
+namespace screen_test {
 namespace {
 
 using nlohmann::json;
@@ -302,3 +303,4 @@ TEST_F(Screen, FailsASceneThatEndsBeforeItsOwnStroke) {
 }
 
 }  // namespace
+}  // namespace screen_test

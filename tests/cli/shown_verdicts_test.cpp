@@ -9,7 +9,7 @@
 #include "cli/findings.h"
 #include "cli/terminal.h"
 
-namespace cutproof::cli {
+namespace cutproof::cli::shown_verdicts_test {
 namespace {
 
 std::string printed_of_failing(int properties) {
@@ -184,4 +184,4 @@ TEST(JunitCases, OfACampaignNameEveryViolationAndTheWhole) {
 }
 
 }  // namespace
-}  // namespace cutproof::cli
+}  // namespace cutproof::cli::shown_verdicts_test

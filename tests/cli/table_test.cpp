@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+namespace table_test {
 namespace {
 
 TEST(Table, HasColumnsAsWideAsWhatStandsInThem) {
@@ -53,3 +54,4 @@ TEST(Table, FallsIntoPartsIfNothingElseHelps) {
 }
 
 }  // namespace
+}  // namespace table_test

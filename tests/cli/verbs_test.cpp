@@ -8,6 +8,7 @@
 
 #include "model/io/array_file.h"
 
+namespace verbs_test {
 namespace {
 
 using namespace cutproof;
@@ -327,3 +328,4 @@ TEST_F(Verbs, FailATuningThatFoundNothing) {
 }
 
 }  // namespace
+}  // namespace verbs_test

@@ -32,7 +32,7 @@
 #include "property_tests/simplify.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::guests {
+namespace cutproof::guests::guests_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -1396,4 +1396,4 @@ TEST_F(JudgeVerb, JudgesStagesToo) {
 }
 
 }  // namespace
-}  // namespace cutproof::guests
+}  // namespace cutproof::guests::guests_test

@@ -23,6 +23,7 @@
     GTEST_SKIP() << "built without its library; install " package " and rebuild"; \
   }
 
+namespace libraries_test {
 namespace {
 
 using namespace cutproof;
@@ -397,3 +398,4 @@ TEST_F(OnTheDevice, TwentyTurnsAreNotAlwaysEnough) {
 }
 
 }  // namespace
+}  // namespace libraries_test

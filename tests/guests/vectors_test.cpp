@@ -22,7 +22,7 @@
 #include "model/error.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::guests {
+namespace cutproof::guests::vectors_test {
 namespace {
 
 namespace files = std::filesystem;
@@ -1067,4 +1067,4 @@ TEST_F(VectorsTest, AreRefusedByTheProgramWithStatusTwo) {
 }
 
 }  // namespace
-}  // namespace cutproof::guests
+}  // namespace cutproof::guests::vectors_test

@@ -6,6 +6,7 @@
 
 #include "tests/program.h"
 
+namespace against_test {
 namespace {
 
 class TheProgram : public Program {};
@@ -47,3 +48,4 @@ TEST_F(TheProgram, RefusesToCompareWithAnythingElse) {
 }
 
 }  // namespace
+}  // namespace against_test

@@ -8,6 +8,7 @@
 #include "model/error.h"
 #include "tests/program.h"
 
+namespace backends_test {
 namespace {
 
 using namespace cutproof::harness;
@@ -94,3 +95,4 @@ TEST_F(BackendsOfTheProgram, AreTimedOnlyIfWhatTheyTakeSaysSomething) {
 }
 
 }  // namespace
+}  // namespace backends_test

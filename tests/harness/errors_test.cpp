@@ -5,6 +5,7 @@
 
 #include "tests/program.h"
 
+namespace errors_test {
 namespace {
 
 using nlohmann::json;
@@ -114,3 +115,4 @@ TEST_F(RunErrors, RefusesWhatIsNoError) {
 }
 
 }  // namespace
+}  // namespace errors_test

@@ -25,7 +25,7 @@
 #include "reference_cpu/reference.h"
 #include "tests/oracles/corruptions.h"
 
-namespace cutproof::harness {
+namespace cutproof::harness::every_field_test {
 namespace {
 
 // Every stage has something to do in it, and the ground something to push (tests/harness/judge_test.cpp).
@@ -48,7 +48,7 @@ fixtures::Built built_scene() {
 // A change far beyond rounding, by which the state stays well formed.
 template <class T>
 void change_well(const Field& field, T& value) {
-  testing::alter(field, value);
+  tests::alter(field, value);
 }
 void change_well(const Field& field, double& value) { value = field.name == "reach" ? 0.8 * value : 1.5 * value + 1; }
 void change_well(const Field&, Vec3& value) { value.y += 0.25; }
@@ -71,7 +71,7 @@ void change_entry(const Field& field, Entry entry, const State& state, std::vect
     if (field.space != IndexSpace::particle || dead == state.alive.end()) return;
     return change_well(field, list[static_cast<std::size_t>(dead - state.alive.begin())]);
   }
-  if (field.space == IndexSpace::state) return testing::alter(field, list);
+  if (field.space == IndexSpace::state) return tests::alter(field, list);
   ASSERT_GE(list.size(), 3u) << field.name;
   const std::size_t ends = field.space == IndexSpace::cluster_end ? 1 : 0;  // they begin with 0
   const std::size_t which = entry == Entry::first    ? ends
@@ -411,4 +411,4 @@ TEST(Contract, WhatIsDueInASpanIsWhatTheReferenceRunsOfIt) {
 }
 
 }  // namespace
-}  // namespace cutproof::harness
+}  // namespace cutproof::harness::every_field_test

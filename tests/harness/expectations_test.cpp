@@ -16,13 +16,13 @@
 #include "model/fields.h"
 #include "tests/oracles/states.h"
 
-namespace cutproof::harness {
+namespace cutproof::harness::expectations_test {
 namespace {
 
-using cutproof::testing::block_body;
-using cutproof::testing::clusters_of;
-using cutproof::testing::setup_of;
-using cutproof::testing::state_of;
+using cutproof::tests::block_body;
+using cutproof::tests::clusters_of;
+using cutproof::tests::setup_of;
+using cutproof::tests::state_of;
 
 constexpr std::size_t kExpectations = 10;
 [[maybe_unused]] void know_every_expectation(const Expectations& all) {
@@ -103,7 +103,7 @@ class MadeRun : public ::testing::Test {
     setup_.blade_moves.assign(16, BladeMove{pose, pose, true, 0});
     initial_ = std::make_shared<const State>(state_of(setup_.body, {{0, 1}, {2, 3}}));
     State state = *initial_;
-    const auto end_frame = [&](const cutproof::testing::Lists& clusters) {
+    const auto end_frame = [&](const cutproof::tests::Lists& clusters) {
       state.clusters = clusters_of(setup_.body, clusters);
       ++state.frame;
       ends_.push_back(std::make_shared<const State>(state));
@@ -224,4 +224,4 @@ TEST_F(MadeRun, IsHeldToWhatTheStagesDecideThatTheBackendRan) {
 }
 
 }  // namespace
-}  // namespace cutproof::harness
+}  // namespace cutproof::harness::expectations_test

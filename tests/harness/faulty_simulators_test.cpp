@@ -22,7 +22,7 @@
 #include "tests/harness/recorded_scene.h"
 #include "tests/harness/simulator.h"
 
-namespace cutproof {
+namespace cutproof::faulty_simulators_test {
 namespace {
 
 using ::testing::IsEmpty;
@@ -203,4 +203,4 @@ TEST(FaultlessSimulator, HoldsInTheSameScenes) {
 }
 
 }  // namespace
-}  // namespace cutproof
+}  // namespace cutproof::faulty_simulators_test

@@ -13,7 +13,7 @@
 #include "model/error.h"
 #include "tests/harness/foreign_files.h"
 
-namespace cutproof {
+namespace cutproof::foreign_state_test {
 namespace {
 
 using harness::ForeignVerdicts;
@@ -941,4 +941,4 @@ TEST(ForeignState, OnAGridMayRestAnywhere) {
 }
 
 }  // namespace
-}  // namespace cutproof
+}  // namespace cutproof::foreign_state_test

@@ -17,7 +17,7 @@
 #include "tests/cut_scene.h"
 #include "tests/harness/recorded_scene.h"
 
-namespace cutproof {
+namespace cutproof::frame_runner_test {
 namespace {
 
 using harness::plan_spans;
@@ -310,4 +310,4 @@ TEST(Dissection, ComparesMergesWithTheReference) {
 }
 
 }  // namespace
-}  // namespace cutproof
+}  // namespace cutproof::frame_runner_test

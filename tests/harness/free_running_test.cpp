@@ -9,7 +9,7 @@
 #include "gpu/backends.h"
 #include "tests/harness/planted.h"
 
-namespace cutproof::harness {
+namespace cutproof::harness::free_running_test {
 namespace {
 
 TEST(FreeRunning, AloneAsksForNoLockstep) {
@@ -154,4 +154,4 @@ TEST(FreeRunning, EndsWithAStateThatCannotBeRead) {
 }
 
 }  // namespace
-}  // namespace cutproof::harness
+}  // namespace cutproof::harness::free_running_test

@@ -29,7 +29,7 @@
 #include "oracles/surface/surface.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::harness {
+namespace cutproof::harness::judge_test {
 namespace {
 
 using ::testing::IsEmpty;
@@ -1099,4 +1099,4 @@ TEST(Expectations, OfIsolatedClustersExcuseConnectedTissueThatIsNotCoupledAlone)
 }
 
 }  // namespace
-}  // namespace cutproof::harness
+}  // namespace cutproof::harness::judge_test

@@ -14,7 +14,7 @@
 #include "harness/reference_stages.h"
 #include "tests/harness/planted.h"
 
-namespace cutproof::harness {
+namespace cutproof::harness::lockstep_test {
 namespace {
 
 // --- What is right --------------------------------------------------------------------------------------------------
@@ -417,4 +417,4 @@ TEST(Lockstep, ComparesOnlyTheStagesThatTheBackendRan) {
 }
 
 }  // namespace
-}  // namespace cutproof::harness
+}  // namespace cutproof::harness::lockstep_test

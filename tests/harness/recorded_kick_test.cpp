@@ -12,7 +12,7 @@
 #include "model/at.h"
 #include "model/error.h"
 
-namespace cutproof {
+namespace cutproof::recorded_kick_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -359,4 +359,4 @@ TEST(Kick, ThatCannotBeUnderstoodIsRefused) {
 }
 
 }  // namespace
-}  // namespace cutproof
+}  // namespace cutproof::recorded_kick_test

@@ -28,7 +28,7 @@
 #include "reference_cpu/reference.h"
 #include "tests/model/recorded_items.h"
 
-namespace cutproof::harness {
+namespace cutproof::harness::recorded_values_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -371,4 +371,4 @@ TEST_F(RecordedValues, SayWhetherTheRunWasCutShort) {
 }
 
 }  // namespace
-}  // namespace cutproof::harness
+}  // namespace cutproof::harness::recorded_values_test

@@ -14,7 +14,7 @@
 #include "tests/harness/recorded_scene.h"
 #include "tests/harness/simulator.h"
 
-namespace cutproof {
+namespace cutproof::relation_sample_test {
 namespace {
 
 using ::testing::Contains;
@@ -212,4 +212,4 @@ TEST_F(Relations, SayWhatABackendCannotBeAsked) {
 }
 
 }  // namespace
-}  // namespace cutproof
+}  // namespace cutproof::relation_sample_test

@@ -15,7 +15,7 @@
 #include "reference_cpu/reference.h"
 #include "tests/cut_scene.h"
 
-namespace cutproof {
+namespace cutproof::run_session_test {
 namespace {
 
 namespace files = std::filesystem;
@@ -102,4 +102,4 @@ TEST_F(Session, RefusesToCompareStagesThatRunInOnePiece) {
 }
 
 }  // namespace
-}  // namespace cutproof
+}  // namespace cutproof::run_session_test

@@ -15,7 +15,7 @@
 #include "tests/cut_scene.h"
 #include "tests/harness/recorded_scene.h"
 
-namespace cutproof {
+namespace cutproof::scene_judge_test {
 namespace {
 
 using ::testing::Contains;
@@ -573,4 +573,4 @@ TEST_F(WrongRecording, OfABodyWithoutParticlesOrOfNoFramesJudgesNothingAndFails)
 }
 
 }  // namespace
-}  // namespace cutproof
+}  // namespace cutproof::scene_judge_test

@@ -13,7 +13,7 @@
 
 #include "model/error.h"
 
-namespace cutproof::io {
+namespace cutproof::io::array_file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -224,4 +224,4 @@ TEST_F(ArrayFiles, AreToldApartFromRecordings) {
 }
 
 }  // namespace
-}  // namespace cutproof::io
+}  // namespace cutproof::io::array_file_test

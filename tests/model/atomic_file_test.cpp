@@ -17,7 +17,7 @@
 
 #include "model/error.h"
 
-namespace cutproof::io {
+namespace cutproof::io::atomic_file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -226,4 +226,4 @@ TEST_F(AtomicFileTest, WhatIsNoRegularFileIsWrittenToAndNotReplaced) {
 }
 
 }  // namespace
-}  // namespace cutproof::io
+}  // namespace cutproof::io::atomic_file_test

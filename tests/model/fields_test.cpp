@@ -13,7 +13,7 @@
 #include "model/digest.h"
 #include "model/setup_fields.h"
 
-namespace cutproof {
+namespace cutproof::fields_test {
 namespace {
 
 template <class T>
@@ -186,4 +186,4 @@ TEST(Rules, HaveANameForEachEnumerator) {
 }
 
 }  // namespace
-}  // namespace cutproof
+}  // namespace cutproof::fields_test

@@ -14,7 +14,7 @@
 #include "model/io/json_text.h"
 #include "model/printable.h"
 
-namespace cutproof::io {
+namespace cutproof::io::input_file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -123,4 +123,4 @@ TEST(JsonText, IsValidWhateverTextsHold) {
 }
 
 }  // namespace
-}  // namespace cutproof::io
+}  // namespace cutproof::io::input_file_test

@@ -5,7 +5,7 @@
 
 #include <limits>
 
-namespace cutproof {
+namespace cutproof::json_number_test {
 namespace {
 
 using nlohmann::json;
@@ -31,4 +31,4 @@ TEST(IntegerFrom, IsRefusedBeyondItAndIfItIsNone) {
 }
 
 }  // namespace
-}  // namespace cutproof
+}  // namespace cutproof::json_number_test

@@ -12,7 +12,7 @@
 
 #include "model/io/atomic_file.h"
 
-namespace cutproof::io {
+namespace cutproof::io::junit_test {
 namespace {
 
 // What Python reads: "NAME=VALUE" of the attributes, and texts, one per line, as Python literals.
@@ -97,4 +97,4 @@ TEST(Junit, WritesTimesThatReadersKnow) {
 }
 
 }  // namespace
-}  // namespace cutproof::io
+}  // namespace cutproof::io::junit_test

@@ -4,7 +4,7 @@
 
 #include "model/error.h"
 
-namespace cutproof {
+namespace cutproof::printable_test {
 namespace {
 
 using namespace std::string_literals;
@@ -63,4 +63,4 @@ TEST(AnInputError, HasTwoLinesWhateverItQuotes) {
 }
 
 }  // namespace
-}  // namespace cutproof
+}  // namespace cutproof::printable_test

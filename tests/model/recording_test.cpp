@@ -28,7 +28,7 @@
 #include "model/io/recording_setup.h"
 #include "tests/model/recording_bits.h"
 
-namespace cutproof::io {
+namespace cutproof::io::recording_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -1113,4 +1113,4 @@ TEST_F(RecordingTest, IsWrittenForTheLayoutCheck) {
 }
 
 }  // namespace
-}  // namespace cutproof::io
+}  // namespace cutproof::io::recording_test

@@ -19,7 +19,7 @@
 #include "model/rules.h"
 #include "model/setup_fields.h"
 
-namespace cutproof::io {
+namespace cutproof::io::scene_io_test {
 namespace {
 
 using nlohmann::json;
@@ -779,4 +779,4 @@ TEST(SceneReference, IsThePageOfTheDocumentation) {
 }
 
 }  // namespace
-}  // namespace cutproof::io
+}  // namespace cutproof::io::scene_io_test

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::best_rotation_test {
 namespace {
 
 using Eigen::Matrix3d;
@@ -108,4 +108,4 @@ TEST(BestRotation, KnowsTheNearestAnswerToAWireThatHasNearlyTurnedAbout) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::best_rotation_test

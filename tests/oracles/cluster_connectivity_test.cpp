@@ -4,10 +4,10 @@
 #include "oracles/oracles.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::cluster_connectivity_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 TEST(ClusterConnectivity, RejectsAClusterInTwoPiecesWithAParticleOfEach) {
   Row row(5, {{0, 1, 2}, {0, 1, 3, 4}, {2, 3}});
@@ -38,4 +38,4 @@ TEST(ClusterConnectivity, RejectsACornerContact) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::cluster_connectivity_test

@@ -8,10 +8,10 @@
 #include "oracles/shells.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::component_match_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 TEST(ComponentMatch, RejectsConnectedTissueThatIsNotCoupledWithThePathBetween) {
   Row row(6, {{0, 1, 2}, {3, 4}, {4, 5}});
@@ -221,4 +221,4 @@ TEST(SkinMatch, AcceptsASkinThatMotionTurnedInsideOut) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::component_match_test

@@ -12,7 +12,7 @@
 
 #include "model/fields.h"
 
-namespace cutproof::testing {
+namespace cutproof::tests {
 
 // Values that break index arithmetic, and some that are merely wrong.
 inline int64_t bad_integer(std::mt19937_64& random) {
@@ -99,4 +99,4 @@ void alter(const Field& field, std::vector<T>& list) {
   alter(field, list.at(list.size() - (field.space == IndexSpace::cluster_end ? 2 : 1)));
 }
 
-}  // namespace cutproof::testing
+}  // namespace cutproof::tests

@@ -4,10 +4,10 @@
 #include "oracles/oracles.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::coverage_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 TEST(Coverage, RejectsAnAliveParticleInNoCluster) {
   Row row(4, {{0, 1}, {1, 2}});
@@ -41,4 +41,4 @@ TEST(Coverage, RejectsARemovedParticleThatIsAlive) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::coverage_test

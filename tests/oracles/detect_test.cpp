@@ -11,10 +11,10 @@
 #include "oracles/oracles.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::detect_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 // A row of four with h = 1 and epsilon = 1.5 whose last particle is pulled away: 0 1 2 → 3.
 Pair pulled(double distance) {
@@ -658,4 +658,4 @@ TEST(Detection, AcceptsABodyOfNoneAndOfOneParticle) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::detect_test

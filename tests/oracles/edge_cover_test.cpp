@@ -4,10 +4,10 @@
 #include "oracles/oracles.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::edge_cover_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 TEST(EdgeCover, RejectsAnEdgeThatNoClusterContains) {
   Row row(5, {{0, 1, 2}, {3, 4}});
@@ -36,4 +36,4 @@ TEST(EdgeCover, IsVacuousWhereItIsNotPromised) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::edge_cover_test

@@ -4,10 +4,10 @@
 #include "oracles/oracles.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::expand_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 // A row of six whose edge 2-3 lies in no cluster.
 Pair uncovered_row(const Lists& after) { return pair_of(block_body(6, 1, 1), {{0, 1, 2}, {3, 4, 5}}, after); }
@@ -110,4 +110,4 @@ TEST(Expansion, AcceptsABodyOfNoneAndOfOneParticle) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::expand_test

@@ -11,7 +11,7 @@
 #include "model/verdict.h"
 #include "tests/oracles/states.h"
 
-namespace cutproof::testing {
+namespace cutproof::tests {
 
 using Numbers = std::vector<int32_t>;
 
@@ -91,4 +91,4 @@ inline Pair cut_row() {
   return pair;
 }
 
-}  // namespace cutproof::testing
+}  // namespace cutproof::tests

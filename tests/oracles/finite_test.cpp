@@ -7,10 +7,10 @@
 #include "oracles/oracles.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::finite_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 TEST(Finite, RejectsEveryKindOfNumberAndNamesWhereItIs) {
   const auto rejected = [](const std::function<void(State&)>& breaks, const Numbers& clusters,
@@ -29,4 +29,4 @@ TEST(Finite, RejectsEveryKindOfNumberAndNamesWhereItIs) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::finite_test

@@ -4,10 +4,10 @@
 #include "oracles/oracles.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::isolation_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 TEST(Isolation, RejectsAGroupOfClustersThatOverlapEachOtherOnly) {
   Row row(8, {{0, 1, 2, 3}, {3, 4}, {5, 6}, {6, 7}});
@@ -34,4 +34,4 @@ TEST(Isolation, IsNotHiddenByAClusterThatCouplesAcrossAGap) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::isolation_test

@@ -11,10 +11,10 @@
 #include "reference_cpu/reference.h"
 #include "tests/oracles/pressed_block.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::iterates_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 // The reference, but for what a fault does to setups that are loaded and to states that are shown.
 class Faulty final : public Backend {
@@ -295,4 +295,4 @@ TEST(Iterates, AreNoneWhereTheSceneHasNone) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::iterates_test

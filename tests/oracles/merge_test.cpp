@@ -8,10 +8,10 @@
 #include "oracles/oracles.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::merge_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 // Merging on a row of n particles.
 struct Merge {
@@ -339,4 +339,4 @@ TEST(JudgeStage, AsksForMaximalityAfterMerge) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::merge_test

@@ -6,10 +6,10 @@
 #include "oracles/oracles.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::no_pass_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 // A 4 × 1 × 3 sheet in the plane y = 1; the blade stands across it at the end of the frame, at x = 2.5, edge along y,
 // back upwards, from z = 2 on.
@@ -89,4 +89,4 @@ TEST(NoPass, IsVacuousWithoutADynamicCut) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::no_pass_test

@@ -14,10 +14,10 @@
 #include "tests/oracles/corruptions.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::oracles_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 constexpr std::array<StateOracle, 10> kOracles = {
     well_formed, cluster_connectivity, coverage,    component_match, skin_match,
@@ -337,4 +337,4 @@ TEST(Judge, SeesAClusterFallApartUnderTheSameNumber) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::oracles_test

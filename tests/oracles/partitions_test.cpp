@@ -7,10 +7,10 @@
 #include "oracles/oracles.h"
 #include "tests/oracles/states.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::partitions_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 // 5 × 1 × 1: 0 1 2 3 4.
 struct Row {
@@ -125,4 +125,4 @@ TEST(WeakCouplings, CountEveryPairOfClusters) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::partitions_test

@@ -5,7 +5,7 @@
 #include "reference_cpu/reference.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::testing {
+namespace cutproof::tests {
 
 inline constexpr double kSpacing = 0.01;
 
@@ -55,4 +55,4 @@ inline StepScene pressed_block(Solver solver = Solver::implicit, Acceleration ac
 // A particle in the middle of a block, away from blade, floor and grips.
 inline constexpr std::size_t kInside = 2 + 9 * (2 + 5 * 2);
 
-}  // namespace cutproof::testing
+}  // namespace cutproof::tests

@@ -14,7 +14,7 @@
 namespace cutproof::oracles {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 TEST(Registry, SaysOfEachPropertyAllThatAJudgeMustKnow) {
   std::set<std::string_view> names;

@@ -15,10 +15,10 @@
 #include "tests/oracles/corruptions.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::remembering_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 constexpr unsigned kPartCount = std::bit_width(static_cast<unsigned>(kAll));
 
@@ -315,4 +315,4 @@ TEST_F(Remembering, JudgesAStageAsAJudgeDoesThatHasSeenNothing) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::remembering_test

@@ -8,10 +8,10 @@
 #include "oracles/oracles.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::rest_frames_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 TEST(RestFrames, RejectsANeighbourOfAMergeThatWasForgotten) {
   Row row(6, {{0, 1, 2}, {2, 3}, {3, 4, 5}, {2, 3, 4}});
@@ -103,4 +103,4 @@ TEST(RestFrames, AreThoseOfBeforeBetweenDetectAndSplit) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::rest_frames_test

@@ -10,10 +10,10 @@
 #include "oracles/oracles.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::rotation_quality_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 TEST(RotationQuality, RejectsAReflectionAndNamesItsCluster) {
   const auto setup = setup_of(block_body(4, 4, 4));
@@ -170,4 +170,4 @@ TEST(RotationMatch, AsksOfADegenerateClusterNoMoreThanItsParticlesTell) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::rotation_quality_test

@@ -12,10 +12,10 @@
 #include "tests/oracles/expectations.h"
 #include "tests/oracles/skins.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::skin_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 TEST(SkinSurface, AcceptsTheOctahedronOfOneParticle) {
   const Scene scene = scene_of({{0, 0, 0}});
@@ -468,4 +468,4 @@ TEST_F(ClosedSurface, IsRejectedIfATriangleHasACornerTwiceOrAVertexNone) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::skin_test

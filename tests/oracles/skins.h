@@ -10,12 +10,7 @@
 #include "oracles/surface/surface.h"
 #include "tests/oracles/states.h"
 
-namespace cutproof::testing {
-
-struct Scene {
-  Setup setup;
-  State state;
-};
+namespace cutproof::tests {
 
 // One cluster over all particles, and the skin at rest.
 inline Scene scene_of(const std::vector<Node>& nodes, double spacing = 1.0) {
@@ -65,4 +60,4 @@ inline int32_t vertex_of(const Skin& skin, int32_t owner, int direction) {
   return -1;
 }
 
-}  // namespace cutproof::testing
+}  // namespace cutproof::tests

@@ -4,10 +4,10 @@
 #include "oracles/oracles.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::split_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 TEST(SplitExactness, AcceptsComponentsNumberedByClusterAndSmallestParticle) {
   const Pair pair = cut_row();
@@ -191,4 +191,4 @@ TEST(SplitExactness, RejectsDebrisThatIsNotListed) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::split_test

@@ -11,10 +11,15 @@
 #include "model/setup.h"
 #include "model/state.h"
 
-namespace cutproof::testing {
+namespace cutproof::tests {
 
 using Node = std::array<int32_t, 3>;
 using Lists = std::vector<std::vector<int32_t>>;
+
+struct Scene {
+  Setup setup;
+  State state;
+};
 
 // A body of the given nodes (i, j, k) >= 0, without duplicates, in any order; one ring of empty nodes is added.
 // Particles are numbered by (k, j, i). The grid holds at least one node, so a body of no particles has a grid too.
@@ -231,4 +236,4 @@ inline void round_to_single(const Body& body, State& state) {
   state.precision = Precision::binary32;
 }
 
-}  // namespace cutproof::testing
+}  // namespace cutproof::tests

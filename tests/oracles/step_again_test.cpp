@@ -14,10 +14,10 @@
 #include "tests/oracles/expectations.h"
 #include "tests/oracles/pressed_block.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::step_again_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 // Off by so much that single roundings do not explain it, but what disturbed runs make of them does, or does not.
 TEST(AdmissibleStep, IsTheSameHoweverManyRunsGoAtTheSameTime) {
@@ -498,4 +498,4 @@ TEST(AdmissibleStep, IsNotAskedOfNumbersThatAreNoneNorBeyondTheSchedule) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::step_again_test

@@ -11,10 +11,10 @@
 #include "reference_cpu/reference.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::step_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 struct ThrownBlock {
   cutproof::Setup setup;
@@ -96,7 +96,7 @@ TEST(Momentum, IsNotJudgedOnAStateThatIsNotWellFormed) {
 TEST(Momentum, CountsOnlyWhatIsAliveBeforeDetection) {
   ThrownBlock scene = thrown_block(Solver::implicit);
   scene.before.alive[3] = 0;
-  scene.before.clusters = testing::clusters_of(scene.setup.body, [] {
+  scene.before.clusters = tests::clusters_of(scene.setup.body, [] {
     auto lists = box_clusters(6, 5, 4, 2);
     for (auto& list : lists) std::erase(list, 3);
     return lists;
@@ -199,4 +199,4 @@ TEST(ComponentMomentum, SaysWhyItAsksNothingOfOnePiece) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::step_test

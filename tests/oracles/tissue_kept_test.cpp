@@ -4,10 +4,10 @@
 #include "oracles/oracles.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::tissue_kept_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 constexpr StateOracle tissue_kept{lone_state_properties, "tissue kept"};
 
@@ -45,4 +45,4 @@ TEST(TissueKept, IsNoPropertyOfRuns) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::tissue_kept_test

@@ -10,10 +10,10 @@
 #include "tests/oracles/corruptions.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::untouched_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 struct Change {
   const char* what;
@@ -144,4 +144,4 @@ INSTANTIATE_TEST_SUITE_P(Untouched, EveryField,
                          name_of_case);
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::untouched_test

@@ -9,10 +9,10 @@
 #include "oracles/oracles.h"
 #include "tests/oracles/expectations.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::well_formed_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 TEST(WellFormed, RejectsWhatCannotBeReadSafely) {
   const std::vector<std::pair<const char*, std::function<void(State&)>>> defects = {
@@ -92,4 +92,4 @@ TEST(WellFormed, RejectsABodyWhoseTablesDisagree) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::well_formed_test

@@ -20,7 +20,7 @@
 #include "property_tests/cases.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::property_tests {
+namespace cutproof::property_tests::bare_graph_test {
 namespace {
 
 constexpr uint64_t kSeed = 1;
@@ -300,4 +300,4 @@ TEST(BareGraph, IsTheSameTurnedAndMirrored) {
 }
 
 }  // namespace
-}  // namespace cutproof::property_tests
+}  // namespace cutproof::property_tests::bare_graph_test

@@ -20,7 +20,7 @@
 #include "property_tests/cases.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::property_tests {
+namespace cutproof::property_tests::bent_strain_test {
 namespace {
 
 struct BentBlock {
@@ -227,4 +227,4 @@ TEST(StrainOfSingleParticles, IsNone) {
 }
 
 }  // namespace
-}  // namespace cutproof::property_tests
+}  // namespace cutproof::property_tests::bent_strain_test

@@ -19,7 +19,7 @@
 #include "property_tests/counterexample.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::property_tests {
+namespace cutproof::property_tests::campaign_test {
 namespace {
 
 // The reference with something planted in what it shows or does.
@@ -356,4 +356,4 @@ TEST(CampaignDocument, IsRefusedWithNumbersThatNoIntegerHolds) {
 }
 
 }  // namespace
-}  // namespace cutproof::property_tests
+}  // namespace cutproof::property_tests::campaign_test

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-namespace cutproof::property_tests {
+namespace cutproof::property_tests::cases_test {
 namespace {
 
 using nlohmann::json;
@@ -332,4 +332,4 @@ TEST(Simplest, HasPlainFieldsWhereTheFaultNeedsNoOthers) {
 }
 
 }  // namespace
-}  // namespace cutproof::property_tests
+}  // namespace cutproof::property_tests::cases_test

@@ -21,7 +21,7 @@
 #include "property_tests/shown_case.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::property_tests {
+namespace cutproof::property_tests::histories_test {
 namespace {
 
 // The reference, and what goes wrong in it. Nothing of it is an error of a single stage.
@@ -326,4 +326,4 @@ TEST(Histories, ComeBackFromJsonAsTheyWere) {
 }
 
 }  // namespace
-}  // namespace cutproof::property_tests
+}  // namespace cutproof::property_tests::histories_test

@@ -13,7 +13,7 @@
 #include "property_tests/cases.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::property_tests {
+namespace cutproof::property_tests::places_of_rest_test {
 namespace {
 
 bool has_friction(const Setup& setup) {
@@ -84,4 +84,4 @@ TEST(PlacesOfRest, AnotherOneIsSaidToBeAnotherOne) {
 }
 
 }  // namespace
-}  // namespace cutproof::property_tests
+}  // namespace cutproof::property_tests::places_of_rest_test

@@ -8,7 +8,7 @@
 
 #include "property_tests/cases.h"
 
-namespace cutproof::property_tests {
+namespace cutproof::property_tests::touching_test {
 namespace {
 
 // Two neighbours at rest far from everything, and one frame of one substep in which the blade (2 × 2 spacings, in the
@@ -175,4 +175,4 @@ TEST(Touching, KnowsWhatGripsHoldAndHaveHeld) {
 }
 
 }  // namespace
-}  // namespace cutproof::property_tests
+}  // namespace cutproof::property_tests::touching_test

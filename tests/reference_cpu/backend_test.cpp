@@ -7,7 +7,7 @@
 #include "fixtures/cook.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::reference {
+namespace cutproof::reference::backend_test {
 namespace {
 
 // A block of 8 × 6 × 6 nodes and a blade that goes down through its middle, one quarter in each of four frames.
@@ -153,4 +153,4 @@ TEST(ReferenceBackend, EndsWithAReportWhenTheBodyIsCutAwayEntirely) {
 }
 
 }  // namespace
-}  // namespace cutproof::reference
+}  // namespace cutproof::reference::backend_test

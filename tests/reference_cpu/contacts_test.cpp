@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-namespace cutproof::reference {
+namespace cutproof::reference::contacts_test {
 namespace {
 
 Setup with_blade(double length, double depth, double thickness) {
@@ -133,4 +133,4 @@ TEST(Contacts, KeepTheBladesClearanceWhereAWallHoldsAsWell) {
 }
 
 }  // namespace
-}  // namespace cutproof::reference
+}  // namespace cutproof::reference::contacts_test

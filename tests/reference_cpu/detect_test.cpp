@@ -9,7 +9,7 @@
 #include "model/at.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::reference {
+namespace cutproof::reference::detect_test {
 namespace {
 
 Setup setup_of(Body body) {
@@ -339,4 +339,4 @@ TEST(DetectGeometric, DoesNothingWhileTheBladeIsUp) {
 }
 
 }  // namespace
-}  // namespace cutproof::reference
+}  // namespace cutproof::reference::detect_test

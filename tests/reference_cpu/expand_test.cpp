@@ -6,10 +6,10 @@
 #include "reference_cpu/reference.h"
 #include "tests/reference_cpu/random_covers.h"
 
-namespace cutproof {
+namespace cutproof::expand_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 Setup setup_with(Body body, ExpandRule rule, int32_t depth = 1) {
   auto setup = setup_of(std::move(body));
@@ -145,4 +145,4 @@ TEST(Expand, DoesNothingUnderTheRuleNone) {
 }
 
 }  // namespace
-}  // namespace cutproof
+}  // namespace cutproof::expand_test

@@ -10,10 +10,10 @@
 #include "reference_cpu/reference.h"
 #include "tests/reference_cpu/random_covers.h"
 
-namespace cutproof {
+namespace cutproof::merge_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 using reference::merge_sets;
 using reference::Merged;
 
@@ -388,4 +388,4 @@ TEST(Merge, KeepsEdgesCovered) {
 }
 
 }  // namespace
-}  // namespace cutproof
+}  // namespace cutproof::merge_test

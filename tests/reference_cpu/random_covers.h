@@ -11,7 +11,7 @@
 
 #include "tests/oracles/states.h"
 
-namespace cutproof::testing {
+namespace cutproof::tests {
 
 using ParticleSet = std::set<int32_t>;
 
@@ -136,4 +136,4 @@ inline int64_t uncovered_edges(const Body& body, const std::vector<uint8_t>& ali
   return static_cast<int64_t>(edges.size());
 }
 
-}  // namespace cutproof::testing
+}  // namespace cutproof::tests

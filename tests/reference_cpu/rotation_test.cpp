@@ -11,7 +11,7 @@
 
 #include "reference_cpu/reference.h"
 
-namespace cutproof::reference {
+namespace cutproof::reference::rotation_test {
 namespace {
 
 using Eigen::Matrix3d;
@@ -167,4 +167,4 @@ TEST(ClosestRotation, CarriesRotationsAndTransposition) {
 }
 
 }  // namespace
-}  // namespace cutproof::reference
+}  // namespace cutproof::reference::rotation_test

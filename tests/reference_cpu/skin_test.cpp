@@ -9,10 +9,10 @@
 #include "reference_cpu/skin_cases.h"
 #include "tests/reference_cpu/random_covers.h"
 
-namespace cutproof {
+namespace cutproof::skin_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 using reference::cell_edges;
 using reference::skin_cases;
 using reference::SkinCase;
@@ -437,4 +437,4 @@ TEST(Skin, GoesWithItsParticleIfThatLiesInNoCluster) {
 }
 
 }  // namespace
-}  // namespace cutproof
+}  // namespace cutproof::skin_test

@@ -6,10 +6,10 @@
 #include "reference_cpu/reference.h"
 #include "tests/reference_cpu/random_covers.h"
 
-namespace cutproof {
+namespace cutproof::split_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 // A rotation by a quarter turn about z, to be recognised again.
 constexpr Mat3 kQuarterTurn = {{0, -1, 0, 1, 0, 0, 0, 0, 1}};
@@ -185,4 +185,4 @@ TEST(Split, AgreesWithBruteForceOnRandomCoversAndRemovals) {
 }
 
 }  // namespace
-}  // namespace cutproof
+}  // namespace cutproof::split_test

@@ -8,7 +8,7 @@
 #include "fixtures/cook.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::reference {
+namespace cutproof::reference::step_test {
 namespace {
 
 Setup setup_of(Body body, int64_t frames, double dt) {
@@ -234,4 +234,4 @@ TEST(Step, BringsInvertedAndFlattenedBodiesBackWithoutNaN) {
 }
 
 }  // namespace
-}  // namespace cutproof::reference
+}  // namespace cutproof::reference::step_test

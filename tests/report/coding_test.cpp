@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-namespace cutproof::report {
+namespace cutproof::report::coding_test {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN(), kInf = std::numeric_limits<double>::infinity();
@@ -144,4 +144,4 @@ TEST(ScriptJson, EndsNoElementAndMeansTheSame) {
 }
 
 }  // namespace
-}  // namespace cutproof::report
+}  // namespace cutproof::report::coding_test

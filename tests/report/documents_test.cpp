@@ -13,7 +13,7 @@
 #include "report/assets.h"
 #include "report/document_page.h"
 
-namespace cutproof::report {
+namespace cutproof::report::documents_test {
 namespace {
 
 using nlohmann::json;
@@ -499,4 +499,4 @@ TEST(DocumentPages, HoldNamesAsTextOnly) {
 }
 
 }  // namespace
-}  // namespace cutproof::report
+}  // namespace cutproof::report::documents_test

@@ -16,7 +16,7 @@
 #include "report/pieces.h"
 #include "tests/report/made_run.h"
 
-namespace cutproof::report {
+namespace cutproof::report::page_test {
 namespace {
 
 using nlohmann::json;
@@ -564,4 +564,4 @@ TEST(Page, RefusesResultsOfAnotherRun) {
 }
 
 }  // namespace
-}  // namespace cutproof::report
+}  // namespace cutproof::report::page_test

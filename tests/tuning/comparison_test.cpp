@@ -10,7 +10,7 @@
 #include "fixtures/bodies.h"
 #include "fixtures/cook.h"
 
-namespace cutproof::tuning {
+namespace cutproof::tuning::comparison_test {
 namespace {
 
 // Four particles in a row. Their neighbours stay neighbours, so there is always one part.
@@ -118,4 +118,4 @@ TEST(Comparison, EndsWithTheReferenceSolution) {
 }
 
 }  // namespace
-}  // namespace cutproof::tuning
+}  // namespace cutproof::tuning::comparison_test

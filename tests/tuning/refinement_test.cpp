@@ -14,7 +14,7 @@
 #include "reference_cpu/reference.h"
 #include "tuning/reference_solution.h"
 
-namespace cutproof::tuning {
+namespace cutproof::tuning::refinement_test {
 namespace {
 
 using benchmarks::PreparedScene;
@@ -397,4 +397,4 @@ TEST(DifferenceInParts, IsSeenAtTheEndOfStrokesAndOfTheScene) {
 }
 
 }  // namespace
-}  // namespace cutproof::tuning
+}  // namespace cutproof::tuning::refinement_test

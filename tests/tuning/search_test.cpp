@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-namespace cutproof::tuning {
+namespace cutproof::tuning::search_test {
 namespace {
 
 // A body of one frame: a time step error 1 / substeps, and a solver error that each iteration shrinks, accelerated ones
@@ -338,4 +338,4 @@ TEST(Search, SizesSampledClustersByBothTheirLengths) {
 }
 
 }  // namespace
-}  // namespace cutproof::tuning
+}  // namespace cutproof::tuning::search_test

@@ -14,6 +14,7 @@
 #include "reference_cpu/reference.h"
 #include "tests/program.h"
 
+namespace tune_test {
 namespace {
 
 using cutproof::Scene;
@@ -330,3 +331,4 @@ TEST_F(Tune, RefusesWhatItCannotTune) {
 }
 
 }  // namespace
+}  // namespace tune_test

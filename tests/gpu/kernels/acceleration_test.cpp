@@ -19,14 +19,14 @@
 #include "tests/gpu/kernels/every_backend.h"
 #include "tests/oracles/comparison/twisted_block.h"
 
-namespace cutproof {
+namespace cutproof::acceleration_test {
 namespace {
 
-using testing::distance;
-using testing::EveryBackend;
-using testing::obstructed_block;
-using testing::Scene;
-using testing::twisted_block;
+using tests::distance;
+using tests::EveryBackend;
+using tests::obstructed_block;
+using tests::Scene;
+using tests::twisted_block;
 
 class Accelerated : public EveryBackend {
  protected:
@@ -229,7 +229,7 @@ TEST_P(Accelerated, DoesNotMindWhoElseIsLoaded) {
 
 // Two blocks on a rough floor, one of them gripped: each the other's stranger.
 Scene two_blocks() {
-  std::vector<testing::Node> nodes;
+  std::vector<tests::Node> nodes;
   for (int32_t k = 0; k < 5; ++k) {
     for (int32_t j = 0; j < 5; ++j) {
       for (int32_t i = 0; i < 11; ++i) {
@@ -238,7 +238,7 @@ Scene two_blocks() {
     }
   }
   Scene scene;
-  scene.setup = testing::setup_of(testing::body_of(nodes, 0.01), 3);
+  scene.setup = tests::setup_of(tests::body_of(nodes, 0.01), 3);
   scene.setup.step.stiffness = 1e6;
   scene.setup.step.iterations = 9;
   scene.setup.step.acceleration = Acceleration::chebyshev;
@@ -277,8 +277,8 @@ TEST_P(Accelerated, KeepsWhatEveryStepMust) {
   EXPECT_EQ(energy.checked, 1) << "only the first iteration is promised";
 }
 
-INSTANTIATE_TEST_SUITE_P(Over, Accelerated, ::testing::ValuesIn(testing::all_backends()),
+INSTANTIATE_TEST_SUITE_P(Over, Accelerated, ::testing::ValuesIn(tests::all_backends()),
                          [](const auto& tested) { return tested.param.name; });
 
 }  // namespace
-}  // namespace cutproof
+}  // namespace cutproof::acceleration_test

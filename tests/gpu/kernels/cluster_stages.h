@@ -18,7 +18,7 @@
 #include "property_tests/random.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::gpu::testing {
+namespace cutproof::gpu::tests {
 
 struct Bodies {
   std::vector<Setup> setups;
@@ -123,4 +123,4 @@ void for_random_states(std::uint64_t seed, int cases, int size, Stage stage, Vis
   }
 }
 
-}  // namespace cutproof::gpu::testing
+}  // namespace cutproof::gpu::tests

@@ -16,7 +16,7 @@
 #include "reference_cpu/carrier.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::gpu {
+namespace cutproof::gpu::detect_kernel_test {
 namespace {
 
 using Random = std::mt19937_64;
@@ -612,4 +612,4 @@ TEST(GpuDetect, JudgesEachBodyOfALoadByItsOwnCriterionUnderAnySchedule) {
 }
 
 }  // namespace
-}  // namespace cutproof::gpu
+}  // namespace cutproof::gpu::detect_kernel_test

@@ -13,7 +13,7 @@
 #include "model/state.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::testing {
+namespace cutproof::tests {
 
 struct NamedBackend {
   std::string name;
@@ -56,4 +56,4 @@ inline double distance(const cutproof::Setup& setup, const std::vector<Vec3>& a,
   return greatest / setup.body.grid.spacing;
 }
 
-}  // namespace cutproof::testing
+}  // namespace cutproof::tests

@@ -8,11 +8,11 @@
 #include "tests/gpu/kernels/cluster_stages.h"
 #include "tests/reference_cpu/random_covers.h"
 
-namespace cutproof::gpu {
+namespace cutproof::gpu::expand_kernel_test {
 namespace {
 
-using namespace cutproof::gpu::testing;
-using namespace cutproof::testing;
+using namespace cutproof::gpu::tests;
+using namespace cutproof::tests;
 
 void expand_on(HostLauncher& launcher, Bench& bench) {
   bench.spoil_scratch();
@@ -305,4 +305,4 @@ TEST(GpuExpand, ALoadWithoutBodiesOrClustersIsLeftAlone) {
 }
 
 }  // namespace
-}  // namespace cutproof::gpu
+}  // namespace cutproof::gpu::expand_kernel_test

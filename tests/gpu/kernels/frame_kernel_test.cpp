@@ -15,12 +15,12 @@
 #include "model/at.h"
 #include "tests/gpu/kernels/cluster_stages.h"
 
-namespace cutproof::gpu {
+namespace cutproof::gpu::frame_kernel_test {
 namespace {
 
-using testing::Bench;
-using testing::Bodies;
-using testing::expect_memberships_agree;
+using tests::Bench;
+using tests::Bodies;
+using tests::expect_memberships_agree;
 
 bool is_in_order(const StagingBuffers& staging, std::size_t p) {
   const auto list = staging.memberships.begin();
@@ -184,4 +184,4 @@ TEST(Frame, NumbersClustersInTheOrderOfTheirSlots) {
 }
 
 }  // namespace
-}  // namespace cutproof::gpu
+}  // namespace cutproof::gpu::frame_kernel_test

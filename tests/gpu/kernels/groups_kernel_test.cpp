@@ -23,7 +23,7 @@
 #include "reference_cpu/reference.h"
 #include "tests/oracles/states.h"
 
-namespace cutproof::gpu {
+namespace cutproof::gpu::groups_kernel_test {
 namespace {
 
 using Random = std::mt19937_64;
@@ -456,9 +456,9 @@ TEST(Groups, FollowParticlesThatPassFromOneClusterToAnother) {
   const std::vector<int32_t> ends[2] = {layers(0, 3), layers(4, 8)}, middle = layers(3, 4), rest = layers(9, 119);
   int passed = 0;
   for (const auto& lists : {std::vector{ends[0], middle, ends[1], rest}, std::vector{ends[1], middle, ends[0], rest}}) {
-    cutproof::Setup setup = cutproof::testing::setup_of(body);
+    cutproof::Setup setup = cutproof::tests::setup_of(body);
     setup.merge.rule = MergeRule::deterministic;
-    const Bodies bodies{{setup}, {cutproof::testing::state_of(body, lists, 20)}};
+    const Bodies bodies{{setup}, {cutproof::tests::state_of(body, lists, 20)}};
     StagingBuffers staging = make_staging_buffers(bodies.setups, bodies.states, Capacity{});
     const DeviceView view = staging.view();
     HostLauncher launcher;
@@ -1078,4 +1078,4 @@ TEST(Groups, AreAllResolvedWhereEverythingTouches) {
 }
 
 }  // namespace
-}  // namespace cutproof::gpu
+}  // namespace cutproof::gpu::groups_kernel_test

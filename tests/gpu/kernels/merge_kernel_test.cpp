@@ -11,11 +11,11 @@
 #include "tests/gpu/kernels/cluster_stages.h"
 #include "tests/reference_cpu/random_covers.h"
 
-namespace cutproof::gpu {
+namespace cutproof::gpu::merge_kernel_test {
 namespace {
 
-using namespace cutproof::gpu::testing;
-using namespace cutproof::testing;
+using namespace cutproof::gpu::tests;
+using namespace cutproof::tests;
 
 void merge_on(HostLauncher& launcher, Bench& bench) {
   bench.spoil_scratch();
@@ -433,4 +433,4 @@ TEST(GpuMerge, ALoadWithoutBodiesOrClustersIsLeftAlone) {
 }
 
 }  // namespace
-}  // namespace cutproof::gpu
+}  // namespace cutproof::gpu::merge_kernel_test

@@ -12,15 +12,15 @@
 #include "tests/gpu/kernels/every_backend.h"
 #include "tests/oracles/comparison/twisted_block.h"
 
-namespace cutproof {
+namespace cutproof::retardation_test {
 namespace {
 
-using testing::distance;
-using testing::EveryBackend;
-using testing::obstructed_block;
-using testing::pressed_block;
-using testing::Scene;
-using testing::twisted_block;
+using tests::distance;
+using tests::EveryBackend;
+using tests::obstructed_block;
+using tests::pressed_block;
+using tests::Scene;
+using tests::twisted_block;
 
 class Retardation : public EveryBackend {};
 
@@ -29,13 +29,13 @@ class Retardation : public EveryBackend {};
 class Drawn {
  public:
   Drawn(double stiffness, double retardation, double dt, int64_t frames)
-      : scene{testing::setup_of(testing::block_body(4, 4, 4, kSpacing)), {}} {
+      : scene{tests::setup_of(tests::block_body(4, 4, 4, kSpacing)), {}} {
     scene.setup.step.substeps = 1;
     scene.setup.step.iterations = 2;
     scene.setup.step.stiffness = stiffness;
     scene.setup.step.retardation = retardation;
     scene.setup.substep_length.assign(static_cast<std::size_t>(frames), dt);
-    scene.state = testing::state_of(scene.setup.body, testing::box_clusters(4, 4, 4, 4));
+    scene.state = tests::state_of(scene.setup.body, tests::box_clusters(4, 4, 4, 4));
     const double middle = 2.5 * kSpacing;
     for (Vec3& x : scene.state.x) x.x = middle + (1 + kDrawn) * (x.x - middle);
   }
@@ -184,8 +184,8 @@ TEST_P(Retardation, ComesToTheAnswerOfItsSubstep) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Over, Retardation, ::testing::ValuesIn(testing::all_backends()),
+INSTANTIATE_TEST_SUITE_P(Over, Retardation, ::testing::ValuesIn(tests::all_backends()),
                          [](const auto& named) { return named.param.name; });
 
 }  // namespace
-}  // namespace cutproof
+}  // namespace cutproof::retardation_test

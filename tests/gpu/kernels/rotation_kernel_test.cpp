@@ -14,7 +14,7 @@
 #include "fixtures/rotation_answers.h"
 #include "gpu/kernels/rotation.cuh"
 
-namespace cutproof::gpu {
+namespace cutproof::gpu::rotation_kernel_test {
 namespace {
 
 using Eigen::Matrix3d;
@@ -216,4 +216,4 @@ TEST(GpuRotation, CarriesRotationsTranspositionAndScale) {
 }
 
 }  // namespace
-}  // namespace cutproof::gpu
+}  // namespace cutproof::gpu::rotation_kernel_test

@@ -14,10 +14,10 @@
 #include "reference_cpu/reference.h"
 #include "tests/reference_cpu/random_covers.h"
 
-namespace cutproof::gpu {
+namespace cutproof::gpu::skin_kernel_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 // ---- The case table, without the reference
 
@@ -619,4 +619,4 @@ TEST(GpuSkin, WritesNothingWhereRoomIsShort) {
 }
 
 }  // namespace
-}  // namespace cutproof::gpu
+}  // namespace cutproof::gpu::skin_kernel_test

@@ -15,10 +15,10 @@
 #include "reference_cpu/reference.h"
 #include "tests/reference_cpu/random_covers.h"
 
-namespace cutproof::gpu {
+namespace cutproof::gpu::split_kernel_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 using Random = std::mt19937;
 
 // One DeviceView of bodies in the middle of a frame, after their detection.
@@ -611,4 +611,4 @@ TEST(GpuRestFrames, RecomputesThoseThatAreMarkedToSinglePrecisionAndNoOthers) {
 }
 
 }  // namespace
-}  // namespace cutproof::gpu
+}  // namespace cutproof::gpu::split_kernel_test

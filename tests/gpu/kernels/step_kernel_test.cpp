@@ -15,7 +15,7 @@
 #include "reference_cpu/contacts.h"
 #include "reference_cpu/reference.h"
 
-namespace cutproof::gpu {
+namespace cutproof::gpu::step_kernel_test {
 namespace {
 
 constexpr double kUnit = 0x1p-24;  // relative error of one rounding in single precision
@@ -649,4 +649,4 @@ TEST(GpuContacts, ProjectWhereTheReferenceDoes) {
 }
 
 }  // namespace
-}  // namespace cutproof::gpu
+}  // namespace cutproof::gpu::step_kernel_test

@@ -12,7 +12,7 @@
 #include "gpu/host/host_launcher.h"
 #include "tests/gpu/launch/launch_checks.h"
 
-namespace cutproof::gpu {
+namespace cutproof::gpu::launch_test {
 namespace {
 
 template <class T>
@@ -638,4 +638,4 @@ TEST(PlantedUnionFindFaults, AScheduleThatShowsOneShrinksToFewPreemptions) {
 }
 
 }  // namespace
-}  // namespace cutproof::gpu
+}  // namespace cutproof::gpu::launch_test

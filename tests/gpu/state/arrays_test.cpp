@@ -19,7 +19,7 @@
 #include "property_tests/cases.h"
 #include "property_tests/random.h"
 
-namespace cutproof::gpu {
+namespace cutproof::gpu::arrays_test {
 namespace {
 
 struct Bodies {
@@ -230,4 +230,4 @@ TEST(Arrays, ThatAreConstantAreNotWritten) {
 }
 
 }  // namespace
-}  // namespace cutproof::gpu
+}  // namespace cutproof::gpu::arrays_test

@@ -14,14 +14,14 @@
 #include "oracles/comparison/cut_geometry.h"
 #include "tests/oracles/states.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::carried_sweep_test {
 namespace {
 
-using testing::block_body;
-using testing::convex_cell_skin;
-using testing::range;
-using testing::setup_of;
-using testing::state_of;
+using tests::block_body;
+using tests::convex_cell_skin;
+using tests::range;
+using tests::setup_of;
+using tests::state_of;
 
 constexpr double kH = 0.01;
 // Where the map of the particles is exact: it is solved from sums of at most 100 terms, and the matrix that is inverted
@@ -73,7 +73,7 @@ struct MovingCut {
     for (int32_t k = 0; k < 6; ++k) {
       for (int32_t j = 0; j < 6; ++j) gone.push_back((k >= 3 ? above : below) - 1 + 9 * (j + 6 * k));
     }
-    testing::remove_particles(after, gone);
+    tests::remove_particles(after, gone);
     after.skin = convex_cell_skin(setup, after);
     return cut_geometry(setup, states.front(), after, sweep.surface());
   }
@@ -333,4 +333,4 @@ TEST(CarriedSweep, FewParticlesAreCarriedAsFarAsTheySay) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::carried_sweep_test

@@ -13,13 +13,13 @@
 #include "reference_cpu/reference.h"
 #include "tests/oracles/states.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::conservation_test {
 namespace {
 
-using testing::block_body;
-using testing::box_clusters;
-using testing::setup_of;
-using testing::state_of;
+using tests::block_body;
+using tests::box_clusters;
+using tests::setup_of;
+using tests::state_of;
 
 constexpr double kH = 0.01;
 
@@ -146,4 +146,4 @@ TEST(Conservation, AFreeBodyMeetsNothing) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::conservation_test

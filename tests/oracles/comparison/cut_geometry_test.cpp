@@ -14,14 +14,14 @@
 #include "oracles/surface/surface_distance.h"
 #include "tests/oracles/states.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::cut_geometry_test {
 namespace {
 
-using testing::block_body;
-using testing::convex_cell_skin;
-using testing::range;
-using testing::setup_of;
-using testing::state_of;
+using tests::block_body;
+using tests::convex_cell_skin;
+using tests::range;
+using tests::setup_of;
+using tests::state_of;
 
 constexpr double kH = 0.01;
 
@@ -52,7 +52,7 @@ struct Cut {
   int32_t particle(int32_t i, int32_t j, int32_t k) const { return i + 7 * (j + 4 * k); }
   // Kills particles and makes the skin of the rest.
   void remove(const std::vector<int32_t>& particles) {
-    testing::remove_particles(after, particles);
+    tests::remove_particles(after, particles);
     after.skin = convex_cell_skin(setup, after);
   }
   std::vector<int32_t> layer(int32_t i, int32_t rows = 4) const {
@@ -299,4 +299,4 @@ TEST(SurfaceDistance, OfTrianglesAndPoints) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::cut_geometry_test

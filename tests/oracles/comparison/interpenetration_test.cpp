@@ -7,17 +7,17 @@
 
 #include "tests/oracles/states.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::interpenetration_test {
 namespace {
 
-using testing::setup_of;
-using testing::state_of;
+using tests::setup_of;
+using tests::state_of;
 
 constexpr double kH = 0.01;
 
 // Two particles that no edge joins, each with a box for a skin.
 struct TwoBoxes {
-  cutproof::Setup setup = setup_of(testing::body_of({{0, 0, 0}, {5, 0, 0}}, kH));
+  cutproof::Setup setup = setup_of(tests::body_of({{0, 0, 0}, {5, 0, 0}}, kH));
   State state = state_of(setup.body, {{0}, {1}});
 
   // Each side as 16 × 16 squares.
@@ -129,4 +129,4 @@ TEST(Interpenetration, ACavityIsNotInside) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::interpenetration_test

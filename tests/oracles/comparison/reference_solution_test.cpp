@@ -16,17 +16,17 @@
 #include "tests/oracles/comparison/twisted_block.h"
 #include "tests/oracles/states.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::reference_solution_test {
 namespace {
 
-using testing::block_body;
-using testing::box_clusters;
-using testing::obstructed_block;
-using testing::pressed_block;
-using testing::Scene;
-using testing::setup_of;
-using testing::state_of;
-using testing::twisted_block;
+using tests::block_body;
+using tests::box_clusters;
+using tests::obstructed_block;
+using tests::pressed_block;
+using tests::Scene;
+using tests::setup_of;
+using tests::state_of;
+using tests::twisted_block;
 
 // Greatest distance of two sets of positions [h].
 double distance(const Scene& scene, const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
@@ -409,7 +409,7 @@ TEST(ReferenceSolution, BodiesOfOneParticleAndOfNoneHaveAnAnswer) {
   const ReferenceSolution answer = reference_solution(one.setup, one.state);
   EXPECT_TRUE(answer.converged);
   EXPECT_LT(norm(answer.x[0] - Vec3{1.004, 1.008, 1.012}), 1e-15);
-  Scene none{setup_of(testing::body_of({})), {}};
+  Scene none{setup_of(tests::body_of({})), {}};
   none.state = state_of(none.setup.body, {});
   EXPECT_TRUE(reference_solution(none.setup, none.state).converged);
   EXPECT_TRUE(reference_solution(none.setup, none.state).x.empty());
@@ -432,4 +432,4 @@ TEST(ReferenceSolution, RefusesWhatHasNoConvergedAnswer) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::reference_solution_test

@@ -11,13 +11,13 @@
 #include "tests/oracles/comparison/twisted_block.h"
 #include "tests/oracles/states.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::solver_error_test {
 namespace {
 
-using testing::block_body;
-using testing::box_clusters;
-using testing::setup_of;
-using testing::state_of;
+using tests::block_body;
+using tests::box_clusters;
+using tests::setup_of;
+using tests::state_of;
 
 constexpr double kH = 0.01;
 
@@ -74,7 +74,7 @@ TEST(SolverError, IsTheSameBesideContactsThatAreNeverTouched) {
 
 TEST(SolverError, UnderABladeIsTheDistanceToAnAnswerOfItsOwn) {
   for (const double friction : {0.0, 0.3}) {
-    testing::Scene scene = testing::pressed_block(1e5, friction);
+    tests::Scene scene = tests::pressed_block(1e5, friction);
     for (const int32_t iterations : {4, 1500}) {
       scene.setup.step.iterations = iterations;
       const auto judged = reference::make_backend();
@@ -90,4 +90,4 @@ TEST(SolverError, UnderABladeIsTheDistanceToAnAnswerOfItsOwn) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::solver_error_test

@@ -11,13 +11,13 @@
 #include "model/rules.h"
 #include "tests/oracles/states.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::stage_comparison_test {
 namespace {
 
-using testing::block_body;
-using testing::box_clusters;
-using testing::setup_of;
-using testing::state_of;
+using tests::block_body;
+using tests::box_clusters;
+using tests::setup_of;
+using tests::state_of;
 
 // A block that has lost a corner, before its split.
 struct Block {
@@ -165,4 +165,4 @@ TEST(StageComparison, CountsARemovalThatRoundingDecides) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::stage_comparison_test

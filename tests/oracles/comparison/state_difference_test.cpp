@@ -14,14 +14,14 @@
 #include "model/fields.h"
 #include "tests/oracles/states.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::state_difference_test {
 namespace {
 
-using testing::block_body;
-using testing::box_clusters;
-using testing::convex_cell_skin;
-using testing::setup_of;
-using testing::state_of;
+using tests::block_body;
+using tests::box_clusters;
+using tests::convex_cell_skin;
+using tests::setup_of;
+using tests::state_of;
 
 // Another value, near the first and as well formed.
 void change(int32_t& value) { ++value; }
@@ -221,7 +221,7 @@ TEST(StateDifference, LeavesSetsOpenWhereARuleDoes) {
 TEST(StateDifference, SaysACauseBeforeWhatFollowsFromIt) {
   const Block block;
   State other = block.state;
-  testing::remove_particles(other, {0});
+  tests::remove_particles(other, {0});
   other.edge_covered = !other.edge_covered;
   EXPECT_EQ(difference_of_decisions(block.state, other)->field, "removed");
   other.removed.clear();
@@ -252,4 +252,4 @@ TEST(ErrorNorm, HasTheGreatestItsPlaceAndTheMeanSquare) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::state_difference_test

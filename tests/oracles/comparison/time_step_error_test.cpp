@@ -8,18 +8,18 @@
 #include "reference_cpu/reference.h"
 #include "tests/oracles/states.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::time_step_error_test {
 namespace {
 
-using testing::block_body;
-using testing::setup_of;
-using testing::state_of;
+using tests::block_body;
+using tests::setup_of;
+using tests::state_of;
 
 constexpr double kH = 0.01;
 
 // In free fall from rest, n substeps of dt go g dt² n (n + 1) / 2; 8 n of dt / 8 go 7 n / 16 · g dt² less.
 TEST(TimeStepError, OfFreeFallIsKnown) {
-  cutproof::Setup setup = setup_of(testing::body_of({{0, 0, 0}}, kH), 5);
+  cutproof::Setup setup = setup_of(tests::body_of({{0, 0, 0}}, kH), 5);
   setup.step.gravity = {0, 0, -9.81};
   const State state = state_of(setup.body, {{0}});
   const TimeStepError error = time_step_error(reference::make_backend, setup, state, 100);
@@ -38,7 +38,7 @@ TEST(TimeStepError, OfFreeFallIsKnown) {
 // The lower of two particles falls away from the upper one, which is held. After frame 2 (12 substeps) it has gone
 // 78 g dt² in the coarse run and 72.75 g dt² in the fine one: εh lies between.
 TEST(TimeStepError, EndsAtTheFirstRemovalThatDiffers) {
-  cutproof::Setup setup = setup_of(testing::body_of({{0, 0, 0}, {0, 0, 1}}, kH), 5);
+  cutproof::Setup setup = setup_of(tests::body_of({{0, 0, 0}, {0, 0, 1}}, kH), 5);
   setup.detect.without_blade = true;
   setup.step.gravity = {0, 0, -0.5 * kH / 75 / (0.004 * 0.004)};
   setup.grips = {{{1}, std::vector<uint8_t>(20, 1), std::vector<Vec3>(20)}};
@@ -85,4 +85,4 @@ TEST(TimeStepError, MoreSubstepsPassTheSamePlaces) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::time_step_error_test

@@ -7,13 +7,13 @@
 
 #include "tests/oracles/states.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::trajectory_test {
 namespace {
 
-using testing::block_body;
-using testing::range;
-using testing::setup_of;
-using testing::state_of;
+using tests::block_body;
+using tests::range;
+using tests::setup_of;
+using tests::state_of;
 
 constexpr double kH = 0.01;
 
@@ -79,4 +79,4 @@ TEST(PoseOf, CountsPartsAnewOnlyWhereSomethingWasRemoved) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::trajectory_test

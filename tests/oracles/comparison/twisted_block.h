@@ -5,12 +5,7 @@
 
 #include "tests/oracles/states.h"
 
-namespace cutproof::testing {
-
-struct Scene {
-  Setup setup;
-  State state;
-};
+namespace cutproof::tests {
 
 // A block of side³ particles, twisted about z and stretched along it by velocities: at the end of the free motion the
 // two ends are turned against each other by `twist`, and everything is `stretch` times as long.
@@ -55,4 +50,4 @@ inline Scene pressed_block(double stiffness, double friction) {
   return scene;
 }
 
-}  // namespace cutproof::testing
+}  // namespace cutproof::tests

@@ -18,17 +18,17 @@
 #include "reference_cpu/reference.h"
 #include "tests/oracles/states.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::relations_test {
 namespace {
 
-using testing::block_body;
-using testing::body_of;
-using testing::box_clusters;
-using testing::Node;
-using testing::range;
-using testing::round_to_single;
-using testing::setup_of;
-using testing::state_of;
+using tests::block_body;
+using tests::body_of;
+using tests::box_clusters;
+using tests::Node;
+using tests::range;
+using tests::round_to_single;
+using tests::setup_of;
+using tests::state_of;
 
 using StageFunction = std::function<void(const cutproof::Setup&, State&)>;
 
@@ -737,12 +737,12 @@ TEST(Equivariance, RejectsASplitThatDependsOnTheOrderOfClusters) {
 TEST(Equivariance, RejectsAMergeThatIsNotLegalInOneOfTheRuns) {
   // Merges the first two clusters, whether they touch or not.
   FakeBackend greedy = fake_stage(Stage::merge, [](const cutproof::Setup& setup, State& state) {
-    auto lists = testing::lists_of(state.clusters);
+    auto lists = tests::lists_of(state.clusters);
     lists[0].insert(lists[0].end(), lists[1].begin(), lists[1].end());
     std::sort(lists[0].begin(), lists[0].end());
     lists[0].erase(std::unique(lists[0].begin(), lists[0].end()), lists[0].end());
     lists.erase(lists.begin() + 1);
-    state.clusters = testing::clusters_of(setup.body, lists);
+    state.clusters = tests::clusters_of(setup.body, lists);
   });
   Scene scene{setup_of(block_body(12, 1, 1)), {}};
   scene.state = state_of(scene.setup.body, {{0, 1, 2}, {2, 3, 4, 5}, {5, 6, 7, 8}, {8, 9, 10, 11}}, 4, 8);
@@ -794,4 +794,4 @@ TEST(Relations, StatesThatAreNotWellFormedAreNotJudged) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::relations_test

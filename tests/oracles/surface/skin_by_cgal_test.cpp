@@ -12,10 +12,10 @@
 #include "oracles/surface/tissue_volume.h"
 #include "tests/oracles/skins.h"
 
-namespace cutproof::oracles {
+namespace cutproof::oracles::skin_by_cgal_test {
 namespace {
 
-using namespace cutproof::testing;
+using namespace cutproof::tests;
 
 TEST(SkinGeometry, RejectsASkinTurnedInsideOut) {
   Scene scene = scene_of(block_nodes({0, 0, 0}, {2, 2, 2}));
@@ -218,4 +218,4 @@ TEST(SkinShells, AreVacuousWithoutASkin) {
 }
 
 }  // namespace
-}  // namespace cutproof::oracles
+}  // namespace cutproof::oracles::skin_by_cgal_test
