@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs what is missing, builds, runs every test, and of the long ones a share that the commit chooses
 # (ci/long_tests.py). The last line is "N passed, N failed, N skipped".
-# CUTPROOF_WHOLE=1: all of the long ones (ci/nightly.sh).
+# CUTPROOF_WHOLE=1: all of the long ones, four times as many random cases, and kernels for every GPU (ci/nightly.sh).
 # CUTPROOF_MESHES: a folder with outside meshes; tests on them say so when it is unset.
 # CUTPROOF_PRESET: another preset of CMakePresets.json (debug, asan, tsan).
 set -euo pipefail
@@ -11,7 +11,13 @@ preset=${CUTPROOF_PRESET:-default}
 ci/install.sh tests browser
 werror=()
 [ "${CI:-}" = true ] && werror=(-DCUTPROOF_WERROR=ON)
-cmake --preset "$preset" -DBUILD_TESTING=ON "${werror[@]}" >/dev/null
+# Where no GPU can run them, kernels are compiled for one kind alone.
+kernels=(-UCMAKE_CUDA_ARCHITECTURES)
+if [ "${CUTPROOF_WHOLE:-}" != 1 ]; then
+  export CUTPROOF_CASES=${CUTPROOF_CASES:-500}
+  [ -e /dev/nvidiactl ] || kernels=(-DCMAKE_CUDA_ARCHITECTURES=90a-real)
+fi
+cmake --preset "$preset" -DBUILD_TESTING=ON "${werror[@]}" "${kernels[@]}" >/dev/null
 build=build/$preset
 cmake --build "$build"
 
@@ -31,4 +37,5 @@ fi
 ctest --test-dir "$build" --output-on-failure --no-tests=error "${left_out[@]}" -j "$(($(nproc) + 1))" --output-junit "$PWD/$report" || status=$?
 [ -s "$report" ] || { echo "no test was run"; echo "0 passed, 1 failed, 0 skipped"; exit 1; }
 echo "$long"
+echo "RANDOM CASES: ${CUTPROOF_CASES:-2000} a property (ci/nightly.sh draws 2000)"
 exec python3 ci/count_tests.py "$report" "$status" "$("$build/cli/cutproof" info | grep -E "^ +gpu ")"

@@ -9,7 +9,7 @@
 #include "tests/input_fuzzing/targets.h"
 
 namespace cutproof::input_fuzzing {
-namespace {
+namespace of_arrays {
 
 // A row of four particles on a grid, cut between the second and the third, with all that a file may hold.
 io::ArrayFile small_state() {
@@ -152,8 +152,8 @@ std::vector<std::string> seeds() {
   return seeds;
 }
 
-}  // namespace
+}  // namespace of_arrays
 
-const Target kArrays = {"arrays", feed, seeds};
+const Target kArrays = {"arrays", of_arrays::feed, of_arrays::seeds};
 
 }  // namespace cutproof::input_fuzzing

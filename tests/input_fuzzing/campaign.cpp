@@ -8,7 +8,7 @@
 #include "tests/input_fuzzing/targets.h"
 
 namespace cutproof::input_fuzzing {
-namespace {
+namespace of_campaign {
 
 Outcome feed(std::string_view bytes) {
   return outcome_of([&] {
@@ -60,8 +60,8 @@ std::vector<std::string> seeds() {
   return {result(1, 1).dump(), result(1, 2).dump() + "\0"s + result(2, 2).dump()};
 }
 
-}  // namespace
+}  // namespace of_campaign
 
-const Target kCampaign = {"campaign", feed, seeds};
+const Target kCampaign = {"campaign", of_campaign::feed, of_campaign::seeds};
 
 }  // namespace cutproof::input_fuzzing

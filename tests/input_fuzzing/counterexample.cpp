@@ -7,7 +7,7 @@
 #include "tests/input_fuzzing/targets.h"
 
 namespace cutproof::input_fuzzing {
-namespace {
+namespace of_counterexample {
 
 Outcome feed(std::string_view bytes) {
   return feed_document(bytes, "a counterexample", property_tests::counterexample_from_json);
@@ -24,8 +24,8 @@ std::vector<std::string> seeds() {
   return seeds;
 }
 
-}  // namespace
+}  // namespace of_counterexample
 
-const Target kCounterexample = {"counterexample", feed, seeds};
+const Target kCounterexample = {"counterexample", of_counterexample::feed, of_counterexample::seeds};
 
 }  // namespace cutproof::input_fuzzing

@@ -3,7 +3,7 @@
 #include "tests/input_fuzzing/targets.h"
 
 namespace cutproof::input_fuzzing {
-namespace {
+namespace of_question {
 
 Outcome feed(std::string_view bytes) { return feed_document(bytes, "a question", guests::question_from_json); }
 
@@ -23,8 +23,8 @@ std::vector<std::string> seeds() {
   return seeds;
 }
 
-}  // namespace
+}  // namespace of_question
 
-const Target kQuestion = {"question", feed, seeds};
+const Target kQuestion = {"question", of_question::feed, of_question::seeds};
 
 }  // namespace cutproof::input_fuzzing

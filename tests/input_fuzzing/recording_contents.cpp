@@ -11,7 +11,7 @@
 #include "tests/model/recorded_items.h"
 
 namespace cutproof::input_fuzzing {
-namespace {
+namespace of_recording_contents {
 
 namespace hdf5 = io::hdf5;
 
@@ -208,8 +208,8 @@ std::vector<std::string> seeds() {
   return seeds;
 }
 
-}  // namespace
+}  // namespace of_recording_contents
 
-const Target kRecordingContents = {"recording_contents", feed, seeds};
+const Target kRecordingContents = {"recording_contents", of_recording_contents::feed, of_recording_contents::seeds};
 
 }  // namespace cutproof::input_fuzzing

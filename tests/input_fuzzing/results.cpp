@@ -9,7 +9,7 @@
 #include "tests/input_fuzzing/targets.h"
 
 namespace cutproof::input_fuzzing {
-namespace {
+namespace of_results {
 
 // A campaign, a measurement.
 void feed_document(const nlohmann::json& document, const std::string& file) {
@@ -144,8 +144,8 @@ std::vector<std::string> seeds() {
   return {run.dump(), check.dump(), campaign.dump(), limits.dump(), tune.dump()};
 }
 
-}  // namespace
+}  // namespace of_results
 
-const Target kResults = {"results", feed, seeds};
+const Target kResults = {"results", of_results::feed, of_results::seeds};
 
 }  // namespace cutproof::input_fuzzing

@@ -6,7 +6,7 @@
 #include "tests/input_fuzzing/targets.h"
 
 namespace cutproof::input_fuzzing {
-namespace {
+namespace of_scene {
 
 Outcome feed(std::string_view bytes) {
   return outcome_of([&] {
@@ -56,8 +56,8 @@ std::vector<std::string> seeds() {
   return seeds;
 }
 
-}  // namespace
+}  // namespace of_scene
 
-const Target kScene = {"scene", feed, seeds};
+const Target kScene = {"scene", of_scene::feed, of_scene::seeds};
 
 }  // namespace cutproof::input_fuzzing
