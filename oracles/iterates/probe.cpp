@@ -9,6 +9,7 @@
 #include "oracles/iterates/substep_judge.h"
 #include "oracles/noise.h"
 #include "oracles/rounding.h"
+#include "oracles/shape_sums.h"
 #include "oracles/single_substep.h"
 #include "oracles/support.h"
 

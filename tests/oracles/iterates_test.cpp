@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "model/at.h"
 #include "oracles/iterates/probe.h"
 #include "reference_cpu/reference.h"
 #include "tests/oracles/pressed_block.h"
