@@ -428,7 +428,7 @@ Vec3 StepModel::Run::placed(std::size_t i, Vec3 free, Vec3 start, const Vec3* pr
       std::min(out_.lead[i], found.in_turn ? 0 : std::max(0.0, found.lead - kNearRounds * u_ * contacts.rounds(free)));
   if (!disturbed_) out_.hold[i] = std::min(out_.hold[i], found.hold);
   if (!found.in_turn || present == nullptr || contacts.has_friction()) return x;
-  const double margin = Contact::refusal_margin(norm(stored(i, *present)), free, *present, u_ - kUnitRoundoff);
+  const double margin = Contact::refusal_margin(norm(stored(i, *present)), free, *present, u_);
   const double there = norm(x - free), here = norm(*present - free);
   if (exceeds(i, there - here - margin, 0)) return *present;
   raised = std::max(0.0, there * there - here * here);
