@@ -166,7 +166,10 @@ Vec3 Contact::place(Vec3 free, int side, Vec3 start, Found& found, const Roundin
       x = rubbed(x, was - start, way / pressed, blade_friction_ * pressed, found);
     }
   }
-  return projected(x, side, found, rounding);
+  const Vec3 end = projected(x, side, found, rounding);
+  // Where friction has taken it so near to the rim, the last turn makes much of a rounding.
+  if (!has_plate_ || rounding.between_turns == nullptr || norm(end - x) < clearance_ / 2) return end;
+  return projected(x + rounding.near * rounding.between_turns->vector(), side, found, rounding);
 }
 
 Vec3 Contact::origin_of(Vec3 seen, Vec3 free) const {
