@@ -413,7 +413,8 @@ def write_table(rows):
         " suspected property. *Took*: cases of a random property or campaign until the find, schedules of a simulated"
         " machine, or a unit test. *Counterexample*: what `cutproof fuzz` has made of the case that it found.",
         "",
-        f"{sum(1 for row in rows if row['found'])} of {len(rows)} found. {simplicity(rows)}",
+        f"{sum(1 for row in rows if row['found'])} of {len(rows)} found, in"
+        f" {sum(row['seconds'] for row in rows) / 3600:.1f} hours of one copy. {simplicity(rows)}",
     ]
     for stage in STAGES:
         of_stage = [row for row in rows if row["stage"] == stage]
