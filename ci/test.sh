@@ -17,7 +17,7 @@ if [ "${CUTPROOF_WHOLE:-}" != 1 ]; then
   export CUTPROOF_CASES=${CUTPROOF_CASES:-500}
   [ -e /dev/nvidiactl ] || kernels=(-DCMAKE_CUDA_ARCHITECTURES=90a-real)
 fi
-cmake --preset "$preset" -DBUILD_TESTING=ON "${werror[@]}" "${kernels[@]}" >/dev/null
+cmake --preset "$preset" --no-warn-unused-cli -DBUILD_TESTING=ON "${werror[@]}" "${kernels[@]}" >/dev/null
 build=build/$preset
 cmake --build "$build"
 
