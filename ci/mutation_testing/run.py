@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Mutation testing: applies one mutant at a time to a copy of the code and asks the gate to find it.
 
-Usage: run.py [--only NAME...] [--shard I/N] [--jobs N] [--json F] [--check]
+Usage: run.py [--only NAME...] [--shard I/N] [--jobs N] [--json F] [--check] [--prepare]
        run.py --alone [--only NAME...] [--shard I/N] [--jobs N] --json F
                                   what a user's commands find without this project's tests (ALONE, below)
        run.py --merge JSON...     makes the table of runs of parts; runs nothing. Results of --alone
@@ -400,8 +400,12 @@ def write_alone(by_itself):
             lines.append(f"| {stage} | " + " | ".join(counts) + " |")
     missed = [name for name in sorted(by_itself) if not any(by_itself[name].values())]
     section = "\n".join(lines + ["", f"None of them finds: {', '.join(missed) or 'no mutant'}."]) + "\n\n"
-    head, *sections = re.split(r"^(?=## )", TABLE.read_text(), flags=re.MULTILINE)
+    head, *sections = sections_of_table()
     TABLE.write_text(head + section + "".join(s for s in sections if ALONE_TITLE not in s))
+
+
+def sections_of_table():
+    return re.split(r"^(?=## )", TABLE.read_text(), flags=re.MULTILINE)
 
 
 def write_table(rows):
@@ -416,6 +420,8 @@ def write_table(rows):
         f"{sum(1 for row in rows if row['found'])} of {len(rows)} found, in"
         f" {sum(row['seconds'] for row in rows) / 3600:.1f} hours of one copy. {simplicity(rows)}",
     ]
+    # What a run of --alone has made stays.
+    lines += ["", *(section.strip() for section in sections_of_table() if ALONE_TITLE in section)]
     for stage in STAGES:
         of_stage = [row for row in rows if row["stage"] == stage]
         if not of_stage:
@@ -493,6 +499,7 @@ def main():
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="of the builds")
     parser.add_argument("--json", metavar="F", help="write the results there as well")
     parser.add_argument("--alone", action="store_true", help="what campaigns and checked scenes find of simulators' mutants")
+    parser.add_argument("--prepare", action="store_true", help="only make and build the copy")
     parser.add_argument("--check", action="store_true", help="only whether every mutant applies to the code as it is")
     parser.add_argument("--merge", nargs="+", metavar="JSON", help="the table of runs of parts; runs nothing")
     options = parser.parse_args()
@@ -523,6 +530,9 @@ def main():
     for mutant in mutants:
         apply(mutant, check_only=True)
     configure()
+    if options.prepare:
+        build({"all"}, options.jobs)
+        return 0
     if options.alone:
         return run_alone([mutant for mutant in mutants if mutant.stage != "judge"], options)
     holds = True
