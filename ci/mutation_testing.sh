@@ -16,12 +16,12 @@ for ((i = 1; i <= copies; ++i)); do
   parts+=("${work}_$i.json")
   rm -f "${work}_$i.json"
   # A build knows where it lies, so each copy takes the place of the first, for those who run in it.
-  unshare --mount bash -c 'cp -a "$1" "$1_$2" && mount --bind "$1_$2" "$1" && exec python3 ci/mutation_testing/run.py "${@:3}"' \
+  unshare --mount bash -c 'rm -rf "$1_$2" && cp -a "$1" "$1_$2" && mount --bind "$1_$2" "$1" && exec python3 ci/mutation_testing/run.py "${@:3}"' \
     part "$work" "$i" --shard "$i/$copies" --jobs $(($(nproc) / copies + 1)) --json "${work}_$i.json" "$@" &
 done
 status=0
 for ((i = 1; i <= copies; ++i)); do wait -n || status=$(($? > status ? $? : status)); done
 rm -rf "${work}"_[0-9]*[0-9] "${work}"_[0-9]
-[ "$status" -le 1 ] || { echo "ci/mutation_testing.sh: a part ended with an error; run it again with --shard I/$copies --json" >&2; exit "$status"; }
+[ "$status" -le 1 ] || { echo "ci/mutation_testing.sh: a part stopped at a mutant, named above; mend the mutant and run again" >&2; exit "$status"; }
 [ $# -gt 0 ] && exit "$status"
 exec python3 ci/mutation_testing/run.py --merge "${parts[@]}"

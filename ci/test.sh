@@ -37,5 +37,5 @@ fi
 ctest --test-dir "$build" --output-on-failure --no-tests=error "${left_out[@]}" -j "$(($(nproc) + 1))" --output-junit "$PWD/$report" || status=$?
 [ -s "$report" ] || { echo "no test was run"; echo "0 passed, 1 failed, 0 skipped"; exit 1; }
 echo "$long"
-echo "RANDOM CASES: ${CUTPROOF_CASES:-2000} a property (ci/nightly.sh draws 2000)"
+echo "RANDOM CASES: ${CUTPROOF_CASES:-2000} a property (ci/nightly.sh draws 2000, of which every class has to occur)"
 exec python3 ci/count_tests.py "$report" "$status" "$("$build/cli/cutproof" info | grep -E "^ +gpu ")"

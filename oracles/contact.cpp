@@ -167,7 +167,8 @@ Vec3 Contact::place(Vec3 free, int side, Vec3 start, Found& found, const Roundin
     }
   }
   const Vec3 end = projected(x, side, found, rounding);
-  // Where friction has taken it so near to the rim, the last turn makes much of a rounding.
+  // Friction may have taken it near to the rim. The last turn leads it out to the clearance, and multiplies a rounding
+  // by the ratio of both distances: by two or more where half the clearance is left of the way.
   if (!has_plate_ || rounding.between_turns == nullptr || norm(end - x) < clearance_ / 2) return end;
   return projected(x + rounding.near * rounding.between_turns->vector(), side, found, rounding);
 }

@@ -19,8 +19,8 @@ class Contact {
   bool any() const { return has_plate_ || !walls_.empty(); }
   bool has_plate() const { return has_plate_; }
   bool has_friction() const { return wall_friction_ > 0 || blade_friction_ > 0; }
-  // Two particles that would go to points a distance d apart end at most so many times d apart: friction takes back as
-  // much as what presses, times μ.
+  // Two particles that would go to points a distance d apart end at most so many times d apart, but for the rim of the
+  // plate: friction takes back as much as what presses, times μ.
   double widened_by_friction() const { return (1 + wall_friction_) * (1 + blade_friction_); }
   // Friction, or room that is not convex.
   bool path_matters() const { return has_plate_ || has_friction(); }
