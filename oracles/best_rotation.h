@@ -25,9 +25,8 @@ BestRotation best_rotation(const Mat3& a);
 // (value - tr(Rᵀ A)) / Σσ, in [-error, 2] for rotations. Requires R finite.
 double objective_gap(const BestRotation& best, const Mat3& r);
 
-// The rotation that takes v to u and is the nearest of those to P: P followed by the shortest turn. `weight`, in
-// [0, 1], falls to 0 where P v = -u and every such rotation is as near as another; rounding is amplified by its
-// inverse.
+// The rotation that takes v to u and is the nearest of those to P: P followed by the shortest turn. `weight` is cos² of
+// half that turn: 0 where P v = -u and every such rotation is as near. Rounding grows by 1 / √weight.
 struct NearestRotation {
   Mat3 r;
   double weight = 0;

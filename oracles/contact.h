@@ -19,8 +19,8 @@ class Contact {
   bool any() const { return has_plate_ || !walls_.empty(); }
   bool has_plate() const { return has_plate_; }
   bool has_friction() const { return wall_friction_ > 0 || blade_friction_ > 0; }
-  // Two particles that would go to points a distance d apart end at most so many times d apart, but for the rim of the
-  // plate: friction takes back as much as what presses, times μ.
+  // Lipschitz constant of place() in `free`, away from the rim of the plate: friction moves a particle by up to μ times
+  // its depth, so each surface with friction multiplies by 1 + μ.
   double widened_by_friction() const { return (1 + wall_friction_) * (1 + blade_friction_); }
   // Friction, or room that is not convex.
   bool path_matters() const { return has_plate_ || has_friction(); }
@@ -30,8 +30,8 @@ class Contact {
   // On which side of it a particle ends, +1 or -1; 0 where it does not end over the plate, by `rim` at least [m], or
   // ends less than half a clearance from it.
   int side_of_end(Vec3 x, double rim) const;
-  // What arithmetic rounds on the way to a contact at x, in units of u [m]: the blade's pose, the way into its frame
-  // and back, the offset of a wall.
+  // What arithmetic rounds on the way to a contact at x, in units of u [m]: 6 times the distance from the blade's edge
+  // plus that of the edge from the origin, or the greatest offset of a wall if that is more.
   double rounds(Vec3 x) const;
 
   // By how much x is inside of what a particle of this side may not enter [m]; not above 0: it may be there. Beside a

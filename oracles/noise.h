@@ -1,4 +1,4 @@
-// Roundings at random, the same everywhere. Internal to oracles/.
+// Random rounding errors, the same on every machine. Internal to oracles/.
 #pragma once
 #include <bit>
 #include <cmath>
@@ -11,12 +11,12 @@ namespace cutproof::oracles {
 // Uniform in [-1, 1] (Vigna's splitmix64).
 class Noise {
  public:
-  // `alike`: numbers that agree to that, relative to themselves, round alike; 0: each for itself.
+  // `alike`: numbers that agree to this share of themselves draw the same error; 0: each draws its own.
   explicit Noise(uint64_t seed, double alike = 0)
       : alike_(alike), seed_(seed * 0x9e3779b97f4a7c15u), state_(seed_), of_equals_(seed_) {}
   virtual ~Noise() = default;
   virtual double operator()() { return drawn(state_); }
-  // Draws from here on are those of this name, whatever was drawn before.
+  // Draws from here on are those of this key, whatever was drawn before.
   void name(uint64_t what, uint64_t index, uint64_t time) {
     const auto of = [&](uint64_t k) { return seed_ ^ (what << 60 ^ time << 32 ^ k) * 0xd1342543de82ef95u; };
     state_ = of(index);
@@ -33,7 +33,7 @@ class Noise {
     const double a = (*this)(), b = (*this)(), c = (*this)();
     return {a, b, c};
   }
-  // Each component by at most so much of its own size, and by at most `more`.
+  // An error for each component, uniform, of amplitude |size| + more.
   Vec3 off(Vec3 size, double more) {
     Vec3 r = vector();
     for (int k = 0; alike_ > 0 && k < 3; ++k) {

@@ -83,9 +83,9 @@ inline constexpr StageOracle component_momentum{"component momentum", Stage::ste
 // Vacuous where none of these can be asked: a blade that is down, friction or a grip may push to any side.
 inline constexpr StageOracle motion{"motion", Stage::step};
 // The step, computed again from the state before it, by an oracle that shares no line with any backend: where every
-// particle, velocity, rotation and the impulse may be, given the rounding of the state's precision. One outcome of what
-// rounding decides must explain all coupled particles. `measured` and `bound` as above; `undecided` counts particles of
-// which only a blunt question can be asked.
+// particle, velocity, rotation and the impulse may be, given the rounding of the state's precision. Where a decision
+// hangs on rounding, all that is coupled with it has wider bounds. `measured` and `bound` as above; `undecided` counts
+// what no sharp bound was asked of.
 inline constexpr StageOracle admissible_step{"admissible step", Stage::step, motion_properties};
 inline constexpr StageOracle detection{"detection",
                                        Stage::detect};  // removed <=> as the criterion says, outside the band

@@ -1,4 +1,4 @@
-// What single operations of shape matching round, by the numbers that enter them (tolerances.md, The step again, What
+// What single operations of shape matching round, by the numbers that enter them (tolerances.md, What a step
 // rounds). Internal to oracles/.
 #pragma once
 #include <algorithm>
@@ -10,7 +10,8 @@
 
 namespace cutproof::oracles {
 
-// A sum of N terms, one after the other, in units of u times the sum of their sizes: in standard deviations.
+// A sum of N terms, one after the other, in units of u times the sum of their sizes: the amplitude of a uniform error.
+// Products round twice; partial sums that grow evenly round by √(N / 3) at most, taken as √N / 2.
 inline double sum_rounds(double terms) { return 2 + std::sqrt(terms) / 2; }
 
 // The same at most, in whatever order and however the roundings are related: terms of a grid are equal, and then all

@@ -24,7 +24,7 @@ constexpr double kEqualRounds = 256;
 // Entries of RᵀR - I, in units of u: R is made of a unit quaternion, whose length is off by 2 u, which is 8 u in them;
 // its entries round by 4 u more, which is 2 √3 times that.
 constexpr double kOrthogonalRounds = 22;
-// Less than this of the previous rotation is nothing to go by, in whatever precision.
+// A line's rotation is undecided where cos² of half its turn is not above this: nothing is left of the previous one.
 constexpr double kNothingLeft = 1e-8;
 constexpr int kTries = 256;
 // Where the first of these are farther apart than this [h], turns of blade and walls lead anywhere, but no more than so
@@ -360,8 +360,8 @@ void SubstepJudge::particle(int32_t i, const Candidate& candidate, Vec3 seen, Ve
   if (!is_clear) push_in_doubt_ += mass / 2 * norm(push);
 }
 
-// How far, at least, `seen` is from where a contact may put the particle. `after`: in: what rounds after that; out:
-// with what a candidate within `wide` makes of it.
+// How far, at least, `seen` is from where a contact may put the particle. `after`: in, what rounds after the contact;
+// out, that and what candidates within `wide` make of it. `decided`: false where these spread too far.
 double SubstepJudge::nearest_contact(int32_t i, const Candidate& candidate, Vec3 seen, Vec3 present, double wide,
                                      double& after, bool& decided) {
   const Vec3 start = began_.x[at(i)];

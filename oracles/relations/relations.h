@@ -39,8 +39,8 @@ Verdict translation_is_exact(Backend& backend, const Setup& setup, const State& 
 // acceleration over the first alone, which is plain.
 Verdict energy_is_monotone(Backend& backend, const Setup& setup, const State& state, int32_t iterations);
 enum class Iterates : uint8_t;  // oracles/iterates/probe.h
-// Every iterate of the step of frame state.frame follows from the one before it, within the rounding of one iteration
-// (tolerances.md, Iterate by iterate); of sampled ones `seed` says which.
+// Iterates of the step of frame state.frame, all or a sample by `seed`, follow from the ones before them, within the
+// rounding of one iteration (tolerances.md, Iterate by iterate).
 Verdict step_by_iterates(Backend& backend, const Setup& setup, const State& state, Iterates wanted, uint64_t seed);
 
 }  // namespace cutproof::oracles
