@@ -179,7 +179,6 @@ class StepModel::Run {
         lasting_((wanted.disturbance + 1) / 2, wanted.disturbance % 2 == 0 ? -1 : +1),
         lost_(static_cast<Lost>(wanted.disturbance % 4)),
         coordinate_(wanted.disturbance / 4 % 6),
-        threshold_(degenerate_rounds(model.u_) * model.u_ / static_cast<double>(2 << wanted.disturbance / 4 % 4)),
         u_(model.u_),
         draws_(~wanted.disturbance),
         stores_positions_(before_.precision != Precision::binary32) {
@@ -238,9 +237,8 @@ class StepModel::Run {
 
   void substep(int32_t s);
   void match_shapes(int32_t s, int32_t j);
-  // `summed`: A before its sum is rounded. `size`: of all terms of A. `noise`: what the rounding of places makes of A.
-  Mat3 rotation_of(int32_t c, const Eigen::Matrix3d& a, const Eigen::Matrix3d& summed, double size, double noise,
-                   bool is_last);
+  // `size`: of all terms of A. `noise`: what the rounding of places makes of A.
+  Mat3 rotation_of(int32_t c, const Eigen::Matrix3d& a, double size, double noise, bool is_last);
   Mat3 one_of_many(BestRotation best, const Mat3& previous, bool all);
   bool keeps_rotation();
   // Whether `lead`, of one outcome over another, is above 0; anything where that is drawn. `rounds`: what it rounds
@@ -274,9 +272,8 @@ class StepModel::Run {
   // How a disturbed run draws the rotation of a cluster whose matrix is no more than rounding, one run this way, the
   // next that way: the best of that noise; any; the best where places differ in one coordinate alone, as they do on
   // walls, each of six directions in turn; the previous one. Which way a pair falls apart may decide where it ends, and
-  // draws of one kind leave out one of the ways. On a line, every second run draws any turn about it, or what noise
-  // makes of it; the others have a threshold as backends do, each another one: layers that are flat to the bit keep
-  // their turn while one that has just become flat is turned by noise.
+  // draws of one kind leave out one of the ways. On a line, any turn about it, and every second time what noise makes
+  // of it.
   enum class Lost : uint8_t { noise, any, coordinate, kept };
 
   const StepModel& model_;
@@ -290,7 +287,6 @@ class StepModel::Run {
   OppositeNoise lasting_;  // of what stays the same throughout a run
   const Lost lost_;
   const std::size_t coordinate_;  // of ±x, ±y, ±z
-  const double threshold_;        // of this run, for what is degenerate
   const double u_;
   Noise draws_;  // of decisions
   const bool stores_positions_;
@@ -327,8 +323,7 @@ Mat3 StepModel::Run::one_of_many(BestRotation best, const Mat3& previous, bool a
 }
 
 // The best rotation; the previous one where there is no extent, the nearest to it along a line.
-Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, const Eigen::Matrix3d& summed, double size,
-                                 double noise, bool is_last) {
+Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, double size, double noise, bool is_last) {
   const Cluster& cluster = model_.clusters_[at(c)];
   const Mat3& previous = out_.rotation[at(c)];
   double& rounding = out_.turn_rounding[at(c)];
@@ -370,11 +365,6 @@ Mat3 StepModel::Run::rotation_of(int32_t c, const Eigen::Matrix3d& a, const Eige
     note_open(c);
     if (is_lost && keeps_rotation()) return previous;
     const BestRotation best = best_rotation(to_mat3(a));
-    if (!is_lost && (lost_ == Lost::coordinate || lost_ == Lost::kept)) {
-      const Eigen::Vector3d exact = Eigen::JacobiSVD<Eigen::Matrix3d>(summed).singularValues();
-      const bool is_below = exact[1] + exact[2] <= threshold_ * exact[0];
-      return is_below ? nearest_of_rank_one(best, previous).r : to_mat3(u * v.transpose());
-    }
     // What noise alone makes of it, every second time: contacts give that a direction of its own.
     if (disturbed_ && (!is_lost || lost_ == Lost::noise) && noise_() < 0) return to_mat3(u * v.transpose());
     return one_of_many(best, previous, is_lost);
@@ -496,7 +486,7 @@ void StepModel::Run::match_shapes(int32_t s, int32_t j) {
         }
       }
       t += noise_.off((2 * u_) * center, mean_amplitude);
-      r = rotation_of(c, a, as_eigen(sum), size.sum(), u_ * farthest / share_ * cluster.arms, is_last);
+      r = rotation_of(c, a, size.sum(), u_ * farthest / share_ * cluster.arms, is_last);
       const Vec3 turn = turn_amplitude_ * noise_.vector();
       if (cluster.extent != Cluster::Extent::point) {
         for (int column = 0; column < 3; ++column) {
@@ -505,7 +495,7 @@ void StepModel::Run::match_shapes(int32_t s, int32_t j) {
         }
       }
     } else {
-      r = rotation_of(c, a, a, size.sum(), u_ * farthest / share_ * cluster.arms, is_last);
+      r = rotation_of(c, a, size.sum(), u_ * farthest / share_ * cluster.arms, is_last);
     }
     out_.rotation[at(c)] = r;
     if (disturbed_) t -= r * rest_off_[at(c)];
