@@ -130,8 +130,8 @@ class Judge {
       const bool is_any = !is_known(at(c)) && is_open(at(c)) && reach_[at(c)] > 0;
       if (is_any) sets.insert(coupled_.label[at(before_.clusters.of(c).front())]);
     }
-    return !sets.empty() && std::all_of(violations_.begin(), violations_.end(),
-                                        [&](int32_t i) { return sets.contains(coupled_.label[at(i)]); });
+    return !violations_.empty() && std::all_of(violations_.begin(), violations_.end(),
+                                               [&](int32_t i) { return sets.contains(coupled_.label[at(i)]); });
   }
   AdmissibleStep nothing_known() const {
     AdmissibleStep found;
@@ -339,8 +339,8 @@ class Judge {
     }
   }
 
-  // Where rounding is carried so far that small changes are no rule any more, all that is coupled is asked one blunt
-  // question: no farther than the farthest of the runs brings any of it.
+  // Where rounding grows so far that small changes are no rule any more, all that is coupled gets one coarse bound: the
+  // widest of any of it. Rotations there are not asked for.
   void ask_bluntly() {
     Bounds& b = bounds_;
     const std::size_t sets = at(coupled_.count) + 1;

@@ -351,6 +351,19 @@ TEST(AdmissibleStep, FollowsTheRotationThatWasTakenAfterHalfATurn) {
   }
 }
 
+// A rotation that nobody states excuses what is coupled with it, and not the impulse.
+TEST(AdmissibleStep, RejectsAnImpulseBesideARotationThatIsNotStated) {
+  StepScene scene{setup_of(block_body(5, 1, 1, kSpacing)), {}, {}};
+  scene.before = state_of(scene.setup.body, {{0, 1, 2, 3, 4}});
+  scene.before.clusters.rotation[0] = {{-1, 0, 0, 0, -1, 0, 0, 0, 1}};
+  scene.take_step();
+  const std::vector<RotationKnown> known = {RotationKnown::no};
+  const auto holds = [&] { return nearest_admissible_step(scene.setup, scene.before, scene.after, known).holds; };
+  EXPECT_TRUE(holds());
+  scene.after.impulse.x += 1e-3 * scene.setup.body.mass[0] * kSpacing / scene.setup.substep_length[0];
+  EXPECT_FALSE(holds());
+}
+
 // A pair that contacts have pressed together falls apart along one coordinate in some disturbed run, this way and that:
 // that is how rounding leaves it on an edge. In another it keeps its rotation, as where a backend finds nothing but
 // zeros. No direction at random comes so near.
