@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <cstring>
 #include <map>
 #include <memory>
 #include <type_traits>
@@ -20,6 +21,26 @@
 namespace cutproof::gpu {
 
 namespace {
+
+// Memory of the host into which the device copies by itself. It grows and never shrinks: making it takes long.
+class LandingPlace {
+ public:
+  // More is not worth the memory: copies of large arrays go fast without it.
+  static constexpr std::size_t kMost = std::size_t{64} << 20;
+  std::byte* at_least(std::size_t bytes) {
+    if (bytes > bytes_) {
+      memory_.reset();
+      bytes_ = 0;
+      memory_ = make_pinned_memory(bytes + bytes / 2);
+      bytes_ = bytes + bytes / 2;
+    }
+    return static_cast<std::byte*>(memory_.get());
+  }
+
+ private:
+  PinnedMemory memory_;
+  std::size_t bytes_ = 0;
+};
 
 // The arrays of a DeviceView on the device.
 class DeviceArrays {
@@ -51,16 +72,32 @@ class DeviceArrays {
 
   const DeviceView& view() const { return view_; }
 
-  // Copies what belongs to the state, as far as it is in use, into the staging's vectors.
-  void download(StagingBuffers& staging) const {
-    Counters& counters = staging.counters.front();
-    CUTPROOF_CUDA(cudaMemcpy(&counters, view_.counters, sizeof(Counters), cudaMemcpyDeviceToHost));
+  // Copies what belongs to the state, as far as it is in use, into the staging's vectors. `counters`: those of the
+  // device. The copies wait for none but the stream, and are waited for together.
+  void download(StagingBuffers& staging, const Counters& counters, cudaStream_t stream, LandingPlace& landing) const {
     static_cast<Extents&>(staging) = in_use(view_, counters);
     DeviceView pointers = view_;
-    staging.each(pointers, [](const auto& array, auto& vector, auto& pointer) {
-      if (array.lifetime != Lifetime::state) return;
-      vector.resize(static_cast<std::size_t>(array.extent));
-      CUTPROOF_CUDA(cudaMemcpy(vector.data(), pointer, vector.size() * sizeof(*pointer), cudaMemcpyDeviceToHost));
+    const auto each_array = [&](const auto& use) {
+      std::size_t begin = 0;
+      staging.each(pointers, [&](const auto& array, auto& vector, auto& pointer) {
+        if (array.lifetime != Lifetime::state) return;
+        const std::size_t bytes = static_cast<std::size_t>(array.extent) * sizeof(*pointer);
+        use(vector, pointer, begin, bytes);
+        begin += (bytes + 15) / 16 * 16;
+      });
+      return begin;
+    };
+    const std::size_t all = each_array(
+        [](auto& vector, auto& pointer, std::size_t, std::size_t bytes) { vector.resize(bytes / sizeof(*pointer)); });
+    std::byte* const landed = all <= LandingPlace::kMost ? landing.at_least(all) : nullptr;
+    each_array([&](auto& vector, auto& pointer, std::size_t begin, std::size_t bytes) {
+      void* const to = landed != nullptr ? static_cast<void*>(landed + begin) : vector.data();
+      if (bytes > 0) CUTPROOF_CUDA(cudaMemcpyAsync(to, pointer, bytes, cudaMemcpyDeviceToHost, stream));
+    });
+    CUTPROOF_CUDA(cudaStreamSynchronize(stream));
+    if (landed == nullptr) return;
+    each_array([&](auto& vector, auto&, std::size_t begin, std::size_t bytes) {
+      if (bytes > 0) std::memcpy(vector.data(), landed + begin, bytes);
     });
   }
 
@@ -134,7 +171,8 @@ class GpuBackend final : public KernelBackend {
   std::vector<State> snapshot_of(const std::vector<bool>& wanted) const override {
     use_device();
     wait();
-    device_.download(load_.staging);
+    device_.download(load_.staging, runs_ > 0 ? counters()[last()] : load_.staging.counters.front(), stream_.get(),
+                     landing_);
     return load_.states_of(wanted);
   }
 
@@ -210,7 +248,8 @@ class GpuBackend final : public KernelBackend {
   PinnedMemory counters_ = make_pinned_memory(kInFlight * sizeof(Counters));
   uint64_t runs_ = 0;  // since the load
   Span span_;
-  mutable Load load_;  // snapshots download to its staging buffers
+  mutable Load load_;  // snapshots download to its staging buffers, by way of landing_
+  mutable LandingPlace landing_;
   DeviceArrays device_;
   std::map<std::pair<int, int>, DeviceGraph> graphs_;
 };
