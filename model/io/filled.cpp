@@ -18,8 +18,9 @@ const nlohmann::json& value_at(const std::string& path, const nlohmann::json& va
   return *value;
 }
 
-std::string figure(const nlohmann::json& value, double factor, const std::string& format) {
+std::string text_of(const nlohmann::json& value, double factor, const std::string& format) {
   if (value.is_null()) return "-";
+  if (value.is_boolean()) return value ? "yes" : "no";
   if (value.is_string()) return printable(value.get_ref<const std::string&>());  // begins no line of its own
   if (format.empty()) return value.dump();
   return fmt::format(fmt::runtime("{" + format + "}"), factor * value.get<double>());
@@ -27,17 +28,23 @@ std::string figure(const nlohmann::json& value, double factor, const std::string
 
 }  // namespace
 
-std::string filled(const std::string& text, const nlohmann::json& values) {
+std::string filled(const std::string& text, const Figure& figure) {
   static const std::regex kFigure(R"(\{(?:([-.e0-9]+)\*)?([^{}:]+)(:[^{}]*)?\})");
   std::string result;
   auto rest = text.begin();
   for (std::sregex_iterator found(text.begin(), text.end(), kFigure), end; found != end; ++found) {
     const std::smatch& match = *found;
     result.append(rest, match[0].first);
-    result += figure(value_at(match[2], values), match[1].matched ? std::stod(match[1]) : 1, match[3]);
+    result += figure(match[2], match[1].matched ? std::stod(match[1]) : 1, match[3]);
     rest = match[0].second;
   }
   return result.append(rest, text.end());
+}
+
+std::string filled(const std::string& text, const nlohmann::json& values) {
+  return filled(text, [&](const std::string& path, double factor, const std::string& format) {
+    return text_of(value_at(path, values), factor, format);
+  });
 }
 
 }  // namespace cutproof::io
