@@ -7,18 +7,7 @@ namespace {
 void print_seed(const nlohmann::json& document) { say_filled("seed {seed}\n", document); }
 
 void print_baselines(const nlohmann::json& document) {
-  const std::vector<Column> columns = {
-      {"", "{name}"},
-      {"ms per frame", "{1e3*seconds/median:.3g}"},
-      {"isolated", "{isolated}"},
-      {"tissue/coupling/skin", "{components}/{couplings}/{shells}"},
-      {"unequal frames", "{unequal_frames} of {frames}"},
-      {"lost/area [h]", "{geometry/lost_per_area:.3g}"},
-      {"ideal [h]", "{geometry/least_per_area:.3g}"},
-      {"Hausdorff [h]", "{geometry/hausdorff:.3g}"},
-      {"interpenetration [h³]", "{interpenetration/volume:.3g} ± {interpenetration/bound:.2g}"},
-      {"clusters", "{clusters_before} -> {clusters}"}};
-  say_as_it_is(fmt::format("\n{}\n", table_of(document.at("rows"), columns)));
+  say_as_it_is("\n" + table_of(document.at("rows"), columns_of(report::kBaselinesSuite)) + "\n");
   say("ideal: the least that removing particles can lose; a blade without thickness would lose nothing.\n"
       "The two that delete are emulated beside the backend: their time is that of step, detect and skin.\n");
   if (!document.at("holds")) {

@@ -143,21 +143,8 @@ void print_scene(const nlohmann::json& document) {
   print_failures(row.at("error").at("frame"));
 }
 
-void print_scenes(const nlohmann::json& document, const std::vector<Column>& beside_clusters,
-                  const std::vector<Column>& beside_times) {
-  std::vector<Column> columns = {{"median ms", "{scene}"},
-                                 {"iterations", "{substeps} × {iterations}"},
-                                 {"acceleration", "{acceleration}"},
-                                 {"particles", "{particles}"},
-                                 {"clusters", "{clusters}"}};
-  columns.insert(columns.end(), beside_clusters.begin(), beside_clusters.end());
-  for (const std::string_view stage : kStageNames) {
-    columns.emplace_back(std::string(stage), fmt::format("{{1e3*seconds/{}/median:.4g}}", stage));
-  }
-  columns.emplace_back("frame", "{1e3*seconds/frame/median:.4g}");
-  columns.emplace_back("least", "{1e3*seconds/frame/min:.4g}");
-  columns.emplace_back("most", "{1e3*seconds/frame/max:.4g}");
-  columns.insert(columns.end(), beside_times.begin(), beside_times.end());
+void print_scenes(const nlohmann::json& document, const report::Suite& suite) {
+  std::vector<Column> columns = columns_of(suite);
   for (const auto& [head, what] : {std::pair{"error of step", "step"}, {"topology", "frame"}}) {
     columns.emplace_back(head, [what = what](const nlohmann::json& row) {
       return benchmarks::in_words(row.at("error").at(what), "not measured");
@@ -173,6 +160,13 @@ void print_failures(const nlohmann::json& frame_error) {
   }
 }
 
-std::string percent(double change) { return fmt::format("{:+.1f} %", 100 * change); }
+std::vector<Column> columns_of(const report::Suite& suite) {
+  std::vector<Column> shown;
+  for (const report::RowColumn& column : suite.columns()) {
+    if (column.shown == report::Shown::page) continue;
+    shown.emplace_back(column.head, [column](const nlohmann::json& row) { return terminal_text(column, row); });
+  }
+  return shown;
+}
 
 }  // namespace cutproof::cli

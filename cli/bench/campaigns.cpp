@@ -12,34 +12,8 @@ void print_row_of_campaigns(const json& document) {
   say_filled("{campaign}, {backend}: {cases_per_second:.0f} cases/s\n", row);
 }
 
-// Of the time of all threads.
-std::string share(const json& row, const char* what) {
-  double sum = 0;
-  for (const json& seconds : row.at("thread_seconds")) sum += seconds.get<double>();
-  return sum > 0 ? fmt::format("{:.0f} %", 100 * row.at("thread_seconds").at(what).get<double>() / sum) : "-";
-}
-
 void print_campaigns(const json& document) {
-  std::vector<Column> columns = {{"campaign", "{campaign}"},
-                                 {"backend", "{backend}"},
-                                 {"devices", [](const json& row) { return std::to_string(row.at("devices").size()); }},
-                                 {"particles", "{mean_particles:.0f}"},
-                                 {"batch", "{batch}"},
-                                 {"threads", "{threads}"},
-                                 {"cases/s", "{cases_per_second:.4g}"},
-                                 {"of reference", "{of_reference:.2f}"}};
-  for (const char* const part : {"generating", "simulating", "reference", "judging", "waiting"}) {
-    columns.push_back({part, [part](const json& row) { return share(row, part); }});
-  }
-  columns.push_back({"verdicts a case", [](const json& row) {
-                       const double cases = row.at("cases").get<double>();
-                       return cases > 0 ? fmt::format("{:.1f}", row.at("error").at("verdicts").get<double>() / cases)
-                                        : "-";
-                     }});
-  columns.push_back({"violations", "{error/violations}"});
-  columns.push_back({"undecided", "{error/undecided} of {error/checked}"});
-  columns.push_back({"max h", "{error/greatest_h:.2g}"});
-  say_as_it_is("\n" + table_of(document.at("rows"), columns, 2));
+  say_as_it_is("\n" + table_of(document.at("rows"), columns_of(report::kCampaignsSuite), 2));
   say("shares are of the time of all threads: simulating is what they wait for a device, too; max h: greatest distance "
       "of a position after a step from the reference's\n");
 }

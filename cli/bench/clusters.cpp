@@ -9,10 +9,6 @@ namespace {
 
 using nlohmann::json;
 
-std::string name_of(const json& curve) {
-  return curve.at("tau").is_null() ? "no merging" : io::filled("τ = {tau:g}", curve);
-}
-
 // At the end of that frame of the scene.
 std::string clusters_at(const json& curve, int64_t scene_frame_end) {
   const auto frames = curve.at("scene_frame").get<std::vector<int64_t>>();
@@ -29,27 +25,22 @@ void print_curves(const std::vector<json>& curves) {
     row.push_back(paper);
     table.add(row);
   };
-  const auto change = [](const char* field) {
-    return [field](const json& curve) { return percent(curve.at(field).get<double>()); };
-  };
-  const auto cell = [](const char* text) { return [text](const json& curve) { return io::filled(text, curve); }; };
-  add("clusters after frame", name_of, "paper");
+  const std::vector<Column> columns = columns_of(report::kClustersSuite);
+  add("clusters after frame", columns.front().cell, "paper");
   for (int64_t frame = 0; frame <= curves.front().at("scene_frame").back().get<int64_t>(); frame += 8) {
     add(fmt::format("{}", frame), [&](const json& curve) { return clusters_at(curve, frame); });
   }
-  add("growth at the end", change("growth"), percent(benchmarks::kPaperGrowth));
-  add("greatest", change("greatest_growth"));
-  add("particles removed", cell("{removed}"));
-  add("frame, median ms", cell("{1e3*seconds/median:.4g}"));
-  add("error: verdicts that fail", [](const json& curve) {
-    return fmt::format("{} of {}", curve.at("error").at("failed").size(), curve.at("error").at("verdicts").dump());
-  });
+  for (const Column& column : columns) {
+    if (&column == &columns.front()) continue;
+    const bool is_papers = &column == &columns[1];
+    add(column.head, column.cell, is_papers ? fmt::format("{:+.1f}", 100 * benchmarks::kPaperGrowth) : "");
+  }
   say_as_it_is("\n" + table.text());
 }
 
 void print_row(const json& document) {
   const json& curve = document.at("rows").back();
-  say("{}, ", name_of(curve));
+  say("{}, ", columns_of(report::kClustersSuite).front().cell(curve));
   say_filled("{particles} particles, ", curve);
   say("{} to {} clusters\n", curve.at("clusters").front().dump(), curve.at("clusters").back().dump());
   for (const json& verdict : curve.at("error").at("failed")) {

@@ -5,15 +5,7 @@ namespace cutproof::cli {
 namespace {
 
 void print_machine_limits(const nlohmann::json& document) {
-  const auto speed = [](const nlohmann::json& row) {
-    return row.contains("bytes") ? io::filled("{1e-9*bytes_per_second:.4g}", row) : "-";
-  };
-  say_as_it_is("\n" + table_of(document.at("rows"), {{"", "{what}"},
-                                                     {"median µs", "{1e6*seconds/median:.4g}"},
-                                                     {"least", "{1e6*seconds/min:.4g}"},
-                                                     {"most", "{1e6*seconds/max:.4g}"},
-                                                     {"GB/s", speed},
-                                                     {"lost", "{lost}"}}));
+  say_as_it_is("\n" + table_of(document.at("rows"), columns_of(report::kMachineLimitsSuite)));
   if (!document.at("holds")) insist("FAILS: something that was timed did not do its work\n");
 }
 

@@ -54,10 +54,6 @@ void print_given(const json& row) {
         "step\n",
         row);
   }
-  const json& judged = row.at("judged");
-  say("  beside the reference: step {}, topology {}\n",
-      judged.at("step_max_h").is_null() ? "did not run" : io::filled("{step_max_h:.2g} h max", judged),
-      judged.at("topology_holds").get<bool>() ? "holds" : failing("FAILS"));
 }
 
 void print_parts(const json& document) {
@@ -65,24 +61,7 @@ void print_parts(const json& document) {
   const auto print = [&] {
     if (rows.empty()) return;
     print_given(rows.front());
-    const auto if_run = [](const char* text) {
-      return [text](const json& row) { return row.at("error").is_null() ? std::string("-") : io::filled(text, row); };
-    };
-    say_as_it_is(
-        table_of(rows,
-                 {{"", words_of_part},
-                  {"ms a frame", if_run("{1e3*seconds_per_frame/median:.3g} ({1e3*seconds_per_frame/min:.3g} to "
-                                        "{1e3*seconds_per_frame/max:.3g})")},
-                  {"of it", if_run("{of_given:.2f}")},
-                  {"RMS h", if_run("{error/rms_h:.2g}")},
-                  {"max h", if_run("{error/max_h:.2g}")},
-                  {"removed otherwise",
-                   [](const json& row) {
-                     if (row.at("error").is_null()) return io::filled("refused: {refused}", row);
-                     const bool same = row.at("error").at("same_components").get<bool>();
-                     return io::filled("{error/removed_otherwise}", row) + (same ? "" : ", other parts");
-                   }}},
-                 1));
+    say_as_it_is(table_of(rows, columns_of(report::kPartsSuite)));
     rows.clear();
   };
   for (const json& row : document.at("rows")) {
@@ -90,11 +69,10 @@ void print_parts(const json& document) {
     rows.push_back(row);
   }
   print();
-  say("of it: of the time of the scene as it is. RMS h, max h: how far, in any frame, tissue is from where it is in "
-      "the "
-      "scene as it is; removed otherwise: particles that only one of both has in the end; other parts: in some frame "
-      "the "
-      "tissue is in another number of pieces.\n");
+  say("Times are of a frame, relative to that of the scene as it is, without nothing. RMS, max: how far, in any frame, "
+      "tissue "
+      "is from where it is in the scene as it is; removed otherwise: particles that only one of both has in the "
+      "end.\n");
 }
 
 }  // namespace

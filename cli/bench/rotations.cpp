@@ -35,25 +35,7 @@ void print_cases(const json& document, const std::string& precision) {
 
 // One line for each method.
 void print_methods(const json& document) {
-  const auto marks = [](const json& row) -> std::string {
-    const bool front = row.at("on_front"), is_default = row.at("default");
-    return front && is_default ? "front, default" : front ? "front" : is_default ? "default" : "";
-  };
-  say_as_it_is("\n" + table_of(document.at("methods"),
-                               {{"method", "{method}"},
-                                {"precision", "{precision}"},
-                                {"worst gap", "{worst_gap:.1e}"},
-                                {"in case", "{worst_case}"},
-                                {"‖RᵀR - I‖", "{worst_orthogonality:.1e}"},
-                                {"wrong", "{wrong}"},
-                                {"NaN", "{not_finite}"},
-                                {"near ms", "{1e3*near_seconds_per_million/median:.4g}"},
-                                {"least", "{1e3*near_seconds_per_million/min:.4g}"},
-                                {"most", "{1e3*near_seconds_per_million/max:.4g}"},
-                                {"cold ms", "{1e3*cold_seconds_per_million/median:.4g}"},
-                                {"× limit", "{multiple_of_limit:.1f}"},
-                                {"", marks}},
-                               2));
+  say_as_it_is("\n" + table_of(document.at("methods"), columns_of(report::kRotationsSuite), 2));
 }
 
 void print_what_is_wrong(const json& document) {

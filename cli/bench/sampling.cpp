@@ -5,16 +5,9 @@ namespace cutproof::cli {
 namespace {
 
 void print_sampling(const nlohmann::json& document) {
-  const bool whole = document.at("scaled_down") == 1;
-  const auto to_first = [](const nlohmann::json& of) {
-    const nlohmann::json& ratio = of.at("frame_to_first");
-    return ratio.is_null() ? "-" : percent(ratio.get<double>() - 1);
-  };
-  print_scenes(document, {{"paper's", whole ? "{paper/clusters}" : "-"}},
-               {{"to first", to_first},
-                {"paper ms", "{1e3*paper/frame_seconds:.2f}"},
-                {"to first", [&](const nlohmann::json& row) { return to_first(row.at("paper")); }}});
-  if (!whole) say_filled("at 1/{scaled_down} of the paper's particles; --full takes them all\n", document);
+  print_scenes(document, report::kSamplingSuite);
+  if (document.at("scaled_down") > 1)
+    say_filled("at 1/{scaled_down} of the paper's particles; --full takes them all\n", document);
 }
 
 }  // namespace

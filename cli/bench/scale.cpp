@@ -4,16 +4,7 @@ namespace cutproof::cli {
 
 namespace {
 
-void print_scale(const nlohmann::json& document) {
-  const auto bytes_of_a_particle = [](const nlohmann::json& row) {
-    if (row.at("bytes").is_null()) return std::string("-");
-    return fmt::format("{:.0f}", row.at("bytes").get<double>() / row.at("particles").get<double>());
-  };
-  print_scenes(document, {},
-               {{"M particles/s", "{1e-6*particles_per_second:.4g}"},
-                {"MB", "{1e-6*bytes:.4g}"},
-                {"B/particle", bytes_of_a_particle}});
-}
+void print_scale(const nlohmann::json& document) { print_scenes(document, report::kScaleSuite); }
 
 }  // namespace
 

@@ -20,29 +20,7 @@ void print_row_of_sensitivity(const nlohmann::json& document) {
 }
 
 void print_sensitivity(const nlohmann::json& document) {
-  const auto within = [](const nlohmann::json& row) -> std::string {
-    const nlohmann::json& goal = row.at("within_goal");
-    return goal.is_null() ? "" : goal.get<bool>() ? "within" : "not yet";
-  };
-  say_as_it_is("\n" + table_of(document.at("rows"),
-                               {{"disturbance", "{disturbance}"},
-                                {"after", "{stage}"},
-                                {"scene", "{scene}"},
-                                {"unit", [](const nlohmann::json& row) { return words_of(row.at("unit")); }},
-                                {"least rejected", "{least:.2g}"},
-                                {"by", "{property}"},
-                                {"its measured",
-                                 [](const nlohmann::json& row) {
-                                   const std::string measured = io::filled("{measured:.2g}", row);
-                                   const nlohmann::json& unit = row.at("measured_unit");
-                                   return unit.is_null() ? measured : io::in_unit(measured, unit);
-                                 }},
-                                {"of bound", "{of_bound:.2g}"},
-                                {"rounding", "{rounding:.2g}"},
-                                {"ratio", "{ratio:.2g}"},
-                                {"goal", "{goal:.2g}"},
-                                {"", within}},
-                               3));
+  say_as_it_is("\n" + table_of(document.at("rows"), columns_of(report::kSensitivitySuite), 3));
   say("least rejected: of a bisection, in the best of the moments. its measured, of bound: the greatest of that "
       "property over the run as it is. rounding: by how much the run as it is differs from the reference's stages.\n");
   for (const nlohmann::json& scene : document.at("scenes")) {

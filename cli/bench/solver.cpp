@@ -11,12 +11,7 @@ void print_entry(const nlohmann::json& document) {
   say_filled(" of {1e3*substep_seconds:g} ms", entry);
   say_filled("; {precision} precision", document);
   say("{}\n", entry.at("converged") ? "" : "; NO converged solution was found, errors are from the last alternation");
-  say_as_it_is(table_of(entry.at("rows"), {{"acceleration", "{acceleration}"},
-                                           {"iterations", "{iterations}"},
-                                           {"max h", "{max_h:.2g}"},
-                                           {"RMS h", "{rms_h:.2g}"},
-                                           {"energy gap", "{energy_gap:.1e}"},
-                                           {"median ms", "{1e3*seconds/median:.4f}"}}));
+  say_as_it_is(table_of(entry.at("rows"), columns_of(report::kSolverSuite)));
   for (const nlohmann::json& least : entry.at("to_tolerance")) {
     say_filled("  {tolerance_h:g} h: ", document);
     say_filled("{acceleration} after {iterations} iterations, {1e3*seconds:.4f} ms\n", least);

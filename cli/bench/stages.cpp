@@ -51,27 +51,13 @@ void print_last_scene(const json& document) {
   say("\n");
   say_filled("{backend}, {precision} precision, {substeps} substeps × {iterations} iterations, ", rows.front());
   say_filled("acceleration {acceleration}, remove {remove}\n", rows.front());
-  const bool limits = std::any_of(rows.begin(), rows.end(), [](const json& row) { return !row.at("limit").is_null(); });
-  std::vector<std::string> head = {"", "median ms", "least ms", "most ms"};
-  if (limits) head.insert(head.end(), {"MB", "phases", "limit ms", "×"});
-  head.insert(head.end(), {"frames", "paper ms", "error"});
-  Table table(head);
-  for (const json& row : rows) {
-    const auto text = [&](const char* cell) { return io::filled(cell, row); };
-    std::vector<std::string> cells = {text("{what}"), text("{1e3*seconds/median:.4f}"), text("{1e3*seconds/min:.4f}"),
-                                      text("{1e3*seconds/max:.4f}")};
-    if (limits && row.at("limit").is_null()) cells.insert(cells.end(), 4, "");
-    if (limits && !row.at("limit").is_null()) {
-      const bool has_multiple = !row.at("limit").at("multiple").is_null();
-      cells.insert(cells.end(), {text("{1e-6*limit/bytes:.4g}"), text("{limit/phases}"),
-                                 text("{1e3*limit/seconds:.4f}"), has_multiple ? text("{limit/multiple:.2f}") : ""});
-    }
-    cells.insert(cells.end(),
-                 {text("{frames}/{of}"), row.at("paper_seconds").is_null() ? "" : text("{1e3*paper_seconds:.2f}"),
-                  text("{error_text}")});
-    table.add(cells);
+  std::vector<Column> columns = columns_of(report::kStagesSuite);
+  if (std::all_of(rows.begin(), rows.end(), [](const json& row) { return row.at("limit").is_null(); })) {
+    std::erase_if(columns, [](const Column& column) {
+      return column.head.find("limit") != std::string::npos || column.head == "MB" || column.head == "phases";
+    });
   }
-  say_as_it_is(table.text());
+  say_as_it_is(table_of(rows, columns));
   if (scene.contains("topology")) {
     print_failures(rows.front().at("error"));
   } else {

@@ -16,6 +16,7 @@
 #include "cli/table.h"
 #include "cli/terminal.h"
 #include "model/io/filled.h"
+#include "report/suites/columns.h"
 
 namespace cutproof::cli {
 
@@ -47,15 +48,13 @@ void add_suite(CLI::App& command, Work& work, const std::string& what, Suite sui
 // The options that suites which time whole scenes have in common.
 void add_timing(CLI::App& command, benchmarks::TimingOptions& options);
 
-// Of a suite that times whole scenes: a line for each row as soon as it is there, and a table of all, with columns of
-// the suite's own beside the clusters and beside the times.
+// Of a suite that times whole scenes: a line for each row as soon as it is there, and a table of all.
 void print_scene(const nlohmann::json& document);
-void print_scenes(const nlohmann::json& document, const std::vector<Column>& beside_clusters,
-                  const std::vector<Column>& beside_times);
+void print_scenes(const nlohmann::json& document, const report::Suite& suite);
 // The verdicts that fail, of a row's error of whole frames.
 void print_failures(const nlohmann::json& frame_error);
 
-// The cell of a change: "+1.0 %".
-std::string percent(double change);
+// Those columns of a suite that a terminal shows.
+std::vector<Column> columns_of(const report::Suite& suite);
 
 }  // namespace cutproof::cli

@@ -36,7 +36,7 @@ TEST_F(BenchClusters, FollowsTheNumberOfClustersForEveryTauAndWithoutMerging) {
   // The blade arrives in frame 35; without merging, what it splits stays split.
   EXPECT_GT(unmerged.at("growth"), 0);
   EXPECT_EQ(unmerged.at("clusters")[30], unmerged.at("clusters")[0]);
-  for (const char* words : {"τ = 0.25", "no merging", "paper", "+1.0 %", "growth at the end"}) {
+  for (const char* words : {"τ = 0.25", "no merging", "paper", "+1.0", "growth at the end [%]"}) {
     EXPECT_NE(outcome.output.find(words), std::string::npos) << "no '" << words << "' in:\n" << outcome.output;
   }
 }

@@ -4,14 +4,19 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "model/error.h"
+#include "model/io/filled.h"
 #include "report/assets.h"
 #include "report/document_page.h"
+#include "report/suites/columns.h"
 
 namespace cutproof::report::documents_test {
 namespace {
@@ -259,10 +264,76 @@ TEST(ABenchmark, ThatMeasuredNothingOrWasStoppedDoesNotHold) {
   EXPECT_EQ(sheet_of(document, "f").holds, false);
 }
 
+// One description, two places: what stands in it is the same figure, as each of them writes it.
+TEST(AColumn, IsWrittenAsATerminalAndAsAPageDoes) {
+  const RowColumns columns = {{"name", "{name}"},
+                              {"count", "{count}"},
+                              {"median [ms]", "{1e3*seconds/median:.1f}"},
+                              {"here", "{count}", Shown::page},
+                              {"there", "{count} of {count}", Shown::terminal},
+                              {"holds", "{holds}"},
+                              {"made", [](const Field& row) { return row["holds"].flag() ? "so" : std::string(); }}};
+  json row = {{"name", "a"}, {"count", 12345}, {"seconds", {{"median", 0.0123456}}}, {"holds", true}};
+  const auto on_page = [&] {
+    Grid grid = grid_of("", "", columns);
+    const std::string file = "f";
+    add_row(grid, columns, Field{&row, file, "rows[0]", "remedy"});
+    return grid;
+  };
+  const auto on_terminal = [&] {
+    std::vector<std::string> cells;
+    for (const RowColumn& column : columns) cells.push_back(terminal_text(column, row));
+    return cells;
+  };
+  using Cells = std::vector<std::string>;
+  EXPECT_EQ(on_page().rows.at(0).cells, (Cells{"a", "12,345", "12.35", "12,345", "yes", "so"}));
+  EXPECT_EQ(on_terminal(), (Cells{"a", "12345", "12.3", "12345", "12345 of 12345", "yes", "so"}));
+  std::vector<bool> numbers;
+  for (const Column& column : on_page().columns) numbers.push_back(column.is_number);
+  EXPECT_EQ(numbers, (std::vector<bool>{false, true, true, true, false, false}));
+  row["seconds"] = nullptr;
+  row["holds"] = false;
+  EXPECT_EQ(on_page().rows.at(0).cells, (Cells{"a", "12,345", "–", "12,345", "no", "–"}));
+  EXPECT_EQ(on_terminal().at(2), "-");
+  EXPECT_EQ(on_terminal().at(6), "-");
+  row["count"] = -1;
+  row["seconds"] = 3;
+  try {
+    on_page();
+    ADD_FAILURE() << "a count below 0 was read";
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.field(), "rows[0].count");
+  }
+  row.erase("count");
+  EXPECT_THROW(on_page(), InputError) << "a count that is missing";
+}
+
+TEST(AColumn, IsOfFieldsThatArePartOfTheFormat) {
+  std::ifstream file(CUTPROOF_SOURCE "/docs/reference/results_schema.md");
+  const std::string page{std::istreambuf_iterator<char>(file), {}};
+  int named = 0;
+  for (const Suite* const suite : kSuites) {
+    EXPECT_NE(page.find(std::string("## `cutproof bench ") + suite->name + "`"), std::string::npos) << suite->name;
+    for (const RowColumn& column : suite->columns()) {
+      const auto* const text = std::get_if<std::string>(&column.cell);
+      if (!text) continue;
+      io::filled(*text, [&](const std::string& path, double, const std::string&) {
+        std::istringstream names(path);
+        for (std::string name; std::getline(names, name, '/'); ++named)
+          EXPECT_NE(page.find("`" + name + "`"), std::string::npos)
+              << suite->name << ", " << column.head << ": " << name;
+        return std::string();
+      });
+    }
+  }
+  EXPECT_GT(named, 100);
+}
+
 // --- Table 3
 
 json sampling_row(int64_t particles, const json& paper, double ms) {
   json row = stage_row("", ms, nullptr);
+  row.erase("what");
   row["scene"] = "kidney_" + std::to_string(paper.at("particles").get<int64_t>());
   row.update({{"particles", particles},
               {"clusters", 311},
