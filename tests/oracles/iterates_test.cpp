@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "model/at.h"
+#include "oracles/contact.h"
 #include "oracles/iterates/probe.h"
+#include "oracles/noise.h"
 #include "reference_cpu/reference.h"
 #include "tests/oracles/pressed_block.h"
 
@@ -293,6 +295,25 @@ TEST(Iterates, AreNoneWhereTheSceneHasNone) {
   turned.of_state = [](State& state, int32_t) { state.clusters.rotation[0](0, 0) = 0.5; };
   expect_holds(judged(right, scene));
   EXPECT_FALSE(judged(turned, scene).holds);
+}
+
+// Friction takes places farther apart than what would go there: by the bound that candidates are given, and by more than
+// nothing.
+TEST(Contact, TakesPlacesApartByNoMoreThanFrictionWidens) {
+  cutproof::Setup setup = pressed_block().setup;
+  setup.walls = {{2, +1, 0, 1.5}};
+  const Contact contact(setup, nullptr, setup.walls);
+  Noise noise(1);
+  double greatest = 0;
+  for (int k = 0; k < 10'000; ++k) {
+    const Vec3 start = kSpacing * (noise.vector() + Vec3{0, 0, 1}), one = kSpacing * noise.vector();
+    const Vec3 other = one + (1e-3 * kSpacing) * noise.vector();
+    Contact::Found found;
+    const Vec3 apart = contact.place(one, +1, start, found, {}) - contact.place(other, +1, start, found, {});
+    greatest = std::max(greatest, norm(apart) / norm(one - other));
+  }
+  EXPECT_LE(greatest, contact.widened_by_friction() * (1 + 1e-9));
+  EXPECT_GT(greatest, 0.6 * contact.widened_by_friction());
 }
 
 }  // namespace
